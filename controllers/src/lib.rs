@@ -1,0 +1,1 @@
+//! Who drives: the ego stack (ACC, AEB, MIS) and the human drivers.

@@ -1,0 +1,1 @@
+//! What is tested: recordings, lane changes, parameter distributions, sampling designs and the scenario library.

@@ -1,0 +1,69 @@
+//! The boundary between the sensors and the loop.
+
+use closecall_traffic::Track;
+
+use crate::Scene;
+
+/// Whether a group of sensors works.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Health {
+    /// It works.
+    #[default]
+    Ok,
+    /// It works with reduced range or certainty.
+    Degraded,
+    /// It delivers nothing that could be used.
+    Failed,
+}
+
+/// The health of each group of E's sensors.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SensorHealth {
+    /// The radar that looks ahead.
+    pub front: Health,
+    /// The short-range sensors to both sides.
+    pub surround: Health,
+    /// LiDAR and camera that look back.
+    pub rear: Health,
+}
+
+/// All of E's sensors with their processing: from the scene to tracks.
+///
+/// Called once for each control step (25 Hz), in order of time.
+pub trait Perception: Send {
+    /// Measures the scene and returns every track, front, surround and rear.
+    ///
+    /// # Errors
+    /// [`SensorError`] where a model failed; the run then ends as an error, never as a result.
+    fn step(&mut self, scene: &Scene<'_>) -> Result<&[Track], SensorError>;
+
+    /// The health of the sensors after the latest step.
+    fn health(&self) -> SensorHealth;
+}
+
+/// A sensor model that could not go on. The state of the sensors after it is undefined; the run ends.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SensorError {
+    /// A number that has to be finite was not.
+    #[error("failed to measure: {what} is not finite at {time}")]
+    NotFinite {
+        /// The quantity.
+        what: &'static str,
+        /// When.
+        time: closecall_traffic::Time,
+    },
+    /// The density clustering refused its input.
+    #[error("failed to cluster {points} points: {reason}")]
+    Clustering {
+        /// Number of points.
+        points: usize,
+        /// The library's reason.
+        reason: String,
+    },
+    /// The classifier could not be run.
+    #[error("failed to classify: {reason}")]
+    Classifier {
+        /// The library's reason.
+        reason: String,
+    },
+}

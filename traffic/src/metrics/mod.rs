@@ -1,0 +1,1 @@
+//! Criticality metrics in continuous time.

@@ -1,0 +1,120 @@
+//! The sampled values of one concrete scenario.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use serde::de::{DeserializeOwned, IntoDeserializer, value};
+use serde::{Deserialize, Serialize};
+
+use crate::{Choice, ConfigError, Num, ParameterName, Problem, Range};
+
+/// The value of one parameter.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Value {
+    /// A finite number, in the unit that the parameter's name ends with.
+    Number(f64),
+    /// One label of a choice.
+    Label(String),
+}
+
+impl fmt::Display for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(value) => write!(f, "{value}"),
+            Self::Label(label) => f.write_str(label),
+        }
+    }
+}
+
+/// The values of all parameters of one concrete scenario, in the order of their names.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Parameters(BTreeMap<ParameterName, Value>);
+
+impl Parameters {
+    /// Sets one parameter.
+    pub fn insert(&mut self, name: ParameterName, value: Value) {
+        self.0.insert(name, value);
+    }
+
+    /// The value of one parameter.
+    pub fn get(&self, name: &ParameterName) -> Option<&Value> {
+        self.0.get(name)
+    }
+
+    /// All values in the order of their names.
+    pub fn iter(&self) -> impl Iterator<Item = (&ParameterName, &Value)> {
+        self.0.iter()
+    }
+
+    /// The number that `num` stands for, which `key` allows where it lies in `range`.
+    ///
+    /// # Errors
+    /// Names `key` where the parameter is unknown, gives a label, or the number is out of range.
+    pub fn number(&self, num: &Num, key: &str, range: Range) -> Result<f64, ConfigError> {
+        let value = match num {
+            Num::Fixed(value) => *value,
+            Num::Parameter(name) => match self.find(name, key)? {
+                Value::Number(value) => *value,
+                Value::Label(label) => {
+                    let found = format!("the label `{label}`");
+                    let problem = Problem::WrongKind { name: name.clone(), found, needed: "a number" };
+                    return Err(ConfigError::new(key, problem));
+                }
+            },
+        };
+        range.check(value, key)
+    }
+
+    /// The word that `choice` stands for.
+    ///
+    /// # Errors
+    /// Names `key` where the parameter is unknown, gives a number, or a label that `T` does not know.
+    pub fn word<T: DeserializeOwned + Clone>(&self, choice: &Choice<T>, key: &str) -> Result<T, ConfigError> {
+        let name = match choice {
+            Choice::Fixed(word) => return Ok(word.clone()),
+            Choice::Parameter(name) => name,
+        };
+        match self.find(name, key)? {
+            Value::Label(label) => {
+                let word: Result<T, value::Error> = T::deserialize(label.as_str().into_deserializer());
+                word.map_err(|error| {
+                    let problem = Problem::UnknownWord { value: label.clone(), allowed: expected_words(&error) };
+                    ConfigError::new(key, problem)
+                })
+            }
+            Value::Number(value) => {
+                let found = format!("the number {value}");
+                let problem = Problem::WrongKind { name: name.clone(), found, needed: "a label" };
+                Err(ConfigError::new(key, problem))
+            }
+        }
+    }
+
+    fn find(&self, name: &ParameterName, key: &str) -> Result<&Value, ConfigError> {
+        self.get(name).ok_or_else(|| {
+            let known = if self.0.is_empty() {
+                "none".to_owned()
+            } else {
+                self.0.keys().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
+            };
+            ConfigError::new(key, Problem::UnknownParameter { name: name.clone(), known })
+        })
+    }
+}
+
+/// The list of words out of serde's message "unknown variant `x`, expected one of `a`, `b`".
+fn expected_words(error: &value::Error) -> String {
+    let text = error.to_string();
+    match text.split_once("expected ") {
+        Some((_, words)) => words.trim_start_matches("one of ").to_owned(),
+        None => text,
+    }
+}
+
+impl FromIterator<(ParameterName, Value)> for Parameters {
+    fn from_iter<I: IntoIterator<Item = (ParameterName, Value)>>(values: I) -> Self {
+        Self(values.into_iter().collect())
+    }
+}

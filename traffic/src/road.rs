@@ -1,0 +1,259 @@
+//! A straight or gently curved road of parallel lanes.
+//!
+//! ```text
+//!        d = 0 ─────────────────────────────  left edge of the leftmost lane
+//!     lane 1     centre at d = −w/2                     s ──▶
+//!              ── ── ── ── ── ── ── ── ── ──
+//!     lane 2     centre at d = −3w/2
+//!              ─────────────────────────────  right edge at d = −n·w
+//! ```
+//!
+//! The reference line is d = 0: a circle of constant curvature, positive where the road bends to the left.
+
+use std::fmt;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::{Check, ConfigError, Num, Parameters, Problem, Range};
+
+/// The left or the right side.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Side {
+    /// Left, towards positive d.
+    Left,
+    /// Right, towards negative d.
+    Right,
+}
+
+/// A lane, counted from 1 at the left.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(transparent)]
+pub struct Lane(pub u8);
+
+impl fmt::Display for Lane {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.0)
+    }
+}
+
+/// A pose in the Cartesian plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlanePose {
+    /// Position along the road's direction at s = 0 [m].
+    pub x_m: f64,
+    /// Position to the left of that [m].
+    pub y_m: f64,
+    /// Heading, counter-clockwise from +x [rad].
+    pub yaw_rad: f64,
+}
+
+/// A road as a scenario file describes it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct RoadConfig {
+    /// Number of lanes in the direction of travel, 1 to 8.
+    pub lanes: u8,
+    /// Width of each lane [m].
+    #[serde(default = "default_lane_width")]
+    pub lane_width_m: Num,
+    /// Curvature of the left edge, positive to the left [1/m].
+    #[serde(default = "default_curvature")]
+    pub curvature_per_m: Num,
+    /// Speed limit [m/s].
+    #[serde(default = "default_speed_limit")]
+    pub speed_limit_mps: Num,
+    /// The side on which one overtakes.
+    #[serde(default = "default_overtaking_side")]
+    pub overtaking_side: Side,
+    /// Guard rails with posts along both edges.
+    #[serde(default)]
+    pub guard_rails: bool,
+}
+
+fn default_lane_width() -> Num {
+    Num::Fixed(3.75)
+}
+fn default_curvature() -> Num {
+    Num::Fixed(0.0)
+}
+/// 130 km/h.
+fn default_speed_limit() -> Num {
+    Num::Fixed(36.1)
+}
+fn default_overtaking_side() -> Side {
+    Side::Left
+}
+
+/// A checked road.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Road {
+    lanes: u8,
+    lane_width_m: f64,
+    curvature_per_m: f64,
+    speed_limit_mps: f64,
+    overtaking_side: Side,
+    guard_rails: bool,
+}
+
+impl Check for RoadConfig {
+    type Checked = Road;
+
+    fn check(&self, parameters: &Parameters) -> Result<Road, ConfigError> {
+        if !(1..=8).contains(&self.lanes) {
+            let problem = Problem::WrongCount { value: self.lanes.into(), allowed: "a number of lanes from 1 to 8" };
+            return Err(ConfigError::new("lanes", problem));
+        }
+        let number = |num, key, range| parameters.number(num, key, range);
+        Ok(Road {
+            lanes: self.lanes,
+            lane_width_m: number(&self.lane_width_m, "lane-width-m", Range::closed(2.5, 5.0))?,
+            // 400 m is the tightest radius at which the small-angle lane geometry used here still holds.
+            curvature_per_m: number(&self.curvature_per_m, "curvature-per-m", Range::closed(-0.0025, 0.0025))?,
+            speed_limit_mps: number(&self.speed_limit_mps, "speed-limit-mps", Range::above(0.0, 100.0))?,
+            overtaking_side: self.overtaking_side,
+            guard_rails: self.guard_rails,
+        })
+    }
+}
+
+impl Road {
+    /// A straight road of `lanes` lanes (1 to 8), 3.75 m wide, limit 36.1 m/s, overtaking on the left.
+    pub fn straight(lanes: u8) -> Self {
+        Self {
+            lanes: lanes.clamp(1, 8),
+            lane_width_m: 3.75,
+            curvature_per_m: 0.0,
+            speed_limit_mps: 36.1,
+            overtaking_side: Side::Left,
+            guard_rails: false,
+        }
+    }
+
+    /// The same road with another curvature [1/m], kept within ±0.0025.
+    #[must_use]
+    pub fn with_curvature(self, curvature_per_m: f64) -> Self {
+        Self { curvature_per_m: curvature_per_m.clamp(-0.0025, 0.0025), ..self }
+    }
+
+    /// Number of lanes.
+    pub fn lanes(&self) -> u8 {
+        self.lanes
+    }
+
+    /// Width of each lane [m].
+    pub fn lane_width_m(&self) -> f64 {
+        self.lane_width_m
+    }
+
+    /// Curvature of the left edge, positive to the left [1/m].
+    pub fn curvature_per_m(&self) -> f64 {
+        self.curvature_per_m
+    }
+
+    /// Speed limit [m/s].
+    pub fn speed_limit_mps(&self) -> f64 {
+        self.speed_limit_mps
+    }
+
+    /// The side on which one overtakes.
+    pub fn overtaking_side(&self) -> Side {
+        self.overtaking_side
+    }
+
+    /// True where guard rails with posts stand along both edges.
+    pub fn has_guard_rails(&self) -> bool {
+        self.guard_rails
+    }
+
+    /// Lateral position of a lane's centre [m], negative.
+    pub fn lane_centre_m(&self, lane: Lane) -> f64 {
+        -(f64::from(lane.0) - 0.5) * self.lane_width_m
+    }
+
+    /// The lane in which the lateral position `d_m` lies; beyond an edge, the lane at that edge.
+    pub fn lane_at(&self, d_m: f64) -> Lane {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 1..=8 before the cast")]
+        let lane = ((-d_m / self.lane_width_m).floor() + 1.0).clamp(1.0, f64::from(self.lanes)) as u8;
+        Lane(lane)
+    }
+
+    /// The lane beside `lane`, where the road has one.
+    pub fn beside(&self, lane: Lane, side: Side) -> Option<Lane> {
+        match side {
+            Side::Left => (lane.0 > 1).then(|| Lane(lane.0 - 1)),
+            Side::Right => (lane.0 < self.lanes).then(|| Lane(lane.0 + 1)),
+        }
+    }
+
+    /// Lateral position of the road's right edge [m], negative.
+    pub fn right_edge_m(&self) -> f64 {
+        -f64::from(self.lanes) * self.lane_width_m
+    }
+
+    /// The pose in the plane of a point at `s_m`, `d_m` with `heading_rad` relative to the road.
+    pub fn plane_pose(&self, s_m: f64, d_m: f64, heading_rad: f64) -> PlanePose {
+        let curvature = self.curvature_per_m;
+        if curvature == 0.0 {
+            return PlanePose { x_m: s_m, y_m: d_m, yaw_rad: heading_rad };
+        }
+        let angle = curvature * s_m;
+        let (sin, cos) = angle.sin_cos();
+        PlanePose {
+            x_m: sin / curvature - d_m * sin,
+            y_m: (1.0 - cos) / curvature + d_m * cos,
+            yaw_rad: angle + heading_rad,
+        }
+    }
+
+    /// The road coordinates (s, d) [m] of a point in the plane; unique within half a turn of s = 0.
+    pub fn road_position_m(&self, x_m: f64, y_m: f64) -> (f64, f64) {
+        let curvature = self.curvature_per_m;
+        if curvature == 0.0 {
+            return (x_m, y_m);
+        }
+        // Distance and bearing from the centre of the circle at (0, 1/κ).
+        let radius = 1.0 / curvature;
+        let (to_x, to_y) = (x_m, y_m - radius);
+        let angle = if curvature > 0.0 { to_x.atan2(-to_y) } else { -to_x.atan2(to_y) };
+        (angle * radius, radius - to_x.hypot(to_y) * radius.signum())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn lanes_are_counted_from_the_left() {
+        let road = Road::straight(3);
+        assert_eq!(road.lane_at(-0.1), Lane(1));
+        assert_eq!(road.lane_at(-3.76), Lane(2));
+        assert_eq!(road.lane_at(-99.0), Lane(3));
+        assert_eq!(road.lane_at(1.0), Lane(1));
+        assert_eq!(road.lane_centre_m(Lane(2)), -5.625);
+        assert_eq!(road.beside(Lane(1), Side::Left), None);
+        assert_eq!(road.beside(Lane(2), Side::Left), Some(Lane(1)));
+        assert_eq!(road.beside(Lane(3), Side::Right), None);
+    }
+
+    proptest! {
+        #[test]
+        fn road_and_plane_are_inverse(s in -500.0..500.0, d in -12.0..2.0, curvature in -0.0025..0.0025) {
+            let road = Road::straight(3).with_curvature(curvature);
+            let pose = road.plane_pose(s, d, 0.0);
+            let (back_s, back_d) = road.road_position_m(pose.x_m, pose.y_m);
+            prop_assert!((back_s - s).abs() < 1e-6, "{back_s} {s}");
+            prop_assert!((back_d - d).abs() < 1e-6, "{back_d} {d}");
+        }
+
+        #[test]
+        fn a_vanishing_curvature_is_straight(s in -500.0..500.0, d in -12.0..2.0) {
+            let bent = Road::straight(3).with_curvature(1e-9).plane_pose(s, d, 0.0);
+            prop_assert!((bent.x_m - s).abs() < 1e-3 && (bent.y_m - d).abs() < 1e-3);
+        }
+    }
+}

@@ -1,0 +1,186 @@
+//! Vehicles: what they are, and the state they are in.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::{Check, Choice, ConfigError, Num, Parameters, Range};
+
+/// The kind of a vehicle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum VehicleClass {
+    /// A passenger car.
+    Car,
+    /// A truck: tractor and trailer.
+    Truck,
+    /// A motorcycle with its rider.
+    Motorcycle,
+}
+
+impl VehicleClass {
+    /// Every class, in the order of class scores.
+    pub const ALL: [Self; 3] = [Self::Car, Self::Truck, Self::Motorcycle];
+
+    /// The class's name as it stands in files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Car => "car",
+            Self::Truck => "truck",
+            Self::Motorcycle => "motorcycle",
+        }
+    }
+
+    /// Typical dimensions of this class.
+    pub const fn typical_dimensions(self) -> Dimensions {
+        match self {
+            Self::Car => Dimensions { length_m: 4.6, width_m: 1.85, height_m: 1.5 },
+            Self::Truck => Dimensions { length_m: 16.5, width_m: 2.55, height_m: 4.0 },
+            Self::Motorcycle => Dimensions { length_m: 2.2, width_m: 0.8, height_m: 1.6 },
+        }
+    }
+
+    /// Typical mass of this class, laden [kg].
+    pub const fn typical_mass_kg(self) -> f64 {
+        match self {
+            Self::Car => 1_600.0,
+            Self::Truck => 30_000.0,
+            Self::Motorcycle => 300.0,
+        }
+    }
+}
+
+/// The size of a vehicle's box.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Dimensions {
+    /// Length along the vehicle [m].
+    pub length_m: f64,
+    /// Width across it [m].
+    pub width_m: f64,
+    /// Height above the ground [m].
+    pub height_m: f64,
+}
+
+/// What the sensors see of a vehicle beside its shape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Appearance {
+    /// Diffuse reflectivity of the paint at the LiDAR's wavelength [1], 0 to 1.
+    pub paint_reflectivity: f64,
+    /// Colour of the paint, sRGB.
+    pub paint_rgb: [u8; 3],
+    /// Which of the body shapes of its class; taken modulo their number.
+    pub body_shape: u8,
+}
+
+/// A vehicle as a scenario file describes it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct VehicleConfig {
+    /// Car, truck or motorcycle.
+    pub class: Choice<VehicleClass>,
+    /// Length [m]; typical of the class where absent.
+    pub length_m: Option<Num>,
+    /// Width [m]; typical of the class where absent.
+    pub width_m: Option<Num>,
+    /// Height [m]; typical of the class where absent.
+    pub height_m: Option<Num>,
+    /// Mass [kg]; typical of the class where absent.
+    pub mass_kg: Option<Num>,
+    /// Reflectivity of the paint at the LiDAR's wavelength [1]; 0.5 where absent.
+    pub paint_reflectivity: Option<Num>,
+    /// Colour of the paint, sRGB; grey where absent.
+    pub paint_rgb: Option<[u8; 3]>,
+    /// Which of the body shapes of its class; the first where absent.
+    pub body_shape: Option<u8>,
+}
+
+/// A checked vehicle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Vehicle {
+    /// Its kind.
+    pub class: VehicleClass,
+    /// Its size.
+    pub dimensions: Dimensions,
+    /// Its mass [kg].
+    pub mass_kg: f64,
+    /// What sensors see of it.
+    pub appearance: Appearance,
+}
+
+impl Vehicle {
+    /// A vehicle with everything typical of its class.
+    pub const fn typical(class: VehicleClass) -> Self {
+        Self {
+            class,
+            dimensions: class.typical_dimensions(),
+            mass_kg: class.typical_mass_kg(),
+            appearance: Appearance { paint_reflectivity: 0.5, paint_rgb: [128, 128, 132], body_shape: 0 },
+        }
+    }
+}
+
+impl Check for VehicleConfig {
+    type Checked = Vehicle;
+
+    fn check(&self, parameters: &Parameters) -> Result<Vehicle, ConfigError> {
+        let typical = Vehicle::typical(parameters.word(&self.class, "class")?);
+        let or_typical = |num: &Option<Num>, key, range, typical| match num {
+            Some(num) => parameters.number(num, key, range),
+            None => Ok(typical),
+        };
+        let size = typical.dimensions;
+        let look = typical.appearance;
+        Ok(Vehicle {
+            class: typical.class,
+            dimensions: Dimensions {
+                length_m: or_typical(&self.length_m, "length-m", Range::closed(1.0, 26.0), size.length_m)?,
+                width_m: or_typical(&self.width_m, "width-m", Range::closed(0.4, 3.0), size.width_m)?,
+                height_m: or_typical(&self.height_m, "height-m", Range::closed(0.8, 4.5), size.height_m)?,
+            },
+            mass_kg: or_typical(&self.mass_kg, "mass-kg", Range::closed(100.0, 60_000.0), typical.mass_kg)?,
+            appearance: Appearance {
+                paint_reflectivity: or_typical(
+                    &self.paint_reflectivity,
+                    "paint-reflectivity",
+                    Range::above(0.0, 1.0),
+                    look.paint_reflectivity,
+                )?,
+                paint_rgb: self.paint_rgb.unwrap_or(look.paint_rgb),
+                body_shape: self.body_shape.unwrap_or(look.body_shape),
+            },
+        })
+    }
+}
+
+/// The direction indicator.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Indicator {
+    /// Not blinking.
+    #[default]
+    Off,
+    /// Blinking to the left.
+    Left,
+    /// Blinking to the right.
+    Right,
+}
+
+/// Where a vehicle is and how it moves, in the road frame. The reference point is the centre of its box.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct VehicleState {
+    /// Position along the road [m].
+    pub s_m: f64,
+    /// Lateral position, positive to the left [m].
+    pub d_m: f64,
+    /// Heading relative to the road, positive to the left [rad].
+    pub heading_rad: f64,
+    /// Speed along the heading, 0 or more [m/s].
+    pub speed_mps: f64,
+    /// Acceleration along the heading [m/s²].
+    pub acceleration_mps2: f64,
+    /// Yaw rate, positive to the left [rad/s].
+    pub yaw_rate_radps: f64,
+    /// True while the brake light is on.
+    pub brake_light: bool,
+    /// The direction indicator.
+    pub indicator: Indicator,
+}
