@@ -6,8 +6,10 @@
 //!            └ object   range, noise, latency, field of view (front radar, surround; rear as a simple stand-in)  ┘
 //! ```
 
+mod detection;
 mod perception;
 mod scene;
 
+pub use detection::{Detection, Extent};
 pub use perception::{Health, Perception, SensorError, SensorHealth};
 pub use scene::{Scene, SceneVehicle};
