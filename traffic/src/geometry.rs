@@ -1,1 +1,0 @@
-//! Plane geometry of vehicles: oriented boxes.
