@@ -6,10 +6,21 @@
 //!            └ object   range, noise, latency, field of view (front radar, surround; rear as a simple stand-in)  ┘
 //! ```
 
+mod config;
 mod detection;
+mod ego_frame;
+mod ground_truth;
+mod object;
 mod perception;
 mod scene;
+mod surroundings;
+#[cfg(test)]
+mod testing;
+mod tracking;
 
+pub use config::{SensorMode, Sensors, SensorsConfig};
 pub use detection::{Detection, Extent};
-pub use perception::{Health, Perception, SensorError, SensorHealth};
+pub use ground_truth::GroundTruth;
+pub use object::{NoiseKey, ObjectPerception, ObjectSensorConfig, ObjectSensorModel};
+pub use perception::{Health, Perception, SCAN_PERIOD, SensorError, SensorHealth};
 pub use scene::{Scene, SceneVehicle};

@@ -1,8 +1,11 @@
 //! The boundary between the sensors and the loop.
 
-use closecall_traffic::Track;
+use closecall_traffic::{Time, Track};
 
 use crate::Scene;
+
+/// Time from one control step, and one scan, to the next: 25 Hz.
+pub const SCAN_PERIOD: Time = Time::from_ms(40);
 
 /// Whether a group of sensors works.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -50,7 +53,7 @@ pub enum SensorError {
         /// The quantity.
         what: &'static str,
         /// When.
-        time: closecall_traffic::Time,
+        time: Time,
     },
     /// The density clustering refused its input.
     #[error("failed to cluster {points} points: {reason}")]

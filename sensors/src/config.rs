@@ -1,0 +1,130 @@
+//! The `[sensors]` table: which model of perception, and its numbers.
+
+use closecall_traffic::{Check, Choice, ConfigError, Parameters};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::{GroundTruth, NoiseKey, ObjectPerception, ObjectSensorConfig, ObjectSensorModel, Perception, SensorError};
+
+/// How much of the sensors is simulated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum SensorMode {
+    /// Object-level sensors all round: fast.
+    #[default]
+    Object,
+    /// Perfect tracks.
+    GroundTruth,
+}
+
+/// The sensors as a scenario file describes them. Everything may be left out.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
+pub struct SensorsConfig {
+    /// How much of the sensors is simulated; `object` where absent.
+    pub mode: Choice<SensorMode>,
+    /// The radar that looks ahead.
+    pub front_radar: ObjectSensorConfig,
+    /// The short-range sensors all round.
+    pub surround: ObjectSensorConfig,
+    /// The object-level stand-in for the rear LiDAR and camera.
+    pub rear_object: ObjectSensorConfig,
+}
+
+impl Default for SensorsConfig {
+    fn default() -> Self {
+        Self {
+            mode: Choice::Fixed(SensorMode::default()),
+            front_radar: ObjectSensorConfig::default(),
+            surround: ObjectSensorConfig::default(),
+            rear_object: ObjectSensorConfig::default(),
+        }
+    }
+}
+
+/// Checked sensors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sensors {
+    mode: SensorMode,
+    /// Front, surround, rear.
+    object: [ObjectSensorModel; 3],
+}
+
+impl Check for SensorsConfig {
+    type Checked = Sensors;
+
+    fn check(&self, parameters: &Parameters) -> Result<Sensors, ConfigError> {
+        let named = |key: &'static str| move |error: ConfigError| error.within(key);
+        Ok(Sensors {
+            mode: parameters.word(&self.mode, "mode")?,
+            object: [
+                self.front_radar.check_front_radar(parameters).map_err(named("front-radar"))?,
+                self.surround.check_surround(parameters).map_err(named("surround"))?,
+                self.rear_object.check_rear_object(parameters).map_err(named("rear-object"))?,
+            ],
+        })
+    }
+}
+
+impl Sensors {
+    /// How much of the sensors is simulated.
+    pub fn mode(&self) -> SensorMode {
+        self.mode
+    }
+
+    /// The same sensors, simulated to another depth, as the command line may ask.
+    #[must_use]
+    pub fn with_mode(self, mode: SensorMode) -> Self {
+        Self { mode, ..self }
+    }
+
+    /// The perception of one run, with random streams of its own under `key`.
+    ///
+    /// # Errors
+    /// [`SensorError`] where a model cannot be set up.
+    pub fn build(&self, key: &NoiseKey) -> Result<Box<dyn Perception>, SensorError> {
+        Ok(match self.mode {
+            SensorMode::GroundTruth => Box::new(GroundTruth::new()),
+            SensorMode::Object => Box::new(ObjectPerception::new(self.object, key)),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn check(text: &str) -> Result<Sensors, ConfigError> {
+        toml::from_str::<SensorsConfig>(text).expect("well-formed").check(&Parameters::default())
+    }
+
+    #[test]
+    fn an_empty_table_is_the_default() {
+        assert_eq!(check("").unwrap(), SensorsConfig::default().check(&Parameters::default()).unwrap());
+        assert_eq!(check("mode = \"ground-truth\"").unwrap().mode(), SensorMode::GroundTruth);
+    }
+
+    #[test]
+    fn errors_name_the_key() {
+        let error = check("rear-object = { range-m = -1.0 }").unwrap_err().to_string();
+        assert_eq!(error, "`rear-object.range-m` is -1, but a number above 0 and up to 500 is needed");
+        let error = check("front-radar = { confirm-hits = 4, confirm-window = 3 }").unwrap_err().to_string();
+        assert_eq!(error, "`front-radar.confirm-hits` is 4, but a number from 1 to `confirm-window` is needed");
+        let error = check("surround = { half-angle-deg = 30 }").unwrap_err().to_string();
+        assert_eq!(error, "`surround.half-angle-deg` contradicts `surround`: the surround sensors look all round");
+    }
+
+    #[test]
+    fn unknown_keys_are_refused() {
+        assert!(toml::from_str::<SensorsConfig>("rear-object = { rnage-m = 1.0 }").is_err());
+        assert!(toml::from_str::<SensorsConfig>("rear-object = { range-m = nan }").is_err());
+    }
+
+    #[test]
+    fn text_survives_a_round_trip() {
+        let config: SensorsConfig =
+            toml::from_str("mode = \"object\"\nrear-object = { range-m = \"$range-m\" }").unwrap();
+        let again: SensorsConfig = toml::from_str(&toml::to_string(&config).unwrap()).unwrap();
+        assert_eq!(again, config);
+    }
+}

@@ -1,0 +1,128 @@
+//! Perception without error: what the controller would do if it saw everything as it is.
+//!
+//! Used to tell faults of the controller from faults of the sensors. The tracks are exact, at once confirmed, of
+//! certain class, and limited only in distance, so that a function that engages on "a confirmed track behind" does not
+//! engage on a vehicle a kilometre away.
+
+use closecall_traffic::{ClassScores, Source, Track, TrackId, TrackStatus};
+use nalgebra::{Matrix4, Vector4};
+
+use crate::surroundings::{Other, survey};
+use crate::{Perception, Scene, SensorError, SensorHealth};
+
+/// Distance, centre to centre along E's axis, up to which vehicles are reported [m]: the nominal range of the rear LiDAR
+/// and more than that of the front radar.
+const RANGE_M: f64 = 200.0;
+
+/// Perfect tracks of every vehicle within 200 m ahead and behind.
+///
+/// The source follows from the position: wholly ahead of E is front, wholly behind is rear, alongside is surround. The
+/// number of a track is the actor's place in the scenario and stays the same when the source changes.
+#[derive(Clone, Debug, Default)]
+pub struct GroundTruth {
+    others: Vec<Other>,
+    tracks: Vec<Track>,
+}
+
+impl GroundTruth {
+    /// Perfect perception.
+    pub fn new() -> Self {
+        Self::default()
+    }
+}
+
+fn source(other: &Other, ego_length_m: f64) -> Source {
+    let alongside_m = 0.5 * (ego_length_m + other.length_m);
+    if other.x_m >= alongside_m {
+        Source::Front
+    } else if other.x_m <= -alongside_m {
+        Source::Rear
+    } else {
+        Source::Surround
+    }
+}
+
+impl Perception for GroundTruth {
+    fn step(&mut self, scene: &Scene<'_>) -> Result<&[Track], SensorError> {
+        let frame = survey(scene, &mut self.others)?;
+        self.tracks.clear();
+        for other in self.others.iter().filter(|other| other.x_m.abs() <= RANGE_M) {
+            #[expect(clippy::cast_possible_truncation, reason = "a scenario has far fewer than 2^32 actors")]
+            let id = TrackId(other.actor as u32);
+            self.tracks.push(Track {
+                id,
+                source: source(other, scene.ego.vehicle.dimensions.length_m),
+                status: TrackStatus::Confirmed,
+                time: scene.time,
+                state: Vector4::new(other.x_m, other.y_m, other.speed_mps * other.cos, other.speed_mps * other.sin),
+                covariance: Matrix4::zeros(),
+                heading_rad: other.heading_rad,
+                length_m: other.length_m,
+                width_m: other.width_m,
+                class: ClassScores::certain(other.class),
+                existence: 1.0,
+                lane: frame.lane_probabilities(other.road_m[1], 0.0),
+            });
+        }
+        Ok(&self.tracks)
+    }
+
+    fn health(&self) -> SensorHealth {
+        SensorHealth::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use closecall_traffic::{Environment, Road, Time, VehicleClass};
+
+    use super::*;
+    use crate::testing::{scene_vehicle, with_speed};
+
+    #[test]
+    fn sources_follow_the_position() {
+        let road = Road::straight(3);
+        let ego = scene_vehicle(0, VehicleClass::Car, 500.0, -5.625);
+        let others = [
+            scene_vehicle(1, VehicleClass::Car, 530.0, -5.625),
+            scene_vehicle(2, VehicleClass::Truck, 509.0, -1.875),
+            scene_vehicle(3, VehicleClass::Motorcycle, 440.0, -5.0),
+            scene_vehicle(4, VehicleClass::Car, 290.0, -5.0),
+        ];
+        let scene = Scene { time: Time::ZERO, road: &road, environment: &Environment::CLEAR_DAY, ego, others: &others };
+        let mut perception = GroundTruth::new();
+        let tracks = perception.step(&scene).unwrap();
+        let seen: Vec<_> = tracks.iter().map(|track| (track.id.0, track.source, track.lane)).collect();
+        let expected = [
+            (1, Source::Front, [0.0, 1.0, 0.0]),
+            (2, Source::Surround, [1.0, 0.0, 0.0]),
+            (3, Source::Rear, [0.0, 1.0, 0.0]),
+        ];
+        assert_eq!(seen, expected);
+        assert_eq!(tracks[2].class.best_vehicle_class(), VehicleClass::Motorcycle);
+    }
+
+    #[test]
+    fn a_follower_in_a_bend_is_in_the_own_lane() {
+        let road = Road::straight(3).with_curvature(0.002);
+        let ego = with_speed(scene_vehicle(0, VehicleClass::Car, 500.0, -5.625), 30.0);
+        let others = [with_speed(scene_vehicle(1, VehicleClass::Car, 400.0, -5.625), 36.0)];
+        let scene = Scene { time: Time::ZERO, road: &road, environment: &Environment::CLEAR_DAY, ego, others: &others };
+        let mut perception = GroundTruth::new();
+        let track = &perception.step(&scene).unwrap()[0];
+        // 100 m back on a circle of 500 m: seen 9.9 m to the left, turned by 0.2 rad against E.
+        assert!(track.y_m() > 9.0, "{}", track.y_m());
+        assert!((track.heading_rad + 0.2).abs() < 1e-9);
+        assert!((track.vx_mps().hypot(track.vy_mps()) - 36.0).abs() < 1e-9);
+        assert_eq!(track.lane, [0.0, 1.0, 0.0]);
+    }
+
+    #[test]
+    fn a_state_that_is_not_finite_is_an_error() {
+        let road = Road::straight(3);
+        let ego = scene_vehicle(0, VehicleClass::Car, 500.0, -5.625);
+        let others = [with_speed(scene_vehicle(1, VehicleClass::Car, 400.0, -5.625), f64::NAN)];
+        let scene = Scene { time: Time::ZERO, road: &road, environment: &Environment::CLEAR_DAY, ego, others: &others };
+        assert!(matches!(GroundTruth::new().step(&scene), Err(SensorError::NotFinite { .. })));
+    }
+}

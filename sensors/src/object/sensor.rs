@@ -1,0 +1,250 @@
+//! One object-level sensor: measures each vehicle in view, filters, confirms, and reports after its latency.
+//!
+//! ```text
+//!  truth ─▶ in view? ─▶ + noise, lost? ─▶ filter (road axes) ─▶ lifecycle ─▶ wait L steps ─▶ predict by L ─▶ E's frame
+//! ```
+//!
+//! Which vehicle a measurement belongs to is taken as known: an object-level sensor models what a sensor with its own
+//! tracking delivers, and confusing two vehicles is left to the full LiDAR chain.
+
+use closecall_traffic::{ClassScores, Source, Track, TrackId, VehicleClass};
+use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
+
+use super::config::{MAX_LATENCY_STEPS, ObjectSensorModel};
+use super::filter::{AxisEstimate, AxisFilter, AxisProcess};
+use super::noise::{NoiseKey, ScanErrors, TargetNoise};
+use super::visibility::{View, Visibility};
+use crate::ego_frame::EgoFrame;
+use crate::surroundings::Other;
+use crate::tracking::lifecycle::Lifecycle;
+use crate::{SCAN_PERIOD, Scene};
+
+/// Spectral density of the white acceleration along the road [m²/s³]: speed is unsure by 0.7 m/s after 1 s, as of a
+/// driver who follows traffic (assumption).
+const ALONG_MANOEUVRE_M2PS3: f64 = 0.5;
+/// The same across the road [m²/s³]: a lane change of 6.8 s peaks at about 0.5 m/s² (assumption).
+const ACROSS_MANOEUVRE_M2PS3: f64 = 0.1;
+/// Speed of a vehicle not yet measured: E's own, within this [m/s].
+const SPEED_PRIOR_SD_MPS: f64 = 10.0;
+/// Lateral speed of a vehicle not yet measured [m/s].
+const LATERAL_SPEED_PRIOR_SD_MPS: f64 = 0.7;
+/// A track is confirmed only once its speed is known to within this [m/s]: nobody could act on it before.
+const SETTLED_SPEED_SD_MPS: f64 = 1.0;
+/// Below this speed the direction of motion says nothing about the heading [m/s].
+const HEADING_SPEED_MPS: f64 = 3.0;
+
+/// What the sensor knows of a vehicle at the end of one scan.
+#[derive(Clone, Copy, Debug)]
+struct Report {
+    id: TrackId,
+    lifecycle: Lifecycle,
+    along: AxisEstimate,
+    across: AxisEstimate,
+}
+
+/// One vehicle, seen or not.
+#[derive(Clone, Debug)]
+struct Target {
+    actor: usize,
+    noise: TargetNoise,
+    filters: Option<(TrackId, Lifecycle, [AxisFilter; 2])>,
+    /// Reports that still wait, at the place of their step modulo the length.
+    waiting: [Option<Report>; MAX_LATENCY_STEPS + 1],
+}
+
+/// The tracks of all sensors of E, and the next free number.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct TrackList {
+    pub(crate) tracks: Vec<Track>,
+    next_id: u32,
+}
+
+impl TrackList {
+    /// A number that no track of this run has had.
+    pub(crate) fn new_id(&mut self) -> TrackId {
+        let id = TrackId(self.next_id);
+        self.next_id += 1;
+        id
+    }
+}
+
+/// What one scan looks at.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ScanView<'a> {
+    pub(crate) scene: &'a Scene<'a>,
+    pub(crate) frame: &'a EgoFrame<'a>,
+    pub(crate) others: &'a [Other],
+}
+
+/// An object-level sensor with all that it remembers.
+#[derive(Clone, Debug)]
+pub(crate) struct ObjectSensor {
+    model: ObjectSensorModel,
+    view: View,
+    source: Source,
+    channel: &'static str,
+    key: NoiseKey,
+    along: AxisProcess,
+    across: AxisProcess,
+    visibility: Visibility,
+    targets: Vec<Target>,
+    step: usize,
+}
+
+impl ObjectSensor {
+    pub(crate) fn front_radar(model: ObjectSensorModel, key: &NoiseKey) -> Self {
+        Self::new(model, View::Ahead, Source::Front, "front-radar", key)
+    }
+
+    pub(crate) fn surround(model: ObjectSensorModel, key: &NoiseKey) -> Self {
+        Self::new(model, View::Around, Source::Surround, "surround", key)
+    }
+
+    pub(crate) fn rear_object(model: ObjectSensorModel, key: &NoiseKey) -> Self {
+        Self::new(model, View::Behind, Source::Rear, "rear-object", key)
+    }
+
+    fn new(model: ObjectSensorModel, view: View, source: Source, channel: &'static str, key: &NoiseKey) -> Self {
+        let process = |manoeuvre_m2ps3| AxisProcess {
+            step_s: SCAN_PERIOD.s(),
+            manoeuvre_m2ps3,
+            drift_sd_m: model.drift_sd_m,
+            drift_decay: model.drift_decay,
+        };
+        Self {
+            model,
+            view,
+            source,
+            channel,
+            key: key.clone(),
+            along: process(ALONG_MANOEUVRE_M2PS3),
+            across: process(ACROSS_MANOEUVRE_M2PS3),
+            visibility: Visibility::default(),
+            targets: Vec::new(),
+            step: 0,
+        }
+    }
+
+    /// Measures one scene and appends the tracks that are due to `list`.
+    pub(crate) fn scan(&mut self, view: &ScanView<'_>, list: &mut TrackList) {
+        let size = view.scene.ego.vehicle.dimensions;
+        let ego_m = [size.length_m, size.width_m];
+        self.visibility.look(self.view, view.others, ego_m);
+        for other in view.others {
+            let place = self.place_of(other.actor);
+            let errors = self.targets[place].noise.next(&self.model);
+            let in_view = self.visibility.sees(self.view, other, &self.model, ego_m);
+            self.follow(place, other, (in_view, errors), view.scene.ego.state.speed_mps, list);
+            self.report(place, other, view, list);
+        }
+        self.step += 1;
+    }
+
+    /// Where the vehicle `actor` is kept; makes room for one that is new.
+    fn place_of(&mut self, actor: usize) -> usize {
+        self.targets.iter().position(|target| target.actor == actor).unwrap_or_else(|| {
+            let noise = TargetNoise::new(&self.key, self.channel, actor, &self.model);
+            self.targets.push(Target { actor, noise, filters: None, waiting: [None; MAX_LATENCY_STEPS + 1] });
+            self.targets.len() - 1
+        })
+    }
+
+    /// Predicts and corrects the filters of one vehicle.
+    fn follow(
+        &mut self,
+        place: usize,
+        other: &Other,
+        (in_view, errors): (bool, ScanErrors),
+        ego_speed_mps: f64,
+        list: &mut TrackList,
+    ) {
+        let (model, target) = (&self.model, &mut self.targets[place]);
+        if let Some((_, _, [along, across])) = &mut target.filters {
+            along.predict(&self.along);
+            across.predict(&self.across);
+        }
+        if in_view && !errors.is_lost {
+            let measured_m = [other.road_m[0] + errors.position_m[0], other.road_m[1] + errors.position_m[1]];
+            let is_new = target.filters.is_none();
+            let (_, lifecycle, [along, across]) = target.filters.get_or_insert_with(|| {
+                let along = AxisFilter::prior(measured_m[0], ego_speed_mps, SPEED_PRIOR_SD_MPS, model.drift_sd_m);
+                let across = AxisFilter::prior(measured_m[1], 0.0, LATERAL_SPEED_PRIOR_SD_MPS, model.drift_sd_m);
+                (list.new_id(), Lifecycle::first_hit(&model.rules), [along, across])
+            });
+            along.measure_position(measured_m[0], model.white_sd_m[0]);
+            across.measure_position(measured_m[1], model.white_sd_m[1]);
+            if let Some(sd_mps) = model.speed_sd_mps {
+                along.measure_speed(other.road_mps[0] + errors.speed_mps, sd_mps);
+            }
+            if !is_new {
+                lifecycle.hit(&model.rules, along.speed_sd_mps() <= SETTLED_SPEED_SD_MPS);
+            }
+        } else if let Some((_, lifecycle, _)) = &mut target.filters {
+            if in_view {
+                lifecycle.miss(&model.rules)
+            } else {
+                lifecycle.unseen()
+            }
+            if lifecycle.is_dead(&model.rules) {
+                target.filters = None;
+            }
+        }
+    }
+
+    /// Puts what is known now in the queue, and appends what was put there `latency_steps` ago.
+    fn report(&mut self, place: usize, other: &Other, view: &ScanView<'_>, list: &mut TrackList) {
+        let latency_s = self.model.latency_steps as f64 * SCAN_PERIOD.s();
+        let target = &mut self.targets[place];
+        let length = target.waiting.len();
+        target.waiting[self.step % length] = target.filters.map(|(id, lifecycle, [along, across])| Report {
+            id,
+            lifecycle,
+            along: along.estimate(latency_s, ALONG_MANOEUVRE_M2PS3),
+            across: across.estimate(latency_s, ACROSS_MANOEUVRE_M2PS3),
+        });
+        // Before the first report is due, the place still holds none.
+        let due = target.waiting[(self.step + length - self.model.latency_steps) % length];
+        if let Some(report) = due {
+            list.tracks.push(self.track(&report, other, view));
+        }
+    }
+
+    /// A report in road axes as a track in E's frame.
+    fn track(&self, report: &Report, other: &Other, view: &ScanView<'_>) -> Track {
+        let (along, across) = (&report.along, &report.across);
+        let point = view.frame.point(along.position_m, across.position_m);
+        let (sin, cos) = point.road_yaw_rad.sin_cos();
+        let stretch = 1.0 - view.scene.road.curvature_per_m() * across.position_m;
+        let to_ego = Matrix2::new(cos * stretch, -sin, sin * stretch, cos);
+        let velocity_mps = to_ego * Vector2::new(along.speed_mps, across.speed_mps);
+        let turned = |along: f64, across: f64| to_ego * Matrix2::new(along, 0.0, 0.0, across) * to_ego.transpose();
+        let cross = turned(along.position_speed_m2ps, across.position_speed_m2ps);
+        let mut covariance = Matrix4::zeros();
+        covariance.fixed_view_mut::<2, 2>(0, 0).copy_from(&turned(along.position_m2, across.position_m2));
+        covariance.fixed_view_mut::<2, 2>(0, 2).copy_from(&cross);
+        covariance.fixed_view_mut::<2, 2>(2, 0).copy_from(&cross);
+        covariance.fixed_view_mut::<2, 2>(2, 2).copy_from(&turned(along.speed_m2ps2, across.speed_m2ps2));
+        let moves = along.speed_mps > HEADING_SPEED_MPS;
+        Track {
+            id: report.id,
+            source: self.source,
+            status: report.lifecycle.status(),
+            time: view.scene.time,
+            state: Vector4::new(point.x_m, point.y_m, velocity_mps.x, velocity_mps.y),
+            covariance,
+            heading_rad: if moves { velocity_mps.y.atan2(velocity_mps.x) } else { point.road_yaw_rad },
+            length_m: other.length_m,
+            width_m: other.width_m,
+            class: class_scores(other.class, self.model.class_confidence),
+            existence: report.lifecycle.existence(),
+            lane: view.frame.lane_probabilities(across.position_m, across.position_m2.sqrt()),
+        }
+    }
+}
+
+/// `confidence` for the true class, the rest in equal shares for the three others.
+fn class_scores(class: VehicleClass, confidence: f64) -> ClassScores {
+    let mut scores = [(1.0 - confidence) / 3.0; 4];
+    scores[class as usize] = confidence;
+    ClassScores(scores)
+}

@@ -1,0 +1,3 @@
+//! From detections to tracks: association, filter, lifecycle.
+
+pub(crate) mod lifecycle;
