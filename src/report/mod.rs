@@ -1,0 +1,9 @@
+//! What a run and a campaign leave behind: files to look at, to keep, and to gate on.
+
+pub mod junit;
+pub mod outcomes;
+pub mod rerun;
+pub mod trace;
+mod write;
+
+pub use write::{WriteError, write_atomically};

@@ -1,0 +1,202 @@
+//! What happens to a vehicle on the way: a trigger, and what it sets off.
+
+use closecall_traffic::{ActorId, Check, ConfigError, Num, Parameters, Range, Time, Vehicle, VehicleState};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::config::ActorConfig;
+use super::placement::find_actor;
+
+/// An event of a scenario file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct EventConfig {
+    /// Name, for the log.
+    pub id: ActorId,
+    /// When it sets in. It sets in once.
+    pub when: TriggerConfig,
+    /// What it does.
+    pub then: EffectConfig,
+}
+
+/// When an event sets in.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum TriggerConfig {
+    /// At a time after the start [s].
+    AtS(Num),
+    /// At a time that follows from the start values alone, and is therefore the same whatever E does.
+    NominalEncounter(NominalEncounterConfig),
+    /// When the time headway of `from`, behind, to `to`, ahead in its lane, falls below a value.
+    ThwBelow(ThwBelowConfig),
+    /// When an actor starts to change lanes in order to overtake.
+    CutOutStarted(CutOutStartedConfig),
+}
+
+/// A time between the nominal arrival of `from` at 100 m behind `to` (phase 0) and 6 s after their nominal encounter
+/// (phase 1), both at the speeds of the start.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct NominalEncounterConfig {
+    /// The actor that comes up from behind.
+    pub from: ActorId,
+    /// The actor that it comes up to.
+    pub to: ActorId,
+    /// 0 to 1.
+    pub phase: Num,
+}
+
+/// A time headway to fall below.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct ThwBelowConfig {
+    /// The actor behind.
+    pub from: ActorId,
+    /// The actor ahead.
+    pub to: ActorId,
+    /// Time headway [s].
+    pub thw_s: Num,
+}
+
+/// The start of an actor's lane change.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct CutOutStartedConfig {
+    /// The actor that changes lanes.
+    pub actor: ActorId,
+    /// How long after the start of its lane change [s]; at once where absent.
+    pub delay_s: Option<Num>,
+}
+
+/// What an event does to its actor.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum EffectConfig {
+    /// Braking at a constant deceleration to a speed, which is then kept.
+    Brake(BrakeConfig),
+}
+
+/// Braking at a constant deceleration.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct BrakeConfig {
+    /// Deceleration [m/s²].
+    pub deceleration_mps2: Num,
+    /// Speed to brake to [m/s]; 0 where absent.
+    pub to_speed_mps: Option<Num>,
+}
+
+/// A checked event.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Event {
+    pub(crate) id: ActorId,
+    pub(crate) when: Trigger,
+    pub(crate) then: Brake,
+}
+
+/// A checked trigger; actors by their places in the list.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Trigger {
+    At(Time),
+    ThwBelow { from: usize, to: usize, thw_s: f64 },
+    CutOutStarted { actor: usize, delay: Time },
+}
+
+/// Braking at a constant deceleration to a speed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Brake {
+    pub(crate) deceleration_mps2: f64,
+    pub(crate) to_speed_mps: f64,
+}
+
+/// R's distance behind E at which the paper's encounter begins [m].
+const ENCOUNTER_BEGINS_M: f64 = 100.0;
+/// How long after the nominal encounter phase 1 lies [s].
+const AFTER_ENCOUNTER_S: f64 = 6.0;
+/// Slowest approach that has a nominal encounter [m/s].
+const SLOWEST_APPROACH_MPS: f64 = 0.1;
+
+/// What a trigger may refer to.
+pub(super) struct Start<'a> {
+    pub(super) actors: &'a [ActorConfig],
+    pub(super) vehicles: &'a [Vehicle],
+    pub(super) states: &'a [VehicleState],
+}
+
+impl EventConfig {
+    pub(super) fn check(&self, start: &Start<'_>, parameters: &Parameters) -> Result<Event, ConfigError> {
+        Ok(Event {
+            id: self.id.clone(),
+            when: self.when.check(start, parameters).map_err(|error| error.within("when"))?,
+            then: self.then.check(parameters).map_err(|error| error.within("then"))?,
+        })
+    }
+}
+
+impl TriggerConfig {
+    fn check(&self, start: &Start<'_>, parameters: &Parameters) -> Result<Trigger, ConfigError> {
+        match self {
+            Self::AtS(time) => {
+                Ok(Trigger::At(Time::from_s(parameters.number(time, "at-s", Range::closed(0.0, 3_600.0))?)))
+            }
+            Self::NominalEncounter(config) => {
+                nominal_time(config, start, parameters).map_err(|error| error.within("nominal-encounter"))
+            }
+            Self::ThwBelow(config) => thw_below(config, start, parameters).map_err(|error| error.within("thw-below")),
+            Self::CutOutStarted(config) => {
+                cut_out(config, start, parameters).map_err(|error| error.within("cut-out-started"))
+            }
+        }
+    }
+}
+
+fn thw_below(config: &ThwBelowConfig, start: &Start<'_>, parameters: &Parameters) -> Result<Trigger, ConfigError> {
+    Ok(Trigger::ThwBelow {
+        from: find_actor(start.actors, &config.from, "from")?,
+        to: find_actor(start.actors, &config.to, "to")?,
+        thw_s: parameters.number(&config.thw_s, "thw-s", Range::above(0.0, 60.0))?,
+    })
+}
+
+fn cut_out(config: &CutOutStartedConfig, start: &Start<'_>, parameters: &Parameters) -> Result<Trigger, ConfigError> {
+    let delay_s = match &config.delay_s {
+        Some(delay) => parameters.number(delay, "delay-s", Range::closed(0.0, 60.0))?,
+        None => 0.0,
+    };
+    let actor = find_actor(start.actors, &config.actor, "actor")?;
+    Ok(Trigger::CutOutStarted { actor, delay: Time::from_s(delay_s) })
+}
+
+fn nominal_time(
+    config: &NominalEncounterConfig,
+    start: &Start<'_>,
+    parameters: &Parameters,
+) -> Result<Trigger, ConfigError> {
+    let from = find_actor(start.actors, &config.from, "from")?;
+    let to = find_actor(start.actors, &config.to, "to")?;
+    let phase = parameters.number(&config.phase, "phase", Range::UNIT)?;
+    let closing_mps = start.states[from].speed_mps - start.states[to].speed_mps;
+    // A vehicle that does not come up has no nominal encounter.
+    Range::above(SLOWEST_APPROACH_MPS, 100.0).check(closing_mps, "from")?;
+    let half_lengths_m = 0.5 * (start.vehicles[from].dimensions.length_m + start.vehicles[to].dimensions.length_m);
+    let gap_m = start.states[to].s_m - start.states[from].s_m - half_lengths_m;
+    let begins_s = ((gap_m - ENCOUNTER_BEGINS_M) / closing_mps).max(0.0);
+    let ends_s = (gap_m / closing_mps).max(begins_s) + AFTER_ENCOUNTER_S;
+    Ok(Trigger::At(Time::from_s(begins_s + phase * (ends_s - begins_s))))
+}
+
+impl Check for EffectConfig {
+    type Checked = Brake;
+
+    fn check(&self, parameters: &Parameters) -> Result<Brake, ConfigError> {
+        let Self::Brake(config) = self;
+        let number = |num, key, range| parameters.number(num, key, range).map_err(|error| error.within("brake"));
+        Ok(Brake {
+            deceleration_mps2: number(&config.deceleration_mps2, "deceleration-mps2", Range::above(0.0, 12.0))?,
+            to_speed_mps: match &config.to_speed_mps {
+                Some(speed) => number(speed, "to-speed-mps", Range::closed(0.0, 80.0))?,
+                None => 0.0,
+            },
+        })
+    }
+}

@@ -1,0 +1,207 @@
+//! Reading a scenario file, and saying precisely what is wrong with it.
+
+use std::path::{Path, PathBuf};
+
+use closecall_scenarios::parameters::ParameterSpace;
+use closecall_traffic::{ActorId, Check, ConfigError, Parameters};
+use toml_edit::DocumentMut;
+
+use super::edit::{Setting, SettingError};
+use super::{Scenario, ScenarioConfig, locate};
+
+/// How many random samples `check` tries beside the nominal values and the bounds.
+const TRIED_SAMPLES: u64 = 64;
+
+/// A scenario file that cannot be used. Nothing has been run.
+#[derive(Debug, thiserror::Error)]
+pub enum ScenarioError {
+    /// It cannot be read.
+    #[error("failed to read {}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// It is not text.
+    #[error("failed to read {}: line {line} is not UTF-8 text; a scenario is a TOML file", path.display())]
+    NotText {
+        /// The file.
+        path: PathBuf,
+        /// The first line that is not text, counted from 1.
+        line: usize,
+    },
+    /// It has no content.
+    #[error("failed to read {}: the file is empty; a scenario needs at least `schema-version`, `name`, `duration-s`, `road` and actors", path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
+    /// It is not TOML, or has a key or a value that does not belong there.
+    #[error("failed to read {}:{line}: {message}", path.display())]
+    Syntax {
+        /// The file.
+        path: PathBuf,
+        /// The line, counted from 1.
+        line: usize,
+        /// What is wrong and what is allowed.
+        message: String,
+    },
+    /// A value is out of range, or contradicts another.
+    #[error("failed to check {}{}: {source}{at}", path.display(), line.map(|line| format!(":{line}")).unwrap_or_default())]
+    Value {
+        /// The file.
+        path: PathBuf,
+        /// The line, counted from 1, where the key stands in the file.
+        line: Option<usize>,
+        /// The key and what is wrong with it.
+        source: ConfigError,
+        /// The parameters with which it goes wrong, where it depends on them.
+        at: String,
+    },
+    /// A `--set` that cannot be applied.
+    #[error("failed to apply --set to {}: {source}", path.display())]
+    Set {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: SettingError,
+    },
+}
+
+/// A scenario file whose keys have been checked.
+#[derive(Clone, Debug)]
+pub struct ScenarioFile {
+    path: PathBuf,
+    text: String,
+    config: ScenarioConfig,
+    space: ParameterSpace,
+}
+
+impl ScenarioFile {
+    /// Reads a file, changes it by `settings`, and checks its keys.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] names the file, the line, the key, and what is allowed.
+    pub fn load(path: &Path, settings: &[Setting]) -> Result<Self, ScenarioError> {
+        let bytes =
+            std::fs::read(path).map_err(|source| ScenarioError::Read { path: path.to_owned(), source })?;
+        let text = String::from_utf8(bytes).map_err(|error| {
+            let line = locate::line_at(&String::from_utf8_lossy(error.as_bytes()), error.utf8_error().valid_up_to());
+            ScenarioError::NotText { path: path.to_owned(), line }
+        })?;
+        Self::parse(path, &text, settings)
+    }
+
+    /// The same for a text that is at hand; `path` serves messages.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn parse(path: &Path, text: &str, settings: &[Setting]) -> Result<Self, ScenarioError> {
+        if text.trim().is_empty() {
+            return Err(ScenarioError::Empty { path: path.to_owned() });
+        }
+        // The text as it stands is read first, so that errors in the file have the file's own lines.
+        let mut config = deserialize(path, text)?;
+        let mut text = text.to_owned();
+        if !settings.is_empty() {
+            text = apply(path, &text, settings)?;
+            config = deserialize(path, &text)?;
+        }
+        let space = config.parameters.check(&Parameters::default()).map_err(|error| {
+            let source = error.within("parameters");
+            let line = locate::line_of(&text, &source.path);
+            ScenarioError::Value { path: path.to_owned(), line, source, at: String::new() }
+        })?;
+        Ok(Self { path: path.to_owned(), text, config, space })
+    }
+
+    /// The file's path, as given.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The scenario's text, all settings applied.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// The scenario as it is written.
+    pub fn config(&self) -> &ScenarioConfig {
+        &self.config
+    }
+
+    /// The distributions of its parameters.
+    pub fn space(&self) -> &ParameterSpace {
+        &self.space
+    }
+
+    /// The name of E, or nothing where no actor has an ego stack.
+    pub fn ego_id(&self) -> Option<&ActorId> {
+        let is_ego = |driver: &_| matches!(driver, closecall_controllers::DriverConfig::EgoStack(_));
+        self.config.actors.iter().find(|actor| is_ego(&actor.driver)).map(|actor| &actor.id)
+    }
+
+    /// The concrete scenario with these parameters.
+    ///
+    /// # Errors
+    /// [`ScenarioError::Value`] where a value is out of range or contradicts another.
+    pub fn concrete(&self, parameters: &Parameters) -> Result<Scenario, ScenarioError> {
+        self.config.check(parameters).map_err(|source| {
+            let line = locate::line_of(&self.text, &source.path);
+            ScenarioError::Value { path: self.path.clone(), line, source, at: describe(parameters) }
+        })
+    }
+
+    /// Checks the scenario with the median of every parameter, with each parameter at both of its bounds, and with 64
+    /// random samples.
+    ///
+    /// # Errors
+    /// The first of these that is not a valid scenario.
+    pub fn check(&self) -> Result<(), ScenarioError> {
+        self.concrete(&self.space.nominal())?;
+        for parameters in self.space.corners() {
+            self.concrete(&parameters)?;
+        }
+        for index in 0..TRIED_SAMPLES {
+            self.concrete(&self.space.sample_random(0, index))?;
+        }
+        Ok(())
+    }
+}
+
+fn describe(parameters: &Parameters) -> String {
+    let values: Vec<String> = parameters.iter().map(|(name, value)| format!("{name} = {value}")).collect();
+    if values.is_empty() { String::new() } else { format!(" (with {})", values.join(", ")) }
+}
+
+fn apply(path: &Path, text: &str, settings: &[Setting]) -> Result<String, ScenarioError> {
+    let mut document: DocumentMut = text.parse().map_err(|error: toml_edit::TomlError| ScenarioError::Syntax {
+        path: path.to_owned(),
+        line: locate::line_at(text, error.span().map_or(0, |span| span.start)),
+        message: error.message().to_owned(),
+    })?;
+    for setting in settings {
+        setting.apply(&mut document).map_err(|source| ScenarioError::Set { path: path.to_owned(), source })?;
+    }
+    Ok(document.to_string())
+}
+
+fn deserialize(path: &Path, text: &str) -> Result<ScenarioConfig, ScenarioError> {
+    toml::from_str(text).map_err(|error: toml::de::Error| {
+        let offset = error.span().map_or(0, |span| span.start);
+        let line = locate::line_at(text, offset);
+        let named = key_at(text, offset).map(|key| format!("`{key}`: ")).unwrap_or_default();
+        ScenarioError::Syntax { path: path.to_owned(), line, message: format!("{named}{}", error.message()) }
+    })
+}
+
+/// The key on the line of a byte offset, for messages that have only a position.
+fn key_at(text: &str, offset: usize) -> Option<String> {
+    let start = text[..offset.min(text.len())].rfind('\n').map_or(0, |newline| newline + 1);
+    let before = &text[start..offset.min(text.len())];
+    let key = before.rsplit(['{', ',', '\n']).next()?.split('=').next()?.trim();
+    let is_key = !key.is_empty() && key.chars().all(|c| c.is_alphanumeric() || "-_.\"".contains(c));
+    is_key.then(|| key.to_owned())
+}
+

@@ -1,0 +1,102 @@
+//! Where in a file's text a key stands.
+
+use closecall_traffic::{KeyPath, Segment};
+use toml_edit::{Document, Item, Table, TableLike, Value};
+
+/// The line, counted from 1, of the deepest part of `path` that the text has.
+pub(super) fn line_of(text: &str, path: &KeyPath) -> Option<usize> {
+    let document = Document::parse(text).ok()?;
+    let mut place = Place::Item(document.as_item());
+    let mut offset = None;
+    for segment in &path.0 {
+        let Some((next, at)) = place.descend(segment) else { break };
+        offset = at.or(offset);
+        place = next;
+    }
+    offset.map(|offset| line_at(text, offset))
+}
+
+/// The line, counted from 1, of a byte offset.
+pub(super) fn line_at(text: &str, offset: usize) -> usize {
+    text.bytes().take(offset).filter(|byte| *byte == b'\n').count() + 1
+}
+
+enum Place<'a> {
+    Item(&'a Item),
+    Table(&'a Table),
+    Value(&'a Value),
+}
+
+impl<'a> Place<'a> {
+    /// What lies one segment further, and where in the text.
+    fn descend(&self, segment: &Segment) -> Option<(Self, Option<usize>)> {
+        match segment {
+            Segment::Key(key) => {
+                let (found_key, item) = self.table()?.get_key_value(key)?;
+                let at = found_key.span().or_else(|| item.span()).map(|span| span.start);
+                Some((Self::Item(item), at))
+            }
+            Segment::Index(index) => self.element(*index),
+        }
+    }
+
+    fn table(&self) -> Option<&'a dyn TableLike> {
+        match self {
+            Self::Item(item) => item.as_table_like(),
+            Self::Table(table) => Some(*table),
+            Self::Value(value) => value.as_inline_table().map(|table| table as &dyn TableLike),
+        }
+    }
+
+    fn element(&self, index: usize) -> Option<(Self, Option<usize>)> {
+        let array = match self {
+            Self::Item(Item::ArrayOfTables(tables)) => {
+                let table = tables.get(index)?;
+                return Some((Self::Table(table), table.span().map(|span| span.start)));
+            }
+            Self::Item(item) => item.as_array()?,
+            Self::Value(value) => value.as_array()?,
+            Self::Table(_) => return None,
+        };
+        let value = array.get(index)?;
+        Some((Self::Value(value), value.span().map(|span| span.start)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "\
+name = 'x'
+[[actor]]
+id = 'ego'
+driver = { ego-stack = { acc = { time-gap-s = 9 } } }
+[[actor]]
+id = 'rear'
+[[actor.event]]
+id = 'brakes'
+then = { brake = { deceleration-mps2 = -1 } }
+";
+
+    fn line(path: &[&str]) -> Option<usize> {
+        let segment = |part: &&str| match part.parse() {
+            Ok(index) => Segment::Index(index),
+            Err(_) => Segment::Key((*part).to_owned()),
+        };
+        line_of(TEXT, &KeyPath(path.iter().map(segment).collect()))
+    }
+
+    #[test]
+    fn a_key_is_found_in_tables_arrays_and_inline_tables() {
+        assert_eq!(line(&["name"]), Some(1));
+        assert_eq!(line(&["actor", "0", "driver", "ego-stack", "acc", "time-gap-s"]), Some(4));
+        assert_eq!(line(&["actor", "1", "event", "0", "then", "brake", "deceleration-mps2"]), Some(9));
+    }
+
+    #[test]
+    fn what_is_missing_is_found_at_the_table_that_should_have_it() {
+        assert_eq!(line(&["actor", "1", "vehicle"]), Some(5));
+        assert_eq!(line(&["duration-s"]), None);
+    }
+}

@@ -1,0 +1,158 @@
+//! Scenarios: from the text of a file to one concrete situation.
+//!
+//! ```text
+//!  file ─▶ ScenarioFile ─(parameters of one sample)─▶ Scenario ─▶ simulation
+//!            text, checked keys                          numbers, checked ranges
+//! ```
+//!
+//! A scenario file describes a *logical* scenario: values that are fixed, and parameters that are sampled. With the
+//! parameters of one sample it becomes a *concrete* one, [`Scenario`], which cannot be invalid.
+
+mod config;
+mod edit;
+mod events;
+mod file;
+mod locate;
+mod placement;
+
+use closecall_controllers::CheckedDriver;
+use closecall_sensors::Sensors;
+use closecall_traffic::{
+    ActorId, Check, ConfigError, Environment, Parameters, Problem, Range, Road, Time, Vehicle, VehicleState,
+};
+
+pub use config::{
+    AbsoluteStartConfig, ActorConfig, RelativeStartConfig, SCHEMA_VERSION, ScenarioConfig, StartConfig,
+};
+pub use edit::Setting;
+pub use events::{
+    BrakeConfig, CutOutStartedConfig, EffectConfig, EventConfig, NominalEncounterConfig, ThwBelowConfig, TriggerConfig,
+};
+pub(crate) use events::{Brake, Event, Trigger};
+pub use file::{ScenarioError, ScenarioFile};
+
+/// One vehicle of a concrete scenario.
+#[derive(Clone, Debug)]
+pub struct Actor {
+    /// Its name.
+    pub id: ActorId,
+    /// What it is.
+    pub vehicle: Vehicle,
+    /// Where it starts.
+    pub start: VehicleState,
+    /// Who drives it.
+    pub driver: CheckedDriver,
+    pub(crate) events: Vec<Event>,
+}
+
+/// A concrete scenario: everything is a number, and every number has been checked.
+#[derive(Clone, Debug)]
+pub struct Scenario {
+    /// Its name.
+    pub name: String,
+    /// Longest duration of a run.
+    pub duration: Time,
+    /// The road.
+    pub road: Road,
+    /// Light, weather and surface.
+    pub environment: Environment,
+    /// The vehicles.
+    pub actors: Vec<Actor>,
+    /// The place of E among them.
+    pub ego: usize,
+    /// What E perceives with.
+    pub sensors: Sensors,
+    /// The sampled values that it was made with.
+    pub parameters: Parameters,
+}
+
+impl Scenario {
+    /// E's name.
+    pub fn ego_id(&self) -> &ActorId {
+        &self.actors[self.ego].id
+    }
+}
+
+impl Check for ScenarioConfig {
+    type Checked = Scenario;
+
+    fn check(&self, parameters: &Parameters) -> Result<Scenario, ConfigError> {
+        self.check_names()?;
+        let duration_s = parameters.number(&self.duration_s, "duration-s", Range::closed(0.1, 3_600.0))?;
+        let road = self.road.check(parameters).map_err(|error| error.within("road"))?;
+        let environment = self.environment.check(parameters).map_err(|error| error.within("environment"))?;
+        let actors = self.check_actors(&road, parameters)?;
+        Ok(Scenario {
+            name: self.name.clone(),
+            duration: Time::from_s(duration_s),
+            road,
+            environment,
+            ego: only_ego(&actors)?,
+            actors,
+            sensors: self.sensors.check(parameters).map_err(|error| error.within("sensors"))?,
+            parameters: parameters.clone(),
+        })
+    }
+}
+
+impl ScenarioConfig {
+    fn check_names(&self) -> Result<(), ConfigError> {
+        if self.schema_version != SCHEMA_VERSION {
+            let problem = Problem::WrongCount { value: self.schema_version.into(), allowed: "schema version 1" };
+            return Err(ConfigError::new("schema-version", problem));
+        }
+        if ActorId::new(&self.name).is_err() {
+            let allowed = "lower-case letters, digits and hyphens, starting with a letter".to_owned();
+            return Err(ConfigError::new("name", Problem::UnknownWord { value: self.name.clone(), allowed }));
+        }
+        for (index, actor) in self.actors.iter().enumerate() {
+            if self.actors[..index].iter().any(|earlier| earlier.id == actor.id) {
+                let problem = Problem::Duplicate { value: actor.id.to_string() };
+                return Err(ConfigError::new("id", problem).within_index(index).within("actor"));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_actors(&self, road: &Road, parameters: &Parameters) -> Result<Vec<Actor>, ConfigError> {
+        let at = |index: usize, error: ConfigError| error.within_index(index).within("actor");
+        let mut vehicles = Vec::with_capacity(self.actors.len());
+        for (index, actor) in self.actors.iter().enumerate() {
+            let vehicle = actor.vehicle.check(parameters).map_err(|error| at(index, error.within("vehicle")))?;
+            vehicles.push(vehicle);
+        }
+        let states = placement::place(&self.actors, &vehicles, road, parameters)?;
+        let start = events::Start { actors: &self.actors, vehicles: &vehicles, states: &states };
+        let mut checked = Vec::with_capacity(self.actors.len());
+        for (index, actor) in self.actors.iter().enumerate() {
+            let driver = actor.driver.check(parameters).map_err(|error| at(index, error.within("driver")))?;
+            let mut events = Vec::with_capacity(actor.events.len());
+            for (place, event) in actor.events.iter().enumerate() {
+                let event = event.check(&start, parameters);
+                events.push(event.map_err(|error| at(index, error.within_index(place).within("event")))?);
+            }
+            checked.push(Actor {
+                id: actor.id.clone(),
+                vehicle: vehicles[index],
+                start: states[index],
+                driver,
+                events,
+            });
+        }
+        Ok(checked)
+    }
+}
+
+/// The place of the one actor with an ego stack.
+fn only_ego(actors: &[Actor]) -> Result<usize, ConfigError> {
+    let mut egos = actors.iter().enumerate().filter(|(_, actor)| matches!(actor.driver, CheckedDriver::Ego(_)));
+    let needed = "exactly one actor with `driver = { ego-stack = … }`";
+    match (egos.next(), egos.next()) {
+        (Some((ego, _)), None) => Ok(ego),
+        (None, _) => Err(ConfigError::new("actor", Problem::Missing { needed })),
+        (Some(_), Some((second, actor))) => {
+            let problem = Problem::Duplicate { value: format!("ego-stack of {}", actor.id) };
+            Err(ConfigError::new("driver", problem).within_index(second).within("actor"))
+        }
+    }
+}

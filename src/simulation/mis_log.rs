@@ -1,0 +1,82 @@
+//! What the margin increase system did in a run, summed up from the commands it gave.
+
+use closecall_controllers::{EgoCommand, EgoState, Reason};
+use closecall_traffic::{Absent, Measured, Time};
+
+use crate::outcome::MisSummary;
+
+/// E at one control step, as the summary needs it.
+pub(super) struct EgoNow<'a> {
+    pub(super) time: Time,
+    pub(super) command: &'a EgoCommand,
+    pub(super) speed_mps: f64,
+    pub(super) thw_front_s: Measured,
+    /// True at the first step at which the vehicle behind is at the critical distance.
+    pub(super) is_critical: bool,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Engagement {
+    at: Time,
+    thw_front_s: Measured,
+    speed_mps: f64,
+    goal_in_reach: Option<bool>,
+    reason: Reason,
+}
+
+/// Follows the margin increase system through a run.
+#[derive(Debug, Default)]
+pub(super) struct MisLog {
+    engaged: Option<Engagement>,
+    released_at: Option<Time>,
+    thw_front_at_critical_s: Option<Measured>,
+    mean_deceleration_mps2: Option<f64>,
+    last_reason: Option<Reason>,
+}
+
+impl MisLog {
+    /// Takes in one control step.
+    pub(super) fn take(&mut self, now: &EgoNow<'_>) {
+        self.last_reason = Some(now.command.reason);
+        let is_active = matches!(now.command.state, EgoState::Increasing | EgoState::Holding);
+        if self.engaged.is_none() && now.command.state == EgoState::Increasing {
+            self.engaged = Some(Engagement {
+                at: now.time,
+                thw_front_s: now.thw_front_s,
+                speed_mps: now.speed_mps,
+                goal_in_reach: now.command.plan.map(|plan| plan.goal_in_reach),
+                reason: now.command.reason,
+            });
+        }
+        let Some(engaged) = self.engaged else { return };
+        if now.is_critical {
+            self.thw_front_at_critical_s.get_or_insert(now.thw_front_s);
+        }
+        if !is_active {
+            self.released_at.get_or_insert(now.time);
+        }
+        if (now.is_critical || !is_active) && now.time > engaged.at {
+            let lasted_s = (now.time - engaged.at).s();
+            self.mean_deceleration_mps2.get_or_insert((engaged.speed_mps - now.speed_mps) / lasted_s);
+        }
+    }
+
+    /// The summary, or that the controller has no such system.
+    pub(super) fn finish(self, has_mis: bool) -> Result<MisSummary, Absent> {
+        let last_reason = self.last_reason.filter(|_| has_mis).ok_or(Absent::NoMis)?;
+        let never = Absent::NeverEngaged;
+        let engaged = self.engaged;
+        let after_engagement = |absent| if engaged.is_some() { absent } else { never };
+        Ok(MisSummary {
+            engaged_at_s: engaged.map(|engaged| engaged.at.s()).ok_or(never),
+            released_at_s: self.released_at.map(Time::s).ok_or(after_engagement(Absent::NotReleased)),
+            thw_front_at_engagement_s: engaged.map_or(Err(never), |engaged| engaged.thw_front_s),
+            thw_front_at_critical_s: self
+                .thw_front_at_critical_s
+                .unwrap_or(Err(after_engagement(Absent::NeverCritical))),
+            mean_deceleration_mps2: self.mean_deceleration_mps2.ok_or(after_engagement(Absent::NotReleased)),
+            goal_in_reach: engaged.and_then(|engaged| engaged.goal_in_reach),
+            reason: engaged.map_or(last_reason, |engaged| engaged.reason),
+        })
+    }
+}

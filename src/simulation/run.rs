@@ -1,0 +1,352 @@
+//! One run: its state, and the parts of a step.
+
+use closecall_controllers::{
+    Driver, DriverInput, DriverNote, EgoCommand, EgoController, EgoInput, EgoState, Neighbours, Odometry,
+    SensorAvailability,
+};
+use closecall_controllers::CheckedDriver;
+use closecall_sensors::{Health, Perception, Scene, SceneVehicle};
+use closecall_traffic::{Measured, Stream, stream};
+
+use super::events::Events;
+use super::margins::MarginMeter;
+use super::mis_log::{EgoNow, MisLog};
+use super::phase::{AFTER_COLLISION, Encounter};
+use super::{
+    Arm, CONTROL_STEP, Happening, MarginsNow, Observer, PHYSICS_STEP, RunKey, SampleError, StepView,
+};
+use crate::outcome::{EndReason, Outcome};
+use crate::scenario::Scenario;
+use crate::world::{Action, Placed, World};
+
+/// The channel of a human driver's random stream.
+const DRIVER_CHANNEL: &str = "driver";
+
+struct Human {
+    actor: usize,
+    driver: Box<dyn Driver>,
+    rng: Stream,
+}
+
+pub(super) struct Run<'a> {
+    scenario: &'a Scenario,
+    key: RunKey,
+    arm: &'a Arm,
+    world: World,
+    perception: Box<dyn Perception>,
+    controller: Box<dyn EgoController>,
+    humans: Vec<Human>,
+    events: Events,
+    encounter: Encounter,
+    meter: MarginMeter,
+    mis: MisLog,
+    critical_gap_m: Option<f64>,
+    command: Option<EgoCommand>,
+    // Buffers, kept from step to step.
+    neighbours: Vec<Neighbours>,
+    margins: MarginsNow,
+    actions: Vec<Action>,
+    others: Vec<SceneVehicle>,
+    vehicles: Vec<SceneVehicle>,
+    fronts: Vec<(Measured, Measured)>,
+}
+
+impl<'a> Run<'a> {
+    pub(super) fn new(scenario: &'a Scenario, key: RunKey, arm: &'a Arm) -> Result<Self, SampleError> {
+        let placed = scenario
+            .actors
+            .iter()
+            .map(|actor| Placed { id: actor.id.clone(), vehicle: actor.vehicle, state: actor.start })
+            .collect();
+        let world = World::new(scenario.road, scenario.environment.friction, PHYSICS_STEP, placed);
+        let CheckedDriver::Ego(settings) = &scenario.actors[scenario.ego].driver else {
+            unreachable!("a checked scenario has its ego stack at `ego`")
+        };
+        let has_mis = arm.controller.has_mis(settings);
+        let margins = MarginsNow::new(world.state(scenario.ego), &Neighbours::default());
+        Ok(Self {
+            scenario,
+            key,
+            arm,
+            perception: scenario.sensors.build(arm.sensors, key.seed, key.sample, scenario.ego_id())?,
+            controller: arm.controller.build(settings),
+            humans: humans(scenario, key),
+            events: Events::new(scenario),
+            encounter: Encounter::default(),
+            meter: MarginMeter::new(PHYSICS_STEP.s()),
+            mis: MisLog::default(),
+            critical_gap_m: settings.critical_gap_m().filter(|_| has_mis),
+            command: None,
+            neighbours: vec![Neighbours::default(); world.len()],
+            margins,
+            actions: vec![Action::default(); world.len()],
+            others: Vec::with_capacity(world.len()),
+            vehicles: Vec::with_capacity(world.len()),
+            fronts: Vec::with_capacity(world.len()),
+            world,
+        })
+    }
+
+    pub(super) fn is_control_step(&self) -> bool {
+        self.world.time().is_multiple_of(CONTROL_STEP)
+    }
+
+    /// Works out who is around whom, E's margins, and the phase of the encounter.
+    pub(super) fn look_around(&mut self, observer: &mut dyn Observer) {
+        for actor in 0..self.world.len() {
+            self.neighbours[actor] = self.world.neighbours(actor);
+        }
+        let ego = self.scenario.ego;
+        let own = self.world.state(ego);
+        self.margins = MarginsNow::new(own, &self.neighbours[ego]);
+        if self.world.is_wrecked(ego) {
+            return;
+        }
+        self.meter.take(own, &self.margins);
+        let follower = self.neighbours[ego].own.follower;
+        let follower = follower.and_then(|f| self.margins.thw_rear_s.ok().map(|thw_s| (f.actor, thw_s)));
+        let before = self.encounter.phase();
+        let phase = self.encounter.update(&self.world, ego, follower);
+        if phase != before {
+            observer.happening(self.world.time(), &Happening::PhaseChanged { to: phase });
+        }
+    }
+
+    /// Lets E measure, and its controller decide, unless E has lost control.
+    pub(super) fn perceive_and_control(&mut self, observer: &mut dyn Observer) -> Result<(), SampleError> {
+        let ego = self.scenario.ego;
+        self.list_vehicles();
+        let time = self.world.time();
+        if !self.world.is_wrecked(ego) {
+            let scene = Scene {
+                time,
+                road: &self.scenario.road,
+                environment: &self.scenario.environment,
+                ego: self.vehicles[ego],
+                others: &self.others,
+            };
+            self.perception.step(&scene)?;
+            let input = EgoInput {
+                time,
+                odometry: self.odometry(),
+                road: &self.scenario.road,
+                tracks: self.perception.tracks(),
+                sensors: availability(self.perception.as_ref()),
+            };
+            let command = self.controller.step(&input)?;
+            if !command.acceleration_mps2.is_finite() {
+                return Err(SampleError::Command { value: command.acceleration_mps2, time });
+            }
+            self.take_command(command, observer);
+        }
+        self.show(observer);
+        Ok(())
+    }
+
+    fn take_command(&mut self, command: EgoCommand, observer: &mut dyn Observer) {
+        let time = self.world.time();
+        let from = self.command.map_or(EgoState::Following, |last| last.state);
+        if command.state != from {
+            let changed = Happening::EgoStateChanged { from, to: command.state, reason: command.reason };
+            observer.happening(time, &changed);
+        }
+        self.command = Some(command);
+        let ego = self.scenario.ego;
+        let is_critical =
+            self.critical_gap_m.is_some_and(|gap_m| self.encounter.reaches(&self.world, ego, gap_m));
+        self.mis.take(&EgoNow {
+            time,
+            command: &command,
+            speed_mps: self.world.state(ego).speed_mps,
+            thw_front_s: self.margins.thw_front_s,
+            is_critical,
+        });
+    }
+
+    /// Fills the lists of vehicles that sensors and observers see.
+    fn list_vehicles(&mut self) {
+        self.others.clear();
+        self.vehicles.clear();
+        for actor in 0..self.world.len() {
+            let vehicle = SceneVehicle {
+                actor,
+                vehicle: *self.world.vehicle(actor),
+                state: *self.world.state(actor),
+                pitch_rad: self.world.pitch_rad(actor),
+            };
+            self.vehicles.push(vehicle);
+            if actor != self.scenario.ego {
+                self.others.push(vehicle);
+            }
+        }
+    }
+
+    fn odometry(&self) -> Odometry {
+        let ego = self.scenario.ego;
+        let state = self.world.state(ego);
+        let lane = self.scenario.road.lane_at(state.d_m);
+        let size = self.world.vehicle(ego).dimensions;
+        Odometry {
+            speed_mps: state.speed_mps,
+            acceleration_mps2: state.acceleration_mps2,
+            yaw_rate_radps: state.yaw_rate_radps,
+            lane,
+            lane_offset_m: state.d_m - self.scenario.road.lane_centre_m(lane),
+            length_m: size.length_m,
+            width_m: size.width_m,
+        }
+    }
+
+    fn show(&mut self, observer: &mut dyn Observer) {
+        let Some(command) = &self.command else { return };
+        self.fronts.clear();
+        for actor in 0..self.world.len() {
+            let now = MarginsNow::new(self.world.state(actor), &self.neighbours[actor]);
+            self.fronts.push((now.gap_front_m, now.thw_front_s));
+        }
+        observer.step(&StepView {
+            time: self.world.time(),
+            scenario: self.scenario,
+            vehicles: &self.vehicles,
+            fronts: &self.fronts,
+            tracks: self.perception.tracks(),
+            perception: self.perception.as_ref(),
+            command,
+            margins: &self.margins,
+            phase: self.encounter.phase(),
+        });
+    }
+
+    /// Lets the human drivers and the scenario's events decide on the state at t.
+    pub(super) fn drive(&mut self, observer: &mut dyn Observer) -> Result<(), SampleError> {
+        let time = self.world.time();
+        self.events.update(&self.world, |event| {
+            observer.happening(time, &Happening::EventTriggered { event: event.to_owned() });
+        });
+        let ego = self.scenario.ego;
+        let asked_mps2 = self.command.map_or(0.0, |command| command.acceleration_mps2);
+        self.actions[ego] = Action { acceleration_mps2: asked_mps2, ..Action::default() };
+        for human in &mut self.humans {
+            let actor = human.actor;
+            if self.world.is_wrecked(actor) {
+                continue;
+            }
+            let input = DriverInput {
+                time,
+                vehicle: self.world.vehicle(actor),
+                own: self.world.state(actor),
+                neighbours: &self.neighbours[actor],
+                road: &self.scenario.road,
+                changing_to: self.world.changing_to(actor),
+            };
+            let action = human.driver.step(&input, &mut human.rng).map_err(|source| SampleError::Driver {
+                actor: self.scenario.actors[actor].id.clone(),
+                source,
+            })?;
+            if let Some(note) = action.note {
+                if note == DriverNote::CutOutStarted {
+                    self.events.cut_out_started(actor, time);
+                }
+                observer.happening(time, &Happening::DriverNote { actor, note });
+            }
+            self.actions[actor] = Action {
+                acceleration_mps2: self
+                    .events
+                    .asked_mps2(actor, &self.world)
+                    .map_or(action.acceleration_mps2, |event_mps2| event_mps2.min(action.acceleration_mps2)),
+                lane_change: action.lane_change,
+                indicator: action.indicator,
+            };
+        }
+        Ok(())
+    }
+
+    /// Moves the world on by one step.
+    pub(super) fn advance(&mut self, observer: &mut dyn Observer) {
+        let known = self.world.collisions().len();
+        self.world.step(&self.actions, self.encounter.phase());
+        for place in known..self.world.collisions().len() {
+            let collision = &self.world.collisions()[place];
+            if collision.involves(self.scenario.ego_id()) {
+                let ahead = self.is_ahead_of_ego(place);
+                self.meter.touched(ahead);
+            }
+            observer.happening(collision.time, &Happening::Collision(collision.clone()));
+        }
+    }
+
+    /// True where the other vehicle of a collision of E has its centre ahead of E's.
+    fn is_ahead_of_ego(&self, collision: usize) -> bool {
+        let ego = self.scenario.ego;
+        let between = &self.world.collisions()[collision].between;
+        let other = self.scenario.actors.iter().position(|actor| {
+            actor.id != *self.scenario.ego_id() && between.contains(&actor.id)
+        });
+        other.is_some_and(|other| self.world.state(other).s_m > self.world.state(ego).s_m)
+    }
+
+    /// Why the run is over, if it is.
+    pub(super) fn end(&self) -> Option<EndReason> {
+        let time = self.world.time();
+        if let Some(first) = self.world.collisions().first() {
+            if time >= first.time + AFTER_COLLISION {
+                return Some(EndReason::Collision);
+            }
+        } else if self.stands_still() {
+            return Some(EndReason::Standstill);
+        }
+        (time >= self.scenario.duration).then_some(EndReason::Duration)
+    }
+
+    /// True where E stands, and so does everyone behind it and the one ahead of it: nothing can happen to E any more.
+    fn stands_still(&self) -> bool {
+        let ego = self.scenario.ego;
+        let own = self.world.state(ego);
+        let lead = self.neighbours[ego].own.lead.map(|lead| lead.actor);
+        own.speed_mps == 0.0
+            && (0..self.world.len()).all(|actor| {
+                let state = self.world.state(actor);
+                let matters = state.s_m <= own.s_m || Some(actor) == lead;
+                !matters || state.speed_mps == 0.0
+            })
+    }
+
+    pub(super) fn finish(self, end: EndReason) -> Outcome {
+        let CheckedDriver::Ego(settings) = &self.scenario.actors[self.scenario.ego].driver else {
+            unreachable!("a checked scenario has its ego stack at `ego`")
+        };
+        Outcome {
+            scenario: self.scenario.name.clone(),
+            seed: self.key.seed,
+            sample: self.key.sample,
+            controller: self.arm.controller.name().to_owned(),
+            parameters: self.scenario.parameters.clone(),
+            end,
+            duration: self.world.time(),
+            collisions: self.world.collisions().to_vec(),
+            margins: self.meter.finish(),
+            mis: self.mis.finish(self.arm.controller.has_mis(settings)),
+        }
+    }
+}
+
+fn humans(scenario: &Scenario, key: RunKey) -> Vec<Human> {
+    let mut humans = Vec::with_capacity(scenario.actors.len());
+    for (actor, setup) in scenario.actors.iter().enumerate() {
+        if let CheckedDriver::Human(human) = &setup.driver {
+            let rng = stream(key.seed, key.sample, &setup.id, DRIVER_CHANNEL);
+            humans.push(Human { actor, driver: human.build(), rng });
+        }
+    }
+    humans
+}
+
+fn availability(perception: &dyn Perception) -> SensorAvailability {
+    let health = perception.health();
+    SensorAvailability {
+        front: health.front != Health::Failed,
+        surround: health.surround != Health::Failed,
+        rear: health.rear != Health::Failed,
+    }
+}
+
