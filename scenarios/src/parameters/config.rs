@@ -1,0 +1,225 @@
+//! Parameters as a scenario file describes them.
+
+use std::collections::BTreeMap;
+
+use closecall_traffic::{ConfigError, KeyPath, ParameterName, Problem, Value};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::distribution::{FINITE, at_least};
+use super::space::{ParameterSpace, Provenance, SpaceEntry};
+use super::{Distribution, finite};
+
+/// What a parameter needs.
+const DISTRIBUTIONS: &str =
+    "a distribution, which is one of `uniform`, `truncated-normal`, `log-normal`, `choice`, `empirical`, `fixed`";
+
+/// The `[parameters]` table of a scenario file.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(transparent)]
+pub struct ParametersConfig(pub BTreeMap<ParameterName, ParameterConfig>);
+
+impl ParametersConfig {
+    /// Checks every parameter.
+    ///
+    /// # Errors
+    /// The first key that is wrong, in the order of the names, with its path below `[parameters]`.
+    pub fn check(&self) -> Result<ParameterSpace, ConfigError> {
+        let check = |(name, config): (&ParameterName, &ParameterConfig)| {
+            let entry = config.check().map_err(|error| error.within(name.as_str()))?;
+            Ok((name.clone(), entry))
+        };
+        self.0.iter().map(check).collect()
+    }
+}
+
+/// One parameter: exactly one distribution, and where it comes from.
+///
+/// The distributions are optional fields of one struct, not variants of an enum, since that alone allows further keys
+/// beside them while unknown ones are refused.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct ParameterConfig {
+    /// Every number between two bounds is equally probable.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub uniform: Option<UniformConfig>,
+    /// A normal distribution, cut off at two bounds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub truncated_normal: Option<TruncatedNormalConfig>,
+    /// A log-normal distribution, which may be cut off above.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub log_normal: Option<LogNormalConfig>,
+    /// One of several labels, each with its weight; weights need not add up to 1.
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "finite::weights")]
+    pub choice: Option<BTreeMap<String, f64>>,
+    /// A distribution given by its quantiles.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub empirical: Option<EmpiricalConfig>,
+    /// Always the same number or label.
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "finite::value")]
+    #[schemars(schema_with = "finite::value_schema")]
+    pub fixed: Option<Value>,
+    /// The distribution was fitted to recordings.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fitted: Option<FittedConfig>,
+    /// The distribution was assumed, and why.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub assumed: Option<String>,
+    /// A remark for the reader.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub note: Option<String>,
+}
+
+/// Every number between two bounds is equally probable.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct UniformConfig {
+    /// Smallest value.
+    #[serde(deserialize_with = "finite::number")]
+    pub min: f64,
+    /// Largest value, above the smallest.
+    #[serde(deserialize_with = "finite::number")]
+    pub max: f64,
+}
+
+/// A normal distribution, cut off at two bounds.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct TruncatedNormalConfig {
+    /// Mean before the cut.
+    #[serde(deserialize_with = "finite::number")]
+    pub mean: f64,
+    /// Standard deviation before the cut, above 0.
+    #[serde(deserialize_with = "finite::number")]
+    pub sd: f64,
+    /// Smallest value.
+    #[serde(deserialize_with = "finite::number")]
+    pub min: f64,
+    /// Largest value, above the smallest.
+    #[serde(deserialize_with = "finite::number")]
+    pub max: f64,
+}
+
+/// A log-normal distribution, which may be cut off above.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct LogNormalConfig {
+    /// Median before the cut, above 0.
+    #[serde(deserialize_with = "finite::number")]
+    pub median: f64,
+    /// Standard deviation of the logarithm, above 0.
+    #[serde(deserialize_with = "finite::number")]
+    pub sigma: f64,
+    /// Largest value; unbounded where absent.
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "finite::option")]
+    pub max: Option<f64>,
+}
+
+/// A distribution given by its quantiles.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct EmpiricalConfig {
+    /// Quantiles at equally spaced probabilities from 0 to 1, not falling; between them it is linear.
+    #[serde(deserialize_with = "finite::list")]
+    pub quantiles: Vec<f64>,
+}
+
+/// What a distribution was fitted to.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct FittedConfig {
+    /// Number of observations.
+    pub n: u64,
+    /// The recording, and how it was evaluated.
+    pub source: String,
+    /// Bootstrap interval of the median, 95 %: [lower, upper].
+    #[serde(
+        default,
+        rename = "interval-95",
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "finite::pair"
+    )]
+    pub interval_95: Option<[f64; 2]>,
+}
+
+impl ParameterConfig {
+    /// Equally probable between two bounds.
+    pub fn uniform(min: f64, max: f64) -> Self {
+        Self { uniform: Some(UniformConfig { min, max }), ..Self::default() }
+    }
+
+    /// Given by quantiles at equally spaced probabilities from 0 to 1.
+    pub fn empirical(quantiles: Vec<f64>) -> Self {
+        Self { empirical: Some(EmpiricalConfig { quantiles }), ..Self::default() }
+    }
+
+    /// Always the same value.
+    pub fn fixed(value: Value) -> Self {
+        Self { fixed: Some(value), ..Self::default() }
+    }
+
+    /// Checks this parameter.
+    ///
+    /// # Errors
+    /// The first key that is wrong, with its path below the parameter's name.
+    pub fn check(&self) -> Result<SpaceEntry, ConfigError> {
+        let candidates = [
+            ("uniform", self.uniform.as_ref().map(Distribution::uniform)),
+            ("truncated-normal", self.truncated_normal.as_ref().map(Distribution::truncated_normal)),
+            ("log-normal", self.log_normal.as_ref().map(Distribution::log_normal)),
+            ("choice", self.choice.as_ref().map(Distribution::choice)),
+            ("empirical", self.empirical.as_ref().map(Distribution::empirical)),
+            ("fixed", self.fixed.as_ref().map(Distribution::fixed)),
+        ];
+        let mut given = candidates.into_iter().filter_map(|(key, candidate)| Some((key, candidate?)));
+        let Some((key, distribution)) = given.next() else {
+            return Err(ConfigError { path: KeyPath::default(), problem: Problem::Missing { needed: DISTRIBUTIONS } });
+        };
+        if let Some((second, _)) = given.next() {
+            let rule = "a parameter has exactly one distribution".to_owned();
+            return Err(ConfigError::new(second, Problem::Contradiction { other: key, rule }));
+        }
+        Ok(SpaceEntry {
+            distribution: distribution.map_err(|error| error.within(key))?,
+            provenance: self.provenance()?,
+            note: self.note.clone(),
+        })
+    }
+
+    fn provenance(&self) -> Result<Provenance, ConfigError> {
+        match (&self.fitted, &self.assumed) {
+            (Some(_), Some(_)) => {
+                let rule = "a distribution is either fitted or assumed".to_owned();
+                Err(ConfigError::new("assumed", Problem::Contradiction { other: "fitted", rule }))
+            }
+            (Some(fitted), None) => {
+                fitted.check().map_err(|error| error.within("fitted"))?;
+                Ok(Provenance::Fitted(fitted.clone()))
+            }
+            (None, Some(why)) if why.trim().is_empty() => {
+                Err(ConfigError::new("assumed", Problem::Missing { needed: "the reason for the assumption" }))
+            }
+            (None, Some(why)) => Ok(Provenance::Assumed(why.clone())),
+            (None, None) => Ok(Provenance::Unstated),
+        }
+    }
+}
+
+impl FittedConfig {
+    fn check(&self) -> Result<(), ConfigError> {
+        if self.n == 0 {
+            return Err(ConfigError::new(
+                "n",
+                Problem::WrongCount { value: self.n, allowed: "at least 1 observation" },
+            ));
+        }
+        if self.source.trim().is_empty() {
+            return Err(ConfigError::new("source", Problem::Missing { needed: "what it was fitted to" }));
+        }
+        if let Some([low, high]) = self.interval_95 {
+            FINITE.check(low, "interval-95")?;
+            at_least(low).check(high, "interval-95")?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,264 @@
+//! Distributions that cannot be invalid.
+
+use std::collections::BTreeMap;
+
+use closecall_traffic::{ConfigError, KeyPath, Problem, Range, Value};
+
+use super::config::{EmpiricalConfig, LogNormalConfig, TruncatedNormalConfig, UniformConfig};
+use super::empirical;
+use super::normal::TruncatedStandardNormal;
+
+/// Largest magnitude of any number in a distribution. No quantity of a scenario comes near it, and sums and products of
+/// such numbers stay finite.
+const MAGNITUDE_LIMIT: f64 = 1e12;
+
+/// Numbers of any size that makes sense.
+pub(super) const FINITE: Range = Range::closed(-MAGNITUDE_LIMIT, MAGNITUDE_LIMIT);
+
+/// Positive numbers of any size that makes sense.
+const POSITIVE: Range = Range::above(0.0, MAGNITUDE_LIMIT);
+
+/// Numbers from `low` upwards.
+pub(super) const fn at_least(low: f64) -> Range {
+    Range::closed(low, MAGNITUDE_LIMIT)
+}
+
+/// The probability that lies between neighbouring numbers of a random generator, 2⁻⁵³, halved: smaller ones are not
+/// distinguished, so that the quantile at 0 of an unbounded distribution is its practical minimum.
+const SMALLEST_PROBABILITY: f64 = f64::EPSILON / 4.0;
+
+/// Largest standard deviation of a logarithm: already nine orders of magnitude between the quartiles' tails.
+const LARGEST_SIGMA: f64 = 10.0;
+
+/// Where the median lies.
+const HALF: f64 = 0.5;
+
+/// The distribution of one parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Distribution(Kind);
+
+#[derive(Clone, Debug, PartialEq)]
+enum Kind {
+    Uniform { min: f64, max: f64 },
+    TruncatedNormal { mean: f64, sd: f64, bounds: [f64; 2], standard: TruncatedStandardNormal },
+    LogNormal { median: f64, sigma: f64, max: Option<f64>, standard: TruncatedStandardNormal },
+    Choice(Weights),
+    Empirical { quantiles: Vec<f64> },
+    Fixed(Value),
+}
+
+/// Labels with a positive probability, in the order of the labels.
+#[derive(Clone, Debug, PartialEq)]
+struct Weights {
+    labels: Vec<String>,
+    /// Probability of each label and all before it.
+    cumulative: Vec<f64>,
+    /// Places of the labels, most probable first, equally probable ones in the order of the labels.
+    by_weight: Vec<usize>,
+}
+
+impl Distribution {
+    /// Equally probable between two bounds.
+    ///
+    /// # Errors
+    /// Unless both are finite and the upper one is larger.
+    pub fn uniform(config: &UniformConfig) -> Result<Self, ConfigError> {
+        let [min, max] = bounds(config.min, config.max)?;
+        Ok(Self(Kind::Uniform { min, max }))
+    }
+
+    /// Normal, cut off at two bounds.
+    ///
+    /// # Errors
+    /// Unless all are finite, the standard deviation positive, the upper bound larger than the lower, and some
+    /// probability left between them.
+    pub fn truncated_normal(config: &TruncatedNormalConfig) -> Result<Self, ConfigError> {
+        let mean = FINITE.check(config.mean, "mean")?;
+        let sd = POSITIVE.check(config.sd, "sd")?;
+        let [min, max] = bounds(config.min, config.max)?;
+        let standard = TruncatedStandardNormal::new((min - mean) / sd, (max - mean) / sd).ok_or_else(|| {
+            let rule = format!("no probability is left between `min` and `max` (sd {sd})");
+            ConfigError::new("mean", Problem::Contradiction { other: "min", rule })
+        })?;
+        Ok(Self(Kind::TruncatedNormal { mean, sd, bounds: [min, max], standard }))
+    }
+
+    /// Log-normal, perhaps cut off above.
+    ///
+    /// # Errors
+    /// Unless all are finite and positive, and some probability is left below the bound.
+    pub fn log_normal(config: &LogNormalConfig) -> Result<Self, ConfigError> {
+        let median = POSITIVE.check(config.median, "median")?;
+        let sigma = Range::above(0.0, LARGEST_SIGMA).check(config.sigma, "sigma")?;
+        let max = config.max.map(|max| POSITIVE.check(max, "max")).transpose()?;
+        let high = max.map_or(f64::INFINITY, |max| (max / median).ln() / sigma);
+        let standard = TruncatedStandardNormal::new(f64::NEG_INFINITY, high).ok_or_else(|| {
+            let rule = format!("no probability is left below it (sigma {sigma})");
+            ConfigError::new("max", Problem::Contradiction { other: "median", rule })
+        })?;
+        Ok(Self(Kind::LogNormal { median, sigma, max, standard }))
+    }
+
+    /// One of several labels; those with weight 0 never occur.
+    ///
+    /// # Errors
+    /// Unless every label is a word, every weight finite and not negative, and one of them positive.
+    pub fn choice(weights: &BTreeMap<String, f64>) -> Result<Self, ConfigError> {
+        for (label, &weight) in weights {
+            label_is_a_word(label).map_err(|problem| ConfigError::new(label, problem))?;
+            at_least(0.0).check(weight, label)?;
+        }
+        let possible: Vec<(&String, f64)> =
+            weights.iter().filter(|(_, weight)| **weight > 0.0).map(|(label, weight)| (label, *weight)).collect();
+        let total: f64 = possible.iter().map(|(_, weight)| weight).sum();
+        if !(total > 0.0) {
+            return Err(here(Problem::Missing { needed: "a label with a weight above 0" }));
+        }
+        let mut sum = 0.0;
+        let cumulative = possible.iter().map(|(_, weight)| {
+            sum += weight;
+            sum / total
+        });
+        let mut by_weight: Vec<usize> = (0..possible.len()).collect();
+        by_weight.sort_by(|&a, &b| possible[b].1.total_cmp(&possible[a].1).then(a.cmp(&b)));
+        Ok(Self(Kind::Choice(Weights {
+            cumulative: cumulative.collect(),
+            labels: possible.iter().map(|(label, _)| (*label).clone()).collect(),
+            by_weight,
+        })))
+    }
+
+    /// Given by quantiles at equally spaced probabilities from 0 to 1, linear between them.
+    ///
+    /// # Errors
+    /// Unless there are two or more finite numbers that do not fall.
+    pub fn empirical(config: &EmpiricalConfig) -> Result<Self, ConfigError> {
+        let quantiles = &config.quantiles;
+        if quantiles.len() < 2 {
+            let problem =
+                Problem::WrongCount { value: quantiles.len() as u64, allowed: "a list of at least 2 numbers" };
+            return Err(ConfigError::new("quantiles", problem));
+        }
+        for (index, &value) in quantiles.iter().enumerate() {
+            let allowed = if index == 0 { FINITE } else { at_least(quantiles[index - 1]) };
+            if !allowed.contains(value) {
+                let error = here(Problem::OutOfRange { value, allowed });
+                return Err(error.within_index(index).within("quantiles"));
+            }
+        }
+        Ok(Self(Kind::Empirical { quantiles: quantiles.clone() }))
+    }
+
+    /// Always the same value.
+    ///
+    /// # Errors
+    /// Unless it is a finite number or a word.
+    pub fn fixed(value: &Value) -> Result<Self, ConfigError> {
+        match value {
+            Value::Number(number) if !FINITE.contains(*number) => {
+                Err(here(Problem::OutOfRange { value: *number, allowed: FINITE }))
+            }
+            Value::Label(label) => label_is_a_word(label).map_err(here).map(|()| Self(Kind::Fixed(value.clone()))),
+            Value::Number(_) => Ok(Self(Kind::Fixed(value.clone()))),
+        }
+    }
+
+    /// The value below which the share `u` of the probability lies, for `u` in [0, 1).
+    ///
+    /// For labels: the label that `u` falls on when they are laid side by side, in their order, as wide as probable.
+    pub fn quantile(&self, u: f64) -> Value {
+        debug_assert!((0.0..1.0).contains(&u), "quantile at {u}");
+        match &self.0 {
+            Kind::Uniform { min, max } => Value::Number((min + u * (max - min)).clamp(*min, *max)),
+            Kind::TruncatedNormal { mean, sd, bounds: [min, max], standard } => {
+                Value::Number((mean + sd * standard.quantile(u)).clamp(*min, *max))
+            }
+            Kind::LogNormal { median, sigma, max, standard } => {
+                let z = standard.quantile(u.max(SMALLEST_PROBABILITY));
+                Value::Number((median * (sigma * z).exp()).min(max.unwrap_or(f64::INFINITY)))
+            }
+            Kind::Choice(weights) => {
+                let place = weights.cumulative.partition_point(|&cumulative| cumulative <= u);
+                Value::Label(weights.labels[place.min(weights.labels.len() - 1)].clone())
+            }
+            Kind::Empirical { quantiles } => Value::Number(empirical::quantile(quantiles, u)),
+            Kind::Fixed(value) => value.clone(),
+        }
+    }
+
+    /// The nominal value: the median, or the most probable label (the first of several).
+    pub fn nominal(&self) -> Value {
+        match &self.0 {
+            Kind::Choice(weights) => Value::Label(weights.labels[weights.by_weight[0]].clone()),
+            _ => self.quantile(HALF),
+        }
+    }
+
+    /// The share of the probability at or below `x`; nothing for labels.
+    pub fn cdf(&self, x: f64) -> Option<f64> {
+        match &self.0 {
+            Kind::Uniform { min, max } => Some(((x - min) / (max - min)).clamp(0.0, 1.0)),
+            Kind::TruncatedNormal { mean, sd, standard, .. } => Some(standard.cdf((x - mean) / sd)),
+            Kind::LogNormal { .. } if x <= 0.0 => Some(0.0),
+            Kind::LogNormal { median, sigma, standard, .. } => Some(standard.cdf((x / median).ln() / sigma)),
+            Kind::Empirical { quantiles } => Some(empirical::cdf(quantiles, x)),
+            Kind::Fixed(Value::Number(value)) => Some(if x < *value { 0.0 } else { 1.0 }),
+            Kind::Choice(_) | Kind::Fixed(Value::Label(_)) => None,
+        }
+    }
+
+    /// The smallest and the largest number that [`Self::quantile`] gives, up to rounding; nothing for labels.
+    pub fn bounds(&self) -> Option<[f64; 2]> {
+        match (self.quantile(0.0), self.quantile(1.0 - SMALLEST_PROBABILITY * 2.0)) {
+            (Value::Number(min), Value::Number(max)) => Some([min, max]),
+            _ => None,
+        }
+    }
+
+    /// The labels that occur, in their order; empty for numbers.
+    pub fn labels(&self) -> &[String] {
+        match &self.0 {
+            Kind::Choice(weights) => &weights.labels,
+            Kind::Fixed(Value::Label(label)) => std::slice::from_ref(label),
+            _ => &[],
+        }
+    }
+
+    /// True where the value is always the same.
+    pub fn is_fixed(&self) -> bool {
+        matches!(self.0, Kind::Fixed(_))
+    }
+
+    /// How many different values a grid can take at most: 1 where fixed, the number of labels, else any number.
+    pub(crate) fn most_levels(&self) -> u64 {
+        match &self.0 {
+            Kind::Choice(weights) => weights.labels.len() as u64,
+            Kind::Fixed(_) => 1,
+            _ => u64::MAX,
+        }
+    }
+
+    /// Value `level` of `of` that represent the distribution: the medians of as many equally probable parts, or the
+    /// most probable labels.
+    pub(crate) fn level(&self, level: u64, of: u64) -> Value {
+        match &self.0 {
+            Kind::Choice(weights) => Value::Label(weights.labels[weights.by_weight[level as usize]].clone()),
+            _ => self.quantile((level as f64 + HALF) / of as f64),
+        }
+    }
+}
+
+/// An error at the distribution itself.
+fn here(problem: Problem) -> ConfigError {
+    ConfigError { path: KeyPath::default(), problem }
+}
+
+fn bounds(min: f64, max: f64) -> Result<[f64; 2], ConfigError> {
+    let min = FINITE.check(min, "min")?;
+    let max = Range::above(min, MAGNITUDE_LIMIT).check(max, "max")?;
+    Ok([min, max])
+}
+
+fn label_is_a_word(label: &str) -> Result<(), Problem> {
+    if label.trim().is_empty() { Err(Problem::Missing { needed: "a label that is not empty" }) } else { Ok(()) }
+}

@@ -1,0 +1,87 @@
+//! Reading numbers that must be finite: `nan` and `inf` are legal TOML, and are refused here by name, where the line
+//! of the file is still known.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use closecall_traffic::Value;
+use schemars::{Schema, SchemaGenerator, json_schema};
+use serde::de::{Error, Visitor};
+use serde::{Deserialize, Deserializer};
+
+/// A finite number as it stands in a file.
+struct Finite(f64);
+
+impl<'de> Deserialize<'de> for Finite {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        finite(f64::deserialize(deserializer)?).map(Self)
+    }
+}
+
+fn finite<E: Error>(value: f64) -> Result<f64, E> {
+    if value.is_finite() {
+        Ok(value)
+    } else {
+        Err(E::custom(format_args!("{value} is not allowed: a finite number is needed")))
+    }
+}
+
+struct ValueVisitor;
+
+impl Visitor<'_> for ValueVisitor {
+    type Value = Value;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a number or a label")
+    }
+
+    fn visit_f64<E: Error>(self, value: f64) -> Result<Value, E> {
+        finite(value).map(Value::Number)
+    }
+
+    fn visit_i64<E: Error>(self, value: i64) -> Result<Value, E> {
+        Ok(Value::Number(value as f64))
+    }
+
+    fn visit_u64<E: Error>(self, value: u64) -> Result<Value, E> {
+        Ok(Value::Number(value as f64))
+    }
+
+    fn visit_str<E: Error>(self, label: &str) -> Result<Value, E> {
+        Ok(Value::Label(label.to_owned()))
+    }
+}
+
+pub(super) fn value<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Value>, D::Error> {
+    deserializer.deserialize_any(ValueVisitor).map(Some)
+}
+
+pub(super) fn value_schema(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({
+        "description": "Always the same number or label.",
+        "anyOf": [{ "type": "number" }, { "type": "string", "minLength": 1 }]
+    })
+}
+
+pub(super) fn number<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Finite::deserialize(deserializer).map(|finite| finite.0)
+}
+
+pub(super) fn option<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
+    number(deserializer).map(Some)
+}
+
+pub(super) fn list<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<f64>, D::Error> {
+    let list = Vec::<Finite>::deserialize(deserializer)?;
+    Ok(list.into_iter().map(|finite| finite.0).collect())
+}
+
+pub(super) fn pair<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<[f64; 2]>, D::Error> {
+    let [low, high] = <[Finite; 2]>::deserialize(deserializer)?;
+    Ok(Some([low.0, high.0]))
+}
+
+pub(super) fn weights<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<BTreeMap<String, f64>>, D::Error> {
+    let weights = BTreeMap::<String, Finite>::deserialize(deserializer)?;
+    Ok(Some(weights.into_iter().map(|(label, weight)| (label, weight.0)).collect()))
+}

@@ -1,0 +1,30 @@
+//! The `[parameters]` of a scenario file: the only values that are sampled.
+//!
+//! Each parameter has one distribution, and says where it comes from:
+//!
+//! ```toml
+//! [parameters]
+//! cruise-mps    = { uniform = { min = 30.0, max = 33.2 }, assumed = "speeds of German motorways" }
+//! front-thw-s   = { truncated-normal = { mean = 0.7, sd = 0.15, min = 0.5, max = 0.9 } }
+//! reaction-s    = { log-normal = { median = 0.9, sigma = 0.3, max = 2.5 } }
+//! cut-out-thw-s = { empirical = { quantiles = [0.15, 0.19, 0.24, 0.31, 0.4] }, fitted = { n = 214, source = "US-101" } }
+//! rear-class    = { choice = { car = 0.8, truck = 0.1, motorcycle = 0.1 } }
+//! brake-mps2    = { fixed = 6.0 }
+//! ```
+//!
+//! Every distribution is evaluated through its quantile function alone, so that a sampling design
+//! ([`crate::sampling`]) is nothing but a way to choose one number in [0, 1) for each parameter.
+
+mod config;
+mod distribution;
+mod empirical;
+mod finite;
+mod normal;
+mod space;
+
+pub use config::{
+    EmpiricalConfig, FittedConfig, LogNormalConfig, ParameterConfig, ParametersConfig, TruncatedNormalConfig,
+    UniformConfig,
+};
+pub use distribution::Distribution;
+pub use space::{ParameterSpace, Provenance, SpaceEntry};
