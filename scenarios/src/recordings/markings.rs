@@ -1,0 +1,86 @@
+//! Where the lane markings are, told from the recorded lanes.
+
+use std::collections::BTreeMap;
+
+use closecall_traffic::{Lane, Trajectory};
+
+/// Width of a lane where a recording tells none [m]: the usual width on motorways in built-up areas, between NGSIM's
+/// 3.4 m and the 3.75 m of the open road.
+pub const DEFAULT_LANE_WIDTH_M: f64 = 3.5;
+
+/// Lateral positions of lane markings.
+///
+/// A marking lies where vehicles are when their recorded lane changes to the one beside: the median over all such
+/// changes, each taken half-way between its two frames. The left edge of lane 1 is d = 0 by definition.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LaneMarkings {
+    right_edge_m: BTreeMap<u8, f64>,
+}
+
+impl LaneMarkings {
+    /// The markings that the recorded lanes of `trajectories` tell.
+    pub fn of(trajectories: &[Trajectory]) -> Self {
+        let mut crossings: BTreeMap<u8, Vec<f64>> = BTreeMap::new();
+        for pair in trajectories.iter().flat_map(|track| track.points.windows(2)) {
+            let [before, after] = pair else { continue };
+            if before.lane.0.abs_diff(after.lane.0) == 1 {
+                let left = before.lane.0.min(after.lane.0);
+                crossings.entry(left).or_default().push(0.5 * (before.d_m + after.d_m));
+            }
+        }
+        Self { right_edge_m: crossings.into_iter().filter_map(|(lane, d)| Some((lane, median(d)?))).collect() }
+    }
+
+    /// Lateral position of the marking to the right of `lane` [m], where known.
+    pub fn right_edge_m(&self, lane: Lane) -> Option<f64> {
+        self.right_edge_m.get(&lane.0).copied()
+    }
+
+    /// Lateral position of the marking to the left of `lane` [m], where known.
+    pub fn left_edge_m(&self, lane: Lane) -> Option<f64> {
+        if lane.0 == 1 { Some(0.0) } else { self.right_edge_m(Lane(lane.0.checked_sub(1)?)) }
+    }
+
+    /// Width of `lane` [m], where both of its markings are known.
+    pub fn lane_width_m(&self, lane: Lane) -> Option<f64> {
+        let width = self.left_edge_m(lane)? - self.right_edge_m(lane)?;
+        (width > 0.0).then_some(width)
+    }
+
+    /// The median of the known widths [m], or [`DEFAULT_LANE_WIDTH_M`].
+    pub fn typical_lane_width_m(&self) -> f64 {
+        let widths = self.right_edge_m.keys().filter_map(|lane| self.lane_width_m(Lane(*lane)));
+        median(widths.collect()).unwrap_or(DEFAULT_LANE_WIDTH_M)
+    }
+}
+
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    let upper = *values.get(middle)?;
+    Some(if values.len() % 2 == 1 { upper } else { 0.5 * (values[middle - 1] + upper) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recordings::test_support::straight_track;
+
+    #[test]
+    fn markings_lie_where_the_recorded_lane_changes() {
+        let crossing = |lane: u8, d_m: f64| {
+            let mut track = straight_track(1, 0.0, 20.0, d_m, 4);
+            for (k, point) in track.points.iter_mut().enumerate() {
+                point.d_m = d_m + 0.1 * (1.5 - k as f64);
+                point.lane = Lane(if k < 2 { lane } else { lane + 1 });
+            }
+            track
+        };
+        let markings = LaneMarkings::of(&[crossing(1, -3.4), crossing(1, -3.6), crossing(2, -7.1)]);
+        assert!((markings.right_edge_m(Lane(1)).unwrap() + 3.5).abs() < 1e-9);
+        assert!((markings.lane_width_m(Lane(2)).unwrap() - 3.6).abs() < 1e-9);
+        assert_eq!(markings.lane_width_m(Lane(3)), None);
+        assert!((markings.typical_lane_width_m() - 3.55).abs() < 1e-9);
+        assert_eq!(LaneMarkings::default().typical_lane_width_m(), DEFAULT_LANE_WIDTH_M);
+    }
+}

@@ -1,0 +1,88 @@
+//! Recorded traffic: reading it, knowing how good it is, and writing it.
+//!
+//! ```text
+//!   file (plain or gzip) ─▶ rows, one line at a time ─▶ layout ─▶ instants in SI units ─▶ tracks without gaps ─▶ Recording
+//! ```
+//!
+//! Two layouts are read, and told apart by what the file holds, not by its name:
+//!
+//! - **plain**: CSV with a header, metres, one row for each (track, frame). The columns `recording_id, track_id,
+//!   vehicle_id, frame, time_s, s_m, d_m, lane_id, speed_mps, accel_mps2, heading_rel_rad, x_m, y_m, length_m, width_m,
+//!   vehicle_class, source_scenario`; this is also what [`write_recording`] writes. `d_m` in the file is positive to the
+//!   *right* of the left edge of lane 1.
+//! - **NGSIM**: the 18 columns of the US DOT's NGSIM vehicle trajectories (DOI 10.21949/1504477) in feet and feet per
+//!   second, either separated by blanks without a header, as originally published, or with a header and commas; or the
+//!   25 columns of the catalogue's CSV export, with a byte order mark and thousands separators.
+//!
+//! # What the reader does
+//!
+//! - Units become SI. `d` becomes positive to the left, 0 at the left edge of the leftmost lane. NGSIM's `Local_Y` is the
+//!   middle of the front bumper: half a length is taken off to get the box's centre. `Local_X` is kept: across a lane
+//!   change at 0.05 rad the front is 0.1 m beside the centre, which is below NGSIM's own accuracy.
+//! - Rows may come in any order. NGSIM numbers recur after gaps: a vehicle's rows are sorted by frame and split wherever
+//!   a frame is missing. The first piece keeps the number, the others get numbers above the largest in the file.
+//! - NGSIM times are milliseconds; where they count from 1970 they are counted from the recording's first frame instead.
+//! - What a layout does not carry is derived by differences between neighbouring frames: the acceleration where its
+//!   field is empty, lateral speed (from the heading where there is one) and lateral acceleration.
+//! - Anything else is refused, with line, column and what is allowed. Nothing is guessed, skipped or repaired.
+
+mod assemble;
+mod error;
+mod fields;
+mod layout;
+mod markings;
+mod ngsim;
+mod plain;
+mod quality;
+mod read;
+mod rows;
+#[cfg(test)]
+pub(crate) mod test_support;
+mod write;
+
+use closecall_traffic::{Time, Trajectory};
+use serde::Serialize;
+
+pub use error::{RecordingError, RecordingProblem, WriteError};
+pub use markings::{DEFAULT_LANE_WIDTH_M, LaneMarkings};
+pub use quality::{Quality, quality};
+pub use read::{read, read_from};
+pub use write::write_recording;
+
+/// The layout of a recording's file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Layout {
+    /// CSV in metres.
+    Plain,
+    /// NGSIM's 18 columns in feet.
+    Ngsim18,
+    /// The 25 columns of NGSIM's catalogue export.
+    Ngsim25,
+}
+
+/// Recorded traffic on one road.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recording {
+    /// Its name: as the file states it, or else the file's name without its extension.
+    pub name: String,
+    /// The layout it was read from, or is to be written in.
+    pub layout: Layout,
+    /// Time between two frames.
+    pub period: Time,
+    /// Where the lane markings are, as far as the recorded lanes tell.
+    pub markings: LaneMarkings,
+    /// The tracks in the order of their numbers.
+    pub trajectories: Vec<Trajectory>,
+    /// BLAKE3 hash of the file, in hexadecimal digits; empty where there is no file.
+    pub hash: String,
+}
+
+impl Recording {
+    /// A recording made of `trajectories`, which are put in the order of their numbers.
+    pub fn new(name: &str, period: Time, mut trajectories: Vec<Trajectory>) -> Self {
+        trajectories.sort_by_key(|track| track.track_id);
+        let markings = LaneMarkings::of(&trajectories);
+        Self { name: name.to_owned(), layout: Layout::Plain, period, markings, trajectories, hash: String::new() }
+    }
+}

@@ -1,0 +1,99 @@
+//! Writing the plain layout.
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use closecall_traffic::{Dimensions, Time, Trajectory, TrajectoryPoint};
+
+use super::plain::HEADER;
+use super::{Recording, WriteError};
+use crate::atomic::write_atomically;
+
+/// What the column `source_scenario` says.
+const SOURCE: &str = "closecall";
+
+/// Times may lie beside a frame by this share of the period.
+const OFF_CLOCK: f64 = 0.01;
+
+/// Writes `recording` in the plain layout, one row for each (track, frame); `x_m`, `y_m` are those of a straight road.
+///
+/// Lengths are written to 0.1 mm. The file appears at `path` as a whole, or not at all.
+///
+/// # Errors
+/// [`WriteError`] where the file cannot be written, a number is not finite, or an instant lies between two frames.
+pub fn write_recording(recording: &Recording, path: &Path) -> Result<(), WriteError> {
+    let name = recording.name.replace(['"', '\n', '\r', ','], "_");
+    write_atomically(path, |file| {
+        writeln!(file, "{}", HEADER.join(","))?;
+        for track in &recording.trajectories {
+            for point in &track.points {
+                check_finite(track, point)?;
+                let frame = frame(track, point, recording.period)?;
+                write_row(file, &name, (track, point, frame))?;
+            }
+        }
+        Ok(())
+    })
+    .map_err(|failure| match failure {
+        Failure::Refused(error) => error,
+        Failure::Io(source) => WriteError::Io { path: path.to_owned(), source },
+    })
+}
+
+/// Why writing stopped, before it knows its file.
+enum Failure {
+    Refused(WriteError),
+    Io(io::Error),
+}
+
+impl From<io::Error> for Failure {
+    fn from(error: io::Error) -> Self {
+        Self::Io(error)
+    }
+}
+
+impl From<WriteError> for Failure {
+    fn from(error: WriteError) -> Self {
+        Self::Refused(error)
+    }
+}
+
+fn frame(track: &Trajectory, point: &TrajectoryPoint, period: Time) -> Result<i64, WriteError> {
+    let frames = point.time.s() / period.s();
+    let frame = frames.round();
+    if !((frames - frame).abs() <= OFF_CLOCK && frame >= 0.0) {
+        let (track_id, time_s, period_s) = (track.track_id, point.time.s(), period.s());
+        return Err(WriteError::OffClock { track_id, time_s, period_s });
+    }
+    #[expect(clippy::cast_possible_truncation, reason = "a whole number of frames, far below 2⁵³")]
+    Ok(frame as i64)
+}
+
+fn check_finite(track: &Trajectory, point: &TrajectoryPoint) -> Result<(), WriteError> {
+    let quantities = [
+        ("the position along the road", point.s_m),
+        ("the lateral position", point.d_m),
+        ("the speed", point.speed_mps),
+        ("the acceleration", point.acceleration_mps2),
+        ("the lateral speed", point.lateral_speed_mps),
+        ("the length", track.dimensions.length_m),
+        ("the width", track.dimensions.width_m),
+    ];
+    match quantities.into_iter().find(|(_, value)| !value.is_finite()) {
+        Some((what, _)) => Err(WriteError::NotFinite { track_id: track.track_id, time_s: point.time.s(), what }),
+        None => Ok(()),
+    }
+}
+
+fn write_row(
+    file: &mut dyn Write,
+    name: &str,
+    (track, point, frame): (&Trajectory, &TrajectoryPoint, i64),
+) -> io::Result<()> {
+    let TrajectoryPoint { s_m, d_m, lane, speed_mps, acceleration_mps2, .. } = point;
+    write!(file, "{name},{},{},{frame},{},", track.track_id, track.vehicle_id, point.time.s())?;
+    write!(file, "{s_m:.4},{:.4},{lane},{speed_mps:.4},{acceleration_mps2:.4},", -d_m)?;
+    write!(file, "{:.6},{s_m:.4},{d_m:.4},", point.lateral_speed_mps.atan2(*speed_mps))?;
+    let Dimensions { length_m, width_m, .. } = track.dimensions;
+    writeln!(file, "{length_m:.4},{width_m:.4},{},{SOURCE}", track.class.name())
+}
