@@ -7,5 +7,8 @@
 mod oriented_box;
 mod swept;
 
+#[cfg(test)]
+mod tests;
+
 pub use oriented_box::{BoxSide, OrientedBox};
 pub use swept::{Contact, first_contact};

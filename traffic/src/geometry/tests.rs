@@ -1,0 +1,274 @@
+//! Closed forms, and properties against independent brute force.
+
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, SQRT_2};
+
+use nalgebra::{Rotation2, Vector2};
+use proptest::prelude::*;
+use serde::Deserialize;
+use serde::de::{IntoDeserializer, value};
+
+use super::*;
+
+const CAR: OrientedBox = OrientedBox { x_m: 0.0, y_m: 0.0, yaw_rad: 0.0, length_m: 4.0, width_m: 2.0 };
+
+fn car(x_m: f64, y_m: f64, yaw_rad: f64) -> OrientedBox {
+    OrientedBox { x_m, y_m, yaw_rad, ..CAR }
+}
+
+/// The box, turned about the plane's origin and shifted.
+fn transformed(shape: &OrientedBox, turn_rad: f64, shift: Vector2<f64>) -> OrientedBox {
+    let centre = Rotation2::new(turn_rad) * shape.centre_m() + shift;
+    OrientedBox { x_m: centre.x, y_m: centre.y, yaw_rad: shape.yaw_rad + turn_rad, ..*shape }
+}
+
+/// The mirror image at the plane's x axis.
+fn mirrored(shape: &OrientedBox) -> OrientedBox {
+    OrientedBox { y_m: -shape.y_m, yaw_rad: -shape.yaw_rad, ..*shape }
+}
+
+/// The pose at a fraction of the step.
+fn between(from: &OrientedBox, to: &OrientedBox, fraction: f64) -> OrientedBox {
+    let at = |from: f64, to: f64| from + fraction * (to - from);
+    let (x_m, y_m) = (at(from.x_m, to.x_m), at(from.y_m, to.y_m));
+    OrientedBox { x_m, y_m, yaw_rad: at(from.yaw_rad, to.yaw_rad), ..*from }
+}
+
+/// Distance by looking at every pair of edges and at whether a corner lies inside, sharing nothing with the code.
+fn brute_force_distance_m(a: &OrientedBox, b: &OrientedBox) -> f64 {
+    let edges = |shape: &OrientedBox| {
+        let corners = shape.corners_m();
+        [0, 1, 2, 3].map(|i| (corners[i], corners[(i + 1) % 4]))
+    };
+    let cross = |u: Vector2<f64>, v: Vector2<f64>| u.x * v.y - u.y * v.x;
+    let inside = |point: Vector2<f64>, shape: &OrientedBox| {
+        edges(shape).iter().all(|(from, to)| cross(to - from, point - from) >= 0.0)
+    };
+    if a.corners_m().iter().any(|corner| inside(*corner, b)) || b.corners_m().iter().any(|corner| inside(*corner, a)) {
+        return 0.0;
+    }
+    let to_segment = |point: Vector2<f64>, (from, to): (Vector2<f64>, Vector2<f64>)| {
+        let along = ((point - from).dot(&(to - from)) / (to - from).norm_squared()).clamp(0.0, 1.0);
+        (from + (to - from) * along - point).norm()
+    };
+    let mut nearest = f64::INFINITY;
+    for e in edges(a) {
+        for f in edges(b) {
+            let crosses = cross(e.1 - e.0, f.0 - e.0) * cross(e.1 - e.0, f.1 - e.0) <= 0.0
+                && cross(f.1 - f.0, e.0 - f.0) * cross(f.1 - f.0, e.1 - f.0) <= 0.0;
+            let apart = to_segment(e.0, f).min(to_segment(e.1, f)).min(to_segment(f.0, e)).min(to_segment(f.1, e));
+            nearest = nearest.min(if crosses { 0.0 } else { apart });
+        }
+    }
+    nearest
+}
+
+prop_compose! {
+    fn any_box()(
+        x_m in -12.0..12.0, y_m in -12.0..12.0, yaw_rad in -PI..PI, length_m in 0.5..17.0, width_m in 0.4..3.0,
+    ) -> OrientedBox {
+        OrientedBox { x_m, y_m, yaw_rad, length_m, width_m }
+    }
+}
+
+prop_compose! {
+    /// A box and where it is a step later: some turn, some do not.
+    fn any_step()(from in any_box(), dx in -15.0..15.0, dy in -15.0..15.0, turn in prop_oneof![Just(0.0), -1.5..1.5])
+        -> (OrientedBox, OrientedBox) {
+        (from, OrientedBox { x_m: from.x_m + dx, y_m: from.y_m + dy, yaw_rad: from.yaw_rad + turn, ..from })
+    }
+}
+
+#[test]
+fn corners_go_round_counter_clockwise_from_the_front_left() {
+    let [front_left, rear_left, rear_right, front_right] = car(10.0, 5.0, FRAC_PI_2).corners_m();
+    for (corner, x_m, y_m) in
+        [(front_left, 9.0, 7.0), (rear_left, 9.0, 3.0), (rear_right, 11.0, 3.0), (front_right, 11.0, 7.0)]
+    {
+        assert!((corner - Vector2::new(x_m, y_m)).norm() < 1e-12, "{corner}");
+    }
+}
+
+#[test]
+fn distance_of_known_places() {
+    assert_eq!(CAR.distance_m(&car(10.0, 0.0, 0.0)), 6.0);
+    assert_eq!(CAR.distance_m(&car(7.0, 6.0, 0.0)), 5.0, "corner to corner: 3, 4, 5");
+    assert_eq!(CAR.distance_m(&car(4.0, 0.0, 0.0)), 0.0, "touching");
+    assert!(CAR.overlaps(&car(4.0, 2.0, 0.0)), "corner on corner");
+    assert!(CAR.overlaps(&car(0.0, 0.0, FRAC_PI_2)), "a cross: no corner inside the other");
+    let turned = car(2.0 + 1.0 + 3.0 / SQRT_2, 0.0, FRAC_PI_4);
+    assert!((CAR.distance_m(&turned) - 1.0).abs() < 1e-12, "a corner ahead of the front");
+}
+
+#[test]
+fn nan_overlaps() {
+    let unknown = car(f64::NAN, 0.0, 0.0);
+    assert!(CAR.overlaps(&unknown) && unknown.overlaps(&CAR));
+    assert_eq!(CAR.distance_m(&unknown), 0.0);
+}
+
+#[test]
+fn a_rear_end_collision_in_closed_form() {
+    let lead = car(10.0, 0.3, 0.0);
+    let contact = first_contact(&CAR, &car(8.0, 0.0, 0.0), &lead, &lead).unwrap();
+    assert!((contact.fraction - 6.0 / 8.0).abs() < 1e-15);
+    assert_eq!(contact.sides, [BoxSide::Front, BoxSide::Rear]);
+    assert!((contact.x_m - 8.0).abs() < 1e-12 && (contact.y_m - 0.15).abs() < 1e-12, "middle of the common front");
+}
+
+#[test]
+fn a_side_swipe_strikes_right_and_left() {
+    let left_of_it = car(1.0, 3.0, 0.0);
+    let contact = first_contact(&left_of_it, &car(3.0, 1.0, 0.0), &CAR, &car(2.0, 0.0, 0.0)).unwrap();
+    assert!((contact.fraction - 0.5).abs() < 1e-15);
+    assert_eq!(contact.sides, [BoxSide::Right, BoxSide::Left]);
+}
+
+#[test]
+fn a_cut_in_with_the_front_corner_strikes_a_side() {
+    // Turned to the right while coming from the left: its front right corner meets the other's left side.
+    let contact = first_contact(&car(-2.0, 3.5, -0.3), &car(-1.5, 2.0, -0.3), &CAR, &CAR).unwrap();
+    assert_eq!(contact.sides[1], BoxSide::Left);
+    assert!((contact.y_m - 1.0).abs() < 1e-9);
+    let corner_beside = 2.0 * 0.3_f64.sin() + 0.3_f64.cos();
+    assert!((contact.fraction - (3.5 - corner_beside - 1.0) / 1.5).abs() < 1e-12);
+}
+
+#[test]
+fn a_turning_corner_in_closed_form() {
+    // The corner at the angle atan(1/2) rises as √5·sin(angle) and meets the wall's lower side at 1.8 m.
+    let wall = OrientedBox { x_m: 0.0, y_m: 2.3, yaw_rad: 0.0, length_m: 50.0, width_m: 1.0 };
+    let contact = first_contact(&CAR, &car(0.0, 0.0, 0.8), &wall, &wall).unwrap();
+    let angle = (1.8 / 5.0_f64.sqrt()).asin() - 0.5_f64.atan();
+    assert!((contact.fraction - angle / 0.8).abs() < 1e-9, "{} {}", contact.fraction, angle / 0.8);
+    assert_eq!(contact.sides[1], BoxSide::Right);
+    // It reaches 2.236 m at most: a wall at 2.3 m is never touched, one at 2.2360679 m just so.
+    let at = |y_m: f64| OrientedBox { y_m: y_m + 0.5, ..wall };
+    let touches = |y_m: f64| first_contact(&CAR, &car(0.0, 0.0, 2.0), &at(y_m), &at(y_m)).is_some();
+    assert!(!touches(5.0_f64.sqrt() + 1e-9) && touches(5.0_f64.sqrt() - 1e-9));
+}
+
+#[test]
+fn the_yaw_turns_by_the_shorter_way() {
+    let wall = OrientedBox { x_m: 0.0, y_m: 2.3, yaw_rad: 0.0, length_m: 50.0, width_m: 1.0 };
+    assert!(first_contact(&car(0.0, 0.0, PI - 0.01), &car(0.0, 0.0, 0.01 - PI), &wall, &wall).is_none());
+}
+
+#[test]
+fn a_thin_box_cannot_tunnel() {
+    let wall = OrientedBox { length_m: 1e-3, width_m: 10.0, x_m: 50.0, ..CAR };
+    let contact = first_contact(&CAR, &car(100.0, 0.0, 0.0), &wall, &wall).unwrap();
+    assert!((contact.fraction - (48.0 - 0.5e-3) / 100.0).abs() < 1e-15);
+}
+
+#[test]
+fn contact_at_the_ends_of_the_step_counts() {
+    let ahead = car(4.0, 0.0, 0.0);
+    assert_eq!(first_contact(&CAR, &CAR, &ahead, &ahead).map(|contact| contact.fraction), Some(0.0));
+    let later = car(6.0, 0.0, 0.0);
+    assert_eq!(first_contact(&CAR, &car(2.0, 0.0, 0.0), &later, &later).map(|contact| contact.fraction), Some(1.0));
+    assert_eq!(first_contact(&CAR, &car(1.999, 0.0, 0.0), &later, &later), None);
+}
+
+#[test]
+fn nan_is_a_contact() {
+    let far = car(100.0, 50.0, 0.1);
+    let ends = [car(f64::NAN, 0.0, 0.0), car(0.0, f64::NAN, 0.0), car(0.0, 0.0, f64::NAN)];
+    for unknown in ends {
+        // Within reach of each other's circles or not known to be out of it.
+        assert!(first_contact(&CAR, &unknown, &car(3.0, 3.0, 0.0), &car(3.0, 3.0, 0.0)).is_some(), "{unknown:?}");
+        assert!(first_contact(&unknown, &CAR, &car(3.0, 3.0, 0.0), &car(3.0, 3.0, 0.0)).is_some(), "{unknown:?}");
+    }
+    assert!(first_contact(&CAR, &car(f64::NAN, f64::NAN, 0.0), &far, &far).is_some());
+}
+
+#[test]
+fn sides_are_written_in_kebab_case() {
+    let read = |word: &str| BoxSide::deserialize(IntoDeserializer::<value::Error>::into_deserializer(word));
+    assert_eq!(["front", "rear", "left", "right"].map(read), BoxSide::ALL.map(Ok));
+}
+
+proptest! {
+    #[test]
+    fn distance_agrees_with_brute_force(a in any_box(), b in any_box()) {
+        let distance = a.distance_m(&b);
+        prop_assert!((distance - brute_force_distance_m(&a, &b)).abs() < 1e-9);
+        prop_assert_eq!(a.overlaps(&b), distance == 0.0);
+    }
+
+    #[test]
+    fn distance_knows_no_order_no_frame_and_no_handedness(
+        a in any_box(), b in any_box(), turn in -PI..PI, x in -500.0..500.0, y in -500.0..500.0,
+    ) {
+        let distance = a.distance_m(&b);
+        let shift = Vector2::new(x, y);
+        prop_assert!((distance - b.distance_m(&a)).abs() < 1e-9);
+        prop_assert!((distance - mirrored(&a).distance_m(&mirrored(&b))).abs() < 1e-9);
+        let moved = transformed(&a, turn, shift).distance_m(&transformed(&b, turn, shift));
+        prop_assert!((distance - moved).abs() < 1e-9);
+    }
+
+    #[test]
+    fn first_contact_agrees_with_a_dense_scan((a0, a1) in any_step(), (b0, b1) in any_step()) {
+        const STEPS: u32 = 400;
+        let distance_at = |fraction| brute_force_distance_m(&between(&a0, &a1, fraction), &between(&b0, &b1, fraction));
+        let contact = first_contact(&a0, &a1, &b0, &b1);
+        let free_until = contact.map_or(1.0, |contact| contact.fraction);
+        for step in 0..=STEPS {
+            let fraction = f64::from(step) / f64::from(STEPS);
+            if fraction < free_until - 1e-9 {
+                prop_assert!(distance_at(fraction) > 0.0, "missed a contact at {fraction}, found {contact:?}");
+            }
+        }
+        if let Some(contact) = contact {
+            prop_assert!(distance_at(contact.fraction) < 1e-9, "apart at the contact");
+            let point = OrientedBox { x_m: contact.x_m, y_m: contact.y_m, yaw_rad: 0.0, length_m: 0.0, width_m: 0.0 };
+            if contact.fraction > 0.0 {
+                prop_assert!(between(&a0, &a1, contact.fraction).distance_m(&point) < 2e-6);
+                prop_assert!(between(&b0, &b1, contact.fraction).distance_m(&point) < 2e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn a_graze_is_found_and_a_miss_by_as_little_is_not(
+        yaw in -PI..PI, turn in -0.2..0.2_f64, half_way in 1.0..20.0_f64, x_m in -1.5..1.5, depth in 1e-8..1e-3_f64,
+    ) {
+        // A car turns while it passes straight along a long wall; its outermost corner dips `depth` into the wall at
+        // one instant, or stays as far away from it.
+        let long = OrientedBox { x_m, y_m: 0.0, yaw_rad: 0.0, length_m: 200.0, width_m: 0.2 };
+        let outermost = |fraction: f64| {
+            let shape = car(0.0, 0.0, yaw + fraction * turn);
+            shape.corners_m().iter().fold(0.0_f64, |reach, corner| reach.max(corner.y))
+        };
+        let peak = (0..=20_000).map(|i| outermost(f64::from(i) / 20_000.0)).fold(0.0, f64::max);
+        let passes_at = |distance: f64| {
+            let y_m = -(0.1 + peak + distance);
+            first_contact(&car(-half_way, y_m, yaw), &car(half_way, y_m, yaw + turn), &long, &long).is_some()
+        };
+        prop_assert!(passes_at(-depth));
+        prop_assert!(!passes_at(depth + 1e-8));
+    }
+
+    #[test]
+    fn first_contact_knows_no_order_no_frame_and_no_handedness(
+        (a0, a1) in any_step(), (b0, b1) in any_step(), turn in -PI..PI, x in -500.0..500.0,
+    ) {
+        let fraction = |contact: Option<Contact>| contact.map(|contact| contact.fraction);
+        let near = |one: Option<f64>, other: Option<f64>| match (one, other) {
+            (Some(one), Some(other)) => (one - other).abs() < 1e-7,
+            (one, other) => one == other,
+        };
+        let contact = first_contact(&a0, &a1, &b0, &b1);
+        let swapped = first_contact(&b0, &b1, &a0, &a1);
+        let image = first_contact(&mirrored(&a0), &mirrored(&a1), &mirrored(&b0), &mirrored(&b1));
+        let moved = [a0, a1, b0, b1].map(|shape| transformed(&shape, turn, Vector2::new(x, 3.0)));
+        let moved = first_contact(&moved[0], &moved[1], &moved[2], &moved[3]);
+        for other in [swapped, image, moved] {
+            prop_assert!(near(fraction(contact), fraction(other)), "{contact:?} {other:?}");
+        }
+        if let (Some(contact), Some(image), Some(swapped)) = (contact, image, swapped) {
+            prop_assert_eq!(contact.sides.map(BoxSide::mirrored), image.sides);
+            prop_assert_eq!([contact.sides[1], contact.sides[0]], swapped.sides);
+        }
+    }
+}
