@@ -100,3 +100,126 @@ pub fn required_deceleration_mps2(
 fn or_most_critical(time_s: f64) -> f64 {
     time_s.max(0.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// How far a follower gets within `gap_m` of a lead in small steps of time, each vehicle braking until it stands.
+    fn smallest_gap_m(gap_m: f64, own: (f64, f64), lead: (f64, f64)) -> f64 {
+        let travelled_m = |(speed, deceleration): (f64, f64), time: f64| {
+            let time = if deceleration > 0.0 { time.min(speed / deceleration) } else { time };
+            speed * time - 0.5 * deceleration * time * time
+        };
+        let gap_at = |step: i32| {
+            let time = f64::from(step) * 0.01;
+            gap_m + travelled_m(lead, time) - travelled_m(own, time)
+        };
+        (0..10_000).map(gap_at).fold(f64::INFINITY, f64::min)
+    }
+
+    #[test]
+    fn headway_in_closed_form() {
+        assert_eq!(time_headway_s(21.0, 30.0), Ok(0.7));
+        assert_eq!(time_headway_s(-0.5, 30.0), Ok(0.0), "side by side in one lane is the most critical headway");
+        assert_eq!(time_headway_s(21.0, 0.0), Err(Absent::Standstill));
+        assert_eq!(time_headway_s(21.0, -1.0), Err(Absent::Standstill));
+    }
+
+    #[test]
+    fn time_to_collision_in_closed_form() {
+        assert_eq!(time_to_collision_s(50.0, 35.0, 30.0), Ok(10.0));
+        assert_eq!(time_to_collision_s(50.0, 30.0, 30.0), Err(Absent::NotApproaching));
+        assert_eq!(time_to_collision_s(0.0, 20.0, 30.0), Ok(0.0));
+    }
+
+    /// Worked by hand: E at 30 m/s with a front headway of 0.7 s brakes at 1 m/s² from R's detection at 100 m, closing
+    /// at 24 km/h, until R is 5 m behind: −20/3 + √((20/3)² + 190) = 8.645 s.
+    #[test]
+    fn the_papers_reference_point_gains_two_seconds_of_headway() {
+        let arrival_s = arrival_time_s(100.0, 24.0 / 3.6, 1.0, 5.0).unwrap();
+        assert!((arrival_s - 8.645).abs() < 1e-3, "{arrival_s}");
+        let front_gap_m = 0.7 * 30.0 + 0.5 * arrival_s * arrival_s;
+        let headway_s = time_headway_s(front_gap_m, 30.0 - arrival_s).unwrap();
+        assert!((headway_s - 2.7).abs() < 0.05, "{headway_s}");
+    }
+
+    #[test]
+    fn a_follower_that_falls_back_arrives_once_the_lead_has_braked() {
+        // −2 m/s of closing, 1 m/s² of braking, 16 m: −2t + t²/2 = 16 at t = 8 s.
+        assert_eq!(arrival_time_s(21.0, -2.0, 1.0, 5.0), Ok(8.0));
+        assert_eq!(arrival_time_s(21.0, -2.0, 0.0, 5.0), Err(Absent::NotApproaching));
+        // A lead that accelerates at 1 m/s² escapes one that closes at 5 m/s from 12.5 m on.
+        assert_eq!(arrival_time_s(12.5, 5.0, -1.0, 0.0), Ok(5.0));
+        assert_eq!(arrival_time_s(12.6, 5.0, -1.0, 0.0), Err(Absent::NotApproaching));
+    }
+
+    #[test]
+    fn required_deceleration_in_closed_form() {
+        assert_eq!(required_deceleration_mps2(25.0, 30.0, 20.0, 0.0), Ok(2.0));
+        assert_eq!(required_deceleration_mps2(50.0, 20.0, 0.0, 0.0), Ok(4.0), "a standing lead");
+        assert_eq!(required_deceleration_mps2(25.0, 30.0, 20.0, 1.0), Ok(3.0), "met while it still moves");
+        // The lead stands after 20²/(2·8) = 25 m: 30²/(2·(25 + 25)).
+        assert_eq!(required_deceleration_mps2(25.0, 30.0, 20.0, 8.0), Ok(9.0));
+        assert_eq!(required_deceleration_mps2(25.0, 20.0, 20.0, 0.0), Err(Absent::NotApproaching));
+        assert_eq!(required_deceleration_mps2(25.0, 21.0, 20.0, -1.0), Err(Absent::NotApproaching));
+        assert_eq!(required_deceleration_mps2(0.0, 30.0, 20.0, 0.0), Err(Absent::Touching));
+    }
+
+    #[cfg(not(debug_assertions))]
+    #[test]
+    fn nan_never_looks_safe() {
+        let nan = f64::NAN;
+        assert_eq!(time_headway_s(nan, 30.0), Ok(0.0));
+        assert_eq!(time_headway_s(20.0, nan), Ok(0.0));
+        for [gap, own, lead] in [[nan, 30.0, 20.0], [50.0, nan, 20.0], [50.0, 30.0, nan], [nan, nan, nan]] {
+            assert_eq!(time_to_collision_s(gap, own, lead), Ok(0.0));
+            for lead_deceleration in [0.0, 4.0, -1.0, nan] {
+                let required = required_deceleration_mps2(gap, own, lead, lead_deceleration);
+                assert_eq!(required, Ok(f64::INFINITY), "{gap} {own} {lead} {lead_deceleration}");
+            }
+        }
+        assert_eq!(required_deceleration_mps2(50.0, 30.0, 20.0, nan), Ok(f64::INFINITY));
+        assert_eq!(arrival_time_s(50.0, 5.0, nan, 5.0), Ok(0.0));
+        assert_eq!(arrival_time_s(50.0, -5.0, nan, 5.0), Ok(0.0));
+        assert_eq!(arrival_time_s(50.0, nan, 1.0, 5.0), Ok(0.0));
+    }
+
+    proptest! {
+        #[test]
+        fn at_the_arrival_the_gap_is_the_critical_one(
+            gap in 5.0..200.0, closing in -10.0..20.0, deceleration in -0.5..5.0, critical in 0.0..10.0,
+        ) {
+            if let Ok(time) = arrival_time_s(gap, closing, deceleration, critical) {
+                let gap_then = gap - closing * time - 0.5 * deceleration * time * time;
+                prop_assert!(time >= 0.0);
+                prop_assert!((gap_then - critical.min(gap)).abs() < 1e-6 * (1.0 + time * time));
+            }
+        }
+
+        #[test]
+        fn a_larger_gap_is_never_more_critical(
+            gap in 0.1..100.0, more in 0.1..50.0, own in 10.0..40.0, lead in 0.0..40.0, lead_deceleration in -1.0..8.0,
+        ) {
+            prop_assert!(time_headway_s(gap, own).unwrap() < time_headway_s(gap + more, own).unwrap());
+            if let Ok(time) = time_to_collision_s(gap, own, lead) {
+                prop_assert!(time < time_to_collision_s(gap + more, own, lead).unwrap());
+            }
+            let required = |gap| required_deceleration_mps2(gap, own, lead, lead_deceleration).unwrap_or(0.0);
+            prop_assert!(required(gap + more) <= required(gap) * (1.0 + 1e-12));
+        }
+
+        #[test]
+        fn the_required_deceleration_just_suffices(
+            gap in 1.0..80.0, own in 5.0..40.0, lead in 0.0..40.0, lead_deceleration in 0.0..9.0,
+        ) {
+            if let Ok(required) = required_deceleration_mps2(gap, own, lead, lead_deceleration) {
+                let smallest = |own_deceleration| smallest_gap_m(gap, (own, own_deceleration), (lead, lead_deceleration));
+                prop_assert!(smallest(required * 1.001) > -1e-6);
+                prop_assert!(smallest(required * 0.95) < 0.0 || own / required > 90.0);
+            }
+        }
+    }
+}

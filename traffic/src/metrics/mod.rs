@@ -15,5 +15,8 @@
 mod following;
 mod plane;
 
+#[cfg(test)]
+mod tests;
+
 pub use following::{arrival_time_s, required_deceleration_mps2, time_headway_s, time_to_collision_s};
 pub use plane::{Encounter, Moving, closest_encounter, time_to_touch_s};
