@@ -1,0 +1,95 @@
+//! What an overtaking driver is given by the scenario.
+
+use closecall_traffic::{Check, ConfigError, Num, Parameters, Problem, Range};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::driver::OvertakerDriver;
+use crate::driver::reaction::{Reaction, ReactionConfig};
+use crate::driver::{Wiedemann99, Wiedemann99Config};
+
+/// Duration of a whole lane change where the scenario gives none [s]: the recorded mean.
+const DEFAULT_DURATION_S: f64 = 6.8;
+
+/// How an overtaking driver follows.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum FollowConfig {
+    /// By Wiedemann 99.
+    Wiedemann99(Wiedemann99Config),
+}
+
+/// An overtaking driver as a scenario file describes it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct OvertakerConfig {
+    /// Time headway to the vehicle ahead when the driver's centre crosses the lane marking [s].
+    pub cut_out_thw_s: Num,
+    /// How it follows while it cannot overtake; its safe gap is also the least it accepts while pulling out.
+    pub follow: FollowConfig,
+    /// Reaction time [s].
+    pub reaction_s: ReactionConfig,
+    /// Time that the whole lane change takes [s]; 6.8.
+    pub lane_change_duration_s: Option<Num>,
+}
+
+/// A checked overtaking driver.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Overtaker {
+    pub(crate) cut_out_thw_s: f64,
+    pub(crate) follow: Wiedemann99,
+    pub(crate) reaction: Reaction,
+    pub(crate) duration_s: f64,
+}
+
+impl Overtaker {
+    /// Checks that a driver following a vehicle at `speed_mps` comes close enough to reach its cut-out headway.
+    ///
+    /// # Errors
+    /// Names the key where the safe gap cc0 + cc1·v is longer than the cut-out headway's gap at this speed.
+    pub fn check_reach(&self, speed_mps: f64) -> Result<(), ConfigError> {
+        let following_m = self.follow.safe_gap_m(speed_mps);
+        let wanted_m = self.cut_out_thw_s * speed_mps;
+        // Written so that NaN is refused.
+        if following_m <= wanted_m {
+            return Ok(());
+        }
+        let rule = format!(
+            "at {speed_mps:.1} m/s the driver follows at {following_m:.1} m or more (cc0 + cc1·v), and so never comes to \
+             the {wanted_m:.1} m at which it would cut out"
+        );
+        Err(ConfigError::new("cut-out-thw-s", Problem::Contradiction { other: "follow", rule }))
+    }
+
+    /// A driver for one run.
+    pub(crate) fn driver(&self) -> OvertakerDriver {
+        OvertakerDriver::new(*self)
+    }
+}
+
+impl Check for OvertakerConfig {
+    type Checked = Overtaker;
+
+    /// What holds at any speed is checked here; [`Overtaker::check_reach`] checks the rest, once speeds are known.
+    fn check(&self, parameters: &Parameters) -> Result<Overtaker, ConfigError> {
+        let cut_out_thw_s = parameters.number(&self.cut_out_thw_s, "cut-out-thw-s", Range::above(0.0, 5.0))?;
+        let FollowConfig::Wiedemann99(config) = &self.follow;
+        let inside = |error: ConfigError| error.within("wiedemann99").within("follow");
+        let follow = config.check(parameters).map_err(inside)?;
+        if follow.reaction.is_some() {
+            let rule = "the overtaking driver has one reaction time, which stands beside `follow`".to_owned();
+            let problem = Problem::Contradiction { other: "overtaker.reaction-s", rule };
+            return Err(inside(ConfigError::new("reaction-s", problem)));
+        }
+        if follow.parameters.cc1_s >= cut_out_thw_s {
+            let rule =
+                "cc1 is no less than the cut-out headway, so that the driver never comes close enough".to_owned();
+            return Err(ConfigError::new("cut-out-thw-s", Problem::Contradiction { other: "follow", rule }));
+        }
+        let duration_s = match &self.lane_change_duration_s {
+            Some(num) => parameters.number(num, "lane-change-duration-s", Range::closed(1.5, 20.0))?,
+            None => DEFAULT_DURATION_S,
+        };
+        Ok(Overtaker { cut_out_thw_s, follow, reaction: self.reaction_s.check(parameters)?, duration_s })
+    }
+}

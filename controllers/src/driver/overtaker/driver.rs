@@ -1,0 +1,321 @@
+//! The overtaking driver in the loop.
+
+use closecall_traffic::{Indicator, Lane, Side, Stream};
+
+use super::acceptance::{Intent, Tolerance};
+use super::conflict::Course;
+use super::{Overtaker, path};
+use crate::driver::perception::{Perceived, Perception, View};
+use crate::driver::wiedemann99::{Emergency, lift_off_for_light};
+use crate::driver::{
+    Driver, DriverAction, DriverError, DriverInput, DriverNote, HARDEST_BRAKING_MPS2, LaneChange, Wiedemann99Model,
+    finite,
+};
+
+/// Braking below which a driver who is about to be clear does not bother [m/s²].
+const TOLERATED_BRAKING_MPS2: f64 = 0.5;
+
+/// By how much a driver brakes harder than it thinks necessary [1].
+const BRAKING_MARGIN: f64 = 1.2;
+
+/// Room sideways between two boxes that counts as clear [m].
+const CLEAR_SIDEWAYS_M: f64 = 0.1;
+
+/// Duration of a change back into the own lane [s].
+const CHANGE_BACK_S: f64 = 3.0;
+
+/// Braking from which on a driver steers more sharply than it had meant to, to get clear sooner [m/s²].
+const SHARPER_STEERING_FROM_MPS2: f64 = 3.0;
+
+/// Lateral acceleration that an ordinary driver accepts in an evasive lane change [m/s²] (4 is seldom exceeded: Burg and
+/// Moser, Handbuch Verkehrsunfallrekonstruktion, 2017).
+const EVASIVE_LATERAL_MPS2: f64 = 3.0;
+
+/// Largest second derivative of the quintic: 10/√3, so that a path of width w and duration T peaks at 5.77·w/T².
+const QUINTIC_PEAK: f64 = 5.773_502_691_896_258;
+
+/// What the driver is about.
+#[derive(Clone, Copy, Debug)]
+enum Phase {
+    /// Comes up behind, or follows.
+    Approaching,
+    /// Changes to the passing lane.
+    Changing(Change),
+    /// Changes back.
+    Aborting { home: Lane },
+    /// Drives past in the passing lane.
+    Overtaking { overtaken: Option<usize> },
+    /// Has passed.
+    Passed,
+}
+
+/// A lane change under way.
+#[derive(Clone, Copy, Debug)]
+struct Change {
+    home: Lane,
+    target: Lane,
+    overtaken: Option<usize>,
+    start_s_m: f64,
+    way_m: f64,
+    /// Share of the way at which the driver is clear of the vehicle it overtakes.
+    clear_at: f64,
+    sharpened: bool,
+}
+
+impl Change {
+    fn way_to_clear_m(&self, s_m: f64) -> f64 {
+        self.clear_at * self.way_m - (s_m - self.start_s_m)
+    }
+}
+
+/// A human who overtakes.
+#[derive(Clone, Debug)]
+pub(crate) struct OvertakerDriver {
+    settings: Overtaker,
+    model: Wiedemann99Model,
+    desired_mps: Option<f64>,
+    perception: Option<Perception>,
+    phase: Phase,
+    emergency: Emergency,
+}
+
+impl OvertakerDriver {
+    pub(super) fn new(settings: Overtaker) -> Self {
+        Self {
+            settings,
+            model: Wiedemann99Model::new(&settings.follow),
+            desired_mps: settings.follow.desired_speed_mps,
+            perception: None,
+            phase: Phase::Approaching,
+            emergency: Emergency::default(),
+        }
+    }
+}
+
+impl Driver for OvertakerDriver {
+    fn step(&mut self, input: &DriverInput<'_>, rng: &mut Stream) -> Result<DriverAction, DriverError> {
+        let speed_mps = input.own.speed_mps;
+        let desired_mps = *self.desired_mps.get_or_insert(speed_mps);
+        let (reaction, side) = (self.settings.reaction, input.road.overtaking_side());
+        let senses = self.perception.get_or_insert_with(|| Perception::new(reaction.draw(rng), Some(side)));
+        let view = senses.look(input);
+        let moment = Moment { input, view: &view, side, speed_mps, desired_mps };
+        let mut action = match self.phase {
+            Phase::Approaching => self.approach(&moment),
+            Phase::Changing(change) => self.change(&moment, change),
+            Phase::Aborting { home } => self.abort(&moment, home),
+            Phase::Overtaking { overtaken } => self.overtake(&moment, overtaken),
+            Phase::Passed => self.cruise(&moment, None),
+        };
+        action.acceleration_mps2 =
+            finite(action.acceleration_mps2, "acceleration of an overtaking driver", input.time)?;
+        let emergency = self.emergency.note(action.acceleration_mps2);
+        action.note = action.note.or(emergency);
+        Ok(action)
+    }
+}
+
+/// One step's input, and what the driver makes of it.
+struct Moment<'a> {
+    input: &'a DriverInput<'a>,
+    view: &'a View,
+    side: Side,
+    speed_mps: f64,
+    desired_mps: f64,
+}
+
+impl Moment<'_> {
+    fn indicator(&self) -> Indicator {
+        match self.side {
+            Side::Left => Indicator::Left,
+            Side::Right => Indicator::Right,
+        }
+    }
+
+    /// A lane change from here to `target`, to be clear of `ahead`.
+    fn change(&self, home: Lane, target: Lane, ahead: Option<&Perceived>, duration_s: f64) -> Change {
+        let (own, road) = (self.input.own, self.input.road);
+        let sideways_m = (road.lane_centre_m(target) - own.d_m).abs();
+        let clear_at = ahead.map_or(0.0, |ahead| {
+            let apart_m = 0.5 * (self.input.vehicle.dimensions.width_m + ahead.width_m) + CLEAR_SIDEWAYS_M;
+            let offset_m = match self.side {
+                Side::Left => ahead.d_m - own.d_m,
+                Side::Right => own.d_m - ahead.d_m,
+            };
+            path::along((apart_m + offset_m) / sideways_m)
+        });
+        Change {
+            home,
+            target,
+            overtaken: ahead.map(|ahead| ahead.actor),
+            start_s_m: own.s_m,
+            way_m: self.speed_mps * duration_s,
+            clear_at,
+            sharpened: false,
+        }
+    }
+}
+
+impl OvertakerDriver {
+    fn approach(&mut self, moment: &Moment<'_>) -> DriverAction {
+        let home = moment.input.road.lane_at(moment.input.own.d_m);
+        let target = moment.input.road.beside(home, moment.side);
+        let (Some(ahead), Some(target), Some(lane)) =
+            (moment.view.ahead.as_ref(), target, moment.view.passing.as_ref())
+        else {
+            return self.cruise(moment, moment.view.ahead.as_ref());
+        };
+        let intent = self.intent(moment, ahead, Tolerance::TO_START);
+        let wants_to = moment.desired_mps > ahead.lead.speed_mps;
+        if !wants_to || !intent.accepts(lane) {
+            return self.cruise(moment, Some(ahead));
+        }
+        let change = moment.change(home, target, Some(ahead), self.settings.duration_s);
+        let course = self.course(moment, ahead, change.clear_at * change.way_m);
+        let keep_mps2 = self.model.acceleration_mps2(moment.speed_mps, moment.desired_mps, None);
+        let keep_mps2 = lift_off_for_light(keep_mps2, moment.speed_mps, Some(ahead));
+        // The centre crosses the marking half a lane width to the side: half of the way where it starts at the centre.
+        let crossing_m = path::along(0.5) * change.way_m;
+        let wanted_gap_m = self.settings.cut_out_thw_s * moment.speed_mps;
+        let pull_out = course.gap_after_m(crossing_m) <= wanted_gap_m
+            || course.gap_after_m(course.way_to_clear_m) <= course.least_gap_m;
+        if !pull_out {
+            return DriverAction { acceleration_mps2: keep_mps2, ..DriverAction::default() };
+        }
+        self.phase = Phase::Changing(change);
+        DriverAction {
+            acceleration_mps2: braked(keep_mps2, &course),
+            lane_change: Some(LaneChange { target, duration_s: self.settings.duration_s }),
+            indicator: moment.indicator(),
+            note: Some(DriverNote::CutOutStarted),
+        }
+    }
+
+    fn change(&mut self, moment: &Moment<'_>, mut change: Change) -> DriverAction {
+        let own = moment.input.own;
+        let over_the_marking = moment.input.road.lane_at(own.d_m) == change.target;
+        let overtaken = self.overtaken(moment, change.overtaken);
+        let way_to_clear_m = change.way_to_clear_m(own.s_m);
+        if over_the_marking && way_to_clear_m <= 0.0 {
+            self.phase = Phase::Overtaking { overtaken: change.overtaken };
+            return self.overtake(moment, change.overtaken);
+        }
+        if !over_the_marking && self.must_abort(moment, overtaken) {
+            self.phase = Phase::Aborting { home: change.home };
+            let back = LaneChange { target: change.home, duration_s: CHANGE_BACK_S };
+            let following = self.cruise(moment, moment.view.ahead.as_ref());
+            return DriverAction { lane_change: Some(back), note: Some(DriverNote::CutOutAborted), ..following };
+        }
+        let beside = self.follow_in_target(moment, change.target, overtaken);
+        let wanted = lift_off_for_light(beside, moment.speed_mps, overtaken.filter(|_| way_to_clear_m > 0.0));
+        let mut action =
+            DriverAction { acceleration_mps2: wanted, indicator: moment.indicator(), ..DriverAction::default() };
+        if let Some(ahead) = overtaken {
+            let course = self.course(moment, ahead, way_to_clear_m);
+            if !change.sharpened && course.needed_braking_mps2() > SHARPER_STEERING_FROM_MPS2 {
+                action.lane_change = sharpen(moment, &mut change, ahead, self.settings.duration_s);
+            }
+            action.acceleration_mps2 = braked(wanted, &self.course(moment, ahead, change.way_to_clear_m(own.s_m)));
+        }
+        self.phase = Phase::Changing(change);
+        action
+    }
+
+    fn abort(&mut self, moment: &Moment<'_>, home: Lane) -> DriverAction {
+        if moment.input.changing_to != Some(home) {
+            self.phase = Phase::Approaching;
+        }
+        self.cruise(moment, moment.view.ahead.as_ref())
+    }
+
+    fn overtake(&mut self, moment: &Moment<'_>, overtaken: Option<usize>) -> DriverAction {
+        // What was seen ahead a reaction time ago may still be the vehicle that is passed by now.
+        let ahead = moment.view.ahead.as_ref().filter(|seen| Some(seen.actor) != overtaken);
+        let mut action = self.cruise(moment, ahead);
+        if moment.input.changing_to.is_some() {
+            action.indicator = moment.indicator();
+        }
+        if has_passed(moment, overtaken) {
+            self.phase = Phase::Passed;
+            action.note = Some(DriverNote::Passed);
+        }
+        action
+    }
+
+    /// Drives on, or follows `ahead` by Wiedemann 99.
+    fn cruise(&mut self, moment: &Moment<'_>, ahead: Option<&Perceived>) -> DriverAction {
+        let lead = ahead.map(|seen| &seen.lead);
+        let wanted = self.model.acceleration_mps2(moment.speed_mps, moment.desired_mps, lead);
+        DriverAction {
+            acceleration_mps2: lift_off_for_light(wanted, moment.speed_mps, ahead),
+            ..DriverAction::default()
+        }
+    }
+
+    /// The acceleration that suits the vehicle ahead in the lane that the driver is changing to.
+    fn follow_in_target(&mut self, moment: &Moment<'_>, target: Lane, overtaken: Option<&Perceived>) -> f64 {
+        let overtaken = overtaken.map(|seen| seen.actor);
+        let seen = if moment.view.lane == target {
+            moment.view.ahead.as_ref().filter(|seen| Some(seen.actor) != overtaken)
+        } else {
+            moment.view.passing.as_ref().and_then(|lane| lane.lead.as_ref())
+        };
+        self.model.acceleration_mps2(moment.speed_mps, moment.desired_mps, seen.map(|seen| &seen.lead))
+    }
+
+    fn must_abort(&self, moment: &Moment<'_>, overtaken: Option<&Perceived>) -> bool {
+        let Some((ahead, lane)) = overtaken.zip(moment.view.passing.as_ref()) else { return false };
+        !self.intent(moment, ahead, Tolerance::TO_GO_ON).accepts(lane)
+    }
+
+    /// The vehicle that is being overtaken, while it is the nearest ahead.
+    fn overtaken<'a>(&self, moment: &Moment<'a>, actor: Option<usize>) -> Option<&'a Perceived> {
+        moment.view.ahead.as_ref().filter(|seen| Some(seen.actor) == actor)
+    }
+
+    fn intent(&self, moment: &Moment<'_>, ahead: &Perceived, tolerance: Tolerance) -> Intent {
+        Intent {
+            speed_mps: moment.speed_mps,
+            slow_mps: ahead.lead.speed_mps,
+            safe_gap_m: self.settings.follow.safe_gap_m(moment.speed_mps),
+            tolerance,
+        }
+    }
+
+    fn course(&self, moment: &Moment<'_>, ahead: &Perceived, way_to_clear_m: f64) -> Course {
+        let least_gap_m = self.settings.follow.safe_gap_m(ahead.lead.speed_mps);
+        Course { speed_mps: moment.speed_mps, lead: ahead.lead, way_to_clear_m, least_gap_m }
+    }
+}
+
+/// Steers as sharply as a human does in need, where that is sharper than planned.
+fn sharpen(moment: &Moment<'_>, change: &mut Change, ahead: &Perceived, planned_s: f64) -> Option<LaneChange> {
+    let sideways_m = (moment.input.road.lane_centre_m(change.target) - moment.input.own.d_m).abs();
+    let duration_s = (QUINTIC_PEAK * sideways_m / EVASIVE_LATERAL_MPS2).sqrt();
+    if duration_s >= planned_s {
+        return None;
+    }
+    *change = Change { sharpened: true, ..moment.change(change.home, change.target, Some(ahead), duration_s) };
+    Some(LaneChange { target: change.target, duration_s })
+}
+
+/// `wanted`, or the braking that the course needs.
+fn braked(wanted_mps2: f64, course: &Course) -> f64 {
+    let needed = course.needed_braking_mps2();
+    if needed > TOLERATED_BRAKING_MPS2 {
+        wanted_mps2.min(-(BRAKING_MARGIN * needed).min(HARDEST_BRAKING_MPS2))
+    } else {
+        wanted_mps2
+    }
+}
+
+/// True once the overtaken vehicle is wholly behind, in the lane beside.
+fn has_passed(moment: &Moment<'_>, overtaken: Option<usize>) -> bool {
+    let near = moment.input.neighbours;
+    let beside = match moment.side {
+        Side::Left => near.right.as_ref(),
+        Side::Right => near.left.as_ref(),
+    };
+    let follower = beside.and_then(|lane| lane.follower.as_ref());
+    overtaken.is_some() && follower.map(|follower| follower.actor) == overtaken
+}

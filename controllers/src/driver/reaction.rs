@@ -1,0 +1,168 @@
+//! A driver's reaction time: fixed, a parameter, or drawn once per run from the driver's own stream.
+//!
+//! Brake reaction times of unwarned drivers are log-normal, with medians from 0.7 s (expected) over 0.9 s to 1.3 s
+//! (surprised): Green, *How long does it take to stop?*, Transportation Human Factors 2 (2000) 195–216.
+
+use std::fmt;
+
+use closecall_traffic::{Check, ConfigError, Num, Parameters, Range, Stream};
+use rand_distr::{Distribution, StandardNormal};
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{self, IntoDeserializer, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
+
+/// Longest reaction time [s]: the memory of perception is as long as that.
+pub(crate) const LONGEST_REACTION_S: f64 = 3.0;
+
+/// A log-normal distribution by its median and the standard deviation of its logarithm.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct LogNormalConfig {
+    /// Median, above 0 and up to 3.
+    pub median: Num,
+    /// Standard deviation of the logarithm, 0 to 1.
+    pub sigma: Num,
+}
+
+/// A reaction time as a scenario file describes it: a number, `"$parameter"`, or `{ log-normal = { median, sigma } }`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ReactionConfig {
+    /// Drawn once per run from the driver's own random stream.
+    LogNormal(LogNormalConfig),
+    /// The value itself, or a parameter that gives it [s].
+    #[serde(untagged)]
+    Value(Num),
+}
+
+struct ReactionVisitor;
+
+/// The part of [`ReactionConfig`] that is a table.
+#[derive(Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+enum Drawn {
+    LogNormal(LogNormalConfig),
+}
+
+impl<'de> Visitor<'de> for ReactionVisitor {
+    type Value = ReactionConfig;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a number, a parameter such as \"$name\", or { log-normal = { median, sigma } }")
+    }
+
+    fn visit_f64<E: de::Error>(self, value: f64) -> Result<ReactionConfig, E> {
+        Num::deserialize(value.into_deserializer()).map(ReactionConfig::Value)
+    }
+
+    fn visit_i64<E: de::Error>(self, value: i64) -> Result<ReactionConfig, E> {
+        Num::deserialize(value.into_deserializer()).map(ReactionConfig::Value)
+    }
+
+    fn visit_u64<E: de::Error>(self, value: u64) -> Result<ReactionConfig, E> {
+        Num::deserialize(value.into_deserializer()).map(ReactionConfig::Value)
+    }
+
+    fn visit_str<E: de::Error>(self, text: &str) -> Result<ReactionConfig, E> {
+        Num::deserialize(text.into_deserializer()).map(ReactionConfig::Value)
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<ReactionConfig, A::Error> {
+        let Drawn::LogNormal(config) = Drawn::deserialize(MapAccessDeserializer::new(map))?;
+        Ok(ReactionConfig::LogNormal(config))
+    }
+}
+
+impl<'de> Deserialize<'de> for ReactionConfig {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(ReactionVisitor)
+    }
+}
+
+impl JsonSchema for ReactionConfig {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Reaction".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let value = generator.subschema_for::<Num>();
+        let drawn = generator.subschema_for::<Drawn>();
+        json_schema!({ "anyOf": [value, drawn] })
+    }
+}
+
+/// A checked reaction time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Reaction {
+    /// The same in every run [s]: 0 to 3.
+    Fixed(f64),
+    /// Drawn once per run.
+    LogNormal {
+        /// Median [s], above 0.
+        median_s: f64,
+        /// Standard deviation of the logarithm, 0 or more.
+        sigma: f64,
+    },
+}
+
+impl Reaction {
+    /// The reaction time of one driver in one run [s], never above 3 s.
+    pub fn draw(self, rng: &mut Stream) -> f64 {
+        match self {
+            Self::Fixed(value) => value,
+            Self::LogNormal { median_s, sigma } => {
+                let normal: f64 = StandardNormal.sample(rng);
+                (median_s * (sigma * normal).exp()).min(LONGEST_REACTION_S)
+            }
+        }
+    }
+}
+
+impl Check for ReactionConfig {
+    type Checked = Reaction;
+
+    fn check(&self, parameters: &Parameters) -> Result<Reaction, ConfigError> {
+        match self {
+            Self::Value(num) => {
+                let value = parameters.number(num, "reaction-s", Range::closed(0.0, LONGEST_REACTION_S))?;
+                Ok(Reaction::Fixed(value))
+            }
+            Self::LogNormal(config) => {
+                let place = |error: ConfigError| error.within("log-normal").within("reaction-s");
+                let range = Range::above(0.0, LONGEST_REACTION_S);
+                let median_s = parameters.number(&config.median, "median", range).map_err(place)?;
+                let sigma = parameters.number(&config.sigma, "sigma", Range::UNIT).map_err(place)?;
+                Ok(Reaction::LogNormal { median_s, sigma })
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use closecall_traffic::{ActorId, stream};
+
+    use super::*;
+
+    #[test]
+    fn a_drawn_reaction_has_the_median_asked_for() {
+        let mut rng = stream(0, 0, &ActorId::new("rear").unwrap(), "driver");
+        let reaction = Reaction::LogNormal { median_s: 0.9, sigma: 0.3 };
+        let mut drawn: Vec<f64> = (0..4001).map(|_| reaction.draw(&mut rng)).collect();
+        drawn.sort_by(f64::total_cmp);
+        assert!((drawn[2000] - 0.9).abs() < 0.02, "{}", drawn[2000]);
+        // The 84th percentile of a log-normal lies one sigma above the median in the logarithm.
+        assert!((drawn[3366] / drawn[2000] - 0.3_f64.exp()).abs() < 0.03);
+    }
+
+    #[test]
+    fn out_of_range_names_the_key() {
+        let none = Parameters::default();
+        let error = ReactionConfig::Value(Num::Fixed(-0.1)).check(&none).unwrap_err();
+        assert_eq!(error.path.to_string(), "reaction-s");
+        let config = LogNormalConfig { median: Num::Fixed(0.0), sigma: Num::Fixed(0.3) };
+        let error = ReactionConfig::LogNormal(config).check(&none).unwrap_err();
+        assert_eq!(error.path.to_string(), "reaction-s.log-normal.median");
+    }
+}

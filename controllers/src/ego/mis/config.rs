@@ -1,0 +1,106 @@
+//! The bounds of the margin increase system.
+
+use closecall_traffic::{Check, ConfigError, Num, Parameters, Range};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// The margin increase system as a scenario file describes it; what is absent has the paper's value.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
+pub struct MisConfig {
+    /// Strongest braking [m/s²]; 1.
+    pub max_deceleration_mps2: Option<Num>,
+    /// Strongest change of braking [m/s³]; 2.
+    pub max_jerk_mps3: Option<Num>,
+    /// Rear gap d_c at which the critical phase begins [m]; 5.
+    pub critical_gap_m: Option<Num>,
+    /// Front time headway to be gained [s]; 2.
+    pub thw_gain_s: Option<Num>,
+    /// Front time headway below which the margin counts as short [s]; 1.5.
+    pub short_thw_s: Option<Num>,
+    /// Rear gap from which on it engages [m]; 100.
+    pub engage_gap_m: Option<Num>,
+    /// Closing speed of R from which on it engages [m/s]; 10 km/h.
+    pub engage_closing_mps: Option<Num>,
+    /// How long E does not brake in the critical phase [s]; 2.
+    pub hold_s: Option<Num>,
+    /// Worst braking of F that has to leave room while holding [m/s²]; 8.
+    pub worst_front_braking_mps2: Option<Num>,
+}
+
+/// The checked bounds of the margin increase system.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MisSettings {
+    /// Strongest braking [m/s²].
+    pub max_deceleration_mps2: f64,
+    /// Strongest change of braking [m/s³].
+    pub max_jerk_mps3: f64,
+    /// Rear gap d_c at which the critical phase begins [m].
+    pub critical_gap_m: f64,
+    /// Front time headway to be gained [s].
+    pub thw_gain_s: f64,
+    /// Front time headway below which the margin counts as short [s].
+    pub short_thw_s: f64,
+    /// Rear gap from which on it engages [m].
+    pub engage_gap_m: f64,
+    /// Closing speed of R from which on it engages [m/s].
+    pub engage_closing_mps: f64,
+    /// How long E does not brake in the critical phase [s].
+    pub hold_s: f64,
+    /// Worst braking of F that has to leave room while holding [m/s²].
+    pub worst_front_braking_mps2: f64,
+}
+
+impl MisSettings {
+    /// The paper's values.
+    pub const PAPER: Self = Self {
+        max_deceleration_mps2: 1.0,
+        max_jerk_mps3: 2.0,
+        critical_gap_m: 5.0,
+        thw_gain_s: 2.0,
+        short_thw_s: 1.5,
+        engage_gap_m: 100.0,
+        engage_closing_mps: 10.0 / 3.6,
+        hold_s: 2.0,
+        worst_front_braking_mps2: 8.0,
+    };
+}
+
+impl Check for MisConfig {
+    type Checked = MisSettings;
+
+    fn check(&self, parameters: &Parameters) -> Result<MisSettings, ConfigError> {
+        let paper = MisSettings::PAPER;
+        let or = |num: &Option<Num>, key, range, default| match num {
+            Some(num) => parameters.number(num, key, range),
+            None => Ok(default),
+        };
+        let braking = Range::above(0.0, 9.0);
+        Ok(MisSettings {
+            max_deceleration_mps2: or(
+                &self.max_deceleration_mps2,
+                "max-deceleration-mps2",
+                braking,
+                paper.max_deceleration_mps2,
+            )?,
+            max_jerk_mps3: or(&self.max_jerk_mps3, "max-jerk-mps3", Range::above(0.0, 50.0), paper.max_jerk_mps3)?,
+            critical_gap_m: or(&self.critical_gap_m, "critical-gap-m", Range::closed(0.0, 50.0), paper.critical_gap_m)?,
+            thw_gain_s: or(&self.thw_gain_s, "thw-gain-s", Range::above(0.0, 10.0), paper.thw_gain_s)?,
+            short_thw_s: or(&self.short_thw_s, "short-thw-s", Range::above(0.0, 10.0), paper.short_thw_s)?,
+            engage_gap_m: or(&self.engage_gap_m, "engage-gap-m", Range::above(0.0, 300.0), paper.engage_gap_m)?,
+            engage_closing_mps: or(
+                &self.engage_closing_mps,
+                "engage-closing-mps",
+                Range::above(0.0, 50.0),
+                paper.engage_closing_mps,
+            )?,
+            hold_s: or(&self.hold_s, "hold-s", Range::closed(0.0, 10.0), paper.hold_s)?,
+            worst_front_braking_mps2: or(
+                &self.worst_front_braking_mps2,
+                "worst-front-braking-mps2",
+                braking,
+                paper.worst_front_braking_mps2,
+            )?,
+        })
+    }
+}

@@ -1,0 +1,215 @@
+//! What the tracks mean: the vehicle ahead, the vehicle behind, and the passing lane.
+//!
+//! Tracks give the centres of boxes in E's frame; gaps are bumper to bumper. A track counts as in a lane where the
+//! tracker gives that lane a probability of at least one half.
+
+use closecall_traffic::{Side, Source, Time, Track, TrackId, TrackStatus};
+
+use super::EgoInput;
+
+/// Probability from which on something counts as there, in that lane, and of that kind [1].
+const LIKELY: f64 = 0.5;
+
+/// Time constant with which the acceleration of the vehicle ahead follows its speed's change [s].
+const ACCELERATION_TIME_S: f64 = 0.2;
+
+/// Strongest acceleration that is believed of the vehicle ahead [m/s²].
+const BELIEVED_MPS2: f64 = 10.0;
+
+/// Distance that two vehicles in the passing lane have to keep from each other to count as free of each other [m].
+const FREE_DISTANCE_M: f64 = 15.0;
+
+/// Gap to E at which the vehicle behind is expected to start using the passing lane [m].
+const USES_PASSING_LANE_FROM_M: f64 = 40.0;
+
+/// Distance ahead of E at which the vehicle behind has passed [m].
+const PASSED_AHEAD_M: f64 = 10.0;
+
+/// The vehicle ahead in E's lane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Front {
+    pub(crate) track: TrackId,
+    pub(crate) gap_m: f64,
+    pub(crate) speed_mps: f64,
+    pub(crate) acceleration_mps2: f64,
+}
+
+#[cfg(test)]
+impl Front {
+    /// A vehicle ahead that keeps its speed.
+    pub(crate) fn new(gap_m: f64, speed_mps: f64) -> Self {
+        Self { track: TrackId(0), gap_m, speed_mps, acceleration_mps2: 0.0 }
+    }
+}
+
+/// A vehicle behind.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Rear {
+    pub(crate) track: TrackId,
+    /// Gap to E [m]; negative where it overlaps E lengthwise or is past.
+    pub(crate) gap_m: f64,
+    /// Position of its centre ahead of E's [m].
+    pub(crate) x_m: f64,
+    pub(crate) length_m: f64,
+    pub(crate) speed_mps: f64,
+    pub(crate) confirmed: bool,
+    pub(crate) classified: bool,
+    /// Probability of being in E's lane [1].
+    pub(crate) own_lane: f64,
+    /// Probability of being in the passing lane [1].
+    pub(crate) passing_lane: f64,
+}
+
+impl Rear {
+    pub(crate) fn in_own_lane(&self) -> bool {
+        self.own_lane >= LIKELY
+    }
+}
+
+/// Whether the passing lane is free for the vehicle behind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum PassingLane {
+    /// The road has none on the overtaking side of E.
+    None,
+    /// Free as far as it matters.
+    Free,
+    /// In use.
+    Occupied,
+    /// Not known: a sensor is missing, or something is there that is not confirmed yet.
+    Unknown,
+}
+
+/// Follows the acceleration of the vehicle ahead, which tracks do not carry.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct FrontFollower {
+    last: Option<(TrackId, Time, f64)>,
+    acceleration_mps2: f64,
+}
+
+impl FrontFollower {
+    /// The nearest vehicle ahead in E's lane, confirmed or coasting.
+    pub(crate) fn update(&mut self, input: &EgoInput<'_>) -> Option<Front> {
+        let nearest = input
+            .tracks
+            .iter()
+            .filter(|track| track.x_m() > 0.0 && established(track) && exists(track) && track.lane[OWN] >= LIKELY)
+            .min_by(|a, b| a.x_m().total_cmp(&b.x_m()));
+        let Some(track) = nearest else {
+            *self = Self::default();
+            return None;
+        };
+        match self.last {
+            Some((id, time, speed_mps)) if id == track.id => {
+                let step_s = (track.time - time).s();
+                if step_s > 0.0 {
+                    let measured = ((track.vx_mps() - speed_mps) / step_s).clamp(-BELIEVED_MPS2, BELIEVED_MPS2);
+                    let share = step_s / (ACCELERATION_TIME_S + step_s);
+                    self.acceleration_mps2 += share * (measured - self.acceleration_mps2);
+                }
+            }
+            _ => self.acceleration_mps2 = 0.0,
+        }
+        self.last = Some((track.id, track.time, track.vx_mps()));
+        Some(Front {
+            track: track.id,
+            gap_m: track.x_m() - 0.5 * (track.length_m + input.odometry.length_m),
+            speed_mps: track.vx_mps(),
+            acceleration_mps2: self.acceleration_mps2,
+        })
+    }
+}
+
+/// Place of E's own lane among a track's lane probabilities.
+const OWN: usize = 1;
+
+/// Place of the passing lane among a track's lane probabilities.
+const fn passing(side: Side) -> usize {
+    match side {
+        Side::Left => 0,
+        Side::Right => 2,
+    }
+}
+
+fn established(track: &Track) -> bool {
+    matches!(track.status, TrackStatus::Confirmed | TrackStatus::Coasting)
+}
+
+fn exists(track: &Track) -> bool {
+    track.existence >= LIKELY
+}
+
+/// True where the most probable class is a vehicle's, and a vehicle is more likely than not. Scores that are all equal
+/// say nothing, and so do not classify.
+fn classified(track: &Track) -> bool {
+    let scores = track.class.0;
+    let best = scores[track.class.best_vehicle_class() as usize];
+    track.class.vehicle() >= LIKELY && best > scores[3]
+}
+
+pub(crate) fn rear_of(track: &Track, input: &EgoInput<'_>) -> Rear {
+    Rear {
+        track: track.id,
+        gap_m: -track.x_m() - 0.5 * (track.length_m + input.odometry.length_m),
+        x_m: track.x_m(),
+        length_m: track.length_m,
+        speed_mps: track.vx_mps(),
+        confirmed: established(track),
+        classified: classified(track),
+        own_lane: track.lane[OWN],
+        passing_lane: track.lane[passing(input.road.overtaking_side())],
+    }
+}
+
+/// The nearest thing behind in E's lane, established or not. Where there is an established one, nearer tentative ones
+/// do not hide it.
+pub(crate) fn nearest_behind(input: &EgoInput<'_>) -> Option<Rear> {
+    let behind = |track: &&Track| {
+        track.x_m() < 0.0 && track.source != Source::Front && exists(track) && track.lane[OWN] >= LIKELY
+    };
+    let nearer = |a: &&Track, b: &&Track| b.x_m().total_cmp(&a.x_m());
+    let vehicles = || input.tracks.iter().filter(behind);
+    let best = vehicles()
+        .filter(|track| established(track) && classified(track))
+        .min_by(nearer)
+        .or_else(|| vehicles().min_by(nearer))?;
+    Some(rear_of(best, input))
+}
+
+/// Whether the passing lane is free for `rear` to overtake E.
+pub(crate) fn passing_lane(input: &EgoInput<'_>, rear: &Rear) -> PassingLane {
+    let side = input.road.overtaking_side();
+    if input.road.beside(input.odometry.lane, side).is_none() {
+        return PassingLane::None;
+    }
+    if !(input.sensors.surround && input.sensors.rear && input.sensors.front) {
+        return PassingLane::Unknown;
+    }
+    let closing_mps = rear.speed_mps - input.odometry.speed_mps;
+    if !(closing_mps > 0.0) {
+        return PassingLane::Unknown;
+    }
+    let from_s = ((rear.gap_m - USES_PASSING_LANE_FROM_M) / closing_mps).max(0.0);
+    let until_s = (rear.gap_m.max(0.0) + input.odometry.length_m + rear.length_m + PASSED_AHEAD_M) / closing_mps;
+    let mut state = PassingLane::Free;
+    for track in input.tracks {
+        if track.id == rear.track || !exists(track) || !(track.lane[passing(side)] >= LIKELY) {
+            continue;
+        }
+        let apart_m = 0.5 * (track.length_m + rear.length_m) + FREE_DISTANCE_M;
+        let ahead_m = track.x_m() - rear.x_m;
+        let opening_mps = track.vx_mps() - rear.speed_mps;
+        if keeps_apart(ahead_m + opening_mps * from_s, ahead_m + opening_mps * until_s, apart_m) {
+            continue;
+        }
+        if established(track) {
+            return PassingLane::Occupied;
+        }
+        state = PassingLane::Unknown;
+    }
+    state
+}
+
+/// True where a distance that goes linearly from `first_m` to `last_m` stays beyond `apart_m` on one side.
+fn keeps_apart(first_m: f64, last_m: f64, apart_m: f64) -> bool {
+    (first_m > apart_m && last_m > apart_m) || (first_m < -apart_m && last_m < -apart_m)
+}
