@@ -20,8 +20,9 @@ pub use noise::NoiseKey;
 use closecall_traffic::Track;
 
 use crate::surroundings::{Other, survey};
+use crate::tracking::TrackList;
 use crate::{Perception, Scene, SensorError, SensorHealth};
-use sensor::{ObjectSensor, ScanView, TrackList};
+pub(crate) use sensor::{ObjectSensor, ScanView};
 
 /// Perception by object-level sensors alone.
 #[derive(Clone, Debug)]

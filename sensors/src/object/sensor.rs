@@ -17,22 +17,15 @@ use super::visibility::{View, Visibility};
 use crate::ego_frame::EgoFrame;
 use crate::surroundings::Other;
 use crate::tracking::lifecycle::Lifecycle;
+use crate::tracking::{ACROSS_MANOEUVRE_M2PS3, ALONG_MANOEUVRE_M2PS3, HEADING_SPEED_MPS, TrackList};
 use crate::{SCAN_PERIOD, Scene};
 
-/// Spectral density of the white acceleration along the road [m²/s³]: speed is unsure by 0.7 m/s after 1 s, as of a
-/// driver who follows traffic (assumption).
-const ALONG_MANOEUVRE_M2PS3: f64 = 0.5;
-/// The same across the road [m²/s³]: a lane change of 6.8 s peaks at about 0.5 m/s² (assumption).
-const ACROSS_MANOEUVRE_M2PS3: f64 = 0.1;
 /// Speed of a vehicle not yet measured: E's own, within this [m/s].
 const SPEED_PRIOR_SD_MPS: f64 = 10.0;
 /// Lateral speed of a vehicle not yet measured [m/s].
 const LATERAL_SPEED_PRIOR_SD_MPS: f64 = 0.7;
 /// A track is confirmed only once its speed is known to within this [m/s]: nobody could act on it before.
 const SETTLED_SPEED_SD_MPS: f64 = 1.0;
-/// Below this speed the direction of motion says nothing about the heading [m/s].
-const HEADING_SPEED_MPS: f64 = 3.0;
-
 /// What the sensor knows of a vehicle at the end of one scan.
 #[derive(Clone, Copy, Debug)]
 struct Report {
@@ -50,22 +43,6 @@ struct Target {
     filters: Option<(TrackId, Lifecycle, [AxisFilter; 2])>,
     /// Reports that still wait, at the place of their step modulo the length.
     waiting: [Option<Report>; MAX_LATENCY_STEPS + 1],
-}
-
-/// The tracks of all sensors of E, and the next free number.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct TrackList {
-    pub(crate) tracks: Vec<Track>,
-    next_id: u32,
-}
-
-impl TrackList {
-    /// A number that no track of this run has had.
-    pub(crate) fn new_id(&mut self) -> TrackId {
-        let id = TrackId(self.next_id);
-        self.next_id += 1;
-        id
-    }
 }
 
 /// What one scan looks at.

@@ -1,0 +1,70 @@
+//! When the tracker believes, and when it gives up.
+
+use closecall_traffic::{Check, ConfigError, Num, Parameters, Problem, Range};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::lifecycle::{LifecycleRules, MAX_WINDOW};
+use crate::SCAN_PERIOD;
+
+/// The tracker as a scenario file describes it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
+pub struct TrackerConfig {
+    /// Detections that confirm a track, out of the latest `confirm-window` scans.
+    pub confirm_hits: u8,
+    /// See `confirm-hits`; 1 to 16. 3 of 6 holds where one side of the mirror misses a far, low car.
+    pub confirm_window: u8,
+    /// Time for which a confirmed track that is no longer detected is kept [s].
+    pub coast_s: Num,
+    /// Standard deviation of a track's speed along its heading above which it is not confirmed yet [m/s].
+    pub settled_speed_sd_mps: Num,
+}
+
+impl Default for TrackerConfig {
+    fn default() -> Self {
+        Self { confirm_hits: 3, confirm_window: 6, coast_s: Num::Fixed(1.0), settled_speed_sd_mps: Num::Fixed(1.5) }
+    }
+}
+
+/// A checked tracker configuration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrackerModel {
+    pub(super) rules: LifecycleRules,
+    pub(super) settled_speed_sd_mps: f64,
+}
+
+/// Probability that a scan detects a vehicle in view: between one of two scans (far, low) and all (near).
+const DETECTION_PROBABILITY: f64 = 0.75;
+/// Probability that clutter gives a detection inside the gate of a wrong track.
+const CLUTTER_PROBABILITY: f64 = 0.1;
+
+impl Check for TrackerConfig {
+    type Checked = TrackerModel;
+
+    fn check(&self, parameters: &Parameters) -> Result<TrackerModel, ConfigError> {
+        if !(1..=MAX_WINDOW).contains(&self.confirm_window) {
+            let value = self.confirm_window.into();
+            let problem = Problem::WrongCount { value, allowed: "a number of scans from 1 to 16" };
+            return Err(ConfigError::new("confirm-window", problem));
+        }
+        if !(1..=self.confirm_window).contains(&self.confirm_hits) {
+            let value = self.confirm_hits.into();
+            let problem = Problem::WrongCount { value, allowed: "a number from 1 to `confirm-window`" };
+            return Err(ConfigError::new("confirm-hits", problem));
+        }
+        let coast_s = parameters.number(&self.coast_s, "coast-s", Range::closed(0.0, 10.0))?;
+        let settled = &self.settled_speed_sd_mps;
+        Ok(TrackerModel {
+            rules: LifecycleRules {
+                confirm_hits: self.confirm_hits.into(),
+                confirm_window: self.confirm_window.into(),
+                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 250 scans")]
+                lost_after: (coast_s / SCAN_PERIOD.s()).round() as u32 + 1,
+                detection_probability: DETECTION_PROBABILITY,
+                clutter_probability: CLUTTER_PROBABILITY,
+            },
+            settled_speed_sd_mps: parameters.number(settled, "settled-speed-sd-mps", Range::above(0.0, 20.0))?,
+        })
+    }
+}
