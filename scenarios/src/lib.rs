@@ -1,7 +1,9 @@
 //! What is tested: recordings, lane changes, parameter distributions, sampling designs and the scenario library.
 
 mod atomic;
+pub mod criticality;
 pub mod filters;
+pub mod fit;
 pub mod lane_change;
 pub mod parameters;
 pub mod recordings;

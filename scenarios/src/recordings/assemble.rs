@@ -114,8 +114,7 @@ fn is_gap(before: &Row, row: &Row, period: Time) -> Result<bool, Blame> {
     let (later, earlier) = if row.line > before.line { (row, before) } else { (before, row) };
     let (frames, step) = (row.frame - before.frame, row.time - before.time);
     if frames == 0 && (step == Time::ZERO || row.clock == Clock::Continuous) {
-        let problem =
-            RecordingProblem::DuplicateRow { vehicle: row.group, frame: row.frame, first_line: earlier.line };
+        let problem = RecordingProblem::DuplicateRow { vehicle: row.group, frame: row.frame, first_line: earlier.line };
         return Err((later.line, problem));
     }
     let is_near = |count: i64| ((step - period * count).ns().abs() as f64) <= UNEVENNESS * period.ns() as f64;

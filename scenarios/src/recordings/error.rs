@@ -104,7 +104,9 @@ pub enum RecordingProblem {
         allowed: String,
     },
     /// The same instant twice.
-    #[error("frame {frame} of vehicle {vehicle} stands there twice, first in line {first_line}; one row for each is needed")]
+    #[error(
+        "frame {frame} of vehicle {vehicle} stands there twice, first in line {first_line}; one row for each is needed"
+    )]
     DuplicateRow {
         /// The vehicle or track.
         vehicle: u64,

@@ -1,11 +1,11 @@
 //! Which layout a file has, by its first line.
 
-use super::{Layout, RecordingProblem};
 use super::assemble::Row;
 use super::fields::Fault;
 use super::ngsim::NgsimColumns;
 use super::plain::PlainColumns;
 use super::rows::{Fields, Separator};
+use super::{Layout, RecordingProblem};
 
 /// How to read the rows of one file.
 pub(super) struct Format {

@@ -116,9 +116,8 @@ impl NgsimColumns {
 
     pub(super) fn parse(&self, line: &str, fields: &Fields) -> Result<Row, Fault> {
         let whole = |index, name, range| integer(fields.get(line, index), name, range);
-        let metres = |index, name, bounds| -> Result<f64, Fault> {
-            Ok(number(fields.get(line, index), name, bounds)? * FOOT_M)
-        };
+        let metres =
+            |index, name, bounds| -> Result<f64, Fault> { Ok(number(fields.get(line, index), name, bounds)? * FOOT_M) };
         let vehicle = whole(self.vehicle, "Vehicle_ID", allowed::IDS)?.unsigned_abs();
         let length_m = metres(self.length, "v_Length", feet::LENGTH)?;
         let front_m = metres(self.y, "Local_Y", feet::POSITION)?;
@@ -145,7 +144,7 @@ impl NgsimColumns {
 fn class(text: &str) -> Result<VehicleClass, Fault> {
     let code = integer(text, "v_Class", (1, 3));
     let named = code.ok().and_then(|code| CLASSES.into_iter().find(|(known, _)| *known == code));
-    named.map(|(_, class)| class).ok_or_else(|| {
-        Fault::at("v_Class", wrong_value(text, "one of 1 (motorcycle), 2 (car), 3 (truck)".to_owned()))
-    })
+    named
+        .map(|(_, class)| class)
+        .ok_or_else(|| Fault::at("v_Class", wrong_value(text, "one of 1 (motorcycle), 2 (car), 3 (truck)".to_owned())))
 }

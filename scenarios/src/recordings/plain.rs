@@ -74,11 +74,7 @@ impl PlainColumns {
     /// Where a column is missing that the reader needs.
     pub(super) fn new(header: &Header) -> Result<Self, RecordingProblem> {
         let need = |name| header.need(name, "plain");
-        let bounded = [
-            ("heading_rel_rad", allowed::HEADING_RAD),
-            ("x_m", allowed::PLANE_M),
-            ("y_m", allowed::PLANE_M),
-        ];
+        let bounded = [("heading_rel_rad", allowed::HEADING_RAD), ("x_m", allowed::PLANE_M), ("y_m", allowed::PLANE_M)];
         let present = bounded.into_iter().filter_map(|(name, bounds)| Some((header.find(name)?, name, bounds)));
         Ok(Self {
             track: need("track_id")?,

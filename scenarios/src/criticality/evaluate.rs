@@ -1,0 +1,266 @@
+//! Evaluates the metrics over the window of a lane change.
+
+use closecall_traffic::geometry::OrientedBox;
+use closecall_traffic::metrics::{Moving, closest_encounter, time_headway_s};
+use closecall_traffic::{Absent, Lane, Time, Trajectory, TrajectoryPoint};
+
+use super::{
+    CRITICAL_A_LAT_MPS2, CRITICAL_A_LON_MPS2, CRITICAL_DCE_M, CRITICAL_DISTANCE_M, CRITICAL_SPEED_FACTOR,
+    CRITICAL_THW_S, CRITICAL_TTCE_S, CriticalLaneChange, DEFAULT_SPEED_LIMIT_MPS, ENCOUNTER_HORIZON_S, MetricRecord,
+    Metrics,
+};
+use crate::filters::SmoothedRecording;
+use crate::lane_change::{LaneChange, detect};
+
+/// Below this speed the direction of movement is noise, and a vehicle is taken to point along the road [m/s].
+const HEADING_FROM_MPS: f64 = 1.0;
+
+/// Every lane change of a recording with its metrics; `speed_limit_mps` where it is known.
+pub fn criticality(recording: &SmoothedRecording, speed_limit_mps: Option<f64>) -> Vec<CriticalLaneChange> {
+    let evaluated = detect(recording).into_iter().filter_map(|lane_change| {
+        let metrics = evaluate(recording, &lane_change, speed_limit_mps)?;
+        Some(CriticalLaneChange { lane_change, metrics })
+    });
+    evaluated.collect()
+}
+
+/// The metrics of one lane change of `recording`, or nothing where the recording does not have its track.
+pub fn evaluate(
+    recording: &SmoothedRecording,
+    lane_change: &LaneChange,
+    speed_limit_mps: Option<f64>,
+) -> Option<Metrics> {
+    let number = lane_change.track_id;
+    let place = recording.trajectories.binary_search_by_key(&number, |track| track.track_id).ok()?;
+    let own = &recording.trajectories[place];
+    let (start, end) = (Time::from_s(lane_change.start_s), Time::from_s(lane_change.end_s));
+    let mut worst = Worst::default();
+    for point in own.points.iter().filter(|point| point.time >= start && point.time <= end) {
+        let others = recording.present_at(point.time).iter().filter(|presence| presence.trajectory != place);
+        let others: Vec<Body<'_>> = others.map(|&presence| Body::new(recording.look_up(presence))).collect();
+        worst.add(&Body::new((own, point)), &others, Lane(lane_change.to_lane));
+    }
+    Some(worst.metrics(speed_limit_mps.unwrap_or(DEFAULT_SPEED_LIMIT_MPS)))
+}
+
+/// A vehicle at one instant.
+#[derive(Clone, Copy)]
+struct Body<'a> {
+    track: &'a Trajectory,
+    point: &'a TrajectoryPoint,
+    moving: Moving,
+}
+
+impl<'a> Body<'a> {
+    fn new((track, point): (&'a Trajectory, &'a TrajectoryPoint)) -> Self {
+        let (vx_mps, vy_mps) = (point.speed_mps, point.lateral_speed_mps);
+        let yaw_rad = if vx_mps.hypot(vy_mps) < HEADING_FROM_MPS { 0.0 } else { vy_mps.atan2(vx_mps) };
+        let (length_m, width_m) = (track.dimensions.length_m, track.dimensions.width_m);
+        let shape = OrientedBox { x_m: point.s_m, y_m: point.d_m, yaw_rad, length_m, width_m };
+        Self { track, point, moving: Moving { shape, vx_mps, vy_mps } }
+    }
+
+    /// Gap from this vehicle's front to the rear of `other` [m], where that one is ahead.
+    fn gap_to_m(&self, other: &Self) -> Option<f64> {
+        let ahead_m = other.point.s_m - self.point.s_m;
+        let gap_m = ahead_m - 0.5 * (self.track.dimensions.length_m + other.track.dimensions.length_m);
+        let reach_m = 0.5 * (self.track.dimensions.width_m + other.track.dimensions.width_m);
+        let overlaps_across = (other.point.d_m - self.point.d_m).abs() < reach_m;
+        (ahead_m > 0.0 && (gap_m >= 0.0 || overlaps_across)).then_some(gap_m)
+    }
+}
+
+/// The most critical value so far.
+#[derive(Clone, Copy)]
+struct Extreme {
+    value: f64,
+    opponent: Option<u64>,
+    time_s: f64,
+}
+
+/// A record of a value, or of why there is none.
+fn record(extreme: Option<Extreme>, otherwise: Absent, is_critical: impl Fn(f64) -> bool) -> MetricRecord {
+    match extreme {
+        Some(Extreme { value, opponent, time_s }) => {
+            MetricRecord::Value { value, opponent, time_s, critical: is_critical(value) }
+        }
+        None => MetricRecord::Absent { absent: otherwise },
+    }
+}
+
+fn keep_smaller(kept: &mut Option<Extreme>, new: Extreme) {
+    if kept.is_none_or(|kept| new.value < kept.value) {
+        *kept = Some(new);
+    }
+}
+
+fn keep_larger(kept: &mut Option<Extreme>, new: Extreme) {
+    if kept.is_none_or(|kept| new.value > kept.value) {
+        *kept = Some(new);
+    }
+}
+
+/// The most critical values over a window.
+#[derive(Default)]
+struct Worst {
+    distance: Option<Extreme>,
+    speed: Option<Extreme>,
+    a_lon: Option<Extreme>,
+    a_lat: Option<Extreme>,
+    thw: Option<Extreme>,
+    dce: Option<Extreme>,
+    ttce: Option<Extreme>,
+    has_opponent: bool,
+    stood_behind_a_lead: bool,
+    looked_too_far: bool,
+}
+
+impl Worst {
+    fn add(&mut self, own: &Body<'_>, others: &[Body<'_>], target: Lane) {
+        let time_s = own.point.time.s();
+        let alone = |value| Extreme { value, opponent: None, time_s };
+        keep_larger(&mut self.speed, alone(own.point.speed_mps));
+        keep_larger(&mut self.a_lon, alone(own.point.acceleration_mps2.abs()));
+        keep_larger(&mut self.a_lat, alone(own.point.lateral_acceleration_mps2.abs()));
+        self.add_headway(own, others, target);
+        for other in others {
+            self.has_opponent = true;
+            let against = |value| Extreme { value, opponent: Some(other.track.track_id), time_s };
+            keep_smaller(&mut self.distance, against(own.moving.shape.distance_m(&other.moving.shape)));
+            match closest_encounter(&own.moving, &other.moving, ENCOUNTER_HORIZON_S) {
+                Ok(encounter) => {
+                    keep_smaller(&mut self.ttce, against(encounter.ttce_s));
+                    if encounter.ttce_s < CRITICAL_TTCE_S {
+                        keep_smaller(&mut self.dce, against(encounter.dce_m));
+                    }
+                }
+                Err(reason) => self.looked_too_far |= reason == Absent::BeyondHorizon,
+            }
+        }
+    }
+
+    fn add_headway(&mut self, own: &Body<'_>, others: &[Body<'_>], target: Lane) {
+        let in_lane = |other: &&Body<'_>| other.point.lane == own.point.lane || other.point.lane == target;
+        let ahead = others.iter().filter(in_lane).filter_map(|other| Some((own.gap_to_m(other)?, other)));
+        let Some((gap_m, lead)) = ahead.min_by(|a, b| a.0.total_cmp(&b.0)) else { return };
+        match time_headway_s(gap_m, own.point.speed_mps) {
+            Ok(value) => {
+                let (opponent, time_s) = (Some(lead.track.track_id), own.point.time.s());
+                keep_smaller(&mut self.thw, Extreme { value, opponent, time_s });
+            }
+            Err(_) => self.stood_behind_a_lead = true,
+        }
+    }
+
+    fn metrics(&self, speed_limit_mps: f64) -> Metrics {
+        let no_lead = if self.stood_behind_a_lead { Absent::Standstill } else { Absent::NoLead };
+        let no_ttce = match (self.has_opponent, self.looked_too_far) {
+            (false, _) => Absent::NoOpponent,
+            (true, true) => Absent::BeyondHorizon,
+            (true, false) => Absent::NotApproaching,
+        };
+        // Where there is an encounter, but none that is near enough to look at its distance.
+        let no_dce = if self.ttce.is_some() { Absent::BeyondHorizon } else { no_ttce };
+        Metrics {
+            distance_m: record(self.distance, Absent::NoOpponent, |value| value < CRITICAL_DISTANCE_M),
+            speed_mps: record(self.speed, Absent::NotRecorded, |v| v > CRITICAL_SPEED_FACTOR * speed_limit_mps),
+            a_lon_mps2: record(self.a_lon, Absent::NotRecorded, |value| value > CRITICAL_A_LON_MPS2),
+            a_lat_mps2: record(self.a_lat, Absent::NotRecorded, |value| value > CRITICAL_A_LAT_MPS2),
+            thw_s: record(self.thw, no_lead, |value| value < CRITICAL_THW_S),
+            dce_m: record(self.dce, no_dce, |value| value < CRITICAL_DCE_M),
+            ttce_s: record(self.ttce, no_ttce, |value| value < CRITICAL_TTCE_S),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::criticality::shares;
+    use crate::filters::smooth;
+    use crate::recordings::test_support::{changing_track, recording_of, straight_track};
+
+    /// From lane 2 to lane 1 between 3 and 8 s at 30 m/s, with other vehicles around.
+    fn evaluated(others: Vec<Trajectory>) -> CriticalLaneChange {
+        let mut tracks = vec![changing_track(1, (0.0, 30.0), (-5.25, -1.75), (3.0, 5.0), 110)];
+        tracks.extend(others);
+        let mut found = criticality(&smooth(&recording_of(tracks)), None);
+        assert_eq!(found.len(), 1);
+        found.remove(0)
+    }
+
+    fn absent(record: MetricRecord) -> Option<Absent> {
+        match record {
+            MetricRecord::Absent { absent } => Some(absent),
+            MetricRecord::Value { .. } => None,
+        }
+    }
+
+    #[test]
+    fn alone_on_the_road_there_is_no_opponent() {
+        let metrics = evaluated(Vec::new()).metrics;
+        assert_eq!(absent(metrics.distance_m), Some(Absent::NoOpponent));
+        assert_eq!(absent(metrics.thw_s), Some(Absent::NoLead));
+        assert_eq!(absent(metrics.dce_m), Some(Absent::NoOpponent));
+        assert_eq!(absent(metrics.ttce_s), Some(Absent::NoOpponent));
+        assert!((metrics.speed_mps.value().unwrap() - 30.0).abs() < 1e-6);
+        // The quintic path's largest lateral acceleration is 10/√3 · L/T².
+        let a_lat = metrics.a_lat_mps2.value().unwrap();
+        assert!((a_lat - 5.7735 * 3.5 / 25.0).abs() < 0.05, "{a_lat}");
+        assert!(metrics.a_lon_mps2.value().unwrap() < 1e-6);
+        assert!(metrics.named().iter().all(|(_, record)| !record.is_critical()));
+    }
+
+    #[test]
+    fn the_headway_to_the_vehicle_pulled_out_from_behind_counts() {
+        // 19.5 m from bumper to bumper, at 30 m/s and the same speed: 0.65 s.
+        let metrics = evaluated(vec![straight_track(2, 24.0, 30.0, -5.25, 110)]).metrics;
+        assert!((metrics.thw_s.value().unwrap() - 0.65).abs() < 1e-6);
+        assert!(metrics.thw_s.is_critical());
+        assert!((metrics.distance_m.value().unwrap() - 19.5).abs() < 0.05);
+        let json = serde_json::to_value(metrics.thw_s).unwrap();
+        assert_eq!((&json["opponent"], &json["critical"]), (&2.into(), &true.into()));
+    }
+
+    #[test]
+    fn a_lead_in_the_target_lane_counts_and_one_elsewhere_does_not() {
+        let target = evaluated(vec![straight_track(2, 64.5, 30.0, -1.75, 110)]).metrics;
+        assert!((target.thw_s.value().unwrap() - 2.0).abs() < 1e-6);
+        let elsewhere = evaluated(vec![straight_track(2, 64.5, 30.0, -8.75, 110)]).metrics;
+        assert_eq!(absent(elsewhere.thw_s), Some(Absent::NoLead));
+    }
+
+    #[test]
+    fn a_fast_vehicle_coming_up_in_the_target_lane_is_an_encounter() {
+        let metrics = evaluated(vec![straight_track(2, -70.0, 38.0, -1.75, 110)]).metrics;
+        let ttce_s = metrics.ttce_s.value().unwrap();
+        assert!(metrics.ttce_s.is_critical() && ttce_s < 2.6, "{ttce_s}");
+        assert!(metrics.dce_m.is_critical());
+        assert_eq!(absent(metrics.thw_s), Some(Absent::NoLead));
+    }
+
+    #[test]
+    fn what_drives_away_is_no_encounter() {
+        let metrics = evaluated(vec![straight_track(2, 50.0, 40.0, -8.75, 110)]).metrics;
+        assert_eq!(absent(metrics.ttce_s), Some(Absent::NotApproaching));
+        assert_eq!(serde_json::to_value(metrics.dce_m).unwrap()["absent"], "not-approaching");
+    }
+
+    #[test]
+    fn the_speed_limit_decides_over_the_speed() {
+        let track = changing_track(1, (0.0, 45.0), (-5.25, -1.75), (3.0, 5.0), 110);
+        let recording = smooth(&recording_of(vec![track]));
+        let by_limit = |limit| criticality(&recording, limit)[0].metrics.speed_mps.is_critical();
+        assert!(by_limit(None) && !by_limit(Some(36.1)));
+    }
+
+    #[test]
+    fn shares_are_of_all_lane_changes() {
+        let close = evaluated(vec![straight_track(2, 24.0, 30.0, -5.25, 110)]);
+        let counted = shares(&[close, evaluated(Vec::new())]);
+        let thw = counted.metrics.iter().find(|share| share.metric == "thw_s").unwrap();
+        assert_eq!((thw.critical, thw.absent, thw.share), (1, 1, Some(0.5)));
+        assert_eq!((counted.lane_changes, counted.any), (2, 1));
+        assert_eq!(shares(&[]).metrics[0].share, None);
+    }
+}

@@ -1,0 +1,87 @@
+//! The result: a lane change with its seven metrics.
+
+use closecall_traffic::Absent;
+use serde::Serialize;
+
+use crate::lane_change::LaneChange;
+
+/// One metric of one lane change.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum MetricRecord {
+    /// The most critical value.
+    Value {
+        /// The value, in the unit of the metric.
+        value: f64,
+        /// The track of the other vehicle; nothing for what concerns one vehicle alone.
+        opponent: Option<u64>,
+        /// When [s].
+        time_s: f64,
+        /// True where the value is beyond the threshold.
+        critical: bool,
+    },
+    /// There is none.
+    Absent {
+        /// Why.
+        absent: Absent,
+    },
+}
+
+impl MetricRecord {
+    /// True where there is a value beyond the threshold.
+    pub fn is_critical(&self) -> bool {
+        matches!(self, Self::Value { critical: true, .. })
+    }
+
+    /// The value, where there is one.
+    pub fn value(&self) -> Option<f64> {
+        match self {
+            Self::Value { value, .. } => Some(*value),
+            Self::Absent { .. } => None,
+        }
+    }
+}
+
+/// The seven metrics of one lane change.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Metrics {
+    /// Smallest distance from box to box [m].
+    pub distance_m: MetricRecord,
+    /// Largest speed [m/s].
+    pub speed_mps: MetricRecord,
+    /// Largest magnitude of the acceleration along the road [m/s²].
+    pub a_lon_mps2: MetricRecord,
+    /// Largest magnitude of the acceleration across the road [m/s²].
+    pub a_lat_mps2: MetricRecord,
+    /// Smallest time headway [s].
+    pub thw_s: MetricRecord,
+    /// Smallest distance of closest encounter [m].
+    pub dce_m: MetricRecord,
+    /// Smallest time to closest encounter [s].
+    pub ttce_s: MetricRecord,
+}
+
+impl Metrics {
+    /// All seven with their names, in their fixed order.
+    pub fn named(&self) -> [(&'static str, MetricRecord); 7] {
+        [
+            ("distance_m", self.distance_m),
+            ("speed_mps", self.speed_mps),
+            ("a_lon_mps2", self.a_lon_mps2),
+            ("a_lat_mps2", self.a_lat_mps2),
+            ("thw_s", self.thw_s),
+            ("dce_m", self.dce_m),
+            ("ttce_s", self.ttce_s),
+        ]
+    }
+}
+
+/// A lane change and how critical it was.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CriticalLaneChange {
+    /// The lane change.
+    #[serde(flatten)]
+    pub lane_change: LaneChange,
+    /// Its metrics.
+    pub metrics: Metrics,
+}

@@ -1,0 +1,284 @@
+//! Quantiles, parametric forms, and how sure they are.
+
+use closecall_traffic::Stream;
+use rand::{RngExt, SeedableRng};
+use statrs::distribution::{ContinuousCDF, Normal};
+
+use super::Quantity;
+
+/// With fewer values than this nothing is fitted.
+pub const MIN_VALUES: usize = 5;
+
+/// Empirical quantiles are given at deciles, or at each value where there are fewer.
+const QUANTILES: usize = 11;
+
+/// Resamples for the interval of the median.
+const MEDIAN_RESAMPLES: usize = 2_000;
+
+/// Samples for the probability of a larger Kolmogorov–Smirnov distance.
+const GOODNESS_SAMPLES: usize = 1_000;
+
+/// A normal distribution is cut at this many standard deviations, which keeps 99.7 % of it.
+const CUT_SDS: f64 = 3.0;
+
+/// Ends of the interval.
+const INTERVAL: [f64; 2] = [0.025, 0.975];
+
+/// A parametric form.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Form {
+    /// Log-normal.
+    LogNormal {
+        /// Its median, in the quantity's unit.
+        median: f64,
+        /// Standard deviation of the logarithm.
+        sigma: f64,
+    },
+    /// Normal, cut at both bounds.
+    TruncatedNormal {
+        /// Mean before the cut.
+        mean: f64,
+        /// Standard deviation before the cut.
+        sd: f64,
+        /// Lower bound.
+        min: f64,
+        /// Upper bound.
+        max: f64,
+    },
+}
+
+/// How well a form fits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Goodness {
+    /// Largest difference of the distribution functions (Kolmogorov–Smirnov).
+    pub distance: f64,
+    /// Probability of a larger one, were the form true.
+    pub p_value: f64,
+}
+
+/// The distribution of one quantity.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FittedQuantity {
+    /// Which one.
+    pub quantity: Quantity,
+    /// Number of values.
+    pub n: usize,
+    /// Quantiles at equally spaced probabilities from 0 to 1.
+    pub quantiles: Vec<f64>,
+    /// The median.
+    pub median: f64,
+    /// Bootstrap interval of the median, 95 %.
+    pub interval_95: [f64; 2],
+    /// The parametric form and how well it fits; nothing where the values do not vary.
+    pub form: Option<(Form, Goodness)>,
+}
+
+impl FittedQuantity {
+    /// The distribution of `values`, or nothing where there are too few.
+    pub fn new(quantity: Quantity, values: &[f64], seed: u64) -> Option<Self> {
+        if values.len() < MIN_VALUES {
+            return None;
+        }
+        let mut sorted = values.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let levels = QUANTILES.min(sorted.len());
+        let level = |k: usize| k as f64 / (levels - 1) as f64;
+        let mut rng = stream(seed, quantity);
+        Some(Self {
+            quantity,
+            n: sorted.len(),
+            quantiles: (0..levels).map(|k| quantile(&sorted, level(k))).collect(),
+            median: quantile(&sorted, 0.5),
+            interval_95: median_interval(&sorted, &mut rng),
+            form: Family::of(quantity).fit(&sorted).map(|form| (form, goodness(&sorted, form, &mut rng))),
+        })
+    }
+}
+
+/// A stream for each quantity, so that one more quantity does not change the others.
+fn stream(seed: u64, quantity: Quantity) -> Stream {
+    let mut hasher = blake3::Hasher::new_derive_key("closecall 2026 bootstrap of fitted distributions v1");
+    hasher.update(&seed.to_le_bytes());
+    hasher.update(quantity.name().as_bytes());
+    Stream::from_seed(*hasher.finalize().as_bytes())
+}
+
+/// The quantile of sorted values at probability `level`, linear between them.
+fn quantile(sorted: &[f64], level: f64) -> f64 {
+    let position = level.clamp(0.0, 1.0) * (sorted.len() - 1) as f64;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and the number of values")]
+    let below = position as usize;
+    let above = (below + 1).min(sorted.len() - 1);
+    sorted[below] + (position - below as f64) * (sorted[above] - sorted[below])
+}
+
+/// The median of one value or more.
+pub(super) fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    quantile(&values, 0.5)
+}
+
+fn median_interval(values: &[f64], rng: &mut Stream) -> [f64; 2] {
+    let resample =
+        |rng: &mut Stream| median((0..values.len()).map(|_| values[rng.random_range(0..values.len())]).collect());
+    let mut medians: Vec<f64> = (0..MEDIAN_RESAMPLES).map(|_| resample(rng)).collect();
+    medians.sort_by(f64::total_cmp);
+    INTERVAL.map(|level| quantile(&medians, level))
+}
+
+/// Which form suits a quantity.
+#[derive(Clone, Copy)]
+enum Family {
+    LogNormal,
+    TruncatedNormal,
+}
+
+impl Family {
+    fn of(quantity: Quantity) -> Self {
+        match quantity {
+            Quantity::CrossingSpeed | Quantity::FollowingSpeed => Self::TruncatedNormal,
+            Quantity::CutOutThw
+            | Quantity::LaneChangeDuration
+            | Quantity::LaneChangeWidth
+            | Quantity::Closing
+            | Quantity::FrontThw => Self::LogNormal,
+        }
+    }
+
+    /// The form with the moments of `values` (of their logarithms), or nothing where they do not vary or, for the
+    /// log-normal form, are not all positive.
+    fn fit(self, values: &[f64]) -> Option<Form> {
+        match self {
+            Self::LogNormal => {
+                let (mean, sigma) = moments(values.iter().map(|value| value.ln()))?;
+                Some(Form::LogNormal { median: mean.exp(), sigma })
+            }
+            Self::TruncatedNormal => {
+                let (mean, sd) = moments(values.iter().copied())?;
+                Some(Form::TruncatedNormal { mean, sd, min: mean - CUT_SDS * sd, max: mean + CUT_SDS * sd })
+            }
+        }
+    }
+}
+
+/// Mean and standard deviation (with n − 1), where both are finite and the latter is above 0.
+fn moments(values: impl Iterator<Item = f64> + Clone) -> Option<(f64, f64)> {
+    let n = values.clone().count() as f64;
+    let mean = values.clone().sum::<f64>() / n;
+    let variance = values.map(|value| (value - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    let sd = variance.sqrt();
+    (mean.is_finite() && sd > 0.0 && sd.is_finite()).then_some((mean, sd))
+}
+
+impl Form {
+    fn family(self) -> Family {
+        match self {
+            Self::LogNormal { .. } => Family::LogNormal,
+            Self::TruncatedNormal { .. } => Family::TruncatedNormal,
+        }
+    }
+
+    fn cdf(self, value: f64) -> f64 {
+        let normal = Normal::standard();
+        match self {
+            Self::LogNormal { median, sigma } => normal.cdf((value.ln() - median.ln()) / sigma),
+            Self::TruncatedNormal { mean, sd, min, max } => {
+                let [low, high] = [min, max].map(|bound| normal.cdf((bound - mean) / sd));
+                ((normal.cdf((value - mean) / sd) - low) / (high - low)).clamp(0.0, 1.0)
+            }
+        }
+    }
+
+    fn quantile(self, u: f64) -> f64 {
+        let normal = Normal::standard();
+        match self {
+            Self::LogNormal { median, sigma } => median * (sigma * normal.inverse_cdf(u)).exp(),
+            Self::TruncatedNormal { mean, sd, min, max } => {
+                let [low, high] = [min, max].map(|bound| normal.cdf((bound - mean) / sd));
+                mean + sd * normal.inverse_cdf(low + u * (high - low))
+            }
+        }
+    }
+}
+
+/// Largest difference between the distribution of sorted values and a form.
+fn ks_distance(sorted: &[f64], form: Form) -> f64 {
+    let n = sorted.len() as f64;
+    let at = |(k, value): (usize, &f64)| {
+        let cdf = form.cdf(*value);
+        ((k + 1) as f64 / n - cdf).max(cdf - k as f64 / n)
+    };
+    sorted.iter().enumerate().map(at).fold(0.0, f64::max)
+}
+
+fn goodness(sorted: &[f64], form: Form, rng: &mut Stream) -> Goodness {
+    let distance = ks_distance(sorted, form);
+    let mut exceeded = 0_usize;
+    for _ in 0..GOODNESS_SAMPLES {
+        // Strictly between 0 and 1, where the quantile function is finite.
+        let draw = |rng: &mut Stream| form.quantile(rng.random::<f64>().max(f64::MIN_POSITIVE));
+        let mut sample: Vec<f64> = (0..sorted.len()).map(|_| draw(rng)).collect();
+        sample.sort_by(f64::total_cmp);
+        let refitted = form.family().fit(&sample).unwrap_or(form);
+        exceeded += usize::from(ks_distance(&sample, refitted) >= distance);
+    }
+    // The observed sample counts as one of them, so that the probability is never 0.
+    Goodness { distance, p_value: (exceeded + 1) as f64 / (GOODNESS_SAMPLES + 1) as f64 }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn log_normal_values(n: usize, median: f64, sigma: f64) -> Vec<f64> {
+        let form = Form::LogNormal { median, sigma };
+        (0..n).map(|k| form.quantile((k as f64 + 0.5) / n as f64)).collect()
+    }
+
+    #[test]
+    fn the_parameters_of_a_log_normal_come_back() {
+        let fitted = FittedQuantity::new(Quantity::CutOutThw, &log_normal_values(400, 0.9, 0.3), 0).unwrap();
+        let Some((Form::LogNormal { median, sigma }, goodness)) = fitted.form else { panic!("a log-normal form") };
+        assert!((median - 0.9).abs() < 1e-3 && (sigma - 0.3).abs() < 5e-3);
+        assert!(goodness.distance < 0.01 && goodness.p_value > 0.9);
+        assert!(fitted.interval_95[0] < 0.9 && fitted.interval_95[1] > 0.9);
+    }
+
+    #[test]
+    fn a_form_that_does_not_fit_has_a_small_probability() {
+        let two_heaps: Vec<f64> = (0..60).map(|k| if k % 2 == 0 { 1.0 } else { 5.0 } + 0.001 * f64::from(k)).collect();
+        let fitted = FittedQuantity::new(Quantity::FrontThw, &two_heaps, 0).unwrap();
+        assert!(fitted.form.unwrap().1.p_value < 0.01);
+    }
+
+    #[test]
+    fn too_few_values_are_not_fitted_and_equal_ones_have_no_form() {
+        assert_eq!(FittedQuantity::new(Quantity::Closing, &[1.0; 4], 0), None);
+        let equal = FittedQuantity::new(Quantity::Closing, &[2.0; 8], 0).unwrap();
+        assert_eq!((equal.form, equal.interval_95), (None, [2.0, 2.0]));
+        let with_zero = FittedQuantity::new(Quantity::CutOutThw, &[0.0, 1.0, 2.0, 3.0, 4.0], 0).unwrap();
+        assert_eq!(with_zero.form, None);
+    }
+
+    #[test]
+    fn the_seed_decides_the_interval() {
+        let values: Vec<f64> = (0..15).map(|k| f64::from(k * k)).collect();
+        let interval = |seed| FittedQuantity::new(Quantity::CrossingSpeed, &values, seed).unwrap().interval_95;
+        assert_eq!(interval(1), interval(1));
+        let spread = (0..20).map(interval).any(|other| other != interval(1));
+        assert!(spread, "different seeds give different resamples");
+    }
+
+    proptest! {
+        #[test]
+        fn quantiles_rise_from_the_smallest_to_the_largest(values in prop::collection::vec(0.1..50.0, 5..40)) {
+            let sorted = { let mut sorted = values.clone(); sorted.sort_by(f64::total_cmp); sorted };
+            let levels: Vec<f64> = (0..=10).map(|k| quantile(&sorted, f64::from(k) / 10.0)).collect();
+            prop_assert!(levels.windows(2).all(|pair| pair[0] <= pair[1]));
+            prop_assert_eq!(levels[0].to_bits(), sorted[0].to_bits());
+            prop_assert_eq!(levels[10].to_bits(), sorted[sorted.len() - 1].to_bits());
+        }
+    }
+}

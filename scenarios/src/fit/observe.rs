@@ -1,0 +1,243 @@
+//! What recordings hold of each quantity.
+
+use std::collections::BTreeMap;
+
+use closecall_traffic::metrics::time_headway_s;
+use closecall_traffic::{Lane, Side, Time, Trajectory, TrajectoryPoint};
+
+use super::distribution::median;
+use crate::filters::{PERIOD, SmoothedRecording};
+use crate::lane_change::{LaneChange, detect};
+
+/// Largest headway at which a vehicle counts as following [s]; see the module's documentation.
+const FOLLOWING_THW_S: f64 = 3.0;
+
+/// A pair counts where one follows the other for at least this.
+const MIN_FOLLOWING: Time = Time::from_ms(2_000);
+
+/// A quantity that is fitted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Quantity {
+    /// Headway to the old lane's lead when the marking is crossed [s].
+    CutOutThw,
+    /// Duration of complete lane changes [s].
+    LaneChangeDuration,
+    /// Peak width of complete lane changes [s].
+    LaneChangeWidth,
+    /// Closing speed to the old lane's lead when the manoeuvre starts [m/s].
+    Closing,
+    /// Speed when the marking is crossed [m/s].
+    CrossingSpeed,
+    /// Headway while following [s].
+    FrontThw,
+    /// Speed while following [m/s].
+    FollowingSpeed,
+}
+
+impl Quantity {
+    /// Every quantity, in the order of output.
+    pub const ALL: [Self; 7] = [
+        Self::CutOutThw,
+        Self::LaneChangeDuration,
+        Self::LaneChangeWidth,
+        Self::Closing,
+        Self::CrossingSpeed,
+        Self::FrontThw,
+        Self::FollowingSpeed,
+    ];
+
+    /// The parameter's name, with its unit.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::CutOutThw => "cut-out-thw-s",
+            Self::LaneChangeDuration => "lane-change-duration-s",
+            Self::LaneChangeWidth => "lane-change-width-s",
+            Self::Closing => "closing-mps",
+            Self::CrossingSpeed => "crossing-mps",
+            Self::FrontThw => "front-thw-s",
+            Self::FollowingSpeed => "following-mps",
+        }
+    }
+
+    /// How the values were taken.
+    pub const fn meaning(self) -> &'static str {
+        match self {
+            Self::CutOutThw => "headway to the old lane's lead at the crossing, lane changes to the left, at most 3 s",
+            Self::LaneChangeDuration => "whole manoeuvre of complete lane changes",
+            Self::LaneChangeWidth => "peak width of complete lane changes",
+            Self::Closing => "closing speed to the old lane's lead at the start, lane changes to the left, approaching",
+            Self::CrossingSpeed => "speed at the crossing of all lane changes",
+            Self::FrontThw => "median headway of each pair that follows for 2 s or more, at most 3 s",
+            Self::FollowingSpeed => "median speed of each pair that follows for 2 s or more",
+        }
+    }
+}
+
+/// The values of each quantity, in the order of recordings, tracks and time.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Samples {
+    values: BTreeMap<Quantity, Vec<f64>>,
+}
+
+impl Samples {
+    /// The values of one quantity.
+    pub fn values(&self, quantity: Quantity) -> &[f64] {
+        self.values.get(&quantity).map_or(&[], Vec::as_slice)
+    }
+
+    /// Appends the values of another recording.
+    pub fn extend(&mut self, other: Self) {
+        for (quantity, values) in other.values {
+            self.values.entry(quantity).or_default().extend(values);
+        }
+    }
+
+    fn push(&mut self, quantity: Quantity, value: f64) {
+        self.values.entry(quantity).or_default().push(value);
+    }
+}
+
+/// The values that one recording holds.
+pub fn observe(recording: &SmoothedRecording) -> Samples {
+    let mut samples = Samples::default();
+    for change in detect(recording) {
+        observe_lane_change(recording, &change, &mut samples);
+    }
+    observe_following(recording, &mut samples);
+    samples
+}
+
+fn observe_lane_change(recording: &SmoothedRecording, change: &LaneChange, samples: &mut Samples) {
+    samples.push(Quantity::CrossingSpeed, change.speed_mps);
+    if change.complete {
+        samples.push(Quantity::LaneChangeDuration, change.duration_s);
+        samples.push(Quantity::LaneChangeWidth, change.width_s);
+    }
+    if change.direction != Side::Left {
+        return;
+    }
+    let crossing = Time::from_s(change.crossing_s);
+    let Some(lead) = lead_in(recording, change.track_id, Lane(change.from_lane), crossing) else { return };
+    let Ok(thw_s) = time_headway_s(lead.gap_m, lead.own.speed_mps) else { return };
+    if thw_s > FOLLOWING_THW_S {
+        return;
+    }
+    samples.push(Quantity::CutOutThw, thw_s);
+    // The same lead when the manoeuvre starts, or as early as both are recorded.
+    let own = &recording.trajectories[lead.own_place];
+    let other = &recording.trajectories[lead.lead_place];
+    let Some((earliest, _)) = own.span().zip(other.span()).map(|(a, b)| (a.0.max(b.0), ())) else { return };
+    let start = Time::from_s(change.start_s).max(earliest).min(crossing);
+    if let Some((own, other)) = own.at(start).zip(other.at(start)) {
+        let closing_mps = own.speed_mps - other.speed_mps;
+        if closing_mps > 0.0 {
+            samples.push(Quantity::Closing, closing_mps);
+        }
+    }
+}
+
+/// A vehicle and the one ahead of it.
+struct LeadView<'a> {
+    own: &'a TrajectoryPoint,
+    own_place: usize,
+    lead_place: usize,
+    gap_m: f64,
+}
+
+/// The nearest vehicle wholly ahead of track `track_id` in `lane` at `time`.
+fn lead_in(recording: &SmoothedRecording, track_id: u64, lane: Lane, time: Time) -> Option<LeadView<'_>> {
+    let present = recording.present_at(time);
+    let own = present.iter().find(|presence| recording.look_up(**presence).0.track_id == track_id)?;
+    let (own_track, own_point) = recording.look_up(*own);
+    let ahead = present.iter().filter(|presence| presence.trajectory != own.trajectory).filter_map(|presence| {
+        let (track, point) = recording.look_up(*presence);
+        let gap_m = gap_m((own_track, own_point), (track, point));
+        (point.lane == lane && gap_m >= 0.0).then_some((gap_m, presence.trajectory))
+    });
+    let (gap_m, lead_place) = ahead.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(LeadView { own: own_point, own_place: own.trajectory, lead_place, gap_m })
+}
+
+fn gap_m(rear: (&Trajectory, &TrajectoryPoint), front: (&Trajectory, &TrajectoryPoint)) -> f64 {
+    front.1.s_m - rear.1.s_m - 0.5 * (front.0.dimensions.length_m + rear.0.dimensions.length_m)
+}
+
+fn observe_following(recording: &SmoothedRecording, samples: &mut Samples) {
+    let mut pairs: BTreeMap<(usize, usize), Vec<(f64, f64)>> = BTreeMap::new();
+    let spans = recording.trajectories.iter().filter_map(Trajectory::span);
+    let Some((mut time, last)) = spans.reduce(|(a, b), (c, d)| (a.min(c), b.max(d))) else { return };
+    while time <= last {
+        for (pair, thw_s, speed_mps) in following_at(recording, time) {
+            pairs.entry(pair).or_default().push((thw_s, speed_mps));
+        }
+        time += PERIOD;
+    }
+    for instants in pairs.into_values() {
+        if PERIOD * (instants.len() as i64) < MIN_FOLLOWING {
+            continue;
+        }
+        let (headways, speeds): (Vec<f64>, Vec<f64>) = instants.into_iter().unzip();
+        samples.push(Quantity::FrontThw, median(headways));
+        samples.push(Quantity::FollowingSpeed, median(speeds));
+    }
+}
+
+/// Every pair of neighbours in one lane that follow each other at `time`: who, headway, speed.
+fn following_at(recording: &SmoothedRecording, time: Time) -> Vec<((usize, usize), f64, f64)> {
+    let mut present: Vec<_> = recording.present_at(time).to_vec();
+    present.sort_by(|a, b| {
+        let (a, b) = (recording.look_up(*a).1, recording.look_up(*b).1);
+        a.lane.cmp(&b.lane).then(a.s_m.total_cmp(&b.s_m))
+    });
+    let follows = present.windows(2).filter_map(|pair| {
+        let (rear, front) = (recording.look_up(pair[0]), recording.look_up(pair[1]));
+        let gap_m = gap_m(rear, front);
+        let thw_s = time_headway_s(gap_m, rear.1.speed_mps).ok()?;
+        let counts = rear.1.lane == front.1.lane && gap_m >= 0.0 && thw_s <= FOLLOWING_THW_S;
+        counts.then_some(((pair[0].trajectory, pair[1].trajectory), thw_s, rear.1.speed_mps))
+    });
+    follows.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::filters::smooth;
+    use crate::recordings::test_support::{changing_track, recording_of, straight_track};
+
+    /// Pulls out to the left at 30 m/s from behind one at 26 m/s.
+    fn overtaking() -> Samples {
+        let own = changing_track(1, (0.0, 30.0), (-5.25, -1.75), (3.0, 5.0), 110);
+        let lead = straight_track(2, 40.0, 26.0, -5.25, 110);
+        observe(&smooth(&recording_of(vec![own, lead])))
+    }
+
+    #[test]
+    fn the_headway_at_the_crossing_and_the_closing_speed() {
+        let samples = overtaking();
+        // At the crossing, 5.5 s or a frame later: gap 40 − 4.5 − 4·t, at 30 m/s.
+        let thw_s = samples.values(Quantity::CutOutThw)[0];
+        assert!((thw_s - (35.5 - 4.0 * 5.5) / 30.0).abs() < 0.4 / 30.0 + 1e-6, "{thw_s}");
+        assert!((samples.values(Quantity::Closing)[0] - 4.0).abs() < 1e-6);
+        assert!((samples.values(Quantity::LaneChangeDuration)[0] - 5.0).abs() < 0.25);
+        assert!((samples.values(Quantity::CrossingSpeed)[0] - 30.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn one_value_for_each_pair_that_follows_long_enough() {
+        let pair = |frames| {
+            let lead = straight_track(2, 44.5, 20.0, -1.75, frames);
+            observe(&smooth(&recording_of(vec![straight_track(1, 0.0, 20.0, -1.75, frames), lead])))
+        };
+        assert_eq!(pair(19).values(Quantity::FrontThw), [0.0; 0]);
+        let samples = pair(20);
+        let [thw_s] = samples.values(Quantity::FrontThw) else { panic!("one pair") };
+        assert!((thw_s - 2.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_free_driver_does_not_follow() {
+        let tracks = vec![straight_track(1, 0.0, 20.0, -1.75, 50), straight_track(2, 70.0, 20.0, -1.75, 50)];
+        assert!(observe(&smooth(&recording_of(tracks))).values(Quantity::FrontThw).is_empty());
+    }
+}
