@@ -4,22 +4,24 @@ use std::collections::BTreeMap;
 
 use closecall_traffic::{Dimensions, Lane, Time, Trajectory, TrajectoryPoint, VehicleClass};
 
-use super::RecordingProblem;
+use super::{RecordingProblem, ngsim};
 
 /// Whether frame numbers may start again within one file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Clock {
     /// One count of frames for the whole file.
     Continuous,
-    /// Files that join several recordings of a place: vehicle and frame numbers recur at other times.
+    /// Original NGSIM files put one behind the other: vehicle and frame numbers recur at later times.
     MayRestart,
 }
 
 /// One vehicle at one frame, in SI units.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Row {
-    /// Rows of the same group belong to one track, before it is split at gaps.
-    pub(super) group: u64,
+    /// Rows of the same number and origin belong to one track, before it is split at gaps.
+    pub(super) number: u64,
+    /// Time of frame 0, where it tells apart several recordings in one file; zero where it does not.
+    pub(super) origin: Time,
     pub(super) vehicle_id: u64,
     pub(super) frame: i64,
     pub(super) time: Time,
@@ -41,21 +43,21 @@ pub(super) type Blame = (u64, RecordingProblem);
 /// Steps of time may differ from the period by this share: files round their times.
 const UNEVENNESS: f64 = 0.02;
 
-/// The period of recordings in which no vehicle has two frames: NGSIM's.
-const USUAL_PERIOD: Time = Time::from_ms(100);
-
 /// Times from here on count from 1970, not from the recording's start: one day.
 const EPOCH_TIMES_FROM: Time = Time::from_ms(86_400_000);
 
-/// Rows by group.
+/// Recordings in one file whose times overlap are laid apart by this, so that their vehicles never meet.
+const APART: Time = Time::from_ms(10_000);
+
+/// Rows by number and origin.
 #[derive(Default)]
 pub(super) struct Assembly {
-    groups: BTreeMap<u64, Vec<Row>>,
+    groups: BTreeMap<(u64, Time), Vec<Row>>,
 }
 
 impl Assembly {
     pub(super) fn push(&mut self, row: Row) {
-        self.groups.entry(row.group).or_default().push(row);
+        self.groups.entry((row.number, row.origin)).or_default().push(row);
     }
 
     /// The tracks in the order of their numbers, and the time between two frames.
@@ -63,14 +65,18 @@ impl Assembly {
         for rows in self.groups.values_mut() {
             rows.sort_by_key(|row| (row.time, row.frame, row.line));
         }
+        self.lay_apart();
         let period = self.period();
         let start = self.start();
-        let mut next_id = self.groups.keys().max().map_or(0, |largest| largest + 1);
+        let mut next_id = self.groups.keys().next_back().map_or(0, |(largest, _)| largest + 1);
+        let mut latest = None;
         let mut tracks = Vec::with_capacity(self.groups.len());
-        for (group, rows) in self.groups {
-            for (piece, range) in pieces(&rows, period)?.into_iter().enumerate() {
-                let track_id = if piece == 0 { group } else { next_id };
-                next_id += u64::from(piece > 0);
+        for ((number, _), rows) in self.groups {
+            for range in pieces(&rows, period)? {
+                let is_first = latest != Some(number);
+                let track_id = if is_first { number } else { next_id };
+                next_id += u64::from(!is_first);
+                latest = Some(number);
                 tracks.push(track(track_id, &rows[range], start));
             }
         }
@@ -78,13 +84,34 @@ impl Assembly {
         Ok((tracks, period))
     }
 
-    /// The mean step over the group with the most rows.
+    /// Shifts recordings of different origin to later times, so that none overlaps the one before.
+    fn lay_apart(&mut self) {
+        let mut spans: BTreeMap<Time, (Time, Time)> = BTreeMap::new();
+        for ((_, origin), rows) in &self.groups {
+            let (Some(first), Some(last)) = (rows.first(), rows.last()) else { continue };
+            let span = spans.entry(*origin).or_insert((first.time, last.time));
+            *span = (span.0.min(first.time), span.1.max(last.time));
+        }
+        let mut shifts = BTreeMap::new();
+        let mut free_from = None;
+        for (origin, (first, last)) in spans {
+            let shift = free_from.map_or(Time::ZERO, |from: Time| (from - first).max(Time::ZERO));
+            free_from = Some(last + shift + APART);
+            shifts.insert(origin, shift);
+        }
+        for ((_, origin), rows) in &mut self.groups {
+            let shift = shifts.get(origin).copied().unwrap_or_default();
+            rows.iter_mut().for_each(|row| row.time += shift);
+        }
+    }
+
+    /// The mean step over the group with the most rows; NGSIM's, where no vehicle has two frames.
     fn period(&self) -> Time {
         let longest = self.groups.values().rev().max_by_key(|rows| rows.len());
-        let Some([first, .., last]) = longest.map(Vec::as_slice) else { return USUAL_PERIOD };
+        let Some([first, .., last]) = longest.map(Vec::as_slice) else { return ngsim::PERIOD };
         let frames = last.frame - first.frame;
         let step_ns = if frames > 0 { (last.time - first.time).ns() / frames } else { 0 };
-        if first.clock == Clock::MayRestart || step_ns <= 0 { USUAL_PERIOD } else { Time::from_ns(step_ns) }
+        if first.clock == Clock::MayRestart || step_ns <= 0 { ngsim::PERIOD } else { Time::from_ns(step_ns) }
     }
 
     /// What is taken off all times.
@@ -114,7 +141,8 @@ fn is_gap(before: &Row, row: &Row, period: Time) -> Result<bool, Blame> {
     let (later, earlier) = if row.line > before.line { (row, before) } else { (before, row) };
     let (frames, step) = (row.frame - before.frame, row.time - before.time);
     if frames == 0 && (step == Time::ZERO || row.clock == Clock::Continuous) {
-        let problem = RecordingProblem::DuplicateRow { vehicle: row.group, frame: row.frame, first_line: earlier.line };
+        let problem =
+            RecordingProblem::DuplicateRow { vehicle: row.number, frame: row.frame, first_line: earlier.line };
         return Err((later.line, problem));
     }
     let is_near = |count: i64| ((step - period * count).ns().abs() as f64) <= UNEVENNESS * period.ns() as f64;
@@ -125,7 +153,7 @@ fn is_gap(before: &Row, row: &Row, period: Time) -> Result<bool, Blame> {
         return Ok(true);
     }
     let problem = RecordingProblem::UnevenTime {
-        vehicle: row.group,
+        vehicle: row.number,
         frame_before: before.frame,
         line_before: before.line,
         frame: row.frame,

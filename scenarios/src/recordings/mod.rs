@@ -21,6 +21,8 @@
 //!   change at 0.05 rad the front is 0.1 m beside the centre, which is below NGSIM's own accuracy.
 //! - Rows may come in any order. NGSIM numbers recur after gaps: a vehicle's rows are sorted by frame and split wherever
 //!   a frame is missing. The first piece keeps the number, the others get numbers above the largest in the file.
+//! - The catalogue's export joins several recordings of one place, in which numbers recur. They are told apart by the
+//!   time of frame 0, and laid one behind the other where their clocks overlap, so that their vehicles never meet.
 //! - NGSIM times are milliseconds; where they count from 1970 they are counted from the recording's first frame instead.
 //! - What a layout does not carry is derived by differences between neighbouring frames: the acceleration where its
 //!   field is empty, lateral speed (from the heading where there is one) and lateral acceleration.

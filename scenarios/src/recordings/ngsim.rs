@@ -12,6 +12,9 @@ use super::rows::Fields;
 /// The international foot [m].
 const FOOT_M: f64 = 0.3048;
 
+/// NGSIM's 10 Hz.
+pub(super) const PERIOD: Time = Time::from_ms(100);
+
 /// NGSIM's codes for classes.
 const CLASSES: [(i64, VehicleClass); 3] =
     [(1, VehicleClass::Motorcycle), (2, VehicleClass::Car), (3, VehicleClass::Truck)];
@@ -122,12 +125,19 @@ impl NgsimColumns {
         let length_m = metres(self.length, "v_Length", feet::LENGTH)?;
         let front_m = metres(self.y, "Local_Y", feet::POSITION)?;
         let right_m = metres(self.x, "Local_X", feet::LATERAL)?;
+        let frame = whole(self.frame, "Frame_ID", allowed::FRAMES)?;
+        let time = Time::from_ms(whole(self.time, "Global_Time", feet::TIME_MS)?);
+        let (origin, clock) = match self.location {
+            Some(_) => (time - PERIOD * frame, Clock::Continuous),
+            None => (Time::ZERO, Clock::MayRestart),
+        };
         Ok(Row {
-            group: vehicle,
+            number: vehicle,
+            origin,
             vehicle_id: vehicle,
-            frame: whole(self.frame, "Frame_ID", allowed::FRAMES)?,
-            time: Time::from_ms(whole(self.time, "Global_Time", feet::TIME_MS)?),
-            clock: Clock::MayRestart,
+            frame,
+            time,
+            clock,
             s_m: front_m - 0.5 * length_m,
             d_m: -right_m,
             lane: whole(self.lane, "Lane_ID", allowed::LANES)?.unsigned_abs() as u8,

@@ -112,7 +112,8 @@ impl PlainColumns {
             text => Some(number(text, "accel_mps2", allowed::ACCELERATION_MPS2)?),
         };
         Ok(Row {
-            group: track.unsigned_abs(),
+            number: track.unsigned_abs(),
+            origin: Time::ZERO,
             vehicle_id: vehicle.unsigned_abs(),
             frame: whole(self.frame, "frame", allowed::FRAMES)?,
             time: Time::from_s(real(self.time, "time_s", allowed::TIME_S)?),
