@@ -217,8 +217,13 @@ impl FittedConfig {
             return Err(ConfigError::new("source", Problem::Missing { needed: "what it was fitted to" }));
         }
         if let Some([low, high]) = self.interval_95 {
-            FINITE.check(low, "interval-95")?;
-            at_least(low).check(high, "interval-95")?;
+            for (index, value, allowed) in [(0, low, FINITE), (1, high, at_least(low))] {
+                if !allowed.contains(value) {
+                    let problem = Problem::OutOfRange { value, allowed };
+                    let place = ConfigError { path: KeyPath::default(), problem }.within_index(index);
+                    return Err(place.within("interval-95"));
+                }
+            }
         }
         Ok(())
     }

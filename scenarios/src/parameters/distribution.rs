@@ -27,7 +27,7 @@ pub(super) const fn at_least(low: f64) -> Range {
 /// distinguished, so that the quantile at 0 of an unbounded distribution is its practical minimum.
 const SMALLEST_PROBABILITY: f64 = f64::EPSILON / 4.0;
 
-/// Largest standard deviation of a logarithm: already nine orders of magnitude between the quartiles' tails.
+/// Largest standard deviation of a logarithm: with it the quartiles already lie a factor of 700,000 apart.
 const LARGEST_SIGMA: f64 = 10.0;
 
 /// Where the median lies.
@@ -111,7 +111,7 @@ impl Distribution {
         let possible: Vec<(&String, f64)> =
             weights.iter().filter(|(_, weight)| **weight > 0.0).map(|(label, weight)| (label, *weight)).collect();
         let total: f64 = possible.iter().map(|(_, weight)| weight).sum();
-        if !(total > 0.0) {
+        if possible.is_empty() {
             return Err(here(Problem::Missing { needed: "a label with a weight above 0" }));
         }
         let mut sum = 0.0;
@@ -207,11 +207,19 @@ impl Distribution {
         }
     }
 
-    /// The smallest and the largest number that [`Self::quantile`] gives, up to rounding; nothing for labels.
+    /// The smallest and the largest number; nothing for labels.
+    ///
+    /// Where a distribution is unbounded, what lies beyond has a probability of 10⁻¹⁶.
     pub fn bounds(&self) -> Option<[f64; 2]> {
-        match (self.quantile(0.0), self.quantile(1.0 - SMALLEST_PROBABILITY * 2.0)) {
-            (Value::Number(min), Value::Number(max)) => Some([min, max]),
-            _ => None,
+        match &self.0 {
+            Kind::Uniform { min, max } | Kind::TruncatedNormal { bounds: [min, max], .. } => Some([*min, *max]),
+            Kind::LogNormal { median, sigma, max, standard } => {
+                let at = |u| median * (sigma * standard.quantile(u)).exp();
+                Some([at(SMALLEST_PROBABILITY), max.unwrap_or_else(|| at(1.0 - 2.0 * SMALLEST_PROBABILITY))])
+            }
+            Kind::Empirical { quantiles } => Some([quantiles[0], quantiles[quantiles.len() - 1]]),
+            Kind::Fixed(Value::Number(value)) => Some([*value, *value]),
+            Kind::Choice(_) | Kind::Fixed(Value::Label(_)) => None,
         }
     }
 

@@ -21,6 +21,8 @@ mod empirical;
 mod finite;
 mod normal;
 mod space;
+#[cfg(test)]
+mod tests;
 
 pub use config::{
     EmpiricalConfig, FittedConfig, LogNormalConfig, ParameterConfig, ParametersConfig, TruncatedNormalConfig,

@@ -1,20 +1,26 @@
 //! The standard normal distribution between two bounds, accurate in both tails.
 //!
 //! Φ and its inverse are taken in whichever tail is the smaller one, so that neither 1 − 10⁻²⁰ nor a truncation at
-//! five standard deviations costs any digits. Both are statrs' complementary error function and its inverse.
+//! five standard deviations costs any digits. The inverse comes from statrs with 11 digits, and one step of Newton's
+//! method with libm's complementary error function makes them 15.
 
-use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
+use std::f64::consts::{FRAC_1_SQRT_2, PI, SQRT_2};
 
-use statrs::function::erf::{erfc, erfc_inv};
+use libm::erfc;
+use statrs::function::erf::erfc_inv;
 
 /// The probability below `z`.
-pub(super) fn below(z: f64) -> f64 {
+fn below(z: f64) -> f64 {
     0.5 * erfc(-z * FRAC_1_SQRT_2)
 }
 
-/// The z below which `probability` lies.
+/// The z below which `probability` lies; infinite for 0.
 fn quantile(probability: f64) -> f64 {
-    -SQRT_2 * erfc_inv(2.0 * probability)
+    let z = -SQRT_2 * erfc_inv(2.0 * probability);
+    let density = (-0.5 * z * z).exp() / (2.0 * PI).sqrt();
+    let step = (below(z) - probability) / density;
+    // The density is 0 where z is infinite, or so far out that its square has no exponential.
+    if step.is_finite() { z - step } else { z }
 }
 
 /// The standard normal distribution, cut off at two bounds, of which either may be infinite.

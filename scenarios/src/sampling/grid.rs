@@ -2,10 +2,10 @@
 //!
 //! # How many levels
 //!
-//! Every parameter starts with one level, which is its nominal value. As long as the number of combinations stays
-//! within n, the parameter with the fewest levels (the first by name of several) that can take one more gets it; a
-//! choice has at most as many levels as labels, a fixed value has one. A number's levels are the medians of as many equally
-//! probable parts, a choice's are its most probable labels.
+//! All parameters get the same number of levels, the largest with which the number of combinations stays within n; but
+//! a choice has at most as many levels as labels, and a fixed value has one. Then each, in the order of the names, gets
+//! one level more where the combinations still stay within n. A number's levels are the medians of as many equally
+//! probable parts, a choice's are its most probable labels; a single level is the nominal value.
 //!
 //! The last name varies fastest.
 
@@ -23,40 +23,31 @@ impl Grid {
     /// The grid with up to `n` points; the nominal values alone where n is 0.
     pub(super) fn within(space: &ParameterSpace, n: u64) -> Self {
         let most: Vec<u64> = space.iter().map(|(_, entry)| entry.distribution.most_levels()).collect();
-        let mut grid = Self::even(&most, n);
-        loop {
-            let can_be_raised = |place: &usize| grid.levels[*place] < most[*place] && grid.fits_raised(*place, n);
-            let fewest = (0..most.len()).filter(can_be_raised).min_by_key(|&place| grid.levels[place]);
-            let Some(place) = fewest else { return grid };
-            grid.levels[place] += 1;
-        }
-    }
-
-    /// The largest grid within `n` in which all parameters have the same number of levels, but for those that cannot
-    /// have so many: where the rule arrives after whole rounds, found by bisection.
-    fn even(most: &[u64], n: u64) -> Self {
-        let grid = |levels: u64| Self { levels: most.iter().map(|&most| most.min(levels)).collect() };
-        let (mut fits, mut too_many) = (1, n.saturating_add(1).max(2));
+        let even = |levels: u64| Self { levels: most.iter().map(|&most| most.min(levels)).collect() };
+        let (mut fits, mut too_many) = (1, n.max(1).saturating_add(1));
         while too_many - fits > 1 {
             let middle = fits + (too_many - fits) / 2;
-            if grid(middle).fits(n) {
+            if even(middle).fits(n) {
                 fits = middle;
             } else {
                 too_many = middle;
             }
         }
-        grid(fits)
+        let mut grid = even(fits);
+        for (place, &most) in most.iter().enumerate() {
+            let mut raised = grid.clone();
+            raised.levels[place] = most.min(fits.saturating_add(1));
+            if raised.fits(n) {
+                grid = raised;
+            }
+        }
+        grid
     }
 
+    /// True where there are no more than `n` combinations.
     fn fits(&self, n: u64) -> bool {
         let product = self.levels.iter().try_fold(1_u64, |product, &levels| product.checked_mul(levels));
         product.is_some_and(|points| points <= n)
-    }
-
-    fn fits_raised(&self, place: usize, n: u64) -> bool {
-        let mut raised = self.clone();
-        raised.levels[place] += 1;
-        raised.fits(n)
     }
 
     /// The number of combinations.

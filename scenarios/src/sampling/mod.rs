@@ -15,4 +15,7 @@ mod grid;
 mod random;
 mod sobol;
 
+#[cfg(test)]
+mod tests;
+
 pub use design::{Design, UnknownDesign};

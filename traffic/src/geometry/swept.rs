@@ -187,7 +187,7 @@ impl Sweep {
         let centre_clearance = normal.dot(&offset) - frames[owner].half_extent_m(side);
         let centre_rate = normal.dot(&change) + own_turn * turned.dot(&offset);
         let clearance_m = centre_clearance - frames[1 - owner].reach_m(normal);
-        if !(clearance_m > TOUCH_M) {
+        if clearance_m <= TOUCH_M || clearance_m.is_nan() {
             return Separation { owner, side, clearance_m, safe_for: 0.0 };
         }
         let safe_for = frames[1 - owner].corner_offsets_m().into_iter().fold(f64::INFINITY, |safe_for, corner| {
