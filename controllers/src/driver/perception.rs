@@ -6,9 +6,9 @@
 //! ```
 //!
 //! - *Late.* Everything outside is known as it was one reaction time ago. Drivers make up for part of that delay: they
-//!   know their own motion at once, and expect the others to keep their speed (temporal anticipation; Treiber, Kesting
-//!   and Helbing, *Delays, inaccuracies and anticipation in microscopic traffic models*, Physica A 360 (2006) 71–88).
-//!   A change of the other's speed is therefore what comes late.
+//!   know their own motion at once, and expect the others to go on as they seem to (temporal anticipation; Treiber,
+//!   Kesting and Helbing, *Delays, inaccuracies and anticipation in microscopic traffic models*, Physica A 360 (2006)
+//!   71–88). What comes late is a change in how the others drive.
 //! - *Coarse.* A speed difference is noticed only where the visual angle of the vehicle ahead grows or shrinks faster
 //!   than 0.003 rad/s (Hoffmann and Mortimer, *Scaling of relative velocity between vehicles*, Accident Analysis and
 //!   Prevention 28 (1996) 415–421). Below that the vehicle ahead seems to keep one's own speed.
@@ -24,7 +24,7 @@ use super::{DriverInput, LaneNeighbours, Lead, Neighbour};
 const LOOMING_THRESHOLD_RADPS: f64 = 0.003;
 
 /// Time constant with which a deceleration is felt from the change of speed [s].
-const FEELING_TIME_S: f64 = 0.4;
+const FEELING_TIME_S: f64 = 0.6;
 
 /// Deceleration assumed when a brake light goes on ahead, before it is felt [m/s²]: an ordinary braking.
 const ASSUMED_BRAKING_MPS2: f64 = 2.0;
@@ -149,10 +149,13 @@ impl Perception {
             own_speed_then_mps: glance.own_speed_mps,
             looming_radps: self.looming_radps,
         };
-        let felt_mps2 = self.feel(glance.ahead.as_ref(), input.time);
+        let believed_mps2 = self.feel(glance.ahead.as_ref(), input.time);
         let mut ahead = glance.ahead.map(|seen| carry.ahead(&seen));
         if let Some(ahead) = &mut ahead {
-            ahead.lead.acceleration_mps2 = felt_mps2;
+            let changed_mps = self.felt.acceleration_mps2 * carry.elapsed_s;
+            ahead.lead.gap_m += 0.5 * changed_mps * carry.elapsed_s;
+            ahead.lead.speed_mps = (ahead.lead.speed_mps + changed_mps).max(0.0);
+            ahead.lead.acceleration_mps2 = believed_mps2;
         }
         let passing = glance.beside.map(|[lead, alongside, follower]| PassingLane {
             lead: lead.map(|seen| carry.ahead(&seen)),

@@ -7,14 +7,17 @@
 //! Near the wanted gap v_allowed = λ·e, which is the constant time gap law whose platoons are string stable for T above
 //! twice the actuators' lag (Swaroop and Rajagopal, *A review of constant time headway policy for automatic vehicle
 //! following*, IEEE ITSC 2001). Far from it v_allowed grows with √e only, as a constant comfortable braking does, so that a
-//! gap in hand is used before the brakes are: E does not brake hard while there is room. It never speeds up to
-//! close faster than a few metres per second.
+//! gap in hand is used before the brakes are. It never speeds up to close faster than a few metres per second.
+//!
+//! Where F brakes so that E will need more than a light constant braking, E begins with that at once ([`Behind`]): the same
+//! stop with the lowest peak, and a brake light that those behind see early.
 
 use closecall_traffic::{Check, ConfigError, Num, Parameters, Range};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::surroundings::Front;
+use crate::braking::Behind;
 
 /// λ: closing speed allowed per metre of error near the wanted gap [1/s].
 const ALLOWED_CLOSING_PER_M: f64 = 0.3;
@@ -33,6 +36,11 @@ const STRONGEST_ACCELERATION_MPS2: f64 = 1.5;
 
 /// Shortest time constant of the control law [s]: three times the actuators' lag, for stability.
 const SHORTEST_TIME_CONSTANT_S: f64 = 0.45;
+
+/// Required constant braking from which on E does not wait until the gap is used up [m/s²].
+///
+/// Chosen on tuning seeds: 2 leaves 4.3 % of collisions with the margin increase system, waiting leaves 7.3 %.
+const EARLY_FROM_MPS2: f64 = 2.0;
 
 /// Time constant with which the set speed is approached [s].
 const SPEED_TIME_S: f64 = 2.0;
@@ -93,9 +101,26 @@ impl Acc {
             let slower = (allowed_mps + opening_mps) / time_s;
             let faster = (allowed_mps.min(FASTEST_CLOSING_UP_MPS) + opening_mps) / time_s;
             wanted = wanted.min(if slower < 0.0 { slower } else { faster.max(0.0) });
+            let required = self.required_mps2(speed_mps, front);
+            if required > EARLY_FROM_MPS2 {
+                wanted = wanted.min(-required);
+            }
         }
         // A NaN passes through `clamp`, and is refused where the command is given.
         wanted.clamp(-STRONGEST_BRAKING_MPS2, STRONGEST_ACCELERATION_MPS2)
+    }
+}
+
+impl Acc {
+    /// The constant braking with which E just keeps its standstill gap [m/s²].
+    fn required_mps2(&self, speed_mps: f64, front: &Front) -> f64 {
+        Behind {
+            speed_mps,
+            lead_mps: front.speed_mps,
+            lead_mps2: front.acceleration_mps2,
+            room_m: front.gap_m - self.standstill_gap_m,
+        }
+        .required_mps2()
     }
 }
 

@@ -1,7 +1,7 @@
 //! The headline encounter, sampled: F, E, R and what may stand in the passing lane.
 
 use closecall_controllers::{
-    AccConfig, AebConfig, CheckedDriver, DriverConfig, DriverNote, EgoSettings, EgoState, EgoStackConfig, FollowConfig,
+    AccConfig, AebConfig, CheckedDriver, DriverConfig, DriverNote, EgoSettings, EgoStackConfig, EgoState, FollowConfig,
     HumanDriver, MisConfig, OvertakerConfig, PrescribedConfig, ReactionConfig, Wiedemann99Config,
 };
 use closecall_traffic::{ActorId, Check, Lane, Num, Parameters, Road, Time, Vehicle, VehicleClass, stream};
@@ -152,6 +152,7 @@ fn rear_driver(case: &Case, drawn: &Sample) -> HumanDriver {
             follow: FollowConfig::Wiedemann99(follow),
             reaction_s: reaction,
             lane_change_duration_s: Some(drawn.duration_s.into()),
+            evasive_lateral_mps2: None,
         })
     })
 }

@@ -113,9 +113,7 @@ impl World {
             gap_m(a, b).max(gap_m(b, a)) < 0.0 && (a.state.d_m - b.state.d_m).abs() < 0.5 * widths
         };
         let n = self.actors.len();
-        (0..n)
-            .flat_map(|a| (a + 1..n).map(move |b| (a, b)))
-            .find(|(a, b)| overlap(&self.actors[*a], &self.actors[*b]))
+        (0..n).flat_map(|a| (a + 1..n).map(move |b| (a, b))).find(|(a, b)| overlap(&self.actors[*a], &self.actors[*b]))
     }
 
     /// One physics step: all read the state, then all move.
@@ -186,9 +184,8 @@ impl World {
         let own = &self.actors[me];
         let reach_m = 0.5 * self.road.lane_width_m();
         let centre_m = self.road.lane_centre_m(lane);
-        let inside = |other: &Actor| {
-            (other.state.d_m - centre_m).abs() < reach_m + 0.5 * other.vehicle.dimensions.width_m
-        };
+        let inside =
+            |other: &Actor| (other.state.d_m - centre_m).abs() < reach_m + 0.5 * other.vehicle.dimensions.width_m;
         LaneNeighbours {
             lead: self.nearest(me, |other| inside(other) && gap_m(other, own) >= 0.0),
             follower: self.nearest(me, |other| inside(other) && gap_m(own, other) >= 0.0),

@@ -11,6 +11,13 @@ use crate::driver::{Wiedemann99, Wiedemann99Config};
 /// Duration of a whole lane change where the scenario gives none [s]: the recorded mean.
 const DEFAULT_DURATION_S: f64 = 6.8;
 
+/// Lateral acceleration that a driver accepts to get clear sooner, where the scenario gives none [m/s²].
+///
+/// In need, drivers brake far more than they steer, and use little of the grip sideways (Adams, *Review of the literature
+/// on obstacle avoidance maneuvers: braking versus steering*, UMTRI-94-19, 1994). Chosen on tuning seeds: with 0 the
+/// encounter without a margin increase system ends in a collision in 35 % of samples, with 1 in 23 %, with 2 in 11 %.
+const DEFAULT_EVASIVE_LATERAL_MPS2: f64 = 1.0;
+
 /// How an overtaking driver follows.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -31,6 +38,9 @@ pub struct OvertakerConfig {
     pub reaction_s: ReactionConfig,
     /// Time that the whole lane change takes [s]; 6.8.
     pub lane_change_duration_s: Option<Num>,
+    /// Lateral acceleration that it accepts in need, to get clear sooner than it had meant to [m/s²]; 1. With 0 it only
+    /// brakes.
+    pub evasive_lateral_mps2: Option<Num>,
 }
 
 /// A checked overtaking driver.
@@ -40,6 +50,7 @@ pub struct Overtaker {
     pub(crate) follow: Wiedemann99,
     pub(crate) reaction: Reaction,
     pub(crate) duration_s: f64,
+    pub(crate) evasive_lateral_mps2: f64,
 }
 
 impl Overtaker {
@@ -86,10 +97,54 @@ impl Check for OvertakerConfig {
                 "cc1 is no less than the cut-out headway, so that the driver never comes close enough".to_owned();
             return Err(ConfigError::new("cut-out-thw-s", Problem::Contradiction { other: "follow", rule }));
         }
+        let evasive_lateral_mps2 = match &self.evasive_lateral_mps2 {
+            Some(num) => parameters.number(num, "evasive-lateral-mps2", Range::closed(0.0, 8.0))?,
+            None => DEFAULT_EVASIVE_LATERAL_MPS2,
+        };
         let duration_s = match &self.lane_change_duration_s {
             Some(num) => parameters.number(num, "lane-change-duration-s", Range::closed(1.5, 20.0))?,
             None => DEFAULT_DURATION_S,
         };
-        Ok(Overtaker { cut_out_thw_s, follow, reaction: self.reaction_s.check(parameters)?, duration_s })
+        let reaction = self.reaction_s.check(parameters)?;
+        Ok(Overtaker { cut_out_thw_s, follow, reaction, duration_s, evasive_lateral_mps2 })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn config(cut_out_thw_s: f64, cc1_s: f64) -> OvertakerConfig {
+        OvertakerConfig {
+            cut_out_thw_s: cut_out_thw_s.into(),
+            follow: FollowConfig::Wiedemann99(Wiedemann99Config { cc1_s: Some(cc1_s.into()), ..Default::default() }),
+            reaction_s: ReactionConfig::Value(0.9.into()),
+            lane_change_duration_s: None,
+            evasive_lateral_mps2: None,
+        }
+    }
+
+    #[test]
+    fn a_following_distance_that_never_lets_it_cut_out_is_refused() {
+        let none = Parameters::default();
+        let error = config(0.3, 0.9).check(&none).unwrap_err();
+        assert_eq!(error.path.to_string(), "cut-out-thw-s");
+        // 1.5 m + 0.05 s · 30 m/s is 3 m; 0.15 s are 4.5 m at 30 m/s, but only 2.25 m at 15 m/s, where it keeps 2.25 m.
+        let driver = config(0.15, 0.05).check(&none).unwrap();
+        assert_eq!(driver.check_reach(30.0), Ok(()));
+        assert!(driver.check_reach(10.0).is_err());
+        assert!(driver.check_reach(f64::NAN).is_err());
+    }
+
+    #[test]
+    fn a_second_reaction_time_is_refused() {
+        let follow = Wiedemann99Config {
+            cc1_s: Some(0.05.into()),
+            reaction_s: Some(ReactionConfig::Value(0.9.into())),
+            ..Default::default()
+        };
+        let config = OvertakerConfig { follow: FollowConfig::Wiedemann99(follow), ..config(0.3, 0.05) };
+        let error = config.check(&Parameters::default()).unwrap_err();
+        assert_eq!(error.path.to_string(), "follow.wiedemann99.reaction-s");
     }
 }

@@ -13,7 +13,7 @@ use crate::driver::{
 };
 
 /// Braking below which a driver who is about to be clear does not bother [m/s²].
-const TOLERATED_BRAKING_MPS2: f64 = 0.5;
+const TOLERATED_BRAKING_MPS2: f64 = 0.1;
 
 /// By how much a driver brakes harder than it thinks necessary [1].
 const BRAKING_MARGIN: f64 = 1.2;
@@ -26,10 +26,6 @@ const CHANGE_BACK_S: f64 = 3.0;
 
 /// Braking from which on a driver steers more sharply than it had meant to, to get clear sooner [m/s²].
 const SHARPER_STEERING_FROM_MPS2: f64 = 3.0;
-
-/// Lateral acceleration that an ordinary driver accepts in an evasive lane change [m/s²] (4 is seldom exceeded: Burg and
-/// Moser, Handbuch Verkehrsunfallrekonstruktion, 2017).
-const EVASIVE_LATERAL_MPS2: f64 = 3.0;
 
 /// Largest second derivative of the quintic: 10/√3, so that a path of width w and duration T peaks at 5.77·w/T².
 const QUINTIC_PEAK: f64 = 5.773_502_691_896_258;
@@ -213,7 +209,7 @@ impl OvertakerDriver {
         if let Some(ahead) = overtaken {
             let course = self.course(moment, ahead, way_to_clear_m);
             if !change.sharpened && course.needed_braking_mps2() > SHARPER_STEERING_FROM_MPS2 {
-                action.lane_change = sharpen(moment, &mut change, ahead, self.settings.duration_s);
+                action.lane_change = sharpen(moment, &mut change, ahead, &self.settings);
             }
             action.acceleration_mps2 = braked(wanted, &self.course(moment, ahead, change.way_to_clear_m(own.s_m)));
         }
@@ -289,13 +285,19 @@ impl OvertakerDriver {
 }
 
 /// Steers as sharply as a human does in need, where that is sharper than planned.
-fn sharpen(moment: &Moment<'_>, change: &mut Change, ahead: &Perceived, planned_s: f64) -> Option<LaneChange> {
+fn sharpen(moment: &Moment<'_>, change: &mut Change, ahead: &Perceived, settings: &Overtaker) -> Option<LaneChange> {
     let sideways_m = (moment.input.road.lane_centre_m(change.target) - moment.input.own.d_m).abs();
-    let duration_s = (QUINTIC_PEAK * sideways_m / EVASIVE_LATERAL_MPS2).sqrt();
-    if duration_s >= planned_s {
+    let duration_s = (QUINTIC_PEAK * sideways_m / settings.evasive_lateral_mps2).sqrt();
+    // Written so that no lateral acceleration at all, for which the duration is infinite, means no sharper steering.
+    if !(duration_s < settings.duration_s) {
         return None;
     }
-    *change = Change { sharpened: true, ..moment.change(change.home, change.target, Some(ahead), duration_s) };
+    let sharper = Change { sharpened: true, ..moment.change(change.home, change.target, Some(ahead), duration_s) };
+    let s_m = moment.input.own.s_m;
+    if sharper.way_to_clear_m(s_m) >= change.way_to_clear_m(s_m) {
+        return None;
+    }
+    *change = sharper;
     Some(LaneChange { target: change.target, duration_s })
 }
 
