@@ -206,11 +206,11 @@ proptest! {
         let space = space(&format!("{text}w = {{ choice = {{ {} }} }}", choice.join(", ")));
         let points = space.samples(Design::Grid, n);
         prop_assert!(1 <= points && points <= n);
-        let levels: Vec<u64> = space.iter().map(|(name, _)| {
-            let values: BTreeSet<String> =
-                (0..points).map(|index| space.sample(Design::Grid, 0, index, n).get(name).map(Value::to_string)).flatten().collect();
-            values.len() as u64
-        }).collect();
+        let distinct = |name: &ParameterName| {
+            let points = (0..points).map(|index| space.sample(Design::Grid, 0, index, n));
+            points.filter_map(|point| point.get(name).map(Value::to_string)).collect::<BTreeSet<_>>().len() as u64
+        };
+        let levels: Vec<u64> = space.iter().map(|(name, _)| distinct(name)).collect();
         prop_assert_eq!(levels.iter().product::<u64>(), points);
         let full = |place: usize| place == numbers && levels[place] == labels as u64;
         let fewest = (0..levels.len()).filter(|&place| !full(place)).map(|place| levels[place]).min().unwrap();
