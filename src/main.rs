@@ -1,1 +1,5 @@
-fn main() {}
+//! The `closecall` program.
+
+fn main() -> std::process::ExitCode {
+    closecall::cli::main().into()
+}

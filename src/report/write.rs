@@ -31,11 +31,7 @@ pub fn write_atomically(
     write: impl FnOnce(&mut BufWriter<&mut std::fs::File>) -> io::Result<()>,
 ) -> Result<(), WriteError> {
     let fail = |source| WriteError::new(path, source);
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    let mut file = NamedTempFile::new_in(folder).map_err(fail)?;
+    let mut file = NamedTempFile::new_in(folder(path)).map_err(fail)?;
     let mut buffered = BufWriter::new(file.as_file_mut());
     write(&mut buffered).and_then(|()| buffered.flush()).map_err(fail)?;
     drop(buffered);
@@ -43,6 +39,22 @@ pub fn write_atomically(
     make_readable(file.as_file()).map_err(fail)?;
     file.persist(path).map_err(|error| fail(error.error))?;
     Ok(())
+}
+
+/// Finds out before any work is done that a file could not be made after it.
+///
+/// # Errors
+/// [`WriteError`] where the folder does not take new files.
+pub(super) fn check_writable(path: &Path) -> Result<(), WriteError> {
+    NamedTempFile::new_in(folder(path)).map_err(|source| WriteError::new(path, source))?;
+    Ok(())
+}
+
+fn folder(path: &Path) -> &Path {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
 }
 
 /// Temporary files are private to their owner; what a campaign leaves behind is for everyone.

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use closecall_scenarios::parameters::ParameterSpace;
+use closecall_scenarios::sampling::Design;
 use closecall_traffic::{ActorId, Check, ConfigError, Parameters};
 use toml_edit::DocumentMut;
 
@@ -108,7 +109,7 @@ impl ScenarioFile {
             text = apply(path, &text, settings)?;
             config = deserialize(path, &text)?;
         }
-        let space = config.parameters.check(&Parameters::default()).map_err(|error| {
+        let space = config.parameters.check().map_err(|error| {
             let source = error.within("parameters");
             let line = locate::line_of(&text, &source.path);
             ScenarioError::Value { path: path.to_owned(), line, source, at: String::new() }
@@ -159,12 +160,11 @@ impl ScenarioFile {
     /// # Errors
     /// The first of these that is not a valid scenario.
     pub fn check(&self) -> Result<(), ScenarioError> {
-        self.concrete(&self.space.nominal())?;
-        for parameters in self.space.corners() {
+        for parameters in self.space.extremes() {
             self.concrete(&parameters)?;
         }
         for index in 0..TRIED_SAMPLES {
-            self.concrete(&self.space.sample_random(0, index))?;
+            self.concrete(&self.space.sample(Design::Random, 0, index, TRIED_SAMPLES))?;
         }
         Ok(())
     }

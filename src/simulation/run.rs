@@ -5,8 +5,8 @@ use closecall_controllers::{
     SensorAvailability,
 };
 use closecall_controllers::CheckedDriver;
-use closecall_sensors::{Health, Perception, Scene, SceneVehicle};
-use closecall_traffic::{Measured, Stream, stream};
+use closecall_sensors::{Health, NoiseKey, Perception, Scene, SceneVehicle};
+use closecall_traffic::{Measured, Stream, Track, stream};
 
 use super::events::Events;
 use super::margins::MarginMeter;
@@ -44,6 +44,7 @@ pub(super) struct Run<'a> {
     command: Option<EgoCommand>,
     // Buffers, kept from step to step.
     neighbours: Vec<Neighbours>,
+    tracks: Vec<Track>,
     margins: MarginsNow,
     actions: Vec<Action>,
     others: Vec<SceneVehicle>,
@@ -64,20 +65,25 @@ impl<'a> Run<'a> {
         };
         let has_mis = arm.controller.has_mis(settings);
         let margins = MarginsNow::new(world.state(scenario.ego), &Neighbours::default());
+        let sensors = match arm.sensors {
+            Some(mode) => scenario.sensors.with_mode(mode),
+            None => scenario.sensors,
+        };
         Ok(Self {
             scenario,
             key,
             arm,
-            perception: scenario.sensors.build(arm.sensors, key.seed, key.sample, scenario.ego_id())?,
+            perception: sensors.build(&NoiseKey { seed: key.seed, sample: key.sample, ego: scenario.ego_id().clone() })?,
             controller: arm.controller.build(settings),
             humans: humans(scenario, key),
             events: Events::new(scenario),
             encounter: Encounter::default(),
             meter: MarginMeter::new(PHYSICS_STEP.s()),
             mis: MisLog::default(),
-            critical_gap_m: settings.critical_gap_m().filter(|_| has_mis),
+            critical_gap_m: settings.mis().filter(|_| has_mis).map(|mis| mis.critical_gap_m),
             command: None,
             neighbours: vec![Neighbours::default(); world.len()],
+            tracks: Vec::new(),
             margins,
             actions: vec![Action::default(); world.len()],
             others: Vec::with_capacity(world.len()),
@@ -125,12 +131,14 @@ impl<'a> Run<'a> {
                 ego: self.vehicles[ego],
                 others: &self.others,
             };
-            self.perception.step(&scene)?;
+            let tracks = self.perception.step(&scene)?;
+            self.tracks.clear();
+            self.tracks.extend_from_slice(tracks);
             let input = EgoInput {
                 time,
                 odometry: self.odometry(),
                 road: &self.scenario.road,
-                tracks: self.perception.tracks(),
+                tracks: &self.tracks,
                 sensors: availability(self.perception.as_ref()),
             };
             let command = self.controller.step(&input)?;
@@ -209,7 +217,7 @@ impl<'a> Run<'a> {
             scenario: self.scenario,
             vehicles: &self.vehicles,
             fronts: &self.fronts,
-            tracks: self.perception.tracks(),
+            tracks: &self.tracks,
             perception: self.perception.as_ref(),
             command,
             margins: &self.margins,

@@ -1,0 +1,43 @@
+//! `closecall check` and `closecall schema`: scenario files without running them.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::CliError;
+use super::args::SetArgs;
+use crate::exit_code::ExitCode;
+use crate::scenario::ScenarioConfig;
+
+/// Arguments of `closecall check`.
+#[derive(Debug, Args)]
+pub(super) struct CheckArgs {
+    /// Scenario files
+    #[arg(required = true)]
+    scenarios: Vec<PathBuf>,
+    #[command(flatten)]
+    set: SetArgs,
+}
+
+pub(super) fn check(args: &CheckArgs) -> Result<ExitCode, CliError> {
+    let mut codes = Vec::new();
+    for path in &args.scenarios {
+        match args.set.load(path) {
+            Ok(file) => {
+                let count = file.space().iter().len();
+                println!("{}: valid, {} with {count} parameters", path.display(), file.config().name);
+            }
+            Err(error) => {
+                codes.push(ExitCode::from(&error));
+                eprintln!("{:?}", miette::Report::new(CliError::from(error)));
+            }
+        }
+    }
+    Ok(ExitCode::first_of(codes))
+}
+
+pub(super) fn schema() -> Result<ExitCode, CliError> {
+    let schema = schemars::schema_for!(ScenarioConfig);
+    println!("{:#}", schema.as_value());
+    Ok(ExitCode::Pass)
+}

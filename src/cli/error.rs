@@ -1,0 +1,71 @@
+//! Whatever keeps a command from its result, and what the program then ends with.
+
+use closecall_scenarios::recordings::RecordingError;
+use miette::Diagnostic;
+
+use crate::campaign::folder::FolderError;
+use crate::exit_code::ExitCode;
+use crate::report::WriteError;
+use crate::report::rerun::RecordError;
+use crate::scenario::ScenarioError;
+use crate::simulation::SampleError;
+
+/// A command that has no result.
+#[derive(Debug, thiserror::Error, Diagnostic)]
+pub enum CliError {
+    /// A scenario cannot be used.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
+    /// A recording cannot be used.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// A campaign's folder cannot be used.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    /// A file cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// A Rerun file cannot be written.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    /// A run has no outcome.
+    #[error("failed to run sample {sample}: {source}")]
+    Sample {
+        /// The sample.
+        sample: u64,
+        /// Why.
+        source: SampleError,
+    },
+    /// The command line asks for something that does not exist.
+    #[error("{message}")]
+    #[diagnostic(help("see `closecall --help`"))]
+    Usage {
+        /// What is wrong, and what is allowed.
+        message: String,
+    },
+    /// The worker threads could not be started.
+    #[error("failed to start {jobs} worker threads: {message}")]
+    Threads {
+        /// How many were asked for.
+        jobs: usize,
+        /// The system's reason.
+        message: String,
+    },
+}
+
+impl From<&CliError> for ExitCode {
+    fn from(error: &CliError) -> Self {
+        match error {
+            CliError::Scenario(error) => Self::from(error),
+            CliError::Recording(_) => Self::InvalidInput,
+            CliError::Folder(error) => match error {
+                FolderError::Write(_) => Self::Io,
+                FolderError::OtherCampaign { .. } | FolderError::NotACampaign { .. } => Self::Usage,
+                FolderError::Read { .. } | FolderError::Content { .. } => Self::InvalidInput,
+            },
+            CliError::Write(_) | CliError::Record(_) | CliError::Threads { .. } => Self::Io,
+            CliError::Sample { .. } => Self::SampleError,
+            CliError::Usage { .. } => Self::Usage,
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! Results as JSON with stable keys. A value that does not exist is `null`, with its reason beside it.
+
+use closecall_traffic::{Absent, Measured, Value as ParameterValue};
+use serde_json::{Map, Value, json};
+
+use crate::campaign::summary::{Counts, Summary};
+use crate::campaign::verdict::Judgement;
+use crate::outcome::{Collision, Margins, MisSummary, Outcome};
+
+/// Puts a value or its absence under `key`.
+pub(super) fn put(object: &mut Map<String, Value>, key: &str, measured: Measured) {
+    match measured {
+        Ok(value) => {
+            object.insert(key.to_owned(), json!(value));
+        }
+        Err(absent) => {
+            object.insert(key.to_owned(), Value::Null);
+            object.insert(format!("{key}_absent"), json!(absent.to_string()));
+        }
+    }
+}
+
+/// The object of `run --format json`.
+pub(super) fn outcome(outcome: &Outcome) -> Value {
+    json!({
+        "scenario": outcome.scenario,
+        "seed": outcome.seed,
+        "sample": outcome.sample,
+        "controller": outcome.controller,
+        "end": outcome.end,
+        "duration_s": outcome.duration.s(),
+        "parameters": parameters(outcome),
+        "collisions": outcome.collisions.iter().map(collision).collect::<Vec<_>>(),
+        "margins": margins(&outcome.margins),
+        "mis": mis(&outcome.mis),
+    })
+}
+
+fn parameters(outcome: &Outcome) -> Map<String, Value> {
+    let value = |value: &ParameterValue| match value {
+        ParameterValue::Number(number) => json!(number),
+        ParameterValue::Label(label) => json!(label),
+    };
+    outcome.parameters.iter().map(|(name, parameter)| (name.to_string(), value(parameter))).collect()
+}
+
+fn collision(collision: &Collision) -> Value {
+    let [first, second] = &collision.between;
+    json!({
+        "time_s": collision.time.s(),
+        "between": collision.between,
+        "struck_side": collision.struck_side,
+        "closed_by": collision.closed_by,
+        "phase": collision.phase,
+        "relative_speed_mps": collision.relative_speed_mps,
+        "delta_v_mps": { first.as_str(): collision.delta_v_mps[0], second.as_str(): collision.delta_v_mps[1] },
+    })
+}
+
+fn margins(margins: &Margins) -> Value {
+    let mut object = Map::new();
+    put(&mut object, "min_thw_front_s", margins.min_thw_front_s);
+    put(&mut object, "min_thw_rear_s", margins.min_thw_rear_s);
+    put(&mut object, "min_gap_front_m", margins.min_gap_front_m);
+    put(&mut object, "min_gap_rear_m", margins.min_gap_rear_m);
+    put(&mut object, "min_ttc_rear_s", margins.min_ttc_rear_s);
+    put(&mut object, "max_deceleration_mps2", Ok(margins.max_deceleration_mps2));
+    put(&mut object, "max_jerk_mps3", Ok(margins.max_jerk_mps3));
+    Value::Object(object)
+}
+
+fn mis(mis: &Result<MisSummary, Absent>) -> Value {
+    let mut object = Map::new();
+    let of = |part: fn(&MisSummary) -> Measured| mis.as_ref().map_err(|absent| *absent).and_then(part);
+    put(&mut object, "engaged_at_s", of(|mis| mis.engaged_at_s));
+    put(&mut object, "released_at_s", of(|mis| mis.released_at_s));
+    put(&mut object, "thw_front_at_engagement_s", of(|mis| mis.thw_front_at_engagement_s));
+    put(&mut object, "thw_front_at_critical_s", of(|mis| mis.thw_front_at_critical_s));
+    put(&mut object, "mean_deceleration_mps2", of(|mis| mis.mean_deceleration_mps2));
+    object.insert("goal_in_reach".to_owned(), json!(mis.as_ref().ok().and_then(|mis| mis.goal_in_reach)));
+    let reason = mis.as_ref().map_or_else(ToString::to_string, |mis| mis.reason.to_string());
+    object.insert("reason".to_owned(), json!(reason));
+    Value::Object(object)
+}
+
+/// The object of `campaign --format json`.
+pub(super) fn campaign(summary: &Summary, judged: &Judgement, wall_s: f64) -> Value {
+    let total = summary.total();
+    let mut object = counts(summary, &total);
+    object.insert("verdict".to_owned(), json!(judged.verdict));
+    object.insert("reasons".to_owned(), json!(judged.reasons));
+    object.insert("wall_s".to_owned(), json!(wall_s));
+    let scenarios: Map<String, Value> = summary
+        .scenarios
+        .iter()
+        .map(|(name, scenario)| (name.clone(), Value::Object(counts(summary, scenario))))
+        .collect();
+    object.insert("scenarios".to_owned(), Value::Object(scenarios));
+    Value::Object(object)
+}
+
+fn counts(summary: &Summary, counts: &Counts) -> Map<String, Value> {
+    let mut object = Map::new();
+    object.insert("samples".to_owned(), json!(counts.samples));
+    object.insert("errors".to_owned(), json!(counts.errors()));
+    object.insert("invalid".to_owned(), json!(counts.invalid));
+    object.insert("simulated_s".to_owned(), json!(counts.simulated_s));
+    let mut controllers = Map::new();
+    for (name, arm) in summary.controllers.iter().zip(&counts.arms) {
+        let mut controller = Map::new();
+        controller.insert("collisions".to_owned(), json!(arm.collisions));
+        controller.insert("collision_rate".to_owned(), json!(arm.collision_rate()));
+        controller.insert("interval_95".to_owned(), json!(arm.interval_95()));
+        controller.insert("errors".to_owned(), json!(arm.errors));
+        controller.insert("engagements".to_owned(), json!(arm.engagements));
+        controller.insert("goals_in_reach".to_owned(), json!(arm.goals_in_reach));
+        controllers.insert(name.clone(), Value::Object(controller));
+    }
+    object.insert("controllers".to_owned(), Value::Object(controllers));
+    if summary.is_paired() {
+        object.insert("paired".to_owned(), json!(counts.pairs));
+    }
+    object
+}

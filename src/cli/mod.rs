@@ -1,0 +1,99 @@
+//! The command line: what is asked for, and what the program ends with.
+
+#![expect(clippy::print_stdout, clippy::print_stderr, reason = "the command line is where results are printed")]
+
+mod args;
+mod campaign;
+mod check;
+mod error;
+mod json;
+mod leave;
+mod record;
+mod recording;
+mod replay;
+mod run;
+
+use clap::{Parser, Subcommand};
+
+pub use error::CliError;
+
+use crate::exit_code::ExitCode;
+
+/// A closed-loop software-in-the-loop testbed for highway ADAS.
+///
+/// Closecall finds critical encounters in recorded traffic, samples variations of them, runs each in a closed loop of
+/// sensors, controller and world, and says with numbers, pictures and an exit code whether the margin increase system
+/// prevents collisions, or causes them.
+#[derive(Debug, Parser)]
+#[command(name = "closecall", version, after_help = EXIT_CODES)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+const EXIT_CODES: &str = "\
+Exit codes:
+  0  pass
+  1  fail: more collisions than allowed
+  2  the command line is wrong
+  3  a scenario or a recording cannot be used; nothing was run
+  4  inconclusive: too few samples for the bound asked for
+  5  some sample ended in an error
+  6  a file or folder cannot be read or written
+  7  invalid: a validity check of the simulator failed";
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Run one sample of a scenario
+    Run(run::RunArgs),
+    /// Run many samples of scenarios, and judge them
+    Campaign(campaign::CampaignArgs),
+    /// Run one sample of a campaign again, bit for bit
+    Replay(replay::ReplayArgs),
+    /// Check scenario files without running them
+    Check(check::CheckArgs),
+    /// Print the JSON Schema of scenario files
+    Schema,
+    /// Find lane changes in a recording
+    LaneChanges(recording::LaneChangesArgs),
+    /// Work out how critical each lane change of a recording was
+    Criticality(recording::CriticalityArgs),
+    /// Fit the distributions of a logical scenario to recordings
+    Fit(recording::FitArgs),
+    /// Record traffic of the testbed's own simulation
+    Record(record::RecordArgs),
+}
+
+/// Runs the program with the process's own arguments.
+pub fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Help and version are no errors, and go where they are expected.
+            let code = if error.use_stderr() { ExitCode::Usage } else { ExitCode::Pass };
+            return if error.print().is_ok() { code } else { ExitCode::Io };
+        }
+    };
+    match dispatch(cli.command) {
+        Ok(code) => code,
+        Err(error) => {
+            let code = ExitCode::from(&error);
+            eprintln!("{:?}", miette::Report::new(error));
+            code
+        }
+    }
+}
+
+fn dispatch(command: Command) -> Result<ExitCode, CliError> {
+    match command {
+        Command::Run(args) => run::run(&args),
+        Command::Campaign(args) => campaign::campaign(&args),
+        Command::Replay(args) => replay::replay(&args),
+        Command::Check(args) => check::check(&args),
+        Command::Schema => check::schema(),
+        Command::LaneChanges(args) => recording::lane_changes(&args),
+        Command::Criticality(args) => recording::criticality(&args),
+        Command::Fit(args) => recording::fit(&args),
+        Command::Record(args) => record::record(&args),
+    }
+}

@@ -1,0 +1,86 @@
+//! `closecall replay`: one sample of a campaign again, bit for bit.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::args::{Format, Sensing, arm};
+use super::run::{WatchArgs, print, run_watched};
+use super::CliError;
+use crate::campaign::folder::Folder;
+use crate::campaign::manifest::{Manifest, ManifestScenario};
+use crate::campaign::runner::concrete;
+use crate::controller::BuiltIn;
+use crate::exit_code::ExitCode;
+use crate::scenario::ScenarioFile;
+use crate::simulation::{Arm, RunKey};
+
+/// Arguments of `closecall replay`.
+#[derive(Debug, Args)]
+pub(super) struct ReplayArgs {
+    /// Folder of the campaign
+    dir: PathBuf,
+    /// Number of the sample
+    sample: u64,
+    /// Name of the scenario, where the campaign has more than one
+    #[arg(long)]
+    scenario: Option<String>,
+    /// The arm to run again; the controller under test where absent
+    #[arg(long, value_enum)]
+    controller: Option<BuiltIn>,
+    #[command(flatten)]
+    watch: WatchArgs,
+    /// Output for people or for programs
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+pub(super) fn replay(args: &ReplayArgs) -> Result<ExitCode, CliError> {
+    let folder = Folder::open(&args.dir);
+    let manifest = folder.manifest()?;
+    let file = scenario_file(&folder, choose(&manifest, args.scenario.as_deref())?)?;
+    let samples = file.space().samples(manifest.sampling.design, manifest.sampling.samples);
+    if args.sample >= samples {
+        let message = format!("there is no sample {}: the campaign has samples 0 to {}", args.sample, samples - 1);
+        return Err(CliError::Usage { message });
+    }
+    let arm = chosen_arm(&manifest, args.controller)?;
+    let fail = |source| CliError::Sample { sample: args.sample, source };
+    let scenario = concrete(&file, manifest.sampling, args.sample).map_err(fail)?;
+    let key = RunKey { seed: manifest.sampling.seed, sample: args.sample };
+    let outcome = run_watched(&scenario, key, &arm, &args.watch)?;
+    print(&outcome, args.format);
+    Ok(ExitCode::Pass)
+}
+
+/// The scenario of a campaign with this name, or its only one.
+fn choose<'a>(manifest: &'a Manifest, name: Option<&str>) -> Result<&'a ManifestScenario, CliError> {
+    let known = || manifest.scenarios.iter().map(|scenario| scenario.name.as_str()).collect::<Vec<_>>().join(", ");
+    match (name, &manifest.scenarios[..]) {
+        (None, [only]) => Ok(only),
+        (None, _) => {
+            Err(CliError::Usage { message: format!("the campaign has several scenarios; name one with --scenario: {}", known()) })
+        }
+        (Some(name), scenarios) => scenarios.iter().find(|scenario| scenario.name == name).ok_or_else(|| {
+            CliError::Usage { message: format!("the campaign has no scenario `{name}`, only {}", known()) }
+        }),
+    }
+}
+
+/// The scenario as the campaign ran it.
+pub(super) fn scenario_file(folder: &Folder, scenario: &ManifestScenario) -> Result<ScenarioFile, CliError> {
+    let path = folder.file(&format!("manifest.json#{}", scenario.name));
+    Ok(ScenarioFile::parse(&path, &scenario.text, &[])?)
+}
+
+/// An arm of the campaign: the named one, or the one under test.
+fn chosen_arm(manifest: &Manifest, controller: Option<BuiltIn>) -> Result<Arm, CliError> {
+    let tested = manifest.arms.last().copied().unwrap_or(BuiltIn::Mis);
+    let controller = controller.unwrap_or(tested);
+    if !manifest.arms.contains(&controller) {
+        let known = manifest.arms.iter().map(|arm| arm.name()).collect::<Vec<_>>().join(", ");
+        let message = format!("the campaign was not run with `{}`, only with {known}", controller.name());
+        return Err(CliError::Usage { message });
+    }
+    Ok(arm(controller, manifest.sensors.as_deref().and_then(Sensing::from_name)))
+}

@@ -1,0 +1,103 @@
+//! What E perceives: tracks as boxes with their uncertainty, in E's own frame, apart for each group of sensors so that
+//! each can be switched off in the viewer.
+
+use closecall_traffic::{Source, Time, Track, TrackStatus};
+use nalgebra::{Matrix2, SymmetricEigen};
+use rerun::{Boxes3D, Ellipsoids3D, FillMode, Quaternion};
+
+use super::RecordError;
+use super::film::Film;
+use super::palette::{self, Rgba};
+use super::stream::Writer;
+use super::vehicles::about_up;
+
+/// Height that boxes of tracks are drawn with, since tracks have none [m].
+const TRACK_HEIGHT_M: f64 = 1.7;
+/// Boxes are drawn this much larger than the track says, so that they stay visible around the vehicle [m].
+const CLEARANCE_M: f64 = 0.15;
+/// Ellipses hold about 95 % of the probability: √χ²₂(0.95).
+const ELLIPSE_SIGMAS: f64 = 2.448;
+const ELLIPSE_Z_M: f64 = 0.08;
+const ELLIPSE_HALF_THICKNESS_M: f64 = 0.01;
+
+const SOURCES: [(Source, &str); 3] =
+    [(Source::Front, "front"), (Source::Surround, "surround"), (Source::Rear, "rear")];
+
+pub(super) fn write(writer: &Writer<'_>, film: &Film<'_>) -> Result<(), RecordError> {
+    let times = film.times();
+    for (source, name) in SOURCES {
+        let of_source = |tracks: &'_ [Track]| -> Vec<Track> {
+            tracks.iter().filter(|track| track.source == source).cloned().collect()
+        };
+        let tracks: Vec<Vec<Track>> = film.frames.iter().map(|frame| of_source(&frame.tracks)).collect();
+        if tracks.iter().all(Vec::is_empty) {
+            continue;
+        }
+        write_boxes(writer, &format!("world/ego/tracks/{name}/boxes"), &times, &tracks)?;
+        write_ellipses(writer, &format!("world/ego/tracks/{name}/covariance"), &times, &tracks)?;
+    }
+    Ok(())
+}
+
+fn write_boxes(writer: &Writer<'_>, entity: &str, times: &[Time], tracks: &[Vec<Track>]) -> Result<(), RecordError> {
+    let fixed = Boxes3D::update_fields()
+        .with_fill_mode(FillMode::MajorWireframe)
+        .with_radii([0.035_f32])
+        .with_show_labels(true);
+    writer.fixed(entity, &fixed)?;
+    writer.rows(entity, times, |range| {
+        let rows = &tracks[range];
+        let all = || rows.iter().flatten();
+        let half = |length_m: f64| (0.5 * length_m + CLEARANCE_M) as f32;
+        Boxes3D::update_fields()
+            .with_centers(all().map(|track| [track.x_m() as f32, track.y_m() as f32, half(TRACK_HEIGHT_M)]))
+            .with_half_sizes(all().map(|track| [half(track.length_m), half(track.width_m), half(TRACK_HEIGHT_M)]))
+            .with_quaternions(all().map(|track| about_up(track.heading_rad)))
+            .with_colors(all().map(|track| colour(track.status)))
+            .with_labels(all().map(label))
+            .columns(rows.iter().map(Vec::len).collect::<Vec<_>>())
+    })
+}
+
+fn write_ellipses(writer: &Writer<'_>, entity: &str, times: &[Time], tracks: &[Vec<Track>]) -> Result<(), RecordError> {
+    let fixed = Ellipsoids3D::update_fields().with_fill_mode(FillMode::MajorWireframe).with_line_radii([0.02_f32]);
+    writer.fixed(entity, &fixed)?;
+    writer.rows(entity, times, |range| {
+        let rows = &tracks[range];
+        let all = || rows.iter().flatten();
+        let ellipses: Vec<([f32; 3], Quaternion)> = all().map(ellipse).collect();
+        Ellipsoids3D::update_fields()
+            .with_centers(all().map(|track| [track.x_m() as f32, track.y_m() as f32, ELLIPSE_Z_M as f32]))
+            .with_half_sizes(ellipses.iter().map(|ellipse| ellipse.0))
+            .with_quaternions(ellipses.iter().map(|ellipse| ellipse.1))
+            .with_colors(all().map(|track| colour(track.status)))
+            .columns(rows.iter().map(Vec::len).collect::<Vec<_>>())
+    })
+}
+
+/// Half axes and direction of the ellipse of a track's position.
+fn ellipse(track: &Track) -> ([f32; 3], Quaternion) {
+    let position: Matrix2<f64> = track.covariance.fixed_view::<2, 2>(0, 0).into_owned();
+    let axes = SymmetricEigen::new(position);
+    let half_m = |place: usize| (ELLIPSE_SIGMAS * axes.eigenvalues[place].max(0.0).sqrt()) as f32;
+    let first = axes.eigenvectors.column(0);
+    ([half_m(0), half_m(1), ELLIPSE_HALF_THICKNESS_M as f32], about_up(first[1].atan2(first[0])))
+}
+
+fn colour(status: TrackStatus) -> Rgba {
+    match status {
+        TrackStatus::Tentative => palette::QUIET,
+        TrackStatus::Confirmed => [96, 230, 255, 255],
+        TrackStatus::Coasting => palette::WARNING,
+    }
+}
+
+/// Number, class with its score, existence. Tentative tracks have none: they are many, and E does not act on them.
+fn label(track: &Track) -> String {
+    if track.status == TrackStatus::Tentative {
+        return String::new();
+    }
+    let class = track.class.best_vehicle_class();
+    let score = track.class.0[class as usize];
+    format!("#{} {} {score:.2}, exists {:.2}", track.id.0, class.name(), track.existence)
+}
