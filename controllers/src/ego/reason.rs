@@ -39,8 +39,8 @@ pub enum Reason {
     EngagedGoalOutOfReach,
     /// The vehicle behind has come to the critical distance.
     CriticalDistance,
-    /// The vehicle behind leaves E's lane to overtake.
-    RearCutsOut,
+    /// The vehicle behind has left E's lane while it was still far away.
+    RearChangedLane,
     /// The vehicle behind is past.
     RearPassed,
     /// The vehicle behind has fallen back.
@@ -82,7 +82,7 @@ impl Reason {
             Self::Engaged => "engaged, goal in reach",
             Self::EngagedGoalOutOfReach => "engaged, goal out of reach",
             Self::CriticalDistance => "vehicle behind at the critical distance",
-            Self::RearCutsOut => "vehicle behind cuts out",
+            Self::RearChangedLane => "vehicle behind changed lanes early",
             Self::RearPassed => "vehicle behind is past",
             Self::RearFellBack => "vehicle behind fell back",
             Self::RearFollows => "vehicle behind follows instead of overtaking",

@@ -4,7 +4,7 @@ use closecall_controllers::{
     AccConfig, AebConfig, CheckedDriver, DriverConfig, DriverNote, EgoSettings, EgoStackConfig, EgoState, FollowConfig,
     HumanDriver, MisConfig, OvertakerConfig, PrescribedConfig, ReactionConfig, Wiedemann99Config,
 };
-use closecall_traffic::{ActorId, Check, Lane, Num, Parameters, Road, Time, Vehicle, VehicleClass, stream};
+use closecall_traffic::{ActorId, Check, Lane, Num, Parameters, RoadConfig, Side, Time, Vehicle, VehicleClass, stream};
 use rand::RngExt;
 
 use crate::world::{Actor, Who, World, gap_m};
@@ -26,8 +26,10 @@ pub(crate) struct Case {
     pub(crate) seed: u64,
     pub(crate) rear: Rear,
     pub(crate) front_brakes: bool,
-    /// Brake relative to the cut-out instead of at an exogenous time.
+    /// Approach at 1 to 4 m/s instead of 10 to 50 km/h.
     pub(crate) slow_approach: bool,
+    /// The side on which one overtakes.
+    pub(crate) side: Side,
     pub(crate) max_deceleration_mps2: f64,
     pub(crate) critical_gap_m: f64,
 }
@@ -38,6 +40,7 @@ impl Case {
         rear: Rear::Overtakes,
         front_brakes: true,
         slow_approach: false,
+        side: Side::Left,
         max_deceleration_mps2: 1.0,
         critical_gap_m: 5.0,
     };
@@ -69,6 +72,8 @@ pub(crate) struct Outcome {
     /// R's time headway to E when its centre crosses the marking.
     pub(crate) crossing_thw_s: Option<f64>,
     pub(crate) engaged: bool,
+    /// Whether the goal was in reach when the system engaged.
+    pub(crate) in_reach: bool,
     /// Front headway at engaging, and when R reached the critical distance or left the lane.
     pub(crate) thw_engaged_s: Option<f64>,
     pub(crate) thw_critical_s: Option<f64>,
@@ -159,7 +164,16 @@ fn rear_driver(case: &Case, drawn: &Sample) -> HumanDriver {
 
 /// The world of one sample: E, F, R, and what stands in the passing lane.
 pub(crate) fn world(case: &Case, drawn: &Sample, index: u64, with_mis: bool) -> World {
-    let road = Road::straight(3);
+    let road = RoadConfig {
+        lanes: 3,
+        lane_width_m: 3.75.into(),
+        curvature_per_m: 0.0.into(),
+        speed_limit_mps: 36.1.into(),
+        overtaking_side: case.side,
+        guard_rails: false,
+    }
+    .check(&Parameters::default())
+    .unwrap();
     let own_d = road.lane_centre_m(Lane(2));
     let car = Vehicle::typical(VehicleClass::Car);
     let rear = Vehicle::typical(drawn.class);
@@ -185,12 +199,12 @@ pub(crate) fn world(case: &Case, drawn: &Sample, index: u64, with_mis: bool) -> 
         ),
     ];
     if case.rear == Rear::IsBlocked {
-        let left_d = road.lane_centre_m(Lane(1));
+        let left_d = road.lane_centre_m(road.beside(Lane(2), case.side).unwrap());
         for offset_m in [-60.0, -20.0, 20.0, 60.0] {
             actors.push(Actor::new(Who::Human(keeps(cruise), rng("left")), car, 500.0 + offset_m, left_d, cruise));
         }
     }
-    World::new(actors)
+    World::new(actors, road)
 }
 
 /// Runs one sample to its end.
@@ -216,6 +230,8 @@ pub(crate) fn run(case: &Case, index: u64, with_mis: bool) -> Outcome {
         if state == EgoState::Increasing && outcome.thw_engaged_s.is_none() {
             outcome.thw_engaged_s = Some(thw_s);
             outcome.engaged = true;
+            outcome.in_reach =
+                world.ego_command.and_then(|command| command.plan).is_some_and(|plan| plan.goal_in_reach);
         }
         if state == EgoState::Holding && before != EgoState::Holding && outcome.thw_critical_s.is_none() {
             outcome.thw_critical_s = Some(thw_s);

@@ -79,6 +79,10 @@ impl Actor {
         self.notes.extend(action.note.map(|note| (time, note)));
     }
 
+    pub(crate) fn command_mps2(&self) -> f64 {
+        self.command_mps2
+    }
+
     pub(crate) fn noted(&self, wanted: DriverNote) -> Option<Time> {
         self.notes.iter().find(|(_, note)| *note == wanted).map(|(time, _)| *time)
     }
@@ -101,8 +105,7 @@ pub(crate) fn gap_m(ahead: &Actor, behind: &Actor) -> f64 {
 }
 
 impl World {
-    pub(crate) fn new(actors: Vec<Actor>) -> Self {
-        let road = Road::straight(3);
+    pub(crate) fn new(actors: Vec<Actor>, road: Road) -> Self {
         Self { road, time: Time::ZERO, actors, ego_command: None, sensors: SensorAvailability::ALL, tracks: Vec::new() }
     }
 

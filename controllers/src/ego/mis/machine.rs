@@ -24,6 +24,10 @@ const SAME_WITHIN_M: f64 = 5.0;
 /// How much its speed may differ [m/s].
 const SAME_WITHIN_MPS: f64 = 3.0;
 
+/// Time headway below which a vehicle behind is critically near [s]: the criterion of the criticality metrics. One that
+/// changes lanes further away needs no margin.
+const LOW_HEADWAY_S: f64 = 0.9;
+
 /// Speed below which E's time headway means nothing [m/s].
 const SLOW_MPS: f64 = 1.0;
 
@@ -234,8 +238,8 @@ impl Mis {
             release(Reason::RearLost)
         } else if rear.x_m > 0.0 {
             release(Reason::RearPassed)
-        } else if !rear.in_own_lane() {
-            Some((State::Holding(*target, now), Reason::RearCutsOut))
+        } else if !rear.in_own_lane() && rear.gap_m > LOW_HEADWAY_S * rear.speed_mps {
+            release(Reason::RearChangedLane)
         } else if rear.gap_m <= settings.critical_gap_m {
             Some((State::Holding(*target, now), Reason::CriticalDistance))
         } else if rear.gap_m > FELL_BACK_AT * settings.engage_gap_m {

@@ -5,10 +5,10 @@
 //! two seconds E need not brake at all.
 //!
 //! ```text
-//!            every condition holds             R at the critical distance, or cuts out
+//!            every condition holds             R at the critical distance
 //!  following ─────────────────────▶ increasing ─────────────────────▶ holding
-//!      ▲                                │ fell back, follows, lost,      │ past, 2 s over,
-//!      │                                ▼ lane occupied, F lost          ▼ no room, lost
+//!      ▲                                │ fell back, follows, lost, lane  │ past, 2 s over,
+//!      │                                ▼ occupied, changed early, F lost ▼ no room, lost
 //!      └──────── margin returned ── releasing ◀──────────────────────────┘
 //! ```
 //!
@@ -16,7 +16,7 @@
 //! |---|---|---|
 //! | following | at the start; the gap is back at the ACC's own | ACC |
 //! | increasing | automated; THW_F below the threshold; track behind confirmed, classified, in lane, d_R ≤ 100 m, Δv ≥ 10 km/h; passing lane free | the smaller of ACC and −a* |
-//! | holding | d_R ≤ d_c, or R leaves the lane for the passing lane | keeps the speed; ACC's braking is suppressed |
+//! | holding | d_R ≤ d_c, R still behind or already in the passing lane | keeps the speed; ACC's braking is suppressed |
 //! | releasing | R past, fallen back, lost; hold over | ACC, its acceleration bounded |
 //!
 //! | bound | value | key |
@@ -33,6 +33,17 @@
 //!
 //! Hysteresis: R has fallen back at 1.2 times the engaging distance; it follows instead of overtaking once it has not
 //! approached at half of the engaging speed for a second; a lost track is waited for half a second.
+//!
+//! R crosses the marking at a headway of 0.15 to 0.4 s, which is mostly before it comes to d_c. E goes on with its plan
+//! until d_c all the same: stopping at the marking leaves as many collisions, but reaches the goal in half as many samples
+//! (16 % instead of 34 %, tuning seeds). An R that leaves the lane at a headway of 0.9 s or more needs no margin.
+//!
+//! # Why 1 m/s², and d_c = 5 m
+//! Tuning seeds, n = 1000, perfect tracks, approach 10 to 50 km/h: without the system 23.4 % of samples end in a collision;
+//! bounded at 1 m/s² 4.2 %, at 2 m/s² 2.9 %, at 3 m/s² 2.7 %, with one sample induced in each. The gain beyond 1 m/s² is
+//! small, and rests on a rear driver who foresees E's braking; with one who does not (no anticipation of the felt
+//! deceleration) 3 m/s² induces more than 1 m/s². So the paper's comfort limit stands. Where the goal is out of reach the
+//! bound is used in full: each tenth of a second gained counts.
 //!
 //! [`Encounter`] is the kinematics with its closed-form solution, `machine` the states, `plan` what is reported.
 

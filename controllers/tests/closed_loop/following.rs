@@ -1,0 +1,71 @@
+//! One vehicle behind another: reaction times as they show from outside.
+
+use closecall_controllers::{DriverConfig, PrescribedConfig, ReactionConfig, Wiedemann99Config};
+use closecall_traffic::{ActorId, Lane, Road, Time, Vehicle, VehicleClass, stream};
+use proptest::prelude::*;
+
+use crate::encounter::human;
+use crate::world::{Actor, Who, World, gap_m};
+
+/// A leader at 30 m/s that brakes at 5 s, and a follower at the same speed `gap` behind it.
+fn pair(gap: f64, cc1_s: f64, reaction_s: f64, brake_mps2: f64) -> World {
+    let road = Road::straight(3);
+    let d_m = road.lane_centre_m(Lane(2));
+    let car = Vehicle::typical(VehicleClass::Car);
+    let who = |config: &DriverConfig, name: &str| {
+        Who::Human(human(config).build(), stream(0, 0, &ActorId::new(name).unwrap(), "driver"))
+    };
+    let leads = DriverConfig::Prescribed(PrescribedConfig { profile: vec![[0.0.into(), 30.0.into()]] });
+    let follows = DriverConfig::Wiedemann99(Wiedemann99Config {
+        cc1_s: Some(cc1_s.into()),
+        // Without the oscillation of following, whose phase at the time of braking would blur the comparison.
+        cc7_mps2: Some(0.0.into()),
+        reaction_s: Some(ReactionConfig::Value(reaction_s.into())),
+        ..Wiedemann99Config::default()
+    });
+    let mut leader = Actor::new(who(&leads, "leader"), car, 100.0 + gap + car.dimensions.length_m, d_m, 30.0);
+    leader.brakes = Some((5.0, brake_mps2));
+    World::new(vec![leader, Actor::new(who(&follows, "follower"), car, 100.0, d_m, 30.0)], road)
+}
+
+fn least_gap_m(mut world: World) -> f64 {
+    let mut least_m = f64::INFINITY;
+    while world.time < Time::from_s(25.0) && world.collision().is_none() {
+        world.step();
+        least_m = least_m.min(gap_m(&world.actors[0], &world.actors[1]));
+    }
+    least_m
+}
+
+#[test]
+fn deceleration_follows_the_brake_light_by_the_reaction_time() {
+    for reaction_s in [0.4, 0.9, 1.5] {
+        let mut world = pair(29.0, 0.9, reaction_s, 6.0);
+        let (mut light, mut answer) = (None, None);
+        while answer.is_none() {
+            let before_mps2 = world.actors[1].command_mps2();
+            world.step();
+            if world.actors[0].state.brake_light && light.is_none() {
+                light = Some(world.time);
+            }
+            if light.is_some() && world.actors[1].command_mps2() < before_mps2.min(-0.5) {
+                answer = Some(world.time);
+            }
+        }
+        let delay_s = (answer.unwrap() - light.unwrap()).s();
+        assert!((delay_s - reaction_s).abs() <= 0.02, "{delay_s} instead of {reaction_s}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(40))]
+
+    #[test]
+    fn a_longer_reaction_never_gives_a_larger_least_gap(
+        gap in 20.0..45.0, reaction in 0.3..1.5, longer in 0.1..1.0, braking in 3.0..7.0,
+    ) {
+        let quick = least_gap_m(pair(gap, 0.6, reaction, braking));
+        let slow = least_gap_m(pair(gap, 0.6, reaction + longer, braking));
+        prop_assert!(slow <= quick + 0.05, "{slow} {quick}");
+    }
+}
