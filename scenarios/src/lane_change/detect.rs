@@ -87,9 +87,11 @@ fn manoeuvres(track: &Trajectory, height_share: f64) -> Vec<Manoeuvre> {
     let mut found = Vec::new();
     for (direction, sign) in [(Side::Left, 1.0), (Side::Right, -1.0)] {
         let speeds: Vec<f64> = track.points.iter().map(|point| sign * point.lateral_speed_mps).collect();
-        let peaks = find_peaks(&speeds, MIN_PROMINENCE_MPS);
+        // Rest before and after the track makes peaks of manoeuvres that the recording cuts at their fastest.
+        let between_rests: Vec<f64> = [&[0.0], speeds.as_slice(), &[0.0]].concat();
+        let peaks = find_peaks(&between_rests, MIN_PROMINENCE_MPS);
         for peak in peaks.into_iter().filter(|peak| peak.height > 0.0) {
-            let (left, right) = width(&speeds, peak.index, height_share * peak.height);
+            let (left, right) = width(&speeds, peak.index - 1, height_share * peak.height);
             let width = right - left;
             let duration = width / quintic_width_share(height_share);
             let beyond = 0.5 * (duration - width);
@@ -199,6 +201,16 @@ mod tests {
         let found = found(changing_track(1, (0.0, 30.0), (-5.25, -1.75), (4.0, 6.0), 80));
         assert_eq!(found.len(), 1);
         assert!(!found[0].complete && (found[0].crossing_s - 7.0).abs() <= 0.1);
+    }
+
+    #[test]
+    fn a_track_that_begins_or_ends_at_the_fastest_moment_still_has_its_crossing() {
+        let whole = changing_track(1, (0.0, 30.0), (-5.25, -1.75), (4.0, 6.0), 150);
+        for range in [0..76, 64..150] {
+            let found = found(whole.with_points(whole.points[range].to_vec()));
+            assert_eq!(found.len(), 1);
+            assert!(!found[0].complete && (found[0].crossing_s - 7.0).abs() <= 0.1);
+        }
     }
 
     #[test]

@@ -37,6 +37,7 @@
 //!   after: flicker on a marking is none. It belongs to the highest peak in its direction between whose start and end it
 //!   lies. A peak that carries a vehicle over two markings gives two lane changes.
 //! - A peak needs a prominence of 0.15 m/s. A lane change of 3.5 m that takes 30 s still peaks at 0.22 m/s.
+//! - A track that begins or ends in the middle of a manoeuvre has its peak at that end, as if at rest beyond it.
 //! - A lane change is *complete* where its start and end were both recorded, it shifts the vehicle by at least 2.5 m, and
 //!   its peak crosses one marking only. Only complete ones belong in statistics of durations.
 

@@ -46,7 +46,8 @@ pub fn quality(recording: &Recording) -> Quality {
 fn jumps(track: &Trajectory) -> usize {
     let is_jump = |pair: &&[TrajectoryPoint]| {
         let step_mps = (pair[1].s_m - pair[0].s_m) / (pair[1].time - pair[0].time).s();
-        !((step_mps - 0.5 * (pair[0].speed_mps + pair[1].speed_mps)).abs() <= JUMP_MPS)
+        let difference_mps = (step_mps - 0.5 * (pair[0].speed_mps + pair[1].speed_mps)).abs();
+        difference_mps.is_nan() || difference_mps > JUMP_MPS
     };
     track.points.windows(2).filter(is_jump).count()
 }

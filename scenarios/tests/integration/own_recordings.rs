@@ -28,7 +28,7 @@ fn forty() -> Vec<MadeUp> {
         speed_mps: 20.0 + 0.3 * f64::from(k),
         start_s: 2.0 + 0.1 * f64::from(k % 7),
         duration_s: 3.0 + 0.2 * f64::from(k),
-        to_the_left: k % 2 == 0,
+        to_the_left: k.is_multiple_of(2),
     };
     (0..40).map(change).collect()
 }
