@@ -84,3 +84,49 @@ fn human<C: Check>(
 ) -> Result<CheckedDriver, ConfigError> {
     config.check(parameters).map(kind).map(CheckedDriver::Human).map_err(|error| error.within(key))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a scenario file may say, as the tables of the file arrive here.
+    fn parse(text: &str) -> Result<DriverConfig, toml::de::Error> {
+        #[derive(Deserialize)]
+        struct Actor {
+            driver: DriverConfig,
+        }
+        toml::from_str::<Actor>(&format!("driver = {text}")).map(|actor| actor.driver)
+    }
+
+    #[test]
+    fn every_driver_of_the_headline_scenario_is_read() {
+        let parameters: Parameters = [("front-thw-s", 0.7), ("cut-out-thw-s", 0.2), ("rear-cc1-s", 0.02)]
+            .map(|(name, value)| {
+                (closecall_traffic::ParameterName::new(name).unwrap(), closecall_traffic::Value::Number(value))
+            })
+            .into_iter()
+            .collect();
+        for text in [
+            "{ ego-stack = { acc = { time-gap-s = \"$front-thw-s\" }, aeb = {}, mis = { critical-gap-m = 5.0 } } }",
+            "{ prescribed = { profile = [[0.0, 30.0], [4.0, 20]] } }",
+            "{ wiedemann99 = { cc1-s = 0.3, desired-speed-mps = 36, reaction-s = 0.9 } }",
+            "{ idm = {} }",
+            "{ overtaker = { cut-out-thw-s = \"$cut-out-thw-s\", follow = { wiedemann99 = { cc1-s = \"$rear-cc1-s\" } }, \
+               reaction-s = { log-normal = { median = 0.9, sigma = 0.3 } } } }",
+        ] {
+            let config = parse(text).unwrap();
+            config.check(&parameters).unwrap();
+            let written = toml::Value::try_from(&config).unwrap();
+            assert_eq!(written.try_into::<DriverConfig>().unwrap(), config, "{text}");
+        }
+    }
+
+    #[test]
+    fn what_is_unknown_or_out_of_range_is_refused_by_name() {
+        assert!(parse("{ ego-stack = { acc = { time-gap-s = 0.7 }, mis = { bound = 1.0 } } }").is_err());
+        assert!(parse("{ overtaker = { reaction-s = { log-normal = { median = nan, sigma = 0.3 } } } }").is_err());
+        let config = parse("{ wiedemann99 = { cc1-s = -0.3 } }").unwrap();
+        let error = config.check(&Parameters::default()).unwrap_err();
+        assert_eq!(error.path.to_string(), "wiedemann99.cc1-s");
+    }
+}

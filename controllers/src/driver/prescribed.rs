@@ -89,3 +89,27 @@ impl Driver for PrescribedDriver {
         Ok(DriverAction { acceleration_mps2, ..DriverAction::default() })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn config(points: &[[f64; 2]]) -> PrescribedConfig {
+        PrescribedConfig { profile: points.iter().map(|pair| pair.map(Num::Fixed)).collect() }
+    }
+
+    #[test]
+    fn speeds_are_linear_in_between_and_constant_outside() {
+        let profile = config(&[[1.0, 30.0], [3.0, 20.0]]).check(&Parameters::default()).unwrap();
+        assert_eq!(profile.at(0.0), (30.0, 0.0));
+        assert_eq!(profile.at(2.0), (25.0, -5.0));
+        assert_eq!(profile.at(9.0), (20.0, 0.0));
+    }
+
+    #[test]
+    fn times_that_do_not_rise_are_refused_with_their_place() {
+        let error = config(&[[0.0, 30.0], [0.0, 20.0]]).check(&Parameters::default()).unwrap_err();
+        assert_eq!(error.path.to_string(), "profile[1].time-s");
+        assert!(config(&[]).check(&Parameters::default()).is_err());
+    }
+}

@@ -7,6 +7,9 @@ use proptest::prelude::*;
 use crate::encounter::human;
 use crate::world::{Actor, Who, World, gap_m};
 
+/// cc0 + cc2, and what a driver who closes in unnoticed may still be off by.
+const CONTENT_M: f64 = 1.5 + 4.0 + 0.5;
+
 /// A leader at 30 m/s that brakes at 5 s, and a follower at the same speed `gap` behind it.
 fn pair(gap: f64, cc1_s: f64, reaction_s: f64, brake_mps2: f64) -> World {
     let road = Road::straight(3);
@@ -58,14 +61,15 @@ fn deceleration_follows_the_brake_light_by_the_reaction_time() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(40))]
+    #![proptest_config(ProptestConfig::with_cases(64))]
 
+    /// Where the gap gets smaller than the band cc0 to cc0 + cc2 in which the model is content to stop.
     #[test]
     fn a_longer_reaction_never_gives_a_larger_least_gap(
-        gap in 20.0..45.0, reaction in 0.3..1.5, longer in 0.1..1.0, braking in 3.0..7.0,
+        gap in 10.0..25.0, reaction in 0.3..1.5, longer in 0.1..1.0, braking in 6.0..8.0,
     ) {
         let quick = least_gap_m(pair(gap, 0.6, reaction, braking));
         let slow = least_gap_m(pair(gap, 0.6, reaction + longer, braking));
-        prop_assert!(slow <= quick + 0.05, "{slow} {quick}");
+        prop_assert!(slow <= quick.max(CONTENT_M) + 0.01, "{slow} {quick}");
     }
 }

@@ -19,7 +19,7 @@
 //! | safe | cc0 + cc1·min(v, v_l) | the gap that is never undercut on purpose |
 //! | follow | safe + cc2 | the gap up to which the driver just follows |
 //! | approach | follow + cc3·(Δv − cc4) | where a driver who closes in begins to slow down |
-//! | closing | cc4 − c·g² | closing is noticed below this Δv |
+//! | closing | cc4 − c·g²; cc4 once noticed | closing is noticed below this Δv |
 //! | opening | cc5 + c·g² | opening is noticed above this Δv |
 //!
 //! | regime | where | acceleration |
@@ -39,6 +39,8 @@
 //!   each is the constant deceleration that removes Δv over the room left, with the room kept above 0.5 m.
 //! - Vissim's term for approaching leaves out the lead's braking. The deceleration that removes Δv over a given room is
 //!   relative to the lead, so that its braking adds to it: without it a hard-braking lead is noticed as emergency only.
+//! - A driver who has noticed that it closes in goes on until Δv is back at cc4. Where the threshold for noticing is used
+//!   for that too, up to 1.5 m/s are left at 30 m of gap, and cc7 takes 4 m to remove them: below the safe gap.
 //! - No random terms: what varies between drivers is sampled as a parameter.
 
 use super::Parameters99;
@@ -149,9 +151,14 @@ impl Wiedemann99Model {
             safe_m,
             follow_m,
             approach_m: follow_m + p.cc3_s * (lead.speed_mps - speed_mps - p.cc4_mps),
-            closing_mps: p.cc4_mps - widening_mps,
+            closing_mps: if self.is_closing() { p.cc4_mps } else { p.cc4_mps - widening_mps },
             opening_mps: p.cc5_mps + widening_mps,
         }
+    }
+
+    /// True where the driver has noticed that it closes in, and reacts to it.
+    fn is_closing(&self) -> bool {
+        matches!(self.regime, Regime::Approaching | Regime::Emergency)
     }
 
     fn regime_at(&self, thresholds: &Thresholds, gap_m: f64, opening_mps: f64) -> Regime {
@@ -167,16 +174,17 @@ impl Wiedemann99Model {
         }
     }
 
-    /// Turns the oscillation of following at the edges of its regime.
+    /// Turns the oscillation of following: where the speed difference is half of what would be noticed, and early enough
+    /// to keep the gap between its edges.
     fn turn(&mut self, thresholds: &Thresholds, gap_m: f64, opening_mps: f64) {
-        let half_closing_mps = 0.5 * thresholds.closing_mps;
-        let half_opening_mps = 0.5 * thresholds.opening_mps;
-        if gap_m <= thresholds.safe_m {
-            // Falling back until the gap opens noticeably; then the speed is matched again.
-            self.rising = opening_mps > half_opening_mps;
-        } else if opening_mps > half_opening_mps {
+        let turning_way_m = opening_mps * opening_mps / (2.0 * self.parameters.cc7_mps2);
+        let too_near = gap_m <= thresholds.safe_m || gap_m - turning_way_m <= thresholds.safe_m;
+        let too_far = gap_m + turning_way_m >= thresholds.follow_m;
+        if opening_mps < 0.0 && too_near {
+            self.rising = false;
+        } else if (opening_mps > 0.0 && too_far) || opening_mps > 0.5 * thresholds.opening_mps {
             self.rising = true;
-        } else if opening_mps < half_closing_mps {
+        } else if opening_mps < 0.5 * thresholds.closing_mps {
             self.rising = false;
         }
     }
@@ -185,4 +193,114 @@ impl Wiedemann99Model {
 /// The constant deceleration that removes the closing speed over `room_m` [m/s²].
 fn removing_mps2(opening_mps: f64, room_m: f64) -> f64 {
     if opening_mps < 0.0 { opening_mps * opening_mps / (2.0 * room_m.max(LEAST_ROOM_M)) } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::driver::wiedemann99::Wiedemann99;
+
+    fn settings(cc1_s: f64) -> Wiedemann99 {
+        let parameters = Parameters99 { cc1_s, ..Parameters99::VISSIM };
+        Wiedemann99 { parameters, desired_speed_mps: None, reaction: None }
+    }
+
+    /// A follower behind a leader: gap, own speed, own acceleration after the actuators' lag of 0.15 s.
+    #[derive(Clone, Copy)]
+    struct Pair {
+        gap_m: f64,
+        speed_mps: f64,
+        actual_mps2: f64,
+    }
+
+    /// Drives behind a leader with the given acceleration over time; returns the gaps at each step.
+    fn drive(cc1_s: f64, mut pair: Pair, mut lead_mps: f64, step_s: f64, lead_mps2: impl Fn(f64) -> f64) -> Vec<f64> {
+        let mut model = Wiedemann99Model::new(&settings(cc1_s));
+        let steps = (120.0 / step_s).round() as usize;
+        let mut gaps = Vec::with_capacity(steps);
+        for step in 0..steps {
+            let lead_mps2 = if lead_mps > 0.0 { lead_mps2(step as f64 * step_s) } else { 0.0 };
+            let lead = Lead { gap_m: pair.gap_m, speed_mps: lead_mps, acceleration_mps2: lead_mps2 };
+            let wanted = model.acceleration_mps2(pair.speed_mps, 36.0, Some(&lead));
+            pair.actual_mps2 += (step_s / 0.15).min(1.0) * (wanted - pair.actual_mps2);
+            let own_mps = (pair.speed_mps + step_s * pair.actual_mps2).max(0.0);
+            let lead_next_mps = f64::max(lead_mps + step_s * lead_mps2, 0.0);
+            pair.gap_m += 0.5 * step_s * (lead_mps + lead_next_mps - own_mps - pair.speed_mps);
+            (pair.speed_mps, lead_mps) = (own_mps, lead_next_mps);
+            gaps.push(pair.gap_m);
+        }
+        gaps
+    }
+
+    const APPROACH: Pair = Pair { gap_m: 120.0, speed_mps: 36.0, actual_mps2: 0.0 };
+
+    #[test]
+    fn behind_a_constant_leader_the_gap_settles_into_its_band() {
+        for speed_mps in [20.0, 30.0] {
+            for cc1_s in [0.2, 0.4, 0.6, 0.9, 1.5] {
+                let safe_m = 1.5 + cc1_s * speed_mps;
+                for step_s in [0.01, 0.04, 0.1] {
+                    let gaps = drive(cc1_s, APPROACH, speed_mps, step_s, |_| 0.0);
+                    let settled = &gaps[gaps.len() / 2..];
+                    let least = settled.iter().copied().fold(f64::INFINITY, f64::min);
+                    let most = settled.iter().copied().fold(0.0, f64::max);
+                    // Half a metre of overshoot: the speed difference of 0.35 m/s and more that goes unnoticed, turned by cc7.
+                    assert!(
+                        least > safe_m - 0.5 && most < safe_m + 4.0 + 0.5,
+                        "{speed_mps} m/s, cc1 {cc1_s} s, step {step_s} s: {least} to {most} around {safe_m}"
+                    );
+                    let overall = gaps.iter().copied().fold(f64::INFINITY, f64::min);
+                    assert!(overall > safe_m - 1.0, "{speed_mps} {cc1_s} {step_s}: {overall} below {safe_m}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn it_does_not_run_into_a_braking_leader() {
+        for cc1_s in [0.4, 0.9, 1.5] {
+            let start = Pair { gap_m: 2.5 + cc1_s * 30.0, speed_mps: 30.0, actual_mps2: 0.0 };
+            for braking in [2.0, 4.0, 6.0] {
+                let gaps = drive(cc1_s, start, 30.0, 0.01, |t| if t > 5.0 { -braking } else { 0.0 });
+                let least = gaps.iter().copied().fold(f64::INFINITY, f64::min);
+                assert!(least > 0.5, "cc1 {cc1_s} s, braking {braking} m/s²: {least} m");
+            }
+        }
+    }
+
+    #[test]
+    fn free_acceleration_is_cc8_at_standstill_and_cc9_at_80_kmh() {
+        let mut model = Wiedemann99Model::new(&settings(0.9));
+        assert_eq!(model.acceleration_mps2(0.0, 36.0, None), 3.5);
+        assert!((model.acceleration_mps2(CC9_SPEED_MPS, 36.0, None) - 1.5).abs() < 1e-12);
+        assert_eq!(model.acceleration_mps2(36.0, 36.0, None), 0.0);
+    }
+
+    #[test]
+    fn each_regime_is_where_the_table_says() {
+        let mut model = Wiedemann99Model::new(&settings(0.9));
+        let mut regime = |gap_m, opening_mps| {
+            let lead = Lead { gap_m, speed_mps: 30.0 + opening_mps, acceleration_mps2: 0.0 };
+            model.acceleration_mps2(30.0, 36.0, Some(&lead));
+            model.regime()
+        };
+        assert_eq!(regime(150.0, 0.0), Regime::Free);
+        assert_eq!(regime(60.0, -10.0), Regime::Approaching);
+        assert_eq!(regime(30.0, 0.0), Regime::Following);
+        assert_eq!(regime(30.0, 5.0), Regime::Free);
+        assert_eq!(regime(15.0, -5.0), Regime::Emergency);
+    }
+
+    proptest! {
+        #[test]
+        fn accelerations_are_bounded_everywhere(
+            gap in -5.0..200.0, speed in 0.0..50.0, lead_mps in 0.0..50.0, lead_mps2 in -10.0..5.0, cc1 in 0.0..2.0,
+        ) {
+            let lead = Lead { gap_m: gap, speed_mps: lead_mps, acceleration_mps2: lead_mps2 };
+            let wanted = Wiedemann99Model::new(&settings(cc1)).acceleration_mps2(speed, 36.0, Some(&lead));
+            prop_assert!((-HARDEST_BRAKING_MPS2..=3.5).contains(&wanted), "{wanted}");
+        }
+    }
 }
