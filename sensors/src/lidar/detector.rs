@@ -1,0 +1,273 @@
+//! From points to detections: selection, clustering, boxes, classes.
+
+use closecall_traffic::{ClassScores, Time, VehicleClass};
+
+use super::boxes::Fit;
+use super::classify::{scores, usual_size_m};
+use super::clustering::{Clustering, NOISE};
+use super::ground::{Candidate, select};
+use super::{LaneGeometry, LidarScan};
+use crate::{Detection, Extent, SensorError};
+
+/// Neighbouring edges of two clusters within this many columns: the nearer one may hide the other.
+const HIDING_COLUMNS: f64 = 3.0;
+/// The nearer one has to be nearer by this [m].
+const HIDING_DEPTH_M: f64 = 1.0;
+/// Width that an edge keeps uncertain, in columns: it lies somewhere within the last step.
+const EDGE_SD_COLUMNS: f64 = 0.3;
+/// How well the front of a vehicle is defined: bumper, plate, bonnet edge [m].
+const FACE_SD_M: f64 = 0.05;
+/// Noise of one range [m].
+const POINT_SD_M: f64 = 0.05;
+/// The least that is claimed across the line of sight [m].
+const LEAST_LATERAL_SD_M: f64 = 0.03;
+/// Where the lowest footprint on a front begins above this, only a car's cabin was seen [m], and its bumper stands
+/// before that by so much on average, with this scatter [m].
+const CABIN_FROM_M: f64 = 0.95;
+const BONNET_M: f64 = 0.9;
+const BONNET_SD_M: f64 = 0.6;
+/// From here on few beams meet the wheel, the lamp and the fairing of a motorcycle, and the rider behind them may be
+/// all that is seen [m]: how far the front then stands before it on average, and the scatter [m].
+const RIDER_FROM_M: f64 = 28.0;
+const RIDER_M: f64 = 0.4;
+const RIDER_SD_M: f64 = 0.35;
+/// Nearer than that, the wheel's tread may send too little back [m].
+const WHEEL_SD_M: f64 = 0.08;
+/// Uncertainty of a front that lies outside of the field of view [m].
+const CUT_SD_M: f64 = 2.0;
+/// A length is measured where at least this much of a side is seen [m].
+const SIDE_SEEN_M: f64 = 3.0;
+/// The farthest point of a side tells its end only where columns meet it closer than this [m].
+const SIDE_SPACING_M: f64 = 0.5;
+
+/// From scans to detections. Keeps no state from scan to scan but memory.
+#[derive(Clone, Debug, Default)]
+pub struct Detector {
+    candidates: Vec<Candidate>,
+    clustering: Clustering,
+    /// Places of the candidates in the scan, cluster by cluster.
+    members: Vec<u32>,
+    /// Where each cluster begins in `members`; one more at the end.
+    starts: Vec<u32>,
+    fits: Vec<Fit>,
+    /// For each cluster the one that it belongs to, mostly itself.
+    hosts: Vec<u32>,
+    detections: Vec<Detection>,
+}
+
+impl Detector {
+    /// Finds boxes in a scan.
+    ///
+    /// # Errors
+    /// [`SensorError::NotFinite`] at a point that is not finite, [`SensorError::Clustering`] where the clustering
+    /// refuses its input.
+    pub fn detect(&mut self, scan: &LidarScan, lane: &LaneGeometry) -> Result<&[Detection], SensorError> {
+        self.detections.clear();
+        self.cluster(scan, lane)?;
+        self.fit(scan, lane);
+        if self.find_hosts(lane) {
+            self.clustering.merge(&self.hosts);
+            self.gather();
+            // The front and the sides are those of the host; the parts behind them would only blur them.
+            let mut hosts = self.hosts.iter().zip(0..).map(|(&host, own)| host == own);
+            self.fits.retain(|_| hosts.next().unwrap_or(false));
+        }
+        for index in 0..self.fits.len() {
+            let hidden = hidden_edges(index, &self.fits);
+            self.detections.push(detection(&self.fits[index], hidden, scan.start, lane));
+        }
+        Ok(&self.detections)
+    }
+
+    /// The boxes found in the latest scan.
+    pub fn latest(&self) -> &[Detection] {
+        &self.detections
+    }
+
+    /// The places in the scan of the points of one detection.
+    pub fn points_of(&self, detection: usize) -> &[u32] {
+        &self.members[self.starts[detection] as usize..self.starts[detection + 1] as usize]
+    }
+
+    /// Selects points and labels them: the part that takes most of the time.
+    ///
+    /// # Errors
+    /// As [`Detector::detect`].
+    pub fn cluster(&mut self, scan: &LidarScan, lane: &LaneGeometry) -> Result<(), SensorError> {
+        select(scan, lane, scan.end, &mut self.candidates)?;
+        self.clustering.run(&self.candidates)?;
+        self.gather();
+        Ok(())
+    }
+
+    /// Sorts the candidates by cluster.
+    fn gather(&mut self) {
+        let count = self.clustering.count;
+        self.starts.clear();
+        self.starts.resize(count + 1, 0);
+        let labels = &self.clustering.labels;
+        for &label in labels.iter().filter(|&&label| label != NOISE) {
+            self.starts[label as usize + 1] += 1;
+        }
+        for cluster in 0..count {
+            self.starts[cluster + 1] += self.starts[cluster];
+        }
+        self.members.clear();
+        self.members.resize(self.starts[count] as usize, 0);
+        for (candidate, &label) in self.candidates.iter().zip(labels) {
+            if label != NOISE {
+                let next = &mut self.starts[label as usize];
+                self.members[*next as usize] = candidate.index;
+                *next += 1;
+            }
+        }
+        // Filling has moved each start to the next cluster's: move them back.
+        self.starts.rotate_right(1);
+        self.starts[0] = 0;
+    }
+
+    fn fit(&mut self, scan: &LidarScan, lane: &LaneGeometry) {
+        self.fits.clear();
+        for cluster in 0..self.clustering.count {
+            let members = &self.members[self.starts[cluster] as usize..self.starts[cluster + 1] as usize];
+            self.fits.push(Fit::to(members, scan, lane));
+        }
+    }
+}
+
+impl Detector {
+    /// Finds clusters within the box of a vehicle before them: what is seen below a truck's cabin, or past a rider.
+    /// True where there is one.
+    fn find_hosts(&mut self, lane: &LaneGeometry) -> bool {
+        self.hosts.clear();
+        for (index, (fit, own)) in self.fits.iter().zip(0..).enumerate() {
+            let holds = |other: &usize| *other != index && holds(&self.fits[*other], fit, lane);
+            let host = (0..self.fits.len()).find(holds);
+            #[expect(clippy::cast_possible_truncation, reason = "fewer clusters than points")]
+            self.hosts.push(host.map_or(own, |host| host as u32));
+        }
+        self.hosts.iter().zip(0..).any(|(&host, own)| host != own)
+    }
+}
+
+/// True where `part` lies behind the front of `whole` and within the size that its class usually has.
+fn holds(whole: &Fit, part: &Fit, lane: &LaneGeometry) -> bool {
+    if part.range_m <= whole.range_m || part.points >= whole.points {
+        return false;
+    }
+    let class = scores(whole, true, lane);
+    let [length, width] = usual_size_m(class.best_vehicle_class() as usize);
+    let (sin, cos) = (part.heading_rad - whole.heading_rad).sin_cos();
+    let across = 0.5 * (part.across_m[0] + part.across_m[1]);
+    let (u, v) = (part.front_u_m * cos - across * sin, part.front_u_m * sin + across * cos);
+    let middle = 0.5 * (whole.across_m[0] + whole.across_m[1]);
+    let reach = length.max(whole.length_m());
+    let half = 0.5 * width.max(whole.width_m());
+    class.vehicle() > 0.5 && u <= whole.front_u_m && u >= whole.front_u_m - reach && (v - middle).abs() <= half
+}
+
+/// Whether the edge at least and at greatest azimuth is hidden by a nearer cluster, or cut by the field of view.
+fn hidden_edges(index: usize, fits: &[Fit]) -> [bool; 2] {
+    let fit = &fits[index];
+    let margin = HIDING_COLUMNS * fit.spacing_m / fit.range_m.max(1.0);
+    let hides = |edge: f64| {
+        fits.iter().enumerate().any(|(other, nearer)| {
+            other != index
+                && nearer.range_m + HIDING_DEPTH_M < fit.range_m
+                && nearer.azimuth_rad[0] - margin < edge
+                && edge < nearer.azimuth_rad[1] + margin
+        })
+    };
+    fit.azimuth_rad.map(|edge| hides(edge) || fit.is_cut())
+}
+
+fn detection(fit: &Fit, hidden: [bool; 2], start: Time, lane: &LaneGeometry) -> Detection {
+    // Seen from the rear, what lies to E's right in azimuth lies to the vehicle's right too: least v, least azimuth.
+    let width_seen = !hidden[0] && !hidden[1];
+    let class = scores(fit, width_seen, lane);
+    let [usual_length, usual_width] = usual_size_m(class.best_vehicle_class() as usize);
+    let across = across(fit, hidden, usual_width);
+    let length_seen = has_seen_length(fit);
+    let (front_u_m, range_sd_m) = front(fit, &class);
+    let (sin, cos) = fit.heading_rad.sin_cos();
+    #[expect(clippy::cast_possible_truncation, reason = "offsets lie within a sweep")]
+    let time = start + Time::from_ns(fit.offset_ns as i64);
+    Detection {
+        time,
+        face_x_m: front_u_m * cos - across.middle_m * sin,
+        face_y_m: front_u_m * sin + across.middle_m * cos,
+        range_sd_m,
+        lateral_sd_m: across.sd_m,
+        heading_rad: fit.heading_rad,
+        length_m: if length_seen { fit.length_m() } else { usual_length.max(fit.length_m()) },
+        length: if length_seen { Extent::Seen } else { Extent::Assumed },
+        width_m: across.width_m,
+        width: across.extent,
+        top_m: fit.top_m,
+        points: fit.points,
+        class,
+    }
+}
+
+/// The front face along the box, and its standard deviation [m].
+fn front(fit: &Fit, class: &ClassScores) -> (f64, f64) {
+    let sd = FACE_SD_M.hypot(POINT_SD_M / (fit.front_points.max(1) as f64).sqrt());
+    if fit.is_cut() {
+        return (fit.front_u_m, sd.hypot(CUT_SD_M));
+    }
+    match class.best_vehicle_class() {
+        VehicleClass::Car if fit.front_bottom_m - 0.5 * fit.layer_m() > CABIN_FROM_M => {
+            (fit.front_u_m + BONNET_M, sd.hypot(BONNET_SD_M))
+        }
+        VehicleClass::Motorcycle if fit.range_m > RIDER_FROM_M => (fit.front_u_m + RIDER_M, sd.hypot(RIDER_SD_M)),
+        VehicleClass::Motorcycle => (fit.front_u_m, sd.hypot(WHEEL_SD_M)),
+        VehicleClass::Car | VehicleClass::Truck => (fit.front_u_m, sd),
+    }
+}
+
+/// Width and middle across.
+struct Across {
+    middle_m: f64,
+    sd_m: f64,
+    width_m: f64,
+    extent: Extent,
+}
+
+fn across(fit: &Fit, [right_hidden, left_hidden]: [bool; 2], usual_m: f64) -> Across {
+    let [right, left] = fit.across_m;
+    let seen = left - right;
+    let edge_sd = EDGE_SD_COLUMNS * fit.spacing_m;
+    let missing = (usual_m - seen).max(0.0);
+    let (middle_m, sd_m) = match (right_hidden, left_hidden) {
+        // Weak returns may have lost columns on either side.
+        (false, false) => (0.5 * (left + right), edge_sd / f64::sqrt(2.0)),
+        (true, false) => (left - 0.5 * seen.max(usual_m), edge_sd),
+        (false, true) => (right + 0.5 * seen.max(usual_m), edge_sd),
+        (true, true) => (0.5 * (left + right), edge_sd),
+    };
+    let lost = missing / f64::sqrt(12.0);
+    let both_seen = !right_hidden && !left_hidden;
+    let extent = if both_seen && missing < 2.0 * fit.spacing_m + 0.2 { Extent::Seen } else { Extent::Assumed };
+    let sd_m = match extent {
+        Extent::Seen => sd_m.hypot(0.5 * lost),
+        Extent::Assumed => sd_m.hypot(lost),
+    };
+    let width_m = match extent {
+        Extent::Seen => seen + 0.5 * fit.spacing_m,
+        Extent::Assumed => seen.max(usual_m),
+    };
+    Across { middle_m, sd_m: sd_m.max(LEAST_LATERAL_SD_M), width_m, extent }
+}
+
+/// True where a side is seen to its end.
+fn has_seen_length(fit: &Fit) -> bool {
+    if fit.is_cut() || fit.length_m() < SIDE_SEEN_M {
+        return false;
+    }
+    // Columns meet a side at distance r and lateral offset y every Δφ·r²/y.
+    let (sin, cos) = fit.heading_rad.sin_cos();
+    let middle = 0.5 * (fit.across_m[0] + fit.across_m[1]);
+    let (x, y) = (fit.rear_u_m * cos - middle * sin, fit.rear_u_m * sin + middle * cos);
+    let step_rad = fit.spacing_m / fit.range_m.max(1.0);
+    y.abs() > 1.0 && step_rad * (x * x + y * y) / y.abs() < SIDE_SPACING_M
+}

@@ -1,0 +1,106 @@
+//! Which points may belong to a vehicle: within the region of interest, and not on the ground.
+//!
+//! The road sends back only where the beams meet it steeply enough: within some 20 m at the usual mounting height. Up
+//! to [`GROUND_REACH_M`] a point near z = 0 is therefore taken as ground; beyond, a low point is kept: it can only come
+//! from something that stands on the road, and its height, that of the beam's centre, may be off by half a footprint.
+
+use closecall_traffic::Time;
+
+use super::{LaneGeometry, LidarScan};
+use crate::SensorError;
+
+/// Where the road may send something back, from the sensor [m].
+const GROUND_REACH_M: f32 = 40.0;
+/// Height below which a point counts as ground, at the sensor [m].
+const GROUND_M: f32 = 0.10;
+/// What the height gains per metre of distance: three standard deviations of the levelling's error, and the footprint,
+/// whose near edge sends more than its far edge [rad].
+const GROUND_SLOPE: f32 = 0.005;
+/// Half the width of the region of interest about E's path: two lanes to each side [m].
+const HALF_WIDTH_M: f32 = 9.5;
+/// Points farther behind the sensor than this are not used [m].
+const REACH_M: f32 = 200.0;
+/// Near returns weaker than this come from droplets: a tyre at 60° still shows 0.025 (low-intensity outlier removal,
+/// after Park et al. 2020, "Fast and accurate desnowing algorithm for LiDAR point clouds").
+const DROPLET_INTENSITY: f32 = 0.02;
+/// Up to where droplets are looked for [m].
+const DROPLET_REACH_M: f32 = 15.0;
+
+/// A point that may belong to a vehicle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Candidate {
+    /// Its place in the scan.
+    pub(crate) index: u32,
+    /// Behind the sensor, along E's axis [m].
+    pub(crate) back_m: f32,
+    /// To the left of E's path [m].
+    pub(crate) left_m: f32,
+}
+
+/// Collects into `kept` what may belong to vehicles.
+///
+/// # Errors
+/// [`SensorError::NotFinite`] at a point that is not finite.
+pub(crate) fn select(
+    scan: &LidarScan,
+    lane: &LaneGeometry,
+    time: Time,
+    kept: &mut Vec<Candidate>,
+) -> Result<(), SensorError> {
+    kept.clear();
+    #[expect(clippy::cast_possible_truncation, reason = "points are in single precision")]
+    let (slope, bend) = (-lane.heading_rad as f32, 0.5 * lane.curvature_per_m as f32);
+    let points = scan.x_m.iter().zip(&scan.y_m).zip(&scan.z_m).zip(&scan.intensity);
+    for ((((&x, &y), &z), &intensity), index) in points.zip(0..) {
+        if !(x + y + z + intensity).is_finite() {
+            return Err(SensorError::NotFinite { what: "a LiDAR point", time });
+        }
+        let back_m = scan.sensor_x_m - x;
+        let left_m = y - (slope + bend * x) * x;
+        let inside = back_m > 0.0 && back_m < REACH_M && left_m.abs() < HALF_WIDTH_M;
+        let range_m = (back_m * back_m + y * y).sqrt();
+        let ground = range_m < GROUND_REACH_M && z < GROUND_M + GROUND_SLOPE * range_m;
+        let droplet = range_m < DROPLET_REACH_M && intensity < DROPLET_INTENSITY;
+        if inside && !ground && !droplet {
+            kept.push(Candidate { index, back_m, left_m });
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LANE: LaneGeometry = LaneGeometry { heading_rad: 0.0, curvature_per_m: 0.0, edges_m: [5.6, -5.6] };
+
+    fn kept(points: &[[f32; 4]]) -> Result<Vec<u32>, SensorError> {
+        let mut scan = LidarScan { sensor_x_m: -2.3, ..LidarScan::default() };
+        for &[x, y, z, intensity] in points {
+            scan.x_m.push(x);
+            scan.y_m.push(y);
+            scan.z_m.push(z);
+            scan.intensity.push(intensity);
+        }
+        let mut kept = Vec::new();
+        select(&scan, &LANE, Time::ZERO, &mut kept)?;
+        Ok(kept.into_iter().map(|candidate| candidate.index).collect())
+    }
+
+    #[test]
+    fn ground_outsiders_and_droplets_are_left_out() {
+        let points = [
+            [-12.0, 0.0, 0.05, 0.1],
+            [-12.0, 0.0, 0.40, 0.1],
+            [-12.0, 12.0, 0.40, 0.1],
+            [-4.0, 0.0, 0.40, 0.01],
+            [-90.0, 0.0, 0.05, 0.01],
+        ];
+        assert_eq!(kept(&points), Ok(vec![1, 4]));
+    }
+
+    #[test]
+    fn a_point_that_is_no_number_is_an_error() {
+        assert!(kept(&[[-12.0, f32::NAN, 0.4, 0.1]]).is_err());
+    }
+}

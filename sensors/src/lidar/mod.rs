@@ -1,0 +1,48 @@
+//! The rear LiDAR: from the scene to points, and from points to boxes.
+//!
+//! ```text
+//!  Scene ─▶ solids (shapes, roadside) ─▶ targets ─▶ cast ─▶ echoes ─▶ receiver ─▶ LidarScan      the sensor
+//!                                         pattern ──┘    power, soft, noise          │
+//!                                                                                    ▼
+//!  Detections ◀─ classify ◀─ boxes ◀─ clustering (linfa) ◀─ thinning ◀─ ground, region of interest   the processing
+//! ```
+//!
+//! The two halves share nothing but the [`LidarScan`].
+
+mod boxes;
+mod cast;
+mod classify;
+mod clustering;
+mod config;
+mod detector;
+mod echo;
+mod ground;
+mod lane;
+mod material;
+mod noise;
+mod pattern;
+mod power;
+mod rear;
+mod receiver;
+mod roadside;
+mod scan;
+mod scanner;
+mod segmentation;
+mod shapes;
+mod soft;
+mod solid;
+mod targets;
+#[cfg(test)]
+mod tests;
+mod viewpoint;
+
+pub use config::{Lidar, LidarConfig, LidarModel};
+pub use detector::Detector;
+pub use lane::LaneGeometry;
+pub use material::Material;
+pub use pattern::{BEAMS, COLUMNS, LAYERS, PERIOD_NS, Pattern};
+pub(crate) use power::extinction_per_m;
+pub use rear::RearLidar;
+pub use scan::{LidarScan, Mirror, PointSource, PointTruth, ScanTruth};
+pub use scanner::Scanner;
+pub use segmentation::SegmentationReport;

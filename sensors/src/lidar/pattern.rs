@@ -1,0 +1,271 @@
+//! Where the beams of one scan point: the pattern of the Valeo SCALA, second generation.
+//!
+//! ```text
+//!        column 0                    column 326                   column 652
+//!   φ  −66.5° ── step 0.25° ── −15° ── step 0.125° ── +15° ── step 0.25° ── +66.5°      (to the right ◀ E ▶ left: φ is
+//!                                                                                        measured about the sensor's own
+//!   layer 15 ┐ group 3 (shifted by 3·0.0181° in azimuth)                                 x axis, which points back)
+//!         …  │
+//!   layer  0 ┘ group 0          one mirror side lifts every layer by 0.14° at φ = 0, the other lowers it
+//! ```
+//!
+//! Source: the published pattern of the SCALA Gen 2, θ = 0.6025·l + 2.564·g − 4.749 ± c(φ) in degrees with the cubic
+//! c(φ) = 1.512e-8·φ³ − 5.152e-6·φ² − 1.233e-3·φ + 0.1412.
+//!
+//! A beam is no line. Its footprint is taken as 0.6° high (the four layers of a group are four detector cells side by
+//! side, 0.6025° apart, which leave no gap) and, as an assumption, as wide as the finest step, 0.125°, so that
+//! neighbouring columns touch. It is sampled by 2 × 4 sub-rays of equal weight.
+
+use super::Mirror;
+
+/// Columns of one scan.
+pub const COLUMNS: usize = 653;
+/// Layers of each column.
+pub const LAYERS: usize = 16;
+/// Beams of one scan.
+pub const BEAMS: usize = COLUMNS * LAYERS;
+/// Layers that are shifted together in azimuth.
+pub(crate) const LAYERS_PER_GROUP: usize = 4;
+pub(crate) const GROUPS: usize = LAYERS / LAYERS_PER_GROUP;
+/// Sub-rays side by side in one footprint.
+pub(crate) const ACROSS: usize = 2;
+/// Sub-rays above each other in one footprint.
+pub(crate) const UPWARD: usize = 4;
+/// Sub-rays in one footprint.
+pub(crate) const SUBRAYS: usize = ACROSS * UPWARD;
+
+/// Time from one scan to the next [ns]: 25 Hz.
+pub const PERIOD_NS: i64 = 40_000_000;
+/// Half the field of view [°].
+const HALF_FIELD_DEG: f64 = 66.5;
+/// Time in which a scan sweeps its field of view [ns].
+///
+/// The mirror has two sides and deflects by twice its own angle: it turns by half a turn each period, and by half of
+/// 133° while it sweeps.
+pub(crate) const SWEEP_NS: f64 = PERIOD_NS as f64 * HALF_FIELD_DEG / 180.0;
+
+/// The finest azimuth step [°]; azimuths are counted in it.
+const FINE_STEP_DEG: f64 = 0.125;
+/// Where the fine steps end [fine steps]: 15°.
+const FINE_TO: i32 = 120;
+/// Where the coarse steps end [fine steps]: 66.5°.
+const COARSE_TO: i32 = 532;
+/// Azimuth shift from group to group [°].
+const GROUP_SHIFT_DEG: f64 = 0.0181;
+/// Width of a footprint [°].
+const FOOTPRINT_WIDTH_DEG: f64 = FINE_STEP_DEG;
+/// Height of a footprint [°].
+const FOOTPRINT_HEIGHT_DEG: f64 = 0.6;
+
+/// One column: what its beams have in common.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Column {
+    /// Azimuth of group 0 [°].
+    pub(crate) azimuth_deg: f64,
+    /// When it is measured, after the scan's start [ns].
+    pub(crate) offset_ns: u32,
+    /// Cosine and sine of the azimuth of each group's centre.
+    pub(crate) centre: [[f32; 2]; GROUPS],
+    /// Cosines of the azimuths of each group's sub-rays.
+    pub(crate) cos: [[f32; ACROSS]; GROUPS],
+    /// Sines of the same.
+    pub(crate) sin: [[f32; ACROSS]; GROUPS],
+}
+
+/// Tangents of elevation of one beam.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Elevation {
+    /// Of its centre.
+    pub(crate) centre: f32,
+    /// Of its sub-rays, upward.
+    pub(crate) subrays: [f32; UPWARD],
+}
+
+/// All beams of both mirror sides, in the sensor's frame.
+///
+/// Directions are kept as (cos φ, sin φ, tan θ): a vector of length 1/cos θ whose multiples count horizontal distance.
+#[derive(Clone, Debug)]
+pub struct Pattern {
+    pub(crate) columns: Vec<Column>,
+    elevations: [Vec<Elevation>; 2],
+}
+
+impl Pattern {
+    /// The pattern of the Valeo SCALA Gen 2.
+    pub fn scala_2() -> Self {
+        let columns: Vec<Column> = azimuth_steps().map(|steps| column(f64::from(steps) * FINE_STEP_DEG)).collect();
+        let elevations = [Mirror::Plus, Mirror::Minus].map(|mirror| {
+            let of = |column: &Column| (0..LAYERS).map(|layer| elevation(layer, column.azimuth_deg, mirror)).collect();
+            columns.iter().flat_map::<Vec<Elevation>, _>(of).collect()
+        });
+        Self { columns, elevations }
+    }
+
+    /// Elevations of the 16 beams of one column.
+    pub(crate) fn elevations(&self, mirror: Mirror, column: usize) -> &[Elevation] {
+        &self.elevations[mirror as usize][column * LAYERS..(column + 1) * LAYERS]
+    }
+
+    /// The columns whose footprints may touch azimuths from `low_deg` to `high_deg`: a half-open range.
+    pub(crate) fn columns_between(&self, low_deg: f64, high_deg: f64) -> std::ops::Range<usize> {
+        let half = 0.5 * FOOTPRINT_WIDTH_DEG;
+        let shift = GROUP_SHIFT_DEG * (GROUPS - 1) as f64;
+        let first = self.columns.partition_point(|column| column.azimuth_deg + shift + half < low_deg);
+        let end = self.columns.partition_point(|column| column.azimuth_deg - half <= high_deg);
+        first..end.max(first)
+    }
+
+    /// The layers whose footprints may touch elevations from `low_deg` to `high_deg`: a half-open range.
+    pub(crate) fn layers_between(mirror: Mirror, low_deg: f64, high_deg: f64) -> std::ops::Range<usize> {
+        let half = 0.5 * FOOTPRINT_HEIGHT_DEG;
+        let (lowest, highest) = match mirror {
+            Mirror::Plus => (CUBIC_LEAST_DEG, CUBIC_MOST_DEG),
+            Mirror::Minus => (-CUBIC_MOST_DEG, -CUBIC_LEAST_DEG),
+        };
+        let touches = |layer: &usize| {
+            base_deg(*layer) + highest + half >= low_deg && base_deg(*layer) + lowest - half <= high_deg
+        };
+        let first = (0..LAYERS).find(touches).unwrap_or(LAYERS);
+        let end = (first..LAYERS).rfind(touches).map_or(first, |last| last + 1);
+        first..end
+    }
+
+    /// Azimuth and elevation of a beam's centre in the sensor's frame [rad].
+    pub fn direction_rad(&self, mirror: Mirror, beam: u16) -> (f64, f64) {
+        let (column, layer) = (usize::from(beam) / LAYERS, usize::from(beam) % LAYERS);
+        let azimuth_deg = self.columns[column].azimuth_deg;
+        (group_azimuth_deg(azimuth_deg, layer).to_radians(), layer_deg(layer, azimuth_deg, mirror).to_radians())
+    }
+
+    /// When a column at this azimuth of the sensor's frame is measured, after the scan's start [s]; clamped to the sweep.
+    pub(crate) fn sweep_offset_s(azimuth_deg: f64) -> f64 {
+        let share = ((azimuth_deg + HALF_FIELD_DEG) / (2.0 * HALF_FIELD_DEG)).clamp(0.0, 1.0);
+        share * SWEEP_NS * 1e-9
+    }
+}
+
+/// Bounds of the cubic over the field of view, rounded outward [°]; a test holds the cubic to them.
+const CUBIC_LEAST_DEG: f64 = 0.040;
+const CUBIC_MOST_DEG: f64 = 0.197;
+
+fn azimuth_steps() -> impl Iterator<Item = i32> {
+    let coarse_right = (-COARSE_TO..-FINE_TO).step_by(2);
+    let coarse_left = (FINE_TO + 2..=COARSE_TO).step_by(2);
+    coarse_right.chain(-FINE_TO..=FINE_TO).chain(coarse_left)
+}
+
+fn cubic_deg(azimuth_deg: f64) -> f64 {
+    ((1.512e-8 * azimuth_deg - 5.152e-6) * azimuth_deg - 1.233e-3) * azimuth_deg + 0.1412
+}
+
+/// Elevation of a layer without the mirror's share [°].
+fn base_deg(layer: usize) -> f64 {
+    let (group, in_group) = (layer / LAYERS_PER_GROUP, layer % LAYERS_PER_GROUP);
+    0.6025 * in_group as f64 + 2.564 * group as f64 - 4.749
+}
+
+fn layer_deg(layer: usize, azimuth_deg: f64, mirror: Mirror) -> f64 {
+    match mirror {
+        Mirror::Plus => base_deg(layer) + cubic_deg(azimuth_deg),
+        Mirror::Minus => base_deg(layer) - cubic_deg(azimuth_deg),
+    }
+}
+
+fn group_azimuth_deg(azimuth_deg: f64, layer: usize) -> f64 {
+    azimuth_deg + GROUP_SHIFT_DEG * (layer / LAYERS_PER_GROUP) as f64
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "the model's directions are single precision: 1e-7 rad")]
+fn column(azimuth_deg: f64) -> Column {
+    let mut column = Column {
+        azimuth_deg,
+        #[expect(clippy::cast_sign_loss, reason = "clamped to 0 and above")]
+        offset_ns: (Pattern::sweep_offset_s(azimuth_deg) * 1e9) as u32,
+        centre: [[0.0; 2]; GROUPS],
+        cos: [[0.0; ACROSS]; GROUPS],
+        sin: [[0.0; ACROSS]; GROUPS],
+    };
+    for group in 0..GROUPS {
+        let centre_deg = group_azimuth_deg(azimuth_deg, group * LAYERS_PER_GROUP);
+        let (sin, cos) = centre_deg.to_radians().sin_cos();
+        column.centre[group] = [cos as f32, sin as f32];
+        for across in 0..ACROSS {
+            let offset_deg = FOOTPRINT_WIDTH_DEG * ((across as f64 + 0.5) / ACROSS as f64 - 0.5);
+            let (sin, cos) = (centre_deg + offset_deg).to_radians().sin_cos();
+            column.cos[group][across] = cos as f32;
+            column.sin[group][across] = sin as f32;
+        }
+    }
+    column
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "the model's directions are single precision: 1e-7 rad")]
+fn elevation(layer: usize, azimuth_deg: f64, mirror: Mirror) -> Elevation {
+    let centre_deg = layer_deg(layer, azimuth_deg, mirror);
+    let mut subrays = [0.0; UPWARD];
+    for (upward, subray) in subrays.iter_mut().enumerate() {
+        let offset_deg = FOOTPRINT_HEIGHT_DEG * ((upward as f64 + 0.5) / UPWARD as f64 - 0.5);
+        *subray = (centre_deg + offset_deg).to_radians().tan() as f32;
+    }
+    Elevation { centre: centre_deg.to_radians().tan() as f32, subrays }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_columns_are_those_of_the_data_sheet() {
+        let azimuths: Vec<f64> = azimuth_steps().map(|steps| f64::from(steps) * FINE_STEP_DEG).collect();
+        assert_eq!(azimuths.len(), COLUMNS);
+        assert_eq!((azimuths[0], azimuths[COLUMNS / 2], azimuths[COLUMNS - 1]), (-66.5, 0.0, 66.5));
+        for pair in azimuths.windows(2) {
+            let fine = pair[0] >= -15.0 && pair[1] <= 15.0;
+            assert_eq!(pair[1] - pair[0], if fine { 0.125 } else { 0.25 });
+        }
+    }
+
+    #[test]
+    fn elevations_agree_with_the_formula_worked_out_by_hand() {
+        let pattern = Pattern::scala_2();
+        let at = |mirror, column: usize, layer: usize| {
+            pattern.direction_rad(mirror, u16::try_from(column * LAYERS + layer).unwrap())
+        };
+        // φ = 0: c = 0.1412. Layer 7 is g = 1, l = 3: 1.8075 + 2.564 − 4.749 = −0.3775.
+        assert!((at(Mirror::Plus, 326, 7).1.to_degrees() - -0.2363).abs() < 1e-9);
+        assert!((at(Mirror::Minus, 326, 7).1.to_degrees() - -0.5187).abs() < 1e-9);
+        // φ = 66.5: 0.004447 − 0.022784 − 0.081995 + 0.1412 = 0.040868. Layer 15: 1.8075 + 7.692 − 4.749 = 4.7505.
+        assert!((at(Mirror::Plus, 652, 15).1.to_degrees() - 4.791_368).abs() < 1e-5);
+        assert!((at(Mirror::Plus, 652, 15).0.to_degrees() - (66.5 + 3.0 * 0.0181)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_bounds_of_the_cubic_hold() {
+        for steps in azimuth_steps() {
+            let cubic = cubic_deg(f64::from(steps) * FINE_STEP_DEG);
+            assert!((CUBIC_LEAST_DEG..=CUBIC_MOST_DEG).contains(&cubic), "{cubic} at {steps}");
+        }
+    }
+
+    #[test]
+    fn a_range_of_azimuths_takes_in_each_footprint_that_it_touches() {
+        let pattern = Pattern::scala_2();
+        let found = pattern.columns_between(-0.3, 0.3);
+        for (index, column) in pattern.columns.iter().enumerate() {
+            let reaches = (0..4).any(|g| {
+                let centre = column.azimuth_deg + 0.0181 * f64::from(g);
+                centre + 0.0625 >= -0.3 && centre - 0.0625 <= 0.3
+            });
+            assert!(!reaches || found.contains(&index), "column {index}");
+        }
+        assert!(found.len() <= 7);
+        assert!(pattern.columns_between(70.0, 80.0).is_empty());
+    }
+
+    #[test]
+    fn the_sweep_takes_the_share_of_the_period_that_the_mirror_needs() {
+        let pattern = Pattern::scala_2();
+        assert_eq!(pattern.columns[0].offset_ns, 0);
+        assert_eq!(pattern.columns[COLUMNS - 1].offset_ns, 14_777_777);
+    }
+}

@@ -1,0 +1,84 @@
+//! How well clusters agree with the truth: vehicles split into several, or several merged into one.
+
+use super::{PointSource, ScanTruth};
+
+/// Points of a vehicle in a cluster, or in a scan, below which they are not counted.
+const FEWEST_POINTS: usize = 3;
+
+/// Counts over scans.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SegmentationReport {
+    /// Vehicles with enough points to be found, summed over the scans.
+    pub vehicles: usize,
+    /// Of these, those whose points lie in more than one cluster.
+    pub over_segmented: usize,
+    /// Of these, those with no cluster of their own or shared.
+    pub missed: usize,
+    /// Clusters that hold more than one vehicle.
+    pub under_segmented: usize,
+    /// Clusters of which most points come from no vehicle.
+    pub background: usize,
+}
+
+impl SegmentationReport {
+    /// Adds one scan. `clusters` yields the places in the scan of each cluster's points.
+    pub fn add<'a>(&mut self, truth: &ScanTruth, clusters: impl Iterator<Item = &'a [u32]>) {
+        let mut in_scan: Vec<(usize, usize)> = Vec::new();
+        count(truth.points.iter().map(|point| point.source), &mut in_scan);
+        in_scan.retain(|&(_, points)| points >= FEWEST_POINTS);
+        let mut pieces = vec![0_usize; in_scan.len()];
+        let mut held: Vec<(usize, usize)> = Vec::new();
+        for members in clusters {
+            held.clear();
+            count(members.iter().map(|&member| truth.points[member as usize].source), &mut held);
+            let from_vehicles: usize = held.iter().map(|&(_, points)| points).sum();
+            held.retain(|&(_, points)| points >= FEWEST_POINTS);
+            self.background += usize::from(2 * from_vehicles < members.len());
+            self.under_segmented += usize::from(held.len() > 1);
+            for &(actor, _) in &held {
+                if let Some(place) = in_scan.iter().position(|&(other, _)| other == actor) {
+                    pieces[place] += 1;
+                }
+            }
+        }
+        self.vehicles += in_scan.len();
+        self.over_segmented += pieces.iter().filter(|&&pieces| pieces > 1).count();
+        self.missed += pieces.iter().filter(|&&pieces| pieces == 0).count();
+    }
+}
+
+/// Counts points by actor, in order of first appearance.
+fn count(sources: impl Iterator<Item = PointSource>, counts: &mut Vec<(usize, usize)>) {
+    for source in sources {
+        if let PointSource::Actor(actor) = source {
+            match counts.iter_mut().find(|(other, _)| *other == actor) {
+                Some((_, points)) => *points += 1,
+                None => counts.push((actor, 1)),
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Material, PointTruth};
+    use super::*;
+
+    #[test]
+    fn splits_merges_and_misses_are_counted() {
+        let of = |actor: Option<usize>| PointTruth {
+            source: actor.map_or(PointSource::Ground, PointSource::Actor),
+            material: Material::Paint,
+            range_m: 10.0,
+        };
+        let actors = [0, 0, 0, 0, 0, 0, 1, 1, 1, 2, 2, 2, 3, 3, 3].map(Some).into_iter().chain([None; 3]);
+        let truth = ScanTruth { points: actors.map(of).collect() };
+        // 0 is split; 1 and 2 are merged; 3 is missed; the last cluster is ground.
+        let clusters: [&[u32]; 4] = [&[0, 1, 2], &[3, 4, 5], &[6, 7, 8, 9, 10, 11], &[15, 16, 17]];
+        let mut report = SegmentationReport::default();
+        report.add(&truth, clusters.into_iter());
+        let expected =
+            SegmentationReport { vehicles: 4, over_segmented: 1, missed: 1, under_segmented: 1, background: 1 };
+        assert_eq!(report, expected);
+    }
+}

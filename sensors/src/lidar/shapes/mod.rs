@@ -1,0 +1,64 @@
+//! Shapes of vehicles: a few convex solids each, with the materials that a LiDAR tells apart.
+//!
+//! ```text
+//!            ____                      ┌──┐┌────────────────┐            o  helmet
+//!      _____/    \____                 │▒▒││                │           /█\ torso
+//!     |______________|  body, cabin    │__││________________│         ─<██>─ bars, fairing
+//!       (o)      (o)    wheels           o      o o     ooo            O  O  wheels
+//! ```
+//!
+//! Each follows the vehicle's own length, width and height; proportions are those of usual models, read off drawings,
+//! not of one model. Everything is in the vehicle's frame: x forward, z = 0 on the ground.
+
+mod car;
+mod motorcycle;
+mod truck;
+
+use closecall_traffic::{Vehicle, VehicleClass};
+
+use super::Material;
+use super::solid::Solid;
+
+/// Appends the solids of a vehicle, in its own frame.
+pub(crate) fn append_solids(vehicle: &Vehicle, solids: &mut Vec<Solid>) {
+    match vehicle.class {
+        VehicleClass::Car => car::append(vehicle, solids),
+        VehicleClass::Truck => truck::append(vehicle, solids),
+        VehicleClass::Motorcycle => motorcycle::append(vehicle, solids),
+    }
+}
+
+/// Appends a block and its mirror image on the other side of y = 0.
+fn append_pair(low: [f64; 3], high: [f64; 3], material: Material, solids: &mut Vec<Solid>) {
+    solids.push(Solid::block(low, high, material));
+    solids.push(Solid::block([low[0], -high[1], low[2]], [high[0], -low[1], high[2]], material));
+}
+
+#[cfg(test)]
+mod tests {
+    use closecall_traffic::Vehicle;
+
+    use super::*;
+
+    #[test]
+    fn every_shape_fills_its_box_and_stays_within_it() {
+        for class in VehicleClass::ALL {
+            for body_shape in 0..8 {
+                let mut vehicle = Vehicle::typical(class);
+                vehicle.appearance.body_shape = body_shape;
+                let mut solids = Vec::new();
+                append_solids(&vehicle, &mut solids);
+                let size = vehicle.dimensions;
+                let half = [0.5 * size.length_m, 0.5 * size.width_m];
+                let most = |axis: usize| solids.iter().map(|solid| solid.high[axis]).fold(f64::MIN, f64::max);
+                let least = |axis: usize| solids.iter().map(|solid| solid.low[axis]).fold(f64::MAX, f64::min);
+                for (axis, half) in half.into_iter().enumerate() {
+                    assert!((most(axis) - half).abs() < 0.03, "{class:?} {body_shape}: {} for {half}", most(axis));
+                    assert!((least(axis) + half).abs() < 0.03, "{class:?} {body_shape}");
+                }
+                assert!((most(2) - size.height_m).abs() < 0.03, "{class:?} {body_shape}: {}", most(2));
+                assert!(least(2) >= 0.0 && least(2) < 0.05, "{class:?} {body_shape}: wheels stand on the ground");
+            }
+        }
+    }
+}

@@ -1,0 +1,197 @@
+//! The solids of a scene as the sensor sees them: faces in the sensor's frame, prepared for the ray cast.
+//!
+//! All rays start in the origin of the sensor's frame. A face n·p ≤ w is therefore kept as m = n/w: along a direction d
+//! the plane is met at distance t with 1/t = m·d. In *inverse* distance u = 1/t a convex solid is met where
+//!
+//! ```text
+//!   u ≤ m·d  for each face that looks to the sensor (w < 0; the origin lies outside of it)
+//!   u ≥ m·d  for each other face,    and u > 0
+//! ```
+//!
+//! so that the nearest point of the solid is the least m·d over the faces that look to the sensor, without a division.
+
+use std::ops::Range;
+
+use nalgebra::{Isometry3, Point3, Vector3};
+
+use super::pattern::Pattern;
+use super::solid::{Solid, SolidFace};
+use super::{Material, Mirror, PointSource};
+
+/// A face closer to the sensor's centre than this is taken to be at this distance [m], so that n/w stays finite.
+const LEAST_OFFSET_M: f64 = 1e-4;
+/// Widening of a solid's bounds against rounding in single precision [°].
+const BOUND_MARGIN_DEG: f64 = 0.02;
+/// Bounds of elevation use a horizontal distance shortened by this share, for the tilt of the sensor's frame.
+const DISTANCE_MARGIN: f64 = 0.98;
+/// The least horizontal distance that bounds of elevation are worked out with [m].
+const LEAST_DISTANCE_M: f64 = 0.05;
+
+/// One face, ready for the ray cast.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Face {
+    /// n/w [1/m].
+    pub(crate) inverse: [f32; 3],
+    /// |w| [m].
+    pub(crate) offset_m: f32,
+    pub(crate) reflectivity: f32,
+    pub(crate) material: Material,
+    pub(crate) source: PointSource,
+}
+
+/// The faces of one solid within [`Targets::faces`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FaceRange {
+    /// Faces that look to the sensor: `first..turned`; the others: `turned..end`.
+    pub(crate) first: u32,
+    pub(crate) turned: u32,
+    pub(crate) end: u32,
+}
+
+impl FaceRange {
+    /// The faces that look to the sensor, as indices.
+    pub(crate) fn towards(self) -> Range<usize> {
+        self.first as usize..self.turned as usize
+    }
+
+    /// The faces turned away from it, as indices.
+    pub(crate) fn away(self) -> Range<usize> {
+        self.turned as usize..self.end as usize
+    }
+}
+
+/// One solid: its faces, and the beams that may meet it.
+#[derive(Clone, Debug)]
+pub(crate) struct Part {
+    pub(crate) faces: FaceRange,
+    pub(crate) columns: Range<usize>,
+    pub(crate) layers: Range<usize>,
+}
+
+/// What the faces of one thing have in common.
+#[derive(Clone, Copy)]
+pub(crate) struct Finish<'a> {
+    pub(crate) source: PointSource,
+    /// Reflectivity of each material [1].
+    pub(crate) reflectivity: &'a dyn Fn(Material) -> f64,
+}
+
+/// The beams of one scan, for finding those that a solid may meet.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Beams<'a> {
+    pub(crate) pattern: &'a Pattern,
+    pub(crate) mirror: Mirror,
+}
+
+/// All solids of a scene. The memory is reused from scan to scan.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Targets {
+    pub(crate) faces: Vec<Face>,
+    pub(crate) parts: Vec<Part>,
+}
+
+impl Targets {
+    pub(crate) fn clear(&mut self) {
+        self.faces.clear();
+        self.parts.clear();
+    }
+
+    /// Appends a solid, unless no beam can meet it from outside.
+    pub(crate) fn push(&mut self, beams: Beams<'_>, solid: &Solid, pose: &Isometry3<f64>, finish: Finish<'_>) {
+        let bounds = Bounds::of(solid, pose);
+        let columns = beams.pattern.columns_between(bounds.azimuth_deg[0], bounds.azimuth_deg[1]);
+        let layers = Pattern::layers_between(beams.mirror, bounds.elevation_deg[0], bounds.elevation_deg[1]);
+        if columns.is_empty() || layers.is_empty() {
+            return;
+        }
+        let faces = self.push_faces(solid, pose, finish);
+        if !faces.towards().is_empty() {
+            self.parts.push(Part { faces, columns, layers });
+        }
+    }
+
+    /// Appends the road's surface, z = 0 of the plane.
+    pub(crate) fn push_ground(&mut self, sensor_from_plane: &Isometry3<f64>, finish: Finish<'_>) {
+        let up = sensor_from_plane.rotation * Vector3::z();
+        let face = (up, up.dot(&sensor_from_plane.translation.vector), Material::Asphalt);
+        self.faces.push(prepared(face, finish));
+    }
+
+    /// Appends the faces of a solid with this pose in the sensor's frame, those that look to the sensor first.
+    #[expect(clippy::cast_possible_truncation, reason = "4 billion faces do not fit into memory")]
+    pub(crate) fn push_faces(&mut self, solid: &Solid, pose: &Isometry3<f64>, finish: Finish<'_>) -> FaceRange {
+        let first = self.faces.len() as u32;
+        self.faces.extend(placed_faces(solid, pose).filter(|face| face.1 < 0.0).map(|face| prepared(face, finish)));
+        let turned = self.faces.len() as u32;
+        self.faces.extend(placed_faces(solid, pose).filter(|face| face.1 >= 0.0).map(|face| prepared(face, finish)));
+        FaceRange { first, turned, end: self.faces.len() as u32 }
+    }
+}
+
+/// A face in the sensor's frame: unit normal, distance w of its plane [m], material.
+type PlacedFace = (Vector3<f64>, f64, Material);
+
+fn placed_faces(solid: &Solid, pose: &Isometry3<f64>) -> impl Iterator<Item = PlacedFace> {
+    let turn = pose.rotation.to_rotation_matrix();
+    let origin = pose.translation.vector;
+    solid.faces().iter().map(move |SolidFace { normal, offset_m, material }| {
+        let normal = turn * normal;
+        (normal, offset_m + normal.dot(&origin), *material)
+    })
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "the ray cast is in single precision: 1e-5 m at 200 m")]
+fn prepared((normal, offset_m, material): PlacedFace, finish: Finish<'_>) -> Face {
+    let offset_m = if offset_m < 0.0 { offset_m.min(-LEAST_OFFSET_M) } else { offset_m.max(LEAST_OFFSET_M) };
+    let inverse = normal / offset_m;
+    Face {
+        inverse: [inverse.x as f32, inverse.y as f32, inverse.z as f32],
+        offset_m: offset_m.abs() as f32,
+        reflectivity: (finish.reflectivity)(material) as f32,
+        material,
+        source: finish.source,
+    }
+}
+
+/// Azimuths and elevations between which a solid lies, in the sensor's frame [°]; rather too wide than too narrow.
+struct Bounds {
+    azimuth_deg: [f64; 2],
+    elevation_deg: [f64; 2],
+}
+
+impl Bounds {
+    fn of(solid: &Solid, pose: &Isometry3<f64>) -> Self {
+        let corners = corners(solid).map(|corner| pose * corner);
+        let fold = |of: fn(&Point3<f64>) -> f64| {
+            corners.iter().map(of).fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
+        };
+        let [bottom, top] = fold(|corner| corner.z);
+        let far = fold(|corner| corner.x.hypot(corner.y))[1];
+        let near = (distance_m(solid, pose) * DISTANCE_MARGIN).max(LEAST_DISTANCE_M);
+        let above = |z: f64, least: f64, most: f64| (z / if z > 0.0 { least } else { most }).atan().to_degrees();
+        // The azimuth jumps by a full turn where the solid crosses the half-plane before E's rear.
+        let crosses = fold(|corner| corner.x)[0] <= 0.0 && {
+            let [right, left] = fold(|corner| corner.y);
+            right <= 0.0 && left >= 0.0
+        };
+        let azimuth = if crosses { [-180.0, 180.0] } else { fold(|corner| corner.y.atan2(corner.x).to_degrees()) };
+        Self {
+            azimuth_deg: [azimuth[0] - BOUND_MARGIN_DEG, azimuth[1] + BOUND_MARGIN_DEG],
+            elevation_deg: [above(bottom, far, near) - BOUND_MARGIN_DEG, above(top, near, far) + BOUND_MARGIN_DEG],
+        }
+    }
+}
+
+fn corners(solid: &Solid) -> [Point3<f64>; 8] {
+    std::array::from_fn(|index| {
+        let pick = |axis: usize| if index >> axis & 1 == 0 { solid.low[axis] } else { solid.high[axis] };
+        Point3::new(pick(0), pick(1), pick(2))
+    })
+}
+
+/// Horizontal distance of the sensor from the solid's box [m], seen in the solid's own frame.
+fn distance_m(solid: &Solid, pose: &Isometry3<f64>) -> f64 {
+    let sensor = pose.inverse() * Point3::origin();
+    let beyond = |axis: usize| (solid.low[axis] - sensor[axis]).max(sensor[axis] - solid.high[axis]).max(0.0);
+    beyond(0).hypot(beyond(1))
+}

@@ -1,0 +1,142 @@
+//! Where the sensor is and where it looks, at each instant of a sweep.
+//!
+//! Frames: the *plane*; *E's vehicle frame*, level, origin on the ground below E's centre; the *sensor's frame*, which
+//! looks back: x along its axis, y to E's right, z up, both tilted with E's body.
+//!
+//! ```text
+//!        level frame of E            x_s = (−cos a, 0, sin a)
+//!          z                         y_s = (0, −1, 0)               a = pitch (nose down) + tilt
+//!          │   x ──▶ travel          z_s = (sin a, 0, cos a)
+//! ```
+//!
+//! A nose-down pitch p turns E's body about its origin: the rear rises, and the beams turn up by p.
+
+use closecall_traffic::PlanePose;
+use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+
+use super::Lidar;
+use crate::Scene;
+
+/// E at the end of a sweep, and how it moved during it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Viewpoint {
+    ego: PlanePose,
+    speed_mps: f64,
+    yaw_rate_radps: f64,
+    /// The sensor in E's level frame [m].
+    pub(crate) sensor_m: Vector3<f64>,
+    /// Angle of the sensor's axis above the horizontal [rad].
+    pub(crate) axis_rad: f64,
+}
+
+/// A planar motion of E from one instant of the sweep to its end: turns and shifts a point of the earlier frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Deskew {
+    pub(crate) cos: f64,
+    pub(crate) sin: f64,
+    pub(crate) x_m: f64,
+    pub(crate) y_m: f64,
+}
+
+impl Viewpoint {
+    pub(crate) fn new(scene: &Scene<'_>, lidar: &Lidar) -> Self {
+        let ego = &scene.ego;
+        let state = &ego.state;
+        Self {
+            ego: scene.road.plane_pose(state.s_m, state.d_m, state.heading_rad),
+            speed_mps: state.speed_mps,
+            yaw_rate_radps: state.yaw_rate_radps,
+            sensor_m: sensor_m(0.5 * ego.vehicle.dimensions.length_m, lidar.mount_height_m, ego.pitch_rad),
+            axis_rad: ego.pitch_rad + lidar.tilt_rad,
+        }
+    }
+
+    /// E's pose `before_s` before the end of the sweep, by its speed and yaw rate.
+    fn ego_at(&self, before_s: f64) -> PlanePose {
+        let turned = self.yaw_rate_radps * before_s;
+        let (sin, cos) = (self.ego.yaw_rad - 0.5 * turned).sin_cos();
+        let way = self.speed_mps * before_s;
+        PlanePose { x_m: self.ego.x_m - way * cos, y_m: self.ego.y_m - way * sin, yaw_rad: self.ego.yaw_rad - turned }
+    }
+
+    /// From the plane to the sensor's frame, `before_s` before the end of the sweep.
+    pub(crate) fn sensor_from_plane(&self, before_s: f64) -> Isometry3<f64> {
+        let level_from_plane = in_plane(self.ego_at(before_s), 0.0).inverse();
+        let turn = UnitQuaternion::from_rotation_matrix(&sensor_axes(self.axis_rad));
+        Isometry3::from_parts(Translation3::from(-(turn * self.sensor_m)), turn) * level_from_plane
+    }
+
+    /// What carries a point from E's frame `before_s` before the end of the sweep to E's frame at its end.
+    pub(crate) fn deskew(&self, before_s: f64) -> Deskew {
+        let turned = self.yaw_rate_radps * before_s;
+        let way = self.speed_mps * before_s;
+        let (sin, cos) = turned.sin_cos();
+        let (half_sin, half_cos) = (0.5 * turned).sin_cos();
+        Deskew { cos, sin: -sin, x_m: -way * half_cos, y_m: way * half_sin }
+    }
+}
+
+/// The sensor in E's level frame [m], mounted `back_m` behind E's origin.
+pub(crate) fn sensor_m(back_m: f64, height_m: f64, pitch_rad: f64) -> Vector3<f64> {
+    let (sin, cos) = pitch_rad.sin_cos();
+    Vector3::new(-back_m * cos + height_m * sin, 0.0, back_m * sin + height_m * cos)
+}
+
+/// The rotation from E's level frame to the sensor's, whose axis points `axis_rad` above the horizontal.
+fn sensor_axes(axis_rad: f64) -> Rotation3<f64> {
+    let (sin, cos) = axis_rad.sin_cos();
+    Rotation3::from_matrix_unchecked(Matrix3::new(-cos, 0.0, sin, 0.0, -1.0, 0.0, sin, 0.0, cos))
+}
+
+/// From the frame of a thing at `pose`, pitched nose down by `pitch_rad`, to the plane.
+pub(crate) fn in_plane(pose: PlanePose, pitch_rad: f64) -> Isometry3<f64> {
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), pose.yaw_rad)
+        * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), pitch_rad);
+    Isometry3::from_parts(Translation3::new(pose.x_m, pose.y_m, 0.0), turn)
+}
+
+#[cfg(test)]
+mod tests {
+    use closecall_traffic::{Environment, Road, Time, Vehicle, VehicleClass, VehicleState};
+    use nalgebra::Point3;
+
+    use super::*;
+    use crate::SceneVehicle;
+
+    fn viewpoint(speed_mps: f64, yaw_rate_radps: f64, pitch_rad: f64) -> Viewpoint {
+        let state = VehicleState { speed_mps, yaw_rate_radps, d_m: -5.6, ..VehicleState::default() };
+        let vehicle = Vehicle::typical(VehicleClass::Car);
+        let ego = SceneVehicle { actor: 0, vehicle, state, pitch_rad };
+        let (road, environment) = (Road::straight(3), Environment::CLEAR_DAY);
+        let scene = Scene { time: Time::ZERO, road: &road, environment: &environment, ego, others: &[] };
+        Viewpoint::new(&scene, &Lidar::default())
+    }
+
+    #[test]
+    fn a_thing_behind_lies_on_the_axis() {
+        let seen = viewpoint(0.0, 0.0, 0.0).sensor_from_plane(0.0) * Point3::new(-12.3, -5.6, 0.6);
+        assert!((seen - Point3::new(10.0, 0.0, 0.0)).norm() < 1e-12, "{seen}");
+    }
+
+    #[test]
+    fn braking_lifts_the_sensor_and_turns_it_up() {
+        let pitch = 0.02;
+        let view = viewpoint(0.0, 0.0, pitch);
+        assert!((view.sensor_m.z - (0.6 * pitch.cos() + 2.3 * pitch.sin())).abs() < 1e-12);
+        // A point at the sensor's own height, 10 m back, now lies below the axis by p.
+        let seen = view.sensor_from_plane(0.0) * Point3::new(view.sensor_m.x - 10.0, -5.6, view.sensor_m.z);
+        assert!((seen.z.atan2(seen.x) + pitch).abs() < 1e-12);
+    }
+
+    #[test]
+    fn deskewing_undoes_the_motion_of_e() {
+        let view = viewpoint(30.0, 0.1, 0.0);
+        let (before, point) = (0.0123, Point3::new(-40.0, -2.0, 0.0));
+        let earlier = in_plane(view.ego_at(before), 0.0).inverse() * point;
+        let latest = in_plane(view.ego_at(0.0), 0.0).inverse() * point;
+        let to = view.deskew(before);
+        let x = to.cos * earlier.x - to.sin * earlier.y + to.x_m;
+        let y = to.sin * earlier.x + to.cos * earlier.y + to.y_m;
+        assert!((x - latest.x).abs() < 1e-9 && (y - latest.y).abs() < 1e-9, "{x} {y} {latest}");
+    }
+}
