@@ -148,8 +148,18 @@ fn pool(jobs: Option<u16>) -> Result<ThreadPool, CliError> {
         .map_err(|error| CliError::Threads { jobs, message: error.to_string() })
 }
 
-/// Wall times [s] of one sample: scenario, sample, controller's place, time.
-pub(super) type Timing = (usize, u64, usize, f64);
+/// What one sample cost in one arm.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Timing {
+    /// Place of the scenario in the campaign.
+    pub(super) scenario: usize,
+    /// Number of the sample.
+    pub(super) sample: u64,
+    /// Place of the arm in the campaign.
+    pub(super) arm: usize,
+    /// Wall time [s].
+    pub(super) wall_s: f64,
+}
 
 fn run_all(
     args: &CampaignArgs,
@@ -171,7 +181,8 @@ fn run_all(
             if let Some(journal) = &mut journal {
                 journal.append(&finished.record)?;
                 let sample = finished.record.sample;
-                timings.extend(finished.wall_s.iter().enumerate().map(|(arm, wall_s)| (place, sample, arm, *wall_s)));
+                let timing = |(arm, wall_s): (usize, &f64)| Timing { scenario: place, sample, arm, wall_s: *wall_s };
+                timings.extend(finished.wall_s.iter().enumerate().map(timing));
             }
             summary.take(&finished, ego);
             bar.inc(1);

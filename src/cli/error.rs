@@ -1,6 +1,6 @@
 //! Whatever keeps a command from its result, and what the program then ends with.
 
-use closecall_scenarios::recordings::RecordingError;
+use closecall_scenarios::recordings::{RecordingError, WriteError as RecordingWriteError};
 use miette::Diagnostic;
 
 use crate::campaign::folder::FolderError;
@@ -19,6 +19,9 @@ pub enum CliError {
     /// A recording cannot be used.
     #[error(transparent)]
     Recording(#[from] RecordingError),
+    /// A recording cannot be written.
+    #[error(transparent)]
+    WriteRecording(#[from] RecordingWriteError),
     /// A campaign's folder cannot be used.
     #[error(transparent)]
     Folder(#[from] FolderError),
@@ -57,13 +60,14 @@ impl From<&CliError> for ExitCode {
     fn from(error: &CliError) -> Self {
         match error {
             CliError::Scenario(error) => Self::from(error),
+            CliError::Recording(error) if error.is_io() => Self::Io,
             CliError::Recording(_) => Self::InvalidInput,
             CliError::Folder(error) => match error {
                 FolderError::Write(_) => Self::Io,
                 FolderError::OtherCampaign { .. } | FolderError::NotACampaign { .. } => Self::Usage,
                 FolderError::Read { .. } | FolderError::Content { .. } => Self::InvalidInput,
             },
-            CliError::Write(_) | CliError::Record(_) | CliError::Threads { .. } => Self::Io,
+            CliError::Write(_) | CliError::Record(_) | CliError::WriteRecording(_) | CliError::Threads { .. } => Self::Io,
             CliError::Sample { .. } => Self::SampleError,
             CliError::Usage { .. } => Self::Usage,
         }

@@ -1,6 +1,6 @@
 //! `closecall replay`: one sample of a campaign again, bit for bit.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
@@ -67,8 +67,25 @@ fn choose<'a>(manifest: &'a Manifest, name: Option<&str>) -> Result<&'a Manifest
     }
 }
 
+/// Runs a sample of the arm under test again and records it.
+pub(super) fn record_sample(
+    folder: &Folder,
+    manifest: &Manifest,
+    scenario: &str,
+    sample: u64,
+    path: &Path,
+) -> Result<(), CliError> {
+    let file = scenario_file(folder, choose(manifest, Some(scenario))?)?;
+    let fail = |source| CliError::Sample { sample, source };
+    let concrete = concrete(&file, manifest.sampling, sample).map_err(fail)?;
+    let key = RunKey { seed: manifest.sampling.seed, sample };
+    let watch = WatchArgs { record: Some(path.to_owned()), trace: None };
+    run_watched(&concrete, key, &chosen_arm(manifest, None)?, &watch)?;
+    Ok(())
+}
+
 /// The scenario as the campaign ran it.
-pub(super) fn scenario_file(folder: &Folder, scenario: &ManifestScenario) -> Result<ScenarioFile, CliError> {
+fn scenario_file(folder: &Folder, scenario: &ManifestScenario) -> Result<ScenarioFile, CliError> {
     let path = folder.file(&format!("manifest.json#{}", scenario.name));
     Ok(ScenarioFile::parse(&path, &scenario.text, &[])?)
 }

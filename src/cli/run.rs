@@ -1,6 +1,6 @@
 //! `closecall run`: one sample of a scenario.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use closecall_scenarios::sampling::Design;
@@ -180,10 +180,4 @@ impl std::fmt::Display for Human<'_> {
             Err(absent) => writeln!(f, "  MIS: {absent}"),
         }
     }
-}
-
-/// The folder that a path lies in.
-#[must_use]
-pub(super) fn folder_of(path: &Path) -> &Path {
-    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }

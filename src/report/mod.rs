@@ -4,6 +4,7 @@ pub mod junit;
 pub mod outcomes;
 pub mod rerun;
 pub mod trace;
+pub mod traffic;
 mod write;
 
 pub use write::{WriteError, write_atomically};

@@ -141,7 +141,9 @@ impl Family {
             | Quantity::LaneChangeDuration
             | Quantity::LaneChangeWidth
             | Quantity::Closing
-            | Quantity::FrontThw => Self::LogNormal,
+            | Quantity::CriticalCutOutThw
+            | Quantity::FrontThw
+            | Quantity::CriticalFrontThw => Self::LogNormal,
         }
     }
 

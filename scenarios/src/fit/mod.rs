@@ -1,7 +1,7 @@
 //! From recordings to the distributions of a logical scenario.
 //!
 //! ```text
-//!   recordings ─▶ lane changes, car following ─▶ samples of seven quantities ─▶ quantiles, parametric forms, intervals ─▶ TOML
+//!   recordings ─▶ lane changes, car following ─▶ samples of nine quantities ─▶ quantiles, parametric forms, intervals ─▶ TOML
 //! ```
 //!
 //! # The quantities
@@ -9,11 +9,13 @@
 //! | name                     | one value for each                     | what                                              |
 //! |--------------------------|----------------------------------------|---------------------------------------------------|
 //! | `cut-out-thw-s`          | lane change to the left, with a lead   | headway to the vehicle that is pulled out from behind, when the centre crosses the marking |
+//! | `critical-cut-out-thw-s` | the same, where it is critical          | the same, below the critical 0.9 s                |
 //! | `lane-change-duration-s` | complete lane change                   | duration of the whole manoeuvre                   |
 //! | `lane-change-width-s`    | complete lane change                   | width of its peak of lateral speed, as published  |
 //! | `closing-mps`            | lane change to the left, approaching   | closing speed to that vehicle when the manoeuvre starts |
 //! | `crossing-mps`           | lane change                            | speed when the centre crosses the marking         |
 //! | `front-thw-s`            | pair of follower and lead              | median headway while following                    |
+//! | `critical-front-thw-s`   | the same, where it is critical          | the same, below the critical 0.9 s                |
 //! | `following-mps`          | pair of follower and lead              | median speed while following                      |
 //!
 //! To the left, because that is where one overtakes. A vehicle counts as following, and as pulling out from behind a

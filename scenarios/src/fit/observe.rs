@@ -6,6 +6,7 @@ use closecall_traffic::metrics::time_headway_s;
 use closecall_traffic::{Lane, Side, Time, Trajectory, TrajectoryPoint};
 
 use super::distribution::median;
+use crate::criticality::CRITICAL_THW_S;
 use crate::filters::{PERIOD, SmoothedRecording};
 use crate::lane_change::{LaneChange, detect};
 
@@ -20,6 +21,8 @@ const MIN_FOLLOWING: Time = Time::from_ms(2_000);
 pub enum Quantity {
     /// Headway to the old lane's lead when the marking is crossed [s].
     CutOutThw,
+    /// The same, of those below the critical headway [s].
+    CriticalCutOutThw,
     /// Duration of complete lane changes [s].
     LaneChangeDuration,
     /// Peak width of complete lane changes [s].
@@ -30,19 +33,23 @@ pub enum Quantity {
     CrossingSpeed,
     /// Headway while following [s].
     FrontThw,
+    /// The same, of those below the critical headway [s].
+    CriticalFrontThw,
     /// Speed while following [m/s].
     FollowingSpeed,
 }
 
 impl Quantity {
     /// Every quantity, in the order of output.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 9] = [
         Self::CutOutThw,
+        Self::CriticalCutOutThw,
         Self::LaneChangeDuration,
         Self::LaneChangeWidth,
         Self::Closing,
         Self::CrossingSpeed,
         Self::FrontThw,
+        Self::CriticalFrontThw,
         Self::FollowingSpeed,
     ];
 
@@ -50,11 +57,13 @@ impl Quantity {
     pub const fn name(self) -> &'static str {
         match self {
             Self::CutOutThw => "cut-out-thw-s",
+            Self::CriticalCutOutThw => "critical-cut-out-thw-s",
             Self::LaneChangeDuration => "lane-change-duration-s",
             Self::LaneChangeWidth => "lane-change-width-s",
             Self::Closing => "closing-mps",
             Self::CrossingSpeed => "crossing-mps",
             Self::FrontThw => "front-thw-s",
+            Self::CriticalFrontThw => "critical-front-thw-s",
             Self::FollowingSpeed => "following-mps",
         }
     }
@@ -63,11 +72,13 @@ impl Quantity {
     pub const fn meaning(self) -> &'static str {
         match self {
             Self::CutOutThw => "headway to the old lane's lead at the crossing, lane changes to the left, at most 3 s",
+            Self::CriticalCutOutThw => "those of cut-out-thw-s that are critical: below 0.9 s",
             Self::LaneChangeDuration => "whole manoeuvre of complete lane changes",
             Self::LaneChangeWidth => "peak width of complete lane changes",
             Self::Closing => "closing speed to the old lane's lead at the start, lane changes to the left, approaching",
             Self::CrossingSpeed => "speed at the crossing of all lane changes",
             Self::FrontThw => "median headway of each pair that follows for 2 s or more, at most 3 s",
+            Self::CriticalFrontThw => "those of front-thw-s that are critical: below 0.9 s",
             Self::FollowingSpeed => "median speed of each pair that follows for 2 s or more",
         }
     }
@@ -94,6 +105,14 @@ impl Samples {
 
     fn push(&mut self, quantity: Quantity, value: f64) {
         self.values.entry(quantity).or_default().push(value);
+    }
+
+    /// A headway under its own quantity, and under the critical one's where it is critical.
+    fn push_headway(&mut self, [all, critical]: [Quantity; 2], thw_s: f64) {
+        self.push(all, thw_s);
+        if thw_s < CRITICAL_THW_S {
+            self.push(critical, thw_s);
+        }
     }
 }
 
@@ -122,7 +141,7 @@ fn observe_lane_change(recording: &SmoothedRecording, change: &LaneChange, sampl
     if thw_s > FOLLOWING_THW_S {
         return;
     }
-    samples.push(Quantity::CutOutThw, thw_s);
+    samples.push_headway([Quantity::CutOutThw, Quantity::CriticalCutOutThw], thw_s);
     // The same lead when the manoeuvre starts, or as early as both are recorded.
     let own = &recording.trajectories[lead.own_place];
     let other = &recording.trajectories[lead.lead_place];
@@ -177,7 +196,7 @@ fn observe_following(recording: &SmoothedRecording, samples: &mut Samples) {
             continue;
         }
         let (headways, speeds): (Vec<f64>, Vec<f64>) = instants.into_iter().unzip();
-        samples.push(Quantity::FrontThw, median(headways));
+        samples.push_headway([Quantity::FrontThw, Quantity::CriticalFrontThw], median(headways));
         samples.push(Quantity::FollowingSpeed, median(speeds));
     }
 }

@@ -1,0 +1,206 @@
+//! `closecall lane-changes`, `criticality` and `fit`: from recorded traffic to distributions.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use closecall_scenarios::criticality::{CriticalLaneChange, criticality as evaluate, shares};
+use closecall_scenarios::filters::smooth;
+use closecall_scenarios::fit::{Heading, fit as fit_distributions, to_toml, write_toml};
+use closecall_scenarios::lane_change::{LaneChange, detect};
+use closecall_scenarios::recordings::{Recording, quality, read};
+
+use super::CliError;
+use super::args::Format;
+use crate::exit_code::ExitCode;
+use crate::report::WriteError;
+
+/// How lane changes are found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum Criterion {
+    /// Peaks of the lateral speed
+    #[default]
+    Peak,
+}
+
+/// Arguments of `closecall lane-changes`.
+#[derive(Debug, Args)]
+pub(super) struct LaneChangesArgs {
+    /// Recording: NGSIM's columns in feet, or the plain CSV that `closecall record` writes; gzip is accepted
+    recording: PathBuf,
+    /// How lane changes are found
+    #[arg(long, value_enum, default_value_t)]
+    criterion: Criterion,
+    /// Output for people or for programs
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+/// Arguments of `closecall criticality`.
+#[derive(Debug, Args)]
+pub(super) struct CriticalityArgs {
+    /// Recording
+    recording: PathBuf,
+    /// Speed limit [m/s]; 120 km/h where absent
+    #[arg(long, value_name = "M/S", value_parser = positive)]
+    speed_limit_mps: Option<f64>,
+    /// Output for people or for programs
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+/// Arguments of `closecall fit`.
+#[derive(Debug, Args)]
+pub(super) struct FitArgs {
+    /// Recordings
+    #[arg(required = true)]
+    recordings: Vec<PathBuf>,
+    /// File to write
+    #[arg(short, long, value_name = "FILE.toml")]
+    output: Option<PathBuf>,
+    /// Where the recordings come from, for the file's heading
+    #[arg(long, default_value = "")]
+    provenance: String,
+    /// Seed of the bootstrap
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Output for people (the file's text) or for programs
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err(format!("`{text}` is not a number above 0")),
+    }
+}
+
+pub(super) fn lane_changes(args: &LaneChangesArgs) -> Result<ExitCode, CliError> {
+    let Criterion::Peak = args.criterion;
+    let recording = read(&args.recording)?;
+    let changes = detect(&smooth(&recording));
+    match args.format {
+        Format::Json => println!("{:#}", serde_json::json!(changes)),
+        Format::Human => {
+            describe(&recording);
+            println!("track  class       direction  lanes   crossing   duration   speed    complete");
+            for change in &changes {
+                println!("{}", line(change));
+            }
+            let complete = changes.iter().filter(|change| change.complete).count();
+            println!("{} lane changes, {complete} of them complete", changes.len());
+        }
+    }
+    Ok(ExitCode::Pass)
+}
+
+fn describe(recording: &Recording) {
+    let quality = quality(recording);
+    println!(
+        "{}: {} tracks of {} vehicles, {} instants every {}; {} gaps, {} jumps, {} overlaps",
+        recording.name,
+        quality.tracks,
+        quality.vehicles,
+        quality.instants,
+        recording.period,
+        quality.gaps,
+        quality.jumps,
+        quality.overlaps,
+    );
+}
+
+fn line(change: &LaneChange) -> String {
+    let direction = match change.direction {
+        closecall_traffic::Side::Left => "left",
+        closecall_traffic::Side::Right => "right",
+    };
+    format!(
+        "{:>5}  {:<10}  {direction:<9}  {} to {}  {:>7.2} s  {:>7.2} s  {:>5.1} m/s  {}",
+        change.track_id,
+        change.vehicle_class.name(),
+        change.from_lane,
+        change.to_lane,
+        change.crossing_s,
+        change.duration_s,
+        change.speed_mps,
+        if change.complete { "yes" } else { "no" },
+    )
+}
+
+pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> {
+    let recording = read(&args.recording)?;
+    let changes = evaluate(&smooth(&recording), args.speed_limit_mps);
+    match args.format {
+        Format::Json => println!("{:#}", serde_json::json!(changes)),
+        Format::Human => {
+            describe(&recording);
+            print_metrics(&changes);
+        }
+    }
+    Ok(ExitCode::Pass)
+}
+
+fn print_metrics(changes: &[CriticalLaneChange]) {
+    for change in changes {
+        println!("{}", line(&change.lane_change));
+        for (name, metric) in change.metrics.named() {
+            let mark = if metric.is_critical() { "  CRITICAL" } else { "" };
+            match metric.value() {
+                Some(value) => println!("         {name:<12} {value:>9.2}{mark}"),
+                None => println!("         {name:<12}         -"),
+            }
+        }
+    }
+    let shares = shares(changes);
+    println!("of {} lane changes, critical:", shares.lane_changes);
+    for share in &shares.metrics {
+        let percent = share.share.map_or("-".to_owned(), |share| format!("{:.0} %", 100.0 * share));
+        println!("  {:<12} {:>4}  {percent:>6}  ({} absent)", share.metric, share.critical, share.absent);
+    }
+    println!("  {:<12} {:>4}", "any", shares.any);
+}
+
+pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
+    let recordings = args.recordings.iter().map(|path| read(path)).collect::<Result<Vec<_>, _>>()?;
+    let fitted = fit_distributions(&recordings, args.seed);
+    let command = std::iter::once("closecall".to_owned()).chain(std::env::args().skip(1)).collect::<Vec<_>>().join(" ");
+    let heading = Heading { command, provenance: args.provenance.clone() };
+    if let Some(path) = &args.output {
+        write_toml(&fitted, &heading, path).map_err(|source| WriteError::new(path, source))?;
+    }
+    match (args.format, &args.output) {
+        (Format::Json, _) => println!("{:#}", json(&fitted)),
+        (Format::Human, None) => print!("{}", to_toml(&fitted, &heading)),
+        (Format::Human, Some(path)) => {
+            for quantity in &fitted.fitted {
+                println!("{:<24} n = {:>4}, median {:.3}", quantity.quantity.name(), quantity.n, quantity.median);
+            }
+            for (quantity, n) in &fitted.too_few {
+                println!("{:<24} n = {n:>4}, too few to fit", quantity.name());
+            }
+            println!("written to {}", path.display());
+        }
+    }
+    Ok(ExitCode::Pass)
+}
+
+fn json(fitted: &closecall_scenarios::fit::FittedDistributions) -> serde_json::Value {
+    let quantity = |quantity: &closecall_scenarios::fit::FittedQuantity| {
+        serde_json::json!({
+            "name": quantity.quantity.name(),
+            "n": quantity.n,
+            "median": quantity.median,
+            "interval_95": quantity.interval_95,
+            "quantiles": quantity.quantiles,
+        })
+    };
+    let too_few = |(quantity, n): &(closecall_scenarios::fit::Quantity, usize)| {
+        serde_json::json!({ "name": quantity.name(), "n": n })
+    };
+    serde_json::json!({
+        "recordings": fitted.recordings.iter().map(|(name, _)| name).collect::<Vec<_>>(),
+        "seed": fitted.seed,
+        "fitted": fitted.fitted.iter().map(quantity).collect::<Vec<_>>(),
+        "too_few": fitted.too_few.iter().map(too_few).collect::<Vec<_>>(),
+    })
+}

@@ -1,0 +1,120 @@
+//! What the program ends with.
+
+use std::fs;
+use std::path::PathBuf;
+
+use crate::support::{closecall, code, folder, headline_with, json, library, stderr, stdout};
+
+fn written(folder: &tempfile::TempDir, text: &str) -> PathBuf {
+    let path = folder.path().join("scenario.toml");
+    fs::write(&path, text).unwrap();
+    path
+}
+
+#[test]
+fn the_gate_fails_where_someone_collided_and_passes_where_nobody_did() {
+    let headline = library("low-thw-overtake");
+    let headline = headline.to_str().unwrap();
+    let failed = closecall(["campaign", headline, "-n", "60", "--controller", "acc", "--max-collisions", "0"]);
+    let text = stdout(&failed, 1);
+    assert!(text.contains("FAIL"), "{text}");
+    let harmless = library("overtake-without-brake");
+    let passed = closecall(["campaign", harmless.to_str().unwrap(), "-n", "60", "--max-collisions", "0"]);
+    assert!(stdout(&passed, 0).contains("PASS"));
+}
+
+#[test]
+fn paired_gates_judge_the_arm_under_test() {
+    let headline = library("low-thw-overtake");
+    let args = ["campaign", headline.to_str().unwrap(), "-n", "100", "--paired", "--format", "json", "--max-collisions"];
+    let report = json(&closecall(args.into_iter().chain(["100"])), 0);
+    let collisions = |arm: &str| report["controllers"][arm]["collisions"].as_u64().unwrap();
+    assert!(collisions("acc") > collisions("mis"));
+    // As many as the arm under test has pass, although the baseline has more.
+    let allowed = collisions("mis").to_string();
+    stdout(&closecall(args.into_iter().chain([allowed.as_str()])), 0);
+}
+
+#[test]
+fn a_broken_scenario_names_file_line_and_key() {
+    let folder = folder();
+    let text = headline_with("friction = 0.9", "friction = -0.9");
+    let line = text.lines().position(|line| line.contains("friction = -0.9")).unwrap() + 1;
+    let path = written(&folder, &text);
+    let output = closecall(["campaign", path.to_str().unwrap(), "-n", "10"]);
+    assert_eq!(code(&output), 3);
+    let message = stderr(&output).replace(['\n', '│'], " ").split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(message.contains(&format!("scenario.toml:{line}")), "{message}");
+    assert!(message.contains("environment.friction"), "{message}");
+    assert!(message.contains("-0.9") && message.contains("0.1 to 1.2"), "{message}");
+    assert!(output.stdout.is_empty());
+}
+
+#[test]
+fn a_folder_that_cannot_be_written_is_found_before_any_work() {
+    let folder = folder();
+    let file = folder.path().join("file");
+    fs::write(&file, "in the way").unwrap();
+    let out = file.join("out");
+    let headline = library("low-thw-overtake");
+    // So many samples would take longer than any test may.
+    let args = ["campaign", headline.to_str().unwrap(), "-n", "100000000", "--out", out.to_str().unwrap()];
+    let output = closecall(args);
+    assert_eq!(code(&output), 6, "{}", stderr(&output));
+}
+
+#[test]
+fn a_folder_with_something_else_in_it_is_left_alone() {
+    let folder = folder();
+    let out = folder.path().join("out");
+    fs::create_dir(&out).unwrap();
+    fs::write(out.join("thesis.tex"), "do not lose this").unwrap();
+    let headline = library("low-thw-overtake");
+    let run = |out: &str| closecall(["campaign", headline.to_str().unwrap(), "-n", "2", "--out", out]);
+    assert_eq!(code(&run(out.to_str().unwrap())), 2);
+    assert_eq!(fs::read_dir(&out).unwrap().count(), 1);
+    let other = folder.path().join("other");
+    stdout(&run(other.to_str().unwrap()), 0);
+    let manifest = fs::read(other.join("manifest.json")).unwrap();
+    let again = closecall(["campaign", headline.to_str().unwrap(), "-n", "3", "--out", other.to_str().unwrap()]);
+    assert_eq!(code(&again), 2, "{}", stderr(&again));
+    assert_eq!(fs::read(other.join("manifest.json")).unwrap(), manifest);
+}
+
+#[test]
+fn wrong_usage_is_2() {
+    let headline = library("low-thw-overtake");
+    let headline = headline.to_str().unwrap();
+    for args in [
+        vec!["campaign"],
+        vec!["campaign", headline, "-n", "0"],
+        vec!["campaign", headline, "-n", "-3"],
+        vec!["campaign", headline, "--jobs", "0"],
+        vec!["campaign", headline, "--design", "latin"],
+        vec!["campaign", headline, "--max-induced", "1"],
+        vec!["campaign", headline, headline],
+        vec!["campaign", headline, "--paired", "--controller", "acc"],
+        vec!["run", headline, "--controller", "hope"],
+        vec!["run", headline, "--set", "nonsense"],
+        vec!["run", headline, "--set", "actor.nobody.id=x"],
+        vec!["fly"],
+    ] {
+        let output = closecall(&args);
+        assert_eq!(code(&output), 2, "{args:?}: {}", stderr(&output));
+        assert!(!stderr(&output).is_empty());
+    }
+}
+
+#[test]
+fn a_replay_of_what_is_not_there_says_so() {
+    let folder = folder();
+    let out = folder.path().join("out");
+    let headline = library("low-thw-overtake");
+    stdout(&closecall(["campaign", headline.to_str().unwrap(), "-n", "4", "--out", out.to_str().unwrap()]), 0);
+    assert_eq!(code(&closecall(["replay", out.to_str().unwrap(), "4"])), 2);
+    assert_eq!(code(&closecall(["replay", folder.path().to_str().unwrap(), "0"])), 3);
+    fs::write(out.join("manifest.json"), "{\"manifest_version\": 1").unwrap();
+    let output = closecall(["replay", out.to_str().unwrap(), "0"]);
+    assert_eq!(code(&output), 3);
+    assert!(stderr(&output).contains("manifest.json"));
+}

@@ -1,0 +1,144 @@
+//! Sanity of the gate: it must tell a system that helps from one that does nothing, harms, or comes too late.
+
+use std::sync::Arc;
+
+use closecall::campaign::runner::{Finished, Sampling, run_samples};
+use closecall::campaign::summary::{Counts, Summary};
+use closecall::controller::BuiltIn;
+use closecall::scenario::ScenarioFile;
+use closecall::simulation::{Arm, ControllerFactory};
+use closecall_controllers::{
+    ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack, EgoState,
+};
+use closecall_scenarios::sampling::Design;
+use closecall_sensors::SensorMode;
+use closecall_traffic::Time;
+
+use crate::support::library;
+
+const SAMPLES: u64 = 200;
+const SEED: u64 = 1;
+
+/// How a controller spoils the commands of the margin increase system.
+#[derive(Clone, Copy)]
+enum Fault {
+    /// The margin increase system accelerates where it should brake.
+    SignFlipped,
+    /// It brakes gently all the time.
+    AlwaysBrakes,
+    /// It acts 5 s late.
+    FiveSecondsLate,
+}
+
+impl ControllerFactory for Fault {
+    fn name(&self) -> &str {
+        match self {
+            Self::SignFlipped => "sign-flipped",
+            Self::AlwaysBrakes => "always-brakes",
+            Self::FiveSecondsLate => "late",
+        }
+    }
+
+    fn has_mis(&self, settings: &EgoSettings) -> bool {
+        settings.mis().is_some()
+    }
+
+    fn build(&self, settings: &EgoSettings) -> Box<dyn EgoController> {
+        let without = EgoStack::new(settings.without_mis());
+        Box::new(Faulty { fault: *self, stack: EgoStack::new(*settings), without, engaged_at: None })
+    }
+}
+
+struct Faulty {
+    fault: Fault,
+    stack: EgoStack,
+    without: EgoStack,
+    engaged_at: Option<Time>,
+}
+
+/// The constant braking of a controller that always brakes [m/s²].
+const ALWAYS_MPS2: f64 = -2.0;
+
+impl EgoController for Faulty {
+    fn step(&mut self, input: &EgoInput<'_>) -> Result<EgoCommand, ControllerError> {
+        let command = self.stack.step(input)?;
+        let base = self.without.step(input)?;
+        let is_active = matches!(command.state, EgoState::Increasing | EgoState::Holding);
+        if is_active {
+            self.engaged_at.get_or_insert(input.time);
+        }
+        Ok(match self.fault {
+            Fault::SignFlipped if command.state == EgoState::Increasing => {
+                EgoCommand { acceleration_mps2: -command.acceleration_mps2, ..command }
+            }
+            Fault::SignFlipped => command,
+            Fault::AlwaysBrakes => {
+                EgoCommand { acceleration_mps2: base.acceleration_mps2.min(ALWAYS_MPS2), ..command }
+            }
+            Fault::FiveSecondsLate => match self.engaged_at {
+                Some(since) if input.time >= since + Time::from_ms(5_000) => command,
+                _ => EgoCommand { state: command.state, ..base },
+            },
+        })
+    }
+}
+
+fn counts(name: &str, tested: Arc<dyn ControllerFactory>) -> Counts {
+    let file = ScenarioFile::load(&library(name), &[]).unwrap();
+    let sampling = Sampling { seed: SEED, design: Design::Random, samples: SAMPLES };
+    let arm = |controller| Arm { controller, sensors: Some(SensorMode::Object) };
+    let arms = [arm(BuiltIn::Acc.factory()), arm(tested)];
+    let pool = rayon::ThreadPoolBuilder::new().build().unwrap();
+    let mut summary = Summary::new(vec!["acc".to_owned(), "tested".to_owned()]);
+    summary.begin(name);
+    let ego = file.ego_id().unwrap();
+    run_samples(&pool, &file, sampling, &arms, 0..SAMPLES, |finished: Finished| {
+        summary.take(&finished, ego);
+        Ok::<(), ()>(())
+    })
+    .unwrap();
+    summary.total()
+}
+
+#[test]
+fn the_margin_increase_system_prevents_more_than_half_of_the_collisions() {
+    let counts = counts("low-thw-overtake", BuiltIn::Mis.factory());
+    let [without, with] = counts.arms[..] else { panic!("two arms") };
+    assert_eq!(counts.errors() + counts.invalid, 0);
+    let share = without.collision_rate().unwrap();
+    assert!((0.15..=0.5).contains(&share), "{share}");
+    assert!(2 * with.collisions <= without.collisions, "{counts:?}");
+    assert!(counts.pairs.prevented > counts.pairs.induced);
+    assert_eq!(counts.pairs.prevented + counts.pairs.both, without.collisions);
+    assert_eq!(counts.pairs.induced + counts.pairs.both, with.collisions);
+}
+
+#[test]
+fn a_controller_that_does_no_more_than_acc_prevents_and_induces_nothing() {
+    let counts = counts("low-thw-overtake", BuiltIn::Acc.factory());
+    assert_eq!((counts.pairs.prevented, counts.pairs.induced), (0, 0));
+    assert!(counts.pairs.both > 0 && counts.pairs.neither > 0);
+}
+
+/// The gate of a regression test: at most half of the collisions without the system.
+fn passes(counts: &Counts) -> bool {
+    2 * counts.arms[1].collisions <= counts.arms[0].collisions
+}
+
+#[test]
+fn a_flipped_sign_fails() {
+    let counts = counts("low-thw-overtake", Arc::new(Fault::SignFlipped));
+    assert!(!passes(&counts), "{counts:?}");
+}
+
+#[test]
+fn braking_all_the_time_fails() {
+    let counts = counts("low-thw-overtake", Arc::new(Fault::AlwaysBrakes));
+    assert!(!passes(&counts), "{counts:?}");
+}
+
+#[test]
+fn acting_five_seconds_late_fails() {
+    let counts = counts("low-thw-overtake", Arc::new(Fault::FiveSecondsLate));
+    assert!(!passes(&counts), "{counts:?}");
+}

@@ -1,0 +1,11 @@
+//! The program from outside: its commands, files and exit codes, and what its verdicts rest on.
+
+mod determinism;
+mod exit_codes;
+mod gate;
+mod library;
+mod malformed;
+mod readme;
+mod recordings;
+mod rerun_files;
+mod support;
