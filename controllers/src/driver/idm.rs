@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::perception::Perception;
 use super::reaction::{Reaction, ReactionConfig};
 use super::wiedemann99::{Emergency, lift_off_for_light, nearest};
-use super::{Driver, DriverAction, DriverError, DriverInput, HARDEST_BRAKING_MPS2, Lead, finite};
+use super::{Driver, DriverAction, DriverError, DriverInput, HARDEST_BRAKING_MPS2, Lead, check_finite, finite};
 
 /// Gap below which the interaction no longer grows [m]: it would diverge.
 const LEAST_GAP_M: f64 = 0.1;
@@ -99,6 +99,7 @@ pub(crate) struct IdmDriver {
 
 impl Driver for IdmDriver {
     fn step(&mut self, input: &DriverInput<'_>, rng: &mut Stream) -> Result<DriverAction, DriverError> {
+        check_finite(input)?;
         let speed_mps = input.own.speed_mps;
         let desired_mps = *self.desired_mps.get_or_insert(speed_mps);
         let wanted = if let Some(reaction) = self.model.reaction {

@@ -177,7 +177,7 @@ pub(crate) fn world(case: &Case, drawn: &Sample, index: u64, with_mis: bool) -> 
     let own_d = road.lane_centre_m(Lane(2));
     let car = Vehicle::typical(VehicleClass::Car);
     let rear = Vehicle::typical(drawn.class);
-    let rng = |name: &str| stream(case.seed, index, &ActorId::new(name).unwrap(), "driver");
+    let rng = |name: &str| Box::new(stream(case.seed, index, &ActorId::new(name).unwrap(), "driver"));
     let keeps = |speed: f64| {
         human(&DriverConfig::Prescribed(PrescribedConfig { profile: vec![[0.0.into(), speed.into()]] })).build()
     };

@@ -16,7 +16,7 @@ fn pair(gap: f64, cc1_s: f64, reaction_s: f64, brake_mps2: f64) -> World {
     let d_m = road.lane_centre_m(Lane(2));
     let car = Vehicle::typical(VehicleClass::Car);
     let who = |config: &DriverConfig, name: &str| {
-        Who::Human(human(config).build(), stream(0, 0, &ActorId::new(name).unwrap(), "driver"))
+        Who::Human(human(config).build(), Box::new(stream(0, 0, &ActorId::new(name).unwrap(), "driver")))
     };
     let leads = DriverConfig::Prescribed(PrescribedConfig { profile: vec![[0.0.into(), 30.0.into()]] });
     let follows = DriverConfig::Wiedemann99(Wiedemann99Config {
@@ -46,12 +46,12 @@ fn deceleration_follows_the_brake_light_by_the_reaction_time() {
         let mut world = pair(29.0, 0.9, reaction_s, 6.0);
         let (mut light, mut answer) = (None, None);
         while answer.is_none() {
-            let before_mps2 = world.actors[1].command_mps2();
+            let before_mps2 = world.actors[1].command_mps2;
             world.step();
             if world.actors[0].state.brake_light && light.is_none() {
                 light = Some(world.time);
             }
-            if light.is_some() && world.actors[1].command_mps2() < before_mps2.min(-0.5) {
+            if light.is_some() && world.actors[1].command_mps2 < before_mps2.min(-0.5) {
                 answer = Some(world.time);
             }
         }

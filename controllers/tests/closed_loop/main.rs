@@ -3,6 +3,8 @@
 //! The figures behind these bounds, with more samples: `cargo run --release -p closecall-controllers --example
 //! validate_margin_increase`.
 
+#![expect(clippy::unwrap_used, reason = "what is set up wrongly here may panic")]
+
 mod encounter;
 mod following;
 mod paper_figure;

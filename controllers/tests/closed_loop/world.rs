@@ -22,7 +22,7 @@ const BRAKE_LIGHT_MPS2: f64 = 1.3;
 /// Who drives.
 pub(crate) enum Who {
     Ego(Box<dyn EgoController>),
-    Human(Box<dyn Driver>, Stream),
+    Human(Box<dyn Driver>, Box<Stream>),
 }
 
 /// A lane change under way.
@@ -38,7 +38,7 @@ pub(crate) struct Actor {
     pub(crate) who: Who,
     pub(crate) vehicle: Vehicle,
     pub(crate) state: VehicleState,
-    command_mps2: f64,
+    pub(crate) command_mps2: f64,
     path: Option<Path>,
     /// Brakes from this time on at this rate, whatever the driver wants.
     pub(crate) brakes: Option<(f64, f64)>,
@@ -77,10 +77,6 @@ impl Actor {
             self.path = Some(Path { target: change.target, from_s_m: s.s_m, from_d_m: s.d_m, way_m });
         }
         self.notes.extend(action.note.map(|note| (time, note)));
-    }
-
-    pub(crate) fn command_mps2(&self) -> f64 {
-        self.command_mps2
     }
 
     pub(crate) fn noted(&self, wanted: DriverNote) -> Option<Time> {

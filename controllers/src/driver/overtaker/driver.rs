@@ -9,7 +9,7 @@ use crate::driver::perception::{Perceived, Perception, View};
 use crate::driver::wiedemann99::{Emergency, lift_off_for_light};
 use crate::driver::{
     Driver, DriverAction, DriverError, DriverInput, DriverNote, HARDEST_BRAKING_MPS2, LaneChange, Wiedemann99Model,
-    finite,
+    check_finite, finite,
 };
 
 /// Braking below which a driver who is about to be clear does not bother [m/s²].
@@ -90,6 +90,7 @@ impl OvertakerDriver {
 
 impl Driver for OvertakerDriver {
     fn step(&mut self, input: &DriverInput<'_>, rng: &mut Stream) -> Result<DriverAction, DriverError> {
+        check_finite(input)?;
         let speed_mps = input.own.speed_mps;
         let desired_mps = *self.desired_mps.get_or_insert(speed_mps);
         let (reaction, side) = (self.settings.reaction, input.road.overtaking_side());

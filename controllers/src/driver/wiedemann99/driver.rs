@@ -5,7 +5,8 @@ use closecall_traffic::Stream;
 use super::{Wiedemann99, Wiedemann99Model};
 use crate::driver::perception::{Perceived, Perception};
 use crate::driver::{
-    Driver, DriverAction, DriverError, DriverInput, DriverNote, HARDEST_BRAKING_MPS2, LIFT_OFF_MPS2, Lead, finite,
+    Driver, DriverAction, DriverError, DriverInput, DriverNote, HARDEST_BRAKING_MPS2, LIFT_OFF_MPS2, Lead,
+    check_finite, finite,
 };
 
 /// Share of the hardest braking from which on a driver brakes in an emergency.
@@ -44,6 +45,7 @@ impl Wiedemann99Driver {
 
 impl Driver for Wiedemann99Driver {
     fn step(&mut self, input: &DriverInput<'_>, rng: &mut Stream) -> Result<DriverAction, DriverError> {
+        check_finite(input)?;
         let speed_mps = input.own.speed_mps;
         let desired_mps = *self.desired_mps.get_or_insert(speed_mps);
         let mut acceleration_mps2 = if self.settings.reaction.is_some() {

@@ -51,6 +51,8 @@ mod config;
 mod machine;
 mod plan;
 mod solver;
+#[cfg(test)]
+mod tests;
 
 pub use config::{MisConfig, MisSettings};
 pub(crate) use machine::{Mis, Situation, Wish};
