@@ -16,7 +16,12 @@ fn perception(criterion: &mut Criterion) {
     let others = [vehicle(1, 1_025.0, -5.6), vehicle(2, 970.0, -5.6), vehicle(3, 1_005.0, -1.9)];
     let sensors = SensorsConfig::default().check(&Parameters::default()).expect("the defaults are valid");
     let key = NoiseKey { seed: 0, sample: 0, ego: ActorId::new("ego").expect("a legal name") };
-    for (name, mode) in [("ground truth", SensorMode::GroundTruth), ("object level", SensorMode::Object)] {
+    let modes = [
+        ("ground truth", SensorMode::GroundTruth),
+        ("object level", SensorMode::Object),
+        ("full, follower at 30 m", SensorMode::Full),
+    ];
+    for (name, mode) in modes {
         let mut perception = sensors.with_mode(mode).build(&key).expect("no model to load");
         let mut scans = 0;
         criterion.bench_function(&format!("perception step, three vehicles, {name}"), |bench| {

@@ -4,12 +4,18 @@ use closecall_traffic::{Check, Choice, ConfigError, Parameters};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{GroundTruth, NoiseKey, ObjectPerception, ObjectSensorConfig, ObjectSensorModel, Perception, SensorError};
+use crate::lidar::LidarConfig;
+use crate::{
+    FullModel, FullPerception, GroundTruth, NoiseKey, ObjectPerception, ObjectSensorConfig, ObjectSensorModel,
+    Perception, SensorError, TrackerConfig,
+};
 
 /// How much of the sensors is simulated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum SensorMode {
+    /// Point clouds behind E, clustered, classified and tracked; object-level sensors ahead and to the sides.
+    Full,
     /// Object-level sensors all round: fast.
     #[default]
     Object,
@@ -29,6 +35,10 @@ pub struct SensorsConfig {
     pub surround: ObjectSensorConfig,
     /// The object-level stand-in for the rear LiDAR and camera.
     pub rear_object: ObjectSensorConfig,
+    /// The rear LiDAR.
+    pub rear_lidar: LidarConfig,
+    /// The tracker behind the rear LiDAR.
+    pub tracker: TrackerConfig,
 }
 
 impl Default for SensorsConfig {
@@ -38,6 +48,8 @@ impl Default for SensorsConfig {
             front_radar: ObjectSensorConfig::default(),
             surround: ObjectSensorConfig::default(),
             rear_object: ObjectSensorConfig::default(),
+            rear_lidar: LidarConfig::default(),
+            tracker: TrackerConfig::default(),
         }
     }
 }
@@ -46,8 +58,8 @@ impl Default for SensorsConfig {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sensors {
     mode: SensorMode,
-    /// Front, surround, rear.
-    object: [ObjectSensorModel; 3],
+    full: FullModel,
+    rear_object: ObjectSensorModel,
 }
 
 impl Check for SensorsConfig {
@@ -57,11 +69,13 @@ impl Check for SensorsConfig {
         let named = |key: &'static str| move |error: ConfigError| error.within(key);
         Ok(Sensors {
             mode: parameters.word(&self.mode, "mode")?,
-            object: [
-                self.front_radar.check_front_radar(parameters).map_err(named("front-radar"))?,
-                self.surround.check_surround(parameters).map_err(named("surround"))?,
-                self.rear_object.check_rear_object(parameters).map_err(named("rear-object"))?,
-            ],
+            full: FullModel {
+                front_radar: self.front_radar.check_front_radar(parameters).map_err(named("front-radar"))?,
+                surround: self.surround.check_surround(parameters).map_err(named("surround"))?,
+                rear_lidar: self.rear_lidar.check(parameters).map_err(named("rear-lidar"))?,
+                tracker: self.tracker.check(parameters).map_err(named("tracker"))?,
+            },
+            rear_object: self.rear_object.check_rear_object(parameters).map_err(named("rear-object"))?,
         })
     }
 }
@@ -85,7 +99,11 @@ impl Sensors {
     pub fn build(&self, key: &NoiseKey) -> Result<Box<dyn Perception>, SensorError> {
         Ok(match self.mode {
             SensorMode::GroundTruth => Box::new(GroundTruth::new()),
-            SensorMode::Object => Box::new(ObjectPerception::new(self.object, key)),
+            SensorMode::Object => {
+                let models = [self.full.front_radar, self.full.surround, self.rear_object];
+                Box::new(ObjectPerception::new(models, key))
+            }
+            SensorMode::Full => Box::new(FullPerception::new(&self.full, key)),
         })
     }
 }

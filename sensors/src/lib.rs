@@ -9,7 +9,9 @@
 mod config;
 mod detection;
 mod ego_frame;
+mod full;
 mod ground_truth;
+pub mod lidar;
 mod object;
 mod perception;
 mod scene;
@@ -20,7 +22,9 @@ mod tracking;
 
 pub use config::{SensorMode, Sensors, SensorsConfig};
 pub use detection::{Detection, Extent};
+pub use full::{DetectionClassifier, FullModel, FullPerception};
 pub use ground_truth::GroundTruth;
 pub use object::{NoiseKey, ObjectPerception, ObjectSensorConfig, ObjectSensorModel};
 pub use perception::{Health, Perception, SCAN_PERIOD, SensorError, SensorHealth};
 pub use scene::{Scene, SceneVehicle};
+pub use tracking::{TrackAudit, TrackerConfig, TrackerModel};

@@ -3,6 +3,7 @@
 use closecall_traffic::{Time, Track};
 
 use crate::Scene;
+use crate::lidar::RearLidar;
 
 /// Time from one control step, and one scan, to the next: 25 Hz.
 pub const SCAN_PERIOD: Time = Time::from_ms(40);
@@ -42,6 +43,11 @@ pub trait Perception: Send {
 
     /// The health of the sensors after the latest step.
     fn health(&self) -> SensorHealth;
+
+    /// The rear LiDAR with its latest points and boxes, for those who show them; none where it is not simulated.
+    fn rear_lidar(&self) -> Option<&RearLidar> {
+        None
+    }
 }
 
 /// A sensor model that could not go on. The state of the sensors after it is undefined; the run ends.

@@ -36,7 +36,7 @@ const CLUTTER_PROBABILITY: f64 = 0.05;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct ObjectSensorConfig {
-    /// Distance from the bumper up to which the nearest face of a vehicle is seen [m].
+    /// Distance from the bumper up to which the nearest face of a vehicle is seen on a clear day [m].
     pub range_m: Option<Num>,
     /// Half of the horizontal field of view [deg]; not for the surround sensors, which look all round.
     pub half_angle_deg: Option<Num>,

@@ -2,7 +2,8 @@
 //!
 //! Three of them look ahead, all round, and behind. Each has a field of view, a range, errors (white and slowly
 //! varying), a latency, losses, and a filter whose covariance is what the errors make it. The rear one stands in for
-//! LiDAR and camera where a campaign is to run fast; the other two serve the full chain as well.
+//! LiDAR and camera where a campaign is to run fast, and like them it sees less far in fog and rain; the other two serve
+//! the full chain as well.
 //!
 //! Deviations from real sensors, on purpose: which measurement belongs to which vehicle is known; extents are the true
 //! ones; there are no ghost objects; the radar's angle error does not grow with range; and E's own motion and its place
@@ -13,6 +14,7 @@ mod filter;
 mod noise;
 mod sensor;
 mod visibility;
+mod weather;
 
 pub use config::{ObjectSensorConfig, ObjectSensorModel};
 pub use noise::NoiseKey;
@@ -60,7 +62,8 @@ impl Perception for ObjectPerception {
     }
 
     fn health(&self) -> SensorHealth {
-        SensorHealth::default()
+        let [front, surround, rear] = &self.sensors;
+        SensorHealth { front: front.health(), surround: surround.health(), rear: rear.health() }
     }
 }
 

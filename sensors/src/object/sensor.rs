@@ -7,18 +7,19 @@
 //! Which vehicle a measurement belongs to is taken as known: an object-level sensor models what a sensor with its own
 //! tracking delivers, and confusing two vehicles is left to the full LiDAR chain.
 
-use closecall_traffic::{ClassScores, Source, Track, TrackId, VehicleClass};
+use closecall_traffic::{ClassScores, Environment, Source, Track, TrackId, VehicleClass};
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
 use super::config::{MAX_LATENCY_STEPS, ObjectSensorModel};
 use super::filter::{AxisEstimate, AxisFilter, AxisProcess};
 use super::noise::{NoiseKey, ScanErrors, TargetNoise};
-use super::visibility::{View, Visibility};
+use super::visibility::{Field, View, Visibility};
+use super::weather::range_in_weather_m;
 use crate::ego_frame::EgoFrame;
 use crate::surroundings::Other;
 use crate::tracking::lifecycle::Lifecycle;
 use crate::tracking::{ACROSS_MANOEUVRE_M2PS3, ALONG_MANOEUVRE_M2PS3, HEADING_SPEED_MPS, TrackList};
-use crate::{SCAN_PERIOD, Scene};
+use crate::{Health, SCAN_PERIOD, Scene};
 
 /// Speed of a vehicle not yet measured: E's own, within this [m/s].
 const SPEED_PRIOR_SD_MPS: f64 = 10.0;
@@ -26,6 +27,9 @@ const SPEED_PRIOR_SD_MPS: f64 = 10.0;
 const LATERAL_SPEED_PRIOR_SD_MPS: f64 = 0.7;
 /// A track is confirmed only once its speed is known to within this [m/s]: nobody could act on it before.
 const SETTLED_SPEED_SD_MPS: f64 = 1.0;
+/// A sensor that reaches less than this share of its range is degraded [1].
+const DEGRADED_SHARE: f64 = 0.5;
+
 /// What the sensor knows of a vehicle at the end of one scan.
 #[derive(Clone, Copy, Debug)]
 struct Report {
@@ -64,6 +68,10 @@ pub(crate) struct ObjectSensor {
     along: AxisProcess,
     across: AxisProcess,
     visibility: Visibility,
+    /// The weather that `range_m` was worked out for.
+    weather: Option<Environment>,
+    /// Range in this weather [m].
+    range_m: f64,
     targets: Vec<Target>,
     step: usize,
 }
@@ -97,6 +105,8 @@ impl ObjectSensor {
             along: process(ALONG_MANOEUVRE_M2PS3),
             across: process(ACROSS_MANOEUVRE_M2PS3),
             visibility: Visibility::default(),
+            weather: None,
+            range_m: model.range_m,
             targets: Vec::new(),
             step: 0,
         }
@@ -106,15 +116,30 @@ impl ObjectSensor {
     pub(crate) fn scan(&mut self, view: &ScanView<'_>, list: &mut TrackList) {
         let size = view.scene.ego.vehicle.dimensions;
         let ego_m = [size.length_m, size.width_m];
+        self.look_at_weather(view.scene.environment);
+        let field = Field { view: self.view, range_m: self.range_m, half_angle_tan: self.model.half_angle_tan };
         self.visibility.look(self.view, view.others, ego_m);
         for other in view.others {
             let place = self.place_of(other.actor);
             let errors = self.targets[place].noise.next(&self.model);
-            let in_view = self.visibility.sees(self.view, other, &self.model, ego_m);
+            let in_view = self.visibility.sees(&field, other, ego_m);
             self.follow(place, other, (in_view, errors), view.scene.ego.state.speed_mps, list);
             self.report(place, other, view, list);
         }
         self.step += 1;
+    }
+
+    /// Only the optical sensor, the rear one, is troubled by fog and rain; radars are not, over these distances.
+    fn look_at_weather(&mut self, environment: &Environment) {
+        if self.view == View::Behind && self.weather != Some(*environment) {
+            self.weather = Some(*environment);
+            self.range_m = range_in_weather_m(self.model.range_m, environment);
+        }
+    }
+
+    /// Degraded where the weather has cost more than half of the range.
+    pub(crate) fn health(&self) -> Health {
+        if self.range_m < DEGRADED_SHARE * self.model.range_m { Health::Degraded } else { Health::Ok }
     }
 
     /// Where the vehicle `actor` is kept; makes room for one that is new.

@@ -7,7 +7,6 @@
 //!
 //! Slopes (left over outward) order the directions as angles do and need no arc tangent.
 
-use super::config::ObjectSensorModel;
 use crate::surroundings::Other;
 
 /// Where a sensor looks.
@@ -19,6 +18,16 @@ pub(super) enum View {
     Around,
     /// From the rear bumper, back.
     Behind,
+}
+
+/// How far and how wide a sensor sees.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Field {
+    pub(super) view: View,
+    /// Distance from the bumper, or the body, to the nearest face [m].
+    pub(super) range_m: f64,
+    /// Tangent of half of the field of view [1].
+    pub(super) half_angle_tan: f64,
 }
 
 /// A vehicle is detected where at least this share of its angular width is in view (assumption: a quarter of a car's
@@ -58,15 +67,15 @@ impl Visibility {
     }
 
     /// True where `other` is within the field of view, in range, and not hidden.
-    pub(super) fn sees(&mut self, view: View, other: &Other, model: &ObjectSensorModel, ego_m: [f64; 2]) -> bool {
-        if view == View::Around {
-            return box_distance_m(other, ego_m) <= model.range_m;
+    pub(super) fn sees(&mut self, field: &Field, other: &Other, ego_m: [f64; 2]) -> bool {
+        if field.view == View::Around {
+            return box_distance_m(other, ego_m) <= field.range_m;
         }
         let Some(target) = self.silhouettes.iter().find(|seen| seen.actor == other.actor).copied() else {
             return false;
         };
-        let (low, high) = (target.low.max(-model.half_angle_tan), target.high.min(model.half_angle_tan));
-        if !(target.near_m <= model.range_m && low < high) {
+        let (low, high) = (target.low.max(-field.half_angle_tan), target.high.min(field.half_angle_tan));
+        if !(target.near_m <= field.range_m && low < high) {
             return false;
         }
         self.covered.clear();
@@ -149,28 +158,27 @@ mod tests {
         }
     }
 
-    fn seen(view: View, others: &[Other], model: &ObjectSensorModel) -> Vec<bool> {
+    const BEHIND: Field = Field { view: View::Behind, range_m: 120.0, half_angle_tan: 2.3 };
+
+    fn seen(field: Field, others: &[Other]) -> Vec<bool> {
         let mut visibility = Visibility::default();
-        visibility.look(view, others, [4.6, 1.85]);
-        others.iter().map(|other| visibility.sees(view, other, model, [4.6, 1.85])).collect()
+        visibility.look(field.view, others, [4.6, 1.85]);
+        others.iter().map(|other| visibility.sees(&field, other, [4.6, 1.85])).collect()
     }
 
     #[test]
     fn the_nearer_hides_the_farther() {
-        let model = super::super::ObjectSensorConfig::default().check_rear_object(&Default::default()).unwrap();
         let in_line = [car(1, -60.0, 0.0), car(2, -20.0, 0.0), car(3, -60.0, 3.75), car(4, 30.0, 0.0)];
-        assert_eq!(seen(View::Behind, &in_line, &model), [false, true, true, false]);
-        assert_eq!(seen(View::Ahead, &in_line, &model), [false, false, false, true]);
-        let beyond_range = [car(1, -127.0, 0.0)];
-        assert_eq!(seen(View::Behind, &beyond_range, &model), [false]);
-        let wide_of_view = [car(1, -5.0, 8.0)];
-        assert_eq!(seen(View::Behind, &wide_of_view, &model), [false]);
+        assert_eq!(seen(BEHIND, &in_line), [false, true, true, false]);
+        assert_eq!(seen(Field { view: View::Ahead, ..BEHIND }, &in_line), [false, false, false, true]);
+        assert_eq!(seen(BEHIND, &[car(1, -127.0, 0.0)]), [false], "beyond its range");
+        assert_eq!(seen(BEHIND, &[car(1, -5.0, 8.0)]), [false], "too far to the side");
     }
 
     #[test]
     fn surround_sees_what_is_near_the_body() {
-        let model = super::super::ObjectSensorConfig::default().check_surround(&Default::default()).unwrap();
+        let around = Field { view: View::Around, range_m: 14.0, half_angle_tan: f64::INFINITY };
         let others = [car(1, 0.0, 3.75), car(2, 18.0, 3.75), car(3, 19.5, 0.0), car(4, -15.0, -3.75)];
-        assert_eq!(seen(View::Around, &others, &model), [true, true, false, true]);
+        assert_eq!(seen(around, &others), [true, true, false, true]);
     }
 }

@@ -25,7 +25,7 @@ pub struct TrackAudit {
     others: Vec<Other>,
     followed: Vec<Followed>,
     false_ids: Vec<TrackId>,
-    /// Times that a vehicle's track changed its number.
+    /// Times that the track nearest to a vehicle changed its number.
     pub id_switches: u64,
     /// Steps in which a confirmed track matched a vehicle.
     pub matched_steps: u64,
@@ -41,27 +41,26 @@ impl TrackAudit {
     /// # Errors
     /// [`SensorError::NotFinite`] where the scene is not finite.
     pub fn observe(&mut self, tracks: &[Track], scene: &Scene<'_>) -> Result<(), SensorError> {
-        survey(scene, &mut self.others)?;
-        for track in tracks {
-            if track.source != Source::Rear || track.status == TrackStatus::Tentative {
-                continue;
-            }
-            let nearest = self
-                .others
-                .iter()
-                .map(|other| (face_distance_m(track, other), *other))
-                .min_by(|a, b| a.0.total_cmp(&b.0))
-                .filter(|(distance_m, _)| *distance_m <= MATCH_DISTANCE_M);
-            match nearest {
-                Some((_, other)) => self.matched(track, &other),
-                None if self.false_ids.contains(&track.id) => {}
-                None => self.false_ids.push(track.id),
+        let mut others = std::mem::take(&mut self.others);
+        survey(scene, &mut others)?;
+        for other in &others {
+            let distance_m = |track: &&Track| face_distance_m(track, other);
+            let nearest = confirmed(tracks).min_by(|a, b| distance_m(a).total_cmp(&distance_m(b)));
+            if let Some(track) = nearest.filter(|track| distance_m(track) <= MATCH_DISTANCE_M) {
+                self.follow(track, other);
             }
         }
+        for track in confirmed(tracks).filter(|track| track.class.vehicle() > 0.5) {
+            let is_near = |other: &Other| face_distance_m(track, other) <= MATCH_DISTANCE_M;
+            if !others.iter().any(is_near) && !self.false_ids.contains(&track.id) {
+                self.false_ids.push(track.id);
+            }
+        }
+        self.others = others;
         Ok(())
     }
 
-    /// Confirmed tracks that at some time belonged to no vehicle.
+    /// Confirmed tracks, taken for vehicles, that at some time belonged to none.
     pub fn false_tracks(&self) -> usize {
         self.false_ids.len()
     }
@@ -76,7 +75,7 @@ impl TrackAudit {
         (self.matched_steps > 0).then(|| (self.speed_error_sum_m2ps2 / self.matched_steps as f64).sqrt())
     }
 
-    fn matched(&mut self, track: &Track, other: &Other) {
+    fn follow(&mut self, track: &Track, other: &Other) {
         match self.followed.iter_mut().find(|followed| followed.actor == other.actor) {
             Some(followed) if followed.last_id == track.id => {}
             Some(followed) => {
@@ -88,11 +87,15 @@ impl TrackAudit {
         let error = face_error(track, other);
         self.speed_error_sum_m2ps2 += error[2] * error[2];
         // A covariance without inverse claims certainty, which no error but zero satisfies.
-        let nees =
-            track.covariance.try_inverse().map_or(f64::INFINITY, |inverse| (error.transpose() * inverse * error)[0]);
-        self.nees_sum += nees;
+        let inverse = track.covariance.try_inverse();
+        self.nees_sum += inverse.map_or(f64::INFINITY, |inverse| (error.transpose() * inverse * error)[0]);
         self.matched_steps += 1;
     }
+}
+
+/// The rear tracks that a controller may act on.
+fn confirmed(tracks: &[Track]) -> impl Iterator<Item = &Track> {
+    tracks.iter().filter(|track| track.source == Source::Rear && track.status != TrackStatus::Tentative)
 }
 
 /// Half a length from a centre at `x_m` to the face that is nearest to E [m], along the heading.

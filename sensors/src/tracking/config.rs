@@ -17,13 +17,21 @@ pub struct TrackerConfig {
     pub confirm_window: u8,
     /// Time for which a confirmed track that is no longer detected is kept [s].
     pub coast_s: Num,
+    /// Time from the end of a scan to its tracks [s]; rounded to whole control steps of 40 ms.
+    pub latency_s: Num,
     /// Standard deviation of a track's speed along its heading above which it is not confirmed yet [m/s].
     pub settled_speed_sd_mps: Num,
 }
 
 impl Default for TrackerConfig {
     fn default() -> Self {
-        Self { confirm_hits: 3, confirm_window: 6, coast_s: Num::Fixed(1.0), settled_speed_sd_mps: Num::Fixed(1.5) }
+        Self {
+            confirm_hits: 3,
+            confirm_window: 6,
+            coast_s: Num::Fixed(1.0),
+            latency_s: Num::Fixed(0.04),
+            settled_speed_sd_mps: Num::Fixed(1.5),
+        }
     }
 }
 
@@ -31,9 +39,26 @@ impl Default for TrackerConfig {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackerModel {
     pub(super) rules: LifecycleRules,
+    latency_steps: u32,
     pub(super) settled_speed_sd_mps: f64,
 }
 
+impl TrackerModel {
+    /// Whole control steps from the end of a scan to its tracks.
+    pub(crate) fn latency_steps(&self) -> usize {
+        self.latency_steps as usize
+    }
+}
+
+/// The number of whole scans nearest to `time_s`, which is 0 or more and short.
+fn steps(time_s: f64) -> u32 {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked to be 0 to 10 s")]
+    let steps = (time_s / SCAN_PERIOD.s()).round() as u32;
+    steps
+}
+
+/// Longest latency that is simulated [s].
+const MAX_LATENCY_S: f64 = 0.4;
 /// Probability that a scan detects a vehicle in view: between one of two scans (far, low) and all (near).
 const DETECTION_PROBABILITY: f64 = 0.75;
 /// Probability that clutter gives a detection inside the gate of a wrong track.
@@ -53,17 +78,18 @@ impl Check for TrackerConfig {
             let problem = Problem::WrongCount { value, allowed: "a number from 1 to `confirm-window`" };
             return Err(ConfigError::new("confirm-hits", problem));
         }
+        let latency_s = parameters.number(&self.latency_s, "latency-s", Range::closed(0.0, MAX_LATENCY_S))?;
         let coast_s = parameters.number(&self.coast_s, "coast-s", Range::closed(0.0, 10.0))?;
         let settled = &self.settled_speed_sd_mps;
         Ok(TrackerModel {
             rules: LifecycleRules {
                 confirm_hits: self.confirm_hits.into(),
                 confirm_window: self.confirm_window.into(),
-                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 250 scans")]
-                lost_after: (coast_s / SCAN_PERIOD.s()).round() as u32 + 1,
+                lost_after: steps(coast_s) + 1,
                 detection_probability: DETECTION_PROBABILITY,
                 clutter_probability: CLUTTER_PROBABILITY,
             },
+            latency_steps: steps(latency_s),
             settled_speed_sd_mps: parameters.number(settled, "settled-speed-sd-mps", Range::above(0.0, 20.0))?,
         })
     }

@@ -22,8 +22,8 @@ mod view;
 
 pub use audit::TrackAudit;
 pub use config::{TrackerConfig, TrackerModel};
-pub use tracker::{EgoPose, Tracker, TrackerScan};
-pub use view::RearView;
+pub(crate) use tracker::{EgoPose, Tracker, TrackerScan};
+pub(crate) use view::RearView;
 
 use closecall_traffic::{Track, TrackId};
 
@@ -42,9 +42,9 @@ pub(crate) const HEADING_SPEED_MPS: f64 = 3.0;
 
 /// The tracks of all sensors of E, and the next free number.
 #[derive(Clone, Debug, Default)]
-pub struct TrackList {
+pub(crate) struct TrackList {
     /// The tracks of the latest step.
-    pub tracks: Vec<Track>,
+    pub(crate) tracks: Vec<Track>,
     next_id: u32,
 }
 

@@ -22,31 +22,48 @@ const SPEED_PRIOR_SD_MPS: f64 = 10.0;
 const LATERAL_SPEED_PRIOR_SD_MPS: f64 = 0.7;
 /// Share by which the heading of a slow track follows that of its latest box [1].
 const HEADING_GAIN: f64 = 0.1;
-/// Two tracks whose faces are nearer than this are one vehicle that fell apart [m].
-const TWIN_DISTANCE_M: f64 = 1.0;
-/// Their speeds then differ by less than this [m/s].
-const TWIN_SPEED_MPS: f64 = 3.0;
+/// Two tracks, one within the other's box, are one vehicle that fell apart if their speeds differ by less than this
+/// [m/s].
+const PART_SPEED_MPS: f64 = 3.0;
+/// A box is taken to be at least this wide when asking whether another is a part of it [m]: a car that is known by one
+/// lamp is as wide as a car, and no two vehicles share a lane's middle side by side.
+const LEAST_PART_WIDTH_M: f64 = 1.9;
+/// How far a part of a vehicle may stand before its face [m].
+const PART_BEFORE_FACE_M: f64 = 1.0;
+/// Fewer points than this may be one lamp or the plate of a dark car.
+const WHOLE_POINTS: usize = 6;
+/// Where within ±0.75 m of the car's middle that is, nobody knows: standard deviation of a uniform distribution [m].
+const PART_LATERAL_SD_M: f64 = 0.43;
+
+/// A box narrower than this is that of a motorcycle, or of a part [m].
+const NARROW_M: f64 = 1.2;
+/// A motorcycle has no front face: wheel, fork and rider stand up to 0.9 m behind each other, and the layers meet now one,
+/// now the other: standard deviation of a uniform distribution [m].
+const NARROW_RANGE_SD_M: f64 = 0.26;
+/// What stays unknown however often it is measured: which part of the front is the face that was seen, by class of
+/// vehicle [m] (assumption: bumpers and grilles of cars and trucks; a motorcycle as above).
+pub(super) const FACE_BIAS_SD_M: [f64; 3] = [0.05, 0.05, 0.26];
 
 /// E's pose and motion, dead-reckoned in any axes that stay fixed to the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct EgoPose {
+pub(crate) struct EgoPose {
     /// Position and heading.
-    pub pose: PlanePose,
+    pub(crate) pose: PlanePose,
     /// Speed along the heading [m/s].
-    pub speed_mps: f64,
+    pub(crate) speed_mps: f64,
 }
 
 /// One scan's detections, all in E's frame at `time`.
 #[derive(Clone, Copy, Debug)]
-pub struct TrackerScan<'a> {
+pub(crate) struct TrackerScan<'a> {
     /// The scan's reference time. A detection's own time says when its target was there.
-    pub time: Time,
+    pub(crate) time: Time,
     /// E at `time`.
-    pub ego: EgoPose,
+    pub(crate) ego: EgoPose,
     /// What the sensor can see.
-    pub view: RearView,
+    pub(crate) view: RearView,
     /// The boxes.
-    pub detections: &'a [Detection],
+    pub(crate) detections: &'a [Detection],
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -76,9 +93,10 @@ impl Tracked {
         };
     }
 
-    fn is_twin_of(&self, other: &Self) -> bool {
-        (self.filter.position_m() - other.filter.position_m()).norm() < TWIN_DISTANCE_M
-            && (self.filter.velocity_mps() - other.filter.velocity_mps()).norm() < TWIN_SPEED_MPS
+    /// True where `other` is a part of this vehicle.
+    fn has_part(&self, other: &Self) -> bool {
+        self.holds(other.filter.position_m())
+            && (self.filter.velocity_mps() - other.filter.velocity_mps()).norm() < PART_SPEED_MPS
     }
 
     /// True where a face at `position_m` lies within this track's box.
@@ -87,7 +105,8 @@ impl Tracked {
         let direction = self.direction();
         let offset = position_m - self.filter.position_m();
         let (along_m, across_m) = (offset.dot(&direction), offset.perp(&direction));
-        along_m.abs() <= length_m && across_m.abs() <= 0.5 * width_m
+        let is_along = (-length_m..=PART_BEFORE_FACE_M).contains(&along_m);
+        is_along && across_m.abs() <= 0.5 * width_m.max(LEAST_PART_WIDTH_M)
     }
 }
 
@@ -98,7 +117,7 @@ fn wrapped(angle_rad: f64) -> f64 {
 
 /// Multi-object tracker for the boxes of the rear LiDAR.
 #[derive(Clone, Debug)]
-pub struct Tracker {
+pub(crate) struct Tracker {
     model: TrackerModel,
     time: Time,
     tracks: Vec<Tracked>,
@@ -109,7 +128,7 @@ pub struct Tracker {
 
 impl Tracker {
     /// A tracker that has seen nothing.
-    pub fn new(model: TrackerModel) -> Self {
+    pub(crate) fn new(model: TrackerModel) -> Self {
         Self {
             model,
             time: Time::ZERO,
@@ -121,7 +140,7 @@ impl Tracker {
     }
 
     /// Takes in one scan; new tracks take their numbers from `list`.
-    pub fn update(&mut self, scan: &TrackerScan<'_>, list: &mut TrackList) {
+    pub(crate) fn update(&mut self, scan: &TrackerScan<'_>, list: &mut TrackList) {
         let elapsed_s = (scan.time - self.time).s();
         self.time = scan.time;
         for track in &mut self.tracks {
@@ -160,10 +179,10 @@ impl Tracker {
         track.filter.correct(&innovation);
         track.turn(scan.ego.pose.yaw_rad + detection.heading_rad);
         track.extent.look(detection);
-        track.class.look(&detection.class);
+        track.class.look(&detection.class, detection.points);
         let speed_sd_mps = track.filter.velocity_sd_mps(track.direction());
         track.lifecycle.hit(&self.model.rules, speed_sd_mps <= self.model.settled_speed_sd_mps);
-        track.lifecycle.weigh(vehicle_log_likelihood_ratio(&detection.class));
+        track.lifecycle.weigh(vehicle_log_likelihood_ratio(&detection.class, detection.points));
     }
 
     fn miss(&mut self, place: usize) {
@@ -185,12 +204,11 @@ impl Tracker {
 
     /// A track for each detection that belongs to none and does not lie within one.
     fn start_new(&mut self, scan: &TrackerScan<'_>, list: &mut TrackList) {
-        let known = self.tracks.len();
         for (index, detection) in scan.detections.iter().enumerate() {
             let measurement = &self.measurements[index];
             let is_finite = measurement.position_m.iter().chain(measurement.noise_m2.iter()).all(|x| x.is_finite());
             let is_taken = self.assigned.contains(&Some(index))
-                || self.tracks[..known].iter().any(|track| track.holds(measurement.position_m));
+                || self.tracks.iter().any(|track| track.holds(measurement.position_m));
             if is_taken || !is_finite {
                 continue;
             }
@@ -207,19 +225,24 @@ impl Tracker {
                 extent: TrackExtent::default(),
             };
             track.extent.look(detection);
-            track.class.look(&detection.class);
+            track.class.look(&detection.class, detection.points);
             self.tracks.push(track);
         }
     }
 
-    /// Deletes the dead, and of two tracks of one vehicle the younger.
+    /// Deletes the dead, and parts of other tracks: the face nearest to E is the vehicle's. Of two that are parts of each
+    /// other the younger goes.
     fn forget(&mut self) {
         let rules = self.model.rules;
         self.tracks.retain(|track| !track.lifecycle.is_dead(&rules));
-        let mut place = 1;
+        let mut place = 0;
         while place < self.tracks.len() {
-            let (older, younger) = (&self.tracks[..place], &self.tracks[place]);
-            if older.iter().any(|track| track.is_twin_of(younger)) {
+            let track = &self.tracks[place];
+            let is_part = self.tracks.iter().enumerate().any(|(other, whole)| {
+                let is_whole = whole.has_part(track) && (other < place || !track.has_part(whole));
+                other != place && is_whole
+            });
+            if is_part {
                 self.tracks.remove(place);
             } else {
                 place += 1;
@@ -233,10 +256,13 @@ fn measurement(detection: &Detection, scan: &TrackerScan<'_>) -> Measurement {
     let pose = &scan.ego.pose;
     let turn = Rotation2::new(pose.yaw_rad);
     let face_m = Vector2::new(detection.face_x_m, detection.face_y_m);
+    let part_sd_m = if detection.points < WHOLE_POINTS { PART_LATERAL_SD_M } else { 0.0 };
+    let depth_sd_m = if detection.width_m < NARROW_M { NARROW_RANGE_SD_M } else { 0.0 };
+    let noise_sd_m = (detection.range_sd_m.hypot(depth_sd_m), detection.lateral_sd_m.hypot(part_sd_m));
     let sight_rad = detection.face_y_m.atan2(detection.face_x_m - scan.view.sensor_x_m);
     Measurement {
         position_m: Vector2::new(pose.x_m, pose.y_m) + turn * face_m,
-        noise_m2: turned(detection.range_sd_m, detection.lateral_sd_m, pose.yaw_rad + sight_rad),
+        noise_m2: turned(noise_sd_m.0, noise_sd_m.1, pose.yaw_rad + sight_rad),
         age_s: (scan.time - detection.time).s(),
     }
 }
@@ -256,7 +282,10 @@ fn in_ego_frame(track: &Tracked, filter: &GroundFilter, ego: &EgoPose, frame: &E
     let matrix: &Matrix2<f64> = turn.matrix();
     both.fixed_view_mut::<2, 2>(0, 0).copy_from(matrix);
     both.fixed_view_mut::<2, 2>(2, 2).copy_from(matrix);
-    let covariance = both * filter.covariance * both.transpose();
+    let mut covariance = both * filter.covariance * both.transpose();
+    let bias_m2 = turned(FACE_BIAS_SD_M[class.best_vehicle_class() as usize], 0.0, heading_rad);
+    let mut position_m2 = covariance.fixed_view_mut::<2, 2>(0, 0);
+    position_m2 += bias_m2;
     let lateral_m = frame.lateral_position_m(centre_m.x, centre_m.y);
     Track {
         id: track.id,

@@ -1,0 +1,144 @@
+//! The rear chain as a whole: how far and how well a vehicle that comes up is tracked, from the point cloud alone.
+//!
+//! Small numbers of runs; `examples/validate_tracking.rs` gives the figures.
+#![expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
+
+use closecall_sensors::{NoiseKey, Perception, Scene, SceneVehicle, SensorMode, SensorsConfig, TrackAudit};
+use closecall_traffic::{
+    ActorId, Check, Environment, Parameters, Road, Source, Time, Track, TrackStatus, Vehicle, VehicleClass,
+    VehicleState,
+};
+
+const OWN_LANE_M: f64 = -5.625;
+const SCAN_S: f64 = 0.04;
+
+/// E at 30 m/s and one vehicle behind it in its lane, on a clear day.
+struct Approach {
+    road: Road,
+    ego: SceneVehicle,
+    rear: SceneVehicle,
+    perception: Box<dyn Perception>,
+    scans: i64,
+}
+
+impl Approach {
+    fn new(class: VehicleClass, gap_m: f64, closing_kmh: f64, sample: u64) -> Self {
+        let vehicle = |actor, class, s_m, speed_mps| {
+            let state = VehicleState { s_m, d_m: OWN_LANE_M, speed_mps, ..VehicleState::default() };
+            SceneVehicle { actor, vehicle: Vehicle::typical(class), state, pitch_rad: 0.0 }
+        };
+        let ego = vehicle(0, VehicleClass::Car, 1_000.0, 30.0);
+        let half_lengths_m = 0.5 * (4.6 + class.typical_dimensions().length_m);
+        let key = NoiseKey { seed: 5, sample, ego: ActorId::new("ego").unwrap() };
+        let sensors = SensorsConfig::default().check(&Parameters::default()).unwrap().with_mode(SensorMode::Full);
+        Self {
+            road: Road::straight(3),
+            ego,
+            rear: vehicle(1, class, 1_000.0 - gap_m - half_lengths_m, 30.0 + closing_kmh / 3.6),
+            perception: sensors.build(&key).unwrap(),
+            scans: 0,
+        }
+    }
+
+    fn gap_m(&self) -> f64 {
+        let lengths_m = self.ego.vehicle.dimensions.length_m + self.rear.vehicle.dimensions.length_m;
+        self.ego.state.s_m - self.rear.state.s_m - 0.5 * lengths_m
+    }
+
+    /// One control step: the confirmed rear tracks, which `audit` gets to see too.
+    fn step(&mut self, audit: &mut TrackAudit) -> Vec<Track> {
+        let others = [self.rear];
+        let time = Time::from_ms(40) * self.scans;
+        let environment = &Environment::CLEAR_DAY;
+        let scene = Scene { time, road: &self.road, environment, ego: self.ego, others: &others };
+        let tracks = self.perception.step(&scene).unwrap();
+        audit.observe(tracks, &scene).unwrap();
+        let confirmed = |track: &&Track| track.source == Source::Rear && track.status != TrackStatus::Tentative;
+        let tracks = tracks.iter().filter(confirmed).cloned().collect();
+        self.scans += 1;
+        for vehicle in [&mut self.ego, &mut self.rear] {
+            vehicle.state.s_m += vehicle.state.speed_mps * SCAN_S;
+        }
+        tracks
+    }
+
+    /// The gap at which it is first confirmed in E's lane; 0 where it never is before `until_m`.
+    fn confirmed_at_m(mut self, until_m: f64) -> f64 {
+        let mut audit = TrackAudit::default();
+        while self.gap_m() > until_m {
+            let gap_m = self.gap_m();
+            if self.step(&mut audit).iter().any(|track| track.lane[1] > 0.5) {
+                return gap_m;
+            }
+        }
+        0.0
+    }
+}
+
+#[test]
+fn a_car_is_confirmed_beyond_100_m() {
+    for sample in 0..6_u32 {
+        let closing_kmh = 10.0 + 10.0 * f64::from(sample);
+        let approach = Approach::new(VehicleClass::Car, 132.0, closing_kmh, sample.into());
+        let at_m = approach.confirmed_at_m(95.0);
+        assert!(at_m >= 100.0, "{closing_kmh} km/h: {at_m} m");
+    }
+}
+
+#[test]
+fn a_motorcycle_is_confirmed_beyond_60_m() {
+    for sample in 0..6_u32 {
+        let closing_kmh = 10.0 + 10.0 * f64::from(sample);
+        let approach = Approach::new(VehicleClass::Motorcycle, 105.0, closing_kmh, sample.into());
+        let at_m = approach.confirmed_at_m(55.0);
+        assert!(at_m >= 60.0, "{closing_kmh} km/h: {at_m} m");
+    }
+}
+
+#[test]
+fn one_vehicle_is_one_track_of_known_speed() {
+    for class in VehicleClass::ALL {
+        let mut approach = Approach::new(class, 90.0, 40.0, 7);
+        let mut audit = TrackAudit::default();
+        let (mut settling, mut numbers) = (25, Vec::new());
+        while approach.gap_m() > 6.0 {
+            let tracks = approach.step(&mut audit);
+            numbers.extend(tracks.iter().map(|track| track.id));
+            if !tracks.is_empty() && settling > 0 {
+                settling -= 1;
+                audit = TrackAudit::default();
+            }
+        }
+        numbers.sort_unstable();
+        numbers.dedup();
+        assert_eq!(numbers.len(), 1, "{class:?}");
+        assert_eq!((audit.id_switches, audit.false_tracks()), (0, 0), "{class:?}");
+        let rmse_mps = audit.speed_rmse_mps().unwrap();
+        assert!(rmse_mps <= 0.7, "{class:?}: {rmse_mps} m/s");
+        let nees = audit.mean_nees().unwrap();
+        // Nobody manoeuvres here, so that the errors are smaller than the covariance must allow for.
+        assert!(nees < 6.0, "{class:?}: {nees}");
+    }
+}
+
+#[test]
+fn nobody_behind_is_no_track() {
+    let mut approach = Approach::new(VehicleClass::Car, 400.0, 0.0, 3);
+    let mut audit = TrackAudit::default();
+    for _ in 0..100 {
+        assert!(approach.step(&mut audit).is_empty());
+    }
+}
+
+#[test]
+fn the_same_key_gives_the_same_bits() {
+    let run = || {
+        let mut approach = Approach::new(VehicleClass::Car, 60.0, 40.0, 9);
+        let mut audit = TrackAudit::default();
+        let states = (0..25).flat_map(|_| approach.step(&mut audit)).flat_map(|track| track.state.data.0[0]);
+        states.map(f64::to_bits).collect::<Vec<_>>()
+    };
+    let bits = run();
+    assert!(!bits.is_empty());
+    assert_eq!(bits, run());
+}
