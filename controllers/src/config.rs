@@ -49,7 +49,7 @@ pub enum HumanDriver {
 }
 
 impl HumanDriver {
-    /// A fresh driver for one run. All that it needs is allocated here.
+    /// A fresh driver for one run. What it needs is allocated here and at its first step, and nothing afterwards.
     pub fn build(&self) -> Box<dyn Driver> {
         match self {
             Self::Prescribed(profile) => Box::new(profile.driver()),

@@ -21,8 +21,9 @@ mod ego;
 pub use config::{CheckedDriver, DriverConfig, HumanDriver};
 pub use driver::{
     Driver, DriverAction, DriverError, DriverInput, DriverNote, FollowConfig, Idm, IdmConfig, LaneChange,
-    LaneNeighbours, LogNormalConfig, Neighbour, Neighbours, Overtaker, OvertakerConfig, Prescribed, PrescribedConfig,
-    Reaction, ReactionConfig, Regime, Wiedemann99, Wiedemann99Config, Wiedemann99Driver, Wiedemann99Model,
+    LaneNeighbours, Lead, LogNormalConfig, Neighbour, Neighbours, Overtaker, OvertakerConfig, Prescribed,
+    PrescribedConfig, Reaction, ReactionConfig, Regime, Wiedemann99, Wiedemann99Config, Wiedemann99Driver,
+    Wiedemann99Model,
 };
 pub use ego::{
     Acc, AccConfig, Aeb, AebConfig, ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack,

@@ -8,8 +8,11 @@ const LEAST_FOLLOWER_GAP_M: f64 = 3.0;
 /// Time headway that is left to a follower [s].
 const FOLLOWER_HEADWAY_S: f64 = 0.3;
 
-/// Seconds in which one expects to gain on the vehicle to be overtaken, used to judge a slow lead in the passing lane.
+/// By how much a lead in the passing lane has to be faster than the vehicle to be overtaken, to be worth following [m/s].
 const GAIN_MPS: f64 = 1.0;
+
+/// Share of the accepted braking below which a slow lead in the passing lane is too far ahead to matter [1].
+const DOES_NOT_MATTER: f64 = 0.25;
 
 /// What braking an overtaking driver accepts, of itself and of the follower in the passing lane.
 #[derive(Clone, Copy, Debug)]
@@ -55,7 +58,7 @@ impl Intent {
         // A lead in the passing lane that is no faster than the vehicle to be overtaken gains nothing, unless it is so far
         // ahead that it will not matter.
         let gains = seen.lead.speed_mps >= self.slow_mps + GAIN_MPS
-            || room_m > closing_mps * closing_mps / (2.0 * 0.25 * self.tolerance.own_mps2);
+            || room_m > closing_mps * closing_mps / (2.0 * DOES_NOT_MATTER * self.tolerance.own_mps2);
         room_m > 0.0 && gains && closing_mps * closing_mps <= 2.0 * room_m * self.tolerance.own_mps2
     }
 
