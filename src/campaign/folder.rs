@@ -127,7 +127,7 @@ impl Folder {
     ///
     /// # Errors
     /// [`FolderError`] where it cannot be read; each record is an error of its own where its line is not one.
-    pub fn records(&self) -> Result<impl Iterator<Item = Result<Record, FolderError>>, FolderError> {
+    pub fn records(&self) -> Result<impl Iterator<Item = Result<Record, FolderError>> + use<>, FolderError> {
         let path = self.file(JOURNAL);
         let file = File::open(&path).map_err(|source| FolderError::Read { path: path.clone(), source })?;
         Ok(BufReader::new(file).lines().enumerate().map(move |(place, line)| {

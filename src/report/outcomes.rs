@@ -200,7 +200,9 @@ impl Columns {
     fn mis(&mut self, name: &str, unit: &'static str, of: fn(&MisSummary) -> Measured) {
         let measured = move |outcome: &Outcome| outcome.mis.as_ref().map_err(|absent| *absent).and_then(of);
         self.number(name, unit, move |row| measured(row.outcome()?).ok());
-        self.text(&format!("{name}_absent"), move |row| measured(row.outcome()?).err().map(|absent| absent.to_string()));
+        self.text(&format!("{name}_absent"), move |row| {
+            measured(row.outcome()?).err().map(|absent| absent.to_string())
+        });
     }
 }
 
@@ -254,9 +256,8 @@ fn collision_columns(columns: &mut Columns) {
     for (place, which) in ["first", "second"].into_iter().enumerate() {
         columns.text(&format!("collision_between_{which}"), move |row| Some(first(row)?.between[place].to_string()));
         columns.text(&format!("collision_struck_side_{which}"), move |row| word(&first(row)?.struck_side[place]));
-        columns.number(&format!("collision_delta_v_{which}_mps"), "m/s", move |row| {
-            Some(first(row)?.delta_v_mps[place])
-        });
+        columns
+            .number(&format!("collision_delta_v_{which}_mps"), "m/s", move |row| Some(first(row)?.delta_v_mps[place]));
     }
     columns.text("collision_closed_by", move |row| word(&first(row)?.closed_by));
     columns.text("collision_phase", move |row| word(&first(row)?.phase));

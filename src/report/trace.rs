@@ -117,9 +117,7 @@ fn write_parquet(file: &mut (impl Write + Send), rows: &[Row]) -> io::Result<()>
         field("gap_front_m", DataType::Float64, Some("m")),
         field("thw_front_s", DataType::Float64, Some("s")),
     ]));
-    let number = |of: fn(&Row) -> Option<f64>| -> ArrayRef {
-        Arc::new(rows.iter().map(of).collect::<Float64Array>())
-    };
+    let number = |of: fn(&Row) -> Option<f64>| -> ArrayRef { Arc::new(rows.iter().map(of).collect::<Float64Array>()) };
     let columns = vec![
         number(|row| Some(row.time.s())),
         Arc::new(rows.iter().map(|row| Some(row.actor.as_str())).collect::<StringArray>()),

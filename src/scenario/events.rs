@@ -1,6 +1,6 @@
 //! What happens to a vehicle on the way: a trigger, and what it sets off.
 
-use closecall_traffic::{ActorId, Check, ConfigError, Num, Parameters, Range, Time, Vehicle, VehicleState};
+use closecall_traffic::{ActorId, ConfigError, Num, Parameters, Range, Time, Vehicle, VehicleState};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -185,9 +185,7 @@ fn nominal_time(
     Ok(Trigger::At(Time::from_s(begins_s + phase * (ends_s - begins_s))))
 }
 
-impl Check for EffectConfig {
-    type Checked = Brake;
-
+impl EffectConfig {
     fn check(&self, parameters: &Parameters) -> Result<Brake, ConfigError> {
         let Self::Brake(config) = self;
         let number = |num, key, range| parameters.number(num, key, range).map_err(|error| error.within("brake"));

@@ -132,11 +132,6 @@ impl World {
         }
     }
 
-    /// A vehicle's box in the plane.
-    pub(crate) fn shape(&self, actor: usize) -> &OrientedBox {
-        &self.shapes[actor]
-    }
-
     /// Pitch of a vehicle's body, positive nose down [rad].
     pub(crate) fn pitch_rad(&self, actor: usize) -> f64 {
         match &self.actors[actor].body {

@@ -49,7 +49,7 @@ const SPEED_TIME_S: f64 = 2.0;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct AccConfig {
-    /// Time gap to the vehicle ahead [s]: 0.3 to 5.
+    /// Time gap to the vehicle ahead [s]: 0.2 to 5.
     pub time_gap_s: Num,
     /// Speed where nobody is ahead [m/s]; the road's speed limit where absent.
     pub set_speed_mps: Option<Num>,
@@ -71,7 +71,7 @@ impl Check for AccConfig {
     fn check(&self, parameters: &Parameters) -> Result<Acc, ConfigError> {
         let set_speed = self.set_speed_mps.as_ref();
         Ok(Acc {
-            time_gap_s: parameters.number(&self.time_gap_s, "time-gap-s", Range::closed(0.3, 5.0))?,
+            time_gap_s: parameters.number(&self.time_gap_s, "time-gap-s", Range::closed(0.2, 5.0))?,
             set_speed_mps: set_speed
                 .map(|num| parameters.number(num, "set-speed-mps", Range::above(0.0, 100.0)))
                 .transpose()?,

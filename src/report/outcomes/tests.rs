@@ -70,11 +70,7 @@ pub(in crate::report) fn rows() -> Vec<OutcomeRow> {
         result,
     };
     let failure = SampleFailure { kind: "panic".to_owned(), message: "a panic: <index> & \"bounds\"".to_owned() };
-    vec![
-        row(0, "acc", Ok(outcome(0, "acc"))),
-        row(0, "mis", Ok(outcome(0, "mis"))),
-        row(1, "mis", Err(failure)),
-    ]
+    vec![row(0, "acc", Ok(outcome(0, "acc"))), row(0, "mis", Ok(outcome(0, "mis"))), row(1, "mis", Err(failure))]
 }
 
 fn write(folder: &Path, name: &str, rows: Vec<OutcomeRow>) -> std::path::PathBuf {
@@ -99,9 +95,7 @@ fn the_table_reads_back() {
         let unit = field.metadata().get("unit").map_or("-", String::as_str);
         let array = batch.column(column);
         let cells: Vec<String> = (0..batch.num_rows())
-            .map(|row| {
-                if array.is_null(row) { "null".to_owned() } else { array_value_to_string(array, row).unwrap() }
-            })
+            .map(|row| if array.is_null(row) { "null".to_owned() } else { array_value_to_string(array, row).unwrap() })
             .collect();
         writeln!(text, "{} [{unit}] {}: {}", field.name(), field.data_type(), cells.join(" | ")).unwrap();
     }
@@ -125,10 +119,8 @@ fn more_rows_than_a_group_keep_their_order() {
     let count = ROWS_PER_GROUP as u64 + 3;
     let many = (0..count).map(|sample| OutcomeRow { sample, ..rows().swap_remove(1) }).collect();
     let batches = read(&write(folder.path(), "a.parquet", many));
-    let samples: Vec<u64> = batches
-        .iter()
-        .flat_map(|batch| batch["sample"].as_primitive::<UInt64Type>().values().to_vec())
-        .collect();
+    let samples: Vec<u64> =
+        batches.iter().flat_map(|batch| batch["sample"].as_primitive::<UInt64Type>().values().to_vec()).collect();
     assert_eq!(samples, (0..count).collect::<Vec<_>>());
     assert_eq!(batches[0]["min_thw_front_s"].as_primitive::<Float64Type>().value(0).to_bits(), 0.7_f64.to_bits());
 }

@@ -1,34 +1,37 @@
 //! The layout that the viewer opens with, stored in the recording itself.
 //!
 //! ```text
-//!  ┌───────────────────────────────┬──────────────────┐
-//!  │  3D, from behind and above E  │ time headway     │
-//!  │                               │ gap              │
-//!  │                               │ encounter        │
-//!  ├───────────────────────────────┤ speed            │
-//!  │  states                       │ acceleration     │
-//!  ├───────────────┬───────────────┤ margin gained    │
-//!  │  log          │ summary       │                  │
-//!  └───────────────┴───────────────┴──────────────────┘
+//!  ┌───────────────────────────────┬───────────────┬───────────────┐
+//!  │                               │ time headway  │ speed         │
+//!  │  3D, from behind and above E  ├───────────────┼───────────────┤
+//!  │                               │ gap           │ acceleration  │
+//!  ├───────────────────────────────┼───────────────┼───────────────┤
+//!  │  states                       │ time to       │ margin gained │
+//!  ├───────────────────────────────┤ encounter     │               │
+//!  │  log │ summary                │               │               │
+//!  └───────────────────────────────┴───────────────┴───────────────┘
 //! ```
 
-use rerun::blueprint::components::{Corner2D, Eye3DKind, PanelState, PlayState};
+use rerun::blueprint::components::{BackgroundKind, Corner2D, Eye3DKind, PanelState, PlayState};
+use rerun::blueprint::datatypes::{TextLogColumn, TextLogColumnKind};
 use rerun::blueprint::{
     Blueprint, BlueprintActivation, BlueprintPanel, ContainerLike, Horizontal, SelectionPanel, Spatial3DView,
-    StateTimelineView, TextDocumentView, TextLogView, TimePanel, TimeSeriesView, Vertical,
+    StateTimelineView, Tabs, TextDocumentView, TextLogView, TimePanel, TimeSeriesView, Vertical,
 };
 use rerun::components::Range1D;
 use rerun::external::re_log_types::BlueprintActivationCommand;
-use rerun::external::re_sdk_types::blueprint::archetypes::{EyeControls3D, LineGrid3D, PlotLegend, ScalarAxis};
+use rerun::external::re_sdk_types::blueprint::archetypes::{
+    Background, EyeControls3D, LineGrid3D, PlotLegend, ScalarAxis, TextLogColumns,
+};
 use rerun::log::LogMsg;
 use rerun::{AsComponents, EntityPath, RecordingStream, RecordingStreamBuilder, StoreId, StoreKind};
 
 use super::stream::OPENING_TIMELINE;
-use super::{APPLICATION, RecordError};
+use super::{APPLICATION, RecordError, palette};
 
 /// Where the eye is and what it looks at, in E's frame [m]: far enough back to see who follows.
-const EYE_M: [f32; 3] = [-34.0, 7.0, 13.0];
-const TARGET_M: [f32; 3] = [4.0, -1.0, 0.0];
+const EYE_M: [f32; 3] = [-23.0, 9.0, 9.0];
+const TARGET_M: [f32; 3] = [7.0, -0.5, 0.0];
 
 /// Lays out the views of one recording.
 #[derive(Default)]
@@ -67,22 +70,23 @@ impl Layout {
 
     fn blueprint(&mut self, has_margin: bool) -> Blueprint {
         let states = StateTimelineView::new("States").with_origin("states");
-        let log = TextLogView::new("What happened").with_origin("log");
         let summary = TextDocumentView::new("Summary").with_origin("summary");
-        let words = Horizontal::new([log.into(), summary.into()]).with_column_shares([3.0, 2.0]);
-        let left = Vertical::new([self.scene(), states.into(), words.into()]).with_row_shares([10.0, 4.0, 5.0]);
-
-        let mut plots = vec![
+        let words = Tabs::new([self.log(), summary.into()]);
+        let left = Vertical::new([self.scene(), states.into(), words.into()]).with_row_shares([10.0, 5.5, 4.5]);
+        let margins = Vertical::new([
             self.plot("Time headway [s]", "plots/headway", Some([0.0, 4.0])),
             self.plot("Gap [m]", "plots/gap", Some([0.0, 120.0])),
             self.plot("Time to encounter [s]", "plots/encounter", Some([0.0, 15.0])),
+        ]);
+        let mut motion = vec![
             self.plot("Speed [m/s]", "plots/speed", None),
             self.plot("Acceleration [m/s²]", "plots/acceleration", Some([-10.0, 4.0])),
         ];
         if has_margin {
-            plots.push(self.plot("Front margin gained [s]", "plots/margin", Some([-1.0, 4.0])));
+            motion.push(self.plot("Front margin gained [s]", "plots/margin", Some([-1.0, 4.0])));
         }
-        let root = Horizontal::new([left.into(), Vertical::new(plots).into()]).with_column_shares([3.0, 2.0]);
+        let plots = Horizontal::new([margins.into(), Vertical::new(motion).into()]);
+        let root = Horizontal::new([left.into(), plots.into()]).with_column_shares([11.0, 9.0]);
         Blueprint::new(root)
             .with_auto_layout(false)
             .with_auto_views(false)
@@ -105,6 +109,16 @@ impl Layout {
             .with_eye_up([0.0, 0.0, 1.0]);
         self.property(&view, "EyeControls3D", eye);
         self.property(&view, "LineGrid3D", LineGrid3D::new().with_visible(false));
+        let sky = Background::new(BackgroundKind::SolidColor).with_color(palette::SKY);
+        self.property(&view, "Background", sky);
+        view
+    }
+
+    /// The log without the columns that its colours and words say already.
+    fn log(&mut self) -> ContainerLike {
+        let view = TextLogView::new("What happened").with_origin("log").into();
+        let columns = [TextLogColumn { visible: true.into(), kind: TextLogColumnKind::Body }];
+        self.property(&view, "TextLogColumns", TextLogColumns::new().with_text_log_columns(columns));
         view
     }
 

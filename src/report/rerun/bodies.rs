@@ -49,7 +49,12 @@ fn car(paint: Rgba) -> Vec<Frustum> {
         wheels(0.6),
         Frustum { along: [[-1.0, 1.0], [-0.98, 0.96]], across: [0.94, 1.0], up: [0.14, 0.40], colour: paint },
         Frustum { along: [[-0.98, 0.96], [-0.94, 0.86]], across: [1.0, 0.92], up: [0.40, 0.60], colour: paint },
-        Frustum { along: [[-0.90, 0.42], [-0.62, 0.08]], across: [0.88, 0.68], up: [0.60, 0.94], colour: palette::GLASS },
+        Frustum {
+            along: [[-0.90, 0.42], [-0.62, 0.08]],
+            across: [0.88, 0.68],
+            up: [0.60, 0.94],
+            colour: palette::GLASS,
+        },
         Frustum { along: [[-0.62, 0.08], [-0.56, 0.04]], across: [0.68, 0.64], up: [0.94, 1.0], colour: paint },
     ]
 }
@@ -109,7 +114,8 @@ impl Solid {
                 size.height_m * frustum.up[level],
             ]
         };
-        let ring = |level| [corner(level, 0, 1.0), corner(level, 0, -1.0), corner(level, 1, -1.0), corner(level, 1, 1.0)];
+        let ring =
+            |level| [corner(level, 0, 1.0), corner(level, 0, -1.0), corner(level, 1, -1.0), corner(level, 1, 1.0)];
         let (below, above) = (ring(0), ring(1));
         for side in 0..4 {
             let next = (side + 1) % 4;

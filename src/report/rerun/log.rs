@@ -41,9 +41,7 @@ fn line(film: &Film<'_>, time: Time, what: &Happening) -> Line {
     let info = |entity, colour, text| Line { time, entity, level: TextLogLevel::INFO, colour, text };
     let warn = |entity, colour, text| Line { time, entity, level: TextLogLevel::WARN, colour, text };
     match what {
-        Happening::EventTriggered { event } => {
-            warn("log/event", palette::WARNING, format!("event `{event}` sets in"))
-        }
+        Happening::EventTriggered { event } => warn("log/event", palette::WARNING, format!("event `{event}` sets in")),
         Happening::DriverNote { actor, note } => {
             let name = film.scenario.actors.get(*actor).map_or("?", |actor| actor.id.as_str());
             let colour = palette::actor(*actor, film.scenario.ego);
@@ -56,9 +54,11 @@ fn line(film: &Film<'_>, time: Time, what: &Happening) -> Line {
         Happening::PhaseChanged { to } => info("log/phase", palette::NEUTRAL, format!("phase: {}", phase_word(*to))),
         Happening::Collision(touch) => {
             // When it was reported, the impact was not over; the outcome has its change of velocity.
-            let settled = film.outcome.collisions.iter().find(|collision| {
-                collision.time == touch.time && collision.between == touch.between
-            });
+            let settled = film
+                .outcome
+                .collisions
+                .iter()
+                .find(|collision| collision.time == touch.time && collision.between == touch.between);
             let text = collision_text(settled.unwrap_or(touch));
             Line { time, entity: "log/collision", level: TextLogLevel::ERROR, colour: palette::CRITICAL, text }
         }

@@ -20,8 +20,7 @@ const ELLIPSE_SIGMAS: f64 = 2.448;
 const ELLIPSE_Z_M: f64 = 0.08;
 const ELLIPSE_HALF_THICKNESS_M: f64 = 0.01;
 
-const SOURCES: [(Source, &str); 3] =
-    [(Source::Front, "front"), (Source::Surround, "surround"), (Source::Rear, "rear")];
+const SOURCES: [(Source, &str); 3] = [(Source::Front, "front"), (Source::Surround, "surround"), (Source::Rear, "rear")];
 
 pub(super) fn write(writer: &Writer<'_>, film: &Film<'_>) -> Result<(), RecordError> {
     let times = film.times();
@@ -40,10 +39,11 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film<'_>) -> Result<(), RecordEr
 }
 
 fn write_boxes(writer: &Writer<'_>, entity: &str, times: &[Time], tracks: &[Vec<Track>]) -> Result<(), RecordError> {
+    // Labels are shown where the pointer is: all at once they would hide the scene.
     let fixed = Boxes3D::update_fields()
         .with_fill_mode(FillMode::MajorWireframe)
         .with_radii([0.035_f32])
-        .with_show_labels(true);
+        .with_show_labels(false);
     writer.fixed(entity, &fixed)?;
     writer.rows(entity, times, |range| {
         let rows = &tracks[range];
@@ -87,16 +87,13 @@ fn ellipse(track: &Track) -> ([f32; 3], Quaternion) {
 fn colour(status: TrackStatus) -> Rgba {
     match status {
         TrackStatus::Tentative => palette::QUIET,
-        TrackStatus::Confirmed => [96, 230, 255, 255],
+        TrackStatus::Confirmed => palette::TRACK,
         TrackStatus::Coasting => palette::WARNING,
     }
 }
 
-/// Number, class with its score, existence. Tentative tracks have none: they are many, and E does not act on them.
+/// Number, class with its score, existence.
 fn label(track: &Track) -> String {
-    if track.status == TrackStatus::Tentative {
-        return String::new();
-    }
     let class = track.class.best_vehicle_class();
     let score = track.class.0[class as usize];
     format!("#{} {} {score:.2}, exists {:.2}", track.id.0, class.name(), track.existence)

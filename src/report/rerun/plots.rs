@@ -62,17 +62,17 @@ impl Plots<'_> {
     }
 
     fn headways(&self) -> Result<(), RecordError> {
-        let front = Pen { name: "front", colour: palette::EGO, width: LINE };
+        let front = Pen { name: "front", colour: palette::FRONT, width: LINE };
         self.curve("plots/headway/front", &front, |frame| frame.margins.thw_front_s.ok())?;
-        let rear = Pen { name: "rear", colour: palette::WARNING, width: LINE };
+        let rear = Pen { name: "rear", colour: palette::REAR, width: LINE };
         self.curve("plots/headway/rear", &rear, |frame| frame.margins.thw_rear_s.ok())?;
         self.level("plots/headway/critical", "critical", CRITICAL_THW_S)
     }
 
     fn gaps(&self) -> Result<(), RecordError> {
-        let front = Pen { name: "front", colour: palette::EGO, width: LINE };
+        let front = Pen { name: "front", colour: palette::FRONT, width: LINE };
         self.curve("plots/gap/front", &front, |frame| frame.margins.gap_front_m.ok())?;
-        let rear = Pen { name: "rear", colour: palette::WARNING, width: LINE };
+        let rear = Pen { name: "rear", colour: palette::REAR, width: LINE };
         self.curve("plots/gap/rear", &rear, |frame| frame.margins.gap_rear_m.ok())?;
         let seen = Pen { name: "rear, as the MIS sees it", colour: palette::NEUTRAL, width: THIN_LINE };
         self.curve("plots/gap/rear_seen", &seen, |frame| frame.command.plan.map(|plan| plan.rear_gap_m))
@@ -80,7 +80,7 @@ impl Plots<'_> {
 
     fn encounter(&self) -> Result<(), RecordError> {
         let plan = |of: fn(&MisPlan) -> Option<f64>| move |frame: &Frame| frame.command.plan.as_ref().and_then(of);
-        let ttc = Pen { name: "TTC rear", colour: palette::WARNING, width: LINE };
+        let ttc = Pen { name: "TTC rear", colour: palette::REAR, width: LINE };
         self.curve("plots/encounter/ttc_rear", &ttc, |frame| frame.margins.ttc_rear_s.ok())?;
         let ttce = Pen { name: "TTCE, as the MIS sees it", colour: palette::NEUTRAL, width: LINE };
         self.curve("plots/encounter/ttce", &ttce, plan(|plan| plan.ttce_s.ok()))?;
@@ -122,13 +122,15 @@ impl Plots<'_> {
 
     fn states(&self) -> Result<(), RecordError> {
         let states: Vec<&str> = self.film.frames.iter().map(|frame| state_word(frame.command.state)).collect();
-        self.band("states/ego", &states, &STATE_COLOURS)?;
+        self.band("states/ego_stack", &states, &STATE_COLOURS)?;
         let phases: Vec<&str> = self.film.frames.iter().map(|frame| phase_word(frame.phase)).collect();
         self.band("states/encounter", &phases, &PHASE_COLOURS)?;
         for (place, actor) in self.film.scenario.actors.iter().enumerate() {
             let braking = self.film.frames.iter().map(|frame| frame.states[place].brake_light);
             let words: Vec<&str> = braking.map(|lit| if lit { BRAKES } else { DRIVES }).collect();
-            self.band(&format!("states/{}_brake", actor.id), &words, &BRAKE_COLOURS)?;
+            if words.contains(&BRAKES) {
+                self.band(&format!("states/{}_brake_light", actor.id), &words, &BRAKE_COLOURS)?;
+            }
         }
         Ok(())
     }
@@ -147,8 +149,8 @@ impl Plots<'_> {
     }
 }
 
-const BRAKES: &str = "brakes";
-const DRIVES: &str = "-";
+const BRAKES: &str = "on";
+const DRIVES: &str = "off";
 const BRAKE_COLOURS: [(&str, Rgba); 2] = [(BRAKES, palette::BRAKE_LIGHT), (DRIVES, palette::QUIET)];
 
 const STATE_COLOURS: [(&str, Rgba); 5] = [

@@ -9,7 +9,7 @@ use super::bodies;
 use super::film::{Film, Frame};
 use super::palette::{self, Rgba};
 use super::stream::{Writer, changes};
-use crate::outcome::CRITICAL_THW_S;
+use crate::outcome::{CRITICAL_THW_S, Collision};
 
 /// A velocity is drawn as the way that the vehicle goes in this time [s].
 const ARROW_S: f64 = 0.25;
@@ -97,7 +97,8 @@ fn write_name(
 ) -> Result<(), RecordError> {
     let entity = format!("{entity}/name");
     let above_m = (size.height_m + LABEL_ABOVE_M) as f32;
-    let fixed = Points3D::new([[0.0, 0.0, above_m]]).with_colors([colour]).with_radii([0.05_f32]).with_show_labels(true);
+    let fixed =
+        Points3D::new([[0.0, 0.0, above_m]]).with_colors([colour]).with_radii([0.05_f32]).with_show_labels(true);
     writer.fixed(&entity, &fixed)?;
     // The speed is rounded to what can be told apart, and only what changed is written.
     let texts: Vec<String> = states.iter().map(|state| format!("{name}  {:.1} m/s", state.speed_mps)).collect();
@@ -127,7 +128,8 @@ fn write_lights(
         colour: palette::BRAKE_LIGHT,
     };
     write_lamps(writer, entity, times, &brake, &states.iter().map(|state| state.brake_light).collect::<Vec<_>>())?;
-    for (side, name, sign) in [(Indicator::Left, "indicators_left", 1.0), (Indicator::Right, "indicators_right", -1.0)] {
+    for (side, name, sign) in [(Indicator::Left, "indicators_left", 1.0), (Indicator::Right, "indicators_right", -1.0)]
+    {
         let edge_m = sign * 0.5 * size.width_m;
         let lamps = Lamps {
             name,
@@ -224,6 +226,12 @@ impl Gap {
     }
 }
 
+/// What the impact did to each.
+fn mark_text(collision: &Collision) -> String {
+    let ([first, second], [first_mps, second_mps]) = (&collision.between, collision.delta_v_mps);
+    format!("COLLISION  ΔV {first} {first_mps:.1} m/s, {second} {second_mps:.1} m/s")
+}
+
 /// A mark on the side of the vehicle that was struck, which it carries on; the changes of velocity beside it.
 fn write_collisions(writer: &Writer<'_>, film: &Film<'_>) -> Result<(), RecordError> {
     for (number, collision) in film.outcome.collisions.iter().enumerate() {
@@ -240,7 +248,7 @@ fn write_collisions(writer: &Writer<'_>, film: &Film<'_>) -> Result<(), RecordEr
         let mark = Points3D::new([[at_m[0] as f32, at_m[1] as f32, 0.6]])
             .with_colors([palette::CRITICAL])
             .with_radii([0.45_f32])
-            .with_labels([super::log::collision_text(collision)])
+            .with_labels([mark_text(collision)])
             .with_show_labels(true);
         // The first frame at or after the touch: before it the vehicles are still apart.
         let shown_at = film.frames.iter().map(|frame| frame.time).find(|&time| time >= collision.time);
