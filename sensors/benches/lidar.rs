@@ -44,7 +44,7 @@ fn scan_and_detect(criterion: &mut Criterion) {
         group.bench_function("scan", |bencher| {
             bencher.iter(|| black_box(scanner.scan(black_box(&scene), &mut rng).len()));
         });
-        let scan = scanner.latest().clone();
+        let scan = scanner.scan(&scene, &mut random()).clone();
         group.bench_function("clustering", |bencher| {
             bencher.iter(|| detector.cluster(black_box(&scan), &lane).expect("finite points"));
         });

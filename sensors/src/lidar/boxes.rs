@@ -91,6 +91,7 @@ impl Fit {
         let sensor_x = f64::from(scan.sensor_x_m);
         let mut nearest = Nearest::default();
         let (mut far, mut squares) = (f64::INFINITY, f64::INFINITY);
+        let mut slopes = [f64::INFINITY, f64::NEG_INFINITY];
         for &member in members {
             let [x, y, z] = point(scan, member);
             let (u, v) = (x * cos + y * sin, y * cos - x * sin);
@@ -99,10 +100,12 @@ impl Fit {
             fit.across_m = [fit.across_m[0].min(v), fit.across_m[1].max(v)];
             fit.top_m = fit.top_m.max(z);
             fit.bottom_m = fit.bottom_m.min(z);
-            let azimuth = y.atan2(sensor_x - x);
-            fit.azimuth_rad = [fit.azimuth_rad[0].min(azimuth), fit.azimuth_rad[1].max(azimuth)];
+            // Everything lies behind the sensor: the slope grows with the azimuth.
+            let slope = y / (sensor_x - x);
+            slopes = [slopes[0].min(slope), slopes[1].max(slope)];
             squares = squares.min((sensor_x - x).powi(2) + y * y);
         }
+        fit.azimuth_rad = slopes.map(f64::atan);
         fit.rear_u_m = far;
         fit.range_m = squares.sqrt();
         fit.spacing_m = fit.range_m * column_step_rad(0.5 * (fit.azimuth_rad[0] + fit.azimuth_rad[1]));
@@ -126,7 +129,7 @@ impl Fit {
             offset_ns: offsets.sum::<f64>() / members.len() as f64,
             range_m: 0.0,
             spacing_m: 0.0,
-            azimuth_rad: [f64::INFINITY, f64::NEG_INFINITY],
+            azimuth_rad: [0.0; 2],
         }
     }
 

@@ -30,11 +30,13 @@ pub(crate) struct ColumnHits {
     pub(crate) beams: [BeamHits; LAYERS],
     /// The layers that some solid may have met, as bits.
     pub(crate) touched: u16,
+    /// The layers that may see the road: all below this one.
+    pub(crate) ground_below: usize,
 }
 
 impl Default for ColumnHits {
     fn default() -> Self {
-        Self { beams: [BeamHits::NONE; LAYERS], touched: 0 }
+        Self { beams: [BeamHits::NONE; LAYERS], touched: 0, ground_below: 0 }
     }
 }
 
@@ -42,18 +44,24 @@ impl ColumnHits {
     /// Forgets the previous column.
     pub(crate) fn clear(&mut self) {
         for layer in 0..LAYERS {
-            if self.touched >> layer & 1 == 1 {
+            if self.is_touched(layer) {
                 self.beams[layer] = BeamHits::NONE;
             }
         }
         self.touched = 0;
+        self.ground_below = 0;
+    }
+
+    /// True where some solid may have met the beam of this layer.
+    pub(crate) fn is_touched(&self, layer: usize) -> bool {
+        self.touched >> layer & 1 == 1
     }
 
     /// Lets the beams of a column meet one solid.
     pub(crate) fn cast(&mut self, column: &Column, elevations: &[Elevation], part: &Part, targets: &Targets) {
         for layer in part.layers.clone() {
             let group = layer / LAYERS_PER_GROUP;
-            let ray = Fan { cos: column.cos[group], sin: column.sin[group], tan: elevations[layer].subrays };
+            let ray = Fan { cos: column.cos[group], sin: column.sin[group], tan: elevations[layer].tan };
             self.meet(layer, &ray, part.faces, targets);
         }
     }
@@ -84,16 +92,12 @@ impl Fan {
     /// m·d of each sub-ray.
     #[inline(always)]
     pub(crate) fn along(&self, inverse: [f32; 3]) -> [f32; SUBRAYS] {
-        let mut level = [0.0; ACROSS];
-        for across in 0..ACROSS {
-            level[across] = inverse[0] * self.cos[across] + inverse[1] * self.sin[across];
-        }
-        let mut along = [0.0; SUBRAYS];
-        for lane in 0..SUBRAYS {
+        let level: [f32; ACROSS] =
+            std::array::from_fn(|across| inverse[0] * self.cos[across] + inverse[1] * self.sin[across]);
+        std::array::from_fn(|lane| {
             let (across, upward) = place(lane);
-            along[lane] = level[across] + inverse[2] * self.tan[upward];
-        }
-        along
+            level[across] + inverse[2] * self.tan[upward]
+        })
     }
 
     /// Keeps in `hits` what is nearer: what was met before, or this solid. Where both are equally near, the former.

@@ -192,6 +192,8 @@ impl NearestNeighbour for Grid {
     }
 }
 
+/// Neighbours for which memory is taken beforehand.
+const NEIGHBOURS: usize = 128;
 /// The most cells along each axis; points spread wider get larger cells.
 const MOST_CELLS: f64 = 256.0;
 
@@ -294,7 +296,7 @@ impl<F: Float> NearestNeighbourIndex<F> for GridIndex<'_, F> {
     }
 
     fn within_range(&self, point: ArrayView1<'_, F>, range: F) -> Result<Vec<(ArrayView1<'_, F>, usize)>, NnError> {
-        let mut found = Vec::new();
+        let mut found = Vec::with_capacity(NEIGHBOURS);
         self.visit(coordinates(point)?, to_f64(range), |_, row| found.push((self.batch.row(row), row)));
         Ok(found)
     }
@@ -349,21 +351,31 @@ mod tests {
         assert_eq!(labels(&[]), [] as [u32; 0]);
     }
 
+    /// One set of points of the golden file with the labels of scikit-learn.
+    struct GoldenSet<'a> {
+        name: &'a str,
+        radius: f64,
+        core_points: usize,
+        flat: Vec<f64>,
+        expected: Vec<i64>,
+    }
+
     #[test]
     fn labels_are_those_of_scikit_learn_up_to_their_numbers() {
         let golden = include_str!("../../tests/golden/dbscan.csv");
-        let mut sets: Vec<(&str, f64, usize, Vec<f64>, Vec<i64>)> = Vec::new();
+        let mut sets: Vec<GoldenSet<'_>> = Vec::new();
         for line in golden.lines().skip(1) {
             let fields: Vec<&str> = line.split(',').collect();
-            if sets.last().is_none_or(|set| set.0 != fields[0]) {
-                sets.push((fields[0], fields[1].parse().unwrap(), fields[2].parse().unwrap(), vec![], vec![]));
+            if sets.last().is_none_or(|set| set.name != fields[0]) {
+                let (radius, core_points) = (fields[1].parse().unwrap(), fields[2].parse().unwrap());
+                sets.push(GoldenSet { name: fields[0], radius, core_points, flat: vec![], expected: vec![] });
             }
             let set = sets.last_mut().unwrap();
-            set.3.extend([fields[3].parse::<f64>().unwrap(), fields[4].parse().unwrap()]);
-            set.4.push(fields[5].parse().unwrap());
+            set.flat.extend([fields[3].parse::<f64>().unwrap(), fields[4].parse().unwrap()]);
+            set.expected.push(fields[5].parse().unwrap());
         }
         assert_eq!(sets.len(), 4);
-        for (name, radius, core_points, flat, expected) in sets {
+        for GoldenSet { name, radius, core_points, flat, expected } in sets {
             let rows = Array2::from_shape_vec((expected.len(), 2), flat).unwrap();
             let found = dbscan(&rows, radius, core_points).unwrap();
             let mut pairs: Vec<(usize, i64)> = Vec::new();

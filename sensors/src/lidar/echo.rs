@@ -4,7 +4,7 @@
 //! beam is split by an edge, or spread over the road at a grazing angle, there are several, each the weaker.
 
 use super::cast::{BeamHits, NO_FACE, place};
-use super::pattern::{SUBRAYS, UPWARD};
+use super::pattern::{ACROSS, Elevation, SUBRAYS, UPWARD};
 use super::power::Link;
 use super::targets::Face;
 
@@ -18,75 +18,166 @@ const SHARE: f32 = 1.0 / SUBRAYS as f32;
 pub(crate) struct Echo {
     /// Distance, weighted by power [m].
     pub(crate) range_m: f32,
-    /// Received power [thresholds].
+    /// Power that would be received without the air's attenuation [thresholds].
     pub(crate) power: f32,
     /// The face that sends most of it.
     pub(crate) face: u32,
 }
 
 /// The echoes of one beam in order of range.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Echoes {
     list: [Echo; SUBRAYS],
     count: usize,
 }
 
 impl Echoes {
+    pub(crate) const NONE: Self = Self { list: [Echo { range_m: 0.0, power: 0.0, face: 0 }; SUBRAYS], count: 0 };
+
     pub(crate) fn as_slice(&self) -> &[Echo] {
         &self.list[..self.count]
     }
 
-    /// The echoes of what the sub-rays met, whose tangents of elevation are `tan`.
-    pub(crate) fn of(hits: &BeamHits, tan: [f32; UPWARD], faces: &[Face], link: &Link) -> Self {
-        let mut met = [Echo::default(); SUBRAYS];
-        let mut count = 0;
-        for lane in 0..SUBRAYS {
-            if hits.face[lane] == NO_FACE {
-                continue;
+    /// The echoes of what the sub-rays met.
+    pub(crate) fn of(hits: &BeamHits, elevation: &Elevation, faces: &[Face], link: &Link) -> Self {
+        let mut lanes = [Echo::default(); SUBRAYS];
+        let (mut nearest, mut farthest) = (f32::INFINITY, 0.0_f32);
+        for (lane, echo) in lanes.iter_mut().enumerate() {
+            let face = hits.face[lane];
+            if face != NO_FACE {
+                let strength = SHARE * link.gain_m2 * faces[face as usize].strength_m;
+                *echo = subray_echo(hits.inverse[lane] * elevation.cos[place(lane).1], strength, face);
+                nearest = nearest.min(echo.range_m);
+                farthest = farthest.max(echo.range_m);
             }
-            let echo = subray_echo(hits.inverse[lane], tan[place(lane).1], hits.face[lane], (faces, link));
-            // Insertion sort: eight at most, and mostly in order already.
-            let mut place = count;
-            while place > 0 && met[place - 1].range_m > echo.range_m {
-                met[place] = met[place - 1];
-                place -= 1;
+        }
+        let mut echoes = Self::NONE;
+        // Mostly all of them end within one pulse; a lane that met nothing adds nothing to the sums.
+        if farthest <= nearest + PULSE_M {
+            if farthest > 0.0 {
+                echoes.list[0] = sum(&lanes);
+                echoes.count = 1;
             }
-            met[place] = echo;
-            count += 1;
+            return echoes;
         }
-        let mut echoes = Self::default();
-        let mut rest = &met[..count];
-        while let Some(first) = rest.first() {
-            let within = rest.iter().take_while(|echo| echo.range_m <= first.range_m + PULSE_M).count();
-            echoes.list[echoes.count] = merged(&rest[..within], link);
-            echoes.count += 1;
-            rest = &rest[within..];
+        for echo in lanes.into_iter().filter(|echo| echo.range_m > 0.0) {
+            echoes.insert(echo);
         }
-        echoes
+        echoes.merged()
+    }
+
+    /// The echoes of a beam that meets nothing but the road: face 0. The two sides of the footprint are alike, and what
+    /// lies higher in it lies farther away.
+    pub(crate) fn of_ground([cos, sin]: [f32; 2], elevation: &Elevation, ground: &Face, link: &Link) -> Self {
+        let strength = ACROSS as f32 * SHARE * link.gain_m2 * ground.strength_m;
+        let level = ground.inverse[0] * cos + ground.inverse[1] * sin;
+        let mut met = Self::NONE;
+        for upward in 0..UPWARD {
+            let inverse = level + ground.inverse[2] * elevation.tan[upward];
+            if !(inverse > 0.0) {
+                break;
+            }
+            met.list[upward] = subray_echo(inverse * elevation.cos[upward], strength, 0);
+            met.count = upward + 1;
+        }
+        met.merged()
+    }
+
+    /// Insertion sort: eight at most, and mostly in order already.
+    #[inline(always)]
+    fn insert(&mut self, echo: Echo) {
+        let mut place = self.count;
+        while place > 0 && self.list[place - 1].range_m > echo.range_m {
+            self.list[place] = self.list[place - 1];
+            place -= 1;
+        }
+        self.list[place] = echo;
+        self.count += 1;
+    }
+
+    /// Adds up what lies within one pulse's length of the first of each group.
+    #[inline(always)]
+    fn merged(mut self) -> Self {
+        let (mut from, mut echoes) = (0, 0);
+        while from < self.count {
+            let most = self.list[from].range_m + PULSE_M;
+            let within = self.list[from..self.count].iter().take_while(|echo| echo.range_m <= most).count();
+            self.list[echoes] = sum(&self.list[from..from + within]);
+            echoes += 1;
+            from += within;
+        }
+        self.count = echoes;
+        self
     }
 }
 
-/// What one sub-ray alone sends back, without the air's attenuation.
-fn subray_echo(inverse: f32, tan: f32, face: u32, (faces, link): (&[Face], &Link)) -> Echo {
-    let surface = &faces[face as usize];
-    let slant = (1.0 + tan * tan).sqrt();
-    // Inverse range; cos γ is the plane's distance over the range.
-    let per_range = inverse / slant;
-    let cosine = (surface.offset_m * per_range).min(1.0);
-    let power = SHARE * link.gain_m2 * surface.reflectivity * cosine * per_range * per_range;
-    Echo { range_m: 1.0 / per_range, power, face }
-}
-
-/// One echo out of neighbours.
-fn merged(parts: &[Echo], link: &Link) -> Echo {
-    let (mut power, mut moment, mut strongest) = (0.0, 0.0, &parts[0]);
+/// One echo out of several.
+#[inline(always)]
+fn sum(parts: &[Echo]) -> Echo {
+    let (mut power, mut moment, mut strongest) = (0.0, 0.0, Echo::default());
     for part in parts {
         power += part.power;
         moment += part.power * part.range_m;
-        if part.power > strongest.power {
-            strongest = part;
+        if part.power >= strongest.power && part.range_m > 0.0 {
+            strongest = *part;
         }
     }
     let range_m = if power > 0.0 { moment / power } else { strongest.range_m };
-    Echo { range_m, power: power * link.transmission(range_m), face: strongest.face }
+    Echo { range_m, power, face: strongest.face }
+}
+
+/// What one sub-ray alone sends back: strength [thresholds · m³] over the third power of the range, since cos γ is the
+/// plane's distance over the range.
+#[inline(always)]
+fn subray_echo(per_range: f32, strength: f32, face: u32) -> Echo {
+    Echo { range_m: 1.0 / per_range, power: strength * per_range * per_range * per_range, face }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Lidar, Material, PointSource};
+    use super::*;
+    use closecall_traffic::Environment;
+
+    fn face(strength_m: f32) -> Face {
+        Face { inverse: [0.0; 3], offset_m: 1.0, strength_m, material: Material::Paint, source: PointSource::Actor(0) }
+    }
+
+    fn echoes(ranges_m: [Option<f32>; SUBRAYS]) -> Vec<(f32, f32)> {
+        let mut hits = BeamHits::NONE;
+        for (lane, range_m) in ranges_m.into_iter().enumerate() {
+            if let Some(range_m) = range_m {
+                hits.inverse[lane] = 1.0 / range_m;
+                hits.face[lane] = 0;
+            }
+        }
+        let level = Elevation { centre: [0.0, 1.0], tan: [0.0; UPWARD], cos: [1.0; UPWARD] };
+        let link = Link::new(&Lidar::default(), &Environment::CLEAR_DAY);
+        // At 10 m each sub-ray sends 1/8 of gain·ρ·cos γ/R² with ρ·cos γ = 1.
+        let found = Echoes::of(&hits, &level, &[face(10.0)], &link);
+        let unit = link.gain_m2 / 100.0;
+        found.as_slice().iter().map(|echo| (echo.range_m, echo.power / unit)).collect()
+    }
+
+    #[test]
+    fn a_whole_target_gives_one_echo_and_a_split_beam_two() {
+        let whole = echoes([Some(10.0); SUBRAYS]);
+        assert_eq!(whole.len(), 1);
+        assert!((whole[0].0 - 10.0).abs() < 1e-4 && (whole[0].1 - 1.0).abs() < 1e-4, "{whole:?}");
+        let (near, far) = (Some(10.0), Some(20.0));
+        let split = echoes([far, near, near, None, far, near, None, None]);
+        assert_eq!(split.len(), 2);
+        assert!((split[0].0 - 10.0).abs() < 1e-4 && (split[0].1 - 0.375).abs() < 1e-4, "{split:?}");
+        assert!((split[1].0 - 20.0).abs() < 1e-3 && (split[1].1 - 0.25 / 8.0).abs() < 1e-4, "{split:?}");
+        assert!(echoes([None; SUBRAYS]).is_empty());
+    }
+
+    #[test]
+    fn what_lies_within_a_pulse_is_one_echo() {
+        let one = echoes([10.0, 10.7, 10.2, 10.4, 10.1, 10.3, 10.5, 10.6].map(Some));
+        assert_eq!(one.len(), 1);
+        assert!(one[0].0 > 10.2 && one[0].0 < 10.4, "{one:?}");
+        let two = echoes([10.0, 10.8, 10.2, 10.4, 10.1, 10.3, 10.5, 10.6].map(Some));
+        assert_eq!(two.len(), 2);
+    }
 }

@@ -47,7 +47,6 @@ impl Noise {
     }
 
     /// Uniform in the open interval from 0 to 1.
-    #[expect(clippy::cast_possible_truncation, reason = "a shift by 41 leaves 23 bits")]
     pub(crate) fn uniform(self, beam: usize, purpose: Purpose) -> f32 {
         ((self.bits(beam, purpose) >> 41) as u32 as f32 + 0.5) * (1.0 / 8_388_608.0)
     }
@@ -56,7 +55,6 @@ impl Noise {
     ///
     /// Quicker than an exact normal number, and the same on every machine. The missing tails do not matter where the
     /// result is one point among several.
-    #[expect(clippy::cast_possible_truncation, reason = "16-bit pieces are wanted")]
     pub(crate) fn normal(self, beam: usize, purpose: Purpose) -> f32 {
         let bits = self.bits(beam, purpose);
         let sum = (bits & 0xffff) as u32

@@ -72,13 +72,15 @@ pub(crate) struct Column {
     pub(crate) sin: [[f32; ACROSS]; GROUPS],
 }
 
-/// Tangents of elevation of one beam.
+/// Elevations of one beam.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Elevation {
-    /// Of its centre.
-    pub(crate) centre: f32,
-    /// Of its sub-rays, upward.
-    pub(crate) subrays: [f32; UPWARD],
+    /// Tangent and cosine of its centre.
+    pub(crate) centre: [f32; 2],
+    /// Tangents of its sub-rays, upward.
+    pub(crate) tan: [f32; UPWARD],
+    /// Cosines of the same.
+    pub(crate) cos: [f32; UPWARD],
 }
 
 /// All beams of both mirror sides, in the sensor's frame.
@@ -202,12 +204,15 @@ fn column(azimuth_deg: f64) -> Column {
 #[expect(clippy::cast_possible_truncation, reason = "the model's directions are single precision: 1e-7 rad")]
 fn elevation(layer: usize, azimuth_deg: f64, mirror: Mirror) -> Elevation {
     let centre_deg = layer_deg(layer, azimuth_deg, mirror);
-    let mut subrays = [0.0; UPWARD];
-    for (upward, subray) in subrays.iter_mut().enumerate() {
+    let subray_rad = |upward: usize| {
         let offset_deg = FOOTPRINT_HEIGHT_DEG * ((upward as f64 + 0.5) / UPWARD as f64 - 0.5);
-        *subray = (centre_deg + offset_deg).to_radians().tan() as f32;
+        (centre_deg + offset_deg).to_radians()
+    };
+    Elevation {
+        centre: [centre_deg.to_radians().tan() as f32, centre_deg.to_radians().cos() as f32],
+        tan: std::array::from_fn(|upward| subray_rad(upward).tan() as f32),
+        cos: std::array::from_fn(|upward| subray_rad(upward).cos() as f32),
     }
-    Elevation { centre: centre_deg.to_radians().tan() as f32, subrays }
 }
 
 #[cfg(test)]

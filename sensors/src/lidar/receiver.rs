@@ -6,7 +6,7 @@
 use super::cast::{ColumnHits, Fan};
 use super::echo::{Echo, Echoes};
 use super::noise::{Noise, Purpose};
-use super::pattern::{ACROSS, BEAMS, Column, Elevation, LAYERS, LAYERS_PER_GROUP, SUBRAYS, UPWARD};
+use super::pattern::{ACROSS, BEAMS, Column, Elevation, LAYERS, LAYERS_PER_GROUP, UPWARD};
 use super::power::{LEAST_POWER, Link, THRESHOLD_OVER_NOISE, range_sd_m};
 use super::soft::{self, Plume, SoftEcho};
 use super::targets::Targets;
@@ -95,30 +95,35 @@ impl Receiver<'_> {
     /// Appends what is detected in this column.
     pub(crate) fn receive(&self, hits: &ColumnHits, scan: &mut LidarScan, truth: &mut ScanTruth) {
         let in_air = !self.plumes.is_empty() || self.link.has_fog();
-        for layer in 0..LAYERS {
-            if hits.touched >> layer & 1 == 0 && !in_air {
+        for (layer, elevation) in self.elevations.iter().enumerate() {
+            let echoes = if hits.is_touched(layer) {
+                Echoes::of(&hits.beams[layer], elevation, &self.targets.faces, self.link)
+            } else if layer < hits.ground_below {
+                let centre = self.column.centre[layer / LAYERS_PER_GROUP];
+                Echoes::of_ground(centre, elevation, &self.targets.faces[0], self.link)
+            } else if in_air {
+                Echoes::NONE
+            } else {
                 continue;
-            }
-            let tan = self.elevations[layer].subrays;
-            let echoes = Echoes::of(&hits.beams[layer], tan, &self.targets.faces, self.link);
-            let [first, last] = if in_air {
-                self.detect_in_air(layer, &echoes)
+            };
+            let found = if in_air {
+                self.detect_in_air(layer, echoes.as_slice())
             } else {
                 self.detect(layer, echoes.as_slice(), |_| 1.0, None)
             };
-            for found in [first, last].into_iter().flatten() {
+            for found in found.into_iter().flatten() {
                 self.report(layer, &found, scan, truth);
             }
         }
     }
 
-    fn detect_in_air(&self, layer: usize, echoes: &Echoes) -> [Option<Return>; 2] {
+    fn detect_in_air(&self, layer: usize, echoes: &[Echo]) -> [Option<Return>; 2] {
         let [cos, sin] = self.column.centre[layer / LAYERS_PER_GROUP];
-        let tan = self.elevations[layer].centre;
+        let tan = self.elevations[layer].centre[0];
         let centre = Fan { cos: [cos; ACROSS], sin: [sin; ACROSS], tan: [tan; UPWARD] };
         let beam = self.index * LAYERS + layer;
         let droplets = soft::droplets(beam, &centre, self.plumes, (self.targets, self.link, self.noise));
-        self.detect(layer, echoes.as_slice(), |range_m| droplets.transmission(range_m), droplets.echo)
+        self.detect(layer, echoes, |range_m| droplets.transmission(range_m), droplets.echo)
     }
 
     /// The first and the last detected return, the latter where it is another one.
@@ -140,7 +145,9 @@ impl Receiver<'_> {
         });
         let hard = echoes.iter().map(|echo| {
             let face = &self.targets.faces[echo.face as usize];
-            let power = echo.power * transmission(echo.range_m);
+            // The air can only take away: what is too weak without it needs no exponential.
+            let through = if echo.power > LEAST_POWER { self.link.transmission(echo.range_m) } else { 1.0 };
+            let power = echo.power * through * transmission(echo.range_m);
             Candidate { range_m: echo.range_m, power, source: face.source, material: face.material }
         });
         for (place, candidate) in soft.into_iter().chain(hard).enumerate() {
@@ -170,8 +177,8 @@ impl Receiver<'_> {
 
     fn report(&self, layer: usize, found: &Return, scan: &mut LidarScan, truth: &mut ScanTruth) {
         let [cos, sin] = self.column.centre[layer / LAYERS_PER_GROUP];
-        let tan = self.elevations[layer].centre;
-        let level = found.measured_m / (1.0 + tan * tan).sqrt();
+        let [tan, cosine] = self.elevations[layer].centre;
+        let level = found.measured_m * cosine;
         let [x, y, z] = self.placement.point_m([level * cos, level * sin, level * tan]);
         scan.x_m.push(x);
         scan.y_m.push(y);
@@ -185,5 +192,3 @@ impl Receiver<'_> {
         truth.points.push(PointTruth { source, material, range_m });
     }
 }
-
-const _: () = assert!(SUBRAYS * BEAMS < usize::MAX / 16, "addresses of noise fit");

@@ -90,10 +90,10 @@ impl Scanner {
             let column = &self.pattern.columns[index];
             let elevations = self.pattern.elevations(mirror, index);
             self.hits.clear();
-            cast_ground(column, elevations, &self.targets, &link, &mut self.hits);
             for &part in self.active.at(index, &self.targets) {
                 self.hits.cast(column, elevations, &self.targets.parts[part], &self.targets);
             }
+            cast_ground(column, elevations, &self.targets, &link, &mut self.hits);
             let before_s = SWEEP_S - f64::from(column.offset_ns) * 1e-9;
             let receiver = Receiver {
                 index,
@@ -199,20 +199,25 @@ fn moved_back(pose: PlanePose, vehicle: &SceneVehicle, before_s: f64) -> PlanePo
 /// The road's surface is the first face of all.
 const GROUND: FaceRange = FaceRange { first: 0, turned: 1, end: 1 };
 
-/// Lets the low beams of a column meet the road, as far up as it can send back enough to be detected. Nothing lies
-/// below the road, so that it need not hide anything.
+/// Finds the beams of a column that may see the road, from below up to where it can no longer send back enough to be
+/// detected; and lets those meet it that meet something else as well. Nothing lies below the road, so that it need not
+/// hide anything.
 fn cast_ground(column: &Column, elevations: &[Elevation], targets: &Targets, link: &Link, hits: &mut ColumnHits) {
     let ground: &Face = &targets.faces[0];
-    let most = link.gain_m2 * ground.reflectivity * ground.offset_m;
+    let most = link.gain_m2 * ground.strength_m;
     for (layer, elevation) in elevations.iter().enumerate() {
         let group = layer / LAYERS_PER_GROUP;
-        let fan = Fan { cos: column.cos[group], sin: column.sin[group], tan: elevation.subrays };
-        let inverse = fan.along(ground.inverse)[0];
+        let [cos, sin] = column.centre[group];
         // The lowest sub-ray is the nearest and meets the road at the steepest angle.
+        let inverse = ground.inverse[0] * cos + ground.inverse[1] * sin + ground.inverse[2] * elevation.tan[0];
         if !(inverse > 0.0 && most * inverse * inverse * inverse > LEAST_POWER) {
             break;
         }
-        hits.meet(layer, &fan, GROUND, targets);
+        hits.ground_below = layer + 1;
+        if hits.is_touched(layer) {
+            let fan = Fan { cos: column.cos[group], sin: column.sin[group], tan: elevation.tan };
+            hits.meet(layer, &fan, GROUND, targets);
+        }
     }
 }
 
@@ -261,8 +266,7 @@ mod tests {
             for lane in 0..SUBRAYS {
                 let (across, upward) = super::super::cast::place(lane);
                 assert!(upward < UPWARD);
-                let direction =
-                    [column.cos[group][across], column.sin[group][across], elevations[layer].subrays[upward]];
+                let direction = [column.cos[group][across], column.sin[group][across], elevations[layer].tan[upward]];
                 let exact = self.nearest_m(direction.map(f64::from));
                 let quick = (hits.face[lane] != NO_FACE).then(|| 1.0 / f64::from(hits.inverse[lane]));
                 counts[0] += usize::from(quick.is_some());

@@ -33,8 +33,10 @@ pub(crate) struct Face {
     /// n/w [1/m].
     pub(crate) inverse: [f32; 3],
     /// |w| [m].
+    #[cfg(test)]
     pub(crate) offset_m: f32,
-    pub(crate) reflectivity: f32,
+    /// ρ·|w| [m]: times the inverse range this is ρ·cos γ.
+    pub(crate) strength_m: f32,
     pub(crate) material: Material,
     pub(crate) source: PointSource,
 }
@@ -146,8 +148,9 @@ fn prepared((normal, offset_m, material): PlacedFace, finish: Finish<'_>) -> Fac
     let inverse = normal / offset_m;
     Face {
         inverse: [inverse.x as f32, inverse.y as f32, inverse.z as f32],
+        #[cfg(test)]
         offset_m: offset_m.abs() as f32,
-        reflectivity: (finish.reflectivity)(material) as f32,
+        strength_m: ((finish.reflectivity)(material) * offset_m.abs()) as f32,
         material,
         source: finish.source,
     }

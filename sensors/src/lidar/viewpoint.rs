@@ -70,10 +70,17 @@ impl Viewpoint {
     pub(crate) fn deskew(&self, before_s: f64) -> Deskew {
         let turned = self.yaw_rate_radps * before_s;
         let way = self.speed_mps * before_s;
-        let (sin, cos) = turned.sin_cos();
-        let (half_sin, half_cos) = (0.5 * turned).sin_cos();
+        let (sin, cos) = small_sin_cos(turned);
+        let (half_sin, half_cos) = small_sin_cos(0.5 * turned);
         Deskew { cos, sin: -sin, x_m: -way * half_cos, y_m: way * half_sin }
     }
+}
+
+/// Sine and cosine of what E turns by during a sweep: at most some hundredths, for which these series err by less than
+/// 1e-10.
+fn small_sin_cos(angle_rad: f64) -> (f64, f64) {
+    let square = angle_rad * angle_rad;
+    (angle_rad * (1.0 - square / 6.0), 1.0 - 0.5 * square * (1.0 - square / 12.0))
 }
 
 /// The sensor in E's level frame [m], mounted `back_m` behind E's origin.
