@@ -15,7 +15,8 @@ pub enum Extent {
     Assumed,
 }
 
-/// A box fitted to one cluster, in E's vehicle frame at `time`.
+/// A box fitted to one cluster, in E's vehicle frame at the end of the scan: where the target was at `time`, seen from
+/// where E is at the scan's end.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Detection {
     /// The time that the position holds for: the points' mean time of measurement, E's motion compensated.

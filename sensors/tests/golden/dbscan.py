@@ -3,7 +3,7 @@
     python -m venv venv && venv/bin/pip install scikit-learn==1.9.1
     venv/bin/python sensors/tests/golden/dbscan.py > sensors/tests/golden/dbscan.csv
 
-Written by this script alone; `lidar::clustering` reads it in its tests. Coordinates have three decimals, so that both
+Written by this script alone; `lidar::clustering::dbscan` reads it in its tests. Coordinates have three decimals, so that both
 sides read the same numbers. A label of -1 is noise.
 """
 

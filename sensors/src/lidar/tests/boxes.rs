@@ -1,0 +1,68 @@
+//! Boxes and clusters against the truth.
+
+use closecall_traffic::VehicleClass;
+
+use super::*;
+use crate::Extent;
+
+#[test]
+fn the_stated_deviations_of_faces_are_those_that_occur() {
+    for class in VehicleClass::ALL {
+        let (mut along, mut across, mut n) = (0.0, 0.0, 0.0);
+        for step in 0..120_i32 {
+            let gap = 4.0 + 0.75 * f64::from(step);
+            let left = [0.0, 3.75, -3.75, 0.7][step as usize % 4];
+            let mut stage = Stage::new().with(class, gap, left);
+            let mut lidar = RearLidar::new(Lidar::default());
+            let found = stage.look(&mut lidar, step.into());
+            let Some((box_, dx, dy)) = first_face(&stage, &found) else { continue };
+            along += (dx / box_.range_sd_m).powi(2);
+            across += (dy / box_.lateral_sd_m).powi(2);
+            n += 1.0;
+        }
+        let (along, across) = (f64::sqrt(along / n), f64::sqrt(across / n));
+        assert!(n > 90.0, "{class:?}: {n} found");
+        assert!((0.4..=1.6).contains(&along), "{class:?}: along {along}");
+        assert!((0.3..=1.6).contains(&across), "{class:?}: across {across}");
+    }
+}
+
+#[test]
+fn classes_and_widths_are_told_by_shape() {
+    for class in VehicleClass::ALL {
+        for body_shape in 0..4 {
+            for gap in [4.0, 10.0, 25.0, 50.0] {
+                let mut stage = Stage::new().with(class, gap, 0.0);
+                stage.others[0].vehicle.appearance.body_shape = body_shape;
+                let found = stage.look(&mut RearLidar::new(Lidar::default()), 1);
+                let (box_, ..) = first_face(&stage, &found).unwrap();
+                assert_eq!(box_.class.best_vehicle_class(), class, "{body_shape} at {gap} m: {box_:?}");
+                assert!(box_.class.vehicle() > 0.6, "{body_shape} at {gap} m: {box_:?}");
+                assert_eq!(box_.width, Extent::Seen);
+                let width = class.typical_dimensions().width_m;
+                assert!((box_.width_m - width).abs() < 0.35, "{} for {width} at {gap} m", box_.width_m);
+            }
+        }
+    }
+}
+
+#[test]
+fn clusters_are_vehicles() {
+    let mut report = SegmentationReport::default();
+    let mut lidar = RearLidar::new(Lidar::default());
+    for step in 0..60_i32 {
+        let along = f64::from(step);
+        let mut stage = Stage::new()
+            .with(VehicleClass::Car, 2.0 + 1.5 * along, 0.0)
+            .with(VehicleClass::Truck, 5.0 + along, -3.75)
+            .with(VehicleClass::Motorcycle, 60.0 - along, 3.75)
+            .with(VehicleClass::Car, 25.0 + 1.2 * along, 3.75);
+        stage.look(&mut lidar, step.into());
+        lidar.report(&mut report);
+    }
+    assert!(report.vehicles > 180, "{report:?}");
+    let share = |count: usize| count as f64 / report.vehicles as f64;
+    assert!(share(report.over_segmented) < 0.03, "{report:?}");
+    assert!(share(report.under_segmented) < 0.03, "{report:?}");
+    assert!(share(report.missed) < 0.03, "{report:?}");
+}

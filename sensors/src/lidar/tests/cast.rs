@@ -1,0 +1,37 @@
+//! The quick ray cast against brute force.
+
+use closecall_traffic::VehicleClass;
+use proptest::prelude::*;
+
+use super::*;
+
+fn placed_vehicle() -> impl Strategy<Value = SceneVehicle> {
+    let class = prop::sample::select(VehicleClass::ALL.to_vec());
+    (class, -130.0..8.0_f64, -9.0..9.0_f64, -0.4..0.4_f64, -0.03..0.03_f64, 0..4_u8).prop_map(
+        |(class, along, left, heading_rad, pitch_rad, body_shape)| {
+            let mut vehicle = scene_vehicle(1, class, 1_000.0 + along, LANE_D_M + left);
+            vehicle.state.heading_rad = heading_rad;
+            vehicle.pitch_rad = pitch_rad;
+            vehicle.vehicle.appearance.body_shape = body_shape;
+            vehicle
+        },
+    )
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(32))]
+
+    #[test]
+    fn brute_force_and_the_quick_cast_agree(
+        others in prop::collection::vec(placed_vehicle(), 0..5),
+        (curvature, pitch_rad, plus) in (-0.0025..0.0025_f64, -0.04..0.04_f64, any::<bool>()),
+    ) {
+        let mut stage = Stage::new();
+        stage.others = others;
+        stage.road = guarded(curvature);
+        stage.ego.pitch_rad = pitch_rad;
+        stage.time = Time::from_ns(if plus { 0 } else { PERIOD_NS });
+        let mut scanner = Scanner::new(Lidar::default());
+        scanner.assert_cast_agrees_with_brute_force(&stage.scene());
+    }
+}

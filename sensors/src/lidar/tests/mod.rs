@@ -1,0 +1,93 @@
+//! The rear LiDAR as a whole: what it sees of vehicles at known places.
+
+mod boxes;
+mod cast;
+mod counts;
+mod motion;
+mod surroundings;
+
+use super::*;
+use crate::testing::{scene_vehicle, with_speed};
+use crate::{Detection, Scene, SceneVehicle};
+use closecall_traffic::{ActorId, Environment, Road, Stream, Time, VehicleClass, VehicleState, stream};
+
+/// E's lane is the middle one of three.
+const LANE_D_M: f64 = -5.625;
+const SPEED_MPS: f64 = 30.0;
+/// From E's origin to its rear bumper [m].
+const REAR_M: f64 = 2.3;
+
+struct Stage {
+    time: Time,
+    road: Road,
+    environment: Environment,
+    ego: SceneVehicle,
+    others: Vec<SceneVehicle>,
+}
+
+impl Stage {
+    fn new() -> Self {
+        let ego = with_speed(scene_vehicle(0, VehicleClass::Car, 1_000.0, LANE_D_M), SPEED_MPS);
+        Self { time: Time::ZERO, road: Road::straight(3), environment: Environment::CLEAR_DAY, ego, others: Vec::new() }
+    }
+
+    /// With a vehicle whose front is `gap_m` behind E's rear, `left_m` to the left of E, as fast as E.
+    fn with(mut self, class: VehicleClass, gap_m: f64, left_m: f64) -> Self {
+        let half = 0.5 * class.typical_dimensions().length_m;
+        let s_m = self.ego.state.s_m - REAR_M - gap_m - half;
+        let vehicle = scene_vehicle(self.others.len() + 1, class, s_m, LANE_D_M + left_m);
+        self.others.push(with_speed(vehicle, SPEED_MPS));
+        self
+    }
+
+    fn scene(&self) -> Scene<'_> {
+        Scene { time: self.time, road: &self.road, environment: &self.environment, ego: self.ego, others: &self.others }
+    }
+
+    /// Looks once, at the side of the mirror that belongs to `look`, with noise that does too.
+    fn look(&mut self, lidar: &mut RearLidar, look: i64) -> Vec<Detection> {
+        self.time = Time::from_ns(PERIOD_NS * look);
+        lidar.scan(&self.scene(), &mut random(look.unsigned_abs()));
+        lidar.detect().unwrap().to_vec()
+    }
+
+    /// Points on the first of the others, mean over 20 scans.
+    fn mean_points(&mut self) -> f64 {
+        let mut lidar = RearLidar::new(Lidar::default());
+        let mut points = 0;
+        for look in 0..20 {
+            self.look(&mut lidar, look);
+            points += count(lidar.truth(), PointSource::Actor(1));
+        }
+        points as f64 / 20.0
+    }
+}
+
+fn random(sample: u64) -> Stream {
+    stream(0, sample, &ActorId::new("ego").unwrap(), "lidar")
+}
+
+fn count(truth: &ScanTruth, source: PointSource) -> usize {
+    truth.points.iter().filter(|point| point.source == source).count()
+}
+
+fn guarded(curvature_per_m: f64) -> Road {
+    let text = format!("lanes = 3\nguard-rails = true\ncurvature-per-m = {curvature_per_m:.6}");
+    let config: closecall_traffic::RoadConfig = toml::from_str(&text).unwrap();
+    closecall_traffic::Check::check(&config, &closecall_traffic::Parameters::default()).unwrap()
+}
+
+/// Detections that belong to the first of the others, with its true face.
+fn first_face(stage: &Stage, found: &[Detection]) -> Option<(Detection, f64, f64)> {
+    let state: &VehicleState = &stage.others[0].state;
+    let half = 0.5 * stage.others[0].vehicle.dimensions.length_m;
+    let near = |box_: &&Detection| {
+        let since_s = (stage.time - box_.time).s();
+        let x = state.s_m + half - SPEED_MPS * since_s - stage.ego.state.s_m;
+        (box_.face_x_m - x).abs() < 2.5 && (box_.face_y_m - (state.d_m - LANE_D_M)).abs() < 1.5
+    };
+    let box_ = found.iter().find(near)?;
+    let since_s = (stage.time - box_.time).s();
+    let x = state.s_m + half - SPEED_MPS * since_s - stage.ego.state.s_m;
+    Some((box_.clone(), box_.face_x_m - x, box_.face_y_m - (state.d_m - LANE_D_M)))
+}
