@@ -15,6 +15,7 @@ use closecall_traffic::{Stream, Time, Track};
 
 use crate::lidar::{Lidar, RearLidar};
 use crate::object::{NoiseKey, ObjectSensor, ObjectSensorModel, ScanView};
+use crate::perception::FieldOfView;
 use crate::surroundings::{Other, survey};
 use crate::tracking::{EgoPose, RearView, TrackList, Tracker, TrackerModel, TrackerScan};
 use crate::{Detection, Health, Perception, Scene, SensorError, SensorHealth};
@@ -145,5 +146,9 @@ impl Perception for FullPerception {
 
     fn rear_lidar(&self) -> Option<&RearLidar> {
         Some(&self.lidar)
+    }
+
+    fn rear_field(&self) -> Option<FieldOfView> {
+        Some(FieldOfView { half_angle_tan: HALF_FIELD_TAN, range_m: self.reach_m })
     }
 }

@@ -31,6 +31,15 @@ pub struct SensorHealth {
     pub rear: Health,
 }
 
+/// The wedge in which a sensor sees, from its place at the bumper on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FieldOfView {
+    /// Tangent of half of its angle [1].
+    pub half_angle_tan: f64,
+    /// How far it reaches, in the present weather where the model says so [m].
+    pub range_m: f64,
+}
+
 /// All of E's sensors with their processing: from the scene to tracks.
 ///
 /// Called once for each control step (25 Hz), in order of time.
@@ -46,6 +55,11 @@ pub trait Perception: Send {
 
     /// The rear LiDAR with its latest points and boxes, for those who show them; none where it is not simulated.
     fn rear_lidar(&self) -> Option<&RearLidar> {
+        None
+    }
+
+    /// Where the rear sensor looks from the rear bumper; none where its limits are not simulated.
+    fn rear_field(&self) -> Option<FieldOfView> {
         None
     }
 }

@@ -21,6 +21,7 @@ pub use noise::NoiseKey;
 
 use closecall_traffic::Track;
 
+use crate::perception::FieldOfView;
 use crate::surroundings::{Other, survey};
 use crate::tracking::TrackList;
 use crate::{Perception, Scene, SensorError, SensorHealth};
@@ -64,6 +65,11 @@ impl Perception for ObjectPerception {
     fn health(&self) -> SensorHealth {
         let [front, surround, rear] = &self.sensors;
         SensorHealth { front: front.health(), surround: surround.health(), rear: rear.health() }
+    }
+
+    fn rear_field(&self) -> Option<FieldOfView> {
+        let [_, _, rear] = &self.sensors;
+        Some(rear.field_of_view())
     }
 }
 

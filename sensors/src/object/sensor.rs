@@ -16,6 +16,7 @@ use super::noise::{NoiseKey, ScanErrors, TargetNoise};
 use super::visibility::{Field, View, Visibility};
 use super::weather::range_in_weather_m;
 use crate::ego_frame::EgoFrame;
+use crate::perception::FieldOfView;
 use crate::surroundings::Other;
 use crate::tracking::lifecycle::Lifecycle;
 use crate::tracking::{ACROSS_MANOEUVRE_M2PS3, ALONG_MANOEUVRE_M2PS3, HEADING_SPEED_MPS, TrackList};
@@ -140,6 +141,11 @@ impl ObjectSensor {
     /// Degraded where the weather has cost more than half of the range.
     pub(crate) fn health(&self) -> Health {
         if self.range_m < DEGRADED_SHARE * self.model.range_m { Health::Degraded } else { Health::Ok }
+    }
+
+    /// Where it looks, in the weather of the latest scan.
+    pub(crate) fn field_of_view(&self) -> FieldOfView {
+        FieldOfView { half_angle_tan: self.model.half_angle_tan, range_m: self.range_m }
     }
 
     /// Where the vehicle `actor` is kept; makes room for one that is new.

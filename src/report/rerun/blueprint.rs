@@ -30,8 +30,8 @@ use super::stream::OPENING_TIMELINE;
 use super::{APPLICATION, RecordError, palette};
 
 /// Where the eye is and what it looks at, in E's frame [m]: far enough back to see who follows.
-const EYE_M: [f32; 3] = [-23.0, 9.0, 9.0];
-const TARGET_M: [f32; 3] = [7.0, -0.5, 0.0];
+const EYE_M: [f32; 3] = [-30.0, 9.0, 11.0];
+const TARGET_M: [f32; 3] = [4.0, -0.5, 0.0];
 
 /// Lays out the views of one recording.
 #[derive(Default)]
@@ -72,7 +72,7 @@ impl Layout {
         let states = StateTimelineView::new("States").with_origin("states");
         let summary = TextDocumentView::new("Summary").with_origin("summary");
         let words = Tabs::new([self.log(), summary.into()]);
-        let left = Vertical::new([self.scene(), states.into(), words.into()]).with_row_shares([10.0, 5.5, 4.5]);
+        let left = Vertical::new([self.scene(), states.into(), words.into()]).with_row_shares([10.0, 6.0, 4.0]);
         let margins = Vertical::new([
             self.plot("Time headway [s]", "plots/headway", Some([0.0, 4.0])),
             self.plot("Gap [m]", "plots/gap", Some([0.0, 120.0])),

@@ -1,6 +1,7 @@
 //! What a run looked like: kept in memory until its outcome is known, since only then is it known what mattered.
 
 use closecall_controllers::EgoCommand;
+use closecall_sensors::FieldOfView;
 use closecall_traffic::{Time, Track, VehicleState};
 
 use crate::outcome::{Outcome, Phase};
@@ -17,6 +18,7 @@ pub(super) struct Frame {
     pub(super) command: EgoCommand,
     pub(super) margins: MarginsNow,
     pub(super) phase: Phase,
+    pub(super) rear_field: Option<FieldOfView>,
 }
 
 impl Frame {
@@ -28,6 +30,7 @@ impl Frame {
             command: *view.command,
             margins: *view.margins,
             phase: view.phase,
+            rear_field: view.perception.rear_field(),
         }
     }
 }

@@ -25,6 +25,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use closecall_traffic::Time;
+use rerun::sink::MemorySinkStorage;
 use rerun::{MediaType, RecordingStreamBuilder, RecordingStreamError, TextDocument, ViewCoordinates};
 
 use super::write::{WriteError, check_writable, write_atomically};
@@ -118,6 +119,10 @@ impl Observer for RunRecorder {
 
 /// The whole recording as the bytes of a file.
 fn encode(film: &Film<'_>) -> Result<Vec<u8>, RecordError> {
+    record(film)?.drain_as_bytes().map_err(|error| RecordError::Encode { reason: error.to_string() })
+}
+
+fn record(film: &Film<'_>) -> Result<MemorySinkStorage, RecordError> {
     let (stream, messages) = RecordingStreamBuilder::new(APPLICATION).recording_name(film.title).memory()?;
     if !stream.is_enabled() {
         return Err(RecordError::Disabled);
@@ -132,5 +137,8 @@ fn encode(film: &Film<'_>) -> Result<Vec<u8>, RecordError> {
     let summary = TextDocument::new(summary::markdown(film)).with_media_type(MediaType::markdown());
     writer.fixed("summary", &summary)?;
     blueprint::Layout::default().send(&stream, has_margin)?;
-    messages.drain_as_bytes().map_err(|error| RecordError::Encode { reason: error.to_string() })
+    Ok(messages)
 }
+
+#[cfg(test)]
+mod tests;

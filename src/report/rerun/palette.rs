@@ -23,6 +23,7 @@ pub(super) const RAIL: Rgba = [150, 156, 162, 255];
 pub(super) const BRAKE_LIGHT: Rgba = [255, 32, 24, 255];
 pub(super) const INDICATOR: Rgba = [255, 170, 0, 255];
 pub(super) const SKY: Rgba = [112, 130, 150, 255];
+pub(super) const FIELD_OF_VIEW: Rgba = [150, 220, 255, 255];
 pub(super) const TRACK: Rgba = [96, 230, 255, 255];
 pub(super) const SAFE: Rgba = [110, 214, 120, 255];
 pub(super) const CRITICAL: Rgba = [255, 64, 64, 255];

@@ -1,14 +1,15 @@
-//! What E perceives: tracks as boxes with their uncertainty, in E's own frame, apart for each group of sensors so that
-//! each can be switched off in the viewer.
+//! What E perceives, in its own frame: where its rear sensor looks, and tracks as boxes with their uncertainty, apart
+//! for each group of sensors so that each can be switched off in the viewer.
 
+use closecall_sensors::FieldOfView;
 use closecall_traffic::{Source, Time, Track, TrackStatus};
 use nalgebra::{Matrix2, SymmetricEigen};
-use rerun::{Boxes3D, Ellipsoids3D, FillMode, Quaternion};
+use rerun::{Boxes3D, Ellipsoids3D, FillMode, LineStrips3D, Quaternion};
 
 use super::RecordError;
 use super::film::Film;
 use super::palette::{self, Rgba};
-use super::stream::Writer;
+use super::stream::{Writer, changes};
 use super::vehicles::about_up;
 
 /// Height that boxes of tracks are drawn with, since tracks have none [m].
@@ -19,11 +20,15 @@ const CLEARANCE_M: f64 = 0.15;
 const ELLIPSE_SIGMAS: f64 = 2.448;
 const ELLIPSE_Z_M: f64 = 0.08;
 const ELLIPSE_HALF_THICKNESS_M: f64 = 0.01;
+/// The field of view is drawn at this height, its arc in this many pieces.
+const FIELD_Z_M: f64 = 0.2;
+const ARC_PIECES: u32 = 48;
 
 const SOURCES: [(Source, &str); 3] = [(Source::Front, "front"), (Source::Surround, "surround"), (Source::Rear, "rear")];
 
 pub(super) fn write(writer: &Writer<'_>, film: &Film<'_>) -> Result<(), RecordError> {
     let times = film.times();
+    write_rear_field(writer, film, &times)?;
     for (source, name) in SOURCES {
         let of_source = |tracks: &'_ [Track]| -> Vec<Track> {
             tracks.iter().filter(|track| track.source == source).cloned().collect()
@@ -36,6 +41,37 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film<'_>) -> Result<(), RecordEr
         write_ellipses(writer, &format!("world/ego/tracks/{name}/covariance"), &times, &tracks)?;
     }
     Ok(())
+}
+
+/// The edge of what the rear sensor sees, from the rear bumper on.
+fn write_rear_field(writer: &Writer<'_>, film: &Film<'_>, times: &[Time]) -> Result<(), RecordError> {
+    let fields: Vec<Option<FieldOfView>> = film.frames.iter().map(|frame| frame.rear_field).collect();
+    if fields.iter().all(Option::is_none) {
+        return Ok(());
+    }
+    let bumper_m = -0.5 * film.scenario.actors[film.scenario.ego].vehicle.dimensions.length_m;
+    let entity = "world/ego/rear_field_of_view";
+    let fixed = LineStrips3D::update_fields().with_colors([palette::FIELD_OF_VIEW]).with_radii([0.05_f32]);
+    writer.fixed(entity, &fixed)?;
+    let rows = changes(&fields);
+    let times: Vec<Time> = rows.iter().map(|&row| times[row]).collect();
+    writer.rows(entity, &times, |range| {
+        let shown: Vec<Option<FieldOfView>> = rows[range].iter().map(|&row| fields[row]).collect();
+        let edges = shown.iter().flatten().map(|field| edge(field, bumper_m));
+        LineStrips3D::new(edges).columns(shown.iter().map(|field| usize::from(field.is_some())).collect::<Vec<_>>())
+    })
+}
+
+/// From the sensor along one side, round the arc, and back.
+fn edge(field: &FieldOfView, bumper_m: f64) -> Vec<[f32; 3]> {
+    let half_rad = field.half_angle_tan.atan();
+    let sensor = [bumper_m as f32, 0.0, FIELD_Z_M as f32];
+    let arc = (0..=ARC_PIECES).map(|piece| {
+        let angle_rad = half_rad * (2.0 * f64::from(piece) / f64::from(ARC_PIECES) - 1.0);
+        let (sin, cos) = angle_rad.sin_cos();
+        [(bumper_m - field.range_m * cos) as f32, (field.range_m * sin) as f32, FIELD_Z_M as f32]
+    });
+    [sensor].into_iter().chain(arc).chain([sensor]).collect()
 }
 
 fn write_boxes(writer: &Writer<'_>, entity: &str, times: &[Time], tracks: &[Vec<Track>]) -> Result<(), RecordError> {
