@@ -15,7 +15,7 @@ mod file;
 mod locate;
 mod placement;
 
-use closecall_controllers::CheckedDriver;
+use closecall_controllers::{CheckedDriver, HumanDriver};
 use closecall_sensors::Sensors;
 use closecall_traffic::{
     ActorId, Check, ConfigError, Environment, Parameters, Problem, Range, Road, Time, Vehicle, VehicleState,
@@ -126,6 +126,7 @@ impl ScenarioConfig {
         let mut checked = Vec::with_capacity(self.actors.len());
         for (index, actor) in self.actors.iter().enumerate() {
             let driver = actor.driver.check(parameters).map_err(|error| at(index, error.within("driver")))?;
+            check_reach(&driver, states[index].speed_mps).map_err(|error| at(index, error))?;
             let mut events = Vec::with_capacity(actor.events.len());
             for (place, event) in actor.events.iter().enumerate() {
                 let event = event.check(&start, parameters);
@@ -140,6 +141,16 @@ impl ScenarioConfig {
             });
         }
         Ok(checked)
+    }
+}
+
+/// Refuses an overtaking driver who never comes as close as it would have to in order to pull out.
+fn check_reach(driver: &CheckedDriver, speed_mps: f64) -> Result<(), ConfigError> {
+    match driver {
+        CheckedDriver::Human(HumanDriver::Overtaker(overtaker)) => overtaker
+            .check_reach(speed_mps)
+            .map_err(|error| error.within("overtaker").within("driver")),
+        _ => Ok(()),
     }
 }
 

@@ -52,6 +52,8 @@ pub(crate) struct Rear {
     pub(crate) x_m: f64,
     pub(crate) length_m: f64,
     pub(crate) speed_mps: f64,
+    /// Standard deviation of the speed [m/s].
+    pub(crate) speed_sd_mps: f64,
     pub(crate) confirmed: bool,
     pub(crate) classified: bool,
     /// Probability of being in E's lane [1].
@@ -153,6 +155,7 @@ pub(crate) fn rear_of(track: &Track, input: &EgoInput<'_>) -> Rear {
         x_m: track.x_m(),
         length_m: track.length_m,
         speed_mps: track.vx_mps(),
+        speed_sd_mps: track.covariance[(2, 2)].max(0.0).sqrt(),
         confirmed: established(track),
         classified: classified(track),
         own_lane: track.lane[OWN],

@@ -143,7 +143,7 @@ impl Family {
             | Quantity::Closing
             | Quantity::CriticalCutOutThw
             | Quantity::FrontThw
-            | Quantity::CriticalFrontThw => Self::LogNormal,
+            | Quantity::ShortFrontThw => Self::LogNormal,
         }
     }
 

@@ -15,7 +15,7 @@
 //! | `closing-mps`            | lane change to the left, approaching   | closing speed to that vehicle when the manoeuvre starts |
 //! | `crossing-mps`           | lane change                            | speed when the centre crosses the marking         |
 //! | `front-thw-s`            | pair of follower and lead              | median headway while following                    |
-//! | `critical-front-thw-s`   | the same, where it is critical          | the same, below the critical 0.9 s                |
+//! | `short-front-thw-s`      | the same, where it is short             | the same, from 0.5 s to the critical 0.9 s        |
 //! | `following-mps`          | pair of follower and lead              | median speed while following                      |
 //!
 //! To the left, because that is where one overtakes. A vehicle counts as following, and as pulling out from behind a

@@ -13,6 +13,9 @@ use crate::lane_change::{LaneChange, detect};
 /// Largest headway at which a vehicle counts as following [s]; see the module's documentation.
 const FOLLOWING_THW_S: f64 = 3.0;
 
+/// Shortest time gap of adaptive cruise control [s]: half of the 1 s that driver's manuals call the shortest setting.
+const SHORTEST_ACC_S: f64 = 0.5;
+
 /// A pair counts where one follows the other for at least this.
 const MIN_FOLLOWING: Time = Time::from_ms(2_000);
 
@@ -33,8 +36,8 @@ pub enum Quantity {
     CrossingSpeed,
     /// Headway while following [s].
     FrontThw,
-    /// The same, of those below the critical headway [s].
-    CriticalFrontThw,
+    /// The same, of those that are critical but no shorter than adaptive cruise control keeps [s].
+    ShortFrontThw,
     /// Speed while following [m/s].
     FollowingSpeed,
 }
@@ -49,7 +52,7 @@ impl Quantity {
         Self::Closing,
         Self::CrossingSpeed,
         Self::FrontThw,
-        Self::CriticalFrontThw,
+        Self::ShortFrontThw,
         Self::FollowingSpeed,
     ];
 
@@ -63,7 +66,7 @@ impl Quantity {
             Self::Closing => "closing-mps",
             Self::CrossingSpeed => "crossing-mps",
             Self::FrontThw => "front-thw-s",
-            Self::CriticalFrontThw => "critical-front-thw-s",
+            Self::ShortFrontThw => "short-front-thw-s",
             Self::FollowingSpeed => "following-mps",
         }
     }
@@ -78,7 +81,7 @@ impl Quantity {
             Self::Closing => "closing speed to the old lane's lead at the start, lane changes to the left, approaching",
             Self::CrossingSpeed => "speed at the crossing of all lane changes",
             Self::FrontThw => "median headway of each pair that follows for 2 s or more, at most 3 s",
-            Self::CriticalFrontThw => "those of front-thw-s that are critical: below 0.9 s",
+            Self::ShortFrontThw => "those of front-thw-s that adaptive cruise control might keep and that are critical: 0.5 to 0.9 s",
             Self::FollowingSpeed => "median speed of each pair that follows for 2 s or more",
         }
     }
@@ -107,10 +110,10 @@ impl Samples {
         self.values.entry(quantity).or_default().push(value);
     }
 
-    /// A headway under its own quantity, and under the critical one's where it is critical.
-    fn push_headway(&mut self, [all, critical]: [Quantity; 2], thw_s: f64) {
+    /// A headway under its own quantity, and under another where it is critical and at least `from_s`.
+    fn push_headway(&mut self, [all, critical]: [Quantity; 2], from_s: f64, thw_s: f64) {
         self.push(all, thw_s);
-        if thw_s < CRITICAL_THW_S {
+        if (from_s..CRITICAL_THW_S).contains(&thw_s) {
             self.push(critical, thw_s);
         }
     }
@@ -141,7 +144,7 @@ fn observe_lane_change(recording: &SmoothedRecording, change: &LaneChange, sampl
     if thw_s > FOLLOWING_THW_S {
         return;
     }
-    samples.push_headway([Quantity::CutOutThw, Quantity::CriticalCutOutThw], thw_s);
+    samples.push_headway([Quantity::CutOutThw, Quantity::CriticalCutOutThw], 0.0, thw_s);
     // The same lead when the manoeuvre starts, or as early as both are recorded.
     let own = &recording.trajectories[lead.own_place];
     let other = &recording.trajectories[lead.lead_place];
@@ -196,7 +199,7 @@ fn observe_following(recording: &SmoothedRecording, samples: &mut Samples) {
             continue;
         }
         let (headways, speeds): (Vec<f64>, Vec<f64>) = instants.into_iter().unzip();
-        samples.push_headway([Quantity::FrontThw, Quantity::CriticalFrontThw], median(headways));
+        samples.push_headway([Quantity::FrontThw, Quantity::ShortFrontThw], SHORTEST_ACC_S, median(headways));
         samples.push(Quantity::FollowingSpeed, median(speeds));
     }
 }

@@ -46,7 +46,7 @@ pub struct ParameterConfig {
     /// A normal distribution, cut off at two bounds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub truncated_normal: Option<TruncatedNormalConfig>,
-    /// A log-normal distribution, which may be cut off above.
+    /// A log-normal distribution, which may be cut off at either end.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub log_normal: Option<LogNormalConfig>,
     /// One of several labels, each with its weight; weights need not add up to 1.
@@ -100,7 +100,7 @@ pub struct TruncatedNormalConfig {
     pub max: f64,
 }
 
-/// A log-normal distribution, which may be cut off above.
+/// A log-normal distribution, which may be cut off at either end.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct LogNormalConfig {
@@ -110,6 +110,9 @@ pub struct LogNormalConfig {
     /// Standard deviation of the logarithm, above 0.
     #[serde(deserialize_with = "finite::number")]
     pub sigma: f64,
+    /// Smallest value; 0 where absent.
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "finite::option")]
+    pub min: Option<f64>,
     /// Largest value; unbounded where absent.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "finite::option")]
     pub max: Option<f64>,

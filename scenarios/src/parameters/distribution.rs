@@ -41,7 +41,7 @@ pub struct Distribution(Kind);
 enum Kind {
     Uniform { min: f64, max: f64 },
     TruncatedNormal { mean: f64, sd: f64, bounds: [f64; 2], standard: TruncatedStandardNormal },
-    LogNormal { median: f64, sigma: f64, max: Option<f64>, standard: TruncatedStandardNormal },
+    LogNormal { median: f64, sigma: f64, cut: [Option<f64>; 2], standard: TruncatedStandardNormal },
     Choice(Weights),
     Empirical { quantiles: Vec<f64> },
     Fixed(Value),
@@ -83,20 +83,22 @@ impl Distribution {
         Ok(Self(Kind::TruncatedNormal { mean, sd, bounds: [min, max], standard }))
     }
 
-    /// Log-normal, perhaps cut off above.
+    /// Log-normal, perhaps cut off at either end.
     ///
     /// # Errors
-    /// Unless all are finite and positive, and some probability is left below the bound.
+    /// Unless all are finite and positive, and some probability is left between the bounds.
     pub fn log_normal(config: &LogNormalConfig) -> Result<Self, ConfigError> {
         let median = POSITIVE.check(config.median, "median")?;
         let sigma = Range::above(0.0, LARGEST_SIGMA).check(config.sigma, "sigma")?;
         let max = config.max.map(|max| POSITIVE.check(max, "max")).transpose()?;
+        let min = config.min.map(|min| POSITIVE.check(min, "min")).transpose()?;
         let high = max.map_or(f64::INFINITY, |max| (max / median).ln() / sigma);
-        let standard = TruncatedStandardNormal::new(f64::NEG_INFINITY, high).ok_or_else(|| {
-            let rule = format!("no probability is left below it (sigma {sigma})");
-            ConfigError::new("max", Problem::Contradiction { other: "median", rule })
+        let low = min.map_or(f64::NEG_INFINITY, |min| (min / median).ln() / sigma);
+        let standard = TruncatedStandardNormal::new(low, high).ok_or_else(|| {
+            let rule = format!("no probability is left between `min` and `max` (sigma {sigma})");
+            ConfigError::new(if max.is_some() { "max" } else { "min" }, Problem::Contradiction { other: "median", rule })
         })?;
-        Ok(Self(Kind::LogNormal { median, sigma, max, standard }))
+        Ok(Self(Kind::LogNormal { median, sigma, cut: [min, max], standard }))
     }
 
     /// One of several labels; those with weight 0 never occur.
@@ -173,9 +175,10 @@ impl Distribution {
             Kind::TruncatedNormal { mean, sd, bounds: [min, max], standard } => {
                 Value::Number((mean + sd * standard.quantile(u)).clamp(*min, *max))
             }
-            Kind::LogNormal { median, sigma, max, standard } => {
+            Kind::LogNormal { median, sigma, cut: [min, max], standard } => {
                 let z = standard.quantile(u.max(SMALLEST_PROBABILITY));
-                Value::Number((median * (sigma * z).exp()).min(max.unwrap_or(f64::INFINITY)))
+                let value = (median * (sigma * z).exp()).min(max.unwrap_or(f64::INFINITY));
+                Value::Number(value.max(min.unwrap_or(0.0)))
             }
             Kind::Choice(weights) => {
                 let place = weights.cumulative.partition_point(|&cumulative| cumulative <= u);
@@ -213,9 +216,10 @@ impl Distribution {
     pub fn bounds(&self) -> Option<[f64; 2]> {
         match &self.0 {
             Kind::Uniform { min, max } | Kind::TruncatedNormal { bounds: [min, max], .. } => Some([*min, *max]),
-            Kind::LogNormal { median, sigma, max, standard } => {
+            Kind::LogNormal { median, sigma, cut: [min, max], standard } => {
                 let at = |u| median * (sigma * standard.quantile(u)).exp();
-                Some([at(SMALLEST_PROBABILITY), max.unwrap_or_else(|| at(1.0 - 2.0 * SMALLEST_PROBABILITY))])
+                let low = min.unwrap_or_else(|| at(SMALLEST_PROBABILITY));
+                Some([low, max.unwrap_or_else(|| at(1.0 - 2.0 * SMALLEST_PROBABILITY))])
             }
             Kind::Empirical { quantiles } => Some([quantiles[0], quantiles[quantiles.len() - 1]]),
             Kind::Fixed(Value::Number(value)) => Some([*value, *value]),

@@ -123,7 +123,7 @@ fn numbers_that_are_not_finite_are_refused_without_a_file_too() {
             ..ParameterConfig::default()
         },
         ParameterConfig {
-            log_normal: Some(LogNormalConfig { median: 1.0, sigma: nan, max: None }),
+            log_normal: Some(LogNormalConfig { median: 1.0, sigma: nan, min: None, max: None }),
             ..ParameterConfig::default()
         },
     ] {

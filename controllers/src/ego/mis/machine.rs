@@ -9,6 +9,9 @@ use crate::ego::{EgoInput, EgoState, Reason};
 /// R has fallen back at this multiple of the engaging distance.
 const FELL_BACK_AT: f64 = 1.2;
 
+/// Standard deviations by which R's measured approach must exceed what engaging needs: 95 %, one-sided. A track whose
+/// speed is not settled yet does not engage; a true one does at once.
+const CONFIDENCE_SD: f64 = 1.645;
 /// Share of the engaging closing speed below which R counts as following.
 const FOLLOWS_BELOW: f64 = 0.5;
 
@@ -204,7 +207,8 @@ impl Mis {
         if !(rear.gap_m <= settings.engage_gap_m) {
             return Err(Reason::RearFar);
         }
-        if !(rear.speed_mps - at.speed_mps() >= settings.engage_closing_mps) {
+        let surely_mps = rear.speed_mps - CONFIDENCE_SD * rear.speed_sd_mps;
+        if !(surely_mps - at.speed_mps() >= settings.engage_closing_mps) {
             return Err(Reason::RearNotApproaching);
         }
         match passing_lane(at.input, &rear) {
