@@ -25,6 +25,6 @@ pub use detection::{Detection, Extent};
 pub use full::{DetectionClassifier, FullModel, FullPerception};
 pub use ground_truth::GroundTruth;
 pub use object::{NoiseKey, ObjectPerception, ObjectSensorConfig, ObjectSensorModel};
-pub use perception::{Health, Perception, SCAN_PERIOD, SensorError, SensorHealth};
+pub use perception::{FieldOfView, Health, Perception, SCAN_PERIOD, SensorError, SensorHealth};
 pub use scene::{Scene, SceneVehicle};
 pub use tracking::{TrackAudit, TrackerConfig, TrackerModel};
