@@ -6,6 +6,7 @@
 //!            └ object   range, noise, latency, field of view (front radar, surround; rear as a simple stand-in)  ┘
 //! ```
 
+pub mod camera;
 mod config;
 mod detection;
 mod ego_frame;

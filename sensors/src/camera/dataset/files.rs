@@ -1,0 +1,44 @@
+//! Files that appear whole or not at all: written beside their place, then renamed into it.
+
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use super::DatasetError;
+use crate::camera::Image;
+
+/// A folder to write into.
+pub(super) struct Output {
+    folder: PathBuf,
+}
+
+impl Output {
+    pub(super) fn new(folder: &Path) -> Result<Self, DatasetError> {
+        fs::create_dir_all(folder).map_err(|source| DatasetError::Write { path: folder.to_owned(), source })?;
+        Ok(Self { folder: folder.to_owned() })
+    }
+
+    /// Writes one file.
+    pub(super) fn write(&self, name: &str, bytes: &[u8]) -> Result<(), DatasetError> {
+        let path = self.folder.join(name);
+        let partial = self.folder.join(format!("{name}.partial"));
+        let written = fs::File::create(&partial)
+            .and_then(|mut file| file.write_all(bytes).and_then(|()| file.sync_all()))
+            .and_then(|()| fs::rename(&partial, &path));
+        written.map_err(|source| DatasetError::Write { path, source })
+    }
+
+    /// Writes an image as PNG.
+    pub(super) fn png(&self, name: &str, image: &Image) -> Result<(), DatasetError> {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, image.width, image.height);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        let encoded = encoder.write_header().and_then(|mut writer| {
+            writer.write_image_data(&image.rgb)?;
+            writer.finish()
+        });
+        encoded.map_err(|source| DatasetError::Encode { path: self.folder.join(name), source })?;
+        self.write(name, &bytes)
+    }
+}

@@ -1,0 +1,200 @@
+//! Random scenes behind E: roads, weather, light, and vehicles of every shape and paint.
+
+use std::f64::consts::PI;
+
+use closecall_traffic::{
+    Check, Choice, ConfigError, Dimensions, Environment, Indicator, Lane, Light, Num, Parameters, Road, RoadConfig,
+    Side, Stream, Time, Vehicle, VehicleClass, VehicleState,
+};
+use rand::RngExt;
+
+use super::Set;
+use crate::camera::{Camera, CameraConfig, HELD_OUT, Pipeline, SHAPES, SunConfig, usual_dimensions};
+use crate::{Scene, SceneVehicle};
+
+/// Vehicles stand this far behind E's centre [m].
+const BEHIND_M: std::ops::Range<f64> = 6.0..125.0;
+/// Tries to place a vehicle clear of the others before it is left out.
+const TRIES: usize = 8;
+/// Gap kept between vehicles in a lane [m].
+const CLEAR_M: f64 = 2.0;
+
+/// A random scene that owns what a [`Scene`] borrows.
+pub(super) struct DrawnScene {
+    pub(super) time: Time,
+    pub(super) road: Road,
+    pub(super) environment: Environment,
+    pub(super) camera: Camera,
+    pub(super) ego: SceneVehicle,
+    pub(super) others: Vec<SceneVehicle>,
+}
+
+impl DrawnScene {
+    /// Draws a scene.
+    pub(super) fn draw(set: Set, rng: &mut Stream) -> Result<Self, ConfigError> {
+        let road = road(rng)?;
+        let environment = environment(rng);
+        let camera = camera(rng)?;
+        let lane = Lane(rng.random_range(1..=road.lanes()));
+        let state = VehicleState {
+            s_m: rng.random_range(500.0..20_000.0),
+            d_m: road.lane_centre_m(lane) + rng.random_range(-0.5..0.5),
+            heading_rad: rng.random_range(-0.01..0.01),
+            speed_mps: rng.random_range(18.0..38.0),
+            brake_light: rng.random_bool(0.2),
+            ..VehicleState::default()
+        };
+        let pitch_rad = rng.random_range(-0.012..0.012);
+        let ego = SceneVehicle { actor: 0, vehicle: Vehicle::typical(VehicleClass::Car), state, pitch_rad };
+        let mut drawn = Self {
+            time: Time::from_ms(40 * rng.random_range(0..1_000)),
+            road,
+            environment,
+            camera,
+            ego,
+            others: Vec::new(),
+        };
+        for actor in 1..=rng.random_range(1..=5) {
+            drawn.add_vehicle(actor, set, rng);
+        }
+        Ok(drawn)
+    }
+
+    /// The scene as sensors see it.
+    pub(super) fn scene(&self) -> Scene<'_> {
+        Scene { time: self.time, road: &self.road, environment: &self.environment, ego: self.ego, others: &self.others }
+    }
+
+    fn add_vehicle(&mut self, actor: usize, set: Set, rng: &mut Stream) {
+        let class = VehicleClass::ALL[rng.random_range(0..3)];
+        let mut vehicle = Vehicle::typical(class);
+        vehicle.appearance.body_shape = shape(set, class, rng);
+        vehicle.appearance.paint_rgb = paint(set, rng);
+        vehicle.dimensions = dimensions(class, vehicle.appearance.body_shape, rng);
+        for _ in 0..TRIES {
+            let lane = Lane(rng.random_range(1..=self.road.lanes()));
+            let gap = vehicle.dimensions.length_m / 2.0 + rng.random_range(BEHIND_M);
+            let changing = if rng.random_bool(0.15) { rng.random_range(-0.07..0.07) } else { 0.0 };
+            let state = VehicleState {
+                s_m: self.ego.state.s_m - gap,
+                d_m: self.road.lane_centre_m(lane) + rng.random_range(-0.7..0.7) + 20.0 * changing,
+                heading_rad: rng.random_range(-0.01..0.01) + changing,
+                speed_mps: self.ego.state.speed_mps + rng.random_range(-5.0..14.0),
+                indicator: [Indicator::Off, Indicator::Left, Indicator::Right][rng.random_range(0..3)],
+                ..VehicleState::default()
+            };
+            let candidate = SceneVehicle { actor, vehicle, state, pitch_rad: rng.random_range(-0.01..0.02) };
+            if self.others.iter().all(|other| are_clear(other, &candidate)) {
+                self.others.push(candidate);
+                return;
+            }
+        }
+    }
+}
+
+fn are_clear(a: &SceneVehicle, b: &SceneVehicle) -> bool {
+    let along =
+        (a.state.s_m - b.state.s_m).abs() - (a.vehicle.dimensions.length_m + b.vehicle.dimensions.length_m) / 2.0;
+    let across =
+        (a.state.d_m - b.state.d_m).abs() - (a.vehicle.dimensions.width_m + b.vehicle.dimensions.width_m) / 2.0;
+    along > CLEAR_M || across > 0.3
+}
+
+fn road(rng: &mut Stream) -> Result<Road, ConfigError> {
+    let config = RoadConfig {
+        lanes: rng.random_range(2..=4),
+        lane_width_m: Num::Fixed(rng.random_range(3.5..3.8)),
+        curvature_per_m: Num::Fixed(if rng.random_bool(0.5) { rng.random_range(-0.001..0.001) } else { 0.0 }),
+        speed_limit_mps: Num::Fixed(36.1),
+        overtaking_side: Side::Left,
+        guard_rails: rng.random_bool(0.5),
+    };
+    config.check(&Parameters::default())
+}
+
+fn environment(rng: &mut Stream) -> Environment {
+    let light = [Light::Day, Light::Day, Light::Dusk, Light::Night, Light::Night][rng.random_range(0..5)];
+    let mut drawn = Environment { light, visibility_m: rng.random_range(3_000.0..20_000.0), ..Environment::CLEAR_DAY };
+    match rng.random_range(0..10) {
+        0 => drawn.visibility_m = rng.random_range(80.0..500.0),
+        1..=4 => {
+            drawn.rain_mm_per_h = rng.random_range(0.5..15.0);
+            drawn.water_film_mm = rng.random_range(0.05..1.2);
+            drawn.visibility_m = rng.random_range(800.0..6_000.0);
+        }
+        // After the rain: wet road, no drops.
+        5 => drawn.water_film_mm = rng.random_range(0.05..0.8),
+        _ => {}
+    }
+    drawn
+}
+
+fn camera(rng: &mut Stream) -> Result<Camera, ConfigError> {
+    let dirt: f64 = rng.random_range(0.0..0.55);
+    let config = CameraConfig {
+        pipeline: Choice::Fixed(Pipeline::CropClassifier),
+        mount_height_m: Num::Fixed(rng.random_range(1.05..1.4)),
+        mount_from_rear_m: Num::Fixed(rng.random_range(0.3..1.0)),
+        pitch_rad: Num::Fixed(rng.random_range(0.0..0.06)),
+        vibration_radps: Num::Fixed(rng.random_range(0.0..0.12)),
+        dirt: Num::Fixed(dirt * dirt),
+        exposure_ev: Num::Fixed(rng.random_range(-0.6..0.6)),
+        sun: SunConfig {
+            azimuth_rad: Num::Fixed(rng.random_range(-PI..PI)),
+            elevation_rad: Num::Fixed(rng.random_range(0.08..1.2)),
+        },
+    };
+    config.check(&Parameters::default())
+}
+
+fn shape(set: Set, class: VehicleClass, rng: &mut Stream) -> u8 {
+    let held_out = HELD_OUT[class as usize];
+    match set {
+        Set::HeldOut => held_out[rng.random_range(0..held_out.len())],
+        Set::Training => loop {
+            let shape = rng.random_range(0..SHAPES[class as usize]);
+            if !held_out.contains(&shape) {
+                return shape;
+            }
+        },
+    }
+}
+
+/// A third of the vehicles have the class's typical size, whatever their shape, as in a scenario that does not say.
+fn dimensions(class: VehicleClass, shape: u8, rng: &mut Stream) -> Dimensions {
+    let usual = if rng.random_bool(1.0 / 3.0) { class.typical_dimensions() } else { usual_dimensions(class, shape) };
+    Dimensions {
+        length_m: usual.length_m * rng.random_range(0.93..1.07),
+        width_m: usual.width_m * rng.random_range(0.95..1.05),
+        height_m: usual.height_m * rng.random_range(0.94..1.06),
+    }
+}
+
+/// Half of the vehicles are grey, the others coloured. The sets differ in the bands of brightness and of hue.
+fn paint(set: Set, rng: &mut Stream) -> [u8; 3] {
+    /// Each sixth of a scale belongs to the held-out set where it has an odd fifth part.
+    const BANDS: f64 = 5.0;
+    let banded = |rng: &mut Stream| loop {
+        let value: f64 = rng.random();
+        let is_held_out = (value * BANDS).fract() > 0.75;
+        if is_held_out == (set == Set::HeldOut) {
+            return value;
+        }
+    };
+    if rng.random_bool(0.5) {
+        let grey = 0.05 + 0.9 * banded(rng);
+        return [grey, grey, grey * rng.random_range(0.95..1.05)].map(byte);
+    }
+    let (hue, saturation, value) = (banded(rng), rng.random_range(0.3..0.95), rng.random_range(0.15..0.95));
+    let channel = |shift: f64| {
+        let place = (hue + shift).fract() * 6.0;
+        let share = ((place - 3.0).abs() - 1.0).clamp(0.0, 1.0);
+        value * (1.0 - saturation * (1.0 - share))
+    };
+    [channel(0.0), channel(2.0 / 3.0), channel(1.0 / 3.0)].map(byte)
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 0 … 255 before the cast")]
+fn byte(share: f64) -> u8 {
+    (share * 255.0).round().clamp(0.0, 255.0) as u8
+}

@@ -1,0 +1,197 @@
+//! The pixels of an exposure.
+//!
+//! Each is a function of (scene, pixel, key) alone: nothing here remembers what was drawn before.
+
+use super::Frame;
+use super::body::{MOMENTS, drawn};
+use super::frame::touches;
+use super::glow::{self, Glow};
+use super::ground::Patch;
+use super::image::{CHANNELS, Crop, Image, LabelledImage, crop_places};
+use super::mesh::{Texture, Vec3, dot, each};
+use super::pinhole::{HEIGHT_PX, PixelRect, WIDTH_PX};
+use super::raster::{Lattice, STEPS};
+use super::sky;
+use super::spray::Cloud;
+
+/// The ground ends in woods at this distance [m].
+const GROUND_TO_M: f32 = 350.0;
+
+/// What reaches the pixels that are being drawn.
+struct Reach {
+    patches: Vec<Patch>,
+    clouds: Vec<Cloud>,
+    glows: Vec<Glow>,
+}
+
+impl Frame {
+    /// The whole image with the instance that each pixel shows.
+    pub fn image(&mut self) -> LabelledImage {
+        /// Side of the squares in which the image is drawn: their samples fit the processor's cache.
+        const TILE: i32 = 64;
+        let (width, height) = (i32::from(WIDTH_PX), i32::from(HEIGHT_PX));
+        let mut rgb = vec![0; usize::from(WIDTH_PX) * usize::from(HEIGHT_PX) * CHANNELS];
+        let mut instances = vec![0; usize::from(WIDTH_PX) * usize::from(HEIGHT_PX)];
+        let mut tile = Vec::new();
+        for top in (0..height).step_by(TILE as usize) {
+            let rows: Vec<i32> = (top..(top + TILE).min(height)).collect();
+            for left in (0..width).step_by(TILE as usize) {
+                let columns: Vec<i32> = (left..(left + TILE).min(width)).collect();
+                tile.resize(rows.len() * columns.len() * CHANNELS, 0);
+                self.draw(&columns, &rows, &mut tile);
+                for (row, line) in tile.chunks_exact(columns.len() * CHANNELS).enumerate() {
+                    let at = (top as usize + row) * usize::from(WIDTH_PX) + left as usize;
+                    rgb[at * CHANNELS..at * CHANNELS + line.len()].copy_from_slice(line);
+                    for column in 0..columns.len() {
+                        instances[at + column] = self.instance(row * columns.len() + column);
+                    }
+                }
+            }
+        }
+        LabelledImage { image: Image { width: WIDTH_PX.into(), height: HEIGHT_PX.into(), rgb }, instances }
+    }
+
+    /// The samples of a square window, for the classifier.
+    pub fn crop(&mut self, window: PixelRect, crop: &mut Crop) {
+        let columns = crop_places(window.left, window.width);
+        let rows = crop_places(window.top, window.height);
+        crop.window = window;
+        self.draw(&columns, &rows, &mut crop.rgb);
+        let inside = |place: i32, limit: u16| (0..i32::from(limit)).contains(&place);
+        for (pixel, rgb) in crop.rgb.chunks_exact_mut(CHANNELS).enumerate() {
+            let (column, row) = (columns[pixel % columns.len()], rows[pixel / columns.len()]);
+            if !(inside(column, WIDTH_PX) && inside(row, HEIGHT_PX)) {
+                rgb.fill(0);
+            }
+        }
+    }
+
+    /// Share of the latest crop's samples that show the vehicle at this place in the scene's list of others.
+    pub fn share_of_latest(&self, other: usize) -> f64 {
+        let samples = self.lists.visibility[0].face.len();
+        let hits = (0..samples).filter(|sample| usize::from(self.instance(*sample)) == other + 1).count();
+        hits as f64 / samples.max(1) as f64
+    }
+
+    /// The instance that a sample of the latest drawing shows.
+    fn instance(&self, sample: usize) -> u16 {
+        let face = self.lists.visibility[0].face[sample] as usize;
+        self.lists.faces.get(face).map_or(0, |shade| shade.instance)
+    }
+
+    /// Draws the pixels at the crossings of `columns` and `rows`.
+    fn draw(&mut self, columns: &[i32], rows: &[i32], rgb: &mut [u8]) {
+        let (Some(left), Some(right), Some(top), Some(bottom)) =
+            (columns.first(), columns.last(), rows.first(), rows.last())
+        else {
+            return;
+        };
+        let bounds = [*left as f32, *top as f32, *right as f32 + 1.0, *bottom as f32 + 1.0];
+        for moment in 0..MOMENTS {
+            let lattice = Lattice { columns, rows, within: self.within[moment] };
+            self.lists.visibility[moment].clear(columns.len() * rows.len());
+            for object in self.lists.objects.iter().filter(|object| touches(&object.bounds, &bounds)) {
+                self.lists.visibility[moment]
+                    .draw(&self.lists.triangles[moment][object.triangles[moment].clone()], &lattice);
+            }
+        }
+        let reach = Reach {
+            patches: self
+                .lists
+                .patches
+                .iter()
+                .filter(|(own, _)| touches(own, &bounds))
+                .map(|(_, patch)| *patch)
+                .collect(),
+            clouds: self
+                .lists
+                .clouds
+                .iter()
+                .filter(|(own, _)| touches(own, &bounds))
+                .map(|(_, cloud)| *cloud)
+                .collect(),
+            glows: self.lists.glows.iter().filter(|(own, _)| touches(own, &bounds)).map(|(_, glow)| *glow).collect(),
+        };
+        for (sample, out) in rgb.chunks_exact_mut(CHANNELS).enumerate() {
+            let pixel = [columns[sample % columns.len()], rows[sample / columns.len()]];
+            out.copy_from_slice(&self.pixel(sample, pixel, &reach));
+        }
+    }
+
+    fn pixel(&self, sample: usize, pixel: [i32; 2], reach: &Reach) -> [u8; 3] {
+        let (centre, length) = self.ray(pixel, [STEPS / 2; 2]);
+        let mut sum = [0.0; 3];
+        let mut nearness = 0.0;
+        for moment in 0..MOMENTS {
+            let (radiance, inverse_depth) = self.sample(sample, moment, pixel, length, &reach.patches);
+            nearness += inverse_depth;
+            for (sum, part) in sum.iter_mut().zip(radiance) {
+                *sum += part;
+            }
+        }
+        let mut light = sum.map(|part| part / MOMENTS as f32);
+        let direction = self.lens.ray_in_ground(centre).map(|part| part / length);
+        let mut thickness = 0.0;
+        for cloud in &reach.clouds {
+            thickness += cloud.optical_depth(direction, length * MOMENTS as f32 / nearness.max(1e-3));
+        }
+        if thickness > 0.0 {
+            let left = 1.0 / (1.0 + thickness * (1.0 + 0.5 * thickness));
+            let air = each(|i| 0.92 * self.light.ambient[i].max(self.light.horizon[i] * 0.8));
+            light = each(|i| air[i] + (light[i] - air[i]) * left);
+        }
+        let at = [pixel[0] as f32 + 0.5, pixel[1] as f32 + 0.5];
+        for glow in &reach.glows {
+            glow.add_to(at, &mut light);
+        }
+        let glare = glow::sun(direction, &self.light);
+        let seen = self.window.seen_through(pixel, each(|i| light[i] + glare[i]), &self.light);
+        self.window.develop(pixel, seen, &self.light)
+    }
+
+    /// The ray through a place within a pixel, in camera axes with depth 1: (x, y), and its length.
+    fn ray(&self, pixel: [i32; 2], within: [i32; 2]) -> ([f32; 2], f32) {
+        let steps = STEPS as f32;
+        let focal = self.lens.focal_px as f32;
+        let part = |axis: usize, extent: u16| {
+            let place = (pixel[axis] * STEPS + within[axis]) as f32 / steps;
+            (place - f32::from(extent) / 2.0) / focal
+        };
+        let [x, y] = [part(0, WIDTH_PX), part(1, HEIGHT_PX)];
+        ([x, y], (x * x + y * y + 1.0).sqrt())
+    }
+
+    /// Radiance and 1/depth of what one sample sees.
+    fn sample(&self, sample: usize, moment: usize, pixel: [i32; 2], length: f32, patches: &[Patch]) -> (Vec3, f32) {
+        let (ray, _) = self.ray(pixel, self.within[moment]);
+        let inverse_depth = self.lists.visibility[moment].inverse_depth[sample];
+        if inverse_depth > 0.0 {
+            let depth = 1.0 / inverse_depth;
+            let shade = &self.lists.faces[self.lists.visibility[moment].face[sample] as usize];
+            let mut radiance = shade.radiance;
+            if shade.texture != Texture::Plain {
+                let at = [ray[0] * depth, ray[1] * depth, depth];
+                let [u, v] = [0, 1].map(|axis| dot(shade.map[axis], at) + shade.offset[axis]);
+                let factor = drawn(shade.texture, u, v);
+                radiance = radiance.map(|part| part * factor);
+            }
+            return (self.through_air(radiance, depth * length), inverse_depth);
+        }
+        let direction = self.lens.ray_in_ground(ray);
+        let run = (direction[0] * direction[0] + direction[1] * direction[1]).sqrt();
+        let slope = direction[2] / run;
+        let height = self.lens.height_m as f32;
+        if slope * GROUND_TO_M < -height {
+            let depth = -height / direction[2];
+            let at = [direction[0] * depth, direction[1] * depth];
+            let radiance = self.ground.radiance(at, self.flow_m[moment], &self.light, patches);
+            return (self.through_air(radiance, depth * length), 1.0 / depth);
+        }
+        (sky::radiance(slope, -direction[1] / direction[0] + self.bearing, &self.light), 0.0)
+    }
+
+    fn through_air(&self, radiance: Vec3, distance_m: f32) -> Vec3 {
+        let left = self.light.transmission(distance_m);
+        each(|i| self.light.horizon[i] + (radiance[i] - self.light.horizon[i]) * left)
+    }
+}

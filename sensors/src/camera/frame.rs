@@ -1,0 +1,330 @@
+//! One exposure: the scene prepared for the lens, of which any pixel can be drawn (`draw.rs` does that).
+//!
+//! ```text
+//!   bodies ─ lit, projected at 4 moments ─▶ which face does each sample see? ─▶ radiance ─▶ air ─▶ mean of 4
+//!   ground, sky ──────────────────────────▶ where it sees none                                        │
+//!                                             bytes ◀─ noise, exposure ◀─ window ◀─ glow ◀─ spray ◀───┘
+//! ```
+//!
+//! **A crop is identical to the same pixels of the whole image, bit for bit**: a pixel is a function of (scene, pixel,
+//! key) alone. Bodies, shadows, clouds and halos that cannot reach the pixels asked for are left out, by bounds that
+//! are never too small; each of them contributes nothing at all beyond its bounds.
+
+use closecall_traffic::{Indicator, Time};
+
+use super::body::{Eye, MOMENTS, Placement, Shade, add, moment_offset};
+use super::glow::Glow;
+use super::ground::{BEAM_M, CONTACT_SHADOW_M, Ground, LONGEST_SHADOW_M, Patch, PatchKind};
+use super::hash::{mix, normal3};
+use super::light::Illumination;
+use super::mesh::{Emission, Mesh};
+use super::pinhole::{GroundBox, Lens, PixelRect};
+use super::raster::{STEPS, ScreenTriangle, Visibility};
+use super::spray::{self, Cloud};
+use super::window::Window;
+use super::{Camera, ExposureKey, shapes};
+use crate::{Scene, SceneVehicle};
+
+/// Bodies farther away than this are not drawn [m].
+const FARTHEST_M: f64 = 400.0;
+/// Where within a pixel the samples of the moments lie: a rotated grid [1/256 px].
+const WITHIN: [[i32; 2]; MOMENTS] = [[32, 160], [96, 32], [224, 96], [160, 224]];
+/// Bounds are widened by this to cover vibration, motion within the exposure, and rounding [px].
+const MARGIN_PX: f64 = 24.0;
+/// Longest shift of the image by vibration during an exposure [px].
+const SHAKE_LIMIT_PX: f64 = 6.0;
+/// Drops on the window move, and are wiped away, this often.
+const DROPS_LAST: Time = Time::from_ms(400);
+/// An indicator is on for half of this time.
+const BLINK: Time = Time::from_ms(700);
+
+/// Bounds in the image [left, top, right, bottom, px].
+pub(super) type Bounds = [f32; 4];
+
+/// One body's triangles.
+pub(super) struct Object {
+    pub(super) bounds: Bounds,
+    /// Places in the lists of triangles.
+    pub(super) triangles: [std::ops::Range<usize>; MOMENTS],
+}
+
+/// One exposure of the rear camera.
+pub struct Frame {
+    pub(super) lens: Lens,
+    pub(super) light: Illumination,
+    pub(super) ground: Ground,
+    pub(super) window: Window,
+    /// Places of the samples within a pixel, with vibration [1/256 px].
+    pub(super) within: [[i32; 2]; MOMENTS],
+    /// How far the road moves along s until each moment [m].
+    pub(super) flow_m: [f32; MOMENTS],
+    pub(super) bearing: f32,
+    pub(super) lists: Lists,
+}
+
+/// The lists of a frame, which another one can take over to save their allocation.
+#[derive(Default)]
+pub struct Lists {
+    pub(super) objects: Vec<Object>,
+    pub(super) triangles: [Vec<ScreenTriangle>; MOMENTS],
+    pub(super) faces: Vec<Shade>,
+    pub(super) patches: Vec<(Bounds, Patch)>,
+    pub(super) clouds: Vec<(Bounds, Cloud)>,
+    pub(super) glows: Vec<(Bounds, Glow)>,
+    pub(super) visibility: [Visibility; MOMENTS],
+}
+
+impl std::fmt::Debug for Lists {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Lists").field("faces", &self.faces.len()).finish_non_exhaustive()
+    }
+}
+
+impl Lists {
+    fn clear(&mut self) {
+        self.objects.clear();
+        self.triangles.iter_mut().for_each(Vec::clear);
+        self.faces.clear();
+        self.patches.clear();
+        self.clouds.clear();
+        self.glows.clear();
+    }
+}
+
+impl Frame {
+    /// Prepares what can be seen within the rectangles `regions` of an exposure; drawing elsewhere is not meaningful.
+    pub fn new(camera: &Camera, scene: &Scene<'_>, key: ExposureKey, regions: &[PixelRect]) -> Self {
+        Self::reusing(Lists::default(), camera, scene, key, regions)
+    }
+
+    /// The same, in the lists of an earlier frame.
+    pub fn reusing(
+        mut lists: Lists,
+        camera: &Camera,
+        scene: &Scene<'_>,
+        key: ExposureKey,
+        regions: &[PixelRect],
+    ) -> Self {
+        lists.clear();
+        let lens = Lens::new(camera, &scene.ego);
+        let ego = &scene.ego.state;
+        let yaw = scene.road.plane_pose(ego.s_m, ego.d_m, ego.heading_rad).yaw_rad;
+        let light = Illumination::new(scene.environment, camera, ego, yaw);
+        let (sin, cos) = ego.heading_rad.sin_cos();
+        let (s_m, d_m) = (ego.s_m + lens.ahead_m * cos, ego.d_m + lens.ahead_m * sin);
+        let drops = scene.time.ns() / DROPS_LAST.ns();
+        let mut frame = Self {
+            lens,
+            ground: Ground::new(scene.road, s_m, d_m, ego.heading_rad),
+            window: Window { dirt: camera.dirt as f32, drops_key: mix(drops as u64), noise_key: key.0 },
+            within: shaken(camera, &light, &lens, key),
+            flow_m: [0, 1, 2, 3].map(|moment| (ego.speed_mps * moment_offset(moment)) as f32 * light.exposure_s),
+            light,
+            bearing: yaw as f32,
+            lists,
+        };
+        for (place, vehicle) in scene.others.iter().enumerate() {
+            frame.add_vehicle(scene, vehicle, u16::try_from(place + 1).unwrap_or(0), regions);
+        }
+        frame.add_roadside(scene, s_m, regions);
+        let own =
+            spray::behind(&scene.ego, scene, [-lens.ahead_m as f32, 0.0], [1.0, 0.0], lens.height_m as f32, key.0);
+        frame.add_clouds(own);
+        frame
+    }
+
+    /// The lists, for the next frame.
+    pub fn into_lists(self) -> Lists {
+        self.lists
+    }
+
+    fn add_vehicle(&mut self, scene: &Scene<'_>, vehicle: &SceneVehicle, instance: u16, regions: &[PixelRect]) {
+        let (at, heading) = self.lens.place(scene, vehicle);
+        if !(at[0].abs() < FARTHEST_M) {
+            return;
+        }
+        let (sin, cos) = heading.sin_cos();
+        let size = vehicle.vehicle.dimensions;
+        let ego = &scene.ego.state;
+        let speed = vehicle.state.speed_mps;
+        let placement = Placement {
+            at,
+            turn: [cos, sin],
+            pitch_rad: vehicle.pitch_rad,
+            velocity: [speed * cos - ego.speed_mps, speed * sin],
+            instance,
+        };
+        let body = GroundBox {
+            x_m: at[0],
+            y_m: at[1],
+            heading_rad: heading,
+            length_m: size.length_m + 0.4,
+            width_m: size.width_m + 0.6,
+            height_m: size.height_m + 0.3,
+        };
+        self.add_patches(&body, size.height_m);
+        let turn = [cos as f32, sin as f32];
+        let clouds =
+            spray::behind(vehicle, scene, at.map(|x| x as f32), turn, self.lens.height_m as f32, self.window.noise_key);
+        self.add_clouds(clouds);
+        let bounds = self.bounds_of(&body);
+        let lamps_matter = self.light.is_dark() && bounds.is_some();
+        let is_wanted =
+            bounds.is_some_and(|bounds| regions.iter().any(|region| touches(&bounds, &bounds_of_rect(region))));
+        if !(is_wanted || lamps_matter) {
+            return;
+        }
+        let mesh = shapes::vehicle(&vehicle.vehicle);
+        let indicators = blinking(vehicle.state.indicator, scene.time);
+        if lamps_matter {
+            self.add_glows(&mesh, &placement, indicators);
+        }
+        if let (true, Some(bounds)) = (is_wanted, bounds) {
+            self.add_object(&mesh, &placement, indicators, bounds);
+        }
+    }
+
+    fn add_object(&mut self, mesh: &Mesh, placement: &Placement, indicators: [bool; 2], bounds: Bounds) {
+        let before: [usize; MOMENTS] = std::array::from_fn(|moment| self.lists.triangles[moment].len());
+        let eye = Eye { lens: &self.lens, light: &self.light, indicators };
+        add(mesh, placement, &eye, &mut self.lists.faces, &mut self.lists.triangles);
+        let triangles = std::array::from_fn(|moment| before[moment]..self.lists.triangles[moment].len());
+        self.lists.objects.push(Object { bounds, triangles });
+    }
+
+    fn add_roadside(&mut self, scene: &Scene<'_>, s_m: f64, regions: &[PixelRect]) {
+        for body in shapes::roadside(scene.road, s_m) {
+            let mut stand = SceneVehicle { pitch_rad: 0.0, ..scene.ego };
+            stand.state = closecall_traffic::VehicleState { s_m: body.s_m, d_m: body.d_m, ..Default::default() };
+            let (at, heading) = self.lens.place(scene, &stand);
+            let [half_length, half_width, height_m] = body.extent_m.map(f64::from);
+            let around = GroundBox {
+                x_m: at[0],
+                y_m: at[1],
+                heading_rad: heading,
+                length_m: 2.0 * half_length,
+                width_m: 2.0 * half_width,
+                height_m,
+            };
+            let Some(bounds) = self.bounds_of(&around) else { continue };
+            if !regions.iter().any(|region| touches(&bounds, &bounds_of_rect(region))) {
+                continue;
+            }
+            let (sin, cos) = heading.sin_cos();
+            let velocity = [-scene.ego.state.speed_mps, 0.0];
+            let placement = Placement { at, turn: [cos, sin], pitch_rad: 0.0, velocity, instance: 0 };
+            self.add_object(&body.mesh(), &placement, [false; 2], bounds);
+        }
+    }
+
+    fn add_patches(&mut self, body: &GroundBox, height_m: f64) {
+        let (sin, cos) = body.heading_rad.sin_cos();
+        let patch = Patch {
+            at: [body.x_m as f32, body.y_m as f32],
+            turn: [cos as f32, sin as f32],
+            extent: [(body.length_m / 2.0 - 0.2) as f32, (body.width_m / 2.0 - 0.3) as f32, height_m as f32],
+            kind: PatchKind::Shadow,
+        };
+        let sun = if self.light.sun[0] > 0.0 { f64::from(LONGEST_SHADOW_M) } else { 0.0 };
+        let grown = 2.0 * (f64::from(CONTACT_SHADOW_M) + sun);
+        let shadow =
+            GroundBox { length_m: body.length_m + grown, width_m: body.width_m + grown, height_m: 0.0, ..*body };
+        if let Some(bounds) = self.bounds_of(&shadow) {
+            self.lists.patches.push((bounds, patch));
+        }
+        if self.light.is_dark() {
+            let [far, wide] = BEAM_M.map(f64::from);
+            let ahead = (body.length_m + far) / 2.0;
+            let lit = GroundBox {
+                x_m: body.x_m + ahead * cos,
+                y_m: body.y_m + ahead * sin,
+                length_m: far + 1.0,
+                width_m: 2.0 * wide,
+                height_m: 0.0,
+                ..*body
+            };
+            if let Some(bounds) = self.bounds_of(&lit) {
+                self.lists.patches.push((bounds, Patch { kind: PatchKind::Beam, ..patch }));
+            }
+        }
+    }
+
+    fn add_clouds(&mut self, clouds: Vec<Cloud>) {
+        for cloud in clouds {
+            let radius = f64::from(cloud.radius_m);
+            let [x, y, up] = cloud.at.map(f64::from);
+            let corners: [[f64; 3]; 8] = std::array::from_fn(|corner| {
+                let sign = |bit: usize| if corner >> bit & 1 == 0 { -radius } else { radius };
+                self.lens.to_camera([x + sign(0), y + sign(1), up + self.lens.height_m + sign(2)])
+            });
+            if let Some(bounds) = self.lens.bounds(&corners) {
+                self.lists.clouds.push((widened(bounds), cloud));
+            }
+        }
+    }
+
+    fn add_glows(&mut self, mesh: &Mesh, placement: &Placement, indicators: [bool; 2]) {
+        let [cos, sin] = placement.turn;
+        let bearing = (placement.at[0].powi(2) + placement.at[1].powi(2)).sqrt().max(1.0);
+        let facing = -(cos * placement.at[0] + sin * placement.at[1]) / bearing;
+        for lamp in &mesh.lamps {
+            let [x, y, z] = lamp.at.map(f64::from);
+            let ground = [placement.at[0] + cos * x - sin * y, placement.at[1] + sin * x + cos * y];
+            let radiance = self.light.emitted(lamp.emission, |is_left| indicators[usize::from(!is_left)]);
+            let camera = self.lens.to_camera([ground[0], ground[1], z]);
+            if camera[2] < 1.0 || radiance[0] <= 0.0 {
+                continue;
+            }
+            let place = |point: [f64; 3]| self.lens.pixel(point).map(|x| x as f32);
+            let left = self.light.transmission(camera[2] as f32);
+            let strength = if lamp.emission == Emission::Headlamp { 1.0 } else { 0.15 };
+            let halo =
+                Glow::halo(place(camera), camera[2] as f32, facing as f32, radiance.map(|x| x * left * strength));
+            self.lists.glows.push((halo.bounds(), halo));
+            let mirrored = self.lens.to_camera([ground[0], ground[1], -z]);
+            if self.light.wetness > 0.0 && mirrored[2] > 1.0 {
+                let streak = Glow::streak(place(mirrored), &halo, self.light.wetness);
+                self.lists.glows.push((streak.bounds(), streak));
+            }
+        }
+    }
+
+    /// Bounds in the image of a box given in the ground frame, never too small.
+    fn bounds_of(&self, body: &GroundBox) -> Option<Bounds> {
+        let corners = body.corners().map(|corner| self.lens.to_camera(corner));
+        self.lens.bounds(&corners).map(widened)
+    }
+}
+
+fn widened([left, top, right, bottom]: [f64; 4]) -> Bounds {
+    [left - MARGIN_PX, top - MARGIN_PX, right + MARGIN_PX, bottom + MARGIN_PX].map(|place| place as f32)
+}
+
+fn bounds_of_rect(rect: &PixelRect) -> Bounds {
+    let (right, bottom) = (i64::from(rect.left) + i64::from(rect.width), i64::from(rect.top) + i64::from(rect.height));
+    [rect.left as f32, rect.top as f32, right as f32, bottom as f32]
+}
+
+pub(super) fn touches(a: &Bounds, b: &Bounds) -> bool {
+    a[0] <= b[2] && b[0] <= a[2] && a[1] <= b[3] && b[1] <= a[3]
+}
+
+/// Whether the left and the right indicator shine at this time.
+fn blinking(indicator: Indicator, time: Time) -> [bool; 2] {
+    let on = time.ns().rem_euclid(BLINK.ns()) < BLINK.ns() / 2;
+    [on && indicator == Indicator::Left, on && indicator == Indicator::Right]
+}
+
+/// Where the samples of each moment lie within the pixels, the camera turning at a constant rate meanwhile.
+fn shaken(camera: &Camera, light: &Illumination, lens: &Lens, key: ExposureKey) -> [[i32; 2]; MOMENTS] {
+    let [yaw, pitch, _] = normal3(mix(key.0 ^ 0x7368_616b));
+    #[expect(clippy::cast_possible_truncation, reason = "limited to a few pixels before the cast")]
+    let shift = |rate: f32, moment: usize| {
+        let turned = camera.vibration_radps * f64::from(rate * light.exposure_s) * moment_offset(moment);
+        ((turned * lens.focal_px).clamp(-SHAKE_LIMIT_PX, SHAKE_LIMIT_PX) * f64::from(STEPS)) as i32
+    };
+    std::array::from_fn(|moment| {
+        let [x, y] = WITHIN[moment];
+        [x + shift(yaw, moment), y + shift(pitch, moment)]
+    })
+}

@@ -1,0 +1,256 @@
+//! The road's surface with its markings, the verge, and the light and shadow that vehicles cast on it.
+//!
+//! Markings follow German practice for motorways: edge lines 0.30 m wide, lane lines 0.15 m, 6 m long every 18 m.
+
+use closecall_traffic::Road;
+
+use super::hash::{noise_2d, split};
+use super::light::Illumination;
+use super::mesh::{Vec3, each};
+
+const EDGE_LINE_HALF_M: f32 = 0.15;
+const LANE_LINE_HALF_M: f32 = 0.075;
+const DASH_M: f32 = 6.0;
+const DASH_EVERY_M: f32 = 18.0;
+/// Dashes merge into a grey line where one pixel row spans them [m].
+const DASHES_MERGE_M: [f32; 2] = [60.0, 110.0];
+/// Paved shoulder left of the leftmost lane, and right of the rightmost [m].
+const SHOULDER_M: [f32; 2] = [1.3, 2.6];
+/// Beyond this the grain of the asphalt is finer than a pixel [m].
+const GRAIN_TO_M: f32 = 50.0;
+const ASPHALT: Vec3 = [0.105, 0.105, 0.108];
+const PAINT: Vec3 = [0.62, 0.62, 0.60];
+const GRASS: Vec3 = [0.075, 0.11, 0.035];
+const GRASS_KEY: u64 = 0x0067_7261_7373;
+const ASPHALT_KEY: u64 = 0x6173_7068;
+
+/// The road's surface as seen from one place.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Ground {
+    /// Lens above the road: its place along the road [m], modulo the textures' period, and its lateral place [m].
+    s_m: f32,
+    d_m: f32,
+    /// Cosine and sine of E's heading relative to the road.
+    cos: f32,
+    sin: f32,
+    curvature_per_m: f32,
+    lane_width_m: f32,
+    lanes: f32,
+}
+
+/// Light or shadow on the ground, with the support in the image that it is confined to.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Patch {
+    /// The vehicle's place in the ground frame [m].
+    pub(crate) at: [f32; 2],
+    /// Cosine and sine of its heading in the ground frame.
+    pub(crate) turn: [f32; 2],
+    /// Half its length, half its width, its height [m].
+    pub(crate) extent: Vec3,
+    /// What it does.
+    pub(crate) kind: PatchKind,
+}
+
+/// What a vehicle does to the ground around it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum PatchKind {
+    /// It hides the sky and the sun.
+    Shadow,
+    /// Its headlamps light the road ahead.
+    Beam,
+}
+
+/// How far beyond a vehicle's box its contact shadow reaches [m].
+pub(crate) const CONTACT_SHADOW_M: f32 = 0.6;
+/// The longest sun shadow [m].
+pub(crate) const LONGEST_SHADOW_M: f32 = 8.0;
+/// How far ahead headlamps light the road, and how far to each side at most [m].
+pub(crate) const BEAM_M: [f32; 2] = [45.0, 8.0];
+
+/// What the patches do to one point of the ground.
+struct PatchLight {
+    sky: f32,
+    sun: f32,
+    beam: f32,
+}
+
+impl Ground {
+    /// The surface of `road` under a lens at (`s_m`, `d_m`), in a vehicle with this heading relative to the road.
+    pub(crate) fn new(road: &Road, s_m: f64, d_m: f64, heading_rad: f64) -> Self {
+        /// A multiple of the dashes' period and of the textures' cells, so that numbers stay small [m].
+        const PERIOD_M: f64 = 18.0 * 512.0;
+        Self {
+            s_m: s_m.rem_euclid(PERIOD_M) as f32,
+            d_m: d_m as f32,
+            cos: heading_rad.cos() as f32,
+            sin: heading_rad.sin() as f32,
+            curvature_per_m: road.curvature_per_m() as f32,
+            lane_width_m: road.lane_width_m() as f32,
+            lanes: f32::from(road.lanes()),
+        }
+    }
+
+    /// Road coordinates (s, d) [m] of the ground frame's point (x, y).
+    ///
+    /// With the reference line a circle of curvature κ touching the X axis, d = −q/(1 + √(1 + κ·q)) for
+    /// q = κ·(X² + Y²) − 2·Y, which stays exact as κ → 0; s = X/(1 − κ·Y) to third order, which only places dashes.
+    fn road_position(&self, x: f32, y: f32) -> (f32, f32) {
+        let along = self.cos * x - self.sin * y;
+        let across = self.d_m + self.sin * x + self.cos * y;
+        let k = self.curvature_per_m;
+        let q = k * (along * along + across * across) - 2.0 * across;
+        let d = -q / (1.0 + (1.0 + k * q).max(0.0).sqrt());
+        let tangent = along / (1.0 - k * across);
+        let bend = k * tangent;
+        (self.s_m + tangent * (1.0 - bend * bend / 3.0), d)
+    }
+
+    /// Radiance of the ground at (x, y) of the ground frame, `slope` being the ray's fall over its run, seen after
+    /// the road has moved by `flow_m` along s.
+    pub(crate) fn radiance(&self, [x, y]: [f32; 2], flow_m: f32, light: &Illumination, patches: &[Patch]) -> Vec3 {
+        let (s, d) = self.road_position(x, y);
+        let s = s + flow_m;
+        let run = -x;
+        let (albedo, gloss) = self.albedo(s, d, run, light.wetness);
+        let cast = cast_by(patches, [x, y], light);
+        let up = light.to_sun[2].max(0.0);
+        let mirrored = light.sky(0.02);
+        each(|channel| {
+            let falls = light.ambient[channel] * cast.sky + light.sun[channel] * up * cast.sun + light.beam * cast.beam;
+            albedo[channel] * falls + gloss * cast.sky * mirrored[channel]
+        })
+    }
+
+    /// Reflectance, and the share of the sky that a wet surface mirrors.
+    fn albedo(&self, s: f32, d: f32, run: f32, wetness: f32) -> (Vec3, f32) {
+        let right = -self.lanes * self.lane_width_m;
+        // Texture fades where a pixel spans more than a cell.
+        let detail = 1.0 / (1.0 + run * run / 400.0);
+        if d > SHOULDER_M[0] || d < right - SHOULDER_M[1] {
+            let shade = 0.75 + 0.5 * noise_2d(GRASS_KEY, 0.7 * s, 1.3 * d) * (0.3 + 0.7 * detail);
+            return (GRASS.map(|value| value * shade), 0.0);
+        }
+        // A wet surface is darker, and mirrors at grazing angles.
+        let gloss = wetness * (run / (run + 25.0)) * 0.55;
+        let dark = 1.0 - 0.45 * wetness;
+        let painted = self.marking(s, d, run);
+        let grain =
+            if run < GRAIN_TO_M { 1.0 + 0.35 * (noise_2d(ASPHALT_KEY, 9.0 * s, 9.0 * d) - 0.5) * detail } else { 1.0 };
+        let wear = 1.0 - 0.12 * noise_2d(ASPHALT_KEY, 0.05 * s, 0.8 * d);
+        let albedo = each(|i| (ASPHALT[i] + (PAINT[i] - ASPHALT[i]) * painted) * grain * wear * dark);
+        (albedo, gloss)
+    }
+
+    /// Share of paint at a place.
+    fn marking(&self, s: f32, d: f32, run: f32) -> f32 {
+        let lanes = -d / self.lane_width_m;
+        let line = (split(lanes + 0.5).0 as f32).clamp(0.0, self.lanes);
+        let off = (d + line * self.lane_width_m).abs();
+        if line == 0.0 || line == self.lanes {
+            return if off < EDGE_LINE_HALF_M { 1.0 } else { 0.0 };
+        }
+        if off >= LANE_LINE_HALF_M {
+            return 0.0;
+        }
+        let phase = split(s / DASH_EVERY_M).1 * DASH_EVERY_M;
+        let dash = if phase < DASH_M { 1.0 } else { 0.0 };
+        let merged = ((run - DASHES_MERGE_M[0]) / (DASHES_MERGE_M[1] - DASHES_MERGE_M[0])).clamp(0.0, 1.0);
+        dash + (DASH_M / DASH_EVERY_M - dash) * merged
+    }
+}
+
+fn cast_by(patches: &[Patch], at: [f32; 2], light: &Illumination) -> PatchLight {
+    let mut cast = PatchLight { sky: 1.0, sun: 1.0, beam: 0.0 };
+    for patch in patches {
+        let [cos, sin] = patch.turn;
+        let (dx, dy) = (at[0] - patch.at[0], at[1] - patch.at[1]);
+        let (along, left) = (cos * dx + sin * dy, cos * dy - sin * dx);
+        match patch.kind {
+            PatchKind::Shadow => {
+                cast.sky *= contact(patch, along, left);
+                if light.sun[0] > 0.0 && in_sun_shadow(patch, [along, left], light.to_sun) {
+                    cast.sun = 0.0;
+                }
+            }
+            PatchKind::Beam => cast.beam += beam(along - patch.extent[0], left),
+        }
+    }
+    cast
+}
+
+/// Share of the sky's light that reaches the ground under and beside a vehicle.
+fn contact(patch: &Patch, along: f32, left: f32) -> f32 {
+    const DARKEST: f32 = 0.12;
+    let outside = (along.abs() - patch.extent[0]).max(left.abs() - patch.extent[1]).max(0.0);
+    let open = (outside / CONTACT_SHADOW_M).min(1.0);
+    DARKEST + (1.0 - DARKEST) * open * (2.0 - open)
+}
+
+/// True where the way from the ground to the sun meets the vehicle's box within its height.
+fn in_sun_shadow(patch: &Patch, [along, left]: [f32; 2], to_sun: Vec3) -> bool {
+    let reach = (patch.extent[2] / to_sun[2].max(0.05)).min(LONGEST_SHADOW_M);
+    let [cos, sin] = patch.turn;
+    let way = [cos * to_sun[0] + sin * to_sun[1], cos * to_sun[1] - sin * to_sun[0]];
+    let (mut from, mut to) = (0.0_f32, reach);
+    for (start, rate, half) in [(along, way[0], patch.extent[0]), (left, way[1], 0.92 * patch.extent[1])] {
+        let rate = if rate.abs() < 1e-6 { 1e-6 } else { rate };
+        let (a, b) = ((-half - start) / rate, (half - start) / rate);
+        from = from.max(a.min(b));
+        to = to.min(a.max(b));
+    }
+    from < to
+}
+
+/// Light of a pair of dipped headlamps on the road `ahead` of them, relative to its peak.
+fn beam(ahead: f32, left: f32) -> f32 {
+    let [far, wide] = BEAM_M;
+    if !(ahead > 0.0 && ahead < far) {
+        return 0.0;
+    }
+    let half = (1.5 + 0.15 * ahead).min(wide);
+    let across = 1.0 - (left / half) * (left / half);
+    if across <= 0.0 {
+        return 0.0;
+    }
+    let along = (1.0 - ahead / far) * (1.0 - ahead / far) * ahead / (ahead + 3.0);
+    along * across * across
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_surface_lies_where_the_road_says() {
+        let road = Road::straight(3).with_curvature(0.002);
+        let (s0, d0, heading) = (640.0, -5.6, 0.02);
+        let ground = Ground::new(&road, s0, d0, heading);
+        let lens = road.plane_pose(s0, d0, heading);
+        for (x, y) in [(-10.0, 1.0), (-60.0, -4.0), (-120.0, 3.0)] {
+            let (sin, cos) = lens.yaw_rad.sin_cos();
+            let plane = (lens.x_m + cos * x - sin * y, lens.y_m + sin * x + cos * y);
+            let (s, d) = road.road_position_m(plane.0, plane.1);
+            let (got_s, got_d) = ground.road_position(x as f32, y as f32);
+            assert!((f64::from(got_d) - d).abs() < 0.01, "{got_d} {d}");
+            assert!((f64::from(got_s) - s).abs() < 0.1, "{got_s} {s}");
+        }
+    }
+
+    #[test]
+    fn lines_are_painted_at_the_edges_and_dashed_between() {
+        let ground = Ground::new(&Road::straight(3), 0.0, -5.6, 0.0);
+        assert_eq!(ground.marking(3.0, 0.0, 10.0), 1.0);
+        assert_eq!(ground.marking(3.0, -11.25, 10.0), 1.0);
+        assert_eq!(ground.marking(3.0, -3.75, 10.0), 1.0);
+        assert_eq!(ground.marking(9.0, -3.75, 10.0), 0.0);
+        assert_eq!(ground.marking(3.0, -1.9, 10.0), 0.0);
+    }
+
+    #[test]
+    fn a_shadow_falls_away_from_the_sun() {
+        let patch = Patch { at: [0.0; 2], turn: [1.0, 0.0], extent: [2.3, 0.9, 1.5], kind: PatchKind::Shadow };
+        let to_sun = [0.0, 0.8, 0.6];
+        assert!(in_sun_shadow(&patch, [0.0, -1.5], to_sun));
+        assert!(!in_sun_shadow(&patch, [0.0, 1.5], to_sun));
+    }
+}

@@ -1,0 +1,241 @@
+//! Light, air and exposure that follow from the environment.
+//!
+//! Radiance is in units in which a white matt surface in full daylight has about 1. Three lights are modelled, not
+//! the time of day: the ratios between them are about those of a camera that has opened up as far as it can.
+//! Air dims by exp(−σ·distance): σ = 3.912/V for the visibility V (Koschmieder, contrast threshold 2 %), and for rain
+//! 1.076·R^0.67 dB/km for the rate R in mm/h (Carbonneau and Wisely, 1998).
+
+use closecall_traffic::{Environment, Light, VehicleState};
+
+use super::Camera;
+use super::mesh::{Emission, Vec3, dot, each};
+
+/// ln 50, for a contrast threshold of 2 %.
+const KOSCHMIEDER: f64 = 3.912;
+/// Extinction [1/m] of 1 dB/km.
+const PER_METRE_OF_DB_PER_KM: f64 = 1.0 / 4_343.0;
+/// At this rain rate the sky is wholly overcast [mm/h].
+const OVERCAST_RAIN_MM_PER_H: f64 = 0.5;
+/// Between these visibilities the sun fades [m].
+const SUN_FADES_M: [f64; 2] = [1_500.0, 5_000.0];
+/// A film of this height makes the road as glossy as it gets [mm].
+const WET_FILM_MM: f64 = 0.3;
+
+/// Everything about the light that does not change across the image.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Illumination {
+    /// Radiance of a white surface that sees the sky alone.
+    pub(crate) ambient: Vec3,
+    /// Radiance that the sun adds on a white surface facing it.
+    pub(crate) sun: Vec3,
+    /// Direction to the sun in the ground frame.
+    pub(crate) to_sun: Vec3,
+    /// Radiance of the sky overhead.
+    pub(crate) zenith: Vec3,
+    /// Radiance of the sky at the horizon, which is also that of the air in between.
+    pub(crate) horizon: Vec3,
+    /// Extinction of the air [1/m].
+    pub(crate) extinction_per_m: f32,
+    /// Gain of the exposure.
+    pub(crate) gain: f32,
+    /// Time of exposure [s].
+    pub(crate) exposure_s: f32,
+    /// Noise in the encoded value: what light itself has, and what reading adds in the dark.
+    pub(crate) noise: [f32; 2],
+    /// Radiance of headlamps seen from ahead.
+    pub(crate) headlamp: f32,
+    /// Radiance of marker lamps.
+    pub(crate) marker: f32,
+    /// Radiance that a headlamp gives a white road a few metres ahead.
+    pub(crate) beam: f32,
+    /// Radiance that E's tail lamps give a white surface 1 m behind them.
+    pub(crate) tail: f32,
+    /// Gloss of the road [1].
+    pub(crate) wetness: f32,
+    /// Rain rate [mm/h].
+    pub(crate) rain_mm_per_h: f32,
+}
+
+/// What one light is like: everything relative to daylight.
+struct Level {
+    ambient: Vec3,
+    sun: f32,
+    horizon: Vec3,
+    zenith: Vec3,
+    gain: f32,
+    exposure_s: f32,
+    noise: [f32; 2],
+    headlamp: f32,
+    marker: f32,
+    beam: f32,
+    tail: f32,
+}
+
+const DAY: Level = Level {
+    ambient: [0.36, 0.40, 0.46],
+    sun: 0.62,
+    horizon: [0.78, 0.84, 0.92],
+    zenith: [0.25, 0.42, 0.75],
+    gain: 0.85,
+    exposure_s: 0.002,
+    noise: [0.006, 0.0006],
+    headlamp: 1.3,
+    marker: 0.0,
+    beam: 0.0,
+    tail: 0.0,
+};
+
+const DUSK: Level = Level {
+    ambient: [0.030, 0.036, 0.050],
+    sun: 0.0,
+    horizon: [0.13, 0.10, 0.085],
+    zenith: [0.025, 0.035, 0.07],
+    gain: 7.0,
+    exposure_s: 0.008,
+    noise: [0.014, 0.002],
+    headlamp: 4.0,
+    marker: 1.0,
+    beam: 0.02,
+    tail: 0.06,
+};
+
+const NIGHT: Level = Level {
+    ambient: [0.0016, 0.0016, 0.0019],
+    sun: 0.0,
+    horizon: [0.0016, 0.0014, 0.0013],
+    zenith: [0.0004, 0.0004, 0.0006],
+    gain: 45.0,
+    exposure_s: 0.016,
+    noise: [0.028, 0.004],
+    headlamp: 3.0,
+    marker: 0.3,
+    beam: 0.02,
+    tail: 0.06,
+};
+
+/// Brake lights are this many times as bright as tail lamps.
+const BRAKE_LIGHT: f32 = 3.0;
+
+impl Illumination {
+    /// The light of an environment, for a camera in a vehicle whose yaw in the plane is `yaw_rad`.
+    pub(crate) fn new(environment: &Environment, camera: &Camera, ego: &VehicleState, yaw_rad: f64) -> Self {
+        let level = match environment.light {
+            Light::Day => DAY,
+            Light::Dusk => DUSK,
+            Light::Night => NIGHT,
+        };
+        let [hazy_m, clear_m] = SUN_FADES_M;
+        let dry = 1.0 - (environment.rain_mm_per_h / OVERCAST_RAIN_MM_PER_H).min(1.0);
+        let clear = dry * ((environment.visibility_m - hazy_m) / (clear_m - hazy_m)).clamp(0.0, 1.0);
+        let (sin, cos) = camera.sun.elevation_rad.sin_cos();
+        let (sin_azimuth, cos_azimuth) = (camera.sun.azimuth_rad - yaw_rad).sin_cos();
+        let clear = clear as f32;
+        // An overcast sky is grey, as bright overhead as at the horizon, and lights from all sides.
+        let grey = level.horizon.iter().sum::<f32>() / 3.0;
+        let overcast = |clear_value: f32, grey_value: f32| grey_value + (clear_value - grey_value) * clear;
+        let rain_db_per_km = 1.076 * environment.rain_mm_per_h.powf(0.67);
+        let extinction_per_m = KOSCHMIEDER / environment.visibility_m + rain_db_per_km * PER_METRE_OF_DB_PER_KM;
+        let brake = if ego.brake_light { BRAKE_LIGHT } else { 1.0 };
+        Self {
+            ambient: level.ambient.map(|value| overcast(value, 0.78 * grey)),
+            sun: [1.0, 0.95, 0.86].map(|tint| tint * level.sun * clear),
+            to_sun: [cos * cos_azimuth, cos * sin_azimuth, sin].map(|part| part as f32),
+            zenith: level.zenith.map(|value| overcast(value, 0.9 * grey)),
+            horizon: level.horizon.map(|value| overcast(value, grey)),
+            extinction_per_m: extinction_per_m as f32,
+            gain: level.gain * (camera.exposure_ev as f32).exp2(),
+            exposure_s: level.exposure_s,
+            noise: level.noise,
+            headlamp: level.headlamp,
+            marker: level.marker,
+            beam: level.beam,
+            tail: level.tail * brake,
+            wetness: (environment.water_film_mm / WET_FILM_MM).min(1.0) as f32,
+            rain_mm_per_h: environment.rain_mm_per_h as f32,
+        }
+    }
+
+    /// True where headlamps matter beyond their own faces.
+    pub(crate) fn is_dark(&self) -> bool {
+        self.beam > 0.0
+    }
+
+    /// Share of light that passes `distance_m` of air [1].
+    pub(crate) fn transmission(&self, distance_m: f32) -> f32 {
+        exp_negative(self.extinction_per_m * distance_m)
+    }
+
+    /// Radiance of a lamp's face.
+    pub(crate) fn emitted(&self, emission: Emission, indicator_is_on: impl Fn(bool) -> bool) -> Vec3 {
+        match emission {
+            Emission::None => [0.0; 3],
+            Emission::Headlamp => [1.0, 0.98, 0.92].map(|tint| tint * self.headlamp),
+            Emission::Marker => [1.0, 0.6, 0.15].map(|tint| tint * self.marker),
+            Emission::Indicator(is_left) => {
+                let on = if indicator_is_on(is_left) { 0.5 * self.headlamp } else { 0.0 };
+                [1.0, 0.5, 0.05].map(|tint| tint * on)
+            }
+        }
+    }
+
+    /// Radiance that a matt white face with this normal reflects.
+    pub(crate) fn falls_on(&self, normal: Vec3) -> Vec3 {
+        /// What the road throws back up, relative to the sky's light.
+        const BOUNCE: f32 = 0.25;
+        let upwards = 0.5 + 0.5 * normal[2];
+        let sky = BOUNCE + (1.0 - BOUNCE) * upwards;
+        let sun = dot(normal, self.to_sun).max(0.0);
+        each(|channel| self.ambient[channel] * sky + self.sun[channel] * sun)
+    }
+
+    /// Radiance of the clear sky at a slope (rise over run) above the horizon.
+    pub(crate) fn sky(&self, slope: f32) -> Vec3 {
+        let high = slope / (slope + 0.35);
+        each(|channel| self.horizon[channel] + (self.zenith[channel] - self.horizon[channel]) * high)
+    }
+}
+
+/// e^−x for x ≥ 0, to 2e-4, without leaving plain arithmetic, so that it is the same on every machine: the fourth
+/// order of the series at x/16, raised to the 16th power.
+fn exp_negative(x: f32) -> f32 {
+    let x = (x / 16.0).min(4.0);
+    let inverse = 1.0 + x * (1.0 + x * (0.5 + x * (1.0 / 6.0 + x / 24.0)));
+    let second = inverse * inverse;
+    let fourth = second * second;
+    let eighth = fourth * fourth;
+    1.0 / (eighth * eighth)
+}
+
+#[cfg(test)]
+mod tests {
+    use closecall_traffic::{Check, Parameters};
+
+    use super::*;
+    use crate::camera::CameraConfig;
+
+    fn light(environment: &Environment) -> Illumination {
+        let camera = CameraConfig::default().check(&Parameters::default()).unwrap();
+        Illumination::new(environment, &camera, &VehicleState::default(), 0.0)
+    }
+
+    #[test]
+    fn at_the_visibility_one_fiftieth_of_the_contrast_is_left() {
+        let foggy = Environment { visibility_m: 200.0, ..Environment::CLEAR_DAY };
+        assert!((light(&foggy).transmission(200.0) - 0.02).abs() < 1e-3);
+    }
+
+    #[test]
+    fn the_series_is_the_exponential() {
+        for step in 0_u8..100 {
+            let x = f32::from(step) * 0.1;
+            assert!((exp_negative(x) - (-x).exp()).abs() < 2e-4, "{x}");
+        }
+    }
+
+    #[test]
+    fn rain_hides_the_sun_and_dims_the_distance() {
+        let rain = light(&Environment { rain_mm_per_h: 5.0, ..Environment::CLEAR_DAY });
+        assert_eq!(rain.sun, [0.0; 3]);
+        assert!(rain.transmission(100.0) < light(&Environment::CLEAR_DAY).transmission(100.0));
+    }
+}
