@@ -134,12 +134,15 @@ pub(super) fn field(name: &str, of: DataType, unit: Option<&str>) -> Field {
     Field::new(name, of, true).with_metadata(metadata)
 }
 
+/// One value of a row, if it has it.
+type Cell<T> = Box<dyn Fn(&OutcomeRow) -> Option<T>>;
+
 /// What a column takes from a row.
 enum Cells {
-    Text(Box<dyn Fn(&OutcomeRow) -> Option<String>>),
-    Number(Box<dyn Fn(&OutcomeRow) -> Option<f64>>),
-    Count(Box<dyn Fn(&OutcomeRow) -> Option<u64>>),
-    Flag(Box<dyn Fn(&OutcomeRow) -> Option<bool>>),
+    Text(Cell<String>),
+    Number(Cell<f64>),
+    Count(Cell<u64>),
+    Flag(Cell<bool>),
 }
 
 struct Column {

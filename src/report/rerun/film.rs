@@ -46,7 +46,7 @@ pub(super) struct Film<'a> {
 
 impl Film<'_> {
     /// The moment to look at first: when E collided, else anyone; where nobody did, when the vehicle behind was at its
-    /// smallest time headway; where there was none, when E was at its own; else the end.
+    /// smallest time headway; where there was none, the end, with the whole run before it.
     pub(super) fn critical_moment(&self) -> Time {
         let ego = self.scenario.ego_id();
         let collisions = &self.outcome.collisions;
@@ -54,14 +54,9 @@ impl Film<'_> {
         if let Some(collision) = collision {
             return collision.time;
         }
-        let least = |of: fn(&Frame) -> Option<f64>| {
-            let values = self.frames.iter().filter_map(|frame| Some((frame.time, of(frame)?)));
-            values.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(time, _)| time)
-        };
-        least(|frame| frame.margins.thw_rear_s.ok())
-            .or_else(|| least(|frame| frame.margins.thw_front_s.ok()))
-            .or_else(|| self.frames.last().map(|frame| frame.time))
-            .unwrap_or(Time::ZERO)
+        let headways = self.frames.iter().filter_map(|frame| Some((frame.time, frame.margins.thw_rear_s.ok()?)));
+        let closest = headways.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(time, _)| time);
+        closest.or_else(|| self.frames.last().map(|frame| frame.time)).unwrap_or(Time::ZERO)
     }
 
     /// The times of all frames.

@@ -89,7 +89,7 @@ fn write_boxes(writer: &Writer<'_>, entity: &str, times: &[Time], tracks: &[Vec<
             .with_centers(all().map(|track| [track.x_m() as f32, track.y_m() as f32, half(TRACK_HEIGHT_M)]))
             .with_half_sizes(all().map(|track| [half(track.length_m), half(track.width_m), half(TRACK_HEIGHT_M)]))
             .with_quaternions(all().map(|track| about_up(track.heading_rad)))
-            .with_colors(all().map(|track| colour(track.status)))
+            .with_colors(all().map(colour))
             .with_labels(all().map(label))
             .columns(rows.iter().map(Vec::len).collect::<Vec<_>>())
     })
@@ -106,7 +106,7 @@ fn write_ellipses(writer: &Writer<'_>, entity: &str, times: &[Time], tracks: &[V
             .with_centers(all().map(|track| [track.x_m() as f32, track.y_m() as f32, ELLIPSE_Z_M as f32]))
             .with_half_sizes(ellipses.iter().map(|ellipse| ellipse.0))
             .with_quaternions(ellipses.iter().map(|ellipse| ellipse.1))
-            .with_colors(all().map(|track| colour(track.status)))
+            .with_colors(all().map(colour))
             .columns(rows.iter().map(Vec::len).collect::<Vec<_>>())
     })
 }
@@ -120,8 +120,10 @@ fn ellipse(track: &Track) -> ([f32; 3], Quaternion) {
     ([half_m(0), half_m(1), ELLIPSE_HALF_THICKNESS_M as f32], about_up(first[1].atan2(first[0])))
 }
 
-fn colour(status: TrackStatus) -> Rgba {
-    match status {
+/// What is more likely no vehicle stays in the background.
+fn colour(track: &Track) -> Rgba {
+    match track.status {
+        _ if track.class.vehicle() < 0.5 => palette::QUIET,
         TrackStatus::Tentative => palette::QUIET,
         TrackStatus::Confirmed => palette::TRACK,
         TrackStatus::Coasting => palette::WARNING,
