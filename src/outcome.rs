@@ -90,6 +90,9 @@ pub struct Margins {
     pub max_deceleration_mps2: f64,
     /// Largest change of E's acceleration before any collision of its own [m/s³].
     pub max_jerk_mps3: f64,
+    /// Most by which E was slower than the vehicle ahead, or than at the start where nobody is ahead [m/s]: what a
+    /// margin costs. A controller that brakes without need cannot hide it behind collisions that it avoids.
+    pub max_speed_deficit_mps: f64,
 }
 
 /// What the margin increase system did.

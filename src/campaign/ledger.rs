@@ -18,7 +18,7 @@ pub fn clopper_pearson(hits: u64, samples: u64) -> [f64; 2] {
 }
 
 /// The counts of one arm.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ArmCounts {
     /// Samples with an outcome.
     pub outcomes: u64,
@@ -30,10 +30,12 @@ pub struct ArmCounts {
     pub engagements: u64,
     /// Engagements whose goal was in reach.
     pub goals_in_reach: u64,
+    /// Most by which E was slower than the vehicle ahead in any sample [m/s].
+    pub max_speed_deficit_mps: f64,
 }
 
 /// What came of one sample in one arm.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tally {
     /// Whether E collided; nothing where the sample ended in an error.
     pub collided: Option<bool>,
@@ -41,6 +43,8 @@ pub struct Tally {
     pub engaged: bool,
     /// Whether its goal was in reach when it did.
     pub goal_in_reach: bool,
+    /// Most by which E was slower than the vehicle ahead [m/s].
+    pub speed_deficit_mps: f64,
 }
 
 impl ArmCounts {
@@ -55,6 +59,7 @@ impl ArmCounts {
         }
         self.engagements += u64::from(tally.engaged);
         self.goals_in_reach += u64::from(tally.engaged && tally.goal_in_reach);
+        self.max_speed_deficit_mps = self.max_speed_deficit_mps.max(tally.speed_deficit_mps);
     }
 
     /// Adds the counts of another campaign.
@@ -64,6 +69,7 @@ impl ArmCounts {
         self.errors += other.errors;
         self.engagements += other.engagements;
         self.goals_in_reach += other.goals_in_reach;
+        self.max_speed_deficit_mps = self.max_speed_deficit_mps.max(other.max_speed_deficit_mps);
     }
 
     /// Share of the samples with an outcome in which E collided; nothing of no samples.
@@ -130,7 +136,7 @@ mod tests {
     #[test]
     fn an_error_is_never_a_pass() {
         let mut counts = ArmCounts::default();
-        counts.take(Tally { collided: None, engaged: false, goal_in_reach: false });
+        counts.take(Tally { collided: None, engaged: false, goal_in_reach: false, speed_deficit_mps: 0.0 });
         assert_eq!((counts.outcomes, counts.errors), (0, 1));
         assert_eq!(counts.collision_rate(), None);
     }

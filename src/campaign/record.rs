@@ -41,9 +41,10 @@ impl ArmRecord {
                     collided: Some(outcome.ego_collided(ego)),
                     engaged: mis.is_some_and(|mis| mis.engaged_at_s.is_ok()),
                     goal_in_reach: mis.is_some_and(|mis| mis.goal_in_reach == Some(true)),
+                    speed_deficit_mps: outcome.margins.max_speed_deficit_mps,
                 }
             }
-            Err(_) => Tally { collided: None, engaged: false, goal_in_reach: false },
+            Err(_) => Tally { collided: None, engaged: false, goal_in_reach: false, speed_deficit_mps: 0.0 },
         }
     }
 }

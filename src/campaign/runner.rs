@@ -124,9 +124,8 @@ pub fn run_samples<E>(
     let mut first = samples.start;
     while first < samples.end {
         let last = samples.end.min(first.saturating_add(block));
-        let finished: Vec<Finished> = pool.install(|| {
-            (first..last).into_par_iter().map(|sample| run_sample(file, sampling, arms, sample)).collect()
-        });
+        let finished: Vec<Finished> = pool
+            .install(|| (first..last).into_par_iter().map(|sample| run_sample(file, sampling, arms, sample)).collect());
         finished.into_iter().try_for_each(&mut take)?;
         first = last;
     }

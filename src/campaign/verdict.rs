@@ -8,12 +8,14 @@ use super::ledger::{ArmCounts, Pairs};
 use crate::exit_code::ExitCode;
 
 /// What a campaign is judged by. Gates count samples in which E collided, in the arm under test.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Gates {
     /// Most samples with a collision of E.
     pub max_collisions: Option<u64>,
     /// Most samples in which E collides only with the system under test.
     pub max_induced: Option<u64>,
+    /// Most by which E may fall below the speed of the vehicle ahead, in any sample [m/s].
+    pub max_speed_deficit_mps: Option<f64>,
 }
 
 /// The answer of a campaign.
@@ -118,6 +120,15 @@ impl Gates {
             }
             (None, _) => {}
         }
+        if let Some(allowed_mps) = self.max_speed_deficit_mps {
+            let most_mps = evidence.tested.max_speed_deficit_mps;
+            reasons.push(format!(
+                "E was up to {most_mps:.1} m/s slower than the vehicle ahead, {allowed_mps} m/s allowed"
+            ));
+            if !(most_mps <= allowed_mps) {
+                codes.push(ExitCode::Fail);
+            }
+        }
         if *self == Self::default() {
             reasons.push("no gate was set: nothing was judged but that every sample has an outcome".to_owned());
         }
@@ -143,14 +154,14 @@ mod tests {
 
     #[test]
     fn the_gate_counts_samples_with_a_collision() {
-        let gates = Gates { max_collisions: Some(3), max_induced: None };
+        let gates = Gates { max_collisions: Some(3), max_induced: None, max_speed_deficit_mps: None };
         assert_eq!(judge(gates, 3, 0).exit_code, ExitCode::Pass);
         assert_eq!(judge(gates, 4, 0).exit_code, ExitCode::Fail);
     }
 
     #[test]
     fn an_error_is_graver_than_a_collision_and_never_passes() {
-        let gates = Gates { max_collisions: Some(3), max_induced: None };
+        let gates = Gates { max_collisions: Some(3), max_induced: None, max_speed_deficit_mps: None };
         let errors = judge(gates, 0, 1);
         assert_eq!((errors.exit_code, errors.verdict), (ExitCode::SampleError, Verdict::Inconclusive));
         let both = judge(gates, 4, 1);

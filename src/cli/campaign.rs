@@ -9,6 +9,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use rayon::ThreadPool;
 
 use super::args::{Format, Sensing, SetArgs, arm};
+use super::output::{out, outln};
 use super::{CliError, json, leave};
 use crate::campaign::folder::{Folder, Journal};
 use crate::campaign::manifest::{MANIFEST_VERSION, Manifest, ManifestScenario};
@@ -59,6 +60,9 @@ pub(super) struct CampaignArgs {
     /// With --paired: fail where more collisions than this happen only with the controller under test
     #[arg(long, value_name = "K", requires = "paired")]
     max_induced: Option<u64>,
+    /// Fail where E falls by more than this below the speed of the vehicle ahead, in any sample
+    #[arg(long, value_name = "M/S", value_parser = super::args::positive)]
+    max_speed_deficit_mps: Option<f64>,
     #[command(flatten)]
     set: SetArgs,
     /// Output for people or for programs
@@ -117,9 +121,13 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
     if let Some(folder) = &folder {
         leave::reports(folder, &files, &timings, args.recordings)?;
     }
-    let judged = summary.judge(Gates { max_collisions: args.max_collisions, max_induced: args.max_induced });
+    let judged = summary.judge(Gates {
+        max_collisions: args.max_collisions,
+        max_induced: args.max_induced,
+        max_speed_deficit_mps: args.max_speed_deficit_mps,
+    });
     match args.format {
-        Format::Json => println!("{:#}", json::campaign(&summary, &judged, wall_s)),
+        Format::Json => outln!("{:#}", json::campaign(&summary, &judged, wall_s)),
         Format::Human => print_human(&summary, &judged, wall_s, &pool),
     }
     Ok(judged.exit_code)
@@ -207,23 +215,19 @@ fn progress(samples: u64) -> ProgressBar {
 
 fn print_human(summary: &Summary, judged: &Judgement, wall_s: f64, pool: &ThreadPool) {
     for (name, counts) in &summary.scenarios {
-        println!("{name}: {} samples", counts.samples);
+        outln!("{name}: {} samples", counts.samples);
         print_counts(summary, counts);
     }
     if summary.scenarios.len() > 1 {
-        println!("all scenarios");
+        outln!("all scenarios");
         print_counts(summary, &summary.total());
     }
-    println!("Rates are conditional on the sampled scenario: they are not the risk of a road.");
+    outln!("Rates are conditional on the sampled scenario: they are not the risk of a road.");
     let total = summary.total();
-    println!(
-        "{:.0} simulated seconds in {wall_s:.1} s on {} threads",
-        total.simulated_s,
-        pool.current_num_threads(),
-    );
-    println!("{}", judged.verdict);
+    outln!("{:.0} simulated seconds in {wall_s:.1} s on {} threads", total.simulated_s, pool.current_num_threads(),);
+    outln!("{}", judged.verdict);
     for reason in &judged.reasons {
-        println!("  {reason}");
+        outln!("  {reason}");
     }
 }
 
@@ -231,20 +235,24 @@ fn print_counts(summary: &Summary, counts: &Counts) {
     for (name, arm) in summary.controllers.iter().zip(&counts.arms) {
         let [low, high] = arm.interval_95().map(|bound| 100.0 * bound);
         let rate = arm.collision_rate().map_or("-".to_owned(), |rate| format!("{:.1} %", 100.0 * rate));
-        print!("  {name:<5} {:>6} collisions  {rate:>7}  (95 %: {low:.1} to {high:.1} %)", arm.collisions);
+        out!("  {name:<5} {:>6} collisions  {rate:>7}  (95 %: {low:.1} to {high:.1} %)", arm.collisions);
         if arm.engagements > 0 {
-            print!("  {} engaged, goal in reach in {}", arm.engagements, arm.goals_in_reach);
+            out!("  {} engaged, goal in reach in {}", arm.engagements, arm.goals_in_reach);
         }
+        out!("  up to {:.1} m/s slower than ahead", arm.max_speed_deficit_mps);
         if arm.errors > 0 {
-            print!("  {} ERRORS", arm.errors);
+            out!("  {} ERRORS", arm.errors);
         }
-        println!();
+        outln!();
     }
     if summary.is_paired() {
         let pairs = counts.pairs;
-        println!(
+        outln!(
             "  pairs: {} prevented, {} induced, {} both, {} neither",
-            pairs.prevented, pairs.induced, pairs.both, pairs.neither,
+            pairs.prevented,
+            pairs.induced,
+            pairs.both,
+            pairs.neither,
         );
     }
 }

@@ -6,6 +6,7 @@ use clap::Args;
 
 use super::CliError;
 use super::args::SetArgs;
+use super::output::{complain, outln};
 use crate::exit_code::ExitCode;
 use crate::scenario::ScenarioConfig;
 
@@ -25,11 +26,11 @@ pub(super) fn check(args: &CheckArgs) -> Result<ExitCode, CliError> {
         match args.set.load(path) {
             Ok(file) => {
                 let count = file.space().iter().len();
-                println!("{}: valid, {} with {count} parameters", path.display(), file.config().name);
+                outln!("{}: valid, {} with {count} parameters", path.display(), file.config().name);
             }
             Err(error) => {
                 codes.push(ExitCode::from(&error));
-                eprintln!("{:?}", miette::Report::new(CliError::from(error)));
+                complain(format_args!("{:?}\n", miette::Report::new(CliError::from(error))));
             }
         }
     }
@@ -38,6 +39,6 @@ pub(super) fn check(args: &CheckArgs) -> Result<ExitCode, CliError> {
 
 pub(super) fn schema() -> Result<ExitCode, CliError> {
     let schema = schemars::schema_for!(ScenarioConfig);
-    println!("{:#}", schema.as_value());
+    outln!("{:#}", schema.as_value());
     Ok(ExitCode::Pass)
 }

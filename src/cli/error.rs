@@ -67,7 +67,9 @@ impl From<&CliError> for ExitCode {
                 FolderError::OtherCampaign { .. } | FolderError::NotACampaign { .. } => Self::Usage,
                 FolderError::Read { .. } | FolderError::Content { .. } => Self::InvalidInput,
             },
-            CliError::Write(_) | CliError::Record(_) | CliError::WriteRecording(_) | CliError::Threads { .. } => Self::Io,
+            CliError::Write(_) | CliError::Record(_) | CliError::WriteRecording(_) | CliError::Threads { .. } => {
+                Self::Io
+            }
             CliError::Sample { .. } => Self::SampleError,
             CliError::Usage { .. } => Self::Usage,
         }

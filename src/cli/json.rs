@@ -66,6 +66,7 @@ fn margins(margins: &Margins) -> Value {
     put(&mut object, "min_ttc_rear_s", margins.min_ttc_rear_s);
     put(&mut object, "max_deceleration_mps2", Ok(margins.max_deceleration_mps2));
     put(&mut object, "max_jerk_mps3", Ok(margins.max_jerk_mps3));
+    put(&mut object, "max_speed_deficit_mps", Ok(margins.max_speed_deficit_mps));
     Value::Object(object)
 }
 
@@ -111,6 +112,7 @@ fn counts(summary: &Summary, counts: &Counts) -> Map<String, Value> {
         controller.insert("collisions".to_owned(), json!(arm.collisions));
         controller.insert("collision_rate".to_owned(), json!(arm.collision_rate()));
         controller.insert("interval_95".to_owned(), json!(arm.interval_95()));
+        controller.insert("max_speed_deficit_mps".to_owned(), json!(arm.max_speed_deficit_mps));
         controller.insert("errors".to_owned(), json!(arm.errors));
         controller.insert("engagements".to_owned(), json!(arm.engagements));
         controller.insert("goals_in_reach".to_owned(), json!(arm.goals_in_reach));

@@ -1,13 +1,12 @@
 //! The command line: what is asked for, and what the program ends with.
 
-#![expect(clippy::print_stdout, clippy::print_stderr, reason = "the command line is where results are printed")]
-
 mod args;
 mod campaign;
 mod check;
 mod error;
 mod json;
 mod leave;
+mod output;
 mod record;
 mod recording;
 mod replay;
@@ -18,6 +17,7 @@ use clap::{Parser, Subcommand};
 pub use error::CliError;
 
 use crate::exit_code::ExitCode;
+use output::complain;
 
 /// A closed-loop software-in-the-loop testbed for highway ADAS.
 ///
@@ -78,7 +78,7 @@ pub fn main() -> ExitCode {
         Ok(code) => code,
         Err(error) => {
             let code = ExitCode::from(&error);
-            eprintln!("{:?}", miette::Report::new(error));
+            complain(format_args!("{:?}\n", miette::Report::new(error)));
             code
         }
     }

@@ -8,6 +8,7 @@ use closecall_scenarios::sampling::Design;
 
 use super::CliError;
 use super::args::{ArmArgs, SetArgs};
+use super::output::outln;
 use crate::campaign::runner::{Sampling, concrete, run_guarded};
 use crate::exit_code::ExitCode;
 use crate::report::traffic::TrafficRecorder;
@@ -47,6 +48,6 @@ pub(super) fn record(args: &RecordArgs) -> Result<ExitCode, CliError> {
     let (tracks, instants) =
         (recording.trajectories.len(), recording.trajectories.iter().map(|track| track.points.len()).sum::<usize>());
     write_recording(&recording, &args.output)?;
-    println!("{tracks} vehicles, {instants} instants written to {}", args.output.display());
+    outln!("{tracks} vehicles, {instants} instants written to {}", args.output.display());
     Ok(ExitCode::Pass)
 }

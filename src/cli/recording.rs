@@ -10,7 +10,8 @@ use closecall_scenarios::lane_change::{LaneChange, detect};
 use closecall_scenarios::recordings::{Recording, quality, read};
 
 use super::CliError;
-use super::args::Format;
+use super::args::{Format, positive};
+use super::output::{out, outln};
 use crate::exit_code::ExitCode;
 use crate::report::WriteError;
 
@@ -68,27 +69,20 @@ pub(super) struct FitArgs {
     format: Format,
 }
 
-fn positive(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
-        _ => Err(format!("`{text}` is not a number above 0")),
-    }
-}
-
 pub(super) fn lane_changes(args: &LaneChangesArgs) -> Result<ExitCode, CliError> {
     let Criterion::Peak = args.criterion;
     let recording = read(&args.recording)?;
     let changes = detect(&smooth(&recording));
     match args.format {
-        Format::Json => println!("{:#}", serde_json::json!(changes)),
+        Format::Json => outln!("{:#}", serde_json::json!(changes)),
         Format::Human => {
             describe(&recording);
-            println!("track  class       direction  lanes   crossing   duration   speed    complete");
+            outln!("track  class       direction  lanes   crossing   duration   speed    complete");
             for change in &changes {
-                println!("{}", line(change));
+                outln!("{}", line(change));
             }
             let complete = changes.iter().filter(|change| change.complete).count();
-            println!("{} lane changes, {complete} of them complete", changes.len());
+            outln!("{} lane changes, {complete} of them complete", changes.len());
         }
     }
     Ok(ExitCode::Pass)
@@ -96,7 +90,7 @@ pub(super) fn lane_changes(args: &LaneChangesArgs) -> Result<ExitCode, CliError>
 
 fn describe(recording: &Recording) {
     let quality = quality(recording);
-    println!(
+    outln!(
         "{}: {} tracks of {} vehicles, {} instants every {}; {} gaps, {} jumps, {} overlaps",
         recording.name,
         quality.tracks,
@@ -131,7 +125,7 @@ pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> 
     let recording = read(&args.recording)?;
     let changes = evaluate(&smooth(&recording), args.speed_limit_mps);
     match args.format {
-        Format::Json => println!("{:#}", serde_json::json!(changes)),
+        Format::Json => outln!("{:#}", serde_json::json!(changes)),
         Format::Human => {
             describe(&recording);
             print_metrics(&changes);
@@ -142,22 +136,22 @@ pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> 
 
 fn print_metrics(changes: &[CriticalLaneChange]) {
     for change in changes {
-        println!("{}", line(&change.lane_change));
+        outln!("{}", line(&change.lane_change));
         for (name, metric) in change.metrics.named() {
             let mark = if metric.is_critical() { "  CRITICAL" } else { "" };
             match metric.value() {
-                Some(value) => println!("         {name:<12} {value:>9.2}{mark}"),
-                None => println!("         {name:<12}         -"),
+                Some(value) => outln!("         {name:<12} {value:>9.2}{mark}"),
+                None => outln!("         {name:<12}         -"),
             }
         }
     }
     let shares = shares(changes);
-    println!("of {} lane changes, critical:", shares.lane_changes);
+    outln!("of {} lane changes, critical:", shares.lane_changes);
     for share in &shares.metrics {
         let percent = share.share.map_or("-".to_owned(), |share| format!("{:.0} %", 100.0 * share));
-        println!("  {:<12} {:>4}  {percent:>6}  ({} absent)", share.metric, share.critical, share.absent);
+        outln!("  {:<12} {:>4}  {percent:>6}  ({} absent)", share.metric, share.critical, share.absent);
     }
-    println!("  {:<12} {:>4}", "any", shares.any);
+    outln!("  {:<12} {:>4}", "any", shares.any);
 }
 
 pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
@@ -169,16 +163,16 @@ pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
         write_toml(&fitted, &heading, path).map_err(|source| WriteError::new(path, source))?;
     }
     match (args.format, &args.output) {
-        (Format::Json, _) => println!("{:#}", json(&fitted)),
-        (Format::Human, None) => print!("{}", to_toml(&fitted, &heading)),
+        (Format::Json, _) => outln!("{:#}", json(&fitted)),
+        (Format::Human, None) => out!("{}", to_toml(&fitted, &heading)),
         (Format::Human, Some(path)) => {
             for quantity in &fitted.fitted {
-                println!("{:<24} n = {:>4}, median {:.3}", quantity.quantity.name(), quantity.n, quantity.median);
+                outln!("{:<24} n = {:>4}, median {:.3}", quantity.quantity.name(), quantity.n, quantity.median);
             }
             for (quantity, n) in &fitted.too_few {
-                println!("{:<24} n = {n:>4}, too few to fit", quantity.name());
+                outln!("{:<24} n = {n:>4}, too few to fit", quantity.name());
             }
-            println!("written to {}", path.display());
+            outln!("written to {}", path.display());
         }
     }
     Ok(ExitCode::Pass)
@@ -194,9 +188,7 @@ fn json(fitted: &closecall_scenarios::fit::FittedDistributions) -> serde_json::V
             "quantiles": quantity.quantiles,
         })
     };
-    let too_few = |(quantity, n): &(closecall_scenarios::fit::Quantity, usize)| {
-        serde_json::json!({ "name": quantity.name(), "n": n })
-    };
+    let too_few = |(quantity, n): &(closecall_scenarios::fit::Quantity, usize)| serde_json::json!({ "name": quantity.name(), "n": n });
     serde_json::json!({
         "recordings": fitted.recordings.iter().map(|(name, _)| name).collect::<Vec<_>>(),
         "seed": fitted.seed,

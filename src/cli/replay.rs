@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use super::CliError;
 use super::args::{Format, Sensing, arm};
 use super::run::{WatchArgs, print, run_watched};
-use super::CliError;
 use crate::campaign::folder::Folder;
 use crate::campaign::manifest::{Manifest, ManifestScenario};
 use crate::campaign::runner::concrete;
@@ -58,9 +58,9 @@ fn choose<'a>(manifest: &'a Manifest, name: Option<&str>) -> Result<&'a Manifest
     let known = || manifest.scenarios.iter().map(|scenario| scenario.name.as_str()).collect::<Vec<_>>().join(", ");
     match (name, &manifest.scenarios[..]) {
         (None, [only]) => Ok(only),
-        (None, _) => {
-            Err(CliError::Usage { message: format!("the campaign has several scenarios; name one with --scenario: {}", known()) })
-        }
+        (None, _) => Err(CliError::Usage {
+            message: format!("the campaign has several scenarios; name one with --scenario: {}", known()),
+        }),
         (Some(name), scenarios) => scenarios.iter().find(|scenario| scenario.name == name).ok_or_else(|| {
             CliError::Usage { message: format!("the campaign has no scenario `{name}`, only {}", known()) }
         }),

@@ -7,6 +7,7 @@ use closecall_scenarios::sampling::Design;
 use closecall_traffic::Time;
 
 use super::args::{ArmArgs, Format, SetArgs};
+use super::output::{out, outln};
 use super::{CliError, json};
 use crate::campaign::runner::{Sampling, concrete, run_guarded};
 use crate::exit_code::ExitCode;
@@ -61,12 +62,7 @@ pub(super) fn run(args: &RunArgs) -> Result<ExitCode, CliError> {
 }
 
 /// Runs a sample and writes what is asked for.
-pub(super) fn run_watched(
-    scenario: &Scenario,
-    key: RunKey,
-    arm: &Arm,
-    watch: &WatchArgs,
-) -> Result<Outcome, CliError> {
+pub(super) fn run_watched(scenario: &Scenario, key: RunKey, arm: &Arm, watch: &WatchArgs) -> Result<Outcome, CliError> {
     let mut watchers = Watchers::new(scenario, key, arm, watch)?;
     let outcome = run_guarded(scenario, key, arm, &mut watchers)
         .map_err(|source| CliError::Sample { sample: key.sample, source })?;
@@ -82,7 +78,8 @@ struct Watchers {
 
 impl Watchers {
     fn new(scenario: &Scenario, key: RunKey, arm: &Arm, watch: &WatchArgs) -> Result<Self, CliError> {
-        let title = format!("{} · {} · seed {} · sample {}", scenario.name, arm.controller.name(), key.seed, key.sample);
+        let title =
+            format!("{} · {} · seed {} · sample {}", scenario.name, arm.controller.name(), key.seed, key.sample);
         let recorder = |path: &PathBuf| RunRecorder::new(path, scenario, &title);
         let trace = |path: &PathBuf| TraceWriter::new(path);
         Ok(Self {
@@ -125,8 +122,8 @@ impl Observer for Watchers {
 /// Prints an outcome.
 pub(super) fn print(outcome: &Outcome, format: Format) {
     match format {
-        Format::Json => println!("{:#}", json::outcome(outcome)),
-        Format::Human => print!("{}", Human(outcome)),
+        Format::Json => outln!("{:#}", json::outcome(outcome)),
+        Format::Human => out!("{}", Human(outcome)),
     }
 }
 

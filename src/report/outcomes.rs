@@ -276,6 +276,7 @@ fn margin_columns(columns: &mut Columns) {
     let margins = |row: &OutcomeRow| Some(row.outcome()?.margins);
     columns.number("max_deceleration_mps2", "m/s²", move |row| Some(margins(row)?.max_deceleration_mps2));
     columns.number("max_jerk_mps3", "m/s³", move |row| Some(margins(row)?.max_jerk_mps3));
+    columns.number("max_speed_deficit_mps", "m/s", move |row| Some(margins(row)?.max_speed_deficit_mps));
 }
 
 fn mis_columns(columns: &mut Columns) {

@@ -85,8 +85,7 @@ impl ScenarioFile {
     /// # Errors
     /// [`ScenarioError`] names the file, the line, the key, and what is allowed.
     pub fn load(path: &Path, settings: &[Setting]) -> Result<Self, ScenarioError> {
-        let bytes =
-            std::fs::read(path).map_err(|source| ScenarioError::Read { path: path.to_owned(), source })?;
+        let bytes = std::fs::read(path).map_err(|source| ScenarioError::Read { path: path.to_owned(), source })?;
         let text = String::from_utf8(bytes).map_err(|error| {
             let line = locate::line_at(&String::from_utf8_lossy(error.as_bytes()), error.utf8_error().valid_up_to());
             ScenarioError::NotText { path: path.to_owned(), line }
@@ -196,12 +195,12 @@ fn deserialize(path: &Path, text: &str) -> Result<ScenarioConfig, ScenarioError>
     })
 }
 
-/// The key on the line of a byte offset, for messages that have only a position.
+/// The key that a byte offset lies in or behind, on its line, for messages that have only a position.
 fn key_at(text: &str, offset: usize) -> Option<String> {
-    let start = text[..offset.min(text.len())].rfind('\n').map_or(0, |newline| newline + 1);
-    let before = &text[start..offset.min(text.len())];
-    let key = before.rsplit(['{', ',', '\n']).next()?.split('=').next()?.trim();
+    let offset = offset.min(text.len());
+    let start = text[..offset].rfind(['\n', '{', ',']).map_or(0, |delimiter| delimiter + 1);
+    let line = text[start..].lines().next()?;
+    let key = line.split('=').next()?.trim();
     let is_key = !key.is_empty() && key.chars().all(|c| c.is_alphanumeric() || "-_.\"".contains(c));
     is_key.then(|| key.to_owned())
 }
-

@@ -21,14 +21,12 @@ use closecall_traffic::{
     ActorId, Check, ConfigError, Environment, Parameters, Problem, Range, Road, Time, Vehicle, VehicleState,
 };
 
-pub use config::{
-    AbsoluteStartConfig, ActorConfig, RelativeStartConfig, SCHEMA_VERSION, ScenarioConfig, StartConfig,
-};
+pub use config::{AbsoluteStartConfig, ActorConfig, RelativeStartConfig, SCHEMA_VERSION, ScenarioConfig, StartConfig};
 pub use edit::Setting;
+pub(crate) use events::{Brake, Event, Trigger};
 pub use events::{
     BrakeConfig, CutOutStartedConfig, EffectConfig, EventConfig, NominalEncounterConfig, ThwBelowConfig, TriggerConfig,
 };
-pub(crate) use events::{Brake, Event, Trigger};
 pub use file::{ScenarioError, ScenarioFile};
 
 /// One vehicle of a concrete scenario.
@@ -147,9 +145,9 @@ impl ScenarioConfig {
 /// Refuses an overtaking driver who never comes as close as it would have to in order to pull out.
 fn check_reach(driver: &CheckedDriver, speed_mps: f64) -> Result<(), ConfigError> {
     match driver {
-        CheckedDriver::Human(HumanDriver::Overtaker(overtaker)) => overtaker
-            .check_reach(speed_mps)
-            .map_err(|error| error.within("overtaker").within("driver")),
+        CheckedDriver::Human(HumanDriver::Overtaker(overtaker)) => {
+            overtaker.check_reach(speed_mps).map_err(|error| error.within("overtaker").within("driver"))
+        }
         _ => Ok(()),
     }
 }

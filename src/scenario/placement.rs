@@ -86,9 +86,8 @@ impl Placing<'_> {
     fn state(&self, index: usize, actor: &ActorConfig) -> Result<Option<VehicleState>, ConfigError> {
         match &actor.start {
             StartConfig::Absolute(start) => {
-                let number = |num, key, range| {
-                    self.parameters.number(num, key, range).map_err(|error| error.within("absolute"))
-                };
+                let number =
+                    |num, key, range| self.parameters.number(num, key, range).map_err(|error| error.within("absolute"));
                 let d_m = self.lane_centre_m(start.lane).map_err(|error| error.within("absolute"))?;
                 let s_m = number(&start.s_m, "s-m", PLACE_RANGE_M)?;
                 let speed_mps = number(&start.speed_mps, "speed-mps", SPEED_RANGE_MPS)?;
@@ -168,7 +167,8 @@ fn exactly_one<'a>(
             Err(ConfigError::new(keys[0], Problem::Contradiction { other: keys[1], rule }))
         }
         (None, None) => {
-            let needed = if keys[0] == "gap-m" { "one of `gap-m` and `thw-s`" } else { "one of `speed-mps` and `closing-mps`" };
+            let needed =
+                if keys[0] == "gap-m" { "one of `gap-m` and `thw-s`" } else { "one of `speed-mps` and `closing-mps`" };
             Err(ConfigError::new(keys[0], Problem::Missing { needed }))
         }
     }

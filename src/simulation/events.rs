@@ -80,7 +80,11 @@ fn is_due(when: &Trigger, world: &World, cut_outs: &[Option<Time>], now: Time) -
 /// The braking of an event: constant, easing out where the speed asked for is reached.
 fn braking_mps2(brake: &Brake, speed_mps: f64) -> f64 {
     let left_mps = speed_mps - brake.to_speed_mps;
-    if brake.to_speed_mps == 0.0 { -brake.deceleration_mps2 } else { -(SPEED_GAIN_PER_S * left_mps).min(brake.deceleration_mps2) }
+    if brake.to_speed_mps == 0.0 {
+        -brake.deceleration_mps2
+    } else {
+        -(SPEED_GAIN_PER_S * left_mps).min(brake.deceleration_mps2)
+    }
 }
 
 #[cfg(test)]

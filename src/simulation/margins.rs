@@ -1,33 +1,43 @@
 //! E's margins: at each instant, and their extremes over a run.
 
-use closecall_controllers::Neighbours;
+use closecall_controllers::{Neighbour, Neighbours};
 use closecall_traffic::metrics::{time_headway_s, time_to_collision_s};
 use closecall_traffic::{Absent, Measured, VehicleState};
 
-use super::observer::MarginsNow;
+use super::observer::{Lead, MarginsNow};
 use crate::outcome::Margins;
 
+/// A vehicle that has passed and pulls in counts as the one ahead after this time [s].
+const SETTLED_LEAD_S: f64 = 1.0;
+
 impl MarginsNow {
-    /// The margins of a vehicle in `own` state among its neighbours.
-    pub(crate) fn new(own: &VehicleState, neighbours: &Neighbours) -> Self {
-        // What counts ahead is what is in the lane, or in the way: whichever is nearer.
-        let ahead = match (neighbours.own.lead, neighbours.in_path) {
+    /// The margins of a vehicle in `own` state among its neighbours, on lanes of this width.
+    ///
+    /// Ahead counts what is in the lane or in the way, whichever is nearer, and not yet alongside; behind counts whose
+    /// centre is in the lane: a vehicle that overtakes counts until it crosses the marking.
+    pub(crate) fn new(own: &VehicleState, neighbours: &Neighbours, lane_width_m: f64) -> Self {
+        let in_path = neighbours.in_path.filter(|path| path.gap_m >= 0.0);
+        let ahead = match (neighbours.own.lead, in_path) {
             (Some(lead), Some(path)) => Some(if path.gap_m < lead.gap_m { path } else { lead }),
             (lead, path) => lead.or(path),
         };
-        let behind = neighbours.own.follower;
+        let in_lane = |behind: &Neighbour| behind.lateral_offset_m.abs() < 0.5 * lane_width_m;
+        let behind = neighbours.own.follower.filter(in_lane);
         let gap_front_m = ahead.map(|ahead| ahead.gap_m).ok_or(Absent::NoLead);
         let gap_rear_m = behind.map(|behind| behind.gap_m).ok_or(Absent::NoFollower);
+        let behind = behind.ok_or(Absent::NoFollower);
         Self {
+            lead: match neighbours.own.lead {
+                Some(lead) if in_lane(&lead) => Ok(Lead { actor: lead.actor, speed_mps: lead.speed_mps }),
+                Some(_) => Err(Absent::BetweenLanes),
+                None => Err(Absent::NoLead),
+            },
+            follower: behind.ok().map(|behind| behind.actor),
             gap_front_m,
             thw_front_s: gap_front_m.and_then(|gap_m| time_headway_s(gap_m, own.speed_mps)),
             gap_rear_m,
-            thw_rear_s: behind
-                .ok_or(Absent::NoFollower)
-                .and_then(|behind| time_headway_s(behind.gap_m, behind.speed_mps)),
-            ttc_rear_s: behind
-                .ok_or(Absent::NoFollower)
-                .and_then(|behind| time_to_collision_s(behind.gap_m, behind.speed_mps, own.speed_mps)),
+            thw_rear_s: behind.and_then(|behind| time_headway_s(behind.gap_m, behind.speed_mps)),
+            ttc_rear_s: behind.and_then(|behind| time_to_collision_s(behind.gap_m, behind.speed_mps, own.speed_mps)),
         }
     }
 }
@@ -37,6 +47,9 @@ impl MarginsNow {
 pub(crate) struct MarginMeter {
     extremes: Margins,
     last_acceleration_mps2: Option<f64>,
+    start_mps: Option<f64>,
+    /// The vehicle ahead, and for how many steps it has been that.
+    lead_for: (usize, u32),
     step_s: f64,
 }
 
@@ -50,8 +63,9 @@ impl MarginMeter {
             min_ttc_rear_s: Err(Absent::NoFollower),
             max_deceleration_mps2: 0.0,
             max_jerk_mps3: 0.0,
+            max_speed_deficit_mps: 0.0,
         };
-        Self { extremes, last_acceleration_mps2: None, step_s }
+        Self { extremes, last_acceleration_mps2: None, start_mps: None, lead_for: (usize::MAX, 0), step_s }
     }
 
     /// Takes in one physics step of E while it has touched nobody.
@@ -68,6 +82,25 @@ impl MarginMeter {
             extremes.max_jerk_mps3 = extremes.max_jerk_mps3.max(jerk_mps3);
         }
         self.last_acceleration_mps2 = Some(own.acceleration_mps2);
+        self.take_deficit(own.speed_mps, now.lead);
+    }
+
+    /// Compares E's speed with what is due: the lead's once it has been ahead for a while, or E's own at the start.
+    fn take_deficit(&mut self, own_mps: f64, lead: Result<Lead, Absent>) {
+        let start_mps = *self.start_mps.get_or_insert(own_mps);
+        let due_mps = match lead {
+            Ok(lead) => {
+                let (same, steps) = self.lead_for;
+                self.lead_for = if same == lead.actor { (same, steps + 1) } else { (lead.actor, 0) };
+                if f64::from(self.lead_for.1) * self.step_s < SETTLED_LEAD_S {
+                    return;
+                }
+                lead.speed_mps
+            }
+            Err(Absent::NoLead) => start_mps,
+            Err(_) => return,
+        };
+        self.extremes.max_speed_deficit_mps = self.extremes.max_speed_deficit_mps.max(due_mps - own_mps);
     }
 
     /// A collision leaves no margin to the vehicle that was struck ahead or behind.

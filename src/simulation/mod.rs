@@ -25,7 +25,7 @@ use closecall_sensors::SensorMode;
 use closecall_traffic::Time;
 
 pub use error::SampleError;
-pub use observer::{Happening, MarginsNow, NoObserver, Observer, StepView};
+pub use observer::{Happening, Lead, MarginsNow, NoObserver, Observer, StepView};
 
 use crate::outcome::Outcome;
 use crate::scenario::Scenario;

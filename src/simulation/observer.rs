@@ -3,14 +3,27 @@
 use closecall_controllers::DriverNote;
 use closecall_controllers::{EgoCommand, EgoState, Reason};
 use closecall_sensors::{Perception, SceneVehicle};
-use closecall_traffic::{Measured, Time, Track};
+use closecall_traffic::{Absent, Measured, Time, Track};
 
 use crate::outcome::{Collision, Phase};
 use crate::scenario::Scenario;
 
+/// The vehicle ahead of another.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lead {
+    /// Its place in the list of actors.
+    pub actor: usize,
+    /// Its speed [m/s].
+    pub speed_mps: f64,
+}
+
 /// E's margins at one instant, as they truly are.
 #[derive(Clone, Copy, Debug)]
 pub struct MarginsNow {
+    /// The vehicle ahead, where its centre is in E's lane.
+    pub lead: Result<Lead, Absent>,
+    /// The vehicle behind, by its place in the list of actors.
+    pub follower: Option<usize>,
     /// Gap to the vehicle ahead in E's lane or path [m].
     pub gap_front_m: Measured,
     /// Time headway to it [s].

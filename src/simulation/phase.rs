@@ -34,7 +34,9 @@ impl Encounter {
             self.phase = if thw_s < CRITICAL_THW_S { Phase::Critical } else { Phase::Approach };
         } else if let Some(actor) = self.challenger {
             self.phase = match self.gap_m(world, ego, actor) {
-                gap_m if gap_m < -(world.vehicle(ego).dimensions.length_m + world.vehicle(actor).dimensions.length_m) => {
+                gap_m
+                    if gap_m < -(world.vehicle(ego).dimensions.length_m + world.vehicle(actor).dimensions.length_m) =>
+                {
                     Phase::After
                 }
                 _ if self.phase == Phase::After => Phase::After,

@@ -1,10 +1,10 @@
 //! One run: its state, and the parts of a step.
 
+use closecall_controllers::CheckedDriver;
 use closecall_controllers::{
     Driver, DriverInput, DriverNote, EgoCommand, EgoController, EgoInput, EgoState, Neighbours, Odometry,
     SensorAvailability,
 };
-use closecall_controllers::CheckedDriver;
 use closecall_sensors::{Health, NoiseKey, Perception, Scene, SceneVehicle};
 use closecall_traffic::{Measured, Stream, Track, stream};
 
@@ -12,9 +12,7 @@ use super::events::Events;
 use super::margins::MarginMeter;
 use super::mis_log::{EgoNow, MisLog};
 use super::phase::{AFTER_COLLISION, Encounter};
-use super::{
-    Arm, CONTROL_STEP, Happening, MarginsNow, Observer, PHYSICS_STEP, RunKey, SampleError, StepView,
-};
+use super::{Arm, CONTROL_STEP, Happening, MarginsNow, Observer, PHYSICS_STEP, RunKey, SampleError, StepView};
 use crate::outcome::{EndReason, Outcome};
 use crate::scenario::Scenario;
 use crate::world::{Action, Placed, World};
@@ -64,7 +62,7 @@ impl<'a> Run<'a> {
             unreachable!("a checked scenario has its ego stack at `ego`")
         };
         let has_mis = arm.controller.has_mis(settings);
-        let margins = MarginsNow::new(world.state(scenario.ego), &Neighbours::default());
+        let margins = MarginsNow::new(world.state(scenario.ego), &Neighbours::default(), scenario.road.lane_width_m());
         let sensors = match arm.sensors {
             Some(mode) => scenario.sensors.with_mode(mode),
             None => scenario.sensors,
@@ -73,7 +71,11 @@ impl<'a> Run<'a> {
             scenario,
             key,
             arm,
-            perception: sensors.build(&NoiseKey { seed: key.seed, sample: key.sample, ego: scenario.ego_id().clone() })?,
+            perception: sensors.build(&NoiseKey {
+                seed: key.seed,
+                sample: key.sample,
+                ego: scenario.ego_id().clone(),
+            })?,
             controller: arm.controller.build(settings),
             humans: humans(scenario, key),
             events: Events::new(scenario),
@@ -104,13 +106,12 @@ impl<'a> Run<'a> {
         }
         let ego = self.scenario.ego;
         let own = self.world.state(ego);
-        self.margins = MarginsNow::new(own, &self.neighbours[ego]);
+        self.margins = MarginsNow::new(own, &self.neighbours[ego], self.scenario.road.lane_width_m());
         if self.world.is_wrecked(ego) {
             return;
         }
         self.meter.take(own, &self.margins);
-        let follower = self.neighbours[ego].own.follower;
-        let follower = follower.and_then(|f| self.margins.thw_rear_s.ok().map(|thw_s| (f.actor, thw_s)));
+        let follower = self.margins.follower.zip(self.margins.thw_rear_s.ok());
         let before = self.encounter.phase();
         let phase = self.encounter.update(&self.world, ego, follower);
         if phase != before {
@@ -160,8 +161,7 @@ impl<'a> Run<'a> {
         }
         self.command = Some(command);
         let ego = self.scenario.ego;
-        let is_critical =
-            self.critical_gap_m.is_some_and(|gap_m| self.encounter.reaches(&self.world, ego, gap_m));
+        let is_critical = self.critical_gap_m.is_some_and(|gap_m| self.encounter.reaches(&self.world, ego, gap_m));
         self.mis.take(&EgoNow {
             time,
             command: &command,
@@ -208,8 +208,9 @@ impl<'a> Run<'a> {
     fn show(&mut self, observer: &mut dyn Observer) {
         let Some(command) = &self.command else { return };
         self.fronts.clear();
+        let lane_width_m = self.scenario.road.lane_width_m();
         for actor in 0..self.world.len() {
-            let now = MarginsNow::new(self.world.state(actor), &self.neighbours[actor]);
+            let now = MarginsNow::new(self.world.state(actor), &self.neighbours[actor], lane_width_m);
             self.fronts.push((now.gap_front_m, now.thw_front_s));
         }
         observer.step(&StepView {
@@ -247,10 +248,10 @@ impl<'a> Run<'a> {
                 road: &self.scenario.road,
                 changing_to: self.world.changing_to(actor),
             };
-            let action = human.driver.step(&input, &mut human.rng).map_err(|source| SampleError::Driver {
-                actor: self.scenario.actors[actor].id.clone(),
-                source,
-            })?;
+            let action = human
+                .driver
+                .step(&input, &mut human.rng)
+                .map_err(|source| SampleError::Driver { actor: self.scenario.actors[actor].id.clone(), source })?;
             if let Some(note) = action.note {
                 if note == DriverNote::CutOutStarted {
                     self.events.cut_out_started(actor, time);
@@ -287,9 +288,11 @@ impl<'a> Run<'a> {
     fn is_ahead_of_ego(&self, collision: usize) -> bool {
         let ego = self.scenario.ego;
         let between = &self.world.collisions()[collision].between;
-        let other = self.scenario.actors.iter().position(|actor| {
-            actor.id != *self.scenario.ego_id() && between.contains(&actor.id)
-        });
+        let other = self
+            .scenario
+            .actors
+            .iter()
+            .position(|actor| actor.id != *self.scenario.ego_id() && between.contains(&actor.id));
         other.is_some_and(|other| self.world.state(other).s_m > self.world.state(ego).s_m)
     }
 
@@ -357,4 +360,3 @@ fn availability(perception: &dyn Perception) -> SensorAvailability {
         rear: health.rear != Health::Failed,
     }
 }
-

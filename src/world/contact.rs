@@ -48,11 +48,7 @@ fn outward(shape: &OrientedBox, side: BoxSide) -> Vector2<f64> {
 /// Which of the two closed the gap: the one that moves towards the other's struck side.
 ///
 /// Judged along the normal of the struck side that faces the approach most squarely.
-pub(super) fn closed_by(
-    shapes: [&OrientedBox; 2],
-    sides: [BoxSide; 2],
-    velocities_mps: [Vector2<f64>; 2],
-) -> ClosedBy {
+pub(super) fn closed_by(shapes: [&OrientedBox; 2], sides: [BoxSide; 2], velocities_mps: [Vector2<f64>; 2]) -> ClosedBy {
     let relative = velocities_mps[0] - velocities_mps[1];
     let from_first = outward(shapes[0], sides[0]);
     let from_second = -outward(shapes[1], sides[1]);

@@ -129,7 +129,8 @@ impl Plant {
         let wanted = asked_mps2.clamp(-strongest_braking, self.capability.largest_acceleration_mps2.min(left_mps2));
 
         let most = self.capability.jerk_limit_mps3 * self.step_s;
-        let acceleration = before.acceleration_mps2 + (self.lag_share * (wanted - before.acceleration_mps2)).clamp(-most, most);
+        let acceleration =
+            before.acceleration_mps2 + (self.lag_share * (wanted - before.acceleration_mps2)).clamp(-most, most);
         let (speed, distance) = advance(before.speed_mps, acceleration, self.step_s);
         self.state.speed_mps = speed;
         self.state.acceleration_mps2 = if speed > 0.0 { acceleration } else { 0.0 };

@@ -26,7 +26,8 @@ fn the_gate_fails_where_someone_collided_and_passes_where_nobody_did() {
 #[test]
 fn paired_gates_judge_the_arm_under_test() {
     let headline = library("low-thw-overtake");
-    let args = ["campaign", headline.to_str().unwrap(), "-n", "100", "--paired", "--format", "json", "--max-collisions"];
+    let args =
+        ["campaign", headline.to_str().unwrap(), "-n", "100", "--paired", "--format", "json", "--max-collisions"];
     let report = json(&closecall(args.into_iter().chain(["100"])), 0);
     let collisions = |arm: &str| report["controllers"][arm]["collisions"].as_u64().unwrap();
     assert!(collisions("acc") > collisions("mis"));

@@ -29,7 +29,8 @@ fn the_readme_s_commands_run() {
     let here = folder.path().to_str().unwrap();
     for command in commands {
         // What a command writes goes to a folder of the test's own.
-        let args: Vec<String> = command.split_whitespace().map(|word| word.replace("/tmp/", &format!("{here}/"))).collect();
+        let args: Vec<String> =
+            command.split_whitespace().map(|word| word.replace("/tmp/", &format!("{here}/"))).collect();
         let output = closecall(&args);
         assert_eq!(code(&output), 0, "{command}: {}", stderr(&output));
     }

@@ -34,7 +34,9 @@ fn the_chain_runs_on_a_recording_of_our_own() {
     assert!(changes.iter().filter(|change| change["complete"] == Value::Bool(true)).count() >= 30);
     let critical = json(&closecall(["criticality", csv, "--format", "json"]), 0);
     assert_eq!(critical.as_array().unwrap().len(), changes.len());
-    assert!(critical[0]["metrics"]["thw_s"]["value"].is_number() || critical[0]["metrics"]["thw_s"]["absent"].is_string());
+    assert!(
+        critical[0]["metrics"]["thw_s"]["value"].is_number() || critical[0]["metrics"]["thw_s"]["absent"].is_string()
+    );
     let fitted = folder.path().join("fitted.toml");
     stdout(&closecall(["fit", csv, "-o", fitted.to_str().unwrap()]), 0);
     assert!(fs::read_to_string(fitted).unwrap().contains("lane-change-duration-s"));

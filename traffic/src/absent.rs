@@ -15,6 +15,9 @@ pub enum Absent {
     /// There is no vehicle behind in the lane.
     #[error("no vehicle behind")]
     NoFollower,
+    /// The nearest vehicle ahead is on its way out of the lane, or into it.
+    #[error("the vehicle ahead is between two lanes")]
+    BetweenLanes,
     /// No other vehicle was present at all.
     #[error("no other vehicle")]
     NoOpponent,

@@ -81,7 +81,9 @@ impl Quantity {
             Self::Closing => "closing speed to the old lane's lead at the start, lane changes to the left, approaching",
             Self::CrossingSpeed => "speed at the crossing of all lane changes",
             Self::FrontThw => "median headway of each pair that follows for 2 s or more, at most 3 s",
-            Self::ShortFrontThw => "those of front-thw-s that adaptive cruise control might keep and that are critical: 0.5 to 0.9 s",
+            Self::ShortFrontThw => {
+                "those of front-thw-s that adaptive cruise control might keep and that are critical: 0.5 to 0.9 s"
+            }
             Self::FollowingSpeed => "median speed of each pair that follows for 2 s or more",
         }
     }

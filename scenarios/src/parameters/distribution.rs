@@ -96,7 +96,10 @@ impl Distribution {
         let low = min.map_or(f64::NEG_INFINITY, |min| (min / median).ln() / sigma);
         let standard = TruncatedStandardNormal::new(low, high).ok_or_else(|| {
             let rule = format!("no probability is left between `min` and `max` (sigma {sigma})");
-            ConfigError::new(if max.is_some() { "max" } else { "min" }, Problem::Contradiction { other: "median", rule })
+            ConfigError::new(
+                if max.is_some() { "max" } else { "min" },
+                Problem::Contradiction { other: "median", rule },
+            )
         })?;
         Ok(Self(Kind::LogNormal { median, sigma, cut: [min, max], standard }))
     }

@@ -35,6 +35,7 @@ fn outcome(sample: u64, controller: &str) -> Outcome {
         min_ttc_rear_s: Err(Absent::NotApproaching),
         max_deceleration_mps2: 0.8,
         max_jerk_mps3: 2.5,
+        max_speed_deficit_mps: 1.5,
     };
     let mis = MisSummary {
         engaged_at_s: Ok(4.52),
