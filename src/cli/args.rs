@@ -1,6 +1,6 @@
 //! Arguments that several commands share.
 
-use std::path::PathBuf;
+use std::path::Path;
 
 use clap::{Args, ValueEnum};
 use closecall_sensors::SensorMode;
@@ -86,7 +86,7 @@ pub(super) struct SetArgs {
 
 impl SetArgs {
     /// Reads a scenario with these changes, and checks it.
-    pub(super) fn load(&self, path: &PathBuf) -> Result<ScenarioFile, ScenarioError> {
+    pub(super) fn load(&self, path: &Path) -> Result<ScenarioFile, ScenarioError> {
         let file = ScenarioFile::load(path, &self.settings)?;
         file.check()?;
         Ok(file)

@@ -66,6 +66,12 @@ enum Command {
 
 /// Runs the program with the process's own arguments.
 pub fn main() -> ExitCode {
+    // Messages name their causes themselves; and a path is to be copied, not to be broken over two lines.
+    let handler = |_: &_| -> Box<dyn miette::ReportHandler> {
+        Box::new(miette::MietteHandlerOpts::new().without_cause_chain().wrap_lines(false).build())
+    };
+    // A hook that is set already belongs to whoever runs this as a library.
+    drop(miette::set_hook(Box::new(handler)));
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {

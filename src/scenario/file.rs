@@ -56,7 +56,7 @@ pub enum ScenarioError {
         /// The line, counted from 1, where the key stands in the file.
         line: Option<usize>,
         /// The key and what is wrong with it.
-        source: ConfigError,
+        source: Box<ConfigError>,
         /// The parameters with which it goes wrong, where it depends on them.
         at: String,
     },
@@ -111,7 +111,7 @@ impl ScenarioFile {
         let space = config.parameters.check().map_err(|error| {
             let source = error.within("parameters");
             let line = locate::line_of(&text, &source.path);
-            ScenarioError::Value { path: path.to_owned(), line, source, at: String::new() }
+            ScenarioError::Value { path: path.to_owned(), line, source: Box::new(source), at: String::new() }
         })?;
         Ok(Self { path: path.to_owned(), text, config, space })
     }
@@ -149,7 +149,7 @@ impl ScenarioFile {
     pub fn concrete(&self, parameters: &Parameters) -> Result<Scenario, ScenarioError> {
         self.config.check(parameters).map_err(|source| {
             let line = locate::line_of(&self.text, &source.path);
-            ScenarioError::Value { path: self.path.clone(), line, source, at: describe(parameters) }
+            ScenarioError::Value { path: self.path.clone(), line, source: Box::new(source), at: describe(parameters) }
         })
     }
 

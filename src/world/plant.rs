@@ -194,7 +194,7 @@ mod tests {
             car.step(-50.0, Indicator::Off, &road);
             hardest = hardest.min(car.state().acceleration_mps2);
         }
-        assert!(hardest >= -0.9 * GRAVITY_MPS2 - 1e-9 && hardest < -0.89 * GRAVITY_MPS2, "{hardest}");
+        assert!((-0.9 * GRAVITY_MPS2 - 1e-9..-0.89 * GRAVITY_MPS2).contains(&hardest), "{hardest}");
         assert_eq!(car.state().speed_mps, 0.0);
         // v²/2µg plus what the lag costs: about 30 m/s for 0.2 s.
         let ideal_m = 30.0 * 30.0 / (2.0 * 0.9 * GRAVITY_MPS2);

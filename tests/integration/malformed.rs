@@ -44,7 +44,7 @@ fn cases() -> Vec<(&'static str, Vec<u8>, &'static [&'static str])> {
             &["rear-class", "a number is needed"],
         ),
         ("unknown class", text("choice = { car = ", "choice = { boat = "), &["boat", "motorcycle"]),
-        ("min above max", text("min = 4.0, max = 8.0", "min = 9.0, max = 8.0"), &["brake-mps2", "min"]),
+        ("min above max", text("min = 4.0, max = 8.0", "min = 9.0, max = 8.0"), &["brake-mps2.uniform.max", "above 9"]),
         ("unknown actor", text("from = \"rear\"", "from = \"raer\""), &["raer", "rear"]),
         ("two of a name", text("id = \"front\"", "id = \"ego\""), &["ego", "twice"]),
         ("lane beyond the road", text("lane = 2", "lane = 4"), &["lane", "4"]),

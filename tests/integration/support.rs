@@ -1,5 +1,6 @@
 //! Running the program, and reading what it leaves.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -56,7 +57,12 @@ pub(crate) fn headline_with(from: &str, to: &str) -> String {
 pub(crate) fn data() -> Option<PathBuf> {
     let folder = std::env::var_os("CLOSECALL_DATA").map(PathBuf::from);
     if folder.is_none() {
-        println!("skipped: CLOSECALL_DATA is not set");
+        skipped("CLOSECALL_DATA is not set");
     }
     folder
+}
+
+/// Says that a test is skipped. Written past the test runner's capture, so that it is seen although the test passes.
+pub(crate) fn skipped(why: &str) {
+    writeln!(std::io::stderr(), "skipped: {why}").expect("standard error");
 }
