@@ -55,15 +55,15 @@ impl Transform {
         // Small pitch: the body's x axis dips, its z axis leans forward.
         let axes = [[cos, sin, -pitch], [-sin, cos, 0.0], [cos * pitch, sin * pitch, 1.0]];
         let at = [placement.at[0], placement.at[1], 0.0];
-        let origin = lens.to_camera(at);
-        let to_camera = |axis: [f64; 3]| {
-            let tip = lens.to_camera([at[0] + axis[0], at[1] + axis[1], axis[2]]);
+        let origin = lens.in_camera(at);
+        let axis_in_camera = |axis: [f64; 3]| {
+            let tip = lens.in_camera([at[0] + axis[0], at[1] + axis[1], axis[2]]);
             each(|i| (tip[i] - origin[i]) as f32)
         };
         Self {
             rotation: axes.map(|axis| axis.map(|part| part as f32)),
             at: at.map(|part| part as f32),
-            camera_rotation: axes.map(to_camera),
+            camera_rotation: axes.map(axis_in_camera),
             camera_at: origin.map(|part| part as f32),
         }
     }
@@ -101,7 +101,7 @@ pub(crate) fn add(
     for (moment, triangles) in moments.iter_mut().enumerate() {
         let late = f64::from(eye.light.exposure_s) * moment_offset(moment);
         let moved = [placement.velocity[0] * late, placement.velocity[1] * late];
-        let shift = eye.lens.to_camera([placement.at[0] + moved[0], placement.at[1] + moved[1], 0.0]);
+        let shift = eye.lens.in_camera([placement.at[0] + moved[0], placement.at[1] + moved[1], 0.0]);
         let at = shift.map(|part| part as f32);
         for (to, from) in camera.iter_mut().zip(&mesh.vertices) {
             *to = apply(&transform.camera_rotation, at, *from);

@@ -255,7 +255,7 @@ impl Frame {
             let [x, y, up] = cloud.at.map(f64::from);
             let corners: [[f64; 3]; 8] = std::array::from_fn(|corner| {
                 let sign = |bit: usize| if corner >> bit & 1 == 0 { -radius } else { radius };
-                self.lens.to_camera([x + sign(0), y + sign(1), up + self.lens.height_m + sign(2)])
+                self.lens.in_camera([x + sign(0), y + sign(1), up + self.lens.height_m + sign(2)])
             });
             if let Some(bounds) = self.lens.bounds(&corners) {
                 self.lists.clouds.push((widened(bounds), cloud));
@@ -271,7 +271,7 @@ impl Frame {
             let [x, y, z] = lamp.at.map(f64::from);
             let ground = [placement.at[0] + cos * x - sin * y, placement.at[1] + sin * x + cos * y];
             let radiance = self.light.emitted(lamp.emission, |is_left| indicators[usize::from(!is_left)]);
-            let camera = self.lens.to_camera([ground[0], ground[1], z]);
+            let camera = self.lens.in_camera([ground[0], ground[1], z]);
             if camera[2] < 1.0 || radiance[0] <= 0.0 {
                 continue;
             }
@@ -281,7 +281,7 @@ impl Frame {
             let halo =
                 Glow::halo(place(camera), camera[2] as f32, facing as f32, radiance.map(|x| x * left * strength));
             self.lists.glows.push((halo.bounds(), halo));
-            let mirrored = self.lens.to_camera([ground[0], ground[1], -z]);
+            let mirrored = self.lens.in_camera([ground[0], ground[1], -z]);
             if self.light.wetness > 0.0 && mirrored[2] > 1.0 {
                 let streak = Glow::streak(place(mirrored), &halo, self.light.wetness);
                 self.lists.glows.push((streak.bounds(), streak));
@@ -291,7 +291,7 @@ impl Frame {
 
     /// Bounds in the image of a box given in the ground frame, never too small.
     fn bounds_of(&self, body: &GroundBox) -> Option<Bounds> {
-        let corners = body.corners().map(|corner| self.lens.to_camera(corner));
+        let corners = body.corners().map(|corner| self.lens.in_camera(corner));
         self.lens.bounds(&corners).map(widened)
     }
 }

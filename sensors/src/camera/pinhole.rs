@@ -112,7 +112,7 @@ impl Lens {
     }
 
     /// A point of the ground frame in camera axes [m].
-    pub(crate) fn to_camera(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
+    pub(crate) fn in_camera(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
         let (s, c) = (self.sin_pitch, self.cos_pitch);
         let up = z - self.height_m;
         [y, s * x - c * up, -c * x - s * up]
@@ -186,9 +186,9 @@ mod tests {
     #[test]
     fn the_left_lane_is_on_the_images_right_and_the_near_is_lower() {
         let lens = lens(0.0);
-        let [u, near] = lens.pixel(lens.to_camera([-20.0, 3.75, 0.0]));
+        let [u, near] = lens.pixel(lens.in_camera([-20.0, 3.75, 0.0]));
         assert!(u > f64::from(WIDTH_PX) / 2.0);
-        let [_, far] = lens.pixel(lens.to_camera([-80.0, 3.75, 0.0]));
+        let [_, far] = lens.pixel(lens.in_camera([-80.0, 3.75, 0.0]));
         assert!(near > far);
     }
 
@@ -201,7 +201,7 @@ mod tests {
 
     #[test]
     fn under_braking_the_camera_looks_higher_so_that_objects_sink_in_the_image() {
-        let at = |lens: Lens| lens.pixel(lens.to_camera([-50.0, 0.0, 1.0]))[1];
+        let at = |lens: Lens| lens.pixel(lens.in_camera([-50.0, 0.0, 1.0]))[1];
         assert!(at(lens(0.02)) > at(lens(0.0)));
     }
 
@@ -210,7 +210,7 @@ mod tests {
         let lens = lens(0.01);
         let there = lens.ray_in_ground([0.3, -0.2]).map(f64::from);
         let from_lens = [there[0], there[1], there[2] + lens.height_m];
-        for (got, wanted) in lens.to_camera(from_lens).iter().zip([0.3, -0.2, 1.0]) {
+        for (got, wanted) in lens.in_camera(from_lens).iter().zip([0.3, -0.2, 1.0]) {
             assert!((got - wanted).abs() < 1e-6);
         }
     }

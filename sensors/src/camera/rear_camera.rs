@@ -49,7 +49,7 @@ impl RearCamera {
     pub fn project(&self, ego: &SceneVehicle, object: &GroundBox) -> Option<PixelRect> {
         let lens = Lens::new(&self.camera, ego);
         let in_ground = GroundBox { x_m: object.x_m - lens.ahead_m, ..*object };
-        let corners = in_ground.corners().map(|corner| lens.to_camera(corner));
+        let corners = in_ground.corners().map(|corner| lens.in_camera(corner));
         let nearest = corners.iter().map(|corner| corner[2]).fold(f64::INFINITY, f64::min);
         let farthest = corners.iter().map(|corner| corner[2]).fold(f64::NEG_INFINITY, f64::max);
         if !(farthest > NEAREST_M) {
