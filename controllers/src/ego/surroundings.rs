@@ -42,6 +42,13 @@ impl Front {
     }
 }
 
+/// Two tracks of one vehicle differ by less than this along the lane [m]: errors of length and position together.
+const SAME_AHEAD_M: f64 = 5.0;
+/// And by less than this across it [m]: half of what is between the centres of two narrow vehicles side by side.
+const SAME_ASIDE_M: f64 = 1.0;
+/// And by less than this in speed [m/s].
+const SAME_SPEED_MPS: f64 = 3.0;
+
 /// A vehicle behind.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Rear {
@@ -50,6 +57,8 @@ pub(crate) struct Rear {
     pub(crate) gap_m: f64,
     /// Position of its centre ahead of E's [m].
     pub(crate) x_m: f64,
+    /// Position of its centre to the left of E's [m].
+    pub(crate) y_m: f64,
     pub(crate) length_m: f64,
     pub(crate) speed_mps: f64,
     /// Standard deviation of the speed [m/s].
@@ -65,6 +74,13 @@ pub(crate) struct Rear {
 impl Rear {
     pub(crate) fn in_own_lane(&self) -> bool {
         self.own_lane >= LIKELY
+    }
+
+    /// True where `track` is this vehicle, perhaps as another sensor sees it while it changes lanes. One that drives
+    /// beside it is further away sideways.
+    fn is_seen_as(&self, track: &Track) -> bool {
+        let is_near = (track.x_m() - self.x_m).abs() < SAME_AHEAD_M && (track.y_m() - self.y_m).abs() < SAME_ASIDE_M;
+        track.id == self.track || (is_near && (track.vx_mps() - self.speed_mps).abs() < SAME_SPEED_MPS)
     }
 }
 
@@ -153,6 +169,7 @@ pub(crate) fn rear_of(track: &Track, input: &EgoInput<'_>) -> Rear {
         track: track.id,
         gap_m: -track.x_m() - 0.5 * (track.length_m + input.odometry.length_m),
         x_m: track.x_m(),
+        y_m: track.y_m(),
         length_m: track.length_m,
         speed_mps: track.vx_mps(),
         speed_sd_mps: track.covariance[(2, 2)].max(0.0).sqrt(),
@@ -195,7 +212,7 @@ pub(crate) fn passing_lane(input: &EgoInput<'_>, rear: &Rear) -> PassingLane {
     let until_s = (rear.gap_m.max(0.0) + input.odometry.length_m + rear.length_m + PASSED_AHEAD_M) / closing_mps;
     let mut state = PassingLane::Free;
     for track in input.tracks {
-        if track.id == rear.track || !exists(track) || !(track.lane[passing(side)] >= LIKELY) {
+        if rear.is_seen_as(track) || !exists(track) || !(track.lane[passing(side)] >= LIKELY) {
             continue;
         }
         let apart_m = 0.5 * (track.length_m + rear.length_m) + FREE_DISTANCE_M;
