@@ -4,7 +4,9 @@ use closecall_traffic::{Check, Choice, ConfigError, Parameters};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::camera::{Camera, CameraConfig, Pipeline};
 use crate::lidar::LidarConfig;
+use crate::worker_classifier::WorkerClassifier;
 use crate::{
     FullModel, FullPerception, GroundTruth, NoiseKey, ObjectPerception, ObjectSensorConfig, ObjectSensorModel,
     Perception, SensorError, TrackerConfig,
@@ -37,6 +39,8 @@ pub struct SensorsConfig {
     pub rear_object: ObjectSensorConfig,
     /// The rear LiDAR.
     pub rear_lidar: LidarConfig,
+    /// The rear camera, whose network says what each cluster of the LiDAR is.
+    pub rear_camera: CameraConfig,
     /// The tracker behind the rear LiDAR.
     pub tracker: TrackerConfig,
 }
@@ -49,6 +53,7 @@ impl Default for SensorsConfig {
             surround: ObjectSensorConfig::default(),
             rear_object: ObjectSensorConfig::default(),
             rear_lidar: LidarConfig::default(),
+            rear_camera: CameraConfig::default(),
             tracker: TrackerConfig::default(),
         }
     }
@@ -59,6 +64,7 @@ impl Default for SensorsConfig {
 pub struct Sensors {
     mode: SensorMode,
     full: FullModel,
+    camera: Camera,
     rear_object: ObjectSensorModel,
 }
 
@@ -75,6 +81,7 @@ impl Check for SensorsConfig {
                 rear_lidar: self.rear_lidar.check(parameters).map_err(named("rear-lidar"))?,
                 tracker: self.tracker.check(parameters).map_err(named("tracker"))?,
             },
+            camera: self.rear_camera.check(parameters).map_err(named("rear-camera"))?,
             rear_object: self.rear_object.check_rear_object(parameters).map_err(named("rear-object"))?,
         })
     }
@@ -103,7 +110,16 @@ impl Sensors {
                 let models = [self.full.front_radar, self.full.surround, self.rear_object];
                 Box::new(ObjectPerception::new(models, key))
             }
-            SensorMode::Full => Box::new(FullPerception::new(&self.full, key)),
+            SensorMode::Full => {
+                let lidar_alone = FullPerception::new(&self.full, key);
+                match self.camera.pipeline {
+                    Pipeline::Off => Box::new(lidar_alone),
+                    Pipeline::CropClassifier => {
+                        let classifier = WorkerClassifier::new(self.camera, key);
+                        Box::new(lidar_alone.with_classifier(Box::new(classifier)))
+                    }
+                }
+            }
         })
     }
 }

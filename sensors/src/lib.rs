@@ -20,6 +20,7 @@ mod surroundings;
 #[cfg(test)]
 mod testing;
 mod tracking;
+mod worker_classifier;
 
 pub use config::{SensorMode, Sensors, SensorsConfig};
 pub use detection::{Detection, Extent};
@@ -29,3 +30,4 @@ pub use object::{NoiseKey, ObjectPerception, ObjectSensorConfig, ObjectSensorMod
 pub use perception::{FieldOfView, Health, Perception, SCAN_PERIOD, SensorError, SensorHealth};
 pub use scene::{Scene, SceneVehicle};
 pub use tracking::{TrackAudit, TrackerConfig, TrackerModel};
+pub use worker_classifier::use_inference_backend;

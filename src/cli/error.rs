@@ -1,6 +1,8 @@
 //! Whatever keeps a command from its result, and what the program then ends with.
 
 use closecall_scenarios::recordings::{RecordingError, WriteError as RecordingWriteError};
+use closecall_sensors::camera::ClassifierError;
+use closecall_sensors::camera::dataset::DatasetError;
 use miette::Diagnostic;
 
 use crate::campaign::folder::FolderError;
@@ -31,6 +33,12 @@ pub enum CliError {
     /// A Rerun file cannot be written.
     #[error(transparent)]
     Record(#[from] RecordError),
+    /// A set of pictures cannot be written.
+    #[error(transparent)]
+    Dataset(#[from] DatasetError),
+    /// The inference backend that was asked for cannot be used.
+    #[error(transparent)]
+    Classifier(#[from] ClassifierError),
     /// A run has no outcome.
     #[error("failed to run sample {sample}: {source}")]
     Sample {
@@ -61,15 +69,17 @@ impl From<&CliError> for ExitCode {
         match error {
             CliError::Scenario(error) => Self::from(error),
             CliError::Recording(error) if error.is_io() => Self::Io,
-            CliError::Recording(_) => Self::InvalidInput,
+            CliError::Recording(_) | CliError::Classifier(_) => Self::InvalidInput,
             CliError::Folder(error) => match error {
                 FolderError::Write(_) => Self::Io,
                 FolderError::OtherCampaign { .. } | FolderError::NotACampaign { .. } => Self::Usage,
                 FolderError::Read { .. } | FolderError::Content { .. } => Self::InvalidInput,
             },
-            CliError::Write(_) | CliError::Record(_) | CliError::WriteRecording(_) | CliError::Threads { .. } => {
-                Self::Io
-            }
+            CliError::Write(_)
+            | CliError::Record(_)
+            | CliError::WriteRecording(_)
+            | CliError::Dataset(_)
+            | CliError::Threads { .. } => Self::Io,
             CliError::Sample { .. } => Self::SampleError,
             CliError::Usage { .. } => Self::Usage,
         }

@@ -9,10 +9,15 @@ mod leave;
 mod output;
 mod record;
 mod recording;
+mod render;
 mod replay;
 mod run;
 
+use std::path::PathBuf;
+
 use clap::{Parser, Subcommand};
+use closecall_sensors::camera::{Backend, Classifier};
+use closecall_sensors::use_inference_backend;
 
 pub use error::CliError;
 
@@ -29,6 +34,10 @@ use output::complain;
 struct Cli {
     #[command(subcommand)]
     command: Command,
+    /// Run the rear camera's network on ONNX Runtime (1.24 or later) from this shared library; on the built-in tract
+    /// where absent
+    #[arg(long, global = true, value_name = "PATH", env = "ORT_DYLIB_PATH")]
+    onnxruntime: Option<PathBuf>,
 }
 
 const EXIT_CODES: &str = "\
@@ -62,6 +71,8 @@ enum Command {
     Fit(recording::FitArgs),
     /// Record traffic of the testbed's own simulation
     Record(record::RecordArgs),
+    /// Draw labelled pictures of the rear camera
+    Render(render::RenderArgs),
 }
 
 /// Runs the program with the process's own arguments.
@@ -80,7 +91,7 @@ pub fn main() -> ExitCode {
             return if error.print().is_ok() { code } else { ExitCode::Io };
         }
     };
-    match dispatch(cli.command) {
+    match choose_backend(cli.onnxruntime).and_then(|()| dispatch(cli.command)) {
         Ok(code) => code,
         Err(error) => {
             let code = ExitCode::from(&error);
@@ -88,6 +99,16 @@ pub fn main() -> ExitCode {
             code
         }
     }
+}
+
+/// Takes a named ONNX Runtime for the rear camera's network, and tries it before any work is done.
+fn choose_backend(onnxruntime: Option<PathBuf>) -> Result<(), CliError> {
+    let backend = Backend::choose(onnxruntime.as_deref(), None);
+    if backend != Backend::Tract {
+        Classifier::shipped(&backend)?;
+    }
+    use_inference_backend(backend);
+    Ok(())
 }
 
 fn dispatch(command: Command) -> Result<ExitCode, CliError> {
@@ -101,5 +122,6 @@ fn dispatch(command: Command) -> Result<ExitCode, CliError> {
         Command::Criticality(args) => recording::criticality(&args),
         Command::Fit(args) => recording::fit(&args),
         Command::Record(args) => record::record(&args),
+        Command::Render(args) => render::render(&args),
     }
 }

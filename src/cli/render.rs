@@ -1,0 +1,67 @@
+//! `closecall render`: labelled pictures of the rear camera, to train and to judge classifiers.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use closecall_sensors::camera::dataset::{Content, DatasetOptions, Set, render_dataset};
+use serde_json::json;
+
+use super::CliError;
+use super::args::Format;
+use super::output::outln;
+use crate::exit_code::ExitCode;
+
+/// Whether pictures are for training or for judging.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum Purpose {
+    /// Body shapes and paints for training
+    #[default]
+    Training,
+    /// Body shapes and paints that training never sees
+    HeldOut,
+}
+
+/// Arguments of `closecall render`.
+#[derive(Debug, Args)]
+pub(super) struct RenderArgs {
+    /// Folder to write to
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// Number of random scenes
+    #[arg(short = 'n', long = "scenes", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..))]
+    scenes: u32,
+    /// Seed of the random scenes
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Shapes and paints for training, or held-out ones
+    #[arg(long, value_enum, default_value_t)]
+    set: Purpose,
+    /// Write the crops that the classifier sees, instead of whole images with COCO annotations
+    #[arg(long)]
+    crops: bool,
+    /// Output for people or for programs
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+pub(super) fn render(args: &RenderArgs) -> Result<ExitCode, CliError> {
+    let options = DatasetOptions {
+        set: match args.set {
+            Purpose::Training => Set::Training,
+            Purpose::HeldOut => Set::HeldOut,
+        },
+        content: if args.crops { Content::Crops } else { Content::Images },
+        scenes: args.scenes,
+        seed: args.seed,
+    };
+    let summary = render_dataset(&options, &args.output)?;
+    match args.format {
+        Format::Json => outln!("{:#}", json!(summary)),
+        Format::Human => {
+            let [car, truck, motorcycle, background] = summary.labels;
+            outln!("{} pictures of {} scenes written to {}", summary.pictures, summary.scenes, args.output.display());
+            outln!("labels: {car} cars, {truck} trucks, {motorcycle} motorcycles, {background} background");
+        }
+    }
+    Ok(ExitCode::Pass)
+}
