@@ -65,8 +65,8 @@ impl From<&ScenarioError> for ExitCode {
     fn from(error: &ScenarioError) -> Self {
         match error {
             ScenarioError::Set { .. } => Self::Usage,
-            ScenarioError::Read { .. }
-            | ScenarioError::NotText { .. }
+            ScenarioError::Read { .. } => Self::Io,
+            ScenarioError::NotText { .. }
             | ScenarioError::Empty { .. }
             | ScenarioError::Syntax { .. }
             | ScenarioError::Value { .. } => Self::InvalidInput,

@@ -141,6 +141,12 @@ pub struct Outcome {
 }
 
 impl Outcome {
+    /// True where two outcomes are the same to the last bit, signs of zero included.
+    pub fn has_same_bits(&self, other: &Self) -> bool {
+        // Floats are written so that they read back exactly: the same text is the same bits.
+        matches!((serde_json::to_string(self), serde_json::to_string(other)), (Ok(one), Ok(two)) if one == two)
+    }
+
     /// True where E itself was in a collision: what gates count.
     pub fn ego_collided(&self, ego: &ActorId) -> bool {
         self.collisions.iter().any(|collision| collision.involves(ego))

@@ -101,7 +101,10 @@ pub fn run_sample(file: &ScenarioFile, sampling: Sampling, arms: &[Arm], sample:
         let result = run().map_err(SampleFailure::from);
         finished.wall_s.push(started.elapsed().as_secs_f64());
         if sample.is_multiple_of(REPEATED) {
-            finished.is_invalid |= run().map_err(SampleFailure::from) != result;
+            finished.is_invalid |= match (run().map_err(SampleFailure::from), &result) {
+                (Ok(again), Ok(outcome)) => !again.has_same_bits(outcome),
+                (again, result) => again != *result,
+            };
         }
         finished.record.arms.push(ArmRecord { controller: arm.controller.name().to_owned(), result });
     }

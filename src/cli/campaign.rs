@@ -9,7 +9,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use rayon::ThreadPool;
 
 use super::args::{Format, Sensing, SetArgs, arm};
-use super::output::{out, outln};
+use super::output::{complain, out, outln};
 use super::{CliError, json, leave};
 use crate::campaign::folder::{Folder, Journal};
 use crate::campaign::manifest::{MANIFEST_VERSION, Manifest, ManifestScenario};
@@ -95,13 +95,22 @@ impl CampaignArgs {
         };
         Manifest {
             manifest_version: MANIFEST_VERSION,
-            closecall_version: env!("CARGO_PKG_VERSION").to_owned(),
+            closecall_version: version(),
             scenarios: files.iter().map(scenario).collect(),
             sampling: self.sampling(),
             arms: controllers.to_vec(),
             sensors: self.sensors.map(|sensing| sensing.name().to_owned()),
             command: std::env::args().collect(),
         }
+    }
+}
+
+/// The version of this very program: two builds of one release may differ, so the executable's own hash is part of it.
+pub(super) fn version() -> String {
+    let release = env!("CARGO_PKG_VERSION");
+    match std::env::current_exe().and_then(std::fs::read) {
+        Ok(bytes) => format!("{release}+{}", &blake3::hash(&bytes).to_hex()[..HASH_DIGITS]),
+        Err(_) => release.to_owned(),
     }
 }
 
@@ -156,6 +165,9 @@ fn pool(jobs: Option<u16>) -> Result<ThreadPool, CliError> {
         .map_err(|error| CliError::Threads { jobs, message: error.to_string() })
 }
 
+/// Hexadecimal digits of the executable's hash in a version.
+const HASH_DIGITS: usize = 16;
+
 /// What one sample cost in one arm.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Timing {
@@ -181,6 +193,13 @@ fn run_all(
     let mut timings = Vec::new();
     let sampling = args.sampling();
     let counts: Vec<u64> = files.iter().map(|file| file.space().samples(args.design, args.samples)).collect();
+    for (file, count) in files.iter().zip(&counts).filter(|(_, count)| **count != args.samples) {
+        complain(format_args!(
+            "{}: the grid has {count} of the {} samples asked for\n",
+            file.config().name,
+            args.samples
+        ));
+    }
     let bar = progress(counts.iter().sum());
     for (place, (file, count)) in files.iter().zip(counts).enumerate() {
         summary.begin(&file.config().name);

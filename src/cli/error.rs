@@ -71,9 +71,9 @@ impl From<&CliError> for ExitCode {
             CliError::Recording(error) if error.is_io() => Self::Io,
             CliError::Recording(_) | CliError::Classifier(_) => Self::InvalidInput,
             CliError::Folder(error) => match error {
-                FolderError::Write(_) => Self::Io,
+                FolderError::Write(_) | FolderError::Read { .. } => Self::Io,
                 FolderError::OtherCampaign { .. } | FolderError::NotACampaign { .. } => Self::Usage,
-                FolderError::Read { .. } | FolderError::Content { .. } => Self::InvalidInput,
+                FolderError::Content { .. } => Self::InvalidInput,
             },
             CliError::Write(_)
             | CliError::Record(_)

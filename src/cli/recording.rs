@@ -1,6 +1,6 @@
 //! `closecall lane-changes`, `criticality` and `fit`: from recorded traffic to distributions.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use closecall_scenarios::criticality::{CriticalLaneChange, criticality as evaluate, shares};
@@ -156,6 +156,8 @@ fn print_metrics(changes: &[CriticalLaneChange]) {
 
 pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
     let recordings = args.recordings.iter().map(|path| read(path)).collect::<Result<Vec<_>, _>>()?;
+    refuse_repetition(&args.recordings, &recordings)?;
+    refuse_overwriting(&args.recordings, args.output.as_deref())?;
     let fitted = fit_distributions(&recordings, args.seed);
     let command = std::iter::once("closecall".to_owned()).chain(std::env::args().skip(1)).collect::<Vec<_>>().join(" ");
     let heading = Heading { command, provenance: args.provenance.clone() };
@@ -176,6 +178,28 @@ pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
         }
     }
     Ok(ExitCode::Pass)
+}
+
+/// A recording that is given twice would count twice, and make every interval too narrow.
+fn refuse_repetition(paths: &[PathBuf], recordings: &[Recording]) -> Result<(), CliError> {
+    for (later, recording) in recordings.iter().enumerate() {
+        if let Some(earlier) = recordings[..later].iter().position(|earlier| earlier.hash == recording.hash) {
+            let (one, other) = (paths[earlier].display(), paths[later].display());
+            return Err(CliError::Usage { message: format!("{one} and {other} are the same recording") });
+        }
+    }
+    Ok(())
+}
+
+fn refuse_overwriting(inputs: &[PathBuf], output: Option<&Path>) -> Result<(), CliError> {
+    let Some(output) = output else { return Ok(()) };
+    let same = |input: &&PathBuf| matches!((input.canonicalize(), output.canonicalize()), (Ok(a), Ok(b)) if a == b);
+    match inputs.iter().find(same) {
+        Some(input) => {
+            Err(CliError::Usage { message: format!("--output would overwrite the recording {}", input.display()) })
+        }
+        None => Ok(()),
+    }
 }
 
 fn json(fitted: &closecall_scenarios::fit::FittedDistributions) -> serde_json::Value {

@@ -6,12 +6,14 @@ use clap::Args;
 
 use super::CliError;
 use super::args::{Format, Sensing, arm};
+use super::output::complain;
 use super::run::{WatchArgs, print, run_watched};
-use crate::campaign::folder::Folder;
+use crate::campaign::folder::{Folder, FolderError};
 use crate::campaign::manifest::{Manifest, ManifestScenario};
 use crate::campaign::runner::concrete;
 use crate::controller::BuiltIn;
 use crate::exit_code::ExitCode;
+use crate::outcome::Outcome;
 use crate::scenario::ScenarioFile;
 use crate::simulation::{Arm, RunKey};
 
@@ -50,7 +52,28 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<ExitCode, CliError> {
     let key = RunKey { seed: manifest.sampling.seed, sample: args.sample };
     let outcome = run_watched(&scenario, key, &arm, &args.watch)?;
     print(&outcome, args.format);
-    Ok(ExitCode::Pass)
+    if agrees_with_journal(&folder, &outcome)? {
+        return Ok(ExitCode::Pass);
+    }
+    complain(format_args!(
+        "the replay differs from the campaign's journal: the campaign was made by closecall {}, this is {}\n",
+        manifest.closecall_version,
+        super::campaign::version(),
+    ));
+    Ok(ExitCode::Invalid)
+}
+
+/// True unless the campaign's journal has another result of this sample, by a single bit.
+fn agrees_with_journal(folder: &Folder, outcome: &Outcome) -> Result<bool, CliError> {
+    let Ok(records) = folder.records() else { return Ok(true) };
+    for record in records {
+        let record = record?;
+        if record.scenario == outcome.scenario && record.sample == outcome.sample {
+            let same_arm = record.arms.iter().find(|arm| arm.controller == outcome.controller);
+            return Ok(same_arm.is_none_or(|arm| arm.result.as_ref().is_ok_and(|kept| kept.has_same_bits(outcome))));
+        }
+    }
+    Ok(true)
 }
 
 /// The scenario of a campaign with this name, or its only one.
@@ -87,6 +110,10 @@ pub(super) fn record_sample(
 /// The scenario as the campaign ran it.
 fn scenario_file(folder: &Folder, scenario: &ManifestScenario) -> Result<ScenarioFile, CliError> {
     let path = folder.file(&format!("manifest.json#{}", scenario.name));
+    if blake3::hash(scenario.text.as_bytes()).to_string() != scenario.blake3 {
+        let message = format!("the text of `{}` has been changed since the campaign was run", scenario.name);
+        return Err(FolderError::Content { path: folder.file("manifest.json"), line: 1, message }.into());
+    }
     Ok(ScenarioFile::parse(&path, &scenario.text, &[])?)
 }
 
@@ -99,5 +126,7 @@ fn chosen_arm(manifest: &Manifest, controller: Option<BuiltIn>) -> Result<Arm, C
         let message = format!("the campaign was not run with `{}`, only with {known}", controller.name());
         return Err(CliError::Usage { message });
     }
-    Ok(arm(controller, manifest.sensors.as_deref().and_then(Sensing::from_name)))
+    let unknown = |name: &str| CliError::Usage { message: format!("the campaign's sensors `{name}` are not known") };
+    let sensing = |name: &String| Sensing::from_name(name).ok_or_else(|| unknown(name));
+    Ok(arm(controller, manifest.sensors.as_ref().map(sensing).transpose()?))
 }

@@ -46,8 +46,17 @@ pub(super) struct WatchArgs {
     #[arg(long, value_name = "FILE.rrd")]
     pub(super) record: Option<PathBuf>,
     /// Write one row per control step and actor
-    #[arg(long, value_name = "FILE.csv|FILE.parquet")]
+    #[arg(long, value_name = "FILE.csv|FILE.parquet", value_parser = table)]
     pub(super) trace: Option<PathBuf>,
+}
+
+/// A path whose ending says how a table is written.
+fn table(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    match path.extension().and_then(|extension| extension.to_str()) {
+        Some("csv" | "parquet") => Ok(path),
+        _ => Err(format!("`{text}` ends neither with .csv nor with .parquet")),
+    }
 }
 
 pub(super) fn run(args: &RunArgs) -> Result<ExitCode, CliError> {

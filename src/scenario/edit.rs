@@ -27,7 +27,7 @@ pub enum SettingError {
         text: String,
     },
     /// The key leads nowhere.
-    #[error("`{key}` leads nowhere: there is no `{part}`, only {known}")]
+    #[error("`{key}` leads nowhere: there is no {part}, only {known}")]
     NoSuchKey {
         /// The whole key.
         key: String,
@@ -65,16 +65,34 @@ impl Setting {
             parameters.insert(name, Item::Value(Value::InlineTable(fixed)));
             return Ok(());
         }
+        if let [name] = &self.key[..]
+            && !document.contains_key(name)
+        {
+            let parameters = document.get("parameters").and_then(Item::as_table_like).map(keys).unwrap_or_default();
+            return Err(self.lost(
+                &format!("`{name}`"),
+                format!("the parameters {parameters} and the keys {}", keys(document.as_table())),
+            ));
+        }
         let Some((last, way)) = self.key.split_last() else { return Ok(()) };
         let mut table: &mut dyn TableLike = document.as_table_mut();
         let mut way = way.iter();
         while let Some(part) = way.next() {
+            // Below the first level a table may be left out of the file; what it then holds is checked like the rest.
+            if !table.contains_key(part) && *part != self.key[0] {
+                table.insert(part, Item::Value(Value::InlineTable(InlineTable::new())));
+            }
             let known = keys(table);
-            let item = table.get_mut(part).ok_or_else(|| self.lost(part, known))?;
+            let item = table.get_mut(part).ok_or_else(|| self.lost(&format!("`{part}`"), known))?;
             table = match item {
                 Item::ArrayOfTables(tables) => self.element(part, tables, way.next())?,
-                item => item.as_table_like_mut().ok_or_else(|| self.lost(part, "a value".to_owned()))?,
+                item => item
+                    .as_table_like_mut()
+                    .ok_or_else(|| self.lost(&format!("table `{part}`"), "a value".to_owned()))?,
             };
+        }
+        if table.get(last).is_some_and(Item::is_array_of_tables) {
+            return Err(self.lost(&format!("single `{last}`"), "a list of them".to_owned()));
         }
         table.insert(last, Item::Value(value));
         Ok(())
@@ -90,8 +108,8 @@ impl Setting {
         let ids: Vec<String> =
             tables.iter().map(|table| table.get("id").and_then(Item::as_str).unwrap_or_default().to_owned()).collect();
         let lost = || {
-            let part = name.cloned().unwrap_or_default();
-            self.lost(&part, format!("`{array}` {}", ids.join(", ")))
+            let part = name.map_or_else(|| format!("single `{array}`"), |name| format!("`{name}`"));
+            self.lost(&part, format!("`{array}` with a name and a key: {}", ids.join(", ")))
         };
         let name = name.ok_or_else(lost)?;
         let place = ids.iter().position(|id| id == name).or_else(|| name.parse().ok()).ok_or_else(lost)?;
@@ -143,7 +161,8 @@ mod tests {
 
     #[test]
     fn what_leads_nowhere_is_refused() {
-        for text in ["nonsense", "=1", "a=", "actor.front.id=1", "actor.7.id=1", "road.lanes=2", "duration-s.x=1"] {
+        let lost = ["actor.front.id=1", "actor.7.id=1", "actor=3", "road.lanes=2", "duration-s.x=1", "brake=3"];
+        for text in ["nonsense", "=1", "a="].into_iter().chain(lost) {
             assert!(set(text).is_err(), "{text}");
         }
     }

@@ -11,17 +11,18 @@ use crate::outcome::Margins;
 const SETTLED_LEAD_S: f64 = 1.0;
 
 impl MarginsNow {
-    /// The margins of a vehicle in `own` state among its neighbours, on lanes of this width.
+    /// The margins of a vehicle in `own` state among its neighbours, with its own width and that of the lanes.
     ///
-    /// Ahead counts what is in the lane or in the way, whichever is nearer, and not yet alongside; behind counts whose
-    /// centre is in the lane: a vehicle that overtakes counts until it crosses the marking.
-    pub(crate) fn new(own: &VehicleState, neighbours: &Neighbours, lane_width_m: f64) -> Self {
-        let in_path = neighbours.in_path.filter(|path| path.gap_m >= 0.0);
-        let ahead = match (neighbours.own.lead, in_path) {
+    /// In the lane is whose centre is: a vehicle that overtakes counts as behind until it crosses the marking, and as
+    /// ahead once it has pulled in. Ahead counts, too, what E would hit by driving on.
+    pub(crate) fn new(own: &VehicleState, neighbours: &Neighbours, [own_width_m, lane_width_m]: [f64; 2]) -> Self {
+        let in_lane = |other: &Neighbour| other.lateral_offset_m.abs() < 0.5 * lane_width_m;
+        let overlaps = |other: &Neighbour| other.lateral_offset_m.abs() < 0.5 * (own_width_m + other.width_m);
+        let in_path = neighbours.in_path.filter(|path| path.gap_m >= 0.0 && overlaps(path));
+        let ahead = match (neighbours.own.lead.filter(in_lane), in_path) {
             (Some(lead), Some(path)) => Some(if path.gap_m < lead.gap_m { path } else { lead }),
             (lead, path) => lead.or(path),
         };
-        let in_lane = |behind: &Neighbour| behind.lateral_offset_m.abs() < 0.5 * lane_width_m;
         let behind = neighbours.own.follower.filter(in_lane);
         let gap_front_m = ahead.map(|ahead| ahead.gap_m).ok_or(Absent::NoLead);
         let gap_rear_m = behind.map(|behind| behind.gap_m).ok_or(Absent::NoFollower);
@@ -77,7 +78,8 @@ impl MarginMeter {
         keep_least(&mut extremes.min_gap_rear_m, now.gap_rear_m);
         keep_least(&mut extremes.min_ttc_rear_s, now.ttc_rear_s);
         extremes.max_deceleration_mps2 = extremes.max_deceleration_mps2.max(-own.acceleration_mps2);
-        if let Some(last_mps2) = self.last_acceleration_mps2 {
+        // Where the vehicle comes to a stand its deceleration ends at once: that is no jerk of the controller's.
+        if let Some(last_mps2) = self.last_acceleration_mps2.filter(|_| own.speed_mps > 0.0) {
             let jerk_mps3 = (own.acceleration_mps2 - last_mps2).abs() / self.step_s;
             extremes.max_jerk_mps3 = extremes.max_jerk_mps3.max(jerk_mps3);
         }

@@ -62,7 +62,8 @@ impl<'a> Run<'a> {
             unreachable!("a checked scenario has its ego stack at `ego`")
         };
         let has_mis = arm.controller.has_mis(settings);
-        let margins = MarginsNow::new(world.state(scenario.ego), &Neighbours::default(), scenario.road.lane_width_m());
+        let margins =
+            MarginsNow::new(world.state(scenario.ego), &Neighbours::default(), [0.0, scenario.road.lane_width_m()]);
         let sensors = match arm.sensors {
             Some(mode) => scenario.sensors.with_mode(mode),
             None => scenario.sensors,
@@ -106,7 +107,7 @@ impl<'a> Run<'a> {
         }
         let ego = self.scenario.ego;
         let own = self.world.state(ego);
-        self.margins = MarginsNow::new(own, &self.neighbours[ego], self.scenario.road.lane_width_m());
+        self.margins = MarginsNow::new(own, &self.neighbours[ego], self.widths_m(ego));
         if self.world.is_wrecked(ego) {
             return;
         }
@@ -189,6 +190,11 @@ impl<'a> Run<'a> {
         }
     }
 
+    /// The width of a vehicle, and that of the lanes [m].
+    fn widths_m(&self, actor: usize) -> [f64; 2] {
+        [self.world.vehicle(actor).dimensions.width_m, self.scenario.road.lane_width_m()]
+    }
+
     fn odometry(&self) -> Odometry {
         let ego = self.scenario.ego;
         let state = self.world.state(ego);
@@ -208,9 +214,8 @@ impl<'a> Run<'a> {
     fn show(&mut self, observer: &mut dyn Observer) {
         let Some(command) = &self.command else { return };
         self.fronts.clear();
-        let lane_width_m = self.scenario.road.lane_width_m();
         for actor in 0..self.world.len() {
-            let now = MarginsNow::new(self.world.state(actor), &self.neighbours[actor], lane_width_m);
+            let now = MarginsNow::new(self.world.state(actor), &self.neighbours[actor], self.widths_m(actor));
             self.fronts.push((now.gap_front_m, now.thw_front_s));
         }
         observer.step(&StepView {

@@ -98,6 +98,10 @@ fn wrong_usage_is_2() {
         vec!["run", headline, "--controller", "hope"],
         vec!["run", headline, "--set", "nonsense"],
         vec!["run", headline, "--set", "actor.nobody.id=x"],
+        vec!["run", headline, "--set", "actor.rear=3"],
+        vec!["run", headline, "--set", "no-such-parameter=3"],
+        vec!["run", headline, "--trace", "trace.txt"],
+        vec!["run", headline, "--trace", "same.csv", "--record", "same.csv"],
         vec!["fly"],
     ] {
         let output = closecall(&args);
@@ -113,7 +117,7 @@ fn a_replay_of_what_is_not_there_says_so() {
     let headline = library("low-thw-overtake");
     stdout(&closecall(["campaign", headline.to_str().unwrap(), "-n", "4", "--out", out.to_str().unwrap()]), 0);
     assert_eq!(code(&closecall(["replay", out.to_str().unwrap(), "4"])), 2);
-    assert_eq!(code(&closecall(["replay", folder.path().to_str().unwrap(), "0"])), 3);
+    assert_eq!(code(&closecall(["replay", folder.path().to_str().unwrap(), "0"])), 6);
     fs::write(out.join("manifest.json"), "{\"manifest_version\": 1").unwrap();
     let output = closecall(["replay", out.to_str().unwrap(), "0"]);
     assert_eq!(code(&output), 3);

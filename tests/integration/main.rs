@@ -5,6 +5,7 @@
 mod determinism;
 mod exit_codes;
 mod gate;
+mod hidden_lead;
 mod library;
 mod malformed;
 mod readme;

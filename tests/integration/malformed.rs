@@ -86,6 +86,6 @@ fn wrong_scenarios_are_refused_with_what_is_wrong() {
 #[test]
 fn a_scenario_that_is_not_there_is_named() {
     let output = closecall(["check", "nowhere.toml"]);
-    assert_eq!(code(&output), 3);
+    assert_eq!(code(&output), 6);
     assert!(stderr(&output).contains("nowhere.toml"));
 }

@@ -5,7 +5,7 @@
 
 use closecall_traffic::{Side, Source, Time, Track, TrackId, TrackStatus};
 
-use super::EgoInput;
+use super::{EgoInput, Odometry};
 
 /// Probability from which on something counts as there, in that lane, and of that kind [1].
 const LIKELY: f64 = 0.5;
@@ -97,44 +97,116 @@ pub(crate) enum PassingLane {
     Unknown,
 }
 
-/// Follows the acceleration of the vehicle ahead, which tracks do not carry.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct FrontFollower {
-    last: Option<(TrackId, Time, f64)>,
+/// How hard whatever is ahead might brake, in order to tell which leaves the least room to stop [m/s²].
+const MAY_BRAKE_MPS2: f64 = 8.0;
+
+/// A vehicle ahead whose track vanished while it was in E's lane is taken to be there still for this long.
+const REMEMBERED: Time = Time::from_ms(500);
+
+/// One vehicle ahead from step to step.
+#[derive(Clone, Copy, Debug)]
+struct Followed {
+    id: TrackId,
+    /// When it was last seen.
+    seen: Time,
+    /// Position of its centre ahead of E's then [m].
+    x_m: f64,
+    length_m: f64,
+    speed_mps: f64,
+    /// Its acceleration, smoothed; tracks do not carry it [m/s²].
     acceleration_mps2: f64,
+    in_lane: bool,
+}
+
+impl Followed {
+    fn new(track: &Track) -> Self {
+        Self {
+            id: track.id,
+            seen: track.time,
+            x_m: track.x_m(),
+            length_m: track.length_m,
+            speed_mps: track.vx_mps(),
+            acceleration_mps2: 0.0,
+            in_lane: in_own_lane(track),
+        }
+    }
+
+    fn see(&mut self, track: &Track) {
+        let step_s = (track.time - self.seen).s();
+        if step_s > 0.0 {
+            let measured = ((track.vx_mps() - self.speed_mps) / step_s).clamp(-BELIEVED_MPS2, BELIEVED_MPS2);
+            let share = step_s / (ACCELERATION_TIME_S + step_s);
+            let acceleration_mps2 = self.acceleration_mps2 + share * (measured - self.acceleration_mps2);
+            *self = Self { acceleration_mps2, ..Self::new(track) };
+        }
+    }
+
+    /// This vehicle at `now`, seen then or predicted: braking on as it did, down to a stand.
+    fn front(&self, now: Time, odometry: &Odometry) -> Front {
+        let since_s = (now - self.seen).s();
+        let speed_mps = (self.speed_mps + self.acceleration_mps2 * since_s).max(0.0);
+        let moved_m = (0.5 * (self.speed_mps + speed_mps) - odometry.speed_mps) * since_s;
+        Front {
+            track: self.id,
+            gap_m: self.x_m + moved_m - 0.5 * (self.length_m + odometry.length_m),
+            speed_mps,
+            acceleration_mps2: self.acceleration_mps2,
+        }
+    }
+}
+
+/// Follows the vehicles ahead from step to step.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct FrontFollower {
+    followed: Vec<Followed>,
 }
 
 impl FrontFollower {
-    /// The nearest vehicle ahead in E's lane, confirmed or coasting.
+    /// Of the vehicles ahead in E's lane the one that leaves E the least room to stop.
+    ///
+    /// Not simply the nearest: one that overtakes and is only just past would hide the one behind which E brakes.
     pub(crate) fn update(&mut self, input: &EgoInput<'_>) -> Option<Front> {
-        let nearest = input
-            .tracks
-            .iter()
-            .filter(|track| track.x_m() > 0.0 && established(track) && exists(track) && track.lane[OWN] >= LIKELY)
-            .min_by(|a, b| a.x_m().total_cmp(&b.x_m()));
-        let Some(track) = nearest else {
-            *self = Self::default();
-            return None;
-        };
-        match self.last {
-            Some((id, time, speed_mps)) if id == track.id => {
-                let step_s = (track.time - time).s();
-                if step_s > 0.0 {
-                    let measured = ((track.vx_mps() - speed_mps) / step_s).clamp(-BELIEVED_MPS2, BELIEVED_MPS2);
-                    let share = step_s / (ACCELERATION_TIME_S + step_s);
-                    self.acceleration_mps2 += share * (measured - self.acceleration_mps2);
-                }
+        let now = input.time;
+        for track in input.tracks.iter().filter(|track| track.x_m() > 0.0 && established(track) && exists(track)) {
+            match self.followed.iter_mut().find(|followed| followed.id == track.id) {
+                // A track that coasts says nothing of its acceleration; for a while the last one is the better guess.
+                Some(followed) if track.status == TrackStatus::Coasting && now - followed.seen <= REMEMBERED => {}
+                Some(followed) => followed.see(track),
+                None => self.begin(track),
             }
-            _ => self.acceleration_mps2 = 0.0,
         }
-        self.last = Some((track.id, track.time, track.vx_mps()));
-        Some(Front {
-            track: track.id,
-            gap_m: track.x_m() - 0.5 * (track.length_m + input.odometry.length_m),
-            speed_mps: track.vx_mps(),
-            acceleration_mps2: self.acceleration_mps2,
-        })
+        let is_gone = |id| !input.tracks.iter().any(|track| track.id == id && track.x_m() > 0.0);
+        self.followed.retain(|followed| {
+            let remembered = followed.in_lane && now - followed.seen <= REMEMBERED;
+            remembered || !is_gone(followed.id)
+        });
+        let room_m = |front: &Front| front.gap_m + front.speed_mps * front.speed_mps / (2.0 * MAY_BRAKE_MPS2);
+        self.followed
+            .iter()
+            .filter(|followed| followed.in_lane)
+            .map(|followed| followed.front(now, &input.odometry))
+            .min_by(|a, b| room_m(a).total_cmp(&room_m(b)))
     }
+
+    /// Follows a new track, as the heir of one that vanished at its place.
+    fn begin(&mut self, track: &Track) {
+        let now = track.time;
+        let heir_of = |followed: &&mut Followed| {
+            let since_s = (now - followed.seen).s();
+            since_s > 0.0
+                && (followed.x_m - track.x_m()).abs() < SAME_AHEAD_M
+                && (followed.speed_mps - track.vx_mps()).abs() < SAME_SPEED_MPS
+        };
+        let fresh = Followed::new(track);
+        match self.followed.iter_mut().find(heir_of) {
+            Some(followed) => *followed = Followed { acceleration_mps2: followed.acceleration_mps2, ..fresh },
+            None => self.followed.push(fresh),
+        }
+    }
+}
+
+fn in_own_lane(track: &Track) -> bool {
+    track.lane[OWN] >= LIKELY
 }
 
 /// Place of E's own lane among a track's lane probabilities.
