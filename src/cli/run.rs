@@ -87,6 +87,9 @@ struct Watchers {
 
 impl Watchers {
     fn new(scenario: &Scenario, key: RunKey, arm: &Arm, watch: &WatchArgs) -> Result<Self, CliError> {
+        if watch.record.is_some() && watch.record == watch.trace {
+            return Err(CliError::Usage { message: "--record and --trace name the same file".to_owned() });
+        }
         let title =
             format!("{} · {} · seed {} · sample {}", scenario.name, arm.controller.name(), key.seed, key.sample);
         let recorder = |path: &PathBuf| RunRecorder::new(path, scenario, &title);

@@ -152,6 +152,9 @@ fn front_margin_long() {
     bench.front().state[0] = 45.0 + CAR_M;
     bench.refuses(Reason::FrontMarginLong);
     bench.tracks.remove(0);
+    // One that vanishes is remembered for half a second.
+    bench.refuses(Reason::FrontMarginLong);
+    bench.step_for(0.6);
     bench.refuses(Reason::NoFront);
 }
 
