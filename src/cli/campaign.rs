@@ -1,6 +1,7 @@
 //! `closecall campaign`: many samples of scenarios, judged.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Instant;
 
 use clap::Args;
@@ -18,6 +19,7 @@ use crate::campaign::summary::{Counts, Summary};
 use crate::campaign::verdict::{Gates, Judgement};
 use crate::controller::BuiltIn;
 use crate::exit_code::ExitCode;
+use crate::report::timings::Timing;
 use crate::scenario::ScenarioFile;
 use crate::simulation::Arm;
 
@@ -168,19 +170,6 @@ fn pool(jobs: Option<u16>) -> Result<ThreadPool, CliError> {
 /// Hexadecimal digits of the executable's hash in a version.
 const HASH_DIGITS: usize = 16;
 
-/// What one sample cost in one arm.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Timing {
-    /// Place of the scenario in the campaign.
-    pub(super) scenario: usize,
-    /// Number of the sample.
-    pub(super) sample: u64,
-    /// Place of the arm in the campaign.
-    pub(super) arm: usize,
-    /// Wall time [s].
-    pub(super) wall_s: f64,
-}
-
 fn run_all(
     args: &CampaignArgs,
     files: &[ScenarioFile],
@@ -201,15 +190,21 @@ fn run_all(
         ));
     }
     let bar = progress(counts.iter().sum());
-    for (place, (file, count)) in files.iter().zip(counts).enumerate() {
+    let controllers: Vec<Arc<str>> = arms.iter().map(|arm| arm.controller.name().into()).collect();
+    for (file, count) in files.iter().zip(counts) {
         summary.begin(&file.config().name);
+        let scenario: Arc<str> = file.config().name.as_str().into();
         let Some(ego) = file.ego_id() else { continue };
         run_samples(pool, file, sampling, arms, 0..count, |finished: Finished| {
             if let Some(journal) = &mut journal {
                 journal.append(&finished.record)?;
                 let sample = finished.record.sample;
-                let timing = |(arm, wall_s): (usize, &f64)| Timing { scenario: place, sample, arm, wall_s: *wall_s };
-                timings.extend(finished.wall_s.iter().enumerate().map(timing));
+                timings.extend(finished.wall_s.iter().zip(&controllers).map(|(wall_s, controller)| Timing {
+                    scenario: scenario.clone(),
+                    sample,
+                    controller: controller.clone(),
+                    wall_s: *wall_s,
+                }));
             }
             summary.take(&finished, ego);
             bar.inc(1);

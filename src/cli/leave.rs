@@ -2,22 +2,18 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::sync::Arc;
 
-use arrow::array::{Float64Array, RecordBatch, StringArray, UInt64Array};
-use arrow::datatypes::{DataType, Field, Schema};
 use closecall_traffic::ActorId;
-use parquet::arrow::ArrowWriter;
 
 use super::CliError;
-use super::campaign::Timing;
 use super::replay::record_sample;
 use crate::campaign::folder::{Folder, FolderError};
 use crate::campaign::manifest::Manifest;
 use crate::campaign::record::Record;
+use crate::report::WriteError;
 use crate::report::junit::write_junit;
 use crate::report::outcomes::{OutcomeRow, parameter_columns, write_outcomes};
-use crate::report::{WriteError, write_atomically};
+use crate::report::timings::{Timing, write_timings};
 use crate::scenario::ScenarioFile;
 
 /// Where recordings lie in a campaign's folder.
@@ -36,7 +32,7 @@ pub(super) fn reports(
     let manifest = folder.manifest()?;
     let nominal: Vec<_> = files.iter().map(|file| file.space().nominal()).collect();
     write_outcomes(&folder.file("outcomes.parquet"), &parameter_columns(&nominal), rows(folder, files, &manifest)?)?;
-    write_timings(folder, &manifest, timings)?;
+    write_timings(&folder.file("timings.parquet"), timings)?;
     let recorded = record_failures(folder, files, &manifest, recordings)?;
     let with_recordings = rows(folder, files, &manifest)?.map(|row| {
         row.map(|row| {
@@ -108,33 +104,4 @@ fn record_failures(
         recorded.insert((record.scenario.clone(), record.sample, tested.controller.clone()), name);
     }
     Ok(recorded)
-}
-
-/// Wall times, in a file of their own: they differ from run to run.
-fn write_timings(folder: &Folder, manifest: &Manifest, timings: &[Timing]) -> Result<(), WriteError> {
-    let path = folder.file("timings.parquet");
-    let scenario = |timing: &Timing| manifest.scenarios.get(timing.scenario).map(|scenario| scenario.name.as_str());
-    let controller = |timing: &Timing| manifest.arms.get(timing.arm).map(|arm| arm.name());
-    let schema = Arc::new(Schema::new(vec![
-        Field::new("scenario", DataType::Utf8, true),
-        Field::new("sample", DataType::UInt64, false),
-        Field::new("controller", DataType::Utf8, true),
-        Field::new("wall_s", DataType::Float64, false),
-    ]));
-    write_atomically(&path, |file| {
-        let batch = RecordBatch::try_new(
-            schema.clone(),
-            vec![
-                Arc::new(timings.iter().map(scenario).collect::<StringArray>()),
-                Arc::new(timings.iter().map(|timing| timing.sample).collect::<UInt64Array>()),
-                Arc::new(timings.iter().map(controller).collect::<StringArray>()),
-                Arc::new(timings.iter().map(|timing| timing.wall_s).collect::<Float64Array>()),
-            ],
-        )
-        .map_err(std::io::Error::other)?;
-        let mut writer = ArrowWriter::try_new(file, schema.clone(), None).map_err(std::io::Error::other)?;
-        writer.write(&batch).map_err(std::io::Error::other)?;
-        writer.close().map_err(std::io::Error::other)?;
-        Ok(())
-    })
 }

@@ -3,6 +3,7 @@
 pub mod junit;
 pub mod outcomes;
 pub mod rerun;
+pub mod timings;
 pub mod trace;
 pub mod traffic;
 mod write;
