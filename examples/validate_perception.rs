@@ -82,18 +82,25 @@ fn run_all(file: &ScenarioFile, mode: SensorMode, samples: u64, seed: u64) -> To
 }
 
 fn print(name: &str, mode: &str, totals: &Totals) {
+    let hours = totals.simulated_s / 3_600.0;
+    let false_per_h = totals.false_tracks as f64 / hours;
+    if totals.nees.len() < 2 {
+        println!(
+            "{name:<28} {mode:<7} nothing was tracked               {:>5}  {false_per_h:>8.1}",
+            totals.id_switches
+        );
+        return;
+    }
     let runs = totals.nees.len() as f64;
     let mean = totals.nees.iter().sum::<f64>() / runs;
     let variance = totals.nees.iter().map(|nees| (nees - mean) * (nees - mean)).sum::<f64>() / (runs - 1.0);
     let half = TWO_SIDED_95 * (variance / runs).sqrt();
     let rmse = (totals.speed_error_sum_m2ps2 / totals.matched_steps as f64).sqrt();
-    let hours = totals.simulated_s / 3_600.0;
     println!(
-        "{name:<28} {mode:<7} {mean:>6.2} [{:.2}, {:.2}]  {rmse:>6.2}  {:>5}  {:>8.1}",
+        "{name:<28} {mode:<7} {mean:>6.2} [{:.2}, {:.2}]  {rmse:>6.2}  {:>5}  {false_per_h:>8.1}",
         mean - half,
         mean + half,
         totals.id_switches,
-        totals.false_tracks as f64 / hours,
     );
 }
 
