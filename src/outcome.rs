@@ -61,6 +61,60 @@ impl Collision {
     }
 }
 
+/// A moment of the encounter with a vehicle R that comes up from behind E while E follows F: the paper's figure names
+/// five of them, (a) to (e).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Moment {
+    /// (a) R is within 100 m of E, in E's lane, and approaches at 10 km/h or more.
+    RearNear,
+    /// (b) R starts to change lanes in order to overtake.
+    CutOut,
+    /// (c) R is at the critical distance behind E.
+    CriticalDistance,
+    /// (d) The brake light of F, the vehicle ahead of E, goes on.
+    FrontBrakes,
+    /// (e) R is past E: it has concluded its overtaking, and E is free to brake.
+    Concluded,
+}
+
+impl Moment {
+    /// All of them, in their order.
+    pub const ALL: [Self; 5] =
+        [Self::RearNear, Self::CutOut, Self::CriticalDistance, Self::FrontBrakes, Self::Concluded];
+
+    /// Its letter in the paper's figure.
+    pub const fn letter(self) -> char {
+        match self {
+            Self::RearNear => 'a',
+            Self::CutOut => 'b',
+            Self::CriticalDistance => 'c',
+            Self::FrontBrakes => 'd',
+            Self::Concluded => 'e',
+        }
+    }
+
+    /// What happens then, as a phrase.
+    pub const fn text(self) -> &'static str {
+        match self {
+            Self::RearNear => "R comes near",
+            Self::CutOut => "R pulls out",
+            Self::CriticalDistance => "R is at the critical distance",
+            Self::FrontBrakes => "F brakes",
+            Self::Concluded => "R has concluded",
+        }
+    }
+}
+
+/// A moment with its time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct MomentAt {
+    /// What happens.
+    pub moment: Moment,
+    /// The control step at which it was first so.
+    pub time: Time,
+}
+
 /// Why a run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -134,6 +188,9 @@ pub struct Outcome {
     pub duration: Time,
     /// Every first touch of two vehicles, in order of time.
     pub collisions: Vec<Collision>,
+    /// The moments of the encounter that were reached before E collided, in order of time.
+    #[serde(default)]
+    pub moments: Vec<MomentAt>,
     /// E's margins.
     pub margins: Margins,
     /// What the margin increase system did, where the controller has one.
@@ -145,6 +202,11 @@ impl Outcome {
     pub fn has_same_bits(&self, other: &Self) -> bool {
         // Floats are written so that they read back exactly: the same text is the same bits.
         matches!((serde_json::to_string(self), serde_json::to_string(other)), (Ok(one), Ok(two)) if one == two)
+    }
+
+    /// When `moment` was, if it was reached.
+    pub fn moment(&self, moment: Moment) -> Option<Time> {
+        self.moments.iter().find(|noted| noted.moment == moment).map(|noted| noted.time)
     }
 
     /// True where E itself was in a collision: what gates count.

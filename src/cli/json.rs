@@ -5,7 +5,7 @@ use serde_json::{Map, Value, json};
 
 use crate::campaign::summary::{Counts, Summary};
 use crate::campaign::verdict::Judgement;
-use crate::outcome::{Collision, Margins, MisSummary, Outcome};
+use crate::outcome::{Collision, Margins, MisSummary, MomentAt, Outcome};
 
 /// Puts a value or its absence under `key`.
 pub(super) fn put(object: &mut Map<String, Value>, key: &str, measured: Measured) {
@@ -31,6 +31,7 @@ pub(super) fn outcome(outcome: &Outcome) -> Value {
         "duration_s": outcome.duration.s(),
         "parameters": parameters(outcome),
         "collisions": outcome.collisions.iter().map(collision).collect::<Vec<_>>(),
+        "moments": outcome.moments.iter().map(moment).collect::<Vec<_>>(),
         "margins": margins(&outcome.margins),
         "mis": mis(&outcome.mis),
     })
@@ -55,6 +56,10 @@ fn collision(collision: &Collision) -> Value {
         "relative_speed_mps": collision.relative_speed_mps,
         "delta_v_mps": { first.as_str(): collision.delta_v_mps[0], second.as_str(): collision.delta_v_mps[1] },
     })
+}
+
+fn moment(noted: &MomentAt) -> Value {
+    json!({ "moment": noted.moment, "letter": noted.moment.letter(), "time_s": noted.time.s() })
 }
 
 fn margins(margins: &Margins) -> Value {

@@ -158,6 +158,9 @@ impl std::fmt::Display for Human<'_> {
         for (name, value) in outcome.parameters.iter() {
             writeln!(f, "  {name} = {value}")?;
         }
+        for noted in &outcome.moments {
+            writeln!(f, "  ({}) {} at {:.2} s", noted.moment.letter(), noted.moment.text(), noted.time.s())?;
+        }
         for collision in &outcome.collisions {
             let [first, second] = &collision.between;
             writeln!(

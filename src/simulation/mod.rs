@@ -14,6 +14,7 @@ mod error;
 mod events;
 mod margins;
 mod mis_log;
+mod moments;
 mod observer;
 mod phase;
 mod run;

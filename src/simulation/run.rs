@@ -2,8 +2,8 @@
 
 use closecall_controllers::CheckedDriver;
 use closecall_controllers::{
-    Driver, DriverInput, DriverNote, EgoCommand, EgoController, EgoInput, EgoState, Neighbours, Odometry,
-    SensorAvailability,
+    Driver, DriverInput, DriverNote, EgoCommand, EgoController, EgoInput, EgoState, MisSettings, Neighbours,
+    Odometry, SensorAvailability,
 };
 use closecall_sensors::{Health, NoiseKey, Perception, Scene, SceneVehicle};
 use closecall_traffic::{Measured, Stream, Track, stream};
@@ -11,9 +11,10 @@ use closecall_traffic::{Measured, Stream, Track, stream};
 use super::events::Events;
 use super::margins::MarginMeter;
 use super::mis_log::{EgoNow, MisLog};
+use super::moments::{Moments, NEAR_CLOSING_MPS, NEAR_GAP_M};
 use super::phase::{AFTER_COLLISION, Encounter};
 use super::{Arm, CONTROL_STEP, Happening, MarginsNow, Observer, PHYSICS_STEP, RunKey, SampleError, StepView};
-use crate::outcome::{EndReason, Outcome};
+use crate::outcome::{EndReason, Moment, Outcome, Phase};
 use crate::scenario::Scenario;
 use crate::world::{Action, Placed, World};
 
@@ -38,7 +39,8 @@ pub(super) struct Run<'a> {
     encounter: Encounter,
     meter: MarginMeter,
     mis: MisLog,
-    critical_gap_m: Option<f64>,
+    moments: Moments,
+    critical_gap_m: f64,
     command: Option<EgoCommand>,
     // Buffers, kept from step to step.
     neighbours: Vec<Neighbours>,
@@ -61,7 +63,6 @@ impl<'a> Run<'a> {
         let CheckedDriver::Ego(settings) = &scenario.actors[scenario.ego].driver else {
             unreachable!("a checked scenario has its ego stack at `ego`")
         };
-        let has_mis = arm.controller.has_mis(settings);
         let margins =
             MarginsNow::new(world.state(scenario.ego), &Neighbours::default(), [0.0, scenario.road.lane_width_m()]);
         let sensors = match arm.sensors {
@@ -83,7 +84,8 @@ impl<'a> Run<'a> {
             encounter: Encounter::default(),
             meter: MarginMeter::new(PHYSICS_STEP.s()),
             mis: MisLog::default(),
-            critical_gap_m: settings.mis().filter(|_| has_mis).map(|mis| mis.critical_gap_m),
+            moments: Moments::default(),
+            critical_gap_m: settings.mis().unwrap_or(&MisSettings::PAPER).critical_gap_m,
             command: None,
             neighbours: vec![Neighbours::default(); world.len()],
             tracks: Vec::new(),
@@ -162,7 +164,8 @@ impl<'a> Run<'a> {
         }
         self.command = Some(command);
         let ego = self.scenario.ego;
-        let is_critical = self.critical_gap_m.is_some_and(|gap_m| self.encounter.reaches(&self.world, ego, gap_m));
+        let is_critical = self.encounter.reaches(&self.world, ego, self.critical_gap_m);
+        self.note_moments(is_critical);
         self.mis.take(&EgoNow {
             time,
             command: &command,
@@ -170,6 +173,27 @@ impl<'a> Run<'a> {
             thw_front_s: self.margins.thw_front_s,
             is_critical,
         });
+    }
+
+    /// Notes which moments of the encounter are now.
+    fn note_moments(&mut self, is_critical: bool) {
+        let time = self.world.time();
+        let own_mps = self.world.state(self.scenario.ego).speed_mps;
+        let is_near = self.margins.follower.is_some_and(|rear| {
+            let closing_mps = self.world.state(rear).speed_mps - own_mps;
+            self.margins.gap_rear_m.is_ok_and(|gap_m| gap_m <= NEAR_GAP_M) && closing_mps >= NEAR_CLOSING_MPS
+        });
+        let brakes = self.margins.lead.is_ok_and(|lead| self.world.state(lead.actor).brake_light);
+        for (moment, is_now) in [
+            (Moment::RearNear, is_near),
+            (Moment::CriticalDistance, is_critical),
+            (Moment::FrontBrakes, brakes),
+            (Moment::Concluded, self.encounter.phase() == Phase::After),
+        ] {
+            if is_now {
+                self.moments.note(moment, time);
+            }
+        }
     }
 
     /// Fills the lists of vehicles that sensors and observers see.
@@ -260,6 +284,9 @@ impl<'a> Run<'a> {
             if let Some(note) = action.note {
                 if note == DriverNote::CutOutStarted {
                     self.events.cut_out_started(actor, time);
+                    if !self.world.is_wrecked(ego) {
+                        self.moments.note(Moment::CutOut, time);
+                    }
                 }
                 observer.happening(time, &Happening::DriverNote { actor, note });
             }
@@ -340,6 +367,7 @@ impl<'a> Run<'a> {
             end,
             duration: self.world.time(),
             collisions: self.world.collisions().to_vec(),
+            moments: self.moments.finish(),
             margins: self.meter.finish(),
             mis: self.mis.finish(self.arm.controller.has_mis(settings)),
         }

@@ -24,8 +24,6 @@ const LATERAL_SHARE: f64 = 0.5;
 const WHEELBASE_SHARE: f64 = 0.6;
 /// A lane change needs some way even at walking pace: twice the steering circle of a car [m].
 const SHORTEST_LANE_CHANGE_M: f64 = 10.0;
-/// From this deceleration on the brake light is on [m/s²] (UN R13-H, 5.2.22: it may stay off below).
-const BRAKE_LIGHT_MPS2: f64 = 0.7;
 /// Quasi-static dive of the body [rad per m/s²]: about 1.5° at 1 g.
 const DIVE_RAD_PER_MPS2: f64 = 0.0027;
 
@@ -62,6 +60,7 @@ impl Capability {
 #[derive(Clone, Debug)]
 pub(crate) struct Plant {
     capability: Capability,
+    brake_light_from_mps2: f64,
     wheelbase_m: f64,
     friction: f64,
     lag_share: f64,
@@ -78,6 +77,7 @@ impl Plant {
         let capability = Capability::of(vehicle.class);
         Self {
             capability,
+            brake_light_from_mps2: vehicle.brake_light_from_mps2,
             wheelbase_m: WHEELBASE_SHARE * vehicle.dimensions.length_m,
             friction,
             lag_share: 1.0 - (-step_s / capability.lag_s).exp(),
@@ -134,7 +134,7 @@ impl Plant {
         let (speed, distance) = advance(before.speed_mps, acceleration, self.step_s);
         self.state.speed_mps = speed;
         self.state.acceleration_mps2 = if speed > 0.0 { acceleration } else { 0.0 };
-        self.state.brake_light = asked_mps2 <= -BRAKE_LIGHT_MPS2 || (speed == 0.0 && asked_mps2 <= 0.0);
+        self.state.brake_light = asked_mps2 <= -self.brake_light_from_mps2 || (speed == 0.0 && asked_mps2 <= 0.0);
         self.state.indicator = indicator;
         self.steer(distance, road);
     }

@@ -8,6 +8,7 @@ mod gate;
 mod hidden_lead;
 mod library;
 mod malformed;
+mod paper_figure;
 mod readme;
 mod recordings;
 mod rerun_files;

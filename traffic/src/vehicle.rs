@@ -91,6 +91,8 @@ pub struct VehicleConfig {
     pub paint_rgb: Option<[u8; 3]>,
     /// Which of the body shapes of its class; the first where absent.
     pub body_shape: Option<u8>,
+    /// Deceleration from which on its brake light is on [m/s²], 0.7 to 1.3; 0.7 where absent.
+    pub brake_light_from_mps2: Option<Num>,
 }
 
 /// A checked vehicle.
@@ -104,7 +106,13 @@ pub struct Vehicle {
     pub mass_kg: f64,
     /// What sensors see of it.
     pub appearance: Appearance,
+    /// Deceleration from which on its brake light is on [m/s²].
+    pub brake_light_from_mps2: f64,
 }
+
+/// The brake light of a vehicle that slows without its friction brakes may go on from the first of these decelerations
+/// on, and must from the second on [m/s²]: UN R13-H, 5.2.22.4.
+const BRAKE_LIGHT_MPS2: [f64; 2] = [0.7, 1.3];
 
 impl Vehicle {
     /// A vehicle with everything typical of its class.
@@ -114,6 +122,7 @@ impl Vehicle {
             dimensions: class.typical_dimensions(),
             mass_kg: class.typical_mass_kg(),
             appearance: Appearance { paint_reflectivity: 0.5, paint_rgb: [128, 128, 132], body_shape: 0 },
+            brake_light_from_mps2: BRAKE_LIGHT_MPS2[0],
         }
     }
 }
@@ -147,6 +156,12 @@ impl Check for VehicleConfig {
                 paint_rgb: self.paint_rgb.unwrap_or(look.paint_rgb),
                 body_shape: self.body_shape.unwrap_or(look.body_shape),
             },
+            brake_light_from_mps2: or_typical(
+                &self.brake_light_from_mps2,
+                "brake-light-from-mps2",
+                Range::closed(BRAKE_LIGHT_MPS2[0], BRAKE_LIGHT_MPS2[1]),
+                typical.brake_light_from_mps2,
+            )?,
         })
     }
 }

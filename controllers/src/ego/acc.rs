@@ -58,7 +58,7 @@ pub struct AccConfig {
 }
 
 /// Checked adaptive cruise control.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Acc {
     pub(crate) time_gap_s: f64,
     pub(crate) set_speed_mps: Option<f64>,

@@ -38,7 +38,7 @@ pub struct AebConfig {
 }
 
 /// Checked emergency braking.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Aeb {
     trigger_mps2: f64,
     max_deceleration_mps2: f64,

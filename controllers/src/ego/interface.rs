@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::{MisPlan, Reason};
 
 /// E's knowledge of its own motion, from wheel speeds, inertial sensors and lane camera.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Odometry {
     /// Speed [m/s].
     pub speed_mps: f64,
@@ -25,7 +25,7 @@ pub struct Odometry {
 }
 
 /// Which groups of sensors can be relied on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct SensorAvailability {
     /// The radar that looks ahead.
     pub front: bool,
@@ -53,6 +53,26 @@ pub struct EgoInput<'a> {
     pub tracks: &'a [Track],
     /// Which sensors work.
     pub sensors: SensorAvailability,
+}
+
+impl EgoInput<'_> {
+    /// Refuses input that is not finite: comparisons and `min` would let it pass for something safe.
+    ///
+    /// # Errors
+    /// [`ControllerError::NotFinite`], with what it is.
+    pub fn check_finite(&self) -> Result<(), ControllerError> {
+        let refuse = |what| Err(ControllerError::NotFinite { what, time: self.time });
+        if !self.odometry.speed_mps.is_finite() {
+            return refuse("own speed");
+        }
+        for track in self.tracks {
+            let sizes = [track.length_m, track.existence, track.lane[0], track.lane[1], track.lane[2]];
+            if !track.state.iter().chain(&sizes).all(|value| value.is_finite()) {
+                return refuse("a track");
+            }
+        }
+        Ok(())
+    }
 }
 
 /// What the ego stack is doing.
@@ -96,9 +116,45 @@ pub enum ControllerError {
         /// When.
         time: Time,
     },
+    /// A controller that does not ship failed for a reason of its own.
+    #[error("failed at {time}: {reason}")]
+    Own {
+        /// What happened, in words.
+        reason: String,
+        /// When.
+        time: Time,
+    },
 }
 
 /// Who drives E: called once for each control step (25 Hz), in order of time.
+///
+/// This is where a controller of your own plugs in. It is given what a vehicle can know, E's odometry and the tracks of
+/// its sensors, and answers with an acceleration and its state; the loop sees to sensors, actuators and everybody else.
+/// One value drives one run, so that whatever it remembers starts afresh with each sample. It may fail, or even panic: that
+/// sample then ends as an error, and the campaign goes on.
+///
+/// ```
+/// use closecall_controllers::{ControllerError, EgoCommand, EgoController, EgoInput, EgoState, Reason};
+///
+/// /// Brakes gently while anything confirmed is behind.
+/// struct Shy;
+///
+/// impl EgoController for Shy {
+///     fn step(&mut self, input: &EgoInput<'_>) -> Result<EgoCommand, ControllerError> {
+///         input.check_finite()?;
+///         let followed = input.tracks.iter().any(|track| track.x_m() < 0.0);
+///         Ok(EgoCommand {
+///             acceleration_mps2: if followed { -0.5 } else { 0.0 },
+///             state: if followed { EgoState::Increasing } else { EgoState::Following },
+///             reason: Reason::External,
+///             plan: None,
+///         })
+///     }
+/// }
+/// ```
+///
+/// A whole one, with the factory that a campaign asks for and a campaign around it, is `examples/own_controller.rs`. A
+/// controller in another language runs as a process of its own: `--controller exec:COMMAND`.
 pub trait EgoController: Send {
     /// The command for the time until the next control step.
     ///

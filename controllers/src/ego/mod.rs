@@ -16,3 +16,4 @@ pub use mis::{Encounter, MisConfig, MisPlan, MisSettings, Solution};
 pub use reason::Reason;
 pub use settings::{EgoSettings, EgoStackConfig};
 pub use stack::EgoStack;
+pub use surroundings::{Front, FrontFollower};

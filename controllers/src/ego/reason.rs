@@ -61,6 +61,8 @@ pub enum Reason {
     BrakingRequired,
     /// Emergency braking is no longer needed.
     BrakingDone,
+    /// A controller that does not ship has reasons of its own.
+    External,
 }
 
 impl Reason {
@@ -93,6 +95,7 @@ impl Reason {
             Self::MarginReturned => "margin given back",
             Self::BrakingRequired => "emergency braking required",
             Self::BrakingDone => "emergency braking done",
+            Self::External => "the controller's own reason",
         }
     }
 }

@@ -27,7 +27,7 @@ fn automated() -> bool {
 }
 
 /// A checked ego stack.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct EgoSettings {
     pub(crate) acc: Acc,
     pub(crate) aeb: Option<Aeb>,

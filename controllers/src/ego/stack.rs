@@ -77,7 +77,7 @@ impl EgoStack {
 
 impl EgoController for EgoStack {
     fn step(&mut self, input: &EgoInput<'_>) -> Result<EgoCommand, ControllerError> {
-        check_finite(input)?;
+        input.check_finite()?;
         let front = self.front.update(input);
         let mut command = self.comfortable(input, front.as_ref());
         let speed_mps = input.odometry.speed_mps;
@@ -96,19 +96,4 @@ impl EgoController for EgoStack {
         self.last = Some((input.time, command.acceleration_mps2));
         Ok(command)
     }
-}
-
-/// Refuses input that is not finite: comparisons and `min` would let it pass for something safe.
-fn check_finite(input: &EgoInput<'_>) -> Result<(), ControllerError> {
-    let refuse = |what| Err(ControllerError::NotFinite { what, time: input.time });
-    if !input.odometry.speed_mps.is_finite() {
-        return refuse("own speed");
-    }
-    for track in input.tracks {
-        let sizes = [track.length_m, track.existence, track.lane[0], track.lane[1], track.lane[2]];
-        if !track.state.iter().chain(&sizes).all(|value| value.is_finite()) {
-            return refuse("a track");
-        }
-    }
-    Ok(())
 }

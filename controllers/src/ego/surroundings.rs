@@ -4,6 +4,7 @@
 //! tracker gives that lane a probability of at least one half.
 
 use closecall_traffic::{Side, Source, Time, Track, TrackId, TrackStatus};
+use serde::Serialize;
 
 use super::{EgoInput, Odometry};
 
@@ -26,12 +27,16 @@ const USES_PASSING_LANE_FROM_M: f64 = 40.0;
 const PASSED_AHEAD_M: f64 = 10.0;
 
 /// The vehicle ahead in E's lane.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Front {
-    pub(crate) track: TrackId,
-    pub(crate) gap_m: f64,
-    pub(crate) speed_mps: f64,
-    pub(crate) acceleration_mps2: f64,
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Front {
+    /// Its track.
+    pub track: TrackId,
+    /// Gap from E to it, bumper to bumper [m].
+    pub gap_m: f64,
+    /// Its speed [m/s].
+    pub speed_mps: f64,
+    /// Its acceleration, smoothed from its speed [m/s²].
+    pub acceleration_mps2: f64,
 }
 
 #[cfg(test)]
@@ -74,6 +79,11 @@ pub(crate) struct Rear {
 impl Rear {
     pub(crate) fn in_own_lane(&self) -> bool {
         self.own_lane >= LIKELY
+    }
+
+    /// True once the whole vehicle is ahead of E: it has concluded its overtaking, whatever E does now.
+    pub(crate) fn is_past(&self, odometry: &Odometry) -> bool {
+        self.x_m > 0.5 * (self.length_m + odometry.length_m)
     }
 
     /// True where `track` is this vehicle, perhaps as another sensor sees it while it changes lanes. One that drives
@@ -155,9 +165,9 @@ impl Followed {
     }
 }
 
-/// Follows the vehicles ahead from step to step.
+/// Follows the vehicles ahead from step to step: to be updated at each control step.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct FrontFollower {
+pub struct FrontFollower {
     followed: Vec<Followed>,
 }
 
@@ -165,7 +175,7 @@ impl FrontFollower {
     /// Of the vehicles ahead in E's lane the one that leaves E the least room to stop.
     ///
     /// Not simply the nearest: one that overtakes and is only just past would hide the one behind which E brakes.
-    pub(crate) fn update(&mut self, input: &EgoInput<'_>) -> Option<Front> {
+    pub fn update(&mut self, input: &EgoInput<'_>) -> Option<Front> {
         let now = input.time;
         for track in input.tracks.iter().filter(|track| track.x_m() > 0.0 && established(track) && exists(track)) {
             match self.followed.iter_mut().find(|followed| followed.id == track.id) {

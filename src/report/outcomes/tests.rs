@@ -55,6 +55,7 @@ fn outcome(sample: u64, controller: &str) -> Outcome {
         end: if controller == "acc" { EndReason::Collision } else { EndReason::Duration },
         duration: Time::from_ms(16_520),
         collisions: if controller == "acc" { vec![hit] } else { Vec::new() },
+        moments: Vec::new(),
         margins,
         mis: if controller == "acc" { Err(Absent::NoMis) } else { Ok(mis) },
     }

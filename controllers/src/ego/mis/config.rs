@@ -29,7 +29,7 @@ pub struct MisConfig {
 }
 
 /// The checked bounds of the margin increase system.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct MisSettings {
     /// Strongest braking [m/s²].
     pub max_deceleration_mps2: f64,

@@ -240,7 +240,7 @@ impl Mis {
             release(Reason::FrontLost)
         } else if now - target.seen > LOST_AFTER {
             release(Reason::RearLost)
-        } else if rear.x_m > 0.0 {
+        } else if rear.is_past(&at.input.odometry) {
             release(Reason::RearPassed)
         } else if !rear.in_own_lane() && rear.gap_m > LOW_HEADWAY_S * rear.speed_mps {
             release(Reason::RearChangedLane)
@@ -263,7 +263,7 @@ impl Mis {
         let now = at.input.time;
         let reason = match at.front {
             None => Reason::FrontLost,
-            Some(_) if target.rear.x_m > 0.0 => Reason::RearPassed,
+            Some(_) if target.rear.is_past(&at.input.odometry) => Reason::RearPassed,
             Some(_) if now - target.seen > LOST_AFTER => Reason::RearLost,
             Some(_) if (now - since).s() >= self.settings.hold_s => Reason::HoldExpired,
             Some(front) if !self.has_room(at.speed_mps(), front) => Reason::NoRoomToHold,

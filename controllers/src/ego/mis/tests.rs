@@ -270,8 +270,11 @@ fn it_releases_when_the_rear_vehicle_is_past() {
     bench.front().state[0] = 60.0;
     bench.rear().state[0] = -5.0 - CAR_M;
     bench.step();
-    bench.rear().state[0] = 0.5;
     bench.rear().lane = [1.0, 0.0, 0.0];
+    // Alongside it has not concluded yet.
+    bench.rear().state[0] = 0.9 * CAR_M;
+    assert_eq!(bench.step().state, EgoState::Holding);
+    bench.rear().state[0] = 1.1 * CAR_M;
     bench.releases(0.0, Reason::RearPassed);
 }
 

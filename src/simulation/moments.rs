@@ -1,0 +1,55 @@
+//! The five moments of the encounter that the margin increase system exists for, as they truly happen.
+//!
+//! ```text
+//!  (a) R comes near ─▶ (b) R pulls out ─▶ (c) R is at d_c ─▶ (d) F brakes ─▶ (e) R has concluded
+//!      E closes up on F    E slows gently     the margin is there    E need not      E is free to brake
+//! ```
+//!
+//! They are read off the truth and not off the controller, so that runs with and without the system can be compared.
+//! Each is noted once. Only the last four may change their order: F may brake early.
+
+use closecall_traffic::Time;
+
+use crate::outcome::{Moment, MomentAt};
+
+/// Rear gap at which the encounter begins [m]: the paper's engaging distance.
+pub(super) const NEAR_GAP_M: f64 = 100.0;
+
+/// Closing speed from which on it is one [m/s]: 10 km/h.
+pub(super) const NEAR_CLOSING_MPS: f64 = 10.0 / 3.6;
+
+/// Collects the moments of a run.
+#[derive(Debug, Default)]
+pub(super) struct Moments {
+    noted: Vec<MomentAt>,
+}
+
+impl Moments {
+    /// Notes that `moment` is now, if it is the first time.
+    pub(super) fn note(&mut self, moment: Moment, time: Time) {
+        if !self.noted.iter().any(|known| known.moment == moment) {
+            self.noted.push(MomentAt { moment, time });
+        }
+    }
+
+    /// All that were noted, in order of time.
+    pub(super) fn finish(mut self) -> Vec<MomentAt> {
+        self.noted.sort_by_key(|noted| (noted.time, noted.moment));
+        self.noted
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_moment_is_noted_once_and_they_come_in_order_of_time() {
+        let mut moments = Moments::default();
+        moments.note(Moment::FrontBrakes, Time::from_ms(40));
+        moments.note(Moment::RearNear, Time::from_ms(40));
+        moments.note(Moment::RearNear, Time::from_ms(80));
+        let noted: Vec<_> = moments.finish().iter().map(|noted| (noted.moment.letter(), noted.time.ns())).collect();
+        assert_eq!(noted, [('a', 40_000_000), ('d', 40_000_000)]);
+    }
+}

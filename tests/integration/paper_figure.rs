@@ -1,0 +1,87 @@
+//! The method's figure, through the scenario that ships: its numbers, and its five moments in their order.
+
+use closecall::campaign::runner::{Sampling, concrete};
+use closecall::controller::BuiltIn;
+use closecall::outcome::{ClosedBy, Moment, Outcome};
+use closecall::scenario::ScenarioFile;
+use closecall::simulation::{Arm, Happening, Observer, RunKey, StepView, simulate};
+use closecall_scenarios::sampling::Design;
+use closecall_traffic::geometry::BoxSide;
+use closecall_traffic::{ActorId, Time};
+
+use crate::support::library;
+
+/// E's acceleration at each control step.
+#[derive(Default)]
+struct Accelerations(Vec<(Time, f64)>);
+
+impl Observer for Accelerations {
+    fn step(&mut self, view: &StepView<'_>) {
+        self.0.push((view.time, view.vehicles[view.scenario.ego].state.acceleration_mps2));
+    }
+
+    fn happening(&mut self, _: Time, _: &Happening) {}
+}
+
+fn run(controller: BuiltIn) -> (Outcome, Accelerations) {
+    let file = ScenarioFile::load(&library("paper-figure"), &[]).unwrap();
+    let scenario = concrete(&file, Sampling { seed: 0, design: Design::Random, samples: 1 }, 0).unwrap();
+    let mut seen = Accelerations::default();
+    let arm = Arm { controller: controller.factory(), sensors: None };
+    let outcome = simulate(&scenario, RunKey { seed: 0, sample: 0 }, &arm, &mut seen).unwrap();
+    (outcome, seen)
+}
+
+#[test]
+fn one_metre_per_second_squared_gains_two_seconds() {
+    let (outcome, _) = run(BuiltIn::Mis);
+    let mis = outcome.mis.unwrap();
+    assert_eq!(mis.goal_in_reach, Some(true));
+    let mean_mps2 = mis.mean_deceleration_mps2.unwrap();
+    assert!((0.9..=1.1).contains(&mean_mps2), "{mean_mps2}");
+    let gained_s = mis.thw_front_at_critical_s.unwrap() - mis.thw_front_at_engagement_s.unwrap();
+    assert!((1.9..=2.1).contains(&gained_s), "{gained_s}");
+}
+
+#[test]
+fn the_five_moments_come_in_their_order() {
+    let (outcome, _) = run(BuiltIn::Mis);
+    let moments: Vec<Moment> = outcome.moments.iter().map(|noted| noted.moment).collect();
+    assert_eq!(moments, Moment::ALL);
+    assert_eq!(moments.iter().map(|moment| moment.letter()).collect::<String>(), "abcde");
+}
+
+/// The comfort limit, and what the control of the actuators may exceed it by [m/s²].
+const GENTLE_MPS2: f64 = 1.0 + 0.01;
+
+#[test]
+fn e_does_not_brake_until_r_has_concluded_although_f_brakes() {
+    let (outcome, seen) = run(BuiltIn::Mis);
+    assert!(outcome.collisions.is_empty(), "{:?}", outcome.collisions);
+    let [critical, brakes, concluded] =
+        [Moment::CriticalDistance, Moment::FrontBrakes, Moment::Concluded].map(|moment| outcome.moment(moment).unwrap());
+    assert!(critical <= brakes && brakes < concluded);
+    let mut released = 0.0_f64;
+    for (time, acceleration_mps2) in seen.0.iter().filter(|(time, _)| *time <= concluded) {
+        assert!(*acceleration_mps2 >= -GENTLE_MPS2, "{acceleration_mps2} m/s² at {time}");
+        // From the critical distance on the brake is let go, and not touched again.
+        if *time > critical {
+            assert!(*acceleration_mps2 >= released - 1e-6 || released == 0.0, "{acceleration_mps2} m/s² at {time}");
+            released = *acceleration_mps2;
+        }
+    }
+    assert!(seen.0.iter().any(|(time, mps2)| *time > concluded && *mps2 < -1.5), "F's braking asks for none of E");
+}
+
+#[test]
+fn without_the_system_the_same_sample_ends_in_the_cascade() {
+    let (outcome, _) = run(BuiltIn::Acc);
+    let id = |name| ActorId::new(name).unwrap();
+    let first = &outcome.collisions[0];
+    assert_eq!(first.between, [id("ego"), id("rear")]);
+    assert_eq!(first.struck_side, [BoxSide::Rear, BoxSide::Front]);
+    assert_eq!(first.closed_by, ClosedBy::Second);
+    assert!(outcome.moment(Moment::FrontBrakes).unwrap() < first.time);
+    // The impact pushes E on into F.
+    assert_eq!(outcome.collisions[1].between, [id("ego"), id("front")]);
+}
