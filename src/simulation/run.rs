@@ -2,8 +2,8 @@
 
 use closecall_controllers::CheckedDriver;
 use closecall_controllers::{
-    Driver, DriverInput, DriverNote, EgoCommand, EgoController, EgoInput, EgoState, MisSettings, Neighbours,
-    Odometry, SensorAvailability,
+    Driver, DriverInput, DriverNote, EgoCommand, EgoController, EgoInput, EgoState, MisSettings, Neighbours, Odometry,
+    SensorAvailability,
 };
 use closecall_sensors::{Health, NoiseKey, Perception, Scene, SceneVehicle};
 use closecall_traffic::{Measured, Stream, Track, stream};

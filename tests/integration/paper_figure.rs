@@ -58,8 +58,8 @@ const GENTLE_MPS2: f64 = 1.0 + 0.01;
 fn e_does_not_brake_until_r_has_concluded_although_f_brakes() {
     let (outcome, seen) = run(BuiltIn::Mis);
     assert!(outcome.collisions.is_empty(), "{:?}", outcome.collisions);
-    let [critical, brakes, concluded] =
-        [Moment::CriticalDistance, Moment::FrontBrakes, Moment::Concluded].map(|moment| outcome.moment(moment).unwrap());
+    let [critical, brakes, concluded] = [Moment::CriticalDistance, Moment::FrontBrakes, Moment::Concluded]
+        .map(|moment| outcome.moment(moment).unwrap());
     assert!(critical <= brakes && brakes < concluded);
     let mut released = 0.0_f64;
     for (time, acceleration_mps2) in seen.0.iter().filter(|(time, _)| *time <= concluded) {
