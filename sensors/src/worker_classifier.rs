@@ -28,6 +28,11 @@ pub fn use_inference_backend(backend: Backend) {
     BACKEND.get_or_init(|| backend);
 }
 
+/// What runs the networks of this process.
+pub fn inference_backend() -> &'static Backend {
+    BACKEND.get_or_init(Backend::default)
+}
+
 /// One run's camera, which looks with its thread's network.
 pub(crate) struct WorkerClassifier {
     camera: Camera,
@@ -47,7 +52,7 @@ impl DetectionClassifier for WorkerClassifier {
         let key = ExposureKey::draw(&mut self.exposures);
         NETWORK.with_borrow_mut(|slot| {
             if slot.as_ref().is_none_or(|(camera, _)| *camera != self.camera) {
-                let backend = BACKEND.get_or_init(Backend::default);
+                let backend = inference_backend();
                 let network = CropClassifier::new(self.camera, backend)
                     .map_err(|error| SensorError::Classifier { reason: error.to_string() })?;
                 *slot = Some((self.camera, network));

@@ -1,24 +1,31 @@
-//! A campaign's folder: made before any work is done, complete when it is over.
+//! A campaign's folder: made before any work is done, complete when it is over, and good to go on with in between.
 //!
 //! ```text
 //!  manifest.json      how it was made: all that a replay needs
-//!  journal.jsonl      one line per sample, appended and synced block by block as results come
+//!  journal.jsonl      one line per sample, appended as results come (see `journal`)
+//!  wall-times.jsonl   what each sample cost, beside it, since that differs from run to run
+//!  lock               held while a campaign runs
 //!  outcomes.parquet   written from the journal, byte-identical however it was computed
-//!  timings.parquet    wall times, apart, since they differ from run to run
+//!  timings.parquet    wall times
 //!  junit.xml          one case per sample and controller
+//!  report.html        for people; summary.md: the same for a pull request
 //!  recordings/        Rerun files of failing samples
 //! ```
 
-use std::fs::{self, File, OpenOptions};
-use std::io::{self, BufRead, BufReader, Write};
+use std::fs;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use super::manifest::Manifest;
+use super::journal::{self, Entry, Journal};
+use super::lock::Lock;
+use super::manifest::{MANIFEST_VERSION, Manifest};
 use super::record::Record;
+use super::wall_times::WallTimes;
 use crate::report::{WriteError, write_atomically};
 
 const MANIFEST: &str = "manifest.json";
 const JOURNAL: &str = "journal.jsonl";
+const WALL_TIMES: &str = "wall-times.jsonl";
 
 /// A campaign's folder that cannot be used. Nothing in it has been changed.
 #[derive(Debug, thiserror::Error)]
@@ -34,17 +41,40 @@ pub enum FolderError {
         /// The system's reason.
         source: io::Error,
     },
+    /// The folder holds a campaign already.
+    #[error(
+        "failed to use {}: it holds a campaign already, and nothing of it is overwritten; go on with it with --resume, name another folder, or delete this one",
+        path.display()
+    )]
+    AlreadyThere {
+        /// The folder.
+        path: PathBuf,
+    },
     /// The folder holds the results of another campaign.
-    #[error("failed to use {}: it holds the results of another campaign; name another folder, or delete this one", path.display())]
+    #[error(
+        "failed to use {}: it holds the results of another campaign; name another folder, or delete this one:\n  {}",
+        path.display(),
+        differences.join("\n  ")
+    )]
     OtherCampaign {
         /// The folder.
         path: PathBuf,
+        /// What is different there.
+        differences: Vec<String>,
     },
     /// The folder holds something that is no campaign.
     #[error("failed to use {}: it is not empty and holds no campaign; name a new folder", path.display())]
     NotACampaign {
         /// The folder.
         path: PathBuf,
+    },
+    /// Another program is at work in the folder.
+    #[error("failed to use {}: another campaign is running in it ({holder})", path.display())]
+    Busy {
+        /// The folder.
+        path: PathBuf,
+        /// Who it is.
+        holder: String,
     },
     /// A file of the folder has content that this program did not write.
     #[error("failed to read {}:{line}: {message}", path.display())]
@@ -64,34 +94,94 @@ pub struct Folder {
     path: PathBuf,
 }
 
+/// A folder that is held to run a campaign in.
+#[derive(Debug)]
+pub struct Held {
+    /// The folder.
+    pub folder: Folder,
+    _lock: Lock,
+}
+
+/// What [`Held::take_up`] found, ready to be appended to.
+#[derive(Debug)]
+pub struct TakenUp {
+    /// The journal.
+    pub journal: Journal,
+    /// The wall times.
+    pub wall_times: WallTimes,
+    /// The line of the journal that was cut off with all after it, and why, where one was.
+    pub torn: Option<(usize, String)>,
+}
+
 impl Folder {
     /// The folder of a campaign that is there.
     pub fn open(path: &Path) -> Self {
         Self { path: path.to_owned() }
     }
 
-    /// Makes the folder, or takes one that holds the very same campaign, and writes its manifest.
+    /// Makes the folder and writes its manifest; with `resume`, takes one that holds the very same campaign, too.
     ///
     /// # Errors
-    /// [`FolderError`] where it cannot be written, or holds something else.
-    pub fn create(path: &Path, manifest: &Manifest) -> Result<Self, FolderError> {
+    /// [`FolderError`] where it cannot be written, holds something else, or another program is at work in it.
+    pub fn hold(path: &Path, manifest: &Manifest, resume: bool) -> Result<Held, FolderError> {
         let folder = Self::open(path);
-        let fail = |source| WriteError::new(path, source);
-        fs::create_dir_all(path).map_err(fail)?;
-        let is_empty = fs::read_dir(path).map_err(fail)?.next().is_none();
-        if !is_empty {
-            match folder.manifest() {
-                Ok(earlier) if earlier.has_same_outcomes(manifest) => {}
-                Ok(_) => return Err(FolderError::OtherCampaign { path: path.to_owned() }),
-                Err(FolderError::Content { .. }) => return Err(FolderError::OtherCampaign { path: path.to_owned() }),
-                Err(_) => return Err(FolderError::NotACampaign { path: path.to_owned() }),
+        fs::create_dir_all(path).map_err(|source| WriteError::new(path, source))?;
+        let is_new = folder.holds_nothing()?;
+        if !is_new && !folder.file(MANIFEST).exists() {
+            return Err(FolderError::NotACampaign { path: path.to_owned() });
+        }
+        let lock = Lock::take(path)?;
+        folder.sweep()?;
+        if folder.file(MANIFEST).exists() {
+            let differences = folder.manifest()?.differences(manifest);
+            if !differences.is_empty() {
+                return Err(FolderError::OtherCampaign { path: path.to_owned(), differences });
+            }
+            if !resume {
+                return Err(FolderError::AlreadyThere { path: path.to_owned() });
+            }
+        } else {
+            folder.write_manifest(manifest)?;
+        }
+        Ok(Held { folder, _lock: lock })
+    }
+
+    /// True where the folder has no entry but what a lock leaves.
+    fn holds_nothing(&self) -> Result<bool, FolderError> {
+        let fail = |source| FolderError::Read { path: self.path.clone(), source };
+        for entry in fs::read_dir(&self.path).map_err(fail)? {
+            let name = entry.map_err(fail)?.file_name();
+            // A manifest that was being written when the program was killed.
+            let is_unfinished = crate::report::is_temporary(&name);
+            if !Lock::is_file_name(&name) && !is_unfinished {
+                return Ok(false);
             }
         }
-        write_atomically(&folder.file(MANIFEST), |file| {
+        Ok(true)
+    }
+
+    /// Removes what a program left behind that was killed while it wrote.
+    fn sweep(&self) -> Result<(), FolderError> {
+        let fail = |source| FolderError::Read { path: self.path.clone(), source };
+        for entry in fs::read_dir(&self.path).map_err(fail)? {
+            let entry = entry.map_err(fail)?;
+            if crate::report::is_temporary(&entry.file_name()) {
+                fs::remove_file(entry.path()).map_err(|source| WriteError::new(&entry.path(), source))?;
+            }
+        }
+        Ok(())
+    }
+
+    fn write_manifest(&self, manifest: &Manifest) -> Result<(), WriteError> {
+        write_atomically(&self.file(MANIFEST), |file| {
             serde_json::to_writer_pretty(&mut *file, manifest)?;
             file.write_all(b"\n")
-        })?;
-        Ok(folder)
+        })
+    }
+
+    /// The folder's own path.
+    pub fn path(&self) -> &Path {
+        &self.path
     }
 
     /// The path of one of its files.
@@ -102,75 +192,74 @@ impl Folder {
     /// How the campaign was made.
     ///
     /// # Errors
-    /// [`FolderError`] where there is no manifest, or it is not one.
+    /// [`FolderError`] where there is no manifest, or it is not one of this version's layout.
     pub fn manifest(&self) -> Result<Manifest, FolderError> {
         let path = self.file(MANIFEST);
         let text = fs::read_to_string(&path).map_err(|source| FolderError::Read { path: path.clone(), source })?;
-        serde_json::from_str(&text).map_err(|error| FolderError::Content {
-            path,
-            line: error.line(),
-            message: error.to_string(),
-        })
+        let content = |line, message| FolderError::Content { path: path.clone(), line, message };
+        let not_json = |error: serde_json::Error| content(error.line(), error.to_string());
+        let value: serde_json::Value = serde_json::from_str(&text).map_err(not_json)?;
+        match value.get("manifest_version").and_then(serde_json::Value::as_u64) {
+            Some(version) if version == u64::from(MANIFEST_VERSION) => serde_json::from_str(&text).map_err(not_json),
+            Some(version) => {
+                let message = format!("its layout has version {version}, this program has {MANIFEST_VERSION}");
+                Err(content(1, message))
+            }
+            None => Err(content(1, "there is no `manifest_version`".to_owned())),
+        }
     }
 
-    /// An empty journal to append to.
-    ///
-    /// # Errors
-    /// [`FolderError::Write`] where it cannot be made.
-    pub fn new_journal(&self) -> Result<Journal, FolderError> {
-        let path = self.file(JOURNAL);
-        let file = OpenOptions::new().create(true).write(true).truncate(true).open(&path);
-        Ok(Journal { file: file.map_err(|source| WriteError::new(&path, source))?, path, unsynced: 0 })
-    }
-
-    /// The records of the journal, in their order.
+    /// The records of the journal, in their order. A last line that was not written to its end is not one of them.
     ///
     /// # Errors
     /// [`FolderError`] where it cannot be read; each record is an error of its own where its line is not one.
     pub fn records(&self) -> Result<impl Iterator<Item = Result<Record, FolderError>> + use<>, FolderError> {
         let path = self.file(JOURNAL);
-        let file = File::open(&path).map_err(|source| FolderError::Read { path: path.clone(), source })?;
-        Ok(BufReader::new(file).lines().enumerate().map(move |(place, line)| {
-            let line = line.map_err(|source| FolderError::Read { path: path.clone(), source })?;
-            serde_json::from_str(&line).map_err(|error| FolderError::Content {
-                path: path.clone(),
-                line: place + 1,
-                message: error.to_string(),
-            })
+        let entries = journal::read(&path).map_err(|source| FolderError::Read { path: path.clone(), source })?;
+        Ok(entries.filter_map(move |entry| match entry {
+            Ok(Entry::Record { record, .. }) => Some(Ok(*record)),
+            Ok(Entry::Torn { is_tail: true, .. }) => None,
+            Ok(Entry::Torn { line, reason: message, .. }) => {
+                Some(Err(FolderError::Content { path: path.clone(), line, message }))
+            }
+            Err(source) => Some(Err(FolderError::Read { path: path.clone(), source })),
         }))
     }
-}
 
-/// Samples between two syncs to the disk.
-const SYNC_EVERY: usize = 64;
-
-/// The results of a campaign as they come, on disk.
-pub struct Journal {
-    file: File,
-    path: PathBuf,
-    unsynced: usize,
-}
-
-impl Journal {
-    /// Appends one record.
+    /// What each sample cost, in the order of the plan.
     ///
     /// # Errors
-    /// [`WriteError`] where the disk does not take it.
-    pub fn append(&mut self, record: &Record) -> Result<(), WriteError> {
-        let fail = |source| WriteError::new(&self.path, source);
-        let mut line = serde_json::to_vec(record).map_err(|error| fail(error.into()))?;
-        line.push(b'\n');
-        self.file.write_all(&line).map_err(fail)?;
-        self.unsynced += 1;
-        if self.unsynced >= SYNC_EVERY { self.sync() } else { Ok(()) }
+    /// [`FolderError::Read`] where it cannot be read.
+    pub fn wall_times(&self) -> Result<impl Iterator<Item = super::wall_times::WallTime> + use<>, FolderError> {
+        let path = self.file(WALL_TIMES);
+        super::wall_times::read(&path).map_err(|source| FolderError::Read { path, source })
     }
+}
 
-    /// Has the disk keep what was appended.
+impl Held {
+    /// Goes through the records that are there, as long as they are the ones that `plan` begins with, and opens the
+    /// journal behind them. Whatever follows is cut off: it was not written to its end, and will be run again.
     ///
     /// # Errors
-    /// [`WriteError`] where it does not.
-    pub fn sync(&mut self) -> Result<(), WriteError> {
-        self.unsynced = 0;
-        self.file.sync_data().map_err(|source| WriteError::new(&self.path, source))
+    /// [`FolderError::Content`] where the journal holds a sample that the plan does not have there; the journal is
+    /// then as it was. Other [`FolderError`]s where something cannot be read or written.
+    pub fn take_up(&self, mut plan: impl FnMut(&Record) -> bool) -> Result<TakenUp, FolderError> {
+        let path = self.folder.file(JOURNAL);
+        let (mut keep, mut kept, mut torn) = (0, 0_u64, None);
+        if path.exists() {
+            let fail = |source| FolderError::Read { path: path.clone(), source };
+            for (place, entry) in journal::read(&path).map_err(fail)?.enumerate() {
+                match entry.map_err(fail)? {
+                    Entry::Record { record, end } if plan(&record) => (keep, kept) = (end, kept + 1),
+                    Entry::Record { record, .. } => {
+                        let message = format!("sample {} of `{}` does not belong here", record.sample, record.scenario);
+                        return Err(FolderError::Content { path: path.clone(), line: place + 1, message });
+                    }
+                    Entry::Torn { line, reason, .. } => torn = Some((line, reason)),
+                }
+            }
+        }
+        let wall_times = WallTimes::open(&self.folder.file(WALL_TIMES), kept)?;
+        Ok(TakenUp { journal: Journal::open(&path, keep)?, wall_times, torn })
     }
 }

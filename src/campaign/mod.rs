@@ -1,17 +1,24 @@
 //! Campaigns: many samples of scenarios, their ledger, and the verdict.
 //!
 //! ```text
-//!  scenario files ─▶ samples 0..n ─▶ runner (rayon) ─▶ records in order ─▶ ledger ─▶ gates ─▶ verdict
-//!                                                           └──▶ journal ─▶ Parquet, JUnit, recordings
+//!  scenario files ─▶ plan ─▶ workers ─▶ records in the order of the plan ─▶ ledger ─▶ gates ─▶ verdict
+//!                     ▲                       └──▶ journal ─▶ Parquet, JUnit, HTML, recordings
+//!                     └──────── resume ◀────────────────┘
 //! ```
 //!
 //! Rates are conditional on the sampled scenario: they say how often a *sampled encounter* ends in a collision, not
 //! how often that happens on a road.
 
+pub mod execution;
 pub mod folder;
+pub mod journal;
 pub mod ledger;
+pub mod lock;
 pub mod manifest;
+pub mod partition;
 pub mod record;
 pub mod runner;
 pub mod summary;
 pub mod verdict;
+pub mod wall_times;
+pub mod workers;

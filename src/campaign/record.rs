@@ -58,4 +58,7 @@ pub struct Record {
     pub sample: u64,
     /// The arms.
     pub arms: Vec<ArmRecord>,
+    /// True where some arm was repeated and came out differently.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub repeat_differs: bool,
 }

@@ -1,20 +1,17 @@
-//! Running samples: each alone, many at a time, handed on in the order of their numbers.
+//! Running one sample in one arm, guarded against whatever the controller does.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;
 
 use closecall_scenarios::sampling::Design;
 use closecall_traffic::Check;
-use rayon::ThreadPool;
-use rayon::prelude::*;
 
-use super::record::{ArmRecord, Record, SampleFailure};
+use super::partition::Partition;
+use super::record::{ArmRecord, SampleFailure};
 use crate::outcome::Outcome;
 use crate::scenario::{Scenario, ScenarioFile};
 use crate::simulation::{Arm, NoObserver, Observer, RunKey, SampleError, simulate};
 
-/// Samples that each worker is given before the results are handed on.
-const SAMPLES_PER_WORKER: u64 = 16;
 /// One sample in so many is run twice: its outcomes must be the same to the last bit.
 const REPEATED: u64 = 100;
 
@@ -43,15 +40,59 @@ mod design_by_name {
     }
 }
 
-/// A sample with what it cost.
+/// What is run: a scenario, how its samples are drawn, and the arms that each of them is run in.
+#[derive(Clone)]
+pub struct Work {
+    /// The scenario.
+    pub file: ScenarioFile,
+    /// How its samples are drawn.
+    pub sampling: Sampling,
+    /// The arms, the baseline first.
+    pub arms: Vec<Arm>,
+}
+
+impl Work {
+    /// How many samples the design has.
+    pub fn count(&self) -> u64 {
+        self.file.space().samples(self.sampling.design, self.sampling.samples)
+    }
+
+    /// The numbers of the samples that belong to a part of the campaign, or to all of it, in their order.
+    pub fn samples(&self, part: Option<Partition>) -> impl Iterator<Item = u64> + use<> {
+        (0..self.count()).filter(move |&sample| part.is_none_or(|part| part.has(sample)))
+    }
+
+    /// Runs one sample in one arm.
+    pub(super) fn run(&self, sample: u64, arm: usize) -> ArmRun {
+        let arm = &self.arms[arm];
+        let key = RunKey { seed: self.sampling.seed, sample };
+        let started = Instant::now();
+        let run = || -> Result<Outcome, SampleFailure> {
+            let result = guarded(|| {
+                let scenario = concrete(&self.file, self.sampling, sample)?;
+                simulate(&scenario, key, arm, &mut NoObserver)
+            });
+            result.map_err(SampleFailure::from)
+        };
+        let result = run();
+        let wall_s = started.elapsed().as_secs_f64();
+        let repeat_differs = sample.is_multiple_of(REPEATED)
+            && match (run(), &result) {
+                (Ok(again), Ok(outcome)) => !again.has_same_bits(outcome),
+                (again, result) => again != *result,
+            };
+        ArmRun { record: ArmRecord { controller: arm.controller.name().to_owned(), result }, wall_s, repeat_differs }
+    }
+}
+
+/// One sample in one arm, with what it cost.
 #[derive(Clone, Debug)]
-pub struct Finished {
-    /// What came of it.
-    pub record: Record,
-    /// Wall time of each arm [s].
-    pub wall_s: Vec<f64>,
-    /// True where the sample was repeated and came out differently.
-    pub is_invalid: bool,
+pub(super) struct ArmRun {
+    pub(super) record: ArmRecord,
+    /// Wall time [s].
+    pub(super) wall_s: f64,
+    /// True where it was repeated and came out differently.
+    pub(super) repeat_differs: bool,
 }
 
 /// The concrete scenario of one sample.
@@ -73,7 +114,11 @@ pub fn run_guarded(
     arm: &Arm,
     observer: &mut dyn Observer,
 ) -> Result<Outcome, SampleError> {
-    catch_unwind(AssertUnwindSafe(|| simulate(scenario, key, arm, observer))).unwrap_or_else(|panic| {
+    guarded(|| simulate(scenario, key, arm, observer))
+}
+
+fn guarded(run: impl FnOnce() -> Result<Outcome, SampleError>) -> Result<Outcome, SampleError> {
+    catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|panic| {
         let message = panic
             .downcast_ref::<&str>()
             .map(|text| (*text).to_owned())
@@ -81,56 +126,4 @@ pub fn run_guarded(
             .unwrap_or_else(|| "without a message".to_owned());
         Err(SampleError::Panic { message })
     })
-}
-
-/// Runs one sample in every arm.
-pub fn run_sample(file: &ScenarioFile, sampling: Sampling, arms: &[Arm], sample: u64) -> Finished {
-    let key = RunKey { seed: sampling.seed, sample };
-    let scenario = concrete(file, sampling, sample);
-    let mut finished = Finished {
-        record: Record { scenario: file.config().name.clone(), sample, arms: Vec::with_capacity(arms.len()) },
-        wall_s: Vec::with_capacity(arms.len()),
-        is_invalid: false,
-    };
-    for arm in arms {
-        let started = Instant::now();
-        let run = || match &scenario {
-            Ok(scenario) => run_guarded(scenario, key, arm, &mut NoObserver),
-            Err(error) => Err(error.clone()),
-        };
-        let result = run().map_err(SampleFailure::from);
-        finished.wall_s.push(started.elapsed().as_secs_f64());
-        if sample.is_multiple_of(REPEATED) {
-            finished.is_invalid |= match (run().map_err(SampleFailure::from), &result) {
-                (Ok(again), Ok(outcome)) => !again.has_same_bits(outcome),
-                (again, result) => again != *result,
-            };
-        }
-        finished.record.arms.push(ArmRecord { controller: arm.controller.name().to_owned(), result });
-    }
-    finished
-}
-
-/// Runs the given samples of a scenario on a pool, and hands them on in their order.
-///
-/// # Errors
-/// Whatever `take` answers: the samples after it are not run.
-pub fn run_samples<E>(
-    pool: &ThreadPool,
-    file: &ScenarioFile,
-    sampling: Sampling,
-    arms: &[Arm],
-    samples: std::ops::Range<u64>,
-    mut take: impl FnMut(Finished) -> Result<(), E>,
-) -> Result<(), E> {
-    let block = SAMPLES_PER_WORKER * pool.current_num_threads() as u64;
-    let mut first = samples.start;
-    while first < samples.end {
-        let last = samples.end.min(first.saturating_add(block));
-        let finished: Vec<Finished> = pool
-            .install(|| (first..last).into_par_iter().map(|sample| run_sample(file, sampling, arms, sample)).collect());
-        finished.into_iter().try_for_each(&mut take)?;
-        first = last;
-    }
-    Ok(())
 }

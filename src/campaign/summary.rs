@@ -3,7 +3,7 @@
 use closecall_traffic::ActorId;
 
 use super::ledger::{ArmCounts, Pairs};
-use super::runner::Finished;
+use super::record::Record;
 use super::verdict::{Evidence, Gates, Judgement};
 
 /// The counts of one scenario, or of all.
@@ -26,9 +26,9 @@ impl Counts {
         Self { arms: vec![ArmCounts::default(); arms], ..Self::default() }
     }
 
-    fn take(&mut self, finished: &Finished, ego: &ActorId) {
+    fn take(&mut self, record: &Record, ego: &ActorId) {
         let mut collided = Vec::with_capacity(self.arms.len());
-        for (counts, arm) in self.arms.iter_mut().zip(&finished.record.arms) {
+        for (counts, arm) in self.arms.iter_mut().zip(&record.arms) {
             let tally = arm.tally(ego);
             counts.take(tally);
             collided.push(tally.collided);
@@ -38,7 +38,7 @@ impl Counts {
             self.pairs.take(baseline, tested);
         }
         self.samples += 1;
-        self.invalid += u64::from(finished.is_invalid);
+        self.invalid += u64::from(record.repeat_differs);
     }
 
     fn add(&mut self, other: &Self) {
@@ -78,9 +78,9 @@ impl Summary {
     }
 
     /// Takes in a sample of the scenario begun last.
-    pub fn take(&mut self, finished: &Finished, ego: &ActorId) {
+    pub fn take(&mut self, record: &Record, ego: &ActorId) {
         if let Some((_, counts)) = self.scenarios.last_mut() {
-            counts.take(finished, ego);
+            counts.take(record, ego);
         }
     }
 

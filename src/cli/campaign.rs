@@ -1,25 +1,32 @@
 //! `closecall campaign`: many samples of scenarios, judged.
 
+use std::num::NonZeroUsize;
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use clap::Args;
 use closecall_scenarios::sampling::Design;
+use closecall_sensors::camera::{Backend, SHIPPED_MODEL};
+use closecall_sensors::inference_backend;
+use closecall_traffic::ActorId;
 use indicatif::{ProgressBar, ProgressStyle};
-use rayon::ThreadPool;
 
 use super::args::{Format, Sensing, SetArgs, arm};
-use super::output::{complain, out, outln};
+use super::gates::GateArgs;
+use super::output::{complain, outln};
+use super::summary::{print_counts, print_verdict};
 use super::{CliError, json, leave};
-use crate::campaign::folder::{Folder, Journal};
-use crate::campaign::manifest::{MANIFEST_VERSION, Manifest, ManifestScenario};
-use crate::campaign::runner::{Finished, Sampling, run_samples};
-use crate::campaign::summary::{Counts, Summary};
-use crate::campaign::verdict::{Gates, Judgement};
+use crate::campaign::execution::{Campaign, Turn};
+use crate::campaign::folder::{Folder, FolderError};
+use crate::campaign::manifest::{MANIFEST_VERSION, Manifest, ManifestModel, ManifestScenario};
+use crate::campaign::partition::Partition;
+use crate::campaign::runner::{Sampling, Work};
+use crate::campaign::summary::Summary;
+use crate::campaign::workers::Workers;
 use crate::controller::BuiltIn;
 use crate::exit_code::ExitCode;
-use crate::report::timings::Timing;
 use crate::scenario::ScenarioFile;
 use crate::simulation::Arm;
 
@@ -50,21 +57,23 @@ pub(super) struct CampaignArgs {
     /// Worker threads; one per processor where absent
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
-    /// Write manifest, journal, Parquet, JUnit and recordings into this folder
+    /// Longest wall time of a sample in one arm; one that takes longer is an error of that sample
+    #[arg(long, value_name = "S", default_value_t = 300.0, value_parser = super::args::positive)]
+    sample_timeout_s: f64,
+    /// Write manifest, journal, Parquet, JUnit, HTML and recordings into this folder
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// With --out: go on with the campaign that the folder holds, where it was stopped
+    #[arg(long, requires = "out")]
+    resume: bool,
+    /// With --out: run only this part of the samples, to be put together by `closecall merge`
+    #[arg(long, value_name = "I/N", requires = "out")]
+    partition: Option<Partition>,
     /// With --out: record this many failing samples as Rerun files
     #[arg(long, default_value_t = 3, value_name = "N")]
     recordings: u64,
-    /// Fail where E collides in more samples than this
-    #[arg(long, value_name = "K")]
-    max_collisions: Option<u64>,
-    /// With --paired: fail where more collisions than this happen only with the controller under test
-    #[arg(long, value_name = "K", requires = "paired")]
-    max_induced: Option<u64>,
-    /// Fail where E falls by more than this below the speed of the vehicle ahead, in any sample
-    #[arg(long, value_name = "M/S", value_parser = super::args::positive)]
-    max_speed_deficit_mps: Option<f64>,
+    #[command(flatten)]
+    gates: GateArgs,
     #[command(flatten)]
     set: SetArgs,
     /// Output for people or for programs
@@ -88,23 +97,50 @@ impl CampaignArgs {
         Sampling { seed: self.seed, design: self.design, samples: self.samples }
     }
 
-    fn manifest(&self, files: &[ScenarioFile], controllers: &[BuiltIn]) -> Manifest {
+    fn manifest(&self, campaign: &Campaign, controllers: &[BuiltIn]) -> Result<Manifest, CliError> {
         let scenario = |file: &ScenarioFile| ManifestScenario {
             name: file.config().name.clone(),
             path: file.path().display().to_string(),
             blake3: blake3::hash(file.text().as_bytes()).to_string(),
             text: file.text().to_owned(),
         };
-        Manifest {
+        Ok(Manifest {
             manifest_version: MANIFEST_VERSION,
             closecall_version: version(),
-            scenarios: files.iter().map(scenario).collect(),
+            scenarios: campaign.works.iter().map(|work| scenario(&work.file)).collect(),
             sampling: self.sampling(),
+            partition: self.partition,
             arms: controllers.to_vec(),
             sensors: self.sensors.map(|sensing| sensing.name().to_owned()),
+            models: vec![rear_classifier()?],
+            sample_timeout_s: self.sample_timeout_s,
             command: std::env::args().collect(),
-        }
+        })
     }
+
+    fn workers(&self) -> Result<Workers, CliError> {
+        let jobs = match self.jobs {
+            Some(jobs) => NonZeroUsize::new(jobs.into()),
+            None => std::thread::available_parallelism().ok(),
+        };
+        let sample_timeout = Duration::try_from_secs_f64(self.sample_timeout_s).map_err(|_| CliError::Usage {
+            message: format!("--sample-timeout-s {}: that is longer than can be waited for", self.sample_timeout_s),
+        })?;
+        Ok(Workers { jobs: jobs.unwrap_or(NonZeroUsize::MIN), sample_timeout })
+    }
+}
+
+/// The network of the rear camera, and what runs it.
+fn rear_classifier() -> Result<ManifestModel, CliError> {
+    let backend = match inference_backend() {
+        Backend::Tract => "tract".to_owned(),
+        Backend::OnnxRuntime(library) => {
+            let bytes = std::fs::read(library).map_err(|source| FolderError::Read { path: library.clone(), source })?;
+            format!("onnxruntime, blake3 {}", blake3::hash(&bytes))
+        }
+    };
+    let blake3 = blake3::hash(SHIPPED_MODEL).to_string();
+    Ok(ManifestModel { name: "rear-classifier".to_owned(), blake3, backend })
 }
 
 /// The version of this very program: two builds of one release may differ, so the executable's own hash is part of it.
@@ -117,31 +153,84 @@ pub(super) fn version() -> String {
 }
 
 pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
-    let files = load(args)?;
     let controllers = args.controllers()?;
-    let folder = match &args.out {
-        Some(path) => Some(Folder::create(path, &args.manifest(&files, &controllers))?),
+    if args.gates.max_induced.is_some() && !args.paired {
+        let message = "--max-induced needs --paired: induced collisions are known only of pairs".to_owned();
+        return Err(CliError::Usage { message });
+    }
+    let arms: Vec<Arm> = controllers.iter().map(|controller| arm(*controller, args.sensors)).collect();
+    let work = |file| Arc::new(Work { file, sampling: args.sampling(), arms: arms.clone() });
+    let works = load(args)?.into_iter().map(work).collect();
+    let campaign = Campaign { works, partition: args.partition, workers: args.workers()? };
+    let held = match &args.out {
+        Some(path) => Some(Folder::hold(path, &args.manifest(&campaign, &controllers)?, args.resume)?),
         None => None,
     };
-    let pool = pool(args.jobs)?;
     let started = Instant::now();
-    let arms: Vec<Arm> = controllers.iter().map(|controller| arm(*controller, args.sensors)).collect();
-    let journal = folder.as_ref().map(Folder::new_journal).transpose()?;
-    let (summary, timings) = run_all(args, &files, &arms, &pool, journal)?;
-    let wall_s = started.elapsed().as_secs_f64();
-    if let Some(folder) = &folder {
-        leave::reports(folder, &files, &timings, args.recordings)?;
+    let mut watch = Watch::new(&campaign, &arms);
+    let torn = campaign.run(held.as_ref(), |turn| watch.take(turn))?;
+    watch.bar.finish_and_clear();
+    if let Some((line, reason)) = torn {
+        complain(format_args!("the journal was torn at line {line} ({reason}): what followed was run again\n"));
     }
-    let judged = summary.judge(Gates {
-        max_collisions: args.max_collisions,
-        max_induced: args.max_induced,
-        max_speed_deficit_mps: args.max_speed_deficit_mps,
-    });
+    let wall_s = started.elapsed().as_secs_f64();
+    let summary = watch.summary;
+    if let Some(held) = &held {
+        leave::reports(&held.folder, &campaign.works, args.recordings)?;
+    }
+    let judged = summary.judge(args.gates.gates());
     match args.format {
         Format::Json => outln!("{:#}", json::campaign(&summary, &judged, wall_s)),
-        Format::Human => print_human(&summary, &judged, wall_s, &pool),
+        Format::Human => {
+            print_counts(&summary);
+            let (simulated_s, jobs) = (summary.total().simulated_s, campaign.workers.jobs);
+            outln!("{simulated_s:.0} simulated seconds in {wall_s:.1} s on {jobs} threads");
+            print_verdict(&judged);
+        }
     }
     Ok(judged.exit_code)
+}
+
+/// Counts what comes, and shows how far it is.
+struct Watch {
+    summary: Summary,
+    egos: Vec<(String, Option<ActorId>)>,
+    bar: ProgressBar,
+}
+
+impl Watch {
+    fn new(campaign: &Campaign, arms: &[Arm]) -> Self {
+        let mut summary = Summary::new(arms.iter().map(|arm| arm.controller.name().to_owned()).collect());
+        let egos: Vec<_> =
+            campaign.works.iter().map(|work| (work.file.config().name.clone(), work.file.ego_id().cloned())).collect();
+        if let Some((first, _)) = egos.first() {
+            summary.begin(first);
+        }
+        for work in &campaign.works {
+            let (name, count, asked) = (&work.file.config().name, work.count(), work.sampling.samples);
+            if count != asked {
+                complain(format_args!("{name}: the grid has {count} of the {asked} samples asked for\n"));
+            }
+        }
+        Self { summary, egos, bar: progress(campaign.len()) }
+    }
+
+    fn take(&mut self, turn: Turn<'_>) -> ControlFlow<()> {
+        while let Some((next, _)) = self.egos.get(self.summary.scenarios.len())
+            && self.summary.scenarios.len() <= turn.work
+        {
+            self.summary.begin(next);
+        }
+        if let Some(ego) = &self.egos[turn.work].1 {
+            self.summary.take(turn.record, ego);
+        }
+        self.bar.inc(1);
+        if !turn.is_new {
+            // What is found in the journal says nothing about how long the rest will take.
+            self.bar.reset_eta();
+        }
+        ControlFlow::Continue(())
+    }
 }
 
 /// Reads every scenario before anything is run; names must differ, because results are filed by them.
@@ -159,64 +248,8 @@ fn load(args: &CampaignArgs) -> Result<Vec<ScenarioFile>, CliError> {
     Ok(files)
 }
 
-fn pool(jobs: Option<u16>) -> Result<ThreadPool, CliError> {
-    let jobs = jobs.map_or(0, usize::from);
-    rayon::ThreadPoolBuilder::new()
-        .num_threads(jobs)
-        .build()
-        .map_err(|error| CliError::Threads { jobs, message: error.to_string() })
-}
-
 /// Hexadecimal digits of the executable's hash in a version.
 const HASH_DIGITS: usize = 16;
-
-fn run_all(
-    args: &CampaignArgs,
-    files: &[ScenarioFile],
-    arms: &[Arm],
-    pool: &ThreadPool,
-    mut journal: Option<Journal>,
-) -> Result<(Summary, Vec<Timing>), CliError> {
-    let names = arms.iter().map(|arm| arm.controller.name().to_owned()).collect();
-    let mut summary = Summary::new(names);
-    let mut timings = Vec::new();
-    let sampling = args.sampling();
-    let counts: Vec<u64> = files.iter().map(|file| file.space().samples(args.design, args.samples)).collect();
-    for (file, count) in files.iter().zip(&counts).filter(|(_, count)| **count != args.samples) {
-        complain(format_args!(
-            "{}: the grid has {count} of the {} samples asked for\n",
-            file.config().name,
-            args.samples
-        ));
-    }
-    let bar = progress(counts.iter().sum());
-    let controllers: Vec<Arc<str>> = arms.iter().map(|arm| arm.controller.name().into()).collect();
-    for (file, count) in files.iter().zip(counts) {
-        summary.begin(&file.config().name);
-        let scenario: Arc<str> = file.config().name.as_str().into();
-        let Some(ego) = file.ego_id() else { continue };
-        run_samples(pool, file, sampling, arms, 0..count, |finished: Finished| {
-            if let Some(journal) = &mut journal {
-                journal.append(&finished.record)?;
-                let sample = finished.record.sample;
-                timings.extend(finished.wall_s.iter().zip(&controllers).map(|(wall_s, controller)| Timing {
-                    scenario: scenario.clone(),
-                    sample,
-                    controller: controller.clone(),
-                    wall_s: *wall_s,
-                }));
-            }
-            summary.take(&finished, ego);
-            bar.inc(1);
-            Ok::<(), CliError>(())
-        })?;
-    }
-    bar.finish_and_clear();
-    if let Some(journal) = &mut journal {
-        journal.sync()?;
-    }
-    Ok((summary, timings))
-}
 
 /// A progress bar on standard error, where that is a terminal.
 fn progress(samples: u64) -> ProgressBar {
@@ -225,48 +258,4 @@ fn progress(samples: u64) -> ProgressBar {
         bar.set_style(style);
     }
     bar
-}
-
-fn print_human(summary: &Summary, judged: &Judgement, wall_s: f64, pool: &ThreadPool) {
-    for (name, counts) in &summary.scenarios {
-        outln!("{name}: {} samples", counts.samples);
-        print_counts(summary, counts);
-    }
-    if summary.scenarios.len() > 1 {
-        outln!("all scenarios");
-        print_counts(summary, &summary.total());
-    }
-    outln!("Rates are conditional on the sampled scenario: they are not the risk of a road.");
-    let total = summary.total();
-    outln!("{:.0} simulated seconds in {wall_s:.1} s on {} threads", total.simulated_s, pool.current_num_threads(),);
-    outln!("{}", judged.verdict);
-    for reason in &judged.reasons {
-        outln!("  {reason}");
-    }
-}
-
-fn print_counts(summary: &Summary, counts: &Counts) {
-    for (name, arm) in summary.controllers.iter().zip(&counts.arms) {
-        let [low, high] = arm.interval_95().map(|bound| 100.0 * bound);
-        let rate = arm.collision_rate().map_or("-".to_owned(), |rate| format!("{:.1} %", 100.0 * rate));
-        out!("  {name:<5} {:>6} collisions  {rate:>7}  (95 %: {low:.1} to {high:.1} %)", arm.collisions);
-        if arm.engagements > 0 {
-            out!("  {} engaged, goal in reach in {}", arm.engagements, arm.goals_in_reach);
-        }
-        out!("  up to {:.1} m/s slower than ahead", arm.max_speed_deficit_mps);
-        if arm.errors > 0 {
-            out!("  {} ERRORS", arm.errors);
-        }
-        outln!();
-    }
-    if summary.is_paired() {
-        let pairs = counts.pairs;
-        outln!(
-            "  pairs: {} prevented, {} induced, {} both, {} neither",
-            pairs.prevented,
-            pairs.induced,
-            pairs.both,
-            pairs.neither,
-        );
-    }
 }

@@ -5,6 +5,7 @@ use closecall_sensors::camera::ClassifierError;
 use closecall_sensors::camera::dataset::DatasetError;
 use miette::Diagnostic;
 
+use crate::campaign::execution::CampaignError;
 use crate::campaign::folder::FolderError;
 use crate::exit_code::ExitCode;
 use crate::report::WriteError;
@@ -54,14 +55,9 @@ pub enum CliError {
         /// What is wrong, and what is allowed.
         message: String,
     },
-    /// The worker threads could not be started.
-    #[error("failed to start {jobs} worker threads: {message}")]
-    Threads {
-        /// How many were asked for.
-        jobs: usize,
-        /// The system's reason.
-        message: String,
-    },
+    /// A campaign could not be carried on.
+    #[error(transparent)]
+    Campaign(#[from] CampaignError),
 }
 
 impl From<&CliError> for ExitCode {
@@ -70,18 +66,26 @@ impl From<&CliError> for ExitCode {
             CliError::Scenario(error) => Self::from(error),
             CliError::Recording(error) if error.is_io() => Self::Io,
             CliError::Recording(_) | CliError::Classifier(_) => Self::InvalidInput,
-            CliError::Folder(error) => match error {
-                FolderError::Write(_) | FolderError::Read { .. } => Self::Io,
-                FolderError::OtherCampaign { .. } | FolderError::NotACampaign { .. } => Self::Usage,
-                FolderError::Content { .. } => Self::InvalidInput,
+            CliError::Folder(error) => Self::from(error),
+            CliError::Campaign(error) => match error {
+                CampaignError::Folder(error) => Self::from(error),
+                CampaignError::Write(_) | CampaignError::Workers(_) => Self::Io,
             },
-            CliError::Write(_)
-            | CliError::Record(_)
-            | CliError::WriteRecording(_)
-            | CliError::Dataset(_)
-            | CliError::Threads { .. } => Self::Io,
+            CliError::Write(_) | CliError::Record(_) | CliError::WriteRecording(_) | CliError::Dataset(_) => Self::Io,
             CliError::Sample { .. } => Self::SampleError,
             CliError::Usage { .. } => Self::Usage,
+        }
+    }
+}
+
+impl From<&FolderError> for ExitCode {
+    fn from(error: &FolderError) -> Self {
+        match error {
+            FolderError::Write(_) | FolderError::Read { .. } | FolderError::Busy { .. } => Self::Io,
+            FolderError::AlreadyThere { .. } | FolderError::OtherCampaign { .. } | FolderError::NotACampaign { .. } => {
+                Self::Usage
+            }
+            FolderError::Content { .. } => Self::InvalidInput,
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::sync::Arc;
 
 use closecall_traffic::ActorId;
 
@@ -10,6 +11,7 @@ use super::replay::record_sample;
 use crate::campaign::folder::{Folder, FolderError};
 use crate::campaign::manifest::Manifest;
 use crate::campaign::record::Record;
+use crate::campaign::runner::Work;
 use crate::report::WriteError;
 use crate::report::junit::write_junit;
 use crate::report::outcomes::{OutcomeRow, parameter_columns, write_outcomes};
@@ -23,16 +25,13 @@ const RECORDINGS: &str = "recordings";
 type Recordings = BTreeMap<(String, u64, String), String>;
 
 /// Writes Parquet, recordings and JUnit, up to `recordings` failing samples of each scenario.
-pub(super) fn reports(
-    folder: &Folder,
-    files: &[ScenarioFile],
-    timings: &[Timing],
-    recordings: u64,
-) -> Result<(), CliError> {
+pub(super) fn reports(folder: &Folder, works: &[Arc<Work>], recordings: u64) -> Result<(), CliError> {
     let manifest = folder.manifest()?;
+    let files: Vec<ScenarioFile> = works.iter().map(|work| work.file.clone()).collect();
+    let files = &files[..];
     let nominal: Vec<_> = files.iter().map(|file| file.space().nominal()).collect();
     write_outcomes(&folder.file("outcomes.parquet"), &parameter_columns(&nominal), rows(folder, files, &manifest)?)?;
-    write_timings(&folder.file("timings.parquet"), timings)?;
+    write_timings(&folder.file("timings.parquet"), timings(folder, &manifest)?)?;
     let recorded = record_failures(folder, files, &manifest, recordings)?;
     let with_recordings = rows(folder, files, &manifest)?.map(|row| {
         row.map(|row| {
@@ -42,6 +41,20 @@ pub(super) fn reports(
     });
     write_junit(&folder.file("junit.xml"), with_recordings)?;
     Ok(())
+}
+
+/// The wall times, one row for each arm.
+fn timings(folder: &Folder, manifest: &Manifest) -> Result<impl Iterator<Item = Timing> + use<>, CliError> {
+    let controllers: Vec<String> = manifest.arms.iter().map(|arm| arm.name().to_owned()).collect();
+    Ok(folder.wall_times()?.flat_map(move |time| {
+        let of_arm = |(controller, wall_s): (&String, f64)| Timing {
+            scenario: time.scenario.clone(),
+            sample: time.sample,
+            controller: controller.clone(),
+            wall_s,
+        };
+        controllers.iter().zip(time.wall_s).map(of_arm).collect::<Vec<_>>()
+    }))
 }
 
 /// The journal's records, one row for each arm.

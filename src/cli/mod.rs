@@ -4,6 +4,7 @@ mod args;
 mod campaign;
 mod check;
 mod error;
+mod gates;
 mod json;
 mod leave;
 mod output;
@@ -12,6 +13,7 @@ mod recording;
 mod render;
 mod replay;
 mod run;
+mod summary;
 
 use std::path::PathBuf;
 

@@ -8,4 +8,5 @@ pub mod trace;
 pub mod traffic;
 mod write;
 
+pub(crate) use write::is_temporary;
 pub use write::{WriteError, write_atomically};

@@ -3,7 +3,10 @@
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use tempfile::NamedTempFile;
+use tempfile::{Builder, NamedTempFile};
+
+/// How temporary files are called: a program that is killed leaves one behind.
+const TEMPORARY: &str = ".closecall-";
 
 /// A file that could not be written. What was there before is untouched.
 #[derive(Debug, thiserror::Error)]
@@ -31,14 +34,34 @@ pub fn write_atomically(
     write: impl FnOnce(&mut BufWriter<&mut std::fs::File>) -> io::Result<()>,
 ) -> Result<(), WriteError> {
     let fail = |source| WriteError::new(path, source);
-    let mut file = NamedTempFile::new_in(folder(path)).map_err(fail)?;
+    let mut file = temporary_in(folder(path)).map_err(fail)?;
     let mut buffered = BufWriter::new(file.as_file_mut());
     write(&mut buffered).and_then(|()| buffered.flush()).map_err(fail)?;
     drop(buffered);
     file.as_file().sync_all().map_err(fail)?;
     make_readable(file.as_file()).map_err(fail)?;
     file.persist(path).map_err(|error| fail(error.error))?;
+    sync_folder(folder(path)).map_err(fail)
+}
+
+/// Has the disk keep a new name.
+#[cfg(unix)]
+fn sync_folder(folder: &Path) -> io::Result<()> {
+    std::fs::File::open(folder)?.sync_all()
+}
+
+#[cfg(not(unix))]
+fn sync_folder(_: &Path) -> io::Result<()> {
     Ok(())
+}
+
+fn temporary_in(folder: &Path) -> io::Result<NamedTempFile> {
+    Builder::new().prefix(TEMPORARY).tempfile_in(folder)
+}
+
+/// True for the name of a file that was being written when the program was killed.
+pub(crate) fn is_temporary(name: &std::ffi::OsStr) -> bool {
+    name.to_string_lossy().starts_with(TEMPORARY)
 }
 
 /// Finds out before any work is done that a file could not be made after it.
@@ -46,7 +69,7 @@ pub fn write_atomically(
 /// # Errors
 /// [`WriteError`] where the folder does not take new files.
 pub(super) fn check_writable(path: &Path) -> Result<(), WriteError> {
-    NamedTempFile::new_in(folder(path)).map_err(|source| WriteError::new(path, source))?;
+    temporary_in(folder(path)).map_err(|source| WriteError::new(path, source))?;
     Ok(())
 }
 

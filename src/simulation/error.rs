@@ -34,6 +34,12 @@ pub enum SampleError {
         /// Why.
         source: DriverError,
     },
+    /// It did not come to its end in time.
+    #[error("no outcome within {limit_s} s of wall time")]
+    Timeout {
+        /// Longest wall time that was allowed [s].
+        limit_s: f64,
+    },
     /// Something panicked.
     #[error("a panic: {message}")]
     Panic {
@@ -51,6 +57,7 @@ impl SampleError {
             Self::Controller(_) => "controller",
             Self::Command { .. } => "command",
             Self::Driver { .. } => "driver",
+            Self::Timeout { .. } => "timeout",
             Self::Panic { .. } => "panic",
         }
     }

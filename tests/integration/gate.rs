@@ -1,10 +1,15 @@
 //! Sanity of the gate: it must tell a system that helps from one that does nothing, harms, or comes too late.
 
+use std::num::NonZeroUsize;
+use std::ops::ControlFlow;
 use std::sync::Arc;
+use std::time::Duration;
 
-use closecall::campaign::runner::{Finished, Sampling, run_samples};
+use closecall::campaign::execution::Campaign;
+use closecall::campaign::runner::{Sampling, Work};
 use closecall::campaign::summary::{Counts, Summary};
 use closecall::campaign::verdict::{Evidence, Gates};
+use closecall::campaign::workers::Workers;
 use closecall::controller::BuiltIn;
 use closecall::exit_code::ExitCode;
 use closecall::scenario::ScenarioFile;
@@ -85,16 +90,18 @@ fn counts(name: &str, tested: Arc<dyn ControllerFactory>) -> Counts {
     let file = ScenarioFile::load(&library(name), &[]).unwrap();
     let sampling = Sampling { seed: SEED, design: Design::Random, samples: SAMPLES };
     let arm = |controller| Arm { controller, sensors: Some(SensorMode::Object) };
-    let arms = [arm(BuiltIn::Acc.factory()), arm(tested)];
-    let pool = rayon::ThreadPoolBuilder::new().build().unwrap();
+    let arms = vec![arm(BuiltIn::Acc.factory()), arm(tested)];
+    let workers = Workers { jobs: NonZeroUsize::MIN.saturating_add(1), sample_timeout: Duration::from_mins(5) };
+    let work = Arc::new(Work { file, sampling, arms });
     let mut summary = Summary::new(vec!["acc".to_owned(), "tested".to_owned()]);
     summary.begin(name);
-    let ego = file.ego_id().unwrap();
-    run_samples(&pool, &file, sampling, &arms, 0..SAMPLES, |finished: Finished| {
-        summary.take(&finished, ego);
-        Ok::<(), ()>(())
-    })
-    .unwrap();
+    let ego = work.file.ego_id().unwrap();
+    let campaign = Campaign { works: vec![work.clone()], partition: None, workers };
+    let taken = campaign.run(None, |turn| {
+        summary.take(turn.record, ego);
+        ControlFlow::Continue(())
+    });
+    taken.unwrap();
     summary.total()
 }
 

@@ -3,7 +3,9 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 mod determinism;
+mod durability;
 mod exit_codes;
+mod faulty_controllers;
 mod gate;
 mod hidden_lead;
 mod library;
