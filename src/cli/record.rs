@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use closecall_scenarios::recordings::write_recording;
+use closecall_controllers::DriverConfig;
+use closecall_scenarios::recordings::{truth_path, write_in_car, write_recording, write_truth};
 use closecall_scenarios::sampling::Design;
 
 use super::CliError;
@@ -11,8 +12,10 @@ use super::args::{ArmArgs, SetArgs};
 use super::output::outln;
 use crate::campaign::runner::{Sampling, concrete, run_guarded};
 use crate::exit_code::ExitCode;
+use crate::report::in_car::InCarRecorder;
 use crate::report::traffic::TrafficRecorder;
-use crate::simulation::RunKey;
+use crate::scenario::{ActorConfig, Scenario, ScenarioFile};
+use crate::simulation::{Observer, RunKey};
 
 /// Arguments of `closecall record`.
 #[derive(Debug, Args)]
@@ -29,25 +32,71 @@ pub(super) struct RecordArgs {
     arm: ArmArgs,
     #[command(flatten)]
     set: SetArgs,
-    /// File to write, in the plain CSV layout
+    /// Write what one vehicle would record of itself, in the in-car layout, and the true lane changes beside it
+    /// (`FILE.truth.csv`): the vehicle of the actor ACTOR; where none is named, that of the first who overtakes
+    #[arg(long, value_name = "ACTOR", num_args = 0..=1, require_equals = true)]
+    in_car: Option<Option<String>>,
+    /// File to write: the plain CSV layout, or with --in-car the in-car layout
     #[arg(short, long, value_name = "FILE.csv")]
     output: PathBuf,
 }
 
 pub(super) fn record(args: &RecordArgs) -> Result<ExitCode, CliError> {
-    let file = args.set.load(&args.scenario)?;
-    let sampling = Sampling { seed: args.seed, design: Design::Random, samples: args.samples };
-    let mut recorder = TrafficRecorder::default();
-    for sample in 0..args.samples {
-        let fail = |source| CliError::Sample { sample, source };
-        let scenario = concrete(&file, sampling, sample).map_err(fail)?;
-        recorder.begin(&scenario);
-        run_guarded(&scenario, RunKey { seed: args.seed, sample }, &args.arm.arm(), &mut recorder).map_err(fail)?;
+    match &args.in_car {
+        None => record_traffic(args),
+        Some(actor) => record_in_car(args, actor.as_deref()),
     }
+}
+
+fn record_traffic(args: &RecordArgs) -> Result<ExitCode, CliError> {
+    let file = args.set.load(&args.scenario)?;
+    let mut recorder = TrafficRecorder::default();
+    each_sample(args, &file, &mut recorder, TrafficRecorder::begin)?;
     let recording = recorder.finish(&file.config().name);
     let (tracks, instants) =
         (recording.trajectories.len(), recording.trajectories.iter().map(|track| track.points.len()).sum::<usize>());
     write_recording(&recording, &args.output)?;
     outln!("{tracks} vehicles, {instants} instants written to {}", args.output.display());
     Ok(ExitCode::Pass)
+}
+
+fn record_in_car(args: &RecordArgs, actor: Option<&str>) -> Result<ExitCode, CliError> {
+    let file = args.set.load(&args.scenario)?;
+    let actors = &file.config().actors;
+    let overtakes = |actor: &&ActorConfig| matches!(actor.driver, DriverConfig::Overtaker(_));
+    let ids = || actors.iter().map(|actor| actor.id.to_string());
+    let chosen = match actor {
+        None => actors.iter().find(overtakes).map(|actor| actor.id.to_string()).ok_or_else(|| CliError::Usage {
+            message: format!("no actor overtakes: name one with --in-car=ACTOR, of {}", ids().collect::<Vec<_>>().join(", ")),
+        }),
+        Some(name) => ids().find(|id| id == name).ok_or_else(|| CliError::Usage {
+            message: format!("there is no actor `{name}` to record in: it has to be one of {}", ids().collect::<Vec<_>>().join(", ")),
+        }),
+    }?;
+    let mut recorder = InCarRecorder::new(&chosen);
+    each_sample(args, &file, &mut recorder, InCarRecorder::begin)?;
+    let (log, changes) = recorder.finish();
+    let truth = truth_path(&args.output);
+    write_in_car(&log, &args.output)?;
+    write_truth(&changes, &truth)?;
+    outln!("{} rows recorded in the vehicle of {chosen} written to {}", log.frames.len(), args.output.display());
+    outln!("{} true lane changes written to {}", changes.len(), truth.display());
+    Ok(ExitCode::Pass)
+}
+
+/// Runs the samples one after the other, watched by `recorder`.
+fn each_sample<R: Observer>(
+    args: &RecordArgs,
+    file: &ScenarioFile,
+    recorder: &mut R,
+    begin: fn(&mut R, &Scenario),
+) -> Result<(), CliError> {
+    let sampling = Sampling { seed: args.seed, design: Design::Random, samples: args.samples };
+    for sample in 0..args.samples {
+        let fail = |source| CliError::Sample { sample, source };
+        let scenario = concrete(file, sampling, sample).map_err(fail)?;
+        begin(recorder, &scenario);
+        run_guarded(&scenario, RunKey { seed: args.seed, sample }, &args.arm.arm(), recorder).map_err(fail)?;
+    }
+    Ok(())
 }

@@ -1,5 +1,6 @@
 //! What a run and a campaign leave behind: files to look at, to keep, and to gate on.
 
+pub mod in_car;
 pub mod junit;
 pub mod outcomes;
 pub mod rerun;

@@ -78,6 +78,7 @@ pub fn simulate(
 ) -> Result<Outcome, SampleError> {
     let mut run = Run::new(scenario, key, arm)?;
     loop {
+        run.show_motion(observer);
         run.look_around(observer);
         if run.is_control_step() {
             run.perceive_and_control(observer)?;

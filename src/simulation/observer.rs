@@ -3,7 +3,7 @@
 use closecall_controllers::DriverNote;
 use closecall_controllers::{EgoCommand, EgoState, Reason};
 use closecall_sensors::{Perception, SceneVehicle};
-use closecall_traffic::{Absent, Measured, Time, Track};
+use closecall_traffic::{Absent, Measured, Time, Track, VehicleState};
 
 use crate::outcome::{Collision, Phase};
 use crate::scenario::Scenario;
@@ -97,6 +97,8 @@ pub trait Observer {
     fn step(&mut self, view: &StepView<'_>);
     /// Something happened at `time`.
     fn happening(&mut self, time: Time, what: &Happening);
+    /// One step of the physics (100 Hz): how every vehicle moves at `time`, in the order of the scenario's actors.
+    fn moved(&mut self, _time: Time, _vehicles: &mut dyn Iterator<Item = VehicleState>) {}
 }
 
 /// Nobody watches.

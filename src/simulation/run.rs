@@ -102,6 +102,11 @@ impl<'a> Run<'a> {
         self.world.time().is_multiple_of(CONTROL_STEP)
     }
 
+    /// Shows how everyone moves, at each step of the physics.
+    pub(super) fn show_motion(&self, observer: &mut dyn Observer) {
+        observer.moved(self.world.time(), &mut (0..self.world.len()).map(|actor| *self.world.state(actor)));
+    }
+
     /// Works out who is around whom, E's margins, and the phase of the encounter.
     pub(super) fn look_around(&mut self, observer: &mut dyn Observer) {
         for actor in 0..self.world.len() {

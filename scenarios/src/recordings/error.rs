@@ -4,6 +4,8 @@ use std::fmt;
 use std::io;
 use std::path::PathBuf;
 
+use super::Layout;
+
 /// A recording that could not be read: nothing of it is used.
 #[derive(Debug, thiserror::Error)]
 pub struct RecordingError {
@@ -53,6 +55,26 @@ pub enum RecordingProblem {
     /// Not a text file.
     #[error("this is not text; CSV or blank-separated text, or either compressed with gzip, is needed")]
     Binary,
+    /// A line that is no text.
+    #[error("the line is not text in UTF-8")]
+    NotText,
+    /// Packed in a way that is not read.
+    #[error("this is {what}, which is not read; unpack it first, or compress the recording with gzip")]
+    Archive {
+        /// What it is.
+        what: &'static str,
+    },
+    /// Another layout than the one asked for.
+    #[error("the content is in the layout {}, not in {asked} as asked for", found.name())]
+    OtherLayout {
+        /// The layout that the content tells.
+        found: Layout,
+        /// The layout asked for.
+        asked: &'static str,
+    },
+    /// The last line has no end.
+    #[error("the last line does not end: the recording may be cut there; if it is whole, end the line")]
+    CutLine,
     /// A line without end.
     #[error("the line is longer than {allowed} bytes")]
     LineTooLong {
@@ -134,6 +156,80 @@ pub enum RecordingProblem {
         /// Time between them as it should be [s].
         needed_s: f64,
     },
+    /// Time that goes back, or stands still, in a log of one vehicle.
+    #[error("is {time_s}, after {before_s} in the row before, but time has to go on from row to row")]
+    TimeBackwards {
+        /// Time of the row before [s].
+        before_s: f64,
+        /// Time of this row [s].
+        time_s: f64,
+    },
+    /// A time between two ticks of a log's clock.
+    #[error("is {time_s}, but the rows before are {period_s} s apart, and this lies between two of their ticks")]
+    OffClock {
+        /// Time of this row [s].
+        time_s: f64,
+        /// Time between two rows [s].
+        period_s: f64,
+    },
+    /// A long recording that is not sorted by vehicle.
+    #[error(
+        "vehicle {vehicle} goes on here after rows of others; a recording of more than {rows} rows has to be sorted by \
+         vehicle or by time throughout"
+    )]
+    NotByVehicle {
+        /// The vehicle.
+        vehicle: u64,
+        /// Longer ones have to be sorted.
+        rows: usize,
+    },
+    /// A long recording that is not sorted by time.
+    #[error(
+        "time goes back by {back_s} s; a recording of more than {rows} rows has to be sorted by vehicle or by time \
+         throughout"
+    )]
+    NotByTime {
+        /// By how much [s].
+        back_s: f64,
+        /// Longer ones have to be sorted.
+        rows: usize,
+    },
+    /// Tracks that never end.
+    #[error("more than {allowed} rows belong to vehicles that are still on the road")]
+    TooManyOpen {
+        /// The most that is kept.
+        allowed: usize,
+    },
+    /// A vehicle with another number of rows than the metadata state.
+    #[error("vehicle {vehicle} has {found} rows, but {stated} are stated in line {line} of {file}")]
+    OtherCount {
+        /// The vehicle.
+        vehicle: u64,
+        /// Rows found.
+        found: u64,
+        /// Rows stated.
+        stated: u64,
+        /// The file with the metadata.
+        file: String,
+        /// Its line.
+        line: u64,
+    },
+    /// A track with gaps for whose pieces there is no number.
+    #[error("track {track} has a gap, but its number is that of a piece already; numbers of vehicles lie below 10¹²")]
+    SplitPiece {
+        /// The track.
+        track: u64,
+    },
+    /// Numbers that no traffic has: units or columns are mixed up.
+    #[error("{what} is {found}, but {allowed} is plausible: are units or columns mixed up?")]
+    Implausible {
+        /// The quantity.
+        what: &'static str,
+        /// Its value, rounded, with its unit.
+        found: String,
+        /// What is plausible.
+        allowed: &'static str,
+    },
     /// Rows of several recordings in one file.
     #[error("is `{found}`, but `{first}` is needed as in the first row: one recording for each file")]
     SeveralRecordings {
@@ -142,6 +238,39 @@ pub enum RecordingProblem {
         /// The other name.
         found: String,
     },
+}
+
+impl RecordingProblem {
+    /// True where one row is unusable, and the ones behind it need not be.
+    pub(super) fn is_of_row(&self) -> bool {
+        matches!(
+            self,
+            Self::ColumnCount { .. }
+                | Self::OpenQuote
+                | Self::Value { .. }
+                | Self::DuplicateRow { .. }
+                | Self::UnevenTime { .. }
+                | Self::TimeBackwards { .. }
+                | Self::OffClock { .. }
+                | Self::CutLine
+                | Self::OtherCount { .. }
+                | Self::NotText
+        )
+    }
+
+    /// A name for what is wrong with a row, for counting.
+    pub(super) fn kind(&self) -> &'static str {
+        match self {
+            Self::ColumnCount { .. } | Self::CutLine => "cut rows",
+            Self::OpenQuote | Self::NotText => "rows that are no text",
+            Self::Value { .. } => "values that are not allowed",
+            Self::DuplicateRow { .. } => "duplicated rows",
+            Self::UnevenTime { .. } | Self::OffClock { .. } => "times off the clock",
+            Self::TimeBackwards { .. } => "times that go back",
+            Self::OtherCount { .. } => "vehicles with rows missing",
+            _ => "other",
+        }
+    }
 }
 
 /// A recording that could not be written. The file that was there before, if any, is still there.

@@ -1,15 +1,16 @@
 //! Which layout a file has, by its first line.
 
-use super::assemble::Row;
 use super::fields::Fault;
+use super::in_car::InCarColumns;
 use super::ngsim::NgsimColumns;
 use super::plain::PlainColumns;
 use super::rows::{Fields, Separator};
-use super::{Layout, RecordingProblem};
+use super::source::{About, Row};
+use super::RecordingProblem;
 
 /// How to read the rows of one file.
 pub(super) struct Format {
-    pub(super) columns: Columns,
+    pub(super) columns: Box<dyn TextLayout>,
     pub(super) separator: Separator,
     /// Number of fields that each row has.
     pub(super) width: usize,
@@ -17,38 +18,26 @@ pub(super) struct Format {
     pub(super) has_header: bool,
 }
 
-/// Where each quantity stands.
-pub(super) enum Columns {
-    /// The plain layout.
-    Plain(PlainColumns),
-    /// NGSIM's layouts.
-    Ngsim(NgsimColumns),
-}
-
-impl Columns {
-    /// One row in SI units.
-    pub(super) fn parse(&self, line: &str, fields: &Fields) -> Result<Row, Fault> {
-        match self {
-            Self::Plain(columns) => columns.parse(line, fields),
-            Self::Ngsim(columns) => columns.parse(line, fields),
-        }
-    }
+/// The columns of one layout of text.
+pub(super) trait TextLayout {
+    /// What is known so far, but for the name.
+    fn about(&self) -> About;
 
     /// The column that names the recording, and the name in this row.
-    pub(super) fn recording<'l>(&self, line: &'l str, fields: &Fields) -> Option<(&'static str, &'l str)> {
-        match self {
-            Self::Plain(columns) => Some(("recording_id", columns.recording(line, fields)?)),
-            Self::Ngsim(columns) => Some(("Location", columns.recording(line, fields)?)),
-        }
-    }
+    fn recording<'l>(&self, line: &'l str, fields: &Fields) -> Option<(&'static str, &'l str)>;
 
-    /// The layout.
-    pub(super) fn layout(&self) -> Layout {
-        match self {
-            Self::Plain(_) => Layout::Plain,
-            Self::Ngsim(columns) if columns.is_export() => Layout::Ngsim25,
-            Self::Ngsim(_) => Layout::Ngsim18,
-        }
+    /// One line in SI units; nothing where the line carries none.
+    ///
+    /// # Errors
+    /// The column and what is wrong.
+    fn parse(&mut self, line: &str, fields: &Fields) -> Result<Option<Row>, Fault>;
+
+    /// The file has ended.
+    ///
+    /// # Errors
+    /// What is then still missing; where asked again, what else.
+    fn end(&mut self) -> Result<(), Fault> {
+        Ok(())
     }
 }
 
@@ -57,6 +46,9 @@ const NGSIM_COLUMNS: usize = 18;
 
 /// With fewer known names than this, a first line is not taken for a header of that layout.
 const FEWEST_KNOWN_NAMES: usize = 4;
+
+/// So many of the names that only in-car logs have make a first line the header of one.
+const FEWEST_OWN_NAMES: usize = 2;
 
 /// The longest beginning of a first line that an error repeats [characters].
 const SHOWN: usize = 40;
@@ -69,17 +61,21 @@ pub(super) fn recognise(line: &str) -> Result<Format, RecordingProblem> {
     let header = Header::new((0..fields.len()).map(|index| fields.get(line, index)));
     let (plain, ngsim) = (header.count(&PlainColumns::NAMES), header.count(&NgsimColumns::NAMES));
     let (width, has_header) = (fields.len(), true);
+    if header.count(&InCarColumns::OWN_NAMES) >= FEWEST_OWN_NAMES {
+        header.refuse_duplicates()?;
+        return Ok(Format { columns: Box::new(InCarColumns::new(&header)?), separator, width, has_header });
+    }
     if plain.max(ngsim) >= FEWEST_KNOWN_NAMES {
         header.refuse_duplicates()?;
-        let columns = if plain > ngsim {
-            Columns::Plain(PlainColumns::new(&header)?)
+        let columns: Box<dyn TextLayout> = if plain > ngsim {
+            Box::new(PlainColumns::new(&header)?)
         } else {
-            Columns::Ngsim(NgsimColumns::new(&header)?)
+            Box::new(NgsimColumns::new(&header)?)
         };
         return Ok(Format { columns, separator, width, has_header });
     }
     if width == NGSIM_COLUMNS && header.is_numeric() {
-        let columns = Columns::Ngsim(NgsimColumns::ORIGINAL);
+        let columns = Box::new(NgsimColumns::ORIGINAL);
         return Ok(Format { columns, separator, width, has_header: false });
     }
     Err(RecordingProblem::UnknownLayout { columns: width, start: line.chars().take(SHOWN).collect() })

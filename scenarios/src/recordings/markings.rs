@@ -20,8 +20,13 @@ pub struct LaneMarkings {
 impl LaneMarkings {
     /// The markings that the recorded lanes of `trajectories` tell.
     pub fn of(trajectories: &[Trajectory]) -> Self {
+        Self::of_tracks(trajectories.iter())
+    }
+
+    /// As [`LaneMarkings::of`], for tracks that do not lie in one list.
+    pub fn of_tracks<'t>(trajectories: impl Iterator<Item = &'t Trajectory>) -> Self {
         let mut crossings: BTreeMap<u8, Vec<f64>> = BTreeMap::new();
-        for pair in trajectories.iter().flat_map(|track| track.points.windows(2)) {
+        for pair in trajectories.flat_map(|track| track.points.windows(2)) {
             let [before, after] = pair else { continue };
             if before.lane.0.abs_diff(after.lane.0) == 1 {
                 let left = before.lane.0.min(after.lane.0);
@@ -29,6 +34,11 @@ impl LaneMarkings {
             }
         }
         Self { right_edge_m: crossings.into_iter().filter_map(|(lane, d)| Some((lane, median(d)?))).collect() }
+    }
+
+    /// Markings that a recording states: the right edge of each lane [m].
+    pub fn stated(right_edges_m: impl IntoIterator<Item = (Lane, f64)>) -> Self {
+        Self { right_edge_m: right_edges_m.into_iter().map(|(lane, edge_m)| (lane.0, edge_m)).collect() }
     }
 
     /// Lateral position of the marking to the right of `lane` [m], where known.

@@ -29,18 +29,27 @@
 //! - Anything else is refused, with line, column and what is allowed. Nothing is guessed, skipped or repaired.
 
 mod assemble;
+mod builder;
+mod dropped;
 mod error;
 mod fields;
+mod in_car;
 mod layout;
 mod markings;
 mod ngsim;
+mod open;
+mod order;
 mod plain;
+mod plausible;
 mod quality;
-mod read;
 mod rows;
+mod source;
 #[cfg(test)]
 pub(crate) mod test_support;
+mod text;
+mod tracks;
 mod write;
+mod write_in_car;
 
 use closecall_traffic::{Time, Trajectory};
 use serde::Serialize;
@@ -48,8 +57,13 @@ use serde::Serialize;
 pub use error::{RecordingError, RecordingProblem, WriteError};
 pub use markings::{DEFAULT_LANE_WIDTH_M, LaneMarkings};
 pub use quality::{Quality, quality};
-pub use read::{read, read_from};
+pub use builder::PIECE_STRIDE;
+pub use dropped::{Dropped, DroppedRows};
+pub use open::{open, open_from, read, read_from, read_with};
+pub use order::WINDOW_ROWS;
+pub use tracks::{BadRows, LayoutChoice, ReadOptions, Tracks};
 pub use write::write_recording;
+pub use write_in_car::{BusFrame, InCarFrame, InCarLog, TrueLaneChange, truth_path, write_in_car, write_truth};
 
 /// The layout of a recording's file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -61,6 +75,56 @@ pub enum Layout {
     Ngsim18,
     /// The 25 columns of NGSIM's catalogue export.
     Ngsim25,
+    /// highD's three files.
+    Highd,
+    /// exiD's three files.
+    Exid,
+    /// CommonRoad XML.
+    Commonroad,
+    /// A log of one vehicle that sees the lane markings.
+    InCar,
+}
+
+impl Layout {
+    /// Its name, as in JSON.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Plain => "plain",
+            Self::Ngsim18 => "ngsim18",
+            Self::Ngsim25 => "ngsim25",
+            Self::Highd => "highd",
+            Self::Exid => "exid",
+            Self::Commonroad => "commonroad",
+            Self::InCar => "in-car",
+        }
+    }
+}
+
+/// How far away the markings of the own lane are, as a vehicle's camera sees them.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MarkingDistances {
+    /// Distance of the left marking from the vehicle's centre line, above 0 while it is on the left [m].
+    pub left_m: Option<f64>,
+    /// Distance of the right marking from the vehicle's centre line, above 0 while it is on the right [m].
+    pub right_m: Option<f64>,
+}
+
+impl MarkingDistances {
+    /// True where at least one marking is seen.
+    pub fn is_seen(&self) -> bool {
+        self.left_m.is_some() || self.right_m.is_some()
+    }
+}
+
+/// A track as a reader gives it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RecordedTrack {
+    /// The movement.
+    pub trajectory: Trajectory,
+    /// The line of the file for each of its points, counted from 1.
+    pub lines: Vec<u64>,
+    /// Distances to the markings for each of its points, in in-car logs; empty in other recordings.
+    pub markings: Vec<MarkingDistances>,
 }
 
 /// Recorded traffic on one road.

@@ -2,12 +2,12 @@
 
 use closecall_traffic::{Time, VehicleClass};
 
-use super::RecordingProblem;
-use super::assemble::{Clock, Row};
 use super::fields::{Bounds, Fault, integer, number, wrong_value};
-use super::layout::Header;
+use super::layout::{Header, TextLayout};
 use super::plain::allowed;
 use super::rows::Fields;
+use super::source::{About, Clock, Row};
+use super::{Layout, MarkingDistances, RecordingProblem};
 
 /// The international foot [m].
 const FOOT_M: f64 = 0.3048;
@@ -108,16 +108,22 @@ impl NgsimColumns {
     }
 
     /// True where the columns are those of the catalogue's export.
-    pub(super) fn is_export(&self) -> bool {
+    fn is_export(&self) -> bool {
         self.location.is_some()
     }
+}
 
-    /// The place of the recording in one row, where the file states it.
-    pub(super) fn recording<'l>(&self, line: &'l str, fields: &Fields) -> Option<&'l str> {
-        self.location.map(|index| fields.get(line, index))
+impl TextLayout for NgsimColumns {
+    fn about(&self) -> About {
+        let layout = if self.is_export() { Layout::Ngsim25 } else { Layout::Ngsim18 };
+        About { layout, name: None, period: None, markings: None }
     }
 
-    pub(super) fn parse(&self, line: &str, fields: &Fields) -> Result<Row, Fault> {
+    fn recording<'l>(&self, line: &'l str, fields: &Fields) -> Option<(&'static str, &'l str)> {
+        self.location.map(|index| ("Location", fields.get(line, index)))
+    }
+
+    fn parse(&mut self, line: &str, fields: &Fields) -> Result<Option<Row>, Fault> {
         let whole = |index, name, range| integer(fields.get(line, index), name, range);
         let metres =
             |index, name, bounds| -> Result<f64, Fault> { Ok(number(fields.get(line, index), name, bounds)? * FOOT_M) };
@@ -131,7 +137,7 @@ impl NgsimColumns {
             Some(_) => (time - PERIOD * frame, Clock::Continuous),
             None => (Time::ZERO, Clock::MayRestart),
         };
-        Ok(Row {
+        let row = Row {
             number: vehicle,
             origin,
             vehicle_id: vehicle,
@@ -146,8 +152,10 @@ impl NgsimColumns {
             length_m,
             width_m: metres(self.width, "v_Width", feet::WIDTH)?,
             class: class(fields.get(line, self.class))?,
+            marking_distances: MarkingDistances::default(),
             line: 0,
-        })
+        };
+        Ok(Some(row))
     }
 }
 

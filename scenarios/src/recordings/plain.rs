@@ -2,11 +2,11 @@
 
 use closecall_traffic::{Time, VehicleClass};
 
-use super::RecordingProblem;
-use super::assemble::{Clock, Row};
 use super::fields::{Bounds, Fault, integer, number, wrong_value};
-use super::layout::Header;
+use super::layout::{Header, TextLayout};
 use super::rows::Fields;
+use super::source::{About, Clock, Row};
+use super::{Layout, MarkingDistances, RecordingProblem};
 
 /// Every column of the layout, in the order in which they are written.
 pub(super) const HEADER: [&str; 17] = [
@@ -33,7 +33,10 @@ pub(super) const HEADER: [&str; 17] = [
 pub(super) mod allowed {
     use super::Bounds;
 
-    pub(in super::super) const IDS: (i64, i64) = (0, 1_000_000_000_000);
+    /// Numbers of vehicles; above them are those of the pieces of a track with gaps.
+    pub(in super::super) const IDS: (i64, i64) = (0, 999_999_999_999);
+    /// Numbers of tracks: a file that we wrote has pieces.
+    pub(in super::super) const TRACKS: (i64, i64) = (0, 9_000_000_000_000_000);
     pub(in super::super) const FRAMES: (i64, i64) = (0, 1_000_000_000);
     pub(in super::super) const LANES: (i64, i64) = (0, 255);
     pub(in super::super) const TIME_S: Bounds = Bounds::closed(0.0, 1e7);
@@ -93,25 +96,30 @@ impl PlainColumns {
             unused: present.collect(),
         })
     }
+}
 
-    /// The recording's name in one row, where the file states it.
-    pub(super) fn recording<'l>(&self, line: &'l str, fields: &Fields) -> Option<&'l str> {
-        self.recording.map(|index| fields.get(line, index))
+impl TextLayout for PlainColumns {
+    fn about(&self) -> About {
+        About { layout: Layout::Plain, name: None, period: None, markings: None }
     }
 
-    pub(super) fn parse(&self, line: &str, fields: &Fields) -> Result<Row, Fault> {
+    fn recording<'l>(&self, line: &'l str, fields: &Fields) -> Option<(&'static str, &'l str)> {
+        self.recording.map(|index| ("recording_id", fields.get(line, index)))
+    }
+
+    fn parse(&mut self, line: &str, fields: &Fields) -> Result<Option<Row>, Fault> {
         let whole = |index, name, range| integer(fields.get(line, index), name, range);
         let real = |index, name, bounds| number(fields.get(line, index), name, bounds);
         for &(index, name, bounds) in &self.unused {
             real(index, name, bounds)?;
         }
-        let track = whole(self.track, "track_id", allowed::IDS)?;
-        let vehicle = self.vehicle.map_or(Ok(track), |index| whole(index, "vehicle_id", allowed::IDS))?;
+        let track = whole(self.track, "track_id", allowed::TRACKS)?;
+        let vehicle = self.vehicle.map_or(Ok(track), |index| whole(index, "vehicle_id", allowed::TRACKS))?;
         let acceleration = match fields.get(line, self.acceleration) {
             "" => None,
             text => Some(number(text, "accel_mps2", allowed::ACCELERATION_MPS2)?),
         };
-        Ok(Row {
+        let row = Row {
             number: track.unsigned_abs(),
             origin: Time::ZERO,
             vehicle_id: vehicle.unsigned_abs(),
@@ -126,12 +134,14 @@ impl PlainColumns {
             length_m: real(self.length, "length_m", allowed::LENGTH_M)?,
             width_m: real(self.width, "width_m", allowed::WIDTH_M)?,
             class: class(fields.get(line, self.class))?,
+            marking_distances: MarkingDistances::default(),
             line: 0,
-        })
+        };
+        Ok(Some(row))
     }
 }
 
-fn class(text: &str) -> Result<VehicleClass, Fault> {
+pub(super) fn class(text: &str) -> Result<VehicleClass, Fault> {
     let named = VehicleClass::ALL.into_iter().find(|class| class.name() == text);
     named.ok_or_else(|| {
         let words = VehicleClass::ALL.map(VehicleClass::name).join(", ");

@@ -56,15 +56,22 @@ impl<R: BufRead> Lines<R> {
                 break;
             }
         }
+
         match std::str::from_utf8(&self.buffer) {
             Ok(line) => Ok(Some((self.number, line.trim()))),
-            Err(_) => Err((self.number, RecordingProblem::Binary)),
+            Err(_) if self.number == 1 => Err((self.number, RecordingProblem::Binary)),
+            Err(_) => Err((self.number, RecordingProblem::NotText)),
         }
+    }
+
+    /// True where the latest line has no end, so that its last field may be cut.
+    pub(super) fn is_cut(&self) -> bool {
+        self.buffer.last().is_some_and(|byte| *byte != b'\n')
     }
 }
 
 /// An I/O failure, told apart from damaged compression, which the decoder reports in the same type.
-fn io_problem(error: io::Error) -> RecordingProblem {
+pub(super) fn io_problem(error: io::Error) -> RecordingProblem {
     match error.kind() {
         io::ErrorKind::InvalidInput | io::ErrorKind::InvalidData | io::ErrorKind::UnexpectedEof => {
             RecordingProblem::Gzip(error)

@@ -4,6 +4,7 @@
 
 mod fitted;
 mod golden;
+mod in_car;
 mod malformed;
 mod ngsim_us101;
 mod own_recordings;

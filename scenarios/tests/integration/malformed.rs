@@ -36,6 +36,12 @@ fn row(changes: &[(&str, &str)]) -> String {
     usual.map(value).join(",")
 }
 
+/// The row of frame `k` of a car that drives at its recorded speed.
+fn moving_row(k: u32) -> String {
+    let (time_s, s_m) = (0.1 * f64::from(k), 297.4 + 1.32 * f64::from(k));
+    row(&[("frame", &k.to_string()), ("time_s", &format!("{time_s:.1}")), ("s_m", &format!("{s_m:.2}"))])
+}
+
 fn plain(rows: &[String]) -> String {
     format!("{PLAIN_HEADER}\n{}\n", rows.join("\n"))
 }
@@ -155,7 +161,7 @@ fn what_is_not_text_is_refused() {
 #[test]
 fn a_cut_gzip_stream_is_refused_and_a_whole_one_read() {
     let rows: Vec<String> =
-        (0..50).map(|k| row(&[("frame", &k.to_string()), ("time_s", &format!("{:.1}", 0.1 * f64::from(k)))])).collect();
+        (0..50).map(moving_row).collect();
     let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
     encoder.write_all(plain(&rows).as_bytes()).unwrap();
     let packed = encoder.finish().unwrap();
@@ -188,6 +194,7 @@ fn rows_in_any_order_give_the_same_tracks() {
             row(&[
                 ("track_id", if k % 2 == 0 { "1" } else { "2" }),
                 ("frame", &(k / 2).to_string()),
+                ("s_m", &format!("{:.2}", 300.0 + 1.32 * f64::from(k / 2))),
                 ("time_s", &format!("{:.1}", 0.1 * f64::from(k / 2))),
             ])
         })
@@ -205,12 +212,12 @@ fn a_vehicle_that_comes_back_is_another_track_of_the_same_vehicle() {
     let at = |frame: i64, y: &str| {
         ngsim(&[(1, &frame.to_string()), (3, &(1_163_368_300_000 + 100 * frame).to_string()), (5, y)])
     };
-    let text = [at(5, "900"), at(2, "880"), at(1, "870"), at(6, "910")].join("\n");
+    let text = [at(5, "900"), at(2, "880"), at(1, "870"), at(6, "910")].join("\n") + "\n";
     let recording = read_from(text.as_bytes(), "x/i80.txt".as_ref()).unwrap();
     assert_eq!(recording.name, "i80");
     let tracks: Vec<_> =
         recording.trajectories.iter().map(|track| (track.track_id, track.vehicle_id, track.points.len())).collect();
-    assert_eq!(tracks, [(1, 1, 2), (2, 1, 2)]);
+    assert_eq!(tracks, [(1, 1, 2), (1_000_000_000_001, 1, 2)]);
     let first = recording.trajectories[0].points[0];
     assert_eq!(first.time.ns(), 0);
     assert!((first.s_m - 0.3048 * (870.0 - 8.0)).abs() < 1e-9, "the centre lies half a length behind the front");
@@ -230,7 +237,7 @@ mod properties {
 
         #[test]
         fn no_cut_or_damage_makes_the_reader_panic(cut in 0_usize..900, place in 0_usize..900, byte in any::<u8>()) {
-            let rows: Vec<String> = (0..6).map(|k| row(&[("frame", &k.to_string()), ("time_s", &format!("{:.1}", 0.1 * f64::from(k)))])).collect();
+            let rows: Vec<String> = (0..6).map(moving_row).collect();
             let mut bytes = plain(&rows).into_bytes();
             let length = bytes.len();
             bytes[place % length] = byte;

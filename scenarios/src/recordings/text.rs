@@ -1,0 +1,91 @@
+//! Readers of text: one row a line.
+
+use std::io::BufRead;
+
+use super::fields::Fault;
+use super::layout::{Format, recognise};
+use super::rows::{Fields, Lines};
+use super::source::{About, Refusal, Row, RowSource};
+use super::RecordingProblem;
+
+/// The rows of a text file, in any of the layouts that have a row on each line.
+pub(super) struct TextSource<R> {
+    lines: Lines<R>,
+    format: Format,
+    fields: Fields,
+    name: Option<String>,
+    /// The first line, where it is a row already.
+    first: Option<(u64, String)>,
+}
+
+impl<R: BufRead> TextSource<R> {
+    /// # Errors
+    /// Where the first line is that of no layout.
+    pub(super) fn new(source: R) -> Result<Self, Refusal> {
+        let mut lines = Lines::new(source);
+        let Some((number, first)) = lines.next().map_err(at_line)? else {
+            return Err(Refusal::of_file(RecordingProblem::Empty));
+        };
+        let format = recognise(first).map_err(|problem| at_line((number, problem)))?;
+        let first = (!format.has_header).then(|| (number, first.to_owned()));
+        Ok(Self { lines, format, fields: Fields::default(), name: None, first })
+    }
+}
+
+fn at_line((line, problem): (u64, RecordingProblem)) -> Refusal {
+    Refusal::new(line, problem)
+}
+
+impl<R: BufRead> RowSource for TextSource<R> {
+    fn about(&self) -> About {
+        About { name: self.name.clone(), ..self.format.columns.about() }
+    }
+
+    fn next_row(&mut self) -> Result<Option<Row>, Refusal> {
+        let Self { lines, format, fields, name, first } = self;
+        loop {
+            let first = first.take();
+            let (number, line) = match &first {
+                Some((number, line)) => (*number, line.as_str()),
+                None => match lines.next().map_err(at_line)? {
+                    Some(next) => next,
+                    None => {
+                        format.columns.end().map_err(Refusal::of_fault)?;
+                        return Ok(None);
+                    }
+                },
+            };
+            let row = parse(line, format, fields, name).map_err(|fault| Refusal::new(number, fault))?;
+            if lines.is_cut() {
+                return Err(Refusal::new(number, RecordingProblem::CutLine));
+            }
+            if let Some(row) = row {
+                return Ok(Some(Row { line: number, ..row }));
+            }
+        }
+    }
+}
+
+fn parse(line: &str, format: &mut Format, fields: &mut Fields, name: &mut Option<String>) -> Result<Option<Row>, Fault> {
+    fields.split(line, format.separator)?;
+    let (found, needed) = (fields.len(), format.width);
+    if found != needed {
+        return Err(RecordingProblem::ColumnCount { found, needed }.into());
+    }
+    check_name(line, format, fields, name)?;
+    format.columns.parse(line, fields)
+}
+
+/// One file holds one recording.
+fn check_name(line: &str, format: &Format, fields: &Fields, name: &mut Option<String>) -> Result<(), Fault> {
+    let Some((column, found)) = format.columns.recording(line, fields) else { return Ok(()) };
+    match name {
+        None => *name = Some(found.to_owned()),
+        Some(first) if first == found => {}
+        Some(first) => {
+            let problem = RecordingProblem::SeveralRecordings { first: first.clone(), found: found.to_owned() };
+            return Err(Fault::at(column, problem));
+        }
+    }
+    Ok(())
+}
