@@ -67,10 +67,16 @@ fn record_in_car(args: &RecordArgs, actor: Option<&str>) -> Result<ExitCode, Cli
     let ids = || actors.iter().map(|actor| actor.id.to_string());
     let chosen = match actor {
         None => actors.iter().find(overtakes).map(|actor| actor.id.to_string()).ok_or_else(|| CliError::Usage {
-            message: format!("no actor overtakes: name one with --in-car=ACTOR, of {}", ids().collect::<Vec<_>>().join(", ")),
+            message: format!(
+                "no actor overtakes: name one with --in-car=ACTOR, of {}",
+                ids().collect::<Vec<_>>().join(", ")
+            ),
         }),
         Some(name) => ids().find(|id| id == name).ok_or_else(|| CliError::Usage {
-            message: format!("there is no actor `{name}` to record in: it has to be one of {}", ids().collect::<Vec<_>>().join(", ")),
+            message: format!(
+                "there is no actor `{name}` to record in: it has to be one of {}",
+                ids().collect::<Vec<_>>().join(", ")
+            ),
         }),
     }?;
     let mut recorder = InCarRecorder::new(&chosen);

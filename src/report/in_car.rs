@@ -62,14 +62,8 @@ impl InCarRecorder {
     /// A recorder in the vehicle of `actor`, for runs of scenarios that have it.
     pub fn new(actor: &str) -> Self {
         let class = VehicleClass::Car;
-        let run = Run {
-            actor: 0,
-            road: Road::straight(1),
-            start: Time::ZERO,
-            is_over: true,
-            manoeuvre: None,
-            before: None,
-        };
+        let run =
+            Run { actor: 0, road: Road::straight(1), start: Time::ZERO, is_over: true, manoeuvre: None, before: None };
         let (frames, changes, dimensions) = (Vec::new(), Vec::new(), class.typical_dimensions());
         Self { actor: actor.to_owned(), frames, changes, run, class, dimensions }
     }

@@ -80,8 +80,7 @@ struct Places {
 
 impl InCarColumns {
     /// The names by which the layout is recognised.
-    pub(super) const NAMES: [&str; 6] =
-        ["time_s", "s_m", "d_left_m", "speed_mps", "left_marking_m", "right_marking_m"];
+    pub(super) const NAMES: [&str; 6] = ["time_s", "s_m", "d_left_m", "speed_mps", "left_marking_m", "right_marking_m"];
 
     /// Those that no other layout has.
     pub(super) const OWN_NAMES: [&str; 3] = ["d_left_m", "left_marking_m", "right_marking_m"];
@@ -126,7 +125,8 @@ impl TextLayout for InCarColumns {
 
     /// Nothing for the rows before the first bus frame: the speed is not known there.
     fn parse(&mut self, line: &str, fields: &Fields) -> Result<Option<Row>, Fault> {
-        let Places { time, s, d, speed, markings, acceleration, lane, length, width, class: class_at, .. } = self.places;
+        let Places { time, s, d, speed, markings, acceleration, lane, length, width, class: class_at, .. } =
+            self.places;
         let real = |index, name, bounds| number(fields.get(line, index), name, bounds);
         let optional = |index: usize, name, bounds| match fields.get(line, index) {
             "" => Ok(None),

@@ -1,12 +1,12 @@
 //! Which layout a file has, by its first line.
 
+use super::RecordingProblem;
 use super::fields::Fault;
 use super::in_car::InCarColumns;
 use super::ngsim::NgsimColumns;
 use super::plain::PlainColumns;
 use super::rows::{Fields, Separator};
 use super::source::{About, Row};
-use super::RecordingProblem;
 
 /// How to read the rows of one file.
 pub(super) struct Format {
@@ -67,11 +67,8 @@ pub(super) fn recognise(line: &str) -> Result<Format, RecordingProblem> {
     }
     if plain.max(ngsim) >= FEWEST_KNOWN_NAMES {
         header.refuse_duplicates()?;
-        let columns: Box<dyn TextLayout> = if plain > ngsim {
-            Box::new(PlainColumns::new(&header)?)
-        } else {
-            Box::new(NgsimColumns::new(&header)?)
-        };
+        let columns: Box<dyn TextLayout> =
+            if plain > ngsim { Box::new(PlainColumns::new(&header)?) } else { Box::new(NgsimColumns::new(&header)?) };
         return Ok(Format { columns, separator, width, has_header });
     }
     if width == NGSIM_COLUMNS && header.is_numeric() {

@@ -11,8 +11,8 @@
 
 use closecall_traffic::{Time, VehicleClass};
 
-use super::{LaneMarkings, Layout, MarkingDistances, RecordingProblem};
 use super::fields::Fault;
+use super::{LaneMarkings, Layout, MarkingDistances, RecordingProblem};
 
 /// Whether frame numbers may start again within one file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,11 +2,11 @@
 
 use std::io::BufRead;
 
+use super::RecordingProblem;
 use super::fields::Fault;
 use super::layout::{Format, recognise};
 use super::rows::{Fields, Lines};
 use super::source::{About, Refusal, Row, RowSource};
-use super::RecordingProblem;
 
 /// The rows of a text file, in any of the layouts that have a row on each line.
 pub(super) struct TextSource<R> {
@@ -66,7 +66,12 @@ impl<R: BufRead> RowSource for TextSource<R> {
     }
 }
 
-fn parse(line: &str, format: &mut Format, fields: &mut Fields, name: &mut Option<String>) -> Result<Option<Row>, Fault> {
+fn parse(
+    line: &str,
+    format: &mut Format,
+    fields: &mut Fields,
+    name: &mut Option<String>,
+) -> Result<Option<Row>, Fault> {
     fields.split(line, format.separator)?;
     let (found, needed) = (fields.len(), format.width);
     if found != needed {

@@ -7,11 +7,11 @@ use closecall_traffic::Time;
 
 use super::builder::Builder;
 use super::dropped::Dropped;
+use super::open::Digest;
 use super::order::{WINDOW_ROWS, order_of};
 use super::plausible;
 use super::source::{About, Clock, Refusal, Row, RowSource};
-use super::{LaneMarkings, Layout, RecordedTrack, RecordingError, RecordingProblem, Recording, ngsim};
-use super::open::Digest;
+use super::{LaneMarkings, Layout, RecordedTrack, Recording, RecordingError, RecordingProblem, ngsim};
 
 /// Times from here on count from 1970, not from the recording's start: one day.
 const EPOCH_TIMES_FROM: Time = Time::from_ms(86_400_000);

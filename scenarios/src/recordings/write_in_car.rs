@@ -102,7 +102,8 @@ pub fn write_truth(changes: &[TrueLaneChange], path: &Path) -> Result<(), WriteE
     let written = write_atomically(path, |file| -> io::Result<()> {
         writeln!(file, "{TRUTH_HEADER}")?;
         changes.iter().try_for_each(|change| {
-            let TrueLaneChange { direction, from_lane, to_lane, start_s, crossing_s, end_s, speed_mps, complete } = change;
+            let TrueLaneChange { direction, from_lane, to_lane, start_s, crossing_s, end_s, speed_mps, complete } =
+                change;
             let direction = if *direction == Side::Left { "left" } else { "right" };
             let duration_s = end_s - start_s;
             writeln!(

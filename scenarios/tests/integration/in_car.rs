@@ -27,7 +27,11 @@ fn log(to_the_left: bool) -> InCarLog {
         }
     };
     let class = VehicleClass::Car;
-    InCarLog { class, dimensions: class.typical_dimensions(), frames: track.points.iter().enumerate().map(frame).collect() }
+    InCarLog {
+        class,
+        dimensions: class.typical_dimensions(),
+        frames: track.points.iter().enumerate().map(frame).collect(),
+    }
 }
 
 fn read_back(log: &InCarLog) -> Vec<RecordedTrack> {

@@ -160,8 +160,7 @@ fn what_is_not_text_is_refused() {
 
 #[test]
 fn a_cut_gzip_stream_is_refused_and_a_whole_one_read() {
-    let rows: Vec<String> =
-        (0..50).map(moving_row).collect();
+    let rows: Vec<String> = (0..50).map(moving_row).collect();
     let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
     encoder.write_all(plain(&rows).as_bytes()).unwrap();
     let packed = encoder.finish().unwrap();
