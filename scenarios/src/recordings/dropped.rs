@@ -29,7 +29,7 @@ pub struct DroppedRows {
 impl Dropped {
     pub(super) fn add(&mut self, refusal: Refusal) {
         let first = || {
-            let column = refusal.column.as_ref().map(|column| format!("column `{column}` ")).unwrap_or_default();
+            let column = refusal.column.map(|column| format!("column `{column}` ")).unwrap_or_default();
             DroppedRows { count: 0, first_line: refusal.line, first: format!("{column}{}", refusal.problem) }
         };
         self.reasons.entry(refusal.problem.kind()).or_insert_with(first).count += 1;

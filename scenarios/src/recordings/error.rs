@@ -14,7 +14,7 @@ pub struct RecordingError {
     /// The line, counted from 1, where one is to blame.
     pub line: Option<u64>,
     /// The column's name, where one is to blame.
-    pub column: Option<String>,
+    pub column: Option<&'static str>,
     /// What is wrong.
     #[source]
     pub problem: RecordingProblem,

@@ -75,7 +75,7 @@ pub(super) trait RowSource {
 #[derive(Debug)]
 pub(super) struct Refusal {
     pub(super) line: Option<u64>,
-    pub(super) column: Option<String>,
+    pub(super) column: Option<&'static str>,
     pub(super) problem: RecordingProblem,
 }
 
@@ -86,11 +86,11 @@ impl Refusal {
 
     pub(super) fn new(line: u64, fault: impl Into<Fault>) -> Self {
         let Fault { column, problem } = fault.into();
-        Self { line: Some(line), column: column.map(str::to_owned), problem }
+        Self { line: Some(line), column, problem }
     }
 
     pub(super) fn of_fault(fault: Fault) -> Self {
-        Self { line: None, column: fault.column.map(str::to_owned), problem: fault.problem }
+        Self { line: None, column: fault.column, problem: fault.problem }
     }
 
     /// True where only this row is unusable, and reading can go on behind it.
