@@ -146,8 +146,10 @@ impl Receiver<'_> {
         let hard = echoes.iter().map(|echo| {
             let face = &self.targets.faces[echo.face as usize];
             // The air can only take away: what is too weak without it needs no exponential.
-            let through = if echo.power > LEAST_POWER { self.link.transmission(echo.range_m) } else { 1.0 };
-            let power = echo.power * through * transmission(echo.range_m);
+            let is_strong = echo.power > LEAST_POWER;
+            let through =
+                if is_strong { self.link.transmission(echo.range_m) * transmission(echo.range_m) } else { 1.0 };
+            let power = echo.power * through;
             Candidate { range_m: echo.range_m, power, source: face.source, material: face.material }
         });
         for (place, candidate) in soft.into_iter().chain(hard).enumerate() {

@@ -177,6 +177,10 @@ impl Scanner {
         };
         let pose = scene.road.plane_pose(of.state.s_m, of.state.d_m, of.state.heading_rad);
         let placed = view.sensor_from_plane(0.0) * in_plane(pose, 0.0);
+        // No beam looks ahead: what lies there wholly would cost each of them a search for nothing.
+        if !solid.corners().any(|corner| (placed * corner).x > 0.0) {
+            return;
+        }
         let water = |_| 0.0;
         let finish = Finish { source: PointSource::Spray, reflectivity: &water };
         let faces = self.targets.push_faces(&solid, &placed, finish);

@@ -106,28 +106,33 @@ pub(crate) fn spray(vehicle: &Vehicle, speed_mps: f64, environment: &Environment
 pub(crate) fn droplets(beam: usize, centre: &Fan, plumes: &[Plume], of: (&Targets, &Link, Noise)) -> Droplets {
     let (targets, link, noise) = of;
     let mut found = Droplets { echo: fog(beam, link, noise), near_m: f32::INFINITY, optical_depth: 0.0 };
-    if plumes.is_empty() {
-        return found;
-    }
-    let column = beam / LAYERS;
-    let clump_at = (column / CLUMP_COLUMNS) * LAYERS + beam % LAYERS;
-    let clump = -noise.uniform(clump_at, Purpose::Plume).ln();
-    let mut depth_left = -0.5 * noise.uniform(beam, Purpose::Depth).ln();
+    // Logarithms are drawn by those beams alone that need them: not by those that cross no plume, ...
+    let mut clump = None;
+    let depth = noise.uniform(beam, Purpose::Depth);
+    let mut is_met = false;
     for plume in plumes {
         let Some([from, to]) = crossing_m(centre, plume.faces, targets) else { continue };
+        let clump = *clump.get_or_insert_with(|| {
+            let column = beam / LAYERS;
+            let clump_at = (column / CLUMP_COLUMNS) * LAYERS + beam % LAYERS;
+            -noise.uniform(clump_at, Purpose::Plume).ln()
+        });
         let extinction = plume.extinction_per_m * clump;
-        let optical_depth = extinction * (to - from);
+        let before = found.optical_depth;
         found.near_m = found.near_m.min(from);
-        found.optical_depth += optical_depth;
-        if depth_left < optical_depth {
-            let range_m = from + depth_left / extinction;
+        found.optical_depth += extinction * (to - from);
+        // ... nor by those that end beyond it: −ln u ≥ 1 − u.
+        if is_met || 0.5 * (1.0 - depth) >= found.optical_depth {
+            continue;
+        }
+        let ends_at = -0.5 * depth.ln();
+        if ends_at < found.optical_depth {
+            is_met = true;
+            let range_m = from + (ends_at - before) / extinction;
             let echo = SoftEcho { range_m, power: soft_power(extinction, range_m, link), source: PointSource::Spray };
             if found.echo.is_none_or(|other| range_m < other.range_m) {
                 found.echo = Some(echo);
             }
-            depth_left = f32::INFINITY;
-        } else {
-            depth_left -= optical_depth;
         }
     }
     found

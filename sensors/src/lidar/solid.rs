@@ -1,6 +1,6 @@
 //! Convex solids of which vehicles and roadside furniture are put together.
 
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 
 use super::Material;
 
@@ -60,6 +60,12 @@ impl Solid {
     /// The faces.
     pub(crate) fn faces(&self) -> &[SolidFace] {
         &self.faces[..self.count]
+    }
+
+    /// The corners of the box along the axes that holds the solid [m].
+    pub(crate) fn corners(&self) -> impl Iterator<Item = Point3<f64>> {
+        let ends = [self.low, self.high];
+        (0..8_usize).map(move |corner| Point3::from(Vector3::from_fn(|axis, _| ends[corner >> axis & 1][axis])))
     }
 
     /// A box along the axes, of one material.
