@@ -22,7 +22,7 @@ pub use config::{CheckedDriver, DriverConfig, HumanDriver};
 pub use driver::{
     Driver, DriverAction, DriverError, DriverInput, DriverNote, FollowConfig, Idm, IdmConfig, LaneChange,
     LaneNeighbours, Lead, LogNormalConfig, Neighbour, Neighbours, Overtaker, OvertakerConfig, Prescribed,
-    PrescribedConfig, Reaction, ReactionConfig, Regime, Wiedemann99, Wiedemann99Config, Wiedemann99Driver,
+    PrescribedConfig, Reaction, ReactionConfig, Regime, Thresholds, Wiedemann99, Wiedemann99Config, Wiedemann99Driver,
     Wiedemann99Model,
 };
 pub use ego::{

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::perception::Perception;
 use super::reaction::{Reaction, ReactionConfig};
-use super::wiedemann99::{Emergency, lift_off_for_light, nearest};
+use super::wiedemann99::{Emergency, lift_off_for_light, nearest, usually_desired_mps};
 use super::{Driver, DriverAction, DriverError, DriverInput, HARDEST_BRAKING_MPS2, Lead, check_finite, finite};
 
 /// Gap below which the interaction no longer grows [m]: it would diverge.
@@ -20,7 +20,7 @@ const LEAST_GAP_M: f64 = 0.1;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct IdmConfig {
-    /// Speed that the driver wants [m/s]; its speed at the start where absent.
+    /// Speed that the driver wants [m/s]; where absent the road's limit, or its speed at the start if that is higher.
     pub desired_speed_mps: Option<Num>,
     /// Time gap T [s]; 1.5.
     pub time_gap_s: Option<Num>,
@@ -101,7 +101,7 @@ impl Driver for IdmDriver {
     fn step(&mut self, input: &DriverInput<'_>, rng: &mut Stream) -> Result<DriverAction, DriverError> {
         check_finite(input)?;
         let speed_mps = input.own.speed_mps;
-        let desired_mps = *self.desired_mps.get_or_insert(speed_mps);
+        let desired_mps = *self.desired_mps.get_or_insert_with(|| usually_desired_mps(input));
         let wanted = if let Some(reaction) = self.model.reaction {
             let senses = self.perception.get_or_insert_with(|| Perception::new(reaction.draw(rng), None));
             let ahead = senses.look(input).ahead;

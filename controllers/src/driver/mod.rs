@@ -18,7 +18,7 @@ pub use interface::{
 pub use overtaker::{FollowConfig, Overtaker, OvertakerConfig};
 pub use prescribed::{Prescribed, PrescribedConfig};
 pub use reaction::{LogNormalConfig, Reaction, ReactionConfig};
-pub use wiedemann99::{Regime, Wiedemann99, Wiedemann99Config, Wiedemann99Driver, Wiedemann99Model};
+pub use wiedemann99::{Regime, Thresholds, Wiedemann99, Wiedemann99Config, Wiedemann99Driver, Wiedemann99Model};
 
 use closecall_traffic::Time;
 

@@ -7,6 +7,7 @@
 
 mod encounter;
 mod following;
+mod golden;
 mod paper_figure;
 mod study;
 mod world;

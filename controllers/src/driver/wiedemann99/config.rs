@@ -30,7 +30,8 @@ pub struct Wiedemann99Config {
     pub cc8_mps2: Option<Num>,
     /// Free acceleration at 80 km/h [m/s²]; 1.5.
     pub cc9_mps2: Option<Num>,
-    /// Speed that the driver wants [m/s]; its speed at the start where absent.
+    /// Speed that the driver wants [m/s]; where absent the road's limit, or its speed at the start if that is higher. An
+    /// overtaking driver wants the speed at which it comes up.
     pub desired_speed_mps: Option<Num>,
     /// Reaction time [s]. Where absent the model drives alone, with the perception thresholds that it has itself; where
     /// given, the driver perceives late, notices speed differences above the looming threshold only, and sees brake

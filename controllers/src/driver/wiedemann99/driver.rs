@@ -47,7 +47,7 @@ impl Driver for Wiedemann99Driver {
     fn step(&mut self, input: &DriverInput<'_>, rng: &mut Stream) -> Result<DriverAction, DriverError> {
         check_finite(input)?;
         let speed_mps = input.own.speed_mps;
-        let desired_mps = *self.desired_mps.get_or_insert(speed_mps);
+        let desired_mps = *self.desired_mps.get_or_insert_with(|| usually_desired_mps(input));
         let mut acceleration_mps2 = if self.settings.reaction.is_some() {
             let ahead = self.lead(input, rng);
             let wanted = self.model.acceleration_mps2(speed_mps, desired_mps, ahead.as_ref().map(|seen| &seen.lead));
@@ -70,6 +70,12 @@ pub(crate) fn nearest(input: &DriverInput<'_>) -> Option<Lead> {
         speed_mps: neighbour.speed_mps,
         acceleration_mps2: neighbour.acceleration_mps2,
     })
+}
+
+/// The speed that a follower wants where its scenario names none [m/s]: the road's limit, or its own speed at the start if
+/// that is higher.
+pub(crate) fn usually_desired_mps(input: &DriverInput<'_>) -> f64 {
+    input.own.speed_mps.max(input.road.speed_limit_mps())
 }
 
 /// Takes the foot off the accelerator where the vehicle ahead shows its brake light and is near.

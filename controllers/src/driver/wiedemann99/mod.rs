@@ -7,9 +7,11 @@
 mod config;
 mod driver;
 mod model;
+mod thresholds;
 
 pub(crate) use config::Parameters99;
 pub use config::{Wiedemann99, Wiedemann99Config};
 pub use driver::Wiedemann99Driver;
-pub(crate) use driver::{Emergency, lift_off_for_light, nearest};
-pub use model::{Regime, Wiedemann99Model};
+pub(crate) use driver::{Emergency, lift_off_for_light, nearest, usually_desired_mps};
+pub use model::Wiedemann99Model;
+pub use thresholds::{Regime, Thresholds};
