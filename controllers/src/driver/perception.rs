@@ -11,7 +11,9 @@
 //!   71–88). What comes late is a change in how the others drive.
 //! - *Coarse.* A speed difference is noticed only where the visual angle of the vehicle ahead grows or shrinks faster
 //!   than 0.003 rad/s (Hoffmann and Mortimer, *Scaling of relative velocity between vehicles*, Accident Analysis and
-//!   Prevention 28 (1996) 415–421). Below that the vehicle ahead seems to keep one's own speed.
+//!   Prevention 28 (1996) 415–421). Below that the vehicle ahead seems to keep one's own speed. Once noticed, the
+//!   difference is watched, and lost from sight only below 0.0006 rad/s, the mean threshold of drivers who attend to it
+//!   (Michaels, *Perceptual factors in car following*, Proc. 2nd Int. Symp. on the Theory of Road Traffic Flow, 1963).
 //! - *Brake light first.* The brake light is seen with the same delay as everything else. The deceleration itself is
 //!   only felt gradually, from the change of speed; until then a driver who sees the light go on assumes a moderate one.
 
@@ -22,6 +24,9 @@ use super::{DriverInput, LaneNeighbours, Lead, Neighbour};
 
 /// Slowest growth of the visual angle that is noticed [rad/s] (Hoffmann and Mortimer 1996).
 const LOOMING_THRESHOLD_RADPS: f64 = 0.003;
+
+/// Slowest growth that is noticed by a driver who has noticed the difference before, and watches it [rad/s] (Michaels 1963).
+const WATCHED_THRESHOLD_RADPS: f64 = 0.0006;
 
 /// Time constant with which a deceleration is felt from the change of speed [s].
 const FEELING_TIME_S: f64 = 0.6;
@@ -101,8 +106,8 @@ pub(crate) struct View {
 #[derive(Clone, Debug)]
 pub(crate) struct Perception {
     reaction: Time,
-    /// Below this growth of the visual angle no speed difference is noticed [rad/s].
-    looming_radps: f64,
+    /// The vehicle ahead whose difference of speeds has been noticed, and is watched.
+    watched: Option<u32>,
     passing_side: Option<Side>,
     memory: Vec<Glance>,
     /// Where the oldest glance lies once the memory is full.
@@ -126,7 +131,7 @@ impl Perception {
     pub(crate) fn new(reaction_s: f64, passing_side: Option<Side>) -> Self {
         Self {
             reaction: Time::from_s(reaction_s),
-            looming_radps: LOOMING_THRESHOLD_RADPS,
+            watched: None,
             passing_side,
             memory: Vec::with_capacity(GLANCES),
             oldest: 0,
@@ -147,18 +152,22 @@ impl Perception {
             elapsed_s: (input.time - glance.time).s(),
             own_travel_m: input.own.s_m - glance.own_s_m,
             own_speed_then_mps: glance.own_speed_mps,
-            looming_radps: self.looming_radps,
         };
         let believed_mps2 = self.feel(glance.ahead.as_ref(), input.time);
-        let mut ahead = glance.ahead.map(|seen| carry.ahead(&seen));
+        let notices = glance.ahead.is_some_and(|seen| {
+            let watches = self.watched == Some(seen.actor);
+            carry.growth_radps(&seen) >= if watches { WATCHED_THRESHOLD_RADPS } else { LOOMING_THRESHOLD_RADPS }
+        });
+        self.watched = glance.ahead.filter(|_| notices).map(|seen| seen.actor);
+        let mut ahead = glance.ahead.map(|seen| carry.ahead(&seen, notices));
         if let Some(ahead) = &mut ahead {
-            let changed_mps = self.felt.acceleration_mps2 * carry.elapsed_s;
-            ahead.lead.gap_m += 0.5 * changed_mps * carry.elapsed_s;
-            ahead.lead.speed_mps = (ahead.lead.speed_mps + changed_mps).max(0.0);
-            ahead.lead.acceleration_mps2 = believed_mps2;
+            let lead = &mut ahead.lead;
+            lead.gap_m += strayed_m(lead.speed_mps, self.felt.acceleration_mps2, carry.elapsed_s);
+            lead.speed_mps = (lead.speed_mps + self.felt.acceleration_mps2 * carry.elapsed_s).max(0.0);
+            lead.acceleration_mps2 = believed_mps2;
         }
         let passing = glance.beside.map(|[lead, alongside, follower]| PassingLane {
-            lead: lead.map(|seen| carry.ahead(&seen)),
+            lead: lead.map(|seen| carry.beside(&seen)),
             alongside: alongside.is_some(),
             follower: follower.map(|seen| carry.behind(&seen)),
         });
@@ -192,6 +201,11 @@ impl Perception {
         };
         let felt = &mut self.felt;
         let step_s = (now - felt.time).s();
+        if seen.speed_mps <= 0.0 {
+            // That a vehicle stands is plain to see: it no longer brakes.
+            *felt = Felt { actor: seen.actor, acceleration_mps2: 0.0, light_on_for_s: 0.0, time: now };
+            return 0.0;
+        }
         if felt.actor == seen.actor {
             let share = step_s / (FEELING_TIME_S + step_s);
             felt.acceleration_mps2 += share * (seen.acceleration_mps2 - felt.acceleration_mps2);
@@ -248,30 +262,45 @@ impl Seen {
     }
 }
 
+/// How much further a vehicle comes in a time than it would at its speed, with an acceleration that ends where it stands [m].
+fn strayed_m(speed_mps: f64, acceleration_mps2: f64, time_s: f64) -> f64 {
+    if speed_mps + acceleration_mps2 * time_s >= 0.0 {
+        0.5 * acceleration_mps2 * time_s * time_s
+    } else {
+        -speed_mps * speed_mps / (2.0 * acceleration_mps2) - speed_mps * time_s
+    }
+}
+
 /// Carries a glance over the reaction time to now.
 struct Carry {
     elapsed_s: f64,
     own_travel_m: f64,
     own_speed_then_mps: f64,
-    looming_radps: f64,
 }
 
 impl Carry {
-    /// The other's speed as it seemed: its own, or the driver's where no difference was noticed.
-    fn seeming_speed_mps(&self, seen: &Seen) -> f64 {
-        let difference_mps = seen.speed_mps - self.own_speed_then_mps;
-        let growth_radps = seen.width_m * difference_mps.abs() / (seen.gap_m * seen.gap_m);
-        // Written so that a gap of zero, where the growth is infinite, is noticed.
-        if growth_radps < self.looming_radps { self.own_speed_then_mps } else { seen.speed_mps }
+    /// Growth of the other's visual angle, or its shrinking [rad/s]; infinite at a gap of zero.
+    fn growth_radps(&self, seen: &Seen) -> f64 {
+        seen.width_m * (seen.speed_mps - self.own_speed_then_mps).abs() / (seen.gap_m * seen.gap_m)
     }
 
-    fn ahead(&self, seen: &Seen) -> Perceived {
-        let speed_mps = self.seeming_speed_mps(seen);
+    /// The other's speed as it seemed: its own, or the driver's where no difference was noticed.
+    fn seeming_speed_mps(&self, seen: &Seen, notices: bool) -> f64 {
+        if notices { seen.speed_mps } else { self.own_speed_then_mps }
+    }
+
+    fn ahead(&self, seen: &Seen, notices: bool) -> Perceived {
+        let speed_mps = self.seeming_speed_mps(seen, notices);
         self.perceived(seen, speed_mps, seen.gap_m + speed_mps * self.elapsed_s - self.own_travel_m)
     }
 
+    /// A vehicle in the passing lane: a look at it is too short to watch it.
+    fn beside(&self, seen: &Seen) -> Perceived {
+        self.ahead(seen, self.growth_radps(seen) >= LOOMING_THRESHOLD_RADPS)
+    }
+
     fn behind(&self, seen: &Seen) -> Perceived {
-        let speed_mps = self.seeming_speed_mps(seen);
+        let speed_mps = self.seeming_speed_mps(seen, self.growth_radps(seen) >= LOOMING_THRESHOLD_RADPS);
         self.perceived(seen, speed_mps, seen.gap_m + self.own_travel_m - speed_mps * self.elapsed_s)
     }
 
@@ -356,10 +385,22 @@ mod tests {
 
     #[test]
     fn a_small_speed_difference_far_away_goes_unnoticed() {
-        // 1.85 m · 5 m/s / g² falls below 0.003 rad/s beyond 55.5 m.
+        // 1.85 m · 5 m/s / g² falls below 0.003 rad/s beyond 55.5 m, and below 0.0006 rad/s beyond 124 m.
         let mut senses = Perception::new(0.0, None);
-        assert_eq!(look(&mut senses, Time::ZERO, (60.0, 25.0, 0.0, false)).lead.speed_mps, 30.0);
-        assert_eq!(look(&mut senses, STEP, (50.0, 25.0, 0.0, false)).lead.speed_mps, 25.0);
+        let mut time = Time::ZERO;
+        for (gap_m, seeming_mps) in [(60.0, 30.0), (50.0, 25.0), (60.0, 25.0), (130.0, 30.0), (60.0, 30.0)] {
+            assert_eq!(look(&mut senses, time, (gap_m, 25.0, 0.0, false)).lead.speed_mps, seeming_mps, "{gap_m} m");
+            time += STEP;
+        }
+    }
+
+    #[test]
+    fn a_vehicle_that_stops_is_not_believed_to_roll_backwards() {
+        // From 6 m/s at 6 m/s² it stands after one second and 3 m: 3 m less than at its speed, however long one waits.
+        assert_eq!(strayed_m(6.0, -6.0, 1.0), -3.0);
+        assert_eq!(6.0 * 2.5 + strayed_m(6.0, -6.0, 2.5), 3.0);
+        assert_eq!(strayed_m(0.0, -6.0, 1.0), 0.0);
+        assert_eq!(strayed_m(10.0, 2.0, 1.0), 1.0);
     }
 
     #[test]

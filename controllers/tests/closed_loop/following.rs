@@ -7,9 +7,6 @@ use proptest::prelude::*;
 use crate::encounter::human;
 use crate::world::{Actor, Who, World, gap_m};
 
-/// cc0: a driver that comes no nearer chooses its gap at leisure, anywhere in the band that it follows in.
-const STANDSTILL_GAP_M: f64 = 1.5;
-
 /// A leader at 30 m/s that brakes at 5 s, and a follower at the same speed `gap` behind it.
 fn pair(gap: f64, cc1_s: f64, reaction_s: f64, brake_mps2: f64) -> World {
     let road = Road::straight(3);
@@ -21,8 +18,6 @@ fn pair(gap: f64, cc1_s: f64, reaction_s: f64, brake_mps2: f64) -> World {
     let leads = DriverConfig::Prescribed(PrescribedConfig { profile: vec![[0.0.into(), 30.0.into()]] });
     let follows = DriverConfig::Wiedemann99(Wiedemann99Config {
         cc1_s: Some(cc1_s.into()),
-        // Without the oscillation of following, whose phase at the time of braking would blur the comparison.
-        cc7_mps2: Some(0.0.into()),
         reaction_s: Some(ReactionConfig::Value(reaction_s.into())),
         ..Wiedemann99Config::default()
     });
@@ -31,10 +26,10 @@ fn pair(gap: f64, cc1_s: f64, reaction_s: f64, brake_mps2: f64) -> World {
     World::new(vec![leader, Actor::new(who(&follows, "follower"), car, 100.0, d_m, 30.0)], road)
 }
 
-/// How well it ends: the least gap [m], or less the speed of the impact [m/s].
+/// How well it ends: the least gap until both stand [m], or less the speed of the impact [m/s].
 fn ending(mut world: World) -> f64 {
     let mut least_m = f64::INFINITY;
-    while world.time < Time::from_s(25.0) {
+    while world.time < Time::from_s(50.0) {
         world.step();
         let [leader, follower] = &world.actors[..] else { unreachable!("two vehicles drive here") };
         if world.collision().is_some() {
@@ -66,14 +61,17 @@ fn deceleration_follows_the_brake_light_by_the_reaction_time() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(200))]
+    #![proptest_config(ProptestConfig::with_cases(300))]
 
+    /// The plain braking case: a driver who follows in its band behind a leader who brakes to standstill at a constant rate.
+    /// All who come to a stop roll up to cc0, so that reaction decides the least gap where room is short, and nothing else.
     #[test]
-    fn where_the_room_is_used_up_a_longer_reaction_never_ends_better(
-        gap in 5.0..20.0, reaction in 0.3..1.5, longer in 0.1..1.0, braking in 4.0..8.0,
+    fn a_longer_reaction_never_gives_a_larger_least_gap(
+        in_band in 0.2..3.8, cc1 in 0.2..1.5, reaction in 0.0..1.8, longer in 0.05..1.0, braking in 2.0..8.0,
     ) {
-        let quick = ending(pair(gap, 0.3, reaction, braking));
-        let slow = ending(pair(gap, 0.3, reaction + longer, braking));
-        prop_assert!(quick > STANDSTILL_GAP_M || slow <= quick + 0.05, "{slow} {quick}");
+        let gap = 1.5 + cc1 * 30.0 + in_band;
+        let quick = ending(pair(gap, cc1, reaction, braking));
+        let slow = ending(pair(gap, cc1, reaction + longer, braking));
+        prop_assert!(slow <= quick + 0.05, "{slow} {quick}");
     }
 }

@@ -95,11 +95,11 @@ fn each_regime_is_where_the_table_says() {
     assert_eq!(regime(15.0, -5.0), Regime::Emergency);
 }
 
-/// Gap at every tenth of a second during the approach and the first swings of following [m].
+/// Gap at every fifth of a second during the approach and the first swings of following [m].
 fn approach_gaps(cc1_s: f64, speed_mps: f64, step_s: f64) -> Vec<f64> {
     let gaps = drive(cc1_s, APPROACH, speed_mps, step_s, |_| 0.0);
-    let every = (0.1 / step_s).round() as usize;
-    gaps.into_iter().skip(every - 1).step_by(every).take(400).collect()
+    let every = (0.2 / step_s).round() as usize;
+    gaps.into_iter().skip(every - 1).step_by(every).take(200).collect()
 }
 
 #[test]
