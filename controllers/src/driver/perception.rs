@@ -11,9 +11,10 @@
 //!   71–88). What comes late is a change in how the others drive.
 //! - *Coarse.* A speed difference is noticed only where the visual angle of the vehicle ahead grows or shrinks faster
 //!   than 0.003 rad/s (Hoffmann and Mortimer, *Scaling of relative velocity between vehicles*, Accident Analysis and
-//!   Prevention 28 (1996) 415–421). Below that the vehicle ahead seems to keep one's own speed. Once noticed, the
-//!   difference is watched, and lost from sight only below 0.0006 rad/s, the mean threshold of drivers who attend to it
-//!   (Michaels, *Perceptual factors in car following*, Proc. 2nd Int. Symp. on the Theory of Road Traffic Flow, 1963).
+//!   Prevention 28 (1996) 415–421). Below that the vehicle ahead seems to go on as it did, at first at one's own speed;
+//!   what one's own accelerator and brake change is known. Once noticed, the difference is watched, and lost from sight
+//!   only below 0.0006 rad/s, the mean threshold of drivers who attend to it (Michaels, *Perceptual factors in car
+//!   following*, Proc. 2nd Int. Symp. on the Theory of Road Traffic Flow, 1963).
 //! - *Brake light first.* The brake light is seen with the same delay as everything else. The deceleration itself is
 //!   only felt gradually, from the change of speed; until then a driver who sees the light go on assumes a moderate one.
 
@@ -106,8 +107,7 @@ pub(crate) struct View {
 #[derive(Clone, Debug)]
 pub(crate) struct Perception {
     reaction: Time,
-    /// The vehicle ahead whose difference of speeds has been noticed, and is watched.
-    watched: Option<u32>,
+    belief: Option<Belief>,
     passing_side: Option<Side>,
     memory: Vec<Glance>,
     /// Where the oldest glance lies once the memory is full.
@@ -115,6 +115,15 @@ pub(crate) struct Perception {
     /// The glance in use, counted from the oldest.
     current: usize,
     felt: Felt,
+}
+
+/// The speed that the vehicle ahead seems to have.
+#[derive(Clone, Copy, Debug)]
+struct Belief {
+    actor: u32,
+    speed_mps: f64,
+    /// True while the difference to the own speed has been noticed, and is watched.
+    watches: bool,
 }
 
 /// The deceleration of the vehicle ahead, as it is felt.
@@ -131,7 +140,7 @@ impl Perception {
     pub(crate) fn new(reaction_s: f64, passing_side: Option<Side>) -> Self {
         Self {
             reaction: Time::from_s(reaction_s),
-            watched: None,
+            belief: None,
             passing_side,
             memory: Vec::with_capacity(GLANCES),
             oldest: 0,
@@ -154,12 +163,10 @@ impl Perception {
             own_speed_then_mps: glance.own_speed_mps,
         };
         let believed_mps2 = self.feel(glance.ahead.as_ref(), input.time);
-        let notices = glance.ahead.is_some_and(|seen| {
-            let watches = self.watched == Some(seen.actor);
-            carry.growth_radps(&seen) >= if watches { WATCHED_THRESHOLD_RADPS } else { LOOMING_THRESHOLD_RADPS }
-        });
-        self.watched = glance.ahead.filter(|_| notices).map(|seen| seen.actor);
-        let mut ahead = glance.ahead.map(|seen| carry.ahead(&seen, notices));
+        let mut ahead = glance.ahead.map(|seen| carry.ahead(&seen, self.believe(&seen, glance.own_speed_mps)));
+        if glance.ahead.is_none() {
+            self.belief = None;
+        }
         if let Some(ahead) = &mut ahead {
             let lead = &mut ahead.lead;
             lead.gap_m += strayed_m(lead.speed_mps, self.felt.acceleration_mps2, carry.elapsed_s);
@@ -167,7 +174,7 @@ impl Perception {
             lead.acceleration_mps2 = believed_mps2;
         }
         let passing = glance.beside.map(|[lead, alongside, follower]| PassingLane {
-            lead: lead.map(|seen| carry.beside(&seen)),
+            lead: lead.map(|seen| carry.ahead(&seen, carry.at_a_glance_mps(&seen))),
             alongside: alongside.is_some(),
             follower: follower.map(|seen| carry.behind(&seen)),
         });
@@ -191,6 +198,20 @@ impl Perception {
             self.oldest = (self.oldest + 1) % GLANCES;
             self.current = self.current.saturating_sub(1);
         }
+    }
+
+    /// The speed of the vehicle ahead as it seems [m/s].
+    fn believe(&mut self, seen: &Seen, own_mps: f64) -> f64 {
+        let known = self.belief.filter(|belief| belief.actor == seen.actor);
+        let Belief { speed_mps, watches, .. } =
+            known.unwrap_or(Belief { actor: seen.actor, speed_mps: own_mps, watches: false });
+        let threshold = if watches { WATCHED_THRESHOLD_RADPS } else { LOOMING_THRESHOLD_RADPS };
+        let watches = seen.growth_radps(own_mps) >= threshold;
+        // What is seen is also noticed where it is not what is expected.
+        let notices = watches || seen.growth_radps(speed_mps) >= LOOMING_THRESHOLD_RADPS;
+        let speed_mps = if notices { seen.speed_mps } else { speed_mps };
+        self.belief = Some(Belief { actor: seen.actor, speed_mps, watches });
+        speed_mps
     }
 
     /// The acceleration of the vehicle ahead as felt, or as its brake light makes one assume.
@@ -260,6 +281,11 @@ impl Seen {
             d_m: own_d_m + neighbour.lateral_offset_m,
         }
     }
+
+    /// How fast its visual angle grows or shrinks for one who drives at `own_mps` [rad/s]; infinite at a gap of zero.
+    fn growth_radps(&self, own_mps: f64) -> f64 {
+        self.width_m * (self.speed_mps - own_mps).abs() / (self.gap_m * self.gap_m)
+    }
 }
 
 /// How much further a vehicle comes in a time than it would at its speed, with an acceleration that ends where it stands [m].
@@ -279,28 +305,19 @@ struct Carry {
 }
 
 impl Carry {
-    /// Growth of the other's visual angle, or its shrinking [rad/s]; infinite at a gap of zero.
-    fn growth_radps(&self, seen: &Seen) -> f64 {
-        seen.width_m * (seen.speed_mps - self.own_speed_then_mps).abs() / (seen.gap_m * seen.gap_m)
-    }
-
-    /// The other's speed as it seemed: its own, or the driver's where no difference was noticed.
-    fn seeming_speed_mps(&self, seen: &Seen, notices: bool) -> f64 {
+    /// The speed of a vehicle beside, at which a look is too short to watch it: its own, or the driver's where no
+    /// difference was noticed [m/s].
+    fn at_a_glance_mps(&self, seen: &Seen) -> f64 {
+        let notices = seen.growth_radps(self.own_speed_then_mps) >= LOOMING_THRESHOLD_RADPS;
         if notices { seen.speed_mps } else { self.own_speed_then_mps }
     }
 
-    fn ahead(&self, seen: &Seen, notices: bool) -> Perceived {
-        let speed_mps = self.seeming_speed_mps(seen, notices);
+    fn ahead(&self, seen: &Seen, speed_mps: f64) -> Perceived {
         self.perceived(seen, speed_mps, seen.gap_m + speed_mps * self.elapsed_s - self.own_travel_m)
     }
 
-    /// A vehicle in the passing lane: a look at it is too short to watch it.
-    fn beside(&self, seen: &Seen) -> Perceived {
-        self.ahead(seen, self.growth_radps(seen) >= LOOMING_THRESHOLD_RADPS)
-    }
-
     fn behind(&self, seen: &Seen) -> Perceived {
-        let speed_mps = self.seeming_speed_mps(seen, self.growth_radps(seen) >= LOOMING_THRESHOLD_RADPS);
+        let speed_mps = self.at_a_glance_mps(seen);
         self.perceived(seen, speed_mps, seen.gap_m + self.own_travel_m - speed_mps * self.elapsed_s)
     }
 
@@ -316,104 +333,4 @@ impl Carry {
 }
 
 #[cfg(test)]
-mod tests {
-    use closecall_traffic::{Indicator, Road, Vehicle, VehicleClass, VehicleState};
-
-    use super::*;
-    use crate::driver::Neighbours;
-
-    const STEP: Time = Time::from_ms(10);
-
-    /// Looks at a leader whose gap, speed and brake light are functions of time, driving at 30 m/s itself.
-    fn look(
-        senses: &mut Perception,
-        time: Time,
-        (gap_m, speed_mps, acceleration_mps2, brake_light): (f64, f64, f64, bool),
-    ) -> Perceived {
-        let road = Road::straight(3);
-        let own = VehicleState { s_m: 30.0 * time.s(), d_m: -5.625, speed_mps: 30.0, ..VehicleState::default() };
-        let lead = Neighbour {
-            actor: 1,
-            gap_m,
-            speed_mps,
-            acceleration_mps2,
-            brake_light,
-            indicator: Indicator::Off,
-            class: VehicleClass::Car,
-            length_m: 4.6,
-            width_m: 1.85,
-            lateral_offset_m: 0.0,
-        };
-        let neighbours = Neighbours {
-            own: LaneNeighbours { lead: Some(lead), ..LaneNeighbours::default() },
-            ..Neighbours::default()
-        };
-        let vehicle = Vehicle::typical(VehicleClass::Car);
-        let input =
-            DriverInput { time, vehicle: &vehicle, own: &own, neighbours: &neighbours, road: &road, changing_to: None };
-        senses.look(&input).ahead.unwrap()
-    }
-
-    #[test]
-    fn a_steady_approach_is_foreseen_exactly() {
-        let mut senses = Perception::new(0.9, None);
-        let mut time = Time::ZERO;
-        for _ in 0..500 {
-            let gap_m = 50.0 - 5.0 * time.s();
-            let seen = look(&mut senses, time, (gap_m, 25.0, 0.0, false));
-            assert!((seen.lead.gap_m - gap_m).abs() < 1e-9 && seen.lead.speed_mps == 25.0, "{seen:?} at {time}");
-            time += STEP;
-        }
-    }
-
-    #[test]
-    fn a_brake_light_comes_one_reaction_later_and_stands_for_an_ordinary_braking() {
-        let mut senses = Perception::new(0.9, None);
-        let mut time = Time::ZERO;
-        let mut first = None;
-        while first.is_none() {
-            let on = time >= Time::from_s(2.0);
-            let seen = look(&mut senses, time, (30.0, 30.0, 0.0, on));
-            if seen.brake_light {
-                assert_eq!(seen.lead.acceleration_mps2, -ASSUMED_BRAKING_MPS2);
-                first = Some(time);
-            }
-            time += STEP;
-        }
-        assert_eq!(first, Some(Time::from_s(2.9)));
-    }
-
-    #[test]
-    fn a_small_speed_difference_far_away_goes_unnoticed() {
-        // 1.85 m · 5 m/s / g² falls below 0.003 rad/s beyond 55.5 m, and below 0.0006 rad/s beyond 124 m.
-        let mut senses = Perception::new(0.0, None);
-        let mut time = Time::ZERO;
-        for (gap_m, seeming_mps) in [(60.0, 30.0), (50.0, 25.0), (60.0, 25.0), (130.0, 30.0), (60.0, 30.0)] {
-            assert_eq!(look(&mut senses, time, (gap_m, 25.0, 0.0, false)).lead.speed_mps, seeming_mps, "{gap_m} m");
-            time += STEP;
-        }
-    }
-
-    #[test]
-    fn a_vehicle_that_stops_is_not_believed_to_roll_backwards() {
-        // From 6 m/s at 6 m/s² it stands after one second and 3 m: 3 m less than at its speed, however long one waits.
-        assert_eq!(strayed_m(6.0, -6.0, 1.0), -3.0);
-        assert_eq!(6.0 * 2.5 + strayed_m(6.0, -6.0, 2.5), 3.0);
-        assert_eq!(strayed_m(0.0, -6.0, 1.0), 0.0);
-        assert_eq!(strayed_m(10.0, 2.0, 1.0), 1.0);
-    }
-
-    #[test]
-    fn memory_has_an_end_and_goes_on() {
-        let mut senses = Perception::new(LONGEST_REACTION_S, None);
-        let mut time = Time::ZERO;
-        for step in 0..2_000_u32 {
-            let seen = look(&mut senses, time, (f64::from(step), 30.0, 0.0, false));
-            let due = step.saturating_sub(300);
-            assert!((seen.lead.gap_m - f64::from(due)).abs() < 1e-6, "{step}: {seen:?}");
-            time += STEP;
-        }
-        assert_eq!(senses.memory.len(), GLANCES);
-        assert_eq!(senses.memory.capacity(), GLANCES);
-    }
-}
+mod tests;
