@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::perception::Perception;
 use super::reaction::{Reaction, ReactionConfig};
-use super::wiedemann99::{Emergency, lift_off_for_light, nearest, usually_desired_mps};
+use super::wiedemann99::{Emergency, brake_for_light, nearest, usually_desired_mps};
 use super::{Driver, DriverAction, DriverError, DriverInput, HARDEST_BRAKING_MPS2, Lead, check_finite, finite};
 
 /// Gap below which the interaction no longer grows [m]: it would diverge.
@@ -106,7 +106,7 @@ impl Driver for IdmDriver {
             let senses = self.perception.get_or_insert_with(|| Perception::new(reaction.draw(rng), None));
             let ahead = senses.look(input).ahead;
             let wanted = self.model.acceleration_mps2(speed_mps, desired_mps, ahead.as_ref().map(|seen| &seen.lead));
-            lift_off_for_light(wanted, speed_mps, ahead.as_ref())
+            brake_for_light(wanted, speed_mps, ahead.as_ref())
         } else {
             self.model.acceleration_mps2(speed_mps, desired_mps, nearest(input).as_ref())
         };

@@ -6,7 +6,7 @@ use super::acceptance::{Intent, Tolerance};
 use super::conflict::Course;
 use super::{Overtaker, path};
 use crate::driver::perception::{Perceived, Perception, View};
-use crate::driver::wiedemann99::{Emergency, lift_off_for_light};
+use crate::driver::wiedemann99::{Emergency, brake_for_light, lift_off_for_light};
 use crate::driver::{
     Driver, DriverAction, DriverError, DriverInput, DriverNote, HARDEST_BRAKING_MPS2, LaneChange, Wiedemann99Model,
     check_finite, finite,
@@ -243,10 +243,7 @@ impl OvertakerDriver {
     fn cruise(&mut self, moment: &Moment<'_>, ahead: Option<&Perceived>) -> DriverAction {
         let lead = ahead.map(|seen| &seen.lead);
         let wanted = self.model.acceleration_mps2(moment.speed_mps, moment.desired_mps, lead);
-        DriverAction {
-            acceleration_mps2: lift_off_for_light(wanted, moment.speed_mps, ahead),
-            ..DriverAction::default()
-        }
+        DriverAction { acceleration_mps2: brake_for_light(wanted, moment.speed_mps, ahead), ..DriverAction::default() }
     }
 
     /// The acceleration that suits the vehicle ahead in the lane that the driver is changing to.

@@ -25,10 +25,8 @@ fn look(
         width_m: 1.85,
         lateral_offset_m: 0.0,
     };
-    let neighbours = Neighbours {
-        own: LaneNeighbours { lead: Some(lead), ..LaneNeighbours::default() },
-        ..Neighbours::default()
-    };
+    let neighbours =
+        Neighbours { own: LaneNeighbours { lead: Some(lead), ..LaneNeighbours::default() }, ..Neighbours::default() };
     let vehicle = Vehicle::typical(VehicleClass::Car);
     let input =
         DriverInput { time, vehicle: &vehicle, own: &own, neighbours: &neighbours, road: &road, changing_to: None };

@@ -15,6 +15,14 @@ const EMERGENCY_SHARE: f64 = 0.75;
 /// Time headway within which a brake light ahead concerns a driver [s].
 const LIGHT_CONCERNS_WITHIN_S: f64 = 3.0;
 
+/// Time headway within which a driver brakes for a brake light ahead instead of waiting for what comes of it [s]: up to
+/// about that the headways of car-following are observed (Fancher et al., *Intelligent Cruise Control Field Operational
+/// Test*, DOT HS 808 849, 1998).
+const LIGHT_IS_FOLLOWED_WITHIN_S: f64 = 2.0;
+
+/// From this speed difference on the vehicle ahead pulls away, whatever its brake light shows [m/s].
+const PULLS_AWAY_MPS: f64 = 2.0;
+
 /// A human who follows by Wiedemann 99 and stays in its lane.
 #[derive(Clone, Debug)]
 pub struct Wiedemann99Driver {
@@ -51,7 +59,7 @@ impl Driver for Wiedemann99Driver {
         let mut acceleration_mps2 = if self.settings.reaction.is_some() {
             let ahead = self.lead(input, rng);
             let wanted = self.model.acceleration_mps2(speed_mps, desired_mps, ahead.as_ref().map(|seen| &seen.lead));
-            lift_off_for_light(wanted, speed_mps, ahead.as_ref())
+            brake_for_light(wanted, speed_mps, ahead.as_ref())
         } else {
             let lead = nearest(input);
             self.model.acceleration_mps2(speed_mps, desired_mps, lead.as_ref())
@@ -84,11 +92,24 @@ pub(crate) fn lift_off_for_light(wanted_mps2: f64, speed_mps: f64, ahead: Option
         Some(seen)
             if seen.brake_light
                 && seen.lead.gap_m < LIGHT_CONCERNS_WITHIN_S * speed_mps
-                && seen.lead.speed_mps <= speed_mps =>
+                && seen.lead.speed_mps < speed_mps + PULLS_AWAY_MPS =>
         {
             wanted_mps2.min(-LIFT_OFF_MPS2)
         }
         _ => wanted_mps2,
+    }
+}
+
+/// The same for one who follows: where the vehicle ahead is so near that it is followed, one brakes like it at once, and
+/// works out afterwards what is needed.
+pub(crate) fn brake_for_light(wanted_mps2: f64, speed_mps: f64, ahead: Option<&Perceived>) -> f64 {
+    let lifted_mps2 = lift_off_for_light(wanted_mps2, speed_mps, ahead);
+    match ahead {
+        Some(seen) if lifted_mps2 <= -LIFT_OFF_MPS2 && seen.brake_light => {
+            let follows = seen.lead.gap_m < LIGHT_IS_FOLLOWED_WITHIN_S * speed_mps;
+            if follows { lifted_mps2.min(seen.lead.acceleration_mps2) } else { lifted_mps2 }
+        }
+        _ => lifted_mps2,
     }
 }
 

@@ -12,6 +12,6 @@ mod thresholds;
 pub(crate) use config::Parameters99;
 pub use config::{Wiedemann99, Wiedemann99Config};
 pub use driver::Wiedemann99Driver;
-pub(crate) use driver::{Emergency, lift_off_for_light, nearest, usually_desired_mps};
+pub(crate) use driver::{Emergency, brake_for_light, lift_off_for_light, nearest, usually_desired_mps};
 pub use model::Wiedemann99Model;
 pub use thresholds::{Regime, Thresholds};
