@@ -9,12 +9,14 @@
 //! Rates are conditional on the sampled scenario: they say how often a *sampled encounter* ends in a collision, not
 //! how often that happens on a road.
 
+pub mod compare;
 pub mod execution;
 pub mod folder;
 pub mod journal;
 pub mod ledger;
 pub mod lock;
 pub mod manifest;
+pub mod merge;
 pub mod partition;
 pub mod record;
 pub mod runner;

@@ -45,7 +45,7 @@ impl Partition {
 
 /// The mixing function of SplitMix64: G. L. Steele et al., *Fast splittable pseudorandom number generators*, OOPSLA
 /// 2014, as S. Vigna's reference implementation has it. Neighbouring numbers get unrelated hashes.
-const fn split_mix(number: u64) -> u64 {
+pub(crate) const fn split_mix(number: u64) -> u64 {
     let z = number.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);

@@ -180,7 +180,7 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
     }
     let judged = summary.judge(args.gates.gates());
     match args.format {
-        Format::Json => outln!("{:#}", json::campaign(&summary, &judged, wall_s)),
+        Format::Json => outln!("{:#}", json::campaign(&summary, &judged, Some(wall_s))),
         Format::Human => {
             print_counts(&summary);
             let (simulated_s, jobs) = (summary.total().simulated_s, campaign.workers.jobs);

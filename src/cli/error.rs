@@ -5,8 +5,10 @@ use closecall_sensors::camera::ClassifierError;
 use closecall_sensors::camera::dataset::DatasetError;
 use miette::Diagnostic;
 
+use crate::campaign::compare::CompareError;
 use crate::campaign::execution::CampaignError;
 use crate::campaign::folder::FolderError;
+use crate::campaign::merge::MergeError;
 use crate::exit_code::ExitCode;
 use crate::report::WriteError;
 use crate::report::rerun::RecordError;
@@ -58,6 +60,12 @@ pub enum CliError {
     /// A campaign could not be carried on.
     #[error(transparent)]
     Campaign(#[from] CampaignError),
+    /// Parts do not make a campaign.
+    #[error(transparent)]
+    Merge(#[from] MergeError),
+    /// Two campaigns cannot be compared.
+    #[error(transparent)]
+    Compare(#[from] CompareError),
 }
 
 impl From<&CliError> for ExitCode {
@@ -67,9 +75,19 @@ impl From<&CliError> for ExitCode {
             CliError::Recording(error) if error.is_io() => Self::Io,
             CliError::Recording(_) | CliError::Classifier(_) => Self::InvalidInput,
             CliError::Folder(error) => Self::from(error),
-            CliError::Campaign(error) => match error {
-                CampaignError::Folder(error) => Self::from(error),
-                CampaignError::Write(_) | CampaignError::Workers(_) => Self::Io,
+            CliError::Campaign(error) => Self::from(error),
+            CliError::Merge(error) => match error {
+                MergeError::Campaign(error) => Self::from(error),
+                MergeError::OutOfPlace { .. } => Self::InvalidInput,
+                MergeError::NotAPart { .. }
+                | MergeError::Foreign { .. }
+                | MergeError::Twice { .. }
+                | MergeError::Missing { .. }
+                | MergeError::Incomplete { .. } => Self::Usage,
+            },
+            CliError::Compare(error) => match error {
+                CompareError::Folder(error) => Self::from(error),
+                CompareError::Different { .. } | CompareError::OtherSample { .. } => Self::Usage,
             },
             CliError::Write(_) | CliError::Record(_) | CliError::WriteRecording(_) | CliError::Dataset(_) => Self::Io,
             CliError::Sample { .. } => Self::SampleError,
@@ -86,6 +104,15 @@ impl From<&FolderError> for ExitCode {
                 Self::Usage
             }
             FolderError::Content { .. } => Self::InvalidInput,
+        }
+    }
+}
+
+impl From<&CampaignError> for ExitCode {
+    fn from(error: &CampaignError) -> Self {
+        match error {
+            CampaignError::Folder(error) => Self::from(error),
+            CampaignError::Write(_) | CampaignError::Workers(_) => Self::Io,
         }
     }
 }

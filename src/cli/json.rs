@@ -90,7 +90,7 @@ fn mis(mis: &Result<MisSummary, Absent>) -> Value {
 }
 
 /// The object of `campaign --format json`.
-pub(super) fn campaign(summary: &Summary, judged: &Judgement, wall_s: f64) -> Value {
+pub(super) fn campaign(summary: &Summary, judged: &Judgement, wall_s: Option<f64>) -> Value {
     let total = summary.total();
     let mut object = counts(summary, &total);
     object.insert("verdict".to_owned(), json!(judged.verdict));

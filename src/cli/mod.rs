@@ -3,11 +3,14 @@
 mod args;
 mod campaign;
 mod check;
+mod compare;
 mod error;
 mod gates;
 mod json;
 mod leave;
+mod merge;
 mod output;
+mod past;
 mod record;
 mod recording;
 mod render;
@@ -59,6 +62,10 @@ enum Command {
     Run(run::RunArgs),
     /// Run many samples of scenarios, and judge them
     Campaign(campaign::CampaignArgs),
+    /// Put the parts of a campaign together, and judge it
+    Merge(merge::MergeArgs),
+    /// Compare a campaign with an earlier one, sample by sample
+    Compare(compare::CompareArgs),
     /// Run one sample of a campaign again, bit for bit
     Replay(replay::ReplayArgs),
     /// Check scenario files without running them
@@ -117,6 +124,8 @@ fn dispatch(command: Command) -> Result<ExitCode, CliError> {
     match command {
         Command::Run(args) => run::run(&args),
         Command::Campaign(args) => campaign::campaign(&args),
+        Command::Merge(args) => merge::merge(&args),
+        Command::Compare(args) => compare::compare(&args),
         Command::Replay(args) => replay::replay(&args),
         Command::Check(args) => check::check(&args),
         Command::Schema => check::schema(),

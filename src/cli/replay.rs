@@ -5,16 +5,16 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::CliError;
-use super::args::{Format, Sensing, arm};
+use super::args::Format;
 use super::output::complain;
+use super::past::{arms, scenario_file};
 use super::run::{WatchArgs, print, run_watched};
-use crate::campaign::folder::{Folder, FolderError};
+use crate::campaign::folder::Folder;
 use crate::campaign::manifest::{Manifest, ManifestScenario};
 use crate::campaign::runner::concrete;
 use crate::controller::BuiltIn;
 use crate::exit_code::ExitCode;
 use crate::outcome::Outcome;
-use crate::scenario::ScenarioFile;
 use crate::simulation::{Arm, RunKey};
 
 /// Arguments of `closecall replay`.
@@ -40,7 +40,7 @@ pub(super) struct ReplayArgs {
 pub(super) fn replay(args: &ReplayArgs) -> Result<ExitCode, CliError> {
     let folder = Folder::open(&args.dir);
     let manifest = folder.manifest()?;
-    let file = scenario_file(&folder, choose(&manifest, args.scenario.as_deref())?)?;
+    let file = scenario_file(folder.path(), choose(&manifest, args.scenario.as_deref())?)?;
     let samples = file.space().samples(manifest.sampling.design, manifest.sampling.samples);
     if args.sample >= samples {
         let message = format!("there is no sample {}: the campaign has samples 0 to {}", args.sample, samples - 1);
@@ -98,23 +98,13 @@ pub(super) fn record_sample(
     sample: u64,
     path: &Path,
 ) -> Result<(), CliError> {
-    let file = scenario_file(folder, choose(manifest, Some(scenario))?)?;
+    let file = scenario_file(folder.path(), choose(manifest, Some(scenario))?)?;
     let fail = |source| CliError::Sample { sample, source };
     let concrete = concrete(&file, manifest.sampling, sample).map_err(fail)?;
     let key = RunKey { seed: manifest.sampling.seed, sample };
     let watch = WatchArgs { record: Some(path.to_owned()), trace: None };
     run_watched(&concrete, key, &chosen_arm(manifest, None)?, &watch)?;
     Ok(())
-}
-
-/// The scenario as the campaign ran it.
-fn scenario_file(folder: &Folder, scenario: &ManifestScenario) -> Result<ScenarioFile, CliError> {
-    let path = folder.file(&format!("manifest.json#{}", scenario.name));
-    if blake3::hash(scenario.text.as_bytes()).to_string() != scenario.blake3 {
-        let message = format!("the text of `{}` has been changed since the campaign was run", scenario.name);
-        return Err(FolderError::Content { path: folder.file("manifest.json"), line: 1, message }.into());
-    }
-    Ok(ScenarioFile::parse(&path, &scenario.text, &[])?)
 }
 
 /// An arm of the campaign: the named one, or the one under test.
@@ -126,7 +116,6 @@ fn chosen_arm(manifest: &Manifest, controller: Option<BuiltIn>) -> Result<Arm, C
         let message = format!("the campaign was not run with `{}`, only with {known}", controller.name());
         return Err(CliError::Usage { message });
     }
-    let unknown = |name: &str| CliError::Usage { message: format!("the campaign's sensors `{name}` are not known") };
-    let sensing = |name: &String| Sensing::from_name(name).ok_or_else(|| unknown(name));
-    Ok(arm(controller, manifest.sensors.as_ref().map(sensing).transpose()?))
+    let place = manifest.arms.iter().position(|arm| *arm == controller).unwrap_or_default();
+    Ok(arms(manifest)?.swap_remove(place))
 }

@@ -23,9 +23,12 @@ pub struct ScenarioConfig {
     /// What the scenario asks, for people.
     #[serde(default)]
     pub description: String,
-    /// Words to select and group scenarios by, such as requirement numbers.
+    /// Words to select and group scenarios by.
     #[serde(default)]
     pub tags: Vec<String>,
+    /// The requirements that the scenario is evidence for, such as `MIS-1`: reports say which of them are met.
+    #[serde(default)]
+    pub requirements: Vec<String>,
     /// Longest duration of a run [s].
     pub duration_s: Num,
     /// The road.

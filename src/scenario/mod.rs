@@ -103,10 +103,29 @@ impl ScenarioConfig {
             let allowed = "lower-case letters, digits and hyphens, starting with a letter".to_owned();
             return Err(ConfigError::new("name", Problem::UnknownWord { value: self.name.clone(), allowed }));
         }
+        self.check_requirements()?;
         for (index, actor) in self.actors.iter().enumerate() {
             if self.actors[..index].iter().any(|earlier| earlier.id == actor.id) {
                 let problem = Problem::Duplicate { value: actor.id.to_string() };
                 return Err(ConfigError::new("id", problem).within_index(index).within("actor"));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_requirements(&self) -> Result<(), ConfigError> {
+        let is_mark = |mark: &str| {
+            let is_part_of_one = |c: char| c.is_ascii_alphanumeric() || "-._".contains(c);
+            mark.starts_with(|c: char| c.is_ascii_alphanumeric()) && mark.chars().all(is_part_of_one)
+        };
+        for (index, mark) in self.requirements.iter().enumerate() {
+            let at = |problem| Err(ConfigError::new("requirements", problem).within_index(index));
+            if !is_mark(mark) {
+                let allowed = "letters, digits, `-`, `.` and `_`, starting with a letter or digit".to_owned();
+                return at(Problem::UnknownWord { value: mark.clone(), allowed });
+            }
+            if self.requirements[..index].contains(mark) {
+                return at(Problem::Duplicate { value: mark.clone() });
             }
         }
         Ok(())

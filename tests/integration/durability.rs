@@ -164,3 +164,78 @@ fn a_full_disk_is_an_i_o_error_and_loses_nothing() {
         assert!(bytes(&whole, file) == bytes(&out, file), "{file} differs");
     }
 }
+
+fn partition(folder: &Path, part: &str, more: &[&str]) -> std::path::PathBuf {
+    let out = folder.join(format!("part-{}", part.replace('/', "-of-")));
+    let more: Vec<&str> = ["--partition", part].iter().chain(more).copied().collect();
+    stdout(&closecall(args(&out, &more)), 0);
+    out
+}
+
+fn merge(parts: &[&Path], out: &Path) -> std::process::Output {
+    let mut args: Vec<&str> = vec!["merge"];
+    args.extend(parts.iter().map(|part| part.to_str().unwrap()));
+    args.extend(["--out", out.to_str().unwrap(), "--recordings", "1"]);
+    closecall(args)
+}
+
+#[test]
+fn parts_that_are_merged_are_the_campaign_of_one_machine() {
+    let folder = folder();
+    for design in ["random", "sobol", "grid"] {
+        let place = folder.path().join(design);
+        let whole = place.join("whole");
+        stdout(&closecall(args(&whole, &["--design", design])), 0);
+        let parts = ["1/3", "2/3", "3/3"].map(|part| partition(&place, part, &["--design", design]));
+        let out = place.join("merged");
+        // Their order does not matter.
+        stdout(&merge(&[&parts[2], &parts[0], &parts[1]], &out), 0);
+        for file in REPORTS {
+            assert!(bytes(&whole, file) == bytes(&out, file), "{design}: {file} differs");
+        }
+    }
+}
+
+#[test]
+fn parts_that_make_no_campaign_are_refused_by_name() {
+    let folder = folder();
+    let [one, two, three] = ["1/3", "2/3", "3/3"].map(|part| partition(folder.path(), part, &[]));
+    let other_seed = folder.path().join("other-seed");
+    let mut of_other_seed = args(&other_seed, &["--partition", "3/3"]);
+    let seed = of_other_seed.iter().position(|arg| arg == "--seed").unwrap() + 1;
+    of_other_seed[seed] = "12".to_owned();
+    stdout(&closecall(of_other_seed), 0);
+    let whole = undisturbed(folder.path());
+    let halves = partition(&folder.path().join("halves"), "2/2", &[]);
+    let out = folder.path().join("out");
+    let cases: [(&[&Path], &str); 6] = [
+        (&[&one, &three], "2/3"),
+        (&[&one], "2/3, 3/3"),
+        (&[&one, &two, &two], "both hold part 2/3"),
+        (&[&one, &two, &other_seed], "sampling.seed: 11 there, 12 here"),
+        (&[&one, &two, &whole], "holds a whole campaign"),
+        (&[&one, &halves], "partition: 1/3 there, 2/2 here"),
+    ];
+    for (parts, named) in cases {
+        let refused = merge(parts, &out);
+        assert_eq!(code(&refused), 2, "{named}: {}", stderr(&refused));
+        assert!(stderr(&refused).contains(named), "{named}: {}", stderr(&refused));
+        assert!(!out.exists(), "{named}");
+    }
+    // A part that was killed before its end.
+    let journal = two.join("journal.jsonl");
+    let text = fs::read(&journal).unwrap();
+    fs::write(&journal, &text[..text.len() - 10]).unwrap();
+    let refused = merge(&[&one, &two, &three], &out);
+    assert_eq!(code(&refused), 2);
+    assert!(stderr(&refused).contains("part-2-of-3") && stderr(&refused).contains("--resume"), "{}", stderr(&refused));
+    let resumed = args(&two, &["--partition", "2/3", "--resume"]);
+    stdout(&closecall(resumed), 0);
+    stdout(&merge(&[&one, &two, &three], &out), 0);
+    assert!(bytes(&whole, "outcomes.parquet") == bytes(&out, "outcomes.parquet"));
+    // The merged folder is a campaign like any other.
+    let replayed = closecall(["replay", out.to_str().unwrap(), "5"]);
+    stdout(&replayed, 0);
+    let again = merge(&[&one, &two, &three], &out);
+    assert_eq!(code(&again), 2, "nothing is overwritten");
+}

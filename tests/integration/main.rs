@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+mod comparison;
 mod determinism;
 mod durability;
 mod exit_codes;

@@ -1,0 +1,52 @@
+//! `closecall merge`: the parts of a campaign put together and judged.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::args::Format;
+use super::gates::GateArgs;
+use super::output::outln;
+use super::summary::{print_counts, print_verdict};
+use super::{CliError, json, leave, past};
+use crate::campaign::merge::Parts;
+use crate::exit_code::ExitCode;
+
+/// Arguments of `closecall merge`.
+#[derive(Debug, Args)]
+pub(super) struct MergeArgs {
+    /// Folders of all parts of one campaign, each made with `campaign --partition I/N`
+    #[arg(required = true, value_name = "DIR")]
+    parts: Vec<PathBuf>,
+    /// New folder for the whole campaign
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Record this many failing samples as Rerun files
+    #[arg(long, default_value_t = 3, value_name = "N")]
+    recordings: u64,
+    #[command(flatten)]
+    gates: GateArgs,
+    /// Output for people or for programs
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
+    let parts = Parts::open(&args.parts)?;
+    let works = past::works(&args.parts[0], parts.manifest())?;
+    let samples: Vec<(String, u64)> =
+        works.iter().map(|work| (work.file.config().name.clone(), work.count())).collect();
+    parts.check(&samples)?;
+    let held = parts.merge(&samples, &args.out, std::env::args().collect())?;
+    let summary = past::summary(&held.folder, &works)?;
+    let judged = summary.judge(args.gates.gates());
+    leave::reports(&held.folder, &works, args.recordings)?;
+    match args.format {
+        Format::Json => outln!("{:#}", json::campaign(&summary, &judged, None)),
+        Format::Human => {
+            print_counts(&summary);
+            print_verdict(&judged);
+        }
+    }
+    Ok(judged.exit_code)
+}

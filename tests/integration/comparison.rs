@@ -1,0 +1,81 @@
+//! A campaign against an earlier one.
+
+use std::path::{Path, PathBuf};
+
+use closecall::campaign::folder::Folder;
+use serde_json::Value;
+
+use crate::support::{closecall, code, folder, json, library, stderr, stdout};
+
+fn campaign(out: PathBuf, more: &[&str]) -> PathBuf {
+    let scenario = library("low-thw-overtake");
+    let args = ["campaign", scenario.to_str().unwrap(), "--seed", "1", "--recordings", "0"];
+    stdout(&closecall(args.iter().chain(&["--out", out.to_str().unwrap()]).chain(more)), 0);
+    out
+}
+
+fn compare(one: &Path, other: &Path, more: &[&str]) -> std::process::Output {
+    let folders = ["compare", one.to_str().unwrap(), other.to_str().unwrap()];
+    closecall(folders.iter().chain(more))
+}
+
+/// The samples in which E collided, by the journal.
+fn failing(folder: &Path) -> Vec<u64> {
+    let ego = closecall_traffic::ActorId::new("ego").unwrap();
+    let records = Folder::open(folder).records().unwrap().map(Result::unwrap);
+    let collided = |record: &closecall::campaign::record::Record| {
+        record.arms.last().unwrap().result.as_ref().unwrap().ego_collided(&ego)
+    };
+    records.filter(collided).map(|record| record.sample).collect()
+}
+
+#[test]
+fn a_regression_is_found_and_named_and_a_fix_is_none() {
+    let folder = folder();
+    let with = campaign(folder.path().join("mis"), &["-n", "80"]);
+    let without = campaign(folder.path().join("acc"), &["-n", "80", "--controller", "acc"]);
+    let (good, bad) = (failing(&with), failing(&without));
+    let newly: Vec<u64> = bad.iter().copied().filter(|sample| !good.contains(sample)).collect();
+    let fixed: Vec<u64> = good.iter().copied().filter(|sample| !bad.contains(sample)).collect();
+    assert!(newly.len() > 5, "{newly:?}");
+    let found = &json(&compare(&with, &without, &["--format", "json"]), 1)["scenarios"]["low-thw-overtake"];
+    let list =
+        |value: &Value| value.as_array().unwrap().iter().map(|value| value.as_u64().unwrap()).collect::<Vec<_>>();
+    assert_eq!((list(&found["newly_failing"]), list(&found["fixed"])), (newly.clone(), fixed.clone()));
+    assert_eq!(found["samples"], 80);
+    // The margin that the system adds is lost.
+    let margin = &found["margins"]["min_thw_front_s"];
+    assert!(margin["worst_change"].as_f64().unwrap() < 0.0);
+    let text = stdout(&compare(&with, &without, &[]), 1);
+    assert!(text.contains("REGRESSION") && text.contains("arms"), "{text}");
+    assert!(text.contains(&format!("{} newly failing: {}", newly.len(), newly[0])), "{text}");
+    let allowed = newly.len().to_string();
+    stdout(&compare(&with, &without, &["--max-newly-failing", &allowed]), 0);
+    // The other way round, what is newly failing is what was fixed.
+    let back = json(&compare(&without, &with, &["--format", "json"]), i32::from(!fixed.is_empty()));
+    assert_eq!(list(&back["scenarios"]["low-thw-overtake"]["newly_failing"]), fixed);
+}
+
+#[test]
+fn a_campaign_is_no_regression_against_itself() {
+    let folder = folder();
+    let one = campaign(folder.path().join("one"), &["-n", "30"]);
+    let found = json(&compare(&one, &one, &["--format", "json"]), 0);
+    let scenario = &found["scenarios"]["low-thw-overtake"];
+    assert_eq!((&scenario["same"], &scenario["samples"]), (&Value::from(30), &Value::from(30)));
+    assert_eq!(found["differences"].as_array().map(Vec::len), Some(0));
+}
+
+#[test]
+fn campaigns_of_other_samples_are_not_compared() {
+    let folder = folder();
+    let one = campaign(folder.path().join("one"), &["-n", "12"]);
+    let longer = campaign(folder.path().join("longer"), &["-n", "13"]);
+    let other = campaign(folder.path().join("other"), &["-n", "12", "--set", "brake-mps2=6"]);
+    for (dir, named) in [(&longer, "only the second has sample 12"), (&other, "brake-mps2")] {
+        let refused = compare(&one, dir, &[]);
+        assert_eq!(code(&refused), 2);
+        assert!(stderr(&refused).contains(named), "{}", stderr(&refused));
+    }
+    assert_eq!(code(&compare(&one, &folder.path().join("nothing"), &[])), 6);
+}
