@@ -88,6 +88,13 @@ impl SetArgs {
     /// Reads a scenario with these changes, and checks it.
     pub(super) fn load(&self, path: &Path) -> Result<ScenarioFile, ScenarioError> {
         let file = ScenarioFile::load(path, &self.settings)?;
+        for name in file.unused_parameters() {
+            super::output::complain(format_args!(
+                "warning: {}: the parameter `{name}` is sampled but used nowhere: write \"${name}\" where its value \
+                 belongs, or remove it\n",
+                path.display()
+            ));
+        }
         file.check()?;
         Ok(file)
     }

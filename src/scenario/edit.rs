@@ -26,6 +26,14 @@ pub enum SettingError {
         /// The text found.
         text: String,
     },
+    /// A number that is none.
+    #[error("`{key}={value}`: a finite number is needed")]
+    NotFinite {
+        /// The key.
+        key: String,
+        /// The value found.
+        value: String,
+    },
     /// The key leads nowhere.
     #[error("`{key}` leads nowhere: there is no {part}, only {known}")]
     NoSuchKey {
@@ -46,7 +54,13 @@ impl FromStr for Setting {
         let (key, value) = text.split_once('=').ok_or_else(form)?;
         let key: Vec<String> = key.trim().split('.').map(|part| part.trim().to_owned()).collect();
         let value = value.trim().to_owned();
-        if key.iter().any(String::is_empty) || value.is_empty() { Err(form()) } else { Ok(Self { key, value }) }
+        if key.iter().any(String::is_empty) || value.is_empty() {
+            return Err(form());
+        }
+        if value.parse().is_ok_and(|number: f64| !number.is_finite()) {
+            return Err(SettingError::NotFinite { key: key.join("."), value });
+        }
+        Ok(Self { key, value })
     }
 }
 
@@ -162,7 +176,7 @@ mod tests {
     #[test]
     fn what_leads_nowhere_is_refused() {
         let lost = ["actor.front.id=1", "actor.7.id=1", "actor=3", "road.lanes=2", "duration-s.x=1", "brake=3"];
-        for text in ["nonsense", "=1", "a="].into_iter().chain(lost) {
+        for text in ["nonsense", "=1", "a=", "duration-s=nan", "duration-s=-inf"].into_iter().chain(lost) {
             assert!(set(text).is_err(), "{text}");
         }
     }

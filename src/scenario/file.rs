@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use closecall_scenarios::parameters::ParameterSpace;
 use closecall_scenarios::sampling::Design;
-use closecall_traffic::{ActorId, Check, ConfigError, Parameters};
+use closecall_traffic::{ActorId, Check, ConfigError, ParameterName, Parameters};
 use toml_edit::DocumentMut;
 
 use super::edit::{Setting, SettingError};
@@ -77,6 +77,7 @@ pub struct ScenarioFile {
     text: String,
     config: ScenarioConfig,
     space: ParameterSpace,
+    unused: Vec<ParameterName>,
 }
 
 impl ScenarioFile {
@@ -103,6 +104,8 @@ impl ScenarioFile {
         }
         // The text as it stands is read first, so that errors in the file have the file's own lines.
         let mut config = deserialize(path, text)?;
+        // A setting may replace the only use of a parameter: only what the file itself leaves unused is a slip.
+        let unused = unused(&config, text);
         let mut text = text.to_owned();
         if !settings.is_empty() {
             text = apply(path, &text, settings)?;
@@ -113,7 +116,7 @@ impl ScenarioFile {
             let line = locate::line_of(&text, &source.path);
             ScenarioError::Value { path: path.to_owned(), line, source: Box::new(source), at: String::new() }
         })?;
-        Ok(Self { path: path.to_owned(), text, config, space })
+        Ok(Self { path: path.to_owned(), text, config, space, unused })
     }
 
     /// The file's path, as given.
@@ -134,6 +137,11 @@ impl ScenarioFile {
     /// The distributions of its parameters.
     pub fn space(&self) -> &ParameterSpace {
         &self.space
+    }
+
+    /// Parameters that are sampled although no value of the file names them: most likely a slip.
+    pub fn unused_parameters(&self) -> &[ParameterName] {
+        &self.unused
     }
 
     /// The name of E, or nothing where no actor has an ego stack.
@@ -191,8 +199,47 @@ fn deserialize(path: &Path, text: &str) -> Result<ScenarioConfig, ScenarioError>
         let offset = error.span().map_or(0, |span| span.start);
         let line = locate::line_at(text, offset);
         let named = key_at(text, offset).map(|key| format!("`{key}`: ")).unwrap_or_default();
-        ScenarioError::Syntax { path: path.to_owned(), line, message: format!("{named}{}", error.message()) }
+        let message = format!("{named}{}", in_plain_words(error.message()));
+        ScenarioError::Syntax { path: path.to_owned(), line, message }
     })
+}
+
+/// The parameters that are sampled although no value names them.
+fn unused(config: &ScenarioConfig, text: &str) -> Vec<ParameterName> {
+    let Ok(document) = toml::from_str::<toml::Table>(text) else { return Vec::new() };
+    let mut used = Vec::new();
+    for (_, value) in document.iter().filter(|(key, _)| *key != "parameters") {
+        append_names(value, &mut used);
+    }
+    config.parameters.0.keys().filter(|name| !used.contains(&name.as_str())).cloned().collect()
+}
+
+/// Appends the names of the parameters that stand for values somewhere in `value`.
+fn append_names<'a>(value: &'a toml::Value, names: &mut Vec<&'a str>) {
+    match value {
+        toml::Value::String(text) => names.extend(text.strip_prefix('$')),
+        toml::Value::Array(values) => values.iter().for_each(|value| append_names(value, names)),
+        toml::Value::Table(table) => table.iter().for_each(|(_, value)| append_names(value, names)),
+        _ => {}
+    }
+}
+
+/// The deserialiser's message without the names of this program's types.
+fn in_plain_words(message: &str) -> String {
+    const WORDS: [(&str, &str); 5] = [
+        ("u8", "a whole number from 0 to 255"),
+        ("u32", "a whole number, 0 or more"),
+        ("u64", "a whole number, 0 or more"),
+        ("f64", "a number"),
+        ("a sequence", "a list"),
+    ];
+    let Some((found, expected)) = message.split_once("expected ") else { return message.to_owned() };
+    let plain = WORDS.iter().find(|(rust, _)| expected.trim_end() == *rust).map(|(_, plain)| *plain);
+    match plain {
+        Some(plain) => format!("{found}expected {plain}"),
+        None if expected.starts_with("struct ") => format!("{found}expected a table of keys"),
+        None => message.to_owned(),
+    }
 }
 
 /// The key that a byte offset lies in or behind, on its line, for messages that have only a position.

@@ -110,6 +110,22 @@ impl ScenarioConfig {
                 return Err(ConfigError::new("id", problem).within_index(index).within("actor"));
             }
         }
+        self.check_event_names()
+    }
+
+    /// Events are told apart by their names in logs and reports, whichever actor they belong to.
+    fn check_event_names(&self) -> Result<(), ConfigError> {
+        let mut names = Vec::new();
+        for (index, actor) in self.actors.iter().enumerate() {
+            for (place, event) in actor.events.iter().enumerate() {
+                if names.contains(&&event.id) {
+                    let problem = Problem::Duplicate { value: event.id.to_string() };
+                    let error = ConfigError::new("id", problem).within_index(place).within("event");
+                    return Err(error.within_index(index).within("actor"));
+                }
+                names.push(&event.id);
+            }
+        }
         Ok(())
     }
 

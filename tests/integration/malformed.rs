@@ -47,6 +47,8 @@ fn cases() -> Vec<(&'static str, Vec<u8>, &'static [&'static str])> {
         ("min above max", text("min = 4.0, max = 8.0", "min = 9.0, max = 8.0"), &["brake-mps2.uniform.max", "above 9"]),
         ("unknown actor", text("from = \"rear\"", "from = \"raer\""), &["raer", "rear"]),
         ("two of a name", text("id = \"front\"", "id = \"ego\""), &["ego", "twice"]),
+        ("negative count", text("lanes = 3", "lanes = -1"), &["lanes", "whole number"]),
+        ("number for a table", text("[sensors]", "[sensors]\nrear-lidar = 3\n[unused]"), &["table"]),
         ("lane beyond the road", text("lane = 2", "lane = 4"), &["lane", "4"]),
         ("no lanes", text("lanes = 3", "lanes = 0"), &["lanes", "0"]),
         ("another schema", text("schema-version = 1", "schema-version = 2"), &["schema-version", "2"]),
@@ -88,4 +90,16 @@ fn a_scenario_that_is_not_there_is_named() {
     let output = closecall(["check", "nowhere.toml"]);
     assert_eq!(code(&output), 6);
     assert!(stderr(&output).contains("nowhere.toml"));
+}
+
+#[test]
+fn a_parameter_that_nothing_uses_is_pointed_out() {
+    let folder = folder();
+    let path = folder.path().join("scenario.toml");
+    fs::write(&path, headline_with("deceleration-mps2 = \"$brake-mps2\"", "deceleration-mps2 = 6.0")).unwrap();
+    for command in ["check", "run"] {
+        let output = closecall([command, path.to_str().unwrap()]);
+        assert_eq!(code(&output), 0);
+        assert!(stderr(&output).contains("brake-mps2"), "{command}: {}", stderr(&output));
+    }
 }
