@@ -1,50 +1,17 @@
-//! The controllers that ship, by the names that the command line knows.
+//! Who controls E: the controllers that ship, and processes that speak a protocol of lines.
+//!
+//! | `--controller` | who |
+//! |---|---|
+//! | `acc` | the scenario's ego stack without its margin increase system |
+//! | `mis` | the scenario's whole ego stack |
+//! | `exec:COMMAND` | a process of your own, started afresh for each sample ([`exec`]) |
+//!
+//! A controller in Rust implements [`EgoController`](closecall_controllers::EgoController) and is handed to a campaign
+//! by a [`ControllerFactory`](crate::simulation::ControllerFactory): `examples/own_controller.rs` is one in one file.
 
-use std::sync::Arc;
+mod built_in;
+mod choice;
+pub mod exec;
 
-use closecall_controllers::{EgoController, EgoSettings, EgoStack};
-use serde::{Deserialize, Serialize};
-
-use crate::simulation::ControllerFactory;
-
-/// A controller that ships.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, clap::ValueEnum)]
-#[serde(rename_all = "kebab-case")]
-pub enum BuiltIn {
-    /// The scenario's ego stack without its margin increase system: adaptive cruise control and emergency braking.
-    Acc,
-    /// The scenario's whole ego stack.
-    Mis,
-}
-
-impl BuiltIn {
-    /// The name on the command line and in every report.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Acc => "acc",
-            Self::Mis => "mis",
-        }
-    }
-
-    /// The factory of this controller.
-    pub fn factory(self) -> Arc<dyn ControllerFactory> {
-        Arc::new(self)
-    }
-}
-
-impl ControllerFactory for BuiltIn {
-    fn name(&self) -> &str {
-        (*self).name()
-    }
-
-    fn has_mis(&self, settings: &EgoSettings) -> bool {
-        *self == Self::Mis && settings.mis().is_some()
-    }
-
-    fn build(&self, settings: &EgoSettings) -> Box<dyn EgoController> {
-        match self {
-            Self::Acc => Box::new(EgoStack::new(settings.without_mis())),
-            Self::Mis => Box::new(EgoStack::new(*settings)),
-        }
-    }
-}
+pub use built_in::BuiltIn;
+pub use choice::ControllerChoice;

@@ -5,7 +5,7 @@ use serde_json::Value;
 
 use super::partition::Partition;
 use super::runner::Sampling;
-use crate::controller::BuiltIn;
+use crate::controller::ControllerChoice;
 
 /// The layout of a campaign's folder.
 pub const MANIFEST_VERSION: u32 = 2;
@@ -48,7 +48,7 @@ pub struct Manifest {
     /// Which part of the samples this folder is for; all of them where absent.
     pub partition: Option<Partition>,
     /// The controllers, the baseline first where the campaign is paired.
-    pub arms: Vec<BuiltIn>,
+    pub arms: Vec<ControllerChoice>,
     /// The sensors, where the command line named them.
     pub sensors: Option<String>,
     /// The networks that the sensors use.
@@ -142,7 +142,7 @@ mod tests {
             }],
             sampling: Sampling { seed: 1, design: Design::Random, samples: 10 },
             partition: None,
-            arms: vec![BuiltIn::Mis],
+            arms: vec![ControllerChoice::Mis],
             sensors: None,
             models: Vec::new(),
             sample_timeout_s: 300.0,
@@ -164,7 +164,7 @@ mod tests {
         other.closecall_version = "0.1.0+01".to_owned();
         other.sampling.seed = 2;
         other.partition = Some("1/3".parse().unwrap());
-        other.arms = vec![BuiltIn::Acc, BuiltIn::Mis];
+        other.arms = vec![ControllerChoice::Acc, ControllerChoice::Mis];
         other.sensors = Some("full".to_owned());
         other.sample_timeout_s = 10.0;
         other.scenarios[0].text = "one\nthree\n".to_owned();

@@ -5,7 +5,9 @@ use std::path::Path;
 use clap::{Args, ValueEnum};
 use closecall_sensors::SensorMode;
 
-use crate::controller::BuiltIn;
+use super::CliError;
+use crate::controller::ControllerChoice;
+use crate::controller::exec::{DEFAULT_MEMORY_MIB, DEFAULT_TIMEOUT_MS, ExecSettings, NAME as EXEC};
 use crate::scenario::{ScenarioError, ScenarioFile, Setting};
 use crate::simulation::Arm;
 
@@ -53,25 +55,76 @@ impl Sensing {
     }
 }
 
+/// Which controller is under test.
+#[derive(Clone, Debug, Args)]
+pub(super) struct ControllerArgs {
+    /// Controller of the ego vehicle: acc, mis, or exec:COMMAND, a process of your own that reads and answers lines
+    #[arg(long, value_name = "acc|mis|exec:COMMAND", default_value = "mis", value_parser = controller)]
+    controller: ControllerChoice,
+    /// With exec: time allowed for each answer [default: 1000]
+    #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u64).range(1..=600_000))]
+    controller_timeout_ms: Option<u64>,
+    /// With exec: memory allowed to each process [default: 1024]
+    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1_048_576))]
+    controller_memory_mib: Option<u64>,
+}
+
+impl ControllerArgs {
+    /// The controller with what is allowed to it.
+    pub(super) fn choice(&self) -> Result<ControllerChoice, CliError> {
+        let (timeout_ms, memory_mib) = (self.controller_timeout_ms, self.controller_memory_mib);
+        match &self.controller {
+            ControllerChoice::Exec(exec) => Ok(ControllerChoice::Exec(ExecSettings {
+                timeout_ms: timeout_ms.unwrap_or(exec.timeout_ms),
+                memory_mib: memory_mib.unwrap_or(exec.memory_mib),
+                ..exec.clone()
+            })),
+            own if timeout_ms.is_none() && memory_mib.is_none() => Ok(own.clone()),
+            own => Err(CliError::Usage {
+                message: format!(
+                    "--controller-timeout-ms and --controller-memory-mib bound a process, and `{own}` is none: name one \
+                     with --controller exec:COMMAND"
+                ),
+            }),
+        }
+    }
+}
+
+/// Reads the name of a controller.
+fn controller(text: &str) -> Result<ControllerChoice, String> {
+    match text.split_once(':') {
+        None if text == ControllerChoice::Acc.name() => Ok(ControllerChoice::Acc),
+        None if text == ControllerChoice::Mis.name() => Ok(ControllerChoice::Mis),
+        Some((EXEC, command)) => {
+            let (timeout_ms, memory_mib) = (DEFAULT_TIMEOUT_MS, DEFAULT_MEMORY_MIB);
+            let exec = ExecSettings { command: command.to_owned(), timeout_ms, memory_mib };
+            match exec.words() {
+                Some(_) => Ok(ControllerChoice::Exec(exec)),
+                None => Err(format!("`{command}` is no command: its quotes do not match, or it is empty")),
+            }
+        }
+        _ => Err(format!("`{text}` is no controller: there are acc, mis and exec:COMMAND")),
+    }
+}
+
 /// Who controls E, and what it perceives with.
-#[derive(Clone, Copy, Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub(super) struct ArmArgs {
-    /// Controller of the ego vehicle
-    #[arg(long, value_enum, default_value_t = BuiltIn::Mis)]
-    pub(super) controller: BuiltIn,
+    #[command(flatten)]
+    pub(super) controller: ControllerArgs,
     /// Depth of the sensor simulation; the scenario's own where absent
     #[arg(long, value_enum)]
     pub(super) sensors: Option<Sensing>,
 }
 
 impl ArmArgs {
-    pub(super) fn arm(&self) -> Arm {
-        arm(self.controller, self.sensors)
+    pub(super) fn arm(&self) -> Result<Arm, CliError> {
+        Ok(arm(&self.controller.choice()?, self.sensors))
     }
 }
 
-/// An arm of a built-in controller.
-pub(super) fn arm(controller: BuiltIn, sensors: Option<Sensing>) -> Arm {
+/// An arm of a controller.
+pub(super) fn arm(controller: &ControllerChoice, sensors: Option<Sensing>) -> Arm {
     Arm { controller: controller.factory(), sensors: sensors.map(Sensing::mode) }
 }
 

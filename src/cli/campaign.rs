@@ -13,7 +13,7 @@ use closecall_sensors::inference_backend;
 use closecall_traffic::ActorId;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::args::{Format, Sensing, SetArgs, arm};
+use super::args::{ControllerArgs, Format, Sensing, SetArgs, arm};
 use super::gates::GateArgs;
 use super::output::{complain, outln};
 use super::summary::{print_counts, print_verdict};
@@ -25,7 +25,7 @@ use crate::campaign::partition::Partition;
 use crate::campaign::runner::{Sampling, Work};
 use crate::campaign::summary::Summary;
 use crate::campaign::workers::Workers;
-use crate::controller::BuiltIn;
+use crate::controller::ControllerChoice;
 use crate::exit_code::ExitCode;
 use crate::scenario::ScenarioFile;
 use crate::simulation::Arm;
@@ -45,9 +45,8 @@ pub(super) struct CampaignArgs {
     /// How the sampled values are laid out: random, sobol or grid
     #[arg(long, default_value_t = Design::Random)]
     design: Design,
-    /// Controller under test
-    #[arg(long, value_enum, default_value_t = BuiltIn::Mis)]
-    controller: BuiltIn,
+    #[command(flatten)]
+    controller: ControllerArgs,
     /// Depth of the sensor simulation; the scenario's own where absent
     #[arg(long, value_enum)]
     sensors: Option<Sensing>,
@@ -83,13 +82,13 @@ pub(super) struct CampaignArgs {
 
 impl CampaignArgs {
     /// The controllers, the baseline first.
-    fn controllers(&self) -> Result<Vec<BuiltIn>, CliError> {
-        match (self.paired, self.controller) {
+    fn controllers(&self) -> Result<Vec<ControllerChoice>, CliError> {
+        match (self.paired, self.controller.choice()?) {
             (false, tested) => Ok(vec![tested]),
-            (true, BuiltIn::Acc) => Err(CliError::Usage {
+            (true, ControllerChoice::Acc) => Err(CliError::Usage {
                 message: "--paired compares a controller with `acc`: name another with --controller".to_owned(),
             }),
-            (true, tested) => Ok(vec![BuiltIn::Acc, tested]),
+            (true, tested) => Ok(vec![ControllerChoice::Acc, tested]),
         }
     }
 
@@ -97,7 +96,7 @@ impl CampaignArgs {
         Sampling { seed: self.seed, design: self.design, samples: self.samples }
     }
 
-    fn manifest(&self, campaign: &Campaign, controllers: &[BuiltIn]) -> Result<Manifest, CliError> {
+    fn manifest(&self, campaign: &Campaign, controllers: &[ControllerChoice]) -> Result<Manifest, CliError> {
         let scenario = |file: &ScenarioFile| ManifestScenario {
             name: file.config().name.clone(),
             path: file.path().display().to_string(),
@@ -158,7 +157,7 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
         let message = "--max-induced needs --paired: induced collisions are known only of pairs".to_owned();
         return Err(CliError::Usage { message });
     }
-    let arms: Vec<Arm> = controllers.iter().map(|controller| arm(*controller, args.sensors)).collect();
+    let arms: Vec<Arm> = controllers.iter().map(|controller| arm(controller, args.sensors)).collect();
     let work = |file| Arc::new(Work { file, sampling: args.sampling(), arms: arms.clone() });
     let works = load(args)?.into_iter().map(work).collect();
     let campaign = Campaign { works, partition: args.partition, workers: args.workers()? };

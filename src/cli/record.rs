@@ -98,11 +98,12 @@ fn each_sample<R: Observer>(
     begin: fn(&mut R, &Scenario),
 ) -> Result<(), CliError> {
     let sampling = Sampling { seed: args.seed, design: Design::Random, samples: args.samples };
+    let arm = args.arm.arm()?;
     for sample in 0..args.samples {
         let fail = |source| CliError::Sample { sample, source };
         let scenario = concrete(file, sampling, sample).map_err(fail)?;
         begin(recorder, &scenario);
-        run_guarded(&scenario, RunKey { seed: args.seed, sample }, &args.arm.arm(), recorder).map_err(fail)?;
+        run_guarded(&scenario, RunKey { seed: args.seed, sample }, &arm, recorder).map_err(fail)?;
     }
     Ok(())
 }

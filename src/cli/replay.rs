@@ -12,7 +12,7 @@ use super::run::{WatchArgs, print, run_watched};
 use crate::campaign::folder::Folder;
 use crate::campaign::manifest::{Manifest, ManifestScenario};
 use crate::campaign::runner::concrete;
-use crate::controller::BuiltIn;
+use crate::controller::ControllerChoice;
 use crate::exit_code::ExitCode;
 use crate::outcome::Outcome;
 use crate::simulation::{Arm, RunKey};
@@ -28,8 +28,8 @@ pub(super) struct ReplayArgs {
     #[arg(long)]
     scenario: Option<String>,
     /// The arm to run again; the controller under test where absent
-    #[arg(long, value_enum)]
-    controller: Option<BuiltIn>,
+    #[arg(long, value_name = "NAME")]
+    controller: Option<String>,
     #[command(flatten)]
     watch: WatchArgs,
     /// Output for people or for programs
@@ -46,7 +46,8 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<ExitCode, CliError> {
         let message = format!("there is no sample {}: the campaign has samples 0 to {}", args.sample, samples - 1);
         return Err(CliError::Usage { message });
     }
-    let arm = chosen_arm(&manifest, args.controller)?;
+    let arm = chosen_arm(&manifest, args.controller.as_deref())?;
+    say_what_is_started(&manifest, arm.controller.name());
     let fail = |source| CliError::Sample { sample: args.sample, source };
     let scenario = concrete(&file, manifest.sampling, args.sample).map_err(fail)?;
     let key = RunKey { seed: manifest.sampling.seed, sample: args.sample };
@@ -61,6 +62,17 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<ExitCode, CliError> {
         super::campaign::version(),
     ));
     Ok(ExitCode::Invalid)
+}
+
+/// A folder may come from somebody else: that it starts a process is not to go unseen.
+fn say_what_is_started(manifest: &Manifest, name: &str) {
+    for arm in &manifest.arms {
+        if let ControllerChoice::Exec(exec) = arm
+            && arm.name() == name
+        {
+            complain(format_args!("running the controller that the campaign names: {}\n", exec.command));
+        }
+    }
 }
 
 /// True unless the campaign's journal has another result of this sample, by a single bit.
@@ -108,14 +120,12 @@ pub(super) fn record_sample(
 }
 
 /// An arm of the campaign: the named one, or the one under test.
-fn chosen_arm(manifest: &Manifest, controller: Option<BuiltIn>) -> Result<Arm, CliError> {
-    let tested = manifest.arms.last().copied().unwrap_or(BuiltIn::Mis);
-    let controller = controller.unwrap_or(tested);
-    if !manifest.arms.contains(&controller) {
-        let known = manifest.arms.iter().map(|arm| arm.name()).collect::<Vec<_>>().join(", ");
-        let message = format!("the campaign was not run with `{}`, only with {known}", controller.name());
+fn chosen_arm(manifest: &Manifest, name: Option<&str>) -> Result<Arm, CliError> {
+    let is_meant = |arm: &ControllerChoice| name.is_none_or(|name| arm.name() == name || arm.to_string() == name);
+    let Some(place) = manifest.arms.iter().rposition(is_meant) else {
+        let known = manifest.arms.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
+        let message = format!("the campaign was not run with `{}`, only with {known}", name.unwrap_or_default());
         return Err(CliError::Usage { message });
-    }
-    let place = manifest.arms.iter().position(|arm| *arm == controller).unwrap_or_default();
+    };
     Ok(arms(manifest)?.swap_remove(place))
 }

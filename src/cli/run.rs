@@ -65,7 +65,7 @@ pub(super) fn run(args: &RunArgs) -> Result<ExitCode, CliError> {
     let fail = |source| CliError::Sample { sample: args.sample, source };
     let scenario = concrete(&file, sampling, args.sample).map_err(fail)?;
     let key = RunKey { seed: args.seed, sample: args.sample };
-    let outcome = run_watched(&scenario, key, &args.arm.arm(), &args.watch)?;
+    let outcome = run_watched(&scenario, key, &args.arm.arm()?, &args.watch)?;
     print(&outcome, args.format);
     Ok(ExitCode::Pass)
 }

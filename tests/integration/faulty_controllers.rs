@@ -16,7 +16,7 @@ use closecall::campaign::runner::{Sampling, Work};
 use closecall::campaign::summary::Summary;
 use closecall::campaign::verdict::{Gates, Verdict};
 use closecall::campaign::workers::Workers;
-use closecall::controller::BuiltIn;
+use closecall::controller::{BuiltIn, ControllerChoice};
 use closecall::exit_code::ExitCode;
 use closecall::outcome::Outcome;
 use closecall::scenario::ScenarioFile;
@@ -108,7 +108,7 @@ fn manifest(campaign: &Campaign) -> Manifest {
         }],
         sampling: campaign.works[0].sampling,
         partition: None,
-        arms: vec![BuiltIn::Acc, BuiltIn::Mis],
+        arms: vec![ControllerChoice::Acc, ControllerChoice::Mis],
         sensors: None,
         models: Vec::new(),
         sample_timeout_s: TIMEOUT.as_secs_f64(),

@@ -5,12 +5,14 @@
 mod comparison;
 mod determinism;
 mod durability;
+mod exec_controller;
 mod exit_codes;
 mod faulty_controllers;
 mod gate;
 mod hidden_lead;
 mod library;
 mod malformed;
+mod own_controller;
 mod paper_figure;
 mod readme;
 mod recordings;

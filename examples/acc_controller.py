@@ -1,0 +1,38 @@
+"""The built-in `acc` (cruise control, emergency braking) as a process: --controller "exec:python3 examples/acc_controller.py"."""
+import json, math, sys
+
+def required(v, front, left_m):  # the constant braking that leaves `left_m` to a vehicle that brakes on as it does
+    room, lead, braking = max(front["gap_m"] - left_m, 0.1), front["speed_mps"], -front["acceleration_mps2"]
+    removing = (v - lead) * (v - lead) / (2.0 * room) if v > lead else 0.0
+    if braking <= 0.0 or lead <= 0.0:
+        return removing
+    to_stop = v * v / (2.0 * (room + lead * lead / (2.0 * braking)))
+    return to_stop if v * braking >= lead * to_stop else braking + removing if v > lead else 0.0
+
+def cruise(v, limit, front, acc):  # towards the closing speed that the gap's error allows
+    a = ((limit if acc["set_speed_mps"] is None else acc["set_speed_mps"]) - v) / 2.0
+    if front:
+        error, touch = front["gap_m"] - max(acc["time_gap_s"] * v, acc["standstill_gap_m"]), 1.5 / (0.3 * 0.3)
+        allowed = 0.3 * error if error < touch else math.sqrt(2.0 * 1.5 * (error - 0.5 * touch))
+        gain, opening = max(acc["time_gap_s"], 0.45), front["speed_mps"] - v
+        slower, faster = (allowed + opening) / gain, (min(allowed, 4.0) + opening) / gain
+        a, needed = min(a, slower if slower < 0.0 else max(faster, 0.0)), required(v, front, acc["standstill_gap_m"])
+        a = min(a, -needed) if needed > 2.0 else a
+    return min(max(a, -3.5), 1.5)
+
+def emergency(v, front, aeb, braked):  # how hard to brake, having braked before or not; 0 where there is no need
+    if braked and v < 0.1:
+        return 2.0 if front and front["speed_mps"] < 1.0 else 0.0
+    needed = required(v, front, aeb["standstill_gap_m"]) if front else 0.0
+    return min(1.15 * needed, aeb["max_deceleration_mps2"]) if needed > (1.5 if braked else aeb["trigger_mps2"]) else 0.0
+
+braked = 0.0
+for message in map(json.loads, sys.stdin):
+    if message["type"] == "hello":
+        hello, answer = message, {"type": "hello", "protocol": 1}
+    else:
+        v, front, settings = message["odometry"]["speed_mps"], message["front"], hello["settings"]
+        braked = emergency(v, front, settings["aeb"], braked > 0.0) if settings["aeb"] else 0.0
+        a = min(cruise(v, hello["road"]["speed_limit_mps"], front, settings["acc"]), -braked if braked else math.inf)
+        answer = {"acceleration_mps2": a, "state": "emergency-braking" if braked else "following"}
+    print(json.dumps(answer), flush=True)

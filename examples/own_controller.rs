@@ -1,0 +1,119 @@
+//! A controller of one's own, in one file: the controller, the factory that makes one for each sample, and a campaign
+//! that holds it against the built-in cruise control.
+//!
+//! ```text
+//! cargo run --release --example own_controller [SCENARIO.toml] [SAMPLES]
+//! ```
+//!
+//! `RoomMaker` follows with the built-in cruise control and emergency braking, but takes off half a metre per second
+//! squared while anybody is close behind: what a driver does who feels pressed. It knows nothing of arrival times, and
+//! is no match for the margin increase system.
+
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::thread::available_parallelism;
+use std::time::Duration;
+
+use closecall::campaign::execution::{Campaign, CampaignError};
+use closecall::campaign::runner::{Sampling, Work};
+use closecall::campaign::summary::{Counts, Summary};
+use closecall::campaign::workers::Workers;
+use closecall::controller::BuiltIn;
+use closecall::scenario::ScenarioFile;
+use closecall::simulation::{Arm, ControllerFactory};
+use closecall_controllers::{
+    ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack, EgoState, Reason,
+};
+use closecall_scenarios::sampling::Design;
+use closecall_traffic::TrackStatus;
+
+/// Time headway behind which it feels pressed [s].
+const PRESSED_BELOW_S: f64 = 1.5;
+
+/// What it takes off the acceleration then [m/s²].
+const EASING_MPS2: f64 = 0.5;
+
+/// Makes room while somebody is close behind.
+struct RoomMaker {
+    cruise: EgoStack,
+}
+
+impl RoomMaker {
+    fn is_pressed(input: &EgoInput<'_>) -> bool {
+        input.tracks.iter().any(|track| {
+            let gap_m = -track.x_m() - 0.5 * (track.length_m + input.odometry.length_m);
+            let is_behind = track.x_m() < 0.0 && track.lane[1] >= 0.5 && track.status == TrackStatus::Confirmed;
+            is_behind && gap_m < PRESSED_BELOW_S * track.vx_mps()
+        })
+    }
+}
+
+impl EgoController for RoomMaker {
+    fn step(&mut self, input: &EgoInput<'_>) -> Result<EgoCommand, ControllerError> {
+        // The built-in stack refuses what is not finite; a controller that does without it calls `input.check_finite()`.
+        let cruise = self.cruise.step(input)?;
+        if !Self::is_pressed(input) || cruise.state == EgoState::EmergencyBraking {
+            return Ok(cruise);
+        }
+        let acceleration_mps2 = cruise.acceleration_mps2.min(-EASING_MPS2);
+        Ok(EgoCommand { acceleration_mps2, state: EgoState::Increasing, reason: Reason::External, plan: None })
+    }
+}
+
+/// Makes one for each sample, so that nothing is carried over.
+pub(crate) struct RoomMakers;
+
+impl ControllerFactory for RoomMakers {
+    fn name(&self) -> &str {
+        "room-maker"
+    }
+
+    fn has_mis(&self, _: &EgoSettings) -> bool {
+        false
+    }
+
+    fn build(&self, settings: &EgoSettings) -> Box<dyn EgoController> {
+        Box::new(RoomMaker { cruise: EgoStack::without_mis(*settings) })
+    }
+}
+
+/// Longest wall time of a sample: one that takes longer is an error of that sample.
+const SAMPLE_TIMEOUT: Duration = Duration::from_secs(300);
+
+/// Runs a campaign of two arms, `acc` and `tested`, on the same samples.
+pub(crate) fn against_cruise_control(
+    file: ScenarioFile,
+    tested: Arc<dyn ControllerFactory>,
+    samples: u64,
+) -> Result<Counts, CampaignError> {
+    let arms = vec![BuiltIn::Acc.factory(), tested].into_iter().map(|controller| Arm { controller, sensors: None });
+    let sampling = Sampling { seed: 1, design: Design::Random, samples };
+    let work = Arc::new(Work { file, sampling, arms: arms.collect() });
+    let mut summary = Summary::new(work.arms.iter().map(|arm| arm.controller.name().to_owned()).collect());
+    summary.begin(&work.file.config().name);
+    let ego = work.file.ego_id().expect("a scenario that was read has an ego vehicle");
+    let jobs = available_parallelism().unwrap_or(std::num::NonZeroUsize::MIN);
+    let workers = Workers { jobs, sample_timeout: SAMPLE_TIMEOUT };
+    let campaign = Campaign { works: vec![Arc::clone(&work)], partition: None, workers };
+    campaign.run(None, |turn| {
+        summary.take(turn.record, ego);
+        ControlFlow::Continue(())
+    })?;
+    Ok(summary.total())
+}
+
+#[expect(clippy::print_stdout, reason = "its output is what it is for")]
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let path = arguments.next().map_or_else(|| PathBuf::from("scenarios/library/low-thw-overtake.toml"), PathBuf::from);
+    let samples = arguments.next().map_or(Ok(200), |text| text.parse())?;
+    let file = ScenarioFile::load(&path, &[])?;
+    let name = file.config().name.clone();
+    let counts = against_cruise_control(file, Arc::new(RoomMakers), samples)?;
+    let [cruise, own] = &counts.arms[..] else { unreachable!("two arms were run") };
+    println!("{name}: {} samples, {} errors", counts.samples, counts.errors());
+    println!("  collisions: acc {}, room-maker {}", cruise.collisions, own.collisions);
+    println!("  {} prevented, {} induced", counts.pairs.prevented, counts.pairs.induced);
+    Ok(())
+}

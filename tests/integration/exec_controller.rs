@@ -1,0 +1,243 @@
+//! Controllers as processes: the shipped example does what the built-in does, and one that misbehaves costs its own
+//! samples only, says what it did, and leaves nothing behind.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+use crate::support::{closecall, code, folder, library, skipped, stderr, stdout};
+
+/// What each way of misbehaving is called by: the argument of `bad.sh`, and a part of the message.
+const WAYS: [(&str, &str); 14] = [
+    ("dies", "the process ended (exit status: 3) after 1 answer; it last wrote: out of cheese"),
+    ("killed", "the process ended (signal: 9 (SIGKILL)) after 1 answer"),
+    ("closes", "the process closed its standard output after 1 answer"),
+    ("hangs", "the process hangs: no answer in twice the 300 ms allowed, after 1 answer"),
+    ("late 0.45", "the process answered later than the 300 ms allowed, after 1 answer"),
+    ("garbage", "the process answered \"what?\", which is not JSON"),
+    ("nan", "asked for an acceleration of nan m/s², which is not a finite number"),
+    ("infinite", "asked for an acceleration of 1e999 m/s², which is not a finite number"),
+    ("missing", "`acceleration_mps2` must be a number, it is absent"),
+    ("state", "`state` must be one of following, increasing"),
+    ("huge", "answered with a line of more than 1048576 bytes"),
+    ("twice", "wrote a line that nobody had asked for"),
+    ("chatter", "the process answered \"this is not an answer\", which is not JSON"),
+    ("version", "speaks version 2 of the protocol, this is version 1"),
+];
+
+fn python() -> bool {
+    let found = Command::new("python3").arg("--version").output().is_ok_and(|output| output.status.success());
+    if !found {
+        skipped("there is no python3");
+    }
+    found
+}
+
+/// Runs one sample with a controller, in an environment that marks its processes.
+fn run_with(controller: &str, mark: &str) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_closecall"))
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .args(["run", library("low-thw-overtake").to_str().unwrap(), "--controller-timeout-ms", "300"])
+        .args(["--controller-memory-mib", "128", "--controller", controller])
+        .env("CLOSECALL_TEST_MARK", mark)
+        .output()
+        .unwrap()
+}
+
+/// Processes that still run with this mark in their environment.
+fn left_behind(mark: &str) -> Vec<String> {
+    let wanted = format!("CLOSECALL_TEST_MARK={mark}");
+    let processes = std::fs::read_dir("/proc").unwrap().filter_map(|entry| Some(entry.ok()?.path()));
+    processes
+        .filter(|path| {
+            let environment = std::fs::read(path.join("environ")).unwrap_or_default();
+            environment.split(|byte| *byte == 0).any(|entry| entry == wanted.as_bytes())
+        })
+        .map(|path| path.display().to_string())
+        .collect()
+}
+
+/// One line, as the message may be broken over several.
+fn message(output: &Output) -> String {
+    stderr(output).replace('│', " ").split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[test]
+fn each_way_of_misbehaving_is_an_error_of_its_own_and_leaves_nothing_behind() {
+    for (way, said) in WAYS {
+        let mark = format!("{}-{}", std::process::id(), way.replace(' ', "-"));
+        let output = run_with(&format!("exec:sh tests/fixtures/controllers/bad.sh {way}"), &mark);
+        assert_eq!(code(&output), 5, "{way}: {}", stderr(&output));
+        assert!(message(&output).contains(said), "{way}: {}", stderr(&output));
+        assert_eq!(left_behind(&mark), Vec::<String>::new(), "{way}");
+    }
+}
+
+#[test]
+fn a_full_standard_error_blocks_nobody() {
+    let output = run_with("exec:sh tests/fixtures/controllers/bad.sh loud", "loud");
+    assert!(stdout(&output, 0).contains("ended at"));
+}
+
+#[test]
+fn one_that_takes_too_much_memory_is_stopped() {
+    if !python() {
+        return;
+    }
+    let output = run_with("exec:python3 tests/fixtures/controllers/hungry.py", "hungry");
+    assert_eq!(code(&output), 5);
+    assert!(message(&output).contains("holds more than the 128 MiB of memory allowed"), "{}", stderr(&output));
+}
+
+#[test]
+fn a_command_that_is_not_there_or_is_none_says_so() {
+    let output = run_with("exec:no-such-program --fast", "none");
+    assert_eq!(code(&output), 5);
+    assert!(message(&output).contains("`no-such-program` could not be started: No such file"), "{}", stderr(&output));
+    let headline = library("low-thw-overtake");
+    for arguments in [
+        vec!["--controller", "exec:"],
+        vec!["--controller", "exec:'open"],
+        vec!["--controller", "exec"],
+        vec!["--controller", "mis", "--controller-timeout-ms", "100"],
+        vec!["--controller-timeout-ms", "0", "--controller", "exec:true"],
+    ] {
+        let output = closecall(["run", headline.to_str().unwrap()].into_iter().chain(arguments.iter().copied()));
+        assert_eq!(code(&output), 2, "{arguments:?}: {}", stderr(&output));
+    }
+}
+
+/// Results by sample: the outcome without what names the controller, or the error's message.
+fn results(out: &Path) -> BTreeMap<u64, Result<Value, String>> {
+    let journal = std::fs::read_to_string(out.join("journal.jsonl")).unwrap();
+    let record = |line: &str| {
+        let record: Value = serde_json::from_str(line).unwrap();
+        let result = &record["arms"].as_array().unwrap().last().unwrap()["result"];
+        let result = match result.get("Ok") {
+            Some(outcome) => {
+                let mut outcome = outcome.clone();
+                for key in ["controller", "mis"] {
+                    outcome.as_object_mut().unwrap().remove(key);
+                }
+                Ok(outcome)
+            }
+            None => Err(result["Err"]["message"].as_str().unwrap().to_owned()),
+        };
+        (record["sample"].as_u64().unwrap(), result)
+    };
+    journal.lines().map(record).collect()
+}
+
+fn campaign(controller: &str, out: &Path, samples: &str) -> Output {
+    let headline = library("low-thw-overtake");
+    closecall([
+        "campaign",
+        headline.to_str().unwrap(),
+        "-n",
+        samples,
+        "--seed",
+        "1",
+        "--jobs",
+        "3",
+        "--recordings",
+        "1",
+        "--controller",
+        controller,
+        "--out",
+        out.to_str().unwrap(),
+    ])
+}
+
+/// True where two values are the same, numbers within 1e-9.
+fn agree(one: &Value, other: &Value) -> bool {
+    match (one, other) {
+        (Value::Number(one), Value::Number(other)) => {
+            (one.as_f64().unwrap() - other.as_f64().unwrap()).abs() <= 1e-9
+        }
+        (Value::Array(one), Value::Array(other)) => {
+            one.len() == other.len() && one.iter().zip(other).all(|(one, other)| agree(one, other))
+        }
+        (Value::Object(one), Value::Object(other)) => {
+            one.len() == other.len()
+                && one.iter().all(|(key, value)| other.get(key).is_some_and(|other| agree(value, other)))
+        }
+        (one, other) => one == other,
+    }
+}
+
+#[test]
+fn the_python_example_reproduces_the_built_in_cruise_control() {
+    if !python() {
+        return;
+    }
+    let folder = folder();
+    let (built_in, process) = (folder.path().join("acc"), folder.path().join("exec"));
+    stdout(&campaign("acc", &built_in, "16"), 0);
+    stdout(&campaign("exec:python3 examples/acc_controller.py", &process, "16"), 0);
+    let (built_in, replayed) = (results(&built_in), results(&process));
+    assert!(built_in.values().flatten().any(|outcome| !outcome["collisions"].as_array().unwrap().is_empty()));
+    for (sample, outcome) in &built_in {
+        let [one, other] = [outcome, &replayed[sample]].map(|outcome| outcome.as_ref().unwrap());
+        assert!(agree(one, other), "sample {sample}: {one} {other}");
+    }
+    // The manifest holds the command, so that a replay needs nothing but the folder.
+    let output = closecall(["replay", process.to_str().unwrap(), "3"]);
+    stdout(&output, 0);
+    assert!(stderr(&output).contains("examples/acc_controller.py"), "{}", stderr(&output));
+}
+
+/// The message of each of the five ways in which `sometimes_bad.py` misbehaves.
+const FIVE: [&str; 5] = [
+    "the process ended (exit status: 3) before its first answer; it last wrote: cannot go on",
+    "the process hangs: no answer in twice the 400 ms allowed",
+    "the process answered \"garbage\", which is not JSON",
+    "the process asked for an acceleration of NaN m/s², which is not a finite number",
+    "the process answered later than the 400 ms allowed",
+];
+
+#[test]
+fn five_bad_samples_are_five_errors_and_the_rest_is_right() {
+    if !python() {
+        return;
+    }
+    let folder = folder();
+    let (built_in, process) = (folder.path().join("acc"), folder.path().join("exec"));
+    stdout(&campaign("acc", &built_in, "24"), 0);
+    let headline = library("low-thw-overtake");
+    let output = closecall([
+        "campaign",
+        headline.to_str().unwrap(),
+        "-n",
+        "24",
+        "--seed",
+        "1",
+        "--jobs",
+        "3",
+        "--controller-timeout-ms",
+        "400",
+        "--controller",
+        "exec:python3 tests/fixtures/controllers/sometimes_bad.py 0.6",
+        "--out",
+        process.to_str().unwrap(),
+    ]);
+    assert_eq!(code(&output), 5, "{}", stderr(&output));
+    let (built_in, process) = (results(&built_in), results(&process));
+    let mut seen = [0; FIVE.len()];
+    for (sample, expected) in &built_in {
+        let expected = expected.as_ref().unwrap();
+        let cruise_mps = expected["parameters"]["cruise-mps"].as_f64().unwrap();
+        // As the controller reckons from E's first speed.
+        let kind = (cruise_mps * 1000.0).floor() as usize % 8;
+        match (&process[sample], FIVE.get(kind)) {
+            (Ok(outcome), None) => assert!(agree(outcome, expected), "sample {sample}"),
+            (Err(message), Some(said)) => {
+                assert!(message.contains(said), "sample {sample}: {message}");
+                seen[kind] += 1;
+            }
+            (result, _) => panic!("sample {sample}, kind {kind}: {result:?}"),
+        }
+    }
+    assert!(seen.iter().all(|count| *count > 0), "{seen:?}");
+}

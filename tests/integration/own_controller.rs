@@ -1,0 +1,63 @@
+//! Controllers that plug in: in Rust, from the example's one file.
+
+use std::sync::Arc;
+
+use closecall::scenario::ScenarioFile;
+use closecall::simulation::ControllerFactory;
+use closecall_controllers::{ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack};
+
+use crate::support::library;
+
+#[path = "../../examples/own_controller.rs"]
+#[expect(dead_code, reason = "the example's `main` is not called here")]
+mod example;
+
+#[test]
+fn the_example_drives_e_in_a_campaign() {
+    let file = ScenarioFile::load(&library("low-thw-overtake"), &[]).unwrap();
+    let counts = example::against_cruise_control(file, Arc::new(example::RoomMakers), 40).unwrap();
+    assert_eq!((counts.samples, counts.errors(), counts.invalid), (40, 0, 0));
+    // It does something: some sample ends otherwise than with the cruise control alone.
+    assert!(counts.pairs.prevented + counts.pairs.induced > 0, "{counts:?}");
+}
+
+/// Panics in samples in which E starts fast.
+struct Panics {
+    stack: EgoStack,
+}
+
+/// E's speed from which on it panics [m/s]: about half of the samples.
+const TOO_FAST_MPS: f64 = 31.6;
+
+impl EgoController for Panics {
+    fn step(&mut self, input: &EgoInput<'_>) -> Result<EgoCommand, ControllerError> {
+        assert!(input.odometry.speed_mps < TOO_FAST_MPS, "far too fast");
+        self.stack.step(input)
+    }
+}
+
+struct PanicsFactory;
+
+impl ControllerFactory for PanicsFactory {
+    fn name(&self) -> &str {
+        "panics"
+    }
+
+    fn has_mis(&self, _: &EgoSettings) -> bool {
+        false
+    }
+
+    fn build(&self, settings: &EgoSettings) -> Box<dyn EgoController> {
+        Box::new(Panics { stack: EgoStack::without_mis(*settings) })
+    }
+}
+
+#[test]
+fn one_that_panics_spoils_its_own_samples_only() {
+    let file = ScenarioFile::load(&library("overtake-without-brake"), &[]).unwrap();
+    let counts = example::against_cruise_control(file, Arc::new(PanicsFactory), 24).unwrap();
+    let [cruise, tested] = counts.arms[..] else { panic!("two arms") };
+    assert_eq!((cruise.outcomes, cruise.errors), (24, 0));
+    assert!(tested.errors > 0 && tested.outcomes > 0, "{tested:?}");
+    assert_eq!((tested.outcomes + tested.errors, counts.invalid), (24, 0));
+}
