@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Command, Output};
 
+use closecall::campaign::folder::Folder;
+use closecall::campaign::record::Record;
 use serde_json::Value;
 
 use crate::support::{closecall, code, folder, library, skipped, stderr, stdout};
@@ -111,23 +113,19 @@ fn a_command_that_is_not_there_or_is_none_says_so() {
 
 /// Results by sample: the outcome without what names the controller, or the error's message.
 fn results(out: &Path) -> BTreeMap<u64, Result<Value, String>> {
-    let journal = std::fs::read_to_string(out.join("journal.jsonl")).unwrap();
-    let record = |line: &str| {
-        let record: Value = serde_json::from_str(line).unwrap();
-        let result = &record["arms"].as_array().unwrap().last().unwrap()["result"];
-        let result = match result.get("Ok") {
-            Some(outcome) => {
-                let mut outcome = outcome.clone();
-                for key in ["controller", "mis"] {
-                    outcome.as_object_mut().unwrap().remove(key);
-                }
-                Ok(outcome)
+    let records = Folder::open(out).records().unwrap().map(Result::unwrap);
+    let result = |record: Record| {
+        let result = record.arms.last().unwrap().result.clone();
+        let comparable = result.map_err(|failure| failure.message).map(|outcome| {
+            let mut outcome = serde_json::to_value(outcome).unwrap();
+            for key in ["controller", "mis"] {
+                outcome.as_object_mut().unwrap().remove(key);
             }
-            None => Err(result["Err"]["message"].as_str().unwrap().to_owned()),
-        };
-        (record["sample"].as_u64().unwrap(), result)
+            outcome
+        });
+        (record.sample, comparable)
     };
-    journal.lines().map(record).collect()
+    records.map(result).collect()
 }
 
 fn campaign(controller: &str, out: &Path, samples: &str) -> Output {
