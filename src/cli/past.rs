@@ -27,7 +27,7 @@ pub(super) fn arms(manifest: &Manifest) -> Result<Vec<Arm>, CliError> {
     let unknown = |name: &str| CliError::Usage { message: format!("the campaign's sensors `{name}` are not known") };
     let sensing = |name: &String| Sensing::from_name(name).ok_or_else(|| unknown(name));
     let sensing = manifest.sensors.as_ref().map(sensing).transpose()?;
-    Ok(manifest.arms.iter().map(|controller| arm(*controller, sensing)).collect())
+    Ok(manifest.arms.iter().map(|controller| arm(controller, sensing)).collect())
 }
 
 /// A scenario as the campaign ran it.
