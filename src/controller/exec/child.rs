@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, waitid};
 
 use super::error::ExecError;
-use super::lines::{Line, LONGEST_LINE, Tail, excerpt, read_lines};
+use super::lines::{LONGEST_LINE, Line, Tail, excerpt, read_lines};
 use super::settings::ExecSettings;
 
 /// How often a process that is being waited for has its memory looked at.
@@ -157,7 +157,9 @@ impl Child {
     fn peak_memory_mib(&self) -> u64 {
         let status = std::fs::read_to_string(format!("/proc/{}/status", self.process.id())).unwrap_or_default();
         let peak_kib = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
-        peak_kib.and_then(|line| line.split_whitespace().next()?.parse::<u64>().ok()).map_or(0, |kib| kib.div_ceil(1_024))
+        peak_kib
+            .and_then(|line| line.split_whitespace().next()?.parse::<u64>().ok())
+            .map_or(0, |kib| kib.div_ceil(1_024))
     }
 
     /// Why there is nothing more to read.

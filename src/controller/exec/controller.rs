@@ -2,9 +2,7 @@
 
 use std::time::Duration;
 
-use closecall_controllers::{
-    ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, FrontFollower, Reason,
-};
+use closecall_controllers::{ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, FrontFollower, Reason};
 
 use super::child::Child;
 use super::error::ExecError;
@@ -76,9 +74,8 @@ impl ExecController {
 impl EgoController for ExecController {
     fn step(&mut self, input: &EgoInput<'_>) -> Result<EgoCommand, ControllerError> {
         input.check_finite()?;
-        let answer = self
-            .ask(input)
-            .map_err(|error| ControllerError::Own { reason: error.to_string(), time: input.time })?;
+        let answer =
+            self.ask(input).map_err(|error| ControllerError::Own { reason: error.to_string(), time: input.time })?;
         Ok(EgoCommand {
             acceleration_mps2: answer.acceleration_mps2,
             state: answer.state,

@@ -195,7 +195,8 @@ mod tests {
 
     #[test]
     fn a_proper_answer_is_read_to_the_last_bit() {
-        let read = answer(br#"{"acceleration_mps2": -0.1234567890123456, "state": "increasing", "more": [1]}"#).unwrap();
+        let read =
+            answer(br#"{"acceleration_mps2": -0.1234567890123456, "state": "increasing", "more": [1]}"#).unwrap();
         assert_eq!(read, Answer { acceleration_mps2: -0.123_456_789_012_345_6, state: EgoState::Increasing });
         assert_eq!(answer(br#"{"acceleration_mps2": 1, "state": "following"}"#).unwrap().acceleration_mps2, 1.0);
     }
