@@ -200,6 +200,44 @@ pub enum RecordingProblem {
         /// The most that is kept.
         allowed: usize,
     },
+    /// XML that is no CommonRoad scenario.
+    #[error("this is no CommonRoad scenario that can be read: {what}")]
+    Xml {
+        /// What is wrong.
+        what: String,
+    },
+    /// The rows of a recording of several files, without the others.
+    #[error(
+        "the header is that of highD's or exiD's tracks, which need the files with their metadata beside them: \
+         NN_tracks.csv, NN_tracksMeta.csv and NN_recordingMeta.csv"
+    )]
+    NeedsMetadata,
+    /// Several recordings in one folder.
+    #[error("there are {count} recordings in this folder, from {first}_tracks.csv to {last}_tracks.csv: name one of them")]
+    SeveralInFolder {
+        /// How many.
+        count: usize,
+        /// What the first one's name begins with.
+        first: String,
+        /// What the last one's name begins with.
+        last: String,
+    },
+    /// A table with another number of rows than it has to have.
+    #[error("there are {found} rows, but {needed} is needed")]
+    RowCount {
+        /// Rows found.
+        found: usize,
+        /// Rows needed.
+        needed: usize,
+    },
+    /// A vehicle that stands in the metadata twice.
+    #[error("vehicle {vehicle} stands there twice, first in line {first_line}")]
+    VehicleTwice {
+        /// The vehicle.
+        vehicle: u64,
+        /// The line of the first of them.
+        first_line: u64,
+    },
     /// A vehicle with another number of rows than the metadata state.
     #[error("vehicle {vehicle} has {found} rows, but {stated} are stated in line {line} of {file}")]
     OtherCount {

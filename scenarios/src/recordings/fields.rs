@@ -39,7 +39,7 @@ impl Bounds {
         Self { low, high, low_is_allowed: false }
     }
 
-    fn contains(self, value: f64) -> bool {
+    pub(super) fn contains(self, value: f64) -> bool {
         (value > self.low || (self.low_is_allowed && value >= self.low)) && value <= self.high
     }
 

@@ -2,6 +2,8 @@
 
 use super::RecordingProblem;
 use super::fields::Fault;
+use super::file_set::Meta;
+use super::highd::HighdColumns;
 use super::in_car::InCarColumns;
 use super::ngsim::NgsimColumns;
 use super::plain::PlainColumns;
@@ -47,20 +49,33 @@ const NGSIM_COLUMNS: usize = 18;
 /// With fewer known names than this, a first line is not taken for a header of that layout.
 const FEWEST_KNOWN_NAMES: usize = 4;
 
-/// So many of the names that only in-car logs have make a first line the header of one.
+/// So many of the names that only one layout has make a first line a header of that.
 const FEWEST_OWN_NAMES: usize = 2;
 
 /// The longest beginning of a first line that an error repeats [characters].
 const SHOWN: usize = 40;
 
+/// True where `line` is the header of the rows of a highD or exiD recording, which need metadata.
+pub(super) fn is_of_drone(line: &str) -> bool {
+    Header::of(line).is_ok_and(|(header, ..)| header.is_highd() || header.is_exid())
+}
+
+/// The format of the rows of a highD or exiD recording.
+pub(super) fn of_drone(line: &str, meta: Meta) -> Result<Format, RecordingProblem> {
+    let (header, separator, width) = Header::of(line)?;
+    header.refuse_duplicates()?;
+    let columns: Box<dyn TextLayout> = Box::new(HighdColumns::new(&header, meta)?);
+    Ok(Format { columns, separator, width, has_header: true })
+}
+
 /// The format of a file that begins with `line`.
 pub(super) fn recognise(line: &str) -> Result<Format, RecordingProblem> {
-    let separator = if line.contains(',') { Separator::Comma } else { Separator::Blank };
-    let mut fields = Fields::default();
-    fields.split(line, separator)?;
-    let header = Header::new((0..fields.len()).map(|index| fields.get(line, index)));
+    let (header, separator, width) = Header::of(line)?;
+    if header.is_highd() || header.is_exid() {
+        return Err(RecordingProblem::NeedsMetadata);
+    }
     let (plain, ngsim) = (header.count(&PlainColumns::NAMES), header.count(&NgsimColumns::NAMES));
-    let (width, has_header) = (fields.len(), true);
+    let has_header = true;
     if header.count(&InCarColumns::OWN_NAMES) >= FEWEST_OWN_NAMES {
         header.refuse_duplicates()?;
         return Ok(Format { columns: Box::new(InCarColumns::new(&header)?), separator, width, has_header });
@@ -84,8 +99,24 @@ pub(super) struct Header {
 }
 
 impl Header {
-    fn new<'l>(names: impl Iterator<Item = &'l str>) -> Self {
+    pub(super) fn new<'l>(names: impl Iterator<Item = &'l str>) -> Self {
         Self { names: names.map(str::to_ascii_lowercase).collect() }
+    }
+
+    /// The names in `line`, what is between them, and how many they are.
+    fn of(line: &str) -> Result<(Self, Separator, usize), RecordingProblem> {
+        let separator = if line.contains(',') { Separator::Comma } else { Separator::Blank };
+        let mut fields = Fields::default();
+        fields.split(line, separator)?;
+        Ok((Self::new((0..fields.len()).map(|index| fields.get(line, index))), separator, fields.len()))
+    }
+
+    fn is_highd(&self) -> bool {
+        self.count(&HighdColumns::OWN_NAMES) >= FEWEST_OWN_NAMES
+    }
+
+    fn is_exid(&self) -> bool {
+        self.count(&["xCenter", "yCenter", "lonVelocity", "laneletId"]) >= FEWEST_OWN_NAMES
     }
 
     /// The place of a column.

@@ -30,10 +30,14 @@
 
 mod assemble;
 mod builder;
+mod commonroad;
 mod dropped;
 mod error;
 mod fields;
+mod file_set;
+mod highd;
 mod in_car;
+mod lanelets;
 mod layout;
 mod markings;
 mod ngsim;
@@ -50,6 +54,7 @@ mod text;
 mod tracks;
 mod write;
 mod write_in_car;
+mod xml;
 
 use closecall_traffic::{Time, Trajectory};
 use serde::Serialize;

@@ -3,11 +3,13 @@
 use std::cell::RefCell;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::rc::Rc;
 
 use flate2::bufread::MultiGzDecoder;
 
+use super::commonroad::CommonRoadSource;
+use super::file_set::FileSet;
 use super::order::WINDOW_ROWS;
 use super::source::{Refusal, RowSource};
 use super::text::TextSource;
@@ -74,12 +76,38 @@ pub fn open_from<'a>(
 ) -> Result<Tracks<'a>, RecordingError> {
     let digest = Digest::default();
     let input = digest.input(source).map_err(|refusal| at(path, refusal))?;
-    let source = choose(input, path, &options).map_err(|refusal| at(path, refusal))?;
+    let source = choose(input, &options).map_err(|refusal| at(path, refusal))?;
     Tracks::new((path, digest), source, options.bad_rows, window)
 }
 
 fn open_window(path: &Path, options: ReadOptions, window: usize) -> Result<Tracks<'static>, RecordingError> {
-    open_from(open_file(path)?, path, options, window)
+    match FileSet::of(path)? {
+        Some(set) => open_set(&set, options, window),
+        None => open_from(open_file(path)?, path, options, window),
+    }
+}
+
+/// Opens one of the recordings that are several files.
+fn open_set(set: &FileSet, options: ReadOptions, window: usize) -> Result<Tracks<'static>, RecordingError> {
+    let path = set.tracks();
+    let digest = Digest::default();
+    let in_tracks = |refusal| at(&path, refusal);
+    let input = digest.input(open_file(&path)?).map_err(in_tracks)?;
+    let source = TextSource::with_meta(input, || set.meta(&digest));
+    let source = source.map_err(|error| error.map_or_else(|other| other, in_tracks))?;
+    check_choice(&source, &options).map_err(in_tracks)?;
+    Tracks::new((&path, digest), Box::new(source), options.bad_rows, window)
+}
+
+/// Refuses another layout than the one asked for.
+fn check_choice(source: &dyn RowSource, options: &ReadOptions) -> Result<(), Refusal> {
+    let found = source.about().layout;
+    match options.layout {
+        Some(choice) if !choice.includes(found) => {
+            Err(Refusal::of_file(RecordingProblem::OtherLayout { found, asked: choice.name() }))
+        }
+        _ => Ok(()),
+    }
 }
 
 pub(super) fn at(path: &Path, Refusal { line, column, problem }: Refusal) -> RecordingError {
@@ -93,27 +121,20 @@ pub(super) fn open_file(path: &Path) -> Result<File, RecordingError> {
 /// The reader for what `input` begins with.
 fn choose<'a>(
     mut input: Box<dyn BufRead + 'a>,
-    path: &Path,
     options: &ReadOptions,
 ) -> Result<Box<dyn RowSource + 'a>, Refusal> {
-    let _ = path;
     let start = input.fill_buf().map_err(|error| Refusal::of_file(super::rows::io_problem(error)))?;
     if let Some((_, what)) = ARCHIVES.into_iter().find(|(magic, _)| start.starts_with(magic)) {
         return Err(Refusal::of_file(RecordingProblem::Archive { what }));
     }
     let text = start.strip_prefix(BYTE_ORDER_MARK).unwrap_or(start).trim_ascii_start();
     let source: Box<dyn RowSource + 'a> = if text.starts_with(b"<") {
-        return Err(Refusal::of_file(RecordingProblem::Binary));
+        Box::new(CommonRoadSource::new(input)?)
     } else {
         Box::new(TextSource::new(input)?)
     };
-    let found = source.about().layout;
-    match options.layout {
-        Some(choice) if !choice.includes(found) => {
-            Err(Refusal::of_file(RecordingProblem::OtherLayout { found, asked: choice.name() }))
-        }
-        _ => Ok(source),
-    }
+    check_choice(source.as_ref(), options)?;
+    Ok(source)
 }
 
 /// The hash of everything that was read of a recording.
@@ -149,10 +170,4 @@ impl<R: Read> Read for Hashed<R> {
         self.digest.0.borrow_mut().update(&buffer[..count]);
         Ok(count)
     }
-}
-
-/// The path of a file beside `path`.
-#[expect(dead_code, reason = "used by the readers of several files")]
-pub(super) fn beside(path: &Path, name: &str) -> PathBuf {
-    path.with_file_name(name)
 }

@@ -2,9 +2,10 @@
 
 use std::io::BufRead;
 
-use super::RecordingProblem;
+use super::{RecordingError, RecordingProblem};
 use super::fields::Fault;
-use super::layout::{Format, recognise};
+use super::file_set::Meta;
+use super::layout::{Format, is_of_drone, of_drone, recognise};
 use super::rows::{Fields, Lines};
 use super::source::{About, Refusal, Row, RowSource};
 
@@ -20,15 +21,41 @@ pub(super) struct TextSource<R> {
 
 impl<R: BufRead> TextSource<R> {
     /// # Errors
-    /// Where the first line is that of no layout.
+    /// Where the first line is that of no layout, or of one that needs other files.
     pub(super) fn new(source: R) -> Result<Self, Refusal> {
-        let mut lines = Lines::new(source);
-        let Some((number, first)) = lines.next().map_err(at_line)? else {
-            return Err(Refusal::of_file(RecordingProblem::Empty));
-        };
-        let format = recognise(first).map_err(|problem| at_line((number, problem)))?;
-        let first = (!format.has_header).then(|| (number, first.to_owned()));
+        let (lines, number, first) = begin(source)?;
+        Self::recognised(lines, number, first)
+    }
+
+    /// As [`TextSource::new`], where `meta` can be asked for what is in the other files.
+    pub(super) fn with_meta(
+        source: R,
+        meta: impl FnOnce() -> Result<Meta, RecordingError>,
+    ) -> Result<Self, Result<Refusal, RecordingError>> {
+        let (lines, number, first) = begin(source).map_err(Ok)?;
+        if !is_of_drone(&first) {
+            return Self::recognised(lines, number, first).map_err(Ok);
+        }
+        let format = of_drone(&first, meta().map_err(Err)?).map_err(|problem| Ok(Refusal::new(number, problem)))?;
+        Ok(Self { lines, format, fields: Fields::default(), name: None, first: None })
+    }
+
+    fn recognised(lines: Lines<R>, number: u64, first: String) -> Result<Self, Refusal> {
+        let format = recognise(&first).map_err(|problem| Refusal::new(number, problem))?;
+        let first = (!format.has_header).then_some((number, first));
         Ok(Self { lines, format, fields: Fields::default(), name: None, first })
+    }
+}
+
+/// The first line, and the lines behind it.
+fn begin<R: BufRead>(source: R) -> Result<(Lines<R>, u64, String), Refusal> {
+    let mut lines = Lines::new(source);
+    match lines.next().map_err(at_line)? {
+        Some((number, first)) => {
+            let first = first.to_owned();
+            Ok((lines, number, first))
+        }
+        None => Err(Refusal::of_file(RecordingProblem::Empty)),
     }
 }
 
@@ -38,7 +65,8 @@ fn at_line((line, problem): (u64, RecordingProblem)) -> Refusal {
 
 impl<R: BufRead> RowSource for TextSource<R> {
     fn about(&self) -> About {
-        About { name: self.name.clone(), ..self.format.columns.about() }
+        let about = self.format.columns.about();
+        About { name: self.name.clone().or(about.name.clone()), ..about }
     }
 
     fn next_row(&mut self) -> Result<Option<Row>, Refusal> {

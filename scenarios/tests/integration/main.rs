@@ -5,6 +5,7 @@
 mod fitted;
 mod golden;
 mod in_car;
+mod layouts;
 mod malformed;
 mod ngsim_us101;
 mod own_recordings;

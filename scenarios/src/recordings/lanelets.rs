@@ -1,0 +1,288 @@
+//! From lanelets to roads: a reference line for each, and the lanes beside it.
+//!
+//! ```text
+//!     ●───────────●───────────●    left bounds of the leftmost lanelets: the reference line, d = 0
+//!     │  lane 1   │  lane 1   │
+//!     ├───────────┼───────────┤    s ──▶
+//!     │  lane 2   │  lane 2   │
+//!     ●───────────●───────────●
+//! ```
+//!
+//! Lanelets that are joined by succession, or lie side by side in the same direction, are one road. Its reference line is
+//! the longest chain of lanelets that have none to their left, weighted with the lanes beside it; beyond its ends it goes
+//! on straight. The lane of a vehicle is that of the lanelet its centre lies in, counted from the left; where it lies in
+//! none of the chain's (on a ramp, beside the road) the lane whose middle is nearest.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::LaneMarkings;
+use closecall_traffic::Lane;
+
+/// A point in the scenario's plane [m].
+pub(super) type Point = (f64, f64);
+
+/// Points nearer to each other than this are one [m].
+const SAME_POINT_M: f64 = 1e-6;
+
+/// How far to the right of one another several roads are laid, so that their vehicles never meet [m].
+const APART_M: f64 = 1_000.0;
+
+/// A piece of a lane.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Lanelet {
+    pub(super) left: Vec<Point>,
+    pub(super) right: Vec<Point>,
+    /// The lanelet to the left, where it is driven in the same direction.
+    pub(super) left_id: Option<i64>,
+    /// The lanelet to the right, where it is driven in the same direction.
+    pub(super) right_id: Option<i64>,
+    pub(super) successors: Vec<i64>,
+}
+
+/// The roads of a scenario.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Roads {
+    roads: Vec<Road>,
+}
+
+/// A position on one of the roads.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct OnRoad {
+    pub(super) s_m: f64,
+    pub(super) d_m: f64,
+    pub(super) lane: u8,
+    /// Heading of the road there, in the scenario's plane [rad].
+    pub(super) heading_rad: f64,
+}
+
+#[derive(Clone, Debug)]
+struct Road {
+    /// The reference line: points, and the distance along the line to each.
+    line: Vec<(Point, f64)>,
+    /// Outlines with their lanes, from 1 at the left; only those beside the reference line.
+    lanes: Vec<(u8, Vec<Point>)>,
+    /// All outlines.
+    outlines: Vec<Vec<Point>>,
+    /// Right edge of each lane, as far as it tells [m].
+    right_edges_m: Vec<f64>,
+    /// What is added to the lane and to d, so that roads do not meet.
+    first_lane: u8,
+    shift_m: f64,
+}
+
+impl Roads {
+    /// The roads that `lanelets` make up, the largest first. Lanelets without extent are passed over.
+    pub(super) fn of(lanelets: &BTreeMap<i64, Lanelet>) -> Self {
+        let mut found: Vec<(f64, Road)> = components(lanelets).iter().filter_map(|ids| road(lanelets, ids)).collect();
+        found.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let (mut first_lane, mut shift_m) = (0_u8, 0.0);
+        let mut roads = Vec::new();
+        for (_, road) in found {
+            let lanes = u8::try_from(road.right_edges_m.len()).unwrap_or(u8::MAX);
+            let width_m = road.right_edges_m.last().copied().unwrap_or_default();
+            roads.push(Road { first_lane, shift_m, ..road });
+            first_lane = first_lane.saturating_add(lanes).saturating_add(1);
+            shift_m += width_m - APART_M;
+        }
+        Self { roads }
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.roads.is_empty()
+    }
+
+    /// The markings of all roads.
+    pub(super) fn markings(&self) -> LaneMarkings {
+        let of_road = |road: &Road| {
+            let edges = road.right_edges_m.clone().into_iter().enumerate();
+            let (first, shift_m) = (road.first_lane, road.shift_m);
+            // The left edge of a later road's first lane stands as the right edge of the lane that is left out.
+            let left = (first > 0).then_some((Lane(first), shift_m));
+            let lane = move |k: usize| Lane(first.saturating_add(u8::try_from(k + 1).unwrap_or(u8::MAX)));
+            left.into_iter().chain(edges.map(move |(k, edge_m)| (lane(k), shift_m + edge_m))).collect::<Vec<_>>()
+        };
+        LaneMarkings::stated(self.roads.iter().flat_map(of_road))
+    }
+
+    /// The road that a vehicle at `point` with `heading_rad` is on: the one with a lanelet there that is driven that way,
+    /// or else the one whose reference line is nearest.
+    pub(super) fn choose(&self, point: Point, heading_rad: f64) -> usize {
+        let rank = |road: &Road| {
+            let on = road.project(point);
+            let is_against = (heading_rad - on.heading_rad).cos() < 0.0;
+            let is_outside = !road.outlines.iter().any(|outline| contains(outline, point));
+            (is_against, is_outside, on.d_m.abs())
+        };
+        let ranked = self.roads.iter().map(rank).enumerate();
+        let best = ranked.min_by(|(_, a), (_, b)| (a.0, a.1).cmp(&(b.0, b.1)).then(a.2.total_cmp(&b.2)));
+        best.map_or(0, |(place, _)| place)
+    }
+
+    /// Where `point` is on the road that was chosen.
+    pub(super) fn place(&self, road: usize, point: Point) -> Option<OnRoad> {
+        let road = self.roads.get(road)?;
+        let on = road.project(point);
+        let inside = road.lanes.iter().find(|(_, outline)| contains(outline, point)).map(|(lane, _)| *lane);
+        let lane = inside.unwrap_or_else(|| road.nearest_lane(on.d_m)).saturating_add(road.first_lane);
+        Some(OnRoad { d_m: on.d_m + road.shift_m, lane, ..on })
+    }
+}
+
+impl Road {
+    /// The position relative to the reference line, which goes on straight beyond its ends.
+    fn project(&self, (x, y): Point) -> OnRoad {
+        let last = self.line.len().saturating_sub(2);
+        let mut nearest = (f64::INFINITY, OnRoad { s_m: 0.0, d_m: 0.0, lane: 0, heading_rad: 0.0 });
+        for (k, pair) in self.line.windows(2).enumerate() {
+            let (((x0, y0), s0), ((x1, y1), s1)) = (pair[0], pair[1]);
+            let length = s1 - s0;
+            let (ux, uy) = ((x1 - x0) / length, (y1 - y0) / length);
+            let (low, high) =
+                (if k == 0 { f64::NEG_INFINITY } else { 0.0 }, if k == last { f64::INFINITY } else { length });
+            let along = ((x - x0) * ux + (y - y0) * uy).clamp(low, high);
+            let (fx, fy) = (x - x0 - along * ux, y - y0 - along * uy);
+            let distance = fx.hypot(fy);
+            if distance < nearest.0 {
+                let side = (ux * (y - y0) - uy * (x - x0)).signum();
+                let on = OnRoad { s_m: s0 + along, d_m: side * distance, lane: 0, heading_rad: uy.atan2(ux) };
+                nearest = (distance, on);
+            }
+        }
+        nearest.1
+    }
+
+    /// The lane whose middle is nearest.
+    fn nearest_lane(&self, d_m: f64) -> u8 {
+        let mut left_m = 0.0;
+        let mut nearest = (f64::INFINITY, 1);
+        for (k, right_m) in self.right_edges_m.iter().enumerate() {
+            let off_m = (0.5 * (left_m + right_m) - d_m).abs();
+            if off_m < nearest.0 {
+                nearest = (off_m, u8::try_from(k + 1).unwrap_or(u8::MAX));
+            }
+            left_m = *right_m;
+        }
+        nearest.1
+    }
+}
+
+/// Lanelets that are joined by succession or lie side by side.
+fn components(lanelets: &BTreeMap<i64, Lanelet>) -> Vec<BTreeSet<i64>> {
+    let mut neighbours: BTreeMap<i64, Vec<i64>> = BTreeMap::new();
+    for (id, lanelet) in lanelets {
+        let joined = lanelet.successors.iter().chain(&lanelet.left_id).chain(&lanelet.right_id);
+        for other in joined.filter(|other| lanelets.contains_key(other)) {
+            neighbours.entry(*id).or_default().push(*other);
+            neighbours.entry(*other).or_default().push(*id);
+        }
+    }
+    let mut seen = BTreeSet::new();
+    let mut components = Vec::new();
+    for id in lanelets.keys() {
+        let (mut component, mut open) = (BTreeSet::new(), vec![*id]);
+        while let Some(id) = open.pop() {
+            if seen.insert(id) {
+                component.insert(id);
+                open.extend(neighbours.get(&id).into_iter().flatten());
+            }
+        }
+        if !component.is_empty() {
+            components.push(component);
+        }
+    }
+    components
+}
+
+/// The road of a component, and its size: length times lanes. Nothing where no lanelet has an extent.
+fn road(lanelets: &BTreeMap<i64, Lanelet>, ids: &BTreeSet<i64>) -> Option<(f64, Road)> {
+    let leftmost = |id: &&i64| lanelets.get(id).is_some_and(|lanelet| lanelet.left_id.is_none());
+    let chains = ids.iter().filter(leftmost).map(|id| chain(lanelets, *id));
+    let sized = chains.filter_map(|chain| {
+        let line = line(lanelets, &chain);
+        let length_m = line.last().filter(|_| line.len() > 1)?.1;
+        let lanes = chain.iter().map(|id| beside(lanelets, *id).len()).max()?;
+        Some((length_m * lanes as f64, chain, line))
+    });
+    let (size, chain, line) = sized.max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)))?;
+    let mut road = Road {
+        line,
+        lanes: Vec::new(),
+        outlines: ids.iter().filter_map(|id| lanelets.get(id)).map(outline).collect(),
+        right_edges_m: Vec::new(),
+        first_lane: 0,
+        shift_m: 0.0,
+    };
+    let mut edges_m: BTreeMap<u8, Vec<f64>> = BTreeMap::new();
+    for id in &chain {
+        for (k, lanelet) in beside(lanelets, *id).into_iter().enumerate() {
+            let lane = u8::try_from(k + 1).unwrap_or(u8::MAX);
+            road.lanes.push((lane, outline(lanelet)));
+            let right = lanelet.right.iter().map(|point| road.project(*point).d_m);
+            edges_m.entry(lane).or_default().extend(right);
+        }
+    }
+    road.right_edges_m = edges_m.into_values().filter_map(middle).collect();
+    Some((size, road))
+}
+
+fn middle(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+/// The lanelets from `id` on, each the successor of the one before that has none to its left, or else any.
+fn chain(lanelets: &BTreeMap<i64, Lanelet>, id: i64) -> Vec<i64> {
+    let (mut chain, mut current) = (vec![id], id);
+    while let Some(lanelet) = lanelets.get(&current) {
+        let known = |id: &&i64| lanelets.contains_key(id) && !chain.contains(id);
+        let is_leftmost = |id: &&i64| lanelets.get(id).is_some_and(|next| next.left_id.is_none());
+        let mut next = lanelet.successors.iter().filter(known).filter(is_leftmost);
+        let Some(next) = next.next() else { break };
+        chain.push(*next);
+        current = *next;
+    }
+    chain
+}
+
+/// The lanelets side by side from `id` to the right.
+fn beside(lanelets: &BTreeMap<i64, Lanelet>, id: i64) -> Vec<&Lanelet> {
+    let (mut seen, mut found, mut current) = (BTreeSet::new(), Vec::new(), Some(id));
+    while let Some((id, lanelet)) = current.and_then(|id| Some((id, lanelets.get(&id)?))) {
+        if !seen.insert(id) {
+            break;
+        }
+        found.push(lanelet);
+        current = lanelet.right_id;
+    }
+    found
+}
+
+/// The left bounds of a chain, with the distance along them.
+fn line(lanelets: &BTreeMap<i64, Lanelet>, chain: &[i64]) -> Vec<(Point, f64)> {
+    let mut line: Vec<(Point, f64)> = Vec::new();
+    for point in chain.iter().filter_map(|id| lanelets.get(id)).flat_map(|lanelet| &lanelet.left) {
+        let Some(((x, y), s_m)) = line.last() else {
+            line.push((*point, 0.0));
+            continue;
+        };
+        let step_m = (point.0 - x).hypot(point.1 - y);
+        if step_m > SAME_POINT_M {
+            let s_m = s_m + step_m;
+            line.push((*point, s_m));
+        }
+    }
+    line
+}
+
+fn outline(lanelet: &Lanelet) -> Vec<Point> {
+    lanelet.left.iter().chain(lanelet.right.iter().rev()).copied().collect()
+}
+
+/// True where `point` lies within the outline: a ray from it crosses the outline an odd number of times.
+fn contains(outline: &[Point], (x, y): Point) -> bool {
+    let ends = outline.iter().skip(1).chain(outline.first());
+    let crosses = |((x0, y0), (x1, y1)): (&Point, &Point)| {
+        (*y0 > y) != (*y1 > y) && x < x0 + (y - y0) / (y1 - y0) * (x1 - x0)
+    };
+    outline.iter().zip(ends).filter(|edge| crosses(*edge)).count() % 2 == 1
+}

@@ -1,0 +1,142 @@
+//! Layouts that tell the same: highD's three files, CommonRoad XML and the plain CSV of one recording; and made-up ones.
+
+use std::path::Path;
+
+use closecall_scenarios::filters::smooth;
+use closecall_scenarios::lane_change::detect;
+use closecall_scenarios::recordings::{
+    Layout, LayoutChoice, ReadOptions, Recording, RecordingProblem, open, read, read_from, read_with,
+};
+use closecall_traffic::{Lane, Time};
+
+use crate::support::data_folder;
+
+#[test]
+fn the_highd_layout_tells_what_the_plain_one_tells() {
+    let Some(data) = data_folder() else { return };
+    let folder = data.join("highd_format_sample");
+    let plain = read(&data.join("ngsim_us101/trajectories/us101_h.csv")).unwrap();
+    let highd = read(&folder.join("01_tracks.csv")).unwrap();
+    assert_eq!((highd.layout, highd.period), (Layout::Highd, Time::from_ms(100)));
+    for other in [folder.clone(), folder.join("01"), folder.join("01_tracksMeta.csv"), folder.join("01_recordingMeta.csv")] {
+        assert_eq!(read(&other).unwrap().trajectories, highd.trajectories, "{}", other.display());
+    }
+    assert_eq!(highd.trajectories.len(), 27);
+    let instants = |recording: &Recording| recording.trajectories.iter().map(|track| track.points.len()).sum::<usize>();
+    assert_eq!(instants(&highd), instants(&plain));
+    assert!((highd.markings.lane_width_m(Lane(1)).unwrap() - 3.45).abs() < 1e-9);
+    let crossings = |recording| {
+        detect(&smooth(recording)).iter().map(|change| (change.direction, change.crossing_s)).collect::<Vec<_>>()
+    };
+    let (mut one, mut other) = (crossings(&plain), crossings(&highd));
+    one.sort_by(|a, b| a.1.total_cmp(&b.1));
+    other.sort_by(|a, b| a.1.total_cmp(&b.1));
+    assert!(one.len() >= 4);
+    assert_eq!(one.len(), other.len());
+    assert!(one.iter().zip(&other).all(|(a, b)| a.0 == b.0 && (a.1 - b.1).abs() <= 0.101), "{one:?} {other:?}");
+}
+
+#[test]
+fn commonroad_scenarios_give_the_tracks_of_the_recording_they_are_cut_from() {
+    let Some(data) = data_folder() else { return };
+    let entries = std::fs::read_dir(data.join("ngsim_us101/commonroad_xml")).unwrap();
+    let mut paths: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
+    paths.sort();
+    let plain: Vec<Recording> = ["a", "b", "f", "g", "h", "i"]
+        .map(|name| read(&data.join(format!("ngsim_us101/trajectories/us101_{name}.csv"))).unwrap())
+        .into();
+    let (mut compared, mut same_lane, mut rows) = (0, 0, 0);
+    for path in &paths {
+        let scenario = read(path).unwrap();
+        assert_eq!((scenario.layout, scenario.period), (Layout::Commonroad, Time::from_ms(100)));
+        assert!(scenario.trajectories.len() > 1, "{}", path.display());
+        for track in &scenario.trajectories {
+            rows += track.points.len();
+            // The same vehicle elsewhere: the same number, the same size, the same speeds for a while.
+            let found = plain.iter().flat_map(|recording| &recording.trajectories).find_map(|other| {
+                let speeds = |points: &[closecall_traffic::TrajectoryPoint]| {
+                    points.iter().map(|point| (point.speed_mps * 10.0).round() as i64).collect::<Vec<_>>()
+                };
+                let (needle, hay) = (speeds(&track.points), speeds(&other.points));
+                (other.vehicle_id == track.vehicle_id && needle.len() > 20 && hay.len() >= needle.len())
+                    .then(|| hay.windows(needle.len()).position(|part| part == needle))
+                    .flatten()
+                    .map(|start| &other.points[start..start + needle.len()])
+            });
+            for (a, b) in track.points.iter().zip(found.unwrap_or_default()) {
+                compared += 1;
+                same_lane += usize::from(a.lane == b.lane && (a.d_m - b.d_m).abs() < 0.5);
+            }
+        }
+    }
+    assert!(rows > 10_000, "{rows}");
+    assert!(compared > 3_000, "{compared}");
+    assert!(same_lane * 100 >= compared * 95, "{same_lane} of {compared}");
+}
+
+#[test]
+fn hand_made_commonroad_scenarios_are_read() {
+    let Some(data) = data_folder() else { return };
+    let merging = read(&data.join("commonroad_crime/ZAM_Zip-1_56_T-1.xml")).unwrap();
+    assert_eq!((merging.name.as_str(), merging.trajectories.len()), ("ZAM_Zip-1_56_T-1", 3));
+    let cut_in = read(&data.join("commonroad_crime/OSC_CutIn-1_2_T-1.xml")).unwrap();
+    assert_eq!(cut_in.trajectories.len(), 2);
+    for track in &cut_in.trajectories {
+        assert!(track.points.iter().all(|point| point.speed_mps > 0.0), "nobody drives backwards");
+        assert!(track.points.windows(2).all(|pair| pair[1].s_m > pair[0].s_m));
+    }
+}
+
+/// Vehicle 1 drives to the left in the upper carriageway, vehicle 2 to the right in the lower one.
+fn write_both_ways(folder: &Path) {
+    let meta = "id,frameRate,upperLaneMarkings,lowerLaneMarkings\n7,25,8.5;12.5;16.5,21.0;25.0;29.0\n";
+    std::fs::write(folder.join("07_recordingMeta.csv"), meta).unwrap();
+    let meta = "id,numFrames,class,drivingDirection\n1,30,Car,1\n2,30,Truck,2\n";
+    std::fs::write(folder.join("07_tracksMeta.csv"), meta).unwrap();
+    let mut rows = "frame,id,x,y,width,height,xVelocity,yVelocity,xAcceleration,yAcceleration,precedingId,laneId\n".to_owned();
+    for frame in 1..=30 {
+        let x_m = 400.0 - 1.2 * f64::from(frame);
+        // From the lane beside the median (laneId 3) to the outer one.
+        let (y_m, lane) = if frame < 16 { (13.5, 3) } else { (9.5, 2) };
+        rows += &format!("{frame},1,{x_m:.2},{y_m},4.5,1.8,-30.0,0,0.5,0,0,{lane}\n");
+    }
+    for frame in 1..=30 {
+        let x_m = 10.0 + f64::from(frame);
+        rows += &format!("{frame},2,{x_m:.2},25.75,12.0,2.5,25.0,0,-0.5,0,0,6\n");
+    }
+    std::fs::write(folder.join("07_tracks.csv"), rows).unwrap();
+}
+
+#[test]
+fn both_carriageways_are_driven_forwards_and_lie_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    write_both_ways(folder.path());
+    let recording = read(folder.path()).unwrap();
+    let [upper, lower] = recording.trajectories.as_slice() else { panic!() };
+    for track in [upper, lower] {
+        assert!(track.points.iter().all(|point| point.speed_mps > 0.0));
+        assert!(track.points.windows(2).all(|pair| pair[1].s_m > pair[0].s_m), "s rises");
+    }
+    assert_eq!((upper.points[0].acceleration_mps2, lower.points[0].acceleration_mps2), (-0.5, -0.5));
+    // The lower carriageway has lanes 1 and 2, the median is left out, the upper one has 4 and 5.
+    assert_eq!(lower.points[0].lane, Lane(2));
+    assert!((lower.points[0].d_m + 6.0).abs() < 1e-9, "27 m is 6 m below the upper marking");
+    assert_eq!((upper.points[0].lane, upper.points[29].lane), (Lane(4), Lane(5)));
+    assert!((upper.points[0].d_m + 1_000.0 + 8.0 + 2.1).abs() < 1e-9, "its left edge is 1 km right of the other's right");
+    assert!(upper.points[29].d_m < upper.points[0].d_m, "it moves to its right");
+    assert_eq!(recording.markings.lane_width_m(Lane(5)), Some(4.0));
+}
+
+#[test]
+fn a_layout_that_is_asked_for_has_to_be_there() {
+    let folder = tempfile::tempdir().unwrap();
+    write_both_ways(folder.path());
+    let path = folder.path().join("07_tracks.csv");
+    let asked = |layout| read_with(&path, ReadOptions { layout: Some(layout), ..ReadOptions::default() });
+    assert!(asked(LayoutChoice::Highd).is_ok());
+    let error = asked(LayoutChoice::Ngsim).unwrap_err();
+    assert!(error.to_string().contains("the layout highd, not in ngsim as asked for"), "{error}");
+    assert!(open(&path, ReadOptions::default()).is_ok());
+    let alone = read_from(std::fs::File::open(&path).unwrap(), &path).unwrap_err();
+    assert!(matches!(alone.problem, RecordingProblem::NeedsMetadata));
+}
