@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use clap::{Args, ValueEnum};
+use closecall_scenarios::recordings::{BadRows, LayoutChoice, ReadOptions};
 use closecall_sensors::SensorMode;
 
 use super::CliError;
@@ -126,6 +127,50 @@ impl ArmArgs {
 /// An arm of a controller.
 pub(super) fn arm(controller: &ControllerChoice, sensors: Option<Sensing>) -> Arm {
     Arm { controller: controller.factory(), sensors: sensors.map(Sensing::mode) }
+}
+
+/// The layout of a recording.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum Layout {
+    /// NGSIM's columns in feet
+    Ngsim,
+    /// highD's or exiD's three files
+    Highd,
+    /// CommonRoad XML
+    Commonroad,
+    /// The plain CSV that `closecall record` writes
+    Csv,
+    /// A log of one vehicle that sees the lane markings
+    InCar,
+}
+
+/// How a recording is read.
+#[derive(Clone, Copy, Debug, Args)]
+pub(super) struct ReadArgs {
+    /// Layout of the recording; told by its content where absent
+    #[arg(long, value_enum)]
+    layout: Option<Layout>,
+    /// Leave out rows that cannot be used, and count them, instead of refusing the recording
+    #[arg(long)]
+    drop_bad_rows: bool,
+}
+
+impl ReadArgs {
+    /// True where rows that cannot be used are left out.
+    pub(super) fn drops_bad_rows(&self) -> bool {
+        self.drop_bad_rows
+    }
+
+    pub(super) fn options(&self) -> ReadOptions {
+        let layout = self.layout.map(|layout| match layout {
+            Layout::Ngsim => LayoutChoice::Ngsim,
+            Layout::Highd => LayoutChoice::Highd,
+            Layout::Commonroad => LayoutChoice::Commonroad,
+            Layout::Csv => LayoutChoice::Csv,
+            Layout::InCar => LayoutChoice::InCar,
+        });
+        ReadOptions { layout, bad_rows: if self.drop_bad_rows { BadRows::Drop } else { BadRows::Refuse } }
+    }
 }
 
 /// Changes of single values.

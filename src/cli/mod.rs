@@ -5,6 +5,7 @@ mod campaign;
 mod check;
 mod compare;
 mod error;
+mod inspect;
 mod gates;
 mod json;
 mod leave;
@@ -72,6 +73,8 @@ enum Command {
     Check(check::CheckArgs),
     /// Print the JSON Schema of scenario files
     Schema,
+    /// Tell how far a recording can be trusted: gaps, jumps, overlaps, and rows that cannot be used
+    Inspect(inspect::InspectArgs),
     /// Find lane changes in a recording
     LaneChanges(recording::LaneChangesArgs),
     /// Work out how critical each lane change of a recording was
@@ -129,6 +132,7 @@ fn dispatch(command: Command) -> Result<ExitCode, CliError> {
         Command::Replay(args) => replay::replay(&args),
         Command::Check(args) => check::check(&args),
         Command::Schema => check::schema(),
+        Command::Inspect(args) => inspect::inspect(&args),
         Command::LaneChanges(args) => recording::lane_changes(&args),
         Command::Criticality(args) => recording::criticality(&args),
         Command::Fit(args) => recording::fit(&args),

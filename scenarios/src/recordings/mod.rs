@@ -65,7 +65,7 @@ pub use error::{RecordingError, RecordingProblem, WriteError};
 pub use markings::{DEFAULT_LANE_WIDTH_M, LaneMarkings};
 pub use open::{open, open_from, read, read_from, read_with};
 pub use order::WINDOW_ROWS;
-pub use quality::{Quality, quality};
+pub use quality::{Flaw, FlawPlace, Flaws, Inspector, Quality, quality};
 pub use tracks::{BadRows, LayoutChoice, ReadOptions, Tracks};
 pub use write::write_recording;
 pub use write_in_car::{BusFrame, InCarFrame, InCarLog, TrueLaneChange, truth_path, write_in_car, write_truth};

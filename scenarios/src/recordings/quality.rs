@@ -1,11 +1,49 @@
-//! How far a recording can be trusted.
+//! How far a recording can be trusted: its flaws, counted, each with the first place.
+//!
+//! | flaw | what counts |
+//! |---|---|
+//! | gap | a piece of a vehicle's track beyond the first: frames are missing before it |
+//! | jump | a step that the recorded speed cannot make: off by more than 10 m/s along the road, or faster than 5 m/s sideways, and by at least 0.5 m |
+//! | acceleration | an instant with more than 12 m/s² (no tyre brakes harder), recorded or from two speeds that differ by at least 0.5 m/s |
+//! | overlap | two vehicles in one lane at one instant whose boxes overlap lengthwise |
+//! | reused number | a piece that cannot be the same vehicle: other class or size, or out of reach of the piece before |
+//!
+//! Rows that could not be used at all are in [`Dropped`](super::Dropped).
+//!
+//! Tracks are looked at one by one. For overlaps the vehicles of some time have to be remembered: up to
+//! 4 million instants, the latest. Where a file is sorted by vehicle and a later track begins before them, its instants are
+//! counted as unchecked.
 
 use std::collections::BTreeMap;
 
-use closecall_traffic::{Time, Trajectory, TrajectoryPoint};
+use closecall_traffic::{Dimensions, Time, Trajectory, TrajectoryPoint, VehicleClass};
 use serde::Serialize;
 
-use super::Recording;
+use super::{RecordedTrack, Recording};
+
+/// A step jumps where its speed along the road differs from the recorded one by more than this [m/s]: at 10 Hz, a metre.
+const JUMP_MPS: f64 = 10.0;
+
+/// A step jumps where it goes sideways faster than this [m/s]: lane changes stay below 2.
+const SIDEWAYS_JUMP_MPS: f64 = 5.0;
+
+/// What jumps, jumps by at least this [m]: at high rates, noise of a centimetre is fast.
+const JUMP_M: f64 = 0.5;
+
+/// No vehicle on tyres brakes or accelerates harder [m/s²].
+const IMPOSSIBLE_MPS2: f64 = 12.0;
+
+/// Speeds that differ by less say nothing about accelerations at high rates [m/s].
+const SPEED_STEP_MPS: f64 = 0.5;
+
+/// Sizes of one vehicle differ by less [m].
+const SAME_SIZE_M: f64 = 0.3;
+
+/// Nobody travels faster between two pieces of a track [m/s].
+const REACH_MPS: f64 = 70.0;
+
+/// Instants that are remembered to find overlaps: 200 MB.
+const REMEMBERED: usize = 4 << 20;
 
 /// Flaws of a recording, counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -16,55 +54,235 @@ pub struct Quality {
     pub vehicles: usize,
     /// Instants of all tracks.
     pub instants: usize,
-    /// Gaps: pieces of a vehicle's track beyond the first.
+    /// Pieces of a vehicle's track beyond the first.
     pub gaps: usize,
-    /// Steps between two frames at a speed that differs from the recorded one by more than 10 m/s.
+    /// Steps between two frames that the recorded speed cannot make.
     pub jumps: usize,
     /// Pairs of vehicles in one lane, at one instant, that overlap lengthwise.
     pub overlaps: usize,
+    /// Instants with an acceleration that no vehicle has.
+    pub accelerations: usize,
+    /// Pieces of a track that cannot be the same vehicle as the piece before.
+    pub reused_numbers: usize,
 }
 
-/// A step counts as a jump where its speed differs from the recorded speed by more than this [m/s]: at 10 Hz, a metre.
-const JUMP_MPS: f64 = 10.0;
+/// Where a flaw is.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FlawPlace {
+    /// The line of the file, where it is known.
+    pub line: Option<u64>,
+    /// The track.
+    pub track_id: u64,
+    /// When [s].
+    pub time_s: f64,
+    /// What is there.
+    pub what: String,
+}
+
+/// Flaws of one kind.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Flaw {
+    /// How many.
+    pub count: usize,
+    /// The first that was found.
+    pub first: Option<FlawPlace>,
+}
+
+/// The flaws of a recording.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Flaws {
+    /// See the module's documentation, for all of them.
+    pub gaps: Flaw,
+    /// Steps that the recorded speed cannot make.
+    pub jumps: Flaw,
+    /// Vehicles in one place.
+    pub overlaps: Flaw,
+    /// Accelerations that no vehicle has.
+    pub accelerations: Flaw,
+    /// Pieces that cannot be the same vehicle.
+    pub reused_numbers: Flaw,
+}
+
+impl Flaws {
+    /// The flaws with their names.
+    pub fn named(&self) -> [(&'static str, &Flaw); 5] {
+        [
+            ("gaps", &self.gaps),
+            ("jumps", &self.jumps),
+            ("overlaps", &self.overlaps),
+            ("impossible accelerations", &self.accelerations),
+            ("reused numbers", &self.reused_numbers),
+        ]
+    }
+}
 
 /// Counts the flaws of `recording`.
 pub fn quality(recording: &Recording) -> Quality {
-    let tracks = &recording.trajectories;
-    let mut vehicles: Vec<u64> = tracks.iter().map(|track| track.vehicle_id).collect();
-    vehicles.sort_unstable();
-    vehicles.dedup();
-    Quality {
-        tracks: tracks.len(),
-        vehicles: vehicles.len(),
-        instants: tracks.iter().map(|track| track.points.len()).sum(),
-        gaps: tracks.len() - vehicles.len(),
-        jumps: tracks.iter().map(jumps).sum(),
-        overlaps: overlaps(tracks),
+    let mut inspector = Inspector::default();
+    for track in &recording.trajectories {
+        inspector.add_trajectory(track, &[]);
     }
+    inspector.quality()
 }
 
-fn jumps(track: &Trajectory) -> usize {
-    let is_jump = |pair: &&[TrajectoryPoint]| {
-        let step_mps = (pair[1].s_m - pair[0].s_m) / (pair[1].time - pair[0].time).s();
-        let difference_mps = (step_mps - 0.5 * (pair[0].speed_mps + pair[1].speed_mps)).abs();
-        difference_mps.is_nan() || difference_mps > JUMP_MPS
-    };
-    track.points.windows(2).filter(is_jump).count()
+/// Looks at tracks one by one.
+#[derive(Debug, Default)]
+pub struct Inspector {
+    flaws: Flaws,
+    tracks: usize,
+    instants: usize,
+    vehicles: BTreeMap<u64, Seen>,
+    road: BTreeMap<Time, Vec<Occupied>>,
+    remembered: usize,
+    forgotten_until: Option<Time>,
+    unchecked: usize,
+    span: Option<(Time, Time)>,
 }
 
-fn overlaps(tracks: &[Trajectory]) -> usize {
-    let mut lanes: BTreeMap<(Time, u8), Vec<(f64, f64)>> = BTreeMap::new();
-    for track in tracks {
-        let half = 0.5 * track.dimensions.length_m;
-        for point in &track.points {
-            lanes.entry((point.time, point.lane.0)).or_default().push((point.s_m - half, point.s_m + half));
+/// A vehicle where it was last seen.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    class: VehicleClass,
+    dimensions: Dimensions,
+    time: Time,
+    s_m: f64,
+}
+
+/// A place in a lane.
+#[derive(Clone, Copy, Debug)]
+struct Occupied {
+    lane: u8,
+    from_m: f64,
+    to_m: f64,
+    track_id: u64,
+}
+
+impl Inspector {
+    /// Looks at the next track.
+    pub fn add(&mut self, track: &RecordedTrack) {
+        self.add_trajectory(&track.trajectory, &track.lines);
+    }
+
+    /// What was found so far.
+    pub fn flaws(&self) -> &Flaws {
+        &self.flaws
+    }
+
+    /// Instants that were not compared with the others to find overlaps.
+    pub fn unchecked_instants(&self) -> usize {
+        self.unchecked
+    }
+
+    /// The first and the last instant.
+    pub fn span(&self) -> Option<(Time, Time)> {
+        self.span
+    }
+
+    /// What was found so far, counted.
+    pub fn quality(&self) -> Quality {
+        Quality {
+            tracks: self.tracks,
+            vehicles: self.vehicles.len(),
+            instants: self.instants,
+            gaps: self.flaws.gaps.count,
+            jumps: self.flaws.jumps.count,
+            overlaps: self.flaws.overlaps.count,
+            accelerations: self.flaws.accelerations.count,
+            reused_numbers: self.flaws.reused_numbers.count,
         }
     }
-    let overlaps_in = |spans: &mut Vec<(f64, f64)>| {
-        spans.sort_by(|a, b| a.0.total_cmp(&b.0));
-        spans.windows(2).filter(|pair| pair[1].0 < pair[0].1).count()
-    };
-    lanes.values_mut().map(overlaps_in).sum()
+
+    fn add_trajectory(&mut self, track: &Trajectory, lines: &[u64]) {
+        self.tracks += 1;
+        self.instants += track.points.len();
+        let (Some(first), Some(last)) = (track.points.first(), track.points.last()) else { return };
+        self.span = Some(self.span.map_or((first.time, last.time), |(a, b)| (a.min(first.time), b.max(last.time))));
+        self.add_piece(track, lines, (first, last));
+        for (k, pair) in track.points.windows(2).enumerate() {
+            if let [before, point] = pair {
+                self.add_step(track.track_id, lines.get(k + 1).copied(), (before, point));
+            }
+        }
+        for (k, point) in track.points.iter().enumerate() {
+            if !(point.acceleration_mps2.abs() <= IMPOSSIBLE_MPS2) {
+                let what = || format!("{:.1} m/s² recorded", point.acceleration_mps2);
+                self.flaws.accelerations.found(lines.get(k).copied(), track.track_id, point.time, what);
+            }
+            self.occupy(track, point, lines.get(k).copied());
+        }
+    }
+
+    fn add_piece(&mut self, track: &Trajectory, lines: &[u64], (first, last): (&TrajectoryPoint, &TrajectoryPoint)) {
+        let (class, dimensions) = (track.class, track.dimensions);
+        let seen = Seen { class, dimensions, time: last.time, s_m: last.s_m };
+        let Some(before) = self.vehicles.insert(track.vehicle_id, seen) else { return };
+        let line = lines.first().copied();
+        let missing_s = (first.time - before.time).s();
+        let gap = || format!("vehicle {} is missing for {missing_s:.2} s before", track.vehicle_id);
+        self.flaws.gaps.found(line, track.track_id, first.time, gap);
+        let differs = |a: f64, b: f64| !((a - b).abs() <= SAME_SIZE_M);
+        let other = before.class != class
+            || differs(before.dimensions.length_m, dimensions.length_m)
+            || differs(before.dimensions.width_m, dimensions.width_m);
+        let travelled_m = first.s_m - before.s_m;
+        let is_out_of_reach = !(travelled_m >= -JUMP_M && travelled_m <= REACH_MPS * missing_s.abs() + JUMP_M);
+        if other || is_out_of_reach {
+            let why = if other { "has another class or size than" } else { "is out of reach of" };
+            let what = || format!("vehicle {} {why} the one of this number {missing_s:.1} s before", track.vehicle_id);
+            self.flaws.reused_numbers.found(line, track.track_id, first.time, what);
+        }
+    }
+
+    fn add_step(&mut self, track_id: u64, line: Option<u64>, (before, point): (&TrajectoryPoint, &TrajectoryPoint)) {
+        let step_s = (point.time - before.time).s();
+        let speed_mps = 0.5 * (before.speed_mps + point.speed_mps);
+        let (along_m, across_m) = (point.s_m - before.s_m - speed_mps * step_s, point.d_m - before.d_m);
+        let is_jump = |off_m: f64, limit_mps: f64| !(off_m.abs() <= (limit_mps * step_s).max(JUMP_M));
+        if is_jump(along_m, JUMP_MPS) || is_jump(across_m, SIDEWAYS_JUMP_MPS) {
+            let what = || format!("{along_m:.2} m along and {across_m:.2} m across beside what its speed makes");
+            self.flaws.jumps.found(line, track_id, point.time, what);
+        }
+        let change_mps = point.speed_mps - before.speed_mps;
+        if !(change_mps.abs() <= (IMPOSSIBLE_MPS2 * step_s).max(SPEED_STEP_MPS))
+            && point.acceleration_mps2.abs() <= IMPOSSIBLE_MPS2
+        {
+            let what = || format!("from {:.1} to {:.1} m/s in {step_s:.3} s", before.speed_mps, point.speed_mps);
+            self.flaws.accelerations.found(line, track_id, point.time, what);
+        }
+    }
+
+    fn occupy(&mut self, track: &Trajectory, point: &TrajectoryPoint, line: Option<u64>) {
+        if self.forgotten_until.is_some_and(|until| point.time <= until) {
+            self.unchecked += 1;
+            return;
+        }
+        let half_m = 0.5 * track.dimensions.length_m;
+        let (from_m, to_m) = (point.s_m - half_m, point.s_m + half_m);
+        let here = Occupied { lane: point.lane.0, from_m, to_m, track_id: track.track_id };
+        let others = self.road.entry(point.time).or_default();
+        for other in others.iter().filter(|other| other.lane == here.lane && other.from_m < to_m && from_m < other.to_m) {
+            let overlap_m = to_m.min(other.to_m) - from_m.max(other.from_m);
+            let what = || format!("overlaps track {} by {overlap_m:.2} m in lane {}", other.track_id, here.lane);
+            self.flaws.overlaps.found(line, track.track_id, point.time, what);
+        }
+        others.push(here);
+        self.remembered += 1;
+        while self.remembered > REMEMBERED
+            && let Some((time, forgotten)) = self.road.pop_first()
+        {
+            self.remembered -= forgotten.len();
+            self.forgotten_until = Some(time);
+        }
+    }
+}
+
+impl Flaw {
+    fn found(&mut self, line: Option<u64>, track_id: u64, time: Time, what: impl FnOnce() -> String) {
+        self.count += 1;
+        if self.first.is_none() {
+            self.first = Some(FlawPlace { line, track_id, time_s: time.s(), what: what() });
+        }
+    }
 }
 
 #[cfg(test)]
@@ -81,6 +299,45 @@ mod tests {
         let close = straight_track(4, 3.0, 20.0, -1.75, 4);
         let recording = recording_of(vec![straight_track(1, 0.0, 20.0, -1.75, 10), jumping, piece, close]);
         let found = quality(&recording);
-        assert_eq!(found, Quality { tracks: 4, vehicles: 3, instants: 34, gaps: 1, jumps: 2, overlaps: 4 });
+        let expected = Quality {
+            tracks: 4,
+            vehicles: 3,
+            instants: 34,
+            gaps: 1,
+            jumps: 2,
+            overlaps: 4,
+            accelerations: 0,
+            // The piece is 100 m behind where vehicle 2 was, at the same time.
+            reused_numbers: 1,
+        };
+        assert_eq!(found, expected);
+    }
+
+    #[test]
+    fn a_jump_to_the_side_is_one_and_its_place_is_told() {
+        let mut track = straight_track(7, 0.0, 20.0, -1.75, 10);
+        track.points.iter_mut().skip(4).for_each(|point| point.d_m -= 0.8);
+        let mut inspector = Inspector::default();
+        inspector.add_trajectory(&track, &(11..21).collect::<Vec<_>>());
+        let jumps = &inspector.flaws().jumps;
+        let first = jumps.first.as_ref().unwrap();
+        assert_eq!((jumps.count, first.line, first.track_id, first.time_s), (1, Some(15), 7, 0.4));
+        assert!(first.what.contains("-0.80 m across"), "{}", first.what);
+    }
+
+    #[test]
+    fn what_no_tyre_can_do_is_found() {
+        let mut braking = straight_track(1, 0.0, 20.0, -1.75, 10);
+        braking.points[3].acceleration_mps2 = -14.0;
+        let mut stopping = straight_track(2, 100.0, 20.0, -1.75, 10);
+        stopping.points[9].speed_mps = 17.0;
+        assert_eq!(quality(&recording_of(vec![braking, stopping])).accelerations, 2);
+    }
+
+    #[test]
+    fn a_lane_change_is_no_flaw() {
+        let track = crate::recordings::test_support::changing_track(1, (0.0, 30.0), (-5.25, -1.75), (4.0, 3.0), 150);
+        let found = quality(&recording_of(vec![track]));
+        assert_eq!((found.jumps, found.accelerations, found.gaps), (0, 0, 0));
     }
 }

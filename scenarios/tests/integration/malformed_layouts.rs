@@ -1,0 +1,371 @@
+//! Broken recordings in highD's layout, in CommonRoad XML, in-car logs, and packed files; and the kinds of mix-ups that
+//! leave every single number legal.
+
+use std::io::{Read, Write as _};
+use std::path::Path;
+
+use closecall_scenarios::recordings::{
+    BadRows, ReadOptions, RecordingError, RecordingProblem, open, open_from, read, read_from,
+};
+
+use crate::support::{PLAIN_HEADER, read_text};
+
+fn says(error: &RecordingError, needed: &[&str], what: &str) {
+    let message = error.to_string();
+    for part in needed {
+        assert!(message.contains(part), "{what}: `{message}` does not say `{part}`");
+    }
+}
+
+const IN_CAR: &str = "time_s,s_m,d_left_m,speed_mps,left_marking_m,right_marking_m";
+
+fn in_car(rows: &[&str]) -> String {
+    format!("{IN_CAR}\n{}\n", rows.join("\n"))
+}
+
+#[test]
+fn broken_in_car_logs_are_refused() {
+    let good = ["0.00,0.0,-5.6,30,1.9,1.8", "0.04,1.2,-5.6,30,1.9,1.8", "0.08,2.4,-5.6,30,1.9,1.8"];
+    let with = |row: &str| in_car(&[good[0], good[1], row]);
+    assert!(read_text(in_car(&good).as_bytes()).is_ok());
+    for (text, needed) in [
+        (in_car(&good).replace("right_marking_m", "right_m"), vec!["line 1", "no column `right_marking_m`", "in-car"]),
+        (in_car(&good).replace(",s_m,", ",s_m2,"), vec!["line 1", "no column `s_m`"]),
+        (with("0.08,2.4,-5.6,30"), vec!["line 4", "4 columns, but 6 are needed"]),
+        (with("0.04,2.4,-5.6,30,1.9,1.8"), vec!["line 4", "`time_s`", "time has to go on"]),
+        (with("0.01,2.4,-5.6,30,1.9,1.8"), vec!["line 4", "is 0.01, after 0.04"]),
+        (with("0.055,2.4,-5.6,30,1.9,1.8"), vec!["line 4", "between two of their ticks"]),
+        (with("0.08,nan,-5.6,30,1.9,1.8"), vec!["line 4", "`s_m`", "is `nan`"]),
+        (with("0.08,2.4,-5.6,30,inf,1.8"), vec!["line 4", "`left_marking_m`", "is `inf`"]),
+        (with("0.08,2.4,-5.6,30,1.9,NaN"), vec!["line 4", "`right_marking_m`"]),
+        (with("0.08,2.4,-5.6,-30,1.9,1.8"), vec!["line 4", "`speed_mps`", "0 to 150"]),
+        (with("0.08,2.4,-5.6,30,190,1.8"), vec!["line 4", "`left_marking_m`", "-20 to 20"]),
+        (with("x,2.4,-5.6,30,1.9,1.8"), vec!["line 4", "`time_s`", "is `x`"]),
+        (in_car(&good).trim_end().to_owned(), vec!["line 4", "does not end"]),
+        (in_car(&["0,0,0,,1.9,1.8", "0.04,0,0,,1.9,1.8"]), vec!["no rows"]),
+    ] {
+        let error = read_text(text.as_bytes()).expect_err(&text);
+        says(&error, &needed, &text);
+        assert!(!error.is_io());
+    }
+}
+
+/// Writes a small recording in highD's layout with one text of each file replaced, and reads it.
+fn highd(file: &str, from: &str, to: &str) -> RecordingError {
+    let folder = tempfile::tempdir().unwrap();
+    let mut rows =
+        "frame,id,x,y,width,height,xVelocity,yVelocity,xAcceleration,yAcceleration,precedingId,laneId\n".to_owned();
+    for frame in 1..=20 {
+        rows += &format!("{frame},2,{}.5,25.75,12.0,2.5,25.0,0,-0.5,0,0,6\n", 10 + frame);
+    }
+    let files = [
+        ("07_recordingMeta.csv", "id,frameRate,upperLaneMarkings,lowerLaneMarkings\n7,25,8.5;12.5;16.5,21.0;25.0;29.0\n".to_owned()),
+        ("07_tracksMeta.csv", "id,numFrames,class,drivingDirection\n2,20,Truck,2\n".to_owned()),
+        ("07_tracks.csv", rows),
+    ];
+    for (name, text) in files {
+        let text = if name == file { text.replacen(from, to, 1) } else { text };
+        if !(name == file && to == "-") {
+            std::fs::write(folder.path().join(name), text).unwrap();
+        }
+    }
+    read(&folder.path().join("07_tracks.csv")).expect_err(&format!("{file}: {from} -> {to}"))
+}
+
+#[test]
+fn broken_recordings_in_highds_layout_are_refused() {
+    let (tracks, vehicles, recording) = ("07_tracks.csv", "07_tracksMeta.csv", "07_recordingMeta.csv");
+    for (file, from, to, needed) in [
+        (tracks, "laneId", "lane", vec!["07_tracks.csv, line 1", "no column `laneId`", "highD"]),
+        (tracks, "3,2,13.5", "3,9,13.5", vec!["line 4", "`id`", "is `9`", "07_tracksMeta.csv"]),
+        (tracks, "3,2,13.5", "2,2,13.5", vec!["line 4", "frame 2 of vehicle 2 stands there twice", "line 3"]),
+        (tracks, "3,2,13.5", "3,-2,13.5", vec!["line 4", "`id`", "is `-2`"]),
+        (tracks, "3,2,13.5", "3,2,nan", vec!["line 4", "`x`", "is `nan`"]),
+        (tracks, "25.0,0", "-25.0,0", vec!["line 2", "`xVelocity`", "towards +x", "07_tracksMeta.csv"]),
+        (tracks, "25.0,0", "abc,0", vec!["line 2", "`xVelocity`"]),
+        (tracks, "12.0,2.5", "-12.0,2.5", vec!["line 2", "`width`", "above 0"]),
+        (tracks, "20,2,30.5,25.75,12.0,2.5,25.0,0,-0.5,0,0,6\n", "", vec!["vehicle 2 has 19 rows, but 20 are stated", "line 2 of 07_tracksMeta.csv"]),
+        (vehicles, "20,Truck", "21,Truck", vec!["20 rows, but 21 are stated"]),
+        (vehicles, "Truck", "Tank", vec!["07_tracksMeta.csv, line 2", "`class`", "is `Tank`"]),
+        (vehicles, "Truck,2", "Truck,3", vec!["line 2", "`drivingDirection`", "1 (towards -x) or 2"]),
+        (vehicles, "Truck,2", "Truck,1", vec!["07_tracks.csv, line 2", "towards -x"]),
+        (vehicles, "2,20,Truck,2\n", "2,20,Truck,2\n2,20,Truck,2\n", vec!["line 3", "vehicle 2 stands there twice, first in line 2"]),
+        (vehicles, "numFrames", "frames", vec!["line 2", "no column `numFrames`"]),
+        (vehicles, "2,20,Truck,2\n", "", vec!["07_tracksMeta.csv", "no rows"]),
+        (recording, "7,25,", "7,0,", vec!["07_recordingMeta.csv, line 2", "`frameRate`", "1 to 1000"]),
+        (recording, "7,25,", "7,nan,", vec!["line 2", "`frameRate`", "is `nan`"]),
+        // A frame rate that is not the recording's: the positions then move at another speed than the speeds say.
+        (recording, "7,25,", "7,50,", vec!["07_tracks.csv, line", "0.6 to 1.6"]),
+        (recording, "21.0;25.0;29.0", "29.0;25.0;21.0", vec!["`lowerLaneMarkings`", "rising"]),
+        (recording, "21.0;25.0;29.0", "", vec!["07_tracks.csv, line 2", "lowerLaneMarkings"]),
+        (recording, "\n7,25", "\n8,25,,1;2\n7,25", vec!["2 rows, but 1 is needed"]),
+    ] {
+        let error = highd(file, from, to);
+        says(&error, &needed, &format!("{file}: {from} -> {to}"));
+        assert!(!error.is_io(), "{error}");
+    }
+    for file in [vehicles, recording] {
+        let error = highd(file, "", "-");
+        assert!(error.is_io() && error.to_string().contains(file), "a missing file is named: {error}");
+    }
+}
+
+#[test]
+fn folders_with_no_recording_or_several_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let error = read(folder.path()).unwrap_err();
+    assert!(error.is_io() && error.to_string().contains("NN_tracks.csv"), "{error}");
+    for name in ["01_tracks.csv", "02_tracks.csv.gz"] {
+        std::fs::write(folder.path().join(name), "x").unwrap();
+    }
+    says(&read(folder.path()).unwrap_err(), &["2 recordings in this folder", "01_tracks.csv to 02_tracks.csv"], "two");
+}
+
+fn scenario(inside: &str) -> String {
+    format!(
+        "<?xml version=\"1.0\"?>\n<commonRoad timeStepSize=\"0.1\" benchmarkID=\"T\">\n<lanelet id=\"1\">\n\
+         <leftBound><point><x>0</x><y>0</y></point><point><x>500</x><y>0</y></point></leftBound>\n\
+         <rightBound><point><x>0</x><y>-3.5</y></point><point><x>500</x><y>-3.5</y></point></rightBound>\n\
+         </lanelet>\n{inside}\n</commonRoad>\n"
+    )
+}
+
+fn obstacle(states: &str) -> String {
+    format!(
+        "<dynamicObstacle id=\"3\"><type>car</type><shape><rectangle><length>4.5</length><width>1.8</width></rectangle>\
+         </shape>\n{states}</dynamicObstacle>"
+    )
+}
+
+fn state(x: &str, time: &str) -> String {
+    format!(
+        "<state><position><point><x>{x}</x><y>-1.7</y></point></position><orientation><exact>0</exact></orientation>\
+         <time><exact>{time}</exact></time><velocity><exact>20</exact></velocity></state>\n"
+    )
+}
+
+fn trajectory(states: &[String]) -> String {
+    scenario(&obstacle(&format!("<trajectory>{}</trajectory>", states.concat())))
+}
+
+#[test]
+fn broken_commonroad_scenarios_are_refused() {
+    let good = trajectory(&[state("10", "0"), state("12", "1"), state("14", "2")]);
+    assert_eq!(read_text(good.as_bytes()).unwrap().trajectories[0].points.len(), 3);
+    let bomb = "<!DOCTYPE b [<!ENTITY a \"aaaaaaaaaa\"><!ENTITY b \"&a;&a;&a;&a;&a;&a;&a;&a;\">]>\n<commonRoad timeStepSize=\"0.1\"/>";
+    let deep = scenario(&"<a>".repeat(100_000));
+    let long = scenario(&format!("<a b=\"{}\"/>", "x".repeat(3_000_000)));
+    let endless_text = scenario(&format!("<a>{}</a>", "x".repeat(3_000_000)));
+    for (text, needed) in [
+        ("<html><body>404</body></html>".to_owned(), vec!["line 1", "the root element is `html`"]),
+        ("<".to_owned(), vec!["line 1", "no CommonRoad scenario"]),
+        ("<?xml version=\"1.0\"?>\n".to_owned(), vec!["there is no element"]),
+        ("<commonRoad/>\n".to_owned(), vec!["timeStepSize"]),
+        (good.replace("timeStepSize=\"0.1\"", "timeStepSize=\"0\""), vec!["`timeStepSize`", "is `0`"]),
+        (good.replace("timeStepSize=\"0.1\"", "timeStepSize=\"nan\""), vec!["is `nan`"]),
+        (good[..good.len() / 2].to_owned(), vec!["line", "it is cut"]),
+        (good.replace("</trajectory>", "</trajectry>"), vec!["line", "no CommonRoad scenario"]),
+        (good.replace("<x>12</x>", "<x>nan</x>"), vec!["line 9", "`x`", "is `nan`"]),
+        (good.replace("<x>12</x>", "<x>&boom;</x>"), vec!["line 9", "`x`"]),
+        (good.replace("<x>12</x>", ""), vec!["line 9", "a `position` that is a point"]),
+        (good.replace("<exact>1</exact>", "<exact>0</exact>"), vec!["frame 0 of vehicle 3 stands there twice"]),
+        (good.replace("<exact>1</exact>", "<exact>-1</exact>"), vec!["line 9", "`time`", "is `-1`"]),
+        (good.replace("<exact>1</exact>", "<intervalStart>1</intervalStart>"), vec!["line 9", "an exact `time`"]),
+        (good.replace("<type>car</type>", "<type>spaceship</type>"), vec!["`type`", "is `spaceship`"]),
+        (good.replace("<type>car</type>", ""), vec!["needs a `type`"]),
+        (good.replace("<length>4.5</length>", "<length>-4.5</length>"), vec!["`length`", "above 0"]),
+        (good.replace("id=\"3\"", "id=\"-3\""), vec!["`id`", "is `-3`"]),
+        (good.replace("<point><x>500</x><y>0</y></point>", ""), vec!["line 6", "lanelet 1", "two points"]),
+        (good.replace("lanelet", "lanelit"), vec!["no lanelets"]),
+        (scenario(""), vec!["no rows"]),
+        (bomb.to_owned(), vec!["line 1", "document type declaration"]),
+        (deep, vec!["nested deeper than 64"]),
+        (long, vec!["longer than 1048576 bytes"]),
+        (endless_text, vec!["longer than 1048576 bytes"]),
+    ] {
+        let error = read_text(text.as_bytes()).expect_err(&text[..text.len().min(400)]);
+        says(&error, &needed, &text[..text.len().min(400)]);
+        assert!(!error.is_io(), "{error}");
+    }
+    let mut not_text = good.into_bytes();
+    let place = not_text.windows(6).position(|part| part == b"<x>12<").unwrap() + 3;
+    not_text[place] = 0xff;
+    assert!(read_text(&not_text).is_err());
+}
+
+#[test]
+fn archives_are_named() {
+    for (bytes, what) in [
+        (&b"PK\x03\x04\x14\0\0\0"[..], "a ZIP archive"),
+        (b"BZh91AY&SY", "a bzip2 file"),
+        (b"\xfd7zXZ\0\0", "an xz file"),
+        (b"\x28\xb5\x2f\xfd\0", "a Zstandard file"),
+    ] {
+        says(&read_text(bytes).unwrap_err(), &["made-up.csv", what, "gzip"], what);
+    }
+}
+
+fn packed(source: &mut impl Read) -> Vec<u8> {
+    let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+    std::io::copy(source, &mut encoder).unwrap();
+    encoder.finish().unwrap()
+}
+
+#[test]
+fn packed_files_that_hold_nothing_or_too_much_are_refused_in_little_memory() {
+    assert!(matches!(read_text(&packed(&mut &b""[..])).unwrap_err().problem, RecordingProblem::Empty));
+    assert!(matches!(read_text(&packed(&mut &b"\n\n"[..])).unwrap_err().problem, RecordingProblem::Empty));
+    // 200 MB of one letter in 0.9 MB, as a line, as a line behind a header, and as a tag.
+    for (start, line) in [("", 1), (PLAIN_HEADER, 2), ("<commonRoad ", 1)] {
+        let break_at = if start == PLAIN_HEADER { "\n" } else { "" };
+        let mut text = start.as_bytes().chain(break_at.as_bytes()).chain(std::io::repeat(b'x').take(200_000_000));
+        let error = read_text(&packed(&mut text)).unwrap_err();
+        assert!(matches!(error.problem, RecordingProblem::LineTooLong { .. }), "{error}");
+        assert_eq!(error.line, Some(line));
+    }
+    // A packed packed file: only one layer is taken off.
+    let twice = packed(&mut packed(&mut &b"hello"[..]).as_slice());
+    assert!(matches!(read_text(&twice).unwrap_err().problem, RecordingProblem::Binary));
+    let mut followed = packed(&mut &b"a,b\n"[..]);
+    followed.extend_from_slice(b"rubbish behind the end");
+    assert!(read_text(&followed).is_err());
+}
+
+/// Rows of one vehicle with every field as `edit` leaves it: time, s, d, speed, length, width.
+fn drive(edit: impl Fn(&mut [f64; 6])) -> String {
+    let mut text = format!("{PLAIN_HEADER}\n");
+    for frame in 0..40 {
+        let time_s = 0.1 * f64::from(frame);
+        let mut at = [time_s, 50.0 + 25.0 * time_s, 5.2, 25.0, 4.6, 1.8];
+        edit(&mut at);
+        let [time_s, s_m, d_m, speed_mps, length_m, width_m] = at;
+        text += &format!(
+            "a,1,1,{frame},{time_s:.4},{s_m:.3},{d_m:.3},2,{speed_mps:.3},,0,0,0,{length_m:.3},{width_m:.3},car,x\n"
+        );
+    }
+    text
+}
+
+#[test]
+fn units_and_columns_that_are_mixed_up_are_noticed() {
+    const FEET_PER_M: f64 = 1.0 / 0.3048;
+    assert!(read_text(drive(|_| {}).as_bytes()).is_ok());
+    let steps = ["line", "the median distance between two frames", "units or columns"];
+    let cases: [(&str, String, &[&str]); 9] = [
+        ("km/h", drive(|at| at[3] *= 3.6), &steps),
+        ("mph", drive(|at| at[3] *= 2.237), &steps),
+        ("ft/s", drive(|at| at[3] *= FEET_PER_M), &steps),
+        ("positions in feet", drive(|at| at[1] *= FEET_PER_M), &steps),
+        ("s and d swapped", drive(|at| at.swap(1, 2)), &steps),
+        ("driven backwards", drive(|at| at[1] = 500.0 - at[1]), &steps),
+        ("times in steps of a second", drive(|at| at[0] *= 10.0), &steps),
+        ("sizes in feet", drive(|at| at.iter_mut().skip(4).for_each(|m| *m *= FEET_PER_M)), &["the median length of cars", "15.092 m", "2 to 12 m"]),
+        ("length and width swapped", drive(|at| at.swap(4, 5)), &["the median length of cars"]),
+    ];
+    for (what, text, needed) in cases {
+        says(&read_text(text.as_bytes()).expect_err(what), needed, what);
+    }
+    // Metres where NGSIM has feet.
+    let metres: String = (0..40)
+        .map(|k| format!("1 {k} 40 {} 5.2 {:.2} 0 0 4.6 1.8 2 25.0 0.0 2 0 0 0.0 0.0\n", 100 * k, 50.0 + 2.5 * f64::from(k)))
+        .collect();
+    says(&read_text(metres.as_bytes()).unwrap_err(), &["the median length of cars", "1.402 m"], "metres");
+}
+
+#[test]
+fn windows_line_ends_and_a_byte_order_mark_change_nothing() {
+    let text = drive(|_| {});
+    let windows = format!("\u{feff}{}", text.replace('\n', "\r\n"));
+    let (a, b) = (read_text(text.as_bytes()).unwrap(), read_text(windows.as_bytes()).unwrap());
+    assert_eq!(a.trajectories, b.trajectories);
+}
+
+#[test]
+fn a_recording_cut_anywhere_in_its_last_row_is_noticed() {
+    let text = drive(|_| {});
+    let last_row = text.trim_end().rfind('\n').unwrap() + 1;
+    for cut in last_row + 1..text.len() {
+        let error = read_text(&text.as_bytes()[..cut]).expect_err("a cut row");
+        assert_eq!(error.line, Some(41), "{error}");
+    }
+}
+
+#[test]
+fn bad_rows_are_left_out_where_asked_for_and_counted() {
+    let text = drive(|_| {});
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    lines[5] = lines[4].clone();
+    lines[9] = lines[9].replace("25.000", "fast");
+    lines[20] = "a,1,1".to_owned();
+    let text = lines.join("\n") + "\n";
+    let options = ReadOptions { bad_rows: BadRows::Drop, ..ReadOptions::default() };
+    let mut tracks = open_from(text.as_bytes(), Path::new("made-up.csv"), options, usize::MAX).unwrap();
+    let mut pieces = 0;
+    while let Some(track) = tracks.next_track().unwrap() {
+        assert_eq!(track.trajectory.vehicle_id, 1);
+        pieces += 1;
+    }
+    assert_eq!(pieces, 4, "three rows are missing in between");
+    let dropped: Vec<_> = tracks.dropped().reasons().map(|(why, rows)| (why, rows.count, rows.first_line)).collect();
+    let expected =
+        [("cut rows", 1, Some(21)), ("duplicated rows", 1, Some(6)), ("values that are not allowed", 1, Some(10))];
+    assert_eq!(dropped, expected);
+    assert_eq!(read_text(text.as_bytes()).unwrap_err().line, Some(10), "and refused where not");
+}
+
+/// A recording of more rows than the window, in the order that `sort` gives the pairs (vehicle, frame).
+fn long_recording(vehicles: u64, frames: u64, place: impl Fn(u64) -> (u64, u64)) -> String {
+    let mut text = "track_id,frame,time_s,s_m,d_m,lane_id,speed_mps,accel_mps2,length_m,width_m,vehicle_class\n".to_owned();
+    for k in 0..vehicles * frames {
+        let (vehicle, age) = place(k);
+        let frame = 5 * vehicle + age;
+        let time_s = 0.1 * frame as f64;
+        text += &format!("{vehicle},{frame},{time_s:.1},{:.1},5.2,2,20,0,4.6,1.8,car\n", 2.0 * age as f64);
+    }
+    text
+}
+
+fn open_with_window(text: &str, window: usize) -> Result<Vec<(u64, usize)>, RecordingError> {
+    let tracks = open_from(text.as_bytes(), Path::new("made-up.csv"), ReadOptions::default(), window)?;
+    let mut found = tracks
+        .map(|track| track.map(|track| (track.trajectory.track_id, track.trajectory.points.len())))
+        .collect::<Result<Vec<_>, _>>()?;
+    found.sort_unstable();
+    Ok(found)
+}
+
+#[test]
+fn long_recordings_are_streamed_by_vehicle_or_by_time_and_others_refused() {
+    let (vehicles, frames) = (40, 30);
+    let by_vehicle = long_recording(vehicles, frames, |k| (k / frames, k % frames));
+    let whole = open_with_window(&by_vehicle, usize::MAX).unwrap();
+    assert_eq!(whole, (0..vehicles).map(|vehicle| (vehicle, 30)).collect::<Vec<_>>());
+    assert_eq!(open_with_window(&by_vehicle, 100).unwrap(), whole);
+    // By time: vehicle v is there in frames 5v to 5v + 29.
+    let (header, rows) = by_vehicle.split_once('\n').unwrap();
+    let mut rows: Vec<&str> = rows.lines().collect();
+    rows.sort_by_key(|row| row.split(',').nth(1).unwrap().parse::<u64>().unwrap());
+    let by_time = format!("{header}\n{}\n", rows.join("\n"));
+    assert_eq!(open_with_window(&by_time, 100).unwrap(), whole);
+    // In no order from the beginning, and from behind the window on.
+    rows.sort_by_key(|row| row.split(',').nth(3).unwrap().parse::<f64>().unwrap() as u64 * 7 % 31);
+    let unsorted = format!("{header}\n{}\n", rows.join("\n"));
+    assert_eq!(open_with_window(&unsorted, usize::MAX).unwrap(), whole, "any order, where it is not longer");
+    let error = open_with_window(&unsorted, 100).unwrap_err();
+    says(&error, &["line", "sorted by vehicle or by time throughout"], "unsorted");
+    let mut lines: Vec<&str> = by_vehicle.lines().collect();
+    lines.swap(200, 900);
+    let error = open_with_window(&(lines.join("\n") + "\n"), 100).unwrap_err();
+    assert_eq!(error.line, Some(202), "{error}");
+    says(&error, &["sorted by vehicle"], "swapped");
+}
+
+#[test]
+fn what_is_not_there_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["none.csv", "none.xml", "03_tracks.csv", "03_tracksMeta.csv"] {
+        let Err(error) = open(&folder.path().join(name), ReadOptions::default()) else { panic!("{name}") };
+        assert!(error.is_io(), "{error}");
+    }
+    assert!(read_from(std::io::empty(), Path::new("x.csv")).is_err());
+}

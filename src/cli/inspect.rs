@@ -1,0 +1,97 @@
+//! `closecall inspect`: how far a recording can be trusted.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use closecall_scenarios::recordings::{BadRows, Inspector, ReadOptions, Tracks, open};
+use serde_json::{Value, json};
+
+use super::CliError;
+use super::args::{Format, ReadArgs};
+use super::output::{complain, outln};
+use crate::exit_code::ExitCode;
+
+/// Arguments of `closecall inspect`.
+#[derive(Debug, Args)]
+pub(super) struct InspectArgs {
+    /// Recording
+    recording: PathBuf,
+    #[command(flatten)]
+    read: ReadArgs,
+    /// Output for people or for programs
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+/// Tells the flaws of a recording. One whose rows cannot all be used ends with the code that other commands would.
+pub(super) fn inspect(args: &InspectArgs) -> Result<ExitCode, CliError> {
+    let mut tracks = open(&args.recording, ReadOptions { bad_rows: BadRows::Drop, ..args.read.options() })?;
+    let mut inspector = Inspector::default();
+    while let Some(track) = tracks.next_track()? {
+        inspector.add(&track);
+    }
+    match args.format {
+        Format::Json => outln!("{:#}", report(&tracks, &inspector)),
+        Format::Human => print(&tracks, &inspector),
+    }
+    let dropped = tracks.dropped();
+    if dropped.count() == 0 || args.read.drops_bad_rows() {
+        return Ok(ExitCode::Pass);
+    }
+    let path = tracks.path().display();
+    complain(format_args!(
+        "{path}: {} rows cannot be used; other commands refuse it, but with --drop-bad-rows\n",
+        dropped.count()
+    ));
+    Ok(ExitCode::InvalidInput)
+}
+
+fn report(tracks: &Tracks<'_>, inspector: &Inspector) -> Value {
+    let quality = inspector.quality();
+    let span = inspector.span();
+    json!({
+        "name": tracks.name(),
+        "layout": tracks.layout(),
+        "period_s": tracks.period().s(),
+        "rows": tracks.rows(),
+        "tracks": quality.tracks,
+        "vehicles": quality.vehicles,
+        "instants": quality.instants,
+        "first_s": span.map(|(first, _)| first.s()),
+        "last_s": span.map(|(_, last)| last.s()),
+        "flaws": inspector.flaws(),
+        "overlaps_unchecked_instants": inspector.unchecked_instants(),
+        "dropped": tracks.dropped(),
+        "usable": tracks.dropped().count() == 0,
+    })
+}
+
+fn print(tracks: &Tracks<'_>, inspector: &Inspector) {
+    let quality = inspector.quality();
+    outln!("{} ({})", tracks.name(), tracks.layout().name());
+    outln!(
+        "  {} rows; {} tracks of {} vehicles, {} instants every {:.3} s",
+        tracks.rows(),
+        quality.tracks,
+        quality.vehicles,
+        quality.instants,
+        tracks.period().s()
+    );
+    for (name, flaw) in inspector.flaws().named() {
+        match &flaw.first {
+            None => outln!("  {:>8}  {name}", flaw.count),
+            Some(place) => {
+                let line = place.line.map(|line| format!("line {line}, ")).unwrap_or_default();
+                let (track, time_s, what) = (place.track_id, place.time_s, &place.what);
+                outln!("  {:>8}  {name}; first: {line}track {track} at {time_s:.2} s: {what}", flaw.count);
+            }
+        }
+    }
+    if inspector.unchecked_instants() > 0 {
+        outln!("  overlaps were not looked for at {} instants that came too late", inspector.unchecked_instants());
+    }
+    for (reason, rows) in tracks.dropped().reasons() {
+        let line = rows.first_line.map(|line| format!("line {line}: ")).unwrap_or_default();
+        outln!("  {:>8}  left out: {reason}; first: {line}{}", rows.count, rows.first);
+    }
+}
