@@ -7,6 +7,7 @@ mod golden;
 mod in_car;
 mod layouts;
 mod malformed;
+mod malformed_layouts;
 mod ngsim_us101;
 mod own_recordings;
 mod support;

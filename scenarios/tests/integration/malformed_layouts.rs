@@ -1,7 +1,7 @@
 //! Broken recordings in highD's layout, in CommonRoad XML, in-car logs, and packed files; and the kinds of mix-ups that
 //! leave every single number legal.
 
-use std::io::{Read, Write as _};
+use std::io::Read;
 use std::path::Path;
 
 use closecall_scenarios::recordings::{
@@ -163,7 +163,8 @@ fn broken_commonroad_scenarios_are_refused() {
         ("<commonRoad/>\n".to_owned(), vec!["timeStepSize"]),
         (good.replace("timeStepSize=\"0.1\"", "timeStepSize=\"0\""), vec!["`timeStepSize`", "is `0`"]),
         (good.replace("timeStepSize=\"0.1\"", "timeStepSize=\"nan\""), vec!["is `nan`"]),
-        (good[..good.len() / 2].to_owned(), vec!["line", "it is cut"]),
+        (good[..good.len() / 2].to_owned(), vec!["line 8", "before end of input"]),
+        (good[..good.find("</state>").unwrap() + 8].to_owned(), vec!["line 8", "inside the element `trajectory`", "it is cut"]),
         (good.replace("</trajectory>", "</trajectry>"), vec!["line", "no CommonRoad scenario"]),
         (good.replace("<x>12</x>", "<x>nan</x>"), vec!["line 9", "`x`", "is `nan`"]),
         (good.replace("<x>12</x>", "<x>&boom;</x>"), vec!["line 9", "`x`"]),
@@ -356,7 +357,7 @@ fn long_recordings_are_streamed_by_vehicle_or_by_time_and_others_refused() {
     let mut lines: Vec<&str> = by_vehicle.lines().collect();
     lines.swap(200, 900);
     let error = open_with_window(&(lines.join("\n") + "\n"), 100).unwrap_err();
-    assert_eq!(error.line, Some(202), "{error}");
+    assert_eq!(error.line, Some(872), "vehicle 29 was there before: {error}");
     says(&error, &["sorted by vehicle"], "swapped");
 }
 
