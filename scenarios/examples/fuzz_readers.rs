@@ -35,9 +35,36 @@ const LARGEST: usize = 1 << 18;
 
 /// Values that readers have stumbled over, here or elsewhere.
 const VALUES: [&str; 30] = [
-    "", "0", "-0", "1", "-1", "0.0", "nan", "NaN", "inf", "-inf", "1e308", "1e-320", "9223372036854775807", "-9223372036854775808",
-    "18446744073709551616", "999999999999", "1000000000", "255", "256", "1,156", "\"", "\"1,2", ";", "1;2;3", "é", "\0", "0x1f",
-    "true", "&amp;", "<x>",
+    "",
+    "0",
+    "-0",
+    "1",
+    "-1",
+    "0.0",
+    "nan",
+    "NaN",
+    "inf",
+    "-inf",
+    "1e308",
+    "1e-320",
+    "9223372036854775807",
+    "-9223372036854775808",
+    "18446744073709551616",
+    "999999999999",
+    "1000000000",
+    "255",
+    "256",
+    "1,156",
+    "\"",
+    "\"1,2",
+    ";",
+    "1;2;3",
+    "é",
+    "\0",
+    "0x1f",
+    "true",
+    "&amp;",
+    "<x>",
 ];
 
 /// A small generator of random numbers (SplitMix64), so that a seed names a run.
@@ -129,8 +156,8 @@ fn damage(bytes: &mut Vec<u8>, random: &mut Random) {
             }
         }
         _ => {
-            let (from, to) = [(&b"\n"[..], &b"\r\n"[..]), (b",", b"\t"), (b",", b";"), (b"\n", b""), (b"<", b"<<")]
-                [random.below(5)];
+            let (from, to) =
+                [(&b"\n"[..], &b"\r\n"[..]), (b",", b"\t"), (b",", b";"), (b"\n", b""), (b"<", b"<<")][random.below(5)];
             let mut out = Vec::new();
             for byte in bytes.iter() {
                 if from == [*byte] { out.extend_from_slice(to) } else { out.push(*byte) }
@@ -193,9 +220,16 @@ fn judge(tracks: Result<Tracks<'_>, RecordingError>) -> Option<String> {
             return Some(format!("track {} is empty, lacks lines or comes twice", track.trajectory.track_id));
         }
         let is_finite = |point: &closecall_traffic::TrajectoryPoint| {
-            [point.s_m, point.d_m, point.speed_mps, point.acceleration_mps2, point.lateral_speed_mps, point.lateral_acceleration_mps2]
-                .iter()
-                .all(|value| value.is_finite())
+            [
+                point.s_m,
+                point.d_m,
+                point.speed_mps,
+                point.acceleration_mps2,
+                point.lateral_speed_mps,
+                point.lateral_acceleration_mps2,
+            ]
+            .iter()
+            .all(|value| value.is_finite())
         };
         if !points.iter().all(is_finite) {
             return Some("a number is not finite".to_owned());
@@ -290,7 +324,8 @@ fn fuzz(reader: &str, seconds: u64, seed: u64) -> std::io::Result<bool> {
 #[expect(clippy::print_stderr, reason = "an example speaks to people")]
 fn main() -> ExitCode {
     let args: Vec<String> = std::env::args().skip(1).collect();
-    let (reader, seconds, seed) = (args.first(), args.get(1).map(|text| text.parse()), args.get(2).map(|text| text.parse()));
+    let (reader, seconds, seed) =
+        (args.first(), args.get(1).map(|text| text.parse()), args.get(2).map(|text| text.parse()));
     let (Some(reader), Some(Ok(seconds)), Ok(seed)) = (reader, seconds, seed.unwrap_or(Ok(0))) else {
         eprintln!("usage: fuzz_readers {}|all SECONDS [SEED]", READERS.join("|"));
         return ExitCode::from(2);

@@ -96,7 +96,8 @@ fn make(layout: &str, bytes: u64, path: &str) -> std::io::Result<bool> {
             for vehicle in 0.. {
                 for age in 0..FRAMES {
                     let at = instant(vehicle, age);
-                    written += if layout == "plain" { write_plain(&mut file, &at)? } else { write_ngsim(&mut file, &at)? };
+                    written +=
+                        if layout == "plain" { write_plain(&mut file, &at)? } else { write_ngsim(&mut file, &at)? };
                 }
                 if written >= bytes {
                     break;

@@ -111,7 +111,8 @@ impl<R: BufRead> CommonRoadSource<R> {
                 self.lanelet = Some((id, Lanelet::default()));
             }
             "dynamicObstacle" | "obstacle" if depth == 2 => {
-                let id = at(&self.xml, integer(attribute("id").unwrap_or_default(), "id", allowed::IDS))?.unsigned_abs();
+                let id =
+                    at(&self.xml, integer(attribute("id").unwrap_or_default(), "id", allowed::IDS))?.unsigned_abs();
                 self.obstacle = Some(Obstacle { id, is_dynamic: name == "dynamicObstacle", ..Obstacle::default() });
             }
             "adjacentLeft" | "adjacentRight" | "successor" if depth == 3 => {
@@ -219,7 +220,9 @@ impl<R: BufRead> CommonRoadSource<R> {
             return self.xml.refuse("a state needs an exact `orientation` and `velocity`");
         };
         let (Some(class), Some(length_m), Some(width_m)) = (obstacle.class, obstacle.length_m, obstacle.width_m) else {
-            return self.xml.refuse("an obstacle needs a `type` and a `shape` that is a rectangle or a circle before its states");
+            return self
+                .xml
+                .refuse("an obstacle needs a `type` and a `shape` that is a rectangle or a circle before its states");
         };
         let road = *obstacle.road.get_or_insert_with(|| roads.choose((x_m, y_m), heading_rad));
         let Some(place) = roads.place(road, (x_m, y_m)) else { return Ok(None) };

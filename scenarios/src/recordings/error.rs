@@ -213,7 +213,9 @@ pub enum RecordingProblem {
     )]
     NeedsMetadata,
     /// Several recordings in one folder.
-    #[error("there are {count} recordings in this folder, from {first}_tracks.csv to {last}_tracks.csv: name one of them")]
+    #[error(
+        "there are {count} recordings in this folder, from {first}_tracks.csv to {last}_tracks.csv: name one of them"
+    )]
     SeveralInFolder {
         /// How many.
         count: usize,

@@ -78,7 +78,11 @@ impl FileSet {
                 Err(io(none))
             }
             [first, .., last] => {
-                let problem = RecordingProblem::SeveralInFolder { first: first.clone(), last: last.clone(), count: prefixes.len() };
+                let problem = RecordingProblem::SeveralInFolder {
+                    first: first.clone(),
+                    last: last.clone(),
+                    count: prefixes.len(),
+                };
                 Err(at(folder, Refusal::of_file(problem)))
             }
         }

@@ -26,10 +26,10 @@ use std::collections::BTreeMap;
 use closecall_traffic::{Lane, Time};
 
 use super::fields::{Bounds, Fault, integer, number, wrong_value};
+use super::file_set::{Meta, RecordingMeta, VehicleMeta};
 use super::layout::{Header, TextLayout};
 use super::plain::allowed;
 use super::rows::Fields;
-use super::file_set::{Meta, RecordingMeta, VehicleMeta};
 use super::source::{About, Clock, Row};
 use super::{LaneMarkings, Layout, MarkingDistances, RecordingProblem};
 
@@ -104,7 +104,8 @@ impl HighdColumns {
         let (upper, lower) = (&self.recording.upper_m, &self.recording.lower_m);
         let count = |markings: &[f64]| i64::try_from(markings.len()).unwrap_or(i64::MAX);
         let unmarked = |which| {
-            let allowed = format!("a vehicle of a carriageway with markings ({which} has none in the recording's metadata)");
+            let allowed =
+                format!("a vehicle of a carriageway with markings ({which} has none in the recording's metadata)");
             Err(Fault::at("id", wrong_value("?", allowed)))
         };
         let (s_m, d_m, lane, lanes, before) = if is_upper {

@@ -281,8 +281,7 @@ fn outline(lanelet: &Lanelet) -> Vec<Point> {
 /// True where `point` lies within the outline: a ray from it crosses the outline an odd number of times.
 fn contains(outline: &[Point], (x, y): Point) -> bool {
     let ends = outline.iter().skip(1).chain(outline.first());
-    let crosses = |((x0, y0), (x1, y1)): (&Point, &Point)| {
-        (*y0 > y) != (*y1 > y) && x < x0 + (y - y0) / (y1 - y0) * (x1 - x0)
-    };
+    let crosses =
+        |((x0, y0), (x1, y1)): (&Point, &Point)| (*y0 > y) != (*y1 > y) && x < x0 + (y - y0) / (y1 - y0) * (x1 - x0);
     outline.iter().zip(ends).filter(|edge| crosses(*edge)).count() % 2 == 1
 }

@@ -119,10 +119,7 @@ pub(super) fn open_file(path: &Path) -> Result<File, RecordingError> {
 }
 
 /// The reader for what `input` begins with.
-fn choose<'a>(
-    mut input: Box<dyn BufRead + 'a>,
-    options: &ReadOptions,
-) -> Result<Box<dyn RowSource + 'a>, Refusal> {
+fn choose<'a>(mut input: Box<dyn BufRead + 'a>, options: &ReadOptions) -> Result<Box<dyn RowSource + 'a>, Refusal> {
     let start = input.fill_buf().map_err(|error| Refusal::of_file(super::rows::io_problem(error)))?;
     if let Some((_, what)) = ARCHIVES.into_iter().find(|(magic, _)| start.starts_with(magic)) {
         return Err(Refusal::of_file(RecordingProblem::Archive { what }));

@@ -260,7 +260,8 @@ impl Inspector {
         let (from_m, to_m) = (point.s_m - half_m, point.s_m + half_m);
         let here = Occupied { lane: point.lane.0, from_m, to_m, track_id: track.track_id };
         let others = self.road.entry(point.time).or_default();
-        for other in others.iter().filter(|other| other.lane == here.lane && other.from_m < to_m && from_m < other.to_m) {
+        for other in others.iter().filter(|other| other.lane == here.lane && other.from_m < to_m && from_m < other.to_m)
+        {
             let overlap_m = to_m.min(other.to_m) - from_m.max(other.from_m);
             let what = || format!("overlaps track {} by {overlap_m:.2} m in lane {}", other.track_id, here.lane);
             self.flaws.overlaps.found(line, track.track_id, point.time, what);

@@ -2,12 +2,12 @@
 
 use std::io::BufRead;
 
-use super::{RecordingError, RecordingProblem};
 use super::fields::Fault;
 use super::file_set::Meta;
 use super::layout::{Format, is_of_drone, of_drone, recognise};
 use super::rows::{Fields, Lines};
 use super::source::{About, Refusal, Row, RowSource};
+use super::{RecordingError, RecordingProblem};
 
 /// The rows of a text file, in any of the layouts that have a row on each line.
 pub(super) struct TextSource<R> {

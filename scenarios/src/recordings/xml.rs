@@ -144,7 +144,9 @@ impl<R: BufRead> Xml<R> {
 
 /// The name of an element, and the attributes that are wanted.
 fn begin(start: &BytesStart<'_>, wanted: &[&'static str]) -> Result<(String, Vec<(&'static str, String)>), String> {
-    let text = |bytes: &[u8]| std::str::from_utf8(bytes).map(str::to_owned).map_err(|_| "a name is no text in UTF-8".to_owned());
+    let text = |bytes: &[u8]| {
+        std::str::from_utf8(bytes).map(str::to_owned).map_err(|_| "a name is no text in UTF-8".to_owned())
+    };
     let name = text(start.name().as_ref())?;
     let mut attributes = Vec::new();
     for attribute in start.attributes() {

@@ -18,7 +18,9 @@ fn the_highd_layout_tells_what_the_plain_one_tells() {
     let plain = read(&data.join("ngsim_us101/trajectories/us101_h.csv")).unwrap();
     let highd = read(&folder.join("01_tracks.csv")).unwrap();
     assert_eq!((highd.layout, highd.period), (Layout::Highd, Time::from_ms(100)));
-    for other in [folder.clone(), folder.join("01"), folder.join("01_tracksMeta.csv"), folder.join("01_recordingMeta.csv")] {
+    for other in
+        [folder.clone(), folder.join("01"), folder.join("01_tracksMeta.csv"), folder.join("01_recordingMeta.csv")]
+    {
         assert_eq!(read(&other).unwrap().trajectories, highd.trajectories, "{}", other.display());
     }
     assert_eq!(highd.trajectories.len(), 27);
@@ -93,7 +95,8 @@ fn write_both_ways(folder: &Path) {
     std::fs::write(folder.join("07_recordingMeta.csv"), meta).unwrap();
     let meta = "id,numFrames,class,drivingDirection\n1,30,Car,1\n2,30,Truck,2\n";
     std::fs::write(folder.join("07_tracksMeta.csv"), meta).unwrap();
-    let mut rows = "frame,id,x,y,width,height,xVelocity,yVelocity,xAcceleration,yAcceleration,precedingId,laneId\n".to_owned();
+    let mut rows =
+        "frame,id,x,y,width,height,xVelocity,yVelocity,xAcceleration,yAcceleration,precedingId,laneId\n".to_owned();
     for frame in 1..=30 {
         let x_m = 400.0 - 1.2 * f64::from(frame);
         // From the lane beside the median (laneId 3) to the outer one.
@@ -122,7 +125,10 @@ fn both_carriageways_are_driven_forwards_and_lie_apart() {
     assert_eq!(lower.points[0].lane, Lane(2));
     assert!((lower.points[0].d_m + 6.0).abs() < 1e-9, "27 m is 6 m below the upper marking");
     assert_eq!((upper.points[0].lane, upper.points[29].lane), (Lane(4), Lane(5)));
-    assert!((upper.points[0].d_m + 1_000.0 + 8.0 + 2.1).abs() < 1e-9, "its left edge is 1 km right of the other's right");
+    assert!(
+        (upper.points[0].d_m + 1_000.0 + 8.0 + 2.1).abs() < 1e-9,
+        "its left edge is 1 km right of the other's right"
+    );
     assert!(upper.points[29].d_m < upper.points[0].d_m, "it moves to its right");
     assert_eq!(recording.markings.lane_width_m(Lane(5)), Some(4.0));
 }

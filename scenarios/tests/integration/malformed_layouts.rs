@@ -59,7 +59,10 @@ fn highd(file: &str, from: &str, to: &str) -> RecordingError {
         rows += &format!("{frame},2,{}.5,25.75,12.0,2.5,25.0,0,-0.5,0,0,6\n", 10 + frame);
     }
     let files = [
-        ("07_recordingMeta.csv", "id,frameRate,upperLaneMarkings,lowerLaneMarkings\n7,25,8.5;12.5;16.5,21.0;25.0;29.0\n".to_owned()),
+        (
+            "07_recordingMeta.csv",
+            "id,frameRate,upperLaneMarkings,lowerLaneMarkings\n7,25,8.5;12.5;16.5,21.0;25.0;29.0\n".to_owned(),
+        ),
         ("07_tracksMeta.csv", "id,numFrames,class,drivingDirection\n2,20,Truck,2\n".to_owned()),
         ("07_tracks.csv", rows),
     ];
@@ -84,12 +87,22 @@ fn broken_recordings_in_highds_layout_are_refused() {
         (tracks, "25.0,0", "-25.0,0", vec!["line 2", "`xVelocity`", "towards +x", "07_tracksMeta.csv"]),
         (tracks, "25.0,0", "abc,0", vec!["line 2", "`xVelocity`"]),
         (tracks, "12.0,2.5", "-12.0,2.5", vec!["line 2", "`width`", "above 0"]),
-        (tracks, "20,2,30.5,25.75,12.0,2.5,25.0,0,-0.5,0,0,6\n", "", vec!["vehicle 2 has 19 rows, but 20 are stated", "line 2 of 07_tracksMeta.csv"]),
+        (
+            tracks,
+            "20,2,30.5,25.75,12.0,2.5,25.0,0,-0.5,0,0,6\n",
+            "",
+            vec!["vehicle 2 has 19 rows, but 20 are stated", "line 2 of 07_tracksMeta.csv"],
+        ),
         (vehicles, "20,Truck", "21,Truck", vec!["20 rows, but 21 are stated"]),
         (vehicles, "Truck", "Tank", vec!["07_tracksMeta.csv, line 2", "`class`", "is `Tank`"]),
         (vehicles, "Truck,2", "Truck,3", vec!["line 2", "`drivingDirection`", "1 (towards -x) or 2"]),
         (vehicles, "Truck,2", "Truck,1", vec!["07_tracks.csv, line 2", "towards -x"]),
-        (vehicles, "2,20,Truck,2\n", "2,20,Truck,2\n2,20,Truck,2\n", vec!["line 3", "vehicle 2 stands there twice, first in line 2"]),
+        (
+            vehicles,
+            "2,20,Truck,2\n",
+            "2,20,Truck,2\n2,20,Truck,2\n",
+            vec!["line 3", "vehicle 2 stands there twice, first in line 2"],
+        ),
         (vehicles, "numFrames", "frames", vec!["line 2", "no column `numFrames`"]),
         (vehicles, "2,20,Truck,2\n", "", vec!["07_tracksMeta.csv", "no rows"]),
         (recording, "7,25,", "7,0,", vec!["07_recordingMeta.csv, line 2", "`frameRate`", "1 to 1000"]),
@@ -164,7 +177,10 @@ fn broken_commonroad_scenarios_are_refused() {
         (good.replace("timeStepSize=\"0.1\"", "timeStepSize=\"0\""), vec!["`timeStepSize`", "is `0`"]),
         (good.replace("timeStepSize=\"0.1\"", "timeStepSize=\"nan\""), vec!["is `nan`"]),
         (good[..good.len() / 2].to_owned(), vec!["line 8", "before end of input"]),
-        (good[..good.find("</state>").unwrap() + 8].to_owned(), vec!["line 8", "inside the element `trajectory`", "it is cut"]),
+        (
+            good[..good.find("</state>").unwrap() + 8].to_owned(),
+            vec!["line 8", "inside the element `trajectory`", "it is cut"],
+        ),
         (good.replace("</trajectory>", "</trajectry>"), vec!["line", "no CommonRoad scenario"]),
         (good.replace("<x>12</x>", "<x>nan</x>"), vec!["line 9", "`x`", "is `nan`"]),
         (good.replace("<x>12</x>", "<x>&boom;</x>"), vec!["line 9", "`x`"]),
@@ -260,7 +276,11 @@ fn units_and_columns_that_are_mixed_up_are_noticed() {
         ("s and d swapped", drive(|at| at.swap(1, 2)), &steps),
         ("driven backwards", drive(|at| at[1] = 500.0 - at[1]), &steps),
         ("times in steps of a second", drive(|at| at[0] *= 10.0), &steps),
-        ("sizes in feet", drive(|at| at.iter_mut().skip(4).for_each(|m| *m *= FEET_PER_M)), &["the median length of cars", "15.092 m", "2 to 12 m"]),
+        (
+            "sizes in feet",
+            drive(|at| at.iter_mut().skip(4).for_each(|m| *m *= FEET_PER_M)),
+            &["the median length of cars", "15.092 m", "2 to 12 m"],
+        ),
         ("length and width swapped", drive(|at| at.swap(4, 5)), &["the median length of cars"]),
     ];
     for (what, text, needed) in cases {
@@ -268,7 +288,9 @@ fn units_and_columns_that_are_mixed_up_are_noticed() {
     }
     // Metres where NGSIM has feet.
     let metres: String = (0..40)
-        .map(|k| format!("1 {k} 40 {} 5.2 {:.2} 0 0 4.6 1.8 2 25.0 0.0 2 0 0 0.0 0.0\n", 100 * k, 50.0 + 2.5 * f64::from(k)))
+        .map(|k| {
+            format!("1 {k} 40 {} 5.2 {:.2} 0 0 4.6 1.8 2 25.0 0.0 2 0 0 0.0 0.0\n", 100 * k, 50.0 + 2.5 * f64::from(k))
+        })
         .collect();
     says(&read_text(metres.as_bytes()).unwrap_err(), &["the median length of cars", "1.402 m"], "metres");
 }
@@ -316,7 +338,8 @@ fn bad_rows_are_left_out_where_asked_for_and_counted() {
 
 /// A recording of more rows than the window, in the order that `sort` gives the pairs (vehicle, frame).
 fn long_recording(vehicles: u64, frames: u64, place: impl Fn(u64) -> (u64, u64)) -> String {
-    let mut text = "track_id,frame,time_s,s_m,d_m,lane_id,speed_mps,accel_mps2,length_m,width_m,vehicle_class\n".to_owned();
+    let mut text =
+        "track_id,frame,time_s,s_m,d_m,lane_id,speed_mps,accel_mps2,length_m,width_m,vehicle_class\n".to_owned();
     for k in 0..vehicles * frames {
         let (vehicle, age) = place(k);
         let frame = 5 * vehicle + age;
