@@ -32,6 +32,9 @@ pub(super) enum Node {
     EndOfFile,
 }
 
+/// An element's name and those of its attributes that are wanted.
+type Begun = (String, Vec<(&'static str, String)>);
+
 /// The elements of an XML file.
 pub(super) struct Xml<R> {
     reader: Reader<Guard<R>>,
@@ -131,7 +134,7 @@ impl<R: BufRead> Xml<R> {
         }
     }
 
-    fn enter(&mut self, begun: Result<(String, Vec<(&'static str, String)>), String>) -> Result<Node, Refusal> {
+    fn enter(&mut self, begun: Result<Begun, String>) -> Result<Node, Refusal> {
         let (name, attributes) = begun.or_else(|what| self.refuse(what))?;
         if self.path.len() >= DEEPEST {
             return self.refuse(format!("elements are nested deeper than {DEEPEST}"));
@@ -143,7 +146,7 @@ impl<R: BufRead> Xml<R> {
 }
 
 /// The name of an element, and the attributes that are wanted.
-fn begin(start: &BytesStart<'_>, wanted: &[&'static str]) -> Result<(String, Vec<(&'static str, String)>), String> {
+fn begin(start: &BytesStart<'_>, wanted: &[&'static str]) -> Result<Begun, String> {
     let text = |bytes: &[u8]| {
         std::str::from_utf8(bytes).map(str::to_owned).map_err(|_| "a name is no text in UTF-8".to_owned())
     };
