@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::camera::{Backend, SHIPPED_MODEL};
 use closecall_sensors::inference_backend;
@@ -15,9 +15,10 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::args::{ControllerArgs, Format, Sensing, SetArgs, arm};
 use super::gates::GateArgs;
+use super::leave::Over;
 use super::output::{complain, outln};
 use super::summary::{print_counts, print_verdict};
-use super::{CliError, json, leave};
+use super::{CliError, json};
 use crate::campaign::execution::{Campaign, Turn};
 use crate::campaign::folder::{Folder, FolderError};
 use crate::campaign::manifest::{MANIFEST_VERSION, Manifest, ManifestModel, ManifestScenario};
@@ -27,8 +28,30 @@ use crate::campaign::summary::Summary;
 use crate::campaign::workers::Workers;
 use crate::controller::ControllerChoice;
 use crate::exit_code::ExitCode;
+use crate::report::overview::Overview;
 use crate::scenario::ScenarioFile;
 use crate::simulation::Arm;
+
+/// Samples of each scenario where nobody says otherwise.
+const DEFAULT_SAMPLES: u64 = 200;
+
+/// How large a campaign is, by its purpose. Presets are paired: a change is judged by what it changes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Preset {
+    /// For every pull request: minutes.
+    Pr,
+    /// For every night.
+    Nightly,
+}
+
+impl Preset {
+    const fn samples(self) -> u64 {
+        match self {
+            Self::Pr => 1_000,
+            Self::Nightly => 20_000,
+        }
+    }
+}
 
 /// Arguments of `closecall campaign`.
 #[derive(Debug, Args)]
@@ -36,9 +59,12 @@ pub(super) struct CampaignArgs {
     /// Scenario files
     #[arg(required = true)]
     scenarios: Vec<PathBuf>,
-    /// Samples of each scenario
-    #[arg(short = 'n', long = "samples", default_value_t = 200, value_parser = clap::value_parser!(u64).range(1..))]
-    samples: u64,
+    /// Samples of each scenario; 200 where absent, unless a preset says otherwise
+    #[arg(short = 'n', long = "samples", value_parser = clap::value_parser!(u64).range(1..))]
+    samples: Option<u64>,
+    /// Size for a purpose: `pr` pairs 1,000 samples of each scenario (minutes), `nightly` 20,000
+    #[arg(long, value_enum)]
+    preset: Option<Preset>,
     /// Seed of the random numbers
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -83,7 +109,7 @@ pub(super) struct CampaignArgs {
 impl CampaignArgs {
     /// The controllers, the baseline first.
     fn controllers(&self) -> Result<Vec<ControllerChoice>, CliError> {
-        match (self.paired, self.controller.choice()?) {
+        match (self.is_paired(), self.controller.choice()?) {
             (false, tested) => Ok(vec![tested]),
             (true, ControllerChoice::Acc) => Err(CliError::Usage {
                 message: "--paired compares a controller with `acc`: name another with --controller".to_owned(),
@@ -92,8 +118,17 @@ impl CampaignArgs {
         }
     }
 
+    fn samples(&self) -> u64 {
+        self.samples.unwrap_or(self.preset.map_or(DEFAULT_SAMPLES, Preset::samples))
+    }
+
+    /// True where every sample is run without the margin increase system too.
+    fn is_paired(&self) -> bool {
+        self.paired || self.preset.is_some()
+    }
+
     fn sampling(&self) -> Sampling {
-        Sampling { seed: self.seed, design: self.design, samples: self.samples }
+        Sampling { seed: self.seed, design: self.design, samples: self.samples() }
     }
 
     fn manifest(&self, campaign: &Campaign, controllers: &[ControllerChoice]) -> Result<Manifest, CliError> {
@@ -153,7 +188,7 @@ pub(super) fn version() -> String {
 
 pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
     let controllers = args.controllers()?;
-    if args.gates.max_induced.is_some() && !args.paired {
+    if args.gates.max_induced.is_some() && !args.is_paired() {
         let message = "--max-induced needs --paired: induced collisions are known only of pairs".to_owned();
         return Err(CliError::Usage { message });
     }
@@ -161,8 +196,9 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
     let work = |file| Arc::new(Work { file, sampling: args.sampling(), arms: arms.clone() });
     let works = load(args)?.into_iter().map(work).collect();
     let campaign = Campaign { works, partition: args.partition, workers: args.workers()? };
+    let manifest = args.manifest(&campaign, &controllers)?;
     let held = match &args.out {
-        Some(path) => Some(Folder::hold(path, &args.manifest(&campaign, &controllers)?, args.resume)?),
+        Some(path) => Some(Folder::hold(path, &manifest, args.resume)?),
         None => None,
     };
     let started = Instant::now();
@@ -173,11 +209,21 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
         complain(format_args!("the journal was torn at line {line} ({reason}): what followed was run again\n"));
     }
     let wall_s = started.elapsed().as_secs_f64();
-    let summary = watch.summary;
-    if let Some(held) = &held {
-        leave::reports(&held.folder, &campaign.works, args.recordings)?;
+    let Watch { summary, overview, .. } = watch;
+    let gates = args.gates.gates();
+    let judged = summary.judge(gates);
+    let over = Over {
+        manifest: &manifest,
+        works: &campaign.works,
+        summary: &summary,
+        overview: &overview,
+        gates,
+        judged: &judged,
+    };
+    match &held {
+        Some(held) => over.leave(&held.folder, args.recordings)?,
+        None => over.leave_no_folder()?,
     }
-    let judged = summary.judge(args.gates.gates());
     match args.format {
         Format::Json => outln!("{:#}", json::campaign(&summary, &judged, Some(wall_s))),
         Format::Human => {
@@ -193,6 +239,7 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
 /// Counts what comes, and shows how far it is.
 struct Watch {
     summary: Summary,
+    overview: Overview,
     egos: Vec<(String, Option<ActorId>)>,
     bar: ProgressBar,
 }
@@ -211,7 +258,8 @@ impl Watch {
                 complain(format_args!("{name}: the grid has {count} of the {asked} samples asked for\n"));
             }
         }
-        Self { summary, egos, bar: progress(campaign.len()) }
+        let overview = Overview::new(campaign.works.iter().map(|work| &work.file), &summary.controllers);
+        Self { summary, overview, egos, bar: progress(campaign.len()) }
     }
 
     fn take(&mut self, turn: Turn<'_>) -> ControlFlow<()> {
@@ -223,6 +271,7 @@ impl Watch {
         if let Some(ego) = &self.egos[turn.work].1 {
             self.summary.take(turn.record, ego);
         }
+        self.overview.take(turn.record);
         self.bar.inc(1);
         if !turn.is_new {
             // What is found in the journal says nothing about how long the rest will take.

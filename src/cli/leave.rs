@@ -1,7 +1,9 @@
 //! What a campaign leaves in its folder once it is over, all made from its journal.
 
 use std::collections::BTreeMap;
-use std::fs;
+use std::fs::{self, OpenOptions};
+use std::io::Write;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use closecall_traffic::ActorId;
@@ -12,35 +14,130 @@ use crate::campaign::folder::{Folder, FolderError};
 use crate::campaign::manifest::Manifest;
 use crate::campaign::record::Record;
 use crate::campaign::runner::Work;
+use crate::campaign::summary::Summary;
+use crate::campaign::verdict::{Gates, Judgement};
 use crate::report::WriteError;
-use crate::report::junit::write_junit;
+use crate::report::findings::{Findings, Recordings};
+use crate::report::html::write_html;
+use crate::report::junit::{SuiteTotals, write_junit};
+use crate::report::markdown::{markdown, write_markdown};
 use crate::report::outcomes::{OutcomeRow, parameter_columns, write_outcomes};
+use crate::report::overview::Overview;
+use crate::report::requirements::requirements;
 use crate::report::timings::{Timing, write_timings};
 use crate::scenario::ScenarioFile;
 
 /// Where recordings lie in a campaign's folder.
 const RECORDINGS: &str = "recordings";
+/// Samples that are listed as the slowest.
+const SLOWEST: usize = 10;
+/// Where GitHub's runners show what a step has to say.
+const STEP_SUMMARY: &str = "GITHUB_STEP_SUMMARY";
 
-/// The recordings of failing samples: (scenario, sample, controller) to the path in the folder.
-type Recordings = BTreeMap<(String, u64, String), String>;
+/// A campaign that is over.
+pub(super) struct Over<'a> {
+    /// How it was made.
+    pub(super) manifest: &'a Manifest,
+    /// The scenarios.
+    pub(super) works: &'a [Arc<Work>],
+    /// The counts.
+    pub(super) summary: &'a Summary,
+    /// What the page shows.
+    pub(super) overview: &'a Overview,
+    /// What it was judged by.
+    pub(super) gates: Gates,
+    /// The verdict.
+    pub(super) judged: &'a Judgement,
+}
 
-/// Writes Parquet, recordings and JUnit, up to `recordings` failing samples of each scenario.
-pub(super) fn reports(folder: &Folder, works: &[Arc<Work>], recordings: u64) -> Result<(), CliError> {
-    let manifest = folder.manifest()?;
-    let files: Vec<ScenarioFile> = works.iter().map(|work| work.file.clone()).collect();
-    let files = &files[..];
-    let nominal: Vec<_> = files.iter().map(|file| file.space().nominal()).collect();
-    write_outcomes(&folder.file("outcomes.parquet"), &parameter_columns(&nominal), rows(folder, files, &manifest)?)?;
-    write_timings(&folder.file("timings.parquet"), timings(folder, &manifest)?)?;
-    let recorded = record_failures(folder, files, &manifest, recordings)?;
-    let with_recordings = rows(folder, files, &manifest)?.map(|row| {
-        row.map(|row| {
-            let recording = recorded.get(&(row.scenario.clone(), row.sample, row.controller.clone())).cloned();
-            (row, recording)
+impl Over<'_> {
+    /// Writes every report into the folder, with recordings of up to so many failing samples of each scenario.
+    pub(super) fn leave(&self, folder: &Folder, recordings: u64) -> Result<(), CliError> {
+        let files: Vec<&ScenarioFile> = self.works.iter().map(|work| &work.file).collect();
+        let nominal: Vec<_> = files.iter().map(|file| file.space().nominal()).collect();
+        let rows = || rows(folder, &files, self.manifest);
+        write_outcomes(&folder.file("outcomes.parquet"), &parameter_columns(&nominal), rows()?)?;
+        let mut slowest = Vec::with_capacity(SLOWEST + 1);
+        let timings = timings(folder, self.manifest)?.inspect(|timing| keep_slowest(&mut slowest, timing));
+        write_timings(&folder.file("timings.parquet"), timings)?;
+        let recorded = record_failures(folder, &files, self.manifest, recordings)?;
+        let with_recordings = rows()?.map(|row| {
+            row.map(|row| {
+                let recording = recorded.get(&(row.scenario.clone(), row.sample, row.controller.clone())).cloned();
+                (row, recording)
+            })
+        });
+        write_junit(&folder.file("junit.xml"), &self.suites(), with_recordings)?;
+        self.with_findings(&files, Some(folder), &recorded, &slowest, |findings| {
+            write_html(&folder.file("report.html"), findings)?;
+            write_markdown(&folder.file("summary.md"), findings)
+        })?;
+        self.tell_runner(&files, Some(folder), &recorded)
+    }
+
+    /// Leaves what can be left without a folder.
+    pub(super) fn leave_no_folder(&self) -> Result<(), CliError> {
+        let files: Vec<&ScenarioFile> = self.works.iter().map(|work| &work.file).collect();
+        self.tell_runner(&files, None, &Recordings::new())
+    }
+
+    fn suites(&self) -> Vec<SuiteTotals> {
+        let suite = |scenario: &crate::report::overview::ScenarioOverview| SuiteTotals {
+            scenario: scenario.name.clone(),
+            tests: scenario.totals.iter().map(|arm| arm.samples).sum(),
+            failures: scenario.totals.iter().map(|arm| arm.failures).sum(),
+            errors: scenario.totals.iter().map(|arm| arm.errors).sum(),
+        };
+        self.overview.scenarios.iter().map(suite).collect()
+    }
+
+    fn with_findings<T>(
+        &self,
+        files: &[&ScenarioFile],
+        folder: Option<&Folder>,
+        recordings: &Recordings,
+        slowest: &[Timing],
+        write: impl FnOnce(&Findings<'_>) -> T,
+    ) -> T {
+        let requirements = requirements(files.iter().copied(), self.summary, self.gates);
+        let gallery = format!("{RECORDINGS}/index.html");
+        let has_gallery = folder.is_some_and(|folder| folder.file(&gallery).exists());
+        write(&Findings {
+            manifest: self.manifest,
+            files,
+            summary: self.summary,
+            judged: self.judged,
+            requirements: &requirements,
+            overview: self.overview,
+            recordings,
+            gallery: has_gallery.then_some(gallery.as_str()),
+            slowest,
         })
-    });
-    write_junit(&folder.file("junit.xml"), with_recordings)?;
-    Ok(())
+    }
+
+    /// Adds the summary to what a CI server shows of this step, where one asks for it.
+    fn tell_runner(
+        &self,
+        files: &[&ScenarioFile],
+        folder: Option<&Folder>,
+        recordings: &Recordings,
+    ) -> Result<(), CliError> {
+        let Some(path) = std::env::var_os(STEP_SUMMARY).filter(|path| !path.is_empty()).map(PathBuf::from) else {
+            return Ok(());
+        };
+        let text = self.with_findings(files, folder, recordings, &[], markdown);
+        let opened = OpenOptions::new().create(true).append(true).open(&path);
+        let written = opened.and_then(|mut file| file.write_all(text.as_bytes()));
+        Ok(written.map_err(|source| WriteError::new(&path, source))?)
+    }
+}
+
+fn keep_slowest(slowest: &mut Vec<Timing>, timing: &Timing) {
+    let place = slowest.partition_point(|slower| slower.wall_s >= timing.wall_s);
+    if place < SLOWEST {
+        slowest.insert(place, timing.clone());
+        slowest.truncate(SLOWEST);
+    }
 }
 
 /// The wall times, one row for each arm.
@@ -60,7 +157,7 @@ fn timings(folder: &Folder, manifest: &Manifest) -> Result<impl Iterator<Item = 
 /// The journal's records, one row for each arm.
 fn rows<'a>(
     folder: &Folder,
-    files: &'a [ScenarioFile],
+    files: &'a [&'a ScenarioFile],
     manifest: &'a Manifest,
 ) -> Result<impl Iterator<Item = Result<OutcomeRow, CliError>> + use<'a>, CliError> {
     let of_record = move |record: Result<Record, FolderError>| -> Vec<Result<OutcomeRow, CliError>> {
@@ -84,14 +181,14 @@ fn rows<'a>(
     Ok(folder.records()?.flat_map(of_record))
 }
 
-fn ego<'a>(files: &'a [ScenarioFile], scenario: &str) -> Option<&'a ActorId> {
+fn ego<'a>(files: &[&'a ScenarioFile], scenario: &str) -> Option<&'a ActorId> {
     files.iter().find(|file| file.config().name == scenario)?.ego_id()
 }
 
 /// Runs the first failing samples of the arm under test again and records them.
 fn record_failures(
     folder: &Folder,
-    files: &[ScenarioFile],
+    files: &[&ScenarioFile],
     manifest: &Manifest,
     most: u64,
 ) -> Result<Recordings, CliError> {
@@ -103,6 +200,9 @@ fn record_failures(
     let mut recorded = Recordings::new();
     let mut counts: BTreeMap<String, u64> = BTreeMap::new();
     for record in folder.records()? {
+        if counts.len() == files.len() && counts.values().all(|count| *count >= most) {
+            break;
+        }
         let record = record?;
         let (Some(ego), Some(tested)) = (ego(files, &record.scenario), record.arms.last()) else { continue };
         let failed = tested.result.as_ref().is_ok_and(|outcome| outcome.ego_collided(ego));

@@ -6,9 +6,10 @@ use clap::Args;
 
 use super::args::Format;
 use super::gates::GateArgs;
+use super::leave::Over;
 use super::output::outln;
 use super::summary::{print_counts, print_verdict};
-use super::{CliError, json, leave, past};
+use super::{CliError, json, past};
 use crate::campaign::merge::Parts;
 use crate::exit_code::ExitCode;
 
@@ -38,9 +39,13 @@ pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
         works.iter().map(|work| (work.file.config().name.clone(), work.count())).collect();
     parts.check(&samples)?;
     let held = parts.merge(&samples, &args.out, std::env::args().collect())?;
-    let summary = past::summary(&held.folder, &works)?;
-    let judged = summary.judge(args.gates.gates());
-    leave::reports(&held.folder, &works, args.recordings)?;
+    let (summary, overview) = past::findings(&held.folder, &works)?;
+    let gates = args.gates.gates();
+    let judged = summary.judge(gates);
+    let manifest = held.folder.manifest()?;
+    let over =
+        Over { manifest: &manifest, works: &works, summary: &summary, overview: &overview, gates, judged: &judged };
+    over.leave(&held.folder, args.recordings)?;
     match args.format {
         Format::Json => outln!("{:#}", json::campaign(&summary, &judged, None)),
         Format::Human => {

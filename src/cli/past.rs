@@ -9,6 +9,7 @@ use crate::campaign::folder::{Folder, FolderError};
 use crate::campaign::manifest::{Manifest, ManifestScenario};
 use crate::campaign::runner::Work;
 use crate::campaign::summary::Summary;
+use crate::report::overview::Overview;
 use crate::scenario::ScenarioFile;
 use crate::simulation::Arm;
 
@@ -40,10 +41,12 @@ pub(super) fn scenario_file(folder: &Path, scenario: &ManifestScenario) -> Resul
     Ok(ScenarioFile::parse(&path, &scenario.text, &[])?)
 }
 
-/// The counts of what the journal holds.
-pub(super) fn summary(folder: &Folder, works: &[Arc<Work>]) -> Result<Summary, CliError> {
+/// The counts of what the journal holds, and what its reports show.
+pub(super) fn findings(folder: &Folder, works: &[Arc<Work>]) -> Result<(Summary, Overview), CliError> {
     let name = |arm: &Arm| arm.controller.name().to_owned();
-    let mut summary = Summary::new(works.first().map_or_else(Vec::new, |work| work.arms.iter().map(name).collect()));
+    let names: Vec<String> = works.first().map_or_else(Vec::new, |work| work.arms.iter().map(name).collect());
+    let mut overview = Overview::new(works.iter().map(|work| &work.file), &names);
+    let mut summary = Summary::new(names);
     let mut records = folder.records()?.peekable();
     for work in works {
         let name = &work.file.config().name;
@@ -51,10 +54,12 @@ pub(super) fn summary(folder: &Folder, works: &[Arc<Work>]) -> Result<Summary, C
         while let Some(record) =
             records.next_if(|record| record.as_ref().map_or(true, |record| record.scenario == *name))
         {
+            let record = record?;
+            overview.take(&record);
             if let Some(ego) = work.file.ego_id() {
-                summary.take(&record?, ego);
+                summary.take(&record, ego);
             }
         }
     }
-    Ok(summary)
+    Ok((summary, overview))
 }

@@ -1,12 +1,19 @@
 //! What a run and a campaign leave behind: files to look at, to keep, and to gate on.
 
+mod charts;
+pub mod findings;
+pub mod html;
 pub mod in_car;
 pub mod junit;
+pub mod markdown;
 pub mod outcomes;
+pub mod overview;
+pub mod requirements;
 pub mod rerun;
 pub mod timings;
 pub mod trace;
 pub mod traffic;
+mod units;
 mod write;
 
 pub(crate) use write::is_temporary;

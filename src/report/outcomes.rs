@@ -14,9 +14,11 @@ use arrow::datatypes::{DataType, Field, Schema};
 use closecall_traffic::{ActorId, Measured, ParameterName, Parameters, Value};
 use parquet::arrow::ArrowWriter;
 use parquet::basic::Compression;
+use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 use serde::Serialize;
 
+use super::units::unit_of;
 use super::write::{WriteError, write_atomically};
 use crate::campaign::record::SampleFailure;
 use crate::outcome::{Collision, MisSummary, Outcome};
@@ -93,7 +95,8 @@ pub fn write_outcomes<E: From<WriteError>>(
     let mut rows = rows.fuse();
     let mut broken = None;
     let written = write_atomically(path, |file| {
-        let mut writer = ArrowWriter::try_new(file, schema.clone(), Some(properties())).map_err(io::Error::other)?;
+        let options = properties().into_builder().set_key_value_metadata(Some(units(&columns))).build();
+        let mut writer = ArrowWriter::try_new(file, schema.clone(), Some(options)).map_err(io::Error::other)?;
         loop {
             let group: Result<Vec<OutcomeRow>, E> = rows.by_ref().take(ROWS_PER_GROUP).collect();
             let group = match group {
@@ -117,6 +120,13 @@ pub fn write_outcomes<E: From<WriteError>>(
         Some(error) => Err(error),
         None => Ok(written?),
     }
+}
+
+/// The units once more, for readers that do not decode Arrow's own schema: one entry for each column that has one.
+fn units(columns: &[Column]) -> Vec<KeyValue> {
+    let unit =
+        |column: &Column| column.unit.map(|unit| KeyValue::new(format!("unit:{}", column.name), unit.to_owned()));
+    columns.iter().filter_map(unit).collect()
 }
 
 /// How every table is written: nothing in it depends on when, where, or by which version of a library.
@@ -233,9 +243,9 @@ fn key_columns(columns: &mut Columns) {
     columns.number("duration_s", "s", |row| Some(row.outcome()?.duration.s()));
 }
 
-/// The name says which parameter, and the end of the parameter's name its unit.
+/// The name says which parameter, and its end the unit.
 fn parameter_column(columns: &mut Columns, name: &ParameterName, kind: ParameterKind) {
-    let column = format!("param:{name}");
+    let (column, unit) = (format!("param:{name}"), unit_of(name.as_str()));
     let name = name.clone();
     match kind {
         ParameterKind::Number => {
@@ -243,7 +253,7 @@ fn parameter_column(columns: &mut Columns, name: &ParameterName, kind: Parameter
                 Value::Number(value) => Some(*value),
                 Value::Label(_) => None,
             };
-            columns.0.push(Column { name: column, unit: None, cells: Cells::Number(Box::new(of)) });
+            columns.0.push(Column { name: column, unit, cells: Cells::Number(Box::new(of)) });
         }
         ParameterKind::Label => {
             columns.text(&column, move |row| row.outcome()?.parameters.get(&name).map(ToString::to_string));

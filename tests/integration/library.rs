@@ -41,6 +41,19 @@ fn every_distribution_is_labelled() {
 }
 
 #[test]
+fn every_scenario_is_evidence_for_a_requirement_that_is_written_down() {
+    let listed = include_str!("../../docs/requirements.md");
+    for path in all() {
+        let file = ScenarioFile::load(&path, &[]).unwrap();
+        let requirements = &file.config().requirements;
+        assert!(!requirements.is_empty(), "{}", path.display());
+        for mark in requirements {
+            assert!(listed.contains(&format!("| `{mark}` |")), "{}: {mark}", path.display());
+        }
+    }
+}
+
+#[test]
 fn fitted_distributions_are_those_of_the_committed_fit() {
     let committed = include_str!("../../scenarios/library/fitted/us101.toml");
     let document: toml::Table = committed.parse().unwrap();

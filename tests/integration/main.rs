@@ -16,5 +16,6 @@ mod own_controller;
 mod paper_figure;
 mod readme;
 mod recordings;
+mod reports;
 mod rerun_files;
 mod support;
