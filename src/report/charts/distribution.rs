@@ -4,7 +4,7 @@ use std::io;
 
 use plotters::prelude::*;
 
-use super::style::{AXIS, GRID, LABEL_PX, arm_colour, colour, draw};
+use super::style::{AXIS, DESCRIPTION_PX, GRID, LABEL_PX, arm_colour, colour, draw};
 use crate::report::overview::{Axis, BINS, CELLS, Fate, MarginBins, MarginKind};
 use crate::report::units::labelled;
 
@@ -19,6 +19,7 @@ pub(in crate::report) fn margin(kind: &MarginKind, arms: &[MarginBins]) -> io::R
     draw(SMALL, |canvas| {
         let mut chart = ChartBuilder::on(canvas)
             .margin(8)
+            .margin_right(20)
             .x_label_area_size(38)
             .y_label_area_size(48)
             .build_cartesian_2d(0.0..kind.high, 0.0..most * HEADROOM)?;
@@ -31,6 +32,7 @@ pub(in crate::report) fn margin(kind: &MarginKind, arms: &[MarginBins]) -> io::R
             .y_labels(4)
             .y_label_formatter(&|count| format!("{count:.0}"))
             .label_style(("sans-serif", LABEL_PX).into_font().color(&AXIS))
+            .axis_desc_style(("sans-serif", DESCRIPTION_PX).into_font().color(&AXIS))
             .x_desc(kind.title)
             .draw()?;
         let width = kind.high / BINS as f64;
@@ -57,6 +59,7 @@ pub(in crate::report) fn coverage(axis: &Axis, counts: &[[u64; Fate::ALL.len()];
     draw(SMALL, |canvas| {
         let mut chart = ChartBuilder::on(canvas)
             .margin(8)
+            .margin_right(20)
             .x_label_area_size(38)
             .y_label_area_size(48)
             .build_cartesian_2d(low..high, 0.0..most * HEADROOM)?;
@@ -72,6 +75,7 @@ pub(in crate::report) fn coverage(axis: &Axis, counts: &[[u64; Fate::ALL.len()];
             .x_label_formatter(&label)
             .y_label_formatter(&|count| format!("{count:.0}"))
             .label_style(("sans-serif", LABEL_PX).into_font().color(&AXIS))
+            .axis_desc_style(("sans-serif", DESCRIPTION_PX).into_font().color(&AXIS))
             .x_desc(labelled(axis.name()))
             .draw()?;
         let width = (high - low) / cells as f64;

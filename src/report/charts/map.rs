@@ -5,7 +5,7 @@ use std::io;
 use plotters::prelude::*;
 
 use super::distribution::label_of;
-use super::style::{AXIS, LABEL_PX, colour, draw};
+use super::style::{AXIS, DESCRIPTION_PX, LABEL_PX, colour, draw};
 use crate::report::overview::{Axis, CELLS, Fate, PairBins, ScenarioOverview};
 use crate::report::units::labelled;
 
@@ -51,6 +51,7 @@ pub(in crate::report) fn outcome_map(scenario: &ScenarioOverview, pair: &PairBin
             .x_label_formatter(&|value| label_of(across, *value))
             .y_label_formatter(&|value| label_of(up, *value))
             .label_style(("sans-serif", LABEL_PX).into_font().color(&AXIS))
+            .axis_desc_style(("sans-serif", DESCRIPTION_PX).into_font().color(&AXIS))
             .x_desc(labelled(across.name()))
             .y_desc(labelled(up.name()))
             .draw()?;

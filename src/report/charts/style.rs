@@ -12,6 +12,7 @@ pub(super) type Canvas<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
 /// Size of letters [px].
 pub(super) const LABEL_PX: i32 = 13;
+pub(super) const DESCRIPTION_PX: i32 = 15;
 /// Grey of axes and grids.
 pub(super) const AXIS: RGBColor = RGBColor(0x55, 0x5f, 0x6b);
 pub(super) const GRID: RGBColor = RGBColor(0xe3, 0xe7, 0xec);

@@ -1,11 +1,12 @@
 //! Single samples: the worst, those in error, and the slowest.
 
-use closecall_traffic::Measured;
+use closecall_traffic::{Measured, Value};
 
 use super::text::{Html, cell, element, escape, markup, number};
 use crate::outcome::Phase;
 use crate::report::findings::Findings;
-use crate::report::overview::{ScenarioOverview, WorstSample};
+use crate::report::overview::{Axis, ScenarioOverview, WorstSample};
+use crate::report::units::labelled;
 
 /// The worst samples of a scenario.
 pub(super) fn worst(html: &mut Html, findings: &Findings<'_>, scenario: &ScenarioOverview) {
@@ -13,45 +14,54 @@ pub(super) fn worst(html: &mut Html, findings: &Findings<'_>, scenario: &Scenari
     html.classed(
         "p",
         "note",
-        "Collisions first, by E's change of velocity; then the narrowest escapes, by the smallest time to collision with \
-         the vehicle behind. The commands run within this folder.",
+        "Induced collisions first, then the other ones, each by E's change of velocity; then the narrowest escapes, by the \
+         smallest time to collision with the vehicle behind. To run one again, within this folder:",
     );
-    html.table(&[
-        "#sample",
-        "what became of it",
-        "#E's ΔV [m/s]",
-        "with",
-        "phase",
-        "#rear TTC [s]",
-        "#rear gap [m]",
-        "#front headway [s]",
-        "recording",
-        "run it again",
-    ]);
+    if let Some(first) = scenario.worst.first() {
+        html.raw(&format!("<pre>{}</pre>", escape(&findings.replay(&scenario.name, first.sample))));
+    }
+    let told: Vec<&Axis> =
+        scenario.map().map_or_else(Vec::new, |pair| pair.axes.map(|place| &scenario.axes[place]).to_vec());
+    let mut columns: Vec<String> =
+        ["#sample", "what became of it", "#E's ΔV [m/s]", "with", "phase", "#rear TTC [s]", "#rear gap [m]"]
+            .map(str::to_owned)
+            .to_vec();
+    columns.push("#front headway [s]".to_owned());
+    columns.extend(told.iter().map(|axis| format!("#{}", labelled(axis.name()))));
+    columns.push("recording".to_owned());
+    html.table(&columns.iter().map(String::as_str).collect::<Vec<_>>());
     for sample in &scenario.worst {
-        let margins = &sample.outcome.margins;
-        let class = if sample.delta_v_mps.is_some() { "collided" } else { "" };
-        html.row(
-            class,
-            &[
-                number(sample.sample),
-                cell(sample.fate.word(scenario.is_paired())),
-                number(sample.delta_v_mps.map_or_else(String::new, |mps| format!("{mps:.2}"))),
-                cell(sample.collision.as_ref().map(|(other, _)| other.to_string()).unwrap_or_default()),
-                cell(phase(sample)),
-                measured(margins.min_ttc_rear_s),
-                measured(margins.min_gap_rear_m),
-                measured(margins.min_thw_front_s),
-                recording(findings, &scenario.name, sample.sample),
-                markup(&element("code", "", findings.replay(&scenario.name, sample.sample))),
-            ],
-        );
+        html.row(if sample.delta_v_mps.is_some() { "collided" } else { "" }, &row(findings, scenario, sample, &told));
     }
     html.end_table();
     if let Some(gallery) = findings.gallery {
         let link = escape(gallery);
         html.raw(&format!("<p><a href=\"{link}\">All recordings with pictures of their critical moments</a></p>"));
     }
+}
+
+fn row(findings: &Findings<'_>, scenario: &ScenarioOverview, sample: &WorstSample, told: &[&Axis]) -> Vec<String> {
+    let margins = &sample.outcome.margins;
+    let mut cells = vec![
+        number(sample.sample),
+        cell(sample.fate.word(scenario.is_paired())),
+        number(sample.delta_v_mps.map_or_else(String::new, |mps| format!("{mps:.2}"))),
+        cell(sample.collision.as_ref().map(|(other, _)| other.to_string()).unwrap_or_default()),
+        cell(phase(sample)),
+        measured(margins.min_ttc_rear_s),
+        measured(margins.min_gap_rear_m),
+        measured(margins.min_thw_front_s),
+    ];
+    for axis in told {
+        let value = sample.outcome.parameters.iter().find(|(name, _)| name.as_str() == axis.name());
+        cells.push(number(match value {
+            Some((_, Value::Number(value))) => format!("{value:.2}"),
+            Some((_, Value::Label(label))) => label.clone(),
+            None => String::new(),
+        }));
+    }
+    cells.push(recording(findings, &scenario.name, sample.sample));
+    cells
 }
 
 fn phase(sample: &WorstSample) -> &'static str {
@@ -74,7 +84,10 @@ fn measured(value: Measured) -> String {
 
 fn recording(findings: &Findings<'_>, scenario: &str, sample: u64) -> String {
     match findings.recording(scenario, sample) {
-        Some(path) => markup(&format!("<a href=\"{0}\">{0}</a>", escape(path))),
+        Some(path) => {
+            let name = path.rsplit('/').next().unwrap_or(path);
+            markup(&format!("<a href=\"{}\">{}</a>", escape(path), escape(name)))
+        }
         None => cell(""),
     }
 }

@@ -67,8 +67,8 @@ pub struct Point {
     pub parameters: Parameters,
 }
 
-/// One of the worst samples in the arm under test: collisions first, by E's change of velocity, then the narrowest escapes,
-/// by the smallest time to collision with the vehicle behind.
+/// One of the worst samples in the arm under test: induced collisions first, then the other ones, each by E's change of
+/// velocity, then the narrowest escapes, by the smallest time to collision with the vehicle behind.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WorstSample {
     /// Its number.
@@ -115,6 +115,7 @@ impl WorstSample {
             (false, false) => ttc_s(self).total_cmp(&ttc_s(other)),
             (one, other) => other.cmp(&one),
         };
-        by_collision.then_with(by_ttc).then(self.sample.cmp(&other.sample))
+        let by_fate = (other.fate == Fate::Induced).cmp(&(self.fate == Fate::Induced));
+        by_fate.then(by_collision).then_with(by_ttc).then(self.sample.cmp(&other.sample))
     }
 }

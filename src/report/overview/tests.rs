@@ -105,7 +105,9 @@ fn the_worst_come_first_and_nan_is_the_worst() {
     let file = file();
     let mut overview = Overview::new([&file], &arms());
     let mut take = |sample, ttc_s, delta_v_mps: Option<f64>| {
-        let mut record = record(sample, 5.0, "car", [false, delta_v_mps.is_some()]);
+        // Sample 8 is induced, the other collisions are in both arms.
+        let collided = delta_v_mps.is_some();
+        let mut record = record(sample, 5.0, "car", [collided && sample != 8, collided]);
         let outcome = record.arms[1].result.as_mut().unwrap();
         outcome.margins.min_ttc_rear_s = ttc_s;
         if let Some(delta_v_mps) = delta_v_mps {
@@ -120,8 +122,9 @@ fn the_worst_come_first_and_nan_is_the_worst() {
     take(5, Ok(2.0), Some(7.0));
     take(6, Ok(f64::NAN), None);
     take(7, Ok(2.0), Some(f64::NAN));
+    take(8, Ok(2.0), Some(0.5));
     let order: Vec<u64> = overview.scenarios[0].worst.iter().map(|sample| sample.sample).collect();
-    assert_eq!(order, [7, 5, 4, 6, 2, 1, 3]);
+    assert_eq!(order, [8, 7, 5, 4, 6, 2, 1, 3]);
 }
 
 #[test]
