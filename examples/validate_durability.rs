@@ -6,8 +6,6 @@
 //! The moments are drawn from the seed, over the time that the undisturbed campaign takes; where they fall within a
 //! sample, a line or a report is up to the machine.
 
-#![expect(clippy::print_stdout, reason = "a program of its own")]
-
 use std::error::Error;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
