@@ -93,6 +93,11 @@ impl Sensors {
         self.mode
     }
 
+    /// The rear camera, whether it is simulated or not.
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
     /// The same sensors, simulated to another depth, as the command line may ask.
     #[must_use]
     pub fn with_mode(self, mode: SensorMode) -> Self {

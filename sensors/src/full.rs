@@ -148,6 +148,10 @@ impl Perception for FullPerception {
         Some(&self.lidar)
     }
 
+    fn rear_detections(&self) -> &[Detection] {
+        self.pending.back().map_or(&[], |scan| &scan.detections)
+    }
+
     fn rear_field(&self) -> Option<FieldOfView> {
         Some(FieldOfView { half_angle_tan: HALF_FIELD_TAN, range_m: self.reach_m })
     }

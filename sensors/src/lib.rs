@@ -30,4 +30,4 @@ pub use object::{NoiseKey, ObjectPerception, ObjectSensorConfig, ObjectSensorMod
 pub use perception::{FieldOfView, Health, Perception, SCAN_PERIOD, SensorError, SensorHealth};
 pub use scene::{Scene, SceneVehicle};
 pub use tracking::{TrackAudit, TrackerConfig, TrackerModel};
-pub use worker_classifier::{inference_backend, use_inference_backend};
+pub use worker_classifier::{inference_backend, rear_exposures, use_inference_backend};

@@ -2,8 +2,8 @@
 
 use closecall_traffic::{Time, Track};
 
-use crate::Scene;
 use crate::lidar::RearLidar;
+use crate::{Detection, Scene};
 
 /// Time from one control step, and one scan, to the next: 25 Hz.
 pub const SCAN_PERIOD: Time = Time::from_ms(40);
@@ -56,6 +56,12 @@ pub trait Perception: Send {
     /// The rear LiDAR with its latest points and boxes, for those who show them; none where it is not simulated.
     fn rear_lidar(&self) -> Option<&RearLidar> {
         None
+    }
+
+    /// The boxes found in the latest scan of the rear LiDAR, with the classes that the camera gave them; none where it is
+    /// not simulated.
+    fn rear_detections(&self) -> &[Detection] {
+        &[]
     }
 
     /// Where the rear sensor looks from the rear bumper; none where its limits are not simulated.

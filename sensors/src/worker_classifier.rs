@@ -16,6 +16,12 @@ use crate::{Detection, NoiseKey, Scene, SensorError};
 /// The channel of the camera's random stream.
 const CHANNEL: &str = "rear-camera";
 
+/// The noise of each exposure of a run's rear camera, scan by scan: with it a picture can be drawn again.
+pub fn rear_exposures(key: &NoiseKey) -> impl Iterator<Item = ExposureKey> + use<> {
+    let mut exposures = key.stream(CHANNEL);
+    std::iter::repeat_with(move || ExposureKey::draw(&mut exposures))
+}
+
 /// What runs the networks of this process.
 static BACKEND: OnceLock<Backend> = OnceLock::new();
 

@@ -20,6 +20,7 @@ pub mod merge;
 pub mod partition;
 pub mod record;
 pub mod runner;
+pub mod selection;
 pub mod summary;
 pub mod verdict;
 pub mod wall_times;

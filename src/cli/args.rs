@@ -122,6 +122,23 @@ impl ArmArgs {
     pub(super) fn arm(&self) -> Result<Arm, CliError> {
         Ok(arm(&self.controller.choice()?, self.sensors))
     }
+
+    /// This arm alone; of a pair, the baseline before it.
+    pub(super) fn arms(&self, paired: bool) -> Result<Vec<Arm>, CliError> {
+        let controllers = controllers(self.controller.choice()?, paired)?;
+        Ok(controllers.iter().map(|controller| arm(controller, self.sensors)).collect())
+    }
+}
+
+/// The controllers of a run: the tested one, of a pair after the baseline.
+pub(super) fn controllers(tested: ControllerChoice, paired: bool) -> Result<Vec<ControllerChoice>, CliError> {
+    match (paired, tested) {
+        (false, tested) => Ok(vec![tested]),
+        (true, ControllerChoice::Acc) => Err(CliError::Usage {
+            message: "--paired compares a controller with `acc`: name another with --controller".to_owned(),
+        }),
+        (true, tested) => Ok(vec![ControllerChoice::Acc, tested]),
+    }
 }
 
 /// An arm of a controller.

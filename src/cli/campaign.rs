@@ -13,7 +13,7 @@ use closecall_sensors::inference_backend;
 use closecall_traffic::ActorId;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::args::{ControllerArgs, Format, Sensing, SetArgs, arm};
+use super::args::{ControllerArgs, Format, Sensing, SetArgs, arm, controllers};
 use super::gates::GateArgs;
 use super::leave::Over;
 use super::output::{complain, outln};
@@ -24,6 +24,7 @@ use crate::campaign::folder::{Folder, FolderError};
 use crate::campaign::manifest::{MANIFEST_VERSION, Manifest, ManifestModel, ManifestScenario};
 use crate::campaign::partition::Partition;
 use crate::campaign::runner::{Sampling, Work};
+use crate::campaign::selection::Selection;
 use crate::campaign::summary::Summary;
 use crate::campaign::workers::Workers;
 use crate::controller::ControllerChoice;
@@ -94,9 +95,10 @@ pub(super) struct CampaignArgs {
     /// With --out: run only this part of the samples, to be put together by `closecall merge`
     #[arg(long, value_name = "I/N", requires = "out")]
     partition: Option<Partition>,
-    /// With --out: record this many failing samples as Rerun files
-    #[arg(long, default_value_t = 3, value_name = "N")]
-    recordings: u64,
+    /// With --out: record chosen samples of each scenario as Rerun files, with a page that shows them; `worst:N`,
+    /// `failures:N` and `random:N`, with commas between
+    #[arg(long, default_value = "failures:3", value_name = "KIND:N,…")]
+    record: Selection,
     #[command(flatten)]
     gates: GateArgs,
     #[command(flatten)]
@@ -107,17 +109,6 @@ pub(super) struct CampaignArgs {
 }
 
 impl CampaignArgs {
-    /// The controllers, the baseline first.
-    fn controllers(&self) -> Result<Vec<ControllerChoice>, CliError> {
-        match (self.is_paired(), self.controller.choice()?) {
-            (false, tested) => Ok(vec![tested]),
-            (true, ControllerChoice::Acc) => Err(CliError::Usage {
-                message: "--paired compares a controller with `acc`: name another with --controller".to_owned(),
-            }),
-            (true, tested) => Ok(vec![ControllerChoice::Acc, tested]),
-        }
-    }
-
     fn samples(&self) -> u64 {
         self.samples.unwrap_or(self.preset.map_or(DEFAULT_SAMPLES, Preset::samples))
     }
@@ -187,7 +178,7 @@ pub(super) fn version() -> String {
 }
 
 pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
-    let controllers = args.controllers()?;
+    let controllers = controllers(args.controller.choice()?, args.is_paired())?;
     if args.gates.max_induced.is_some() && !args.is_paired() {
         let message = "--max-induced needs --paired: induced collisions are known only of pairs".to_owned();
         return Err(CliError::Usage { message });
@@ -221,7 +212,7 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
         judged: &judged,
     };
     match &held {
-        Some(held) => over.leave(&held.folder, args.recordings)?,
+        Some(held) => over.leave(&held.folder, args.record)?,
         None => over.leave_no_folder()?,
     }
     match args.format {

@@ -11,6 +11,8 @@ use crate::campaign::folder::FolderError;
 use crate::campaign::merge::MergeError;
 use crate::exit_code::ExitCode;
 use crate::report::WriteError;
+use crate::report::figure::PngError;
+use crate::report::film::TrafficFilmError;
 use crate::report::rerun::RecordError;
 use crate::scenario::ScenarioError;
 use crate::simulation::SampleError;
@@ -36,6 +38,12 @@ pub enum CliError {
     /// A Rerun file cannot be written.
     #[error(transparent)]
     Record(#[from] RecordError),
+    /// A figure cannot be drawn.
+    #[error(transparent)]
+    Figure(#[from] PngError),
+    /// A recorded lane change cannot be shown.
+    #[error(transparent)]
+    TrafficFilm(#[from] TrafficFilmError),
     /// A set of pictures cannot be written.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
@@ -73,7 +81,7 @@ impl From<&CliError> for ExitCode {
         match error {
             CliError::Scenario(error) => Self::from(error),
             CliError::Recording(error) if error.is_io() => Self::Io,
-            CliError::Recording(_) | CliError::Classifier(_) => Self::InvalidInput,
+            CliError::Recording(_) | CliError::TrafficFilm(_) | CliError::Classifier(_) => Self::InvalidInput,
             CliError::Folder(error) => Self::from(error),
             CliError::Campaign(error) => Self::from(error),
             CliError::Merge(error) => match error {
@@ -89,7 +97,11 @@ impl From<&CliError> for ExitCode {
                 CompareError::Folder(error) => Self::from(error),
                 CompareError::Different { .. } | CompareError::OtherSample { .. } => Self::Usage,
             },
-            CliError::Write(_) | CliError::Record(_) | CliError::WriteRecording(_) | CliError::Dataset(_) => Self::Io,
+            CliError::Write(_)
+            | CliError::Record(_)
+            | CliError::Figure(_)
+            | CliError::WriteRecording(_)
+            | CliError::Dataset(_) => Self::Io,
             CliError::Sample { .. } => Self::SampleError,
             CliError::Usage { .. } => Self::Usage,
         }

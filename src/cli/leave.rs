@@ -1,7 +1,6 @@
 //! What a campaign leaves in its folder once it is over, all made from its journal.
 
-use std::collections::BTreeMap;
-use std::fs::{self, OpenOptions};
+use std::fs::OpenOptions;
 use std::io::Write;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -9,11 +8,12 @@ use std::sync::Arc;
 use closecall_traffic::ActorId;
 
 use super::CliError;
-use super::replay::record_sample;
+use super::recordings::{INDEX, RECORDINGS, record};
 use crate::campaign::folder::{Folder, FolderError};
 use crate::campaign::manifest::Manifest;
 use crate::campaign::record::Record;
 use crate::campaign::runner::Work;
+use crate::campaign::selection::Selection;
 use crate::campaign::summary::Summary;
 use crate::campaign::verdict::{Gates, Judgement};
 use crate::report::WriteError;
@@ -27,8 +27,6 @@ use crate::report::requirements::requirements;
 use crate::report::timings::{Timing, write_timings};
 use crate::scenario::ScenarioFile;
 
-/// Where recordings lie in a campaign's folder.
-const RECORDINGS: &str = "recordings";
 /// Samples that are listed as the slowest.
 const SLOWEST: usize = 10;
 /// Where GitHub's runners show what a step has to say.
@@ -51,8 +49,8 @@ pub(super) struct Over<'a> {
 }
 
 impl Over<'_> {
-    /// Writes every report into the folder, with recordings of up to so many failing samples of each scenario.
-    pub(super) fn leave(&self, folder: &Folder, recordings: u64) -> Result<(), CliError> {
+    /// Writes every report into the folder, with recordings of the selected samples.
+    pub(super) fn leave(&self, folder: &Folder, selection: Selection) -> Result<(), CliError> {
         let files: Vec<&ScenarioFile> = self.works.iter().map(|work| &work.file).collect();
         let nominal: Vec<_> = files.iter().map(|file| file.space().nominal()).collect();
         let rows = || rows(folder, &files, self.manifest);
@@ -60,7 +58,7 @@ impl Over<'_> {
         let mut slowest = Vec::with_capacity(SLOWEST + 1);
         let timings = timings(folder, self.manifest)?.inspect(|timing| keep_slowest(&mut slowest, timing));
         write_timings(&folder.file("timings.parquet"), timings)?;
-        let recorded = record_failures(folder, &files, self.manifest, recordings)?;
+        let recorded = record(folder, self.manifest, &files, selection)?;
         let with_recordings = rows()?.map(|row| {
             row.map(|row| {
                 let recording = recorded.get(&(row.scenario.clone(), row.sample, row.controller.clone())).cloned();
@@ -100,7 +98,7 @@ impl Over<'_> {
         write: impl FnOnce(&Findings<'_>) -> T,
     ) -> T {
         let requirements = requirements(files.iter().copied(), self.summary, self.gates);
-        let gallery = format!("{RECORDINGS}/index.html");
+        let gallery = format!("{RECORDINGS}/{INDEX}");
         let has_gallery = folder.is_some_and(|folder| folder.file(&gallery).exists());
         write(&Findings {
             manifest: self.manifest,
@@ -183,38 +181,4 @@ fn rows<'a>(
 
 fn ego<'a>(files: &[&'a ScenarioFile], scenario: &str) -> Option<&'a ActorId> {
     files.iter().find(|file| file.config().name == scenario)?.ego_id()
-}
-
-/// Runs the first failing samples of the arm under test again and records them.
-fn record_failures(
-    folder: &Folder,
-    files: &[&ScenarioFile],
-    manifest: &Manifest,
-    most: u64,
-) -> Result<Recordings, CliError> {
-    let path = folder.file(RECORDINGS);
-    // The recordings of an earlier, identical campaign may have been more.
-    if path.exists() {
-        fs::remove_dir_all(&path).map_err(|source| WriteError::new(&path, source))?;
-    }
-    let mut recorded = Recordings::new();
-    let mut counts: BTreeMap<String, u64> = BTreeMap::new();
-    for record in folder.records()? {
-        if counts.len() == files.len() && counts.values().all(|count| *count >= most) {
-            break;
-        }
-        let record = record?;
-        let (Some(ego), Some(tested)) = (ego(files, &record.scenario), record.arms.last()) else { continue };
-        let failed = tested.result.as_ref().is_ok_and(|outcome| outcome.ego_collided(ego));
-        let count = counts.entry(record.scenario.clone()).or_default();
-        if !failed || *count >= most {
-            continue;
-        }
-        *count += 1;
-        fs::create_dir_all(&path).map_err(|source| WriteError::new(&path, source))?;
-        let name = format!("{RECORDINGS}/{}-{}-{}.rrd", record.scenario, record.sample, tested.controller);
-        record_sample(folder, manifest, &record.scenario, record.sample, &folder.file(&name))?;
-        recorded.insert((record.scenario.clone(), record.sample, tested.controller.clone()), name);
-    }
-    Ok(recorded)
 }

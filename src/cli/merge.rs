@@ -11,6 +11,7 @@ use super::output::outln;
 use super::summary::{print_counts, print_verdict};
 use super::{CliError, json, past};
 use crate::campaign::merge::Parts;
+use crate::campaign::selection::Selection;
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall merge`.
@@ -22,9 +23,10 @@ pub(super) struct MergeArgs {
     /// New folder for the whole campaign
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Record this many failing samples as Rerun files
-    #[arg(long, default_value_t = 3, value_name = "N")]
-    recordings: u64,
+    /// Record chosen samples of each scenario as Rerun files, with a page that shows them; `worst:N`, `failures:N` and
+    /// `random:N`, with commas between
+    #[arg(long, default_value = "failures:3", value_name = "KIND:N,…")]
+    record: Selection,
     #[command(flatten)]
     gates: GateArgs,
     /// Output for people or for programs
@@ -45,7 +47,7 @@ pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
     let manifest = held.folder.manifest()?;
     let over =
         Over { manifest: &manifest, works: &works, summary: &summary, overview: &overview, gates, judged: &judged };
-    over.leave(&held.folder, args.recordings)?;
+    over.leave(&held.folder, args.record)?;
     match args.format {
         Format::Json => outln!("{:#}", json::campaign(&summary, &judged, None)),
         Format::Human => {

@@ -12,12 +12,15 @@ mod leave;
 mod merge;
 mod output;
 mod past;
+mod plot;
 mod record;
 mod recording;
+mod recordings;
 mod render;
 mod replay;
 mod run;
 mod summary;
+mod watch;
 
 use std::path::PathBuf;
 
@@ -83,6 +86,8 @@ enum Command {
     Fit(recording::FitArgs),
     /// Record traffic of the testbed's own simulation
     Record(record::RecordArgs),
+    /// Draw an encounter as a static figure, SVG or PNG
+    Plot(plot::PlotArgs),
     /// Draw labelled pictures of the rear camera
     Render(render::RenderArgs),
 }
@@ -137,6 +142,7 @@ fn dispatch(command: Command) -> Result<ExitCode, CliError> {
         Command::Criticality(args) => recording::criticality(&args),
         Command::Fit(args) => recording::fit(&args),
         Command::Record(args) => record::record(&args),
+        Command::Plot(args) => plot::plot(&args),
         Command::Render(args) => render::render(&args),
     }
 }

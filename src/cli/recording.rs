@@ -12,6 +12,7 @@ use closecall_scenarios::recordings::{Recording, quality, read};
 use super::CliError;
 use super::args::{Format, positive};
 use super::output::{out, outln};
+use super::watch::record_lane_change;
 use crate::exit_code::ExitCode;
 use crate::report::WriteError;
 
@@ -44,6 +45,12 @@ pub(super) struct CriticalityArgs {
     /// Speed limit [m/s]; 120 km/h where absent
     #[arg(long, value_name = "M/S", value_parser = positive)]
     speed_limit_mps: Option<f64>,
+    /// Write a Rerun file of a lane change to look at: of the most critical one, or of the track named with --track
+    #[arg(long, value_name = "FILE.rrd")]
+    record: Option<PathBuf>,
+    /// With --record: the track whose lane change is shown
+    #[arg(long, value_name = "ID", requires = "record")]
+    track: Option<u64>,
     /// Output for people or for programs
     #[arg(long, value_enum, default_value_t)]
     format: Format,
@@ -123,7 +130,11 @@ fn line(change: &LaneChange) -> String {
 
 pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> {
     let recording = read(&args.recording)?;
-    let changes = evaluate(&smooth(&recording), args.speed_limit_mps);
+    let smoothed = smooth(&recording);
+    let changes = evaluate(&smoothed, args.speed_limit_mps);
+    if let Some(path) = &args.record {
+        record_lane_change(path, &smoothed, &changes, args.track)?;
+    }
     match args.format {
         Format::Json => outln!("{:#}", serde_json::json!(changes)),
         Format::Human => {

@@ -1,6 +1,6 @@
 //! `closecall replay`: one sample of a campaign again, bit for bit.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 
@@ -8,13 +8,15 @@ use super::CliError;
 use super::args::Format;
 use super::output::complain;
 use super::past::{arms, scenario_file};
-use super::run::{WatchArgs, print, run_watched};
+use super::run::print;
+use super::watch::{WatchArgs, run_watched};
 use crate::campaign::folder::Folder;
 use crate::campaign::manifest::{Manifest, ManifestScenario};
 use crate::campaign::runner::concrete;
 use crate::controller::ControllerChoice;
 use crate::exit_code::ExitCode;
 use crate::outcome::Outcome;
+use crate::scenario::Scenario;
 use crate::simulation::{Arm, RunKey};
 
 /// Arguments of `closecall replay`.
@@ -30,6 +32,9 @@ pub(super) struct ReplayArgs {
     /// The arm to run again; the controller under test where absent
     #[arg(long, value_name = "NAME")]
     controller: Option<String>,
+    /// Run every arm of the campaign again; with --record all in one file
+    #[arg(long, conflicts_with = "controller")]
+    paired: bool,
     #[command(flatten)]
     watch: WatchArgs,
     /// Output for people or for programs
@@ -40,20 +45,21 @@ pub(super) struct ReplayArgs {
 pub(super) fn replay(args: &ReplayArgs) -> Result<ExitCode, CliError> {
     let folder = Folder::open(&args.dir);
     let manifest = folder.manifest()?;
-    let file = scenario_file(folder.path(), choose(&manifest, args.scenario.as_deref())?)?;
-    let samples = file.space().samples(manifest.sampling.design, manifest.sampling.samples);
-    if args.sample >= samples {
-        let message = format!("there is no sample {}: the campaign has samples 0 to {}", args.sample, samples - 1);
-        return Err(CliError::Usage { message });
+    let (scenario, key) = sample_of(&folder, &manifest, args.scenario.as_deref(), args.sample)?;
+    let arms = match args.paired {
+        true => arms(&manifest)?,
+        false => vec![chosen_arm(&manifest, args.controller.as_deref())?],
+    };
+    for arm in &arms {
+        say_what_is_started(&manifest, arm.controller.name());
     }
-    let arm = chosen_arm(&manifest, args.controller.as_deref())?;
-    say_what_is_started(&manifest, arm.controller.name());
-    let fail = |source| CliError::Sample { sample: args.sample, source };
-    let scenario = concrete(&file, manifest.sampling, args.sample).map_err(fail)?;
-    let key = RunKey { seed: manifest.sampling.seed, sample: args.sample };
-    let outcome = run_watched(&scenario, key, &arm, &args.watch)?;
-    print(&outcome, args.format);
-    if agrees_with_journal(&folder, &outcome)? {
+    let outcomes = run_watched(&scenario, key, &arms, &args.watch)?;
+    print(&outcomes, args.format);
+    let mut agrees = true;
+    for outcome in &outcomes {
+        agrees &= agrees_with_journal(&folder, outcome)?;
+    }
+    if agrees {
         return Ok(ExitCode::Pass);
     }
     complain(format_args!(
@@ -102,21 +108,22 @@ fn choose<'a>(manifest: &'a Manifest, name: Option<&str>) -> Result<&'a Manifest
     }
 }
 
-/// Runs a sample of the arm under test again and records it.
-pub(super) fn record_sample(
+/// The concrete scenario of one sample of a campaign.
+pub(super) fn sample_of(
     folder: &Folder,
     manifest: &Manifest,
-    scenario: &str,
+    scenario: Option<&str>,
     sample: u64,
-    path: &Path,
-) -> Result<(), CliError> {
-    let file = scenario_file(folder.path(), choose(manifest, Some(scenario))?)?;
-    let fail = |source| CliError::Sample { sample, source };
-    let concrete = concrete(&file, manifest.sampling, sample).map_err(fail)?;
-    let key = RunKey { seed: manifest.sampling.seed, sample };
-    let watch = WatchArgs { record: Some(path.to_owned()), trace: None };
-    run_watched(&concrete, key, &chosen_arm(manifest, None)?, &watch)?;
-    Ok(())
+) -> Result<(Scenario, RunKey), CliError> {
+    let file = scenario_file(folder.path(), choose(manifest, scenario)?)?;
+    let samples = file.space().samples(manifest.sampling.design, manifest.sampling.samples);
+    if sample >= samples {
+        let message = format!("there is no sample {sample}: the campaign has samples 0 to {}", samples - 1);
+        return Err(CliError::Usage { message });
+    }
+    let scenario =
+        concrete(&file, manifest.sampling, sample).map_err(|source| CliError::Sample { sample, source })?;
+    Ok((scenario, RunKey { seed: manifest.sampling.seed, sample }))
 }
 
 /// An arm of the campaign: the named one, or the one under test.

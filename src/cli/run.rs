@@ -4,18 +4,15 @@ use std::path::PathBuf;
 
 use clap::Args;
 use closecall_scenarios::sampling::Design;
-use closecall_traffic::Time;
 
 use super::args::{ArmArgs, Format, SetArgs};
 use super::output::{out, outln};
+use super::watch::{WatchArgs, run_watched};
 use super::{CliError, json};
-use crate::campaign::runner::{Sampling, concrete, run_guarded};
+use crate::campaign::runner::{Sampling, concrete};
 use crate::exit_code::ExitCode;
 use crate::outcome::Outcome;
-use crate::report::rerun::RunRecorder;
-use crate::report::trace::TraceWriter;
-use crate::scenario::Scenario;
-use crate::simulation::{Arm, Happening, Observer, RunKey, StepView};
+use crate::simulation::RunKey;
 
 /// Arguments of `closecall run`.
 #[derive(Debug, Args)]
@@ -30,6 +27,10 @@ pub(super) struct RunArgs {
     sample: u64,
     #[command(flatten)]
     arm: ArmArgs,
+    /// Run the sample without the margin increase system too, on the same random numbers; with --record both in one
+    /// file
+    #[arg(long)]
+    paired: bool,
     #[command(flatten)]
     set: SetArgs,
     #[command(flatten)]
@@ -39,103 +40,30 @@ pub(super) struct RunArgs {
     format: Format,
 }
 
-/// What to write of a run.
-#[derive(Clone, Debug, Default, Args)]
-pub(super) struct WatchArgs {
-    /// Write a Rerun file to look at
-    #[arg(long, value_name = "FILE.rrd")]
-    pub(super) record: Option<PathBuf>,
-    /// Write one row per control step and actor
-    #[arg(long, value_name = "FILE.csv|FILE.parquet", value_parser = table)]
-    pub(super) trace: Option<PathBuf>,
-}
-
-/// A path whose ending says how a table is written.
-fn table(text: &str) -> Result<PathBuf, String> {
-    let path = PathBuf::from(text);
-    match path.extension().and_then(|extension| extension.to_str()) {
-        Some("csv" | "parquet") => Ok(path),
-        _ => Err(format!("`{text}` ends neither with .csv nor with .parquet")),
-    }
-}
-
 pub(super) fn run(args: &RunArgs) -> Result<ExitCode, CliError> {
     let file = args.set.load(&args.scenario)?;
     let sampling = Sampling { seed: args.seed, design: Design::Random, samples: args.sample.saturating_add(1) };
     let fail = |source| CliError::Sample { sample: args.sample, source };
     let scenario = concrete(&file, sampling, args.sample).map_err(fail)?;
     let key = RunKey { seed: args.seed, sample: args.sample };
-    let outcome = run_watched(&scenario, key, &args.arm.arm()?, &args.watch)?;
-    print(&outcome, args.format);
+    let outcomes = run_watched(&scenario, key, &args.arm.arms(args.paired)?, &args.watch)?;
+    print(&outcomes, args.format);
     Ok(ExitCode::Pass)
 }
 
-/// Runs a sample and writes what is asked for.
-pub(super) fn run_watched(scenario: &Scenario, key: RunKey, arm: &Arm, watch: &WatchArgs) -> Result<Outcome, CliError> {
-    let mut watchers = Watchers::new(scenario, key, arm, watch)?;
-    let outcome = run_guarded(scenario, key, arm, &mut watchers)
-        .map_err(|source| CliError::Sample { sample: key.sample, source })?;
-    watchers.finish(&outcome)?;
-    Ok(outcome)
-}
-
-/// Everyone who watches a run from the command line.
-struct Watchers {
-    recorder: Option<RunRecorder>,
-    trace: Option<TraceWriter>,
-}
-
-impl Watchers {
-    fn new(scenario: &Scenario, key: RunKey, arm: &Arm, watch: &WatchArgs) -> Result<Self, CliError> {
-        if watch.record.is_some() && watch.record == watch.trace {
-            return Err(CliError::Usage { message: "--record and --trace name the same file".to_owned() });
+/// Prints the outcome of a run; of a pair, both, the baseline first, as a list.
+pub(super) fn print(outcomes: &[Outcome], format: Format) {
+    match (format, outcomes) {
+        (Format::Json, [outcome]) => outln!("{:#}", json::outcome(outcome)),
+        (Format::Json, outcomes) => {
+            let both: Vec<_> = outcomes.iter().map(json::outcome).collect();
+            outln!("{:#}", serde_json::Value::Array(both));
         }
-        let title =
-            format!("{} · {} · seed {} · sample {}", scenario.name, arm.controller.name(), key.seed, key.sample);
-        let recorder = |path: &PathBuf| RunRecorder::new(path, scenario, &title);
-        let trace = |path: &PathBuf| TraceWriter::new(path);
-        Ok(Self {
-            recorder: watch.record.as_ref().map(recorder).transpose()?,
-            trace: watch.trace.as_ref().map(trace).transpose()?,
-        })
-    }
-
-    fn finish(self, outcome: &Outcome) -> Result<(), CliError> {
-        if let Some(recorder) = self.recorder {
-            recorder.finish(outcome)?;
+        (Format::Human, outcomes) => {
+            for outcome in outcomes {
+                out!("{}", Human(outcome));
+            }
         }
-        if let Some(trace) = self.trace {
-            trace.finish()?;
-        }
-        Ok(())
-    }
-}
-
-impl Observer for Watchers {
-    fn step(&mut self, view: &StepView<'_>) {
-        if let Some(recorder) = &mut self.recorder {
-            recorder.step(view);
-        }
-        if let Some(trace) = &mut self.trace {
-            trace.step(view);
-        }
-    }
-
-    fn happening(&mut self, time: Time, what: &Happening) {
-        if let Some(recorder) = &mut self.recorder {
-            recorder.happening(time, what);
-        }
-        if let Some(trace) = &mut self.trace {
-            trace.happening(time, what);
-        }
-    }
-}
-
-/// Prints an outcome.
-pub(super) fn print(outcome: &Outcome, format: Format) {
-    match format {
-        Format::Json => outln!("{:#}", json::outcome(outcome)),
-        Format::Human => out!("{}", Human(outcome)),
     }
 }
 

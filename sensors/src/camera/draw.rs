@@ -51,6 +51,30 @@ impl Frame {
         LabelledImage { image: Image { width: WIDTH_PX.into(), height: HEIGHT_PX.into(), rgb }, instances }
     }
 
+    /// Every `step`-th pixel of the rows `rows` of the image, as a small picture for people: each pixel is that of the
+    /// whole image.
+    pub fn preview(&mut self, step: u16, rows: std::ops::Range<u16>) -> Image {
+        /// Side of the squares in which the picture is drawn: their samples fit the processor's cache.
+        const TILE: usize = 64;
+        let columns: Vec<i32> = (step / 2..WIDTH_PX).step_by(step.into()).map(i32::from).collect();
+        let rows: Vec<i32> =
+            (rows.start + step / 2..rows.end.min(HEIGHT_PX)).step_by(step.into()).map(i32::from).collect();
+        let mut rgb = vec![0; columns.len() * rows.len() * CHANNELS];
+        let mut tile = Vec::new();
+        for (upper, rows) in rows.chunks(TILE).enumerate() {
+            for (before, some) in columns.chunks(TILE).enumerate() {
+                tile.resize(rows.len() * some.len() * CHANNELS, 0);
+                self.draw(some, rows, &mut tile);
+                for (row, line) in tile.chunks_exact(some.len() * CHANNELS).enumerate() {
+                    let at = ((upper * TILE + row) * columns.len() + before * TILE) * CHANNELS;
+                    rgb[at..at + line.len()].copy_from_slice(line);
+                }
+            }
+        }
+        let [width, height] = [columns.len(), rows.len()].map(|count| u32::try_from(count).unwrap_or(0));
+        Image { width, height, rgb }
+    }
+
     /// The samples of a square window, for the classifier.
     pub fn crop(&mut self, window: PixelRect, crop: &mut Crop) {
         let columns = crop_places(window.left, window.width);

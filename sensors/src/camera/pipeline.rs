@@ -4,7 +4,7 @@ use closecall_traffic::ClassScores;
 
 use super::classifier::{Backend, Classifier, ClassifierError};
 use super::{Camera, Crop, ExposureKey, Frame, GroundBox, Lists, PixelRect, RearCamera};
-use crate::{Detection, Scene, SensorError};
+use crate::{Detection, Scene, SceneVehicle, SensorError};
 
 /// A window of which less than this share lies in the image says nothing [1].
 const LEAST_IN_IMAGE: f64 = 0.6;
@@ -48,7 +48,7 @@ impl CropClassifier {
         let seen: Vec<(usize, PixelRect)> = detections
             .iter()
             .enumerate()
-            .filter_map(|(place, detection)| Some((place, self.window(scene, detection)?)))
+            .filter_map(|(place, detection)| Some((place, self.camera.window_of(&scene.ego, detection)?)))
             .collect();
         if seen.is_empty() {
             return Ok(0);
@@ -66,8 +66,11 @@ impl CropClassifier {
         self.lists = frame.into_lists();
         Ok(seen.len())
     }
+}
 
-    fn window(&self, scene: &Scene<'_>, detection: &Detection) -> Option<PixelRect> {
+impl RearCamera {
+    /// The window that the network is shown of a detection; nothing where too little of it lies in the image.
+    pub fn window_of(&self, ego: &SceneVehicle, detection: &Detection) -> Option<PixelRect> {
         let (x_m, y_m) = detection.centre_m();
         let object = GroundBox {
             x_m,
@@ -77,7 +80,7 @@ impl CropClassifier {
             width_m: detection.width_m,
             height_m: detection.top_m.max(LEAST_HEIGHT_M),
         };
-        self.camera.project(&scene.ego, &object).filter(|window| window.share_in_image() >= LEAST_IN_IMAGE)
+        self.project(ego, &object).filter(|window| window.share_in_image() >= LEAST_IN_IMAGE)
     }
 }
 
@@ -94,7 +97,7 @@ mod tests {
 
     use super::*;
     use crate::camera::CameraConfig;
-    use crate::{Extent, SceneVehicle};
+    use crate::Extent;
 
     fn vehicle(class: VehicleClass, s_m: f64) -> SceneVehicle {
         let state = VehicleState { s_m, d_m: -5.6, speed_mps: 30.0, ..VehicleState::default() };

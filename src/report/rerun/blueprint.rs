@@ -4,34 +4,68 @@
 //!  ┌───────────────────────────────┬───────────────┬───────────────┐
 //!  │                               │ time headway  │ speed         │
 //!  │  3D, from behind and above E  ├───────────────┼───────────────┤
-//!  │                               │ gap           │ acceleration  │
+//!  │  (of a pair: side by side)    │ gap           │ acceleration  │
 //!  ├───────────────────────────────┼───────────────┼───────────────┤
-//!  │  states                       │ time to       │ margin gained │
-//!  ├───────────────────────────────┤ encounter     │               │
-//!  │  log │ summary                │               │               │
-//!  └───────────────────────────────┴───────────────┴───────────────┘
+//!  │  from above                   │ encounter     │ margin gained │
+//!  ├───────────────┬───────────────┼───────────────┴───────────────┤
+//!  │  rear camera  │ states        │  story │ log                  │
+//!  └───────────────┴───────────────┴───────────────────────────────┘
 //! ```
+//!
+//! Only views that have something to show are laid out.
+
+mod send;
 
 use rerun::blueprint::components::{BackgroundKind, Corner2D, Eye3DKind, PanelState, PlayState};
 use rerun::blueprint::datatypes::{TextLogColumn, TextLogColumnKind};
 use rerun::blueprint::{
-    Blueprint, BlueprintActivation, BlueprintPanel, ContainerLike, Horizontal, SelectionPanel, Spatial3DView,
-    StateTimelineView, Tabs, TextDocumentView, TextLogView, TimePanel, TimeSeriesView, Vertical,
+    Blueprint, BlueprintPanel, ContainerLike, Horizontal, SelectionPanel, Spatial2DView, Spatial3DView,
+    StateTimelineView, TextDocumentView, TextLogView, TimePanel, TimeSeriesView, Vertical,
 };
 use rerun::components::Range1D;
-use rerun::external::re_log_types::BlueprintActivationCommand;
+use rerun::datatypes::Range2D;
 use rerun::external::re_sdk_types::blueprint::archetypes::{
-    Background, EyeControls3D, LineGrid3D, PlotLegend, ScalarAxis, TextLogColumns,
+    Background, EntityBehavior, EyeControls3D, LineGrid3D, PlotLegend, ScalarAxis, TextLogColumns, VisualBounds2D,
 };
-use rerun::log::LogMsg;
-use rerun::{AsComponents, EntityPath, RecordingStream, RecordingStreamBuilder, StoreId, StoreKind};
+use rerun::{AsComponents, EntityPath};
 
+use super::palette;
 use super::stream::OPENING_TIMELINE;
-use super::{APPLICATION, RecordError, palette};
 
 /// Where the eye is and what it looks at, in E's frame [m]: far enough back to see who follows.
-const EYE_M: [f32; 3] = [-30.0, 9.0, 11.0];
-const TARGET_M: [f32; 3] = [4.0, -0.5, 0.0];
+const EYE_M: [f32; 3] = [-32.0, 6.0, 12.0];
+const TARGET_M: [f32; 3] = [-1.0, 0.0, 0.0];
+/// Room above and below the road from above, for names.
+const BIRD_MARGIN: f64 = 4.5;
+
+/// Every plot: its entity, its title, and its range where a fixed one helps.
+const PLOTS: [(&str, &str, Option<[f64; 2]>); 6] = [
+    ("headway", "Time headway [s]: front orange, rear pink", Some([0.0, 4.0])),
+    ("gap", "Gap [m]", Some([0.0, 120.0])),
+    ("encounter", "Closest encounter: TTCE [s], DCE [m]", Some([0.0, 10.0])),
+    ("speed", "Speed [m/s]: ego blue", None),
+    ("acceleration", "Acceleration [m/s²]", Some([-10.0, 4.0])),
+    ("margin", "Front headway gained [s]", Some([-1.0, 4.0])),
+];
+
+/// What there is to show of one film.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Shown {
+    /// Where its entities lie.
+    pub(super) root: String,
+    /// What its views are called.
+    pub(super) name: String,
+    /// Layers of the scene that are there, to be switched on by those who want them.
+    pub(super) hidden: Vec<String>,
+    /// The vehicles and the road.
+    pub(super) has_scene: bool,
+    /// Upper and lower edge of the road from above.
+    pub(super) edges: [f64; 2],
+    pub(super) has_camera: bool,
+    pub(super) has_states: bool,
+    /// The plots with a curve.
+    pub(super) plots: Vec<&'static str>,
+}
 
 /// Lays out the views of one recording.
 #[derive(Default)]
@@ -41,67 +75,49 @@ pub(super) struct Layout {
 }
 
 impl Layout {
-    /// Sends the blueprint into a recording; `has_margin` where there is a gained margin to plot.
-    pub(super) fn send(mut self, stream: &RecordingStream, has_margin: bool) -> Result<(), RecordError> {
-        let blueprint = self.blueprint(has_margin);
-        let (carrier, messages) = RecordingStreamBuilder::new(APPLICATION).memory()?;
-        blueprint.send(&carrier, BlueprintActivation::default())?;
-        let mut messages: Vec<LogMsg> = messages.take();
-        messages.retain(|message| message.store_id().kind() == StoreKind::Blueprint && !is_activation(message));
-        let Some(id) = messages.first().map(|message| message.store_id().clone()) else {
-            return Err(RecordError::Disabled);
+    fn blueprint(&mut self, films: &[Shown]) -> Blueprint {
+        let mut left = Vec::new();
+        let mut shares = Vec::new();
+        let mut add = |view: Option<ContainerLike>, share: f32| {
+            if let Some(view) = view {
+                left.push(view);
+                shares.push(share);
+            }
         };
-        messages.extend(self.property_messages(&id)?);
-        stream.send_blueprint(messages, BlueprintActivationCommand::make_active(id));
-        Ok(())
-    }
-
-    fn property_messages(self, id: &StoreId) -> Result<Vec<LogMsg>, RecordError> {
-        let (stream, messages) = RecordingStreamBuilder::from_store_id(id).send_properties(false).memory()?;
-        // The blueprint's only timeline, by which the viewer reads it.
-        stream.set_time_sequence("blueprint", 0);
-        for (path, property) in self.properties {
-            stream.log(path, property.as_ref())?;
+        let scenes: Vec<ContainerLike> =
+            films.iter().filter(|film| film.has_scene).map(|film| self.scene(film)).collect();
+        add(side_by_side(scenes), 10.0);
+        for film in films.iter().filter(|film| film.has_scene) {
+            add(Some(self.bird(film)), if films.len() > 1 { 2.9 } else { 3.8 });
         }
-        let mut messages = messages.take();
-        messages.retain(|message| matches!(message, LogMsg::ArrowMsg(..)));
-        Ok(messages)
-    }
-
-    fn blueprint(&mut self, has_margin: bool) -> Blueprint {
-        let states = StateTimelineView::new("States").with_origin("states");
-        let summary = TextDocumentView::new("Summary").with_origin("summary");
-        let words = Tabs::new([self.log(), summary.into()]);
-        let left = Vertical::new([self.scene(), states.into(), words.into()]).with_row_shares([10.0, 6.0, 4.0]);
-        let margins = Vertical::new([
-            self.plot("Time headway [s]", "plots/headway", Some([0.0, 4.0])),
-            self.plot("Gap [m]", "plots/gap", Some([0.0, 120.0])),
-            self.plot("Time to encounter [s]", "plots/encounter", Some([0.0, 15.0])),
-        ]);
-        let mut motion = vec![
-            self.plot("Speed [m/s]", "plots/speed", None),
-            self.plot("Acceleration [m/s²]", "plots/acceleration", Some([-10.0, 4.0])),
-        ];
-        if has_margin {
-            motion.push(self.plot("Front margin gained [s]", "plots/margin", Some([-1.0, 4.0])));
-        }
-        let plots = Horizontal::new([margins.into(), Vertical::new(motion).into()]);
-        let root = Horizontal::new([left.into(), plots.into()]).with_column_shares([11.0, 9.0]);
+        let cameras = films.iter().filter(|film| film.has_camera);
+        let mut below: Vec<ContainerLike> = cameras.map(|film| self.camera(film)).collect();
+        below.extend(films.iter().filter(|film| film.has_states).map(states));
+        add(side_by_side(below), 4.6);
+        let left = Vertical::new(left).with_row_shares(shares);
+        let right = Vertical::new([self.plots(films), self.words(films)]).with_row_shares([12.0, 6.0]);
+        let root = Horizontal::new([left.into(), right.into()]).with_column_shares([11.0, 9.0]);
+        let time = TimePanel::new()
+            .with_state(PanelState::Collapsed)
+            .with_timeline(OPENING_TIMELINE)
+            .with_play_state(PlayState::Following);
         Blueprint::new(root)
             .with_auto_layout(false)
             .with_auto_views(false)
             .with_blueprint_panel(BlueprintPanel::from_state(PanelState::Collapsed))
             .with_selection_panel(SelectionPanel::from_state(PanelState::Collapsed))
-            .with_time_panel(
-                TimePanel::new()
-                    .with_state(PanelState::Collapsed)
-                    .with_timeline(OPENING_TIMELINE)
-                    .with_play_state(PlayState::Following),
-            )
+            .with_time_panel(time)
     }
 
-    fn scene(&mut self) -> ContainerLike {
-        let view = Spatial3DView::new("Scene").with_origin("world/ego").with_contents(["/world/**"]).into();
+    fn scene(&mut self, film: &Shown) -> ContainerLike {
+        let root = &film.root;
+        let view = Spatial3DView::new(titled("Scene", film))
+            .with_origin(format!("{root}world/ego"))
+            .with_contents([format!("/{root}world/**")])
+            .into();
+        for layer in film.hidden.iter().map(|layer| format!("ViewContents/overrides/{root}{layer}/visualizers")) {
+            self.property(&view, &layer, EntityBehavior::update_fields().with_visible(false));
+        }
         let eye = EyeControls3D::new()
             .with_kind(Eye3DKind::Orbital)
             .with_position(EYE_M)
@@ -114,21 +130,51 @@ impl Layout {
         view
     }
 
-    /// The log without the columns that its colours and words say already.
-    fn log(&mut self) -> ContainerLike {
-        let view = TextLogView::new("What happened").with_origin("log").into();
-        let columns = [TextLogColumn { visible: true.into(), kind: TextLogColumnKind::Body }];
-        self.property(&view, "TextLogColumns", TextLogColumns::new().with_text_log_columns(columns));
+    fn bird(&mut self, film: &Shown) -> ContainerLike {
+        let title = titled("From above (across the road twice as wide)", film);
+        let view = Spatial2DView::new(title).with_origin(format!("{}bird", film.root)).into();
+        let reach = super::bird::REACH_M;
+        let [top, bottom] = film.edges;
+        let bounds = Range2D { x_range: [-reach, reach].into(), y_range: [top - BIRD_MARGIN, bottom + BIRD_MARGIN].into() };
+        self.property(&view, "VisualBounds2D", VisualBounds2D::new(bounds));
         view
     }
 
-    fn plot(&mut self, name: &str, origin: &str, range: Option<[f64; 2]>) -> ContainerLike {
-        let view = TimeSeriesView::new(name).with_origin(origin).into();
-        self.property(&view, "PlotLegend", PlotLegend::new().with_corner(Corner2D::LeftTop));
-        if let Some([low, high]) = range {
-            self.property(&view, "ScalarAxis", ScalarAxis::new().with_range(Range1D::new(low, high)));
+    fn camera(&mut self, film: &Shown) -> ContainerLike {
+        Spatial2DView::new(titled("Rear camera", film)).with_origin(format!("{}camera", film.root)).into()
+    }
+
+    /// The plots that any film has a curve in; films share them.
+    fn plots(&mut self, films: &[Shown]) -> ContainerLike {
+        let mut columns: [Vec<ContainerLike>; 2] = [Vec::new(), Vec::new()];
+        for (place, (name, title, range)) in PLOTS.into_iter().enumerate() {
+            let having: Vec<&Shown> = films.iter().filter(|film| film.plots.contains(&name)).collect();
+            if having.is_empty() {
+                continue;
+            }
+            let contents = having.iter().map(|film| format!("/{}plots/{name}/**", film.root));
+            let view = TimeSeriesView::new(title).with_origin("/").with_contents(contents).into();
+            // Colours are those of the vehicles throughout: only what has other curves needs a legend.
+            let is_plain = matches!(name, "gap" | "speed") || (films.len() > 1 && name == "acceleration");
+            let legend = PlotLegend::new().with_corner(Corner2D::LeftTop).with_visible(!is_plain);
+            self.property(&view, "PlotLegend", legend);
+            if let Some([low, high]) = range {
+                self.property(&view, "ScalarAxis", ScalarAxis::new().with_range(Range1D::new(low, high)));
+            }
+            columns[place / (PLOTS.len() / 2)].push(view);
         }
-        view
+        let columns = columns.into_iter().filter(|views| !views.is_empty());
+        side_by_side(columns.map(|views| Vertical::new(views).into()).collect()).unwrap_or_else(|| Vertical::new([]).into())
+    }
+
+    /// The story beside the log, without the columns that its colours and words say already.
+    fn words(&mut self, films: &[Shown]) -> ContainerLike {
+        let story = TextDocumentView::new("Story").with_origin("summary").into();
+        let contents = films.iter().map(|film| format!("/{}log/**", film.root));
+        let log = TextLogView::new("Log").with_origin("/").with_contents(contents).into();
+        let columns = [TextLogColumn { visible: true.into(), kind: TextLogColumnKind::Body }];
+        self.property(&log, "TextLogColumns", TextLogColumns::new().with_text_log_columns(columns));
+        Horizontal::new([story, log]).into()
     }
 
     fn property(&mut self, view: &ContainerLike, name: &str, property: impl AsComponents + 'static) {
@@ -139,6 +185,20 @@ impl Layout {
     }
 }
 
-fn is_activation(message: &LogMsg) -> bool {
-    matches!(message, LogMsg::BlueprintActivationCommand(_))
+fn states(film: &Shown) -> ContainerLike {
+    StateTimelineView::new(titled("States", film)).with_origin(format!("{}states", film.root)).into()
+}
+
+/// The title of a view, with the name of its film where there are several.
+fn titled(title: &str, film: &Shown) -> String {
+    if film.root.is_empty() { title.to_owned() } else { format!("{title}: {}", film.name) }
+}
+
+/// Views beside each other; a single one needs no frame.
+fn side_by_side(mut views: Vec<ContainerLike>) -> Option<ContainerLike> {
+    match views.len() {
+        0 => None,
+        1 => views.pop(),
+        _ => Some(Horizontal::new(views).into()),
+    }
 }

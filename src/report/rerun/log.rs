@@ -1,15 +1,13 @@
 //! What happened, in words, at the moment it happened.
 
-use closecall_controllers::DriverNote;
 use closecall_traffic::Time;
 use rerun::{TextLog, TextLogLevel};
 
 use super::RecordError;
-use super::film::Film;
 use super::palette::{self, Rgba};
-use super::plots::{phase_word, state_word};
+use super::plots::phase_word;
 use super::stream::Writer;
-use crate::outcome::Collision;
+use crate::report::film::{Film, collision_text, note_words, state_word};
 use crate::simulation::Happening;
 
 /// One line of the log.
@@ -21,30 +19,34 @@ struct Line {
     text: String,
 }
 
-pub(super) fn write(writer: &Writer<'_>, film: &Film<'_>) -> Result<(), RecordError> {
-    let begin = Line {
-        time: Time::ZERO,
-        entity: "log/run",
-        level: TextLogLevel::INFO,
-        colour: palette::NEUTRAL,
-        text: film.title.to_owned(),
-    };
-    let happened = film.happenings.iter().map(|(time, what)| line(film, *time, what));
-    for line in std::iter::once(begin).chain(happened) {
-        let row = TextLog::new(line.text).with_level(line.level).with_color(line.colour);
+/// Writes the log of a film; where there are several, each line says whose it is.
+pub(super) fn write(writer: &Writer<'_>, film: &Film, is_alone: bool) -> Result<(), RecordError> {
+    let start = film.frames.first().map_or(Time::ZERO, |frame| frame.time);
+    let plain = |entity, time, text| Line { time, entity, level: TextLogLevel::INFO, colour: palette::NEUTRAL, text };
+    let mut lines = vec![plain("log/run", start, film.title.clone())];
+    lines.extend(film.happenings.iter().map(|(time, what)| line(film, *time, what)));
+    lines.extend(film.moments().iter().map(|noted| {
+        let text = format!("({}) {}", noted.moment.letter(), noted.moment.text());
+        Line { colour: palette::MARKING, ..plain("log/moment", noted.time, text) }
+    }));
+    lines.extend(film.notes.iter().map(|(time, text)| plain("log/note", *time, text.clone())));
+    lines.push(plain("log/run", film.end(), "the run ends here".to_owned()));
+    for line in lines {
+        let text = if is_alone { line.text } else { format!("[{}] {}", film.arm, line.text) };
+        let row = TextLog::new(text).with_level(line.level).with_color(line.colour);
         writer.rows(line.entity, &[line.time], |_| row.clone().columns_of_unit_batches())?;
     }
     Ok(())
 }
 
-fn line(film: &Film<'_>, time: Time, what: &Happening) -> Line {
+fn line(film: &Film, time: Time, what: &Happening) -> Line {
     let info = |entity, colour, text| Line { time, entity, level: TextLogLevel::INFO, colour, text };
     let warn = |entity, colour, text| Line { time, entity, level: TextLogLevel::WARN, colour, text };
     match what {
         Happening::EventTriggered { event } => warn("log/event", palette::WARNING, format!("event `{event}` sets in")),
         Happening::DriverNote { actor, note } => {
-            let name = film.scenario.actors.get(*actor).map_or("?", |actor| actor.id.as_str());
-            let colour = palette::actor(*actor, film.scenario.ego);
+            let name = film.cast.get(*actor).map_or("?", |actor| actor.name.as_str());
+            let colour = palette::actor(*actor, film.ego);
             info("log/driver", colour, format!("{name} {}", note_words(*note)))
         }
         Happening::EgoStateChanged { from, to, reason } => {
@@ -53,32 +55,8 @@ fn line(film: &Film<'_>, time: Time, what: &Happening) -> Line {
         }
         Happening::PhaseChanged { to } => info("log/phase", palette::NEUTRAL, format!("phase: {}", phase_word(*to))),
         Happening::Collision(touch) => {
-            // When it was reported, the impact was not over; the outcome has its change of velocity.
-            let settled = film
-                .outcome
-                .collisions
-                .iter()
-                .find(|collision| collision.time == touch.time && collision.between == touch.between);
-            let text = collision_text(settled.unwrap_or(touch));
+            let text = format!("COLLISION: {}", collision_text(film.settled(touch)));
             Line { time, entity: "log/collision", level: TextLogLevel::ERROR, colour: palette::CRITICAL, text }
         }
     }
-}
-
-fn note_words(note: DriverNote) -> &'static str {
-    match note {
-        DriverNote::CutOutStarted => "begins to change lanes to overtake",
-        DriverNote::CutOutAborted => "gives up the lane change",
-        DriverNote::Passed => "has passed",
-        DriverNote::EmergencyBraking => "brakes as hard as possible",
-    }
-}
-
-/// Who touched whom, how fast, and what it did to each.
-pub(super) fn collision_text(collision: &Collision) -> String {
-    let [first, second] = &collision.between;
-    format!(
-        "collision of {first} and {second} at {:.1} m/s: ΔV {first} {:.1} m/s, {second} {:.1} m/s",
-        collision.relative_speed_mps, collision.delta_v_mps[0], collision.delta_v_mps[1]
-    )
 }

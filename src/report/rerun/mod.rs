@@ -1,38 +1,42 @@
-//! A run as a file of the Rerun viewer, with a layout of its own.
+//! A run, or a pair of them, as a file of the Rerun viewer, with a layout of its own.
 //!
 //! ```text
-//!  steps, happenings ─▶ Film ─(outcome)─▶ road, vehicles, tracks │ plots │ log │ summary │ blueprint ─▶ F.rrd
+//!  Film ─▶ road, vehicles, tracks, points │ from above │ camera │ plots │ log │ story │ blueprint ─▶ F.rrd
 //! ```
 //!
-//! [`RunRecorder`] watches a run and keeps what it sees. Only when the outcome is known is the file written, in one go
-//! and in columns: small, fast, never half there, and opening at the moment that turned out to be the critical one.
+//! A film is written when its outcome is known, in one go and in columns: small, fast, never half there, and opening at
+//! the moment that turned out to be the critical one. Two films share one time line: each has a world of its own, in
+//! which the other's vehicles stand as outlines, and both are drawn into the same plots.
 //!
 //! This folder is the only one that names the library.
 
+mod bird;
 mod blueprint;
 mod bodies;
-mod film;
+mod camera;
+mod ghosts;
 mod log;
 mod palette;
 mod perceived;
 mod plots;
+mod points;
 mod road;
 mod stream;
 mod summary;
+mod truth;
 mod vehicles;
 
 use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use closecall_traffic::Time;
 use rerun::sink::MemorySinkStorage;
-use rerun::{MediaType, RecordingStreamBuilder, RecordingStreamError, TextDocument, ViewCoordinates};
+use rerun::{MediaType, RecordingStream, RecordingStreamBuilder, RecordingStreamError, TextDocument, ViewCoordinates};
 
+use super::film::{Film, Level};
 use super::write::{WriteError, check_writable, write_atomically};
-use crate::outcome::Outcome;
-use crate::scenario::Scenario;
-use crate::simulation::{Happening, Observer, StepView};
-use film::{Film, Frame};
+use blueprint::{Layout, Shown};
+use plots::Role;
 use stream::Writer;
 
 /// The name under which the viewer keeps its layouts.
@@ -61,83 +65,86 @@ pub enum RecordError {
     Write(#[from] WriteError),
 }
 
-/// Watches a run and writes it as a recording.
-pub struct RunRecorder {
-    path: PathBuf,
-    scenario: Scenario,
-    title: String,
-    frames: Vec<Frame>,
-    happenings: Vec<(Time, Happening)>,
+/// Finds out before any work is done whether a recording can be written.
+///
+/// # Errors
+/// [`RecordError`] where recording is switched off, or no file can be made at that place.
+pub fn check_recordable(path: &Path) -> Result<(), RecordError> {
+    if !rerun::decide_logging_enabled(true) {
+        return Err(RecordError::Disabled);
+    }
+    Ok(check_writable(path)?)
 }
 
-impl RunRecorder {
-    /// A recorder of one run of `scenario` into the file `path`, called `title` in the viewer.
-    ///
-    /// # Errors
-    /// [`RecordError`] where recording is switched off, or no file can be made at that place.
-    pub fn new(path: &Path, scenario: &Scenario, title: &str) -> Result<Self, RecordError> {
-        if !rerun::decide_logging_enabled(true) {
-            return Err(RecordError::Disabled);
-        }
-        check_writable(path)?;
-        Ok(Self {
-            path: path.to_owned(),
-            scenario: scenario.clone(),
-            title: title.to_owned(),
-            frames: Vec::new(),
-            happenings: Vec::new(),
-        })
-    }
-
-    /// Writes the file.
-    ///
-    /// # Errors
-    /// [`RecordError`] where it cannot be written whole.
-    pub fn finish(self, outcome: &Outcome) -> Result<(), RecordError> {
-        let film = Film {
-            scenario: &self.scenario,
-            title: &self.title,
-            frames: &self.frames,
-            happenings: &self.happenings,
-            outcome,
-        };
-        let bytes = encode(&film)?;
-        write_atomically(&self.path, |file| file.write_all(&bytes))?;
-        Ok(())
-    }
-}
-
-impl Observer for RunRecorder {
-    fn step(&mut self, view: &StepView<'_>) {
-        self.frames.push(Frame::new(view));
-    }
-
-    fn happening(&mut self, time: Time, what: &Happening) {
-        self.happenings.push((time, what.clone()));
-    }
+/// Writes one film, or a baseline and the film that is compared with it, into a file.
+///
+/// # Errors
+/// [`RecordError`] where it cannot be written whole.
+pub fn write_films(path: &Path, films: &[Film]) -> Result<(), RecordError> {
+    let bytes = encode(films)?;
+    write_atomically(path, |file| file.write_all(&bytes))?;
+    Ok(())
 }
 
 /// The whole recording as the bytes of a file.
-fn encode(film: &Film<'_>) -> Result<Vec<u8>, RecordError> {
-    record(film)?.drain_as_bytes().map_err(|error| RecordError::Encode { reason: error.to_string() })
+fn encode(films: &[Film]) -> Result<Vec<u8>, RecordError> {
+    record(films)?.drain_as_bytes().map_err(|error| RecordError::Encode { reason: error.to_string() })
 }
 
-fn record(film: &Film<'_>) -> Result<MemorySinkStorage, RecordError> {
-    let (stream, messages) = RecordingStreamBuilder::new(APPLICATION).recording_name(film.title).memory()?;
+fn record(films: &[Film]) -> Result<MemorySinkStorage, RecordError> {
+    let title = films.iter().map(Film::title).collect::<Vec<_>>().join(" and ");
+    let (stream, messages) = RecordingStreamBuilder::new(APPLICATION).recording_name(title).memory()?;
     if !stream.is_enabled() {
         return Err(RecordError::Disabled);
     }
-    let writer = Writer::new(&stream, film.critical_moment() + AFTER_CRITICAL);
-    writer.fixed("world", &ViewCoordinates::FLU())?;
-    road::write(&writer, film)?;
-    vehicles::write(&writer, film)?;
-    perceived::write(&writer, film)?;
-    let has_margin = plots::write(&writer, film)?;
-    log::write(&writer, film)?;
-    let summary = TextDocument::new(summary::markdown(film)).with_media_type(MediaType::markdown());
-    writer.fixed("summary", &summary)?;
-    blueprint::Layout::default().send(&stream, has_margin)?;
+    let opening = opening(films) + AFTER_CRITICAL;
+    let mut shown = Vec::new();
+    for (place, film) in films.iter().enumerate() {
+        let role = match (films.len(), place) {
+            (1, _) => Role::Alone,
+            (_, 0) => Role::Baseline,
+            _ => Role::Tested,
+        };
+        let root = if role == Role::Alone { String::new() } else { format!("{}/", film.arm) };
+        let writer = Writer::new(&stream, opening, &root, film.period);
+        shown.push(write_film(&writer, film, (root, role))?);
+        if role == Role::Tested && film.level >= Level::Objects {
+            ghosts::write(&writer, film, &films[0])?;
+        }
+    }
+    write_summary(&stream, films)?;
+    Layout::default().send(&stream, &shown)?;
     Ok(messages)
+}
+
+/// The moment to open at: the first collision of any film, else what is critical in the last one.
+fn opening(films: &[Film]) -> Time {
+    let collisions = films.iter().filter_map(|film| film.worst_collision().map(|collision| collision.time));
+    collisions.min().or_else(|| films.last().map(Film::critical_moment)).unwrap_or(Time::ZERO)
+}
+
+fn write_film(writer: &Writer<'_>, film: &Film, (root, role): (String, Role)) -> Result<Shown, RecordError> {
+    let mut shown = Shown { name: film.arm.clone(), root, edges: bird::edges(film), ..Shown::default() };
+    if film.level >= Level::Objects && !film.frames.is_empty() {
+        writer.fixed("world", &ViewCoordinates::FLU())?;
+        road::write(writer, film)?;
+        vehicles::write(writer, film)?;
+        perceived::write(writer, film)?;
+        shown.hidden.extend(truth::write(writer, film)?);
+        shown.hidden.extend(points::write(writer, film)?);
+        bird::write(writer, film)?;
+        shown.has_scene = true;
+        shown.has_camera = camera::write(writer, film)?;
+    }
+    shown.plots = plots::write(writer, film, role)?;
+    shown.has_states = film.frames.iter().any(|frame| frame.command.is_some());
+    log::write(writer, film, role == Role::Alone)?;
+    Ok(shown)
+}
+
+fn write_summary(stream: &RecordingStream, films: &[Film]) -> Result<(), RecordError> {
+    let summary = TextDocument::new(summary::markdown(films)).with_media_type(MediaType::markdown());
+    Ok(stream.log_static("summary", &summary)?)
 }
 
 #[cfg(test)]

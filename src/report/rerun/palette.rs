@@ -23,6 +23,10 @@ pub(super) const RAIL: Rgba = [150, 156, 162, 255];
 pub(super) const BRAKE_LIGHT: Rgba = [255, 32, 24, 255];
 pub(super) const INDICATOR: Rgba = [255, 170, 0, 255];
 pub(super) const SKY: Rgba = [112, 130, 150, 255];
+pub(super) const BOX_FIT: Rgba = [255, 255, 255, 255];
+pub(super) const TRUTH: Rgba = [110, 214, 120, 255];
+pub(super) const MISSED: Rgba = [255, 120, 0, 255];
+pub(super) const FALSE_TRACK: Rgba = [255, 0, 200, 255];
 pub(super) const FIELD_OF_VIEW: Rgba = [150, 220, 255, 255];
 pub(super) const TRACK: Rgba = [96, 230, 255, 255];
 pub(super) const SAFE: Rgba = [110, 214, 120, 255];
@@ -43,4 +47,46 @@ pub(super) fn actor(place: usize, ego: usize) -> Rgba {
 /// The same colour, see-through.
 pub(super) fn faint([red, green, blue, _]: Rgba, opacity: u8) -> Rgba {
     [red, green, blue, opacity]
+}
+
+/// A darker shade of the same colour: of what is compared with.
+pub(super) fn dim([red, green, blue, opacity]: Rgba) -> Rgba {
+    let darker = |channel: u8| (u16::from(channel) * 11 / 20) as u8;
+    [darker(red), darker(green), darker(blue), opacity]
+}
+
+/// The colour of the n-th part of the encounter.
+pub(super) fn moment(place: usize) -> Rgba {
+    OTHERS[(place + 2) % OTHERS.len()]
+}
+
+/// The colour of the n-th cluster of a scan.
+pub(super) fn cluster(number: u8) -> Rgba {
+    const CLUSTERS: [Rgba; 7] = [
+        [255, 99, 72, 255],
+        [46, 213, 115, 255],
+        [83, 182, 255, 255],
+        [255, 221, 89, 255],
+        [214, 120, 255, 255],
+        [72, 219, 251, 255],
+        [255, 159, 243, 255],
+    ];
+    CLUSTERS[usize::from(number) % CLUSTERS.len()]
+}
+
+/// The colour of an intensity: dark blue, green, yellow, in eight shades, which pack well.
+pub(super) fn intensity(intensity: u8) -> Rgba {
+    const SHADES: [Rgba; 8] = [
+        [68, 1, 84, 255],
+        [70, 50, 127, 255],
+        [54, 92, 141, 255],
+        [39, 127, 142, 255],
+        [31, 161, 135, 255],
+        [74, 194, 109, 255],
+        [159, 218, 58, 255],
+        [253, 231, 37, 255],
+    ];
+    // Most returns are weak: the scale is that of the square root.
+    let root = f32::from(intensity).sqrt() / f32::from(u8::MAX).sqrt();
+    SHADES[((root * 8.0) as usize).min(7)]
 }

@@ -7,7 +7,7 @@ use nalgebra::{Matrix2, SymmetricEigen};
 use rerun::{Boxes3D, Ellipsoids3D, FillMode, LineStrips3D, Quaternion};
 
 use super::RecordError;
-use super::film::Film;
+use crate::report::film::Film;
 use super::palette::{self, Rgba};
 use super::stream::{Writer, changes};
 use super::vehicles::about_up;
@@ -24,9 +24,14 @@ const ELLIPSE_HALF_THICKNESS_M: f64 = 0.01;
 const FIELD_Z_M: f64 = 0.2;
 const ARC_PIECES: u32 = 48;
 
+/// How far ahead paths are predicted [s]: for as long as the margin increase system lets E hold on.
+const PREDICTED_S: f64 = 2.0;
+/// Height at which paths are drawn [m].
+const PATH_Z_M: f32 = 0.12;
+
 const SOURCES: [(Source, &str); 3] = [(Source::Front, "front"), (Source::Surround, "surround"), (Source::Rear, "rear")];
 
-pub(super) fn write(writer: &Writer<'_>, film: &Film<'_>) -> Result<(), RecordError> {
+pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError> {
     let times = film.times();
     write_rear_field(writer, film, &times)?;
     for (source, name) in SOURCES {
@@ -39,17 +44,69 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film<'_>) -> Result<(), RecordEr
         }
         write_boxes(writer, &format!("world/ego/tracks/{name}/boxes"), &times, &tracks)?;
         write_ellipses(writer, &format!("world/ego/tracks/{name}/covariance"), &times, &tracks)?;
+        write_predictions(writer, &format!("world/ego/tracks/{name}/predicted"), &times, &tracks)?;
     }
-    Ok(())
+    write_own_path(writer, film, &times)
+}
+
+/// Where confirmed tracks will be, each at its present velocity.
+fn write_predictions(
+    writer: &Writer<'_>,
+    entity: &str,
+    times: &[Time],
+    tracks: &[Vec<Track>],
+) -> Result<(), RecordError> {
+    writer.fixed(entity, &LineStrips3D::update_fields().with_radii([0.05_f32]))?;
+    let is_shown = |track: &&Track| track.status != TrackStatus::Tentative && track.class.vehicle() >= 0.5;
+    writer.rows(entity, times, |range| {
+        let rows = &tracks[range];
+        let all = || rows.iter().flatten().filter(is_shown);
+        let path = |track: &Track| {
+            let ahead = |of: f64, speed_mps: f64| (of + PREDICTED_S * speed_mps) as f32;
+            let (x, y) = (track.x_m(), track.y_m());
+            [
+                [x as f32, y as f32, PATH_Z_M],
+                [ahead(x, track.vx_mps()), ahead(y, track.vy_mps()), PATH_Z_M],
+            ]
+        };
+        LineStrips3D::new(all().map(path))
+            .with_colors(all().map(|track| palette::faint(colour(track), 150)))
+            .columns(rows.iter().map(|row| row.iter().filter(is_shown).count()).collect::<Vec<_>>())
+    })
+}
+
+/// Where E will be at the acceleration that its controller asks for.
+fn write_own_path(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordError> {
+    if film.frames.iter().any(|frame| frame.command.is_none()) {
+        return Ok(());
+    }
+    let entity = "world/ego/predicted";
+    let fixed = LineStrips3D::update_fields().with_colors([palette::faint(palette::EGO, 200)]).with_radii([0.07_f32]);
+    writer.fixed(entity, &fixed)?;
+    writer.rows(entity, times, |range| {
+        let ends = film.frames[range.clone()].iter().map(|frame| {
+            let asked_mps2 = frame.command.map_or(0.0, |command| command.acceleration_mps2);
+            let way_m = way_m(frame.states[film.ego].speed_mps, asked_mps2);
+            [[0.0, 0.0, PATH_Z_M], [way_m as f32, 0.0, PATH_Z_M]]
+        });
+        LineStrips3D::new(ends).columns_of_unit_batches()
+    })
+}
+
+/// The way until the end of the prediction, or until a stand [m].
+fn way_m(speed_mps: f64, acceleration_mps2: f64) -> f64 {
+    let until_stand_s = if acceleration_mps2 < 0.0 { -speed_mps / acceleration_mps2 } else { f64::INFINITY };
+    let lasts_s = PREDICTED_S.min(until_stand_s);
+    speed_mps * lasts_s + 0.5 * acceleration_mps2 * lasts_s * lasts_s
 }
 
 /// The edge of what the rear sensor sees, from the rear bumper on.
-fn write_rear_field(writer: &Writer<'_>, film: &Film<'_>, times: &[Time]) -> Result<(), RecordError> {
+fn write_rear_field(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordError> {
     let fields: Vec<Option<FieldOfView>> = film.frames.iter().map(|frame| frame.rear_field).collect();
     if fields.iter().all(Option::is_none) {
         return Ok(());
     }
-    let bumper_m = -0.5 * film.scenario.actors[film.scenario.ego].vehicle.dimensions.length_m;
+    let bumper_m = -0.5 * film.cast[film.ego].vehicle.dimensions.length_m;
     let entity = "world/ego/rear_field_of_view";
     let fixed = LineStrips3D::update_fields().with_colors([palette::FIELD_OF_VIEW]).with_radii([0.05_f32]);
     writer.fixed(entity, &fixed)?;

@@ -4,7 +4,7 @@ use closecall_traffic::{Lane, Road};
 use rerun::{LineStrips3D, Mesh3D};
 
 use super::RecordError;
-use super::film::Film;
+use crate::report::film::Film;
 use super::palette::{self, Rgba};
 use super::stream::Writer;
 
@@ -29,8 +29,8 @@ const RAIL_OFFSET_M: f64 = SHOULDER_M - 0.5;
 const VERGE_Z_M: f64 = -0.30;
 const MARKING_Z_M: f64 = 0.03;
 
-pub(super) fn write(writer: &Writer<'_>, film: &Film<'_>) -> Result<(), RecordError> {
-    let road = &film.scenario.road;
+pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError> {
+    let road = &film.road;
     let (first_m, last_m) = film.reach_m();
     if !(first_m <= last_m) {
         return Ok(());

@@ -8,12 +8,11 @@ use std::ops::Range;
 
 use closecall_traffic::Time;
 use rerun::{
-    AsComponents, RecordingStream, RecordingStreamError, Scalars, SerializationResult, SerializedComponentColumn,
-    TimeColumn,
+    AsComponents, Clear, RecordingStream, RecordingStreamError, Scalars, SerializationResult, SerializedComponentColumn,
+    TimeCell, TimeColumn,
 };
 
 use super::RecordError;
-use crate::simulation::CONTROL_STEP;
 
 /// Simulated time in seconds.
 pub(super) const TIME_TIMELINE: &str = "time";
@@ -27,16 +26,25 @@ pub(super) struct Writer<'a> {
     stream: &'a RecordingStream,
     /// The last moment on the opening timeline.
     opening: Time,
+    /// Where the entities of this film lie: nothing for the only film of a file.
+    root: String,
+    /// Time of a step.
+    period: Time,
 }
 
 impl<'a> Writer<'a> {
-    pub(super) fn new(stream: &'a RecordingStream, opening: Time) -> Self {
-        Self { stream, opening }
+    pub(super) fn new(stream: &'a RecordingStream, opening: Time, root: &str, period: Time) -> Self {
+        Self { stream, opening, root: root.to_owned(), period }
+    }
+
+    /// The path of an entity of this film.
+    pub(super) fn path(&self, entity: &str) -> String {
+        format!("{}{entity}", self.root)
     }
 
     /// What holds for the whole run.
     pub(super) fn fixed(&self, entity: &str, what: &impl AsComponents) -> Result<(), RecordError> {
-        Ok(self.stream.log_static(entity, what)?)
+        Ok(self.stream.log_static(self.path(entity), what)?)
     }
 
     /// One row for each of `times`, which ascend; `build` gives the columns of a range of the rows.
@@ -55,9 +63,25 @@ impl<'a> Writer<'a> {
                 continue;
             }
             let columns = build(range.clone()).map_err(RecordingStreamError::from)?;
-            self.stream.send_columns(entity, self.timelines(&times[range]), columns)?;
+            self.stream.send_columns(self.path(entity), self.timelines(&times[range]), columns)?;
         }
         Ok(())
+    }
+
+    /// Something that is so from `time` on, as a whole.
+    pub(super) fn from(&self, entity: &str, time: Time, what: &impl AsComponents) -> Result<(), RecordError> {
+        for timeline in self.timelines(&[time]) {
+            let cell = TimeCell::new(timeline.timeline().typ(), timeline.times_raw()[0]);
+            self.stream.set_time(*timeline.timeline().name(), cell);
+        }
+        let logged = self.stream.log(self.path(entity), what);
+        self.stream.reset_time();
+        Ok(logged?)
+    }
+
+    /// An entity that is no longer there from `time` on, with all that belongs to it.
+    pub(super) fn gone(&self, entity: &str, time: Time) -> Result<(), RecordError> {
+        self.rows(entity, &[time], |_| Clear::recursive().columns_of_unit_batches())
     }
 
     /// A series to plot; a value that is absent leaves a gap.
@@ -73,7 +97,7 @@ impl<'a> Writer<'a> {
         let ns = || times.iter().map(|time| time.ns());
         let mut timelines = vec![
             TimeColumn::new_duration_nanos(TIME_TIMELINE, ns()),
-            TimeColumn::new_sequence(STEP_TIMELINE, ns().map(|ns| ns / CONTROL_STEP.ns())),
+            TimeColumn::new_sequence(STEP_TIMELINE, ns().map(|ns| ns / self.period.ns())),
         ];
         if times.last().is_some_and(|&last| last <= self.opening) {
             timelines.push(TimeColumn::new_duration_nanos(OPENING_TIMELINE, ns()));

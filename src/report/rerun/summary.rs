@@ -1,23 +1,44 @@
-//! What the run was and how it ended, as a page of text.
+//! What the run was, what happened in it and how it ended, as a page of text.
 
 use std::fmt::Write as _;
 
 use closecall_traffic::Measured;
 
-use super::film::Film;
-use super::log::collision_text;
+use crate::report::film::Film;
 
-/// The page, in Markdown.
-pub(super) fn markdown(film: &Film<'_>) -> String {
-    let outcome = film.outcome;
-    let mut page = format!("# {}\n\n**{}**\n\n", film.title, verdict(film));
+/// The page, in Markdown: the verdict first, then the story, then the numbers.
+pub(super) fn markdown(films: &[Film]) -> String {
+    let mut page = String::new();
+    for film in films {
+        tell(&mut page, film);
+    }
+    for film in films {
+        numbers(&mut page, film);
+    }
+    page
+}
+
+fn tell(page: &mut String, film: &Film) {
+    // Writing to a string cannot fail.
+    let _ = write!(page, "### {}\n\n**{}**\n\n", film.title, film.headline());
+    if let Some(verdict) = film.verdict_on_mis() {
+        let _ = write!(page, "{verdict}\n\n");
+    }
+    for line in film.story() {
+        let mark = if line.is_grave { "**" } else { "" };
+        let _ = writeln!(page, "- {mark}{:.2} s: {}{mark}", line.time.s(), line.text);
+    }
+    page.push('\n');
+}
+
+fn numbers(page: &mut String, film: &Film) {
+    let Some(outcome) = &film.outcome else { return };
     let mut row = |name: &str, value: &dyn std::fmt::Display| {
-        // Writing to a string cannot fail.
         let _ = writeln!(page, "| {name} | {value} |");
     };
-    row("scenario", &outcome.scenario);
-    row("---", &"---");
     row("controller", &outcome.controller);
+    row("---", &"---");
+    row("scenario", &outcome.scenario);
     row("seed, sample", &format_args!("{}, {}", outcome.seed, outcome.sample));
     row("duration", &format_args!("{:.2} s", outcome.duration.s()));
     let margins = &outcome.margins;
@@ -36,21 +57,10 @@ pub(super) fn markdown(film: &Film<'_>) -> String {
         }
         Err(absent) => row("MIS", absent),
     }
-    page.push_str("\n| parameter | value |\n| --- | --- |\n");
     for (name, value) in outcome.parameters.iter() {
-        let _ = writeln!(page, "| {name} | {value} |");
+        row(&format!("parameter {name}"), value);
     }
-    page
-}
-
-fn verdict(film: &Film<'_>) -> String {
-    let collisions = &film.outcome.collisions;
-    if collisions.is_empty() {
-        return "No collision.".to_owned();
-    }
-    let texts: Vec<String> =
-        collisions.iter().map(|collision| format!("{}: {}.", collision.time, collision_text(collision))).collect();
-    texts.join("\n\n")
+    page.push('\n');
 }
 
 /// A value with its unit, or why there is none.

@@ -1,42 +1,42 @@
 use std::collections::BTreeSet;
 
 use closecall_scenarios::sampling::Design;
+use closecall_sensors::SensorMode;
 use closecall_traffic::geometry::BoxSide;
 use rerun::log::{Chunk, LogMsg};
 use rerun::{StoreKind, TimelineName};
 
-use super::stream::{OPENING_TIMELINE, TIME_TIMELINE};
+use super::stream::{OPENING_TIMELINE, STEP_TIMELINE, TIME_TIMELINE};
 use super::*;
 use crate::campaign::runner::{Sampling, concrete};
 use crate::controller::BuiltIn;
 use crate::outcome::{ClosedBy, Collision, Phase};
+use crate::report::film::FilmRecorder;
 use crate::scenario::ScenarioFile;
 use crate::simulation::{Arm, RunKey, simulate};
 
-/// A sample of the headline scenario, recorded with the margin increase system.
-fn recorded(path: &Path) -> (RunRecorder, Outcome) {
-    let library = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/library/low-thw-overtake.toml");
-    let file = ScenarioFile::load(&library, &[]).unwrap();
+fn library(name: &str) -> ScenarioFile {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/library");
+    ScenarioFile::load(&folder.join(format!("{name}.toml")), &[]).unwrap()
+}
+
+/// One sample of a scenario of the library, filmed.
+fn filmed(name: &str, controller: BuiltIn, (sensors, level): (Option<SensorMode>, Level)) -> Film {
     let sampling = Sampling { seed: 1, design: Design::Random, samples: 1 };
-    let scenario = concrete(&file, sampling, 0).unwrap();
-    let mut recorder = RunRecorder::new(path, &scenario, "a run").unwrap();
-    let arm = Arm { controller: BuiltIn::Mis.factory(), sensors: None };
-    let outcome = simulate(&scenario, RunKey { seed: 1, sample: 0 }, &arm, &mut recorder).unwrap();
-    (recorder, outcome)
+    let scenario = concrete(&library(name), sampling, 0).unwrap();
+    let arm = Arm { controller: controller.factory(), sensors };
+    let key = RunKey { seed: 1, sample: 0 };
+    let mut recorder = FilmRecorder::new(&scenario, key, &arm, level);
+    let outcome = simulate(&scenario, key, &arm, &mut recorder).unwrap();
+    recorder.finish(&outcome)
 }
 
-fn film<'a>(recorder: &'a RunRecorder, outcome: &'a Outcome) -> Film<'a> {
-    Film {
-        scenario: &recorder.scenario,
-        title: &recorder.title,
-        frames: &recorder.frames,
-        happenings: &recorder.happenings,
-        outcome,
-    }
+fn usual() -> Film {
+    filmed("low-thw-overtake", BuiltIn::Mis, (None, Level::Full))
 }
 
-fn chunks(film: &Film<'_>, kind: StoreKind) -> Vec<Chunk> {
-    let messages = record(film).unwrap().take();
+fn chunks(films: &[Film], kind: StoreKind) -> Vec<Chunk> {
+    let messages = record(films).unwrap().take();
     let of_kind = messages.iter().filter(|message| message.store_id().kind() == kind);
     of_kind
         .filter_map(|message| match message {
@@ -53,70 +53,131 @@ fn latest_ns(chunks: &[Chunk], timeline: &'static str) -> i64 {
     columns.map(|column| column.time_range().max().as_i64()).max().unwrap()
 }
 
-#[test]
-fn every_view_of_the_blueprint_has_something_to_show() {
-    let folder = tempfile::tempdir().unwrap();
-    let (recorder, outcome) = recorded(&folder.path().join("run.rrd"));
-    let film = film(&recorder, &outcome);
-    let entities: BTreeSet<String> =
-        chunks(&film, StoreKind::Recording).iter().map(|chunk| chunk.entity_path().to_string()).collect();
-    let origins = [
-        "/world/ego",
-        "/world/road",
-        "/world/vehicles/front",
-        "/world/vehicles/rear",
-        "/world/ego/tracks",
-        "/states",
-        "/log",
-        "/summary",
-        "/plots/headway",
-        "/plots/gap",
-        "/plots/encounter",
-        "/plots/speed",
-        "/plots/acceleration",
-        "/plots/margin",
-    ];
-    for origin in origins {
-        assert!(entities.iter().any(|entity| entity.starts_with(origin)), "{origin} is empty: {entities:?}");
+/// Every text that a component of the blueprint holds.
+fn texts(chunk: &Chunk, component: &str) -> Vec<String> {
+    let mut texts = Vec::new();
+    for list in chunk.components().values().filter(|column| column.descriptor.component.as_str() == component) {
+        let values = list.list_array.values();
+        let strings = values.as_any().downcast_ref::<arrow::array::StringArray>();
+        texts.extend(strings.into_iter().flat_map(|strings| strings.iter().flatten().map(str::to_owned)));
     }
-    let views = chunks(&film, StoreKind::Blueprint);
-    assert!(views.iter().any(|chunk| chunk.entity_path().to_string().ends_with("/EyeControls3D")));
+    texts
+}
+
+/// Where the views of a recording look that have nothing there, and the timeline that it opens with.
+fn empty_views(films: &[Film]) -> (usize, Vec<String>, Vec<String>) {
+    let data = chunks(films, StoreKind::Recording);
+    let entities: BTreeSet<String> = data.iter().map(|chunk| chunk.entity_path().to_string()).collect();
+    let has = |prefix: &str| entities.iter().any(|entity| entity == prefix || entity.starts_with(&format!("{prefix}/")));
+    let (mut views, mut empty, mut timelines) = (0, Vec::new(), Vec::new());
+    for chunk in chunks(films, StoreKind::Blueprint) {
+        let origins = texts(&chunk, "ViewBlueprint:space_origin");
+        views += origins.len();
+        let queries = texts(&chunk, "ViewContents:query");
+        let inherited = |query: &&String| query.contains("$origin");
+        let named = queries.iter().filter(|query| !inherited(query)).flat_map(|query| query.split_whitespace());
+        let named = named.map(|query| query.trim_start_matches('+').trim_end_matches("/**").to_owned());
+        let rootless = |origin: &String| origin != "/";
+        empty.extend(origins.into_iter().filter(rootless).chain(named).filter(|place| !has(place)));
+        timelines.extend(texts(&chunk, "TimePanelBlueprint:timeline"));
+    }
+    (views, empty, timelines)
 }
 
 #[test]
-fn the_opening_timeline_ends_at_the_critical_moment() {
-    let folder = tempfile::tempdir().unwrap();
-    let (recorder, outcome) = recorded(&folder.path().join("run.rrd"));
-    let film = film(&recorder, &outcome);
-    let chunks = chunks(&film, StoreKind::Recording);
-    let opening = film.critical_moment() + AFTER_CRITICAL;
+fn every_scenario_of_the_library_fills_every_view_at_every_level() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/library");
+    let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let names = files.filter(|path| path.extension().is_some_and(|extension| extension == "toml"));
+    for name in names.map(|path| path.file_stem().unwrap().to_str().unwrap().to_owned()) {
+        for (level, least) in [(Level::Events, 5), (Level::Objects, 7), (Level::Full, 7)] {
+            let films = [filmed(&name, BuiltIn::Mis, (Some(SensorMode::Object), level))];
+            let (views, empty, timelines) = empty_views(&films);
+            assert!(views >= least && empty.is_empty(), "{name}, {level:?}: {views} views, nothing at {empty:?}");
+            assert_eq!(timelines, [OPENING_TIMELINE], "{name}, {level:?}");
+        }
+    }
+}
+
+#[test]
+fn a_pair_fills_every_view_and_shows_the_baseline_as_ghosts() {
+    let film = |controller| filmed("paper-figure", controller, (None, Level::Objects));
+    let films = [film(BuiltIn::Acc), film(BuiltIn::Mis)];
+    let (views, empty, _) = empty_views(&films);
+    assert!(views >= 13 && empty.is_empty(), "{views} views, nothing at {empty:?}");
+    let data = chunks(&films, StoreKind::Recording);
+    for entity in ["/mis/world/ghosts/ego", "/mis/bird/ghosts", "/acc/world/ego/collision_1", "/mis/plots/margin/goal"] {
+        assert!(data.iter().any(|chunk| chunk.entity_path().to_string() == entity), "{entity}");
+    }
+}
+
+#[test]
+fn full_sensors_show_points_boxes_truth_and_pictures() {
+    let films = [filmed("low-thw-overtake", BuiltIn::Mis, (Some(SensorMode::Full), Level::Full))];
+    let data = chunks(&films, StoreKind::Recording);
+    let entities = [
+        "/world/ego/lidar/clusters",
+        "/world/ego/lidar/intensity",
+        "/world/ego/lidar/rejected",
+        "/world/ego/lidar/boxes",
+        "/world/ego/tracks/rear/covariance",
+        "/world/ego/truth/known",
+        "/world/ego/truth/missed",
+        "/world/ego/truth/false_tracks",
+        "/camera",
+        "/camera/windows",
+    ];
+    for entity in entities {
+        assert!(data.iter().any(|chunk| chunk.entity_path().to_string() == entity), "{entity}");
+    }
+    let (_, empty, _) = empty_views(&films);
+    assert!(empty.is_empty(), "{empty:?}");
+    assert!(encode(&films).unwrap().len() < 25_000_000);
+}
+
+#[test]
+fn both_timelines_span_the_run_and_the_opening_one_ends_at_the_critical_moment() {
+    let films = [usual()];
+    let chunks = chunks(&films, StoreKind::Recording);
+    let (critical, end) = (films[0].critical_moment(), films[0].end());
     let latest = latest_ns(&chunks, OPENING_TIMELINE);
-    assert!(latest <= opening.ns() && latest > film.critical_moment().ns(), "{latest} {opening:?}");
-    assert_eq!(latest_ns(&chunks, TIME_TIMELINE), recorder.frames.last().unwrap().time.ns());
+    assert!(latest <= (critical + AFTER_CRITICAL).ns() && latest > critical.ns(), "{latest} {critical:?}");
+    assert_eq!(latest_ns(&chunks, TIME_TIMELINE), end.ns());
+    assert_eq!(latest_ns(&chunks, STEP_TIMELINE), end.ns() / films[0].period.ns());
+    for chunk in chunks.iter().filter(|chunk| !chunk.is_static()) {
+        for timeline in [TIME_TIMELINE, STEP_TIMELINE] {
+            let name = TimelineName::from_static_str(timeline);
+            assert!(chunk.timelines().contains_key(&name), "{} lacks {timeline}", chunk.entity_path());
+        }
+    }
 }
 
 #[test]
 fn a_collision_of_ego_is_what_matters_most() {
-    let folder = tempfile::tempdir().unwrap();
-    let (recorder, mut outcome) = recorded(&folder.path().join("run.rrd"));
-    let actors = &recorder.scenario.actors;
+    let mut film = usual();
+    let ids: Vec<_> = library("low-thw-overtake").config().actors.iter().map(|actor| actor.id.clone()).collect();
     let collision = |time, between: [usize; 2]| Collision {
         time,
-        between: between.map(|actor| actors[actor].id.clone()),
+        between: between.map(|actor| ids[actor].clone()),
         struck_side: [BoxSide::Rear, BoxSide::Front],
         closed_by: ClosedBy::Second,
         phase: Phase::Critical,
         relative_speed_mps: 5.0,
         delta_v_mps: [2.5, 2.5],
     };
-    let ego = recorder.scenario.ego;
-    let others: Vec<usize> = (0..actors.len()).filter(|&actor| actor != ego).collect();
-    outcome.collisions = vec![collision(Time::from_ms(1_000), [others[0], others[1]])];
-    assert_eq!(film(&recorder, &outcome).critical_moment(), Time::from_ms(1_000));
-    outcome.collisions.push(collision(Time::from_ms(2_000), [ego, others[1]]));
-    let film = film(&recorder, &outcome);
+    let ego = film.ego;
+    let others: Vec<usize> = (0..ids.len()).filter(|&actor| actor != ego).collect();
+    let mut collide = |time_ms, between| {
+        if let Some(outcome) = &mut film.outcome {
+            outcome.collisions.push(collision(Time::from_ms(time_ms), between));
+        }
+        film.clone()
+    };
+    let film = collide(1_000, [others[0], others[1]]);
+    assert_eq!(film.critical_moment(), Time::from_ms(1_000));
+    let film = collide(2_000, [ego, others[1]]);
     assert_eq!(film.critical_moment(), Time::from_ms(2_000));
-    let marks = chunks(&film, StoreKind::Recording);
+    let marks = chunks(&[film], StoreKind::Recording);
     assert!(marks.iter().any(|chunk| chunk.entity_path().to_string() == "/world/ego/collision_2"));
 }
 
@@ -124,12 +185,11 @@ fn a_collision_of_ego_is_what_matters_most() {
 fn the_file_is_whole_and_alone() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.rrd");
-    let (recorder, outcome) = recorded(&path);
+    check_recordable(&path).unwrap();
     assert!(!path.exists());
-    recorder.finish(&outcome).unwrap();
+    write_films(&path, &[usual()]).unwrap();
     assert_eq!(&std::fs::read(&path).unwrap()[..4], b"RRF2");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
-    let (recorder, _) = recorded(&path);
-    let error = RunRecorder::new(&folder.path().join("no/folder.rrd"), &recorder.scenario, "a run").err().unwrap();
+    let error = check_recordable(&folder.path().join("no/folder.rrd")).unwrap_err();
     assert!(error.to_string().contains("no/folder.rrd"), "{error}");
 }

@@ -6,7 +6,7 @@ use rerun::{Arrows3D, Boxes3D, FillMode, LineStrips3D, Points3D, Quaternion, Tra
 
 use super::RecordError;
 use super::bodies;
-use super::film::{Film, Frame};
+use crate::report::film::{Film, Frame};
 use super::palette::{self, Rgba};
 use super::stream::{Writer, changes};
 use crate::outcome::{CRITICAL_THW_S, Collision};
@@ -15,32 +15,41 @@ use crate::outcome::{CRITICAL_THW_S, Collision};
 const ARROW_S: f64 = 0.25;
 /// Names stand this high above the roof, arrows half as high [m].
 const LABEL_ABOVE_M: f64 = 0.8;
+/// Height of the words about a collision [m].
+const TEXT_Z_M: f32 = 5.0;
 /// Height at which gaps are drawn [m].
 const GAP_Z_M: f64 = 0.5;
 
 /// The entity of an actor.
-pub(super) fn entity(film: &Film<'_>, actor: usize) -> String {
-    if actor == film.scenario.ego {
-        "world/ego".to_owned()
-    } else {
-        format!("world/vehicles/{}", film.scenario.actors[actor].id)
-    }
+pub(super) fn entity(film: &Film, actor: usize) -> String {
+    if actor == film.ego { "world/ego".to_owned() } else { format!("world/vehicles/{}", film.cast[actor].name) }
 }
 
-pub(super) fn write(writer: &Writer<'_>, film: &Film<'_>) -> Result<(), RecordError> {
-    let times = film.times();
-    for (place, actor) in film.scenario.actors.iter().enumerate() {
+pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError> {
+    let all_times = film.times();
+    for (place, actor) in film.cast.iter().enumerate().filter(|(_, actor)| !actor.rows.is_empty()) {
         let entity = entity(film, place);
-        let colour = palette::actor(place, film.scenario.ego);
-        let states: Vec<&VehicleState> = film.frames.iter().map(|frame| &frame.states[place]).collect();
+        let colour = palette::actor(place, film.ego);
+        let times = &all_times[actor.rows.clone()];
+        let states: Vec<&VehicleState> =
+            film.frames[actor.rows.clone()].iter().map(|frame| &frame.states[place]).collect();
         let size = &actor.vehicle.dimensions;
-        writer.fixed(&format!("{entity}/body"), &bodies::body(&actor.vehicle, colour))?;
-        write_motion(writer, &entity, &times, &states, &film.scenario.road)?;
-        write_velocity(writer, &entity, &times, &states, (size, colour))?;
-        write_name(writer, &entity, &times, &states, (actor.id.as_str(), size, colour))?;
-        write_lights(writer, &entity, &times, &states, (actor.vehicle.class, size))?;
+        let body = (format!("{entity}/body"), bodies::body(&actor.vehicle, colour));
+        if actor.rows == (0..all_times.len()) {
+            writer.fixed(&body.0, &body.1)?;
+        } else {
+            // What is there for a while only comes and goes with its vehicle.
+            writer.from(&body.0, times[0], &body.1)?;
+        }
+        write_motion(writer, &entity, times, &states, &film.road)?;
+        write_velocity(writer, &entity, times, &states, (size, colour))?;
+        write_name(writer, &entity, times, &states, (actor.name.as_str(), size, colour))?;
+        write_lights(writer, &entity, times, &states, (actor.vehicle.class, size))?;
+        if let Some(&gone) = all_times.get(actor.rows.end) {
+            writer.gone(&entity, gone)?;
+        }
     }
-    write_gaps(writer, film, &times)?;
+    write_gaps(writer, film, &all_times)?;
     write_collisions(writer, film)
 }
 
@@ -101,7 +110,7 @@ fn write_name(
         Points3D::new([[0.0, 0.0, above_m]]).with_colors([colour]).with_radii([0.05_f32]).with_show_labels(true);
     writer.fixed(&entity, &fixed)?;
     // The speed is rounded to what can be told apart, and only what changed is written.
-    let texts: Vec<String> = states.iter().map(|state| format!("{name}  {:.1} m/s", state.speed_mps)).collect();
+    let texts: Vec<String> = states.iter().map(|state| format!("{name} {:.0} m/s", state.speed_mps)).collect();
     let rows = changes(&texts);
     let times: Vec<Time> = rows.iter().map(|&row| times[row]).collect();
     writer.rows(&entity, &times, |range| {
@@ -179,8 +188,8 @@ fn write_lamps(
 }
 
 /// The gaps in front of and behind E, from bumper to bumper, with their time headways; red below the critical one.
-fn write_gaps(writer: &Writer<'_>, film: &Film<'_>, times: &[Time]) -> Result<(), RecordError> {
-    let bumper_m = 0.5 * film.scenario.actors[film.scenario.ego].vehicle.dimensions.length_m;
+fn write_gaps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordError> {
+    let bumper_m = 0.5 * film.cast[film.ego].vehicle.dimensions.length_m;
     let front = |frame: &Frame| Gap::new([bumper_m, 1.0], frame.margins.gap_front_m, frame.margins.thw_front_s);
     let rear = |frame: &Frame| Gap::new([-bumper_m, -1.0], frame.margins.gap_rear_m, frame.margins.thw_rear_s);
     let both: [(&str, Vec<Option<Gap>>); 2] = [
@@ -215,7 +224,7 @@ impl Gap {
         let is_critical = thw_s.is_ok_and(|thw_s| thw_s < CRITICAL_THW_S);
         let end = |x_m: f64| [x_m as f32, 0.0, GAP_Z_M as f32];
         let text = match thw_s {
-            Ok(thw_s) => format!("{gap_m:.1} m, {thw_s:.2} s"),
+            Ok(thw_s) => format!("{thw_s:.2} s"),
             Err(_) => format!("{gap_m:.1} m"),
         };
         Some(Self {
@@ -229,15 +238,15 @@ impl Gap {
 /// What the impact did to each.
 fn mark_text(collision: &Collision) -> String {
     let ([first, second], [first_mps, second_mps]) = (&collision.between, collision.delta_v_mps);
-    format!("COLLISION  ΔV {first} {first_mps:.1} m/s, {second} {second_mps:.1} m/s")
+    format!("COLLISION: ΔV {first} {first_mps:.1}, {second} {second_mps:.1} m/s")
 }
 
 /// A mark on the side of the vehicle that was struck, which it carries on; the changes of velocity beside it.
-fn write_collisions(writer: &Writer<'_>, film: &Film<'_>) -> Result<(), RecordError> {
-    for (number, collision) in film.outcome.collisions.iter().enumerate() {
-        let place = film.scenario.actors.iter().position(|actor| actor.id == collision.between[0]);
+fn write_collisions(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError> {
+    for (number, collision) in film.collisions().iter().enumerate() {
+        let place = film.cast.iter().position(|actor| actor.name == collision.between[0].as_str());
         let Some(place) = place else { continue };
-        let size = &film.scenario.actors[place].vehicle.dimensions;
+        let size = &film.cast[place].vehicle.dimensions;
         let at_m = match collision.struck_side[0] {
             BoxSide::Front => [0.5 * size.length_m, 0.0],
             BoxSide::Rear => [-0.5 * size.length_m, 0.0],
@@ -245,14 +254,16 @@ fn write_collisions(writer: &Writer<'_>, film: &Film<'_>) -> Result<(), RecordEr
             BoxSide::Right => [0.0, -0.5 * size.width_m],
         };
         let entity = format!("{}/collision_{}", entity(film, place), number + 1);
-        let mark = Points3D::new([[at_m[0] as f32, at_m[1] as f32, 0.6]])
+        let [x, y] = at_m.map(|at_m| at_m as f32);
+        // The words stand well above the mark, clear of the vehicles' names.
+        let mark = Points3D::new([[x, y, 0.6], [x, y, TEXT_Z_M]])
             .with_colors([palette::CRITICAL])
-            .with_radii([0.45_f32])
-            .with_labels([mark_text(collision)])
+            .with_radii([0.45_f32, 0.05])
+            .with_labels([String::new(), mark_text(collision)])
             .with_show_labels(true);
         // The first frame at or after the touch: before it the vehicles are still apart.
         let shown_at = film.frames.iter().map(|frame| frame.time).find(|&time| time >= collision.time);
-        writer.rows(&entity, &[shown_at.unwrap_or(collision.time)], |_| mark.clone().columns_of_unit_batches())?;
+        writer.from(&entity, shown_at.unwrap_or(collision.time), &mark)?;
     }
     Ok(())
 }

@@ -1,0 +1,111 @@
+//! `closecall plot`: an encounter as a static figure, for a report.
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use closecall_scenarios::sampling::Design;
+
+use super::CliError;
+use super::args::{ArmArgs, SetArgs, arm};
+use super::output::outln;
+use super::past::arms;
+use super::replay::sample_of;
+use super::watch::films;
+use crate::campaign::folder::Folder;
+use crate::campaign::runner::{Sampling, concrete};
+use crate::exit_code::ExitCode;
+use crate::report::figure::{encounter, png};
+use crate::report::film::{Film, Level};
+use crate::report::write_atomically;
+use crate::simulation::RunKey;
+
+/// Arguments of `closecall plot`.
+#[derive(Debug, Args)]
+pub(super) struct PlotArgs {
+    /// Scenario file, or the folder of a campaign
+    source: PathBuf,
+    /// Number of the sample; for the folder of a campaign it must be given
+    #[arg(value_name = "SAMPLE")]
+    number: Option<u64>,
+    /// Number of the sample
+    #[arg(long, conflicts_with = "number")]
+    sample: Option<u64>,
+    /// Seed of the random numbers; 0 where absent, of a campaign its own
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Name of the scenario, where the campaign has more than one
+    #[arg(long)]
+    scenario: Option<String>,
+    /// Draw the run without the margin increase system, too, dashed
+    #[arg(long)]
+    paired: bool,
+    #[command(flatten)]
+    arm: ArmArgs,
+    #[command(flatten)]
+    set: SetArgs,
+    /// File to write; its ending says whether it is SVG or PNG
+    #[arg(short, long, value_name = "FILE.svg|FILE.png", value_parser = picture)]
+    output: PathBuf,
+}
+
+/// A path whose ending says how a picture is written.
+fn picture(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    match path.extension().and_then(|extension| extension.to_str()) {
+        Some("svg" | "png") => Ok(path),
+        _ => Err(format!("`{text}` ends neither with .svg nor with .png")),
+    }
+}
+
+pub(super) fn plot(args: &PlotArgs) -> Result<ExitCode, CliError> {
+    let films = if args.source.is_dir() { of_campaign(args)? } else { of_scenario(args)? };
+    write_picture(&args.output, &encounter(&films))?;
+    for film in &films {
+        outln!("{}: {}", film.title(), film.headline());
+    }
+    outln!("written to {}", args.output.display());
+    Ok(ExitCode::Pass)
+}
+
+fn of_scenario(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
+    if args.scenario.is_some() {
+        let message = "--scenario names one of a campaign's scenarios: name the campaign's folder".to_owned();
+        return Err(CliError::Usage { message });
+    }
+    let file = args.set.load(&args.source)?;
+    let (seed, sample) = (args.seed.unwrap_or(0), args.number.or(args.sample).unwrap_or(0));
+    let sampling = Sampling { seed, design: Design::Random, samples: sample.saturating_add(1) };
+    let scenario = concrete(&file, sampling, sample).map_err(|source| CliError::Sample { sample, source })?;
+    films(&scenario, RunKey { seed, sample }, &args.arm.arms(args.paired)?, Level::Objects)
+}
+
+/// A sample of a campaign, as the campaign ran it: every arm where it was paired.
+fn of_campaign(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
+    if args.seed.is_some() || !args.set.settings.is_empty() {
+        let message = "a campaign has its own seed and settings: leave out --seed and --set".to_owned();
+        return Err(CliError::Usage { message });
+    }
+    let Some(sample) = args.number.or(args.sample) else {
+        let message = "which sample of the campaign? Name it: closecall plot DIR SAMPLE -o FILE.svg".to_owned();
+        return Err(CliError::Usage { message });
+    };
+    let folder = Folder::open(&args.source);
+    let manifest = folder.manifest()?;
+    let (scenario, key) = sample_of(&folder, &manifest, args.scenario.as_deref(), sample)?;
+    let mut arms = arms(&manifest)?;
+    if args.paired && arms.len() < 2 {
+        arms.insert(0, arm(&crate::controller::ControllerChoice::Acc, args.arm.sensors));
+    }
+    films(&scenario, key, &arms, Level::Objects)
+}
+
+fn write_picture(path: &Path, svg: &str) -> Result<(), CliError> {
+    if path.extension().is_some_and(|extension| extension == "png") {
+        let bytes = png(svg)?;
+        write_atomically(path, |file| file.write_all(&bytes))?;
+    } else {
+        write_atomically(path, |file| file.write_all(svg.as_bytes()))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,74 @@
+//! The vehicles of the other film of a pair, as see-through outlines in the world of this one: where everyone would be
+//! without the system under test.
+
+use closecall_traffic::Time;
+use rerun::{Boxes3D, FillMode, LineStrips2D};
+
+use super::RecordError;
+use super::bird::STRETCH;
+use super::palette;
+use super::stream::Writer;
+use super::vehicles::about_up;
+use crate::report::film::Film;
+
+/// Opacity of an outline.
+const FAINT: u8 = 120;
+
+/// Writes the vehicles of `other` into the world of `film`, for as long as both last.
+pub(super) fn write(writer: &Writer<'_>, film: &Film, other: &Film) -> Result<(), RecordError> {
+    for place in 0..other.cast.len() {
+        write_outline(writer, other, place)?;
+    }
+    write_from_above(writer, film, other)
+}
+
+fn write_outline(writer: &Writer<'_>, other: &Film, place: usize) -> Result<(), RecordError> {
+    let member = &other.cast[place];
+    let size = &member.vehicle.dimensions;
+    let entity = format!("world/ghosts/{}", member.name);
+    let half = |extent_m: f64| (0.5 * extent_m) as f32;
+    let fixed = Boxes3D::update_fields()
+        .with_half_sizes([[half(size.length_m), half(size.width_m), half(size.height_m)]])
+        .with_colors([palette::faint(palette::actor(place, other.ego), FAINT)])
+        .with_fill_mode(FillMode::MajorWireframe)
+        .with_radii([0.04_f32])
+        .with_labels([format!("{} ({})", member.name, other.arm)])
+        .with_show_labels(place == other.ego);
+    writer.fixed(&entity, &fixed)?;
+    let times = other.times();
+    writer.rows(&entity, &times, |range| {
+        let poses = other.frames[range].iter().map(|frame| {
+            let state = &frame.states[place];
+            other.road.plane_pose(state.s_m, state.d_m, state.heading_rad)
+        });
+        let poses: Vec<_> = poses.collect();
+        Boxes3D::update_fields()
+            .with_centers(poses.iter().map(|pose| [pose.x_m as f32, pose.y_m as f32, half(size.height_m)]))
+            .with_quaternions(poses.iter().map(|pose| about_up(pose.yaw_rad)))
+            .columns_of_unit_batches()
+    })
+}
+
+fn write_from_above(writer: &Writer<'_>, film: &Film, other: &Film) -> Result<(), RecordError> {
+    let entity = "bird/ghosts";
+    let count = film.frames.len().min(other.frames.len());
+    let times: Vec<Time> = film.frames[..count].iter().map(|frame| frame.time).collect();
+    let colours = (0..other.cast.len()).map(|place| palette::faint(palette::actor(place, other.ego), FAINT));
+    let fixed = LineStrips2D::update_fields().with_colors(colours).with_radii([0.3_f32]);
+    writer.fixed(entity, &fixed)?;
+    writer.rows(entity, &times, |range| {
+        let frames = film.frames[range.clone()].iter().zip(&other.frames[range.clone()]);
+        let outlines = frames.flat_map(|(own, ghost)| {
+            let from_m = own.states[film.ego].s_m;
+            (0..other.cast.len()).map(move |place| {
+                let (state, size) = (&ghost.states[place], &other.cast[place].vehicle.dimensions);
+                let corners = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5]];
+                corners.map(|[along, across]: [f64; 2]| {
+                    let (s_m, d_m) = (state.s_m + along * size.length_m, state.d_m + across * size.width_m);
+                    [(s_m - from_m) as f32, (-d_m * STRETCH) as f32]
+                })
+            })
+        });
+        LineStrips2D::update_fields().with_strips(outlines).columns(range.map(|_| other.cast.len()).collect::<Vec<_>>())
+    })
+}
