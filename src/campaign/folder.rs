@@ -9,7 +9,7 @@
 //!  timings.parquet    wall times
 //!  junit.xml          one case per sample and controller
 //!  report.html        for people; summary.md: the same for a pull request
-//!  recordings/        Rerun files of failing samples
+//!  recordings/        Rerun files of chosen samples, and a page that shows them
 //! ```
 
 use std::fs;

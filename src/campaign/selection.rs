@@ -6,7 +6,7 @@
 //!
 //! *Worst* are the samples of the arm under test with the hardest collisions of E, then those with the smallest time
 //! headways; *failures* the first ones in which E collided; *random* ones show what is usual. All counts are for each
-//! scenario. A sample that is chosen for several reasons is recorded once.
+//! scenario; a count alone is that of failures. A sample that is chosen for several reasons is recorded once.
 
 use std::str::FromStr;
 
@@ -34,6 +34,9 @@ impl FromStr for Selection {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
+        if let Ok(failures) = text.parse() {
+            return Ok(Self { failures, ..Self::default() });
+        }
         let mut selection = Self::default();
         let mut named: Vec<&str> = Vec::new();
         for part in text.split(',').map(str::trim) {
@@ -140,10 +143,7 @@ fn severity(sample: u64, outcome: &Outcome, ego: &ActorId) -> Severity {
 /// By collision, then by headway; of two alike the later one is the lesser.
 fn order(a: &Severity, b: &Severity) -> std::cmp::Ordering {
     let collided = |severity: &Severity| severity.delta_v_mps.unwrap_or(f64::NEG_INFINITY);
-    collided(a)
-        .total_cmp(&collided(b))
-        .then(b.thw_s.total_cmp(&a.thw_s))
-        .then(b.sample.cmp(&a.sample))
+    collided(a).total_cmp(&collided(b)).then(b.thw_s.total_cmp(&a.thw_s)).then(b.sample.cmp(&a.sample))
 }
 
 #[cfg(test)]
@@ -155,6 +155,7 @@ mod tests {
         let read = |text: &str| text.parse::<Selection>();
         assert_eq!(read("worst:5,failures:20,random:3"), Ok(Selection { worst: 5, failures: 20, random: 3 }));
         assert_eq!(read("failures:0"), Ok(Selection::default()));
+        assert_eq!(read("4"), read("failures:4"));
         let selection = Selection { worst: 1, failures: 0, random: 2 };
         assert_eq!(selection.to_string().parse(), Ok(selection));
         for wrong in ["", "worst", "worst:-1", "best:3", "worst:1,worst:2", "random:1;worst:1"] {

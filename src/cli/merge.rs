@@ -25,7 +25,7 @@ pub(super) struct MergeArgs {
     out: PathBuf,
     /// Record chosen samples of each scenario as Rerun files, with a page that shows them; `worst:N`, `failures:N` and
     /// `random:N`, with commas between
-    #[arg(long, default_value = "failures:3", value_name = "KIND:N,…")]
+    #[arg(long, alias = "recordings", default_value = "failures:3", value_name = "KIND:N,…")]
     record: Selection,
     #[command(flatten)]
     gates: GateArgs,

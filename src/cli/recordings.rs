@@ -78,7 +78,7 @@ fn record_one(folder: &Folder, manifest: &Manifest, scenario: &str, chosen: &Cho
     let paired = if films.len() > 1 { " --paired" } else { "" };
     let replay = format!(
         "closecall replay {} {} --scenario {scenario}{paired} --record {file}",
-        folder.file("").display(),
+        folder.path().display(),
         chosen.sample
     );
     let story = films.iter().flat_map(|film| {

@@ -121,8 +121,7 @@ pub(super) fn sample_of(
         let message = format!("there is no sample {sample}: the campaign has samples 0 to {}", samples - 1);
         return Err(CliError::Usage { message });
     }
-    let scenario =
-        concrete(&file, manifest.sampling, sample).map_err(|source| CliError::Sample { sample, source })?;
+    let scenario = concrete(&file, manifest.sampling, sample).map_err(|source| CliError::Sample { sample, source })?;
     Ok((scenario, RunKey { seed: manifest.sampling.seed, sample }))
 }
 

@@ -55,8 +55,8 @@ fn page(entries: &[IndexEntry]) -> String {
     let _ = write!(
         page,
         "<h1>Recordings</h1>\n<p>{} recorded samples. Each picture shows the critical moment from above: driving \
-         direction to the right, the road drawn wider than it is. The recordings open in the Rerun viewer 0.36 \
-         (<code>pip install rerun-sdk==0.36.3</code>).</p>\n",
+         direction to the right, the road drawn wider than it is. The recordings open in the Rerun viewer 0.36: \
+         </p><code>pip install rerun-sdk==0.36.3</code>\n",
         entries.len()
     );
     for entry in entries {

@@ -11,6 +11,7 @@ mod faulty_controllers;
 mod gate;
 mod hidden_lead;
 mod library;
+mod looking;
 mod malformed;
 mod own_controller;
 mod paper_figure;

@@ -96,8 +96,8 @@ mod tests {
     use closecall_traffic::{Check, Environment, Parameters, Road, Time, Vehicle, VehicleClass, VehicleState};
 
     use super::*;
-    use crate::camera::CameraConfig;
     use crate::Extent;
+    use crate::camera::CameraConfig;
 
     fn vehicle(class: VehicleClass, s_m: f64) -> SceneVehicle {
         let state = VehicleState { s_m, d_m: -5.6, speed_mps: 30.0, ..VehicleState::default() };

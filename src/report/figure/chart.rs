@@ -174,7 +174,14 @@ mod tests {
 
     #[test]
     fn a_gap_parts_a_curve() {
-        let points = [(0.0, Some(1.0)), (1.0, Some(2.0)), (2.0, None), (3.0, Some(f64::NAN)), (4.0, Some(1.0)), (5.0, Some(1.0))];
+        let points = [
+            (0.0, Some(1.0)),
+            (1.0, Some(2.0)),
+            (2.0, None),
+            (3.0, Some(f64::NAN)),
+            (4.0, Some(1.0)),
+            (5.0, Some(1.0)),
+        ];
         assert_eq!(pieces(&points).len(), 2);
     }
 }

@@ -84,9 +84,8 @@ fn instants(film: &Film) -> Vec<(Time, char, String)> {
     } else if instants.is_empty() {
         let (start, critical) = (film.frames.first().map_or(Time::ZERO, |frame| frame.time), film.critical_moment());
         let at = |part: u8| start.s() + (critical - start).s() * f64::from(part) / f64::from(INSTANTS);
-        instants = (0..=INSTANTS)
-            .map(|part| (Time::from_s(at(part)), char::from(b'1' + part), String::new()))
-            .collect();
+        instants =
+            (0..=INSTANTS).map(|part| (Time::from_s(at(part)), char::from(b'1' + part), String::new())).collect();
     }
     instants.sort_by_key(|(time, ..)| *time);
     instants
@@ -120,15 +119,7 @@ fn charts(films: &[Film]) -> Vec<Chart<'static>> {
     let plot = |name, curves: Vec<Curve<'static>>, levels: Vec<(f64, String)>, [low, high]: Range, most: Range| {
         let values = curves.iter().flat_map(|curve| curve.points.iter().filter_map(|point| point.1));
         let [bottom, top] = range_of(values, [low, high]);
-        Chart {
-            name,
-            x: span,
-            y: [bottom.max(most[0]), top.min(most[1])],
-            curves,
-            levels,
-            moments: &[],
-            x_name: None,
-        }
+        Chart { name, x: span, y: [bottom.max(most[0]), top.min(most[1])], curves, levels, moments: &[], x_name: None }
     };
     let free = [f64::NEG_INFINITY, f64::INFINITY];
     vec![
@@ -184,7 +175,10 @@ fn over_time(
             points: films[place].frames.iter().map(|frame| (frame.time.s(), of(frame, which))).collect(),
         }
     };
-    (0..films.len()).flat_map(|place| (0..curves.len()).map(move |which| (place, which))).map(|(a, b)| curve(a, b)).collect()
+    (0..films.len())
+        .flat_map(|place| (0..curves.len()).map(move |which| (place, which)))
+        .map(|(a, b)| curve(a, b))
+        .collect()
 }
 
 /// The name of a curve, with its arm where there are several.
@@ -266,8 +260,7 @@ fn bands(svg: &mut Svg, films: &[Film], top: f64) {
         let y = top + (BAND_HEIGHT + 4.0) * row as f64;
         let letters = |colour, anchor| Letters { size: 10.0, colour, anchor };
         svg.text([LEFT - 6.0, y + 12.0], film.arm(), letters(INK, Anchor::End));
-        let states: Vec<_> =
-            film.frames[rows(films, film)]
+        let states: Vec<_> = film.frames[rows(films, film)]
             .iter()
             .filter_map(|frame| Some((frame.time.s(), frame.command?.state)))
             .collect();
@@ -276,7 +269,12 @@ fn bands(svg: &mut Svg, films: &[Film], top: f64) {
             let state = states[first].1;
             let next = (first..states.len()).find(|&at| states[at].1 != state).unwrap_or(states.len());
             let until = states.get(next).or(states.last()).map_or(start, |at| at.0);
-            let area = Area { left: x_of(states[first].0), top: y, width: x_of(until) - x_of(states[first].0), height: BAND_HEIGHT };
+            let area = Area {
+                left: x_of(states[first].0),
+                top: y,
+                width: x_of(until) - x_of(states[first].0),
+                height: BAND_HEIGHT,
+            };
             svg.rect(area, band_colour(state));
             svg.clipped(area, |svg| {
                 svg.text([area.left + 4.0, y + 12.0], state_word(state), letters("#ffffff", Anchor::Start));

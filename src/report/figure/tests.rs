@@ -4,18 +4,18 @@ use closecall_scenarios::sampling::Design;
 
 use super::*;
 use crate::campaign::runner::{Sampling, concrete};
-use crate::controller::BuiltIn;
+use crate::controller::ControllerChoice;
 use crate::report::film::{Film, FilmRecorder, Level};
 use crate::scenario::ScenarioFile;
 use crate::simulation::{Arm, RunKey, simulate};
 
-fn films(name: &str, arms: &[BuiltIn]) -> Vec<Film> {
+fn films(name: &str, arms: &[ControllerChoice]) -> Vec<Film> {
     let library = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenarios/library/{name}.toml"));
     let file = ScenarioFile::load(&library, &[]).unwrap();
     let sampling = Sampling { seed: 1, design: Design::Random, samples: 1 };
     let scenario = concrete(&file, sampling, 0).unwrap();
     let key = RunKey { seed: 1, sample: 0 };
-    let film = |controller: &BuiltIn| {
+    let film = |controller: &ControllerChoice| {
         let arm = Arm { controller: controller.factory(), sensors: None };
         let mut recorder = FilmRecorder::new(&scenario, key, &arm, Level::Objects);
         let outcome = simulate(&scenario, key, &arm, &mut recorder).unwrap();
@@ -26,7 +26,7 @@ fn films(name: &str, arms: &[BuiltIn]) -> Vec<Film> {
 
 #[test]
 fn the_methods_figure_shows_all_five_moments_and_the_collision_that_is_prevented() {
-    let films = films("paper-figure", &[BuiltIn::Acc, BuiltIn::Mis]);
+    let films = films("paper-figure", &[ControllerChoice::Acc, ControllerChoice::Mis]);
     let text = encounter(&films);
     for letter in ["(a)", "(b)", "(c)", "(d)", "(e)", "COLLISION", "No collision", "critical 0.9 s", "increasing"] {
         assert!(text.contains(letter), "{letter}");
@@ -46,7 +46,7 @@ fn a_picture_turns_into_the_same_pixels_again_with_letters_in_it() {
 
 #[test]
 fn a_run_without_anyone_near_has_a_still_and_a_figure_all_the_same() {
-    let films = films("empty-wet-road", &[BuiltIn::Mis]);
+    let films = films("empty-wet-road", &[ControllerChoice::Mis]);
     for text in [still(&films[0]), encounter(&films)] {
         assert!(text.contains("No collision") && !text.contains("NaN") && !text.contains("inf"));
     }

@@ -164,9 +164,8 @@ impl Film {
         let frame = &self.frames[row];
         let own = self.moving(frame, self.ego);
         let others = (0..self.cast.len()).filter(|&actor| actor != self.ego && self.is_there(actor, row));
-        let ahead = others.filter_map(|actor| {
-            closest_encounter(&own, &self.moving(frame, actor), ENCOUNTER_HORIZON_S).ok()
-        });
+        let ahead =
+            others.filter_map(|actor| closest_encounter(&own, &self.moving(frame, actor), ENCOUNTER_HORIZON_S).ok());
         ahead.min_by(|a, b| a.ttce_s.total_cmp(&b.ttce_s))
     }
 

@@ -1,8 +1,8 @@
 //! Watches a run and keeps what it sees.
 
 use closecall_controllers::CheckedDriver;
-use closecall_sensors::{NoiseKey, SensorMode};
 use closecall_sensors::camera::Pipeline;
+use closecall_sensors::{NoiseKey, SensorMode};
 use closecall_traffic::Time;
 
 use super::{Film, Frame, Level, Limit, Member, Scan};

@@ -81,9 +81,7 @@ impl Film {
         let plain = |text: String| Some(Line { time, text, is_grave: false });
         match what {
             Happening::EventTriggered { event } => plain(format!("the scenario's event `{event}` sets in")),
-            Happening::DriverNote { actor, note } => {
-                plain(format!("{} {}", self.cast[*actor].name, note_words(*note)))
-            }
+            Happening::DriverNote { actor, note } => plain(format!("{} {}", self.cast[*actor].name, note_words(*note))),
             Happening::EgoStateChanged { to, reason, .. } => {
                 let text = format!("E: {} ({reason})", state_word(*to));
                 Some(Line { time, text, is_grave: *to == EgoState::EmergencyBraking })

@@ -45,10 +45,7 @@ pub enum TrafficFilmError {
 ///
 /// # Errors
 /// [`TrafficFilmError`] where the recording does not have its track, or its lanes make no road.
-pub fn film_lane_change(
-    recording: &SmoothedRecording,
-    change: &CriticalLaneChange,
-) -> Result<Film, TrafficFilmError> {
+pub fn film_lane_change(recording: &SmoothedRecording, change: &CriticalLaneChange) -> Result<Film, TrafficFilmError> {
     let track_id = change.lane_change.track_id;
     let own = recording.trajectories.iter().find(|track| track.track_id == track_id);
     let own = own.ok_or(TrafficFilmError::NoTrack { track_id })?;
@@ -124,9 +121,8 @@ fn frame(tracks: &[&Trajectory], time: Time) -> Frame {
     };
     let points: Vec<Option<TrajectoryPoint>> = tracks.iter().map(|track| nearest(track)).collect();
     let states: Vec<VehicleState> = points.iter().map(|point| point.map(state).unwrap_or_default()).collect();
-    let present: Vec<(usize, TrajectoryPoint)> = (0..tracks.len())
-        .filter_map(|place| Some((place, tracks[place].at(time).copied()?)))
-        .collect();
+    let present: Vec<(usize, TrajectoryPoint)> =
+        (0..tracks.len()).filter_map(|place| Some((place, tracks[place].at(time).copied()?))).collect();
     Frame {
         time,
         pitches_rad: vec![0.0; states.len()],
@@ -158,9 +154,8 @@ fn margins(tracks: &[&Trajectory], present: &[(usize, TrajectoryPoint)]) -> Marg
     let own = present.iter().find(|(place, _)| *place == 0).map(|(_, point)| *point);
     let in_lane = |ahead: bool| {
         let own = own?;
-        let others = present.iter().filter(move |(place, at)| {
-            *place != 0 && at.lane == own.lane && (at.s_m > own.s_m) == ahead
-        });
+        let others =
+            present.iter().filter(move |(place, at)| *place != 0 && at.lane == own.lane && (at.s_m > own.s_m) == ahead);
         let nearest = others.min_by(|a, b| (a.1.s_m - own.s_m).abs().total_cmp(&(b.1.s_m - own.s_m).abs()))?;
         let lengths_m = tracks[0].dimensions.length_m + tracks[nearest.0].dimensions.length_m;
         Some((nearest.0, nearest.1.speed_mps, (nearest.1.s_m - own.s_m).abs() - 0.5 * lengths_m))

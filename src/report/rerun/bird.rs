@@ -171,8 +171,7 @@ fn write_gaps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), Re
     };
     let rows: Vec<Vec<([[f32; 2]; 2], Rgba, String)>> = film.frames.iter().map(gaps).collect();
     let entity = "bird/gaps";
-    let fixed =
-        LineStrips2D::update_fields().with_radii([0.6_f32]).with_draw_order(MARKS).with_show_labels(true);
+    let fixed = LineStrips2D::update_fields().with_radii([0.6_f32]).with_draw_order(MARKS).with_show_labels(true);
     writer.fixed(entity, &fixed)?;
     writer.rows(entity, times, |range| {
         let rows = &rows[range];
@@ -233,7 +232,8 @@ fn write_collisions(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError>
         .with_show_labels(true);
     writer.fixed(entity, &fixed)?;
     writer.rows(entity, &times, |range| {
-        let marks = frames[range].iter().map(|frame| at(film, frame, frame.states[struck].s_m, frame.states[struck].d_m));
+        let marks =
+            frames[range].iter().map(|frame| at(film, frame, frame.states[struck].s_m, frame.states[struck].d_m));
         Points2D::update_fields().with_positions(marks).columns_of_unit_batches()
     })
 }

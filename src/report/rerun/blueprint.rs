@@ -135,7 +135,8 @@ impl Layout {
         let view = Spatial2DView::new(title).with_origin(format!("{}bird", film.root)).into();
         let reach = super::bird::REACH_M;
         let [top, bottom] = film.edges;
-        let bounds = Range2D { x_range: [-reach, reach].into(), y_range: [top - BIRD_MARGIN, bottom + BIRD_MARGIN].into() };
+        let bounds =
+            Range2D { x_range: [-reach, reach].into(), y_range: [top - BIRD_MARGIN, bottom + BIRD_MARGIN].into() };
         self.property(&view, "VisualBounds2D", VisualBounds2D::new(bounds));
         view
     }
@@ -164,7 +165,8 @@ impl Layout {
             columns[place / (PLOTS.len() / 2)].push(view);
         }
         let columns = columns.into_iter().filter(|views| !views.is_empty());
-        side_by_side(columns.map(|views| Vertical::new(views).into()).collect()).unwrap_or_else(|| Vertical::new([]).into())
+        side_by_side(columns.map(|views| Vertical::new(views).into()).collect())
+            .unwrap_or_else(|| Vertical::new([]).into())
     }
 
     /// The story beside the log, without the columns that its colours and words say already.

@@ -32,7 +32,7 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<bool, RecordErro
     for (frame, exposure) in chosen(film, rear_exposures(key)) {
         let image;
         (image, lists) = draw(film, &camera, frame, (exposure, lists));
-        writer.from("camera", frame.time, &image)?;
+        writer.since("camera", frame.time, &image)?;
         write_windows(writer, film, &camera, frame)?;
         drawn = true;
     }
@@ -63,10 +63,8 @@ fn draw(film: &Film, camera: &RearCamera, frame: &Frame, (key, lists): (Exposure
 fn write_windows(writer: &Writer<'_>, film: &Film, camera: &RearCamera, frame: &Frame) -> Result<(), RecordError> {
     let (ego, _) = film.scene_vehicles(frame);
     let boxes = frame.scan.as_ref().map_or(&[][..], |scan| &scan.boxes);
-    let seen: Vec<(&Detection, PixelRect)> = boxes
-        .iter()
-        .filter_map(|found| Some((found, camera.window_of(&ego, found)?)))
-        .collect();
+    let seen: Vec<(&Detection, PixelRect)> =
+        boxes.iter().filter_map(|found| Some((found, camera.window_of(&ego, found)?))).collect();
     let scale = 1.0 / f32::from(STEP);
     let corner = |window: &PixelRect| [window.left as f32 * scale, (window.top as f32 - f32::from(ROWS.start)) * scale];
     let size = |window: &PixelRect| [window.width as f32 * scale, window.height as f32 * scale];
@@ -76,7 +74,7 @@ fn write_windows(writer: &Writer<'_>, film: &Film, camera: &RearCamera, frame: &
     )
     .with_colors(seen.iter().map(|(found, _)| colour(found)))
     .with_labels(seen.iter().map(|(found, _)| label(found)));
-    writer.from("camera/windows", frame.time, &windows)
+    writer.since("camera/windows", frame.time, &windows)
 }
 
 fn colour(found: &Detection) -> Rgba {

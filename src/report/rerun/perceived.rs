@@ -7,10 +7,10 @@ use nalgebra::{Matrix2, SymmetricEigen};
 use rerun::{Boxes3D, Ellipsoids3D, FillMode, LineStrips3D, Quaternion};
 
 use super::RecordError;
-use crate::report::film::Film;
 use super::palette::{self, Rgba};
 use super::stream::{Writer, changes};
 use super::vehicles::about_up;
+use crate::report::film::Film;
 
 /// Height that boxes of tracks are drawn with, since tracks have none [m].
 const TRACK_HEIGHT_M: f64 = 1.7;
@@ -64,10 +64,7 @@ fn write_predictions(
         let path = |track: &Track| {
             let ahead = |of: f64, speed_mps: f64| (of + PREDICTED_S * speed_mps) as f32;
             let (x, y) = (track.x_m(), track.y_m());
-            [
-                [x as f32, y as f32, PATH_Z_M],
-                [ahead(x, track.vx_mps()), ahead(y, track.vy_mps()), PATH_Z_M],
-            ]
+            [[x as f32, y as f32, PATH_Z_M], [ahead(x, track.vx_mps()), ahead(y, track.vy_mps()), PATH_Z_M]]
         };
         LineStrips3D::new(all().map(path))
             .with_colors(all().map(|track| palette::faint(colour(track), 150)))

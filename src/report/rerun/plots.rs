@@ -61,12 +61,7 @@ struct Pen<'a> {
 
 impl Plots<'_> {
     /// Writes a curve, and says whether it has any value.
-    fn curve(
-        &self,
-        entity: &str,
-        pen: &Pen<'_>,
-        of: impl Fn(&Frame) -> Option<f64>,
-    ) -> Result<bool, RecordError> {
+    fn curve(&self, entity: &str, pen: &Pen<'_>, of: impl Fn(&Frame) -> Option<f64>) -> Result<bool, RecordError> {
         self.series(entity, pen, &self.film.frames.iter().map(of).collect::<Vec<_>>())
     }
 
@@ -97,8 +92,7 @@ impl Plots<'_> {
         if self.role == Role::Baseline {
             return Ok(());
         }
-        let style =
-            SeriesLines::new().with_names([name]).with_colors([palette::CRITICAL]).with_widths([THIN_LINE]);
+        let style = SeriesLines::new().with_names([name]).with_colors([palette::CRITICAL]).with_widths([THIN_LINE]);
         self.writer.fixed(entity, &style)?;
         self.writer.series(entity, &self.times, &vec![Some(level); self.times.len()])
     }
@@ -126,8 +120,7 @@ impl Plots<'_> {
 
     /// The closest encounter ahead, both vehicles at their present velocities, as it truly is and as the MIS sees it.
     fn encounter(&self) -> Result<bool, RecordError> {
-        let encounters: Vec<Option<Encounter>> =
-            (0..self.times.len()).map(|row| self.film.encounter(row)).collect();
+        let encounters: Vec<Option<Encounter>> = (0..self.times.len()).map(|row| self.film.encounter(row)).collect();
         let of = |of: fn(&Encounter) -> f64| encounters.iter().map(|at| at.as_ref().map(of)).collect::<Vec<_>>();
         let ttce = Pen { name: "TTCE", colour: palette::REAR, width: LINE };
         let any = self.series("plots/encounter/ttce", &ttce, &of(|encounter| encounter.ttce_s))?;
@@ -214,7 +207,11 @@ impl Plots<'_> {
         let words: Vec<&str> =
             self.times.iter().map(|&time| latest(time).map_or(BEFORE, |place| texts[place].as_str())).collect();
         let colours = texts.iter().enumerate().map(|(place, text)| (text.as_str(), palette::moment(place)));
-        self.band("states/3_moments", &words, &std::iter::once((BEFORE, palette::QUIET)).chain(colours).collect::<Vec<_>>())
+        self.band(
+            "states/3_moments",
+            &words,
+            &std::iter::once((BEFORE, palette::QUIET)).chain(colours).collect::<Vec<_>>(),
+        )
     }
 
     fn band(&self, entity: &str, words: &[&str], colours: &[(&str, Rgba)]) -> Result<(), RecordError> {

@@ -4,9 +4,9 @@ use closecall_traffic::{Lane, Road};
 use rerun::{LineStrips3D, Mesh3D};
 
 use super::RecordError;
-use crate::report::film::Film;
 use super::palette::{self, Rgba};
 use super::stream::Writer;
+use crate::report::film::Film;
 
 /// Road shown beyond the first and the last place of any vehicle [m].
 const MARGIN_M: f64 = 300.0;

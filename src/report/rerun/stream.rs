@@ -8,8 +8,8 @@ use std::ops::Range;
 
 use closecall_traffic::Time;
 use rerun::{
-    AsComponents, Clear, RecordingStream, RecordingStreamError, Scalars, SerializationResult, SerializedComponentColumn,
-    TimeCell, TimeColumn,
+    AsComponents, Clear, RecordingStream, RecordingStreamError, Scalars, SerializationResult,
+    SerializedComponentColumn, TimeCell, TimeColumn,
 };
 
 use super::RecordError;
@@ -69,7 +69,7 @@ impl<'a> Writer<'a> {
     }
 
     /// Something that is so from `time` on, as a whole.
-    pub(super) fn from(&self, entity: &str, time: Time, what: &impl AsComponents) -> Result<(), RecordError> {
+    pub(super) fn since(&self, entity: &str, time: Time, what: &impl AsComponents) -> Result<(), RecordError> {
         for timeline in self.timelines(&[time]) {
             let cell = TimeCell::new(timeline.timeline().typ(), timeline.times_raw()[0]);
             self.stream.set_time(*timeline.timeline().name(), cell);

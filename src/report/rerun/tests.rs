@@ -9,7 +9,7 @@ use rerun::{StoreKind, TimelineName};
 use super::stream::{OPENING_TIMELINE, STEP_TIMELINE, TIME_TIMELINE};
 use super::*;
 use crate::campaign::runner::{Sampling, concrete};
-use crate::controller::BuiltIn;
+use crate::controller::ControllerChoice;
 use crate::outcome::{ClosedBy, Collision, Phase};
 use crate::report::film::FilmRecorder;
 use crate::scenario::ScenarioFile;
@@ -21,7 +21,7 @@ fn library(name: &str) -> ScenarioFile {
 }
 
 /// One sample of a scenario of the library, filmed.
-fn filmed(name: &str, controller: BuiltIn, (sensors, level): (Option<SensorMode>, Level)) -> Film {
+fn filmed(name: &str, controller: ControllerChoice, (sensors, level): (Option<SensorMode>, Level)) -> Film {
     let sampling = Sampling { seed: 1, design: Design::Random, samples: 1 };
     let scenario = concrete(&library(name), sampling, 0).unwrap();
     let arm = Arm { controller: controller.factory(), sensors };
@@ -32,7 +32,7 @@ fn filmed(name: &str, controller: BuiltIn, (sensors, level): (Option<SensorMode>
 }
 
 fn usual() -> Film {
-    filmed("low-thw-overtake", BuiltIn::Mis, (None, Level::Full))
+    filmed("low-thw-overtake", ControllerChoice::Mis, (None, Level::Full))
 }
 
 fn chunks(films: &[Film], kind: StoreKind) -> Vec<Chunk> {
@@ -68,7 +68,8 @@ fn texts(chunk: &Chunk, component: &str) -> Vec<String> {
 fn empty_views(films: &[Film]) -> (usize, Vec<String>, Vec<String>) {
     let data = chunks(films, StoreKind::Recording);
     let entities: BTreeSet<String> = data.iter().map(|chunk| chunk.entity_path().to_string()).collect();
-    let has = |prefix: &str| entities.iter().any(|entity| entity == prefix || entity.starts_with(&format!("{prefix}/")));
+    let has =
+        |prefix: &str| entities.iter().any(|entity| entity == prefix || entity.starts_with(&format!("{prefix}/")));
     let (mut views, mut empty, mut timelines) = (0, Vec::new(), Vec::new());
     for chunk in chunks(films, StoreKind::Blueprint) {
         let origins = texts(&chunk, "ViewBlueprint:space_origin");
@@ -91,7 +92,7 @@ fn every_scenario_of_the_library_fills_every_view_at_every_level() {
     let names = files.filter(|path| path.extension().is_some_and(|extension| extension == "toml"));
     for name in names.map(|path| path.file_stem().unwrap().to_str().unwrap().to_owned()) {
         for (level, least) in [(Level::Events, 5), (Level::Objects, 7), (Level::Full, 7)] {
-            let films = [filmed(&name, BuiltIn::Mis, (Some(SensorMode::Object), level))];
+            let films = [filmed(&name, ControllerChoice::Mis, (Some(SensorMode::Object), level))];
             let (views, empty, timelines) = empty_views(&films);
             assert!(views >= least && empty.is_empty(), "{name}, {level:?}: {views} views, nothing at {empty:?}");
             assert_eq!(timelines, [OPENING_TIMELINE], "{name}, {level:?}");
@@ -102,18 +103,19 @@ fn every_scenario_of_the_library_fills_every_view_at_every_level() {
 #[test]
 fn a_pair_fills_every_view_and_shows_the_baseline_as_ghosts() {
     let film = |controller| filmed("paper-figure", controller, (None, Level::Objects));
-    let films = [film(BuiltIn::Acc), film(BuiltIn::Mis)];
+    let films = [film(ControllerChoice::Acc), film(ControllerChoice::Mis)];
     let (views, empty, _) = empty_views(&films);
     assert!(views >= 13 && empty.is_empty(), "{views} views, nothing at {empty:?}");
     let data = chunks(&films, StoreKind::Recording);
-    for entity in ["/mis/world/ghosts/ego", "/mis/bird/ghosts", "/acc/world/ego/collision_1", "/mis/plots/margin/goal"] {
+    for entity in ["/mis/world/ghosts/ego", "/mis/bird/ghosts", "/acc/world/ego/collision_1", "/mis/plots/margin/goal"]
+    {
         assert!(data.iter().any(|chunk| chunk.entity_path().to_string() == entity), "{entity}");
     }
 }
 
 #[test]
 fn full_sensors_show_points_boxes_truth_and_pictures() {
-    let films = [filmed("low-thw-overtake", BuiltIn::Mis, (Some(SensorMode::Full), Level::Full))];
+    let films = [filmed("low-thw-overtake", ControllerChoice::Mis, (Some(SensorMode::Full), Level::Full))];
     let data = chunks(&films, StoreKind::Recording);
     let entities = [
         "/world/ego/lidar/clusters",

@@ -61,15 +61,12 @@ fn write_layer(
     times: &[Time],
     shapes: &[&Vec<Shape>],
 ) -> Result<(), RecordError> {
-    let fixed = Boxes3D::update_fields()
-        .with_fill_mode(FillMode::MajorWireframe)
-        .with_radii([0.05_f32])
-        .with_colors([colour]);
+    let fixed =
+        Boxes3D::update_fields().with_fill_mode(FillMode::MajorWireframe).with_radii([0.05_f32]).with_colors([colour]);
     writer.fixed(entity, &fixed)?;
     // Only frames in which there is something, and the first after them: the rest stays as it is.
-    let rows: Vec<usize> = (0..shapes.len())
-        .filter(|&row| row == 0 || !shapes[row].is_empty() || !shapes[row - 1].is_empty())
-        .collect();
+    let rows: Vec<usize> =
+        (0..shapes.len()).filter(|&row| row == 0 || !shapes[row].is_empty() || !shapes[row - 1].is_empty()).collect();
     let times: Vec<Time> = rows.iter().map(|&row| times[row]).collect();
     writer.rows(entity, &times, |range| {
         let rows = &rows[range];

@@ -6,10 +6,10 @@ use rerun::{Arrows3D, Boxes3D, FillMode, LineStrips3D, Points3D, Quaternion, Tra
 
 use super::RecordError;
 use super::bodies;
-use crate::report::film::{Film, Frame};
 use super::palette::{self, Rgba};
 use super::stream::{Writer, changes};
 use crate::outcome::{CRITICAL_THW_S, Collision};
+use crate::report::film::{Film, Frame};
 
 /// A velocity is drawn as the way that the vehicle goes in this time [s].
 const ARROW_S: f64 = 0.25;
@@ -39,7 +39,7 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError>
             writer.fixed(&body.0, &body.1)?;
         } else {
             // What is there for a while only comes and goes with its vehicle.
-            writer.from(&body.0, times[0], &body.1)?;
+            writer.since(&body.0, times[0], &body.1)?;
         }
         write_motion(writer, &entity, times, &states, &film.road)?;
         write_velocity(writer, &entity, times, &states, (size, colour))?;
@@ -263,7 +263,7 @@ fn write_collisions(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError>
             .with_show_labels(true);
         // The first frame at or after the touch: before it the vehicles are still apart.
         let shown_at = film.frames.iter().map(|frame| frame.time).find(|&time| time >= collision.time);
-        writer.from(&entity, shown_at.unwrap_or(collision.time), &mark)?;
+        writer.since(&entity, shown_at.unwrap_or(collision.time), &mark)?;
     }
     Ok(())
 }
