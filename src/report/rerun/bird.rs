@@ -154,10 +154,13 @@ fn write_lamps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), R
     })
 }
 
+/// The ends of a gap in the picture, its colour and its headway.
+type Gap = ([[f32; 2]; 2], Rgba, String);
+
 /// The gaps before and behind E with their headways, red where these are critical.
 fn write_gaps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordError> {
     let half_m = 0.5 * film.cast[film.ego].vehicle.dimensions.length_m;
-    let gaps = |frame: &Frame| -> Vec<([[f32; 2]; 2], Rgba, String)> {
+    let gaps = |frame: &Frame| -> Vec<Gap> {
         let own = &frame.states[film.ego];
         let margins = &frame.margins;
         let sides = [(1.0, margins.gap_front_m, margins.thw_front_s), (-1.0, margins.gap_rear_m, margins.thw_rear_s)];
@@ -169,7 +172,7 @@ fn write_gaps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), Re
         };
         sides.into_iter().filter_map(line).collect()
     };
-    let rows: Vec<Vec<([[f32; 2]; 2], Rgba, String)>> = film.frames.iter().map(gaps).collect();
+    let rows: Vec<Vec<Gap>> = film.frames.iter().map(gaps).collect();
     let entity = "bird/gaps";
     let fixed = LineStrips2D::update_fields().with_radii([0.6_f32]).with_draw_order(MARKS).with_show_labels(true);
     writer.fixed(entity, &fixed)?;

@@ -36,6 +36,9 @@ struct Verdict {
     false_tracks: Vec<Shape>,
 }
 
+/// A layer: its name, its colour, and which of the shapes are in it.
+type Layer = (&'static str, Rgba, fn(&Verdict) -> &Vec<Shape>);
+
 /// Writes the layers; names those that are there for whoever wants them.
 pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<Vec<String>, RecordError> {
     if film.frames.iter().all(|frame| frame.tracks.is_empty() && frame.rear_field.is_none()) {
@@ -43,7 +46,7 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<Vec<String>, Rec
     }
     let times = film.times();
     let verdicts: Vec<Verdict> = film.frames.iter().map(|frame| judge(film, frame)).collect();
-    let layers: [(&str, Rgba, fn(&Verdict) -> &Vec<Shape>); 3] = [
+    let layers: [Layer; 3] = [
         ("known", palette::TRUTH, |verdict| &verdict.known),
         ("missed", palette::MISSED, |verdict| &verdict.missed),
         ("false_tracks", palette::FALSE_TRACK, |verdict| &verdict.false_tracks),
