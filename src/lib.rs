@@ -13,6 +13,7 @@
 //! * [`simulation`]: the closed loop of one run
 //! * [`outcome`]: what a run ends in
 //! * [`campaign`]: many runs, their ledger and their verdict
+//! * [`statistics`]: how sure one can be from samples
 //! * [`report`]: Rerun, Parquet, JUnit, JSON, for people and machines
 //! * [`cli`], [`exit_code`]: the command line
 
@@ -24,4 +25,5 @@ pub mod outcome;
 pub mod report;
 pub mod scenario;
 pub mod simulation;
+pub mod statistics;
 mod world;
