@@ -18,6 +18,7 @@ use std::time::Duration;
 use closecall::campaign::execution::{Campaign, CampaignError};
 use closecall::campaign::runner::{Sampling, Work};
 use closecall::campaign::summary::{Counts, Summary};
+use closecall::campaign::validity::CheckPlan;
 use closecall::campaign::workers::Workers;
 use closecall::controller::BuiltIn;
 use closecall::scenario::ScenarioFile;
@@ -89,7 +90,7 @@ pub(crate) fn against_cruise_control(
 ) -> Result<Counts, CampaignError> {
     let arms = vec![BuiltIn::Acc.factory(), tested].into_iter().map(|controller| Arm { controller, sensors: None });
     let sampling = Sampling { seed: 1, design: Design::Random, samples };
-    let work = Arc::new(Work { file, sampling, arms: arms.collect() });
+    let work = Arc::new(Work { file, sampling, arms: arms.collect(), checks: CheckPlan::default() });
     let mut summary = Summary::new(work.arms.iter().map(|arm| arm.controller.name().to_owned()).collect());
     summary.begin(&work.file.config().name);
     let ego = work.file.ego_id().expect("a scenario that was read has an ego vehicle");

@@ -8,7 +8,7 @@ use crate::scenario::ScenarioError;
 /// | code | name | meaning |
 /// |---|---|---|
 /// | 0 | pass | done; every gate that was asked for is met |
-/// | 1 | fail | more collisions than allowed |
+/// | 1 | fail | a gate is not met: more collisions than allowed, a regression |
 /// | 2 | usage | the command line is wrong |
 /// | 3 | invalid input | a scenario or a recording cannot be used; nothing was run |
 /// | 4 | inconclusive | too few samples for the bound asked for |

@@ -17,6 +17,11 @@ pub enum ClosedBy {
     Both,
 }
 
+/// The larger of two, where one that is not a number is the largest of all: it must never look safe.
+pub(crate) fn worse(one: f64, other: f64) -> f64 {
+    if one.is_nan() || one >= other { one } else { other }
+}
+
 /// Part of an encounter with a vehicle that comes up from behind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -40,7 +45,7 @@ pub const CRITICAL_THW_S: f64 = 0.9;
 pub struct Collision {
     /// When they first touched.
     pub time: Time,
-    /// Who.
+    /// Who, in the order of their names.
     pub between: [ActorId; 2],
     /// Which side of each was struck.
     pub struck_side: [BoxSide; 2],
@@ -207,6 +212,15 @@ impl Outcome {
     /// When `moment` was, if it was reached.
     pub fn moment(&self, moment: Moment) -> Option<Time> {
         self.moments.iter().find(|noted| noted.moment == moment).map(|noted| noted.time)
+    }
+
+    /// The largest change of velocity that `actor` suffered [m/s]; 0 where it was in no collision.
+    pub fn largest_delta_v_mps(&self, actor: &ActorId) -> f64 {
+        let of_actor = |collision: &Collision| {
+            let place = collision.between.iter().position(|id| id == actor)?;
+            Some(collision.delta_v_mps[place])
+        };
+        self.collisions.iter().filter_map(of_actor).fold(0.0, worse)
     }
 
     /// True where E itself was in a collision: what gates count.

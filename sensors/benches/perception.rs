@@ -15,7 +15,7 @@ fn perception(criterion: &mut Criterion) {
     let road = Road::straight(3);
     let others = [vehicle(1, 1_025.0, -5.6), vehicle(2, 970.0, -5.6), vehicle(3, 1_005.0, -1.9)];
     let sensors = SensorsConfig::default().check(&Parameters::default()).expect("the defaults are valid");
-    let key = NoiseKey { seed: 0, sample: 0, ego: ActorId::new("ego").expect("a legal name") };
+    let key = NoiseKey { seed: 0, sample: 0, ego: ActorId::new("ego").expect("a legal name"), actors: [].into() };
     let modes = [
         ("ground truth", SensorMode::GroundTruth),
         ("object level", SensorMode::Object),

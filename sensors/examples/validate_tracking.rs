@@ -58,7 +58,7 @@ fn road(guard_rails: bool) -> Road {
 }
 
 fn approach(case: &Case, sensors: &Sensors, sample: u64, result: &mut Result) {
-    let key = NoiseKey { seed: 11, sample, ego: ActorId::new("ego").expect("a legal name") };
+    let key = NoiseKey { seed: 11, sample, ego: ActorId::new("ego").expect("a legal name"), actors: [].into() };
     let mut perception = sensors.build(&key).expect("no model to load");
     let road = road(case.guard_rails);
     let closing_mps = (10.0 + 50.0 * sample as f64 / (RUNS - 1) as f64) / 3.6;

@@ -26,6 +26,6 @@ pub struct Scene<'a> {
     pub environment: &'a Environment,
     /// E itself.
     pub ego: SceneVehicle,
-    /// All the others, in the order of the scenario's list of actors.
+    /// All the others, in the order of their names.
     pub others: &'a [SceneVehicle],
 }

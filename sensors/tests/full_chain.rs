@@ -29,7 +29,7 @@ impl Approach {
         };
         let ego = vehicle(0, VehicleClass::Car, 1_000.0, 30.0);
         let half_lengths_m = 0.5 * (4.6 + class.typical_dimensions().length_m);
-        let key = NoiseKey { seed: 5, sample, ego: ActorId::new("ego").unwrap() };
+        let key = NoiseKey { seed: 5, sample, ego: ActorId::new("ego").unwrap(), actors: [].into() };
         let sensors = SensorsConfig::default().check(&Parameters::default()).unwrap().with_mode(SensorMode::Full);
         Self {
             road: Road::straight(3),

@@ -36,6 +36,15 @@ pub enum CampaignError {
     Workers(#[from] WorkersError),
 }
 
+/// What ends with a record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum End {
+    /// Its scenario: the next one begins.
+    Scenario,
+    /// The campaign.
+    Campaign,
+}
+
 /// A record whose turn has come.
 #[derive(Clone, Copy, Debug)]
 pub struct Turn<'a> {
@@ -59,7 +68,8 @@ impl Campaign {
     }
 
     /// Runs what is not in the folder's journal yet; everything where there is no folder. `take` gets every record in the
-    /// order of the plan, those of the journal first; where it breaks, the campaign ends with that record.
+    /// order of the plan, those of the journal first; where it breaks, that scenario or the campaign ends with that
+    /// record.
     ///
     /// Answers what was cut off the journal, where its end was torn.
     ///
@@ -68,7 +78,7 @@ impl Campaign {
     pub fn run(
         &self,
         held: Option<&Held>,
-        mut take: impl FnMut(Turn<'_>) -> ControlFlow<()>,
+        mut take: impl FnMut(Turn<'_>) -> ControlFlow<End>,
     ) -> Result<Option<(usize, String)>, CampaignError> {
         let mut place = Place { work: 0, done: 0, all: 0, is_over: false };
         let mut kept = match held {
@@ -90,7 +100,7 @@ impl Campaign {
         &self,
         held: &Held,
         place: &mut Place,
-        take: &mut impl FnMut(Turn<'_>) -> ControlFlow<()>,
+        take: &mut impl FnMut(Turn<'_>) -> ControlFlow<End>,
     ) -> Result<TakenUp, FolderError> {
         let mut samples = self.works.first().map(|work| work.samples(self.partition));
         held.take_up(|record| {
@@ -102,7 +112,12 @@ impl Campaign {
                         if fits {
                             place.done += 1;
                             place.all += 1;
-                            place.is_over = take(Turn { work: place.work, record, is_new: false }).is_break();
+                            let end = take(Turn { work: place.work, record, is_new: false }).break_value();
+                            place.is_over = end == Some(End::Campaign);
+                            if end == Some(End::Scenario) {
+                                (place.work, place.done) = (place.work + 1, 0);
+                                samples = self.works.get(place.work).map(|work| work.samples(self.partition));
+                            }
                         }
                         return fits;
                     }
@@ -119,7 +134,7 @@ impl Campaign {
         &self,
         from: Place,
         mut kept: Option<&mut TakenUp>,
-        take: &mut impl FnMut(Turn<'_>) -> ControlFlow<()>,
+        take: &mut impl FnMut(Turn<'_>) -> ControlFlow<End>,
     ) -> Result<(), CampaignError> {
         let (mut place, mut is_over) = (from.all, false);
         for (number, work) in self.works.iter().enumerate().skip(from.work) {
@@ -130,9 +145,9 @@ impl Campaign {
                     keep(kept, place, &finished)?;
                 }
                 place += 1;
-                let flow = take(Turn { work: number, record: &finished.record, is_new: true });
-                is_over = flow.is_break();
-                Ok::<_, CampaignError>(flow)
+                let end = take(Turn { work: number, record: &finished.record, is_new: true }).break_value();
+                is_over = end == Some(End::Campaign);
+                Ok::<_, CampaignError>(if end.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
             })?;
             if is_over {
                 break;

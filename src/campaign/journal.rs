@@ -174,8 +174,8 @@ mod tests {
 
     fn record(sample: u64) -> Record {
         let failure = SampleFailure { kind: "panic".to_owned(), message: "a \"quoted\"\nline".to_owned() };
-        let arm = ArmRecord { controller: "mis".to_owned(), result: Err(failure) };
-        Record { scenario: "s".to_owned(), sample, arms: vec![arm], repeat_differs: false }
+        let arm = ArmRecord { controller: "mis".to_owned(), result: Err(failure), checks: None };
+        Record { scenario: "s".to_owned(), sample, arms: vec![arm] }
     }
 
     fn written(path: &Path) -> Vec<u8> {

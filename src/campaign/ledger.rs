@@ -1,20 +1,56 @@
 //! Counts over the samples of a campaign, with how sure they are.
 
-use serde::Serialize;
-use statrs::distribution::{Beta, ContinuousCDF};
+use serde::{Deserialize, Serialize};
 
-/// Share of repetitions in which the interval covers the true probability, at least.
+use crate::outcome::worse;
+use crate::statistics::{interval, mcnemar, sequence};
+
+/// Share of repetitions in which a reported interval covers the true probability, at least.
 const COVERAGE: f64 = 0.95;
 
-/// An exact (Clopper–Pearson) interval of a probability at 95 %: C. J. Clopper and E. S. Pearson, *Biometrika* 26
-/// (1934). It covers the truth in at least 95 % of campaigns, whatever the truth is. Nothing is known of no samples.
-pub fn clopper_pearson(hits: u64, samples: u64) -> [f64; 2] {
-    let tail = 0.5 * (1.0 - COVERAGE);
-    let (k, n) = (hits as f64, samples as f64);
-    let quantile = |a: f64, b: f64, p: f64| Beta::new(a, b).map_or(f64::NAN, |beta| beta.inverse_cdf(p));
-    let low = if hits == 0 { 0.0 } else { quantile(k, n - k + 1.0, tail) };
-    let high = if hits >= samples { 1.0 } else { quantile(k + 1.0, n - k, 1.0 - tail) };
-    [low, high]
+/// What the number of samples came from: which bounds of a probability hold.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Inference {
+    /// It was fixed in advance: exact intervals (Clopper–Pearson).
+    #[default]
+    FixedSamples,
+    /// It came from the outcomes or the clock: a confidence sequence, valid however one stops.
+    Sequential,
+}
+
+impl Inference {
+    /// The one-sided upper bound of a probability.
+    pub fn upper_bound(self, hits: u64, samples: u64, confidence: f64) -> f64 {
+        match self {
+            Self::FixedSamples => interval::upper_bound(hits, samples, confidence),
+            Self::Sequential => sequence::upper_bound(hits, samples, confidence),
+        }
+    }
+
+    /// The one-sided lower bound of a probability.
+    pub fn lower_bound(self, hits: u64, samples: u64, confidence: f64) -> f64 {
+        match self {
+            Self::FixedSamples => interval::lower_bound(hits, samples, confidence),
+            Self::Sequential => sequence::lower_bound(hits, samples, confidence),
+        }
+    }
+
+    /// The two-sided interval at 95 %.
+    pub fn interval_95(self, hits: u64, samples: u64) -> [f64; 2] {
+        match self {
+            Self::FixedSamples => interval::clopper_pearson(hits, samples, COVERAGE),
+            Self::Sequential => sequence::interval(hits, samples, COVERAGE),
+        }
+    }
+
+    /// The name of the method, for reports.
+    pub const fn method(self) -> &'static str {
+        match self {
+            Self::FixedSamples => "clopper-pearson",
+            Self::Sequential => "confidence-sequence",
+        }
+    }
 }
 
 /// The counts of one arm.
@@ -22,7 +58,8 @@ pub fn clopper_pearson(hits: u64, samples: u64) -> [f64; 2] {
 pub struct ArmCounts {
     /// Samples with an outcome.
     pub outcomes: u64,
-    /// Samples in which E collided.
+    /// Samples in which E collided, as judged: where the validity checks flipped a verdict, the one that speaks worse
+    /// for the system under test.
     pub collisions: u64,
     /// Samples that ended in an error.
     pub errors: u64,
@@ -32,12 +69,18 @@ pub struct ArmCounts {
     pub goals_in_reach: u64,
     /// Most by which E was slower than the vehicle ahead in any sample [m/s].
     pub max_speed_deficit_mps: f64,
+    /// Largest jerk of E in any sample, before any collision of its own [m/s³].
+    pub max_jerk_mps3: f64,
+    /// Largest change of velocity of E in any sample [m/s].
+    pub max_delta_v_mps: f64,
+    /// Harm of all samples: see [`super::harm`].
+    pub harm: f64,
 }
 
 /// What came of one sample in one arm.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tally {
-    /// Whether E collided; nothing where the sample ended in an error.
+    /// Whether E collided, as judged; nothing where the sample ended in an error.
     pub collided: Option<bool>,
     /// Whether the margin increase system engaged.
     pub engaged: bool,
@@ -45,6 +88,12 @@ pub struct Tally {
     pub goal_in_reach: bool,
     /// Most by which E was slower than the vehicle ahead [m/s].
     pub speed_deficit_mps: f64,
+    /// Largest jerk of E [m/s³].
+    pub jerk_mps3: f64,
+    /// Largest change of velocity of E [m/s].
+    pub delta_v_mps: f64,
+    /// Harm of the collisions, E's and others'.
+    pub harm: f64,
 }
 
 impl ArmCounts {
@@ -59,7 +108,10 @@ impl ArmCounts {
         }
         self.engagements += u64::from(tally.engaged);
         self.goals_in_reach += u64::from(tally.engaged && tally.goal_in_reach);
-        self.max_speed_deficit_mps = self.max_speed_deficit_mps.max(tally.speed_deficit_mps);
+        self.max_speed_deficit_mps = worse(self.max_speed_deficit_mps, tally.speed_deficit_mps);
+        self.max_jerk_mps3 = worse(self.max_jerk_mps3, tally.jerk_mps3);
+        self.max_delta_v_mps = worse(self.max_delta_v_mps, tally.delta_v_mps);
+        self.harm += tally.harm;
     }
 
     /// Adds the counts of another campaign.
@@ -69,22 +121,34 @@ impl ArmCounts {
         self.errors += other.errors;
         self.engagements += other.engagements;
         self.goals_in_reach += other.goals_in_reach;
-        self.max_speed_deficit_mps = self.max_speed_deficit_mps.max(other.max_speed_deficit_mps);
+        self.max_speed_deficit_mps = worse(self.max_speed_deficit_mps, other.max_speed_deficit_mps);
+        self.max_jerk_mps3 = worse(self.max_jerk_mps3, other.max_jerk_mps3);
+        self.max_delta_v_mps = worse(self.max_delta_v_mps, other.max_delta_v_mps);
+        self.harm += other.harm;
     }
 
     /// Share of the samples with an outcome in which E collided; nothing of no samples.
     pub fn collision_rate(&self) -> Option<f64> {
-        (self.outcomes > 0).then(|| self.collisions as f64 / self.outcomes as f64)
+        self.share(self.collisions)
     }
 
-    /// The exact interval of the probability of a collision, given the sampled scenario.
-    pub fn interval_95(&self) -> [f64; 2] {
-        clopper_pearson(self.collisions, self.outcomes)
+    /// Share of the samples with an outcome in which the system engaged; nothing of no samples.
+    pub fn engagement_rate(&self) -> Option<f64> {
+        self.share(self.engagements)
+    }
+
+    fn share(&self, count: u64) -> Option<f64> {
+        (self.outcomes > 0).then(|| count as f64 / self.outcomes as f64)
+    }
+
+    /// The interval of the probability of a collision, given the sampled scenario.
+    pub fn interval_95(&self, inference: Inference) -> [f64; 2] {
+        inference.interval_95(self.collisions, self.outcomes)
     }
 }
 
 /// Pairs of the same sample without and with the system under test.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pairs {
     /// Collision without it, none with it.
     pub prevented: u64,
@@ -94,16 +158,27 @@ pub struct Pairs {
     pub both: u64,
     /// No collision either way.
     pub neither: u64,
+    /// Harm that was less with it, over the samples in which it was less.
+    pub prevented_harm: f64,
+    /// Harm that was more with it, over the samples in which it was more.
+    pub induced_harm: f64,
 }
 
 impl Pairs {
     /// Takes in one pair that has both outcomes.
-    pub fn take(&mut self, baseline_collided: bool, collided: bool) {
-        match (baseline_collided, collided) {
-            (true, false) => self.prevented += 1,
-            (false, true) => self.induced += 1,
-            (true, true) => self.both += 1,
-            (false, false) => self.neither += 1,
+    pub fn take(&mut self, baseline: &Tally, tested: &Tally) {
+        match (baseline.collided, tested.collided) {
+            (Some(true), Some(false)) => self.prevented += 1,
+            (Some(false), Some(true)) => self.induced += 1,
+            (Some(true), Some(true)) => self.both += 1,
+            (Some(false), Some(false)) => self.neither += 1,
+            (None, _) | (_, None) => return,
+        }
+        let more = tested.harm - baseline.harm;
+        if more > 0.0 {
+            self.induced_harm += more;
+        } else {
+            self.prevented_harm -= more;
         }
     }
 
@@ -113,6 +188,14 @@ impl Pairs {
         self.induced += other.induced;
         self.both += other.both;
         self.neither += other.neither;
+        self.prevented_harm += other.prevented_harm;
+        self.induced_harm += other.induced_harm;
+    }
+
+    /// How rare a split at least as uneven would be if the arms were alike (exact McNemar test, two-sided). It holds for
+    /// a number of samples that was fixed in advance alone.
+    pub fn mcnemar_p(&self, inference: Inference) -> Option<f64> {
+        (inference == Inference::FixedSamples).then(|| mcnemar::two_sided_p(self.prevented, self.induced))
     }
 }
 
@@ -121,23 +204,32 @@ mod tests {
     use super::*;
 
     #[test]
-    fn intervals_are_those_of_the_textbook() {
-        // 0 of n: the upper bound is 1 − (α/2)^(1/n).
-        let [low, high] = clopper_pearson(0, 200);
-        assert_eq!(low, 0.0);
-        assert!((high - (1.0 - 0.025_f64.powf(1.0 / 200.0))).abs() < 1e-9);
-        // 10 of 100: 4.90 % to 17.62 % (tabulated).
-        let [low, high] = clopper_pearson(10, 100);
-        assert!((low - 0.049_005).abs() < 1e-5 && (high - 0.176_223).abs() < 1e-5, "{low} {high}");
-        assert_eq!(clopper_pearson(7, 7)[1], 1.0);
-        assert_eq!(clopper_pearson(0, 0), [0.0, 1.0]);
+    fn an_error_is_never_a_pass() {
+        let mut counts = ArmCounts::default();
+        counts.take(Tally { collided: None, ..Tally::default() });
+        assert_eq!((counts.outcomes, counts.errors), (0, 1));
+        assert_eq!(counts.collision_rate(), None);
     }
 
     #[test]
-    fn an_error_is_never_a_pass() {
+    fn what_is_not_a_number_stays_the_worst() {
         let mut counts = ArmCounts::default();
-        counts.take(Tally { collided: None, engaged: false, goal_in_reach: false, speed_deficit_mps: 0.0 });
-        assert_eq!((counts.outcomes, counts.errors), (0, 1));
-        assert_eq!(counts.collision_rate(), None);
+        for jerk_mps3 in [3.0, f64::NAN, 5.0] {
+            counts.take(Tally { collided: Some(false), jerk_mps3, ..Tally::default() });
+        }
+        assert!(counts.max_jerk_mps3.is_nan());
+    }
+
+    #[test]
+    fn pairs_weigh_harm_apart_from_counts() {
+        let tally = |collided, harm| Tally { collided: Some(collided), harm, ..Tally::default() };
+        let mut pairs = Pairs::default();
+        pairs.take(&tally(true, 0.5), &tally(false, 0.0));
+        pairs.take(&tally(true, 0.25), &tally(true, 1.0));
+        pairs.take(&tally(false, 0.0), &Tally::default());
+        assert_eq!((pairs.prevented, pairs.induced, pairs.both, pairs.neither), (1, 0, 1, 0));
+        assert_eq!((pairs.prevented_harm, pairs.induced_harm), (0.5, 0.75));
+        assert_eq!(pairs.mcnemar_p(Inference::FixedSamples), Some(1.0));
+        assert_eq!(pairs.mcnemar_p(Inference::Sequential), None);
     }
 }

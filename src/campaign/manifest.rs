@@ -3,8 +3,10 @@
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use super::ledger::Inference;
 use super::partition::Partition;
 use super::runner::Sampling;
+use super::validity::CheckPlan;
 use crate::controller::ControllerChoice;
 
 /// The layout of a campaign's folder.
@@ -51,6 +53,10 @@ pub struct Manifest {
     pub arms: Vec<ControllerChoice>,
     /// The sensors, where the command line named them.
     pub sensors: Option<String>,
+    /// Which samples are checked.
+    pub checks: CheckPlan,
+    /// What the number of samples comes from.
+    pub inference: Inference,
     /// The networks that the sensors use.
     pub models: Vec<ManifestModel>,
     /// Longest wall time of a sample in one arm [s].
@@ -144,6 +150,8 @@ mod tests {
             partition: None,
             arms: vec![ControllerChoice::Mis],
             sensors: None,
+            checks: CheckPlan::default(),
+            inference: Inference::default(),
             models: Vec::new(),
             sample_timeout_s: 300.0,
             command: vec!["closecall".to_owned()],

@@ -3,7 +3,9 @@
 use closecall_traffic::ActorId;
 use serde::{Deserialize, Serialize};
 
+use super::harm::harm;
 use super::ledger::Tally;
+use super::validity::ArmChecks;
 use crate::outcome::Outcome;
 use crate::simulation::SampleError;
 
@@ -29,10 +31,13 @@ pub struct ArmRecord {
     pub controller: String,
     /// What came of it.
     pub result: Result<Outcome, SampleFailure>,
+    /// What the validity checks found, where this sample was checked.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub checks: Option<ArmChecks>,
 }
 
 impl ArmRecord {
-    /// The counts of this sample.
+    /// The counts of this sample, as it came out.
     pub fn tally(&self, ego: &ActorId) -> Tally {
         match &self.result {
             Ok(outcome) => {
@@ -42,9 +47,12 @@ impl ArmRecord {
                     engaged: mis.is_some_and(|mis| mis.engaged_at_s.is_ok()),
                     goal_in_reach: mis.is_some_and(|mis| mis.goal_in_reach == Some(true)),
                     speed_deficit_mps: outcome.margins.max_speed_deficit_mps,
+                    jerk_mps3: outcome.margins.max_jerk_mps3,
+                    delta_v_mps: outcome.largest_delta_v_mps(ego),
+                    harm: harm(outcome),
                 }
             }
-            Err(_) => Tally { collided: None, engaged: false, goal_in_reach: false, speed_deficit_mps: 0.0 },
+            Err(_) => Tally::default(),
         }
     }
 }
@@ -58,7 +66,28 @@ pub struct Record {
     pub sample: u64,
     /// The arms.
     pub arms: Vec<ArmRecord>,
-    /// True where some arm was repeated and came out differently.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub repeat_differs: bool,
+}
+
+impl Record {
+    /// True where a validity check made a difference where none may be.
+    pub fn is_invalid(&self) -> bool {
+        self.arms.iter().filter_map(|arm| arm.checks.as_ref()).any(|checks| !checks.broken.is_empty())
+    }
+
+    /// The counts of each arm, as they are judged: where a verdict flipped at half the time step, the arm under test,
+    /// the last, counts as collided, and the baseline as not. Either speaks worse for the system under test.
+    pub fn tallies(&self, ego: &ActorId) -> Vec<Tally> {
+        let tested = self.arms.len().saturating_sub(1);
+        let judged = |(place, arm): (usize, &ArmRecord)| {
+            let tally = arm.tally(ego);
+            let halved = arm.checks.as_ref().and_then(|checks| checks.collided_at_half_step);
+            let worse = |collided: bool| match halved {
+                Some(halved) if place == tested => collided || halved,
+                Some(halved) => collided && halved,
+                None => collided,
+            };
+            Tally { collided: tally.collided.map(worse), ..tally }
+        };
+        self.arms.iter().enumerate().map(judged).collect()
+    }
 }

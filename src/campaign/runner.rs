@@ -8,12 +8,10 @@ use closecall_traffic::Check;
 
 use super::partition::Partition;
 use super::record::{ArmRecord, SampleFailure};
+use super::validity::{CheckPlan, Subject};
 use crate::outcome::Outcome;
 use crate::scenario::{Scenario, ScenarioFile};
 use crate::simulation::{Arm, NoObserver, Observer, RunKey, SampleError, simulate};
-
-/// One sample in so many is run twice: its outcomes must be the same to the last bit.
-const REPEATED: u64 = 100;
 
 /// How the samples of a campaign are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -49,6 +47,8 @@ pub struct Work {
     pub sampling: Sampling,
     /// The arms, the baseline first.
     pub arms: Vec<Arm>,
+    /// Which samples are checked.
+    pub checks: CheckPlan,
 }
 
 impl Work {
@@ -62,26 +62,24 @@ impl Work {
         (0..self.count()).filter(move |&sample| part.is_none_or(|part| part.has(sample)))
     }
 
-    /// Runs one sample in one arm.
+    /// Runs one sample in one arm, and checks it where its turn has come.
     pub(super) fn run(&self, sample: u64, arm: usize) -> ArmRun {
         let arm = &self.arms[arm];
         let key = RunKey { seed: self.sampling.seed, sample };
         let started = Instant::now();
-        let run = || -> Result<Outcome, SampleFailure> {
-            let result = guarded(|| {
-                let scenario = concrete(&self.file, self.sampling, sample)?;
-                simulate(&scenario, key, arm, &mut NoObserver)
-            });
-            result.map_err(SampleFailure::from)
+        let scenario = guarded(|| concrete(&self.file, self.sampling, sample));
+        let subject = scenario.as_ref().map(|scenario| Subject { scenario, key, arm });
+        let result = match &subject {
+            Ok(subject) => run_guarded(subject.scenario, key, arm, &mut NoObserver),
+            Err(error) => Err((*error).clone()),
         };
-        let result = run();
         let wall_s = started.elapsed().as_secs_f64();
-        let repeat_differs = sample.is_multiple_of(REPEATED)
-            && match (run(), &result) {
-                (Ok(again), Ok(outcome)) => !again.has_same_bits(outcome),
-                (again, result) => again != *result,
-            };
-        ArmRun { record: ArmRecord { controller: arm.controller.name().to_owned(), result }, wall_s, repeat_differs }
+        let checks = match (&subject, &result) {
+            (Ok(subject), Ok(outcome)) if self.checks.has(key) => Some(subject.check(outcome)),
+            _ => None,
+        };
+        let (controller, result) = (arm.controller.name().to_owned(), result.map_err(SampleFailure::from));
+        ArmRun { record: ArmRecord { controller, result, checks }, wall_s }
     }
 }
 
@@ -91,8 +89,6 @@ pub(super) struct ArmRun {
     pub(super) record: ArmRecord,
     /// Wall time [s].
     pub(super) wall_s: f64,
-    /// True where it was repeated and came out differently.
-    pub(super) repeat_differs: bool,
 }
 
 /// The concrete scenario of one sample.
@@ -117,7 +113,7 @@ pub fn run_guarded(
     guarded(|| simulate(scenario, key, arm, observer))
 }
 
-fn guarded(run: impl FnOnce() -> Result<Outcome, SampleError>) -> Result<Outcome, SampleError> {
+fn guarded<T>(run: impl FnOnce() -> Result<T, SampleError>) -> Result<T, SampleError> {
     catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|panic| {
         let message = panic
             .downcast_ref::<&str>()

@@ -2,8 +2,9 @@
 
 use closecall_traffic::ActorId;
 
-use super::ledger::{ArmCounts, Pairs};
+use super::ledger::{ArmCounts, Inference, Pairs};
 use super::record::Record;
+use super::validity::CheckCounts;
 use super::verdict::{Evidence, Gates, Judgement};
 
 /// The counts of one scenario, or of all.
@@ -15,8 +16,10 @@ pub struct Counts {
     pub pairs: Pairs,
     /// Samples that were run.
     pub samples: u64,
-    /// Samples whose repetition came out differently.
+    /// Samples in which a validity check made a difference where none may be.
     pub invalid: u64,
+    /// What the validity checks found.
+    pub checks: CheckCounts,
     /// Simulated time of all runs [s].
     pub simulated_s: f64,
 }
@@ -27,18 +30,22 @@ impl Counts {
     }
 
     fn take(&mut self, record: &Record, ego: &ActorId) {
-        let mut collided = Vec::with_capacity(self.arms.len());
-        for (counts, arm) in self.arms.iter_mut().zip(&record.arms) {
-            let tally = arm.tally(ego);
-            counts.take(tally);
-            collided.push(tally.collided);
-            self.simulated_s += arm.result.as_ref().map_or(0.0, |outcome| outcome.duration.s());
+        let tallies = record.tallies(ego);
+        for (counts, tally) in self.arms.iter_mut().zip(&tallies) {
+            counts.take(*tally);
         }
-        if let [Some(baseline), Some(tested)] = collided[..] {
+        if let [baseline, tested] = &tallies[..] {
             self.pairs.take(baseline, tested);
         }
+        for arm in &record.arms {
+            let Ok(outcome) = &arm.result else { continue };
+            self.simulated_s += outcome.duration.s();
+            if let Some(checks) = &arm.checks {
+                self.checks.take(checks, outcome.ego_collided(ego));
+            }
+        }
         self.samples += 1;
-        self.invalid += u64::from(record.repeat_differs);
+        self.invalid += u64::from(record.is_invalid());
     }
 
     fn add(&mut self, other: &Self) {
@@ -48,6 +55,7 @@ impl Counts {
         self.pairs.add(&other.pairs);
         self.samples += other.samples;
         self.invalid += other.invalid;
+        self.checks.add(&other.checks);
         self.simulated_s += other.simulated_s;
     }
 
@@ -64,12 +72,20 @@ pub struct Summary {
     pub controllers: Vec<String>,
     /// The counts of each scenario, by name.
     pub scenarios: Vec<(String, Counts)>,
+    /// What the numbers of samples came from.
+    pub inference: Inference,
 }
 
 impl Summary {
     /// Nothing yet.
     pub fn new(controllers: Vec<String>) -> Self {
-        Self { controllers, scenarios: Vec::new() }
+        Self { controllers, scenarios: Vec::new(), inference: Inference::default() }
+    }
+
+    /// The same, where the numbers of samples come from something else.
+    #[must_use]
+    pub fn with_inference(self, inference: Inference) -> Self {
+        Self { inference, ..self }
     }
 
     /// Begins the counts of the next scenario.
@@ -102,11 +118,18 @@ impl Summary {
     pub fn judge(&self, gates: Gates) -> Judgement {
         let total = self.total();
         let tested = total.arms.last().copied().unwrap_or_default();
+        let scenarios: Vec<(&str, &ArmCounts)> = self
+            .scenarios
+            .iter()
+            .filter_map(|(name, counts)| counts.arms.last().map(|tested| (name.as_str(), tested)))
+            .collect();
         gates.judge(&Evidence {
             tested: &tested,
+            scenarios: &scenarios,
             errors: total.errors(),
-            invalid: total.invalid,
+            checks: &total.checks,
             pairs: self.is_paired().then_some(&total.pairs),
+            inference: self.inference,
         })
     }
 }

@@ -4,18 +4,45 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::ledger::{ArmCounts, Pairs};
+use super::ledger::{ArmCounts, Inference, Pairs};
+use super::probability::{Answer, Finding, ProbabilityGate, percent};
+use super::validity::CheckCounts;
 use crate::exit_code::ExitCode;
 
+/// Share of the checked verdicts that may flip at half the time step, where nobody says otherwise.
+pub const MAX_FLIP_RATE: f64 = 0.05;
+
 /// What a campaign is judged by. Gates count samples in which E collided, in the arm under test.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gates {
     /// Most samples with a collision of E.
     pub max_collisions: Option<u64>,
+    /// Most probable a collision of E may be, in each scenario.
+    pub probability: Option<ProbabilityGate>,
     /// Most samples in which E collides only with the system under test.
     pub max_induced: Option<u64>,
+    /// Largest share of the samples in which the system may engage, in each scenario.
+    pub max_engagement_rate: Option<f64>,
     /// Most by which E may fall below the speed of the vehicle ahead, in any sample [m/s].
     pub max_speed_deficit_mps: Option<f64>,
+    /// Largest jerk of E in any sample [m/s³].
+    pub max_jerk_mps3: Option<f64>,
+    /// Share of the checked verdicts that may flip at half the time step, rounded up to whole samples.
+    pub max_flip_rate: f64,
+}
+
+impl Default for Gates {
+    fn default() -> Self {
+        Self {
+            max_collisions: None,
+            probability: None,
+            max_induced: None,
+            max_engagement_rate: None,
+            max_speed_deficit_mps: None,
+            max_jerk_mps3: None,
+            max_flip_rate: MAX_FLIP_RATE,
+        }
+    }
 }
 
 /// The answer of a campaign.
@@ -44,7 +71,7 @@ impl fmt::Display for Verdict {
 }
 
 /// A verdict with its reasons.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Judgement {
     /// The answer.
     pub verdict: Verdict,
@@ -52,87 +79,167 @@ pub struct Judgement {
     pub reasons: Vec<String>,
     /// What the program ends with.
     pub exit_code: ExitCode,
+    /// What the samples of each scenario say about its probability, where that was asked.
+    pub probabilities: Vec<(String, Finding)>,
 }
 
 /// What is judged.
 #[derive(Clone, Copy, Debug)]
 pub struct Evidence<'a> {
-    /// The arm under test.
+    /// The arm under test, over all scenarios.
     pub tested: &'a ArmCounts,
+    /// The arm under test in each scenario, by name.
+    pub scenarios: &'a [(&'a str, &'a ArmCounts)],
     /// Errors in any arm.
     pub errors: u64,
-    /// Samples whose repetition differed.
-    pub invalid: u64,
+    /// What the validity checks found.
+    pub checks: &'a CheckCounts,
     /// Pairs with the baseline, where there is one.
     pub pairs: Option<&'a Pairs>,
+    /// What the number of samples came from.
+    pub inference: Inference,
 }
 
 impl Gates {
     /// Judges a campaign.
     pub fn judge(&self, evidence: &Evidence<'_>) -> Judgement {
-        let mut reasons = Vec::new();
-        let mut codes = Vec::new();
+        let mut found = Found::default();
         if evidence.errors > 0 {
-            reasons.push(format!("{} ended in an error", samples(evidence.errors)));
-            codes.push(ExitCode::SampleError);
+            found.add(ExitCode::SampleError, format!("{} ended in an error", samples(evidence.errors)));
         }
-        if evidence.invalid > 0 {
-            reasons.push(format!("{} gave another outcome when repeated", samples(evidence.invalid)));
-            codes.push(ExitCode::Invalid);
-        }
+        self.judge_validity(evidence.checks, &mut found);
         if evidence.tested.outcomes == 0 {
-            reasons.push("no sample has an outcome".to_owned());
-            codes.push(ExitCode::Inconclusive);
+            found.add(ExitCode::Inconclusive, "no sample has an outcome".to_owned());
         }
-        self.judge_counts(evidence, &mut reasons, &mut codes);
-        let verdict = match ExitCode::first_of(codes.iter().copied()) {
-            ExitCode::Pass => Verdict::Pass,
-            ExitCode::Fail => Verdict::Fail,
-            ExitCode::Inconclusive => Verdict::Inconclusive,
-            // An error of a sample leaves open what that sample would have ended in.
-            _ if codes.contains(&ExitCode::Fail) => Verdict::Fail,
-            ExitCode::SampleError => Verdict::Inconclusive,
-            _ => Verdict::Invalid,
-        };
-        Judgement { verdict, reasons, exit_code: ExitCode::first_of(codes) }
+        let probabilities = self.judge_probability(evidence, &mut found);
+        self.judge_counts(evidence, &mut found);
+        self.judge_comfort(evidence, &mut found);
+        if (Self { max_flip_rate: MAX_FLIP_RATE, ..*self }) == Self::default() {
+            found.note("no gate was set: nothing was judged but that every sample has an outcome".to_owned());
+        }
+        let exit_code = ExitCode::first_of(found.codes.iter().copied());
+        Judgement { verdict: verdict(exit_code, &found.codes), reasons: found.reasons, exit_code, probabilities }
     }
 
-    fn judge_counts(&self, evidence: &Evidence<'_>, reasons: &mut Vec<String>, codes: &mut Vec<ExitCode>) {
-        let collisions = evidence.tested.collisions;
-        match self.max_collisions {
-            Some(allowed) if collisions > allowed => {
-                reasons.push(format!("E collided in {}, {allowed} allowed", samples(collisions)));
-                codes.push(ExitCode::Fail);
+    fn judge_validity(&self, checks: &CheckCounts, found: &mut Found) {
+        for (check, count) in checks.broken() {
+            found.add(ExitCode::Invalid, format!("{}: {} of {} checked", check.finding(), count, checks.runs));
+        }
+        if checks.flips == 0 {
+            return;
+        }
+        let allowed = allowed_flips(self.max_flip_rate, checks.runs);
+        let sentence = format!(
+            "{} of {} checked verdicts flipped at half the time step, {allowed} allowed ({} of them, rounded up)",
+            checks.flips,
+            checks.runs,
+            percent(self.max_flip_rate)
+        );
+        if checks.flips > allowed { found.add(ExitCode::Invalid, sentence) } else { found.note(sentence) }
+    }
+
+    fn judge_probability(&self, evidence: &Evidence<'_>, found: &mut Found) -> Vec<(String, Finding)> {
+        let Some(gate) = &self.probability else { return Vec::new() };
+        let count = evidence.scenarios.len();
+        let judge = |&(name, counts): &(&str, &ArmCounts)| {
+            let finding = gate.judge(counts, count, evidence.inference);
+            let sentence = format!("{name}: {}", finding.sentence(counts));
+            match finding.answer {
+                Answer::Below => found.note(sentence),
+                Answer::Above => found.add(ExitCode::Fail, sentence),
+                Answer::Open => found.add(ExitCode::Inconclusive, sentence),
             }
-            Some(allowed) => reasons.push(format!("E collided in {}, {allowed} allowed", samples(collisions))),
-            None => {}
+            (name.to_owned(), finding)
+        };
+        evidence.scenarios.iter().map(judge).collect()
+    }
+
+    fn judge_counts(&self, evidence: &Evidence<'_>, found: &mut Found) {
+        let collisions = evidence.tested.collisions;
+        if let Some(allowed) = self.max_collisions {
+            let sentence = format!("E collided in {}, {allowed} allowed", samples(collisions));
+            found.judge(collisions <= allowed, sentence);
         }
         match (self.max_induced, evidence.pairs) {
             (Some(allowed), Some(pairs)) => {
-                reasons.push(format!("{} induced, {allowed} allowed", collisions_of(pairs.induced)));
-                if pairs.induced > allowed {
-                    codes.push(ExitCode::Fail);
-                }
+                let sentence = format!("{} induced, {allowed} allowed", collisions_of(pairs.induced));
+                found.judge(pairs.induced <= allowed, sentence);
             }
             (Some(_), None) => {
-                reasons.push("induced collisions are known only of paired samples".to_owned());
-                codes.push(ExitCode::Inconclusive);
+                let sentence = "induced collisions are known only of paired samples".to_owned();
+                found.add(ExitCode::Inconclusive, sentence);
             }
             (None, _) => {}
         }
-        if let Some(allowed_mps) = self.max_speed_deficit_mps {
-            let most_mps = evidence.tested.max_speed_deficit_mps;
-            reasons.push(format!(
-                "E was up to {most_mps:.1} m/s slower than the vehicle ahead, {allowed_mps} m/s allowed"
-            ));
-            if !(most_mps <= allowed_mps) {
-                codes.push(ExitCode::Fail);
+    }
+
+    fn judge_comfort(&self, evidence: &Evidence<'_>, found: &mut Found) {
+        if let Some(allowed) = self.max_engagement_rate {
+            for (name, counts) in evidence.scenarios {
+                let Some(rate) = counts.engagement_rate() else { continue };
+                let (engaged, outcomes) = (counts.engagements, counts.outcomes);
+                let (rate_percent, allowed_percent) = (percent(rate), percent(allowed));
+                let sentence = format!(
+                    "{name}: the system engaged in {engaged} of {outcomes} samples ({rate_percent}), {allowed_percent} allowed"
+                );
+                found.judge(rate <= allowed, sentence);
             }
         }
-        if *self == Self::default() {
-            reasons.push("no gate was set: nothing was judged but that every sample has an outcome".to_owned());
+        if let Some(allowed_mps) = self.max_speed_deficit_mps {
+            let most_mps = evidence.tested.max_speed_deficit_mps;
+            let sentence =
+                format!("E was up to {most_mps:.1} m/s slower than the vehicle ahead, {allowed_mps} m/s allowed");
+            found.judge(most_mps <= allowed_mps, sentence);
+        }
+        if let Some(allowed_mps3) = self.max_jerk_mps3 {
+            let most_mps3 = evidence.tested.max_jerk_mps3;
+            let sentence = format!("E's jerk reached {most_mps3:.1} m/s³, {allowed_mps3} m/s³ allowed");
+            found.judge(most_mps3 <= allowed_mps3, sentence);
         }
     }
+}
+
+/// Reasons and exit codes as they are found.
+#[derive(Default)]
+struct Found {
+    reasons: Vec<String>,
+    codes: Vec<ExitCode>,
+}
+
+impl Found {
+    fn note(&mut self, reason: String) {
+        self.reasons.push(reason);
+    }
+
+    fn add(&mut self, code: ExitCode, reason: String) {
+        self.codes.push(code);
+        self.reasons.push(reason);
+    }
+
+    /// Notes the reason either way. A comparison with something that is not a number is false, and so fails.
+    fn judge(&mut self, is_met: bool, reason: String) {
+        if is_met { self.note(reason) } else { self.add(ExitCode::Fail, reason) }
+    }
+}
+
+/// The verdict that goes with an exit code, where all of `codes` hold.
+fn verdict(exit_code: ExitCode, codes: &[ExitCode]) -> Verdict {
+    match exit_code {
+        ExitCode::Pass => Verdict::Pass,
+        ExitCode::Fail => Verdict::Fail,
+        ExitCode::Inconclusive => Verdict::Inconclusive,
+        // An error of a sample leaves open what that sample would have ended in.
+        ExitCode::SampleError if codes.contains(&ExitCode::Invalid) => Verdict::Invalid,
+        ExitCode::SampleError if codes.contains(&ExitCode::Fail) => Verdict::Fail,
+        ExitCode::SampleError => Verdict::Inconclusive,
+        _ => Verdict::Invalid,
+    }
+}
+
+/// How many of `checked` verdicts may flip: the share, rounded up to whole ones.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count of samples")]
+fn allowed_flips(max_flip_rate: f64, checked: u64) -> u64 {
+    (max_flip_rate * checked as f64).ceil() as u64
 }
 
 fn samples(count: u64) -> String {
@@ -145,33 +252,104 @@ fn collisions_of(count: u64) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::validity::Invariance;
     use super::*;
 
-    fn judge(gates: Gates, collisions: u64, errors: u64) -> Judgement {
-        let tested = ArmCounts { outcomes: 100, collisions, ..ArmCounts::default() };
-        gates.judge(&Evidence { tested: &tested, errors, invalid: 0, pairs: None })
+    /// Judges 100 samples of one scenario.
+    fn judge(gates: Gates, tested: ArmCounts, errors: u64, checks: &CheckCounts) -> Judgement {
+        let tested = ArmCounts { outcomes: 100, ..tested };
+        let scenarios = [("low", &tested)];
+        let inference = Inference::FixedSamples;
+        gates.judge(&Evidence { tested: &tested, scenarios: &scenarios, errors, checks, pairs: None, inference })
     }
+
+    fn collided(gates: Gates, collisions: u64, errors: u64) -> Judgement {
+        judge(gates, ArmCounts { collisions, ..ArmCounts::default() }, errors, &CheckCounts::default())
+    }
+
+    const THREE: Gates = Gates {
+        max_collisions: Some(3),
+        probability: None,
+        max_induced: None,
+        max_engagement_rate: None,
+        max_speed_deficit_mps: None,
+        max_jerk_mps3: None,
+        max_flip_rate: MAX_FLIP_RATE,
+    };
 
     #[test]
     fn the_gate_counts_samples_with_a_collision() {
-        let gates = Gates { max_collisions: Some(3), max_induced: None, max_speed_deficit_mps: None };
-        assert_eq!(judge(gates, 3, 0).exit_code, ExitCode::Pass);
-        assert_eq!(judge(gates, 4, 0).exit_code, ExitCode::Fail);
+        assert_eq!(collided(THREE, 3, 0).exit_code, ExitCode::Pass);
+        assert_eq!(collided(THREE, 4, 0).exit_code, ExitCode::Fail);
     }
 
     #[test]
     fn an_error_is_graver_than_a_collision_and_never_passes() {
-        let gates = Gates { max_collisions: Some(3), max_induced: None, max_speed_deficit_mps: None };
-        let errors = judge(gates, 0, 1);
+        let errors = collided(THREE, 0, 1);
         assert_eq!((errors.exit_code, errors.verdict), (ExitCode::SampleError, Verdict::Inconclusive));
-        let both = judge(gates, 4, 1);
+        let both = collided(THREE, 4, 1);
         assert_eq!((both.exit_code, both.verdict), (ExitCode::SampleError, Verdict::Fail));
     }
 
     #[test]
     fn a_campaign_without_outcomes_does_not_pass() {
         let tested = ArmCounts::default();
-        let judged = Gates::default().judge(&Evidence { tested: &tested, errors: 0, invalid: 0, pairs: None });
+        let judged = Gates::default().judge(&Evidence {
+            tested: &tested,
+            scenarios: &[],
+            errors: 0,
+            checks: &CheckCounts::default(),
+            pairs: None,
+            inference: Inference::FixedSamples,
+        });
         assert_eq!(judged.exit_code, ExitCode::Inconclusive);
+    }
+
+    #[test]
+    fn the_probability_gate_passes_fails_or_asks_for_more() {
+        let gates = |max| Gates { probability: ProbabilityGate::new(max, 0.95).ok(), ..Gates::default() };
+        assert_eq!(collided(gates(0.03), 0, 0).exit_code, ExitCode::Pass);
+        assert_eq!(collided(gates(0.03), 8, 0).exit_code, ExitCode::Fail);
+        let open = collided(gates(0.01), 0, 0);
+        assert_eq!((open.exit_code, open.verdict), (ExitCode::Inconclusive, Verdict::Inconclusive));
+        assert!(open.reasons[0].contains("199 more samples"), "{:?}", open.reasons);
+        // A count that fails is graver than a bound that is still open.
+        let failed = collided(Gates { max_collisions: Some(0), ..gates(0.05) }, 2, 0);
+        assert_eq!((failed.exit_code, failed.verdict), (ExitCode::Fail, Verdict::Fail));
+    }
+
+    #[test]
+    fn comfort_and_engagements_are_judged_and_what_is_not_a_number_fails() {
+        let gates = Gates { max_jerk_mps3: Some(10.0), max_engagement_rate: Some(0.05), ..Gates::default() };
+        let with = |max_jerk_mps3, engagements| {
+            let tested = ArmCounts { max_jerk_mps3, engagements, ..ArmCounts::default() };
+            judge(gates, tested, 0, &CheckCounts::default()).exit_code
+        };
+        assert_eq!(with(10.0, 5), ExitCode::Pass);
+        assert_eq!(with(10.1, 5), ExitCode::Fail);
+        assert_eq!(with(10.0, 6), ExitCode::Fail);
+        assert_eq!(with(f64::NAN, 0), ExitCode::Fail);
+    }
+
+    #[test]
+    fn flips_are_bounded_and_a_broken_check_is_invalid() {
+        let flipped = |flips| {
+            let checks = CheckCounts { runs: 40, flips, ..CheckCounts::default() };
+            judge(Gates::default(), ArmCounts::default(), 0, &checks)
+        };
+        assert_eq!(flipped(2).exit_code, ExitCode::Pass, "5 % of 40");
+        assert_eq!((flipped(3).exit_code, flipped(3).verdict), (ExitCode::Invalid, Verdict::Invalid));
+        let mut checks = CheckCounts { runs: 40, ..CheckCounts::default() };
+        checks.count(Invariance::ActorOrder);
+        let broken = judge(THREE, ArmCounts { collisions: 9, ..ArmCounts::default() }, 0, &checks);
+        assert_eq!((broken.exit_code, broken.verdict), (ExitCode::Invalid, Verdict::Invalid));
+        assert!(broken.reasons[0].contains("order of the actors"), "{:?}", broken.reasons);
+    }
+
+    #[test]
+    fn no_flip_at_all_can_be_asked_for() {
+        let gates = Gates { max_flip_rate: 0.0, ..Gates::default() };
+        let checks = CheckCounts { runs: 5, flips: 1, ..CheckCounts::default() };
+        assert_eq!(judge(gates, ArmCounts::default(), 0, &checks).exit_code, ExitCode::Invalid);
     }
 }

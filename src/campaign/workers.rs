@@ -195,8 +195,8 @@ impl Crew {
             if let Some((job, since)) = late {
                 let failure = SampleFailure::from(SampleError::Timeout { limit_s: limit.as_secs_f64() });
                 let controller = self.work.arms[job.arm].controller.name().to_owned();
-                let record = ArmRecord { controller, result: Err(failure) };
-                let run = ArmRun { record, wall_s: since.elapsed().as_secs_f64(), repeat_differs: false };
+                let record = ArmRecord { controller, result: Err(failure), checks: None };
+                let run = ArmRun { record, wall_s: since.elapsed().as_secs_f64() };
                 done.push((job.place, Done { sample: job.sample, run }));
                 self.slots[place] = self.hire()?;
             }
@@ -226,7 +226,6 @@ impl Order {
             record: Record {
                 scenario: work.file.config().name.clone(),
                 sample: done.first()?.sample,
-                repeat_differs: done.iter().any(|done| done.run.repeat_differs),
                 arms: done.into_iter().map(|done| done.run.record).collect(),
             },
         })

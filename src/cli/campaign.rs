@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::camera::{Backend, SHIPPED_MODEL};
 use closecall_sensors::inference_backend;
@@ -17,10 +17,13 @@ use super::args::{ControllerArgs, Format, Sensing, SetArgs, arm, controllers};
 use super::gates::GateArgs;
 use super::leave::Over;
 use super::output::{complain, outln};
+use super::plan::PlanArgs;
+use super::stop::{Stop, StopWatch};
 use super::summary::{print_counts, print_verdict};
 use super::{CliError, json};
-use crate::campaign::execution::{Campaign, Turn};
+use crate::campaign::execution::{Campaign, End, Turn};
 use crate::campaign::folder::{Folder, FolderError};
+use crate::campaign::ledger::Inference;
 use crate::campaign::manifest::{MANIFEST_VERSION, Manifest, ManifestModel, ManifestScenario};
 use crate::campaign::partition::Partition;
 use crate::campaign::runner::{Sampling, Work};
@@ -33,39 +36,14 @@ use crate::report::overview::Overview;
 use crate::scenario::ScenarioFile;
 use crate::simulation::Arm;
 
-/// Samples of each scenario where nobody says otherwise.
-const DEFAULT_SAMPLES: u64 = 200;
-
-/// How large a campaign is, by its purpose. Presets are paired: a change is judged by what it changes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Preset {
-    /// For every pull request: minutes.
-    Pr,
-    /// For every night.
-    Nightly,
-}
-
-impl Preset {
-    const fn samples(self) -> u64 {
-        match self {
-            Self::Pr => 1_000,
-            Self::Nightly => 20_000,
-        }
-    }
-}
-
 /// Arguments of `closecall campaign`.
 #[derive(Debug, Args)]
 pub(super) struct CampaignArgs {
     /// Scenario files
     #[arg(required = true)]
     scenarios: Vec<PathBuf>,
-    /// Samples of each scenario; 200 where absent, unless a preset says otherwise
-    #[arg(short = 'n', long = "samples", value_parser = clap::value_parser!(u64).range(1..))]
-    samples: Option<u64>,
-    /// Size for a purpose: `pr` pairs 1,000 samples of each scenario (minutes), `nightly` 20,000
-    #[arg(long, value_enum)]
-    preset: Option<Preset>,
+    #[command(flatten)]
+    plan: PlanArgs,
     /// Seed of the random numbers
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -109,17 +87,13 @@ pub(super) struct CampaignArgs {
 }
 
 impl CampaignArgs {
-    fn samples(&self) -> u64 {
-        self.samples.unwrap_or(self.preset.map_or(DEFAULT_SAMPLES, Preset::samples))
-    }
-
-    /// True where every sample is run without the margin increase system too.
-    fn is_paired(&self) -> bool {
-        self.paired || self.preset.is_some()
+    /// True where a baseline is run beside the controller under test: where it is asked for, or a preset can have it.
+    fn is_paired(&self, tested: &ControllerChoice) -> bool {
+        self.paired || (self.plan.wants_pairs() && *tested != ControllerChoice::Acc)
     }
 
     fn sampling(&self) -> Sampling {
-        Sampling { seed: self.seed, design: self.design, samples: self.samples() }
+        Sampling { seed: self.seed, design: self.design, samples: self.plan.samples() }
     }
 
     fn manifest(&self, campaign: &Campaign, controllers: &[ControllerChoice]) -> Result<Manifest, CliError> {
@@ -137,6 +111,8 @@ impl CampaignArgs {
             partition: self.partition,
             arms: controllers.to_vec(),
             sensors: self.sensors.map(|sensing| sensing.name().to_owned()),
+            checks: self.plan.checks()?,
+            inference: self.plan.inference(),
             models: vec![rear_classifier()?],
             sample_timeout_s: self.sample_timeout_s,
             command: std::env::args().collect(),
@@ -178,13 +154,12 @@ pub(super) fn version() -> String {
 }
 
 pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
-    let controllers = controllers(args.controller.choice()?, args.is_paired())?;
-    if args.gates.max_induced.is_some() && !args.is_paired() {
-        let message = "--max-induced needs --paired: induced collisions are known only of pairs".to_owned();
-        return Err(CliError::Usage { message });
-    }
+    let tested = args.controller.choice()?;
+    let is_paired = args.is_paired(&tested);
+    let controllers = controllers(tested, is_paired)?;
+    let (gates, checks) = (args.gates.gates(is_paired, args.design)?, args.plan.checks()?);
     let arms: Vec<Arm> = controllers.iter().map(|controller| arm(controller, args.sensors)).collect();
-    let work = |file| Arc::new(Work { file, sampling: args.sampling(), arms: arms.clone() });
+    let work = |file| Arc::new(Work { file, sampling: args.sampling(), arms: arms.clone(), checks });
     let works = load(args)?.into_iter().map(work).collect();
     let campaign = Campaign { works, partition: args.partition, workers: args.workers()? };
     let manifest = args.manifest(&campaign, &controllers)?;
@@ -193,7 +168,12 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
         None => None,
     };
     let started = Instant::now();
-    let mut watch = Watch::new(&campaign, &arms);
+    let stop = Stop {
+        certain: gates.probability.filter(|_| args.plan.ends_when_certain()),
+        budget: args.plan.time_budget(),
+        scenarios: campaign.works.len(),
+    };
+    let mut watch = Watch::new(&campaign, &arms, StopWatch::start(stop), args.plan.inference());
     let torn = campaign.run(held.as_ref(), |turn| watch.take(turn))?;
     watch.bar.finish_and_clear();
     if let Some((line, reason)) = torn {
@@ -201,7 +181,6 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
     }
     let wall_s = started.elapsed().as_secs_f64();
     let Watch { summary, overview, .. } = watch;
-    let gates = args.gates.gates();
     let judged = summary.judge(gates);
     let over = Over {
         manifest: &manifest,
@@ -232,12 +211,14 @@ struct Watch {
     summary: Summary,
     overview: Overview,
     egos: Vec<(String, Option<ActorId>)>,
+    stop: StopWatch,
     bar: ProgressBar,
 }
 
 impl Watch {
-    fn new(campaign: &Campaign, arms: &[Arm]) -> Self {
-        let mut summary = Summary::new(arms.iter().map(|arm| arm.controller.name().to_owned()).collect());
+    fn new(campaign: &Campaign, arms: &[Arm], stop: StopWatch, inference: Inference) -> Self {
+        let controllers = arms.iter().map(|arm| arm.controller.name().to_owned()).collect();
+        let mut summary = Summary::new(controllers).with_inference(inference);
         let egos: Vec<_> =
             campaign.works.iter().map(|work| (work.file.config().name.clone(), work.file.ego_id().cloned())).collect();
         if let Some((first, _)) = egos.first() {
@@ -250,10 +231,10 @@ impl Watch {
             }
         }
         let overview = Overview::new(campaign.works.iter().map(|work| &work.file), &summary.controllers);
-        Self { summary, overview, egos, bar: progress(campaign.len()) }
+        Self { summary, overview, egos, stop, bar: progress(campaign.len()) }
     }
 
-    fn take(&mut self, turn: Turn<'_>) -> ControlFlow<()> {
+    fn take(&mut self, turn: Turn<'_>) -> ControlFlow<End> {
         while let Some((next, _)) = self.egos.get(self.summary.scenarios.len())
             && self.summary.scenarios.len() <= turn.work
         {
@@ -268,7 +249,8 @@ impl Watch {
             // What is found in the journal says nothing about how long the rest will take.
             self.bar.reset_eta();
         }
-        ControlFlow::Continue(())
+        let tested = self.summary.scenarios.last().and_then(|(_, counts)| counts.arms.last());
+        tested.map_or(ControlFlow::Continue(()), |tested| self.stop.look(turn.work, tested))
     }
 }
 

@@ -3,7 +3,10 @@
 use closecall_traffic::{Absent, Measured, Value as ParameterValue};
 use serde_json::{Map, Value, json};
 
+use crate::campaign::harm;
+use crate::campaign::ledger::{Inference, Pairs};
 use crate::campaign::summary::{Counts, Summary};
+use crate::campaign::validity::CheckCounts;
 use crate::campaign::verdict::Judgement;
 use crate::outcome::{Collision, Margins, MisSummary, MomentAt, Outcome};
 
@@ -95,6 +98,7 @@ pub(super) fn campaign(summary: &Summary, judged: &Judgement, wall_s: Option<f64
     let mut object = counts(summary, &total);
     object.insert("verdict".to_owned(), json!(judged.verdict));
     object.insert("reasons".to_owned(), json!(judged.reasons));
+    object.insert("probabilities".to_owned(), probabilities(judged));
     object.insert("wall_s".to_owned(), json!(wall_s));
     let scenarios: Map<String, Value> = summary
         .scenarios
@@ -116,16 +120,50 @@ fn counts(summary: &Summary, counts: &Counts) -> Map<String, Value> {
         let mut controller = Map::new();
         controller.insert("collisions".to_owned(), json!(arm.collisions));
         controller.insert("collision_rate".to_owned(), json!(arm.collision_rate()));
-        controller.insert("interval_95".to_owned(), json!(arm.interval_95()));
+        controller.insert("interval_95".to_owned(), json!(arm.interval_95(summary.inference)));
+        controller.insert("interval_method".to_owned(), json!(summary.inference.method()));
         controller.insert("max_speed_deficit_mps".to_owned(), json!(arm.max_speed_deficit_mps));
         controller.insert("errors".to_owned(), json!(arm.errors));
         controller.insert("engagements".to_owned(), json!(arm.engagements));
+        controller.insert("engagement_rate".to_owned(), json!(arm.engagement_rate()));
         controller.insert("goals_in_reach".to_owned(), json!(arm.goals_in_reach));
+        controller.insert("max_jerk_mps3".to_owned(), json!(arm.max_jerk_mps3));
+        controller.insert("max_delta_v_mps".to_owned(), json!(arm.max_delta_v_mps));
+        controller.insert("harm".to_owned(), json!(arm.harm));
         controllers.insert(name.clone(), Value::Object(controller));
     }
     object.insert("controllers".to_owned(), Value::Object(controllers));
     if summary.is_paired() {
-        object.insert("paired".to_owned(), json!(counts.pairs));
+        object.insert("paired".to_owned(), paired(&counts.pairs, summary.inference));
+    }
+    object.insert("checks".to_owned(), checks(&counts.checks));
+    object
+}
+
+fn paired(pairs: &Pairs, inference: Inference) -> Value {
+    let mut object = json!({
+        "prevented": pairs.prevented,
+        "induced": pairs.induced,
+        "both": pairs.both,
+        "neither": pairs.neither,
+        "prevented_harm": pairs.prevented_harm,
+        "induced_harm": pairs.induced_harm,
+        "harm_weight": harm::WEIGHT,
+        "mcnemar_p": pairs.mcnemar_p(inference),
+    });
+    if inference == Inference::Sequential {
+        object["mcnemar_p_absent"] = json!("the number of samples was not fixed in advance");
     }
     object
+}
+
+fn checks(counts: &CheckCounts) -> Value {
+    let broken: Map<String, Value> =
+        counts.broken().map(|(check, count)| (check.name().to_owned(), json!(count))).collect();
+    json!({ "runs": counts.runs, "flips": counts.flips, "flip_rate": counts.flip_rate(), "broken": broken })
+}
+
+/// What the samples say about the probability of a collision, scenario by scenario.
+fn probabilities(judged: &Judgement) -> Value {
+    Value::Object(judged.probabilities.iter().map(|(name, finding)| (name.clone(), json!(finding))).collect())
 }

@@ -40,9 +40,10 @@ pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
     let samples: Vec<(String, u64)> =
         works.iter().map(|work| (work.file.config().name.clone(), work.count())).collect();
     parts.check(&samples)?;
+    let is_paired = works.iter().all(|work| work.arms.len() > 1);
+    let gates = args.gates.gates(is_paired, parts.manifest().sampling.design)?;
     let held = parts.merge(&samples, &args.out, std::env::args().collect())?;
     let (summary, overview) = past::findings(&held.folder, &works)?;
-    let gates = args.gates.gates();
     let judged = summary.judge(gates);
     let manifest = held.folder.manifest()?;
     let over =

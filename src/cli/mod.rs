@@ -12,6 +12,7 @@ mod leave;
 mod merge;
 mod output;
 mod past;
+mod plan;
 mod plot;
 mod record;
 mod recording;
@@ -19,6 +20,7 @@ mod recordings;
 mod render;
 mod replay;
 mod run;
+mod stop;
 mod summary;
 mod watch;
 

@@ -18,7 +18,7 @@ pub(super) fn works(folder: &Path, manifest: &Manifest) -> Result<Vec<Arc<Work>>
     let arms = arms(manifest)?;
     let work = |scenario| {
         let file = scenario_file(folder, scenario)?;
-        Ok(Arc::new(Work { file, sampling: manifest.sampling, arms: arms.clone() }))
+        Ok(Arc::new(Work { file, sampling: manifest.sampling, arms: arms.clone(), checks: manifest.checks }))
     };
     manifest.scenarios.iter().map(work).collect()
 }
@@ -46,7 +46,7 @@ pub(super) fn findings(folder: &Folder, works: &[Arc<Work>]) -> Result<(Summary,
     let name = |arm: &Arm| arm.controller.name().to_owned();
     let names: Vec<String> = works.first().map_or_else(Vec::new, |work| work.arms.iter().map(name).collect());
     let mut overview = Overview::new(works.iter().map(|work| &work.file), &names);
-    let mut summary = Summary::new(names);
+    let mut summary = Summary::new(names).with_inference(folder.manifest()?.inference);
     let mut records = folder.records()?.peekable();
     for work in works {
         let name = &work.file.config().name;

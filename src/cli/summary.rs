@@ -1,6 +1,9 @@
 //! What a campaign comes to, for people.
 
 use super::output::{out, outln};
+use crate::campaign::harm;
+use crate::campaign::ledger::{ArmCounts, Inference};
+use crate::campaign::probability::percent;
 use crate::campaign::summary::{Counts, Summary};
 use crate::campaign::verdict::Judgement;
 
@@ -13,6 +16,9 @@ pub(super) fn print_counts(summary: &Summary) {
     if summary.scenarios.len() > 1 {
         outln!("all scenarios");
         print_scenario(summary, &summary.total());
+    }
+    if summary.inference == Inference::Sequential {
+        outln!("Intervals are confidence sequences: they hold however the number of samples came about.");
     }
     outln!("Rates are conditional on the sampled scenario: they are not the risk of a road.");
 }
@@ -27,26 +33,44 @@ pub(super) fn print_verdict(judged: &Judgement) {
 
 fn print_scenario(summary: &Summary, counts: &Counts) {
     for (name, arm) in summary.controllers.iter().zip(&counts.arms) {
-        let [low, high] = arm.interval_95().map(|bound| 100.0 * bound);
-        let rate = arm.collision_rate().map_or("-".to_owned(), |rate| format!("{:.1} %", 100.0 * rate));
-        out!("  {name:<5} {:>6} collisions  {rate:>7}  (95 %: {low:.1} to {high:.1} %)", arm.collisions);
-        if arm.engagements > 0 {
-            out!("  {} engaged, goal in reach in {}", arm.engagements, arm.goals_in_reach);
-        }
-        out!("  up to {:.1} m/s slower than ahead", arm.max_speed_deficit_mps);
-        if arm.errors > 0 {
-            out!("  {} ERRORS", arm.errors);
-        }
-        outln!();
+        print_arm(name, arm, summary.inference);
     }
     if summary.is_paired() {
         let pairs = counts.pairs;
-        outln!(
-            "  pairs: {} prevented, {} induced, {} both, {} neither",
-            pairs.prevented,
-            pairs.induced,
-            pairs.both,
-            pairs.neither,
-        );
+        let [prevented, induced] = [pairs.prevented, pairs.induced];
+        out!("  pairs: {prevented} prevented, {induced} induced, {} both, {} neither", pairs.both, pairs.neither);
+        if let Some(p) = pairs.mcnemar_p(summary.inference) {
+            out!("  (exact McNemar p {p:.2e})");
+        }
+        outln!();
+        if counts.arms.iter().any(|arm| arm.harm > 0.0) {
+            outln!(
+                "  harm: {:.3} prevented, {:.3} induced ({})",
+                pairs.prevented_harm,
+                pairs.induced_harm,
+                harm::WEIGHT
+            );
+        }
     }
+    let checks = &counts.checks;
+    if let Some(rate) = checks.flip_rate() {
+        outln!("  checked: {} runs, {} flipped at half the time step ({})", checks.runs, checks.flips, percent(rate));
+    }
+}
+
+fn print_arm(name: &str, arm: &ArmCounts, inference: Inference) {
+    let [low, high] = arm.interval_95(inference).map(|bound| 100.0 * bound);
+    let rate = arm.collision_rate().map_or("-".to_owned(), |rate| format!("{:.1} %", 100.0 * rate));
+    out!("  {name:<5} {:>6} collisions  {rate:>7}  (95 %: {low:.1} to {high:.1} %)", arm.collisions);
+    if arm.collisions > 0 {
+        out!("  delta-v up to {:.1} m/s", arm.max_delta_v_mps);
+    }
+    if arm.engagements > 0 {
+        out!("  {} engaged, goal in reach in {}", arm.engagements, arm.goals_in_reach);
+    }
+    out!("  up to {:.1} m/s slower than ahead", arm.max_speed_deficit_mps);
+    if arm.errors > 0 {
+        out!("  {} ERRORS", arm.errors);
+    }
+    outln!();
 }

@@ -48,7 +48,7 @@ fn counts(summary: &Summary) -> String {
     let total = (summary.scenarios.len() > 1).then(|| ("all".to_owned(), summary.total()));
     for (name, counts) in summary.scenarios.iter().chain(&total) {
         for (controller, arm) in summary.controllers.iter().zip(&counts.arms) {
-            let [low, high] = arm.interval_95().map(|bound| 100.0 * bound);
+            let [low, high] = arm.interval_95(summary.inference).map(|bound| 100.0 * bound);
             let rate = arm.collision_rate().map_or_else(|| "-".to_owned(), |rate| format!("{:.2} %", 100.0 * rate));
             text.push_str(&format!(
                 "| {} | {} | {} | {} | {rate} | {low:.2} to {high:.2} % | {} |\n",

@@ -14,6 +14,7 @@ mod events;
 mod file;
 mod locate;
 mod placement;
+mod variation;
 
 use closecall_controllers::{CheckedDriver, HumanDriver};
 use closecall_sensors::Sensors;
@@ -21,6 +22,7 @@ use closecall_traffic::{
     ActorId, Check, ConfigError, Environment, Parameters, Problem, Range, Road, Time, Vehicle, VehicleState,
 };
 
+use crate::simulation::PHYSICS_STEP;
 pub use config::{AbsoluteStartConfig, ActorConfig, RelativeStartConfig, SCHEMA_VERSION, ScenarioConfig, StartConfig};
 pub use edit::Setting;
 pub(crate) use events::{Brake, Event, Trigger};
@@ -62,6 +64,8 @@ pub struct Scenario {
     pub sensors: Sensors,
     /// The sampled values that it was made with.
     pub parameters: Parameters,
+    /// Step of vehicles and human drivers; a control step is a whole number of them.
+    pub(crate) physics_step: Time,
 }
 
 impl Scenario {
@@ -89,6 +93,7 @@ impl Check for ScenarioConfig {
             actors,
             sensors: self.sensors.check(parameters).map_err(|error| error.within("sensors"))?,
             parameters: parameters.clone(),
+            physics_step: PHYSICS_STEP,
         })
     }
 }

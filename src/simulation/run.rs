@@ -13,7 +13,7 @@ use super::margins::MarginMeter;
 use super::mis_log::{EgoNow, MisLog};
 use super::moments::{Moments, NEAR_CLOSING_MPS, NEAR_GAP_M};
 use super::phase::{AFTER_COLLISION, Encounter};
-use super::{Arm, CONTROL_STEP, Happening, MarginsNow, Observer, PHYSICS_STEP, RunKey, SampleError, StepView};
+use super::{Arm, CONTROL_STEP, Happening, MarginsNow, Observer, RunKey, SampleError, StepView};
 use crate::outcome::{EndReason, Moment, Outcome, Phase};
 use crate::scenario::Scenario;
 use crate::world::{Action, Placed, World};
@@ -59,7 +59,7 @@ impl<'a> Run<'a> {
             .iter()
             .map(|actor| Placed { id: actor.id.clone(), vehicle: actor.vehicle, state: actor.start })
             .collect();
-        let world = World::new(scenario.road, scenario.environment.friction, PHYSICS_STEP, placed);
+        let world = World::new(scenario.road, scenario.environment.friction, scenario.physics_step, placed);
         let CheckedDriver::Ego(settings) = &scenario.actors[scenario.ego].driver else {
             unreachable!("a checked scenario has its ego stack at `ego`")
         };
@@ -77,12 +77,13 @@ impl<'a> Run<'a> {
                 seed: key.seed,
                 sample: key.sample,
                 ego: scenario.ego_id().clone(),
+                actors: scenario.actors.iter().map(|actor| actor.id.clone()).collect(),
             })?,
             controller: arm.controller.build(settings),
             humans: humans(scenario, key),
             events: Events::new(scenario),
             encounter: Encounter::default(),
-            meter: MarginMeter::new(PHYSICS_STEP.s()),
+            meter: MarginMeter::new(scenario.physics_step.s()),
             mis: MisLog::default(),
             moments: Moments::default(),
             critical_gap_m: settings.mis().unwrap_or(&MisSettings::PAPER).critical_gap_m,
@@ -213,10 +214,10 @@ impl<'a> Run<'a> {
                 pitch_rad: self.world.pitch_rad(actor),
             };
             self.vehicles.push(vehicle);
-            if actor != self.scenario.ego {
-                self.others.push(vehicle);
-            }
         }
+        // The sensors meet the others in the order of their names: what they draw does not depend on the list's order.
+        let others = self.world.by_name().iter().filter(|actor| **actor != self.scenario.ego);
+        self.others.extend(others.map(|&actor| self.vehicles[actor]));
     }
 
     /// The width of a vehicle, and that of the lanes [m].

@@ -4,7 +4,7 @@
 //! that none of them is a hit, which is the least that can be needed, and that they are hits at the rate observed.
 
 /// Numbers of samples above this are not looked for.
-pub const MOST_SAMPLES: u64 = 1_000_000_000;
+pub const MOST_SAMPLES: u64 = 100_000_000;
 
 /// The smallest number of samples, `hits` of them hits, with which `passes`: which has to go from false to true once as
 /// the samples grow. Nothing where that is more than [`MOST_SAMPLES`].
@@ -21,9 +21,8 @@ pub fn samples_at_rate(hits: u64, samples: u64, passes: impl Fn(u64, u64) -> boo
     }
     // With j hits at that rate there are at most j·n/k samples, and more than (j − 1)·n/k.
     let with = |total_hits: u64| u128::from(total_hits) * u128::from(samples) / u128::from(hits);
-    let enough = |total_hits: u64| {
-        least_samples(total_hits, &passes).is_some_and(|least| u128::from(least) <= with(total_hits))
-    };
+    let enough =
+        |total_hits: u64| least_samples(total_hits, &passes).is_some_and(|least| u128::from(least) <= with(total_hits));
     let most_hits = u64::try_from(u128::from(MOST_SAMPLES) * u128::from(hits) / u128::from(samples)).ok()?;
     let total_hits = first(hits, most_hits.max(hits), enough)?;
     let before = u64::try_from(with(total_hits - 1)).ok()?;

@@ -8,7 +8,7 @@ use crate::outcome::ClosedBy;
 /// First touch of two vehicles within one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Touch {
-    /// The two, by their places in the list of actors.
+    /// The two, by their places in the list of actors, in the order of their names.
     pub(super) pair: [usize; 2],
     /// The share of the step that had passed, 0 to 1.
     pub(super) fraction: f64,
@@ -16,11 +16,17 @@ pub(super) struct Touch {
     pub(super) struck_side: [BoxSide; 2],
 }
 
-/// All pairs that touch within a step from `before` to `after` and are not among `known`, in order of time.
-pub(super) fn find(before: &[OrientedBox], after: &[OrientedBox], known: &[[usize; 2]], found: &mut Vec<Touch>) {
+/// All pairs that touch within a step between the two lists of boxes and are not among `known`, in order of time, and of
+/// `by_name` where they touch at once.
+pub(super) fn find(
+    [before, after]: [&[OrientedBox]; 2],
+    by_name: &[usize],
+    known: &[[usize; 2]],
+    found: &mut Vec<Touch>,
+) {
     found.clear();
-    for first in 0..before.len() {
-        for second in first + 1..before.len() {
+    for (place, &first) in by_name.iter().enumerate() {
+        for &second in &by_name[place + 1..] {
             if known.contains(&[first, second]) {
                 continue;
             }
@@ -31,7 +37,8 @@ pub(super) fn find(before: &[OrientedBox], after: &[OrientedBox], known: &[[usiz
             }
         }
     }
-    found.sort_by(|one, other| one.fraction.total_cmp(&other.fraction).then(one.pair.cmp(&other.pair)));
+    // Stable: what touches at once stays in the order of the names.
+    found.sort_by(|one, other| one.fraction.total_cmp(&other.fraction));
 }
 
 /// The outward normal of a box's side, in the plane.

@@ -72,6 +72,9 @@ pub(crate) struct World {
     step: Time,
     time: Time,
     actors: Vec<Actor>,
+    /// The places of the actors in the order of their names: what is done to pairs is done in this order, so that the
+    /// order of the list does not matter.
+    by_name: Vec<usize>,
     shapes: Vec<OrientedBox>,
     shapes_before: Vec<OrientedBox>,
     touches: Vec<Touch>,
@@ -91,7 +94,10 @@ impl World {
                 Actor { id, vehicle, body }
             })
             .collect();
+        let mut by_name: Vec<usize> = (0..actors.len()).collect();
+        by_name.sort_by(|&one, &other| actors[one].id.cmp(&actors[other].id));
         let mut world = Self {
+            by_name,
             road,
             friction,
             step,
@@ -117,6 +123,11 @@ impl World {
     /// Number of vehicles.
     pub(crate) fn len(&self) -> usize {
         self.actors.len()
+    }
+
+    /// The places of the vehicles in the order of their names.
+    pub(crate) fn by_name(&self) -> &[usize] {
+        &self.by_name
     }
 
     /// What a vehicle is.
@@ -213,7 +224,7 @@ impl World {
     /// Finds new touches within the step just taken, records them, and hands the vehicles to the solver.
     fn collide(&mut self, phase: Phase) {
         let mut touches = std::mem::take(&mut self.touches);
-        contact::find(&self.shapes_before, &self.shapes, &self.touched_pairs, &mut touches);
+        contact::find([&self.shapes_before, &self.shapes], &self.by_name, &self.touched_pairs, &mut touches);
         for touch in &touches {
             self.record(touch, phase);
         }

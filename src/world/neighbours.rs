@@ -47,7 +47,10 @@ pub(super) fn around(world: &World, actor: usize, road: &Road) -> Neighbours {
 }
 
 fn keep_nearest(slot: &mut Option<Neighbour>, candidate: Neighbour) {
-    if slot.is_none_or(|known| candidate.gap_m < known.gap_m) {
+    // No two vehicles at the same gap have the same lateral position, unless they overlap: the order of the list decides
+    // nothing.
+    let order = |neighbour: &Neighbour| (neighbour.gap_m, neighbour.lateral_offset_m);
+    if slot.is_none_or(|known| order(&candidate) < order(&known)) {
         *slot = Some(candidate);
     }
 }
@@ -101,7 +104,7 @@ impl Seen {
 
     fn enter(&self, lane: &mut LaneNeighbours) {
         if self.neighbour.gap_m < 0.0 {
-            lane.alongside = Some(self.neighbour);
+            keep_nearest(&mut lane.alongside, self.neighbour);
         } else if self.ahead_m > 0.0 {
             keep_nearest(&mut lane.lead, self.neighbour);
         } else {

@@ -8,12 +8,14 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use closecall::campaign::execution::Campaign;
+use closecall::campaign::execution::{Campaign, End};
 use closecall::campaign::folder::Folder;
+use closecall::campaign::ledger::Inference;
 use closecall::campaign::manifest::{MANIFEST_VERSION, Manifest, ManifestScenario};
 use closecall::campaign::record::{Record, SampleFailure};
 use closecall::campaign::runner::{Sampling, Work};
 use closecall::campaign::summary::Summary;
+use closecall::campaign::validity::CheckPlan;
 use closecall::campaign::verdict::{Gates, Verdict};
 use closecall::campaign::workers::Workers;
 use closecall::controller::{BuiltIn, ControllerChoice};
@@ -92,7 +94,11 @@ fn campaign(fault: Option<Fault>, jobs: usize) -> Campaign {
     let arms = vec![arm(BuiltIn::Acc.factory()), arm(Arc::new(Faulty { fault }))];
     let sampling = Sampling { seed: SEED, design: Design::Random, samples: SAMPLES };
     let workers = Workers { jobs: NonZeroUsize::new(jobs).unwrap(), sample_timeout: TIMEOUT };
-    Campaign { works: vec![Arc::new(Work { file, sampling, arms })], partition: None, workers }
+    Campaign {
+        works: vec![Arc::new(Work { file, sampling, arms, checks: CheckPlan::default() })],
+        partition: None,
+        workers,
+    }
 }
 
 fn manifest(campaign: &Campaign) -> Manifest {
@@ -110,6 +116,8 @@ fn manifest(campaign: &Campaign) -> Manifest {
         partition: None,
         arms: vec![ControllerChoice::Acc, ControllerChoice::Mis],
         sensors: None,
+        checks: CheckPlan::default(),
+        inference: Inference::default(),
         models: Vec::new(),
         sample_timeout_s: TIMEOUT.as_secs_f64(),
         command: Vec::new(),
@@ -174,7 +182,7 @@ fn run_part(campaign: &Campaign, path: &Path, samples: usize) {
     let mut left = samples;
     let taken = campaign.run(Some(&held), |turn| {
         left = if turn.is_new { left - 1 } else { left };
-        if left == 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        if left == 0 { ControlFlow::Break(End::Campaign) } else { ControlFlow::Continue(()) }
     });
     taken.unwrap();
 }

@@ -6,8 +6,10 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use closecall::campaign::execution::Campaign;
+use closecall::campaign::ledger::Inference;
 use closecall::campaign::runner::{Sampling, Work};
 use closecall::campaign::summary::{Counts, Summary};
+use closecall::campaign::validity::CheckPlan;
 use closecall::campaign::verdict::{Evidence, Gates};
 use closecall::campaign::workers::Workers;
 use closecall::controller::BuiltIn;
@@ -92,7 +94,7 @@ fn counts(name: &str, tested: Arc<dyn ControllerFactory>) -> Counts {
     let arm = |controller| Arm { controller, sensors: Some(SensorMode::Object) };
     let arms = vec![arm(BuiltIn::Acc.factory()), arm(tested)];
     let workers = Workers { jobs: NonZeroUsize::MIN.saturating_add(1), sample_timeout: Duration::from_mins(5) };
-    let work = Arc::new(Work { file, sampling, arms });
+    let work = Arc::new(Work { file, sampling, arms, checks: CheckPlan::default() });
     let mut summary = Summary::new(vec!["acc".to_owned(), "tested".to_owned()]);
     summary.begin(name);
     let ego = work.file.ego_id().unwrap();
@@ -133,14 +135,16 @@ const MAX_SPEED_DEFICIT_MPS: f64 = 15.0;
 fn passes(counts: &Counts) -> bool {
     let gates = Gates {
         max_collisions: Some(counts.arms[0].collisions / 2),
-        max_induced: None,
         max_speed_deficit_mps: Some(MAX_SPEED_DEFICIT_MPS),
+        ..Gates::default()
     };
     let evidence = Evidence {
         tested: &counts.arms[1],
+        scenarios: &[],
         errors: counts.errors(),
-        invalid: counts.invalid,
+        checks: &counts.checks,
         pairs: Some(&counts.pairs),
+        inference: Inference::FixedSamples,
     };
     gates.judge(&evidence).exit_code == ExitCode::Pass
 }

@@ -19,4 +19,6 @@ mod readme;
 mod recordings;
 mod reports;
 mod rerun_files;
+mod statistics;
 mod support;
+mod validity;

@@ -137,6 +137,16 @@ impl Road {
         Self { curvature_per_m: curvature_per_m.clamp(-0.0025, 0.0025), ..self }
     }
 
+    /// The mirror image of a straight road: one overtakes on the other side, and lane 1 is what was the last. Nothing on
+    /// a bend: positions along it are counted on its left edge, which the mirror image has on its right.
+    pub fn mirrored(self) -> Option<Self> {
+        let overtaking_side = match self.overtaking_side {
+            Side::Left => Side::Right,
+            Side::Right => Side::Left,
+        };
+        (self.curvature_per_m == 0.0).then_some(Self { overtaking_side, ..self })
+    }
+
     /// Number of lanes.
     pub fn lanes(&self) -> u8 {
         self.lanes

@@ -7,7 +7,7 @@
 
 use closecall_traffic::VehicleClass;
 
-use super::hash::{mix_at, unit};
+use super::hash::{mix, mix_at, unit};
 use super::mesh::{Vec3, dot};
 use crate::{Scene, SceneVehicle};
 
@@ -54,6 +54,17 @@ impl Cloud {
     }
 }
 
+/// Edge of the cells of the road that spray is keyed by [m]: no two vehicles have their centres in one.
+const CELL_M: f64 = 0.1;
+
+/// The cell that a vehicle's centre is in. Keyed by it and not by its place in a list, spray does not change with the
+/// order of the vehicles.
+#[expect(clippy::cast_possible_truncation, reason = "a float cast saturates, far beyond the ends of any road")]
+fn cell(vehicle: &SceneVehicle) -> u64 {
+    let [along, across] = [vehicle.state.s_m, vehicle.state.d_m].map(|place_m| (place_m / CELL_M).round() as i32);
+    (u64::from(along.cast_unsigned()) << 32) | u64::from(across.cast_unsigned())
+}
+
 /// The clouds behind one vehicle, given its place [m] and its heading's cosine and sine in the ground frame.
 pub(crate) fn behind(
     vehicle: &SceneVehicle,
@@ -77,11 +88,11 @@ pub(crate) fn behind(
     let size = vehicle.vehicle.dimensions;
     let half_track = (0.40 * size.width_m) as f32;
     let mut clouds = Vec::new();
+    let key = mix(key ^ cell(vehicle));
     for axle_m in [0.3 * size.length_m as f32, -0.35 * size.length_m as f32] {
         for side in [-1_i8, 1] {
             for place in 0..CLOUDS {
-                let bits =
-                    mix_at(key, vehicle.actor as i32 * 64 + place, i32::from(side) + if axle_m > 0.0 { 10 } else { 0 });
+                let bits = mix_at(key, place, i32::from(side) + if axle_m > 0.0 { 10 } else { 0 });
                 let back = axle_m - 0.6 - CLOUD_EVERY_M * (place as f32 + 0.6 * unit(bits));
                 let grown = 0.35 + 0.13 * place as f32;
                 let radius_m = large * grown * (0.8 + 0.5 * unit(bits << 12));

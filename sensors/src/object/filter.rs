@@ -128,7 +128,7 @@ mod tests {
         };
         let mut sum = 0.0;
         for run in 0..runs {
-            let key = NoiseKey { seed: 7, sample: run, ego: ActorId::new("ego").unwrap() };
+            let key = NoiseKey { seed: 7, sample: run, ego: ActorId::new("ego").unwrap(), actors: [].into() };
             let mut world = key.stream("world");
             let mut normal = || world.sample::<f64, _>(StandardNormal);
             let mut noise = TargetNoise::new(&key, "test", 0, &model);

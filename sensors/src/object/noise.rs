@@ -7,7 +7,9 @@
 //! Every step draws the same numbers, whether the vehicle is seen or not. So two runs that differ only in what E does
 //! (with and without MIS) meet the same errors at the same times.
 
-use closecall_traffic::{ActorId, Stream, stream};
+use std::sync::Arc;
+
+use closecall_traffic::{ActorId, Side, Stream, stream};
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
@@ -22,12 +24,23 @@ pub struct NoiseKey {
     pub sample: u64,
     /// The ego vehicle.
     pub ego: ActorId,
+    /// The scenario's actors, in the order of its list: the errors about each are keyed by its name, so that neither the
+    /// order nor a further actor changes them. An actor beyond the list is keyed by its number.
+    pub actors: Arc<[ActorId]>,
 }
 
 impl NoiseKey {
     /// The stream of one channel, such as `front-radar`.
     pub fn stream(&self, channel: &str) -> Stream {
         stream(self.seed, self.sample, &self.ego, channel)
+    }
+
+    /// The stream of what one channel has to do with one actor.
+    fn stream_about(&self, channel: &str, actor: usize) -> Stream {
+        match self.actors.get(actor) {
+            Some(name) => self.stream(&format!("{channel}/{name}")),
+            None => self.stream(&format!("{channel}/{actor}")),
+        }
     }
 }
 
@@ -49,10 +62,22 @@ pub(super) struct ScanErrors {
     pub(super) is_lost: bool,
 }
 
+impl ScanErrors {
+    /// The same errors with the lateral one drawn towards the side on which one overtakes: where one drives on the left,
+    /// the sensors err as they do where one drives on the right, mirrored.
+    pub(super) fn towards(self, overtaking_side: Side) -> Self {
+        let [along_m, across_m] = self.position_m;
+        match overtaking_side {
+            Side::Left => self,
+            Side::Right => Self { position_m: [along_m, -across_m], ..self },
+        }
+    }
+}
+
 impl TargetNoise {
     /// The errors about the vehicle that is number `actor`, in the middle of their stationary course.
     pub(super) fn new(key: &NoiseKey, channel: &str, actor: usize, model: &ObjectSensorModel) -> Self {
-        let mut rng = key.stream(&format!("{channel}/{actor}"));
+        let mut rng = key.stream_about(channel, actor);
         let drift_m = [(); 2].map(|()| model.drift_sd_m * normal(&mut rng));
         Self { rng, drift_m }
     }

@@ -124,6 +124,7 @@ impl ObjectSensor {
             let place = self.place_of(other.actor);
             let errors = self.targets[place].noise.next(&self.model);
             let in_view = self.visibility.sees(&field, other, ego_m);
+            let errors = errors.towards(view.scene.road.overtaking_side());
             self.follow(place, other, (in_view, errors), view.scene.ego.state.speed_mps, list);
             self.report(place, other, view, list);
         }

@@ -10,7 +10,7 @@ const OWN_LANE_M: f64 = -5.625;
 const PERIOD_S: f64 = 0.04;
 
 fn key(sample: u64) -> NoiseKey {
-    NoiseKey { seed: 1, sample, ego: ActorId::new("ego").unwrap() }
+    NoiseKey { seed: 1, sample, ego: ActorId::new("ego").unwrap(), actors: [].into() }
 }
 
 fn perception(sample: u64) -> ObjectPerception {

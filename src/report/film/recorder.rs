@@ -56,7 +56,8 @@ impl FilmRecorder {
             acceleration_limits: limits(scenario, arm),
             camera: (sees && level == Level::Full).then(|| {
                 let ego = scenario.ego_id().clone();
-                (*sensors.camera(), NoiseKey { seed: key.seed, sample: key.sample, ego })
+                let actors = scenario.actors.iter().map(|actor| actor.id.clone()).collect();
+                (*sensors.camera(), NoiseKey { seed: key.seed, sample: key.sample, ego, actors })
             }),
             outcome: None,
         };

@@ -13,7 +13,7 @@ pub(super) fn write(html: &mut Html, findings: &Findings<'_>) {
     }
     let arms = || rows.iter().flat_map(|(_, counts)| &counts.arms);
     // One scale for all bars, so that they can be held against each other.
-    let most = arms().map(|arm| arm.interval_95()[1]).fold(0.0, f64::max);
+    let most = arms().map(|arm| arm.interval_95(summary.inference)[1]).fold(0.0, f64::max);
     html.table(&[
         "scenario",
         "controller",
@@ -29,7 +29,7 @@ pub(super) fn write(html: &mut Html, findings: &Findings<'_>) {
     ]);
     for (name, counts) in &rows {
         for (place, (controller, arm)) in summary.controllers.iter().zip(&counts.arms).enumerate() {
-            let [low, high] = arm.interval_95();
+            let [low, high] = arm.interval_95(summary.inference);
             let is_tested = place + 1 == counts.arms.len();
             let rate = arm.collision_rate();
             html.row(

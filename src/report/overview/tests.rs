@@ -33,13 +33,12 @@ fn record(sample: u64, closing_mps: f64, class: &str, collided: [bool; 2]) -> Re
         let mut outcome = if collided { hit.clone() } else { miss.clone() };
         (outcome.sample, outcome.parameters) = (sample, parameters.clone());
         outcome.controller.clone_from(&controller);
-        ArmRecord { controller, result: Ok(outcome) }
+        ArmRecord { controller, result: Ok(outcome), checks: None }
     };
     Record {
         scenario: "low-thw-overtake".to_owned(),
         sample,
         arms: arms().into_iter().zip(collided).map(arm).collect(),
-        repeat_differs: false,
     }
 }
 

@@ -1,0 +1,106 @@
+//! How often the campaign's statistics are right, on a scenario whose probability of a collision is known.
+//!
+//! ```sh
+//! cargo run --release --example validate_statistics -- 1000
+//! ```
+//!
+//! Runs as many campaigns as the argument says (1,000 where there is none), each with a seed of its own, on
+//! `tests/fixtures/known-probability.toml`, whose probability is 0.05 by construction. It ends with 1 where the exact
+//! intervals at 95 % cover the truth in less than 93.5 % of them, or where the sequential mode, looking after every
+//! sample, is ever wrong in more than 5 %: with a gate right at the truth, where both answers are hardest to tell from
+//! chance.
+
+use std::num::NonZeroUsize;
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::Duration;
+
+use closecall::campaign::execution::{Campaign, CampaignError, End};
+use closecall::campaign::ledger::{ArmCounts, Inference};
+use closecall::campaign::probability::{Answer, ProbabilityGate};
+use closecall::campaign::runner::{Sampling, Work};
+use closecall::campaign::summary::Summary;
+use closecall::campaign::validity::CheckPlan;
+use closecall::campaign::workers::Workers;
+use closecall::controller::BuiltIn;
+use closecall::scenario::ScenarioFile;
+use closecall::simulation::Arm;
+use closecall_scenarios::sampling::Design;
+
+/// The probability of a collision in the scenario, by construction.
+const TRUTH: f64 = 0.05;
+/// How sure the bounds are to be.
+const CONFIDENCE: f64 = 0.95;
+/// Samples of a campaign of fixed length.
+const FIXED: u64 = 200;
+/// Most samples of a campaign that stops when it is certain.
+const MOST: u64 = 2_000;
+/// Least share of the campaigns whose interval has to cover the truth: two standard errors of 1,000 below 95 %.
+const LEAST_COVERAGE: f64 = 0.935;
+
+/// What one campaign came to.
+struct Came {
+    counts: ArmCounts,
+    /// True where the confidence sequence had the truth outside at any time.
+    is_ever_outside: bool,
+}
+
+/// Runs one campaign, until `stops` says so.
+fn run(seed: u64, samples: u64, stops: impl Fn(&ArmCounts) -> bool) -> Result<Came, CampaignError> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/known-probability.toml");
+    let file = ScenarioFile::load(&path, &[]).expect("the fixture is a valid scenario");
+    let arms = vec![Arm { controller: BuiltIn::Acc.factory(), sensors: None }];
+    let sampling = Sampling { seed, design: Design::Random, samples };
+    let jobs = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
+    let workers = Workers { jobs, sample_timeout: Duration::from_secs(60) };
+    let work = Arc::new(Work { file, sampling, arms, checks: CheckPlan::default() });
+    let campaign = Campaign { works: vec![work.clone()], partition: None, workers };
+    let ego = work.file.ego_id().expect("the fixture has an ego");
+    let mut summary = Summary::new(vec!["acc".to_owned()]);
+    summary.begin("known-probability");
+    let mut is_ever_outside = false;
+    campaign.run(None, |turn| {
+        summary.take(turn.record, ego);
+        let counts = summary.total().arms[0];
+        let [low, high] = Inference::Sequential.interval_95(counts.collisions, counts.outcomes);
+        is_ever_outside |= !(low <= TRUTH && TRUTH <= high);
+        if stops(&counts) { ControlFlow::Break(End::Scenario) } else { ControlFlow::Continue(()) }
+    })?;
+    let total = summary.total();
+    assert_eq!((total.errors(), total.invalid, total.checks.flips), (0, 0, 0), "{total:?}");
+    Ok(Came { counts: total.arms[0], is_ever_outside })
+}
+
+fn main() -> Result<ExitCode, Box<dyn std::error::Error>> {
+    let campaigns: u64 = std::env::args().nth(1).map_or(Ok(1_000), |text| text.parse())?;
+    let gate = ProbabilityGate::new(TRUTH, CONFIDENCE)?;
+    let (mut covered, mut below, mut above, mut outside) = (0_u64, 0_u64, 0_u64, 0_u64);
+    for seed in 0..campaigns {
+        let fixed = run(seed, FIXED, |_| false)?.counts;
+        let [low, high] = Inference::FixedSamples.interval_95(fixed.collisions, fixed.outcomes);
+        covered += u64::from(low <= TRUTH && TRUTH <= high);
+        let peeked = run(seed, MOST, |counts| gate.is_settled(counts, 1))?;
+        let answer = gate.judge(&peeked.counts, 1, Inference::Sequential).answer;
+        below += u64::from(answer == Answer::Below);
+        above += u64::from(answer == Answer::Above);
+        outside += u64::from(peeked.is_ever_outside);
+    }
+    let share = |count: u64| count as f64 / campaigns as f64;
+    let report = format!(
+        "{campaigns} campaigns, collision probability {TRUTH}\n\
+         exact intervals at 95 % cover it, n = {FIXED}:              {:.1} %\n\
+         stopped wrongly as below a gate at {TRUTH}, up to {MOST}:   {:.1} %\n\
+         stopped wrongly as above a gate at {TRUTH}, up to {MOST}:   {:.1} %\n\
+         95 % confidence sequence ever without it until then: {:.1} %\n",
+        100.0 * share(covered),
+        100.0 * share(below),
+        100.0 * share(above),
+        100.0 * share(outside),
+    );
+    std::io::Write::write_all(&mut std::io::stdout(), report.as_bytes())?;
+    let is_right = share(covered) >= LEAST_COVERAGE
+        && [below, above, outside].iter().all(|&wrong| share(wrong) <= 1.0 - CONFIDENCE);
+    Ok(if is_right { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
