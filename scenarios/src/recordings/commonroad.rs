@@ -14,8 +14,9 @@ use std::io::BufRead;
 use closecall_traffic::{Time, VehicleClass};
 
 use super::fields::{Bounds, Fault, integer, number, wrong_value};
-use super::lanelets::{Lanelet, Point, Roads};
+use super::lanelets::{Lanelet, Roads};
 use super::plain::allowed;
+use super::reference_line::Point;
 use super::source::{About, Clock, Refusal, Row, RowSource};
 use super::xml::{Node, Xml};
 use super::{Layout, MarkingDistances};

@@ -212,6 +212,9 @@ pub enum RecordingProblem {
          NN_tracks.csv, NN_tracksMeta.csv and NN_recordingMeta.csv"
     )]
     NeedsMetadata,
+    /// Traffic that tells no road.
+    #[error("no vehicle moves, so that the road cannot be told from the traffic")]
+    NothingMoves,
     /// Several recordings in one folder.
     #[error(
         "there are {count} recordings in this folder, from {first}_tracks.csv to {last}_tracks.csv: name one of them"

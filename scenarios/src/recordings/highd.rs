@@ -34,7 +34,7 @@ use super::source::{About, Clock, Row};
 use super::{LaneMarkings, Layout, MarkingDistances, RecordingProblem};
 
 /// Vehicles are as good as never reversing; noise at standstill is below this [m/s].
-const SPEED_MPS: Bounds = Bounds::closed(-1.0, 150.0);
+pub(super) const SPEED_MPS: Bounds = Bounds::closed(-1.0, 150.0);
 const VELOCITY_MPS: Bounds = Bounds::closed(-150.0, 150.0);
 const DIMENSION_M: Bounds = Bounds::above(0.0, 60.0);
 
@@ -185,12 +185,15 @@ impl TextLayout for HighdColumns {
         }))
     }
 
-    /// The vehicles that have other numbers of rows than the metadata state.
     fn end(&mut self) -> Result<(), Fault> {
-        let wrong = self.vehicles.iter().find(|(_, vehicle)| vehicle.found != vehicle.rows);
-        let Some((&number, &VehicleMeta { rows: stated, found, line, .. })) = wrong else { return Ok(()) };
-        self.vehicles.remove(&number);
-        let file = self.meta_file.clone();
-        Err(RecordingProblem::OtherCount { vehicle: number, found, stated, file, line }.into())
+        count_rows(&mut self.vehicles, &self.meta_file)
     }
+}
+
+/// Tells the first vehicle that has another number of rows than the metadata state, and forgets it.
+pub(super) fn count_rows(vehicles: &mut BTreeMap<u64, VehicleMeta>, meta_file: &str) -> Result<(), Fault> {
+    let wrong = vehicles.iter().find(|(_, vehicle)| vehicle.found != vehicle.rows);
+    let Some((&number, &VehicleMeta { rows: stated, found, line, .. })) = wrong else { return Ok(()) };
+    vehicles.remove(&number);
+    Err(RecordingProblem::OtherCount { vehicle: number, found, stated, file: meta_file.to_owned(), line }.into())
 }

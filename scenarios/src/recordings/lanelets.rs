@@ -15,14 +15,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::LaneMarkings;
 use closecall_traffic::Lane;
 
-/// A point in the scenario's plane [m].
-pub(super) type Point = (f64, f64);
-
-/// Points nearer to each other than this are one [m].
-const SAME_POINT_M: f64 = 1e-6;
+use super::LaneMarkings;
+use super::reference_line::{Beside, Point, ReferenceLine};
 
 /// How far to the right of one another several roads are laid, so that their vehicles never meet [m].
 const APART_M: f64 = 1_000.0;
@@ -57,8 +53,7 @@ pub(super) struct OnRoad {
 
 #[derive(Clone, Debug)]
 struct Road {
-    /// The reference line: points, and the distance along the line to each.
-    line: Vec<(Point, f64)>,
+    line: ReferenceLine,
     /// Outlines with their lanes, from 1 at the left; only those beside the reference line.
     lanes: Vec<(u8, Vec<Point>)>,
     /// All outlines.
@@ -108,7 +103,7 @@ impl Roads {
     /// or else the one whose reference line is nearest.
     pub(super) fn choose(&self, point: Point, heading_rad: f64) -> usize {
         let rank = |road: &Road| {
-            let on = road.project(point);
+            let on = road.line.project(point);
             let is_against = (heading_rad - on.heading_rad).cos() < 0.0;
             let is_outside = !road.outlines.iter().any(|outline| contains(outline, point));
             (is_against, is_outside, on.d_m.abs())
@@ -121,36 +116,14 @@ impl Roads {
     /// Where `point` is on the road that was chosen.
     pub(super) fn place(&self, road: usize, point: Point) -> Option<OnRoad> {
         let road = self.roads.get(road)?;
-        let on = road.project(point);
+        let Beside { s_m, d_m, heading_rad } = road.line.project(point);
         let inside = road.lanes.iter().find(|(_, outline)| contains(outline, point)).map(|(lane, _)| *lane);
-        let lane = inside.unwrap_or_else(|| road.nearest_lane(on.d_m)).saturating_add(road.first_lane);
-        Some(OnRoad { d_m: on.d_m + road.shift_m, lane, ..on })
+        let lane = inside.unwrap_or_else(|| road.nearest_lane(d_m)).saturating_add(road.first_lane);
+        Some(OnRoad { s_m, d_m: d_m + road.shift_m, lane, heading_rad })
     }
 }
 
 impl Road {
-    /// The position relative to the reference line, which goes on straight beyond its ends.
-    fn project(&self, (x, y): Point) -> OnRoad {
-        let last = self.line.len().saturating_sub(2);
-        let mut nearest = (f64::INFINITY, OnRoad { s_m: 0.0, d_m: 0.0, lane: 0, heading_rad: 0.0 });
-        for (k, pair) in self.line.windows(2).enumerate() {
-            let (((x0, y0), s0), ((x1, y1), s1)) = (pair[0], pair[1]);
-            let length = s1 - s0;
-            let (ux, uy) = ((x1 - x0) / length, (y1 - y0) / length);
-            let (low, high) =
-                (if k == 0 { f64::NEG_INFINITY } else { 0.0 }, if k == last { f64::INFINITY } else { length });
-            let along = ((x - x0) * ux + (y - y0) * uy).clamp(low, high);
-            let (fx, fy) = (x - x0 - along * ux, y - y0 - along * uy);
-            let distance = fx.hypot(fy);
-            if distance < nearest.0 {
-                let side = (ux * (y - y0) - uy * (x - x0)).signum();
-                let on = OnRoad { s_m: s0 + along, d_m: side * distance, lane: 0, heading_rad: uy.atan2(ux) };
-                nearest = (distance, on);
-            }
-        }
-        nearest.1
-    }
-
     /// The lane whose middle is nearest.
     fn nearest_lane(&self, d_m: f64) -> u8 {
         let mut left_m = 0.0;
@@ -199,7 +172,7 @@ fn road(lanelets: &BTreeMap<i64, Lanelet>, ids: &BTreeSet<i64>) -> Option<(f64, 
     let chains = ids.iter().filter(leftmost).map(|id| chain(lanelets, *id));
     let sized = chains.filter_map(|chain| {
         let line = line(lanelets, &chain);
-        let length_m = line.last().filter(|_| line.len() > 1)?.1;
+        let length_m = line.length_m()?;
         let lanes = chain.iter().map(|id| beside(lanelets, *id).len()).max()?;
         Some((length_m * lanes as f64, chain, line))
     });
@@ -217,7 +190,7 @@ fn road(lanelets: &BTreeMap<i64, Lanelet>, ids: &BTreeSet<i64>) -> Option<(f64, 
         for (k, lanelet) in beside(lanelets, *id).into_iter().enumerate() {
             let lane = u8::try_from(k + 1).unwrap_or(u8::MAX);
             road.lanes.push((lane, outline(lanelet)));
-            let right = lanelet.right.iter().map(|point| road.project(*point).d_m);
+            let right = lanelet.right.iter().map(|point| road.line.project(*point).d_m);
             edges_m.entry(lane).or_default().extend(right);
         }
     }
@@ -257,21 +230,10 @@ fn beside(lanelets: &BTreeMap<i64, Lanelet>, id: i64) -> Vec<&Lanelet> {
     found
 }
 
-/// The left bounds of a chain, with the distance along them.
-fn line(lanelets: &BTreeMap<i64, Lanelet>, chain: &[i64]) -> Vec<(Point, f64)> {
-    let mut line: Vec<(Point, f64)> = Vec::new();
-    for point in chain.iter().filter_map(|id| lanelets.get(id)).flat_map(|lanelet| &lanelet.left) {
-        let Some(((x, y), s_m)) = line.last() else {
-            line.push((*point, 0.0));
-            continue;
-        };
-        let step_m = (point.0 - x).hypot(point.1 - y);
-        if step_m > SAME_POINT_M {
-            let s_m = s_m + step_m;
-            line.push((*point, s_m));
-        }
-    }
-    line
+/// The left bounds of a chain.
+fn line(lanelets: &BTreeMap<i64, Lanelet>, chain: &[i64]) -> ReferenceLine {
+    let lanelets = chain.iter().filter_map(|id| lanelets.get(id));
+    ReferenceLine::through(lanelets.flat_map(|lanelet| &lanelet.left).copied())
 }
 
 fn outline(lanelet: &Lanelet) -> Vec<Point> {

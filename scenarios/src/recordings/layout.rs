@@ -1,6 +1,7 @@
 //! Which layout a file has, by its first line.
 
-use super::RecordingProblem;
+use super::{RecordingError, RecordingProblem};
+use super::exid::{ExidColumns, Survey};
 use super::fields::Fault;
 use super::file_set::Meta;
 use super::highd::HighdColumns;
@@ -61,10 +62,20 @@ pub(super) fn is_of_drone(line: &str) -> bool {
 }
 
 /// The format of the rows of a highD or exiD recording.
-pub(super) fn of_drone(line: &str, meta: Meta) -> Result<Format, RecordingProblem> {
-    let (header, separator, width) = Header::of(line)?;
-    header.refuse_duplicates()?;
-    let columns: Box<dyn TextLayout> = Box::new(HighdColumns::new(&header, meta)?);
+///
+/// `survey` is asked for where the layout is exiD's.
+pub(super) fn of_drone(
+    line: &str,
+    meta: Meta,
+    survey: impl FnOnce() -> Result<Survey, RecordingError>,
+) -> Result<Format, Result<RecordingProblem, RecordingError>> {
+    let (header, separator, width) = Header::of(line).map_err(Ok)?;
+    header.refuse_duplicates().map_err(Ok)?;
+    let columns: Box<dyn TextLayout> = if header.is_exid() {
+        Box::new(ExidColumns::new(&header, meta, survey().map_err(Err)?).map_err(Ok)?)
+    } else {
+        Box::new(HighdColumns::new(&header, meta).map_err(Ok)?)
+    };
     Ok(Format { columns, separator, width, has_header: true })
 }
 

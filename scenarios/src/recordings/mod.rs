@@ -33,6 +33,7 @@ mod builder;
 mod commonroad;
 mod dropped;
 mod error;
+mod exid;
 mod fields;
 mod file_set;
 mod highd;
@@ -46,6 +47,7 @@ mod order;
 mod plain;
 mod plausible;
 mod quality;
+mod reference_line;
 mod rows;
 mod source;
 #[cfg(test)]

@@ -9,6 +9,7 @@ use std::rc::Rc;
 use flate2::bufread::MultiGzDecoder;
 
 use super::commonroad::CommonRoadSource;
+use super::exid::Survey;
 use super::file_set::FileSet;
 use super::order::WINDOW_ROWS;
 use super::source::{Refusal, RowSource};
@@ -93,7 +94,7 @@ fn open_set(set: &FileSet, options: ReadOptions, window: usize) -> Result<Tracks
     let digest = Digest::default();
     let in_tracks = |refusal| at(&path, refusal);
     let input = digest.input(open_file(&path)?).map_err(in_tracks)?;
-    let source = TextSource::with_meta(input, || set.meta(&digest));
+    let source = TextSource::with_meta(input, || set.meta(&digest), || Survey::of(&path));
     let source = source.map_err(|error| error.map_or_else(|other| other, in_tracks))?;
     check_choice(&source, &options).map_err(in_tracks)?;
     Tracks::new((&path, digest), Box::new(source), options.bad_rows, window)

@@ -2,6 +2,7 @@
 
 use std::io::BufRead;
 
+use super::exid::Survey;
 use super::fields::Fault;
 use super::file_set::Meta;
 use super::layout::{Format, is_of_drone, of_drone, recognise};
@@ -27,16 +28,19 @@ impl<R: BufRead> TextSource<R> {
         Self::recognised(lines, number, first)
     }
 
-    /// As [`TextSource::new`], where `meta` can be asked for what is in the other files.
+    /// As [`TextSource::new`], where `meta` can be asked for what is in the other files, and `survey` for what the traffic
+    /// tells about the road.
     pub(super) fn with_meta(
         source: R,
         meta: impl FnOnce() -> Result<Meta, RecordingError>,
+        survey: impl FnOnce() -> Result<Survey, RecordingError>,
     ) -> Result<Self, Result<Refusal, RecordingError>> {
         let (lines, number, first) = begin(source).map_err(Ok)?;
         if !is_of_drone(&first) {
             return Self::recognised(lines, number, first).map_err(Ok);
         }
-        let format = of_drone(&first, meta().map_err(Err)?).map_err(|problem| Ok(Refusal::new(number, problem)))?;
+        let format = of_drone(&first, meta().map_err(Err)?, survey)
+            .map_err(|error| error.map(|problem| Refusal::new(number, problem)))?;
         Ok(Self { lines, format, fields: Fields::default(), name: None, first: None })
     }
 

@@ -146,3 +146,65 @@ fn a_layout_that_is_asked_for_has_to_be_there() {
     let alone = read_from(std::fs::File::open(&path).unwrap(), &path).unwrap_err();
     assert!(matches!(alone.problem, RecordingProblem::NeedsMetadata));
 }
+
+/// A road of two lanes that bends with a radius of 2 km, driven in both directions, in exiD's layout. Vehicle 1 keeps the
+/// right lane, vehicle 2 changes from it to the left one, vehicle 3 keeps the left lane, vehicle 4 drives the other way.
+fn write_bent_both_ways(folder: &Path) {
+    const RADIUS_M: f64 = 2_000.0;
+    const LANE_M: f64 = 3.75;
+    let meta = "recordingId,locationId,frameRate\n3,0,25\n";
+    std::fs::write(folder.join("03_recordingMeta.csv"), meta).unwrap();
+    let header = "recordingId,trackId,initialFrame,finalFrame,numFrames,width,length,class\n";
+    let vehicles = ["car", "van", "truck", "motorcycle"];
+    let meta: String =
+        vehicles.iter().enumerate().map(|(k, class)| format!("3,{},0,249,250,1.9,4.7,{class}\n", k + 1)).collect();
+    std::fs::write(folder.join("03_tracksMeta.csv"), format!("{header}{meta}")).unwrap();
+    let mut rows = "recordingId,trackId,frame,xCenter,yCenter,heading,width,length,xVelocity,yVelocity,lonVelocity,\
+                    latVelocity,lonAcceleration,latAcceleration,laneWidth,laneletId,laneChange\n"
+        .to_owned();
+    for vehicle in 1..=4 {
+        for frame in 0..250 {
+            let time_s = 0.04 * f64::from(frame);
+            let tau = ((time_s - 3.0) / 4.0).clamp(0.0, 1.0);
+            let shape = tau.powi(3) * (10.0 - 15.0 * tau + 6.0 * tau * tau);
+            // To the left of the first direction, 0 in the middle of its right lane.
+            let left_m = match vehicle {
+                1 => 0.0,
+                2 => LANE_M * shape,
+                3 => LANE_M,
+                _ => 4.0 * LANE_M,
+            };
+            let is_back = vehicle == 4;
+            let along_m = if is_back { 290.0 - 29.0 * time_s } else { 20.0 + (24.0 + f64::from(vehicle)) * time_s };
+            let angle = along_m / RADIUS_M;
+            let (x_m, y_m) = ((RADIUS_M - left_m) * angle.sin(), RADIUS_M - (RADIUS_M - left_m) * angle.cos());
+            let heading = angle.to_degrees() + if is_back { 180.0 } else { 0.0 };
+            let speed_mps = if is_back { 29.0 } else { 24.0 + f64::from(vehicle) };
+            let changes = u8::from(vehicle == 2 && frame == 125);
+            rows += &format!(
+                "3,{vehicle},{frame},{x_m:.4},{y_m:.4},{heading:.4},1.9,4.7,0,0,{speed_mps},0,0.5,0,{LANE_M};3.7,12;13,{changes}\n"
+            );
+        }
+    }
+    std::fs::write(folder.join("03_tracks.csv"), rows).unwrap();
+}
+
+#[test]
+fn exids_road_is_told_from_its_traffic() {
+    let folder = tempfile::tempdir().unwrap();
+    write_bent_both_ways(folder.path());
+    let recording = read(folder.path()).unwrap();
+    assert_eq!((recording.layout, recording.period), (Layout::Exid, Time::from_ms(40)));
+    let [keeps, changes, left, back] = recording.trajectories.as_slice() else { panic!() };
+    let lanes = |track: &closecall_traffic::Trajectory| (track.points[0].lane.0, track.points[249].lane.0);
+    assert_eq!((lanes(keeps), lanes(changes), lanes(left), lanes(back)), ((2, 2), (2, 1), (1, 1), (4, 4)));
+    for track in &recording.trajectories {
+        assert!(track.points.windows(2).all(|pair| pair[1].s_m > pair[0].s_m), "s rises");
+    }
+    let d_m = |track: &closecall_traffic::Trajectory| track.points[249].d_m;
+    assert!((d_m(keeps) + 1.5 * 3.75).abs() < 0.05 && (d_m(changes) + 0.5 * 3.75).abs() < 0.05);
+    assert!((d_m(back) + 2.0 * 3.75 + 1_000.0 + 0.5 * 3.75).abs() < 0.05, "{}", d_m(back));
+    let found = detect(&smooth(&recording));
+    assert_eq!(found.iter().map(|change| change.track_id).collect::<Vec<_>>(), [2]);
+    assert!((found[0].crossing_s - 5.0).abs() < 0.2, "{}", found[0].crossing_s);
+}
