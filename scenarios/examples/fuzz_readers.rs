@@ -5,7 +5,7 @@
 //! cargo run --release -p closecall-scenarios --example fuzz_readers -- all 60 7
 //! ```
 //!
-//! Arguments: the reader (`ngsim`, `csv`, `highd`, `commonroad`, `in-car`, or `all`, one after the other), the seconds for
+//! Arguments: the reader (`ngsim`, `csv`, `highd`, `exid`, `commonroad`, `in-car`, or `all`, one after the other), the seconds for
 //! each, and a seed (0 where absent). It starts from the small files in `scenarios/fuzz`, and damages them where the formats
 //! can be damaged: single bytes, fields, columns, lines, tags, blocks moved and repeated, ends cut off, compressed or
 //! not. Half of what it makes is packed with gzip and cut or damaged after that. It needs no special compiler.
@@ -22,7 +22,7 @@ use std::time::{Duration, Instant};
 
 use closecall_scenarios::recordings::{BadRows, ReadOptions, RecordingError, Tracks, open, open_from};
 
-const READERS: [&str; 5] = ["ngsim", "csv", "highd", "commonroad", "in-car"];
+const READERS: [&str; 6] = ["ngsim", "csv", "highd", "exid", "commonroad", "in-car"];
 
 /// One file may take this long.
 const SLOW: Duration = Duration::from_secs(2);
@@ -281,7 +281,7 @@ impl Target {
         let window = [usize::MAX, 1 << 20, 16][self.random.below(3)];
         let options = ReadOptions { layout: None, bad_rows };
         let begun = Instant::now();
-        let judged = if self.reader == "highd" {
+        let judged = if self.reader == "highd" || self.reader == "exid" {
             for (other, whole) in &self.corpus {
                 let path = self.folder.path().join(other);
                 // Some file systems wait for the disk where a file is written over.

@@ -10,6 +10,7 @@ mod exit_codes;
 mod faulty_controllers;
 mod gate;
 mod hidden_lead;
+mod inspect;
 mod library;
 mod looking;
 mod malformed;

@@ -29,7 +29,7 @@ const VELOCITY_MPS: Bounds = Bounds::closed(-150.0, 150.0);
 const LANELET_IDS: (i64, i64) = (-1_000_000_000_000, 1_000_000_000_000);
 
 /// The most points that the lanelets may have: a scenario of some kilometres has some thousands.
-const MOST_POINTS: usize = 1_000_000;
+const MOST_POINTS: usize = 200_000;
 
 /// Reads the states of a CommonRoad scenario.
 pub(super) struct CommonRoadSource<R> {

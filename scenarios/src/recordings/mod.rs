@@ -1,32 +1,42 @@
 //! Recorded traffic: reading it, knowing how good it is, and writing it.
 //!
 //! ```text
-//!   file (plain or gzip) ─▶ rows, one line at a time ─▶ layout ─▶ instants in SI units ─▶ tracks without gaps ─▶ Recording
+//!   file (plain or gzip) ─▶ reader of its layout ─▶ rows in SI units ─▶ tracks without gaps, one by one ─▶ Recording
+//!                            (one line or element at a time)            (memory: the open ones)         (all of them)
 //! ```
 //!
-//! Two layouts are read, and told apart by what the file holds, not by its name:
+//! The layout is told by what the file holds, not by its name; `docs/recordings.md` describes all of them for users:
 //!
-//! - **plain**: CSV with a header, metres, one row for each (track, frame). The columns `recording_id, track_id,
-//!   vehicle_id, frame, time_s, s_m, d_m, lane_id, speed_mps, accel_mps2, heading_rel_rad, x_m, y_m, length_m, width_m,
-//!   vehicle_class, source_scenario`; this is also what [`write_recording`] writes. `d_m` in the file is positive to the
-//!   *right* of the left edge of lane 1.
-//! - **NGSIM**: the 18 columns of the US DOT's NGSIM vehicle trajectories (DOI 10.21949/1504477) in feet and feet per
-//!   second, either separated by blanks without a header, as originally published, or with a header and commas; or the
-//!   25 columns of the catalogue's CSV export, with a byte order mark and thousands separators.
+//! | layout | what | module |
+//! |---|---|---|
+//! | plain | CSV with a header, metres, one row for each (track, frame); what [`write_recording`] writes | `plain` |
+//! | NGSIM | 18 columns in feet, with or without a header; 25 columns of the catalogue's export (DOI 10.21949/1504477) | `ngsim` |
+//! | highD, exiD | three files for each recording | `highd`, `exid`, `file_set` |
+//! | CommonRoad | XML with lanelets and dynamic obstacles | `commonroad`, `lanelets` |
+//! | in-car | log of one vehicle that sees the lane markings; what [`write_in_car`] writes | `in_car` |
 //!
-//! # What the reader does
+//! # What the readers do
 //!
 //! - Units become SI. `d` becomes positive to the left, 0 at the left edge of the leftmost lane. NGSIM's `Local_Y` is the
 //!   middle of the front bumper: half a length is taken off to get the box's centre. `Local_X` is kept: across a lane
 //!   change at 0.05 rad the front is 0.1 m beside the centre, which is below NGSIM's own accuracy.
-//! - Rows may come in any order. NGSIM numbers recur after gaps: a vehicle's rows are sorted by frame and split wherever
-//!   a frame is missing. The first piece keeps the number, the others get numbers above the largest in the file.
+//! - A vehicle's rows are split wherever a frame is missing, as NGSIM numbers recur after gaps. The first piece keeps the
+//!   number; the later ones add multiples of [`PIECE_STRIDE`] to it.
 //! - The catalogue's export joins several recordings of one place, in which numbers recur. They are told apart by the
-//!   time of frame 0, and laid one behind the other where their clocks overlap, so that their vehicles never meet.
-//! - NGSIM times are milliseconds; where they count from 1970 they are counted from the recording's first frame instead.
+//!   time of frame 0, and laid one behind the other where their clocks overlap, so that their vehicles never meet. (Not in
+//!   files longer than [`WINDOW_ROWS`] rows: their spans are not known before the end.)
+//! - NGSIM times are milliseconds; where they count from 1970 they are counted from the first instant instead.
 //! - What a layout does not carry is derived by differences between neighbouring frames: the acceleration where its
-//!   field is empty, lateral speed (from the heading where there is one) and lateral acceleration.
-//! - Anything else is refused, with line, column and what is allowed. Nothing is guessed, skipped or repaired.
+//!   field is empty, lateral speed and lateral acceleration.
+//! - Anything else is refused, with line, column and what is allowed, also units and columns that are mixed up
+//!   (`plausible`). Nothing is guessed or repaired. Rows that cannot be used are left out only where that is asked for
+//!   ([`BadRows::Drop`]), and counted.
+//!
+//! # Memory
+//!
+//! [`open`] gives complete tracks one by one and keeps the rows of the tracks that are not complete, and some dozen bytes for
+//! each vehicle. For that, files longer than [`WINDOW_ROWS`] rows have to be sorted by vehicle or by time; `order` says more.
+//! [`read`] keeps the whole recording, in any order: criticality needs it, because every vehicle may be an opponent.
 
 mod assemble;
 mod builder;

@@ -1,0 +1,54 @@
+//! How far a recording can be trusted, and logs that a vehicle makes of itself.
+
+use std::fs;
+
+use crate::support::{closecall, code, folder, json, library, stderr, stdout};
+
+#[test]
+fn a_recordings_flaws_are_told_and_rows_that_cannot_be_used_end_with_3() {
+    let folder = folder();
+    let csv = folder.path().join("own.csv");
+    let csv = csv.to_str().unwrap();
+    let scenario = library("overtake-without-brake");
+    stdout(&closecall(["record", scenario.to_str().unwrap(), "-n", "1", "--controller", "acc", "-o", csv]), 0);
+    let report = json(&closecall(["inspect", csv, "--format", "json"]), 0);
+    assert_eq!(report["layout"], "plain");
+    assert_eq!((report["usable"].as_bool(), report["vehicles"].as_u64()), (Some(true), Some(3)));
+    assert_eq!(report["flaws"]["jumps"]["count"], 0);
+    let text = fs::read_to_string(csv).unwrap();
+    let mut lines: Vec<&str> = text.lines().collect();
+    lines.insert(100, lines[99]);
+    fs::write(csv, lines.join("\n") + "\n").unwrap();
+    let output = closecall(["inspect", csv, "--format", "json"]);
+    assert!(stderr(&output).contains("1 rows cannot be used"), "{}", stderr(&output));
+    let report = json(&output, 3);
+    assert_eq!(report["dropped"]["duplicated rows"]["first_line"], 101);
+    assert_eq!(code(&closecall(["inspect", csv, "--drop-bad-rows"])), 0);
+    assert_eq!(code(&closecall(["inspect", csv, "--layout", "highd"])), 3);
+    assert_eq!(code(&closecall(["inspect", "nowhere.csv"])), 6);
+}
+
+#[test]
+fn a_log_in_the_vehicle_has_the_true_lane_changes_beside_it() {
+    let folder = folder();
+    let csv = folder.path().join("drive.csv");
+    let csv = csv.to_str().unwrap();
+    let scenario = library("overtake-without-brake");
+    let scenario = scenario.to_str().unwrap();
+    let args = ["record", scenario, "-n", "3", "--controller", "acc", "--in-car", "-o", csv];
+    stdout(&closecall(args), 0);
+    let truth = fs::read_to_string(folder.path().join("drive.truth.csv")).unwrap();
+    let crossings: Vec<f64> = truth.lines().skip(1).map(|line| line.split(',').nth(4).unwrap().parse().unwrap()).collect();
+    assert_eq!(crossings.len(), 3, "one overtaking in each sample");
+    let report = json(&closecall(["inspect", csv, "--format", "json"]), 0);
+    assert_eq!((report["layout"].as_str(), report["period_s"].as_f64()), (Some("in-car"), Some(0.01)));
+    let changes = json(&closecall(["lane-changes", csv, "--format", "json"]), 0);
+    for (change, truth) in changes.as_array().unwrap().iter().zip(&crossings) {
+        let found = change["crossing_s"].as_f64().unwrap();
+        assert!((found - truth).abs() <= 0.3, "{found} instead of {truth}");
+    }
+    assert_eq!(changes.as_array().unwrap().len(), 3);
+    let nobody = closecall(["record", scenario, "-n", "1", "--in-car=nobody", "-o", csv]);
+    assert_eq!(code(&nobody), 2);
+    assert!(stderr(&nobody).contains("rear"), "the actors are named: {}", stderr(&nobody));
+}
