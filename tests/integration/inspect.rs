@@ -38,7 +38,8 @@ fn a_log_in_the_vehicle_has_the_true_lane_changes_beside_it() {
     let args = ["record", scenario, "-n", "3", "--controller", "acc", "--in-car", "-o", csv];
     stdout(&closecall(args), 0);
     let truth = fs::read_to_string(folder.path().join("drive.truth.csv")).unwrap();
-    let crossings: Vec<f64> = truth.lines().skip(1).map(|line| line.split(',').nth(4).unwrap().parse().unwrap()).collect();
+    let crossings: Vec<f64> =
+        truth.lines().skip(1).map(|line| line.split(',').nth(4).unwrap().parse().unwrap()).collect();
     assert_eq!(crossings.len(), 3, "one overtaking in each sample");
     let report = json(&closecall(["inspect", csv, "--format", "json"]), 0);
     assert_eq!((report["layout"].as_str(), report["period_s"].as_f64()), (Some("in-car"), Some(0.01)));

@@ -1,6 +1,5 @@
 //! Which layout a file has, by its first line.
 
-use super::{RecordingError, RecordingProblem};
 use super::exid::{ExidColumns, Survey};
 use super::fields::Fault;
 use super::file_set::Meta;
@@ -10,6 +9,7 @@ use super::ngsim::NgsimColumns;
 use super::plain::PlainColumns;
 use super::rows::{Fields, Separator};
 use super::source::{About, Row};
+use super::{RecordingError, RecordingProblem};
 
 /// How to read the rows of one file.
 pub(super) struct Format {
