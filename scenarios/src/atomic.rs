@@ -1,25 +1,47 @@
 //! Files that appear as a whole, or not at all.
 
+use std::ffi::OsStr;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 use tempfile::{Builder, NamedTempFile};
 
-/// Writes a file by `content` under a temporary name beside `path`, then renames it.
+/// How temporary files are called: a program that is killed leaves one behind.
+const TEMPORARY: &str = ".closecall-";
+
+/// Writes a file by `content` under a temporary name beside `path`, then renames it. When this returns, the disk has been
+/// asked to keep both the content and the name.
 ///
 /// # Errors
 /// Those of `content`, and I/O errors; a file that was at `path` before is then untouched.
-pub(crate) fn write_atomically<E: From<io::Error>>(
+pub fn write_atomically<E: From<io::Error>>(
     path: &Path,
-    content: impl FnOnce(&mut dyn Write) -> Result<(), E>,
+    content: impl FnOnce(&mut (dyn Write + Send)) -> Result<(), E>,
 ) -> Result<(), E> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = folder(path);
     let mut file = BufWriter::new(temporary_in(folder)?);
     content(&mut file)?;
     let file = file.into_inner().map_err(io::IntoInnerError::into_error)?;
     file.as_file().sync_all()?;
     file.persist(path).map_err(|error| error.error)?;
-    Ok(())
+    Ok(sync_folder(folder)?)
+}
+
+/// Finds out before any work is done that a file could not be made after it.
+///
+/// # Errors
+/// The system's reason where the folder does not take new files.
+pub fn check_writable(path: &Path) -> io::Result<()> {
+    temporary_in(folder(path)).map(drop)
+}
+
+/// True for the name of a file that was being written when the program was killed.
+pub fn is_temporary(name: &OsStr) -> bool {
+    name.to_string_lossy().starts_with(TEMPORARY)
+}
+
+fn folder(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// A temporary file that, once renamed, can be read by whom the umask lets read.
@@ -31,7 +53,18 @@ fn temporary_in(folder: &Path) -> io::Result<NamedTempFile> {
         const READ_AND_WRITE: u32 = 0o666;
         builder.permissions(std::fs::Permissions::from_mode(READ_AND_WRITE));
     }
-    builder.prefix(".closecall-").tempfile_in(folder)
+    builder.prefix(TEMPORARY).tempfile_in(folder)
+}
+
+/// Has the disk keep a new name.
+#[cfg(unix)]
+fn sync_folder(folder: &Path) -> io::Result<()> {
+    std::fs::File::open(folder)?.sync_all()
+}
+
+#[cfg(not(unix))]
+fn sync_folder(_: &Path) -> io::Result<()> {
+    Ok(())
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! What is tested: recordings, lane changes, parameter distributions, sampling designs and the scenario library.
 
-mod atomic;
+pub mod atomic;
 pub mod criticality;
 pub mod filters;
 pub mod fit;

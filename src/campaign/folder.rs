@@ -13,8 +13,10 @@
 //! ```
 
 use std::fs;
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
+
+use closecall_scenarios::atomic::is_temporary;
 
 use super::journal::{self, Entry, Journal};
 use super::lock::Lock;
@@ -152,7 +154,7 @@ impl Folder {
         for entry in fs::read_dir(&self.path).map_err(fail)? {
             let name = entry.map_err(fail)?.file_name();
             // A manifest that was being written when the program was killed.
-            let is_unfinished = crate::report::is_temporary(&name);
+            let is_unfinished = is_temporary(&name);
             if !Lock::is_file_name(&name) && !is_unfinished {
                 return Ok(false);
             }
@@ -165,7 +167,7 @@ impl Folder {
         let fail = |source| FolderError::Read { path: self.path.clone(), source };
         for entry in fs::read_dir(&self.path).map_err(fail)? {
             let entry = entry.map_err(fail)?;
-            if crate::report::is_temporary(&entry.file_name()) {
+            if is_temporary(&entry.file_name()) {
                 fs::remove_file(entry.path()).map_err(|source| WriteError::new(&entry.path(), source))?;
             }
         }

@@ -1,6 +1,5 @@
 //! A campaign in Markdown, short enough for a pull request.
 
-use std::io::Write;
 use std::path::Path;
 
 use super::findings::Findings;

@@ -19,5 +19,4 @@ pub mod traffic;
 mod units;
 mod write;
 
-pub(crate) use write::is_temporary;
 pub use write::{WriteError, write_atomically};

@@ -94,7 +94,7 @@ impl Observer for TraceWriter {
 }
 
 /// Names of actors need no quoting: they are letters, digits and hyphens. Numbers read back to the same bits.
-fn write_csv(file: &mut impl Write, rows: &[Row]) -> io::Result<()> {
+fn write_csv(file: &mut (impl Write + ?Sized), rows: &[Row]) -> io::Result<()> {
     writeln!(file, "time_s,actor,lane,s_m,d_m,speed_mps,acceleration_mps2,gap_front_m,thw_front_s")?;
     for row in rows {
         write!(file, "{},{},{},{},{},", row.time.s(), row.actor, row.lane, row.s_m, row.d_m)?;
@@ -105,7 +105,7 @@ fn write_csv(file: &mut impl Write, rows: &[Row]) -> io::Result<()> {
     Ok(())
 }
 
-fn write_parquet(file: &mut (impl Write + Send), rows: &[Row]) -> io::Result<()> {
+fn write_parquet(file: &mut (impl Write + Send + ?Sized), rows: &[Row]) -> io::Result<()> {
     let schema = Arc::new(Schema::new(vec![
         field("time_s", DataType::Float64, Some("s")),
         field("actor", DataType::Utf8, None),

@@ -30,7 +30,7 @@ pub(in crate::report) fn margin(kind: &MarginKind, arms: &[MarginBins]) -> io::R
             .bold_line_style(GRID)
             .axis_style(AXIS)
             .y_labels(4)
-            .y_label_formatter(&|count| format!("{count:.0}"))
+            .y_label_formatter(&whole)
             .label_style(("sans-serif", LABEL_PX).into_font().color(&AXIS))
             .axis_desc_style(("sans-serif", DESCRIPTION_PX).into_font().color(&AXIS))
             .x_desc(kind.title)
@@ -73,7 +73,7 @@ pub(in crate::report) fn coverage(axis: &Axis, counts: &[[u64; Fate::ALL.len()];
             .x_labels(6)
             .y_labels(4)
             .x_label_formatter(&label)
-            .y_label_formatter(&|count| format!("{count:.0}"))
+            .y_label_formatter(&whole)
             .label_style(("sans-serif", LABEL_PX).into_font().color(&AXIS))
             .axis_desc_style(("sans-serif", DESCRIPTION_PX).into_font().color(&AXIS))
             .x_desc(labelled(axis.name()))
@@ -93,6 +93,11 @@ pub(in crate::report) fn coverage(axis: &Axis, counts: &[[u64; Fate::ALL.len()];
         }
         Ok(())
     })
+}
+
+/// A count at its place of an axis; nothing between two counts.
+fn whole(count: &f64) -> String {
+    if count.fract() == 0.0 { format!("{count:.0}") } else { String::new() }
 }
 
 /// The text at a place of an axis: the label that stands there, or the number.

@@ -28,7 +28,12 @@ pub(super) fn write(html: &mut Html, findings: &Findings<'_>) {
     html.classed(
         "p",
         "what",
-        format!("{controllers}: {samples} samples, {} design, seed {}{part}", sampling.design, sampling.seed),
+        format!(
+            "{controllers}: {samples} {}, {} design, seed {}{part}",
+            if samples == 1 { "sample" } else { "samples" },
+            sampling.design,
+            sampling.seed,
+        ),
     );
     html.raw("<ul>");
     for reason in &judged.reasons {
