@@ -1,6 +1,5 @@
 //! `closecall plot`: an encounter as a static figure, for a report.
 
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use clap::Args;

@@ -2,7 +2,6 @@
 //! commands that open it and run it again.
 
 use std::fmt::Write as _;
-use std::io::Write as _;
 use std::path::Path;
 
 use closecall_traffic::Measured;

@@ -26,7 +26,6 @@ mod summary;
 mod truth;
 mod vehicles;
 
-use std::io::Write as _;
 use std::path::Path;
 
 use closecall_traffic::Time;
