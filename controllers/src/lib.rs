@@ -27,6 +27,6 @@ pub use driver::{
 };
 pub use ego::{
     Acc, AccConfig, Aeb, AebConfig, ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack,
-    EgoStackConfig, EgoState, Encounter, Front, FrontFollower, MisConfig, MisPlan, MisSettings, Odometry, Reason,
-    SensorAvailability, Solution,
+    EgoStackConfig, EgoState, Encounter, Foresight, Front, FrontFollower, MisConfig, MisPlan, MisSettings, Odometry,
+    Reason, Response, SensorAvailability, Solution,
 };

@@ -5,6 +5,7 @@
 mod comparison;
 mod determinism;
 mod durability;
+mod engagement;
 mod exec_controller;
 mod exit_codes;
 mod faulty_controllers;

@@ -12,7 +12,7 @@ mod surroundings;
 pub use acc::{Acc, AccConfig};
 pub use aeb::{Aeb, AebConfig};
 pub use interface::{ControllerError, EgoCommand, EgoController, EgoInput, EgoState, Odometry, SensorAvailability};
-pub use mis::{Encounter, MisConfig, MisPlan, MisSettings, Solution};
+pub use mis::{Encounter, Foresight, MisConfig, MisPlan, MisSettings, Response, Solution};
 pub use reason::Reason;
 pub use settings::{EgoSettings, EgoStackConfig};
 pub use stack::EgoStack;

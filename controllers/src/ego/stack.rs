@@ -11,15 +11,12 @@
 
 use closecall_traffic::Time;
 
-use super::mis::{Mis, Situation, Wish};
+use super::mis::{LETTING_GO_MPS3, Mis, Situation, Wish};
 use super::surroundings::{Front, FrontFollower};
 use super::{ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoState, Reason};
 
 /// Acceleration with which the margin is given back [m/s²].
 const GIVING_BACK_MPS2: f64 = 0.8;
-
-/// Jerk with which braking is let go [m/s³].
-const LETTING_GO_MPS3: f64 = 3.0;
 
 /// The built-in ego stack.
 #[derive(Clone, Debug)]
@@ -55,14 +52,15 @@ impl EgoStack {
                 plan: None,
             };
         };
+        let (last, step_s) = self.last.map_or((0.0, 0.0), |(time, last)| (last, (input.time - time).s()));
         let situation = Situation {
             input,
             front,
+            asked_mps2: last,
             automated: self.settings.automated,
             acc_gap_m: self.settings.acc.wanted_gap_m(speed_mps),
         };
         let decision = mis.step(&situation);
-        let (last, step_s) = self.last.map_or((0.0, 0.0), |(time, last)| (last, (input.time - time).s()));
         let lowest = last - mis.settings().max_jerk_mps3 * step_s;
         let highest = last + LETTING_GO_MPS3 * step_s;
         let acceleration_mps2 = match decision.wish {

@@ -2,7 +2,7 @@
 
 use closecall_traffic::{Absent, Time, TrackId};
 
-use super::{Encounter, MisPlan, MisSettings};
+use super::{Encounter, Foresight, MisPlan, MisSettings, Response};
 use crate::ego::surroundings::{Front, PassingLane, Rear, nearest_behind, passing_lane, rear_of};
 use crate::ego::{EgoInput, EgoState, Reason};
 
@@ -42,6 +42,12 @@ const SURE_BRAKING_MPS2: f64 = 6.0;
 
 /// Gap to be left to a standing F [m].
 const LEFT_AT_STANDSTILL_M: f64 = 2.0;
+
+/// Jerk with which braking is let go [m/s³].
+pub(crate) const LETTING_GO_MPS3: f64 = 3.0;
+
+/// Time constant of E's actuators, as E knows it [s].
+const ACTUATOR_LAG_S: f64 = 0.15;
 
 /// The margin counts as given back within this multiple of the ACC's gap.
 const RETURNED_WITHIN: f64 = 1.2;
@@ -101,6 +107,8 @@ pub(crate) struct Situation<'a> {
     pub(crate) input: &'a EgoInput<'a>,
     pub(crate) front: Option<&'a Front>,
     pub(crate) automated: bool,
+    /// The acceleration that was last asked of the actuators [m/s²].
+    pub(crate) asked_mps2: f64,
     /// The gap that the ACC would keep [m].
     pub(crate) acc_gap_m: f64,
 }
@@ -245,7 +253,12 @@ impl Mis {
         } else if !rear.in_own_lane() && rear.gap_m > LOW_HEADWAY_S * rear.speed_mps {
             release(Reason::RearChangedLane)
         } else if rear.gap_m <= settings.critical_gap_m {
-            Some((State::Holding(*target, now), Reason::CriticalDistance))
+            match at.front {
+                Some(front) if self.has_room(at.speed_mps(), front) => {
+                    Some((State::Holding(*target, now), Reason::CriticalDistance))
+                }
+                _ => release(Reason::NoRoomToHold),
+            }
         } else if rear.gap_m > FELL_BACK_AT * settings.engage_gap_m {
             release(Reason::RearFellBack)
         } else if now - target.approached > PATIENCE {
@@ -279,6 +292,17 @@ impl Mis {
         front.gap_m + front_way_m - own_way_m > LEFT_AT_STANDSTILL_M
     }
 
+    /// How E's braking would build up from here.
+    fn response(&self, at: &Situation<'_>) -> Response {
+        Response {
+            asked_mps2: (-at.asked_mps2).max(0.0),
+            braking_mps2: -at.input.odometry.acceleration_mps2,
+            build_up_mps3: self.settings.max_jerk_mps3,
+            let_go_mps3: LETTING_GO_MPS3,
+            lag_s: ACTUATOR_LAG_S,
+        }
+    }
+
     /// What to report, and the braking to apply [m/s²].
     fn plan(&self, at: &Situation<'_>, target: &Target) -> (MisPlan, f64) {
         let rear = &target.rear;
@@ -292,8 +316,9 @@ impl Mis {
             closing_mps: rear.speed_mps - ego_mps,
             critical_gap_m: self.settings.critical_gap_m,
         };
+        let foresight = Foresight { encounter, response: self.response(at) };
         let bound = self.settings.max_deceleration_mps2;
-        let solution = at.front.and_then(|_| encounter.solve(target.goal_thw_s, bound));
+        let solution = at.front.and_then(|_| foresight.solve(target.goal_thw_s, bound));
         let braking = solution.map_or(0.0, |solution| solution.deceleration_mps2);
         let touching = Encounter { critical_gap_m: 0.0, ..encounter };
         let ttce_s = if rear.gap_m <= 0.0 {
@@ -301,14 +326,14 @@ impl Mis {
         } else {
             touching.arrival_s(0.0).ok_or(Absent::NotApproaching)
         };
-        let foreseen = encounter.headway_at_arrival_s(braking).filter(|thw_s| thw_s.is_finite());
+        let foreseen = foresight.headway_at_arrival_s(braking).filter(|thw_s| thw_s.is_finite());
         let plan = MisPlan {
             track: rear.track,
             rear_gap_m: rear.gap_m,
             closing_mps: encounter.closing_mps,
             thw_front_s: at.thw_front_s(),
             ttce_s,
-            time_to_critical_s: encounter.arrival_s(braking).ok_or(Absent::NotApproaching),
+            time_to_critical_s: foresight.arrival_s(braking).ok_or(Absent::NotApproaching),
             deceleration_mps2: braking,
             goal_thw_s: target.goal_thw_s,
             thw_at_critical_s: foreseen.ok_or(if at.front.is_some() { Absent::NotApproaching } else { Absent::NoLead }),

@@ -47,7 +47,7 @@ pub struct Solution {
 
 impl Encounter {
     /// D: R's way to the critical distance [m], 0 or more.
-    fn way_m(&self) -> f64 {
+    pub(super) fn way_m(&self) -> f64 {
         (self.rear_gap_m - self.critical_gap_m).max(0.0)
     }
 
@@ -169,7 +169,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(2000))]
+        #![proptest_config(ProptestConfig::with_cases(10_000))]
 
         #[test]
         fn it_equals_a_brute_force_scan(encounter in encounters(), gain in 0.1..3.0, bound in 0.5..3.0) {
