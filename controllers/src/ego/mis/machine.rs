@@ -49,6 +49,10 @@ pub(crate) const LETTING_GO_MPS3: f64 = 3.0;
 /// Time constant of E's actuators, as E knows it [s].
 const ACTUATOR_LAG_S: f64 = 0.15;
 
+/// A goal that the bound misses by no more than this counts as in reach [s]: half of what a margin may fall short by and
+/// still be called 2 s (1.9 s).
+const REACHED_WITHIN_S: f64 = 0.05;
+
 /// The margin counts as given back within this multiple of the ACC's gap.
 const RETURNED_WITHIN: f64 = 1.2;
 
@@ -337,7 +341,8 @@ impl Mis {
             deceleration_mps2: braking,
             goal_thw_s: target.goal_thw_s,
             thw_at_critical_s: foreseen.ok_or(if at.front.is_some() { Absent::NotApproaching } else { Absent::NoLead }),
-            goal_in_reach: solution.is_some_and(|solution| solution.in_reach),
+            goal_in_reach: solution.is_some()
+                && foreseen.is_some_and(|thw_s| thw_s >= target.goal_thw_s - REACHED_WITHIN_S),
         };
         (plan, braking)
     }
