@@ -84,7 +84,7 @@
 //!
 //! # The plan
 //! a* is the smallest braking with which THW_F, when R comes to d_c, is the headway at engaging plus `thw-gain-s`; where the
-//! bound does not suffice, the bound. The goal is out of reach where that misses it by more than 0.05 s. [`Encounter`] is the method's
+//! bound does not suffice, the bound. The goal is out of reach where that misses it by more than 0.08 s. [`Encounter`] is the method's
 //! kinematics and their solution in closed form, for braking that is there at once. E's is not: [`Response`] is how it builds
 //! up, and [`Foresight`] solves the same problem with it, by a bracketed search. All assume that F and R drive on as they do;
 //! the plan is worked out afresh at every step.
