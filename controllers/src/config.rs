@@ -109,6 +109,7 @@ mod tests {
         for text in [
             "{ ego-stack = { acc = { time-gap-s = \"$front-thw-s\" }, aeb = {}, mis = { critical-gap-m = 5.0 } } }",
             "{ prescribed = { profile = [[0.0, 30.0], [4.0, 20]] } }",
+            "{ prescribed = { acceleration-profile = [[2, -4.5], [5.0, \"$rear-cc1-s\"]] } }",
             "{ wiedemann99 = { cc1-s = 0.3, desired-speed-mps = 36, reaction-s = 0.9 } }",
             "{ idm = {} }",
             "{ overtaker = { cut-out-thw-s = \"$cut-out-thw-s\", follow = { wiedemann99 = { cc1-s = \"$rear-cc1-s\" } }, \

@@ -8,6 +8,7 @@ use closecall_traffic::{Check, ConfigError, Num, Parameters, Range, Stream};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::attention::{Lapse, LapseConfig, check_lapse};
 use super::perception::Perception;
 use super::reaction::{Reaction, ReactionConfig};
 use super::wiedemann99::{Emergency, brake_for_light, nearest, usually_desired_mps};
@@ -32,6 +33,8 @@ pub struct IdmConfig {
     pub comfortable_braking_mps2: Option<Num>,
     /// Reaction time [s]; none where absent.
     pub reaction_s: Option<ReactionConfig>,
+    /// Lapses of attention; none where absent. They need a reaction time.
+    pub lapse: Option<LapseConfig>,
 }
 
 /// A checked Intelligent Driver Model.
@@ -43,6 +46,7 @@ pub struct Idm {
     acceleration_mps2: f64,
     comfortable_braking_mps2: f64,
     reaction: Option<Reaction>,
+    lapse: Option<Lapse>,
 }
 
 impl Check for IdmConfig {
@@ -65,6 +69,7 @@ impl Check for IdmConfig {
             acceleration_mps2: or(&self.acceleration_mps2, "acceleration-mps2", Range::above(0.0, 8.0), 1.4)?,
             comfortable_braking_mps2: or(&self.comfortable_braking_mps2, "comfortable-braking-mps2", braking, 2.0)?,
             reaction: reaction.map(|config| config.check(parameters)).transpose()?,
+            lapse: check_lapse(self.lapse.as_ref(), reaction.is_some(), parameters)?,
         })
     }
 }
@@ -103,8 +108,8 @@ impl Driver for IdmDriver {
         let speed_mps = input.own.speed_mps;
         let desired_mps = *self.desired_mps.get_or_insert_with(|| usually_desired_mps(input));
         let wanted = if let Some(reaction) = self.model.reaction {
-            let senses = self.perception.get_or_insert_with(|| Perception::new(reaction.draw(rng), None));
-            let ahead = senses.look(input).ahead;
+            let new = || Perception::new(reaction.draw(rng), None).with_lapses(self.model.lapse);
+            let ahead = self.perception.get_or_insert_with(new).look(input, rng).ahead;
             let wanted = self.model.acceleration_mps2(speed_mps, desired_mps, ahead.as_ref().map(|seen| &seen.lead));
             brake_for_light(wanted, speed_mps, ahead.as_ref())
         } else {

@@ -3,6 +3,7 @@
 //! Each has the same three layers: *perception* (the truth, late and coarse), a *model* of following, which is pure and
 //! can be tested alone, and a *driver* that adapts the two to the loop.
 
+mod attention;
 mod idm;
 mod interface;
 mod overtaker;
@@ -11,12 +12,13 @@ mod prescribed;
 mod reaction;
 mod wiedemann99;
 
+pub use attention::{Lapse, LapseConfig};
 pub use idm::{Idm, IdmConfig};
 pub use interface::{
     Driver, DriverAction, DriverError, DriverInput, DriverNote, LaneChange, LaneNeighbours, Neighbour, Neighbours,
 };
-pub use overtaker::{FollowConfig, Overtaker, OvertakerConfig};
-pub use prescribed::{Prescribed, PrescribedConfig};
+pub use overtaker::{FollowConfig, Overtaker, OvertakerConfig, Return, ReturnConfig};
+pub use prescribed::{Prescribed, PrescribedConfig, RecordedConfig};
 pub use reaction::{LogNormalConfig, Reaction, ReactionConfig};
 pub use wiedemann99::{Regime, Thresholds, Wiedemann99, Wiedemann99Config, Wiedemann99Driver, Wiedemann99Model};
 
@@ -103,6 +105,8 @@ mod tests {
             reaction_s: ReactionConfig::Value(0.9.into()),
             lane_change_duration_s: None,
             evasive_lateral_mps2: None,
+            lapse: None,
+            returns: None,
         };
         assert!(overtaker.check(&none).unwrap().driver().step(&input, &mut rng).is_err());
     }

@@ -18,8 +18,9 @@
 //! - *Brake light first.* The brake light is seen with the same delay as everything else. The deceleration itself is
 //!   only felt gradually, from the change of speed; until then a driver who sees the light go on assumes a moderate one.
 
-use closecall_traffic::{Lane, Side, Time};
+use closecall_traffic::{Lane, Side, Stream, Time};
 
+use super::attention::{Attention, Lapse};
 use super::reaction::LONGEST_REACTION_S;
 use super::{DriverInput, LaneNeighbours, Lead, Neighbour};
 
@@ -66,6 +67,8 @@ struct Glance {
     own_speed_mps: f64,
     own_lane: Lane,
     ahead: Option<Seen>,
+    /// The side that was looked to.
+    side: Option<Side>,
     beside: Option<[Option<Seen>; 3]>,
 }
 
@@ -84,7 +87,7 @@ pub(crate) struct Perceived {
     pub(crate) d_m: f64,
 }
 
-/// The passing lane as the driver believes it to be now.
+/// A lane beside as the driver believes it to be now.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct PassingLane {
     pub(crate) lead: Option<Perceived>,
@@ -97,18 +100,27 @@ pub(crate) struct PassingLane {
 pub(crate) struct View {
     /// The nearest vehicle ahead, in the lane or in the way.
     pub(crate) ahead: Option<Perceived>,
-    /// The lane for overtaking, beside the lane that the driver was in at the glance; absent where there is none.
-    pub(crate) passing: Option<PassingLane>,
+    /// The lane on the side that the driver looked to, beside the lane that it was in; absent where there is none.
+    beside: Option<(Side, PassingLane)>,
     /// The lane that the driver was in at the glance.
     pub(crate) lane: Lane,
+}
+
+impl View {
+    /// The lane on `side`, where the driver has looked there.
+    pub(crate) fn beside(&self, side: Side) -> Option<&PassingLane> {
+        self.beside.as_ref().filter(|(looked_to, _)| *looked_to == side).map(|(_, lane)| lane)
+    }
 }
 
 /// The memory and the senses of one driver.
 #[derive(Clone, Debug)]
 pub(crate) struct Perception {
     reaction: Time,
+    attention: Attention,
     belief: Option<Belief>,
-    passing_side: Option<Side>,
+    /// The side that the driver looks to, if any.
+    side: Option<Side>,
     memory: Vec<Glance>,
     /// Where the oldest glance lies once the memory is full.
     oldest: usize,
@@ -136,12 +148,13 @@ struct Felt {
 }
 
 impl Perception {
-    /// Senses with a reaction time [s]; `passing_side` is the side to look at beside the own lane, if any.
-    pub(crate) fn new(reaction_s: f64, passing_side: Option<Side>) -> Self {
+    /// Senses with a reaction time [s]; `side` is the side to look to beside the own lane, if any.
+    pub(crate) fn new(reaction_s: f64, side: Option<Side>) -> Self {
         Self {
             reaction: Time::from_s(reaction_s),
+            attention: Attention::default(),
             belief: None,
-            passing_side,
+            side,
             memory: Vec::with_capacity(GLANCES),
             oldest: 0,
             current: 0,
@@ -149,9 +162,22 @@ impl Perception {
         }
     }
 
+    /// The same senses, with lapses of attention.
+    pub(crate) fn with_lapses(self, lapse: Option<Lapse>) -> Self {
+        Self { attention: Attention::new(lapse), ..self }
+    }
+
+    /// Looks to another side from now on.
+    pub(crate) fn look_to(&mut self, side: Side) {
+        self.side = Some(side);
+    }
+
     /// Takes in the present moment, and returns what the driver believes.
-    pub(crate) fn look(&mut self, input: &DriverInput<'_>) -> View {
-        self.remember(input);
+    pub(crate) fn look(&mut self, input: &DriverInput<'_>, rng: &mut Stream) -> View {
+        // Nobody begins to drive without a look.
+        if !self.attention.is_away(input.time, rng) || self.memory.is_empty() {
+            self.remember(input);
+        }
         let due = input.time - self.reaction;
         while self.current + 1 < self.memory.len() && self.glance(self.current + 1).time <= due {
             self.current += 1;
@@ -173,12 +199,15 @@ impl Perception {
             lead.speed_mps = (lead.speed_mps + self.felt.acceleration_mps2 * carry.elapsed_s).max(0.0);
             lead.acceleration_mps2 = believed_mps2;
         }
-        let passing = glance.beside.map(|[lead, alongside, follower]| PassingLane {
-            lead: lead.map(|seen| carry.ahead(&seen, carry.at_a_glance_mps(&seen))),
-            alongside: alongside.is_some(),
-            follower: follower.map(|seen| carry.behind(&seen)),
+        let beside = glance.side.zip(glance.beside).map(|(side, [lead, alongside, follower])| {
+            let lane = PassingLane {
+                lead: lead.map(|seen| carry.ahead(&seen, carry.at_a_glance_mps(&seen))),
+                alongside: alongside.is_some(),
+                follower: follower.map(|seen| carry.behind(&seen)),
+            };
+            (side, lane)
         });
-        View { ahead, passing, lane: glance.own_lane }
+        View { ahead, beside, lane: glance.own_lane }
     }
 
     fn glance(&self, place: usize) -> &Glance {
@@ -190,7 +219,7 @@ impl Perception {
         if length > 0 && input.time - self.glance(length - 1).time < GLANCE_PERIOD {
             return;
         }
-        let glance = Glance::of(input, self.passing_side);
+        let glance = Glance::of(input, self.side);
         if length < GLANCES {
             self.memory.push(glance);
         } else {
@@ -244,7 +273,7 @@ impl Perception {
 }
 
 impl Glance {
-    fn of(input: &DriverInput<'_>, passing_side: Option<Side>) -> Self {
+    fn of(input: &DriverInput<'_>, side: Option<Side>) -> Self {
         let near = input.neighbours;
         let own_d_m = input.own.d_m;
         let nearer = match (near.own.lead.as_ref(), near.in_path.as_ref()) {
@@ -252,7 +281,7 @@ impl Glance {
             (Some(lead), _) => Some(lead),
             (None, in_path) => in_path,
         };
-        let beside: Option<&LaneNeighbours> = match passing_side {
+        let beside: Option<&LaneNeighbours> = match side {
             Some(Side::Left) => near.left.as_ref(),
             Some(Side::Right) => near.right.as_ref(),
             None => None,
@@ -264,6 +293,7 @@ impl Glance {
             own_speed_mps: input.own.speed_mps,
             own_lane: input.road.lane_at(own_d_m),
             ahead: nearer.map(seen),
+            side,
             beside: beside.map(|lane| [&lane.lead, &lane.alongside, &lane.follower].map(|n| n.as_ref().map(seen))),
         }
     }

@@ -158,6 +158,8 @@ fn rear_driver(case: &Case, drawn: &Sample) -> HumanDriver {
             reaction_s: reaction,
             lane_change_duration_s: Some(drawn.duration_s.into()),
             evasive_lateral_mps2: None,
+            lapse: None,
+            returns: None,
         })
     })
 }
@@ -178,9 +180,7 @@ pub(crate) fn world(case: &Case, drawn: &Sample, index: u64, with_mis: bool) -> 
     let car = Vehicle::typical(VehicleClass::Car);
     let rear = Vehicle::typical(drawn.class);
     let rng = |name: &str| Box::new(stream(case.seed, index, &ActorId::new(name).unwrap(), "driver"));
-    let keeps = |speed: f64| {
-        human(&DriverConfig::Prescribed(PrescribedConfig { profile: vec![[0.0.into(), speed.into()]] })).build()
-    };
+    let keeps = |speed: f64| human(&DriverConfig::Prescribed(PrescribedConfig::speeds(&[[0.0, speed]]))).build();
     let cruise = drawn.cruise_mps;
     let car_m = car.dimensions.length_m;
     let front_s = 500.0 + car_m + drawn.front_thw_s * cruise;

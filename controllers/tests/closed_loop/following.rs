@@ -7,6 +7,12 @@ use proptest::prelude::*;
 use crate::encounter::human;
 use crate::world::{Actor, Who, World, gap_m};
 
+/// cc0.
+const STANDSTILL_GAP_M: f64 = 1.5;
+
+/// How much nearer than cc0 one may come to rest [m].
+const REST_M: f64 = 0.2;
+
 /// A leader at 30 m/s that brakes at 5 s, and a follower at the same speed `gap` behind it.
 fn pair(gap: f64, cc1_s: f64, reaction_s: f64, brake_mps2: f64) -> World {
     let road = Road::straight(3);
@@ -15,7 +21,7 @@ fn pair(gap: f64, cc1_s: f64, reaction_s: f64, brake_mps2: f64) -> World {
     let who = |config: &DriverConfig, name: &str| {
         Who::Human(human(config).build(), Box::new(stream(0, 0, &ActorId::new(name).unwrap(), "driver")))
     };
-    let leads = DriverConfig::Prescribed(PrescribedConfig { profile: vec![[0.0.into(), 30.0.into()]] });
+    let leads = DriverConfig::Prescribed(PrescribedConfig::speeds(&[[0.0, 30.0]]));
     let follows = DriverConfig::Wiedemann99(Wiedemann99Config {
         cc1_s: Some(cc1_s.into()),
         reaction_s: Some(ReactionConfig::Value(reaction_s.into())),
@@ -65,6 +71,8 @@ proptest! {
 
     /// The plain braking case: a driver who follows in its band behind a leader who brakes to standstill at a constant rate.
     /// All who come to a stop roll up to cc0, so that reaction decides the least gap where room is short, and nothing else.
+    /// One exception: who had to brake hard to the end may come to rest up to 0.2 m nearer than cc0, and how much of that
+    /// it is does not follow the reaction time.
     #[test]
     fn a_longer_reaction_never_gives_a_larger_least_gap(
         in_band in 0.2..3.8, cc1 in 0.2..1.5, reaction in 0.0..1.8, longer in 0.05..1.0, braking in 2.0..8.0,
@@ -72,6 +80,7 @@ proptest! {
         let gap = 1.5 + cc1 * 30.0 + in_band;
         let quick = ending(pair(gap, cc1, reaction, braking));
         let slow = ending(pair(gap, cc1, reaction + longer, braking));
-        prop_assert!(slow <= quick + 0.05, "{slow} {quick}");
+        let tolerance_m = if quick > STANDSTILL_GAP_M - REST_M { REST_M } else { 0.02 };
+        prop_assert!(slow <= quick + tolerance_m, "{slow} {quick}");
     }
 }

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::io::Write;
 
 use closecall_controllers::{DriverConfig, PrescribedConfig, Wiedemann99Config};
-use closecall_traffic::{ActorId, Lane, Num, Road, Time, Vehicle, VehicleClass, stream};
+use closecall_traffic::{ActorId, Lane, Road, Time, Vehicle, VehicleClass, stream};
 
 use crate::encounter::human;
 use crate::world::{Actor, Who, World, gap_m};
@@ -53,8 +53,8 @@ fn ours(case: &Case) -> Vec<(f64, f64, f64)> {
     let who = |config: &DriverConfig, name: &str| {
         Who::Human(human(config).build(), Box::new(stream(0, 0, &ActorId::new(name).unwrap(), "driver")))
     };
-    let profile = case.rows.iter().map(|row| [Num::Fixed(row.time_s), Num::Fixed(row.leader_mps)]).collect();
-    let leads = DriverConfig::Prescribed(PrescribedConfig { profile });
+    let profile: Vec<_> = case.rows.iter().map(|row| [row.time_s, row.leader_mps]).collect();
+    let leads = DriverConfig::Prescribed(PrescribedConfig::speeds(&profile));
     let follows = DriverConfig::Wiedemann99(Wiedemann99Config {
         cc1_s: Some(case.cc1_s.into()),
         desired_speed_mps: Some(36.0.into()),

@@ -8,6 +8,7 @@
 mod encounter;
 mod following;
 mod golden;
+mod overtaking;
 mod paper_figure;
 mod study;
 mod world;

@@ -5,6 +5,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::driver::OvertakerDriver;
+use super::returning::{Return, ReturnConfig};
+use crate::driver::attention::{Lapse, LapseConfig, check_lapse};
 use crate::driver::reaction::{Reaction, ReactionConfig};
 use crate::driver::{Wiedemann99, Wiedemann99Config};
 
@@ -41,6 +43,10 @@ pub struct OvertakerConfig {
     /// Lateral acceleration that it accepts in need, to get clear sooner than it had meant to [m/s²]; 1. With 0 it only
     /// brakes.
     pub evasive_lateral_mps2: Option<Num>,
+    /// Lapses of attention; none where absent.
+    pub lapse: Option<LapseConfig>,
+    /// That it changes back to the lane that it came from, once it has passed; it stays where absent.
+    pub returns: Option<ReturnConfig>,
 }
 
 /// A checked overtaking driver.
@@ -51,6 +57,8 @@ pub struct Overtaker {
     pub(crate) reaction: Reaction,
     pub(crate) duration_s: f64,
     pub(crate) evasive_lateral_mps2: f64,
+    pub(crate) lapse: Option<Lapse>,
+    pub(crate) returns: Option<Return>,
 }
 
 impl Overtaker {
@@ -105,8 +113,15 @@ impl Check for OvertakerConfig {
             Some(num) => parameters.number(num, "lane-change-duration-s", Range::closed(1.5, 20.0))?,
             None => DEFAULT_DURATION_S,
         };
-        let reaction = self.reaction_s.check(parameters)?;
-        Ok(Overtaker { cut_out_thw_s, follow, reaction, duration_s, evasive_lateral_mps2 })
+        Ok(Overtaker {
+            cut_out_thw_s,
+            follow,
+            reaction: self.reaction_s.check(parameters)?,
+            duration_s,
+            evasive_lateral_mps2,
+            lapse: check_lapse(self.lapse.as_ref(), true, parameters)?,
+            returns: self.returns.as_ref().map(|config| config.check(parameters)).transpose()?,
+        })
     }
 }
 
@@ -121,6 +136,8 @@ mod tests {
             reaction_s: ReactionConfig::Value(0.9.into()),
             lane_change_duration_s: None,
             evasive_lateral_mps2: None,
+            lapse: None,
+            returns: None,
         }
     }
 

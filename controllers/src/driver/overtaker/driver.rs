@@ -1,9 +1,10 @@
 //! The overtaking driver in the loop.
 
-use closecall_traffic::{Indicator, Lane, Side, Stream};
+use closecall_traffic::{Indicator, Lane, Side, Stream, Time};
 
 use super::acceptance::{Intent, Tolerance};
 use super::conflict::Course;
+use super::returning::{indicator, opposite};
 use super::{Overtaker, path};
 use crate::driver::perception::{Perceived, Perception, View};
 use crate::driver::wiedemann99::{Emergency, brake_for_light, lift_off_for_light};
@@ -21,6 +22,9 @@ const BRAKING_MARGIN: f64 = 1.2;
 /// Room sideways between two boxes that counts as clear [m].
 const CLEAR_SIDEWAYS_M: f64 = 0.1;
 
+/// How long before pulling out a driver signals [s]: a choice, of the order of the three flashes of an indicator.
+const SIGNALS_BEFORE_S: f64 = 2.0;
+
 /// Duration of a change back into the own lane [s].
 const CHANGE_BACK_S: f64 = 3.0;
 
@@ -32,7 +36,7 @@ const QUINTIC_PEAK: f64 = 5.773_502_691_896_258;
 
 /// What the driver is about.
 #[derive(Clone, Copy, Debug)]
-enum Phase {
+pub(super) enum Phase {
     /// Comes up behind, or follows.
     Approaching,
     /// Changes to the passing lane.
@@ -42,12 +46,23 @@ enum Phase {
     /// Drives past in the passing lane.
     Overtaking { overtaken: Option<usize> },
     /// Has passed.
-    Passed,
+    Passed(Past),
+    /// Changes back to the lane that it came from.
+    Returning { home: Lane, past: Past },
+}
+
+/// What is behind.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Past {
+    /// Since when.
+    pub(super) since: Time,
+    /// Which vehicle.
+    pub(super) overtaken: Option<usize>,
 }
 
 /// A lane change under way.
 #[derive(Clone, Copy, Debug)]
-struct Change {
+pub(super) struct Change {
     home: Lane,
     target: Lane,
     overtaken: Option<usize>,
@@ -67,11 +82,11 @@ impl Change {
 /// A human who overtakes.
 #[derive(Clone, Debug)]
 pub(crate) struct OvertakerDriver {
-    settings: Overtaker,
+    pub(super) settings: Overtaker,
     model: Wiedemann99Model,
     desired_mps: Option<f64>,
     perception: Option<Perception>,
-    phase: Phase,
+    pub(super) phase: Phase,
     emergency: Emergency,
 }
 
@@ -94,15 +109,16 @@ impl Driver for OvertakerDriver {
         let speed_mps = input.own.speed_mps;
         let desired_mps = *self.desired_mps.get_or_insert(speed_mps);
         let (reaction, side) = (self.settings.reaction, input.road.overtaking_side());
-        let senses = self.perception.get_or_insert_with(|| Perception::new(reaction.draw(rng), Some(side)));
-        let view = senses.look(input);
+        let new = || Perception::new(reaction.draw(rng), Some(side)).with_lapses(self.settings.lapse);
+        let view = self.perception.get_or_insert_with(new).look(input, rng);
         let moment = Moment { input, view: &view, side, speed_mps, desired_mps };
         let mut action = match self.phase {
             Phase::Approaching => self.approach(&moment),
             Phase::Changing(change) => self.change(&moment, change),
             Phase::Aborting { home } => self.abort(&moment, home),
             Phase::Overtaking { overtaken } => self.overtake(&moment, overtaken),
-            Phase::Passed => self.cruise(&moment, None),
+            Phase::Passed(past) => self.cruise_past(&moment, past),
+            Phase::Returning { home, past } => self.change_back(&moment, home, past),
         };
         action.acceleration_mps2 =
             finite(action.acceleration_mps2, "acceleration of an overtaking driver", input.time)?;
@@ -113,20 +129,23 @@ impl Driver for OvertakerDriver {
 }
 
 /// One step's input, and what the driver makes of it.
-struct Moment<'a> {
-    input: &'a DriverInput<'a>,
-    view: &'a View,
-    side: Side,
-    speed_mps: f64,
+pub(super) struct Moment<'a> {
+    pub(super) input: &'a DriverInput<'a>,
+    pub(super) view: &'a View,
+    /// The side on which one overtakes.
+    pub(super) side: Side,
+    pub(super) speed_mps: f64,
     desired_mps: f64,
 }
 
 impl Moment<'_> {
     fn indicator(&self) -> Indicator {
-        match self.side {
-            Side::Left => Indicator::Left,
-            Side::Right => Indicator::Right,
-        }
+        indicator(self.side)
+    }
+
+    /// The vehicle ahead, unless it is the overtaken one: what was seen ahead a reaction time ago may be passed by now.
+    pub(super) fn ahead_but(&self, overtaken: Option<usize>) -> Option<&Perceived> {
+        self.view.ahead.as_ref().filter(|seen| Some(seen.actor) != overtaken)
     }
 
     /// A lane change from here to `target`, to be clear of `ahead`.
@@ -158,11 +177,11 @@ impl OvertakerDriver {
         let home = moment.input.road.lane_at(moment.input.own.d_m);
         let target = moment.input.road.beside(home, moment.side);
         let (Some(ahead), Some(target), Some(lane)) =
-            (moment.view.ahead.as_ref(), target, moment.view.passing.as_ref())
+            (moment.view.ahead.as_ref(), target, moment.view.beside(moment.side))
         else {
             return self.cruise(moment, moment.view.ahead.as_ref());
         };
-        let intent = self.intent(moment, ahead, Tolerance::TO_START);
+        let intent = self.intent(moment, ahead.lead.speed_mps, Tolerance::TO_START);
         let wants_to = moment.desired_mps > ahead.lead.speed_mps;
         if !wants_to || !intent.accepts(lane) {
             return self.cruise(moment, Some(ahead));
@@ -177,7 +196,10 @@ impl OvertakerDriver {
         let pull_out = course.gap_after_m(crossing_m) <= wanted_gap_m
             || course.gap_after_m(course.way_to_clear_m) <= course.least_gap_m;
         if !pull_out {
-            return DriverAction { acceleration_mps2: keep_mps2, ..DriverAction::default() };
+            let soon_m = crossing_m + SIGNALS_BEFORE_S * moment.speed_mps;
+            let signals = course.gap_after_m(soon_m) <= wanted_gap_m;
+            let indicator = if signals { moment.indicator() } else { Indicator::Off };
+            return DriverAction { acceleration_mps2: keep_mps2, indicator, ..DriverAction::default() };
         }
         self.phase = Phase::Changing(change);
         DriverAction {
@@ -226,21 +248,27 @@ impl OvertakerDriver {
     }
 
     fn overtake(&mut self, moment: &Moment<'_>, overtaken: Option<usize>) -> DriverAction {
-        // What was seen ahead a reaction time ago may still be the vehicle that is passed by now.
-        let ahead = moment.view.ahead.as_ref().filter(|seen| Some(seen.actor) != overtaken);
-        let mut action = self.cruise(moment, ahead);
+        let mut action = self.cruise(moment, moment.ahead_but(overtaken));
         if moment.input.changing_to.is_some() {
             action.indicator = moment.indicator();
         }
         if has_passed(moment, overtaken) {
-            self.phase = Phase::Passed;
+            self.phase = Phase::Passed(Past { since: moment.input.time, overtaken });
+            self.look_to(opposite(moment.side));
             action.note = Some(DriverNote::Passed);
         }
         action
     }
 
+    /// Looks to a side from now on.
+    pub(super) fn look_to(&mut self, side: Side) {
+        if let Some(senses) = &mut self.perception {
+            senses.look_to(side);
+        }
+    }
+
     /// Drives on, or follows `ahead` by Wiedemann 99.
-    fn cruise(&mut self, moment: &Moment<'_>, ahead: Option<&Perceived>) -> DriverAction {
+    pub(super) fn cruise(&mut self, moment: &Moment<'_>, ahead: Option<&Perceived>) -> DriverAction {
         let lead = ahead.map(|seen| &seen.lead);
         let wanted = self.model.acceleration_mps2(moment.speed_mps, moment.desired_mps, lead);
         DriverAction { acceleration_mps2: brake_for_light(wanted, moment.speed_mps, ahead), ..DriverAction::default() }
@@ -252,14 +280,14 @@ impl OvertakerDriver {
         let seen = if moment.view.lane == target {
             moment.view.ahead.as_ref().filter(|seen| Some(seen.actor) != overtaken)
         } else {
-            moment.view.passing.as_ref().and_then(|lane| lane.lead.as_ref())
+            moment.view.beside(moment.side).and_then(|lane| lane.lead.as_ref())
         };
         self.model.acceleration_mps2(moment.speed_mps, moment.desired_mps, seen.map(|seen| &seen.lead))
     }
 
     fn must_abort(&self, moment: &Moment<'_>, overtaken: Option<&Perceived>) -> bool {
-        let Some((ahead, lane)) = overtaken.zip(moment.view.passing.as_ref()) else { return false };
-        !self.intent(moment, ahead, Tolerance::TO_GO_ON).accepts(lane)
+        let Some((ahead, lane)) = overtaken.zip(moment.view.beside(moment.side)) else { return false };
+        !self.intent(moment, ahead.lead.speed_mps, Tolerance::TO_GO_ON).accepts(lane)
     }
 
     /// The vehicle that is being overtaken, while it is the nearest ahead.
@@ -267,10 +295,10 @@ impl OvertakerDriver {
         moment.view.ahead.as_ref().filter(|seen| Some(seen.actor) == actor)
     }
 
-    fn intent(&self, moment: &Moment<'_>, ahead: &Perceived, tolerance: Tolerance) -> Intent {
+    pub(super) fn intent(&self, moment: &Moment<'_>, slow_mps: f64, tolerance: Tolerance) -> Intent {
         Intent {
             speed_mps: moment.speed_mps,
-            slow_mps: ahead.lead.speed_mps,
+            slow_mps,
             safe_gap_m: self.settings.follow.safe_gap_m(moment.speed_mps),
             tolerance,
         }

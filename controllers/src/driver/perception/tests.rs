@@ -1,7 +1,7 @@
-use closecall_traffic::{Indicator, Road, Vehicle, VehicleClass, VehicleState};
+use closecall_traffic::{ActorId, Check, Indicator, Parameters, Road, Vehicle, VehicleClass, VehicleState, stream};
 
 use super::*;
-use crate::driver::Neighbours;
+use crate::driver::{LapseConfig, Neighbours};
 
 const STEP: Time = Time::from_ms(10);
 
@@ -30,7 +30,8 @@ fn look(
     let vehicle = Vehicle::typical(VehicleClass::Car);
     let input =
         DriverInput { time, vehicle: &vehicle, own: &own, neighbours: &neighbours, road: &road, changing_to: None };
-    senses.look(&input).ahead.unwrap()
+    let mut rng = stream(0, 0, &ActorId::new("rear").unwrap(), "driver");
+    senses.look(&input, &mut rng).ahead.unwrap()
 }
 
 #[test]
@@ -104,4 +105,19 @@ fn memory_has_an_end_and_goes_on() {
     }
     assert_eq!(senses.memory.len(), GLANCES);
     assert_eq!(senses.memory.capacity(), GLANCES);
+}
+
+#[test]
+fn who_looks_away_misses_a_brake_light_until_a_reaction_after_looking_back() {
+    let lapse = LapseConfig { at_s: Some(1.5.into()), every_s: None, duration_s: 2.0.into() };
+    let lapse = lapse.check(&Parameters::default()).unwrap();
+    let mut senses = Perception::new(0.9, None).with_lapses(Some(lapse));
+    let mut time = Time::ZERO;
+    let seen = |senses: &mut Perception, time: Time| {
+        look(senses, time, (30.0, 30.0, 0.0, time >= Time::from_s(2.0))).brake_light
+    };
+    while !seen(&mut senses, time) {
+        time += STEP;
+    }
+    assert_eq!(time, Time::from_s(1.5 + 2.0 + 0.9));
 }

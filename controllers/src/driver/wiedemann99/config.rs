@@ -4,7 +4,8 @@ use closecall_traffic::{Check, ConfigError, Num, Parameters, Range};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::super::reaction::{Reaction, ReactionConfig};
+use crate::driver::attention::{Lapse, LapseConfig, check_lapse};
+use crate::driver::reaction::{Reaction, ReactionConfig};
 
 /// Wiedemann 99 as a scenario file describes it; what is absent has Vissim's published default.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -37,6 +38,8 @@ pub struct Wiedemann99Config {
     /// given, the driver perceives late, notices speed differences above the looming threshold only, and sees brake
     /// lights.
     pub reaction_s: Option<ReactionConfig>,
+    /// Lapses of attention; none where absent. They need a reaction time.
+    pub lapse: Option<LapseConfig>,
 }
 
 /// The ten parameters.
@@ -76,6 +79,7 @@ pub struct Wiedemann99 {
     pub(crate) parameters: Parameters99,
     pub(crate) desired_speed_mps: Option<f64>,
     pub(crate) reaction: Option<Reaction>,
+    pub(crate) lapse: Option<Lapse>,
 }
 
 impl Wiedemann99 {
@@ -113,6 +117,7 @@ impl Check for Wiedemann99Config {
                 .map(|num| parameters.number(num, "desired-speed-mps", Range::closed(0.0, 100.0)))
                 .transpose()?,
             reaction: reaction.map(|config| config.check(parameters)).transpose()?,
+            lapse: check_lapse(self.lapse.as_ref(), reaction.is_some(), parameters)?,
         })
     }
 }

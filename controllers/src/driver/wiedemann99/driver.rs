@@ -47,7 +47,8 @@ impl Wiedemann99Driver {
 
     fn lead(&mut self, input: &DriverInput<'_>, rng: &mut Stream) -> Option<Perceived> {
         let reaction = self.settings.reaction?;
-        self.perception.get_or_insert_with(|| Perception::new(reaction.draw(rng), None)).look(input).ahead
+        let new = || Perception::new(reaction.draw(rng), None).with_lapses(self.settings.lapse);
+        self.perception.get_or_insert_with(new).look(input, rng).ahead
     }
 }
 

@@ -5,7 +5,7 @@ use crate::driver::wiedemann99::Wiedemann99;
 
 fn settings(cc1_s: f64) -> Wiedemann99 {
     let parameters = Parameters99 { cc1_s, ..Parameters99::VISSIM };
-    Wiedemann99 { parameters, desired_speed_mps: None, reaction: None }
+    Wiedemann99 { parameters, desired_speed_mps: None, reaction: None, lapse: None }
 }
 
 /// A follower behind a leader: gap, own speed, own acceleration after the actuators' lag of 0.15 s.

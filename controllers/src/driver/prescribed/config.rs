@@ -1,0 +1,188 @@
+//! What a prescribed driver is given by the scenario.
+
+use closecall_traffic::{Check, ConfigError, Num, Parameters, Problem, Range};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::driver::PrescribedDriver;
+use super::profile::{SpeedProfile, Step};
+
+/// Latest time of a profile [s].
+const LATEST_S: f64 = 1e6;
+
+/// Fastest that a profile goes [m/s].
+const FASTEST_MPS: f64 = 100.0;
+
+/// A profile as a scenario file describes it: exactly one of the three keys.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
+pub struct PrescribedConfig {
+    /// Pairs of time [s] and speed [m/s], times rising; linear in between, constant before and after.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub profile: Option<Vec<[Num; 2]>>,
+    /// Pairs of time [s] and acceleration [m/s²], times rising; each holds until the next, and before the first there is
+    /// none. From the speed at the start; braking ends at standstill, accelerating at 100 m/s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub acceleration_profile: Option<Vec<[Num; 2]>>,
+    /// The speeds of a recorded vehicle.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub recorded: Option<RecordedConfig>,
+}
+
+/// A track of a recording, which is read together with the scenario file and takes the place of `profile` in its text.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct RecordedConfig {
+    /// The recording's file, from the scenario file's folder.
+    pub file: String,
+    /// The number of the track.
+    pub track_id: u64,
+    /// The time of the run at which the track begins [s]; 0 where absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from_s: Option<f64>,
+}
+
+/// A checked profile: at least one point, times rising.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Prescribed(Points);
+
+#[derive(Clone, Debug, PartialEq)]
+enum Points {
+    Speeds(SpeedProfile),
+    Accelerations(Vec<Step>),
+}
+
+impl PrescribedConfig {
+    /// A profile of times [s] and speeds [m/s].
+    pub fn speeds(points: &[[f64; 2]]) -> Self {
+        let profile = points.iter().map(|pair| pair.map(Num::Fixed)).collect();
+        Self { profile: Some(profile), ..Self::default() }
+    }
+}
+
+impl Check for PrescribedConfig {
+    type Checked = Prescribed;
+
+    fn check(&self, parameters: &Parameters) -> Result<Prescribed, ConfigError> {
+        match (&self.profile, &self.acceleration_profile, &self.recorded) {
+            (Some(pairs), None, None) => {
+                let points = check_pairs(pairs, "profile", &SPEED, parameters)?;
+                Ok(Prescribed(Points::Speeds(SpeedProfile::new(points))))
+            }
+            (None, Some(pairs), None) => {
+                let steps = check_pairs(pairs, "acceleration-profile", &ACCELERATION, parameters)?;
+                let steps = steps.into_iter().map(|(from_s, rate_mps2)| Step { from_s, rate_mps2 }).collect();
+                Ok(Prescribed(Points::Accelerations(steps)))
+            }
+            (None, None, Some(_)) => {
+                let needed = "the recording's speeds, which are read together with a scenario file";
+                Err(ConfigError::new("recorded", Problem::Missing { needed }))
+            }
+            (None, None, None) => {
+                let needed = "one of `profile`, `acceleration-profile` and `recorded`";
+                Err(ConfigError::new("profile", Problem::Missing { needed }))
+            }
+            (profile, ..) => {
+                let other = if profile.is_some() { "profile" } else { "acceleration-profile" };
+                let key = if profile.is_some() && self.acceleration_profile.is_some() {
+                    "acceleration-profile"
+                } else {
+                    "recorded"
+                };
+                let rule = "only one of the three may be given".to_owned();
+                Err(ConfigError::new(key, Problem::Contradiction { other, rule }))
+            }
+        }
+    }
+}
+
+/// The second value of each pair.
+struct Quantity {
+    key: &'static str,
+    range: Range,
+    needed: &'static str,
+}
+
+const SPEED: Quantity = Quantity {
+    key: "speed-mps",
+    range: Range::closed(0.0, FASTEST_MPS),
+    needed: "at least one pair of time and speed",
+};
+
+const ACCELERATION: Quantity = Quantity {
+    key: "acceleration-mps2",
+    range: Range::closed(-12.0, 12.0),
+    needed: "at least one pair of time and acceleration",
+};
+
+fn check_pairs(
+    pairs: &[[Num; 2]],
+    key: &str,
+    quantity: &Quantity,
+    parameters: &Parameters,
+) -> Result<Vec<(f64, f64)>, ConfigError> {
+    if pairs.is_empty() {
+        return Err(ConfigError::new(key, Problem::Missing { needed: quantity.needed }));
+    }
+    let mut points: Vec<(f64, f64)> = Vec::with_capacity(pairs.len());
+    for (place, [time, value]) in pairs.iter().enumerate() {
+        let here = |error: ConfigError| error.within_index(place).within(key);
+        let earliest = match points.last() {
+            Some((last, _)) => Range::above(*last, LATEST_S),
+            None => Range::closed(0.0, LATEST_S),
+        };
+        let time_s = parameters.number(time, "time-s", earliest).map_err(here)?;
+        points.push((time_s, parameters.number(value, quantity.key, quantity.range).map_err(here)?));
+    }
+    Ok(points)
+}
+
+impl Prescribed {
+    /// The profile of one who drives at `start_mps` at time zero.
+    pub(super) fn speeds_from(&self, start_mps: f64) -> SpeedProfile {
+        match &self.0 {
+            Points::Speeds(profile) => profile.clone(),
+            Points::Accelerations(steps) => SpeedProfile::integrated(start_mps, steps, FASTEST_MPS),
+        }
+    }
+
+    /// A driver for one run.
+    pub(crate) fn driver(&self) -> PrescribedDriver {
+        PrescribedDriver::new(self.clone())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pairs(points: &[[f64; 2]]) -> Option<Vec<[Num; 2]>> {
+        PrescribedConfig::speeds(points).profile
+    }
+
+    #[test]
+    fn times_that_do_not_rise_are_refused_with_their_place() {
+        let none = Parameters::default();
+        let twice = [[0.0, 3.0], [0.0, 2.0]];
+        let error = PrescribedConfig::speeds(&twice).check(&none).unwrap_err();
+        assert_eq!(error.path.to_string(), "profile[1].time-s");
+        let accelerates = PrescribedConfig { acceleration_profile: pairs(&twice), ..PrescribedConfig::default() };
+        let error = accelerates.check(&none).unwrap_err();
+        assert_eq!(error.path.to_string(), "acceleration-profile[1].time-s");
+        assert!(PrescribedConfig::speeds(&[]).check(&none).is_err());
+        assert!(PrescribedConfig::speeds(&[[f64::NAN, 3.0]]).check(&none).is_err());
+    }
+
+    #[test]
+    fn exactly_one_profile_is_needed() {
+        let none = Parameters::default();
+        assert!(PrescribedConfig::default().check(&none).is_err());
+        let recorded = Some(RecordedConfig { file: "a.csv".to_owned(), track_id: 1, from_s: None });
+        let (profile, acceleration_profile) = (pairs(&[[0.0, 3.0]]), pairs(&[[0.0, -3.0]]));
+        let path = |config: PrescribedConfig| config.check(&none).unwrap_err().path.to_string();
+        let both = PrescribedConfig { profile: profile.clone(), acceleration_profile, recorded: None };
+        assert_eq!(path(both.clone()), "acceleration-profile");
+        assert_eq!(path(PrescribedConfig { profile: None, recorded: recorded.clone(), ..both.clone() }), "recorded");
+        assert_eq!(path(PrescribedConfig { acceleration_profile: None, recorded, ..both }), "recorded");
+    }
+}
