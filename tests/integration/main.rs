@@ -4,6 +4,7 @@
 
 mod comparison;
 mod determinism;
+mod drivers;
 mod durability;
 mod engagement;
 mod exec_controller;
