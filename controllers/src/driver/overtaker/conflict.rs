@@ -41,6 +41,14 @@ impl Course {
         }
     }
 
+    /// The time headway after driving on for `way_m` while slowing down by `slowing_mps2`, which is 0 or more [s].
+    pub(super) fn thw_after_s(&self, way_m: f64, slowing_mps2: f64) -> f64 {
+        let square = self.speed_mps * self.speed_mps - 2.0 * slowing_mps2 * way_m;
+        let then_mps = square.max(STANDING_MPS * STANDING_MPS).sqrt();
+        let time_s = 2.0 * way_m / (self.speed_mps + then_mps).max(STANDING_MPS);
+        (self.lead.gap_m + self.lead_way_m(time_s) - way_m) / then_mps
+    }
+
     /// The gap after driving on for `way_m` at the present speed [m].
     pub(super) fn gap_after_m(&self, way_m: f64) -> f64 {
         let time_s = way_m / self.speed_mps.max(STANDING_MPS);
@@ -100,6 +108,15 @@ mod tests {
         let course = course(20.0, 40.0, 30.0, 0.0, 40.0);
         assert_eq!(course.needed_braking_mps2(), 0.0);
         assert!((course.gap_after_m(40.0) - 10.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn one_who_slows_down_comes_later_and_finds_more_headway() {
+        let course = course(20.0, 40.0, 30.0, 0.0, 40.0);
+        assert!((course.thw_after_s(40.0, 0.0) - 10.0 / 40.0).abs() < 1e-12);
+        // 40 m from 40 m/s at 3.75 m/s² end at √1300 = 36.056 m/s after 1.0518 s, in which the lead drives 31.55 m.
+        let expected_s = (20.0 + 30.0 * 80.0 / (40.0 + 1300.0_f64.sqrt()) - 40.0) / 1300.0_f64.sqrt();
+        assert!((course.thw_after_s(40.0, 3.75) - expected_s).abs() < 1e-12);
     }
 
     proptest! {

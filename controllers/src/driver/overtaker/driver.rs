@@ -192,12 +192,12 @@ impl OvertakerDriver {
         let keep_mps2 = lift_off_for_light(keep_mps2, moment.speed_mps, Some(ahead));
         // The centre crosses the marking half a lane width to the side: half of the way where it starts at the centre.
         let crossing_m = path::along(0.5) * change.way_m;
-        let wanted_gap_m = self.settings.cut_out_thw_s * moment.speed_mps;
-        let pull_out = course.gap_after_m(crossing_m) <= wanted_gap_m
+        let slowing_mps2 = (-keep_mps2).max(0.0);
+        let pull_out = course.thw_after_s(crossing_m, slowing_mps2) <= self.settings.cut_out_thw_s
             || course.gap_after_m(course.way_to_clear_m) <= course.least_gap_m;
         if !pull_out {
             let soon_m = crossing_m + SIGNALS_BEFORE_S * moment.speed_mps;
-            let signals = course.gap_after_m(soon_m) <= wanted_gap_m;
+            let signals = course.thw_after_s(soon_m, slowing_mps2) <= self.settings.cut_out_thw_s;
             let indicator = if signals { moment.indicator() } else { Indicator::Off };
             return DriverAction { acceleration_mps2: keep_mps2, indicator, ..DriverAction::default() };
         }
