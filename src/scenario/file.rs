@@ -8,7 +8,8 @@ use closecall_traffic::{ActorId, Check, ConfigError, ParameterName, Parameters};
 use toml_edit::DocumentMut;
 
 use super::edit::{Setting, SettingError};
-use super::{Scenario, ScenarioConfig, locate};
+use super::recorded::RecordedError;
+use super::{Scenario, ScenarioConfig, locate, recorded};
 
 /// How many random samples `check` tries beside the nominal values and the bounds.
 const TRIED_SAMPLES: u64 = 64;
@@ -111,6 +112,12 @@ impl ScenarioFile {
             text = apply(path, &text, settings)?;
             config = deserialize(path, &text)?;
         }
+        if let Some(inlined) =
+            recorded::inline(path, &text, &config).map_err(|error| recorded_error(path, &text, &error))?
+        {
+            text = inlined;
+            config = deserialize(path, &text)?;
+        }
         let space = config.parameters.check().map_err(|error| {
             let source = error.within("parameters");
             let line = locate::line_of(&text, &source.path);
@@ -192,6 +199,12 @@ fn apply(path: &Path, text: &str, settings: &[Setting]) -> Result<String, Scenar
         setting.apply(&mut document).map_err(|source| ScenarioError::Set { path: path.to_owned(), source })?;
     }
     Ok(document.to_string())
+}
+
+/// An error at the first line that speaks of a recording.
+fn recorded_error(path: &Path, text: &str, error: &RecordedError) -> ScenarioError {
+    let line = text.lines().position(|line| line.contains("recorded")).map_or(1, |index| index + 1);
+    ScenarioError::Syntax { path: path.to_owned(), line, message: format!("`recorded`: {error}") }
 }
 
 fn deserialize(path: &Path, text: &str) -> Result<ScenarioConfig, ScenarioError> {

@@ -14,6 +14,7 @@ mod events;
 mod file;
 mod locate;
 mod placement;
+mod recorded;
 mod variation;
 
 use closecall_controllers::{CheckedDriver, HumanDriver};

@@ -10,7 +10,7 @@ use closecall::scenario::{Scenario, ScenarioFile};
 use closecall::simulation::{Arm, Happening, Observer, RunKey, StepView, simulate};
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
-use closecall_traffic::{ParameterName, Time};
+use closecall_traffic::{ParameterName, Time, Value};
 use statrs::distribution::{ContinuousCDF, LogNormal};
 
 use crate::support::{closecall, folder, library, stdout};
@@ -97,7 +97,7 @@ struct BrakeLight {
 impl Observer for BrakeLight {
     fn step(&mut self, view: &StepView<'_>) {
         // More than the oscillation of following, which is 0.25 m/s².
-        const DECELERATES_MPS2: f64 = -0.6;
+        const DECELERATES_MPS2: f64 = -0.3;
         let [ego, _, rear] = view.vehicles else { unreachable!("three vehicles drive here") };
         if ego.state.brake_light && self.on.is_none() {
             self.on = Some(view.time);
@@ -159,18 +159,29 @@ fn the_headway_at_the_crossing_of_the_marking_is_the_one_asked_for() {
     let file = ScenarioFile::load(&library("overtake-without-brake"), &[]).unwrap();
     let name = ParameterName::new("cut-out-thw-s").unwrap();
     let asked = file.space().get(&name).unwrap().distribution.clone();
-    for controller in [BuiltIn::Acc, BuiltIn::Mis] {
-        let headways: Vec<f64> = (0..SAMPLES)
-            .map(|index| {
-                let mut crossing = Crossing::default();
-                let key = RunKey { seed: 5, sample: index };
-                simulate(&sample(&file, 5, index), key, &arm(controller), &mut crossing).unwrap();
-                crossing.thw_s.unwrap()
-            })
-            .collect();
-        let what = format!("R's headway at the crossing of the marking, with {controller:?}");
-        must_follow(&what, headways, |thw_s| asked.cdf(thw_s).unwrap());
-    }
+    let headway_s = |controller, index| {
+        let mut crossing = Crossing::default();
+        let key = RunKey { seed: 5, sample: index };
+        let scenario = sample(&file, 5, index);
+        simulate(&scenario, key, &arm(controller), &mut crossing).unwrap();
+        let Some(Value::Number(asked_s)) = scenario.parameters.get(&name) else { panic!("{name} is a number") };
+        (crossing.thw_s.unwrap(), *asked_s)
+    };
+    let without: Vec<f64> = (0..SAMPLES).map(|index| headway_s(BuiltIn::Acc, index).0).collect();
+    must_follow("R's headway at the crossing of the marking", without, |thw_s| asked.cdf(thw_s).unwrap());
+    // With the system, E brakes while R is on its way to the marking: R foresees the braking that it has felt, no more.
+    let with: Vec<(f64, f64)> = (0..SAMPLES).map(|index| headway_s(BuiltIn::Mis, index)).collect();
+    let (distance, p) = kolmogorov_smirnov(with.iter().map(|(thw_s, _)| *thw_s).collect(), |s| asked.cdf(s).unwrap());
+    let mut errors_s: Vec<f64> = with.iter().map(|(thw_s, asked_s)| thw_s - asked_s).collect();
+    errors_s.sort_by(f64::total_cmp);
+    let [low_s, median_s, high_s] = [5, 50, 95].map(|percent| errors_s[errors_s.len() * percent / 100]);
+    writeln!(
+        std::io::stderr(),
+        "the same with the margin increase system: D = {distance:.4}, p = {p:.3}; off by {low_s:.3}, {median_s:.3}, \
+         {high_s:.3} s (5, 50, 95 %)"
+    )
+    .unwrap();
+    assert!(median_s.abs() < 0.05, "{median_s}");
 }
 
 /// E far behind in another lane, and the vehicles of a test.
@@ -241,7 +252,11 @@ fn a_cascade_of_followers_comes_to_rest_behind_a_leader_that_accelerates_and_bra
         "{ wiedemann99 = { cc1-s = 0.9, reaction-s = 0.7 } }",
     );
     for (id, of, driver) in [
-        ("second", "tail", "{ wiedemann99 = { cc1-s = 0.8, reaction-s = { log-normal = { median = 0.7, sigma = 0.2 } } } }"),
+        (
+            "second",
+            "tail",
+            "{ wiedemann99 = { cc1-s = 0.8, reaction-s = { log-normal = { median = 0.7, sigma = 0.2 } } } }",
+        ),
         ("third", "second", "{ idm = { time-gap-s = 1.0, reaction-s = 0.6 } }"),
         ("fourth", "third", "{ wiedemann99 = { cc1-s = 0.7 } }"),
     ] {
@@ -260,4 +275,28 @@ fn a_cascade_of_followers_comes_to_rest_behind_a_leader_that_accelerates_and_bra
         assert!(least_m > 1.0, "{follower}: {least_m}");
         assert!(rows.last().unwrap().speed_mps < 0.5, "{follower}");
     }
+}
+
+#[test]
+fn a_recorded_vehicle_is_followed_and_the_scenario_needs_the_recording_no_more() {
+    let folder = folder();
+    let recording = folder.path().join("own.csv");
+    let library = library("overtake-without-brake");
+    stdout(&closecall(["record", library.to_str().unwrap(), "-n", "1", "-o", recording.to_str().unwrap()]), 0);
+    let actors = pair("{ recorded = { file = \"own.csv\", track-id = 1 } }", "{ wiedemann99 = {} }");
+    let ego = "[[actor]]\nid = \"ego\"\nvehicle = { class = \"car\" }\n\
+               start = { absolute = { lane = 1, s-m = -900.0, speed-mps = 20.0 } }\n\
+               driver = { ego-stack = { acc = { time-gap-s = 1.0 } } }\n";
+    let path = folder.path().join("scenario.toml");
+    let text = format!("{ROAD}{actors}{ego}");
+    std::fs::write(&path, &text).unwrap();
+    let file = ScenarioFile::load(&path, &[]).unwrap();
+    assert!(file.text().contains("profile") && !file.text().contains("recorded"), "{}", file.text());
+    std::fs::remove_file(&recording).unwrap();
+    let again = ScenarioFile::parse(&path, file.text(), &[]).unwrap();
+    assert_eq!(again.text(), file.text());
+    // Without the recording, the file as it was written says what is missing and where.
+    let error = ScenarioFile::parse(&path, &text, &[]).unwrap_err().to_string();
+    let line = 1 + text.lines().position(|line| line.contains("recorded")).unwrap();
+    assert!(error.contains(&format!("scenario.toml:{line}")) && error.contains("own.csv"), "{error}");
 }
