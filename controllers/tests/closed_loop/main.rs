@@ -15,6 +15,7 @@ mod world;
 
 use closecall_traffic::Side;
 use encounter::{Case, Rear, run, sample};
+use proptest::prelude::*;
 use study::paired;
 
 #[test]
@@ -69,12 +70,17 @@ fn a_goal_said_to_be_in_reach_is_reached() {
     assert!(in_reach > 30, "{in_reach}");
 }
 
-#[test]
-fn a_mirrored_road_gives_a_mirrored_encounter() {
-    let right = Case { side: Side::Right, ..Case::HEADLINE };
-    for index in 0..10 {
-        for with_mis in [false, true] {
-            assert_eq!(run(&Case::HEADLINE, index, with_mis), run(&right, index, with_mis), "sample {index}");
-        }
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    /// Where one overtakes on the right, all happens as it does on the left, to the last bit.
+    #[test]
+    fn a_mirrored_road_gives_a_mirrored_encounter(
+        seed in 0_u64..1_000, index in 0_u64..1_000, with_mis: bool, front_brakes: bool, blocked: bool,
+    ) {
+        let rear = if blocked { Rear::IsBlocked } else { Rear::Overtakes };
+        let left = Case { seed, rear, front_brakes, ..Case::HEADLINE };
+        let right = Case { side: Side::Right, ..left };
+        prop_assert_eq!(run(&left, index, with_mis), run(&right, index, with_mis));
     }
 }

@@ -17,7 +17,7 @@ const STEP_S: f64 = 0.01;
 const CONTROL_PERIOD: Time = Time::from_ms(40);
 const LAG_S: f64 = 0.15;
 const GRIP_MPS2: f64 = 0.9 * 9.81;
-const BRAKE_LIGHT_MPS2: f64 = 0.7;
+const BRAKE_LIGHT_MPS2: f64 = 1.3;
 
 /// Who drives.
 pub(crate) enum Who {
@@ -57,7 +57,7 @@ impl Actor {
         let before = s.speed_mps;
         s.speed_mps = (before + STEP_S * s.acceleration_mps2).max(0.0);
         s.s_m += 0.5 * (before + s.speed_mps) * STEP_S;
-        s.brake_light = self.command_mps2 <= -BRAKE_LIGHT_MPS2;
+        s.brake_light = s.acceleration_mps2 < -BRAKE_LIGHT_MPS2;
         if let Some(path) = &self.path {
             let u = ((s.s_m - path.from_s_m) / path.way_m).clamp(0.0, 1.0);
             let share = u * u * u * (10.0 - 15.0 * u + 6.0 * u * u);
