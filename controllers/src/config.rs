@@ -13,6 +13,7 @@ use crate::ego::{EgoSettings, EgoStackConfig};
 /// Who drives an actor, as a scenario file describes it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
+#[expect(clippy::large_enum_variant, reason = "a scenario has a handful of them, read once")]
 pub enum DriverConfig {
     /// The controller under test, with its adaptive cruise control, emergency braking and margin increase system.
     EgoStack(EgoStackConfig),
