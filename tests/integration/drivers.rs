@@ -43,7 +43,8 @@ fn kolmogorov_smirnov(mut drawn: Vec<f64>, cdf: impl Fn(f64) -> f64) -> (f64, f6
 fn must_follow(what: &str, drawn: Vec<f64>, cdf: impl Fn(f64) -> f64) {
     let n = drawn.len();
     let (distance, p) = kolmogorov_smirnov(drawn, cdf);
-    writeln!(std::io::stderr(), "{what}: Kolmogorov-Smirnov D = {distance:.4}, p = {p:.3}, n = {n}").unwrap();
+    writeln!(std::io::stderr(), "{what}: Kolmogorov-Smirnov D = {distance:.4}, p = {p:.3}, n = {n}")
+        .expect("standard error");
     assert!(p > LEVEL, "{what}: D = {distance}, p = {p}");
 }
 
@@ -180,7 +181,7 @@ fn the_headway_at_the_crossing_of_the_marking_is_the_one_asked_for() {
         "the same with the margin increase system: D = {distance:.4}, p = {p:.3}; off by {low_s:.3}, {median_s:.3}, \
          {high_s:.3} s (5, 50, 95 %)"
     )
-    .unwrap();
+    .expect("standard error");
     assert!(median_s.abs() < 0.05, "{median_s}");
 }
 
