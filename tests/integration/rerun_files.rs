@@ -20,7 +20,7 @@ fn verify(rerun: &Path, file: &Path) {
     assert!(size > 10_000 && size < 25_000_000, "{}: {size} bytes", file.display());
     let verified = Command::new(rerun).args(["rrd", "verify"]).arg(file).output().unwrap();
     assert!(verified.status.success(), "{}: {}", file.display(), stderr(&verified));
-    let printed = Command::new(rerun).args(["rrd", "print"]).arg(file).output().unwrap();
+    let printed = Command::new(rerun).args(["rrd", "print", "-vv"]).arg(file).output().unwrap();
     let printed = String::from_utf8_lossy(&printed.stdout).into_owned();
     for named in ["until_critical", "time", "step", "/summary", "plots/speed/"] {
         assert!(printed.contains(named), "{}: no `{named}`", file.display());
