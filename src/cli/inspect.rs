@@ -39,9 +39,11 @@ pub(super) fn inspect(args: &InspectArgs) -> Result<ExitCode, CliError> {
         return Ok(ExitCode::Pass);
     }
     let path = tracks.path().display();
+    let first = dropped.reasons().filter_map(|(_, rows)| Some((rows.first_line?, &rows.first))).min();
+    let first = first.map(|(line, what)| format!(", line {line}: {what}")).unwrap_or_default();
+    let count = dropped.count();
     complain(format_args!(
-        "{path}: {} rows cannot be used; other commands refuse it, but with --drop-bad-rows\n",
-        dropped.count()
+        "{path}{first}\n{count} rows cannot be used: other commands refuse the recording, but with --drop-bad-rows\n"
     ));
     Ok(ExitCode::InvalidInput)
 }

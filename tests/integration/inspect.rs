@@ -20,6 +20,7 @@ fn a_recordings_flaws_are_told_and_rows_that_cannot_be_used_end_with_3() {
     lines.insert(100, lines[99]);
     fs::write(csv, lines.join("\n") + "\n").unwrap();
     let output = closecall(["inspect", csv, "--format", "json"]);
+    assert!(stderr(&output).contains("own.csv, line 101: frame 98"), "{}", stderr(&output));
     assert!(stderr(&output).contains("1 rows cannot be used"), "{}", stderr(&output));
     let report = json(&output, 3);
     assert_eq!(report["dropped"]["duplicated rows"]["first_line"], 101);
