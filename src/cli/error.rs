@@ -1,5 +1,6 @@
 //! Whatever keeps a command from its result, and what the program then ends with.
 
+use closecall_scenarios::lane_change::ReferenceError;
 use closecall_scenarios::recordings::{RecordingError, WriteError as RecordingWriteError};
 use closecall_sensors::camera::ClassifierError;
 use closecall_sensors::camera::dataset::DatasetError;
@@ -13,6 +14,7 @@ use crate::exit_code::ExitCode;
 use crate::report::WriteError;
 use crate::report::figure::PngError;
 use crate::report::film::TrafficFilmError;
+use crate::report::recording_charts::ChartError;
 use crate::report::rerun::RecordError;
 use crate::scenario::ScenarioError;
 use crate::simulation::SampleError;
@@ -26,6 +28,9 @@ pub enum CliError {
     /// A recording cannot be used.
     #[error(transparent)]
     Recording(#[from] RecordingError),
+    /// A list of known lane changes cannot be used.
+    #[error("failed to use the list of lane changes {0}")]
+    Reference(#[from] ReferenceError),
     /// A recording cannot be written.
     #[error(transparent)]
     WriteRecording(#[from] RecordingWriteError),
@@ -35,6 +40,9 @@ pub enum CliError {
     /// A file cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
+    /// A chart cannot be drawn.
+    #[error(transparent)]
+    Chart(#[from] ChartError),
     /// A Rerun file cannot be written.
     #[error(transparent)]
     Record(#[from] RecordError),
@@ -81,7 +89,10 @@ impl From<&CliError> for ExitCode {
         match error {
             CliError::Scenario(error) => Self::from(error),
             CliError::Recording(error) if error.is_io() => Self::Io,
-            CliError::Recording(_) | CliError::TrafficFilm(_) | CliError::Classifier(_) => Self::InvalidInput,
+            CliError::Reference(error) if error.is_io() => Self::Io,
+            CliError::Recording(_) | CliError::Reference(_) | CliError::TrafficFilm(_) | CliError::Classifier(_) => {
+                Self::InvalidInput
+            }
             CliError::Folder(error) => Self::from(error),
             CliError::Campaign(error) => Self::from(error),
             CliError::Merge(error) => match error {
@@ -98,6 +109,7 @@ impl From<&CliError> for ExitCode {
                 CompareError::Different { .. } | CompareError::OtherSample { .. } => Self::Usage,
             },
             CliError::Write(_)
+            | CliError::Chart(_)
             | CliError::Record(_)
             | CliError::Figure(_)
             | CliError::WriteRecording(_)

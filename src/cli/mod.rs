@@ -19,8 +19,10 @@ mod recording;
 mod recordings;
 mod render;
 mod replay;
+mod robustness;
 mod run;
 mod stop;
+mod statistics;
 mod summary;
 mod watch;
 
@@ -86,6 +88,10 @@ enum Command {
     Criticality(recording::CriticalityArgs),
     /// Fit the distributions of a logical scenario to recordings
     Fit(recording::FitArgs),
+    /// Durations, speeds and counts of lane changes, and what they correlate with
+    Statistics(statistics::StatisticsArgs),
+    /// Study how much noise and offset the criteria for lane changes bear
+    Robustness(robustness::RobustnessArgs),
     /// Record traffic of the testbed's own simulation
     Record(record::RecordArgs),
     /// Draw an encounter as a static figure, SVG or PNG
@@ -143,6 +149,8 @@ fn dispatch(command: Command) -> Result<ExitCode, CliError> {
         Command::LaneChanges(args) => recording::lane_changes(&args),
         Command::Criticality(args) => recording::criticality(&args),
         Command::Fit(args) => recording::fit(&args),
+        Command::Statistics(args) => statistics::statistics(&args),
+        Command::Robustness(args) => robustness::robustness(&args),
         Command::Record(args) => record::record(&args),
         Command::Plot(args) => plot::plot(&args),
         Command::Render(args) => render::render(&args),

@@ -6,11 +6,11 @@ use clap::{Args, ValueEnum};
 use closecall_scenarios::criticality::{CriticalLaneChange, criticality as evaluate, shares};
 use closecall_scenarios::filters::smooth;
 use closecall_scenarios::fit::{Heading, fit as fit_distributions, to_toml, write_toml};
-use closecall_scenarios::lane_change::{LaneChange, detect};
-use closecall_scenarios::recordings::{Recording, quality, read};
+use closecall_scenarios::lane_change::{Criterion, Detector, LaneChange, Lanes, Score, Spans, read_references, score};
+use closecall_scenarios::recordings::{Layout, Recording, open, quality, read_with};
 
 use super::CliError;
-use super::args::{Format, positive};
+use super::args::{Format, ReadArgs, positive};
 use super::output::{out, outln};
 use super::watch::record_lane_change;
 use crate::exit_code::ExitCode;
@@ -18,20 +18,41 @@ use crate::report::WriteError;
 
 /// How lane changes are found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-enum Criterion {
+pub(super) enum By {
     /// Peaks of the lateral speed
     #[default]
     Peak,
+    /// Displacement from the lane's centre
+    Distance,
+    /// Jumps of the distances to the markings; in-car logs only
+    Gradient,
+}
+
+impl By {
+    const fn criterion(self) -> Criterion {
+        match self {
+            Self::Peak => Criterion::Peak,
+            Self::Distance => Criterion::Distance,
+            Self::Gradient => Criterion::Gradient,
+        }
+    }
 }
 
 /// Arguments of `closecall lane-changes`.
 #[derive(Debug, Args)]
 pub(super) struct LaneChangesArgs {
-    /// Recording: NGSIM's columns in feet, or the plain CSV that `closecall record` writes; gzip is accepted
+    /// Recording: NGSIM, highD or exiD, CommonRoad XML, an in-car log, or the plain CSV that `closecall record` writes; gzip
+    /// is accepted
     recording: PathBuf,
+    #[command(flatten)]
+    read: ReadArgs,
     /// How lane changes are found
     #[arg(long, value_enum, default_value_t)]
-    criterion: Criterion,
+    criterion: By,
+    /// Known lane changes of this recording, to state recall and precision: CSV with the columns recording_id, track_id,
+    /// time_s, direction, clear
+    #[arg(long, value_name = "FILE.csv")]
+    reference: Option<PathBuf>,
     /// Output for people or for programs
     #[arg(long, value_enum, default_value_t)]
     format: Format,
@@ -42,6 +63,8 @@ pub(super) struct LaneChangesArgs {
 pub(super) struct CriticalityArgs {
     /// Recording
     recording: PathBuf,
+    #[command(flatten)]
+    read: ReadArgs,
     /// Speed limit [m/s]; 120 km/h where absent
     #[arg(long, value_name = "M/S", value_parser = positive)]
     speed_limit_mps: Option<f64>,
@@ -62,6 +85,8 @@ pub(super) struct FitArgs {
     /// Recordings
     #[arg(required = true)]
     recordings: Vec<PathBuf>,
+    #[command(flatten)]
+    read: ReadArgs,
     /// File to write
     #[arg(short, long, value_name = "FILE.toml")]
     output: Option<PathBuf>,
@@ -77,22 +102,61 @@ pub(super) struct FitArgs {
 }
 
 pub(super) fn lane_changes(args: &LaneChangesArgs) -> Result<ExitCode, CliError> {
-    let Criterion::Peak = args.criterion;
-    let recording = read(&args.recording)?;
-    let changes = detect(&smooth(&recording));
-    match args.format {
-        Format::Json => outln!("{:#}", serde_json::json!(changes)),
-        Format::Human => {
-            describe(&recording);
-            outln!("track  class       direction  lanes   crossing   duration   speed    complete");
-            for change in &changes {
-                outln!("{}", line(change));
+    let references = args.reference.as_deref().map(read_references).transpose()?;
+    let mut tracks = open(&args.recording, args.read.options())?;
+    if args.criterion == By::Gradient && tracks.layout() != Layout::InCar {
+        let message = format!(
+            "{}: the gradient criterion needs the measured distances to the markings, which only in-car logs have; use \
+             `--criterion peak` or `distance`",
+            args.recording.display(),
+        );
+        return Err(CliError::Usage { message });
+    }
+    let detector = Detector::new(Lanes::Recorded, tracks.markings());
+    let (mut changes, mut spans, mut count) = (Vec::new(), Spans::new(), 0_u64);
+    // Track by track, so that memory does not grow with the recording.
+    while let Some(track) = tracks.next_track()? {
+        count += 1;
+        changes.extend(detector.detect(args.criterion.criterion(), &track.trajectory, &track.markings));
+        if references.is_some() {
+            spans.extend(track.trajectory.span().map(|span| (track.trajectory.track_id, span)));
+        }
+    }
+    changes.sort_by(|a: &LaneChange, b| a.track_id.cmp(&b.track_id).then(a.crossing_s.total_cmp(&b.crossing_s)));
+    let name = tracks.name();
+    let scored = references.map(|references| {
+        let listed: Vec<_> = references.iter().filter(|listed| listed.recording_id == name).collect();
+        score(&changes, &listed, &spans)
+    });
+    match (args.format, scored) {
+        (Format::Json, None) => outln!("{:#}", serde_json::json!(changes)),
+        (Format::Json, Some(scored)) => outln!("{:#}", serde_json::json!({ "lane_changes": changes, "score": scored })),
+        (Format::Human, scored) => {
+            let (rows, period, dropped) = (tracks.rows(), tracks.period(), tracks.dropped().count());
+            outln!("{name}: {count} tracks, {rows} rows every {period}, {dropped} of them left out");
+            list(&changes);
+            if let Some(scored) = scored {
+                print_score(&scored);
             }
-            let complete = changes.iter().filter(|change| change.complete).count();
-            outln!("{} lane changes, {complete} of them complete", changes.len());
         }
     }
     Ok(ExitCode::Pass)
+}
+
+fn list(changes: &[LaneChange]) {
+    outln!("track  class       direction  lanes      start    middle  crossing       end  duration     speed");
+    for change in changes {
+        outln!("{}", line(change));
+    }
+    let complete = changes.iter().filter(|change| change.complete).count();
+    let double = changes.iter().filter(|change| change.double).count();
+    outln!("{} lane changes, {complete} of them complete, {double} of them parts of double ones", changes.len());
+}
+
+fn print_score(score: &Score) {
+    outln!("recall     {}", score.recall);
+    outln!("precision  {}", score.precision);
+    outln!("crossing times differ by at most {:.2} s", score.max_time_error_s);
 }
 
 fn describe(recording: &Recording) {
@@ -115,21 +179,28 @@ fn line(change: &LaneChange) -> String {
         closecall_traffic::Side::Left => "left",
         closecall_traffic::Side::Right => "right",
     };
+    let mark = match (change.complete, change.double) {
+        (true, _) => "complete",
+        (false, true) => "double",
+        (false, false) => "",
+    };
     format!(
-        "{:>5}  {:<10}  {direction:<9}  {} to {}  {:>7.2} s  {:>7.2} s  {:>5.1} m/s  {}",
+        "{:>5}  {:<10}  {direction:<9}  {} to {}  {:>7.2} s {:>7.2} s {:>7.2} s {:>7.2} s {:>7.2} s  {:>4.1} m/s  {mark}",
         change.track_id,
         change.vehicle_class.name(),
         change.from_lane,
         change.to_lane,
+        change.start_s,
+        change.midpoint_s,
         change.crossing_s,
+        change.end_s,
         change.duration_s,
         change.speed_mps,
-        if change.complete { "yes" } else { "no" },
     )
 }
 
 pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> {
-    let recording = read(&args.recording)?;
+    let recording = read_with(&args.recording, args.read.options())?;
     let smoothed = smooth(&recording);
     let changes = evaluate(&smoothed, args.speed_limit_mps);
     if let Some(path) = &args.record {
@@ -166,7 +237,8 @@ fn print_metrics(changes: &[CriticalLaneChange]) {
 }
 
 pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
-    let recordings = args.recordings.iter().map(|path| read(path)).collect::<Result<Vec<_>, _>>()?;
+    let recordings =
+        args.recordings.iter().map(|path| read_with(path, args.read.options())).collect::<Result<Vec<_>, _>>()?;
     refuse_repetition(&args.recordings, &recordings)?;
     refuse_overwriting(&args.recordings, args.output.as_deref())?;
     let fitted = fit_distributions(&recordings, args.seed);
@@ -192,7 +264,7 @@ pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
 }
 
 /// A recording that is given twice would count twice, and make every interval too narrow.
-fn refuse_repetition(paths: &[PathBuf], recordings: &[Recording]) -> Result<(), CliError> {
+pub(super) fn refuse_repetition(paths: &[PathBuf], recordings: &[Recording]) -> Result<(), CliError> {
     for (later, recording) in recordings.iter().enumerate() {
         if let Some(earlier) = recordings[..later].iter().position(|earlier| earlier.hash == recording.hash) {
             let (one, other) = (paths[earlier].display(), paths[later].display());

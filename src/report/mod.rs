@@ -11,6 +11,7 @@ pub mod markdown;
 pub mod outcomes;
 pub mod overview;
 pub mod recordings_index;
+pub mod recording_charts;
 pub mod requirements;
 pub mod rerun;
 pub mod timings;

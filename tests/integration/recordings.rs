@@ -81,3 +81,96 @@ fn broken_recordings_are_refused_with_file_and_line() {
         }
     }
 }
+
+/// The true lane changes of an in-car log: direction, crossing, whether both ends were recorded.
+fn truth(path: &std::path::Path) -> Vec<(String, f64, bool)> {
+    let text = fs::read_to_string(path).unwrap();
+    let mut lines = text.lines();
+    let header: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let place = |name| header.iter().position(|column| *column == name).unwrap();
+    let [direction, crossing, complete] = ["direction", "crossing_s", "complete"].map(place);
+    let row = |line: &str| {
+        let fields: Vec<&str> = line.split(',').collect();
+        (fields[direction].to_owned(), fields[crossing].parse().unwrap(), fields[complete] == "true")
+    };
+    lines.map(row).collect()
+}
+
+#[test]
+fn an_in_car_log_gives_its_true_lane_changes_by_every_criterion_and_bears_an_offset_by_two() {
+    let folder = folder();
+    let csv = folder.path().join("drive.csv");
+    let csv = csv.to_str().unwrap();
+    let scenario = library("overtake-without-brake");
+    let args = ["record", scenario.to_str().unwrap(), "-n", "12", "--controller", "acc", "--in-car", "-o", csv];
+    stdout(&closecall(args), 0);
+    let truth: Vec<_> =
+        truth(&folder.path().join("drive.truth.csv")).into_iter().filter(|(.., complete)| *complete).collect();
+    assert!(truth.len() >= 8, "{}", truth.len());
+    for (criterion, within_s) in [("gradient", 0.05), ("peak", 0.05), ("distance", 0.25)] {
+        let found = json(&closecall(["lane-changes", csv, "--criterion", criterion, "--format", "json"]), 0);
+        let found = found.as_array().unwrap();
+        for (direction, crossing_s, _) in &truth {
+            let is_same = |change: &&Value| {
+                change["direction"] == direction.as_str()
+                    && (change["crossing_s"].as_f64().unwrap() - crossing_s).abs() <= within_s
+            };
+            assert_eq!(found.iter().filter(is_same).count(), 1, "{criterion} at {crossing_s}");
+        }
+    }
+    let plots = folder.path().join("plots");
+    let args = ["robustness", csv, "--repetitions", "1", "--format", "json", "--plot", plots.to_str().unwrap()];
+    let found = json(&closecall(args), 0);
+    assert_eq!(found["reference_kind"], "gradient");
+    assert_eq!(found["criteria"], serde_json::json!(["peak", "distance", "gradient"]));
+    let reference = found["reference"].as_f64().unwrap();
+    assert!(reference >= truth.len() as f64);
+    let levels = found["setup"]["offset_m"].as_array().unwrap();
+    let metre = levels.iter().position(|level| level.as_f64() == Some(1.0)).unwrap();
+    let again = |column: usize| found["offset"][metre][column]["again"].as_f64().unwrap();
+    assert!(again(0) >= 0.95 * reference && again(2) == reference, "{} {}", again(0), again(2));
+    assert!(again(1) <= 0.5 * reference, "{}", again(1));
+    assert!(found["fails_from_noise_m_per_sqrt_s"]["peak"].as_f64().unwrap() > 0.0);
+    for name in ["noise.svg", "offset.svg"] {
+        assert!(fs::read_to_string(plots.join(name)).unwrap().contains("gradient: found again"));
+    }
+}
+
+#[test]
+fn statistics_count_by_class_and_draw_boxes() {
+    let folder = folder();
+    let csv = folder.path().join("own.csv");
+    let csv = csv.to_str().unwrap();
+    let scenario = library("overtake-without-brake");
+    stdout(&closecall(["record", scenario.to_str().unwrap(), "-n", "30", "--controller", "acc", "-o", csv]), 0);
+    let plots = folder.path().join("plots");
+    let args = ["statistics", csv, "--format", "json", "--plot", plots.to_str().unwrap()];
+    let found = json(&closecall(args), 0);
+    let classes = found["classes"].as_array().unwrap();
+    let changes = json(&closecall(["lane-changes", csv, "--format", "json"]), 0);
+    let counted: u64 = classes.iter().map(|class| class["lane_changes"].as_u64().unwrap()).sum();
+    assert_eq!(counted, changes.as_array().unwrap().len() as u64);
+    assert!(classes.iter().any(|class| class["duration_s"]["n"].as_u64() > Some(5)));
+    assert_eq!(found["correlations"].as_array().unwrap().len(), 15);
+    for name in ["duration.svg", "speed.svg"] {
+        assert!(fs::read_to_string(plots.join(name)).unwrap().contains("car (n = "));
+    }
+}
+
+#[test]
+fn what_a_recording_does_not_have_is_asked_for_in_vain() {
+    let folder = folder();
+    let csv = folder.path().join("own.csv");
+    let csv = csv.to_str().unwrap();
+    let scenario = library("overtake-without-brake");
+    stdout(&closecall(["record", scenario.to_str().unwrap(), "-n", "1", "-o", csv]), 0);
+    let refused = closecall(["lane-changes", csv, "--criterion", "gradient"]);
+    assert_eq!(code(&refused), 2);
+    assert!(stderr(&refused).contains("own.csv") && stderr(&refused).contains("in-car"), "{}", stderr(&refused));
+    let list = folder.path().join("list.csv");
+    fs::write(&list, "track_id,time_s\n1,x\n").unwrap();
+    let refused = closecall(["lane-changes", csv, "--reference", list.to_str().unwrap()]);
+    assert_eq!(code(&refused), 3);
+    assert!(stderr(&refused).contains("list.csv"), "{}", stderr(&refused));
+    assert_eq!(code(&closecall(["lane-changes", csv, "--reference", "/no/such/list.csv"])), 6);
+}

@@ -31,12 +31,12 @@ pub fn evaluate(
     speed_limit_mps: Option<f64>,
 ) -> Option<Metrics> {
     let number = lane_change.track_id;
-    let place = recording.trajectories.binary_search_by_key(&number, |track| track.track_id).ok()?;
-    let own = &recording.trajectories[place];
+    let place = recording.place_of(number)?;
+    let own = &recording.tracks[place].trajectory;
     let (start, end) = (Time::from_s(lane_change.start_s), Time::from_s(lane_change.end_s));
     let mut worst = Worst::default();
     for point in own.points.iter().filter(|point| point.time >= start && point.time <= end) {
-        let others = recording.present_at(point.time).iter().filter(|presence| presence.trajectory != place);
+        let others = recording.present_at(point.time).iter().filter(|presence| presence.track != place);
         let others: Vec<Body<'_>> = others.map(|&presence| Body::new(recording.look_up(presence))).collect();
         worst.add(&Body::new((own, point)), &others, Lane(lane_change.to_lane));
     }

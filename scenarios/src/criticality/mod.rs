@@ -33,10 +33,12 @@
 mod evaluate;
 mod record;
 mod shares;
+mod statistics;
 
 pub use evaluate::{criticality, evaluate};
 pub use record::{CriticalLaneChange, MetricRecord, Metrics};
 pub use shares::{CriticalShare, CriticalShares, shares};
+pub use statistics::{BoxNumbers, ClassStatistics, Correlation, Statistics, statistics};
 
 /// Distance below which it is critical [m].
 pub const CRITICAL_DISTANCE_M: f64 = 1.0;

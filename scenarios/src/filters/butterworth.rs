@@ -6,9 +6,6 @@
 
 use std::f64::consts::{PI, SQRT_2};
 
-/// Samples that are reflected beyond each end: three times the filter's length, as SciPy does.
-const REFLECTED: usize = 9;
-
 /// A low-pass filter of second order.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LowPass {
@@ -34,10 +31,12 @@ impl LowPass {
     }
 
     /// `signal` filtered without any shift in time; one value out for each in.
-    pub fn forwards_and_backwards(&self, signal: &[f64]) -> Vec<f64> {
+    ///
+    /// `reflected` samples are made up beyond each end (SciPy's `padlen`, whose own choice is 9), or as many as there are.
+    pub fn forwards_and_backwards(&self, signal: &[f64], reflected: usize) -> Vec<f64> {
         let [.., last] = signal else { return Vec::new() };
         let (first, end) = (signal[0], signal.len() - 1);
-        let reflected = REFLECTED.min(end);
+        let reflected = reflected.min(end);
         let before = (1..=reflected).rev().map(|i| 2.0 * first - signal[i]);
         let after = (1..=reflected).map(|i| 2.0 * last - signal[end - i]);
         let mut extended: Vec<f64> = before.chain(signal.iter().copied()).chain(after).collect();
@@ -70,6 +69,8 @@ mod tests {
 
     use super::*;
 
+    const REFLECTED: usize = 9;
+
     fn filter() -> LowPass {
         LowPass::new(1.3, 10.0).unwrap()
     }
@@ -85,29 +86,29 @@ mod tests {
     fn the_gain_at_the_corner_is_one_half() {
         let rate = 10.0;
         let wave = |k: usize| (2.0 * PI * 1.3 * k as f64 / rate).sin();
-        let out = filter().forwards_and_backwards(&(0..2_000).map(wave).collect::<Vec<_>>());
+        let out = filter().forwards_and_backwards(&(0..2_000).map(wave).collect::<Vec<_>>(), REFLECTED);
         let largest = out[500..1_500].iter().fold(0.0_f64, |max, value| max.max(value.abs()));
         assert!((largest - 0.5).abs() < 0.01, "{largest}");
     }
 
     #[test]
     fn nothing_in_gives_nothing_out() {
-        assert!(filter().forwards_and_backwards(&[]).is_empty());
-        assert_eq!(filter().forwards_and_backwards(&[3.5]).len(), 1);
+        assert!(filter().forwards_and_backwards(&[], REFLECTED).is_empty());
+        assert_eq!(filter().forwards_and_backwards(&[3.5], REFLECTED).len(), 1);
     }
 
     proptest! {
         #[test]
         fn a_constant_passes_unchanged(value in -100.0..100.0, n in 1_usize..80) {
-            for filtered in filter().forwards_and_backwards(&vec![value; n]) {
+            for filtered in filter().forwards_and_backwards(&vec![value; n], REFLECTED) {
                 prop_assert!((filtered - value).abs() < 1e-9, "{filtered} {value}");
             }
         }
 
         #[test]
         fn a_mirrored_signal_gives_the_mirrored_result(signal in prop::collection::vec(-10.0..10.0, 1..60)) {
-            let plus = filter().forwards_and_backwards(&signal);
-            let minus = filter().forwards_and_backwards(&signal.iter().map(|x| -x).collect::<Vec<_>>());
+            let plus = filter().forwards_and_backwards(&signal, REFLECTED);
+            let minus = filter().forwards_and_backwards(&signal.iter().map(|x| -x).collect::<Vec<_>>(), REFLECTED);
             for (a, b) in plus.iter().zip(&minus) {
                 prop_assert_eq!(a.to_bits(), (-b).to_bits());
             }

@@ -1,16 +1,29 @@
-//! A whole recording, resampled and smoothed.
+//! A whole recording, smoothed and on the common clock.
 
 use closecall_traffic::{Time, Trajectory, TrajectoryPoint};
 
 use super::butterworth::LowPass;
 use super::resample::resample;
+use super::stays::{Stay, period_of, stays_of};
 use crate::recordings::{LaneMarkings, Recording};
 
-/// The common clock: 10 Hz, the rate of the NGSIM recordings.
-pub const PERIOD: Time = Time::from_ms(100);
+/// The common clock: 5 Hz.
+pub const PERIOD: Time = Time::from_ms(200);
 
 /// The filter's corner [Hz]; see the module's documentation.
 pub const CORNER_HZ: f64 = 1.3;
+
+/// How far the signal is reflected beyond each end [s]: 9 samples of the common clock.
+const REFLECTED_S: f64 = 1.8;
+
+/// One vehicle, smoothed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SmoothedTrack {
+    /// Its movement on the common clock.
+    pub trajectory: Trajectory,
+    /// Its recorded lanes, from the recorded frames.
+    pub stays: Vec<Stay>,
+}
 
 /// A recording on the common clock, with smooth positions and their derivatives.
 #[derive(Clone, Debug)]
@@ -20,7 +33,7 @@ pub struct SmoothedRecording {
     /// Where the lane markings are.
     pub markings: LaneMarkings,
     /// The tracks in the order of their numbers; those that cover no instant of the clock are not there.
-    pub trajectories: Vec<Trajectory>,
+    pub tracks: Vec<SmoothedTrack>,
     first_tick: i64,
     present: Vec<Vec<Presence>>,
 }
@@ -28,26 +41,42 @@ pub struct SmoothedRecording {
 /// One vehicle at one instant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Presence {
-    /// Which of the recording's trajectories.
-    pub trajectory: usize,
+    /// Which of the recording's tracks.
+    pub track: usize,
     /// Which of its points.
     pub point: usize,
 }
 
-/// Resamples every track to the common clock and smooths it.
+/// Smooths every track and brings it to the common clock.
 pub fn smooth(recording: &Recording) -> SmoothedRecording {
-    let filter = LowPass::new(CORNER_HZ, 1.0 / PERIOD.s());
-    let smoothed = recording.trajectories.iter();
-    let smoothed = smoothed.map(|track| track.with_points(smooth_points(resample(&track.points, PERIOD), filter)));
-    let trajectories: Vec<_> = smoothed.filter(|track| !track.points.is_empty()).collect();
-    let (first_tick, present) = presence(&trajectories);
+    let tracks: Vec<_> = recording.trajectories.iter().filter_map(smooth_track).collect();
+    let (first_tick, present) = presence(&tracks);
     SmoothedRecording {
         name: recording.name.clone(),
         markings: recording.markings.clone(),
-        trajectories,
+        tracks,
         first_tick,
         present,
     }
+}
+
+/// One track, smoothed and on the common clock; nothing where it covers no instant of it.
+pub fn smooth_track(track: &Trajectory) -> Option<SmoothedTrack> {
+    let points = match period_of(track) {
+        None => resample(&track.points, PERIOD),
+        Some(period) if period <= PERIOD => {
+            let mut points = track.points.clone();
+            smooth_points(&mut points, period);
+            resample(&points, PERIOD)
+        }
+        Some(_) => {
+            let mut points = resample(&track.points, PERIOD);
+            smooth_points(&mut points, PERIOD);
+            points
+        }
+    };
+    let trajectory = (!points.is_empty()).then(|| track.with_points(points))?;
+    Some(SmoothedTrack { trajectory, stays: stays_of(track) })
 }
 
 impl SmoothedRecording {
@@ -59,8 +88,13 @@ impl SmoothedRecording {
 
     /// A track and its point.
     pub fn look_up(&self, presence: Presence) -> (&Trajectory, &TrajectoryPoint) {
-        let track = &self.trajectories[presence.trajectory];
+        let track = &self.tracks[presence.track].trajectory;
         (track, &track.points[presence.point])
+    }
+
+    /// The place of track `track_id` among the tracks.
+    pub fn place_of(&self, track_id: u64) -> Option<usize> {
+        self.tracks.binary_search_by_key(&track_id, |track| track.trajectory.track_id).ok()
     }
 }
 
@@ -68,31 +102,37 @@ fn tick_of(time: Time) -> i64 {
     (time.ns() + PERIOD.ns() / 2).div_euclid(PERIOD.ns())
 }
 
-fn presence(trajectories: &[Trajectory]) -> (i64, Vec<Vec<Presence>>) {
-    let starts = trajectories.iter().filter_map(Trajectory::span);
-    let Some((first, last)) = starts.reduce(|(a, b), (c, d)| (a.min(c), b.max(d))) else { return (0, Vec::new()) };
+fn presence(tracks: &[SmoothedTrack]) -> (i64, Vec<Vec<Presence>>) {
+    let spans = tracks.iter().filter_map(|track| track.trajectory.span());
+    let Some((first, last)) = spans.reduce(|(a, b), (c, d)| (a.min(c), b.max(d))) else { return (0, Vec::new()) };
     let first_tick = tick_of(first);
     let ticks = usize::try_from(tick_of(last) - first_tick).map_or(0, |ticks| ticks + 1);
     let mut present = vec![Vec::new(); ticks];
-    for (trajectory, track) in trajectories.iter().enumerate() {
-        for (point, instant) in track.points.iter().enumerate() {
+    for (place, track) in tracks.iter().enumerate() {
+        for (point, instant) in track.trajectory.points.iter().enumerate() {
             if let Ok(tick) = usize::try_from(tick_of(instant.time) - first_tick) {
-                present[tick].push(Presence { trajectory, point });
+                present[tick].push(Presence { track: place, point });
             }
         }
     }
     (first_tick, present)
 }
 
-fn smooth_points(mut points: Vec<TrajectoryPoint>, filter: Option<LowPass>) -> Vec<TrajectoryPoint> {
-    let (Some(filter), true) = (filter, points.len() > 1) else { return points };
-    let filtered = |value: fn(&TrajectoryPoint) -> f64| low_pass(&points.iter().map(value).collect::<Vec<_>>(), filter);
-    let along = filtered(|point| point.s_m);
-    let across = filtered(|point| point.d_m);
-    let speed = filtered(|point| point.speed_mps);
-    let acceleration = difference(&speed);
-    let lateral_speed = difference(&across);
-    let lateral_acceleration = difference(&lateral_speed);
+/// Smooths points that are `period` apart, in place.
+fn smooth_points(points: &mut [TrajectoryPoint], period: Time) {
+    let rate_hz = 1.0 / period.s();
+    let (Some(filter), true) = (LowPass::new(CORNER_HZ, rate_hz), points.len() > 1) else { return };
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "positive, and small")]
+    let reflected = (REFLECTED_S * rate_hz).round() as usize;
+    let filtered = |points: &[TrajectoryPoint], value: fn(&TrajectoryPoint) -> f64| {
+        low_pass(&points.iter().map(value).collect::<Vec<_>>(), filter, reflected)
+    };
+    let along = filtered(points, |point| point.s_m);
+    let across = filtered(points, |point| point.d_m);
+    let speed = filtered(points, |point| point.speed_mps);
+    let acceleration = derivative(&speed, period);
+    let lateral_speed = derivative(&across, period);
+    let lateral_acceleration = derivative(&lateral_speed, period);
     for (k, point) in points.iter_mut().enumerate() {
         point.s_m = along[k];
         point.d_m = across[k];
@@ -101,27 +141,30 @@ fn smooth_points(mut points: Vec<TrajectoryPoint>, filter: Option<LowPass>) -> V
         point.lateral_speed_mps = lateral_speed[k];
         point.lateral_acceleration_mps2 = lateral_acceleration[k];
     }
-    points
 }
 
 /// `values` filtered about the chord through both ends, so that steady movement passes unchanged up to the ends.
-fn low_pass(values: &[f64], filter: LowPass) -> Vec<f64> {
+fn low_pass(values: &[f64], filter: LowPass, reflected: usize) -> Vec<f64> {
     let (Some(first), Some(last)) = (values.first(), values.last()) else { return Vec::new() };
     let slope = (last - first) / (values.len() - 1).max(1) as f64;
     let chord = |k: usize| first + slope * k as f64;
     let residual: Vec<f64> = values.iter().enumerate().map(|(k, value)| value - chord(k)).collect();
-    let filtered = filter.forwards_and_backwards(&residual).into_iter().enumerate();
+    let filtered = filter.forwards_and_backwards(&residual, reflected).into_iter().enumerate();
     filtered.map(|(k, value)| value + chord(k)).collect()
 }
 
-/// The derivative with respect to time: central differences, one-sided at both ends.
-fn difference(values: &[f64]) -> Vec<f64> {
+/// The derivative with respect to time: central differences over five samples, over three beside the ends, one-sided at
+/// the ends.
+fn derivative(values: &[f64], period: Time) -> Vec<f64> {
+    let step_s = period.s();
     let last = values.len().saturating_sub(1);
-    let slope = |k: usize| {
+    let over_five =
+        |k: usize| (8.0 * (values[k + 1] - values[k - 1]) - (values[k + 2] - values[k - 2])) / (12.0 * step_s);
+    let over_three = |k: usize| {
         let (left, right) = (k.saturating_sub(1), (k + 1).min(last));
-        if left == right { 0.0 } else { (values[right] - values[left]) / ((right - left) as f64 * PERIOD.s()) }
+        if left == right { 0.0 } else { (values[right] - values[left]) / ((right - left) as f64 * step_s) }
     };
-    (0..values.len()).map(slope).collect()
+    (0..values.len()).map(|k| if k >= 2 && k + 2 <= last { over_five(k) } else { over_three(k) }).collect()
 }
 
 #[cfg(test)]
@@ -132,7 +175,7 @@ mod tests {
     #[test]
     fn a_steady_drive_stays_a_steady_drive() {
         let smoothed = smooth(&recording_of(vec![straight_track(1, 0.0, 25.0, -1.75, 80)]));
-        for point in &smoothed.trajectories[0].points {
+        for point in &smoothed.tracks[0].trajectory.points {
             assert!((point.speed_mps - 25.0).abs() < 1e-9 && point.acceleration_mps2.abs() < 1e-6);
             assert!(point.lateral_speed_mps.abs() < 1e-9 && (point.s_m - 25.0 * point.time.s()).abs() < 1e-6);
         }
@@ -147,9 +190,36 @@ mod tests {
             let present = smoothed.present_at(Time::from_s(s)).iter();
             present.map(|&presence| smoothed.look_up(presence).0.track_id).collect::<Vec<_>>()
         };
-        assert_eq!(numbers(0.5), [1]);
+        assert_eq!(numbers(0.4), [1]);
         assert_eq!(numbers(1.0), [1, 2]);
         assert_eq!(numbers(1.2), [2]);
         assert!(numbers(9.0).is_empty() && numbers(-1.0).is_empty());
+    }
+
+    #[test]
+    fn the_rate_of_the_recording_does_not_matter() {
+        let wave = |period_ms: i64| {
+            let mut track = straight_track(1, 0.0, 25.0, -1.75, 20_000 / period_ms);
+            for (k, point) in (0_i64..).zip(&mut track.points) {
+                point.time = Time::from_ms(period_ms) * k;
+                point.d_m = (2.0 * std::f64::consts::PI * 0.2 * point.time.s()).sin();
+            }
+            smooth_track(&track).unwrap().trajectory.points
+        };
+        for period_ms in [10, 40, 100, 200] {
+            for point in wave(period_ms).iter().filter(|point| (3.0..17.0).contains(&point.time.s())) {
+                let angular = 2.0 * std::f64::consts::PI * 0.2;
+                let expected_mps = angular * (angular * point.time.s()).cos();
+                assert!((point.lateral_speed_mps - expected_mps).abs() < 0.01, "{period_ms} ms at {}", point.time);
+            }
+        }
+    }
+
+    #[test]
+    fn stays_count_recorded_frames() {
+        let mut track = straight_track(1, 0.0, 25.0, -1.75, 11);
+        track.points.iter_mut().skip(7).for_each(|point| point.lane = closecall_traffic::Lane(2));
+        let held: Vec<_> = smooth_track(&track).unwrap().stays.iter().map(|stay| (stay.lane.0, stay.held)).collect();
+        assert_eq!(held, [(1, Time::from_ms(700)), (2, Time::from_ms(400))]);
     }
 }

@@ -148,8 +148,8 @@ fn observe_lane_change(recording: &SmoothedRecording, change: &LaneChange, sampl
     }
     samples.push_headway([Quantity::CutOutThw, Quantity::CriticalCutOutThw], 0.0, thw_s);
     // The same lead when the manoeuvre starts, or as early as both are recorded.
-    let own = &recording.trajectories[lead.own_place];
-    let other = &recording.trajectories[lead.lead_place];
+    let own = &recording.tracks[lead.own_place].trajectory;
+    let other = &recording.tracks[lead.lead_place].trajectory;
     let Some((earliest, _)) = own.span().zip(other.span()).map(|(a, b)| (a.0.max(b.0), ())) else { return };
     let start = Time::from_s(change.start_s).max(earliest).min(crossing);
     if let Some((own, other)) = own.at(start).zip(other.at(start)) {
@@ -173,13 +173,13 @@ fn lead_in(recording: &SmoothedRecording, track_id: u64, lane: Lane, time: Time)
     let present = recording.present_at(time);
     let own = present.iter().find(|presence| recording.look_up(**presence).0.track_id == track_id)?;
     let (own_track, own_point) = recording.look_up(*own);
-    let ahead = present.iter().filter(|presence| presence.trajectory != own.trajectory).filter_map(|presence| {
+    let ahead = present.iter().filter(|presence| presence.track != own.track).filter_map(|presence| {
         let (track, point) = recording.look_up(*presence);
         let gap_m = gap_m((own_track, own_point), (track, point));
-        (point.lane == lane && gap_m >= 0.0).then_some((gap_m, presence.trajectory))
+        (point.lane == lane && gap_m >= 0.0).then_some((gap_m, presence.track))
     });
     let (gap_m, lead_place) = ahead.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    Some(LeadView { own: own_point, own_place: own.trajectory, lead_place, gap_m })
+    Some(LeadView { own: own_point, own_place: own.track, lead_place, gap_m })
 }
 
 fn gap_m(rear: (&Trajectory, &TrajectoryPoint), front: (&Trajectory, &TrajectoryPoint)) -> f64 {
@@ -188,7 +188,7 @@ fn gap_m(rear: (&Trajectory, &TrajectoryPoint), front: (&Trajectory, &Trajectory
 
 fn observe_following(recording: &SmoothedRecording, samples: &mut Samples) {
     let mut pairs: BTreeMap<(usize, usize), Vec<(f64, f64)>> = BTreeMap::new();
-    let spans = recording.trajectories.iter().filter_map(Trajectory::span);
+    let spans = recording.tracks.iter().filter_map(|track| track.trajectory.span());
     let Some((mut time, last)) = spans.reduce(|(a, b), (c, d)| (a.min(c), b.max(d))) else { return };
     while time <= last {
         for (pair, thw_s, speed_mps) in following_at(recording, time) {
@@ -218,7 +218,7 @@ fn following_at(recording: &SmoothedRecording, time: Time) -> Vec<((usize, usize
         let gap_m = gap_m(rear, front);
         let thw_s = time_headway_s(gap_m, rear.1.speed_mps).ok()?;
         let counts = rear.1.lane == front.1.lane && gap_m >= 0.0 && thw_s <= FOLLOWING_THW_S;
-        counts.then_some(((pair[0].trajectory, pair[1].trajectory), thw_s, rear.1.speed_mps))
+        counts.then_some(((pair[0].track, pair[1].track), thw_s, rear.1.speed_mps))
     });
     follows.collect()
 }
@@ -253,7 +253,7 @@ mod tests {
             let lead = straight_track(2, 44.5, 20.0, -1.75, frames);
             observe(&smooth(&recording_of(vec![straight_track(1, 0.0, 20.0, -1.75, frames), lead])))
         };
-        assert_eq!(pair(19).values(Quantity::FrontThw), [0.0; 0]);
+        assert_eq!(pair(18).values(Quantity::FrontThw), [0.0; 0]);
         let samples = pair(20);
         let [thw_s] = samples.values(Quantity::FrontThw) else { panic!("one pair") };
         assert!((thw_s - 2.0).abs() < 1e-6);

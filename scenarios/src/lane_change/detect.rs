@@ -1,135 +1,198 @@
 //! From smoothed trajectories to lane changes.
 
-use closecall_traffic::{Lane, Side, Trajectory};
+use closecall_traffic::{Lane, Side, Time, Trajectory};
+use serde::Serialize;
 
 use super::LaneChange;
-use super::peaks::{find_peaks, width};
-use crate::filters::{PERIOD, SmoothedRecording};
-use crate::recordings::LaneMarkings;
+use super::crossings::{Crossing, crossings};
+use super::distance::by_distance;
+use super::double::mark_doubles;
+use super::geometry::LaneGrid;
+use super::gradient;
+use super::manoeuvre::{MIN_SHIFT_M, Manoeuvre, Sampled, height_share, manoeuvres, quintic_width_share};
+use crate::filters::{PERIOD, SmoothedRecording, SmoothedTrack, smooth_track, stays_of};
+use crate::recordings::{LaneMarkings, MarkingDistances};
 
-/// A peak of lateral speed needs this prominence [m/s]; see the module's documentation.
-pub const MIN_PROMINENCE_MPS: f64 = 0.15;
+/// A crossing up to this far outside of a manoeuvre still belongs to it [samples]: 1 s. Vehicles pause on a marking, and
+/// the ends are estimates.
+const OUTSIDE_SAMPLES: f64 = 5.0;
 
-/// A complete lane change shifts the vehicle by at least this [m]: most of a lane, but a vehicle need not end in its middle.
-pub const MIN_SHIFT_M: f64 = 2.5;
-
-/// Samples for which a lane must be held before and after a crossing: 0.5 s.
-const MIN_DWELL_SAMPLES: usize = 5;
-
-/// A crossing this far beyond a manoeuvre's estimated ends still belongs to it [samples]: the estimate rounds to samples.
-const END_TOLERANCE_SAMPLES: f64 = 0.5;
-
-/// The lane changes of all tracks, in the order of track numbers and then of time.
-pub fn detect(recording: &SmoothedRecording) -> Vec<LaneChange> {
-    recording.trajectories.iter().flat_map(|track| detect_in(track, &recording.markings)).collect()
+/// What lane changes are told by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Criterion {
+    /// Peaks of the lateral speed.
+    Peak,
+    /// Displacement from the lane's centre.
+    Distance,
+    /// Jumps of the distances to the markings; finds nothing where these were not measured.
+    Gradient,
 }
 
-/// Share of a quintic lane change's duration that its peak of lateral speed is wide, measured at the share
-/// `height_share` of the peak: √(1 − √h).
-pub fn quintic_width_share(height_share: f64) -> f64 {
-    (1.0 - height_share.sqrt()).sqrt()
-}
+impl Criterion {
+    /// Every criterion.
+    pub const ALL: [Self; 3] = [Self::Peak, Self::Distance, Self::Gradient];
 
-/// A peak of lateral speed as a manoeuvre, in samples of its track.
-struct Manoeuvre {
-    direction: Side,
-    peak_mps: f64,
-    width: f64,
-    duration: f64,
-    start: f64,
-    end: f64,
-}
-
-/// A change of the recorded lane.
-struct Crossing {
-    sample: usize,
-    from: Lane,
-    to: Lane,
-}
-
-impl Crossing {
-    fn direction(&self) -> Side {
-        if self.to < self.from { Side::Left } else { Side::Right }
-    }
-}
-
-fn detect_in(track: &Trajectory, markings: &LaneMarkings) -> Vec<LaneChange> {
-    let crossings = crossings(track);
-    if crossings.is_empty() {
-        return Vec::new();
-    }
-    let manoeuvres = manoeuvres(track, height_share(track, markings));
-    let owners: Vec<Option<usize>> = crossings.iter().map(|crossing| owner(crossing, &manoeuvres)).collect();
-    let found = crossings.iter().zip(&owners).filter_map(|(crossing, owner)| {
-        let sole = owner.is_some() && owners.iter().filter(|other| *other == owner).count() == 1;
-        Some(lane_change(track, crossing, manoeuvres.get((*owner)?)?, sole))
-    });
-    found.collect()
-}
-
-/// h = (w_vehicle / w_lane) / 2, the height at which widths are measured as a share of the peak.
-fn height_share(track: &Trajectory, markings: &LaneMarkings) -> f64 {
-    0.5 * (track.dimensions.width_m / markings.typical_lane_width_m()).min(1.0)
-}
-
-/// The highest peak in the crossing's direction between whose ends it lies.
-fn owner(crossing: &Crossing, manoeuvres: &[Manoeuvre]) -> Option<usize> {
-    let sample = crossing.sample as f64;
-    let candidates = manoeuvres.iter().enumerate().filter(|(_, manoeuvre)| {
-        manoeuvre.direction == crossing.direction()
-            && sample >= manoeuvre.start - END_TOLERANCE_SAMPLES
-            && sample <= manoeuvre.end + END_TOLERANCE_SAMPLES
-    });
-    candidates.max_by(|(_, a), (_, b)| a.peak_mps.total_cmp(&b.peak_mps)).map(|(index, _)| index)
-}
-
-fn manoeuvres(track: &Trajectory, height_share: f64) -> Vec<Manoeuvre> {
-    let mut found = Vec::new();
-    for (direction, sign) in [(Side::Left, 1.0), (Side::Right, -1.0)] {
-        let speeds: Vec<f64> = track.points.iter().map(|point| sign * point.lateral_speed_mps).collect();
-        // Rest before and after the track makes peaks of manoeuvres that the recording cuts at their fastest.
-        let between_rests: Vec<f64> = [&[0.0], speeds.as_slice(), &[0.0]].concat();
-        let peaks = find_peaks(&between_rests, MIN_PROMINENCE_MPS);
-        for peak in peaks.into_iter().filter(|peak| peak.height > 0.0) {
-            let (left, right) = width(&speeds, peak.index - 1, height_share * peak.height);
-            let width = right - left;
-            let duration = width / quintic_width_share(height_share);
-            let beyond = 0.5 * (duration - width);
-            let (start, end) = (left - beyond, right + beyond);
-            found.push(Manoeuvre { direction, peak_mps: peak.height, width, duration, start, end });
+    /// Its name.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Peak => "peak",
+            Self::Distance => "distance",
+            Self::Gradient => "gradient",
         }
     }
+}
+
+/// Whether the recorded lane of a vehicle can be relied on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lanes {
+    /// A lane change by the peak criterion is one of the recorded lane.
+    Recorded,
+    /// It is a shift by most of a lane, whatever lane is recorded.
+    Doubtful,
+}
+
+/// Finds the lane changes of one track at a time.
+#[derive(Clone, Debug)]
+pub struct Detector {
+    lanes: Lanes,
+    grid: LaneGrid,
+    lane_width_m: f64,
+}
+
+/// A track as it was recorded, and smoothed.
+#[derive(Clone, Copy, Debug)]
+struct Subject<'a> {
+    recorded: &'a Trajectory,
+    seen: &'a [MarkingDistances],
+    smoothed: &'a SmoothedTrack,
+}
+
+/// The lane changes of all tracks by the peak criterion, in the order of track numbers and then of time.
+pub fn detect(recording: &SmoothedRecording) -> Vec<LaneChange> {
+    let detector = Detector::new(Lanes::Recorded, &recording.markings);
+    recording.tracks.iter().flat_map(|track| detector.by_recorded_lane(track)).collect()
+}
+
+impl Detector {
+    /// A detector for tracks between `markings`.
+    pub fn new(lanes: Lanes, markings: &LaneMarkings) -> Self {
+        Self { lanes, grid: LaneGrid::new(markings), lane_width_m: markings.typical_lane_width_m() }
+    }
+
+    /// The lane changes of a track by one criterion, in the order of time. `seen` are the distances to the markings for
+    /// each of its points, where they were measured, or else nothing.
+    ///
+    /// Where a lane change is one of the recorded lane, tracks without any are not even smoothed.
+    pub fn detect(&self, criterion: Criterion, recorded: &Trajectory, seen: &[MarkingDistances]) -> Vec<LaneChange> {
+        let by_lane = (criterion, self.lanes) == (Criterion::Peak, Lanes::Recorded);
+        if by_lane && crossings(&stays_of(recorded)).is_empty() {
+            return Vec::new();
+        }
+        let Some(smoothed) = smooth_track(recorded) else { return Vec::new() };
+        self.by(criterion, Subject { recorded, seen, smoothed: &smoothed })
+    }
+
+    /// The lane changes of a track by each of `criteria`, for which it is smoothed once.
+    pub fn detect_by_each(
+        &self,
+        criteria: &[Criterion],
+        recorded: &Trajectory,
+        seen: &[MarkingDistances],
+    ) -> Vec<Vec<LaneChange>> {
+        let Some(smoothed) = smooth_track(recorded) else { return vec![Vec::new(); criteria.len()] };
+        let subject = Subject { recorded, seen, smoothed: &smoothed };
+        criteria.iter().map(|criterion| self.by(*criterion, subject)).collect()
+    }
+
+    fn by_recorded_lane(&self, track: &SmoothedTrack) -> Vec<LaneChange> {
+        let mut found = by_crossings(&track.trajectory, &crossings(&track.stays), self.lane_width_m);
+        mark_doubles(&mut found);
+        found
+    }
+
+    fn by(&self, criterion: Criterion, subject: Subject<'_>) -> Vec<LaneChange> {
+        let Subject { recorded, seen, smoothed } = subject;
+        let track = &smoothed.trajectory;
+        let width_m = || gradient::lane_width_m(recorded, seen).unwrap_or(self.lane_width_m);
+        let mut found = match (criterion, self.lanes) {
+            (Criterion::Peak, Lanes::Recorded) => by_crossings(track, &crossings(&smoothed.stays), width_m()),
+            (Criterion::Peak, Lanes::Doubtful) => by_shift(track, width_m()),
+            (Criterion::Distance, _) if seen.is_empty() => by_distance(track, |k| self.grid.at(track.points[k].d_m)),
+            (Criterion::Distance, _) => {
+                let places = gradient::lane_places(recorded, seen, track, PERIOD);
+                by_distance(track, |k| places[k])
+            }
+            (Criterion::Gradient, _) => by_crossings(track, &gradient::jumps(recorded, seen), width_m()),
+        };
+        mark_doubles(&mut found);
+        found
+    }
+}
+
+/// Peaks of lateral speed that carry the vehicle over a marking.
+fn by_crossings(track: &Trajectory, crossings: &[Crossing], lane_width_m: f64) -> Vec<LaneChange> {
+    let (false, Some(sampled)) = (crossings.is_empty(), Sampled::new(track)) else { return Vec::new() };
+    let manoeuvres = manoeuvres(track, lane_width_m);
+    let owned = crossings.iter().filter_map(|crossing| Some((crossing, owner(&sampled, crossing, &manoeuvres)?)));
+    let change = |(crossing, manoeuvre): (&Crossing, &Manoeuvre)| {
+        lane_change(&sampled, manoeuvre, height_share(track, lane_width_m), *crossing)
+    };
+    owned.map(change).collect()
+}
+
+/// The manoeuvre in the crossing's direction that it belongs to: of those that it lies in the one with the highest peak,
+/// or else the nearest.
+fn owner<'m>(sampled: &Sampled<'_>, crossing: &Crossing, manoeuvres: &'m [Manoeuvre]) -> Option<&'m Manoeuvre> {
+    let sample = sampled.sample(crossing.time);
+    let outside = |manoeuvre: &Manoeuvre| (manoeuvre.start - sample).max(sample - manoeuvre.end).max(0.0);
+    let candidates = manoeuvres
+        .iter()
+        .filter(|manoeuvre| manoeuvre.direction == crossing.direction() && outside(manoeuvre) <= OUTSIDE_SAMPLES);
+    candidates.min_by(|a, b| outside(a).total_cmp(&outside(b)).then(b.peak_mps.total_cmp(&a.peak_mps)))
+}
+
+/// Peaks of lateral speed that shift the vehicle by most of a lane, in the order of time.
+fn by_shift(track: &Trajectory, lane_width_m: f64) -> Vec<LaneChange> {
+    let Some(sampled) = Sampled::new(track) else { return Vec::new() };
+    let mut found: Vec<LaneChange> = Vec::new();
+    for manoeuvre in manoeuvres(track, lane_width_m) {
+        let span = [manoeuvre.start, manoeuvre.end];
+        let shift_m = sampled.shift_m(manoeuvre.direction, span);
+        if !(shift_m >= MIN_SHIFT_M) {
+            continue;
+        }
+        let markings = (shift_m / lane_width_m).round().max(1.0);
+        let first_lane = sampled.point(manoeuvre.start).lane;
+        let mut share = 0.5 / markings;
+        let mut from = first_lane;
+        while share < 1.0 {
+            let sample = sampled.sample_of_share(share, span);
+            let to = beside(from, manoeuvre.direction);
+            let crossing = Crossing { time: Time::from_s(sampled.time_s(sample)), from, to };
+            found.push(lane_change(&sampled, &manoeuvre, height_share(track, lane_width_m), crossing));
+            from = to;
+            share += 1.0 / markings;
+        }
+    }
+    found.sort_by(|a, b| a.crossing_s.total_cmp(&b.crossing_s));
     found
 }
 
-/// Changes between lanes that are each held for the least dwell; shorter stays are passed over.
-fn crossings(track: &Trajectory) -> Vec<Crossing> {
-    let stays = track.points.chunk_by(|a, b| a.lane == b.lane);
-    let mut crossings = Vec::new();
-    let (mut sample, mut held) = (0, None);
-    for stay in stays {
-        if stay.len() >= MIN_DWELL_SAMPLES {
-            let to = stay[0].lane;
-            if let Some(from) = held.filter(|from| *from != to) {
-                crossings.push(Crossing { sample, from, to });
-            }
-            held = Some(to);
-        }
-        sample += stay.len();
+/// The lane beside; the first lane has none to its left, where its own number stands.
+pub(super) fn beside(lane: Lane, direction: Side) -> Lane {
+    match direction {
+        Side::Left => Lane(lane.0.saturating_sub(1).max(1)),
+        Side::Right => Lane(lane.0.saturating_add(1)),
     }
-    crossings
 }
 
-fn lane_change(track: &Trajectory, crossing: &Crossing, manoeuvre: &Manoeuvre, sole: bool) -> LaneChange {
-    let last = (track.points.len() - 1) as f64;
-    let is_recorded = manoeuvre.start >= 0.0 && manoeuvre.end <= last;
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the track's samples")]
-    let point = |sample: f64| &track.points[sample.clamp(0.0, last) as usize];
-    let shift = point(manoeuvre.end.ceil()).d_m - point(manoeuvre.start.floor()).d_m;
-    let lateral_shift_m = if manoeuvre.direction == Side::Left { shift } else { -shift };
-    let seconds = |samples: f64| samples * PERIOD.s();
-    let time_s = |sample: f64| track.points[0].time.s() + seconds(sample);
-    let at_crossing = &track.points[crossing.sample];
+fn lane_change(sampled: &Sampled<'_>, manoeuvre: &Manoeuvre, height_share: f64, crossing: Crossing) -> LaneChange {
+    let track = sampled.track;
+    let span = [manoeuvre.start, manoeuvre.end];
+    let is_recorded = manoeuvre.start >= 0.0 && manoeuvre.end <= sampled.last();
+    let lateral_shift_m = sampled.shift_m(manoeuvre.direction, span);
+    let width_s = manoeuvre.width * PERIOD.s();
     LaneChange {
         track_id: track.track_id,
         vehicle_id: track.vehicle_id,
@@ -137,15 +200,17 @@ fn lane_change(track: &Trajectory, crossing: &Crossing, manoeuvre: &Manoeuvre, s
         direction: manoeuvre.direction,
         from_lane: crossing.from.0,
         to_lane: crossing.to.0,
-        start_s: time_s(manoeuvre.start),
-        crossing_s: at_crossing.time.s(),
-        end_s: time_s(manoeuvre.end),
-        duration_s: seconds(manoeuvre.duration),
-        width_s: seconds(manoeuvre.width),
-        speed_mps: at_crossing.speed_mps,
+        start_s: sampled.time_s(manoeuvre.start),
+        midpoint_s: sampled.time_s(sampled.sample_of_share(0.5, span)),
+        crossing_s: crossing.time.s(),
+        end_s: sampled.time_s(manoeuvre.end),
+        duration_s: width_s / quintic_width_share(height_share),
+        width_s,
+        speed_mps: sampled.point(sampled.sample(crossing.time).round()).speed_mps,
         peak_lateral_speed_mps: manoeuvre.peak_mps,
         lateral_shift_m,
-        complete: is_recorded && sole && lateral_shift_m >= MIN_SHIFT_M,
+        double: false,
+        complete: is_recorded && lateral_shift_m >= MIN_SHIFT_M,
     }
 }
 
@@ -159,11 +224,6 @@ mod tests {
 
     fn found(track: Trajectory) -> Vec<LaneChange> {
         detect(&smooth(&recording_of(vec![track])))
-    }
-
-    #[test]
-    fn the_published_share_of_a_quintic_path() {
-        assert!((quintic_width_share(0.5 * 1.85 / 3.75) - 0.71).abs() < 0.005);
     }
 
     #[test]
@@ -217,7 +277,56 @@ mod tests {
     fn one_sweep_over_two_markings_is_two_lane_changes() {
         let found = found(changing_track(1, (0.0, 30.0), (-8.75, -1.75), (4.0, 9.0), 180));
         assert_eq!(found.iter().map(|change| (change.from_lane, change.to_lane)).collect::<Vec<_>>(), [(3, 2), (2, 1)]);
-        assert!(found.iter().all(|change| !change.complete));
+        assert!(found.iter().all(|change| !change.complete && change.double));
+    }
+
+    /// From lane 3 over lane 2 to lane 1, the second lane change `pause_s` after the first has begun.
+    fn two_to_the_left(pause_s: f64) -> Vec<LaneChange> {
+        let mut track = changing_track(1, (0.0, 30.0), (-8.75, -5.25), (3.0, 4.0), 250);
+        let second = changing_track(1, (0.0, 30.0), (0.0, 3.5), (3.0 + pause_s, 4.0), 250);
+        for (point, second) in track.points.iter_mut().zip(&second.points) {
+            point.d_m += second.d_m;
+            point.lane = Lane((-point.d_m / 3.5).floor() as u8 + 1);
+        }
+        found(track)
+    }
+
+    #[test]
+    fn only_what_overlaps_is_a_double() {
+        let double = |pause_s| -> Vec<_> {
+            two_to_the_left(pause_s).iter().map(|change| (change.double, change.complete)).collect()
+        };
+        assert_eq!(double(3.5), [(true, false); 2]);
+        assert_eq!(double(7.0), [(false, true); 2]);
+    }
+
+    #[test]
+    fn the_middle_is_where_half_of_the_shift_is_done() {
+        let found = found(changing_track(1, (0.0, 30.0), (-5.85, -2.35), (4.0, 6.0), 150));
+        assert_eq!(found.len(), 1);
+        // The marking is crossed later than that: the vehicle started right of its lane's middle.
+        assert!((found[0].midpoint_s - 7.0).abs() < 0.05 && found[0].crossing_s > 7.4, "{:?}", found[0]);
+    }
+
+    fn by_distance_beside_by(offset_m: f64) -> Vec<LaneChange> {
+        let mut track = changing_track(1, (0.0, 30.0), (-5.25, -1.75), (4.0, 6.0), 150);
+        track.points.iter_mut().for_each(|point| point.d_m += offset_m);
+        let markings = recording_of(vec![changing_track(2, (0.0, 30.0), (-5.25, -1.75), (4.0, 6.0), 150)]).markings;
+        Detector::new(Lanes::Doubtful, &markings).detect(Criterion::Distance, &track, &[])
+    }
+
+    #[test]
+    fn the_distance_criterion_counts_the_time_on_the_marking() {
+        let found = by_distance_beside_by(0.0);
+        let [change] = &found[..] else { panic!("{}", found.len()) };
+        assert!((change.crossing_s - 7.0).abs() <= 0.2 && (change.midpoint_s - 7.0).abs() <= 0.1);
+        assert_eq!((change.direction, change.from_lane, change.to_lane), (Side::Left, 2, 1));
+        // 1.8 m of 3.5 m at 1.875 times the mean speed and less: at least 1.65 s.
+        assert!((1.6..2.3).contains(&change.duration_s), "{}", change.duration_s);
+        assert!(change.complete && change.lateral_shift_m > 3.0);
+        assert_eq!(by_distance_beside_by(0.5).len(), 1);
+        // Further aside than (3.5 − 1.8) / 2 it is in no lane.
+        assert!(by_distance_beside_by(1.0).is_empty() && by_distance_beside_by(-1.0).is_empty());
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Peaks of a signal: where they are, how far they stand out, and how wide they are.
 //!
-//! The definitions are those of SciPy's `find_peaks`, `peak_prominences` and `peak_widths`.
+//! The definitions are those of SciPy's `find_peaks`, `peak_prominences` (without `wlen`) and `peak_widths`, to the bit
+//! where sums are taken in the same order; `tests/golden/make_golden.py` makes the values that the tests compare with.
 
 /// A peak.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -9,14 +10,29 @@ pub struct Peak {
     pub index: usize,
     /// The signal there.
     pub height: f64,
-    /// How far it rises above the higher one of the lowest points between it and higher ground on either side.
+    /// How far it rises above the higher one of its two bases.
     pub prominence: f64,
+    /// Sample of the lowest value between it and higher ground on the left, or the end; the nearest one of several.
+    pub left_base: usize,
+    /// The same on the right.
+    pub right_base: usize,
+}
+
+/// Where a peak is cut at some height.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Width {
+    /// The height at which it is cut.
+    pub level: f64,
+    /// Left end in fractional samples.
+    pub left: f64,
+    /// Right end in fractional samples.
+    pub right: f64,
 }
 
 /// Every peak with at least `min_prominence`, in order. The ends of the signal are none. NaN makes none.
 pub fn find_peaks(signal: &[f64], min_prominence: f64) -> Vec<Peak> {
-    let with_prominence = |index: usize| Peak { index, height: signal[index], prominence: prominence(signal, index) };
-    local_maxima(signal).into_iter().map(with_prominence).filter(|peak| peak.prominence >= min_prominence).collect()
+    let peaks = local_maxima(signal).into_iter().map(|index| peak_at(signal, index));
+    peaks.filter(|peak| peak.prominence >= min_prominence).collect()
 }
 
 fn local_maxima(signal: &[f64]) -> Vec<usize> {
@@ -37,31 +53,39 @@ fn local_maxima(signal: &[f64]) -> Vec<usize> {
     maxima
 }
 
-fn prominence(signal: &[f64], index: usize) -> f64 {
+/// What `peak_prominences` tells of the peak at `index`.
+pub(super) fn peak_at(signal: &[f64], index: usize) -> Peak {
     let height = signal[index];
-    let lowest_until_higher = |side: &mut dyn Iterator<Item = &f64>| {
-        side.take_while(|value| **value <= height).fold(height, |lowest, value| lowest.min(*value))
+    let lowest = |side: &mut dyn Iterator<Item = usize>| {
+        let mut base = index;
+        for k in side.take_while(|&k| signal[k] <= height) {
+            if signal[k] < signal[base] {
+                base = k;
+            }
+        }
+        base
     };
-    let left = lowest_until_higher(&mut signal[..index].iter().rev());
-    let right = lowest_until_higher(&mut signal[index + 1..].iter());
-    height - left.max(right)
+    let left_base = lowest(&mut (0..index).rev());
+    let right_base = lowest(&mut (index + 1..signal.len()));
+    let prominence = height - signal[left_base].max(signal[right_base]);
+    Peak { index, height, prominence, left_base, right_base }
 }
 
-/// Where the signal, going outwards from `index`, first falls to `level` on either side, in fractional samples.
+/// Where `peak` of `signal` is cut by the height that lies `rel_height` of its prominence below its top.
 ///
-/// The end of the signal where it never does: then that side is cut.
-pub fn width(signal: &[f64], index: usize, level: f64) -> (f64, f64) {
-    let left = (0..=index).rev().find(|&k| signal[k] <= level);
-    let right = (index..signal.len()).find(|&k| signal[k] <= level);
-    // The share of the last step, where the signal passes the level.
-    let share = |inner: usize, outer: usize| {
-        let (above, below) = (signal[inner], signal[outer]);
-        if above > below { (level - below) / (above - below) } else { 0.0 }
-    };
-    let left = left.map_or(0.0, |k| if k == index { k as f64 } else { k as f64 + share(k + 1, k) });
-    let last = signal.len().saturating_sub(1) as f64;
-    let right = right.map_or(last, |k| if k == index { k as f64 } else { k as f64 - share(k - 1, k) });
-    (left, right)
+/// Ends are interpolated linearly, and lie no further out than the bases.
+pub fn peak_width(signal: &[f64], peak: &Peak, rel_height: f64) -> Width {
+    let level = peak.height - peak.prominence * rel_height;
+    let (mut i, mut j) = (peak.index, peak.index);
+    while i > peak.left_base && level < signal[i] {
+        i -= 1;
+    }
+    while j < peak.right_base && level < signal[j] {
+        j += 1;
+    }
+    let left = if signal[i] < level { i as f64 + (level - signal[i]) / (signal[i + 1] - signal[i]) } else { i as f64 };
+    let right = if signal[j] < level { j as f64 - (level - signal[j]) / (signal[j - 1] - signal[j]) } else { j as f64 };
+    Width { level, left, right }
 }
 
 #[cfg(test)]
@@ -80,6 +104,7 @@ mod tests {
         assert_eq!(indices(&[3.0, 1.0, 2.0, 1.0, 3.0], 0.0), [2]);
         assert_eq!(indices(&[0.0, 1.0, 1.0], 0.0), [0_usize; 0]);
         assert_eq!(indices(&[], 0.0), [0_usize; 0]);
+        assert_eq!(indices(&[0.0, f64::NAN, 0.0, 1.0, f64::NAN], 0.0), [0_usize; 0]);
     }
 
     #[test]
@@ -92,22 +117,27 @@ mod tests {
     }
 
     #[test]
-    fn widths_are_interpolated_and_cut_at_the_ends() {
+    fn widths_are_interpolated() {
         let triangle = [0.0, 1.0, 2.0, 1.0, 0.0];
-        assert_eq!(width(&triangle, 2, 0.5), (0.5, 3.5));
-        assert_eq!(width(&[1.5, 2.0, 1.0, 0.0], 1, 0.5), (0.0, 2.5));
+        let top = find_peaks(&triangle, 0.0)[0];
+        assert_eq!(peak_width(&triangle, &top, 0.75), Width { level: 0.5, left: 0.5, right: 3.5 });
     }
 
     proptest! {
         #[test]
         fn peaks_do_not_depend_on_the_direction_of_time(mut signal in prop::collection::vec(-5.0..5.0, 3..60)) {
-            let forwards = find_peaks(&signal, 0.3);
+            let widths = |signal: &[f64]| -> Vec<_> {
+                find_peaks(signal, 0.3).iter().map(|peak| (*peak, peak_width(signal, peak, 0.7))).collect()
+            };
+            let forwards = widths(&signal);
             signal.reverse();
-            let backwards = find_peaks(&signal, 0.3);
+            let backwards = widths(&signal);
             prop_assert_eq!(forwards.len(), backwards.len());
-            for (a, b) in forwards.iter().zip(backwards.iter().rev()) {
-                prop_assert_eq!(a.index, signal.len() - 1 - b.index);
+            let last = signal.len() - 1;
+            for ((a, a_width), (b, b_width)) in forwards.iter().zip(backwards.iter().rev()) {
+                prop_assert_eq!(a.index, last - b.index);
                 prop_assert_eq!(a.prominence.to_bits(), b.prominence.to_bits());
+                prop_assert!((a_width.left - (last as f64 - b_width.right)).abs() < 1e-9);
             }
         }
     }

@@ -1,63 +1,108 @@
 //! Filter and peaks against SciPy; `golden/make_golden.py` makes the reference values.
 
-use closecall_scenarios::filters::{CORNER_HZ, LowPass, PERIOD};
-use closecall_scenarios::lane_change::{find_peaks, width};
+use closecall_scenarios::filters::{CORNER_HZ, LowPass};
+use closecall_scenarios::lane_change::{find_peaks, peak_width};
+use serde::Deserialize;
 
-const REFERENCE: &str = include_str!("../golden/scipy.csv");
-const REL_HEIGHT: f64 = 0.75;
-const MIN_PROMINENCE: f64 = 0.3;
+const REFERENCE: &str = include_str!("../golden/scipy.json");
 
-fn signal(n: usize) -> Vec<f64> {
-    let at = |k: f64| (0.11 * k).sin() + 0.4 * (0.57 * k + 1.0).sin() + 0.2 * (2.3 * k).cos() + 0.01 * k;
-    (0..n).map(|k| at(k as f64)).collect()
+#[derive(Deserialize)]
+struct Golden {
+    filter: Vec<FilterCase>,
+    peaks: Vec<PeakCase>,
 }
 
-/// The rows of one kind: number of samples and values.
-fn reference(kind: &str) -> Vec<(usize, Vec<f64>)> {
-    let rows = REFERENCE.lines().filter_map(|line| {
-        let mut fields = line.split(',');
-        (fields.next() == Some(kind)).then(|| {
-            let n = fields.next().unwrap().parse().unwrap();
-            (n, fields.map(|field| field.parse().unwrap()).collect())
-        })
-    });
-    let rows: Vec<_> = rows.collect();
-    assert!(!rows.is_empty(), "no rows of {kind}");
-    rows
+#[derive(Deserialize)]
+struct FilterCase {
+    name: String,
+    rate_hz: f64,
+    padding: usize,
+    signal: Vec<f64>,
+    filtered: Vec<f64>,
 }
 
-fn assert_close(found: &[f64], expected: &[f64], what: &str) {
-    assert_eq!(found.len(), expected.len(), "{what}");
-    for (found, expected) in found.iter().zip(expected) {
-        assert!((found - expected).abs() < 1e-10, "{what}: {found} instead of {expected}");
-    }
+#[derive(Deserialize)]
+struct PeakCase {
+    name: String,
+    signal: Vec<f64>,
+    min_prominence: f64,
+    peaks: Vec<usize>,
+    prominences: Vec<f64>,
+    left_bases: Vec<usize>,
+    right_bases: Vec<usize>,
+    widths: Vec<WidthCase>,
 }
+
+#[derive(Deserialize)]
+struct WidthCase {
+    rel_height: f64,
+    widths: Vec<f64>,
+    levels: Vec<f64>,
+    left: Vec<f64>,
+    right: Vec<f64>,
+}
+
+fn golden() -> Golden {
+    serde_json::from_str(REFERENCE).unwrap()
+}
+
+/// Largest difference of a width, as a share of it.
+const WIDTH_SHARE: f64 = 1e-9;
+
+/// Largest difference of a filtered value, as a share of the signal's largest.
+const FILTER_SHARE: f64 = 1e-9;
 
 #[test]
 fn the_filter_is_that_of_scipy() {
-    let filter = LowPass::new(CORNER_HZ, 1.0 / PERIOD.s()).unwrap();
-    for (n, expected) in reference("filtfilt") {
-        assert_close(&filter.forwards_and_backwards(&signal(n)), &expected, &format!("filtfilt of {n}"));
+    let cases = golden().filter;
+    assert!(cases.len() > 100);
+    for case in cases {
+        let filter = LowPass::new(CORNER_HZ, case.rate_hz).unwrap();
+        let found = filter.forwards_and_backwards(&case.signal, case.padding);
+        assert_eq!(found.len(), case.filtered.len(), "{}", case.name);
+        let largest = case.signal.iter().fold(1.0_f64, |largest, value| largest.max(value.abs()));
+        for (found, expected) in found.iter().zip(&case.filtered) {
+            let error = (found - expected).abs() / largest;
+            assert!(error < FILTER_SHARE, "{}: {found} instead of {expected}", case.name);
+        }
     }
 }
 
 #[test]
-fn peaks_and_prominences_are_those_of_scipy() {
-    for ((n, places), (_, prominences)) in reference("peaks").into_iter().zip(reference("prominences")) {
-        let found = find_peaks(&signal(n), MIN_PROMINENCE);
-        assert_close(&found.iter().map(|peak| peak.index as f64).collect::<Vec<_>>(), &places, "peaks");
-        assert_close(&found.iter().map(|peak| peak.prominence).collect::<Vec<_>>(), &prominences, "prominences");
+fn peaks_prominences_and_bases_are_exactly_those_of_scipy() {
+    let cases = golden().peaks;
+    assert!(cases.iter().map(|case| case.peaks.len()).sum::<usize>() > 500);
+    for case in cases {
+        let found = find_peaks(&case.signal, case.min_prominence);
+        let places =
+            |value: fn(&closecall_scenarios::lane_change::Peak) -> usize| found.iter().map(value).collect::<Vec<_>>();
+        assert_eq!(places(|peak| peak.index), case.peaks, "{}", case.name);
+        assert_eq!(places(|peak| peak.left_base), case.left_bases, "{}", case.name);
+        assert_eq!(places(|peak| peak.right_base), case.right_bases, "{}", case.name);
+        let prominences: Vec<f64> = found.iter().map(|peak| peak.prominence).collect();
+        assert_eq!(prominences, case.prominences, "{}", case.name);
     }
 }
 
 #[test]
 fn widths_are_those_of_scipy() {
-    for ((n, left), (_, right)) in reference("left").into_iter().zip(reference("right")) {
-        let signal = signal(n);
-        let peaks = find_peaks(&signal, MIN_PROMINENCE).into_iter().filter(|peak| peak.height > 0.0);
-        let (found_left, found_right): (Vec<f64>, Vec<f64>) =
-            peaks.map(|peak| width(&signal, peak.index, (1.0 - REL_HEIGHT) * peak.height)).unzip();
-        assert_close(&found_left, &left, "left ends");
-        assert_close(&found_right, &right, "right ends");
+    for case in golden().peaks {
+        let found = find_peaks(&case.signal, case.min_prominence);
+        for expected in &case.widths {
+            assert_eq!(found.len(), expected.widths.len(), "{}", case.name);
+            for (k, peak) in found.iter().enumerate() {
+                let found = peak_width(&case.signal, peak, expected.rel_height);
+                assert_eq!(found.level, expected.levels[k], "{}", case.name);
+                let width = expected.widths[k];
+                for (found, expected) in [
+                    (found.right - found.left, width),
+                    (found.left, expected.left[k]),
+                    (found.right, expected.right[k]),
+                ] {
+                    let error = (found - expected).abs();
+                    assert!(error <= WIDTH_SHARE * width.abs(), "{}: {found} instead of {expected}", case.name);
+                }
+            }
+        }
     }
 }

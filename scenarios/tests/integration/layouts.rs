@@ -7,7 +7,7 @@ use closecall_scenarios::lane_change::detect;
 use closecall_scenarios::recordings::{
     Layout, LayoutChoice, ReadOptions, Recording, RecordingProblem, open, read, read_from, read_with,
 };
-use closecall_traffic::{Lane, Time};
+use closecall_traffic::{Lane, Side, Time};
 
 use crate::support::data_folder;
 
@@ -30,12 +30,10 @@ fn the_highd_layout_tells_what_the_plain_one_tells() {
     let crossings = |recording| {
         detect(&smooth(recording)).iter().map(|change| (change.direction, change.crossing_s)).collect::<Vec<_>>()
     };
-    let (mut one, mut other) = (crossings(&plain), crossings(&highd));
-    one.sort_by(|a, b| a.1.total_cmp(&b.1));
-    other.sort_by(|a, b| a.1.total_cmp(&b.1));
-    assert!(one.len() >= 4);
-    assert_eq!(one.len(), other.len());
-    assert!(one.iter().zip(&other).all(|(a, b)| a.0 == b.0 && (a.1 - b.1).abs() <= 0.101), "{one:?} {other:?}");
+    let (one, other) = (crossings(&plain), crossings(&highd));
+    assert_eq!(other.len(), 4, "as many as the lane changes in that file; some rows of the plain one are not in it");
+    let is_same = |a: &(Side, f64), b: &(Side, f64)| a.0 == b.0 && (a.1 - b.1).abs() <= 0.101;
+    assert!(other.iter().all(|b| one.iter().any(|a| is_same(a, b))), "{one:?} {other:?}");
 }
 
 #[test]

@@ -10,4 +10,5 @@ mod malformed;
 mod malformed_layouts;
 mod ngsim_us101;
 mod own_recordings;
+mod robustness;
 mod support;

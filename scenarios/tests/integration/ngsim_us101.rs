@@ -1,43 +1,13 @@
 //! The recordings of US-101, where the data is there: layouts agree, and lane changes are those of the reference list.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
 use closecall_scenarios::filters::smooth;
-use closecall_scenarios::lane_change::{LaneChange, detect};
+use closecall_scenarios::lane_change::{Criterion, Detector, Lanes, Score, Spans, detect, read_references, score};
 use closecall_scenarios::recordings::{Layout, Recording, quality, read};
-use closecall_traffic::{Lane, Side, Time};
+use closecall_traffic::{Lane, Time, Trajectory};
 
 use crate::support::data_folder;
-
-/// A lane change of the reference list.
-struct Reference {
-    track_id: u64,
-    time_s: f64,
-    direction: Side,
-    clear: bool,
-}
-
-/// The reference list by recording.
-fn references(folder: &Path) -> BTreeMap<String, Vec<Reference>> {
-    let text = std::fs::read_to_string(folder.join("ngsim_us101/reference_lane_changes.csv")).unwrap();
-    let mut lines = text.lines();
-    let header: Vec<&str> = lines.next().unwrap().split(',').collect();
-    let place = |name| header.iter().position(|column| *column == name).unwrap();
-    let (recording, track, time) = (place("recording_id"), place("track_id"), place("time_s"));
-    let (direction, clear) = (place("direction"), place("clear"));
-    let mut found: BTreeMap<String, Vec<Reference>> = BTreeMap::new();
-    for line in lines {
-        let fields: Vec<&str> = line.split(',').collect();
-        found.entry(fields[recording].to_owned()).or_default().push(Reference {
-            track_id: fields[track].parse().unwrap(),
-            time_s: fields[time].parse().unwrap(),
-            direction: if fields[direction] == "left" { Side::Left } else { Side::Right },
-            clear: fields[clear] == "1",
-        });
-    }
-    found
-}
 
 fn recordings(folder: &Path) -> Vec<Recording> {
     let entries = std::fs::read_dir(folder.join("ngsim_us101/trajectories")).unwrap();
@@ -46,43 +16,41 @@ fn recordings(folder: &Path) -> Vec<Recording> {
     paths.iter().map(|path| read(path).unwrap()).collect()
 }
 
-/// Largest difference between the crossing found and the reference's [s].
-const CROSSING_S: f64 = 0.5;
-
-fn agrees(found: &LaneChange, reference: &Reference) -> bool {
-    found.track_id == reference.track_id
-        && found.direction == reference.direction
-        && (found.crossing_s - reference.time_s).abs() <= CROSSING_S
+fn spans(tracks: &[Trajectory]) -> Spans {
+    tracks.iter().filter_map(|track| Some((track.track_id, track.span()?))).collect()
 }
 
-/// Clear ones with at least 2 s of track on both sides have to be found.
-fn has_to_be_found(recording: &Recording, reference: &Reference) -> bool {
-    const ON_EACH_SIDE_S: f64 = 2.0;
-    let track = recording.trajectories.iter().find(|track| track.track_id == reference.track_id).unwrap();
-    let (first, last) = track.span().unwrap();
-    reference.clear
-        && reference.time_s - first.s() >= ON_EACH_SIDE_S - 1e-9
-        && last.s() - reference.time_s >= ON_EACH_SIDE_S - 1e-9
+/// What a criterion reaches over all recordings.
+fn scored(folder: &Path, criterion: Criterion) -> Score {
+    let references = read_references(&folder.join("ngsim_us101/reference_lane_changes.csv")).unwrap();
+    let mut total = Score::default();
+    for recording in recordings(folder) {
+        let listed: Vec<_> = references.iter().filter(|listed| listed.recording_id == recording.name).collect();
+        let detector = Detector::new(Lanes::Recorded, &recording.markings);
+        let tracks = &recording.trajectories;
+        let found: Vec<_> = tracks.iter().flat_map(|track| detector.detect(criterion, track, &[])).collect();
+        total.add(&score(&found, &listed, &spans(tracks)));
+    }
+    total
 }
 
 #[test]
 fn lane_changes_are_those_of_the_reference_list() {
     let Some(folder) = data_folder() else { return };
-    let mut references = references(&folder);
-    let (mut needed, mut recalled, mut found_all, mut right) = (0, 0, 0, 0);
-    for recording in recordings(&folder) {
-        let listed = references.remove(&recording.name).unwrap_or_default();
-        let found = detect(&smooth(&recording));
-        for reference in listed.iter().filter(|reference| has_to_be_found(&recording, reference)) {
-            needed += 1;
-            recalled += usize::from(found.iter().any(|change| agrees(change, reference)));
-        }
-        found_all += found.len();
-        right += found.iter().filter(|change| listed.iter().any(|reference| agrees(change, reference))).count();
-    }
-    assert!(needed >= 10 && found_all >= 20, "too little data to say: {needed} {found_all}");
-    assert!(recalled * 100 >= needed * 95, "recall {recalled} of {needed}");
-    assert!(right * 100 >= found_all * 95, "precision {right} of {found_all}");
+    let Score { recall, precision, max_time_error_s } = scored(&folder, Criterion::Peak);
+    assert!(recall.of >= 10 && precision.of >= 20, "too little data to say: {recall}, {precision}");
+    assert!(recall.hits * 100 >= recall.of * 95, "recall {recall}");
+    assert!(precision.hits * 100 >= precision.of * 95, "precision {precision}");
+    assert!(max_time_error_s <= 0.1, "{max_time_error_s}");
+}
+
+#[test]
+fn what_the_distance_criterion_finds_is_right_but_it_does_not_find_all() {
+    let Some(folder) = data_folder() else { return };
+    let Score { recall, precision, .. } = scored(&folder, Criterion::Distance);
+    // Measured: 13 of 18. Vehicles that ride beside the middle of narrow lanes, or whose track is short, are in no band.
+    assert!(recall.hits * 100 >= recall.of * 60 && recall.hits < recall.of, "recall {recall}");
+    assert!(precision.hits * 100 >= precision.of * 95, "precision {precision}");
 }
 
 #[test]

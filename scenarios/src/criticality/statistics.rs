@@ -1,0 +1,226 @@
+//! Statistics of lane changes: how long they take, how fast they are driven, and what goes with what.
+//!
+//! Only *complete* lane changes enter durations, speeds and correlations ([`crate::lane_change`]); all are counted, and
+//! double ones apart.
+//!
+//! - **Boxes**: quartiles by linear interpolation between order statistics (Hyndman and Fan's type 7, as R and NumPy
+//!   do); whiskers reach to the furthest values within 1.5 interquartile ranges of the box (Tukey), others are outliers.
+//! - **Correlation**: Pearson's r of the values and Spearman's ρ of their ranks (ties share their mean rank), over the
+//!   lane changes for which both quantities have a value, with how many these are. With fewer than 5 pairs, or where a
+//!   quantity does not vary, there is none.
+
+use closecall_traffic::{Side, VehicleClass};
+use serde::Serialize;
+
+use super::CriticalLaneChange;
+
+/// Fewer pairs than this have no correlation worth stating.
+const MIN_PAIRS: usize = 5;
+
+/// Whiskers reach this many interquartile ranges beyond the box (J. W. Tukey, Exploratory Data Analysis, 1977).
+const WHISKER_RANGES: f64 = 1.5;
+
+/// The box of a box plot.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct BoxNumbers {
+    /// How many values.
+    pub n: usize,
+    /// Their mean.
+    pub mean: f64,
+    /// Lower whisker, lower quartile, median, upper quartile, upper whisker.
+    pub five: [f64; 5],
+    /// Values beyond the whiskers, rising.
+    pub outliers: Vec<f64>,
+}
+
+impl BoxNumbers {
+    /// The box of `values`, or nothing where there are none.
+    pub fn of(mut values: Vec<f64>) -> Option<Self> {
+        values.retain(|value| value.is_finite());
+        values.sort_by(f64::total_cmp);
+        let [lower, median, upper] = [0.25, 0.5, 0.75].map(|share| quantile(&values, share));
+        let (lower, median, upper) = (lower?, median?, upper?);
+        let reach = WHISKER_RANGES * (upper - lower);
+        let is_within = |value: &f64| (lower - reach..=upper + reach).contains(value);
+        let within: Vec<f64> = values.iter().copied().filter(is_within).collect();
+        let five = [*within.first()?, lower, median, upper, *within.last()?];
+        let outliers = values.iter().copied().filter(|value| !is_within(value)).collect();
+        Some(Self { n: values.len(), mean: values.iter().sum::<f64>() / values.len() as f64, five, outliers })
+    }
+}
+
+/// A quantile of sorted values by linear interpolation.
+fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
+    let place = share * (sorted.len().checked_sub(1)?) as f64;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and the number of values")]
+    let below = place as usize;
+    let (low, high) = (sorted[below], sorted[(below + 1).min(sorted.len() - 1)]);
+    Some(low + (place - below as f64) * (high - low))
+}
+
+/// The lane changes of one class of vehicles.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ClassStatistics {
+    /// The class.
+    pub vehicle_class: VehicleClass,
+    /// All lane changes.
+    pub lane_changes: usize,
+    /// Those to the left.
+    pub to_the_left: usize,
+    /// Complete ones.
+    pub complete: usize,
+    /// Parts of double ones.
+    pub double: usize,
+    /// Durations of complete ones [s].
+    pub duration_s: Option<BoxNumbers>,
+    /// Speeds at the crossing of complete ones [m/s].
+    pub speed_mps: Option<BoxNumbers>,
+}
+
+/// How two quantities go together.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Correlation {
+    /// One quantity.
+    pub of: &'static str,
+    /// The other.
+    pub with: &'static str,
+    /// Complete lane changes that have both.
+    pub n: usize,
+    /// Pearson's coefficient.
+    pub pearson: Option<f64>,
+    /// Spearman's coefficient.
+    pub spearman: Option<f64>,
+}
+
+/// Statistics over many lane changes.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Statistics {
+    /// By class, in the order of classes; those without lane changes are not there.
+    pub classes: Vec<ClassStatistics>,
+    /// Duration and speed against each other, then each against the metrics in their fixed order.
+    pub correlations: Vec<Correlation>,
+}
+
+/// The statistics of `changes`.
+pub fn statistics(changes: &[CriticalLaneChange]) -> Statistics {
+    let classes = VehicleClass::ALL.into_iter().filter_map(|class| class_statistics(changes, class));
+    Statistics { classes: classes.collect(), correlations: correlations(changes) }
+}
+
+fn class_statistics(changes: &[CriticalLaneChange], vehicle_class: VehicleClass) -> Option<ClassStatistics> {
+    let all: Vec<_> = changes
+        .iter()
+        .map(|change| &change.lane_change)
+        .filter(|change| change.vehicle_class == vehicle_class)
+        .collect();
+    let complete: Vec<_> = all.iter().filter(|change| change.complete).collect();
+    (!all.is_empty()).then(|| ClassStatistics {
+        vehicle_class,
+        lane_changes: all.len(),
+        to_the_left: all.iter().filter(|change| change.direction == Side::Left).count(),
+        complete: complete.len(),
+        double: all.iter().filter(|change| change.double).count(),
+        duration_s: BoxNumbers::of(complete.iter().map(|change| change.duration_s).collect()),
+        speed_mps: BoxNumbers::of(complete.iter().map(|change| change.speed_mps).collect()),
+    })
+}
+
+/// A quantity of one lane change, where it has a value.
+type Quantity = Box<dyn Fn(&CriticalLaneChange) -> Option<f64>>;
+
+fn correlations(changes: &[CriticalLaneChange]) -> Vec<Correlation> {
+    let complete: Vec<_> = changes.iter().filter(|change| change.lane_change.complete).collect();
+    let duration: (_, Quantity) = ("duration_s", Box::new(|change| Some(change.lane_change.duration_s)));
+    let speed: (_, Quantity) = ("crossing_speed_mps", Box::new(|change| Some(change.lane_change.speed_mps)));
+    let names: Vec<&'static str> =
+        complete.first().map_or_else(Vec::new, |change| change.metrics.named().map(|(name, _)| name).to_vec());
+    let metrics: Vec<(_, Quantity)> = names
+        .into_iter()
+        .enumerate()
+        .map(|(place, name)| -> (_, Quantity) {
+            (name, Box::new(move |change| change.metrics.named()[place].1.value()))
+        })
+        .collect();
+    let with_metrics = [&duration, &speed].into_iter().flat_map(|of| metrics.iter().map(move |with| (of, with)));
+    let pairs = [(&duration, &speed)].into_iter().chain(with_metrics);
+    pairs.map(|(of, with)| correlation(&complete, of, with)).collect()
+}
+
+fn correlation(
+    complete: &[&CriticalLaneChange],
+    (of, one): &(&'static str, Quantity),
+    (with, other): &(&'static str, Quantity),
+) -> Correlation {
+    let pairs = complete.iter().filter_map(|change| one(change).zip(other(change)));
+    let (a, b): (Vec<f64>, Vec<f64>) = pairs.filter(|(a, b)| a.is_finite() && b.is_finite()).unzip();
+    Correlation { of, with, n: a.len(), pearson: pearson(&a, &b), spearman: pearson(&ranks(&a), &ranks(&b)) }
+}
+
+fn pearson(a: &[f64], b: &[f64]) -> Option<f64> {
+    let n = a.len() as f64;
+    let (mean_a, mean_b) = (a.iter().sum::<f64>() / n, b.iter().sum::<f64>() / n);
+    let sum =
+        |product: &dyn Fn(f64, f64) -> f64| a.iter().zip(b).map(|(a, b)| product(a - mean_a, b - mean_b)).sum::<f64>();
+    let (aa, bb, ab) = (sum(&|a, _| a * a), sum(&|_, b| b * b), sum(&|a, b| a * b));
+    (a.len() >= MIN_PAIRS && aa > 0.0 && bb > 0.0).then(|| (ab / (aa.sqrt() * bb.sqrt())).clamp(-1.0, 1.0))
+}
+
+/// Ranks from 1 on; equal values share the mean of theirs.
+fn ranks(values: &[f64]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
+    let mut ranks = vec![0.0; values.len()];
+    let mut passed = 0;
+    for tied in order.chunk_by(|&a, &b| values[a] == values[b]) {
+        let rank = passed as f64 + 0.5 * (tied.len() + 1) as f64;
+        tied.iter().for_each(|&place| ranks[place] = rank);
+        passed += tied.len();
+    }
+    ranks
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::criticality::criticality;
+    use crate::filters::smooth;
+    use crate::recordings::test_support::{changing_track, recording_of};
+
+    #[test]
+    fn boxes_are_those_of_the_textbook() {
+        let found = BoxNumbers::of(vec![7.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 30.0]).unwrap();
+        // NumPy: percentile([1, 2, 3, 4, 5, 6, 7, 30], [25, 50, 75]) = 2.75, 4.5, 6.25.
+        assert_eq!((found.n, found.mean, found.five), (8, 7.25, [1.0, 2.75, 4.5, 6.25, 7.0]));
+        assert_eq!(found.outliers, [30.0]);
+        assert_eq!(BoxNumbers::of(vec![2.0]).unwrap().five, [2.0; 5]);
+        assert_eq!(BoxNumbers::of(vec![f64::NAN]), None);
+    }
+
+    #[test]
+    fn correlations_are_those_of_scipy() {
+        let (a, b) = ([1.0, 2.0, 3.0, 4.0, 5.0, 5.0], [2.0, 1.0, 4.0, 3.0, 7.0, 5.0]);
+        // scipy.stats.pearsonr and spearmanr.
+        assert!((pearson(&a, &b).unwrap() - 0.831_521_840_620_299_8).abs() < 1e-12);
+        assert!((pearson(&ranks(&a), &ranks(&b)).unwrap() - 0.869_656_553_478_672_7).abs() < 1e-12);
+        assert_eq!(pearson(&[1.0; 6], &b), None);
+        assert_eq!(pearson(&a[..4], &b[..4]), None);
+        assert_eq!(ranks(&[3.0, 1.0, 3.0]), [2.5, 1.0, 2.5]);
+    }
+
+    #[test]
+    fn slow_lane_changes_take_longer() {
+        let track = |k: u64| {
+            let duration_s = 3.0 + 0.5 * k as f64;
+            changing_track(k + 1, (0.0, 40.0 - 2.0 * k as f64), (-5.25, -1.75), (3.0, duration_s), 160)
+        };
+        let changes = criticality(&smooth(&recording_of((0..8).map(track).collect())), None);
+        let found = statistics(&changes);
+        let [cars] = &found.classes[..] else { panic!("one class") };
+        assert_eq!((cars.lane_changes, cars.to_the_left, cars.complete, cars.double), (8, 8, 8, 0));
+        assert!((cars.duration_s.as_ref().unwrap().five[2] - 4.75).abs() < 0.2);
+        let first = &found.correlations[0];
+        assert_eq!((first.of, first.with, first.n), ("duration_s", "crossing_speed_mps", 8));
+        assert!(first.pearson.unwrap() < -0.99 && first.spearman.unwrap() < -0.999);
+        assert_eq!(found.correlations.len(), 15);
+    }
+}

@@ -1,0 +1,115 @@
+//! The distance criterion: from one lane that is kept to another.
+
+use closecall_traffic::{Lane, Side, Trajectory};
+
+use super::LaneChange;
+use super::crossings::MIN_DWELL;
+use super::geometry::LanePlace;
+use super::manoeuvre::{MIN_SHIFT_M, Sampled, sign};
+use crate::filters::PERIOD;
+
+/// The shift is taken from this long before the start to this long after the end, for the slow parts of it [samples]: 1.5 s.
+const SETTLED_SAMPLES: f64 = 7.5;
+
+/// Samples in a row within one lane's band.
+struct Kept {
+    lane: Lane,
+    first: usize,
+    last: usize,
+}
+
+/// The lane changes of a smoothed track; `place` tells the lane of a sample at a lateral position.
+pub(super) fn by_distance(track: &Trajectory, place: impl Fn(usize) -> Option<LanePlace>) -> Vec<LaneChange> {
+    let Some(sampled) = Sampled::new(track) else { return Vec::new() };
+    let kept = kept_lanes(track, &place);
+    let changes = kept.windows(2).filter(|pair| pair[0].lane != pair[1].lane);
+    changes.flat_map(|pair| lane_changes(&sampled, &pair[0], &pair[1], &place)).collect()
+}
+
+/// The lanes that the vehicle keeps for the least dwell, in order; stays in the same lane are joined.
+fn kept_lanes(track: &Trajectory, place: &impl Fn(usize) -> Option<LanePlace>) -> Vec<Kept> {
+    let in_band = |k: usize| {
+        let place = place(k)?;
+        let band_m = 0.5 * (place.width_m - track.dimensions.width_m).max(0.0);
+        ((track.points[k].d_m - place.centre_m).abs() <= band_m).then_some(place.lane)
+    };
+    let mut runs: Vec<Kept> = Vec::new();
+    let mut before = None;
+    for k in 0..track.points.len() {
+        let lane = in_band(k);
+        match (lane, runs.last_mut()) {
+            (Some(lane), Some(run)) if before == Some(lane) => {
+                debug_assert_eq!(run.lane, lane);
+                run.last = k;
+            }
+            (Some(lane), _) => runs.push(Kept { lane, first: k, last: k }),
+            (None, _) => {}
+        }
+        before = lane;
+    }
+    let mut kept: Vec<Kept> = Vec::new();
+    for run in runs.into_iter().filter(|run| PERIOD * (run.last - run.first + 1) as i64 >= MIN_DWELL) {
+        match kept.last_mut() {
+            Some(last) if last.lane == run.lane => last.last = run.last,
+            _ => kept.push(run),
+        }
+    }
+    kept
+}
+
+/// The lane changes between two kept lanes: one for each marking between them.
+fn lane_changes(
+    sampled: &Sampled<'_>,
+    before: &Kept,
+    after: &Kept,
+    place: &impl Fn(usize) -> Option<LanePlace>,
+) -> Vec<LaneChange> {
+    let direction = if after.lane < before.lane { Side::Left } else { Side::Right };
+    let markings = before.lane.0.abs_diff(after.lane.0);
+    let beyond = |lane: Lane, passed: u8| match direction {
+        Side::Left => lane.0 <= before.lane.0 - passed,
+        Side::Right => lane.0 >= before.lane.0 + passed,
+    };
+    let crossing = |passed: u8| {
+        let within = (before.last + 1)..=after.first;
+        within.into_iter().find(|&k| place(k).is_some_and(|place| beyond(place.lane, passed))).unwrap_or(after.first)
+    };
+    let step = |passed: u8| match direction {
+        Side::Left => before.lane.0 - passed,
+        Side::Right => before.lane.0 + passed,
+    };
+    let change = |passed: u8| LaneChange {
+        from_lane: step(passed - 1),
+        to_lane: step(passed),
+        ..lane_change(sampled, direction, [before.last, crossing(passed), after.first])
+    };
+    (1..=markings).map(change).collect()
+}
+
+fn lane_change(sampled: &Sampled<'_>, direction: Side, [start, crossing, end]: [usize; 3]) -> LaneChange {
+    let track = sampled.track;
+    let span = [start as f64, end as f64];
+    let settled = [span[0] - SETTLED_SAMPLES, span[1] + SETTLED_SAMPLES];
+    let lateral_shift_m = sampled.shift_m(direction, settled);
+    let duration_s = (span[1] - span[0]) * PERIOD.s();
+    let speeds = track.points[start..=end].iter().map(|point| sign(direction) * point.lateral_speed_mps);
+    LaneChange {
+        track_id: track.track_id,
+        vehicle_id: track.vehicle_id,
+        vehicle_class: track.class,
+        direction,
+        from_lane: 0,
+        to_lane: 0,
+        start_s: sampled.time_s(span[0]),
+        midpoint_s: sampled.time_s(sampled.sample_of_share(0.5, span)),
+        crossing_s: sampled.time_s(crossing as f64),
+        end_s: sampled.time_s(span[1]),
+        duration_s,
+        width_s: duration_s,
+        speed_mps: track.points[crossing].speed_mps,
+        peak_lateral_speed_mps: speeds.fold(f64::NEG_INFINITY, f64::max),
+        lateral_shift_m,
+        double: false,
+        complete: settled[0] >= 0.0 && settled[1] <= sampled.last() && lateral_shift_m >= MIN_SHIFT_M,
+    }
+}
