@@ -21,8 +21,8 @@ mod render;
 mod replay;
 mod robustness;
 mod run;
-mod stop;
 mod statistics;
+mod stop;
 mod summary;
 mod watch;
 

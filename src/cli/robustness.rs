@@ -1,6 +1,5 @@
 //! `closecall robustness`: how much noise and offset each criterion for lane changes bears.
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;

@@ -1,6 +1,5 @@
 //! `closecall statistics`: durations, speeds and counts of recorded lane changes, and what they correlate with.
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;

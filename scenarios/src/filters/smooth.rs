@@ -92,6 +92,11 @@ impl SmoothedRecording {
         (track, &track.points[presence.point])
     }
 
+    /// The movements, in the order of the track numbers.
+    pub fn trajectories(&self) -> impl Iterator<Item = &Trajectory> {
+        self.tracks.iter().map(|track| &track.trajectory)
+    }
+
     /// The place of track `track_id` among the tracks.
     pub fn place_of(&self, track_id: u64) -> Option<usize> {
         self.tracks.binary_search_by_key(&track_id, |track| track.trajectory.track_id).ok()

@@ -47,7 +47,7 @@ pub enum TrafficFilmError {
 /// [`TrafficFilmError`] where the recording does not have its track, or its lanes make no road.
 pub fn film_lane_change(recording: &SmoothedRecording, change: &CriticalLaneChange) -> Result<Film, TrafficFilmError> {
     let track_id = change.lane_change.track_id;
-    let own = recording.trajectories.iter().find(|track| track.track_id == track_id);
+    let own = recording.trajectories().find(|track| track.track_id == track_id);
     let own = own.ok_or(TrafficFilmError::NoTrack { track_id })?;
     let (from, to) = (Time::from_s(change.lane_change.start_s), Time::from_s(change.lane_change.end_s));
     let shown = |point: &&TrajectoryPoint| point.time >= from - AROUND && point.time <= to + AROUND;
@@ -87,7 +87,7 @@ fn around<'a>(
         track.track_id != own.track_id
             && instants.iter().any(|own| track.at(own.time).is_some_and(|at| (at.s_m - own.s_m).abs() < REACH_M))
     };
-    std::iter::once(own).chain(recording.trajectories.iter().filter(near)).collect()
+    std::iter::once(own).chain(recording.trajectories().filter(near)).collect()
 }
 
 /// The frames in which a track is there.
