@@ -27,6 +27,9 @@ const READERS: [&str; 6] = ["ngsim", "csv", "highd", "exid", "commonroad", "in-c
 /// One file may take this long.
 const SLOW: Duration = Duration::from_secs(2);
 
+/// What takes longer is tried again so often in all.
+const REPEATED: u32 = 3;
+
 /// The most damages in one file.
 const MOST_DAMAGES: u64 = 6;
 
@@ -272,6 +275,27 @@ impl Target {
         bytes
     }
 
+    /// Reads a damaged recording: what is wrong with what comes of it, or a panic.
+    fn judged(
+        &self,
+        (name, bytes): (&String, &[u8]),
+        options: ReadOptions,
+        window: usize,
+    ) -> std::io::Result<std::thread::Result<Option<String>>> {
+        if self.reader != "highd" && self.reader != "exid" {
+            let path = PathBuf::from(name);
+            return Ok(catch_unwind(AssertUnwindSafe(|| judge(open_from(Cursor::new(bytes), &path, options, window)))));
+        }
+        for (other, whole) in &self.corpus {
+            let path = self.folder.path().join(other);
+            // Some file systems wait for the disk where a file is written over.
+            drop(std::fs::remove_file(&path));
+            std::fs::write(&path, if other == name { bytes } else { whole })?;
+        }
+        let path = self.folder.path().join("07_tracks.csv");
+        Ok(catch_unwind(AssertUnwindSafe(|| judge(open(&path, options)))))
+    }
+
     /// One damaged recording: what is wrong with how it is read, and its files.
     fn once(&mut self) -> std::io::Result<Option<(String, Corpus)>> {
         let which = self.random.below(self.corpus.len());
@@ -280,23 +304,20 @@ impl Target {
         let bad_rows = if self.random.below(2) == 0 { BadRows::Refuse } else { BadRows::Drop };
         let window = [usize::MAX, 1 << 20, 16][self.random.below(3)];
         let options = ReadOptions { layout: None, bad_rows };
-        let begun = Instant::now();
-        let judged = if self.reader == "highd" || self.reader == "exid" {
-            for (other, whole) in &self.corpus {
-                let path = self.folder.path().join(other);
-                // Some file systems wait for the disk where a file is written over.
-                drop(std::fs::remove_file(&path));
-                std::fs::write(&path, if *other == name { &bytes } else { whole })?;
+        let mut judged = Ok(None);
+        let mut fastest = Duration::MAX;
+        // A machine that is busy elsewhere makes anything slow once.
+        for _ in 0..REPEATED {
+            let begun = Instant::now();
+            judged = self.judged((&name, &bytes), options, window)?;
+            fastest = fastest.min(begun.elapsed());
+            if fastest <= SLOW {
+                break;
             }
-            let path = self.folder.path().join("07_tracks.csv");
-            catch_unwind(AssertUnwindSafe(|| judge(open(&path, options))))
-        } else {
-            let path = PathBuf::from(&name);
-            catch_unwind(AssertUnwindSafe(|| judge(open_from(Cursor::new(&bytes), &path, options, window))))
-        };
+        }
         let wrong = match judged {
             Err(_) => Some("a panic".to_owned()),
-            Ok(None) if begun.elapsed() > SLOW => Some(format!("it took {:.1} s", begun.elapsed().as_secs_f64())),
+            Ok(None) if fastest > SLOW => Some(format!("it took {:.1} s", fastest.as_secs_f64())),
             Ok(wrong) => wrong,
         };
         Ok(wrong.map(|wrong| (wrong, vec![(name, bytes)])))
