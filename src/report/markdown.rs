@@ -5,6 +5,8 @@ use std::path::Path;
 use super::findings::Findings;
 use super::overview::{ScenarioOverview, WorstSample};
 use super::write::{WriteError, write_atomically};
+use crate::campaign::harm;
+use crate::campaign::ledger::Inference;
 use crate::campaign::summary::{Counts, Summary};
 
 /// Samples that are listed for each scenario.
@@ -61,16 +63,23 @@ fn counts(summary: &Summary) -> String {
     }
     text.push('\n');
     if summary.is_paired() {
-        text.push_str(&pairs(&summary.total()));
+        text.push_str(&pairs(&summary.total(), summary.inference));
     }
     text
 }
 
-fn pairs(total: &Counts) -> String {
+fn pairs(total: &Counts, inference: Inference) -> String {
     let pairs = &total.pairs;
+    let sure = pairs.mcnemar_p(inference).map_or_else(String::new, |p| format!(" Exact McNemar p {p:.1e}."));
     format!(
-        "**{} prevented, {} induced**, {} in both arms, {} in neither.\n\n",
-        pairs.prevented, pairs.induced, pairs.both, pairs.neither,
+        "**{} prevented, {} induced**, {} in both arms, {} in neither.{sure} Harm: {:.3} prevented, {:.3} induced ({}).\n\n",
+        pairs.prevented,
+        pairs.induced,
+        pairs.both,
+        pairs.neither,
+        pairs.prevented_harm,
+        pairs.induced_harm,
+        harm::WEIGHT,
     )
 }
 

@@ -1,6 +1,8 @@
 //! The ledger: who collided how often, how sure that is, and what the system under test changed.
 
 use super::text::{Html, cell, markup, number, percent};
+use crate::campaign::harm;
+use crate::campaign::ledger::Inference;
 use crate::campaign::summary::Counts;
 use crate::report::findings::Findings;
 
@@ -23,6 +25,7 @@ pub(super) fn write(html: &mut Html, findings: &Findings<'_>) {
         "#95 % from",
         "#to",
         &format!("rate and interval, 0 to {}", percent(most)),
+        "#E's ΔV up to [m/s]",
         "#engaged",
         "#goal in reach",
         "#errors",
@@ -43,6 +46,7 @@ pub(super) fn write(html: &mut Html, findings: &Findings<'_>) {
                     number(percent(low)),
                     number(percent(high)),
                     markup(&bar(rate, [low, high], most, is_tested)),
+                    number(if arm.collisions > 0 { format!("{:.1}", arm.max_delta_v_mps) } else { String::new() }),
                     number(arm.engagements),
                     number(arm.goals_in_reach),
                     number(arm.errors),
@@ -52,7 +56,7 @@ pub(super) fn write(html: &mut Html, findings: &Findings<'_>) {
     }
     html.end_table();
     if summary.is_paired() {
-        pairs(html, &rows);
+        pairs(html, &rows, summary.inference);
     }
     html.classed(
         "p",
@@ -62,7 +66,7 @@ pub(super) fn write(html: &mut Html, findings: &Findings<'_>) {
     );
 }
 
-fn pairs(html: &mut Html, rows: &[(String, Counts)]) {
+fn pairs(html: &mut Html, rows: &[(String, Counts)], inference: Inference) {
     html.element("h2", "What the controller under test changes");
     html.table(&[
         "scenario",
@@ -85,6 +89,45 @@ fn pairs(html: &mut Html, rows: &[(String, Counts)]) {
                 number(pairs.both),
                 number(pairs.neither),
                 markup(&balance(pairs.prevented, pairs.induced, most)),
+                number(pairs.mcnemar_p(inference).map_or_else(|| "-".to_owned(), |p| format!("{p:.1e}"))),
+                number(format!("{:.3}", pairs.prevented_harm)),
+                number(format!("{:.3}", pairs.induced_harm)),
+            ],
+        );
+    }
+    html.end_table();
+    html.classed(
+        "p",
+        "note",
+        format!(
+            "McNemar p (exact, two-sided): how rare so uneven a split is if the arms are alike; it holds for a number of \
+             samples that was fixed in advance. Harm: {}.",
+            harm::WEIGHT
+        ),
+    );
+}
+
+/// What the validity checks found, scenario by scenario.
+pub(super) fn checks(html: &mut Html, findings: &Findings<'_>) {
+    let summary = findings.summary;
+    if summary.scenarios.iter().all(|(_, counts)| counts.checks.runs == 0) {
+        return;
+    }
+    html.element("h2", "Validity of the simulation");
+    html.table(&["scenario", "#runs checked", "#verdicts flipped at half the time step", "#share", "differences"]);
+    for (name, counts) in &summary.scenarios {
+        let checks = &counts.checks;
+        let broken: Vec<String> =
+            checks.broken().map(|(check, count)| format!("{count} × {}", check.finding())).collect();
+        let found = if broken.is_empty() { "none".to_owned() } else { broken.join("; ") };
+        html.row(
+            if broken.is_empty() { "" } else { "collided" },
+            &[
+                cell(name),
+                number(checks.runs),
+                number(checks.flips),
+                number(checks.flip_rate().map_or_else(|| "-".to_owned(), percent)),
+                cell(found),
             ],
         );
     }

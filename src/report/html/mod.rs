@@ -38,6 +38,7 @@ fn page(findings: &Findings<'_>) -> io::Result<String> {
     verdict::write(&mut body, findings);
     ledger::write(&mut body, findings);
     verdict::requirements(&mut body, findings);
+    ledger::checks(&mut body, findings);
     for scenario in &findings.overview.scenarios {
         scenario::write(&mut body, findings, scenario)?;
     }
