@@ -143,7 +143,10 @@ fn a_sequential_campaign_is_the_same_on_any_number_of_threads() {
 
 #[test]
 fn a_time_budget_ends_a_campaign() {
-    let report = json(&campaign(&["--time-budget", "1s", "--max-probability", "0.2", "--format", "json"]), 0);
+    let output = campaign(&["--time-budget", "1s", "--max-probability", "0.2", "--format", "json"]);
+    // How far one gets in a second, and so whether there is an answer by then, is the machine's affair.
+    assert!([0, 4].contains(&code(&output)), "{}", stderr(&output));
+    let report = json(&output, code(&output));
     let samples = report["samples"].as_u64().unwrap();
     assert!((1..1_000_000).contains(&samples), "{samples}");
 }
@@ -164,7 +167,8 @@ fn every_sample_can_be_checked_and_no_check_breaks() {
 fn a_preset_says_how_many_and_what_is_given_beside_it_counts_before_it() {
     let path = library("slow-approach");
     let run = |more: &[&str]| {
-        let args = ["campaign", path.to_str().unwrap(), "--preset", "pr", "--format", "json"];
+        let args =
+            ["campaign", path.to_str().unwrap(), "--preset", "pr", "--set", "duration-s=2", "--format", "json"];
         json(&closecall(args.iter().chain(more)), 0)
     };
     let report = run(&[]);
