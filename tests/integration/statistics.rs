@@ -167,8 +167,7 @@ fn every_sample_can_be_checked_and_no_check_breaks() {
 fn a_preset_says_how_many_and_what_is_given_beside_it_counts_before_it() {
     let path = library("slow-approach");
     let run = |more: &[&str]| {
-        let args =
-            ["campaign", path.to_str().unwrap(), "--preset", "pr", "--set", "duration-s=2", "--format", "json"];
+        let args = ["campaign", path.to_str().unwrap(), "--preset", "pr", "--set", "duration-s=2", "--format", "json"];
         json(&closecall(args.iter().chain(more)), 0)
     };
     let report = run(&[]);
