@@ -1,13 +1,14 @@
 //! How far, how well and how honestly the rear chain tracks: one vehicle that comes up behind E, many times.
 //!
 //! ```text
-//! cargo run --release -p closecall-sensors --example validate_tracking
+//! cargo run --release -p closecall-sensors --example validate_tracking [SEED]
 //! ```
 //!
 //! Each line is one kind of target: the distance from bumper to bumper at which 95 %, 50 % and 5 % of the approaches
 //! (10 to 60 km/h faster than E, in its lane) had a confirmed track; the root mean square error of the speed once
 //! tracked for 1 s; the mean normalised error squared (4 if the covariance is honest); changes of the track's number;
 //! confirmed tracks of nothing; share of the confirmed steps in which the track was taken for a vehicle.
+//! Nothing was tuned on the default seed, 2026; the scanner's constants were chosen with 11, the tracker's with others.
 #![expect(clippy::print_stdout, reason = "its output is what it is for")]
 
 use closecall_sensors::{NoiseKey, Scene, SceneVehicle, SensorMode, Sensors, SensorsConfig, TrackAudit};
@@ -17,6 +18,7 @@ use closecall_traffic::{
 };
 
 const RUNS: u64 = 40;
+const DEFAULT_SEED: u64 = 2026;
 const EGO_MPS: f64 = 30.0;
 const OWN_LANE_M: f64 = -5.625;
 const START_GAP_M: f64 = 190.0;
@@ -57,8 +59,8 @@ fn road(guard_rails: bool) -> Road {
     config.check(&Parameters::default()).expect("a valid road")
 }
 
-fn approach(case: &Case, sensors: &Sensors, sample: u64, result: &mut Result) {
-    let key = NoiseKey { seed: 11, sample, ego: ActorId::new("ego").expect("a legal name"), actors: [].into() };
+fn approach(case: &Case, sensors: &Sensors, [seed, sample]: [u64; 2], result: &mut Result) {
+    let key = NoiseKey { seed, sample, ego: ActorId::new("ego").expect("a legal name"), actors: [].into() };
     let mut perception = sensors.build(&key).expect("no model to load");
     let road = road(case.guard_rails);
     let closing_mps = (10.0 + 50.0 * sample as f64 / (RUNS - 1) as f64) / 3.6;
@@ -105,6 +107,7 @@ fn approach(case: &Case, sensors: &Sensors, sample: u64, result: &mut Result) {
 }
 
 fn main() {
+    let seed = std::env::args().nth(1).map_or(DEFAULT_SEED, |text| text.parse().expect("a seed is a whole number"));
     let sensors = SensorsConfig::default().check(&Parameters::default()).expect("the defaults are valid");
     let day = Environment::CLEAR_DAY;
     let fog = Environment { visibility_m: 100.0, ..day };
@@ -120,12 +123,12 @@ fn main() {
         case("motorcycle", VehicleClass::Motorcycle, 0.5, day, false),
     ];
     for mode in [SensorMode::Object, SensorMode::Full] {
-        println!("{mode:?}, {RUNS} approaches each");
+        println!("{mode:?}, {RUNS} approaches each, seed {seed}");
         println!("                            95 %    50 %     5 %   speed    NEES  switches  false  vehicle");
         for case in &cases {
             let mut result = Result::default();
             for sample in 0..RUNS {
-                approach(case, &sensors.with_mode(mode), sample, &mut result);
+                approach(case, &sensors.with_mode(mode), [seed, sample], &mut result);
             }
             print(case, &mut result);
         }

@@ -66,6 +66,23 @@ impl<'a> EgoFrame<'a> {
         }
     }
 
+    /// The road coordinates (s, d) [m] of a point in E's frame.
+    pub(crate) fn road_position_m(&self, x_m: f64, y_m: f64) -> (f64, f64) {
+        let along_m = x_m * self.cos - y_m * self.sin;
+        let across_m = y_m * self.cos + x_m * self.sin;
+        let curvature = self.road.curvature_per_m();
+        let way_m = match curvature {
+            0.0 => along_m,
+            _ => (curvature * along_m).atan2(1.0 - curvature * (self.d_m + across_m)) / curvature,
+        };
+        (self.s_m + way_m, self.lateral_position_m(x_m, y_m))
+    }
+
+    /// What a vehicle at `d_m` covers of its own path for each metre of the reference line [1].
+    pub(crate) fn stretch(&self, d_m: f64) -> f64 {
+        1.0 - self.road.curvature_per_m() * d_m
+    }
+
     /// The lateral road coordinate d [m] of a point in E's frame: what E knows from its lane camera and its map.
     pub(crate) fn lateral_position_m(&self, x_m: f64, y_m: f64) -> f64 {
         let along_m = x_m * self.cos - y_m * self.sin;
@@ -133,14 +150,17 @@ mod tests {
         }
 
         #[test]
-        fn the_lateral_position_comes_back(
+        fn the_road_coordinates_come_back(
             ds in -150.0..150.0, d in -11.0..0.0, heading in -0.2..0.2, curvature in -0.0025..0.0025,
         ) {
             let road = Road::straight(3).with_curvature(curvature);
             let state = ego(-5.6, heading);
             let frame = EgoFrame::new(&road, &state);
             let point = frame.point(3_000.0 + ds, d);
-            prop_assert!((frame.lateral_position_m(point.x_m, point.y_m) - d).abs() < 1e-9);
+            let (s_m, d_m) = frame.road_position_m(point.x_m, point.y_m);
+            let expected_m: [f64; 2] = [3_000.0 + ds, d];
+            prop_assert!((s_m - expected_m[0]).abs() < 1e-9, "{s_m} for {}", expected_m[0]);
+            prop_assert!((d_m - expected_m[1]).abs() < 1e-9, "{d_m} for {d}");
         }
     }
 

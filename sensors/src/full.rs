@@ -11,17 +11,19 @@
 
 use std::collections::VecDeque;
 
-use closecall_traffic::{Stream, Time, Track};
+use closecall_traffic::{Road, Stream, Time, Track, VehicleState};
 
 use crate::lidar::{Lidar, RearLidar};
-use crate::object::{NoiseKey, ObjectSensor, ObjectSensorModel, ScanView};
+use crate::object::{DEGRADED_SHARE, NoiseKey, ObjectSensor, ObjectSensorModel, ScanView, range_in_weather_m};
 use crate::perception::FieldOfView;
 use crate::surroundings::{Other, survey};
-use crate::tracking::{EgoPose, RearView, TrackList, Tracker, TrackerModel, TrackerScan};
+use crate::tracking::{RearView, TrackList, Tracker, TrackerModel, TrackerScan};
 use crate::{Detection, Health, Perception, Scene, SensorError, SensorHealth};
 
 /// Tangent of half of the LiDAR's field of view, 66.5° (Valeo SCALA Gen 2).
 const HALF_FIELD_TAN: f64 = 2.2998;
+/// Scans in a row without a single point, not even from the road, after which the LiDAR counts as blocked: 1 s.
+const DARK_SCANS: u32 = 25;
 
 /// Gives detections the classes that another sensor sees.
 pub trait DetectionClassifier: Send {
@@ -50,7 +52,8 @@ pub struct FullModel {
 #[derive(Clone, Debug)]
 struct Pending {
     time: Time,
-    ego: EgoPose,
+    road: Road,
+    ego: VehicleState,
     detections: Vec<Detection>,
 }
 
@@ -60,6 +63,11 @@ pub struct FullPerception {
     surround: ObjectSensor,
     lidar: RearLidar,
     reach_m: f64,
+    /// The nominal range with what the window lets through [m].
+    clear_m: f64,
+    /// Latest scans in a row without a point.
+    dark_scans: u32,
+    health: Health,
     rng: Stream,
     classifier: Option<Box<dyn DetectionClassifier>>,
     latency_steps: usize,
@@ -77,6 +85,9 @@ impl FullPerception {
             surround: ObjectSensor::surround(model.surround, key),
             lidar: RearLidar::new(model.rear_lidar),
             reach_m: model.rear_lidar.nominal_range_m,
+            clear_m: model.rear_lidar.nominal_range_m * model.rear_lidar.window_transmission,
+            dark_scans: 0,
+            health: Health::Ok,
             rng: key.stream("rear-lidar"),
             classifier: None,
             latency_steps: model.tracker.latency_steps(),
@@ -94,8 +105,10 @@ impl FullPerception {
     }
 
     /// Scans the scene and lines its detections up behind those that are still being processed.
-    fn detect(&mut self, scene: &Scene<'_>, ego: EgoPose) -> Result<(), SensorError> {
-        self.lidar.scan(scene, &mut self.rng);
+    fn detect(&mut self, scene: &Scene<'_>) -> Result<(), SensorError> {
+        let is_dark = self.lidar.scan(scene, &mut self.rng).is_empty();
+        self.dark_scans = if is_dark { self.dark_scans.saturating_add(1) } else { 0 };
+        self.health = self.judged(scene);
         let found = self.lidar.detect()?;
         // The memory of a scan that has been processed is used again.
         let mut detections = match self.pending.len() > self.latency_steps {
@@ -107,8 +120,20 @@ impl FullPerception {
         if let Some(classifier) = &mut self.classifier {
             classifier.classify(scene, &mut detections)?;
         }
-        self.pending.push_back(Pending { time: scene.time, ego, detections });
+        self.pending.push_back(Pending { time: scene.time, road: *scene.road, ego: scene.ego.state, detections });
         Ok(())
+    }
+
+    /// Blocked where nothing comes back for a while, degraded where weather or dirt cost more than half of the range.
+    fn judged(&self, scene: &Scene<'_>) -> Health {
+        let least_m = DEGRADED_SHARE * self.reach_m;
+        if self.dark_scans >= DARK_SCANS {
+            Health::Failed
+        } else if self.clear_m < least_m || range_in_weather_m(self.clear_m, scene.environment) < least_m {
+            Health::Degraded
+        } else {
+            Health::Ok
+        }
     }
 
     /// Hands the scan whose processing ends now to the tracker.
@@ -118,7 +143,8 @@ impl FullPerception {
         }
         if let Some(scan) = self.pending.front() {
             let view = RearView { half_angle_tan: HALF_FIELD_TAN, range_m: self.reach_m, sensor_x_m };
-            let scan = TrackerScan { time: scan.time, ego: scan.ego, view, detections: &scan.detections };
+            let scan =
+                TrackerScan { time: scan.time, road: &scan.road, ego: scan.ego, view, detections: &scan.detections };
             self.tracker.update(&scan, &mut self.list);
         }
     }
@@ -131,17 +157,14 @@ impl Perception for FullPerception {
         let view = ScanView { scene, frame: &frame, others: &self.others };
         self.front.scan(&view, &mut self.list);
         self.surround.scan(&view, &mut self.list);
-        let own = &scene.ego.state;
-        let pose = scene.road.plane_pose(own.s_m, own.d_m, own.heading_rad);
-        let ego = EgoPose { pose, speed_mps: own.speed_mps };
-        self.detect(scene, ego)?;
+        self.detect(scene)?;
         self.follow(-0.5 * scene.ego.vehicle.dimensions.length_m);
-        self.tracker.report(scene.time, &ego, &frame, &mut self.list);
+        self.tracker.report(scene.time, &frame, &mut self.list);
         Ok(&self.list.tracks)
     }
 
     fn health(&self) -> SensorHealth {
-        SensorHealth { front: self.front.health(), surround: self.surround.health(), rear: Health::Ok }
+        SensorHealth { front: self.front.health(), surround: self.surround.health(), rear: self.health }
     }
 
     fn rear_lidar(&self) -> Option<&RearLidar> {

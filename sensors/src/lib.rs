@@ -29,5 +29,5 @@ pub use ground_truth::GroundTruth;
 pub use object::{NoiseKey, ObjectPerception, ObjectSensorConfig, ObjectSensorModel};
 pub use perception::{FieldOfView, Health, Perception, SCAN_PERIOD, SensorError, SensorHealth};
 pub use scene::{Scene, SceneVehicle};
-pub use tracking::{TrackAudit, TrackerConfig, TrackerModel};
+pub use tracking::{NEES_95, TrackAudit, TrackerConfig, TrackerModel};
 pub use worker_classifier::{inference_backend, rear_exposures, use_inference_backend};

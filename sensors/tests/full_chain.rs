@@ -3,7 +3,7 @@
 //! Small numbers of runs; `examples/validate_tracking.rs` gives the figures.
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
-use closecall_sensors::{NoiseKey, Perception, Scene, SceneVehicle, SensorMode, SensorsConfig, TrackAudit};
+use closecall_sensors::{Health, NoiseKey, Perception, Scene, SceneVehicle, SensorMode, SensorsConfig, TrackAudit};
 use closecall_traffic::{
     ActorId, Check, Environment, Parameters, Road, Source, Time, Track, TrackStatus, Vehicle, VehicleClass,
     VehicleState,
@@ -128,6 +128,35 @@ fn nobody_behind_is_no_track() {
     for _ in 0..100 {
         assert!(approach.step(&mut audit).is_empty());
     }
+}
+
+/// The health of the rear sensors after 2 s on an empty road.
+fn health_on_an_empty_road(lidar: &str, environment: &Environment) -> Health {
+    let config: SensorsConfig =
+        toml::from_str(&format!("mode = \"full\"\nrear-lidar = {{ {lidar} }}\nrear-camera = {{ pipeline = \"off\" }}"))
+            .unwrap();
+    let key = NoiseKey { seed: 6, sample: 0, ego: ActorId::new("ego").unwrap(), actors: [].into() };
+    let mut perception = config.check(&Parameters::default()).unwrap().build(&key).unwrap();
+    let road = Road::straight(3);
+    let state = VehicleState { s_m: 1_000.0, d_m: OWN_LANE_M, speed_mps: 30.0, ..VehicleState::default() };
+    let ego = SceneVehicle { actor: 0, vehicle: Vehicle::typical(VehicleClass::Car), state, pitch_rad: 0.0 };
+    for scan in 0..50 {
+        let scene = Scene { time: Time::from_ms(40) * scan, road: &road, environment, ego, others: &[] };
+        perception.step(&scene).unwrap();
+    }
+    perception.health().rear
+}
+
+#[test]
+fn a_blocked_window_and_fog_are_visible_and_an_empty_road_is_no_fault() {
+    let day = Environment::CLEAR_DAY;
+    let fog = Environment { visibility_m: 100.0, ..day };
+    let wet = Environment { rain_mm_per_h: 5.0, water_film_mm: 1.0, friction: 0.6, visibility_m: 3_000.0, ..day };
+    assert_eq!(health_on_an_empty_road("", &day), Health::Ok);
+    assert_eq!(health_on_an_empty_road("", &wet), Health::Ok);
+    assert_eq!(health_on_an_empty_road("", &fog), Health::Degraded);
+    assert_eq!(health_on_an_empty_road("window-transmission = 0.4", &day), Health::Degraded);
+    assert_eq!(health_on_an_empty_road("window-transmission = 0.0", &day), Health::Failed);
 }
 
 #[test]

@@ -12,7 +12,7 @@
 //! is refined about that by the closeness criterion of L-shape fitting (Zhang, Xu, Dong and Dolan 2017, "Efficient
 //! L-shape fitting for vehicle detection using laser scanners").
 
-use super::{LaneGeometry, LidarScan};
+use super::{COLUMNS, LAYERS, LaneGeometry, LidarScan};
 
 /// Azimuth step within 15° of the axis, and outside [rad].
 const FINE_STEP_RAD: f64 = 0.125 * DEGREE;
@@ -21,8 +21,8 @@ const FINE_FIELD_RAD: f64 = 15.0 * DEGREE;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 /// Height of a footprint [rad].
 const LAYER_RAD: f64 = 0.6 * DEGREE;
-/// Beyond this azimuth a cluster may go on outside of the field of view [rad].
-const FIELD_EDGE_RAD: f64 = 65.5 * DEGREE;
+/// A cluster that reaches one of this many columns at either end may go on outside of the field of view.
+const EDGE_COLUMNS: usize = 4;
 /// Share of the points that may lie before the front face by noise.
 const STRAY_SHARE: usize = 20;
 /// Depth within which points are taken to lie on the front face [m].
@@ -69,6 +69,9 @@ pub(crate) struct Fit {
     pub(crate) spacing_m: f64,
     /// Azimuths of its edges as the sensor sees them, to E's left [rad], least first.
     pub(crate) azimuth_rad: [f64; 2],
+    /// Whether its right and its left edge reach the edge of the field of view. Told by the columns: E has moved on since
+    /// the first was measured, so that the azimuth of a near point at the scan's end is not that of its beam.
+    pub(crate) cut: [bool; 2],
 }
 
 impl Fit {
@@ -130,6 +133,7 @@ impl Fit {
             range_m: 0.0,
             spacing_m: 0.0,
             azimuth_rad: [0.0; 2],
+            cut: cut(members, scan),
         }
     }
 
@@ -166,8 +170,15 @@ impl Fit {
 
     /// True where the cluster reaches the edge of the field of view.
     pub(crate) fn is_cut(&self) -> bool {
-        self.azimuth_rad[0] < -FIELD_EDGE_RAD || self.azimuth_rad[1] > FIELD_EDGE_RAD
+        self.cut[0] || self.cut[1]
     }
+}
+
+/// Whether points come from the outermost columns on the right and on the left of E; the sweep begins on the left.
+fn cut(members: &[u32], scan: &LidarScan) -> [bool; 2] {
+    let columns = members.iter().map(|&member| usize::from(scan.beam[member as usize]) / LAYERS);
+    let (first, last) = columns.fold((COLUMNS, 0), |(first, last), column| (first.min(column), last.max(column)));
+    [last >= COLUMNS - EDGE_COLUMNS, first < EDGE_COLUMNS]
 }
 
 /// The greatest values offered, for a quantile near the top.

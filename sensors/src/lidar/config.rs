@@ -29,6 +29,8 @@ pub struct LidarConfig {
     pub dropout: Num,
     /// Standard deviation of the pitch by which E levels its points [rad].
     pub levelling_sd_rad: Num,
+    /// Share of the light that the sensor's window lets through each way [1]: 1 clean, 0 blocked by snow or mud.
+    pub window_transmission: Num,
 }
 
 impl Default for LidarConfig {
@@ -42,6 +44,7 @@ impl Default for LidarConfig {
             nominal_range_m: Num::Fixed(200.0),
             dropout: Num::Fixed(0.01),
             levelling_sd_rad: Num::Fixed(0.0005),
+            window_transmission: Num::Fixed(1.0),
         }
     }
 }
@@ -55,6 +58,7 @@ pub struct Lidar {
     pub(crate) nominal_range_m: f64,
     pub(crate) dropout: f64,
     pub(crate) levelling_sd_rad: f64,
+    pub(crate) window_transmission: f64,
 }
 
 impl Check for LidarConfig {
@@ -69,6 +73,7 @@ impl Check for LidarConfig {
             nominal_range_m: number(&self.nominal_range_m, "nominal-range-m", Range::closed(10.0, 500.0))?,
             dropout: number(&self.dropout, "dropout", Range::closed(0.0, 0.5))?,
             levelling_sd_rad: number(&self.levelling_sd_rad, "levelling-sd-rad", Range::closed(0.0, 0.02))?,
+            window_transmission: number(&self.window_transmission, "window-transmission", Range::closed(0.0, 1.0))?,
         })
     }
 }
@@ -83,6 +88,7 @@ impl Default for Lidar {
             nominal_range_m: 200.0,
             dropout: 0.01,
             levelling_sd_rad: 0.0005,
+            window_transmission: 1.0,
         }
     }
 }

@@ -16,11 +16,19 @@ const HIDING_DEPTH_M: f64 = 1.0;
 /// Width that an edge keeps uncertain, in columns: it lies somewhere within the last step.
 const EDGE_SD_COLUMNS: f64 = 0.3;
 /// How well the front of a vehicle is defined: bumper, plate, bonnet edge [m].
-const FACE_SD_M: f64 = 0.05;
+const FACE_SD_M: f64 = 0.04;
 /// Noise of one range [m].
 const POINT_SD_M: f64 = 0.05;
+/// The same where a side is seen too, whose points lie close behind the front's [m].
+const CORNER_SD_M: f64 = 0.05;
+/// What a side that is seen adds across: mirrors and wheels stand out from it [m].
+const SIDE_SD_M: f64 = 0.02;
+/// The outermost columns are lost to weak returns the farther the likelier: the edges' uncertainty grows by this share
+/// at 100 m, and with the square of the distance [1].
+const LOST_EDGE_SHARE: f64 = 0.6;
+const LOST_EDGE_M: f64 = 100.0;
 /// The least that is claimed across the line of sight [m].
-const LEAST_LATERAL_SD_M: f64 = 0.03;
+const LEAST_LATERAL_SD_M: f64 = 0.004;
 /// Where the lowest footprint on a front begins above this, only a car's cabin was seen [m], and its bumper stands
 /// before that by so much on average, with this scatter [m].
 const CABIN_FROM_M: f64 = 0.95;
@@ -29,12 +37,16 @@ const BONNET_SD_M: f64 = 0.6;
 /// From here on few beams meet the wheel, the lamp and the fairing of a motorcycle, and the rider behind them may be
 /// all that is seen [m]: how far the front then stands before it on average, and the scatter [m].
 const RIDER_FROM_M: f64 = 28.0;
-const RIDER_M: f64 = 0.4;
-const RIDER_SD_M: f64 = 0.35;
+const RIDER_M: f64 = 0.2;
+const RIDER_SD_M: f64 = 0.2;
 /// Nearer than that, the wheel's tread may send too little back [m].
 const WHEEL_SD_M: f64 = 0.08;
-/// Uncertainty of a front that lies outside of the field of view [m].
-const CUT_SD_M: f64 = 2.0;
+/// Uncertainty of a front that lies outside of the field of view: the scatter of lengths where the rear end is seen,
+/// else anywhere along the vehicle [m].
+const CUT_LENGTH_SD_M: f64 = 0.5;
+const CUT_SD_M: f64 = 3.0;
+/// How far parts of a vehicle may stand out from its side [m]: mirrors, wheels.
+const PROUD_SIDE_M: f64 = 0.25;
 /// A length is measured where at least this much of a side is seen [m].
 const SIDE_SEEN_M: f64 = 3.0;
 /// The farthest point of a side tells its end only where columns meet it closer than this [m].
@@ -163,6 +175,8 @@ fn holds(whole: &Fit, part: &Fit, lane: &LaneGeometry) -> bool {
     let middle = 0.5 * (whole.across_m[0] + whole.across_m[1]);
     let reach = length.max(whole.length_m());
     let half = 0.5 * width.max(whole.width_m());
+    // A wheel or a mirror stands out from the side, and the middle of the front is known to a column.
+    let half = half + PROUD_SIDE_M + whole.spacing_m;
     class.vehicle() > 0.5 && u <= whole.front_u_m && u >= whole.front_u_m - reach && (v - middle).abs() <= half
 }
 
@@ -178,7 +192,7 @@ fn hidden_edges(index: usize, fits: &[Fit]) -> [bool; 2] {
                 && edge < nearer.azimuth_rad[1] + margin
         })
     };
-    fit.azimuth_rad.map(|edge| hides(edge) || fit.is_cut())
+    [0, 1].map(|side| hides(fit.azimuth_rad[side]) || fit.cut[side])
 }
 
 fn detection(fit: &Fit, hidden: [bool; 2], start: Time, lane: &LaneGeometry) -> Detection {
@@ -211,9 +225,15 @@ fn detection(fit: &Fit, hidden: [bool; 2], start: Time, lane: &LaneGeometry) -> 
 
 /// The front face along the box, and its standard deviation [m].
 fn front(fit: &Fit, class: &ClassScores) -> (f64, f64) {
-    let sd = FACE_SD_M.hypot(POINT_SD_M / (fit.front_points.max(1) as f64).sqrt());
+    let face_sd_m = if sees_side(fit) { FACE_SD_M.hypot(CORNER_SD_M) } else { FACE_SD_M };
+    let sd = face_sd_m.hypot(POINT_SD_M / (fit.front_points.max(1) as f64).sqrt());
     if fit.is_cut() {
-        return (fit.front_u_m, sd.hypot(CUT_SD_M));
+        // Wholly or in part beside E: the rear end tells where the front is, as well as lengths are known.
+        let [usual_length, _] = usual_size_m(class.best_vehicle_class() as usize);
+        return match sees_rear(fit) && fit.length_m() < usual_length {
+            true => (fit.rear_u_m + usual_length, CUT_LENGTH_SD_M),
+            false => (fit.front_u_m, CUT_SD_M),
+        };
     }
     match class.best_vehicle_class() {
         VehicleClass::Car if fit.front_bottom_m - 0.5 * fit.layer_m() > CABIN_FROM_M => {
@@ -236,7 +256,8 @@ struct Across {
 fn across(fit: &Fit, [right_hidden, left_hidden]: [bool; 2], usual_m: f64) -> Across {
     let [right, left] = fit.across_m;
     let seen = left - right;
-    let edge_sd = EDGE_SD_COLUMNS * fit.spacing_m;
+    let lost_share = LOST_EDGE_SHARE * (fit.range_m / LOST_EDGE_M).powi(2);
+    let edge_sd = EDGE_SD_COLUMNS * fit.spacing_m * (1.0 + lost_share);
     let missing = (usual_m - seen).max(0.0);
     let (middle_m, sd_m) = match (right_hidden, left_hidden) {
         // Weak returns may have lost columns on either side.
@@ -256,14 +277,22 @@ fn across(fit: &Fit, [right_hidden, left_hidden]: [bool; 2], usual_m: f64) -> Ac
         Extent::Seen => seen + 0.5 * fit.spacing_m,
         Extent::Assumed => seen.max(usual_m),
     };
-    Across { middle_m, sd_m: sd_m.max(LEAST_LATERAL_SD_M), width_m, extent }
+    let side_sd_m = if sees_side(fit) { SIDE_SD_M } else { 0.0 };
+    Across { middle_m, sd_m: sd_m.max(LEAST_LATERAL_SD_M).hypot(side_sd_m), width_m, extent }
+}
+
+/// True where a box stands so far to one side that the sensor sees that side of it.
+fn sees_side(fit: &Fit) -> bool {
+    fit.azimuth_rad[0] > 0.0 || fit.azimuth_rad[1] < 0.0
 }
 
 /// True where a side is seen to its end.
 fn has_seen_length(fit: &Fit) -> bool {
-    if fit.is_cut() || fit.length_m() < SIDE_SEEN_M {
-        return false;
-    }
+    !fit.is_cut() && fit.length_m() >= SIDE_SEEN_M && sees_rear(fit)
+}
+
+/// True where columns meet the side so closely that its farthest point is the rear end.
+fn sees_rear(fit: &Fit) -> bool {
     // Columns meet a side at distance r and lateral offset y every Δφ·r²/y.
     let (sin, cos) = fit.heading_rad.sin_cos();
     let middle = 0.5 * (fit.across_m[0] + fit.across_m[1]);

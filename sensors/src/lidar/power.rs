@@ -52,7 +52,8 @@ impl Link {
     #[expect(clippy::cast_possible_truncation, reason = "powers need no more than single precision")]
     pub(crate) fn new(lidar: &Lidar, environment: &Environment) -> Self {
         Self {
-            gain_m2: (lidar.nominal_range_m.powi(2) / NOMINAL_REFLECTIVITY) as f32,
+            // Out through the window, and back.
+            gain_m2: ((lidar.nominal_range_m * lidar.window_transmission).powi(2) / NOMINAL_REFLECTIVITY) as f32,
             extinction_per_m: extinction_per_m(environment) as f32,
         }
     }

@@ -10,7 +10,6 @@
 //! in the lane are known exactly (odometry and map).
 
 mod config;
-mod filter;
 mod noise;
 mod sensor;
 mod visibility;
@@ -25,7 +24,8 @@ use crate::perception::FieldOfView;
 use crate::surroundings::{Other, survey};
 use crate::tracking::TrackList;
 use crate::{Perception, Scene, SensorError, SensorHealth};
-pub(crate) use sensor::{ObjectSensor, ScanView};
+pub(crate) use sensor::{DEGRADED_SHARE, ObjectSensor, ScanView};
+pub(crate) use weather::range_in_weather_m;
 
 /// Perception by object-level sensors alone.
 #[derive(Clone, Debug)]

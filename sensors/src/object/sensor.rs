@@ -8,28 +8,31 @@
 //! tracking delivers, and confusing two vehicles is left to the full LiDAR chain.
 
 use closecall_traffic::{ClassScores, Environment, Source, Track, TrackId, VehicleClass};
-use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
 use super::config::{MAX_LATENCY_STEPS, ObjectSensorModel};
-use super::filter::{AxisEstimate, AxisFilter, AxisProcess};
 use super::noise::{NoiseKey, ScanErrors, TargetNoise};
 use super::visibility::{Field, View, Visibility};
 use super::weather::range_in_weather_m;
 use crate::ego_frame::EgoFrame;
 use crate::perception::FieldOfView;
 use crate::surroundings::Other;
+use crate::tracking::TrackList;
+use crate::tracking::axis::{AxisEstimate, AxisFilter, AxisMeasurement};
 use crate::tracking::lifecycle::Lifecycle;
-use crate::tracking::{ACROSS_MANOEUVRE_M2PS3, ALONG_MANOEUVRE_M2PS3, HEADING_SPEED_MPS, TrackList};
+use crate::tracking::motion::{ACROSS, ACROSS_WHITE, ALONG, ALONG_WHITE, Mode};
+use crate::tracking::road_filter::in_ego_frame;
 use crate::{Health, SCAN_PERIOD, Scene};
 
 /// Speed of a vehicle not yet measured: E's own, within this [m/s].
 const SPEED_PRIOR_SD_MPS: f64 = 10.0;
+/// Position before the first measurement: nothing in particular [m].
+const POSITION_PRIOR_SD_M: f64 = 1_000.0;
 /// Lateral speed of a vehicle not yet measured [m/s].
 const LATERAL_SPEED_PRIOR_SD_MPS: f64 = 0.7;
 /// A track is confirmed only once its speed is known to within this [m/s]: nobody could act on it before.
 const SETTLED_SPEED_SD_MPS: f64 = 1.0;
 /// A sensor that reaches less than this share of its range is degraded [1].
-const DEGRADED_SHARE: f64 = 0.5;
+pub(crate) const DEGRADED_SHARE: f64 = 0.5;
 
 /// What the sensor knows of a vehicle at the end of one scan.
 #[derive(Clone, Copy, Debug)]
@@ -66,8 +69,8 @@ pub(crate) struct ObjectSensor {
     source: Source,
     channel: &'static str,
     key: NoiseKey,
-    along: AxisProcess,
-    across: AxisProcess,
+    /// How vehicles move along and across the road.
+    modes: [&'static [Mode]; 2],
     visibility: Visibility,
     /// The weather that `range_m` was worked out for.
     weather: Option<Environment>,
@@ -91,11 +94,10 @@ impl ObjectSensor {
     }
 
     fn new(model: ObjectSensorModel, view: View, source: Source, channel: &'static str, key: &NoiseKey) -> Self {
-        let process = |manoeuvre_m2ps3| AxisProcess {
-            step_s: SCAN_PERIOD.s(),
-            manoeuvre_m2ps3,
-            drift_sd_m: model.drift_sd_m,
-            drift_decay: model.drift_decay,
+        // The radar measures speed, and what is alongside is seen for a moment: one mode serves them.
+        let modes = match view {
+            View::Behind => [ALONG, ACROSS],
+            View::Ahead | View::Around => [ALONG_WHITE, ACROSS_WHITE],
         };
         Self {
             model,
@@ -103,8 +105,7 @@ impl ObjectSensor {
             source,
             channel,
             key: key.clone(),
-            along: process(ALONG_MANOEUVRE_M2PS3),
-            across: process(ACROSS_MANOEUVRE_M2PS3),
+            modes,
             visibility: Visibility::default(),
             weather: None,
             range_m: model.range_m,
@@ -169,24 +170,34 @@ impl ObjectSensor {
     ) {
         let (model, target) = (&self.model, &mut self.targets[place]);
         if let Some((_, _, [along, across])) = &mut target.filters {
-            along.predict(&self.along);
-            across.predict(&self.across);
+            for axis in [along, across] {
+                axis.predict(SCAN_PERIOD.s(), model.drift_decay);
+            }
         }
         if in_view && !errors.is_lost {
             let measured_m = [other.road_m[0] + errors.position_m[0], other.road_m[1] + errors.position_m[1]];
             let is_new = target.filters.is_none();
             let (_, lifecycle, [along, across]) = target.filters.get_or_insert_with(|| {
-                let along = AxisFilter::prior(measured_m[0], ego_speed_mps, SPEED_PRIOR_SD_MPS, model.drift_sd_m);
-                let across = AxisFilter::prior(measured_m[1], 0.0, LATERAL_SPEED_PRIOR_SD_MPS, model.drift_sd_m);
-                (list.new_id(), Lifecycle::first_hit(&model.rules), [along, across])
+                let speeds_mps = [[ego_speed_mps, SPEED_PRIOR_SD_MPS], [0.0, LATERAL_SPEED_PRIOR_SD_MPS]];
+                let prior = |axis: usize| {
+                    let position_m = [measured_m[axis], POSITION_PRIOR_SD_M];
+                    AxisFilter::prior(self.modes[axis], position_m, speeds_mps[axis])
+                };
+                (list.new_id(), Lifecycle::first_hit(&model.rules), [prior(0), prior(1)])
             });
-            along.measure_position(measured_m[0], model.white_sd_m[0]);
-            across.measure_position(measured_m[1], model.white_sd_m[1]);
+            for (place, axis) in [&mut *along, across].into_iter().enumerate() {
+                axis.measure_position(&AxisMeasurement {
+                    position_m: measured_m[place],
+                    white_sd_m: model.white_sd_m[place],
+                    slow_sd_m: model.drift_sd_m,
+                    lever_s: 0.0,
+                });
+            }
             if let Some(sd_mps) = model.speed_sd_mps {
                 along.measure_speed(other.road_mps[0] + errors.speed_mps, sd_mps);
             }
             if !is_new {
-                lifecycle.hit(&model.rules, along.speed_sd_mps() <= SETTLED_SPEED_SD_MPS);
+                lifecycle.hit(&model.rules, along.now().speed_m2ps2.sqrt() <= SETTLED_SPEED_SD_MPS);
             }
         } else if let Some((_, lifecycle, _)) = &mut target.filters {
             if in_view {
@@ -208,8 +219,8 @@ impl ObjectSensor {
         target.waiting[self.step % length] = target.filters.map(|(id, lifecycle, [along, across])| Report {
             id,
             lifecycle,
-            along: along.estimate(latency_s, ALONG_MANOEUVRE_M2PS3),
-            across: across.estimate(latency_s, ACROSS_MANOEUVRE_M2PS3),
+            along: along.ahead(latency_s),
+            across: across.ahead(latency_s),
         });
         // Before the first report is due, the place still holds none.
         let due = target.waiting[(self.step + length - self.model.latency_steps) % length];
@@ -220,28 +231,16 @@ impl ObjectSensor {
 
     /// A report in road axes as a track in E's frame.
     fn track(&self, report: &Report, other: &Other, view: &ScanView<'_>) -> Track {
-        let (along, across) = (&report.along, &report.across);
-        let point = view.frame.point(along.position_m, across.position_m);
-        let (sin, cos) = point.road_yaw_rad.sin_cos();
-        let stretch = 1.0 - view.scene.road.curvature_per_m() * across.position_m;
-        let to_ego = Matrix2::new(cos * stretch, -sin, sin * stretch, cos);
-        let velocity_mps = to_ego * Vector2::new(along.speed_mps, across.speed_mps);
-        let turned = |along: f64, across: f64| to_ego * Matrix2::new(along, 0.0, 0.0, across) * to_ego.transpose();
-        let cross = turned(along.position_speed_m2ps, across.position_speed_m2ps);
-        let mut covariance = Matrix4::zeros();
-        covariance.fixed_view_mut::<2, 2>(0, 0).copy_from(&turned(along.position_m2, across.position_m2));
-        covariance.fixed_view_mut::<2, 2>(0, 2).copy_from(&cross);
-        covariance.fixed_view_mut::<2, 2>(2, 0).copy_from(&cross);
-        covariance.fixed_view_mut::<2, 2>(2, 2).copy_from(&turned(along.speed_m2ps2, across.speed_m2ps2));
-        let moves = along.speed_mps > HEADING_SPEED_MPS;
+        let estimate = in_ego_frame(&[report.along, report.across], view.frame);
+        let across = &report.across;
         Track {
             id: report.id,
             source: self.source,
             status: report.lifecycle.status(),
             time: view.scene.time,
-            state: Vector4::new(point.x_m, point.y_m, velocity_mps.x, velocity_mps.y),
-            covariance,
-            heading_rad: if moves { velocity_mps.y.atan2(velocity_mps.x) } else { point.road_yaw_rad },
+            state: estimate.state,
+            covariance: estimate.covariance,
+            heading_rad: estimate.heading_rad,
             length_m: other.length_m,
             width_m: other.width_m,
             class: class_scores(other.class, self.model.class_confidence),

@@ -12,7 +12,7 @@ use crate::lidar::extinction_per_m;
 const STEPS: usize = 12;
 
 /// The range [m] in this weather of an optical sensor that reaches `clear_m` on a clear day.
-pub(super) fn range_in_weather_m(clear_m: f64, environment: &Environment) -> f64 {
+pub(crate) fn range_in_weather_m(clear_m: f64, environment: &Environment) -> f64 {
     let clear_per_m = extinction_per_m(&Environment::CLEAR_DAY);
     let excess_per_m = extinction_per_m(environment) - clear_per_m;
     if excess_per_m <= 0.0 {

@@ -12,7 +12,20 @@ use crate::{Scene, SensorError};
 /// A track belongs to a vehicle whose nearest face is within this of the track's [m].
 const MATCH_DISTANCE_M: f64 = 3.0;
 
-/// What was seen of one vehicle.
+/// A track keeps its vehicle while it is within this of it, or within so many standard deviations: one that coasts may
+/// come near another, and is no track of that.
+const KEPT_DEVIATIONS: f64 = 3.0;
+/// Below this 95 % of the normalised errors squared of a consistent filter lie: χ² of 4 degrees of freedom.
+pub const NEES_95: f64 = 9.488;
+
+/// The vehicle of one track.
+#[derive(Clone, Copy, Debug)]
+struct Owned {
+    id: TrackId,
+    actor: usize,
+}
+
+/// The latest track of one vehicle.
 #[derive(Clone, Copy, Debug)]
 struct Followed {
     actor: usize,
@@ -23,9 +36,12 @@ struct Followed {
 #[derive(Clone, Debug, Default)]
 pub struct TrackAudit {
     others: Vec<Other>,
+    owned: Vec<Owned>,
     followed: Vec<Followed>,
     false_ids: Vec<TrackId>,
-    /// Times that the track nearest to a vehicle changed its number.
+    /// The normalised error squared of each step in which a confirmed track matched a vehicle, in order.
+    pub nees: Vec<f64>,
+    /// Times that the track of a vehicle changed its number.
     pub id_switches: u64,
     /// Steps in which a confirmed track matched a vehicle.
     pub matched_steps: u64,
@@ -44,15 +60,20 @@ impl TrackAudit {
         let mut others = std::mem::take(&mut self.others);
         survey(scene, &mut others)?;
         for other in &others {
-            let distance_m = |track: &&Track| face_distance_m(track, other);
-            let nearest = confirmed(tracks).min_by(|a, b| distance_m(a).total_cmp(&distance_m(b)));
-            if let Some(track) = nearest.filter(|track| distance_m(track) <= MATCH_DISTANCE_M) {
+            let owner = |track: &&Track| owner(&self.owned, track, &others) == Some(other.actor);
+            let nearest = confirmed(tracks)
+                .filter(owner)
+                .min_by(|a, b| face_distance_m(a, other).total_cmp(&face_distance_m(b, other)));
+            if let Some(track) = nearest {
                 self.follow(track, other);
             }
         }
-        for track in confirmed(tracks).filter(|track| track.class.vehicle() > 0.5) {
-            let is_near = |other: &Other| face_distance_m(track, other) <= MATCH_DISTANCE_M;
-            if !others.iter().any(is_near) && !self.false_ids.contains(&track.id) {
+        for track in confirmed(tracks) {
+            let owner = owner(&self.owned, track, &others);
+            if let Some(actor) = owner {
+                self.owned.retain(|owned| owned.id != track.id);
+                self.owned.push(Owned { id: track.id, actor });
+            } else if track.class.vehicle() > 0.5 && !self.false_ids.contains(&track.id) {
                 self.false_ids.push(track.id);
             }
         }
@@ -88,9 +109,23 @@ impl TrackAudit {
         self.speed_error_sum_m2ps2 += error[2] * error[2];
         // A covariance without inverse claims certainty, which no error but zero satisfies.
         let inverse = track.covariance.try_inverse();
-        self.nees_sum += inverse.map_or(f64::INFINITY, |inverse| (error.transpose() * inverse * error)[0]);
+        let nees = inverse.map_or(f64::INFINITY, |inverse| (error.transpose() * inverse * error)[0]);
+        self.nees.push(nees);
+        self.nees_sum += nees;
         self.matched_steps += 1;
     }
+}
+
+/// The vehicle that a track belongs to: the one that it had, while it is near enough, else the nearest.
+fn owner(owned: &[Owned], track: &Track, others: &[Other]) -> Option<usize> {
+    let reach_m = KEPT_DEVIATIONS * (track.covariance[(0, 0)] + track.covariance[(1, 1)]).sqrt();
+    let before = owned.iter().find(|owned| owned.id == track.id).map(|owned| owned.actor);
+    let kept = others.iter().find(|other| Some(other.actor) == before);
+    if kept.is_some_and(|other| face_distance_m(track, other) <= reach_m.max(MATCH_DISTANCE_M)) {
+        return before;
+    }
+    let nearest = others.iter().min_by(|a, b| face_distance_m(track, a).total_cmp(&face_distance_m(track, b)));
+    nearest.filter(|other| face_distance_m(track, other) <= MATCH_DISTANCE_M).map(|other| other.actor)
 }
 
 /// The rear tracks that a controller may act on.
@@ -98,19 +133,15 @@ fn confirmed(tracks: &[Track]) -> impl Iterator<Item = &Track> {
     tracks.iter().filter(|track| track.source == Source::Rear && track.status != TrackStatus::Tentative)
 }
 
-/// Half a length from a centre at `x_m` to the face that is nearest to E [m], along the heading.
-fn to_face_m(x_m: f64, length_m: f64) -> f64 {
-    if x_m < 0.0 { 0.5 * length_m } else { -0.5 * length_m }
-}
-
-/// Error of the nearest face's position and of the velocity, in E's frame.
+/// Error of the nearest face's position along the vehicle and of the centre's across it, and of the velocity, in E's
+/// frame. Half of the difference of the lengths is taken out: the face is what is measured, and what gaps are made of.
 fn face_error(track: &Track, other: &Other) -> Vector4<f64> {
-    let seen_m = to_face_m(track.x_m(), track.length_m);
-    let true_m = to_face_m(other.x_m, other.length_m);
-    let (sin, cos) = track.heading_rad.sin_cos();
+    let half_m = 0.5 * (track.length_m - other.length_m);
+    // What is behind E shows its front, and a rear sensor has seen nothing else of what has come alongside since.
+    let longer_m = if other.x_m < 0.0 || track.source == Source::Rear { half_m } else { -half_m };
     Vector4::new(
-        track.x_m() + seen_m * cos - other.x_m - true_m * other.cos,
-        track.y_m() + seen_m * sin - other.y_m - true_m * other.sin,
+        track.x_m() + longer_m * other.cos - other.x_m,
+        track.y_m() + longer_m * other.sin - other.y_m,
         track.vx_mps() - other.speed_mps * other.cos,
         track.vy_mps() - other.speed_mps * other.sin,
     )

@@ -6,7 +6,6 @@ use closecall_traffic::{
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
-use super::tracker::FACE_BIAS_SD_M;
 use super::*;
 use crate::ego_frame::EgoFrame;
 use crate::surroundings::survey;
@@ -18,6 +17,10 @@ const LEFT_LANE_M: f64 = -1.875;
 const PERIOD_S: f64 = 0.04;
 const RANGE_SD_M: f64 = 0.1;
 const LATERAL_SD_M: f64 = 0.15;
+const FACE_SD_M: f64 = 0.04;
+/// How the others accelerate where they do, and for how long.
+const ACCELERATION_SD_MPS2: f64 = 0.7;
+const PERSISTENCE_S: f64 = 2.0;
 
 fn normal(rng: &mut Stream) -> f64 {
     rng.sample(StandardNormal)
@@ -32,6 +35,8 @@ struct Bench {
     rng: Stream,
     /// By how much the face that is seen stands before the box's, for the whole run [m].
     face_bias_m: f64,
+    /// The acceleration of those who manoeuvre [m/s²].
+    acceleration_mps2: f64,
     tracker: Tracker,
     list: TrackList,
     audit: TrackAudit,
@@ -42,7 +47,8 @@ impl Bench {
         let model = TrackerConfig::default().check(&Parameters::default()).unwrap();
         let mut rng = stream(3, sample, &ActorId::new("ego").unwrap(), "tracker-test");
         Self {
-            face_bias_m: FACE_BIAS_SD_M[VehicleClass::Car as usize] * normal(&mut rng),
+            face_bias_m: FACE_SD_M * normal(&mut rng),
+            acceleration_mps2: 0.0,
             road: Road::straight(3),
             ego: with_speed(scene_vehicle(0, VehicleClass::Car, 1_000.0, OWN_LANE_M), 30.0),
             others,
@@ -54,32 +60,22 @@ impl Bench {
         }
     }
 
-    /// Everybody goes on by one scan; those with `manoeuvre` accelerate like the filter's process noise.
+    /// Everybody goes on by one scan; with `manoeuvre` the others accelerate and coast as in traffic.
     fn advance(&mut self, manoeuvre: bool) {
         self.scans += 1;
-        for vehicle in &mut self.others {
+        let persists = (-PERIOD_S / PERSISTENCE_S).exp();
+        let kick_mps2 = ACCELERATION_SD_MPS2 * (1.0 - persists * persists).sqrt() * normal(&mut self.rng);
+        self.acceleration_mps2 = persists * self.acceleration_mps2 + kick_mps2;
+        let acceleration_mps2 = if manoeuvre { self.acceleration_mps2 } else { 0.0 };
+        for vehicle in self.others.iter_mut().chain([&mut self.ego]) {
             let state = &mut vehicle.state;
             let stretch = 1.0 - self.road.curvature_per_m() * state.d_m;
-            let (sin, cos) = state.heading_rad.sin_cos();
-            let [mut along_mps, mut across_mps] = [state.speed_mps * cos, state.speed_mps * sin];
-            let mut kick = |speed_mps: &mut f64, density_m2ps3: f64| {
-                // White acceleration over one scan: the changes of position and of speed are correlated.
-                let (t, a, b) = (PERIOD_S, normal(&mut self.rng), normal(&mut self.rng));
-                let density_m2ps3 = if manoeuvre { density_m2ps3 } else { 0.0 };
-                let step_m =
-                    t * *speed_mps + (density_m2ps3 * t * t * t / 3.0).sqrt() * (0.75_f64.sqrt() * a + 0.5 * b);
-                *speed_mps += (density_m2ps3 * t).sqrt() * a;
-                step_m
-            };
-            state.s_m += kick(&mut along_mps, ALONG_MANOEUVRE_M2PS3) / stretch;
-            state.d_m += kick(&mut across_mps, ACROSS_MANOEUVRE_M2PS3);
-            state.speed_mps = along_mps.hypot(across_mps);
-            state.heading_rad = across_mps.atan2(along_mps);
+            state.s_m += PERIOD_S * state.speed_mps * state.heading_rad.cos() / stretch;
+            state.d_m += PERIOD_S * state.speed_mps * state.heading_rad.sin();
         }
-        let state = &mut self.ego.state;
-        let stretch = 1.0 - self.road.curvature_per_m() * state.d_m;
-        state.s_m += PERIOD_S * state.speed_mps * state.heading_rad.cos() / stretch;
-        state.d_m += PERIOD_S * state.speed_mps * state.heading_rad.sin();
+        for vehicle in &mut self.others {
+            vehicle.state.speed_mps += acceleration_mps2 * PERIOD_S;
+        }
     }
 
     /// One scan that sees those vehicles for which `sees` is true, and the tracks after it.
@@ -112,14 +108,11 @@ impl Bench {
                 class: ClassScores([0.6, 0.1, 0.1, 0.2]),
             });
         }
-        let pose = EgoPose {
-            pose: road.plane_pose(ego.state.s_m, ego.state.d_m, ego.state.heading_rad),
-            speed_mps: ego.state.speed_mps,
-        };
         let view = RearView { half_angle_tan: 2.3, range_m: 200.0, sensor_x_m: -2.3 };
         self.list.tracks.clear();
-        self.tracker.update(&TrackerScan { time, ego: pose, view, detections: &detections }, &mut self.list);
-        self.tracker.report(time, &pose, &EgoFrame::new(&road, &ego.state), &mut self.list);
+        let scan = TrackerScan { time, road: &road, ego: ego.state, view, detections: &detections };
+        self.tracker.update(&scan, &mut self.list);
+        self.tracker.report(time, &EgoFrame::new(&road, &ego.state), &mut self.list);
         self.audit.observe(&self.list.tracks, &scene).unwrap();
         &self.list.tracks
     }
@@ -130,16 +123,12 @@ fn follower(s_m: f64, d_m: f64, speed_mps: f64) -> SceneVehicle {
 }
 
 #[test]
-fn normalised_errors_squared_lie_within_their_95_percent_bounds() {
-    let runs = 1_000_u32;
+fn normalised_errors_squared_do_not_exceed_their_95_percent_bound() {
+    let runs = 300_u32;
     let mut sum = 0.0;
     for sample in 0..runs {
-        // The front of a vehicle of some length swings out before its centre moves aside, which the filter's model does
-        // not have: a short one tests the filter and its noise alone.
-        let mut short = follower(900.0, OWN_LANE_M, 32.0);
-        short.vehicle.dimensions.length_m = 0.1;
-        let mut bench = Bench::new(sample.into(), vec![short]);
-        for _ in 0..50 {
+        let mut bench = Bench::new(sample.into(), vec![follower(900.0, OWN_LANE_M, 32.0)]);
+        for _ in 0..75 {
             bench.scan(|_| true);
             bench.advance(true);
         }
@@ -147,10 +136,33 @@ fn normalised_errors_squared_lie_within_their_95_percent_bounds() {
         bench.scan(|_| true);
         sum += bench.audit.mean_nees().unwrap();
     }
-    // The sum over n runs is χ² with 4n degrees of freedom.
+    // The sum over n runs is χ² with 4n degrees of freedom. Nobody changes lanes here, which the filter has to allow
+    // for: the errors across are smaller than it says, but not absurdly so.
     let n = f64::from(runs);
-    let deviation = (sum / n - 4.0) / (8.0 / n).sqrt();
-    assert!(deviation.abs() < 1.96, "mean {}: {deviation} standard deviations from 4", sum / n);
+    let mean = sum / n;
+    assert!(mean < 4.0 + 1.96 * (8.0 / n).sqrt() && mean > 1.5, "{mean}");
+}
+
+#[test]
+fn a_lane_change_is_followed_under_one_number() {
+    let mut bench = Bench::new(3, vec![follower(960.0, OWN_LANE_M, 32.0)]);
+    for _ in 0..50 {
+        bench.scan(|_| true);
+        bench.advance(false);
+    }
+    // 3.75 m within 4 s, at first as if nothing happened.
+    bench.audit = TrackAudit::default();
+    for step in 0..100 {
+        let way = f64::from(step) / 100.0;
+        let lateral_mps = 3.75 / 4.0 * 30.0 * way * way * (1.0 - way) * (1.0 - way);
+        bench.others[0].state.heading_rad = (lateral_mps / 32.0).atan();
+        bench.advance(false);
+        let tracks = bench.scan(|_| true);
+        assert_eq!((tracks.len(), tracks[0].id, tracks[0].status), (1, TrackId(0), TrackStatus::Confirmed), "{step}");
+    }
+    assert!(bench.list.tracks[0].lane[0] > 0.99, "{:?}", bench.list.tracks[0].lane);
+    let nees = bench.audit.mean_nees().unwrap();
+    assert!(nees < 8.0, "{nees}");
 }
 
 #[test]

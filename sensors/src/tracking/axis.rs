@@ -1,0 +1,375 @@
+//! A filter for one axis of the road: position and speed of a vehicle, under one or several modes of motion, with the
+//! slow error of the sensor in the state.
+//!
+//! State of each mode [p, v, a, β]: position, speed, persistent acceleration, and the slow part of the measurement's
+//! error in units of its standard deviation, a Gauss–Markov process. A measured position is
+//!
+//! ```text
+//!   z = p + ℓ·v + σ_β·β + white noise          ℓ: lever [s], e.g. the age of the measurement
+//! ```
+//!
+//! With β in the state the covariance stays honest although the errors of successive scans are alike (Bar-Shalom, Li,
+//! Kirubarajan, *Estimation with Applications to Tracking and Navigation*, 2001, section 8.2: state augmentation for
+//! autocorrelated noise). The modes are mixed before, and weighed after each measurement (the same, section 11.6.6: the
+//! interacting multiple model estimator); the estimate reported is the mean over the modes, and its covariance has the
+//! spread between them. Both axes of the road are independent; in road coordinates a vehicle that follows a bend at
+//! constant speed moves uniformly, so that the bend is no manoeuvre.
+
+use nalgebra::{Matrix4, Vector4};
+
+use super::motion::{MODES, Mode};
+
+/// What is known under one mode.
+#[derive(Clone, Copy, Debug)]
+struct Estimate {
+    state: Vector4<f64>,
+    covariance: Matrix4<f64>,
+    /// Probability that the mode holds [1].
+    probability: f64,
+}
+
+/// What is known of one vehicle along one axis.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct AxisFilter {
+    modes: &'static [Mode],
+    estimates: [Estimate; MODES],
+}
+
+/// How well a measurement fits to what is known along one axis.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct AxisFit {
+    /// Squared deviation over its variance, under the mode that expects it most [1].
+    pub(crate) distance: f64,
+    /// −2 · the logarithm of its likelihood over all modes, up to a constant.
+    pub(crate) cost: f64,
+    /// The same at the edge of a gate of distance 0: the logarithm of the variance over all modes.
+    pub(crate) log_variance: f64,
+}
+
+/// A measured position.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct AxisMeasurement {
+    pub(crate) position_m: f64,
+    /// Standard deviation of the error that is new in each scan [m].
+    pub(crate) white_sd_m: f64,
+    /// Standard deviation of the slow error [m].
+    pub(crate) slow_sd_m: f64,
+    /// Time by which the speed carries the position on to what was measured [s].
+    pub(crate) lever_s: f64,
+}
+
+/// Position and speed along one axis, with their covariance.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct AxisEstimate {
+    pub(crate) position_m: f64,
+    pub(crate) speed_mps: f64,
+    pub(crate) position_m2: f64,
+    pub(crate) position_speed_m2ps: f64,
+    pub(crate) speed_m2ps2: f64,
+}
+
+impl AxisFilter {
+    /// A filter whose first measurement is still to come, at a place where it is near `position_m` ± `position_sd_m`,
+    /// with a speed of `speed_mps` ± `speed_sd_mps`.
+    pub(crate) fn prior(modes: &'static [Mode], position_m: [f64; 2], speed_mps: [f64; 2]) -> Self {
+        let estimates = std::array::from_fn(|index| {
+            let mode = modes.get(index);
+            let acceleration_sd = mode.map_or(0.0, |mode| mode.acceleration_sd_mps2);
+            let deviations = Vector4::new(position_m[1], speed_mps[1], acceleration_sd, 1.0);
+            Estimate {
+                state: Vector4::new(position_m[0], speed_mps[0], 0.0, 0.0),
+                covariance: Matrix4::from_diagonal(&deviations.component_mul(&deviations)),
+                probability: mode.map_or(0.0, |mode| mode.prior),
+            }
+        });
+        Self { modes, estimates }
+    }
+
+    /// Goes on by `step_s`, after which `slow_share` of the slow error is left.
+    pub(crate) fn predict(&mut self, step_s: f64, slow_share: f64) {
+        if self.modes.len() > 1 {
+            self.mix(step_s);
+        }
+        for (estimate, mode) in self.estimates.iter_mut().zip(self.modes) {
+            estimate.predict(mode, step_s, slow_share);
+        }
+    }
+
+    /// The estimate of each mode as that of what may have switched to it within the step.
+    fn mix(&mut self, step_s: f64) {
+        let before = self.estimates;
+        let count = self.modes.len();
+        for (to, mixed) in self.estimates.iter_mut().enumerate().take(count) {
+            let weights: [f64; MODES] = std::array::from_fn(|from| {
+                let Some(mode) = self.modes.get(from) else { return 0.0 };
+                let share =
+                    if from == to { 1.0 - step_s * mode.leaving_per_s(from) } else { step_s * mode.to_per_s[to] };
+                before[from].probability * share
+            });
+            *mixed = mean(&before[..count], &weights);
+        }
+    }
+
+    /// How well a measurement fits. Where a vehicle has held its lane for long, that mode alone would not let it go.
+    pub(crate) fn fit(&self, measurement: &AxisMeasurement) -> AxisFit {
+        let (mut distance, mut likelihood, mut variance) = (f64::INFINITY, 0.0, 0.0);
+        for estimate in &self.estimates[..self.modes.len()] {
+            let (innovation_m, _, variance_m2) = estimate.innovation(measurement);
+            let deviations = innovation_m * innovation_m / variance_m2;
+            distance = distance.min(deviations);
+            likelihood += estimate.probability * (-0.5 * deviations).exp() / variance_m2.sqrt();
+            variance += estimate.probability * variance_m2;
+        }
+        AxisFit { distance, cost: -2.0 * likelihood.ln(), log_variance: variance.ln() }
+    }
+
+    /// Takes in a measured position.
+    pub(crate) fn measure_position(&mut self, measurement: &AxisMeasurement) {
+        let count = self.modes.len();
+        let mut logs = [f64::NEG_INFINITY; MODES];
+        for (estimate, log) in self.estimates.iter_mut().zip(&mut logs).take(count) {
+            let (innovation_m, gain, variance_m2) = estimate.innovation(measurement);
+            *log = -0.5 * (innovation_m * innovation_m / variance_m2 + variance_m2.ln());
+            estimate.correct(innovation_m, &gain, variance_m2);
+        }
+        self.weigh(&logs);
+    }
+
+    /// Takes in a measured speed.
+    pub(crate) fn measure_speed(&mut self, speed_mps: f64, sd_mps: f64) {
+        let count = self.modes.len();
+        let mut logs = [f64::NEG_INFINITY; MODES];
+        for (estimate, log) in self.estimates.iter_mut().zip(&mut logs).take(count) {
+            let gain = estimate.covariance.column(1).into_owned();
+            let (innovation, variance) = (speed_mps - estimate.state[1], gain[1] + sd_mps * sd_mps);
+            *log = -0.5 * (innovation * innovation / variance + variance.ln());
+            estimate.correct(innovation, &gain, variance);
+        }
+        self.weigh(&logs);
+    }
+
+    /// Multiplies the probabilities of the modes by their likelihoods.
+    fn weigh(&mut self, logs: &[f64; MODES]) {
+        if self.modes.len() < 2 {
+            return;
+        }
+        let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let weights: [f64; MODES] =
+            std::array::from_fn(|index| self.estimates[index].probability * (logs[index] - most).exp());
+        let sum: f64 = weights.iter().sum();
+        // No likelihood is a number where the measurement was none: then nothing is learned of the modes.
+        if sum > 0.0 && sum.is_finite() {
+            for (estimate, weight) in self.estimates.iter_mut().zip(weights) {
+                estimate.probability = weight / sum;
+            }
+        }
+    }
+
+    fn combined(&self) -> Estimate {
+        if let [only] = &self.estimates[..self.modes.len()] {
+            return *only;
+        }
+        let weights = self.estimates.map(|estimate| estimate.probability);
+        mean(&self.estimates[..self.modes.len()], &weights)
+    }
+
+    /// Position and speed now.
+    pub(crate) fn now(&self) -> AxisEstimate {
+        let Estimate { state, covariance, .. } = self.combined();
+        AxisEstimate {
+            position_m: state[0],
+            speed_mps: state[1],
+            position_m2: covariance[(0, 0)],
+            position_speed_m2ps: covariance[(0, 1)],
+            speed_m2ps2: covariance[(1, 1)],
+        }
+    }
+
+    /// Position and speed after `horizon_s` without another measurement.
+    pub(crate) fn ahead(&self, horizon_s: f64) -> AxisEstimate {
+        let mut ahead = *self;
+        if horizon_s > 0.0 {
+            ahead.predict(horizon_s, 1.0);
+        }
+        ahead.now()
+    }
+}
+
+impl Mode {
+    /// Rate at which the mode number `own` is left [1/s].
+    fn leaving_per_s(&self, own: usize) -> f64 {
+        self.to_per_s.iter().enumerate().filter(|(to, _)| *to != own).map(|(_, rate)| rate).sum()
+    }
+}
+
+/// Mean and covariance of a mixture; its probability is the sum of the weights.
+fn mean(estimates: &[Estimate], weights: &[f64; MODES]) -> Estimate {
+    let sum: f64 = weights.iter().sum();
+    let mut state = Vector4::zeros();
+    for (estimate, weight) in estimates.iter().zip(weights) {
+        state += estimate.state * (weight / sum);
+    }
+    let mut covariance = Matrix4::zeros();
+    for (estimate, weight) in estimates.iter().zip(weights) {
+        let apart = estimate.state - state;
+        covariance += (estimate.covariance + apart * apart.transpose()) * (weight / sum);
+    }
+    Estimate { state, covariance, probability: sum }
+}
+
+impl Estimate {
+    fn predict(&mut self, mode: &Mode, t: f64, slow_share: f64) {
+        let persists = if mode.persistence_s > 0.0 { (-t / mode.persistence_s).exp() } else { 0.0 };
+        let lasts = (-t / mode.calming_s).exp();
+        let half = 0.5 * t * t;
+        #[rustfmt::skip]
+        let step = Matrix4::new(
+            1.0, t, half, 0.0,
+            0.0, lasts, t, 0.0,
+            0.0, 0.0, persists, 0.0,
+            0.0, 0.0, 0.0, slow_share,
+        );
+        self.state = step * self.state;
+        self.covariance = step * self.covariance * step.transpose();
+        let q = mode.white_m2ps3;
+        let new_share = 1.0 - persists * persists;
+        self.covariance[(0, 0)] += q * t * t * t / 3.0;
+        self.covariance[(0, 1)] += q * half;
+        self.covariance[(1, 0)] += q * half;
+        self.covariance[(1, 1)] += q * t;
+        self.covariance[(2, 2)] += new_share * mode.acceleration_sd_mps2 * mode.acceleration_sd_mps2;
+        self.covariance[(3, 3)] += 1.0 - slow_share * slow_share;
+    }
+
+    /// How a measurement deviates from what was expected, P·Hᵀ, and the variance of the deviation.
+    fn innovation(&self, measurement: &AxisMeasurement) -> (f64, Vector4<f64>, f64) {
+        let row = Vector4::new(1.0, measurement.lever_s, 0.0, measurement.slow_sd_m);
+        let gain = self.covariance * row;
+        let variance_m2 = row.dot(&gain) + measurement.white_sd_m * measurement.white_sd_m;
+        (measurement.position_m - row.dot(&self.state), gain, variance_m2)
+    }
+
+    fn correct(&mut self, innovation: f64, gain: &Vector4<f64>, variance: f64) {
+        self.state += gain * (innovation / variance);
+        self.covariance -= gain * gain.transpose() / variance;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use closecall_traffic::{ActorId, Stream, stream};
+    use rand::RngExt;
+    use rand_distr::StandardNormal;
+
+    use super::super::motion::{ACROSS, ALONG, ALONG_WHITE};
+    use super::*;
+
+    const STEP_S: f64 = 0.04;
+    const WHITE_SD_M: f64 = 0.1;
+    const SLOW_SD_M: f64 = 0.1;
+    const SLOW_SHARE: f64 = 0.96;
+
+    fn normal(rng: &mut Stream) -> f64 {
+        rng.sample(StandardNormal)
+    }
+
+    /// A vehicle and its filter, which goes through the modes as the model says.
+    struct Twin {
+        rng: Stream,
+        truth: Vector4<f64>,
+        mode: usize,
+        filter: AxisFilter,
+    }
+
+    impl Twin {
+        fn new(modes: &'static [Mode], run: u64) -> Self {
+            let mut rng = stream(7, run, &ActorId::new("ego").unwrap(), "axis-test");
+            let mode = 0;
+            let truth = Vector4::new(50.0, 1.0 * normal(&mut rng), 0.0, normal(&mut rng));
+            Self { rng, truth, mode, filter: AxisFilter::prior(modes, [50.0, 100.0], [0.0, 1.0]) }
+        }
+
+        fn advance(&mut self) {
+            let modes = self.filter.modes;
+            let mut draw: f64 = self.rng.random();
+            for (to, rate) in modes[self.mode].to_per_s.iter().enumerate().filter(|(to, _)| *to < modes.len()) {
+                draw -= rate * STEP_S;
+                if draw < 0.0 && to != self.mode {
+                    self.mode = to;
+                    break;
+                }
+            }
+            // The filter's own step, with noise drawn by the factor of its covariance.
+            let mut step = Estimate { state: self.truth, covariance: Matrix4::zeros(), probability: 1.0 };
+            step.predict(&modes[self.mode], STEP_S, SLOW_SHARE);
+            let tiny = Matrix4::identity() * 1e-15;
+            let factor = (step.covariance + tiny).cholesky().unwrap().l();
+            let draws = Vector4::from_fn(|_, _| normal(&mut self.rng));
+            self.truth = step.state + factor * draws;
+            self.filter.predict(STEP_S, SLOW_SHARE);
+        }
+
+        fn measure(&mut self) {
+            let error_m = SLOW_SD_M * self.truth[3] + WHITE_SD_M * normal(&mut self.rng);
+            let position_m = self.truth[0] + error_m;
+            let measurement =
+                AxisMeasurement { position_m, white_sd_m: WHITE_SD_M, slow_sd_m: SLOW_SD_M, lever_s: 0.0 };
+            self.filter.measure_position(&measurement);
+        }
+
+        /// Normalised error squared of position and speed.
+        fn nees(&self) -> f64 {
+            let now = self.filter.now();
+            let (dp, dv) = (self.truth[0] - now.position_m, self.truth[1] - now.speed_mps);
+            let (pp, pv, vv) = (now.position_m2, now.position_speed_m2ps, now.speed_m2ps2);
+            (vv * dp * dp - 2.0 * pv * dp * dv + pp * dv * dv) / (pp * vv - pv * pv)
+        }
+    }
+
+    fn mean_nees(modes: &'static [Mode], runs: u32) -> f64 {
+        let sum: f64 = (0..runs)
+            .map(|run| {
+                let mut twin = Twin::new(modes, run.into());
+                twin.measure();
+                for _ in 0..100 {
+                    twin.advance();
+                    twin.measure();
+                }
+                twin.nees()
+            })
+            .sum();
+        sum / f64::from(runs)
+    }
+
+    #[test]
+    fn one_mode_is_consistent_despite_the_slow_error() {
+        let runs = 1_000;
+        // The mean of n χ² variables of 2 degrees of freedom has the standard deviation 2/√n.
+        let deviation = (mean_nees(ALONG_WHITE, runs) - 2.0) / (2.0 / f64::from(runs).sqrt());
+        assert!(deviation.abs() < 3.0, "{deviation} standard deviations from 2");
+    }
+
+    #[test]
+    fn switching_modes_are_nearly_consistent() {
+        // Mixing the modes is an approximation, and a mixture has longer tails than a normal distribution.
+        for modes in [ALONG, ACROSS] {
+            let mean = mean_nees(modes, 600);
+            assert!((1.6..2.6).contains(&mean), "{mean}");
+        }
+    }
+
+    #[test]
+    fn a_measurement_that_is_no_number_teaches_no_mode() {
+        let mut filter = AxisFilter::prior(ALONG, [0.0, 1.0], [0.0, 1.0]);
+        let before = filter.estimates.map(|estimate| estimate.probability);
+        filter.measure_position(&AxisMeasurement {
+            position_m: f64::NAN,
+            white_sd_m: 1.0,
+            slow_sd_m: 0.0,
+            lever_s: 0.0,
+        });
+        assert_eq!(filter.estimates.map(|estimate| estimate.probability), before);
+        // And nothing that follows looks safe.
+        assert!(filter.now().position_m.is_nan());
+    }
+}
