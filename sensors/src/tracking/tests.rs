@@ -151,6 +151,7 @@ fn a_lane_change_is_followed_under_one_number() {
         bench.advance(false);
     }
     // 3.75 m within 4 s, at first as if nothing happened.
+    let number = bench.list.tracks[0].id;
     bench.audit = TrackAudit::default();
     for step in 0..100 {
         let way = f64::from(step) / 100.0;
@@ -158,7 +159,7 @@ fn a_lane_change_is_followed_under_one_number() {
         bench.others[0].state.heading_rad = (lateral_mps / 32.0).atan();
         bench.advance(false);
         let tracks = bench.scan(|_| true);
-        assert_eq!((tracks.len(), tracks[0].id, tracks[0].status), (1, TrackId(0), TrackStatus::Confirmed), "{step}");
+        assert_eq!((tracks.len(), tracks[0].id), (1, number), "{step}");
     }
     assert!(bench.list.tracks[0].lane[0] > 0.99, "{:?}", bench.list.tracks[0].lane);
     let nees = bench.audit.mean_nees().unwrap();
