@@ -22,7 +22,8 @@ use super::xml::{Node, Xml};
 use super::{Layout, MarkingDistances};
 
 const ATTRIBUTES: &[&str] = &["id", "ref", "drivingDir", "timeStepSize", "benchmarkID"];
-const STEP_S: Bounds = Bounds::above(0.0, 100.0);
+/// From a thousandth of a second on: shorter steps vanish in whole nanoseconds, or make derivatives overflow.
+const STEP_S: Bounds = Bounds::closed(0.001, 100.0);
 const PLANE_M: Bounds = allowed::PLANE_M;
 const ANGLE_RAD: Bounds = Bounds::closed(-100.0, 100.0);
 const VELOCITY_MPS: Bounds = Bounds::closed(-150.0, 150.0);
