@@ -22,10 +22,9 @@ pub(super) fn write(html: &mut Html, findings: &Findings<'_>) {
         "#samples",
         "#collisions",
         "#rate",
-        "#95 % from",
-        "#to",
-        &format!("rate and interval, 0 to {}", percent(most)),
-        "#E's ΔV up to [m/s]",
+        "#95 %",
+        &format!("0 to {}", percent(most)),
+        "#ΔV up to [m/s]",
         "#engaged",
         "#goal in reach",
         "#errors",
@@ -43,8 +42,7 @@ pub(super) fn write(html: &mut Html, findings: &Findings<'_>) {
                     number(arm.outcomes),
                     number(arm.collisions),
                     number(rate.map_or_else(|| "-".to_owned(), percent)),
-                    number(percent(low)),
-                    number(percent(high)),
+                    number(format!("{:.2} to {}", 100.0 * low, percent(high))),
                     markup(&bar(rate, [low, high], most, is_tested)),
                     number(if arm.collisions > 0 { format!("{:.1}", arm.max_delta_v_mps) } else { String::new() }),
                     number(arm.engagements),
@@ -75,6 +73,9 @@ fn pairs(html: &mut Html, rows: &[(String, Counts)], inference: Inference) {
         "#collision in both",
         "#in neither",
         "prevented against induced",
+        "#McNemar p",
+        "#harm prevented",
+        "#harm induced",
     ]);
     let most =
         rows.iter().map(|(_, counts)| counts.pairs.prevented.max(counts.pairs.induced)).max().unwrap_or(0).max(1);
