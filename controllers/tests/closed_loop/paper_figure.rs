@@ -32,6 +32,8 @@ fn one_metre_per_second_squared_gains_two_seconds() {
         rear_gap_m = gap_m(ego, rear);
         if engaged.is_none() && world.ego_command.unwrap().state == EgoState::Increasing {
             assert!(rear_gap_m <= 100.0 && rear_gap_m > 99.0, "{rear_gap_m}");
+            let plan = world.ego_command.unwrap().plan.unwrap();
+            assert!(plan.goal_in_reach && plan.thw_at_critical_s.unwrap() >= 2.63, "{plan:?}");
             engaged = Some((world.time.s(), ego.state.speed_mps, thw_s));
         }
     }
