@@ -27,6 +27,7 @@ use closecall::campaign::workers::Workers;
 use closecall::controller::BuiltIn;
 use closecall::scenario::ScenarioFile;
 use closecall::simulation::Arm;
+use closecall::statistics::sequence::{evidence_above, evidence_below, is_certain};
 use closecall_scenarios::sampling::Design;
 
 /// The probability of a collision in the scenario, by construction.
@@ -64,8 +65,11 @@ fn run(seed: u64, samples: u64, stops: impl Fn(&ArmCounts) -> bool) -> Result<Ca
     campaign.run(None, |turn| {
         summary.take(turn.record, ego);
         let counts = summary.total().arms[0];
-        let [low, high] = Inference::Sequential.interval_95(counts.collisions, counts.outcomes);
-        is_ever_outside |= !(low <= TRUTH && TRUTH <= high);
+        let (hits, samples) = (counts.collisions, counts.outcomes);
+        // The truth is outside the two-sided bounds where either side has refuted it.
+        is_ever_outside |= [evidence_below, evidence_above]
+            .iter()
+            .any(|evidence| is_certain(evidence(hits, samples, TRUTH), 0.5 * (1.0 + CONFIDENCE)));
         if stops(&counts) { ControlFlow::Break(End::Scenario) } else { ControlFlow::Continue(()) }
     })?;
     let total = summary.total();
