@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Command, Output};
+use std::time::Duration;
 
 use closecall::campaign::folder::Folder;
 use closecall::campaign::record::Record;
@@ -48,8 +49,25 @@ fn run_with(controller: &str, mark: &str) -> Output {
         .unwrap()
 }
 
-/// Processes that still run with this mark in their environment.
+/// Processes that go on running with this mark in their environment. One that was killed is given time to end: the
+/// signal is sent when the program ends, and the kernel takes it down when it finds the time.
 fn left_behind(mark: &str) -> Vec<String> {
+    /// How often it is looked, and the pause between.
+    const LOOKS: usize = 100;
+    const PAUSE: Duration = Duration::from_millis(100);
+    let mut running = marked(mark);
+    for _ in 0..LOOKS {
+        if running.is_empty() {
+            break;
+        }
+        std::thread::sleep(PAUSE);
+        running = marked(mark);
+    }
+    running
+}
+
+/// Processes with this mark in their environment.
+fn marked(mark: &str) -> Vec<String> {
     let wanted = format!("CLOSECALL_TEST_MARK={mark}");
     let processes = std::fs::read_dir("/proc").unwrap().filter_map(|entry| Some(entry.ok()?.path()));
     processes
