@@ -36,6 +36,18 @@ pub enum CheckedDriver {
     Human(HumanDriver),
 }
 
+impl CheckedDriver {
+    /// The same driver in the mirrored world, in which left is right. Most only know the side on which one overtakes, and
+    /// have that from the road.
+    #[must_use]
+    pub fn mirrored(&self) -> Self {
+        match self {
+            Self::Human(HumanDriver::Prescribed(profile)) => Self::Human(HumanDriver::Prescribed(profile.mirrored())),
+            other => other.clone(),
+        }
+    }
+}
+
 /// A human driver that cannot be invalid.
 #[derive(Clone, Debug, PartialEq)]
 pub enum HumanDriver {
@@ -111,6 +123,7 @@ mod tests {
             "{ ego-stack = { acc = { time-gap-s = \"$front-thw-s\" }, aeb = {}, mis = { critical-gap-m = 5.0 } } }",
             "{ prescribed = { profile = [[0.0, 30.0], [4.0, 20]] } }",
             "{ prescribed = { acceleration-profile = [[2, -4.5], [5.0, \"$rear-cc1-s\"]] } }",
+            "{ prescribed = { profile = [[0.0, 30]], lane-changes = [{ at-s = 2, to = \"left\", duration-s = 6.8 }] } }",
             "{ wiedemann99 = { cc1-s = 0.3, desired-speed-mps = 36, reaction-s = 0.9 } }",
             "{ idm = {} }",
             "{ overtaker = { cut-out-thw-s = \"$cut-out-thw-s\", follow = { wiedemann99 = { cc1-s = \"$rear-cc1-s\" } }, \

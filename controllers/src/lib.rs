@@ -22,8 +22,8 @@ pub use config::{CheckedDriver, DriverConfig, HumanDriver};
 pub use driver::{
     Driver, DriverAction, DriverError, DriverInput, DriverNote, FollowConfig, Idm, IdmConfig, LaneChange,
     LaneNeighbours, Lapse, LapseConfig, Lead, LogNormalConfig, Neighbour, Neighbours, Overtaker, OvertakerConfig,
-    Prescribed, PrescribedConfig, Reaction, ReactionConfig, RecordedConfig, Regime, Return, ReturnConfig, Thresholds,
-    Wiedemann99, Wiedemann99Config, Wiedemann99Driver, Wiedemann99Model,
+    Prescribed, PrescribedConfig, PrescribedLaneChangeConfig, Reaction, ReactionConfig, RecordedConfig, Regime, Return,
+    ReturnConfig, Thresholds, Wiedemann99, Wiedemann99Config, Wiedemann99Driver, Wiedemann99Model,
 };
 pub use ego::{
     Acc, AccConfig, Aeb, AebConfig, ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack,

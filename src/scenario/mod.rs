@@ -166,6 +166,7 @@ impl ScenarioConfig {
         for (index, actor) in self.actors.iter().enumerate() {
             let driver = actor.driver.check(parameters).map_err(|error| at(index, error.within("driver")))?;
             check_reach(&driver, states[index].speed_mps).map_err(|error| at(index, error))?;
+            check_lanes(&driver, &states[index], road).map_err(|error| at(index, error))?;
             let mut events = Vec::with_capacity(actor.events.len());
             for (place, event) in actor.events.iter().enumerate() {
                 let event = event.check(&start, parameters);
@@ -189,6 +190,16 @@ fn check_reach(driver: &CheckedDriver, speed_mps: f64) -> Result<(), ConfigError
         CheckedDriver::Human(HumanDriver::Overtaker(overtaker)) => {
             overtaker.check_reach(speed_mps).map_err(|error| error.within("overtaker").within("driver"))
         }
+        _ => Ok(()),
+    }
+}
+
+/// Refuses a prescribed driver who would change to a lane that the road does not have.
+fn check_lanes(driver: &CheckedDriver, start: &VehicleState, road: &Road) -> Result<(), ConfigError> {
+    match driver {
+        CheckedDriver::Human(HumanDriver::Prescribed(prescribed)) => prescribed
+            .check_lanes(road.lane_at(start.d_m), road.lanes())
+            .map_err(|error| error.within("prescribed").within("driver")),
         _ => Ok(()),
     }
 }

@@ -23,7 +23,11 @@ impl Scenario {
     /// The mirror image, in which left is right. Nothing on a bend, which has none with positions along its left edge.
     pub fn mirrored(&self) -> Option<Self> {
         let road = self.road.mirrored()?;
-        let mirrored = |actor: &Actor| Actor { start: mirrored(&actor.start, &self.road), ..actor.clone() };
+        let mirrored = |actor: &Actor| Actor {
+            start: mirrored(&actor.start, &self.road),
+            driver: actor.driver.mirrored(),
+            ..actor.clone()
+        };
         Some(Self { road, actors: self.actors.iter().map(mirrored).collect(), ..self.clone() })
     }
 }

@@ -290,7 +290,7 @@ impl<'a> Run<'a> {
             if let Some(note) = action.note {
                 if note == DriverNote::CutOutStarted {
                     self.events.cut_out_started(actor, time);
-                    if !self.world.is_wrecked(ego) {
+                    if !self.world.is_wrecked(ego) && self.margins.follower == Some(actor) {
                         self.moments.note(Moment::CutOut, time);
                     }
                 }

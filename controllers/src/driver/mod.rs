@@ -18,7 +18,7 @@ pub use interface::{
     Driver, DriverAction, DriverError, DriverInput, DriverNote, LaneChange, LaneNeighbours, Neighbour, Neighbours,
 };
 pub use overtaker::{FollowConfig, Overtaker, OvertakerConfig, Return, ReturnConfig};
-pub use prescribed::{Prescribed, PrescribedConfig, RecordedConfig};
+pub use prescribed::{Prescribed, PrescribedConfig, PrescribedLaneChangeConfig, RecordedConfig};
 pub use reaction::{LogNormalConfig, Reaction, ReactionConfig};
 pub use wiedemann99::{Regime, Thresholds, Wiedemann99, Wiedemann99Config, Wiedemann99Driver, Wiedemann99Model};
 

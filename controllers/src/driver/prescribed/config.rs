@@ -1,19 +1,20 @@
 //! What a prescribed driver is given by the scenario.
 
-use closecall_traffic::{Check, ConfigError, Num, Parameters, Problem, Range};
+use closecall_traffic::{Check, ConfigError, Lane, Num, Parameters, Problem, Range, Side};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::driver::PrescribedDriver;
+use super::lane_change::{PrescribedLaneChange, PrescribedLaneChangeConfig, check_lane_changes};
 use super::profile::{SpeedProfile, Step};
 
 /// Latest time of a profile [s].
-const LATEST_S: f64 = 1e6;
+pub(super) const LATEST_S: f64 = 1e6;
 
 /// Fastest that a profile goes [m/s].
 const FASTEST_MPS: f64 = 100.0;
 
-/// A profile as a scenario file describes it: exactly one of the three keys.
+/// A profile as a scenario file describes it: exactly one of the first three keys, and lane changes where there are any.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct PrescribedConfig {
@@ -27,6 +28,9 @@ pub struct PrescribedConfig {
     /// The speeds of a recorded vehicle.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub recorded: Option<RecordedConfig>,
+    /// Changes to the lane beside, each at a time, the next no earlier than the one before has ended.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub lane_changes: Vec<PrescribedLaneChangeConfig>,
 }
 
 /// A track of a recording, which is read together with the scenario file and takes the place of `profile` in its text.
@@ -42,9 +46,12 @@ pub struct RecordedConfig {
     pub from_s: Option<f64>,
 }
 
-/// A checked profile: at least one point, times rising.
+/// A checked profile: at least one point, times rising; and the lane changes on the way.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Prescribed(Points);
+pub struct Prescribed {
+    points: Points,
+    pub(super) lane_changes: Vec<PrescribedLaneChange>,
+}
 
 #[derive(Clone, Debug, PartialEq)]
 enum Points {
@@ -64,15 +71,24 @@ impl Check for PrescribedConfig {
     type Checked = Prescribed;
 
     fn check(&self, parameters: &Parameters) -> Result<Prescribed, ConfigError> {
+        Ok(Prescribed {
+            points: self.check_points(parameters)?,
+            lane_changes: check_lane_changes(&self.lane_changes, parameters)?,
+        })
+    }
+}
+
+impl PrescribedConfig {
+    fn check_points(&self, parameters: &Parameters) -> Result<Points, ConfigError> {
         match (&self.profile, &self.acceleration_profile, &self.recorded) {
             (Some(pairs), None, None) => {
                 let points = check_pairs(pairs, "profile", &SPEED, parameters)?;
-                Ok(Prescribed(Points::Speeds(SpeedProfile::new(points))))
+                Ok(Points::Speeds(SpeedProfile::new(points)))
             }
             (None, Some(pairs), None) => {
                 let steps = check_pairs(pairs, "acceleration-profile", &ACCELERATION, parameters)?;
                 let steps = steps.into_iter().map(|(from_s, rate_mps2)| Step { from_s, rate_mps2 }).collect();
-                Ok(Prescribed(Points::Accelerations(steps)))
+                Ok(Points::Accelerations(steps))
             }
             (None, None, Some(_)) => {
                 let needed = "the recording's speeds, which are read together with a scenario file";
@@ -140,10 +156,35 @@ fn check_pairs(
 impl Prescribed {
     /// The profile of one who drives at `start_mps` at time zero.
     pub(super) fn speeds_from(&self, start_mps: f64) -> SpeedProfile {
-        match &self.0 {
+        match &self.points {
             Points::Speeds(profile) => profile.clone(),
             Points::Accelerations(steps) => SpeedProfile::integrated(start_mps, steps, FASTEST_MPS),
         }
+    }
+
+    /// Checks that there is a lane for each lane change of a vehicle that starts in lane `start` of `lanes`.
+    ///
+    /// # Errors
+    /// Names the lane change that would leave the road.
+    pub fn check_lanes(&self, start: Lane, lanes: u8) -> Result<(), ConfigError> {
+        let mut lane = start.0;
+        for (place, change) in self.lane_changes.iter().enumerate() {
+            let beside = match change.to {
+                Side::Left => lane.checked_sub(1).filter(|lane| *lane >= 1),
+                Side::Right => lane.checked_add(1).filter(|lane| *lane <= lanes),
+            };
+            let rule = || format!("lane {lane} of {lanes} has no lane on that side, counted from 1 at the left");
+            let off_road = || ConfigError::new("to", Problem::Contradiction { other: "start", rule: rule() });
+            lane = beside.ok_or_else(|| off_road().within_index(place).within("lane-changes"))?;
+        }
+        Ok(())
+    }
+
+    /// The same in the mirrored world, in which left is right.
+    #[must_use]
+    pub(crate) fn mirrored(&self) -> Self {
+        let lane_changes = self.lane_changes.iter().map(PrescribedLaneChange::mirrored).collect();
+        Self { lane_changes, ..self.clone() }
     }
 
     /// A driver for one run.
@@ -180,9 +221,24 @@ mod tests {
         let recorded = Some(RecordedConfig { file: "a.csv".to_owned(), track_id: 1, from_s: None });
         let (profile, acceleration_profile) = (pairs(&[[0.0, 3.0]]), pairs(&[[0.0, -3.0]]));
         let path = |config: PrescribedConfig| config.check(&none).unwrap_err().path.to_string();
-        let both = PrescribedConfig { profile: profile.clone(), acceleration_profile, recorded: None };
+        let both = PrescribedConfig { profile: profile.clone(), acceleration_profile, ..PrescribedConfig::default() };
         assert_eq!(path(both.clone()), "acceleration-profile");
         assert_eq!(path(PrescribedConfig { profile: None, recorded: recorded.clone(), ..both.clone() }), "recorded");
         assert_eq!(path(PrescribedConfig { acceleration_profile: None, recorded, ..both }), "recorded");
+    }
+    #[test]
+    fn lane_changes_stay_on_the_road_and_follow_each_other() {
+        let none = Parameters::default();
+        let change = |at_s: f64, to| PrescribedLaneChangeConfig { at_s: at_s.into(), to, duration_s: 5.0.into() };
+        let config = |lane_changes| PrescribedConfig { lane_changes, ..PrescribedConfig::speeds(&[[0.0, 30.0]]) };
+        let there_and_back = config(vec![change(1.0, Side::Left), change(6.0, Side::Right)]).check(&none).unwrap();
+        assert_eq!(there_and_back.check_lanes(Lane(2), 2), Ok(()));
+        let error = there_and_back.check_lanes(Lane(1), 2).unwrap_err();
+        assert_eq!(error.path.to_string(), "lane-changes[0].to");
+        let mirrored = there_and_back.mirrored();
+        assert!(mirrored.check_lanes(Lane(1), 2).is_ok() && mirrored.check_lanes(Lane(2), 2).is_err());
+        let error = config(vec![change(1.0, Side::Left), change(5.9, Side::Left)]).check(&none).unwrap_err();
+        assert_eq!(error.path.to_string(), "lane-changes[1].at-s");
+        assert!(config(vec![change(f64::NAN, Side::Left)]).check(&none).is_err());
     }
 }

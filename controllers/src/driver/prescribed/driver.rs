@@ -1,10 +1,10 @@
 //! The profile in the loop.
 
-use closecall_traffic::Stream;
+use closecall_traffic::{Indicator, Side, Stream};
 
 use super::Prescribed;
 use super::profile::SpeedProfile;
-use crate::driver::{Driver, DriverAction, DriverError, DriverInput, finite};
+use crate::driver::{Driver, DriverAction, DriverError, DriverInput, DriverNote, LaneChange, finite};
 
 /// How fast a deviation from the prescribed speed is removed [1/s]; well below the actuators' 1/0.15 s.
 const SPEED_GAIN_PER_S: f64 = 2.0;
@@ -21,11 +21,15 @@ pub(crate) struct PrescribedDriver {
     profile: Prescribed,
     /// The profile's speeds, known with the speed at the start.
     speeds: Option<SpeedProfile>,
+    /// Which of the lane changes comes next.
+    next_change: usize,
+    /// The side to which it changes or last changed lanes.
+    side: Indicator,
 }
 
 impl PrescribedDriver {
     pub(super) fn new(profile: Prescribed) -> Self {
-        Self { profile, speeds: None }
+        Self { profile, speeds: None, next_change: 0, side: Indicator::Off }
     }
 }
 
@@ -37,6 +41,27 @@ impl Driver for PrescribedDriver {
         let wanted = slope_mps2 + SPEED_GAIN_PER_S * (speed_mps - own_mps);
         let wanted = finite(wanted, "acceleration of a profile", input.time)?;
         let acceleration_mps2 = wanted.clamp(-STRONGEST_BRAKING_MPS2, STRONGEST_ACCELERATION_MPS2);
-        Ok(DriverAction { acceleration_mps2, ..DriverAction::default() })
+        let lane_change = self.lane_change(input);
+        let is_changing = lane_change.is_some() || input.changing_to.is_some();
+        Ok(DriverAction {
+            acceleration_mps2,
+            indicator: if is_changing { self.side } else { Indicator::Off },
+            note: lane_change.map(|_| DriverNote::CutOutStarted),
+            lane_change,
+        })
+    }
+}
+
+impl PrescribedDriver {
+    /// The lane change that begins now.
+    fn lane_change(&mut self, input: &DriverInput<'_>) -> Option<LaneChange> {
+        let change = *self.profile.lane_changes.get(self.next_change).filter(|change| input.time >= change.at)?;
+        self.next_change += 1;
+        let target = input.road.beside(input.road.lane_at(input.own.d_m), change.to)?;
+        self.side = match change.to {
+            Side::Left => Indicator::Left,
+            Side::Right => Indicator::Right,
+        };
+        Some(LaneChange { target, duration_s: change.duration_s })
     }
 }

@@ -6,9 +6,13 @@
 //!   recorded              a track of a recording's file ── read with the ──┘
 //!                                                          scenario file
 //! ```
+//!
+//! It changes lanes where `lane-changes` says so, on the smooth path that all vehicles take.
 
 mod config;
 mod driver;
+mod lane_change;
 mod profile;
 
 pub use config::{Prescribed, PrescribedConfig, RecordedConfig};
+pub use lane_change::PrescribedLaneChangeConfig;
