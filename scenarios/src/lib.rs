@@ -2,6 +2,7 @@
 
 pub mod atomic;
 pub mod criticality;
+pub mod encounter;
 pub mod filters;
 pub mod fit;
 pub mod interval;

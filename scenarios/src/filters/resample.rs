@@ -6,7 +6,7 @@ use closecall_traffic::{Time, TrajectoryPoint};
 ///
 /// Linear interpolation is off by at most a·Δt²/8, which is 5 mm for 4 m/s² at 10 Hz. Where the points lie on the grid
 /// they are returned unchanged.
-pub(super) fn resample(points: &[TrajectoryPoint], period: Time) -> Vec<TrajectoryPoint> {
+pub(crate) fn resample(points: &[TrajectoryPoint], period: Time) -> Vec<TrajectoryPoint> {
     let (Some(first), Some(last)) = (points.first(), points.last()) else { return Vec::new() };
     let (first_tick, last_tick) = (ceil_div(first.time.ns(), period.ns()), last.time.ns().div_euclid(period.ns()));
     let mut right = 0;

@@ -1,0 +1,77 @@
+use closecall_traffic::{Lane, Time, Trajectory};
+
+use super::*;
+use crate::filters::smooth;
+use crate::lane_change::detect;
+use crate::recordings::test_support::{changing_track, recording_of, straight_track};
+
+const PERIOD: Time = Time::from_ms(40);
+
+/// R from lane 2 to lane 1 between 10 and 15 s, 10 m/s faster than E, which it is 150 m behind, and F.
+fn rear() -> Trajectory {
+    changing_track(3, (0.0, 30.0), (-5.25, -1.75), (10.0, 5.0), 200)
+}
+
+fn found(others: Vec<Trajectory>) -> Result<RecordedEncounter, NoEncounter> {
+    let recording = smooth(&recording_of(std::iter::once(rear()).chain(others).collect()));
+    let changes = detect(&recording);
+    let change = changes.iter().find(|change| change.track_id == 3).unwrap();
+    encounter(&recording, change, &changes, PERIOD)
+}
+
+fn usual() -> Vec<Trajectory> {
+    vec![straight_track(1, 150.0, 20.0, -5.25, 250), straight_track(2, 180.0, 20.0, -5.25, 250)]
+}
+
+#[test]
+fn everyone_has_its_role_on_a_clock_and_a_road_of_their_own() {
+    let found = found(usual()).unwrap();
+    assert_eq!(found.protagonists().map(|track| track.track_id), [1, 2, 3]);
+    assert_eq!((found.start, found.lanes, found.home, found.target), (Time::ZERO, 2, Lane(2), Lane(1)));
+    let [ego, _, rear] = found.protagonists();
+    assert!(ego.points[0].s_m.abs() < 1e-6 && (rear.points[0].s_m + 150.0).abs() < 1e-6);
+    assert!(ego.points.windows(2).all(|pair| pair[1].time - pair[0].time == PERIOD));
+    // R is 75 m behind when it crosses the marking, less a vehicle's length.
+    assert!((found.crossing.s() - 12.5).abs() < 0.2, "{}", found.crossing);
+    assert!((found.crossing_thw_s - (150.0 - 10.0 * found.crossing.s() - 4.5) / 30.0).abs() < 0.1);
+    let crossing = rear.points.iter().find(|point| point.time >= found.crossing).unwrap();
+    assert!((crossing.d_m + found.lane_width_m).abs() < 0.2, "{}", crossing.d_m);
+    assert!(found.end <= Time::from_s(21.2) && found.end > Time::from_s(20.0), "{}", found.end);
+}
+
+#[test]
+fn the_encounter_starts_once_e_follows_f() {
+    // Until 5 s another vehicle drives between E and F.
+    let mut between = straight_track(4, 165.0, 20.0, -5.25, 50);
+    between.points.retain(|point| point.time < Time::from_s(5.0));
+    let found = found(usual().into_iter().chain([between]).collect()).unwrap();
+    assert!((found.start.s() - 5.0).abs() < 0.5, "{}", found.start);
+    assert_eq!(found.protagonists().map(|track| track.track_id), [1, 2, 3]);
+}
+
+#[test]
+fn another_carriageway_is_another_road() {
+    let mut far = straight_track(5, 150.0, 20.0, -1_005.25, 250);
+    far.points.iter_mut().for_each(|point| point.lane = Lane(4));
+    let near = straight_track(6, 150.0, 20.0, -1.75, 250);
+    let found = found(usual().into_iter().chain([far, near]).collect()).unwrap();
+    let tracks: Vec<u64> = found.vehicles.iter().map(|vehicle| vehicle.trajectory.track_id).collect();
+    assert_eq!((tracks, found.lanes), (vec![1, 2, 3, 6], 2));
+}
+
+#[test]
+fn what_is_no_encounter_says_why() {
+    let message = |others| found(others).unwrap_err().to_string();
+    assert!(message(Vec::new()).contains("nobody is ahead of track 3 in lane 2"));
+    assert!(message(usual()[..1].to_vec()).contains("track 1, which track 3 is behind, follows nobody"));
+    let late = |mut track: Trajectory| {
+        track.points.retain(|point| point.time > Time::from_s(11.0));
+        track
+    };
+    let late = usual().into_iter().map(late).collect();
+    let error = message(late);
+    assert!(error.contains("nobody is ahead") || error.contains("2.0 s are needed"), "{error}");
+    // E is passed before the marking is crossed.
+    let passed = vec![straight_track(1, 110.0, 20.0, -5.25, 250), straight_track(2, 180.0, 20.0, -5.25, 250)];
+    assert!(message(passed).contains("has to be above 0"));
+}
