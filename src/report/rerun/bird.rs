@@ -15,6 +15,7 @@ use rerun::{LineStrips2D, Points2D};
 use super::RecordError;
 use super::palette::{self, Rgba};
 use super::stream::Writer;
+use super::vehicles::LABELLED_GAP_M;
 use crate::outcome::CRITICAL_THW_S;
 use crate::report::film::{Film, Frame};
 
@@ -24,6 +25,8 @@ pub(super) const STRETCH: f64 = 2.0;
 pub(super) const REACH_M: f64 = 80.0;
 /// A velocity is drawn as the way that a vehicle goes in this time [s].
 const ARROW_S: f64 = 0.5;
+/// Where the words about a collision stand, beside the left edge of the road [m].
+const WORDS_D_M: f64 = 1.0;
 /// What is drawn first lies below.
 const LANES: f32 = 0.0;
 const PATHS: f32 = 1.0;
@@ -168,7 +171,8 @@ fn write_gaps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), Re
             let (gap_m, thw_s) = (gap_m.ok().filter(|&gap_m| gap_m > 0.0)?, thw_s.ok()?);
             let ends = [half_m, half_m + gap_m].map(|along_m| at(film, frame, own.s_m + sign * along_m, own.d_m));
             let colour = if thw_s < CRITICAL_THW_S { palette::CRITICAL } else { palette::SAFE };
-            Some((ends, colour, format!("{thw_s:.2} s")))
+            let text = if gap_m < LABELLED_GAP_M { String::new() } else { format!("{thw_s:.2} s") };
+            Some((ends, colour, text))
         };
         sides.into_iter().filter_map(line).collect()
     };
@@ -229,14 +233,18 @@ fn write_collisions(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError>
     let text = format!("COLLISION {:.1} m/s", collision.relative_speed_mps);
     let fixed = Points2D::update_fields()
         .with_colors([palette::CRITICAL])
-        .with_radii([2.5_f32])
-        .with_labels([text])
+        .with_radii([2.5_f32, 0.1])
+        .with_labels([String::new(), text])
         .with_draw_order(MARKS)
         .with_show_labels(true);
     writer.fixed(entity, &fixed)?;
     writer.rows(entity, &times, |range| {
-        let marks =
-            frames[range].iter().map(|frame| at(film, frame, frame.states[struck].s_m, frame.states[struck].d_m));
-        Points2D::update_fields().with_positions(marks).columns_of_unit_batches()
+        let frames = &frames[range];
+        // The words stand beside the road, clear of the vehicles' names.
+        let marks = frames.iter().flat_map(|frame| {
+            let state = &frame.states[struck];
+            [state.d_m, WORDS_D_M].map(|d_m| at(film, frame, state.s_m, d_m))
+        });
+        Points2D::update_fields().with_positions(marks).columns(vec![2; frames.len()])
     })
 }

@@ -15,8 +15,11 @@ use crate::report::film::{Film, Frame};
 const ARROW_S: f64 = 0.25;
 /// Names stand this high above the roof, arrows half as high [m].
 const LABEL_ABOVE_M: f64 = 0.8;
-/// Height of the words about a collision [m].
-const TEXT_Z_M: f32 = 5.0;
+/// Words about a collision lie on the road behind it, where no vehicle has its name: the first of them this far behind
+/// the middle of the vehicle that carries it, each further one so much further [m].
+const WORDS_BEHIND_M: [f32; 2] = [11.0, 4.0];
+/// A shorter gap has no room for its headway between the names of the two vehicles [m].
+pub(super) const LABELLED_GAP_M: f64 = 3.0;
 /// Height at which gaps are drawn [m].
 const GAP_Z_M: f64 = 0.5;
 
@@ -224,6 +227,7 @@ impl Gap {
         let is_critical = thw_s.is_ok_and(|thw_s| thw_s < CRITICAL_THW_S);
         let end = |x_m: f64| [x_m as f32, 0.0, GAP_Z_M as f32];
         let text = match thw_s {
+            _ if gap_m < LABELLED_GAP_M => String::new(),
             Ok(thw_s) => format!("{thw_s:.2} s"),
             Err(_) => format!("{gap_m:.1} m"),
         };
@@ -241,8 +245,10 @@ fn mark_text(collision: &Collision) -> String {
     format!("COLLISION: ΔV {first} {first_mps:.1}, {second} {second_mps:.1} m/s")
 }
 
-/// A mark on the side of the vehicle that was struck, which it carries on; the changes of velocity beside it.
+/// A mark on the side of the vehicle that was struck, which it carries on; the changes of velocity on the road behind.
 fn write_collisions(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError> {
+    let [first_m, further_m] = WORDS_BEHIND_M;
+    let mut words_m = -first_m;
     for (number, collision) in film.collisions().iter().enumerate() {
         let place = film.cast.iter().position(|actor| actor.name == collision.between[0].as_str());
         let Some(place) = place else { continue };
@@ -255,8 +261,7 @@ fn write_collisions(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError>
         };
         let entity = format!("{}/collision_{}", entity(film, place), number + 1);
         let [x, y] = at_m.map(|at_m| at_m as f32);
-        // The words stand well above the mark, clear of the vehicles' names.
-        let mark = Points3D::new([[x, y, 0.6], [x, y, TEXT_Z_M]])
+        let mark = Points3D::new([[x, y, 0.6], [words_m, 0.0, 0.0]])
             .with_colors([palette::CRITICAL])
             .with_radii([0.45_f32, 0.05])
             .with_labels([String::new(), mark_text(collision)])
@@ -264,6 +269,7 @@ fn write_collisions(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError>
         // The first frame at or after the touch: before it the vehicles are still apart.
         let shown_at = film.frames.iter().map(|frame| frame.time).find(|&time| time >= collision.time);
         writer.since(&entity, shown_at.unwrap_or(collision.time), &mark)?;
+        words_m -= further_m;
     }
     Ok(())
 }
