@@ -1,5 +1,6 @@
 //! Whatever keeps a command from its result, and what the program then ends with.
 
+use closecall_scenarios::encounter::NoEncounter;
 use closecall_scenarios::lane_change::ReferenceError;
 use closecall_scenarios::recordings::{RecordingError, WriteError as RecordingWriteError};
 use closecall_sensors::camera::ClassifierError;
@@ -18,6 +19,9 @@ use crate::report::recording_charts::ChartError;
 use crate::report::rerun::RecordError;
 use crate::scenario::ScenarioError;
 use crate::simulation::SampleError;
+
+/// Of the tracks that could be asked for, so many are named.
+const MOST_NAMED: usize = 10;
 
 /// A command that has no result.
 #[derive(Debug, thiserror::Error, Diagnostic)]
@@ -52,6 +56,16 @@ pub enum CliError {
     /// A recorded lane change cannot be shown.
     #[error(transparent)]
     TrafficFilm(#[from] TrafficFilmError),
+    /// A recorded lane change is no encounter.
+    #[error("failed to re-enact an encounter of {file}: {source}{}", others(possible))]
+    NoEncounter {
+        /// The recording's file.
+        file: String,
+        /// Why.
+        source: NoEncounter,
+        /// The tracks of the recording that can be re-enacted.
+        possible: Vec<u64>,
+    },
     /// A set of pictures cannot be written.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
@@ -84,15 +98,27 @@ pub enum CliError {
     Compare(#[from] CompareError),
 }
 
+/// What else could be asked for with `--track`.
+fn others(possible: &[u64]) -> String {
+    let named: Vec<String> = possible.iter().take(MOST_NAMED).map(u64::to_string).collect();
+    match possible.len() {
+        0 => String::new(),
+        count if count > MOST_NAMED => format!("; --track can name {count} others, such as {}", named.join(", ")),
+        _ => format!("; --track can name {}", named.join(", ")),
+    }
+}
+
 impl From<&CliError> for ExitCode {
     fn from(error: &CliError) -> Self {
         match error {
             CliError::Scenario(error) => Self::from(error),
             CliError::Recording(error) if error.is_io() => Self::Io,
             CliError::Reference(error) if error.is_io() => Self::Io,
-            CliError::Recording(_) | CliError::Reference(_) | CliError::TrafficFilm(_) | CliError::Classifier(_) => {
-                Self::InvalidInput
-            }
+            CliError::Recording(_)
+            | CliError::Reference(_)
+            | CliError::TrafficFilm(_)
+            | CliError::NoEncounter { .. }
+            | CliError::Classifier(_) => Self::InvalidInput,
             CliError::Folder(error) => Self::from(error),
             CliError::Campaign(error) => Self::from(error),
             CliError::Merge(error) => match error {

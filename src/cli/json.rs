@@ -9,6 +9,7 @@ use crate::campaign::summary::{Counts, Summary};
 use crate::campaign::validity::CheckCounts;
 use crate::campaign::verdict::Judgement;
 use crate::outcome::{Collision, Margins, MisSummary, MomentAt, Outcome};
+use crate::report::film::Course;
 
 /// Puts a value or its absence under `key`.
 pub(super) fn put(object: &mut Map<String, Value>, key: &str, measured: Measured) {
@@ -38,6 +39,18 @@ pub(super) fn outcome(outcome: &Outcome) -> Value {
         "margins": margins(&outcome.margins),
         "mis": mis(&outcome.mis),
     })
+}
+
+/// How close an encounter was, recorded or simulated.
+pub(super) fn course(course: &Course) -> Value {
+    let mut object = Map::new();
+    put(&mut object, "crossing_s", course.crossing_s);
+    put(&mut object, "thw_front_at_crossing_s", course.thw_front_at_crossing_s);
+    put(&mut object, "thw_rear_at_crossing_s", course.thw_rear_at_crossing_s);
+    put(&mut object, "min_thw_front_s", course.min_thw_front_s);
+    put(&mut object, "min_thw_rear_s", course.min_thw_rear_s);
+    put(&mut object, "max_deceleration_mps2", Ok(course.max_deceleration_mps2));
+    Value::Object(object)
 }
 
 fn parameters(outcome: &Outcome) -> Map<String, Value> {

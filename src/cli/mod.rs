@@ -17,6 +17,7 @@ mod plot;
 mod record;
 mod recording;
 mod recordings;
+mod reenact;
 mod render;
 mod replay;
 mod robustness;
@@ -86,6 +87,8 @@ enum Command {
     LaneChanges(recording::LaneChangesArgs),
     /// Work out how critical each lane change of a recording was
     Criticality(recording::CriticalityArgs),
+    /// Run a recorded encounter once more, with the controller under test in E's place, and compare the two
+    Reenact(reenact::ReenactArgs),
     /// Fit the distributions of a logical scenario to recordings
     Fit(recording::FitArgs),
     /// Durations, speeds and counts of lane changes, and what they correlate with
@@ -148,6 +151,7 @@ fn dispatch(command: Command) -> Result<ExitCode, CliError> {
         Command::Inspect(args) => inspect::inspect(&args),
         Command::LaneChanges(args) => recording::lane_changes(&args),
         Command::Criticality(args) => recording::criticality(&args),
+        Command::Reenact(args) => reenact::reenact(&args),
         Command::Fit(args) => recording::fit(&args),
         Command::Statistics(args) => statistics::statistics(&args),
         Command::Robustness(args) => robustness::robustness(&args),

@@ -274,7 +274,7 @@ pub(super) fn refuse_repetition(paths: &[PathBuf], recordings: &[Recording]) -> 
     Ok(())
 }
 
-fn refuse_overwriting(inputs: &[PathBuf], output: Option<&Path>) -> Result<(), CliError> {
+pub(super) fn refuse_overwriting(inputs: &[PathBuf], output: Option<&Path>) -> Result<(), CliError> {
     let Some(output) = output else { return Ok(()) };
     let same = |input: &&PathBuf| matches!((input.canonicalize(), output.canonicalize()), (Ok(a), Ok(b)) if a == b);
     match inputs.iter().find(same) {

@@ -31,6 +31,16 @@ pub(super) struct WatchArgs {
     pub(super) trace: Option<PathBuf>,
 }
 
+impl WatchArgs {
+    /// Finds out before any work is done that what is asked for can be written.
+    fn check(&self) -> Result<(), CliError> {
+        if self.record.is_some() && self.record == self.trace {
+            return Err(CliError::Usage { message: "--record and --trace name the same file".to_owned() });
+        }
+        Ok(self.record.as_deref().map(check_recordable).transpose().map(drop)?)
+    }
+}
+
 /// A path whose ending says how a table is written.
 fn table(text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
@@ -47,20 +57,17 @@ pub(super) fn run_watched(
     arms: &[Arm],
     watch: &WatchArgs,
 ) -> Result<Vec<Outcome>, CliError> {
-    if watch.record.is_some() && watch.record == watch.trace {
-        return Err(CliError::Usage { message: "--record and --trace name the same file".to_owned() });
-    }
-    watch.record.as_deref().map(check_recordable).transpose()?;
+    watch.check()?;
     let mut trace = watch.trace.as_deref().map(TraceWriter::new).transpose()?;
     let mut films = Vec::new();
     let mut outcomes = Vec::new();
     for (place, arm) in arms.iter().enumerate() {
         let is_tested = place + 1 == arms.len();
-        let recorder = watch.record.as_ref().map(|_| FilmRecorder::new(scenario, key, arm, watch.record_level));
-        let mut watchers = Watchers { recorder, trace: trace.as_mut().filter(|_| is_tested) };
+        let mut recorder = watch.record.as_ref().map(|_| FilmRecorder::new(scenario, key, arm, watch.record_level));
+        let mut watchers = Watchers { recorder: recorder.as_mut(), trace: trace.as_mut().filter(|_| is_tested) };
         let outcome = run_guarded(scenario, key, arm, &mut watchers)
             .map_err(|source| CliError::Sample { sample: key.sample, source })?;
-        films.extend(watchers.recorder.map(|recorder| recorder.finish(&outcome)));
+        films.extend(recorder.map(|recorder| recorder.finish(&outcome)));
         outcomes.push(outcome);
     }
     if let Some(path) = &watch.record {
@@ -70,6 +77,26 @@ pub(super) fn run_watched(
         trace.finish()?;
     }
     Ok(outcomes)
+}
+
+/// Runs a sample in one arm, writes the trace that is asked for, and keeps a film whether or not it is to be recorded.
+pub(super) fn run_filmed(
+    scenario: &Scenario,
+    key: RunKey,
+    arm: &Arm,
+    watch: &WatchArgs,
+) -> Result<(Outcome, Film), CliError> {
+    watch.check()?;
+    let mut trace = watch.trace.as_deref().map(TraceWriter::new).transpose()?;
+    let mut recorder = FilmRecorder::new(scenario, key, arm, watch.record_level);
+    let mut watchers = Watchers { recorder: Some(&mut recorder), trace: trace.as_mut() };
+    let outcome = run_guarded(scenario, key, arm, &mut watchers)
+        .map_err(|source| CliError::Sample { sample: key.sample, source })?;
+    if let Some(trace) = trace {
+        trace.finish()?;
+    }
+    let film = recorder.finish(&outcome);
+    Ok((outcome, film))
 }
 
 /// Runs a sample in each of the arms, and keeps a film of each.
@@ -85,7 +112,7 @@ pub(super) fn films(scenario: &Scenario, key: RunKey, arms: &[Arm], level: Level
 
 /// Everyone who watches a run from the command line.
 struct Watchers<'a> {
-    recorder: Option<FilmRecorder>,
+    recorder: Option<&'a mut FilmRecorder>,
     trace: Option<&'a mut TraceWriter>,
 }
 
@@ -122,13 +149,20 @@ pub(super) fn record_lane_change(
     changes: &[CriticalLaneChange],
     track: Option<u64>,
 ) -> Result<(), CliError> {
-    let is_wanted = |change: &&CriticalLaneChange| track.is_none_or(|track| change.lane_change.track_id == track);
-    let chosen = changes.iter().filter(is_wanted).max_by(|a, b| severity(a).partial_cmp(&severity(b)).unwrap_or(Equal));
-    let Some(chosen) = chosen else {
+    let wanted = by_severity(changes, track);
+    let Some(chosen) = wanted.first() else {
         let whose = track.map_or(String::new(), |track| format!(" of track {track}"));
         return Err(CliError::Usage { message: format!("the recording has no lane change{whose}: nothing to record") });
     };
     record_films(path, &[film_lane_change(recording, chosen)?])
+}
+
+/// The lane changes of `track`, or of all, the most critical first; of equals, the later one.
+pub(super) fn by_severity(changes: &[CriticalLaneChange], track: Option<u64>) -> Vec<&CriticalLaneChange> {
+    let is_wanted = |change: &&CriticalLaneChange| track.is_none_or(|track| change.lane_change.track_id == track);
+    let mut wanted: Vec<&CriticalLaneChange> = changes.iter().rev().filter(is_wanted).collect();
+    wanted.sort_by(|a, b| severity(b).partial_cmp(&severity(a)).unwrap_or(Equal));
+    wanted
 }
 
 /// How many metrics are critical, and how near the nearest vehicle came.

@@ -15,6 +15,7 @@ mod file;
 mod locate;
 mod placement;
 mod recorded;
+mod reenacted;
 mod variation;
 
 use closecall_controllers::{CheckedDriver, HumanDriver};
@@ -31,6 +32,7 @@ pub use events::{
     BrakeConfig, CutOutStartedConfig, EffectConfig, EventConfig, NominalEncounterConfig, ThwBelowConfig, TriggerConfig,
 };
 pub use file::{ScenarioError, ScenarioFile};
+pub use reenacted::{RearDriver, actor_name, reenact};
 
 /// One vehicle of a concrete scenario.
 #[derive(Clone, Debug)]

@@ -20,6 +20,7 @@ mod own_controller;
 mod paper_figure;
 mod readme;
 mod recordings;
+mod reenact;
 mod reports;
 mod rerun_files;
 mod statistics;

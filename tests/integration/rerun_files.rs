@@ -49,13 +49,14 @@ fn a_pair_a_full_run_and_recorded_traffic_verify_too() {
     let folder = folder();
     let file = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let (figure, headline) = (library("paper-figure"), library("low-thw-overtake"));
-    let (pair, full, traffic) = (file("pair.rrd"), file("full.rrd"), file("traffic.rrd"));
+    let [pair, full, traffic, beside] = ["pair.rrd", "full.rrd", "traffic.rrd", "beside.rrd"].map(file);
     stdout(&closecall(["run", figure.to_str().unwrap(), "--paired", "--record", &pair]), 0);
     stdout(&closecall(["run", headline.to_str().unwrap(), "--sensors", "full", "--record", &full]), 0);
     let own = file("own.csv");
     stdout(&closecall(["record", headline.to_str().unwrap(), "-n", "2", "-o", &own]), 0);
     stdout(&closecall(["criticality", &own, "--record", &traffic]), 0);
-    for file in [pair, full, traffic] {
+    stdout(&closecall(["reenact", &own, "--record", &beside]), 0);
+    for file in [pair, full, traffic, beside] {
         verify(&rerun, Path::new(&file));
     }
     let none = closecall(["criticality", &own, "--record", &file("none.rrd"), "--track", "99999"]);

@@ -48,6 +48,9 @@ pub enum Absent {
     /// The critical phase was never reached.
     #[error("the critical phase was never reached")]
     NeverCritical,
+    /// The vehicle behind never crossed the lane marking.
+    #[error("the marking was never crossed")]
+    NeverCrossed,
     /// The recording does not carry what the value needs.
     #[error("not recorded")]
     NotRecorded,

@@ -3,12 +3,15 @@
 //! ```text
 //!  simulation ─▶ FilmRecorder ─(outcome)─┐
 //!                                        ├─▶ Film ─▶ Rerun file │ static figure │ still picture
-//!  recorded traffic, one lane change ────┘
+//!  recorded traffic: a lane change, ──────┘
+//!  or an encounter that is re-enacted
 //! ```
 //!
 //! A film is the same thing whether its vehicles were simulated or recorded on a road, so that both can be looked at in
 //! the same views.
 
+mod comparison;
+mod encounter;
 mod moments;
 mod recorder;
 mod scan;
@@ -24,6 +27,8 @@ use closecall_traffic::geometry::OrientedBox;
 use closecall_traffic::metrics::{Encounter, Moving, closest_encounter};
 use closecall_traffic::{Environment, Road, Time, Track, Vehicle, VehicleState};
 
+pub use comparison::{Comparison, Course};
+pub use encounter::film_encounter;
 pub use recorder::FilmRecorder;
 pub(super) use scan::{NO_CLUSTER, Scan};
 pub(super) use story::{collision_text, note_words, state_word};
@@ -56,6 +61,8 @@ pub struct Member {
     pub vehicle: Vehicle,
     /// The frames in which it is there.
     pub rows: Range<usize>,
+    /// True where its speed and acceleration are plotted.
+    pub is_plotted: bool,
 }
 
 /// One instant of a film.
@@ -106,9 +113,28 @@ pub struct Film {
     pub(super) camera: Option<(Camera, NoiseKey)>,
     /// How it ended; nothing for recorded traffic.
     pub(super) outcome: Option<Outcome>,
+    /// The moment to look at first, where it is known otherwise than from collisions and headways.
+    pub(super) highlight: Option<Time>,
+    /// What is to be said before its story, as Markdown.
+    pub(super) foreword: String,
 }
 
 impl Film {
+    /// Puts a text in Markdown before the story.
+    #[must_use]
+    pub fn with_foreword(self, foreword: String) -> Self {
+        Self { foreword, ..self }
+    }
+
+    /// Plots the speeds and accelerations of the first `count` vehicles only.
+    #[must_use]
+    pub fn plotting_first(mut self, count: usize) -> Self {
+        for (place, member) in self.cast.iter_mut().enumerate() {
+            member.is_plotted = place < count;
+        }
+        self
+    }
+
     /// What the film is called.
     pub fn title(&self) -> &str {
         &self.title

@@ -7,11 +7,14 @@ use crate::outcome::MomentAt;
 
 impl Film {
     /// The moment to look at first: when E collided, else anyone; where nobody did, when the vehicle behind was at its
-    /// smallest time headway; in recorded traffic, when the encounter was closest; where there was none of all this, the
-    /// end, with the whole run before it.
+    /// smallest time headway; in recorded traffic, when the marking was crossed in an encounter, or anyone was closest;
+    /// where there was none of all this, the end, with the whole run before it.
     pub fn critical_moment(&self) -> Time {
         if let Some(collision) = self.worst_collision() {
             return collision.time;
+        }
+        if let Some(highlight) = self.highlight {
+            return highlight;
         }
         if self.outcome.is_none() {
             return self.closest_moment();

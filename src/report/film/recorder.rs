@@ -40,6 +40,7 @@ impl FilmRecorder {
             name: actor.id.to_string(),
             vehicle: actor.vehicle,
             rows: 0..usize::MAX,
+            is_plotted: true,
         };
         let film = Film {
             title: format!("{} · {name} · seed {} · sample {}", scenario.name, key.seed, key.sample),
@@ -60,6 +61,8 @@ impl FilmRecorder {
                 (*sensors.camera(), NoiseKey { seed: key.seed, sample: key.sample, ego, actors })
             }),
             outcome: None,
+            highlight: None,
+            foreword: String::new(),
         };
         Self { film, dense_scans: 0, closest: None }
     }

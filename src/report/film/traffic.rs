@@ -57,7 +57,8 @@ pub fn film_lane_change(recording: &SmoothedRecording, change: &CriticalLaneChan
     let member = |track: &&Trajectory| Member {
         name: format!("track-{}", track.track_id),
         vehicle: Vehicle { dimensions: track.dimensions, ..Vehicle::typical(track.class) },
-        rows: rows(track, &instants),
+        rows: rows(track, instants.iter().map(|point| point.time)),
+        is_plotted: true,
     };
     Ok(Film {
         title: format!("{} · lane change of track {track_id}", recording.name),
@@ -74,6 +75,8 @@ pub fn film_lane_change(recording: &SmoothedRecording, change: &CriticalLaneChan
         acceleration_limits: Vec::new(),
         camera: None,
         outcome: None,
+        highlight: None,
+        foreword: String::new(),
     })
 }
 
@@ -90,22 +93,25 @@ fn around<'a>(
     std::iter::once(own).chain(recording.trajectories().filter(near)).collect()
 }
 
-/// The frames in which a track is there.
-fn rows(track: &Trajectory, instants: &[&TrajectoryPoint]) -> std::ops::Range<usize> {
-    let first = instants.iter().position(|own| track.at(own.time).is_some());
-    let last = instants.iter().rposition(|own| track.at(own.time).is_some());
-    match (first, last) {
-        (Some(first), Some(last)) => first..last + 1,
-        _ => 0..0,
+/// The frames, at `instants`, in which a track is there.
+pub(super) fn rows(track: &Trajectory, instants: impl Iterator<Item = Time>) -> std::ops::Range<usize> {
+    let mut there = instants.enumerate().filter(|(_, time)| track.at(*time).is_some()).map(|(row, _)| row);
+    match there.next() {
+        Some(first) => first..there.last().unwrap_or(first) + 1,
+        None => 0..0,
     }
 }
 
 fn road(recording: &SmoothedRecording, tracks: &[&Trajectory]) -> Result<Road, ConfigError> {
     let lanes = tracks.iter().flat_map(|track| track.points.iter().map(|point| point.lane.0)).max();
-    let width_m = recording.markings.typical_lane_width_m();
+    straight_road(lanes.unwrap_or(1).clamp(1, MOST_LANES), recording.markings.typical_lane_width_m())
+}
+
+/// A straight road to draw recorded traffic on.
+pub(super) fn straight_road(lanes: u8, lane_width_m: f64) -> Result<Road, ConfigError> {
     let config = RoadConfig {
-        lanes: lanes.unwrap_or(1).clamp(1, MOST_LANES),
-        lane_width_m: Num::Fixed(width_m.clamp(LANE_WIDTHS_M[0], LANE_WIDTHS_M[1])),
+        lanes,
+        lane_width_m: Num::Fixed(lane_width_m.clamp(LANE_WIDTHS_M[0], LANE_WIDTHS_M[1])),
         curvature_per_m: Num::Fixed(0.0),
         speed_limit_mps: Num::Fixed(SPEED_LIMIT_MPS),
         overtaking_side: Side::Left,
@@ -114,7 +120,8 @@ fn road(recording: &SmoothedRecording, tracks: &[&Trajectory]) -> Result<Road, C
     config.check(&Parameters::default())
 }
 
-fn frame(tracks: &[&Trajectory], time: Time) -> Frame {
+/// One instant of recorded vehicles, the first of them E.
+pub(super) fn frame(tracks: &[&Trajectory], time: Time) -> Frame {
     let nearest = |track: &Trajectory| {
         let late = track.points.first().is_none_or(|first| time >= first.time);
         track.at(time).or(if late { track.points.last() } else { track.points.first() }).copied()

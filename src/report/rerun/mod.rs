@@ -107,8 +107,8 @@ fn record(films: &[Film]) -> Result<MemorySinkStorage, RecordError> {
         let root = if role == Role::Alone { String::new() } else { format!("{}/", film.arm) };
         let writer = Writer::new(&stream, opening, &root, film.period);
         shown.push(write_film(&writer, film, (root, role))?);
-        if role == Role::Tested && film.level >= Level::Objects {
-            ghosts::write(&writer, film, &films[0])?;
+        if let Some(ghosts) = ghosts_in(films, place).filter(|_| film.level >= Level::Objects) {
+            ghosts::write(&writer, film, ghosts)?;
         }
     }
     write_summary(&stream, films)?;
@@ -116,10 +116,25 @@ fn record(films: &[Film]) -> Result<MemorySinkStorage, RecordError> {
     Ok(messages)
 }
 
-/// The moment to open at: the first collision of any film, else what is critical in the last one.
+/// The film whose vehicles stand as outlines in another: the baseline's in those that are tested; of recorded traffic and
+/// a run, neither of which is the baseline, each one's in the other.
+fn ghosts_in(films: &[Film], place: usize) -> Option<&Film> {
+    match (films, place) {
+        (_, 1..) => films.first(),
+        ([recorded, simulated], 0) if recorded.outcome.is_none() => Some(simulated),
+        _ => None,
+    }
+}
+
+/// The moment to open at: the first collision of any film, else what is critical in the last one; beside recorded
+/// traffic, the later of the two, when both encounters have been seen.
 fn opening(films: &[Film]) -> Time {
     let collisions = films.iter().filter_map(|film| film.worst_collision().map(|collision| collision.time));
-    collisions.min().or_else(|| films.last().map(Film::critical_moment)).unwrap_or(Time::ZERO)
+    let critical = || match films {
+        [recorded, _] if recorded.outcome.is_none() => films.iter().map(Film::critical_moment).max(),
+        _ => films.last().map(Film::critical_moment),
+    };
+    collisions.min().or_else(critical).unwrap_or(Time::ZERO)
 }
 
 fn write_film(writer: &Writer<'_>, film: &Film, (root, role): (String, Role)) -> Result<Shown, RecordError> {

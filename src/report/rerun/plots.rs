@@ -141,7 +141,7 @@ impl Plots<'_> {
     }
 
     fn motion(&self) -> Result<(), RecordError> {
-        for (place, actor) in self.film.cast.iter().enumerate() {
+        for (place, actor) in self.film.cast.iter().enumerate().filter(|(_, actor)| actor.is_plotted) {
             let colour = palette::actor(place, self.film.ego);
             let pen = Pen { name: &actor.name, colour, width: LINE };
             let of = |of: fn(&closecall_traffic::VehicleState) -> f64| {

@@ -6,9 +6,12 @@ use closecall_traffic::Measured;
 
 use crate::report::film::Film;
 
-/// The page, in Markdown: the verdict first, then the story, then the numbers.
+/// The page, in Markdown: forewords and the verdict first, then the story, then the numbers.
 pub(super) fn markdown(films: &[Film]) -> String {
     let mut page = String::new();
+    for film in films {
+        page.push_str(&film.foreword);
+    }
     for film in films {
         tell(&mut page, film);
     }

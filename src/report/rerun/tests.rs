@@ -1,5 +1,8 @@
 use std::collections::BTreeSet;
 
+use closecall_scenarios::encounter::encounter;
+use closecall_scenarios::filters::smooth;
+use closecall_scenarios::lane_change::detect;
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
 use closecall_traffic::geometry::BoxSide;
@@ -11,9 +14,10 @@ use super::*;
 use crate::campaign::runner::{Sampling, concrete};
 use crate::controller::ControllerChoice;
 use crate::outcome::{ClosedBy, Collision, Phase};
-use crate::report::film::FilmRecorder;
-use crate::scenario::ScenarioFile;
-use crate::simulation::{Arm, RunKey, simulate};
+use crate::report::film::{Comparison, FilmRecorder, film_encounter};
+use crate::report::traffic::TrafficRecorder;
+use crate::scenario::{RearDriver, ScenarioFile, reenact};
+use crate::simulation::{Arm, CONTROL_STEP, RunKey, simulate};
 
 fn library(name: &str) -> ScenarioFile {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/library");
@@ -33,6 +37,26 @@ fn filmed(name: &str, controller: ControllerChoice, (sensors, level): (Option<Se
 
 fn usual() -> Film {
     filmed("low-thw-overtake", ControllerChoice::Mis, (None, Level::Full))
+}
+
+/// An encounter of our own traffic without the system, and the same with it.
+fn recorded_and_simulated(level: Level) -> [Film; 2] {
+    let (sampling, key) = (Sampling { seed: 1, design: Design::Random, samples: 1 }, RunKey { seed: 1, sample: 0 });
+    let arm = |controller: ControllerChoice| Arm { controller: controller.factory(), sensors: None };
+    let scenario = concrete(&library("overtake-without-brake"), sampling, 0).unwrap();
+    let mut traffic = TrafficRecorder::default();
+    traffic.begin(&scenario);
+    simulate(&scenario, key, &arm(ControllerChoice::Acc), &mut traffic).unwrap();
+    let recording = smooth(&traffic.finish("own"));
+    let changes = detect(&recording);
+    let found = encounter(&recording, &changes[0], &changes, CONTROL_STEP).unwrap();
+    let again = reenact(&found, RearDriver::Driver, (Path::new("own"), &[])).unwrap();
+    let again = again.concrete(&again.space().nominal()).unwrap();
+    let mut recorder = FilmRecorder::new(&again, key, &arm(ControllerChoice::Mis), level);
+    let outcome = simulate(&again, key, &arm(ControllerChoice::Mis), &mut recorder).unwrap();
+    let (recorded, simulated) = (film_encounter(&found, level).unwrap(), recorder.finish(&outcome));
+    let foreword = Comparison::new(&found, &recorded, &simulated).markdown(&found, &simulated, RearDriver::Driver);
+    [recorded.with_foreword(foreword), simulated]
 }
 
 fn chunks(films: &[Film], kind: StoreKind) -> Vec<Chunk> {
@@ -111,6 +135,32 @@ fn a_pair_fills_every_view_and_shows_the_baseline_as_ghosts() {
     {
         assert!(data.iter().any(|chunk| chunk.entity_path().to_string() == entity), "{entity}");
     }
+}
+
+#[test]
+fn recorded_and_simulated_traffic_share_views_and_time_lines_and_are_each_other_s_ghosts() {
+    for (level, least) in [(Level::Events, 7), (Level::Objects, 12), (Level::Full, 12)] {
+        let films = recorded_and_simulated(level);
+        let (views, empty, timelines) = empty_views(&films);
+        assert!(views >= least && empty.is_empty(), "{level:?}: {views} views, nothing at {empty:?}");
+        assert_eq!(timelines, [OPENING_TIMELINE], "{level:?}");
+    }
+    let films = recorded_and_simulated(Level::Objects);
+    let data = chunks(&films, StoreKind::Recording);
+    let half = |root: &str| -> Vec<Chunk> {
+        data.iter().filter(|chunk| chunk.entity_path().to_string().starts_with(root)).cloned().collect()
+    };
+    let halves = [half("/recorded/"), half("/mis/")];
+    for timeline in [TIME_TIMELINE, STEP_TIMELINE] {
+        let [recorded, simulated] = [&halves[0], &halves[1]].map(|half| latest_ns(half, timeline));
+        assert_eq!(recorded, simulated, "{timeline}");
+    }
+    assert!(halves.iter().all(|half| latest_ns(half, OPENING_TIMELINE) > 0));
+    for entity in ["/recorded/world/ghosts/ego", "/mis/world/ghosts/rear", "/recorded/bird/ghosts", "/mis/bird/ghosts"]
+    {
+        assert!(data.iter().any(|chunk| chunk.entity_path().to_string() == entity), "{entity}");
+    }
+    assert!(summary::markdown(&films).starts_with("### Recorded beside mis"));
 }
 
 #[test]

@@ -1,0 +1,137 @@
+//! Recorded encounters once more, with the controller under test.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use crate::support::{closecall, code, data, folder, json, library, stderr, stdout};
+
+/// A recording of our own traffic without the margin increase system: three vehicles for each sample, R the last.
+fn own(folder: &Path) -> PathBuf {
+    let csv = folder.join("own.csv");
+    let scenario = library("overtake-without-brake");
+    let args = ["record", scenario.to_str().unwrap(), "-n", "4", "--controller", "acc", "-o", csv.to_str().unwrap()];
+    stdout(&closecall(args), 0);
+    csv
+}
+
+fn reenacted(recording: &Path, more: &[&str]) -> Value {
+    let args = ["reenact", recording.to_str().unwrap(), "--format", "json"];
+    json(&closecall(args.iter().chain(more)), 0)
+}
+
+fn number(found: &Value, half: &str, key: &str) -> f64 {
+    found[half][key].as_f64().unwrap_or_else(|| panic!("{half}.{key}: {found}"))
+}
+
+#[test]
+fn without_the_system_the_run_is_like_the_recording_and_with_it_the_margin_is_larger() {
+    let folder = folder();
+    let own = own(folder.path());
+    for track in ["3", "6", "9", "12"] {
+        let acc = reenacted(&own, &["--track", track, "--controller", "acc"]);
+        assert_eq!(acc["track_id"].to_string(), track);
+        let ids = ["ego_track_id", "front_track_id"].map(|key| acc[key].as_u64().unwrap());
+        let first = track.parse::<u64>().unwrap() - 2;
+        assert_eq!(ids, [first, first + 1]);
+        for (key, within) in [("crossing_s", 1.0), ("thw_front_at_crossing_s", 0.1), ("thw_rear_at_crossing_s", 0.1)] {
+            let [recorded, simulated] = ["recorded", "simulated"].map(|half| number(&acc, half, key));
+            assert!((recorded - simulated).abs() < within, "track {track}, {key}: {recorded} and {simulated}");
+        }
+        let mis = reenacted(&own, &["--track", track]);
+        assert_eq!(mis["recorded"], acc["recorded"]);
+        let gained_s =
+            number(&mis, "simulated", "thw_front_at_crossing_s") - number(&mis, "recorded", "thw_front_at_crossing_s");
+        assert!(gained_s > 0.5, "track {track}: {gained_s}");
+    }
+}
+
+#[test]
+fn with_everyone_as_recorded_the_run_is_the_recording() {
+    let folder = folder();
+    let own = own(folder.path());
+    let toml = folder.path().join("again.toml");
+    let path = toml.to_str().unwrap();
+    let found = reenacted(&own, &["--track", "3", "--controller", "acc", "--rear", "recorded", "-o", path]);
+    for key in ["crossing_s", "thw_rear_at_crossing_s", "min_thw_rear_s", "thw_front_at_crossing_s"] {
+        let [recorded, simulated] = ["recorded", "simulated"].map(|half| number(&found, half, key));
+        assert!((recorded - simulated).abs() < 0.2, "{key}: {recorded} and {simulated}");
+    }
+    // Lane changes at given times have a mirror image, and the simulator's checks look at it.
+    assert!(fs::read_to_string(&toml).unwrap().contains("lane-changes"));
+    stdout(&closecall(["campaign", path, "-n", "1", "--controller", "acc"]), 0);
+}
+
+#[test]
+fn the_scenario_that_is_written_runs_to_the_same_outcome_and_can_be_varied() {
+    let folder = folder();
+    let own = own(folder.path());
+    let toml = folder.path().join("again.toml");
+    let path = toml.to_str().unwrap();
+    let found = reenacted(&own, &["--track", "6", "-o", path]);
+    assert_eq!(found, reenacted(&own, &["--track", "6"]));
+    let text = fs::read_to_string(&toml).unwrap();
+    assert!(text.starts_with("# Made by `closecall reenact") && text.contains("own.csv"), "{text}");
+    let run = json(&closecall(["run", path, "--format", "json"]), 0);
+    assert_eq!(run, found["outcome"]);
+    stdout(&closecall(["campaign", path, "-n", "2", "--paired"]), 0);
+    let set = "actor.ego.driver.ego-stack.mis.max-deceleration-mps2=0.2";
+    let weaker = reenacted(&own, &["--track", "6", "--set", set]);
+    let gained = |found: &Value| number(found, "simulated", "thw_front_at_crossing_s");
+    assert!(gained(&weaker) < gained(&found), "{} {}", gained(&weaker), gained(&found));
+}
+
+#[test]
+fn what_cannot_be_re_enacted_is_said() {
+    let folder = folder();
+    let own = own(folder.path());
+    let own = own.to_str().unwrap();
+    let refused = |args: &[&str], expected: i32, words: &[&str]| {
+        let output = closecall(std::iter::once(&"reenact").chain(args));
+        let said = stderr(&output);
+        assert_eq!(code(&output), expected, "{args:?}: {said}");
+        assert!(words.iter().all(|word| said.contains(word)), "{args:?}: {said}");
+    };
+    refused(&[own, "--track", "99"], 2, &["own.csv", "no lane change of track 99"]);
+    refused(&["/no/such.csv"], 6, &["/no/such.csv"]);
+    refused(&[own, "--record", "/nowhere/at/all.rrd"], 6, &["/nowhere/at/all.rrd"]);
+    refused(&[own, "-o", own], 2, &["would overwrite"]);
+    refused(&[own, "--set", "actor.nobody.start=1"], 2, &["actor.nobody.start"]);
+    refused(&[own, "--record-level", "full"], 2, &["--record"]);
+    // R alone on the road: its in-car log has nobody else.
+    let drive = folder.path().join("drive.csv");
+    let drive = drive.to_str().unwrap();
+    let scenario = library("overtake-without-brake");
+    stdout(&closecall(["record", scenario.to_str().unwrap(), "-n", "1", "--in-car", "-o", drive]), 0);
+    refused(&[drive], 3, &["drive.csv", "nobody is ahead of track 1"]);
+    // Without F, which a recording need not have.
+    let text = fs::read_to_string(own).unwrap();
+    let place = text.lines().next().unwrap().split(',').position(|column| column == "track_id").unwrap();
+    let is_front = |line: &&str| line.split(',').nth(place) == Some("2");
+    let without: String = text.lines().filter(|line| !is_front(line)).map(|line| format!("{line}\n")).collect();
+    let alone = folder.path().join("alone.csv");
+    fs::write(&alone, without).unwrap();
+    refused(&[alone.to_str().unwrap(), "--track", "3"], 3, &["track 1, which track 3 is behind", "6, 9, 12"]);
+}
+
+#[test]
+fn recorded_traffic_is_re_enacted_or_it_is_said_why_not() {
+    let Some(data) = data() else { return };
+    let ngsim = ["ngsim_us101/trajectories/us101_a.csv", "ngsim_us101/us101_a_ngsim18col_feet.csv"];
+    for recording in ngsim.map(|file| data.join(file)) {
+        let changes = json(&closecall(["lane-changes", recording.to_str().unwrap(), "--format", "json"]), 0);
+        let mut count = 0;
+        for change in changes.as_array().unwrap() {
+            let track = change["track_id"].to_string();
+            for rear in ["driver", "recorded"] {
+                let args = ["reenact", recording.to_str().unwrap(), "--track", &track, "--rear", rear];
+                let output = closecall(args);
+                assert!([0, 3].contains(&code(&output)), "{args:?}: {}", stderr(&output));
+                assert_eq!(code(&output) == 3, stderr(&output).contains("failed to re-enact"), "{}", stderr(&output));
+                count += usize::from(code(&output) == 0);
+            }
+        }
+        assert!(count > changes.as_array().unwrap().len() / 2, "{}: {count}", recording.display());
+    }
+}
