@@ -1,6 +1,6 @@
 //! A scenario as its file says it: text that is not checked yet.
 
-use closecall_controllers::DriverConfig;
+use closecall_controllers::{DriverConfig, LaneKeepingConfig, SpeedKeepingConfig};
 use closecall_scenarios::parameters::ParametersConfig;
 use closecall_sensors::SensorsConfig;
 use closecall_traffic::{ActorId, EnvironmentConfig, Lane, Num, RoadConfig, VehicleConfig};
@@ -59,6 +59,10 @@ pub struct ActorConfig {
     pub start: StartConfig,
     /// Who drives it.
     pub driver: DriverConfig,
+    /// How a human driver weaves in its lane; not at all where absent.
+    pub lane_keeping: Option<LaneKeepingConfig>,
+    /// How the speed that a human driver wants wanders; not at all where absent.
+    pub speed_keeping: Option<SpeedKeepingConfig>,
     /// What happens to it on the way.
     #[serde(default, rename = "event")]
     pub events: Vec<EventConfig>,

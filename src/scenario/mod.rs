@@ -18,13 +18,14 @@ mod recorded;
 mod reenacted;
 mod variation;
 
-use closecall_controllers::{CheckedDriver, HumanDriver};
+use closecall_controllers::{CheckedDriver, DriverConfig, HumanDriver, LaneKeeping, SpeedKeeping};
 use closecall_sensors::Sensors;
 use closecall_traffic::{
     ActorId, Check, ConfigError, Environment, Parameters, Problem, Range, Road, Time, Vehicle, VehicleState,
 };
 
 use crate::simulation::PHYSICS_STEP;
+use crate::world::lateral_grip_mps2;
 pub use config::{AbsoluteStartConfig, ActorConfig, RelativeStartConfig, SCHEMA_VERSION, ScenarioConfig, StartConfig};
 pub use edit::Setting;
 pub(crate) use events::{Brake, Event, Trigger};
@@ -45,6 +46,10 @@ pub struct Actor {
     pub start: VehicleState,
     /// Who drives it.
     pub driver: CheckedDriver,
+    /// How it keeps its lane; exactly where absent.
+    pub lane_keeping: Option<LaneKeeping>,
+    /// How the speed that its driver wants wanders; not at all where absent.
+    pub speed_keeping: Option<SpeedKeeping>,
     pub(crate) events: Vec<Event>,
 }
 
@@ -86,7 +91,7 @@ impl Check for ScenarioConfig {
         let duration_s = parameters.number(&self.duration_s, "duration-s", Range::closed(0.1, 3_600.0))?;
         let road = self.road.check(parameters).map_err(|error| error.within("road"))?;
         let environment = self.environment.check(parameters).map_err(|error| error.within("environment"))?;
-        let actors = self.check_actors(&road, parameters)?;
+        let actors = self.check_actors(&road, environment.friction, parameters)?;
         Ok(Scenario {
             name: self.name.clone(),
             duration: Time::from_s(duration_s),
@@ -155,7 +160,7 @@ impl ScenarioConfig {
         Ok(())
     }
 
-    fn check_actors(&self, road: &Road, parameters: &Parameters) -> Result<Vec<Actor>, ConfigError> {
+    fn check_actors(&self, road: &Road, friction: f64, parameters: &Parameters) -> Result<Vec<Actor>, ConfigError> {
         let at = |index: usize, error: ConfigError| error.within_index(index).within("actor");
         let mut vehicles = Vec::with_capacity(self.actors.len());
         for (index, actor) in self.actors.iter().enumerate() {
@@ -169,6 +174,8 @@ impl ScenarioConfig {
             let driver = actor.driver.check(parameters).map_err(|error| at(index, error.within("driver")))?;
             check_reach(&driver, states[index].speed_mps).map_err(|error| at(index, error))?;
             check_lanes(&driver, &states[index], road).map_err(|error| at(index, error))?;
+            let (lane_keeping, speed_keeping) = actor.check_keeping(parameters).map_err(|error| at(index, error))?;
+            check_weave(lane_keeping, states[index].speed_mps, friction).map_err(|error| at(index, error))?;
             let mut events = Vec::with_capacity(actor.events.len());
             for (place, event) in actor.events.iter().enumerate() {
                 let event = event.check(&start, parameters);
@@ -179,11 +186,62 @@ impl ScenarioConfig {
                 vehicle: vehicles[index],
                 start: states[index],
                 driver,
+                lane_keeping,
+                speed_keeping,
                 events,
             });
         }
         Ok(checked)
     }
+}
+
+impl ActorConfig {
+    /// How the driver keeps lane and speed.
+    fn check_keeping(
+        &self,
+        parameters: &Parameters,
+    ) -> Result<(Option<LaneKeeping>, Option<SpeedKeeping>), ConfigError> {
+        let refused = |key, rule: &str| {
+            Err(ConfigError::new(key, Problem::Contradiction { other: "driver", rule: rule.to_owned() }))
+        };
+        match &self.driver {
+            DriverConfig::EgoStack(_) if self.lane_keeping.is_some() => {
+                return refused("lane-keeping", "the ego stack keeps its lane without weaving");
+            }
+            DriverConfig::EgoStack(_) if self.speed_keeping.is_some() => {
+                return refused("speed-keeping", "the ego stack drives as its controller asks");
+            }
+            DriverConfig::Prescribed(_) if self.speed_keeping.is_some() => {
+                return refused("speed-keeping", "a prescribed driver keeps to its list of speeds");
+            }
+            DriverConfig::Prescribed(_)
+            | DriverConfig::EgoStack(_)
+            | DriverConfig::Wiedemann99(_)
+            | DriverConfig::Idm(_)
+            | DriverConfig::Overtaker(_) => {}
+        }
+        let lane_keeping = self.lane_keeping.as_ref().map(|config| config.check(parameters));
+        let speed_keeping = self.speed_keeping.as_ref().map(|config| config.check(parameters));
+        Ok((
+            lane_keeping.transpose().map_err(|error| error.within("lane-keeping"))?,
+            speed_keeping.transpose().map_err(|error| error.within("speed-keeping"))?,
+        ))
+    }
+}
+
+/// Refuses a weave that the tyres cannot give at the speed at which its driver starts.
+fn check_weave(keeping: Option<LaneKeeping>, speed_mps: f64, friction: f64) -> Result<(), ConfigError> {
+    let largest_mps2 = keeping.map_or(0.0, |keeping| 3.0 * keeping.lateral_acceleration_sd_mps2(speed_mps));
+    let grip_mps2 = lateral_grip_mps2(friction);
+    if largest_mps2 <= grip_mps2 {
+        return Ok(());
+    }
+    let rule = format!(
+        "at {speed_mps:.1} m/s such a weave needs up to {largest_mps2:.2} m/s² sideways, and drivers steer up to \
+         {grip_mps2:.2} m/s² on this road"
+    );
+    let problem = Problem::Contradiction { other: "environment.friction", rule };
+    Err(ConfigError::new("sdlp-m", problem).within("lane-keeping"))
 }
 
 /// Refuses an overtaking driver who never comes as close as it would have to in order to pull out.

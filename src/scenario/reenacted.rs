@@ -160,6 +160,8 @@ fn actor(
             speed_mps: rounded(start.speed_mps.max(0.0)),
         }),
         driver,
+        lane_keeping: None,
+        speed_keeping: None,
         events: Vec::new(),
     })
 }

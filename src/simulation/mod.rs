@@ -12,6 +12,7 @@
 
 mod error;
 mod events;
+mod humans;
 mod margins;
 mod mis_log;
 mod moments;

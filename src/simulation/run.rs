@@ -2,13 +2,14 @@
 
 use closecall_controllers::CheckedDriver;
 use closecall_controllers::{
-    Driver, DriverInput, DriverNote, EgoCommand, EgoController, EgoInput, EgoState, MisSettings, Neighbours, Odometry,
+    DriverInput, DriverNote, EgoCommand, EgoController, EgoInput, EgoState, MisSettings, Neighbours, Odometry,
     SensorAvailability,
 };
 use closecall_sensors::{Health, NoiseKey, Perception, Scene, SceneVehicle};
-use closecall_traffic::{Measured, Stream, Track, stream};
+use closecall_traffic::{Measured, Track};
 
 use super::events::Events;
+use super::humans::{Human, humans, weave};
 use super::margins::MarginMeter;
 use super::mis_log::{EgoNow, MisLog};
 use super::moments::{Moments, NEAR_CLOSING_MPS, NEAR_GAP_M};
@@ -17,15 +18,6 @@ use super::{Arm, CONTROL_STEP, Happening, MarginsNow, Observer, RunKey, SampleEr
 use crate::outcome::{EndReason, Moment, Outcome, Phase};
 use crate::scenario::Scenario;
 use crate::world::{Action, Placed, World};
-
-/// The channel of a human driver's random stream.
-const DRIVER_CHANNEL: &str = "driver";
-
-struct Human {
-    actor: usize,
-    driver: Box<dyn Driver>,
-    rng: Stream,
-}
 
 pub(super) struct Run<'a> {
     scenario: &'a Scenario,
@@ -57,7 +49,12 @@ impl<'a> Run<'a> {
         let placed = scenario
             .actors
             .iter()
-            .map(|actor| Placed { id: actor.id.clone(), vehicle: actor.vehicle, state: actor.start })
+            .map(|actor| Placed {
+                id: actor.id.clone(),
+                vehicle: actor.vehicle,
+                state: actor.start,
+                weave: weave(actor, &scenario.road, key),
+            })
             .collect();
         let world = World::new(scenario.road, scenario.environment.friction, scenario.physics_step, placed);
         let CheckedDriver::Ego(settings) = &scenario.actors[scenario.ego].driver else {
@@ -282,6 +279,8 @@ impl<'a> Run<'a> {
                 neighbours: &self.neighbours[actor],
                 road: &self.scenario.road,
                 changing_to: self.world.changing_to(actor),
+                lateral_deviation_m: self.world.lateral_deviation_m(actor),
+                desired_speed_offset_mps: human.wander.as_mut().map_or(0.0, |wander| wander.at(time)),
             };
             let action = human
                 .driver
@@ -378,17 +377,6 @@ impl<'a> Run<'a> {
             mis: self.mis.finish(self.arm.controller.has_mis(settings)),
         }
     }
-}
-
-fn humans(scenario: &Scenario, key: RunKey) -> Vec<Human> {
-    let mut humans = Vec::with_capacity(scenario.actors.len());
-    for (actor, setup) in scenario.actors.iter().enumerate() {
-        if let CheckedDriver::Human(human) = &setup.driver {
-            let rng = stream(key.seed, key.sample, &setup.id, DRIVER_CHANNEL);
-            humans.push(Human { actor, driver: human.build(), rng });
-        }
-    }
-    humans
 }
 
 fn availability(perception: &dyn Perception) -> SensorAvailability {

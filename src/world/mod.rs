@@ -14,7 +14,7 @@ mod neighbours;
 mod path;
 mod plant;
 
-use closecall_controllers::{LaneChange, Neighbours};
+use closecall_controllers::{LaneChange, Neighbours, Weave};
 use closecall_traffic::geometry::OrientedBox;
 use closecall_traffic::{ActorId, Indicator, Lane, Road, Time, Vehicle, VehicleState};
 use nalgebra::Vector2;
@@ -23,6 +23,7 @@ use crate::outcome::{Collision, Phase};
 use contact::Touch;
 use impact::{BodyId, BodySpec, IMPACT_DURATION_S, Motion, Wreckage};
 use plant::Plant;
+pub(crate) use plant::lateral_grip_mps2;
 
 /// What is asked of one vehicle for one step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -44,10 +45,12 @@ pub(crate) struct Placed {
     pub(crate) vehicle: Vehicle,
     /// Where it starts.
     pub(crate) state: VehicleState,
+    /// How its driver weaves about that.
+    pub(crate) weave: Option<Weave>,
 }
 
 enum Body {
-    Driven(Plant),
+    Driven(Box<Plant>),
     Wrecked { body: BodyId, state: VehicleState },
 }
 
@@ -89,8 +92,8 @@ impl World {
     pub(crate) fn new(road: Road, friction: f64, step: Time, placed: Vec<Placed>) -> Self {
         let actors: Vec<Actor> = placed
             .into_iter()
-            .map(|Placed { id, vehicle, state }| {
-                let body = Body::Driven(Plant::new(&vehicle, state, friction, step.s()));
+            .map(|Placed { id, vehicle, state, weave }| {
+                let body = Body::Driven(Box::new(Plant::new(&vehicle, state, weave, friction, step.s())));
                 Actor { id, vehicle, body }
             })
             .collect();
@@ -156,6 +159,14 @@ impl World {
         match &self.actors[actor].body {
             Body::Driven(plant) => plant.changing_to(),
             Body::Wrecked { .. } => None,
+        }
+    }
+
+    /// How far a vehicle is beside the path that its driver means to take, positive to the left [m].
+    pub(crate) fn lateral_deviation_m(&self, actor: usize) -> f64 {
+        match &self.actors[actor].body {
+            Body::Driven(plant) => plant.lateral_deviation_m(),
+            Body::Wrecked { .. } => 0.0,
         }
     }
 

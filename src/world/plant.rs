@@ -2,16 +2,18 @@
 //!
 //! ```text
 //!  asked acceleration ─▶ friction limit ─▶ first-order lag ─▶ jerk limit ─▶ speed ─▶ distance travelled
-//!  asked lane change  ─▶ quintic path over that distance ─▶ kinematic bicycle: course, slip, yaw rate
+//!  asked lane change  ─▶ quintic path over that distance ─┬─▶ kinematic bicycle: course, slip, yaw rate
+//!  weave of its driver ─▶ deviation over that distance  ──┘
 //! ```
 //!
 //! Lag and jerk limits are of the order of published brake-system responses: a passenger car builds up full braking
 //! in 0.2 to 0.4 s, an air-braked truck in 0.4 to 0.6 s (UN R13 asks for at most 0.6 s to 75 % of the pressure).
 //! The kinematic bicycle (Rajamani, *Vehicle Dynamics and Control*, 2012, ch. 2) is inverted: the path is followed
 //! exactly, and course, slip angle and yaw rate are those that the bicycle needs for it. What the tyres cannot give
-//! is refused when the path is planned: a lane change that would need more lateral acceleration is made longer.
+//! is refused when the path is planned: a lane change that would need more lateral acceleration is made longer, and the
+//! scenario's check refuses a weave that would.
 
-use closecall_controllers::LaneChange;
+use closecall_controllers::{Deviation, LaneChange, Weave};
 use closecall_traffic::{Indicator, Lane, Road, Vehicle, VehicleClass, VehicleState};
 
 use super::path::{LanePath, LateralState};
@@ -26,6 +28,11 @@ const WHEELBASE_SHARE: f64 = 0.6;
 const SHORTEST_LANE_CHANGE_M: f64 = 10.0;
 /// Quasi-static dive of the body [rad per m/s²]: about 1.5° at 1 g.
 const DIVE_RAD_PER_MPS2: f64 = 0.0027;
+
+/// The lateral acceleration up to which drivers steer on a road of this friction [m/s²].
+pub(crate) fn lateral_grip_mps2(friction: f64) -> f64 {
+    LATERAL_SHARE * friction * GRAVITY_MPS2
+}
 
 /// What a class of vehicles can do.
 #[derive(Clone, Copy, Debug)]
@@ -68,12 +75,24 @@ pub(crate) struct Plant {
     state: VehicleState,
     path: Option<(LanePath, Lane)>,
     travelled_m: f64,
-    lateral: LateralState,
+    /// Where the driver means to be.
+    meant: LateralState,
+    weave: Option<Weave>,
+    /// The whole way so far, over which the weave is written.
+    way_m: f64,
+    deviation: Deviation,
 }
 
 impl Plant {
-    /// A vehicle at rest on its lane's centre line or moving along it; `friction` is the road's, `step_s` the step.
-    pub(crate) fn new(vehicle: &Vehicle, state: VehicleState, friction: f64, step_s: f64) -> Self {
+    /// A vehicle at rest on its lane's centre line or moving along it, about which its driver may weave from now on;
+    /// `friction` is the road's, `step_s` the step.
+    pub(crate) fn new(
+        vehicle: &Vehicle,
+        state: VehicleState,
+        weave: Option<Weave>,
+        friction: f64,
+        step_s: f64,
+    ) -> Self {
         let capability = Capability::of(vehicle.class);
         Self {
             capability,
@@ -85,7 +104,10 @@ impl Plant {
             state,
             path: None,
             travelled_m: 0.0,
-            lateral: LateralState { d_m: state.d_m, ..LateralState::default() },
+            meant: LateralState { d_m: state.d_m, ..LateralState::default() },
+            weave,
+            way_m: 0.0,
+            deviation: Deviation::default(),
         }
     }
 
@@ -99,6 +121,11 @@ impl Plant {
         self.path.map(|(_, target)| target)
     }
 
+    /// How far the vehicle is beside the path that its driver means to take, positive to the left [m].
+    pub(crate) fn lateral_deviation_m(&self) -> f64 {
+        self.deviation.offset_m
+    }
+
     /// Pitch of the body, positive nose down [rad].
     pub(crate) fn pitch_rad(&self) -> f64 {
         -self.state.acceleration_mps2 * DIVE_RAD_PER_MPS2
@@ -108,12 +135,12 @@ impl Plant {
     pub(crate) fn change_lane(&mut self, change: LaneChange, road: &Road) {
         let target_m = road.lane_centre_m(change.target);
         let wanted_m = change.duration_s * self.state.speed_mps;
-        let mut path = LanePath::new(self.lateral, target_m, wanted_m.max(SHORTEST_LANE_CHANGE_M));
+        let mut path = LanePath::new(self.meant, target_m, wanted_m.max(SHORTEST_LANE_CHANGE_M));
         let bend_limit_per_m =
-            LATERAL_SHARE * self.friction * GRAVITY_MPS2 / (self.state.speed_mps * self.state.speed_mps).max(1.0);
+            lateral_grip_mps2(self.friction) / (self.state.speed_mps * self.state.speed_mps).max(1.0);
         // The curvature falls with the square of the length, so that a few stretches by a tenth suffice.
         while path.largest_bend_per_m() > bend_limit_per_m && path.length_m() < 10.0 * wanted_m.max(100.0) {
-            path = LanePath::new(self.lateral, target_m, 1.1 * path.length_m());
+            path = LanePath::new(self.meant, target_m, 1.1 * path.length_m());
         }
         self.path = Some((path, change.target));
         self.travelled_m = 0.0;
@@ -141,15 +168,19 @@ impl Plant {
 
     fn steer(&mut self, distance_m: f64, road: &Road) {
         // Way along the lane's direction: what the path is written over.
-        let along_m = distance_m * self.lateral.slope.atan().cos();
+        let along_m = distance_m * self.lateral().slope.atan().cos();
         self.travelled_m += along_m;
+        self.way_m += along_m;
+        if let Some(weave) = &mut self.weave {
+            self.deviation = weave.at(self.way_m);
+        }
         if let Some((path, _)) = self.path {
-            self.lateral = path.at(self.travelled_m);
+            self.meant = path.at(self.travelled_m);
             if self.travelled_m >= path.length_m() {
                 self.path = None;
             }
         }
-        let LateralState { d_m, slope, bend_per_m } = self.lateral;
+        let LateralState { d_m, slope, bend_per_m } = self.lateral();
         let course_rad = slope.atan();
         let curvature_per_m = bend_per_m / (1.0 + slope * slope).powf(1.5);
         // Slip at the box's centre, half a wheelbase ahead of the rear axle.
@@ -159,6 +190,15 @@ impl Plant {
         self.state.yaw_rate_radps = self.state.speed_mps * (curvature_per_m + road.curvature_per_m());
         // Off the reference line of a bend, the same way along the lane is another way along the road.
         self.state.s_m += along_m / (1.0 - road.curvature_per_m() * d_m);
+    }
+
+    /// Where the vehicle is: beside the path by the deviation.
+    fn lateral(&self) -> LateralState {
+        LateralState {
+            d_m: self.meant.d_m + self.deviation.offset_m,
+            slope: self.meant.slope + self.deviation.slope,
+            bend_per_m: self.meant.bend_per_m + self.deviation.bend_per_m,
+        }
     }
 }
 
@@ -176,13 +216,26 @@ fn advance(speed_mps: f64, acceleration_mps2: f64, step_s: f64) -> (f64, f64) {
 
 #[cfg(test)]
 mod tests {
+    use closecall_controllers::LaneKeepingConfig;
+    use closecall_traffic::{ActorId, Check, Parameters, Side, stream};
+
     use super::*;
 
     const STEP_S: f64 = 0.01;
 
+    fn weaving(weave: Option<Weave>) -> Plant {
+        let state = VehicleState { speed_mps: 30.0, d_m: -5.625, ..VehicleState::default() };
+        Plant::new(&Vehicle::typical(VehicleClass::Car), state, weave, 0.9, STEP_S)
+    }
+
+    fn weave() -> Option<Weave> {
+        let keeping = LaneKeepingConfig { sdlp_m: 0.3.into() }.check(&Parameters::default()).unwrap();
+        keeping.weave(Side::Left, stream(1, 0, &ActorId::new("rear").unwrap(), "lane-keeping"))
+    }
+
     fn car(speed_mps: f64) -> Plant {
         let state = VehicleState { speed_mps, d_m: -5.625, ..VehicleState::default() };
-        Plant::new(&Vehicle::typical(VehicleClass::Car), state, 0.9, STEP_S)
+        Plant::new(&Vehicle::typical(VehicleClass::Car), state, None, 0.9, STEP_S)
     }
 
     #[test]
@@ -238,15 +291,47 @@ mod tests {
     #[test]
     fn heading_and_lateral_speed_agree() {
         let road = Road::straight(3);
-        let mut car = car(30.0);
-        car.change_lane(LaneChange { target: Lane(1), duration_s: 5.0 }, &road);
-        let mut previous = car.state().d_m;
-        for _ in 0..400 {
-            car.step(0.0, Indicator::Left, &road);
-            let lateral_mps = (car.state().d_m - previous) / STEP_S;
-            let course_rad = (lateral_mps / 30.0).asin();
-            assert!((course_rad - car.state().heading_rad).abs() < 0.01);
-            previous = car.state().d_m;
+        for mut car in [weaving(None), weaving(weave())] {
+            car.change_lane(LaneChange { target: Lane(1), duration_s: 5.0 }, &road);
+            let mut previous = car.state().d_m;
+            for _ in 0..400 {
+                car.step(0.0, Indicator::Left, &road);
+                let lateral_mps = (car.state().d_m - previous) / STEP_S;
+                let course_rad = (lateral_mps / 30.0).asin();
+                assert!((course_rad - car.state().heading_rad).abs() < 0.01);
+                previous = car.state().d_m;
+            }
         }
+    }
+
+    #[test]
+    fn one_who_weaves_starts_on_its_path_and_changes_lanes_as_far_beside_it() {
+        let road = Road::straight(3);
+        let (mut straight, mut weaving) = (weaving(None), weaving(weave()));
+        assert_eq!(straight.state(), weaving.state());
+        let mut widest_m: f64 = 0.0;
+        for step in 0..3_000 {
+            if step == 1_000 {
+                let change = LaneChange { target: Lane(1), duration_s: 5.0 };
+                straight.change_lane(change, &road);
+                weaving.change_lane(change, &road);
+            }
+            straight.step(0.0, Indicator::Off, &road);
+            weaving.step(0.0, Indicator::Off, &road);
+            // Slopes tilt the way along the lane by some millimetres, over which the lane change lies then.
+            let beside_m = weaving.state().d_m - straight.state().d_m;
+            assert!((beside_m - weaving.lateral_deviation_m()).abs() < 0.005, "step {step}: {beside_m}");
+            widest_m = widest_m.max(beside_m.abs());
+        }
+        assert!((0.3..1.2).contains(&widest_m), "{widest_m}");
+        // One who stands stays where it is.
+        while weaving.state().speed_mps > 0.0 {
+            weaving.step(-5.0, Indicator::Off, &road);
+        }
+        let stands_at_m = weaving.state().d_m;
+        for _ in 0..100 {
+            weaving.step(-5.0, Indicator::Off, &road);
+        }
+        assert_eq!(weaving.state().d_m.to_bits(), stands_at_m.to_bits());
     }
 }

@@ -62,6 +62,22 @@ fn cases() -> Vec<(&'static str, Vec<u8>, &'static [&'static str])> {
         ),
         ("capital letters", text("name = \"low-thw-overtake\"", "name = \"Low\""), &["name", "Low"]),
         ("overlap", text("gap-m = 120.0", "gap-m = -3.0"), &["overlap"]),
+        (
+            "no human at the wheel",
+            text("vehicle = { class = \"car\" }\n", "vehicle = { class = \"car\" }\nlane-keeping = { sdlp-m = 0.2 }\n"),
+            &["actor[0].lane-keeping", "the ego stack keeps its lane"],
+        ),
+        ("weaves through the lanes", text("sdlp-m = 0.2", "sdlp-m = 0.6"), &["lane-keeping.sdlp-m", "0.6", "0 to 0.5"]),
+        (
+            "weaves on ice",
+            text("friction = 0.9", "friction = 0.1"),
+            &["lane-keeping.sdlp-m", "environment.friction", "m/s²"],
+        ),
+        (
+            "a prescribed speed that wanders",
+            text("sdlp-m = 0.2 }\n", "sdlp-m = 0.2 }\nspeed-keeping = { acceleration-noise-mps2 = 0.1 }\n"),
+            &["speed-keeping", "a prescribed driver keeps"],
+        ),
     ]
 }
 

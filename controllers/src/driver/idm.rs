@@ -2,7 +2,8 @@
 //!
 //! Treiber, Hennecke and Helbing, *Congested traffic states in empirical observations and microscopic simulations*,
 //! Physical Review E 62 (2000) 1805–1824, equations 1 and 2:
-//! a = A·[1 − (v/v₀)⁴ − (s*/g)²] with s* = s₀ + max(0, v·T + v·(v − v_l)/(2·√(A·B))).
+//! a = A·[1 − (v/v₀)⁴ − (s*/g)²] with s* = s₀ + max(0, v·T + v·(v − v_l)/(2·√(A·B))). Beyond v₀ the free term brakes with B at
+//! most, where the published one grows with the fourth power.
 
 use closecall_traffic::{Check, ConfigError, Num, Parameters, Range, Stream};
 use schemars::JsonSchema;
@@ -89,7 +90,9 @@ impl Idm {
             let wanted_m = self.standstill_gap_m + (speed_mps * self.time_gap_s + closing / softness).max(0.0);
             (wanted_m / lead.gap_m.max(LEAST_GAP_M)).powi(2)
         });
-        (self.acceleration_mps2 * (1.0 - ratio.powi(4) - interaction)).max(-HARDEST_BRAKING_MPS2)
+        // For its wish alone nobody brakes harder than is comfortable.
+        let free = (1.0 - ratio.powi(4)).max(-self.comfortable_braking_mps2 / self.acceleration_mps2);
+        (self.acceleration_mps2 * (free - interaction)).max(-HARDEST_BRAKING_MPS2)
     }
 }
 
@@ -106,7 +109,8 @@ impl Driver for IdmDriver {
     fn step(&mut self, input: &DriverInput<'_>, rng: &mut Stream) -> Result<DriverAction, DriverError> {
         check_finite(input)?;
         let speed_mps = input.own.speed_mps;
-        let desired_mps = *self.desired_mps.get_or_insert_with(|| usually_desired_mps(input));
+        let usual_mps = *self.desired_mps.get_or_insert_with(|| usually_desired_mps(input));
+        let desired_mps = input.desired_now_mps(usual_mps);
         let wanted = if let Some(reaction) = self.model.reaction {
             let new = || Perception::new(reaction.draw(rng), None).with_lapses(self.model.lapse);
             let ahead = self.perception.get_or_insert_with(new).look(input, rng).ahead;
@@ -131,6 +135,7 @@ mod tests {
         let gap_m = (2.0 + 20.0 * 1.5) / (1.0 - (20.0_f64 / 33.3).powi(4)).sqrt();
         let lead = Lead { gap_m, speed_mps: 20.0, acceleration_mps2: 0.0 };
         assert!(idm.acceleration_mps2(20.0, 33.3, Some(&lead)).abs() < 1e-12);
+        assert_eq!(idm.acceleration_mps2(30.0, 10.0, None), -2.0);
         let nearer = Lead { gap_m: gap_m - 5.0, ..lead };
         assert!(idm.acceleration_mps2(20.0, 33.3, Some(&nearer)) < 0.0);
     }

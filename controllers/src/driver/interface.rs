@@ -68,6 +68,17 @@ pub struct DriverInput<'a> {
     pub road: &'a Road,
     /// The lane change under way, if any: its target.
     pub changing_to: Option<Lane>,
+    /// How far weaving has carried the vehicle beside the path that the driver means to take, positive to the left [m].
+    pub lateral_deviation_m: f64,
+    /// By how much the speed that the driver wants now differs from the one that it wants in the long run [m/s].
+    pub desired_speed_offset_mps: f64,
+}
+
+impl DriverInput<'_> {
+    /// The speed wanted now by a driver who wants `usual_mps` in the long run: never less than half of that [m/s].
+    pub(crate) fn desired_now_mps(&self, usual_mps: f64) -> f64 {
+        (usual_mps + self.desired_speed_offset_mps).max(0.5 * usual_mps)
+    }
 }
 
 /// A lane change to begin now. The plant follows a smooth path to the target lane's centre.

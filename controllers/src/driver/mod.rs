@@ -4,12 +4,15 @@
 //! can be tested alone, and a *driver* that adapts the two to the loop.
 
 mod attention;
+mod drift;
 mod idm;
 mod interface;
+mod lane_keeping;
 mod overtaker;
 mod perception;
 mod prescribed;
 mod reaction;
+mod speed_keeping;
 mod wiedemann99;
 
 pub use attention::{Lapse, LapseConfig};
@@ -17,9 +20,11 @@ pub use idm::{Idm, IdmConfig};
 pub use interface::{
     Driver, DriverAction, DriverError, DriverInput, DriverNote, LaneChange, LaneNeighbours, Neighbour, Neighbours,
 };
+pub use lane_keeping::{Deviation, LaneKeeping, LaneKeepingConfig, Weave};
 pub use overtaker::{FollowConfig, Overtaker, OvertakerConfig, Return, ReturnConfig};
 pub use prescribed::{Prescribed, PrescribedConfig, PrescribedLaneChangeConfig, RecordedConfig};
 pub use reaction::{LogNormalConfig, Reaction, ReactionConfig};
+pub use speed_keeping::{SpeedKeeping, SpeedKeepingConfig, Wander};
 pub use wiedemann99::{Regime, Thresholds, Wiedemann99, Wiedemann99Config, Wiedemann99Driver, Wiedemann99Model};
 
 use closecall_traffic::Time;
@@ -39,9 +44,10 @@ pub(crate) fn finite(value: f64, what: &'static str, time: Time) -> Result<f64, 
 /// Refuses input that is not finite: comparisons and `min` would let it pass for something safe.
 pub(crate) fn check_finite(input: &DriverInput<'_>) -> Result<(), DriverError> {
     let (own, near) = (input.own, input.neighbours);
-    for value in [own.s_m, own.d_m, own.speed_mps] {
+    for value in [own.s_m, own.d_m, own.speed_mps, input.lateral_deviation_m] {
         finite(value, "own state", input.time)?;
     }
+    finite(input.desired_speed_offset_mps, "wanted speed", input.time)?;
     let lanes = [Some(&near.own), near.left.as_ref(), near.right.as_ref()];
     let beside = lanes.iter().flatten().flat_map(|lane| [&lane.lead, &lane.follower, &lane.alongside]);
     for other in beside.chain([&near.in_path]).flatten() {
@@ -93,6 +99,8 @@ mod tests {
             neighbours: &neighbours,
             road: &road,
             changing_to: None,
+            lateral_deviation_m: 0.0,
+            desired_speed_offset_mps: 0.0,
         };
         let mut rng = stream(0, 0, &ActorId::new("rear").unwrap(), "driver");
         let none = Parameters::default();

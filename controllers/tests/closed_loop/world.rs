@@ -134,6 +134,8 @@ impl World {
                         neighbours: &neighbours,
                         road: &road,
                         changing_to: actor.path.as_ref().map(|path| path.target),
+                        lateral_deviation_m: 0.0,
+                        desired_speed_offset_mps: 0.0,
                     };
                     driver.step(&input, rng).unwrap()
                 }

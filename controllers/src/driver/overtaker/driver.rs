@@ -68,6 +68,9 @@ pub(super) struct Change {
     overtaken: Option<usize>,
     start_s_m: f64,
     way_m: f64,
+    /// Where the path begins [m], and how far it leads sideways [m].
+    start_d_m: f64,
+    sideways_m: f64,
     /// Share of the way at which the driver is clear of the vehicle it overtakes.
     clear_at: f64,
     sharpened: bool,
@@ -107,7 +110,7 @@ impl Driver for OvertakerDriver {
     fn step(&mut self, input: &DriverInput<'_>, rng: &mut Stream) -> Result<DriverAction, DriverError> {
         check_finite(input)?;
         let speed_mps = input.own.speed_mps;
-        let desired_mps = *self.desired_mps.get_or_insert(speed_mps);
+        let desired_mps = input.desired_now_mps(*self.desired_mps.get_or_insert(speed_mps));
         let (reaction, side) = (self.settings.reaction, input.road.overtaking_side());
         let new = || Perception::new(reaction.draw(rng), Some(side)).with_lapses(self.settings.lapse);
         let view = self.perception.get_or_insert_with(new).look(input, rng);
@@ -148,26 +151,54 @@ impl Moment<'_> {
         self.view.ahead.as_ref().filter(|seen| Some(seen.actor) != overtaken)
     }
 
+    /// Where the path that the driver means to take is now [m].
+    fn path_d_m(&self) -> f64 {
+        self.input.own.d_m - self.input.lateral_deviation_m
+    }
+
+    /// Way across the road from there to the middle of `target` [m].
+    fn sideways_m(&self, target: Lane) -> f64 {
+        (self.input.road.lane_centre_m(target) - self.path_d_m()).abs()
+    }
+
     /// A lane change from here to `target`, to be clear of `ahead`.
     fn change(&self, home: Lane, target: Lane, ahead: Option<&Perceived>, duration_s: f64) -> Change {
-        let (own, road) = (self.input.own, self.input.road);
-        let sideways_m = (road.lane_centre_m(target) - own.d_m).abs();
-        let clear_at = ahead.map_or(0.0, |ahead| {
-            let apart_m = 0.5 * (self.input.vehicle.dimensions.width_m + ahead.width_m) + CLEAR_SIDEWAYS_M;
-            let offset_m = match self.side {
-                Side::Left => ahead.d_m - own.d_m,
-                Side::Right => own.d_m - ahead.d_m,
-            };
-            path::along((apart_m + offset_m) / sideways_m)
-        });
-        Change {
+        let start_d_m = self.path_d_m();
+        let mut change = Change {
             home,
             target,
             overtaken: ahead.map(|ahead| ahead.actor),
-            start_s_m: own.s_m,
+            start_s_m: self.input.own.s_m,
             way_m: self.speed_mps * duration_s,
-            clear_at,
+            start_d_m,
+            sideways_m: self.sideways_m(target),
+            clear_at: 0.0,
             sharpened: false,
+        };
+        change.clear_at = ahead.map_or(0.0, |ahead| self.clear_at(&change, ahead));
+        change
+    }
+
+    /// Share of the way at which the driver is clear of `ahead`.
+    fn clear_at(&self, change: &Change, ahead: &Perceived) -> f64 {
+        let apart_m = 0.5 * (self.input.vehicle.dimensions.width_m + ahead.width_m) + CLEAR_SIDEWAYS_M;
+        path::along((apart_m + self.beyond_start_m(change, ahead.d_m)) / change.sideways_m)
+    }
+
+    /// Share of the way at which the driver's centre is over the marking between the two lanes.
+    fn crossing_at(&self, change: &Change) -> f64 {
+        let road = self.input.road;
+        let marking_m = 0.5 * (road.lane_centre_m(change.home) + road.lane_centre_m(change.target));
+        path::along(self.beyond_start_m(change, marking_m) / change.sideways_m)
+    }
+
+    /// How far `d_m` is from the start of a change, towards its target, for a driver who stays as far beside its path as it
+    /// is now [m].
+    fn beyond_start_m(&self, change: &Change, d_m: f64) -> f64 {
+        let to_the_left_m = d_m - change.start_d_m - self.input.lateral_deviation_m;
+        match self.side {
+            Side::Left => to_the_left_m,
+            Side::Right => -to_the_left_m,
         }
     }
 }
@@ -190,8 +221,7 @@ impl OvertakerDriver {
         let course = self.course(moment, ahead, change.clear_at * change.way_m);
         let keep_mps2 = self.model.acceleration_mps2(moment.speed_mps, moment.desired_mps, None);
         let keep_mps2 = lift_off_for_light(keep_mps2, moment.speed_mps, Some(ahead));
-        // The centre crosses the marking half a lane width to the side: half of the way where it starts at the centre.
-        let crossing_m = path::along(0.5) * change.way_m;
+        let crossing_m = moment.crossing_at(&change) * change.way_m;
         let slowing_mps2 = (-keep_mps2).max(0.0);
         let pull_out = course.thw_after_s(crossing_m, slowing_mps2) <= self.settings.cut_out_thw_s
             || course.gap_after_m(course.way_to_clear_m) <= course.least_gap_m;
@@ -214,6 +244,9 @@ impl OvertakerDriver {
         let own = moment.input.own;
         let over_the_marking = moment.input.road.lane_at(own.d_m) == change.target;
         let overtaken = self.overtaken(moment, change.overtaken);
+        if let Some(ahead) = overtaken {
+            change.clear_at = moment.clear_at(&change, ahead);
+        }
         let way_to_clear_m = change.way_to_clear_m(own.s_m);
         if over_the_marking && way_to_clear_m <= 0.0 {
             self.phase = Phase::Overtaking { overtaken: change.overtaken };
@@ -312,8 +345,7 @@ impl OvertakerDriver {
 
 /// Steers as sharply as a human does in need, where that is sharper than planned.
 fn sharpen(moment: &Moment<'_>, change: &mut Change, ahead: &Perceived, settings: &Overtaker) -> Option<LaneChange> {
-    let sideways_m = (moment.input.road.lane_centre_m(change.target) - moment.input.own.d_m).abs();
-    let duration_s = (QUINTIC_PEAK * sideways_m / settings.evasive_lateral_mps2).sqrt();
+    let duration_s = (QUINTIC_PEAK * moment.sideways_m(change.target) / settings.evasive_lateral_mps2).sqrt();
     // Written so that no lateral acceleration at all, for which the duration is infinite, means no sharper steering.
     if !(duration_s < settings.duration_s) {
         return None;

@@ -28,8 +28,16 @@ fn look(
     let neighbours =
         Neighbours { own: LaneNeighbours { lead: Some(lead), ..LaneNeighbours::default() }, ..Neighbours::default() };
     let vehicle = Vehicle::typical(VehicleClass::Car);
-    let input =
-        DriverInput { time, vehicle: &vehicle, own: &own, neighbours: &neighbours, road: &road, changing_to: None };
+    let input = DriverInput {
+        time,
+        vehicle: &vehicle,
+        own: &own,
+        neighbours: &neighbours,
+        road: &road,
+        changing_to: None,
+        lateral_deviation_m: 0.0,
+        desired_speed_offset_mps: 0.0,
+    };
     let mut rng = stream(0, 0, &ActorId::new("rear").unwrap(), "driver");
     senses.look(&input, &mut rng).ahead.unwrap()
 }

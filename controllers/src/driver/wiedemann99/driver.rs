@@ -56,7 +56,8 @@ impl Driver for Wiedemann99Driver {
     fn step(&mut self, input: &DriverInput<'_>, rng: &mut Stream) -> Result<DriverAction, DriverError> {
         check_finite(input)?;
         let speed_mps = input.own.speed_mps;
-        let desired_mps = *self.desired_mps.get_or_insert_with(|| usually_desired_mps(input));
+        let usual_mps = *self.desired_mps.get_or_insert_with(|| usually_desired_mps(input));
+        let desired_mps = input.desired_now_mps(usual_mps);
         let mut acceleration_mps2 = if self.settings.reaction.is_some() {
             let ahead = self.lead(input, rng);
             let wanted = self.model.acceleration_mps2(speed_mps, desired_mps, ahead.as_ref().map(|seen| &seen.lead));
