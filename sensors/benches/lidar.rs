@@ -1,16 +1,29 @@
-//! Time of one scan and of its processing, with R at 3, 30 and 100 m behind E and two more vehicles in view.
+//! Time of one scan and of its processing, with R at 3, 30 and 100 m behind E and two more vehicles in view, and the share
+//! that each part has of a whole perception step without the camera.
+#![expect(clippy::print_stdout, reason = "a benchmark prints its figures")]
 
 use std::hint::black_box;
+use std::time::Instant;
 
 use closecall_sensors::lidar::{Detector, LaneGeometry, Lidar, Scanner};
-use closecall_sensors::{Scene, SceneVehicle};
-use closecall_traffic::{ActorId, Environment, Road, Stream, Time, Vehicle, VehicleClass, VehicleState, stream};
+use closecall_sensors::tracking::{RearView, TrackList, Tracker, TrackerScan};
+use closecall_sensors::{Detection, FullPerception, NoiseKey, Perception, Scene, SceneVehicle, Sensors, SensorsConfig};
+use closecall_traffic::{
+    ActorId, Check, Environment, Parameters, Road, Stream, Time, Vehicle, VehicleClass, VehicleState, stream,
+};
 use criterion::{Criterion, criterion_group, criterion_main};
 
 /// E drives in the middle lane.
 const EGO_S_M: f64 = 1_000.0;
 const EGO_D_M: f64 = -5.625;
+/// Its rear bumper.
+const REAR_S_M: f64 = EGO_S_M - 2.3;
 const SPEED_MPS: f64 = 30.0;
+/// Where R is behind E [m].
+const GAPS_M: [f64; 3] = [3.0, 30.0, 100.0];
+/// Steps over which shares are measured.
+const STEPS: u32 = 2_000;
+const SCAN_PERIOD: Time = Time::from_ms(40);
 
 fn vehicle(actor: usize, class: VehicleClass, s_m: f64, d_m: f64) -> SceneVehicle {
     let state = VehicleState { s_m, d_m, speed_mps: SPEED_MPS, ..VehicleState::default() };
@@ -19,11 +32,10 @@ fn vehicle(actor: usize, class: VehicleClass, s_m: f64, d_m: f64) -> SceneVehicl
 
 /// R in E's lane, a truck to the right 40 m behind E, a car to the left 60 m behind E.
 fn others(gap_m: f64) -> [SceneVehicle; 3] {
-    let rear_s_m = EGO_S_M - 2.3;
     [
-        vehicle(1, VehicleClass::Car, rear_s_m - gap_m - 2.3, EGO_D_M),
-        vehicle(2, VehicleClass::Truck, rear_s_m - 40.0 - 8.25, EGO_D_M - 3.75),
-        vehicle(3, VehicleClass::Car, rear_s_m - 60.0 - 2.3, EGO_D_M + 3.75),
+        vehicle(1, VehicleClass::Car, REAR_S_M - gap_m - 2.3, EGO_D_M),
+        vehicle(2, VehicleClass::Truck, REAR_S_M - 40.0 - 8.25, EGO_D_M - 3.75),
+        vehicle(3, VehicleClass::Car, REAR_S_M - 60.0 - 2.3, EGO_D_M + 3.75),
     ]
 }
 
@@ -31,10 +43,47 @@ fn random() -> Stream {
     stream(0, 0, &ActorId::new("ego").expect("a legal name"), "lidar")
 }
 
+fn sensors() -> Sensors {
+    SensorsConfig::default().check(&Parameters::default()).expect("the defaults are valid")
+}
+
+/// All of perception without the camera.
+fn full() -> FullPerception {
+    let key = NoiseKey { seed: 0, sample: 0, ego: ActorId::new("ego").expect("a legal name"), actors: [].into() };
+    FullPerception::new(&sensors().full_model(), &key)
+}
+
+/// The rear LiDAR's tracker, which is told of the same boxes scan after scan while E drives on.
+struct Following {
+    tracker: Tracker,
+    list: TrackList,
+    view: RearView,
+    road: Road,
+    time: Time,
+}
+
+impl Following {
+    fn new(road: Road) -> Self {
+        let tracker = Tracker::new(sensors().full_model().tracker);
+        let field = full().rear_field().expect("a rear sensor has one");
+        let view =
+            RearView { half_angle_tan: field.half_angle_tan, range_m: field.range_m, sensor_x_m: REAR_S_M - EGO_S_M };
+        Self { tracker, list: TrackList::default(), view, road, time: Time::ZERO }
+    }
+
+    fn step(&mut self, detections: &[Detection]) {
+        self.time += SCAN_PERIOD;
+        let s_m = EGO_S_M + SPEED_MPS * self.time.s();
+        let ego = VehicleState { s_m, d_m: EGO_D_M, speed_mps: SPEED_MPS, ..VehicleState::default() };
+        let scan = TrackerScan { time: self.time, road: &self.road, ego, view: self.view, detections };
+        self.tracker.update(&scan, &mut self.list);
+    }
+}
+
 fn scan_and_detect(criterion: &mut Criterion) {
     let road = Road::straight(3);
     let environment = Environment::CLEAR_DAY;
-    for gap_m in [3.0, 30.0, 100.0] {
+    for gap_m in GAPS_M {
         let others = others(gap_m);
         let ego = vehicle(0, VehicleClass::Car, EGO_S_M, EGO_D_M);
         let scene = Scene { time: Time::ZERO, road: &road, environment: &environment, ego, others: &others };
@@ -51,9 +100,51 @@ fn scan_and_detect(criterion: &mut Criterion) {
         group.bench_function("clustering and boxes", |bencher| {
             bencher.iter(|| black_box(detector.detect(black_box(&scan), &lane).expect("finite points").len()));
         });
+        let detections = detector.detect(&scan, &lane).expect("finite points").to_vec();
+        let mut following = Following::new(road);
+        group.bench_function("tracking", |bencher| bencher.iter(|| following.step(black_box(&detections))));
         group.finish();
     }
 }
 
-criterion_group!(benches, scan_and_detect);
+/// Mean time of one of [`STEPS`] calls [µs].
+fn mean_us(mut part: impl FnMut()) -> f64 {
+    let start = Instant::now();
+    (0..STEPS).for_each(|_| part());
+    start.elapsed().as_secs_f64() * 1e6 / f64::from(STEPS)
+}
+
+/// Prints each part's mean time, and its share of a perception step without the camera; the radars are in it, too.
+fn shares(_: &mut Criterion) {
+    let road = Road::straight(3);
+    let environment = Environment::CLEAR_DAY;
+    println!("\n{STEPS} steps each: time [us] and share of a whole perception step");
+    println!("gap      scan          clustering      boxes           tracking        whole step");
+    for gap_m in GAPS_M {
+        let others = others(gap_m);
+        let ego = vehicle(0, VehicleClass::Car, EGO_S_M, EGO_D_M);
+        let scene = Scene { time: Time::ZERO, road: &road, environment: &environment, ego, others: &others };
+        let lane = LaneGeometry::of(&scene);
+        let (mut scanner, mut detector, mut rng) = (Scanner::new(Lidar::default()), Detector::default(), random());
+        let scan_us = mean_us(|| _ = black_box(scanner.scan(&scene, &mut rng).len()));
+        let scan = scanner.scan(&scene, &mut random()).clone();
+        let cluster_us = mean_us(|| detector.cluster(black_box(&scan), &lane).expect("finite points"));
+        let detect_us = mean_us(|| _ = black_box(detector.detect(&scan, &lane).expect("finite points").len()));
+        let detections = detector.detect(&scan, &lane).expect("finite points").to_vec();
+        let mut following = Following::new(road);
+        let track_us = mean_us(|| following.step(black_box(&detections)));
+        let (mut whole, mut time, mut ego, mut others) = (full(), Time::ZERO, ego, others);
+        let whole_us = mean_us(|| {
+            time += SCAN_PERIOD;
+            others.iter_mut().chain([&mut ego]).for_each(|vehicle| vehicle.state.s_m += SPEED_MPS * SCAN_PERIOD.s());
+            let scene = Scene { time, road: &road, environment: &environment, ego, others: &others };
+            black_box(whole.step(&scene).expect("finite").len());
+        });
+        let of = |part_us: f64| format!("{part_us:>6.1} ({:>2.0} %)", 100.0 * part_us / whole_us);
+        let parts = [scan_us, cluster_us, detect_us - cluster_us, track_us].map(of);
+        println!("{gap_m:>3} m  {}  {whole_us:>6.1}", parts.join("   "));
+    }
+}
+
+criterion_group!(benches, scan_and_detect, shares);
 criterion_main!(benches);

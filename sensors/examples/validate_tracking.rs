@@ -101,9 +101,7 @@ fn approach(case: &Case, sensors: &Sensors, [seed, sample]: [u64; 2], result: &m
     result.confirmed_at_m.push(confirmed_at_m);
     result.false_tracks += audit.false_tracks();
     result.audit.id_switches += audit.id_switches;
-    result.audit.matched_steps += settled.matched_steps;
-    result.audit.nees_sum += settled.nees_sum;
-    result.audit.speed_error_sum_m2ps2 += settled.speed_error_sum_m2ps2;
+    result.audit.extend(&settled);
 }
 
 fn main() {

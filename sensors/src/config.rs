@@ -98,6 +98,11 @@ impl Sensors {
         &self.camera
     }
 
+    /// The models of the whole chain, whether it is simulated or not.
+    pub fn full_model(&self) -> FullModel {
+        self.full
+    }
+
     /// The same sensors, simulated to another depth, as the command line may ask.
     #[must_use]
     pub fn with_mode(self, mode: SensorMode) -> Self {

@@ -19,7 +19,7 @@ mod scene;
 mod surroundings;
 #[cfg(test)]
 mod testing;
-mod tracking;
+pub mod tracking;
 mod worker_classifier;
 
 pub use config::{SensorMode, Sensors, SensorsConfig};
@@ -29,5 +29,5 @@ pub use ground_truth::GroundTruth;
 pub use object::{NoiseKey, ObjectPerception, ObjectSensorConfig, ObjectSensorModel};
 pub use perception::{FieldOfView, Health, Perception, SCAN_PERIOD, SensorError, SensorHealth};
 pub use scene::{Scene, SceneVehicle};
-pub use tracking::{NEES_95, TrackAudit, TrackerConfig, TrackerModel};
+pub use tracking::{Consistency, Credibility, NEES_95, TrackAudit, TrackerConfig, TrackerModel};
 pub use worker_classifier::{inference_backend, rear_exposures, use_inference_backend};

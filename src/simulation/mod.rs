@@ -10,6 +10,7 @@
 //! All read the state at t, then all are moved to t + dt. What a run ends in follows from the scenario, the seed, the
 //! sample and the arm alone, to the last bit.
 
+mod auditor;
 mod error;
 mod events;
 mod humans;
@@ -26,6 +27,7 @@ use closecall_controllers::{EgoController, EgoSettings};
 use closecall_sensors::SensorMode;
 use closecall_traffic::Time;
 
+pub use auditor::TrackAuditor;
 pub use error::SampleError;
 pub use observer::{Happening, Lead, MarginsNow, NoObserver, Observer, StepView};
 

@@ -16,7 +16,7 @@ const HIDING_DEPTH_M: f64 = 1.0;
 /// Width that an edge keeps uncertain, in columns: it lies somewhere within the last step.
 const EDGE_SD_COLUMNS: f64 = 0.3;
 /// How well the front of a vehicle is defined: bumper, plate, bonnet edge [m].
-const FACE_SD_M: f64 = 0.04;
+const FACE_SD_M: f64 = 0.034;
 /// Noise of one range [m].
 const POINT_SD_M: f64 = 0.05;
 /// The same where a side is seen too, whose points lie close behind the front's [m].

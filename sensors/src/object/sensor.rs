@@ -19,7 +19,7 @@ use crate::surroundings::Other;
 use crate::tracking::TrackList;
 use crate::tracking::axis::{AxisEstimate, AxisFilter, AxisMeasurement};
 use crate::tracking::lifecycle::Lifecycle;
-use crate::tracking::motion::{ACROSS, ACROSS_WHITE, ALONG, ALONG_WHITE, Mode};
+use crate::tracking::motion::{ACROSS, ACROSS_WHITE, ALONG, ALONG_WHITE, Behind, EgoRear, Mode, Situation};
 use crate::tracking::road_filter::in_ego_frame;
 use crate::{Health, SCAN_PERIOD, Scene};
 
@@ -118,6 +118,13 @@ impl ObjectSensor {
     pub(crate) fn scan(&mut self, view: &ScanView<'_>, list: &mut TrackList) {
         let size = view.scene.ego.vehicle.dimensions;
         let ego_m = [size.length_m, size.width_m];
+        let state = &view.scene.ego.state;
+        let ego = EgoRear {
+            s_m: state.s_m - 0.5 * size.length_m,
+            d_m: state.d_m,
+            speed_mps: state.speed_mps,
+            half_lane_m: 0.5 * view.scene.road.lane_width_m(),
+        };
         self.look_at_weather(view.scene.environment);
         let field = Field { view: self.view, range_m: self.range_m, half_angle_tan: self.model.half_angle_tan };
         self.visibility.look(self.view, view.others, ego_m);
@@ -126,7 +133,7 @@ impl ObjectSensor {
             let errors = self.targets[place].noise.next(&self.model);
             let in_view = self.visibility.sees(&field, other, ego_m);
             let errors = errors.towards(view.scene.road.overtaking_side());
-            self.follow(place, other, (in_view, errors), view.scene.ego.state.speed_mps, list);
+            self.follow(place, other, (in_view, errors), &ego, list);
             self.report(place, other, view, list);
         }
         self.step += 1;
@@ -165,20 +172,24 @@ impl ObjectSensor {
         place: usize,
         other: &Other,
         (in_view, errors): (bool, ScanErrors),
-        ego_speed_mps: f64,
+        ego: &EgoRear,
         list: &mut TrackList,
     ) {
         let (model, target) = (&self.model, &mut self.targets[place]);
         if let Some((_, _, [along, across])) = &mut target.filters {
+            // The filter follows the middle of the vehicle.
+            let AxisEstimate { position_m, speed_mps, .. } = along.now();
+            let front_s_m = position_m + 0.5 * other.length_m + speed_mps * SCAN_PERIOD.s();
+            let situation = Situation::of(&Behind { front_s_m, d_m: across.now().position_m, speed_mps }, ego);
             for axis in [along, across] {
-                axis.predict(SCAN_PERIOD.s(), model.drift_decay);
+                axis.predict(SCAN_PERIOD.s(), model.drift_decay, situation);
             }
         }
         if in_view && !errors.is_lost {
             let measured_m = [other.road_m[0] + errors.position_m[0], other.road_m[1] + errors.position_m[1]];
             let is_new = target.filters.is_none();
             let (_, lifecycle, [along, across]) = target.filters.get_or_insert_with(|| {
-                let speeds_mps = [[ego_speed_mps, SPEED_PRIOR_SD_MPS], [0.0, LATERAL_SPEED_PRIOR_SD_MPS]];
+                let speeds_mps = [[ego.speed_mps, SPEED_PRIOR_SD_MPS], [0.0, LATERAL_SPEED_PRIOR_SD_MPS]];
                 let prior = |axis: usize| {
                     let position_m = [measured_m[axis], POSITION_PRIOR_SD_M];
                     AxisFilter::prior(self.modes[axis], position_m, speeds_mps[axis])

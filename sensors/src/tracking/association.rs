@@ -1,7 +1,7 @@
 //! Which detection belongs to which track: gate, then the assignment of least total cost.
 //!
 //! The cost of a pair is its negative log-likelihood up to constants, d² + ln det S, d the Mahalanobis distance and S the
-//! innovation's covariance. A pair is allowed where d² is below the gate. Each track may also stay without a detection
+//! innovation's covariance, with room for a manoeuvre that has just begun. A pair is allowed where d² is below the gate. Each track may also stay without a detection
 //! at the cost of one at the edge of the gate, so that a far-fetched pair is not forced. The optimum is found by the
 //! Kuhn–Munkres algorithm of the `pathfinding` crate, on integers, so that the result does not depend on rounding.
 
@@ -10,7 +10,8 @@ use pathfinding::prelude::{Matrix, kuhn_munkres_min};
 use super::axis::AxisFit;
 use super::road_filter::{Measurement, RoadFilter};
 
-/// A true pair lies outside of the gate once in a thousand scans: χ² of 2 degrees of freedom.
+/// A true pair lies outside of the gate once in a thousand scans, and even less often near by, where the room for a manoeuvre
+/// is most of S: χ² of 2 degrees of freedom.
 pub(super) const GATE: f64 = 13.8;
 
 /// Integer cost per unit of log-likelihood.

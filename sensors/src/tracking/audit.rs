@@ -1,10 +1,10 @@
-//! Tracks held against the truth: switches of identity, false tracks, and whether the covariance is honest.
+//! Tracks held against the truth: switches of identity, false tracks, and whether the covariance is consistent.
 //!
 //! Nothing here feeds back into perception. The normalised error squared (NEES) of a consistent filter has the mean 4,
 //! the number of dimensions [x, y, vx, vy] of the nearest face (Bar-Shalom, Li, Kirubarajan 2001, section 5.4.2).
 
 use closecall_traffic::{Source, Track, TrackId, TrackStatus};
-use nalgebra::Vector4;
+use nalgebra::{Matrix2, Vector2, Vector4};
 
 use crate::surroundings::{Other, survey};
 use crate::{Scene, SensorError};
@@ -41,13 +41,11 @@ pub struct TrackAudit {
     false_ids: Vec<TrackId>,
     /// The normalised error squared of each step in which a confirmed track matched a vehicle, in order.
     pub nees: Vec<f64>,
+    /// The same for [x, vx] alone and for [y, vy] alone; the mean of each is 2 for a consistent filter.
+    pub nees_by_axis: Vec<[f64; 2]>,
     /// Times that the track of a vehicle changed its number.
     pub id_switches: u64,
-    /// Steps in which a confirmed track matched a vehicle.
-    pub matched_steps: u64,
-    /// Sum of the normalised errors squared over these.
-    pub nees_sum: f64,
-    /// Sum of the squared errors of the speed along E's axis over these [m²/s²].
+    /// Sum of the squared errors of the speed along E's axis over these steps [m²/s²].
     pub speed_error_sum_m2ps2: f64,
 }
 
@@ -88,12 +86,23 @@ impl TrackAudit {
 
     /// Mean normalised error squared; `None` before the first match.
     pub fn mean_nees(&self) -> Option<f64> {
-        (self.matched_steps > 0).then(|| self.nees_sum / self.matched_steps as f64)
+        self.mean_over_steps(self.nees.iter().sum())
     }
 
     /// Root mean square error of the speed [m/s]; `None` before the first match.
     pub fn speed_rmse_mps(&self) -> Option<f64> {
-        (self.matched_steps > 0).then(|| (self.speed_error_sum_m2ps2 / self.matched_steps as f64).sqrt())
+        self.mean_over_steps(self.speed_error_sum_m2ps2).map(f64::sqrt)
+    }
+
+    /// Takes in the errors of other steps, their order included.
+    pub fn extend(&mut self, other: &Self) {
+        self.nees.extend_from_slice(&other.nees);
+        self.nees_by_axis.extend_from_slice(&other.nees_by_axis);
+        self.speed_error_sum_m2ps2 += other.speed_error_sum_m2ps2;
+    }
+
+    fn mean_over_steps(&self, sum: f64) -> Option<f64> {
+        (!self.nees.is_empty()).then(|| sum / self.nees.len() as f64)
     }
 
     fn follow(&mut self, track: &Track, other: &Other) {
@@ -111,9 +120,16 @@ impl TrackAudit {
         let inverse = track.covariance.try_inverse();
         let nees = inverse.map_or(f64::INFINITY, |inverse| (error.transpose() * inverse * error)[0]);
         self.nees.push(nees);
-        self.nees_sum += nees;
-        self.matched_steps += 1;
+        self.nees_by_axis.push([0, 1].map(|axis| axis_nees(track, &error, axis)));
     }
+}
+
+/// The normalised error squared of position and speed along one of E's axes.
+fn axis_nees(track: &Track, error: &Vector4<f64>, axis: usize) -> f64 {
+    let error = Vector2::new(error[axis], error[axis + 2]);
+    let part = |row: usize, column: usize| track.covariance[(axis + 2 * row, axis + 2 * column)];
+    let inverse = Matrix2::from_fn(part).try_inverse();
+    inverse.map_or(f64::INFINITY, |inverse| (error.transpose() * inverse * error)[0])
 }
 
 /// The vehicle that a track belongs to: the one that it had, while it is near enough, else the nearest.

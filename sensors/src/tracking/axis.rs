@@ -17,7 +17,15 @@
 
 use nalgebra::{Matrix4, Vector4};
 
-use super::motion::{MODES, Mode};
+use super::motion::{MODES, Mode, Situation};
+
+/// How far a manoeuvre that has just begun may carry a vehicle beside what the filter expects [m]: 2.5 m/s² for 0.4 s. Only
+/// the gate knows of it, which is at least 0.7 m wide therefore: less than what is between two vehicles in any direction.
+const MANOEUVRE_SD_M: f64 = 0.2;
+/// Horizons are gone in steps no longer than this [s].
+const LONGEST_STEP_S: f64 = 0.04;
+/// What is left of a horizon by rounding [s].
+const ROUNDING_S: f64 = 1e-9;
 
 /// What is known under one mode.
 #[derive(Clone, Copy, Debug)]
@@ -33,16 +41,18 @@ struct Estimate {
 pub(crate) struct AxisFilter {
     modes: &'static [Mode],
     estimates: [Estimate; MODES],
+    /// That of the latest prediction.
+    situation: Situation,
 }
 
 /// How well a measurement fits to what is known along one axis.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct AxisFit {
-    /// Squared deviation over its variance, under the mode that expects it most [1].
+    /// Squared deviation over its variance, that of a manoeuvre included, under the mode that expects it most [1].
     pub(crate) distance: f64,
     /// −2 · the logarithm of its likelihood over all modes, up to a constant.
     pub(crate) cost: f64,
-    /// The same at the edge of a gate of distance 0: the logarithm of the variance over all modes.
+    /// The logarithm of that variance, the mean over all modes: what a pair at the distance 0 would cost.
     pub(crate) log_variance: f64,
 }
 
@@ -82,11 +92,12 @@ impl AxisFilter {
                 probability: mode.map_or(0.0, |mode| mode.prior),
             }
         });
-        Self { modes, estimates }
+        Self { modes, estimates, situation: Situation::FREE }
     }
 
-    /// Goes on by `step_s`, after which `slow_share` of the slow error is left.
-    pub(crate) fn predict(&mut self, step_s: f64, slow_share: f64) {
+    /// Goes on by `step_s` in this situation, after which `slow_share` of the slow error is left.
+    pub(crate) fn predict(&mut self, step_s: f64, slow_share: f64, situation: Situation) {
+        self.situation = situation;
         if self.modes.len() > 1 {
             self.mix(step_s);
         }
@@ -102,19 +113,19 @@ impl AxisFilter {
         for (to, mixed) in self.estimates.iter_mut().enumerate().take(count) {
             let weights: [f64; MODES] = std::array::from_fn(|from| {
                 let Some(mode) = self.modes.get(from) else { return 0.0 };
-                let share =
-                    if from == to { 1.0 - step_s * mode.leaving_per_s(from) } else { step_s * mode.to_per_s[to] };
-                before[from].probability * share
+                before[from].probability * switches(&mode.rates_per_s(self.situation), from, to, step_s)
             });
             *mixed = mean(&before[..count], &weights);
         }
     }
 
-    /// How well a measurement fits. Where a vehicle has held its lane for long, that mode alone would not let it go.
+    /// How well a measurement fits. Where a vehicle has held its lane for long, that mode alone would not let it go, and
+    /// from near by, where it is known to millimetres, not even all modes would when it swerves.
     pub(crate) fn fit(&self, measurement: &AxisMeasurement) -> AxisFit {
         let (mut distance, mut likelihood, mut variance) = (f64::INFINITY, 0.0, 0.0);
         for estimate in &self.estimates[..self.modes.len()] {
-            let (innovation_m, _, variance_m2) = estimate.innovation(measurement);
+            let (innovation_m, _, known_m2) = estimate.innovation(measurement);
+            let variance_m2 = known_m2 + MANOEUVRE_SD_M * MANOEUVRE_SD_M;
             let deviations = innovation_m * innovation_m / variance_m2;
             distance = distance.min(deviations);
             likelihood += estimate.probability * (-0.5 * deviations).exp() / variance_m2.sqrt();
@@ -185,20 +196,30 @@ impl AxisFilter {
         }
     }
 
-    /// Position and speed after `horizon_s` without another measurement.
+    /// Position and speed after `horizon_s` without another measurement, in the situation of the latest prediction.
     pub(crate) fn ahead(&self, horizon_s: f64) -> AxisEstimate {
         let mut ahead = *self;
-        if horizon_s > 0.0 {
-            ahead.predict(horizon_s, 1.0);
+        let mut left_s = horizon_s;
+        while left_s > ROUNDING_S {
+            let step_s = left_s.min(LONGEST_STEP_S);
+            ahead.predict(step_s, 1.0, self.situation);
+            left_s -= step_s;
         }
         ahead.now()
     }
 }
 
-impl Mode {
-    /// Rate at which the mode number `own` is left [1/s].
-    fn leaving_per_s(&self, own: usize) -> f64 {
-        self.to_per_s.iter().enumerate().filter(|(to, _)| *to != own).map(|(_, rate)| rate).sum()
+/// Probability of being in the mode number `to` a step of `step_s` after that of the number `from`, which is left at these
+/// rates [1/s] once at most.
+fn switches(rates_per_s: &[f64; MODES], from: usize, to: usize, step_s: f64) -> f64 {
+    let leaving_per_s: f64 = (0..MODES).filter(|other| *other != from).map(|other| rates_per_s[other]).sum();
+    let stays = (-leaving_per_s * step_s).exp();
+    if from == to {
+        stays
+    } else if leaving_per_s > 0.0 {
+        (1.0 - stays) * rates_per_s[to] / leaving_per_s
+    } else {
+        0.0
     }
 }
 
@@ -306,7 +327,7 @@ mod tests {
             let factor = (step.covariance + tiny).cholesky().unwrap().l();
             let draws = Vector4::from_fn(|_, _| normal(&mut self.rng));
             self.truth = step.state + factor * draws;
-            self.filter.predict(STEP_S, SLOW_SHARE);
+            self.filter.predict(STEP_S, SLOW_SHARE, Situation::FREE);
         }
 
         fn measure(&mut self) {
@@ -356,6 +377,33 @@ mod tests {
             let mean = mean_nees(modes, 600);
             assert!((1.6..2.6).contains(&mean), "{mean}");
         }
+    }
+
+    #[test]
+    fn probabilities_of_switching_are_probabilities_after_any_time() {
+        for rates_per_s in [[0.0, 7.7, 0.5], [0.0; MODES]] {
+            for step_s in [0.0, 0.04, 1.0, 100.0] {
+                let shares: Vec<f64> = (0..MODES).map(|to| switches(&rates_per_s, 0, to, step_s)).collect();
+                assert!(shares.iter().all(|share| (0.0..=1.0).contains(share)), "{shares:?}");
+                assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{shares:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn looking_ahead_is_as_uncertain_as_having_gone_there() {
+        for modes in [ALONG, ACROSS] {
+            let filter = AxisFilter::prior(modes, [0.0, 0.1], [0.0, 0.1]);
+            let mut gone = filter;
+            for _ in 0..10 {
+                gone.predict(STEP_S, 1.0, Situation::FREE);
+            }
+            let (ahead, gone) = (filter.ahead(10.0 * STEP_S), gone.now());
+            assert!((ahead.speed_m2ps2 / gone.speed_m2ps2 - 1.0).abs() < 1e-9, "{ahead:?} {gone:?}");
+            assert!((ahead.position_m2 / gone.position_m2 - 1.0).abs() < 1e-9, "{ahead:?} {gone:?}");
+        }
+        let here = AxisFilter::prior(ALONG, [0.0, 0.1], [0.0, 0.1]);
+        assert_eq!(here.ahead(0.0), here.now());
     }
 
     #[test]

@@ -16,6 +16,7 @@ mod audit;
 pub(crate) mod axis;
 mod classes;
 mod config;
+mod consistency;
 mod extent;
 pub(crate) mod lifecycle;
 mod measurement;
@@ -26,14 +27,15 @@ mod view;
 
 pub use audit::{NEES_95, TrackAudit};
 pub use config::{TrackerConfig, TrackerModel};
-pub(crate) use tracker::{Tracker, TrackerScan};
-pub(crate) use view::RearView;
+pub use consistency::{Consistency, Credibility};
+pub use tracker::{Tracker, TrackerScan};
+pub use view::RearView;
 
 use closecall_traffic::{Track, TrackId};
 
-/// The tracks of all sensors of E, and the next free number.
+/// The tracks of all sensors of E as they are reported, and the next free number.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct TrackList {
+pub struct TrackList {
     /// The tracks of the latest step.
     pub(crate) tracks: Vec<Track>,
     next_id: u32,

@@ -5,7 +5,7 @@
 //! the heading, and so by ½·L·v_d/v_s further to the side.
 
 use super::axis::{AxisEstimate, AxisFilter, AxisFit, AxisMeasurement};
-use super::motion::{ACROSS, ALONG};
+use super::motion::{ACROSS, ALONG, Behind, EgoRear, Situation};
 use crate::ego_frame::EgoFrame;
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
@@ -19,6 +19,10 @@ const POSITION_PRIOR_SD_M: f64 = 1_000.0;
 /// wander over the vehicle.
 const SLOW_TIME_S: f64 = 5.0;
 const SLOW_WAY_M: f64 = 5.0;
+/// How well half of a length is taken to be known [m]: cars are 3.6 to 5.2 m long, of which a follower shows nothing, and
+/// half of that lies within ±0.4 m of the typical one. The same is taken where the length was seen, and for trucks: it counts
+/// only while a vehicle moves across the road.
+const HALF_LENGTH_SD_M: f64 = 0.4;
 /// Below this speed the direction of motion says nothing about the heading [m/s].
 pub(crate) const HEADING_SPEED_MPS: f64 = 3.0;
 
@@ -30,9 +34,15 @@ pub(super) struct Measurement {
 }
 
 impl Measurement {
-    /// As seen of a vehicle that is `ahead_s` long in half its own time: half a length over its speed.
-    fn across_at(&self, ahead_s: f64) -> AxisMeasurement {
-        AxisMeasurement { lever_s: self.across.lever_s + ahead_s, ..self.across }
+    /// Across the road, as seen of a vehicle of this half length that moves so: its front's middle lies half a length along
+    /// the heading from its centre, as well as the length is known.
+    fn across_of(&self, half_m: f64, [along, across]: &[AxisEstimate; 2]) -> AxisMeasurement {
+        if !(along.speed_mps > HEADING_SPEED_MPS) {
+            return self.across;
+        }
+        let unknown_m = HALF_LENGTH_SD_M * across.speed_mps / along.speed_mps;
+        let lever_s = self.across.lever_s + half_m / along.speed_mps;
+        AxisMeasurement { lever_s, slow_sd_m: self.across.slow_sd_m.hypot(unknown_m), ..self.across }
     }
 
     pub(super) fn is_finite(&self) -> bool {
@@ -61,24 +71,27 @@ impl RoadFilter {
         filter
     }
 
-    /// Goes on by `t` seconds, when E's speed along the road is `ego_mps`.
-    pub(super) fn predict(&mut self, t: f64, ego_mps: f64) {
-        let way_m = (self.along.now().speed_mps - ego_mps).abs() * t;
+    /// Goes on by `t` seconds, to when E's rear is at `ego`.
+    pub(super) fn predict(&mut self, t: f64, ego: &EgoRear) {
+        let [along, across] = self.now();
+        let way_m = (along.speed_mps - ego.speed_mps).abs() * t;
         let slow_share = (-t / SLOW_TIME_S - way_m / SLOW_WAY_M).exp();
-        self.along.predict(t, slow_share);
-        self.across.predict(t, slow_share);
+        let front_s_m = along.position_m + along.speed_mps * t;
+        let situation = Situation::of(&Behind { front_s_m, d_m: across.position_m, speed_mps: along.speed_mps }, ego);
+        self.along.predict(t, slow_share, situation);
+        self.across.predict(t, slow_share, situation);
     }
 
     /// Takes in a measurement of the face, half a length of `half_m` before the centre.
     pub(super) fn correct(&mut self, measurement: &Measurement, half_m: f64) {
-        let across = measurement.across_at(ahead_s(half_m, self.along.now().speed_mps));
+        let across = measurement.across_of(half_m, &self.now());
         self.along.measure_position(&measurement.along);
         self.across.measure_position(&across);
     }
 
     /// How well a measurement fits to a vehicle of this half length, along and across the road.
     pub(super) fn fit(&self, measurement: &Measurement, half_m: f64) -> [AxisFit; 2] {
-        let across = measurement.across_at(ahead_s(half_m, self.along.now().speed_mps));
+        let across = measurement.across_of(half_m, &self.now());
         [self.along.fit(&measurement.along), self.across.fit(&across)]
     }
 
@@ -91,11 +104,6 @@ impl RoadFilter {
     pub(super) fn ahead(&self, horizon_s: f64) -> [AxisEstimate; 2] {
         [self.along.ahead(horizon_s), self.across.ahead(horizon_s)]
     }
-}
-
-/// The time in which a vehicle covers `half_m`; 0 for one that is too slow to have a heading of its own.
-fn ahead_s(half_m: f64, speed_mps: f64) -> f64 {
-    if speed_mps > HEADING_SPEED_MPS { half_m / speed_mps } else { 0.0 }
 }
 
 /// State, covariance and heading in E's frame.

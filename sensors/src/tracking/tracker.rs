@@ -10,6 +10,7 @@ use super::config::TrackerModel;
 use super::extent::TrackExtent;
 use super::lifecycle::Lifecycle;
 use super::measurement::measurement;
+use super::motion::EgoRear;
 use super::road_filter::{Measurement, RoadFilter, in_ego_frame};
 use super::view::{Face, RearView};
 use crate::Detection;
@@ -28,17 +29,17 @@ const PART_BEFORE_FACE_M: f64 = 1.0;
 
 /// One scan's detections, all in E's frame at `time`.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct TrackerScan<'a> {
+pub struct TrackerScan<'a> {
     /// The scan's reference time. A detection's own time says when its target was there.
-    pub(crate) time: Time,
+    pub time: Time,
     /// The road, as the map has it.
-    pub(crate) road: &'a Road,
+    pub road: &'a Road,
     /// E at `time`, by its odometry and its place in the lane.
-    pub(crate) ego: VehicleState,
+    pub ego: VehicleState,
     /// What the sensor can see.
-    pub(crate) view: RearView,
+    pub view: RearView,
     /// The boxes.
-    pub(crate) detections: &'a [Detection],
+    pub detections: &'a [Detection],
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -75,7 +76,7 @@ impl Tracked {
 
 /// Multi-object tracker for the boxes of the rear LiDAR.
 #[derive(Clone, Debug)]
-pub(crate) struct Tracker {
+pub struct Tracker {
     model: TrackerModel,
     time: Time,
     tracks: Vec<Tracked>,
@@ -86,7 +87,7 @@ pub(crate) struct Tracker {
 
 impl Tracker {
     /// A tracker that has seen nothing.
-    pub(crate) fn new(model: TrackerModel) -> Self {
+    pub fn new(model: TrackerModel) -> Self {
         Self {
             model,
             time: Time::ZERO,
@@ -97,14 +98,20 @@ impl Tracker {
         }
     }
 
-    /// Takes in one scan; new tracks take their numbers from `list`.
-    pub(crate) fn update(&mut self, scan: &TrackerScan<'_>, list: &mut TrackList) {
+    /// Takes in one scan, which is not older than the one before; new tracks take their numbers from `list`.
+    pub fn update(&mut self, scan: &TrackerScan<'_>, list: &mut TrackList) {
         let elapsed_s = (scan.time - self.time).s();
         self.time = scan.time;
         let frame = EgoFrame::new(scan.road, &scan.ego);
         let ego_mps = scan.ego.speed_mps * scan.ego.heading_rad.cos() / frame.stretch(scan.ego.d_m);
+        let ego = EgoRear {
+            s_m: scan.ego.s_m + scan.view.sensor_x_m,
+            d_m: scan.ego.d_m,
+            speed_mps: ego_mps,
+            half_lane_m: 0.5 * scan.road.lane_width_m(),
+        };
         for track in &mut self.tracks {
-            track.filter.predict(elapsed_s, ego_mps);
+            track.filter.predict(elapsed_s, &ego);
         }
         self.measurements.clear();
         let measured = scan.detections.iter().map(|detection| measurement(detection, &frame, scan.time));

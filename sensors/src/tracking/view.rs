@@ -5,13 +5,13 @@
 
 /// What the rear sensor can see.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct RearView {
+pub struct RearView {
     /// Tangent of half of the horizontal field of view [1].
-    pub(crate) half_angle_tan: f64,
+    pub half_angle_tan: f64,
     /// Range beyond which nothing is expected [m].
-    pub(crate) range_m: f64,
+    pub range_m: f64,
     /// Where the sensor is, ahead of E's origin [m]; negative, at the rear bumper.
-    pub(crate) sensor_x_m: f64,
+    pub sensor_x_m: f64,
 }
 
 /// A face, as the sensor sees it.

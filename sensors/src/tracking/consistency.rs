@@ -1,0 +1,165 @@
+//! Whether a covariance is consistent: the mean of many normalised errors squared against its 95 % bounds.
+//!
+//! The statistic is the normalised error squared (NEES) averaged over all steps of independent runs. If the covariance is
+//! consistent, its expectation is the number of dimensions n (Bar-Shalom, Li, Kirubarajan, *Estimation with Applications to
+//! Tracking and Navigation*, 2001, section 5.4.2). The bounds are n ± t standard errors, where t is Student's quantile for
+//! the number of runs and the standard error that of the runs' scatter about the mean: runs are independent, while the steps
+//! of one run are alike. Runs of several scenarios with the same seed and sample meet the same noise, and count as one.
+//!
+//! Quantiles of χ²(n·N)/N, the usual bounds for N independent values, ask for errors that are normal; here a motion that
+//! switches puts much of the sum into the few steps after a surprise. The price of not asking for it: runs that scatter widely
+//! widen the bounds. Bounds wider than a quarter of n to either side are no evidence, and the answer is that.
+
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+/// Where Student's distribution is cut on the right for a two-sided 95 % interval.
+const QUANTILE: f64 = 0.975;
+
+/// Dimensions of the state [x, y, vx, vy] whose errors are judged.
+const DIMENSIONS: f64 = 4.0;
+
+/// Widest bounds that say something, to either side of [`DIMENSIONS`].
+const WIDEST: f64 = 1.0;
+
+/// The normalised errors squared of many runs put together.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Consistency {
+    /// Their mean over all steps; 4 where the covariance is consistent.
+    pub mean: f64,
+    /// Half of the width of the 95 % interval about that.
+    pub half_width: f64,
+}
+
+/// What a mean says of the covariance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Credibility {
+    /// Within the 95 % bounds.
+    Consistent,
+    /// Below them: errors are smaller than the covariance says.
+    Conservative,
+    /// Above them: the tracker is surer than it may be.
+    Overconfident,
+    /// Within bounds so wide that nothing is known.
+    Undecided,
+}
+
+impl Consistency {
+    /// Puts the normalised errors squared of independent runs together; nothing where fewer than two runs have any.
+    pub fn of(runs: &[Vec<f64>]) -> Option<Self> {
+        let runs: Vec<(f64, f64)> =
+            runs.iter().filter(|run| !run.is_empty()).map(|run| (run.iter().sum::<f64>(), run.len() as f64)).collect();
+        let count = runs.len() as f64;
+        let student = StudentsT::new(0.0, 1.0, count - 1.0).ok()?;
+        let steps: f64 = runs.iter().map(|(_, steps)| steps).sum();
+        let mean = runs.iter().map(|(sum, _)| sum).sum::<f64>() / steps;
+        // The variance of a ratio of two sums over runs, to first order.
+        let squares: f64 = runs.iter().map(|(sum, steps)| (sum - mean * steps).powi(2)).sum();
+        let standard_error = (squares * count / (count - 1.0)).sqrt() / steps;
+        Some(Self { mean, half_width: student.inverse_cdf(QUANTILE) * standard_error })
+    }
+
+    /// The two-sided 95 % bounds of the mean for a consistent covariance.
+    pub fn bounds(&self) -> [f64; 2] {
+        [DIMENSIONS - self.half_width, DIMENSIONS + self.half_width]
+    }
+
+    /// Where the mean lies in the bounds.
+    pub fn credibility(&self) -> Credibility {
+        let [low, high] = self.bounds();
+        if self.mean < low {
+            Credibility::Conservative
+        } else if self.mean <= high {
+            if self.half_width <= WIDEST { Credibility::Consistent } else { Credibility::Undecided }
+        } else {
+            // A mean that is not finite is no sign of consistency.
+            Credibility::Overconfident
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use closecall_traffic::{ActorId, stream};
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+
+    /// Runs of squared errors in four dimensions, each axis a first-order process that remembers the share `memory` of the
+    /// last step, with a variance of `variance` times what is claimed.
+    fn runs(count: u64, memory: f64, variance: f64) -> Vec<Vec<f64>> {
+        let run = |sample| {
+            let mut rng = stream(1, sample, &ActorId::new("ego").unwrap(), "consistency");
+            let mut draw = || -> f64 { StandardNormal.sample(&mut rng) };
+            let mut errors: [f64; 4] = std::array::from_fn(|_| draw());
+            (0..400)
+                .map(|_| {
+                    let fresh = (1.0 - memory * memory).sqrt();
+                    errors.iter_mut().for_each(|error| *error = memory * *error + fresh * draw());
+                    variance * errors.iter().map(|error| error * error).sum::<f64>()
+                })
+                .collect()
+        };
+        (0..count).map(run).collect()
+    }
+
+    /// How many of `cases` are this.
+    fn count(cases: &[Consistency], credibility: Credibility) -> usize {
+        cases.iter().filter(|case| case.credibility() == credibility).count()
+    }
+
+    #[test]
+    fn consistent_errors_are_within_the_bounds_in_19_of_20_cases() {
+        for (memory, of_a_case) in [(0.0, 40), (0.9, 40), (0.9, 8)] {
+            let all = runs(200 * of_a_case as u64, memory, 1.0);
+            let cases: Vec<_> = all.chunks(of_a_case).map(|case| Consistency::of(case).unwrap()).collect();
+            // 190 of 200 expected, with a standard deviation of 3.
+            let consistent = count(&cases, Credibility::Consistent);
+            assert!((181..=199).contains(&consistent), "memory {memory}: {consistent} of 200");
+        }
+    }
+
+    #[test]
+    fn runs_of_any_length_count_by_their_steps() {
+        let all: Vec<Vec<f64>> =
+            runs(8_000, 0.5, 1.0).into_iter().enumerate().map(|(run, nees)| nees[..10 + run % 390].to_vec()).collect();
+        let cases: Vec<_> = all.chunks(40).map(|case| Consistency::of(case).unwrap()).collect();
+        let consistent = count(&cases, Credibility::Consistent);
+        assert!((181..=199).contains(&consistent), "{consistent} of 200");
+        let found = Consistency::of(&[vec![2.0; 30], vec![8.0; 10]]).unwrap();
+        assert_eq!(found.mean, 3.5);
+    }
+
+    #[test]
+    fn a_memory_makes_of_many_steps_few_values() {
+        let [without, with] = [0.0, 0.9].map(|memory| Consistency::of(&runs(400, memory, 1.0)).unwrap());
+        // Squares of a process that remembers 0.9 are correlated by 0.81 per step: (1 + 0.81)/(1 − 0.81) = 9.5 steps are one.
+        let expected = 1.966 * (2.0 * DIMENSIONS / 160_000.0).sqrt();
+        assert!((0.9..1.1).contains(&(without.half_width / expected)), "{without:?}");
+        assert!((0.9..1.1).contains(&(with.half_width / (9.5_f64.sqrt() * expected))), "{with:?}");
+    }
+
+    #[test]
+    fn wrong_covariances_are_told_apart() {
+        let of = |variance| Consistency::of(&runs(40, 0.9, variance)).unwrap();
+        assert_eq!(of(0.8).credibility(), Credibility::Conservative);
+        assert_eq!(of(1.25).credibility(), Credibility::Overconfident);
+        assert_eq!(Consistency { mean: f64::NAN, ..of(1.0) }.credibility(), Credibility::Overconfident);
+    }
+
+    #[test]
+    fn a_few_runs_gone_wild_are_no_consistency() {
+        let mut all = runs(40, 0.9, 1.0);
+        for run in [3, 17] {
+            all[run].iter_mut().for_each(|nees| *nees += 100.0);
+        }
+        let found = Consistency::of(&all).unwrap();
+        assert_eq!(found.credibility(), Credibility::Undecided, "{found:?}");
+    }
+
+    #[test]
+    fn one_run_alone_says_nothing() {
+        assert_eq!(Consistency::of(&[]), None);
+        assert_eq!(Consistency::of(&runs(1, 0.0, 1.0)), None);
+        assert_eq!(Consistency::of(&[vec![4.0; 10], Vec::new()]), None);
+    }
+}

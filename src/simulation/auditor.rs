@@ -1,0 +1,49 @@
+//! Holds the tracks of a run against the truth.
+
+use closecall_sensors::{Scene, SceneVehicle, SensorError, TrackAudit};
+use closecall_traffic::Time;
+
+use super::{Happening, Observer, StepView};
+
+/// An observer that audits the confirmed rear tracks of a run, until the first collision: a wreck moves like no model.
+#[derive(Debug, Default)]
+pub struct TrackAuditor {
+    audit: TrackAudit,
+    others: Vec<SceneVehicle>,
+    error: Option<SensorError>,
+    has_collided: bool,
+}
+
+impl TrackAuditor {
+    /// What was found.
+    ///
+    /// # Errors
+    /// [`SensorError::NotFinite`] where the truth was not finite in some step.
+    pub fn into_audit(self) -> Result<TrackAudit, SensorError> {
+        self.error.map_or(Ok(self.audit), Err)
+    }
+}
+
+impl Observer for TrackAuditor {
+    fn step(&mut self, view: &StepView<'_>) {
+        if self.has_collided || self.error.is_some() {
+            return;
+        }
+        let ego = view.scenario.ego;
+        let others = view.vehicles.iter().enumerate().filter(|(actor, _)| *actor != ego);
+        self.others.clear();
+        self.others.extend(others.map(|(_, other)| *other));
+        let scene = Scene {
+            time: view.time,
+            road: &view.scenario.road,
+            environment: &view.scenario.environment,
+            ego: view.vehicles[ego],
+            others: &self.others,
+        };
+        self.error = self.audit.observe(view.tracks, &scene).err();
+    }
+
+    fn happening(&mut self, _: Time, what: &Happening) {
+        self.has_collided |= matches!(what, Happening::Collision(_));
+    }
+}
