@@ -18,6 +18,7 @@ mod looking;
 mod malformed;
 mod own_controller;
 mod paper_figure;
+mod perception;
 mod readme;
 mod recordings;
 mod reenact;
