@@ -17,8 +17,8 @@ const WAYS: [(&str, &str); 14] = [
     ("dies", "the process ended (exit status: 3) after 1 answer; it last wrote: out of cheese"),
     ("killed", "the process ended (signal: 9 (SIGKILL)) after 1 answer"),
     ("closes", "the process closed its standard output after 1 answer"),
-    ("hangs", "the process hangs: no answer in twice the 300 ms allowed, after 1 answer"),
-    ("late 0.45", "the process answered later than the 300 ms allowed, after 1 answer"),
+    ("hangs", "the process hangs: no answer in twice the 1000 ms allowed, after 1 answer"),
+    ("late 1.5", "the process answered later than the 1000 ms allowed, after 1 answer"),
     ("garbage", "the process answered \"what?\", which is not JSON"),
     ("nan", "asked for an acceleration of nan m/s², which is not a finite number"),
     ("infinite", "asked for an acceleration of 1e999 m/s², which is not a finite number"),
@@ -42,7 +42,7 @@ fn python() -> bool {
 fn run_with(controller: &str, mark: &str) -> Output {
     Command::new(env!("CARGO_BIN_EXE_closecall"))
         .current_dir(env!("CARGO_MANIFEST_DIR"))
-        .args(["run", library("low-thw-overtake").to_str().unwrap(), "--controller-timeout-ms", "300"])
+        .args(["run", library("low-thw-overtake").to_str().unwrap(), "--controller-timeout-ms", "1000"])
         .args(["--controller-memory-mib", "128", "--controller", controller])
         .env("CLOSECALL_TEST_MARK", mark)
         .output()
