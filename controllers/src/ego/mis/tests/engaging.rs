@@ -1,0 +1,120 @@
+//! Each condition for engaging, alone.
+
+use super::*;
+
+#[test]
+fn it_engages_at_the_first_step_where_every_condition_holds() {
+    let command = Bench::new().step();
+    assert_eq!((command.state, command.reason), (EgoState::Increasing, Reason::EngagedGoalOutOfReach));
+    let plan = command.plan.unwrap();
+    assert!((plan.goal_thw_s - 2.7).abs() < 1e-9 && plan.deceleration_mps2 == 1.0, "{plan:?}");
+    assert!((plan.ttce_s.unwrap() - 90.0 / 8.0).abs() < 1e-9, "{plan:?}");
+}
+
+#[test]
+fn braking_grows_within_the_jerk_limit() {
+    let mut bench = Bench::engaged();
+    let mut last = 0.0;
+    for _ in 0..40 {
+        let now = bench.step().acceleration_mps2;
+        assert!((last - now) <= 2.0 * 0.04 + 1e-9, "{last} to {now}");
+        last = now;
+    }
+    assert_eq!(last, -1.0);
+}
+
+#[test]
+fn not_automated() {
+    Bench::with(false).refuses(Reason::NotAutomated);
+}
+
+#[test]
+fn front_margin_long() {
+    let mut bench = Bench::new();
+    bench.front().state[0] = 45.0 + CAR_M;
+    bench.refuses(Reason::FrontMarginLong);
+    bench.tracks.remove(0);
+    // One that vanishes is remembered for half a second.
+    bench.refuses(Reason::FrontMarginLong);
+    bench.step_for(0.6);
+    bench.refuses(Reason::NoFront);
+}
+
+#[test]
+fn rear_far_or_absent() {
+    let mut bench = Bench::new();
+    bench.rear().state[0] = -100.1 - CAR_M;
+    bench.refuses(Reason::RearFar);
+    bench.tracks.remove(1);
+    bench.refuses(Reason::NoRear);
+}
+
+#[test]
+fn rear_unconfirmed() {
+    let mut bench = Bench::new();
+    bench.rear().status = TrackStatus::Tentative;
+    bench.refuses(Reason::RearUnconfirmed);
+}
+
+#[test]
+fn rear_unclassified() {
+    let mut bench = Bench::new();
+    for scores in [ClassScores::UNKNOWN, ClassScores([0.2, 0.1, 0.1, 0.6]), ClassScores([0.2, 0.2, 0.2, 0.4])] {
+        bench.rear().class = scores;
+        bench.refuses(Reason::RearUnclassified);
+    }
+}
+
+#[test]
+fn rear_in_another_lane() {
+    let mut bench = Bench::new();
+    bench.rear().lane = [0.0, 0.4, 0.6];
+    bench.refuses(Reason::NoRear);
+}
+
+#[test]
+fn rear_receding_or_slow() {
+    let mut bench = Bench::new();
+    for speed_mps in [25.0, 32.7] {
+        bench.rear().state[2] = speed_mps;
+        bench.refuses(Reason::RearNotApproaching);
+    }
+}
+
+#[test]
+fn passing_lane_occupied_unknown_or_absent() {
+    let mut bench = Bench::new();
+    bench.sensors.surround = false;
+    bench.refuses(Reason::PassingLaneUnknown);
+    bench.sensors = SensorAvailability::ALL;
+    bench.tracks.push(track(3, 5.0, 30.0, 0));
+    bench.refuses(Reason::PassingLaneOccupied);
+    bench.tracks[2].status = TrackStatus::Tentative;
+    bench.refuses(Reason::PassingLaneUnknown);
+    bench.tracks.pop();
+    bench.lane = Lane(1);
+    bench.refuses(Reason::NoPassingLane);
+}
+
+#[test]
+fn a_fast_vehicle_ahead_in_the_passing_lane_does_not_matter() {
+    let mut bench = Bench::new();
+    bench.tracks.push(track(3, 30.0, 40.0, 0));
+    assert_eq!(bench.step().state, EgoState::Increasing);
+}
+
+#[test]
+fn a_motorcycle_or_truck_counts_like_a_car() {
+    for class in [VehicleClass::Motorcycle, VehicleClass::Truck] {
+        let mut bench = Bench::new();
+        bench.rear().class = ClassScores::certain(class);
+        assert_eq!(bench.step().state, EgoState::Increasing);
+    }
+}
+
+#[test]
+fn of_two_behind_the_nearer_one_counts() {
+    let mut bench = Bench::new();
+    bench.tracks.push(track(3, -50.0, 34.0, 1));
+    assert_eq!(bench.step().plan.unwrap().track, TrackId(3));
+}

@@ -1,0 +1,125 @@
+//! One test for each condition and transition, on the whole stack with tracks made by hand.
+
+mod engaging;
+mod holding;
+mod releasing;
+
+use closecall_traffic::{ClassScores, Lane, Road, Source, Time, Track, TrackId, TrackStatus, VehicleClass};
+
+use super::MisSettings;
+use crate::ego::{
+    Acc, ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack, EgoState, Odometry, Reason,
+    SensorAvailability,
+};
+
+const CAR_M: f64 = 4.6;
+const PERIOD: Time = Time::from_ms(40);
+
+/// E at 30 m/s, F at 21 m, R at 90 m and 8 m/s faster: every condition for engaging holds.
+struct Bench {
+    stack: EgoStack,
+    time: Time,
+    road: Road,
+    lane: Lane,
+    sensors: SensorAvailability,
+    tracks: Vec<Track>,
+}
+
+fn track(id: u32, x_m: f64, speed_mps: f64, lane: usize) -> Track {
+    let mut probability = [0.0; 3];
+    probability[lane] = 1.0;
+    Track {
+        id: TrackId(id),
+        source: if x_m > 0.0 { Source::Front } else { Source::Rear },
+        status: TrackStatus::Confirmed,
+        time: Time::ZERO,
+        state: [x_m, 0.0, speed_mps, 0.0].into(),
+        covariance: Default::default(),
+        heading_rad: 0.0,
+        length_m: CAR_M,
+        width_m: 1.85,
+        class: ClassScores::certain(VehicleClass::Car),
+        existence: 1.0,
+        lane: probability,
+    }
+}
+
+impl Bench {
+    fn new() -> Self {
+        Self::with(true)
+    }
+
+    fn with(automated: bool) -> Self {
+        let settings = EgoSettings {
+            acc: Acc { time_gap_s: 0.7, set_speed_mps: None, standstill_gap_m: 3.0 },
+            aeb: None,
+            mis: Some(MisSettings::PAPER),
+            automated,
+        };
+        Self {
+            stack: EgoStack::new(settings),
+            time: Time::ZERO,
+            road: Road::straight(3),
+            lane: Lane(2),
+            sensors: SensorAvailability::ALL,
+            tracks: vec![track(1, 21.0 + CAR_M, 30.0, 1), track(2, -90.0 - CAR_M, 38.0, 1)],
+        }
+    }
+
+    fn front(&mut self) -> &mut Track {
+        &mut self.tracks[0]
+    }
+
+    fn rear(&mut self) -> &mut Track {
+        &mut self.tracks[1]
+    }
+
+    fn step(&mut self) -> EgoCommand {
+        self.try_step().unwrap()
+    }
+
+    fn try_step(&mut self) -> Result<EgoCommand, ControllerError> {
+        for track in &mut self.tracks {
+            track.time = self.time;
+        }
+        let odometry = Odometry {
+            speed_mps: 30.0,
+            acceleration_mps2: 0.0,
+            yaw_rate_radps: 0.0,
+            lane: self.lane,
+            lane_offset_m: 0.0,
+            length_m: CAR_M,
+            width_m: 1.85,
+        };
+        let (time, road) = (self.time, &self.road);
+        self.time += PERIOD;
+        self.stack.step(&EgoInput { time, odometry, road, tracks: &self.tracks, sensors: self.sensors })
+    }
+
+    /// Steps for `seconds`, and returns the last command.
+    fn step_for(&mut self, seconds: f64) -> EgoCommand {
+        let until = self.time + Time::from_s(seconds);
+        let mut command = self.step();
+        while self.time < until {
+            command = self.step();
+        }
+        command
+    }
+
+    fn refuses(&mut self, reason: Reason) {
+        let command = self.step();
+        assert_eq!((command.state, command.reason), (EgoState::Following, reason));
+        assert_eq!(command.plan, None);
+    }
+
+    fn engaged() -> Self {
+        let mut bench = Self::new();
+        assert_eq!(bench.step().state, EgoState::Increasing);
+        bench
+    }
+
+    fn releases(&mut self, within_s: f64, reason: Reason) {
+        let command = self.step_for(within_s);
+        assert_eq!((command.state, command.reason), (EgoState::Releasing, reason));
+    }
+}
