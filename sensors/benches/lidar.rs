@@ -39,6 +39,12 @@ fn others(gap_m: f64) -> [SceneVehicle; 3] {
     ]
 }
 
+/// E on a clear day before these others.
+fn scene<'a>(road: &'a Road, others: &'a [SceneVehicle]) -> Scene<'a> {
+    let ego = vehicle(0, VehicleClass::Car, EGO_S_M, EGO_D_M);
+    Scene { time: Time::ZERO, road, environment: &Environment::CLEAR_DAY, ego, others }
+}
+
 fn random() -> Stream {
     stream(0, 0, &ActorId::new("ego").expect("a legal name"), "lidar")
 }
@@ -82,11 +88,9 @@ impl Following {
 
 fn scan_and_detect(criterion: &mut Criterion) {
     let road = Road::straight(3);
-    let environment = Environment::CLEAR_DAY;
     for gap_m in GAPS_M {
         let others = others(gap_m);
-        let ego = vehicle(0, VehicleClass::Car, EGO_S_M, EGO_D_M);
-        let scene = Scene { time: Time::ZERO, road: &road, environment: &environment, ego, others: &others };
+        let scene = self::scene(&road, &others);
         let lane = LaneGeometry::of(&scene);
         let (mut scanner, mut detector, mut rng) = (Scanner::new(Lidar::default()), Detector::default(), random());
         let mut group = criterion.benchmark_group(format!("R at {gap_m} m"));
@@ -117,13 +121,11 @@ fn mean_us(mut part: impl FnMut()) -> f64 {
 /// Prints each part's mean time, and its share of a perception step without the camera; the radars are in it, too.
 fn shares(_: &mut Criterion) {
     let road = Road::straight(3);
-    let environment = Environment::CLEAR_DAY;
     println!("\n{STEPS} steps each: time [us] and share of a whole perception step");
     println!("gap      scan          clustering      boxes           tracking        whole step");
     for gap_m in GAPS_M {
         let others = others(gap_m);
-        let ego = vehicle(0, VehicleClass::Car, EGO_S_M, EGO_D_M);
-        let scene = Scene { time: Time::ZERO, road: &road, environment: &environment, ego, others: &others };
+        let scene = self::scene(&road, &others);
         let lane = LaneGeometry::of(&scene);
         let (mut scanner, mut detector, mut rng) = (Scanner::new(Lidar::default()), Detector::default(), random());
         let scan_us = mean_us(|| _ = black_box(scanner.scan(&scene, &mut rng).len()));
@@ -133,11 +135,11 @@ fn shares(_: &mut Criterion) {
         let detections = detector.detect(&scan, &lane).expect("finite points").to_vec();
         let mut following = Following::new(road);
         let track_us = mean_us(|| following.step(black_box(&detections)));
-        let (mut whole, mut time, mut ego, mut others) = (full(), Time::ZERO, ego, others);
+        let (mut whole, mut time, mut ego, mut others) = (full(), Time::ZERO, scene.ego, others);
         let whole_us = mean_us(|| {
             time += SCAN_PERIOD;
             others.iter_mut().chain([&mut ego]).for_each(|vehicle| vehicle.state.s_m += SPEED_MPS * SCAN_PERIOD.s());
-            let scene = Scene { time, road: &road, environment: &environment, ego, others: &others };
+            let scene = Scene { time, ego, ..self::scene(&road, &others) };
             black_box(whole.step(&scene).expect("finite").len());
         });
         let of = |part_us: f64| format!("{part_us:>6.1} ({:>2.0} %)", 100.0 * part_us / whole_us);
