@@ -8,12 +8,12 @@
 use std::path::Path;
 use std::time::Instant;
 
-use closecall::campaign::runner::{Sampling, concrete};
-use closecall::controller::BuiltIn;
-use closecall::scenario::{Scenario, ScenarioFile};
-use closecall::simulation::{Arm, NoObserver, RunKey, simulate};
+use closecall_campaign::runner::{Sampling, concrete};
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
+use closecall_simulation::controller::BuiltIn;
+use closecall_simulation::scenario::{Scenario, ScenarioFile};
+use closecall_simulation::{Arm, NoObserver, RunKey, simulate};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 
 /// Samples of the headline that are run in one iteration.

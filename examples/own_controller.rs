@@ -15,18 +15,18 @@ use std::sync::Arc;
 use std::thread::available_parallelism;
 use std::time::Duration;
 
-use closecall::campaign::execution::{Campaign, CampaignError};
-use closecall::campaign::runner::{Sampling, Work};
-use closecall::campaign::summary::{Counts, Summary};
-use closecall::campaign::validity::CheckPlan;
-use closecall::campaign::workers::Workers;
-use closecall::controller::BuiltIn;
-use closecall::scenario::ScenarioFile;
-use closecall::simulation::{Arm, ControllerFactory};
+use closecall_campaign::execution::{Campaign, CampaignError};
+use closecall_campaign::runner::{Sampling, Work};
+use closecall_campaign::summary::{Counts, Summary};
+use closecall_campaign::validity::CheckPlan;
+use closecall_campaign::workers::Workers;
 use closecall_controllers::{
     ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack, EgoState, Reason,
 };
 use closecall_scenarios::sampling::Design;
+use closecall_simulation::controller::BuiltIn;
+use closecall_simulation::scenario::ScenarioFile;
+use closecall_simulation::{Arm, ControllerFactory};
 use closecall_traffic::TrackStatus;
 
 /// Time headway behind which it feels pressed [s].
@@ -91,17 +91,9 @@ pub(crate) fn against_cruise_control(
     let arms = vec![BuiltIn::Acc.factory(), tested].into_iter().map(|controller| Arm { controller, sensors: None });
     let sampling = Sampling { seed: 1, design: Design::Random, samples };
     let work = Arc::new(Work { file, sampling, arms: arms.collect(), checks: CheckPlan::default() });
-    let mut summary = Summary::new(work.arms.iter().map(|arm| arm.controller.name().to_owned()).collect());
-    summary.begin(&work.file.config().name);
-    let ego = work.file.ego_id().expect("a scenario that was read has an ego vehicle");
     let jobs = available_parallelism().unwrap_or(std::num::NonZeroUsize::MIN);
     let workers = Workers { jobs, sample_timeout: SAMPLE_TIMEOUT };
-    let campaign = Campaign { works: vec![Arc::clone(&work)], partition: None, workers };
-    campaign.run(None, |turn| {
-        summary.take(turn.record, ego);
-        ControlFlow::Continue(())
-    })?;
-    Ok(summary.total())
+    Ok(Campaign::new(vec![work], workers).count()?.total())
 }
 
 #[expect(clippy::print_stdout, reason = "its output is what it is for")]

@@ -15,13 +15,13 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use closecall::campaign::runner::{Sampling, concrete};
-use closecall::controller::BuiltIn;
-use closecall::scenario::{ScenarioFile, Setting};
-use closecall::simulation::{Arm, Happening, Observer, RunKey, StepView, simulate};
+use closecall_campaign::runner::{Sampling, concrete};
 use closecall_controllers::EgoState;
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
+use closecall_simulation::controller::BuiltIn;
+use closecall_simulation::scenario::{ScenarioFile, Setting};
+use closecall_simulation::{Arm, Happening, Observer, RunKey, StepView, simulate};
 use closecall_traffic::{Source, Time, TrackId, TrackStatus};
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use statrs::distribution::{ChiSquared, ContinuousCDF};

@@ -20,14 +20,14 @@ use std::error::Error;
 use std::path::Path;
 use std::process::ExitCode;
 
-use closecall::campaign::runner::{Sampling, concrete};
-use closecall::controller::BuiltIn;
-use closecall::outcome::{Moment, Outcome};
-use closecall::scenario::ScenarioFile;
-use closecall::simulation::{Arm, Happening, Observer, RunKey, StepView, simulate};
+use closecall_campaign::runner::{Sampling, concrete};
 use closecall_controllers::EgoState;
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
+use closecall_simulation::controller::BuiltIn;
+use closecall_simulation::outcome::{Moment, Outcome};
+use closecall_simulation::scenario::ScenarioFile;
+use closecall_simulation::{Arm, Happening, Observer, RunKey, StepView, simulate};
 use closecall_traffic::Time;
 use plotters::prelude::*;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
@@ -91,7 +91,7 @@ fn seen(outcome: &Outcome, watch: &Watch) -> Seen {
         (_, None) => true,
         (None, Some(_)) => false,
     };
-    let gained = |mis: &closecall::outcome::MisSummary| {
+    let gained = |mis: &closecall_simulation::outcome::MisSummary| {
         Some(mis.thw_front_at_critical_s.ok()? - mis.thw_front_at_engagement_s.ok()?)
     };
     Seen {

@@ -26,12 +26,12 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use closecall::campaign::runner::{Sampling, concrete};
-use closecall::controller::BuiltIn;
-use closecall::scenario::ScenarioFile;
-use closecall::simulation::{Arm, RunKey, TrackAuditor, simulate};
+use closecall_campaign::runner::{Sampling, concrete};
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::{Consistency, Credibility, NEES_95, SensorMode, TrackAudit};
+use closecall_simulation::controller::BuiltIn;
+use closecall_simulation::scenario::ScenarioFile;
+use closecall_simulation::{Arm, RunKey, TrackAuditor, simulate};
 use rayon::prelude::*;
 
 const SECONDS_PER_HOUR: f64 = 3_600.0;

@@ -17,18 +17,18 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Duration;
 
-use closecall::campaign::execution::{Campaign, CampaignError, End};
-use closecall::campaign::ledger::{ArmCounts, Inference};
-use closecall::campaign::probability::{Answer, ProbabilityGate};
-use closecall::campaign::runner::{Sampling, Work};
-use closecall::campaign::summary::Summary;
-use closecall::campaign::validity::CheckPlan;
-use closecall::campaign::workers::Workers;
-use closecall::controller::BuiltIn;
-use closecall::scenario::ScenarioFile;
-use closecall::simulation::Arm;
-use closecall::statistics::sequence::{evidence_above, evidence_below, is_certain};
+use closecall_campaign::execution::{Campaign, CampaignError, End};
+use closecall_campaign::ledger::{ArmCounts, Inference};
+use closecall_campaign::probability::{Answer, ProbabilityGate};
+use closecall_campaign::runner::{Sampling, Work};
+use closecall_campaign::summary::Summary;
+use closecall_campaign::validity::CheckPlan;
+use closecall_campaign::workers::Workers;
 use closecall_scenarios::sampling::Design;
+use closecall_simulation::Arm;
+use closecall_simulation::controller::BuiltIn;
+use closecall_simulation::scenario::ScenarioFile;
+use closecall_statistics::sequence::{evidence_above, evidence_below, is_certain};
 
 /// The probability of a collision in the scenario, by construction.
 const TRUTH: f64 = 0.05;
@@ -57,13 +57,11 @@ fn run(seed: u64, samples: u64, stops: impl Fn(&ArmCounts) -> bool) -> Result<Ca
     let jobs = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
     let workers = Workers { jobs, sample_timeout: Duration::from_secs(60) };
     let work = Arc::new(Work { file, sampling, arms, checks: CheckPlan::default() });
-    let campaign = Campaign { works: vec![work.clone()], partition: None, workers };
-    let ego = work.file.ego_id().expect("the fixture has an ego");
-    let mut summary = Summary::new(vec!["acc".to_owned()]);
-    summary.begin("known-probability");
+    let campaign = Campaign::new(vec![work.clone()], workers);
+    let mut summary = campaign.summary();
     let mut is_ever_outside = false;
     campaign.run(None, |turn| {
-        summary.take(turn.record, ego);
+        summary.push(turn.record);
         let counts = summary.total().arms[0];
         let (hits, samples) = (counts.collisions, counts.outcomes);
         // The truth is outside the two-sided bounds where either side has refuted it.

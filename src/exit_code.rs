@@ -1,7 +1,8 @@
 //! Exit codes. They carry a verdict or the kind of a failure, never a count.
 
-use crate::report::WriteError;
-use crate::scenario::ScenarioError;
+use closecall_campaign::verdict::{Decision, Judgement};
+use closecall_scenarios::atomic::WriteError;
+use closecall_simulation::scenario::ScenarioError;
 
 /// What the program ends with.
 ///
@@ -70,6 +71,18 @@ impl From<&ScenarioError> for ExitCode {
             | ScenarioError::Empty { .. }
             | ScenarioError::Syntax { .. }
             | ScenarioError::Value { .. } => Self::InvalidInput,
+        }
+    }
+}
+
+impl From<&Judgement> for ExitCode {
+    fn from(judged: &Judgement) -> Self {
+        match judged.decision {
+            Decision::Pass => Self::Pass,
+            Decision::Fail => Self::Fail,
+            Decision::Inconclusive => Self::Inconclusive,
+            Decision::SampleError => Self::SampleError,
+            Decision::Invalid => Self::Invalid,
         }
     }
 }

@@ -2,12 +2,40 @@
 
 use std::ffi::OsStr;
 use std::io::{self, BufWriter, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use tempfile::{Builder, NamedTempFile};
 
 /// How temporary files are called: a program that is killed leaves one behind.
 const TEMPORARY: &str = ".closecall-";
+
+/// A file that cannot be written. What was there before is untouched.
+#[derive(Debug, thiserror::Error)]
+#[error("failed to write {}: {source}", path.display())]
+pub struct WriteError {
+    /// The file.
+    pub path: PathBuf,
+    /// The system's reason.
+    pub source: io::Error,
+}
+
+impl WriteError {
+    /// Returns a failure to write `path`.
+    pub fn new(path: &Path, source: io::Error) -> Self {
+        Self { path: path.to_owned(), source }
+    }
+}
+
+/// Writes a file as [`write_atomically`] does, and names it if that fails.
+///
+/// # Errors
+/// [`WriteError`] if the folder or the file cannot be written; a file of that name is then unchanged.
+pub fn write_file(
+    path: &Path,
+    content: impl FnOnce(&mut (dyn Write + Send)) -> io::Result<()>,
+) -> Result<(), WriteError> {
+    write_atomically(path, content).map_err(|source| WriteError::new(path, source))
+}
 
 /// Writes a file by `content` under a temporary name beside `path`, then renames it. When this returns, the disk has been
 /// asked to keep both the content and the name.
@@ -27,12 +55,12 @@ pub fn write_atomically<E: From<io::Error>>(
     Ok(sync_folder(folder)?)
 }
 
-/// Finds out before any work is done that a file could not be made after it.
+/// Checks, before any work is done, that a file can be created at `path` later.
 ///
 /// # Errors
-/// The system's reason where the folder does not take new files.
-pub fn check_writable(path: &Path) -> io::Result<()> {
-    temporary_in(folder(path)).map(drop)
+/// [`WriteError`] if the folder does not take new files.
+pub fn check_writable(path: &Path) -> Result<(), WriteError> {
+    temporary_in(folder(path)).map(drop).map_err(|source| WriteError::new(path, source))
 }
 
 /// True for the name of a file that was being written when the program was killed.

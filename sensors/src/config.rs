@@ -25,6 +25,17 @@ pub enum SensorMode {
     GroundTruth,
 }
 
+impl SensorMode {
+    /// Returns the name in scenario files, on the command line and in manifests.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Full => "full",
+            Self::Object => "object",
+            Self::GroundTruth => "ground-truth",
+        }
+    }
+}
+
 /// The sensors as a scenario file describes them. Everything may be left out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]

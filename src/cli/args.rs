@@ -7,10 +7,10 @@ use closecall_scenarios::recordings::{BadRows, LayoutChoice, ReadOptions};
 use closecall_sensors::SensorMode;
 
 use super::CliError;
-use crate::controller::ControllerChoice;
-use crate::controller::exec::{DEFAULT_MEMORY_MIB, DEFAULT_TIMEOUT_MS, ExecSettings, NAME as EXEC};
-use crate::scenario::{ScenarioError, ScenarioFile, Setting};
-use crate::simulation::Arm;
+use closecall_simulation::Arm;
+use closecall_simulation::controller::ControllerChoice;
+use closecall_simulation::controller::exec::{DEFAULT_MEMORY_MIB, DEFAULT_TIMEOUT_MS, ExecSettings, NAME as EXEC};
+use closecall_simulation::scenario::{ScenarioError, ScenarioFile, Setting};
 
 /// For whom output is written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -40,19 +40,6 @@ impl Sensing {
             Self::Object => SensorMode::Object,
             Self::GroundTruth => SensorMode::GroundTruth,
         }
-    }
-
-    /// The name on the command line and in a manifest.
-    pub(super) const fn name(self) -> &'static str {
-        match self {
-            Self::Full => "full",
-            Self::Object => "object",
-            Self::GroundTruth => "ground-truth",
-        }
-    }
-
-    pub(super) fn from_name(name: &str) -> Option<Self> {
-        [Self::Full, Self::Object, Self::GroundTruth].into_iter().find(|sensing| sensing.name() == name)
     }
 }
 

@@ -8,7 +8,7 @@ use super::CliError;
 use super::args::SetArgs;
 use super::output::{complain, outln};
 use crate::exit_code::ExitCode;
-use crate::scenario::ScenarioConfig;
+use closecall_simulation::scenario::ScenarioConfig;
 
 /// Arguments of `closecall check`.
 #[derive(Debug, Args)]

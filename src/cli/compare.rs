@@ -5,12 +5,12 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::{Map, Value, json};
 
+use super::CliError;
 use super::args::Format;
 use super::output::{out, outln};
-use super::{CliError, past};
-use crate::campaign::compare::{ScenarioComparison, compare as compare_folders};
-use crate::campaign::folder::Folder;
 use crate::exit_code::ExitCode;
+use closecall_campaign::compare::{ScenarioComparison, compare as compare_folders};
+use closecall_campaign::folder::Folder;
 
 /// Arguments of `closecall compare`.
 #[derive(Debug, Args)]
@@ -30,11 +30,8 @@ pub(super) struct CompareArgs {
 pub(super) fn compare(args: &CompareArgs) -> Result<ExitCode, CliError> {
     let (baseline, now) = (Folder::open(&args.baseline), Folder::open(&args.dir));
     let manifests = (baseline.manifest()?, now.manifest()?);
-    let works = past::works(now.path(), &manifests.1)?;
-    let scenarios: Vec<_> =
-        works.iter().filter_map(|work| Some((work.file.config().name.clone(), work.file.ego_id()?.clone()))).collect();
     let notes = manifests.0.differences(&manifests.1);
-    let found = compare_folders(&baseline, &now, &scenarios)?;
+    let found = compare_folders(&baseline, &now)?;
     let code = judge(&found, args.max_newly_failing);
     match args.format {
         Format::Json => outln!("{:#}", to_json(&found, &notes, code)),

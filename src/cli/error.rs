@@ -7,18 +7,21 @@ use closecall_sensors::camera::ClassifierError;
 use closecall_sensors::camera::dataset::DatasetError;
 use miette::Diagnostic;
 
-use crate::campaign::compare::CompareError;
-use crate::campaign::execution::CampaignError;
-use crate::campaign::folder::FolderError;
-use crate::campaign::merge::MergeError;
 use crate::exit_code::ExitCode;
-use crate::report::WriteError;
-use crate::report::figure::PngError;
-use crate::report::film::TrafficFilmError;
-use crate::report::recording_charts::ChartError;
-use crate::report::rerun::RecordError;
-use crate::scenario::ScenarioError;
-use crate::simulation::SampleError;
+use closecall_campaign::compare::CompareError;
+use closecall_campaign::execution::CampaignError;
+use closecall_campaign::folder::FolderError;
+use closecall_campaign::merge::MergeError;
+use closecall_campaign::plan::PlanError;
+use closecall_campaign::saved::SavedError;
+use closecall_report::campaign::ReportError;
+use closecall_report::run::figure::PngError;
+use closecall_report::run::film::TrafficFilmError;
+use closecall_report::run::rerun::RecordError;
+use closecall_report::traffic::recording_charts::ChartError;
+use closecall_scenarios::atomic::WriteError;
+use closecall_simulation::SampleError;
+use closecall_simulation::scenario::ScenarioError;
 
 /// Of the tracks that could be asked for, so many are named.
 const MOST_NAMED: usize = 10;
@@ -93,6 +96,17 @@ pub enum CliError {
     /// Parts do not make a campaign.
     #[error(transparent)]
     Merge(#[from] MergeError),
+    /// The scenarios cannot stand in one campaign.
+    #[error(transparent)]
+    #[diagnostic(help("see `closecall --help`"))]
+    Plan(#[from] PlanError),
+    /// A saved campaign does not have what is asked for.
+    #[error(transparent)]
+    #[diagnostic(help("see `closecall --help`"))]
+    Saved(#[from] SavedError),
+    /// The reports of a campaign cannot be made.
+    #[error(transparent)]
+    Report(#[from] ReportError),
     /// Two campaigns cannot be compared.
     #[error(transparent)]
     Compare(#[from] CompareError),
@@ -121,6 +135,13 @@ impl From<&CliError> for ExitCode {
             | CliError::Classifier(_) => Self::InvalidInput,
             CliError::Folder(error) => Self::from(error),
             CliError::Campaign(error) => Self::from(error),
+            CliError::Saved(error) => Self::from(error),
+            CliError::Report(error) => match error {
+                ReportError::Folder(error) => Self::from(error),
+                ReportError::Saved(error) => Self::from(error),
+                ReportError::Write(_) | ReportError::Recording(_) => Self::Io,
+                ReportError::Sample { .. } => Self::SampleError,
+            },
             CliError::Merge(error) => match error {
                 MergeError::Campaign(error) => Self::from(error),
                 MergeError::OutOfPlace { .. } => Self::InvalidInput,
@@ -141,7 +162,7 @@ impl From<&CliError> for ExitCode {
             | CliError::WriteRecording(_)
             | CliError::Dataset(_) => Self::Io,
             CliError::Sample { .. } => Self::SampleError,
-            CliError::Usage { .. } => Self::Usage,
+            CliError::Usage { .. } | CliError::Plan(_) => Self::Usage,
         }
     }
 }
@@ -154,6 +175,20 @@ impl From<&FolderError> for ExitCode {
                 Self::Usage
             }
             FolderError::Content { .. } => Self::InvalidInput,
+        }
+    }
+}
+
+impl From<&SavedError> for ExitCode {
+    fn from(error: &SavedError) -> Self {
+        match error {
+            SavedError::Folder(error) => Self::from(error),
+            SavedError::Scenario(error) => Self::from(error),
+            SavedError::Sample { .. } => Self::SampleError,
+            SavedError::ScenarioNotNamed { .. }
+            | SavedError::UnknownScenario { .. }
+            | SavedError::UnknownSample { .. }
+            | SavedError::UnknownArm { .. } => Self::Usage,
         }
     }
 }

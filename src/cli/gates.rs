@@ -4,8 +4,8 @@ use clap::Args;
 use closecall_scenarios::sampling::Design;
 
 use super::CliError;
-use crate::campaign::probability::ProbabilityGate;
-use crate::campaign::verdict::{Gates, MAX_FLIP_RATE};
+use closecall_campaign::probability::ProbabilityGate;
+use closecall_campaign::verdict::{Gates, MAX_FLIP_RATE};
 
 /// The confidence of the gate on the probability, where nobody says otherwise.
 const CONFIDENCE: f64 = 0.95;

@@ -3,13 +3,13 @@
 use closecall_traffic::{Absent, Measured, Value as ParameterValue};
 use serde_json::{Map, Value, json};
 
-use crate::campaign::harm;
-use crate::campaign::ledger::{Inference, Pairs};
-use crate::campaign::summary::{Counts, Summary};
-use crate::campaign::validity::CheckCounts;
-use crate::campaign::verdict::Judgement;
-use crate::outcome::{Collision, Margins, MisSummary, MomentAt, Outcome};
-use crate::report::film::Course;
+use closecall_campaign::harm;
+use closecall_campaign::ledger::{Inference, Pairs};
+use closecall_campaign::summary::{Counts, Summary};
+use closecall_campaign::validity::CheckCounts;
+use closecall_campaign::verdict::Judgement;
+use closecall_report::run::film::Course;
+use closecall_simulation::outcome::{Collision, Margins, MisSummary, MomentAt, Outcome};
 
 /// Puts a value or its absence under `key`.
 pub(super) fn put(object: &mut Map<String, Value>, key: &str, measured: Measured) {

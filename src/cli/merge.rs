@@ -6,13 +6,14 @@ use clap::Args;
 
 use super::args::Format;
 use super::gates::GateArgs;
-use super::leave::Over;
 use super::output::outln;
 use super::summary::{print_counts, print_verdict};
-use super::{CliError, json, past};
-use crate::campaign::merge::Parts;
-use crate::campaign::selection::Selection;
+use super::{CliError, json};
 use crate::exit_code::ExitCode;
+use closecall_campaign::merge::Parts;
+use closecall_campaign::saved::{SavedCampaign, works};
+use closecall_campaign::selection::Selection;
+use closecall_report::campaign::{CampaignReport, Tally};
 
 /// Arguments of `closecall merge`.
 #[derive(Debug, Args)]
@@ -36,25 +37,24 @@ pub(super) struct MergeArgs {
 
 pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
     let parts = Parts::open(&args.parts)?;
-    let works = past::works(&args.parts[0], parts.manifest())?;
+    let works = works(&args.parts[0], parts.manifest())?;
     let samples: Vec<(String, u64)> =
         works.iter().map(|work| (work.file.config().name.clone(), work.count())).collect();
     parts.check(&samples)?;
     let is_paired = works.iter().all(|work| work.arms.len() > 1);
     let gates = args.gates.gates(is_paired, parts.manifest().sampling.design)?;
     let held = parts.merge(&samples, &args.out, std::env::args().collect())?;
-    let (summary, overview) = past::findings(&held.folder, &works)?;
-    let judged = summary.judge(gates);
-    let manifest = held.folder.manifest()?;
-    let over =
-        Over { manifest: &manifest, works: &works, summary: &summary, overview: &overview, gates, judged: &judged };
-    over.leave(&held.folder, args.record)?;
+    let saved = SavedCampaign::of(held.folder.clone())?;
+    let tally = Tally::of(&saved, &works)?;
+    let judged = tally.summary.judge(gates);
+    let report = CampaignReport { manifest: saved.manifest(), works: &works, tally: &tally, gates, judged: &judged };
+    report.write(saved.folder(), args.record)?;
     match args.format {
-        Format::Json => outln!("{:#}", json::campaign(&summary, &judged, None)),
+        Format::Json => outln!("{:#}", json::campaign(&tally.summary, &judged, None)),
         Format::Human => {
-            print_counts(&summary);
+            print_counts(&tally.summary);
             print_verdict(&judged);
         }
     }
-    Ok(judged.exit_code)
+    Ok(ExitCode::from(&judged))
 }

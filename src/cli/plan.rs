@@ -6,8 +6,8 @@ use clap::{Args, ValueEnum};
 
 use super::CliError;
 use super::gates::share;
-use crate::campaign::ledger::Inference;
-use crate::campaign::validity::CheckPlan;
+use closecall_campaign::ledger::Inference;
+use closecall_campaign::validity::CheckPlan;
 
 /// Samples of each scenario where nobody says otherwise.
 const SAMPLES: u64 = 200;

@@ -8,16 +8,15 @@ use closecall_scenarios::sampling::Design;
 use super::CliError;
 use super::args::{ArmArgs, SetArgs, arm};
 use super::output::outln;
-use super::past::arms;
-use super::replay::sample_of;
-use super::watch::films;
-use crate::campaign::folder::Folder;
-use crate::campaign::runner::{Sampling, concrete};
 use crate::exit_code::ExitCode;
-use crate::report::figure::{encounter, png};
-use crate::report::film::{Film, Level};
-use crate::report::write_atomically;
-use crate::simulation::RunKey;
+use closecall_campaign::runner::{Sampling, concrete};
+use closecall_campaign::saved::SavedCampaign;
+use closecall_report::run::figure::{encounter, png};
+use closecall_report::run::film::{Film, Level, film_arms};
+use closecall_scenarios::atomic::write_file;
+use closecall_simulation::controller::ControllerChoice;
+use closecall_simulation::scenario::Scenario;
+use closecall_simulation::{Arm, RunKey};
 
 /// Arguments of `closecall plot`.
 #[derive(Debug, Args)]
@@ -76,7 +75,7 @@ fn of_scenario(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
     let (seed, sample) = (args.seed.unwrap_or(0), args.number.or(args.sample).unwrap_or(0));
     let sampling = Sampling { seed, design: Design::Random, samples: sample.saturating_add(1) };
     let scenario = concrete(&file, sampling, sample).map_err(|source| CliError::Sample { sample, source })?;
-    films(&scenario, RunKey { seed, sample }, &args.arm.arms(args.paired)?, Level::Objects)
+    films(&scenario, RunKey { seed, sample }, &args.arm.arms(args.paired)?)
 }
 
 /// A sample of a campaign, as the campaign ran it: every arm where it was paired.
@@ -89,22 +88,25 @@ fn of_campaign(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
         let message = "which sample of the campaign? Name it: closecall plot DIR SAMPLE -o FILE.svg".to_owned();
         return Err(CliError::Usage { message });
     };
-    let folder = Folder::open(&args.source);
-    let manifest = folder.manifest()?;
-    let (scenario, key) = sample_of(&folder, &manifest, args.scenario.as_deref(), sample)?;
-    let mut arms = arms(&manifest)?;
+    let saved = SavedCampaign::open(&args.source)?;
+    let (scenario, key) = saved.sample(args.scenario.as_deref(), sample)?;
+    let mut arms = saved.manifest().arms();
     if args.paired && arms.len() < 2 {
-        arms.insert(0, arm(&crate::controller::ControllerChoice::Acc, args.arm.sensors));
+        arms.insert(0, arm(&ControllerChoice::Acc, args.arm.sensors));
     }
-    films(&scenario, key, &arms, Level::Objects)
+    films(&scenario, key, &arms)
+}
+
+fn films(scenario: &Scenario, key: RunKey, arms: &[Arm]) -> Result<Vec<Film>, CliError> {
+    film_arms(scenario, key, arms, Level::Objects).map_err(|source| CliError::Sample { sample: key.sample, source })
 }
 
 fn write_picture(path: &Path, svg: &str) -> Result<(), CliError> {
     if path.extension().is_some_and(|extension| extension == "png") {
         let bytes = png(svg)?;
-        write_atomically(path, |file| file.write_all(&bytes))?;
+        write_file(path, |file| file.write_all(&bytes))?;
     } else {
-        write_atomically(path, |file| file.write_all(svg.as_bytes()))?;
+        write_file(path, |file| file.write_all(svg.as_bytes()))?;
     }
     Ok(())
 }

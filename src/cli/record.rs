@@ -10,12 +10,12 @@ use closecall_scenarios::sampling::Design;
 use super::CliError;
 use super::args::{ArmArgs, SetArgs};
 use super::output::outln;
-use crate::campaign::runner::{Sampling, concrete, run_guarded};
 use crate::exit_code::ExitCode;
-use crate::report::in_car::InCarRecorder;
-use crate::report::traffic::TrafficRecorder;
-use crate::scenario::{ActorConfig, Scenario, ScenarioFile};
-use crate::simulation::{Observer, RunKey};
+use closecall_campaign::runner::{Sampling, concrete, run_guarded};
+use closecall_report::traffic::in_car::InCarRecorder;
+use closecall_report::traffic::traffic::TrafficRecorder;
+use closecall_simulation::scenario::{ActorConfig, Scenario, ScenarioFile};
+use closecall_simulation::{Observer, RunKey};
 
 /// Arguments of `closecall record`.
 #[derive(Debug, Args)]

@@ -14,7 +14,7 @@ use super::args::{Format, ReadArgs, positive};
 use super::output::{out, outln};
 use super::watch::record_lane_change;
 use crate::exit_code::ExitCode;
-use crate::report::WriteError;
+use closecall_scenarios::atomic::WriteError;
 
 /// How lane changes are found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use closecall_scenarios::criticality::{CriticalLaneChange, criticality};
 use closecall_scenarios::encounter::{NoEncounter, RecordedEncounter, encounter};
 use closecall_scenarios::filters::smooth;
@@ -13,17 +13,37 @@ use serde_json::json;
 use super::args::{ArmArgs, Format, ReadArgs, SetArgs};
 use super::output::outln;
 use super::recording::refuse_overwriting;
-use super::watch::{WatchArgs, by_severity, record_films, run_filmed};
+use super::watch::{WatchArgs, by_severity, run_filmed};
 use super::{CliError, json};
 use crate::exit_code::ExitCode;
-use crate::outcome::Outcome;
-use crate::report::film::{Comparison, Film, film_encounter};
-use crate::report::write_atomically;
-use crate::scenario::{RearDriver, ScenarioFile, reenact as scenario_of};
-use crate::simulation::{CONTROL_STEP, RunKey};
+use closecall_report::run::film::{Comparison, Film, film_encounter};
+use closecall_report::run::rerun::record_films;
+use closecall_scenarios::atomic::write_file;
+use closecall_simulation::outcome::Outcome;
+use closecall_simulation::scenario::{RearDriver, ScenarioFile, reenact as scenario_of};
+use closecall_simulation::{CONTROL_STEP, RunKey};
 
 /// E, F and R: whose speeds are plotted.
 const PROTAGONISTS: usize = 3;
+
+/// Who drives R.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum Rear {
+    /// A human driver who reacts to E, follows as closely as was recorded, and pulls out at the recorded headway
+    #[default]
+    Driver,
+    /// The recorded speeds and the recorded lane change, whatever E does
+    Recorded,
+}
+
+impl From<Rear> for RearDriver {
+    fn from(rear: Rear) -> Self {
+        match rear {
+            Rear::Driver => Self::Driver,
+            Rear::Recorded => Self::Recorded,
+        }
+    }
+}
 
 /// Arguments of `closecall reenact`.
 #[derive(Debug, Args)]
@@ -37,7 +57,7 @@ pub(super) struct ReenactArgs {
     track: Option<u64>,
     /// Who drives R
     #[arg(long, value_enum, default_value_t)]
-    rear: RearDriver,
+    rear: Rear,
     /// Seed of the random numbers
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -62,19 +82,19 @@ pub(super) fn reenact(args: &ReenactArgs) -> Result<ExitCode, CliError> {
     let all: Vec<LaneChange> = changes.iter().map(|change| change.lane_change.clone()).collect();
     let found = choose(args, &changes, |change| encounter(&recording, change, &all, CONTROL_STEP))?;
     let source = format!("{} (track {})", args.recording.display(), found.change.track_id);
-    let file = scenario_of(&found, args.rear, (Path::new(&source), &args.set.settings))?;
+    let file = scenario_of(&found, args.rear.into(), (Path::new(&source), &args.set.settings))?;
     let scenario = file.concrete(&file.space().nominal())?;
     let key = RunKey { seed: args.seed, sample: 0 };
     let (outcome, simulated) = run_filmed(&scenario, key, &args.arm.arm()?, &args.watch)?;
     let recorded = film_encounter(&found, args.watch.record_level)?;
     let comparison = Comparison::new(&found, &recorded, &simulated);
-    let foreword = comparison.markdown(&found, &simulated, args.rear);
+    let foreword = comparison.markdown(&found, &simulated, args.rear.into());
     let films = [recorded.with_foreword(foreword), simulated].map(|film| film.plotting_first(PROTAGONISTS));
     if let Some(path) = &args.watch.record {
         record_films(path, &films)?;
     }
     if let Some(path) = &args.output {
-        write_atomically(path, |written| written.write_all(text_of(&file, args).as_bytes()))?;
+        write_file(path, |written| written.write_all(text_of(&file, args).as_bytes()))?;
     }
     print(args.format, &found, (&comparison, &films, &outcome));
     Ok(ExitCode::Pass)

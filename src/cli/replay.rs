@@ -7,17 +7,14 @@ use clap::Args;
 use super::CliError;
 use super::args::Format;
 use super::output::complain;
-use super::past::{arms, scenario_file};
 use super::run::print;
 use super::watch::{WatchArgs, run_watched};
-use crate::campaign::folder::Folder;
-use crate::campaign::manifest::{Manifest, ManifestScenario};
-use crate::campaign::runner::concrete;
-use crate::controller::ControllerChoice;
 use crate::exit_code::ExitCode;
-use crate::outcome::Outcome;
-use crate::scenario::Scenario;
-use crate::simulation::{Arm, RunKey};
+use closecall_campaign::folder::Folder;
+use closecall_campaign::manifest::{Manifest, version};
+use closecall_campaign::saved::SavedCampaign;
+use closecall_simulation::controller::ControllerChoice;
+use closecall_simulation::outcome::Outcome;
 
 /// Arguments of `closecall replay`.
 #[derive(Debug, Args)]
@@ -43,29 +40,28 @@ pub(super) struct ReplayArgs {
 }
 
 pub(super) fn replay(args: &ReplayArgs) -> Result<ExitCode, CliError> {
-    let folder = Folder::open(&args.dir);
-    let manifest = folder.manifest()?;
-    let (scenario, key) = sample_of(&folder, &manifest, args.scenario.as_deref(), args.sample)?;
+    let saved = SavedCampaign::open(&args.dir)?;
+    let (scenario, key) = saved.sample(args.scenario.as_deref(), args.sample)?;
     let arms = match args.paired {
-        true => arms(&manifest)?,
-        false => vec![chosen_arm(&manifest, args.controller.as_deref())?],
+        true => saved.manifest().arms(),
+        false => vec![saved.arm(args.controller.as_deref())?],
     };
     for arm in &arms {
-        say_what_is_started(&manifest, arm.controller.name());
+        say_what_is_started(saved.manifest(), arm.controller.name());
     }
     let outcomes = run_watched(&scenario, key, &arms, &args.watch)?;
     print(&outcomes, args.format);
     let mut agrees = true;
     for outcome in &outcomes {
-        agrees &= agrees_with_journal(&folder, outcome)?;
+        agrees &= agrees_with_journal(saved.folder(), outcome)?;
     }
     if agrees {
         return Ok(ExitCode::Pass);
     }
     complain(format_args!(
         "the replay differs from the campaign's journal: the campaign was made by closecall {}, this is {}\n",
-        manifest.closecall_version,
-        super::campaign::version(),
+        saved.manifest().closecall_version,
+        version(),
     ));
     Ok(ExitCode::Invalid)
 }
@@ -92,46 +88,4 @@ fn agrees_with_journal(folder: &Folder, outcome: &Outcome) -> Result<bool, CliEr
         }
     }
     Ok(true)
-}
-
-/// The scenario of a campaign with this name, or its only one.
-fn choose<'a>(manifest: &'a Manifest, name: Option<&str>) -> Result<&'a ManifestScenario, CliError> {
-    let known = || manifest.scenarios.iter().map(|scenario| scenario.name.as_str()).collect::<Vec<_>>().join(", ");
-    match (name, &manifest.scenarios[..]) {
-        (None, [only]) => Ok(only),
-        (None, _) => Err(CliError::Usage {
-            message: format!("the campaign has several scenarios; name one with --scenario: {}", known()),
-        }),
-        (Some(name), scenarios) => scenarios.iter().find(|scenario| scenario.name == name).ok_or_else(|| {
-            CliError::Usage { message: format!("the campaign has no scenario `{name}`, only {}", known()) }
-        }),
-    }
-}
-
-/// The concrete scenario of one sample of a campaign.
-pub(super) fn sample_of(
-    folder: &Folder,
-    manifest: &Manifest,
-    scenario: Option<&str>,
-    sample: u64,
-) -> Result<(Scenario, RunKey), CliError> {
-    let file = scenario_file(folder.path(), choose(manifest, scenario)?)?;
-    let samples = file.space().samples(manifest.sampling.design, manifest.sampling.samples);
-    if sample >= samples {
-        let message = format!("there is no sample {sample}: the campaign has samples 0 to {}", samples - 1);
-        return Err(CliError::Usage { message });
-    }
-    let scenario = concrete(&file, manifest.sampling, sample).map_err(|source| CliError::Sample { sample, source })?;
-    Ok((scenario, RunKey { seed: manifest.sampling.seed, sample }))
-}
-
-/// An arm of the campaign: the named one, or the one under test.
-fn chosen_arm(manifest: &Manifest, name: Option<&str>) -> Result<Arm, CliError> {
-    let is_meant = |arm: &ControllerChoice| name.is_none_or(|name| arm.name() == name || arm.to_string() == name);
-    let Some(place) = manifest.arms.iter().rposition(is_meant) else {
-        let known = manifest.arms.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
-        let message = format!("the campaign was not run with `{}`, only with {known}", name.unwrap_or_default());
-        return Err(CliError::Usage { message });
-    };
-    Ok(arms(manifest)?.swap_remove(place))
 }

@@ -12,8 +12,8 @@ use super::CliError;
 use super::args::{Format, ReadArgs};
 use super::output::outln;
 use crate::exit_code::ExitCode;
-use crate::report::recording_charts::{Legend, Line, LineChart};
-use crate::report::{WriteError, write_atomically};
+use closecall_report::traffic::recording_charts::{Legend, Line, LineChart};
+use closecall_scenarios::atomic::{WriteError, write_file};
 
 /// Arguments of `closecall robustness`.
 #[derive(Debug, Args)]
@@ -142,7 +142,7 @@ fn plot(found: &Robustness, folder: &Path) -> Result<(), CliError> {
         [("noise.svg", Legend::LowerLeft, noise), ("offset.svg", Legend::LowerMiddle, offset)]
     {
         let svg = LineChart { legend, ..chart(found, x_name, levels, rows) }.svg()?;
-        write_atomically(&folder.join(name), |file| file.write_all(svg.as_bytes()))?;
+        write_file(&folder.join(name), |file| file.write_all(svg.as_bytes()))?;
     }
     Ok(())
 }

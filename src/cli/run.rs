@@ -9,10 +9,10 @@ use super::args::{ArmArgs, Format, SetArgs};
 use super::output::{out, outln};
 use super::watch::{WatchArgs, run_watched};
 use super::{CliError, json};
-use crate::campaign::runner::{Sampling, concrete};
 use crate::exit_code::ExitCode;
-use crate::outcome::Outcome;
-use crate::simulation::RunKey;
+use closecall_campaign::runner::{Sampling, concrete};
+use closecall_simulation::RunKey;
+use closecall_simulation::outcome::Outcome;
 
 /// Arguments of `closecall run`.
 #[derive(Debug, Args)]

@@ -14,8 +14,8 @@ use super::args::{Format, ReadArgs, positive};
 use super::output::outln;
 use super::recording::refuse_repetition;
 use crate::exit_code::ExitCode;
-use crate::report::recording_charts::{BoxChart, BoxOf};
-use crate::report::{WriteError, write_atomically};
+use closecall_report::traffic::recording_charts::{BoxChart, BoxOf};
+use closecall_scenarios::atomic::{WriteError, write_file};
 
 /// Arguments of `closecall statistics`.
 #[derive(Debug, Args)]
@@ -92,7 +92,7 @@ fn plot(found: &Statistics, folder: &Path) -> Result<(), CliError> {
     ] {
         let boxes = found.classes.iter().filter_map(|class| Some(box_of(class, value(class)?))).collect();
         let svg = BoxChart { title: title.to_owned(), y_name: y_name.to_owned(), boxes }.svg()?;
-        write_atomically(&folder.join(name), |file| file.write_all(svg.as_bytes()))?;
+        write_file(&folder.join(name), |file| file.write_all(svg.as_bytes()))?;
     }
     Ok(())
 }

@@ -1,11 +1,11 @@
 //! What a campaign comes to, for people.
 
 use super::output::{out, outln};
-use crate::campaign::harm;
-use crate::campaign::ledger::{ArmCounts, Inference};
-use crate::campaign::probability::percent;
-use crate::campaign::summary::{Counts, Summary};
-use crate::campaign::verdict::Judgement;
+use closecall_campaign::harm;
+use closecall_campaign::ledger::{ArmCounts, Inference};
+use closecall_campaign::probability::percent;
+use closecall_campaign::summary::{Counts, Summary};
+use closecall_campaign::verdict::Judgement;
 
 /// Prints the counts of each scenario, and of all.
 pub(super) fn print_counts(summary: &Summary) {

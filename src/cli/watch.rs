@@ -3,19 +3,41 @@
 use std::cmp::Ordering::Equal;
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use closecall_scenarios::criticality::CriticalLaneChange;
 use closecall_scenarios::filters::SmoothedRecording;
 use closecall_traffic::Time;
 
 use super::CliError;
-use crate::campaign::runner::run_guarded;
-use crate::outcome::Outcome;
-use crate::report::film::{Film, FilmRecorder, Level, film_lane_change};
-use crate::report::rerun::{check_recordable, write_films};
-use crate::report::trace::TraceWriter;
-use crate::scenario::Scenario;
-use crate::simulation::{Arm, Happening, Observer, RunKey, StepView};
+use closecall_campaign::runner::run_guarded;
+use closecall_report::run::film::{Film, FilmRecorder, Level, film_lane_change};
+use closecall_report::run::rerun::{check_recordable, record_films, write_films};
+use closecall_report::run::trace::TraceWriter;
+use closecall_simulation::outcome::Outcome;
+use closecall_simulation::scenario::Scenario;
+use closecall_simulation::{Arm, Happening, Observer, RunKey, StepView};
+
+/// How much of a run is kept.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum RecordLevel {
+    /// States, events and plots
+    Events,
+    /// The vehicles and what E takes them for as well
+    Objects,
+    /// The rear sensors' points and pictures as well, where they are simulated
+    #[default]
+    Full,
+}
+
+impl From<RecordLevel> for Level {
+    fn from(level: RecordLevel) -> Self {
+        match level {
+            RecordLevel::Events => Self::Events,
+            RecordLevel::Objects => Self::Objects,
+            RecordLevel::Full => Self::Full,
+        }
+    }
+}
 
 /// What to write of a run.
 #[derive(Clone, Debug, Default, Args)]
@@ -25,7 +47,7 @@ pub(super) struct WatchArgs {
     pub(super) record: Option<PathBuf>,
     /// How much of the run a Rerun file holds
     #[arg(long, value_enum, default_value_t, requires = "record")]
-    pub(super) record_level: Level,
+    record_level: RecordLevel,
     /// Write one row per control step and actor; of a pair, of the controller under test
     #[arg(long, value_name = "FILE.csv|FILE.parquet", value_parser = table)]
     pub(super) trace: Option<PathBuf>,
@@ -63,7 +85,8 @@ pub(super) fn run_watched(
     let mut outcomes = Vec::new();
     for (place, arm) in arms.iter().enumerate() {
         let is_tested = place + 1 == arms.len();
-        let mut recorder = watch.record.as_ref().map(|_| FilmRecorder::new(scenario, key, arm, watch.record_level));
+        let mut recorder =
+            watch.record.as_ref().map(|_| FilmRecorder::new(scenario, key, arm, watch.record_level.into()));
         let mut watchers = Watchers { recorder: recorder.as_mut(), trace: trace.as_mut().filter(|_| is_tested) };
         let outcome = run_guarded(scenario, key, arm, &mut watchers)
             .map_err(|source| CliError::Sample { sample: key.sample, source })?;
@@ -88,7 +111,7 @@ pub(super) fn run_filmed(
 ) -> Result<(Outcome, Film), CliError> {
     watch.check()?;
     let mut trace = watch.trace.as_deref().map(TraceWriter::new).transpose()?;
-    let mut recorder = FilmRecorder::new(scenario, key, arm, watch.record_level);
+    let mut recorder = FilmRecorder::new(scenario, key, arm, watch.record_level.into());
     let mut watchers = Watchers { recorder: Some(&mut recorder), trace: trace.as_mut() };
     let outcome = run_guarded(scenario, key, arm, &mut watchers)
         .map_err(|source| CliError::Sample { sample: key.sample, source })?;
@@ -97,17 +120,6 @@ pub(super) fn run_filmed(
     }
     let film = recorder.finish(&outcome);
     Ok((outcome, film))
-}
-
-/// Runs a sample in each of the arms, and keeps a film of each.
-pub(super) fn films(scenario: &Scenario, key: RunKey, arms: &[Arm], level: Level) -> Result<Vec<Film>, CliError> {
-    let film = |arm: &Arm| {
-        let mut recorder = FilmRecorder::new(scenario, key, arm, level);
-        let outcome = run_guarded(scenario, key, arm, &mut recorder)
-            .map_err(|source| CliError::Sample { sample: key.sample, source })?;
-        Ok(recorder.finish(&outcome))
-    };
-    arms.iter().map(film).collect()
 }
 
 /// Everyone who watches a run from the command line.
@@ -136,12 +148,6 @@ impl Observer for Watchers<'_> {
     }
 }
 
-/// Writes films into a Rerun file at `path`.
-pub(super) fn record_films(path: &Path, films: &[Film]) -> Result<(), CliError> {
-    check_recordable(path)?;
-    Ok(write_films(path, films)?)
-}
-
 /// Writes a film of one lane change of a recording: of `track`, or of the most critical one.
 pub(super) fn record_lane_change(
     path: &Path,
@@ -154,7 +160,7 @@ pub(super) fn record_lane_change(
         let whose = track.map_or(String::new(), |track| format!(" of track {track}"));
         return Err(CliError::Usage { message: format!("the recording has no lane change{whose}: nothing to record") });
     };
-    record_films(path, &[film_lane_change(recording, chosen)?])
+    Ok(record_films(path, &[film_lane_change(recording, chosen)?])?)
 }
 
 /// The lane changes of `track`, or of all, the most critical first; of equals, the later one.

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use closecall::campaign::folder::Folder;
+use closecall_campaign::folder::Folder;
 use serde_json::Value;
 
 use crate::support::{closecall, code, folder, json, library, stderr, stdout};
@@ -21,10 +21,9 @@ fn compare(one: &Path, other: &Path, more: &[&str]) -> std::process::Output {
 
 /// The samples in which E collided, by the journal.
 fn failing(folder: &Path) -> Vec<u64> {
-    let ego = closecall_traffic::ActorId::new("ego").unwrap();
     let records = Folder::open(folder).records().unwrap().map(Result::unwrap);
-    let collided = |record: &closecall::campaign::record::Record| {
-        record.arms.last().unwrap().result.as_ref().unwrap().ego_collided(&ego)
+    let collided = |record: &closecall_campaign::record::Record| {
+        record.arms.last().unwrap().result.as_ref().unwrap().ego_collided()
     };
     records.filter(collided).map(|record| record.sample).collect()
 }

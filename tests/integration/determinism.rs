@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use closecall::campaign::folder::Folder;
+use closecall_campaign::folder::Folder;
 use serde_json::Value;
 
 use crate::support::{closecall, folder, json, library, stdout};

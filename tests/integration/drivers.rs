@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::Path;
 
-use closecall::campaign::runner::{Sampling, concrete};
-use closecall::controller::BuiltIn;
-use closecall::scenario::{Scenario, ScenarioFile};
-use closecall::simulation::{Arm, Happening, Observer, RunKey, StepView, simulate};
+use closecall_campaign::runner::{Sampling, concrete};
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
+use closecall_simulation::controller::BuiltIn;
+use closecall_simulation::scenario::{Scenario, ScenarioFile};
+use closecall_simulation::{Arm, Happening, Observer, RunKey, StepView, simulate};
 use closecall_traffic::{ParameterName, Time, Value};
 use statrs::distribution::{ContinuousCDF, LogNormal};
 

@@ -1,14 +1,14 @@
 //! With true tracks the margin increase system engages when, and only when, its conditions hold; and it keeps what it says
 //! of its goal. The conditions are worked out here from the truth, apart from the controller.
 
-use closecall::campaign::runner::{Sampling, concrete};
-use closecall::controller::BuiltIn;
-use closecall::outcome::{Moment, Outcome};
-use closecall::scenario::{ScenarioFile, Setting};
-use closecall::simulation::{Arm, CONTROL_STEP, Happening, Observer, RunKey, StepView, simulate};
+use closecall_campaign::runner::{Sampling, concrete};
 use closecall_controllers::EgoState;
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
+use closecall_simulation::controller::BuiltIn;
+use closecall_simulation::outcome::{Moment, Outcome};
+use closecall_simulation::scenario::{ScenarioFile, Setting};
+use closecall_simulation::{Arm, CONTROL_STEP, Happening, Observer, RunKey, StepView, simulate};
 use closecall_traffic::Time;
 
 use crate::support::library;

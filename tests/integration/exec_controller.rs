@@ -6,8 +6,8 @@ use std::path::Path;
 use std::process::{Command, Output};
 use std::time::Duration;
 
-use closecall::campaign::folder::Folder;
-use closecall::campaign::record::Record;
+use closecall_campaign::folder::Folder;
+use closecall_campaign::record::Record;
 use serde_json::Value;
 
 use crate::support::{closecall, code, folder, library, skipped, stderr, stdout};

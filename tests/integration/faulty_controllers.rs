@@ -8,24 +8,24 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use closecall::campaign::execution::{Campaign, End};
-use closecall::campaign::folder::Folder;
-use closecall::campaign::ledger::Inference;
-use closecall::campaign::manifest::{MANIFEST_VERSION, Manifest, ManifestScenario};
-use closecall::campaign::record::{Record, SampleFailure};
-use closecall::campaign::runner::{Sampling, Work};
-use closecall::campaign::summary::Summary;
-use closecall::campaign::validity::CheckPlan;
-use closecall::campaign::verdict::{Gates, Verdict};
-use closecall::campaign::workers::Workers;
-use closecall::controller::{BuiltIn, ControllerChoice};
-use closecall::exit_code::ExitCode;
-use closecall::outcome::Outcome;
-use closecall::scenario::ScenarioFile;
-use closecall::simulation::{Arm, ControllerFactory};
+use closecall_campaign::verdict::Decision;
+use closecall_campaign::execution::{Campaign, End};
+use closecall_campaign::folder::Folder;
+use closecall_campaign::ledger::Inference;
+use closecall_campaign::manifest::{MANIFEST_VERSION, Manifest, ManifestScenario};
+use closecall_campaign::record::{Record, SampleFailure};
+use closecall_campaign::runner::{Sampling, Work};
+use closecall_campaign::summary::Summary;
+use closecall_campaign::validity::CheckPlan;
+use closecall_campaign::verdict::{Gates, Verdict};
+use closecall_campaign::workers::Workers;
 use closecall_controllers::{ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack};
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
+use closecall_simulation::controller::{BuiltIn, ControllerChoice};
+use closecall_simulation::outcome::Outcome;
+use closecall_simulation::scenario::ScenarioFile;
+use closecall_simulation::{Arm, ControllerFactory};
 use closecall_traffic::Time;
 
 use crate::support::{folder, library};
@@ -126,12 +126,10 @@ fn manifest(campaign: &Campaign) -> Manifest {
 
 fn run(fault: Option<Fault>, jobs: usize) -> (Vec<Record>, Summary) {
     let campaign = campaign(fault, jobs);
-    let mut summary = Summary::new(vec!["acc".to_owned(), "mis".to_owned()]);
-    summary.begin("low-thw-overtake");
+    let mut summary = campaign.summary();
     let mut records = Vec::new();
-    let ego = campaign.works[0].file.ego_id().unwrap();
     let taken = campaign.run(None, |turn| {
-        summary.take(turn.record, ego);
+        summary.push(turn.record);
         records.push(turn.record.clone());
         ControlFlow::Continue(())
     });
@@ -168,7 +166,7 @@ fn each_fault_is_an_error_with_its_reason_and_the_rest_is_right() {
             assert_eq!(record.arms[0], sound.arms[0], "the other arm is not touched");
         }
         let judged = summary.judge(Gates::default());
-        assert_eq!(judged.exit_code, ExitCode::SampleError, "{fault:?}");
+        assert_eq!(judged.decision, Decision::SampleError, "{fault:?}");
         assert_ne!(judged.verdict, Verdict::Pass, "{fault:?}");
         assert_eq!(summary.total().errors(), failed.len() as u64);
         hit.push(failed);

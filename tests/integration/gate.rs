@@ -5,20 +5,20 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Duration;
 
-use closecall::campaign::execution::Campaign;
-use closecall::campaign::ledger::Inference;
-use closecall::campaign::runner::{Sampling, Work};
-use closecall::campaign::summary::{Counts, Summary};
-use closecall::campaign::validity::CheckPlan;
-use closecall::campaign::verdict::{Evidence, Gates};
-use closecall::campaign::workers::Workers;
-use closecall::controller::BuiltIn;
-use closecall::exit_code::ExitCode;
-use closecall::scenario::ScenarioFile;
-use closecall::simulation::{Arm, ControllerFactory};
+use closecall_campaign::verdict::Decision;
+use closecall_campaign::execution::Campaign;
+use closecall_campaign::ledger::Inference;
+use closecall_campaign::runner::{Sampling, Work};
+use closecall_campaign::summary::{Counts, Summary};
+use closecall_campaign::validity::CheckPlan;
+use closecall_campaign::verdict::{Evidence, Gates};
+use closecall_campaign::workers::Workers;
 use closecall_controllers::{ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack, EgoState};
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
+use closecall_simulation::controller::BuiltIn;
+use closecall_simulation::scenario::ScenarioFile;
+use closecall_simulation::{Arm, ControllerFactory};
 use closecall_traffic::Time;
 
 use crate::support::library;
@@ -95,12 +95,10 @@ fn counts(name: &str, tested: Arc<dyn ControllerFactory>) -> Counts {
     let arms = vec![arm(BuiltIn::Acc.factory()), arm(tested)];
     let workers = Workers { jobs: NonZeroUsize::MIN.saturating_add(1), sample_timeout: Duration::from_mins(5) };
     let work = Arc::new(Work { file, sampling, arms, checks: CheckPlan::default() });
-    let mut summary = Summary::new(vec!["acc".to_owned(), "tested".to_owned()]);
-    summary.begin(name);
-    let ego = work.file.ego_id().unwrap();
-    let campaign = Campaign { works: vec![work.clone()], partition: None, workers };
+    let mut summary = campaign.summary();
+    let campaign = Campaign::new(vec![work.clone()], workers);
     let taken = campaign.run(None, |turn| {
-        summary.take(turn.record, ego);
+        summary.push(turn.record);
         ControlFlow::Continue(())
     });
     taken.unwrap();
@@ -146,7 +144,7 @@ fn passes(counts: &Counts) -> bool {
         pairs: Some(&counts.pairs),
         inference: Inference::FixedSamples,
     };
-    gates.judge(&evidence).exit_code == ExitCode::Pass
+    gates.judge(&evidence).decision == Decision::Pass
 }
 
 #[test]

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use closecall::scenario::ScenarioFile;
 use closecall_scenarios::parameters::{ParameterConfig, ParametersConfig, Provenance};
+use closecall_simulation::scenario::ScenarioFile;
 
 use crate::support::{closecall, json, library, stdout};
 

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use closecall::scenario::ScenarioFile;
-use closecall::simulation::ControllerFactory;
 use closecall_controllers::{ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack};
+use closecall_simulation::ControllerFactory;
+use closecall_simulation::scenario::ScenarioFile;
 
 use crate::support::library;
 

@@ -1,11 +1,11 @@
 //! The method's figure, through the scenario that ships: its numbers, and its five moments in their order.
 
-use closecall::campaign::runner::{Sampling, concrete};
-use closecall::controller::BuiltIn;
-use closecall::outcome::{ClosedBy, Moment, Outcome};
-use closecall::scenario::ScenarioFile;
-use closecall::simulation::{Arm, Happening, Observer, RunKey, StepView, simulate};
+use closecall_campaign::runner::{Sampling, concrete};
 use closecall_scenarios::sampling::Design;
+use closecall_simulation::controller::BuiltIn;
+use closecall_simulation::outcome::{ClosedBy, Moment, Outcome};
+use closecall_simulation::scenario::ScenarioFile;
+use closecall_simulation::{Arm, Happening, Observer, RunKey, StepView, simulate};
 use closecall_traffic::geometry::BoxSide;
 use closecall_traffic::{ActorId, Time};
 

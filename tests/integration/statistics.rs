@@ -8,18 +8,18 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-use closecall::campaign::execution::{Campaign, End};
-use closecall::campaign::ledger::{ArmCounts, Inference};
-use closecall::campaign::probability::{Answer, ProbabilityGate};
-use closecall::campaign::record::Record;
-use closecall::campaign::runner::{Sampling, Work};
-use closecall::campaign::summary::Summary;
-use closecall::campaign::validity::CheckPlan;
-use closecall::campaign::workers::Workers;
-use closecall::controller::BuiltIn;
-use closecall::scenario::ScenarioFile;
-use closecall::simulation::Arm;
+use closecall_campaign::execution::{Campaign, End};
+use closecall_campaign::ledger::{ArmCounts, Inference};
+use closecall_campaign::probability::{Answer, ProbabilityGate};
+use closecall_campaign::record::Record;
+use closecall_campaign::runner::{Sampling, Work};
+use closecall_campaign::summary::Summary;
+use closecall_campaign::validity::CheckPlan;
+use closecall_campaign::workers::Workers;
 use closecall_scenarios::sampling::Design;
+use closecall_simulation::Arm;
+use closecall_simulation::controller::BuiltIn;
+use closecall_simulation::scenario::ScenarioFile;
 
 use crate::support::{closecall, code, folder, json, library, stderr, stdout};
 
@@ -37,13 +37,12 @@ fn run(seed: u64, samples: u64, stops: impl Fn(&ArmCounts) -> bool, mut see: imp
     let sampling = Sampling { seed, design: Design::Random, samples };
     let workers = Workers { jobs: NonZeroUsize::new(2).unwrap(), sample_timeout: Duration::from_secs(60) };
     let work = Arc::new(Work { file, sampling, arms, checks: CheckPlan::default() });
-    let campaign = Campaign { works: vec![work.clone()], partition: None, workers };
-    let mut summary = Summary::new(vec!["acc".to_owned()]);
-    summary.begin("known-probability");
+    let campaign = Campaign::new(vec![work.clone()], workers);
+    let mut summary = campaign.summary();
     campaign
         .run(None, |turn| {
             see(turn.record);
-            summary.take(turn.record, work.file.ego_id().unwrap());
+            summary.push(turn.record);
             let counts = summary.total().arms[0];
             if stops(&counts) { ControlFlow::Break(End::Scenario) } else { ControlFlow::Continue(()) }
         })

@@ -6,18 +6,18 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use closecall::campaign::execution::Campaign;
-use closecall::campaign::runner::{Sampling, Work};
-use closecall::campaign::summary::{Counts, Summary};
-use closecall::campaign::validity::{CheckPlan, Invariance};
-use closecall::campaign::verdict::{Gates, Verdict};
-use closecall::campaign::workers::Workers;
-use closecall::exit_code::ExitCode;
-use closecall::scenario::ScenarioFile;
-use closecall::simulation::{Arm, ControllerFactory};
+use closecall_campaign::verdict::Decision;
+use closecall_campaign::execution::Campaign;
+use closecall_campaign::runner::{Sampling, Work};
+use closecall_campaign::summary::{Counts, Summary};
+use closecall_campaign::validity::{CheckPlan, Invariance};
+use closecall_campaign::verdict::{Gates, Verdict};
+use closecall_campaign::workers::Workers;
 use closecall_controllers::{ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack};
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
+use closecall_simulation::scenario::ScenarioFile;
+use closecall_simulation::{Arm, ControllerFactory};
 use closecall_traffic::Side;
 
 use crate::support::{closecall, folder, json, library, stdout};
@@ -90,11 +90,10 @@ fn checked(on: DependsOn) -> Summary {
     let sampling = Sampling { seed: 5, design: Design::Random, samples: 6 };
     let workers = Workers { jobs: NonZeroUsize::MIN, sample_timeout: Duration::from_secs(60) };
     let work = Arc::new(Work { file, sampling, arms, checks: CheckPlan::new(1.0, 100).unwrap() });
-    let mut summary = Summary::new(vec!["flawed".to_owned()]);
-    summary.begin("low-thw-overtake");
-    Campaign { works: vec![work.clone()], partition: None, workers }
+    let mut summary = campaign.summary();
+    Campaign::new(vec![work.clone()], workers)
         .run(None, |turn| {
-            summary.take(turn.record, work.file.ego_id().unwrap());
+            summary.push(turn.record);
             ControlFlow::Continue(())
         })
         .unwrap();
@@ -116,7 +115,7 @@ fn each_check_finds_what_it_is_there_for() {
         let summary = checked(on);
         assert_eq!(found(&summary.total()), [(expected, 6)], "{expected:?}");
         let judged = summary.judge(Gates::default());
-        assert_eq!((judged.verdict, judged.exit_code), (Verdict::Invalid, ExitCode::Invalid));
+        assert_eq!((judged.verdict, judged.decision), (Verdict::Invalid, Decision::Invalid));
         assert!(judged.reasons[0].contains(expected.finding()), "{:?}", judged.reasons);
     }
 }

@@ -1,0 +1,146 @@
+//! The plan of a campaign: all that its outcomes follow from.
+//!
+//! ```text
+//!  scenario files ┐
+//!  sampling       ├─▶ Plan ─▶ Campaign (runs it)
+//!  controllers    ┘        └─▶ Manifest (keeps it)
+//! ```
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use closecall_sensors::camera::{Backend, SHIPPED_MODEL};
+use closecall_sensors::{SensorMode, inference_backend};
+use closecall_simulation::Arm;
+use closecall_simulation::controller::ControllerChoice;
+use closecall_simulation::scenario::ScenarioFile;
+
+use crate::execution::Campaign;
+use crate::folder::FolderError;
+use crate::ledger::Inference;
+use crate::manifest::{MANIFEST_VERSION, Manifest, ManifestModel, ManifestScenario, file_hash, version};
+use crate::partition::Partition;
+use crate::runner::{Sampling, Work};
+use crate::validity::CheckPlan;
+use crate::workers::Workers;
+
+/// Scenarios that cannot stand in one campaign.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PlanError {
+    /// Results are filed by the scenario's name, and two scenarios have the same.
+    #[error("{} and {} have the same name `{name}`", first.display(), second.display())]
+    SameName {
+        /// One file.
+        first: PathBuf,
+        /// The other file.
+        second: PathBuf,
+        /// The name of both.
+        name: String,
+    },
+}
+
+/// The plan of a campaign.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    scenarios: Vec<ScenarioFile>,
+    sampling: Sampling,
+    controllers: Vec<ControllerChoice>,
+    /// The sensors; those of each scenario if `None`.
+    pub sensors: Option<SensorMode>,
+    /// The part of the samples that is run; all of them if `None`.
+    pub partition: Option<Partition>,
+    /// Which samples are checked for validity.
+    pub checks: CheckPlan,
+    /// What the number of samples comes from.
+    pub inference: Inference,
+    /// Threads, and the time that a sample may take.
+    pub workers: Workers,
+}
+
+impl Plan {
+    /// Returns a plan that runs each sample of each scenario once for each controller. The last controller is the one
+    /// under test; one before it is the baseline.
+    ///
+    /// # Errors
+    /// [`PlanError`] if two scenarios have the same name.
+    pub fn new(
+        scenarios: Vec<ScenarioFile>,
+        sampling: Sampling,
+        controllers: Vec<ControllerChoice>,
+    ) -> Result<Self, PlanError> {
+        for (index, file) in scenarios.iter().enumerate() {
+            let name = &file.config().name;
+            if let Some(same) = scenarios[..index].iter().find(|earlier| earlier.config().name == *name) {
+                let (first, second) = (same.path().to_owned(), file.path().to_owned());
+                return Err(PlanError::SameName { first, second, name: name.clone() });
+            }
+        }
+        Ok(Self {
+            scenarios,
+            sampling,
+            controllers,
+            sensors: None,
+            partition: None,
+            checks: CheckPlan::default(),
+            inference: Inference::default(),
+            workers: Workers::default(),
+        })
+    }
+
+    /// Returns the campaign, ready to run.
+    pub fn campaign(&self) -> Campaign {
+        let arms: Vec<Arm> = self
+            .controllers
+            .iter()
+            .map(|controller| Arm { controller: controller.factory(), sensors: self.sensors })
+            .collect();
+        let (sampling, checks) = (self.sampling, self.checks);
+        let work = |file: &ScenarioFile| Arc::new(Work { file: file.clone(), sampling, arms: arms.clone(), checks });
+        Campaign {
+            works: self.scenarios.iter().map(work).collect(),
+            partition: self.partition,
+            workers: self.workers,
+            inference: self.inference,
+        }
+    }
+
+    /// Returns what a campaign's folder says about this plan. `command` is the command line that asked for it.
+    ///
+    /// # Errors
+    /// [`FolderError::Read`] if the inference library that is in use cannot be read.
+    pub fn manifest(&self, command: Vec<String>) -> Result<Manifest, FolderError> {
+        let scenario = |file: &ScenarioFile| ManifestScenario {
+            name: file.config().name.clone(),
+            path: file.path().display().to_string(),
+            blake3: blake3::hash(file.text().as_bytes()).to_string(),
+            text: file.text().to_owned(),
+        };
+        Ok(Manifest {
+            manifest_version: MANIFEST_VERSION,
+            closecall_version: version(),
+            scenarios: self.scenarios.iter().map(scenario).collect(),
+            sampling: self.sampling,
+            partition: self.partition,
+            arms: self.controllers.clone(),
+            sensors: self.sensors,
+            checks: self.checks,
+            inference: self.inference,
+            models: vec![rear_classifier()?],
+            sample_timeout_s: self.workers.sample_timeout.as_secs_f64(),
+            command,
+        })
+    }
+}
+
+/// The network of the rear camera, and what runs it.
+fn rear_classifier() -> Result<ManifestModel, FolderError> {
+    let backend = match inference_backend() {
+        Backend::Tract => "tract".to_owned(),
+        Backend::OnnxRuntime(library) => {
+            let hash = file_hash(&library).map_err(|source| FolderError::Read { path: library.clone(), source })?;
+            format!("onnxruntime, blake3 {hash}")
+        }
+    };
+    let blake3 = blake3::hash(SHIPPED_MODEL).to_string();
+    Ok(ManifestModel { name: "rear-classifier".to_owned(), blake3, backend })
+}

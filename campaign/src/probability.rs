@@ -1,0 +1,302 @@
+//! The gate on the probability of a collision: is it surely low enough, surely too high, or not known yet?
+//!
+//! ```text
+//!     lower bound       upper bound
+//!   ──────┼───────────────────┼──────────▶ probability
+//!    allowed below: FAIL      allowed above: PASS      allowed in between: INCONCLUSIVE
+//! ```
+//!
+//! Each scenario is judged alone: a mixture would hide one bad scenario behind many good ones. That all pass wrongly is no
+//! likelier than that one does (intersection–union test: R. L. Berger, *Multiparameter hypothesis testing and acceptance
+//! sampling*, Technometrics 24 (1982) 295–300), so that passing needs no correction for their number; that some one
+//! *fails* wrongly is likelier, so that its share of error is divided by their number (Bonferroni).
+
+use serde::Serialize;
+
+use super::ledger::{ArmCounts, Inference};
+use closecall_statistics::binomial::at_most;
+use closecall_statistics::needed;
+use closecall_statistics::sequence::{evidence_above, evidence_below, is_certain};
+
+/// The collision probability that is allowed, and how sure one wants to be of keeping it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ProbabilityGate {
+    max: f64,
+    confidence: f64,
+}
+
+/// Limits of a gate that make no sense.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum GateError {
+    /// No probability that could be shown.
+    #[error("{value} is no probability that could be shown: a number above 0 and below 1 is needed")]
+    Probability {
+        /// The value found.
+        value: f64,
+    },
+    /// No confidence.
+    #[error("{value} is no confidence: a number above 0.5 and below 1 is needed")]
+    Confidence {
+        /// The value found.
+        value: f64,
+    },
+}
+
+impl ProbabilityGate {
+    /// A gate at `max`, between 0 and 1, with a confidence between ½ and 1.
+    ///
+    /// # Errors
+    /// [`GateError`] where either is not.
+    pub fn new(max: f64, confidence: f64) -> Result<Self, GateError> {
+        if !(max > 0.0 && max < 1.0) {
+            return Err(GateError::Probability { value: max });
+        }
+        if !(confidence > 0.5 && confidence < 1.0) {
+            return Err(GateError::Confidence { value: confidence });
+        }
+        Ok(Self { max, confidence })
+    }
+
+    /// The probability that is allowed.
+    pub fn max(&self) -> f64 {
+        self.max
+    }
+
+    /// How sure one wants to be.
+    pub fn confidence(&self) -> f64 {
+        self.confidence
+    }
+
+    /// Judges the counts of one scenario of `scenarios`.
+    pub fn judge(&self, counts: &ArmCounts, scenarios: usize, inference: Inference) -> Finding {
+        let (hits, samples) = (counts.collisions, counts.outcomes);
+        let upper_bound = inference.upper_bound(hits, samples, self.confidence);
+        let lower_bound = inference.lower_bound(hits, samples, self.confidence_to_fail(scenarios));
+        let answer = if upper_bound <= self.max {
+            Answer::Below
+        } else if lower_bound >= self.max {
+            Answer::Above
+        } else {
+            Answer::Open
+        };
+        let missing = (answer == Answer::Open).then(|| self.missing(hits, samples, inference));
+        let (max, confidence) = (self.max, self.confidence);
+        Finding { answer, max, confidence, lower_bound, upper_bound, missing }
+    }
+
+    /// True where samples that are looked at on the way say already whether one scenario of `scenarios` keeps the gate: as
+    /// [`Self::judge`] answers by confidence sequences, without working out the bounds.
+    pub fn is_settled(&self, counts: &ArmCounts, scenarios: usize) -> bool {
+        let (hits, samples) = (counts.collisions, counts.outcomes);
+        is_certain(evidence_below(hits, samples, self.max), self.confidence)
+            || is_certain(evidence_above(hits, samples, self.max), self.confidence_to_fail(scenarios))
+    }
+
+    /// How sure one has to be that one of `scenarios` fails, so that all together fail wrongly no more often than asked.
+    fn confidence_to_fail(&self, scenarios: usize) -> f64 {
+        1.0 - (1.0 - self.confidence) / scenarios.max(1) as f64
+    }
+
+    /// How many samples more the upper bound needs.
+    fn missing(&self, hits: u64, samples: u64, inference: Inference) -> Missing {
+        // Whether the upper bound is low enough, without working it out.
+        let passes = |hits, samples| match inference {
+            Inference::FixedSamples => at_most(hits, samples, self.max) <= 1.0 - self.confidence,
+            Inference::Sequential => is_certain(evidence_below(hits, samples, self.max), self.confidence),
+        };
+        let more = |total: Option<u64>| total.map(|total| total.saturating_sub(samples));
+        // At a rate that is not below what is allowed no number is enough: there is nothing to look for.
+        let is_low = hits as f64 / (samples as f64) < self.max || samples == 0;
+        let at_rate = is_low.then(|| needed::samples_at_rate(hits, samples, passes)).flatten();
+        Missing { without_collisions: more(needed::least_samples(hits, passes)), at_observed_rate: more(at_rate) }
+    }
+}
+
+/// What the samples say about the probability.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Answer {
+    /// It is surely as low as allowed.
+    Below,
+    /// It is surely higher than allowed.
+    Above,
+    /// They do not say.
+    Open,
+}
+
+/// The answer with its bounds.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Finding {
+    /// What the samples say.
+    pub answer: Answer,
+    /// The probability that is allowed.
+    pub max: f64,
+    /// How sure one wants to be.
+    pub confidence: f64,
+    /// One-sided lower bound of the probability.
+    pub lower_bound: f64,
+    /// One-sided upper bound of the probability.
+    pub upper_bound: f64,
+    /// How many samples more are needed, where they do not say.
+    pub missing: Option<Missing>,
+}
+
+/// Samples that are needed beyond those there are; absent where more than a hundred million would be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Missing {
+    /// Where none of them ends in a collision: the least that can be needed.
+    pub without_collisions: Option<u64>,
+    /// Where collisions go on at the observed rate; absent, too, where the bound is then never met.
+    pub at_observed_rate: Option<u64>,
+}
+
+impl Finding {
+    /// The finding in a sentence.
+    pub fn sentence(&self, counts: &ArmCounts) -> String {
+        let (confidence, allowed) = (percent(self.confidence), percent(self.max));
+        let (hits, samples) = (counts.collisions, counts.outcomes);
+        let [low, high] = [self.lower_bound, self.upper_bound].map(percent);
+        match (self.answer, self.missing) {
+            (Answer::Below, _) => format!(
+                "the collision probability is at most {high} ({hits} of {samples}, {confidence} confidence), {allowed} allowed"
+            ),
+            (Answer::Above, _) => format!(
+                "the collision probability is at least {low} ({hits} of {samples}, {confidence} confidence), {allowed} allowed"
+            ),
+            (Answer::Open, missing) => format!(
+                "the collision probability is between {low} and {high} ({hits} of {samples}, {confidence} confidence), \
+                 {allowed} allowed: {}",
+                missing.map(|missing| missing.sentence()).unwrap_or_default()
+            ),
+        }
+    }
+}
+
+impl Missing {
+    fn sentence(&self) -> String {
+        let Some(least) = self.without_collisions else {
+            return format!("more than {} samples are needed", needed::MOST_SAMPLES);
+        };
+        let at_rate = match self.at_observed_rate {
+            Some(more) if more == least => return format!("{least} more samples are needed if none of them collides"),
+            Some(more) => format!("{more} at the observed rate"),
+            None => "at the observed rate no number is enough".to_owned(),
+        };
+        format!("{least} more samples are needed if none of them collides, {at_rate}")
+    }
+}
+
+/// Significant digits of a printed share.
+const DIGITS: i32 = 3;
+
+/// A share in percent, with three significant digits.
+pub(crate) fn percent(share: f64) -> String {
+    let value = 100.0 * share;
+    if !(value > 0.0) || !value.is_finite() {
+        return format!("{value} %");
+    }
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small number, above 0 by the clamp")]
+    let decimals = (DIGITS - 1 - value.log10().floor() as i32).clamp(0, 9) as usize;
+    let text = format!("{value:.decimals$}");
+    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    format!("{text} %")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn judge(max: f64, collisions: u64, outcomes: u64, inference: Inference) -> Finding {
+        let counts = ArmCounts { outcomes, collisions, ..ArmCounts::default() };
+        ProbabilityGate::new(max, 0.95).unwrap().judge(&counts, 1, inference)
+    }
+
+    #[test]
+    fn the_three_answers() {
+        assert_eq!(judge(0.01, 0, 299, Inference::FixedSamples).answer, Answer::Below);
+        assert_eq!(judge(0.01, 9, 300, Inference::FixedSamples).answer, Answer::Above);
+        let open = judge(0.01, 0, 200, Inference::FixedSamples);
+        assert_eq!(open.answer, Answer::Open);
+        assert_eq!(open.missing, Some(Missing { without_collisions: Some(99), at_observed_rate: Some(99) }));
+        assert_eq!(judge(0.01, 0, 0, Inference::FixedSamples).answer, Answer::Open, "nothing says nothing");
+    }
+
+    #[test]
+    fn looking_on_the_way_costs_samples() {
+        assert_eq!(judge(0.01, 0, 299, Inference::Sequential).answer, Answer::Open);
+        let missing = judge(0.01, 0, 299, Inference::Sequential).missing.unwrap();
+        let total = 299 + missing.without_collisions.unwrap();
+        assert_eq!(judge(0.01, 0, total, Inference::Sequential).answer, Answer::Below);
+        assert_eq!(judge(0.01, 0, total - 1, Inference::Sequential).answer, Answer::Open);
+    }
+
+    #[test]
+    fn a_scenario_ends_exactly_where_its_bounds_answer() {
+        let gate = ProbabilityGate::new(0.2, 0.95).unwrap();
+        for collisions in 0..60 {
+            for outcomes in collisions.max(1)..60 {
+                let counts = ArmCounts { outcomes, collisions, ..ArmCounts::default() };
+                let upper_bound = Inference::Sequential.upper_bound(collisions, outcomes, 0.95);
+                let lower_bound = Inference::Sequential.lower_bound(collisions, outcomes, gate.confidence_to_fail(3));
+                let answers = upper_bound <= gate.max() || lower_bound >= gate.max();
+                assert_eq!(gate.is_settled(&counts, 3), answers, "{collisions} of {outcomes}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_sentence_says_what_is_missing_and_under_which_assumption() {
+        let gate = ProbabilityGate::new(0.01, 0.95).unwrap();
+        let sentence = |collisions, outcomes| {
+            let counts = ArmCounts { outcomes, collisions, ..ArmCounts::default() };
+            gate.judge(&counts, 1, Inference::FixedSamples).sentence(&counts)
+        };
+        let low = "the collision probability is";
+        assert_eq!(sentence(0, 300), format!("{low} at most 0.994 % (0 of 300, 95 % confidence), 1 % allowed"));
+        assert_eq!(sentence(9, 300), format!("{low} at least 1.57 % (9 of 300, 95 % confidence), 1 % allowed"));
+        let open = |bounds| format!("{low} between {bounds}, 95 % confidence), 1 % allowed");
+        assert_eq!(
+            sentence(0, 200),
+            open("0 % and 1.49 % (0 of 200") + ": 99 more samples are needed if none of them collides"
+        );
+        assert_eq!(
+            sentence(1, 200),
+            open("0.0256 % and 2.35 % (1 of 200")
+                + ": 273 more samples are needed if none of them collides, 982 at the observed rate"
+        );
+        assert_eq!(
+            sentence(3, 200),
+            open("0.41 % and 3.83 % (3 of 200")
+                + ": 573 more samples are needed if none of them collides, at the observed rate no number is enough"
+        );
+    }
+
+    #[test]
+    fn nonsense_is_refused() {
+        for max in [0.0, 1.0, -0.1, f64::NAN, f64::INFINITY] {
+            assert!(matches!(ProbabilityGate::new(max, 0.95), Err(GateError::Probability { .. })), "{max}");
+        }
+        for confidence in [0.5, 1.0, 95.0, f64::NAN] {
+            assert!(
+                matches!(ProbabilityGate::new(0.01, confidence), Err(GateError::Confidence { .. })),
+                "{confidence}"
+            );
+        }
+    }
+
+    #[test]
+    fn more_scenarios_do_not_fail_by_chance() {
+        let counts = ArmCounts { outcomes: 100, collisions: 4, ..ArmCounts::default() };
+        let gate = ProbabilityGate::new(0.01, 0.95).unwrap();
+        let alone = gate.judge(&counts, 1, Inference::FixedSamples);
+        let of_twenty = gate.judge(&counts, 20, Inference::FixedSamples);
+        assert!(of_twenty.lower_bound < alone.lower_bound);
+        assert_eq!(of_twenty.upper_bound, alone.upper_bound);
+    }
+
+    #[test]
+    fn percentages_have_three_digits() {
+        let texts = [0.009_936_4, 0.01, 0.95, 0.5, 0.000_012_34, 1.0, 0.0].map(percent);
+        assert_eq!(texts, ["0.994 %", "1 %", "95 %", "50 %", "0.00123 %", "100 %", "0 %"]);
+    }
+}

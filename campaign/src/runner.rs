@@ -1,0 +1,135 @@
+//! Running one sample in one arm, guarded against whatever the controller does.
+
+use std::fmt;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::Instant;
+
+use closecall_scenarios::sampling::Design;
+use closecall_traffic::Check;
+
+use super::partition::Partition;
+use super::record::{ArmRecord, SampleFailure};
+use super::validity::{CheckPlan, Subject};
+use closecall_simulation::outcome::Outcome;
+use closecall_simulation::scenario::{Scenario, ScenarioFile};
+use closecall_simulation::{Arm, NoObserver, Observer, RunKey, SampleError, simulate};
+
+/// How the samples of a campaign are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct Sampling {
+    /// The campaign's seed.
+    pub seed: u64,
+    /// How the values of the parameters are laid out.
+    #[serde(with = "design_by_name")]
+    pub design: Design,
+    /// Samples of each scenario.
+    pub samples: u64,
+}
+
+mod design_by_name {
+    use closecall_scenarios::sampling::Design;
+    use serde::{Deserialize, Deserializer, Serializer, de};
+
+    pub(super) fn serialize<S: Serializer>(design: &Design, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(design.name())
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Design, D::Error> {
+        String::deserialize(deserializer)?.parse().map_err(de::Error::custom)
+    }
+}
+
+impl fmt::Debug for Work {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Work")
+            .field("scenario", &self.file.config().name)
+            .field("sampling", &self.sampling)
+            .finish_non_exhaustive()
+    }
+}
+
+/// What is run: a scenario, how its samples are drawn, and the arms that each of them is run in.
+#[derive(Clone)]
+pub struct Work {
+    /// The scenario.
+    pub file: ScenarioFile,
+    /// How its samples are drawn.
+    pub sampling: Sampling,
+    /// The arms, the baseline first.
+    pub arms: Vec<Arm>,
+    /// Which samples are checked.
+    pub checks: CheckPlan,
+}
+
+impl Work {
+    /// How many samples the design has.
+    pub fn count(&self) -> u64 {
+        self.file.space().samples(self.sampling.design, self.sampling.samples)
+    }
+
+    /// The numbers of the samples that belong to a part of the campaign, or to all of it, in their order.
+    pub fn samples(&self, part: Option<Partition>) -> impl Iterator<Item = u64> + use<> {
+        (0..self.count()).filter(move |&sample| part.is_none_or(|part| part.has(sample)))
+    }
+
+    /// Runs one sample in one arm, and checks it where its turn has come.
+    pub(super) fn run(&self, sample: u64, arm: usize) -> ArmRun {
+        let arm = &self.arms[arm];
+        let key = RunKey { seed: self.sampling.seed, sample };
+        let started = Instant::now();
+        let scenario = guarded(|| concrete(&self.file, self.sampling, sample));
+        let subject = scenario.as_ref().map(|scenario| Subject { scenario, key, arm });
+        let result = match &subject {
+            Ok(subject) => run_guarded(subject.scenario, key, arm, &mut NoObserver),
+            Err(error) => Err((*error).clone()),
+        };
+        let wall_s = started.elapsed().as_secs_f64();
+        let checks = match (&subject, &result) {
+            (Ok(subject), Ok(outcome)) if self.checks.has(key) => Some(subject.check(outcome)),
+            _ => None,
+        };
+        let (controller, result) = (arm.controller.name().to_owned(), result.map_err(SampleFailure::from));
+        ArmRun { record: ArmRecord { controller, result, checks }, wall_s }
+    }
+}
+
+/// One sample in one arm, with what it cost.
+#[derive(Clone, Debug)]
+pub(super) struct ArmRun {
+    pub(super) record: ArmRecord,
+    /// Wall time [s].
+    pub(super) wall_s: f64,
+}
+
+/// The concrete scenario of one sample.
+///
+/// # Errors
+/// [`SampleError::Scenario`] where the sampled values contradict each other.
+pub fn concrete(file: &ScenarioFile, sampling: Sampling, sample: u64) -> Result<Scenario, SampleError> {
+    let parameters = file.space().sample(sampling.design, sampling.seed, sample, sampling.samples);
+    file.config().check(&parameters).map_err(SampleError::Scenario)
+}
+
+/// Runs one sample in one arm; a panic is an error of this sample.
+///
+/// # Errors
+/// [`SampleError`] where the sample has no outcome.
+pub fn run_guarded(
+    scenario: &Scenario,
+    key: RunKey,
+    arm: &Arm,
+    observer: &mut dyn Observer,
+) -> Result<Outcome, SampleError> {
+    guarded(|| simulate(scenario, key, arm, observer))
+}
+
+fn guarded<T>(run: impl FnOnce() -> Result<T, SampleError>) -> Result<T, SampleError> {
+    catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|panic| {
+        let message = panic
+            .downcast_ref::<&str>()
+            .map(|text| (*text).to_owned())
+            .or_else(|| panic.downcast_ref::<String>().cloned())
+            .unwrap_or_else(|| "without a message".to_owned());
+        Err(SampleError::Panic { message })
+    })
+}

@@ -1,0 +1,29 @@
+//! A campaign from Rust, without the command line.
+//!
+//! ```sh
+//! cargo run --release --example campaign
+//! ```
+
+use std::error::Error;
+use std::path::Path;
+
+use closecall::campaign::plan::Plan;
+use closecall::campaign::runner::Sampling;
+use closecall::campaign::verdict::Gates;
+use closecall::scenarios::sampling::Design;
+use closecall::simulation::controller::ControllerChoice;
+use closecall::simulation::scenario::ScenarioFile;
+
+/// Runs 20 samples with and without the margin increase system, and judges them by a gate.
+#[expect(clippy::print_stdout, reason = "its output is what it is for")]
+pub(crate) fn main() -> Result<(), Box<dyn Error>> {
+    let library = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/library");
+    let scenario = ScenarioFile::load(&library.join("low-thw-overtake.toml"), &[])?;
+    let sampling = Sampling { seed: 1, design: Design::Random, samples: 20 };
+    let plan = Plan::new(vec![scenario], sampling, vec![ControllerChoice::Acc, ControllerChoice::Mis])?;
+    let summary = plan.campaign().count()?;
+    let pairs = summary.total().pairs;
+    let judged = summary.judge(Gates { max_induced: Some(1), ..Gates::default() });
+    println!("{} prevented, {} induced: {}", pairs.prevented, pairs.induced, judged.verdict);
+    Ok(())
+}

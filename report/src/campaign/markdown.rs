@@ -1,0 +1,140 @@
+//! A campaign in Markdown, short enough for a pull request.
+
+use std::path::Path;
+
+use super::findings::Findings;
+use super::overview::{ScenarioOverview, WorstSample};
+use closecall_campaign::harm;
+use closecall_campaign::ledger::Inference;
+use closecall_campaign::summary::{Counts, Summary};
+use closecall_scenarios::atomic::{WriteError, write_file};
+
+/// Samples that are listed for each scenario.
+const LISTED: usize = 5;
+
+/// Writes the summary into a file of its own.
+///
+/// # Errors
+/// [`WriteError`] where the file cannot be written; a file of that name is then as it was.
+pub fn write_markdown(path: &Path, findings: &Findings<'_>) -> Result<(), WriteError> {
+    let text = markdown(findings);
+    write_file(path, |file| file.write_all(text.as_bytes()))
+}
+
+/// The summary.
+pub fn markdown(findings: &Findings<'_>) -> String {
+    let mut text = format!("## Closecall: {}\n\n", findings.judged.verdict);
+    for reason in &findings.judged.reasons {
+        text.push_str(&format!("- {reason}\n"));
+    }
+    text.push('\n');
+    text.push_str(&counts(findings.summary));
+    text.push_str(&requirements(findings));
+    for scenario in &findings.overview.scenarios {
+        text.push_str(&worst(findings, scenario));
+    }
+    let (sampling, version) = (findings.manifest.sampling, &findings.manifest.closecall_version);
+    text.push_str(&format!(
+        "<sub>Rates are conditional on the sampled scenario: they are not the risk of a road. Seed {}, {} design, \
+         closecall {version}.</sub>\n",
+        sampling.seed, sampling.design,
+    ));
+    text
+}
+
+fn counts(summary: &Summary) -> String {
+    let mut text = "| scenario | controller | samples | collisions | rate | 95 % | errors |\n\
+                    |---|---|---:|---:|---:|---|---:|\n"
+        .to_owned();
+    let total = (summary.scenarios.len() > 1).then(|| ("all".to_owned(), summary.total()));
+    for (name, counts) in summary.scenarios.iter().chain(&total) {
+        for (controller, arm) in summary.controllers.iter().zip(&counts.arms) {
+            let [low, high] = arm.interval_95(summary.inference).map(|bound| 100.0 * bound);
+            let rate = arm.collision_rate().map_or_else(|| "-".to_owned(), |rate| format!("{:.2} %", 100.0 * rate));
+            text.push_str(&format!(
+                "| {} | {} | {} | {} | {rate} | {low:.2} to {high:.2} % | {} |\n",
+                cell(name),
+                cell(controller),
+                arm.outcomes,
+                arm.collisions,
+                arm.errors,
+            ));
+        }
+    }
+    text.push('\n');
+    if summary.is_paired() {
+        text.push_str(&pairs(&summary.total(), summary.inference));
+    }
+    text
+}
+
+fn pairs(total: &Counts, inference: Inference) -> String {
+    let pairs = &total.pairs;
+    let sure = pairs.mcnemar_p(inference).map_or_else(String::new, |p| format!(" Exact McNemar p {p:.1e}."));
+    format!(
+        "**{} prevented, {} induced**, {} in both arms, {} in neither.{sure} Harm: {:.3} prevented, {:.3} induced ({}).\n\n",
+        pairs.prevented,
+        pairs.induced,
+        pairs.both,
+        pairs.neither,
+        pairs.prevented_harm,
+        pairs.induced_harm,
+        harm::WEIGHT,
+    )
+}
+
+fn requirements(findings: &Findings<'_>) -> String {
+    if findings.requirements.is_empty() {
+        return String::new();
+    }
+    let mut text = "| requirement | scenarios | result |\n|---|---|---|\n".to_owned();
+    for requirement in findings.requirements {
+        let scenarios: Vec<String> = requirement
+            .evidence
+            .iter()
+            .map(|evidence| format!("{} ({} of {})", evidence.scenario, evidence.collisions, evidence.samples))
+            .collect();
+        let (mark, result) = (cell(&requirement.mark), requirement.standing().word());
+        text.push_str(&format!("| {mark} | {} | {result} |\n", cell(&scenarios.join(", "))));
+    }
+    text.push('\n');
+    text
+}
+
+fn worst(findings: &Findings<'_>, scenario: &ScenarioOverview) -> String {
+    let collided: Vec<&WorstSample> =
+        scenario.worst.iter().filter(|sample| sample.delta_v_mps.is_some()).take(LISTED).collect();
+    let mut text = String::new();
+    for ((arm, kind), error) in &scenario.errors {
+        let first_line = error.message.lines().next().unwrap_or_default();
+        let (count, sample) = (error.count, error.first_sample);
+        text.push_str(&format!(
+            "- {count} × `{kind}` in {}, first in sample {sample}: {}\n",
+            cell(arm),
+            cell(first_line)
+        ));
+    }
+    if !text.is_empty() {
+        text = format!("**Errors in {}**\n\n{text}\n", cell(&scenario.name));
+    }
+    if collided.is_empty() {
+        return text;
+    }
+    text.push_str(&format!(
+        "<details><summary>Worst collisions in {}</summary>\n\n| sample | E's ΔV | with | again |\n|---:|---:|---|---|\n",
+        cell(&scenario.name)
+    ));
+    for sample in collided {
+        let delta_v_mps = sample.delta_v_mps.unwrap_or_default();
+        let with = sample.collision.as_ref().map(|(other, _)| other.to_string()).unwrap_or_default();
+        let replay = findings.replay(&scenario.name, sample.sample);
+        text.push_str(&format!("| {} | {delta_v_mps:.1} m/s | {} | `{replay}` |\n", sample.sample, cell(&with)));
+    }
+    text.push_str("\n</details>\n\n");
+    text
+}
+
+/// A text that does not break the table that it stands in.
+fn cell(text: &str) -> String {
+    text.replace('|', "\\|").replace(['\n', '\r'], " ").replace('<', "&lt;")
+}

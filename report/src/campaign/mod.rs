@@ -1,0 +1,23 @@
+//! Many runs.
+//!
+//! ```text
+//!  journal ─▶ Tally ─▶ Summary ─▶ verdict ─┐
+//!                └───▶ Overview ───────────┴▶ Findings ─▶ report.html │ summary.md │ junit.xml
+//!          └▶ rows ─▶ outcomes.parquet        chosen samples ─▶ recordings/*.rrd
+//! ```
+
+mod files;
+pub mod findings;
+pub mod html;
+pub mod junit;
+pub mod markdown;
+pub mod outcomes;
+pub mod overview;
+mod recordings;
+pub mod recordings_index;
+pub mod requirements;
+mod tally;
+pub mod timings;
+
+pub use files::{CampaignReport, ReportError};
+pub use tally::Tally;

@@ -1,0 +1,290 @@
+//! The table of a campaign's outcomes, as Parquet: one row for each sample and controller.
+//!
+//! The file depends on the rows alone: the same rows give the same bytes, whoever worked them out, and in what order.
+//! Nothing in it tells when or where it was written. Units stand in the metadata of the columns. A margin that does
+//! not exist is null, with the reason in the column `<margin>_absent`.
+
+use std::collections::BTreeMap;
+use std::io;
+use std::path::Path;
+use std::sync::Arc;
+
+use arrow::array::{ArrayRef, BooleanArray, Float64Array, RecordBatch, StringArray, UInt64Array};
+use arrow::datatypes::{DataType, Field, Schema};
+use closecall_traffic::{Measured, ParameterName, Parameters, Value};
+use parquet::arrow::ArrowWriter;
+use parquet::file::metadata::KeyValue;
+use serde::Serialize;
+
+use crate::table::{ROWS_PER_GROUP, field, properties};
+use crate::units::unit_of;
+use closecall_campaign::record::SampleFailure;
+use closecall_scenarios::atomic::{WriteError, write_file};
+use closecall_simulation::outcome::{Collision, MisSummary, Outcome};
+
+/// One sample in one arm.
+#[derive(Clone, Debug)]
+pub struct OutcomeRow {
+    /// The scenario's name.
+    pub scenario: String,
+    /// The campaign's seed.
+    pub seed: u64,
+    /// The sample's number.
+    pub sample: u64,
+    /// The controller's name.
+    pub controller: String,
+    /// What came of it.
+    pub result: Result<Outcome, SampleFailure>,
+}
+
+impl OutcomeRow {
+    fn outcome(&self) -> Option<&Outcome> {
+        self.result.as_ref().ok()
+    }
+
+    /// The first collision of E.
+    pub fn ego_collision(&self) -> Option<&Collision> {
+        self.outcome()?.ego_collisions().next()
+    }
+}
+
+/// What a parameter's column holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ParameterKind {
+    /// Numbers.
+    Number,
+    /// Words, and numbers as text where a parameter is both.
+    Label,
+}
+
+/// The columns for the parameters of several scenarios, in the order of their names.
+pub fn parameter_columns<'a>(
+    parameters: impl IntoIterator<Item = &'a Parameters>,
+) -> BTreeMap<ParameterName, ParameterKind> {
+    let mut columns = BTreeMap::new();
+    for (name, value) in parameters.into_iter().flat_map(Parameters::iter) {
+        let kind = match value {
+            Value::Number(_) => ParameterKind::Number,
+            Value::Label(_) => ParameterKind::Label,
+        };
+        let column = columns.entry(name.clone()).or_insert(kind);
+        if kind == ParameterKind::Label {
+            *column = kind;
+        }
+    }
+    columns
+}
+
+/// Writes the table, group by group as the rows come.
+///
+/// # Errors
+/// The first error of `rows`, or [`WriteError`]; a file of that name is then as it was.
+pub fn write_outcomes<E: From<WriteError>>(
+    path: &Path,
+    parameters: &BTreeMap<ParameterName, ParameterKind>,
+    rows: impl Iterator<Item = Result<OutcomeRow, E>>,
+) -> Result<(), E> {
+    let columns = columns(parameters);
+    let schema = Arc::new(Schema::new(columns.iter().map(Column::field).collect::<Vec<_>>()));
+    let mut rows = rows.fuse();
+    let mut broken = None;
+    let written = write_file(path, |file| {
+        let options = properties().into_builder().set_key_value_metadata(Some(units(&columns))).build();
+        let mut writer = ArrowWriter::try_new(file, schema.clone(), Some(options)).map_err(io::Error::other)?;
+        loop {
+            let group: Result<Vec<OutcomeRow>, E> = rows.by_ref().take(ROWS_PER_GROUP).collect();
+            let group = match group {
+                Ok(group) => group,
+                Err(error) => {
+                    broken = Some(error);
+                    return Err(io::Error::other("a row is an error"));
+                }
+            };
+            if group.is_empty() {
+                break;
+            }
+            let arrays = columns.iter().map(|column| column.array(&group)).collect();
+            let batch = RecordBatch::try_new(schema.clone(), arrays).map_err(io::Error::other)?;
+            writer.write(&batch).map_err(io::Error::other)?;
+        }
+        writer.close().map_err(io::Error::other)?;
+        Ok(())
+    });
+    match broken {
+        Some(error) => Err(error),
+        None => Ok(written?),
+    }
+}
+
+/// The units once more, for readers that do not decode Arrow's own schema: one entry for each column that has one.
+fn units(columns: &[Column]) -> Vec<KeyValue> {
+    let unit =
+        |column: &Column| column.unit.map(|unit| KeyValue::new(format!("unit:{}", column.name), unit.to_owned()));
+    columns.iter().filter_map(unit).collect()
+}
+
+/// One value of a row, if it has it.
+type Cell<T> = Box<dyn Fn(&OutcomeRow) -> Option<T>>;
+
+/// What a column takes from a row.
+enum Cells {
+    Text(Cell<String>),
+    Number(Cell<f64>),
+    Count(Cell<u64>),
+    Flag(Cell<bool>),
+}
+
+struct Column {
+    name: String,
+    unit: Option<&'static str>,
+    cells: Cells,
+}
+
+impl Column {
+    fn field(&self) -> Field {
+        let of = match self.cells {
+            Cells::Text(_) => DataType::Utf8,
+            Cells::Number(_) => DataType::Float64,
+            Cells::Count(_) => DataType::UInt64,
+            Cells::Flag(_) => DataType::Boolean,
+        };
+        field(&self.name, of, self.unit)
+    }
+
+    fn array(&self, rows: &[OutcomeRow]) -> ArrayRef {
+        match &self.cells {
+            Cells::Text(of) => Arc::new(rows.iter().map(of).collect::<StringArray>()),
+            Cells::Number(of) => Arc::new(rows.iter().map(of).collect::<Float64Array>()),
+            Cells::Count(of) => Arc::new(rows.iter().map(of).collect::<UInt64Array>()),
+            Cells::Flag(of) => Arc::new(rows.iter().map(of).collect::<BooleanArray>()),
+        }
+    }
+}
+
+/// A table in the making.
+#[derive(Default)]
+struct Columns(Vec<Column>);
+
+impl Columns {
+    fn text(&mut self, name: &str, of: impl Fn(&OutcomeRow) -> Option<String> + 'static) {
+        self.0.push(Column { name: name.to_owned(), unit: None, cells: Cells::Text(Box::new(of)) });
+    }
+
+    fn count(&mut self, name: &str, of: impl Fn(&OutcomeRow) -> Option<u64> + 'static) {
+        self.0.push(Column { name: name.to_owned(), unit: None, cells: Cells::Count(Box::new(of)) });
+    }
+
+    fn flag(&mut self, name: &str, of: impl Fn(&OutcomeRow) -> Option<bool> + 'static) {
+        self.0.push(Column { name: name.to_owned(), unit: None, cells: Cells::Flag(Box::new(of)) });
+    }
+
+    fn number(&mut self, name: &str, unit: &'static str, of: impl Fn(&OutcomeRow) -> Option<f64> + 'static) {
+        self.0.push(Column { name: name.to_owned(), unit: Some(unit), cells: Cells::Number(Box::new(of)) });
+    }
+
+    /// A value and, beside it, why there is none.
+    fn measured(&mut self, name: &str, unit: &'static str, of: fn(&Outcome) -> Measured) {
+        self.number(name, unit, move |row| of(row.outcome()?).ok());
+        self.text(&format!("{name}_absent"), move |row| of(row.outcome()?).err().map(|absent| absent.to_string()));
+    }
+
+    /// The same of the margin increase system.
+    fn mis(&mut self, name: &str, unit: &'static str, of: fn(&MisSummary) -> Measured) {
+        let measured = move |outcome: &Outcome| outcome.mis.as_ref().map_err(|absent| *absent).and_then(of);
+        self.number(name, unit, move |row| measured(row.outcome()?).ok());
+        self.text(&format!("{name}_absent"), move |row| {
+            measured(row.outcome()?).err().map(|absent| absent.to_string())
+        });
+    }
+}
+
+fn columns(parameters: &BTreeMap<ParameterName, ParameterKind>) -> Vec<Column> {
+    let mut columns = Columns::default();
+    key_columns(&mut columns);
+    for (name, kind) in parameters {
+        parameter_column(&mut columns, name, *kind);
+    }
+    collision_columns(&mut columns);
+    margin_columns(&mut columns);
+    mis_columns(&mut columns);
+    columns.0
+}
+
+fn key_columns(columns: &mut Columns) {
+    columns.text("scenario", |row| Some(row.scenario.clone()));
+    columns.count("seed", |row| Some(row.seed));
+    columns.count("sample", |row| Some(row.sample));
+    columns.text("controller", |row| Some(row.controller.clone()));
+    columns.text("status", |row| Some(if row.result.is_ok() { "ok" } else { "error" }.to_owned()));
+    columns.text("error_kind", |row| row.result.as_ref().err().map(|error| error.kind.clone()));
+    columns.text("error_message", |row| row.result.as_ref().err().map(|error| error.message.clone()));
+    columns.text("end", |row| word(&row.outcome()?.end));
+    columns.number("duration_s", "s", |row| Some(row.outcome()?.duration.s()));
+}
+
+/// The name says which parameter, and its end the unit.
+fn parameter_column(columns: &mut Columns, name: &ParameterName, kind: ParameterKind) {
+    let (column, unit) = (format!("param:{name}"), unit_of(name.as_str()));
+    let name = name.clone();
+    match kind {
+        ParameterKind::Number => {
+            let of = move |row: &OutcomeRow| match row.outcome()?.parameters.get(&name)? {
+                Value::Number(value) => Some(*value),
+                Value::Label(_) => None,
+            };
+            columns.0.push(Column { name: column, unit, cells: Cells::Number(Box::new(of)) });
+        }
+        ParameterKind::Label => {
+            columns.text(&column, move |row| row.outcome()?.parameters.get(&name).map(ToString::to_string));
+        }
+    }
+}
+
+fn collision_columns(columns: &mut Columns) {
+    columns.count("collisions", |row| Some(row.outcome()?.collisions.len() as u64));
+    columns.flag("ego_collided", |row| Some(row.outcome()?.ego_collided()));
+    let first = |row: &OutcomeRow| row.outcome()?.collisions.first().cloned();
+    columns.number("collision_time_s", "s", move |row| Some(first(row)?.time.s()));
+    for (place, which) in ["first", "second"].into_iter().enumerate() {
+        columns.text(&format!("collision_between_{which}"), move |row| Some(first(row)?.between[place].to_string()));
+        columns.text(&format!("collision_struck_side_{which}"), move |row| word(&first(row)?.struck_side[place]));
+        columns
+            .number(&format!("collision_delta_v_{which}_mps"), "m/s", move |row| Some(first(row)?.delta_v_mps[place]));
+    }
+    columns.text("collision_closed_by", move |row| word(&first(row)?.closed_by));
+    columns.text("collision_phase", move |row| word(&first(row)?.phase));
+    columns.number("collision_relative_speed_mps", "m/s", move |row| Some(first(row)?.relative_speed_mps));
+}
+
+fn margin_columns(columns: &mut Columns) {
+    columns.measured("min_thw_front_s", "s", |outcome| outcome.margins.min_thw_front_s);
+    columns.measured("min_thw_rear_s", "s", |outcome| outcome.margins.min_thw_rear_s);
+    columns.measured("min_gap_front_m", "m", |outcome| outcome.margins.min_gap_front_m);
+    columns.measured("min_gap_rear_m", "m", |outcome| outcome.margins.min_gap_rear_m);
+    columns.measured("min_ttc_rear_s", "s", |outcome| outcome.margins.min_ttc_rear_s);
+    let margins = |row: &OutcomeRow| Some(row.outcome()?.margins);
+    columns.number("max_deceleration_mps2", "m/s²", move |row| Some(margins(row)?.max_deceleration_mps2));
+    columns.number("max_jerk_mps3", "m/s³", move |row| Some(margins(row)?.max_jerk_mps3));
+    columns.number("max_speed_deficit_mps", "m/s", move |row| Some(margins(row)?.max_speed_deficit_mps));
+}
+
+fn mis_columns(columns: &mut Columns) {
+    columns.mis("mis_engaged_at_s", "s", |mis| mis.engaged_at_s);
+    columns.mis("mis_released_at_s", "s", |mis| mis.released_at_s);
+    columns.mis("mis_thw_front_at_engagement_s", "s", |mis| mis.thw_front_at_engagement_s);
+    columns.mis("mis_thw_front_at_critical_s", "s", |mis| mis.thw_front_at_critical_s);
+    columns.mis("mis_mean_deceleration_mps2", "m/s²", |mis| mis.mean_deceleration_mps2);
+    let mis = |row: &OutcomeRow| row.outcome()?.mis.ok();
+    columns.flag("mis_goal_in_reach", move |row| mis(row)?.goal_in_reach);
+    columns.text("mis_reason", move |row| {
+        Some(row.outcome()?.mis.map_or_else(|absent| absent.to_string(), |mis| mis.reason.to_string()))
+    });
+}
+
+/// A word of a value list, as it stands in JSON too.
+fn word(of: &impl Serialize) -> Option<String> {
+    serde_json::to_value(of).ok()?.as_str().map(str::to_owned)
+}
+
+#[cfg(test)]
+pub(super) mod tests;

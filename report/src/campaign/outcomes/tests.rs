@@ -1,0 +1,148 @@
+use std::fmt::Write as _;
+
+use arrow::array::{Array, AsArray};
+use arrow::datatypes::{Float64Type, UInt64Type};
+use arrow::util::display::array_value_to_string;
+use closecall_controllers::Reason;
+use closecall_traffic::geometry::BoxSide;
+use closecall_traffic::{Absent, Time};
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+
+use super::*;
+use closecall_simulation::outcome::{ClosedBy, EndReason, Margins, Phase};
+
+fn parameters(rear_class: &str) -> Parameters {
+    let values = [("closing-mps", Value::Number(6.5)), ("rear-class", Value::Label(rear_class.to_owned()))];
+    values.into_iter().map(|(name, value)| (ParameterName::new(name).unwrap(), value)).collect()
+}
+
+fn outcome(sample: u64, controller: &str) -> Outcome {
+    let id = |name| ActorId::new(name).unwrap();
+    let hit = Collision {
+        time: Time::from_ms(14_520),
+        between: [id("ego"), id("rear")],
+        struck_side: [BoxSide::Rear, BoxSide::Front],
+        closed_by: ClosedBy::Second,
+        phase: Phase::Critical,
+        relative_speed_mps: 6.25,
+        delta_v_mps: [3.125, 3.5],
+    };
+    let margins = Margins {
+        min_thw_front_s: Ok(0.7),
+        min_thw_rear_s: Ok(0.2),
+        min_gap_front_m: Ok(21.0),
+        min_gap_rear_m: Ok(if controller == "acc" { 0.0 } else { 5.5 }),
+        min_ttc_rear_s: Err(Absent::NotApproaching),
+        max_deceleration_mps2: 0.8,
+        max_jerk_mps3: 2.5,
+        max_speed_deficit_mps: 1.5,
+    };
+    let mis = MisSummary {
+        engaged_at_s: Ok(4.52),
+        released_at_s: Err(Absent::NotReleased),
+        thw_front_at_engagement_s: Ok(0.7),
+        thw_front_at_critical_s: Ok(2.6),
+        mean_deceleration_mps2: Ok(0.75),
+        goal_in_reach: Some(true),
+        reason: Reason::Engaged,
+    };
+    Outcome {
+        scenario: "low-thw-overtake".to_owned(),
+        seed: 1,
+        sample,
+        controller: controller.to_owned(),
+        ego: ActorId::new("ego").unwrap(),
+        parameters: parameters("car"),
+        end: if controller == "acc" { EndReason::Collision } else { EndReason::Duration },
+        duration: Time::from_ms(16_520),
+        collisions: if controller == "acc" { vec![hit] } else { Vec::new() },
+        moments: Vec::new(),
+        margins,
+        mis: if controller == "acc" { Err(Absent::NoMis) } else { Ok(mis) },
+    }
+}
+
+/// A collision, a success, an error.
+pub(crate) fn rows() -> Vec<OutcomeRow> {
+    let row = |sample, controller: &str, result| OutcomeRow {
+        scenario: "low-thw-overtake".to_owned(),
+        seed: 1,
+        sample,
+        controller: controller.to_owned(),
+        result,
+    };
+    let failure = SampleFailure { kind: "panic".to_owned(), message: "a panic: <index> & \"bounds\"".to_owned() };
+    vec![row(0, "acc", Ok(outcome(0, "acc"))), row(0, "mis", Ok(outcome(0, "mis"))), row(1, "mis", Err(failure))]
+}
+
+fn write(folder: &Path, name: &str, rows: Vec<OutcomeRow>) -> std::path::PathBuf {
+    let path = folder.join(name);
+    let columns = parameter_columns(rows.iter().filter_map(|row| Some(&row.outcome()?.parameters)));
+    write_outcomes(&path, &columns, rows.into_iter().map(Ok::<_, WriteError>)).unwrap();
+    path
+}
+
+fn read(path: &Path) -> Vec<RecordBatch> {
+    let file = std::fs::File::open(path).unwrap();
+    ParquetRecordBatchReaderBuilder::try_new(file).unwrap().build().unwrap().map(Result::unwrap).collect()
+}
+
+#[test]
+fn the_table_reads_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let batches = read(&write(folder.path(), "a.parquet", rows()));
+    let batch = &batches[0];
+    let mut text = String::new();
+    for (column, field) in batch.schema().fields().iter().enumerate() {
+        let unit = field.metadata().get("unit").map_or("-", String::as_str);
+        let array = batch.column(column);
+        let cells: Vec<String> = (0..batch.num_rows())
+            .map(|row| if array.is_null(row) { "null".to_owned() } else { array_value_to_string(array, row).unwrap() })
+            .collect();
+        writeln!(text, "{} [{unit}] {}: {}", field.name(), field.data_type(), cells.join(" | ")).unwrap();
+    }
+    insta::assert_snapshot!(text);
+}
+
+#[test]
+fn the_same_rows_give_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let first = std::fs::read(write(folder.path(), "a.parquet", rows())).unwrap();
+    let second = std::fs::read(write(folder.path(), "b.parquet", rows())).unwrap();
+    assert_eq!(first, second);
+    let mut other = rows();
+    other[1].sample = 7;
+    assert_ne!(first, std::fs::read(write(folder.path(), "c.parquet", other)).unwrap());
+}
+
+#[test]
+fn more_rows_than_a_group_keep_their_order() {
+    let folder = tempfile::tempdir().unwrap();
+    let count = ROWS_PER_GROUP as u64 + 3;
+    let many = (0..count).map(|sample| OutcomeRow { sample, ..rows().swap_remove(1) }).collect();
+    let batches = read(&write(folder.path(), "a.parquet", many));
+    let samples: Vec<u64> =
+        batches.iter().flat_map(|batch| batch["sample"].as_primitive::<UInt64Type>().values().to_vec()).collect();
+    assert_eq!(samples, (0..count).collect::<Vec<_>>());
+    assert_eq!(batches[0]["min_thw_front_s"].as_primitive::<Float64Type>().value(0).to_bits(), 0.7_f64.to_bits());
+}
+
+#[test]
+fn an_error_among_the_rows_leaves_the_old_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.parquet");
+    std::fs::write(&path, "old").unwrap();
+    let rows = rows().into_iter().map(Ok).chain([Err(WriteError::new(Path::new("journal"), io::Error::other("cut")))]);
+    let error = write_outcomes(&path, &BTreeMap::new(), rows).unwrap_err();
+    assert_eq!(error.to_string(), "failed to write journal: cut");
+    assert_eq!(std::fs::read(&path).unwrap(), b"old");
+}
+
+#[test]
+fn a_parameter_that_is_a_label_anywhere_is_text() {
+    let mut mixed = Parameters::default();
+    mixed.insert(ParameterName::new("rear-class").unwrap(), Value::Number(1.0));
+    let columns = parameter_columns([&mixed, &parameters("truck")]);
+    let kinds: Vec<(&str, ParameterKind)> = columns.iter().map(|(name, kind)| (name.as_str(), *kind)).collect();
+    assert_eq!(kinds, [("closing-mps", ParameterKind::Number), ("rear-class", ParameterKind::Label)]);
+}

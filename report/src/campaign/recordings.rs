@@ -1,0 +1,93 @@
+//! Recordings of chosen samples of a campaign, with a page that shows them.
+
+use std::fs;
+
+use closecall_campaign::folder::Folder;
+use closecall_campaign::saved::SavedCampaign;
+use closecall_campaign::selection::{Chooser, Chosen, Selection};
+use closecall_scenarios::atomic::WriteError;
+use closecall_simulation::scenario::ScenarioFile;
+
+use super::files::ReportError;
+use super::findings::Recordings;
+use super::recordings_index::{IndexEntry, write_index};
+use crate::run::figure::still;
+use crate::run::film::{Level, film_arms};
+use crate::run::rerun::record_films;
+
+/// The folder of the recordings within a campaign's folder.
+pub(super) const RECORDINGS: &str = "recordings";
+/// The page that shows them.
+pub(super) const INDEX: &str = "index.html";
+
+/// Runs the chosen samples again, all arms of each into one file, and writes the page.
+pub(super) fn record(
+    folder: &Folder,
+    scenarios: &[&ScenarioFile],
+    selection: Selection,
+) -> Result<Recordings, ReportError> {
+    let saved = SavedCampaign::of(folder.clone())?;
+    let path = folder.file(RECORDINGS);
+    // The recordings of an earlier, identical campaign may have been others.
+    if path.exists() {
+        fs::remove_dir_all(&path).map_err(|source| WriteError::new(&path, source))?;
+    }
+    let mut recorded = Recordings::new();
+    let mut entries = Vec::new();
+    for scenario in scenarios {
+        for chosen in choose(&saved, scenario, selection)? {
+            fs::create_dir_all(&path).map_err(|source| WriteError::new(&path, source))?;
+            let name = &scenario.config().name;
+            let entry = record_one(&saved, name, &chosen)?;
+            for outcome in &entry.outcomes {
+                let key = (name.clone(), chosen.sample, outcome.controller.clone());
+                recorded.insert(key, format!("{RECORDINGS}/{}", entry.file));
+            }
+            entries.push(entry);
+        }
+    }
+    if !entries.is_empty() {
+        write_index(&path.join(INDEX), &entries)?;
+    }
+    Ok(recorded)
+}
+
+fn choose(saved: &SavedCampaign, scenario: &ScenarioFile, selection: Selection) -> Result<Vec<Chosen>, ReportError> {
+    let Some(ego) = scenario.ego_id() else { return Ok(Vec::new()) };
+    let mut chooser = Chooser::new(selection);
+    for record in saved.folder().records()? {
+        let record = record?;
+        if record.scenario == scenario.config().name {
+            chooser.push(&record);
+        }
+    }
+    Ok(chooser.choose(saved.manifest().sampling.seed, ego))
+}
+
+fn record_one(saved: &SavedCampaign, scenario: &str, chosen: &Chosen) -> Result<IndexEntry, ReportError> {
+    let sample = chosen.sample;
+    let (concrete, key) = saved.sample(Some(scenario), sample)?;
+    let films = film_arms(&concrete, key, &saved.manifest().arms(), Level::Full)
+        .map_err(|source| ReportError::Sample { sample, source })?;
+    let file = format!("{scenario}-{sample}.rrd");
+    record_films(&saved.folder().file(&format!("{RECORDINGS}/{file}")), &films)?;
+    let paired = if films.len() > 1 { " --paired" } else { "" };
+    let replay = format!(
+        "closecall replay {} {sample} --scenario {scenario}{paired} --record {file}",
+        saved.folder().path().display(),
+    );
+    let story = films.iter().flat_map(|film| {
+        let arm = film.arm();
+        [Some(film.headline()), film.verdict_on_mis()].into_iter().flatten().map(move |line| format!("{arm}: {line}"))
+    });
+    Ok(IndexEntry {
+        scenario: scenario.to_owned(),
+        sample,
+        reasons: chosen.reasons.clone(),
+        file,
+        replay,
+        story: story.collect(),
+        still: films.last().map_or(String::new(), still),
+        outcomes: films.iter().filter_map(|film| film.outcome().cloned()).collect(),
+    })
+}

@@ -1,0 +1,61 @@
+//! Wall times of a campaign's samples, as Parquet: in a file of their own, since they differ from run to run.
+
+use std::io;
+use std::path::Path;
+use std::sync::Arc;
+
+use arrow::array::{ArrayRef, Float64Array, RecordBatch, StringArray, UInt64Array};
+use arrow::datatypes::{DataType, Schema};
+use parquet::arrow::ArrowWriter;
+
+use crate::table::{ROWS_PER_GROUP, field, properties};
+use closecall_scenarios::atomic::{WriteError, write_file};
+
+/// What one sample cost in one arm.
+#[derive(Clone, Debug)]
+pub struct Timing {
+    /// The scenario's name.
+    pub scenario: String,
+    /// Number of the sample.
+    pub sample: u64,
+    /// The controller's name.
+    pub controller: String,
+    /// Wall time [s].
+    pub wall_s: f64,
+}
+
+/// Writes the table, one row for each sample and controller, group by group as they come.
+///
+/// # Errors
+/// [`WriteError`] where the file cannot be written; a file of that name is then as it was.
+pub fn write_timings(path: &Path, timings: impl Iterator<Item = Timing>) -> Result<(), WriteError> {
+    let schema = Arc::new(Schema::new(vec![
+        field("scenario", DataType::Utf8, None),
+        field("sample", DataType::UInt64, None),
+        field("controller", DataType::Utf8, None),
+        field("wall_s", DataType::Float64, Some("s")),
+    ]));
+    let mut timings = timings.fuse();
+    write_file(path, |file| {
+        let mut writer = ArrowWriter::try_new(file, schema.clone(), Some(properties())).map_err(io::Error::other)?;
+        loop {
+            let group: Vec<Timing> = timings.by_ref().take(ROWS_PER_GROUP).collect();
+            if group.is_empty() {
+                break;
+            }
+            let batch = RecordBatch::try_new(schema.clone(), columns(&group)).map_err(io::Error::other)?;
+            writer.write(&batch).map_err(io::Error::other)?;
+        }
+        writer.close().map_err(io::Error::other)?;
+        Ok(())
+    })
+}
+
+fn columns(timings: &[Timing]) -> Vec<ArrayRef> {
+    vec![
+        Arc::new(StringArray::from_iter_values(timings.iter().map(|timing| &timing.scenario))),
+        Arc::new(UInt64Array::from_iter_values(timings.iter().map(|timing| timing.sample))),
+        Arc::new(StringArray::from_iter_values(timings.iter().map(|timing| &timing.controller))),
+        Arc::new(Float64Array::from_iter_values(timings.iter().map(|timing| timing.wall_s))),
+    ]
+}

@@ -1,0 +1,42 @@
+//! Sending a layout, with the properties that the library's builder has no words for.
+
+use rerun::blueprint::BlueprintActivation;
+use rerun::external::re_log_types::BlueprintActivationCommand;
+use rerun::log::LogMsg;
+use rerun::{RecordingStream, RecordingStreamBuilder, StoreId, StoreKind};
+
+use super::super::write::{APPLICATION, RecordError};
+use super::{Layout, Shown};
+
+impl Layout {
+    /// Sends the layout for these films into a recording.
+    pub(in super::super) fn send(mut self, stream: &RecordingStream, films: &[Shown]) -> Result<(), RecordError> {
+        let blueprint = self.blueprint(films);
+        let (carrier, messages) = RecordingStreamBuilder::new(APPLICATION).memory()?;
+        blueprint.send(&carrier, BlueprintActivation::default())?;
+        let mut messages: Vec<LogMsg> = messages.take();
+        messages.retain(|message| message.store_id().kind() == StoreKind::Blueprint && !is_activation(message));
+        let Some(id) = messages.first().map(|message| message.store_id().clone()) else {
+            return Err(RecordError::Disabled);
+        };
+        messages.extend(self.property_messages(&id)?);
+        stream.send_blueprint(messages, BlueprintActivationCommand::make_active(id));
+        Ok(())
+    }
+
+    fn property_messages(self, id: &StoreId) -> Result<Vec<LogMsg>, RecordError> {
+        let (stream, messages) = RecordingStreamBuilder::from_store_id(id).send_properties(false).memory()?;
+        // The blueprint's only timeline, by which the viewer reads it.
+        stream.set_time_sequence("blueprint", 0);
+        for (path, property) in self.properties {
+            stream.log(path, property.as_ref())?;
+        }
+        let mut messages = messages.take();
+        messages.retain(|message| matches!(message, LogMsg::ArrowMsg(..)));
+        Ok(messages)
+    }
+}
+
+fn is_activation(message: &LogMsg) -> bool {
+    matches!(message, LogMsg::BlueprintActivationCommand(_))
+}

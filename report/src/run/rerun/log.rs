@@ -1,0 +1,62 @@
+//! What happened, in words, at the moment it happened.
+
+use closecall_traffic::Time;
+use rerun::{TextLog, TextLogLevel};
+
+use super::RecordError;
+use super::palette::{self, Rgba};
+use super::plots::phase_word;
+use super::stream::Writer;
+use crate::run::film::{Film, collision_text, note_words, state_word};
+use closecall_simulation::Happening;
+
+/// One line of the log.
+struct Line {
+    time: Time,
+    entity: &'static str,
+    level: &'static str,
+    colour: Rgba,
+    text: String,
+}
+
+/// Writes the log of a film; where there are several, each line says whose it is.
+pub(super) fn write(writer: &Writer<'_>, film: &Film, is_alone: bool) -> Result<(), RecordError> {
+    let start = film.frames.first().map_or(Time::ZERO, |frame| frame.time);
+    let plain = |entity, time, text| Line { time, entity, level: TextLogLevel::INFO, colour: palette::NEUTRAL, text };
+    let mut lines = vec![plain("log/run", start, film.title.clone())];
+    lines.extend(film.happenings.iter().map(|(time, what)| line(film, *time, what)));
+    lines.extend(film.moments().iter().map(|noted| {
+        let text = format!("({}) {}", noted.moment.letter(), noted.moment.text());
+        Line { colour: palette::MARKING, ..plain("log/moment", noted.time, text) }
+    }));
+    lines.extend(film.notes.iter().map(|(time, text)| plain("log/note", *time, text.clone())));
+    lines.push(plain("log/run", film.end(), "the run ends here".to_owned()));
+    for line in lines {
+        let text = if is_alone { line.text } else { format!("[{}] {}", film.arm, line.text) };
+        let row = TextLog::new(text).with_level(line.level).with_color(line.colour);
+        writer.rows(line.entity, &[line.time], |_| row.clone().columns_of_unit_batches())?;
+    }
+    Ok(())
+}
+
+fn line(film: &Film, time: Time, what: &Happening) -> Line {
+    let info = |entity, colour, text| Line { time, entity, level: TextLogLevel::INFO, colour, text };
+    let warn = |entity, colour, text| Line { time, entity, level: TextLogLevel::WARN, colour, text };
+    match what {
+        Happening::EventTriggered { event } => warn("log/event", palette::WARNING, format!("event `{event}` sets in")),
+        Happening::DriverNote { actor, note } => {
+            let name = film.cast.get(*actor).map_or("?", |actor| actor.name.as_str());
+            let colour = palette::actor(*actor, film.ego);
+            info("log/driver", colour, format!("{name} {}", note_words(*note)))
+        }
+        Happening::EgoStateChanged { from, to, reason } => {
+            let text = format!("ego: {} -> {} ({reason})", state_word(*from), state_word(*to));
+            info("log/ego", palette::EGO, text)
+        }
+        Happening::PhaseChanged { to } => info("log/phase", palette::NEUTRAL, format!("phase: {}", phase_word(*to))),
+        Happening::Collision(touch) => {
+            let text = format!("COLLISION: {}", collision_text(film.settled(touch)));
+            Line { time, entity: "log/collision", level: TextLogLevel::ERROR, colour: palette::CRITICAL, text }
+        }
+    }
+}

@@ -1,0 +1,263 @@
+//! Curves and bands over time: margins, speeds, accelerations, states.
+
+use closecall_controllers::{EgoState, MisPlan};
+use closecall_scenarios::criticality::{CRITICAL_DCE_M, CRITICAL_TTCE_S};
+use closecall_traffic::Time;
+use closecall_traffic::metrics::Encounter;
+use rerun::{SeriesLines, StateChange, StateConfiguration};
+
+use super::RecordError;
+use super::palette::{self, Rgba};
+use super::stream::{Writer, changes};
+use crate::run::film::{Film, Frame, state_word};
+use closecall_simulation::outcome::{CRITICAL_THW_S, Phase};
+
+const LINE: f32 = 2.0;
+const THIN_LINE: f32 = 1.0;
+
+/// Which of two films, drawn into the same plots, a curve belongs to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Role {
+    /// The only one.
+    Alone,
+    /// The one that is compared with: drawn dimmer.
+    Baseline,
+    /// The one that is looked at.
+    Tested,
+}
+
+/// The plots that have something to show, by their names.
+pub(super) type Shown = Vec<&'static str>;
+
+/// Writes every curve, and says which plots have any.
+pub(super) fn write(writer: &Writer<'_>, film: &Film, role: Role) -> Result<Shown, RecordError> {
+    let plots = Plots { writer, film, role, times: film.times() };
+    let mut shown = Shown::new();
+    let mut note = |name: &'static str, has_curve: bool| shown.extend(has_curve.then_some(name));
+    note("headway", plots.headways()?);
+    note("gap", plots.gaps()?);
+    note("encounter", plots.encounter()?);
+    plots.motion()?;
+    note("speed", true);
+    note("acceleration", true);
+    note("margin", plots.margin()?);
+    plots.states()?;
+    Ok(shown)
+}
+
+struct Plots<'a> {
+    writer: &'a Writer<'a>,
+    film: &'a Film,
+    role: Role,
+    times: Vec<Time>,
+}
+
+/// What a curve looks like.
+struct Pen<'a> {
+    name: &'a str,
+    colour: Rgba,
+    width: f32,
+}
+
+impl Plots<'_> {
+    /// Writes a curve, and says whether it has any value.
+    fn curve(&self, entity: &str, pen: &Pen<'_>, of: impl Fn(&Frame) -> Option<f64>) -> Result<bool, RecordError> {
+        self.series(entity, pen, &self.film.frames.iter().map(of).collect::<Vec<_>>())
+    }
+
+    fn series(&self, entity: &str, pen: &Pen<'_>, values: &[Option<f64>]) -> Result<bool, RecordError> {
+        if values.iter().all(Option::is_none) {
+            return Ok(false);
+        }
+        self.pen(entity, pen)?;
+        self.writer.series(entity, &self.times, values)?;
+        Ok(true)
+    }
+
+    fn pen(&self, entity: &str, pen: &Pen<'_>) -> Result<(), RecordError> {
+        let name = match self.role {
+            Role::Alone => pen.name.to_owned(),
+            Role::Baseline | Role::Tested => format!("{} ({})", pen.name, self.film.arm),
+        };
+        let (colour, width) = match self.role {
+            Role::Baseline => (palette::dim(pen.colour), THIN_LINE),
+            Role::Alone | Role::Tested => (pen.colour, pen.width),
+        };
+        let style = SeriesLines::new().with_names([name]).with_colors([colour]).with_widths([width]);
+        self.writer.fixed(entity, &style)
+    }
+
+    /// A level that values are compared with, from the first to the last frame; once where two films share a plot.
+    fn level(&self, entity: &str, name: &str, level: f64) -> Result<(), RecordError> {
+        if self.role == Role::Baseline {
+            return Ok(());
+        }
+        let style = SeriesLines::new().with_names([name]).with_colors([palette::CRITICAL]).with_widths([THIN_LINE]);
+        self.writer.fixed(entity, &style)?;
+        self.writer.series(entity, &self.times, &vec![Some(level); self.times.len()])
+    }
+
+    fn headways(&self) -> Result<bool, RecordError> {
+        let front = Pen { name: "front", colour: palette::FRONT, width: LINE };
+        let front = self.curve("plots/headway/front", &front, |frame| frame.margins.thw_front_s.ok())?;
+        let rear = Pen { name: "rear", colour: palette::REAR, width: LINE };
+        let rear = self.curve("plots/headway/rear", &rear, |frame| frame.margins.thw_rear_s.ok())?;
+        if front || rear {
+            self.level("plots/headway/critical", "0.9 s", CRITICAL_THW_S)?;
+        }
+        Ok(front || rear)
+    }
+
+    fn gaps(&self) -> Result<bool, RecordError> {
+        let front = Pen { name: "front", colour: palette::FRONT, width: LINE };
+        let front = self.curve("plots/gap/front", &front, |frame| frame.margins.gap_front_m.ok())?;
+        let rear = Pen { name: "rear", colour: palette::REAR, width: LINE };
+        let rear = self.curve("plots/gap/rear", &rear, |frame| frame.margins.gap_rear_m.ok())?;
+        let seen = Pen { name: "rear, MIS", colour: palette::NEUTRAL, width: THIN_LINE };
+        let seen = self.curve("plots/gap/rear_seen", &seen, |frame| Some(plan(frame)?.rear_gap_m))?;
+        Ok(front || rear || seen)
+    }
+
+    /// The closest encounter ahead, both vehicles at their present velocities, as it truly is and as the MIS sees it.
+    fn encounter(&self) -> Result<bool, RecordError> {
+        let encounters: Vec<Option<Encounter>> = (0..self.times.len()).map(|row| self.film.encounter(row)).collect();
+        let of = |of: fn(&Encounter) -> f64| encounters.iter().map(|at| at.as_ref().map(of)).collect::<Vec<_>>();
+        let ttce = Pen { name: "TTCE", colour: palette::REAR, width: LINE };
+        let any = self.series("plots/encounter/ttce", &ttce, &of(|encounter| encounter.ttce_s))?;
+        // The distance matters where the encounter is near: far ahead it says little.
+        let near = |encounter: &Encounter| (encounter.ttce_s < CRITICAL_TTCE_S).then_some(encounter.dce_m);
+        let distances: Vec<_> = encounters.iter().map(|at| at.as_ref().and_then(near)).collect();
+        let dce = Pen { name: "DCE if near", colour: palette::WARNING, width: LINE };
+        self.series("plots/encounter/dce", &dce, &distances)?;
+        let seen = Pen { name: "TTCE, MIS", colour: palette::NEUTRAL, width: THIN_LINE };
+        let seen = self.curve("plots/encounter/ttce_seen", &seen, |frame| plan(frame)?.ttce_s.ok())?;
+        let planned = Pen { name: "t_c, MIS", colour: palette::EGO, width: THIN_LINE };
+        self.curve("plots/encounter/planned", &planned, |frame| plan(frame)?.time_to_critical_s.ok())?;
+        if any || seen {
+            self.level("plots/encounter/critical_ttce", "2.6 s", CRITICAL_TTCE_S)?;
+            self.level("plots/encounter/critical_dce", "1.0 m", CRITICAL_DCE_M)?;
+        }
+        Ok(any || seen)
+    }
+
+    fn motion(&self) -> Result<(), RecordError> {
+        for (place, actor) in self.film.cast.iter().enumerate().filter(|(_, actor)| actor.is_plotted) {
+            let colour = palette::actor(place, self.film.ego);
+            let pen = Pen { name: &actor.name, colour, width: LINE };
+            let of = |of: fn(&closecall_traffic::VehicleState) -> f64| {
+                let rows = self.film.frames.iter().enumerate();
+                rows.map(|(row, frame)| actor.rows.contains(&row).then(|| of(&frame.states[place]))).collect::<Vec<_>>()
+            };
+            self.series(&format!("plots/speed/{}", actor.name), &pen, &of(|state| state.speed_mps))?;
+            self.series(&format!("plots/acceleration/{}", actor.name), &pen, &of(|state| state.acceleration_mps2))?;
+        }
+        let commanded = Pen { name: "ego, commanded", colour: palette::NEUTRAL, width: THIN_LINE };
+        self.curve("plots/acceleration/commanded", &commanded, |frame| Some(frame.command?.acceleration_mps2))?;
+        for (number, limit) in self.film.acceleration_limits.iter().enumerate() {
+            self.level(&format!("plots/acceleration/limit_{number}"), &limit.name, limit.value)?;
+        }
+        Ok(())
+    }
+
+    /// The front time headway gained since the system first engaged, beside its goal.
+    fn margin(&self) -> Result<bool, RecordError> {
+        let increases = |frame: &&Frame| frame.command.is_some_and(|command| command.state == EgoState::Increasing);
+        let first = self.film.frames.iter().find(increases);
+        let start = first.and_then(|frame| Some((frame.time, frame.margins.thw_front_s.ok()?, plan(frame))));
+        let Some((since, thw_s, planned)) = start else { return Ok(false) };
+        let gained = |frame: &Frame, thw: Option<f64>| thw.filter(|_| frame.time >= since).map(|now_s| now_s - thw_s);
+        let pen = Pen { name: "gained", colour: palette::EGO, width: LINE };
+        self.curve("plots/margin/gained", &pen, |frame| gained(frame, frame.margins.thw_front_s.ok()))?;
+        let pen = Pen { name: "foreseen", colour: palette::NEUTRAL, width: THIN_LINE };
+        self.curve("plots/margin/foreseen", &pen, |frame| gained(frame, plan(frame)?.thw_at_critical_s.ok()))?;
+        let goal_s = planned.map(|plan| plan.goal_thw_s - thw_s);
+        let pen = Pen { name: "goal +2 s", colour: palette::SAFE, width: THIN_LINE };
+        self.curve("plots/margin/goal", &pen, |frame| goal_s.filter(|_| frame.time >= since))?;
+        Ok(true)
+    }
+
+    fn states(&self) -> Result<(), RecordError> {
+        let frames = &self.film.frames;
+        if frames.iter().all(|frame| frame.command.is_some()) {
+            let state = |frame: &Frame| frame.command.map_or("", |command| state_word(command.state));
+            self.band("states/1_mis", &frames.iter().map(state).collect::<Vec<_>>(), &STATE_COLOURS)?;
+            let phase = |frame: &Frame| frame.phase.map_or("", phase_word);
+            self.band("states/2_encounter", &frames.iter().map(phase).collect::<Vec<_>>(), &PHASE_COLOURS)?;
+        }
+        self.moments()?;
+        for (place, actor) in self.film.cast.iter().enumerate() {
+            let braking = frames.iter().map(|frame| frame.states[place].brake_light);
+            let words: Vec<&str> = braking.map(|lit| if lit { BRAKES } else { DRIVES }).collect();
+            if words.contains(&BRAKES) {
+                self.band(&format!("states/4_{}_brake_light", actor.name), &words, &BRAKE_COLOURS)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The part of the encounter after each of the moments (a) to (e).
+    fn moments(&self) -> Result<(), RecordError> {
+        let moments = self.film.moments();
+        if moments.is_empty() {
+            return Ok(());
+        }
+        let texts: Vec<String> =
+            moments.iter().map(|noted| format!("({}) {}", noted.moment.letter(), noted.moment.text())).collect();
+        let latest = |time: Time| moments.iter().rposition(|noted| noted.time <= time);
+        let words: Vec<&str> =
+            self.times.iter().map(|&time| latest(time).map_or(BEFORE, |place| texts[place].as_str())).collect();
+        let colours = texts.iter().enumerate().map(|(place, text)| (text.as_str(), palette::moment(place)));
+        self.band(
+            "states/3_moments",
+            &words,
+            &std::iter::once((BEFORE, palette::QUIET)).chain(colours).collect::<Vec<_>>(),
+        )
+    }
+
+    fn band(&self, entity: &str, words: &[&str], colours: &[(&str, Rgba)]) -> Result<(), RecordError> {
+        let configuration = StateConfiguration::new()
+            .with_values(colours.iter().map(|(word, _)| *word))
+            .with_labels(colours.iter().map(|(word, _)| *word))
+            .with_colors(colours.iter().map(|(_, colour)| *colour));
+        self.writer.fixed(entity, &configuration)?;
+        let rows = changes(words);
+        let times: Vec<Time> = rows.iter().map(|&row| self.times[row]).collect();
+        self.writer.rows(entity, &times, |range| {
+            StateChange::new().with_state(rows[range].iter().map(|&row| words[row])).columns_of_unit_batches()
+        })
+    }
+}
+
+fn plan(frame: &Frame) -> Option<MisPlan> {
+    frame.command?.plan
+}
+
+const BEFORE: &str = "-";
+const BRAKES: &str = "on";
+const DRIVES: &str = "off";
+const BRAKE_COLOURS: [(&str, Rgba); 2] = [(BRAKES, palette::BRAKE_LIGHT), (DRIVES, palette::QUIET)];
+
+const STATE_COLOURS: [(&str, Rgba); 5] = [
+    (state_word(EgoState::Following), palette::QUIET),
+    (state_word(EgoState::Increasing), palette::EGO),
+    (state_word(EgoState::Holding), palette::SAFE),
+    (state_word(EgoState::Releasing), palette::NEUTRAL),
+    (state_word(EgoState::EmergencyBraking), palette::CRITICAL),
+];
+
+const PHASE_COLOURS: [(&str, Rgba); 4] = [
+    (phase_word(Phase::Approach), palette::QUIET),
+    (phase_word(Phase::Critical), palette::CRITICAL),
+    (phase_word(Phase::Overtaking), palette::WARNING),
+    (phase_word(Phase::After), palette::NEUTRAL),
+];
+
+/// What a phase of the encounter is called.
+pub(super) const fn phase_word(phase: Phase) -> &'static str {
+    match phase {
+        Phase::Approach => "approach",
+        Phase::Critical => "critical",
+        Phase::Overtaking => "overtaking",
+        Phase::After => "after",
+    }
+}

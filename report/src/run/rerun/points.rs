@@ -1,0 +1,110 @@
+//! The rear LiDAR's points, in layers that can be switched, and the boxes fitted to the clusters.
+//!
+//! | layer | points | colour |
+//! |---|---|---|
+//! | `clusters` | those that belong to a box | by box |
+//! | `rejected` | those that belong to none: ground, guard rails, spray, noise | by intensity |
+//! | `intensity` | those of `clusters` again | by intensity: with `rejected`, the raw scan |
+
+use closecall_sensors::Detection;
+use closecall_traffic::Time;
+use rerun::{Boxes3D, FillMode, Points3D};
+
+use super::RecordError;
+use super::palette::{self, Rgba};
+use super::stream::Writer;
+use super::vehicles::about_up;
+use crate::run::film::{Film, NO_CLUSTER, Scan};
+
+/// A point is drawn as a ball of this radius [m].
+const POINT_M: f32 = 0.05;
+
+/// Writes the layers; names those that are there for whoever wants them.
+pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<Vec<String>, RecordError> {
+    let chosen: Vec<(Time, &Scan)> = chosen(film);
+    if chosen.is_empty() {
+        return Ok(Vec::new());
+    }
+    let times: Vec<Time> = chosen.iter().map(|(time, _)| *time).collect();
+    let scans: Vec<&Scan> = chosen.iter().map(|(_, scan)| *scan).collect();
+    let is_clustered = |scan: &Scan, point: usize| scan.clusters[point] != NO_CLUSTER;
+    let shade = |scan: &Scan, point: usize| palette::intensity(scan.intensities[point]);
+    let clusters =
+        layer(&scans, |scan, point| is_clustered(scan, point).then(|| palette::cluster(scan.clusters[point])));
+    write_layer(writer, "world/ego/lidar/clusters", &times, &clusters)?;
+    let intensity = layer(&scans, |scan, point| is_clustered(scan, point).then(|| shade(scan, point)));
+    write_layer(writer, "world/ego/lidar/intensity", &times, &intensity)?;
+    let rejected = layer(&scans, |scan, point| (!is_clustered(scan, point)).then(|| shade(scan, point)));
+    write_layer(writer, "world/ego/lidar/rejected", &times, &rejected)?;
+    write_boxes(writer, &times, &scans)?;
+    Ok(["intensity", "rejected", "boxes"].map(|layer| format!("world/ego/lidar/{layer}")).to_vec())
+}
+
+/// The scans that were kept, each with its time.
+fn chosen(film: &Film) -> Vec<(Time, &Scan)> {
+    film.frames.iter().filter_map(|frame| Some((frame.time, frame.scan.as_ref()?))).collect()
+}
+
+/// Points of all scans in one row after the other.
+#[derive(Default)]
+struct Layer {
+    points_m: Vec<[f32; 3]>,
+    colours: Vec<Rgba>,
+    /// Number of points of each scan.
+    lengths: Vec<usize>,
+    /// Where the points of each scan begin.
+    starts: Vec<usize>,
+}
+
+fn layer(scans: &[&Scan], colour: impl Fn(&Scan, usize) -> Option<Rgba>) -> Layer {
+    let mut layer = Layer::default();
+    for scan in scans {
+        let first = layer.points_m.len();
+        layer.starts.push(first);
+        for (point, at_m) in scan.points_m().enumerate() {
+            if let Some(colour) = colour(scan, point) {
+                layer.points_m.push(at_m);
+                layer.colours.push(colour);
+            }
+        }
+        layer.lengths.push(layer.points_m.len() - first);
+    }
+    layer
+}
+
+fn write_layer(writer: &Writer<'_>, entity: &str, times: &[Time], layer: &Layer) -> Result<(), RecordError> {
+    writer.fixed(entity, &Points3D::update_fields().with_radii([POINT_M]))?;
+    writer.rows(entity, times, |range| {
+        let first = layer.starts[range.start];
+        let last = layer.starts.get(range.end).copied().unwrap_or(layer.points_m.len());
+        Points3D::update_fields()
+            .with_positions(layer.points_m[first..last].iter().copied())
+            .with_colors(layer.colours[first..last].iter().copied())
+            .columns(layer.lengths[range].iter().copied())
+    })
+}
+
+fn write_boxes(writer: &Writer<'_>, times: &[Time], scans: &[&Scan]) -> Result<(), RecordError> {
+    let entity = "world/ego/lidar/boxes";
+    let fixed = Boxes3D::update_fields()
+        .with_fill_mode(FillMode::MajorWireframe)
+        .with_radii([0.02_f32])
+        .with_colors([palette::BOX_FIT])
+        .with_show_labels(false);
+    writer.fixed(entity, &fixed)?;
+    writer.rows(entity, times, |range| {
+        let scans = &scans[range];
+        let all = || scans.iter().flat_map(|scan| &scan.boxes);
+        let half = |extent_m: f64| (0.5 * extent_m) as f32;
+        let centre = |found: &Detection| {
+            let (x_m, y_m) = found.centre_m();
+            [x_m as f32, y_m as f32, half(found.top_m)]
+        };
+        Boxes3D::update_fields()
+            .with_centers(all().map(centre))
+            .with_half_sizes(all().map(|found| [half(found.length_m), half(found.width_m), half(found.top_m)]))
+            .with_quaternions(all().map(|found| about_up(found.heading_rad)))
+            .with_labels(all().map(|found| format!("{} points", found.points)))
+            .columns(scans.iter().map(|scan| scan.boxes.len()).collect::<Vec<_>>())
+    })
+}

@@ -1,0 +1,148 @@
+//! The road, drawn once: surface, lane markings, guard rails.
+
+use closecall_traffic::{Lane, Road};
+use rerun::{LineStrips3D, Mesh3D};
+
+use super::RecordError;
+use super::palette::{self, Rgba};
+use super::stream::Writer;
+use crate::run::film::Film;
+
+/// Road shown beyond the first and the last place of any vehicle [m].
+const MARGIN_M: f64 = 300.0;
+/// Length of the pieces that a curve is drawn with [m]: 3 cm off the arc at the tightest radius.
+const PIECE_M: f64 = 10.0;
+/// Hard shoulder and verge beside the lanes [m].
+const SHOULDER_M: f64 = 2.5;
+const VERGE_M: f64 = 40.0;
+/// Lane marking of German motorways (RMS): 6 m of line, 12 m apart, 0.15 m wide; edge lines 0.30 m.
+const DASH_M: f64 = 6.0;
+const DASH_PERIOD_M: f64 = 18.0;
+const DASH_WIDTH_M: f64 = 0.15;
+const EDGE_WIDTH_M: f64 = 0.30;
+/// Guard rails: height of the beam, distance of the posts, distance from the edge of the lanes [m].
+const RAIL_HEIGHT_M: f64 = 0.75;
+const POST_PERIOD_M: f64 = 4.0;
+const RAIL_OFFSET_M: f64 = SHOULDER_M - 0.5;
+
+/// Heights that keep what lies flat apart [m].
+const VERGE_Z_M: f64 = -0.30;
+const MARKING_Z_M: f64 = 0.03;
+
+pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError> {
+    let road = &film.road;
+    let (first_m, last_m) = film.reach_m();
+    if !(first_m <= last_m) {
+        return Ok(());
+    }
+    let (from_m, to_m) = (first_m - MARGIN_M, last_m + MARGIN_M);
+    let left_m = SHOULDER_M;
+    let right_m = road.right_edge_m() - SHOULDER_M;
+
+    let mut verge = Ribbons::new(road, VERGE_Z_M);
+    verge.add([from_m, to_m], [right_m - VERGE_M, left_m + VERGE_M]);
+    writer.fixed("world/road/verge", &verge.mesh(palette::VERGE))?;
+
+    let mut surface = Ribbons::new(road, 0.0);
+    surface.add([from_m, to_m], [right_m, left_m]);
+    writer.fixed("world/road/surface", &surface.mesh(palette::ROAD))?;
+
+    writer.fixed("world/road/markings", &markings(road, [from_m, to_m]).mesh(palette::MARKING))?;
+    if road.has_guard_rails() {
+        writer.fixed("world/road/guard_rails", &guard_rails(road, [from_m, to_m]))?;
+    }
+    Ok(())
+}
+
+fn markings(road: &Road, [from_m, to_m]: [f64; 2]) -> Ribbons<'_> {
+    let mut markings = Ribbons::new(road, MARKING_Z_M);
+    let around = |d_m: f64, width_m: f64| [d_m - 0.5 * width_m, d_m + 0.5 * width_m];
+    for edge_m in [0.0, road.right_edge_m()] {
+        markings.add([from_m, to_m], around(edge_m, EDGE_WIDTH_M));
+    }
+    for lane in 1..road.lanes() {
+        let line_m = road.lane_centre_m(Lane(lane)) - 0.5 * road.lane_width_m();
+        for dash in multiples(DASH_PERIOD_M, [from_m, to_m]) {
+            markings.add([dash, dash + DASH_M], around(line_m, DASH_WIDTH_M));
+        }
+    }
+    markings
+}
+
+fn guard_rails(road: &Road, [from_m, to_m]: [f64; 2]) -> LineStrips3D {
+    let mut strips: Vec<Vec<[f32; 3]>> = Vec::new();
+    for d_m in [RAIL_OFFSET_M, road.right_edge_m() - RAIL_OFFSET_M] {
+        let along = pieces(road, [from_m, to_m]);
+        strips.push(along.iter().map(|&s_m| point(road, s_m, d_m, RAIL_HEIGHT_M)).collect());
+        for s_m in multiples(POST_PERIOD_M, [from_m, to_m]) {
+            strips.push(vec![point(road, s_m, d_m, 0.0), point(road, s_m, d_m, RAIL_HEIGHT_M)]);
+        }
+    }
+    LineStrips3D::new(strips).with_colors([palette::RAIL]).with_radii([0.08_f32])
+}
+
+/// Multiples of `period_m` in a range: what is painted or planted stands at the same places in every recording.
+fn multiples(period_m: f64, [from_m, to_m]: [f64; 2]) -> impl Iterator<Item = f64> {
+    let first = (from_m / period_m).ceil();
+    let mut count = 0.0;
+    std::iter::from_fn(move || {
+        let at_m = (first + count) * period_m;
+        count += 1.0;
+        (at_m <= to_m).then_some(at_m)
+    })
+}
+
+/// The ends of the pieces that a stretch of the road is drawn with.
+fn pieces(road: &Road, [from_m, to_m]: [f64; 2]) -> Vec<f64> {
+    if road.curvature_per_m() == 0.0 {
+        return vec![from_m, to_m];
+    }
+    let count = ((to_m - from_m) / PIECE_M).ceil().max(1.0);
+    let mut ends = Vec::new();
+    let mut piece = 0.0;
+    while piece <= count {
+        ends.push(from_m + (to_m - from_m) * piece / count);
+        piece += 1.0;
+    }
+    ends
+}
+
+fn point(road: &Road, s_m: f64, d_m: f64, z_m: f64) -> [f32; 3] {
+    let pose = road.plane_pose(s_m, d_m, 0.0);
+    [pose.x_m as f32, pose.y_m as f32, z_m as f32]
+}
+
+/// Stretches of the road as flat quadrilaterals.
+struct Ribbons<'a> {
+    road: &'a Road,
+    z_m: f64,
+    vertices: Vec<[f32; 3]>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl<'a> Ribbons<'a> {
+    fn new(road: &'a Road, z_m: f64) -> Self {
+        Self { road, z_m, vertices: Vec::new(), triangles: Vec::new() }
+    }
+
+    fn add(&mut self, along_m: [f64; 2], [right_m, left_m]: [f64; 2]) {
+        let mut before = None;
+        for s_m in pieces(self.road, along_m) {
+            #[expect(clippy::cast_possible_truncation, reason = "a road has far fewer than 2^32 vertices")]
+            let here = self.vertices.len() as u32;
+            self.vertices.push(point(self.road, s_m, right_m, self.z_m));
+            self.vertices.push(point(self.road, s_m, left_m, self.z_m));
+            if let Some(before) = before.replace(here) {
+                self.triangles.push([before, here, here + 1]);
+                self.triangles.push([before, here + 1, before + 1]);
+            }
+        }
+    }
+
+    fn mesh(&self, colour: Rgba) -> Mesh3D {
+        Mesh3D::new(self.vertices.iter().copied())
+            .with_triangle_indices(self.triangles.iter().copied())
+            .with_vertex_normals(vec![[0.0_f32, 0.0, 1.0]; self.vertices.len()])
+            .with_vertex_colors(vec![colour; self.vertices.len()])
+    }
+}

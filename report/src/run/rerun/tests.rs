@@ -1,0 +1,247 @@
+use std::collections::BTreeSet;
+
+use closecall_scenarios::encounter::encounter;
+use closecall_scenarios::filters::smooth;
+use closecall_scenarios::lane_change::detect;
+use closecall_scenarios::sampling::Design;
+use closecall_sensors::SensorMode;
+use closecall_traffic::geometry::BoxSide;
+use rerun::log::{Chunk, LogMsg};
+use rerun::{StoreKind, TimelineName};
+
+use super::stream::{OPENING_TIMELINE, STEP_TIMELINE, TIME_TIMELINE};
+use super::*;
+use crate::run::film::{Comparison, FilmRecorder, film_encounter};
+use crate::traffic::traffic::TrafficRecorder;
+use closecall_campaign::runner::{Sampling, concrete};
+use closecall_simulation::controller::ControllerChoice;
+use closecall_simulation::outcome::{ClosedBy, Collision, Phase};
+use closecall_simulation::scenario::{RearDriver, ScenarioFile, reenact};
+use closecall_simulation::{Arm, CONTROL_STEP, RunKey, simulate};
+
+fn library(name: &str) -> ScenarioFile {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/library");
+    ScenarioFile::load(&folder.join(format!("{name}.toml")), &[]).unwrap()
+}
+
+/// One sample of a scenario of the library, filmed.
+fn filmed(name: &str, controller: ControllerChoice, (sensors, level): (Option<SensorMode>, Level)) -> Film {
+    let sampling = Sampling { seed: 1, design: Design::Random, samples: 1 };
+    let scenario = concrete(&library(name), sampling, 0).unwrap();
+    let arm = Arm { controller: controller.factory(), sensors };
+    let key = RunKey { seed: 1, sample: 0 };
+    let mut recorder = FilmRecorder::new(&scenario, key, &arm, level);
+    let outcome = simulate(&scenario, key, &arm, &mut recorder).unwrap();
+    recorder.finish(&outcome)
+}
+
+fn usual() -> Film {
+    filmed("low-thw-overtake", ControllerChoice::Mis, (None, Level::Full))
+}
+
+/// An encounter of our own traffic without the system, and the same with it.
+fn recorded_and_simulated(level: Level) -> [Film; 2] {
+    let (sampling, key) = (Sampling { seed: 1, design: Design::Random, samples: 1 }, RunKey { seed: 1, sample: 0 });
+    let arm = |controller: ControllerChoice| Arm { controller: controller.factory(), sensors: None };
+    let scenario = concrete(&library("overtake-without-brake"), sampling, 0).unwrap();
+    let mut traffic = TrafficRecorder::default();
+    traffic.begin(&scenario);
+    simulate(&scenario, key, &arm(ControllerChoice::Acc), &mut traffic).unwrap();
+    let recording = smooth(&traffic.finish("own"));
+    let changes = detect(&recording);
+    let found = encounter(&recording, &changes[0], &changes, CONTROL_STEP).unwrap();
+    let again = reenact(&found, RearDriver::Driver, (Path::new("own"), &[])).unwrap();
+    let again = again.concrete(&again.space().nominal()).unwrap();
+    let mut recorder = FilmRecorder::new(&again, key, &arm(ControllerChoice::Mis), level);
+    let outcome = simulate(&again, key, &arm(ControllerChoice::Mis), &mut recorder).unwrap();
+    let (recorded, simulated) = (film_encounter(&found, level).unwrap(), recorder.finish(&outcome));
+    let foreword = Comparison::new(&found, &recorded, &simulated).markdown(&found, &simulated, RearDriver::Driver);
+    [recorded.with_foreword(foreword), simulated]
+}
+
+fn chunks(films: &[Film], kind: StoreKind) -> Vec<Chunk> {
+    let messages = record(films).unwrap().take();
+    let of_kind = messages.iter().filter(|message| message.store_id().kind() == kind);
+    of_kind
+        .filter_map(|message| match message {
+            LogMsg::ArrowMsg(_, arrow) => Some(Chunk::from_arrow_msg(arrow).unwrap()),
+            _ => None,
+        })
+        .collect()
+}
+
+/// The latest moment on a timeline [ns].
+fn latest_ns(chunks: &[Chunk], timeline: &'static str) -> i64 {
+    let timeline = TimelineName::from_static_str(timeline);
+    let columns = chunks.iter().filter_map(|chunk| chunk.timelines().get(&timeline));
+    columns.map(|column| column.time_range().max().as_i64()).max().unwrap()
+}
+
+/// Every text that a component of the blueprint holds.
+fn texts(chunk: &Chunk, component: &str) -> Vec<String> {
+    let mut texts = Vec::new();
+    for list in chunk.components().values().filter(|column| column.descriptor.component.as_str() == component) {
+        let values = list.list_array.values();
+        let strings = values.as_any().downcast_ref::<arrow::array::StringArray>();
+        texts.extend(strings.into_iter().flat_map(|strings| strings.iter().flatten().map(str::to_owned)));
+    }
+    texts
+}
+
+/// Where the views of a recording look that have nothing there, and the timeline that it opens with.
+fn empty_views(films: &[Film]) -> (usize, Vec<String>, Vec<String>) {
+    let data = chunks(films, StoreKind::Recording);
+    let entities: BTreeSet<String> = data.iter().map(|chunk| chunk.entity_path().to_string()).collect();
+    let has =
+        |prefix: &str| entities.iter().any(|entity| entity == prefix || entity.starts_with(&format!("{prefix}/")));
+    let (mut views, mut empty, mut timelines) = (0, Vec::new(), Vec::new());
+    for chunk in chunks(films, StoreKind::Blueprint) {
+        let origins = texts(&chunk, "ViewBlueprint:space_origin");
+        views += origins.len();
+        let queries = texts(&chunk, "ViewContents:query");
+        let inherited = |query: &&String| query.contains("$origin");
+        let named = queries.iter().filter(|query| !inherited(query)).flat_map(|query| query.split_whitespace());
+        let named = named.map(|query| query.trim_start_matches('+').trim_end_matches("/**").to_owned());
+        let rootless = |origin: &String| origin != "/";
+        empty.extend(origins.into_iter().filter(rootless).chain(named).filter(|place| !has(place)));
+        timelines.extend(texts(&chunk, "TimePanelBlueprint:timeline"));
+    }
+    (views, empty, timelines)
+}
+
+#[test]
+fn every_scenario_of_the_library_fills_every_view_at_every_level() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/library");
+    let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let names = files.filter(|path| path.extension().is_some_and(|extension| extension == "toml"));
+    for name in names.map(|path| path.file_stem().unwrap().to_str().unwrap().to_owned()) {
+        for (level, least) in [(Level::Events, 5), (Level::Objects, 7), (Level::Full, 7)] {
+            let films = [filmed(&name, ControllerChoice::Mis, (Some(SensorMode::Object), level))];
+            let (views, empty, timelines) = empty_views(&films);
+            assert!(views >= least && empty.is_empty(), "{name}, {level:?}: {views} views, nothing at {empty:?}");
+            assert_eq!(timelines, [OPENING_TIMELINE], "{name}, {level:?}");
+        }
+    }
+}
+
+#[test]
+fn a_pair_fills_every_view_and_shows_the_baseline_as_ghosts() {
+    let film = |controller| filmed("paper-figure", controller, (None, Level::Objects));
+    let films = [film(ControllerChoice::Acc), film(ControllerChoice::Mis)];
+    let (views, empty, _) = empty_views(&films);
+    assert!(views >= 13 && empty.is_empty(), "{views} views, nothing at {empty:?}");
+    let data = chunks(&films, StoreKind::Recording);
+    for entity in ["/mis/world/ghosts/ego", "/mis/bird/ghosts", "/acc/world/ego/collision_1", "/mis/plots/margin/goal"]
+    {
+        assert!(data.iter().any(|chunk| chunk.entity_path().to_string() == entity), "{entity}");
+    }
+}
+
+#[test]
+fn recorded_and_simulated_traffic_share_views_and_time_lines_and_are_each_other_s_ghosts() {
+    for (level, least) in [(Level::Events, 7), (Level::Objects, 12), (Level::Full, 12)] {
+        let films = recorded_and_simulated(level);
+        let (views, empty, timelines) = empty_views(&films);
+        assert!(views >= least && empty.is_empty(), "{level:?}: {views} views, nothing at {empty:?}");
+        assert_eq!(timelines, [OPENING_TIMELINE], "{level:?}");
+    }
+    let films = recorded_and_simulated(Level::Objects);
+    let data = chunks(&films, StoreKind::Recording);
+    let half = |root: &str| -> Vec<Chunk> {
+        data.iter().filter(|chunk| chunk.entity_path().to_string().starts_with(root)).cloned().collect()
+    };
+    let halves = [half("/recorded/"), half("/mis/")];
+    for timeline in [TIME_TIMELINE, STEP_TIMELINE] {
+        let [recorded, simulated] = [&halves[0], &halves[1]].map(|half| latest_ns(half, timeline));
+        assert_eq!(recorded, simulated, "{timeline}");
+    }
+    assert!(halves.iter().all(|half| latest_ns(half, OPENING_TIMELINE) > 0));
+    for entity in ["/recorded/world/ghosts/ego", "/mis/world/ghosts/rear", "/recorded/bird/ghosts", "/mis/bird/ghosts"]
+    {
+        assert!(data.iter().any(|chunk| chunk.entity_path().to_string() == entity), "{entity}");
+    }
+    assert!(summary::markdown(&films).starts_with("### Recorded beside mis"));
+}
+
+#[test]
+fn full_sensors_show_points_boxes_truth_and_pictures() {
+    let films = [filmed("low-thw-overtake", ControllerChoice::Mis, (Some(SensorMode::Full), Level::Full))];
+    let data = chunks(&films, StoreKind::Recording);
+    let entities = [
+        "/world/ego/lidar/clusters",
+        "/world/ego/lidar/intensity",
+        "/world/ego/lidar/rejected",
+        "/world/ego/lidar/boxes",
+        "/world/ego/tracks/rear/covariance",
+        "/world/ego/truth/known",
+        "/world/ego/truth/missed",
+        "/world/ego/truth/false_tracks",
+        "/camera",
+        "/camera/windows",
+    ];
+    for entity in entities {
+        assert!(data.iter().any(|chunk| chunk.entity_path().to_string() == entity), "{entity}");
+    }
+    let (_, empty, _) = empty_views(&films);
+    assert!(empty.is_empty(), "{empty:?}");
+    assert!(encode(&films).unwrap().len() < 25_000_000);
+}
+
+#[test]
+fn both_timelines_span_the_run_and_the_opening_one_ends_at_the_critical_moment() {
+    let films = [usual()];
+    let chunks = chunks(&films, StoreKind::Recording);
+    let (critical, end) = (films[0].critical_moment(), films[0].end());
+    let latest = latest_ns(&chunks, OPENING_TIMELINE);
+    assert!(latest <= (critical + AFTER_CRITICAL).ns() && latest > critical.ns(), "{latest} {critical:?}");
+    assert_eq!(latest_ns(&chunks, TIME_TIMELINE), end.ns());
+    assert_eq!(latest_ns(&chunks, STEP_TIMELINE), end.ns() / films[0].period.ns());
+    for chunk in chunks.iter().filter(|chunk| !chunk.is_static()) {
+        for timeline in [TIME_TIMELINE, STEP_TIMELINE] {
+            let name = TimelineName::from_static_str(timeline);
+            assert!(chunk.timelines().contains_key(&name), "{} lacks {timeline}", chunk.entity_path());
+        }
+    }
+}
+
+#[test]
+fn a_collision_of_ego_is_what_matters_most() {
+    let mut film = usual();
+    let ids: Vec<_> = library("low-thw-overtake").config().actors.iter().map(|actor| actor.id.clone()).collect();
+    let collision = |time, between: [usize; 2]| Collision {
+        time,
+        between: between.map(|actor| ids[actor].clone()),
+        struck_side: [BoxSide::Rear, BoxSide::Front],
+        closed_by: ClosedBy::Second,
+        phase: Phase::Critical,
+        relative_speed_mps: 5.0,
+        delta_v_mps: [2.5, 2.5],
+    };
+    let ego = film.ego;
+    let others: Vec<usize> = (0..ids.len()).filter(|&actor| actor != ego).collect();
+    let mut collide = |time_ms, between| {
+        if let Some(outcome) = &mut film.outcome {
+            outcome.collisions.push(collision(Time::from_ms(time_ms), between));
+        }
+        film.clone()
+    };
+    let film = collide(1_000, [others[0], others[1]]);
+    assert_eq!(film.critical_moment(), Time::from_ms(1_000));
+    let film = collide(2_000, [ego, others[1]]);
+    assert_eq!(film.critical_moment(), Time::from_ms(2_000));
+    let marks = chunks(&[film], StoreKind::Recording);
+    assert!(marks.iter().any(|chunk| chunk.entity_path().to_string() == "/world/ego/collision_2"));
+}
+
+#[test]
+fn the_file_is_whole_and_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.rrd");
+    check_recordable(&path).unwrap();
+    assert!(!path.exists());
+    write_films(&path, &[usual()]).unwrap();
+    assert_eq!(&std::fs::read(&path).unwrap()[..4], b"RRF2");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    let error = check_recordable(&folder.path().join("no/folder.rrd")).unwrap_err();
+    assert!(error.to_string().contains("no/folder.rrd"), "{error}");
+}

@@ -1,0 +1,275 @@
+//! The vehicles on the road: bodies that move, lights, names, and the gaps around E.
+
+use closecall_traffic::geometry::BoxSide;
+use closecall_traffic::{Dimensions, Indicator, Measured, Road, Time, VehicleClass, VehicleState};
+use rerun::{Arrows3D, Boxes3D, FillMode, LineStrips3D, Points3D, Quaternion, Transform3D};
+
+use super::RecordError;
+use super::bodies;
+use super::palette::{self, Rgba};
+use super::stream::{Writer, changes};
+use crate::run::film::{Film, Frame};
+use closecall_simulation::outcome::{CRITICAL_THW_S, Collision};
+
+/// A velocity is drawn as the way that the vehicle goes in this time [s].
+const ARROW_S: f64 = 0.25;
+/// Names stand this high above the roof, arrows half as high [m].
+const LABEL_ABOVE_M: f64 = 0.8;
+/// Words about a collision lie on the road behind it, where no vehicle has its name: the first of them this far behind
+/// the middle of the vehicle that carries it, each further one so much further [m].
+const WORDS_BEHIND_M: [f32; 2] = [11.0, 4.0];
+/// A shorter gap has no room for its headway between the names of the two vehicles [m].
+pub(super) const LABELLED_GAP_M: f64 = 3.0;
+/// Height at which gaps are drawn [m].
+const GAP_Z_M: f64 = 0.5;
+
+/// The entity of an actor.
+pub(super) fn entity(film: &Film, actor: usize) -> String {
+    if actor == film.ego { "world/ego".to_owned() } else { format!("world/vehicles/{}", film.cast[actor].name) }
+}
+
+pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError> {
+    let all_times = film.times();
+    for (place, actor) in film.cast.iter().enumerate().filter(|(_, actor)| !actor.rows.is_empty()) {
+        let entity = entity(film, place);
+        let colour = palette::actor(place, film.ego);
+        let times = &all_times[actor.rows.clone()];
+        let states: Vec<&VehicleState> =
+            film.frames[actor.rows.clone()].iter().map(|frame| &frame.states[place]).collect();
+        let size = &actor.vehicle.dimensions;
+        let body = (format!("{entity}/body"), bodies::body(&actor.vehicle, colour));
+        if actor.rows == (0..all_times.len()) {
+            writer.fixed(&body.0, &body.1)?;
+        } else {
+            // What is there for a while only comes and goes with its vehicle.
+            writer.since(&body.0, times[0], &body.1)?;
+        }
+        write_motion(writer, &entity, times, &states, &film.road)?;
+        write_velocity(writer, &entity, times, &states, (size, colour))?;
+        write_name(writer, &entity, times, &states, (actor.name.as_str(), size, colour))?;
+        write_lights(writer, &entity, times, &states, (actor.vehicle.class, size))?;
+        if let Some(&gone) = all_times.get(actor.rows.end) {
+            writer.gone(&entity, gone)?;
+        }
+    }
+    write_gaps(writer, film, &all_times)?;
+    write_collisions(writer, film)
+}
+
+fn write_motion(
+    writer: &Writer<'_>,
+    entity: &str,
+    times: &[Time],
+    states: &[&VehicleState],
+    road: &Road,
+) -> Result<(), RecordError> {
+    let poses: Vec<_> = states.iter().map(|state| road.plane_pose(state.s_m, state.d_m, state.heading_rad)).collect();
+    writer.rows(entity, times, |range| {
+        let poses = &poses[range];
+        Transform3D::update_fields()
+            .with_many_translation(poses.iter().map(|pose| [pose.x_m as f32, pose.y_m as f32, 0.0]))
+            .with_many_quaternion(poses.iter().map(|pose| about_up(pose.yaw_rad)))
+            .columns_of_unit_batches()
+    })
+}
+
+/// A rotation about the vertical axis.
+pub(super) fn about_up(yaw_rad: f64) -> Quaternion {
+    let (sin, cos) = (0.5 * yaw_rad).sin_cos();
+    Quaternion::from_xyzw([0.0, 0.0, sin as f32, cos as f32])
+}
+
+fn write_velocity(
+    writer: &Writer<'_>,
+    entity: &str,
+    times: &[Time],
+    states: &[&VehicleState],
+    (size, colour): (&Dimensions, Rgba),
+) -> Result<(), RecordError> {
+    let entity = format!("{entity}/velocity");
+    let above_m = (size.height_m + 0.5 * LABEL_ABOVE_M) as f32;
+    let fixed = Arrows3D::update_fields()
+        .with_origins([[0.0, 0.0, above_m]])
+        .with_colors([palette::faint(colour, 220)])
+        .with_radii([0.09_f32]);
+    writer.fixed(&entity, &fixed)?;
+    writer.rows(&entity, times, |range| {
+        Arrows3D::update_fields()
+            .with_vectors(states[range].iter().map(|state| [(ARROW_S * state.speed_mps) as f32, 0.0, 0.0]))
+            .columns_of_unit_batches()
+    })
+}
+
+fn write_name(
+    writer: &Writer<'_>,
+    entity: &str,
+    times: &[Time],
+    states: &[&VehicleState],
+    (name, size, colour): (&str, &Dimensions, Rgba),
+) -> Result<(), RecordError> {
+    let entity = format!("{entity}/name");
+    let above_m = (size.height_m + LABEL_ABOVE_M) as f32;
+    let fixed =
+        Points3D::new([[0.0, 0.0, above_m]]).with_colors([colour]).with_radii([0.05_f32]).with_show_labels(true);
+    writer.fixed(&entity, &fixed)?;
+    // The speed is rounded to what can be told apart, and only what changed is written.
+    let texts: Vec<String> = states.iter().map(|state| format!("{name} {:.0} m/s", state.speed_mps)).collect();
+    let rows = changes(&texts);
+    let times: Vec<Time> = rows.iter().map(|&row| times[row]).collect();
+    writer.rows(&entity, &times, |range| {
+        let texts = rows[range].iter().map(|&row| texts[row].as_str());
+        Points3D::update_fields().with_labels(texts).columns_of_unit_batches()
+    })
+}
+
+fn write_lights(
+    writer: &Writer<'_>,
+    entity: &str,
+    times: &[Time],
+    states: &[&VehicleState],
+    (class, size): (VehicleClass, &Dimensions),
+) -> Result<(), RecordError> {
+    let (rear_m, front_m) = (-0.5 * size.length_m, 0.5 * size.length_m);
+    // A motorcycle has one brake light; the others have theirs at the corners.
+    let side_m = 0.5 * size.width_m - if class == VehicleClass::Motorcycle { 0.5 * size.width_m } else { 0.25 };
+    let lamp_m = 0.5 * size.height_m.min(1.8);
+    let brake = Lamps {
+        name: "brake_lights",
+        at_m: [[rear_m, side_m, lamp_m], [rear_m, -side_m, lamp_m]],
+        half_m: [0.06, 0.2, 0.11],
+        colour: palette::BRAKE_LIGHT,
+    };
+    write_lamps(writer, entity, times, &brake, &states.iter().map(|state| state.brake_light).collect::<Vec<_>>())?;
+    for (side, name, sign) in [(Indicator::Left, "indicators_left", 1.0), (Indicator::Right, "indicators_right", -1.0)]
+    {
+        let edge_m = sign * 0.5 * size.width_m;
+        let lamps = Lamps {
+            name,
+            at_m: [[rear_m, edge_m, lamp_m], [front_m, edge_m, lamp_m]],
+            half_m: [0.16, 0.12, 0.11],
+            colour: palette::INDICATOR,
+        };
+        // Lit throughout instead of blinking: a still picture shows it, whenever it is taken.
+        let lit: Vec<bool> = states.iter().map(|state| state.indicator == side).collect();
+        write_lamps(writer, entity, times, &lamps, &lit)?;
+    }
+    Ok(())
+}
+
+/// A pair of lamps that are on or off together.
+struct Lamps {
+    name: &'static str,
+    at_m: [[f64; 3]; 2],
+    half_m: [f32; 3],
+    colour: Rgba,
+}
+
+fn write_lamps(
+    writer: &Writer<'_>,
+    entity: &str,
+    times: &[Time],
+    lamps: &Lamps,
+    lit: &[bool],
+) -> Result<(), RecordError> {
+    let rows = changes(lit);
+    if !lit.contains(&true) {
+        return Ok(());
+    }
+    let entity = format!("{entity}/{}", lamps.name);
+    let fixed = Boxes3D::update_fields().with_colors([lamps.colour]).with_fill_mode(FillMode::Solid);
+    writer.fixed(&entity, &fixed)?;
+    let times: Vec<Time> = rows.iter().map(|&row| times[row]).collect();
+    writer.rows(&entity, &times, |range| {
+        let lengths: Vec<usize> = rows[range].iter().map(|&row| if lit[row] { lamps.at_m.len() } else { 0 }).collect();
+        let count = lengths.iter().sum();
+        let centres = lamps.at_m.iter().cycle().take(count).map(|at| at.map(|value| value as f32));
+        Boxes3D::update_fields()
+            .with_centers(centres)
+            .with_half_sizes(std::iter::repeat_n(lamps.half_m, count))
+            .columns(lengths)
+    })
+}
+
+/// The gaps in front of and behind E, from bumper to bumper, with their time headways; red below the critical one.
+fn write_gaps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordError> {
+    let bumper_m = 0.5 * film.cast[film.ego].vehicle.dimensions.length_m;
+    let front = |frame: &Frame| Gap::new([bumper_m, 1.0], frame.margins.gap_front_m, frame.margins.thw_front_s);
+    let rear = |frame: &Frame| Gap::new([-bumper_m, -1.0], frame.margins.gap_rear_m, frame.margins.thw_rear_s);
+    let both: [(&str, Vec<Option<Gap>>); 2] = [
+        ("world/ego/gap_front", film.frames.iter().map(front).collect()),
+        ("world/ego/gap_rear", film.frames.iter().map(rear).collect()),
+    ];
+    for (entity, gaps) in both {
+        writer.fixed(entity, &LineStrips3D::update_fields().with_radii([0.06_f32]).with_show_labels(true))?;
+        writer.rows(entity, times, |range| {
+            let gaps = &gaps[range];
+            let lengths: Vec<usize> = gaps.iter().map(|gap| usize::from(gap.is_some())).collect();
+            let shown = || gaps.iter().flatten();
+            LineStrips3D::new(shown().map(|gap| gap.ends_m))
+                .with_colors(shown().map(|gap| gap.colour))
+                .with_labels(shown().map(|gap| gap.text.as_str()))
+                .columns(lengths)
+        })?;
+    }
+    Ok(())
+}
+
+struct Gap {
+    ends_m: [[f32; 3]; 2],
+    colour: Rgba,
+    text: String,
+}
+
+impl Gap {
+    /// From `bumper_m` on in the direction of `sign`, in E's frame.
+    fn new([bumper_m, sign]: [f64; 2], gap_m: Measured, thw_s: Measured) -> Option<Self> {
+        let gap_m = gap_m.ok().filter(|&gap_m| gap_m > 0.0)?;
+        let is_critical = thw_s.is_ok_and(|thw_s| thw_s < CRITICAL_THW_S);
+        let end = |x_m: f64| [x_m as f32, 0.0, GAP_Z_M as f32];
+        let text = match thw_s {
+            _ if gap_m < LABELLED_GAP_M => String::new(),
+            Ok(thw_s) => format!("{thw_s:.2} s"),
+            Err(_) => format!("{gap_m:.1} m"),
+        };
+        Some(Self {
+            ends_m: [end(bumper_m), end(bumper_m + sign * gap_m)],
+            colour: if is_critical { palette::CRITICAL } else { palette::SAFE },
+            text,
+        })
+    }
+}
+
+/// What the impact did to each.
+fn mark_text(collision: &Collision) -> String {
+    let ([first, second], [first_mps, second_mps]) = (&collision.between, collision.delta_v_mps);
+    format!("COLLISION: ΔV {first} {first_mps:.1}, {second} {second_mps:.1} m/s")
+}
+
+/// A mark on the side of the vehicle that was struck, which it carries on; the changes of velocity on the road behind.
+fn write_collisions(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError> {
+    let [first_m, further_m] = WORDS_BEHIND_M;
+    let mut words_m = -first_m;
+    for (number, collision) in film.collisions().iter().enumerate() {
+        let place = film.cast.iter().position(|actor| actor.name == collision.between[0].as_str());
+        let Some(place) = place else { continue };
+        let size = &film.cast[place].vehicle.dimensions;
+        let at_m = match collision.struck_side[0] {
+            BoxSide::Front => [0.5 * size.length_m, 0.0],
+            BoxSide::Rear => [-0.5 * size.length_m, 0.0],
+            BoxSide::Left => [0.0, 0.5 * size.width_m],
+            BoxSide::Right => [0.0, -0.5 * size.width_m],
+        };
+        let entity = format!("{}/collision_{}", entity(film, place), number + 1);
+        let [x, y] = at_m.map(|at_m| at_m as f32);
+        let mark = Points3D::new([[x, y, 0.6], [words_m, 0.0, 0.0]])
+            .with_colors([palette::CRITICAL])
+            .with_radii([0.45_f32, 0.05])
+            .with_labels([String::new(), mark_text(collision)])
+            .with_show_labels(true);
+        // The first frame at or after the touch: before it the vehicles are still apart.
+        let shown_at = film.frames.iter().map(|frame| frame.time).find(|&time| time >= collision.time);
+        writer.since(&entity, shown_at.unwrap_or(collision.time), &mark)?;
+        words_m -= further_m;
+    }
+    Ok(())
+}

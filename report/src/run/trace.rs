@@ -1,0 +1,186 @@
+//! A run as a table: one row for each control step and actor, as CSV or Parquet.
+
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use arrow::array::{ArrayRef, Float64Array, RecordBatch, StringArray, UInt8Array};
+use arrow::datatypes::{DataType, Schema};
+use closecall_traffic::{ActorId, Lane, Measured, Time};
+use parquet::arrow::ArrowWriter;
+
+use crate::table::{field, properties};
+use closecall_scenarios::atomic::{WriteError, check_writable, write_file};
+use closecall_simulation::{Happening, Observer, StepView};
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Format {
+    Csv,
+    Parquet,
+}
+
+impl Format {
+    /// By the ending of the file's name.
+    fn of(path: &Path) -> io::Result<Self> {
+        match path.extension().and_then(|ending| ending.to_str()) {
+            Some("csv") => Ok(Self::Csv),
+            Some("parquet") => Ok(Self::Parquet),
+            _ => Err(io::Error::new(io::ErrorKind::InvalidInput, "a trace is a file *.csv or *.parquet")),
+        }
+    }
+}
+
+/// One actor at one control step.
+#[derive(Clone, Debug)]
+struct Row {
+    time: Time,
+    actor: ActorId,
+    lane: Lane,
+    s_m: f64,
+    d_m: f64,
+    speed_mps: f64,
+    acceleration_mps2: f64,
+    gap_front_m: Measured,
+    thw_front_s: Measured,
+}
+
+/// Watches a run and writes it as a table. What does not exist is an empty cell, or null.
+pub struct TraceWriter {
+    path: PathBuf,
+    format: Format,
+    rows: Vec<Row>,
+}
+
+impl TraceWriter {
+    /// A writer into the file `path`, whose name says the format.
+    ///
+    /// # Errors
+    /// [`WriteError`] where the name ends neither with `.csv` nor with `.parquet`, or no file can be made there.
+    pub fn new(path: &Path) -> Result<Self, WriteError> {
+        let format = Format::of(path).map_err(|error| WriteError::new(path, error))?;
+        check_writable(path)?;
+        Ok(Self { path: path.to_owned(), format, rows: Vec::new() })
+    }
+
+    /// Writes the file.
+    ///
+    /// # Errors
+    /// [`WriteError`] where it cannot be written whole.
+    pub fn finish(self) -> Result<(), WriteError> {
+        write_file(&self.path, |file| match self.format {
+            Format::Csv => write_csv(file, &self.rows),
+            Format::Parquet => write_parquet(file, &self.rows),
+        })
+    }
+}
+
+impl Observer for TraceWriter {
+    fn step(&mut self, view: &StepView<'_>) {
+        let actors = view.scenario.actors.iter().zip(view.vehicles).zip(view.fronts);
+        self.rows.extend(actors.map(|((actor, vehicle), &(gap_front_m, thw_front_s))| Row {
+            time: view.time,
+            actor: actor.id.clone(),
+            lane: view.scenario.road.lane_at(vehicle.state.d_m),
+            s_m: vehicle.state.s_m,
+            d_m: vehicle.state.d_m,
+            speed_mps: vehicle.state.speed_mps,
+            acceleration_mps2: vehicle.state.acceleration_mps2,
+            gap_front_m,
+            thw_front_s,
+        }));
+    }
+
+    fn happening(&mut self, _: Time, _: &Happening) {}
+}
+
+/// Names of actors need no quoting: they are letters, digits and hyphens. Numbers read back to the same bits.
+fn write_csv(file: &mut (impl Write + ?Sized), rows: &[Row]) -> io::Result<()> {
+    writeln!(file, "time_s,actor,lane,s_m,d_m,speed_mps,acceleration_mps2,gap_front_m,thw_front_s")?;
+    for row in rows {
+        write!(file, "{},{},{},{},{},", row.time.s(), row.actor, row.lane, row.s_m, row.d_m)?;
+        write!(file, "{},{},", row.speed_mps, row.acceleration_mps2)?;
+        let cell = |value: Measured| value.map_or_else(|_| String::new(), |value| value.to_string());
+        writeln!(file, "{},{}", cell(row.gap_front_m), cell(row.thw_front_s))?;
+    }
+    Ok(())
+}
+
+fn write_parquet(file: &mut (impl Write + Send + ?Sized), rows: &[Row]) -> io::Result<()> {
+    let schema = Arc::new(Schema::new(vec![
+        field("time_s", DataType::Float64, Some("s")),
+        field("actor", DataType::Utf8, None),
+        field("lane", DataType::UInt8, None),
+        field("s_m", DataType::Float64, Some("m")),
+        field("d_m", DataType::Float64, Some("m")),
+        field("speed_mps", DataType::Float64, Some("m/s")),
+        field("acceleration_mps2", DataType::Float64, Some("m/s²")),
+        field("gap_front_m", DataType::Float64, Some("m")),
+        field("thw_front_s", DataType::Float64, Some("s")),
+    ]));
+    let number = |of: fn(&Row) -> Option<f64>| -> ArrayRef { Arc::new(rows.iter().map(of).collect::<Float64Array>()) };
+    let columns = vec![
+        number(|row| Some(row.time.s())),
+        Arc::new(rows.iter().map(|row| Some(row.actor.as_str())).collect::<StringArray>()),
+        Arc::new(rows.iter().map(|row| Some(row.lane.0)).collect::<UInt8Array>()),
+        number(|row| Some(row.s_m)),
+        number(|row| Some(row.d_m)),
+        number(|row| Some(row.speed_mps)),
+        number(|row| Some(row.acceleration_mps2)),
+        number(|row| row.gap_front_m.ok()),
+        number(|row| row.thw_front_s.ok()),
+    ];
+    let batch = RecordBatch::try_new(schema.clone(), columns).map_err(io::Error::other)?;
+    let mut writer = ArrowWriter::try_new(file, schema, Some(properties())).map_err(io::Error::other)?;
+    writer.write(&batch).map_err(io::Error::other)?;
+    writer.close().map_err(io::Error::other)?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rows() -> Vec<Row> {
+        let row = |name: &str, gap_front_m: Measured, thw_front_s: Measured| Row {
+            time: Time::from_ms(40),
+            actor: ActorId::new(name).unwrap(),
+            lane: Lane(2),
+            s_m: 500.1,
+            d_m: -5.625,
+            speed_mps: 30.0,
+            acceleration_mps2: -0.25,
+            gap_front_m,
+            thw_front_s,
+        };
+        let no_lead = Err(closecall_traffic::Absent::NoLead);
+        vec![row("ego", Ok(21.0), Ok(0.7)), row("front", no_lead, no_lead)]
+    }
+
+    #[test]
+    fn what_does_not_exist_is_an_empty_cell() {
+        let mut text = Vec::new();
+        write_csv(&mut text, &rows()).unwrap();
+        let expected = "time_s,actor,lane,s_m,d_m,speed_mps,acceleration_mps2,gap_front_m,thw_front_s\n\
+                        0.04,ego,2,500.1,-5.625,30,-0.25,21,0.7\n\
+                        0.04,front,2,500.1,-5.625,30,-0.25,,\n";
+        assert_eq!(String::from_utf8(text).unwrap(), expected);
+    }
+
+    #[test]
+    fn a_parquet_trace_is_the_same_every_time() {
+        let mut first = Vec::new();
+        write_parquet(&mut first, &rows()).unwrap();
+        let mut second = Vec::new();
+        write_parquet(&mut second, &rows()).unwrap();
+        assert_eq!(first, second);
+        assert_eq!((&first[..4], &first[first.len() - 4..]), (&b"PAR1"[..], &b"PAR1"[..]));
+    }
+
+    #[test]
+    fn the_name_of_the_file_says_its_format() {
+        assert_eq!(Format::of(Path::new("a/b.csv")).unwrap(), Format::Csv);
+        assert_eq!(Format::of(Path::new("b.parquet")).unwrap(), Format::Parquet);
+        let error = TraceWriter::new(Path::new("trace.txt")).err().unwrap();
+        assert_eq!(error.to_string(), "failed to write trace.txt: a trace is a file *.csv or *.parquet");
+    }
+}

@@ -1,0 +1,5 @@
+//! Trajectory data: made by the simulator, or shown as charts.
+
+pub mod in_car;
+pub mod recorder;
+pub mod recording_charts;

@@ -1,0 +1,67 @@
+//! Simulated traffic as a recording, in the layout in which recorded traffic is read.
+
+use closecall_scenarios::recordings::Recording;
+use closecall_traffic::{Lane, Time, Trajectory, TrajectoryPoint};
+
+use closecall_simulation::scenario::Scenario;
+use closecall_simulation::{CONTROL_STEP, Happening, Observer, StepView};
+
+/// Pause between two runs, so that vehicles of different runs never meet.
+const PAUSE: Time = Time::from_ms(10_000);
+
+/// Collects the vehicles of several runs into one recording, one run after the other.
+#[derive(Debug, Default)]
+pub struct TrafficRecorder {
+    trajectories: Vec<Trajectory>,
+    /// Place of the current run's first vehicle.
+    first: usize,
+    start: Time,
+    end: Time,
+}
+
+impl TrafficRecorder {
+    /// Begins the next run.
+    pub fn begin(&mut self, scenario: &Scenario) {
+        self.first = self.trajectories.len();
+        self.start = if self.first == 0 { Time::ZERO } else { self.end + PAUSE };
+        for actor in &scenario.actors {
+            let number = self.trajectories.len() as u64 + 1;
+            self.trajectories.push(Trajectory {
+                track_id: number,
+                vehicle_id: number,
+                class: actor.vehicle.class,
+                dimensions: actor.vehicle.dimensions,
+                points: Vec::new(),
+            });
+        }
+    }
+
+    /// The recording of all runs.
+    pub fn finish(self, name: &str) -> Recording {
+        Recording::new(name, CONTROL_STEP, self.trajectories)
+    }
+}
+
+impl Observer for TrafficRecorder {
+    fn step(&mut self, view: &StepView<'_>) {
+        let time = self.start + view.time;
+        self.end = time;
+        for (vehicle, trajectory) in view.vehicles.iter().zip(&mut self.trajectories[self.first..]) {
+            let state = &vehicle.state;
+            let (sin, cos) = state.heading_rad.sin_cos();
+            let Lane(lane) = view.scenario.road.lane_at(state.d_m);
+            trajectory.points.push(TrajectoryPoint {
+                time,
+                s_m: state.s_m,
+                d_m: state.d_m,
+                speed_mps: state.speed_mps * cos,
+                acceleration_mps2: state.acceleration_mps2 * cos,
+                lateral_speed_mps: state.speed_mps * sin,
+                lateral_acceleration_mps2: state.speed_mps * state.yaw_rate_radps,
+                lane: Lane(lane),
+            });
+        }
+    }
+
+    fn happening(&mut self, _: Time, _: &Happening) {}
+}

@@ -1,0 +1,31 @@
+//! The closed loop of one run.
+//!
+//! ```text
+//!        ┌────────────────────────────── 100 Hz ──────────────────────────────┐
+//!        ▼                                                                    │
+//!  state at t ─▶ human drivers ──────────────────────────────▶ actions ─▶ world ─▶ state at t + dt
+//!        └─(25 Hz)─▶ sensors ─▶ tracks ─▶ ego controller ─▶ command ┘
+//! ```
+//!
+//! Drivers, sensors and controller read the state at t; then every vehicle moves to t + dt.
+
+mod arm;
+mod auditor;
+mod clock;
+mod closed_loop;
+mod error;
+mod events;
+mod humans;
+mod margins;
+mod mis_log;
+mod moments;
+mod observer;
+mod phase;
+mod state;
+
+pub use arm::{Arm, ControllerFactory, RunKey};
+pub use auditor::TrackAuditor;
+pub use clock::{CONTROL_STEP, PHYSICS_STEP};
+pub use closed_loop::simulate;
+pub use error::SampleError;
+pub use observer::{Happening, Lead, MarginsNow, NoObserver, Observer, StepView};

@@ -1,0 +1,30 @@
+//! Scenarios: from the text of a file to one concrete situation.
+//!
+//! ```text
+//!  file ─▶ ScenarioFile ─(parameters of one sample)─▶ Scenario ─▶ simulation
+//!            text, checked keys                          numbers, checked ranges
+//! ```
+//!
+//! A scenario file describes a *logical* scenario: values that are fixed, and parameters that are sampled. With the
+//! parameters of one sample it becomes a *concrete* one, [`Scenario`], which cannot be invalid.
+
+mod checked;
+mod config;
+mod edit;
+mod events;
+mod file;
+mod locate;
+mod placement;
+mod recorded;
+mod reenacted;
+mod variation;
+
+pub use checked::{Actor, Scenario};
+pub use config::{AbsoluteStartConfig, ActorConfig, RelativeStartConfig, SCHEMA_VERSION, ScenarioConfig, StartConfig};
+pub use edit::Setting;
+pub(crate) use events::{Brake, Event, Trigger};
+pub use events::{
+    BrakeConfig, CutOutStartedConfig, EffectConfig, EventConfig, NominalEncounterConfig, ThwBelowConfig, TriggerConfig,
+};
+pub use file::{ScenarioError, ScenarioFile};
+pub use reenacted::{RearDriver, actor_name, reenact};
