@@ -1,4 +1,4 @@
-"""Reads the crops that `render_dataset` writes: pixels from crops.rgb, labels from crops.csv."""
+"""Reads the crops that `render_dataset` writes: the pixels from crops.rgb, the labels from crops.csv."""
 
 import csv
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ CLASSES = ("car", "truck", "motorcycle", "background")
 
 @dataclass
 class Crops:
-    """Crops as 8-bit (n, 3, 32, 32) with a row of labels for each."""
+    """n crops: 8-bit pixels of shape (n, 3, 32, 32), and label columns of length n."""
 
     pixels: np.ndarray
     label: np.ndarray
@@ -23,13 +23,13 @@ class Crops:
     def __len__(self):
         return len(self.label)
 
-    def where(self, chosen):
-        """The crops for which `chosen` is true, or those at the given places."""
-        return Crops(*(column[chosen] for column in vars(self).values()))
+    def select(self, selection):
+        """Returns the crops that `selection` selects: a Boolean mask, an index array or a slice."""
+        return Crops(*(column[selection] for column in vars(self).values()))
 
 
 def read(folder):
-    """Reads one folder."""
+    """Reads the crops of one folder."""
     folder = Path(folder)
     with open(folder / "crops.csv", newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))

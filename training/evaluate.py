@@ -1,9 +1,10 @@
-"""Judges the exported network on held-out crops and writes its model card.
+"""Evaluates the exported network on held-out crops and writes its model card.
 
     python training/evaluate.py --crops DIR --model sensors/models/rear-classifier.onnx \\
         --card sensors/models/MODEL_CARD.md
 
-Held out are body shapes, bands of paint, and seeds. Exits with 1 where a target of the card is missed.
+The held-out crops use body shapes, bands of paint, and seeds that the training crops do not use. The exit code is 1 if
+a target of the card is missed.
 """
 
 import argparse
@@ -37,15 +38,15 @@ Says what a LiDAR cluster behind the ego vehicle looks like in the rear camera: 
 
 
 def expected_calibration_error(probabilities, labels):
-    """Mean gap between certainty and accuracy over equally wide bins of certainty, weighted by their crops."""
+    """Returns the mean gap between certainty and accuracy over equal bins of certainty, weighted by crop count."""
     certainty, right = probabilities.max(axis=1), probabilities.argmax(axis=1) == labels
-    place = np.minimum((certainty * BINS).astype(int), BINS - 1)
-    gaps = [abs(certainty[place == b].mean() - right[place == b].mean()) * (place == b).sum() for b in np.unique(place)]
+    bins = np.minimum((certainty * BINS).astype(int), BINS - 1)
+    gaps = [abs(certainty[bins == b].mean() - right[bins == b].mean()) * (bins == b).sum() for b in np.unique(bins)]
     return sum(gaps) / len(labels)
 
 
 def matrix(answers, labels):
-    """A confusion matrix as a table."""
+    """Returns the confusion matrix as a Markdown table."""
     lines = ["| truth | " + " | ".join(crops.CLASSES) + " | right |", "|---" * (len(crops.CLASSES) + 2) + "|"]
     for label, name in enumerate(crops.CLASSES):
         counts = np.bincount(answers[labels == label], minlength=len(crops.CLASSES))
@@ -56,19 +57,19 @@ def matrix(answers, labels):
 
 
 def targets(data, answers, probabilities):
-    """Each target as (what, found, wanted, met)."""
+    """Returns a tuple (what, found, wanted, met) for each target."""
     right = answers == data.label
     by_day = (data.light == "day") & (data.weather == "dry")
     near, middle = data.distance_m <= 60, (data.distance_m > 60) & (data.distance_m <= 100)
     rows = []
-    for what, chosen, wanted in (
+    for what, selected, wanted in (
         ("dry day, to 60 m", by_day & near, 0.99),
         ("dry day, 60 to 100 m", by_day & middle, 0.95),
         ("night, to 60 m", (data.light == "night") & near, 0.90),
         ("rain, to 60 m", (data.weather == "rain") & near, 0.90),
         ("night and rain, to 60 m", (data.light == "night") & (data.weather == "rain") & near, 0.90),
     ):
-        found, vehicles = right[chosen].mean(), chosen & (data.label < crops.CLASSES.index("background"))
+        found, vehicles = right[selected].mean(), selected & (data.label < crops.CLASSES.index("background"))
         text = f"{100 * found:.2f} % (vehicles alone {100 * right[vehicles].mean():.2f} % of {vehicles.sum()})"
         rows.append((f"right, {what} ({chosen.sum()} crops)", text, f"≥ {100 * wanted:.0f} %", found >= wanted))
     error = expected_calibration_error(probabilities, data.label)
@@ -77,7 +78,7 @@ def targets(data, answers, probabilities):
 
 
 def card(data, probabilities, model):
-    """The model card's text and whether all targets are met."""
+    """Returns the text of the model card, and the list of targets (see `targets`)."""
     import hashlib
 
     answers = probabilities.argmax(axis=1)
@@ -92,12 +93,12 @@ def card(data, probabilities, model):
     for light in LIGHTS:
         for weather in WEATHERS:
             for low, high in BANDS_M:
-                chosen = (data.light == light) & (data.weather == weather) & (data.distance_m > low) & (data.distance_m <= high)
-                if chosen.sum():
-                    right = 100 * (answers[chosen] == data.label[chosen]).mean()
-                    error = expected_calibration_error(probabilities[chosen], data.label[chosen])
+                selected = (data.light == light) & (data.weather == weather) & (data.distance_m > low) & (data.distance_m <= high)
+                if selected.sum():
+                    right = 100 * (answers[selected] == data.label[selected]).mean()
+                    error = expected_calibration_error(probabilities[selected], data.label[selected])
                     title = f"### {light}, {weather}, {low} to {high} m: {right:.1f} % right, calibration error {error:.3f}"
-                    parts.append(title + "\n\n" + matrix(answers[chosen], data.label[chosen]))
+                    parts.append(title + "\n\n" + matrix(answers[selected], data.label[selected]))
     return "\n\n".join(parts) + "\n", rows
 
 

@@ -2,10 +2,11 @@
 
     python training/train.py --crops DIR --out sensors/models/rear-classifier.onnx
 
-The network is small on purpose: it runs for every LiDAR cluster of every scan on one core. Four convolutions and one
-linear layer, about 50,000 weights. Batch normalisation and the scale of the pixels are folded into the convolutions on
-export, the calibration's temperature into the last layer, so that the graph takes bytes as numbers (0 to 255, red,
-green, blue planes) and gives probabilities of car, truck, motorcycle, background.
+The network is deliberately small, because it runs on one core for every LiDAR cluster of every scan. It has four
+convolutions and one linear layer with about 50,000 weights in total. The export folds batch normalisation and the
+scaling of the pixels into the convolutions, and the calibration temperature into the last layer. The exported graph
+therefore takes pixel values from 0 to 255 (red, green and blue planes) and returns the probabilities of car, truck,
+motorcycle and background.
 """
 
 import argparse
@@ -18,14 +19,14 @@ from torch import nn
 
 import crops
 
-# Channels out, kernel, stride of each convolution.
+# Output channels, kernel size and stride of each convolution.
 LAYERS = ((16, 5, 2), (32, 3, 2), (48, 3, 1), (64, 3, 2))
 CELLS = 4 * 4
 OPSET = 17
 
 
 class Network(nn.Module):
-    """The classifier before export."""
+    """The classifier in the form that is trained."""
 
     def __init__(self):
         super().__init__()
@@ -39,12 +40,12 @@ class Network(nn.Module):
         self.head = nn.Linear(channels * CELLS, len(crops.CLASSES))
 
     def forward(self, pixels):
-        """Logits of pixels 0 to 1."""
+        """Returns the logits for pixel values from 0 to 1."""
         return self.head(self.dropout(self.features(pixels).flatten(1)))
 
 
-def augmented(pixels, generator):
-    """Mirrored at random, and brighter or darker by up to a fifth."""
+def augment(pixels, generator):
+    """Mirrors crops at random, and makes them brighter or darker by up to a fifth."""
     mirrored = torch.rand(len(pixels), generator=generator) < 0.5
     pixels = torch.where(mirrored[:, None, None, None], pixels.flip(3), pixels)
     gain = 0.8 + 0.4 * torch.rand(len(pixels), 1, 1, 1, generator=generator)
@@ -52,7 +53,7 @@ def augmented(pixels, generator):
 
 
 def train(network, data, epochs, generator):
-    """Fits the weights; the learning rate rises and falls once."""
+    """Fits the weights with a one-cycle schedule of the learning rate."""
     batch = 128
     steps = epochs * (len(data) // batch)
     optimizer = torch.optim.AdamW(network.parameters(), weight_decay=0.02)
@@ -63,9 +64,9 @@ def train(network, data, epochs, generator):
         order = torch.randperm(len(data), generator=generator)
         total = 0.0
         for first in range(0, len(data) // batch * batch, batch):
-            chosen = order[first : first + batch]
-            logits = network(augmented(pixels[chosen].float() / 255.0, generator))
-            loss = nn.functional.cross_entropy(logits, labels[chosen])
+            selected = order[first : first + batch]
+            logits = network(augment(pixels[selected].float() / 255.0, generator))
+            loss = nn.functional.cross_entropy(logits, labels[selected])
             optimizer.zero_grad()
             loss.backward()
             optimizer.step()
@@ -76,14 +77,14 @@ def train(network, data, epochs, generator):
 
 @torch.no_grad()
 def logits_of(network, data):
-    """Logits of all crops."""
+    """Returns the logits of all crops."""
     network.eval()
     parts = torch.from_numpy(data.pixels).split(1024)
     return torch.cat([network(part.float() / 255.0) for part in parts])
 
 
-def temperature(logits, labels):
-    """The temperature that makes the probabilities most likely (Guo et al., On calibration of modern neural networks, 2017)."""
+def fit_temperature(logits, labels):
+    """Returns the temperature of maximum likelihood (Guo et al., On calibration of modern neural networks, 2017)."""
     log_temperature = torch.zeros(1, requires_grad=True)
     optimizer = torch.optim.LBFGS([log_temperature], max_iter=50)
 
@@ -97,8 +98,8 @@ def temperature(logits, labels):
     return float(log_temperature.detach().exp())
 
 
-def export(network, heat, path):
-    """Writes the graph: convolution and rectifier four times, one matrix, softmax."""
+def export(network, temperature, path):
+    """Writes the ONNX graph: four times convolution and rectifier, then a linear layer and softmax."""
     network.eval()
     nodes, weights = [], []
 
@@ -107,22 +108,22 @@ def export(network, heat, path):
         return name
 
     value = "pixels"
-    for place, (_, kernel, stride) in enumerate(LAYERS):
-        convolution, norm = network.features[3 * place], network.features[3 * place + 1]
+    for index, (_, kernel, stride) in enumerate(LAYERS):
+        convolution, norm = network.features[3 * index], network.features[3 * index + 1]
         gain = norm.weight / torch.sqrt(norm.running_var + norm.eps)
         weight = convolution.weight * gain[:, None, None, None]
         bias = norm.bias - norm.running_mean * gain
-        if place == 0:
+        if index == 0:
             weight = weight / 255.0
-        inputs = [value, constant(f"weight{place}", weight.detach()), constant(f"bias{place}", bias.detach())]
+        inputs = [value, constant(f"weight{index}", weight.detach()), constant(f"bias{index}", bias.detach())]
         shape = {"kernel_shape": [kernel, kernel], "strides": [stride, stride], "pads": [kernel // 2] * 4}
-        nodes.append(helper.make_node("Conv", inputs, [f"sum{place}"], **shape))
-        nodes.append(helper.make_node("Relu", [f"sum{place}"], [f"layer{place}"]))
-        value = f"layer{place}"
+        nodes.append(helper.make_node("Conv", inputs, [f"sum{index}"], **shape))
+        nodes.append(helper.make_node("Relu", [f"sum{index}"], [f"layer{index}"]))
+        value = f"layer{index}"
     nodes.append(helper.make_node("Flatten", [value], ["flat"], axis=1))
     head = network.head
-    matrix = constant("matrix", (head.weight / heat).detach().numpy().T)
-    offset = constant("offset", (head.bias / heat).detach())
+    matrix = constant("matrix", (head.weight / temperature).detach().numpy().T)
+    offset = constant("offset", (head.bias / temperature).detach())
     nodes.append(helper.make_node("Gemm", ["flat", matrix, offset], ["logits"]))
     nodes.append(helper.make_node("Softmax", ["logits"], ["scores"], axis=1))
     side = crops.SIDE_PX
@@ -151,16 +152,16 @@ def main():
     torch.manual_seed(arguments.seed)
     generator = torch.Generator().manual_seed(arguments.seed)
     data = crops.read(arguments.crops)
-    # The last tenth of the scenes is kept for the calibration.
-    kept = len(data) * 9 // 10
+    # The last tenth of the crops, from the last scenes, is held back for the calibration.
+    split = len(data) * 9 // 10
     network = Network()
-    train(network, data.where(slice(None, kept)), arguments.epochs, generator)
-    calibration = data.where(slice(kept, None))
+    train(network, data.select(slice(None, split)), arguments.epochs, generator)
+    calibration = data.select(slice(split, None))
     logits, labels = logits_of(network, calibration), torch.from_numpy(calibration.label)
-    heat = temperature(logits, labels)
+    temperature = fit_temperature(logits, labels)
     accuracy = float((logits.argmax(1) == labels).float().mean())
-    print(f"kept tenth: accuracy {accuracy:.4f}, temperature {heat:.3f}")
-    export(network, heat, arguments.out)
+    print(f"kept tenth: accuracy {accuracy:.4f}, temperature {temperature:.3f}")
+    export(network, temperature, arguments.out)
 
 
 if __name__ == "__main__":

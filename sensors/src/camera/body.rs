@@ -1,4 +1,5 @@
-//! A body on its way to the image: its faces lit, its triangles projected once for each moment of the exposure.
+//! Shading and projection of a body: its faces are lit once, and its triangles are projected once for each moment of
+//! the exposure.
 
 use super::hash::split;
 use super::light::Illumination;
@@ -6,41 +7,42 @@ use super::mesh::{Mesh, Surface, Texture, Vec3, add_scaled, cross, dot, each, no
 use super::pinhole::Lens;
 use super::raster::{ScreenTriangle, project};
 
-/// Moments of one exposure at which the scene is sampled: as many samples for each pixel. The mean over them blurs
-/// what moves and smooths edges (Haeberli and Akeley, *The accumulation buffer*, 1990).
+/// Number of moments within one exposure at which the scene is sampled, once per pixel each. The mean over these
+/// samples blurs moving objects and smooths edges (Haeberli and Akeley, *The accumulation buffer*, 1990).
 pub(crate) const MOMENTS: usize = 4;
 
-/// What a sample needs to know of the face that it hit.
+/// The properties of a shaded face that a sample of it needs.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Shade {
-    /// Radiance towards the lens before texture and air.
+    /// Radiance towards the lens, before texture and air are applied.
     pub(crate) radiance: Vec3,
-    /// What is drawn onto it.
+    /// The pattern drawn onto the face.
     pub(crate) texture: Texture,
-    /// Texture coordinate u = map[0] · (place in camera axes) + offset[0], v likewise.
+    /// Coefficients of the texture coordinates: `u = map[0] · p + offset[0]` for the position p in camera axes, and
+    /// likewise v.
     pub(crate) map: [Vec3; 2],
-    /// See `map`.
+    /// Constants of the texture coordinates, see `map`.
     pub(crate) offset: [f32; 2],
-    /// The instance that the face belongs to; 0 for none.
+    /// Instance number of the vehicle that the face belongs to, or 0 if it belongs to none.
     pub(crate) instance: u16,
 }
 
-/// Where and how a body stands in the ground frame.
+/// Pose and motion of a body in the ground frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Placement {
-    /// Its origin [m].
+    /// Position of the body's origin (m).
     pub(crate) at: [f64; 2],
-    /// Cosine and sine of its heading.
+    /// Cosine and sine of the body's heading.
     pub(crate) turn: [f64; 2],
-    /// Pitch of the body, nose down [rad].
+    /// Pitch of the body, positive if its nose points down (rad).
     pub(crate) pitch_rad: f64,
-    /// Its velocity relative to the lens [m/s].
+    /// Velocity of the body relative to the lens (m/s).
     pub(crate) velocity: [f64; 2],
-    /// Its instance number in the truth; 0 for none.
+    /// Instance number of the body in the ground truth, or 0 if it is no vehicle.
     pub(crate) instance: u16,
 }
 
-/// Rotation and translation from body to ground frame and to camera axes.
+/// The rotations and translations from the body's frame to the ground frame and to camera axes.
 struct Transform {
     rotation: [Vec3; 3],
     at: Vec3,
@@ -52,7 +54,7 @@ impl Transform {
     fn new(placement: &Placement, lens: &Lens) -> Self {
         let [cos, sin] = placement.turn;
         let pitch = placement.pitch_rad;
-        // Small pitch: the body's x axis dips, its z axis leans forward.
+        // Small-angle approximation of the pitch: the body's x axis dips, and its z axis leans forward.
         let axes = [[cos, sin, -pitch], [-sin, cos, 0.0], [cos * pitch, sin * pitch, 1.0]];
         let at = [placement.at[0], placement.at[1], 0.0];
         let origin = lens.in_camera(at);
@@ -69,7 +71,7 @@ impl Transform {
     }
 }
 
-fn apply(rotation: &[Vec3; 3], at: Vec3, point: Vec3) -> Vec3 {
+fn transform_point(rotation: &[Vec3; 3], at: Vec3, point: Vec3) -> Vec3 {
     let mut sum = at;
     for (axis, share) in rotation.iter().zip(point) {
         sum = add_scaled(sum, *axis, share);
@@ -77,20 +79,21 @@ fn apply(rotation: &[Vec3; 3], at: Vec3, point: Vec3) -> Vec3 {
     sum
 }
 
-/// Lights the faces of a body, and appends them and their triangles to a frame's lists.
-pub(crate) fn add(
+/// Shades the faces of a body, projects them for each moment, and appends the results to `faces` and `moments`.
+pub(crate) fn add_body(
     mesh: &Mesh,
     placement: &Placement,
-    eye: &Eye<'_>,
+    shading: &Shading<'_>,
     faces: &mut Vec<Shade>,
     moments: &mut [Vec<ScreenTriangle>; MOMENTS],
 ) {
-    let transform = Transform::new(placement, eye.lens);
+    let transform = Transform::new(placement, shading.lens);
     let first = faces.len();
-    let ground: Vec<Vec3> = mesh.vertices.iter().map(|v| apply(&transform.rotation, transform.at, *v)).collect();
+    let ground: Vec<Vec3> =
+        mesh.vertices.iter().map(|v| transform_point(&transform.rotation, transform.at, *v)).collect();
     for face in &mesh.faces {
         let corners = face.corners.map(|corner| ground[usize::from(corner)]);
-        let radiance = lit(&corners, &face.surface, eye);
+        let radiance = shaded_radiance(&corners, &face.surface, shading);
         let (map, offset) = match face.surface.texture {
             Texture::Plain => ([[0.0; 3]; 2], [0.0; 2]),
             _ => texture_map(mesh, usize::from(face.map), &transform),
@@ -99,67 +102,68 @@ pub(crate) fn add(
     }
     let mut camera = vec![[0.0; 3]; mesh.vertices.len()];
     for (moment, triangles) in moments.iter_mut().enumerate() {
-        let late = f64::from(eye.light.exposure_s) * moment_offset(moment);
-        let moved = [placement.velocity[0] * late, placement.velocity[1] * late];
-        let shift = eye.lens.in_camera([placement.at[0] + moved[0], placement.at[1] + moved[1], 0.0]);
+        let delay_s = f64::from(shading.light.exposure_s) * moment_offset(moment);
+        let moved = [placement.velocity[0] * delay_s, placement.velocity[1] * delay_s];
+        let shift = shading.lens.in_camera([placement.at[0] + moved[0], placement.at[1] + moved[1], 0.0]);
         let at = shift.map(|part| part as f32);
         for (to, from) in camera.iter_mut().zip(&mesh.vertices) {
-            *to = apply(&transform.camera_rotation, at, *from);
+            *to = transform_point(&transform.camera_rotation, at, *from);
         }
-        for (place, face) in mesh.faces.iter().enumerate() {
+        for (index, face) in mesh.faces.iter().enumerate() {
             let corners = face.corners.map(|corner| camera[usize::from(corner)]);
-            project(corners, eye.lens.focal_px as f32, (first + place) as u32, triangles);
+            project(corners, shading.lens.focal_px as f32, (first + index) as u32, triangles);
         }
     }
 }
 
-/// When a moment lies in the exposure: −½ … ½ of it.
+/// Returns the time of a moment relative to the middle of the exposure, in units of the exposure time (−½ to ½).
 pub(crate) fn moment_offset(moment: usize) -> f64 {
     (moment as f64 + 0.5) / MOMENTS as f64 - 0.5
 }
 
-/// What it takes to light a face.
-pub(crate) struct Eye<'a> {
-    /// The lens.
+/// The inputs of shading that are the same for all faces of a body.
+pub(crate) struct Shading<'a> {
+    /// The lens that looks at the body.
     pub(crate) lens: &'a Lens,
-    /// The light.
+    /// The illumination of the scene.
     pub(crate) light: &'a Illumination,
-    /// Whether the indicator on the left (`true`) or right side shines.
+    /// Whether the left and the right indicator shine.
     pub(crate) indicators: [bool; 2],
 }
 
-fn lit(corners: &[Vec3; 3], surface: &Surface, eye: &Eye<'_>) -> Vec3 {
-    let light = eye.light;
+fn shaded_radiance(corners: &[Vec3; 3], surface: &Surface, shading: &Shading<'_>) -> Vec3 {
+    let light = shading.light;
     let normal = normalised(cross(sub(corners[1], corners[0]), sub(corners[2], corners[0])));
     let centre = each(|axis| (corners[0][axis] + corners[1][axis] + corners[2][axis]) / 3.0);
-    let to_lens = sub([0.0, 0.0, eye.lens.height_m as f32], centre);
+    let to_lens = sub([0.0, 0.0, shading.lens.height_m as f32], centre);
     let distance = dot(to_lens, to_lens).sqrt().max(0.5);
     let view = to_lens.map(|part| part / distance);
-    let falls = light.falls_on(normal);
-    // E's tail lamps, about where the lens is.
+    let diffuse = light.diffuse_radiance(normal);
+    // The ego's tail lamps illuminate the scene from about the position of the lens.
     let tail = light.tail * dot(normal, view).max(0.0) / (distance * distance);
-    let emitted = light.emitted(surface.emission, |is_left| eye.indicators[usize::from(!is_left)]);
-    // A lamp's beam is narrow.
+    let emitted = light.emitted_radiance(surface.emission, |is_left| shading.indicators[usize::from(!is_left)]);
+    // The beam of a lamp is narrow, so its radiance falls with the angle.
     let beam = dot(normal, view).max(0.0);
-    let mirror = mirrored(normal, view, surface.gloss, light);
+    let mirror = reflected_radiance(normal, view, surface.gloss, light);
     each(|i| {
         let red = if i == 0 { tail } else { 0.05 * tail };
-        surface.albedo[i] * (falls[i] + red) + mirror[i] + emitted[i] * beam * beam
+        surface.albedo[i] * (diffuse[i] + red) + mirror[i] + emitted[i] * beam * beam
     })
 }
 
-/// What the clear layer of a face mirrors: the sky above, the road below, the sun where it happens to.
-fn mirrored(normal: Vec3, view: Vec3, gloss: f32, light: &Illumination) -> Vec3 {
-    /// Reflectance of glass and lacquer at perpendicular incidence.
-    const STRAIGHT: f32 = 0.04;
+/// Returns the radiance that the clear coat of a face reflects: the sky above, the road below, and the sun near its
+/// mirror direction.
+fn reflected_radiance(normal: Vec3, view: Vec3, gloss: f32, light: &Illumination) -> Vec3 {
+    /// Reflectance of glass and clear coat at perpendicular incidence.
+    const PERPENDICULAR_REFLECTANCE: f32 = 0.04;
     if gloss == 0.0 {
         return [0.0; 3];
     }
     let cosine = dot(normal, view).clamp(0.0, 1.0);
-    // Schlick's approximation of Fresnel's equations (1994).
+    // Schlick's approximation of the Fresnel equations (1994).
     let grazing = 1.0 - cosine;
     let squared = grazing * grazing;
-    let share = gloss * (STRAIGHT + (1.0 - STRAIGHT) * squared * squared * grazing);
+    let share = gloss * (PERPENDICULAR_REFLECTANCE + (1.0 - PERPENDICULAR_REFLECTANCE) * squared * squared * grazing);
     let bounced = sub(normal.map(|part| 2.0 * cosine * part), view);
     let sky = light.sky(bounced[2].max(0.0));
     let upwards = (bounced[2] * 4.0 + 0.5).clamp(0.0, 1.0);
@@ -171,15 +175,16 @@ fn mirrored(normal: Vec3, view: Vec3, gloss: f32, light: &Illumination) -> Vec3 
     })
 }
 
-fn texture_map(mesh: &Mesh, place: usize, transform: &Transform) -> ([Vec3; 2], [f32; 2]) {
-    let map = &mesh.maps[place];
-    let origin = apply(&transform.camera_rotation, transform.camera_at, map.origin);
-    let axes = [map.u_axis, map.v_axis].map(|axis| apply(&transform.camera_rotation, [0.0; 3], axis));
+fn texture_map(mesh: &Mesh, index: usize, transform: &Transform) -> ([Vec3; 2], [f32; 2]) {
+    let map = &mesh.maps[index];
+    let origin = transform_point(&transform.camera_rotation, transform.camera_at, map.origin);
+    let axes = [map.u_axis, map.v_axis].map(|axis| transform_point(&transform.camera_rotation, [0.0; 3], axis));
     (axes, axes.map(|axis| -dot(origin, axis)))
 }
 
-/// Reflectance relative to the face's own at texture coordinates (u, v), each 0 … 1.
-pub(crate) fn drawn(texture: Texture, u: f32, v: f32) -> f32 {
+/// Returns the factor by which a texture changes the reflectance of its face at the texture coordinates (u, v), each
+/// from 0 to 1.
+pub(crate) fn texture_factor(texture: Texture, u: f32, v: f32) -> f32 {
     let stripe = |x: f32, count: f32| split(x * count).1;
     match texture {
         Texture::Plain => 1.0,
@@ -200,7 +205,7 @@ pub(crate) fn drawn(texture: Texture, u: f32, v: f32) -> f32 {
             if sign { 0.35 } else { rib }
         }
         Texture::Glass => {
-            // Seats and occupants show against the light from behind.
+            // Seats and occupants appear as silhouettes against the light from behind.
             let seat = (v < 0.45 && stripe(u * 1.1 + 0.2, 2.0) < 0.45) as u8;
             0.55 + 0.7 * v - 0.15 * f32::from(seat)
         }
@@ -221,8 +226,8 @@ mod tests {
 
     #[test]
     fn a_plate_has_glyphs_and_a_margin() {
-        assert_eq!(drawn(Texture::Plate, 0.02, 0.5), 1.0);
-        assert!((0..100).any(|step| drawn(Texture::Plate, step as f32 / 100.0, 0.5) < 0.5));
+        assert_eq!(texture_factor(Texture::Plate, 0.02, 0.5), 1.0);
+        assert!((0..100).any(|step| texture_factor(Texture::Plate, step as f32 / 100.0, 0.5) < 0.5));
         assert_eq!(Emission::None, Surface::PLATE.emission);
     }
 }

@@ -1,31 +1,31 @@
-//! The rear camera as a scenario file describes it, and checked.
+//! The configuration of the rear camera: the text in a scenario file, and its checked form.
 
 use closecall_traffic::{Check, Choice, ConfigError, Num, Parameters, Range};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What is done with the camera's image.
+/// The processing of the camera's image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Pipeline {
-    /// A network classifies the part of the image in which each LiDAR cluster lies.
+    /// A neural network classifies the part of the image that shows each LiDAR cluster.
     CropClassifier,
-    /// Nothing: class scores come from the clusters' shapes alone.
+    /// The image is not used: class scores come from the shapes of the LiDAR clusters alone.
     Off,
 }
 
-/// Where the sun stands.
+/// The position of the sun, as a scenario file describes it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct SunConfig {
-    /// Direction to the sun over ground, counter-clockwise from the road's direction at s = 0 [rad].
+    /// Azimuth of the sun, counter-clockwise from the road's direction at s = 0 (rad).
     pub azimuth_rad: Num,
-    /// Height of the sun above the horizon [rad].
+    /// Elevation of the sun above the horizon (rad).
     pub elevation_rad: Num,
 }
 
 impl Default for SunConfig {
-    /// A forenoon's sun, ahead and to the left: not in the rear camera's view.
+    /// Returns a sun ahead of the ego vehicle and to its left, outside the view of the rear camera.
     fn default() -> Self {
         Self { azimuth_rad: Num::Fixed(0.9), elevation_rad: Num::Fixed(0.7) }
     }
@@ -35,21 +35,21 @@ impl Default for SunConfig {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct CameraConfig {
-    /// What is done with the image.
+    /// Processing of the image.
     pub pipeline: Choice<Pipeline>,
-    /// Height of the lens above the ground [m].
+    /// Height of the lens above the ground (m).
     pub mount_height_m: Num,
-    /// How far the lens lies ahead of E's rear bumper [m].
+    /// Distance of the lens ahead of the ego's rear bumper (m).
     pub mount_from_rear_m: Num,
-    /// Pitch of the camera in E, positive looking down [rad].
+    /// Pitch of the camera relative to the ego's body, positive if it looks down (rad).
     pub pitch_rad: Num,
-    /// Root mean square of the angular rate of the camera's vibration [rad/s], which blurs long exposures.
+    /// Root mean square of the angular rate of the camera's vibration (rad/s). Vibration blurs long exposures.
     pub vibration_radps: Num,
-    /// Share of the window that is soiled [1].
+    /// Share of the rear window that is soiled (0 to 1).
     pub dirt: Num,
-    /// Brighter than the automatic exposure by this power of two [1].
+    /// Exposure compensation (EV): each unit doubles the brightness relative to the automatic exposure.
     pub exposure_ev: Num,
-    /// Where the sun stands.
+    /// Position of the sun.
     pub sun: SunConfig,
 }
 
@@ -68,33 +68,33 @@ impl Default for CameraConfig {
     }
 }
 
-/// Where the sun stands, checked.
+/// The checked position of the sun.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sun {
-    /// Direction to the sun over ground, counter-clockwise from the road's direction at s = 0 [rad].
+    /// Azimuth of the sun, counter-clockwise from the road's direction at s = 0 (rad).
     pub azimuth_rad: f64,
-    /// Height of the sun above the horizon [rad].
+    /// Elevation of the sun above the horizon (rad).
     pub elevation_rad: f64,
 }
 
-/// A checked rear camera.
+/// The checked configuration of the rear camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// What is done with the image.
+    /// Processing of the image.
     pub pipeline: Pipeline,
-    /// Height of the lens above the ground [m].
+    /// Height of the lens above the ground (m).
     pub mount_height_m: f64,
-    /// How far the lens lies ahead of E's rear bumper [m].
+    /// Distance of the lens ahead of the ego's rear bumper (m).
     pub mount_from_rear_m: f64,
-    /// Pitch of the camera in E, positive looking down [rad].
+    /// Pitch of the camera relative to the ego's body, positive if it looks down (rad).
     pub pitch_rad: f64,
-    /// Root mean square of the angular rate of the camera's vibration [rad/s].
+    /// Root mean square of the angular rate of the camera's vibration (rad/s).
     pub vibration_radps: f64,
-    /// Share of the window that is soiled [1].
+    /// Share of the rear window that is soiled (0 to 1).
     pub dirt: f64,
-    /// Brighter than the automatic exposure by this power of two [1].
+    /// Exposure compensation (EV): each unit doubles the brightness relative to the automatic exposure.
     pub exposure_ev: f64,
-    /// Where the sun stands.
+    /// Position of the sun.
     pub sun: Sun,
 }
 
@@ -126,14 +126,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_headline_configuration_is_the_default() {
+    fn naming_only_the_pipeline_gives_the_default_configuration() {
         let config: CameraConfig = serde_json::from_str(r#"{ "pipeline": "crop-classifier" }"#).unwrap();
         assert_eq!(config, CameraConfig::default());
         assert_eq!(config.check(&Parameters::default()).unwrap().pipeline, Pipeline::CropClassifier);
     }
 
     #[test]
-    fn a_wrong_sun_is_named_with_its_path() {
+    fn an_invalid_sun_elevation_is_reported_with_its_key_path() {
         let sun = SunConfig { elevation_rad: Num::Fixed(2.0), ..SunConfig::default() };
         let error = CameraConfig { sun, ..CameraConfig::default() }.check(&Parameters::default()).unwrap_err();
         assert!(error.to_string().starts_with("`sun.elevation-rad` is 2"), "{error}");

@@ -1,33 +1,33 @@
-//! The pixels of an exposure.
+//! The rendering of an exposure's pixels.
 //!
-//! Each is a function of (scene, pixel, key) alone: nothing here remembers what was drawn before.
+//! Each pixel is a function of (scene, pixel, key) alone, and does not depend on what was rendered before.
 
 use super::Frame;
-use super::body::{MOMENTS, drawn};
+use super::body::{MOMENTS, texture_factor};
 use super::frame::touches;
 use super::glow::{self, Glow};
 use super::ground::Patch;
-use super::image::{CHANNELS, Crop, Image, LabelledImage, crop_places};
+use super::image::{CHANNELS, Crop, Image, LabelledImage, sample_positions};
 use super::mesh::{Texture, Vec3, dot, each};
 use super::pinhole::{HEIGHT_PX, PixelRect, WIDTH_PX};
-use super::raster::{Lattice, STEPS};
+use super::raster::{Lattice, SUBPIXEL_STEPS};
 use super::sky;
 use super::spray::Cloud;
 
-/// The ground ends in woods at this distance [m].
+/// Distance at which the ground ends in woods (m).
 const GROUND_TO_M: f32 = 350.0;
 
-/// What reaches the pixels that are being drawn.
-struct Reach {
+/// The shadows, beams, spray clouds and glows that can affect the pixels that are being rendered.
+struct Effects {
     patches: Vec<Patch>,
     clouds: Vec<Cloud>,
     glows: Vec<Glow>,
 }
 
 impl Frame {
-    /// The whole image with the instance that each pixel shows.
+    /// Renders the whole image with the instance number of each pixel.
     pub fn image(&mut self) -> LabelledImage {
-        /// Side of the squares in which the image is drawn: their samples fit the processor's cache.
+        /// Side of the square tiles in which the image is rendered (px), small enough for the processor's cache.
         const TILE: i32 = 64;
         let (width, height) = (i32::from(WIDTH_PX), i32::from(HEIGHT_PX));
         let mut rgb = vec![0; usize::from(WIDTH_PX) * usize::from(HEIGHT_PX) * CHANNELS];
@@ -51,10 +51,10 @@ impl Frame {
         LabelledImage { image: Image { width: WIDTH_PX.into(), height: HEIGHT_PX.into(), rgb }, instances }
     }
 
-    /// Every `step`-th pixel of the rows `rows` of the image, as a small picture for people: each pixel is that of the
-    /// whole image.
+    /// Renders every `step`-th pixel of the rows `rows` of the image, as a small picture for human viewers. Each pixel
+    /// is identical to that of the whole image.
     pub fn preview(&mut self, step: u16, rows: std::ops::Range<u16>) -> Image {
-        /// Side of the squares in which the picture is drawn: their samples fit the processor's cache.
+        /// Side of the square tiles in which the picture is rendered (px), small enough for the processor's cache.
         const TILE: usize = 64;
         let columns: Vec<i32> = (step / 2..WIDTH_PX).step_by(step.into()).map(i32::from).collect();
         let rows: Vec<i32> =
@@ -75,35 +75,36 @@ impl Frame {
         Image { width, height, rgb }
     }
 
-    /// The samples of a square window, for the classifier.
+    /// Renders the classifier's crop of a square window.
     pub fn crop(&mut self, window: PixelRect, crop: &mut Crop) {
-        let columns = crop_places(window.left, window.width);
-        let rows = crop_places(window.top, window.height);
+        let columns = sample_positions(window.left, window.width);
+        let rows = sample_positions(window.top, window.height);
         crop.window = window;
         self.draw(&columns, &rows, &mut crop.rgb);
-        let inside = |place: i32, limit: u16| (0..i32::from(limit)).contains(&place);
+        let is_inside = |position: i32, limit: u16| (0..i32::from(limit)).contains(&position);
         for (pixel, rgb) in crop.rgb.chunks_exact_mut(CHANNELS).enumerate() {
             let (column, row) = (columns[pixel % columns.len()], rows[pixel / columns.len()]);
-            if !(inside(column, WIDTH_PX) && inside(row, HEIGHT_PX)) {
+            if !(is_inside(column, WIDTH_PX) && is_inside(row, HEIGHT_PX)) {
                 rgb.fill(0);
             }
         }
     }
 
-    /// Share of the latest crop's samples that show the vehicle at this place in the scene's list of others.
-    pub fn share_of_latest(&self, other: usize) -> f64 {
+    /// Returns the share of the latest crop's samples that show the vehicle with the index `other` in the scene's list
+    /// of other vehicles.
+    pub fn instance_share(&self, other: usize) -> f64 {
         let samples = self.lists.visibility[0].face.len();
         let hits = (0..samples).filter(|sample| usize::from(self.instance(*sample)) == other + 1).count();
         hits as f64 / samples.max(1) as f64
     }
 
-    /// The instance that a sample of the latest drawing shows.
+    /// Returns the instance number that a sample of the latest rendering shows, or 0 if it shows no vehicle.
     fn instance(&self, sample: usize) -> u16 {
         let face = self.lists.visibility[0].face[sample] as usize;
         self.lists.faces.get(face).map_or(0, |shade| shade.instance)
     }
 
-    /// Draws the pixels at the crossings of `columns` and `rows`.
+    /// Renders the pixels at the intersections of `columns` and `rows`.
     fn draw(&mut self, columns: &[i32], rows: &[i32], rgb: &mut [u8]) {
         let (Some(left), Some(right), Some(top), Some(bottom)) =
             (columns.first(), columns.last(), rows.first(), rows.last())
@@ -112,14 +113,14 @@ impl Frame {
         };
         let bounds = [*left as f32, *top as f32, *right as f32 + 1.0, *bottom as f32 + 1.0];
         for moment in 0..MOMENTS {
-            let lattice = Lattice { columns, rows, within: self.within[moment] };
+            let lattice = Lattice { columns, rows, subpixel: self.subpixel[moment] };
             self.lists.visibility[moment].clear(columns.len() * rows.len());
             for object in self.lists.objects.iter().filter(|object| touches(&object.bounds, &bounds)) {
                 self.lists.visibility[moment]
                     .draw(&self.lists.triangles[moment][object.triangles[moment].clone()], &lattice);
             }
         }
-        let reach = Reach {
+        let effects = Effects {
             patches: self
                 .lists
                 .patches
@@ -138,16 +139,16 @@ impl Frame {
         };
         for (sample, out) in rgb.chunks_exact_mut(CHANNELS).enumerate() {
             let pixel = [columns[sample % columns.len()], rows[sample / columns.len()]];
-            out.copy_from_slice(&self.pixel(sample, pixel, &reach));
+            out.copy_from_slice(&self.pixel(sample, pixel, &effects));
         }
     }
 
-    fn pixel(&self, sample: usize, pixel: [i32; 2], reach: &Reach) -> [u8; 3] {
-        let (centre, length) = self.ray(pixel, [STEPS / 2; 2]);
+    fn pixel(&self, sample: usize, pixel: [i32; 2], effects: &Effects) -> [u8; 3] {
+        let (centre, length) = self.ray(pixel, [SUBPIXEL_STEPS / 2; 2]);
         let mut sum = [0.0; 3];
         let mut nearness = 0.0;
         for moment in 0..MOMENTS {
-            let (radiance, inverse_depth) = self.sample(sample, moment, pixel, length, &reach.patches);
+            let (radiance, inverse_depth) = self.sample(sample, moment, pixel, length, &effects.patches);
             nearness += inverse_depth;
             for (sum, part) in sum.iter_mut().zip(radiance) {
                 *sum += part;
@@ -156,7 +157,7 @@ impl Frame {
         let mut light = sum.map(|part| part / MOMENTS as f32);
         let direction = self.lens.ray_in_ground(centre).map(|part| part / length);
         let mut thickness = 0.0;
-        for cloud in &reach.clouds {
+        for cloud in &effects.clouds {
             thickness += cloud.optical_depth(direction, length * MOMENTS as f32 / nearness.max(1e-3));
         }
         if thickness > 0.0 {
@@ -165,29 +166,29 @@ impl Frame {
             light = each(|i| air[i] + (light[i] - air[i]) * left);
         }
         let at = [pixel[0] as f32 + 0.5, pixel[1] as f32 + 0.5];
-        for glow in &reach.glows {
+        for glow in &effects.glows {
             glow.add_to(at, &mut light);
         }
         let glare = glow::sun(direction, &self.light);
-        let seen = self.window.seen_through(pixel, each(|i| light[i] + glare[i]), &self.light);
-        self.window.develop(pixel, seen, &self.light)
+        let radiance = self.window.transmitted(pixel, each(|i| light[i] + glare[i]), &self.light);
+        self.window.encode(pixel, radiance, &self.light)
     }
 
-    /// The ray through a place within a pixel, in camera axes with depth 1: (x, y), and its length.
-    fn ray(&self, pixel: [i32; 2], within: [i32; 2]) -> ([f32; 2], f32) {
-        let steps = STEPS as f32;
+    /// Returns the ray through a point within a pixel, in camera axes with depth 1: its (x, y), and its length.
+    fn ray(&self, pixel: [i32; 2], subpixel: [i32; 2]) -> ([f32; 2], f32) {
+        let steps = SUBPIXEL_STEPS as f32;
         let focal = self.lens.focal_px as f32;
         let part = |axis: usize, extent: u16| {
-            let place = (pixel[axis] * STEPS + within[axis]) as f32 / steps;
-            (place - f32::from(extent) / 2.0) / focal
+            let position = (pixel[axis] * SUBPIXEL_STEPS + subpixel[axis]) as f32 / steps;
+            (position - f32::from(extent) / 2.0) / focal
         };
         let [x, y] = [part(0, WIDTH_PX), part(1, HEIGHT_PX)];
         ([x, y], (x * x + y * y + 1.0).sqrt())
     }
 
-    /// Radiance and 1/depth of what one sample sees.
+    /// Returns the radiance that one sample sees, and 1/depth (1/m), which is 0 for the sky.
     fn sample(&self, sample: usize, moment: usize, pixel: [i32; 2], length: f32, patches: &[Patch]) -> (Vec3, f32) {
-        let (ray, _) = self.ray(pixel, self.within[moment]);
+        let (ray, _) = self.ray(pixel, self.subpixel[moment]);
         let inverse_depth = self.lists.visibility[moment].inverse_depth[sample];
         if inverse_depth > 0.0 {
             let depth = 1.0 / inverse_depth;
@@ -196,7 +197,7 @@ impl Frame {
             if shade.texture != Texture::Plain {
                 let at = [ray[0] * depth, ray[1] * depth, depth];
                 let [u, v] = [0, 1].map(|axis| dot(shade.map[axis], at) + shade.offset[axis]);
-                let factor = drawn(shade.texture, u, v);
+                let factor = texture_factor(shade.texture, u, v);
                 radiance = radiance.map(|part| part * factor);
             }
             return (self.through_air(radiance, depth * length), inverse_depth);
@@ -208,10 +209,10 @@ impl Frame {
         if slope * GROUND_TO_M < -height {
             let depth = -height / direction[2];
             let at = [direction[0] * depth, direction[1] * depth];
-            let radiance = self.ground.radiance(at, self.flow_m[moment], &self.light, patches);
+            let radiance = self.ground.radiance(at, self.travelled_m[moment], &self.light, patches);
             return (self.through_air(radiance, depth * length), 1.0 / depth);
         }
-        (sky::radiance(slope, -direction[1] / direction[0] + self.bearing, &self.light), 0.0)
+        (sky::radiance(slope, -direction[1] / direction[0] + self.ego_yaw_rad, &self.light), 0.0)
     }
 
     fn through_air(&self, radiance: Vec3, distance_m: f32) -> Vec3 {

@@ -1,50 +1,50 @@
-//! One exposure: the scene prepared for the lens, of which any pixel can be drawn (`draw.rs` does that).
+//! One exposure of the rear camera: the scene, prepared so that `draw.rs` can render any of its pixels.
 //!
 //! ```text
-//!   bodies ─ lit, projected at 4 moments ─▶ which face does each sample see? ─▶ radiance ─▶ air ─▶ mean of 4
-//!   ground, sky ──────────────────────────▶ where it sees none                                        │
-//!                                             bytes ◀─ noise, exposure ◀─ window ◀─ glow ◀─ spray ◀───┘
+//!   bodies ─ shaded, projected at 4 moments ─▶ visible face of each sample ─▶ radiance ─▶ air ─▶ mean of 4
+//!   ground, sky ─────────────────────────────▶ if no face is visible ─────────────▲                 │
+//!                                          bytes ◀─ noise, exposure ◀─ window ◀─ glow ◀─ spray ◀────┘
 //! ```
 //!
-//! **A crop is identical to the same pixels of the whole image, bit for bit**: a pixel is a function of (scene, pixel,
-//! key) alone. Bodies, shadows, clouds and halos that cannot reach the pixels asked for are left out, by bounds that
-//! are never too small; each of them contributes nothing at all beyond its bounds.
+//! **A crop is identical to the same pixels of the whole image, bit for bit**, because a pixel is a function of (scene,
+//! pixel, key) alone. The frame leaves out bodies, shadows, spray clouds and halos that cannot reach the requested
+//! pixels. Their bounds are never too small, and each contributes exactly nothing outside its bounds.
 
 use closecall_traffic::{Indicator, Time};
 
-use super::body::{Eye, MOMENTS, Placement, Shade, add, moment_offset};
+use super::body::{MOMENTS, Placement, Shade, Shading, add_body, moment_offset};
 use super::glow::Glow;
 use super::ground::{BEAM_M, CONTACT_SHADOW_M, Ground, LONGEST_SHADOW_M, Patch, PatchKind};
 use super::hash::{mix, normal3};
 use super::light::Illumination;
 use super::mesh::{Emission, Mesh};
 use super::pinhole::{GroundBox, Lens, PixelRect};
-use super::raster::{STEPS, ScreenTriangle, Visibility};
+use super::raster::{SUBPIXEL_STEPS, ScreenTriangle, Visibility};
 use super::spray::{self, Cloud};
-use super::window::Window;
+use super::window::RearWindow;
 use super::{Camera, ExposureKey, shapes};
 use crate::{Scene, SceneVehicle};
 
-/// Bodies farther away than this are not drawn [m].
-const FARTHEST_M: f64 = 400.0;
-/// Where within a pixel the samples of the moments lie: a rotated grid [1/256 px].
-const WITHIN: [[i32; 2]; MOMENTS] = [[32, 160], [96, 32], [224, 96], [160, 224]];
-/// Bounds are widened by this to cover vibration, motion within the exposure, and rounding [px].
+/// Longitudinal distance beyond which vehicles are not rendered (m).
+const MAX_DISTANCE_M: f64 = 400.0;
+/// Offset within the pixel of the sample of each moment (1/256 px). Together they form a rotated grid.
+const SUBPIXEL_OFFSETS: [[i32; 2]; MOMENTS] = [[32, 160], [96, 32], [224, 96], [160, 224]];
+/// Margin by which bounds are enlarged to cover vibration, motion within the exposure, and rounding (px).
 const MARGIN_PX: f64 = 24.0;
-/// Longest shift of the image by vibration during an exposure [px].
-const SHAKE_LIMIT_PX: f64 = 6.0;
-/// Drops on the window move, and are wiped away, this often.
-const DROPS_LAST: Time = Time::from_ms(400);
-/// An indicator is on for half of this time.
-const BLINK: Time = Time::from_ms(700);
+/// Maximum shift of the image by vibration during an exposure (px).
+const MAX_SHAKE_PX: f64 = 6.0;
+/// Interval at which the pattern of drops on the window changes, because drops move and are wiped away.
+const DROP_PATTERN_PERIOD: Time = Time::from_ms(400);
+/// Period of a blinking indicator, which shines during the first half.
+const BLINK_PERIOD: Time = Time::from_ms(700);
 
-/// Bounds in the image [left, top, right, bottom, px].
+/// Bounds in the image, `[left, top, right, bottom]` (px).
 pub(super) type Bounds = [f32; 4];
 
-/// One body's triangles.
+/// The triangles of one body.
 pub(super) struct Object {
     pub(super) bounds: Bounds,
-    /// Places in the lists of triangles.
+    /// For each moment, the range of the body's triangles in [`Lists::triangles`].
     pub(super) triangles: [std::ops::Range<usize>; MOMENTS],
 }
 
@@ -53,16 +53,17 @@ pub struct Frame {
     pub(super) lens: Lens,
     pub(super) light: Illumination,
     pub(super) ground: Ground,
-    pub(super) window: Window,
-    /// Places of the samples within a pixel, with vibration [1/256 px].
-    pub(super) within: [[i32; 2]; MOMENTS],
-    /// How far the road moves along s until each moment [m].
-    pub(super) flow_m: [f32; MOMENTS],
-    pub(super) bearing: f32,
+    pub(super) window: RearWindow,
+    /// Offset within the pixel of the sample of each moment, including vibration (1/256 px).
+    pub(super) subpixel: [[i32; 2]; MOMENTS],
+    /// Distance that the ego has moved along s at each moment, relative to the middle of the exposure (m).
+    pub(super) travelled_m: [f32; MOMENTS],
+    /// Yaw of the ego in the plane (rad).
+    pub(super) ego_yaw_rad: f32,
     pub(super) lists: Lists,
 }
 
-/// The lists of a frame, which another one can take over to save their allocation.
+/// The buffers of a frame, which the next frame can reuse to avoid allocations.
 #[derive(Default)]
 pub struct Lists {
     pub(super) objects: Vec<Object>,
@@ -92,12 +93,12 @@ impl Lists {
 }
 
 impl Frame {
-    /// Prepares what can be seen within the rectangles `regions` of an exposure; drawing elsewhere is not meaningful.
+    /// Prepares the exposure for rendering within the rectangles `regions`. Pixels outside of them are not valid.
     pub fn new(camera: &Camera, scene: &Scene<'_>, key: ExposureKey, regions: &[PixelRect]) -> Self {
         Self::reusing(Lists::default(), camera, scene, key, regions)
     }
 
-    /// The same, in the lists of an earlier frame.
+    /// Prepares the exposure like [`Frame::new`], but reuses the buffers of an earlier frame.
     pub fn reusing(
         mut lists: Lists,
         camera: &Camera,
@@ -112,35 +113,41 @@ impl Frame {
         let light = Illumination::new(scene.environment, camera, ego, yaw);
         let (sin, cos) = ego.heading_rad.sin_cos();
         let (s_m, d_m) = (ego.s_m + lens.ahead_m * cos, ego.d_m + lens.ahead_m * sin);
-        let drops = scene.time.ns() / DROPS_LAST.ns();
+        let drops = scene.time.ns() / DROP_PATTERN_PERIOD.ns();
         let mut frame = Self {
             lens,
             ground: Ground::new(scene.road, s_m, d_m, ego.heading_rad),
-            window: Window { dirt: camera.dirt as f32, drops_key: mix(drops as u64), noise_key: key.0 },
-            within: shaken(camera, &light, &lens, key),
-            flow_m: [0, 1, 2, 3].map(|moment| (ego.speed_mps * moment_offset(moment)) as f32 * light.exposure_s),
+            window: RearWindow { dirt: camera.dirt as f32, drops_key: mix(drops as u64), noise_key: key.0 },
+            subpixel: shaken_offsets(camera, &light, &lens, key),
+            travelled_m: [0, 1, 2, 3].map(|moment| (ego.speed_mps * moment_offset(moment)) as f32 * light.exposure_s),
             light,
-            bearing: yaw as f32,
+            ego_yaw_rad: yaw as f32,
             lists,
         };
-        for (place, vehicle) in scene.others.iter().enumerate() {
-            frame.add_vehicle(scene, vehicle, u16::try_from(place + 1).unwrap_or(0), regions);
+        for (index, vehicle) in scene.others.iter().enumerate() {
+            frame.add_vehicle(scene, vehicle, u16::try_from(index + 1).unwrap_or(0), regions);
         }
         frame.add_roadside(scene, s_m, regions);
-        let own =
-            spray::behind(&scene.ego, scene, [-lens.ahead_m as f32, 0.0], [1.0, 0.0], lens.height_m as f32, key.0);
+        let own = spray::clouds_behind(
+            &scene.ego,
+            scene,
+            [-lens.ahead_m as f32, 0.0],
+            [1.0, 0.0],
+            lens.height_m as f32,
+            key.0,
+        );
         frame.add_clouds(own);
         frame
     }
 
-    /// The lists, for the next frame.
+    /// Returns the buffers, for reuse by the next frame.
     pub fn into_lists(self) -> Lists {
         self.lists
     }
 
     fn add_vehicle(&mut self, scene: &Scene<'_>, vehicle: &SceneVehicle, instance: u16, regions: &[PixelRect]) {
-        let (at, heading) = self.lens.place(scene, vehicle);
-        if !(at[0].abs() < FARTHEST_M) {
+        let (at, heading) = self.lens.pose_in_ground(scene, vehicle);
+        if !(at[0].abs() < MAX_DISTANCE_M) {
             return;
         }
         let (sin, cos) = heading.sin_cos();
@@ -164,8 +171,14 @@ impl Frame {
         };
         self.add_patches(&body, size.height_m);
         let turn = [cos as f32, sin as f32];
-        let clouds =
-            spray::behind(vehicle, scene, at.map(|x| x as f32), turn, self.lens.height_m as f32, self.window.noise_key);
+        let clouds = spray::clouds_behind(
+            vehicle,
+            scene,
+            at.map(|x| x as f32),
+            turn,
+            self.lens.height_m as f32,
+            self.window.noise_key,
+        );
         self.add_clouds(clouds);
         let bounds = self.bounds_of(&body);
         let lamps_matter = self.light.is_dark() && bounds.is_some();
@@ -186,17 +199,17 @@ impl Frame {
 
     fn add_object(&mut self, mesh: &Mesh, placement: &Placement, indicators: [bool; 2], bounds: Bounds) {
         let before: [usize; MOMENTS] = std::array::from_fn(|moment| self.lists.triangles[moment].len());
-        let eye = Eye { lens: &self.lens, light: &self.light, indicators };
-        add(mesh, placement, &eye, &mut self.lists.faces, &mut self.lists.triangles);
+        let shading = Shading { lens: &self.lens, light: &self.light, indicators };
+        add_body(mesh, placement, &shading, &mut self.lists.faces, &mut self.lists.triangles);
         let triangles = std::array::from_fn(|moment| before[moment]..self.lists.triangles[moment].len());
         self.lists.objects.push(Object { bounds, triangles });
     }
 
     fn add_roadside(&mut self, scene: &Scene<'_>, s_m: f64, regions: &[PixelRect]) {
         for body in shapes::roadside(scene.road, s_m) {
-            let mut stand = SceneVehicle { pitch_rad: 0.0, ..scene.ego };
-            stand.state = closecall_traffic::VehicleState { s_m: body.s_m, d_m: body.d_m, ..Default::default() };
-            let (at, heading) = self.lens.place(scene, &stand);
+            let mut anchor = SceneVehicle { pitch_rad: 0.0, ..scene.ego };
+            anchor.state = closecall_traffic::VehicleState { s_m: body.s_m, d_m: body.d_m, ..Default::default() };
+            let (at, heading) = self.lens.pose_in_ground(scene, &anchor);
             let [half_length, half_width, height_m] = body.extent_m.map(f64::from);
             let around = GroundBox {
                 x_m: at[0],
@@ -265,31 +278,32 @@ impl Frame {
 
     fn add_glows(&mut self, mesh: &Mesh, placement: &Placement, indicators: [bool; 2]) {
         let [cos, sin] = placement.turn;
-        let bearing = (placement.at[0].powi(2) + placement.at[1].powi(2)).sqrt().max(1.0);
-        let facing = -(cos * placement.at[0] + sin * placement.at[1]) / bearing;
+        let distance = (placement.at[0].powi(2) + placement.at[1].powi(2)).sqrt().max(1.0);
+        let facing = -(cos * placement.at[0] + sin * placement.at[1]) / distance;
         for lamp in &mesh.lamps {
             let [x, y, z] = lamp.at.map(f64::from);
             let ground = [placement.at[0] + cos * x - sin * y, placement.at[1] + sin * x + cos * y];
-            let radiance = self.light.emitted(lamp.emission, |is_left| indicators[usize::from(!is_left)]);
+            let radiance = self.light.emitted_radiance(lamp.emission, |is_left| indicators[usize::from(!is_left)]);
             let camera = self.lens.in_camera([ground[0], ground[1], z]);
             if camera[2] < 1.0 || radiance[0] <= 0.0 {
                 continue;
             }
-            let place = |point: [f64; 3]| self.lens.pixel(point).map(|x| x as f32);
+            let project = |point: [f64; 3]| self.lens.pixel(point).map(|x| x as f32);
             let left = self.light.transmission(camera[2] as f32);
             let strength = if lamp.emission == Emission::Headlamp { 1.0 } else { 0.15 };
             let halo =
-                Glow::halo(place(camera), camera[2] as f32, facing as f32, radiance.map(|x| x * left * strength));
+                Glow::halo(project(camera), camera[2] as f32, facing as f32, radiance.map(|x| x * left * strength));
             self.lists.glows.push((halo.bounds(), halo));
             let mirrored = self.lens.in_camera([ground[0], ground[1], -z]);
             if self.light.wetness > 0.0 && mirrored[2] > 1.0 {
-                let streak = Glow::streak(place(mirrored), &halo, self.light.wetness);
+                let streak = Glow::streak(project(mirrored), &halo, self.light.wetness);
                 self.lists.glows.push((streak.bounds(), streak));
             }
         }
     }
 
-    /// Bounds in the image of a box given in the ground frame, never too small.
+    /// Returns the bounds in the image of a box given in the ground frame, never too small. Returns `None` if the box
+    /// is not visible.
     fn bounds_of(&self, body: &GroundBox) -> Option<Bounds> {
         let corners = body.corners().map(|corner| self.lens.in_camera(corner));
         self.lens.bounds(&corners).map(widened)
@@ -297,7 +311,7 @@ impl Frame {
 }
 
 fn widened([left, top, right, bottom]: [f64; 4]) -> Bounds {
-    [left - MARGIN_PX, top - MARGIN_PX, right + MARGIN_PX, bottom + MARGIN_PX].map(|place| place as f32)
+    [left - MARGIN_PX, top - MARGIN_PX, right + MARGIN_PX, bottom + MARGIN_PX].map(|bound| bound as f32)
 }
 
 fn bounds_of_rect(rect: &PixelRect) -> Bounds {
@@ -309,22 +323,23 @@ pub(super) fn touches(a: &Bounds, b: &Bounds) -> bool {
     a[0] <= b[2] && b[0] <= a[2] && a[1] <= b[3] && b[1] <= a[3]
 }
 
-/// Whether the left and the right indicator shine at this time.
+/// Returns whether the left and the right indicator shine at this time.
 fn blinking(indicator: Indicator, time: Time) -> [bool; 2] {
-    let on = time.ns().rem_euclid(BLINK.ns()) < BLINK.ns() / 2;
+    let on = time.ns().rem_euclid(BLINK_PERIOD.ns()) < BLINK_PERIOD.ns() / 2;
     [on && indicator == Indicator::Left, on && indicator == Indicator::Right]
 }
 
-/// Where the samples of each moment lie within the pixels, the camera turning at a constant rate meanwhile.
-fn shaken(camera: &Camera, light: &Illumination, lens: &Lens, key: ExposureKey) -> [[i32; 2]; MOMENTS] {
+/// Returns the offset within the pixel of the sample of each moment, for a camera that rotates at a constant rate
+/// during the exposure.
+fn shaken_offsets(camera: &Camera, light: &Illumination, lens: &Lens, key: ExposureKey) -> [[i32; 2]; MOMENTS] {
     let [yaw, pitch, _] = normal3(mix(key.0 ^ 0x7368_616b));
     #[expect(clippy::cast_possible_truncation, reason = "limited to a few pixels before the cast")]
     let shift = |rate: f32, moment: usize| {
         let turned = camera.vibration_radps * f64::from(rate * light.exposure_s) * moment_offset(moment);
-        ((turned * lens.focal_px).clamp(-SHAKE_LIMIT_PX, SHAKE_LIMIT_PX) * f64::from(STEPS)) as i32
+        ((turned * lens.focal_px).clamp(-MAX_SHAKE_PX, MAX_SHAKE_PX) * f64::from(SUBPIXEL_STEPS)) as i32
     };
     std::array::from_fn(|moment| {
-        let [x, y] = WITHIN[moment];
+        let [x, y] = SUBPIXEL_OFFSETS[moment];
         [x + shift(yaw, moment), y + shift(pitch, moment)]
     })
 }

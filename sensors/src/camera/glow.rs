@@ -1,66 +1,74 @@
-//! Light that strays in the lens and the window: halos around lamps, their streaks on a wet road, the sun's glare.
+//! Stray light in the lens and the window, and reflections: halos around lamps, streaks of lamps on a wet road, and the
+//! glare of the sun.
 //!
-//! A halo ends at a finite radius, so that it can be left out where it does not reach without changing a pixel.
+//! A halo has a finite radius and contributes exactly zero beyond it. A crop that the halo does not reach can therefore
+//! be rendered without it.
 
 use super::light::Illumination;
 use super::mesh::{Vec3, dot};
 
-/// The sun's glare begins at this cosine of the angle to it: about 53°.
+/// Cosine of the angle to the sun within which glare is visible: about 53°.
 const GLARE_FROM_COSINE: f32 = 0.6;
 
 /// A halo or a streak in the image.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Glow {
-    /// Its middle [px].
-    pub(crate) at: [f32; 2],
-    /// Where it ends, to the side and upwards [px].
+    /// Centre (px).
+    pub(crate) centre_px: [f32; 2],
+    /// Horizontal and vertical radius, beyond which there is no light (px).
     pub(crate) reach_px: [f32; 2],
-    /// How much brighter its middle is than its flanks [1]: 0 for a streak.
+    /// Sharpness of the peak in the middle, dimensionless: 0 for a streak, which has none.
     pub(crate) peak: f32,
-    /// Radiance in the middle.
+    /// Radiance in the centre.
     pub(crate) radiance: Vec3,
 }
 
 impl Glow {
-    /// The halo of a lamp `depth_m` away, `facing` the lens by this cosine, which shows in the dark alone.
-    pub(crate) fn halo(at: [f32; 2], depth_m: f32, facing: f32, radiance: Vec3) -> Self {
-        /// Depth at which a halo is as described here [m].
+    /// Returns the halo of a lamp at the depth `depth_m`. `facing` is the cosine of the angle between the lamp's axis
+    /// and the direction to the lens. Halos are used only in the dark.
+    pub(crate) fn halo(centre_px: [f32; 2], depth_m: f32, facing: f32, radiance: Vec3) -> Self {
+        /// Depth at which the halo's size and strength have their nominal values (m).
         const REFERENCE_M: f32 = 30.0;
         let near = (REFERENCE_M / depth_m.max(2.0)).min(6.0);
         let reach = 14.0 + 50.0 * near.min(2.5);
         let strength = 0.030 * near.min(2.0) * facing.max(0.0).powi(3);
-        Self { at, reach_px: [reach, reach], peak: 900.0 / (1.0 + near), radiance: radiance.map(|x| x * strength) }
+        Self {
+            centre_px,
+            reach_px: [reach, reach],
+            peak: 900.0 / (1.0 + near),
+            radiance: radiance.map(|x| x * strength),
+        }
     }
 
-    /// The streak that the same lamp draws on a wet road, whose mirror image is at `at`.
-    pub(crate) fn streak(at: [f32; 2], halo: &Self, wetness: f32) -> Self {
+    /// Returns the streak that the lamp of `halo` draws on a wet road. The mirror image of the lamp is at `at` (px).
+    pub(crate) fn streak(centre_px: [f32; 2], halo: &Self, wetness: f32) -> Self {
         let [side, _] = halo.reach_px;
         let reach_px = [0.16 * side, 0.9 * side];
-        Self { at, reach_px, peak: 0.0, radiance: halo.radiance.map(|x| x * 0.5 * wetness) }
+        Self { centre_px, reach_px, peak: 0.0, radiance: halo.radiance.map(|x| x * 0.5 * wetness) }
     }
 
-    /// Smallest and largest column, smallest and largest row that it reaches [px].
+    /// Returns the bounds `[left, top, right, bottom]` of the glow in the image (px).
     pub(crate) fn bounds(&self) -> [f32; 4] {
-        let [u, v] = self.at;
+        let [u, v] = self.centre_px;
         let [side, up] = self.reach_px;
         [u - side, v - up, u + side, v + up]
     }
 
-    /// Its radiance at a pixel.
+    /// Adds the glow's radiance at a pixel to `light`.
     pub(crate) fn add_to(&self, pixel: [f32; 2], light: &mut Vec3) {
-        let x = (pixel[0] - self.at[0]) / self.reach_px[0];
-        let y = (pixel[1] - self.at[1]) / self.reach_px[1];
+        let x = (pixel[0] - self.centre_px[0]) / self.reach_px[0];
+        let y = (pixel[1] - self.centre_px[1]) / self.reach_px[1];
         let square = x * x + y * y;
         if square < 1.0 {
-            let falls = (1.0 - square) * (1.0 - square) / (1.0 + self.peak * square);
-            for (sum, own) in light.iter_mut().zip(self.radiance) {
-                *sum += own * falls;
+            let falloff = (1.0 - square) * (1.0 - square) / (1.0 + self.peak * square);
+            for (sum, radiance) in light.iter_mut().zip(self.radiance) {
+                *sum += radiance * falloff;
             }
         }
     }
 }
 
-/// Radiance of the sun's disc and of its glare in the direction of the unit vector `towards`.
+/// Returns the radiance of the sun's disc and of its glare in the direction of the unit vector `towards`.
 pub(crate) fn sun(towards: Vec3, light: &Illumination) -> Vec3 {
     let cosine = dot(towards, light.to_sun);
     if light.sun[0] <= 0.0 || cosine <= GLARE_FROM_COSINE {
@@ -77,16 +85,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_halo_ends_where_its_bounds_say() {
+    fn a_halo_is_zero_at_its_bounds_and_peaks_in_its_centre() {
         let halo = Glow::halo([100.0, 100.0], 40.0, 1.0, [3.0; 3]);
         let [left, _, right, _] = halo.bounds();
-        let at = |u: f32| {
+        let radiance_at = |u: f32| {
             let mut light = [0.0; 3];
             halo.add_to([u, 100.0], &mut light);
             light[0]
         };
-        assert_eq!(at(left), 0.0);
-        assert_eq!(at(right), 0.0);
-        assert!(at(100.0) > at(110.0) && at(110.0) > 0.0);
+        assert_eq!(radiance_at(left), 0.0);
+        assert_eq!(radiance_at(right), 0.0);
+        assert!(radiance_at(100.0) > radiance_at(110.0) && radiance_at(110.0) > 0.0);
     }
 }

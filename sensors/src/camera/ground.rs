@@ -1,6 +1,7 @@
-//! The road's surface with its markings, the verge, and the light and shadow that vehicles cast on it.
+//! The ground: the road surface with its markings, the verge, and the shadows and headlamp beams of vehicles on it.
 //!
-//! Markings follow German practice for motorways: edge lines 0.30 m wide, lane lines 0.15 m, 6 m long every 18 m.
+//! The markings follow German practice for motorways: edge lines are 0.30 m wide, lane lines are 0.15 m wide and
+//! dashed, with dashes of 6 m every 18 m.
 
 use closecall_traffic::Road;
 
@@ -12,11 +13,12 @@ const EDGE_LINE_HALF_M: f32 = 0.15;
 const LANE_LINE_HALF_M: f32 = 0.075;
 const DASH_M: f32 = 6.0;
 const DASH_EVERY_M: f32 = 18.0;
-/// Dashes merge into a grey line where one pixel row spans them [m].
+/// The distances at which dashes begin to merge into a uniform grey line and at which they have merged (m), because a
+/// pixel row then spans several of them.
 const DASHES_MERGE_M: [f32; 2] = [60.0, 110.0];
-/// Paved shoulder left of the leftmost lane, and right of the rightmost [m].
+/// Widths of the paved shoulder left of the leftmost lane and right of the rightmost lane (m).
 const SHOULDER_M: [f32; 2] = [1.3, 2.6];
-/// Beyond this the grain of the asphalt is finer than a pixel [m].
+/// Distance beyond which the grain of the asphalt is finer than a pixel (m).
 const GRAIN_TO_M: f32 = 50.0;
 const ASPHALT: Vec3 = [0.105, 0.105, 0.108];
 const PAINT: Vec3 = [0.62, 0.62, 0.60];
@@ -24,13 +26,13 @@ const GRASS: Vec3 = [0.075, 0.11, 0.035];
 const GRASS_KEY: u64 = 0x0067_7261_7373;
 const ASPHALT_KEY: u64 = 0x6173_7068;
 
-/// The road's surface as seen from one place.
+/// The road surface as seen from one position of the lens.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ground {
-    /// Lens above the road: its place along the road [m], modulo the textures' period, and its lateral place [m].
+    /// Position of the lens in road coordinates (s, d) (m), with s modulo the period of the textures.
     s_m: f32,
     d_m: f32,
-    /// Cosine and sine of E's heading relative to the road.
+    /// Cosine and sine of the ego's heading relative to the road.
     cos: f32,
     sin: f32,
     curvature_per_m: f32,
@@ -38,36 +40,37 @@ pub(crate) struct Ground {
     lanes: f32,
 }
 
-/// Light or shadow on the ground, with the support in the image that it is confined to.
+/// A shadow or a headlamp beam that one vehicle casts on the ground.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Patch {
-    /// The vehicle's place in the ground frame [m].
+    /// Position of the vehicle in the ground frame (m).
     pub(crate) at: [f32; 2],
-    /// Cosine and sine of its heading in the ground frame.
+    /// Cosine and sine of the vehicle's heading in the ground frame.
     pub(crate) turn: [f32; 2],
-    /// Half its length, half its width, its height [m].
+    /// Half length, half width and height of the vehicle (m).
     pub(crate) extent: Vec3,
-    /// What it does.
+    /// Effect on the ground.
     pub(crate) kind: PatchKind,
 }
 
-/// What a vehicle does to the ground around it.
+/// The effect of a vehicle on the light that reaches the ground.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum PatchKind {
-    /// It hides the sky and the sun.
+    /// The vehicle hides part of the sky and the sun.
     Shadow,
-    /// Its headlamps light the road ahead.
+    /// The vehicle's headlamps illuminate the road ahead of it.
     Beam,
 }
 
-/// How far beyond a vehicle's box its contact shadow reaches [m].
+/// Extent of the contact shadow beyond the vehicle's box (m).
 pub(crate) const CONTACT_SHADOW_M: f32 = 0.6;
-/// The longest sun shadow [m].
+/// Maximum length of a shadow cast by the sun (m).
 pub(crate) const LONGEST_SHADOW_M: f32 = 8.0;
-/// How far ahead headlamps light the road, and how far to each side at most [m].
+/// Range of the headlamps on the road, and their maximum reach to each side (m).
 pub(crate) const BEAM_M: [f32; 2] = [45.0, 8.0];
 
-/// What the patches do to one point of the ground.
+/// The combined effect of all patches on one point of the ground: the visible shares of sky and sun, and the added
+/// light of headlamps.
 struct PatchLight {
     sky: f32,
     sun: f32,
@@ -75,9 +78,9 @@ struct PatchLight {
 }
 
 impl Ground {
-    /// The surface of `road` under a lens at (`s_m`, `d_m`), in a vehicle with this heading relative to the road.
+    /// Creates the surface of `road` for a lens at (`s_m`, `d_m`) in a vehicle with this heading relative to the road.
     pub(crate) fn new(road: &Road, s_m: f64, d_m: f64, heading_rad: f64) -> Self {
-        /// A multiple of the dashes' period and of the textures' cells, so that numbers stay small [m].
+        /// Period at which s is wrapped to keep numbers small (m): a multiple of the periods of dashes and textures.
         const PERIOD_M: f64 = 18.0 * 512.0;
         Self {
             s_m: s_m.rem_euclid(PERIOD_M) as f32,
@@ -90,10 +93,11 @@ impl Ground {
         }
     }
 
-    /// Road coordinates (s, d) [m] of the ground frame's point (x, y).
+    /// Returns the road coordinates (s, d) (m) of the point (x, y) of the ground frame.
     ///
-    /// With the reference line a circle of curvature κ touching the X axis, d = −q/(1 + √(1 + κ·q)) for
-    /// q = κ·(X² + Y²) − 2·Y, which stays exact as κ → 0; s = X/(1 − κ·Y) to third order, which only places dashes.
+    /// The reference line is a circle of curvature κ that touches the X axis. Then d = −q/(1 + √(1 + κ·q)) for
+    /// q = κ·(X² + Y²) − 2·Y, which stays exact as κ → 0. The arc length s follows from X/(1 − κ·Y) to third order,
+    /// which suffices because it only positions dashes and textures.
     fn road_position(&self, x: f32, y: f32) -> (f32, f32) {
         let along = self.cos * x - self.sin * y;
         let across = self.d_m + self.sin * x + self.cos * y;
@@ -105,35 +109,37 @@ impl Ground {
         (self.s_m + tangent * (1.0 - bend * bend / 3.0), d)
     }
 
-    /// Radiance of the ground at (x, y) of the ground frame, `slope` being the ray's fall over its run, seen after
-    /// the road has moved by `flow_m` along s.
-    pub(crate) fn radiance(&self, [x, y]: [f32; 2], flow_m: f32, light: &Illumination, patches: &[Patch]) -> Vec3 {
+    /// Returns the radiance of the ground at the point (x, y) of the ground frame, after the ego has moved by
+    /// `travelled_m` along s.
+    pub(crate) fn radiance(&self, [x, y]: [f32; 2], travelled_m: f32, light: &Illumination, patches: &[Patch]) -> Vec3 {
         let (s, d) = self.road_position(x, y);
-        let s = s + flow_m;
+        let s = s + travelled_m;
         let run = -x;
         let (albedo, gloss) = self.albedo(s, d, run, light.wetness);
-        let cast = cast_by(patches, [x, y], light);
+        let cast = patch_light(patches, [x, y], light);
         let up = light.to_sun[2].max(0.0);
         let mirrored = light.sky(0.02);
         each(|channel| {
-            let falls = light.ambient[channel] * cast.sky + light.sun[channel] * up * cast.sun + light.beam * cast.beam;
-            albedo[channel] * falls + gloss * cast.sky * mirrored[channel]
+            let illumination =
+                light.ambient[channel] * cast.sky + light.sun[channel] * up * cast.sun + light.beam * cast.beam;
+            albedo[channel] * illumination + gloss * cast.sky * mirrored[channel]
         })
     }
 
-    /// Reflectance, and the share of the sky that a wet surface mirrors.
+    /// Returns the reflectance, and the share of the sky's light that a wet surface mirrors. `run` is the horizontal
+    /// distance from the lens (m).
     fn albedo(&self, s: f32, d: f32, run: f32, wetness: f32) -> (Vec3, f32) {
         let right = -self.lanes * self.lane_width_m;
-        // Texture fades where a pixel spans more than a cell.
+        // The texture fades with distance, as a pixel spans more than one of its cells.
         let detail = 1.0 / (1.0 + run * run / 400.0);
         if d > SHOULDER_M[0] || d < right - SHOULDER_M[1] {
             let shade = 0.75 + 0.5 * noise_2d(GRASS_KEY, 0.7 * s, 1.3 * d) * (0.3 + 0.7 * detail);
             return (GRASS.map(|value| value * shade), 0.0);
         }
-        // A wet surface is darker, and mirrors at grazing angles.
+        // A wet surface is darker, and reflects the sky at grazing angles.
         let gloss = wetness * (run / (run + 25.0)) * 0.55;
         let dark = 1.0 - 0.45 * wetness;
-        let painted = self.marking(s, d, run);
+        let painted = self.paint_share(s, d, run);
         let grain =
             if run < GRAIN_TO_M { 1.0 + 0.35 * (noise_2d(ASPHALT_KEY, 9.0 * s, 9.0 * d) - 0.5) * detail } else { 1.0 };
         let wear = 1.0 - 0.12 * noise_2d(ASPHALT_KEY, 0.05 * s, 0.8 * d);
@@ -141,8 +147,8 @@ impl Ground {
         (albedo, gloss)
     }
 
-    /// Share of paint at a place.
-    fn marking(&self, s: f32, d: f32, run: f32) -> f32 {
+    /// Returns the share of the surface at this position that is covered by paint (0 to 1).
+    fn paint_share(&self, s: f32, d: f32, run: f32) -> f32 {
         let lanes = -d / self.lane_width_m;
         let line = (split(lanes + 0.5).0 as f32).clamp(0.0, self.lanes);
         let off = (d + line * self.lane_width_m).abs();
@@ -159,7 +165,7 @@ impl Ground {
     }
 }
 
-fn cast_by(patches: &[Patch], at: [f32; 2], light: &Illumination) -> PatchLight {
+fn patch_light(patches: &[Patch], at: [f32; 2], light: &Illumination) -> PatchLight {
     let mut cast = PatchLight { sky: 1.0, sun: 1.0, beam: 0.0 };
     for patch in patches {
         let [cos, sin] = patch.turn;
@@ -172,13 +178,13 @@ fn cast_by(patches: &[Patch], at: [f32; 2], light: &Illumination) -> PatchLight 
                     cast.sun = 0.0;
                 }
             }
-            PatchKind::Beam => cast.beam += beam(along - patch.extent[0], left),
+            PatchKind::Beam => cast.beam += headlamp_beam(along - patch.extent[0], left),
         }
     }
     cast
 }
 
-/// Share of the sky's light that reaches the ground under and beside a vehicle.
+/// Returns the share of the sky's light that reaches the ground under and beside a vehicle.
 fn contact(patch: &Patch, along: f32, left: f32) -> f32 {
     const DARKEST: f32 = 0.12;
     let outside = (along.abs() - patch.extent[0]).max(left.abs() - patch.extent[1]).max(0.0);
@@ -186,7 +192,7 @@ fn contact(patch: &Patch, along: f32, left: f32) -> f32 {
     DARKEST + (1.0 - DARKEST) * open * (2.0 - open)
 }
 
-/// True where the way from the ground to the sun meets the vehicle's box within its height.
+/// Returns `true` if the line from the ground to the sun passes through the vehicle's box.
 fn in_sun_shadow(patch: &Patch, [along, left]: [f32; 2], to_sun: Vec3) -> bool {
     let reach = (patch.extent[2] / to_sun[2].max(0.05)).min(LONGEST_SHADOW_M);
     let [cos, sin] = patch.turn;
@@ -201,8 +207,9 @@ fn in_sun_shadow(patch: &Patch, [along, left]: [f32; 2], to_sun: Vec3) -> bool {
     from < to
 }
 
-/// Light of a pair of dipped headlamps on the road `ahead` of them, relative to its peak.
-fn beam(ahead: f32, left: f32) -> f32 {
+/// Returns the light of a pair of dipped headlamps on the road, `ahead` of them and to their `left` (m), in units of
+/// [`Illumination::beam`].
+fn headlamp_beam(ahead: f32, left: f32) -> f32 {
     let [far, wide] = BEAM_M;
     if !(ahead > 0.0 && ahead < far) {
         return 0.0;
@@ -221,7 +228,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_surface_lies_where_the_road_says() {
+    fn road_coordinates_agree_with_the_road_model() {
         let road = Road::straight(3).with_curvature(0.002);
         let (s0, d0, heading) = (640.0, -5.6, 0.02);
         let ground = Ground::new(&road, s0, d0, heading);
@@ -237,17 +244,17 @@ mod tests {
     }
 
     #[test]
-    fn lines_are_painted_at_the_edges_and_dashed_between() {
+    fn edge_lines_are_solid_and_lane_lines_are_dashed() {
         let ground = Ground::new(&Road::straight(3), 0.0, -5.6, 0.0);
-        assert_eq!(ground.marking(3.0, 0.0, 10.0), 1.0);
-        assert_eq!(ground.marking(3.0, -11.25, 10.0), 1.0);
-        assert_eq!(ground.marking(3.0, -3.75, 10.0), 1.0);
-        assert_eq!(ground.marking(9.0, -3.75, 10.0), 0.0);
-        assert_eq!(ground.marking(3.0, -1.9, 10.0), 0.0);
+        assert_eq!(ground.paint_share(3.0, 0.0, 10.0), 1.0);
+        assert_eq!(ground.paint_share(3.0, -11.25, 10.0), 1.0);
+        assert_eq!(ground.paint_share(3.0, -3.75, 10.0), 1.0);
+        assert_eq!(ground.paint_share(9.0, -3.75, 10.0), 0.0);
+        assert_eq!(ground.paint_share(3.0, -1.9, 10.0), 0.0);
     }
 
     #[test]
-    fn a_shadow_falls_away_from_the_sun() {
+    fn a_shadow_falls_on_the_side_away_from_the_sun() {
         let patch = Patch { at: [0.0; 2], turn: [1.0, 0.0], extent: [2.3, 0.9, 1.5], kind: PatchKind::Shadow };
         let to_sun = [0.0, 0.8, 0.6];
         assert!(in_sun_shadow(&patch, [0.0, -1.5], to_sun));

@@ -1,10 +1,11 @@
-//! Reproducible noise that is a function of place, not of order.
+//! Reproducible noise that depends on the position, not on the order of evaluation.
 //!
-//! A pixel's noise may depend on nothing but the key and the pixel, or a crop would differ from the whole image. So
-//! the camera draws from a hash instead of from a stream: the finaliser of SplitMix64 (Steele, Lea and Flood, *Fast
-//! splittable pseudorandom number generators*, 2014), which passes the usual test batteries when fed with counters.
+//! The noise of a pixel depends only on a key and on the pixel's coordinates, so that a crop has the same noise as the
+//! whole image. The camera therefore uses a hash instead of a random stream: the finaliser of SplitMix64 (Steele, Lea
+//! and Flood, *Fast splittable pseudorandom number generators*, 2014). With a counter as input it passes the usual
+//! statistical test batteries.
 
-/// Scrambles 64 bits.
+/// Hashes 64 bits.
 #[inline]
 pub(crate) const fn mix(bits: u64) -> u64 {
     let bits = bits.wrapping_add(0x9e37_79b9_7f4a_7c15);
@@ -13,28 +14,28 @@ pub(crate) const fn mix(bits: u64) -> u64 {
     bits ^ (bits >> 31)
 }
 
-/// Scrambles a key and two whole numbers.
+/// Hashes a key and two integers, such as the coordinates of a pixel or of a cell.
 #[inline]
 pub(crate) const fn mix_at(key: u64, x: i32, y: i32) -> u64 {
     mix(key ^ ((x as u32 as u64) << 32 | y as u32 as u64))
 }
 
-/// The topmost bits as a number in [0, 1).
+/// Converts the topmost bits to a number from 0 (inclusive) to 1 (exclusive).
 #[inline]
 pub(crate) const fn unit(bits: u64) -> f32 {
-    /// 2⁻²⁴: a `f32` has 24 significant bits.
+    /// 2⁻²⁴, because an `f32` has 24 significant bits.
     const STEP: f32 = 1.0 / 16_777_216.0;
     (bits >> 40) as f32 * STEP
 }
 
-/// Three roughly normal numbers of mean 0 and standard deviation 1, within ±3: each the sum of three uniform ones
-/// of 7 bits (Irwin–Hall).
+/// Returns three approximately normal numbers with mean 0 and standard deviation 1, within ±3. Each is the sum of three
+/// uniform numbers of 7 bits (Irwin–Hall distribution).
 pub(crate) fn normal3(bits: u64) -> [f32; 3] {
     const BITS: u32 = 7;
     const MASK: u64 = (1 << BITS) - 1;
-    /// Mean of the sum of three numbers 0 … 127.
+    /// Mean of the sum of three uniform numbers from 0 to 127.
     const MEAN: f32 = 1.5 * MASK as f32;
-    /// 1 / standard deviation of that sum: √(3·(128² − 1)/12).
+    /// Reciprocal of the standard deviation of that sum, √(3·(128² − 1)/12).
     const PER_SD: f32 = 1.0 / 64.0;
     [0, 1, 2].map(|channel| {
         let part = bits >> (3 * BITS * channel);
@@ -43,37 +44,37 @@ pub(crate) fn normal3(bits: u64) -> [f32; 3] {
     })
 }
 
-/// The whole number at or below `x`, and how far `x` lies above it.
+/// Splits `x` into its integer part, rounded down, and its fractional part.
 #[inline]
 pub(crate) fn split(x: f32) -> (i32, f32) {
-    // Rounding down by a cast is several times as fast as calling the library's floor.
+    // Rounding down by a cast is several times as fast as a call of `f32::floor`.
     #[expect(clippy::cast_possible_truncation, reason = "a float cast saturates: far cells just share their noise")]
     let towards_zero = x as i32;
     let whole = if towards_zero as f32 > x { towards_zero.wrapping_sub(1) } else { towards_zero };
     (whole, x - whole as f32)
 }
 
-fn smooth(x: f32) -> f32 {
+fn smoothstep(x: f32) -> f32 {
     x * x * (3.0 - 2.0 * x)
 }
 
-/// Value noise in [0, 1) along a line, with cells of size 1.
+/// Value noise along a line, with cells of size 1. The values lie between 0 (inclusive) and 1 (exclusive).
 pub(crate) fn noise_1d(key: u64, x: f32) -> f32 {
     let (cell, within) = split(x);
     let (low, high) = (unit(mix_at(key, cell, 0)), unit(mix_at(key, cell.wrapping_add(1), 0)));
-    low + (high - low) * smooth(within)
+    low + (high - low) * smoothstep(within)
 }
 
-/// Value noise in [0, 1) in a plane, with cells of size 1.
+/// Value noise in a plane, with cells of size 1. The values lie between 0 (inclusive) and 1 (exclusive).
 #[inline]
 pub(crate) fn noise_2d(key: u64, x: f32, y: f32) -> f32 {
     let ((i, fx), (j, fy)) = (split(x), split(y));
     let (i1, j1) = (i.wrapping_add(1), j.wrapping_add(1));
     let corner = |i, j| unit(mix_at(key, i, j));
-    let across = smooth(fx);
+    let across = smoothstep(fx);
     let near = corner(i, j) + (corner(i1, j) - corner(i, j)) * across;
     let far = corner(i, j1) + (corner(i1, j1) - corner(i, j1)) * across;
-    near + (far - near) * smooth(fy)
+    near + (far - near) * smoothstep(fy)
 }
 
 #[cfg(test)]
@@ -81,11 +82,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_normal_numbers_have_mean_0_and_deviation_1() {
-        let drawn: Vec<f32> = (0..20_000).flat_map(|i| normal3(mix(i))).collect();
-        let count = drawn.len() as f32;
-        let mean = drawn.iter().sum::<f32>() / count;
-        let variance = drawn.iter().map(|x| (x - mean).powi(2)).sum::<f32>() / count;
+    fn the_normal_numbers_have_mean_0_and_standard_deviation_1() {
+        let samples: Vec<f32> = (0..20_000).flat_map(|i| normal3(mix(i))).collect();
+        let count = samples.len() as f32;
+        let mean = samples.iter().sum::<f32>() / count;
+        let variance = samples.iter().map(|x| (x - mean).powi(2)).sum::<f32>() / count;
         assert!(mean.abs() < 0.02, "{mean}");
         assert!((variance - 1.0).abs() < 0.03, "{variance}");
     }

@@ -1,25 +1,25 @@
-//! Pictures: the whole image, the crop that the classifier sees, and an image with its truth.
+//! Image types: the whole image, the crop that the classifier receives, and an image with its ground truth.
 
 use super::pinhole::PixelRect;
 
-/// Side of the classifier's input [px].
+/// Side of the classifier's input (px).
 pub const CROP_PX: usize = 32;
-/// Colour channels: red, green, blue.
+/// Number of colour channels: red, green and blue.
 pub const CHANNELS: usize = 3;
 
-/// A picture: rows from the top, three bytes for each pixel.
+/// An 8-bit colour image, stored row by row from the top, with three bytes per pixel.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Image {
     /// Number of columns.
     pub width: u32,
     /// Number of rows.
     pub height: u32,
-    /// Red, green, blue of each pixel.
+    /// Red, green and blue of each pixel.
     pub rgb: Vec<u8>,
 }
 
 impl Image {
-    /// The colour of a pixel, or nothing beyond the image.
+    /// Returns the colour of a pixel, or `None` if the pixel lies outside the image.
     pub fn pixel(&self, column: u32, row: u32) -> Option<[u8; 3]> {
         if column >= self.width {
             return None;
@@ -30,16 +30,17 @@ impl Image {
     }
 }
 
-/// What the classifier sees of one object: 32 × 32 pixels picked out of a square window of the image.
+/// The classifier's input for one object: 32 × 32 pixels sampled from a square window of the image.
 ///
-/// A window of side n is sampled at columns `left + ⌊(2i + 1)·n/64⌋`, i = 0 … 31, and likewise in rows: every
-/// (n/32)-th pixel of a near object, all of a far one's, some twice where it is farther still. No pixel is averaged
-/// with others, so each is that of the whole image, bit for bit. Beyond the image all is black.
+/// A window of side n is sampled at the columns `left + ⌊(2i + 1)·n/64⌋`, i = 0 … 31, and at the rows by the same
+/// formula. A large window (a near object) contributes every (n/32)-th pixel, a window of 32 px every pixel, and a
+/// smaller one some pixels more than once. Pixels are not averaged, so that each sample is identical, bit for bit, to a
+/// pixel of the whole image. Samples outside the image are black.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Crop {
-    /// The window of the image that was sampled: square.
+    /// The square window of the image that was sampled.
     pub window: PixelRect,
-    /// Red, green, blue of each of the 32 × 32 samples, rows from the top.
+    /// Red, green and blue of each of the 32 × 32 samples, row by row from the top.
     pub rgb: Vec<u8>,
 }
 
@@ -52,18 +53,20 @@ impl Default for Crop {
     }
 }
 
-/// The pixels along one axis that a crop samples from a window starting at `start` and `extent` wide.
-pub(crate) fn crop_places(start: i32, extent: u32) -> [i32; CROP_PX] {
+/// Returns the pixel coordinates that a crop samples along one axis of a window, which begins at `start` and is
+/// `extent` pixels wide.
+pub(crate) fn sample_positions(start: i32, extent: u32) -> [i32; CROP_PX] {
     #[expect(clippy::cast_possible_wrap, reason = "windows are a few thousand pixels at most")]
     std::array::from_fn(|i| start + ((2 * i as u32 + 1) * extent / (2 * CROP_PX as u32)) as i32)
 }
 
-/// An image with the truth about it.
+/// An image with its ground truth.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LabelledImage {
     /// The image.
     pub image: Image,
-    /// For each pixel, rows from the top: 0, or 1 + the place of the vehicle in the scene's list of others.
+    /// The instance number of each pixel, row by row from the top: 1 + the index of the visible vehicle in
+    /// [`Scene::others`](crate::Scene::others), or 0 if the pixel shows no vehicle.
     pub instances: Vec<u16>,
 }
 
@@ -72,10 +75,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_crop_picks_every_nth_pixel_from_the_middle_of_its_cells() {
-        assert_eq!(crop_places(10, 32)[..3], [10, 11, 12]);
-        assert_eq!(crop_places(-5, 96)[..3], [-4, -1, 2]);
-        assert_eq!(crop_places(0, 16)[..4], [0, 0, 1, 1]);
-        assert_eq!(crop_places(0, 96)[CROP_PX - 1], 94);
+    fn a_crop_samples_the_middle_pixel_of_each_of_its_cells() {
+        assert_eq!(sample_positions(10, 32)[..3], [10, 11, 12]);
+        assert_eq!(sample_positions(-5, 96)[..3], [-4, -1, 2]);
+        assert_eq!(sample_positions(0, 16)[..4], [0, 0, 1, 1]);
+        assert_eq!(sample_positions(0, 96)[CROP_PX - 1], 94);
     }
 }

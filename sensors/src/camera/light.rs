@@ -1,63 +1,66 @@
-//! Light, air and exposure that follow from the environment.
+//! The illumination, the attenuation by the air, and the exposure settings that follow from the environment.
 //!
-//! Radiance is in units in which a white matt surface in full daylight has about 1. Three lights are modelled, not
-//! the time of day: the ratios between them are about those of a camera that has opened up as far as it can.
-//! Air dims by exp(−σ·distance): σ = 3.912/V for the visibility V (Koschmieder, contrast threshold 2 %), and for rain
-//! 1.076·R^0.67 dB/km for the rate R in mm/h (Carbonneau and Wisely, 1998).
+//! Radiance has a relative unit: a white matt surface in full daylight has about 1. The model knows three light levels
+//! (day, dusk, night) instead of the time of day. The ratios between them are about those of a camera that has opened
+//! up as far as it can.
+//! Air attenuates light by exp(−σ·distance): σ = 3.912/V for the visibility V (Koschmieder, contrast threshold 2 %).
+//! Rain adds 1.076·R^0.67 dB/km for the rain rate R in mm/h (Carbonneau and Wisely, 1998).
 
 use closecall_traffic::{Environment, Light, VehicleState};
 
 use super::Camera;
 use super::mesh::{Emission, Vec3, dot, each};
 
-/// ln 50, for a contrast threshold of 2 %.
+/// Koschmieder's constant: ln 50, for a contrast threshold of 2 %.
 const KOSCHMIEDER: f64 = 3.912;
-/// Extinction [1/m] of 1 dB/km.
+/// Extinction coefficient that corresponds to 1 dB/km (1/m).
 const PER_METRE_OF_DB_PER_KM: f64 = 1.0 / 4_343.0;
-/// At this rain rate the sky is wholly overcast [mm/h].
+/// Rain rate from which the sky is fully overcast (mm/h).
 const OVERCAST_RAIN_MM_PER_H: f64 = 0.5;
-/// Between these visibilities the sun fades [m].
+/// The visibility up to which the sun gives no direct light, and the one from which it gives its full light (m).
 const SUN_FADES_M: [f64; 2] = [1_500.0, 5_000.0];
-/// A film of this height makes the road as glossy as it gets [mm].
+/// Height of the water film from which the road has its full gloss (mm).
 const WET_FILM_MM: f64 = 0.3;
 
-/// Everything about the light that does not change across the image.
+/// The properties of light, air and exposure that are the same for all pixels of an image.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Illumination {
-    /// Radiance of a white surface that sees the sky alone.
+    /// Radiance of a white surface that only the sky illuminates.
     pub(crate) ambient: Vec3,
-    /// Radiance that the sun adds on a white surface facing it.
+    /// Radiance that the sun adds to a white surface facing it.
     pub(crate) sun: Vec3,
-    /// Direction to the sun in the ground frame.
+    /// Unit vector towards the sun in the ground frame.
     pub(crate) to_sun: Vec3,
     /// Radiance of the sky overhead.
     pub(crate) zenith: Vec3,
-    /// Radiance of the sky at the horizon, which is also that of the air in between.
+    /// Radiance of the sky at the horizon, which is also the radiance of the scattering air in front of distant
+    /// objects.
     pub(crate) horizon: Vec3,
-    /// Extinction of the air [1/m].
+    /// Extinction coefficient of the air (1/m).
     pub(crate) extinction_per_m: f32,
-    /// Gain of the exposure.
+    /// Factor from radiance to linear sensor value: 1 saturates the sensor.
     pub(crate) gain: f32,
-    /// Time of exposure [s].
+    /// Exposure time (s).
     pub(crate) exposure_s: f32,
-    /// Noise in the encoded value: what light itself has, and what reading adds in the dark.
+    /// Noise of the encoded value: the standard deviation of the shot noise, and the coefficient of the read noise,
+    /// which matters in dark pixels.
     pub(crate) noise: [f32; 2],
-    /// Radiance of headlamps seen from ahead.
+    /// Radiance of headlamps seen from the front.
     pub(crate) headlamp: f32,
     /// Radiance of marker lamps.
     pub(crate) marker: f32,
-    /// Radiance that a headlamp gives a white road a few metres ahead.
+    /// Radiance of a white road surface that a headlamp illuminates from a few metres.
     pub(crate) beam: f32,
-    /// Radiance that E's tail lamps give a white surface 1 m behind them.
+    /// Radiance of a white surface 1 m behind the ego's tail lamps that only they illuminate.
     pub(crate) tail: f32,
-    /// Gloss of the road [1].
+    /// Gloss of the road, from 0 (dry) to 1 (wet).
     pub(crate) wetness: f32,
-    /// Rain rate [mm/h].
+    /// Rain rate (mm/h).
     pub(crate) rain_mm_per_h: f32,
 }
 
-/// What one light is like: everything relative to daylight.
-struct Level {
+/// The parameters of one light level. For their meaning see [`Illumination`].
+struct LightLevel {
     ambient: Vec3,
     sun: f32,
     horizon: Vec3,
@@ -71,7 +74,7 @@ struct Level {
     tail: f32,
 }
 
-const DAY: Level = Level {
+const DAY: LightLevel = LightLevel {
     ambient: [0.36, 0.40, 0.46],
     sun: 0.62,
     horizon: [0.78, 0.84, 0.92],
@@ -85,7 +88,7 @@ const DAY: Level = Level {
     tail: 0.0,
 };
 
-const DUSK: Level = Level {
+const DUSK: LightLevel = LightLevel {
     ambient: [0.030, 0.036, 0.050],
     sun: 0.0,
     horizon: [0.13, 0.10, 0.085],
@@ -99,7 +102,7 @@ const DUSK: Level = Level {
     tail: 0.06,
 };
 
-const NIGHT: Level = Level {
+const NIGHT: LightLevel = LightLevel {
     ambient: [0.0016, 0.0016, 0.0019],
     sun: 0.0,
     horizon: [0.0016, 0.0014, 0.0013],
@@ -113,11 +116,12 @@ const NIGHT: Level = Level {
     tail: 0.06,
 };
 
-/// Brake lights are this many times as bright as tail lamps.
+/// Ratio of the brightness of brake lights to that of tail lamps.
 const BRAKE_LIGHT: f32 = 3.0;
 
 impl Illumination {
-    /// The light of an environment, for a camera in a vehicle whose yaw in the plane is `yaw_rad`.
+    /// Derives the illumination from the environment, for a camera in the vehicle `ego`, whose yaw in the plane is
+    /// `yaw_rad`.
     pub(crate) fn new(environment: &Environment, camera: &Camera, ego: &VehicleState, yaw_rad: f64) -> Self {
         let level = match environment.light {
             Light::Day => DAY,
@@ -130,7 +134,7 @@ impl Illumination {
         let (sin, cos) = camera.sun.elevation_rad.sin_cos();
         let (sin_azimuth, cos_azimuth) = (camera.sun.azimuth_rad - yaw_rad).sin_cos();
         let clear = clear as f32;
-        // An overcast sky is grey, as bright overhead as at the horizon, and lights from all sides.
+        // An overcast sky is grey, about as bright at the zenith as at the horizon, and illuminates from all sides.
         let grey = level.horizon.iter().sum::<f32>() / 3.0;
         let overcast = |clear_value: f32, grey_value: f32| grey_value + (clear_value - grey_value) * clear;
         let rain_db_per_km = 1.076 * environment.rain_mm_per_h.powf(0.67);
@@ -155,18 +159,18 @@ impl Illumination {
         }
     }
 
-    /// True where headlamps matter beyond their own faces.
+    /// Returns `true` if it is so dark that headlamps visibly illuminate the road and show halos.
     pub(crate) fn is_dark(&self) -> bool {
         self.beam > 0.0
     }
 
-    /// Share of light that passes `distance_m` of air [1].
+    /// Returns the share of light that passes through `distance_m` of air (0 to 1).
     pub(crate) fn transmission(&self, distance_m: f32) -> f32 {
         exp_negative(self.extinction_per_m * distance_m)
     }
 
-    /// Radiance of a lamp's face.
-    pub(crate) fn emitted(&self, emission: Emission, indicator_is_on: impl Fn(bool) -> bool) -> Vec3 {
+    /// Returns the radiance of a lamp's face.
+    pub(crate) fn emitted_radiance(&self, emission: Emission, indicator_is_on: impl Fn(bool) -> bool) -> Vec3 {
         match emission {
             Emission::None => [0.0; 3],
             Emission::Headlamp => [1.0, 0.98, 0.92].map(|tint| tint * self.headlamp),
@@ -178,9 +182,9 @@ impl Illumination {
         }
     }
 
-    /// Radiance that a matt white face with this normal reflects.
-    pub(crate) fn falls_on(&self, normal: Vec3) -> Vec3 {
-        /// What the road throws back up, relative to the sky's light.
+    /// Returns the radiance that a matt white face with this normal vector reflects.
+    pub(crate) fn diffuse_radiance(&self, normal: Vec3) -> Vec3 {
+        /// Light that the road reflects upwards, relative to the light of the sky.
         const BOUNCE: f32 = 0.25;
         let upwards = 0.5 + 0.5 * normal[2];
         let sky = BOUNCE + (1.0 - BOUNCE) * upwards;
@@ -188,15 +192,15 @@ impl Illumination {
         each(|channel| self.ambient[channel] * sky + self.sun[channel] * sun)
     }
 
-    /// Radiance of the clear sky at a slope (rise over run) above the horizon.
+    /// Returns the radiance of the sky, without clouds, at a slope (rise over run) above the horizon.
     pub(crate) fn sky(&self, slope: f32) -> Vec3 {
         let high = slope / (slope + 0.35);
         each(|channel| self.horizon[channel] + (self.zenith[channel] - self.horizon[channel]) * high)
     }
 }
 
-/// e^−x for x ≥ 0, to 2e-4, without leaving plain arithmetic, so that it is the same on every machine: the fourth
-/// order of the series at x/16, raised to the 16th power.
+/// Returns e^−x for x ≥ 0, with an error below 2e-4. It uses only basic arithmetic, so that the result is the same on
+/// every machine: the series of e^(x/16) to fourth order, raised to the 16th power and inverted.
 fn exp_negative(x: f32) -> f32 {
     let x = (x / 16.0).min(4.0);
     let inverse = 1.0 + x * (1.0 + x * (0.5 + x * (1.0 / 6.0 + x / 24.0)));
@@ -219,13 +223,13 @@ mod tests {
     }
 
     #[test]
-    fn at_the_visibility_one_fiftieth_of_the_contrast_is_left() {
+    fn at_the_visibility_distance_one_fiftieth_of_the_contrast_remains() {
         let foggy = Environment { visibility_m: 200.0, ..Environment::CLEAR_DAY };
         assert!((light(&foggy).transmission(200.0) - 0.02).abs() < 1e-3);
     }
 
     #[test]
-    fn the_series_is_the_exponential() {
+    fn the_series_approximates_the_exponential() {
         for step in 0_u8..100 {
             let x = f32::from(step) * 0.1;
             assert!((exp_negative(x) - (-x).exp()).abs() < 2e-4, "{x}");
@@ -233,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn rain_hides_the_sun_and_dims_the_distance() {
+    fn rain_hides_the_sun_and_attenuates_distant_light() {
         let rain = light(&Environment { rain_mm_per_h: 5.0, ..Environment::CLEAR_DAY });
         assert_eq!(rain.sun, [0.0; 3]);
         assert!(rain.transmission(100.0) < light(&Environment::CLEAR_DAY).transmission(100.0));

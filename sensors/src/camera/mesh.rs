@@ -1,11 +1,12 @@
-//! Bodies as flat triangles, and the few solids that they are put together from.
+//! Triangle meshes of bodies, and the few solids that they are composed of.
 //!
-//! Every solid is convex, so that its faces can be turned outwards by looking from its middle. Coordinates are those
-//! of the body's own frame: for a vehicle x forward, y left, z up, origin on the ground below the box's centre.
+//! Every solid is convex, so that its faces can be oriented outwards by a comparison with its centre. Coordinates are
+//! in the frame of the body: for a vehicle x forward, y left, z up, with the origin on the ground below the centre of
+//! its box.
 
 pub(crate) type Vec3 = [f32; 3];
 
-/// One value for each of three axes or colours. Unlike `map` on an array, it is always compiled in place.
+/// Returns one value for each of three axes or colours. Unlike `map` on an array, it is always inlined.
 #[inline]
 pub(crate) fn each<T>(value: impl Fn(usize) -> T) -> [T; 3] {
     [value(0), value(1), value(2)]
@@ -37,59 +38,60 @@ pub(crate) fn normalised(a: Vec3) -> Vec3 {
     a.map(|x| x / length)
 }
 
-/// What is drawn onto a face.
+/// The pattern drawn onto a face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Texture {
-    /// One colour.
+    /// A uniform colour.
     Plain,
     /// A licence plate: dark glyphs on white.
     Plate,
-    /// A radiator grille: bars.
+    /// A radiator grille with horizontal bars.
     Grille,
-    /// A trailer's tarpaulin or box: ribs, and a sign.
+    /// The tarpaulin or box of a trailer, with ribs and lettering.
     Panel,
-    /// A windscreen: the interior shows, darker towards the bottom.
+    /// A window through which the interior is visible, darker towards the bottom.
     Glass,
 }
 
-/// Light that a face gives off.
+/// The light that a face emits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Emission {
-    /// None.
+    /// No light.
     None,
-    /// A headlamp seen from ahead: dipped beam, or daytime running light.
+    /// A headlamp seen from the front: dipped beam, or daytime running light.
     Headlamp,
     /// A small amber lamp, on at dusk and at night.
     Marker,
-    /// A direction indicator, on while it blinks to E's left (`true`: on the vehicle's left side).
+    /// A direction indicator, which shines during the bright phase of its blinking. `true` if it is on the vehicle's
+    /// left side.
     Indicator(bool),
 }
 
-/// How a face looks.
+/// The appearance of a face.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Surface {
-    /// Diffuse reflectance, linear red, green, blue [1].
+    /// Diffuse reflectance of linear red, green and blue (0 to 1).
     pub(crate) albedo: Vec3,
-    /// Reflectance at grazing incidence of the clear layer on top [1]: 0 matt, 1 polished.
+    /// Reflectance of the clear coat at grazing incidence: 0 is matt, 1 is polished.
     pub(crate) gloss: f32,
-    /// Its own light.
+    /// The light that the face emits.
     pub(crate) emission: Emission,
-    /// What is drawn onto it.
+    /// The pattern drawn onto the face.
     pub(crate) texture: Texture,
 }
 
 impl Surface {
-    /// A surface of one colour.
+    /// Returns a surface of uniform colour that emits no light.
     pub(crate) const fn plain(albedo: Vec3, gloss: f32) -> Self {
         Self { albedo, gloss, emission: Emission::None, texture: Texture::Plain }
     }
 
-    /// The same with something drawn onto it.
+    /// Returns the same surface with a texture.
     pub(crate) const fn with_texture(self, texture: Texture) -> Self {
         Self { texture, ..self }
     }
 
-    /// The same with light of its own.
+    /// Returns the same surface with an emission.
     pub(crate) const fn with_emission(self, emission: Emission) -> Self {
         Self { emission, ..self }
     }
@@ -107,15 +109,16 @@ impl Surface {
 /// A triangle of a body.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Face {
-    /// Its corners: places in the list of vertices; counter-clockwise seen from outside.
+    /// Indices of the corners in [`Mesh::vertices`], counter-clockwise as seen from outside.
     pub(crate) corners: [u16; 3],
-    /// How it looks.
+    /// Appearance of the face.
     pub(crate) surface: Surface,
-    /// Place in the list of texture maps, for textures other than plain.
+    /// Index in [`Mesh::maps`], used for textures other than [`Texture::Plain`].
     pub(crate) map: u16,
 }
 
-/// Texture coordinates as linear functions of place: u = (p − origin)·u_axis, both 0 … 1 across the face.
+/// Texture coordinates as linear functions of the position p: u = (p − origin)·u_axis, and likewise v. Both range from
+/// 0 to 1 across the face.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TextureMap {
     pub(crate) origin: Vec3,
@@ -123,17 +126,17 @@ pub(crate) struct TextureMap {
     pub(crate) v_axis: Vec3,
 }
 
-/// A lamp, for the glow around it in the image.
+/// A lamp, recorded for the glow that surrounds it in the image.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lamp {
     pub(crate) at: Vec3,
     pub(crate) emission: Emission,
 }
 
-/// A corner of a prism's outline: place along the body, height, and half the width there [m].
+/// A corner of a prism's outline: longitudinal position, height, and half the width of the prism there (m).
 pub(crate) type Rib = [f32; 3];
 
-/// A body of flat triangles.
+/// A body as a mesh of flat triangles.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Mesh {
     pub(crate) vertices: Vec<Vec3>,
@@ -148,7 +151,7 @@ impl Mesh {
         u16::try_from(self.vertices.len() - 1).unwrap_or(u16::MAX)
     }
 
-    /// A flat convex polygon, turned so that it faces away from `inside`.
+    /// Adds a flat convex polygon, oriented so that it faces away from the point `inside`.
     fn polygon(&mut self, corners: &[Vec3], inside: Vec3, surface: Surface) {
         let normal = cross(sub(corners[1], corners[0]), sub(corners[2], corners[0]));
         let outwards = dot(normal, sub(corners[0], inside)) >= 0.0;
@@ -162,8 +165,8 @@ impl Mesh {
         }
     }
 
-    /// A prism that is symmetric about y = `centre_y`: a convex outline in the x–z plane, each corner with its own
-    /// half width.
+    /// Adds a prism that is symmetric about y = `centre_y`. Its outline is convex in the x–z plane, and each corner of
+    /// the outline has its own half width.
     pub(crate) fn prism(&mut self, ribs: &[Rib], centre_y: f32, surface: Surface) {
         let count = ribs.len() as f32;
         let mean = |part: usize| ribs.iter().map(|rib| rib[part]).sum::<f32>() / count;
@@ -173,20 +176,20 @@ impl Mesh {
             let outline: Vec<Vec3> = ribs.iter().map(side(sign)).collect();
             self.polygon(&outline, inside, surface);
         }
-        for (place, a) in ribs.iter().enumerate() {
-            let b = &ribs[(place + 1) % ribs.len()];
+        for (index, a) in ribs.iter().enumerate() {
+            let b = &ribs[(index + 1) % ribs.len()];
             self.polygon(&[side(-1.0)(a), side(1.0)(a), side(1.0)(b), side(-1.0)(b)], inside, surface);
         }
     }
 
-    /// A box of `half` extents around `centre`.
+    /// Adds a box around `centre` with the half extents `half`.
     pub(crate) fn block(&mut self, centre: Vec3, half: Vec3, surface: Surface) {
         let [x, y, z] = centre;
         let rib = |sx: f32, sz: f32| [x + sx * half[0], z + sz * half[2], half[1]];
         self.prism(&[rib(1.0, -1.0), rib(1.0, 1.0), rib(-1.0, 1.0), rib(-1.0, -1.0)], y, surface);
     }
 
-    /// A wheel: eight-sided, its axis along y.
+    /// Adds a wheel: an octagonal prism that stands on the ground, with its axis along y.
     pub(crate) fn wheel(&mut self, [x, y, radius]: Vec3, half_width: f32) {
         let rim = [(0.92, 0.38), (0.38, 0.92), (-0.38, 0.92), (-0.92, 0.38)];
         let round = rim.into_iter().chain(rim.into_iter().map(|(a, b)| (-a, -b)));
@@ -195,8 +198,8 @@ impl Mesh {
         self.prism(&ribs, y, Surface::RUBBER);
     }
 
-    /// A ball, flattened or drawn out to `radii`: three rings of six faces.
-    pub(crate) fn ball(&mut self, centre: Vec3, radii: Vec3, surface: Surface) {
+    /// Adds an ellipsoid with these `radii`, approximated by three rings of six faces and a lid.
+    pub(crate) fn ellipsoid(&mut self, centre: Vec3, radii: Vec3, surface: Surface) {
         const SECTORS: [(f32, f32); 6] =
             [(1.0, 0.0), (0.5, 0.87), (-0.5, 0.87), (-1.0, 0.0), (-0.5, -0.87), (0.5, -0.87)];
         const RINGS: [(f32, f32); 4] = [(-1.0, 0.3), (-0.45, 0.93), (0.45, 0.93), (1.0, 0.3)];
@@ -216,16 +219,16 @@ impl Mesh {
         self.polygon(&lid, centre, surface);
     }
 
-    /// A quadrangle laid onto a face: corners bottom left, bottom right, top right, top left as seen from outside.
-    /// It is lifted off the face a little, and pulled in from the corners by the share `inset`.
+    /// Adds a quadrangle on top of a face. Its corners are bottom left, bottom right, top right and top left, as seen
+    /// from outside. It is raised slightly above the face and shrunk towards its centre by the share `inset`.
     pub(crate) fn decal(&mut self, corners: [Vec3; 4], inset: f32, surface: Surface) {
-        /// Far enough not to be hidden by what lies below at any distance [m].
+        /// Height above the face (m), sufficient for the decal not to be hidden by the face at any distance.
         const LIFT_M: f32 = 0.012;
         let normal = normalised(cross(sub(corners[1], corners[0]), sub(corners[3], corners[0])));
         let centre = [0, 1, 2].map(|axis| corners.iter().map(|corner| corner[axis]).sum::<f32>() / 4.0);
         let corners = corners.map(|corner| {
-            let pulled = add_scaled(corner, sub(centre, corner), inset);
-            add_scaled(pulled, normal, LIFT_M)
+            let shrunk = add_scaled(corner, sub(centre, corner), inset);
+            add_scaled(shrunk, normal, LIFT_M)
         });
         let inside = add_scaled(centre, normal, -1.0);
         let first = self.faces.len();
@@ -244,9 +247,9 @@ impl Mesh {
         }
     }
 
-    /// A decal on a plane of constant x that faces forward: centre (y, z), half extents (y, z).
+    /// Adds a decal that faces forward on a plane of constant `x`. Its centre and its half extents are given as (y, z).
     pub(crate) fn front_decal(&mut self, x: f32, [y, z]: [f32; 2], [half_y, half_z]: [f32; 2], surface: Surface) {
-        // Seen from ahead, the vehicle's left (+y) is on the right.
+        // Seen from the front, the vehicle's left (+y) is on the right.
         let corners =
             [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(a, b)| [x, y + a * half_y, z + b * half_z]);
         self.decal(corners, 0.0, surface);
@@ -257,20 +260,20 @@ impl Mesh {
 mod tests {
     use super::*;
 
-    /// Six times the volume that the faces enclose: positive where all are turned outwards.
+    /// Returns the volume that the faces enclose, which is positive if they all face outwards.
     fn volume(mesh: &Mesh) -> f32 {
-        let corner = |face: &Face, place: usize| mesh.vertices[usize::from(face.corners[place])];
+        let corner = |face: &Face, index: usize| mesh.vertices[usize::from(face.corners[index])];
         mesh.faces.iter().map(|f| dot(corner(f, 0), cross(corner(f, 1), corner(f, 2)))).sum::<f32>() / 6.0
     }
 
     #[test]
-    fn solids_are_closed_and_turned_outwards() {
+    fn solids_are_closed_and_their_faces_point_outwards() {
         let mut block = Mesh::default();
         block.block([3.0, -2.0, 1.0], [0.5, 1.0, 2.0], Surface::METAL);
         assert!((volume(&block) - 8.0).abs() < 1e-4);
-        let mut ball = Mesh::default();
-        ball.ball([0.0; 3], [1.0; 3], Surface::METAL);
-        assert!((1.5..4.2).contains(&volume(&ball)), "{}", volume(&ball));
+        let mut ellipsoid = Mesh::default();
+        ellipsoid.ellipsoid([0.0; 3], [1.0; 3], Surface::METAL);
+        assert!((1.5..4.2).contains(&volume(&ellipsoid)), "{}", volume(&ellipsoid));
     }
 
     #[test]

@@ -1,12 +1,13 @@
-//! The rear camera: a software renderer, and a network that says what each LiDAR cluster looks like.
+//! The rear camera: a software renderer, and a neural network that classifies the image of each LiDAR cluster.
 //!
 //! ```text
-//!   detection ─▶ box in E's frame ─▶ window of the image ─▶ crop, 32 × 32 ─▶ network ─▶ class scores
-//!                                         scene ─────────────▲
+//!   detection ─▶ box in the ego's frame ─▶ window of the image ─▶ crop, 32 × 32 px ─▶ network ─▶ class scores
+//!                                              scene ──────────────▲
 //! ```
 //!
-//! The image is that of a pinhole camera in the rear window, 1280 × 800 px, 60° wide. It is never drawn as a whole in
-//! the loop: a crop has the same pixels as the whole image would have, bit for bit (see [`Frame`]).
+//! The camera is a pinhole camera in the ego's rear window. Its image has 1280 × 800 px and covers 60° horizontally.
+//! A simulated run renders only the crops that the network classifies, never the whole image. Each pixel of a crop is
+//! identical, bit for bit, to the same pixel of the whole image (see [`Frame`]).
 
 mod body;
 mod classifier;
@@ -36,4 +37,4 @@ pub use image::{CHANNELS, CROP_PX, Crop, Image, LabelledImage};
 pub use pinhole::{GroundBox, HEIGHT_PX, PixelRect, WIDTH_PX};
 pub use pipeline::CropClassifier;
 pub use rear_camera::{ExposureKey, RearCamera};
-pub use shapes::{HELD_OUT, SHAPES, usual_dimensions};
+pub use shapes::{HELD_OUT_SHAPES, SHAPE_COUNTS, usual_dimensions};

@@ -1,30 +1,30 @@
-//! The ideal lens: from places to pixels and back.
+//! The pinhole projection: from points in space to pixels and back.
 //!
 //! ```text
 //!   ground frame G                          image
 //!   origin on the ground below the lens     (0,0) ──▶ u, 1280 px = 60°
-//!   x along E's heading, y left, z up         │
+//!   x along the ego's heading, y left, z up   │
 //!                                             ▼ v, 800 px
-//!        E ▐██▌·lens ─ ─ ▶ looks along −x,  so E's left (+y) is on the image's *right*
+//!      ego ▐██▌·lens ─ ─ ▶ looks along −x,  so the ego's left (+y) is on the *right* of the image
 //! ```
 //!
-//! Camera axes as usual in computer vision: x right, y down, z along the optical axis (the *depth*). Square pixels,
-//! no distortion.
+//! The camera axes follow the convention of computer vision: x right, y down, z along the optical axis (the *depth*).
+//! Pixels are square, and the lens has no distortion.
 
 use crate::{Scene, SceneVehicle};
 
 use super::Camera;
 
-/// Width of the image [px].
+/// Width of the image (px).
 pub const WIDTH_PX: u16 = 1280;
-/// Height of the image [px].
+/// Height of the image (px).
 pub const HEIGHT_PX: u16 = 800;
-/// Horizontal field of view [rad]: 60°.
+/// Horizontal field of view (rad): 60°.
 const FIELD_OF_VIEW_RAD: f64 = std::f64::consts::FRAC_PI_3;
-/// Nothing nearer than this is drawn or projected [m]: E's own body lies there.
+/// Depth of the near plane (m). Nothing nearer is rendered or projected, because the ego's own body lies there.
 pub(crate) const NEAR_M: f64 = 0.3;
 
-/// A rectangle of pixels; it may reach beyond the image.
+/// A rectangle of pixels, which may extend beyond the image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PixelRect {
     /// Leftmost column.
@@ -41,7 +41,7 @@ impl PixelRect {
     /// The whole image.
     pub const IMAGE: Self = Self { left: 0, top: 0, width: WIDTH_PX as u32, height: HEIGHT_PX as u32 };
 
-    /// Share of the rectangle's area that lies in the image [1].
+    /// Returns the share of the rectangle's area that lies in the image (0 to 1).
     pub fn share_in_image(&self) -> f64 {
         let overlap = |start: i32, extent: u32, limit: u16| {
             let end = i64::from(start) + i64::from(extent);
@@ -51,25 +51,25 @@ impl PixelRect {
     }
 }
 
-/// A box standing on the ground in E's vehicle frame, as a detection describes it.
+/// A box that stands on the ground, in the ego's vehicle frame, as a detection describes it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GroundBox {
-    /// Centre of the box, ahead of E's centre [m]; negative behind.
+    /// Longitudinal position of the box's centre relative to the ego's centre (m), negative behind the ego.
     pub x_m: f64,
-    /// Centre of the box, to the left of E [m].
+    /// Lateral position of the box's centre relative to the ego's centre (m), positive to the left.
     pub y_m: f64,
-    /// Heading relative to E's [rad].
+    /// Heading relative to the ego's heading (rad).
     pub heading_rad: f64,
-    /// Length along the heading [m].
+    /// Length along the heading (m).
     pub length_m: f64,
-    /// Width across it [m].
+    /// Width across the heading (m).
     pub width_m: f64,
-    /// Height above the ground [m].
+    /// Height above the ground (m).
     pub height_m: f64,
 }
 
 impl GroundBox {
-    /// The eight corners in E's vehicle frame [m].
+    /// Returns the eight corners in the ego's vehicle frame (m).
     pub(crate) fn corners(&self) -> [[f64; 3]; 8] {
         let (sin, cos) = self.heading_rad.sin_cos();
         std::array::from_fn(|corner| {
@@ -81,26 +81,26 @@ impl GroundBox {
     }
 }
 
-/// The lens at one instant: where it is in E and how it is pitched.
+/// The lens at one instant: its position in the ego vehicle and its pitch.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lens {
-    /// Focal length [px].
+    /// Focal length (px).
     pub(crate) focal_px: f64,
-    /// The lens lies this far ahead of E's centre [m]: negative.
+    /// Position of the lens relative to the ego's centre (m), negative because the lens lies behind the centre.
     pub(crate) ahead_m: f64,
-    /// Height of the lens above the ground [m].
+    /// Height of the lens above the ground (m).
     pub(crate) height_m: f64,
     /// Sine of the downward pitch of the optical axis.
     pub(crate) sin_pitch: f64,
-    /// Cosine of it.
+    /// Cosine of the downward pitch of the optical axis.
     pub(crate) cos_pitch: f64,
 }
 
 impl Lens {
-    /// The lens in E, whose body may be pitched.
+    /// Creates the lens of the rear camera in `ego`, whose body may be pitched.
     pub(crate) fn new(camera: &Camera, ego: &SceneVehicle) -> Self {
         let ahead_m = camera.mount_from_rear_m - ego.vehicle.dimensions.length_m / 2.0;
-        // With the nose down, the tail is up: the lens rises and its axis points higher.
+        // If the nose of the ego dips, its tail rises: the lens moves up and its axis points higher.
         let pitch = camera.pitch_rad - ego.pitch_rad;
         Self {
             focal_px: f64::from(WIDTH_PX) / 2.0 / (FIELD_OF_VIEW_RAD / 2.0).tan(),
@@ -111,26 +111,27 @@ impl Lens {
         }
     }
 
-    /// A point of the ground frame in camera axes [m].
+    /// Converts a point from the ground frame to camera axes (m).
     pub(crate) fn in_camera(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
         let (s, c) = (self.sin_pitch, self.cos_pitch);
         let up = z - self.height_m;
         [y, s * x - c * up, -c * x - s * up]
     }
 
-    /// The ray (x, y, 1) of camera axes in the ground frame.
+    /// Rotates the ray (x, y, 1), given in camera axes, into the ground frame.
     pub(crate) fn ray_in_ground(&self, [x, y]: [f32; 2]) -> [f32; 3] {
         let (s, c) = (self.sin_pitch as f32, self.cos_pitch as f32);
         [s * y - c, x, -c * y - s]
     }
 
-    /// Where a point in camera axes, which must lie ahead of the lens, appears [px].
+    /// Projects a point in camera axes to the image (px). The point must lie in front of the lens.
     pub(crate) fn pixel(&self, [x, y, z]: [f64; 3]) -> [f64; 2] {
         [f64::from(WIDTH_PX) / 2.0 + self.focal_px * x / z, f64::from(HEIGHT_PX) / 2.0 + self.focal_px * y / z]
     }
 
-    /// Where vehicle `other` stands in the ground frame: (x, y) of its centre [m] and its heading [rad].
-    pub(crate) fn place(&self, scene: &Scene<'_>, other: &SceneVehicle) -> ([f64; 2], f64) {
+    /// Returns the pose of vehicle `other` in the ground frame: the position (x, y) of its centre (m) and its heading
+    /// (rad).
+    pub(crate) fn pose_in_ground(&self, scene: &Scene<'_>, other: &SceneVehicle) -> ([f64; 2], f64) {
         let pose = |vehicle: &SceneVehicle| {
             scene.road.plane_pose(vehicle.state.s_m, vehicle.state.d_m, vehicle.state.heading_rad)
         };
@@ -140,20 +141,20 @@ impl Lens {
         ([cos * dx + sin * dy - self.ahead_m, cos * dy - sin * dx], other.yaw_rad - ego.yaw_rad)
     }
 
-    /// The smallest rectangle [left, top, right, bottom] [px] around what is visible of points in camera axes that
-    /// span a convex body; nothing where all of it lies behind the lens.
+    /// Returns the smallest rectangle `[left, top, right, bottom]` (px) around the visible part of a convex body, given
+    /// its corners in camera axes. Returns `None` if no part of the body lies beyond the near plane.
     pub(crate) fn bounds(&self, corners: &[[f64; 3]]) -> Option<[f64; 4]> {
         let mut bounds = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
         let mut include = |point: [f64; 3]| {
             let [u, v] = self.pixel(point);
             bounds = [bounds[0].min(u), bounds[1].min(v), bounds[2].max(u), bounds[3].max(v)];
         };
-        for (place, &a) in corners.iter().enumerate() {
+        for (index, &a) in corners.iter().enumerate() {
             if a[2] >= NEAR_M {
                 include(a);
             }
-            // Where the body reaches through the near plane, so does some line between two of its corners.
-            for &b in &corners[place + 1..] {
+            // If the body crosses the near plane, some of the lines between two of its corners cross it, too.
+            for &b in &corners[index + 1..] {
                 if (a[2] < NEAR_M) != (b[2] < NEAR_M) {
                     let part = (NEAR_M - a[2]) / (b[2] - a[2]);
                     include([a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1]), NEAR_M]);
@@ -184,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn the_left_lane_is_on_the_images_right_and_the_near_is_lower() {
+    fn the_left_lane_appears_on_the_right_and_near_points_appear_lower() {
         let lens = lens(0.0);
         let [u, near] = lens.pixel(lens.in_camera([-20.0, 3.75, 0.0]));
         assert!(u > f64::from(WIDTH_PX) / 2.0);
@@ -193,20 +194,20 @@ mod tests {
     }
 
     #[test]
-    fn thirty_degrees_off_the_axis_is_the_images_edge() {
+    fn a_point_thirty_degrees_off_the_axis_appears_at_the_edge_of_the_image() {
         let lens = lens(0.0);
         let [u, _] = lens.pixel([10.0 * (FIELD_OF_VIEW_RAD / 2.0).tan(), 0.0, 10.0]);
         assert!((u - f64::from(WIDTH_PX)).abs() < 1e-9);
     }
 
     #[test]
-    fn under_braking_the_camera_looks_higher_so_that_objects_sink_in_the_image() {
+    fn when_the_ego_brakes_its_camera_looks_higher_and_objects_appear_lower() {
         let at = |lens: Lens| lens.pixel(lens.in_camera([-50.0, 0.0, 1.0]))[1];
         assert!(at(lens(0.02)) > at(lens(0.0)));
     }
 
     #[test]
-    fn rays_turn_back_and_forth() {
+    fn a_ray_rotated_into_the_ground_frame_and_back_is_unchanged() {
         let lens = lens(0.01);
         let there = lens.ray_in_ground([0.3, -0.2]).map(f64::from);
         let from_lens = [there[0], there[1], there[2] + lens.height_m];
@@ -216,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn a_body_through_the_near_plane_has_bounds_and_one_behind_has_none() {
+    fn a_body_across_the_near_plane_has_bounds_and_a_body_behind_it_has_none() {
         let lens = lens(0.0);
         let body = |z: f64| [[-1.0, -1.0, z], [1.0, 1.0, z], [-1.0, 1.0, z + 4.0], [1.0, -1.0, z + 4.0]];
         assert!(lens.bounds(&body(-2.0)).is_some());

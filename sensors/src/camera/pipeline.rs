@@ -1,4 +1,4 @@
-//! The camera in the loop: each detection of the LiDAR gets the class that its place in the image suggests.
+//! The camera in the simulation loop: it adds the evidence of the image to the class scores of each LiDAR detection.
 
 use closecall_traffic::ClassScores;
 
@@ -6,14 +6,15 @@ use super::classifier::{Backend, Classifier, ClassifierError};
 use super::{Camera, Crop, ExposureKey, Frame, GroundBox, Lists, PixelRect, RearCamera};
 use crate::{Detection, Scene, SceneVehicle, SensorError};
 
-/// A window of which less than this share lies in the image says nothing [1].
-const LEAST_IN_IMAGE: f64 = 0.6;
-/// Neither the shape nor the image ever rules a class out: no score is taken for less than this [1].
-const NEVER_BELOW: f64 = 0.02;
-/// A cluster is at least this high for the camera [m]: the LiDAR's beams may have met its foot alone.
-const LEAST_HEIGHT_M: f64 = 0.8;
+/// Minimum share of a window that must lie in the image for it to be classified (0 to 1).
+const MIN_SHARE_IN_IMAGE: f64 = 0.6;
+/// Lower bound that the fusion applies to each score (0 to 1), so that neither the shape nor the image alone can rule
+/// out a class.
+const MIN_SCORE: f64 = 0.02;
+/// Minimum height assumed for a cluster (m), because the LiDAR's beams may have hit only the lower part of the object.
+const MIN_HEIGHT_M: f64 = 0.8;
 
-/// Camera and network of one worker.
+/// The camera and the neural network of one worker thread.
 #[derive(Debug)]
 pub struct CropClassifier {
     camera: RearCamera,
@@ -23,53 +24,56 @@ pub struct CropClassifier {
 }
 
 impl CropClassifier {
-    /// A camera with the network that ships.
+    /// Creates a camera with the network that ships with Closecall.
     ///
     /// # Errors
-    /// [`ClassifierError`] where the backend cannot be set up.
+    /// Returns a [`ClassifierError`] if the backend cannot be set up.
     pub fn new(camera: Camera, backend: &Backend) -> Result<Self, ClassifierError> {
         let classifier = Classifier::shipped(backend)?;
         Ok(Self { camera: RearCamera::new(camera), classifier, crop: Crop::default(), lists: Lists::default() })
     }
 
-    /// Looks at every detection that lies in the image, and fuses what the network says with the class scores that
-    /// the detection has from its shape. Detections out of view keep theirs. Returns how many were looked at.
+    /// Classifies every detection that lies in the image, and fuses the network's scores with the class scores that
+    /// the detection has from its shape. Detections out of view keep their scores. Returns the number of classified
+    /// detections.
     ///
-    /// `scene` is the instant of the scan, `key` that of the exposure's noise.
+    /// `scene` is the scene at the time of the scan, `key` the key of the exposure's noise.
     ///
     /// # Errors
-    /// [`SensorError::Classifier`] where the network stopped; detections before that one have been changed.
+    /// Returns [`SensorError::Classifier`] if the network fails. The scores of the detections before the failure have
+    /// then been updated already.
     pub fn classify_detections(
         &mut self,
         scene: &Scene<'_>,
         key: ExposureKey,
         detections: &mut [Detection],
     ) -> Result<usize, SensorError> {
-        let seen: Vec<(usize, PixelRect)> = detections
+        let visible: Vec<(usize, PixelRect)> = detections
             .iter()
             .enumerate()
-            .filter_map(|(place, detection)| Some((place, self.camera.window_of(&scene.ego, detection)?)))
+            .filter_map(|(index, detection)| Some((index, self.camera.window_of(&scene.ego, detection)?)))
             .collect();
-        if seen.is_empty() {
+        if visible.is_empty() {
             return Ok(0);
         }
-        let windows: Vec<PixelRect> = seen.iter().map(|(_, window)| *window).collect();
+        let windows: Vec<PixelRect> = visible.iter().map(|(_, window)| *window).collect();
         let mut frame = Frame::reusing(std::mem::take(&mut self.lists), self.camera.camera(), scene, key, &windows);
-        for (place, window) in &seen {
+        for (index, window) in &visible {
             frame.crop(*window, &mut self.crop);
-            let looked = self
+            let image_scores = self
                 .classifier
                 .classify(&self.crop)
                 .map_err(|error| SensorError::Classifier { reason: error.to_string() })?;
-            detections[*place].class = fused(&detections[*place].class, &looked);
+            detections[*index].class = fuse(&detections[*index].class, &image_scores);
         }
         self.lists = frame.into_lists();
-        Ok(seen.len())
+        Ok(visible.len())
     }
 }
 
 impl RearCamera {
-    /// The window that the network is shown of a detection; nothing where too little of it lies in the image.
+    /// Returns the window of the image that the network classifies for a detection. Returns `None` if too little of the
+    /// window lies in the image.
     pub fn window_of(&self, ego: &SceneVehicle, detection: &Detection) -> Option<PixelRect> {
         let (x_m, y_m) = detection.centre_m();
         let object = GroundBox {
@@ -78,15 +82,16 @@ impl RearCamera {
             heading_rad: detection.heading_rad,
             length_m: detection.length_m,
             width_m: detection.width_m,
-            height_m: detection.top_m.max(LEAST_HEIGHT_M),
+            height_m: detection.top_m.max(MIN_HEIGHT_M),
         };
-        self.project(ego, &object).filter(|window| window.share_in_image() >= LEAST_IN_IMAGE)
+        self.project(ego, &object).filter(|window| window.share_in_image() >= MIN_SHARE_IN_IMAGE)
     }
 }
 
-/// Scores after two witnesses that err independently, all classes being as likely beforehand: the normalised product.
-fn fused(shape: &ClassScores, image: &ClassScores) -> ClassScores {
-    let product = [0, 1, 2, 3].map(|class| shape.0[class].max(NEVER_BELOW) * image.0[class].max(NEVER_BELOW));
+/// Fuses the scores from shape and image by their normalised product, which assumes that their errors are independent
+/// and that all classes are equally likely a priori.
+fn fuse(shape: &ClassScores, image: &ClassScores) -> ClassScores {
+    let product = [0, 1, 2, 3].map(|class| shape.0[class].max(MIN_SCORE) * image.0[class].max(MIN_SCORE));
     let sum: f64 = product.iter().sum();
     ClassScores(product.map(|score| score / sum))
 }
@@ -122,7 +127,7 @@ mod tests {
         }
     }
 
-    fn classified(others: &[SceneVehicle], detections: &mut [Detection]) -> usize {
+    fn classify(others: &[SceneVehicle], detections: &mut [Detection]) -> usize {
         let camera = CameraConfig::default().check(&Parameters::default()).unwrap();
         let (road, environment, ego) = (Road::straight(3), Environment::CLEAR_DAY, vehicle(VehicleClass::Car, 500.0));
         let scene = Scene { time: Time::ZERO, road: &road, environment: &environment, ego, others };
@@ -131,31 +136,31 @@ mod tests {
     }
 
     #[test]
-    fn each_class_is_told_and_an_empty_road_is_background() {
+    fn each_vehicle_class_is_recognised_and_an_empty_road_is_background() {
         for class in VehicleClass::ALL {
             let other = vehicle(class, 460.0);
             let size = other.vehicle.dimensions;
             let mut detections = [detection(-40.0 + size.length_m / 2.0, size.width_m, size.height_m)];
-            assert_eq!(classified(&[other], &mut detections), 1);
+            assert_eq!(classify(&[other], &mut detections), 1);
             assert!(detections[0].class.0[class as usize] > 0.8, "{class:?}: {:?}", detections[0].class);
         }
-        let mut nothing = [detection(-12.0, 1.0, 0.8)];
-        classified(&[], &mut nothing);
-        assert!(nothing[0].class.vehicle() < 0.2, "{:?}", nothing[0].class);
+        let mut empty_road = [detection(-12.0, 1.0, 0.8)];
+        classify(&[], &mut empty_road);
+        assert!(empty_road[0].class.vehicle() < 0.2, "{:?}", empty_road[0].class);
     }
 
     #[test]
-    fn what_lies_out_of_view_keeps_its_scores() {
+    fn a_detection_out_of_view_keeps_its_scores() {
         let mut detections = [detection(30.0, 1.8, 1.5)];
-        assert_eq!(classified(&[], &mut detections), 0);
+        assert_eq!(classify(&[], &mut detections), 0);
         assert_eq!(detections[0].class, ClassScores::UNKNOWN);
     }
 
     #[test]
-    fn no_witness_rules_a_class_out_alone() {
+    fn neither_shape_nor_image_alone_rules_out_a_class() {
         let car = ClassScores::certain(VehicleClass::Car);
         let truck = ClassScores::certain(VehicleClass::Truck);
-        let scores = fused(&car, &truck).0;
+        let scores = fuse(&car, &truck).0;
         assert!((scores[0] - scores[1]).abs() < 1e-12 && scores[0] > 0.4);
         assert!((scores.iter().sum::<f64>() - 1.0).abs() < 1e-12);
     }

@@ -1,50 +1,50 @@
-//! Which triangle each sample sees: an exact integer rasteriser with a depth buffer.
+//! An exact integer rasteriser with a depth buffer. It determines which triangle is visible at each sample.
 //!
-//! Corners are snapped to 1/256 px. Whether a sample lies inside is then decided by edge functions in whole numbers
-//! (Pineda, *A parallel algorithm for polygon rasterization*, 1988), which have no rounding: neighbouring triangles
-//! leave no gaps, and the answer for one pixel cannot depend on which other pixels are drawn.
+//! Corners are snapped to a grid of 1/256 px. Integer edge functions (Pineda, *A parallel algorithm for polygon
+//! rasterization*, 1988) then decide whether a sample lies inside a triangle. They have no rounding error: adjacent
+//! triangles leave no gaps, and the result for one pixel does not depend on which other pixels are rendered.
 
 use super::mesh::{Vec3, cross, dot, sub};
 use super::pinhole::{HEIGHT_PX, NEAR_M, WIDTH_PX};
 
-/// Steps of the fixed-point grid in one pixel.
-pub(crate) const STEPS: i32 = 256;
+/// Number of steps of the fixed-point grid per pixel.
+pub(crate) const SUBPIXEL_STEPS: i32 = 256;
 
-/// A triangle on the image, ready to be drawn.
+/// A triangle projected to the image, ready to be rasterised.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ScreenTriangle {
-    /// Edge functions a·x + b·y + c, all 0 or more inside.
+    /// Coefficients (a, b, c) of the edge functions a·x + b·y + c, which are all ≥ 0 inside the triangle.
     edges: [[i64; 3]; 3],
-    /// Smallest and largest x, smallest and largest y [1/256 px].
+    /// Minimum and maximum x, minimum and maximum y (1/256 px).
     bounds: [i32; 4],
-    /// 1/depth as a·x + b·y + c [1/m] over the fixed-point grid.
+    /// Coefficients (a, b, c) of 1/depth = a·x + b·y + c (1/m), with x and y on the fixed-point grid.
     inverse_depth: [f64; 3],
-    /// Which face it is part of.
+    /// Index of the face that the triangle is part of.
     face: u32,
 }
 
-/// The samples to be taken: a lattice of pixels, each sampled at the same place within itself.
+/// The samples to be rendered: a lattice of pixels, each sampled at the same offset within the pixel.
 #[derive(Clone, Debug)]
 pub(crate) struct Lattice<'a> {
-    /// Columns of the image, in rising order.
+    /// Columns of the image, in ascending order.
     pub(crate) columns: &'a [i32],
-    /// Rows of the image, in rising order.
+    /// Rows of the image, in ascending order.
     pub(crate) rows: &'a [i32],
-    /// Place within the pixel, x and y [1/256 px].
-    pub(crate) within: [i32; 2],
+    /// Offset of the sample within the pixel, x and y (1/256 px).
+    pub(crate) subpixel: [i32; 2],
 }
 
-/// What each sample sees.
+/// The depth buffer, and the visible face of each sample.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Visibility {
-    /// 1/depth [1/m]; 0 where no body is hit.
+    /// 1/depth (1/m), or 0 if the sample shows no body.
     pub(crate) inverse_depth: Vec<f32>,
-    /// The face hit, where one is.
+    /// Index of the visible face, or `u32::MAX` if the sample shows no body.
     pub(crate) face: Vec<u32>,
 }
 
 impl Visibility {
-    /// Forgets everything and takes on the size of a lattice.
+    /// Clears the buffer and resizes it to `samples` samples.
     pub(crate) fn clear(&mut self, samples: usize) {
         self.inverse_depth.clear();
         self.inverse_depth.resize(samples, 0.0);
@@ -52,7 +52,7 @@ impl Visibility {
         self.face.resize(samples, u32::MAX);
     }
 
-    /// Draws triangles over what is there.
+    /// Rasterises triangles into the buffer.
     pub(crate) fn draw(&mut self, triangles: &[ScreenTriangle], lattice: &Lattice<'_>) {
         for triangle in triangles {
             self.draw_one(triangle, lattice);
@@ -61,23 +61,23 @@ impl Visibility {
 
     fn draw_one(&mut self, triangle: &ScreenTriangle, lattice: &Lattice<'_>) {
         let [left, right, top, bottom] = triangle.bounds;
-        let [within_x, within_y] = lattice.within;
-        let hit = |places: &[i32], within: i32, low: i32, high: i32| {
-            let from = places.partition_point(|place| place * STEPS + within < low);
-            let to = places.partition_point(|place| place * STEPS + within <= high);
+        let [subpixel_x, subpixel_y] = lattice.subpixel;
+        let covered = |positions: &[i32], subpixel: i32, low: i32, high: i32| {
+            let from = positions.partition_point(|position| position * SUBPIXEL_STEPS + subpixel < low);
+            let to = positions.partition_point(|position| position * SUBPIXEL_STEPS + subpixel <= high);
             from..to
         };
-        let columns = hit(lattice.columns, within_x, left, right);
+        let columns = covered(lattice.columns, subpixel_x, left, right);
         if columns.is_empty() {
             return;
         }
         let width = lattice.columns.len();
-        for row in hit(lattice.rows, within_y, top, bottom) {
-            let y = i64::from(lattice.rows[row] * STEPS + within_y);
+        for row in covered(lattice.rows, subpixel_y, top, bottom) {
+            let y = i64::from(lattice.rows[row] * SUBPIXEL_STEPS + subpixel_y);
             let of_row = triangle.edges.map(|[_, b, c]| b * y + c);
             let depth_of_row = triangle.inverse_depth[1] * y as f64 + triangle.inverse_depth[2];
             for column in columns.clone() {
-                let x = i64::from(lattice.columns[column] * STEPS + within_x);
+                let x = i64::from(lattice.columns[column] * SUBPIXEL_STEPS + subpixel_x);
                 let edge = |i: usize| triangle.edges[i][0] * x + of_row[i];
                 if (edge(0) | edge(1) | edge(2)) < 0 {
                     continue;
@@ -93,11 +93,13 @@ impl Visibility {
     }
 }
 
-/// Projects a triangle given in camera axes [m] and appends what is seen of it; nothing where it faces away.
+/// Projects a triangle given in camera axes (m) and appends its visible part to `out`. Appends nothing if the triangle
+/// faces away from the lens.
 pub(crate) fn project(corners: [Vec3; 3], focal_px: f32, face: u32, out: &mut Vec<ScreenTriangle>) {
     let normal = cross(sub(corners[1], corners[0]), sub(corners[2], corners[0]));
     let offset = dot(normal, corners[0]);
-    // Camera axes: the lens is the origin, so a face is seen from outside where its plane has the lens in front of it.
+    // The lens is the origin of the camera axes, so a face is seen from outside if the origin lies in front of its
+    // plane.
     if !(offset < 0.0) {
         return;
     }
@@ -109,8 +111,8 @@ pub(crate) fn project(corners: [Vec3; 3], focal_px: f32, face: u32, out: &mut Ve
     }
     let mut clipped: [Vec3; 4] = [[0.0; 3]; 4];
     let mut count = 0;
-    for place in 0..3 {
-        let (a, b) = (corners[place], corners[(place + 1) % 3]);
+    for index in 0..3 {
+        let (a, b) = (corners[index], corners[(index + 1) % 3]);
         if a[2] >= near {
             clipped[count] = a;
             count += 1;
@@ -127,34 +129,34 @@ pub(crate) fn project(corners: [Vec3; 3], focal_px: f32, face: u32, out: &mut Ve
     }
 }
 
-/// A face's plane in camera axes: normal · p = offset.
+/// The plane of a face in camera axes, normal · p = offset, and the focal length.
 struct Plane {
     normal: [f64; 3],
     offset: f64,
     focal_px: f64,
 }
 
-/// The fixed-point place of a point in camera axes.
+/// Projects a point in camera axes to the fixed-point grid.
 #[expect(clippy::cast_possible_truncation, reason = "a float cast saturates, and the near plane bounds the quotient")]
 fn snap([x, y, z]: Vec3, focal_px: f32) -> [i32; 2] {
-    let steps = STEPS as f32;
-    let place = |centre: u16, offset: f32| ((f32::from(centre) / 2.0 + focal_px * offset / z) * steps).round() as i32;
-    [place(WIDTH_PX, x), place(HEIGHT_PX, y)]
+    let steps = SUBPIXEL_STEPS as f32;
+    let to_grid = |centre: u16, offset: f32| ((f32::from(centre) / 2.0 + focal_px * offset / z) * steps).round() as i32;
+    [to_grid(WIDTH_PX, x), to_grid(HEIGHT_PX, y)]
 }
 
 fn append(mut corners: [[i32; 2]; 3], plane: &Plane, face: u32, out: &mut Vec<ScreenTriangle>) {
     let [a, b, c] = corners.map(|corner| corner.map(i64::from));
     let doubled_area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
-    // Counter-clockwise from outside is clockwise in coordinates whose y points down: a negative area.
+    // Counter-clockwise corners have a negative area in image coordinates, because y points down.
     if doubled_area >= 0 {
         return;
     }
     corners.swap(1, 2);
-    let edges = [0, 1, 2].map(|place| edge(corners[place], corners[(place + 1) % 3]));
+    let edges = [0, 1, 2].map(|index| edge(corners[index], corners[(index + 1) % 3]));
     let low = |axis: usize| corners.iter().map(|corner| corner[axis]).fold(i32::MAX, i32::min);
     let high = |axis: usize| corners.iter().map(|corner| corner[axis]).fold(i32::MIN, i32::max);
-    // A ray (x, y, 1)·depth meets the plane where depth·(normal · ray) = offset.
-    let steps = f64::from(STEPS);
+    // The ray (x, y, 1)·depth intersects the plane at depth·(normal · ray) = offset.
+    let steps = f64::from(SUBPIXEL_STEPS);
     let [nx, ny, nz] = plane.normal.map(|part| part / plane.offset);
     let centre = [WIDTH_PX, HEIGHT_PX].map(|extent| f64::from(extent) / 2.0);
     let slope = [nx, ny].map(|part| part / (plane.focal_px * steps));
@@ -182,14 +184,14 @@ mod tests {
 
     const FOCAL_PX: f32 = 1000.0;
 
-    fn drawn(triangles: &[ScreenTriangle], columns: &[i32], rows: &[i32]) -> Visibility {
+    fn rasterised(triangles: &[ScreenTriangle], columns: &[i32], rows: &[i32]) -> Visibility {
         let mut visibility = Visibility::default();
         visibility.clear(columns.len() * rows.len());
-        visibility.draw(triangles, &Lattice { columns, rows, within: [128, 128] });
+        visibility.draw(triangles, &Lattice { columns, rows, subpixel: [128, 128] });
         visibility
     }
 
-    /// Two triangles that make up the square from −1 to 1 at depth 10, seen from outside.
+    /// Returns two triangles that form the square from −1 to 1 at depth 10, seen from outside.
     fn square() -> Vec<ScreenTriangle> {
         let [a, b, c, d] = [[-1.0, 1.0, 10.0], [1.0, 1.0, 10.0], [1.0, -1.0, 10.0], [-1.0, -1.0, 10.0]];
         let mut out = Vec::new();
@@ -203,34 +205,35 @@ mod tests {
         let columns: Vec<i32> = (530..750).collect();
         let rows: Vec<i32> = (290..510).collect();
         let triangles = square();
-        let both = drawn(&triangles, &columns, &rows);
+        let both = rasterised(&triangles, &columns, &rows);
         let hits = |visibility: &Visibility| visibility.face.iter().filter(|face| **face != u32::MAX).count();
         assert_eq!(hits(&both), 200 * 200);
-        let single: usize = triangles.iter().map(|one| hits(&drawn(std::slice::from_ref(one), &columns, &rows))).sum();
+        let single: usize =
+            triangles.iter().map(|one| hits(&rasterised(std::slice::from_ref(one), &columns, &rows))).sum();
         assert_eq!(single, 200 * 200);
         assert!(both.inverse_depth.iter().all(|w| *w == 0.0 || (w - 0.1).abs() < 1e-6));
     }
 
     #[test]
-    fn faces_that_look_away_are_not_drawn() {
+    fn a_triangle_that_faces_away_is_not_rendered() {
         let mut out = Vec::new();
         project([[-1.0, 1.0, 10.0], [1.0, -1.0, 10.0], [1.0, 1.0, 10.0]], FOCAL_PX, 0, &mut out);
         assert!(out.is_empty());
     }
 
     #[test]
-    fn the_nearer_one_hides_the_other_in_either_order() {
+    fn the_nearer_triangle_hides_the_farther_one_in_either_order() {
         let mut near = Vec::new();
         project([[-1.0, 1.0, 5.0], [1.0, 1.0, 5.0], [1.0, -1.0, 5.0]], FOCAL_PX, 7, &mut near);
         let forwards: Vec<_> = square().into_iter().chain(near.clone()).collect();
         let backwards: Vec<_> = near.into_iter().chain(square()).collect();
         let (columns, rows): (Vec<i32>, Vec<i32>) = ((600..700).collect(), (380..420).collect());
-        assert_eq!(drawn(&forwards, &columns, &rows).face, drawn(&backwards, &columns, &rows).face);
-        assert!(drawn(&forwards, &columns, &rows).face.contains(&7));
+        assert_eq!(rasterised(&forwards, &columns, &rows).face, rasterised(&backwards, &columns, &rows).face);
+        assert!(rasterised(&forwards, &columns, &rows).face.contains(&7));
     }
 
     #[test]
-    fn a_triangle_through_the_near_plane_is_cut_there() {
+    fn a_triangle_across_the_near_plane_is_clipped() {
         let mut out = Vec::new();
         project([[-1.0, 1.0, -2.0], [-1.0, 1.0, 10.0], [-1.0, -1.0, 10.0]], FOCAL_PX, 0, &mut out);
         project([[-1.0, 1.0, -2.0], [-1.0, -1.0, 10.0], [-1.0, 1.0, 10.0]], FOCAL_PX, 0, &mut out);

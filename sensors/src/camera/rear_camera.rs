@@ -1,4 +1,4 @@
-//! The rear camera as its users see it: boxes to windows, scenes to images and crops.
+//! The public interface of the rear camera: it projects boxes to windows and renders scenes to images and crops.
 
 use rand::RngExt;
 
@@ -7,57 +7,58 @@ use super::pinhole::{GroundBox, Lens, NEAR_M, PixelRect};
 use super::{Camera, Frame};
 use crate::{Scene, SceneVehicle};
 
-/// How much larger than the object its window is.
-const WINDOW_TO_OBJECT: f64 = 1.3;
-/// No window is narrower than this at the object's distance [m]: a crop of a lone post shows its surroundings too.
-const NARROWEST_M: f64 = 2.2;
-/// No window is wider than this [px].
-const WIDEST_PX: f64 = 2_400.0;
-/// Boxes nearer than this to the lens have no window [m].
-const NEAREST_M: f64 = 1.5;
+/// Ratio of the side of a window to the larger side of the object's projection.
+const WINDOW_TO_OBJECT_RATIO: f64 = 1.3;
+/// Minimum width of a window, measured at the object's distance (m), so that a crop of a single post also shows its
+/// surroundings.
+const MIN_WINDOW_WIDTH_M: f64 = 2.2;
+/// Maximum width of a window (px).
+const MAX_WINDOW_WIDTH_PX: f64 = 2_400.0;
+/// A box has a window only if part of it lies deeper than this along the optical axis (m).
+const MIN_DEPTH_M: f64 = 1.5;
 
-/// Keys the noise of one exposure.
+/// The key of the noise of one exposure: the same scene and key give the same pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ExposureKey(pub u64);
 
 impl ExposureKey {
-    /// The next exposure's key.
+    /// Draws the key of the next exposure.
     pub fn draw(rng: &mut impl rand::Rng) -> Self {
         Self(rng.random())
     }
 }
 
-/// The rear camera.
+/// The rear camera of the ego vehicle.
 #[derive(Clone, Debug)]
 pub struct RearCamera {
     camera: Camera,
 }
 
 impl RearCamera {
-    /// A camera after its checked description.
+    /// Creates a camera from its checked configuration.
     pub fn new(camera: Camera) -> Self {
         Self { camera }
     }
 
-    /// The checked description.
+    /// Returns the checked configuration.
     pub fn camera(&self) -> &Camera {
         &self.camera
     }
 
-    /// The square window of the image around a box in the vehicle frame of `ego`, or nothing where the box is not
-    /// behind the lens or too near.
+    /// Returns the square window of the image around a box given in the vehicle frame of `ego`. Returns `None` if the
+    /// box is not behind the ego vehicle or is too near to the lens.
     pub fn project(&self, ego: &SceneVehicle, object: &GroundBox) -> Option<PixelRect> {
         let lens = Lens::new(&self.camera, ego);
-        let in_ground = GroundBox { x_m: object.x_m - lens.ahead_m, ..*object };
-        let corners = in_ground.corners().map(|corner| lens.in_camera(corner));
+        let relative_to_lens = GroundBox { x_m: object.x_m - lens.ahead_m, ..*object };
+        let corners = relative_to_lens.corners().map(|corner| lens.in_camera(corner));
         let nearest = corners.iter().map(|corner| corner[2]).fold(f64::INFINITY, f64::min);
         let farthest = corners.iter().map(|corner| corner[2]).fold(f64::NEG_INFINITY, f64::max);
-        if !(farthest > NEAREST_M) {
+        if !(farthest > MIN_DEPTH_M) {
             return None;
         }
         let [left, top, right, bottom] = lens.bounds(&corners)?;
-        let narrowest = NARROWEST_M * lens.focal_px / nearest.max(NEAR_M).max(NEAREST_M);
-        let side = ((right - left).max(bottom - top) * WINDOW_TO_OBJECT).max(narrowest).min(WIDEST_PX);
+        let min_side = MIN_WINDOW_WIDTH_M * lens.focal_px / nearest.max(NEAR_M).max(MIN_DEPTH_M);
+        let side = ((right - left).max(bottom - top) * WINDOW_TO_OBJECT_RATIO).max(min_side).min(MAX_WINDOW_WIDTH_PX);
         if !(side >= 1.0) {
             return None;
         }
@@ -70,12 +71,12 @@ impl RearCamera {
         Some(PixelRect { left, top, width: side, height: side })
     }
 
-    /// The whole image, with the vehicle that each pixel shows.
+    /// Renders the whole image, and for each pixel the vehicle that it shows.
     pub fn render_image(&self, scene: &Scene<'_>, key: ExposureKey) -> LabelledImage {
         Frame::new(&self.camera, scene, key, &[PixelRect::IMAGE]).image()
     }
 
-    /// The samples of one window; for several windows of one exposure, prepare one [`Frame`].
+    /// Renders the crop of one window. For several windows of the same exposure, prepare one [`Frame`] instead.
     pub fn render_crop(&self, scene: &Scene<'_>, window: PixelRect, key: ExposureKey, crop: &mut Crop) {
         Frame::new(&self.camera, scene, key, &[window]).crop(window, crop);
     }
@@ -87,7 +88,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::super::CameraConfig;
-    use super::super::image::{CROP_PX, crop_places};
+    use super::super::image::{CROP_PX, sample_positions};
     use super::*;
 
     fn rear_camera() -> RearCamera {
@@ -111,8 +112,8 @@ mod tests {
         }
     }
 
-    /// A scene with something of everything: three classes, rain, spray, guard rails, a bend.
-    fn wild(light: Light) -> (Road, Environment, Vec<SceneVehicle>) {
+    /// A varied scene: a vehicle of each class, rain, spray, guard rails and a bend.
+    fn varied_scene(light: Light) -> (Road, Environment, Vec<SceneVehicle>) {
         let road = Road::straight(3).with_curvature(0.001);
         let environment =
             Environment { light, rain_mm_per_h: 4.0, water_film_mm: 0.8, visibility_m: 2_000.0, friction: 0.6 };
@@ -125,7 +126,7 @@ mod tests {
     }
 
     fn assert_crops_match(light: Light, windows: &[PixelRect]) {
-        let (road, environment, others) = wild(light);
+        let (road, environment, others) = varied_scene(light);
         let ego = vehicle(VehicleClass::Car, 500.0, -5.6);
         let scene = Scene { time: Time::from_ms(880), road: &road, environment: &environment, ego, others: &others };
         let camera = rear_camera();
@@ -133,9 +134,10 @@ mod tests {
         let mut crop = Crop::default();
         for window in windows {
             camera.render_crop(&scene, *window, ExposureKey(42), &mut crop);
-            let (columns, rows) = (crop_places(window.left, window.width), crop_places(window.top, window.height));
-            for (place, rgb) in crop.rgb.chunks_exact(3).enumerate() {
-                let (u, v) = (columns[place % CROP_PX], rows[place / CROP_PX]);
+            let (columns, rows) =
+                (sample_positions(window.left, window.width), sample_positions(window.top, window.height));
+            for (index, rgb) in crop.rgb.chunks_exact(3).enumerate() {
+                let (u, v) = (columns[index % CROP_PX], rows[index / CROP_PX]);
                 let whole = u32::try_from(u).ok().zip(u32::try_from(v).ok()).and_then(|(u, v)| image.pixel(u, v));
                 assert_eq!(rgb, whole.unwrap_or_default(), "{light:?} {window:?} at {u} {v}");
             }
@@ -163,48 +165,48 @@ mod tests {
     }
 
     #[test]
-    fn the_window_of_a_vehicle_shows_it() {
-        let (_, environment, others) = wild(Light::Day);
+    fn the_projected_window_of_a_vehicle_shows_the_vehicle() {
+        let (_, environment, others) = varied_scene(Light::Day);
         let ego = vehicle(VehicleClass::Car, 500.0, -5.6);
         let road = Road::straight(3);
         let scene = Scene { time: Time::ZERO, road: &road, environment: &environment, ego, others: &others };
         let camera = rear_camera();
-        for (place, other) in others.iter().enumerate() {
+        for (index, other) in others.iter().enumerate() {
             let window = camera.project(&ego, &box_of(&ego, other)).unwrap();
             let mut frame = Frame::new(camera.camera(), &scene, ExposureKey(1), &[window]);
             frame.crop(window, &mut Crop::default());
-            let share = frame.share_of_latest(place);
+            let share = frame.instance_share(index);
             assert!((0.1..0.9).contains(&share), "{:?}: {share}", other.vehicle.class);
         }
     }
 
     #[test]
-    fn the_same_key_gives_the_same_image_and_another_other_noise() {
-        let (road, environment, others) = wild(Light::Dusk);
+    fn the_same_key_gives_the_same_image_and_a_different_key_different_noise() {
+        let (road, environment, others) = varied_scene(Light::Dusk);
         let ego = vehicle(VehicleClass::Car, 500.0, -5.6);
         let scene = Scene { time: Time::ZERO, road: &road, environment: &environment, ego, others: &others };
         let window = PixelRect { left: 600, top: 380, width: 64, height: 64 };
-        let drawn = |key| {
+        let rendered = |key| {
             let mut crop = Crop::default();
             rear_camera().render_crop(&scene, window, ExposureKey(key), &mut crop);
             crop
         };
-        assert_eq!(drawn(5), drawn(5));
-        assert_ne!(drawn(5), drawn(6));
+        assert_eq!(rendered(5), rendered(5));
+        assert_ne!(rendered(5), rendered(6));
     }
 
     #[test]
-    fn nothing_ahead_or_alongside_has_a_window() {
+    fn boxes_ahead_and_alongside_have_no_visible_window() {
         let ego = vehicle(VehicleClass::Car, 500.0, -5.6);
-        let beside = |x_m| GroundBox { x_m, y_m: 3.7, heading_rad: 0.0, length_m: 4.6, width_m: 1.8, height_m: 1.5 };
-        assert_eq!(rear_camera().project(&ego, &beside(30.0)), None);
+        let box_at = |x_m| GroundBox { x_m, y_m: 3.7, heading_rad: 0.0, length_m: 4.6, width_m: 1.8, height_m: 1.5 };
+        assert_eq!(rear_camera().project(&ego, &box_at(30.0)), None);
         assert_eq!(
             rear_camera()
-                .project(&ego, &beside(0.0))
+                .project(&ego, &box_at(0.0))
                 .map(|window| window.share_in_image())
                 .filter(|share| *share > 0.0),
             None
         );
-        assert!(rear_camera().project(&ego, &beside(-30.0)).is_some());
+        assert!(rear_camera().project(&ego, &box_at(-30.0)).is_some());
     }
 }

@@ -1,19 +1,19 @@
-//! What one sees above the ground where nothing stands: woods at the horizon, clouds, sky.
+//! The background above the ground: woods at the horizon, clouds and sky.
 
 use super::hash::{noise_1d, noise_2d};
 use super::light::Illumination;
 use super::mesh::{Vec3, each};
 
-/// Distance of the woods, which air dims [m].
+/// Distance of the woods, which determines how much the air attenuates their light (m).
 const WOODS_M: f32 = 350.0;
-/// Tallest woods seen from the road: slope, rise over run.
+/// Maximum slope (rise over run) of the treetops, seen from the lens.
 const WOODS_SLOPE: f32 = 0.075;
 const WOODS: Vec3 = [0.035, 0.055, 0.025];
 const WOODS_KEY: u64 = 0x0077_6f6f_6473;
 const CLOUDS_KEY: u64 = 0x636c_6f75_6473;
 
-/// Radiance in a direction `slope` (rise over run) above the horizon, at `bearing` (tangent of the angle from the
-/// axis, plus E's yaw).
+/// Returns the radiance of the background in a direction `slope` (rise over run) above the horizon. `bearing` is the
+/// tangent of the angle from the camera's axis plus the ego's yaw.
 pub(crate) fn radiance(slope: f32, bearing: f32, light: &Illumination) -> Vec3 {
     let sky = light.sky(slope.max(0.0));
     if slope < WOODS_SLOPE {

@@ -1,11 +1,11 @@
-//! Annotations in the COCO format (Lin et al., *Microsoft COCO: common objects in context*, 2014; field names after
-//! <https://cocodataset.org/#format-data>). Masks are uncompressed run lengths, column by column, starting with a run
-//! of zeros.
+//! Annotations in the COCO format (Lin et al., *Microsoft COCO: common objects in context*, 2014). The field names
+//! follow <https://cocodataset.org/#format-data>. Masks are uncompressed run lengths in column-major order, and the
+//! first run counts zeros.
 
 use closecall_traffic::VehicleClass;
 use serde::Serialize;
 
-use super::{DatasetOptions, DatasetSummary, DrawnScene};
+use super::{DatasetOptions, DatasetSummary, RandomScene};
 use crate::camera::LabelledImage;
 
 #[derive(Serialize)]
@@ -39,7 +39,7 @@ struct Annotation {
     id: usize,
     image_id: usize,
     category_id: usize,
-    /// Left, top, width, height [px].
+    /// Left, top, width and height (px).
     bbox: [usize; 4],
     area: usize,
     iscrowd: u8,
@@ -50,7 +50,7 @@ struct Annotation {
 
 #[derive(Serialize)]
 struct RunLengths {
-    /// Height, width.
+    /// Height and width (px).
     size: [u32; 2],
     counts: Vec<u32>,
 }
@@ -74,12 +74,12 @@ impl Annotations {
         }
     }
 
-    /// Adds one image and an annotation for each vehicle that is seen in it.
+    /// Adds one image, with an annotation for each vehicle that is visible in it.
     pub(super) fn add(
         &mut self,
         name: &str,
         picture: &LabelledImage,
-        scene: &DrawnScene,
+        scene: &RandomScene,
         summary: &mut DatasetSummary,
     ) {
         let image_id = self.images.len() + 1;
@@ -93,8 +93,8 @@ impl Annotations {
             visibility_m: scene.environment.visibility_m,
         });
         summary.pictures += 1;
-        for (place, vehicle) in scene.others.iter().enumerate() {
-            let Some((bbox, area)) = extent(picture, place) else { continue };
+        for (index, vehicle) in scene.others.iter().enumerate() {
+            let Some((bbox, area)) = extent(picture, index) else { continue };
             summary.labels[vehicle.vehicle.class as usize] += 1;
             self.annotations.push(Annotation {
                 id: self.annotations.len() + 1,
@@ -103,7 +103,7 @@ impl Annotations {
                 bbox,
                 area,
                 iscrowd: 0,
-                segmentation: run_lengths(picture, place),
+                segmentation: run_lengths(picture, index),
                 distance_m: scene.ego.state.s_m - vehicle.state.s_m,
                 body_shape: vehicle.vehicle.appearance.body_shape,
             });
@@ -111,17 +111,18 @@ impl Annotations {
     }
 }
 
-/// Category ids start at 1.
+/// Returns the category id of a class. The ids start at 1.
 fn category(class: VehicleClass) -> usize {
     class as usize + 1
 }
 
-/// Bounding box and number of the pixels that show a vehicle, where any do.
-fn extent(picture: &LabelledImage, place: usize) -> Option<([usize; 4], usize)> {
+/// Returns the bounding box `[left, top, width, height]` (px) and the number of the pixels that show the vehicle with
+/// this index. Returns `None` if no pixel shows it.
+fn extent(picture: &LabelledImage, index: usize) -> Option<([usize; 4], usize)> {
     let width = picture.image.width as usize;
-    let hits = picture.instances.iter().enumerate().filter(|(_, instance)| usize::from(**instance) == place + 1);
+    let pixels = picture.instances.iter().enumerate().filter(|(_, instance)| usize::from(**instance) == index + 1);
     let (mut left, mut top, mut right, mut bottom, mut area) = (usize::MAX, usize::MAX, 0, 0, 0);
-    for (pixel, _) in hits {
+    for (pixel, _) in pixels {
         let (column, row) = (pixel % width, pixel / width);
         (left, top) = (left.min(column), top.min(row));
         (right, bottom) = (right.max(column + 1), bottom.max(row + 1));
@@ -130,15 +131,15 @@ fn extent(picture: &LabelledImage, place: usize) -> Option<([usize; 4], usize)> 
     (area > 0).then(|| ([left, top, right - left, bottom - top], area))
 }
 
-fn run_lengths(picture: &LabelledImage, place: usize) -> RunLengths {
+fn run_lengths(picture: &LabelledImage, index: usize) -> RunLengths {
     let (width, height) = (picture.image.width as usize, picture.image.height as usize);
     let mut counts = vec![0];
     let mut inside = false;
     for pixel in (0..width).flat_map(|column| (0..height).map(move |row| row * width + column)) {
-        let hit = usize::from(picture.instances[pixel]) == place + 1;
-        if hit != inside {
+        let is_visible = usize::from(picture.instances[pixel]) == index + 1;
+        if is_visible != inside {
             counts.push(0);
-            inside = hit;
+            inside = is_visible;
         }
         if let Some(run) = counts.last_mut() {
             *run += 1;

@@ -1,26 +1,26 @@
-//! Crops with their labels: vehicles in boxes that are off as those of LiDAR clusters are, and clusters of nothing.
+//! Labelled crops: vehicles in boxes with errors like those of LiDAR clusters, and background.
 
 use std::fmt::Write;
 
 use closecall_traffic::{Light, Stream};
 use rand::RngExt;
 
-use super::{DatasetSummary, DrawnScene};
+use super::{DatasetSummary, RandomScene};
 use crate::camera::{Crop, ExposureKey, Frame, GroundBox, PixelRect, RearCamera};
 use crate::{Scene, SceneVehicle};
 
-/// A window must show at least this share of itself within the image [1].
-const LEAST_IN_IMAGE: f64 = 0.6;
-/// A vehicle of which less than this share is left by those in front of it is no label [1].
-const LEAST_VISIBLE: f64 = 0.55;
-/// A window in which a vehicle fills more than this share is no background [1].
-const MOST_IN_BACKGROUND: f64 = 0.10;
+/// Minimum share of a window that must lie in the image (0 to 1).
+const MIN_SHARE_IN_IMAGE: f64 = 0.6;
+/// Minimum unoccluded share of a vehicle for it to be labelled (0 to 1).
+const MIN_VISIBLE_SHARE: f64 = 0.55;
+/// Maximum share of a background window that any vehicle may fill (0 to 1).
+const MAX_VEHICLE_SHARE: f64 = 0.10;
 /// Class label of the background.
 const BACKGROUND: usize = 3;
-/// Background windows in one scene.
-const BACKGROUNDS: usize = 3;
+/// Number of background windows drawn in one scene.
+const BACKGROUND_WINDOWS: usize = 3;
 
-/// Crops and their labels, as they stand in the files.
+/// The crops and their labels, in the format of the files.
 pub(super) struct Crops {
     pub(super) rgb: Vec<u8>,
     pub(super) csv: String,
@@ -34,47 +34,54 @@ impl Default for Crops {
 
 impl Crops {
     /// Adds the crops of one scene.
-    pub(super) fn add(&mut self, drawn: &DrawnScene, rng: &mut Stream, summary: &mut DatasetSummary) {
-        let camera = RearCamera::new(drawn.camera);
+    pub(super) fn add(&mut self, scene: &RandomScene, rng: &mut Stream, summary: &mut DatasetSummary) {
+        let camera = RearCamera::new(scene.camera);
         let key = ExposureKey::draw(rng);
-        for place in 0..drawn.others.len() {
-            let found = jittered(drawn, &drawn.others[place], rng);
-            let Some(window) = window(&camera, drawn, &found) else { continue };
+        for index in 0..scene.others.len() {
+            let cluster_box = vehicle_cluster_box(scene, &scene.others[index], rng);
+            let Some(window) = window(&camera, scene, &cluster_box) else { continue };
             let mut crop = Crop::default();
-            let seen = share(&camera, &drawn.scene(), place, window, key, &mut crop);
-            let alone = Scene { others: &drawn.others[place..=place], ..drawn.scene() };
-            let whole = share(&camera, &alone, 0, window, key, &mut Crop::default());
-            if seen > 0.01 && seen > LEAST_VISIBLE * whole {
-                let vehicle = &drawn.others[place].vehicle;
-                self.push(drawn, vehicle.class as usize, &found, &crop, summary);
+            let visible = rendered_share(&camera, &scene.scene(), index, window, key, &mut crop);
+            let unoccluded_scene = Scene { others: &scene.others[index..=index], ..scene.scene() };
+            let unoccluded = rendered_share(&camera, &unoccluded_scene, 0, window, key, &mut Crop::default());
+            if visible > 0.01 && visible > MIN_VISIBLE_SHARE * unoccluded {
+                let vehicle = &scene.others[index].vehicle;
+                self.push(scene, vehicle.class as usize, &cluster_box, &crop, summary);
                 let _ = writeln!(self.csv, ",{},{}", vehicle.appearance.body_shape, window.width);
             }
         }
-        for _ in 0..BACKGROUNDS {
-            let found = nothing(drawn, rng);
-            let Some(window) = window(&camera, drawn, &found) else { continue };
-            let mut frame = Frame::new(&drawn.camera, &drawn.scene(), key, &[window]);
+        for _ in 0..BACKGROUND_WINDOWS {
+            let cluster_box = background_cluster_box(scene, rng);
+            let Some(window) = window(&camera, scene, &cluster_box) else { continue };
+            let mut frame = Frame::new(&scene.camera, &scene.scene(), key, &[window]);
             let mut crop = Crop::default();
             frame.crop(window, &mut crop);
-            let fullest = (0..drawn.others.len()).map(|other| frame.share_of_latest(other)).fold(0.0, f64::max);
-            if fullest <= MOST_IN_BACKGROUND {
-                self.push(drawn, BACKGROUND, &found, &crop, summary);
+            let max_share = (0..scene.others.len()).map(|other| frame.instance_share(other)).fold(0.0, f64::max);
+            if max_share <= MAX_VEHICLE_SHARE {
+                self.push(scene, BACKGROUND, &cluster_box, &crop, summary);
                 let _ = writeln!(self.csv, ",,{}", window.width);
             }
         }
     }
 
-    fn push(&mut self, drawn: &DrawnScene, label: usize, found: &GroundBox, crop: &Crop, summary: &mut DatasetSummary) {
+    fn push(
+        &mut self,
+        scene: &RandomScene,
+        label: usize,
+        cluster_box: &GroundBox,
+        crop: &Crop,
+        summary: &mut DatasetSummary,
+    ) {
         self.rgb.extend_from_slice(&crop.rgb);
         summary.pictures += 1;
         summary.labels[label] += 1;
-        let rear = -found.x_m - drawn.ego.vehicle.dimensions.length_m / 2.0 - found.length_m / 2.0;
-        let light = match drawn.environment.light {
+        let rear = -cluster_box.x_m - scene.ego.vehicle.dimensions.length_m / 2.0 - cluster_box.length_m / 2.0;
+        let light = match scene.environment.light {
             Light::Day => "day",
             Light::Dusk => "dusk",
             Light::Night => "night",
         };
-        let environment = &drawn.environment;
+        let environment = &scene.environment;
         let weather = match (environment.rain_mm_per_h > 0.0, environment.visibility_m < 1_000.0) {
             (true, _) => "rain",
             (false, true) => "fog",
@@ -84,28 +91,28 @@ impl Crops {
     }
 }
 
-fn window(camera: &RearCamera, drawn: &DrawnScene, found: &GroundBox) -> Option<PixelRect> {
-    camera.project(&drawn.ego, found).filter(|window| window.share_in_image() >= LEAST_IN_IMAGE)
+fn window(camera: &RearCamera, scene: &RandomScene, cluster_box: &GroundBox) -> Option<PixelRect> {
+    camera.project(&scene.ego, cluster_box).filter(|window| window.share_in_image() >= MIN_SHARE_IN_IMAGE)
 }
 
-/// Draws a crop, and returns the share of it that shows one vehicle.
-fn share(
+/// Renders a crop, and returns the share of its samples that show the vehicle with this index.
+fn rendered_share(
     camera: &RearCamera,
     scene: &Scene<'_>,
-    place: usize,
+    index: usize,
     window: PixelRect,
     key: ExposureKey,
     crop: &mut Crop,
 ) -> f64 {
     let mut frame = Frame::new(camera.camera(), scene, key, &[window]);
     frame.crop(window, crop);
-    frame.share_of_latest(place)
+    frame.instance_share(index)
 }
 
-/// The box that a LiDAR cluster of a vehicle might have given: the face that it sees is nearly right, the length is
-/// often assumed, the height is what the beams happened to hit.
-fn jittered(drawn: &DrawnScene, vehicle: &SceneVehicle, rng: &mut Stream) -> GroundBox {
-    let mut truth = ego_box(drawn, vehicle);
+/// Returns a random box that a LiDAR cluster of the vehicle could have given. The visible face is almost correct, the
+/// length is often an assumption, and the height depends on which part of the vehicle the beams hit.
+fn vehicle_cluster_box(scene: &RandomScene, vehicle: &SceneVehicle, rng: &mut Stream) -> GroundBox {
+    let mut truth = ego_box(scene, vehicle);
     let face = truth.length_m / 2.0;
     truth.length_m = if rng.random_bool(0.5) { rng.random_range(1.5..6.0) } else { truth.length_m };
     let (sin, cos) = truth.heading_rad.sin_cos();
@@ -119,10 +126,10 @@ fn jittered(drawn: &DrawnScene, vehicle: &SceneVehicle, rng: &mut Stream) -> Gro
     truth
 }
 
-/// A vehicle's true box in E's frame.
-fn ego_box(drawn: &DrawnScene, vehicle: &SceneVehicle) -> GroundBox {
-    let pose = |of: &SceneVehicle| drawn.road.plane_pose(of.state.s_m, of.state.d_m, of.state.heading_rad);
-    let (ego, other) = (pose(&drawn.ego), pose(vehicle));
+/// Returns the true box of a vehicle in the ego's frame.
+fn ego_box(scene: &RandomScene, vehicle: &SceneVehicle) -> GroundBox {
+    let pose = |of: &SceneVehicle| scene.road.plane_pose(of.state.s_m, of.state.d_m, of.state.heading_rad);
+    let (ego, other) = (pose(&scene.ego), pose(vehicle));
     let (sin, cos) = ego.yaw_rad.sin_cos();
     let (dx, dy) = (other.x_m - ego.x_m, other.y_m - ego.y_m);
     let size = vehicle.vehicle.dimensions;
@@ -136,26 +143,27 @@ fn ego_box(drawn: &DrawnScene, vehicle: &SceneVehicle) -> GroundBox {
     }
 }
 
-/// The box of a cluster where no vehicle is: spray and ground near E, rails and posts beside the road, anything.
-fn nothing(drawn: &DrawnScene, rng: &mut Stream) -> GroundBox {
+/// Returns the random box of a cluster that is not a vehicle: spray or ground near the ego, rails and posts beside the
+/// road, or any other position.
+fn background_cluster_box(scene: &RandomScene, rng: &mut Stream) -> GroundBox {
     let kind = rng.random_range(0..3);
     let back = match kind {
         0 => rng.random_range(3.0..25.0),
         _ => rng.random_range(4.0..120.0),
     };
     let d_m = match kind {
-        0 => drawn.ego.state.d_m + rng.random_range(-2.5..2.5),
-        1 => [0.79, drawn.road.right_edge_m() - 3.04, drawn.road.right_edge_m() / 2.0][rng.random_range(0..3)],
-        _ => rng.random_range(drawn.road.right_edge_m() - 6.0..6.0),
+        0 => scene.ego.state.d_m + rng.random_range(-2.5..2.5),
+        1 => [0.79, scene.road.right_edge_m() - 3.04, scene.road.right_edge_m() / 2.0][rng.random_range(0..3)],
+        _ => rng.random_range(scene.road.right_edge_m() - 6.0..6.0),
     };
-    let mut stand = drawn.ego;
-    stand.state.s_m -= back + drawn.ego.vehicle.dimensions.length_m / 2.0;
-    stand.state.d_m = d_m;
-    stand.state.heading_rad = 0.0;
+    let mut anchor = scene.ego;
+    anchor.state.s_m -= back + scene.ego.vehicle.dimensions.length_m / 2.0;
+    anchor.state.d_m = d_m;
+    anchor.state.heading_rad = 0.0;
     GroundBox {
         length_m: rng.random_range(0.1..5.0),
         width_m: rng.random_range(0.1..2.5),
         height_m: rng.random_range(0.2..2.5),
-        ..ego_box(drawn, &stand)
+        ..ego_box(scene, &anchor)
     }
 }

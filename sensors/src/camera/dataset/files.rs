@@ -1,4 +1,4 @@
-//! Files that appear whole or not at all: written beside their place, then renamed into it.
+//! Atomic file output: a file is written under a temporary name in the same folder, and then renamed.
 
 use std::fs;
 use std::io::Write;
@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use super::DatasetError;
 use crate::camera::Image;
 
-/// A folder to write into.
+/// The folder that receives the files.
 pub(super) struct Output {
     folder: PathBuf,
 }
@@ -18,7 +18,7 @@ impl Output {
         Ok(Self { folder: folder.to_owned() })
     }
 
-    /// Writes one file.
+    /// Writes one file atomically.
     pub(super) fn write(&self, name: &str, bytes: &[u8]) -> Result<(), DatasetError> {
         let path = self.folder.join(name);
         let partial = self.folder.join(format!("{name}.partial"));
@@ -28,7 +28,7 @@ impl Output {
         written.map_err(|source| DatasetError::Write { path, source })
     }
 
-    /// Writes an image as PNG.
+    /// Writes an image as a PNG file.
     pub(super) fn png(&self, name: &str, image: &Image) -> Result<(), DatasetError> {
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, image.width, image.height);

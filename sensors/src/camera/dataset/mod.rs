@@ -1,12 +1,13 @@
-//! Labelled pictures for training and for judging classifiers, made by the renderer itself.
+//! Labelled images from the renderer, for the training and the evaluation of classifiers.
 //!
-//! Two kinds, of the same random scenes:
-//! - *images*: `image-000000.png` … and `annotations.json` in the COCO format: bounding boxes, masks (run lengths) and
-//!   classes of every vehicle that is seen;
-//! - *crops*: `crops.rgb`, 32 × 32 × 3 bytes for each, one after the other, and `crops.csv` with a row for each:
-//!   what the classifier is trained on. Boxes are off by as much as those fitted to LiDAR clusters are.
+//! There are two kinds of content, rendered from the same random scenes:
+//! - *images*: `image-000000.png` … and `annotations.json` in the COCO format, with the bounding box, the mask (run
+//!   lengths) and the class of every visible vehicle;
+//! - *crops*: `crops.rgb`, which holds 32 × 32 × 3 bytes per crop, and `crops.csv`, which holds one row per crop. The
+//!   classifier is trained on them. Their boxes have errors as large as those of boxes fitted to LiDAR clusters.
 //!
-//! The two sets share no body shape ([`HELD_OUT`](super::HELD_OUT)), no paint and no random numbers.
+//! The training set and the held-out set share no body shape ([`HELD_OUT_SHAPES`](super::HELD_OUT_SHAPES)), no paint
+//! and no random numbers.
 
 mod coco;
 mod crops;
@@ -20,53 +21,54 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use files::Output;
-use scenes::DrawnScene;
+use scenes::RandomScene;
 
-/// Which of the disjoint sets is rendered.
+/// One of the two disjoint data sets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Set {
-    /// Shapes and paints for training.
+    /// The set for training, with its own shapes and paints.
     Training,
-    /// Held-out shapes and paints.
+    /// The set for evaluation, with the held-out shapes and paints.
     HeldOut,
 }
 
-/// What is written.
+/// The kind of content that is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Content {
     /// Whole images with COCO annotations.
     Images,
-    /// Crops as the classifier sees them.
+    /// Crops in the format of the classifier's input.
     Crops,
 }
 
-/// What to render.
+/// The options of a data set to be rendered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DatasetOptions {
-    /// Training or held-out.
+    /// The set to render, training or held-out.
     pub set: Set,
-    /// Images or crops.
+    /// The content to render, images or crops.
     pub content: Content,
     /// Number of random scenes.
     pub scenes: u32,
-    /// Seed of the scenes; 0 is a seed like any other.
+    /// Seed of the scenes. 0 is a seed like any other.
     pub seed: u64,
 }
 
-/// What was written.
+/// The summary of a written data set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct DatasetSummary {
-    /// Number of scenes drawn.
+    /// Number of random scenes.
     pub scenes: u32,
     /// Number of images or crops.
     pub pictures: usize,
-    /// Labels by class: car, truck, motorcycle, background.
+    /// Number of labels of each class: car, truck, motorcycle, background.
     pub labels: [usize; 4],
 }
 
-/// A data set that could not be written. What was there before is still there; temporary files may be left.
+/// The reason why a data set cannot be written. Every file in the folder is complete, from this run or from an earlier
+/// one, except that a temporary file may remain.
 #[derive(Debug, thiserror::Error)]
 pub enum DatasetError {
     /// A file could not be written.
@@ -74,7 +76,7 @@ pub enum DatasetError {
     Write {
         /// The file.
         path: std::path::PathBuf,
-        /// The system's reason.
+        /// The reason that the system gives.
         source: std::io::Error,
     },
     /// An image could not be encoded.
@@ -82,26 +84,26 @@ pub enum DatasetError {
     Encode {
         /// The file.
         path: std::path::PathBuf,
-        /// The encoder's reason.
+        /// The reason that the encoder gives.
         source: png::EncodingError,
     },
     /// The annotations could not be encoded.
     #[error("failed to encode the annotations: {0}")]
     Annotations(#[from] serde_json::Error),
-    /// A drawn scene was refused by the checks that scenario files pass too.
+    /// A random scene fails the checks that also apply to scenario files.
     #[error("failed to set up a random scene: {0}")]
     Scene(#[from] ConfigError),
-    /// The fixed name of the random streams was refused.
+    /// The fixed name of the random streams is invalid.
     #[error("failed to name the random stream: {0}")]
     Stream(#[from] closecall_traffic::InvalidActorId),
 }
 
-/// Renders a data set into `folder`, which is made where it does not exist. Each file appears whole or not at all.
+/// Renders a data set into `folder`, which is created if it does not exist. Each file is written atomically.
 ///
 /// The same options give the same bytes.
 ///
 /// # Errors
-/// [`DatasetError`] where a file cannot be written.
+/// Returns a [`DatasetError`] if a scene cannot be set up, or if a file cannot be encoded or written.
 pub fn render_dataset(options: &DatasetOptions, folder: &Path) -> Result<DatasetSummary, DatasetError> {
     let output = Output::new(folder)?;
     let mut summary = DatasetSummary { scenes: options.scenes, pictures: 0, labels: [0; 4] };
@@ -109,7 +111,7 @@ pub fn render_dataset(options: &DatasetOptions, folder: &Path) -> Result<Dataset
         Content::Images => {
             let mut annotations = coco::Annotations::new(options);
             for index in 0..options.scenes {
-                let scene = draw(options, index)?;
+                let scene = random_scene(options, index)?;
                 let key = super::ExposureKey(super::hash::mix(options.seed ^ u64::from(index)));
                 let picture = super::RearCamera::new(scene.camera).render_image(&scene.scene(), key);
                 let name = format!("image-{index:06}.png");
@@ -121,7 +123,7 @@ pub fn render_dataset(options: &DatasetOptions, folder: &Path) -> Result<Dataset
         Content::Crops => {
             let mut crops = crops::Crops::default();
             for index in 0..options.scenes {
-                let scene = draw(options, index)?;
+                let scene = random_scene(options, index)?;
                 let mut rng =
                     stream(options.seed, u64::from(index), &ActorId::new("ego")?, options.set.channel("crops"));
                 crops.add(&scene, &mut rng, &mut summary);
@@ -134,7 +136,7 @@ pub fn render_dataset(options: &DatasetOptions, folder: &Path) -> Result<Dataset
 }
 
 impl Set {
-    /// The two sets draw from streams of their own.
+    /// Returns the channel of the random stream for this set and purpose. The two sets use separate streams.
     fn channel(self, purpose: &str) -> &'static str {
         match (self, purpose == "crops") {
             (Self::Training, true) => "training-crops",
@@ -145,9 +147,9 @@ impl Set {
     }
 }
 
-fn draw(options: &DatasetOptions, index: u32) -> Result<DrawnScene, DatasetError> {
+fn random_scene(options: &DatasetOptions, index: u32) -> Result<RandomScene, DatasetError> {
     let mut rng = stream(options.seed, u64::from(index), &ActorId::new("ego")?, options.set.channel("scenes"));
-    Ok(DrawnScene::draw(options.set, &mut rng)?)
+    Ok(RandomScene::draw(options.set, &mut rng)?)
 }
 
 #[cfg(test)]
@@ -159,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn crops_come_with_a_row_each_and_the_same_options_give_the_same_bytes() {
+    fn each_crop_has_a_row_and_the_same_options_give_the_same_bytes() {
         let options = DatasetOptions { set: Set::HeldOut, content: Content::Crops, scenes: 6, seed: 3 };
         let (first, second) = (folder("a"), folder("b"));
         let summary = render_dataset(&options, &first).unwrap();
@@ -177,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn an_image_has_annotations_whose_masks_fit_their_boxes() {
+    fn the_masks_of_an_image_fit_their_bounding_boxes() {
         let options = DatasetOptions { set: Set::Training, content: Content::Images, scenes: 1, seed: 1 };
         let folder = folder("images");
         render_dataset(&options, &folder).unwrap();

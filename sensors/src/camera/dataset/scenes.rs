@@ -1,4 +1,4 @@
-//! Random scenes behind E: roads, weather, light, and vehicles of every shape and paint.
+//! Random scenes behind the ego vehicle: road, weather, light, and vehicles of every shape and paint.
 
 use std::f64::consts::PI;
 
@@ -9,18 +9,18 @@ use closecall_traffic::{
 use rand::RngExt;
 
 use super::Set;
-use crate::camera::{Camera, CameraConfig, HELD_OUT, Pipeline, SHAPES, SunConfig, usual_dimensions};
+use crate::camera::{Camera, CameraConfig, HELD_OUT_SHAPES, Pipeline, SHAPE_COUNTS, SunConfig, usual_dimensions};
 use crate::{Scene, SceneVehicle};
 
-/// Vehicles stand this far behind E's centre [m].
+/// Range of the distance from the ego's centre back to the front of a vehicle (m).
 const BEHIND_M: std::ops::Range<f64> = 6.0..125.0;
-/// Tries to place a vehicle clear of the others before it is left out.
-const TRIES: usize = 8;
-/// Gap kept between vehicles in a lane [m].
-const CLEAR_M: f64 = 2.0;
+/// Maximum number of attempts to place a vehicle clear of the others, after which it is left out.
+const MAX_ATTEMPTS: usize = 8;
+/// Minimum longitudinal gap between vehicles that are not laterally clear of each other (m).
+const MIN_GAP_M: f64 = 2.0;
 
-/// A random scene that owns what a [`Scene`] borrows.
-pub(super) struct DrawnScene {
+/// A random scene. It owns the data that a [`Scene`] borrows.
+pub(super) struct RandomScene {
     pub(super) time: Time,
     pub(super) road: Road,
     pub(super) environment: Environment,
@@ -29,8 +29,8 @@ pub(super) struct DrawnScene {
     pub(super) others: Vec<SceneVehicle>,
 }
 
-impl DrawnScene {
-    /// Draws a scene.
+impl RandomScene {
+    /// Draws a random scene.
     pub(super) fn draw(set: Set, rng: &mut Stream) -> Result<Self, ConfigError> {
         let road = road(rng)?;
         let environment = environment(rng);
@@ -46,7 +46,7 @@ impl DrawnScene {
         };
         let pitch_rad = rng.random_range(-0.012..0.012);
         let ego = SceneVehicle { actor: 0, vehicle: Vehicle::typical(VehicleClass::Car), state, pitch_rad };
-        let mut drawn = Self {
+        let mut scene = Self {
             time: Time::from_ms(40 * rng.random_range(0..1_000)),
             road,
             environment,
@@ -55,12 +55,12 @@ impl DrawnScene {
             others: Vec::new(),
         };
         for actor in 1..=rng.random_range(1..=5) {
-            drawn.add_vehicle(actor, set, rng);
+            scene.add_vehicle(actor, set, rng);
         }
-        Ok(drawn)
+        Ok(scene)
     }
 
-    /// The scene as sensors see it.
+    /// Returns the scene in the form that the sensors use.
     pub(super) fn scene(&self) -> Scene<'_> {
         Scene { time: self.time, road: &self.road, environment: &self.environment, ego: self.ego, others: &self.others }
     }
@@ -71,7 +71,7 @@ impl DrawnScene {
         vehicle.appearance.body_shape = shape(set, class, rng);
         vehicle.appearance.paint_rgb = paint(set, rng);
         vehicle.dimensions = dimensions(class, vehicle.appearance.body_shape, rng);
-        for _ in 0..TRIES {
+        for _ in 0..MAX_ATTEMPTS {
             let lane = Lane(rng.random_range(1..=self.road.lanes()));
             let gap = vehicle.dimensions.length_m / 2.0 + rng.random_range(BEHIND_M);
             let changing = if rng.random_bool(0.15) { rng.random_range(-0.07..0.07) } else { 0.0 };
@@ -84,7 +84,7 @@ impl DrawnScene {
                 ..VehicleState::default()
             };
             let candidate = SceneVehicle { actor, vehicle, state, pitch_rad: rng.random_range(-0.01..0.02) };
-            if self.others.iter().all(|other| are_clear(other, &candidate)) {
+            if self.others.iter().all(|other| have_clearance(other, &candidate)) {
                 self.others.push(candidate);
                 return;
             }
@@ -92,12 +92,12 @@ impl DrawnScene {
     }
 }
 
-fn are_clear(a: &SceneVehicle, b: &SceneVehicle) -> bool {
+fn have_clearance(a: &SceneVehicle, b: &SceneVehicle) -> bool {
     let along =
         (a.state.s_m - b.state.s_m).abs() - (a.vehicle.dimensions.length_m + b.vehicle.dimensions.length_m) / 2.0;
     let across =
         (a.state.d_m - b.state.d_m).abs() - (a.vehicle.dimensions.width_m + b.vehicle.dimensions.width_m) / 2.0;
-    along > CLEAR_M || across > 0.3
+    along > MIN_GAP_M || across > 0.3
 }
 
 fn road(rng: &mut Stream) -> Result<Road, ConfigError> {
@@ -114,19 +114,20 @@ fn road(rng: &mut Stream) -> Result<Road, ConfigError> {
 
 fn environment(rng: &mut Stream) -> Environment {
     let light = [Light::Day, Light::Day, Light::Dusk, Light::Night, Light::Night][rng.random_range(0..5)];
-    let mut drawn = Environment { light, visibility_m: rng.random_range(3_000.0..20_000.0), ..Environment::CLEAR_DAY };
+    let mut environment =
+        Environment { light, visibility_m: rng.random_range(3_000.0..20_000.0), ..Environment::CLEAR_DAY };
     match rng.random_range(0..10) {
-        0 => drawn.visibility_m = rng.random_range(80.0..500.0),
+        0 => environment.visibility_m = rng.random_range(80.0..500.0),
         1..=4 => {
-            drawn.rain_mm_per_h = rng.random_range(0.5..15.0);
-            drawn.water_film_mm = rng.random_range(0.05..1.2);
-            drawn.visibility_m = rng.random_range(800.0..6_000.0);
+            environment.rain_mm_per_h = rng.random_range(0.5..15.0);
+            environment.water_film_mm = rng.random_range(0.05..1.2);
+            environment.visibility_m = rng.random_range(800.0..6_000.0);
         }
-        // After the rain: wet road, no drops.
-        5 => drawn.water_film_mm = rng.random_range(0.05..0.8),
+        // After rain: the road is wet, but no drops fall.
+        5 => environment.water_film_mm = rng.random_range(0.05..0.8),
         _ => {}
     }
-    drawn
+    environment
 }
 
 fn camera(rng: &mut Stream) -> Result<Camera, ConfigError> {
@@ -148,11 +149,11 @@ fn camera(rng: &mut Stream) -> Result<Camera, ConfigError> {
 }
 
 fn shape(set: Set, class: VehicleClass, rng: &mut Stream) -> u8 {
-    let held_out = HELD_OUT[class as usize];
+    let held_out = HELD_OUT_SHAPES[class as usize];
     match set {
         Set::HeldOut => held_out[rng.random_range(0..held_out.len())],
         Set::Training => loop {
-            let shape = rng.random_range(0..SHAPES[class as usize]);
+            let shape = rng.random_range(0..SHAPE_COUNTS[class as usize]);
             if !held_out.contains(&shape) {
                 return shape;
             }
@@ -160,7 +161,8 @@ fn shape(set: Set, class: VehicleClass, rng: &mut Stream) -> u8 {
     }
 }
 
-/// A third of the vehicles have the class's typical size, whatever their shape, as in a scenario that does not say.
+/// Draws the dimensions of a vehicle. A third of the vehicles have about the typical size of the class regardless of
+/// their shape, as in a scenario file that does not state the size.
 fn dimensions(class: VehicleClass, shape: u8, rng: &mut Stream) -> Dimensions {
     let usual = if rng.random_bool(1.0 / 3.0) { class.typical_dimensions() } else { usual_dimensions(class, shape) };
     Dimensions {
@@ -170,9 +172,10 @@ fn dimensions(class: VehicleClass, shape: u8, rng: &mut Stream) -> Dimensions {
     }
 }
 
-/// Half of the vehicles are grey, the others coloured. The sets differ in the bands of brightness and of hue.
+/// Draws the paint of a vehicle. Half of the vehicles are grey, the others coloured. The two sets use disjoint bands of
+/// brightness (grey) and of hue (coloured).
 fn paint(set: Set, rng: &mut Stream) -> [u8; 3] {
-    /// Each sixth of a scale belongs to the held-out set where it has an odd fifth part.
+    /// Number of equal parts of the scale. The upper quarter of each part belongs to the held-out set.
     const BANDS: f64 = 5.0;
     let banded = |rng: &mut Stream| loop {
         let value: f64 = rng.random();
@@ -187,8 +190,8 @@ fn paint(set: Set, rng: &mut Stream) -> [u8; 3] {
     }
     let (hue, saturation, value) = (banded(rng), rng.random_range(0.3..0.95), rng.random_range(0.15..0.95));
     let channel = |shift: f64| {
-        let place = (hue + shift).fract() * 6.0;
-        let share = ((place - 3.0).abs() - 1.0).clamp(0.0, 1.0);
+        let sector = (hue + shift).fract() * 6.0;
+        let share = ((sector - 3.0).abs() - 1.0).clamp(0.0, 1.0);
         value * (1.0 - saturation * (1.0 - share))
     };
     [channel(0.0), channel(2.0 / 3.0), channel(1.0 / 3.0)].map(byte)

@@ -1,9 +1,9 @@
-//! Passenger cars: a lower body, a greenhouse with windows on top, and what one sees of the front.
+//! Passenger cars: a lower body, a greenhouse with windows on top of it, and the details of the front.
 //!
 //! ```text
 //!            roof ________
-//!               /  glass  \___ deck          heights as shares of the car's height,
-//!   cowl ______/            \  |             places as shares of its length from the front
+//!               /  glass  \___ deck          heights are shares of the car's height,
+//!   cowl ______/            \  |             positions are shares of its length, from the front
 //!  nose /   bonnet             |
 //!       |_( )____________( )___|
 //! ```
@@ -13,25 +13,25 @@ use crate::camera::mesh::{Emission, Mesh, Rib, Surface};
 
 /// Proportions of one body shape.
 pub(super) struct CarShape {
-    /// Usual length, width, height [m].
+    /// Usual length, width and height (m).
     pub(super) usual_m: [f64; 3],
-    /// Height of the nose's upper edge, and of the belt line below the windows [share of the height].
+    /// Height of the nose's upper edge, and of the belt line below the windows (shares of the height).
     nose_belt: [f32; 2],
-    /// Where the windscreen begins and where the roof begins [share of the length from the front].
+    /// Position of the windscreen's lower edge and of the roof's front edge (shares of the length, from the front).
     cowl_roof: [f32; 2],
-    /// Where the roof ends and where the rear window ends [share of the length from the front].
+    /// Position of the roof's rear edge and of the rear window's lower edge (shares of the length, from the front).
     roof_end_deck: [f32; 2],
-    /// Half the roof's width [share of the width].
+    /// Half the width of the roof (share of the width).
     roof_half: f32,
-    /// Half width and half height of a headlamp [share of width, of height].
+    /// Half width and half height of a headlamp (shares of width and height).
     lamp: [f32; 2],
-    /// Half width and half height of the grille [share of width, of height].
+    /// Half width and half height of the grille (shares of width and height).
     grille: [f32; 2],
-    /// Clearance below the body [share of the height].
+    /// Ground clearance below the body (share of the height).
     clearance: f32,
 }
 
-/// The body shapes, in order: saloon, hatchback, estate, coupé, sport utility vehicle, van, small city car, minivan,
+/// The body shapes in order: saloon, hatchback, estate, coupé, sport utility vehicle, van, small city car, minivan,
 /// pickup.
 pub(super) const SHAPES: [CarShape; 9] = [
     CarShape {
@@ -126,7 +126,7 @@ pub(super) const SHAPES: [CarShape; 9] = [
     },
 ];
 
-/// The body in its own frame.
+/// Builds the body in its own frame.
 pub(super) fn mesh(body: &Body) -> Mesh {
     let shape = &SHAPES[usize::from(body.shape) % SHAPES.len()];
     let mut mesh = Mesh::default();
@@ -143,7 +143,7 @@ pub(super) fn mesh(body: &Body) -> Mesh {
     mesh
 }
 
-/// The greenhouse's four ribs: foot and top of the windscreen, top and foot of the rear window.
+/// Returns the four ribs of the greenhouse: bottom and top of the windscreen, top and bottom of the rear window.
 fn greenhouse(body: &Body, shape: &CarShape) -> [Rib; 4] {
     let [length, width, height] = body.extents();
     let x = |share: f32| length * (0.5 - share);
@@ -198,7 +198,7 @@ fn front(mesh: &mut Mesh, body: &Body, shape: &CarShape) {
     mesh.front_decal(front, [0.0, lamp_height], [shape.grille[0] * width, shape.grille[1] * height], Surface::GRILLE);
     let bumper = shape.clearance * height + 0.12 * height;
     mesh.front_decal(front, [0.0, bumper], [0.34 * width, 0.035 * height], Surface::PLASTIC);
-    // A plate is 0.52 m × 0.11 m.
+    // A licence plate measures 0.52 m × 0.11 m.
     mesh.front_decal(front + 0.01, [0.0, bumper + 0.06 * height], [0.26, 0.055], Surface::PLATE);
     for side in [-1.0, 1.0] {
         let at = [side * (0.46 * width - lamp_y), lamp_height];

@@ -1,8 +1,8 @@
-//! Body shapes: what the vehicles of each class and the furniture of the road look like.
+//! Body shapes: the geometry of vehicles of each class and of roadside furniture.
 //!
-//! A shape is a row of proportions; it is scaled into the vehicle's box, so that what the camera sees has the same
-//! extents as what the LiDAR measures. [`HELD_OUT`] shapes never appear in training: the model card judges the
-//! classifier on them.
+//! A shape is a set of proportions that is scaled to the vehicle's box, so that the camera sees the same extents as the
+//! LiDAR measures. The shapes in [`HELD_OUT_SHAPES`] never appear in training: the model card evaluates the classifier
+//! on them.
 
 mod car;
 mod motorcycle;
@@ -16,12 +16,12 @@ use super::mesh::{Mesh, Surface, Vec3};
 pub(crate) use roadside::roadside;
 
 /// Number of body shapes of each class, in the order of [`VehicleClass::ALL`].
-pub const SHAPES: [u8; 3] = [car::SHAPES.len() as u8, truck::SHAPES.len() as u8, motorcycle::SHAPES.len() as u8];
+pub const SHAPE_COUNTS: [u8; 3] = [car::SHAPES.len() as u8, truck::SHAPES.len() as u8, motorcycle::SHAPES.len() as u8];
 
-/// The shapes of each class that only evaluation may use, in the order of [`VehicleClass::ALL`].
-pub const HELD_OUT: [&[u8]; 3] = [&[3, 7], &[2, 5], &[2, 4]];
+/// The indices of the shapes of each class that are reserved for evaluation, in the order of [`VehicleClass::ALL`].
+pub const HELD_OUT_SHAPES: [&[u8]; 3] = [&[3, 7], &[2, 5], &[2, 4]];
 
-/// The body of a vehicle in its own frame.
+/// Builds the body of a vehicle in its own frame.
 pub(crate) fn vehicle(vehicle: &Vehicle) -> Mesh {
     let look = &vehicle.appearance;
     let paint = Surface::plain(look.paint_rgb.map(linear), 0.6);
@@ -33,9 +33,9 @@ pub(crate) fn vehicle(vehicle: &Vehicle) -> Mesh {
     }
 }
 
-/// Dimensions that suit a body shape, which is taken modulo the number of shapes.
+/// Returns the usual dimensions of a body shape. The index `shape` is taken modulo the number of shapes.
 pub fn usual_dimensions(class: VehicleClass, shape: u8) -> Dimensions {
-    let index = usize::from(shape % SHAPES[class as usize]);
+    let index = usize::from(shape % SHAPE_COUNTS[class as usize]);
     let [length_m, width_m, height_m] = match class {
         VehicleClass::Car => car::SHAPES[index].usual_m,
         VehicleClass::Truck => truck::SHAPES[index].usual_m,
@@ -44,7 +44,7 @@ pub fn usual_dimensions(class: VehicleClass, shape: u8) -> Dimensions {
     Dimensions { length_m, width_m, height_m }
 }
 
-/// What a body is made to.
+/// The parameters from which a body is built.
 struct Body {
     size: Dimensions,
     paint: Surface,
@@ -52,13 +52,13 @@ struct Body {
 }
 
 impl Body {
-    /// Length, width, height [m].
+    /// Returns length, width and height (m).
     fn extents(&self) -> Vec3 {
         [self.size.length_m as f32, self.size.width_m as f32, self.size.height_m as f32]
     }
 }
 
-/// Linear reflectance of an sRGB value, by the power law of 2 that the camera encodes with.
+/// Converts an sRGB value to linear reflectance by a square, the inverse of the camera's square-root encoding.
 fn linear(value: u8) -> f32 {
     let share = f32::from(value) / 255.0;
     share * share
@@ -68,13 +68,13 @@ fn linear(value: u8) -> f32 {
 mod tests {
     use super::*;
 
-    /// Mirrors and handlebars may reach beyond the box by this much [m].
+    /// Maximum overhang of mirrors and handlebars beyond the box (m).
     const OVERHANG_M: f32 = 0.25;
 
     #[test]
-    fn every_shape_fills_its_box_and_hardly_exceeds_it() {
+    fn every_shape_fills_its_box_and_exceeds_it_only_by_mirrors_and_handlebars() {
         for class in VehicleClass::ALL {
-            for shape in 0..SHAPES[class as usize] {
+            for shape in 0..SHAPE_COUNTS[class as usize] {
                 let mut typical = Vehicle::typical(class);
                 typical.appearance.body_shape = shape;
                 typical.dimensions = usual_dimensions(class, shape);
@@ -97,9 +97,9 @@ mod tests {
     #[test]
     fn held_out_shapes_exist_and_leave_enough_to_train_on() {
         for class in VehicleClass::ALL {
-            let held_out = HELD_OUT[class as usize];
-            assert!(held_out.iter().all(|shape| *shape < SHAPES[class as usize]));
-            assert!(usize::from(SHAPES[class as usize]) >= held_out.len() + 3);
+            let held_out = HELD_OUT_SHAPES[class as usize];
+            assert!(held_out.iter().all(|shape| *shape < SHAPE_COUNTS[class as usize]));
+            assert!(usize::from(SHAPE_COUNTS[class as usize]) >= held_out.len() + 3);
         }
     }
 }

@@ -1,27 +1,28 @@
-//! Motorcycles with their riders. The rider is the larger part of what one sees.
+//! Motorcycles with their riders. The rider is the larger part of the visible area.
 
 use super::Body;
 use crate::camera::mesh::{Emission, Mesh, Surface};
 
 /// Proportions of one body shape.
 pub(super) struct MotorcycleShape {
-    /// Usual length, width, height [m].
+    /// Usual length, width and height (m).
     pub(super) usual_m: [f64; 3],
-    /// Half width and height of the fairing's or the shield's upper edge [m, share of the height]; 0 for none.
+    /// Half width (m) and height (share of the height) of the upper edge of the fairing or shield; 0 for none.
     fairing: [f32; 2],
-    /// Half width and half height of the headlamp, and half the distance between two of them [m].
+    /// Half width and half height of a headlamp, and half the distance between two headlamps (m). A distance of 0 means
+    /// a single headlamp.
     lamp_m: [f32; 3],
-    /// How far the rider leans forward [m].
+    /// Distance by which the rider's shoulders lean forward (m).
     lean_m: f32,
-    /// Height of the handlebar [share of the height].
+    /// Height of the handlebar (share of the height).
     bar: f32,
-    /// Half width of side cases [m]; 0 for none.
+    /// Half width of the side cases (m); 0 for none.
     cases_m: f32,
-    /// The rider's suit, linear red, green, blue.
+    /// Reflectance of the rider's suit (linear red, green, blue).
     suit: [f32; 3],
 }
 
-/// The body shapes, in order: naked, sport, tourer with cases, scooter, chopper, trail bike.
+/// The body shapes in order: naked bike, sport bike, tourer with cases, scooter, chopper, trail bike.
 pub(super) const SHAPES: [MotorcycleShape; 6] = [
     MotorcycleShape {
         usual_m: [2.1, 0.80, 1.65],
@@ -79,7 +80,7 @@ pub(super) const SHAPES: [MotorcycleShape; 6] = [
     },
 ];
 
-/// The body in its own frame.
+/// Builds the body in its own frame.
 pub(super) fn mesh(body: &Body) -> Mesh {
     let shape = &SHAPES[usize::from(body.shape) % SHAPES.len()];
     let mut mesh = Mesh::default();
@@ -95,7 +96,7 @@ fn machine(mesh: &mut Mesh, body: &Body, shape: &MotorcycleShape) {
     for x in [front - radius, radius - front] {
         mesh.wheel([x, 0.0, radius], 0.065);
     }
-    // Fork, engine and tank, tail.
+    // Fork, engine, tank and tail.
     let head = front - 0.45;
     mesh.prism(
         &[[front - 0.28, 0.4, 0.09], [front - 0.34, 0.4, 0.09], [head - 0.06, 0.95, 0.1], [head, 0.95, 0.1]],
@@ -136,8 +137,8 @@ fn lamps(mesh: &mut Mesh, [x, width, bar]: [f32; 3], shape: &MotorcycleShape) {
     let [half_y, half_z, apart] = shape.lamp_m;
     let at_z = 0.86;
     mesh.block([x - 0.06, 0.0, at_z], [0.05, half_y + apart + 0.02, half_z + 0.02], Surface::PLASTIC);
-    let places: &[f32] = if apart > 0.0 { &[-1.0, 1.0] } else { &[0.0] };
-    for side in places {
+    let sides: &[f32] = if apart > 0.0 { &[-1.0, 1.0] } else { &[0.0] };
+    for side in sides {
         mesh.front_decal(x, [side * apart, at_z], [half_y, half_z], Surface::HEADLAMP);
     }
     for side in [-1.0, 1.0] {
@@ -163,12 +164,12 @@ fn rider(mesh: &mut Mesh, body: &Body, shape: &MotorcycleShape) {
     ];
     mesh.prism(&torso, 0.0, suit);
     let head = [hip + lean + 0.1, 0.0, height - 0.15];
-    mesh.ball(head, [0.15, 0.13, 0.15], body.paint);
+    mesh.ellipsoid(head, [0.15, 0.13, 0.15], body.paint);
     let visor = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
         .map(|(a, b)| [head[0] + 0.145, a * 0.09, head[2] + b * 0.045]);
     mesh.decal(visor, 0.0, Surface::GLASS);
     for side in [-1.0, 1.0] {
-        // Thigh and shin, then the arm to the handlebar.
+        // Thigh, shin, and the arm that reaches to the handlebar.
         mesh.prism(
             &[[hip, seat + 0.02, 0.08], [0.15, seat - 0.02, 0.07], [0.15, seat - 0.18, 0.07], [hip, seat - 0.14, 0.08]],
             side * 0.22,

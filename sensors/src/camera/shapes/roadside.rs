@@ -1,105 +1,106 @@
-//! What stands along the road: guard rails with their posts, delineator posts, and gantries with signs.
+//! Roadside furniture: guard rails with their posts, delineator posts, and gantries with signs.
 //!
-//! All of it stands at places that the road alone decides (multiples of a spacing along s), so that it flows past as
-//! E drives. Dimensions follow German practice: rails 0.75 m high with posts every 4 m, delineators every 50 m.
+//! The positions depend only on the road (multiples of a spacing along s), so that the furniture passes by as the ego
+//! drives. Dimensions follow German practice: rails are 0.75 m high with posts every 4 m, and delineators stand every
+//! 50 m.
 
 use closecall_traffic::Road;
 
 use crate::camera::hash::{mix_at, unit};
 use crate::camera::mesh::{Mesh, Surface, Vec3};
 
-/// How far beyond the left edge, and beyond the right edge with its hard shoulder, a guard rail stands [m]: where the
-/// LiDAR's model has it too.
-const RAIL_BESIDE_M: [f64; 2] = [0.79, 3.04];
-/// Distance between the posts of a rail [m].
-const POST_EVERY_M: f64 = 4.0;
-/// Distance between delineator posts [m].
-const DELINEATOR_EVERY_M: f64 = 50.0;
-/// Mean distance between gantries [m].
-const GANTRY_EVERY_M: f64 = 400.0;
-/// Rails are drawn to this distance behind the lens [m].
-const RAIL_TO_M: f64 = 240.0;
-/// Posts of rails are drawn to this distance [m]: beyond, they are thinner than a pixel.
-const POSTS_TO_M: f64 = 90.0;
-/// Keys the choices of places.
-const PLACES: u64 = 0x706c_6163_6573;
+/// Lateral distance of the guard rails beyond the left edge of the lanes, and beyond their right edge with the hard
+/// shoulder in between (m). The LiDAR model places the rails at the same positions.
+const RAIL_OFFSET_M: [f64; 2] = [0.79, 3.04];
+/// Distance between the posts of a rail (m).
+const POST_SPACING_M: f64 = 4.0;
+/// Distance between delineator posts (m).
+const DELINEATOR_SPACING_M: f64 = 50.0;
+/// Mean distance between gantries (m).
+const GANTRY_SPACING_M: f64 = 400.0;
+/// Distance behind the lens up to which roadside furniture is rendered (m).
+const MAX_DISTANCE_M: f64 = 240.0;
+/// Distance up to which the posts of rails are rendered (m). Beyond it they are thinner than a pixel.
+const MAX_POST_DISTANCE_M: f64 = 90.0;
+/// Key of the random positions and sizes of gantries and their signs.
+const PLACEMENT_KEY: u64 = 0x706c_6163_6573;
 
-/// One body of the roadside, placed in the road frame.
+/// One body of the roadside furniture, with its position in the road frame.
 pub(crate) struct Roadside {
-    /// Its place along the road [m].
+    /// Position along the road (m).
     pub(crate) s_m: f64,
-    /// Its lateral place [m].
+    /// Lateral position (m).
     pub(crate) d_m: f64,
-    /// Half its length along the road, half its width, its height [m].
+    /// Half length along the road, half width, and height (m).
     pub(crate) extent_m: Vec3,
     kind: Kind,
 }
 
-/// What stands there.
+/// The kind of a roadside body.
 enum Kind {
     Beam,
     Post,
     Delineator,
-    Gantry { place: i32 },
+    Gantry { index: i32 },
 }
 
 impl Roadside {
-    /// Its body: x along the road, y left, z up. Built only for what comes into view.
+    /// Builds the mesh: x along the road, y left, z up. It is built only for bodies that are in view.
     pub(crate) fn mesh(&self) -> Mesh {
         match self.kind {
             Kind::Beam => beam(self.extent_m[0]),
             Kind::Post => post(),
             Kind::Delineator => delineator(),
-            Kind::Gantry { place } => gantry(self.extent_m[1] - 0.2, place),
+            Kind::Gantry { index } => gantry(self.extent_m[1] - 0.2, index),
         }
     }
 }
 
-/// Everything that stands between `RAIL_TO_M` behind `s_m` and `s_m`.
+/// Returns all roadside bodies from [`MAX_DISTANCE_M`] behind `s_m` up to `s_m`.
 pub(crate) fn roadside(road: &Road, s_m: f64) -> Vec<Roadside> {
     let mut bodies = Vec::new();
-    let sides = [RAIL_BESIDE_M[0], road.right_edge_m() - RAIL_BESIDE_M[1]];
+    let sides = [RAIL_OFFSET_M[0], road.right_edge_m() - RAIL_OFFSET_M[1]];
     if road.has_guard_rails() {
         for d_m in sides {
             rail(&mut bodies, s_m, d_m);
         }
     } else {
-        for place in places(s_m, DELINEATOR_EVERY_M, RAIL_TO_M) {
+        for index in spacing_indices(s_m, DELINEATOR_SPACING_M, MAX_DISTANCE_M) {
             for d_m in [1.5, road.right_edge_m() - 3.0] {
-                let s_m = f64::from(place) * DELINEATOR_EVERY_M;
+                let s_m = f64::from(index) * DELINEATOR_SPACING_M;
                 bodies.push(Roadside { s_m, d_m, extent_m: [0.06, 0.06, 1.02], kind: Kind::Delineator });
             }
         }
     }
-    for place in places(s_m, GANTRY_EVERY_M, RAIL_TO_M) {
-        let shift = f64::from(unit(mix_at(PLACES, place, 0))) * 0.6 * GANTRY_EVERY_M;
-        let s_m = f64::from(place) * GANTRY_EVERY_M + shift;
+    for index in spacing_indices(s_m, GANTRY_SPACING_M, MAX_DISTANCE_M) {
+        let shift = f64::from(unit(mix_at(PLACEMENT_KEY, index, 0))) * 0.6 * GANTRY_SPACING_M;
+        let s_m = f64::from(index) * GANTRY_SPACING_M + shift;
         let half_m = (-road.right_edge_m() / 2.0 + 3.5) as f32;
         let d_m = road.right_edge_m() / 2.0;
-        bodies.push(Roadside { s_m, d_m, extent_m: [0.4, half_m + 0.2, 7.2], kind: Kind::Gantry { place } });
+        bodies.push(Roadside { s_m, d_m, extent_m: [0.4, half_m + 0.2, 7.2], kind: Kind::Gantry { index } });
     }
     bodies
 }
 
-/// The multiples of a spacing between `to_m` behind `s_m` and `s_m`.
+/// Returns the indices of the multiples of `spacing_m` from `distance_m` behind `s_m` up to `s_m`.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "a float cast saturates: nothing stands two million kilometres away"
 )]
-fn places(s_m: f64, every_m: f64, to_m: f64) -> std::ops::RangeInclusive<i32> {
-    ((s_m - to_m) / every_m).ceil() as i32..=(s_m / every_m).floor() as i32
+fn spacing_indices(s_m: f64, spacing_m: f64, distance_m: f64) -> std::ops::RangeInclusive<i32> {
+    ((s_m - distance_m) / spacing_m).ceil() as i32..=(s_m / spacing_m).floor() as i32
 }
 
 fn rail(bodies: &mut Vec<Roadside>, s_m: f64, d_m: f64) {
-    // Beams in pieces that grow with the distance, so that they follow a bend.
-    const PIECES_M: [f64; 10] = [0.0, 8.0, 16.0, 28.0, 44.0, 64.0, 92.0, 128.0, 180.0, RAIL_TO_M];
+    // The beam consists of straight pieces, so that it follows a bend. Their length grows with the distance.
+    const PIECES_M: [f64; 10] = [0.0, 8.0, 16.0, 28.0, 44.0, 64.0, 92.0, 128.0, 180.0, MAX_DISTANCE_M];
     for piece in PIECES_M.windows(2) {
         let half_m = ((piece[1] - piece[0]) / 2.0) as f32;
         let s_m = s_m - (piece[0] + piece[1]) / 2.0;
         bodies.push(Roadside { s_m, d_m, extent_m: [half_m, 0.03, 0.75], kind: Kind::Beam });
     }
-    for place in places(s_m, POST_EVERY_M, POSTS_TO_M) {
-        let s_m = f64::from(place) * POST_EVERY_M;
+    for index in spacing_indices(s_m, POST_SPACING_M, MAX_POST_DISTANCE_M) {
+        let s_m = f64::from(index) * POST_SPACING_M;
         bodies.push(Roadside { s_m, d_m, extent_m: [0.05, 0.06, 0.66], kind: Kind::Post });
     }
 }
@@ -127,8 +128,8 @@ fn delineator() -> Mesh {
     mesh
 }
 
-/// A sign bridge as wide as the road; its signs are seen from behind when one looks back.
-fn gantry(half_m: f32, place: i32) -> Mesh {
+/// Builds a sign gantry as wide as the road. The rear camera sees the backs of its signs.
+fn gantry(half_m: f32, index: i32) -> Mesh {
     const CLEAR_M: f32 = 5.2;
     const BACK: Surface = Surface::plain([0.30, 0.31, 0.32], 0.2);
     let mut mesh = Mesh::default();
@@ -138,7 +139,7 @@ fn gantry(half_m: f32, place: i32) -> Mesh {
     let beam: Vec3 = [0.15, half_m, 0.35];
     mesh.block([0.0, 0.0, CLEAR_M + 0.6], beam, Surface::METAL);
     for sign in 0..3 {
-        let bits = mix_at(PLACES, place, 1 + sign);
+        let bits = mix_at(PLACEMENT_KEY, index, 1 + sign);
         let y = half_m * (unit(bits) - 0.5) * 1.4;
         mesh.block([0.3, y, CLEAR_M + 0.9], [0.05, 1.0 + unit(bits << 20), 0.8], BACK);
     }
@@ -150,7 +151,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nothing_reaches_beyond_its_extents() {
+    fn no_body_exceeds_its_extents() {
         let road = Road::straight(3);
         let mut bodies = roadside(&road, 3_000.0);
         rail(&mut bodies, 3_000.0, 1.0);

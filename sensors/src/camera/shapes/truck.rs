@@ -1,36 +1,36 @@
-//! Trucks: a cab, and behind it what it carries or pulls.
+//! Trucks: a cab, and the load or trailer behind it.
 
 use super::Body;
 use crate::camera::mesh::{Emission, Mesh, Surface, Texture};
 
-/// What stands behind the cab.
+/// The part of the truck behind the cab.
 enum Load {
-    /// A box or a tarpaulin of this colour.
+    /// A box or a tarpaulin of this colour (linear red, green, blue).
     Panels([f32; 3]),
     /// A round tank.
     Tank,
     /// An open platform with a low load.
     Platform,
-    /// Nothing apart: the body is one, as a coach's is.
+    /// The passenger compartment of a coach, which forms one body with the cab.
     Coach,
 }
 
 /// Proportions of one body shape.
 pub(super) struct TruckShape {
-    /// Usual length, width, height [m].
+    /// Usual length, width and height (m).
     pub(super) usual_m: [f64; 3],
-    /// Height of the cab's roof [share of the height].
+    /// Height of the cab's roof (share of the height).
     cab_height: f32,
-    /// Length of a bonnet ahead of the windscreen [m]; 0 for a cab over the engine.
+    /// Length of the bonnet ahead of the windscreen (m), or 0 for a cab over the engine.
     bonnet_m: f32,
-    /// Lower and upper edge of the windscreen [share of the cab's height].
+    /// Height of the windscreen's lower and upper edge (shares of the cab's height).
     windscreen: [f32; 2],
-    /// Half width and half height of the grille [share of width, of height].
+    /// Half width and half height of the grille (shares of width and height).
     grille: [f32; 2],
     load: Load,
 }
 
-/// The body shapes, in order: tractor with tarpaulin trailer, tractor with box trailer, tanker, bonneted tractor with
+/// The body shapes in order: tractor with tarpaulin trailer, tractor with box trailer, tanker, bonneted tractor with
 /// box trailer, platform truck, coach, rigid box truck.
 pub(super) const SHAPES: [TruckShape; 7] = [
     TruckShape {
@@ -91,10 +91,10 @@ pub(super) const SHAPES: [TruckShape; 7] = [
     },
 ];
 
-/// Length of a cab over the engine [m].
+/// Length of a cab over the engine (m).
 const CAB_M: f32 = 2.2;
 
-/// The body in its own frame.
+/// Builds the body in its own frame.
 pub(super) fn mesh(body: &Body) -> Mesh {
     let shape = &SHAPES[usize::from(body.shape) % SHAPES.len()];
     let mut mesh = Mesh::default();
@@ -111,7 +111,7 @@ pub(super) fn mesh(body: &Body) -> Mesh {
     mesh
 }
 
-/// Place of the windscreen along the truck, height of the cab's roof [m].
+/// Returns the longitudinal position of the windscreen and the height of the cab's roof (m).
 fn cab_front(body: &Body, shape: &TruckShape) -> (f32, f32) {
     let [length, _, height] = body.extents();
     (length / 2.0 - shape.bonnet_m, shape.cab_height * height)
@@ -144,7 +144,7 @@ fn cab(mesh: &mut Mesh, body: &Body, shape: &TruckShape) {
             corners.swap(2, 3);
         }
         mesh.decal(corners, 0.05, Surface::GLASS);
-        // Mirrors hang out on both sides.
+        // Mirrors protrude on both sides.
         mesh.block([screen - 0.1, side * (0.5 * width + 0.1), top - 0.35], [0.06, 0.09, 0.32], Surface::PLASTIC);
     }
     if shape.bonnet_m > 0.0 {
@@ -172,7 +172,7 @@ fn front(mesh: &mut Mesh, body: &Body, shape: &TruckShape) {
         mesh.front_decal(front, [side * 0.40 * width, 0.62], [0.19, 0.10], Surface::HEADLAMP);
         let indicator = Surface::MARKER.with_emission(Emission::Indicator(side > 0.0));
         mesh.front_decal(front, [side * 0.46 * width, 0.78], [0.06, 0.04], indicator);
-        // Contour lamps high up tell a truck at night.
+        // High marker lamps make a truck recognisable at night.
         mesh.front_decal(
             front - shape.bonnet_m - 0.42,
             [side * 0.42 * width, roof - 0.06],
@@ -208,7 +208,7 @@ fn load(mesh: &mut Mesh, body: &Body, load: &Load) {
         }
         Load::Tank => {
             let (centre, radius) = (1.1 + (height - 1.1) / 2.0, (height - 1.1) / 2.0);
-            mesh.ball([middle, 0.0, centre], [half, width / 2.0, radius], Surface::METAL);
+            mesh.ellipsoid([middle, 0.0, centre], [half, width / 2.0, radius], Surface::METAL);
         }
         Load::Platform => {
             mesh.block([middle, 0.0, 1.15], [half, width / 2.0, 0.12], Surface::PLASTIC);
