@@ -1,39 +1,39 @@
-//! A measured value, or the reason why there is none.
+//! A measured value, or the reason for its absence.
 
 use serde::{Deserialize, Serialize};
 
-/// Why a metric or a margin has no value.
+/// The reason why a metric or a margin has no value.
 ///
-/// This is not an error: it says that the question does not apply to this situation. A computation that failed is an
+/// This is not an error: it says that the quantity is not defined in this situation. A computation that fails is an
 /// error, so that it can never look safe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, thiserror::Error)]
 #[serde(rename_all = "kebab-case")]
 pub enum Absent {
-    /// There is no vehicle ahead in the lane.
+    /// No vehicle is ahead in the lane.
     #[error("no vehicle ahead")]
     NoLead,
-    /// There is no vehicle behind in the lane.
+    /// No vehicle is behind in the lane.
     #[error("no vehicle behind")]
     NoFollower,
-    /// The nearest vehicle ahead is on its way out of the lane, or into it.
+    /// The nearest vehicle ahead is leaving the lane or entering it.
     #[error("the vehicle ahead is between two lanes")]
     BetweenLanes,
-    /// No other vehicle was present at all.
+    /// No other vehicle was present.
     #[error("no other vehicle")]
     NoOpponent,
-    /// The vehicle stands, so that a time headway is not defined.
+    /// The vehicle stands still, so that its time headway is not defined.
     #[error("the vehicle stands")]
     Standstill,
     /// The two vehicles do not approach each other.
     #[error("the vehicles do not approach each other")]
     NotApproaching,
-    /// On their present courses the two vehicles never touch.
+    /// The two vehicles never touch if they keep their velocities.
     #[error("on their present courses the vehicles never touch")]
     NoCollisionCourse,
-    /// The two vehicles touch or overlap already.
+    /// The two vehicles already touch or overlap.
     #[error("the vehicles touch already")]
     Touching,
-    /// The encounter lies further ahead than the metric looks.
+    /// The encounter lies beyond the time horizon of the metric.
     #[error("the encounter lies beyond the horizon")]
     BeyondHorizon,
     /// The controller has no margin increase system.
@@ -51,10 +51,10 @@ pub enum Absent {
     /// The vehicle behind never crossed the lane marking.
     #[error("the marking was never crossed")]
     NeverCrossed,
-    /// The recording does not carry what the value needs.
+    /// The data do not contain what the value needs.
     #[error("not recorded")]
     NotRecorded,
 }
 
-/// A value, or the reason why there is none.
+/// A value, or the reason for its absence.
 pub type Measured = Result<f64, Absent>;

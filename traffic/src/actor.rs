@@ -1,4 +1,4 @@
-//! Names of the actors in a scenario.
+//! Identifiers of the actors in a scenario.
 
 use std::fmt;
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 #[schemars(with = "String")]
 pub struct ActorId(Arc<str>);
 
-/// A name that cannot be an actor's.
+/// The error for a text that is not a valid actor name.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`{name}` is not an actor's name: lower-case letters, digits and hyphens, starting with a letter")]
 pub struct InvalidActorId {
@@ -20,21 +20,22 @@ pub struct InvalidActorId {
 }
 
 impl ActorId {
-    /// The actor of this name.
+    /// Creates an identifier from a name.
     ///
     /// # Errors
-    /// [`InvalidActorId`] where `name` is empty or has other characters than `a-z`, `0-9` and `-`.
+    /// [`InvalidActorId`] if `name` is empty, does not start with a letter, or contains characters other than `a-z`,
+    /// `0-9` and `-`.
     pub fn new(name: &str) -> Result<Self, InvalidActorId> {
         if is_kebab_name(name) { Ok(Self(name.into())) } else { Err(InvalidActorId { name: name.to_owned() }) }
     }
 
-    /// The name.
+    /// Returns the name.
     pub fn as_str(&self) -> &str {
         &self.0
     }
 }
 
-/// True for lower-case letters, digits and hyphens, starting with a letter.
+/// Returns true if `name` consists of lower-case letters, digits and hyphens, and starts with a letter.
 pub(crate) fn is_kebab_name(name: &str) -> bool {
     name.starts_with(|c: char| c.is_ascii_lowercase())
         && name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-')

@@ -1,39 +1,39 @@
-//! From configuration text to values that cannot be invalid.
+//! Checking of configuration text into values that cannot be invalid.
 
 use std::fmt;
 
 use crate::{Absent, ParameterName, Parameters};
 
-/// A configuration as written, which can be checked into something that cannot be invalid.
+/// A configuration as written in a file, which can be checked into a value that cannot be invalid.
 pub trait Check {
-    /// The checked thing.
+    /// The type of the checked value.
     type Checked;
 
-    /// Resolves parameters and checks every range.
+    /// Resolves parameters and checks every value against its range.
     ///
     /// # Errors
-    /// The first key that is wrong, with its path below this configuration, its value, and what is allowed.
+    /// [`ConfigError`] for the first wrong key, with its path below this configuration, its value, and what is allowed.
     fn check(&self, parameters: &Parameters) -> Result<Self::Checked, ConfigError>;
 }
 
-/// One step from a table to what lies in it.
+/// One step of a path from a table or array to one of its elements.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Segment {
     /// A key of a table.
     Key(String),
-    /// A place in an array, counted from 0.
+    /// An index of an array, counted from 0.
     Index(usize),
 }
 
-/// The way from the root of a file to a value, such as `actor[2].driver.overtaker.reaction-s`.
+/// The path from the root of a file to a value, such as `actor[2].driver.overtaker.reaction-s`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct KeyPath(pub Vec<Segment>);
 
 impl fmt::Display for KeyPath {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (place, segment) in self.0.iter().enumerate() {
+        for (depth, segment) in self.0.iter().enumerate() {
             match segment {
-                Segment::Key(key) if place == 0 => write!(f, "{key}")?,
+                Segment::Key(key) if depth == 0 => write!(f, "{key}")?,
                 Segment::Key(key) => write!(f, ".{key}")?,
                 Segment::Index(index) => write!(f, "[{index}]")?,
             }
@@ -42,10 +42,10 @@ impl fmt::Display for KeyPath {
     }
 }
 
-/// What is wrong with a value.
+/// The reason why a value is wrong.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Problem {
-    /// A number outside of what is allowed.
+    /// A number is outside its range.
     #[error("is {value}, but {allowed} is needed")]
     OutOfRange {
         /// The number found.
@@ -53,7 +53,7 @@ pub enum Problem {
         /// What is allowed.
         allowed: Range,
     },
-    /// A count outside of what is allowed.
+    /// A count is outside its range.
     #[error("is {value}, but {allowed} is needed")]
     WrongCount {
         /// The count found.
@@ -61,7 +61,7 @@ pub enum Problem {
         /// What is allowed.
         allowed: &'static str,
     },
-    /// `$name` where no such parameter exists.
+    /// `$name` refers to a parameter that does not exist.
     #[error("names the parameter `${name}`, which [parameters] does not have; it has {known}")]
     UnknownParameter {
         /// The name found.
@@ -69,7 +69,7 @@ pub enum Problem {
         /// The names that exist.
         known: String,
     },
-    /// A parameter of the other kind.
+    /// A parameter gives a label where a number is needed, or a number where a label is needed.
     #[error("names the parameter `${name}`, which gives {found}, where {needed} is needed")]
     WrongKind {
         /// The name found.
@@ -79,15 +79,15 @@ pub enum Problem {
         /// What the key needs.
         needed: &'static str,
     },
-    /// A word outside of a fixed list.
+    /// A label is not in the list of allowed ones.
     #[error("is `{value}`, but one of {allowed} is needed")]
     UnknownWord {
-        /// The word found.
+        /// The label found.
         value: String,
-        /// The words that exist.
+        /// The labels that are allowed.
         allowed: String,
     },
-    /// A reference to an actor that does not exist.
+    /// A name refers to an actor that does not exist.
     #[error("names the actor `{value}`, but the actors are {known}")]
     UnknownActor {
         /// The name found.
@@ -95,55 +95,55 @@ pub enum Problem {
         /// The names that exist.
         known: String,
     },
-    /// The same name twice.
+    /// A name occurs twice.
     #[error("is `{value}`, which stands there twice")]
     Duplicate {
         /// The name found.
         value: String,
     },
-    /// Something that is needed is not there.
+    /// A needed value is missing.
     #[error("is missing: {needed}")]
     Missing {
         /// What is needed.
         needed: &'static str,
     },
-    /// Two values that cannot both hold.
+    /// Two values contradict each other.
     #[error("contradicts `{other}`: {rule}")]
     Contradiction {
         /// The other key.
         other: &'static str,
-        /// What must hold between the two.
+        /// The rule that must hold between the two values.
         rule: String,
     },
-    /// A value that the situation does not define.
+    /// A value that is derived from others does not exist.
     #[error("cannot be worked out: {0}")]
     Undefined(Absent),
 }
 
-/// A key with a wrong value.
+/// The error for a key with a wrong value.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("`{path}` {problem}")]
 pub struct ConfigError {
-    /// Where.
+    /// The path to the key.
     pub path: KeyPath,
-    /// What.
+    /// What is wrong with its value.
     pub problem: Problem,
 }
 
 impl ConfigError {
-    /// An error at `key`.
+    /// Creates an error at `key`.
     pub fn new(key: &str, problem: Problem) -> Self {
         Self { path: KeyPath(vec![Segment::Key(key.to_owned())]), problem }
     }
 
-    /// The same error seen from the table that holds `key`.
+    /// Returns the same error with `key` prepended to its path.
     #[must_use]
     pub fn within(mut self, key: &str) -> Self {
         self.path.0.insert(0, Segment::Key(key.to_owned()));
         self
     }
 
-    /// The same error seen from the array that holds element `index`, counted from 0.
+    /// Returns the same error with the array index `index`, counted from 0, prepended to its path.
     #[must_use]
     pub fn within_index(mut self, index: usize) -> Self {
         self.path.0.insert(0, Segment::Index(index));
@@ -151,7 +151,7 @@ impl ConfigError {
     }
 }
 
-/// The numbers that a key allows. NaN is in no range.
+/// The range of numbers that a key allows. It never contains NaN.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
     low: f64,
@@ -160,25 +160,25 @@ pub struct Range {
 }
 
 impl Range {
-    /// `low` to `high`, both allowed.
+    /// Creates the range from `low` to `high`, including both.
     pub const fn closed(low: f64, high: f64) -> Self {
         Self { low, high, low_is_allowed: true }
     }
 
-    /// Above `low`, up to and including `high`.
+    /// Creates the range from `low`, excluded, to `high`, included.
     pub const fn above(low: f64, high: f64) -> Self {
         Self { low, high, low_is_allowed: false }
     }
 
-    /// A share: 0 to 1.
+    /// The range of shares and probabilities: 0 to 1.
     pub const UNIT: Self = Self::closed(0.0, 1.0);
 
-    /// True where `value` lies in the range; never for NaN.
+    /// Returns true if `value` lies in the range; false for NaN.
     pub fn contains(self, value: f64) -> bool {
         (value > self.low || (self.low_is_allowed && value >= self.low)) && value <= self.high
     }
 
-    /// `value`, where it lies in the range.
+    /// Returns `value` if it lies in the range.
     ///
     /// # Errors
     /// [`Problem::OutOfRange`] at `key` otherwise.

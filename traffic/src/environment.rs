@@ -1,11 +1,11 @@
-//! Light, weather and road surface.
+//! Light, weather and road surface condition.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{Check, Choice, ConfigError, Num, Parameters, Range};
 
-/// The light in which the cameras see.
+/// The ambient light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Light {
@@ -23,13 +23,13 @@ pub enum Light {
 pub struct EnvironmentConfig {
     /// Day, dusk or night.
     pub light: Choice<Light>,
-    /// Meteorological visibility [m].
+    /// Meteorological visibility (m).
     pub visibility_m: Num,
-    /// Rain rate [mm/h].
+    /// Rain rate (mm/h).
     pub rain_mm_per_h: Num,
-    /// Height of the water on the road, which feeds the spray [mm].
+    /// Depth of the water film on the road (mm); it determines the amount of spray.
     pub water_film_mm: Num,
-    /// Friction coefficient between tyre and road [1].
+    /// Friction coefficient between tyre and road.
     pub friction: Num,
 }
 
@@ -51,13 +51,13 @@ impl Default for EnvironmentConfig {
 pub struct Environment {
     /// Day, dusk or night.
     pub light: Light,
-    /// Meteorological visibility [m], 20 or more.
+    /// Meteorological visibility (m), 20 or more.
     pub visibility_m: f64,
-    /// Rain rate [mm/h], 0 or more.
+    /// Rain rate (mm/h), 0 or more.
     pub rain_mm_per_h: f64,
-    /// Height of the water on the road [mm], 0 or more.
+    /// Depth of the water film on the road (mm), 0 or more.
     pub water_film_mm: f64,
-    /// Friction coefficient between tyre and road [1], above 0.
+    /// Friction coefficient between tyre and road, above 0.
     pub friction: f64,
 }
 

@@ -1,12 +1,13 @@
-//! The shared nouns of Closecall, and the criticality metrics.
+//! The data types that the crates of Closecall share, and the criticality metrics.
 //!
-//! Everything that crosses a boundary between the crates is defined here once: time, ids, the road, vehicles and
-//! their states, recorded trajectories, the tracks a sensor reports, parameters of a scenario, and seeded random
-//! streams. This crate imports none of its users.
+//! This crate defines every type that crosses a boundary between crates: time, identifiers, the road, vehicles and
+//! their states, recorded trajectories, the tracks that a sensor reports, the parameters of a scenario, and seeded
+//! random streams. It depends on none of the other crates.
 //!
 //! # Conventions
 //!
-//! SI units, named in every public field (`speed_mps`, `gap_m`). Three frames are used:
+//! All quantities are in SI units. The name of every public field carries its unit (`speed_mps`, `gap_m`). Three frames
+//! are used:
 //!
 //! ```text
 //!  road frame       s along the road, d to the left; d = 0 is the left edge of the leftmost lane,
@@ -15,8 +16,41 @@
 //!  plane            x, y of a flat Cartesian plane, in which the road frame's s = 0 points along +x
 //! ```
 //!
-//! Gaps are bumper to bumper. A metric or margin that does not exist is an [`Absent`] with its reason, never a
+//! Gaps are measured bumper to bumper. A metric or margin that does not exist is an [`Absent`] with its reason, never a
 //! sentinel number.
+//!
+//! # Glossary
+//! The paper is the one that Closecall's margin increase system follows. ISO 15622 is the standard for adaptive cruise
+//! control (ACC). UN R157 is the UN Regulation on automated lane keeping systems (ALKS). "-" means that the source has
+//! no such term, or that none is claimed here. The paper's letters appear in formulas and in references to its figures
+//! only.
+//!
+//! | paper | name here | ISO 15622 / UN R157 | meaning |
+//! |---|---|---|---|
+//! | E | ego (vehicle), `ego` | subject vehicle / ALKS vehicle | The vehicle that carries the system under test. |
+//! | F | lead vehicle, `lead`; in file keys `front` | forward vehicle / lead vehicle | The vehicle ahead of the ego in its lane. |
+//! | R | rear vehicle, `rear` | - | A vehicle that approaches the ego from behind and overtakes it. |
+//! | Opp₁ (MIS section) | rear vehicle, `rear` | - | Another name for R. |
+//! | Opp₁ (sampling section) | overtaken vehicle | - | The vehicle that is overtaken. |
+//! | Opp₂ (sampling section) | overtaking vehicle | - | The vehicle that overtakes. |
+//! | g_F; d_R, g_R | front gap, rear gap, `gap_m` | clearance / following distance | Bumper-to-bumper distance along the lane: ego to lead vehicle, rear vehicle to ego. |
+//! | d | distance, `distance_m` | - | Shortest Euclidean distance between the boxes of two vehicles. |
+//! | THW | time headway, `thw_s`, [`metrics::time_headway_s`] | time gap / time gap | Gap divided by the follower's speed. Traffic engineering measures headway front to front; here it is bumper to bumper. |
+//! | - | time gap, `time_gap_s` | time gap / minimum time gap | The time headway that the ACC keeps: a setting, not a measurement. |
+//! | TTC | time to collision, [`metrics::time_to_collision_s`] | - / TTC | Time until contact if both vehicles keep their speeds. |
+//! | TTCE | time to closest encounter, `ttce_s`, [`metrics::closest_encounter`] | - | Time until two vehicles are closest if both keep their velocities. |
+//! | DCE | distance of closest encounter, `dce_m`, [`metrics::closest_encounter`] | - | Distance between two vehicles at that time; 0 on a collision course. |
+//! | Δv | closing speed, `closing_mps` | - | Speed at which a gap shrinks. |
+//! | t_c(a) | time to critical, [`metrics::arrival_time_s`] | - | Time until the rear vehicle reaches the critical gap while the ego brakes at a. |
+//! | d_c | critical gap, `critical_gap_m` | - | Rear gap at which the critical phase begins. |
+//! | a_lon, a_lat | longitudinal, lateral acceleration | - | Acceleration along and across the road. |
+//! | MIS | margin increase system, `mis` | - | The system under test: it raises the ego's front time headway before a rear vehicle overtakes. |
+//! | - | ACC, `acc` | adaptive cruise control / - | Keeps a set speed, or a time gap to the lead vehicle. |
+//! | - | AEB, `aeb` | - | Automatic emergency braking. |
+//! | - | cut-in | - / cut-in | A lane change of another vehicle into the lane of the ego, ahead of it. |
+//! | - | cut-out | - / cut-out | A lane change out of the lane of the ego. UN R157 means the lead vehicle's; here it is mostly the rear vehicle's, to overtake. |
+//! | - | passing lane | - | The lane next to the ego in which a rear vehicle overtakes. |
+//! | - | road frame `s_m`, `d_m` | - | Position along the road, and across it to the left. |
 
 mod absent;
 mod actor;

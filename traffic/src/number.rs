@@ -1,4 +1,4 @@
-//! Values in a configuration: fixed, or the name of a sampled parameter.
+//! Configuration values that are either fixed or given by a sampled parameter.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -10,7 +10,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::actor::is_kebab_name;
 
-/// Marks the name of a parameter where a value could stand.
+/// The character that marks a parameter name in place of a value.
 const PARAMETER_MARK: char = '$';
 
 /// The name of a sampled parameter: lower-case letters, digits and hyphens, starting with a letter.
@@ -19,12 +19,12 @@ const PARAMETER_MARK: char = '$';
 pub struct ParameterName(String);
 
 impl ParameterName {
-    /// The parameter of this name, or nothing where it is not a legal name.
+    /// Creates a parameter name. Returns `None` if `name` is not a valid one.
     pub fn new(name: &str) -> Option<Self> {
         is_kebab_name(name).then(|| Self(name.to_owned()))
     }
 
-    /// The name.
+    /// Returns the name.
     pub fn as_str(&self) -> &str {
         &self.0
     }
@@ -47,10 +47,10 @@ impl<'de> Deserialize<'de> for ParameterName {
     }
 }
 
-/// A number that is fixed, or that a parameter gives.
+/// A number that is either fixed or given by a parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Num {
-    /// The number itself; finite.
+    /// The number; finite.
     Fixed(f64),
     /// The value of a parameter, written `"$name"`.
     Parameter(ParameterName),
@@ -126,10 +126,10 @@ impl JsonSchema for Num {
     }
 }
 
-/// A word that is fixed, or that a parameter gives.
+/// A label that is either fixed or given by a parameter.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Choice<T> {
-    /// The word itself.
+    /// The label.
     Fixed(T),
     /// The label that a parameter gives, written `"$name"`.
     Parameter(ParameterName),

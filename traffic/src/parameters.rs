@@ -1,4 +1,4 @@
-//! The sampled values of one concrete scenario.
+//! The sampled parameter values of one concrete scenario.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -8,13 +8,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Choice, ConfigError, Num, ParameterName, Problem, Range};
 
-/// The value of one parameter.
+/// The value of a parameter.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Value {
-    /// A finite number, in the unit that the parameter's name ends with.
+    /// A finite number, in the unit that the name of the parameter ends with.
     Number(f64),
-    /// One label of a choice.
+    /// One label out of a choice.
     Label(String),
 }
 
@@ -27,31 +27,31 @@ impl fmt::Display for Value {
     }
 }
 
-/// The values of all parameters of one concrete scenario, in the order of their names.
+/// The values of all parameters of one concrete scenario, ordered by name.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Parameters(BTreeMap<ParameterName, Value>);
 
 impl Parameters {
-    /// Sets one parameter.
+    /// Sets the value of a parameter.
     pub fn insert(&mut self, name: ParameterName, value: Value) {
         self.0.insert(name, value);
     }
 
-    /// The value of one parameter.
+    /// Returns the value of a parameter, or `None` if it does not exist.
     pub fn get(&self, name: &ParameterName) -> Option<&Value> {
         self.0.get(name)
     }
 
-    /// All values in the order of their names.
+    /// Returns all values, ordered by name.
     pub fn iter(&self) -> impl Iterator<Item = (&ParameterName, &Value)> {
         self.0.iter()
     }
 
-    /// The number that `num` stands for, which `key` allows where it lies in `range`.
+    /// Returns the number that `num` stands for, checked against `range`.
     ///
     /// # Errors
-    /// Names `key` where the parameter is unknown, gives a label, or the number is out of range.
+    /// [`ConfigError`] at `key` if the parameter does not exist or gives a label, or if the number is out of range.
     pub fn number(&self, num: &Num, key: &str, range: Range) -> Result<f64, ConfigError> {
         let value = match num {
             Num::Fixed(value) => *value,
@@ -67,10 +67,10 @@ impl Parameters {
         range.check(value, key)
     }
 
-    /// The word that `choice` stands for.
+    /// Returns the label that `choice` stands for.
     ///
     /// # Errors
-    /// Names `key` where the parameter is unknown, gives a number, or a label that `T` does not know.
+    /// [`ConfigError`] at `key` if the parameter does not exist or gives a number, or if `T` does not know its label.
     pub fn word<T: DeserializeOwned + Clone>(&self, choice: &Choice<T>, key: &str) -> Result<T, ConfigError> {
         let name = match choice {
             Choice::Fixed(word) => return Ok(word.clone()),
@@ -104,7 +104,7 @@ impl Parameters {
     }
 }
 
-/// The list of words out of serde's message "unknown variant `x`, expected one of `a`, `b`".
+/// Extracts the list of labels from serde's message "unknown variant `x`, expected one of `a`, `b`".
 fn expected_words(error: &value::Error) -> String {
     let text = error.to_string();
     match text.split_once("expected ") {

@@ -1,22 +1,22 @@
-//! The polynomial of fifth degree between two states: the smoothest way from one to the other.
+//! Quintic polynomials: smooth transitions between two states.
 
-/// A quintic between two states, each with value, first and second derivative.
+/// A quintic polynomial between two states, each with value, first and second derivative.
 ///
-/// Between two values at rest it is the minimum-jerk path 10p³ − 15p⁴ + 6p⁵ (Flash and Hogan, *Journal of Neuroscience* 5
-/// (1985) 1688–1703).
+/// If all derivatives at both ends are 0, it is the minimum-jerk path 10p³ − 15p⁴ + 6p⁵ (Flash and Hogan, *Journal of
+/// Neuroscience* 5 (1985) 1688–1703).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quintic {
     length: f64,
-    /// By powers of the share of the way [1].
+    /// Coefficients by powers of the share of the length.
     coefficients: [f64; 6],
 }
 
 impl Quintic {
-    /// The quintic that leads from the state `from` to the state `to` over `length` (above 0).
+    /// Creates the quintic that leads from the state `from` to the state `to` over `length` (above 0).
     pub fn between(from: [f64; 3], to: [f64; 3], length: f64) -> Self {
         let [start, start_first, start_second] = [from[0], from[1] * length, from[2] * length * length];
         let [end, end_first, end_second] = [to[0], to[1] * length, to[2] * length * length];
-        // What the first three terms leave to be made up at the end.
+        // The part of the change that remains after the first three terms.
         let rest = end - start - start_first - 0.5 * start_second;
         let rest_first = end_first - start_first - start_second;
         let rest_second = end_second - start_second;
@@ -33,12 +33,12 @@ impl Quintic {
         }
     }
 
-    /// From start to end, in the unit of the argument.
+    /// Returns the length of the interval, in the unit of the argument.
     pub fn length(&self) -> f64 {
         self.length
     }
 
-    /// Value, first and second derivative at `x`, which lies between 0 and the length.
+    /// Returns the value, the first and the second derivative at `x`, which lies between 0 and the length.
     pub fn at(&self, x: f64) -> [f64; 3] {
         let p = x / self.length;
         let [c0, c1, c2, c3, c4, c5] = self.coefficients;
@@ -56,7 +56,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn between_two_values_at_rest_it_is_the_minimum_jerk_path() {
+    fn with_zero_derivatives_it_is_the_minimum_jerk_path() {
         let path = Quintic::between([-5.625, 0.0, 0.0], [-1.875, 0.0, 0.0], 150.0);
         let [middle, slope, bend] = path.at(75.0);
         assert!((middle + 3.75).abs() < 1e-12);
@@ -67,14 +67,14 @@ mod tests {
 
     proptest! {
         #[test]
-        fn both_ends_are_met(
+        fn both_end_states_are_reached(
             from in (-12.0..0.0, -0.1..0.1, -0.01..0.01), to in (-12.0..0.0, -0.1..0.1, -0.01..0.01), length in 0.25..300.0,
         ) {
             let (from, to): ([f64; 3], [f64; 3]) = (from.into(), to.into());
             let path = Quintic::between(from, to, length);
             for (wanted, at) in [(from, path.at(0.0)), (to, path.at(length))] {
                 for order in 0..3 {
-                    // Derivatives are divided by the length, and so are their rounding errors.
+                    // The derivatives are divided by the length, and so are their rounding errors.
                     let tolerance = 1e-11 * (1.0 + length.powi(-2));
                     prop_assert!((wanted[order] - at[order]).abs() < tolerance, "{wanted:?} {at:?}");
                 }

@@ -8,7 +8,7 @@
 //!              ─────────────────────────────  right edge at d = −n·w
 //! ```
 //!
-//! The reference line is d = 0: a circle of constant curvature, positive where the road bends to the left.
+//! The reference line is d = 0: an arc of constant curvature, positive if the road bends to the left.
 
 use std::fmt;
 
@@ -17,17 +17,17 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Check, ConfigError, Num, Parameters, Problem, Range};
 
-/// The left or the right side.
+/// A lateral side: left or right.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Side {
-    /// Left, towards positive d.
+    /// The left side, towards positive d.
     Left,
-    /// Right, towards negative d.
+    /// The right side, towards negative d.
     Right,
 }
 
-/// A lane, counted from 1 at the left.
+/// The number of a lane, counted from 1 at the left.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(transparent)]
 pub struct Lane(pub u8);
@@ -41,11 +41,11 @@ impl fmt::Display for Lane {
 /// A pose in the Cartesian plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlanePose {
-    /// Position along the road's direction at s = 0 [m].
+    /// Position along the direction of the road at s = 0 (m).
     pub x_m: f64,
-    /// Position to the left of that [m].
+    /// Position to the left of that direction (m).
     pub y_m: f64,
-    /// Heading, counter-clockwise from +x [rad].
+    /// Heading, counter-clockwise from +x (rad).
     pub yaw_rad: f64,
 }
 
@@ -55,19 +55,19 @@ pub struct PlanePose {
 pub struct RoadConfig {
     /// Number of lanes in the direction of travel, 1 to 8.
     pub lanes: u8,
-    /// Width of each lane [m].
+    /// Width of each lane (m).
     #[serde(default = "default_lane_width")]
     pub lane_width_m: Num,
-    /// Curvature of the left edge, positive to the left [1/m].
+    /// Curvature of the left edge (1/m), positive if the road bends to the left.
     #[serde(default = "default_curvature")]
     pub curvature_per_m: Num,
-    /// Speed limit [m/s].
+    /// Speed limit (m/s).
     #[serde(default = "default_speed_limit")]
     pub speed_limit_mps: Num,
-    /// The side on which one overtakes.
+    /// The side on which vehicles overtake.
     #[serde(default = "default_overtaking_side")]
     pub overtaking_side: Side,
-    /// Guard rails with posts along both edges.
+    /// Whether guard rails with posts stand along both edges.
     #[serde(default)]
     pub guard_rails: bool,
 }
@@ -109,7 +109,7 @@ impl Check for RoadConfig {
         Ok(Road {
             lanes: self.lanes,
             lane_width_m: number(&self.lane_width_m, "lane-width-m", Range::closed(2.5, 5.0))?,
-            // 400 m is the tightest radius at which the small-angle lane geometry used here still holds.
+            // 400 m is the smallest radius at which the small-angle lane geometry used here still holds.
             curvature_per_m: number(&self.curvature_per_m, "curvature-per-m", Range::closed(-0.0025, 0.0025))?,
             speed_limit_mps: number(&self.speed_limit_mps, "speed-limit-mps", Range::above(0.0, 100.0))?,
             overtaking_side: self.overtaking_side,
@@ -119,7 +119,8 @@ impl Check for RoadConfig {
 }
 
 impl Road {
-    /// A straight road of `lanes` lanes (1 to 8), 3.75 m wide, limit 36.1 m/s, overtaking on the left.
+    /// Creates a straight road of `lanes` lanes (clamped to 1 to 8), each 3.75 m wide, with a speed limit of 36.1 m/s,
+    /// overtaking on the left and no guard rails.
     pub fn straight(lanes: u8) -> Self {
         Self {
             lanes: lanes.clamp(1, 8),
@@ -131,14 +132,15 @@ impl Road {
         }
     }
 
-    /// The same road with another curvature [1/m], kept within ±0.0025.
+    /// Returns the same road with another curvature (1/m), clamped to ±0.0025.
     #[must_use]
     pub fn with_curvature(self, curvature_per_m: f64) -> Self {
         Self { curvature_per_m: curvature_per_m.clamp(-0.0025, 0.0025), ..self }
     }
 
-    /// The mirror image of a straight road: one overtakes on the other side, and lane 1 is what was the last. Nothing on
-    /// a bend: positions along it are counted on its left edge, which the mirror image has on its right.
+    /// Returns the mirror image of a straight road: vehicles overtake on the other side, and lane 1 corresponds to the
+    /// former last lane. Returns `None` for a curved road, because positions are measured along its left edge, which is
+    /// the right edge of the mirror image.
     pub fn mirrored(self) -> Option<Self> {
         let overtaking_side = match self.overtaking_side {
             Side::Left => Side::Right,
@@ -147,49 +149,49 @@ impl Road {
         (self.curvature_per_m == 0.0).then_some(Self { overtaking_side, ..self })
     }
 
-    /// Number of lanes.
+    /// Returns the number of lanes.
     pub fn lanes(&self) -> u8 {
         self.lanes
     }
 
-    /// Width of each lane [m].
+    /// Returns the width of each lane (m).
     pub fn lane_width_m(&self) -> f64 {
         self.lane_width_m
     }
 
-    /// Curvature of the left edge, positive to the left [1/m].
+    /// Returns the curvature of the left edge (1/m), positive if the road bends to the left.
     pub fn curvature_per_m(&self) -> f64 {
         self.curvature_per_m
     }
 
-    /// Speed limit [m/s].
+    /// Returns the speed limit (m/s).
     pub fn speed_limit_mps(&self) -> f64 {
         self.speed_limit_mps
     }
 
-    /// The side on which one overtakes.
+    /// Returns the side on which vehicles overtake.
     pub fn overtaking_side(&self) -> Side {
         self.overtaking_side
     }
 
-    /// True where guard rails with posts stand along both edges.
+    /// Returns true if guard rails with posts stand along both edges.
     pub fn has_guard_rails(&self) -> bool {
         self.guard_rails
     }
 
-    /// Lateral position of a lane's centre [m], negative.
+    /// Returns the lateral position of the centre of a lane (m), which is negative.
     pub fn lane_centre_m(&self, lane: Lane) -> f64 {
         -(f64::from(lane.0) - 0.5) * self.lane_width_m
     }
 
-    /// The lane in which the lateral position `d_m` lies; beyond an edge, the lane at that edge.
+    /// Returns the lane in which the lateral position `d_m` lies; beyond an edge, the lane at that edge.
     pub fn lane_at(&self, d_m: f64) -> Lane {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 1..=8 before the cast")]
         let lane = ((-d_m / self.lane_width_m).floor() + 1.0).clamp(1.0, f64::from(self.lanes)) as u8;
         Lane(lane)
     }
 
-    /// The lane beside `lane`, where the road has one.
+    /// Returns the lane next to `lane` on one side, or `None` if the road has none there.
     pub fn beside(&self, lane: Lane, side: Side) -> Option<Lane> {
         match side {
             Side::Left => (lane.0 > 1).then(|| Lane(lane.0 - 1)),
@@ -197,12 +199,12 @@ impl Road {
         }
     }
 
-    /// Lateral position of the road's right edge [m], negative.
+    /// Returns the lateral position of the right edge of the road (m), which is negative.
     pub fn right_edge_m(&self) -> f64 {
         -f64::from(self.lanes) * self.lane_width_m
     }
 
-    /// The pose in the plane of a point at `s_m`, `d_m` with `heading_rad` relative to the road.
+    /// Returns the pose in the plane of a point at `s_m`, `d_m` with `heading_rad` relative to the road.
     pub fn plane_pose(&self, s_m: f64, d_m: f64, heading_rad: f64) -> PlanePose {
         let curvature = self.curvature_per_m;
         if curvature == 0.0 {
@@ -217,7 +219,7 @@ impl Road {
         }
     }
 
-    /// The road coordinates (s, d) [m] of a point in the plane; unique within half a turn of s = 0.
+    /// Returns the road coordinates s and d (m) of a point in the plane; unique within half a turn of s = 0.
     pub fn road_position_m(&self, x_m: f64, y_m: f64) -> (f64, f64) {
         let curvature = self.curvature_per_m;
         if curvature == 0.0 {

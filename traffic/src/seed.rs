@@ -1,22 +1,22 @@
 //! Seeded random streams, one for each purpose.
 //!
-//! A stream is keyed by (campaign seed, sample, actor, channel) and by nothing else. Adding an actor or a sensor
-//! therefore does not shift the numbers that the others draw, and both arms of a paired sample draw the same ones.
+//! A stream is keyed by (campaign seed, sample, actor, channel) and by nothing else. An additional actor or sensor
+//! therefore does not shift the numbers that the others draw, and both arms of a paired sample draw the same numbers.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use crate::ActorId;
 
-/// A deterministic random stream: ChaCha with 8 rounds.
+/// A deterministic stream of random numbers: ChaCha with 8 rounds.
 pub type Stream = ChaCha8Rng;
 
-/// Separates these keys from any other use of the hash, and versions them.
+/// The context string of the key derivation: it separates these keys from any other use of the hash, and versions them.
 const DOMAIN: &str = "closecall 2026 random stream v1";
 
-/// The random stream of one purpose.
+/// Returns the random stream of one purpose.
 ///
-/// Every seed is like any other; 0 does not mean random.
+/// All seeds are equivalent; 0 does not mean a random seed.
 pub fn stream(seed: u64, sample: u64, actor: &ActorId, channel: &str) -> Stream {
     let mut hasher = blake3::Hasher::new_derive_key(DOMAIN);
     hasher.update(&seed.to_le_bytes());
@@ -39,7 +39,7 @@ mod tests {
     }
 
     #[test]
-    fn each_part_of_the_key_counts() {
+    fn each_part_of_the_key_changes_the_stream() {
         let base = first(0, 0, "rear", "reaction");
         assert_eq!(base, first(0, 0, "rear", "reaction"));
         for other in [

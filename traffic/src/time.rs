@@ -1,6 +1,6 @@
 //! Simulated time as an integer number of nanoseconds.
 //!
-//! Sums of integer steps are exact, so that a run of 6,000 steps of 10 ms ends at 60 s, not near it.
+//! Sums of integer steps are exact, so that a run of 6,000 steps of 10 ms ends at exactly 60 s.
 
 use std::fmt;
 use std::ops::{Add, AddAssign, Mul, Rem, Sub};
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 const NS_PER_S: f64 = 1e9;
 
-/// A point in simulated time, or a span of it, in nanoseconds since the start.
+/// A point in simulated time since the start of the run, or a duration, in nanoseconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Time(i64);
@@ -17,36 +17,36 @@ pub struct Time(i64);
 impl Time {
     /// The start of every run.
     pub const ZERO: Self = Self(0);
-    /// The latest time that can be expressed: about 292 years.
+    /// The latest time that the type can represent: about 292 years.
     pub const MAX: Self = Self(i64::MAX);
 
-    /// Time from whole nanoseconds.
+    /// Creates a time from whole nanoseconds.
     pub const fn from_ns(ns: i64) -> Self {
         Self(ns)
     }
 
-    /// Time from whole milliseconds.
+    /// Creates a time from whole milliseconds.
     pub const fn from_ms(ms: i64) -> Self {
         Self(ms * 1_000_000)
     }
 
-    /// Time nearest to `seconds` [s]; saturates at the limits of the type, NaN gives zero.
+    /// Creates the time nearest to `seconds` (s). Saturates at the limits of the type; NaN gives zero.
     pub fn from_s(seconds: f64) -> Self {
         #[expect(clippy::cast_possible_truncation, reason = "a float cast saturates, which is what is documented")]
         Self((seconds * NS_PER_S).round() as i64)
     }
 
-    /// Whole nanoseconds.
+    /// Returns the time in whole nanoseconds.
     pub const fn ns(self) -> i64 {
         self.0
     }
 
-    /// Seconds [s], for formulas and output.
+    /// Returns the time in seconds, for formulas and output.
     pub fn s(self) -> f64 {
         self.0 as f64 / NS_PER_S
     }
 
-    /// True where this time is a whole multiple of `period`.
+    /// Returns true if this time is a whole multiple of `period`.
     pub fn is_multiple_of(self, period: Self) -> bool {
         self.0 % period.0 == 0
     }

@@ -1,4 +1,4 @@
-//! What a sensor reports of another vehicle.
+//! Tracks: the perceived states of other vehicles.
 
 use nalgebra::{Matrix4, Vector4};
 use serde::{Deserialize, Serialize};
@@ -10,51 +10,51 @@ use crate::{Time, VehicleClass};
 #[serde(transparent)]
 pub struct TrackId(pub u32);
 
-/// The sensor, or the set of sensors, that a track comes from.
+/// The sensor, or the group of sensors, that reports a track.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Source {
-    /// The radar that looks ahead.
+    /// The front radar.
     Front,
-    /// The short-range sensors to both sides.
+    /// The short-range sensors on both sides.
     Surround,
-    /// The sensors that look back: LiDAR and camera.
+    /// The rear sensors: LiDAR and camera.
     Rear,
 }
 
-/// How well established a track is.
+/// The maturity of a track.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TrackStatus {
-    /// Seen too seldom to act on.
+    /// Detected too seldom to act on.
     Tentative,
-    /// Established, and measured in the latest scan.
+    /// Confirmed, and detected in the latest scan.
     Confirmed,
-    /// Established, but predicted since it was last measured.
+    /// Confirmed, but not detected in the latest scan; the state is predicted.
     Coasting,
 }
 
-/// Probabilities of [car, truck, motorcycle, background], adding up to 1.
+/// Probabilities of car, truck, motorcycle and background, in this order; they add up to 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClassScores(pub [f64; 4]);
 
 impl ClassScores {
-    /// Nothing known: all equal.
+    /// The scores if nothing is known: all equal.
     pub const UNKNOWN: Self = Self([0.25; 4]);
 
-    /// Full certainty of one class.
+    /// Creates the scores of a class that is known for certain.
     pub fn certain(class: VehicleClass) -> Self {
         let mut scores = [0.0; 4];
         scores[class as usize] = 1.0;
         Self(scores)
     }
 
-    /// Probability that this is a vehicle of any class.
+    /// Returns the probability that the object is a vehicle of any class.
     pub fn vehicle(&self) -> f64 {
         1.0 - self.0[3]
     }
 
-    /// The most probable vehicle class, whatever the background's score.
+    /// Returns the most probable vehicle class, whatever the score of the background.
     pub fn best_vehicle_class(&self) -> VehicleClass {
         let mut best = VehicleClass::Car;
         for class in VehicleClass::ALL {
@@ -66,52 +66,52 @@ impl ClassScores {
     }
 }
 
-/// Another vehicle as E perceives it, in E's vehicle frame at `time`.
+/// The perceived state of another vehicle, in the vehicle frame of the ego at `time`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Track {
-    /// Its number; kept while the track lives.
+    /// The number of the track, constant over its life.
     pub id: TrackId,
-    /// Where it comes from.
+    /// The sensor, or group of sensors, that reports the track.
     pub source: Source,
-    /// How well established it is.
+    /// The maturity of the track.
     pub status: TrackStatus,
-    /// The time that the state holds for.
+    /// The time at which the state holds.
     pub time: Time,
-    /// [x, y, vx, vy] of the box's centre [m, m, m/s, m/s]; velocity over ground in E's axes.
+    /// `[x, y, vx, vy]` of the centre of the box (m, m, m/s, m/s); velocity over ground along the axes of the ego.
     pub state: Vector4<f64>,
-    /// Covariance of `state`.
+    /// Covariance matrix of `state`.
     pub covariance: Matrix4<f64>,
-    /// Heading relative to E's [rad].
+    /// Heading relative to that of the ego (rad).
     pub heading_rad: f64,
-    /// Length of the box [m].
+    /// Length of the box (m).
     pub length_m: f64,
-    /// Width of the box [m].
+    /// Width of the box (m).
     pub width_m: f64,
-    /// What it is.
+    /// Class probabilities.
     pub class: ClassScores,
-    /// Probability that there is anything at all [1].
+    /// Probability that the track belongs to a real object.
     pub existence: f64,
-    /// Probability that it is in the lane left of E's, in E's own, right of E's [1].
+    /// Probabilities of being in the lane left of the ego, in the lane of the ego, and in the lane right of it.
     pub lane: [f64; 3],
 }
 
 impl Track {
-    /// Position ahead of E, negative behind [m].
+    /// Returns the longitudinal position relative to the ego (m): positive ahead, negative behind.
     pub fn x_m(&self) -> f64 {
         self.state[0]
     }
 
-    /// Position to the left of E [m].
+    /// Returns the lateral position relative to the ego (m), positive to the left.
     pub fn y_m(&self) -> f64 {
         self.state[1]
     }
 
-    /// Speed over ground along E's axis [m/s].
+    /// Returns the speed over ground along the longitudinal axis of the ego (m/s).
     pub fn vx_mps(&self) -> f64 {
         self.state[2]
     }
 
-    /// Speed over ground to E's left [m/s].
+    /// Returns the speed over ground to the left of the ego (m/s).
     pub fn vy_mps(&self) -> f64 {
         self.state[3]
     }

@@ -1,59 +1,60 @@
-//! Recorded movements of one vehicle.
+//! Trajectories: the recorded movements of vehicles.
 
 use crate::{Dimensions, Lane, Time, VehicleClass};
 
-/// One instant of a recorded vehicle, in the road frame.
+/// The state of a recorded vehicle at one instant, in the road frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrajectoryPoint {
-    /// When.
+    /// The time.
     pub time: Time,
-    /// Position of the centre along the road [m].
+    /// Position of the centre along the road (m).
     pub s_m: f64,
-    /// Lateral position of the centre, positive to the left, 0 at the left edge of the leftmost lane [m].
+    /// Lateral position of the centre, positive to the left, 0 at the left edge of the leftmost lane (m).
     pub d_m: f64,
-    /// Speed along the road [m/s].
+    /// Speed along the road (m/s).
     pub speed_mps: f64,
-    /// Acceleration along the road [m/s²].
+    /// Acceleration along the road (m/s²).
     pub acceleration_mps2: f64,
-    /// Speed to the left [m/s].
+    /// Lateral speed, positive to the left (m/s).
     pub lateral_speed_mps: f64,
-    /// Acceleration to the left [m/s²].
+    /// Lateral acceleration, positive to the left (m/s²).
     pub lateral_acceleration_mps2: f64,
-    /// The lane, as recorded.
+    /// The lane as given in the trajectory data.
     pub lane: Lane,
 }
 
-/// The recorded movement of one vehicle without gaps.
+/// The recorded movement of one vehicle, without interruptions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trajectory {
-    /// The recording's number for this piece of track; unique within a recording.
+    /// Number of this piece of a track, unique within a trajectory file.
     pub track_id: u64,
-    /// The recording's number for the vehicle; the pieces of a track that was lost for a while share it.
+    /// Number of the vehicle in the trajectory file. The pieces of a track that was interrupted share it.
     pub vehicle_id: u64,
-    /// Kind of the vehicle.
+    /// Class of the vehicle.
     pub class: VehicleClass,
-    /// Size of the vehicle; its height is typical of the class where not recorded.
+    /// Size of the vehicle; the height is typical of the class if it is not recorded.
     pub dimensions: Dimensions,
-    /// Its instants, equally spaced in time.
+    /// The states, equally spaced in time.
     pub points: Vec<TrajectoryPoint>,
 }
 
 impl Trajectory {
-    /// The first and the last instant, or nothing where there are no points.
+    /// Returns the first and the last time, or `None` if there are no points.
     pub fn span(&self) -> Option<(Time, Time)> {
         Some((self.points.first()?.time, self.points.last()?.time))
     }
 
-    /// The same vehicle with other points.
+    /// Returns a trajectory of the same vehicle with other points.
     #[must_use]
     pub fn with_points(&self, points: Vec<TrajectoryPoint>) -> Self {
         let Self { track_id, vehicle_id, class, dimensions, .. } = *self;
         Self { track_id, vehicle_id, class, dimensions, points }
     }
 
-    /// The point nearest to `time`, where the track covers it.
+    /// Returns the point nearest to `time`, or `None` if the trajectory does not cover it.
     ///
-    /// Half of the spacing beyond each end still counts as covered, so that times between two frames round to a frame.
+    /// The trajectory covers half of the point spacing beyond each end, so that every time between two frames rounds to
+    /// a frame.
     pub fn at(&self, time: Time) -> Option<&TrajectoryPoint> {
         let (first, last) = self.span()?;
         let steps = self.points.len() as i64 - 1;
@@ -90,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn the_nearest_point_is_found_and_none_outside() {
+    fn the_nearest_point_is_found_inside_and_none_outside() {
         let track = track(5);
         let s_at = |ms| track.at(Time::from_ms(ms)).map(|point| point.s_m);
         assert_eq!(s_at(1_000), Some(0.0));

@@ -1,11 +1,11 @@
-//! Vehicles: what they are, and the state they are in.
+//! Vehicles: their properties and their states.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{Check, Choice, ConfigError, Num, Parameters, Range};
 
-/// The kind of a vehicle.
+/// The class of a vehicle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum VehicleClass {
@@ -18,10 +18,10 @@ pub enum VehicleClass {
 }
 
 impl VehicleClass {
-    /// Every class, in the order of class scores.
+    /// All classes, in the order of the class scores.
     pub const ALL: [Self; 3] = [Self::Car, Self::Truck, Self::Motorcycle];
 
-    /// The class's name as it stands in files.
+    /// Returns the name of the class in files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Car => "car",
@@ -30,7 +30,7 @@ impl VehicleClass {
         }
     }
 
-    /// Typical dimensions of this class.
+    /// Returns the typical dimensions of this class.
     pub const fn typical_dimensions(self) -> Dimensions {
         match self {
             Self::Car => Dimensions { length_m: 4.6, width_m: 1.85, height_m: 1.5 },
@@ -39,7 +39,7 @@ impl VehicleClass {
         }
     }
 
-    /// Typical mass of this class, laden [kg].
+    /// Returns the typical mass of this class, laden (kg).
     pub const fn typical_mass_kg(self) -> f64 {
         match self {
             Self::Car => 1_600.0,
@@ -52,22 +52,22 @@ impl VehicleClass {
 /// The size of a vehicle's box.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Dimensions {
-    /// Length along the vehicle [m].
+    /// Length along the longitudinal axis (m).
     pub length_m: f64,
-    /// Width across it [m].
+    /// Width along the lateral axis (m).
     pub width_m: f64,
-    /// Height above the ground [m].
+    /// Height above the ground (m).
     pub height_m: f64,
 }
 
-/// What the sensors see of a vehicle beside its shape.
+/// The properties of a vehicle, beside its shape, that the sensors perceive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Appearance {
-    /// Diffuse reflectivity of the paint at the LiDAR's wavelength [1], 0 to 1.
+    /// Diffuse reflectivity of the paint at the wavelength of the LiDAR, 0 to 1.
     pub paint_reflectivity: f64,
     /// Colour of the paint, sRGB.
     pub paint_rgb: [u8; 3],
-    /// Which of the body shapes of its class; taken modulo their number.
+    /// Index of the body shape within the class, taken modulo the number of shapes.
     pub body_shape: u8,
 }
 
@@ -77,45 +77,45 @@ pub struct Appearance {
 pub struct VehicleConfig {
     /// Car, truck or motorcycle.
     pub class: Choice<VehicleClass>,
-    /// Length [m]; typical of the class where absent.
+    /// Length (m); typical of the class if absent.
     pub length_m: Option<Num>,
-    /// Width [m]; typical of the class where absent.
+    /// Width (m); typical of the class if absent.
     pub width_m: Option<Num>,
-    /// Height [m]; typical of the class where absent.
+    /// Height (m); typical of the class if absent.
     pub height_m: Option<Num>,
-    /// Mass [kg]; typical of the class where absent.
+    /// Mass (kg); typical of the class if absent.
     pub mass_kg: Option<Num>,
-    /// Reflectivity of the paint at the LiDAR's wavelength [1]; 0.5 where absent.
+    /// Diffuse reflectivity of the paint at the wavelength of the LiDAR; 0.5 if absent.
     pub paint_reflectivity: Option<Num>,
-    /// Colour of the paint, sRGB; grey where absent.
+    /// Colour of the paint, sRGB; grey if absent.
     pub paint_rgb: Option<[u8; 3]>,
-    /// Which of the body shapes of its class; the first where absent.
+    /// Index of the body shape within the class; 0 if absent.
     pub body_shape: Option<u8>,
-    /// Deceleration from which on its brake light is on [m/s²], 0.7 to 1.3; 0.7 where absent.
+    /// Deceleration at which the brake light switches on (m/s²), 0.7 to 1.3; 0.7 if absent.
     pub brake_light_from_mps2: Option<Num>,
 }
 
 /// A checked vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vehicle {
-    /// Its kind.
+    /// Class of the vehicle.
     pub class: VehicleClass,
-    /// Its size.
+    /// Size of the box.
     pub dimensions: Dimensions,
-    /// Its mass [kg].
+    /// Mass (kg).
     pub mass_kg: f64,
-    /// What sensors see of it.
+    /// Appearance to the sensors.
     pub appearance: Appearance,
-    /// Deceleration from which on its brake light is on [m/s²].
+    /// Deceleration at which the brake light switches on (m/s²).
     pub brake_light_from_mps2: f64,
 }
 
-/// The brake light of a vehicle that slows without its friction brakes may go on from the first of these decelerations
-/// on, and must from the second on [m/s²]: UN R13-H, 5.2.22.4.
+/// Range of the deceleration (m/s²) at which the brake light of a vehicle that slows down without its friction brakes
+/// switches on: it may from the first value on, and must from the second on (UN R13-H, 5.2.22.4).
 const BRAKE_LIGHT_MPS2: [f64; 2] = [0.7, 1.3];
 
 impl Vehicle {
-    /// A vehicle with everything typical of its class.
+    /// Creates a vehicle with the typical properties of its class.
     pub const fn typical(class: VehicleClass) -> Self {
         Self {
             class,
@@ -166,7 +166,7 @@ impl Check for VehicleConfig {
     }
 }
 
-/// The direction indicator.
+/// The state of the direction indicator.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Indicator {
@@ -179,23 +179,23 @@ pub enum Indicator {
     Right,
 }
 
-/// Where a vehicle is and how it moves, in the road frame. The reference point is the centre of its box.
+/// The position and motion of a vehicle in the road frame. The reference point is the centre of its box.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct VehicleState {
-    /// Position along the road [m].
+    /// Position along the road (m).
     pub s_m: f64,
-    /// Lateral position, positive to the left [m].
+    /// Lateral position, positive to the left (m).
     pub d_m: f64,
-    /// Heading relative to the road, positive to the left [rad].
+    /// Heading relative to the road, positive to the left (rad).
     pub heading_rad: f64,
-    /// Speed along the heading, 0 or more [m/s].
+    /// Speed along the heading, 0 or more (m/s).
     pub speed_mps: f64,
-    /// Acceleration along the heading [m/s²].
+    /// Acceleration along the heading (m/s²).
     pub acceleration_mps2: f64,
-    /// Yaw rate, positive to the left [rad/s].
+    /// Yaw rate, positive to the left (rad/s).
     pub yaw_rate_radps: f64,
-    /// True while the brake light is on.
+    /// Whether the brake light is on.
     pub brake_light: bool,
-    /// The direction indicator.
+    /// State of the direction indicator.
     pub indicator: Indicator,
 }

@@ -1,8 +1,8 @@
-//! Plane geometry of vehicles: oriented boxes, their distance, and the moment at which two moving ones touch.
+//! Plane geometry of vehicles: oriented boxes, the distance between them, and the first contact of two moving ones.
 //!
-//! A vehicle seen from above is a rectangle. Two of them are disjoint if and only if one of the four directions of
+//! A vehicle seen from above is a rectangle. Two rectangles are disjoint if and only if one of the four directions of
 //! their sides separates them (the separating axis theorem for convex polygons; S. Gottschalk, M. C. Lin, D. Manocha,
-//! *OBBTree*, SIGGRAPH 1996); everything here rests on that.
+//! *OBBTree*, SIGGRAPH 1996). Every function of this module rests on this theorem.
 
 mod oriented_box;
 mod swept;

@@ -29,10 +29,10 @@ pub enum BoxSide {
 }
 
 impl BoxSide {
-    /// Every side, in the order in which ties are broken.
+    /// All sides, in the order in which ties are broken.
     pub const ALL: [Self; 4] = [Self::Front, Self::Rear, Self::Left, Self::Right];
 
-    /// The side that a mirror image shows: left and right are exchanged.
+    /// Returns the same side in a mirror image: left and right are exchanged.
     #[must_use]
     pub const fn mirrored(self) -> Self {
         match self {
@@ -43,58 +43,58 @@ impl BoxSide {
     }
 }
 
-/// A rectangle around its centre, turned counter-clockwise by its yaw.
+/// A rectangle, given by its centre, size and yaw angle (counter-clockwise).
 ///
-/// All fields must be finite and both sizes positive.
+/// All fields must be finite, and both sizes must be positive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OrientedBox {
-    /// Position of the centre along the plane's x axis [m].
+    /// Position of the centre along the plane's x axis (m).
     pub x_m: f64,
-    /// Position of the centre along the plane's y axis [m].
+    /// Position of the centre along the plane's y axis (m).
     pub y_m: f64,
-    /// Angle from the plane's x axis to the vehicle's [rad], counter-clockwise.
+    /// Angle from the plane's x axis to the vehicle's x axis (rad), counter-clockwise.
     pub yaw_rad: f64,
-    /// Length along the vehicle's x axis [m].
+    /// Length along the vehicle's x axis (m).
     pub length_m: f64,
-    /// Width along the vehicle's y axis [m].
+    /// Width along the vehicle's y axis (m).
     pub width_m: f64,
 }
 
 impl OrientedBox {
-    /// The box of a vehicle of this size whose centre has this pose.
+    /// Creates the box of a vehicle from the pose of its centre and its size.
     pub const fn new(pose: PlanePose, size: Dimensions) -> Self {
         let PlanePose { x_m, y_m, yaw_rad } = pose;
         Self { x_m, y_m, yaw_rad, length_m: size.length_m, width_m: size.width_m }
     }
 
-    /// The centre [m].
+    /// Returns the centre (m).
     pub fn centre_m(&self) -> Vector2<f64> {
         Vector2::new(self.x_m, self.y_m)
     }
 
-    /// The four corners [m], counter-clockwise: front left, rear left, rear right, front right.
+    /// Returns the four corners (m), counter-clockwise: front left, rear left, rear right, front right.
     pub fn corners_m(&self) -> [Vector2<f64>; 4] {
         let centre = self.centre_m();
         Frame::new(self).corner_offsets_m().map(|offset| centre + offset)
     }
 
-    /// The radius of the circle through the corners [m].
+    /// Returns the radius of the circle through the corners (m).
     pub fn radius_m(&self) -> f64 {
         0.5 * self.length_m.hypot(self.width_m)
     }
 
-    /// True where the two boxes overlap or touch. NaN overlaps.
+    /// Returns true if the two boxes overlap or touch. NaN counts as an overlap.
     pub fn overlaps(&self, other: &Self) -> bool {
         self.overlap_of_frames(other, &Frame::new(self), &Frame::new(other))
     }
 
-    /// The Euclidean distance between the two boxes [m]: 0 where they overlap or touch, and for NaN.
+    /// Returns the Euclidean distance between the two boxes (m): 0 if they overlap or touch, and for NaN.
     pub fn distance_m(&self, other: &Self) -> f64 {
         let (own, others) = (Frame::new(self), Frame::new(other));
         if self.overlap_of_frames(other, &own, &others) {
             return 0.0;
         }
-        // Two disjoint convex polygons are nearest at a corner of one of them.
+        // Two disjoint convex polygons are nearest to each other at a corner of one of them.
         let offset = other.centre_m() - self.centre_m();
         let others_corners = others.corner_offsets_m().map(|corner| own.distance_squared_m2(offset + corner));
         let own_corners = own.corner_offsets_m().map(|corner| others.distance_squared_m2(corner - offset));
@@ -109,16 +109,16 @@ impl OrientedBox {
     }
 }
 
-/// The axes and half sizes of a box, its sine and cosine computed once.
+/// The axes and half sizes of a box; holds the sine and cosine of the yaw, so that they are computed only once.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Frame {
-    /// Unit vector to the front.
+    /// Unit vector that points to the front.
     pub(crate) forward: Vector2<f64>,
-    /// Unit vector to the left.
+    /// Unit vector that points to the left.
     pub(crate) left: Vector2<f64>,
-    /// Half of the length [m].
+    /// Half of the length (m).
     pub(crate) half_length_m: f64,
-    /// Half of the width [m].
+    /// Half of the width (m).
     pub(crate) half_width_m: f64,
 }
 
@@ -133,18 +133,18 @@ impl Frame {
         }
     }
 
-    /// The corners seen from the centre, in the order of [`OrientedBox::corners_m`].
+    /// Returns the corners relative to the centre (m), in the order of [`OrientedBox::corners_m`].
     pub(crate) fn corner_offsets_m(&self) -> [Vector2<f64>; 4] {
         let (along, across) = (self.forward * self.half_length_m, self.left * self.half_width_m);
         [along + across, across - along, -along - across, along - across]
     }
 
-    /// How far the box reaches from its centre along `direction`, a unit vector.
+    /// Returns the extent of the box from its centre along the unit vector `direction` (m).
     pub(crate) fn reach_m(&self, direction: Vector2<f64>) -> f64 {
         self.half_length_m * self.forward.dot(&direction).abs() + self.half_width_m * self.left.dot(&direction).abs()
     }
 
-    /// The outward normal of a side.
+    /// Returns the outward normal of a side.
     pub(crate) fn normal(&self, side: BoxSide) -> Vector2<f64> {
         match side {
             BoxSide::Front => self.forward,
@@ -154,7 +154,7 @@ impl Frame {
         }
     }
 
-    /// The distance from the centre to a side [m].
+    /// Returns the distance from the centre to a side (m).
     pub(crate) fn half_extent_m(&self, side: BoxSide) -> f64 {
         match side {
             BoxSide::Front | BoxSide::Rear => self.half_length_m,
@@ -162,7 +162,7 @@ impl Frame {
         }
     }
 
-    /// Half of the length of a side itself [m].
+    /// Returns half of the length of a side (m).
     pub(crate) fn half_span_m(&self, side: BoxSide) -> f64 {
         match side {
             BoxSide::Front | BoxSide::Rear => self.half_width_m,
@@ -170,7 +170,7 @@ impl Frame {
         }
     }
 
-    /// The two corners at the ends of a side, seen from the centre.
+    /// Returns the two corners at the ends of a side, relative to the centre (m).
     pub(crate) fn ends_m(&self, side: BoxSide) -> [Vector2<f64>; 2] {
         let [front_left, rear_left, rear_right, front_right] = self.corner_offsets_m();
         match side {
@@ -181,7 +181,7 @@ impl Frame {
         }
     }
 
-    /// Squared distance from the box to a point seen from its centre.
+    /// Returns the squared distance from the box to a point that is given relative to its centre (m²).
     fn distance_squared_m2(&self, point: Vector2<f64>) -> f64 {
         let beyond = |axis: Vector2<f64>, half_m: f64| (axis.dot(&point).abs() - half_m).max(0.0);
         let (along, across) = (beyond(self.forward, self.half_length_m), beyond(self.left, self.half_width_m));

@@ -1,8 +1,9 @@
-//! The first moment at which two moving boxes touch within a time step.
+//! Continuous collision detection: the first contact of two moving boxes within a time step.
 //!
-//! Over a step each box moves along a straight line and turns at a constant rate (by the shorter way). Seen from box
-//! *a*, with d(τ) from its centre to that of *b*, a side of *a* with outward normal n(τ) and half extent e clears the
-//! corner c(τ) of *b* by
+//! Over a step each box moves along a straight line and turns at a constant rate, in the direction of the smaller
+//! angle. Seen from box *a*, a side of *a* with outward normal n(τ) and half extent e has the following clearance g to
+//! the corner c(τ) of *b*, where d(τ) is the vector from the centre of *a* to that of *b*, and ωₐ and ω_b are the yaw
+//! rates:
 //!
 //! ```text
 //! g(τ)  = n·(d + c) − e
@@ -10,11 +11,11 @@
 //! |g''| ≤ ωₐ² |d| + 2 |ωₐ| |v| + (ω_b − ωₐ)² |c| =: K
 //! ```
 //!
-//! so that the side separates the boxes at least until the first root of g + g'δ − ½Kδ² of any corner. The step is
-//! walked through in such safe advances, each by the side (of either box) that allows the longest: conservative
-//! advancement (B. Mirtich, *Impulse-based dynamic simulation of rigid body systems*, UC Berkeley 1996) of second
-//! order. No contact can be missed, however thin or fast the boxes; without rotation each advance is exact, with it
-//! they converge quadratically.
+//! The side therefore separates the boxes at least until the first root of g + g'δ − ½Kδ² of any corner. The algorithm
+//! advances through the step by such safe amounts; for each it uses the side, of either box, that allows the longest
+//! advance. This is conservative advancement (B. Mirtich, *Impulse-based dynamic simulation of rigid body systems*, UC
+//! Berkeley 1996) of second order. It cannot miss a contact, however thin or fast the boxes are. Without rotation each
+//! advance is exact; with rotation the advances converge quadratically.
 
 use std::f64::consts::TAU;
 
@@ -23,29 +24,30 @@ use nalgebra::Vector2;
 use super::oriented_box::Frame;
 use super::{BoxSide, OrientedBox};
 
-/// Boxes nearer than this touch [m]: a picometre, well above the rounding of differences of road coordinates.
+/// Clearance below which boxes count as touching (m): a picometre, well above the rounding error of differences between
+/// road coordinates.
 const TOUCH_M: f64 = 1e-12;
 
-/// Two corners whose depths differ by less touch together [m]: what is flush to within a micrometre meets flatly.
+/// Difference of depth below which the two corners of a side touch at the same time (m): the contact is then flat.
 const FLUSH_M: f64 = 1e-6;
 
-/// Where and when two boxes touch first.
+/// The time and place of the first contact of two boxes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
-    /// Share of the step that has passed at the first touch, 0 to 1; 0 where the boxes overlap from the start.
+    /// Share of the step that has passed at the first contact, 0 to 1; 0 if the boxes overlap from the start.
     pub fraction: f64,
-    /// Where they touch, along the plane's x axis [m].
+    /// Position of the contact along the plane's x axis (m).
     pub x_m: f64,
-    /// Where they touch, along the plane's y axis [m].
+    /// Position of the contact along the plane's y axis (m).
     pub y_m: f64,
-    /// The side that was struck, of the first and of the second box.
+    /// The struck side of the first and of the second box.
     pub sides: [BoxSide; 2],
 }
 
-/// The first contact of two boxes that move from their first to their second pose within a step.
+/// Finds the first contact of two boxes that move from their first to their second pose within a step.
 ///
-/// Both poses of a box have the size of the first. Boxes that touch at the very end of the step are in contact at
-/// fraction 1. NaN is taken for a contact: it can never look safe.
+/// The size of each box is taken from its first pose. Boxes that touch at the very end of the step have a contact at
+/// fraction 1. NaN counts as a contact, so that it can never look safe. Returns `None` if the boxes do not touch.
 pub fn first_contact(
     a_from: &OrientedBox,
     a_to: &OrientedBox,
@@ -60,24 +62,24 @@ pub fn first_contact(
     Sweep::new([Moving::new(a_from, a_to), Moving::new(b_from, b_to)], start, end).first_contact()
 }
 
-/// True where the circles around the boxes do not meet while the second centre moves from `start` to `end`, seen from
-/// the first.
+/// Returns true if the circumscribed circles of the boxes do not meet while the centre of `b`, relative to that of `a`,
+/// moves from `start` to `end`.
 fn circles_stay_apart(a: &OrientedBox, b: &OrientedBox, start: Vector2<f64>, end: Vector2<f64>) -> bool {
     let square = |x: f64| x * x;
-    // (rₐ + r_b)² ≤ 2 (rₐ² + r_b²), which needs no root.
+    // The bound (rₐ + r_b)² ≤ 2 (rₐ² + r_b²) needs no square root.
     let reach_squared = 0.5 * (square(a.length_m) + square(a.width_m) + square(b.length_m) + square(b.width_m));
     let passes_beside = |from: f64, to: f64| from * to > 0.0 && square(from).min(square(to)) > reach_squared;
     passes_beside(start.x, end.x) || passes_beside(start.y, end.y)
 }
 
-/// A box that moves straight and turns at a constant rate over the step.
+/// A box that moves in a straight line and turns at a constant rate over the step.
 #[derive(Clone, Copy, Debug)]
 struct Moving {
-    /// The box at the start.
+    /// The box at the start of the step.
     shape: OrientedBox,
-    /// Movement of the centre over the step [m].
+    /// Displacement of the centre over the step (m).
     shift: Vector2<f64>,
-    /// Yaw over the whole step [rad], by the shorter way.
+    /// Change of yaw over the step (rad), in the direction of the smaller angle.
     turn_rad: f64,
 }
 
@@ -97,27 +99,27 @@ impl Moving {
     }
 }
 
-/// A side of one box, and how it separates it from the other at one moment.
+/// A side of one box, and its separation from the other box at one moment.
 #[derive(Clone, Copy, Debug)]
 struct Separation {
-    /// Whose side: 0 or 1.
+    /// Index of the box that the side belongs to: 0 or 1.
     owner: usize,
     side: BoxSide,
-    /// Distance from the side to the nearest corner of the other box [m]; negative behind the side.
+    /// Distance from the side to the nearest corner of the other box (m); negative if the corner is behind the side.
     clearance_m: f64,
-    /// Share of the step for which the side separates the boxes for certain; infinite where to the end of the step.
+    /// Share of the step for which the side is certain to separate the boxes; infinite if until the end of the step.
     safe_for: f64,
 }
 
-/// The relative movement of two boxes within a step; index 0 is box a, 1 is box b.
+/// The relative movement of two boxes within a step. Index 0 is box a, index 1 is box b.
 #[derive(Clone, Copy, Debug)]
 struct Sweep {
     boxes: [Moving; 2],
-    /// From the centre of a to that of b at the start [m].
+    /// Vector from the centre of a to that of b at the start of the step (m).
     start: Vector2<f64>,
-    /// Change of that over the step [m].
+    /// Change of that vector over the step (m).
     change: Vector2<f64>,
-    /// Bound of the clearances' second derivative, by the owner of the side [m].
+    /// Bound K on the second derivative of the clearances (m), by the owner of the side.
     curvature_m: [f64; 2],
 }
 
@@ -148,7 +150,7 @@ impl Sweep {
                 return None;
             }
             let next = (fraction + safe_for).min(1.0);
-            // Also where the advance is lost in rounding.
+            // This also covers an advance that is lost in rounding.
             if next <= fraction {
                 return Some(self.contact(&separations, &frames, fraction));
             }
@@ -156,13 +158,13 @@ impl Sweep {
         }
     }
 
-    /// From the centre of the owner's box to that of the other [m].
+    /// Returns the vector from the centre of the owner's box to that of the other box (m).
     fn offset(&self, owner: usize, fraction: f64) -> Vector2<f64> {
         let from_a_to_b = self.start + self.change * fraction;
         if owner == 0 { from_a_to_b } else { -from_a_to_b }
     }
 
-    /// The sides that can separate the boxes: of each box, the two that face the other's centre.
+    /// Evaluates the sides that can separate the boxes: of each box, the two that face the centre of the other.
     fn separations(&self, frames: &[Frame; 2], fraction: f64) -> [Separation; 4] {
         [(0, false), (0, true), (1, false), (1, true)].map(|(owner, lateral)| {
             let offset = self.offset(owner, fraction);
@@ -175,7 +177,8 @@ impl Sweep {
         })
     }
 
-    /// How a side clears the other box's corners, now and later (formulas in the module's documentation).
+    /// Evaluates the clearance between a side and the corners of the other box, now and later (formulas in the module
+    /// documentation).
     fn separation(&self, owner: usize, side: BoxSide, frames: &[Frame; 2], fraction: f64) -> Separation {
         let normal = frames[owner].normal(side);
         let turned = perpendicular(normal);
@@ -198,7 +201,8 @@ impl Sweep {
         Separation { owner, side, clearance_m, safe_for }
     }
 
-    /// What touches at `fraction`: the side that separated the boxes last, and what of the other box reached it.
+    /// Describes the contact at `fraction`: the side that separated the boxes last, and the part of the other box that
+    /// reached it.
     fn contact(&self, separations: &[Separation; 4], frames: &[Frame; 2], fraction: f64) -> Contact {
         let mut last = separations[0];
         for separation in separations {
@@ -237,20 +241,20 @@ impl Sweep {
     }
 }
 
-/// How long `value + rate·δ − ½·curvature·δ²` stays positive, where `value` is; infinite where until `end`, and 0 for
-/// NaN.
+/// Returns how long `value + rate·δ − ½·curvature·δ²` stays positive if `value` is positive: infinity if until `end`,
+/// and 0 for NaN.
 fn positive_for(value: f64, rate: f64, curvature: f64, end: f64) -> f64 {
-    // The parabola is concave: positive at both ends is positive between them.
+    // The parabola is concave: if it is positive at both ends, it is positive between them.
     if value + rate * end - 0.5 * curvature * end * end > 0.0 {
         return f64::INFINITY;
     }
     let root = (rate * rate + 2.0 * curvature * value).sqrt();
-    // Of the two forms of the root, the one that does not cancel. `max` turns NaN into 0.
+    // Of the two equivalent forms of the root, this takes the one without cancellation. `max` turns NaN into 0.
     let duration = if rate > 0.0 { (rate + root) / curvature } else { 2.0 * value / (root - rate) };
     duration.max(0.0).min(end)
 }
 
-/// `vector` turned counter-clockwise by 90°.
+/// Returns `vector` rotated counter-clockwise by 90°.
 fn perpendicular(vector: Vector2<f64>) -> Vector2<f64> {
     Vector2::new(-vector.y, vector.x)
 }

@@ -1,4 +1,4 @@
-//! Closed forms, and properties against independent brute force.
+//! Tests against closed forms, and property tests against an independent brute-force implementation.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, SQRT_2};
 
@@ -15,25 +15,26 @@ fn car(x_m: f64, y_m: f64, yaw_rad: f64) -> OrientedBox {
     OrientedBox { x_m, y_m, yaw_rad, ..CAR }
 }
 
-/// The box, turned about the plane's origin and shifted.
+/// Rotates the box about the origin of the plane and shifts it.
 fn transformed(shape: &OrientedBox, turn_rad: f64, shift: Vector2<f64>) -> OrientedBox {
     let centre = Rotation2::new(turn_rad) * shape.centre_m() + shift;
     OrientedBox { x_m: centre.x, y_m: centre.y, yaw_rad: shape.yaw_rad + turn_rad, ..*shape }
 }
 
-/// The mirror image at the plane's x axis.
+/// Mirrors the box at the plane's x axis.
 fn mirrored(shape: &OrientedBox) -> OrientedBox {
     OrientedBox { y_m: -shape.y_m, yaw_rad: -shape.yaw_rad, ..*shape }
 }
 
-/// The pose at a fraction of the step.
+/// Interpolates the pose at a fraction of the step.
 fn between(from: &OrientedBox, to: &OrientedBox, fraction: f64) -> OrientedBox {
     let at = |from: f64, to: f64| from + fraction * (to - from);
     let (x_m, y_m) = (at(from.x_m, to.x_m), at(from.y_m, to.y_m));
     OrientedBox { x_m, y_m, yaw_rad: at(from.yaw_rad, to.yaw_rad), ..*from }
 }
 
-/// Distance by looking at every pair of edges and at whether a corner lies inside, sharing nothing with the code.
+/// Computes the distance from all pairs of edges and a test for corners inside; it shares no code with the
+/// implementation.
 fn brute_force_distance_m(a: &OrientedBox, b: &OrientedBox) -> f64 {
     let edges = |shape: &OrientedBox| {
         let corners = shape.corners_m();
@@ -71,7 +72,7 @@ prop_compose! {
 }
 
 prop_compose! {
-    /// A box and where it is a step later: some turn, some do not.
+    /// A box and its pose one step later; some of the boxes turn, some do not.
     fn any_step()(from in any_box(), dx in -15.0..15.0, dy in -15.0..15.0, turn in prop_oneof![Just(0.0), -1.5..1.5])
         -> (OrientedBox, OrientedBox) {
         (from, OrientedBox { x_m: from.x_m + dx, y_m: from.y_m + dy, yaw_rad: from.yaw_rad + turn, ..from })
@@ -79,7 +80,7 @@ prop_compose! {
 }
 
 #[test]
-fn corners_go_round_counter_clockwise_from_the_front_left() {
+fn corners_are_ordered_counter_clockwise_from_the_front_left() {
     let [front_left, rear_left, rear_right, front_right] = car(10.0, 5.0, FRAC_PI_2).corners_m();
     for (corner, x_m, y_m) in
         [(front_left, 9.0, 7.0), (rear_left, 9.0, 3.0), (rear_right, 11.0, 3.0), (front_right, 11.0, 7.0)]
@@ -89,7 +90,7 @@ fn corners_go_round_counter_clockwise_from_the_front_left() {
 }
 
 #[test]
-fn distance_of_known_places() {
+fn distance_of_known_poses() {
     assert_eq!(CAR.distance_m(&car(10.0, 0.0, 0.0)), 6.0);
     assert_eq!(CAR.distance_m(&car(7.0, 6.0, 0.0)), 5.0, "corner to corner: 3, 4, 5");
     assert_eq!(CAR.distance_m(&car(4.0, 0.0, 0.0)), 0.0, "touching");
@@ -125,7 +126,7 @@ fn a_side_swipe_strikes_right_and_left() {
 
 #[test]
 fn a_cut_in_with_the_front_corner_strikes_a_side() {
-    // Turned to the right while coming from the left: its front right corner meets the other's left side.
+    // It comes from the left and is turned to the right: its front right corner meets the left side of the other box.
     let contact = first_contact(&car(-2.0, 3.5, -0.3), &car(-1.5, 2.0, -0.3), &CAR, &CAR).unwrap();
     assert_eq!(contact.sides[1], BoxSide::Left);
     assert!((contact.y_m - 1.0).abs() < 1e-9);
@@ -135,20 +136,21 @@ fn a_cut_in_with_the_front_corner_strikes_a_side() {
 
 #[test]
 fn a_turning_corner_in_closed_form() {
-    // The corner at the angle atan(1/2) rises as √5·sin(angle) and meets the wall's lower side at 1.8 m.
+    // The corner at the angle atan(1/2) rises as √5·sin(angle) and meets the lower side of the wall at 1.8 m.
     let wall = OrientedBox { x_m: 0.0, y_m: 2.3, yaw_rad: 0.0, length_m: 50.0, width_m: 1.0 };
     let contact = first_contact(&CAR, &car(0.0, 0.0, 0.8), &wall, &wall).unwrap();
     let angle = (1.8 / 5.0_f64.sqrt()).asin() - 0.5_f64.atan();
     assert!((contact.fraction - angle / 0.8).abs() < 1e-9, "{} {}", contact.fraction, angle / 0.8);
     assert_eq!(contact.sides[1], BoxSide::Right);
-    // It reaches 2.236 m at most: a wall at 2.3 m is never touched, one at 2.2360679 m just so.
+    // The corner reaches at most √5 m = 2.236 m, so it never touches a wall at 2.3 m. A wall just beyond √5 m stays
+    // untouched; one just below it is touched.
     let at = |y_m: f64| OrientedBox { y_m: y_m + 0.5, ..wall };
     let touches = |y_m: f64| first_contact(&CAR, &car(0.0, 0.0, 2.0), &at(y_m), &at(y_m)).is_some();
     assert!(!touches(5.0_f64.sqrt() + 1e-9) && touches(5.0_f64.sqrt() - 1e-9));
 }
 
 #[test]
-fn the_yaw_turns_by_the_shorter_way() {
+fn the_yaw_turns_in_the_direction_of_the_smaller_angle() {
     let wall = OrientedBox { x_m: 0.0, y_m: 2.3, yaw_rad: 0.0, length_m: 50.0, width_m: 1.0 };
     assert!(first_contact(&car(0.0, 0.0, PI - 0.01), &car(0.0, 0.0, 0.01 - PI), &wall, &wall).is_none());
 }
@@ -174,7 +176,7 @@ fn nan_is_a_contact() {
     let far = car(100.0, 50.0, 0.1);
     let ends = [car(f64::NAN, 0.0, 0.0), car(0.0, f64::NAN, 0.0), car(0.0, 0.0, f64::NAN)];
     for unknown in ends {
-        // Within reach of each other's circles or not known to be out of it.
+        // The circumscribed circles either overlap or are not known to be apart.
         assert!(first_contact(&CAR, &unknown, &car(3.0, 3.0, 0.0), &car(3.0, 3.0, 0.0)).is_some(), "{unknown:?}");
         assert!(first_contact(&unknown, &CAR, &car(3.0, 3.0, 0.0), &car(3.0, 3.0, 0.0)).is_some(), "{unknown:?}");
     }
@@ -196,7 +198,7 @@ proptest! {
     }
 
     #[test]
-    fn distance_knows_no_order_no_frame_and_no_handedness(
+    fn distance_does_not_depend_on_order_frame_or_handedness(
         a in any_box(), b in any_box(), turn in -PI..PI, x in -500.0..500.0, y in -500.0..500.0,
     ) {
         let distance = a.distance_m(&b);
@@ -230,11 +232,11 @@ proptest! {
     }
 
     #[test]
-    fn a_graze_is_found_and_a_miss_by_as_little_is_not(
+    fn a_slight_graze_is_a_contact_and_a_near_miss_is_not(
         yaw in -PI..PI, turn in -0.2..0.2_f64, half_way in 1.0..20.0_f64, x_m in -1.5..1.5, depth in 1e-8..1e-3_f64,
     ) {
-        // A car turns while it passes straight along a long wall; its outermost corner dips `depth` into the wall at
-        // one instant, or stays as far away from it.
+        // A car turns while it moves in a straight line along a long wall. Its outermost corner either dips `depth`
+        // into the wall at one instant or stays as far away from it.
         let long = OrientedBox { x_m, y_m: 0.0, yaw_rad: 0.0, length_m: 200.0, width_m: 0.2 };
         let outermost = |fraction: f64| {
             let shape = car(0.0, 0.0, yaw + fraction * turn);
@@ -250,7 +252,7 @@ proptest! {
     }
 
     #[test]
-    fn first_contact_knows_no_order_no_frame_and_no_handedness(
+    fn first_contact_does_not_depend_on_order_frame_or_handedness(
         (a0, a1) in any_step(), (b0, b1) in any_step(), turn in -PI..PI, x in -500.0..500.0,
     ) {
         let fraction = |contact: Option<Contact>| contact.map(|contact| contact.fraction);

@@ -1,13 +1,13 @@
-//! Metrics of one vehicle behind another, along the road. Gaps are bumper to bumper.
+//! Metrics of a vehicle that follows another along the road. Gaps are measured bumper to bumper.
 
 use crate::{Absent, Measured};
 
-/// Time headway [s]: the time in which a vehicle at `speed_mps` covers its gap to the vehicle ahead.
+/// Returns the time headway (s): the time that a vehicle at `speed_mps` needs to cover its gap to the vehicle ahead.
 ///
-/// 0 where the two overlap along the road.
+/// The result is 0 if the two vehicles overlap along the road.
 ///
 /// # Errors
-/// [`Absent::Standstill`] where the vehicle does not move forward.
+/// [`Absent::Standstill`] if the vehicle does not move forward.
 pub fn time_headway_s(gap_m: f64, speed_mps: f64) -> Measured {
     debug_assert!(gap_m.is_finite() && speed_mps.is_finite(), "time headway of {gap_m} m at {speed_mps} m/s");
     if speed_mps <= 0.0 {
@@ -16,25 +16,27 @@ pub fn time_headway_s(gap_m: f64, speed_mps: f64) -> Measured {
     Ok(or_most_critical(gap_m / speed_mps))
 }
 
-/// Time to collision [s] with the vehicle ahead, both at constant speed; 0 where they touch already.
+/// Returns the time to collision (s) with the vehicle ahead if both keep their speeds; 0 if they touch already.
 ///
 /// # Errors
-/// [`Absent::NotApproaching`] where there is a gap and it does not shrink.
+/// [`Absent::NotApproaching`] if there is a gap and it does not shrink.
 pub fn time_to_collision_s(gap_m: f64, own_speed_mps: f64, lead_speed_mps: f64) -> Measured {
     arrival_time_s(gap_m, own_speed_mps - lead_speed_mps, 0.0, 0.0)
 }
 
-/// Time [s] after which a follower reaches the gap `critical_gap_m`, while the vehicle ahead brakes constantly.
+/// Returns the time (s) after which a follower reaches the gap `critical_gap_m` while the vehicle ahead brakes
+/// constantly.
 ///
 /// ```text
-/// t_c(a) = (−Δv + √(Δv² + 2·a·(g − d_c))) / a          Δv: closing speed, a: deceleration of the vehicle ahead
+/// t_c(a) = (−Δv + √(Δv² + 2·a·(g − d_c))) / a          Δv: closing speed, a: deceleration of the vehicle ahead,
+///                                                      g: gap, d_c: critical gap
 /// ```
 ///
-/// The follower keeps its speed, and the vehicle ahead does not come to a standstill before. With a = 0 this is the
-/// longitudinal time to closest encounter (g − d_c)/Δv. 0 where the gap is critical already.
+/// The formula assumes that the follower keeps its speed and that the vehicle ahead does not stop before. With a = 0
+/// the result is the longitudinal time to closest encounter (g − d_c)/Δv. It is 0 if the gap is critical already.
 ///
 /// # Errors
-/// [`Absent::NotApproaching`] where the gap never shrinks to the critical one.
+/// [`Absent::NotApproaching`] if the gap never shrinks to the critical one.
 pub fn arrival_time_s(gap_m: f64, closing_mps: f64, deceleration_mps2: f64, critical_gap_m: f64) -> Measured {
     let distance_m = gap_m - critical_gap_m;
     debug_assert!(
@@ -48,7 +50,8 @@ pub fn arrival_time_s(gap_m: f64, closing_mps: f64, deceleration_mps2: f64, crit
     if discriminant < 0.0 || (closing_mps <= 0.0 && deceleration_mps2 <= 0.0) {
         return Err(Absent::NotApproaching);
     }
-    // Of the two forms of the root, the one that does not cancel; the first also holds for a = 0.
+    // Of the two equivalent forms of the root, each branch takes the one without cancellation; the first also holds for
+    // a = 0.
     let root = discriminant.sqrt();
     Ok(or_most_critical(if closing_mps > 0.0 {
         2.0 * distance_m / (closing_mps + root)
@@ -57,15 +60,16 @@ pub fn arrival_time_s(gap_m: f64, closing_mps: f64, deceleration_mps2: f64, crit
     }))
 }
 
-/// The smallest constant deceleration [m/s²] by which a vehicle avoids hitting the one ahead, which itself brakes at
-/// `lead_deceleration_mps2` until it stands (negative: it accelerates).
+/// Returns the smallest constant deceleration (m/s²) with which a vehicle avoids a collision with the vehicle ahead,
+/// which itself brakes at `lead_deceleration_mps2` to a standstill (negative: it accelerates).
 ///
-/// Where both still move when they would meet, Δv²/(2g) more than the lead's; else the deceleration that stops the
-/// vehicle at the place where the lead comes to stand. Without reaction time.
+/// If both vehicles would still be moving when they meet, the result is the deceleration of the vehicle ahead plus
+/// Δv²/(2g). Otherwise it is the deceleration that stops the vehicle where the vehicle ahead comes to a standstill. No
+/// reaction time is included.
 ///
 /// # Errors
-/// [`Absent::Touching`] where there is no gap, so that no deceleration suffices; [`Absent::NotApproaching`] where none
-/// is needed.
+/// [`Absent::Touching`] if there is no gap, so that no deceleration suffices; [`Absent::NotApproaching`] if none is
+/// needed.
 pub fn required_deceleration_mps2(
     gap_m: f64,
     own_speed_mps: f64,
@@ -96,7 +100,7 @@ pub fn required_deceleration_mps2(
     Ok(if required.is_nan() { f64::INFINITY } else { required })
 }
 
-/// `time_s`, but 0 where it is negative or NaN.
+/// Returns `time_s`, or 0 if it is negative or NaN.
 fn or_most_critical(time_s: f64) -> f64 {
     time_s.max(0.0)
 }
@@ -107,7 +111,7 @@ mod tests {
 
     use super::*;
 
-    /// How far a follower gets within `gap_m` of a lead in small steps of time, each vehicle braking until it stands.
+    /// Returns the smallest gap to the lead vehicle (m) over small steps of time, each vehicle braking to a standstill.
     fn smallest_gap_m(gap_m: f64, own: (f64, f64), lead: (f64, f64)) -> f64 {
         let travelled_m = |(speed, deceleration): (f64, f64), time: f64| {
             let time = if deceleration > 0.0 { time.min(speed / deceleration) } else { time };
@@ -135,8 +139,8 @@ mod tests {
         assert_eq!(time_to_collision_s(0.0, 20.0, 30.0), Ok(0.0));
     }
 
-    /// Worked by hand: E at 30 m/s with a front headway of 0.7 s brakes at 1 m/s² from R's detection at 100 m, closing
-    /// at 24 km/h, until R is 5 m behind: −20/3 + √((20/3)² + 190) = 8.645 s.
+    /// A case computed by hand. E, at 30 m/s with a front time headway of 0.7 s, brakes at 1 m/s² from the detection of
+    /// R at 100 m, closing at 24 km/h, until R is 5 m behind: −20/3 + √((20/3)² + 190) = 8.645 s.
     #[test]
     fn the_papers_reference_point_gains_two_seconds_of_headway() {
         let arrival_s = arrival_time_s(100.0, 24.0 / 3.6, 1.0, 5.0).unwrap();
@@ -148,10 +152,11 @@ mod tests {
 
     #[test]
     fn a_follower_that_falls_back_arrives_once_the_lead_has_braked() {
-        // −2 m/s of closing, 1 m/s² of braking, 16 m: −2t + t²/2 = 16 at t = 8 s.
+        // Closing at −2 m/s, braking at 1 m/s², 16 m to go: −2t + t²/2 = 16 at t = 8 s.
         assert_eq!(arrival_time_s(21.0, -2.0, 1.0, 5.0), Ok(8.0));
         assert_eq!(arrival_time_s(21.0, -2.0, 0.0, 5.0), Err(Absent::NotApproaching));
-        // A lead that accelerates at 1 m/s² escapes one that closes at 5 m/s from 12.5 m on.
+        // A lead vehicle that accelerates at 1 m/s² escapes a follower that closes in at 5 m/s if the gap exceeds 12.5
+        // m.
         assert_eq!(arrival_time_s(12.5, 5.0, -1.0, 0.0), Ok(5.0));
         assert_eq!(arrival_time_s(12.6, 5.0, -1.0, 0.0), Err(Absent::NotApproaching));
     }
@@ -161,7 +166,7 @@ mod tests {
         assert_eq!(required_deceleration_mps2(25.0, 30.0, 20.0, 0.0), Ok(2.0));
         assert_eq!(required_deceleration_mps2(50.0, 20.0, 0.0, 0.0), Ok(4.0), "a standing lead");
         assert_eq!(required_deceleration_mps2(25.0, 30.0, 20.0, 1.0), Ok(3.0), "met while it still moves");
-        // The lead stands after 20²/(2·8) = 25 m: 30²/(2·(25 + 25)).
+        // The lead vehicle stops after 20²/(2·8) = 25 m: 30²/(2·(25 + 25)).
         assert_eq!(required_deceleration_mps2(25.0, 30.0, 20.0, 8.0), Ok(9.0));
         assert_eq!(required_deceleration_mps2(25.0, 20.0, 20.0, 0.0), Err(Absent::NotApproaching));
         assert_eq!(required_deceleration_mps2(25.0, 21.0, 20.0, -1.0), Err(Absent::NotApproaching));

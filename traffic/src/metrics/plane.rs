@@ -1,60 +1,61 @@
 //! Time to and distance at the closest encounter of two oriented boxes at constant velocity.
 //!
-//! Seen from box *a*, box *b* moves along the line d + v·t (d: from centre to centre, v: relative velocity). The two
-//! touch while that point lies in the Minkowski difference of the boxes: a convex polygon of up to eight sides,
+//! Seen from box *a*, box *b* moves along the line d + v·t (d: vector between the centres, v: relative velocity). The
+//! boxes touch while that point lies in their Minkowski difference. This is a convex polygon of up to eight sides,
 //! symmetric about the origin, and spanned by the four half axes gᵢ of the boxes (a *zonogon*).
 //!
 //! ```text
-//!            ╱‾‾‾‾‾╲                 reach of the zonogon along a unit vector u:  h(u) = Σ |gᵢ·u|
+//!            ╱‾‾‾‾‾╲                 extent of the zonogon along a unit vector u:  h(u) = Σ |gᵢ·u|
 //!           │   +   │  ▲ DCE
-//!            ╲_____╱   ▼             distance of the line from the origin:        c = d·n,  n ⊥ v, c ≥ 0
+//!            ╲_____╱   ▼             distance of the line from the origin:         c = d·n,  n ⊥ v, c ≥ 0
 //!   d ●────────●──────────▶ v·t
 //!           TTCE
 //! ```
 //!
-//! The distance between the boxes is a convex function of t. Where c > h(n) the line passes the zonogon at the
-//! distance DCE = c − h(n), beside the corner Σ sign(gᵢ·n)·gᵢ; where not, it enters it at TTCE with DCE = 0, through
-//! the last of the four slabs |d·m + v·m·t| ≤ h(m), m ⊥ gᵢ. Both are exact.
+//! The distance between the boxes is a convex function of t. If c > h(n), the line passes the zonogon at the distance
+//! DCE = c − h(n), beside the corner Σ sign(gᵢ·n)·gᵢ. Otherwise the line enters the zonogon at TTCE with DCE = 0,
+//! through the last of the four slabs |d·m + v·m·t| ≤ h(m), m ⊥ gᵢ. Both results are exact.
 //!
-//! The metrics are those of the criticality literature (time to closest encounter and distance of closest encounter:
-//! J. Eggert, *Predictive risk estimation for intelligent ADAS functions*, ITSC 2014), there for points, here for boxes.
+//! The metrics are those of the criticality literature (time to closest encounter and distance of closest encounter: J.
+//! Eggert, *Predictive risk estimation for intelligent ADAS functions*, ITSC 2014), which defines them for points. This
+//! module extends them to boxes.
 
 use nalgebra::Vector2;
 
 use crate::geometry::OrientedBox;
 use crate::{Absent, Measured};
 
-/// Two sides are taken for parallel to the course where their ends pass equally near to within this [m].
+/// Difference below which the ends of a side pass equally near, so that the side counts as parallel to the course (m).
 const PARALLEL_M: f64 = 1e-9;
 
-/// A box in straight, constant motion.
+/// A box that moves at constant velocity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moving {
-    /// Where it is now.
+    /// The box at the present time.
     pub shape: OrientedBox,
-    /// Velocity along the plane's x axis [m/s].
+    /// Velocity along the plane's x axis (m/s).
     pub vx_mps: f64,
-    /// Velocity along the plane's y axis [m/s].
+    /// Velocity along the plane's y axis (m/s).
     pub vy_mps: f64,
 }
 
-/// The moment at which two vehicles come closest.
+/// The closest encounter of two vehicles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Encounter {
-    /// Time to closest encounter [s]: the first time at which they are as near as they will ever be.
+    /// Time to closest encounter (s): the first time at which the distance between the vehicles is smallest.
     pub ttce_s: f64,
-    /// Distance of closest encounter [m]; 0 on a collision course.
+    /// Distance of closest encounter (m); 0 on a collision course.
     pub dce_m: f64,
 }
 
-/// Time and distance of the closest encounter of two boxes that keep their velocities.
+/// Computes the time and distance of the closest encounter of two boxes that keep their velocities.
 ///
-/// On touching courses it is the first touch, with a distance of 0; for boxes that touch already both values are 0.
-/// Where a side of one box slides past a corner of the other in parallel, so that the distance stays at its smallest
-/// for a while, it is the beginning of that.
+/// On a collision course the encounter is the first contact, with a distance of 0. If the boxes touch already, both
+/// values are 0. If a side of one box passes a corner of the other in parallel, the distance stays at its minimum for a
+/// while; the encounter is then the beginning of that interval.
 ///
 /// # Errors
-/// [`Absent::NotApproaching`] where the distance never shrinks; [`Absent::BeyondHorizon`] where it still does after
+/// [`Absent::NotApproaching`] if the distance never shrinks; [`Absent::BeyondHorizon`] if it still shrinks after
 /// `horizon_s`.
 pub fn closest_encounter(a: &Moving, b: &Moving, horizon_s: f64) -> Result<Encounter, Absent> {
     let course = Course::new(a, b);
@@ -65,11 +66,11 @@ pub fn closest_encounter(a: &Moving, b: &Moving, horizon_s: f64) -> Result<Encou
     if encounter.ttce_s > horizon_s { Err(Absent::BeyondHorizon) } else { Ok(encounter) }
 }
 
-/// Time until two boxes that keep their velocities touch [s]; 0 where they touch already.
+/// Returns the time until two boxes that keep their velocities touch (s); 0 if they touch already.
 ///
 /// # Errors
-/// [`Absent::NotApproaching`] where their distance never shrinks, [`Absent::NoCollisionCourse`] where it does, but
-/// they pass each other.
+/// [`Absent::NotApproaching`] if their distance never shrinks; [`Absent::NoCollisionCourse`] if it shrinks, but the
+/// boxes pass each other.
 pub fn time_to_touch_s(a: &Moving, b: &Moving) -> Measured {
     let course = Course::new(a, b);
     match course.touch()? {
@@ -80,11 +81,11 @@ pub fn time_to_touch_s(a: &Moving, b: &Moving) -> Measured {
 
 /// The movement of one box relative to another, and their Minkowski difference.
 struct Course {
-    /// From the centre of a to that of b [m].
+    /// Vector from the centre of a to that of b (m).
     offset_m: Vector2<f64>,
-    /// Velocity of b relative to a [m/s].
+    /// Velocity of b relative to a (m/s).
     velocity_mps: Vector2<f64>,
-    /// The half axes of both boxes [m], each with a unit vector across it.
+    /// The half axes of both boxes (m), each with a unit vector perpendicular to it.
     half_axes: [(Vector2<f64>, Vector2<f64>); 4],
 }
 
@@ -101,12 +102,12 @@ impl Course {
         course
     }
 
-    /// Reach of the Minkowski difference along a unit vector [m].
+    /// Returns the extent of the Minkowski difference along a unit vector (m).
     fn reach_m(&self, direction: Vector2<f64>) -> f64 {
         self.half_axes.iter().map(|(axis, _)| axis.dot(&direction).abs()).sum()
     }
 
-    /// When the boxes touch first [s]; nothing where the line of the course misses.
+    /// Returns the time of the first contact (s), or `None` if the boxes pass each other.
     fn touch(&self) -> Result<Option<f64>, Absent> {
         let mut enters_s = f64::NEG_INFINITY;
         let mut leaves_s = f64::INFINITY;
@@ -132,7 +133,7 @@ impl Course {
         }
     }
 
-    /// The closest encounter where the line of the course misses.
+    /// Returns the closest encounter of boxes that pass each other.
     fn passing(&self) -> Result<Encounter, Absent> {
         let speed_mps = self.velocity_mps.norm();
         if speed_mps == 0.0 {
@@ -143,7 +144,8 @@ impl Course {
         if across.dot(&self.offset_m) < 0.0 {
             across = -across;
         }
-        // The corner that is passed, and how long a side of the difference lies there in parallel to the course.
+        // The corner that is passed, and half the length of a side of the difference there that is parallel to the
+        // course.
         let mut corner_m = 0.0;
         let mut parallel_m = 0.0;
         for (axis, _) in self.half_axes {
@@ -158,7 +160,7 @@ impl Course {
         if to_corner_m + parallel_m < 0.0 {
             return Err(Absent::NotApproaching);
         }
-        // Neither is negative but by rounding; `max` also turns NaN into 0.
+        // Both are negative only by rounding. `max` also turns NaN into 0.
         Ok(Encounter {
             ttce_s: ((to_corner_m - parallel_m) / speed_mps).max(0.0),
             dce_m: (across.dot(&self.offset_m) - self.reach_m(across)).max(0.0),
@@ -166,7 +168,7 @@ impl Course {
     }
 }
 
-/// The half axes of a box along its length and width [m], each with a unit vector across it.
+/// Returns the half axes of a box along its length and width (m), each with a unit vector perpendicular to it.
 fn half_axes(shape: &OrientedBox) -> [(Vector2<f64>, Vector2<f64>); 2] {
     let (sin, cos) = shape.yaw_rad.sin_cos();
     let (forward, left) = (Vector2::new(cos, sin), Vector2::new(-sin, cos));

@@ -1,4 +1,4 @@
-//! Encounters in the plane: closed forms, and properties against a dense scan in time.
+//! Tests of encounters in the plane against closed forms, and property tests against a dense scan in time.
 
 use std::f64::consts::{FRAC_PI_4, PI, SQRT_2};
 
@@ -66,7 +66,7 @@ fn passing_in_the_next_lane_is_closest_when_the_bumpers_are_level() {
     let (slow, fast) = (moving(54.0, 0.0, 0.0, 30.0, 0.0), moving(0.0, 3.75, 0.0, 35.0, 0.0));
     assert_eq!(closest_encounter(&slow, &fast, 20.0), Ok(Encounter { ttce_s: 10.0, dce_m: 1.75 }));
     assert_eq!(time_to_touch_s(&slow, &fast), Err(Absent::NoCollisionCourse));
-    // Alongside it stays as near: the encounter is now. Once past it is over.
+    // Alongside, the distance stays the same, so the encounter is now. Once the vehicle is past, the encounter is over.
     let alongside = moving(55.0, 3.75, 0.0, 35.0, 0.0);
     assert_eq!(closest_encounter(&slow, &alongside, 20.0), Ok(Encounter { ttce_s: 0.0, dce_m: 1.75 }));
     let past = moving(58.1, 3.75, 0.0, 35.0, 0.0);
@@ -75,7 +75,7 @@ fn passing_in_the_next_lane_is_closest_when_the_bumpers_are_level() {
 
 #[test]
 fn a_crossing_course_passes_a_corner_in_closed_form() {
-    // A square turned by 45° crosses ahead of a standing one; its lowest corner passes the other's side.
+    // A square turned by 45° crosses ahead of a standing one; its lowest corner passes the side of the other.
     let square = |x_m, y_m, yaw_rad, vx_mps| Moving {
         shape: OrientedBox { x_m, y_m, yaw_rad, length_m: 2.0, width_m: 2.0 },
         vx_mps,
@@ -88,7 +88,7 @@ fn a_crossing_course_passes_a_corner_in_closed_form() {
 }
 
 #[test]
-fn what_does_not_approach_has_no_encounter() {
+fn vehicles_that_do_not_approach_have_no_encounter() {
     let (ahead, behind) = (moving(20.0, 0.0, 0.0, 30.0, 0.0), moving(0.0, 0.0, 0.0, 25.0, 0.0));
     for metric in [
         closest_encounter(&ahead, &behind, HORIZON_S).map(|encounter| encounter.ttce_s),
@@ -102,7 +102,7 @@ fn what_does_not_approach_has_no_encounter() {
 }
 
 #[test]
-fn what_touches_already_is_at_zero() {
+fn boxes_that_touch_already_have_time_and_distance_zero() {
     let (one, other) = (moving(0.0, 0.0, 0.0, 30.0, 0.0), moving(3.0, 1.0, 0.3, 35.0, 0.0));
     assert_eq!(closest_encounter(&one, &other, HORIZON_S), Ok(Encounter { ttce_s: 0.0, dce_m: 0.0 }));
     assert_eq!(time_to_touch_s(&one, &other), Ok(0.0));
@@ -116,7 +116,7 @@ fn a_far_encounter_lies_beyond_the_horizon() {
     assert_eq!(closest_encounter(&lead, &follower, 9.9), Err(Absent::BeyondHorizon));
 }
 
-/// Two headings that differ by rounding alone must not move the encounter from the front bumper to the rear one.
+/// Headings that differ only by rounding must not move the encounter from the front bumper to the rear one.
 #[test]
 fn nearly_parallel_sides_count_as_parallel() {
     for noise in [1e-13, -1e-13] {
@@ -130,8 +130,8 @@ fn nearly_parallel_sides_count_as_parallel() {
 #[test]
 fn nan_never_looks_safe() {
     let known = moving(0.0, 0.0, 0.0, 30.0, 0.0);
-    let place = [0.0, 1.0, 2.0, 3.0, 4.0];
-    for unknown in 0..place.len() {
+    const ARGUMENTS: usize = 5;
+    for unknown in 0..ARGUMENTS {
         let at = |i: usize, value: f64| if i == unknown { f64::NAN } else { value };
         let other = moving(at(0, 50.0), at(1, 20.0), at(2, 0.3), at(3, 60.0), at(4, 1.0));
         assert_eq!(time_to_touch_s(&known, &other), Ok(0.0), "{other:?}");
@@ -176,7 +176,7 @@ proptest! {
     }
 
     #[test]
-    fn encounters_know_no_order_no_frame_and_no_handedness(
+    fn encounters_do_not_depend_on_order_frame_or_handedness(
         a in any_moving(), b in any_moving(), turn in -PI..PI, x in -500.0..500.0, y in -500.0..500.0,
     ) {
         let encounter = closest_encounter(&a, &b, HORIZON_S);
