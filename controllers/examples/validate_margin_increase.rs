@@ -1,12 +1,13 @@
-//! The paired study behind the choices in this crate, in its small closed loop: with and without the margin increase
-//! system, for three bounds on its braking, and in the encounters in which F does not brake.
+//! The paired study that supports the default values of this crate, in its small closed loop. It compares runs with and
+//! without the margin increase system, for three bounds on its braking, and in encounters in which the lead vehicle
+//! does not brake.
 //!
 //! `cargo run --release -p closecall-controllers --example validate_margin_increase -- [SAMPLES] [SEED]`
 //!
-//! The seed of the figures in the documentation is 1 (tuning), with 1000 samples.
+//! The figures in the documentation use seed 1 (a tuning seed) and 1000 samples.
 
 #![expect(clippy::print_stdout, reason = "the table is what this example is for")]
-#![expect(clippy::unwrap_used, reason = "what is set up wrongly here may panic")]
+#![expect(clippy::unwrap_used, reason = "a wrong setup may panic in an example")]
 
 #[path = "../tests/closed_loop/encounter.rs"]
 mod encounter;
@@ -18,12 +19,12 @@ mod world;
 use encounter::{Case, Outcome, Rear, sample};
 use study::paired;
 
-/// The quantile `share` of sorted values.
+/// Returns the quantile `share` of sorted values.
 fn quantile(sorted: &[f64], share: f64) -> f64 {
     let last = sorted.len() - 1;
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a place in a list")]
-    let place = (share * last as f64).round() as usize;
-    sorted[place.min(last)]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an index of a list")]
+    let index = (share * last as f64).round() as usize;
+    sorted[index.min(last)]
 }
 
 fn main() {
@@ -31,19 +32,19 @@ fn main() {
     let samples = arguments.next().unwrap_or(1000);
     let headline = Case { seed: arguments.next().unwrap_or(1), ..Case::HEADLINE };
     println!("{samples} samples, seed {}", headline.seed);
-    println!("bound  d_c  without  with  prevented  induced  E into F");
+    println!("bound  d_c  without  with  prevented  induced  ego into lead");
     for critical_gap_m in [5.0, 10.0] {
         for max_deceleration_mps2 in [1.0, 2.0, 3.0] {
             let case = Case { max_deceleration_mps2, critical_gap_m, ..headline };
             let (ledger, _) = paired(&case, samples);
             println!(
-                "{max_deceleration_mps2:5} {critical_gap_m:4} {:8} {:5} {:10} {:8} {:9}",
+                "{max_deceleration_mps2:5} {critical_gap_m:4} {:8} {:5} {:10} {:8} {:14}",
                 ledger.without, ledger.with, ledger.prevented, ledger.induced, ledger.with_front
             );
         }
     }
     let calm = Case { front_brakes: false, ..headline };
-    println!("F does not brake      collisions without, with  aborted  least gap in lane [m]");
+    println!("lead does not brake   collisions without, with  aborted  least gap in lane [m]");
     for (name, case) in [
         ("overtakes", calm),
         ("follows", Case { rear: Rear::Follows, ..calm }),
@@ -61,7 +62,7 @@ fn main() {
     }
 }
 
-/// How well R meets the headway asked for, and E its goal.
+/// Prints how well the rear vehicle meets its requested time headway, and the ego its goal.
 fn headways(case: &Case, pairs: &[(Outcome, Outcome)]) {
     for (arm, pick) in [("without", 0), ("with", 1)] {
         let outcomes = pairs.iter().map(|pair| if pick == 0 { pair.0 } else { pair.1 });
@@ -72,7 +73,7 @@ fn headways(case: &Case, pairs: &[(Outcome, Outcome)]) {
         off.sort_by(f64::total_cmp);
         let [low, middle, high] = [0.01, 0.5, 0.99].map(|share| quantile(&off, share));
         println!(
-            "  {arm}: headway at the marking less the one asked for [s]: 1 % {low:.3}, median {middle:.3}, 99 % {high:.3}"
+            "  {arm}: headway at the marking minus the requested one [s]: 1 % {low:.3}, median {middle:.3}, 99 % {high:.3}"
         );
     }
     let gained = |outcome: &Outcome| Some(outcome.thw_critical_s? - outcome.thw_engaged_s?);

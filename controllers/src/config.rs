@@ -1,4 +1,4 @@
-//! The `driver` table of an actor: who drives it.
+//! The `driver` table of an actor.
 
 use closecall_traffic::{Check, ConfigError, Parameters};
 use schemars::JsonSchema;
@@ -10,24 +10,24 @@ use crate::driver::{
 };
 use crate::ego::{EgoSettings, EgoStackConfig};
 
-/// Who drives an actor, as a scenario file describes it.
+/// The driver of an actor as a scenario file describes it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 #[expect(clippy::large_enum_variant, reason = "a scenario has a handful of them, read once")]
 pub enum DriverConfig {
-    /// The controller under test, with its adaptive cruise control, emergency braking and margin increase system.
+    /// The controller under test: adaptive cruise control, emergency braking and margin increase system.
     EgoStack(EgoStackConfig),
-    /// A list of times and speeds, followed whatever the others do.
+    /// A list of times and speeds, followed regardless of the other vehicles.
     Prescribed(PrescribedConfig),
-    /// A human who follows by Wiedemann's model of 1999 and stays in its lane.
+    /// A human driver that follows by Wiedemann's model of 1999 and stays in its lane.
     Wiedemann99(Wiedemann99Config),
-    /// A human who follows by the Intelligent Driver Model and stays in its lane.
+    /// A human driver that follows by the Intelligent Driver Model and stays in its lane.
     Idm(IdmConfig),
-    /// A human who comes up fast, closes to a low headway and overtakes.
+    /// A human driver that approaches fast, closes to a short time headway and overtakes.
     Overtaker(OvertakerConfig),
 }
 
-/// A driver that cannot be invalid.
+/// A checked driver, which cannot be invalid.
 #[derive(Clone, Debug, PartialEq)]
 pub enum CheckedDriver {
     /// The controller under test.
@@ -37,8 +37,8 @@ pub enum CheckedDriver {
 }
 
 impl CheckedDriver {
-    /// The same driver in the mirrored world, in which left is right. Most only know the side on which one overtakes, and
-    /// have that from the road.
+    /// Returns the same driver in the mirrored world, in which left and right are exchanged. Most drivers depend only
+    /// on the overtaking side, which they read from the road.
     #[must_use]
     pub fn mirrored(&self) -> Self {
         match self {
@@ -48,21 +48,21 @@ impl CheckedDriver {
     }
 }
 
-/// A human driver that cannot be invalid.
+/// A checked human driver, which cannot be invalid.
 #[derive(Clone, Debug, PartialEq)]
 pub enum HumanDriver {
     /// A list of times and speeds.
     Prescribed(Prescribed),
-    /// Follows by Wiedemann 99.
+    /// A driver that follows by Wiedemann 99.
     Wiedemann99(crate::driver::Wiedemann99),
-    /// Follows by the Intelligent Driver Model.
+    /// A driver that follows by the Intelligent Driver Model.
     Idm(Idm),
-    /// Comes up fast and overtakes.
+    /// A driver that approaches fast and overtakes.
     Overtaker(Overtaker),
 }
 
 impl HumanDriver {
-    /// A fresh driver for one run. What it needs is allocated here and at its first step, and nothing afterwards.
+    /// Builds a new driver for one run. It allocates memory here and in its first step, and none afterwards.
     pub fn build(&self) -> Box<dyn Driver> {
         match self {
             Self::Prescribed(profile) => Box::new(profile.driver()),
@@ -81,15 +81,15 @@ impl Check for DriverConfig {
             Self::EgoStack(config) => {
                 config.check(parameters).map(CheckedDriver::Ego).map_err(|error| error.within("ego-stack"))
             }
-            Self::Prescribed(config) => human(config, parameters, HumanDriver::Prescribed, "prescribed"),
-            Self::Wiedemann99(config) => human(config, parameters, HumanDriver::Wiedemann99, "wiedemann99"),
-            Self::Idm(config) => human(config, parameters, HumanDriver::Idm, "idm"),
-            Self::Overtaker(config) => human(config, parameters, HumanDriver::Overtaker, "overtaker"),
+            Self::Prescribed(config) => check_human(config, parameters, HumanDriver::Prescribed, "prescribed"),
+            Self::Wiedemann99(config) => check_human(config, parameters, HumanDriver::Wiedemann99, "wiedemann99"),
+            Self::Idm(config) => check_human(config, parameters, HumanDriver::Idm, "idm"),
+            Self::Overtaker(config) => check_human(config, parameters, HumanDriver::Overtaker, "overtaker"),
         }
     }
 }
 
-fn human<C: Check>(
+fn check_human<C: Check>(
     config: &C,
     parameters: &Parameters,
     kind: fn(C::Checked) -> HumanDriver,
@@ -102,7 +102,7 @@ fn human<C: Check>(
 mod tests {
     use super::*;
 
-    /// What a scenario file may say, as the tables of the file arrive here.
+    /// Parses a `driver` table in the form in which the tables of a scenario file arrive here.
     fn parse(text: &str) -> Result<DriverConfig, toml::de::Error> {
         #[derive(Deserialize)]
         struct Actor {
@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_unknown_or_out_of_range_is_refused_by_name() {
+    fn an_unknown_key_or_a_value_out_of_range_is_refused_by_name() {
         assert!(parse("{ ego-stack = { acc = { time-gap-s = 0.7 }, mis = { bound = 1.0 } } }").is_err());
         assert!(parse("{ overtaker = { reaction-s = { log-normal = { median = nan, sigma = 0.3 } } } }").is_err());
         let config = parse("{ wiedemann99 = { cc1-s = -0.3 } }").unwrap();

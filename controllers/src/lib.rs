@@ -1,17 +1,18 @@
-//! Who drives: the ego stack (ACC, AEB, MIS) and the human drivers.
+//! The vehicle controllers: the ego stack (ACC, AEB, MIS) and the human driver models.
 //!
 //! ```text
-//!  truth ─▶ driver/  perception (late, coarse) ─▶ Wiedemann 99 │ IDM │ overtaker │ prescribed profile ─▶ acceleration, lane change
-//!  tracks ─▶ ego/    surroundings ─▶ ACC ─┐
-//!                                  MIS ─┼─▶ arbitration (stack) ─▶ acceleration, state, reason
-//!                                  AEB ─┘
+//!  ground truth ─▶ driver/  perception (delayed, coarse) ─▶ Wiedemann 99 │ IDM │ overtaker │ prescribed profile
+//!                                                          ─▶ acceleration, lane change
+//!  tracks ───────▶ ego/     surroundings ─▶ ACC ─┐
+//!                                           MIS ─┼─▶ arbitration (stack) ─▶ acceleration, state, reason
+//!                                           AEB ─┘
 //! ```
 //!
-//! The type system forbids cheating: an ego controller is given its own odometry and tracks, never the truth; a human
-//! driver is given the truth, and its own part is to perceive it late.
+//! The types keep the ground truth from the ego: an ego controller receives its own odometry and tracks, never the
+//! ground truth. A human driver model receives the ground truth, and itself models delayed perception.
 //!
-//! A scenario's `driver` table is a [`DriverConfig`]; checked, it is a [`CheckedDriver`], from which a fresh driver is
-//! built for each run.
+//! The `driver` table of a scenario file is a [`DriverConfig`]. Checking it yields a [`CheckedDriver`], from which each
+//! run builds a new driver.
 
 mod braking;
 mod config;
@@ -27,7 +28,7 @@ pub use driver::{
     Wiedemann99, Wiedemann99Config, Wiedemann99Driver, Wiedemann99Model,
 };
 pub use ego::{
-    Acc, AccConfig, Aeb, AebConfig, ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack,
-    EgoStackConfig, EgoState, Encounter, Foresight, Front, FrontFollower, MisConfig, MisPlan, MisSettings, Odometry,
-    Reason, Response, SensorAvailability, Solution,
+    Acc, AccConfig, Aeb, AebConfig, ArrivalPrediction, BrakingResponse, ControllerError, EgoCommand, EgoController,
+    EgoInput, EgoSettings, EgoStack, EgoStackConfig, EgoState, Encounter, Front, FrontFollower, MisConfig, MisPlan,
+    MisSettings, Odometry, Reason, SensorAvailability, Solution,
 };

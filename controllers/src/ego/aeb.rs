@@ -1,10 +1,11 @@
-//! Emergency braking: only when the required deceleration says so.
+//! Automatic emergency braking: brakes only if the required deceleration demands it.
 //!
-//! The required deceleration is the constant one with which E just keeps a small gap to the vehicle ahead, which goes on
-//! braking as it does now ([`Behind`]).
+//! The required deceleration is the constant deceleration with which the ego just keeps a small gap to the lead
+//! vehicle, if that vehicle continues to brake as it does now ([`Behind`]).
 //!
-//! The system begins above one threshold, asks for the requirement and a margin, and stays until a lower threshold
-//! holds. What friction allows is the plant's matter.
+//! The system starts to brake if the required deceleration exceeds a threshold. It commands the required deceleration
+//! plus a margin, until the required deceleration is below a lower threshold. The friction limit is applied by the
+//! vehicle model, not here.
 
 use closecall_traffic::{Check, ConfigError, Num, Parameters, Range};
 use schemars::JsonSchema;
@@ -13,31 +14,31 @@ use serde::{Deserialize, Serialize};
 use super::surroundings::Front;
 use crate::braking::Behind;
 
-/// By how much more than required is braked [1].
+/// Ratio of commanded to required deceleration.
 const BRAKING_MARGIN: f64 = 1.15;
 
-/// Required deceleration below which emergency braking ends [m/s²].
-const DONE_BELOW_MPS2: f64 = 1.5;
+/// Required deceleration below which emergency braking ends (m/s²).
+const RELEASE_THRESHOLD_MPS2: f64 = 1.5;
 
-/// Speed below which E counts as standing [m/s].
-const STANDING_MPS: f64 = 0.1;
+/// Speed below which the ego counts as standing (m/s).
+const STANDSTILL_MPS: f64 = 0.1;
 
-/// Braking that holds E at standstill [m/s²].
+/// Braking that holds the ego at standstill (m/s²).
 const HOLDING_BRAKE_MPS2: f64 = 2.0;
 
 /// Emergency braking as a scenario file describes it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct AebConfig {
-    /// Required deceleration from which on it brakes [m/s²]; 4.
+    /// Required deceleration above which it brakes (m/s²); 4 if absent.
     pub trigger_mps2: Option<Num>,
-    /// Strongest braking [m/s²]; 9.
+    /// Strongest braking (m/s²); 9 if absent.
     pub max_deceleration_mps2: Option<Num>,
-    /// Gap to be left at standstill [m]; 2.
+    /// Gap to be left at standstill (m); 2 if absent.
     pub standstill_gap_m: Option<Num>,
 }
 
-/// Checked emergency braking.
+/// The checked emergency braking.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Aeb {
     trigger_mps2: f64,
@@ -67,25 +68,26 @@ impl Check for AebConfig {
 }
 
 impl Aeb {
-    /// The braking that is needed from now on [m/s²]; 0 where none is.
-    pub(crate) fn required_mps2(&self, speed_mps: f64, front: &Front) -> f64 {
+    /// Returns the braking that is needed from now on (m/s²); 0 if none is needed.
+    pub(crate) fn required_mps2(&self, speed_mps: f64, lead: &Front) -> f64 {
         Behind {
             speed_mps,
-            lead_mps: front.speed_mps,
-            lead_mps2: front.acceleration_mps2,
-            room_m: front.gap_m - self.standstill_gap_m,
+            lead_mps: lead.speed_mps,
+            lead_mps2: lead.acceleration_mps2,
+            room_m: lead.gap_m - self.standstill_gap_m,
         }
         .required_mps2()
     }
 
-    /// Whether to brake now, having braked before or not, and how hard [m/s²].
-    pub(crate) fn braking_mps2(&self, braked: bool, speed_mps: f64, front: Option<&Front>) -> Option<f64> {
-        let required = front.map_or(0.0, |front| self.required_mps2(speed_mps, front));
-        if braked && speed_mps < STANDING_MPS {
-            let still_near = front.is_some_and(|front| front.speed_mps < 1.0);
+    /// Returns the braking to apply (m/s²), or `None` if none is due. `was_braking` says whether the system braked at
+    /// the previous step.
+    pub(crate) fn braking_mps2(&self, was_braking: bool, speed_mps: f64, lead: Option<&Front>) -> Option<f64> {
+        let required = lead.map_or(0.0, |lead| self.required_mps2(speed_mps, lead));
+        if was_braking && speed_mps < STANDSTILL_MPS {
+            let still_near = lead.is_some_and(|lead| lead.speed_mps < 1.0);
             return still_near.then_some(HOLDING_BRAKE_MPS2);
         }
-        let threshold = if braked { DONE_BELOW_MPS2 } else { self.trigger_mps2 };
+        let threshold = if was_braking { RELEASE_THRESHOLD_MPS2 } else { self.trigger_mps2 };
         (required > threshold).then(|| (BRAKING_MARGIN * required).min(self.max_deceleration_mps2))
     }
 }
@@ -98,32 +100,34 @@ mod tests {
 
     const AEB: Aeb = Aeb { trigger_mps2: 4.0, max_deceleration_mps2: 9.0, standstill_gap_m: 2.0 };
 
-    fn front(gap_m: f64, speed_mps: f64, acceleration_mps2: f64) -> Front {
+    fn lead(gap_m: f64, speed_mps: f64, acceleration_mps2: f64) -> Front {
         Front { acceleration_mps2, ..Front::new(gap_m, speed_mps) }
     }
 
     #[test]
     fn following_closely_is_no_emergency() {
-        assert_eq!(AEB.braking_mps2(false, 33.0, Some(&front(17.0, 33.0, 0.0))), None);
-        assert_eq!(AEB.braking_mps2(false, 33.0, Some(&front(17.0, 33.0, -2.0))), None);
+        assert_eq!(AEB.braking_mps2(false, 33.0, Some(&lead(17.0, 33.0, 0.0))), None);
+        assert_eq!(AEB.braking_mps2(false, 33.0, Some(&lead(17.0, 33.0, -2.0))), None);
     }
 
     #[test]
-    fn a_hard_braking_front_is_one_and_it_latches() {
-        let braking = AEB.braking_mps2(false, 33.0, Some(&front(17.0, 33.0, -8.0))).unwrap();
+    fn a_hard_braking_lead_vehicle_triggers_braking_that_latches() {
+        let braking = AEB.braking_mps2(false, 33.0, Some(&lead(17.0, 33.0, -8.0))).unwrap();
         assert!(braking > 6.0 && braking <= 9.0, "{braking}");
-        assert!(AEB.braking_mps2(true, 30.0, Some(&front(17.0, 28.0, -3.0))).is_some());
-        assert_eq!(AEB.braking_mps2(true, 20.0, Some(&front(17.0, 25.0, 0.0))), None);
+        assert!(AEB.braking_mps2(true, 30.0, Some(&lead(17.0, 28.0, -3.0))).is_some());
+        assert_eq!(AEB.braking_mps2(true, 20.0, Some(&lead(17.0, 25.0, 0.0))), None);
     }
 
     proptest! {
-        /// Braking as required leaves the standstill gap; checked by stepping both vehicles.
+        /// The required braking leaves exactly the standstill gap; checked by time-stepping both vehicles.
         #[test]
-        fn the_required_braking_is_enough_and_not_too_much(gap in 6.0..80.0, own in 5.0..40.0, faster in -5.0..15.0, braking in 0.5..9.0_f64) {
-            let front_mps = f64::max(own - faster, 0.5);
-            let required = AEB.required_mps2(own, &front(gap, front_mps, -braking));
+        fn the_required_braking_just_suffices(
+            gap in 6.0..80.0, own in 5.0..40.0, faster in -5.0..15.0, braking in 0.5..9.0_f64,
+        ) {
+            let lead_mps = f64::max(own - faster, 0.5);
+            let required = AEB.required_mps2(own, &lead(gap, lead_mps, -braking));
             prop_assume!(required > 0.0 && required < 20.0);
-            let (step, mut e, mut f, mut least) = (1e-3, (0.0, own), (gap, front_mps), gap);
+            let (step, mut e, mut f, mut least) = (1e-3, (0.0, own), (gap, lead_mps), gap);
             while e.1 > 0.0 {
                 e = (e.0 + e.1 * step, (e.1 - required * step).max(0.0));
                 f = (f.0 + f.1 * step, (f.1 - braking * step).max(0.0));

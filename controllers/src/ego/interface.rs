@@ -1,65 +1,65 @@
-//! The boundary between the ego stack and the loop: what a controller is given, and what it answers.
+//! The interface between an ego controller and the simulation loop: the input and the command of a control step.
 
 use closecall_traffic::{Lane, Road, Time, Track};
 use serde::{Deserialize, Serialize};
 
 use super::{MisPlan, Reason};
 
-/// E's knowledge of its own motion, from wheel speeds, inertial sensors and lane camera.
+/// The ego's measurement of its own motion, from wheel speeds, inertial sensors and lane camera.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Odometry {
-    /// Speed [m/s].
+    /// Speed (m/s).
     pub speed_mps: f64,
-    /// Acceleration along the vehicle [m/s²].
+    /// Longitudinal acceleration (m/s²).
     pub acceleration_mps2: f64,
-    /// Yaw rate [rad/s].
+    /// Yaw rate (rad/s).
     pub yaw_rate_radps: f64,
-    /// The lane that E drives in.
+    /// The lane of the ego.
     pub lane: Lane,
-    /// Position to the left of that lane's centre [m].
+    /// Lateral offset from the centre of that lane (m), positive to the left.
     pub lane_offset_m: f64,
-    /// Length of E itself [m]: tracks give centres, gaps are bumper to bumper.
+    /// Length of the ego (m); needed because tracks give the centres of vehicles, while gaps are bumper to bumper.
     pub length_m: f64,
-    /// Width of E itself [m].
+    /// Width of the ego (m).
     pub width_m: f64,
 }
 
-/// Which groups of sensors can be relied on.
+/// The groups of sensors that work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct SensorAvailability {
-    /// The radar that looks ahead.
+    /// The front radar.
     pub front: bool,
-    /// The short-range sensors to both sides.
+    /// The short-range sensors on both sides.
     pub surround: bool,
-    /// The sensors that look back.
+    /// The rear sensors.
     pub rear: bool,
 }
 
 impl SensorAvailability {
-    /// Every sensor works.
+    /// All sensors work.
     pub const ALL: Self = Self { front: true, surround: true, rear: true };
 }
 
-/// What an ego controller is given at each control step: its own odometry and tracks, never the truth.
+/// The input of an ego controller at each control step: its own odometry and tracks, never the ground truth.
 #[derive(Clone, Copy, Debug)]
 pub struct EgoInput<'a> {
     /// The time of this step.
     pub time: Time,
-    /// E's own motion.
+    /// The motion of the ego.
     pub odometry: Odometry,
-    /// The road, as a map would give it.
+    /// The road, as a map describes it.
     pub road: &'a Road,
-    /// Everything the sensors report, tentative tracks too.
+    /// All tracks that the sensors report, including tentative ones.
     pub tracks: &'a [Track],
-    /// Which sensors work.
+    /// The groups of sensors that work.
     pub sensors: SensorAvailability,
 }
 
 impl EgoInput<'_> {
-    /// Refuses input that is not finite: comparisons and `min` would let it pass for something safe.
+    /// Refuses input that is not finite, because comparisons and `min` could otherwise make it look safe.
     ///
     /// # Errors
-    /// [`ControllerError::NotFinite`], with what it is.
+    /// [`ControllerError::NotFinite`] with the name of the quantity.
     pub fn check_finite(&self) -> Result<(), ControllerError> {
         let refuse = |what| Err(ControllerError::NotFinite { what, time: self.time });
         if !self.odometry.speed_mps.is_finite() {
@@ -75,71 +75,71 @@ impl EgoInput<'_> {
     }
 }
 
-/// What the ego stack is doing.
+/// The state of the ego stack.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum EgoState {
-    /// Adaptive cruise control alone.
+    /// Only the adaptive cruise control is active.
     #[default]
     Following,
-    /// The margin increase system slows down to raise the front time headway.
+    /// The margin increase system slows the ego down to raise its front time headway.
     Increasing,
-    /// Inside the critical phase the margin is used up instead of braking.
+    /// The ego is in the critical phase and uses up the margin instead of braking.
     Holding,
-    /// The margin is given back smoothly.
+    /// The ego returns the margin smoothly.
     Releasing,
     /// Emergency braking.
     EmergencyBraking,
 }
 
-/// What an ego controller answers.
+/// The command of an ego controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EgoCommand {
-    /// Acceleration asked of the actuators [m/s²]; must be finite.
+    /// Commanded acceleration (m/s²); must be finite.
     pub acceleration_mps2: f64,
-    /// What the stack is doing.
+    /// The state of the stack.
     pub state: EgoState,
-    /// Why it does it.
+    /// The reason for the state.
     pub reason: Reason,
-    /// What the margin increase system last worked out, where it follows a vehicle behind.
+    /// The plan of the margin increase system, while it has a rear vehicle as its target.
     pub plan: Option<MisPlan>,
 }
 
-/// A controller that failed. Its state is undefined afterwards; the run ends as an error.
+/// The error of a controller that failed. Its state is undefined afterwards, and the run ends as an error.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ControllerError {
-    /// A number that has to be finite was not.
+    /// A number that must be finite is not.
     #[error("failed to control: {what} is not finite at {time}")]
     NotFinite {
         /// The quantity.
         what: &'static str,
-        /// When.
+        /// The time of the control step.
         time: Time,
     },
-    /// A controller that does not ship failed for a reason of its own.
+    /// A controller from outside Closecall failed for a reason of its own.
     #[error("failed at {time}: {reason}")]
     Own {
-        /// What happened, in words.
+        /// The failure, in words.
         reason: String,
-        /// When.
+        /// The time of the control step.
         time: Time,
     },
 }
 
-/// Who drives E: called once for each control step (25 Hz), in order of time.
+/// A controller of the ego, called once per control step (25 Hz) in order of time.
 ///
-/// This is where a controller of your own plugs in. It is given what a vehicle can know, E's odometry and the tracks of
-/// its sensors, and answers with an acceleration and its state; the loop sees to sensors, actuators and everybody else.
-/// One value drives one run, so that whatever it remembers starts afresh with each sample. It may fail, or even panic: that
-/// sample then ends as an error, and the campaign goes on.
+/// Implement this trait to test your own controller. A controller receives what a vehicle can know: the odometry of the
+/// ego and the tracks of its sensors. It returns an acceleration and its state. The loop simulates the sensors, the
+/// actuators and all other vehicles. One instance drives one run, so that each sample starts without memory of another.
+/// A controller may fail or even panic: that sample then ends as an error, and the campaign continues.
 ///
 /// ```
 /// use closecall_controllers::{ControllerError, EgoCommand, EgoController, EgoInput, EgoState, Reason};
 ///
-/// /// Brakes gently while anything confirmed is behind.
-/// struct Shy;
+/// /// Brakes gently while any track is behind the ego.
+/// struct GentleBraking;
 ///
-/// impl EgoController for Shy {
+/// impl EgoController for GentleBraking {
 ///     fn step(&mut self, input: &EgoInput<'_>) -> Result<EgoCommand, ControllerError> {
 ///         input.check_finite()?;
 ///         let followed = input.tracks.iter().any(|track| track.x_m() < 0.0);
@@ -153,12 +153,12 @@ pub enum ControllerError {
 /// }
 /// ```
 ///
-/// A whole one, with the factory that a campaign asks for and a campaign around it, is `examples/own_controller.rs`. A
-/// controller in another language runs as a process of its own: `--controller exec:COMMAND`.
+/// A complete example with a factory and a campaign is `examples/own_controller.rs`. A controller in another language
+/// runs as a process of its own: `--controller exec:COMMAND`.
 pub trait EgoController: Send {
-    /// The command for the time until the next control step.
+    /// Returns the command for the time until the next control step.
     ///
     /// # Errors
-    /// [`ControllerError`] where no command could be worked out.
+    /// [`ControllerError`] if no command could be computed.
     fn step(&mut self, input: &EgoInput<'_>) -> Result<EgoCommand, ControllerError>;
 }

@@ -1,4 +1,5 @@
-//! The ego stack: adaptive cruise control, emergency braking, and the margin increase system above them.
+//! The ego stack: adaptive cruise control (ACC), automatic emergency braking (AEB), and the margin increase system
+//! (MIS) above them.
 
 mod acc;
 mod aeb;
@@ -12,7 +13,7 @@ mod surroundings;
 pub use acc::{Acc, AccConfig};
 pub use aeb::{Aeb, AebConfig};
 pub use interface::{ControllerError, EgoCommand, EgoController, EgoInput, EgoState, Odometry, SensorAvailability};
-pub use mis::{Encounter, Foresight, MisConfig, MisPlan, MisSettings, Response, Solution};
+pub use mis::{ArrivalPrediction, BrakingResponse, Encounter, MisConfig, MisPlan, MisSettings, Solution};
 pub use reason::Reason;
 pub use settings::{EgoSettings, EgoStackConfig};
 pub use stack::EgoStack;

@@ -1,72 +1,72 @@
-//! Why the ego stack does what it does.
+//! Reasons for the state of the ego stack.
 
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// Why the stack is in its state: at a change of state the cause of the change; while following, the condition that
-/// keeps the margin increase system from engaging.
+/// The reason for the state of the stack: after a change of state, the cause of the change; while following, the
+/// condition that keeps the margin increase system from engaging.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Reason {
     /// The controller has no margin increase system.
     NoMis,
-    /// E is not in automated mode.
+    /// The ego is not in automated mode.
     NotAutomated,
-    /// There is no vehicle ahead in E's lane.
+    /// No vehicle is ahead in the lane of the ego.
     NoFront,
-    /// The front time headway is long enough already.
+    /// The front time headway is already long enough.
     FrontMarginLong,
-    /// No vehicle is known behind E in its lane.
+    /// No vehicle is known to be behind the ego in its lane.
     NoRear,
-    /// The track behind is not confirmed yet.
+    /// The track of the rear vehicle is not confirmed yet.
     RearUnconfirmed,
-    /// The track behind is not classified as a vehicle.
+    /// The track of the rear vehicle is not classified as a vehicle.
     RearUnclassified,
-    /// The vehicle behind is too far away.
+    /// The rear vehicle is too far away.
     RearFar,
-    /// The vehicle behind does not approach fast enough.
+    /// The rear vehicle does not approach fast enough.
     RearNotApproaching,
-    /// There is no lane beside E in which the vehicle behind could overtake.
+    /// No lane beside the ego allows the rear vehicle to overtake.
     NoPassingLane,
     /// The passing lane is not free.
     PassingLaneOccupied,
-    /// Whether the passing lane is free is not known.
+    /// It is not known whether the passing lane is free.
     PassingLaneUnknown,
-    /// All conditions for engaging hold; the goal is in reach.
+    /// All conditions for engaging hold, and the goal is in reach.
     Engaged,
-    /// All conditions for engaging hold; the goal is out of reach, and the comfort limit is used in full.
+    /// All conditions for engaging hold, but the goal is out of reach; the comfort limit is used in full.
     EngagedGoalOutOfReach,
-    /// The vehicle behind has come to the critical distance.
+    /// The rear vehicle has reached the critical distance.
     CriticalDistance,
-    /// The vehicle behind has left E's lane while it was still far away.
+    /// The rear vehicle has left the lane of the ego while still far away.
     RearChangedLane,
-    /// The vehicle behind is past.
+    /// The rear vehicle has passed.
     RearPassed,
-    /// The vehicle behind has fallen back.
+    /// The rear vehicle has fallen back.
     RearFellBack,
-    /// The vehicle behind follows instead of overtaking.
+    /// The rear vehicle follows instead of overtaking.
     RearFollows,
-    /// The track of the vehicle behind was lost.
+    /// The track of the rear vehicle was lost.
     RearLost,
-    /// The vehicle ahead was lost, or left the lane.
+    /// The lead vehicle was lost, or left the lane.
     FrontLost,
-    /// The time allowed for holding is over.
+    /// The time limit for holding has expired.
     HoldExpired,
-    /// A braking of the vehicle ahead would leave no room for holding on.
+    /// There is no room to keep holding if the lead vehicle brakes.
     NoRoomToHold,
-    /// The margin has been given back.
+    /// The margin has been returned.
     MarginReturned,
-    /// Only emergency braking avoids running into the vehicle ahead.
+    /// Only emergency braking avoids a collision with the lead vehicle.
     BrakingRequired,
     /// Emergency braking is no longer needed.
     BrakingDone,
-    /// A controller that does not ship has reasons of its own.
+    /// A controller from outside Closecall has a reason of its own.
     External,
 }
 
 impl Reason {
-    /// What the reason says, as a phrase.
+    /// Returns the reason as a phrase.
     pub const fn text(self) -> &'static str {
         match self {
             Self::NoMis => "no margin increase system",

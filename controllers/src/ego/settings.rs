@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Acc, AccConfig, Aeb, AebConfig, EgoController, EgoStack, MisConfig, MisSettings};
 
-/// The ego stack as a scenario file describes it. A function that is absent does not exist.
+/// The ego stack as a scenario file describes it. An absent function is not part of the stack.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct EgoStackConfig {
@@ -16,13 +16,13 @@ pub struct EgoStackConfig {
     pub aeb: Option<AebConfig>,
     /// The margin increase system.
     pub mis: Option<MisConfig>,
-    /// Whether E is in automated mode. Where it is not, the margin increase system never engages; the same control laws
-    /// then stand for an attentive driver.
-    #[serde(default = "automated")]
+    /// Whether the ego is in automated mode. If not, the margin increase system never engages; the same control laws
+    /// then represent an attentive driver.
+    #[serde(default = "default_automated")]
     pub automated: bool,
 }
 
-fn automated() -> bool {
+fn default_automated() -> bool {
     true
 }
 
@@ -36,23 +36,23 @@ pub struct EgoSettings {
 }
 
 impl EgoSettings {
-    /// The same stack without the margin increase system: the controller `acc`.
+    /// Returns the same stack without the margin increase system: the controller `acc`.
     #[must_use]
     pub fn without_mis(self) -> Self {
         Self { mis: None, ..self }
     }
 
-    /// The settings of the margin increase system, where there is one.
+    /// Returns the settings of the margin increase system, or `None` if the stack has none.
     pub fn mis(&self) -> Option<&MisSettings> {
         self.mis.as_ref()
     }
 
-    /// The time gap that the adaptive cruise control keeps [s].
+    /// Returns the time gap of the adaptive cruise control (s).
     pub fn time_gap_s(&self) -> f64 {
         self.acc.time_gap_s
     }
 
-    /// A fresh controller for one run.
+    /// Builds a new controller for one run.
     pub fn build(&self) -> Box<dyn EgoController> {
         Box::new(EgoStack::new(*self))
     }

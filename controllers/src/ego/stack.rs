@@ -1,49 +1,50 @@
-//! The one place where ACC, MIS and AEB are arbitrated.
+//! Arbitration between ACC, MIS and AEB.
 //!
-//! | MIS wishes | command |
+//! | request of the MIS | command |
 //! |---|---|
 //! | follow | ACC |
-//! | brake by a | the smaller of ACC and −a, which is reached within the jerk limit |
-//! | hold | the speed, whatever ACC wants |
-//! | release | ACC, its acceleration bounded and raised within the jerk limit |
+//! | brake by a | the smaller of the ACC's acceleration and −a, which is approached within the jerk limits |
+//! | hold | keep the speed, whatever the ACC requests |
+//! | release | ACC, its acceleration limited, and raised within the jerk limit for releasing the brake |
 //!
-//! Emergency braking overrides all of them where it asks for more braking.
+//! Emergency braking overrides all of them if it requests more braking.
 
 use closecall_traffic::Time;
 
-use super::mis::{LETTING_GO_MPS3, Mis, Situation, Wish};
+use super::mis::{BRAKE_RELEASE_JERK_MPS3, Mis, Request, Situation};
 use super::surroundings::{Front, FrontFollower};
 use super::{ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoState, Reason};
 
-/// Acceleration with which the margin is given back [m/s²].
-const GIVING_BACK_MPS2: f64 = 0.8;
+/// Largest acceleration while the margin is returned (m/s²).
+const RELEASE_ACCELERATION_MPS2: f64 = 0.8;
 
 /// The built-in ego stack.
 #[derive(Clone, Debug)]
 pub struct EgoStack {
     settings: EgoSettings,
-    front: FrontFollower,
+    lead: FrontFollower,
     mis: Option<Mis>,
-    emergency: bool,
-    last: Option<(Time, f64)>,
+    emergency_braking: bool,
+    /// Time and value (m/s²) of the last commanded acceleration.
+    last_command: Option<(Time, f64)>,
 }
 
 impl EgoStack {
-    /// A stack for one run.
+    /// Creates a stack for one run.
     pub fn new(settings: EgoSettings) -> Self {
         let mis = settings.mis.map(Mis::new);
-        Self { settings, front: FrontFollower::default(), mis, emergency: false, last: None }
+        Self { settings, lead: FrontFollower::default(), mis, emergency_braking: false, last_command: None }
     }
 
-    /// The same stack without the margin increase system, for one run: the controller `acc`.
+    /// Creates a stack without the margin increase system for one run: the controller `acc`.
     pub fn without_mis(settings: EgoSettings) -> Self {
         Self::new(settings.without_mis())
     }
 
-    /// The command of ACC and MIS, the state, its reason and the plan.
-    fn comfortable(&mut self, input: &EgoInput<'_>, front: Option<&Front>) -> EgoCommand {
+    /// Computes the command of ACC and MIS, with state, reason and plan.
+    fn comfort_command(&mut self, input: &EgoInput<'_>, lead: Option<&Front>) -> EgoCommand {
         let speed_mps = input.odometry.speed_mps;
-        let acc_mps2 = self.settings.acc.acceleration_mps2(speed_mps, input.road.speed_limit_mps(), front);
+        let acc_mps2 = self.settings.acc.acceleration_mps2(speed_mps, input.road.speed_limit_mps(), lead);
         let Some(mis) = &mut self.mis else {
             return EgoCommand {
                 acceleration_mps2: acc_mps2,
@@ -52,22 +53,22 @@ impl EgoStack {
                 plan: None,
             };
         };
-        let (last, step_s) = self.last.map_or((0.0, 0.0), |(time, last)| (last, (input.time - time).s()));
+        let (last, step_s) = self.last_command.map_or((0.0, 0.0), |(time, last)| (last, (input.time - time).s()));
         let situation = Situation {
             input,
-            front,
-            asked_mps2: last,
+            lead,
+            commanded_mps2: last,
             automated: self.settings.automated,
-            acc_gap_m: self.settings.acc.wanted_gap_m(speed_mps),
+            acc_gap_m: self.settings.acc.desired_gap_m(speed_mps),
         };
         let decision = mis.step(&situation);
         let lowest = last - mis.settings().max_jerk_mps3 * step_s;
-        let highest = last + LETTING_GO_MPS3 * step_s;
-        let acceleration_mps2 = match decision.wish {
-            Wish::Follow => acc_mps2,
-            Wish::Brake(braking) => acc_mps2.min((-braking).max(lowest).min(highest)),
-            Wish::Hold => highest.min(0.0).max(lowest),
-            Wish::Release => acc_mps2.min(GIVING_BACK_MPS2).min(highest),
+        let highest = last + BRAKE_RELEASE_JERK_MPS3 * step_s;
+        let acceleration_mps2 = match decision.request {
+            Request::Follow => acc_mps2,
+            Request::Brake(braking) => acc_mps2.min((-braking).max(lowest).min(highest)),
+            Request::Hold => highest.min(0.0).max(lowest),
+            Request::Release => acc_mps2.min(RELEASE_ACCELERATION_MPS2).min(highest),
         };
         EgoCommand { acceleration_mps2, state: decision.state, reason: decision.reason, plan: decision.plan }
     }
@@ -76,22 +77,23 @@ impl EgoStack {
 impl EgoController for EgoStack {
     fn step(&mut self, input: &EgoInput<'_>) -> Result<EgoCommand, ControllerError> {
         input.check_finite()?;
-        let front = self.front.update(input);
-        let mut command = self.comfortable(input, front.as_ref());
+        let lead = self.lead.update(input);
+        let mut command = self.comfort_command(input, lead.as_ref());
         let speed_mps = input.odometry.speed_mps;
-        let braking = self.settings.aeb.and_then(|aeb| aeb.braking_mps2(self.emergency, speed_mps, front.as_ref()));
+        let braking =
+            self.settings.aeb.and_then(|aeb| aeb.braking_mps2(self.emergency_braking, speed_mps, lead.as_ref()));
         if let Some(braking) = braking {
             command.acceleration_mps2 = command.acceleration_mps2.min(-braking);
             command.state = EgoState::EmergencyBraking;
             command.reason = Reason::BrakingRequired;
-        } else if self.emergency {
+        } else if self.emergency_braking {
             command.reason = Reason::BrakingDone;
         }
-        self.emergency = braking.is_some();
+        self.emergency_braking = braking.is_some();
         if !command.acceleration_mps2.is_finite() {
             return Err(ControllerError::NotFinite { what: "commanded acceleration", time: input.time });
         }
-        self.last = Some((input.time, command.acceleration_mps2));
+        self.last_command = Some((input.time, command.acceleration_mps2));
         Ok(command)
     }
 }

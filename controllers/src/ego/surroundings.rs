@@ -1,138 +1,140 @@
-//! What the tracks mean: the vehicle ahead, the vehicle behind, and the passing lane.
+//! Interpretation of the tracks: the lead vehicle, the rear vehicle, and the occupancy of the passing lane.
 //!
-//! Tracks give the centres of boxes in E's frame; gaps are bumper to bumper. A track counts as in a lane where the
-//! tracker gives that lane a probability of at least one half.
+//! Tracks give the centres of boxes in the vehicle frame of the ego, whereas gaps are bumper to bumper. A track counts
+//! as being in a lane if the tracker gives that lane a probability of at least one half.
 
 use closecall_traffic::{Side, Source, Time, Track, TrackId, TrackStatus};
 use serde::Serialize;
 
 use super::{EgoInput, Odometry};
 
-/// Probability from which on something counts as there, in that lane, and of that kind [1].
+/// Probability from which on a track counts as real, as being in a lane, or as a vehicle.
 const LIKELY: f64 = 0.5;
 
-/// Time constant with which the acceleration of the vehicle ahead follows its speed's change [s].
-const ACCELERATION_TIME_S: f64 = 0.2;
+/// Time constant of the smoothing of the lead vehicle's acceleration (s).
+const ACCELERATION_TIME_CONSTANT_S: f64 = 0.2;
 
-/// Strongest acceleration that is believed of the vehicle ahead [m/s²].
-const BELIEVED_MPS2: f64 = 10.0;
+/// Largest plausible acceleration of the lead vehicle (m/s²).
+const MAX_PLAUSIBLE_ACCELERATION_MPS2: f64 = 10.0;
 
-/// Distance that two vehicles in the passing lane have to keep from each other to count as free of each other [m].
-const FREE_DISTANCE_M: f64 = 15.0;
+/// Bumper-to-bumper spacing below which two vehicles in the passing lane are in each other's way (m).
+const MIN_SPACING_M: f64 = 15.0;
 
-/// Gap to E at which the vehicle behind is expected to start using the passing lane [m].
-const USES_PASSING_LANE_FROM_M: f64 = 40.0;
+/// Gap to the ego at which the rear vehicle is expected to enter the passing lane (m).
+const PASSING_LANE_ENTRY_GAP_M: f64 = 40.0;
 
-/// Distance ahead of E at which the vehicle behind has passed [m].
-const PASSED_AHEAD_M: f64 = 10.0;
+/// Gap ahead of the ego beyond which the rear vehicle no longer needs the passing lane (m).
+const PASSING_LANE_EXIT_GAP_M: f64 = 10.0;
 
-/// The vehicle ahead in E's lane.
+/// The lead vehicle: the vehicle ahead in the lane of the ego.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Front {
-    /// Its track.
+    /// Number of its track.
     pub track: TrackId,
-    /// Gap from E to it, bumper to bumper [m].
+    /// Gap from the ego to the lead vehicle, bumper to bumper (m).
     pub gap_m: f64,
-    /// Its speed [m/s].
+    /// Speed of the lead vehicle (m/s).
     pub speed_mps: f64,
-    /// Its acceleration, smoothed from its speed [m/s²].
+    /// Acceleration of the lead vehicle, smoothed from its speed (m/s²).
     pub acceleration_mps2: f64,
 }
 
 #[cfg(test)]
 impl Front {
-    /// A vehicle ahead that keeps its speed.
+    /// Creates a lead vehicle that keeps its speed.
     pub(crate) fn new(gap_m: f64, speed_mps: f64) -> Self {
         Self { track: TrackId(0), gap_m, speed_mps, acceleration_mps2: 0.0 }
     }
 }
 
-/// Two tracks of one vehicle differ by less than this along the lane [m]: errors of length and position together.
-const SAME_AHEAD_M: f64 = 5.0;
-/// And by less than this across it [m]: half of what is between the centres of two narrow vehicles side by side.
-const SAME_ASIDE_M: f64 = 1.0;
-/// And by less than this in speed [m/s].
-const SAME_SPEED_MPS: f64 = 3.0;
+/// Largest longitudinal difference between two tracks of one vehicle (m): the errors of length and position together.
+const SAME_VEHICLE_LONGITUDINAL_M: f64 = 5.0;
+/// Largest lateral difference between two tracks of one vehicle (m): half of the distance between the centres of two
+/// narrow vehicles side by side.
+const SAME_VEHICLE_LATERAL_M: f64 = 1.0;
+/// Largest difference of speed between two tracks of one vehicle (m/s).
+const SAME_VEHICLE_SPEED_MPS: f64 = 3.0;
 
-/// A vehicle behind.
+/// A rear vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Rear {
+pub(crate) struct RearVehicle {
     pub(crate) track: TrackId,
-    /// Gap to E [m]; negative where it overlaps E lengthwise or is past.
+    /// Gap to the ego (m); negative if the vehicle overlaps the ego lengthwise or is past.
     pub(crate) gap_m: f64,
-    /// Position of its centre ahead of E's [m].
+    /// Longitudinal position of its centre relative to that of the ego (m), positive ahead.
     pub(crate) x_m: f64,
-    /// Position of its centre to the left of E's [m].
+    /// Lateral position of its centre relative to that of the ego (m), positive to the left.
     pub(crate) y_m: f64,
     pub(crate) length_m: f64,
     pub(crate) speed_mps: f64,
-    /// Standard deviation of the speed [m/s].
+    /// Standard deviation of the speed (m/s).
     pub(crate) speed_sd_mps: f64,
     pub(crate) confirmed: bool,
     pub(crate) classified: bool,
-    /// Probability of being in E's lane [1].
+    /// Probability of being in the lane of the ego.
     pub(crate) own_lane: f64,
-    /// Probability of being in the passing lane [1].
+    /// Probability of being in the passing lane.
     pub(crate) passing_lane: f64,
 }
 
-impl Rear {
+impl RearVehicle {
     pub(crate) fn in_own_lane(&self) -> bool {
         self.own_lane >= LIKELY
     }
 
-    /// True once the whole vehicle is ahead of E: it has concluded its overtaking, whatever E does now.
+    /// Returns true if the whole vehicle is ahead of the ego. Its overtaking is then complete, whatever the ego does.
     pub(crate) fn is_past(&self, odometry: &Odometry) -> bool {
         self.x_m > 0.5 * (self.length_m + odometry.length_m)
     }
 
-    /// True where `track` is this vehicle, perhaps as another sensor sees it while it changes lanes. One that drives
-    /// beside it is further away sideways.
-    fn is_seen_as(&self, track: &Track) -> bool {
-        let is_near = (track.x_m() - self.x_m).abs() < SAME_AHEAD_M && (track.y_m() - self.y_m).abs() < SAME_ASIDE_M;
-        track.id == self.track || (is_near && (track.vx_mps() - self.speed_mps).abs() < SAME_SPEED_MPS)
+    /// Returns true if `track` belongs to this vehicle, perhaps as seen by another sensor during a lane change. A
+    /// vehicle that drives beside it is further away laterally.
+    fn matches(&self, track: &Track) -> bool {
+        let is_near = (track.x_m() - self.x_m).abs() < SAME_VEHICLE_LONGITUDINAL_M
+            && (track.y_m() - self.y_m).abs() < SAME_VEHICLE_LATERAL_M;
+        track.id == self.track || (is_near && (track.vx_mps() - self.speed_mps).abs() < SAME_VEHICLE_SPEED_MPS)
     }
 }
 
-/// Whether the passing lane is free for the vehicle behind.
+/// The occupancy of the passing lane for the rear vehicle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum PassingLane {
-    /// The road has none on the overtaking side of E.
+    /// The road has no lane on the overtaking side of the ego.
     None,
-    /// Free as far as it matters.
+    /// No other vehicle is in the way of the rear vehicle.
     Free,
-    /// In use.
+    /// Another vehicle is in the way.
     Occupied,
-    /// Not known: a sensor is missing, or something is there that is not confirmed yet.
+    /// Not known: a sensor is missing, an unconfirmed track is in the way, or the rear vehicle does not approach.
     Unknown,
 }
 
-/// How hard whatever is ahead might brake, in order to tell which leaves the least room to stop [m/s²].
-const MAY_BRAKE_MPS2: f64 = 8.0;
+/// Assumed braking of the vehicles ahead (m/s²): it decides which of them leaves the least room to stop.
+const WORST_LEAD_BRAKING_MPS2: f64 = 8.0;
 
-/// A vehicle ahead whose track vanished while it was in E's lane is taken to be there still for this long.
-const REMEMBERED: Time = Time::from_ms(500);
+/// Time for which a vehicle that vanished from the lane of the ego is assumed to be there still.
+const TRACK_MEMORY: Time = Time::from_ms(500);
 
-/// One vehicle ahead from step to step.
+/// A vehicle ahead, followed over the control steps.
 #[derive(Clone, Copy, Debug)]
-struct Followed {
+struct LeadCandidate {
     id: TrackId,
-    /// When it was last seen.
-    seen: Time,
-    /// Position of its centre ahead of E's then [m].
+    /// Time of the last observation.
+    last_seen: Time,
+    /// Longitudinal position of its centre relative to that of the ego at that time (m).
     x_m: f64,
     length_m: f64,
     speed_mps: f64,
-    /// Its acceleration, smoothed; tracks do not carry it [m/s²].
+    /// Acceleration, smoothed from the speed because tracks do not carry it (m/s²).
     acceleration_mps2: f64,
     in_lane: bool,
 }
 
-impl Followed {
+impl LeadCandidate {
     fn new(track: &Track) -> Self {
         Self {
             id: track.id,
-            seen: track.time,
+            last_seen: track.time,
             x_m: track.x_m(),
             length_m: track.length_m,
             speed_mps: track.vx_mps(),
@@ -141,19 +143,21 @@ impl Followed {
         }
     }
 
-    fn see(&mut self, track: &Track) {
-        let step_s = (track.time - self.seen).s();
+    fn observe(&mut self, track: &Track) {
+        let step_s = (track.time - self.last_seen).s();
         if step_s > 0.0 {
-            let measured = ((track.vx_mps() - self.speed_mps) / step_s).clamp(-BELIEVED_MPS2, BELIEVED_MPS2);
-            let share = step_s / (ACCELERATION_TIME_S + step_s);
+            let measured = ((track.vx_mps() - self.speed_mps) / step_s)
+                .clamp(-MAX_PLAUSIBLE_ACCELERATION_MPS2, MAX_PLAUSIBLE_ACCELERATION_MPS2);
+            let share = step_s / (ACCELERATION_TIME_CONSTANT_S + step_s);
             let acceleration_mps2 = self.acceleration_mps2 + share * (measured - self.acceleration_mps2);
             *self = Self { acceleration_mps2, ..Self::new(track) };
         }
     }
 
-    /// This vehicle at `now`, seen then or predicted: braking on as it did, down to a stand.
-    fn front(&self, now: Time, odometry: &Odometry) -> Front {
-        let since_s = (now - self.seen).s();
+    /// Returns the vehicle at `now`, observed or predicted: the prediction keeps the acceleration, down to a
+    /// standstill.
+    fn predict(&self, now: Time, odometry: &Odometry) -> Front {
+        let since_s = (now - self.last_seen).s();
         let speed_mps = (self.speed_mps + self.acceleration_mps2 * since_s).max(0.0);
         let moved_m = (0.5 * (self.speed_mps + speed_mps) - odometry.speed_mps) * since_s;
         Front {
@@ -165,72 +169,76 @@ impl Followed {
     }
 }
 
-/// Follows the vehicles ahead from step to step: to be updated at each control step.
+/// Selects the lead vehicle; to be updated at each control step.
 #[derive(Clone, Debug, Default)]
 pub struct FrontFollower {
-    followed: Vec<Followed>,
+    candidates: Vec<LeadCandidate>,
 }
 
 impl FrontFollower {
-    /// Of the vehicles ahead in E's lane the one that leaves E the least room to stop.
+    /// Observes the tracks of this step. Returns, of the vehicles ahead in the lane of the ego, the one that leaves the
+    /// ego the least room to stop.
     ///
-    /// Not simply the nearest: one that overtakes and is only just past would hide the one behind which E brakes.
+    /// This is not always the nearest one: a vehicle that overtakes and is only just past would hide the one behind
+    /// which the ego brakes.
     pub fn update(&mut self, input: &EgoInput<'_>) -> Option<Front> {
         let now = input.time;
-        for track in input.tracks.iter().filter(|track| track.x_m() > 0.0 && established(track) && exists(track)) {
-            match self.followed.iter_mut().find(|followed| followed.id == track.id) {
-                // A track that coasts says nothing of its acceleration; for a while the last one is the better guess.
-                Some(followed) if track.status == TrackStatus::Coasting && now - followed.seen <= REMEMBERED => {}
-                Some(followed) => followed.see(track),
-                None => self.begin(track),
+        for track in input.tracks.iter().filter(|track| track.x_m() > 0.0 && is_established(track) && exists(track)) {
+            match self.candidates.iter_mut().find(|candidate| candidate.id == track.id) {
+                // A coasting track carries no new information on the acceleration; for a while the last estimate is
+                // better.
+                Some(candidate)
+                    if track.status == TrackStatus::Coasting && now - candidate.last_seen <= TRACK_MEMORY => {}
+                Some(candidate) => candidate.observe(track),
+                None => self.add(track),
             }
         }
         let is_gone = |id| !input.tracks.iter().any(|track| track.id == id && track.x_m() > 0.0);
-        self.followed.retain(|followed| {
-            let remembered = followed.in_lane && now - followed.seen <= REMEMBERED;
-            remembered || !is_gone(followed.id)
+        self.candidates.retain(|candidate| {
+            let is_remembered = candidate.in_lane && now - candidate.last_seen <= TRACK_MEMORY;
+            is_remembered || !is_gone(candidate.id)
         });
-        let room_m = |front: &Front| front.gap_m + front.speed_mps * front.speed_mps / (2.0 * MAY_BRAKE_MPS2);
-        self.followed
+        let room_m = |lead: &Front| lead.gap_m + lead.speed_mps * lead.speed_mps / (2.0 * WORST_LEAD_BRAKING_MPS2);
+        self.candidates
             .iter()
-            .filter(|followed| followed.in_lane)
-            .map(|followed| followed.front(now, &input.odometry))
+            .filter(|candidate| candidate.in_lane)
+            .map(|candidate| candidate.predict(now, &input.odometry))
             .min_by(|a, b| room_m(a).total_cmp(&room_m(b)))
     }
 
-    /// Follows a new track, as the heir of one that vanished at its place.
-    fn begin(&mut self, track: &Track) {
+    /// Adds a new track. If a track vanished at the same place, the new one takes over its acceleration.
+    fn add(&mut self, track: &Track) {
         let now = track.time;
-        let heir_of = |followed: &&mut Followed| {
-            let since_s = (now - followed.seen).s();
+        let is_predecessor = |candidate: &&mut LeadCandidate| {
+            let since_s = (now - candidate.last_seen).s();
             since_s > 0.0
-                && (followed.x_m - track.x_m()).abs() < SAME_AHEAD_M
-                && (followed.speed_mps - track.vx_mps()).abs() < SAME_SPEED_MPS
+                && (candidate.x_m - track.x_m()).abs() < SAME_VEHICLE_LONGITUDINAL_M
+                && (candidate.speed_mps - track.vx_mps()).abs() < SAME_VEHICLE_SPEED_MPS
         };
-        let fresh = Followed::new(track);
-        match self.followed.iter_mut().find(heir_of) {
-            Some(followed) => *followed = Followed { acceleration_mps2: followed.acceleration_mps2, ..fresh },
-            None => self.followed.push(fresh),
+        let new = LeadCandidate::new(track);
+        match self.candidates.iter_mut().find(is_predecessor) {
+            Some(candidate) => *candidate = LeadCandidate { acceleration_mps2: candidate.acceleration_mps2, ..new },
+            None => self.candidates.push(new),
         }
     }
 }
 
 fn in_own_lane(track: &Track) -> bool {
-    track.lane[OWN] >= LIKELY
+    track.lane[OWN_LANE_INDEX] >= LIKELY
 }
 
-/// Place of E's own lane among a track's lane probabilities.
-const OWN: usize = 1;
+/// Index of the lane of the ego in the lane probabilities of a track.
+const OWN_LANE_INDEX: usize = 1;
 
-/// Place of the passing lane among a track's lane probabilities.
-const fn passing(side: Side) -> usize {
+/// Returns the index of the passing lane in the lane probabilities of a track.
+const fn passing_lane_index(side: Side) -> usize {
     match side {
         Side::Left => 0,
         Side::Right => 2,
     }
 }
 
-fn established(track: &Track) -> bool {
+fn is_established(track: &Track) -> bool {
     matches!(track.status, TrackStatus::Confirmed | TrackStatus::Coasting)
 }
 
@@ -238,16 +246,16 @@ fn exists(track: &Track) -> bool {
     track.existence >= LIKELY
 }
 
-/// True where the most probable class is a vehicle's, and a vehicle is more likely than not. Scores that are all equal
-/// say nothing, and so do not classify.
-fn classified(track: &Track) -> bool {
+/// Returns true if the track is at least as likely a vehicle as not, and one vehicle class is more probable than the
+/// background. Equal scores carry no information and do not classify a track.
+fn is_classified(track: &Track) -> bool {
     let scores = track.class.0;
     let best = scores[track.class.best_vehicle_class() as usize];
     track.class.vehicle() >= LIKELY && best > scores[3]
 }
 
-pub(crate) fn rear_of(track: &Track, input: &EgoInput<'_>) -> Rear {
-    Rear {
+pub(crate) fn rear_vehicle_from(track: &Track, input: &EgoInput<'_>) -> RearVehicle {
+    RearVehicle {
         track: track.id,
         gap_m: -track.x_m() - 0.5 * (track.length_m + input.odometry.length_m),
         x_m: track.x_m(),
@@ -255,30 +263,30 @@ pub(crate) fn rear_of(track: &Track, input: &EgoInput<'_>) -> Rear {
         length_m: track.length_m,
         speed_mps: track.vx_mps(),
         speed_sd_mps: track.covariance[(2, 2)].max(0.0).sqrt(),
-        confirmed: established(track),
-        classified: classified(track),
-        own_lane: track.lane[OWN],
-        passing_lane: track.lane[passing(input.road.overtaking_side())],
+        confirmed: is_established(track),
+        classified: is_classified(track),
+        own_lane: track.lane[OWN_LANE_INDEX],
+        passing_lane: track.lane[passing_lane_index(input.road.overtaking_side())],
     }
 }
 
-/// The nearest thing behind in E's lane, established or not. Where there is an established one, nearer tentative ones
-/// do not hide it.
-pub(crate) fn nearest_behind(input: &EgoInput<'_>) -> Option<Rear> {
+/// Returns the nearest vehicle behind in the lane of the ego. A confirmed and classified track has priority over nearer
+/// ones that are not both.
+pub(crate) fn nearest_rear_vehicle(input: &EgoInput<'_>) -> Option<RearVehicle> {
     let behind = |track: &&Track| {
-        track.x_m() < 0.0 && track.source != Source::Front && exists(track) && track.lane[OWN] >= LIKELY
+        track.x_m() < 0.0 && track.source != Source::Front && exists(track) && track.lane[OWN_LANE_INDEX] >= LIKELY
     };
     let nearer = |a: &&Track, b: &&Track| b.x_m().total_cmp(&a.x_m());
     let vehicles = || input.tracks.iter().filter(behind);
     let best = vehicles()
-        .filter(|track| established(track) && classified(track))
+        .filter(|track| is_established(track) && is_classified(track))
         .min_by(nearer)
         .or_else(|| vehicles().min_by(nearer))?;
-    Some(rear_of(best, input))
+    Some(rear_vehicle_from(best, input))
 }
 
-/// Whether the passing lane is free for `rear` to overtake E.
-pub(crate) fn passing_lane(input: &EgoInput<'_>, rear: &Rear) -> PassingLane {
+/// Determines whether the passing lane is free for `rear` to overtake the ego, with all vehicles at constant speed.
+pub(crate) fn passing_lane(input: &EgoInput<'_>, rear: &RearVehicle) -> PassingLane {
     let side = input.road.overtaking_side();
     if input.road.beside(input.odometry.lane, side).is_none() {
         return PassingLane::None;
@@ -290,20 +298,21 @@ pub(crate) fn passing_lane(input: &EgoInput<'_>, rear: &Rear) -> PassingLane {
     if !(closing_mps > 0.0) {
         return PassingLane::Unknown;
     }
-    let from_s = ((rear.gap_m - USES_PASSING_LANE_FROM_M) / closing_mps).max(0.0);
-    let until_s = (rear.gap_m.max(0.0) + input.odometry.length_m + rear.length_m + PASSED_AHEAD_M) / closing_mps;
+    let from_s = ((rear.gap_m - PASSING_LANE_ENTRY_GAP_M) / closing_mps).max(0.0);
+    let until_s =
+        (rear.gap_m.max(0.0) + input.odometry.length_m + rear.length_m + PASSING_LANE_EXIT_GAP_M) / closing_mps;
     let mut state = PassingLane::Free;
     for track in input.tracks {
-        if rear.is_seen_as(track) || !exists(track) || !(track.lane[passing(side)] >= LIKELY) {
+        if rear.matches(track) || !exists(track) || !(track.lane[passing_lane_index(side)] >= LIKELY) {
             continue;
         }
-        let apart_m = 0.5 * (track.length_m + rear.length_m) + FREE_DISTANCE_M;
+        let apart_m = 0.5 * (track.length_m + rear.length_m) + MIN_SPACING_M;
         let ahead_m = track.x_m() - rear.x_m;
         let opening_mps = track.vx_mps() - rear.speed_mps;
         if keeps_apart(ahead_m + opening_mps * from_s, ahead_m + opening_mps * until_s, apart_m) {
             continue;
         }
-        if established(track) {
+        if is_established(track) {
             return PassingLane::Occupied;
         }
         state = PassingLane::Unknown;
@@ -311,7 +320,8 @@ pub(crate) fn passing_lane(input: &EgoInput<'_>, rear: &Rear) -> PassingLane {
     state
 }
 
-/// True where a distance that goes linearly from `first_m` to `last_m` stays beyond `apart_m` on one side.
+/// Returns true if a signed distance that changes linearly from `first_m` to `last_m` stays beyond `apart_m` on one
+/// side.
 fn keeps_apart(first_m: f64, last_m: f64, apart_m: f64) -> bool {
     (first_m > apart_m && last_m > apart_m) || (first_m < -apart_m && last_m < -apart_m)
 }

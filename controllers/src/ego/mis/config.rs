@@ -1,53 +1,54 @@
-//! The bounds of the margin increase system.
+//! The parameters of the margin increase system.
 
 use closecall_traffic::{Check, ConfigError, Num, Parameters, Range};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The margin increase system as a scenario file describes it; what is absent has the paper's value.
+/// The margin increase system as a scenario file describes it. An absent value takes the default of
+/// [`MisSettings::PAPER`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct MisConfig {
-    /// Strongest braking [m/s²]; 1.
+    /// Strongest braking (m/s²); 1 if absent.
     pub max_deceleration_mps2: Option<Num>,
-    /// Strongest change of braking [m/s³]; 2.
+    /// Largest rate at which the braking builds up (m/s³); 2 if absent.
     pub max_jerk_mps3: Option<Num>,
-    /// Rear gap d_c at which the critical phase begins [m]; 5.
+    /// Rear gap d_c at which the critical phase begins (m); 5 if absent.
     pub critical_gap_m: Option<Num>,
-    /// Front time headway to be gained [s]; 2.
+    /// Front time headway to be gained (s); 2 if absent.
     pub thw_gain_s: Option<Num>,
-    /// Front time headway below which the margin counts as short [s]; 1.5.
+    /// Front time headway below which the margin counts as short (s); 1.5 if absent.
     pub short_thw_s: Option<Num>,
-    /// Rear gap from which on it engages [m]; 100.
+    /// Largest rear gap at which the system engages (m); 100 if absent.
     pub engage_gap_m: Option<Num>,
-    /// Closing speed of R from which on it engages [m/s]; 10 km/h.
+    /// Smallest closing speed of the rear vehicle at which the system engages (m/s); 10 km/h if absent.
     pub engage_closing_mps: Option<Num>,
-    /// How long E does not brake in the critical phase [s]; 2.
+    /// Longest time for which the ego does not brake in the critical phase (s); 2 if absent.
     pub hold_s: Option<Num>,
-    /// Worst braking of F that has to leave room while holding [m/s²]; 8.
+    /// Worst assumed braking of the lead vehicle, which must leave room while holding (m/s²); 8 if absent.
     pub worst_front_braking_mps2: Option<Num>,
 }
 
-/// The checked bounds of the margin increase system.
+/// The checked parameters of the margin increase system.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct MisSettings {
-    /// Strongest braking [m/s²].
+    /// Strongest braking (m/s²).
     pub max_deceleration_mps2: f64,
-    /// Strongest change of braking [m/s³].
+    /// Largest rate at which the braking builds up (m/s³).
     pub max_jerk_mps3: f64,
-    /// Rear gap d_c at which the critical phase begins [m].
+    /// Rear gap d_c at which the critical phase begins (m).
     pub critical_gap_m: f64,
-    /// Front time headway to be gained [s].
+    /// Front time headway to be gained (s).
     pub thw_gain_s: f64,
-    /// Front time headway below which the margin counts as short [s].
+    /// Front time headway below which the margin counts as short (s).
     pub short_thw_s: f64,
-    /// Rear gap from which on it engages [m].
+    /// Largest rear gap at which the system engages (m).
     pub engage_gap_m: f64,
-    /// Closing speed of R from which on it engages [m/s].
+    /// Smallest closing speed of the rear vehicle at which the system engages (m/s).
     pub engage_closing_mps: f64,
-    /// How long E does not brake in the critical phase [s].
+    /// Longest time for which the ego does not brake in the critical phase (s).
     pub hold_s: f64,
-    /// Worst braking of F that has to leave room while holding [m/s²].
+    /// Worst assumed braking of the lead vehicle, which must leave room while holding (m/s²).
     pub worst_front_braking_mps2: f64,
 }
 

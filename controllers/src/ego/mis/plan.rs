@@ -1,28 +1,29 @@
-//! What the margin increase system last worked out, for logs and plots.
+//! The plan of the margin increase system, for logs and plots.
 
 use closecall_traffic::{Measured, TrackId};
 
 /// The plan of one control step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MisPlan {
-    /// The track of the vehicle behind.
+    /// The track of the rear vehicle.
     pub track: TrackId,
-    /// Its gap to E [m]; negative where it overlaps E lengthwise.
+    /// Gap from the rear vehicle to the ego (m); negative if it overlaps the ego lengthwise.
     pub rear_gap_m: f64,
-    /// Its closing speed [m/s]; negative where it falls back.
+    /// Closing speed of the rear vehicle (m/s); negative if it falls back.
     pub closing_mps: f64,
-    /// Front time headway now [s].
+    /// Present front time headway (s).
     pub thw_front_s: Measured,
-    /// Time to closest encounter: until R reaches E's rear, both at their present speeds [s].
+    /// Time to closest encounter: time until the rear vehicle reaches the rear of the ego, both at their present speeds
+    /// (s).
     pub ttce_s: Measured,
-    /// t_c(a): until R reaches the critical distance, with E braking as planned [s].
+    /// t_c(a): time until the rear vehicle reaches the critical gap while the ego brakes as planned (s).
     pub time_to_critical_s: Measured,
-    /// a*: the braking planned [m/s²]; 0 where none is needed.
+    /// a*: planned braking (m/s²); 0 if none is needed.
     pub deceleration_mps2: f64,
-    /// The front time headway aimed at, fixed when engaging [s].
+    /// Target front time headway, fixed when engaging (s).
     pub goal_thw_s: f64,
-    /// Front time headway foreseen when R reaches the critical distance [s].
+    /// Predicted front time headway when the rear vehicle reaches the critical gap (s).
     pub thw_at_critical_s: Measured,
-    /// Whether the goal can be reached within the comfort limit.
+    /// Whether the target can be reached within the comfort limit.
     pub goal_in_reach: bool,
 }

@@ -1,85 +1,85 @@
-//! How E's braking builds up: within a jerk limit, and through the actuators' lag.
+//! The build-up of the ego's braking, within a jerk limit and through the lag of the actuators.
 //!
 //! ```text
-//!  asked     ╱‾‾‾‾‾‾‾ a        c(t): from what is asked now to a, at the jerk j, done after r = |a − c₀|/j
-//!           ╱   ______         x(t): what E does: τ·ẋ = c − x, from what it does now, x(0) = β
-//!  c₀ ─────╱  ╱                V(t) = ∫x: the speed lost;  W(t) = ∫V: the way lost
+//!  commanded     ╱‾‾‾‾‾‾‾ a    c(t): command, from the present one c₀ to a with the jerk j, reached after r = |a − c₀|/j
+//!           ╱   ______         x(t): braking of the ego: τ·ẋ = c − x, from the present braking x(0) = β
+//!  c₀ ─────╱  ╱                V(t) = ∫x: loss of speed;  W(t) = ∫V: loss of distance
 //!  β  ───────╱
 //! ```
 //!
-//! Integrating τ·ẋ = c − x once and twice gives V = ∫c − τ·(x − β) and W = ∬c − τ·(V − β·t), so that everything is in
-//! closed form: c is a line and then a constant, and x relaxes towards it exponentially.
+//! Integrating τ·ẋ = c − x once and twice gives V = ∫c − τ·(x − β) and W = ∬c − τ·(V − β·t), where τ is the lag.
+//! Everything is in closed form: c is a line and then a constant, and x approaches it exponentially.
 //!
-//! Without this the plan would take braking for something that is there at once. Half a second of ramp and lag costs
-//! 0.3 s of the 2 s at the reference point's approach, and more of faster ones.
+//! Without this model, the plan would assume that braking takes effect at once. The half second of ramp and lag costs
+//! 0.3 s of the 2 s of headway gain at the closing speed of the reference point, and more at higher closing speeds.
 
-/// How E's braking builds up from now. All braking is positive.
+/// The build-up of the ego's braking from now on. Braking is positive.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Response {
-    /// Braking asked of the actuators now [m/s²].
-    pub asked_mps2: f64,
-    /// Braking now [m/s²].
+pub struct BrakingResponse {
+    /// Present command to the actuators (m/s²).
+    pub commanded_mps2: f64,
+    /// Present braking (m/s²).
     pub braking_mps2: f64,
-    /// How fast more may be asked [m/s³].
+    /// Largest rate at which the command may increase (m/s³).
     pub build_up_mps3: f64,
-    /// How fast less may be asked [m/s³].
-    pub let_go_mps3: f64,
-    /// Time constant of the actuators [s].
+    /// Largest rate at which the command may decrease (m/s³).
+    pub release_mps3: f64,
+    /// Time constant of the actuators (s).
     pub lag_s: f64,
 }
 
-/// What E has lost after some time, against driving on at its present speed.
+/// The loss of speed and distance after some time, compared with driving on at the present speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Lost {
-    /// Speed [m/s].
+pub(super) struct Loss {
+    /// Loss of speed (m/s).
     pub(super) speed_mps: f64,
-    /// Way [m].
-    pub(super) way_m: f64,
+    /// Loss of distance (m).
+    pub(super) distance_m: f64,
 }
 
-/// One stretch in which what is asked changes evenly: its integrals, and what E does at its end.
-struct Stretch {
-    /// ∫c, ∬c [m/s, m].
-    asked: [f64; 2],
-    /// x at the end [m/s²].
+/// A time segment in which the command changes linearly: the integrals of the command, and the braking at its end.
+struct Segment {
+    /// ∫c and ∬c (m/s, m).
+    commanded: [f64; 2],
+    /// Braking x at the end (m/s²).
     braking_mps2: f64,
 }
 
-impl Response {
-    /// Braking that is there at once, from none.
+impl BrakingResponse {
+    /// Braking that takes effect at once, starting from none.
     pub const IMMEDIATE: Self = Self {
-        asked_mps2: 0.0,
+        commanded_mps2: 0.0,
         braking_mps2: 0.0,
         build_up_mps3: f64::INFINITY,
-        let_go_mps3: f64::INFINITY,
+        release_mps3: f64::INFINITY,
         lag_s: 0.0,
     };
 
-    /// What is lost after `time_s`, where `braking_mps2` is what E aims at.
-    pub(super) fn lost(&self, braking_mps2: f64, time_s: f64) -> Lost {
-        let change = braking_mps2 - self.asked_mps2;
-        let jerk_mps3 = if change >= 0.0 { self.build_up_mps3 } else { -self.let_go_mps3 };
+    /// Returns the loss after `time_s` if the command goes to `braking_mps2`.
+    pub(super) fn loss(&self, braking_mps2: f64, time_s: f64) -> Loss {
+        let change = braking_mps2 - self.commanded_mps2;
+        let jerk_mps3 = if change >= 0.0 { self.build_up_mps3 } else { -self.release_mps3 };
         let ramp_s = (change / jerk_mps3).min(time_s);
-        // An immediate change takes no time at whatever jerk.
+        // An immediate change takes no time, whatever the jerk.
         let slope_mps3 = if ramp_s > 0.0 { jerk_mps3 } else { 0.0 };
-        let ramp = self.stretch(self.asked_mps2, slope_mps3, self.braking_mps2, ramp_s);
+        let ramp = self.segment(self.commanded_mps2, slope_mps3, self.braking_mps2, ramp_s);
         let rest_s = time_s - ramp_s;
-        let level = self.stretch(braking_mps2, 0.0, ramp.braking_mps2, rest_s);
-        let asked_speed = ramp.asked[0] + level.asked[0];
-        let asked_way = ramp.asked[1] + ramp.asked[0] * rest_s + level.asked[1];
-        let speed_mps = asked_speed - self.lag_s * (level.braking_mps2 - self.braking_mps2);
-        Lost { speed_mps, way_m: asked_way - self.lag_s * (speed_mps - self.braking_mps2 * time_s) }
+        let level = self.segment(braking_mps2, 0.0, ramp.braking_mps2, rest_s);
+        let commanded_speed = ramp.commanded[0] + level.commanded[0];
+        let commanded_distance = ramp.commanded[1] + ramp.commanded[0] * rest_s + level.commanded[1];
+        let speed_mps = commanded_speed - self.lag_s * (level.braking_mps2 - self.braking_mps2);
+        Loss { speed_mps, distance_m: commanded_distance - self.lag_s * (speed_mps - self.braking_mps2 * time_s) }
     }
 
-    fn stretch(&self, asked_mps2: f64, slope_mps3: f64, braking_mps2: f64, time_s: f64) -> Stretch {
-        let asked = [
-            (asked_mps2 + 0.5 * slope_mps3 * time_s) * time_s,
-            (0.5 * asked_mps2 + slope_mps3 * time_s / 6.0) * time_s * time_s,
+    fn segment(&self, commanded_mps2: f64, slope_mps3: f64, braking_mps2: f64, time_s: f64) -> Segment {
+        let commanded = [
+            (commanded_mps2 + 0.5 * slope_mps3 * time_s) * time_s,
+            (0.5 * commanded_mps2 + slope_mps3 * time_s / 6.0) * time_s * time_s,
         ];
-        // A line c₀ + s·t is followed a lag behind; what was off at the beginning fades.
-        let behind = |at_s: f64| asked_mps2 + slope_mps3 * (at_s - self.lag_s);
-        let fading = if self.lag_s > 0.0 { (-time_s / self.lag_s).exp() } else { 0.0 };
-        Stretch { asked, braking_mps2: behind(time_s) + (braking_mps2 - behind(0.0)) * fading }
+        // The response to a line c₀ + s·t lags behind it by τ; the initial deviation decays.
+        let lagged = |at_s: f64| commanded_mps2 + slope_mps3 * (at_s - self.lag_s);
+        let decay = if self.lag_s > 0.0 { (-time_s / self.lag_s).exp() } else { 0.0 };
+        Segment { commanded, braking_mps2: lagged(time_s) + (braking_mps2 - lagged(0.0)) * decay }
     }
 }
 
@@ -90,31 +90,33 @@ mod tests {
     use super::*;
 
     proptest! {
-        /// Against stepping ramp and lag, thirty thousand times a second.
+        /// Compares the closed form with time-stepping ramp and lag in 120,000 steps.
         #[test]
-        fn it_is_what_stepping_gives(
-            asked in 0.0..2.0_f64, now in -1.0..2.0_f64, aim in 0.0..3.0_f64, time_s in 0.0..4.0_f64, lag_s in 0.05..0.4_f64,
-            jerk in 1.0..5.0_f64,
+        fn the_closed_form_equals_time_stepping(
+            commanded in 0.0..2.0_f64, now in -1.0..2.0_f64, aim in 0.0..3.0_f64, time_s in 0.0..4.0_f64,
+            lag_s in 0.05..0.4_f64, jerk in 1.0..5.0_f64,
         ) {
-            let response = Response { asked_mps2: asked, braking_mps2: now, build_up_mps3: jerk, let_go_mps3: 3.0, lag_s };
+            let response = BrakingResponse {
+                commanded_mps2: commanded, braking_mps2: now, build_up_mps3: jerk, release_mps3: 3.0, lag_s,
+            };
             let steps = 120_000;
             let step_s = time_s / f64::from(steps);
-            let (mut c, mut x, mut lost): (f64, f64, Lost) = (asked, now, Lost { speed_mps: 0.0, way_m: 0.0 });
+            let (mut c, mut x, mut loss): (f64, f64, Loss) = (commanded, now, Loss { speed_mps: 0.0, distance_m: 0.0 });
             for _ in 0..steps {
-                lost.way_m += step_s * lost.speed_mps;
-                lost.speed_mps += step_s * x;
+                loss.distance_m += step_s * loss.speed_mps;
+                loss.speed_mps += step_s * x;
                 x += step_s * (c - x) / lag_s;
                 c = if aim > c { (c + jerk * step_s).min(aim) } else { (c - 3.0 * step_s).max(aim) };
             }
-            let closed = response.lost(aim, time_s);
-            prop_assert!((closed.speed_mps - lost.speed_mps).abs() < 1e-3, "{closed:?} {lost:?}");
-            prop_assert!((closed.way_m - lost.way_m).abs() < 2e-3, "{closed:?} {lost:?}");
+            let closed = response.loss(aim, time_s);
+            prop_assert!((closed.speed_mps - loss.speed_mps).abs() < 1e-3, "{closed:?} {loss:?}");
+            prop_assert!((closed.distance_m - loss.distance_m).abs() < 2e-3, "{closed:?} {loss:?}");
         }
     }
 
     #[test]
-    fn without_ramp_and_lag_it_is_the_textbook() {
-        let lost = Response::IMMEDIATE.lost(1.5, 4.0);
-        assert_eq!(lost, Lost { speed_mps: 6.0, way_m: 12.0 });
+    fn without_ramp_and_lag_the_loss_is_that_of_constant_braking() {
+        let loss = BrakingResponse::IMMEDIATE.loss(1.5, 4.0);
+        assert_eq!(loss, Loss { speed_mps: 6.0, distance_m: 12.0 });
     }
 }

@@ -1,102 +1,107 @@
-//! How hard must E brake, so that its front headway has grown enough when R arrives?
+//! The braking with which the ego's front time headway has grown enough when the rear vehicle arrives.
 //!
-//! With R's way D = g_R − d_c to the critical distance, its closing speed Δv > 0, and E braking at a, R arrives after
+//! Notation: E is the ego, F the lead vehicle, R the rear vehicle; v are speeds, g_F and g_R the gaps to F and R, and
+//! THW is the front time headway. R covers the distance D = g_R − d_c to the critical gap d_c at the closing speed Δv >
+//! 0, while E brakes at a. R arrives after
 //!
 //! t(a) = (−Δv + √(Δv² + 2·a·D))/a, which solves D = Δv·t + ½·a·t², with the limit D/Δv for a → 0.
 //!
-//! The front headway then is THW(t) = (g_F + (v_F − v_E)·t + ½·a·t²)/(v_E − a·t). With ½·a·t² = D − Δv·t it depends on t
-//! alone:
+//! The front time headway is then THW(t) = (g_F + (v_F − v_E)·t + ½·a·t²)/(v_E − a·t). With ½·a·t² = D − Δv·t it
+//! depends only on t:
 //!
 //! THW(t) = (G − w·t)/(v_E + 2·Δv − 2·D/t), with G = g_F + D and w = v_E + Δv − v_F, the speed by which R exceeds F.
 //!
-//! THW(t) = H is a quadratic equation, w·t² + B·t − 2·H·D = 0 with B = H·(v_E + 2·Δv) − G. A braking of 0 means
-//! t = D/Δv, and harder braking means earlier; going from there to earlier times the first solution is
-//! t* = 4·H·D/(B + √(B² + 8·w·H·D)), whatever the sign of w, and the braking is a* = 2·(D − Δv·t*)/t*².
+//! THW(t) = H is a quadratic equation, w·t² + B·t − 2·H·D = 0 with B = H·(v_E + 2·Δv) − G. No braking means t = D/Δv,
+//! and harder braking means an earlier arrival. Towards earlier times the first solution is t* = 4·H·D/(B + √(B² +
+//! 8·w·H·D)), whatever the sign of w. The braking is a* = 2·(D − Δv·t*)/t*².
 //!
-//! For w ≥ 0, which is the case the system exists for, the headway at arrival grows with the braking; so t* is the only
-//! solution, and a* the smallest braking that reaches H.
+//! For w ≥ 0, which is the case that the system is built for, the headway at arrival grows with the braking. Then t* is
+//! the only solution, and a* is the smallest braking that reaches H.
 
-/// Braking below which E counts as keeping its speed [m/s²].
+/// Braking below which the ego counts as keeping its speed (m/s²).
 const NO_BRAKING_MPS2: f64 = 1e-9;
 
-/// E between F ahead and R behind, at one instant.
+/// The ego between the lead vehicle and the rear vehicle, at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Encounter {
-    /// E's speed [m/s].
+    /// Speed of the ego (m/s).
     pub ego_mps: f64,
-    /// Gap to F [m].
+    /// Gap from the ego to the lead vehicle (m).
     pub front_gap_m: f64,
-    /// F's speed [m/s].
-    pub front_mps: f64,
-    /// Gap from R to E [m].
+    /// Speed of the lead vehicle (m/s).
+    pub lead_mps: f64,
+    /// Gap from the rear vehicle to the ego (m).
     pub rear_gap_m: f64,
-    /// R's closing speed [m/s].
+    /// Closing speed of the rear vehicle (m/s).
     pub closing_mps: f64,
-    /// Rear gap d_c at which the critical phase begins [m].
+    /// Rear gap d_c at which the critical phase begins (m).
     pub critical_gap_m: f64,
 }
 
-/// What an encounter asks for.
+/// The braking that an encounter requires.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Solution {
-    /// The braking to apply [m/s²]: the smallest that reaches the goal, or the bound.
+    /// Braking to apply (m/s²): the smallest that reaches the goal, or the bound.
     pub deceleration_mps2: f64,
-    /// Whether the goal is reached with it.
+    /// Whether this braking reaches the goal.
     pub in_reach: bool,
 }
 
 impl Encounter {
-    /// D: R's way to the critical distance [m], 0 or more.
-    pub(super) fn way_m(&self) -> f64 {
+    /// Returns D, the distance of the rear vehicle to the critical gap (m), 0 or more.
+    pub(super) fn distance_to_critical_m(&self) -> f64 {
         (self.rear_gap_m - self.critical_gap_m).max(0.0)
     }
 
-    /// t_c(a): the time until R reaches the critical distance, with E braking at `deceleration_mps2` [s].
+    /// Returns t_c(a), the time until the rear vehicle reaches the critical gap while the ego brakes at
+    /// `deceleration_mps2` (s).
     ///
-    /// Nothing where R never comes: it does not approach, and E does not brake.
+    /// Returns `None` if the rear vehicle never arrives: it does not approach, and the ego does not brake.
     pub fn arrival_s(&self, deceleration_mps2: f64) -> Option<f64> {
-        let (way_m, closing_mps) = (self.way_m(), self.closing_mps);
+        let (distance_m, closing_mps) = (self.distance_to_critical_m(), self.closing_mps);
         if deceleration_mps2 > NO_BRAKING_MPS2 {
-            let root = (closing_mps * closing_mps + 2.0 * deceleration_mps2 * way_m).sqrt();
-            // The two forms are equal; each is free of cancellation on its side.
+            let root = (closing_mps * closing_mps + 2.0 * deceleration_mps2 * distance_m).sqrt();
+            // The two forms are equal; each avoids cancellation on its side.
             return Some(if closing_mps > 0.0 {
-                2.0 * way_m / (closing_mps + root)
+                2.0 * distance_m / (closing_mps + root)
             } else {
                 (root - closing_mps) / deceleration_mps2
             });
         }
-        (closing_mps > 0.0).then(|| way_m / closing_mps)
+        (closing_mps > 0.0).then(|| distance_m / closing_mps)
     }
 
-    /// The front time headway when R arrives, with E braking at `deceleration_mps2` [s].
+    /// Returns the front time headway when the rear vehicle arrives, with the ego braking at `deceleration_mps2` (s).
     ///
-    /// Nothing where R never comes, or E stands before.
+    /// Returns `None` if the rear vehicle never arrives, or if the ego stops before.
     pub fn headway_at_arrival_s(&self, deceleration_mps2: f64) -> Option<f64> {
         let time_s = self.arrival_s(deceleration_mps2)?;
         let speed_mps = self.ego_mps - deceleration_mps2 * time_s;
         if !(speed_mps > 0.0) {
             return None;
         }
-        let opening_m = (self.front_mps - self.ego_mps) * time_s + 0.5 * deceleration_mps2 * time_s * time_s;
+        let opening_m = (self.lead_mps - self.ego_mps) * time_s + 0.5 * deceleration_mps2 * time_s * time_s;
         Some((self.front_gap_m + opening_m) / speed_mps)
     }
 
-    /// The smallest braking up to `bound_mps2` with which the front headway is `goal_s` when R arrives.
+    /// Returns the smallest braking up to `bound_mps2` with which the front time headway is `goal_s` when the rear
+    /// vehicle arrives.
     ///
-    /// Nothing where R does not approach: then there is no encounter to prepare for.
+    /// Returns `None` if the rear vehicle does not approach: there is then no encounter to prepare for.
     pub fn solve(&self, goal_s: f64, bound_mps2: f64) -> Option<Solution> {
         if self.headway_at_arrival_s(0.0)? >= goal_s {
             return Some(Solution { deceleration_mps2: 0.0, in_reach: true });
         }
-        let way_m = self.way_m();
-        let w = self.ego_mps + self.closing_mps - self.front_mps;
-        let b = goal_s * (self.ego_mps + 2.0 * self.closing_mps) - (self.front_gap_m + way_m);
-        let product = 8.0 * w * goal_s * way_m;
+        let distance_m = self.distance_to_critical_m();
+        let w = self.ego_mps + self.closing_mps - self.lead_mps;
+        let b = goal_s * (self.ego_mps + 2.0 * self.closing_mps) - (self.front_gap_m + distance_m);
+        let product = 8.0 * w * goal_s * distance_m;
         let root = (b * b + product).sqrt();
-        // For b < 0 the sum b + √… cancels; the conjugate form does not.
-        let time_s = if b >= 0.0 { 4.0 * goal_s * way_m / (b + root) } else { (root - b) / (2.0 * w) };
-        let needed = 2.0 * (way_m - self.closing_mps * time_s) / (time_s * time_s);
-        // Written so that NaN, where R has no way left or no solution exists, is out of reach.
+        // For b < 0 the sum b + √… suffers from cancellation; the conjugate form does not.
+        let time_s = if b >= 0.0 { 4.0 * goal_s * distance_m / (b + root) } else { (root - b) / (2.0 * w) };
+        let needed = 2.0 * (distance_m - self.closing_mps * time_s) / (time_s * time_s);
+        // NaN occurs if the rear vehicle is at the critical gap or no solution exists. The comparison is written so
+        // that NaN is out of reach.
         if needed <= bound_mps2 {
             Some(Solution { deceleration_mps2: needed.max(0.0), in_reach: true })
         } else {
@@ -111,11 +116,11 @@ mod tests {
 
     use super::*;
 
-    /// The paper's figure.
+    /// The reference point: the paper's figure.
     const REFERENCE: Encounter = Encounter {
         ego_mps: 30.0,
         front_gap_m: 21.0,
-        front_mps: 30.0,
+        lead_mps: 30.0,
         rear_gap_m: 100.0,
         closing_mps: 24.0 / 3.6,
         critical_gap_m: 5.0,
@@ -138,29 +143,29 @@ mod tests {
     }
 
     #[test]
-    fn one_that_recedes_is_no_encounter() {
+    fn a_receding_vehicle_is_no_encounter() {
         assert_eq!(Encounter { closing_mps: -1.0, ..REFERENCE }.solve(2.7, 1.0), None);
         assert_eq!(Encounter { closing_mps: f64::NAN, ..REFERENCE }.solve(2.7, 1.0), None);
     }
 
     #[test]
-    fn with_no_way_left_the_goal_is_out_of_reach() {
+    fn at_the_critical_distance_the_goal_is_out_of_reach() {
         let solution = Encounter { rear_gap_m: 4.0, ..REFERENCE }.solve(2.7, 1.0).unwrap();
         assert_eq!(solution, Solution { deceleration_mps2: 1.0, in_reach: false });
     }
 
     prop_compose! {
         fn encounters()(
-            ego_mps in 15.0..40.0, thw in 0.3..1.5, front in -3.0..3.0, rear_gap_m in 6.0..120.0, closing_mps in 0.5..20.0,
+            ego_mps in 15.0..40.0, thw in 0.3..1.5, lead in -3.0..3.0, rear_gap_m in 6.0..120.0, closing_mps in 0.5..20.0,
         ) -> Encounter {
             Encounter {
-                ego_mps, front_gap_m: thw * ego_mps, front_mps: ego_mps + front, rear_gap_m, closing_mps,
+                ego_mps, front_gap_m: thw * ego_mps, lead_mps: ego_mps + lead, rear_gap_m, closing_mps,
                 critical_gap_m: 5.0,
             }
         }
     }
 
-    /// The smallest braking on a fine grid that reaches the goal.
+    /// Returns the smallest braking on a fine grid that reaches the goal.
     fn brute_force(encounter: &Encounter, goal_s: f64, bound: f64) -> Option<f64> {
         let steps = 2000;
         (0..=steps)
@@ -172,7 +177,7 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(10_000))]
 
         #[test]
-        fn it_equals_a_brute_force_scan(encounter in encounters(), gain in 0.1..3.0, bound in 0.5..3.0) {
+        fn the_solution_equals_a_brute_force_scan(encounter in encounters(), gain in 0.1..3.0, bound in 0.5..3.0) {
             let goal = encounter.front_gap_m / encounter.ego_mps + gain;
             let solution = encounter.solve(goal, bound).unwrap();
             prop_assert!((0.0..=bound).contains(&solution.deceleration_mps2));
@@ -186,7 +191,7 @@ mod tests {
         }
 
         #[test]
-        fn it_meets_the_goal_exactly(encounter in encounters(), gain in 0.1..3.0) {
+        fn the_solution_meets_the_goal_exactly(encounter in encounters(), gain in 0.1..3.0) {
             let goal = encounter.front_gap_m / encounter.ego_mps + gain;
             let solution = encounter.solve(goal, 9.0).unwrap();
             if solution.in_reach && solution.deceleration_mps2 > 1e-6 {
@@ -196,7 +201,7 @@ mod tests {
         }
 
         #[test]
-        fn a_higher_goal_never_needs_less(encounter in encounters(), gain in 0.0..3.0, more in 0.0..1.0) {
+        fn a_higher_goal_never_needs_less_braking(encounter in encounters(), gain in 0.0..3.0, more in 0.0..1.0) {
             let goal = encounter.front_gap_m / encounter.ego_mps + gain;
             let low = encounter.solve(goal, 3.0).unwrap().deceleration_mps2;
             let high = encounter.solve(goal + more, 3.0).unwrap().deceleration_mps2;
@@ -204,7 +209,7 @@ mod tests {
         }
 
         #[test]
-        fn a_goal_already_met_needs_nothing(encounter in encounters()) {
+        fn a_goal_already_met_needs_no_braking(encounter in encounters()) {
             let met = encounter.headway_at_arrival_s(0.0).unwrap();
             let solution = encounter.solve(met, 1.0).unwrap();
             prop_assert_eq!(solution, Solution { deceleration_mps2: 0.0, in_reach: true });

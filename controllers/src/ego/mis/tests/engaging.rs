@@ -1,9 +1,9 @@
-//! Each condition for engaging, alone.
+//! Tests of each single condition for engaging.
 
 use super::*;
 
 #[test]
-fn it_engages_at_the_first_step_where_every_condition_holds() {
+fn it_engages_at_the_first_step_at_which_every_condition_holds() {
     let command = Bench::new().step();
     assert_eq!((command.state, command.reason), (EgoState::Increasing, Reason::EngagedGoalOutOfReach));
     let plan = command.plan.unwrap();
@@ -25,35 +25,35 @@ fn braking_grows_within_the_jerk_limit() {
 
 #[test]
 fn not_automated() {
-    Bench::with(false).refuses(Reason::NotAutomated);
+    Bench::with_automation(false).assert_not_engaged(Reason::NotAutomated);
 }
 
 #[test]
 fn front_margin_long() {
     let mut bench = Bench::new();
-    bench.front().state[0] = 45.0 + CAR_M;
-    bench.refuses(Reason::FrontMarginLong);
+    bench.lead().state[0] = 45.0 + CAR_M;
+    bench.assert_not_engaged(Reason::FrontMarginLong);
     bench.tracks.remove(0);
-    // One that vanishes is remembered for half a second.
-    bench.refuses(Reason::FrontMarginLong);
+    // A lead vehicle whose track vanishes is remembered for half a second.
+    bench.assert_not_engaged(Reason::FrontMarginLong);
     bench.step_for(0.6);
-    bench.refuses(Reason::NoFront);
+    bench.assert_not_engaged(Reason::NoFront);
 }
 
 #[test]
 fn rear_far_or_absent() {
     let mut bench = Bench::new();
     bench.rear().state[0] = -100.1 - CAR_M;
-    bench.refuses(Reason::RearFar);
+    bench.assert_not_engaged(Reason::RearFar);
     bench.tracks.remove(1);
-    bench.refuses(Reason::NoRear);
+    bench.assert_not_engaged(Reason::NoRear);
 }
 
 #[test]
 fn rear_unconfirmed() {
     let mut bench = Bench::new();
     bench.rear().status = TrackStatus::Tentative;
-    bench.refuses(Reason::RearUnconfirmed);
+    bench.assert_not_engaged(Reason::RearUnconfirmed);
 }
 
 #[test]
@@ -61,7 +61,7 @@ fn rear_unclassified() {
     let mut bench = Bench::new();
     for scores in [ClassScores::UNKNOWN, ClassScores([0.2, 0.1, 0.1, 0.6]), ClassScores([0.2, 0.2, 0.2, 0.4])] {
         bench.rear().class = scores;
-        bench.refuses(Reason::RearUnclassified);
+        bench.assert_not_engaged(Reason::RearUnclassified);
     }
 }
 
@@ -69,7 +69,7 @@ fn rear_unclassified() {
 fn rear_in_another_lane() {
     let mut bench = Bench::new();
     bench.rear().lane = [0.0, 0.4, 0.6];
-    bench.refuses(Reason::NoRear);
+    bench.assert_not_engaged(Reason::NoRear);
 }
 
 #[test]
@@ -77,7 +77,7 @@ fn rear_receding_or_slow() {
     let mut bench = Bench::new();
     for speed_mps in [25.0, 32.7] {
         bench.rear().state[2] = speed_mps;
-        bench.refuses(Reason::RearNotApproaching);
+        bench.assert_not_engaged(Reason::RearNotApproaching);
     }
 }
 
@@ -85,15 +85,15 @@ fn rear_receding_or_slow() {
 fn passing_lane_occupied_unknown_or_absent() {
     let mut bench = Bench::new();
     bench.sensors.surround = false;
-    bench.refuses(Reason::PassingLaneUnknown);
+    bench.assert_not_engaged(Reason::PassingLaneUnknown);
     bench.sensors = SensorAvailability::ALL;
     bench.tracks.push(track(3, 5.0, 30.0, 0));
-    bench.refuses(Reason::PassingLaneOccupied);
+    bench.assert_not_engaged(Reason::PassingLaneOccupied);
     bench.tracks[2].status = TrackStatus::Tentative;
-    bench.refuses(Reason::PassingLaneUnknown);
+    bench.assert_not_engaged(Reason::PassingLaneUnknown);
     bench.tracks.pop();
     bench.lane = Lane(1);
-    bench.refuses(Reason::NoPassingLane);
+    bench.assert_not_engaged(Reason::NoPassingLane);
 }
 
 #[test]
@@ -104,7 +104,7 @@ fn a_fast_vehicle_ahead_in_the_passing_lane_does_not_matter() {
 }
 
 #[test]
-fn a_motorcycle_or_truck_counts_like_a_car() {
+fn a_motorcycle_or_truck_is_treated_like_a_car() {
     for class in [VehicleClass::Motorcycle, VehicleClass::Truck] {
         let mut bench = Bench::new();
         bench.rear().class = ClassScores::certain(class);
@@ -113,7 +113,7 @@ fn a_motorcycle_or_truck_counts_like_a_car() {
 }
 
 #[test]
-fn of_two_behind_the_nearer_one_counts() {
+fn the_nearer_of_two_rear_vehicles_is_the_target() {
     let mut bench = Bench::new();
     bench.tracks.push(track(3, -50.0, 34.0, 1));
     assert_eq!(bench.step().plan.unwrap().track, TrackId(3));

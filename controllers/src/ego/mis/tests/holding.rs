@@ -1,155 +1,155 @@
-//! What happens while it is engaged: holding, waiting, sensors that fail, comfort.
+//! Tests of the engaged system: holding, tolerance of losses, sensor failures, comfort.
 
 use super::*;
 
 #[test]
 fn holding_begins_at_the_critical_distance_and_ends_after_two_seconds() {
     let mut bench = Bench::engaged();
-    bench.front().state[0] = 60.0;
+    bench.lead().state[0] = 60.0;
     bench.rear().state[0] = -5.0 - CAR_M;
     let command = bench.step();
     assert_eq!((command.state, command.reason), (EgoState::Holding, Reason::CriticalDistance));
-    // F brakes: E holds all the same, while there is room.
-    bench.front().state[2] = 27.0;
+    // The lead vehicle brakes. The ego still holds while there is room.
+    bench.lead().state[2] = 27.0;
     let command = bench.step_for(1.0);
     assert_eq!(command.state, EgoState::Holding);
     assert!(command.acceleration_mps2.abs() < 1e-9, "{command:?}");
-    bench.releases(1.2, Reason::HoldExpired);
+    bench.assert_released(1.2, Reason::HoldExpired);
 }
 
 #[test]
-fn holding_needs_room_for_the_worst_braking_of_f() {
-    // At the headway of following there is none: it does not even begin.
+fn holding_needs_room_for_the_worst_braking_of_the_lead_vehicle() {
+    // At the time headway of following there is no room, so that holding does not even begin.
     let mut bench = Bench::engaged();
     bench.rear().state[0] = -5.0 - CAR_M;
-    bench.releases(0.0, Reason::NoRoomToHold);
+    bench.assert_released(0.0, Reason::NoRoomToHold);
 
     let mut bench = Bench::engaged();
-    bench.front().state[0] = 60.0;
+    bench.lead().state[0] = 60.0;
     bench.rear().state[0] = -5.0 - CAR_M;
     assert_eq!(bench.step().state, EgoState::Holding);
-    bench.front().state[0] = 15.0;
-    bench.front().state[2] = 20.0;
+    bench.lead().state[0] = 15.0;
+    bench.lead().state[2] = 20.0;
     let command = bench.step();
     assert_eq!((command.state, command.reason), (EgoState::Releasing, Reason::NoRoomToHold));
     assert!(command.acceleration_mps2 < -3.0, "{command:?}");
 }
 
-/// E's room behind F at which it may just hold, by stepping the worst case: F brakes at 8 m/s² at once, E 0.3 s later at
-/// 6 m/s², and 2 m are left.
+/// Finds the gaps at which the ego may just hold by time-stepping the worst case: the lead vehicle brakes at 8 m/s² at
+/// once, the ego 0.3 s later at 6 m/s², and 2 m are left.
 #[test]
-fn it_holds_exactly_where_the_worst_case_leaves_room() {
-    let left_m = |gap_m: f64, front_mps: f64| {
-        let (mut gap, mut front, mut ego, step_s) = (gap_m, front_mps, 30.0_f64, 1e-4);
+fn it_holds_exactly_if_the_worst_case_leaves_room() {
+    let left_m = |gap_m: f64, lead_mps: f64| {
+        let (mut gap, mut lead, mut ego, step_s) = (gap_m, lead_mps, 30.0_f64, 1e-4);
         let mut time_s = 0.0;
         while ego > 0.0 {
-            gap += (front - ego) * step_s;
-            front = f64::max(front - 8.0 * step_s, 0.0);
+            gap += (lead - ego) * step_s;
+            lead = f64::max(lead - 8.0 * step_s, 0.0);
             ego -= if time_s < 0.3 { 0.0 } else { 6.0 * step_s };
             time_s += step_s;
         }
         gap
     };
-    for front_mps in [20.0, 25.0, 30.0] {
+    for lead_mps in [20.0, 25.0, 30.0] {
         for gap_m in (20..80).map(f64::from) {
-            let left = left_m(gap_m, front_mps);
+            let left = left_m(gap_m, lead_mps);
             if (left - 2.0).abs() < 0.1 {
                 continue;
             }
             let mut bench = Bench::engaged();
-            bench.front().state = [gap_m + CAR_M, 0.0, front_mps, 0.0].into();
+            bench.lead().state = [gap_m + CAR_M, 0.0, lead_mps, 0.0].into();
             bench.rear().state[0] = -5.0 - CAR_M;
             let state = bench.step().state;
             let expected = if left > 2.0 { EgoState::Holding } else { EgoState::Releasing };
-            assert_eq!(state, expected, "gap {gap_m}, F at {front_mps}: {left} m left");
+            assert_eq!(state, expected, "gap {gap_m} m, lead vehicle at {lead_mps} m/s: {left} m left");
         }
     }
 }
 
 #[test]
-fn one_that_leaves_the_lane_late_is_awaited_until_it_is_past() {
+fn a_rear_vehicle_that_leaves_the_lane_late_stays_the_target_until_it_is_past() {
     let mut bench = Bench::engaged();
-    bench.front().state[0] = 60.0;
+    bench.lead().state[0] = 60.0;
     bench.rear().lane = [1.0, 0.0, 0.0];
-    // 8 m are 0.2 s: the very headway at which it is expected to cross the marking.
+    // 8 m are 0.2 s: the time headway at which the rear vehicle is expected to cross the marking.
     bench.rear().state[0] = -8.0 - CAR_M;
     assert_eq!(bench.step().state, EgoState::Increasing);
     bench.rear().state[0] = -5.0 - CAR_M;
     assert_eq!(bench.step().state, EgoState::Holding);
     bench.rear().state[0] = 1.1 * CAR_M;
-    bench.releases(0.0, Reason::RearPassed);
+    bench.assert_released(0.0, Reason::RearPassed);
 }
 
 #[test]
-fn one_that_never_leaves_the_lane_is_held_for_two_seconds_only() {
+fn holding_ends_after_two_seconds_if_the_rear_vehicle_never_leaves_the_lane() {
     let mut bench = Bench::engaged();
-    bench.front().state[0] = 60.0;
+    bench.lead().state[0] = 60.0;
     bench.rear().state[0] = -4.0 - CAR_M;
     bench.rear().state[2] = 30.0;
     assert_eq!(bench.step_for(1.9).state, EgoState::Holding);
-    bench.releases(0.2, Reason::HoldExpired);
+    bench.assert_released(0.2, Reason::HoldExpired);
 }
 
 #[test]
-fn the_second_of_two_behind_is_prepared_for_once_the_first_is_past() {
+fn the_second_of_two_rear_vehicles_becomes_the_target_once_the_first_is_past() {
     let mut bench = Bench::engaged();
     bench.tracks.push(track(3, -60.0, 38.0, 1));
-    assert_eq!(bench.step().plan.unwrap().track, TrackId(2), "the first stays the one that counts");
+    assert_eq!(bench.step().plan.unwrap().track, TrackId(2), "the first vehicle stays the target");
     bench.rear().state[0] = 1.1 * CAR_M;
     bench.rear().lane = [1.0, 0.0, 0.0];
-    bench.front().state[0] = 30.0 + CAR_M;
-    bench.releases(0.0, Reason::RearPassed);
-    // As soon as the passing lane is free of the first one.
+    bench.lead().state[0] = 30.0 + CAR_M;
+    bench.assert_released(0.0, Reason::RearPassed);
+    // The system engages again as soon as the passing lane is free of the first vehicle.
     bench.rear().state = [60.0, 0.0, 50.0, 0.0].into();
     let command = bench.step();
     assert_eq!((command.state, command.plan.unwrap().track), (EgoState::Increasing, TrackId(3)));
 }
 
 #[test]
-fn a_nearer_one_that_does_not_approach_keeps_it_off() {
+fn a_nearer_vehicle_that_does_not_approach_prevents_engaging() {
     let mut bench = Bench::new();
     bench.tracks.push(track(3, -40.0, 30.0, 1));
-    bench.refuses(Reason::RearNotApproaching);
+    bench.assert_not_engaged(Reason::RearNotApproaching);
 }
 
 #[test]
-fn a_truck_or_motorcycle_is_past_by_its_own_length() {
+fn the_length_of_a_truck_or_motorcycle_decides_when_it_is_past() {
     for (length_m, past_m) in [(16.5, 10.6), (2.2, 3.5)] {
         let mut bench = Bench::engaged();
-        bench.front().state[0] = 60.0;
+        bench.lead().state[0] = 60.0;
         bench.rear().length_m = length_m;
         bench.rear().state[0] = -5.0 - 0.5 * (length_m + CAR_M);
         assert_eq!(bench.step().state, EgoState::Holding);
         bench.rear().lane = [1.0, 0.0, 0.0];
         bench.rear().state[0] = past_m - 0.2;
-        assert_eq!(bench.step().state, EgoState::Holding, "{length_m}");
+        assert_eq!(bench.step().state, EgoState::Holding, "length {length_m} m");
         bench.rear().state[0] = past_m;
-        bench.releases(0.0, Reason::RearPassed);
+        bench.assert_released(0.0, Reason::RearPassed);
     }
 }
 
 #[test]
-fn a_sensor_that_fails_ends_it_after_half_a_second() {
+fn a_sensor_failure_releases_after_half_a_second() {
     for broken in [
         SensorAvailability { surround: false, ..SensorAvailability::ALL },
         SensorAvailability { rear: false, ..SensorAvailability::ALL },
         SensorAvailability { front: false, ..SensorAvailability::ALL },
     ] {
         let mut bench = Bench::engaged();
-        bench.front().state[0] = 60.0;
+        bench.lead().state[0] = 60.0;
         bench.sensors = broken;
         assert_eq!(bench.step_for(0.4).state, EgoState::Increasing);
-        bench.releases(0.2, Reason::PassingLaneUnknown);
-        // And it does not engage again while the sensor is missing.
-        bench.front().state[0] = 21.0 + CAR_M;
+        bench.assert_released(0.2, Reason::PassingLaneUnknown);
+        // The system does not engage again while the sensor is missing.
+        bench.lead().state[0] = 21.0 + CAR_M;
         assert_eq!(bench.step_for(1.0).state, EgoState::Following);
     }
 }
 
 #[test]
-fn the_front_vehicle_s_track_is_waited_for() {
+fn a_lost_lead_track_is_tolerated_for_half_a_second() {
     let mut bench = Bench::engaged();
-    bench.front().state[0] = 60.0;
+    bench.lead().state[0] = 60.0;
     bench.step();
     bench.tracks.remove(0);
     assert_eq!(bench.step_for(0.4).state, EgoState::Increasing);
@@ -158,15 +158,15 @@ fn the_front_vehicle_s_track_is_waited_for() {
         command = bench.step();
     }
     assert_eq!((command.state, command.reason), (EgoState::Releasing, Reason::FrontLost));
-    // Nobody is left to keep a margin to.
+    // No lead vehicle is left to keep a margin to.
     let command = bench.step();
     assert_eq!((command.state, command.reason), (EgoState::Following, Reason::MarginReturned));
 }
 
 #[test]
-fn what_wavers_about_a_threshold_does_not_switch_it() {
+fn fluctuations_about_a_threshold_do_not_change_the_state() {
     let mut bench = Bench::engaged();
-    bench.front().state[0] = 60.0;
+    bench.lead().state[0] = 60.0;
     for step in 0..200 {
         let sign = if step % 2 == 0 { 1.0 } else { -1.0 };
         bench.rear().state = [-100.0 - CAR_M - 5.0 * sign, 0.0, 30.0 + 10.0 / 3.6 + sign, 0.0].into();
@@ -175,19 +175,19 @@ fn what_wavers_about_a_threshold_does_not_switch_it() {
 }
 
 #[test]
-fn every_command_but_a_needed_braking_stays_within_the_comfort_limits() {
+fn commands_stay_within_the_comfort_limits() {
     let mut bench = Bench::engaged();
-    bench.front().state[0] = 60.0;
+    bench.lead().state[0] = 60.0;
     let mut last_mps2 = 0.0;
     for step in 0..250 {
-        let r_m = -90.0 + 0.6 * f64::from(step);
-        bench.rear().state[0] = r_m;
-        bench.rear().lane = if r_m > -10.0 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
+        let rear_m = -90.0 + 0.6 * f64::from(step);
+        bench.rear().state[0] = rear_m;
+        bench.rear().lane = if rear_m > -10.0 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
         let now_mps2 = bench.step().acceleration_mps2;
         assert!((-1.0..=0.8).contains(&now_mps2), "{now_mps2}");
         let jerk_mps3 = (now_mps2 - last_mps2) / 0.04;
         assert!((-2.0 - 1e-9..=3.0 + 1e-9).contains(&jerk_mps3), "step {step}: {jerk_mps3}");
         last_mps2 = now_mps2;
     }
-    assert!(last_mps2 > 0.0, "the margin is given back");
+    assert!(last_mps2 > 0.0, "the margin is returned");
 }

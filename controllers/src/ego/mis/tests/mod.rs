@@ -1,4 +1,4 @@
-//! One test for each condition and transition, on the whole stack with tracks made by hand.
+//! Tests of each condition and transition, on the whole ego stack with hand-made tracks.
 
 mod engaging;
 mod holding;
@@ -15,7 +15,8 @@ use crate::ego::{
 const CAR_M: f64 = 4.6;
 const PERIOD: Time = Time::from_ms(40);
 
-/// E at 30 m/s, F at 21 m, R at 90 m and 8 m/s faster: every condition for engaging holds.
+/// A test bench in which every condition for engaging holds: the ego drives at 30 m/s, the lead vehicle is at 21 m, and
+/// the rear vehicle is at 90 m and 8 m/s faster.
 struct Bench {
     stack: EgoStack,
     time: Time,
@@ -46,10 +47,10 @@ fn track(id: u32, x_m: f64, speed_mps: f64, lane: usize) -> Track {
 
 impl Bench {
     fn new() -> Self {
-        Self::with(true)
+        Self::with_automation(true)
     }
 
-    fn with(automated: bool) -> Self {
+    fn with_automation(automated: bool) -> Self {
         let settings = EgoSettings {
             acc: Acc { time_gap_s: 0.7, set_speed_mps: None, standstill_gap_m: 3.0 },
             aeb: None,
@@ -66,7 +67,7 @@ impl Bench {
         }
     }
 
-    fn front(&mut self) -> &mut Track {
+    fn lead(&mut self) -> &mut Track {
         &mut self.tracks[0]
     }
 
@@ -96,7 +97,7 @@ impl Bench {
         self.stack.step(&EgoInput { time, odometry, road, tracks: &self.tracks, sensors: self.sensors })
     }
 
-    /// Steps for `seconds`, and returns the last command.
+    /// Steps for `seconds` and returns the last command.
     fn step_for(&mut self, seconds: f64) -> EgoCommand {
         let until = self.time + Time::from_s(seconds);
         let mut command = self.step();
@@ -106,7 +107,7 @@ impl Bench {
         command
     }
 
-    fn refuses(&mut self, reason: Reason) {
+    fn assert_not_engaged(&mut self, reason: Reason) {
         let command = self.step();
         assert_eq!((command.state, command.reason), (EgoState::Following, reason));
         assert_eq!(command.plan, None);
@@ -118,7 +119,7 @@ impl Bench {
         bench
     }
 
-    fn releases(&mut self, within_s: f64, reason: Reason) {
+    fn assert_released(&mut self, within_s: f64, reason: Reason) {
         let command = self.step_for(within_s);
         assert_eq!((command.state, command.reason), (EgoState::Releasing, reason));
     }

@@ -1,0 +1,302 @@
+//! The smallest braking that reaches the goal, taking into account that braking builds up over time.
+//!
+//! [`Encounter`] has the closed-form solution for braking that takes effect at once. With a [`BrakingResponse`], the
+//! arrival time solves D = Δv·t + W(t), where D is the distance to the critical gap, Δv the closing speed and W the
+//! ego's loss of distance. Newton's method finds the root of this convex function within a few steps, starting from the
+//! closed-form arrival. The braking is then bisected between a value that misses the goal and one that reaches it.
+//!
+//! If the rear vehicle is at least as fast as the lead vehicle, which is the case that the system is built for, the
+//! headway at arrival grows with the braking, without limit until the ego stops. Evaluating the bound alone then tells
+//! whether any braking reaches the goal. If the lead vehicle is faster still, the headway may fall with the braking.
+//! The range is then scanned from its lower end, and the first braking that reaches the goal is bracketed.
+
+use super::response::BrakingResponse;
+use super::{Encounter, Solution};
+
+/// Number of parts in which the range is scanned if the headway at arrival may fall with the braking.
+const SCAN_PARTS: u32 = 64;
+
+/// Bisection steps: to 10⁻⁹ of the bound.
+const BISECTION_STEPS: u32 = 30;
+
+/// Largest number of steps of Newton's method; four are enough for full precision from any start.
+const NEWTON_STEPS: u32 = 12;
+
+/// Change of the arrival time below which it counts as found (s).
+const ARRIVAL_TOLERANCE_S: f64 = 1e-10;
+
+/// Prediction of the rear vehicle's arrival: an encounter, and the build-up of the ego's braking in it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ArrivalPrediction {
+    /// The present encounter.
+    pub encounter: Encounter,
+    /// The build-up of the ego's braking from now on.
+    pub response: BrakingResponse,
+}
+
+impl ArrivalPrediction {
+    /// Returns the time until the rear vehicle reaches the critical gap, with the ego braking up to `deceleration_mps2`
+    /// (s).
+    ///
+    /// Returns `None` if the rear vehicle never arrives.
+    pub fn arrival_s(&self, deceleration_mps2: f64) -> Option<f64> {
+        let Encounter { closing_mps, .. } = self.encounter;
+        let distance_m = self.encounter.distance_to_critical_m();
+        let mut time_s = self.encounter.arrival_s(deceleration_mps2)?;
+        for _ in 0..NEWTON_STEPS {
+            let loss = self.response.loss(deceleration_mps2, time_s);
+            let rate_mps = closing_mps + loss.speed_mps;
+            if !(rate_mps > 0.0) {
+                return None;
+            }
+            let next_s = (time_s - (closing_mps * time_s + loss.distance_m - distance_m) / rate_mps).max(0.0);
+            let step_s = (next_s - time_s).abs();
+            time_s = next_s;
+            if step_s < ARRIVAL_TOLERANCE_S {
+                return Some(time_s);
+            }
+        }
+        // An arrival time that does not converge, such as NaN, is no arrival.
+        None
+    }
+
+    /// Returns the front time headway when the rear vehicle arrives, with the ego braking up to `deceleration_mps2`
+    /// (s).
+    ///
+    /// Returns `None` if the rear vehicle never arrives, or if the ego stops before.
+    pub fn headway_at_arrival_s(&self, deceleration_mps2: f64) -> Option<f64> {
+        let (gap_m, speed_mps) = self.at_arrival(deceleration_mps2)?;
+        (speed_mps > 0.0).then(|| gap_m / speed_mps)
+    }
+
+    /// Returns the front gap (m) and the speed of the ego (m/s) when the rear vehicle arrives; a speed of 0 or less
+    /// means that the ego stops before.
+    fn at_arrival(&self, deceleration_mps2: f64) -> Option<(f64, f64)> {
+        let Encounter { ego_mps, front_gap_m, lead_mps, .. } = self.encounter;
+        let time_s = self.arrival_s(deceleration_mps2)?;
+        let loss = self.response.loss(deceleration_mps2, time_s);
+        Some((front_gap_m + (lead_mps - ego_mps) * time_s + loss.distance_m, ego_mps - loss.speed_mps))
+    }
+
+    /// Returns the smallest braking up to `bound_mps2` with which the front time headway is at least `goal_s` when the
+    /// rear vehicle arrives.
+    ///
+    /// Returns `None` if the rear vehicle does not approach: there is then no encounter to prepare for.
+    pub fn solve(&self, goal_s: f64, bound_mps2: f64) -> Option<Solution> {
+        if !(self.encounter.closing_mps > 0.0) {
+            return None;
+        }
+        if self.reaches_goal(goal_s, 0.0) {
+            return Some(Solution { deceleration_mps2: 0.0, in_reach: true });
+        }
+        let Encounter { ego_mps, closing_mps, lead_mps, .. } = self.encounter;
+        let parts = if ego_mps + closing_mps >= lead_mps { 1 } else { SCAN_PARTS };
+        let at = |part: u32| bound_mps2 * f64::from(part) / f64::from(parts);
+        let part = (1..=parts).find(|part| self.reaches_goal(goal_s, at(*part)));
+        Some(match part {
+            Some(part) => Solution { deceleration_mps2: self.bisect(goal_s, at(part - 1), at(part)), in_reach: true },
+            None => Solution { deceleration_mps2: bound_mps2, in_reach: false },
+        })
+    }
+
+    /// Returns true if this braking reaches or exceeds the goal. If the ego stops before the arrival, it does: the
+    /// headway passes every value on the way to a standstill.
+    fn reaches_goal(&self, goal_s: f64, deceleration_mps2: f64) -> bool {
+        let enough = |(gap_m, speed_mps)| speed_mps <= 0.0 || gap_m / speed_mps >= goal_s;
+        self.at_arrival(deceleration_mps2).is_some_and(enough)
+    }
+
+    /// Returns the smallest braking that reaches the goal, between one that does not and one that does.
+    fn bisect(&self, goal_s: f64, mut too_little: f64, mut enough: f64) -> f64 {
+        for _ in 0..BISECTION_STEPS {
+            let middle = 0.5 * (too_little + enough);
+            if self.reaches_goal(goal_s, middle) { enough = middle } else { too_little = middle }
+        }
+        enough
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// Build-up at the comfort limit, with the actuators of a car.
+    const CAR: BrakingResponse =
+        BrakingResponse { commanded_mps2: 0.0, braking_mps2: 0.0, build_up_mps3: 2.0, release_mps3: 3.0, lag_s: 0.15 };
+
+    prop_compose! {
+        fn encounters()(
+            ego_mps in 15.0..40.0, thw in 0.3..1.5, lead in -3.0..3.0, rear_gap_m in 6.0..120.0, closing_mps in 0.5..20.0,
+        ) -> Encounter {
+            Encounter {
+                ego_mps, front_gap_m: thw * ego_mps, lead_mps: ego_mps + lead, rear_gap_m, closing_mps,
+                critical_gap_m: 5.0,
+            }
+        }
+    }
+
+    prop_compose! {
+        fn responses()(commanded in 0.0..1.5, now in -0.5..1.5) -> BrakingResponse {
+            BrakingResponse { commanded_mps2: commanded, braking_mps2: now, ..CAR }
+        }
+    }
+
+    /// Computes the front time headway when the rear vehicle arrives by time-stepping all three vehicles, a hundred
+    /// times a second.
+    fn stepped(prediction: &ArrivalPrediction, aim: f64) -> Option<f64> {
+        let ArrivalPrediction { encounter, response } = prediction;
+        let step_s = 0.01;
+        let (mut commanded, mut braking) = (response.commanded_mps2, response.braking_mps2);
+        let (mut ego_mps, mut front_m, mut rear_m) = (encounter.ego_mps, encounter.front_gap_m, encounter.rear_gap_m);
+        let rear_mps = encounter.ego_mps + encounter.closing_mps;
+        let decay = (-step_s / response.lag_s).exp();
+        for _ in 0..100_000 {
+            if ego_mps <= 0.0 || rear_mps <= ego_mps {
+                return None;
+            }
+            let before = (ego_mps, front_m, rear_m);
+            let next = if aim > commanded {
+                (commanded + response.build_up_mps3 * step_s).min(aim)
+            } else {
+                (commanded - response.release_mps3 * step_s).max(aim)
+            };
+            let (middle, was) = (0.5 * (commanded + next), braking);
+            commanded = next;
+            braking = middle + (braking - middle) * decay;
+            ego_mps -= 0.5 * (was + braking) * step_s;
+            let mean_mps = 0.5 * (before.0 + ego_mps);
+            front_m += (encounter.lead_mps - mean_mps) * step_s;
+            rear_m -= (rear_mps - mean_mps) * step_s;
+            if rear_m <= encounter.critical_gap_m {
+                let share = (before.2 - encounter.critical_gap_m) / (before.2 - rear_m);
+                let between = |from: f64, to: f64| from + share * (to - from);
+                return Some(between(before.1, front_m) / between(before.0, ego_mps));
+            }
+        }
+        None
+    }
+
+    /// The result of a scan over the braking. A scan is inconclusive if the headway is within its own error of the
+    /// goal.
+    #[derive(Debug, PartialEq)]
+    enum Scanned {
+        Reached,
+        Missed,
+        Close,
+    }
+
+    fn scan(prediction: &ArrivalPrediction, goal_s: f64, bound: f64) -> Scanned {
+        let error_s = 5e-3;
+        let best = (0..=40)
+            .filter_map(|step| stepped(prediction, bound * f64::from(step) / 40.0))
+            .fold(f64::NEG_INFINITY, f64::max);
+        if best >= goal_s + error_s {
+            Scanned::Reached
+        } else if best < goal_s - error_s {
+            Scanned::Missed
+        } else {
+            Scanned::Close
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(10_000))]
+
+        /// Holds if the rear vehicle is at least as fast as the lead vehicle, as in every state in which the system
+        /// engages.
+        #[test]
+        fn the_reachable_set_equals_that_of_a_scan(
+            encounter in encounters(), response in responses(), gain in 0.1..3.0, bound in 0.5..3.0,
+        ) {
+            prop_assume!(encounter.ego_mps + encounter.closing_mps >= encounter.lead_mps);
+            let prediction = ArrivalPrediction { encounter, response };
+            let goal = encounter.front_gap_m / encounter.ego_mps + gain;
+            let solution = prediction.solve(goal, bound).unwrap();
+            prop_assert!((0.0..=bound).contains(&solution.deceleration_mps2));
+            match scan(&prediction, goal, bound) {
+                Scanned::Reached => prop_assert!(solution.in_reach, "{solution:?}"),
+                Scanned::Missed => prop_assert!(!solution.in_reach, "{solution:?}"),
+                Scanned::Close => {}
+            }
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2_000))]
+
+        #[test]
+        fn immediate_braking_equals_the_closed_form(encounter in encounters(), gain in 0.1..3.0, bound in 0.5..3.0) {
+            prop_assume!(encounter.ego_mps + encounter.closing_mps >= encounter.lead_mps);
+            let goal = encounter.front_gap_m / encounter.ego_mps + gain;
+            let closed = encounter.solve(goal, bound).unwrap();
+            let immediate = ArrivalPrediction { encounter, response: BrakingResponse::IMMEDIATE };
+            let bracketed = immediate.solve(goal, bound).unwrap();
+            prop_assert!((closed.deceleration_mps2 - bracketed.deceleration_mps2).abs() < 1e-6, "{closed:?} {bracketed:?}");
+        }
+
+        #[test]
+        fn slow_build_up_never_needs_less_braking(encounter in encounters(), gain in 0.1..3.0) {
+            prop_assume!(encounter.ego_mps + encounter.closing_mps >= encounter.lead_mps);
+            let goal = encounter.front_gap_m / encounter.ego_mps + gain;
+            let at_once = encounter.solve(goal, 3.0).unwrap();
+            let slowly = ArrivalPrediction { encounter, response: CAR }.solve(goal, 3.0).unwrap();
+            prop_assert!(slowly.deceleration_mps2 >= at_once.deceleration_mps2 - 1e-6, "{slowly:?} {at_once:?}");
+        }
+
+        #[test]
+        fn the_smallest_braking_meets_the_goal_exactly(
+            encounter in encounters(), response in responses(), gain in 0.1..3.0,
+        ) {
+            let prediction = ArrivalPrediction { encounter, response };
+            let goal = encounter.front_gap_m / encounter.ego_mps + gain;
+            let Solution { deceleration_mps2, in_reach } = prediction.solve(goal, 9.0).unwrap();
+            if in_reach && deceleration_mps2 > 1e-6 {
+                let headway = prediction.headway_at_arrival_s(deceleration_mps2).unwrap();
+                prop_assert!((headway - goal).abs() < 1e-5, "{headway} {goal}");
+            }
+        }
+
+        #[test]
+        fn a_higher_goal_never_needs_less_braking_and_a_goal_already_met_needs_none(
+            encounter in encounters(), response in responses(), gain in 0.0..3.0, more in 0.0..1.0,
+        ) {
+            prop_assume!(encounter.ego_mps + encounter.closing_mps >= encounter.lead_mps);
+            let prediction = ArrivalPrediction { encounter, response };
+            let goal = encounter.front_gap_m / encounter.ego_mps + gain;
+            let low = prediction.solve(goal, 3.0).unwrap();
+            let high = prediction.solve(goal + more, 3.0).unwrap();
+            prop_assert!(high.deceleration_mps2 >= low.deceleration_mps2 - 1e-9);
+            if let Some(met) = prediction.headway_at_arrival_s(0.0) {
+                let solution = prediction.solve(met, 1.0).unwrap();
+                prop_assert_eq!(solution, Solution { deceleration_mps2: 0.0, in_reach: true });
+            }
+        }
+    }
+
+    #[test]
+    fn with_nan_the_goal_is_out_of_reach() {
+        let encounter = Encounter {
+            ego_mps: 30.0,
+            front_gap_m: 21.0,
+            lead_mps: 30.0,
+            rear_gap_m: 100.0,
+            closing_mps: 24.0 / 3.6,
+            critical_gap_m: 5.0,
+        };
+        for broken in
+            [Encounter { front_gap_m: f64::NAN, ..encounter }, Encounter { rear_gap_m: f64::NAN, ..encounter }]
+        {
+            let solution = ArrivalPrediction { encounter: broken, response: CAR }.solve(2.7, 1.0).unwrap();
+            assert_eq!(solution, Solution { deceleration_mps2: 1.0, in_reach: false });
+        }
+        let broken = BrakingResponse { braking_mps2: f64::NAN, ..CAR };
+        assert!(!ArrivalPrediction { encounter, response: broken }.solve(2.7, 1.0).unwrap().in_reach);
+        assert_eq!(
+            ArrivalPrediction { encounter: Encounter { closing_mps: f64::NAN, ..encounter }, response: CAR }
+                .solve(2.7, 1.0),
+            None
+        );
+    }
+}
