@@ -1,4 +1,4 @@
-//! Files that appear as a whole, or not at all.
+//! Atomic file writes: a file appears complete, or not at all.
 
 use std::ffi::OsStr;
 use std::io::{self, BufWriter, Write};
@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use tempfile::{Builder, NamedTempFile};
 
-/// How temporary files are called: a program that is killed leaves one behind.
-const TEMPORARY: &str = ".closecall-";
+/// Name prefix of temporary files. A killed program leaves such a file behind.
+const TEMPORARY_PREFIX: &str = ".closecall-";
 
 /// A file that cannot be written. What was there before is untouched.
 #[derive(Debug, thiserror::Error)]
@@ -37,16 +37,17 @@ pub fn write_file(
     write_atomically(path, content).map_err(|source| WriteError::new(path, source))
 }
 
-/// Writes a file by `content` under a temporary name beside `path`, then renames it. When this returns, the disk has been
-/// asked to keep both the content and the name.
+/// Writes the file `path` through `content`: first under a temporary name in the same folder, then by a rename.
+///
+/// On return, both the content and the name have been synchronized to the disk.
 ///
 /// # Errors
-/// Those of `content`, and I/O errors; a file that was at `path` before is then untouched.
+/// Returns the error of `content`, or an I/O error. A file that existed at `path` before then stays untouched.
 pub fn write_atomically<E: From<io::Error>>(
     path: &Path,
     content: impl FnOnce(&mut (dyn Write + Send)) -> Result<(), E>,
 ) -> Result<(), E> {
-    let folder = folder(path);
+    let folder = parent_folder(path);
     let mut file = BufWriter::new(temporary_in(folder)?);
     content(&mut file)?;
     let file = file.into_inner().map_err(io::IntoInnerError::into_error)?;
@@ -55,24 +56,26 @@ pub fn write_atomically<E: From<io::Error>>(
     Ok(sync_folder(folder)?)
 }
 
-/// Checks, before any work is done, that a file can be created at `path` later.
+/// Checks that a file can be created at `path`, so that a long computation does not fail only when it saves its result.
 ///
 /// # Errors
-/// [`WriteError`] if the folder does not take new files.
+/// [`WriteError`] if no file can be created in the folder of `path`.
 pub fn check_writable(path: &Path) -> Result<(), WriteError> {
-    temporary_in(folder(path)).map(drop).map_err(|source| WriteError::new(path, source))
+    temporary_in(parent_folder(path)).map(drop).map_err(|source| WriteError::new(path, source))
 }
 
-/// True for the name of a file that was being written when the program was killed.
+/// Returns true if `name` is that of a temporary file, left by a program that was killed while it wrote.
 pub fn is_temporary(name: &OsStr) -> bool {
-    name.to_string_lossy().starts_with(TEMPORARY)
+    name.to_string_lossy().starts_with(TEMPORARY_PREFIX)
 }
 
-fn folder(path: &Path) -> &Path {
+fn parent_folder(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// A temporary file that, once renamed, can be read by whom the umask lets read.
+/// Creates a temporary file whose permissions follow the umask, like those of any other new file.
+///
+/// The default of `tempfile` is read and write access for the owner alone, which the renamed file would keep.
 fn temporary_in(folder: &Path) -> io::Result<NamedTempFile> {
     let mut builder = Builder::new();
     #[cfg(unix)]
@@ -81,10 +84,10 @@ fn temporary_in(folder: &Path) -> io::Result<NamedTempFile> {
         const READ_AND_WRITE: u32 = 0o666;
         builder.permissions(std::fs::Permissions::from_mode(READ_AND_WRITE));
     }
-    builder.prefix(TEMPORARY).tempfile_in(folder)
+    builder.prefix(TEMPORARY_PREFIX).tempfile_in(folder)
 }
 
-/// Has the disk keep a new name.
+/// Synchronizes a folder to the disk, so that a new file name survives a power failure.
 #[cfg(unix)]
 fn sync_folder(folder: &Path) -> io::Result<()> {
     std::fs::File::open(folder)?.sync_all()
@@ -100,7 +103,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_failure_leaves_the_old_file_and_nothing_else() {
+    fn a_failed_write_keeps_the_old_file_and_leaves_no_temporary_file() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.txt");
         std::fs::write(&path, "old").unwrap();

@@ -1,12 +1,15 @@
-//! How sure a share is that was counted.
+//! Confidence interval of a probability that was estimated by counting.
 
 use statrs::distribution::{Beta, ContinuousCDF};
 
-/// Share of repetitions in which the interval covers the true probability, at least.
+/// Confidence level: the least share of repetitions in which the interval covers the true probability.
 const COVERAGE: f64 = 0.95;
 
-/// An exact (Clopper–Pearson) interval of a probability at 95 %: C. J. Clopper and E. S. Pearson, *Biometrika* 26
-/// (1934). It covers the truth in at least 95 % of repetitions, whatever the truth is. Nothing is known of no samples.
+/// Returns the exact (Clopper–Pearson) 95 % confidence interval `[lower, upper]` of a probability, from the number of
+/// `hits` among `samples`.
+///
+/// Source: C. J. Clopper and E. S. Pearson, *Biometrika* 26 (1934). The interval covers the true probability in at
+/// least 95 % of repetitions, whatever that probability is. Without samples it is `[0, 1]`.
 pub fn clopper_pearson(hits: u64, samples: u64) -> [f64; 2] {
     let tail = 0.5 * (1.0 - COVERAGE);
     let (k, n) = (hits as f64, samples as f64);
@@ -21,7 +24,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn exact_intervals() {
+    fn intervals_match_known_values() {
         let [low, high] = clopper_pearson(0, 200);
         assert!(low == 0.0 && (high - 0.0183).abs() < 1e-4);
         let [low, high] = clopper_pearson(29, 29);

@@ -1,4 +1,5 @@
-//! What is tested: recordings, lane changes, parameter distributions, sampling designs and the scenario library.
+//! What Closecall tests: trajectory data, lane changes, parameter distributions, sampling designs and the scenario
+//! library.
 
 pub mod atomic;
 pub mod criticality;

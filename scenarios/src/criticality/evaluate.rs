@@ -1,4 +1,4 @@
-//! Evaluates the metrics over the window of a lane change.
+//! Evaluation of the metrics over the window of a lane change.
 
 use closecall_traffic::geometry::OrientedBox;
 use closecall_traffic::metrics::{Moving, closest_encounter, time_headway_s};
@@ -12,10 +12,12 @@ use super::{
 use crate::filters::SmoothedRecording;
 use crate::lane_change::{LaneChange, detect};
 
-/// Below this speed the direction of movement is noise, and a vehicle is taken to point along the road [m/s].
+/// Speed below which a vehicle is assumed to point along the road, because its direction of movement is noise (m/s).
 const HEADING_FROM_MPS: f64 = 1.0;
 
-/// Every lane change of a recording with its metrics; `speed_limit_mps` where it is known.
+/// Detects all lane changes of `recording` and evaluates their metrics.
+///
+/// `speed_limit_mps` is `None` if the speed limit is not known.
 pub fn criticality(recording: &SmoothedRecording, speed_limit_mps: Option<f64>) -> Vec<CriticalLaneChange> {
     let evaluated = detect(recording).into_iter().filter_map(|lane_change| {
         let metrics = evaluate(recording, &lane_change, speed_limit_mps)?;
@@ -24,34 +26,36 @@ pub fn criticality(recording: &SmoothedRecording, speed_limit_mps: Option<f64>) 
     evaluated.collect()
 }
 
-/// The metrics of one lane change of `recording`, or nothing where the recording does not have its track.
+/// Evaluates the metrics of one lane change. Returns `None` if `recording` does not have its track.
+///
+/// `speed_limit_mps` is `None` if the speed limit is not known.
 pub fn evaluate(
     recording: &SmoothedRecording,
     lane_change: &LaneChange,
     speed_limit_mps: Option<f64>,
 ) -> Option<Metrics> {
-    let number = lane_change.track_id;
-    let place = recording.place_of(number)?;
-    let own = &recording.tracks[place].trajectory;
+    let own_index = recording.place_of(lane_change.track_id)?;
+    let own = &recording.tracks[own_index].trajectory;
     let (start, end) = (Time::from_s(lane_change.start_s), Time::from_s(lane_change.end_s));
-    let mut worst = Worst::default();
+    let mut extremes = Extremes::default();
     for point in own.points.iter().filter(|point| point.time >= start && point.time <= end) {
-        let others = recording.present_at(point.time).iter().filter(|presence| presence.track != place);
-        let others: Vec<Body<'_>> = others.map(|&presence| Body::new(recording.look_up(presence))).collect();
-        worst.add(&Body::new((own, point)), &others, Lane(lane_change.to_lane));
+        let others = recording.present_at(point.time).iter().filter(|presence| presence.track_index != own_index);
+        let others: Vec<VehicleState<'_>> =
+            others.map(|&presence| VehicleState::new(recording.look_up(presence))).collect();
+        extremes.observe(&VehicleState::new((own, point)), &others, Lane(lane_change.to_lane));
     }
-    Some(worst.metrics(speed_limit_mps.unwrap_or(DEFAULT_SPEED_LIMIT_MPS)))
+    Some(extremes.metrics(speed_limit_mps.unwrap_or(DEFAULT_SPEED_LIMIT_MPS)))
 }
 
-/// A vehicle at one instant.
+/// The state of one vehicle at one instant.
 #[derive(Clone, Copy)]
-struct Body<'a> {
+struct VehicleState<'a> {
     track: &'a Trajectory,
     point: &'a TrajectoryPoint,
     moving: Moving,
 }
 
-impl<'a> Body<'a> {
+impl<'a> VehicleState<'a> {
     fn new((track, point): (&'a Trajectory, &'a TrajectoryPoint)) -> Self {
         let (vx_mps, vy_mps) = (point.speed_mps, point.lateral_speed_mps);
         let yaw_rad = if vx_mps.hypot(vy_mps) < HEADING_FROM_MPS { 0.0 } else { vy_mps.atan2(vx_mps) };
@@ -60,7 +64,7 @@ impl<'a> Body<'a> {
         Self { track, point, moving: Moving { shape, vx_mps, vy_mps } }
     }
 
-    /// Gap from this vehicle's front to the rear of `other` [m], where that one is ahead.
+    /// Returns the gap from this vehicle's front to the rear of `other` (m), or `None` if `other` is not ahead.
     fn gap_to_m(&self, other: &Self) -> Option<f64> {
         let ahead_m = other.point.s_m - self.point.s_m;
         let gap_m = ahead_m - 0.5 * (self.track.dimensions.length_m + other.track.dimensions.length_m);
@@ -70,7 +74,7 @@ impl<'a> Body<'a> {
     }
 }
 
-/// The most critical value so far.
+/// The most critical value of a metric so far, with its opponent and time.
 #[derive(Clone, Copy)]
 struct Extreme {
     value: f64,
@@ -78,8 +82,8 @@ struct Extreme {
     time_s: f64,
 }
 
-/// A record of a value, or of why there is none.
-fn record(extreme: Option<Extreme>, otherwise: Absent, is_critical: impl Fn(f64) -> bool) -> MetricRecord {
+/// Returns the result of a metric: its most critical value, or the reason `otherwise` if there is none.
+fn metric_record(extreme: Option<Extreme>, otherwise: Absent, is_critical: impl Fn(f64) -> bool) -> MetricRecord {
     match extreme {
         Some(Extreme { value, opponent, time_s }) => {
             MetricRecord::Value { value, opponent, time_s, critical: is_critical(value) }
@@ -88,21 +92,23 @@ fn record(extreme: Option<Extreme>, otherwise: Absent, is_critical: impl Fn(f64)
     }
 }
 
+/// Replaces `kept` by `new` if `new` is smaller.
 fn keep_smaller(kept: &mut Option<Extreme>, new: Extreme) {
     if kept.is_none_or(|kept| new.value < kept.value) {
         *kept = Some(new);
     }
 }
 
+/// Replaces `kept` by `new` if `new` is larger.
 fn keep_larger(kept: &mut Option<Extreme>, new: Extreme) {
     if kept.is_none_or(|kept| new.value > kept.value) {
         *kept = Some(new);
     }
 }
 
-/// The most critical values over a window.
+/// The most critical values of all metrics over a window.
 #[derive(Default)]
-struct Worst {
+struct Extremes {
     distance: Option<Extreme>,
     speed: Option<Extreme>,
     a_lon: Option<Extreme>,
@@ -111,18 +117,19 @@ struct Worst {
     dce: Option<Extreme>,
     ttce: Option<Extreme>,
     has_opponent: bool,
-    stood_behind_a_lead: bool,
-    looked_too_far: bool,
+    was_standing_behind_lead: bool,
+    has_encounter_beyond_horizon: bool,
 }
 
-impl Worst {
-    fn add(&mut self, own: &Body<'_>, others: &[Body<'_>], target: Lane) {
+impl Extremes {
+    /// Updates every extreme with the vehicles at one instant; `target` is the lane that the vehicle changes to.
+    fn observe(&mut self, own: &VehicleState<'_>, others: &[VehicleState<'_>], target: Lane) {
         let time_s = own.point.time.s();
         let alone = |value| Extreme { value, opponent: None, time_s };
         keep_larger(&mut self.speed, alone(own.point.speed_mps));
         keep_larger(&mut self.a_lon, alone(own.point.acceleration_mps2.abs()));
         keep_larger(&mut self.a_lat, alone(own.point.lateral_acceleration_mps2.abs()));
-        self.add_headway(own, others, target);
+        self.observe_headway(own, others, target);
         for other in others {
             self.has_opponent = true;
             let against = |value| Extreme { value, opponent: Some(other.track.track_id), time_s };
@@ -134,13 +141,13 @@ impl Worst {
                         keep_smaller(&mut self.dce, against(encounter.dce_m));
                     }
                 }
-                Err(reason) => self.looked_too_far |= reason == Absent::BeyondHorizon,
+                Err(reason) => self.has_encounter_beyond_horizon |= reason == Absent::BeyondHorizon,
             }
         }
     }
 
-    fn add_headway(&mut self, own: &Body<'_>, others: &[Body<'_>], target: Lane) {
-        let in_lane = |other: &&Body<'_>| other.point.lane == own.point.lane || other.point.lane == target;
+    fn observe_headway(&mut self, own: &VehicleState<'_>, others: &[VehicleState<'_>], target: Lane) {
+        let in_lane = |other: &&VehicleState<'_>| other.point.lane == own.point.lane || other.point.lane == target;
         let ahead = others.iter().filter(in_lane).filter_map(|other| Some((own.gap_to_m(other)?, other)));
         let Some((gap_m, lead)) = ahead.min_by(|a, b| a.0.total_cmp(&b.0)) else { return };
         match time_headway_s(gap_m, own.point.speed_mps) {
@@ -148,27 +155,27 @@ impl Worst {
                 let (opponent, time_s) = (Some(lead.track.track_id), own.point.time.s());
                 keep_smaller(&mut self.thw, Extreme { value, opponent, time_s });
             }
-            Err(_) => self.stood_behind_a_lead = true,
+            Err(_) => self.was_standing_behind_lead = true,
         }
     }
 
     fn metrics(&self, speed_limit_mps: f64) -> Metrics {
-        let no_lead = if self.stood_behind_a_lead { Absent::Standstill } else { Absent::NoLead };
-        let no_ttce = match (self.has_opponent, self.looked_too_far) {
+        let no_lead = if self.was_standing_behind_lead { Absent::Standstill } else { Absent::NoLead };
+        let no_ttce = match (self.has_opponent, self.has_encounter_beyond_horizon) {
             (false, _) => Absent::NoOpponent,
             (true, true) => Absent::BeyondHorizon,
             (true, false) => Absent::NotApproaching,
         };
-        // Where there is an encounter, but none that is near enough to look at its distance.
+        // If there are encounters, but none near enough in time, DCE is absent because of the horizon.
         let no_dce = if self.ttce.is_some() { Absent::BeyondHorizon } else { no_ttce };
         Metrics {
-            distance_m: record(self.distance, Absent::NoOpponent, |value| value < CRITICAL_DISTANCE_M),
-            speed_mps: record(self.speed, Absent::NotRecorded, |v| v > CRITICAL_SPEED_FACTOR * speed_limit_mps),
-            a_lon_mps2: record(self.a_lon, Absent::NotRecorded, |value| value > CRITICAL_A_LON_MPS2),
-            a_lat_mps2: record(self.a_lat, Absent::NotRecorded, |value| value > CRITICAL_A_LAT_MPS2),
-            thw_s: record(self.thw, no_lead, |value| value < CRITICAL_THW_S),
-            dce_m: record(self.dce, no_dce, |value| value < CRITICAL_DCE_M),
-            ttce_s: record(self.ttce, no_ttce, |value| value < CRITICAL_TTCE_S),
+            distance_m: metric_record(self.distance, Absent::NoOpponent, |value| value < CRITICAL_DISTANCE_M),
+            speed_mps: metric_record(self.speed, Absent::NotRecorded, |v| v > CRITICAL_SPEED_FACTOR * speed_limit_mps),
+            a_lon_mps2: metric_record(self.a_lon, Absent::NotRecorded, |value| value > CRITICAL_A_LON_MPS2),
+            a_lat_mps2: metric_record(self.a_lat, Absent::NotRecorded, |value| value > CRITICAL_A_LAT_MPS2),
+            thw_s: metric_record(self.thw, no_lead, |value| value < CRITICAL_THW_S),
+            dce_m: metric_record(self.dce, no_dce, |value| value < CRITICAL_DCE_M),
+            ttce_s: metric_record(self.ttce, no_ttce, |value| value < CRITICAL_TTCE_S),
         }
     }
 }
@@ -180,7 +187,7 @@ mod tests {
     use crate::filters::smooth;
     use crate::recordings::test_support::{changing_track, recording_of, straight_track};
 
-    /// From lane 2 to lane 1 between 3 and 8 s at 30 m/s, with other vehicles around.
+    /// A lane change from lane 2 to lane 1 between 3 and 8 s at 30 m/s, evaluated against `others`.
     fn evaluated(others: Vec<Trajectory>) -> CriticalLaneChange {
         let mut tracks = vec![changing_track(1, (0.0, 30.0), (-5.25, -1.75), (3.0, 5.0), 110)];
         tracks.extend(others);
@@ -197,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn alone_on_the_road_there_is_no_opponent() {
+    fn a_vehicle_alone_on_the_road_has_no_opponent() {
         let metrics = evaluated(Vec::new()).metrics;
         assert_eq!(absent(metrics.distance_m), Some(Absent::NoOpponent));
         assert_eq!(absent(metrics.thw_s), Some(Absent::NoLead));
@@ -212,8 +219,8 @@ mod tests {
     }
 
     #[test]
-    fn the_headway_to_the_vehicle_pulled_out_from_behind_counts() {
-        // 19.5 m from bumper to bumper, at 30 m/s and the same speed: 0.65 s.
+    fn the_headway_to_the_lead_vehicle_in_the_old_lane_counts() {
+        // Both drive at 30 m/s, 19.5 m bumper to bumper: 0.65 s.
         let metrics = evaluated(vec![straight_track(2, 24.0, 30.0, -5.25, 110)]).metrics;
         assert!((metrics.thw_s.value().unwrap() - 0.65).abs() < 1e-6);
         assert!(metrics.thw_s.is_critical());
@@ -223,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lead_in_the_target_lane_counts_and_one_elsewhere_does_not() {
+    fn a_lead_vehicle_counts_in_the_target_lane_and_not_in_a_third_lane() {
         let target = evaluated(vec![straight_track(2, 64.5, 30.0, -1.75, 110)]).metrics;
         assert!((target.thw_s.value().unwrap() - 2.0).abs() < 1e-6);
         let elsewhere = evaluated(vec![straight_track(2, 64.5, 30.0, -8.75, 110)]).metrics;
@@ -231,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fast_vehicle_coming_up_in_the_target_lane_is_an_encounter() {
+    fn a_fast_vehicle_that_approaches_in_the_target_lane_is_an_encounter() {
         let metrics = evaluated(vec![straight_track(2, -70.0, 38.0, -1.75, 110)]).metrics;
         let ttce_s = metrics.ttce_s.value().unwrap();
         assert!(metrics.ttce_s.is_critical() && ttce_s < 2.6, "{ttce_s}");
@@ -240,14 +247,14 @@ mod tests {
     }
 
     #[test]
-    fn what_drives_away_is_no_encounter() {
+    fn a_vehicle_that_drives_away_is_no_encounter() {
         let metrics = evaluated(vec![straight_track(2, 50.0, 40.0, -8.75, 110)]).metrics;
         assert_eq!(absent(metrics.ttce_s), Some(Absent::NotApproaching));
         assert_eq!(serde_json::to_value(metrics.dce_m).unwrap()["absent"], "not-approaching");
     }
 
     #[test]
-    fn the_speed_limit_decides_over_the_speed() {
+    fn the_speed_limit_decides_whether_a_speed_is_critical() {
         let track = changing_track(1, (0.0, 45.0), (-5.25, -1.75), (3.0, 5.0), 110);
         let recording = smooth(&recording_of(vec![track]));
         let by_limit = |limit| criticality(&recording, limit)[0].metrics.speed_mps.is_critical();
@@ -255,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn shares_are_of_all_lane_changes() {
+    fn shares_refer_to_all_lane_changes() {
         let close = evaluated(vec![straight_track(2, 24.0, 30.0, -5.25, 110)]);
         let counted = shares(&[close, evaluated(Vec::new())]);
         let thw = counted.metrics.iter().find(|share| share.metric == "thw_s").unwrap();

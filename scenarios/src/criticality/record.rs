@@ -1,39 +1,39 @@
-//! The result: a lane change with its seven metrics.
+//! The result of an evaluation: a lane change with its seven metrics.
 
 use closecall_traffic::Absent;
 use serde::Serialize;
 
 use crate::lane_change::LaneChange;
 
-/// One metric of one lane change.
+/// The result of one metric for one lane change.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum MetricRecord {
     /// The most critical value.
     Value {
-        /// The value, in the unit of the metric.
+        /// The value, in the metric's unit.
         value: f64,
-        /// The track of the other vehicle; nothing for what concerns one vehicle alone.
+        /// Track id of the other vehicle; `None` for a metric of a single vehicle.
         opponent: Option<u64>,
-        /// When [s].
+        /// Time at which the value occurs (s).
         time_s: f64,
-        /// True where the value is beyond the threshold.
+        /// True if the value is beyond the threshold.
         critical: bool,
     },
-    /// There is none.
+    /// The metric has no value.
     Absent {
-        /// Why.
+        /// The reason.
         absent: Absent,
     },
 }
 
 impl MetricRecord {
-    /// True where there is a value beyond the threshold.
+    /// Returns true if there is a value and it is beyond the threshold.
     pub fn is_critical(&self) -> bool {
         matches!(self, Self::Value { critical: true, .. })
     }
 
-    /// The value, where there is one.
+    /// Returns the value, or `None` if it is absent.
     pub fn value(&self) -> Option<f64> {
         match self {
             Self::Value { value, .. } => Some(*value),
@@ -45,24 +45,24 @@ impl MetricRecord {
 /// The seven metrics of one lane change.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Metrics {
-    /// Smallest distance from box to box [m].
+    /// Smallest distance from box to box (m).
     pub distance_m: MetricRecord,
-    /// Largest speed [m/s].
+    /// Largest speed (m/s).
     pub speed_mps: MetricRecord,
-    /// Largest magnitude of the acceleration along the road [m/s²].
+    /// Largest magnitude of the acceleration along the road (m/s²).
     pub a_lon_mps2: MetricRecord,
-    /// Largest magnitude of the acceleration across the road [m/s²].
+    /// Largest magnitude of the acceleration across the road (m/s²).
     pub a_lat_mps2: MetricRecord,
-    /// Smallest time headway [s].
+    /// Smallest time headway (s).
     pub thw_s: MetricRecord,
-    /// Smallest distance of closest encounter [m].
+    /// Smallest distance at closest encounter (m).
     pub dce_m: MetricRecord,
-    /// Smallest time to closest encounter [s].
+    /// Smallest time to closest encounter (s).
     pub ttce_s: MetricRecord,
 }
 
 impl Metrics {
-    /// All seven with their names, in their fixed order.
+    /// Returns all seven metrics with their names, in a fixed order.
     pub fn named(&self) -> [(&'static str, MetricRecord); 7] {
         [
             ("distance_m", self.distance_m),
@@ -76,12 +76,12 @@ impl Metrics {
     }
 }
 
-/// A lane change and how critical it was.
+/// A lane change with its criticality metrics.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CriticalLaneChange {
     /// The lane change.
     #[serde(flatten)]
     pub lane_change: LaneChange,
-    /// Its metrics.
+    /// The metrics.
     pub metrics: Metrics,
 }

@@ -1,44 +1,45 @@
-//! Statistics of lane changes: how long they take, how fast they are driven, and what goes with what.
+//! Statistics of lane changes: durations, speeds, and correlations with the criticality metrics.
 //!
-//! Only *complete* lane changes enter durations, speeds and correlations ([`crate::lane_change`]); all are counted, and
-//! double ones apart.
+//! Durations, speeds and correlations use *complete* lane changes only ([`crate::lane_change`]). The counts include all
+//! lane changes; double ones are also counted separately.
 //!
-//! - **Boxes**: quartiles by linear interpolation between order statistics (Hyndman and Fan's type 7, as R and NumPy
-//!   do); whiskers reach to the furthest values within 1.5 interquartile ranges of the box (Tukey), others are outliers.
-//! - **Correlation**: Pearson's r of the values and Spearman's ρ of their ranks (ties share their mean rank), over the
-//!   lane changes for which both quantities have a value, with how many these are. With fewer than 5 pairs, or where a
-//!   quantity does not vary, there is none.
+//! - **Box plots**: quartiles by linear interpolation between order statistics (Hyndman and Fan's type 7, the default
+//!   of R and NumPy). Whiskers reach to the furthest values within 1.5 interquartile ranges of the box (Tukey); values
+//!   beyond are outliers.
+//! - **Correlation**: Pearson's r of the values and Spearman's ρ of their ranks (ties share their mean rank). It covers
+//!   the lane changes for which both quantities have a value, and their number is stated. With fewer than 5 pairs, or
+//!   if a quantity does not vary, there is no coefficient.
 
 use closecall_traffic::{Side, VehicleClass};
 use serde::Serialize;
 
 use super::CriticalLaneChange;
 
-/// Fewer pairs than this have no correlation worth stating.
+/// Least number of pairs for which a correlation is stated.
 const MIN_PAIRS: usize = 5;
 
-/// Whiskers reach this many interquartile ranges beyond the box (J. W. Tukey, Exploratory Data Analysis, 1977).
+/// Largest length of a whisker in interquartile ranges (J. W. Tukey, Exploratory Data Analysis, 1977).
 const WHISKER_RANGES: f64 = 1.5;
 
-/// The box of a box plot.
+/// The numbers that define a box plot, in the unit of its values.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BoxNumbers {
-    /// How many values.
+    /// Number of values.
     pub n: usize,
-    /// Their mean.
+    /// Mean of the values.
     pub mean: f64,
     /// Lower whisker, lower quartile, median, upper quartile, upper whisker.
     pub five: [f64; 5],
-    /// Values beyond the whiskers, rising.
+    /// Values beyond the whiskers, in ascending order.
     pub outliers: Vec<f64>,
 }
 
 impl BoxNumbers {
-    /// The box of `values`, or nothing where there are none.
+    /// Computes the box plot of all finite `values`. Returns `None` if there are none.
     pub fn of(mut values: Vec<f64>) -> Option<Self> {
         values.retain(|value| value.is_finite());
         values.sort_by(f64::total_cmp);
-        let [lower, median, upper] = [0.25, 0.5, 0.75].map(|share| quantile(&values, share));
+        let [lower, median, upper] = [0.25, 0.5, 0.75].map(|level| quantile(&values, level));
         let (lower, median, upper) = (lower?, median?, upper?);
         let reach = WHISKER_RANGES * (upper - lower);
         let is_within = |value: &f64| (lower - reach..=upper + reach).contains(value);
@@ -49,59 +50,60 @@ impl BoxNumbers {
     }
 }
 
-/// A quantile of sorted values by linear interpolation.
-fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
-    let place = share * (sorted.len().checked_sub(1)?) as f64;
+/// Returns the quantile of `sorted` values at probability `level`, by linear interpolation, or `None` if there are
+/// none.
+fn quantile(sorted: &[f64], level: f64) -> Option<f64> {
+    let position = level * (sorted.len().checked_sub(1)?) as f64;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and the number of values")]
-    let below = place as usize;
+    let below = position as usize;
     let (low, high) = (sorted[below], sorted[(below + 1).min(sorted.len() - 1)]);
-    Some(low + (place - below as f64) * (high - low))
+    Some(low + (position - below as f64) * (high - low))
 }
 
-/// The lane changes of one class of vehicles.
+/// Statistics of the lane changes of one vehicle class.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ClassStatistics {
-    /// The class.
+    /// The vehicle class.
     pub vehicle_class: VehicleClass,
-    /// All lane changes.
+    /// Number of all lane changes.
     pub lane_changes: usize,
-    /// Those to the left.
+    /// Number of lane changes to the left.
     pub to_the_left: usize,
-    /// Complete ones.
+    /// Number of complete lane changes.
     pub complete: usize,
-    /// Parts of double ones.
+    /// Number of lane changes that are part of a double one.
     pub double: usize,
-    /// Durations of complete ones [s].
+    /// Durations of the complete lane changes (s).
     pub duration_s: Option<BoxNumbers>,
-    /// Speeds at the crossing of complete ones [m/s].
+    /// Speeds of the complete lane changes when the centre crosses the marking (m/s).
     pub speed_mps: Option<BoxNumbers>,
 }
 
-/// How two quantities go together.
+/// The correlation of two quantities.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Correlation {
-    /// One quantity.
+    /// Name of the first quantity.
     pub of: &'static str,
-    /// The other.
+    /// Name of the second quantity.
     pub with: &'static str,
-    /// Complete lane changes that have both.
+    /// Number of complete lane changes for which both have a value.
     pub n: usize,
-    /// Pearson's coefficient.
+    /// Pearson's correlation coefficient r (-).
     pub pearson: Option<f64>,
-    /// Spearman's coefficient.
+    /// Spearman's rank correlation coefficient ρ (-).
     pub spearman: Option<f64>,
 }
 
 /// Statistics over many lane changes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Statistics {
-    /// By class, in the order of classes; those without lane changes are not there.
+    /// One entry for each vehicle class with lane changes, in the order of `VehicleClass::ALL`.
     pub classes: Vec<ClassStatistics>,
-    /// Duration and speed against each other, then each against the metrics in their fixed order.
+    /// Duration against speed, then each of the two against every metric in the order of `Metrics::named`.
     pub correlations: Vec<Correlation>,
 }
 
-/// The statistics of `changes`.
+/// Computes the statistics of `changes`.
 pub fn statistics(changes: &[CriticalLaneChange]) -> Statistics {
     let classes = VehicleClass::ALL.into_iter().filter_map(|class| class_statistics(changes, class));
     Statistics { classes: classes.collect(), correlations: correlations(changes) }
@@ -125,7 +127,7 @@ fn class_statistics(changes: &[CriticalLaneChange], vehicle_class: VehicleClass)
     })
 }
 
-/// A quantity of one lane change, where it has a value.
+/// Reads a quantity from a lane change; `None` if it has no value there.
 type Quantity = Box<dyn Fn(&CriticalLaneChange) -> Option<f64>>;
 
 fn correlations(changes: &[CriticalLaneChange]) -> Vec<Correlation> {
@@ -137,8 +139,8 @@ fn correlations(changes: &[CriticalLaneChange]) -> Vec<Correlation> {
     let metrics: Vec<(_, Quantity)> = names
         .into_iter()
         .enumerate()
-        .map(|(place, name)| -> (_, Quantity) {
-            (name, Box::new(move |change| change.metrics.named()[place].1.value()))
+        .map(|(index, name)| -> (_, Quantity) {
+            (name, Box::new(move |change| change.metrics.named()[index].1.value()))
         })
         .collect();
     let with_metrics = [&duration, &speed].into_iter().flat_map(|of| metrics.iter().map(move |with| (of, with)));
@@ -148,14 +150,15 @@ fn correlations(changes: &[CriticalLaneChange]) -> Vec<Correlation> {
 
 fn correlation(
     complete: &[&CriticalLaneChange],
-    (of, one): &(&'static str, Quantity),
-    (with, other): &(&'static str, Quantity),
+    (of, first): &(&'static str, Quantity),
+    (with, second): &(&'static str, Quantity),
 ) -> Correlation {
-    let pairs = complete.iter().filter_map(|change| one(change).zip(other(change)));
+    let pairs = complete.iter().filter_map(|change| first(change).zip(second(change)));
     let (a, b): (Vec<f64>, Vec<f64>) = pairs.filter(|(a, b)| a.is_finite() && b.is_finite()).unzip();
     Correlation { of, with, n: a.len(), pearson: pearson(&a, &b), spearman: pearson(&ranks(&a), &ranks(&b)) }
 }
 
+/// Returns Pearson's correlation coefficient, or `None` with too few pairs or if a quantity does not vary.
 fn pearson(a: &[f64], b: &[f64]) -> Option<f64> {
     let n = a.len() as f64;
     let (mean_a, mean_b) = (a.iter().sum::<f64>() / n, b.iter().sum::<f64>() / n);
@@ -165,16 +168,16 @@ fn pearson(a: &[f64], b: &[f64]) -> Option<f64> {
     (a.len() >= MIN_PAIRS && aa > 0.0 && bb > 0.0).then(|| (ab / (aa.sqrt() * bb.sqrt())).clamp(-1.0, 1.0))
 }
 
-/// Ranks from 1 on; equal values share the mean of theirs.
+/// Returns the ranks of `values`, starting at 1; equal values share their mean rank.
 fn ranks(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
     let mut ranks = vec![0.0; values.len()];
-    let mut passed = 0;
+    let mut ranked = 0;
     for tied in order.chunk_by(|&a, &b| values[a] == values[b]) {
-        let rank = passed as f64 + 0.5 * (tied.len() + 1) as f64;
-        tied.iter().for_each(|&place| ranks[place] = rank);
-        passed += tied.len();
+        let rank = ranked as f64 + 0.5 * (tied.len() + 1) as f64;
+        tied.iter().for_each(|&index| ranks[index] = rank);
+        ranked += tied.len();
     }
     ranks
 }
@@ -187,7 +190,7 @@ mod tests {
     use crate::recordings::test_support::{changing_track, recording_of};
 
     #[test]
-    fn boxes_are_those_of_the_textbook() {
+    fn box_plots_match_numpy() {
         let found = BoxNumbers::of(vec![7.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 30.0]).unwrap();
         // NumPy: percentile([1, 2, 3, 4, 5, 6, 7, 30], [25, 50, 75]) = 2.75, 4.5, 6.25.
         assert_eq!((found.n, found.mean, found.five), (8, 7.25, [1.0, 2.75, 4.5, 6.25, 7.0]));
@@ -197,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn correlations_are_those_of_scipy() {
+    fn correlations_match_scipy() {
         let (a, b) = ([1.0, 2.0, 3.0, 4.0, 5.0, 5.0], [2.0, 1.0, 4.0, 3.0, 7.0, 5.0]);
         // scipy.stats.pearsonr and spearmanr.
         assert!((pearson(&a, &b).unwrap() - 0.831_521_840_620_299_8).abs() < 1e-12);
@@ -208,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn slow_lane_changes_take_longer() {
+    fn a_slower_lane_change_with_a_longer_duration_gives_a_negative_correlation() {
         let track = |k: u64| {
             let duration_s = 3.0 + 0.5 * k as f64;
             changing_track(k + 1, (0.0, 40.0 - 2.0 * k as f64), (-5.25, -1.75), (3.0, duration_s), 160)

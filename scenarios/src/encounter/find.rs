@@ -1,37 +1,40 @@
-//! Who is who, and from when to when.
+//! Assignment of the roles in an encounter, and its start and end.
 
 use closecall_traffic::metrics::time_headway_s;
 use closecall_traffic::{Absent, Lane, Measured, Time, Trajectory, TrajectoryPoint};
 
-use super::frame::{Frame, RoadPlace};
+use super::frame::{Frame, RoadSection};
 use super::{
     EGO, LEAD_IN, LEAD_OUT, LONGEST_THW_S, NoEncounter, Participant, REACH_M, RecordedEncounter, SHORTEST_APPROACH,
 };
 use crate::filters::{PERIOD, SmoothedRecording};
 use crate::lane_change::LaneChange;
 
-/// The encounter around one of the lane changes of a recording, `all` of which are given; trajectories at every `period`,
-/// of which a multiple is the recording's common clock.
+/// Extracts the encounter around the lane change `change`, with a trajectory point at every `period`.
+///
+/// `all` holds all lane changes of `recording`. The period of the common clock must be a multiple of `period`.
 ///
 /// # Errors
-/// [`NoEncounter`] where nobody is there to be E or F, or the three are not recorded together for long enough.
+/// Returns [`NoEncounter`] if there is no ego or lead vehicle, if the three vehicles are not recorded together for long
+/// enough, if the rear vehicle is not close behind the ego vehicle at the crossing, or if they do not share a valid
+/// road.
 pub fn encounter(
     recording: &SmoothedRecording,
     change: &LaneChange,
     all: &[LaneChange],
     period: Time,
 ) -> Result<RecordedEncounter, NoEncounter> {
-    let cast = Cast::of(recording, change)?;
-    let start = cast.start(recording, change)?;
-    let road = RoadPlace::of(recording, cast.rear, change)?;
-    let last = cast.ego.span().map_or(start, |(_, last)| last);
+    let roles = Roles::of(recording, change)?;
+    let start = roles.start(recording, change)?;
+    let road = RoadSection::of(recording, roles.rear, change)?;
+    let last = roles.ego.span().map_or(start, |(_, last)| last);
     let end = last.min(on_clock(Time::from_s(change.end_s) + LEAD_OUT));
-    let origin_m = cast.ego.at(start).map_or(0.0, |point| point.s_m);
+    let origin_m = roles.ego.at(start).map_or(0.0, |point| point.s_m);
     let frame = Frame { start, end, origin_m, road };
-    let (track_id, ego_id) = (cast.rear.track_id, cast.ego.track_id);
-    let vehicles = participants(recording, &cast, &frame, (all, period));
+    let (track_id, ego_id) = (roles.rear.track_id, roles.ego.track_id);
+    let vehicles = participants(recording, &roles, &frame, (all, period));
     let vehicles = vehicles.ok_or(NoEncounter::LeavesTheRoad { track_id })?;
-    let thw_s = cast.headway_s(Time::from_s(change.crossing_s));
+    let thw_s = roles.headway_s(Time::from_s(change.crossing_s));
     let is_behind = |thw_s: &f64| *thw_s > 0.0 && *thw_s <= LONGEST_THW_S;
     let not_behind = NoEncounter::NotBehind { track_id, ego_id, thw_s, longest_s: LONGEST_THW_S };
     let crossing_thw_s = thw_s.ok().filter(is_behind).ok_or(not_behind)?;
@@ -50,61 +53,61 @@ pub fn encounter(
     })
 }
 
-/// `time`, or the last instant of the common clock before it.
+/// Returns the last instant of the common clock at or before `time`.
 fn on_clock(time: Time) -> Time {
     Time::from_ns(time.ns().div_euclid(PERIOD.ns()) * PERIOD.ns())
 }
 
-/// The three who make the encounter, and when they are looked for.
-struct Cast<'a> {
+/// The three vehicles of an encounter, and the time at which their roles are assigned.
+struct Roles<'a> {
     ego: &'a Trajectory,
-    front: &'a Trajectory,
+    lead: &'a Trajectory,
     rear: &'a Trajectory,
-    /// The instant of the common clock at which R begins to change lanes, or is first seen doing so.
-    pull_out: Time,
+    /// First instant of the common clock at which the rear vehicle is recorded while it changes lanes.
+    change_start: Time,
 }
 
-impl<'a> Cast<'a> {
+impl<'a> Roles<'a> {
+    /// Assigns the roles at the start of the lane change `change`.
     fn of(recording: &'a SmoothedRecording, change: &LaneChange) -> Result<Self, NoEncounter> {
         let track_id = change.track_id;
-        let place = recording.place_of(track_id).ok_or(NoEncounter::NoTrack { track_id })?;
-        let track = &recording.tracks[place];
+        let index = recording.place_of(track_id).ok_or(NoEncounter::NoTrack { track_id })?;
+        let track = &recording.tracks[index];
         let rear = &track.trajectory;
         let crossing = Time::from_s(change.crossing_s);
         let stays = track.stays.iter().filter(|stay| stay.lane.0 == change.from_lane && stay.first < crossing);
         let home_since = stays.map(|stay| stay.first).next_back();
-        let seen_since = rear.span().map(|(first, _)| first);
-        let begins = [Some(Time::from_s(change.start_s)), home_since, seen_since].into_iter().flatten().max();
-        // The first instant at which it is so.
-        let pull_out = on_clock(begins.unwrap_or(crossing) + PERIOD - Time::from_ns(1));
-        let nobody = NoEncounter::NobodyAhead { track_id, lane: change.from_lane };
+        let recorded_since = rear.span().map(|(first, _)| first);
+        let begins = [Some(Time::from_s(change.start_s)), home_since, recorded_since].into_iter().flatten().max();
+        // Rounded up to the common clock.
+        let change_start = on_clock(begins.unwrap_or(crossing) + PERIOD - Time::from_ns(1));
+        let no_ego = NoEncounter::NoEgo { track_id, lane: change.from_lane };
         let lane = Lane(change.from_lane);
-        let ego = lead_of(recording, rear, lane, pull_out).ok_or(nobody)?;
-        let nobody = NoEncounter::NobodyAheadOfEgo { track_id, ego_id: ego.track_id };
-        let front = lead_of(recording, ego, lane, pull_out).ok_or(nobody)?;
-        Ok(Self { ego, front, rear, pull_out })
+        let ego = next_ahead(recording, rear, lane, change_start).ok_or(no_ego)?;
+        let no_lead = NoEncounter::NoLead { track_id, ego_id: ego.track_id };
+        let lead = next_ahead(recording, ego, lane, change_start).ok_or(no_lead)?;
+        Ok(Self { ego, lead, rear, change_start })
     }
 
-    /// The earliest instant from which on the three stay in this order in the lane.
+    /// Returns the earliest instant from which the three vehicles keep their order in the lane without interruption.
     fn start(&self, recording: &SmoothedRecording, change: &LaneChange) -> Result<Time, NoEncounter> {
         let lane = Lane(change.from_lane);
-        let number = |track: Option<&Trajectory>| track.map(|track| track.track_id);
-        let together = |time: Time| {
-            number(lead_of(recording, self.rear, lane, time)) == Some(self.ego.track_id)
-                && number(lead_of(recording, self.ego, lane, time)) == Some(self.front.track_id)
+        let next_id = |own: &Trajectory, time: Time| next_ahead(recording, own, lane, time).map(|track| track.track_id);
+        let in_order = |time: Time| {
+            next_id(self.rear, time) == Some(self.ego.track_id) && next_id(self.ego, time) == Some(self.lead.track_id)
         };
-        let most = LEAD_IN.ns() / PERIOD.ns();
-        let instants = (0..=most).map(|ticks| self.pull_out - PERIOD * ticks);
-        let start = instants.take_while(|&time| together(time)).last().unwrap_or(self.pull_out);
+        let max_ticks = LEAD_IN.ns() / PERIOD.ns();
+        let instants = (0..=max_ticks).map(|ticks| self.change_start - PERIOD * ticks);
+        let start = instants.take_while(|&time| in_order(time)).last().unwrap_or(self.change_start);
         let crossing = Time::from_s(change.crossing_s);
-        let recorded_to = [self.ego, self.front, self.rear].iter().filter_map(|track| Some(track.span()?.1)).min();
+        let recorded_to = [self.ego, self.lead, self.rear].iter().filter_map(|track| Some(track.span()?.1)).min();
         let until = recorded_to.map_or(start, |last| last.min(crossing));
-        // A crossing between two instants of the clock may lie up to one of them after the last.
+        // The crossing may lie between two instants of the clock, up to one period after the last recorded one.
         if until < start + SHORTEST_APPROACH || until + PERIOD < crossing {
             return Err(NoEncounter::TooShort {
                 track_id: self.rear.track_id,
                 ego_id: self.ego.track_id,
-                front_id: self.front.track_id,
+                front_id: self.lead.track_id,
                 recorded_s: (until - start).s(),
                 needed_s: SHORTEST_APPROACH.s(),
             });
@@ -112,7 +115,7 @@ impl<'a> Cast<'a> {
         Ok(start)
     }
 
-    /// R's time headway to E [s].
+    /// Returns the time headway of the rear vehicle to the ego vehicle (s).
     fn headway_s(&self, time: Time) -> Measured {
         let (rear, ego) = (self.rear.at(time), self.ego.at(time));
         let (rear, ego) = rear.zip(ego).ok_or(Absent::NotRecorded)?;
@@ -121,8 +124,13 @@ impl<'a> Cast<'a> {
     }
 }
 
-/// The nearest vehicle ahead of `own` in `lane`, where `own` is in it.
-fn lead_of<'a>(recording: &'a SmoothedRecording, own: &Trajectory, lane: Lane, time: Time) -> Option<&'a Trajectory> {
+/// Returns the nearest vehicle ahead of `own` in `lane`, or `None` if there is none or `own` is not in that lane.
+fn next_ahead<'a>(
+    recording: &'a SmoothedRecording,
+    own: &Trajectory,
+    lane: Lane,
+    time: Time,
+) -> Option<&'a Trajectory> {
     let here: &TrajectoryPoint = own.at(time).filter(|point| point.lane == lane)?;
     let others = recording.present_at(time).iter().map(|&presence| recording.look_up(presence));
     let ahead =
@@ -130,10 +138,12 @@ fn lead_of<'a>(recording: &'a SmoothedRecording, own: &Trajectory, lane: Lane, t
     ahead.min_by(|a, b| a.1.s_m.total_cmp(&b.1.s_m)).map(|(track, _)| track)
 }
 
-/// E, F, R, and everyone else who comes near E; nothing where one of the three is not on the road.
+/// Returns the ego, lead and rear vehicle, then all other vehicles that come near the ego vehicle.
+///
+/// Returns `None` if one of the three leaves the road.
 fn participants(
     recording: &SmoothedRecording,
-    cast: &Cast<'_>,
+    roles: &Roles<'_>,
     frame: &Frame,
     (all, period): (&[LaneChange], Time),
 ) -> Option<Vec<Participant>> {
@@ -145,14 +155,14 @@ fn participants(
         let trajectory = frame.view(track, period)?;
         Some(Participant { trajectory, changes: all.iter().filter(within).cloned().collect() })
     };
-    let protagonists = [cast.ego, cast.front, cast.rear];
+    let protagonists = [roles.ego, roles.lead, roles.rear];
     let mut vehicles: Vec<Participant> = protagonists.into_iter().map(participant).collect::<Option<_>>()?;
     let ego = vehicles[EGO].trajectory.clone();
     let is_near = |other: &Participant| {
-        let apart = |point: &TrajectoryPoint| Some((point.s_m - ego.at(point.time)?.s_m).abs());
-        other.trajectory.points.iter().filter_map(apart).any(|apart_m| apart_m < REACH_M)
+        let distance_m = |point: &TrajectoryPoint| Some((point.s_m - ego.at(point.time)?.s_m).abs());
+        other.trajectory.points.iter().filter_map(distance_m).any(|distance_m| distance_m < REACH_M)
     };
-    let is_other = |track: &&Trajectory| protagonists.iter().all(|known| known.track_id != track.track_id);
+    let is_other = |track: &&Trajectory| protagonists.iter().all(|role| role.track_id != track.track_id);
     let others = recording.trajectories().filter(is_other).filter_map(participant);
     vehicles.extend(others.filter(is_near));
     Some(vehicles)

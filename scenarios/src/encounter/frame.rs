@@ -1,4 +1,4 @@
-//! The road and the clock of an encounter.
+//! The frame of an encounter: its road and its clock, relative to those of the trajectory data.
 
 use std::collections::BTreeSet;
 
@@ -8,32 +8,38 @@ use super::NoEncounter;
 use crate::filters::{SmoothedRecording, resample};
 use crate::lane_change::LaneChange;
 
-/// Lane widths that a road may have [m], and the most lanes.
+/// Smallest and largest lane width of a road (m).
 const LANE_WIDTHS_M: [f64; 2] = [2.5, 5.0];
-const MOST_LANES: u8 = 8;
+/// Largest number of lanes of a road.
+const MAX_LANES: u8 = 8;
 
-/// Where an encounter's frame lies in its recording's.
+/// The frame of an encounter, located in the frame of the trajectory data.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Frame {
+    /// Start of the encounter.
     pub(super) start: Time,
+    /// End of the encounter.
     pub(super) end: Time,
+    /// Position s of the encounter's origin (m).
     pub(super) origin_m: f64,
-    pub(super) road: RoadPlace,
+    pub(super) road: RoadSection,
 }
 
-/// The lanes of a road among all lanes of a recording.
+/// The road of an encounter: contiguous lanes among all lanes of the trajectory data.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct RoadPlace {
-    /// The recording's number of its leftmost lane.
+pub(super) struct RoadSection {
+    /// Number of its leftmost lane in the trajectory data.
     pub(super) first: u8,
+    /// Number of lanes.
     pub(super) lanes: u8,
+    /// Width of each lane (m).
     pub(super) lane_width_m: f64,
-    /// Where its left edge lies in the recording [m].
+    /// Lateral position d of its left edge in the trajectory data (m).
     pub(super) left_edge_m: f64,
 }
 
-impl RoadPlace {
-    /// The road on which `own` makes `change`.
+impl RoadSection {
+    /// Finds the road on which the vehicle `own` makes the lane change `change`.
     pub(super) fn of(
         recording: &SmoothedRecording,
         own: &Trajectory,
@@ -47,8 +53,8 @@ impl RoadPlace {
         let first = (1..=left).rev().take_while(|lane| known.contains(lane)).last().unwrap_or(left);
         let last = (left..=u8::MAX).take_while(|lane| known.contains(lane)).last().unwrap_or(left);
         let lanes = last - first + 1;
-        if lanes > MOST_LANES {
-            return Err(NoEncounter::TooManyLanes { track_id: change.track_id, lanes, most: MOST_LANES });
+        if lanes > MAX_LANES {
+            return Err(NoEncounter::TooManyLanes { track_id: change.track_id, lanes, most: MAX_LANES });
         }
         let lane_width_m = recording.markings.typical_lane_width_m().clamp(LANE_WIDTHS_M[0], LANE_WIDTHS_M[1]);
         let crossed_m = recording.markings.right_edge_m(Lane(left));
@@ -57,16 +63,18 @@ impl RoadPlace {
         Ok(Self { first, lanes, lane_width_m, left_edge_m })
     }
 
-    /// The recording's lane `lane` as this road counts it, where it is one of its own.
+    /// Converts lane number `lane` of the trajectory data to a lane of this road. Returns `None` if it is not part of
+    /// it.
     pub(super) fn lane(&self, lane: u8) -> Option<Lane> {
-        let place = lane.checked_sub(self.first)?;
-        (place < self.lanes).then(|| Lane(place + 1))
+        let index = lane.checked_sub(self.first)?;
+        (index < self.lanes).then(|| Lane(index + 1))
     }
 }
 
 impl Frame {
-    /// The part of a track that lies within the encounter, in its frame, at every `period`; nothing of a vehicle that is
-    /// on another road, or there for less than two instants.
+    /// Returns the part of a track that lies within the encounter, in its frame, with a point at every `period`.
+    ///
+    /// Returns `None` if a point of that part is on another road, or if fewer than two points remain.
     pub(super) fn view(&self, track: &Trajectory, period: Time) -> Option<Trajectory> {
         let within = track.points.iter().filter(|point| point.time >= self.start && point.time <= self.end);
         let points: Option<Vec<TrajectoryPoint>> = within.map(|point| self.point(point)).collect();
@@ -74,6 +82,7 @@ impl Frame {
         (points.len() >= 2).then(|| track.with_points(points))
     }
 
+    /// Converts a point to the frame of the encounter. Returns `None` if it is on another road.
     fn point(&self, point: &TrajectoryPoint) -> Option<TrajectoryPoint> {
         Some(TrajectoryPoint {
             time: point.time - self.start,

@@ -1,20 +1,27 @@
-//! A recorded lane change as an encounter: who is R, E and F, from when to when, on a road and a clock of its own.
+//! Extraction of an encounter from trajectory data: a recorded lane change with its rear, ego and lead vehicle, on a
+//! road and a clock of its own.
 //!
 //! ```text
-//!   target ─────────────────────────────────────╭──────▶
-//!                                        ╭──────╯
-//!   home   ── R ─────────────────────────╯──▶  E ──▶  F ──▶
-//!             │                          │
-//!             start (time 0)             crossing
+//!   target ────────────────────────────────────────╭────────▶
+//!                                           ╭──────╯
+//!   home   ── rear ─────────────────────────╯──▶  ego ──▶  lead ──▶
+//!             │                             │
+//!             start (time 0)                crossing
 //! ```
 //!
-//! R is the vehicle that changes lanes; E the one that it is behind as it begins to, in the lane that it leaves; F the one
-//! that E then follows. The encounter starts as early as the three are recorded in this order, at most [`LEAD_IN`] before
-//! R begins to change lanes, and ends [`LEAD_OUT`] after the lane change, or with E's track.
+//! The *rear vehicle* is the vehicle that changes lanes. When its lane change begins, the *ego vehicle* is the next
+//! vehicle ahead of it in the lane that it leaves (its *home* lane), and the *lead vehicle* is the next vehicle ahead
+//! of the ego vehicle in that lane.
 //!
-//! **Its own frame.** Time is 0 at the start, s is 0 where E then is. Recordings may hold several carriageways, laid side
-//! by side with lanes counted on: the road is the lanes around R's that are counted without a break, the first of them
-//! lane 1. They get the recording's typical width, placed so that the marking which R crosses is where it was recorded.
+//! The encounter starts when the three vehicles are first recorded in this order without interruption, at most
+//! [`LEAD_IN`] before the lane change begins. It ends [`LEAD_OUT`] after the lane change, or with the track of the ego
+//! vehicle.
+//!
+//! **Frame.** Time is 0 at the start of the encounter, and s is 0 at the position of the ego vehicle at that time.
+//! Trajectory data may hold several carriageways side by side, with continued lane numbers. The road of the encounter
+//! consists of the lanes around those of the rear vehicle whose numbers are contiguous, renumbered from lane 1. All its
+//! lanes have the typical width of the trajectory data. The marking that the rear vehicle crosses keeps its recorded
+//! lateral position.
 
 mod find;
 mod frame;
@@ -25,146 +32,151 @@ pub use find::encounter;
 
 use crate::lane_change::LaneChange;
 
-/// Longest time before the lane change that belongs to an encounter.
+/// Longest part of an encounter before the lane change begins.
 pub const LEAD_IN: Time = Time::from_ms(20_000);
-/// Time after the lane change that belongs to an encounter.
+/// Part of an encounter after the lane change ends.
 pub const LEAD_OUT: Time = Time::from_ms(6_000);
-/// An encounter that begins later than this before the crossing shows nothing.
+/// Shortest time from the start of an encounter to the crossing: a shorter approach is not informative.
 pub const SHORTEST_APPROACH: Time = Time::from_ms(2_000);
-/// Vehicles that never come nearer to E than this along the road do not belong to it [m].
+/// Distance to the ego vehicle along the road below which another vehicle belongs to the encounter (m).
 pub const REACH_M: f64 = 150.0;
-/// R is not taken to be behind E for E's sake at a longer headway than this at the crossing [s].
+/// Longest time headway of the rear vehicle to the ego vehicle at the crossing (s): beyond it, the rear vehicle is not
+/// considered to change lanes because of the ego vehicle.
 pub const LONGEST_THW_S: f64 = 5.0;
 
-/// The place of E among an encounter's vehicles.
+/// Index of the ego vehicle in [`RecordedEncounter::vehicles`].
 pub const EGO: usize = 0;
-/// The place of F.
+/// Index of the lead vehicle in [`RecordedEncounter::vehicles`].
 pub const FRONT: usize = 1;
-/// The place of R.
+/// Index of the rear vehicle in [`RecordedEncounter::vehicles`].
 pub const REAR: usize = 2;
 
 /// One vehicle of an encounter.
 #[derive(Clone, Debug)]
 pub struct Participant {
-    /// How it moved, in the encounter's frame.
+    /// Its trajectory, in the frame of the encounter.
     pub trajectory: Trajectory,
-    /// Its lane changes, in the recording's time and lanes.
+    /// Its lane changes, with the time and the lane numbers of the trajectory data.
     pub changes: Vec<LaneChange>,
 }
 
-/// A recorded encounter.
+/// An encounter from trajectory data.
 #[derive(Clone, Debug)]
 pub struct RecordedEncounter {
-    /// The recording's name.
+    /// Name of the trajectory data set.
     pub recording: String,
-    /// R's lane change, in the recording's time and lanes.
+    /// Lane change of the rear vehicle, with the time and the lane numbers of the trajectory data.
     pub change: LaneChange,
-    /// The recording's time at the encounter's time 0.
+    /// Time of the trajectory data at time 0 of the encounter.
     pub start: Time,
-    /// When R crosses the marking.
+    /// Time of the encounter at which the centre of the rear vehicle crosses the marking.
     pub crossing: Time,
-    /// When it ends.
+    /// Time of the encounter at its end.
     pub end: Time,
-    /// R's time headway to E at the crossing [s].
+    /// Time headway of the rear vehicle to the ego vehicle at the crossing (s).
     pub crossing_thw_s: f64,
     /// Number of lanes of the road.
     pub lanes: u8,
-    /// Their width [m].
+    /// Width of each lane (m).
     pub lane_width_m: f64,
-    /// The lane that R leaves.
+    /// Lane that the rear vehicle leaves.
     pub home: Lane,
-    /// The lane that R changes to.
+    /// Lane that the rear vehicle changes to.
     pub target: Lane,
-    /// E, F, R, then everyone else who comes near E, in the order of the track numbers.
+    /// The ego, lead and rear vehicle, then all other vehicles that come near the ego vehicle, in order of their track
+    /// ids.
     pub vehicles: Vec<Participant>,
 }
 
 impl RecordedEncounter {
-    /// E, F and R.
+    /// Returns the trajectories of the ego, the lead and the rear vehicle, in this order.
     pub fn protagonists(&self) -> [&Trajectory; 3] {
-        [EGO, FRONT, REAR].map(|place| &self.vehicles[place].trajectory)
+        [EGO, FRONT, REAR].map(|index| &self.vehicles[index].trajectory)
     }
 
-    /// A time of the recording on the encounter's clock.
+    /// Converts a time of the trajectory data (s) to the clock of the encounter.
     pub fn time_of(&self, recorded_s: f64) -> Time {
         Time::from_s(recorded_s) - self.start
     }
 }
 
-/// Why a lane change is no encounter. Tracks are numbered as in the recording.
+/// The reason why a lane change is not an encounter. Track ids and lanes are those of the trajectory data.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NoEncounter {
-    /// The recording does not have the track.
+    /// The trajectory data does not contain the track.
     #[error("the recording has no track {track_id}")]
     NoTrack {
-        /// R.
+        /// Track id of the rear vehicle.
         track_id: u64,
     },
-    /// There is no E.
-    #[error("nobody is ahead of track {track_id} in lane {lane} as it begins to change lanes: there is no E")]
-    NobodyAhead {
-        /// R.
+    /// No vehicle is ahead of the rear vehicle.
+    #[error(
+        "no vehicle is ahead of track {track_id} in lane {lane} when its lane change begins: there is no ego vehicle"
+    )]
+    NoEgo {
+        /// Track id of the rear vehicle.
         track_id: u64,
-        /// The lane that it leaves.
+        /// The lane that the rear vehicle leaves.
         lane: u8,
     },
-    /// There is no F.
+    /// No vehicle is ahead of the ego vehicle.
     #[error(
-        "track {ego_id}, which track {track_id} is behind, follows nobody: without F ahead E has no margin to increase"
+        "no vehicle is ahead of track {ego_id}, the ego vehicle in front of track {track_id}: without a lead vehicle \
+         there is no margin to increase"
     )]
-    NobodyAheadOfEgo {
-        /// R.
+    NoLead {
+        /// Track id of the rear vehicle.
         track_id: u64,
-        /// E.
+        /// Track id of the ego vehicle.
         ego_id: u64,
     },
-    /// The three are not recorded for long enough.
+    /// The three vehicles are not recorded together for long enough before the crossing.
     #[error(
         "track {track_id} behind track {ego_id} behind track {front_id} is recorded for {recorded_s:.1} s before it \
          crosses the marking; {needed_s:.1} s are needed"
     )]
     TooShort {
-        /// R.
+        /// Track id of the rear vehicle.
         track_id: u64,
-        /// E.
+        /// Track id of the ego vehicle.
         ego_id: u64,
-        /// F.
+        /// Track id of the lead vehicle.
         front_id: u64,
-        /// What is recorded [s].
+        /// Time for which they are recorded together (s).
         recorded_s: f64,
-        /// What is needed [s].
+        /// Least time that is required (s).
         needed_s: f64,
     },
-    /// R does not cross the marking close behind E.
+    /// The rear vehicle is not close behind the ego vehicle when it crosses the marking.
     #[error(
         "as track {track_id} crosses the marking, its headway to track {ego_id} is {}: it has to be above 0 and at most \
          {longest_s:.0} s",
         match thw_s { Ok(thw_s) => format!("{thw_s:.2} s"), Err(absent) => format!("none ({absent})") }
     )]
     NotBehind {
-        /// R.
+        /// Track id of the rear vehicle.
         track_id: u64,
-        /// E.
+        /// Track id of the ego vehicle.
         ego_id: u64,
-        /// R's time headway then [s].
+        /// Time headway of the rear vehicle at the crossing (s).
         thw_s: Measured,
-        /// The longest [s].
+        /// Longest time headway that is accepted (s).
         longest_s: f64,
     },
-    /// One of the three is recorded beside the road, too.
+    /// One of the three vehicles is also recorded outside the lanes of the road.
     #[error("track {track_id}, or one of the two ahead of it, leaves the road on which it changes lanes")]
     LeavesTheRoad {
-        /// R.
+        /// Track id of the rear vehicle.
         track_id: u64,
     },
-    /// The road has more lanes than a road may have.
+    /// The road has more lanes than a road is allowed to have.
     #[error("the road of track {track_id} has {lanes} lanes; at most {most} are possible")]
     TooManyLanes {
-        /// R.
+        /// Track id of the rear vehicle.
         track_id: u64,
-        /// How many.
+        /// Number of lanes.
         lanes: u8,
-        /// The most.
+        /// Largest number of lanes that is allowed.
         most: u8,
     },
 }

@@ -7,7 +7,8 @@ use crate::recordings::test_support::{changing_track, recording_of, straight_tra
 
 const PERIOD: Time = Time::from_ms(40);
 
-/// R from lane 2 to lane 1 between 10 and 15 s, 10 m/s faster than E, which it is 150 m behind, and F.
+/// Rear vehicle that changes from lane 2 to lane 1 between 10 and 15 s, 150 m behind the ego vehicle and 10 m/s faster
+/// than the ego and the lead vehicle.
 fn rear() -> Trajectory {
     changing_track(3, (0.0, 30.0), (-5.25, -1.75), (10.0, 5.0), 200)
 }
@@ -19,19 +20,20 @@ fn found(others: Vec<Trajectory>) -> Result<RecordedEncounter, NoEncounter> {
     encounter(&recording, change, &changes, PERIOD)
 }
 
-fn usual() -> Vec<Trajectory> {
+/// Ego and lead vehicle, 30 m apart.
+fn ego_and_lead() -> Vec<Trajectory> {
     vec![straight_track(1, 150.0, 20.0, -5.25, 250), straight_track(2, 180.0, 20.0, -5.25, 250)]
 }
 
 #[test]
-fn everyone_has_its_role_on_a_clock_and_a_road_of_their_own() {
-    let found = found(usual()).unwrap();
+fn roles_clock_and_road_are_assigned() {
+    let found = found(ego_and_lead()).unwrap();
     assert_eq!(found.protagonists().map(|track| track.track_id), [1, 2, 3]);
     assert_eq!((found.start, found.lanes, found.home, found.target), (Time::ZERO, 2, Lane(2), Lane(1)));
     let [ego, _, rear] = found.protagonists();
     assert!(ego.points[0].s_m.abs() < 1e-6 && (rear.points[0].s_m + 150.0).abs() < 1e-6);
     assert!(ego.points.windows(2).all(|pair| pair[1].time - pair[0].time == PERIOD));
-    // R is 75 m behind when it crosses the marking, less a vehicle's length.
+    // The gap at the crossing is the initial 150 m less 10 m/s times the elapsed time and a vehicle's length.
     assert!((found.crossing.s() - 12.5).abs() < 0.2, "{}", found.crossing);
     assert!((found.crossing_thw_s - (150.0 - 10.0 * found.crossing.s() - 4.5) / 30.0).abs() < 0.1);
     let crossing = rear.points.iter().find(|point| point.time >= found.crossing).unwrap();
@@ -40,38 +42,41 @@ fn everyone_has_its_role_on_a_clock_and_a_road_of_their_own() {
 }
 
 #[test]
-fn the_encounter_starts_once_e_follows_f() {
-    // Until 5 s another vehicle drives between E and F.
+fn the_encounter_starts_once_the_ego_follows_the_lead() {
+    // Until 5 s another vehicle drives between the ego and the lead vehicle.
     let mut between = straight_track(4, 165.0, 20.0, -5.25, 50);
     between.points.retain(|point| point.time < Time::from_s(5.0));
-    let found = found(usual().into_iter().chain([between]).collect()).unwrap();
+    let found = found(ego_and_lead().into_iter().chain([between]).collect()).unwrap();
     assert!((found.start.s() - 5.0).abs() < 0.5, "{}", found.start);
     assert_eq!(found.protagonists().map(|track| track.track_id), [1, 2, 3]);
 }
 
 #[test]
-fn another_carriageway_is_another_road() {
+fn vehicles_of_another_carriageway_are_left_out() {
     let mut far = straight_track(5, 150.0, 20.0, -1_005.25, 250);
     far.points.iter_mut().for_each(|point| point.lane = Lane(4));
     let near = straight_track(6, 150.0, 20.0, -1.75, 250);
-    let found = found(usual().into_iter().chain([far, near]).collect()).unwrap();
+    let found = found(ego_and_lead().into_iter().chain([far, near]).collect()).unwrap();
     let tracks: Vec<u64> = found.vehicles.iter().map(|vehicle| vehicle.trajectory.track_id).collect();
     assert_eq!((tracks, found.lanes), (vec![1, 2, 3, 6], 2));
 }
 
 #[test]
-fn what_is_no_encounter_says_why() {
+fn a_lane_change_that_is_no_encounter_states_the_reason() {
     let message = |others| found(others).unwrap_err().to_string();
-    assert!(message(Vec::new()).contains("nobody is ahead of track 3 in lane 2"));
-    assert!(message(usual()[..1].to_vec()).contains("track 1, which track 3 is behind, follows nobody"));
+    assert!(message(Vec::new()).contains("no vehicle is ahead of track 3 in lane 2"));
+    assert!(
+        message(ego_and_lead()[..1].to_vec())
+            .contains("no vehicle is ahead of track 1, the ego vehicle in front of track 3")
+    );
     let late = |mut track: Trajectory| {
         track.points.retain(|point| point.time > Time::from_s(11.0));
         track
     };
-    let late = usual().into_iter().map(late).collect();
+    let late = ego_and_lead().into_iter().map(late).collect();
     let error = message(late);
-    assert!(error.contains("nobody is ahead") || error.contains("2.0 s are needed"), "{error}");
-    // E is passed before the marking is crossed.
+    assert!(error.contains("no vehicle is ahead") || error.contains("2.0 s are needed"), "{error}");
+    // The rear vehicle has passed the ego vehicle before it crosses the marking.
     let passed = vec![straight_track(1, 110.0, 20.0, -5.25, 250), straight_track(2, 180.0, 20.0, -5.25, 250)];
     assert!(message(passed).contains("has to be above 0"));
 }

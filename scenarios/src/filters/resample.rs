@@ -1,11 +1,12 @@
-//! Trajectories on a clock that all vehicles share.
+//! Resampling of trajectories to a clock that all vehicles share.
 
 use closecall_traffic::{Time, TrajectoryPoint};
 
-/// `points` at every multiple of `period` that they cover, by linear interpolation; the lane is that of the nearest point.
+/// Interpolates `points` linearly at every multiple of `period` within their time span.
 ///
-/// Linear interpolation is off by at most a·Δt²/8, which is 5 mm for 4 m/s² at 10 Hz. Where the points lie on the grid
-/// they are returned unchanged.
+/// Each new point takes the lane of the nearest given point. The interpolation error is at most a·Δt²/8, with the
+/// acceleration a and the time Δt between two given points: 5 mm for 4 m/s² at 10 Hz. A given point that lies on such a
+/// multiple is returned unchanged.
 pub(crate) fn resample(points: &[TrajectoryPoint], period: Time) -> Vec<TrajectoryPoint> {
     let (Some(first), Some(last)) = (points.first(), points.last()) else { return Vec::new() };
     let (first_tick, last_tick) = (ceil_div(first.time.ns(), period.ns()), last.time.ns().div_euclid(period.ns()));
@@ -16,7 +17,7 @@ pub(crate) fn resample(points: &[TrajectoryPoint], period: Time) -> Vec<Trajecto
         while right + 1 < points.len() && points[right].time < time {
             right += 1;
         }
-        resampled.push(between(&points[right.saturating_sub(1)], &points[right], time));
+        resampled.push(interpolate(&points[right.saturating_sub(1)], &points[right], time));
     }
     resampled
 }
@@ -25,7 +26,7 @@ fn ceil_div(value: i64, divisor: i64) -> i64 {
     -(-value).div_euclid(divisor)
 }
 
-fn between(left: &TrajectoryPoint, right: &TrajectoryPoint, time: Time) -> TrajectoryPoint {
+fn interpolate(left: &TrajectoryPoint, right: &TrajectoryPoint, time: Time) -> TrajectoryPoint {
     if time == right.time {
         return *right;
     }
@@ -70,16 +71,16 @@ mod tests {
     }
 
     #[test]
-    fn a_faster_clock_is_thinned_and_a_shifted_one_interpolated() {
-        let thinned = resample(&line(&[120, 160, 200, 240, 280, 320]), Time::from_ms(100));
-        assert_eq!(thinned.iter().map(|point| point.s_m).collect::<Vec<_>>(), [200.0, 300.0]);
+    fn faster_points_are_decimated_and_shifted_ones_interpolated() {
+        let decimated = resample(&line(&[120, 160, 200, 240, 280, 320]), Time::from_ms(100));
+        assert_eq!(decimated.iter().map(|point| point.s_m).collect::<Vec<_>>(), [200.0, 300.0]);
         let shifted = resample(&line(&[-150, -50, 50, 150, 250]), Time::from_ms(100));
         assert_eq!(shifted.iter().map(|point| point.s_m).collect::<Vec<_>>(), [-100.0, 0.0, 100.0, 200.0]);
         assert_eq!(shifted[3].lane, Lane(2));
     }
 
     #[test]
-    fn a_track_that_misses_the_grid_gives_nothing() {
+    fn a_track_that_covers_no_instant_of_the_grid_gives_no_points() {
         assert!(resample(&line(&[110, 140]), Time::from_ms(100)).is_empty());
         assert!(resample(&[], Time::from_ms(100)).is_empty());
     }

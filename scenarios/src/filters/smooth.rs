@@ -1,4 +1,4 @@
-//! A whole recording, smoothed and on the common clock.
+//! Smoothing of whole trajectory data sets on the common clock.
 
 use closecall_traffic::{Time, Trajectory, TrajectoryPoint};
 
@@ -7,50 +7,50 @@ use super::resample::resample;
 use super::stays::{Stay, period_of, stays_of};
 use crate::recordings::{LaneMarkings, Recording};
 
-/// The common clock: 5 Hz.
+/// Period of the common clock, which runs at 5 Hz.
 pub const PERIOD: Time = Time::from_ms(200);
 
-/// The filter's corner [Hz]; see the module's documentation.
+/// Corner frequency of the low-pass filter (Hz); see the module documentation.
 pub const CORNER_HZ: f64 = 1.3;
 
-/// How far the signal is reflected beyond each end [s]: 9 samples of the common clock.
-const REFLECTED_S: f64 = 1.8;
+/// Time by which reflection extends a signal beyond each end (s): 9 samples of the common clock.
+const PADDING_S: f64 = 1.8;
 
-/// One vehicle, smoothed.
+/// The smoothed track of one vehicle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SmoothedTrack {
-    /// Its movement on the common clock.
+    /// The movement on the common clock.
     pub trajectory: Trajectory,
-    /// Its recorded lanes, from the recorded frames.
+    /// The lane stays, from the recorded frames.
     pub stays: Vec<Stay>,
 }
 
-/// A recording on the common clock, with smooth positions and their derivatives.
+/// Trajectory data on the common clock, with smoothed positions and their derivatives.
 #[derive(Clone, Debug)]
 pub struct SmoothedRecording {
-    /// The recording's name.
+    /// Name of the trajectory data set.
     pub name: String,
-    /// Where the lane markings are.
+    /// Lateral positions of the lane markings.
     pub markings: LaneMarkings,
-    /// The tracks in the order of their numbers; those that cover no instant of the clock are not there.
+    /// The tracks in order of their track ids, without those that cover no instant of the common clock.
     pub tracks: Vec<SmoothedTrack>,
     first_tick: i64,
     present: Vec<Vec<Presence>>,
 }
 
-/// One vehicle at one instant.
+/// One vehicle at one instant, as indices into [`SmoothedRecording::tracks`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Presence {
-    /// Which of the recording's tracks.
-    pub track: usize,
-    /// Which of its points.
-    pub point: usize,
+    /// Index of the track.
+    pub track_index: usize,
+    /// Index of the point within the track.
+    pub point_index: usize,
 }
 
-/// Smooths every track and brings it to the common clock.
+/// Smooths every track and resamples it to the common clock.
 pub fn smooth(recording: &Recording) -> SmoothedRecording {
     let tracks: Vec<_> = recording.trajectories.iter().filter_map(smooth_track).collect();
-    let (first_tick, present) = presence(&tracks);
+    let (first_tick, present) = presence_by_tick(&tracks);
     SmoothedRecording {
         name: recording.name.clone(),
         markings: recording.markings.clone(),
@@ -60,7 +60,9 @@ pub fn smooth(recording: &Recording) -> SmoothedRecording {
     }
 }
 
-/// One track, smoothed and on the common clock; nothing where it covers no instant of it.
+/// Smooths one track and resamples it to the common clock.
+///
+/// Returns `None` if the track covers no instant of that clock.
 pub fn smooth_track(track: &Trajectory) -> Option<SmoothedTrack> {
     let points = match period_of(track) {
         None => resample(&track.points, PERIOD),
@@ -80,57 +82,59 @@ pub fn smooth_track(track: &Trajectory) -> Option<SmoothedTrack> {
 }
 
 impl SmoothedRecording {
-    /// Every vehicle that is there at the instant of the clock nearest to `time`, in the order of the track numbers.
+    /// Returns all vehicles present at the clock instant nearest to `time`, in order of their track ids.
     pub fn present_at(&self, time: Time) -> &[Presence] {
         let tick = tick_of(time) - self.first_tick;
         usize::try_from(tick).ok().and_then(|tick| self.present.get(tick)).map_or(&[], Vec::as_slice)
     }
 
-    /// A track and its point.
+    /// Returns the trajectory and the point that `presence` refers to.
     pub fn look_up(&self, presence: Presence) -> (&Trajectory, &TrajectoryPoint) {
-        let track = &self.tracks[presence.track].trajectory;
-        (track, &track.points[presence.point])
+        let track = &self.tracks[presence.track_index].trajectory;
+        (track, &track.points[presence.point_index])
     }
 
-    /// The movements, in the order of the track numbers.
+    /// Iterates over the trajectories in order of their track ids.
     pub fn trajectories(&self) -> impl Iterator<Item = &Trajectory> {
         self.tracks.iter().map(|track| &track.trajectory)
     }
 
-    /// The place of track `track_id` among the tracks.
+    /// Returns the index of track `track_id` in [`Self::tracks`], or `None` if there is no such track.
     pub fn place_of(&self, track_id: u64) -> Option<usize> {
         self.tracks.binary_search_by_key(&track_id, |track| track.trajectory.track_id).ok()
     }
 }
 
+/// Returns the number of the clock instant nearest to `time`.
 fn tick_of(time: Time) -> i64 {
     (time.ns() + PERIOD.ns() / 2).div_euclid(PERIOD.ns())
 }
 
-fn presence(tracks: &[SmoothedTrack]) -> (i64, Vec<Vec<Presence>>) {
+/// Returns the first clock instant of `tracks`, and the vehicles present at each instant from that one on.
+fn presence_by_tick(tracks: &[SmoothedTrack]) -> (i64, Vec<Vec<Presence>>) {
     let spans = tracks.iter().filter_map(|track| track.trajectory.span());
     let Some((first, last)) = spans.reduce(|(a, b), (c, d)| (a.min(c), b.max(d))) else { return (0, Vec::new()) };
     let first_tick = tick_of(first);
     let ticks = usize::try_from(tick_of(last) - first_tick).map_or(0, |ticks| ticks + 1);
     let mut present = vec![Vec::new(); ticks];
-    for (place, track) in tracks.iter().enumerate() {
-        for (point, instant) in track.trajectory.points.iter().enumerate() {
-            if let Ok(tick) = usize::try_from(tick_of(instant.time) - first_tick) {
-                present[tick].push(Presence { track: place, point });
+    for (track_index, track) in tracks.iter().enumerate() {
+        for (point_index, point) in track.trajectory.points.iter().enumerate() {
+            if let Ok(tick) = usize::try_from(tick_of(point.time) - first_tick) {
+                present[tick].push(Presence { track_index, point_index });
             }
         }
     }
     (first_tick, present)
 }
 
-/// Smooths points that are `period` apart, in place.
+/// Smooths, in place, points that are `period` apart, and derives their speeds and accelerations.
 fn smooth_points(points: &mut [TrajectoryPoint], period: Time) {
     let rate_hz = 1.0 / period.s();
     let (Some(filter), true) = (LowPass::new(CORNER_HZ, rate_hz), points.len() > 1) else { return };
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "positive, and small")]
-    let reflected = (REFLECTED_S * rate_hz).round() as usize;
+    let padding = (PADDING_S * rate_hz).round() as usize;
     let filtered = |points: &[TrajectoryPoint], value: fn(&TrajectoryPoint) -> f64| {
-        low_pass(&points.iter().map(value).collect::<Vec<_>>(), filter, reflected)
+        low_pass(&points.iter().map(value).collect::<Vec<_>>(), filter, padding)
     };
     let along = filtered(points, |point| point.s_m);
     let across = filtered(points, |point| point.d_m);
@@ -148,18 +152,18 @@ fn smooth_points(points: &mut [TrajectoryPoint], period: Time) {
     }
 }
 
-/// `values` filtered about the chord through both ends, so that steady movement passes unchanged up to the ends.
-fn low_pass(values: &[f64], filter: LowPass, reflected: usize) -> Vec<f64> {
+/// Filters the deviation of `values` from the chord through both ends, so that steady movement passes unchanged.
+fn low_pass(values: &[f64], filter: LowPass, padding: usize) -> Vec<f64> {
     let (Some(first), Some(last)) = (values.first(), values.last()) else { return Vec::new() };
     let slope = (last - first) / (values.len() - 1).max(1) as f64;
     let chord = |k: usize| first + slope * k as f64;
     let residual: Vec<f64> = values.iter().enumerate().map(|(k, value)| value - chord(k)).collect();
-    let filtered = filter.forwards_and_backwards(&residual, reflected).into_iter().enumerate();
+    let filtered = filter.forwards_and_backwards(&residual, padding).into_iter().enumerate();
     filtered.map(|(k, value)| value + chord(k)).collect()
 }
 
-/// The derivative with respect to time: central differences over five samples, over three beside the ends, one-sided at
-/// the ends.
+/// Returns the derivative with respect to time: central differences over five samples, over three next to the ends,
+/// one-sided at the ends.
 fn derivative(values: &[f64], period: Time) -> Vec<f64> {
     let step_s = period.s();
     let last = values.len().saturating_sub(1);
@@ -178,7 +182,7 @@ mod tests {
     use crate::recordings::test_support::{recording_of, straight_track};
 
     #[test]
-    fn a_steady_drive_stays_a_steady_drive() {
+    fn constant_speed_passes_unchanged() {
         let smoothed = smooth(&recording_of(vec![straight_track(1, 0.0, 25.0, -1.75, 80)]));
         for point in &smoothed.tracks[0].trajectory.points {
             assert!((point.speed_mps - 25.0).abs() < 1e-9 && point.acceleration_mps2.abs() < 1e-6);
@@ -187,22 +191,22 @@ mod tests {
     }
 
     #[test]
-    fn every_vehicle_is_found_at_its_instants() {
+    fn a_vehicle_is_present_exactly_while_it_is_recorded() {
         let mut late = straight_track(2, 0.0, 20.0, -5.0, 3);
         late.points.iter_mut().for_each(|point| point.time += Time::from_s(1.0));
         let smoothed = smooth(&recording_of(vec![straight_track(1, 0.0, 25.0, -1.75, 11), late]));
-        let numbers = |s| {
+        let track_ids = |s| {
             let present = smoothed.present_at(Time::from_s(s)).iter();
             present.map(|&presence| smoothed.look_up(presence).0.track_id).collect::<Vec<_>>()
         };
-        assert_eq!(numbers(0.4), [1]);
-        assert_eq!(numbers(1.0), [1, 2]);
-        assert_eq!(numbers(1.2), [2]);
-        assert!(numbers(9.0).is_empty() && numbers(-1.0).is_empty());
+        assert_eq!(track_ids(0.4), [1]);
+        assert_eq!(track_ids(1.0), [1, 2]);
+        assert_eq!(track_ids(1.2), [2]);
+        assert!(track_ids(9.0).is_empty() && track_ids(-1.0).is_empty());
     }
 
     #[test]
-    fn the_rate_of_the_recording_does_not_matter() {
+    fn the_result_does_not_depend_on_the_recorded_rate() {
         let wave = |period_ms: i64| {
             let mut track = straight_track(1, 0.0, 25.0, -1.75, 20_000 / period_ms);
             for (k, point) in (0_i64..).zip(&mut track.points) {
@@ -221,10 +225,11 @@ mod tests {
     }
 
     #[test]
-    fn stays_count_recorded_frames() {
+    fn stays_are_as_long_as_their_recorded_frames() {
         let mut track = straight_track(1, 0.0, 25.0, -1.75, 11);
         track.points.iter_mut().skip(7).for_each(|point| point.lane = closecall_traffic::Lane(2));
-        let held: Vec<_> = smooth_track(&track).unwrap().stays.iter().map(|stay| (stay.lane.0, stay.held)).collect();
-        assert_eq!(held, [(1, Time::from_ms(700)), (2, Time::from_ms(400))]);
+        let smoothed = smooth_track(&track).unwrap();
+        let stays: Vec<_> = smoothed.stays.iter().map(|stay| (stay.lane.0, stay.duration)).collect();
+        assert_eq!(stays, [(1, Time::from_ms(700)), (2, Time::from_ms(400))]);
     }
 }

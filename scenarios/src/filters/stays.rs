@@ -1,34 +1,34 @@
-//! For how long a vehicle was recorded in which lane.
+//! Lane stays: how long a vehicle was recorded in which lane.
 
 use closecall_traffic::{Lane, Time, Trajectory};
 
 use super::PERIOD;
 
-/// Frames in a row in one lane.
+/// A lane stay: consecutive recorded frames of a vehicle in one lane.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stay {
     /// The lane.
     pub lane: Lane,
-    /// Its first frame.
+    /// Time of the first frame.
     pub first: Time,
-    /// For how long it is held: its frames times the time between two.
-    pub held: Time,
+    /// Duration of the stay: the number of its frames times the frame period.
+    pub duration: Time,
 }
 
-/// The stays of a track, in the order of time.
+/// Returns the lane stays of a track in order of time.
 pub fn stays_of(track: &Trajectory) -> Vec<Stay> {
     let period = period_of(track).unwrap_or(PERIOD);
     let mut found: Vec<Stay> = Vec::new();
     for point in &track.points {
         match found.last_mut() {
-            Some(stay) if stay.lane == point.lane => stay.held += period,
-            _ => found.push(Stay { lane: point.lane, first: point.time, held: period }),
+            Some(stay) if stay.lane == point.lane => stay.duration += period,
+            _ => found.push(Stay { lane: point.lane, first: point.time, duration: period }),
         }
     }
     found
 }
 
-/// The time between two frames of a track that has at least two, at different times.
+/// Returns the mean time between two frames of a track, or `None` if the track does not have two at different times.
 pub(super) fn period_of(track: &Trajectory) -> Option<Time> {
     let (first, last) = track.span()?;
     let steps = track.points.len() as i64 - 1;

@@ -1,4 +1,4 @@
-//! Quantiles, parametric forms, and how sure they are.
+//! Empirical quantiles and parametric forms, with their confidence interval and goodness of fit.
 
 use closecall_traffic::Stream;
 use rand::{RngExt, SeedableRng};
@@ -6,39 +6,39 @@ use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::Quantity;
 
-/// With fewer values than this nothing is fitted.
+/// Least number of values to which a distribution is fitted.
 pub const MIN_VALUES: usize = 5;
 
-/// Empirical quantiles are given at deciles, or at each value where there are fewer.
+/// Largest number of empirical quantiles: the deciles. With fewer values, there are as many quantiles as values.
 const QUANTILES: usize = 11;
 
-/// Resamples for the interval of the median.
+/// Number of bootstrap resamples for the interval of the median.
 const MEDIAN_RESAMPLES: usize = 2_000;
 
-/// Samples for the probability of a larger Kolmogorov–Smirnov distance.
-const GOODNESS_SAMPLES: usize = 1_000;
+/// Number of bootstrap samples for the probability of a larger Kolmogorov–Smirnov distance.
+const GOODNESS_OF_FIT_SAMPLES: usize = 1_000;
 
-/// A normal distribution is cut at this many standard deviations, which keeps 99.7 % of it.
-const CUT_SDS: f64 = 3.0;
+/// Number of standard deviations at which a normal distribution is truncated, which keeps 99.7 % of it.
+const TRUNCATION_SDS: f64 = 3.0;
 
-/// Ends of the interval.
+/// Probabilities of the lower and upper end of the interval.
 const INTERVAL: [f64; 2] = [0.025, 0.975];
 
-/// A parametric form.
+/// A parametric form with its parameters, in the quantity's unit unless stated otherwise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Form {
-    /// Log-normal.
+    /// Log-normal distribution.
     LogNormal {
-        /// Its median, in the quantity's unit.
+        /// Median.
         median: f64,
-        /// Standard deviation of the logarithm.
+        /// Standard deviation of the logarithm (-).
         sigma: f64,
     },
-    /// Normal, cut at both bounds.
+    /// Normal distribution, truncated at both bounds.
     TruncatedNormal {
-        /// Mean before the cut.
+        /// Mean before truncation.
         mean: f64,
-        /// Standard deviation before the cut.
+        /// Standard deviation before truncation.
         sd: f64,
         /// Lower bound.
         min: f64,
@@ -47,34 +47,36 @@ pub enum Form {
     },
 }
 
-/// How well a form fits.
+/// How well a parametric form fits the values.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Goodness {
-    /// Largest difference of the distribution functions (Kolmogorov–Smirnov).
+pub struct GoodnessOfFit {
+    /// Kolmogorov–Smirnov distance: largest difference between the two distribution functions (-).
     pub distance: f64,
-    /// Probability of a larger one, were the form true.
+    /// Probability of a larger distance if the form were true (-).
     pub p_value: f64,
 }
 
-/// The distribution of one quantity.
+/// The fitted distribution of one quantity, with values in the quantity's unit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FittedQuantity {
-    /// Which one.
+    /// The quantity.
     pub quantity: Quantity,
     /// Number of values.
     pub n: usize,
     /// Quantiles at equally spaced probabilities from 0 to 1.
     pub quantiles: Vec<f64>,
-    /// The median.
+    /// Median.
     pub median: f64,
-    /// Bootstrap interval of the median, 95 %.
+    /// Lower and upper end of the 95 % bootstrap interval of the median.
     pub interval_95: [f64; 2],
-    /// The parametric form and how well it fits; nothing where the values do not vary.
-    pub form: Option<(Form, Goodness)>,
+    /// The parametric form and its goodness of fit.
+    ///
+    /// `None` if the values do not vary, or if they are not all positive and the form is log-normal.
+    pub form: Option<(Form, GoodnessOfFit)>,
 }
 
 impl FittedQuantity {
-    /// The distribution of `values`, or nothing where there are too few.
+    /// Fits the distribution of `values`. Returns `None` if there are fewer than [`MIN_VALUES`].
     pub fn new(quantity: Quantity, values: &[f64], seed: u64) -> Option<Self> {
         if values.len() < MIN_VALUES {
             return None;
@@ -90,12 +92,12 @@ impl FittedQuantity {
             quantiles: (0..levels).map(|k| quantile(&sorted, level(k))).collect(),
             median: quantile(&sorted, 0.5),
             interval_95: median_interval(&sorted, &mut rng),
-            form: Family::of(quantity).fit(&sorted).map(|form| (form, goodness(&sorted, form, &mut rng))),
+            form: Family::of(quantity).fit(&sorted).map(|form| (form, goodness_of_fit(&sorted, form, &mut rng))),
         })
     }
 }
 
-/// A stream for each quantity, so that one more quantity does not change the others.
+/// Returns the random stream of one quantity. Each has its own, so that a further quantity does not change the others.
 fn stream(seed: u64, quantity: Quantity) -> Stream {
     let mut hasher = blake3::Hasher::new_derive_key("closecall 2026 bootstrap of fitted distributions v1");
     hasher.update(&seed.to_le_bytes());
@@ -103,7 +105,7 @@ fn stream(seed: u64, quantity: Quantity) -> Stream {
     Stream::from_seed(*hasher.finalize().as_bytes())
 }
 
-/// The quantile of sorted values at probability `level`, linear between them.
+/// Returns the quantile of sorted values at probability `level`, by linear interpolation.
 fn quantile(sorted: &[f64], level: f64) -> f64 {
     let position = level.clamp(0.0, 1.0) * (sorted.len() - 1) as f64;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and the number of values")]
@@ -112,12 +114,13 @@ fn quantile(sorted: &[f64], level: f64) -> f64 {
     sorted[below] + (position - below as f64) * (sorted[above] - sorted[below])
 }
 
-/// The median of one value or more.
+/// Returns the median of one or more values.
 pub(super) fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     quantile(&values, 0.5)
 }
 
+/// Returns the percentile bootstrap interval of the median.
 fn median_interval(values: &[f64], rng: &mut Stream) -> [f64; 2] {
     let resample =
         |rng: &mut Stream| median((0..values.len()).map(|_| values[rng.random_range(0..values.len())]).collect());
@@ -126,7 +129,7 @@ fn median_interval(values: &[f64], rng: &mut Stream) -> [f64; 2] {
     INTERVAL.map(|level| quantile(&medians, level))
 }
 
-/// Which form suits a quantity.
+/// The family of parametric forms that is fitted to a quantity.
 #[derive(Clone, Copy)]
 enum Family {
     LogNormal,
@@ -147,8 +150,9 @@ impl Family {
         }
     }
 
-    /// The form with the moments of `values` (of their logarithms), or nothing where they do not vary or, for the
-    /// log-normal form, are not all positive.
+    /// Fits the form by the moments of `values`, or of their logarithms for the log-normal form.
+    ///
+    /// Returns `None` if the values do not vary, or if they are not all positive and the form is log-normal.
     fn fit(self, values: &[f64]) -> Option<Form> {
         match self {
             Self::LogNormal => {
@@ -157,13 +161,19 @@ impl Family {
             }
             Self::TruncatedNormal => {
                 let (mean, sd) = moments(values.iter().copied())?;
-                Some(Form::TruncatedNormal { mean, sd, min: mean - CUT_SDS * sd, max: mean + CUT_SDS * sd })
+                Some(Form::TruncatedNormal {
+                    mean,
+                    sd,
+                    min: mean - TRUNCATION_SDS * sd,
+                    max: mean + TRUNCATION_SDS * sd,
+                })
             }
         }
     }
 }
 
-/// Mean and standard deviation (with n − 1), where both are finite and the latter is above 0.
+/// Returns the mean and the standard deviation (with n − 1), or `None` unless both are finite and the latter is above
+/// 0.
 fn moments(values: impl Iterator<Item = f64> + Clone) -> Option<(f64, f64)> {
     let n = values.clone().count() as f64;
     let mean = values.clone().sum::<f64>() / n;
@@ -203,7 +213,7 @@ impl Form {
     }
 }
 
-/// Largest difference between the distribution of sorted values and a form.
+/// Returns the Kolmogorov–Smirnov distance between sorted values and a form.
 fn ks_distance(sorted: &[f64], form: Form) -> f64 {
     let n = sorted.len() as f64;
     let at = |(k, value): (usize, &f64)| {
@@ -213,19 +223,20 @@ fn ks_distance(sorted: &[f64], form: Form) -> f64 {
     sorted.iter().enumerate().map(at).fold(0.0, f64::max)
 }
 
-fn goodness(sorted: &[f64], form: Form, rng: &mut Stream) -> Goodness {
+/// Returns the goodness of fit of `form`, by a parametric bootstrap that refits the form to each sample.
+fn goodness_of_fit(sorted: &[f64], form: Form, rng: &mut Stream) -> GoodnessOfFit {
     let distance = ks_distance(sorted, form);
     let mut exceeded = 0_usize;
-    for _ in 0..GOODNESS_SAMPLES {
-        // Strictly between 0 and 1, where the quantile function is finite.
+    for _ in 0..GOODNESS_OF_FIT_SAMPLES {
+        // The quantile function is finite only strictly between 0 and 1.
         let draw = |rng: &mut Stream| form.quantile(rng.random::<f64>().max(f64::MIN_POSITIVE));
         let mut sample: Vec<f64> = (0..sorted.len()).map(|_| draw(rng)).collect();
         sample.sort_by(f64::total_cmp);
         let refitted = form.family().fit(&sample).unwrap_or(form);
         exceeded += usize::from(ks_distance(&sample, refitted) >= distance);
     }
-    // The observed sample counts as one of them, so that the probability is never 0.
-    Goodness { distance, p_value: (exceeded + 1) as f64 / (GOODNESS_SAMPLES + 1) as f64 }
+    // The observed sample counts as one of the samples, so that the probability is never 0.
+    GoodnessOfFit { distance, p_value: (exceeded + 1) as f64 / (GOODNESS_OF_FIT_SAMPLES + 1) as f64 }
 }
 
 #[cfg(test)]
@@ -240,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn the_parameters_of_a_log_normal_come_back() {
+    fn the_fit_recovers_the_parameters_of_a_log_normal() {
         let fitted = FittedQuantity::new(Quantity::CutOutThw, &log_normal_values(400, 0.9, 0.3), 0).unwrap();
         let Some((Form::LogNormal { median, sigma }, goodness)) = fitted.form else { panic!("a log-normal form") };
         assert!((median - 0.9).abs() < 1e-3 && (sigma - 0.3).abs() < 5e-3);
@@ -249,14 +260,15 @@ mod tests {
     }
 
     #[test]
-    fn a_form_that_does_not_fit_has_a_small_probability() {
-        let two_heaps: Vec<f64> = (0..60).map(|k| if k % 2 == 0 { 1.0 } else { 5.0 } + 0.001 * f64::from(k)).collect();
-        let fitted = FittedQuantity::new(Quantity::FrontThw, &two_heaps, 0).unwrap();
+    fn a_form_that_does_not_fit_has_a_small_p_value() {
+        let two_clusters: Vec<f64> =
+            (0..60).map(|k| if k % 2 == 0 { 1.0 } else { 5.0 } + 0.001 * f64::from(k)).collect();
+        let fitted = FittedQuantity::new(Quantity::FrontThw, &two_clusters, 0).unwrap();
         assert!(fitted.form.unwrap().1.p_value < 0.01);
     }
 
     #[test]
-    fn too_few_values_are_not_fitted_and_equal_ones_have_no_form() {
+    fn too_few_values_are_not_fitted_and_equal_or_zero_values_have_no_form() {
         assert_eq!(FittedQuantity::new(Quantity::Closing, &[1.0; 4], 0), None);
         let equal = FittedQuantity::new(Quantity::Closing, &[2.0; 8], 0).unwrap();
         assert_eq!((equal.form, equal.interval_95), (None, [2.0, 2.0]));
@@ -265,12 +277,12 @@ mod tests {
     }
 
     #[test]
-    fn the_seed_decides_the_interval() {
+    fn the_interval_is_reproducible_and_depends_on_the_seed() {
         let values: Vec<f64> = (0..15).map(|k| f64::from(k * k)).collect();
         let interval = |seed| FittedQuantity::new(Quantity::CrossingSpeed, &values, seed).unwrap().interval_95;
         assert_eq!(interval(1), interval(1));
-        let spread = (0..20).map(interval).any(|other| other != interval(1));
-        assert!(spread, "different seeds give different resamples");
+        let differs = (0..20).map(interval).any(|other| other != interval(1));
+        assert!(differs, "different seeds give different resamples");
     }
 
     proptest! {

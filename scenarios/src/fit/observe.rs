@@ -1,4 +1,4 @@
-//! What recordings hold of each quantity.
+//! Extraction of the values of each quantity from trajectory data.
 
 use std::collections::BTreeMap;
 
@@ -10,40 +10,40 @@ use crate::criticality::CRITICAL_THW_S;
 use crate::filters::{PERIOD, SmoothedRecording};
 use crate::lane_change::{LaneChange, detect};
 
-/// Largest headway at which a vehicle counts as following [s]; see the module's documentation.
+/// Largest headway at which a vehicle counts as following (s); see the module documentation.
 const FOLLOWING_THW_S: f64 = 3.0;
 
-/// Shortest time gap of adaptive cruise control [s]: half of the 1 s that driver's manuals call the shortest setting.
+/// Shortest time gap of adaptive cruise control (s): half of the 1 s that driver's manuals call the shortest setting.
 const SHORTEST_ACC_S: f64 = 0.5;
 
-/// A pair counts where one follows the other for at least this.
+/// Shortest total time of following for which a pair of vehicles counts.
 const MIN_FOLLOWING: Time = Time::from_ms(2_000);
 
-/// A quantity that is fitted.
+/// A quantity to which a distribution is fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Quantity {
-    /// Headway to the old lane's lead when the marking is crossed [s].
+    /// Headway to the lead vehicle of the old lane when the centre crosses the marking (s).
     CutOutThw,
-    /// The same, of those below the critical headway [s].
+    /// The same, for values below the critical headway only (s).
     CriticalCutOutThw,
-    /// Duration of complete lane changes [s].
+    /// Duration of complete lane changes (s).
     LaneChangeDuration,
-    /// Peak width of complete lane changes [s].
+    /// Width of the peak of lateral speed of complete lane changes (s).
     LaneChangeWidth,
-    /// Closing speed to the old lane's lead when the manoeuvre starts [m/s].
+    /// Closing speed to the lead vehicle of the old lane when the manoeuvre starts (m/s).
     Closing,
-    /// Speed when the marking is crossed [m/s].
+    /// Speed when the centre crosses the marking (m/s).
     CrossingSpeed,
-    /// Headway while following [s].
+    /// Median headway of a pair while following (s).
     FrontThw,
-    /// The same, of those that are critical but no shorter than adaptive cruise control keeps [s].
+    /// The same, for values that are critical but not shorter than those of adaptive cruise control only (s).
     ShortFrontThw,
-    /// Speed while following [m/s].
+    /// Median speed of the following vehicle of a pair (m/s).
     FollowingSpeed,
 }
 
 impl Quantity {
-    /// Every quantity, in the order of output.
+    /// All quantities, in the order of output.
     pub const ALL: [Self; 9] = [
         Self::CutOutThw,
         Self::CriticalCutOutThw,
@@ -56,7 +56,7 @@ impl Quantity {
         Self::FollowingSpeed,
     ];
 
-    /// The parameter's name, with its unit.
+    /// Returns the name of the scenario parameter, which ends with its unit.
     pub const fn name(self) -> &'static str {
         match self {
             Self::CutOutThw => "cut-out-thw-s",
@@ -71,7 +71,7 @@ impl Quantity {
         }
     }
 
-    /// How the values were taken.
+    /// Returns a description of the values, for the comments of the output file.
     pub const fn meaning(self) -> &'static str {
         match self {
             Self::CutOutThw => "headway to the old lane's lead at the crossing, lane changes to the left, at most 3 s",
@@ -89,19 +89,19 @@ impl Quantity {
     }
 }
 
-/// The values of each quantity, in the order of recordings, tracks and time.
+/// The values of each quantity, in the order of trajectory data sets, tracks and time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Samples {
     values: BTreeMap<Quantity, Vec<f64>>,
 }
 
 impl Samples {
-    /// The values of one quantity.
+    /// Returns the values of one quantity.
     pub fn values(&self, quantity: Quantity) -> &[f64] {
         self.values.get(&quantity).map_or(&[], Vec::as_slice)
     }
 
-    /// Appends the values of another recording.
+    /// Appends the values of another trajectory data set.
     pub fn extend(&mut self, other: Self) {
         for (quantity, values) in other.values {
             self.values.entry(quantity).or_default().extend(values);
@@ -112,7 +112,7 @@ impl Samples {
         self.values.entry(quantity).or_default().push(value);
     }
 
-    /// A headway under its own quantity, and under another where it is critical and at least `from_s`.
+    /// Adds a headway to quantity `all`, and also to `critical` if it is critical and at least `from_s`.
     fn push_headway(&mut self, [all, critical]: [Quantity; 2], from_s: f64, thw_s: f64) {
         self.push(all, thw_s);
         if (from_s..CRITICAL_THW_S).contains(&thw_s) {
@@ -121,7 +121,7 @@ impl Samples {
     }
 }
 
-/// The values that one recording holds.
+/// Extracts the values of all quantities from one trajectory data set.
 pub fn observe(recording: &SmoothedRecording) -> Samples {
     let mut samples = Samples::default();
     for change in detect(recording) {
@@ -147,9 +147,9 @@ fn observe_lane_change(recording: &SmoothedRecording, change: &LaneChange, sampl
         return;
     }
     samples.push_headway([Quantity::CutOutThw, Quantity::CriticalCutOutThw], 0.0, thw_s);
-    // The same lead when the manoeuvre starts, or as early as both are recorded.
-    let own = &recording.tracks[lead.own_place].trajectory;
-    let other = &recording.tracks[lead.lead_place].trajectory;
+    // The closing speed to the same lead vehicle at the start of the manoeuvre, or when both are first recorded.
+    let own = &recording.tracks[lead.own_index].trajectory;
+    let other = &recording.tracks[lead.lead_index].trajectory;
     let Some((earliest, _)) = own.span().zip(other.span()).map(|(a, b)| (a.0.max(b.0), ())) else { return };
     let start = Time::from_s(change.start_s).max(earliest).min(crossing);
     if let Some((own, other)) = own.at(start).zip(other.at(start)) {
@@ -160,32 +160,35 @@ fn observe_lane_change(recording: &SmoothedRecording, change: &LaneChange, sampl
     }
 }
 
-/// A vehicle and the one ahead of it.
-struct LeadView<'a> {
+/// A vehicle and its lead vehicle at one instant.
+struct LeadPair<'a> {
     own: &'a TrajectoryPoint,
-    own_place: usize,
-    lead_place: usize,
+    own_index: usize,
+    lead_index: usize,
+    /// Gap bumper to bumper (m).
     gap_m: f64,
 }
 
-/// The nearest vehicle wholly ahead of track `track_id` in `lane` at `time`.
-fn lead_in(recording: &SmoothedRecording, track_id: u64, lane: Lane, time: Time) -> Option<LeadView<'_>> {
+/// Returns track `track_id` and the nearest vehicle in `lane` that is entirely ahead of it at `time`.
+fn lead_in(recording: &SmoothedRecording, track_id: u64, lane: Lane, time: Time) -> Option<LeadPair<'_>> {
     let present = recording.present_at(time);
     let own = present.iter().find(|presence| recording.look_up(**presence).0.track_id == track_id)?;
     let (own_track, own_point) = recording.look_up(*own);
-    let ahead = present.iter().filter(|presence| presence.track != own.track).filter_map(|presence| {
+    let ahead = present.iter().filter(|presence| presence.track_index != own.track_index).filter_map(|presence| {
         let (track, point) = recording.look_up(*presence);
         let gap_m = gap_m((own_track, own_point), (track, point));
-        (point.lane == lane && gap_m >= 0.0).then_some((gap_m, presence.track))
+        (point.lane == lane && gap_m >= 0.0).then_some((gap_m, presence.track_index))
     });
-    let (gap_m, lead_place) = ahead.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    Some(LeadView { own: own_point, own_place: own.track, lead_place, gap_m })
+    let (gap_m, lead_index) = ahead.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(LeadPair { own: own_point, own_index: own.track_index, lead_index, gap_m })
 }
 
+/// Returns the gap between two vehicles, bumper to bumper (m).
 fn gap_m(rear: (&Trajectory, &TrajectoryPoint), front: (&Trajectory, &TrajectoryPoint)) -> f64 {
     front.1.s_m - rear.1.s_m - 0.5 * (front.0.dimensions.length_m + rear.0.dimensions.length_m)
 }
 
+/// Adds the median headway and speed of each pair of vehicles that follow each other for long enough.
 fn observe_following(recording: &SmoothedRecording, samples: &mut Samples) {
     let mut pairs: BTreeMap<(usize, usize), Vec<(f64, f64)>> = BTreeMap::new();
     let spans = recording.tracks.iter().filter_map(|track| track.trajectory.span());
@@ -206,7 +209,8 @@ fn observe_following(recording: &SmoothedRecording, samples: &mut Samples) {
     }
 }
 
-/// Every pair of neighbours in one lane that follow each other at `time`: who, headway, speed.
+/// Returns all pairs of neighbours in one lane of which one follows the other at `time`: the track indices of the
+/// following and the lead vehicle, the headway (s), and the speed of the following vehicle (m/s).
 fn following_at(recording: &SmoothedRecording, time: Time) -> Vec<((usize, usize), f64, f64)> {
     let mut present: Vec<_> = recording.present_at(time).to_vec();
     present.sort_by(|a, b| {
@@ -218,7 +222,7 @@ fn following_at(recording: &SmoothedRecording, time: Time) -> Vec<((usize, usize
         let gap_m = gap_m(rear, front);
         let thw_s = time_headway_s(gap_m, rear.1.speed_mps).ok()?;
         let counts = rear.1.lane == front.1.lane && gap_m >= 0.0 && thw_s <= FOLLOWING_THW_S;
-        counts.then_some(((pair[0].track, pair[1].track), thw_s, rear.1.speed_mps))
+        counts.then_some(((pair[0].track_index, pair[1].track_index), thw_s, rear.1.speed_mps))
     });
     follows.collect()
 }
@@ -229,7 +233,7 @@ mod tests {
     use crate::filters::smooth;
     use crate::recordings::test_support::{changing_track, recording_of, straight_track};
 
-    /// Pulls out to the left at 30 m/s from behind one at 26 m/s.
+    /// A vehicle at 30 m/s changes lanes to the left behind a lead vehicle at 26 m/s.
     fn overtaking() -> Samples {
         let own = changing_track(1, (0.0, 30.0), (-5.25, -1.75), (3.0, 5.0), 110);
         let lead = straight_track(2, 40.0, 26.0, -5.25, 110);
@@ -237,9 +241,9 @@ mod tests {
     }
 
     #[test]
-    fn the_headway_at_the_crossing_and_the_closing_speed() {
+    fn a_lane_change_gives_headway_closing_speed_and_duration() {
         let samples = overtaking();
-        // At the crossing, 5.5 s or a frame later: gap 40 − 4.5 − 4·t, at 30 m/s.
+        // The crossing is at 5.5 s or one frame later, with a gap of 40 − 4.5 − 4·t (m) at 30 m/s.
         let thw_s = samples.values(Quantity::CutOutThw)[0];
         assert!((thw_s - (35.5 - 4.0 * 5.5) / 30.0).abs() < 0.4 / 30.0 + 1e-6, "{thw_s}");
         assert!((samples.values(Quantity::Closing)[0] - 4.0).abs() < 1e-6);
@@ -248,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn one_value_for_each_pair_that_follows_long_enough() {
+    fn each_pair_that_follows_long_enough_gives_one_value() {
         let pair = |frames| {
             let lead = straight_track(2, 44.5, 20.0, -1.75, frames);
             observe(&smooth(&recording_of(vec![straight_track(1, 0.0, 20.0, -1.75, frames), lead])))
@@ -260,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn a_free_driver_does_not_follow() {
+    fn a_vehicle_with_a_long_headway_does_not_follow() {
         let tracks = vec![straight_track(1, 0.0, 20.0, -1.75, 50), straight_track(2, 70.0, 20.0, -1.75, 50)];
         assert!(observe(&smooth(&recording_of(tracks))).values(Quantity::FrontThw).is_empty());
     }

@@ -1,4 +1,4 @@
-//! The result as TOML, whose lines can be pasted into the `[parameters]` of a scenario.
+//! Writes fitted distributions as TOML, whose lines can be pasted into the `[parameters]` table of a scenario.
 
 use std::fmt::Write as _;
 use std::io;
@@ -7,18 +7,19 @@ use std::path::Path;
 use super::{FittedDistributions, FittedQuantity, Form, MIN_VALUES};
 use crate::atomic::write_atomically;
 
-/// What the heading of the file says beside the figures.
+/// Text for the heading of the file.
 #[derive(Clone, Debug, Default)]
 pub struct Heading {
-    /// The command that makes the file again.
+    /// The command that reproduces the file.
     pub command: String,
-    /// Where the recordings come from, and their licence.
+    /// The origin of the trajectory data, and its licence.
     pub provenance: String,
 }
 
-/// The distributions as TOML text.
+/// Formats the distributions as TOML text.
 ///
-/// `[parameters]` holds the empirical quantiles, `[parametric]` the parametric forms under the same names.
+/// The table `[parameters]` holds the empirical quantiles, and `[parametric]` the parametric forms under the same
+/// names.
 pub fn to_toml(result: &FittedDistributions, heading: &Heading) -> String {
     let mut text = String::new();
     push_heading(&mut text, result, heading);
@@ -46,10 +47,10 @@ pub fn to_toml(result: &FittedDistributions, heading: &Heading) -> String {
     text
 }
 
-/// Writes the distributions to `path`: the whole file, or none.
+/// Writes the distributions to `path` atomically.
 ///
 /// # Errors
-/// Where it cannot be written; a file that was there before is untouched then.
+/// Returns an I/O error if the file cannot be written. A file that existed before then stays untouched.
 pub fn write_toml(result: &FittedDistributions, heading: &Heading, path: &Path) -> io::Result<()> {
     let text = to_toml(result, heading);
     write_atomically(path, |file| file.write_all(text.as_bytes()))
@@ -61,7 +62,7 @@ fn push_line(text: &mut String, line: &str) {
 }
 
 fn push_heading(text: &mut String, result: &FittedDistributions, heading: &Heading) {
-    push_line(text, "# Distributions fitted to recorded traffic. Figures only; the recordings are not part of it.");
+    push_line(text, "# Distributions fitted to trajectory data. This file holds the fitted values only, not the data.");
     for (key, value) in [("command", &heading.command), ("provenance", &heading.provenance)] {
         for line in value.lines() {
             push_line(text, &format!("# {key}: {line}"));
@@ -94,15 +95,17 @@ fn form_text(form: Form) -> String {
     }
 }
 
-/// To a thousandth: finer than any recording.
+/// Formats a number to three decimals, which is finer than the resolution of any trajectory data.
 fn number(value: f64) -> String {
     format!("{value:.3}")
 }
 
+/// Replaces control characters, so that the text stays on one line.
 fn one_line(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }
 
+/// Returns the text as a TOML string.
 fn quoted(text: &str) -> String {
     format!("\"{}\"", one_line(text).replace('\\', "\\\\").replace('"', "\\\""))
 }
@@ -128,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn both_tables_are_parameters_of_a_scenario() {
+    fn both_tables_are_valid_scenario_parameters() {
         let text = to_toml(&result(), &Heading { command: "closecall fit".to_owned(), provenance: String::new() });
         let document: toml::Table = text.parse().unwrap();
         for table in ["parameters", "parametric"] {
@@ -141,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn the_file_is_the_text() {
+    fn the_file_holds_the_text() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("fit.toml");
         write_toml(&result(), &Heading::default(), &path).unwrap();

@@ -1,21 +1,23 @@
-//! Changes of the recorded lane.
+//! Lane crossings: changes of the recorded lane.
 
 use closecall_traffic::{Lane, Side, Time};
 
 use crate::filters::Stay;
 
-/// A lane must be held for this long before and after a crossing.
+/// Shortest time in a lane before and after a crossing.
 pub(super) const MIN_DWELL: Time = Time::from_ms(500);
 
-/// Recorded times are rounded; a dwell may be short by this.
+/// Tolerance of the dwell time, because recorded times are rounded.
 const ROUNDING: Time = Time::from_ms(5);
 
-/// A change from one lane to another.
+/// A change of the recorded lane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Crossing {
-    /// First frame in the other lane.
+    /// Time of the first frame in the new lane.
     pub(super) time: Time,
+    /// Old lane.
     pub(super) from: Lane,
+    /// New lane.
     pub(super) to: Lane,
 }
 
@@ -25,15 +27,16 @@ impl Crossing {
     }
 }
 
-/// Changes between lanes that are each held for the least dwell; shorter stays are passed over.
+/// Returns the changes between lanes in each of which the vehicle stays for at least [`MIN_DWELL`]. Shorter stays are
+/// ignored.
 pub(super) fn crossings(stays: &[Stay]) -> Vec<Crossing> {
     let mut crossings = Vec::new();
-    let mut kept: Option<Lane> = None;
-    for stay in stays.iter().filter(|stay| stay.held + ROUNDING >= MIN_DWELL) {
-        if let Some(from) = kept.filter(|from| *from != stay.lane) {
+    let mut current: Option<Lane> = None;
+    for stay in stays.iter().filter(|stay| stay.duration + ROUNDING >= MIN_DWELL) {
+        if let Some(from) = current.filter(|from| *from != stay.lane) {
             crossings.push(Crossing { time: stay.first, from, to: stay.lane });
         }
-        kept = Some(stay.lane);
+        current = Some(stay.lane);
     }
     crossings
 }
@@ -42,19 +45,19 @@ pub(super) fn crossings(stays: &[Stay]) -> Vec<Crossing> {
 mod tests {
     use super::*;
 
-    fn stay(lane: u8, first_ms: i64, held_ms: i64) -> Stay {
-        Stay { lane: Lane(lane), first: Time::from_ms(first_ms), held: Time::from_ms(held_ms) }
+    fn stay(lane: u8, first_ms: i64, duration_ms: i64) -> Stay {
+        Stay { lane: Lane(lane), first: Time::from_ms(first_ms), duration: Time::from_ms(duration_ms) }
     }
 
     #[test]
-    fn flicker_is_passed_over() {
+    fn short_stays_are_ignored() {
         let found = crossings(&[stay(2, 0, 3_000), stay(1, 3_000, 200), stay(2, 3_200, 300), stay(1, 3_500, 900)]);
         assert_eq!(found, [Crossing { time: Time::from_ms(3_500), from: Lane(2), to: Lane(1) }]);
         assert_eq!(found[0].direction(), Side::Left);
     }
 
     #[test]
-    fn half_a_second_is_enough_and_less_is_not() {
+    fn half_a_second_in_each_lane_is_enough_and_less_is_not() {
         assert_eq!(crossings(&[stay(1, 0, 500), stay(2, 500, 500)]).len(), 1);
         assert!(crossings(&[stay(1, 0, 500), stay(2, 500, 400)]).is_empty());
         assert!(crossings(&[stay(1, 0, 400), stay(2, 400, 900)]).is_empty());

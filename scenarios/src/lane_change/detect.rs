@@ -1,4 +1,4 @@
-//! From smoothed trajectories to lane changes.
+//! Detection of lane changes in smoothed trajectories.
 
 use closecall_traffic::{Lane, Side, Time, Trajectory};
 use serde::Serialize;
@@ -13,11 +13,11 @@ use super::manoeuvre::{MIN_SHIFT_M, Manoeuvre, Sampled, height_share, manoeuvres
 use crate::filters::{PERIOD, SmoothedRecording, SmoothedTrack, smooth_track, stays_of};
 use crate::recordings::{LaneMarkings, MarkingDistances};
 
-/// A crossing up to this far outside of a manoeuvre still belongs to it [samples]: 1 s. Vehicles pause on a marking, and
-/// the ends are estimates.
+/// Largest distance from a crossing to the manoeuvre that it belongs to, if it lies outside (samples): 1 s. Vehicles
+/// pause on a marking, and the start and end of a manoeuvre are estimates.
 const OUTSIDE_SAMPLES: f64 = 5.0;
 
-/// What lane changes are told by.
+/// The criterion by which lane changes are detected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Criterion {
@@ -25,15 +25,15 @@ pub enum Criterion {
     Peak,
     /// Displacement from the lane's centre.
     Distance,
-    /// Jumps of the distances to the markings; finds nothing where these were not measured.
+    /// Jumps of the distances to the markings. Detects nothing if these were not measured.
     Gradient,
 }
 
 impl Criterion {
-    /// Every criterion.
+    /// All criteria.
     pub const ALL: [Self; 3] = [Self::Peak, Self::Distance, Self::Gradient];
 
-    /// Its name.
+    /// Returns the name of the criterion, as on the command line and in files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Peak => "peak",
@@ -43,16 +43,16 @@ impl Criterion {
     }
 }
 
-/// Whether the recorded lane of a vehicle can be relied on.
+/// Whether the recorded lane of a vehicle is reliable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lanes {
-    /// A lane change by the peak criterion is one of the recorded lane.
+    /// Reliable: the peak criterion requires a change of the recorded lane.
     Recorded,
-    /// It is a shift by most of a lane, whatever lane is recorded.
+    /// Unreliable: the peak criterion requires a lateral shift by most of a lane and ignores the recorded lane.
     Doubtful,
 }
 
-/// Finds the lane changes of one track at a time.
+/// Detects the lane changes of one track at a time.
 #[derive(Clone, Debug)]
 pub struct Detector {
     lanes: Lanes,
@@ -60,49 +60,56 @@ pub struct Detector {
     lane_width_m: f64,
 }
 
-/// A track as it was recorded, and smoothed.
+/// The data of one track from which lane changes are detected.
 #[derive(Clone, Copy, Debug)]
-struct Subject<'a> {
+struct TrackData<'a> {
     recorded: &'a Trajectory,
-    seen: &'a [MarkingDistances],
+    /// Distances to the markings for each recorded point; empty if they were not measured.
+    distances: &'a [MarkingDistances],
     smoothed: &'a SmoothedTrack,
 }
 
-/// The lane changes of all tracks by the peak criterion, in the order of track numbers and then of time.
+/// Detects the lane changes of all tracks by the peak criterion, in order of track id and time.
 pub fn detect(recording: &SmoothedRecording) -> Vec<LaneChange> {
     let detector = Detector::new(Lanes::Recorded, &recording.markings);
     recording.tracks.iter().flat_map(|track| detector.by_recorded_lane(track)).collect()
 }
 
 impl Detector {
-    /// A detector for tracks between `markings`.
+    /// Creates a detector for tracks on the road with these `markings`.
     pub fn new(lanes: Lanes, markings: &LaneMarkings) -> Self {
         Self { lanes, grid: LaneGrid::new(markings), lane_width_m: markings.typical_lane_width_m() }
     }
 
-    /// The lane changes of a track by one criterion, in the order of time. `seen` are the distances to the markings for
-    /// each of its points, where they were measured, or else nothing.
+    /// Detects the lane changes of a track by one criterion, in order of time.
     ///
-    /// Where a lane change is one of the recorded lane, tracks without any are not even smoothed.
-    pub fn detect(&self, criterion: Criterion, recorded: &Trajectory, seen: &[MarkingDistances]) -> Vec<LaneChange> {
+    /// `distances` holds the distances to the markings for each point of the track; it is empty if they were not
+    /// measured. If the criterion requires a change of the recorded lane, a track without such a change is not
+    /// smoothed.
+    pub fn detect(
+        &self,
+        criterion: Criterion,
+        recorded: &Trajectory,
+        distances: &[MarkingDistances],
+    ) -> Vec<LaneChange> {
         let by_lane = (criterion, self.lanes) == (Criterion::Peak, Lanes::Recorded);
         if by_lane && crossings(&stays_of(recorded)).is_empty() {
             return Vec::new();
         }
         let Some(smoothed) = smooth_track(recorded) else { return Vec::new() };
-        self.by(criterion, Subject { recorded, seen, smoothed: &smoothed })
+        self.detect_smoothed(criterion, TrackData { recorded, distances, smoothed: &smoothed })
     }
 
-    /// The lane changes of a track by each of `criteria`, for which it is smoothed once.
+    /// Detects the lane changes of a track by each of `criteria`, but smooths the track only once.
     pub fn detect_by_each(
         &self,
         criteria: &[Criterion],
         recorded: &Trajectory,
-        seen: &[MarkingDistances],
+        distances: &[MarkingDistances],
     ) -> Vec<Vec<LaneChange>> {
         let Some(smoothed) = smooth_track(recorded) else { return vec![Vec::new(); criteria.len()] };
-        let subject = Subject { recorded, seen, smoothed: &smoothed };
-        criteria.iter().map(|criterion| self.by(*criterion, subject)).collect()
+        let data = TrackData { recorded, distances, smoothed: &smoothed };
+        criteria.iter().map(|criterion| self.detect_smoothed(*criterion, data)).collect()
     }
 
     fn by_recorded_lane(&self, track: &SmoothedTrack) -> Vec<LaneChange> {
@@ -111,39 +118,43 @@ impl Detector {
         found
     }
 
-    fn by(&self, criterion: Criterion, subject: Subject<'_>) -> Vec<LaneChange> {
-        let Subject { recorded, seen, smoothed } = subject;
+    fn detect_smoothed(&self, criterion: Criterion, data: TrackData<'_>) -> Vec<LaneChange> {
+        let TrackData { recorded, distances, smoothed } = data;
         let track = &smoothed.trajectory;
-        let width_m = || gradient::lane_width_m(recorded, seen).unwrap_or(self.lane_width_m);
+        let width_m = || gradient::lane_width_m(recorded, distances).unwrap_or(self.lane_width_m);
         let mut found = match (criterion, self.lanes) {
             (Criterion::Peak, Lanes::Recorded) => by_crossings(track, &crossings(&smoothed.stays), width_m()),
             (Criterion::Peak, Lanes::Doubtful) => by_shift(track, width_m()),
-            (Criterion::Distance, _) if seen.is_empty() => by_distance(track, |k| self.grid.at(track.points[k].d_m)),
-            (Criterion::Distance, _) => {
-                let places = gradient::lane_places(recorded, seen, track, PERIOD);
-                by_distance(track, |k| places[k])
+            (Criterion::Distance, _) if distances.is_empty() => {
+                by_distance(track, |k| self.grid.at(track.points[k].d_m))
             }
-            (Criterion::Gradient, _) => by_crossings(track, &gradient::jumps(recorded, seen), width_m()),
+            (Criterion::Distance, _) => {
+                let lanes = gradient::measured_lanes(recorded, distances, track, PERIOD);
+                by_distance(track, |k| lanes[k])
+            }
+            (Criterion::Gradient, _) => by_crossings(track, &gradient::jumps(recorded, distances), width_m()),
         };
         mark_doubles(&mut found);
         found
     }
 }
 
-/// Peaks of lateral speed that carry the vehicle over a marking.
+/// Returns the lane changes whose peak of lateral speed carries the vehicle over a marking.
 fn by_crossings(track: &Trajectory, crossings: &[Crossing], lane_width_m: f64) -> Vec<LaneChange> {
     let (false, Some(sampled)) = (crossings.is_empty(), Sampled::new(track)) else { return Vec::new() };
     let manoeuvres = manoeuvres(track, lane_width_m);
-    let owned = crossings.iter().filter_map(|crossing| Some((crossing, owner(&sampled, crossing, &manoeuvres)?)));
+    let matched =
+        crossings.iter().filter_map(|crossing| Some((crossing, manoeuvre_of(&sampled, crossing, &manoeuvres)?)));
     let change = |(crossing, manoeuvre): (&Crossing, &Manoeuvre)| {
         lane_change(&sampled, manoeuvre, height_share(track, lane_width_m), *crossing)
     };
-    owned.map(change).collect()
+    matched.map(change).collect()
 }
 
-/// The manoeuvre in the crossing's direction that it belongs to: of those that it lies in the one with the highest peak,
-/// or else the nearest.
-fn owner<'m>(sampled: &Sampled<'_>, crossing: &Crossing, manoeuvres: &'m [Manoeuvre]) -> Option<&'m Manoeuvre> {
+/// Returns the manoeuvre that a crossing belongs to, in the direction of the crossing.
+///
+/// Of the manoeuvres that contain the crossing, this is the one with the highest peak; if none does, it is the nearest.
+fn manoeuvre_of<'m>(sampled: &Sampled<'_>, crossing: &Crossing, manoeuvres: &'m [Manoeuvre]) -> Option<&'m Manoeuvre> {
     let sample = sampled.sample(crossing.time);
     let outside = |manoeuvre: &Manoeuvre| (manoeuvre.start - sample).max(sample - manoeuvre.end).max(0.0);
     let candidates = manoeuvres
@@ -152,7 +163,7 @@ fn owner<'m>(sampled: &Sampled<'_>, crossing: &Crossing, manoeuvres: &'m [Manoeu
     candidates.min_by(|a, b| outside(a).total_cmp(&outside(b)).then(b.peak_mps.total_cmp(&a.peak_mps)))
 }
 
-/// Peaks of lateral speed that shift the vehicle by most of a lane, in the order of time.
+/// Returns the lane changes whose peak of lateral speed shifts the vehicle by most of a lane, in order of time.
 fn by_shift(track: &Trajectory, lane_width_m: f64) -> Vec<LaneChange> {
     let Some(sampled) = Sampled::new(track) else { return Vec::new() };
     let mut found: Vec<LaneChange> = Vec::new();
@@ -179,7 +190,7 @@ fn by_shift(track: &Trajectory, lane_width_m: f64) -> Vec<LaneChange> {
     found
 }
 
-/// The lane beside; the first lane has none to its left, where its own number stands.
+/// Returns the adjacent lane in `direction`. Lane 1 has none to its left; the result is then lane 1 itself.
 pub(super) fn beside(lane: Lane, direction: Side) -> Lane {
     match direction {
         Side::Left => Lane(lane.0.saturating_sub(1).max(1)),
@@ -227,12 +238,12 @@ mod tests {
     }
 
     #[test]
-    fn keeping_the_lane_is_no_lane_change() {
+    fn lane_keeping_is_no_lane_change() {
         assert!(found(straight_track(1, 0.0, 25.0, -1.75, 200)).is_empty());
     }
 
     #[test]
-    fn a_swerve_that_stays_in_its_lane_is_none() {
+    fn a_swerve_within_the_lane_is_no_lane_change() {
         let mut track = straight_track(1, 0.0, 25.0, -1.75, 200);
         for (k, point) in track.points.iter_mut().enumerate() {
             point.d_m += (0.1 * k as f64).sin();
@@ -241,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn both_lane_changes_of_an_overtaking_are_found() {
+    fn both_lane_changes_of_an_overtaking_manoeuvre_are_detected() {
         let out = changing_track(1, (0.0, 30.0), (-5.25, -1.75), (4.0, 5.0), 300);
         let back = changing_track(1, (0.0, 30.0), (0.0, -3.5), (18.0, 6.0), 300);
         let mut track = out.clone();
@@ -257,14 +268,14 @@ mod tests {
     }
 
     #[test]
-    fn a_lane_change_that_the_recording_cuts_is_not_complete() {
+    fn a_lane_change_beyond_the_end_of_the_track_is_not_complete() {
         let found = found(changing_track(1, (0.0, 30.0), (-5.25, -1.75), (4.0, 6.0), 80));
         assert_eq!(found.len(), 1);
         assert!(!found[0].complete && (found[0].crossing_s - 7.0).abs() <= 0.1);
     }
 
     #[test]
-    fn a_track_that_begins_or_ends_at_the_fastest_moment_still_has_its_crossing() {
+    fn a_track_that_begins_or_ends_at_the_peak_still_has_its_crossing() {
         let whole = changing_track(1, (0.0, 30.0), (-5.25, -1.75), (4.0, 6.0), 150);
         for range in [0..76, 64..150] {
             let found = found(whole.with_points(whole.points[range].to_vec()));
@@ -274,13 +285,13 @@ mod tests {
     }
 
     #[test]
-    fn one_sweep_over_two_markings_is_two_lane_changes() {
+    fn one_manoeuvre_over_two_markings_is_two_lane_changes() {
         let found = found(changing_track(1, (0.0, 30.0), (-8.75, -1.75), (4.0, 9.0), 180));
         assert_eq!(found.iter().map(|change| (change.from_lane, change.to_lane)).collect::<Vec<_>>(), [(3, 2), (2, 1)]);
         assert!(found.iter().all(|change| !change.complete && change.double));
     }
 
-    /// From lane 3 over lane 2 to lane 1, the second lane change `pause_s` after the first has begun.
+    /// Detects two lane changes from lane 3 to lane 1, of which the second begins `pause_s` after the first has begun.
     fn two_to_the_left(pause_s: f64) -> Vec<LaneChange> {
         let mut track = changing_track(1, (0.0, 30.0), (-8.75, -5.25), (3.0, 4.0), 250);
         let second = changing_track(1, (0.0, 30.0), (0.0, 3.5), (3.0 + pause_s, 4.0), 250);
@@ -292,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn only_what_overlaps_is_a_double() {
+    fn only_overlapping_lane_changes_are_double() {
         let double = |pause_s| -> Vec<_> {
             two_to_the_left(pause_s).iter().map(|change| (change.double, change.complete)).collect()
         };
@@ -301,14 +312,15 @@ mod tests {
     }
 
     #[test]
-    fn the_middle_is_where_half_of_the_shift_is_done() {
+    fn the_midpoint_is_at_half_of_the_lateral_shift() {
         let found = found(changing_track(1, (0.0, 30.0), (-5.85, -2.35), (4.0, 6.0), 150));
         assert_eq!(found.len(), 1);
-        // The marking is crossed later than that: the vehicle started right of its lane's middle.
+        // The crossing is later than the midpoint, because the vehicle starts to the right of its lane's centre.
         assert!((found[0].midpoint_s - 7.0).abs() < 0.05 && found[0].crossing_s > 7.4, "{:?}", found[0]);
     }
 
-    fn by_distance_beside_by(offset_m: f64) -> Vec<LaneChange> {
+    /// Detects one lane change by the distance criterion, with all lateral positions displaced by `offset_m`.
+    fn by_distance_with_offset(offset_m: f64) -> Vec<LaneChange> {
         let mut track = changing_track(1, (0.0, 30.0), (-5.25, -1.75), (4.0, 6.0), 150);
         track.points.iter_mut().for_each(|point| point.d_m += offset_m);
         let markings = recording_of(vec![changing_track(2, (0.0, 30.0), (-5.25, -1.75), (4.0, 6.0), 150)]).markings;
@@ -316,21 +328,21 @@ mod tests {
     }
 
     #[test]
-    fn the_distance_criterion_counts_the_time_on_the_marking() {
-        let found = by_distance_beside_by(0.0);
+    fn the_distance_criterion_measures_the_time_on_the_marking() {
+        let found = by_distance_with_offset(0.0);
         let [change] = &found[..] else { panic!("{}", found.len()) };
         assert!((change.crossing_s - 7.0).abs() < 0.21 && (change.midpoint_s - 7.0).abs() <= 0.1);
         assert_eq!((change.direction, change.from_lane, change.to_lane), (Side::Left, 2, 1));
         // 1.8 m of 3.5 m at 1.875 times the mean speed and less: at least 1.65 s.
         assert!((1.6..2.3).contains(&change.duration_s), "{}", change.duration_s);
         assert!(change.complete && change.lateral_shift_m > 3.0);
-        assert_eq!(by_distance_beside_by(0.5).len(), 1);
-        // Further aside than (3.5 − 1.8) / 2 it is in no lane.
-        assert!(by_distance_beside_by(1.0).is_empty() && by_distance_beside_by(-1.0).is_empty());
+        assert_eq!(by_distance_with_offset(0.5).len(), 1);
+        // With an offset above (3.5 − 1.8) / 2 the vehicle is in no lane.
+        assert!(by_distance_with_offset(1.0).is_empty() && by_distance_with_offset(-1.0).is_empty());
     }
 
     #[test]
-    fn flicker_of_the_recorded_lane_is_passed_over() {
+    fn flicker_of_the_recorded_lane_is_ignored() {
         let mut track = changing_track(1, (0.0, 30.0), (-5.25, -1.75), (4.0, 6.0), 150);
         for k in [20, 21, 68, 100] {
             track.points[k].lane = Lane(3 - track.points[k].lane.0);
@@ -342,7 +354,7 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(64))]
 
         #[test]
-        fn durations_come_back_within_five_percent(
+        fn durations_are_recovered_within_five_percent(
             start_s in 1.0_f64..4.0,
             duration_s in 2.0_f64..12.0,
             to_the_left in any::<bool>(),

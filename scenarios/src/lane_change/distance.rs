@@ -1,53 +1,55 @@
-//! The distance criterion: from one lane that is kept to another.
+//! The distance criterion: a lane change is the transition from one kept lane to another.
 
 use closecall_traffic::{Lane, Side, Trajectory};
 
 use super::LaneChange;
 use super::crossings::MIN_DWELL;
-use super::geometry::LanePlace;
+use super::geometry::LaneGeometry;
 use super::manoeuvre::{MIN_SHIFT_M, Sampled, sign};
 use crate::filters::PERIOD;
 
-/// The shift is taken from this long before the start to this long after the end, for the slow parts of it [samples]: 1.5 s.
+/// Time by which the lateral shift is measured before the start and after the end, to include the slow parts of the
+/// manoeuvre (samples): 1.5 s.
 const SETTLED_SAMPLES: f64 = 7.5;
 
-/// Samples in a row within one lane's band.
-struct Kept {
+/// Consecutive samples within the band of one lane.
+struct LaneRun {
     lane: Lane,
     first: usize,
     last: usize,
 }
 
-/// The lane changes of a smoothed track; `place` tells the lane of a sample at a lateral position.
-pub(super) fn by_distance(track: &Trajectory, place: impl Fn(usize) -> Option<LanePlace>) -> Vec<LaneChange> {
+/// Detects the lane changes of a smoothed track; `lane_at` returns the lane that contains a sample.
+pub(super) fn by_distance(track: &Trajectory, lane_at: impl Fn(usize) -> Option<LaneGeometry>) -> Vec<LaneChange> {
     let Some(sampled) = Sampled::new(track) else { return Vec::new() };
-    let kept = kept_lanes(track, &place);
+    let kept = kept_lanes(track, &lane_at);
     let changes = kept.windows(2).filter(|pair| pair[0].lane != pair[1].lane);
-    changes.flat_map(|pair| lane_changes(&sampled, &pair[0], &pair[1], &place)).collect()
+    changes.flat_map(|pair| lane_changes(&sampled, &pair[0], &pair[1], &lane_at)).collect()
 }
 
-/// The lanes that the vehicle keeps for the least dwell, in order; stays in the same lane are joined.
-fn kept_lanes(track: &Trajectory, place: &impl Fn(usize) -> Option<LanePlace>) -> Vec<Kept> {
+/// Returns the lanes that the vehicle keeps for at least [`MIN_DWELL`], in order of time. Successive runs in the same
+/// lane are joined.
+fn kept_lanes(track: &Trajectory, lane_at: &impl Fn(usize) -> Option<LaneGeometry>) -> Vec<LaneRun> {
     let in_band = |k: usize| {
-        let place = place(k)?;
-        let band_m = 0.5 * (place.width_m - track.dimensions.width_m).max(0.0);
-        ((track.points[k].d_m - place.centre_m).abs() <= band_m).then_some(place.lane)
+        let found = lane_at(k)?;
+        let band_m = 0.5 * (found.width_m - track.dimensions.width_m).max(0.0);
+        ((track.points[k].d_m - found.centre_m).abs() <= band_m).then_some(found.lane)
     };
-    let mut runs: Vec<Kept> = Vec::new();
-    let mut before = None;
+    let mut runs: Vec<LaneRun> = Vec::new();
+    let mut previous = None;
     for k in 0..track.points.len() {
         let lane = in_band(k);
         match (lane, runs.last_mut()) {
-            (Some(lane), Some(run)) if before == Some(lane) => {
+            (Some(lane), Some(run)) if previous == Some(lane) => {
                 debug_assert_eq!(run.lane, lane);
                 run.last = k;
             }
-            (Some(lane), _) => runs.push(Kept { lane, first: k, last: k }),
+            (Some(lane), _) => runs.push(LaneRun { lane, first: k, last: k }),
             (None, _) => {}
         }
-        before = lane;
+        previous = lane;
     }
-    let mut kept: Vec<Kept> = Vec::new();
+    let mut kept: Vec<LaneRun> = Vec::new();
     for run in runs.into_iter().filter(|run| PERIOD * (run.last - run.first + 1) as i64 >= MIN_DWELL) {
         match kept.last_mut() {
             Some(last) if last.lane == run.lane => last.last = run.last,
@@ -57,12 +59,12 @@ fn kept_lanes(track: &Trajectory, place: &impl Fn(usize) -> Option<LanePlace>) -
     kept
 }
 
-/// The lane changes between two kept lanes: one for each marking between them.
+/// Returns the lane changes between two kept lanes: one for each marking between them.
 fn lane_changes(
     sampled: &Sampled<'_>,
-    before: &Kept,
-    after: &Kept,
-    place: &impl Fn(usize) -> Option<LanePlace>,
+    before: &LaneRun,
+    after: &LaneRun,
+    lane_at: &impl Fn(usize) -> Option<LaneGeometry>,
 ) -> Vec<LaneChange> {
     let direction = if after.lane < before.lane { Side::Left } else { Side::Right };
     let markings = before.lane.0.abs_diff(after.lane.0);
@@ -72,7 +74,7 @@ fn lane_changes(
     };
     let crossing = |passed: u8| {
         let within = (before.last + 1)..=after.first;
-        within.into_iter().find(|&k| place(k).is_some_and(|place| beyond(place.lane, passed))).unwrap_or(after.first)
+        within.into_iter().find(|&k| lane_at(k).is_some_and(|found| beyond(found.lane, passed))).unwrap_or(after.first)
     };
     let step = |passed: u8| match direction {
         Side::Left => before.lane.0 - passed,

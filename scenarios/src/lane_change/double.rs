@@ -1,9 +1,11 @@
-//! Two lane changes in one go.
+//! Double lane changes: two lane changes that overlap in time.
 
 use super::LaneChange;
 
-/// Marks lane changes of one track that follow each other in the same direction before the first has ended; `found` is
-/// in the order of their crossings. Those are not complete.
+/// Marks as double, and as not complete, each lane change that begins before the previous one in the same direction has
+/// ended, and that previous one.
+///
+/// `found` holds the lane changes of one track in order of their crossings.
 pub(super) fn mark_doubles(found: &mut [LaneChange]) {
     for next in 1..found.len() {
         let (before, after) = found.split_at_mut(next);

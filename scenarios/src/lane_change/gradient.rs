@@ -1,23 +1,23 @@
-//! The gradient criterion: both marking distances jump against each other.
+//! The gradient criterion: the distances to the left and right marking jump in opposite directions.
 
 use closecall_traffic::{Lane, Side, Time, Trajectory};
 
 use super::crossings::Crossing;
-use super::geometry::LanePlace;
+use super::geometry::LaneGeometry;
 use crate::recordings::MarkingDistances;
 
-/// A distance jumps where it changes by at least this share of the lane's width between two frames.
+/// Least change of a distance between two frames that counts as a jump, as a share of the lane width (-).
 const JUMP_SHARE: f64 = 0.5;
 
-/// Frames further apart than this are not compared: a vehicle moves half a lane aside in it.
+/// Longest time between two frames that are compared: in a longer time a vehicle can move sideways by half a lane.
 const LONGEST_GAP: Time = Time::from_ms(1_000);
 
-/// Widths that lanes have [m]; other sums of both distances are those of mistaken markings.
+/// Plausible lane widths (m). If the sum of both distances is outside, the markings were mistaken.
 const LANE_WIDTH_M: std::ops::RangeInclusive<f64> = 2.0..=6.0;
 
-/// One frame with both markings in view.
+/// One frame in which both markings were measured.
 #[derive(Clone, Copy, Debug)]
-struct View {
+struct MarkingView {
     time: Time,
     left_m: f64,
     right_m: f64,
@@ -25,34 +25,36 @@ struct View {
     lane: Lane,
 }
 
-impl View {
+impl MarkingView {
     fn width_m(&self) -> f64 {
         self.left_m + self.right_m
     }
 }
 
-fn views<'a>(track: &'a Trajectory, seen: &'a [MarkingDistances]) -> impl Iterator<Item = View> + 'a {
-    track.points.iter().zip(seen).filter_map(|(point, seen)| {
-        let (left_m, right_m) = seen.left_m.zip(seen.right_m)?;
-        let view = View { time: point.time, left_m, right_m, d_m: point.d_m, lane: point.lane };
+/// Iterates over the frames of a track in which both markings were measured with a plausible lane width.
+fn views<'a>(track: &'a Trajectory, distances: &'a [MarkingDistances]) -> impl Iterator<Item = MarkingView> + 'a {
+    track.points.iter().zip(distances).filter_map(|(point, measured)| {
+        let (left_m, right_m) = measured.left_m.zip(measured.right_m)?;
+        let view = MarkingView { time: point.time, left_m, right_m, d_m: point.d_m, lane: point.lane };
         LANE_WIDTH_M.contains(&view.width_m()).then_some(view)
     })
 }
 
-/// The jumps of both distances against each other, in the order of time.
-pub(super) fn jumps(track: &Trajectory, seen: &[MarkingDistances]) -> Vec<Crossing> {
+/// Returns a crossing for each jump of both distances in opposite directions, in order of time.
+pub(super) fn jumps(track: &Trajectory, distances: &[MarkingDistances]) -> Vec<Crossing> {
     let mut found = Vec::new();
-    let mut before: Option<View> = None;
-    for view in views(track, seen) {
-        if let Some(crossing) = before.and_then(|before| jump(&before, &view)) {
+    let mut previous: Option<MarkingView> = None;
+    for view in views(track, distances) {
+        if let Some(crossing) = previous.and_then(|previous| jump(&previous, &view)) {
             found.push(crossing);
         }
-        before = Some(view);
+        previous = Some(view);
     }
     found
 }
 
-fn jump(before: &View, after: &View) -> Option<Crossing> {
+/// Returns the crossing between two frames, or `None` if the distances do not jump.
+fn jump(before: &MarkingView, after: &MarkingView) -> Option<Crossing> {
     let least_m = JUMP_SHARE * before.width_m();
     let (left_m, right_m) = (after.left_m - before.left_m, after.right_m - before.right_m);
     let direction = match (left_m >= least_m, right_m <= -least_m, left_m <= -least_m, right_m >= least_m) {
@@ -65,32 +67,33 @@ fn jump(before: &View, after: &View) -> Option<Crossing> {
     is_near.then_some(Crossing { time: after.time, from: before.lane, to })
 }
 
-/// The median width of the lane, where both markings are seen at all [m].
-pub(super) fn lane_width_m(track: &Trajectory, seen: &[MarkingDistances]) -> Option<f64> {
-    let mut widths: Vec<f64> = views(track, seen).map(|view| view.width_m()).collect();
+/// Returns the median lane width (m), or `None` if both markings were never measured together.
+pub(super) fn lane_width_m(track: &Trajectory, distances: &[MarkingDistances]) -> Option<f64> {
+    let mut widths: Vec<f64> = views(track, distances).map(|view| view.width_m()).collect();
     widths.sort_by(f64::total_cmp);
     widths.get(widths.len() / 2).copied()
 }
 
-/// For each point of a smoothed track, the lane that the distances told in the frame nearest to it, up to half of
-/// `period` away.
-pub(super) fn lane_places(
+/// Returns, for each point of a smoothed track, the lane according to the distances in the frame nearest in time.
+///
+/// An entry is `None` if that frame is more than half of `period` away.
+pub(super) fn measured_lanes(
     track: &Trajectory,
-    seen: &[MarkingDistances],
+    distances: &[MarkingDistances],
     smoothed: &Trajectory,
     period: Time,
-) -> Vec<Option<LanePlace>> {
-    let views: Vec<View> = views(track, seen).collect();
+) -> Vec<Option<LaneGeometry>> {
+    let views: Vec<MarkingView> = views(track, distances).collect();
     let mut nearest = 0;
-    let place = |time: Time| {
-        let away = |view: &View| (view.time - time).ns().abs();
+    let lane_at = |time: Time| {
+        let away = |view: &MarkingView| (view.time - time).ns().abs();
         while nearest + 1 < views.len() && away(&views[nearest + 1]) <= away(&views[nearest]) {
             nearest += 1;
         }
         let view = views.get(nearest).filter(|view| 2 * away(view) <= period.ns())?;
-        // Half the difference of both distances is how far the vehicle is to the left of the lane's centre.
+        // Half the difference of both distances is the displacement of the vehicle to the left of the lane's centre.
         let centre_m = view.d_m - 0.5 * (view.right_m - view.left_m);
-        Some(LanePlace { lane: view.lane, centre_m, width_m: view.width_m() })
+        Some(LaneGeometry { lane: view.lane, centre_m, width_m: view.width_m() })
     };
-    smoothed.points.iter().map(|point| point.time).map(place).collect()
+    smoothed.points.iter().map(|point| point.time).map(lane_at).collect()
 }

@@ -1,38 +1,45 @@
-//! Peaks of the lateral speed as manoeuvres.
+//! Lateral manoeuvres, as peaks of the lateral speed.
 
 use closecall_traffic::{Side, Time, Trajectory, TrajectoryPoint};
 
 use super::peaks::{find_peaks, peak_at, peak_width};
 use crate::filters::PERIOD;
 
-/// A peak of lateral speed needs this prominence [m/s]; see the module's documentation.
+/// Least prominence of a peak of lateral speed (m/s); see the module documentation.
 pub const MIN_PROMINENCE_MPS: f64 = 0.15;
 
-/// A complete lane change shifts the vehicle by at least this [m]: most of a lane, but a vehicle need not end in its middle.
+/// Least lateral shift of a complete lane change (m): most of a lane, because a vehicle need not end at the lane's
+/// centre.
 pub const MIN_SHIFT_M: f64 = 2.5;
 
-/// A peak of lateral speed, in fractional samples of its track.
+/// A lateral manoeuvre: a peak of lateral speed, in fractional samples of its track.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Manoeuvre {
+    /// Direction of the movement.
     pub(super) direction: Side,
+    /// Lateral speed at the peak (m/s).
     pub(super) peak_mps: f64,
+    /// Width of the peak (samples).
     pub(super) width: f64,
+    /// Estimated start; it may lie before the track (samples).
     pub(super) start: f64,
+    /// Estimated end; it may lie after the track (samples).
     pub(super) end: f64,
 }
 
-/// Share of a quintic lane change's duration that its peak of lateral speed is wide, measured at the share
-/// `height_share` of the peak: √(1 − √h).
+/// Returns the width of the peak of lateral speed of a quintic lane change, as a share of its duration (-): √(1 − √h).
+///
+/// The width is measured at the height h = `height_share`, as a share of the peak (-).
 pub fn quintic_width_share(height_share: f64) -> f64 {
     (1.0 - height_share.sqrt()).sqrt()
 }
 
-/// h = (w_vehicle / w_lane) / 2, the height at which widths are measured as a share of the peak.
+/// Returns the height at which the width of a peak is measured: h = (w_vehicle / w_lane) / 2, a share of the peak (-).
 pub(super) fn height_share(track: &Trajectory, lane_width_m: f64) -> f64 {
     0.5 * (track.dimensions.width_m / lane_width_m).min(1.0)
 }
 
-/// The manoeuvres of a track, those to the left first.
+/// Returns the manoeuvres of a track, those to the left first.
 pub(super) fn manoeuvres(track: &Trajectory, lane_width_m: f64) -> Vec<Manoeuvre> {
     let height_share = height_share(track, lane_width_m);
     let mut found = manoeuvres_to(track, Side::Left, height_share);
@@ -42,7 +49,7 @@ pub(super) fn manoeuvres(track: &Trajectory, lane_width_m: f64) -> Vec<Manoeuvre
 
 fn manoeuvres_to(track: &Trajectory, direction: Side, height_share: f64) -> Vec<Manoeuvre> {
     let sign = sign(direction);
-    // Rest before and after the track makes peaks of manoeuvres that the recording cuts at their fastest.
+    // A lateral speed of 0 before and after the track turns its end into a peak if the manoeuvre is cut off there.
     let mut speeds = Vec::with_capacity(track.points.len() + 2);
     speeds.push(0.0);
     speeds.extend(track.points.iter().map(|point| sign * point.lateral_speed_mps));
@@ -59,7 +66,7 @@ fn manoeuvres_to(track: &Trajectory, direction: Side, height_share: f64) -> Vec<
     peaks.into_iter().filter(|peak| peak.height > 0.0).map(manoeuvre).collect()
 }
 
-/// +1 to the left, where lateral positions grow.
+/// Returns +1 to the left, where lateral positions increase, and −1 to the right.
 pub(super) const fn sign(direction: Side) -> f64 {
     match direction {
         Side::Left => 1.0,
@@ -67,49 +74,53 @@ pub(super) const fn sign(direction: Side) -> f64 {
     }
 }
 
-/// A track on the common clock, looked at by fractional samples.
+/// A track on the common clock, addressed by fractional samples.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sampled<'a> {
     pub(super) track: &'a Trajectory,
 }
 
 impl<'a> Sampled<'a> {
-    /// Nothing for a track without points.
+    /// Returns `None` if the track has no points.
     pub(super) fn new(track: &'a Trajectory) -> Option<Self> {
         (!track.points.is_empty()).then_some(Self { track })
     }
 
+    /// Returns the last sample.
     pub(super) fn last(&self) -> f64 {
         (self.track.points.len() - 1) as f64
     }
 
+    /// Returns the time of a sample (s).
     pub(super) fn time_s(&self, sample: f64) -> f64 {
         self.track.points[0].time.s() + sample * PERIOD.s()
     }
 
+    /// Returns the sample at `time`.
     pub(super) fn sample(&self, time: Time) -> f64 {
         (time - self.track.points[0].time).s() / PERIOD.s()
     }
 
-    /// The whole sample at or below `sample`, within the track.
-    pub(super) fn place(&self, sample: f64) -> usize {
+    /// Returns the index of the point at or before `sample`, clamped to the track.
+    pub(super) fn index(&self, sample: f64) -> usize {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the track's samples")]
-        let place = sample.clamp(0.0, self.last()) as usize;
-        place
+        let index = sample.clamp(0.0, self.last()) as usize;
+        index
     }
 
+    /// Returns the point at or before `sample`, clamped to the track.
     pub(super) fn point(&self, sample: f64) -> &'a TrajectoryPoint {
-        &self.track.points[self.place(sample)]
+        &self.track.points[self.index(sample)]
     }
 
-    /// Shift towards `direction` between two samples, as far as recorded [m].
+    /// Returns the lateral shift towards `direction` between two samples, as far as it was recorded (m).
     pub(super) fn shift_m(&self, direction: Side, [start, end]: [f64; 2]) -> f64 {
         sign(direction) * (self.point(end.ceil()).d_m - self.point(start.floor()).d_m)
     }
 
-    /// The first sample at which the share `share` of the shift between two samples is done.
+    /// Returns the first sample at which the given share of the lateral shift between two samples is done.
     pub(super) fn sample_of_share(&self, share: f64, [start, end]: [f64; 2]) -> f64 {
-        let (first, last) = (self.place(start.floor()), self.place(end.ceil()));
+        let (first, last) = (self.index(start.floor()), self.index(end.ceil()));
         let points = &self.track.points[first..=last];
         let (from_m, to_m) = (points[0].d_m, points[points.len() - 1].d_m);
         let level_m = from_m + share * (to_m - from_m);
@@ -127,7 +138,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_published_share_of_a_quintic_path() {
+    fn the_width_share_of_a_quintic_path_matches_the_published_value() {
         assert!((quintic_width_share(0.5 * 1.85 / 3.75) - 0.71).abs() < 0.005);
     }
 }

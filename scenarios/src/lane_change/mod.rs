@@ -1,9 +1,9 @@
-//! Finding lane changes: three criteria, of which each sees something else.
+//! Detection of lane changes by three criteria.
 //!
-//! | criterion    | what it looks at                                             | where                |
-//! |--------------|--------------------------------------------------------------|----------------------|
-//! | **peak**     | peaks of the smoothed lateral speed                          | every recording      |
-//! | **distance** | displacement from the lane's centre                          | every recording      |
+//! | criterion    | evaluates                                                     | applies to                 |
+//! |--------------|---------------------------------------------------------------|----------------------------|
+//! | **peak**     | peaks of the smoothed lateral speed                           | all trajectory data        |
+//! | **distance** | displacement from the lane's centre                           | all trajectory data        |
 //! | **gradient** | jumps of the measured distances to the left and right marking | in-car logs: the reference |
 //!
 //! # Peak
@@ -19,56 +19,58 @@
 //!               └── duration ──┘
 //! ```
 //!
-//! A manoeuvre is a peak of the lateral speed in one direction, with a prominence of at least 0.15 m/s: a lane change of
-//! 3.5 m that takes 30 s still peaks at 0.22 m/s. Peaks, their prominence and their width are those of SciPy's
-//! `find_peaks` and `peak_widths`, with `rel_height = 1 − (w_vehicle / w_lane) / 2`. Peaks are found in the lateral speed
-//! with its sign, and with rest before and after the track. Widths are taken where it is cut off at zero: a vehicle that
-//! keeps its lane has no lateral speed, so neither its swerving the other way nor the end of its track belongs to the
-//! height of which the width is a share.
+//! A manoeuvre is a peak of the lateral speed in one direction, with a prominence of at least 0.15 m/s: a lane change
+//! of 3.5 m that takes 30 s still peaks at 0.22 m/s. Peaks, prominences and widths are those of SciPy's `find_peaks`
+//! and `peak_widths`, with `rel_height = 1 − (w_vehicle / w_lane) / 2`. Peaks are searched in the signed lateral speed,
+//! which is 0 before and after the track. Widths are measured in the lateral speed clipped at zero: a vehicle that
+//! keeps its lane has no lateral speed, so neither a swerve in the other direction nor the end of the track may
+//! contribute to the height at which the width is measured.
 //!
-//! The width leaves out both slow ends of the manoeuvre. On a quintic path of length L and duration T, with τ = t/T,
-//! d = L·(10τ³ − 15τ⁴ + 6τ⁵), the lateral speed is 16·τ²·(1 − τ)² times its peak. It is at the share h = 1 − rel_height
-//! of the peak where 4·τ·(1 − τ) = √h, so that
+//! The width excludes both slow ends of the manoeuvre. A quintic path of length L and duration T has the lateral
+//! position d = L·(10τ³ − 15τ⁴ + 6τ⁵), with τ = t/T, and its lateral speed is 16·τ²·(1 − τ)² times its peak. This equals
+//! the share h = 1 − rel_height of the peak at 4·τ·(1 − τ) = √h. Hence
 //!
 //! ```text
 //!   width / T = √(1 − √h),        h = (w_vehicle / w_lane) / 2
 //! ```
 //!
-//! which is 0.71 for a car of 1.85 m in a lane of 3.75 m. Published mean durations of 6.7 to 6.9 s are such widths. Here
-//! both are reported: `width_s`, and `duration_s` = width / √(1 − √h), of which `start_s` and `end_s` are the ends,
-//! placed evenly about the width.
+//! which is 0.71 for a car of 1.85 m in a lane of 3.75 m. Published mean durations of 6.7 to 6.9 s are such widths.
+//! Both are reported: `width_s`, and `duration_s` = width / √(1 − √h). The duration extends symmetrically about the
+//! width, from `start_s` to `end_s`.
 //!
-//! - A track that begins or ends in the middle of a manoeuvre has its peak at that end, as if at rest beyond it.
-//! - Where lanes are recorded, a manoeuvre is a lane change if between its start and end the recorded lane changes in its
-//!   direction. The crossing is the first frame in the other lane, where each lane is held for at least 0.5 s: flicker
-//!   on a marking is none. It belongs to the highest of several such peaks; a vehicle that pauses on the marking has it
-//!   up to 1 s before or after one.
-//! - Where the lane is in doubt (in-car logs have none, and the robustness study moves vehicles off theirs), a manoeuvre
-//!   is a lane change if it shifts the vehicle by at least 2.5 m: nothing that stays in its lane does. The crossing is
-//!   then where half of the shift is done.
+//! - A track that begins or ends in the middle of a manoeuvre has its peak at that end, because the lateral speed is 0
+//!   beyond it.
+//! - If lanes are recorded, a manoeuvre is a lane change if the recorded lane changes in the manoeuvre's direction
+//!   between its start and end. The crossing is the first frame in the new lane. The vehicle must stay in each lane for
+//!   at least 0.5 s, so that flicker on a marking does not count. If several peaks contain the crossing, it belongs to
+//!   the highest one. The crossing may also lie up to 1 s before or after a peak, because vehicles pause on a marking.
+//! - If the lane is unreliable (in-car logs have none, and the robustness study displaces vehicles), a manoeuvre is a
+//!   lane change if it shifts the vehicle by at least 2.5 m, which no vehicle does within its lane. The crossing is
+//!   then at half of the shift.
 //!
 //! # Distance
 //!
-//! A vehicle keeps a lane while it lies within it with its whole width, |e| ≤ (w_lane − w_vehicle)/2 of the displacement e
-//! from the lane's centre, for at least 0.5 s. A lane change is from one kept lane to another. It starts when the vehicle
-//! leaves its old lane's band, ends when it enters the new one, and crosses where its centre passes the marking. Its
-//! shift is that from 1.5 s before to 1.5 s after, its duration shorter than by the peak, since it only counts the time
-//! on the marking. What displaces the measured position displaces this criterion: beyond (w_lane − w_vehicle)/2, 0.8 to
-//! 0.95 m for a car, vehicles in the middle of their lane are in none.
+//! A vehicle keeps a lane if its whole width lies within the lane for at least 0.5 s: |e| ≤ (w_lane − w_vehicle)/2,
+//! with the displacement e from the lane's centre. A lane change is the transition from one kept lane to another. It
+//! starts when the vehicle leaves the band of its old lane and ends when it enters that of the new lane. The crossing
+//! is where its centre passes the marking. The shift is measured from 1.5 s before the start to 1.5 s after the end.
+//! The duration is shorter than by the peak criterion, because it covers only the time on the marking. An offset of the
+//! measured position affects this criterion directly: with an offset beyond (w_lane − w_vehicle)/2, 0.8 to 0.95 m for a
+//! car, a vehicle in the middle of its lane is in none.
 //!
 //! # Gradient
 //!
-//! When a test vehicle crosses the left marking, the marking that was the left one becomes the right one: the distance
-//! to the left jumps up by a lane's width, that to the right down. Nothing else makes both jump against each other, no
-//! offset changes it, and it is sharp in time. Start and end are those of the peak of lateral speed that it lies in; a
-//! jump outside of any peak is one of the camera's, and no lane change.
+//! When a test vehicle crosses the left marking, this marking becomes the right one: the distance to the left marking
+//! jumps up by a lane width, and that to the right marking jumps down. Nothing else makes both jump in opposite
+//! directions, no offset affects the jump, and it is sharp in time. Start and end are those of the peak of lateral
+//! speed that contains the jump. A jump outside of any peak is a camera error, not a lane change.
 //!
-//! # What is marked
+//! # Flags
 //!
-//! - *complete*: start and end were recorded, the shift is at least 2.5 m, and it is no part of a double. Only complete
-//!   ones belong in statistics of durations.
+//! - *complete*: start and end were recorded, the shift is at least 2.5 m, and the lane change is not part of a double
+//!   one. Only complete lane changes enter statistics of durations.
 //! - *double*: another lane change of the same vehicle in the same direction begins before this one ends, or one peak
-//!   carries the vehicle over two markings. Both are listed.
+//!   carries the vehicle over two markings. Both lane changes are listed.
 
 mod crossings;
 mod detect;
@@ -88,41 +90,42 @@ pub use manoeuvre::{MIN_PROMINENCE_MPS, MIN_SHIFT_M, quintic_width_share};
 pub use peaks::{Peak, Width, find_peaks, peak_width};
 pub use score::{ReferenceChange, ReferenceError, Score, Share, Spans, read_references, score};
 
-/// One lane change.
+/// A detected lane change.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LaneChange {
-    /// The recording's number of the track.
+    /// Track id in the trajectory data.
     pub track_id: u64,
-    /// The recording's number of the vehicle.
+    /// Vehicle id in the trajectory data.
     pub vehicle_id: u64,
-    /// Car, truck or motorcycle.
+    /// Vehicle class: car, truck or motorcycle.
     pub vehicle_class: VehicleClass,
-    /// To the left or to the right.
+    /// Direction: to the left or to the right.
     pub direction: Side,
-    /// The lane before.
+    /// Number of the old lane.
     pub from_lane: u8,
-    /// The lane after.
+    /// Number of the new lane.
     pub to_lane: u8,
-    /// When the manoeuvre starts [s]; where it is not complete, this may lie before the track.
+    /// Start of the manoeuvre (s). It may lie before the track if the lane change is not complete.
     pub start_s: f64,
-    /// When half of the lateral shift is done, as far as it was recorded [s].
+    /// Time at which half of the recorded lateral shift is done (s).
     pub midpoint_s: f64,
-    /// First instant with the centre in the other lane [s].
+    /// First instant with the centre in the new lane (s).
     pub crossing_s: f64,
-    /// When the manoeuvre ends [s]; where it is not complete, this may lie after the track.
+    /// End of the manoeuvre (s). It may lie after the track if the lane change is not complete.
     pub end_s: f64,
-    /// Duration of the whole manoeuvre [s].
+    /// Duration of the whole manoeuvre (s).
     pub duration_s: f64,
-    /// Width of the peak of lateral speed [s]: about 0.7 of the duration. By the distance criterion the duration itself.
+    /// Width of the peak of lateral speed (s), about 0.7 of the duration; by the distance criterion the duration
+    /// itself.
     pub width_s: f64,
-    /// Speed along the road at the crossing [m/s].
+    /// Speed along the road at the crossing (m/s).
     pub speed_mps: f64,
-    /// Largest lateral speed, positive in the direction of the lane change [m/s].
+    /// Largest lateral speed, positive in the direction of the lane change (m/s).
     pub peak_lateral_speed_mps: f64,
-    /// Lateral shift from start to end, as far as recorded, positive in the direction of the lane change [m].
+    /// Lateral shift from start to end, as far as recorded, positive in the direction of the lane change (m).
     pub lateral_shift_m: f64,
-    /// True where it is one of two or more in a row in the same direction.
+    /// True if the lane change is part of a double one; see the module documentation.
     pub double: bool,
-    /// True where the whole manoeuvre was recorded, shifts the vehicle by at least 2.5 m, and is no part of a double.
+    /// True if the whole manoeuvre was recorded, shifts the vehicle by at least 2.5 m, and is not part of a double one.
     pub complete: bool,
 }

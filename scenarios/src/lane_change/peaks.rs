@@ -1,40 +1,45 @@
-//! Peaks of a signal: where they are, how far they stand out, and how wide they are.
+//! Peaks of a signal, with their position, prominence and width.
 //!
-//! The definitions are those of SciPy's `find_peaks`, `peak_prominences` (without `wlen`) and `peak_widths`, to the bit
-//! where sums are taken in the same order; `tests/golden/make_golden.py` makes the values that the tests compare with.
+//! The definitions are those of SciPy's `find_peaks`, `peak_prominences` (without `wlen`) and `peak_widths`. The
+//! results are identical to the bit if sums are taken in the same order. `tests/golden/make_golden.py` generates the
+//! values with which the tests compare.
 
-/// A peak.
+/// A peak of a signal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Peak {
-    /// Its sample; the middle one of a flat top, rounded down.
+    /// Index of its sample; on a flat top the middle one, rounded down.
     pub index: usize,
-    /// The signal there.
+    /// Value of the signal at the peak.
     pub height: f64,
-    /// How far it rises above the higher one of its two bases.
+    /// Prominence: height above the higher one of its two bases.
     pub prominence: f64,
-    /// Sample of the lowest value between it and higher ground on the left, or the end; the nearest one of several.
+    /// Index of the left base: the lowest value between the peak and the next higher value on the left, or the end of
+    /// the signal. Of several equal values it is the nearest one.
     pub left_base: usize,
-    /// The same on the right.
+    /// Index of the right base, defined alike.
     pub right_base: usize,
 }
 
-/// Where a peak is cut at some height.
+/// The width of a peak at some height.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Width {
-    /// The height at which it is cut.
+    /// Value of the signal at which the width is measured.
     pub level: f64,
-    /// Left end in fractional samples.
+    /// Left end (fractional samples).
     pub left: f64,
-    /// Right end in fractional samples.
+    /// Right end (fractional samples).
     pub right: f64,
 }
 
-/// Every peak with at least `min_prominence`, in order. The ends of the signal are none. NaN makes none.
+/// Finds all peaks with a prominence of at least `min_prominence`, in order.
+///
+/// The ends of a signal are not peaks, and neither is NaN.
 pub fn find_peaks(signal: &[f64], min_prominence: f64) -> Vec<Peak> {
     let peaks = local_maxima(signal).into_iter().map(|index| peak_at(signal, index));
     peaks.filter(|peak| peak.prominence >= min_prominence).collect()
 }
 
+/// Returns the indices of all local maxima, in order.
 fn local_maxima(signal: &[f64]) -> Vec<usize> {
     let mut maxima = Vec::new();
     let mut k = 1;
@@ -53,7 +58,7 @@ fn local_maxima(signal: &[f64]) -> Vec<usize> {
     maxima
 }
 
-/// What `peak_prominences` tells of the peak at `index`.
+/// Returns the peak at `index`, with the prominence and the bases of SciPy's `peak_prominences`.
 pub(super) fn peak_at(signal: &[f64], index: usize) -> Peak {
     let height = signal[index];
     let lowest = |side: &mut dyn Iterator<Item = usize>| {
@@ -71,9 +76,9 @@ pub(super) fn peak_at(signal: &[f64], index: usize) -> Peak {
     Peak { index, height, prominence, left_base, right_base }
 }
 
-/// Where `peak` of `signal` is cut by the height that lies `rel_height` of its prominence below its top.
+/// Measures the width of `peak` at the height that lies `rel_height` times its prominence below its top.
 ///
-/// Ends are interpolated linearly, and lie no further out than the bases.
+/// The ends are interpolated linearly and lie no further out than the bases.
 pub fn peak_width(signal: &[f64], peak: &Peak, rel_height: f64) -> Width {
     let level = peak.height - peak.prominence * rel_height;
     let (mut i, mut j) = (peak.index, peak.index);
@@ -108,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ripple_on_a_hill_has_only_its_own_prominence() {
+    fn a_small_peak_beside_a_high_one_has_its_own_prominence() {
         let signal = [0.0, 5.0, 4.0, 4.5, 1.0, 2.0, 0.0];
         let found = find_peaks(&signal, 0.0);
         let prominences: Vec<f64> = found.iter().map(|peak| peak.prominence).collect();
@@ -125,7 +130,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn peaks_do_not_depend_on_the_direction_of_time(mut signal in prop::collection::vec(-5.0..5.0, 3..60)) {
+        fn peaks_of_a_reversed_signal_are_the_reversed_peaks(mut signal in prop::collection::vec(-5.0..5.0, 3..60)) {
             let widths = |signal: &[f64]| -> Vec<_> {
                 find_peaks(signal, 0.3).iter().map(|peak| (*peak, peak_width(signal, peak, 0.7))).collect()
             };

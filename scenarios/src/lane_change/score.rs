@@ -1,10 +1,12 @@
-//! Lane changes that were found, held against a list of those that happened.
+//! Scores detected lane changes against a reference list.
 //!
-//! The list is CSV with the columns `recording_id, track_id, time_s, direction, clear`; others may stand beside them. A
-//! found lane change agrees with a listed one of the same track and direction whose time it meets within 0.5 s.
+//! The list is a CSV file with the columns `recording_id, track_id, time_s, direction, clear`; further columns are
+//! allowed. A detected lane change matches a listed one of the same track and direction if their times differ by at
+//! most 0.5 s.
 //!
-//! - **recall** is over the listed ones that have to be found: `clear` ones, with at least 2 s of track on both sides;
-//! - **precision** is against all listed ones, whether clear or not.
+//! - **Recall** refers to the listed lane changes that must be detected: `clear` ones with at least 2 s of track on
+//!   both sides.
+//! - **Precision** refers to all listed lane changes, clear or not.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -16,63 +18,63 @@ use serde::{Deserialize, Serialize};
 use super::LaneChange;
 use crate::interval::clopper_pearson;
 
-/// Largest difference between the crossing found and the listed one [s].
+/// Largest difference between the detected and the listed crossing time (s).
 const AGREEMENT_S: f64 = 0.5;
 
-/// A listed lane change has to be found where its track goes on for this long on both sides [s].
+/// Length of track on both sides from which on a listed lane change must be detected (s).
 const ON_EACH_SIDE_S: f64 = 2.0;
 
-/// Times in files are rounded; a difference may exceed its limit by this [s].
+/// Tolerance of time differences, because times in files are rounded (s).
 const ROUNDING_S: f64 = 1e-6;
 
-/// A lane change that happened.
+/// A lane change of the reference list.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct ReferenceChange {
-    /// The recording's name.
+    /// Name of the trajectory data set.
     pub recording_id: String,
-    /// The recording's number of the track.
+    /// Track id in the trajectory data.
     pub track_id: u64,
-    /// First instant in the other lane [s].
+    /// First instant in the new lane (s).
     pub time_s: f64,
-    /// To the left or to the right.
+    /// Direction: to the left or to the right.
     pub direction: Side,
-    /// 1 where the vehicle clearly moved from one lane to another, 0 where it rode on the marking or its track was cut.
+    /// 1 if the vehicle clearly moved from one lane to another; 0 if it drove on the marking or its track was cut off.
     pub clear: u8,
 }
 
-/// A list that cannot be used.
+/// The error for a reference list that cannot be read.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {source}; needed are the columns recording_id, track_id, time_s, direction (left or right), clear (0 or 1)", path.display())]
 pub struct ReferenceError {
     /// The file.
     pub path: PathBuf,
-    /// What is wrong, with its line.
+    /// The cause, with its line.
     pub source: csv::Error,
 }
 
 impl ReferenceError {
-    /// True where the file could not be read at all.
+    /// Returns true if the cause is an I/O error.
     pub fn is_io(&self) -> bool {
         self.source.is_io_error()
     }
 }
 
-/// Reads a list of lane changes that happened.
+/// Reads a reference list.
 ///
 /// # Errors
-/// [`ReferenceError`] with the file, the line and what is needed.
+/// Returns a [`ReferenceError`] with the file, the line and the required columns.
 pub fn read_references(path: &Path) -> Result<Vec<ReferenceChange>, ReferenceError> {
     let fail = |source| ReferenceError { path: path.to_owned(), source };
     let mut reader = csv::Reader::from_path(path).map_err(fail)?;
     reader.deserialize().collect::<Result<_, _>>().map_err(fail)
 }
 
-/// Hits among trials.
+/// A share, as a number of hits among trials.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Share {
-    /// How many were hit.
+    /// Number of hits.
     pub hits: u64,
-    /// Of how many.
+    /// Number of trials.
     pub of: u64,
 }
 
@@ -88,19 +90,19 @@ impl fmt::Display for Share {
     }
 }
 
-/// How well a detector did.
+/// The score of a detector.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Score {
-    /// Of the listed ones that have to be found, those that were.
+    /// Share of the listed lane changes that must be detected and are.
     pub recall: Share,
-    /// Of those found, the listed ones.
+    /// Share of the detected lane changes that are listed.
     pub precision: Share,
-    /// Largest difference of a crossing time among those that agree [s].
+    /// Largest difference of the crossing times of a match (s).
     pub max_time_error_s: f64,
 }
 
 impl Score {
-    /// Adds what another recording gave.
+    /// Adds the score of another trajectory data set.
     pub fn add(&mut self, other: &Self) {
         for (own, other) in [(&mut self.recall, other.recall), (&mut self.precision, other.precision)] {
             own.hits += other.hits;
@@ -110,32 +112,33 @@ impl Score {
     }
 }
 
-/// First and last instant of the tracks of a recording, by their numbers.
+/// First and last instant of each track, by track id.
 pub type Spans = BTreeMap<u64, (Time, Time)>;
 
-/// Scores `found` against the `listed` ones of the same recording, whose tracks last as `spans` says.
+/// Scores the lane changes `found` against those `listed` for the same trajectory data, whose tracks cover `spans`.
 pub fn score(found: &[LaneChange], listed: &[&ReferenceChange], spans: &Spans) -> Score {
-    let needed: Vec<_> = listed.iter().filter(|listed| has_to_be_found(listed, spans)).collect();
-    let recalled = needed.iter().filter(|listed| found.iter().any(|change| error_s(change, listed).is_some()));
+    let required: Vec<_> = listed.iter().filter(|listed| must_be_detected(listed, spans)).collect();
+    let recalled = required.iter().filter(|listed| found.iter().any(|change| error_s(change, listed).is_some()));
     let errors = found
         .iter()
         .filter_map(|change| listed.iter().filter_map(|listed| error_s(change, listed)).min_by(f64::total_cmp));
     let errors: Vec<f64> = errors.collect();
     Score {
-        recall: Share { hits: recalled.count() as u64, of: needed.len() as u64 },
+        recall: Share { hits: recalled.count() as u64, of: required.len() as u64 },
         precision: Share { hits: errors.len() as u64, of: found.len() as u64 },
         max_time_error_s: errors.into_iter().fold(0.0, f64::max),
     }
 }
 
-/// The difference of the crossing times [s], where the two agree.
+/// Returns the difference of the crossing times (s), or `None` if the two do not match.
 fn error_s(found: &LaneChange, listed: &ReferenceChange) -> Option<f64> {
     let error_s = (found.crossing_s - listed.time_s).abs();
     let same = found.track_id == listed.track_id && found.direction == listed.direction;
     (same && error_s <= AGREEMENT_S + ROUNDING_S).then_some(error_s)
 }
 
-fn has_to_be_found(listed: &ReferenceChange, spans: &Spans) -> bool {
+/// Returns true if a listed lane change counts for recall.
+fn must_be_detected(listed: &ReferenceChange, spans: &Spans) -> bool {
     let Some((first, last)) = spans.get(&listed.track_id) else { return false };
     listed.clear == 1
         && listed.time_s - first.s() >= ON_EACH_SIDE_S - ROUNDING_S
@@ -154,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn what_agrees_counts_and_what_does_not_counts_against_both() {
+    fn a_mismatch_lowers_both_recall_and_precision() {
         let track = |id| changing_track(id, (0.0, 30.0), (-5.25, -1.75), (4.0, 6.0), 150);
         let recording = recording_of(vec![track(1), track(2), track(3)]);
         let found = detect(&smooth(&recording));
@@ -171,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn a_list_that_cannot_be_used_names_its_line() {
+    fn a_malformed_list_is_refused_with_its_line() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("list.csv");
         std::fs::write(&path, "recording_id,track_id,time_s,direction,clear\na,1,2.0,left,1\na,1,2.0,up,1\n").unwrap();

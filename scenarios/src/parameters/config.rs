@@ -1,4 +1,4 @@
-//! Parameters as a scenario file describes them.
+//! The configuration of parameters, as in a scenario file.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use super::distribution::{FINITE, at_least};
 use super::space::{ParameterSpace, Provenance, SpaceEntry};
 use super::{Distribution, finite};
 
-/// What a parameter needs.
+/// What is missing if a parameter has no distribution.
 const DISTRIBUTIONS: &str =
     "a distribution, which is one of `uniform`, `truncated-normal`, `log-normal`, `choice`, `empirical`, `fixed`";
 
@@ -20,10 +20,10 @@ const DISTRIBUTIONS: &str =
 pub struct ParametersConfig(pub BTreeMap<ParameterName, ParameterConfig>);
 
 impl ParametersConfig {
-    /// Checks every parameter.
+    /// Checks all parameters.
     ///
     /// # Errors
-    /// The first key that is wrong, in the order of the names, with its path below `[parameters]`.
+    /// Returns the first invalid key in the order of the names, with its path below `[parameters]`.
     pub fn check(&self) -> Result<ParameterSpace, ConfigError> {
         let check = |(name, config): (&ParameterName, &ParameterConfig)| {
             let entry = config.check().map_err(|error| error.within(name.as_str()))?;
@@ -33,36 +33,36 @@ impl ParametersConfig {
     }
 }
 
-/// One parameter: exactly one distribution, and where it comes from.
+/// The configuration of one parameter: exactly one distribution, and its provenance.
 ///
-/// The distributions are optional fields of one struct, not variants of an enum, since that alone allows further keys
-/// beside them while unknown ones are refused.
+/// The distributions are optional fields of one struct, not variants of an enum: only this allows further keys beside
+/// them and still refuses unknown keys.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ParameterConfig {
-    /// Every number between two bounds is equally probable.
+    /// Uniform distribution between two bounds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub uniform: Option<UniformConfig>,
-    /// A normal distribution, cut off at two bounds.
+    /// Normal distribution, truncated at two bounds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub truncated_normal: Option<TruncatedNormalConfig>,
-    /// A log-normal distribution, which may be cut off at either end.
+    /// Log-normal distribution, which may be truncated at either end.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub log_normal: Option<LogNormalConfig>,
-    /// One of several labels, each with its weight; weights need not add up to 1.
+    /// One of several labels, each with its weight. The weights need not add up to 1.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "finite::weights")]
     pub choice: Option<BTreeMap<String, f64>>,
-    /// A distribution given by its quantiles.
+    /// Distribution given by its quantiles.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub empirical: Option<EmpiricalConfig>,
-    /// Always the same number or label.
+    /// The same number or label in every sample.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "finite::value")]
     #[schemars(schema_with = "finite::value_schema")]
     pub fixed: Option<Value>,
-    /// The distribution was fitted to recordings.
+    /// Provenance: the distribution was fitted to trajectory data.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fitted: Option<FittedConfig>,
-    /// The distribution was assumed, and why.
+    /// Provenance: the distribution was assumed, for the reason given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub assumed: Option<String>,
     /// A remark for the reader.
@@ -70,7 +70,7 @@ pub struct ParameterConfig {
     pub note: Option<String>,
 }
 
-/// Every number between two bounds is equally probable.
+/// A uniform distribution between two bounds, in the parameter's unit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct UniformConfig {
@@ -82,14 +82,14 @@ pub struct UniformConfig {
     pub max: f64,
 }
 
-/// A normal distribution, cut off at two bounds.
+/// A normal distribution, truncated at two bounds, in the parameter's unit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct TruncatedNormalConfig {
-    /// Mean before the cut.
+    /// Mean before truncation.
     #[serde(deserialize_with = "finite::number")]
     pub mean: f64,
-    /// Standard deviation before the cut, above 0.
+    /// Standard deviation before truncation, above 0.
     #[serde(deserialize_with = "finite::number")]
     pub sd: f64,
     /// Smallest value.
@@ -100,42 +100,42 @@ pub struct TruncatedNormalConfig {
     pub max: f64,
 }
 
-/// A log-normal distribution, which may be cut off at either end.
+/// A log-normal distribution, which may be truncated at either end, in the parameter's unit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct LogNormalConfig {
-    /// Median before the cut, above 0.
+    /// Median before truncation, above 0.
     #[serde(deserialize_with = "finite::number")]
     pub median: f64,
-    /// Standard deviation of the logarithm, above 0.
+    /// Standard deviation of the logarithm, above 0 (-).
     #[serde(deserialize_with = "finite::number")]
     pub sigma: f64,
-    /// Smallest value; 0 where absent.
+    /// Smallest value; 0 if absent.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "finite::option")]
     pub min: Option<f64>,
-    /// Largest value; unbounded where absent.
+    /// Largest value; unbounded if absent.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "finite::option")]
     pub max: Option<f64>,
 }
 
-/// A distribution given by its quantiles.
+/// A distribution given by its quantiles, in the parameter's unit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct EmpiricalConfig {
-    /// Quantiles at equally spaced probabilities from 0 to 1, not falling; between them it is linear.
+    /// Quantiles at equally spaced probabilities from 0 to 1, in non-descending order, with linear interpolation.
     #[serde(deserialize_with = "finite::list")]
     pub quantiles: Vec<f64>,
 }
 
-/// What a distribution was fitted to.
+/// The data to which a distribution was fitted.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct FittedConfig {
     /// Number of observations.
     pub n: u64,
-    /// The recording, and how it was evaluated.
+    /// The trajectory data, and how it was evaluated.
     pub source: String,
-    /// Bootstrap interval of the median, 95 %: [lower, upper].
+    /// Lower and upper end of the 95 % bootstrap interval of the median.
     #[serde(
         default,
         rename = "interval-95",
@@ -146,17 +146,17 @@ pub struct FittedConfig {
 }
 
 impl ParameterConfig {
-    /// Equally probable between two bounds.
+    /// Creates a parameter with a uniform distribution between two bounds.
     pub fn uniform(min: f64, max: f64) -> Self {
         Self { uniform: Some(UniformConfig { min, max }), ..Self::default() }
     }
 
-    /// Given by quantiles at equally spaced probabilities from 0 to 1.
+    /// Creates a parameter whose distribution is given by quantiles at equally spaced probabilities from 0 to 1.
     pub fn empirical(quantiles: Vec<f64>) -> Self {
         Self { empirical: Some(EmpiricalConfig { quantiles }), ..Self::default() }
     }
 
-    /// Always the same value.
+    /// Creates a parameter that has the same value in every sample.
     pub fn fixed(value: Value) -> Self {
         Self { fixed: Some(value), ..Self::default() }
     }
@@ -164,7 +164,7 @@ impl ParameterConfig {
     /// Checks this parameter.
     ///
     /// # Errors
-    /// The first key that is wrong, with its path below the parameter's name.
+    /// Returns the first invalid key, with its path below the parameter's name.
     pub fn check(&self) -> Result<SpaceEntry, ConfigError> {
         let candidates = [
             ("uniform", self.uniform.as_ref().map(Distribution::uniform)),
@@ -189,6 +189,7 @@ impl ParameterConfig {
         })
     }
 
+    /// Checks the provenance.
     fn provenance(&self) -> Result<Provenance, ConfigError> {
         match (&self.fitted, &self.assumed) {
             (Some(_), Some(_)) => {
@@ -223,8 +224,8 @@ impl FittedConfig {
             for (index, value, allowed) in [(0, low, FINITE), (1, high, at_least(low))] {
                 if !allowed.contains(value) {
                     let problem = Problem::OutOfRange { value, allowed };
-                    let place = ConfigError { path: KeyPath::default(), problem }.within_index(index);
-                    return Err(place.within("interval-95"));
+                    let error = ConfigError { path: KeyPath::default(), problem }.within_index(index);
+                    return Err(error.within("interval-95"));
                 }
             }
         }

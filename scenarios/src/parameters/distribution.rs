@@ -1,4 +1,4 @@
-//! Distributions that cannot be invalid.
+//! Checked distributions of a parameter.
 
 use std::collections::BTreeMap;
 
@@ -8,70 +8,71 @@ use super::config::{EmpiricalConfig, LogNormalConfig, TruncatedNormalConfig, Uni
 use super::empirical;
 use super::normal::TruncatedStandardNormal;
 
-/// Largest magnitude of any number in a distribution. No quantity of a scenario comes near it, and sums and products of
-/// such numbers stay finite.
+/// Largest magnitude of a number in a distribution. It is far above every quantity of a scenario, and sums and products
+/// of such numbers stay finite.
 const MAGNITUDE_LIMIT: f64 = 1e12;
 
-/// Numbers of any size that makes sense.
+/// Range of all numbers up to the largest magnitude.
 pub(super) const FINITE: Range = Range::closed(-MAGNITUDE_LIMIT, MAGNITUDE_LIMIT);
 
-/// Positive numbers of any size that makes sense.
+/// Range of all positive numbers up to the largest magnitude.
 const POSITIVE: Range = Range::above(0.0, MAGNITUDE_LIMIT);
 
-/// Numbers from `low` upwards.
+/// Returns the range from `low` up to the largest magnitude.
 pub(super) const fn at_least(low: f64) -> Range {
     Range::closed(low, MAGNITUDE_LIMIT)
 }
 
-/// The probability that lies between neighbouring numbers of a random generator, 2⁻⁵³, halved: smaller ones are not
-/// distinguished, so that the quantile at 0 of an unbounded distribution is its practical minimum.
+/// Smallest probability that is distinguished from 0: half the spacing 2⁻⁵³ of the numbers of the random generator. The
+/// quantile at 0 of an unbounded distribution is its quantile at this probability, and therefore finite.
 const SMALLEST_PROBABILITY: f64 = f64::EPSILON / 4.0;
 
-/// Largest standard deviation of a logarithm: with it the quartiles already lie a factor of 700,000 apart.
+/// Largest standard deviation of a logarithm (-), at which the quartiles already differ by a factor of 700,000.
 const LARGEST_SIGMA: f64 = 10.0;
 
-/// Where the median lies.
+/// Probability of the median, and the middle of a cell of a grid.
 const HALF: f64 = 0.5;
 
 /// The distribution of one parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Distribution(Kind);
 
+/// The kind of a distribution, with its checked parameters.
 #[derive(Clone, Debug, PartialEq)]
 enum Kind {
     Uniform { min: f64, max: f64 },
     TruncatedNormal { mean: f64, sd: f64, bounds: [f64; 2], standard: TruncatedStandardNormal },
     LogNormal { median: f64, sigma: f64, cut: [Option<f64>; 2], standard: TruncatedStandardNormal },
-    Choice(Weights),
+    Choice(WeightedLabels),
     Empirical { quantiles: Vec<f64> },
     Fixed(Value),
 }
 
 /// Labels with a positive probability, in the order of the labels.
 #[derive(Clone, Debug, PartialEq)]
-struct Weights {
+struct WeightedLabels {
     labels: Vec<String>,
-    /// Probability of each label and all before it.
+    /// Cumulative probability of each label and all before it.
     cumulative: Vec<f64>,
-    /// Places of the labels, most probable first, equally probable ones in the order of the labels.
+    /// Indices of the labels, the most probable first; equally probable ones in the order of the labels.
     by_weight: Vec<usize>,
 }
 
 impl Distribution {
-    /// Equally probable between two bounds.
+    /// Creates a uniform distribution between two bounds.
     ///
     /// # Errors
-    /// Unless both are finite and the upper one is larger.
+    /// Returns an error unless both bounds are finite and the upper one is larger.
     pub fn uniform(config: &UniformConfig) -> Result<Self, ConfigError> {
         let [min, max] = bounds(config.min, config.max)?;
         Ok(Self(Kind::Uniform { min, max }))
     }
 
-    /// Normal, cut off at two bounds.
+    /// Creates a normal distribution, truncated at two bounds.
     ///
     /// # Errors
-    /// Unless all are finite, the standard deviation positive, the upper bound larger than the lower, and some
-    /// probability left between them.
+    /// Returns an error unless all numbers are finite, the standard deviation is positive, the upper bound is larger
+    /// than the lower one, and some probability is left between them.
     pub fn truncated_normal(config: &TruncatedNormalConfig) -> Result<Self, ConfigError> {
         let mean = FINITE.check(config.mean, "mean")?;
         let sd = POSITIVE.check(config.sd, "sd")?;
@@ -83,10 +84,10 @@ impl Distribution {
         Ok(Self(Kind::TruncatedNormal { mean, sd, bounds: [min, max], standard }))
     }
 
-    /// Log-normal, perhaps cut off at either end.
+    /// Creates a log-normal distribution, which may be truncated at either end.
     ///
     /// # Errors
-    /// Unless all are finite and positive, and some probability is left between the bounds.
+    /// Returns an error unless all numbers are finite and positive, and some probability is left between the bounds.
     pub fn log_normal(config: &LogNormalConfig) -> Result<Self, ConfigError> {
         let median = POSITIVE.check(config.median, "median")?;
         let sigma = Range::above(0.0, LARGEST_SIGMA).check(config.sigma, "sigma")?;
@@ -104,20 +105,21 @@ impl Distribution {
         Ok(Self(Kind::LogNormal { median, sigma, cut: [min, max], standard }))
     }
 
-    /// One of several labels; those with weight 0 never occur.
+    /// Creates a choice of one of several labels. A label with weight 0 never occurs.
     ///
     /// # Errors
-    /// Unless every label is a word, every weight finite and not negative, and one of them positive.
+    /// Returns an error unless every label contains a visible character, every weight is finite and not negative, and
+    /// at least one weight is positive.
     pub fn choice(weights: &BTreeMap<String, f64>) -> Result<Self, ConfigError> {
         for (label, &weight) in weights {
-            label_is_a_word(label).map_err(|problem| ConfigError::new(label, problem))?;
+            check_label(label).map_err(|problem| ConfigError::new(label, problem))?;
             at_least(0.0).check(weight, label)?;
         }
         let possible: Vec<(&String, f64)> =
             weights.iter().filter(|(_, weight)| **weight > 0.0).map(|(label, weight)| (label, *weight)).collect();
         let total: f64 = possible.iter().map(|(_, weight)| weight).sum();
         if possible.is_empty() {
-            return Err(here(Problem::Missing { needed: "a label with a weight above 0" }));
+            return Err(own_error(Problem::Missing { needed: "a label with a weight above 0" }));
         }
         let mut sum = 0.0;
         let cumulative = possible.iter().map(|(_, weight)| {
@@ -126,17 +128,17 @@ impl Distribution {
         });
         let mut by_weight: Vec<usize> = (0..possible.len()).collect();
         by_weight.sort_by(|&a, &b| possible[b].1.total_cmp(&possible[a].1).then(a.cmp(&b)));
-        Ok(Self(Kind::Choice(Weights {
+        Ok(Self(Kind::Choice(WeightedLabels {
             cumulative: cumulative.collect(),
             labels: possible.iter().map(|(label, _)| (*label).clone()).collect(),
             by_weight,
         })))
     }
 
-    /// Given by quantiles at equally spaced probabilities from 0 to 1, linear between them.
+    /// Creates a distribution from quantiles at equally spaced probabilities from 0 to 1, with linear interpolation.
     ///
     /// # Errors
-    /// Unless there are two or more finite numbers that do not fall.
+    /// Returns an error unless there are two or more finite numbers in non-descending order.
     pub fn empirical(config: &EmpiricalConfig) -> Result<Self, ConfigError> {
         let quantiles = &config.quantiles;
         if quantiles.len() < 2 {
@@ -147,30 +149,30 @@ impl Distribution {
         for (index, &value) in quantiles.iter().enumerate() {
             let allowed = if index == 0 { FINITE } else { at_least(quantiles[index - 1]) };
             if !allowed.contains(value) {
-                let error = here(Problem::OutOfRange { value, allowed });
+                let error = own_error(Problem::OutOfRange { value, allowed });
                 return Err(error.within_index(index).within("quantiles"));
             }
         }
         Ok(Self(Kind::Empirical { quantiles: quantiles.clone() }))
     }
 
-    /// Always the same value.
+    /// Creates a distribution that always has the same value.
     ///
     /// # Errors
-    /// Unless it is a finite number or a word.
+    /// Returns an error unless the value is a finite number or a label with a visible character.
     pub fn fixed(value: &Value) -> Result<Self, ConfigError> {
         match value {
             Value::Number(number) if !FINITE.contains(*number) => {
-                Err(here(Problem::OutOfRange { value: *number, allowed: FINITE }))
+                Err(own_error(Problem::OutOfRange { value: *number, allowed: FINITE }))
             }
-            Value::Label(label) => label_is_a_word(label).map_err(here).map(|()| Self(Kind::Fixed(value.clone()))),
+            Value::Label(label) => check_label(label).map_err(own_error).map(|()| Self(Kind::Fixed(value.clone()))),
             Value::Number(_) => Ok(Self(Kind::Fixed(value.clone()))),
         }
     }
 
-    /// The value below which the share `u` of the probability lies, for `u` in [0, 1).
+    /// Returns the quantile at probability `u`, for `u` in [0, 1).
     ///
-    /// For labels: the label that `u` falls on when they are laid side by side, in their order, as wide as probable.
+    /// For labels, this is the first label in their order whose cumulative probability exceeds `u`.
     pub fn quantile(&self, u: f64) -> Value {
         debug_assert!((0.0..1.0).contains(&u), "quantile at {u}");
         match &self.0 {
@@ -184,15 +186,15 @@ impl Distribution {
                 Value::Number(value.max(min.unwrap_or(0.0)))
             }
             Kind::Choice(weights) => {
-                let place = weights.cumulative.partition_point(|&cumulative| cumulative <= u);
-                Value::Label(weights.labels[place.min(weights.labels.len() - 1)].clone())
+                let index = weights.cumulative.partition_point(|&cumulative| cumulative <= u);
+                Value::Label(weights.labels[index.min(weights.labels.len() - 1)].clone())
             }
             Kind::Empirical { quantiles } => Value::Number(empirical::quantile(quantiles, u)),
             Kind::Fixed(value) => value.clone(),
         }
     }
 
-    /// The nominal value: the median, or the most probable label (the first of several).
+    /// Returns the nominal value: the median, or the most probable label (the first of several).
     pub fn nominal(&self) -> Value {
         match &self.0 {
             Kind::Choice(weights) => Value::Label(weights.labels[weights.by_weight[0]].clone()),
@@ -200,7 +202,7 @@ impl Distribution {
         }
     }
 
-    /// The share of the probability at or below `x`; nothing for labels.
+    /// Returns the cumulative probability at `x`, or `None` for labels.
     pub fn cdf(&self, x: f64) -> Option<f64> {
         match &self.0 {
             Kind::Uniform { min, max } => Some(((x - min) / (max - min)).clamp(0.0, 1.0)),
@@ -213,9 +215,9 @@ impl Distribution {
         }
     }
 
-    /// The smallest and the largest number; nothing for labels.
+    /// Returns the smallest and the largest number, or `None` for labels.
     ///
-    /// Where a distribution is unbounded, what lies beyond has a probability of 10⁻¹⁶.
+    /// If a distribution is unbounded, the probability beyond the returned bound is 10⁻¹⁶.
     pub fn bounds(&self) -> Option<[f64; 2]> {
         match &self.0 {
             Kind::Uniform { min, max } | Kind::TruncatedNormal { bounds: [min, max], .. } => Some([*min, *max]),
@@ -230,7 +232,7 @@ impl Distribution {
         }
     }
 
-    /// The labels that occur, in their order; empty for numbers.
+    /// Returns the labels that can occur, in their order; empty for numbers.
     pub fn labels(&self) -> &[String] {
         match &self.0 {
             Kind::Choice(weights) => &weights.labels,
@@ -239,13 +241,13 @@ impl Distribution {
         }
     }
 
-    /// True where the value is always the same.
+    /// Returns true if the value is always the same.
     pub fn is_fixed(&self) -> bool {
         matches!(self.0, Kind::Fixed(_))
     }
 
-    /// How many different values a grid can take at most: 1 where fixed, the number of labels, else any number.
-    pub(crate) fn most_levels(&self) -> u64 {
+    /// Returns the largest number of levels that a grid can have: 1 if fixed, the number of labels, or no limit.
+    pub(crate) fn max_levels(&self) -> u64 {
         match &self.0 {
             Kind::Choice(weights) => weights.labels.len() as u64,
             Kind::Fixed(_) => 1,
@@ -253,27 +255,29 @@ impl Distribution {
         }
     }
 
-    /// Value `level` of `of` that represent the distribution: the medians of as many equally probable parts, or the
-    /// most probable labels.
-    pub(crate) fn level(&self, level: u64, of: u64) -> Value {
+    /// Returns level number `level` of `count` levels: the medians of as many equally probable parts, or the most
+    /// probable labels.
+    pub(crate) fn level(&self, level: u64, count: u64) -> Value {
         match &self.0 {
             Kind::Choice(weights) => Value::Label(weights.labels[weights.by_weight[level as usize]].clone()),
-            _ => self.quantile((level as f64 + HALF) / of as f64),
+            _ => self.quantile((level as f64 + HALF) / count as f64),
         }
     }
 }
 
-/// An error at the distribution itself.
-fn here(problem: Problem) -> ConfigError {
+/// Returns an error that refers to the distribution itself, not to one of its keys.
+fn own_error(problem: Problem) -> ConfigError {
     ConfigError { path: KeyPath::default(), problem }
 }
 
+/// Checks the bounds `min` and `max`.
 fn bounds(min: f64, max: f64) -> Result<[f64; 2], ConfigError> {
     let min = FINITE.check(min, "min")?;
     let max = Range::above(min, MAGNITUDE_LIMIT).check(max, "max")?;
     Ok([min, max])
 }
 
-fn label_is_a_word(label: &str) -> Result<(), Problem> {
+/// Checks that a label contains a visible character.
+fn check_label(label: &str) -> Result<(), Problem> {
     if label.trim().is_empty() { Err(Problem::Missing { needed: "a label that is not empty" }) } else { Ok(()) }
 }

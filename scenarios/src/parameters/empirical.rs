@@ -1,6 +1,6 @@
-//! A distribution given by its quantiles at equally spaced probabilities from 0 to 1, linear between them.
+//! A distribution given by its quantiles at equally spaced probabilities from 0 to 1, with linear interpolation.
 
-/// The value below which the share `u` lies, for two or more `quantiles` that do not fall.
+/// Returns the quantile at probability `u`, for two or more `quantiles` in non-descending order.
 pub(super) fn quantile(quantiles: &[f64], u: f64) -> f64 {
     let intervals = quantiles.len() - 1;
     let position = u * intervals as f64;
@@ -10,7 +10,7 @@ pub(super) fn quantile(quantiles: &[f64], u: f64) -> f64 {
     (low + (position - below as f64) * (high - low)).clamp(low, high)
 }
 
-/// The share at or below `x`.
+/// Returns the cumulative probability at `x`.
 pub(super) fn cdf(quantiles: &[f64], x: f64) -> f64 {
     let intervals = quantiles.len() - 1;
     match quantiles.partition_point(|&quantile| quantile <= x) {

@@ -1,5 +1,7 @@
-//! Reading numbers that must be finite: `nan` and `inf` are legal TOML, and are refused here by name, where the line
-//! of the file is still known.
+//! Deserialization of numbers that must be finite.
+//!
+//! `nan` and `inf` are legal TOML. They are refused while the file is parsed, so that the error states the line and the
+//! value.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -9,7 +11,7 @@ use schemars::{Schema, SchemaGenerator, json_schema};
 use serde::de::{Error, Visitor};
 use serde::{Deserialize, Deserializer};
 
-/// A finite number as it stands in a file.
+/// A finite number in a file.
 struct Finite(f64);
 
 impl<'de> Deserialize<'de> for Finite {
@@ -18,6 +20,7 @@ impl<'de> Deserialize<'de> for Finite {
     }
 }
 
+/// Returns `value` if it is finite, and an error that names it otherwise.
 fn finite<E: Error>(value: f64) -> Result<f64, E> {
     if value.is_finite() {
         Ok(value)
@@ -26,6 +29,7 @@ fn finite<E: Error>(value: f64) -> Result<f64, E> {
     }
 }
 
+/// Reads a finite number or a label.
 struct ValueVisitor;
 
 impl Visitor<'_> for ValueVisitor {
@@ -52,35 +56,42 @@ impl Visitor<'_> for ValueVisitor {
     }
 }
 
+/// Deserializes an optional number or label.
 pub(super) fn value<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Value>, D::Error> {
     deserializer.deserialize_any(ValueVisitor).map(Some)
 }
 
+/// Returns the JSON Schema of [`value`].
 pub(super) fn value_schema(_: &mut SchemaGenerator) -> Schema {
     json_schema!({
-        "description": "Always the same number or label.",
+        "description": "The same number or label in every sample.",
         "anyOf": [{ "type": "number" }, { "type": "string", "minLength": 1 }]
     })
 }
 
+/// Deserializes a finite number.
 pub(super) fn number<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     Finite::deserialize(deserializer).map(|finite| finite.0)
 }
 
+/// Deserializes an optional finite number.
 pub(super) fn option<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
     number(deserializer).map(Some)
 }
 
+/// Deserializes a list of finite numbers.
 pub(super) fn list<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<f64>, D::Error> {
     let list = Vec::<Finite>::deserialize(deserializer)?;
     Ok(list.into_iter().map(|finite| finite.0).collect())
 }
 
+/// Deserializes an optional pair of finite numbers.
 pub(super) fn pair<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<[f64; 2]>, D::Error> {
     let [low, high] = <[Finite; 2]>::deserialize(deserializer)?;
     Ok(Some([low.0, high.0]))
 }
 
+/// Deserializes optional labels with finite weights.
 pub(super) fn weights<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<BTreeMap<String, f64>>, D::Error> {
     let weights = BTreeMap::<String, Finite>::deserialize(deserializer)?;
     Ok(Some(weights.into_iter().map(|(label, weight)| (label, weight.0)).collect()))

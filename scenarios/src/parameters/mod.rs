@@ -1,6 +1,6 @@
 //! The `[parameters]` of a scenario file: the only values that are sampled.
 //!
-//! Each parameter has one distribution, and says where it comes from:
+//! Each parameter has one distribution and may state its provenance (`fitted` or `assumed`):
 //!
 //! ```toml
 //! [parameters]
@@ -12,8 +12,8 @@
 //! brake-mps2    = { fixed = 6.0 }
 //! ```
 //!
-//! Every distribution is evaluated through its quantile function alone, so that a sampling design
-//! ([`crate::sampling`]) is nothing but a way to choose one number in [0, 1) for each parameter.
+//! Every distribution is sampled through its quantile function. A sampling design ([`crate::sampling`]) therefore only
+//! chooses one number in [0, 1) for each parameter.
 
 mod config;
 mod distribution;

@@ -1,4 +1,4 @@
-//! All parameters of a scenario, checked.
+//! The checked parameters of a scenario.
 
 use std::collections::BTreeMap;
 
@@ -6,23 +6,23 @@ use closecall_traffic::{ParameterName, Parameters, Value};
 
 use super::{Distribution, FittedConfig};
 
-/// Where a distribution comes from.
+/// The provenance of a distribution.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Provenance {
-    /// Fitted to recordings.
+    /// Fitted to trajectory data.
     Fitted(FittedConfig),
-    /// Assumed, for this reason.
+    /// Assumed, with the reason.
     Assumed(String),
-    /// The file does not say.
+    /// Not stated in the file.
     Unstated,
 }
 
 /// One checked parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SpaceEntry {
-    /// Which values it takes.
+    /// Distribution of its values.
     pub distribution: Distribution,
-    /// Where that comes from.
+    /// Provenance of the distribution.
     pub provenance: Provenance,
     /// A remark for the reader.
     pub note: Option<String>,
@@ -30,29 +30,29 @@ pub struct SpaceEntry {
 
 /// The parameters of a scenario with their distributions, in the order of their names.
 ///
-/// They are sampled independently of each other. [`crate::sampling`] gives it the designs.
+/// The parameters are sampled independently of each other, by the designs of [`crate::sampling`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ParameterSpace(BTreeMap<ParameterName, SpaceEntry>);
 
 impl ParameterSpace {
-    /// All parameters in the order of their names.
+    /// Iterates over all parameters in the order of their names.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = (&ParameterName, &SpaceEntry)> {
         self.0.iter()
     }
 
-    /// One parameter.
+    /// Returns the parameter `name`, or `None` if there is none.
     pub fn get(&self, name: &ParameterName) -> Option<&SpaceEntry> {
         self.0.get(name)
     }
 
-    /// Every parameter at its nominal value: the median, or the most probable label.
+    /// Returns the nominal value of every parameter: the median, or the most probable label.
     pub fn nominal(&self) -> Parameters {
         self.map(|_, _, distribution| distribution.nominal())
     }
 
-    /// The nominal values, and for each parameter those with it alone at each of its bounds or labels.
+    /// Returns the nominal values, then variations of them with one parameter at one of its bounds or labels.
     ///
-    /// A scenario that is valid for all of these is valid wherever its checks look at single values.
+    /// If a scenario is valid for all of these, it passes every check that depends on a single parameter.
     pub fn extremes(&self) -> Vec<Parameters> {
         let nominal = self.nominal();
         let mut extremes = vec![nominal.clone()];
@@ -68,11 +68,11 @@ impl ParameterSpace {
         extremes
     }
 
-    /// The values that `value` gives for each parameter, from its name, its place among the names, and its
+    /// Maps every parameter to a value. `value` receives its name, its index in the order of the names, and its
     /// distribution.
     pub(crate) fn map(&self, mut value: impl FnMut(&ParameterName, usize, &Distribution) -> Value) -> Parameters {
         let entries = self.0.iter().enumerate();
-        entries.map(|(place, (name, entry))| (name.clone(), value(name, place, &entry.distribution))).collect()
+        entries.map(|(index, (name, entry))| (name.clone(), value(name, index, &entry.distribution))).collect()
     }
 }
 

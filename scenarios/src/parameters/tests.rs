@@ -1,4 +1,4 @@
-//! Reading, refusing and evaluating parameters.
+//! Tests of reading, refusing and evaluating parameters.
 
 use closecall_traffic::{ParameterName, Value};
 use proptest::prelude::*;
@@ -25,12 +25,12 @@ fn number(value: &Value) -> f64 {
     }
 }
 
-/// What is wrong with a parameter `x` that can be read.
+/// Returns the error of a parameter `x` that can be parsed but is invalid.
 fn refusal(text: &str) -> String {
     parsed(&format!("x = {{ {text} }}")).check().unwrap_err().to_string()
 }
 
-/// Why a parameter `x` cannot even be read.
+/// Returns the error of a parameter `x` that cannot be parsed.
 fn unreadable(text: &str) -> String {
     toml::from_str::<ParametersConfig>(&format!("x = {{ {text} }}")).unwrap_err().to_string()
 }
@@ -46,7 +46,7 @@ rear-class    = { choice = { car = 8, truck = 1, motorcycle = 1 } }
 "#;
 
 #[test]
-fn every_kind_is_read_and_has_its_nominal_value() {
+fn every_kind_is_parsed_and_has_its_nominal_value() {
     let space = space(ALL_KINDS);
     let nominal: Vec<String> = space.nominal().iter().map(|(name, value)| format!("{name} {value:.3}")).collect();
     assert_eq!(
@@ -64,7 +64,7 @@ fn every_kind_is_read_and_has_its_nominal_value() {
 }
 
 #[test]
-fn a_distribution_says_where_it_comes_from() {
+fn a_distribution_states_its_provenance() {
     let space = space(ALL_KINDS);
     let provenance = |name| space.get(&ParameterName::new(name).unwrap()).unwrap().provenance.clone();
     let fitted = FittedConfig { n: 214, source: "US-101".to_owned(), interval_95: Some([0.21, 0.27]) };
@@ -74,7 +74,7 @@ fn a_distribution_says_where_it_comes_from() {
 }
 
 #[test]
-fn what_is_written_reads_back_the_same() {
+fn a_written_configuration_is_parsed_to_the_same_one() {
     let config = parsed(ALL_KINDS);
     assert_eq!(parsed(&toml::to_string(&config).unwrap()), config);
     let json = serde_json::to_string(&config).unwrap();
@@ -90,7 +90,7 @@ fn the_schema_describes_every_distribution() {
 }
 
 #[test]
-fn numbers_that_are_not_finite_are_refused_by_name() {
+fn non_finite_numbers_in_a_file_are_refused_with_value_and_line() {
     for (text, name) in [
         ("uniform = { min = nan, max = 1.0 }", "NaN"),
         ("uniform = { min = 0.0, max = inf }", "inf"),
@@ -106,9 +106,9 @@ fn numbers_that_are_not_finite_are_refused_by_name() {
     }
 }
 
-/// The same numbers, put in by code instead of a file.
+/// The same numbers, set by code instead of a file.
 #[test]
-fn numbers_that_are_not_finite_are_refused_without_a_file_too() {
+fn non_finite_numbers_set_by_code_are_refused() {
     let nan = f64::NAN;
     for config in [
         ParameterConfig::uniform(nan, 1.0),
@@ -132,7 +132,7 @@ fn numbers_that_are_not_finite_are_refused_without_a_file_too() {
 }
 
 #[test]
-fn a_refusal_gives_the_key_the_value_and_what_is_allowed() {
+fn an_error_states_the_key_the_value_and_what_is_allowed() {
     for (text, message) in [
         (
             "note = \"none\"",
@@ -189,7 +189,7 @@ fn a_refusal_gives_the_key_the_value_and_what_is_allowed() {
 }
 
 #[test]
-fn unknown_keys_and_wrong_types_are_refused_while_reading() {
+fn unknown_keys_and_wrong_types_are_refused_while_parsing() {
     for (text, message) in [
         ("unifrom = { min = 0, max = 1 }", "unknown field `unifrom`"),
         ("uniform = { min = 0, max = 1, mean = 0.5 }", "unknown field `mean`"),
@@ -206,7 +206,7 @@ fn unknown_keys_and_wrong_types_are_refused_while_reading() {
 }
 
 #[test]
-fn a_choice_takes_its_labels_as_often_as_they_weigh() {
+fn labels_are_chosen_in_proportion_to_their_weights() {
     let choice = distribution("choice = { car = 8, motorcycle = 1, never = 0, truck = 1 }");
     let label = |u| choice.quantile(u).to_string();
     for (u, expected) in [
@@ -224,7 +224,7 @@ fn a_choice_takes_its_labels_as_often_as_they_weigh() {
     assert_eq!(choice.cdf(0.5), None);
 }
 
-/// Distribution, share u, and quantile by bisection of the distribution function in mpmath 1.3 with 250 digits.
+/// Distribution, probability u, and quantile by bisection of the distribution function in mpmath 1.3 with 250 digits.
 const TAIL_REFERENCES: [(&str, f64, f64); 13] = [
     ("truncated-normal = { mean = 0, sd = 1, min = -8, max = 8 }", 1e-06, -4.753424308697181),
     ("truncated-normal = { mean = 0, sd = 1, min = -8, max = 8 }", 0.75, 0.6744897501960808),
@@ -297,7 +297,7 @@ fn any_distribution() -> impl Strategy<Value = Distribution> {
 
 proptest! {
     #[test]
-    fn quantiles_rise_within_the_bounds(distribution in any_distribution(), u in 0.0..1.0, v in 0.0..1.0) {
+    fn quantiles_ascend_within_the_bounds(distribution in any_distribution(), u in 0.0..1.0, v in 0.0..1.0) {
         let [min, max] = distribution.bounds().unwrap();
         let (low, high) = (number(&distribution.quantile(f64::min(u, v))), number(&distribution.quantile(f64::max(u, v))));
         prop_assert!(min <= low && low <= high && high <= max, "{min} {low} {high} {max}");
@@ -306,8 +306,8 @@ proptest! {
     #[test]
     fn the_cdf_is_the_inverse_of_the_quantile(distribution in any_distribution(), u in 0.001..0.999) {
         let value = number(&distribution.quantile(u));
-        let share = distribution.cdf(value).unwrap();
-        prop_assert!((share - u).abs() < 1e-8, "{share} at {value}");
+        let probability = distribution.cdf(value).unwrap();
+        prop_assert!((probability - u).abs() < 1e-8, "{probability} at {value}");
         prop_assert!(distribution.cdf(f64::MAX).unwrap() > 1.0 - 1e-12);
         prop_assert_eq!(distribution.cdf(-f64::MAX).unwrap(), 0.0);
     }

@@ -1,4 +1,4 @@
-//! Every criterion at every level of each disturbance.
+//! Runs every criterion at every level of each disturbance.
 
 use closecall_traffic::Trajectory;
 use serde::Serialize;
@@ -7,27 +7,29 @@ use super::disturb::{Disturbance, Repetition};
 use crate::lane_change::{Criterion, Detector, LaneChange, Lanes};
 use crate::recordings::{LaneMarkings, MarkingDistances};
 
-/// A criterion fails where it misses, or invents, more than this share of the reference.
+/// Share of missed or of invented lane changes above which a criterion fails (-), relative to the number that it
+/// detects undisturbed.
 pub const FAILING_SHARE: f64 = 0.05;
 
-/// One track, with the distances to the markings for each of its points where they were measured.
+/// A track, and the distances to the markings for each of its points; these are empty if they were not measured.
 pub type Measured = (Trajectory, Vec<MarkingDistances>);
 
-/// Levels of the disturbances, and how often the noise is drawn.
+/// The levels of the disturbances, and the repetitions and seed of the noise.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Setup {
-    /// Intensities of Brownian noise, rising from 0 [m/√s].
+    /// Intensities of the Brownian noise, ascending from 0 (m/√s).
     pub noise_m_per_sqrt_s: Vec<f64>,
-    /// Constant offsets, rising [m].
+    /// Constant offsets, ascending (m).
     pub offset_m: Vec<f64>,
-    /// Draws of the noise.
+    /// Number of repetitions at each noise level.
     pub repetitions: u64,
     /// Seed of the noise.
     pub seed: u64,
 }
 
 impl Default for Setup {
-    /// Noise up to 1 m/√s, at which a vehicle drifts by a lane's width in a dozen seconds; offsets up to a lane's half.
+    /// Noise up to 1 m/√s, at which a vehicle drifts by a lane width in a dozen seconds; offsets up to half a lane
+    /// width.
     fn default() -> Self {
         Self {
             noise_m_per_sqrt_s: vec![0.0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0],
@@ -38,86 +40,90 @@ impl Default for Setup {
     }
 }
 
-/// What the lane changes are held against.
+/// The kind of reference with which the lane changes are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ReferenceKind {
-    /// Jumps of the distances to the markings.
+    /// Lane changes by the gradient criterion: jumps of the distances to the markings.
     Gradient,
-    /// The recorded lanes, at peaks of the lateral speed.
+    /// Lane changes by the peak criterion: changes of the recorded lane at peaks of the lateral speed.
     RecordedLanes,
 }
 
-/// A recording, ready to be disturbed.
+/// A robustness study of one trajectory data set, with its reference lane changes.
 #[derive(Clone, Debug)]
 pub struct Study {
     tracks: Vec<Measured>,
     criteria: Vec<Criterion>,
-    doubtful: Detector,
-    /// For each track, every lane change that happened.
-    happened: Vec<Vec<LaneChange>>,
-    /// For each track and each of its lane changes, which criteria find it undisturbed.
-    known: Vec<Vec<Vec<bool>>>,
+    /// Detector that does not rely on the recorded lanes.
+    detector: Detector,
+    /// Reference lane changes of each track.
+    reference: Vec<Vec<LaneChange>>,
+    /// For each track, each of its reference lane changes and each criterion: true if it is detected undisturbed.
+    undisturbed: Vec<Vec<Vec<bool>>>,
     kind: ReferenceKind,
 }
 
-/// One experiment.
+/// One experiment: a disturbance and a repetition of its noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Case {
     disturbance: Disturbance,
     repetition: Repetition,
 }
 
-/// What one criterion did in one experiment, or in the mean of several.
+/// The counts of one criterion in one experiment, or their mean over several.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Cell {
-    /// Lane changes found.
+    /// Number of detected lane changes.
     pub found: f64,
-    /// Of those that the criterion finds undisturbed, those found again.
+    /// Number of reference lane changes that the criterion detects undisturbed and also detects here.
     pub again: f64,
-    /// Found where none happened.
+    /// Number of detected lane changes that match no reference lane change.
     pub invented: f64,
 }
 
 impl Study {
-    /// Finds the reference in `tracks` between `markings`.
+    /// Detects the reference lane changes in `tracks` on the road with these `markings`.
     pub fn new(tracks: Vec<Measured>, markings: &LaneMarkings) -> Self {
-        let sees_markings = tracks.iter().any(|(_, seen)| !seen.is_empty());
-        let (kind, reference, criteria) = if sees_markings {
+        let has_distances = tracks.iter().any(|(_, distances)| !distances.is_empty());
+        let (kind, reference_criterion, criteria) = if has_distances {
             (ReferenceKind::Gradient, Criterion::Gradient, Criterion::ALL.to_vec())
         } else {
             (ReferenceKind::RecordedLanes, Criterion::Peak, vec![Criterion::Peak, Criterion::Distance])
         };
-        let trusting = Detector::new(Lanes::Recorded, markings);
-        let happened: Vec<_> = tracks.iter().map(|(track, seen)| trusting.detect(reference, track, seen)).collect();
-        let doubtful = Detector::new(Lanes::Doubtful, markings);
-        let known = tracks.iter().zip(&happened).map(|((track, seen), happened)| {
-            let found = doubtful.detect_by_each(&criteria, track, seen);
+        let reference_detector = Detector::new(Lanes::Recorded, markings);
+        let reference: Vec<_> = tracks
+            .iter()
+            .map(|(track, distances)| reference_detector.detect(reference_criterion, track, distances))
+            .collect();
+        let detector = Detector::new(Lanes::Doubtful, markings);
+        let undisturbed = tracks.iter().zip(&reference).map(|((track, distances), reference)| {
+            let found = detector.detect_by_each(&criteria, track, distances);
             let by_criteria = |change: &LaneChange| {
-                found.iter().map(|found| found.iter().any(|found| meets(found, change))).collect()
+                found.iter().map(|found| found.iter().any(|found| matches_reference(found, change))).collect()
             };
-            happened.iter().map(by_criteria).collect()
+            reference.iter().map(by_criteria).collect()
         });
-        Self { known: known.collect(), tracks, criteria, doubtful, happened, kind }
+        Self { undisturbed: undisturbed.collect(), tracks, criteria, detector, reference, kind }
     }
 
-    /// What the lane changes are held against.
+    /// Returns the kind of the reference.
     pub fn kind(&self) -> ReferenceKind {
         self.kind
     }
 
-    /// Number of lane changes that happened.
+    /// Returns the number of reference lane changes.
     pub fn reference(&self) -> usize {
-        self.happened.iter().flatten().count()
+        self.reference.iter().flatten().count()
     }
 
-    /// Number of those that each criterion finds undisturbed, and therefore has to find again.
+    /// Returns, for each criterion, the number of reference lane changes that it detects undisturbed.
     pub fn undisturbed(&self) -> Vec<usize> {
-        let known = |criterion: usize| self.known.iter().flatten().filter(|found| found[criterion]).count();
-        (0..self.criteria.len()).map(known).collect()
+        let count = |criterion: usize| self.undisturbed.iter().flatten().filter(|found| found[criterion]).count();
+        (0..self.criteria.len()).map(count).collect()
     }
 
-    /// All experiments of `setup`: first those with noise, level by level, then those with an offset.
+    /// Returns all experiments of `setup`: first those with noise, level by level, then those with an offset.
     pub fn cases(setup: &Setup) -> Vec<Case> {
         let noise = setup.noise_m_per_sqrt_s.iter().flat_map(|&noise_m_per_sqrt_s| {
             let disturbance = Disturbance { offset_m: 0.0, noise_m_per_sqrt_s };
@@ -129,30 +135,31 @@ impl Study {
         noise.chain(offsets).map(case).collect()
     }
 
-    /// Runs one experiment: a cell for each criterion.
+    /// Runs one experiment and returns one cell for each criterion.
     pub fn run(&self, case: &Case) -> Vec<Cell> {
         let mut cells = vec![Cell::default(); self.criteria.len()];
-        for (((track, seen), happened), known) in self.tracks.iter().zip(&self.happened).zip(&self.known) {
-            let (track, seen) = case.disturbance.apply(track, seen, case.repetition);
-            let found = self.doubtful.detect_by_each(&self.criteria, &track, &seen);
+        let references = self.reference.iter().zip(&self.undisturbed);
+        for ((track, distances), (reference, undisturbed)) in self.tracks.iter().zip(references) {
+            let (track, distances) = case.disturbance.apply(track, distances, case.repetition);
+            let found = self.detector.detect_by_each(&self.criteria, &track, &distances);
             for (criterion, (cell, found)) in cells.iter_mut().zip(&found).enumerate() {
-                let known: Vec<_> = happened
+                let required: Vec<_> = reference
                     .iter()
-                    .zip(known)
-                    .filter(|(_, known)| known[criterion])
+                    .zip(undisturbed)
+                    .filter(|(_, undisturbed)| undisturbed[criterion])
                     .map(|(change, _)| change)
                     .collect();
-                cell.count(found, happened, &known);
+                cell.count(found, reference, &required);
             }
         }
         cells
     }
 
-    /// Puts together what the experiments of `setup` gave, in the order of [`Self::cases`].
+    /// Combines the `results` of all experiments of `setup`, which are in the order of [`Self::cases`].
     pub fn robustness(&self, setup: &Setup, results: &[Vec<Cell>]) -> Robustness {
         let (noise, offsets) = results.split_at(results.len() - setup.offset_m.len());
         let repetitions = usize::try_from(setup.repetitions).unwrap_or(usize::MAX).max(1);
-        let noise = noise.chunks(repetitions).map(|draws| self.mean(draws)).collect();
+        let noise = noise.chunks(repetitions).map(|repeated| self.mean(repeated)).collect();
         Robustness {
             reference_kind: self.kind,
             reference: self.reference(),
@@ -164,10 +171,11 @@ impl Study {
         }
     }
 
-    fn mean(&self, draws: &[Vec<Cell>]) -> Vec<Cell> {
-        let n = draws.len() as f64;
+    /// Returns the mean cell of each criterion over repeated experiments.
+    fn mean(&self, repeated: &[Vec<Cell>]) -> Vec<Cell> {
+        let n = repeated.len() as f64;
         let mean_of = |criterion: usize, value: fn(&Cell) -> f64| {
-            draws.iter().map(|cells| value(&cells[criterion])).sum::<f64>() / n
+            repeated.iter().map(|cells| value(&cells[criterion])).sum::<f64>() / n
         };
         let cell = |criterion| Cell {
             found: mean_of(criterion, |cell| cell.found),
@@ -179,39 +187,45 @@ impl Study {
 }
 
 impl Cell {
-    fn count(&mut self, found: &[LaneChange], happened: &[LaneChange], known: &[&LaneChange]) {
+    /// Adds the counts of one track: the lane changes that were `found`, all `reference` ones, and the `required` ones,
+    /// which the criterion detects undisturbed.
+    fn count(&mut self, found: &[LaneChange], reference: &[LaneChange], required: &[&LaneChange]) {
         self.found += found.len() as f64;
-        self.again += known.iter().filter(|change| found.iter().any(|found| meets(found, change))).count() as f64;
-        let invented = found.iter().filter(|found| !happened.iter().any(|change| meets(found, change)));
+        let is_found = |change: &&&LaneChange| found.iter().any(|found| matches_reference(found, change));
+        self.again += required.iter().filter(is_found).count() as f64;
+        let invented = found.iter().filter(|found| !reference.iter().any(|change| matches_reference(found, change)));
         self.invented += invented.count() as f64;
     }
 }
 
-fn meets(found: &LaneChange, happened: &LaneChange) -> bool {
-    found.direction == happened.direction && found.start_s <= happened.end_s && happened.start_s <= found.end_s
+/// Returns true if a detected lane change has the direction of a reference lane change and overlaps it in time.
+fn matches_reference(found: &LaneChange, reference: &LaneChange) -> bool {
+    found.direction == reference.direction && found.start_s <= reference.end_s && reference.start_s <= found.end_s
 }
 
-/// What a robustness study found; each row of cells is in the order of `criteria`.
+/// The result of a robustness study; each row of cells is in the order of `criteria`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Robustness {
-    /// What the lane changes are held against.
+    /// Kind of the reference.
     pub reference_kind: ReferenceKind,
-    /// Number of lane changes that happened.
+    /// Number of reference lane changes.
     pub reference: usize,
-    /// Number of those that each criterion finds undisturbed, and therefore has to find again.
+    /// Number of reference lane changes that each criterion detects undisturbed.
     pub undisturbed: Vec<usize>,
     /// Levels, repetitions and seed.
     pub setup: Setup,
     /// The criteria.
     pub criteria: Vec<Criterion>,
-    /// For each level of noise, the mean over the repetitions.
+    /// One row for each noise level: the means over the repetitions.
     pub noise: Vec<Vec<Cell>>,
-    /// For each offset.
+    /// One row for each offset.
     pub offset: Vec<Vec<Cell>>,
 }
 
 impl Robustness {
-    /// Adds what another recording gave at the same levels; false, and nothing added, where it is of another kind.
+    /// Adds the result of another trajectory data set.
+    ///
+    /// Returns false and adds nothing if its kind of reference or its setup differs.
     #[must_use]
     pub fn add(&mut self, other: &Self) -> bool {
         if self.reference_kind != other.reference_kind || self.setup != other.setup {
@@ -228,14 +242,15 @@ impl Robustness {
         true
     }
 
-    /// Whether the criterion in column `criterion` fails with what is in `cell`.
+    /// Returns true if the criterion in column `criterion` fails with the counts of `cell`.
     pub fn fails(&self, criterion: usize, cell: &Cell) -> bool {
-        let known = self.undisturbed[criterion] as f64;
-        let allowed = FAILING_SHARE * known;
-        !(known - cell.again <= allowed && cell.invented <= allowed)
+        let required = self.undisturbed[criterion] as f64;
+        let allowed = FAILING_SHARE * required;
+        !(required - cell.again <= allowed && cell.invented <= allowed)
     }
 
-    /// The lowest intensity of noise at which the criterion in column `criterion` fails, if any [m/√s].
+    /// Returns the lowest noise intensity at which the criterion in column `criterion` fails (m/√s), or `None` if it
+    /// fails at no level.
     pub fn fails_from_noise(&self, criterion: usize) -> Option<f64> {
         let levels = self.setup.noise_m_per_sqrt_s.iter().zip(&self.noise);
         levels.filter(|(_, cells)| self.fails(criterion, &cells[criterion])).map(|(level, _)| *level).next()

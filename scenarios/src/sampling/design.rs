@@ -1,4 +1,4 @@
-//! The designs by name, and the samples of a parameter space.
+//! The sampling designs and their names, and the samples of a parameter space.
 
 use std::fmt;
 use std::str::FromStr;
@@ -10,21 +10,21 @@ use serde::{Deserialize, Serialize};
 use super::{grid, random, sobol};
 use crate::parameters::ParameterSpace;
 
-/// How a parameter space is sampled.
+/// The sampling design: how a parameter space is sampled.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Design {
-    /// Independent random numbers: rates and their intervals can be estimated from them.
+    /// Independent random samples, from which rates and their confidence intervals can be estimated.
     #[default]
     Random,
     /// A scrambled Sobol sequence, which covers the space more evenly.
     Sobol,
-    /// Every combination of some levels of each parameter. All points count alike: their share is not a probability
-    /// where labels have different weights.
+    /// All combinations of some levels of each parameter. All points have the same weight, so that a share of them is
+    /// not a probability if labels have different weights.
     Grid,
 }
 
-/// A word that is no design.
+/// The error for a word that is not the name of a design.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`{word}` is not a sampling design: one of `random`, `sobol`, `grid` is needed")]
 pub struct UnknownDesign {
@@ -32,10 +32,10 @@ pub struct UnknownDesign {
 }
 
 impl Design {
-    /// Every design.
+    /// All designs.
     pub const ALL: [Self; 3] = [Self::Random, Self::Sobol, Self::Grid];
 
-    /// The design's name as it stands on the command line and in files.
+    /// Returns the name of the design, as on the command line and in files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Random => "random",
@@ -60,7 +60,8 @@ impl FromStr for Design {
 }
 
 impl ParameterSpace {
-    /// How many samples a design has when up to `n` are asked for: `n`, or the points of the largest grid within `n`.
+    /// Returns the number of samples of a design if up to `n` are requested: `n`, or the size of the largest grid
+    /// within `n`.
     pub fn samples(&self, design: Design, n: u64) -> u64 {
         match design {
             Design::Random | Design::Sobol => n,
@@ -68,9 +69,9 @@ impl ParameterSpace {
         }
     }
 
-    /// The values of sample `index` of a campaign of up to `n` samples.
+    /// Returns the parameter values of sample `index` in a campaign of up to `n` samples.
     ///
-    /// Only the grid depends on `n`; beyond its last point ([`Self::samples`]) it begins again.
+    /// Only the grid depends on `n`. After its last point ([`Self::samples`]) it starts again from the first.
     pub fn sample(&self, design: Design, seed: u64, index: u64, n: u64) -> Parameters {
         match design {
             Design::Random => random::sample(self, seed, index),

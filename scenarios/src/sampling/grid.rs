@@ -1,13 +1,14 @@
 //! Full factorial grids.
 //!
-//! # How many levels
+//! # Number of levels
 //!
-//! All parameters get the same number of levels, the largest with which the number of combinations stays within n; but
-//! a choice has at most as many levels as labels, and a fixed value has one. Then each, in the order of the names, gets
-//! one level more where the combinations still stay within n. A number's levels are the medians of as many equally
-//! probable parts, a choice's are its most probable labels; a single level is the nominal value.
+//! All parameters get the same number of levels: the largest for which the number of combinations does not exceed n. A
+//! choice has at most as many levels as labels, and a fixed value has one. Then each parameter, in the order of the
+//! names, gets one more level if the number of combinations still does not exceed n. The levels of a number are the
+//! medians of as many equally probable parts, and those of a choice are its most probable labels. A single level is the
+//! nominal value.
 //!
-//! The last name varies fastest.
+//! The parameter with the last name varies fastest.
 
 use closecall_traffic::Parameters;
 
@@ -20,23 +21,25 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// The grid with up to `n` points; the nominal values alone where n is 0.
+    /// Returns the grid with up to `n` points; see the module documentation. If `n` is 0, its only point is the nominal
+    /// one.
     pub(super) fn within(space: &ParameterSpace, n: u64) -> Self {
-        let most: Vec<u64> = space.iter().map(|(_, entry)| entry.distribution.most_levels()).collect();
-        let even = |levels: u64| Self { levels: most.iter().map(|&most| most.min(levels)).collect() };
-        let (mut fits, mut too_many) = (1, n.max(1).saturating_add(1));
-        while too_many - fits > 1 {
-            let middle = fits + (too_many - fits) / 2;
+        let max_levels: Vec<u64> = space.iter().map(|(_, entry)| entry.distribution.max_levels()).collect();
+        let even = |levels: u64| Self { levels: max_levels.iter().map(|&max| max.min(levels)).collect() };
+        // Bisection for the largest number of levels, up to n, with which the grid fits.
+        let (mut low, mut high) = (1, n.max(1).saturating_add(1));
+        while high - low > 1 {
+            let middle = low + (high - low) / 2;
             if even(middle).fits(n) {
-                fits = middle;
+                low = middle;
             } else {
-                too_many = middle;
+                high = middle;
             }
         }
-        let mut grid = even(fits);
-        for (place, &most) in most.iter().enumerate() {
+        let mut grid = even(low);
+        for (index, &max) in max_levels.iter().enumerate() {
             let mut raised = grid.clone();
-            raised.levels[place] = most.min(fits.saturating_add(1));
+            raised.levels[index] = max.min(low.saturating_add(1));
             if raised.fits(n) {
                 grid = raised;
             }
@@ -44,25 +47,25 @@ impl Grid {
         grid
     }
 
-    /// True where there are no more than `n` combinations.
+    /// Returns true if the number of combinations does not exceed `n`.
     fn fits(&self, n: u64) -> bool {
         let product = self.levels.iter().try_fold(1_u64, |product, &levels| product.checked_mul(levels));
         product.is_some_and(|points| points <= n)
     }
 
-    /// The number of combinations.
+    /// Returns the number of combinations.
     pub(super) fn points(&self) -> u64 {
         self.levels.iter().product()
     }
 
-    /// One combination.
+    /// Returns combination `index`, counted modulo [`Self::points`].
     pub(super) fn point(&self, space: &ParameterSpace, index: u64) -> Parameters {
-        let mut rest = index % self.points();
+        let mut remainder = index % self.points();
         let mut chosen = vec![0; self.levels.len()];
-        for (level, of) in chosen.iter_mut().zip(&self.levels).rev() {
-            *level = rest % of;
-            rest /= of;
+        for (level, count) in chosen.iter_mut().zip(&self.levels).rev() {
+            *level = remainder % count;
+            remainder /= count;
         }
-        space.map(|_, place, distribution| distribution.level(chosen[place], self.levels[place]))
+        space.map(|_, index, distribution| distribution.level(chosen[index], self.levels[index]))
     }
 }

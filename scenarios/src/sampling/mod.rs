@@ -1,14 +1,14 @@
-//! Sampling designs: which values the parameters take in sample 0, 1, 2 …
+//! Sampling designs: the parameter values of sample 0, 1, 2 …
 //!
-//! A design chooses for each sample and parameter one number u in [0, 1); the parameter's quantile function
-//! ([`crate::parameters`]) makes a value of it. Every design is addressed by index, so that a sample can be worked out
-//! alone, in any order and on any thread, always with the same bits.
+//! For each sample and parameter, a design chooses one number u in [0, 1), and the quantile function of the parameter
+//! ([`crate::parameters`]) maps it to a value. Every design is addressed by the sample index, so that each sample can
+//! be computed alone, in any order and on any thread, always with the same bits.
 //!
-//! | design   | u                                                                  | sample k depends on n |
-//! |----------|--------------------------------------------------------------------|-----------------------|
-//! | `random` | independent, from the stream of (seed, k, the parameter's name)    | no                    |
-//! | `sobol`  | a Sobol sequence, Owen-scrambled by the seed; one dimension a name | no                    |
-//! | `grid`   | midpoints of equally probable parts, in all combinations           | yes                   |
+//! | design   | number u of sample k                                                     | depends on sample count n |
+//! |----------|--------------------------------------------------------------------------|---------------------------|
+//! | `random` | independent, from the random stream of (seed, k, parameter name)         | no                        |
+//! | `sobol`  | Sobol sequence, Owen-scrambled by the seed, one dimension for each name  | no                        |
+//! | `grid`   | midpoints of equally probable parts, in all combinations                 | yes                       |
 
 mod design;
 mod grid;

@@ -1,24 +1,25 @@
 //! Independent random samples.
 //!
-//! Each parameter draws from a stream of its own, keyed by its name: adding or removing a parameter changes none of
-//! the others.
+//! Each parameter draws from its own random stream, keyed by its name, so that adding or removing a parameter does not
+//! change the others.
 
 use closecall_traffic::{ActorId, Parameters, Stream, stream};
 use rand::RngExt;
 
 use crate::parameters::ParameterSpace;
 
-/// Keys the streams of the parameters, which belong to no actor. The channels below hold a `/`, as no name of a
-/// component does, so that an actor of this name shares no stream with them.
+/// Key of the random streams of parameters, which belong to no actor. Their channel names contain a `/`, which the name
+/// of a component never does, so that an actor of the same name shares no stream with them.
 const OWNER: &str = "scenario";
 
+/// Returns the parameter values of sample `index`.
 pub(super) fn sample(space: &ParameterSpace, seed: u64, index: u64) -> Parameters {
     space.map(|name, _, distribution| {
         distribution.quantile(scenario_stream(seed, index, &format!("parameter/{name}")).random())
     })
 }
 
-/// A random stream for something of the scenario as a whole.
+/// Returns a random stream that belongs to the scenario as a whole, not to an actor.
 pub(super) fn scenario_stream(seed: u64, index: u64, channel: &str) -> Stream {
     #[expect(clippy::expect_used, reason = "a constant, and a test draws from it")]
     let owner = ActorId::new(OWNER).expect("a legal name");

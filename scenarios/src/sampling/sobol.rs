@@ -1,8 +1,8 @@
 //! A Sobol sequence with hash-based Owen scrambling.
 //!
-//! B. Burley, *Practical Hash-based Owen Scrambling*, JCGT 9(4), 2020, as the crate `sobol_burley` implements it: 2¹⁶
-//! points in 256 dimensions for each 32-bit seed. A longer sequence is continued by the next block of 2¹⁶ points, and
-//! more dimensions by the next group of 256, each scrambled independently.
+//! Source: B. Burley, *Practical Hash-based Owen Scrambling*, JCGT 9(4), 2020, as implemented in the crate
+//! `sobol_burley`: 2¹⁶ points in 256 dimensions for each 32-bit seed. A longer sequence continues with further blocks
+//! of 2¹⁶ points, and more dimensions with further groups of 256. Each block and each group is scrambled independently.
 
 use closecall_traffic::Parameters;
 use rand::Rng;
@@ -11,22 +11,23 @@ use sobol_burley::NUM_DIMENSIONS;
 use super::random::scenario_stream;
 use crate::parameters::ParameterSpace;
 
-/// log₂ of the number of points of a block.
+/// Binary logarithm of the number of points in a block.
 const BLOCK_BITS: u32 = 16;
 
-/// Half the spacing of the sequence's numbers, which have 23 bits. In the middle of its cell no number is 0, where
-/// the quantile of an unbounded distribution is infinite.
+/// Half the spacing of the numbers in the sequence, which have 23 bits. It moves each number to the middle of its cell,
+/// so that none is 0, where the quantile of an unbounded distribution is infinite.
 const HALF_CELL: f64 = 1.0 / (1_u32 << 24) as f64;
 
+/// Returns the parameter values of sample `index`.
 pub(super) fn sample(space: &ParameterSpace, seed: u64, index: u64) -> Parameters {
     let block = index >> BLOCK_BITS;
-    let place = (index & ((1 << BLOCK_BITS) - 1)) as u32;
+    let point = (index & ((1 << BLOCK_BITS) - 1)) as u32;
     let mut scramble = 0;
-    space.map(|_, name_place, distribution| {
-        let (group, dimension) = (name_place as u32 / NUM_DIMENSIONS, name_place as u32 % NUM_DIMENSIONS);
+    space.map(|_, name_index, distribution| {
+        let (group, dimension) = (name_index as u32 / NUM_DIMENSIONS, name_index as u32 % NUM_DIMENSIONS);
         if dimension == 0 {
             scramble = scenario_stream(seed, block, &format!("sobol/{group}")).next_u32();
         }
-        distribution.quantile(f64::from(sobol_burley::sample(place, dimension, scramble)) + HALF_CELL)
+        distribution.quantile(f64::from(sobol_burley::sample(point, dimension, scramble)) + HALF_CELL)
     })
 }

@@ -1,4 +1,4 @@
-//! Coverage, independence and addressing of the designs.
+//! Tests of the coverage, the independence and the addressing of the designs.
 
 use std::collections::BTreeSet;
 
@@ -14,7 +14,7 @@ fn space(text: &str) -> ParameterSpace {
     toml::from_str::<ParametersConfig>(text).unwrap().check().unwrap()
 }
 
-/// `dimensions` parameters whose values are the design's own numbers u.
+/// A space of `dimensions` parameters whose values are the numbers u of the design.
 fn unit_cube(dimensions: usize) -> ParameterSpace {
     let line = |i| format!("u{i:03} = {{ uniform = {{ min = 0, max = 1 }} }}\n");
     space(&(0..dimensions).map(line).collect::<String>())
@@ -44,7 +44,7 @@ fn designs_are_named_as_in_files() {
     assert_eq!(error, "`halton` is not a sampling design: one of `random`, `sobol`, `grid` is needed");
 }
 
-/// Kolmogorov's test in each dimension at the level 10⁻⁶, on fixed seeds.
+/// Kolmogorov's test in each dimension at the significance level 10⁻⁶, with fixed seeds.
 #[test]
 fn random_numbers_are_uniform() {
     const N: usize = 2_000;
@@ -56,29 +56,29 @@ fn random_numbers_are_uniform() {
         for dimension in 0..4 {
             let mut column: Vec<f64> = samples.iter().map(|sample| sample[dimension]).collect();
             column.sort_by(f64::total_cmp);
-            let off = |(rank, u): (usize, &f64)| {
+            let deviation = |(rank, u): (usize, &f64)| {
                 (u - rank as f64 / N as f64).abs().max((u - (rank + 1) as f64 / N as f64).abs())
             };
-            let largest = column.iter().enumerate().map(off).fold(0.0, f64::max);
+            let largest = column.iter().enumerate().map(deviation).fold(0.0, f64::max);
             assert!(largest < critical, "seed {seed}, dimension {dimension}: {largest} ≥ {critical}");
         }
     }
 }
 
 #[test]
-fn random_parameters_do_not_correlate() {
+fn random_parameters_are_uncorrelated() {
     const N: u64 = 4_000;
     let cube = unit_cube(3);
     let samples: Vec<Vec<f64>> = (0..N).map(|index| numbers(&cube.sample(Design::Random, 7, index, N))).collect();
     for (a, b) in [(0, 1), (0, 2), (1, 2)] {
         let covariance: f64 = samples.iter().map(|u| (u[a] - 0.5) * (u[b] - 0.5)).sum::<f64>() / N as f64;
-        // Five standard errors of a correlation of 0.
+        // The limit is five standard errors of a correlation of 0.
         assert!((covariance * 12.0).abs() < 5.0 / (N as f64).sqrt(), "{a} and {b}: {covariance}");
     }
 }
 
 #[test]
-fn adding_a_parameter_changes_no_other_random_one() {
+fn adding_a_parameter_does_not_change_the_others_in_the_random_design() {
     let small = space("b = { uniform = { min = 0, max = 1 } }\nd = { choice = { x = 1, y = 1 } }");
     let large = space(
         "a = { fixed = 1 }\nb = { uniform = { min = 0, max = 1 } }\nc = { uniform = { min = 0, max = 9 } }\n\
@@ -125,20 +125,20 @@ fn sobol_is_stratified_in_the_plane() {
 }
 
 #[test]
-fn sobol_depends_on_the_seed_and_goes_on_after_its_last_point() {
+fn sobol_depends_on_the_seed_and_continues_after_a_block() {
     let cube = unit_cube(3);
     let at = |seed, index| numbers(&cube.sample(Design::Sobol, seed, index, 1));
     assert_ne!(at(0, 0), at(1, 0));
-    assert_ne!(at(0, 0), at(0, 1 << 16), "the second block is scrambled otherwise");
+    assert_ne!(at(0, 0), at(0, 1 << 16), "the second block is scrambled differently");
     assert_ne!(at(0, (1 << 16) - 1), at(0, (2 << 16) - 1));
-    // More dimensions than the sequence has: the second group is not a copy of the first.
+    // With more dimensions than the sequence has, the second group is not a copy of the first.
     let wide = numbers(&unit_cube(300).sample(Design::Sobol, 0, 3, 10));
     assert!(wide.iter().all(|u| (0.0..1.0).contains(u)));
     assert_ne!(wide[0..40], wide[256..296]);
 }
 
 #[test]
-fn fixing_a_parameter_leaves_the_other_dimensions_alone() {
+fn fixing_a_parameter_does_not_change_the_others_in_the_sobol_design() {
     let free = unit_cube(3);
     let pinned = space(
         "u000 = { uniform = { min = 0, max = 1 } }\nu001 = { fixed = 0.5 }\nu002 = { uniform = { min = 0, max = 1 } }",
@@ -152,7 +152,7 @@ fn fixing_a_parameter_leaves_the_other_dimensions_alone() {
 }
 
 #[test]
-fn a_grid_holds_every_combination_once() {
+fn a_grid_contains_each_combination_once() {
     let space = space(
         "a = { uniform = { min = 0, max = 1 } }\nb = { choice = { car = 8, truck = 1, never = 0 } }\n\
          c = { fixed = 3 }\nd = { uniform = { min = 0, max = 1 } }",
@@ -168,7 +168,11 @@ fn a_grid_holds_every_combination_once() {
     assert_eq!(points.iter().collect::<BTreeSet<_>>().len(), 24);
     assert_eq!(points[0], format!("0.125 car 3 {:.4}", Value::Number(1.0 / 6.0)));
     assert_eq!(points[3], format!("0.125 truck 3 {:.4}", Value::Number(1.0 / 6.0)));
-    assert_eq!(space.sample(Design::Grid, 0, 24, 30), space.sample(Design::Grid, 0, 0, 30), "it begins again");
+    assert_eq!(
+        space.sample(Design::Grid, 0, 24, 30),
+        space.sample(Design::Grid, 0, 0, 30),
+        "the grid starts again after its last point"
+    );
 }
 
 #[test]
@@ -178,9 +182,9 @@ fn the_smallest_grid_is_the_nominal_point() {
         assert_eq!(space.samples(Design::Grid, n), 1);
         assert_eq!(space.sample(Design::Grid, 0, 0, n), space.nominal());
     }
-    let nothing_to_vary = ParameterSpace::default();
-    assert_eq!(nothing_to_vary.samples(Design::Grid, u64::MAX), 1);
-    assert_eq!(space.samples(Design::Grid, u64::MAX - 1), (u64::MAX - 1) / 2 * 2, "huge grids need no long search");
+    let empty = ParameterSpace::default();
+    assert_eq!(empty.samples(Design::Grid, u64::MAX), 1);
+    assert_eq!(space.samples(Design::Grid, u64::MAX - 1), (u64::MAX - 1) / 2 * 2, "the search is fast for huge grids");
 }
 
 proptest! {
@@ -199,7 +203,7 @@ proptest! {
     }
 
     #[test]
-    fn a_grid_fits_is_even_and_could_not_be_larger(n in 1_u64..600, numbers in 1_usize..6, labels in 1_usize..5) {
+    fn a_grid_is_even_and_the_largest_within_n(n in 1_u64..600, numbers in 1_usize..6, labels in 1_usize..5) {
         let choice: Vec<String> = (0..labels).map(|i| format!("l{i} = 1")).collect();
         let uniform = |i| format!("u{i} = {{ uniform = {{ min = 0, max = 1 }} }}\n");
         let text: String = (0..numbers).map(uniform).collect();
@@ -212,12 +216,12 @@ proptest! {
         };
         let levels: Vec<u64> = space.iter().map(|(name, _)| distinct(name)).collect();
         prop_assert_eq!(levels.iter().product::<u64>(), points);
-        let full = |place: usize| place == numbers && levels[place] == labels as u64;
-        let fewest = (0..levels.len()).filter(|&place| !full(place)).map(|place| levels[place]).min().unwrap();
-        for (place, &level) in levels.iter().enumerate() {
+        let full = |index: usize| index == numbers && levels[index] == labels as u64;
+        let fewest = (0..levels.len()).filter(|&index| !full(index)).map(|index| levels[index]).min().unwrap();
+        for (index, &level) in levels.iter().enumerate() {
             let raised = level > fewest;
-            prop_assert!(full(place) || raised || points / level * (level + 1) > n, "{levels:?} within {n}");
-            prop_assert!(full(place) || level <= fewest + 1, "{levels:?}");
+            prop_assert!(full(index) || raised || points / level * (level + 1) > n, "{levels:?} within {n}");
+            prop_assert!(full(index) || level <= fewest + 1, "{levels:?}");
         }
     }
 }
