@@ -26,7 +26,7 @@ fn scenarios() -> Vec<Scenario> {
     (0..SAMPLES).map(|sample| concrete(&file, sampling, sample).expect("a valid sample")).collect()
 }
 
-/// Runs every sample and returns the simulated time [s].
+/// Runs every sample and returns the simulated time (s).
 fn run_all(scenarios: &[Scenario], arm: &Arm) -> f64 {
     let run = |(sample, scenario): (usize, &Scenario)| {
         let key = RunKey { seed: 0, sample: sample as u64 };

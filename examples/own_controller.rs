@@ -29,10 +29,10 @@ use closecall_simulation::scenario::ScenarioFile;
 use closecall_simulation::{Arm, ControllerFactory};
 use closecall_traffic::TrackStatus;
 
-/// Time headway behind which it feels pressed [s].
+/// Time headway behind which it feels pressed (s).
 const PRESSED_BELOW_S: f64 = 1.5;
 
-/// What it takes off the acceleration then [m/s²].
+/// What it takes off the acceleration then (m/s²).
 const EASING_MPS2: f64 = 0.5;
 
 /// Makes room while somebody is close behind.

@@ -20,7 +20,7 @@ type Plane<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<RangedCoordf64, Ra
 
 const LEAD_MPS: f64 = 30.0;
 const DESIRED_MPS: f64 = 36.0;
-/// Edges of the picture: speed of the lead minus own speed [m/s], and gap [m].
+/// Edges of the picture: speed of the lead minus own speed (m/s), and gap (m).
 const OPENING_MPS: (f64, f64) = (-7.0, 5.0);
 const GAP_M: (f64, f64) = (0.0, 110.0);
 /// Size of a coloured cell.
@@ -66,7 +66,7 @@ fn steps((from, to): (f64, f64), step: f64) -> impl Iterator<Item = f64> {
     (0..).map(move |index| from + f64::from(index) * step).take_while(move |value| *value < to)
 }
 
-/// Speed difference [m/s] and gap [m] of a driver who comes up from behind.
+/// Speed difference (m/s) and gap (m) of a driver who comes up from behind.
 fn approach(driver: &Wiedemann99) -> Vec<(f64, f64)> {
     let mut model = Wiedemann99Model::new(driver);
     let (mut gap_m, mut speed_mps, mut actual_mps2) = (GAP_M.1, DESIRED_MPS, 0.0);

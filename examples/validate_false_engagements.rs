@@ -26,7 +26,7 @@ use closecall_traffic::{Source, Time, TrackId, TrackStatus};
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-/// What may not be reached by the 95 % upper bound [engagements per hour].
+/// What may not be reached by the 95 % upper bound (engagements per hour).
 const MOST_PER_HOUR: f64 = 1.0;
 /// Confidence of the one-sided bound, and of the two-sided interval.
 const CONFIDENCE: f64 = 0.95;

@@ -15,14 +15,14 @@ use std::time::Duration;
 
 use plotters::prelude::*;
 
-/// What the campaign may need at most [MiB].
+/// What the campaign may need at most (MiB).
 const LIMIT_MIB: f64 = 500.0;
 const KIB_PER_MIB: f64 = 1_024.0;
 /// Time between two looks at the kernel's account.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
 const SIZE: (u32, u32) = (760, 360);
 
-/// The peak so far [MiB]; nothing once the program has ended.
+/// The peak so far (MiB); nothing once the program has ended.
 fn peak_mib(process: u32) -> Option<f64> {
     let status = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;

@@ -34,13 +34,13 @@ use rayon::iter::{IntoParallelIterator, ParallelIterator};
 
 const SCENARIOS: [&str; 3] = ["overtake-without-brake", "low-thw-overtake", "low-thw-overtake-at-cut-out"];
 
-/// Edges of the bands of approach speed [km/h].
+/// Edges of the bands of approach speed (km/h).
 const EDGES_KMH: [f64; 5] = [10.0, 20.0, 30.0, 40.0, 51.0];
 
-/// By how much the gain may fall short of the 2 s aimed at [s].
+/// By how much the gain may fall short of the 2 s aimed at (s).
 const SHORT_BY_S: f64 = 0.1;
 
-/// The gain aimed at [s].
+/// The gain aimed at (s).
 const GOAL_S: f64 = 2.0;
 
 const KMH_PER_MPS: f64 = 3.6;
@@ -48,9 +48,9 @@ const KMH_PER_MPS: f64 = 3.6;
 /// One sample.
 #[derive(Clone, Copy, Debug, Default)]
 struct Seen {
-    /// R's approach at the start [km/h].
+    /// R's approach at the start (km/h).
     approach_kmh: f64,
-    /// R's true gap at the engagement [m].
+    /// R's true gap at the engagement (m).
     engaged_at_m: Option<f64>,
     promised: bool,
     /// F braked before R arrived, or the system released before.

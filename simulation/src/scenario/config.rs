@@ -29,7 +29,7 @@ pub struct ScenarioConfig {
     /// The requirements that the scenario is evidence for, such as `MIS-1`: reports say which of them are met.
     #[serde(default)]
     pub requirements: Vec<String>,
-    /// Longest duration of a run [s].
+    /// Longest duration of a run (s).
     pub duration_s: Num,
     /// The road.
     pub road: RoadConfig,
@@ -86,9 +86,9 @@ pub enum StartConfig {
 pub struct AbsoluteStartConfig {
     /// The lane, counted from 1 at the left.
     pub lane: Lane,
-    /// Position of the centre along the road [m].
+    /// Position of the centre along the road (m).
     pub s_m: Num,
-    /// Speed [m/s].
+    /// Speed (m/s).
     pub speed_mps: Num,
 }
 
@@ -98,13 +98,13 @@ pub struct AbsoluteStartConfig {
 pub struct RelativeStartConfig {
     /// The other actor.
     pub of: ActorId,
-    /// Gap between the two, bumper to bumper [m]; negative alongside, in another lane.
+    /// Gap between the two, bumper to bumper (m); negative alongside, in another lane.
     pub gap_m: Option<Num>,
-    /// Time headway between the two [s]: of the other one where this starts ahead, of this one where it starts behind.
+    /// Time headway between the two (s): of the other one where this starts ahead, of this one where it starts behind.
     pub thw_s: Option<Num>,
-    /// Speed [m/s].
+    /// Speed (m/s).
     pub speed_mps: Option<Num>,
-    /// Speed at which the gap closes [m/s].
+    /// Speed at which the gap closes (m/s).
     pub closing_mps: Option<Num>,
     /// The lane, counted from 1 at the left; the other actor's where absent.
     pub lane: Option<Lane>,

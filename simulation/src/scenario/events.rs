@@ -23,7 +23,7 @@ pub struct EventConfig {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum TriggerConfig {
-    /// At a time after the start [s].
+    /// At a time after the start (s).
     AtS(Num),
     /// At a time that follows from the start values alone, and is therefore the same whatever E does.
     NominalEncounter(NominalEncounterConfig),
@@ -54,7 +54,7 @@ pub struct ThwBelowConfig {
     pub from: ActorId,
     /// The actor ahead.
     pub to: ActorId,
-    /// Time headway [s].
+    /// Time headway (s).
     pub thw_s: Num,
 }
 
@@ -64,7 +64,7 @@ pub struct ThwBelowConfig {
 pub struct CutOutStartedConfig {
     /// The actor that changes lanes.
     pub actor: ActorId,
-    /// How long after the start of its lane change [s]; at once where absent.
+    /// How long after the start of its lane change (s); at once where absent.
     pub delay_s: Option<Num>,
 }
 
@@ -80,9 +80,9 @@ pub enum EffectConfig {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct BrakeConfig {
-    /// Deceleration [m/s²].
+    /// Deceleration (m/s²).
     pub deceleration_mps2: Num,
-    /// Speed to brake to [m/s]; 0 where absent.
+    /// Speed to brake to (m/s); 0 where absent.
     pub to_speed_mps: Option<Num>,
 }
 
@@ -109,11 +109,11 @@ pub(crate) struct Brake {
     pub(crate) to_speed_mps: f64,
 }
 
-/// R's distance behind E at which the paper's encounter begins [m].
+/// R's distance behind E at which the paper's encounter begins (m).
 const ENCOUNTER_BEGINS_M: f64 = 100.0;
-/// How long after the nominal encounter phase 1 lies [s].
+/// How long after the nominal encounter phase 1 lies (s).
 const AFTER_ENCOUNTER_S: f64 = 6.0;
-/// Slowest approach that has a nominal encounter [m/s].
+/// Slowest approach that has a nominal encounter (m/s).
 const SLOWEST_APPROACH_MPS: f64 = 0.1;
 
 /// What a trigger may refer to.

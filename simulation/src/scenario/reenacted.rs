@@ -39,18 +39,18 @@ pub enum RearDriver {
 
 /// The names of E, F and R as actors.
 const NAMES: [&str; 3] = ["ego", "front", "rear"];
-/// The human drivers' reaction time [s]: the median of unwarned drivers (Green, Transportation Human Factors 2 (2000)).
+/// The human drivers' reaction time (s): the median of unwarned drivers (Green, Transportation Human Factors 2 (2000)).
 const REACTION_S: f64 = 0.9;
-/// Gap at standstill of Wiedemann's model [m]: its published default.
+/// Gap at standstill of Wiedemann's model (m): its published default.
 const STANDSTILL_GAP_M: f64 = 1.5;
 /// R follows closer than it pulls out, by this factor, so that it gets to pull out.
 const FOLLOWS_CLOSER: f64 = 0.9;
-/// Time gaps that an adaptive cruise control has [s], and durations that a lane change has [s].
+/// Time gaps that an adaptive cruise control has (s), and durations that a lane change has (s).
 const TIME_GAPS_S: [f64; 2] = [0.2, 5.0];
 const LANE_CHANGES_S: [f64; 2] = [1.5, 20.0];
-/// Where nothing slower was recorded, speeds are taken to be at least this [m/s].
+/// Where nothing slower was recorded, speeds are taken to be at least this (m/s).
 const SLOWEST_MPS: f64 = 1.0;
-/// Room between two vehicles that start in one lane [m].
+/// Room between two vehicles that start in one lane (m).
 const LEAST_GAP_M: f64 = 0.5;
 /// Values in the file have so many steps per unit.
 const STEPS: f64 = 1_000.0;
@@ -223,7 +223,7 @@ fn overtaker(encounter: &RecordedEncounter) -> DriverConfig {
     })
 }
 
-/// Gap to `ahead` [m] and own speed [m/s] of a vehicle, up to a time.
+/// Gap to `ahead` (m) and own speed (m/s) of a vehicle, up to a time.
 fn gaps(own: &Trajectory, ahead: &Trajectory, until: Time) -> impl Iterator<Item = (f64, f64)> {
     let half_lengths_m = 0.5 * (own.dimensions.length_m + ahead.dimensions.length_m);
     let before = own.points.iter().take_while(move |point| point.time < until);

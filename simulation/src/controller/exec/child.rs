@@ -153,7 +153,7 @@ impl Child {
         }
     }
 
-    /// The most memory that it ever held [MiB]; 0 where the system does not say, as when it has just ended.
+    /// The most memory that it ever held (MiB); 0 where the system does not say, as when it has just ended.
     fn peak_memory_mib(&self) -> u64 {
         let status = std::fs::read_to_string(format!("/proc/{}/status", self.process.id())).unwrap_or_default();
         let peak_kib = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));

@@ -43,7 +43,7 @@ pub enum ExecError {
     /// It answered, but too late.
     #[error("the process answered later than the {limit_ms} ms allowed, {}", when(*answered))]
     Late {
-        /// Time allowed [ms].
+        /// Time allowed (ms).
         limit_ms: u128,
         /// Answers that it had given, the greeting among them.
         answered: u64,
@@ -51,7 +51,7 @@ pub enum ExecError {
     /// It hangs.
     #[error("the process hangs: no answer in twice the {limit_ms} ms allowed, {}{}", when(*answered), tail(words))]
     Hangs {
-        /// Time allowed [ms].
+        /// Time allowed (ms).
         limit_ms: u128,
         /// Answers that it had given, the greeting among them.
         answered: u64,
@@ -109,7 +109,7 @@ pub enum ExecError {
     /// It holds too much memory.
     #[error("the process holds more than the {limit_mib} MiB of memory allowed")]
     Memory {
-        /// Most that is allowed [MiB].
+        /// Most that is allowed (MiB).
         limit_mib: u64,
     },
 }

@@ -4,16 +4,16 @@ use std::collections::VecDeque;
 use std::io::{self, BufRead, BufReader, Read};
 use std::sync::mpsc::SyncSender;
 
-/// Longest line that is read [bytes].
+/// Longest line that is read (bytes).
 pub(super) const LONGEST_LINE: usize = 1 << 20;
 
-/// What is kept of standard error [bytes].
+/// What is kept of standard error (bytes).
 const KEPT_WORDS: usize = 2_048;
 
 /// Lines of standard error that an error message repeats.
 const REPEATED_LINES: usize = 5;
 
-/// Longest excerpt of a line in an error message [characters].
+/// Longest excerpt of a line in an error message (characters).
 const EXCERPT: usize = 120;
 
 /// A line of standard output.

@@ -4,10 +4,10 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-/// Time for one answer where nothing else is said [ms]: 25 control steps, which an interpreter's pauses stay below.
+/// Time for one answer where nothing else is said (ms): 25 control steps, which an interpreter's pauses stay below.
 pub const DEFAULT_TIMEOUT_MS: u64 = 1_000;
 
-/// Memory where nothing else is said [MiB]: an interpreter with its numerical libraries, with room.
+/// Memory where nothing else is said (MiB): an interpreter with its numerical libraries, with room.
 pub const DEFAULT_MEMORY_MIB: u64 = 1_024;
 
 /// A controller that is a command.
@@ -16,9 +16,9 @@ pub const DEFAULT_MEMORY_MIB: u64 = 1_024;
 pub struct ExecSettings {
     /// The command with its arguments, quoted as for a shell.
     pub command: String,
-    /// Time allowed for each answer [ms].
+    /// Time allowed for each answer (ms).
     pub timeout_ms: u64,
-    /// Most memory that the process may hold [MiB].
+    /// Most memory that the process may hold (MiB).
     pub memory_mib: u64,
 }
 
