@@ -13,6 +13,7 @@ mod arm;
 mod auditor;
 mod clock;
 mod closed_loop;
+mod ego_input;
 mod error;
 mod events;
 mod humans;

@@ -2,12 +2,12 @@
 
 use closecall_controllers::CheckedDriver;
 use closecall_controllers::{
-    DriverInput, DriverNote, EgoCommand, EgoController, EgoInput, EgoState, MisSettings, Neighbours, Odometry,
-    SensorAvailability,
+    DriverInput, DriverNote, EgoCommand, EgoController, EgoInput, EgoState, MisSettings, Neighbours,
 };
-use closecall_sensors::{Health, NoiseKey, Perception, Scene, SceneVehicle};
+use closecall_sensors::{NoiseKey, Perception, Scene, SceneVehicle};
 use closecall_traffic::{Measured, Track};
 
+use super::ego_input::{odometry, sensor_availability};
 use super::events::Events;
 use super::humans::{Human, human_drivers, weave};
 use super::margins::{MarginMeter, Widths};
@@ -150,10 +150,10 @@ impl<'a> Run<'a> {
             self.tracks.extend_from_slice(tracks);
             let input = EgoInput {
                 time,
-                odometry: self.odometry(),
+                odometry: odometry(self.scenario, &self.world),
                 road: &self.scenario.road,
                 tracks: &self.tracks,
-                sensors: availability(self.perception.as_ref()),
+                sensors: sensor_availability(self.perception.as_ref()),
             };
             let command = self.controller.step(&input)?;
             if !command.acceleration_mps2.is_finite() {
@@ -228,22 +228,6 @@ impl<'a> Run<'a> {
 
     fn widths(&self, actor: usize) -> Widths {
         Widths { vehicle_m: self.world.vehicle(actor).dimensions.width_m, lane_m: self.scenario.road.lane_width_m() }
-    }
-
-    fn odometry(&self) -> Odometry {
-        let ego = self.scenario.ego;
-        let state = self.world.state(ego);
-        let lane = self.scenario.road.lane_at(state.d_m);
-        let size = self.world.vehicle(ego).dimensions;
-        Odometry {
-            speed_mps: state.speed_mps,
-            acceleration_mps2: state.acceleration_mps2,
-            yaw_rate_radps: state.yaw_rate_radps,
-            lane,
-            lane_offset_m: state.d_m - self.scenario.road.lane_centre_m(lane),
-            length_m: size.length_m,
-            width_m: size.width_m,
-        }
     }
 
     /// Reports the control step to the observer.
@@ -390,15 +374,5 @@ impl<'a> Run<'a> {
             margins: self.meter.finish(),
             mis: self.mis.finish(self.arm.controller.has_mis(settings)),
         }
-    }
-}
-
-/// Returns which of the ego's sensors have not failed.
-fn availability(perception: &dyn Perception) -> SensorAvailability {
-    let health = perception.health();
-    SensorAvailability {
-        front: health.front != Health::Failed,
-        surround: health.surround != Health::Failed,
-        rear: health.rear != Health::Failed,
     }
 }

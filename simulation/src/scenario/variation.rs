@@ -70,7 +70,7 @@ mod tests {
     use super::*;
 
     fn headline() -> Scenario {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/library/low-thw-overtake-at-cut-out.toml");
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios/library/low-thw-overtake-at-cut-out.toml");
         let file = ScenarioFile::load(&path, &[]).unwrap();
         file.concrete(&file.space().nominal()).unwrap()
     }
