@@ -111,8 +111,8 @@ pub fn at_most(hits: u64, samples: u64, p: f64) -> f64 {
     }
 }
 
-/// Returns the probability of at least `hits` hits in `samples` samples with probability `p` each. Returns NaN if `p` is not
-/// in \[0, 1\] and `hits` is not above `samples`.
+/// Returns the probability of at least `hits` hits in `samples` samples with probability `p` each. Returns NaN if `p` is
+/// NaN, or if it is outside \[0, 1\] and `hits` does not exceed `samples`.
 pub fn at_least(hits: u64, samples: u64, p: f64) -> f64 {
     if hits > samples {
         return if p.is_nan() { f64::NAN } else { 0.0 };
