@@ -1,6 +1,6 @@
 //! The lateral path of a lane change: a quintic polynomial over the distance travelled.
 //!
-//! The path is a function of distance, not of time, so that a vehicle can follow it at any speed: a driver who brakes
+//! The path is a function of distance, not of time, so that a vehicle can follow it at any speed: a driver that brakes
 //! in the middle of a lane change stays on the path and takes longer.
 //!
 //! The quintic connects any lateral state (position, slope, second derivative) to the centre of the target lane, where
