@@ -97,8 +97,8 @@ impl Campaign {
 
     /// Runs the samples that the folder's journal does not hold yet; all samples if there is no folder.
     ///
-    /// `on_record` receives every record in the order of the plan, those of the journal first. If it breaks, the scenario
-    /// or the campaign ends after that record.
+    /// `on_record` receives every record in the order of the plan, those of the journal first. If it breaks, the
+    /// scenario or the campaign ends after that record.
     ///
     /// Returns the line at which the journal was cut off, if it was damaged.
     ///

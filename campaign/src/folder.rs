@@ -189,8 +189,8 @@ impl Folder {
 }
 
 impl LockedFolder {
-    /// Hands each existing record to `is_expected`, and opens the journal for appending behind the last one. A torn line
-    /// is cut off together with everything after it: those samples run again.
+    /// Hands each existing record to `is_expected`, and opens the journal for appending behind the last one. A torn
+    /// line is cut off together with everything after it: those samples run again.
     ///
     /// `is_expected` returns true if the record is the next one in the plan.
     ///

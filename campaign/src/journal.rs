@@ -1,4 +1,5 @@
-//! The journal of a campaign: a file to which the record of each sample is appended as one line, in the order of the plan.
+//! The journal of a campaign: a file to which the record of each sample is appended as one line, in the order of the
+//! plan.
 //!
 //! ```text
 //!  5f1c09a2b7d34e68 {"scenario":"low-thw-overtake","sample":0,"arms":[…]}
@@ -7,8 +8,8 @@
 //!
 //! Each line is handed to the operating system in one write. A program that is killed therefore leaves at most the last
 //! line incomplete. Once a second the journal is synchronised to the disk, so that a machine that fails loses about one
-//! second of results. The checksum reveals an incomplete or damaged line. That line and everything after it are cut off,
-//! and their samples run again: the same samples give the same lines.
+//! second of results. The checksum reveals an incomplete or damaged line. That line and everything after it are cut
+//! off, and their samples run again: the same samples give the same lines.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
@@ -105,8 +106,8 @@ pub enum Entry {
 /// Returns the entries of a journal in their order. The first torn entry is the last one returned.
 ///
 /// # Errors
-/// The error of the operating system if the file cannot be opened. An item of the iterator is an error if the file cannot
-/// be read further.
+/// The error of the operating system if the file cannot be opened. An item of the iterator is an error if the file
+/// cannot be read further.
 pub fn read(path: &Path) -> io::Result<Entries> {
     Ok(Entries { reader: BufReader::new(File::open(path)?), end: 0, line: 0, is_over: false, buffer: Vec::new() })
 }

@@ -6,14 +6,14 @@
 //!                     └──────── resume ◀────────────────┘
 //! ```
 //!
-//! - A *sample* is one concrete scenario, drawn from the distributions of a scenario file. Its number, the seed, and the
-//!   sampling design determine it.
-//! - An *arm* is a controller with its sensors. In a *paired* campaign each sample runs in two arms: the baseline, and the
-//!   arm under test.
+//! - A *sample* is one concrete scenario, drawn from the distributions of a scenario file. Its number, the seed, and
+//!   the sampling design determine it.
+//! - An *arm* is a controller with its sensors. In a *paired* campaign each sample runs in two arms: the baseline, and
+//!   the arm under test.
 //! - A *record* is the result of one sample in all arms: one line of the [`journal`].
 //!
-//! Rates are conditional on the sampled scenario: they are the share of *sampled encounters* that end in a collision, not
-//! the frequency of collisions on a road.
+//! Rates are conditional on the sampled scenario: they are the share of *sampled encounters* that end in a collision,
+//! not the frequency of collisions on a road.
 
 pub mod compare;
 pub mod execution;

@@ -1,6 +1,7 @@
 //! A lock that keeps a second program out of a campaign's folder.
 //!
-//! The operating system releases the lock when the program ends, even if the program is killed. A stale lock cannot exist.
+//! The operating system releases the lock when the program ends, even if the program is killed. A stale lock cannot
+//! exist.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, Write};
@@ -22,7 +23,8 @@ impl Lock {
     /// Locks a folder.
     ///
     /// # Errors
-    /// [`FolderError::Busy`] if another program holds the lock, [`FolderError::Write`] if the lock file cannot be written.
+    /// [`FolderError::Busy`] if another program holds the lock, [`FolderError::Write`] if the lock file cannot be
+    /// written.
     pub fn acquire(folder: &Path) -> Result<Self, FolderError> {
         let path = folder.join(LOCK);
         let fail = |source| WriteError::new(&path, source);

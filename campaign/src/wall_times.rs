@@ -1,7 +1,7 @@
 //! The wall time of each sample: a file beside the journal, with one line of JSON per sample, in the same order.
 //!
-//! Wall times differ from run to run. They therefore have a file of their own, apart from those that are reproducible. No
-//! result depends on them, so their lines are buffered: a program that is killed may lose the last ones.
+//! Wall times differ from run to run. They therefore have a file of their own, apart from those that are reproducible.
+//! No result depends on them, so their lines are buffered: a program that is killed may lose the last ones.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, BufRead, BufReader, BufWriter, Seek, SeekFrom, Write};
@@ -33,8 +33,8 @@ pub struct WallTimes {
 }
 
 impl WallTimes {
-    /// Opens the file for appending, and cuts it to the samples before `index` in the journal. Creates the file if there
-    /// is none.
+    /// Opens the file for appending, and cuts it to the samples before `index` in the journal. Creates the file if
+    /// there is none.
     ///
     /// # Errors
     /// [`WriteError`] if the file cannot be created or cut.

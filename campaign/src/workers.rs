@@ -9,8 +9,8 @@
 //! A run starts only if it is at most one window ahead of the last result returned. The window bounds the results that
 //! wait in memory, and the runs that a killed program has to repeat.
 //!
-//! A thread cannot be ended from outside. A worker that exceeds the time limit goes on until its run or the program ends,
-//! and its result is discarded.
+//! A thread cannot be ended from outside. A worker that exceeds the time limit goes on until its run or the program
+//! ends, and its result is discarded.
 
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
@@ -69,8 +69,8 @@ pub struct Finished {
 }
 
 impl Workers {
-    /// Runs the given samples, and passes each result to `on_finished` in the order of `samples`. Stops when `on_finished`
-    /// breaks.
+    /// Runs the given samples, and passes each result to `on_finished` in the order of `samples`. Stops when
+    /// `on_finished` breaks.
     ///
     /// # Errors
     /// The error of `on_finished`, or [`WorkersError`]. No further result is passed on then.
@@ -193,7 +193,8 @@ impl WorkerPool {
         self.submitted += 1;
     }
 
-    /// Waits until a run has finished or the interval of the watch is over. Returns the finished and the abandoned runs.
+    /// Waits until a run has finished or the interval of the watch is over. Returns the finished and the abandoned
+    /// runs.
     fn wait(&mut self) -> Result<Vec<Done>, WorkersError> {
         let mut done = Vec::new();
         match self.results.recv_timeout(WATCH_EVERY) {
