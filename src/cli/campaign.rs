@@ -58,10 +58,10 @@ pub(super) struct CampaignArgs {
     /// Folder for the results: manifest, journal, Parquet tables, JUnit and HTML reports, and recordings
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Resume the interrupted campaign in the folder given by --out
+    /// With --out: resume the interrupted campaign in that folder
     #[arg(long, requires = "out")]
     resume: bool,
-    /// Run only part I of N of the samples; `closecall merge` merges the parts
+    /// With --out: run only part I of N of the samples; `closecall merge` merges the parts
     #[arg(long, value_name = "I/N", requires = "out")]
     partition: Option<Partition>,
     /// With --out: save recordings (Rerun files) of selected samples of each scenario, and a page that shows them. KIND

@@ -155,7 +155,7 @@ struct Axis<'a> {
 }
 
 fn chart(found: &Robustness, axis: &Axis<'_>) -> LineChart {
-    let points = |column: usize, value: fn(&Cell) -> f64| {
+    let points = |column: usize, value: fn(&Cell) -> f64| -> Vec<(f64, f64)> {
         axis.levels.iter().zip(axis.rows).map(|(level, cells)| (*level, value(&cells[column]))).collect()
     };
     let lines = found.criteria.iter().enumerate().flat_map(|(column, criterion)| {

@@ -25,7 +25,7 @@ pub(super) struct StatisticsArgs {
     files: Vec<PathBuf>,
     #[command(flatten)]
     read: ReadArgs,
-    /// Speed limit in m/s [default: that of the trajectory file, or 120 km/h]
+    /// Speed limit in m/s [default: 120 km/h]
     #[arg(long, value_name = "M/S", value_parser = positive)]
     speed_limit_mps: Option<f64>,
     /// Folder for the box plots `duration.svg` and `speed.svg`

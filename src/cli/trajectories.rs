@@ -67,7 +67,7 @@ pub(super) struct CriticalityArgs {
     file: PathBuf,
     #[command(flatten)]
     read: ReadArgs,
-    /// Speed limit in m/s [default: that of the trajectory file, or 120 km/h]
+    /// Speed limit in m/s [default: 120 km/h]
     #[arg(long, value_name = "M/S", value_parser = positive)]
     speed_limit_mps: Option<f64>,
     /// Save a recording (Rerun file) of one lane change: the most critical one, or that of the track named by --track
@@ -89,7 +89,7 @@ pub(super) struct FitArgs {
     files: Vec<PathBuf>,
     #[command(flatten)]
     read: ReadArgs,
-    /// File to write; standard output if it is not given
+    /// File to write [default: standard output]
     #[arg(short, long, value_name = "FILE.toml")]
     output: Option<PathBuf>,
     /// Origin of the trajectory files, for the heading of the output
@@ -98,7 +98,7 @@ pub(super) struct FitArgs {
     /// Seed of the bootstrap, which computes the confidence intervals
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Output for people (the file's text) or for programs
+    /// Output format; without --output, `human` prints the text of the file
     #[arg(long, value_enum, default_value_t)]
     format: Format,
 }
