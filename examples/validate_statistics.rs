@@ -61,8 +61,8 @@ fn run(seed: u64, samples: u64, stops: impl Fn(&ArmCounts) -> bool) -> Result<Ca
     let campaign = Campaign::new(vec![work.clone()], workers);
     let mut summary = campaign.summary();
     let mut is_ever_outside = false;
-    campaign.run(None, |turn| {
-        summary.push(turn.record);
+    campaign.run(None, |next| {
+        summary.push(next.record);
         let counts = summary.total().arms[0];
         let (hits, samples) = (counts.collisions, counts.outcomes);
         // The two-sided bounds exclude the true probability if either side has refuted it.
