@@ -34,7 +34,7 @@ struct Run {
     road: Road,
     /// Start of the run on the clock of the log.
     start: Time,
-    /// True from the vehicle's first collision on: its motion is no longer driving and is not recorded.
+    /// True while nothing is recorded: the scenario lacks the actor, or the vehicle has collided and no longer drives.
     has_ended: bool,
     manoeuvre: Option<Manoeuvre>,
     /// Lane and time of the previous step.

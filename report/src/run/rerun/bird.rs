@@ -67,33 +67,33 @@ fn write_lanes(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError> {
     let edge = |line: u8| line == 0 || line == road.lanes();
     let colours = (0..=road.lanes()).map(|line| if edge(line) { palette::MARKING } else { palette::QUIET });
     let lanes = LineStrips2D::new(strips).with_colors(colours).with_radii([0.15_f32]).with_draw_order(LANES);
-    writer.fixed("bird/lanes", &lanes)
+    writer.write_static("bird/lanes", &lanes)
 }
 
 /// One bar for each vehicle that is there, with its name and speed.
 fn write_bodies(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordError> {
-    for (place, member) in film.cast.iter().enumerate().filter(|(_, member)| !member.rows.is_empty()) {
-        let entity = format!("bird/vehicles/{}", member.name);
-        let size = &member.vehicle.dimensions;
+    for (index, actor) in film.actors.iter().enumerate().filter(|(_, actor)| !actor.present_frames.is_empty()) {
+        let entity = format!("bird/vehicles/{}", actor.name);
+        let size = &actor.vehicle.dimensions;
         let fixed = LineStrips2D::update_fields()
-            .with_colors([palette::actor(place, film.ego)])
+            .with_colors([palette::actor(index, film.ego)])
             .with_radii([(0.5 * size.width_m * STRETCH) as f32])
             .with_draw_order(BODIES)
             .with_show_labels(true);
-        writer.fixed(&entity, &fixed)?;
+        writer.write_static(&entity, &fixed)?;
         let half_m = 0.5 * size.length_m;
-        writer.rows(&entity, times, |range| {
+        writer.write_rows(&entity, times, |range| {
             let rows: Vec<usize> = range.collect();
-            let there = || rows.iter().filter(|&&row| member.rows.contains(&row)).map(|&row| &film.frames[row]);
+            let present = || rows.iter().filter(|&&row| actor.present_frames.contains(&row)).map(|&row| &film.frames[row]);
             let bar = |frame: &Frame| {
-                let state = &frame.states[place];
+                let state = &frame.states[index];
                 [-half_m, half_m].map(|along_m| at(film, frame, state.s_m + along_m, state.d_m))
             };
-            let text = |frame: &Frame| format!("{} {:.1} m/s", member.name, frame.states[place].speed_mps);
+            let text = |frame: &Frame| format!("{} {:.1} m/s", actor.name, frame.states[index].speed_mps);
             LineStrips2D::update_fields()
-                .with_strips(there().map(bar))
-                .with_labels(there().map(text))
-                .columns(rows.iter().map(|row| usize::from(member.rows.contains(row))).collect::<Vec<_>>())
+                .with_strips(present().map(bar))
+                .with_labels(present().map(text))
+                .columns(rows.iter().map(|row| usize::from(actor.present_frames.contains(row))).collect::<Vec<_>>())
         })?;
     }
     Ok(())
@@ -102,14 +102,14 @@ fn write_bodies(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), 
 /// Velocities as lines ahead of the vehicles.
 fn write_speeds(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordError> {
     let entity = "bird/velocity";
-    writer.fixed(entity, &LineStrips2D::update_fields().with_radii([0.5_f32]).with_draw_order(PATHS))?;
-    let there = |row: usize| (0..film.cast.len()).filter(move |&actor| film.is_there(actor, row));
-    writer.rows(entity, times, |range| {
-        let all = || range.clone().flat_map(|row| there(row).map(move |actor| (row, actor)));
+    writer.write_static(entity, &LineStrips2D::update_fields().with_radii([0.5_f32]).with_draw_order(PATHS))?;
+    let present = |row: usize| (0..film.actors.len()).filter(move |&actor| film.is_present(actor, row));
+    writer.write_rows(entity, times, |range| {
+        let all = || range.clone().flat_map(|row| present(row).map(move |actor| (row, actor)));
         let line = |(row, actor): (usize, usize)| {
             let frame: &Frame = &film.frames[row];
             let state = &frame.states[actor];
-            let front_m = 0.5 * film.cast[actor].vehicle.dimensions.length_m;
+            let front_m = 0.5 * film.actors[actor].vehicle.dimensions.length_m;
             let (sin, cos) = state.heading_rad.sin_cos();
             let way_m = front_m + ARROW_S * state.speed_mps;
             [
@@ -118,8 +118,8 @@ fn write_speeds(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), 
             ]
         };
         LineStrips2D::new(all().map(line))
-            .with_colors(all().map(|(_, actor)| palette::faint(palette::actor(actor, film.ego), 170)))
-            .columns(range.clone().map(|row| there(row).count()).collect::<Vec<_>>())
+            .with_colors(all().map(|(_, actor)| palette::with_opacity(palette::actor(actor, film.ego), 170)))
+            .columns(range.clone().map(|row| present(row).count()).collect::<Vec<_>>())
     })
 }
 
@@ -128,8 +128,8 @@ fn write_lamps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), R
     let lit = |row: usize| -> Vec<([f32; 2], Rgba)> {
         let frame = &film.frames[row];
         let mut lamps = Vec::new();
-        for actor in (0..film.cast.len()).filter(|&actor| film.is_there(actor, row)) {
-            let (state, size) = (&frame.states[actor], &film.cast[actor].vehicle.dimensions);
+        for actor in (0..film.actors.len()).filter(|&actor| film.is_present(actor, row)) {
+            let (state, size) = (&frame.states[actor], &film.actors[actor].vehicle.dimensions);
             let rear_m = state.s_m - 0.5 * size.length_m;
             if state.brake_light {
                 lamps.push((at(film, frame, rear_m, state.d_m), palette::BRAKE_LIGHT));
@@ -148,8 +148,8 @@ fn write_lamps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), R
         return Ok(());
     }
     let entity = "bird/lamps";
-    writer.fixed(entity, &Points2D::update_fields().with_radii([1.1_f32]).with_draw_order(MARKS))?;
-    writer.rows(entity, times, |range| {
+    writer.write_static(entity, &Points2D::update_fields().with_radii([1.1_f32]).with_draw_order(MARKS))?;
+    writer.write_rows(entity, times, |range| {
         let rows = &rows[range];
         Points2D::new(rows.iter().flatten().map(|lamp| lamp.0))
             .with_colors(rows.iter().flatten().map(|lamp| lamp.1))
@@ -162,7 +162,7 @@ type Gap = ([[f32; 2]; 2], Rgba, String);
 
 /// The gaps before and behind E with their headways, red where these are critical.
 fn write_gaps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordError> {
-    let half_m = 0.5 * film.cast[film.ego].vehicle.dimensions.length_m;
+    let half_m = 0.5 * film.actors[film.ego].vehicle.dimensions.length_m;
     let gaps = |frame: &Frame| -> Vec<Gap> {
         let own = &frame.states[film.ego];
         let margins = &frame.margins;
@@ -179,8 +179,8 @@ fn write_gaps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), Re
     let rows: Vec<Vec<Gap>> = film.frames.iter().map(gaps).collect();
     let entity = "bird/gaps";
     let fixed = LineStrips2D::update_fields().with_radii([0.6_f32]).with_draw_order(MARKS).with_show_labels(true);
-    writer.fixed(entity, &fixed)?;
-    writer.rows(entity, times, |range| {
+    writer.write_static(entity, &fixed)?;
+    writer.write_rows(entity, times, |range| {
         let rows = &rows[range];
         LineStrips2D::new(rows.iter().flatten().map(|gap| gap.0))
             .with_colors(rows.iter().flatten().map(|gap| gap.1))
@@ -213,8 +213,8 @@ fn write_tracks(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), 
     let entity = "bird/tracks";
     let fixed =
         LineStrips2D::update_fields().with_colors([palette::TRACK]).with_radii([0.35_f32]).with_draw_order(MARKS);
-    writer.fixed(entity, &fixed)?;
-    writer.rows(entity, times, |range| {
+    writer.write_static(entity, &fixed)?;
+    writer.write_rows(entity, times, |range| {
         let rows = &rows[range];
         LineStrips2D::new(rows.iter().flatten().map(|outline| outline.iter().copied()))
             .columns(rows.iter().map(Vec::len).collect::<Vec<_>>())
@@ -224,7 +224,7 @@ fn write_tracks(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), 
 /// A mark from the collision on, where E then is.
 fn write_collisions(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError> {
     let Some(collision) = film.worst_collision() else { return Ok(()) };
-    let struck = film.cast.iter().position(|member| member.name == collision.between[0].as_str());
+    let struck = film.actors.iter().position(|actor| actor.name == collision.between[0].as_str());
     let Some(row) = film.frames.iter().position(|frame| frame.time >= collision.time) else { return Ok(()) };
     let Some(struck) = struck else { return Ok(()) };
     let frames = &film.frames[row..];
@@ -237,8 +237,8 @@ fn write_collisions(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError>
         .with_labels([String::new(), text])
         .with_draw_order(MARKS)
         .with_show_labels(true);
-    writer.fixed(entity, &fixed)?;
-    writer.rows(entity, &times, |range| {
+    writer.write_static(entity, &fixed)?;
+    writer.write_rows(entity, &times, |range| {
         let frames = &frames[range];
         // The words stand beside the road, clear of the vehicles' names.
         let marks = frames.iter().flat_map(|frame| {

@@ -148,7 +148,7 @@ impl Layout {
     /// The plots that any film has a curve in; films share them.
     fn plots(&mut self, films: &[Shown]) -> ContainerLike {
         let mut columns: [Vec<ContainerLike>; 2] = [Vec::new(), Vec::new()];
-        for (place, (name, title, range)) in PLOTS.into_iter().enumerate() {
+        for (index, (name, title, range)) in PLOTS.into_iter().enumerate() {
             let having: Vec<&Shown> = films.iter().filter(|film| film.plots.contains(&name)).collect();
             if having.is_empty() {
                 continue;
@@ -162,7 +162,7 @@ impl Layout {
             if let Some([low, high]) = range {
                 self.property(&view, "ScalarAxis", ScalarAxis::new().with_range(Range1D::new(low, high)));
             }
-            columns[place / (PLOTS.len() / 2)].push(view);
+            columns[index / (PLOTS.len() / 2)].push(view);
         }
         let columns = columns.into_iter().filter(|views| !views.is_empty());
         side_by_side(columns.map(|views| Vertical::new(views).into()).collect())

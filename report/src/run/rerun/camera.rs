@@ -26,13 +26,13 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<bool, RecordErro
     let Some((camera, key)) = &film.camera else { return Ok(false) };
     let camera = RearCamera::new(*camera);
     let fixed = Boxes2D::update_fields().with_radii([-1.5_f32]).with_show_labels(true);
-    writer.fixed("camera/windows", &fixed)?;
+    writer.write_static("camera/windows", &fixed)?;
     let mut lists = Lists::default();
     let mut drawn = false;
     for (frame, exposure) in chosen(film, rear_exposures(key)) {
         let image;
         (image, lists) = draw(film, &camera, frame, (exposure, lists));
-        writer.since("camera", frame.time, &image)?;
+        writer.write_from("camera", frame.time, &image)?;
         write_windows(writer, film, &camera, frame)?;
         drawn = true;
     }
@@ -74,7 +74,7 @@ fn write_windows(writer: &Writer<'_>, film: &Film, camera: &RearCamera, frame: &
     )
     .with_colors(seen.iter().map(|(found, _)| colour(found)))
     .with_labels(seen.iter().map(|(found, _)| label(found)));
-    writer.since("camera/windows", frame.time, &windows)
+    writer.write_from("camera/windows", frame.time, &windows)
 }
 
 fn colour(found: &Detection) -> Rgba {

@@ -9,7 +9,7 @@ use rerun::{Boxes3D, Ellipsoids3D, FillMode, LineStrips3D, Quaternion};
 use super::RecordError;
 use super::palette::{self, Rgba};
 use super::stream::{Writer, changes};
-use super::vehicles::about_up;
+use super::vehicles::yaw_rotation;
 use crate::run::film::Film;
 
 /// Height that boxes of tracks are drawn with, since tracks have none [m].
@@ -56,9 +56,9 @@ fn write_predictions(
     times: &[Time],
     tracks: &[Vec<Track>],
 ) -> Result<(), RecordError> {
-    writer.fixed(entity, &LineStrips3D::update_fields().with_radii([0.05_f32]))?;
+    writer.write_static(entity, &LineStrips3D::update_fields().with_radii([0.05_f32]))?;
     let is_shown = |track: &&Track| track.status != TrackStatus::Tentative && track.class.vehicle() >= 0.5;
-    writer.rows(entity, times, |range| {
+    writer.write_rows(entity, times, |range| {
         let rows = &tracks[range];
         let all = || rows.iter().flatten().filter(is_shown);
         let path = |track: &Track| {
@@ -67,7 +67,7 @@ fn write_predictions(
             [[x as f32, y as f32, PATH_Z_M], [ahead(x, track.vx_mps()), ahead(y, track.vy_mps()), PATH_Z_M]]
         };
         LineStrips3D::new(all().map(path))
-            .with_colors(all().map(|track| palette::faint(colour(track), 150)))
+            .with_colors(all().map(|track| palette::with_opacity(colour(track), 150)))
             .columns(rows.iter().map(|row| row.iter().filter(is_shown).count()).collect::<Vec<_>>())
     })
 }
@@ -78,9 +78,9 @@ fn write_own_path(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<()
         return Ok(());
     }
     let entity = "world/ego/predicted";
-    let fixed = LineStrips3D::update_fields().with_colors([palette::faint(palette::EGO, 200)]).with_radii([0.07_f32]);
-    writer.fixed(entity, &fixed)?;
-    writer.rows(entity, times, |range| {
+    let fixed = LineStrips3D::update_fields().with_colors([palette::with_opacity(palette::EGO, 200)]).with_radii([0.07_f32]);
+    writer.write_static(entity, &fixed)?;
+    writer.write_rows(entity, times, |range| {
         let ends = film.frames[range.clone()].iter().map(|frame| {
             let asked_mps2 = frame.command.map_or(0.0, |command| command.acceleration_mps2);
             let way_m = way_m(frame.states[film.ego].speed_mps, asked_mps2);
@@ -103,13 +103,13 @@ fn write_rear_field(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<
     if fields.iter().all(Option::is_none) {
         return Ok(());
     }
-    let bumper_m = -0.5 * film.cast[film.ego].vehicle.dimensions.length_m;
+    let bumper_m = -0.5 * film.actors[film.ego].vehicle.dimensions.length_m;
     let entity = "world/ego/rear_field_of_view";
     let fixed = LineStrips3D::update_fields().with_colors([palette::FIELD_OF_VIEW]).with_radii([0.05_f32]);
-    writer.fixed(entity, &fixed)?;
+    writer.write_static(entity, &fixed)?;
     let rows = changes(&fields);
     let times: Vec<Time> = rows.iter().map(|&row| times[row]).collect();
-    writer.rows(entity, &times, |range| {
+    writer.write_rows(entity, &times, |range| {
         let shown: Vec<Option<FieldOfView>> = rows[range].iter().map(|&row| fields[row]).collect();
         let edges = shown.iter().flatten().map(|field| edge(field, bumper_m));
         LineStrips3D::new(edges).columns(shown.iter().map(|field| usize::from(field.is_some())).collect::<Vec<_>>())
@@ -134,15 +134,15 @@ fn write_boxes(writer: &Writer<'_>, entity: &str, times: &[Time], tracks: &[Vec<
         .with_fill_mode(FillMode::MajorWireframe)
         .with_radii([0.035_f32])
         .with_show_labels(false);
-    writer.fixed(entity, &fixed)?;
-    writer.rows(entity, times, |range| {
+    writer.write_static(entity, &fixed)?;
+    writer.write_rows(entity, times, |range| {
         let rows = &tracks[range];
         let all = || rows.iter().flatten();
         let half = |length_m: f64| (0.5 * length_m + CLEARANCE_M) as f32;
         Boxes3D::update_fields()
             .with_centers(all().map(|track| [track.x_m() as f32, track.y_m() as f32, half(TRACK_HEIGHT_M)]))
             .with_half_sizes(all().map(|track| [half(track.length_m), half(track.width_m), half(TRACK_HEIGHT_M)]))
-            .with_quaternions(all().map(|track| about_up(track.heading_rad)))
+            .with_quaternions(all().map(|track| yaw_rotation(track.heading_rad)))
             .with_colors(all().map(colour))
             .with_labels(all().map(label))
             .columns(rows.iter().map(Vec::len).collect::<Vec<_>>())
@@ -151,8 +151,8 @@ fn write_boxes(writer: &Writer<'_>, entity: &str, times: &[Time], tracks: &[Vec<
 
 fn write_ellipses(writer: &Writer<'_>, entity: &str, times: &[Time], tracks: &[Vec<Track>]) -> Result<(), RecordError> {
     let fixed = Ellipsoids3D::update_fields().with_fill_mode(FillMode::MajorWireframe).with_line_radii([0.02_f32]);
-    writer.fixed(entity, &fixed)?;
-    writer.rows(entity, times, |range| {
+    writer.write_static(entity, &fixed)?;
+    writer.write_rows(entity, times, |range| {
         let rows = &tracks[range];
         let all = || rows.iter().flatten();
         let ellipses: Vec<([f32; 3], Quaternion)> = all().map(ellipse).collect();
@@ -169,9 +169,9 @@ fn write_ellipses(writer: &Writer<'_>, entity: &str, times: &[Time], tracks: &[V
 fn ellipse(track: &Track) -> ([f32; 3], Quaternion) {
     let position: Matrix2<f64> = track.covariance.fixed_view::<2, 2>(0, 0).into_owned();
     let axes = SymmetricEigen::new(position);
-    let half_m = |place: usize| (ELLIPSE_SIGMAS * axes.eigenvalues[place].max(0.0).sqrt()) as f32;
+    let half_m = |index: usize| (ELLIPSE_SIGMAS * axes.eigenvalues[index].max(0.0).sqrt()) as f32;
     let first = axes.eigenvectors.column(0);
-    ([half_m(0), half_m(1), ELLIPSE_HALF_THICKNESS_M as f32], about_up(first[1].atan2(first[0])))
+    ([half_m(0), half_m(1), ELLIPSE_HALF_THICKNESS_M as f32], yaw_rotation(first[1].atan2(first[0])))
 }
 
 /// What is more likely no vehicle stays in the background.

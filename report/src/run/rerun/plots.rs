@@ -9,7 +9,7 @@ use rerun::{SeriesLines, StateChange, StateConfiguration};
 use super::RecordError;
 use super::palette::{self, Rgba};
 use super::stream::{Writer, changes};
-use crate::run::film::{Film, Frame, state_word};
+use crate::run::film::{Film, Frame, ego_state_name};
 use closecall_simulation::outcome::{CRITICAL_THW_S, Phase};
 
 const LINE: f32 = 2.0;
@@ -70,7 +70,7 @@ impl Plots<'_> {
             return Ok(false);
         }
         self.pen(entity, pen)?;
-        self.writer.series(entity, &self.times, values)?;
+        self.writer.write_series(entity, &self.times, values)?;
         Ok(true)
     }
 
@@ -80,11 +80,11 @@ impl Plots<'_> {
             Role::Baseline | Role::Tested => format!("{} ({})", pen.name, self.film.arm),
         };
         let (colour, width) = match self.role {
-            Role::Baseline => (palette::dim(pen.colour), THIN_LINE),
+            Role::Baseline => (palette::darker(pen.colour), THIN_LINE),
             Role::Alone | Role::Tested => (pen.colour, pen.width),
         };
         let style = SeriesLines::new().with_names([name]).with_colors([colour]).with_widths([width]);
-        self.writer.fixed(entity, &style)
+        self.writer.write_static(entity, &style)
     }
 
     /// A level that values are compared with, from the first to the last frame; once where two films share a plot.
@@ -93,8 +93,8 @@ impl Plots<'_> {
             return Ok(());
         }
         let style = SeriesLines::new().with_names([name]).with_colors([palette::CRITICAL]).with_widths([THIN_LINE]);
-        self.writer.fixed(entity, &style)?;
-        self.writer.series(entity, &self.times, &vec![Some(level); self.times.len()])
+        self.writer.write_static(entity, &style)?;
+        self.writer.write_series(entity, &self.times, &vec![Some(level); self.times.len()])
     }
 
     fn headways(&self) -> Result<bool, RecordError> {
@@ -120,7 +120,7 @@ impl Plots<'_> {
 
     /// The closest encounter ahead, both vehicles at their present velocities, as it truly is and as the MIS sees it.
     fn encounter(&self) -> Result<bool, RecordError> {
-        let encounters: Vec<Option<Encounter>> = (0..self.times.len()).map(|row| self.film.encounter(row)).collect();
+        let encounters: Vec<Option<Encounter>> = (0..self.times.len()).map(|row| self.film.soonest_encounter(row)).collect();
         let of = |of: fn(&Encounter) -> f64| encounters.iter().map(|at| at.as_ref().map(of)).collect::<Vec<_>>();
         let ttce = Pen { name: "TTCE", colour: palette::REAR, width: LINE };
         let any = self.series("plots/encounter/ttce", &ttce, &of(|encounter| encounter.ttce_s))?;
@@ -141,12 +141,12 @@ impl Plots<'_> {
     }
 
     fn motion(&self) -> Result<(), RecordError> {
-        for (place, actor) in self.film.cast.iter().enumerate().filter(|(_, actor)| actor.is_plotted) {
-            let colour = palette::actor(place, self.film.ego);
+        for (index, actor) in self.film.actors.iter().enumerate().filter(|(_, actor)| actor.is_plotted) {
+            let colour = palette::actor(index, self.film.ego);
             let pen = Pen { name: &actor.name, colour, width: LINE };
             let of = |of: fn(&closecall_traffic::VehicleState) -> f64| {
                 let rows = self.film.frames.iter().enumerate();
-                rows.map(|(row, frame)| actor.rows.contains(&row).then(|| of(&frame.states[place]))).collect::<Vec<_>>()
+                rows.map(|(row, frame)| actor.present_frames.contains(&row).then(|| of(&frame.states[index]))).collect::<Vec<_>>()
             };
             self.series(&format!("plots/speed/{}", actor.name), &pen, &of(|state| state.speed_mps))?;
             self.series(&format!("plots/acceleration/{}", actor.name), &pen, &of(|state| state.acceleration_mps2))?;
@@ -179,14 +179,14 @@ impl Plots<'_> {
     fn states(&self) -> Result<(), RecordError> {
         let frames = &self.film.frames;
         if frames.iter().all(|frame| frame.command.is_some()) {
-            let state = |frame: &Frame| frame.command.map_or("", |command| state_word(command.state));
+            let state = |frame: &Frame| frame.command.map_or("", |command| ego_state_name(command.state));
             self.band("states/1_mis", &frames.iter().map(state).collect::<Vec<_>>(), &STATE_COLOURS)?;
-            let phase = |frame: &Frame| frame.phase.map_or("", phase_word);
+            let phase = |frame: &Frame| frame.phase.map_or("", phase_name);
             self.band("states/2_encounter", &frames.iter().map(phase).collect::<Vec<_>>(), &PHASE_COLOURS)?;
         }
         self.moments()?;
-        for (place, actor) in self.film.cast.iter().enumerate() {
-            let braking = frames.iter().map(|frame| frame.states[place].brake_light);
+        for (index, actor) in self.film.actors.iter().enumerate() {
+            let braking = frames.iter().map(|frame| frame.states[index].brake_light);
             let words: Vec<&str> = braking.map(|lit| if lit { BRAKES } else { DRIVES }).collect();
             if words.contains(&BRAKES) {
                 self.band(&format!("states/4_{}_brake_light", actor.name), &words, &BRAKE_COLOURS)?;
@@ -205,8 +205,8 @@ impl Plots<'_> {
             moments.iter().map(|noted| format!("({}) {}", noted.moment.letter(), noted.moment.text())).collect();
         let latest = |time: Time| moments.iter().rposition(|noted| noted.time <= time);
         let words: Vec<&str> =
-            self.times.iter().map(|&time| latest(time).map_or(BEFORE, |place| texts[place].as_str())).collect();
-        let colours = texts.iter().enumerate().map(|(place, text)| (text.as_str(), palette::moment(place)));
+            self.times.iter().map(|&time| latest(time).map_or(BEFORE, |index| texts[index].as_str())).collect();
+        let colours = texts.iter().enumerate().map(|(index, text)| (text.as_str(), palette::moment(index)));
         self.band(
             "states/3_moments",
             &words,
@@ -219,10 +219,10 @@ impl Plots<'_> {
             .with_values(colours.iter().map(|(word, _)| *word))
             .with_labels(colours.iter().map(|(word, _)| *word))
             .with_colors(colours.iter().map(|(_, colour)| *colour));
-        self.writer.fixed(entity, &configuration)?;
+        self.writer.write_static(entity, &configuration)?;
         let rows = changes(words);
         let times: Vec<Time> = rows.iter().map(|&row| self.times[row]).collect();
-        self.writer.rows(entity, &times, |range| {
+        self.writer.write_rows(entity, &times, |range| {
             StateChange::new().with_state(rows[range].iter().map(|&row| words[row])).columns_of_unit_batches()
         })
     }
@@ -238,22 +238,22 @@ const DRIVES: &str = "off";
 const BRAKE_COLOURS: [(&str, Rgba); 2] = [(BRAKES, palette::BRAKE_LIGHT), (DRIVES, palette::QUIET)];
 
 const STATE_COLOURS: [(&str, Rgba); 5] = [
-    (state_word(EgoState::Following), palette::QUIET),
-    (state_word(EgoState::Increasing), palette::EGO),
-    (state_word(EgoState::Holding), palette::SAFE),
-    (state_word(EgoState::Releasing), palette::NEUTRAL),
-    (state_word(EgoState::EmergencyBraking), palette::CRITICAL),
+    (ego_state_name(EgoState::Following), palette::QUIET),
+    (ego_state_name(EgoState::Increasing), palette::EGO),
+    (ego_state_name(EgoState::Holding), palette::SAFE),
+    (ego_state_name(EgoState::Releasing), palette::NEUTRAL),
+    (ego_state_name(EgoState::EmergencyBraking), palette::CRITICAL),
 ];
 
 const PHASE_COLOURS: [(&str, Rgba); 4] = [
-    (phase_word(Phase::Approach), palette::QUIET),
-    (phase_word(Phase::Critical), palette::CRITICAL),
-    (phase_word(Phase::Overtaking), palette::WARNING),
-    (phase_word(Phase::After), palette::NEUTRAL),
+    (phase_name(Phase::Approach), palette::QUIET),
+    (phase_name(Phase::Critical), palette::CRITICAL),
+    (phase_name(Phase::Overtaking), palette::WARNING),
+    (phase_name(Phase::After), palette::NEUTRAL),
 ];
 
 /// What a phase of the encounter is called.
-pub(super) const fn phase_word(phase: Phase) -> &'static str {
+pub(super) const fn phase_name(phase: Phase) -> &'static str {
     match phase {
         Phase::Approach => "approach",
         Phase::Critical => "critical",

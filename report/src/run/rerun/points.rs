@@ -13,7 +13,7 @@ use rerun::{Boxes3D, FillMode, Points3D};
 use super::RecordError;
 use super::palette::{self, Rgba};
 use super::stream::Writer;
-use super::vehicles::about_up;
+use super::vehicles::yaw_rotation;
 use crate::run::film::{Film, NO_CLUSTER, Scan};
 
 /// A point is drawn as a ball of this radius [m].
@@ -73,8 +73,8 @@ fn layer(scans: &[&Scan], colour: impl Fn(&Scan, usize) -> Option<Rgba>) -> Laye
 }
 
 fn write_layer(writer: &Writer<'_>, entity: &str, times: &[Time], layer: &Layer) -> Result<(), RecordError> {
-    writer.fixed(entity, &Points3D::update_fields().with_radii([POINT_M]))?;
-    writer.rows(entity, times, |range| {
+    writer.write_static(entity, &Points3D::update_fields().with_radii([POINT_M]))?;
+    writer.write_rows(entity, times, |range| {
         let first = layer.starts[range.start];
         let last = layer.starts.get(range.end).copied().unwrap_or(layer.points_m.len());
         Points3D::update_fields()
@@ -91,8 +91,8 @@ fn write_boxes(writer: &Writer<'_>, times: &[Time], scans: &[&Scan]) -> Result<(
         .with_radii([0.02_f32])
         .with_colors([palette::BOX_FIT])
         .with_show_labels(false);
-    writer.fixed(entity, &fixed)?;
-    writer.rows(entity, times, |range| {
+    writer.write_static(entity, &fixed)?;
+    writer.write_rows(entity, times, |range| {
         let scans = &scans[range];
         let all = || scans.iter().flat_map(|scan| &scan.boxes);
         let half = |extent_m: f64| (0.5 * extent_m) as f32;
@@ -103,7 +103,7 @@ fn write_boxes(writer: &Writer<'_>, times: &[Time], scans: &[&Scan]) -> Result<(
         Boxes3D::update_fields()
             .with_centers(all().map(centre))
             .with_half_sizes(all().map(|found| [half(found.length_m), half(found.width_m), half(found.top_m)]))
-            .with_quaternions(all().map(|found| about_up(found.heading_rad)))
+            .with_quaternions(all().map(|found| yaw_rotation(found.heading_rad)))
             .with_labels(all().map(|found| format!("{} points", found.points)))
             .columns(scans.iter().map(|scan| scan.boxes.len()).collect::<Vec<_>>())
     })

@@ -28,7 +28,7 @@ fn tell(page: &mut String, film: &Film) {
         let _ = write!(page, "{verdict}\n\n");
     }
     for line in film.story() {
-        let mark = if line.is_grave { "**" } else { "" };
+        let mark = if line.is_severe { "**" } else { "" };
         let _ = writeln!(page, "- {mark}{:.2} s: {}{mark}", line.time.s(), line.text);
     }
     page.push('\n');

@@ -103,7 +103,7 @@ fn empty_views(films: &[Film]) -> (usize, Vec<String>, Vec<String>) {
         let named = queries.iter().filter(|query| !inherited(query)).flat_map(|query| query.split_whitespace());
         let named = named.map(|query| query.trim_start_matches('+').trim_end_matches("/**").to_owned());
         let rootless = |origin: &String| origin != "/";
-        empty.extend(origins.into_iter().filter(rootless).chain(named).filter(|place| !has(place)));
+        empty.extend(origins.into_iter().filter(rootless).chain(named).filter(|entity| !has(entity)));
         timelines.extend(texts(&chunk, "TimePanelBlueprint:timeline"));
     }
     (views, empty, timelines)

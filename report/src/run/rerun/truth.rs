@@ -10,7 +10,7 @@ use rerun::{Boxes3D, FillMode, Quaternion};
 use super::RecordError;
 use super::palette::{self, Rgba};
 use super::stream::Writer;
-use super::vehicles::about_up;
+use super::vehicles::yaw_rotation;
 use crate::run::film::{Film, Frame};
 
 /// Distance of the near faces up to which a track belongs to a vehicle [m], as the audit of tracking has it.
@@ -66,12 +66,12 @@ fn write_layer(
 ) -> Result<(), RecordError> {
     let fixed =
         Boxes3D::update_fields().with_fill_mode(FillMode::MajorWireframe).with_radii([0.05_f32]).with_colors([colour]);
-    writer.fixed(entity, &fixed)?;
+    writer.write_static(entity, &fixed)?;
     // Only frames in which there is something, and the first after them: the rest stays as it is.
     let rows: Vec<usize> =
         (0..shapes.len()).filter(|&row| row == 0 || !shapes[row].is_empty() || !shapes[row - 1].is_empty()).collect();
     let times: Vec<Time> = rows.iter().map(|&row| times[row]).collect();
-    writer.rows(entity, &times, |range| {
+    writer.write_rows(entity, &times, |range| {
         let rows = &rows[range];
         let all = || rows.iter().flat_map(|&row| shapes[row]);
         Boxes3D::update_fields()
@@ -86,22 +86,22 @@ fn judge(film: &Film, frame: &Frame) -> Verdict {
     let mut verdict = Verdict::default();
     let confirmed = |track: &&Track| track.source == Source::Rear && track.status != TrackStatus::Tentative;
     let tracks: Vec<&Track> = frame.tracks.iter().filter(confirmed).collect();
-    let others = (0..film.cast.len()).filter(|&actor| actor != film.ego);
-    let places: Vec<(usize, [f64; 3])> = others.map(|actor| (actor, film.in_ego_frame(frame, actor))).collect();
-    let bumper_m = -0.5 * film.cast[film.ego].vehicle.dimensions.length_m;
-    let length_m = |actor: usize| film.cast[actor].vehicle.dimensions.length_m;
-    for &(actor, place) in &places {
-        let face = face_m(place, length_m(actor));
+    let others = (0..film.actors.len()).filter(|&actor| actor != film.ego);
+    let poses: Vec<(usize, [f64; 3])> = others.map(|actor| (actor, film.in_ego_frame(frame, actor))).collect();
+    let bumper_m = -0.5 * film.actors[film.ego].vehicle.dimensions.length_m;
+    let length_m = |actor: usize| film.actors[actor].vehicle.dimensions.length_m;
+    for &(actor, pose) in &poses {
+        let face = face_m(pose, length_m(actor));
         if face[0] > bumper_m || !frame.rear_field.is_none_or(|field| sees(&field, bumper_m, face)) {
             continue;
         }
         let is_known = tracks.iter().any(|track| near(face, track_face_m(track)));
-        let shape = truth(film, actor, place);
+        let shape = truth(film, actor, pose);
         if is_known { verdict.known.push(shape) } else { verdict.missed.push(shape) }
     }
     for track in tracks.iter().filter(|track| track.class.vehicle() > 0.5) {
-        let of_any = |&(actor, place): &(usize, [f64; 3])| near(face_m(place, length_m(actor)), track_face_m(track));
-        if !places.iter().any(of_any) {
+        let of_any = |&(actor, pose): &(usize, [f64; 3])| near(face_m(pose, length_m(actor)), track_face_m(track));
+        if !poses.iter().any(of_any) {
             verdict.false_tracks.push(claimed(track));
         }
     }
@@ -109,12 +109,12 @@ fn judge(film: &Film, frame: &Frame) -> Verdict {
 }
 
 fn truth(film: &Film, actor: usize, [x_m, y_m, yaw_rad]: [f64; 3]) -> Shape {
-    let size = &film.cast[actor].vehicle.dimensions;
+    let size = &film.actors[actor].vehicle.dimensions;
     let half = |extent_m: f64| (0.5 * extent_m + CLEARANCE_M) as f32;
     Shape {
         centre_m: [x_m as f32, y_m as f32, 0.5 * size.height_m as f32],
         half_m: [half(size.length_m), half(size.width_m), half(size.height_m)],
-        turn: about_up(yaw_rad),
+        turn: yaw_rotation(yaw_rad),
     }
 }
 
@@ -123,7 +123,7 @@ fn claimed(track: &Track) -> Shape {
     Shape {
         centre_m: [track.x_m() as f32, track.y_m() as f32, half(FALSE_HEIGHT_M)],
         half_m: [half(track.length_m), half(track.width_m), half(FALSE_HEIGHT_M)],
-        turn: about_up(track.heading_rad),
+        turn: yaw_rotation(track.heading_rad),
     }
 }
 

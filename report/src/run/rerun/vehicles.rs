@@ -25,31 +25,31 @@ const GAP_Z_M: f64 = 0.5;
 
 /// The entity of an actor.
 pub(super) fn entity(film: &Film, actor: usize) -> String {
-    if actor == film.ego { "world/ego".to_owned() } else { format!("world/vehicles/{}", film.cast[actor].name) }
+    if actor == film.ego { "world/ego".to_owned() } else { format!("world/vehicles/{}", film.actors[actor].name) }
 }
 
 pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError> {
     let all_times = film.times();
-    for (place, actor) in film.cast.iter().enumerate().filter(|(_, actor)| !actor.rows.is_empty()) {
-        let entity = entity(film, place);
-        let colour = palette::actor(place, film.ego);
-        let times = &all_times[actor.rows.clone()];
+    for (index, actor) in film.actors.iter().enumerate().filter(|(_, actor)| !actor.present_frames.is_empty()) {
+        let entity = entity(film, index);
+        let colour = palette::actor(index, film.ego);
+        let times = &all_times[actor.present_frames.clone()];
         let states: Vec<&VehicleState> =
-            film.frames[actor.rows.clone()].iter().map(|frame| &frame.states[place]).collect();
+            film.frames[actor.present_frames.clone()].iter().map(|frame| &frame.states[index]).collect();
         let size = &actor.vehicle.dimensions;
         let body = (format!("{entity}/body"), bodies::body(&actor.vehicle, colour));
-        if actor.rows == (0..all_times.len()) {
-            writer.fixed(&body.0, &body.1)?;
+        if actor.present_frames == (0..all_times.len()) {
+            writer.write_static(&body.0, &body.1)?;
         } else {
             // What is there for a while only comes and goes with its vehicle.
-            writer.since(&body.0, times[0], &body.1)?;
+            writer.write_from(&body.0, times[0], &body.1)?;
         }
         write_motion(writer, &entity, times, &states, &film.road)?;
         write_velocity(writer, &entity, times, &states, (size, colour))?;
         write_name(writer, &entity, times, &states, (actor.name.as_str(), size, colour))?;
         write_lights(writer, &entity, times, &states, (actor.vehicle.class, size))?;
-        if let Some(&gone) = all_times.get(actor.rows.end) {
-            writer.gone(&entity, gone)?;
+        if let Some(&gone) = all_times.get(actor.present_frames.end) {
+            writer.write_clear(&entity, gone)?;
         }
     }
     write_gaps(writer, film, &all_times)?;
@@ -64,17 +64,17 @@ fn write_motion(
     road: &Road,
 ) -> Result<(), RecordError> {
     let poses: Vec<_> = states.iter().map(|state| road.plane_pose(state.s_m, state.d_m, state.heading_rad)).collect();
-    writer.rows(entity, times, |range| {
+    writer.write_rows(entity, times, |range| {
         let poses = &poses[range];
         Transform3D::update_fields()
             .with_many_translation(poses.iter().map(|pose| [pose.x_m as f32, pose.y_m as f32, 0.0]))
-            .with_many_quaternion(poses.iter().map(|pose| about_up(pose.yaw_rad)))
+            .with_many_quaternion(poses.iter().map(|pose| yaw_rotation(pose.yaw_rad)))
             .columns_of_unit_batches()
     })
 }
 
 /// A rotation about the vertical axis.
-pub(super) fn about_up(yaw_rad: f64) -> Quaternion {
+pub(super) fn yaw_rotation(yaw_rad: f64) -> Quaternion {
     let (sin, cos) = (0.5 * yaw_rad).sin_cos();
     Quaternion::from_xyzw([0.0, 0.0, sin as f32, cos as f32])
 }
@@ -90,10 +90,10 @@ fn write_velocity(
     let above_m = (size.height_m + 0.5 * LABEL_ABOVE_M) as f32;
     let fixed = Arrows3D::update_fields()
         .with_origins([[0.0, 0.0, above_m]])
-        .with_colors([palette::faint(colour, 220)])
+        .with_colors([palette::with_opacity(colour, 220)])
         .with_radii([0.09_f32]);
-    writer.fixed(&entity, &fixed)?;
-    writer.rows(&entity, times, |range| {
+    writer.write_static(&entity, &fixed)?;
+    writer.write_rows(&entity, times, |range| {
         Arrows3D::update_fields()
             .with_vectors(states[range].iter().map(|state| [(ARROW_S * state.speed_mps) as f32, 0.0, 0.0]))
             .columns_of_unit_batches()
@@ -111,12 +111,12 @@ fn write_name(
     let above_m = (size.height_m + LABEL_ABOVE_M) as f32;
     let fixed =
         Points3D::new([[0.0, 0.0, above_m]]).with_colors([colour]).with_radii([0.05_f32]).with_show_labels(true);
-    writer.fixed(&entity, &fixed)?;
+    writer.write_static(&entity, &fixed)?;
     // The speed is rounded to what can be told apart, and only what changed is written.
     let texts: Vec<String> = states.iter().map(|state| format!("{name} {:.0} m/s", state.speed_mps)).collect();
     let rows = changes(&texts);
     let times: Vec<Time> = rows.iter().map(|&row| times[row]).collect();
-    writer.rows(&entity, &times, |range| {
+    writer.write_rows(&entity, &times, |range| {
         let texts = rows[range].iter().map(|&row| texts[row].as_str());
         Points3D::update_fields().with_labels(texts).columns_of_unit_batches()
     })
@@ -177,9 +177,9 @@ fn write_lamps(
     }
     let entity = format!("{entity}/{}", lamps.name);
     let fixed = Boxes3D::update_fields().with_colors([lamps.colour]).with_fill_mode(FillMode::Solid);
-    writer.fixed(&entity, &fixed)?;
+    writer.write_static(&entity, &fixed)?;
     let times: Vec<Time> = rows.iter().map(|&row| times[row]).collect();
-    writer.rows(&entity, &times, |range| {
+    writer.write_rows(&entity, &times, |range| {
         let lengths: Vec<usize> = rows[range].iter().map(|&row| if lit[row] { lamps.at_m.len() } else { 0 }).collect();
         let count = lengths.iter().sum();
         let centres = lamps.at_m.iter().cycle().take(count).map(|at| at.map(|value| value as f32));
@@ -192,7 +192,7 @@ fn write_lamps(
 
 /// The gaps in front of and behind E, from bumper to bumper, with their time headways; red below the critical one.
 fn write_gaps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordError> {
-    let bumper_m = 0.5 * film.cast[film.ego].vehicle.dimensions.length_m;
+    let bumper_m = 0.5 * film.actors[film.ego].vehicle.dimensions.length_m;
     let front = |frame: &Frame| Gap::new([bumper_m, 1.0], frame.margins.gap_front_m, frame.margins.thw_front_s);
     let rear = |frame: &Frame| Gap::new([-bumper_m, -1.0], frame.margins.gap_rear_m, frame.margins.thw_rear_s);
     let both: [(&str, Vec<Option<Gap>>); 2] = [
@@ -200,8 +200,8 @@ fn write_gaps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), Re
         ("world/ego/gap_rear", film.frames.iter().map(rear).collect()),
     ];
     for (entity, gaps) in both {
-        writer.fixed(entity, &LineStrips3D::update_fields().with_radii([0.06_f32]).with_show_labels(true))?;
-        writer.rows(entity, times, |range| {
+        writer.write_static(entity, &LineStrips3D::update_fields().with_radii([0.06_f32]).with_show_labels(true))?;
+        writer.write_rows(entity, times, |range| {
             let gaps = &gaps[range];
             let lengths: Vec<usize> = gaps.iter().map(|gap| usize::from(gap.is_some())).collect();
             let shown = || gaps.iter().flatten();
@@ -250,16 +250,16 @@ fn write_collisions(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError>
     let [first_m, further_m] = WORDS_BEHIND_M;
     let mut words_m = -first_m;
     for (number, collision) in film.collisions().iter().enumerate() {
-        let place = film.cast.iter().position(|actor| actor.name == collision.between[0].as_str());
-        let Some(place) = place else { continue };
-        let size = &film.cast[place].vehicle.dimensions;
+        let index = film.actors.iter().position(|actor| actor.name == collision.between[0].as_str());
+        let Some(index) = index else { continue };
+        let size = &film.actors[index].vehicle.dimensions;
         let at_m = match collision.struck_side[0] {
             BoxSide::Front => [0.5 * size.length_m, 0.0],
             BoxSide::Rear => [-0.5 * size.length_m, 0.0],
             BoxSide::Left => [0.0, 0.5 * size.width_m],
             BoxSide::Right => [0.0, -0.5 * size.width_m],
         };
-        let entity = format!("{}/collision_{}", entity(film, place), number + 1);
+        let entity = format!("{}/collision_{}", entity(film, index), number + 1);
         let [x, y] = at_m.map(|at_m| at_m as f32);
         let mark = Points3D::new([[x, y, 0.6], [words_m, 0.0, 0.0]])
             .with_colors([palette::CRITICAL])
@@ -268,7 +268,7 @@ fn write_collisions(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError>
             .with_show_labels(true);
         // The first frame at or after the touch: before it the vehicles are still apart.
         let shown_at = film.frames.iter().map(|frame| frame.time).find(|&time| time >= collision.time);
-        writer.since(&entity, shown_at.unwrap_or(collision.time), &mark)?;
+        writer.write_from(&entity, shown_at.unwrap_or(collision.time), &mark)?;
         words_m -= further_m;
     }
     Ok(())
