@@ -18,8 +18,8 @@ const UNITS: [(&str, &str); 14] = [
     ("s", "s"),
 ];
 
-/// Returns the unit that the suffix of a name stands for, or `None` if there is none. The parts of the name may be joined
-/// by `-` or `_`.
+/// Returns the unit that the suffix of a name stands for, or `None` if there is none. The parts of the name may be
+/// joined by `-` or `_`.
 pub(crate) fn unit_of(name: &str) -> Option<&'static str> {
     split(name).1
 }

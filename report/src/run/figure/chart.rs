@@ -1,6 +1,6 @@
 //! A line chart: axes with round ticks, curves with gaps, reference levels, and the marked moments of the encounter.
 
-use super::svg::{Anchor, Area, TextStyle, Stroke, Svg};
+use super::svg::{Anchor, Area, Stroke, Svg, TextStyle};
 
 /// Colour of text and axes.
 pub(super) const INK: &str = "#222222";

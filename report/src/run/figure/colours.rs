@@ -4,9 +4,9 @@
 
 /// Colour of the ego.
 pub(super) const EGO: &str = "#1f6fd1";
-/// Colour of the first of the other actors, which is the lead vehicle in most scenarios.
+/// Colour of the first of the other actors, by convention the lead vehicle.
 pub(super) const FRONT: &str = "#d98200";
-/// Colour of the second of the other actors, which is the rear vehicle in most scenarios.
+/// Colour of the second of the other actors, by convention the rear vehicle.
 pub(super) const REAR: &str = "#d4307c";
 /// Colours of the other actors, in their order.
 const OTHERS: [&str; 6] = [FRONT, REAR, "#4f9a1f", "#7b4fd0", "#149a94", "#8f7f3f"];

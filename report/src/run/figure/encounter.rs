@@ -1,5 +1,5 @@
-//! The figure of a whole encounter, laid out like the paper's: the road at the moments (a) to (e), the trajectories in the
-//! road frame, and plots over time with the moments marked.
+//! The figure of a whole encounter, laid out like the paper's: the road at the moments (a) to (e), the trajectories in
+//! the road frame, and plots over time with the moments marked.
 //!
 //! If there are two films, the first is the baseline. Its curves are dashed, and its moments are not marked.
 
@@ -9,7 +9,7 @@ use closecall_traffic::Time;
 use super::chart::{Chart, Curve, Range, range_of};
 use super::colours::{EGO, FRONT, REAR, colour};
 use super::strip;
-use super::svg::{Anchor, Area, TextStyle, Stroke, Svg};
+use super::svg::{Anchor, Area, Stroke, Svg, TextStyle};
 use crate::run::film::{Film, Frame, ego_state_name};
 use closecall_simulation::outcome::CRITICAL_THW_S;
 
@@ -71,7 +71,11 @@ fn title(svg: &mut Svg, films: &[Film]) {
     for (row, film) in films.iter().enumerate() {
         let has_collision = film.worst_collision().is_some();
         let line = if films.len() > 1 { format!("{}: {}", film.arm(), film.headline()) } else { film.headline() };
-        svg.text([LEFT, 36.0 + 14.0 * row as f64], &line, style(11.0, if has_collision { "#c40018" } else { "#1e7d32" }));
+        svg.text(
+            [LEFT, 36.0 + 14.0 * row as f64],
+            &line,
+            style(11.0, if has_collision { "#c40018" } else { "#1e7d32" }),
+        );
     }
 }
 
@@ -86,8 +90,9 @@ fn instants(film: &Film) -> Vec<(Time, char, String)> {
     } else if instants.is_empty() {
         let (start, critical) = (film.frames.first().map_or(Time::ZERO, |frame| frame.time), film.critical_moment());
         let at = |part: u8| start.s() + (critical - start).s() * f64::from(part) / f64::from(FALLBACK_INTERVALS);
-        instants =
-            (0..=FALLBACK_INTERVALS).map(|part| (Time::from_s(at(part)), char::from(b'1' + part), String::new())).collect();
+        instants = (0..=FALLBACK_INTERVALS)
+            .map(|part| (Time::from_s(at(part)), char::from(b'1' + part), String::new()))
+            .collect();
     }
     instants.sort_by_key(|(time, ..)| *time);
     instants
@@ -121,7 +126,15 @@ fn charts(films: &[Film]) -> Vec<Chart<'static>> {
     let plot = |name, curves: Vec<Curve<'static>>, levels: Vec<(f64, String)>, [low, high]: Range, limits: Range| {
         let values = curves.iter().flat_map(|curve| curve.points.iter().filter_map(|point| point.1));
         let [bottom, top] = range_of(values, [low, high]);
-        Chart { name, x: span, y: [bottom.max(limits[0]), top.min(limits[1])], curves, levels, moments: &[], x_name: None }
+        Chart {
+            name,
+            x: span,
+            y: [bottom.max(limits[0]), top.min(limits[1])],
+            curves,
+            levels,
+            moments: &[],
+            x_name: None,
+        }
     };
     let unlimited = [f64::NEG_INFINITY, f64::INFINITY];
     vec![
@@ -146,8 +159,8 @@ fn initial_speed_range(films: &[Film]) -> Range {
     first.map_or([0.0, 1.0], |speed_mps| [speed_mps - 1.0, speed_mps + 1.0])
 }
 
-/// Returns the time span of the plots (s): from the first instant of any film until [`AFTER_S`] after the last moment of
-/// any film.
+/// Returns the time span of the plots (s): from the first instant of any film until [`AFTER_S`] after the last moment
+/// of any film.
 fn span(films: &[Film]) -> Range {
     let starts = films.iter().filter_map(|film| film.frames.first()).map(|frame| frame.time.s());
     let ends = films.iter().map(|film| {

@@ -1,12 +1,13 @@
-//! Static figures of an encounter, which need no viewer: for a report, and for the index page of a campaign's recordings.
+//! Static figures of an encounter, which need no viewer: for a report, and for the index page of a campaign's
+//! recordings.
 //!
 //! ```text
 //!   Film ─▶ road strips at (a) … (e) ─┐
 //!        ─▶ trajectories, plots ──────┴─▶ SVG ─(bundled font)─▶ PNG
 //! ```
 //!
-//! The same film gives the same bytes on every machine: this module writes the SVG itself, and renders its text with the
-//! bundled font (a subset of DejaVu Sans; see `font/`), never with the fonts of the machine.
+//! The same film gives the same bytes on every machine: this module writes the SVG itself, and renders its text with
+//! the bundled font (a subset of DejaVu Sans; see `font/`), never with the fonts of the machine.
 
 mod chart;
 mod colours;

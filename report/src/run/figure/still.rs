@@ -3,7 +3,7 @@
 use super::chart::{Chart, Curve, range_of};
 use super::colours::{FRONT, REAR};
 use super::strip;
-use super::svg::{Anchor, Area, TextStyle, Stroke, Svg};
+use super::svg::{Anchor, Area, Stroke, Svg, TextStyle};
 use crate::run::film::{Film, Frame};
 use closecall_simulation::outcome::CRITICAL_THW_S;
 
@@ -19,7 +19,8 @@ const MAX_THW_S: f64 = 5.0;
 pub fn still(film: &Film) -> String {
     let mut svg = Svg::new(SIZE);
     let critical = film.critical_moment();
-    let frame_index = film.frames.partition_point(|frame| frame.time < critical).min(film.frames.len().saturating_sub(1));
+    let frame_index =
+        film.frames.partition_point(|frame| frame.time < critical).min(film.frames.len().saturating_sub(1));
     let has_collision = film.worst_collision().is_some();
     let title = format!("{} · {:.2} s", film.title(), critical.s());
     let style = |size, colour| TextStyle { size, colour, anchor: Anchor::Start };

@@ -3,7 +3,7 @@
 use closecall_traffic::{Lane, Measured};
 
 use super::colours::colour;
-use super::svg::{Anchor, Area, TextStyle, Stroke, Svg};
+use super::svg::{Anchor, Area, Stroke, Svg, TextStyle};
 use crate::run::film::{Film, Frame};
 use closecall_simulation::outcome::CRITICAL_THW_S;
 
@@ -96,7 +96,8 @@ impl Strip<'_> {
             svg.circle(corner([-1.0, side]), 3.0, INDICATOR);
         }
         let [x, _] = corner([0.0, 0.0]);
-        // The name of the ego is below its body, those of the others are above: a vehicle beside the ego covers neither.
+        // The name of the ego is below its body, those of the others are above: a vehicle beside the ego covers
+        // neither.
         let y = if actor == self.film.ego { corner([0.0, -1.0])[1] + 11.0 } else { corner([0.0, 1.0])[1] - 3.0 };
         let style = TextStyle { size: FONT_SIZE_PX, colour: paint, anchor: Anchor::Middle };
         svg.text([x, y], &format!("{} {:.1} m/s", actor.name, state.speed_mps), style);

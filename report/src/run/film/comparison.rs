@@ -46,7 +46,10 @@ impl Comparison {
         let from_lane = encounter.home;
         let crosses = |frame: &&Frame| simulated.road.lane_at(frame.states[REAR].d_m) != from_lane;
         let crossing = simulated.frames.iter().find(crosses).map(|frame| frame.time);
-        Self { recorded: Course::measure(recorded, Some(encounter.crossing)), simulated: Course::measure(simulated, crossing) }
+        Self {
+            recorded: Course::measure(recorded, Some(encounter.crossing)),
+            simulated: Course::measure(simulated, crossing),
+        }
     }
 
     /// Returns the name of each metric with its text for the recorded encounter and for the simulated run.
@@ -61,8 +64,8 @@ impl Comparison {
         })
     }
 
-    /// Returns the comparison as Markdown: the vehicles, a table of the metrics, and how the run deviates from the recorded
-    /// encounter.
+    /// Returns the comparison as Markdown: the vehicles, a table of the metrics, and how the run deviates from the
+    /// recorded encounter.
     pub fn markdown(&self, encounter: &RecordedEncounter, simulated: &Film, driver: RearDriver) -> String {
         let [ego, front, rear] = encounter.protagonists().map(|track| track.track_id);
         let (arm, start_s) = (simulated.arm(), encounter.start.s());

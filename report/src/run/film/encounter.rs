@@ -1,14 +1,14 @@
 //! The film of a recorded encounter, to be viewed beside the run that re-enacts it.
 //!
-//! The recorded vehicle that the simulated ego replaces is the ego of the film. Clock, road and vehicle indices are those
-//! of the scenario that is made from the encounter, so that one film can be drawn into the other. The frames are one
-//! control step of the simulation apart.
+//! The recorded vehicle that the simulated ego replaces is the ego of the film. Clock, road and vehicle indices are
+//! those of the scenario that is made from the encounter, so that one film can be drawn into the other. The frames are
+//! one control step of the simulation apart.
 
 use closecall_scenarios::encounter::{EGO, RecordedEncounter};
 use closecall_traffic::{Environment, Time, Trajectory, Vehicle};
 
 use super::traffic::{frame_at, present_frames, straight_road};
-use super::{Film, Level, FilmActor, TrafficFilmError};
+use super::{Film, FilmActor, Level, TrafficFilmError};
 use closecall_simulation::CONTROL_STEP;
 use closecall_simulation::scenario::actor_name;
 

@@ -46,8 +46,8 @@ pub struct FilmActor {
 #[derive(Clone, Debug)]
 pub struct Frame {
     pub(in crate::run) time: Time,
-    /// States of the vehicles, in the order of [`Film::actors`]. A vehicle that is absent has the nearest of its states in
-    /// time.
+    /// States of the vehicles, in the order of [`Film::actors`]. A vehicle that is absent has the nearest of its states
+    /// in time.
     pub(in crate::run) states: Vec<VehicleState>,
     /// Pitch of each body, positive nose down (rad).
     pub(in crate::run) pitches_rad: Vec<f64>,
@@ -84,7 +84,8 @@ pub struct Film {
     pub(in crate::run) environment: Environment,
     /// The vehicles, in the order of the scenario's actors.
     pub(in crate::run) actors: Vec<FilmActor>,
-    /// Index of the ego among the actors. In the film of a recorded lane change, the vehicle that changes lanes is the ego.
+    /// Index of the ego among the actors. In the film of a recorded lane change, the vehicle that changes lanes is the
+    /// ego.
     pub(in crate::run) ego: usize,
     pub(in crate::run) frames: Vec<Frame>,
     pub(in crate::run) happenings: Vec<(Time, Happening)>,
@@ -168,14 +169,14 @@ impl Film {
         self.actors[actor].rows.contains(&frame_index)
     }
 
-    /// Returns the ego's closest encounter that comes next after a frame, or `None` if there is none within the horizon. Both
-    /// vehicles are assumed to keep their velocities.
+    /// Returns the ego's closest encounter that comes next after a frame, or `None` if there is none within the
+    /// horizon. Both vehicles are assumed to keep their velocities.
     pub(in crate::run) fn soonest_encounter(&self, frame_index: usize) -> Option<Encounter> {
         let frame = &self.frames[frame_index];
         let own = self.moving_box(frame, self.ego);
         let others = (0..self.actors.len()).filter(|&actor| actor != self.ego && self.is_present(actor, frame_index));
-        let encounters =
-            others.filter_map(|actor| closest_encounter(&own, &self.moving_box(frame, actor), ENCOUNTER_HORIZON_S).ok());
+        let encounters = others
+            .filter_map(|actor| closest_encounter(&own, &self.moving_box(frame, actor), ENCOUNTER_HORIZON_S).ok());
         encounters.min_by(|a, b| a.ttce_s.total_cmp(&b.ttce_s))
     }
 

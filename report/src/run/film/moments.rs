@@ -44,7 +44,8 @@ impl Film {
         let distance_m = |frame_index: usize| {
             let frame = &self.frames[frame_index];
             let own = self.moving_box(frame, self.ego).shape;
-            let others = (0..self.actors.len()).filter(|&actor| actor != self.ego && self.is_present(actor, frame_index));
+            let others =
+                (0..self.actors.len()).filter(|&actor| actor != self.ego && self.is_present(actor, frame_index));
             others.map(|actor| own.distance_m(&self.moving_box(frame, actor).shape)).min_by(f64::total_cmp)
         };
         let distances = (0..self.frames.len()).filter_map(|index| Some((index, distance_m(index)?)));

@@ -5,17 +5,18 @@ use closecall_sensors::camera::Pipeline;
 use closecall_sensors::{NoiseKey, SensorMode};
 use closecall_traffic::Time;
 
-use super::{Film, Frame, Level, Limit, FilmActor, Scan};
+use super::{Film, FilmActor, Frame, Level, Limit, Scan};
 use closecall_simulation::outcome::{Outcome, Phase};
 use closecall_simulation::scenario::Scenario;
 use closecall_simulation::{Arm, CONTROL_STEP, Happening, Observer, RunKey, StepView};
 
-/// Gravitational acceleration (m/s²). Its product with the friction coefficient is the largest deceleration that the road
-/// allows.
+/// Gravitational acceleration (m/s²). Its product with the friction coefficient is the largest deceleration that the
+/// road allows.
 const GRAVITY_MPS2: f64 = 9.81;
 
-// A run has more than a million LiDAR points, so that a film keeps only some of its scans: sparse ones throughout, dense
-// ones in the critical and the overtaking phase up to a maximum number, and always the one at the smallest rear headway.
+// A run has more than a million LiDAR points, so that a film keeps only some of its scans: sparse ones throughout,
+// dense ones in the critical and the overtaking phase up to a maximum number, and always the one at the smallest rear
+// headway.
 
 /// Number of frames between two kept scans in all phases.
 const SPARSE_SCAN_INTERVAL: usize = 50;

@@ -71,7 +71,8 @@ impl Film {
             text: format!("({}) {}", noted.moment.letter(), noted.moment.text()),
             is_severe: false,
         });
-        let notes = self.notes.iter().map(|(time, text)| StoryLine { time: *time, text: text.clone(), is_severe: false });
+        let notes =
+            self.notes.iter().map(|(time, text)| StoryLine { time: *time, text: text.clone(), is_severe: false });
         let mut lines: Vec<StoryLine> = happenings.chain(moments).chain(notes).collect();
         lines.sort_by_key(|line| line.time);
         lines
@@ -81,7 +82,9 @@ impl Film {
         let plain = |text: String| Some(StoryLine { time, text, is_severe: false });
         match what {
             Happening::EventTriggered { event } => plain(format!("the scenario's event `{event}` sets in")),
-            Happening::DriverNote { actor, note } => plain(format!("{} {}", self.actors[*actor].name, driver_note_text(*note))),
+            Happening::DriverNote { actor, note } => {
+                plain(format!("{} {}", self.actors[*actor].name, driver_note_text(*note)))
+            }
             Happening::EgoStateChanged { to, reason, .. } => {
                 let text = format!("E: {} ({reason})", ego_state_name(*to));
                 Some(StoryLine { time, text, is_severe: *to == EgoState::EmergencyBraking })

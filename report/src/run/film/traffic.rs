@@ -13,7 +13,7 @@ use closecall_traffic::{
     TrajectoryPoint, Vehicle, VehicleState,
 };
 
-use super::{Film, Frame, Level, FilmActor};
+use super::{Film, FilmActor, Frame, Level};
 use closecall_simulation::{Lead, MarginsNow};
 
 /// Time shown before the start and after the end of the lane change.

@@ -1,5 +1,6 @@
-//! The vehicles of the other film of a pair, as see-through outlines in the world of this one: where everyone would be
-//! without the system under test, or is in the recording.
+//! Ghosts: the vehicles of one film of a pair, as transparent outlines in the views of the other.
+//!
+//! They show where the vehicles are without the system under test, or in the recorded traffic.
 
 use closecall_traffic::Time;
 use rerun::{Boxes3D, FillMode, LineStrips2D};
@@ -12,9 +13,9 @@ use super::vehicles::yaw_rotation;
 use crate::run::film::Film;
 
 /// Opacity of an outline.
-const FAINT: u8 = 120;
+const OPACITY: u8 = 120;
 
-/// Writes the vehicles of `other` into the world of `film`, for as long as both last.
+/// Writes the vehicles of `other` into the 3D scene and the view from above of `film`.
 pub(super) fn write(writer: &Writer<'_>, film: &Film, other: &Film) -> Result<(), RecordError> {
     for (index, _) in other.actors.iter().enumerate().filter(|(_, actor)| !actor.present_frames.is_empty()) {
         write_outline(writer, other, index)?;
@@ -29,7 +30,7 @@ fn write_outline(writer: &Writer<'_>, other: &Film, index: usize) -> Result<(), 
     let half = |extent_m: f64| (0.5 * extent_m) as f32;
     let fixed = Boxes3D::update_fields()
         .with_half_sizes([[half(size.length_m), half(size.width_m), half(size.height_m)]])
-        .with_colors([palette::with_opacity(palette::actor(index, other.ego), FAINT)])
+        .with_colors([palette::with_opacity(palette::actor(index, other.ego), OPACITY)])
         .with_fill_mode(FillMode::MajorWireframe)
         .with_radii([0.04_f32])
         .with_labels([format!("{} ({})", actor.name, other.arm)])
@@ -73,7 +74,7 @@ fn write_from_above(writer: &Writer<'_>, film: &Film, other: &Film) -> Result<()
         };
         LineStrips2D::update_fields()
             .with_strips(all().map(outline))
-            .with_colors(all().map(|(_, index)| palette::with_opacity(palette::actor(index, other.ego), FAINT)))
+            .with_colors(all().map(|(_, index)| palette::with_opacity(palette::actor(index, other.ego), OPACITY)))
             .columns(range.clone().map(|row| present(row).count()).collect::<Vec<_>>())
     })
 }

@@ -19,7 +19,8 @@ struct Line {
     text: String,
 }
 
-/// Writes the log of a film. Unless the film is the only one of the recording, each line begins with the name of its arm.
+/// Writes the log of a film. Unless the film is the only one of the recording, each line begins with the name of its
+/// arm.
 pub(super) fn write(writer: &Writer<'_>, film: &Film, is_alone: bool) -> Result<(), RecordError> {
     let start = film.frames.first().map_or(Time::ZERO, |frame| frame.time);
     let plain = |entity, time, text| Line { time, entity, level: TextLogLevel::INFO, colour: palette::NEUTRAL, text };

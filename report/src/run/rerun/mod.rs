@@ -4,9 +4,9 @@
 //!  Film ─▶ road, vehicles, tracks, points │ from above │ camera │ plots │ log │ story │ blueprint ─▶ FILE.rrd
 //! ```
 //!
-//! A recording is written as a whole when the outcome of the run is known. It is therefore small and never incomplete, and
-//! it opens at the critical moment. Two films share one timeline and the same plots. Each has a 3D scene of its own, in
-//! which the vehicles of the other film appear as outlines.
+//! A recording is written as a whole when the outcome of the run is known. It is therefore small and never incomplete,
+//! and it opens at the critical moment. Two films share one timeline and the same plots. Each has a 3D scene of its
+//! own, in which the vehicles of the other film appear as outlines.
 //!
 //! This folder is the only one that uses the rerun library.
 

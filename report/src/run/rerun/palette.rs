@@ -1,14 +1,14 @@
-//! The colours of a recording. Each actor has the same colour in all views, so that a vehicle in the scene and its curves in
-//! the plots can be matched.
+//! The colours of a recording. Each actor has the same colour in all views, so that a vehicle in the scene and its
+//! curves in the plots can be matched.
 
 /// An sRGB colour with its opacity.
 pub(super) type Rgba = [u8; 4];
 
 /// The ego.
 pub(super) const EGO: Rgba = [64, 156, 255, 255];
-/// The first of the other actors, which is the lead vehicle in most scenarios.
+/// The first of the other actors, by convention the lead vehicle.
 pub(super) const FRONT: Rgba = [255, 176, 59, 255];
-/// The second of the other actors, which is the rear vehicle in most scenarios.
+/// The second of the other actors, by convention the rear vehicle.
 pub(super) const REAR: Rgba = [244, 92, 160, 255];
 /// Colours of the other actors, in their order. They repeat if there are more actors.
 const OTHERS: [Rgba; 6] =

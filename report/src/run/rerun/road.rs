@@ -31,7 +31,7 @@ const POST_PERIOD_M: f64 = 4.0;
 /// Lateral distance of the guard rail from the edge of the lanes (m).
 const RAIL_OFFSET_M: f64 = SHOULDER_M - 0.5;
 
-/// Height of the verge (m). Flat layers need different heights so that they do not flicker.
+/// Height of the verge (m). Flat layers lie at different heights, so that each of them is visible.
 const VERGE_Z_M: f64 = -0.30;
 /// Height of the lane markings (m).
 const MARKING_Z_M: f64 = 0.03;

@@ -1,8 +1,8 @@
 //! The writer of a film's entities, on the three timelines of the recording.
 //!
-//! The timelines `time` and `step` span the whole run. The viewer opens a timeline at its latest moment, and a file cannot
-//! set another one. A third timeline, [`OPENING_TIMELINE`], therefore ends shortly after the critical moment. The
-//! blueprint selects it, so that the viewer opens at the critical moment.
+//! The timelines `time` and `step` span the whole run. The viewer opens a timeline at its latest moment, and a file
+//! cannot set another one. A third timeline, [`OPENING_TIMELINE`], therefore ends shortly after the critical moment.
+//! The blueprint selects it, so that the viewer opens at the critical moment.
 
 use std::ops::Range;
 
@@ -48,7 +48,8 @@ impl<'a> Writer<'a> {
         Ok(self.stream.log_static(self.path(entity), what)?)
     }
 
-    /// Writes one row of components for each of `times`, which must ascend. `build` returns the columns of a range of rows.
+    /// Writes one row of components for each of `times`, which must ascend. `build` returns the columns of a range of
+    /// rows.
     pub(super) fn write_rows<C>(
         &self,
         entity: &str,

@@ -1,4 +1,4 @@
-//! The vehicles on the road: bodies that move, lights, names, and the gaps around E.
+//! The vehicles in the 3D scene: bodies, lights, names, velocities, collisions, and the gaps around the ego.
 
 use closecall_traffic::geometry::BoxSide;
 use closecall_traffic::{Dimensions, Indicator, Measured, Road, Time, VehicleClass, VehicleState};
@@ -11,19 +11,21 @@ use super::stream::{Writer, changes};
 use crate::run::film::{Film, Frame};
 use closecall_simulation::outcome::{CRITICAL_THW_S, Collision};
 
-/// A velocity is drawn as the way that the vehicle goes in this time [s].
+/// An arrow shows the distance that the vehicle travels in this time (s).
 const ARROW_S: f64 = 0.25;
-/// Names stand this high above the roof, arrows half as high [m].
+/// Height of the names above the roof (m). The arrows are half as high above it.
 const LABEL_ABOVE_M: f64 = 0.8;
-/// Words about a collision lie on the road behind it, where no vehicle has its name: the first of them this far behind
-/// the middle of the vehicle that carries it, each further one so much further [m].
-const WORDS_BEHIND_M: [f32; 2] = [11.0, 4.0];
-/// A shorter gap has no room for its headway between the names of the two vehicles [m].
+/// Distance of the text about the first collision behind the centre of the vehicle that carries it (m). The text lies
+/// on the road, clear of the names of the vehicles.
+const COLLISION_TEXT_BEHIND_M: f32 = 11.0;
+/// Distance between the texts about two collisions (m).
+const COLLISION_TEXT_SPACING_M: f32 = 4.0;
+/// Length of a gap below which it has no label, since the names of the two vehicles leave no room (m).
 pub(super) const LABELLED_GAP_M: f64 = 3.0;
-/// Height at which gaps are drawn [m].
+/// Height at which gaps are drawn (m).
 const GAP_Z_M: f64 = 0.5;
 
-/// The entity of an actor.
+/// Returns the path of the entity of an actor.
 pub(super) fn entity(film: &Film, actor: usize) -> String {
     if actor == film.ego { "world/ego".to_owned() } else { format!("world/vehicles/{}", film.actors[actor].name) }
 }
@@ -41,7 +43,7 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError>
         if actor.present_frames == (0..all_times.len()) {
             writer.write_static(&body.0, &body.1)?;
         } else {
-            // What is there for a while only comes and goes with its vehicle.
+            // A body written statically could not disappear with its vehicle.
             writer.write_from(&body.0, times[0], &body.1)?;
         }
         write_motion(writer, &entity, times, &states, &film.road)?;
@@ -73,7 +75,7 @@ fn write_motion(
     })
 }
 
-/// A rotation about the vertical axis.
+/// Returns a rotation about the vertical axis.
 pub(super) fn yaw_rotation(yaw_rad: f64) -> Quaternion {
     let (sin, cos) = (0.5 * yaw_rad).sin_cos();
     Quaternion::from_xyzw([0.0, 0.0, sin as f32, cos as f32])
@@ -112,7 +114,7 @@ fn write_name(
     let fixed =
         Points3D::new([[0.0, 0.0, above_m]]).with_colors([colour]).with_radii([0.05_f32]).with_show_labels(true);
     writer.write_static(&entity, &fixed)?;
-    // The speed is rounded to what can be told apart, and only what changed is written.
+    // Only a change of the rounded speed gives a new row.
     let texts: Vec<String> = states.iter().map(|state| format!("{name} {:.0} m/s", state.speed_mps)).collect();
     let rows = changes(&texts);
     let times: Vec<Time> = rows.iter().map(|&row| times[row]).collect();
@@ -130,7 +132,7 @@ fn write_lights(
     (class, size): (VehicleClass, &Dimensions),
 ) -> Result<(), RecordError> {
     let (rear_m, front_m) = (-0.5 * size.length_m, 0.5 * size.length_m);
-    // A motorcycle has one brake light; the others have theirs at the corners.
+    // A motorcycle has one brake light in the middle; the other vehicles have two at the corners.
     let side_m = 0.5 * size.width_m - if class == VehicleClass::Motorcycle { 0.5 * size.width_m } else { 0.25 };
     let lamp_m = 0.5 * size.height_m.min(1.8);
     let brake = Lamps {
@@ -149,14 +151,14 @@ fn write_lights(
             half_m: [0.16, 0.12, 0.11],
             colour: palette::INDICATOR,
         };
-        // Lit throughout instead of blinking: a still picture shows it, whenever it is taken.
+        // The indicators do not blink, so that every single frame shows them.
         let lit: Vec<bool> = states.iter().map(|state| state.indicator == side).collect();
         write_lamps(writer, entity, times, &lamps, &lit)?;
     }
     Ok(())
 }
 
-/// A pair of lamps that are on or off together.
+/// A pair of lamps that are switched together.
 struct Lamps {
     name: &'static str,
     at_m: [[f64; 3]; 2],
@@ -190,7 +192,7 @@ fn write_lamps(
     })
 }
 
-/// The gaps in front of and behind E, from bumper to bumper, with their time headways; red below the critical one.
+/// Writes the gaps in front of and behind the ego, bumper to bumper, with their time headways. A critical gap is red.
 fn write_gaps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordError> {
     let bumper_m = 0.5 * film.actors[film.ego].vehicle.dimensions.length_m;
     let front = |frame: &Frame| Gap::new([bumper_m, 1.0], frame.margins.gap_front_m, frame.margins.thw_front_s);
@@ -214,6 +216,7 @@ fn write_gaps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), Re
     Ok(())
 }
 
+/// The line that shows a gap.
 struct Gap {
     ends_m: [[f32; 3]; 2],
     colour: Rgba,
@@ -221,7 +224,8 @@ struct Gap {
 }
 
 impl Gap {
-    /// From `bumper_m` on in the direction of `sign`, in E's frame.
+    /// Returns the gap that begins at `bumper_m` and extends in the direction of `sign`, in the ego frame, or `None` if
+    /// there is no positive gap.
     fn new([bumper_m, sign]: [f64; 2], gap_m: Measured, thw_s: Measured) -> Option<Self> {
         let gap_m = gap_m.ok().filter(|&gap_m| gap_m > 0.0)?;
         let is_critical = thw_s.is_ok_and(|thw_s| thw_s < CRITICAL_THW_S);
@@ -239,16 +243,16 @@ impl Gap {
     }
 }
 
-/// What the impact did to each.
+/// Returns the text about a collision, with the change of velocity of each vehicle.
 fn mark_text(collision: &Collision) -> String {
     let ([first, second], [first_mps, second_mps]) = (&collision.between, collision.delta_v_mps);
     format!("COLLISION: ΔV {first} {first_mps:.1}, {second} {second_mps:.1} m/s")
 }
 
-/// A mark on the side of the vehicle that was struck, which it carries on; the changes of velocity on the road behind.
+/// Writes a mark on the struck side of the first vehicle of each collision, and the changes of velocity as a text on
+/// the road behind it. Both move with the vehicle.
 fn write_collisions(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError> {
-    let [first_m, further_m] = WORDS_BEHIND_M;
-    let mut words_m = -first_m;
+    let mut text_x_m = -COLLISION_TEXT_BEHIND_M;
     for (number, collision) in film.collisions().iter().enumerate() {
         let index = film.actors.iter().position(|actor| actor.name == collision.between[0].as_str());
         let Some(index) = index else { continue };
@@ -261,15 +265,15 @@ fn write_collisions(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError>
         };
         let entity = format!("{}/collision_{}", entity(film, index), number + 1);
         let [x, y] = at_m.map(|at_m| at_m as f32);
-        let mark = Points3D::new([[x, y, 0.6], [words_m, 0.0, 0.0]])
+        let mark = Points3D::new([[x, y, 0.6], [text_x_m, 0.0, 0.0]])
             .with_colors([palette::CRITICAL])
             .with_radii([0.45_f32, 0.05])
             .with_labels([String::new(), mark_text(collision)])
             .with_show_labels(true);
-        // The first frame at or after the touch: before it the vehicles are still apart.
-        let shown_at = film.frames.iter().map(|frame| frame.time).find(|&time| time >= collision.time);
-        writer.write_from(&entity, shown_at.unwrap_or(collision.time), &mark)?;
-        words_m -= further_m;
+        // The mark appears at the first frame at or after the contact: in earlier frames the vehicles are still apart.
+        let appears_at = film.frames.iter().map(|frame| frame.time).find(|&time| time >= collision.time);
+        writer.write_from(&entity, appears_at.unwrap_or(collision.time), &mark)?;
+        text_x_m -= COLLISION_TEXT_SPACING_M;
     }
     Ok(())
 }

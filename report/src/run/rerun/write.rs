@@ -113,9 +113,9 @@ fn ghosts_in(films: &[Film], index: usize) -> Option<&Film> {
     }
 }
 
-/// Returns the moment at which the recording opens: the earliest of the films' collisions or, if there is none, the
-/// critical moment of the last film. If the first film is recorded traffic, it is the later of the two critical moments,
-/// so that both encounters are visible.
+/// Returns the moment at which the recording opens: the earliest of the films' worst collisions or, if there is none,
+/// the critical moment of the last film. If the first film is recorded traffic, it is the later of the two critical
+/// moments, so that both encounters are visible.
 fn opening_moment(films: &[Film]) -> Time {
     let collisions = films.iter().filter_map(|film| film.worst_collision().map(|collision| collision.time));
     let critical = || match films {
@@ -127,7 +127,8 @@ fn opening_moment(films: &[Film]) -> Time {
 
 /// Writes a film and returns what its views can show.
 fn write_film(writer: &Writer<'_>, film: &Film, (root, role): (String, Role)) -> Result<FilmContents, RecordError> {
-    let mut contents = FilmContents { name: film.arm.clone(), root, edges: bird::edges(film), ..FilmContents::default() };
+    let mut contents =
+        FilmContents { name: film.arm.clone(), root, edges: bird::edges(film), ..FilmContents::default() };
     if film.level >= Level::Objects && !film.frames.is_empty() {
         writer.write_static("world", &ViewCoordinates::FLU())?;
         road::write(writer, film)?;
