@@ -78,8 +78,9 @@ impl Strip<'_> {
 
     /// Draws the body with its pointed front, the brake light, the indicator, and the name with the speed.
     fn vehicle(&self, svg: &mut Svg, actor: usize) {
-        let (state, actor) = (&self.frame.states[actor], &self.film.actors[actor]);
-        let (half_m, side_m) = (0.5 * actor.vehicle.dimensions.length_m, 0.5 * actor.vehicle.dimensions.width_m);
+        let (state, film_actor) = (&self.frame.states[actor], &self.film.actors[actor]);
+        let (half_m, side_m) =
+            (0.5 * film_actor.vehicle.dimensions.length_m, 0.5 * film_actor.vehicle.dimensions.width_m);
         let corner = |[along, across]: [f64; 2]| self.at(state.s_m + along * half_m, state.d_m + across * side_m);
         let shape = [[-1.0, -1.0], [0.5, -1.0], [1.0, -0.5], [1.0, 0.5], [0.5, 1.0], [-1.0, 1.0]].map(corner);
         let paint = colour(actor, self.film.ego);
@@ -100,7 +101,7 @@ impl Strip<'_> {
         // neither.
         let y = if actor == self.film.ego { corner([0.0, -1.0])[1] + 11.0 } else { corner([0.0, 1.0])[1] - 3.0 };
         let style = TextStyle { size: FONT_SIZE_PX, colour: paint, anchor: Anchor::Middle };
-        svg.text([x, y], &format!("{} {:.1} m/s", actor.name, state.speed_mps), style);
+        svg.text([x, y], &format!("{} {:.1} m/s", film_actor.name, state.speed_mps), style);
     }
 
     /// Draws the gaps in front of and behind the ego with their time headways.

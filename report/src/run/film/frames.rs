@@ -166,7 +166,7 @@ impl Film {
 
     /// Returns true if a vehicle is present in a frame.
     pub(in crate::run) fn is_present(&self, actor: usize, frame_index: usize) -> bool {
-        self.actors[actor].rows.contains(&frame_index)
+        self.actors[actor].present_frames.contains(&frame_index)
     }
 
     /// Returns the ego's closest encounter that comes next after a frame, or `None` if there is none within the

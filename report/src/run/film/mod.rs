@@ -25,7 +25,7 @@ pub use arms::film_arms;
 pub use comparison::{Comparison, Course};
 pub use encounter::film_encounter;
 pub(super) use frames::Limit;
-pub use frames::{Film, Frame, Level, FilmActor};
+pub use frames::{Film, FilmActor, Frame, Level};
 pub use recorder::FilmRecorder;
 pub(super) use scan::{NO_CLUSTER, Scan};
 pub(super) use story::{collision_text, driver_note_text, ego_state_name};

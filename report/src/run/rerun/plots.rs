@@ -13,9 +13,9 @@ use crate::run::film::{Film, Frame, ego_state_name};
 use closecall_simulation::outcome::{CRITICAL_THW_S, Phase};
 
 /// Width of a curve (UI points).
-const LINE_WIDTH_PX: f32 = 2.0;
+const LINE_WIDTH: f32 = 2.0;
 /// Width of a curve that is less important (UI points).
-const THIN_LINE_WIDTH_PX: f32 = 1.0;
+const THIN_LINE_WIDTH: f32 = 1.0;
 
 /// The role of a film among the films of a recording, which share the plots.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -90,7 +90,7 @@ impl Plots<'_> {
             Role::Baseline | Role::Tested => format!("{} ({})", curve.name, self.film.arm),
         };
         let (colour, width) = match self.role {
-            Role::Baseline => (palette::darker(curve.colour), THIN_LINE_WIDTH_PX),
+            Role::Baseline => (palette::darker(curve.colour), THIN_LINE_WIDTH),
             Role::Alone | Role::Tested => (curve.colour, curve.width),
         };
         let style = SeriesLines::new().with_names([name]).with_colors([colour]).with_widths([width]);
@@ -104,16 +104,16 @@ impl Plots<'_> {
             return Ok(());
         }
         let style =
-            SeriesLines::new().with_names([name]).with_colors([palette::CRITICAL]).with_widths([THIN_LINE_WIDTH_PX]);
+            SeriesLines::new().with_names([name]).with_colors([palette::CRITICAL]).with_widths([THIN_LINE_WIDTH]);
         self.writer.write_static(entity, &style)?;
         self.writer.write_series(entity, &self.times, &vec![Some(level); self.times.len()])
     }
 
     /// Writes the time headways in front of and behind the ego.
     fn headways(&self) -> Result<bool, RecordError> {
-        let front = CurveStyle { name: "front", colour: palette::FRONT, width: LINE_WIDTH_PX };
+        let front = CurveStyle { name: "front", colour: palette::FRONT, width: LINE_WIDTH };
         let front = self.curve("plots/headway/front", &front, |frame| frame.margins.thw_front_s.ok())?;
-        let rear = CurveStyle { name: "rear", colour: palette::REAR, width: LINE_WIDTH_PX };
+        let rear = CurveStyle { name: "rear", colour: palette::REAR, width: LINE_WIDTH };
         let rear = self.curve("plots/headway/rear", &rear, |frame| frame.margins.thw_rear_s.ok())?;
         if front || rear {
             self.level("plots/headway/critical", "0.9 s", CRITICAL_THW_S)?;
@@ -123,11 +123,11 @@ impl Plots<'_> {
 
     /// Writes the gaps in front of and behind the ego, and the rear gap as the MIS estimates it.
     fn gaps(&self) -> Result<bool, RecordError> {
-        let front = CurveStyle { name: "front", colour: palette::FRONT, width: LINE_WIDTH_PX };
+        let front = CurveStyle { name: "front", colour: palette::FRONT, width: LINE_WIDTH };
         let front = self.curve("plots/gap/front", &front, |frame| frame.margins.gap_front_m.ok())?;
-        let rear = CurveStyle { name: "rear", colour: palette::REAR, width: LINE_WIDTH_PX };
+        let rear = CurveStyle { name: "rear", colour: palette::REAR, width: LINE_WIDTH };
         let rear = self.curve("plots/gap/rear", &rear, |frame| frame.margins.gap_rear_m.ok())?;
-        let seen = CurveStyle { name: "rear, MIS", colour: palette::NEUTRAL, width: THIN_LINE_WIDTH_PX };
+        let seen = CurveStyle { name: "rear, MIS", colour: palette::NEUTRAL, width: THIN_LINE_WIDTH };
         let seen = self.curve("plots/gap/rear_seen", &seen, |frame| Some(plan(frame)?.rear_gap_m))?;
         Ok(front || rear || seen)
     }
@@ -137,16 +137,16 @@ impl Plots<'_> {
         let encounters: Vec<Option<Encounter>> =
             (0..self.times.len()).map(|row| self.film.soonest_encounter(row)).collect();
         let of = |of: fn(&Encounter) -> f64| encounters.iter().map(|at| at.as_ref().map(of)).collect::<Vec<_>>();
-        let ttce = CurveStyle { name: "TTCE", colour: palette::REAR, width: LINE_WIDTH_PX };
+        let ttce = CurveStyle { name: "TTCE", colour: palette::REAR, width: LINE_WIDTH };
         let has_ttce = self.series("plots/encounter/ttce", &ttce, &of(|encounter| encounter.ttce_s))?;
         // The distance of an encounter that is far ahead says little, so that only near encounters are shown.
         let near = |encounter: &Encounter| (encounter.ttce_s < CRITICAL_TTCE_S).then_some(encounter.dce_m);
         let distances: Vec<_> = encounters.iter().map(|at| at.as_ref().and_then(near)).collect();
-        let dce = CurveStyle { name: "DCE if near", colour: palette::WARNING, width: LINE_WIDTH_PX };
+        let dce = CurveStyle { name: "DCE if near", colour: palette::WARNING, width: LINE_WIDTH };
         self.series("plots/encounter/dce", &dce, &distances)?;
-        let seen = CurveStyle { name: "TTCE, MIS", colour: palette::NEUTRAL, width: THIN_LINE_WIDTH_PX };
+        let seen = CurveStyle { name: "TTCE, MIS", colour: palette::NEUTRAL, width: THIN_LINE_WIDTH };
         let seen = self.curve("plots/encounter/ttce_seen", &seen, |frame| plan(frame)?.ttce_s.ok())?;
-        let planned = CurveStyle { name: "t_c, MIS", colour: palette::EGO, width: THIN_LINE_WIDTH_PX };
+        let planned = CurveStyle { name: "t_c, MIS", colour: palette::EGO, width: THIN_LINE_WIDTH };
         self.curve("plots/encounter/planned", &planned, |frame| plan(frame)?.time_to_critical_s.ok())?;
         if has_ttce || seen {
             self.level("plots/encounter/critical_ttce", "2.6 s", CRITICAL_TTCE_S)?;
@@ -159,7 +159,7 @@ impl Plots<'_> {
     fn motion(&self) -> Result<(), RecordError> {
         for (index, actor) in self.film.actors.iter().enumerate().filter(|(_, actor)| actor.is_plotted) {
             let colour = palette::actor(index, self.film.ego);
-            let style = CurveStyle { name: &actor.name, colour, width: LINE_WIDTH_PX };
+            let style = CurveStyle { name: &actor.name, colour, width: LINE_WIDTH };
             let of = |of: fn(&closecall_traffic::VehicleState) -> f64| {
                 let rows = self.film.frames.iter().enumerate();
                 rows.map(|(row, frame)| actor.present_frames.contains(&row).then(|| of(&frame.states[index])))
@@ -168,7 +168,7 @@ impl Plots<'_> {
             self.series(&format!("plots/speed/{}", actor.name), &style, &of(|state| state.speed_mps))?;
             self.series(&format!("plots/acceleration/{}", actor.name), &style, &of(|state| state.acceleration_mps2))?;
         }
-        let commanded = CurveStyle { name: "ego, commanded", colour: palette::NEUTRAL, width: THIN_LINE_WIDTH_PX };
+        let commanded = CurveStyle { name: "ego, commanded", colour: palette::NEUTRAL, width: THIN_LINE_WIDTH };
         self.curve("plots/acceleration/commanded", &commanded, |frame| Some(frame.command?.acceleration_mps2))?;
         for (number, limit) in self.film.acceleration_limits.iter().enumerate() {
             self.level(&format!("plots/acceleration/limit_{number}"), &limit.name, limit.value)?;
@@ -183,12 +183,12 @@ impl Plots<'_> {
         let start = first.and_then(|frame| Some((frame.time, frame.margins.thw_front_s.ok()?, plan(frame))));
         let Some((since, thw_s, planned)) = start else { return Ok(false) };
         let gained = |frame: &Frame, thw: Option<f64>| thw.filter(|_| frame.time >= since).map(|now_s| now_s - thw_s);
-        let style = CurveStyle { name: "gained", colour: palette::EGO, width: LINE_WIDTH_PX };
+        let style = CurveStyle { name: "gained", colour: palette::EGO, width: LINE_WIDTH };
         self.curve("plots/margin/gained", &style, |frame| gained(frame, frame.margins.thw_front_s.ok()))?;
-        let style = CurveStyle { name: "foreseen", colour: palette::NEUTRAL, width: THIN_LINE_WIDTH_PX };
+        let style = CurveStyle { name: "foreseen", colour: palette::NEUTRAL, width: THIN_LINE_WIDTH };
         self.curve("plots/margin/foreseen", &style, |frame| gained(frame, plan(frame)?.thw_at_critical_s.ok()))?;
         let goal_s = planned.map(|plan| plan.goal_thw_s - thw_s);
-        let style = CurveStyle { name: "goal +2 s", colour: palette::SAFE, width: THIN_LINE_WIDTH_PX };
+        let style = CurveStyle { name: "goal +2 s", colour: palette::SAFE, width: THIN_LINE_WIDTH };
         self.curve("plots/margin/goal", &style, |frame| goal_s.filter(|_| frame.time >= since))?;
         Ok(true)
     }
