@@ -10,7 +10,7 @@ use closecall_simulation::scenario::ScenarioFile;
 use closecall_simulation::{Arm, RunKey, simulate};
 
 fn films(name: &str, arms: &[ControllerChoice]) -> Vec<Film> {
-    let library = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenarios/library/{name}.toml"));
+    let library = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../scenarios/library/{name}.toml"));
     let file = ScenarioFile::load(&library, &[]).unwrap();
     let sampling = Sampling { seed: 1, design: Design::Random, samples: 1 };
     let scenario = concrete(&file, sampling, 0).unwrap();

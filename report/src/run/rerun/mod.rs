@@ -27,7 +27,4 @@ mod truth;
 mod vehicles;
 mod write;
 
-#[cfg(test)]
-mod tests;
-
 pub use write::{RecordError, check_recordable, record_films, write_films};

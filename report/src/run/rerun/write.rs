@@ -151,3 +151,6 @@ fn write_summary(stream: &RecordingStream, films: &[Film]) -> Result<(), RecordE
     let summary = TextDocument::new(summary::markdown(films)).with_media_type(MediaType::markdown());
     Ok(stream.log_static("summary", &summary)?)
 }
+
+#[cfg(test)]
+mod tests;

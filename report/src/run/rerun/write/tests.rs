@@ -9,10 +9,10 @@ use closecall_traffic::geometry::BoxSide;
 use rerun::log::{Chunk, LogMsg};
 use rerun::{StoreKind, TimelineName};
 
-use super::stream::{OPENING_TIMELINE, STEP_TIMELINE, TIME_TIMELINE};
+use super::super::stream::{OPENING_TIMELINE, STEP_TIMELINE, TIME_TIMELINE};
 use super::*;
 use crate::run::film::{Comparison, FilmRecorder, film_encounter};
-use crate::traffic::traffic::TrafficRecorder;
+use crate::traffic::recorder::TrafficRecorder;
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::outcome::{ClosedBy, Collision, Phase};
@@ -20,7 +20,7 @@ use closecall_simulation::scenario::{RearDriver, ScenarioFile, reenact};
 use closecall_simulation::{Arm, CONTROL_STEP, RunKey, simulate};
 
 fn library(name: &str) -> ScenarioFile {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/library");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios/library");
     ScenarioFile::load(&folder.join(format!("{name}.toml")), &[]).unwrap()
 }
 
@@ -112,7 +112,7 @@ fn empty_views(films: &[Film]) -> (usize, Vec<String>, Vec<String>) {
 
 #[test]
 fn every_scenario_of_the_library_fills_every_view_at_every_level() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/library");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios/library");
     let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     let names = files.filter(|path| path.extension().is_some_and(|extension| extension == "toml"));
     for name in names.map(|path| path.file_stem().unwrap().to_str().unwrap().to_owned()) {
