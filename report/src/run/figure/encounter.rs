@@ -159,8 +159,8 @@ fn initial_speed_range(films: &[Film]) -> Range {
     first.map_or([0.0, 1.0], |speed_mps| [speed_mps - 1.0, speed_mps + 1.0])
 }
 
-/// Returns the time span of the plots (s): from the first instant of any film until [`AFTER_S`] after the last moment
-/// of any film.
+/// Returns the time span of the plots (s): from the first instant of any film until [`AFTER_S`] after the last of the
+/// moments and critical moments, or until the end if that comes first.
 fn span(films: &[Film]) -> Range {
     let starts = films.iter().filter_map(|film| film.frames.first()).map(|frame| frame.time.s());
     let ends = films.iter().map(|film| {
