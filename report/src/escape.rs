@@ -1,4 +1,4 @@
-//! Text inside markup.
+//! Text inside SVG.
 
 /// Returns the text as it may stand between tags and in quoted attributes.
 pub(crate) fn escaped(text: &str) -> String {

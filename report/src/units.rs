@@ -1,6 +1,6 @@
-//! Units of measurement, as the end of every name says them.
+//! Units of measurement, which are the ends of names.
 
-/// The ends of names, longer ones first where one ends in another, and what they stand for.
+/// The ends of names and their units. If one end is the end of another, the longer one comes first.
 const UNITS: [(&str, &str); 14] = [
     ("mm-per-h", "mm/h"),
     ("m-per-h", "m/h"),
@@ -18,12 +18,13 @@ const UNITS: [(&str, &str); 14] = [
     ("s", "s"),
 ];
 
-/// The unit that a name ends with, be its parts joined by `-` or `_`; nothing where the value is a plain number.
+/// Returns the unit that a name ends with, or `None` if it ends with no unit. The parts of the name are joined by `-` or
+/// `_`.
 pub(crate) fn unit_of(name: &str) -> Option<&'static str> {
     split(name).1
 }
 
-/// A name for people: `closing-mps` is `closing [m/s]`.
+/// Returns the name as reports show it: `closing-mps` becomes `closing [m/s]`.
 pub(crate) fn labelled(name: &str) -> String {
     match split(name) {
         (stem, Some(unit)) => format!("{} [{unit}]", stem.replace(['-', '_'], " ")),
@@ -33,7 +34,7 @@ pub(crate) fn labelled(name: &str) -> String {
 
 fn split(name: &str) -> (&str, Option<&'static str>) {
     let found = UNITS.iter().find_map(|(end, unit)| {
-        // The ends hold hyphens themselves; names of columns have underscores in their place.
+        // The ends contain hyphens; names of columns have underscores instead.
         let stem = name.len().checked_sub(end.len() + 1)?;
         let tail = name.get(stem..)?;
         let is_joined = tail.starts_with(['-', '_']);

@@ -10,10 +10,12 @@
 //! * [`sequence`]: bounds that hold at every number of samples at once, and may therefore be looked at all the time
 //! * [`needed`]: how many samples a bound still needs
 //! * [`mcnemar`]: whether pairs differ
+//! * [`format`](mod@format): how a share is printed
 //!
 //! Everything here rests on samples that are independent and equally distributed, as those of the random design are.
 
 pub mod binomial;
+pub mod format;
 pub mod interval;
 pub mod mcnemar;
 pub mod needed;

@@ -1,4 +1,4 @@
-//! Trajectory data: made by the simulator, or shown as charts.
+//! Trajectory data: written by the simulator, or shown as charts.
 
 pub mod in_car;
 pub mod recorder;
