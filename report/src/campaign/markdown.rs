@@ -90,7 +90,7 @@ fn requirements(findings: &Findings<'_>) -> String {
     if findings.requirements.is_empty() {
         return String::new();
     }
-    let mut text = "| requirement | scenarios | result |\n|---|---|---|\n".to_owned();
+    let mut text = "| requirement | scenarios (samples with a collision) | result |\n|---|---|---|\n".to_owned();
     for requirement in findings.requirements {
         let scenarios: Vec<String> = requirement
             .evidence

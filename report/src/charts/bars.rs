@@ -5,7 +5,7 @@ use std::io;
 use maud::Markup;
 use plotters::prelude::*;
 
-use super::style::{Drawn, GRID, arm_colour, fate_colour, sized};
+use super::style::{Canvas, Drawn, GRID, arm_colour, fate_colour, sized};
 use crate::campaign::overview::Fate;
 
 /// Size of a bar on the page (px).
@@ -48,7 +48,7 @@ pub(crate) fn balance(prevented: u64, induced: u64, most: u64) -> io::Result<Mar
     })
 }
 
-fn bar(paint: impl FnOnce(&super::style::Canvas<'_>) -> Drawn) -> io::Result<Markup> {
+fn bar(paint: impl FnOnce(&Canvas<'_>) -> Drawn) -> io::Result<Markup> {
     let (width, height) = SIZE_PX;
     let attributes = format!("width=\"{width}\" height=\"{height}\" role=\"img\"");
     sized((UNITS_PER_PX * width, UNITS_PER_PX * height), &attributes, paint)

@@ -81,9 +81,9 @@ fn count_axis(most: u64) -> ChartAxis<'static> {
 /// Returns the axis of a parameter, with at most this many labels.
 pub(super) fn parameter_axis<'a>(axis: &'a Axis, name: &'a str, labels: usize) -> ChartAxis<'a> {
     let [low, high] = axis.ends();
-    let text: Box<dyn Fn(&f64) -> String> = match axis {
+    let text: Box<dyn Fn(&f64) -> String + 'a> = match axis {
         Axis::Numbers { low, high, .. } => Box::new(number_text(*low, *high)),
-        Axis::Labels { labels, .. } => Box::new(|value| label_near(labels, *value)),
+        Axis::Labels { labels, .. } => Box::new(|value: &f64| label_near(labels, *value)),
     };
     ChartAxis { name, range: low..high, labels, text, has_grid: false }
 }

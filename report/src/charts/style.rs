@@ -6,9 +6,8 @@ use std::io;
 use std::ops::Range;
 
 use maud::{Markup, PreEscaped};
-use plotters::chart::ChartContext;
 use plotters::coord::Shift;
-use plotters::coord::ranged1d::{BoldPoints, Ranged};
+use plotters::coord::ranged1d::BoldPoints;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 

@@ -141,7 +141,7 @@ impl BoxChart {
             name: "",
             range: -0.5..self.boxes.len() as f64 - 0.5,
             labels: 2 * self.boxes.len() + 1,
-            text: Box::new(|x| self.name_at(*x)),
+            text: Box::new(|x: &f64| self.name_at(*x)),
             has_grid: false,
         };
         let values = self.boxes.iter().flat_map(|one| one.five.iter().chain(&one.outliers).copied());

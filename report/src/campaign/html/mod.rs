@@ -22,5 +22,8 @@ mod samples;
 mod scenario;
 mod verdict;
 
+#[cfg(test)]
+mod tests;
+
 pub(super) use page::write_html;
 pub(super) use recordings::{IndexEntry, write_index};

@@ -21,7 +21,8 @@ pub(in crate::campaign) fn write_html(path: &Path, findings: &Findings<'_>) -> R
     write_file(path, |file| file.write_all(campaign(findings)?.into_string().as_bytes()))
 }
 
-fn campaign(findings: &Findings<'_>) -> io::Result<Markup> {
+/// Returns the page of a campaign.
+pub(super) fn campaign(findings: &Findings<'_>) -> io::Result<Markup> {
     let title = format!("{}: {}", findings.judged.verdict, findings.scenario_names());
     let body = html! {
         (verdict::header(findings))
