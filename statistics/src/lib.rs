@@ -6,6 +6,7 @@
 //! ```
 //!
 //! * [`binomial`]: probabilities of the binomial distribution, accurate to the last few bits
+//! * [`format`](mod@format): shares as text
 //! * [`interval`]: exact bounds of a probability for a number of samples that is fixed in advance
 //! * [`sequence`]: bounds of a probability that hold at every number of samples at once, and may be inspected at any time
 //! * [`needed`]: the number of samples that a bound needs
@@ -14,6 +15,7 @@
 //! All methods assume independent, identically distributed samples, as in the random sampling design.
 
 pub mod binomial;
+pub mod format;
 pub mod interval;
 pub mod mcnemar;
 pub mod needed;
