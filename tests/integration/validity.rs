@@ -6,11 +6,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use closecall_campaign::verdict::Decision;
 use closecall_campaign::execution::Campaign;
 use closecall_campaign::runner::{Sampling, Work};
 use closecall_campaign::summary::{Counts, Summary};
 use closecall_campaign::validity::{CheckPlan, Invariance};
+use closecall_campaign::verdict::Decision;
 use closecall_campaign::verdict::{Gates, Verdict};
 use closecall_campaign::workers::Workers;
 use closecall_controllers::{ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack};
