@@ -21,8 +21,8 @@ const SAMPLES: u64 = 300;
 /// Significance level of the Kolmogorov–Smirnov tests.
 const LEVEL: f64 = 0.01;
 
-/// Returns the largest distance between the distribution of `values` and `cdf`, and the probability of a distance at least
-/// as large.
+/// Returns the largest distance between the distribution of `values` and `cdf`, and the probability of a distance at
+/// least as large.
 fn kolmogorov_smirnov(mut values: Vec<f64>, cdf: impl Fn(f64) -> f64) -> (f64, f64) {
     values.sort_by(f64::total_cmp);
     let n = values.len() as f64;
@@ -159,8 +159,8 @@ impl Observer for Crossing {
     fn happening(&mut self, _: Time, _: &Happening) {}
 }
 
-/// Returns the scenario `overtake-without-brake` as it ships, and with a rear vehicle that weaves in its lane and varies
-/// its speed.
+/// Returns the scenario `overtake-without-brake` as it ships, and with a rear vehicle that weaves in its lane and
+/// varies its speed.
 fn steady_and_weaving() -> [ScenarioFile; 2] {
     let text = std::fs::read_to_string(library("overtake-without-brake")).unwrap();
     let folder = folder();
@@ -191,9 +191,9 @@ fn the_headway_at_the_crossing_of_the_marking_follows_the_distribution_of_the_sc
     assert_follows("the rear vehicle's headway at the crossing of the marking", without, |thw_s| {
         expected.cdf(thw_s).unwrap()
     });
-    // The driver predicts the crossing with the ego's present deceleration and its own present offset from its path. With
-    // the MIS the ego's deceleration changes, and while weaving the offset changes, so the headway is only close to the
-    // drawn one.
+    // The driver predicts its crossing from the ego's deceleration, as it perceives it, and from its own present
+    // offset. With the MIS the ego's deceleration changes, and while weaving the offset changes. The headway is then
+    // only close to the drawn one.
     for (when, file, controller) in [("with the MIS", &file, BuiltIn::Mis), ("while weaving", &weaving, BuiltIn::Acc)] {
         let found: Vec<(f64, f64)> = (0..SAMPLES).map(|index| headway_s(file, controller, index)).collect();
         let headways_s = found.iter().map(|(thw_s, _)| *thw_s).collect();
@@ -203,7 +203,7 @@ fn the_headway_at_the_crossing_of_the_marking_follows_the_distribution_of_the_sc
         let [low_s, median_s, high_s] = [5, 50, 95].map(|percent| errors_s[errors_s.len() * percent / 100]);
         writeln!(
             std::io::stderr(),
-            "the same {when}: D = {distance:.4}, p = {p:.3}; error {low_s:.3}, {median_s:.3}, {high_s:.3} s (5, 50, 95 %)"
+            "the same {when}: D = {distance:.4}, p = {p:.3}; off by {low_s:.3}, {median_s:.3}, {high_s:.3} s (5, 50, 95 %)"
         )
         .expect("standard error");
         assert!(median_s.abs() < 0.03, "{when}: {median_s}");
@@ -322,7 +322,8 @@ fn a_loaded_scenario_holds_the_track_of_a_recorded_vehicle_and_no_longer_needs_t
     std::fs::remove_file(&trajectories).unwrap();
     let again = ScenarioFile::parse(&path, file.text(), &[]).unwrap();
     assert_eq!(again.text(), file.text());
-    // The scenario as it was written needs the trajectory file. The error names the file, and the line that asks for it.
+    // The scenario as it was written needs the trajectory file. The error names the file, and the line that asks for
+    // it.
     let error = ScenarioFile::parse(&path, &text, &[]).unwrap_err().to_string();
     let line = 1 + text.lines().position(|line| line.contains("recorded")).unwrap();
     assert!(error.contains(&format!("scenario.toml:{line}")) && error.contains("own.csv"), "{error}");

@@ -1,5 +1,5 @@
-//! A campaign that is killed and resumed, stopped by a full disk, or split among machines gives the same bytes as one that
-//! runs undisturbed.
+//! A campaign that is killed and resumed, stopped by a full disk, or split among machines gives the same bytes as one
+//! that runs undisturbed.
 
 use std::fs;
 use std::path::Path;
@@ -49,8 +49,8 @@ fn first_lines(journal: &[u8], lines: usize) -> &[u8] {
     &journal[..ends.take(lines).last().unwrap_or(0)]
 }
 
-/// Runs a campaign until its journal has at least `lines` more lines, kills it, and tears the journal: the last of these
-/// lines lacks its last `torn` bytes. Returns true if the campaign still ran when it was killed.
+/// Runs a campaign until its journal has at least `lines` more lines, kills it, and tears the journal: the last of
+/// these lines lacks its last `torn` bytes. Returns true if the campaign still ran when it was killed.
 ///
 /// What the program wrote beyond these lines before the signal arrived is cut off, so that the rest of the test is the
 /// same on any machine.
@@ -85,8 +85,8 @@ fn a_campaign_that_is_killed_and_resumed_repeatedly_ends_in_the_same_bytes() {
     let folder = folder();
     let whole = undisturbed(folder.path());
     let out = folder.path().join("killed");
-    // The first kill comes after one of 400 samples, so it does interrupt the campaign. On a slow machine a later one may
-    // come after the end.
+    // The first kill comes after one of 400 samples, so it does interrupt the campaign. On a slow machine a later one
+    // may come after the end.
     for (index, (jobs, lines)) in [("1", 1), ("2", 57), ("1", 90), ("2", 3), ("2", 120)].into_iter().enumerate() {
         let was_running = kill_after(&args(&out, &["--jobs", jobs, "--resume"]), &out, lines, lines);
         assert!(was_running || index > 0, "the campaign ended before it was killed");
@@ -163,8 +163,8 @@ fn a_full_disk_is_an_i_o_error_and_loses_nothing() {
     let folder = folder();
     let whole = undisturbed(folder.path());
     let out = folder.path().join("full");
-    // The shell limits files to 200 blocks of 512 or 1,024 bytes. With the signal for the limit ignored, the write fails
-    // as on a full disk.
+    // The shell limits files to 200 blocks of 512 or 1,024 bytes. With the signal for the limit ignored, the write
+    // fails as on a full disk.
     let script = "ulimit -f 200; trap '' XFSZ; exec \"$@\"";
     let limited = Command::new("sh")
         .current_dir(ROOT)

@@ -1,5 +1,6 @@
-//! Controllers that run as processes. The shipped example behaves like the built-in controller. A process that misbehaves
-//! causes an error in its own samples only, with a message that names the fault, and leaves no process behind.
+//! Controllers that run as processes. The shipped example behaves like the built-in controller. A process that
+//! misbehaves causes an error in its own samples only, with a message that names the fault, and leaves no process
+//! behind.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -46,8 +47,8 @@ fn run_with(controller: &str, mark: &str) -> Output {
 
 /// Returns the processes with `mark` in their environment that do not end.
 ///
-/// The program kills its processes when it ends, and the kernel removes them some time later. This function waits for that,
-/// at most a minute.
+/// The program kills its processes when it ends, and the kernel removes them some time later. This function waits for
+/// that, at most a minute.
 fn left_behind(mark: &str) -> Vec<String> {
     const LOOKS: usize = 600;
     const PAUSE: Duration = Duration::from_millis(100);

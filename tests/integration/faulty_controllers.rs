@@ -1,5 +1,5 @@
-//! A controller that panics, hangs, or returns nonsense causes an error of its sample, with the reason. All other samples
-//! have the same outcomes as without the fault.
+//! A controller that panics, hangs, or returns nonsense causes an error of its sample, with the reason. All other
+//! samples have the same outcomes as without the fault.
 
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;

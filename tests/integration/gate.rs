@@ -119,8 +119,8 @@ fn the_cruise_control_alone_prevents_and_induces_no_collision() {
     assert!(counts.pairs.both > 0 && counts.pairs.neither > 0);
 }
 
-/// The most by which the ego may be slower than the lead vehicle (m/s). The MIS, braking at 1 m/s² until the rear vehicle
-/// has arrived, stays below.
+/// The most by which the ego may be slower than the lead vehicle (m/s). The MIS, braking at 1 m/s² until the rear
+/// vehicle has arrived, stays below.
 const MAX_SPEED_DEFICIT_MPS: f64 = 15.0;
 
 /// Returns true if a controller passes the gate of a regression test: at most half of the collisions without it, and a

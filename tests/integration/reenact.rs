@@ -8,7 +8,8 @@ use serde_json::Value;
 
 use crate::support::{closecall, code, folder, json, library, stderr, stdout};
 
-/// Writes a trajectory file of simulated traffic without the MIS. Each sample has three vehicles, the rear vehicle last.
+/// Writes a trajectory file of simulated traffic without the MIS. Each sample has three vehicles, the rear vehicle
+/// last.
 fn own_trajectories(folder: &Path) -> PathBuf {
     let csv = folder.join("own.csv");
     let scenario = library("overtake-without-brake");

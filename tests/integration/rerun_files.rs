@@ -7,8 +7,8 @@ use closecall_testing::viewer;
 
 use crate::support::{all_of_library, closecall, code, folder, library, program, stderr, stdout};
 
-/// Fails if the viewer does not verify a recording, or if the recording lacks a timeline or an entity that its blueprint
-/// shows.
+/// Fails if the viewer does not verify a recording, or if the recording lacks a timeline or an entity that its
+/// blueprint shows.
 fn verify(viewer: &Path, file: &Path) {
     let size = std::fs::metadata(file).unwrap().len();
     assert!(size > 10_000 && size < 25_000_000, "{}: {size} bytes", file.display());

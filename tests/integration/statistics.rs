@@ -146,6 +146,7 @@ fn a_time_budget_ends_a_campaign() {
     assert!([0, 4].contains(&code(&output)), "{}", stderr(&output));
     let report = json(&output, code(&output));
     let samples = report["samples"].as_u64().unwrap();
+    // Without a number of samples, a campaign has 1,000,000.
     assert!((1..1_000_000).contains(&samples), "{samples}");
 }
 

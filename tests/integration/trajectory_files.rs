@@ -84,7 +84,8 @@ fn broken_trajectory_files_are_refused_by_name() {
     }
 }
 
-/// Reads the true lane changes of an in-car log: direction, time of the crossing (s), and whether the log holds both ends.
+/// Reads the true lane changes of an in-car log: direction, time of the crossing (s), and whether the log holds both
+/// ends.
 fn truth(path: &std::path::Path) -> Vec<(String, f64, bool)> {
     let text = fs::read_to_string(path).unwrap();
     let mut lines = text.lines();

@@ -119,8 +119,8 @@ fn no_check_finds_a_fault_of_a_sound_controller() {
     assert_eq!((findings(&total), total.checks.runs, total.invalid), (Vec::new(), 6, 0));
 }
 
-/// The rear vehicle brakes between two steps of 10 ms. The gaps lie so close to the limit between a collision and none that
-/// half the time step changes the result of some samples.
+/// The rear vehicle brakes between two steps of 10 ms. The gaps lie so close to the limit between a collision and none
+/// that half the time step changes the result of some samples.
 const EDGE: &str = r#"
 schema-version = 1
 name = "edge-of-the-step"

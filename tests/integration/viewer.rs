@@ -54,8 +54,8 @@ const RIGHT: [View; 8] = [
 const LEAST_SHARE: f64 = 0.000_5;
 /// The largest number of pictures that are taken of a file.
 const PICTURES: usize = 5;
-/// Held while a viewer runs. Two viewers at once, without a graphics card, slow each other so much that neither loads its file
-/// in time.
+/// Held while a viewer runs. Two viewers at once, without a graphics card, slow each other so much that neither loads
+/// its file in time.
 static VIEWER: Mutex<()> = Mutex::new(());
 
 /// Returns the viewer if it has a display to draw on.
