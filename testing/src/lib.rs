@@ -2,8 +2,8 @@
 //!
 //! A few tests compare Closecall with other programs, or read trajectory data that is not part of the repository. On a
 //! machine that lacks one of these, such a test says `skipped (NEED): REASON` and passes. The environment variable
-//! `CLOSECALL_REQUIRE` lists needs, separated by commas, that must not be lacking: `CLOSECALL_REQUIRE=viewer,data`. A test
-//! that lacks one of them fails. A word that is not a need fails every test that asks for one, so that a misspelt
+//! `CLOSECALL_REQUIRE` lists needs, separated by commas, that must not be lacking: `CLOSECALL_REQUIRE=viewer,data`. A
+//! test that lacks one of them fails. A word that is not a need fails every test that asks for one, so that a misspelt
 //! variable cannot go unnoticed.
 //!
 //! | need | found by |

@@ -195,11 +195,19 @@ fn follow(path: &Path) -> Findings {
     findings
 }
 
-/// Returns the README and the pages of `docs/`, in alphabetical order.
+/// Returns the README and the pages below `docs/`, in alphabetical order.
 fn documents() -> Vec<PathBuf> {
-    let docs = std::fs::read_dir(Path::new(ROOT).join("docs")).unwrap().map(|entry| entry.unwrap().path());
-    let mut documents: Vec<PathBuf> = docs.filter(|path| path.extension().is_some_and(|end| end == "md")).collect();
-    documents.push(Path::new(ROOT).join("README.md"));
+    let mut documents = vec![Path::new(ROOT).join("README.md")];
+    let mut folders = vec![Path::new(ROOT).join("docs")];
+    while let Some(folder) = folders.pop() {
+        for path in std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|end| end == "md") {
+                documents.push(path);
+            }
+        }
+    }
     documents.sort();
     documents
 }
