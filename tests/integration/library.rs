@@ -21,7 +21,8 @@ fn verdict(path: &Path) -> String {
 fn check_calls_every_scenario_valid() {
     let files = all_of_library();
     assert!(files.len() >= LEAST_SCENARIOS, "{files:?}");
-    let text = stdout(&closecall(std::iter::once(Path::new("check")).chain(files.iter().map(|file| file.as_path()))), 0);
+    let text =
+        stdout(&closecall(std::iter::once(Path::new("check")).chain(files.iter().map(|file| file.as_path()))), 0);
     let expected: Vec<String> = files.iter().map(|path| verdict(path)).collect();
     assert_eq!(text.lines().collect::<Vec<_>>(), expected);
 }
