@@ -5,19 +5,11 @@
 #[path = "onnx_golden/mod.rs"]
 mod onnx_golden;
 
-use std::io::Write;
-
 use closecall_sensors::camera::{Backend, Classifier};
 
 #[test]
 fn onnx_runtime_agrees_with_python() {
-    let backend = Backend::choose(None, std::env::var_os("CLOSECALL_ONNXRUNTIME").map(Into::into));
-    if backend == Backend::Tract {
-        // Not by `eprintln!`, which the test harness keeps to itself: a skipped test must show.
-        let said =
-            writeln!(std::io::stderr(), "skipped: CLOSECALL_ONNXRUNTIME does not name ONNX Runtime's shared library");
-        return said.unwrap();
-    }
-    let mut classifier = Classifier::shipped(&backend).unwrap();
+    let Some(library) = closecall_testing::onnxruntime() else { return };
+    let mut classifier = Classifier::shipped(&Backend::OnnxRuntime(library)).unwrap();
     onnx_golden::assert_agrees(&mut classifier);
 }
