@@ -19,7 +19,7 @@ const EGO_D_M: f64 = -5.625;
 /// Its rear bumper.
 const REAR_S_M: f64 = EGO_S_M - 2.3;
 const SPEED_MPS: f64 = 30.0;
-/// Where R is behind E [m].
+/// Where R is behind E (m).
 const GAPS_M: [f64; 3] = [3.0, 30.0, 100.0];
 /// Steps over which shares are measured.
 const STEPS: u32 = 2_000;
@@ -91,7 +91,7 @@ fn scan_and_detect(criterion: &mut Criterion) {
     for gap_m in GAPS_M {
         let others = others(gap_m);
         let scene = self::scene(&road, &others);
-        let lane = LaneGeometry::of(&scene);
+        let lane = LaneGeometry::from_scene(&scene);
         let (mut scanner, mut detector, mut rng) = (Scanner::new(Lidar::default()), Detector::default(), random());
         let mut group = criterion.benchmark_group(format!("R at {gap_m} m"));
         group.bench_function("scan", |bencher| {
@@ -111,7 +111,7 @@ fn scan_and_detect(criterion: &mut Criterion) {
     }
 }
 
-/// Mean time of one of [`STEPS`] calls [µs].
+/// Mean time of one of [`STEPS`] calls (µs).
 fn mean_us(mut part: impl FnMut()) -> f64 {
     let start = Instant::now();
     (0..STEPS).for_each(|_| part());
@@ -126,7 +126,7 @@ fn shares(_: &mut Criterion) {
     for gap_m in GAPS_M {
         let others = others(gap_m);
         let scene = self::scene(&road, &others);
-        let lane = LaneGeometry::of(&scene);
+        let lane = LaneGeometry::from_scene(&scene);
         let (mut scanner, mut detector, mut rng) = (Scanner::new(Lidar::default()), Detector::default(), random());
         let scan_us = mean_us(|| _ = black_box(scanner.scan(&scene, &mut rng).len()));
         let scan = scanner.scan(&scene, &mut random()).clone();

@@ -14,91 +14,91 @@
 
 use super::{COLUMNS, LAYERS, LaneGeometry, LidarScan};
 
-/// Azimuth step within 15° of the axis, and outside [rad].
+/// Azimuth step within 15° of the axis, and outside (rad).
 const FINE_STEP_RAD: f64 = 0.125 * DEGREE;
 const COARSE_STEP_RAD: f64 = 0.25 * DEGREE;
 const FINE_FIELD_RAD: f64 = 15.0 * DEGREE;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
-/// Height of a footprint [rad].
-const LAYER_RAD: f64 = 0.6 * DEGREE;
+/// Height of a footprint (rad).
+const LAYER_STEP_RAD: f64 = 0.6 * DEGREE;
 /// A cluster that reaches one of this many columns at either end may go on outside of the field of view.
 const EDGE_COLUMNS: usize = 4;
 /// Share of the points that may lie before the front face by noise.
 const STRAY_SHARE: usize = 20;
-/// Depth within which points are taken to lie on the front face [m].
+/// Depth within which points are taken to lie on the front face (m).
 const FACE_DEPTH_M: f64 = 0.2;
-/// A heading is refined where a side of at least this length is seen [m] with at least this many points.
+/// A heading is refined where a side of at least this length is seen (m) with at least this many points.
 const REFINE_LENGTH_M: f64 = 2.5;
 const REFINE_POINTS: usize = 30;
-/// Headings tried on each side of the road's direction, and their spacing [rad].
+/// Headings tried on each side of the road's direction, and their spacing (rad).
 const HEADINGS: i32 = 6;
 const HEADING_STEP_RAD: f64 = 1.0 * DEGREE;
-/// How far headings scatter about the road's direction: 3.5 m/s to the side at 100 km/h is 7° [rad] (assumption).
+/// How far headings scatter about the road's direction: 3.5 m/s to the side at 100 km/h is 7° (rad) (assumption).
 const HEADING_SD_RAD: f64 = 2.5 * DEGREE;
-/// Points beyond this distance from either side tell the fit nothing [m].
-const CLOSENESS_MOST_M: f64 = 0.5;
+/// Points beyond this distance from either side tell the fit nothing (m).
+const MAX_CLOSENESS_M: f64 = 0.5;
 /// Points used for trying headings.
-const REFINE_WITH: usize = 80;
+const REFINE_MAX_POINTS: usize = 80;
 
 /// What was seen of a cluster, in the frame of its own box.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Fit {
-    /// Direction of the box relative to E's heading [rad].
+pub(crate) struct BoxFit {
+    /// Direction of the box relative to E's heading (rad).
     pub(crate) heading_rad: f64,
-    /// The face nearest to E, along the direction, from E's origin [m].
+    /// The face nearest to E, along the direction, from E's origin (m).
     pub(crate) front_u_m: f64,
-    /// Farthest point seen [m].
+    /// Farthest point seen (m).
     pub(crate) rear_u_m: f64,
-    /// Least and greatest position across [m].
+    /// Least and greatest position across (m).
     pub(crate) across_m: [f64; 2],
-    /// Highest and lowest point [m].
+    /// Highest and lowest point (m).
     pub(crate) top_m: f64,
     pub(crate) bottom_m: f64,
-    /// Lowest point on the front face [m].
+    /// Lowest point on the front face (m).
     pub(crate) front_bottom_m: f64,
-    /// Mean received intensity [1].
+    /// Mean received intensity (dimensionless).
     pub(crate) intensity: f64,
     pub(crate) points: usize,
     /// Points on the front face.
     pub(crate) front_points: usize,
-    /// Mean time of measurement after the scan's start [ns].
+    /// Mean time of measurement after the scan's start (ns).
     pub(crate) offset_ns: f64,
-    /// Distance from the sensor [m].
+    /// Distance from the sensor (m).
     pub(crate) range_m: f64,
-    /// Spacing of columns there, across the line of sight [m].
+    /// Spacing of columns there, across the line of sight (m).
     pub(crate) spacing_m: f64,
-    /// Azimuths of its edges as the sensor sees them, to E's left [rad], least first.
+    /// Azimuths of its edges as the sensor sees them, to E's left (rad), least first.
     pub(crate) azimuth_rad: [f64; 2],
     /// Whether its right and its left edge reach the edge of the field of view. Told by the columns: E has moved on since
     /// the first was measured, so that the azimuth of a near point at the scan's end is not that of its beam.
-    pub(crate) cut: [bool; 2],
+    pub(crate) truncated: [bool; 2],
 }
 
-impl Fit {
+impl BoxFit {
     /// Fits a box to the points of a cluster, which are given by their places in the scan; at least one.
-    pub(crate) fn to(members: &[u32], scan: &LidarScan, lane: &LaneGeometry) -> Self {
+    pub(crate) fn new(members: &[u32], scan: &LidarScan, lane: &LaneGeometry) -> Self {
         let mean_x = mean(members, &scan.x_m);
         let road_rad = lane.direction_rad(mean_x);
-        let mut fit = Self::along(road_rad, members, scan);
+        let mut fit = Self::with_heading(road_rad, members, scan);
         let side_seen = fit.front_u_m - fit.rear_u_m > REFINE_LENGTH_M;
         if side_seen && members.len() >= REFINE_POINTS {
-            fit = Self::along(refined(road_rad, members, scan), members, scan);
+            fit = Self::with_heading(refined_heading_rad(road_rad, members, scan), members, scan);
         }
         fit
     }
 
     /// The box in one direction.
-    fn along(heading_rad: f64, members: &[u32], scan: &LidarScan) -> Self {
+    fn with_heading(heading_rad: f64, members: &[u32], scan: &LidarScan) -> Self {
         let (sin, cos) = heading_rad.sin_cos();
-        let mut fit = Self::empty(heading_rad, members, scan);
+        let mut fit = Self::without_extent(heading_rad, members, scan);
         let sensor_x = f64::from(scan.sensor_x_m);
-        let mut nearest = Nearest::default();
+        let mut nearest = LargestValues::default();
         let (mut far, mut squares) = (f64::INFINITY, f64::INFINITY);
         let mut slopes = [f64::INFINITY, f64::NEG_INFINITY];
         for &member in members {
             let [x, y, z] = point(scan, member);
             let (u, v) = (x * cos + y * sin, y * cos - x * sin);
-            nearest.offer(u, members.len() / STRAY_SHARE);
+            nearest.insert(u, members.len() / STRAY_SHARE);
             far = far.min(u);
             fit.across_m = [fit.across_m[0].min(v), fit.across_m[1].max(v)];
             fit.top_m = fit.top_m.max(z);
@@ -112,11 +112,11 @@ impl Fit {
         fit.rear_u_m = far;
         fit.range_m = squares.sqrt();
         fit.spacing_m = fit.range_m * column_step_rad(0.5 * (fit.azimuth_rad[0] + fit.azimuth_rad[1]));
-        fit.place_front(nearest.value(), [sin, cos], members, scan);
+        fit.locate_front(nearest.value(), [sin, cos], members, scan);
         fit
     }
 
-    fn empty(heading_rad: f64, members: &[u32], scan: &LidarScan) -> Self {
+    fn without_extent(heading_rad: f64, members: &[u32], scan: &LidarScan) -> Self {
         let offsets = members.iter().map(|&member| f64::from(scan.offset_ns[member as usize]));
         Self {
             heading_rad,
@@ -133,12 +133,12 @@ impl Fit {
             range_m: 0.0,
             spacing_m: 0.0,
             azimuth_rad: [0.0; 2],
-            cut: cut(members, scan),
+            truncated: truncated_edges(members, scan),
         }
     }
 
     /// The front face: the mean of the points about the nearest that is not a stray.
-    fn place_front(&mut self, edge_m: f64, [sin, cos]: [f64; 2], members: &[u32], scan: &LidarScan) {
+    fn locate_front(&mut self, edge_m: f64, [sin, cos]: [f64; 2], members: &[u32], scan: &LidarScan) {
         let (mut sum, mut count) = (0.0, 0_usize);
         for &member in members {
             let [x, y, z] = point(scan, member);
@@ -153,29 +153,29 @@ impl Fit {
         self.front_u_m = if count > 0 { sum / count as f64 } else { edge_m };
     }
 
-    /// Extent across, as seen [m].
+    /// Extent across, as seen (m).
     pub(crate) fn width_m(&self) -> f64 {
         self.across_m[1] - self.across_m[0]
     }
 
-    /// Extent along, as seen [m].
+    /// Extent along, as seen (m).
     pub(crate) fn length_m(&self) -> f64 {
         (self.front_u_m - self.rear_u_m).max(0.0)
     }
 
-    /// Spacing of layers at this distance [m].
+    /// Spacing of layers at this distance (m).
     pub(crate) fn layer_m(&self) -> f64 {
-        self.range_m * LAYER_RAD
+        self.range_m * LAYER_STEP_RAD
     }
 
     /// True where the cluster reaches the edge of the field of view.
-    pub(crate) fn is_cut(&self) -> bool {
-        self.cut[0] || self.cut[1]
+    pub(crate) fn is_truncated(&self) -> bool {
+        self.truncated[0] || self.truncated[1]
     }
 }
 
 /// Whether points come from the outermost columns on the right and on the left of E; the sweep begins on the left.
-fn cut(members: &[u32], scan: &LidarScan) -> [bool; 2] {
+fn truncated_edges(members: &[u32], scan: &LidarScan) -> [bool; 2] {
     let columns = members.iter().map(|&member| usize::from(scan.beam[member as usize]) / LAYERS);
     let (first, last) = columns.fold((COLUMNS, 0), |(first, last), column| (first.min(column), last.max(column)));
     [last >= COLUMNS - EDGE_COLUMNS, first < EDGE_COLUMNS]
@@ -183,50 +183,50 @@ fn cut(members: &[u32], scan: &LidarScan) -> [bool; 2] {
 
 /// The greatest values offered, for a quantile near the top.
 #[derive(Clone, Copy, Debug)]
-struct Nearest {
-    kept: [f64; Self::MOST],
+struct LargestValues {
+    values: [f64; Self::CAPACITY],
     rank: usize,
 }
 
-impl Default for Nearest {
+impl Default for LargestValues {
     fn default() -> Self {
-        Self { kept: [f64::NEG_INFINITY; Self::MOST], rank: 0 }
+        Self { values: [f64::NEG_INFINITY; Self::CAPACITY], rank: 0 }
     }
 }
 
-impl Nearest {
-    const MOST: usize = 6;
+impl LargestValues {
+    const CAPACITY: usize = 6;
 
     /// Takes one value, when the `rank`-th greatest is asked for (0: the greatest; at most 5).
-    fn offer(&mut self, value: f64, rank: usize) {
-        self.rank = rank.min(Self::MOST - 1);
+    fn insert(&mut self, value: f64, rank: usize) {
+        self.rank = rank.min(Self::CAPACITY - 1);
         let mut value = value;
-        for kept in &mut self.kept[..=self.rank] {
-            if value > *kept {
-                std::mem::swap(&mut value, kept);
+        for slot in &mut self.values[..=self.rank] {
+            if value > *slot {
+                std::mem::swap(&mut value, slot);
             }
         }
     }
 
     fn value(&self) -> f64 {
-        self.kept[self.rank]
+        self.values[self.rank]
     }
 }
 
 /// The direction about `road_rad` in which the points lie closest to the two sides of a rectangle.
-fn refined(road_rad: f64, members: &[u32], scan: &LidarScan) -> f64 {
-    let stride = members.len().div_ceil(REFINE_WITH);
+fn refined_heading_rad(road_rad: f64, members: &[u32], scan: &LidarScan) -> f64 {
+    let stride = members.len().div_ceil(REFINE_MAX_POINTS);
     let mut best = (f64::INFINITY, road_rad);
     for step in -HEADINGS..=HEADINGS {
         let turned = f64::from(step) * HEADING_STEP_RAD;
         let (sin, cos) = (road_rad + turned).sin_cos();
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        let across = |member: u32| {
+        let rotated = |member: u32| {
             let [x, y, _] = point(scan, member);
             [x * cos + y * sin, y * cos - x * sin]
         };
         for &member in members.iter().step_by(stride) {
-            let at = across(member);
+            let at = rotated(member);
             for axis in 0..2 {
                 low[axis] = low[axis].min(at[axis]);
                 high[axis] = high[axis].max(at[axis]);
@@ -234,10 +234,10 @@ fn refined(road_rad: f64, members: &[u32], scan: &LidarScan) -> f64 {
         }
         let mut cost = 0.5 * (turned / HEADING_SD_RAD).powi(2);
         for &member in members.iter().step_by(stride) {
-            let at = across(member);
+            let at = rotated(member);
             let side = (at[1] - low[1]).min(high[1] - at[1]);
             let end = (at[0] - low[0]).min(high[0] - at[0]);
-            cost += side.min(end).min(CLOSENESS_MOST_M);
+            cost += side.min(end).min(MAX_CLOSENESS_M);
         }
         if cost < best.0 {
             best = (cost, road_rad + turned);
@@ -246,7 +246,7 @@ fn refined(road_rad: f64, members: &[u32], scan: &LidarScan) -> f64 {
     best.1
 }
 
-/// Spacing of columns at an azimuth about the sensor's axis [rad].
+/// Spacing of columns at an azimuth about the sensor's axis (rad).
 fn column_step_rad(azimuth_rad: f64) -> f64 {
     if azimuth_rad.abs() < FINE_FIELD_RAD { FINE_STEP_RAD } else { COARSE_STEP_RAD }
 }

@@ -5,7 +5,7 @@
 //! layers that a solid can touch are found beforehand from its bounds; [`by_brute_force`] tries everything instead, and
 //! a property test holds the two to the same bits.
 
-use super::pattern::{ACROSS, Column, Elevation, LAYERS, LAYERS_PER_GROUP, SUBRAYS, UPWARD};
+use super::pattern::{Column, Elevation, LAYERS, LAYERS_PER_GROUP, SUBRAY_COLUMNS, SUBRAY_ROWS, SUBRAYS};
 use super::targets::{FaceRange, Part, Targets};
 
 /// No face was met.
@@ -14,7 +14,7 @@ pub(crate) const NO_FACE: u32 = u32::MAX;
 /// What the sub-rays of one beam meet first.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct BeamHits {
-    /// Inverse of the horizontal distance [1/m], 0 where nothing is met.
+    /// Inverse of the horizontal distance (1/m), 0 where nothing is met.
     pub(crate) inverse: [f32; SUBRAYS],
     /// The face, as an index; [`NO_FACE`] where nothing is met.
     pub(crate) face: [u32; SUBRAYS],
@@ -61,82 +61,83 @@ impl ColumnHits {
     pub(crate) fn cast(&mut self, column: &Column, elevations: &[Elevation], part: &Part, targets: &Targets) {
         for layer in part.layers.clone() {
             let group = layer / LAYERS_PER_GROUP;
-            let ray = Fan { cos: column.cos[group], sin: column.sin[group], tan: elevations[layer].tan };
-            self.meet(layer, &ray, part.faces, targets);
+            let subrays = SubRays { cos: column.cos[group], sin: column.sin[group], tan: elevations[layer].tan };
+            self.intersect(layer, &subrays, part.faces, targets);
         }
     }
 
     /// Lets the beam of one layer meet one solid.
     #[inline]
-    pub(crate) fn meet(&mut self, layer: usize, fan: &Fan, faces: FaceRange, targets: &Targets) {
-        fan.meet(faces, targets, &mut self.beams[layer]);
+    pub(crate) fn intersect(&mut self, layer: usize, subrays: &SubRays, faces: FaceRange, targets: &Targets) {
+        subrays.intersect(faces, targets, &mut self.beams[layer]);
         self.touched |= 1 << layer;
     }
 }
 
 /// Which sub-ray a lane is: across and upward. Neighbours in range are neighbours in the lanes.
 #[inline(always)]
-pub(crate) const fn place(lane: usize) -> (usize, usize) {
-    (lane % ACROSS, lane / ACROSS)
+pub(crate) const fn subray_position(subray: usize) -> (usize, usize) {
+    (subray % SUBRAY_COLUMNS, subray / SUBRAY_COLUMNS)
 }
 
 /// The sub-rays of one beam.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Fan {
-    pub(crate) cos: [f32; ACROSS],
-    pub(crate) sin: [f32; ACROSS],
-    pub(crate) tan: [f32; UPWARD],
+pub(crate) struct SubRays {
+    pub(crate) cos: [f32; SUBRAY_COLUMNS],
+    pub(crate) sin: [f32; SUBRAY_COLUMNS],
+    pub(crate) tan: [f32; SUBRAY_ROWS],
 }
 
-impl Fan {
+impl SubRays {
     /// m·d of each sub-ray.
     #[inline(always)]
-    pub(crate) fn along(&self, inverse: [f32; 3]) -> [f32; SUBRAYS] {
-        let level: [f32; ACROSS] =
+    pub(crate) fn inverse_distances(&self, inverse: [f32; 3]) -> [f32; SUBRAYS] {
+        let horizontal: [f32; SUBRAY_COLUMNS] =
             std::array::from_fn(|across| inverse[0] * self.cos[across] + inverse[1] * self.sin[across]);
-        std::array::from_fn(|lane| {
-            let (across, upward) = place(lane);
-            level[across] + inverse[2] * self.tan[upward]
+        std::array::from_fn(|subray| {
+            let (across, upward) = subray_position(subray);
+            horizontal[across] + inverse[2] * self.tan[upward]
         })
     }
 
     /// Keeps in `hits` what is nearer: what was met before, or this solid. Where both are equally near, the former.
     #[inline(always)]
-    fn meet(&self, faces: FaceRange, targets: &Targets, hits: &mut BeamHits) {
+    fn intersect(&self, faces: FaceRange, targets: &Targets, hits: &mut BeamHits) {
         let mut nearest = [f32::INFINITY; SUBRAYS];
-        let mut by = [NO_FACE; SUBRAYS];
-        for (face, index) in targets.faces[faces.towards()].iter().zip(faces.first..) {
-            let along = self.along(face.inverse);
-            for lane in 0..SUBRAYS {
-                by[lane] = if along[lane] < nearest[lane] { index } else { by[lane] };
-                nearest[lane] = if along[lane] < nearest[lane] { along[lane] } else { nearest[lane] };
+        let mut nearest_face = [NO_FACE; SUBRAYS];
+        for (face, index) in targets.faces[faces.front_facing()].iter().zip(faces.first..) {
+            let planes = self.inverse_distances(face.inverse);
+            for subray in 0..SUBRAYS {
+                nearest_face[subray] = if planes[subray] < nearest[subray] { index } else { nearest_face[subray] };
+                nearest[subray] = if planes[subray] < nearest[subray] { planes[subray] } else { nearest[subray] };
             }
         }
-        let mut farthest = [0.0_f32; SUBRAYS];
-        for face in &targets.faces[faces.away()] {
-            let along = self.along(face.inverse);
-            for lane in 0..SUBRAYS {
-                farthest[lane] = if along[lane] > farthest[lane] { along[lane] } else { farthest[lane] };
+        let mut entered_after = [0.0_f32; SUBRAYS];
+        for face in &targets.faces[faces.back_facing()] {
+            let planes = self.inverse_distances(face.inverse);
+            for subray in 0..SUBRAYS {
+                entered_after[subray] =
+                    if planes[subray] > entered_after[subray] { planes[subray] } else { entered_after[subray] };
             }
         }
-        for lane in 0..SUBRAYS {
-            let met = nearest[lane] > farthest[lane] && nearest[lane] > hits.inverse[lane];
-            hits.inverse[lane] = if met { nearest[lane] } else { hits.inverse[lane] };
-            hits.face[lane] = if met { by[lane] } else { hits.face[lane] };
+        for subray in 0..SUBRAYS {
+            let is_nearer = nearest[subray] > entered_after[subray] && nearest[subray] > hits.inverse[subray];
+            hits.inverse[subray] = if is_nearer { nearest[subray] } else { hits.inverse[subray] };
+            hits.face[subray] = if is_nearer { nearest_face[subray] } else { hits.face[subray] };
         }
     }
 }
 
 /// The parts that a sweep over the columns has to try at each of them.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Active {
+pub(crate) struct ActiveParts {
     /// Parts in order of their first column, then of their index.
     queue: Vec<usize>,
     next: usize,
     parts: Vec<usize>,
 }
 
-impl Active {
+impl ActiveParts {
     /// Starts a sweep.
     pub(crate) fn start(&mut self, targets: &Targets) {
         self.queue.clear();
@@ -147,13 +148,13 @@ impl Active {
     }
 
     /// The parts for the next column, in order of their index.
-    pub(crate) fn at(&mut self, column: usize, targets: &Targets) -> &[usize] {
+    pub(crate) fn advance_to(&mut self, column: usize, targets: &Targets) -> &[usize] {
         self.parts.retain(|&part| targets.parts[part].columns.end > column);
         while let Some(&part) = self.queue.get(self.next)
             && targets.parts[part].columns.start <= column
         {
-            let place = self.parts.partition_point(|&other| other < part);
-            self.parts.insert(place, part);
+            let position = self.parts.partition_point(|&other| other < part);
+            self.parts.insert(position, part);
             self.next += 1;
         }
         &self.parts

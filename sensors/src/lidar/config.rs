@@ -18,18 +18,18 @@ pub enum LidarModel {
 pub struct LidarConfig {
     /// Which scanner.
     pub model: Choice<LidarModel>,
-    /// Height of its centre above the ground [m].
+    /// Height of its centre above the ground (m).
     pub mount_height_m: Num,
-    /// Upward tilt of its axis against E's body [rad].
+    /// Upward tilt of its axis against E's body (rad).
     pub tilt_rad: Num,
     /// Range at which a target of 50 % reflectivity that fills the beam is detected with probability 0.5, in air
-    /// that does not attenuate [m].
+    /// that does not attenuate (m).
     pub nominal_range_m: Num,
-    /// Share of returns that are lost whatever their power [1].
+    /// Share of returns that are lost whatever their power (dimensionless).
     pub dropout: Num,
-    /// Standard deviation of the pitch by which E levels its points [rad].
+    /// Standard deviation of the pitch by which E levels its points (rad).
     pub levelling_sd_rad: Num,
-    /// Share of the light that the sensor's window lets through each way [1]: 1 clean, 0 blocked by snow or mud.
+    /// Share of the light that the sensor's window lets through each way (dimensionless): 1 clean, 0 blocked by snow or mud.
     pub window_transmission: Num,
 }
 

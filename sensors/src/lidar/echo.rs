@@ -3,12 +3,12 @@
 //! Sub-rays that end within the length of one pulse add up to one echo, whose power is the sum of their shares; where a
 //! beam is split by an edge, or spread over the road at a grazing angle, there are several, each the weaker.
 
-use super::cast::{BeamHits, NO_FACE, place};
-use super::pattern::{ACROSS, Elevation, SUBRAYS, UPWARD};
-use super::power::Link;
+use super::cast::{BeamHits, NO_FACE, subray_position};
+use super::pattern::{Elevation, SUBRAY_COLUMNS, SUBRAY_ROWS, SUBRAYS};
+use super::power::LinkBudget;
 use super::targets::Face;
 
-/// Length in range that one pulse of about 5 ns takes up: c·τ/2 [m].
+/// Length in range that one pulse of about 5 ns takes up: c·τ/2 (m).
 pub(crate) const PULSE_M: f32 = 0.75;
 /// Share of each sub-ray in the footprint.
 const SHARE: f32 = 1.0 / SUBRAYS as f32;
@@ -16,9 +16,9 @@ const SHARE: f32 = 1.0 / SUBRAYS as f32;
 /// One echo.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Echo {
-    /// Distance, weighted by power [m].
+    /// Distance, weighted by power (m).
     pub(crate) range_m: f32,
-    /// Power that would be received without the air's attenuation [thresholds].
+    /// Power that would be received without the air's attenuation (thresholds).
     pub(crate) power: f32,
     /// The face that sends most of it.
     pub(crate) face: u32,
@@ -39,14 +39,14 @@ impl Echoes {
     }
 
     /// The echoes of what the sub-rays met.
-    pub(crate) fn of(hits: &BeamHits, elevation: &Elevation, faces: &[Face], link: &Link) -> Self {
-        let mut lanes = [Echo::default(); SUBRAYS];
+    pub(crate) fn of(hits: &BeamHits, elevation: &Elevation, faces: &[Face], link: &LinkBudget) -> Self {
+        let mut subray_echoes = [Echo::default(); SUBRAYS];
         let (mut nearest, mut farthest) = (f32::INFINITY, 0.0_f32);
-        for (lane, echo) in lanes.iter_mut().enumerate() {
-            let face = hits.face[lane];
+        for (subray, echo) in subray_echoes.iter_mut().enumerate() {
+            let face = hits.face[subray];
             if face != NO_FACE {
                 let strength = SHARE * link.gain_m2 * faces[face as usize].strength_m;
-                *echo = subray_echo(hits.inverse[lane] * elevation.cos[place(lane).1], strength, face);
+                *echo = subray_echo(hits.inverse[subray] * elevation.cos[subray_position(subray).1], strength, face);
                 nearest = nearest.min(echo.range_m);
                 farthest = farthest.max(echo.range_m);
             }
@@ -55,12 +55,12 @@ impl Echoes {
         // Mostly all of them end within one pulse; a lane that met nothing adds nothing to the sums.
         if farthest <= nearest + PULSE_M {
             if farthest > 0.0 {
-                echoes.list[0] = sum(&lanes);
+                echoes.list[0] = sum(&subray_echoes);
                 echoes.count = 1;
             }
             return echoes;
         }
-        for echo in lanes.into_iter().filter(|echo| echo.range_m > 0.0) {
+        for echo in subray_echoes.into_iter().filter(|echo| echo.range_m > 0.0) {
             echoes.insert(echo);
         }
         echoes.merged()
@@ -68,11 +68,11 @@ impl Echoes {
 
     /// The echoes of a beam that meets nothing but the road: face 0. The two sides of the footprint are alike, and what
     /// lies higher in it lies farther away.
-    pub(crate) fn of_ground([cos, sin]: [f32; 2], elevation: &Elevation, ground: &Face, link: &Link) -> Self {
-        let strength = ACROSS as f32 * SHARE * link.gain_m2 * ground.strength_m;
+    pub(crate) fn of_ground([cos, sin]: [f32; 2], elevation: &Elevation, ground: &Face, link: &LinkBudget) -> Self {
+        let strength = SUBRAY_COLUMNS as f32 * SHARE * link.gain_m2 * ground.strength_m;
         let level = ground.inverse[0] * cos + ground.inverse[1] * sin;
         let mut met = Self::NONE;
-        for upward in 0..UPWARD {
+        for upward in 0..SUBRAY_ROWS {
             let inverse = level + ground.inverse[2] * elevation.tan[upward];
             if !(inverse > 0.0) {
                 break;
@@ -86,12 +86,12 @@ impl Echoes {
     /// Insertion sort: eight at most, and mostly in order already.
     #[inline(always)]
     fn insert(&mut self, echo: Echo) {
-        let mut place = self.count;
-        while place > 0 && self.list[place - 1].range_m > echo.range_m {
-            self.list[place] = self.list[place - 1];
-            place -= 1;
+        let mut index = self.count;
+        while index > 0 && self.list[index - 1].range_m > echo.range_m {
+            self.list[index] = self.list[index - 1];
+            index -= 1;
         }
-        self.list[place] = echo;
+        self.list[index] = echo;
         self.count += 1;
     }
 
@@ -100,8 +100,8 @@ impl Echoes {
     fn merged(mut self) -> Self {
         let (mut from, mut echoes) = (0, 0);
         while from < self.count {
-            let most = self.list[from].range_m + PULSE_M;
-            let within = self.list[from..self.count].iter().take_while(|echo| echo.range_m <= most).count();
+            let end_m = self.list[from].range_m + PULSE_M;
+            let within = self.list[from..self.count].iter().take_while(|echo| echo.range_m <= end_m).count();
             self.list[echoes] = sum(&self.list[from..from + within]);
             echoes += 1;
             from += within;
@@ -126,7 +126,7 @@ fn sum(parts: &[Echo]) -> Echo {
     Echo { range_m, power, face: strongest.face }
 }
 
-/// What one sub-ray alone sends back: strength [thresholds · m³] over the third power of the range, since cos γ is the
+/// What one sub-ray alone sends back: strength (thresholds · m³) over the third power of the range, since cos γ is the
 /// plane's distance over the range.
 #[inline(always)]
 fn subray_echo(per_range: f32, strength: f32, face: u32) -> Echo {
@@ -145,14 +145,14 @@ mod tests {
 
     fn echoes(ranges_m: [Option<f32>; SUBRAYS]) -> Vec<(f32, f32)> {
         let mut hits = BeamHits::NONE;
-        for (lane, range_m) in ranges_m.into_iter().enumerate() {
+        for (subray, range_m) in ranges_m.into_iter().enumerate() {
             if let Some(range_m) = range_m {
-                hits.inverse[lane] = 1.0 / range_m;
-                hits.face[lane] = 0;
+                hits.inverse[subray] = 1.0 / range_m;
+                hits.face[subray] = 0;
             }
         }
-        let level = Elevation { centre: [0.0, 1.0], tan: [0.0; UPWARD], cos: [1.0; UPWARD] };
-        let link = Link::new(&Lidar::default(), &Environment::CLEAR_DAY);
+        let level = Elevation { centre: [0.0, 1.0], tan: [0.0; SUBRAY_ROWS], cos: [1.0; SUBRAY_ROWS] };
+        let link = LinkBudget::new(&Lidar::default(), &Environment::CLEAR_DAY);
         // At 10 m each sub-ray sends 1/8 of gain·ρ·cos γ/R² with ρ·cos γ = 1.
         let found = Echoes::of(&hits, &level, &[face(10.0)], &link);
         let unit = link.gain_m2 / 100.0;

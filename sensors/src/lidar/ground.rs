@@ -9,21 +9,21 @@ use closecall_traffic::Time;
 use super::{LaneGeometry, LidarScan};
 use crate::SensorError;
 
-/// Where the road may send something back, from the sensor [m].
+/// Where the road may send something back, from the sensor (m).
 const GROUND_REACH_M: f32 = 40.0;
-/// Height below which a point counts as ground, at the sensor [m].
+/// Height below which a point counts as ground, at the sensor (m).
 const GROUND_M: f32 = 0.10;
 /// What the height gains per metre of distance: three standard deviations of the levelling's error, and the footprint,
-/// whose near edge sends more than its far edge [rad].
+/// whose near edge sends more than its far edge (rad).
 const GROUND_SLOPE: f32 = 0.005;
-/// Half the width of the region of interest about E's path: two lanes to each side [m].
+/// Half the width of the region of interest about E's path: two lanes to each side (m).
 const HALF_WIDTH_M: f32 = 9.5;
-/// Points farther behind the sensor than this are not used [m].
+/// Points farther behind the sensor than this are not used (m).
 const REACH_M: f32 = 200.0;
 /// Near returns weaker than this come from droplets: a tyre at 60° still shows 0.025 (low-intensity outlier removal,
 /// after Park et al. 2020, "Fast and accurate desnowing algorithm for LiDAR point clouds").
 const DROPLET_INTENSITY: f32 = 0.02;
-/// Up to where droplets are looked for [m].
+/// Up to where droplets are looked for (m).
 const DROPLET_REACH_M: f32 = 15.0;
 
 /// A point that may belong to a vehicle.
@@ -31,9 +31,9 @@ const DROPLET_REACH_M: f32 = 15.0;
 pub(crate) struct Candidate {
     /// Its place in the scan.
     pub(crate) index: u32,
-    /// Behind the sensor, along E's axis [m].
+    /// Behind the sensor, along E's axis (m).
     pub(crate) back_m: f32,
-    /// To the left of E's path [m].
+    /// To the left of E's path (m).
     pub(crate) left_m: f32,
 }
 
@@ -41,13 +41,13 @@ pub(crate) struct Candidate {
 ///
 /// # Errors
 /// [`SensorError::NotFinite`] at a point that is not finite.
-pub(crate) fn select(
+pub(crate) fn select_candidates(
     scan: &LidarScan,
     lane: &LaneGeometry,
     time: Time,
-    kept: &mut Vec<Candidate>,
+    candidates: &mut Vec<Candidate>,
 ) -> Result<(), SensorError> {
-    kept.clear();
+    candidates.clear();
     #[expect(clippy::cast_possible_truncation, reason = "points are in single precision")]
     let (slope, bend) = (-lane.heading_rad as f32, 0.5 * lane.curvature_per_m as f32);
     let points = scan.x_m.iter().zip(&scan.y_m).zip(&scan.z_m).zip(&scan.intensity);
@@ -62,7 +62,7 @@ pub(crate) fn select(
         let ground = range_m < GROUND_REACH_M && z < GROUND_M + GROUND_SLOPE * range_m;
         let droplet = range_m < DROPLET_REACH_M && intensity < DROPLET_INTENSITY;
         if inside && !ground && !droplet {
-            kept.push(Candidate { index, back_m, left_m });
+            candidates.push(Candidate { index, back_m, left_m });
         }
     }
     Ok(())
@@ -83,7 +83,7 @@ mod tests {
             scan.intensity.push(intensity);
         }
         let mut kept = Vec::new();
-        select(&scan, &LANE, Time::ZERO, &mut kept)?;
+        select_candidates(&scan, &LANE, Time::ZERO, &mut kept)?;
         Ok(kept.into_iter().map(|candidate| candidate.index).collect())
     }
 

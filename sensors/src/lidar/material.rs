@@ -34,7 +34,7 @@ pub enum Material {
 
 /// Windows let through or mirror away nearly all; what comes back is dust and the edge of the dashboard (assumption).
 const GLASS: f64 = 0.05;
-/// A retro-reflector of R_A [cd/(lx·m²)] looks like a Lambertian surface of ρ = π·R_A. New plates have some tens
+/// A retro-reflector of R_A (cd/(lx·m²)) looks like a Lambertian surface of ρ = π·R_A. New plates have some tens
 /// (ISO 7591 sets the minimum); 20 is assumed for one in use.
 const PLATE: f64 = std::f64::consts::PI * 20.0;
 /// A clear lens before a reflector (assumption).
@@ -55,11 +55,11 @@ const ASPHALT: f64 = 0.15;
 /// A wet rough surface reflects about half as much diffusely (Lekner and Dorf 1988, "Why some things are darker when
 /// wet"); a closed film mirrors the rest away from a sensor at a grazing angle.
 const WET_SHARE: f64 = 0.4;
-/// Height of water at which the surface counts as wholly wet [mm].
+/// Height of water at which the surface counts as wholly wet (mm).
 const WET_FILM_MM: f64 = 0.2;
 
 impl Material {
-    /// Equivalent Lambertian reflectivity [1] on a vehicle of this appearance, in this weather.
+    /// Equivalent Lambertian reflectivity (dimensionless) on a vehicle of this appearance, in this weather.
     pub fn reflectivity(self, appearance: &Appearance, environment: &Environment) -> f64 {
         match self {
             Self::Paint => appearance.paint_reflectivity,
@@ -77,7 +77,7 @@ impl Material {
     }
 }
 
-/// Reflectivity of the road [1]: the wetter, the darker.
+/// Reflectivity of the road (dimensionless): the wetter, the darker.
 pub(crate) fn asphalt(environment: &Environment) -> f64 {
     let wetness = (environment.water_film_mm / WET_FILM_MM).clamp(0.0, 1.0);
     ASPHALT * (1.0 - (1.0 - WET_SHARE) * wetness)

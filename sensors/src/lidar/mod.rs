@@ -43,6 +43,6 @@ pub use material::Material;
 pub use pattern::{BEAMS, COLUMNS, LAYERS, PERIOD_NS, Pattern};
 pub(crate) use power::extinction_per_m;
 pub use rear::RearLidar;
-pub use scan::{LidarScan, Mirror, PointSource, PointTruth, ScanTruth};
+pub use scan::{LidarScan, MirrorSide, PointSource, PointTruth, ScanTruth};
 pub use scanner::Scanner;
 pub use segmentation::SegmentationReport;

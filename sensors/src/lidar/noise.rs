@@ -39,8 +39,8 @@ impl Noise {
     }
 
     fn bits(self, beam: usize, purpose: Purpose) -> u64 {
-        let place = beam as u64 * PURPOSES + purpose as u64 + 1;
-        let mut z = self.key.wrapping_add(place.wrapping_mul(INCREMENT));
+        let counter = beam as u64 * PURPOSES + purpose as u64 + 1;
+        let mut z = self.key.wrapping_add(counter.wrapping_mul(INCREMENT));
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         z ^ (z >> 31)

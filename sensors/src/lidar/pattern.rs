@@ -16,7 +16,7 @@
 //! side, 0.6025° apart, which leave no gap) and, as an assumption, as wide as the finest step, 0.125°, so that
 //! neighbouring columns touch. It is sampled by 2 × 4 sub-rays of equal weight.
 
-use super::Mirror;
+use super::MirrorSide;
 
 /// Columns of one scan.
 pub const COLUMNS: usize = 653;
@@ -28,48 +28,48 @@ pub const BEAMS: usize = COLUMNS * LAYERS;
 pub(crate) const LAYERS_PER_GROUP: usize = 4;
 pub(crate) const GROUPS: usize = LAYERS / LAYERS_PER_GROUP;
 /// Sub-rays side by side in one footprint.
-pub(crate) const ACROSS: usize = 2;
+pub(crate) const SUBRAY_COLUMNS: usize = 2;
 /// Sub-rays above each other in one footprint.
-pub(crate) const UPWARD: usize = 4;
+pub(crate) const SUBRAY_ROWS: usize = 4;
 /// Sub-rays in one footprint.
-pub(crate) const SUBRAYS: usize = ACROSS * UPWARD;
+pub(crate) const SUBRAYS: usize = SUBRAY_COLUMNS * SUBRAY_ROWS;
 
-/// Time from one scan to the next [ns]: 25 Hz.
+/// Time from one scan to the next (ns): 25 Hz.
 pub const PERIOD_NS: i64 = 40_000_000;
-/// Half the field of view [°].
+/// Half the field of view (°).
 const HALF_FIELD_DEG: f64 = 66.5;
-/// Time in which a scan sweeps its field of view [ns].
+/// Time in which a scan sweeps its field of view (ns).
 ///
 /// The mirror has two sides and deflects by twice its own angle: it turns by half a turn each period, and by half of
 /// 133° while it sweeps.
 pub(crate) const SWEEP_NS: f64 = PERIOD_NS as f64 * HALF_FIELD_DEG / 180.0;
 
-/// The finest azimuth step [°]; azimuths are counted in it.
+/// The finest azimuth step (°); azimuths are counted in it.
 const FINE_STEP_DEG: f64 = 0.125;
-/// Where the fine steps end [fine steps]: 15°.
-const FINE_TO: i32 = 120;
-/// Where the coarse steps end [fine steps]: 66.5°.
-const COARSE_TO: i32 = 532;
-/// Azimuth shift from group to group [°].
+/// Where the fine steps end (fine steps): 15°.
+const FINE_END_STEPS: i32 = 120;
+/// Where the coarse steps end (fine steps): 66.5°.
+const COARSE_END_STEPS: i32 = 532;
+/// Azimuth shift from group to group (°).
 const GROUP_SHIFT_DEG: f64 = 0.0181;
-/// Width of a footprint [°].
+/// Width of a footprint (°).
 const FOOTPRINT_WIDTH_DEG: f64 = FINE_STEP_DEG;
-/// Height of a footprint [°].
+/// Height of a footprint (°).
 const FOOTPRINT_HEIGHT_DEG: f64 = 0.6;
 
 /// One column: what its beams have in common.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Column {
-    /// Azimuth of group 0 [°].
+    /// Azimuth of group 0 (°).
     pub(crate) azimuth_deg: f64,
-    /// When it is measured, after the scan's start [ns].
+    /// When it is measured, after the scan's start (ns).
     pub(crate) offset_ns: u32,
     /// Cosine and sine of the azimuth of each group's centre.
     pub(crate) centre: [[f32; 2]; GROUPS],
     /// Cosines of the azimuths of each group's sub-rays.
-    pub(crate) cos: [[f32; ACROSS]; GROUPS],
+    pub(crate) cos: [[f32; SUBRAY_COLUMNS]; GROUPS],
     /// Sines of the same.
-    pub(crate) sin: [[f32; ACROSS]; GROUPS],
+    pub(crate) sin: [[f32; SUBRAY_COLUMNS]; GROUPS],
 }
 
 /// Elevations of one beam.
@@ -78,9 +78,9 @@ pub(crate) struct Elevation {
     /// Tangent and cosine of its centre.
     pub(crate) centre: [f32; 2],
     /// Tangents of its sub-rays, upward.
-    pub(crate) tan: [f32; UPWARD],
+    pub(crate) tan: [f32; SUBRAY_ROWS],
     /// Cosines of the same.
-    pub(crate) cos: [f32; UPWARD],
+    pub(crate) cos: [f32; SUBRAY_ROWS],
 }
 
 /// All beams of both mirror sides, in the sensor's frame.
@@ -96,16 +96,17 @@ impl Pattern {
     /// The pattern of the Valeo SCALA Gen 2.
     pub fn scala_2() -> Self {
         let columns: Vec<Column> = azimuth_steps().map(|steps| column(f64::from(steps) * FINE_STEP_DEG)).collect();
-        let elevations = [Mirror::Plus, Mirror::Minus].map(|mirror| {
-            let of = |column: &Column| (0..LAYERS).map(|layer| elevation(layer, column.azimuth_deg, mirror)).collect();
+        let elevations = [MirrorSide::Plus, MirrorSide::Minus].map(|mirror_side| {
+            let of =
+                |column: &Column| (0..LAYERS).map(|layer| elevation(layer, column.azimuth_deg, mirror_side)).collect();
             columns.iter().flat_map::<Vec<Elevation>, _>(of).collect()
         });
         Self { columns, elevations }
     }
 
     /// Elevations of the 16 beams of one column.
-    pub(crate) fn elevations(&self, mirror: Mirror, column: usize) -> &[Elevation] {
-        &self.elevations[mirror as usize][column * LAYERS..(column + 1) * LAYERS]
+    pub(crate) fn elevations(&self, mirror_side: MirrorSide, column: usize) -> &[Elevation] {
+        &self.elevations[mirror_side as usize][column * LAYERS..(column + 1) * LAYERS]
     }
 
     /// The columns whose footprints may touch azimuths from `low_deg` to `high_deg`: a half-open range.
@@ -118,11 +119,11 @@ impl Pattern {
     }
 
     /// The layers whose footprints may touch elevations from `low_deg` to `high_deg`: a half-open range.
-    pub(crate) fn layers_between(mirror: Mirror, low_deg: f64, high_deg: f64) -> std::ops::Range<usize> {
+    pub(crate) fn layers_between(mirror_side: MirrorSide, low_deg: f64, high_deg: f64) -> std::ops::Range<usize> {
         let half = 0.5 * FOOTPRINT_HEIGHT_DEG;
-        let (lowest, highest) = match mirror {
-            Mirror::Plus => (CUBIC_LEAST_DEG, CUBIC_MOST_DEG),
-            Mirror::Minus => (-CUBIC_MOST_DEG, -CUBIC_LEAST_DEG),
+        let (lowest, highest) = match mirror_side {
+            MirrorSide::Plus => (CUBIC_MIN_DEG, CUBIC_MAX_DEG),
+            MirrorSide::Minus => (-CUBIC_MAX_DEG, -CUBIC_MIN_DEG),
         };
         let touches = |layer: &usize| {
             base_deg(*layer) + highest + half >= low_deg && base_deg(*layer) + lowest - half <= high_deg
@@ -132,44 +133,44 @@ impl Pattern {
         first..end
     }
 
-    /// Azimuth and elevation of a beam's centre in the sensor's frame [rad].
-    pub fn direction_rad(&self, mirror: Mirror, beam: u16) -> (f64, f64) {
+    /// Azimuth and elevation of a beam's centre in the sensor's frame (rad).
+    pub fn direction_rad(&self, mirror_side: MirrorSide, beam: u16) -> (f64, f64) {
         let (column, layer) = (usize::from(beam) / LAYERS, usize::from(beam) % LAYERS);
         let azimuth_deg = self.columns[column].azimuth_deg;
-        (group_azimuth_deg(azimuth_deg, layer).to_radians(), layer_deg(layer, azimuth_deg, mirror).to_radians())
+        (group_azimuth_deg(azimuth_deg, layer).to_radians(), layer_deg(layer, azimuth_deg, mirror_side).to_radians())
     }
 
-    /// When a column at this azimuth of the sensor's frame is measured, after the scan's start [s]; clamped to the sweep.
+    /// When a column at this azimuth of the sensor's frame is measured, after the scan's start (s); clamped to the sweep.
     pub(crate) fn sweep_offset_s(azimuth_deg: f64) -> f64 {
         let share = ((azimuth_deg + HALF_FIELD_DEG) / (2.0 * HALF_FIELD_DEG)).clamp(0.0, 1.0);
         share * SWEEP_NS * 1e-9
     }
 }
 
-/// Bounds of the cubic over the field of view, rounded outward [°]; a test holds the cubic to them.
-const CUBIC_LEAST_DEG: f64 = 0.040;
-const CUBIC_MOST_DEG: f64 = 0.197;
+/// Bounds of the cubic over the field of view, rounded outward (°); a test holds the cubic to them.
+const CUBIC_MIN_DEG: f64 = 0.040;
+const CUBIC_MAX_DEG: f64 = 0.197;
 
 fn azimuth_steps() -> impl Iterator<Item = i32> {
-    let coarse_right = (-COARSE_TO..-FINE_TO).step_by(2);
-    let coarse_left = (FINE_TO + 2..=COARSE_TO).step_by(2);
-    coarse_right.chain(-FINE_TO..=FINE_TO).chain(coarse_left)
+    let coarse_right = (-COARSE_END_STEPS..-FINE_END_STEPS).step_by(2);
+    let coarse_left = (FINE_END_STEPS + 2..=COARSE_END_STEPS).step_by(2);
+    coarse_right.chain(-FINE_END_STEPS..=FINE_END_STEPS).chain(coarse_left)
 }
 
 fn cubic_deg(azimuth_deg: f64) -> f64 {
     ((1.512e-8 * azimuth_deg - 5.152e-6) * azimuth_deg - 1.233e-3) * azimuth_deg + 0.1412
 }
 
-/// Elevation of a layer without the mirror's share [°].
+/// Elevation of a layer without the mirror's share (°).
 fn base_deg(layer: usize) -> f64 {
     let (group, in_group) = (layer / LAYERS_PER_GROUP, layer % LAYERS_PER_GROUP);
     0.6025 * in_group as f64 + 2.564 * group as f64 - 4.749
 }
 
-fn layer_deg(layer: usize, azimuth_deg: f64, mirror: Mirror) -> f64 {
-    match mirror {
-        Mirror::Plus => base_deg(layer) + cubic_deg(azimuth_deg),
-        Mirror::Minus => base_deg(layer) - cubic_deg(azimuth_deg),
+fn layer_deg(layer: usize, azimuth_deg: f64, mirror_side: MirrorSide) -> f64 {
+    match mirror_side {
+        MirrorSide::Plus => base_deg(layer) + cubic_deg(azimuth_deg),
+        MirrorSide::Minus => base_deg(layer) - cubic_deg(azimuth_deg),
     }
 }
 
@@ -184,15 +185,15 @@ fn column(azimuth_deg: f64) -> Column {
         #[expect(clippy::cast_sign_loss, reason = "clamped to 0 and above")]
         offset_ns: (Pattern::sweep_offset_s(azimuth_deg) * 1e9) as u32,
         centre: [[0.0; 2]; GROUPS],
-        cos: [[0.0; ACROSS]; GROUPS],
-        sin: [[0.0; ACROSS]; GROUPS],
+        cos: [[0.0; SUBRAY_COLUMNS]; GROUPS],
+        sin: [[0.0; SUBRAY_COLUMNS]; GROUPS],
     };
     for group in 0..GROUPS {
         let centre_deg = group_azimuth_deg(azimuth_deg, group * LAYERS_PER_GROUP);
         let (sin, cos) = centre_deg.to_radians().sin_cos();
         column.centre[group] = [cos as f32, sin as f32];
-        for across in 0..ACROSS {
-            let offset_deg = FOOTPRINT_WIDTH_DEG * ((across as f64 + 0.5) / ACROSS as f64 - 0.5);
+        for across in 0..SUBRAY_COLUMNS {
+            let offset_deg = FOOTPRINT_WIDTH_DEG * ((across as f64 + 0.5) / SUBRAY_COLUMNS as f64 - 0.5);
             let (sin, cos) = (centre_deg + offset_deg).to_radians().sin_cos();
             column.cos[group][across] = cos as f32;
             column.sin[group][across] = sin as f32;
@@ -202,10 +203,10 @@ fn column(azimuth_deg: f64) -> Column {
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "the model's directions are single precision: 1e-7 rad")]
-fn elevation(layer: usize, azimuth_deg: f64, mirror: Mirror) -> Elevation {
-    let centre_deg = layer_deg(layer, azimuth_deg, mirror);
+fn elevation(layer: usize, azimuth_deg: f64, mirror_side: MirrorSide) -> Elevation {
+    let centre_deg = layer_deg(layer, azimuth_deg, mirror_side);
     let subray_rad = |upward: usize| {
-        let offset_deg = FOOTPRINT_HEIGHT_DEG * ((upward as f64 + 0.5) / UPWARD as f64 - 0.5);
+        let offset_deg = FOOTPRINT_HEIGHT_DEG * ((upward as f64 + 0.5) / SUBRAY_ROWS as f64 - 0.5);
         (centre_deg + offset_deg).to_radians()
     };
     Elevation {
@@ -233,22 +234,22 @@ mod tests {
     #[test]
     fn elevations_agree_with_the_formula_worked_out_by_hand() {
         let pattern = Pattern::scala_2();
-        let at = |mirror, column: usize, layer: usize| {
-            pattern.direction_rad(mirror, u16::try_from(column * LAYERS + layer).unwrap())
+        let at = |mirror_side, column: usize, layer: usize| {
+            pattern.direction_rad(mirror_side, u16::try_from(column * LAYERS + layer).unwrap())
         };
         // φ = 0: c = 0.1412. Layer 7 is g = 1, l = 3: 1.8075 + 2.564 − 4.749 = −0.3775.
-        assert!((at(Mirror::Plus, 326, 7).1.to_degrees() - -0.2363).abs() < 1e-9);
-        assert!((at(Mirror::Minus, 326, 7).1.to_degrees() - -0.5187).abs() < 1e-9);
+        assert!((at(MirrorSide::Plus, 326, 7).1.to_degrees() - -0.2363).abs() < 1e-9);
+        assert!((at(MirrorSide::Minus, 326, 7).1.to_degrees() - -0.5187).abs() < 1e-9);
         // φ = 66.5: 0.004447 − 0.022784 − 0.081995 + 0.1412 = 0.040868. Layer 15: 1.8075 + 7.692 − 4.749 = 4.7505.
-        assert!((at(Mirror::Plus, 652, 15).1.to_degrees() - 4.791_368).abs() < 1e-5);
-        assert!((at(Mirror::Plus, 652, 15).0.to_degrees() - (66.5 + 3.0 * 0.0181)).abs() < 1e-9);
+        assert!((at(MirrorSide::Plus, 652, 15).1.to_degrees() - 4.791_368).abs() < 1e-5);
+        assert!((at(MirrorSide::Plus, 652, 15).0.to_degrees() - (66.5 + 3.0 * 0.0181)).abs() < 1e-9);
     }
 
     #[test]
     fn the_bounds_of_the_cubic_hold() {
         for steps in azimuth_steps() {
             let cubic = cubic_deg(f64::from(steps) * FINE_STEP_DEG);
-            assert!((CUBIC_LEAST_DEG..=CUBIC_MOST_DEG).contains(&cubic), "{cubic} at {steps}");
+            assert!((CUBIC_MIN_DEG..=CUBIC_MAX_DEG).contains(&cubic), "{cubic} at {steps}");
         }
     }
 

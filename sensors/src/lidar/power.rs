@@ -22,10 +22,10 @@ use super::Lidar;
 /// range cells each has a false alarm every third scan; they are not modelled.
 pub(crate) const THRESHOLD_OVER_NOISE: f32 = 5.0;
 /// Power below which the noise, which stays within 3.47 standard deviations, cannot lift a return above the threshold.
-pub(crate) const LEAST_POWER: f32 = 1.0 - 3.47 / THRESHOLD_OVER_NOISE;
-/// Reflectivity of the target of the nominal range [1].
+pub(crate) const MIN_POWER: f32 = 1.0 - 3.47 / THRESHOLD_OVER_NOISE;
+/// Reflectivity of the target of the nominal range (dimensionless).
 const NOMINAL_REFLECTIVITY: f64 = 0.5;
-/// Standard deviation of range at high power [m], and what is added at the threshold.
+/// Standard deviation of range at high power (m), and what is added at the threshold.
 const RANGE_SD_M: f32 = 0.03;
 const RANGE_SD_AT_THRESHOLD_M: f32 = 0.09;
 /// Meteorological visibility is the distance at which contrast falls to 2 %: α = ln 50 / V (Koschmieder 1924).
@@ -36,19 +36,19 @@ const RAIN_EXPONENT: f64 = 0.67;
 /// Decibels per neper of power, times metres per kilometre.
 const DB_PER_KM_OVER_PER_M: f64 = 4_342.944_819;
 
-/// Extinction below which the air sends nothing back that could be told from noise [1/m]: a visibility of 1 km.
+/// Extinction below which the air sends nothing back that could be told from noise (1/m): a visibility of 1 km.
 const FOG_FROM_PER_M: f32 = 0.004;
 
 /// The link between surface and receiver in one weather.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Link {
-    /// Power of ρ·cos γ·f = 1 at 1 m without attenuation [thresholds · m²].
+pub(crate) struct LinkBudget {
+    /// Power of ρ·cos γ·f = 1 at 1 m without attenuation (thresholds · m²).
     pub(crate) gain_m2: f32,
-    /// Extinction coefficient of the air α [1/m].
+    /// Extinction coefficient of the air α (1/m).
     pub(crate) extinction_per_m: f32,
 }
 
-impl Link {
+impl LinkBudget {
     #[expect(clippy::cast_possible_truncation, reason = "powers need no more than single precision")]
     pub(crate) fn new(lidar: &Lidar, environment: &Environment) -> Self {
         Self {
@@ -69,7 +69,7 @@ impl Link {
     }
 }
 
-/// Extinction of the air [1/m]: what the visibility gives, or what the rain alone gives, whichever is more.
+/// Extinction of the air (1/m): what the visibility gives, or what the rain alone gives, whichever is more.
 ///
 /// A visibility that was observed in rain has the rain's extinction in it, hence not the sum.
 pub(crate) fn extinction_per_m(environment: &Environment) -> f64 {
@@ -77,7 +77,7 @@ pub(crate) fn extinction_per_m(environment: &Environment) -> f64 {
     (KOSCHMIEDER / environment.visibility_m).max(rain_db_per_km / DB_PER_KM_OVER_PER_M)
 }
 
-/// Standard deviation of the measured range [m]: 0.03 m for a strong return, 0.1 m at the threshold.
+/// Standard deviation of the measured range (m): 0.03 m for a strong return, 0.1 m at the threshold.
 pub(crate) fn range_sd_m(power: f32) -> f32 {
     let weak = RANGE_SD_AT_THRESHOLD_M / power.max(1.0);
     (RANGE_SD_M * RANGE_SD_M + weak * weak).sqrt()
@@ -89,7 +89,7 @@ mod tests {
 
     #[test]
     fn the_nominal_target_is_at_the_threshold() {
-        let link = Link::new(&Lidar::default(), &Environment::CLEAR_DAY);
+        let link = LinkBudget::new(&Lidar::default(), &Environment::CLEAR_DAY);
         assert!((link.gain_m2 * 0.5 / (200.0 * 200.0) - 1.0).abs() < 1e-6);
     }
 

@@ -21,7 +21,7 @@ impl RearLidar {
 
     /// Scans the scene; the scan ends at the scene's time. Draws exactly one number from `rng`.
     pub fn scan(&mut self, scene: &Scene<'_>, rng: &mut Stream) -> &LidarScan {
-        self.lane = Some(LaneGeometry::of(scene));
+        self.lane = Some(LaneGeometry::from_scene(scene));
         self.scanner.scan(scene, rng)
     }
 
@@ -59,6 +59,6 @@ impl RearLidar {
     /// Adds the latest scan to a report on the clusters.
     pub fn report(&self, report: &mut SegmentationReport) {
         let clusters = (0..self.detector.latest().len()).map(|detection| self.detector.points_of(detection));
-        report.add(self.scanner.truth(), clusters);
+        report.observe(self.scanner.truth(), clusters);
     }
 }

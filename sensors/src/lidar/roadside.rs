@@ -19,14 +19,14 @@ const RIGHT_OFFSET_M: f64 = 3.0;
 /// Beyond this distance nothing comes back from steel at so grazing an angle; it could still hide something.
 const RAIL_REACH_M: f64 = 160.0;
 const POST_REACH_M: f64 = 60.0;
-/// Chords of a bent rail [m]: 4 cm off the arc at the tightest curvature that a road may have.
+/// Chords of a bent rail (m): 4 cm off the arc at the tightest curvature that a road may have.
 const CHORD_M: f64 = 12.0;
 
 /// A solid with the pose of its frame in the plane.
-pub(super) type Placed = (Solid, PlanePose);
+pub(super) type PlacedSolid = (Solid, PlanePose);
 
 /// Appends the rails behind the road position `s_m`.
-pub(super) fn append_guard_rails(road: &Road, s_m: f64, placed: &mut Vec<Placed>) {
+pub(super) fn append_guard_rails(road: &Road, s_m: f64, placed: &mut Vec<PlacedSolid>) {
     let chord = if road.curvature_per_m() == 0.0 { RAIL_REACH_M } else { CHORD_M };
     for (d_m, outward) in [(LEFT_OFFSET_M, 1.0), (road.right_edge_m() - RIGHT_OFFSET_M, -1.0)] {
         let mut from = s_m - RAIL_REACH_M;
@@ -35,7 +35,7 @@ pub(super) fn append_guard_rails(road: &Road, s_m: f64, placed: &mut Vec<Placed>
             let half = 0.5 * (to - from);
             let depth = [0.0, outward * BEAM_DEPTH_M];
             let low = [-half, depth[0].min(depth[1]), BEAM_LOW_M];
-            let beam = Solid::block(low, [half, depth[0].max(depth[1]), BEAM_TOP_M], Steel);
+            let beam = Solid::cuboid(low, [half, depth[0].max(depth[1]), BEAM_TOP_M], Steel);
             placed.push((beam, road.plane_pose(0.5 * (from + to), d_m, 0.0)));
             from = to;
         }
@@ -43,7 +43,7 @@ pub(super) fn append_guard_rails(road: &Road, s_m: f64, placed: &mut Vec<Placed>
         let mut index = ((s_m - POST_REACH_M) / POST_SPACING_M).ceil();
         while index * POST_SPACING_M < s_m {
             let half = 0.5 * POST_WIDTH_M;
-            let post = Solid::block([-half, -half, 0.0], [half, half, BEAM_LOW_M], Steel);
+            let post = Solid::cuboid([-half, -half, 0.0], [half, half, BEAM_LOW_M], Steel);
             let d_post = d_m + outward * (BEAM_DEPTH_M + half);
             placed.push((post, road.plane_pose(index * POST_SPACING_M, d_post, 0.0)));
             index += 1.0;

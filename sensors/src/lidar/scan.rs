@@ -6,7 +6,7 @@ use super::Material;
 
 /// The side of the two-sided mirror that deflects a scan.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Mirror {
+pub enum MirrorSide {
     /// The side that lifts the layers: + in the pattern's formula.
     #[default]
     Plus,
@@ -26,18 +26,18 @@ pub struct LidarScan {
     /// When the last column was measured; the coordinates hold for E's pose at this time.
     pub end: Time,
     /// Side of the mirror.
-    pub mirror: Mirror,
-    /// Where the sensor is, ahead of E's origin [m]; negative, at the rear bumper.
+    pub mirror_side: MirrorSide,
+    /// Where the sensor is, ahead of E's origin (m); negative, at the rear bumper.
     pub sensor_x_m: f32,
-    /// Ahead of E [m]; negative behind.
+    /// Ahead of E (m); negative behind.
     pub x_m: Vec<f32>,
-    /// To the left of E [m].
+    /// To the left of E (m).
     pub y_m: Vec<f32>,
-    /// Above the ground [m].
+    /// Above the ground (m).
     pub z_m: Vec<f32>,
-    /// Received power × range², as the reflectivity of a target that faces the sensor and fills the beam [1].
+    /// Received power × range², as the reflectivity of a target that faces the sensor and fills the beam (dimensionless).
     pub intensity: Vec<f32>,
-    /// Time of measurement after `start` [ns].
+    /// Time of measurement after `start` (ns).
     pub offset_ns: Vec<u32>,
     /// Beam: column · 16 + layer.
     pub beam: Vec<u16>,
@@ -87,7 +87,7 @@ pub struct PointTruth {
     pub source: PointSource,
     /// What the surface is made of.
     pub material: Material,
-    /// Distance from the sensor without noise [m].
+    /// Distance from the sensor without noise (m).
     pub range_m: f32,
 }
 

@@ -5,14 +5,14 @@ use nalgebra::{Point3, Vector3};
 use super::Material;
 
 /// The most faces of one solid: a side profile of six edges, and two sides.
-pub(crate) const MOST_FACES: usize = 8;
+pub(crate) const MAX_FACES: usize = 8;
 
 /// One face: the half-space n·p ≤ w that the solid lies in.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SolidFace {
     /// Outward unit normal n.
     pub(crate) normal: Vector3<f64>,
-    /// Distance w from the origin along the normal [m].
+    /// Distance w from the origin along the normal (m).
     pub(crate) offset_m: f64,
     pub(crate) material: Material,
 }
@@ -20,9 +20,9 @@ pub(crate) struct SolidFace {
 /// A convex solid as the intersection of half-spaces, in the frame of what it belongs to.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Solid {
-    faces: [SolidFace; MOST_FACES],
+    faces: [SolidFace; MAX_FACES],
     count: usize,
-    /// Corners of a box along the axes that holds the solid [m].
+    /// Corners of a box along the axes that holds the solid (m).
     pub(crate) low: Vector3<f64>,
     pub(crate) high: Vector3<f64>,
 }
@@ -62,16 +62,16 @@ impl Solid {
         &self.faces[..self.count]
     }
 
-    /// The corners of the box along the axes that holds the solid [m].
+    /// The corners of the box along the axes that holds the solid (m).
     pub(crate) fn corners(&self) -> impl Iterator<Item = Point3<f64>> {
         let ends = [self.low, self.high];
         (0..8_usize).map(move |corner| Point3::from(Vector3::from_fn(|axis, _| ends[corner >> axis & 1][axis])))
     }
 
     /// A box along the axes, of one material.
-    pub(crate) fn block(low: [f64; 3], high: [f64; 3], material: Material) -> Self {
+    pub(crate) fn cuboid(low: [f64; 3], high: [f64; 3], material: Material) -> Self {
         let (low, high) = (Vector3::from(low), Vector3::from(high));
-        let mut solid = Self { faces: [NO_FACE; MOST_FACES], count: 0, low, high };
+        let mut solid = Self { faces: [NO_FACE; MAX_FACES], count: 0, low, high };
         for axis in 0..3 {
             let mut normal = Vector3::zeros();
             normal[axis] = 1.0;
@@ -83,9 +83,9 @@ impl Solid {
 
     /// A convex side profile of at most six corners, in order around it, given width about y = 0.
     pub(crate) fn prism(profile: &[Corner], width: HalfWidth, side: Material) -> Self {
-        let most = width.bottom_m.max(width.top_m);
-        let mut low = Vector3::new(f64::INFINITY, -most, f64::INFINITY);
-        let mut high = Vector3::new(f64::NEG_INFINITY, most, f64::NEG_INFINITY);
+        let max_half_m = width.bottom_m.max(width.top_m);
+        let mut low = Vector3::new(f64::INFINITY, -max_half_m, f64::INFINITY);
+        let mut high = Vector3::new(f64::NEG_INFINITY, max_half_m, f64::NEG_INFINITY);
         let (mut middle_x, mut middle_z) = (0.0, 0.0);
         for at in profile {
             low.x = low.x.min(at.x_m);
@@ -95,7 +95,7 @@ impl Solid {
             middle_x += at.x_m / profile.len() as f64;
             middle_z += at.z_m / profile.len() as f64;
         }
-        let mut solid = Self { faces: [NO_FACE; MOST_FACES], count: 0, low, high };
+        let mut solid = Self { faces: [NO_FACE; MAX_FACES], count: 0, low, high };
         for (index, from) in profile.iter().enumerate() {
             let to = profile[(index + 1) % profile.len()];
             let mut normal = Vector3::new(to.z_m - from.z_m, 0.0, from.x_m - to.x_m).normalize();
@@ -113,7 +113,7 @@ impl Solid {
     }
 
     fn push(&mut self, normal: Vector3<f64>, offset_m: f64, material: Material) {
-        if self.count < MOST_FACES {
+        if self.count < MAX_FACES {
             self.faces[self.count] = SolidFace { normal, offset_m, material };
             self.count += 1;
         }
@@ -130,7 +130,7 @@ mod tests {
 
     #[test]
     fn a_block_holds_its_corners_and_nothing_beyond() {
-        let block = Solid::block([0.0, -1.0, 0.5], [2.0, 1.0, 1.5], Material::Paint);
+        let block = Solid::cuboid([0.0, -1.0, 0.5], [2.0, 1.0, 1.5], Material::Paint);
         assert!(holds(&block, [2.0, 1.0, 1.5]) && holds(&block, [0.0, -1.0, 0.5]));
         assert!(!holds(&block, [2.01, 0.0, 1.0]) && !holds(&block, [1.0, 0.0, 0.49]));
     }

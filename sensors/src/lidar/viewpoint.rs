@@ -23,9 +23,9 @@ pub(crate) struct Viewpoint {
     ego: PlanePose,
     speed_mps: f64,
     yaw_rate_radps: f64,
-    /// The sensor in E's level frame [m].
-    pub(crate) sensor_m: Vector3<f64>,
-    /// Angle of the sensor's axis above the horizontal [rad].
+    /// The sensor in E's level frame (m).
+    pub(crate) sensor_position_m: Vector3<f64>,
+    /// Angle of the sensor's axis above the horizontal (rad).
     pub(crate) axis_rad: f64,
 }
 
@@ -46,33 +46,41 @@ impl Viewpoint {
             ego: scene.road.plane_pose(state.s_m, state.d_m, state.heading_rad),
             speed_mps: state.speed_mps,
             yaw_rate_radps: state.yaw_rate_radps,
-            sensor_m: sensor_m(0.5 * ego.vehicle.dimensions.length_m, lidar.mount_height_m, ego.pitch_rad),
+            sensor_position_m: sensor_position_m(
+                0.5 * ego.vehicle.dimensions.length_m,
+                lidar.mount_height_m,
+                ego.pitch_rad,
+            ),
             axis_rad: ego.pitch_rad + lidar.tilt_rad,
         }
     }
 
     /// E's pose `before_s` before the end of the sweep, by its speed and yaw rate.
-    fn ego_at(&self, before_s: f64) -> PlanePose {
-        let turned = self.yaw_rate_radps * before_s;
+    fn ego_at(&self, before_end_s: f64) -> PlanePose {
+        let turned = self.yaw_rate_radps * before_end_s;
         let (sin, cos) = (self.ego.yaw_rad - 0.5 * turned).sin_cos();
-        let way = self.speed_mps * before_s;
-        PlanePose { x_m: self.ego.x_m - way * cos, y_m: self.ego.y_m - way * sin, yaw_rad: self.ego.yaw_rad - turned }
+        let distance_m = self.speed_mps * before_end_s;
+        PlanePose {
+            x_m: self.ego.x_m - distance_m * cos,
+            y_m: self.ego.y_m - distance_m * sin,
+            yaw_rad: self.ego.yaw_rad - turned,
+        }
     }
 
     /// From the plane to the sensor's frame, `before_s` before the end of the sweep.
-    pub(crate) fn sensor_from_plane(&self, before_s: f64) -> Isometry3<f64> {
-        let level_from_plane = in_plane(self.ego_at(before_s), 0.0).inverse();
+    pub(crate) fn sensor_from_plane(&self, before_end_s: f64) -> Isometry3<f64> {
+        let level_from_plane = plane_from_body(self.ego_at(before_end_s), 0.0).inverse();
         let turn = UnitQuaternion::from_rotation_matrix(&sensor_axes(self.axis_rad));
-        Isometry3::from_parts(Translation3::from(-(turn * self.sensor_m)), turn) * level_from_plane
+        Isometry3::from_parts(Translation3::from(-(turn * self.sensor_position_m)), turn) * level_from_plane
     }
 
     /// What carries a point from E's frame `before_s` before the end of the sweep to E's frame at its end.
-    pub(crate) fn deskew(&self, before_s: f64) -> Deskew {
-        let turned = self.yaw_rate_radps * before_s;
-        let way = self.speed_mps * before_s;
+    pub(crate) fn deskew(&self, before_end_s: f64) -> Deskew {
+        let turned = self.yaw_rate_radps * before_end_s;
+        let distance_m = self.speed_mps * before_end_s;
         let (sin, cos) = small_sin_cos(turned);
         let (half_sin, half_cos) = small_sin_cos(0.5 * turned);
-        Deskew { cos, sin: -sin, x_m: -way * half_cos, y_m: way * half_sin }
+        Deskew { cos, sin: -sin, x_m: -distance_m * half_cos, y_m: distance_m * half_sin }
     }
 }
 
@@ -83,8 +91,8 @@ fn small_sin_cos(angle_rad: f64) -> (f64, f64) {
     (angle_rad * (1.0 - square / 6.0), 1.0 - 0.5 * square * (1.0 - square / 12.0))
 }
 
-/// The sensor in E's level frame [m], mounted `back_m` behind E's origin.
-pub(crate) fn sensor_m(back_m: f64, height_m: f64, pitch_rad: f64) -> Vector3<f64> {
+/// The sensor in E's level frame (m), mounted `back_m` behind E's origin.
+pub(crate) fn sensor_position_m(back_m: f64, height_m: f64, pitch_rad: f64) -> Vector3<f64> {
     let (sin, cos) = pitch_rad.sin_cos();
     Vector3::new(-back_m * cos + height_m * sin, 0.0, back_m * sin + height_m * cos)
 }
@@ -96,7 +104,7 @@ fn sensor_axes(axis_rad: f64) -> Rotation3<f64> {
 }
 
 /// From the frame of a thing at `pose`, pitched nose down by `pitch_rad`, to the plane.
-pub(crate) fn in_plane(pose: PlanePose, pitch_rad: f64) -> Isometry3<f64> {
+pub(crate) fn plane_from_body(pose: PlanePose, pitch_rad: f64) -> Isometry3<f64> {
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), pose.yaw_rad)
         * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), pitch_rad);
     Isometry3::from_parts(Translation3::new(pose.x_m, pose.y_m, 0.0), turn)
@@ -129,9 +137,10 @@ mod tests {
     fn braking_lifts_the_sensor_and_turns_it_up() {
         let pitch = 0.02;
         let view = viewpoint(0.0, 0.0, pitch);
-        assert!((view.sensor_m.z - (0.6 * pitch.cos() + 2.3 * pitch.sin())).abs() < 1e-12);
+        assert!((view.sensor_position_m.z - (0.6 * pitch.cos() + 2.3 * pitch.sin())).abs() < 1e-12);
         // A point at the sensor's own height, 10 m back, now lies below the axis by p.
-        let seen = view.sensor_from_plane(0.0) * Point3::new(view.sensor_m.x - 10.0, -5.6, view.sensor_m.z);
+        let seen =
+            view.sensor_from_plane(0.0) * Point3::new(view.sensor_position_m.x - 10.0, -5.6, view.sensor_position_m.z);
         assert!((seen.z.atan2(seen.x) + pitch).abs() < 1e-12);
     }
 
@@ -139,8 +148,8 @@ mod tests {
     fn deskewing_undoes_the_motion_of_e() {
         let view = viewpoint(30.0, 0.1, 0.0);
         let (before, point) = (0.0123, Point3::new(-40.0, -2.0, 0.0));
-        let earlier = in_plane(view.ego_at(before), 0.0).inverse() * point;
-        let latest = in_plane(view.ego_at(0.0), 0.0).inverse() * point;
+        let earlier = plane_from_body(view.ego_at(before), 0.0).inverse() * point;
+        let latest = plane_from_body(view.ego_at(0.0), 0.0).inverse() * point;
         let to = view.deskew(before);
         let x = to.cos * earlier.x - to.sin * earlier.y + to.x_m;
         let y = to.sin * earlier.x + to.cos * earlier.y + to.y_m;

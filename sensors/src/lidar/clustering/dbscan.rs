@@ -45,7 +45,7 @@ impl NearestNeighbour for Grid {
 /// Neighbours for which memory is taken beforehand.
 const NEIGHBOURS: usize = 128;
 /// The most cells along each axis; points spread wider get larger cells.
-const MOST_CELLS: f64 = 256.0;
+const MAX_CELLS: f64 = 256.0;
 
 /// Points sorted by the cell that they lie in.
 #[derive(Debug)]
@@ -75,16 +75,16 @@ impl<'a, F: Float> GridIndex<'a, F> {
             }
         }
         let extent = (high[0] - low[0]).max(high[1] - low[1]).max(0.0);
-        let cell = cell.max(extent / MOST_CELLS);
+        let cell = cell.max(extent / MAX_CELLS);
         let mut index = Self { batch, low, cell, size: [1; 2], starts: Vec::new(), sorted: Vec::new() };
-        index.size = [0, 1].map(|axis| index.place(high[axis], axis, usize::MAX) + 1);
-        index.sort(points);
+        index.size = [0, 1].map(|axis| index.cell_along(high[axis], axis, usize::MAX) + 1);
+        index.sort_into_cells(points);
         index
     }
 
     /// Sorts by counting.
     #[expect(clippy::cast_possible_truncation, reason = "a scan has at most 20,000 points")]
-    fn sort<I: Iterator<Item = [f64; 2]>>(&mut self, points: impl Fn() -> I) {
+    fn sort_into_cells<I: Iterator<Item = [f64; 2]>>(&mut self, points: impl Fn() -> I) {
         self.starts.resize(self.size[0] * self.size[1] + 1, 0);
         for point in points() {
             let cell = self.cell_of(point);
@@ -104,21 +104,21 @@ impl<'a, F: Float> GridIndex<'a, F> {
 
     /// The cell along one axis, at most `most`.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates, NaN gives 0, then clamped")]
-    fn place(&self, value: f64, axis: usize, most: usize) -> usize {
-        (((value - self.low[axis]) / self.cell) as usize).min(most)
+    fn cell_along(&self, value: f64, axis: usize, max: usize) -> usize {
+        (((value - self.low[axis]) / self.cell) as usize).min(max)
     }
 
     fn cell_of(&self, point: [f64; 2]) -> usize {
-        let [column, row] = [0, 1].map(|axis| self.place(point[axis], axis, self.size[axis] - 1));
+        let [column, row] = [0, 1].map(|axis| self.cell_along(point[axis], axis, self.size[axis] - 1));
         column * self.size[1] + row
     }
 
     /// Calls `each` with the squared distance and the row of each point within `range`.
-    fn visit(&self, point: [f64; 2], range: f64, mut each: impl FnMut(f64, usize)) {
+    fn for_each_within(&self, point: [f64; 2], range: f64, mut each: impl FnMut(f64, usize)) {
         let square = range * range;
         let span = |axis: usize| {
-            let most = self.size[axis] - 1;
-            self.place(point[axis] - range, axis, most)..=self.place(point[axis] + range, axis, most)
+            let max = self.size[axis] - 1;
+            self.cell_along(point[axis] - range, axis, max)..=self.cell_along(point[axis] + range, axis, max)
         };
         for column in span(0) {
             let rows = span(1);
@@ -139,7 +139,7 @@ impl<F: Float> NearestNeighbourIndex<F> for GridIndex<'_, F> {
     fn k_nearest(&self, point: ArrayView1<'_, F>, k: usize) -> Result<Vec<(ArrayView1<'_, F>, usize)>, NnError> {
         let at = coordinates(point)?;
         let mut found = Vec::with_capacity(self.sorted.len());
-        self.visit(at, f64::INFINITY, |distance, row| found.push((distance, row)));
+        self.for_each_within(at, f64::INFINITY, |distance, row| found.push((distance, row)));
         found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         found.truncate(k);
         Ok(found.into_iter().map(|(_, row)| (self.batch.row(row).reborrow(), row)).collect())
@@ -147,7 +147,7 @@ impl<F: Float> NearestNeighbourIndex<F> for GridIndex<'_, F> {
 
     fn within_range(&self, point: ArrayView1<'_, F>, range: F) -> Result<Vec<(ArrayView1<'_, F>, usize)>, NnError> {
         let mut found = Vec::with_capacity(NEIGHBOURS);
-        self.visit(coordinates(point)?, to_f64(range), |_, row| found.push((self.batch.row(row), row)));
+        self.for_each_within(coordinates(point)?, to_f64(range), |_, row| found.push((self.batch.row(row), row)));
         Ok(found)
     }
 }
@@ -204,8 +204,8 @@ mod tests {
             let clusters = expected.iter().max().unwrap() + 1;
             assert!(clusters > 1, "{name}");
             assert_eq!(pairs.len(), usize::try_from(clusters).unwrap(), "{name}");
-            for (place, pair) in pairs.iter().enumerate() {
-                assert_eq!(pair.0, place, "{name}");
+            for (index, pair) in pairs.iter().enumerate() {
+                assert_eq!(pair.0, index, "{name}");
                 assert!(pair.1 >= 0 && pairs.iter().filter(|other| other.1 == pair.1).count() == 1, "{name}");
             }
         }

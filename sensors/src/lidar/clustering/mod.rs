@@ -23,10 +23,10 @@ use ndarray::Array2;
 use super::ground::Candidate;
 use crate::SensorError;
 
-/// Radius along the road: at the sensor [m], and its gain with distance [1].
+/// Radius along the road: at the sensor (m), and its gain with distance (dimensionless).
 const ALONG_M: f32 = 0.8;
 const ALONG_GAIN: f32 = 0.015;
-/// Radius across the road: at the sensor [m], and its gain with distance [1].
+/// Radius across the road: at the sensor (m), and its gain with distance (dimensionless).
 const ACROSS_M: f32 = 0.5;
 const ACROSS_GAIN: f32 = 0.005;
 /// Points within the radius, itself among them, that make a point a core point.
@@ -89,7 +89,7 @@ impl Clustering {
         let rows = Array2::from_shape_vec(shape, std::mem::take(&mut self.rows));
         let rows = rows.map_err(|error| refused(error.to_string()))?;
         let labels = dbscan(&rows, RADIUS, CORE_POINTS).map_err(refused)?;
-        self.count = labels.iter().flatten().max().map_or(0, |most| most + 1);
+        self.count = labels.iter().flatten().max().map_or(0, |max| max + 1);
         #[expect(clippy::cast_possible_truncation, reason = "fewer clusters than points")]
         let label = |row: &u32| labels[*row as usize].map_or(NOISE, |label| label as u32);
         self.labels.extend(self.row_of.iter().map(label));
@@ -98,19 +98,19 @@ impl Clustering {
     }
 
     /// Joins clusters: each to its host, which is another cluster or itself; hosts of hosts count.
-    pub(crate) fn merge(&mut self, hosts: &[u32]) {
+    pub(crate) fn merge(&mut self, parents: &[u32]) {
         let root = |label: u32| {
             let mut root = label;
             // A host is nearer than what it holds, so that the chain ends.
-            while hosts[root as usize] != root {
-                root = hosts[root as usize];
+            while parents[root as usize] != root {
+                root = parents[root as usize];
             }
             root
         };
         let mut next = 0;
-        let mut renumbered = vec![NOISE; hosts.len()];
-        for (label, &host) in (0..).zip(hosts) {
-            if label == host {
+        let mut renumbered = vec![NOISE; parents.len()];
+        for (label, &parent) in (0..).zip(parents) {
+            if label == parent {
                 renumbered[label as usize] = next;
                 next += 1;
             }
@@ -127,7 +127,7 @@ impl Clustering {
         self.row_of.clear();
         self.cell_of.clear();
         for candidate in candidates {
-            let [along, across] = stretched(candidate);
+            let [along, across] = to_stretched_plane(candidate);
             let cell = cell(along, across);
             #[expect(clippy::cast_possible_truncation, reason = "a grid of 105,000 cells, a scan of 20,000 points")]
             self.cell_of.push(cell as u32);
@@ -147,7 +147,7 @@ impl Clustering {
     }
 }
 
-fn stretched(candidate: &Candidate) -> [f32; 2] {
+fn to_stretched_plane(candidate: &Candidate) -> [f32; 2] {
     let along = (ALONG_GAIN / ALONG_M * candidate.back_m).ln_1p() / ALONG_GAIN;
     [along, candidate.left_m / (ACROSS_M + ACROSS_GAIN * candidate.back_m)]
 }
@@ -214,7 +214,7 @@ mod tests {
         ) {
             // Crowded cells: each point several times over.
             let points: Vec<_> = points.iter().flat_map(|&point| vec![point; copies]).collect();
-            let rows: Vec<f64> = candidates(&points).iter().flat_map(|at| stretched(at).map(f64::from)).collect();
+            let rows: Vec<f64> = candidates(&points).iter().flat_map(|at| to_stretched_plane(at).map(f64::from)).collect();
             let rows = Array2::from_shape_vec((points.len(), 2), rows).unwrap();
             let thinned = labels(&points);
             let whole = dbscan(&rows, RADIUS, CORE_POINTS).unwrap();

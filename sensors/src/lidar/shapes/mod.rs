@@ -30,8 +30,8 @@ pub(crate) fn append_solids(vehicle: &Vehicle, solids: &mut Vec<Solid>) {
 
 /// Appends a block and its mirror image on the other side of y = 0.
 fn append_pair(low: [f64; 3], high: [f64; 3], material: Material, solids: &mut Vec<Solid>) {
-    solids.push(Solid::block(low, high, material));
-    solids.push(Solid::block([low[0], -high[1], low[2]], [high[0], -low[1], high[2]], material));
+    solids.push(Solid::cuboid(low, high, material));
+    solids.push(Solid::cuboid([low[0], -high[1], low[2]], [high[0], -low[1], high[2]], material));
 }
 
 #[cfg(test)]

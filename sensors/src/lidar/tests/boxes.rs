@@ -12,12 +12,12 @@ fn the_stated_deviations_of_faces_are_those_that_occur() {
         for step in 0..120_i32 {
             let gap = 4.0 + 0.75 * f64::from(step);
             let left = [0.0, 3.75, -3.75, 0.7][step as usize % 4];
-            let mut stage = Stage::new().with(class, gap, left);
+            let mut setup = TestScene::new().with(class, gap, left);
             let mut lidar = RearLidar::new(Lidar::default());
-            let found = stage.look(&mut lidar, step.into());
-            let Some((box_, dx, dy)) = first_face(&stage, &found) else { continue };
-            along += (dx / box_.range_sd_m).powi(2);
-            across += (dy / box_.lateral_sd_m).powi(2);
+            let found = setup.detect(&mut lidar, step.into());
+            let Some((detection, dx, dy)) = first_vehicle_error(&setup, &found) else { continue };
+            along += (dx / detection.range_sd_m).powi(2);
+            across += (dy / detection.lateral_sd_m).powi(2);
             n += 1.0;
         }
         let (along, across) = (f64::sqrt(along / n), f64::sqrt(across / n));
@@ -32,15 +32,15 @@ fn classes_and_widths_are_told_by_shape() {
     for class in VehicleClass::ALL {
         for body_shape in 0..4 {
             for gap in [4.0, 10.0, 25.0, 50.0] {
-                let mut stage = Stage::new().with(class, gap, 0.0);
-                stage.others[0].vehicle.appearance.body_shape = body_shape;
-                let found = stage.look(&mut RearLidar::new(Lidar::default()), 1);
-                let (box_, ..) = first_face(&stage, &found).unwrap();
-                assert_eq!(box_.class.best_vehicle_class(), class, "{body_shape} at {gap} m: {box_:?}");
-                assert!(box_.class.vehicle() > 0.6, "{body_shape} at {gap} m: {box_:?}");
-                assert_eq!(box_.width, Extent::Seen);
+                let mut setup = TestScene::new().with(class, gap, 0.0);
+                setup.others[0].vehicle.appearance.body_shape = body_shape;
+                let found = setup.detect(&mut RearLidar::new(Lidar::default()), 1);
+                let (detection, ..) = first_vehicle_error(&setup, &found).unwrap();
+                assert_eq!(detection.class.best_vehicle_class(), class, "{body_shape} at {gap} m: {detection:?}");
+                assert!(detection.class.vehicle() > 0.6, "{body_shape} at {gap} m: {detection:?}");
+                assert_eq!(detection.width, Extent::Seen);
                 let width = class.typical_dimensions().width_m;
-                assert!((box_.width_m - width).abs() < 0.35, "{} for {width} at {gap} m", box_.width_m);
+                assert!((detection.width_m - width).abs() < 0.35, "{} for {width} at {gap} m", detection.width_m);
             }
         }
     }
@@ -52,12 +52,12 @@ fn clusters_are_vehicles() {
     let mut lidar = RearLidar::new(Lidar::default());
     for step in 0..60_i32 {
         let along = f64::from(step);
-        let mut stage = Stage::new()
+        let mut setup = TestScene::new()
             .with(VehicleClass::Car, 2.0 + 1.5 * along, 0.0)
             .with(VehicleClass::Truck, 5.0 + along, -3.75)
             .with(VehicleClass::Motorcycle, 60.0 - along, 3.75)
             .with(VehicleClass::Car, 25.0 + 1.2 * along, 3.75);
-        stage.look(&mut lidar, step.into());
+        setup.detect(&mut lidar, step.into());
         lidar.report(&mut report);
     }
     assert!(report.vehicles > 180, "{report:?}");

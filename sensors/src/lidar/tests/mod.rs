@@ -14,10 +14,10 @@ use closecall_traffic::{ActorId, Environment, Road, Stream, Time, VehicleClass, 
 /// E's lane is the middle one of three.
 const LANE_D_M: f64 = -5.625;
 const SPEED_MPS: f64 = 30.0;
-/// From E's origin to its rear bumper [m].
-const REAR_M: f64 = 2.3;
+/// From E's origin to its rear bumper (m).
+const REAR_BUMPER_M: f64 = 2.3;
 
-struct Stage {
+struct TestScene {
     time: Time,
     road: Road,
     environment: Environment,
@@ -25,7 +25,7 @@ struct Stage {
     others: Vec<SceneVehicle>,
 }
 
-impl Stage {
+impl TestScene {
     fn new() -> Self {
         let ego = with_speed(scene_vehicle(0, VehicleClass::Car, 1_000.0, LANE_D_M), SPEED_MPS);
         Self { time: Time::ZERO, road: Road::straight(3), environment: Environment::CLEAR_DAY, ego, others: Vec::new() }
@@ -34,7 +34,7 @@ impl Stage {
     /// With a vehicle whose front is `gap_m` behind E's rear, `left_m` to the left of E, as fast as E.
     fn with(mut self, class: VehicleClass, gap_m: f64, left_m: f64) -> Self {
         let half = 0.5 * class.typical_dimensions().length_m;
-        let s_m = self.ego.state.s_m - REAR_M - gap_m - half;
+        let s_m = self.ego.state.s_m - REAR_BUMPER_M - gap_m - half;
         let vehicle = scene_vehicle(self.others.len() + 1, class, s_m, LANE_D_M + left_m);
         self.others.push(with_speed(vehicle, SPEED_MPS));
         self
@@ -45,9 +45,9 @@ impl Stage {
     }
 
     /// Looks once, at the side of the mirror that belongs to `look`, with noise that does too.
-    fn look(&mut self, lidar: &mut RearLidar, look: i64) -> Vec<Detection> {
-        self.time = Time::from_ns(PERIOD_NS * look);
-        lidar.scan(&self.scene(), &mut random(look.unsigned_abs()));
+    fn detect(&mut self, lidar: &mut RearLidar, scan_index: i64) -> Vec<Detection> {
+        self.time = Time::from_ns(PERIOD_NS * scan_index);
+        lidar.scan(&self.scene(), &mut random(scan_index.unsigned_abs()));
         lidar.detect().unwrap().to_vec()
     }
 
@@ -55,8 +55,8 @@ impl Stage {
     fn mean_points(&mut self) -> f64 {
         let mut lidar = RearLidar::new(Lidar::default());
         let mut points = 0;
-        for look in 0..20 {
-            self.look(&mut lidar, look);
+        for scan_index in 0..20 {
+            self.detect(&mut lidar, scan_index);
             points += count(lidar.truth(), PointSource::Actor(1));
         }
         points as f64 / 20.0
@@ -71,23 +71,23 @@ fn count(truth: &ScanTruth, source: PointSource) -> usize {
     truth.points.iter().filter(|point| point.source == source).count()
 }
 
-fn guarded(curvature_per_m: f64) -> Road {
+fn road_with_guard_rails(curvature_per_m: f64) -> Road {
     let text = format!("lanes = 3\nguard-rails = true\ncurvature-per-m = {curvature_per_m:.6}");
     let config: closecall_traffic::RoadConfig = toml::from_str(&text).unwrap();
     closecall_traffic::Check::check(&config, &closecall_traffic::Parameters::default()).unwrap()
 }
 
 /// Detections that belong to the first of the others, with its true face.
-fn first_face(stage: &Stage, found: &[Detection]) -> Option<(Detection, f64, f64)> {
-    let state: &VehicleState = &stage.others[0].state;
-    let half = 0.5 * stage.others[0].vehicle.dimensions.length_m;
-    let near = |box_: &&Detection| {
-        let since_s = (stage.time - box_.time).s();
-        let x = state.s_m + half - SPEED_MPS * since_s - stage.ego.state.s_m;
-        (box_.face_x_m - x).abs() < 2.5 && (box_.face_y_m - (state.d_m - LANE_D_M)).abs() < 1.5
+fn first_vehicle_error(setup: &TestScene, found: &[Detection]) -> Option<(Detection, f64, f64)> {
+    let state: &VehicleState = &setup.others[0].state;
+    let half = 0.5 * setup.others[0].vehicle.dimensions.length_m;
+    let near = |detection: &&Detection| {
+        let since_s = (setup.time - detection.time).s();
+        let x = state.s_m + half - SPEED_MPS * since_s - setup.ego.state.s_m;
+        (detection.face_x_m - x).abs() < 2.5 && (detection.face_y_m - (state.d_m - LANE_D_M)).abs() < 1.5
     };
-    let box_ = found.iter().find(near)?;
-    let since_s = (stage.time - box_.time).s();
-    let x = state.s_m + half - SPEED_MPS * since_s - stage.ego.state.s_m;
-    Some((box_.clone(), box_.face_x_m - x, box_.face_y_m - (state.d_m - LANE_D_M)))
+    let detection = found.iter().find(near)?;
+    let since_s = (setup.time - detection.time).s();
+    let x = state.s_m + half - SPEED_MPS * since_s - setup.ego.state.s_m;
+    Some((detection.clone(), detection.face_x_m - x, detection.face_y_m - (state.d_m - LANE_D_M)))
 }

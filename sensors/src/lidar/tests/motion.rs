@@ -6,10 +6,10 @@ use super::*;
 
 #[test]
 fn a_bend_bends_the_boxes_with_it() {
-    let mut stage = Stage::new().with(VehicleClass::Car, 60.0, 0.0);
-    stage.road = Road::straight(3).with_curvature(0.0025);
+    let mut setup = TestScene::new().with(VehicleClass::Car, 60.0, 0.0);
+    setup.road = Road::straight(3).with_curvature(0.0025);
     let mut lidar = RearLidar::new(Lidar::default());
-    let found = stage.look(&mut lidar, 0);
+    let found = setup.detect(&mut lidar, 0);
     assert_eq!(found.len(), 1);
     // Chord of a circle of 394 m radius... of E's lane: y = κ·x²/2 with κ = 0.0025/(1 + 0.0025·5.625).
     let kappa = 0.0025 / (1.0 + 0.0025 * 5.625);
@@ -20,30 +20,30 @@ fn a_bend_bends_the_boxes_with_it() {
 
 #[test]
 fn what_stands_still_is_where_it_stands_at_the_end_of_the_scan() {
-    let mut stage = Stage::new().with(VehicleClass::Truck, 30.0, 0.0);
-    stage.others[0].state.speed_mps = 0.0;
+    let mut setup = TestScene::new().with(VehicleClass::Truck, 30.0, 0.0);
+    setup.others[0].state.speed_mps = 0.0;
     let mut lidar = RearLidar::new(Lidar::default());
-    let found = stage.look(&mut lidar, 5);
-    assert!((found[0].face_x_m + REAR_M + 30.0).abs() < 0.1, "{}", found[0].face_x_m);
+    let found = setup.detect(&mut lidar, 5);
+    assert!((found[0].face_x_m + REAR_BUMPER_M + 30.0).abs() < 0.1, "{}", found[0].face_x_m);
     // What drives is where it was when it was measured.
-    stage.others[0].state.speed_mps = SPEED_MPS;
-    let found = stage.look(&mut lidar, 5);
-    let since_s = (stage.time - found[0].time).s();
+    setup.others[0].state.speed_mps = SPEED_MPS;
+    let found = setup.detect(&mut lidar, 5);
+    let since_s = (setup.time - found[0].time).s();
     assert!((0.006..0.009).contains(&since_s), "{since_s}");
-    let expected = -REAR_M - 30.0 - SPEED_MPS * since_s;
+    let expected = -REAR_BUMPER_M - 30.0 - SPEED_MPS * since_s;
     assert!((found[0].face_x_m - expected).abs() < 0.1, "{} for {expected}", found[0].face_x_m);
 }
 
 #[test]
 fn scans_are_the_same_to_the_bit_whatever_was_scanned_before() {
-    let mut stage = Stage::new().with(VehicleClass::Car, 12.0, 0.3).with(VehicleClass::Truck, 40.0, -3.75);
-    stage.road = guarded(0.001);
-    stage.environment.water_film_mm = 0.5;
+    let mut setup = TestScene::new().with(VehicleClass::Car, 12.0, 0.3).with(VehicleClass::Truck, 40.0, -3.75);
+    setup.road = road_with_guard_rails(0.001);
+    setup.environment.water_film_mm = 0.5;
     let mut fresh = RearLidar::new(Lidar::default());
-    let first = stage.look(&mut fresh, 3);
+    let first = setup.detect(&mut fresh, 3);
     let mut used = RearLidar::new(Lidar::default());
-    Stage::new().with(VehicleClass::Motorcycle, 3.0, 0.0).look(&mut used, 8);
-    let second = stage.look(&mut used, 3);
+    TestScene::new().with(VehicleClass::Motorcycle, 3.0, 0.0).detect(&mut used, 8);
+    let second = setup.detect(&mut used, 3);
     let bits = |lidar: &RearLidar| -> Vec<u32> {
         let scan = lidar.latest();
         let columns = [&scan.x_m, &scan.y_m, &scan.z_m, &scan.intensity];
@@ -56,11 +56,11 @@ fn scans_are_the_same_to_the_bit_whatever_was_scanned_before() {
 
 #[test]
 fn another_vehicle_leaves_the_noise_of_other_beams_alone() {
-    let mut alone = Stage::new().with(VehicleClass::Car, 20.0, 0.0);
-    let mut beside = Stage::new().with(VehicleClass::Car, 20.0, 0.0).with(VehicleClass::Car, 20.0, 7.0);
+    let mut alone = TestScene::new().with(VehicleClass::Car, 20.0, 0.0);
+    let mut beside = TestScene::new().with(VehicleClass::Car, 20.0, 0.0).with(VehicleClass::Car, 20.0, 7.0);
     let (mut a, mut b) = (RearLidar::new(Lidar::default()), RearLidar::new(Lidar::default()));
-    alone.look(&mut a, 0);
-    beside.look(&mut b, 0);
+    alone.detect(&mut a, 0);
+    beside.detect(&mut b, 0);
     let points = |lidar: &RearLidar| -> Vec<(u16, u32)> {
         let scan = lidar.latest();
         let on = |&at: &usize| lidar.truth().points[at].source == PointSource::Actor(1);
