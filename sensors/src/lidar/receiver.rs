@@ -1,7 +1,7 @@
-//! The receiver: which echoes are detected, and where E believes them to be.
+//! The receiver: decides which echoes are detected, and computes the points that are reported for them.
 //!
-//! Of each beam the first and the last detected echo are reported. Their distance goes along the *centre* of the beam:
-//! the sensor cannot know which part of the footprint sent it.
+//! The first and the last detected echo of each beam are reported. Their points lie on the *centre* line of the beam,
+//! because the sensor cannot know which part of the footprint returned the light.
 
 use super::cast::{ColumnHits, SubRays};
 use super::echo::{Echo, Echoes};
@@ -14,10 +14,10 @@ use super::viewpoint::{Deskew, sensor_position_m};
 use super::{Lidar, LidarScan, Material, PointSource, PointTruth, ScanTruth};
 use crate::Scene;
 
-/// The brightest target that the receiver can still tell from a brighter one, as a reflectivity (dimensionless).
+/// Intensity at which the receiver saturates, as a reflectivity.
 const MAX_INTENSITY: f32 = 4.0;
 
-/// Where E believes the sensor to be: its pitch is measured with an error.
+/// The sensor's pose as the ego estimates it: the pitch is measured with an error.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SensorPoseEstimate {
     sensor_m: [f32; 3],
@@ -28,6 +28,7 @@ pub(crate) struct SensorPoseEstimate {
 
 impl SensorPoseEstimate {
     #[expect(clippy::cast_possible_truncation, reason = "points are in single precision")]
+    /// Returns the estimate for the end of the sweep, with a random error of the pitch.
     pub(crate) fn new(scene: &Scene<'_>, lidar: &Lidar, noise: Noise) -> Self {
         let error_rad = lidar.levelling_sd_rad * f64::from(noise.normal(BEAMS, Purpose::Levelling));
         let pitch_rad = scene.ego.pitch_rad + error_rad;
@@ -41,18 +42,19 @@ impl SensorPoseEstimate {
         }
     }
 
+    /// Returns the longitudinal position of the sensor in the ego's frame (m).
     pub(crate) fn sensor_x_m(&self) -> f32 {
         self.sensor_m[0]
     }
 
-    /// The same at another instant of the sweep.
+    /// Returns this estimate for another instant of the sweep.
     #[expect(clippy::cast_possible_truncation, reason = "points are in single precision")]
     pub(crate) fn deskewed(&self, deskew: Deskew) -> Self {
         Self { deskew: [deskew.cos as f32, deskew.sin as f32, deskew.x_m as f32, deskew.y_m as f32], ..*self }
     }
 
-    /// A point of the sensor's frame in E's frame at the end of the sweep (m).
-    fn to_ego_frame_m(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
+    /// Transforms a point from the sensor's frame to the ego's frame at the end of the sweep (m).
+    fn ego_frame_point_m(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
         let ahead = self.sensor_m[0] - self.cos * x + self.sin * z;
         let left = self.sensor_m[1] - y;
         let above = self.sensor_m[2] + self.sin * x + self.cos * z;
@@ -61,7 +63,7 @@ impl SensorPoseEstimate {
     }
 }
 
-/// A return that may be reported.
+/// A return that reaches the receiver and may be detected.
 #[derive(Clone, Copy, Debug)]
 struct PotentialReturn {
     range_m: f32,
@@ -78,9 +80,10 @@ struct DetectedReturn {
     measured_power: f32,
 }
 
-/// The receiver during one column.
+/// The receiver and its inputs for one column.
 pub(crate) struct Receiver<'a> {
-    pub(crate) index: usize,
+    /// Index of the column.
+    pub(crate) column_index: usize,
     pub(crate) column: &'a Column,
     pub(crate) elevations: &'a [Elevation],
     pub(crate) pose: SensorPoseEstimate,
@@ -88,15 +91,16 @@ pub(crate) struct Receiver<'a> {
     pub(crate) plumes: &'a [Plume],
     pub(crate) link: &'a LinkBudget,
     pub(crate) noise: Noise,
+    /// Share of returns that are lost regardless of their power.
     pub(crate) dropout: f32,
 }
 
 impl Receiver<'_> {
-    /// Appends what is detected in this column.
+    /// Appends the detected returns of this column to the scan and to its ground truth.
     pub(crate) fn receive(&self, hits: &ColumnHits, scan: &mut LidarScan, truth: &mut ScanTruth) {
         let in_air = !self.plumes.is_empty() || self.link.has_fog();
         for (layer, elevation) in self.elevations.iter().enumerate() {
-            let echoes = if hits.is_touched(layer) {
+            let echoes = if hits.is_tested(layer) {
                 Echoes::of(&hits.beams[layer], elevation, &self.targets.faces, self.link)
             } else if layer < hits.ground_below {
                 let centre = self.column.centre[layer / LAYERS_PER_GROUP];
@@ -117,16 +121,17 @@ impl Receiver<'_> {
         }
     }
 
+    /// Returns the detected returns of a beam if there are droplets in the air.
     fn detect_in_air(&self, layer: usize, echoes: &[Echo]) -> [Option<DetectedReturn>; 2] {
         let [cos, sin] = self.column.centre[layer / LAYERS_PER_GROUP];
         let tan = self.elevations[layer].centre[0];
         let centre = SubRays { cos: [cos; SUBRAY_COLUMNS], sin: [sin; SUBRAY_COLUMNS], tan: [tan; SUBRAY_ROWS] };
-        let beam = self.index * LAYERS + layer;
+        let beam = self.column_index * LAYERS + layer;
         let droplets = soft::droplet_effect(beam, &centre, self.plumes, (self.targets, self.link, self.noise));
         self.detect(layer, echoes, |range_m| droplets.transmission(range_m), droplets.echo)
     }
 
-    /// The first and the last detected return, the latter where it is another one.
+    /// Returns the first and the last detected return. The second is `None` if there is only one.
     fn detect(
         &self,
         layer: usize,
@@ -134,7 +139,7 @@ impl Receiver<'_> {
         transmission: impl Fn(f32) -> f32,
         soft: Option<SoftEcho>,
     ) -> [Option<DetectedReturn>; 2] {
-        let beam = self.index * LAYERS + layer;
+        let beam = self.column_index * LAYERS + layer;
         let mut found = [None, None];
         let before_hard = |soft: &SoftEcho| echoes.first().is_none_or(|echo| soft.range_m < echo.range_m);
         let soft = soft.filter(before_hard).map(|soft| PotentialReturn {
@@ -145,7 +150,7 @@ impl Receiver<'_> {
         });
         let hard = echoes.iter().map(|echo| {
             let face = &self.targets.faces[echo.face as usize];
-            // The air can only take away: what is too weak without it needs no exponential.
+            // The air can only attenuate: an echo that is too weak without attenuation needs no exponential.
             let is_strong = echo.power > MIN_POWER;
             let through =
                 if is_strong { self.link.transmission(echo.range_m) * transmission(echo.range_m) } else { 1.0 };
@@ -164,7 +169,7 @@ impl Receiver<'_> {
         found
     }
 
-    /// The return, where noise lets it pass the threshold.
+    /// Returns the measurement if the power with noise exceeds the threshold and the return is not dropped.
     fn detect_one(&self, address: usize, potential: PotentialReturn) -> Option<DetectedReturn> {
         if !(potential.power > MIN_POWER) {
             return None;
@@ -177,11 +182,12 @@ impl Receiver<'_> {
         Some(DetectedReturn { potential, measured_m: potential.range_m + error, measured_power })
     }
 
+    /// Appends a detected return to the scan and to its ground truth.
     fn append(&self, layer: usize, found: &DetectedReturn, scan: &mut LidarScan, truth: &mut ScanTruth) {
         let [cos, sin] = self.column.centre[layer / LAYERS_PER_GROUP];
         let [tan, cosine] = self.elevations[layer].centre;
         let level = found.measured_m * cosine;
-        let [x, y, z] = self.pose.to_ego_frame_m([level * cos, level * sin, level * tan]);
+        let [x, y, z] = self.pose.ego_frame_point_m([level * cos, level * sin, level * tan]);
         scan.x_m.push(x);
         scan.y_m.push(y);
         scan.z_m.push(z);
@@ -189,7 +195,7 @@ impl Receiver<'_> {
         scan.intensity.push((found.measured_power * square / self.link.gain_m2).min(MAX_INTENSITY));
         scan.offset_ns.push(self.column.offset_ns);
         #[expect(clippy::cast_possible_truncation, reason = "653 columns of 16 layers")]
-        scan.beam.push((self.index * LAYERS + layer) as u16);
+        scan.beam.push((self.column_index * LAYERS + layer) as u16);
         let PotentialReturn { range_m, source, material, .. } = found.potential;
         truth.points.push(PointTruth { source, material, range_m });
     }

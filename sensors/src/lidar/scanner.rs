@@ -1,8 +1,8 @@
-//! One scan of a scene: from solids to points with noise, each with its own time.
+//! The scanner: turns a scene into a scan, whose points have noise and a time of measurement each.
 //!
-//! The scan ends at the scene's time; the sweep before it takes 14.8 ms. Each solid is frozen at the instant at which
-//! the sweep crosses the middle of the vehicle that it belongs to: within the width of one vehicle the sweep takes
-//! 0.4 ms at 30 m and 4 ms at 3 m, in which it moves against E by millimetres to centimetres.
+//! The scan ends at the scene's time, and its sweep takes 14.8 ms. Each solid is frozen at the instant at which the
+//! sweep crosses the middle of its vehicle. The error is small: the sweep crosses the width of a vehicle in 0.4 ms at
+//! 30 m and in 4 ms at 3 m, and the vehicle moves relative to the ego by millimetres to centimetres in that time.
 
 use closecall_traffic::{PlanePose, Stream, Time};
 use nalgebra::{Isometry3, Point3};
@@ -22,12 +22,12 @@ use super::viewpoint::{Viewpoint, plane_from_body};
 use super::{Lidar, LidarScan, Material, MirrorSide, PointSource, ScanTruth};
 use crate::{Scene, SceneVehicle};
 
-/// Length of a sweep (s).
+/// Duration of a sweep (s).
 const SWEEP_S: f64 = SWEEP_NS * 1e-9;
-/// Vehicles whose centre is farther away than this are left out (m): beyond the reach for anything but a plate.
+/// Distance of a vehicle's centre beyond which the vehicle is ignored (m). From there only a plate could give a return.
 const MAX_CENTRE_DISTANCE_M: f64 = 300.0;
 
-/// The scanner: makes points out of a scene. Keeps no state from scan to scan but memory.
+/// The scanner of the rear LiDAR. It keeps no state from scan to scan except allocated memory.
 #[derive(Clone, Debug)]
 pub struct Scanner {
     lidar: Lidar,
@@ -43,7 +43,7 @@ pub struct Scanner {
 }
 
 impl Scanner {
-    /// A scanner of this kind.
+    /// Creates a scanner with this configuration.
     pub fn new(lidar: Lidar) -> Self {
         Self {
             lidar,
@@ -61,22 +61,22 @@ impl Scanner {
         }
     }
 
-    /// The latest scan.
+    /// Returns the latest scan.
     pub fn latest(&self) -> &LidarScan {
         &self.scan
     }
 
-    /// The truth behind the latest scan.
+    /// Returns the ground truth of the latest scan.
     pub fn truth(&self) -> &ScanTruth {
         &self.truth
     }
 
-    /// The side of the mirror whose scan ends at `time`: the sides alternate.
+    /// Returns the mirror side of the scan that ends at `time`. The sides alternate from scan to scan.
     pub fn mirror_side_at(time: Time) -> MirrorSide {
         if time.ns().div_euclid(PERIOD_NS) % 2 == 0 { MirrorSide::Plus } else { MirrorSide::Minus }
     }
 
-    /// Scans the scene; the scan ends at the scene's time. Draws exactly one number from `rng`.
+    /// Scans the scene. The scan ends at the scene's time. Draws exactly one number from `rng`.
     pub fn scan(&mut self, scene: &Scene<'_>, rng: &mut Stream) -> &LidarScan {
         let noise = Noise::draw(rng);
         let mirror_side = Self::mirror_side_at(scene.time);
@@ -96,7 +96,7 @@ impl Scanner {
             cast_ground(column, elevations, &self.targets, &link, &mut self.hits);
             let before_end_s = SWEEP_S - f64::from(column.offset_ns) * 1e-9;
             let receiver = Receiver {
-                index,
+                column_index: index,
                 column,
                 elevations,
                 pose: pose.deskewed(viewpoint.deskew(before_end_s)),
@@ -111,6 +111,7 @@ impl Scanner {
         &self.scan
     }
 
+    /// Clears the scan and sets its times and its mirror side.
     fn begin(&mut self, end: Time, mirror_side: MirrorSide, pose: &SensorPoseEstimate) {
         self.scan.clear();
         self.truth.points.clear();
@@ -122,7 +123,7 @@ impl Scanner {
         self.scan.sensor_x_m = pose.sensor_x_m();
     }
 
-    /// Collects everything that a beam could meet.
+    /// Collects all solids and spray plumes that a beam could hit.
     fn collect_targets(&mut self, scene: &Scene<'_>, mirror_side: MirrorSide, view: &Viewpoint) {
         self.targets.clear();
         self.plumes.clear();
@@ -179,7 +180,7 @@ impl Scanner {
         };
         let pose = scene.road.plane_pose(of.state.s_m, of.state.d_m, of.state.heading_rad);
         let placed = view.sensor_from_plane(0.0) * plane_from_body(pose, 0.0);
-        // No beam looks ahead: what lies there wholly would cost each of them a search for nothing.
+        // No beam points forward. A plume that lies entirely ahead would only cost each beam a test.
         if !solid.corners().any(|corner| (placed * corner).x > 0.0) {
             return;
         }
@@ -190,37 +191,40 @@ impl Scanner {
     }
 }
 
-/// How long before its end the sweep crosses the middle of a thing (s).
+/// Returns how long before its end the sweep crosses the origin of a body's frame (s).
 fn crossing_before_end_s(view: &Viewpoint, plane_from_thing: &Isometry3<f64>) -> f64 {
     let middle = view.sensor_from_plane(0.0) * (plane_from_thing * Point3::origin());
     SWEEP_S - Pattern::sweep_offset_s(middle.y.atan2(middle.x).to_degrees())
 }
 
+/// Returns the pose of a vehicle `before_end_s` earlier, extrapolated at its current speed and heading.
 fn moved_back(pose: PlanePose, vehicle: &SceneVehicle, before_end_s: f64) -> PlanePose {
     let distance_m = vehicle.state.speed_mps * before_end_s;
     let (sin, cos) = pose.yaw_rad.sin_cos();
     PlanePose { x_m: pose.x_m - distance_m * cos, y_m: pose.y_m - distance_m * sin, ..pose }
 }
 
-/// The road's surface is the first face of all.
+/// The faces of the road's surface, which is always the first of all faces.
 const GROUND_FACES: FaceRange = FaceRange { first: 0, first_back: 1, end: 1 };
 
-/// Finds the beams of a column that may see the road, from below up to where it can no longer send back enough to be
-/// detected; and lets those meet it that meet something else as well. Nothing lies below the road, so that it need not
-/// hide anything.
+/// Finds the layers of a column that may receive a return from the road, and sets [`ColumnHits::ground_below`].
+///
+/// The layers are tried from the lowest up to the first whose return would be too weak to be detected. Beams that may
+/// also hit a solid are intersected with the road here. For the others the receiver computes the return directly, since
+/// the road, with nothing below it, occludes nothing.
 fn cast_ground(column: &Column, elevations: &[Elevation], targets: &Targets, link: &LinkBudget, hits: &mut ColumnHits) {
     let ground: &Face = &targets.faces[0];
     let max_power_m3 = link.gain_m2 * ground.strength_m;
     for (layer, elevation) in elevations.iter().enumerate() {
         let group = layer / LAYERS_PER_GROUP;
         let [cos, sin] = column.centre[group];
-        // The lowest sub-ray is the nearest and meets the road at the steepest angle.
+        // The lowest sub-ray hits the road at the shortest distance and at the steepest angle.
         let inverse = ground.inverse[0] * cos + ground.inverse[1] * sin + ground.inverse[2] * elevation.tan[0];
         if !(inverse > 0.0 && max_power_m3 * inverse * inverse * inverse > MIN_POWER) {
             break;
         }
         hits.ground_below = layer + 1;
-        if hits.is_touched(layer) {
+        if hits.is_tested(layer) {
             let subrays = SubRays { cos: column.cos[group], sin: column.sin[group], tan: elevation.tan };
             hits.intersect(layer, &subrays, GROUND_FACES, targets);
         }
@@ -234,12 +238,13 @@ mod tests {
     use super::super::pattern::{LAYERS, SUBRAY_ROWS, SUBRAYS};
     use super::*;
 
-    /// The most by which a distance may differ from that of double precision (share).
+    /// Maximum relative difference between a distance in single and in double precision.
     const PRECISION: f64 = 2e-5;
 
     impl Scanner {
-        /// Casts a scene three times: quickly, by brute force, and in double precision without any of the ray cast's
-        /// tricks. The first two agree to the bit; the third may differ at edges only.
+        /// Asserts that three ray casts of a scene agree: the fast one, the one by brute force, and one in double
+        /// precision that clips a ray at one plane after the other. The first two agree to the bit. The third may
+        /// differ at edges.
         pub(crate) fn assert_cast_agrees_with_brute_force(&mut self, scene: &Scene<'_>) {
             let mirror_side = Self::mirror_side_at(scene.time);
             self.collect_targets(scene, mirror_side, &Viewpoint::new(scene, &self.lidar));
@@ -264,7 +269,8 @@ mod tests {
             assert!(differ <= 2 + hits / 200, "{differ} of {hits}");
         }
 
-        /// Sub-rays of a beam that meet something, and those that double precision sees elsewhere.
+        /// Returns the number of sub-rays of a beam that hit something, and how many of them differ in double
+        /// precision.
         fn compare_exactly(&self, column: &Column, elevations: &[Elevation], layer: usize) -> [usize; 2] {
             let group = layer / LAYERS_PER_GROUP;
             let hits = &self.hits.beams[layer];
@@ -285,7 +291,8 @@ mod tests {
             counts
         }
 
-        /// Where a ray first enters a solid, by clipping it at one plane after the other.
+        /// Returns the distance at which a ray first enters a solid (m), found by clipping it at one plane after the
+        /// other.
         fn nearest_m(&self, direction: [f64; 3]) -> Option<f64> {
             let mut nearest: Option<f64> = None;
             for part in &self.targets.parts {

@@ -1,20 +1,20 @@
-//! Droplets in the air: spray behind vehicles, fog, rain. They dim what lies behind them and send false returns.
+//! Droplets in the air: spray behind vehicles, fog and rain. They attenuate the beams and give false returns.
 //!
 //! ```text
-//!        ┌──────┐ ░ ░ ▒▒        plume: as wide as the vehicle, as long as it drives in a quarter of a second
-//!   ◀── E│      │▒▒▒▒▒ ░ ░░
+//!        ┌──────┐ ░ ░ ▒▒        plume: as wide as the vehicle, as long as its way in a quarter of a second
+//!   ◀── ego     │▒▒▒▒▒ ░ ░░
 //!        └o────o┘▒▒▒▒░▒ ░
 //! ```
 //!
-//! A layer of droplets of extinction α and depth ΔR sends back like a surface of ρ = π·α·ΔR/S, where S is the ratio of
+//! A layer of droplets with extinction α and depth ΔR reflects like a surface of ρ = π·α·ΔR/S, where S is the ratio of
 //! extinction to backscatter: 18.8 sr for water droplets at 905 nm (O'Connor, Illingworth and Hogan 2004). ΔR is the
-//! length of the pulse. Droplets come in clumps: the extinction along a beam is exponentially distributed about its
-//! mean, and neighbouring columns share it.
+//! length of the pulse. Droplets occur in clumps: the extinction along a beam is exponentially distributed about its
+//! mean, and neighbouring columns share the same value.
 //!
-//! How dense spray is has been measured only roughly. The sizes here are assumptions that give what recordings show
-//! (Walz et al. 2021, "A benchmark for spray from nearby cutting vehicles"; Linnhoff et al. 2022, "Simulating road spray
-//! effects in automotive lidar sensor models"): nothing below 40 to 50 km/h, much more with speed and water, tens to
-//! hundreds of false points, most of them within 10 m behind a vehicle.
+//! The density of spray has been measured only roughly. The values here are assumptions that reproduce published
+//! measurements (Walz et al. 2021, "A benchmark for spray from nearby cutting vehicles"; Linnhoff et al. 2022,
+//! "Simulating road spray effects in automotive lidar sensor models"): no spray below 40 to 50 km/h, a strong increase
+//! with speed and water, tens to hundreds of false points, most of them within 10 m behind a vehicle.
 
 use closecall_traffic::{Environment, Vehicle, VehicleClass};
 
@@ -27,28 +27,33 @@ use super::solid::Solid;
 use super::targets::{FaceRange, Targets};
 use super::{Material, PointSource};
 
-/// Extinction over backscatter of water droplets at 905 nm (sr).
+/// Ratio of extinction to backscatter of water droplets at 905 nm (sr).
 const LIDAR_RATIO_SR: f32 = 18.8;
-/// Speed below which tyres throw up no spray (m/s).
+/// Speed below which tyres raise no spray (m/s).
 const SPRAY_FROM_MPS: f64 = 12.0;
-/// Mean extinction in the plume of a car at the reference speed on a film of 1 mm (1/m) (assumption).
+/// Mean extinction in the plume of a car, per mm of water film, at the reference speed (1/m per mm; assumption).
 const SPRAY_PER_M_AND_MM: f64 = 0.008;
+/// Reference speed (m/s).
 const SPRAY_REFERENCE_MPS: f64 = 30.0;
-/// Deeper water runs off to the sides (mm) (assumption).
+/// Depth of the water film above which more water raises no more spray, because it runs off to the sides (mm;
+/// assumption).
 const MAX_FILM_MM: f64 = 3.0;
-/// Time for which a plume hangs together (s) (assumption).
+/// Time after which a plume has dispersed (s; assumption).
 const PLUME_LIFE_S: f64 = 0.25;
+/// Maximum height of a plume (m).
 const PLUME_HEIGHT_M: f64 = 1.4;
-/// Columns that share one clump of droplets.
+/// Number of neighbouring columns that share a clump of droplets.
 const CLUMP_COLUMNS: usize = 3;
-/// Share of the backscatter of fog that varies within a pulse's length; the receiver filters out the rest
-/// (assumption).
+/// Share of the backscatter of fog that varies within the length of a pulse (assumption). The receiver filters out the
+/// constant rest.
 const FOG_CLUMPINESS: f32 = 0.1;
-/// Light and receiver overlap fully only beyond some metres (m): half at this distance (assumption).
+/// Distance at which the laser beam and the receiver's field of view overlap by half (m; assumption). They overlap
+/// fully only beyond some metres.
 const OVERLAP_M: f32 = 2.0;
+/// Minimum distance of a return from droplets (m).
 const NEAREST_M: f32 = 0.5;
 
-/// A cloud of droplets with clear bounds.
+/// A spray plume: a cloud of droplets with sharp bounds.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Plume {
     pub(crate) faces: FaceRange,
@@ -56,32 +61,36 @@ pub(crate) struct Plume {
     pub(crate) extinction_per_m: f32,
 }
 
-/// A false return.
+/// A false return from droplets.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SoftEcho {
+    /// Distance from the sensor (m).
     pub(crate) range_m: f32,
+    /// Received power, in multiples of the detection threshold.
     pub(crate) power: f32,
     pub(crate) source: PointSource,
 }
 
-/// What droplets do to one beam.
+/// The effect of droplets on a beam.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DropletEffect {
-    /// The nearest false return, were it strong enough.
+    /// The nearest false return, which may be too weak to be detected.
     pub(crate) echo: Option<SoftEcho>,
-    /// Depth (m) and mean optical depth of the plumes that the beam crosses.
+    /// Distance at which the beam enters the first plume (m).
     near_m: f32,
+    /// Optical depth of all plumes that the beam crosses.
     optical_depth: f32,
 }
 
 impl DropletEffect {
-    /// Share of the light from `range_m` that gets through the plumes.
+    /// Returns the share of the light from `range_m` that the plumes transmit, on the way out and back.
     pub(crate) fn transmission(&self, range_m: f32) -> f32 {
         if self.optical_depth > 0.0 && range_m > self.near_m { (-2.0 * self.optical_depth).exp() } else { 1.0 }
     }
 }
 
-/// The plume behind a vehicle in its own frame, and its mean extinction (1/m); nothing where it is dry or slow.
+/// Returns the plume behind a vehicle, in the vehicle's own frame, and its mean extinction (1/m). Returns `None` if the
+/// road is dry or the vehicle slow.
 pub(crate) fn spray_plume(vehicle: &Vehicle, speed_mps: f64, environment: &Environment) -> Option<(Solid, f32)> {
     let film_mm = environment.water_film_mm.min(MAX_FILM_MM);
     let speed = (speed_mps - SPRAY_FROM_MPS) / (SPRAY_REFERENCE_MPS - SPRAY_FROM_MPS);
@@ -102,7 +111,7 @@ pub(crate) fn spray_plume(vehicle: &Vehicle, speed_mps: f64, environment: &Envir
     Some((Solid::cuboid(low, high, Material::Water), extinction))
 }
 
-/// What the beam with this centre meets in the air.
+/// Returns the effect of the droplets on the beam with this centre.
 pub(crate) fn droplet_effect(
     beam: usize,
     centre: &SubRays,
@@ -111,7 +120,7 @@ pub(crate) fn droplet_effect(
 ) -> DropletEffect {
     let (targets, link, noise) = of;
     let mut found = DropletEffect { echo: fog(beam, link, noise), near_m: f32::INFINITY, optical_depth: 0.0 };
-    // Logarithms are drawn by those beams alone that need them: not by those that cross no plume, ...
+    // Logarithms are computed only if needed: not for a beam that crosses no plume, ...
     let mut clump = None;
     let depth = noise.uniform(beam, Purpose::Depth);
     let mut has_echo = false;
@@ -126,7 +135,7 @@ pub(crate) fn droplet_effect(
         let before = found.optical_depth;
         found.near_m = found.near_m.min(from);
         found.optical_depth += extinction * (to - from);
-        // ... nor by those that end beyond it: −ln u ≥ 1 − u.
+        // ... nor for one that surely returns no light from this plume, since −ln u ≥ 1 − u.
         if has_echo || 0.5 * (1.0 - depth) >= found.optical_depth {
             continue;
         }
@@ -143,7 +152,7 @@ pub(crate) fn droplet_effect(
     found
 }
 
-/// Between which ranges a beam is inside of a plume (m).
+/// Returns the ranges at which a beam enters and leaves a plume (m), or `None` if it does not cross the plume.
 fn plume_interval_m(centre: &SubRays, faces: FaceRange, targets: &Targets) -> Option<[f32; 2]> {
     let slant = (1.0 + centre.tan[0] * centre.tan[0]).sqrt();
     let along = |face: usize| centre.inverse_distances(targets.faces[face].inverse)[0];
@@ -152,7 +161,7 @@ fn plume_interval_m(centre: &SubRays, faces: FaceRange, targets: &Targets) -> Op
     (nearest > farthest && farthest > 0.0).then(|| [slant / nearest, slant / farthest])
 }
 
-/// Power of a clump of droplets (thresholds).
+/// Returns the received power from a clump of droplets, in multiples of the detection threshold.
 fn soft_power(extinction_per_m: f32, range_m: f32, link: &LinkBudget) -> f32 {
     let reflectivity = std::f32::consts::PI * extinction_per_m * PULSE_M / LIDAR_RATIO_SR;
     let square = range_m * range_m;
@@ -160,7 +169,7 @@ fn soft_power(extinction_per_m: f32, range_m: f32, link: &LinkBudget) -> f32 {
     link.gain_m2 * reflectivity * overlap / square * link.transmission(range_m)
 }
 
-/// The clump of fog or rain that this beam meets first.
+/// Returns the return from the first clump of fog or rain that the beam hits, or `None` if the air is clear.
 fn fog(beam: usize, link: &LinkBudget, noise: Noise) -> Option<SoftEcho> {
     if !link.has_fog() {
         return None;

@@ -1,4 +1,4 @@
-//! Passenger cars: saloon, hatchback, sport utility vehicle, van.
+//! The shapes of passenger cars: saloon, hatchback or estate, sport utility vehicle, van.
 
 use closecall_traffic::Vehicle;
 
@@ -6,24 +6,25 @@ use super::append_pair;
 use crate::lidar::Material::{Glass, Lamp, Paint, Plastic, Plate, Tyre};
 use crate::lidar::solid::{HalfWidth, Solid, corner};
 
-/// Proportions of a body: lengths behind the front end, and heights as shares of the car's.
+/// The proportions of a car's body.
 struct Body {
     /// Height of the bonnet's front edge (share of the height).
     nose: f64,
     /// Height of the belt line, where the windows begin (share of the height).
     belt: f64,
-    /// Foot of the windscreen behind the front end (share of the length).
+    /// Distance of the windscreen's foot from the front end (share of the length).
     screen_foot: f64,
-    /// Front edge of the roof behind the front end (share of the length).
+    /// Distance of the roof's front edge from the front end (share of the length).
     roof_front: f64,
-    /// Rear edge of the roof before the rear end (share of the length).
+    /// Distance of the roof's rear edge from the rear end (share of the length).
     roof_rear: f64,
-    /// Foot of the rear window before the rear end (share of the length).
+    /// Distance of the rear window's foot from the rear end (share of the length).
     rear_foot: f64,
-    /// Height of the bumper's lower lip (m).
+    /// Height of the bumper's lower edge (m).
     ground_clearance_m: f64,
 }
 
+/// The body shapes, which `Appearance::body_shape` selects.
 const BODIES: [Body; 4] = [
     // Saloon.
     Body {
@@ -67,16 +68,16 @@ const BODIES: [Body; 4] = [
     },
 ];
 
-/// How far the cabin's roof is narrower than its belt, on each side (share of the width).
+/// Inward lean of the windows: by how much the roof is narrower than the belt line on each side (share of the width).
 const TUMBLEHOME: f64 = 0.09;
-/// How far things stand out from the painted front (m).
+/// Protrusion of the plate from the painted front (m). Grille and lamps protrude by half of it.
 const PROTRUSION_M: f64 = 0.01;
 /// European plate: 520 × 110 mm (Council Regulation (EC) No 2411/98 gives its layout).
 const PLATE_HALF_WIDTH_M: f64 = 0.26;
 const PLATE_HEIGHT_M: f64 = 0.11;
 const WHEEL_DIAMETER_M: f64 = 0.65;
 const TYRE_WIDTH_M: f64 = 0.21;
-/// Axle behind the front end, and before the rear end (share of the length).
+/// Distance of each axle from the nearer end of the car (share of the length).
 const OVERHANG: f64 = 0.19;
 
 pub(super) fn append(vehicle: &Vehicle, solids: &mut Vec<Solid>) {
@@ -86,7 +87,7 @@ pub(super) fn append(vehicle: &Vehicle, solids: &mut Vec<Solid>) {
     let (nose, belt, floor) = (body.nose * top, body.belt * top, body.ground_clearance_m);
     let from_front = |share: f64| front - share * size.length_m;
     let from_rear = |share: f64| -front + share * size.length_m;
-    // Nothing stands further forward than the front end: the body begins where plate and lamps end.
+    // The plate ends exactly at the front end of the bounding box, so the painted body begins behind it.
     let skin = front - PROTRUSION_M;
     let hull = [
         corner(skin - 0.04, floor, Paint),
@@ -109,7 +110,7 @@ pub(super) fn append(vehicle: &Vehicle, solids: &mut Vec<Solid>) {
     append_wheels(front, half, size.length_m, solids);
 }
 
-/// Grille, plate and lamps, which stand a little before the painted front.
+/// Appends grille, plate and lamps, which protrude slightly from the painted front.
 fn append_front(front: f64, half: f64, [floor, nose]: [f64; 2], solids: &mut Vec<Solid>) {
     let height = nose - floor;
     let at = |share: f64| floor + share * height;

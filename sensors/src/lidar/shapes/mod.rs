@@ -1,4 +1,4 @@
-//! Shapes of vehicles: a few convex solids each, with the materials that a LiDAR tells apart.
+//! The shapes of vehicles: a few convex solids each, with the materials that matter for a LiDAR.
 //!
 //! ```text
 //!            ____                      ┌──┐┌────────────────┐            o  helmet
@@ -7,8 +7,8 @@
 //!       (o)      (o)    wheels           o      o o     ooo            O  O  wheels
 //! ```
 //!
-//! Each follows the vehicle's own length, width and height; proportions are those of usual models, read off drawings,
-//! not of one model. Everything is in the vehicle's frame: x forward, z = 0 on the ground.
+//! Each shape is scaled to the vehicle's own length, width and height. The proportions are typical values read off
+//! drawings, not those of a specific model. All coordinates are in the vehicle's frame: x forward, z = 0 on the ground.
 
 mod car;
 mod motorcycle;
@@ -41,7 +41,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_shape_fills_its_box_and_stays_within_it() {
+    fn every_shape_fills_its_bounding_box_exactly() {
         for class in VehicleClass::ALL {
             for body_shape in 0..8 {
                 let mut vehicle = Vehicle::typical(class);

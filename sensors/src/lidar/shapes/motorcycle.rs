@@ -1,4 +1,4 @@
-//! Motorcycles with their riders: naked, and with a fairing. They bear no plate in front.
+//! The shapes of motorcycles with their riders: with and without a fairing. They have no plate in front.
 
 use closecall_traffic::Vehicle;
 
@@ -8,7 +8,7 @@ use crate::lidar::solid::{HalfWidth, Solid, corner};
 
 const WHEEL_DIAMETER_M: f64 = 0.62;
 const TYRE_HALF_WIDTH_M: f64 = 0.07;
-/// Half the width of the front above the wheel: fork and lamp, or a fairing (m).
+/// Half the width of the front above the wheel (m): of fork and lamp, and of a fairing.
 const FRONT_HALF_WIDTHS_M: [f64; 2] = [0.13, 0.27];
 const TORSO_HALF_WIDTH_M: f64 = 0.25;
 const HELMET_HALF_WIDTH_M: f64 = 0.14;

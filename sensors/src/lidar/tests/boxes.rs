@@ -1,4 +1,4 @@
-//! Boxes and clusters against the truth.
+//! Boxes and clusters, compared with the ground truth.
 
 use closecall_traffic::VehicleClass;
 
@@ -6,7 +6,7 @@ use super::*;
 use crate::Extent;
 
 #[test]
-fn the_stated_deviations_of_faces_are_those_that_occur() {
+fn reported_standard_deviations_match_the_errors_of_the_front_face() {
     for class in VehicleClass::ALL {
         let (mut along, mut across, mut n) = (0.0, 0.0, 0.0);
         for step in 0..120_i32 {
@@ -28,7 +28,7 @@ fn the_stated_deviations_of_faces_are_those_that_occur() {
 }
 
 #[test]
-fn classes_and_widths_are_told_by_shape() {
+fn class_and_width_follow_from_the_shape() {
     for class in VehicleClass::ALL {
         for body_shape in 0..4 {
             for gap in [4.0, 10.0, 25.0, 50.0] {
@@ -47,7 +47,7 @@ fn classes_and_widths_are_told_by_shape() {
 }
 
 #[test]
-fn clusters_are_vehicles() {
+fn each_vehicle_forms_one_cluster() {
     let mut report = SegmentationReport::default();
     let mut lidar = RearLidar::new(Lidar::default());
     for step in 0..60_i32 {
@@ -58,7 +58,7 @@ fn clusters_are_vehicles() {
             .with(VehicleClass::Motorcycle, 60.0 - along, 3.75)
             .with(VehicleClass::Car, 25.0 + 1.2 * along, 3.75);
         setup.detect(&mut lidar, step.into());
-        lidar.report(&mut report);
+        lidar.add_to_report(&mut report);
     }
     assert!(report.vehicles > 180, "{report:?}");
     let share = |count: usize| count as f64 / report.vehicles as f64;

@@ -1,10 +1,10 @@
-//! Points on a vehicle, against counts of the pattern by hand and against the physics of range.
+//! Numbers of points on a vehicle, compared with the scan pattern, with real scans and with the link budget.
 
 use closecall_traffic::{Environment, VehicleClass};
 
 use super::*;
 
-/// Beams whose centres meet the upright rectangle, by the formula of the pattern alone.
+/// Returns the number of beams whose centres hit an upright rectangle, from the formula of the scan pattern alone.
 fn hand_count(mirror_side: MirrorSide, distance_m: f64, half_width_m: f64, [low_m, high_m]: [f64; 2]) -> usize {
     let pattern = Pattern::scala_2();
     let meets = |&beam: &u16| {
@@ -16,7 +16,7 @@ fn hand_count(mirror_side: MirrorSide, distance_m: f64, half_width_m: f64, [low_
 }
 
 #[test]
-fn the_counts_on_a_truck_are_those_of_the_pattern() {
+fn point_counts_on_a_truck_match_the_scan_pattern() {
     for gap_m in [3.0, 10.0, 30.0, 60.0] {
         let mut setup = TestScene::new().with(VehicleClass::Truck, gap_m, 0.0);
         let mut lidar = RearLidar::new(Lidar { dropout: 0.0, ..Lidar::default() });
@@ -27,8 +27,9 @@ fn the_counts_on_a_truck_are_those_of_the_pattern() {
             let on = points.filter(|(_, point)| point.source == PointSource::Actor(1));
             let mut beams: Vec<u16> = on.map(|(&beam, _)| beam).collect();
             beams.dedup();
-            // The cabin's front is 2.51 m wide and reaches from 0.35 m to 3.8 m: at least the beams whose centres meet
-            // it, and at most those whose footprints touch the vehicle, wheels and load taken in.
+            // The cabin's front is 2.51 m wide and extends from 0.35 m to 3.8 m. The count is at least the number of
+            // beams whose centres hit the front, and at most the number whose footprints touch the vehicle, including
+            // its wheels and its load.
             let footprint = [gap_m * 0.0625_f64.to_radians(), gap_m * 0.3_f64.to_radians()];
             let least = hand_count(mirror_side, gap_m, 1.255, [0.35, 3.8]);
             let most = hand_count(
@@ -44,13 +45,13 @@ fn the_counts_on_a_truck_are_those_of_the_pattern() {
 }
 
 #[test]
-fn the_counts_on_a_car_are_those_that_recordings_show() {
+fn point_counts_on_a_car_match_real_scans() {
     for gap_m in [3.0, 4.0, 5.0] {
         let points = TestScene::new().with(VehicleClass::Car, gap_m, 0.0).mean_points();
         assert!((2_500.0..=4_100.0).contains(&points), "{points} at {gap_m} m");
     }
     let points = TestScene::new().with(VehicleClass::Car, 30.0, 0.0).mean_points();
-    // 28 columns by the 4 or 5 layers between 0.18 m and 1.5 m.
+    // 28 columns times the 4 or 5 layers between 0.18 m and 1.5 m.
     assert!((100.0..=160.0).contains(&points), "{points}");
     let points = TestScene::new().with(VehicleClass::Car, 100.0, 0.0).mean_points();
     assert!((5.0..=20.0).contains(&points), "{points}");
@@ -59,7 +60,7 @@ fn the_counts_on_a_car_are_those_that_recordings_show() {
 #[test]
 fn a_motorcycle_at_100_m_fills_three_columns() {
     let mut setup = TestScene::new().with(VehicleClass::Motorcycle, 100.0, 0.0);
-    // A receiver that misses nothing shows the geometry alone.
+    // With a receiver that misses no return, only the geometry counts.
     let mut lidar = RearLidar::new(Lidar { dropout: 0.0, nominal_range_m: 500.0, ..Lidar::default() });
     for scan_index in 0..2 {
         setup.detect(&mut lidar, scan_index);
@@ -73,7 +74,7 @@ fn a_motorcycle_at_100_m_fills_three_columns() {
 }
 
 #[test]
-fn dark_paint_rain_and_fog_shorten_the_sight() {
+fn dark_paint_rain_and_fog_reduce_the_point_count() {
     let seen = |reflectivity: f64, environment: Environment, gap_m: f64| {
         let mut setup = TestScene::new().with(VehicleClass::Car, gap_m, 0.0);
         setup.environment = environment;
@@ -83,7 +84,7 @@ fn dark_paint_rain_and_fog_shorten_the_sight() {
     let clear = Environment::CLEAR_DAY;
     let rain = Environment { rain_mm_per_h: 50.0, ..clear };
     let fog = |visibility_m| Environment { visibility_m, ..clear };
-    // At 90 m every step makes a difference; two-way transmission: rain 0.54, fog of 200 m 0.03.
+    // At 90 m each step has an effect. The two-way transmission is 0.54 in rain, and 0.03 in fog of 200 m visibility.
     let counts = [
         seen(0.8, clear, 90.0),
         seen(0.5, clear, 90.0),
@@ -96,7 +97,8 @@ fn dark_paint_rain_and_fog_shorten_the_sight() {
     assert!(fogs.windows(2).all(|pair| pair[0] > pair[1]), "{fogs:?}");
 }
 
-/// Share of scans in which the first of the others is found as a vehicle, over gaps from `from_m` on.
+/// Returns the share of 60 scans in which the first of the other vehicles is detected as a vehicle, at gaps from
+/// `from_m` to about 10 m more.
 fn found_share(class: VehicleClass, reflectivity: f64, environment: Environment, from_m: f64) -> f64 {
     let mut lidar = RearLidar::new(Lidar::default());
     let mut found = 0;
@@ -113,13 +115,13 @@ fn found_share(class: VehicleClass, reflectivity: f64, environment: Environment,
 }
 
 #[test]
-fn ranges_of_detection_follow_from_the_physics() {
+fn detection_ranges_follow_from_reflectivity_and_visibility() {
     let clear = Environment::CLEAR_DAY;
     let fog = Environment { visibility_m: 100.0, ..clear };
     let car = |reflectivity, environment, from_m| found_share(VehicleClass::Car, reflectivity, environment, from_m);
     assert!(car(0.5, clear, 90.0) > 0.95);
     assert!(car(0.5, clear, 100.0) > 0.75);
-    // Half of the scans, one side of the mirror, are enough to confirm a track.
+    // Half of the scans, those of one mirror side, are enough to confirm a track.
     assert!(car(0.5, clear, 120.0) > 0.2);
     assert!(car(0.1, clear, 60.0) > 0.9 && car(0.1, clear, 100.0) < 0.2);
     assert!(car(0.5, fog, 30.0) > 0.8 && car(0.5, fog, 70.0) < 0.2);

@@ -5,7 +5,7 @@ use closecall_traffic::VehicleClass;
 use super::*;
 
 #[test]
-fn vehicles_hide_each_other() {
+fn vehicles_occlude_each_other() {
     let mut setup = TestScene::new().with(VehicleClass::Motorcycle, 40.0, 0.0).with(VehicleClass::Truck, 10.0, 0.0);
     let mut lidar = RearLidar::new(Lidar::default());
     setup.detect(&mut lidar, 0);
@@ -16,7 +16,7 @@ fn vehicles_hide_each_other() {
 }
 
 #[test]
-fn pitch_under_braking_moves_the_beams_and_levelling_undoes_it() {
+fn pitch_under_braking_moves_the_beams_and_levelling_compensates_it() {
     let mut setup = TestScene::new().with(VehicleClass::Truck, 30.0, 0.0);
     let mut lidar = RearLidar::new(Lidar { levelling_sd_rad: 0.0, ..Lidar::default() });
     let mut means = |pitch_rad: f64| {
@@ -41,7 +41,7 @@ fn pitch_under_braking_moves_the_beams_and_levelling_undoes_it() {
 }
 
 #[test]
-fn wet_roads_raise_spray_behind_e_and_dry_ones_do_not() {
+fn there_is_spray_behind_the_ego_on_wet_roads_only() {
     let mut setup = TestScene::new().with(VehicleClass::Car, 20.0, 0.0);
     let mut lidar = RearLidar::new(Lidar::default());
     let mut spray = |film_mm: f64, speed_mps: f64| {
@@ -50,7 +50,7 @@ fn wet_roads_raise_spray_behind_e_and_dry_ones_do_not() {
         let found = setup.detect(&mut lidar, 0);
         let points: Vec<_> = lidar.truth().points.iter().filter(|at| at.source == PointSource::Spray).collect();
         assert!(points.iter().all(|point| point.range_m < 15.0));
-        // Spray hides nobody, and is no vehicle.
+        // Spray neither occludes the vehicle nor is detected as one.
         assert_eq!(found.iter().filter(|detection| detection.class.vehicle() > 0.5).count(), 1, "{found:?}");
         points.len()
     };
@@ -61,7 +61,7 @@ fn wet_roads_raise_spray_behind_e_and_dry_ones_do_not() {
 }
 
 #[test]
-fn fog_sends_false_returns_and_is_no_vehicle() {
+fn fog_gives_false_returns_that_are_not_classified_as_vehicles() {
     let mut setup = TestScene::new();
     setup.environment.visibility_m = 60.0;
     let mut lidar = RearLidar::new(Lidar::default());
@@ -71,7 +71,7 @@ fn fog_sends_false_returns_and_is_no_vehicle() {
 }
 
 #[test]
-fn guard_rails_are_seen_and_told_from_vehicles() {
+fn guard_rails_give_returns_but_no_vehicle_detections() {
     for curvature in [0.0, 0.0025, -0.0025] {
         let mut setup = TestScene::new().with(VehicleClass::Car, 30.0, 0.0).with(VehicleClass::Car, 20.0, -3.75);
         setup.road = road_with_guard_rails(curvature);
