@@ -131,9 +131,11 @@ impl Targets {
     #[expect(clippy::cast_possible_truncation, reason = "4 billion faces do not fit into memory")]
     pub(crate) fn push_faces(&mut self, solid: &Solid, pose: &Isometry3<f64>, surface: Surface<'_>) -> FaceRange {
         let first = self.faces.len() as u32;
-        self.faces.extend(placed_faces(solid, pose).filter(|face| face.1 < 0.0).map(|face| prepare_face(face, surface)));
+        self.faces
+            .extend(placed_faces(solid, pose).filter(|face| face.1 < 0.0).map(|face| prepare_face(face, surface)));
         let first_back = self.faces.len() as u32;
-        self.faces.extend(placed_faces(solid, pose).filter(|face| face.1 >= 0.0).map(|face| prepare_face(face, surface)));
+        self.faces
+            .extend(placed_faces(solid, pose).filter(|face| face.1 >= 0.0).map(|face| prepare_face(face, surface)));
         FaceRange { first, first_back, end: self.faces.len() as u32 }
     }
 }

@@ -224,7 +224,7 @@ mod tests {
         ) {
             // Several copies of each point make the cells crowded.
             let points: Vec<_> = points.iter().flat_map(|&point| vec![point; copies]).collect();
-            let stretched = |at| to_stretched_plane(at).map(f64::from);
+            let stretched = |at: &Candidate| to_stretched_plane(at).map(f64::from);
             let rows: Vec<f64> = candidates(&points).iter().flat_map(stretched).collect();
             let rows = Array2::from_shape_vec((points.len(), 2), rows).unwrap();
             let thinned = labels(&points);

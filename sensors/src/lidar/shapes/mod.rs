@@ -41,7 +41,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_shape_fills_its_bounding_box_exactly() {
+    fn every_shape_fills_its_bounding_box() {
         for class in VehicleClass::ALL {
             for body_shape in 0..8 {
                 let mut vehicle = Vehicle::typical(class);
