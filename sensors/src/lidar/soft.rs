@@ -1,8 +1,8 @@
 //! Droplets in the air: spray behind vehicles, fog and rain. They attenuate the beams and give false returns.
 //!
 //! ```text
-//!        ┌──────┐ ░ ░ ▒▒        plume: as wide as the vehicle, as long as its way in a quarter of a second
-//!   ◀── ego     │▒▒▒▒▒ ░ ░░
+//!        ┌──────┐ ░ ░ ▒▒        plume: as wide as the vehicle, as long as the distance it drives in 0.25 s
+//!   ◀──  │ ego  │▒▒▒▒▒ ░ ░░
 //!        └o────o┘▒▒▒▒░▒ ░
 //! ```
 //!
