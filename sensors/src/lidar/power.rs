@@ -8,9 +8,9 @@
 //! ```
 //!
 //! Powers are in multiples of the detection threshold. The receiver adds normal noise with a standard deviation of 1/T
-//! of the threshold. It reports a return if the sum exceeds the threshold: with probability 0.5 at P = 1, and
-//! with 0.9 at P = 1.26. This single step yields the detection probability, its dependence on all terms of the formula,
-//! and the scatter of the intensities.
+//! of the threshold. It reports a return if the sum exceeds the threshold: with probability 0.5 at P = 1, and with 0.9
+//! at P = 1.26. This single step yields the detection probability, its dependence on all terms of the formula, and the
+//! scatter of the intensities.
 //!
 //! Calibration: P = 1 for a surface of reflectivity 0.5 that faces the sensor and fills the footprint at the nominal
 //! range (200 m), in air that does not attenuate. A surface of reflectivity 0.8 is then detected with probability 0.9
@@ -22,8 +22,8 @@ use super::Lidar;
 
 /// Ratio T of the detection threshold to the standard deviation of the receiver's noise.
 ///
-/// With T = 5, a scan of 10⁴ beams with 10² independent range cells each has a false alarm every third time. False alarms
-/// are not modelled.
+/// With T = 5, a scan of 10⁴ beams with 10² independent range cells each has a false alarm every third time. False
+/// alarms are not modelled.
 pub(crate) const THRESHOLD_OVER_NOISE: f32 = 5.0;
 /// Power below which a return cannot be detected: the noise stays within 3.47 standard deviations, and cannot raise the
 /// return above the threshold.
