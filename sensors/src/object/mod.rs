@@ -21,7 +21,7 @@ pub use noise::NoiseKey;
 use closecall_traffic::Track;
 
 use crate::perception::FieldOfView;
-use crate::surroundings::{Other, survey};
+use crate::surroundings::{OtherVehicle, transform_scene};
 use crate::tracking::TrackList;
 use crate::{Perception, Scene, SensorError, SensorHealth};
 pub(crate) use sensor::{DEGRADED_SHARE, ObjectSensor, ScanView};
@@ -31,7 +31,7 @@ pub(crate) use weather::range_in_weather_m;
 #[derive(Clone, Debug)]
 pub struct ObjectPerception {
     sensors: [ObjectSensor; 3],
-    others: Vec<Other>,
+    others: Vec<OtherVehicle>,
     list: TrackList,
 }
 
@@ -53,7 +53,7 @@ impl ObjectPerception {
 
 impl Perception for ObjectPerception {
     fn step(&mut self, scene: &Scene<'_>) -> Result<&[Track], SensorError> {
-        let frame = survey(scene, &mut self.others)?;
+        let frame = transform_scene(scene, &mut self.others)?;
         self.list.tracks.clear();
         let view = ScanView { scene, frame: &frame, others: &self.others };
         for sensor in &mut self.sensors {

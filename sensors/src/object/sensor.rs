@@ -15,7 +15,7 @@ use super::visibility::{Field, View, Visibility};
 use super::weather::range_in_weather_m;
 use crate::ego_frame::EgoFrame;
 use crate::perception::FieldOfView;
-use crate::surroundings::Other;
+use crate::surroundings::OtherVehicle;
 use crate::tracking::TrackList;
 use crate::tracking::axis::{AxisEstimate, AxisFilter, AxisMeasurement};
 use crate::tracking::lifecycle::Lifecycle;
@@ -58,7 +58,7 @@ struct Target {
 pub(crate) struct ScanView<'a> {
     pub(crate) scene: &'a Scene<'a>,
     pub(crate) frame: &'a EgoFrame<'a>,
-    pub(crate) others: &'a [Other],
+    pub(crate) others: &'a [OtherVehicle],
 }
 
 /// An object-level sensor with all that it remembers.
@@ -170,7 +170,7 @@ impl ObjectSensor {
     fn follow(
         &mut self,
         place: usize,
-        other: &Other,
+        other: &OtherVehicle,
         (in_view, errors): (bool, ScanErrors),
         ego: &EgoRear,
         list: &mut TrackList,
@@ -223,7 +223,7 @@ impl ObjectSensor {
     }
 
     /// Puts what is known now in the queue, and appends what was put there `latency_steps` ago.
-    fn report(&mut self, place: usize, other: &Other, view: &ScanView<'_>, list: &mut TrackList) {
+    fn report(&mut self, place: usize, other: &OtherVehicle, view: &ScanView<'_>, list: &mut TrackList) {
         let latency_s = self.model.latency_steps as f64 * SCAN_PERIOD.s();
         let target = &mut self.targets[place];
         let length = target.waiting.len();
@@ -241,7 +241,7 @@ impl ObjectSensor {
     }
 
     /// A report in road axes as a track in E's frame.
-    fn track(&self, report: &Report, other: &Other, view: &ScanView<'_>) -> Track {
+    fn track(&self, report: &Report, other: &OtherVehicle, view: &ScanView<'_>) -> Track {
         let estimate = in_ego_frame(&[report.along, report.across], view.frame);
         let across = &report.across;
         Track {

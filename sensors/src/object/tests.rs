@@ -53,8 +53,8 @@ impl Encounter {
     fn advance(&mut self) {
         self.scans += 1;
         for vehicle in std::iter::once(&mut self.ego).chain(&mut self.others) {
-            let stretch = 1.0 - self.road.curvature_per_m() * vehicle.state.d_m;
-            vehicle.state.s_m += vehicle.state.speed_mps / stretch * PERIOD_S;
+            let path_scale = 1.0 - self.road.curvature_per_m() * vehicle.state.d_m;
+            vehicle.state.s_m += vehicle.state.speed_mps / path_scale * PERIOD_S;
         }
     }
 }
@@ -88,7 +88,7 @@ fn rear_error_squared(sample: u64, curvature_per_m: f64) -> f64 {
     }
     let scene = encounter.scene();
     let mut others = Vec::new();
-    survey(&scene, &mut others).unwrap();
+    transform_scene(&scene, &mut others).unwrap();
     let truth = others[1];
     let track = of(perception.step(&scene).unwrap(), Source::Rear).unwrap();
     let error = track.state

@@ -7,7 +7,7 @@
 //!
 //! Slopes (left over outward) order the directions as angles do and need no arc tangent.
 
-use crate::surroundings::Other;
+use crate::surroundings::OtherVehicle;
 
 /// Where a sensor looks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,7 +55,7 @@ pub(super) struct Visibility {
 
 impl Visibility {
     /// Looks at all vehicles from a sensor of E, whose size is `ego_m` (length, width).
-    pub(super) fn look(&mut self, view: View, others: &[Other], ego_m: [f64; 2]) {
+    pub(super) fn look(&mut self, view: View, others: &[OtherVehicle], ego_m: [f64; 2]) {
         self.silhouettes.clear();
         let outward = match view {
             View::Ahead => 1.0,
@@ -67,7 +67,7 @@ impl Visibility {
     }
 
     /// True where `other` is within the field of view, in range, and not hidden.
-    pub(super) fn sees(&mut self, field: &Field, other: &Other, ego_m: [f64; 2]) -> bool {
+    pub(super) fn sees(&mut self, field: &Field, other: &OtherVehicle, ego_m: [f64; 2]) -> bool {
         if field.view == View::Around {
             return box_distance_m(other, ego_m) <= field.range_m;
         }
@@ -92,7 +92,7 @@ impl Visibility {
 
 /// The directions that `other` covers, seen from the bumper at `mount_m` from E's centre; none where it lies wholly on
 /// the other side.
-fn silhouette(other: &Other, outward: f64, mount_m: f64) -> Option<Silhouette> {
+fn silhouette(other: &OtherVehicle, outward: f64, mount_m: f64) -> Option<Silhouette> {
     let (ahead_m, left_m) = (0.5 * other.length_m, 0.5 * other.width_m);
     let corners = [(ahead_m, left_m), (ahead_m, -left_m), (-ahead_m, left_m), (-ahead_m, -left_m)];
     let mut seen = Silhouette { actor: other.actor, near_m: f64::INFINITY, low: f64::INFINITY, high: -f64::INFINITY };
@@ -109,7 +109,7 @@ fn silhouette(other: &Other, outward: f64, mount_m: f64) -> Option<Silhouette> {
 }
 
 /// Distance between E's box and `other`'s, both taken as parallel [m].
-fn box_distance_m(other: &Other, ego_m: [f64; 2]) -> f64 {
+fn box_distance_m(other: &OtherVehicle, ego_m: [f64; 2]) -> f64 {
     let along_m = other.x_m.abs() - 0.5 * (other.length_m + ego_m[0]);
     let across_m = other.y_m.abs() - 0.5 * (other.width_m + ego_m[1]);
     along_m.max(0.0).hypot(across_m.max(0.0))
@@ -141,8 +141,8 @@ mod tests {
         assert_eq!(union_width(&mut []), 0.0);
     }
 
-    fn car(actor: usize, x_m: f64, y_m: f64) -> Other {
-        Other {
+    fn car(actor: usize, x_m: f64, y_m: f64) -> OtherVehicle {
+        OtherVehicle {
             actor,
             class: VehicleClass::Car,
             length_m: 4.6,
@@ -160,7 +160,7 @@ mod tests {
 
     const BEHIND: Field = Field { view: View::Behind, range_m: 120.0, half_angle_tan: 2.3 };
 
-    fn seen(field: Field, others: &[Other]) -> Vec<bool> {
+    fn seen(field: Field, others: &[OtherVehicle]) -> Vec<bool> {
         let mut visibility = Visibility::default();
         visibility.look(field.view, others, [4.6, 1.85]);
         others.iter().map(|other| visibility.sees(&field, other, [4.6, 1.85])).collect()

@@ -6,7 +6,7 @@
 use closecall_traffic::{Source, Track, TrackId, TrackStatus};
 use nalgebra::{Matrix2, Vector2, Vector4};
 
-use crate::surroundings::{Other, survey};
+use crate::surroundings::{OtherVehicle, transform_scene};
 use crate::{Scene, SensorError};
 
 /// A track belongs to a vehicle whose nearest face is within this of the track's [m].
@@ -35,7 +35,7 @@ struct Followed {
 /// Counters over the confirmed rear tracks of a run.
 #[derive(Clone, Debug, Default)]
 pub struct TrackAudit {
-    others: Vec<Other>,
+    others: Vec<OtherVehicle>,
     owned: Vec<Owned>,
     followed: Vec<Followed>,
     false_ids: Vec<TrackId>,
@@ -56,7 +56,7 @@ impl TrackAudit {
     /// [`SensorError::NotFinite`] where the scene is not finite.
     pub fn observe(&mut self, tracks: &[Track], scene: &Scene<'_>) -> Result<(), SensorError> {
         let mut others = std::mem::take(&mut self.others);
-        survey(scene, &mut others)?;
+        transform_scene(scene, &mut others)?;
         for other in &others {
             let owner = |track: &&Track| owner(&self.owned, track, &others) == Some(other.actor);
             let nearest = confirmed(tracks)
@@ -105,7 +105,7 @@ impl TrackAudit {
         (!self.nees.is_empty()).then(|| sum / self.nees.len() as f64)
     }
 
-    fn follow(&mut self, track: &Track, other: &Other) {
+    fn follow(&mut self, track: &Track, other: &OtherVehicle) {
         match self.followed.iter_mut().find(|followed| followed.actor == other.actor) {
             Some(followed) if followed.last_id == track.id => {}
             Some(followed) => {
@@ -133,7 +133,7 @@ fn axis_nees(track: &Track, error: &Vector4<f64>, axis: usize) -> f64 {
 }
 
 /// The vehicle that a track belongs to: the one that it had, while it is near enough, else the nearest.
-fn owner(owned: &[Owned], track: &Track, others: &[Other]) -> Option<usize> {
+fn owner(owned: &[Owned], track: &Track, others: &[OtherVehicle]) -> Option<usize> {
     let reach_m = KEPT_DEVIATIONS * (track.covariance[(0, 0)] + track.covariance[(1, 1)]).sqrt();
     let before = owned.iter().find(|owned| owned.id == track.id).map(|owned| owned.actor);
     let kept = others.iter().find(|other| Some(other.actor) == before);
@@ -151,7 +151,7 @@ fn confirmed(tracks: &[Track]) -> impl Iterator<Item = &Track> {
 
 /// Error of the nearest face's position along the vehicle and of the centre's across it, and of the velocity, in E's
 /// frame. Half of the difference of the lengths is taken out: the face is what is measured, and what gaps are made of.
-fn face_error(track: &Track, other: &Other) -> Vector4<f64> {
+fn face_error(track: &Track, other: &OtherVehicle) -> Vector4<f64> {
     let half_m = 0.5 * (track.length_m - other.length_m);
     // What is behind E shows its front, and a rear sensor has seen nothing else of what has come alongside since.
     let longer_m = if other.x_m < 0.0 || track.source == Source::Rear { half_m } else { -half_m };
@@ -163,7 +163,7 @@ fn face_error(track: &Track, other: &Other) -> Vector4<f64> {
     )
 }
 
-fn face_distance_m(track: &Track, other: &Other) -> f64 {
+fn face_distance_m(track: &Track, other: &OtherVehicle) -> f64 {
     let error = face_error(track, other);
     error[0].hypot(error[1])
 }

@@ -119,8 +119,8 @@ pub(crate) struct EgoEstimate {
 pub(crate) fn in_ego_frame([along, across]: &[AxisEstimate; 2], frame: &EgoFrame<'_>) -> EgoEstimate {
     let point = frame.point(along.position_m, across.position_m);
     let (sin, cos) = point.road_yaw_rad.sin_cos();
-    let stretch = frame.stretch(across.position_m);
-    let to_ego = Matrix2::new(cos * stretch, -sin, sin * stretch, cos);
+    let path_scale = frame.path_scale(across.position_m);
+    let to_ego = Matrix2::new(cos * path_scale, -sin, sin * path_scale, cos);
     let velocity_mps = to_ego * Vector2::new(along.speed_mps, across.speed_mps);
     let turned = |along: f64, across: f64| to_ego * Matrix2::new(along, 0.0, 0.0, across) * to_ego.transpose();
     let cross = turned(along.position_speed_m2ps, across.position_speed_m2ps);

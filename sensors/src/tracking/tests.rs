@@ -9,7 +9,7 @@ use rand_distr::StandardNormal;
 use super::motion::{ACROSS, ALONG, Mode, Situation};
 use super::*;
 use crate::ego_frame::EgoFrame;
-use crate::surroundings::survey;
+use crate::surroundings::transform_scene;
 use crate::testing::{scene_vehicle, with_speed};
 use crate::{Detection, Extent, Scene, SceneVehicle};
 
@@ -109,8 +109,8 @@ impl Bench {
         self.scans += 1;
         for vehicle in self.others.iter_mut().chain([&mut self.ego]) {
             let state = &mut vehicle.state;
-            let stretch = 1.0 - self.road.curvature_per_m() * state.d_m;
-            state.s_m += PERIOD_S * state.speed_mps * state.heading_rad.cos() / stretch;
+            let path_scale = 1.0 - self.road.curvature_per_m() * state.d_m;
+            state.s_m += PERIOD_S * state.speed_mps * state.heading_rad.cos() / path_scale;
             state.d_m += PERIOD_S * state.speed_mps * state.heading_rad.sin();
         }
         if manoeuvre {
@@ -130,7 +130,7 @@ impl Bench {
         let time = Time::from_ms(40) * self.scans;
         let scene = Scene { time, road: &road, environment: &Environment::CLEAR_DAY, ego, others: &others };
         let mut truths = Vec::new();
-        survey(&scene, &mut truths).unwrap();
+        transform_scene(&scene, &mut truths).unwrap();
         let mut detections = Vec::new();
         let closing_mps = others.first().map_or(0.0, |other| (other.state.speed_mps - ego.state.speed_mps).abs());
         let left = (-PERIOD_S / SLOW_TIME_S - closing_mps * PERIOD_S / SLOW_WAY_M).exp();

@@ -103,7 +103,7 @@ impl Tracker {
         let elapsed_s = (scan.time - self.time).s();
         self.time = scan.time;
         let frame = EgoFrame::new(scan.road, &scan.ego);
-        let ego_mps = scan.ego.speed_mps * scan.ego.heading_rad.cos() / frame.stretch(scan.ego.d_m);
+        let ego_mps = scan.ego.speed_mps * scan.ego.heading_rad.cos() / frame.path_scale(scan.ego.d_m);
         let ego = EgoRear {
             s_m: scan.ego.s_m + scan.view.sensor_x_m,
             d_m: scan.ego.d_m,
@@ -211,7 +211,7 @@ impl Tracker {
 /// length behind it. The covariance along the road is that of the face, which gaps are made of.
 fn reported(track: &Tracked, [along, across]: [AxisEstimate; 2], frame: &EgoFrame<'_>, time: Time) -> Track {
     let (length_m, width_m) = track.size_m();
-    let back_m = 0.5 * length_m / frame.stretch(across.position_m);
+    let back_m = 0.5 * length_m / frame.path_scale(across.position_m);
     let centre = AxisEstimate { position_m: along.position_m - back_m, ..along };
     let estimate = in_ego_frame(&[centre, across], frame);
     Track {
