@@ -14,7 +14,7 @@ use std::collections::VecDeque;
 use closecall_traffic::{Road, Stream, Time, Track, VehicleState};
 
 use crate::lidar::{Lidar, RearLidar};
-use crate::object::{DEGRADED_SHARE, NoiseKey, ObjectSensor, ObjectSensorModel, ScanView, range_in_weather_m};
+use crate::object::{DEGRADED_SHARE, NoiseKey, ObjectSensor, ObjectSensorModel, ScanInput, range_in_weather_m};
 use crate::perception::FieldOfView;
 use crate::surroundings::{OtherVehicle, transform_scene};
 use crate::tracking::{RearView, TrackList, Tracker, TrackerModel, TrackerScan};
@@ -157,9 +157,9 @@ impl Perception for FullPerception {
     fn step(&mut self, scene: &Scene<'_>) -> Result<&[Track], SensorError> {
         let frame = transform_scene(scene, &mut self.others)?;
         self.list.tracks.clear();
-        let view = ScanView { scene, frame: &frame, others: &self.others };
-        self.front.scan(&view, &mut self.list);
-        self.surround.scan(&view, &mut self.list);
+        let input = ScanInput { scene, frame: &frame, others: &self.others };
+        self.front.scan(&input, &mut self.list);
+        self.surround.scan(&input, &mut self.list);
         self.detect(scene)?;
         self.update_tracker(-0.5 * scene.ego.vehicle.dimensions.length_m);
         self.tracker.report(scene.time, &frame, &mut self.list);
