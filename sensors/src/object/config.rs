@@ -14,14 +14,11 @@
 //! | `latency-s` | 0.08 (a) | 0.04 | 0.08 |
 //! | `dropout` | 0.02 | 0.02 | 0.05 |
 //!
-//! - (a) Of the order of long-range radars such as Continental's ARS 408-21, with its 72 ms cycle; the half-angle is
-//!   that
+//! - (a) Of the order of long-range radars such as Continental's ARS 408-21, with its 72 ms cycle; the half-angle is that
 //!   of its near scan.
-//! - (b) Autoliv's 24 GHz short-range module NB24G1V2 (user's manual, blind spot mode): 0.5 to 14 m, error ±0.2 m,
-//!   taken
+//! - (b) Autoliv's 24 GHz short-range module NB24G1V2 (user's manual, blind spot mode): 0.5 to 14 m, error ±0.2 m, taken
 //!   as two standard deviations.
-//! - (c) This sensor replaces the rear LiDAR with its tracker. The field of view is Valeo SCALA Gen 2's; the range is
-//!   the
+//! - (c) This sensor replaces the rear LiDAR with its tracker. The field of view is Valeo SCALA Gen 2's. The range is the
 //!   one at which a usual car is confirmed.
 //!
 //! All other values are assumptions.
@@ -234,7 +231,7 @@ impl ObjectSensorConfig {
             confirm_window: window.into(),
             // The first scan after the coasting time deletes the track.
             #[expect(clippy::cast_possible_truncation, reason = "10 s of coasting are 250 scans")]
-            lost_after: coast_steps as u32 + 1,
+            delete_after_misses: coast_steps as u32 + 1,
             // The limit below 1 keeps a single miss from making existence impossible for a sensor without dropouts.
             detection_probability: (1.0 - dropout).min(0.99),
             clutter_probability: CLUTTER_PROBABILITY,

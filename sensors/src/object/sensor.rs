@@ -20,7 +20,9 @@ use crate::surroundings::OtherVehicle;
 use crate::tracking::TrackList;
 use crate::tracking::axis::{AxisEstimate, AxisFilter, AxisMeasurement};
 use crate::tracking::lifecycle::Lifecycle;
-use crate::tracking::motion::{ACROSS, ACROSS_WHITE, ALONG, ALONG_WHITE, Behind, EgoRear, Mode, Situation};
+use crate::tracking::motion::{
+    ACROSS_MODES, ACROSS_WHITE_MODE, ALONG_MODES, ALONG_WHITE_MODE, EgoRear, Mode, RearVehicle, Situation,
+};
 use crate::tracking::road_filter::in_ego_frame;
 use crate::{Health, SCAN_PERIOD, Scene};
 
@@ -105,8 +107,8 @@ impl ObjectSensor {
         // One mode is enough for the radar, which measures speed, and for the surround sensors, which see a vehicle
         // only for a short time.
         let modes = match direction {
-            Direction::Behind => [ALONG, ACROSS],
-            Direction::Ahead | Direction::Around => [ALONG_WHITE, ACROSS_WHITE],
+            Direction::Behind => [ALONG_MODES, ACROSS_MODES],
+            Direction::Ahead | Direction::Around => [ALONG_WHITE_MODE, ACROSS_WHITE_MODE],
         };
         Self {
             model,
@@ -191,9 +193,10 @@ impl ObjectSensor {
         let (model, target) = (&self.model, &mut self.targets[index]);
         if let Some((_, _, [along, across])) = &mut target.filters {
             // The filter estimates the position of the vehicle's centre.
-            let AxisEstimate { position_m, speed_mps, .. } = along.now();
+            let AxisEstimate { position_m, speed_mps, .. } = along.estimate();
             let front_s_m = position_m + 0.5 * other.length_m + speed_mps * SCAN_PERIOD.s();
-            let situation = Situation::of(&Behind { front_s_m, d_m: across.now().position_m, speed_mps }, ego);
+            let situation =
+                Situation::of(&RearVehicle { front_s_m, d_m: across.estimate().position_m, speed_mps }, ego);
             for axis in [along, across] {
                 axis.predict(SCAN_PERIOD.s(), model.drift_decay, situation);
             }
@@ -214,22 +217,22 @@ impl ObjectSensor {
                     position_m: measured_m[road_axis],
                     white_sd_m: model.white_sd_m[road_axis],
                     slow_sd_m: model.drift_sd_m,
-                    lever_s: 0.0,
+                    time_offset_s: 0.0,
                 });
             }
             if let Some(sd_mps) = model.speed_sd_mps {
                 along.measure_speed(other.road_mps[0] + errors.speed_mps, sd_mps);
             }
             if !is_new {
-                lifecycle.hit(&model.rules, along.now().speed_m2ps2.sqrt() <= SETTLED_SPEED_SD_MPS);
+                lifecycle.hit(&model.rules, along.estimate().speed_variance_m2ps2.sqrt() <= SETTLED_SPEED_SD_MPS);
             }
         } else if let Some((_, lifecycle, _)) = &mut target.filters {
             if in_view {
                 lifecycle.miss(&model.rules)
             } else {
-                lifecycle.unseen()
+                lifecycle.skip()
             }
-            if lifecycle.is_dead(&model.rules) {
+            if lifecycle.should_delete(&model.rules) {
                 target.filters = None;
             }
         }
@@ -243,8 +246,8 @@ impl ObjectSensor {
         target.reports[self.step % length] = target.filters.map(|(id, lifecycle, [along, across])| Report {
             id,
             lifecycle,
-            along: along.ahead(latency_s),
-            across: across.ahead(latency_s),
+            along: along.predicted(latency_s),
+            across: across.predicted(latency_s),
         });
         // The entry is still `None` before the first report is due.
         let due = target.reports[(self.step + length - self.model.latency_steps) % length];
@@ -269,7 +272,7 @@ impl ObjectSensor {
             width_m: other.width_m,
             class: class_scores(other.class, self.model.class_confidence),
             existence: report.lifecycle.existence(),
-            lane: input.frame.lane_probabilities(across.position_m, across.position_m2.sqrt()),
+            lane: input.frame.lane_probabilities(across.position_m, across.position_variance_m2.sqrt()),
         }
     }
 }

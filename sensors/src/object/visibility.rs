@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!        sensor at the bumper ▷ ─ ─ ─ ─ ─ ─ ─ ─ high ▕▔▔▔▏
-//!                              `─ ─ ─ ─ ─ ─ ─ ─ low  ▕▁▁▁▏   a box covers the slopes low … high beyond the distance `near_m`
+//!                              `─ ─ ─ ─ ─ ─ ─ ─ low  ▕▁▁▁▏   a box covers the slopes low … high from `near_m` on
 //! ```
 //!
 //! A slope is the distance to the left divided by the distance outward. Slopes order directions as angles do, without
