@@ -1,8 +1,13 @@
 //! The errors of one sensor's measurements of one vehicle: white noise, a slow drift, and lost measurements.
 //!
-//! The drift is a first-order Gauss–Markov process with the standard deviation σ and the correlation time τ, bₖ₊₁ =
-//! φ·bₖ + σ·√(1 − φ²)·w with φ = exp(−Δt/τ) (Gelb, *Applied Optimal Estimation*, 1974). It models a radar's centre of
-//! reflection, which wanders over the vehicle's body instead of jumping from scan to scan.
+//! The drift is a first-order Gauss–Markov process with the standard deviation σ and the correlation time τ (Gelb,
+//! *Applied Optimal Estimation*, 1974):
+//!
+//! ```text
+//!   bₖ₊₁ = φ·bₖ + σ·√(1 − φ²)·w        φ = exp(−Δt/τ), w: standard normal
+//! ```
+//!
+//! It models a radar's centre of reflection, which wanders over the vehicle's body instead of jumping from scan to scan.
 //!
 //! Every step draws the same number of random values, whether the vehicle is seen or not. Two runs that differ only in
 //! the ego's behaviour (with and without MIS) therefore have the same errors at the same times.
