@@ -60,8 +60,8 @@ pub(super) struct Visibility {
 }
 
 impl Visibility {
-    /// Computes the silhouettes of all vehicles as seen from a sensor of the ego, whose size is `ego_m` (length,
-    /// width).
+    /// Computes the silhouettes of all vehicles as seen from a sensor of the ego, whose size is `ego_size_m`
+    /// (length, width).
     pub(super) fn update(&mut self, direction: Direction, others: &[OtherVehicle], ego_size_m: [f64; 2]) {
         self.silhouettes.clear();
         let outward = match direction {

@@ -11,8 +11,8 @@ use closecall_traffic::TrackStatus;
 /// Maximum number of scans in the confirmation window.
 pub(crate) const MAX_WINDOW: u8 = 16;
 
-/// Maximum absolute value of the log-odds (an existence probability of 0.9999), so that misses can still end a track
-/// that was detected a thousand times.
+/// Maximum absolute value of the log-odds (an existence probability of 0.9999), so that misses can still lower it
+/// for a track that was detected a thousand times.
 const MAX_LOG_ODDS: f64 = 9.2;
 
 /// Log-odds of existence before the first detection: even odds.

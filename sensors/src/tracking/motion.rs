@@ -8,7 +8,7 @@
 //!
 //! | axis | mode | acceleration | mean duration |
 //! |---|---|---|---|
-//! | along | holds its speed | 0.2 m/s² for 6.5 s: the unsteady accelerator pedal of free driving (Herman et al. 1959: 0.1 m/s² and more) | 33 s |
+//! | along | holds its speed | 0.2 m/s² for 6.5 s: unsteady pedal control in free driving (Herman et al. 1959: 0.1 m/s² and more) | 33 s |
 //! | along | drives | 0.8 m/s² for 1 s: accelerating and coasting in traffic | 4 s |
 //! | along | brakes | 4 m/s² for 1.5 s: up to emergency braking | 2 s |
 //! | across | keeps its lane | 0.215 m/s² for 0.2 s, and the lateral speed decays within a second: weaving with 0.1 m/s, as for an SDLP of 0.2 m | 60 s |

@@ -10,8 +10,9 @@ use super::motion::{ACROSS_MODES, ALONG_MODES, EgoRear, RearVehicle, Situation};
 use crate::ego_frame::EgoFrame;
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
-/// Prior standard deviation of a vehicle's speed, whose prior mean is the ego's speed (m/s). A parked vehicle is at 3
-/// σ.
+/// Prior standard deviation of a vehicle's speed, whose prior mean is the ego's speed (m/s).
+///
+/// It is wide enough for a parked vehicle, which is at 3 σ.
 const SPEED_PRIOR_SD_MPS: f64 = 10.0;
 /// Prior standard deviation of a vehicle's speed across the road (m/s).
 const LATERAL_SPEED_PRIOR_SD_MPS: f64 = 0.7;

@@ -24,7 +24,7 @@ pub(super) struct Face {
     high_slope: f64,
 }
 
-/// Share of a face's width that a nearer face must exceed to hide it.
+/// Share of a face's width; a nearer face that covers more than this share hides the face.
 const HIDDEN_SHARE: f64 = 0.5;
 
 /// Least distance from the sensor's plane (m). Nearer faces are alongside the ego and out of view.
