@@ -78,7 +78,7 @@ struct Bench {
     others: Vec<SceneVehicle>,
     scans: i64,
     rng: Stream,
-    /// Slow error of the detected face along and across the line of sight (m).
+    /// Slow error of the detected face: ahead along the vehicle, and across the line of sight (m).
     slow_m: [f64; 2],
     /// Motion of the manoeuvring vehicles along and across the road.
     motion: [Motion; 2],
@@ -214,7 +214,7 @@ fn a_track_keeps_its_id_through_a_lane_change() {
             bench.others[0].state.heading_rad = (lateral_mps / 32.0).atan();
             bench.advance(false);
             let tracks = bench.scan(|_| true);
-            assert_eq!((tracks.len(), tracks[0].id), (1, id), "{step} of run {sample}");
+            assert_eq!((tracks.len(), tracks[0].id), (1, id), "scan {step} of run {sample}");
         }
         assert!(bench.list.tracks[0].lane[0] > 0.99, "{:?}", bench.list.tracks[0].lane);
         sum += bench.audit.mean_nees().unwrap();
