@@ -125,16 +125,16 @@ impl Driver for IdmDriver {
         let speed_mps = input.own.speed_mps;
         let long_term_mps = *self.desired_mps.get_or_insert_with(|| default_desired_mps(input));
         let desired_mps = input.desired_now_mps(long_term_mps);
-        let wanted = if let Some(reaction) = self.model.reaction {
+        let requested_mps2 = if let Some(reaction) = self.model.reaction {
             let new = || Perception::new(reaction.draw_s(rng), None).with_lapses(self.model.lapse);
             let ahead = self.perception.get_or_insert_with(new).observe(input, rng).ahead;
-            let wanted =
+            let requested_mps2 =
                 self.model.acceleration_mps2(speed_mps, desired_mps, ahead.as_ref().map(|vehicle| &vehicle.lead));
-            brake_for_brake_light(wanted, speed_mps, ahead.as_ref())
+            brake_for_brake_light(requested_mps2, speed_mps, ahead.as_ref())
         } else {
             self.model.acceleration_mps2(speed_mps, desired_mps, nearest_lead(input).as_ref())
         };
-        let acceleration_mps2 = finite(wanted, "acceleration of a follower", input.time)?;
+        let acceleration_mps2 = finite(requested_mps2, "acceleration of a follower", input.time)?;
         Ok(DriverAction {
             acceleration_mps2,
             note: self.emergency.detect(acceleration_mps2),

@@ -87,8 +87,10 @@ impl PrescribedConfig {
             }
             (None, Some(pairs), None) => {
                 let steps = check_pairs(pairs, "acceleration-profile", &ACCELERATION, parameters)?;
-                let steps =
-                    steps.into_iter().map(|(from_s, rate_mps2)| AccelerationStep { from_s, rate_mps2 }).collect();
+                let steps = steps
+                    .into_iter()
+                    .map(|(from_s, acceleration_mps2)| AccelerationStep { from_s, acceleration_mps2 })
+                    .collect();
                 Ok(Points::Accelerations(steps))
             }
             (None, None, Some(_)) => {

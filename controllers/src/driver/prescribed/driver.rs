@@ -38,9 +38,9 @@ impl Driver for PrescribedDriver {
         let own_mps = finite(input.own.speed_mps, "own speed", input.time)?;
         let speeds = self.speeds.get_or_insert_with(|| self.profile.speeds_from(own_mps));
         let (speed_mps, slope_mps2) = speeds.at(input.time.s());
-        let desired_mps2 = slope_mps2 + SPEED_GAIN_PER_S * (speed_mps - own_mps);
-        let desired_mps2 = finite(desired_mps2, "acceleration of a profile", input.time)?;
-        let acceleration_mps2 = desired_mps2.clamp(-MAX_BRAKING_MPS2, MAX_ACCELERATION_MPS2);
+        let requested_mps2 = slope_mps2 + SPEED_GAIN_PER_S * (speed_mps - own_mps);
+        let requested_mps2 = finite(requested_mps2, "acceleration of a profile", input.time)?;
+        let acceleration_mps2 = requested_mps2.clamp(-MAX_BRAKING_MPS2, MAX_ACCELERATION_MPS2);
         let lane_change = self.lane_change(input);
         let is_changing = lane_change.is_some() || input.changing_to.is_some();
         Ok(DriverAction {

@@ -4,7 +4,7 @@
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct AccelerationStep {
     pub(super) from_s: f64,
-    pub(super) rate_mps2: f64,
+    pub(super) acceleration_mps2: f64,
 }
 
 /// A speed profile: at least one point, with times that do not decrease.
@@ -29,11 +29,12 @@ impl SpeedProfile {
             if step.from_s > time_s {
                 points.push((step.from_s, speed_mps));
             }
-            let limit_mps = if step.rate_mps2 < 0.0 { 0.0 } else { max_mps.max(speed_mps) };
-            let until_limit_s = if step.rate_mps2 == 0.0 { 0.0 } else { (limit_mps - speed_mps) / step.rate_mps2 };
+            let limit_mps = if step.acceleration_mps2 < 0.0 { 0.0 } else { max_mps.max(speed_mps) };
+            let until_limit_s =
+                if step.acceleration_mps2 == 0.0 { 0.0 } else { (limit_mps - speed_mps) / step.acceleration_mps2 };
             let next_s = steps.get(index + 1).map_or(f64::INFINITY, |next| next.from_s);
             let duration_s = until_limit_s.min(next_s - step.from_s);
-            points.push((step.from_s + duration_s, speed_mps + step.rate_mps2 * duration_s));
+            points.push((step.from_s + duration_s, speed_mps + step.acceleration_mps2 * duration_s));
         }
         Self { points }
     }
@@ -66,7 +67,7 @@ mod tests {
 
     #[test]
     fn accelerations_are_integrated_between_standstill_and_the_maximum_speed() {
-        let step = |from_s, rate_mps2| AccelerationStep { from_s, rate_mps2 };
+        let step = |from_s, acceleration_mps2| AccelerationStep { from_s, acceleration_mps2 };
         let steps = [step(1.0, -5.0), step(3.0, 0.0), step(4.0, 2.5), step(6.0, -10.0), step(20.0, 1.0)];
         let profile = SpeedProfile::integrated(30.0, &steps, 22.0);
         let expected =
