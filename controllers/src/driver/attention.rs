@@ -1,8 +1,9 @@
 //! Lapses of attention: a driver who looks away observes nothing new, and assumes that traffic continues unchanged.
 //!
-//! Glances away from the road of more than 2 s double the risk of a crash (Klauer et al., *The Impact of Driver Inattention
-//! on Near-Crash/Crash Risk*, DOT HS 810 594, 2006). A lapse does not depend on the traffic: it begins at a time that the
-//! scenario gives, or at random times with a given mean interval, drawn from the driver's own random stream.
+//! Glances away from the road of more than 2 s double the risk of a crash (Klauer et al., *The Impact of Driver
+//! Inattention on Near-Crash/Crash Risk*, DOT HS 810 594, 2006). A lapse does not depend on the traffic: it begins at a
+//! time that the scenario gives, or at random times with a given mean interval, drawn from the driver's own random
+//! stream.
 
 use closecall_traffic::{Check, ConfigError, Num, Parameters, Problem, Range, Stream, Time};
 use rand::RngExt;

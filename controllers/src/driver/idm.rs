@@ -5,8 +5,9 @@
 //!
 //! a = A·(1 − (v/v₀)⁴ − (s*/g)²) with s* = s₀ + max(0, v·T + v·(v − v_l)/(2·√(A·B)))
 //!
-//! Here v is the own speed, v₀ the desired speed, v_l the speed of the lead vehicle and g the gap; [`IdmConfig`] defines the
-//! parameters. Above v₀, the free term brakes with B at most; the published term grows with the fourth power of the speed.
+//! Here v is the own speed, v₀ the desired speed, v_l the speed of the lead vehicle and g the gap; [`IdmConfig`]
+//! defines the parameters. Above v₀, the free term brakes with B at most; the published term grows with the fourth
+//! power of the speed.
 
 use closecall_traffic::{Check, ConfigError, Num, Parameters, Range, Stream};
 use schemars::JsonSchema;

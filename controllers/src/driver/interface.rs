@@ -1,7 +1,7 @@
 //! The interface between human drivers and the simulation loop.
 //!
-//! The loop gives a driver the true state of the surrounding vehicles. The driver itself models how a human perceives that
-//! state: with a delay and imprecisely.
+//! The loop gives a driver the true state of the surrounding vehicles. The driver itself models how a human perceives
+//! that state: with a delay and imprecisely.
 
 use closecall_traffic::{Indicator, Lane, Road, Stream, Time, Vehicle, VehicleClass, VehicleState};
 
@@ -50,8 +50,8 @@ pub struct Neighbours {
     pub left: Option<LaneNeighbours>,
     /// In the lane to the right; `None` if there is no such lane.
     pub right: Option<LaneNeighbours>,
-    /// The nearest vehicle ahead in any lane whose box overlaps the driver's vehicle laterally: driving straight on would hit
-    /// it.
+    /// The nearest vehicle ahead in any lane whose box overlaps the driver's vehicle laterally: driving straight on
+    /// would hit it.
     pub in_path: Option<Neighbour>,
 }
 
@@ -77,8 +77,8 @@ pub struct DriverInput<'a> {
 }
 
 impl DriverInput<'_> {
-    /// Returns the present desired speed of a driver with the long-term desired speed `long_term_mps` (m/s). It is at least
-    /// half of the long-term one.
+    /// Returns the present desired speed of a driver with the long-term desired speed `long_term_mps` (m/s). It is at
+    /// least half of the long-term one.
     pub(crate) fn desired_now_mps(&self, long_term_mps: f64) -> f64 {
         (long_term_mps + self.desired_speed_offset_mps).max(0.5 * long_term_mps)
     }

@@ -1,8 +1,8 @@
 //! Human driver models.
 //!
-//! The drivers that follow have the same three layers: *perception* (the true state of traffic, delayed and imprecise), a
-//! car-following *model*, which is a pure algorithm that can be tested alone, and a *driver*, which adapts the two to the
-//! simulation loop.
+//! The drivers that follow have the same three layers: *perception* (the true state of traffic, delayed and imprecise),
+//! a car-following *model*, which is a pure algorithm that can be tested alone, and a *driver*, which adapts the two to
+//! the simulation loop.
 
 mod attention;
 mod idm;

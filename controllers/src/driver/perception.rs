@@ -9,12 +9,13 @@
 //!   delay: they know their own motion at once, and assume that other vehicles continue as perceived (temporal
 //!   anticipation; Treiber, Kesting and Helbing, *Delays, inaccuracies and anticipation in microscopic traffic models*,
 //!   Physica A 360 (2006) 71–88). Only a change in the motion of another vehicle is perceived late.
-//! - *Looming threshold.* A driver notices a speed difference only if the visual angle of the vehicle ahead changes faster
-//!   than 0.003 rad/s (Hoffmann and Mortimer, *Scaling of relative velocity between vehicles*, Accident Analysis and
-//!   Prevention 28 (1996) 415–421). Below that threshold, the driver assumes that the vehicle ahead keeps its speed; the
-//!   first assumption is the driver's own speed. The driver always knows the effect of the own accelerator and brake. Once
-//!   noticed, the difference is attended to until it falls below 0.0006 rad/s, the mean threshold of drivers who attend to
-//!   it (Michaels, *Perceptual factors in car following*, Proc. 2nd Int. Symp. on the Theory of Road Traffic Flow, 1963).
+//! - *Looming threshold.* A driver notices a speed difference only if the visual angle of the vehicle ahead changes
+//!   faster than 0.003 rad/s (Hoffmann and Mortimer, *Scaling of relative velocity between vehicles*, Accident Analysis
+//!   and Prevention 28 (1996) 415–421). Below that threshold, the driver assumes that the vehicle ahead keeps its
+//!   speed; the first assumption is the driver's own speed. The driver always knows the effect of the own accelerator
+//!   and brake. Once noticed, the difference is attended to until it falls below 0.0006 rad/s, the mean threshold of
+//!   drivers who attend to it (Michaels, *Perceptual factors in car following*, Proc. 2nd Int. Symp. on the Theory of
+//!   Road Traffic Flow, 1963).
 //! - *Brake light.* The brake light is perceived with the same delay as everything else. The deceleration itself is
 //!   perceived only gradually, from the change of speed. Until then, a driver who sees the brake light go on assumes a
 //!   moderate deceleration.
@@ -28,7 +29,8 @@ use super::{DriverInput, LaneNeighbours, Lead, Neighbour};
 /// Slowest change of the visual angle that a driver notices (rad/s) (Hoffmann and Mortimer 1996).
 const LOOMING_THRESHOLD_RADPS: f64 = 0.003;
 
-/// Slowest change of the visual angle that is still noticed by a driver who already attends to it (rad/s) (Michaels 1963).
+/// Slowest change of the visual angle that is still noticed by a driver who already attends to it (rad/s) (Michaels
+/// 1963).
 const ATTENDED_THRESHOLD_RADPS: f64 = 0.0006;
 
 /// Time constant of the low-pass filter with which a deceleration is perceived from the change of speed (s).
@@ -152,8 +154,8 @@ struct AccelerationEstimate {
 }
 
 impl Perception {
-    /// Creates the perception of a driver with the reaction time `reaction_s` (s). `side` is the side whose adjacent lane
-    /// the driver observes, if any.
+    /// Creates the perception of a driver with the reaction time `reaction_s` (s). `side` is the side whose adjacent
+    /// lane the driver observes, if any.
     pub(crate) fn new(reaction_s: f64, side: Option<Side>) -> Self {
         Self {
             reaction: Time::from_s(reaction_s),
@@ -330,15 +332,15 @@ impl ObservedVehicle {
         }
     }
 
-    /// Rate at which the vehicle's visual angle grows or shrinks, observed from a vehicle at `own_mps` (rad/s). Infinite at a
-    /// gap of zero.
+    /// Rate at which the vehicle's visual angle grows or shrinks, observed from a vehicle at `own_mps` (rad/s).
+    /// Infinite at a gap of zero.
     fn visual_angle_rate_radps(&self, own_mps: f64) -> f64 {
         self.width_m * (self.speed_mps - own_mps).abs() / (self.gap_m * self.gap_m)
     }
 }
 
-/// Displacement over `time_s` due to an acceleration, relative to motion at constant speed (m). A braking vehicle stops at
-/// standstill; it does not roll backwards.
+/// Displacement over `time_s` due to an acceleration, relative to motion at constant speed (m). A braking vehicle stops
+/// at standstill; it does not roll backwards.
 fn accelerated_displacement_m(speed_mps: f64, acceleration_mps2: f64, time_s: f64) -> f64 {
     if speed_mps + acceleration_mps2 * time_s >= 0.0 {
         0.5 * acceleration_mps2 * time_s * time_s
@@ -355,8 +357,8 @@ struct Extrapolation {
 }
 
 impl Extrapolation {
-    /// Perceived speed of a vehicle in the adjacent lane (m/s): its own, or the driver's if no difference is noticed. The
-    /// driver looks there too briefly to attend to a difference.
+    /// Perceived speed of a vehicle in the adjacent lane (m/s): its own, or the driver's if no difference is noticed.
+    /// The driver looks there too briefly to attend to a difference.
     fn adjacent_speed_mps(&self, observed: &ObservedVehicle) -> f64 {
         let notices = observed.visual_angle_rate_radps(self.own_speed_then_mps) >= LOOMING_THRESHOLD_RADPS;
         if notices { observed.speed_mps } else { self.own_speed_then_mps }

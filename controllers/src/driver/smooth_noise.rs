@@ -1,14 +1,14 @@
-//! Coloured noise with zero mean, as smooth as human steering and acceleration: white noise filtered by three first-order
-//! lags.
+//! Coloured noise with zero mean, as smooth as human steering and acceleration: white noise filtered by three
+//! first-order lags.
 //!
 //! ```text
 //!  white noise ─▶ 1/(1 + s·T₁) ─▶ 1/(1 + s·T₂) ─▶ 1/(1 + s·T₃) ─▶ value with two continuous derivatives
 //! ```
 //!
-//! Value, first and second derivative together form a Markov process with the state matrix A. They are sampled at knots a
-//! time h apart, with the exact transition Φ = exp(A·h) and covariance Q = P − Φ·P·Φᵀ, where P is the stationary covariance
-//! (Maybeck, *Stochastic Models, Estimation, and Control*, vol. 1, 1979, ch. 4). A quintic polynomial interpolates between
-//! two knots; it meets value and derivatives at both.
+//! Value, first and second derivative together form a Markov process with the state matrix A. They are sampled at knots
+//! a time h apart, with the exact transition Φ = exp(A·h) and covariance Q = P − Φ·P·Φᵀ, where P is the stationary
+//! covariance (Maybeck, *Stochastic Models, Estimation, and Control*, vol. 1, 1979, ch. 4). A quintic polynomial
+//! interpolates between two knots; it meets value and derivatives at both.
 
 use closecall_traffic::{Quintic, Stream};
 use nalgebra::{Matrix3, Vector3};
@@ -102,8 +102,8 @@ fn stationary_covariance(lags_s: [f64; 3]) -> Matrix3<f64> {
     Matrix3::new(1.0, 0.0, -first, 0.0, first, 0.0, -first, 0.0, second)
 }
 
-/// Returns the lower triangular L with L·Lᵀ = `covariance`. If the covariance is not positive definite, L is NaN, which the
-/// check of the driver's input refuses.
+/// Returns the lower triangular L with L·Lᵀ = `covariance`. If the covariance is not positive definite, L is NaN, which
+/// the check of the driver's input refuses.
 fn lower_triangle(covariance: &Matrix3<f64>) -> Matrix3<f64> {
     covariance.cholesky().map_or_else(|| Matrix3::repeat(f64::NAN), |cholesky| cholesky.l())
 }
@@ -131,8 +131,8 @@ mod tests {
             squares.iter_mut().zip(now).for_each(|(sum, value)| *sum += value * value / f64::from(steps));
         }
         let expected = 0.2 * 0.2 * stationary_covariance(LAGS_S).diagonal();
-        // 40,000 s are some 10,000 times the longest lag: the sample variance is accurate to 3 %. Between the knots, the
-        // second derivative of the quintic varies slightly less than that of the noise.
+        // 40,000 s are some 10,000 times the longest lag: the sample variance is accurate to 3 %. Between the knots,
+        // the second derivative of the quintic varies slightly less than that of the noise.
         assert!((squares[0] / expected[0] - 1.0).abs() < 0.05, "{squares:?} {expected}");
         assert!((squares[1] / expected[1] - 1.0).abs() < 0.05, "{squares:?} {expected}");
         assert!((0.8..1.05).contains(&(squares[2] / expected[2])), "{squares:?} {expected}");

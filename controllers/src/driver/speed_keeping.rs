@@ -1,9 +1,10 @@
 //! Human speed keeping: the desired speed fluctuates around its long-term value.
 //!
-//! Herman, Montroll, Potts and Rothery (*Traffic Dynamics: Analysis of Stability in Car Following*, Operations Research 7
-//! (1959) 86–106) measured the standard deviation of the acceleration of free drivers, "acceleration noise", as about
-//! 0.1 m/s² on a good road. Here the desired speed is white noise filtered by three lags. The longest lag stands for a driver
-//! who checks the speedometer only occasionally. The driver model decides how closely the vehicle follows the desired speed.
+//! Herman, Montroll, Potts and Rothery (*Traffic Dynamics: Analysis of Stability in Car Following*, Operations Research
+//! 7 (1959) 86–106) measured the standard deviation of the acceleration of free drivers, "acceleration noise", as about
+//! 0.1 m/s² on a good road. Here the desired speed is white noise filtered by three lags. The longest lag stands for a
+//! driver who checks the speedometer only occasionally. The driver model decides how closely the vehicle follows the
+//! desired speed.
 
 use closecall_traffic::{Check, ConfigError, Num, Parameters, Range, Stream, Time};
 use schemars::JsonSchema;
@@ -47,8 +48,8 @@ impl SpeedKeeping {
     }
 }
 
-/// Generates the fluctuation of one driver's desired speed during a run. It starts at zero, because the scenario gives the
-/// initial speeds.
+/// Generates the fluctuation of one driver's desired speed during a run. It starts at zero, because the scenario gives
+/// the initial speeds.
 #[derive(Clone, Debug)]
 pub struct Wander {
     noise: SmoothNoise,

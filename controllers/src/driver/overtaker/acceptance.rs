@@ -8,11 +8,12 @@ const MIN_FOLLOWER_GAP_M: f64 = 3.0;
 /// Time headway left to a follower in the passing lane (s).
 const FOLLOWER_HEADWAY_S: f64 = 0.3;
 
-/// Speed by which a lead vehicle in the passing lane must exceed that of the overtaken vehicle to be worth following (m/s).
+/// Speed by which a lead vehicle in the passing lane must exceed that of the overtaken vehicle to be worth following
+/// (m/s).
 const MIN_GAIN_MPS: f64 = 1.0;
 
-/// Share of the accepted own braking. A slow lead vehicle in the passing lane that requires less braking is too far ahead to
-/// matter.
+/// Share of the accepted own braking. A slow lead vehicle in the passing lane that requires less braking is too far
+/// ahead to matter.
 const IRRELEVANT_LEAD_BRAKING_SHARE: f64 = 0.25;
 
 /// Braking that an overtaking driver accepts, of itself and of the follower in the adjacent lane.
@@ -27,8 +28,9 @@ pub(super) struct Tolerance {
 }
 
 impl Tolerance {
-    /// Tolerance for pulling out. A follower need not brake by more than 2 m/s² (the safety criterion of MOBIL: Kesting,
-    /// Treiber and Helbing, Transportation Research Record 1999 (2007) 86–94, with half of its limit of 4 m/s²).
+    /// Tolerance for pulling out. A follower need not brake by more than 2 m/s² (the safety criterion of MOBIL:
+    /// Kesting, Treiber and Helbing, Transportation Research Record 1999 (2007) 86–94, with half of its limit of 4
+    /// m/s²).
     pub(super) const TO_START: Self =
         Self { own_mps2: 1.0, follower_mps2: 2.0, follower_headway_s: FOLLOWER_HEADWAY_S };
     /// Tolerance for continuing after pulling out: MOBIL's limit itself.
@@ -72,8 +74,8 @@ impl GapAcceptance {
         room_m > 0.0 && closing_mps * closing_mps <= 2.0 * room_m * self.tolerance.own_mps2
     }
 
-    /// Returns true if the change gains speed: the lead vehicle in the lane is faster than the vehicle to overtake, or so far
-    /// ahead that it does not matter.
+    /// Returns true if the change gains speed: the lead vehicle in the lane is faster than the vehicle to overtake, or
+    /// so far ahead that it does not matter.
     fn gains_speed(&self, vehicle: &PerceivedVehicle) -> bool {
         let (room_m, closing_mps) = self.room_and_closing(vehicle);
         vehicle.lead.speed_mps >= self.overtaken_mps + MIN_GAIN_MPS

@@ -15,9 +15,10 @@ const DEFAULT_DURATION_S: f64 = 6.8;
 
 /// Default lateral acceleration that a driver accepts in evasive steering, to be clear earlier (m/s²).
 ///
-/// In an emergency, drivers brake far more than they steer, and use little of the lateral grip (Adams, *Review of the literature
-/// on obstacle avoidance maneuvers: braking versus steering*, UMTRI-94-19, 1994). The value is chosen on tuning seeds: without a margin increase
-/// system, the encounter ends in a collision in 37 % of the samples with 0, in 23 % with 1, and in 10 % with 2.
+/// In an emergency, drivers brake far more than they steer, and use little of the lateral grip (Adams, *Review of the
+/// literature on obstacle avoidance maneuvers: braking versus steering*, UMTRI-94-19, 1994). The value is chosen on
+/// tuning seeds: without a margin increase system, the encounter ends in a collision in 37 % of the samples with 0, in
+/// 23 % with 1, and in 10 % with 2.
 const DEFAULT_EVASIVE_LATERAL_MPS2: f64 = 1.0;
 
 /// Car-following model of an overtaking driver.
@@ -34,15 +35,15 @@ pub enum FollowConfig {
 pub struct OvertakerConfig {
     /// Time headway to the vehicle ahead when the centre of the driver's vehicle crosses the lane marking (s).
     pub cut_out_thw_s: Num,
-    /// Car-following model while the driver cannot overtake. Its safe gap is also the smallest gap that the driver accepts
-    /// while pulling out.
+    /// Car-following model while the driver cannot overtake. Its safe gap is also the smallest gap that the driver
+    /// accepts while pulling out.
     pub follow: FollowConfig,
     /// Reaction time (s).
     pub reaction_s: ReactionConfig,
     /// Duration of the whole lane change (s). Default: 6.8.
     pub lane_change_duration_s: Option<Num>,
-    /// Lateral acceleration accepted in evasive steering, to be clear earlier than planned (m/s²). Default: 1. With 0, the
-    /// driver only brakes.
+    /// Lateral acceleration accepted in evasive steering, to be clear earlier than planned (m/s²). Default: 1. With 0,
+    /// the driver only brakes.
     pub evasive_lateral_mps2: Option<Num>,
     /// Lapses of attention. Default: none.
     pub lapse: Option<LapseConfig>,
@@ -66,8 +67,8 @@ impl Overtaker {
     /// Checks that a driver who follows a vehicle at `speed_mps` comes close enough to reach the cut-out time headway.
     ///
     /// # Errors
-    /// Returns a [`ConfigError`] that names the key if the safe gap cc0 + cc1·v exceeds the gap of the cut-out time headway at
-    /// this speed.
+    /// Returns a [`ConfigError`] that names the key if the safe gap cc0 + cc1·v exceeds the gap of the cut-out time
+    /// headway at this speed.
     pub fn check_reach(&self, speed_mps: f64) -> Result<(), ConfigError> {
         let following_m = self.follow.safe_gap_m(speed_mps);
         let wanted_m = self.cut_out_thw_s * speed_mps;

@@ -25,7 +25,7 @@ const LATERAL_CLEARANCE_M: f64 = 0.1;
 /// Time before pulling out from which a driver signals (s): a choice, of the order of three flashes of an indicator.
 const SIGNALLING_TIME_S: f64 = 2.0;
 
-/// Duration of an aborted lane change back to the original lane (s).
+/// Duration of the change back to the original lane after an abort (s).
 const ABORT_DURATION_S: f64 = 3.0;
 
 /// Required braking above which a driver steers more sharply than planned, to be clear earlier (m/s²).
@@ -33,7 +33,7 @@ const EVASIVE_STEERING_FROM_MPS2: f64 = 3.0;
 
 /// Peak of the second derivative of the quintic: 10/√3. A lane change of width w and duration T has the peak lateral
 /// acceleration 5.77·w/T².
-const QUINTIC_PEAK_ACCELERATION: f64 = 5.773_502_691_896_258;
+const QUINTIC_PEAK: f64 = 5.773_502_691_896_258;
 
 /// Phase of the overtaking manoeuvre.
 #[derive(Clone, Copy, Debug)]
@@ -56,7 +56,7 @@ pub(super) enum Phase {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CompletedPassing {
     /// Time at which the overtaken vehicle was passed.
-    pub(super) since: Time,
+    pub(super) time: Time,
     /// Index of the overtaken vehicle.
     pub(super) overtaken: Option<usize>,
 }
@@ -119,14 +119,14 @@ impl Driver for OvertakerDriver {
         let (reaction, side) = (self.settings.reaction, input.road.overtaking_side());
         let new = || Perception::new(reaction.draw_s(rng), Some(side)).with_lapses(self.settings.lapse);
         let scene = self.perception.get_or_insert_with(new).observe(input, rng);
-        let situation = Situation { input, scene: &scene, side, speed_mps, desired_mps };
+        let step = Step { input, scene: &scene, side, speed_mps, desired_mps };
         let mut action = match self.phase {
-            Phase::Approaching => self.approach(&situation),
-            Phase::Changing(change) => self.continue_change(&situation, change),
-            Phase::Aborting { origin } => self.abort(&situation, origin),
-            Phase::Overtaking { overtaken } => self.overtake(&situation, overtaken),
-            Phase::Passed(passing) => self.drive_on(&situation, passing),
-            Phase::Returning { origin, passing } => self.return_to_origin(&situation, origin, passing),
+            Phase::Approaching => self.approach(&step),
+            Phase::Changing(change) => self.continue_change(&step, change),
+            Phase::Aborting { origin } => self.abort(&step, origin),
+            Phase::Overtaking { overtaken } => self.overtake(&step, overtaken),
+            Phase::Passed(passing) => self.drive_on(&step, passing),
+            Phase::Returning { origin, passing } => self.return_to_origin(&step, origin, passing),
         };
         action.acceleration_mps2 =
             finite(action.acceleration_mps2, "acceleration of an overtaking driver", input.time)?;
@@ -137,7 +137,7 @@ impl Driver for OvertakerDriver {
 }
 
 /// The input of one step and how the driver perceives it.
-pub(super) struct Situation<'a> {
+pub(super) struct Step<'a> {
     pub(super) input: &'a DriverInput<'a>,
     pub(super) scene: &'a PerceivedScene,
     /// Side of the passing lane.
@@ -146,13 +146,13 @@ pub(super) struct Situation<'a> {
     desired_mps: f64,
 }
 
-impl Situation<'_> {
+impl Step<'_> {
     fn indicator(&self) -> Indicator {
         indicator(self.side)
     }
 
-    /// Returns the perceived vehicle ahead, unless it is the overtaken one: a vehicle observed ahead one reaction time ago
-    /// may have been passed since.
+    /// Returns the perceived vehicle ahead, unless it is the overtaken one: a vehicle observed ahead one reaction time
+    /// ago may have been passed since.
     pub(super) fn ahead_except(&self, overtaken: Option<usize>) -> Option<&PerceivedVehicle> {
         self.scene.ahead.as_ref().filter(|vehicle| Some(vehicle.actor) != overtaken)
     }
@@ -167,7 +167,7 @@ impl Situation<'_> {
         (self.input.road.lane_centre_m(target) - self.path_d_m()).abs()
     }
 
-    /// Plans a lane change from the present position to `target`, passing the vehicle `ahead`.
+    /// Plans a lane change from the present position to `target`, past the vehicle `ahead`.
     fn plan_change(&self, origin: Lane, target: Lane, ahead: Option<&PerceivedVehicle>, duration_s: f64) -> Change {
         let start_d_m = self.path_d_m();
         let mut change = Change {
@@ -198,8 +198,8 @@ impl Situation<'_> {
         path::longitudinal_share(self.lateral_from_start_m(change, marking_m) / change.lateral_distance_m)
     }
 
-    /// Returns the lateral distance from the start of a change to `d_m`, positive towards its target (m), for a driver who
-    /// keeps the present deviation from the intended path.
+    /// Returns the lateral distance from the start of a change to `d_m`, positive towards its target (m), for a driver
+    /// who keeps the present deviation from the intended path.
     fn lateral_from_start_m(&self, change: &Change, d_m: f64) -> f64 {
         let to_the_left_m = d_m - change.start_d_m - self.input.lateral_deviation_m;
         match self.side {
@@ -211,100 +211,95 @@ impl Situation<'_> {
 
 impl OvertakerDriver {
     /// Keeps the speed and pulls out in time, if the passing lane is free; follows the vehicle ahead otherwise.
-    fn approach(&mut self, situation: &Situation<'_>) -> DriverAction {
-        let origin = situation.input.road.lane_at(situation.input.own.d_m);
-        let target = situation.input.road.beside(origin, situation.side);
+    fn approach(&mut self, step: &Step<'_>) -> DriverAction {
+        let origin = step.input.road.lane_at(step.input.own.d_m);
+        let target = step.input.road.beside(origin, step.side);
         let (Some(ahead), Some(target), Some(lane)) =
-            (situation.scene.ahead.as_ref(), target, situation.scene.adjacent(situation.side))
+            (step.scene.ahead.as_ref(), target, step.scene.adjacent(step.side))
         else {
-            return self.cruise(situation, situation.scene.ahead.as_ref());
+            return self.cruise(step, step.scene.ahead.as_ref());
         };
-        let acceptance = self.gap_acceptance(situation, ahead.lead.speed_mps, Tolerance::TO_START);
-        let wants_to_overtake = situation.desired_mps > ahead.lead.speed_mps;
+        let acceptance = self.gap_acceptance(step, ahead.lead.speed_mps, Tolerance::TO_START);
+        let wants_to_overtake = step.desired_mps > ahead.lead.speed_mps;
         if !wants_to_overtake || !acceptance.accepts(lane) {
-            return self.cruise(situation, Some(ahead));
+            return self.cruise(step, Some(ahead));
         }
-        let change = situation.plan_change(origin, target, Some(ahead), self.settings.duration_s);
-        let course = self.course(situation, ahead, change.clear_at * change.length_m);
-        let keep_mps2 = self.model.acceleration_mps2(situation.speed_mps, situation.desired_mps, None);
-        let keep_mps2 = coast_for_brake_light(keep_mps2, situation.speed_mps, Some(ahead));
-        let crossing_m = situation.crossing_at(&change) * change.length_m;
+        let change = step.plan_change(origin, target, Some(ahead), self.settings.duration_s);
+        let course = self.course(step, ahead, change.clear_at * change.length_m);
+        let keep_mps2 = self.model.acceleration_mps2(step.speed_mps, step.desired_mps, None);
+        let keep_mps2 = coast_for_brake_light(keep_mps2, step.speed_mps, Some(ahead));
+        let crossing_m = step.crossing_at(&change) * change.length_m;
         let slowing_mps2 = (-keep_mps2).max(0.0);
         let pull_out = course.thw_after_s(crossing_m, slowing_mps2) <= self.settings.cut_out_thw_s
             || course.gap_after_m(course.distance_to_clear_m) <= course.min_gap_m;
         if !pull_out {
-            let soon_m = crossing_m + SIGNALLING_TIME_S * situation.speed_mps;
-            let signals = course.thw_after_s(soon_m, slowing_mps2) <= self.settings.cut_out_thw_s;
-            let indicator = if signals { situation.indicator() } else { Indicator::Off };
+            let signalling_m = crossing_m + SIGNALLING_TIME_S * step.speed_mps;
+            let signals = course.thw_after_s(signalling_m, slowing_mps2) <= self.settings.cut_out_thw_s;
+            let indicator = if signals { step.indicator() } else { Indicator::Off };
             return DriverAction { acceleration_mps2: keep_mps2, indicator, ..DriverAction::default() };
         }
         self.phase = Phase::Changing(change);
         DriverAction {
             acceleration_mps2: limited_by_course_mps2(keep_mps2, &course),
             lane_change: Some(LaneChange { target, duration_s: self.settings.duration_s }),
-            indicator: situation.indicator(),
+            indicator: step.indicator(),
             note: Some(DriverNote::CutOutStarted),
         }
     }
 
     /// Continues the lane change to the passing lane, or aborts it.
-    fn continue_change(&mut self, situation: &Situation<'_>, mut change: Change) -> DriverAction {
-        let own = situation.input.own;
-        let in_target_lane = situation.input.road.lane_at(own.d_m) == change.target;
-        let overtaken = self.overtaken(situation, change.overtaken);
+    fn continue_change(&mut self, step: &Step<'_>, mut change: Change) -> DriverAction {
+        let own = step.input.own;
+        let in_target_lane = step.input.road.lane_at(own.d_m) == change.target;
+        let overtaken = self.overtaken(step, change.overtaken);
         if let Some(ahead) = overtaken {
-            change.clear_at = situation.clear_at(&change, ahead);
+            change.clear_at = step.clear_at(&change, ahead);
         }
         let distance_to_clear_m = change.distance_to_clear_m(own.s_m);
         if in_target_lane && distance_to_clear_m <= 0.0 {
             self.phase = Phase::Overtaking { overtaken: change.overtaken };
-            return self.overtake(situation, change.overtaken);
+            return self.overtake(step, change.overtaken);
         }
-        if !in_target_lane && self.must_abort(situation, overtaken) {
+        if !in_target_lane && self.must_abort(step, overtaken) {
             self.phase = Phase::Aborting { origin: change.origin };
             let back = LaneChange { target: change.origin, duration_s: ABORT_DURATION_S };
-            let following = self.cruise(situation, situation.scene.ahead.as_ref());
+            let following = self.cruise(step, step.scene.ahead.as_ref());
             return DriverAction { lane_change: Some(back), note: Some(DriverNote::CutOutAborted), ..following };
         }
-        let following_mps2 = self.follow_in_target(situation, change.target, overtaken);
+        let following_mps2 = self.follow_in_target(step, change.target, overtaken);
         let requested_mps2 =
-            coast_for_brake_light(following_mps2, situation.speed_mps, overtaken.filter(|_| distance_to_clear_m > 0.0));
-        let mut action = DriverAction {
-            acceleration_mps2: requested_mps2,
-            indicator: situation.indicator(),
-            ..DriverAction::default()
-        };
+            coast_for_brake_light(following_mps2, step.speed_mps, overtaken.filter(|_| distance_to_clear_m > 0.0));
+        let mut action =
+            DriverAction { acceleration_mps2: requested_mps2, indicator: step.indicator(), ..DriverAction::default() };
         if let Some(ahead) = overtaken {
-            let course = self.course(situation, ahead, distance_to_clear_m);
+            let course = self.course(step, ahead, distance_to_clear_m);
             if !change.evasive && course.required_braking_mps2() > EVASIVE_STEERING_FROM_MPS2 {
-                action.lane_change = steer_evasively(situation, &mut change, ahead, &self.settings);
+                action.lane_change = steer_evasively(step, &mut change, ahead, &self.settings);
             }
-            action.acceleration_mps2 = limited_by_course_mps2(
-                requested_mps2,
-                &self.course(situation, ahead, change.distance_to_clear_m(own.s_m)),
-            );
+            action.acceleration_mps2 =
+                limited_by_course_mps2(requested_mps2, &self.course(step, ahead, change.distance_to_clear_m(own.s_m)));
         }
         self.phase = Phase::Changing(change);
         action
     }
 
     /// Follows the vehicle ahead until the driver is back in the original lane.
-    fn abort(&mut self, situation: &Situation<'_>, origin: Lane) -> DriverAction {
-        if situation.input.changing_to != Some(origin) {
+    fn abort(&mut self, step: &Step<'_>, origin: Lane) -> DriverAction {
+        if step.input.changing_to != Some(origin) {
             self.phase = Phase::Approaching;
         }
-        self.cruise(situation, situation.scene.ahead.as_ref())
+        self.cruise(step, step.scene.ahead.as_ref())
     }
 
-    /// Drives passing the overtaken vehicle in the passing lane.
-    fn overtake(&mut self, situation: &Situation<'_>, overtaken: Option<usize>) -> DriverAction {
-        let mut action = self.cruise(situation, situation.ahead_except(overtaken));
-        if situation.input.changing_to.is_some() {
-            action.indicator = situation.indicator();
+    /// Drives past the overtaken vehicle in the passing lane.
+    fn overtake(&mut self, step: &Step<'_>, overtaken: Option<usize>) -> DriverAction {
+        let mut action = self.cruise(step, step.ahead_except(overtaken));
+        if step.input.changing_to.is_some() {
+            action.indicator = step.indicator();
         }
-        if has_passed(situation, overtaken) {
-            self.phase = Phase::Passed(CompletedPassing { since: situation.input.time, overtaken });
-            self.observe_side(opposite(situation.side));
+        if has_passed(step, overtaken) {
+            self.phase = Phase::Passed(CompletedPassing { time: step.input.time, overtaken });
+            self.observe_side(opposite(step.side));
             action.note = Some(DriverNote::Passed);
         }
         action
@@ -318,81 +313,69 @@ impl OvertakerDriver {
     }
 
     /// Drives freely, or follows `ahead` by the Wiedemann 99 model.
-    pub(super) fn cruise(&mut self, situation: &Situation<'_>, ahead: Option<&PerceivedVehicle>) -> DriverAction {
+    pub(super) fn cruise(&mut self, step: &Step<'_>, ahead: Option<&PerceivedVehicle>) -> DriverAction {
         let lead = ahead.map(|vehicle| &vehicle.lead);
-        let requested_mps2 = self.model.acceleration_mps2(situation.speed_mps, situation.desired_mps, lead);
+        let requested_mps2 = self.model.acceleration_mps2(step.speed_mps, step.desired_mps, lead);
         DriverAction {
-            acceleration_mps2: brake_for_brake_light(requested_mps2, situation.speed_mps, ahead),
+            acceleration_mps2: brake_for_brake_light(requested_mps2, step.speed_mps, ahead),
             ..DriverAction::default()
         }
     }
 
     /// Returns the acceleration behind the lead vehicle in the target lane (m/s²).
-    fn follow_in_target(
-        &mut self,
-        situation: &Situation<'_>,
-        target: Lane,
-        overtaken: Option<&PerceivedVehicle>,
-    ) -> f64 {
+    fn follow_in_target(&mut self, step: &Step<'_>, target: Lane, overtaken: Option<&PerceivedVehicle>) -> f64 {
         let overtaken = overtaken.map(|vehicle| vehicle.actor);
-        let vehicle = if situation.scene.lane == target {
-            situation.scene.ahead.as_ref().filter(|vehicle| Some(vehicle.actor) != overtaken)
+        let vehicle = if step.scene.lane == target {
+            step.scene.ahead.as_ref().filter(|vehicle| Some(vehicle.actor) != overtaken)
         } else {
-            situation.scene.adjacent(situation.side).and_then(|lane| lane.lead.as_ref())
+            step.scene.adjacent(step.side).and_then(|lane| lane.lead.as_ref())
         };
-        self.model.acceleration_mps2(situation.speed_mps, situation.desired_mps, vehicle.map(|vehicle| &vehicle.lead))
+        self.model.acceleration_mps2(step.speed_mps, step.desired_mps, vehicle.map(|vehicle| &vehicle.lead))
     }
 
     /// Returns true if the driver is no longer willing to change to the passing lane.
-    fn must_abort(&self, situation: &Situation<'_>, overtaken: Option<&PerceivedVehicle>) -> bool {
-        let Some((ahead, lane)) = overtaken.zip(situation.scene.adjacent(situation.side)) else { return false };
-        !self.gap_acceptance(situation, ahead.lead.speed_mps, Tolerance::TO_CONTINUE).accepts(lane)
+    fn must_abort(&self, step: &Step<'_>, overtaken: Option<&PerceivedVehicle>) -> bool {
+        let Some((ahead, lane)) = overtaken.zip(step.scene.adjacent(step.side)) else { return false };
+        !self.gap_acceptance(step, ahead.lead.speed_mps, Tolerance::TO_CONTINUE).accepts(lane)
     }
 
     /// Returns the vehicle that is being overtaken while it is the nearest one ahead.
-    fn overtaken<'a>(&self, situation: &Situation<'a>, actor: Option<usize>) -> Option<&'a PerceivedVehicle> {
-        situation.scene.ahead.as_ref().filter(|vehicle| Some(vehicle.actor) == actor)
+    fn overtaken<'a>(&self, step: &Step<'a>, actor: Option<usize>) -> Option<&'a PerceivedVehicle> {
+        step.scene.ahead.as_ref().filter(|vehicle| Some(vehicle.actor) == actor)
     }
 
     /// Returns the criterion by which the driver accepts an adjacent lane.
-    pub(super) fn gap_acceptance(
-        &self,
-        situation: &Situation<'_>,
-        overtaken_mps: f64,
-        tolerance: Tolerance,
-    ) -> GapAcceptance {
+    pub(super) fn gap_acceptance(&self, step: &Step<'_>, overtaken_mps: f64, tolerance: Tolerance) -> GapAcceptance {
         GapAcceptance {
-            speed_mps: situation.speed_mps,
+            speed_mps: step.speed_mps,
             overtaken_mps,
-            safe_gap_m: self.settings.follow.safe_gap_m(situation.speed_mps),
+            safe_gap_m: self.settings.follow.safe_gap_m(step.speed_mps),
             tolerance,
         }
     }
 
     /// Returns the present course relative to the vehicle `ahead`.
-    fn course(&self, situation: &Situation<'_>, ahead: &PerceivedVehicle, distance_to_clear_m: f64) -> Course {
+    fn course(&self, step: &Step<'_>, ahead: &PerceivedVehicle, distance_to_clear_m: f64) -> Course {
         let min_gap_m = self.settings.follow.safe_gap_m(ahead.lead.speed_mps);
-        Course { speed_mps: situation.speed_mps, lead: ahead.lead, distance_to_clear_m, min_gap_m }
+        Course { speed_mps: step.speed_mps, lead: ahead.lead, distance_to_clear_m, min_gap_m }
     }
 }
 
-/// Returns a lane change with evasive steering, and adopts it as the change in progress. Returns `None` if it is not sharper
-/// than planned.
+/// Returns a lane change with evasive steering, and adopts it as the change in progress. Returns `None` if it is not
+/// sharper than planned.
 fn steer_evasively(
-    situation: &Situation<'_>,
+    step: &Step<'_>,
     change: &mut Change,
     ahead: &PerceivedVehicle,
     settings: &Overtaker,
 ) -> Option<LaneChange> {
-    let duration_s =
-        (QUINTIC_PEAK_ACCELERATION * situation.sideways_m(change.target) / settings.evasive_lateral_mps2).sqrt();
+    let duration_s = (QUINTIC_PEAK * step.lateral_distance_m(change.target) / settings.evasive_lateral_mps2).sqrt();
     // Written so that a lateral acceleration of zero, for which the duration is infinite, means no sharper steering.
     if !(duration_s < settings.duration_s) {
         return None;
     }
-    let sharper =
-        Change { evasive: true, ..situation.plan_change(change.origin, change.target, Some(ahead), duration_s) };
-    let s_m = situation.input.own.s_m;
+    let sharper = Change { evasive: true, ..step.plan_change(change.origin, change.target, Some(ahead), duration_s) };
+    let s_m = step.input.own.s_m;
     if sharper.distance_to_clear_m(s_m) >= change.distance_to_clear_m(s_m) {
         return None;
     }
@@ -411,9 +394,9 @@ fn limited_by_course_mps2(requested_mps2: f64, course: &Course) -> f64 {
 }
 
 /// Returns true once the overtaken vehicle is entirely behind in the adjacent lane.
-fn has_passed(situation: &Situation<'_>, overtaken: Option<usize>) -> bool {
-    let near = situation.input.neighbours;
-    let adjacent = match situation.side {
+fn has_passed(step: &Step<'_>, overtaken: Option<usize>) -> bool {
+    let near = step.input.neighbours;
+    let adjacent = match step.side {
         Side::Left => near.right.as_ref(),
         Side::Right => near.left.as_ref(),
     };

@@ -5,19 +5,19 @@
 //!                    ▼                                              │
 //!   start ──▶ approaching ── pulls out ──▶ changing ── centre in passing lane, clear ──▶ overtaking ──▶ passed
 //!                    ▲                        │                                                          │
-//!                    ├── back in lane ── aborting ◀── passing lane not free, own lane not yet left       │ if the scenario
-//!                    └── back in lane ── returning ◀── gap in the original lane ─────────────────────────┘ asks for it
+//!                    ├── back in lane ── aborting ◀── passing lane not free, own lane not yet left       │ if the
+//!                    └── back in lane ── returning ◀── gap in the original lane ─────────────────────────┘ scenario asks
 //! ```
 //!
-//! In the phase *approaching* with a free passing lane, the driver keeps its speed: it does not slow down behind a vehicle
-//! that it is about to overtake. It pulls out so that, as far as it can predict, the time headway has the value given by the
-//! scenario when its centre crosses the lane marking. On a quintic path of duration T, that is T/2 after pulling out. While
-//! the passing lane is not free, the driver follows by the Wiedemann 99 model. It signals from two seconds before it pulls
-//! out.
+//! In the phase *approaching* with a free passing lane, the driver keeps its speed: it does not slow down behind a
+//! vehicle that it is about to overtake. It pulls out so that, as far as it can predict, the time headway has the value
+//! given by the scenario when its centre crosses the lane marking. On a quintic path of duration T, that is T/2 after
+//! pulling out. While the passing lane is not free, the driver follows by the Wiedemann 99 model. It signals from two
+//! seconds before it pulls out.
 //!
-//! In all phases, the driver predicts whether its present course would collide with the vehicle ahead before the two are
-//! laterally clear of each other ([`conflict`]). If so, it brakes as hard as necessary, up to the limit of a human, and
-//! continues to steer. The gap that it tries to keep is its own safe gap, cc0 + cc1·v.
+//! In all phases, the driver predicts whether its present course would collide with the vehicle ahead before the two
+//! are laterally clear of each other ([`conflict`]). If so, it brakes as hard as necessary, up to the limit of a human,
+//! and continues to steer. The gap that it tries to keep is its own safe gap, cc0 + cc1·v.
 
 mod acceptance;
 mod config;

@@ -5,12 +5,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::acceptance::Tolerance;
-use super::driver::{CompletedPassing, OvertakerDriver, Phase, Situation};
+use super::driver::{CompletedPassing, OvertakerDriver, Phase, Step};
 use crate::driver::perception::PerceivedVehicle;
 use crate::driver::{DriverAction, LaneChange};
 
-/// Default time headway left to the vehicle behind (s): what drivers are taught to leave before they change back, so that
-/// they see the whole overtaken vehicle in the mirror.
+/// Default time headway left to the vehicle behind (s): what drivers are taught to leave before they change back, so
+/// that they see the whole overtaken vehicle in the mirror.
 const DEFAULT_THW_S: f64 = 1.0;
 
 /// The return to the original lane after passing, as a scenario file describes it.
@@ -48,19 +48,19 @@ impl Check for ReturnConfig {
 
 impl OvertakerDriver {
     /// Drives on in the passing lane, and begins to change back once the scenario and the traffic allow it.
-    pub(super) fn drive_on(&mut self, situation: &Situation<'_>, passing: CompletedPassing) -> DriverAction {
-        let mut action = self.cruise(situation, situation.ahead_except(passing.overtaken));
-        let origin_side = opposite(situation.side);
-        let own_lane = situation.input.road.lane_at(situation.input.own.d_m);
-        let origin = situation.input.road.beside(own_lane, origin_side);
+    pub(super) fn drive_on(&mut self, step: &Step<'_>, passing: CompletedPassing) -> DriverAction {
+        let mut action = self.cruise(step, step.ahead_except(passing.overtaken));
+        let origin_side = opposite(step.side);
+        let own_lane = step.input.road.lane_at(step.input.own.d_m);
+        let origin = step.input.road.beside(own_lane, origin_side);
         let (Some(returns), Some(origin)) = (self.settings.returns, origin) else { return action };
-        if situation.input.changing_to.is_some() || situation.input.time < passing.since + returns.after {
+        if step.input.changing_to.is_some() || step.input.time < passing.time + returns.after {
             return action;
         }
         action.indicator = indicator(origin_side);
         let tolerance = Tolerance { follower_headway_s: returns.thw_s, ..Tolerance::TO_START };
-        let acceptance = self.gap_acceptance(situation, situation.speed_mps, tolerance);
-        if situation.scene.adjacent(origin_side).is_some_and(|lane| acceptance.is_free(lane)) {
+        let acceptance = self.gap_acceptance(step, step.speed_mps, tolerance);
+        if step.scene.adjacent(origin_side).is_some_and(|lane| acceptance.is_free(lane)) {
             self.phase = Phase::Returning { origin, passing };
             action.lane_change = Some(LaneChange { target: origin, duration_s: self.settings.duration_s });
         }
@@ -70,18 +70,18 @@ impl OvertakerDriver {
     /// Changes back to `origin`, and follows the nearer of the vehicles ahead in either lane.
     pub(super) fn return_to_origin(
         &mut self,
-        situation: &Situation<'_>,
+        step: &Step<'_>,
         origin: Lane,
         passing: CompletedPassing,
     ) -> DriverAction {
-        if situation.input.changing_to != Some(origin) {
+        if step.input.changing_to != Some(origin) {
             self.phase = Phase::Approaching;
-            self.observe_side(situation.side);
+            self.observe_side(step.side);
         }
-        let in_origin = situation.scene.adjacent(opposite(situation.side)).and_then(|lane| lane.lead.as_ref());
-        let ahead = [situation.ahead_except(passing.overtaken), in_origin].into_iter().flatten();
+        let in_origin = step.scene.adjacent(opposite(step.side)).and_then(|lane| lane.lead.as_ref());
+        let ahead = [step.ahead_except(passing.overtaken), in_origin].into_iter().flatten();
         let nearest: Option<&PerceivedVehicle> = ahead.min_by(|a, b| a.lead.gap_m.total_cmp(&b.lead.gap_m));
-        DriverAction { indicator: indicator(opposite(situation.side)), ..self.cruise(situation, nearest) }
+        DriverAction { indicator: indicator(opposite(step.side)), ..self.cruise(step, nearest) }
     }
 }
 

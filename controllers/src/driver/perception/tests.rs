@@ -5,8 +5,8 @@ use crate::driver::{LapseConfig, Neighbours};
 
 const STEP: Time = Time::from_ms(10);
 
-/// Observes a lead vehicle with the given gap, speed, acceleration and brake light from a vehicle at 30 m/s, and returns it
-/// as perceived.
+/// Observes a lead vehicle with the given gap, speed, acceleration and brake light from a vehicle at 30 m/s, and
+/// returns it as perceived.
 fn observe(
     perception: &mut Perception,
     time: Time,
@@ -81,7 +81,8 @@ fn a_small_speed_difference_at_a_large_gap_is_not_noticed() {
         (60.0, 25.0, 30.0),
         (50.0, 25.0, 25.0),
         (60.0, 26.0, 26.0),
-        // Below the attended threshold, the perceived speed stays at 26 m/s until the observed one differs enough from it.
+        // Below the attended threshold, the perceived speed stays at 26 m/s until the observed one differs enough from
+        // it.
         (130.0, 25.5, 26.0),
         (60.0, 27.0, 26.0),
         (60.0, 29.9, 26.0),

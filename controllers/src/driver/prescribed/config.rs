@@ -18,11 +18,13 @@ const MAX_SPEED_MPS: f64 = 100.0;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct PrescribedConfig {
-    /// Pairs of time (s) and speed (m/s), with increasing times. The speed is linear in between, constant before and after.
+    /// Pairs of time (s) and speed (m/s), with increasing times. The speed is linear in between, constant before and
+    /// after.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub profile: Option<Vec<[Num; 2]>>,
-    /// Pairs of time (s) and acceleration (m/s²), with increasing times. Each acceleration holds until the next; before the
-    /// first it is zero. The driver starts at the initial speed; braking ends at standstill, accelerating at 100 m/s.
+    /// Pairs of time (s) and acceleration (m/s²), with increasing times. Each acceleration holds until the next; before
+    /// the first it is zero. The driver starts at the initial speed; braking ends at standstill, accelerating at 100
+    /// m/s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub acceleration_profile: Option<Vec<[Num; 2]>>,
     /// The speeds of a vehicle in recorded traffic.

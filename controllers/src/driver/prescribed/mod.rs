@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   profile               times and speeds, linear in between ───────────────┐
-//!   acceleration-profile  times and accelerations, each held ── integrated ──┼─▶ desired speed and its slope ─▶ acceleration
+//!   acceleration-profile  times and accelerations, each held ── integrated ──┼─▶ speed and slope ─▶ acceleration
 //!   recorded              a track of a trajectory file ── read together ─────┘
 //!                                                         with the scenario file
 //! ```

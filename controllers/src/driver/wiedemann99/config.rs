@@ -31,12 +31,12 @@ pub struct Wiedemann99Config {
     pub cc8_mps2: Option<Num>,
     /// Free acceleration at 80 km/h (m/s²). Default: 1.5.
     pub cc9_mps2: Option<Num>,
-    /// Desired speed (m/s). Default: the larger of the road's speed limit and the vehicle's initial speed; for an overtaking
-    /// driver, its initial speed.
+    /// Desired speed (m/s). Default: the larger of the road's speed limit and the vehicle's initial speed; for an
+    /// overtaking driver, its initial speed.
     pub desired_speed_mps: Option<Num>,
     /// Reaction time (s). With it, the driver perceives with a delay, notices speed differences only above the looming
-    /// threshold, and reacts to brake lights. Without it, the driver uses the true state of traffic, and only the model's
-    /// own perception thresholds apply.
+    /// threshold, and reacts to brake lights. Without it, the driver uses the true state of traffic, and only the
+    /// model's own perception thresholds apply.
     pub reaction_s: Option<ReactionConfig>,
     /// Lapses of attention. Default: none. They need a reaction time.
     pub lapse: Option<LapseConfig>,

@@ -15,9 +15,9 @@ const EMERGENCY_BRAKING_SHARE: f64 = 0.75;
 /// Time headway below which a driver releases the accelerator because of a brake light ahead (s).
 const COASTING_FOR_LIGHT_THW_S: f64 = 3.0;
 
-/// Time headway below which a driver brakes because of a brake light ahead, instead of only releasing the accelerator (s):
-/// about the upper end of the headways observed in car-following (Fancher et al., *Intelligent Cruise Control Field Operational
-/// Test*, DOT HS 808 849, 1998).
+/// Time headway below which a driver brakes because of a brake light ahead, instead of only releasing the accelerator
+/// (s): about the upper end of the headways observed in car-following (Fancher et al., *Intelligent Cruise Control
+/// Field Operational Test*, DOT HS 808 849, 1998).
 const BRAKING_FOR_LIGHT_THW_S: f64 = 2.0;
 
 /// Speed difference above which the vehicle ahead pulls away, so that its brake light does not matter (m/s).
@@ -94,8 +94,8 @@ pub(crate) fn default_desired_mps(input: &DriverInput<'_>) -> f64 {
     input.own.speed_mps.max(input.road.speed_limit_mps())
 }
 
-/// Returns `requested_mps2`, or at most the acceleration with released accelerator if a near vehicle ahead shows its brake
-/// light.
+/// Returns `requested_mps2`, or at most the acceleration with released accelerator if a near vehicle ahead shows its
+/// brake light.
 pub(crate) fn coast_for_brake_light(requested_mps2: f64, speed_mps: f64, ahead: Option<&PerceivedVehicle>) -> f64 {
     match ahead {
         Some(vehicle)
@@ -109,8 +109,9 @@ pub(crate) fn coast_for_brake_light(requested_mps2: f64, speed_mps: f64, ahead: 
     }
 }
 
-/// Limits the acceleration as [`coast_for_brake_light`] does. If the vehicle ahead is near enough to be followed, the driver
-/// also brakes at least as hard as that vehicle: humans brake first, and assess afterwards how hard they need to.
+/// Limits the acceleration as [`coast_for_brake_light`] does. If the vehicle ahead is near enough to be followed, the
+/// driver also brakes at least as hard as that vehicle: humans brake first, and assess afterwards how hard they need
+/// to.
 pub(crate) fn brake_for_brake_light(requested_mps2: f64, speed_mps: f64, ahead: Option<&PerceivedVehicle>) -> f64 {
     let limited_mps2 = coast_for_brake_light(requested_mps2, speed_mps, ahead);
     match ahead {

@@ -1,8 +1,8 @@
 //! The Wiedemann 99 model: the acceleration in each regime.
 //!
-//! Here g is the gap, v the own speed, v_l the speed of the lead vehicle, Δv = v_l − v (negative while closing), b_l the
-//! deceleration of the lead vehicle, and safe and follow are thresholds. [`super::thresholds`] defines the thresholds and
-//! the regimes.
+//! Here g is the gap, v the own speed, v_l the speed of the lead vehicle, Δv = v_l − v (negative while closing), b_l
+//! the deceleration of the lead vehicle, and safe and follow are thresholds. [`super::thresholds`] defines the
+//! thresholds and the regimes.
 //!
 //! | regime | acceleration |
 //! |---|---|
@@ -13,35 +13,37 @@
 //!
 //! *Slowing* is the larger of two decelerations:
 //!
-//! - *To keep apart:* the deceleration that keeps the gap above cc0, increased by a fifth, if the lead vehicle continues as
-//!   it does and, if it brakes, stops. Behind a lead vehicle that keeps its speed it is Δv²/(2·(g − cc0)); behind one that
-//!   stops first it is v²/(2·(g − cc0 + v_l²/(2·b_l))).
+//! - *To keep apart:* the deceleration that keeps the gap above cc0, increased by a fifth, if the lead vehicle
+//!   continues as it does and, if it brakes, stops. Behind a lead vehicle that keeps its speed it is Δv²/(2·(g − cc0));
+//!   behind one that stops first it is v²/(2·(g − cc0 + v_l²/(2·b_l))).
 //! - *To keep the safe gap:* Δv²/(2·(g − safe)), limited to comfortable braking. A driver who notices late that the gap
-//!   closes prefers a gap below the safe one for some time to hard braking. Behind a braking lead vehicle, the safe gap itself
-//!   shrinks at the rate cc1·b_l; that part of the closing speed needs no braking.
+//!   closes prefers a gap below the safe one for some time to hard braking. Behind a braking lead vehicle, the safe gap
+//!   itself shrinks at the rate cc1·b_l; that part of the closing speed needs no braking.
 //!
 //! # Differences between published variants, and the choice made here
-//! - The smaller of the two speeds enters the safe gap, as in the formulas published by Aghabayk et al. (2013). In the steady
-//!   state both speeds are equal. SUMO adds random noise to the smaller one.
+//! - The smaller of the two speeds enters the safe gap, as in the formulas published by Aghabayk et al. (2013). In the
+//!   steady state both speeds are equal. SUMO adds random noise to the smaller one.
 //! - Vissim's manual defines cc8 as the acceleration *from standstill* and cc9 as that *at 80 km/h*. Some open
 //!   implementations (SUMO among them) add cc9·v to cc8 and limit the sum to cc8, so that cc9 has no effect. This model
 //!   follows the manual; above 80 km/h, the value at 80 km/h holds.
 //! - Open implementations use the terms Δv²/(cc0 − g) if the gap is too small, ½·Δv²/(safe − g) while closing and
-//!   Δv²/(follow − g) while closing up. These diverge as the gap approaches the threshold. Here, each is replaced by the
-//!   constant deceleration that removes Δv over the remaining distance; it is continuous across the safe gap and bounded
-//!   everywhere. Closing up uses the free acceleration.
+//!   Δv²/(follow − g) while closing up. These diverge as the gap approaches the threshold. Here, each is replaced by
+//!   the constant deceleration that removes Δv over the remaining distance; it is continuous across the safe gap and
+//!   bounded everywhere. Closing up uses the free acceleration.
 //! - SUMO has its own defaults (cc1 is 1.3 s, cc2 is 8 m). This model uses those published for Vissim (0.9 s, 4 m).
-//! - The published term for approaching omits the deceleration of the lead vehicle, so that a driver reacts to a hard-braking
-//!   lead vehicle only in the emergency regime. The published term for emergency adds that deceleration as if it lasted for
-//!   ever, so that the driver stops far behind a lead vehicle that has stopped first. This model uses the two
-//!   decelerations above in both regimes.
-//! - A driver who has noticed closing continues to slow down until Δv is back at cc4. If the threshold of noticing applied
-//!   there, too, up to 1.5 m/s would remain at a gap of 30 m, and cc7 would need 4 m to remove them: the gap would fall
-//!   below the safe one. For the same reason, the driver aims beyond the safe gap by the distance in which cc7 removes cc4.
-//! - The sign of the oscillation changes at half of the noticeable Δv, and early enough to keep the gap between safe and
-//!   follow. In the published text it changes at the thresholds of Δv alone, so that the gap drifts out of that band.
-//! - The manual gives cc0 no variation. Behind a standing vehicle, the driver therefore rolls up to cc0, instead of standing
-//!   still anywhere between cc0 and cc0 + cc2.
+//! - The published term for approaching omits the deceleration of the lead vehicle, so that a driver reacts to a
+//!   hard-braking lead vehicle only in the emergency regime. The published term for emergency adds that deceleration as
+//!   if it lasted for ever, so that the driver stops far behind a lead vehicle that has stopped first. This model uses
+//!   the two decelerations above in both regimes.
+//! - A driver who has noticed closing continues to slow down until Δv is back at cc4. If the threshold of noticing
+//!   applied there, too, up to 1.5 m/s would remain at a gap of 30 m, and cc7 would need 4 m to remove them: the gap
+//!   would fall below the safe one. For the same reason, the driver aims beyond the safe gap by the distance in which
+//!   cc7 removes cc4.
+//! - The sign of the oscillation changes at half of the noticeable Δv, and early enough to keep the gap between safe
+//!   and follow. In the published text it changes at the thresholds of Δv alone, so that the gap drifts out of that
+//!   band.
+//! - The manual gives cc0 no variation. Behind a standing vehicle, the driver therefore rolls up to cc0, instead of
+//!   standing still anywhere between cc0 and cc0 + cc2.
 //! - The model has no random terms. Variation between drivers is sampled as parameters.
 
 use super::thresholds::{Regime, Thresholds};
@@ -55,8 +57,8 @@ const CC9_SPEED_MPS: f64 = 80.0 / 3.6;
 /// Smallest distance that enters the deceleration to keep the safe gap (m); at zero it diverges.
 const MIN_ROOM_M: f64 = 0.5;
 
-/// Hardest braking to keep the safe gap (m/s²): the upper end of comfortable braking (ISO 15622:2018 allows adaptive cruise
-/// control to brake by up to 3.5 m/s² at speeds above 20 m/s).
+/// Hardest braking to keep the safe gap (m/s²): the upper end of comfortable braking (ISO 15622:2018 allows adaptive
+/// cruise control to brake by up to 3.5 m/s² at speeds above 20 m/s).
 const COMFORTABLE_MPS2: f64 = 3.5;
 
 /// Factor by which a driver brakes harder than necessary in order to keep apart.
@@ -68,8 +70,8 @@ const STANDING_MPS: f64 = 0.1;
 /// Time constant with which the driver approaches the desired speed (s).
 const SPEED_TIME_S: f64 = 1.0;
 
-/// Time that the vehicle needs to reverse the oscillation of following (s): twice the actuator lag of 0.15 s, because the
-/// acceleration changes from −cc7 to +cc7.
+/// Time that the vehicle needs to reverse the oscillation of following (s): twice the actuator lag of 0.15 s, because
+/// the acceleration changes from −cc7 to +cc7.
 const REVERSAL_TIME_S: f64 = 0.3;
 
 /// State of the Wiedemann 99 model for one driver.
@@ -92,8 +94,8 @@ impl Wiedemann99Model {
         self.regime
     }
 
-    /// Returns the thresholds at `speed_mps` behind `lead`. The closing threshold depends on whether the driver has noticed
-    /// the closing.
+    /// Returns the thresholds at `speed_mps` behind `lead`. The closing threshold depends on whether the driver has
+    /// noticed the closing.
     pub fn thresholds(&self, speed_mps: f64, lead: &Lead) -> Thresholds {
         Thresholds::new(&self.parameters, speed_mps, lead, self.regime)
     }
@@ -163,10 +165,11 @@ impl Wiedemann99Model {
         if distance_m < 0.5 * p.cc2_m { distance_m } else { 0.5 * p.cc2_m }
     }
 
-    /// Updates the sign of the oscillation of following. It changes if the speed difference exceeds half of the noticeable
-    /// one, and early enough to keep the gap between the edges of its band.
+    /// Updates the sign of the oscillation of following. It changes if the speed difference exceeds half of the
+    /// noticeable one, and early enough to keep the gap between the edges of its band.
     fn update_oscillation(&mut self, thresholds: &Thresholds, lead: &Lead, opening_mps: f64) {
-        // While the driver is slower, its own speed determines the safe gap. The gap settles at the lead vehicle's speed.
+        // While the driver is slower, its own speed determines the safe gap. The gap settles at the lead vehicle's
+        // speed.
         let settled_gap_m = self.parameters.cc0_m + self.parameters.cc1_s * lead.speed_mps.max(0.0);
         let reversal_distance_m = self.reversal_distance_m(opening_mps);
         let gap_too_small = lead.gap_m - reversal_distance_m <= settled_gap_m;

@@ -47,7 +47,8 @@ fn behind_a_lead_vehicle_at_constant_speed_the_gap_settles_into_its_band() {
                 let settled = &gaps[gaps.len() / 2..];
                 let least = settled.iter().copied().fold(f64::INFINITY, f64::min);
                 let most = settled.iter().copied().fold(0.0, f64::max);
-                // The coarsest step allows an overshoot of 0.25 m. At steps up to 0.04 s, only the actuator lag causes overshoot.
+                // The coarsest step allows an overshoot of 0.25 m. At steps up to 0.04 s, only the actuator lag causes
+                // overshoot.
                 let overshoot_m = if step_s > 0.05 { 0.25 } else { 0.1 };
                 assert!(
                     least > safe_m - overshoot_m && most < safe_m + 4.0 + overshoot_m,
