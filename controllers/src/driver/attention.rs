@@ -19,7 +19,7 @@ const MAX_LAPSE_S: f64 = 30.0;
 pub struct LapseConfig {
     /// Time at which the driver looks away, once (s).
     pub at_s: Option<Num>,
-    /// Mean time from the end of one random lapse to the begin of the next (s).
+    /// Mean time from the end of one random lapse to the start of the next (s).
     pub every_s: Option<Num>,
     /// Duration for which the driver looks away (s).
     pub duration_s: Num,
@@ -83,7 +83,7 @@ pub(crate) fn check_lapse(
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Attention {
     lapse: Option<Lapse>,
-    /// Begin and end of the present or next lapse; `None` until it is drawn.
+    /// Start and end of the present or next lapse; `None` until it is drawn.
     next: Option<(Time, Time)>,
 }
 
@@ -105,7 +105,7 @@ impl Attention {
 }
 
 impl Lapse {
-    /// Returns begin and end of the next lapse after `now`.
+    /// Returns the start and end of the next lapse after `now`.
     fn after(&self, now: Time, rng: &mut Stream) -> (Time, Time) {
         let begin = match self.timing {
             LapseTiming::Once { at_s } => Time::from_s(at_s),

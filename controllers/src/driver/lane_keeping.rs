@@ -4,8 +4,9 @@
 //! fitted to the trajectory data US-101 (NGSIM, 120 vehicles that stay in one lane for at least 8 s at more than 8 m/s,
 //! within 1.2 m of its centre; mean speed 14 m/s). There the variogram of the lateral position, half of the mean
 //! squared difference, is 0.0105, 0.0224, 0.0315, 0.049, 0.0685 and 0.080 m² at 1, 2, 3, 5, 8 and 12 s. With a standard
-//! deviation of 0.284 m, the lags below reproduce it within 17 %. At 1 s they are lower, because there the data contain
-//! measurement errors that no vehicle drives. The standard deviation is a parameter of each driver (`sdlp-m`).
+//! deviation of 0.284 m, the lags below reproduce it within 17 %. At 1 s the variogram of the model is lower: that of
+//! the data contains measurement errors that no vehicle drives. The standard deviation is a parameter of each driver
+//! (`sdlp-m`).
 //!
 //! The deviation is a function of the distance driven, as the path of a lane change is: a driver who brakes stays on
 //! the path, and a vehicle at standstill does not move sideways. The lags hold at 30 m/s. No trajectory data at hand

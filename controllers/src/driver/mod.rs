@@ -1,8 +1,8 @@
 //! Human driver models.
 //!
-//! The drivers that follow have the same three layers: *perception* (the true state of traffic, delayed and imprecise),
-//! a car-following *model*, which is a pure algorithm that can be tested alone, and a *driver*, which adapts the two to
-//! the simulation loop.
+//! Each driver except the prescribed one has three layers: *perception* (the true state of traffic, delayed and
+//! imprecise), a car-following *model*, which is a pure algorithm that can be tested alone, and a *driver*, which
+//! adapts the two to the simulation loop.
 
 mod attention;
 mod idm;
@@ -34,7 +34,7 @@ use closecall_traffic::Time;
 /// Verkehrsunfallrekonstruktion, 2017: 7.5 to 8.5 m/s²).
 pub(crate) const HARDEST_BRAKING_MPS2: f64 = 8.0;
 
-/// Deceleration at highway speed with the accelerator released (m/s²) (engine and air drag: 0.5 to 1 m/s²).
+/// Deceleration at highway speed with the accelerator released (m/s²): engine and air drag, 0.5 to 1 m/s².
 pub(crate) const COASTING_DECELERATION_MPS2: f64 = 0.7;
 
 /// Returns `value`, or an error if it is not finite.

@@ -11,8 +11,8 @@
 //!   Physica A 360 (2006) 71–88). Only a change in the motion of another vehicle is perceived late.
 //! - *Looming threshold.* A driver notices a speed difference only if the visual angle of the vehicle ahead changes
 //!   faster than 0.003 rad/s (Hoffmann and Mortimer, *Scaling of relative velocity between vehicles*, Accident Analysis
-//!   and Prevention 28 (1996) 415–421). Below that threshold, the driver assumes that the vehicle ahead keeps its
-//!   speed; the first assumption is the driver's own speed. The driver always knows the effect of the own accelerator
+//!   and Prevention 28 (1996) 415–421). Below that threshold, the driver assumes that the vehicle ahead keeps the
+//!   speed last noticed, initially the driver's own speed. The driver always knows the effect of its own accelerator
 //!   and brake. Once noticed, the difference is attended to until it falls below 0.0006 rad/s, the mean threshold of
 //!   drivers who attend to it (Michaels, *Perceptual factors in car following*, Proc. 2nd Int. Symp. on the Theory of
 //!   Road Traffic Flow, 1963).

@@ -8,12 +8,10 @@ const MIN_FOLLOWER_GAP_M: f64 = 3.0;
 /// Time headway left to a follower in the passing lane (s).
 const FOLLOWER_HEADWAY_S: f64 = 0.3;
 
-/// Speed by which a lead vehicle in the passing lane must exceed that of the overtaken vehicle to be worth following
-/// (m/s).
+/// Speed by which a lead vehicle in the passing lane must exceed the one to overtake to be worth following (m/s).
 const MIN_GAIN_MPS: f64 = 1.0;
 
-/// Share of the accepted own braking. A slow lead vehicle in the passing lane that requires less braking is too far
-/// ahead to matter.
+/// Share of the accepted own braking below which a slow lead vehicle in the passing lane is too far ahead to matter.
 const IRRELEVANT_LEAD_BRAKING_SHARE: f64 = 0.25;
 
 /// Braking that an overtaking driver accepts, of itself and of the follower in the adjacent lane.
@@ -38,7 +36,7 @@ impl Tolerance {
         Self { own_mps2: 3.0, follower_mps2: 4.0, follower_headway_s: FOLLOWER_HEADWAY_S };
 }
 
-/// Decides whether the driver accepts a lane.
+/// The criterion by which a driver accepts an adjacent lane.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct GapAcceptance {
     /// Own speed (m/s).

@@ -2,8 +2,8 @@
 //! deceleration prevents that.
 //!
 //! A lane change is a path along the road, so that braking does not shorten the distance D that the driver covers until
-//! the two are laterally clear. In the same time, the vehicle ahead, at speed v_l and deceleration a_l, must cover X =
-//! D − gap + minimum gap. It needs the time t = (v_l − √(v_l² − 2·a_l·X))/a_l. In order not to arrive earlier, the
+//! the two are laterally clear. In the same time, the vehicle ahead, at speed v_l and deceleration a_l, must cover
+//! X = D − gap + minimum gap. It needs the time t = (v_l − √(v_l² − 2·a_l·X))/a_l. In order not to arrive earlier, the
 //! driver at speed v must brake with b = 2·(v·t − D)/t². If the vehicle ahead stops short of X, or the gap has its
 //! minimum before the driver is clear, the driver must brake so as to stay behind.
 
@@ -43,8 +43,7 @@ impl Course {
         }
     }
 
-    /// Returns the time headway after the distance `distance_m` with the constant deceleration `slowing_mps2`, which is
-    /// at least 0 (s).
+    /// Returns the time headway after the distance `distance_m` at the constant deceleration `slowing_mps2` ≥ 0 (s).
     pub(super) fn thw_after_s(&self, distance_m: f64, slowing_mps2: f64) -> f64 {
         let square = self.speed_mps * self.speed_mps - 2.0 * slowing_mps2 * distance_m;
         let then_mps = square.max(STANDING_MPS * STANDING_MPS).sqrt();

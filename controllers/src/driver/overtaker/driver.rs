@@ -31,8 +31,7 @@ const ABORT_DURATION_S: f64 = 3.0;
 /// Required braking above which a driver steers more sharply than planned, to be clear earlier (m/s²).
 const EVASIVE_STEERING_FROM_MPS2: f64 = 3.0;
 
-/// Peak of the second derivative of the quintic: 10/√3. A lane change of width w and duration T has the peak lateral
-/// acceleration 5.77·w/T².
+/// Peak second derivative of the quintic, 10/√3: the lateral acceleration peaks at 5.77·width/duration².
 const QUINTIC_PEAK: f64 = 5.773_502_691_896_258;
 
 /// Phase of the overtaking manoeuvre.
@@ -70,9 +69,9 @@ pub(super) struct Change {
     start_s_m: f64,
     /// Length of the path along the road (m).
     length_m: f64,
-    /// Lateral position of the begin of the path (m).
+    /// Lateral position of the start of the path (m).
     start_d_m: f64,
-    /// Lateral distance from begin to end of the path (m).
+    /// Lateral distance from start to end of the path (m).
     lateral_distance_m: f64,
     /// Share of the length at which the driver is laterally clear of the overtaken vehicle.
     clear_at: f64,
@@ -274,7 +273,7 @@ impl OvertakerDriver {
         if let Some(ahead) = overtaken {
             let course = self.course(step, ahead, distance_to_clear_m);
             if !change.evasive && course.required_braking_mps2() > EVASIVE_STEERING_FROM_MPS2 {
-                action.lane_change = steer_evasively(step, &mut change, ahead, &self.settings);
+                action.lane_change = evade(step, &mut change, ahead, &self.settings);
             }
             action.acceleration_mps2 =
                 limited_by_course_mps2(requested_mps2, &self.course(step, ahead, change.distance_to_clear_m(own.s_m)));
@@ -316,10 +315,8 @@ impl OvertakerDriver {
     pub(super) fn cruise(&mut self, step: &Step<'_>, ahead: Option<&PerceivedVehicle>) -> DriverAction {
         let lead = ahead.map(|vehicle| &vehicle.lead);
         let requested_mps2 = self.model.acceleration_mps2(step.speed_mps, step.desired_mps, lead);
-        DriverAction {
-            acceleration_mps2: brake_for_brake_light(requested_mps2, step.speed_mps, ahead),
-            ..DriverAction::default()
-        }
+        let acceleration_mps2 = brake_for_brake_light(requested_mps2, step.speed_mps, ahead);
+        DriverAction { acceleration_mps2, ..DriverAction::default() }
     }
 
     /// Returns the acceleration behind the lead vehicle in the target lane (m/s²).
@@ -361,14 +358,8 @@ impl OvertakerDriver {
     }
 }
 
-/// Returns a lane change with evasive steering, and adopts it as the change in progress. Returns `None` if it is not
-/// sharper than planned.
-fn steer_evasively(
-    step: &Step<'_>,
-    change: &mut Change,
-    ahead: &PerceivedVehicle,
-    settings: &Overtaker,
-) -> Option<LaneChange> {
+/// Replaces `change` by one with evasive steering and returns its command, or `None` if it is not sharper than planned.
+fn evade(step: &Step<'_>, change: &mut Change, ahead: &PerceivedVehicle, settings: &Overtaker) -> Option<LaneChange> {
     let duration_s = (QUINTIC_PEAK * step.lateral_distance_m(change.target) / settings.evasive_lateral_mps2).sqrt();
     // Written so that a lateral acceleration of zero, for which the duration is infinite, means no sharper steering.
     if !(duration_s < settings.duration_s) {
@@ -383,7 +374,7 @@ fn steer_evasively(
     Some(LaneChange { target: change.target, duration_s })
 }
 
-/// Limits `requested_mps2` to the braking that the course requires, with a margin.
+/// Returns `requested_mps2`, lowered to the braking that the course requires (with a margin) if it exceeds that.
 fn limited_by_course_mps2(requested_mps2: f64, course: &Course) -> f64 {
     let required_mps2 = course.required_braking_mps2();
     if required_mps2 > TOLERATED_BRAKING_MPS2 {

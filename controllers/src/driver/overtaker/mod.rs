@@ -1,12 +1,12 @@
 //! A human driver who approaches fast, closes to a very short time headway, and only then changes lanes to overtake.
 //!
 //! ```text
-//!                    ┌─────────── passing lane not free ────────────┐
-//!                    ▼                                              │
-//!   start ──▶ approaching ── pulls out ──▶ changing ── centre in passing lane, clear ──▶ overtaking ──▶ passed
-//!                    ▲                        │                                                          │
-//!                    ├── back in lane ── aborting ◀── passing lane not free, own lane not yet left       │ if the
-//!                    └── back in lane ── returning ◀── gap in the original lane ─────────────────────────┘ scenario asks
+//!                  ┌─────────── passing lane not free ────────────┐
+//!                  ▼                                              │
+//! start ──▶ approaching ── pulls out ──▶ changing ── centre in passing lane, clear ──▶ overtaking ──▶ passed
+//!                  ▲                        │                                                          │
+//!                  ├── back in lane ── aborting ◀── passing lane not free, own lane not yet left       │ if the
+//!                  └── back in lane ── returning ◀── gap in the original lane ─────────────────────────┘ scenario asks
 //! ```
 //!
 //! In the phase *approaching* with a free passing lane, the driver keeps its speed: it does not slow down behind a

@@ -23,8 +23,8 @@ pub struct PrescribedConfig {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub profile: Option<Vec<[Num; 2]>>,
     /// Pairs of time (s) and acceleration (m/s²), with increasing times. Each acceleration holds until the next; before
-    /// the first it is zero. The driver starts at the initial speed; braking ends at standstill, accelerating at 100
-    /// m/s.
+    /// the first it is zero. The driver starts at the initial speed; braking ends at standstill, accelerating at
+    /// 100 m/s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub acceleration_profile: Option<Vec<[Num; 2]>>,
     /// The speeds of a vehicle in recorded traffic.
@@ -35,7 +35,7 @@ pub struct PrescribedConfig {
     pub lane_changes: Vec<PrescribedLaneChangeConfig>,
 }
 
-/// A track of a trajectory file. It is read together with the scenario file and replaces `profile` there.
+/// A track of a trajectory file, in place of `profile`. It is read together with the scenario file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct RecordedConfig {

@@ -17,7 +17,7 @@ pub struct PrescribedLaneChangeConfig {
     pub at_s: Num,
     /// Side of the target lane.
     pub to: Side,
-    /// Duration of the whole lane change at the speed at its begin (s): 1.5 to 20.
+    /// Duration of the whole lane change at the speed at which it begins (s): 1.5 to 20.
     pub duration_s: Num,
 }
 

@@ -123,7 +123,7 @@ pub(crate) fn brake_for_brake_light(requested_mps2: f64, speed_mps: f64, ahead: 
     }
 }
 
-/// Detects the begin of emergency braking.
+/// Detects the start of emergency braking.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct EmergencyBrakingDetector {
     brakes: bool,
