@@ -23,6 +23,7 @@ mod perception;
 mod readme;
 mod recordings;
 mod reenact;
+mod references;
 mod reports;
 mod rerun_files;
 mod statistics;
