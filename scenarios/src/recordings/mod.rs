@@ -5,7 +5,7 @@
 //!                            (one line or element at a time)            (memory: the open ones)         (all of them)
 //! ```
 //!
-//! The layout is told by what the file holds, not by its name; `docs/recordings.md` describes all of them for users:
+//! The layout is told by what the file holds, not by its name; `docs/trajectory-data.md` describes all of them for users:
 //!
 //! | layout | what | module |
 //! |---|---|---|
