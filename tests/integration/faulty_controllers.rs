@@ -128,9 +128,9 @@ fn run(fault: Option<Fault>, jobs: usize) -> (Vec<Record>, Summary) {
     let campaign = campaign(fault, jobs);
     let mut summary = campaign.summary();
     let mut records = Vec::new();
-    let taken = campaign.run(None, |turn| {
-        summary.push(turn.record);
-        records.push(turn.record.clone());
+    let taken = campaign.run(None, |next| {
+        summary.push(next.record);
+        records.push(next.record.clone());
         ControlFlow::Continue(())
     });
     taken.unwrap();
@@ -176,10 +176,10 @@ fn each_fault_is_an_error_with_its_reason_and_the_rest_is_right() {
 
 /// Runs `campaign` in a folder until `samples` more have been run, as if it had been stopped there.
 fn run_part(campaign: &Campaign, path: &Path, samples: usize) {
-    let held = Folder::hold(path, &manifest(campaign), true).unwrap();
+    let locked = Folder::lock(path, &manifest(campaign), true).unwrap();
     let mut left = samples;
-    let taken = campaign.run(Some(&held), |turn| {
-        left = if turn.is_new { left - 1 } else { left };
+    let taken = campaign.run(Some(&locked), |next| {
+        left = if next.is_new { left - 1 } else { left };
         if left == 0 { ControlFlow::Break(End::Campaign) } else { ControlFlow::Continue(()) }
     });
     taken.unwrap();

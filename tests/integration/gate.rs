@@ -97,8 +97,8 @@ fn counts(name: &str, tested: Arc<dyn ControllerFactory>) -> Counts {
     let work = Arc::new(Work { file, sampling, arms, checks: CheckPlan::default() });
     let mut summary = campaign.summary();
     let campaign = Campaign::new(vec![work.clone()], workers);
-    let taken = campaign.run(None, |turn| {
-        summary.push(turn.record);
+    let taken = campaign.run(None, |next| {
+        summary.push(next.record);
         ControlFlow::Continue(())
     });
     taken.unwrap();

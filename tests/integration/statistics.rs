@@ -40,9 +40,9 @@ fn run(seed: u64, samples: u64, stops: impl Fn(&ArmCounts) -> bool, mut see: imp
     let campaign = Campaign::new(vec![work.clone()], workers);
     let mut summary = campaign.summary();
     campaign
-        .run(None, |turn| {
-            see(turn.record);
-            summary.push(turn.record);
+        .run(None, |next| {
+            see(next.record);
+            summary.push(next.record);
             let counts = summary.total().arms[0];
             if stops(&counts) { ControlFlow::Break(End::Scenario) } else { ControlFlow::Continue(()) }
         })

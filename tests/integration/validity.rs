@@ -92,8 +92,8 @@ fn checked(on: DependsOn) -> Summary {
     let work = Arc::new(Work { file, sampling, arms, checks: CheckPlan::new(1.0, 100).unwrap() });
     let mut summary = campaign.summary();
     Campaign::new(vec![work.clone()], workers)
-        .run(None, |turn| {
-            summary.push(turn.record);
+        .run(None, |next| {
+            summary.push(next.record);
             ControlFlow::Continue(())
         })
         .unwrap();
