@@ -1,9 +1,10 @@
-//! What E perceives: rear LiDAR, rear camera, object-level sensors, and the tracker that they feed.
+//! What the ego vehicle perceives: models of its rear LiDAR, rear camera and object-level sensors, and the tracker
+//! behind the rear LiDAR.
 //!
 //! ```text
-//!            ┌ lidar/   scan pattern ─▶ ray cast ─▶ power, noise ─▶ points ─▶ ground removal ─▶ clusters ─▶ boxes ┐
-//!  Scene ────┤ camera/  crop of the image at each cluster ─▶ classifier ─▶ class scores                          ├─▶ tracking/ ─▶ tracks
-//!            └ object   range, noise, latency, field of view (front radar, surround; rear as a simple stand-in)  ┘
+//!            ┌ lidar/   scan pattern ─▶ ray cast ─▶ power, noise ─▶ points ─▶ clusters ─▶ boxes ┐
+//!  Scene ────┤ camera/  image crop at each cluster ─▶ classifier ─▶ class scores                ├─▶ tracking/ ─▶ tracks
+//!            └ object/  range, noise, latency, field of view (front radar, surround, rear sensor) ─▶ tracks
 //! ```
 
 pub mod camera;
