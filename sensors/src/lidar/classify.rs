@@ -30,8 +30,6 @@ const CLASS_MODELS: [ClassModel; 4] = [
     ClassModel { prior: 0.10, width_m: [0.70, 0.20], height_m: [1.50, 0.20], length_m: [2.2, 0.2] },
     ClassModel { prior: 0.10, width_m: [1.00, 1.50], height_m: [0.70, 0.60], length_m: [6.0, 10.0] },
 ];
-/// Index of the background class.
-const BACKGROUND: usize = 3;
 /// Tangent of the elevation of the uppermost layer's upper edge.
 const HIGHEST_TAN: f64 = 0.085;
 /// Distance from which the upper part of a vehicle may be missed entirely (m).
@@ -62,7 +60,7 @@ pub(crate) fn class_scores(fit: &BoxFit, width_seen: bool, lane: &LaneGeometry) 
     for (log, model) in logs.iter_mut().zip(&CLASS_MODELS) {
         *log = model.prior.ln() + width_log(fit, model, width_seen) + height_log(fit, model) + length_log(fit, model);
     }
-    logs[BACKGROUND] += background_log(fit, lane);
+    logs[ClassScores::BACKGROUND] += background_log(fit, lane);
     let max = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let mut scores = logs.map(|log| (log - max).exp());
     let sum: f64 = scores.iter().sum();

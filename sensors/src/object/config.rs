@@ -23,11 +23,11 @@
 //!
 //! All other values are assumptions.
 
-use closecall_traffic::{ConfigError, Num, Parameters, Problem, Range};
+use closecall_traffic::{CONTROL_STEP, ConfigError, Num, Parameters, Problem, Range};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::SCAN_PERIOD;
+use crate::lidar::HALF_FIELD_DEG;
 use crate::tracking::lifecycle::{LifecycleRules, MAX_WINDOW};
 
 /// Maximum latency in control steps: 0.4 s.
@@ -135,7 +135,7 @@ const SURROUND: Defaults = Defaults {
 
 const REAR_OBJECT: Defaults = Defaults {
     range_m: 120.0,
-    half_angle_deg: Some(66.5),
+    half_angle_deg: Some(HALF_FIELD_DEG),
     range_sd_m: 0.1,
     lateral_sd_m: 0.15,
     drift_sd_m: 0.1,
@@ -155,7 +155,7 @@ fn half_angle_not_allowed() -> ConfigError {
 /// Returns the number of whole control steps nearest to `time_s`, which is from 0 to 10 s.
 fn steps(time_s: f64) -> usize {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked to be 0 to 10 s")]
-    let steps = (time_s / SCAN_PERIOD.s()).round() as usize;
+    let steps = (time_s / CONTROL_STEP.s()).round() as usize;
     steps
 }
 
@@ -191,7 +191,7 @@ impl ObjectSensorConfig {
             (Some(num), _) => Some(parameters.number(num, "speed-sd-mps", Range::closed(0.01, 20.0))?),
             (None, default) => default,
         };
-        let longest_s = MAX_LATENCY_STEPS as f64 * SCAN_PERIOD.s();
+        let longest_s = MAX_LATENCY_STEPS as f64 * CONTROL_STEP.s();
         let latency_s = number(&self.latency_s, defaults.latency_s, "latency-s", Range::closed(0.0, longest_s))?;
         let dropout = number(&self.dropout, defaults.dropout, "dropout", Range::closed(0.0, 0.95))?;
         let coast_s = number(&self.coast_s, defaults.coast_s, "coast-s", Range::closed(0.0, 10.0))?;
@@ -206,7 +206,7 @@ impl ObjectSensorConfig {
                 number(&self.lateral_sd_m, defaults.lateral_sd_m, "lateral-sd-m", white_sd)?,
             ],
             drift_sd_m: number(&self.drift_sd_m, defaults.drift_sd_m, "drift-sd-m", Range::closed(0.0, 10.0))?,
-            drift_decay: (-SCAN_PERIOD.s() / drift_time_s).exp(),
+            drift_decay: (-CONTROL_STEP.s() / drift_time_s).exp(),
             speed_sd_mps,
             latency_steps: steps(latency_s),
             dropout,

@@ -8,7 +8,7 @@
 //! L is the latency in control steps. The vehicle that a measurement belongs to is known, because an object-level
 //! sensor models the output of a sensor with its own tracking. Only the full LiDAR chain can confuse two vehicles.
 
-use closecall_traffic::{ClassScores, Environment, Source, Track, TrackId, VehicleClass};
+use closecall_traffic::{CONTROL_STEP, ClassScores, Environment, Source, Track, TrackId, VehicleClass};
 
 use super::config::{MAX_LATENCY_STEPS, ObjectSensorModel};
 use super::noise::{MeasurementErrors, NoiseKey, TargetNoise};
@@ -23,15 +23,11 @@ use crate::tracking::lifecycle::Lifecycle;
 use crate::tracking::motion::{
     ACROSS_MODES, ACROSS_WHITE_MODE, ALONG_MODES, ALONG_WHITE_MODE, EgoRear, Mode, RearVehicle, Situation,
 };
-use crate::tracking::road_filter::in_ego_frame;
-use crate::{Health, SCAN_PERIOD, Scene};
+use crate::tracking::road_filter::{
+    LATERAL_SPEED_PRIOR_SD_MPS, POSITION_PRIOR_SD_M, SPEED_PRIOR_SD_MPS, in_ego_frame,
+};
+use crate::{Health, Scene};
 
-/// Prior standard deviation of a vehicle's speed, whose prior mean is the ego's speed (m/s).
-const SPEED_PRIOR_SD_MPS: f64 = 10.0;
-/// Prior standard deviation of a vehicle's position (m): wide enough to have no influence.
-const POSITION_PRIOR_SD_M: f64 = 1_000.0;
-/// Prior standard deviation of a vehicle's lateral speed (m/s).
-const LATERAL_SPEED_PRIOR_SD_MPS: f64 = 0.7;
 /// Standard deviation of a track's speed above which the track is not confirmed (m/s): no function could act on it yet.
 const SETTLED_SPEED_SD_MPS: f64 = 1.0;
 /// Share of the nominal range below which a sensor counts as degraded.
@@ -194,11 +190,11 @@ impl ObjectSensor {
         if let Some((_, _, [along, across])) = &mut target.filters {
             // The filter estimates the position of the vehicle's centre.
             let AxisEstimate { position_m, speed_mps, .. } = along.estimate();
-            let front_s_m = position_m + 0.5 * other.length_m + speed_mps * SCAN_PERIOD.s();
+            let front_s_m = position_m + 0.5 * other.length_m + speed_mps * CONTROL_STEP.s();
             let situation =
                 Situation::of(&RearVehicle { front_s_m, d_m: across.estimate().position_m, speed_mps }, ego);
             for axis in [along, across] {
-                axis.predict(SCAN_PERIOD.s(), model.drift_decay, situation);
+                axis.predict(CONTROL_STEP.s(), model.drift_decay, situation);
             }
         }
         if in_view && !errors.is_lost {
@@ -240,7 +236,7 @@ impl ObjectSensor {
 
     /// Stores the current estimate in the ring buffer, and appends the one stored `latency_steps` ago to `list`.
     fn report(&mut self, index: usize, other: &OtherVehicle, input: &ScanInput<'_>, list: &mut TrackList) {
-        let latency_s = self.model.latency_steps as f64 * SCAN_PERIOD.s();
+        let latency_s = self.model.latency_steps as f64 * CONTROL_STEP.s();
         let target = &mut self.targets[index];
         let length = target.reports.len();
         target.reports[self.step % length] = target.filters.map(|(id, lifecycle, [along, across])| Report {

@@ -8,6 +8,8 @@
 //! A slope is the distance to the left divided by the distance outward. Slopes order directions as angles do, without
 //! an arc tangent.
 
+use closecall_traffic::metrics::bumper_gap_m;
+
 use crate::surroundings::OtherVehicle;
 
 /// Viewing direction of a sensor.
@@ -118,7 +120,7 @@ fn silhouette(other: &OtherVehicle, outward: f64, mount_m: f64) -> Option<Silhou
 
 /// Returns the distance between the boxes of the ego and of `other`, both taken as parallel (m).
 fn box_distance_m(other: &OtherVehicle, ego_size_m: [f64; 2]) -> f64 {
-    let along_m = other.x_m.abs() - 0.5 * (other.length_m + ego_size_m[0]);
+    let along_m = bumper_gap_m(other.x_m.abs(), other.length_m, ego_size_m[0]);
     let across_m = other.y_m.abs() - 0.5 * (other.width_m + ego_size_m[1]);
     along_m.max(0.0).hypot(across_m.max(0.0))
 }

@@ -16,6 +16,7 @@
 //! independent. In road coordinates, a vehicle that follows a bend at constant speed moves uniformly, so a bend is not
 //! a manoeuvre.
 
+use closecall_traffic::CONTROL_STEP;
 use nalgebra::{Matrix4, Vector4};
 
 use super::motion::{MODES, Mode, Situation};
@@ -27,7 +28,7 @@ use super::motion::{MODES, Mode, Situation};
 /// vehicles in any direction.
 const MANOEUVRE_SD_M: f64 = 0.2;
 /// Maximum step of a prediction over a horizon (s).
-const MAX_STEP_S: f64 = 0.04;
+const MAX_STEP_S: f64 = CONTROL_STEP.s();
 /// Rest of a horizon that is due to rounding (s).
 const ROUNDING_S: f64 = 1e-9;
 

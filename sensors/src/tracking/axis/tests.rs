@@ -1,13 +1,13 @@
 //! Tests of the axis filter on motions and measurements that are drawn from its own model.
 
-use closecall_traffic::{ActorId, Stream, stream};
+use closecall_traffic::{ActorId, CONTROL_STEP, Stream, stream};
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
 use super::super::motion::{ACROSS_MODES, ALONG_MODES, ALONG_WHITE_MODE};
 use super::*;
 
-const STEP_S: f64 = 0.04;
+const STEP_S: f64 = CONTROL_STEP.s();
 const WHITE_SD_M: f64 = 0.1;
 const SLOW_SD_M: f64 = 0.1;
 const SLOW_SHARE: f64 = 0.96;
