@@ -98,14 +98,13 @@ impl CampaignArgs {
     /// Reads every scenario before anything is run.
     fn plan(&self, controllers: Vec<ControllerChoice>) -> Result<Plan, CliError> {
         let files = self.scenarios.iter().map(|path| self.set.load(path)).collect::<Result<Vec<_>, _>>()?;
-        Ok(Plan {
-            sensors: self.sensors.map(Sensing::mode),
-            partition: self.partition,
-            checks: self.plan.checks()?,
-            inference: self.plan.inference(),
-            workers: self.workers()?,
-            ..Plan::new(files, self.sampling(), controllers)?
-        })
+        let mut plan = Plan::new(files, self.sampling(), controllers)?;
+        plan.sensors = self.sensors.map(Sensing::mode);
+        plan.partition = self.partition;
+        plan.checks = self.plan.checks()?;
+        plan.inference = self.plan.inference();
+        plan.workers = self.workers()?;
+        Ok(plan)
     }
 }
 

@@ -13,7 +13,7 @@ use super::output::outln;
 use crate::exit_code::ExitCode;
 use closecall_campaign::runner::{Sampling, concrete, run_guarded};
 use closecall_report::traffic::in_car::InCarRecorder;
-use closecall_report::traffic::traffic::TrafficRecorder;
+use closecall_report::traffic::recorder::TrafficRecorder;
 use closecall_simulation::scenario::{ActorConfig, Scenario, ScenarioFile};
 use closecall_simulation::{Observer, RunKey};
 

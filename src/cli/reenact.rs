@@ -86,7 +86,7 @@ pub(super) fn reenact(args: &ReenactArgs) -> Result<ExitCode, CliError> {
     let scenario = file.concrete(&file.space().nominal())?;
     let key = RunKey { seed: args.seed, sample: 0 };
     let (outcome, simulated) = run_filmed(&scenario, key, &args.arm.arm()?, &args.watch)?;
-    let recorded = film_encounter(&found, args.watch.record_level)?;
+    let recorded = film_encounter(&found, args.watch.record_level.into())?;
     let comparison = Comparison::new(&found, &recorded, &simulated);
     let foreword = comparison.markdown(&found, &simulated, args.rear.into());
     let films = [recorded.with_foreword(foreword), simulated].map(|film| film.plotting_first(PROTAGONISTS));

@@ -19,7 +19,7 @@ use closecall_simulation::{Arm, Happening, Observer, RunKey, StepView};
 
 /// How much of a run is kept.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-enum RecordLevel {
+pub(super) enum RecordLevel {
     /// States, events and plots
     Events,
     /// The vehicles and what E takes them for as well
@@ -47,7 +47,7 @@ pub(super) struct WatchArgs {
     pub(super) record: Option<PathBuf>,
     /// How much of the run a Rerun file holds
     #[arg(long, value_enum, default_value_t, requires = "record")]
-    record_level: RecordLevel,
+    pub(super) record_level: RecordLevel,
     /// Write one row per control step and actor; of a pair, of the controller under test
     #[arg(long, value_name = "FILE.csv|FILE.parquet", value_parser = table)]
     pub(super) trace: Option<PathBuf>,
