@@ -44,6 +44,10 @@ pub fn lower_bound(hits: u64, samples: u64, confidence: f64) -> f64 {
     below
 }
 
+/// Coverage of the intervals that are reported: the least share of repetitions in which they contain the true
+/// probability.
+pub const COVERAGE: f64 = 0.95;
+
 /// The two-sided interval, with half of 1 − `confidence` on either side.
 pub fn clopper_pearson(hits: u64, samples: u64, confidence: f64) -> [f64; 2] {
     let one_sided = 0.5 * (1.0 + confidence);

@@ -10,13 +10,17 @@
 //! * [`sequence`]: bounds that hold at every number of samples at once, and may therefore be looked at all the time
 //! * [`needed`]: how many samples a bound still needs
 //! * [`mcnemar`]: whether pairs differ
+//! * [`quantiles`]: quantiles of sorted values, and the distribution that they define
+//! * [`normal`]: the truncated normal distribution
 //!
-//! Everything here rests on samples that are independent and equally distributed, as those of the random design are.
+//! Everything about probabilities rests on samples that are independent and equally distributed, as those of the random design are.
 
 pub mod binomial;
 pub mod interval;
 pub mod mcnemar;
 pub mod needed;
+pub mod normal;
+pub mod quantiles;
 pub mod sequence;
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ use closecall_traffic::{ClassScores, Side, Source, Time, Track, TrackId, TrackSt
 use serde::Serialize;
 
 use super::{EgoInput, Odometry};
+use crate::braking::Behind;
 
 /// Probability from which on a track counts as real, as being in a lane, or as a vehicle.
 const LIKELY: f64 = 0.5;
@@ -38,6 +39,20 @@ pub struct Front {
     pub speed_mps: f64,
     /// Acceleration of the lead vehicle, smoothed from its speed (m/s²).
     pub acceleration_mps2: f64,
+}
+
+impl Front {
+    /// Returns the constant braking with which the ego at `speed_mps` just keeps a gap of `standstill_gap_m` to the lead
+    /// vehicle (m/s²); 0 if none is needed.
+    pub(crate) fn required_braking_mps2(&self, speed_mps: f64, standstill_gap_m: f64) -> f64 {
+        Behind {
+            speed_mps,
+            lead_mps: self.speed_mps,
+            lead_mps2: self.acceleration_mps2,
+            room_m: self.gap_m - standstill_gap_m,
+        }
+        .required_mps2()
+    }
 }
 
 #[cfg(test)]

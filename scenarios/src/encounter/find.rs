@@ -1,6 +1,6 @@
 //! Assignment of the roles in an encounter, and its start and end.
 
-use closecall_traffic::metrics::time_headway_s;
+use closecall_traffic::metrics::{bumper_gap_m, time_headway_s};
 use closecall_traffic::{Absent, Lane, Measured, Time, Trajectory, TrajectoryPoint};
 
 use super::frame::{Frame, RoadSection};
@@ -119,8 +119,8 @@ impl<'a> Roles<'a> {
     fn headway_s(&self, time: Time) -> Measured {
         let (rear, ego) = (self.rear.at(time), self.ego.at(time));
         let (rear, ego) = rear.zip(ego).ok_or(Absent::NotRecorded)?;
-        let half_lengths_m = 0.5 * (self.rear.dimensions.length_m + self.ego.dimensions.length_m);
-        time_headway_s(ego.s_m - rear.s_m - half_lengths_m, rear.speed_mps)
+        let gap_m = bumper_gap_m(ego.s_m - rear.s_m, self.rear.dimensions.length_m, self.ego.dimensions.length_m);
+        time_headway_s(gap_m, rear.speed_mps)
     }
 }
 

@@ -1,5 +1,6 @@
 //! Empirical quantiles and parametric forms, with their confidence interval and goodness of fit.
 
+use closecall_statistics::quantiles::{median, quantile};
 use closecall_traffic::Stream;
 use rand::{RngExt, SeedableRng};
 use statrs::distribution::{ContinuousCDF, Normal};
@@ -103,21 +104,6 @@ fn stream(seed: u64, quantity: Quantity) -> Stream {
     hasher.update(&seed.to_le_bytes());
     hasher.update(quantity.name().as_bytes());
     Stream::from_seed(*hasher.finalize().as_bytes())
-}
-
-/// Returns the quantile of sorted values at probability `level`, by linear interpolation.
-fn quantile(sorted: &[f64], level: f64) -> f64 {
-    let position = level.clamp(0.0, 1.0) * (sorted.len() - 1) as f64;
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and the number of values")]
-    let below = position as usize;
-    let above = (below + 1).min(sorted.len() - 1);
-    sorted[below] + (position - below as f64) * (sorted[above] - sorted[below])
-}
-
-/// Returns the median of one or more values.
-pub(super) fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    quantile(&values, 0.5)
 }
 
 /// Returns the percentile bootstrap interval of the median.
@@ -241,8 +227,6 @@ fn goodness_of_fit(sorted: &[f64], form: Form, rng: &mut Stream) -> GoodnessOfFi
 
 #[cfg(test)]
 mod tests {
-    use proptest::prelude::*;
-
     use super::*;
 
     fn log_normal_values(n: usize, median: f64, sigma: f64) -> Vec<f64> {
@@ -283,16 +267,5 @@ mod tests {
         assert_eq!(interval(1), interval(1));
         let differs = (0..20).map(interval).any(|other| other != interval(1));
         assert!(differs, "different seeds give different resamples");
-    }
-
-    proptest! {
-        #[test]
-        fn quantiles_rise_from_the_smallest_to_the_largest(values in prop::collection::vec(0.1..50.0, 5..40)) {
-            let sorted = { let mut sorted = values.clone(); sorted.sort_by(f64::total_cmp); sorted };
-            let levels: Vec<f64> = (0..=10).map(|k| quantile(&sorted, f64::from(k) / 10.0)).collect();
-            prop_assert!(levels.windows(2).all(|pair| pair[0] <= pair[1]));
-            prop_assert_eq!(levels[0].to_bits(), sorted[0].to_bits());
-            prop_assert_eq!(levels[10].to_bits(), sorted[sorted.len() - 1].to_bits());
-        }
     }
 }

@@ -2,11 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use closecall_traffic::metrics::time_headway_s;
+use closecall_statistics::quantiles::median;
+use closecall_traffic::metrics::{CRITICAL_THW_S, bumper_gap_m, time_headway_s};
 use closecall_traffic::{Lane, Side, Time, Trajectory, TrajectoryPoint};
 
-use super::distribution::median;
-use crate::criticality::CRITICAL_THW_S;
 use crate::filters::{PERIOD, SmoothedRecording};
 use crate::lane_change::{LaneChange, detect};
 
@@ -185,7 +184,7 @@ fn lead_in(recording: &SmoothedRecording, track_id: u64, lane: Lane, time: Time)
 
 /// Returns the gap between two vehicles, bumper to bumper (m).
 fn gap_m(rear: (&Trajectory, &TrajectoryPoint), front: (&Trajectory, &TrajectoryPoint)) -> f64 {
-    front.1.s_m - rear.1.s_m - 0.5 * (front.0.dimensions.length_m + rear.0.dimensions.length_m)
+    bumper_gap_m(front.1.s_m - rear.1.s_m, front.0.dimensions.length_m, rear.0.dimensions.length_m)
 }
 
 /// Adds the median headway and speed of each pair of vehicles that follow each other for long enough.

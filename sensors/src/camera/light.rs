@@ -136,7 +136,8 @@ impl Illumination {
         // An overcast sky is grey, about as bright at the zenith as at the horizon, and illuminates from all sides.
         let grey = level.horizon.iter().sum::<f32>() / 3.0;
         let overcast = |clear_value: f32, grey_value: f32| grey_value + (clear_value - grey_value) * clear;
-        let extinction_per_m = KOSCHMIEDER / environment.visibility_m + rain_db_per_km(environment) * PER_METRE_OF_DB_PER_KM;
+        let extinction_per_m =
+            KOSCHMIEDER / environment.visibility_m + rain_db_per_km(environment) * PER_METRE_OF_DB_PER_KM;
         let brake = if ego.brake_light { BRAKE_LIGHT } else { 1.0 };
         Self {
             ambient: level.ambient.map(|value| overcast(value, 0.78 * grey)),

@@ -12,12 +12,6 @@ use closecall_traffic::Time;
 
 use crate::outcome::{Moment, MomentAt};
 
-/// Rear gap at which the encounter begins [m]: the paper's engaging distance.
-pub(super) const NEAR_GAP_M: f64 = 100.0;
-
-/// Closing speed from which on it is one [m/s]: 10 km/h.
-pub(super) const NEAR_CLOSING_MPS: f64 = 10.0 / 3.6;
-
 /// Collects the moments of a run.
 #[derive(Debug, Default)]
 pub(super) struct Moments {

@@ -9,8 +9,9 @@
 //! The vehicle in question, the challenger, is the latest one that was behind E in E's lane.
 
 use closecall_traffic::Time;
+use closecall_traffic::metrics::{CRITICAL_THW_S, bumper_gap_m};
 
-use crate::outcome::{CRITICAL_THW_S, Phase};
+use crate::outcome::Phase;
 use crate::world::World;
 
 /// Follows the phase of the encounter, step by step.
@@ -58,8 +59,8 @@ impl Encounter {
 
     /// Gap from the challenger's front to E's rear along the road [m]; negative once the challenger is past that.
     fn gap_m(&self, world: &World, ego: usize, actor: usize) -> f64 {
-        let half_lengths_m = 0.5 * (world.vehicle(ego).dimensions.length_m + world.vehicle(actor).dimensions.length_m);
-        world.state(ego).s_m - world.state(actor).s_m - half_lengths_m
+        let [ego_m, actor_m] = [ego, actor].map(|index| world.vehicle(index).dimensions.length_m);
+        bumper_gap_m(world.state(ego).s_m - world.state(actor).s_m, ego_m, actor_m)
     }
 }
 

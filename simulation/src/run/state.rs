@@ -6,15 +6,15 @@ use closecall_controllers::{
     SensorAvailability,
 };
 use closecall_sensors::{Health, NoiseKey, Perception, Scene, SceneVehicle};
-use closecall_traffic::{Measured, Track};
+use closecall_traffic::{CONTROL_STEP, ENGAGEMENT_CLOSING_MPS, ENGAGEMENT_GAP_M, Measured, Track};
 
 use super::events::Events;
 use super::humans::{Human, humans, weave};
 use super::margins::MarginMeter;
 use super::mis_log::{EgoNow, MisLog};
-use super::moments::{Moments, NEAR_CLOSING_MPS, NEAR_GAP_M};
+use super::moments::Moments;
 use super::phase::{AFTER_COLLISION, Encounter};
-use super::{Arm, CONTROL_STEP, Happening, MarginsNow, Observer, RunKey, SampleError, StepView};
+use super::{Arm, Happening, MarginsNow, Observer, RunKey, SampleError, StepView};
 use crate::outcome::{EndReason, Moment, Outcome, Phase};
 use crate::scenario::Scenario;
 use crate::world::{Action, Placed, World};
@@ -184,7 +184,8 @@ impl<'a> Run<'a> {
         let own_mps = self.world.state(self.scenario.ego).speed_mps;
         let is_near = self.margins.follower.is_some_and(|rear| {
             let closing_mps = self.world.state(rear).speed_mps - own_mps;
-            self.margins.gap_rear_m.is_ok_and(|gap_m| gap_m <= NEAR_GAP_M) && closing_mps >= NEAR_CLOSING_MPS
+            self.margins.gap_rear_m.is_ok_and(|gap_m| gap_m <= ENGAGEMENT_GAP_M)
+                && closing_mps >= ENGAGEMENT_CLOSING_MPS
         });
         let brakes = self.margins.lead.is_ok_and(|lead| self.world.state(lead.actor).brake_light);
         for (moment, is_now) in [

@@ -20,7 +20,7 @@ use closecall_controllers::{
 };
 use closecall_scenarios::encounter::{EGO, FRONT, Participant, REAR, RecordedEncounter};
 use closecall_scenarios::filters::PERIOD;
-use closecall_traffic::metrics::time_headway_s;
+use closecall_traffic::metrics::{bumper_gap_m, time_headway_s, touching_distance_m};
 use closecall_traffic::{ActorId, Choice, Num, RoadConfig, Time, Trajectory, TrajectoryPoint, VehicleConfig};
 use toml_edit::{ArrayOfTables, DocumentMut, Item};
 
@@ -173,8 +173,8 @@ fn start_of(vehicle: &Trajectory) -> Option<&TrajectoryPoint> {
 
 /// True where a vehicle that starts at `start` does not touch another one in its lane.
 fn is_clear(other: &Trajectory, start: &TrajectoryPoint, vehicle: &Participant) -> bool {
-    let half_lengths_m = 0.5 * (other.dimensions.length_m + vehicle.trajectory.dimensions.length_m);
-    start_of(other).is_none_or(|at| at.lane != start.lane || (at.s_m - start.s_m).abs() > half_lengths_m + LEAST_GAP_M)
+    let touching_m = touching_distance_m(other.dimensions.length_m, vehicle.trajectory.dimensions.length_m);
+    start_of(other).is_none_or(|at| at.lane != start.lane || (at.s_m - start.s_m).abs() > touching_m + LEAST_GAP_M)
 }
 
 fn ego_stack(encounter: &RecordedEncounter) -> DriverConfig {
@@ -225,9 +225,11 @@ fn overtaker(encounter: &RecordedEncounter) -> DriverConfig {
 
 /// Gap to `ahead` [m] and own speed [m/s] of a vehicle, up to a time.
 fn gaps(own: &Trajectory, ahead: &Trajectory, until: Time) -> impl Iterator<Item = (f64, f64)> {
-    let half_lengths_m = 0.5 * (own.dimensions.length_m + ahead.dimensions.length_m);
+    let [own_m, ahead_m] = [own, ahead].map(|vehicle| vehicle.dimensions.length_m);
     let before = own.points.iter().take_while(move |point| point.time < until);
-    before.filter_map(move |point| Some((ahead.at(point.time)?.s_m - point.s_m - half_lengths_m, point.speed_mps)))
+    before.filter_map(move |point| {
+        Some((bumper_gap_m(ahead.at(point.time)?.s_m - point.s_m, own_m, ahead_m), point.speed_mps))
+    })
 }
 
 /// Who is neither E, F nor R; nothing for those who are not simulated.

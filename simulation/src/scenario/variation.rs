@@ -1,6 +1,6 @@
 //! The same scenario, changed in ways that must not matter: what the validity checks run.
 
-use closecall_traffic::{Indicator, Road, Time, VehicleState};
+use closecall_traffic::{Road, Time, VehicleState};
 
 use super::{Actor, Scenario, Trigger};
 
@@ -48,16 +48,11 @@ impl Actor {
 }
 
 fn mirrored(state: &VehicleState, road: &Road) -> VehicleState {
-    let indicator = match state.indicator {
-        Indicator::Left => Indicator::Right,
-        Indicator::Right => Indicator::Left,
-        Indicator::Off => Indicator::Off,
-    };
     VehicleState {
         d_m: road.right_edge_m() - state.d_m,
         heading_rad: -state.heading_rad,
         yaw_rate_radps: -state.yaw_rate_radps,
-        indicator,
+        indicator: state.indicator.mirrored(),
         ..*state
     }
 }

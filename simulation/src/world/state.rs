@@ -6,8 +6,8 @@ use closecall_traffic::{ActorId, Indicator, Lane, Road, Time, Vehicle, VehicleSt
 use nalgebra::Vector2;
 
 use super::contact::{self, Touch};
-use super::neighbours;
 use super::impact::{BodyId, BodySpec, IMPACT_DURATION_S, Motion, Wreckage};
+use super::neighbours;
 use super::plant::Plant;
 use crate::outcome::{Collision, Phase};
 

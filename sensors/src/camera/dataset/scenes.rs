@@ -4,8 +4,8 @@ use std::f64::consts::PI;
 
 use closecall_traffic::metrics::bumper_gap_m;
 use closecall_traffic::{
-    CONTROL_STEP, Check, Choice, ConfigError, Dimensions, Environment, Indicator, Lane, Light, Num, Parameters, Road, RoadConfig,
-    Side, Stream, Time, Vehicle, VehicleClass, VehicleState,
+    CONTROL_STEP, Check, Choice, ConfigError, Dimensions, Environment, Indicator, Lane, Light, Num, Parameters, Road,
+    RoadConfig, Side, Stream, Time, Vehicle, VehicleClass, VehicleState,
 };
 use rand::RngExt;
 

@@ -1,8 +1,0 @@
-//! The steps of a run, exact multiples of each other.
-
-use closecall_traffic::Time;
-
-/// Step of the physics and of the human drivers: 100 Hz.
-pub const PHYSICS_STEP: Time = Time::from_ms(10);
-/// Step of the sensors and of the ego controller: 25 Hz.
-pub const CONTROL_STEP: Time = Time::from_ms(40);
