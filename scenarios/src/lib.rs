@@ -6,7 +6,7 @@ pub mod criticality;
 pub mod encounter;
 pub mod filters;
 pub mod fit;
-pub pub mod lane_change;
+pub mod lane_change;
 pub mod parameters;
 pub mod recordings;
 pub mod robustness;
