@@ -12,6 +12,7 @@ mod config;
 mod detection;
 mod ego_frame;
 mod full;
+mod gaussian;
 mod ground_truth;
 mod guard_rail;
 pub mod lidar;

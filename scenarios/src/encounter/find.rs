@@ -32,7 +32,7 @@ pub fn encounter(
     let origin_m = roles.ego.at(start).map_or(0.0, |point| point.s_m);
     let frame = Frame { start, end, origin_m, road };
     let (track_id, ego_id) = (roles.rear.track_id, roles.ego.track_id);
-    let vehicles = participants(recording, &roles, &frame, (all, period));
+    let vehicles = participants(recording, &roles, &frame, all, period);
     let vehicles = vehicles.ok_or(NoEncounter::LeavesTheRoad { track_id })?;
     let thw_s = roles.headway_s(Time::from_s(change.crossing_s));
     let is_behind = |thw_s: &f64| *thw_s > 0.0 && *thw_s <= LONGEST_THW_S;
@@ -145,7 +145,8 @@ fn participants(
     recording: &SmoothedRecording,
     roles: &Roles<'_>,
     frame: &Frame,
-    (all, period): (&[LaneChange], Time),
+    all: &[LaneChange],
+    period: Time,
 ) -> Option<Vec<Participant>> {
     let participant = |track: &Trajectory| {
         let within = |change: &&LaneChange| {

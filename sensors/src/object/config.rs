@@ -99,9 +99,14 @@ struct Defaults {
     speed_sd_mps: Option<f64>,
     latency_s: f64,
     dropout: f64,
-    /// `confirm-hits` and `confirm-window`.
-    confirm: (u8, u8),
+    confirm: Confirmation,
     coast_s: f64,
+}
+
+/// How a track is confirmed: by `hits` measurements within `window` scans.
+struct Confirmation {
+    hits: u8,
+    window: u8,
 }
 
 const DRIFT_TIME_S: f64 = 1.0;
@@ -116,7 +121,7 @@ const FRONT_RADAR: Defaults = Defaults {
     speed_sd_mps: Some(0.1),
     latency_s: 0.08,
     dropout: 0.02,
-    confirm: (3, 5),
+    confirm: Confirmation { hits: 3, window: 5 },
     coast_s: 0.6,
 };
 
@@ -129,7 +134,7 @@ const SURROUND: Defaults = Defaults {
     speed_sd_mps: None,
     latency_s: 0.04,
     dropout: 0.02,
-    confirm: (2, 4),
+    confirm: Confirmation { hits: 2, window: 4 },
     coast_s: 0.3,
 };
 
@@ -142,7 +147,7 @@ const REAR_OBJECT: Defaults = Defaults {
     speed_sd_mps: None,
     latency_s: 0.08,
     dropout: 0.05,
-    confirm: (3, 5),
+    confirm: Confirmation { hits: 3, window: 5 },
     coast_s: 1.0,
 };
 
@@ -216,12 +221,12 @@ impl ObjectSensorConfig {
     }
 
     fn rules(&self, defaults: &Defaults, dropout: f64, coast_steps: usize) -> Result<LifecycleRules, ConfigError> {
-        let window = self.confirm_window.unwrap_or(defaults.confirm.1);
+        let window = self.confirm_window.unwrap_or(defaults.confirm.window);
         if !(1..=MAX_WINDOW).contains(&window) {
             let problem = Problem::WrongCount { value: window.into(), allowed: "a number of scans from 1 to 16" };
             return Err(ConfigError::new("confirm-window", problem));
         }
-        let hits = self.confirm_hits.unwrap_or(defaults.confirm.0);
+        let hits = self.confirm_hits.unwrap_or(defaults.confirm.hits);
         if !(1..=window).contains(&hits) {
             let problem = Problem::WrongCount { value: hits.into(), allowed: "a number from 1 to `confirm-window`" };
             return Err(ConfigError::new("confirm-hits", problem));

@@ -15,6 +15,7 @@ use super::noise::{MeasurementErrors, NoiseKey, TargetNoise};
 use super::visibility::{Direction, Field, Visibility};
 use super::weather::range_in_weather_m;
 use crate::ego_frame::EgoFrame;
+use crate::gaussian::Gaussian;
 use crate::perception::FieldOfView;
 use crate::surroundings::OtherVehicle;
 use crate::tracking::TrackList;
@@ -122,7 +123,6 @@ impl ObjectSensor {
     /// Measures one scene, and appends to `list` the tracks whose latency has elapsed.
     pub(crate) fn scan(&mut self, input: &ScanInput<'_>, list: &mut TrackList) {
         let size = input.scene.ego.vehicle.dimensions;
-        let ego_size_m = [size.length_m, size.width_m];
         let state = &input.scene.ego.state;
         let ego = EgoRear {
             s_m: state.s_m - 0.5 * size.length_m,
@@ -133,13 +133,13 @@ impl ObjectSensor {
         self.update_range(input.scene.environment);
         let field =
             Field { direction: self.direction, range_m: self.range_m, half_angle_tan: self.model.half_angle_tan };
-        self.visibility.update(self.direction, input.others, ego_size_m);
+        self.visibility.update(self.direction, input.others, &size);
         for other in input.others {
             let index = self.target_index(other.actor);
             let errors = self.targets[index].noise.draw(&self.model);
-            let in_view = self.visibility.sees(&field, other, ego_size_m);
             let errors = errors.mirrored_for(input.scene.road.overtaking_side());
-            self.update_target(index, other, (in_view, errors), &ego, list);
+            let errors = self.visibility.sees(&field, other, &size).then_some(errors);
+            self.update_target(index, other, errors, &ego, list);
             self.report(index, other, input, list);
         }
         self.step += 1;
@@ -175,12 +175,12 @@ impl ObjectSensor {
         })
     }
 
-    /// Predicts and corrects the filters of one vehicle.
+    /// Predicts and corrects the filters of one vehicle. `errors` is `None` if the vehicle is not in view.
     fn update_target(
         &mut self,
         index: usize,
         other: &OtherVehicle,
-        (in_view, errors): (bool, MeasurementErrors),
+        errors: Option<MeasurementErrors>,
         ego: &EgoRear,
         list: &mut TrackList,
     ) {
@@ -195,16 +195,17 @@ impl ObjectSensor {
                 axis.predict(CONTROL_STEP.s(), model.drift_decay, situation);
             }
         }
-        if in_view && !errors.is_lost {
+        if let Some(errors) = errors.filter(|errors| !errors.is_lost) {
             let measured_m = [other.road_m[0] + errors.position_m[0], other.road_m[1] + errors.position_m[1]];
             let is_new = target.filters.is_none();
             let (_, lifecycle, [along, across]) = target.filters.get_or_insert_with(|| {
-                let speeds_mps = [[ego.speed_mps, SPEED_PRIOR_SD_MPS], [0.0, LATERAL_SPEED_PRIOR_SD_MPS]];
-                let prior = |axis: usize| {
-                    let position_m = [measured_m[axis], POSITION_PRIOR_SD_M];
-                    AxisFilter::prior(self.modes[axis], position_m, speeds_mps[axis])
+                let along_mps = Gaussian::new(ego.speed_mps, SPEED_PRIOR_SD_MPS);
+                let across_mps = Gaussian::new(0.0, LATERAL_SPEED_PRIOR_SD_MPS);
+                let prior = |axis: usize, speed_mps| {
+                    let position_m = Gaussian::new(measured_m[axis], POSITION_PRIOR_SD_M);
+                    AxisFilter::prior(self.modes[axis], position_m, speed_mps)
                 };
-                (list.new_id(), Lifecycle::first_hit(&model.rules), [prior(0), prior(1)])
+                (list.new_id(), Lifecycle::first_hit(&model.rules), [prior(0, along_mps), prior(1, across_mps)])
             });
             for (road_axis, axis) in [&mut *along, across].into_iter().enumerate() {
                 axis.measure_position(&AxisMeasurement {
@@ -221,7 +222,7 @@ impl ObjectSensor {
                 lifecycle.hit(&model.rules, along.estimate().speed_variance_m2ps2.sqrt() <= SETTLED_SPEED_SD_MPS);
             }
         } else if let Some((_, lifecycle, _)) = &mut target.filters {
-            if in_view {
+            if errors.is_some() {
                 lifecycle.miss(&model.rules)
             } else {
                 lifecycle.skip()

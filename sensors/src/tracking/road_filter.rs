@@ -8,6 +8,7 @@
 use super::axis::{AxisEstimate, AxisFilter, AxisFit, AxisMeasurement};
 use super::motion::{ACROSS_MODES, ALONG_MODES, EgoRear, RearVehicle, Situation};
 use crate::ego_frame::EgoFrame;
+use crate::gaussian::Gaussian;
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
 /// Prior standard deviation of a vehicle's speed, whose prior mean is the ego's speed (m/s).
@@ -71,10 +72,12 @@ pub(super) struct RoadFilter {
 impl RoadFilter {
     /// Creates a filter at its first measurement. The prior speed along the road is `speed_mps`.
     pub(super) fn new(measurement: &Measurement, speed_mps: f64) -> Self {
-        let at = |axis: &AxisMeasurement| [axis.position_m, POSITION_PRIOR_SD_M];
+        let at = |axis: &AxisMeasurement| Gaussian::new(axis.position_m, POSITION_PRIOR_SD_M);
+        let along_mps = Gaussian::new(speed_mps, SPEED_PRIOR_SD_MPS);
+        let across_mps = Gaussian::new(0.0, LATERAL_SPEED_PRIOR_SD_MPS);
         let mut filter = Self {
-            along: AxisFilter::prior(ALONG_MODES, at(&measurement.along), [speed_mps, SPEED_PRIOR_SD_MPS]),
-            across: AxisFilter::prior(ACROSS_MODES, at(&measurement.across), [0.0, LATERAL_SPEED_PRIOR_SD_MPS]),
+            along: AxisFilter::prior(ALONG_MODES, at(&measurement.along), along_mps),
+            across: AxisFilter::prior(ACROSS_MODES, at(&measurement.across), across_mps),
         };
         filter.correct(measurement, 0.0);
         filter
