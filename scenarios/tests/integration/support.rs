@@ -1,11 +1,11 @@
-//! What several tests need.
+//! Helpers shared by several tests.
 
 use std::path::{Path, PathBuf};
 
 use closecall_scenarios::recordings::{Recording, RecordingError, read_from};
 use closecall_traffic::{Lane, Time, Trajectory, TrajectoryPoint, VehicleClass};
 
-/// The folder of recorded data, or nothing, said so, where it is not there.
+/// Returns the folder with recorded traffic. Returns `None` and prints a notice if `CLOSECALL_DATA` is not set.
 pub(crate) fn data_folder() -> Option<PathBuf> {
     let folder = std::env::var_os("CLOSECALL_DATA").map(PathBuf::from);
     if folder.is_none() {
@@ -17,7 +17,7 @@ pub(crate) fn data_folder() -> Option<PathBuf> {
     folder
 }
 
-/// Reads a recording from text.
+/// Reads trajectory data from text.
 pub(crate) fn read_text(text: &[u8]) -> Result<Recording, RecordingError> {
     read_from(text, Path::new("made-up.csv"))
 }
@@ -26,9 +26,9 @@ pub(crate) fn read_text(text: &[u8]) -> Result<Recording, RecordingError> {
 pub(crate) const PLAIN_HEADER: &str = "recording_id,track_id,vehicle_id,frame,time_s,s_m,d_m,lane_id,speed_mps,\
      accel_mps2,heading_rel_rad,x_m,y_m,length_m,width_m,vehicle_class,source_scenario";
 
-/// One lane change of a made-up vehicle.
+/// One lane change of a synthetic vehicle.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct MadeUp {
+pub(crate) struct SyntheticLaneChange {
     pub(crate) track_id: u64,
     pub(crate) speed_mps: f64,
     pub(crate) start_s: f64,
@@ -36,11 +36,12 @@ pub(crate) struct MadeUp {
     pub(crate) to_the_left: bool,
 }
 
-/// Lane width of made-up roads [m].
+/// Lane width of synthetic roads (m).
 pub(crate) const LANE_M: f64 = 3.75;
 
-/// A vehicle that changes once between lanes 1 and 2 on a quintic path, recorded for 20 s.
-pub(crate) fn track(change: MadeUp, period: Time) -> Trajectory {
+/// Creates the track of a vehicle that changes lanes once between lanes 1 and 2 on a quintic path. The track lasts 20
+/// s.
+pub(crate) fn track(change: SyntheticLaneChange, period: Time) -> Trajectory {
     const RECORDED_S: f64 = 20.0;
     let (from, to) = if change.to_the_left { (-1.5 * LANE_M, -0.5 * LANE_M) } else { (-0.5 * LANE_M, -1.5 * LANE_M) };
     let point = |frame: i64| {
