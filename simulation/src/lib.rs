@@ -18,7 +18,8 @@ pub mod run;
 pub mod scenario;
 mod world;
 
+pub use closecall_traffic::CONTROL_STEP;
 pub use run::{
-    Arm, CONTROL_STEP, ControllerFactory, Happening, Lead, MarginsNow, NoObserver, Observer, PHYSICS_STEP, RunKey,
-    SampleError, StepView, TrackAuditor, simulate,
+    Arm, ControllerFactory, Happening, Lead, MarginsNow, NoObserver, Observer, RunKey, SampleError, StepView,
+    TrackAuditor, simulate,
 };
