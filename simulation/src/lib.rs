@@ -13,6 +13,8 @@
 //! one that names rapier, inside `world`.
 
 pub mod controller;
+pub mod criteria;
+pub mod harm;
 pub mod outcome;
 pub mod run;
 pub mod scenario;

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 use closecall_traffic::ActorId;
 
-use closecall_simulation::outcome::{Outcome, worse};
+use crate::outcome::{Outcome, worse};
 
 /// The weight and its source, for reports.
 pub const WEIGHT: &str = "driver deaths expected, (delta-v / 31.74 m/s)^4 for each vehicle (Joksch 1993)";
