@@ -17,7 +17,7 @@ use std::fmt;
 use closecall_statistics::format::percent;
 use serde::Serialize;
 
-use super::gate::{ExpectationResult, GateResult, Judge, RequirementResult, Standing};
+use super::gate::{ExpectationResult, GateResult, GateSource, Judge, RequirementResult, Standing};
 use super::probability::{Answer, Finding};
 use super::summary::Summary;
 use super::validity::CheckCounts;
@@ -166,7 +166,7 @@ pub fn judge(summary: &Summary, judge: &Judge, max_flip_rate: f64) -> Judgement 
     for requirement in requirements.iter().filter(|requirement| !has_criteria(requirement)) {
         found.note(format!("not checked: {}: {}: it has no criteria", requirement.scenario, requirement.mark));
     }
-    let is_judged = !probabilities.is_empty() || gates.iter().any(GateResult::is_decided);
+    let is_judged = !probabilities.is_empty() || is_judged(&gates);
     let decision = if judge.is_measurement() {
         // Errors, and a simulator that cannot be believed, spoil a measurement, too.
         let spoils = |decision: &Decision| matches!(decision, Decision::SampleError | Decision::Invalid);
@@ -179,6 +179,15 @@ pub fn judge(summary: &Summary, judge: &Judge, max_flip_rate: f64) -> Judgement 
         Decision::first_of(&found.decisions).unwrap_or(Decision::Pass)
     };
     Judgement { decision, reasons: found.reasons, gates, requirements, expectations, probabilities }
+}
+
+/// Returns true if the gates say something: a gate that somebody set is decided, or every check of every requirement is. A
+/// requirement that is checked in part is not checked.
+fn is_judged(gates: &[GateResult]) -> bool {
+    let is_check = |gate: &&GateResult| matches!(gate.source, GateSource::Requirement(_));
+    let (checks, set): (Vec<&GateResult>, Vec<&GateResult>) = gates.iter().partition(is_check);
+    set.iter().any(|gate| gate.is_decided())
+        || (!checks.is_empty() && checks.iter().all(|gate| gate.standing() != Standing::NotChecked))
 }
 
 fn judge_validity(checks: &CheckCounts, max_flip_rate: f64, found: &mut Found) {

@@ -91,7 +91,11 @@ impl fmt::Display for GateResult {
         if let Answer::Open(reason) = answer {
             write!(f, "; {}", reason.text())?;
         }
-        write!(f, "; from {})", self.source)
+        match self.source {
+            // The name says so already.
+            GateSource::Requirement(_) => f.write_str(")"),
+            _ => write!(f, "; from {})", self.source),
+        }
     }
 }
 

@@ -174,5 +174,6 @@ pub const MEASURES: &[Measure] = &[
         Some(outcome.ego_delta_v_mps().unwrap_or(0.0))
     }),
     number("harm", "driver deaths expected from all collisions of the sample", |outcome| Some(harm(outcome))),
+    number("duration_s", "duration of the run", |outcome| Some(outcome.duration.s())),
     number("thw_gain_s", "front time headway gained from the engagement to the critical distance", thw_gain_s),
 ];
