@@ -6,14 +6,13 @@ use std::fmt::Write;
 use closecall::simulation::scenario::ScenarioConfig;
 use serde_json::Value;
 
+use super::files::{ANNOTATED, at_root};
 use super::probe::Probe;
 use super::schema::{Key, Kind, Step, Table, Way, tables};
 use super::text::Described;
 
-/// The tables that describe an object-level sensor, in the order of the columns of [`SENSOR_DEFAULTS`].
-pub(crate) const SENSORS: [&str; 3] = ["front-radar", "surround", "rear-object"];
-
-/// What the object-level sensors do by default. A sensor without a default does not have the property.
+/// The defaults of the object-level sensors: of the front radar, the surround sensors and the rear object-level sensor. A
+/// sensor without a default does not have the property.
 pub(crate) const SENSOR_DEFAULTS: [(&str, [Option<f64>; 3]); 13] = [
     ("range-m", [Some(150.0), Some(14.0), Some(120.0)]),
     ("half-angle-deg", [Some(45.0), None, Some(66.5)]),
@@ -65,7 +64,7 @@ pub(crate) fn scenario_page() -> Result<String, Box<dyn Error>> {
     let probe = Probe::new()?;
     let schema = schemars::schema_for!(ScenarioConfig);
     let tables = tables(schema.as_value(), &|key| probe.position(key));
-    let annotated = std::fs::read_to_string(super::at_root(super::ANNOTATED))?;
+    let annotated = std::fs::read_to_string(at_root(ANNOTATED))?;
     let mut page = format!("{INTRODUCTION}```toml\n{annotated}```\n{READING}");
     writeln!(page, "## The tables\n")?;
     for table in &tables {

@@ -1,7 +1,7 @@
 //! What the checks of a scenario allow, asked of the checks themselves.
 //!
 //! The scenario that uses every key is changed in one place and checked again. A number far beyond any range is refused
-//! with the range that is allowed; a default that is stated is right if the scenario with it is the scenario without it.
+//! with the range that is allowed.
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -10,6 +10,7 @@ use closecall::simulation::scenario::{ScenarioError, ScenarioFile};
 use closecall::traffic::{KeyPath, Problem, Segment};
 use toml::{Table, Value};
 
+use super::files::{EVERY_KEY, at_root};
 use super::schema::Step;
 
 /// Larger than every number that a scenario allows.
@@ -28,7 +29,7 @@ pub(crate) struct Probe {
 impl Probe {
     /// Reads the scenario that uses every key.
     pub(crate) fn new() -> Result<Self, Box<dyn Error>> {
-        let path = super::at_root(super::EVERY_KEY);
+        let path = at_root(EVERY_KEY);
         let text = std::fs::read_to_string(&path)?;
         let table = text.parse()?;
         Ok(Self { path, text, table })
@@ -80,24 +81,15 @@ impl Probe {
         shortened(&text, minimum)
     }
 
-    /// Returns true if the scenario with `value` at `at` is the same as without any value there.
-    pub(crate) fn is_default(&self, at: &KeyPath, value: &Value) -> Result<bool, Box<dyn Error>> {
-        let concrete = |value: Option<Value>| -> Result<String, Box<dyn Error>> {
-            let table = self.with(at, value).ok_or("the key cannot be set")?;
-            let file = self.check(&table)?;
-            Ok(format!("{:?}", file.concrete(&file.space().nominal())?))
-        };
-        Ok(concrete(Some(value.clone()))? == concrete(None)?)
-    }
-
-    fn check(&self, table: &Table) -> Result<ScenarioFile, ScenarioError> {
+    /// Reads and checks a changed scenario.
+    pub(crate) fn check(&self, table: &Table) -> Result<ScenarioFile, ScenarioError> {
         let file = ScenarioFile::parse(&self.path, &table.to_string(), &[])?;
         file.check()?;
         Ok(file)
     }
 
-    /// The scenario with another value at `at`, or with none.
-    fn with(&self, at: &KeyPath, value: Option<Value>) -> Option<Table> {
+    /// Returns the scenario with another value at `at`, or with none; `None` if there is no such place.
+    pub(crate) fn with(&self, at: &KeyPath, value: Option<Value>) -> Option<Table> {
         let mut root = Value::Table(self.table.clone());
         let (last, way) = at.0.split_last()?;
         let mut place = &mut root;
