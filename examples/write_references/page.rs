@@ -82,7 +82,7 @@ fn section(page: &mut String, table: &Table, all: &[Table], probe: &Probe) -> Re
     let titles: Vec<String> = table.ways.iter().map(|way| format!("`{}`", title(way))).collect();
     let way = &table.ways[0];
     writeln!(page, "\n<a id=\"{}\"></a>\n\n### {}\n", anchor(way), titles.join(", "))?;
-    let Described { meaning, .. } = Described::new("", &table.description);
+    let Described { meaning, .. } = Described::new("", &table.description, false);
     if !meaning.is_empty() {
         writeln!(page, "{meaning}\n")?;
     }
@@ -98,19 +98,17 @@ fn section(page: &mut String, table: &Table, all: &[Table], probe: &Probe) -> Re
 }
 
 fn row(page: &mut String, table: &Table, key: &Key, all: &[Table], probe: &Probe) -> Result<(), Box<dyn Error>> {
-    let described = Described::new(&key.name, &key.description);
+    let is_number = !table.is_choice && matches!(key.kind, Kind::Number { .. } | Kind::Either(_));
+    let described = Described::new(&key.name, &key.description, is_number);
     let inner: Vec<Way> = table.ways.iter().map(|way| with(way, Step::Key(key.name.clone()))).collect();
     let found = inner.iter().flat_map(|way| probe.values(way)).next();
-    let value = value(key, &inner[0], all, probe);
+    let value = value(key, &inner, all, probe);
     let meaning = described.meaning.replace('|', "\\|");
     if table.is_choice {
         writeln!(page, "| `{}` | {value} | {meaning} |", key.name)?;
         return Ok(());
     }
-    let unit = match key.kind {
-        Kind::Number { .. } | Kind::Either(_) => described.unit.as_deref().unwrap_or(""),
-        _ => "",
-    };
+    let unit = described.unit.as_deref().unwrap_or("");
     let example = match found {
         Some((_, example)) if is_short(&key.kind) => format!("`{example}`"),
         _ => String::new(),
@@ -124,15 +122,17 @@ fn row(page: &mut String, table: &Table, key: &Key, all: &[Table], probe: &Probe
     Ok(())
 }
 
-/// What a key holds, and what is allowed there.
-fn value(key: &Key, way: &Way, all: &[Table], probe: &Probe) -> String {
-    let range = |way: &Way, is_whole| {
-        let found = probe.values(way).into_iter().find(|(_, value)| !value.is_array() && !value.is_table());
+/// What a key holds, and what is allowed there. `ways` are all of its places.
+fn value(key: &Key, ways: &[Way], all: &[Table], probe: &Probe) -> String {
+    let way = &ways[0];
+    let range = |is_whole| {
+        let mut values = ways.iter().flat_map(|way| probe.values(way));
+        let found = values.find(|(_, value)| !value.is_array() && !value.is_table());
         found.and_then(|(at, _)| probe.allowed(&at, is_whole))
     };
     let ranged = |name: String, range: Option<String>| range.map_or(name.clone(), |range| format!("{name}, {range}"));
     match &key.kind {
-        Kind::Number { .. } | Kind::Whole => ranged(name(&key.kind), range(way, key.kind == Kind::Whole)),
+        Kind::Number { .. } | Kind::Whole => ranged(name(&key.kind), range(key.kind == Kind::Whole)),
         Kind::Table | Kind::Map(_) => {
             link(way, all).map_or(name(&key.kind), |link| format!("[{}]({link})", name(&key.kind)))
         }
@@ -158,7 +158,7 @@ fn value(key: &Key, way: &Way, all: &[Table], probe: &Probe) -> String {
                 .iter()
                 .map(|kind| match (kind, link(way, all)) {
                     (Kind::Table, Some(link)) => format!("[table]({link})"),
-                    (Kind::Number { .. }, _) => ranged(name(kind), range(way, false)),
+                    (Kind::Number { .. }, _) => ranged(name(kind), range(false)),
                     _ => name(kind),
                 })
                 .collect();
@@ -210,6 +210,7 @@ fn default(key: &Key, stated: Option<String>) -> String {
         (Some(Value::String(word)), None) if word.is_empty() => "empty".to_owned(),
         (Some(Value::String(word)), None) => format!("`{word}`"),
         (Some(Value::Array(list)), None) if list.is_empty() => "none".to_owned(),
+        (Some(Value::Object(map)), None) if map.is_empty() => "none".to_owned(),
         (Some(Value::Object(_)), None) => "its defaults".to_owned(),
         (Some(value), None) => value.to_string(),
         (None, None) => "-".to_owned(),

@@ -32,8 +32,8 @@ pub(crate) struct Described {
 }
 
 impl Described {
-    /// Takes a doc comment of the key `name` apart.
-    pub(crate) fn new(name: &str, description: &str) -> Self {
+    /// Takes a doc comment of the key `name` apart. `is_number` says whether the key has a unit of its own.
+    pub(crate) fn new(name: &str, description: &str, is_number: bool) -> Self {
         let plain = description
             .replace(", as a scenario file describes them", "")
             .replace(", as a scenario file describes it", "")
@@ -45,8 +45,8 @@ impl Described {
             Some(found) => (found.rest, Some(found.value)),
             None => (plain, None),
         };
-        let by_name = ENDS.iter().find(|(end, _)| name.ends_with(end)).map(|(_, unit)| (*unit).to_owned());
-        let written = UNITS.iter().find(|unit| meaning.contains(&format!(" ({unit})")));
+        let by_name = ENDS.iter().find(|(end, _)| is_number && name.ends_with(end)).map(|(_, unit)| (*unit).to_owned());
+        let written = UNITS.iter().find(|unit| is_number && meaning.contains(&format!(" ({unit})")));
         let unit = by_name.or(written.filter(|unit| **unit != "0 to 1").map(|unit| (*unit).to_owned()));
         let meaning = match written {
             Some(unit) => meaning.replacen(&format!(" ({unit})"), "", 1),
