@@ -13,15 +13,13 @@ use std::collections::VecDeque;
 
 use closecall_traffic::{Road, Stream, Time, Track, VehicleState};
 
-use crate::lidar::{Lidar, RearLidar};
+use crate::lidar::{HALF_FIELD_TAN, Lidar, RearLidar};
 use crate::object::{DEGRADED_SHARE, NoiseKey, ObjectSensor, ObjectSensorModel, ScanInput, range_in_weather_m};
 use crate::perception::FieldOfView;
 use crate::surroundings::{OtherVehicle, transform_scene};
 use crate::tracking::{RearView, TrackList, Tracker, TrackerModel, TrackerScan};
 use crate::{Detection, Health, Perception, Scene, SensorError, SensorHealth};
 
-/// Tangent of half of the LiDAR's horizontal field of view, 66.5° (Valeo SCALA Gen 2).
-const HALF_ANGLE_TAN: f64 = 2.2998;
 /// Number of successive scans without a single point, not even from the road, after which the LiDAR counts as blocked:
 /// 1 s.
 const BLOCKED_AFTER_SCANS: u32 = 25;
@@ -145,7 +143,7 @@ impl FullPerception {
             return;
         }
         if let Some(scan) = self.pending.front() {
-            let view = RearView { half_angle_tan: HALF_ANGLE_TAN, range_m: self.nominal_range_m, sensor_x_m };
+            let view = RearView { half_angle_tan: HALF_FIELD_TAN, range_m: self.nominal_range_m, sensor_x_m };
             let scan =
                 TrackerScan { time: scan.time, road: &scan.road, ego: scan.ego, view, detections: &scan.detections };
             self.tracker.update(&scan, &mut self.list);
@@ -179,6 +177,6 @@ impl Perception for FullPerception {
     }
 
     fn rear_field(&self) -> Option<FieldOfView> {
-        Some(FieldOfView { half_angle_tan: HALF_ANGLE_TAN, range_m: self.nominal_range_m })
+        Some(FieldOfView { half_angle_tan: HALF_FIELD_TAN, range_m: self.nominal_range_m })
     }
 }

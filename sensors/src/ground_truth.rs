@@ -3,6 +3,7 @@
 //! The tracks are exact, confirmed at once, and of certain class. Only their distance is limited, so that a function
 //! that engages on a confirmed track behind the ego does not engage on a vehicle a kilometre away.
 
+use closecall_traffic::metrics::touching_distance_m;
 use closecall_traffic::{ClassScores, Source, Track, TrackId, TrackStatus};
 use nalgebra::{Matrix4, Vector4};
 
@@ -33,7 +34,7 @@ impl GroundTruth {
 }
 
 fn source(other: &OtherVehicle, ego_length_m: f64) -> Source {
-    let alongside_m = 0.5 * (ego_length_m + other.length_m);
+    let alongside_m = touching_distance_m(ego_length_m, other.length_m);
     if other.x_m >= alongside_m {
         Source::Front
     } else if other.x_m <= -alongside_m {

@@ -5,9 +5,6 @@ use closecall_traffic::{Time, Track};
 use crate::lidar::RearLidar;
 use crate::{Detection, Scene};
 
-/// Period of the control steps and of the scans: 25 Hz.
-pub const SCAN_PERIOD: Time = Time::from_ms(40);
-
 /// Operating state of a group of sensors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Health {
@@ -42,7 +39,7 @@ pub struct FieldOfView {
 
 /// All of the ego's sensors with their processing, from the scene to the tracks.
 ///
-/// The loop calls [`Perception::step`] once in each control step (25 Hz), in order of time.
+/// The loop calls [`Perception::step`] once in each control step, in order of time.
 pub trait Perception: Send {
     /// Measures the scene and returns the tracks of all sensors: front, surround and rear.
     ///

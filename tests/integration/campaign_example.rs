@@ -1,9 +1,9 @@
-//! A campaign from Rust, from the example's one file.
+//! The example `campaign` runs a campaign from Rust, without the command line.
 
 #[path = "../../examples/campaign.rs"]
 mod example;
 
 #[test]
-fn the_example_runs_a_campaign_without_the_command_line() {
+fn the_example_runs_a_campaign() {
     example::main().unwrap();
 }

@@ -1,4 +1,4 @@
-//! A campaign against an earlier one.
+//! `compare` holds one campaign against an earlier one.
 
 use std::path::{Path, PathBuf};
 
@@ -14,12 +14,12 @@ fn campaign(out: PathBuf, more: &[&str]) -> PathBuf {
     out
 }
 
-fn compare(one: &Path, other: &Path, more: &[&str]) -> std::process::Output {
-    let folders = ["compare", one.to_str().unwrap(), other.to_str().unwrap()];
+fn compare(baseline: &Path, other: &Path, more: &[&str]) -> std::process::Output {
+    let folders = ["compare", baseline.to_str().unwrap(), other.to_str().unwrap()];
     closecall(folders.iter().chain(more))
 }
 
-/// The samples in which E collided, by the journal.
+/// Returns the samples of a campaign's journal in which the ego collided.
 fn failing(folder: &Path) -> Vec<u64> {
     let records = Folder::open(folder).records().unwrap().map(Result::unwrap);
     let collided = |record: &closecall_campaign::record::Record| {
@@ -29,7 +29,7 @@ fn failing(folder: &Path) -> Vec<u64> {
 }
 
 #[test]
-fn a_regression_is_found_and_named_and_a_fix_is_none() {
+fn compare_names_newly_failing_and_fixed_samples() {
     let folder = folder();
     let with = campaign(folder.path().join("mis"), &["-n", "80"]);
     let without = campaign(folder.path().join("acc"), &["-n", "80", "--controller", "acc"]);
@@ -42,7 +42,7 @@ fn a_regression_is_found_and_named_and_a_fix_is_none() {
         |value: &Value| value.as_array().unwrap().iter().map(|value| value.as_u64().unwrap()).collect::<Vec<_>>();
     assert_eq!((list(&found["newly_failing"]), list(&found["fixed"])), (newly.clone(), fixed.clone()));
     assert_eq!(found["samples"], 80);
-    // The margin that the system adds is lost.
+    // Without the MIS the ego has less headway.
     let margin = &found["margins"]["min_thw_front_s"];
     assert!(margin["worst_change"].as_f64().unwrap() < 0.0);
     let text = stdout(&compare(&with, &without, &[]), 1);
@@ -50,7 +50,7 @@ fn a_regression_is_found_and_named_and_a_fix_is_none() {
     assert!(text.contains(&format!("{} newly failing: {}", newly.len(), newly[0])), "{text}");
     let allowed = newly.len().to_string();
     stdout(&compare(&with, &without, &["--max-newly-failing", &allowed]), 0);
-    // The other way round, what is newly failing is what was fixed.
+    // With the folders exchanged, the fixed samples are the newly failing ones.
     let back = json(&compare(&without, &with, &["--format", "json"]), i32::from(!fixed.is_empty()));
     assert_eq!(list(&back["scenarios"]["low-thw-overtake"]["newly_failing"]), fixed);
 }
@@ -66,7 +66,7 @@ fn a_campaign_is_no_regression_against_itself() {
 }
 
 #[test]
-fn campaigns_of_other_samples_are_not_compared() {
+fn campaigns_with_different_samples_are_not_compared() {
     let folder = folder();
     let one = campaign(folder.path().join("one"), &["-n", "12"]);
     let longer = campaign(folder.path().join("longer"), &["-n", "13"]);

@@ -1,75 +1,147 @@
-//! The same scenario, seed and binary give the same bits: with one thread or two, again, alone or in a campaign.
+//! The same binary, scenario and seed give the same bits: with any number of jobs, in every repetition, alone or in a
+//! campaign.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use closecall_campaign::folder::Folder;
+use closecall_campaign::record::Record;
+use closecall_campaign::saved::SavedCampaign;
+use closecall_simulation::{NoObserver, simulate};
 use serde_json::Value;
 
 use crate::support::{closecall, folder, json, library, stdout};
 
-fn campaign(out: &Path, jobs: &str) {
-    let out = out.to_str().unwrap();
+/// Runs a paired campaign of 60 samples, or of another number, with seed 7.
+fn campaign(out: &Path, more: &[&str]) {
     let scenario = library("low-thw-overtake");
-    let args =
-        ["campaign", scenario.to_str().unwrap(), "-n", "60", "--seed", "7", "--paired", "--jobs", jobs, "--out", out];
-    stdout(&closecall(args), 0);
+    let args = ["campaign", scenario.to_str().unwrap(), "--seed", "7", "--paired", "--out", out.to_str().unwrap()];
+    let size: &[&str] = if more.contains(&"-n") { &[] } else { &["-n", "60"] };
+    stdout(&closecall(args.iter().chain(size).chain(more)), 0);
+}
+
+/// Files of a campaign's folder that differ between two runs: they hold wall times, or come from the Rerun SDK.
+fn varies(path: &str) -> bool {
+    ["timings.parquet", "report.html", "wall-times.jsonl"].contains(&path) || path.ends_with(".rrd")
+}
+
+/// Returns the content of each file below `folder` by its path. A file that varies has no content here. The manifest
+/// lacks the command, which names the folder and the number of jobs.
+fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut files = BTreeMap::new();
+    let mut folders = vec![folder.to_owned()];
+    while let Some(current) = folders.pop() {
+        for entry in std::fs::read_dir(&current).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+                continue;
+            }
+            let name = path.strip_prefix(folder).unwrap().to_str().unwrap().to_owned();
+            let mut bytes = std::fs::read(&path).unwrap();
+            if name == "manifest.json" {
+                let mut manifest: Value = serde_json::from_slice(&bytes).unwrap();
+                manifest.as_object_mut().unwrap().remove("command").unwrap();
+                bytes = manifest.to_string().into_bytes();
+            }
+            files.insert(name.clone(), if varies(&name) { Vec::new() } else { bytes });
+        }
+    }
+    files
 }
 
 #[test]
-fn outcomes_are_the_same_bytes_with_any_number_of_jobs_and_again() {
-    let folders = [folder(), folder(), folder()];
-    for (folder, jobs) in folders.iter().zip(["1", "2", "2"]) {
-        campaign(&folder.path().join("out"), jobs);
+fn a_campaign_writes_the_same_bytes_with_any_number_of_jobs_and_in_every_repetition() {
+    let folder = folder();
+    let [one_job, two_jobs, repetition] =
+        [("one-job", "1"), ("two-jobs", "2"), ("repetition", "2")].map(|(name, jobs)| {
+            let out = folder.path().join(name);
+            campaign(&out, &["--jobs", jobs, "--record", "worst:1"]);
+            files(&out)
+        });
+    for name in
+        ["manifest.json", "journal.jsonl", "outcomes.parquet", "junit.xml", "summary.md", "recordings/index.html"]
+    {
+        assert!(!one_job[name].is_empty(), "{name} is empty");
     }
-    for file in ["outcomes.parquet", "journal.jsonl", "junit.xml"] {
-        let bytes = |place: usize| std::fs::read(folders[place].path().join("out").join(file)).unwrap();
-        assert!(!bytes(0).is_empty(), "{file}");
-        assert!(bytes(0) == bytes(1), "{file} differs between one job and two");
-        assert!(bytes(1) == bytes(2), "{file} differs between two runs");
+    for (other, what) in [(&two_jobs, "two jobs"), (&repetition, "a repetition")] {
+        assert_eq!(one_job.keys().collect::<Vec<_>>(), other.keys().collect::<Vec<_>>(), "files of {what}");
+        for (name, bytes) in &one_job {
+            assert!(*bytes == other[name], "{name} differs between one job and {what}");
+        }
     }
 }
 
+/// Returns the records of a campaign's journal in the order of the samples.
+fn records(out: &Path) -> Vec<Record> {
+    Folder::open(out).records().unwrap().map(Result::unwrap).collect()
+}
+
 #[test]
-fn a_replay_gives_the_journal_s_outcome_to_the_last_bit() {
+fn a_replay_gives_the_outcome_of_the_journal_to_the_last_bit() {
     let folder = folder();
     let out = folder.path().join("out");
-    campaign(&out, "2");
-    let records: Vec<_> = Folder::open(&out).records().unwrap().map(|record| record.unwrap()).collect();
+    campaign(&out, &["--jobs", "2"]);
+    let saved = SavedCampaign::open(&out).unwrap();
+    let records = records(&out);
     for sample in [0, 17, 59] {
-        for arm in &records[sample].arms {
-            let number = sample.to_string();
-            let args = ["replay", out.to_str().unwrap(), &number, "--controller", &arm.controller, "--format", "json"];
-            let replayed = json(&closecall(args), 0);
-            let outcome = arm.result.as_ref().unwrap();
-            // JSON floats are written so that they read back exactly.
-            let margin = outcome.margins.min_thw_front_s.unwrap();
-            assert_eq!(replayed["margins"]["min_thw_front_s"].as_f64().unwrap().to_bits(), margin.to_bits());
-            let jerk = outcome.margins.max_jerk_mps3;
-            assert_eq!(replayed["margins"]["max_jerk_mps3"].as_f64().unwrap().to_bits(), jerk.to_bits());
-            assert_eq!(replayed["duration_s"].as_f64().unwrap().to_bits(), outcome.duration.s().to_bits());
-            assert_eq!(replayed["collisions"].as_array().map(Vec::len), Some(outcome.collisions.len()));
+        let (scenario, key) = saved.sample(None, sample).unwrap();
+        for arm in &records[usize::try_from(sample).unwrap()].arms {
+            let again = simulate(&scenario, key, &saved.arm(Some(&arm.controller)).unwrap(), &mut NoObserver).unwrap();
+            // Numbers are written so that they read back exactly: equal text means equal bits.
+            let [replayed, kept] = [&again, arm.result.as_ref().unwrap()].map(|it| serde_json::to_string(it).unwrap());
+            assert_eq!(replayed, kept, "sample {sample} with {}", arm.controller);
+        }
+    }
+}
+
+/// Runs one sample with a trace, and returns the printed JSON and the trace.
+fn traced(folder: &Path, args: &[&str]) -> (Value, Vec<u8>) {
+    let trace = folder.join("trace.csv");
+    let more = ["--format", "json", "--trace", trace.to_str().unwrap()];
+    let printed = json(&closecall(args.iter().chain(&more)), 0);
+    (printed, std::fs::read(&trace).unwrap())
+}
+
+#[test]
+fn a_single_run_prints_and_traces_the_same_as_a_replay_of_the_campaign_s_sample() {
+    let folder = folder();
+    let out = folder.path().join("out");
+    campaign(&out, &["--jobs", "2"]);
+    let scenario = library("low-thw-overtake");
+    for sample in ["5", "17"] {
+        for controller in ["acc", "mis"] {
+            let replay = ["replay", out.to_str().unwrap(), sample, "--controller", controller];
+            let run =
+                ["run", scenario.to_str().unwrap(), "--seed", "7", "--sample", sample, "--controller", controller];
+            let [(replayed, replayed_trace), (alone, trace)] =
+                [&replay[..], &run[..]].map(|args| traced(folder.path(), args));
+            assert_eq!(replayed, alone, "sample {sample} with {controller}");
+            assert!(trace.len() > 10_000 && trace == replayed_trace, "the traces of sample {sample} with {controller}");
         }
     }
 }
 
 #[test]
-fn a_single_run_is_the_campaign_s_sample() {
+fn a_sample_does_not_depend_on_the_number_of_samples() {
     let folder = folder();
-    let out = folder.path().join("out");
-    campaign(&out, "2");
-    let replayed = json(&closecall(["replay", out.to_str().unwrap(), "5", "--format", "json"]), 0);
-    let scenario = library("low-thw-overtake");
-    let args = ["run", scenario.to_str().unwrap(), "--seed", "7", "--sample", "5", "--format", "json"];
-    assert_eq!(json(&closecall(args), 0), replayed);
+    let [short, long] = ["6", "20"].map(|samples| {
+        let out = folder.path().join(samples);
+        campaign(&out, &["-n", samples]);
+        records(&out)
+    });
+    assert_eq!((short.len(), long.len()), (6, 20));
+    let text = |records: &[Record]| serde_json::to_string(records).unwrap();
+    assert_eq!(text(&short), text(&long[..6]));
 }
 
 #[test]
-fn a_sample_does_not_depend_on_how_many_there_are() {
+fn zero_is_a_seed_like_any_other() {
     let scenario = library("low-thw-overtake");
-    let run = |seed: &str| -> Value {
+    let run = |seed: &str| {
         let args = ["run", scenario.to_str().unwrap(), "--seed", seed, "--sample", "3", "--format", "json"];
         json(&closecall(args), 0)
     };
-    assert_eq!(run("1"), run("1"));
-    assert_ne!(run("1")["parameters"], run("0")["parameters"], "0 is a seed like any other");
+    assert_eq!(run("0"), run("0"));
+    assert_ne!(run("0")["parameters"], run("1")["parameters"]);
 }

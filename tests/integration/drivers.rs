@@ -1,4 +1,4 @@
-//! The human drivers in the whole loop: what a scenario file asks of them is what they do.
+//! The human drivers do in the closed loop what the scenario file asks of them.
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -15,22 +15,23 @@ use statrs::distribution::{ContinuousCDF, LogNormal};
 
 use crate::support::{closecall, folder, library, stdout};
 
-/// Samples of each distribution.
+/// The number of samples of each distribution.
 const SAMPLES: u64 = 300;
 
-/// Level at which a Kolmogorov–Smirnov test rejects.
+/// Significance level of the Kolmogorov–Smirnov tests.
 const LEVEL: f64 = 0.01;
 
-/// Largest distance of the drawn values' distribution from the one asked for, and the probability of one as large.
-fn kolmogorov_smirnov(mut drawn: Vec<f64>, cdf: impl Fn(f64) -> f64) -> (f64, f64) {
-    drawn.sort_by(f64::total_cmp);
-    let n = drawn.len() as f64;
-    let distance = drawn
+/// Returns the largest distance between the distribution of `values` and `cdf`, and the probability of a distance at
+/// least as large.
+fn kolmogorov_smirnov(mut values: Vec<f64>, cdf: impl Fn(f64) -> f64) -> (f64, f64) {
+    values.sort_by(f64::total_cmp);
+    let n = values.len() as f64;
+    let distance = values
         .iter()
         .enumerate()
-        .map(|(place, value)| {
+        .map(|(index, value)| {
             let expected = cdf(*value);
-            (expected - place as f64 / n).max((place + 1) as f64 / n - expected)
+            (expected - index as f64 / n).max((index + 1) as f64 / n - expected)
         })
         .fold(0.0, f64::max);
     // Stephens' form of the asymptotic distribution (Journal of the Royal Statistical Society B 32 (1970) 115–122).
@@ -39,10 +40,10 @@ fn kolmogorov_smirnov(mut drawn: Vec<f64>, cdf: impl Fn(f64) -> f64) -> (f64, f6
     (distance, (1..=100).map(term).sum::<f64>().clamp(0.0, 1.0))
 }
 
-/// Prints a test's result past the test runner's capture, and fails where it rejects.
-fn must_follow(what: &str, drawn: Vec<f64>, cdf: impl Fn(f64) -> f64) {
-    let n = drawn.len();
-    let (distance, p) = kolmogorov_smirnov(drawn, cdf);
+/// Fails if `values` do not follow the distribution `cdf`. Prints the result past the capture of the test runner.
+fn assert_follows(what: &str, values: Vec<f64>, cdf: impl Fn(f64) -> f64) {
+    let n = values.len();
+    let (distance, p) = kolmogorov_smirnov(values, cdf);
     writeln!(std::io::stderr(), "{what}: Kolmogorov-Smirnov D = {distance:.4}, p = {p:.3}, n = {n}")
         .expect("standard error");
     assert!(p > LEVEL, "{what}: D = {distance}, p = {p}");
@@ -63,7 +64,7 @@ duration-s = 20.0
 road = { lanes = 3, lane-width-m = 3.75, curvature-per-m = 0.0, speed-limit-mps = 36.1, overtaking-side = "left" }
 "#;
 
-/// E follows F, R follows E; F brakes after 12 s.
+/// The ego follows the lead vehicle, the rear vehicle follows the ego. The lead vehicle brakes after 12 s.
 const REACTION: &str = r#"
 [[actor]]
 id = "ego"
@@ -88,23 +89,23 @@ start = { behind = { of = "ego", thw-s = 1.0, speed-mps = 30.0 } }
 driver = { wiedemann99 = { cc1-s = 0.9, reaction-s = { log-normal = { median = 0.9, sigma = 0.3 } } } }
 "#;
 
-/// When E's brake light goes on, and when R decelerates afterwards.
+/// The time at which the ego's brake light goes on, and the time at which the rear vehicle then decelerates.
 #[derive(Default)]
 struct BrakeLight {
     on: Option<Time>,
-    answered: Option<Time>,
+    rear_decelerates: Option<Time>,
 }
 
 impl Observer for BrakeLight {
     fn step(&mut self, view: &StepView<'_>) {
-        // More than the oscillation of following, which is 0.25 m/s².
+        // More than the oscillation of a following driver, which is 0.25 m/s².
         const DECELERATES_MPS2: f64 = -0.3;
-        let [ego, _, rear] = view.vehicles else { unreachable!("three vehicles drive here") };
+        let [ego, _, rear] = view.vehicles else { unreachable!("the scenario has three vehicles") };
         if ego.state.brake_light && self.on.is_none() {
             self.on = Some(view.time);
         }
-        if self.on.is_some() && self.answered.is_none() && rear.state.acceleration_mps2 < DECELERATES_MPS2 {
-            self.answered = Some(view.time);
+        if self.on.is_some() && self.rear_decelerates.is_none() && rear.state.acceleration_mps2 < DECELERATES_MPS2 {
+            self.rear_decelerates = Some(view.time);
         }
     }
 
@@ -112,7 +113,7 @@ impl Observer for BrakeLight {
 }
 
 #[test]
-fn the_delay_between_brake_light_and_deceleration_is_the_reaction_time_asked_for() {
+fn the_delay_between_brake_light_and_deceleration_follows_the_reaction_time_of_the_scenario() {
     let file = ScenarioFile::parse(Path::new("reaction.toml"), &format!("{ROAD}{REACTION}"), &[]).unwrap();
     let delays: Vec<f64> = (0..SAMPLES)
         .map(|index| {
@@ -120,25 +121,28 @@ fn the_delay_between_brake_light_and_deceleration_is_the_reaction_time_asked_for
             let key = RunKey { seed: 5, sample: index };
             simulate(&sample(&file, 5, index), key, &arm(BuiltIn::Acc), &mut light).unwrap();
             let on = light.on.unwrap();
-            assert!(on > Time::from_s(12.0), "sample {index}: on at {on}");
-            (light.answered.unwrap() - on).s()
+            assert!(on > Time::from_s(12.0), "sample {index}: the brake light is on at {on}");
+            (light.rear_decelerates.unwrap() - on).s()
         })
         .collect();
-    let asked = LogNormal::new(0.9_f64.ln(), 0.3).unwrap();
-    must_follow("delay between E's brake light and R's deceleration", delays, |delay_s| asked.cdf(delay_s));
+    let expected = LogNormal::new(0.9_f64.ln(), 0.3).unwrap();
+    assert_follows("delay between the ego's brake light and the rear vehicle's deceleration", delays, |delay_s| {
+        expected.cdf(delay_s)
+    });
 }
 
-/// R's time headway to E at the moment at which its centre crosses the marking.
+/// The rear vehicle's time headway to the ego when its centre crosses the lane marking.
 #[derive(Default)]
 struct Crossing {
+    /// Distance beyond the marking (m) and time headway (s) at the step before.
     before: Option<(f64, f64)>,
     thw_s: Option<f64>,
 }
 
 impl Observer for Crossing {
     fn step(&mut self, view: &StepView<'_>) {
-        let place = |id: &str| view.scenario.actors.iter().position(|actor| actor.id.as_str() == id).unwrap();
-        let [ego, rear] = [place("ego"), place("rear")].map(|place| &view.vehicles[place]);
+        let index = |id: &str| view.scenario.actors.iter().position(|actor| actor.id.as_str() == id).unwrap();
+        let [ego, rear] = ["ego", "rear"].map(|id| &view.vehicles[index(id)]);
         let lengths_m = ego.vehicle.dimensions.length_m + rear.vehicle.dimensions.length_m;
         let thw_s = (ego.state.s_m - rear.state.s_m - 0.5 * lengths_m) / rear.state.speed_mps;
         let marking_m = -view.scenario.road.lane_width_m();
@@ -155,8 +159,9 @@ impl Observer for Crossing {
     fn happening(&mut self, _: Time, _: &Happening) {}
 }
 
-/// The overtaking that nobody brakes in, as it ships and with an R that weaves and whose wanted speed wanders.
-fn steady_and_human() -> [ScenarioFile; 2] {
+/// Returns the scenario `overtake-without-brake` as it ships, and with a rear vehicle that weaves in its lane and
+/// varies its speed.
+fn steady_and_weaving() -> [ScenarioFile; 2] {
     let text = std::fs::read_to_string(library("overtake-without-brake")).unwrap();
     let folder = folder();
     let load = |name: &str, text: &str| {
@@ -164,46 +169,49 @@ fn steady_and_human() -> [ScenarioFile; 2] {
         std::fs::write(&path, text).unwrap();
         ScenarioFile::load(&path, &[]).unwrap()
     };
-    let human = "lane-keeping = { sdlp-m = 0.2 }\nspeed-keeping = { acceleration-noise-mps2 = 0.1 }\n\n[sensors]";
+    let weaving = "lane-keeping = { sdlp-m = 0.2 }\nspeed-keeping = { acceleration-noise-mps2 = 0.1 }\n\n[sensors]";
     assert!(text.contains("[[actor]]\nid = \"rear\"") && text.contains("\n\n[sensors]"));
-    [load("steady.toml", &text), load("human.toml", &text.replace("\n[sensors]", human))]
+    [load("steady.toml", &text), load("weaving.toml", &text.replace("\n[sensors]", weaving))]
 }
 
 #[test]
-fn the_headway_at_the_crossing_of_the_marking_is_the_one_asked_for() {
-    let [file, human] = steady_and_human();
+fn the_headway_at_the_crossing_of_the_marking_follows_the_distribution_of_the_scenario() {
+    let [file, weaving] = steady_and_weaving();
     let name = ParameterName::new("cut-out-thw-s").unwrap();
-    let asked = file.space().get(&name).unwrap().distribution.clone();
+    let expected = file.space().get(&name).unwrap().distribution.clone();
     let headway_s = |file: &ScenarioFile, controller, index| {
         let mut crossing = Crossing::default();
         let key = RunKey { seed: 5, sample: index };
         let scenario = sample(file, 5, index);
         simulate(&scenario, key, &arm(controller), &mut crossing).unwrap();
-        let Some(Value::Number(asked_s)) = scenario.parameters.get(&name) else { panic!("{name} is a number") };
-        (crossing.thw_s.unwrap(), *asked_s)
+        let Some(Value::Number(drawn_s)) = scenario.parameters.get(&name) else { panic!("{name} is a number") };
+        (crossing.thw_s.unwrap(), *drawn_s)
     };
     let without: Vec<f64> = (0..SAMPLES).map(|index| headway_s(&file, BuiltIn::Acc, index).0).collect();
-    must_follow("R's headway at the crossing of the marking", without, |thw_s| asked.cdf(thw_s).unwrap());
-    // With the system, E brakes while R is on its way to the marking: R foresees the braking that it has felt, no more. And one
-    // who weaves foresees that it stays as far beside its path as it is, which it does not.
-    for (who, file, controller) in [("with the system", &file, BuiltIn::Mis), ("while weaving", &human, BuiltIn::Acc)] {
+    assert_follows("the rear vehicle's headway at the crossing of the marking", without, |thw_s| {
+        expected.cdf(thw_s).unwrap()
+    });
+    // The driver predicts its crossing from the ego's deceleration, as it perceives it, and from its own present
+    // offset. With the MIS the ego's deceleration changes, and while weaving the offset changes. The headway is then
+    // only close to the drawn one.
+    for (when, file, controller) in [("with the MIS", &file, BuiltIn::Mis), ("while weaving", &weaving, BuiltIn::Acc)] {
         let found: Vec<(f64, f64)> = (0..SAMPLES).map(|index| headway_s(file, controller, index)).collect();
-        let drawn = found.iter().map(|(thw_s, _)| *thw_s).collect();
-        let (distance, p) = kolmogorov_smirnov(drawn, |thw_s| asked.cdf(thw_s).unwrap());
-        let mut errors_s: Vec<f64> = found.iter().map(|(thw_s, asked_s)| thw_s - asked_s).collect();
+        let headways_s = found.iter().map(|(thw_s, _)| *thw_s).collect();
+        let (distance, p) = kolmogorov_smirnov(headways_s, |thw_s| expected.cdf(thw_s).unwrap());
+        let mut errors_s: Vec<f64> = found.iter().map(|(thw_s, drawn_s)| thw_s - drawn_s).collect();
         errors_s.sort_by(f64::total_cmp);
         let [low_s, median_s, high_s] = [5, 50, 95].map(|percent| errors_s[errors_s.len() * percent / 100]);
         writeln!(
             std::io::stderr(),
-            "the same {who}: D = {distance:.4}, p = {p:.3}; off by {low_s:.3}, {median_s:.3}, {high_s:.3} s (5, 50, 95 %)"
+            "the same {when}: D = {distance:.4}, p = {p:.3}; off by {low_s:.3}, {median_s:.3}, {high_s:.3} s (5, 50, 95 %)"
         )
         .expect("standard error");
-        assert!(median_s.abs() < 0.03, "{who}: {median_s}");
-        assert!(low_s > -0.15 && high_s < 0.15, "{who}: {low_s} to {high_s}");
+        assert!(median_s.abs() < 0.03, "{when}: {median_s}");
+        assert!(low_s > -0.15 && high_s < 0.15, "{when}: {low_s} to {high_s}");
     }
 }
 
-/// E far behind in another lane, and the vehicles of a test.
+/// Runs the vehicles of a test with an ego far behind them in another lane. Returns the rows of the trace by actor.
 fn traced(actors: &str, duration_s: f64) -> BTreeMap<String, Vec<Row>> {
     let folder = folder();
     let (path, trace) = (folder.path().join("drivers.toml"), folder.path().join("trace.csv"));
@@ -218,7 +226,7 @@ fn traced(actors: &str, duration_s: f64) -> BTreeMap<String, Vec<Row>> {
     let mut rows: BTreeMap<String, Vec<Row>> = BTreeMap::new();
     for line in std::fs::read_to_string(&trace).unwrap().lines().skip(1) {
         let cells: Vec<&str> = line.split(',').collect();
-        let number = |place: usize| cells[place].parse::<f64>().ok();
+        let number = |column: usize| cells[column].parse::<f64>().ok();
         rows.entry(cells[1].to_owned()).or_default().push(Row {
             time_s: number(0).unwrap(),
             speed_mps: number(5).unwrap(),
@@ -229,7 +237,7 @@ fn traced(actors: &str, duration_s: f64) -> BTreeMap<String, Vec<Row>> {
     rows
 }
 
-/// One row of a trace.
+/// A row of a trace.
 struct Row {
     time_s: f64,
     speed_mps: f64,
@@ -237,7 +245,7 @@ struct Row {
     gap_m: Option<f64>,
 }
 
-/// A leader, and a follower behind it.
+/// Returns a lead vehicle and a follower as tables of a scenario file.
 fn pair(profile: &str, follower: &str) -> String {
     format!(
         "[[actor]]\nid = \"lead\"\nvehicle = {{ class = \"car\" }}\n\
@@ -249,9 +257,9 @@ fn pair(profile: &str, follower: &str) -> String {
 }
 
 #[test]
-fn a_trace_shows_the_gap_of_wiedemann_99_in_its_band() {
+fn a_wiedemann_99_driver_keeps_its_gap_in_the_band_of_the_model() {
     for (cc1_s, reaction) in [(0.35, ""), (0.75, ""), (1.2, ""), (0.55, ", reaction-s = 0.8")] {
-        // 27.3 m/s, then down to 21.7 m/s within 4 s, and kept.
+        // The lead vehicle slows from 27.3 m/s to 21.7 m/s within 4 s, and keeps that speed.
         let profile = "{ profile = [[0.0, 27.3], [40.0, 27.3], [44.0, 21.7]] }";
         let follower = format!("{{ wiedemann99 = {{ cc1-s = {cc1_s}{reaction} }} }}");
         let rows = &traced(&pair(profile, &follower), 200.0)["tail"];
@@ -265,7 +273,7 @@ fn a_trace_shows_the_gap_of_wiedemann_99_in_its_band() {
 }
 
 #[test]
-fn a_cascade_of_followers_comes_to_rest_behind_a_leader_that_accelerates_and_brakes_by_a_list() {
+fn a_column_of_followers_stops_without_contact_behind_a_lead_vehicle_with_prescribed_accelerations() {
     let mut actors = pair(
         "{ acceleration-profile = [[6.0, 1.1], [9.0, 0.0], [30.0, -5.3]] }",
         "{ wiedemann99 = { cc1-s = 0.9, reaction-s = 0.7 } }",
@@ -286,7 +294,7 @@ fn a_cascade_of_followers_comes_to_rest_behind_a_leader_that_accelerates_and_bra
     }
     let rows = traced(&actors, 75.0);
     let lead_at = |time_s: f64| rows["lead"].iter().find(|row| row.time_s >= time_s).unwrap().speed_mps;
-    // 27.3 + 3 · 1.1 = 30.6 m/s, which are braked away at 5.3 m/s² in 5.8 s.
+    // 27.3 + 3 · 1.1 = 30.6 m/s; braking at 5.3 m/s² from there takes 5.8 s.
     assert!((lead_at(20.0) - 30.6).abs() < 0.05 && lead_at(36.5) < 0.05, "{} {}", lead_at(20.0), lead_at(36.5));
     for follower in ["tail", "second", "third", "fourth"] {
         let rows = &rows[follower];
@@ -297,11 +305,11 @@ fn a_cascade_of_followers_comes_to_rest_behind_a_leader_that_accelerates_and_bra
 }
 
 #[test]
-fn a_recorded_vehicle_is_followed_and_the_scenario_needs_the_recording_no_more() {
+fn a_loaded_scenario_holds_the_track_of_a_recorded_vehicle_and_no_longer_needs_the_trajectory_file() {
     let folder = folder();
-    let recording = folder.path().join("own.csv");
+    let trajectories = folder.path().join("own.csv");
     let library = library("overtake-without-brake");
-    stdout(&closecall(["record", library.to_str().unwrap(), "-n", "1", "-o", recording.to_str().unwrap()]), 0);
+    stdout(&closecall(["record", library.to_str().unwrap(), "-n", "1", "-o", trajectories.to_str().unwrap()]), 0);
     let actors = pair("{ recorded = { file = \"own.csv\", track-id = 1 } }", "{ wiedemann99 = {} }");
     let ego = "[[actor]]\nid = \"ego\"\nvehicle = { class = \"car\" }\n\
                start = { absolute = { lane = 1, s-m = -900.0, speed-mps = 20.0 } }\n\
@@ -311,10 +319,11 @@ fn a_recorded_vehicle_is_followed_and_the_scenario_needs_the_recording_no_more()
     std::fs::write(&path, &text).unwrap();
     let file = ScenarioFile::load(&path, &[]).unwrap();
     assert!(file.text().contains("profile") && !file.text().contains("recorded"), "{}", file.text());
-    std::fs::remove_file(&recording).unwrap();
+    std::fs::remove_file(&trajectories).unwrap();
     let again = ScenarioFile::parse(&path, file.text(), &[]).unwrap();
     assert_eq!(again.text(), file.text());
-    // Without the recording, the file as it was written says what is missing and where.
+    // The scenario as it was written needs the trajectory file. The error names the file, and the line that asks for
+    // it.
     let error = ScenarioFile::parse(&path, &text, &[]).unwrap_err().to_string();
     let line = 1 + text.lines().position(|line| line.contains("recorded")).unwrap();
     assert!(error.contains(&format!("scenario.toml:{line}")) && error.contains("own.csv"), "{error}");

@@ -1,13 +1,20 @@
-//! A campaign that is killed, cut short by a full disk, or shared out gives the same bytes as one that is left alone.
+//! A campaign that is killed and resumed, stopped by a full disk, or split among machines gives the same bytes as one
+//! that runs undisturbed.
 
 use std::fs;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::support::{closecall, code, folder, library, stderr, stdout};
+use crate::support::{ROOT, closecall, code, folder, library, program, stderr, stdout};
 
 const SAMPLES: usize = 400;
+
+/// How long a test waits before it takes a campaign for hung.
+const HUNG_AFTER: Duration = Duration::from_mins(10);
+
+/// The pause between two looks at a journal.
+const PAUSE: Duration = Duration::from_millis(1);
 
 fn args(out: &Path, more: &[&str]) -> Vec<String> {
     let scenario = library("low-thw-overtake");
@@ -24,32 +31,47 @@ fn bytes(folder: &Path, file: &str) -> Vec<u8> {
 }
 
 fn start(args: &[String]) -> Child {
-    Command::new(env!("CARGO_BIN_EXE_closecall"))
-        .current_dir(env!("CARGO_MANIFEST_DIR"))
-        .args(args)
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .expect("the program starts")
+    program().args(args).stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the program starts")
 }
 
-/// Lets a campaign run until its journal has grown by some lines, and kills it. Answers whether it was killed.
-fn kill_after(args: &[String], out: &Path, lines: usize) -> bool {
-    let journal = out.join("journal.jsonl");
-    let count = || fs::read(&journal).map_or(0, |text| text.iter().filter(|&&byte| byte == b'\n').count());
-    let before = count();
-    let mut child = start(args);
+/// Waits until a condition holds.
+fn wait_until(mut holds: impl FnMut() -> bool) {
     let started = Instant::now();
-    while child.try_wait().unwrap().is_none() && count() < before + lines {
-        assert!(started.elapsed() < Duration::from_mins(2), "it does not get on");
+    while !holds() {
+        assert!(started.elapsed() < HUNG_AFTER, "the campaign hangs");
+        std::thread::sleep(PAUSE);
     }
+}
+
+/// Returns the bytes of a journal up to the end of its first `lines` lines, or all of them if it has fewer.
+fn first_lines(journal: &[u8], lines: usize) -> &[u8] {
+    let ends = journal.iter().enumerate().filter(|(_, byte)| **byte == b'\n').map(|(index, _)| index + 1);
+    &journal[..ends.take(lines).last().unwrap_or(0)]
+}
+
+/// Runs a campaign until its journal has at least `lines` more lines, kills it, and tears the journal: the last of
+/// these lines lacks its last `torn` bytes. Returns true if the campaign still ran when it was killed.
+///
+/// What the program wrote beyond these lines before the signal arrived is cut off, so that the rest of the test is the
+/// same on any machine.
+fn kill_after(args: &[String], out: &Path, lines: usize, torn: usize) -> bool {
+    let journal = out.join("journal.jsonl");
+    let read = || fs::read(&journal).unwrap_or_default();
+    let count = || read().iter().filter(|byte| **byte == b'\n').count();
+    let wanted = count() + lines;
+    let mut child = start(args);
+    wait_until(|| count() >= wanted || child.try_wait().unwrap().is_some());
     let was_running = child.try_wait().unwrap().is_none();
     child.kill().unwrap();
     child.wait().unwrap();
+    let written = read();
+    let kept = first_lines(&written, wanted);
+    assert!(kept.len() > torn, "the campaign ended before it had written {wanted} lines");
+    fs::write(&journal, &kept[..kept.len() - torn]).unwrap();
     was_running
 }
 
-/// The folder of the campaign that was left alone, which the others are held against.
+/// Runs the campaign that the others are compared with. Returns its folder.
 fn undisturbed(folder: &Path) -> std::path::PathBuf {
     let out = folder.join("undisturbed");
     stdout(&closecall(args(&out, &["--jobs", "2"])), 0);
@@ -59,16 +81,15 @@ fn undisturbed(folder: &Path) -> std::path::PathBuf {
 const REPORTS: [&str; 3] = ["journal.jsonl", "outcomes.parquet", "junit.xml"];
 
 #[test]
-fn a_campaign_killed_again_and_again_ends_in_the_same_bytes() {
+fn a_campaign_that_is_killed_and_resumed_repeatedly_ends_in_the_same_bytes() {
     let folder = folder();
     let whole = undisturbed(folder.path());
     let out = folder.path().join("killed");
-    for (jobs, lines) in [("1", 1), ("2", 57), ("1", 90), ("2", 3), ("2", 120)] {
-        assert!(kill_after(&args(&out, &["--jobs", jobs, "--resume"]), &out, lines), "killed too late");
-        // What a line is torn to by a crash is cut off, wherever it ends.
-        let journal = out.join("journal.jsonl");
-        let text = fs::read(&journal).unwrap();
-        fs::write(&journal, &text[..text.len() - lines.min(text.len())]).unwrap();
+    // The first kill comes after one of 400 samples, so it does interrupt the campaign. On a slow machine a later one
+    // may come after the end.
+    for (index, (jobs, lines)) in [("1", 1), ("2", 57), ("1", 90), ("2", 3), ("2", 120)].into_iter().enumerate() {
+        let was_running = kill_after(&args(&out, &["--jobs", jobs, "--resume"]), &out, lines, lines);
+        assert!(was_running || index > 0, "the campaign ended before it was killed");
     }
     let resumed = closecall(args(&out, &["--jobs", "2", "--resume"]));
     stdout(&resumed, 0);
@@ -76,7 +97,7 @@ fn a_campaign_killed_again_and_again_ends_in_the_same_bytes() {
     for file in REPORTS {
         assert!(bytes(&whole, file) == bytes(&out, file), "{file} differs");
     }
-    // Nothing is left to run: the same once more.
+    // Nothing is left to run: another resume changes nothing.
     stdout(&closecall(args(&out, &["--resume"])), 0);
     for file in REPORTS {
         assert!(bytes(&whole, file) == bytes(&out, file), "{file} differs");
@@ -84,7 +105,7 @@ fn a_campaign_killed_again_and_again_ends_in_the_same_bytes() {
 }
 
 #[test]
-fn a_folder_with_a_campaign_is_not_overwritten() {
+fn the_folder_of_a_campaign_is_not_overwritten() {
     let folder = folder();
     let out = folder.path().join("out");
     stdout(&closecall(args(&out, &[])), 0);
@@ -97,42 +118,39 @@ fn a_folder_with_a_campaign_is_not_overwritten() {
     for named in ["scenarios.low-thw-overtake.text", "sensors: null there, \"ground-truth\" here"] {
         assert!(stderr(&other).contains(named), "{}", stderr(&other));
     }
-    let seed = closecall(args(&out, &["--resume", "--partition", "1/2"]));
-    assert_eq!(code(&seed), 2);
-    assert!(stderr(&seed).contains("partition: null there, \"1/2\" here"), "{}", stderr(&seed));
+    let part = closecall(args(&out, &["--resume", "--partition", "1/2"]));
+    assert_eq!(code(&part), 2);
+    assert!(stderr(&part).contains("partition: null there, \"1/2\" here"), "{}", stderr(&part));
     assert!(bytes(&out, "journal.jsonl") == before);
 }
 
 #[test]
-fn a_damaged_journal_is_run_again_from_the_damage_on() {
+fn samples_after_a_damaged_journal_record_are_run_again() {
     let folder = folder();
     let whole = undisturbed(folder.path());
     let mut damaged = bytes(&whole, "journal.jsonl");
-    let good = damaged.clone();
+    let intact = damaged.clone();
     let middle = damaged.len() / 2;
     damaged[middle] ^= 1;
     fs::write(whole.join("journal.jsonl"), damaged).unwrap();
     let resumed = closecall(args(&whole, &["--resume"]));
     stdout(&resumed, 0);
     assert!(stderr(&resumed).contains("checksum"), "{}", stderr(&resumed));
-    assert!(bytes(&whole, "journal.jsonl") == good);
+    assert!(bytes(&whole, "journal.jsonl") == intact);
 }
 
 #[test]
-fn two_campaigns_do_not_share_a_folder() {
+fn two_campaigns_cannot_use_a_folder_at_the_same_time() {
     let folder = folder();
     let out = folder.path().join("out");
-    let mut more = args(&out, &[]);
-    let place = more.iter().position(|arg| arg == "-n").unwrap() + 1;
-    // More than any test waits for.
-    more[place] = "10000000".to_owned();
-    let mut first = start(&more);
-    let started = Instant::now();
-    while !out.join("journal.jsonl").exists() {
-        assert!(started.elapsed() < Duration::from_mins(2));
-    }
-    more.push("--resume".to_owned());
-    let second = closecall(&more);
+    let mut args = args(&out, &[]);
+    let count = args.iter().position(|arg| arg == "-n").unwrap() + 1;
+    // So many samples that the first campaign does not end before the second one starts.
+    args[count] = "10000000".to_owned();
+    let mut first = start(&args);
+    wait_until(|| out.join("journal.jsonl").exists());
+    args.push("--resume".to_owned());
+    let second = closecall(&args);
     first.kill().unwrap();
     first.wait().unwrap();
     assert_eq!(code(&second), 6, "{}", stderr(&second));
@@ -145,11 +163,11 @@ fn a_full_disk_is_an_i_o_error_and_loses_nothing() {
     let folder = folder();
     let whole = undisturbed(folder.path());
     let out = folder.path().join("full");
-    // No file may grow beyond 200 blocks of 512 or 1,024 bytes, by the shell; the signal that says so is ignored, so
-    // that the write fails as on a full disk.
+    // The shell limits files to 200 blocks of 512 or 1,024 bytes. With the signal for the limit ignored, the write
+    // fails as on a full disk.
     let script = "ulimit -f 200; trap '' XFSZ; exec \"$@\"";
     let limited = Command::new("sh")
-        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .current_dir(ROOT)
         .args(["-c", script, "sh", env!("CARGO_BIN_EXE_closecall")])
         .args(args(&out, &[]))
         .output()
@@ -157,7 +175,7 @@ fn a_full_disk_is_an_i_o_error_and_loses_nothing() {
     assert_eq!(code(&limited), 6, "{}", stderr(&limited));
     let message = stderr(&limited);
     assert!(message.contains("journal.jsonl") && message.contains("--resume"), "{message}");
-    assert!(bytes(&out, "journal.jsonl").len() > 50_000, "what was written before is kept");
+    assert!(bytes(&out, "journal.jsonl").len() > 50_000, "the records before the full disk are kept");
     assert!(!out.join("outcomes.parquet").exists());
     stdout(&closecall(args(&out, &["--resume"])), 0);
     for file in REPORTS {
@@ -180,15 +198,15 @@ fn merge(parts: &[&Path], out: &Path) -> std::process::Output {
 }
 
 #[test]
-fn parts_that_are_merged_are_the_campaign_of_one_machine() {
+fn merged_parts_equal_the_campaign_of_one_machine() {
     let folder = folder();
     for design in ["random", "sobol", "grid"] {
-        let place = folder.path().join(design);
-        let whole = place.join("whole");
+        let folder = folder.path().join(design);
+        let whole = folder.join("whole");
         stdout(&closecall(args(&whole, &["--design", design])), 0);
-        let parts = ["1/3", "2/3", "3/3"].map(|part| partition(&place, part, &["--design", design]));
-        let out = place.join("merged");
-        // Their order does not matter.
+        let parts = ["1/3", "2/3", "3/3"].map(|part| partition(&folder, part, &["--design", design]));
+        let out = folder.join("merged");
+        // The order of the parts does not matter.
         stdout(&merge(&[&parts[2], &parts[0], &parts[1]], &out), 0);
         for file in REPORTS {
             assert!(bytes(&whole, file) == bytes(&out, file), "{design}: {file} differs");
@@ -197,7 +215,7 @@ fn parts_that_are_merged_are_the_campaign_of_one_machine() {
 }
 
 #[test]
-fn parts_that_make_no_campaign_are_refused_by_name() {
+fn parts_that_do_not_make_a_campaign_are_refused_by_name() {
     let folder = folder();
     let [one, two, three] = ["1/3", "2/3", "3/3"].map(|part| partition(folder.path(), part, &[]));
     let other_seed = folder.path().join("other-seed");
@@ -233,9 +251,9 @@ fn parts_that_make_no_campaign_are_refused_by_name() {
     stdout(&closecall(resumed), 0);
     stdout(&merge(&[&one, &two, &three], &out), 0);
     assert!(bytes(&whole, "outcomes.parquet") == bytes(&out, "outcomes.parquet"));
-    // The merged folder is a campaign like any other.
+    // The merged folder can be replayed like that of any campaign.
     let replayed = closecall(["replay", out.to_str().unwrap(), "5"]);
     stdout(&replayed, 0);
     let again = merge(&[&one, &two, &three], &out);
-    assert_eq!(code(&again), 2, "nothing is overwritten");
+    assert_eq!(code(&again), 2, "the merged folder is overwritten");
 }

@@ -1,24 +1,29 @@
-//! Controllers as processes: the shipped example does what the built-in does, and one that misbehaves costs its own
-//! samples only, says what it did, and leaves nothing behind.
+//! Controllers that run as processes. The shipped example behaves like the built-in controller. A process that
+//! misbehaves causes an error in its own samples only, with a message that names the fault, and leaves no process
+//! behind.
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 use std::time::Duration;
 
 use closecall_campaign::folder::Folder;
 use closecall_campaign::record::Record;
+use closecall_testing::has_python;
 use serde_json::Value;
 
-use crate::support::{closecall, code, folder, library, skipped, stderr, stdout};
+use crate::support::{closecall, code, folder, library, message, program, stderr, stdout};
 
-/// What each way of misbehaving is called by: the argument of `bad.sh`, and a part of the message.
-const WAYS: [(&str, &str); 14] = [
+/// The time that a controller has for an answer (ms): much longer than any of these controllers needs.
+const TIMEOUT_MS: &str = "2000";
+
+/// The faults of `bad.sh`: its arguments, and a part of the error message.
+const FAULTS: [(&str, &str); 14] = [
     ("dies", "the process ended (exit status: 3) after 1 answer; it last wrote: out of cheese"),
     ("killed", "the process ended (signal: 9 (SIGKILL)) after 1 answer"),
     ("closes", "the process closed its standard output after 1 answer"),
-    ("hangs", "the process hangs: no answer in twice the 1000 ms allowed, after 1 answer"),
-    ("late 1.5", "the process answered later than the 1000 ms allowed, after 1 answer"),
+    ("hangs", "the process hangs: no answer in twice the 2000 ms allowed, after 1 answer"),
+    ("late 3", "the process answered later than the 2000 ms allowed, after 1 answer"),
     ("garbage", "the process answered \"what?\", which is not JSON"),
     ("nan", "asked for an acceleration of nan m/s², which is not a finite number"),
     ("infinite", "asked for an acceleration of 1e999 m/s², which is not a finite number"),
@@ -30,30 +35,22 @@ const WAYS: [(&str, &str); 14] = [
     ("version", "speaks version 2 of the protocol, this is version 1"),
 ];
 
-fn python() -> bool {
-    let found = Command::new("python3").arg("--version").output().is_ok_and(|output| output.status.success());
-    if !found {
-        skipped("there is no python3");
-    }
-    found
-}
-
-/// Runs one sample with a controller, in an environment that marks its processes.
+/// Runs one sample with a controller. The environment of its processes holds `mark`.
 fn run_with(controller: &str, mark: &str) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_closecall"))
-        .current_dir(env!("CARGO_MANIFEST_DIR"))
-        .args(["run", library("low-thw-overtake").to_str().unwrap(), "--controller-timeout-ms", "1000"])
+    program()
+        .args(["run", library("low-thw-overtake").to_str().unwrap(), "--controller-timeout-ms", TIMEOUT_MS])
         .args(["--controller-memory-mib", "128", "--controller", controller])
         .env("CLOSECALL_TEST_MARK", mark)
         .output()
         .unwrap()
 }
 
-/// Processes that go on running with this mark in their environment. One that was killed is given time to end: the
-/// signal is sent when the program ends, and the kernel takes it down when it finds the time.
+/// Returns the processes with `mark` in their environment that do not end.
+///
+/// The program kills its processes when it ends, and the kernel removes them some time later. This function waits for
+/// that, at most a minute.
 fn left_behind(mark: &str) -> Vec<String> {
-    /// How often it is looked, and the pause between.
-    const LOOKS: usize = 100;
+    const LOOKS: usize = 600;
     const PAUSE: Duration = Duration::from_millis(100);
     let mut running = marked(mark);
     for _ in 0..LOOKS {
@@ -66,7 +63,7 @@ fn left_behind(mark: &str) -> Vec<String> {
     running
 }
 
-/// Processes with this mark in their environment.
+/// Returns the processes with `mark` in their environment.
 fn marked(mark: &str) -> Vec<String> {
     let wanted = format!("CLOSECALL_TEST_MARK={mark}");
     let processes = std::fs::read_dir("/proc").unwrap().filter_map(|entry| Some(entry.ok()?.path()));
@@ -79,31 +76,26 @@ fn marked(mark: &str) -> Vec<String> {
         .collect()
 }
 
-/// One line, as the message may be broken over several.
-fn message(output: &Output) -> String {
-    stderr(output).replace('│', " ").split_whitespace().collect::<Vec<_>>().join(" ")
-}
-
 #[test]
-fn each_way_of_misbehaving_is_an_error_of_its_own_and_leaves_nothing_behind() {
-    for (way, said) in WAYS {
-        let mark = format!("{}-{}", std::process::id(), way.replace(' ', "-"));
-        let output = run_with(&format!("exec:sh tests/fixtures/controllers/bad.sh {way}"), &mark);
-        assert_eq!(code(&output), 5, "{way}: {}", stderr(&output));
-        assert!(message(&output).contains(said), "{way}: {}", stderr(&output));
-        assert_eq!(left_behind(&mark), Vec::<String>::new(), "{way}");
+fn each_fault_has_an_error_message_of_its_own_and_leaves_no_process_behind() {
+    for (fault, expected) in FAULTS {
+        let mark = format!("{}-{}", std::process::id(), fault.replace(' ', "-"));
+        let output = run_with(&format!("exec:sh tests/fixtures/controllers/bad.sh {fault}"), &mark);
+        assert_eq!(code(&output), 5, "{fault}: {}", stderr(&output));
+        assert!(message(&output).contains(expected), "{fault}: {}", stderr(&output));
+        assert_eq!(left_behind(&mark), Vec::<String>::new(), "{fault}");
     }
 }
 
 #[test]
-fn a_full_standard_error_blocks_nobody() {
+fn a_controller_that_writes_much_to_standard_error_is_not_blocked() {
     let output = run_with("exec:sh tests/fixtures/controllers/bad.sh loud", "loud");
     assert!(stdout(&output, 0).contains("ended at"));
 }
 
 #[test]
-fn one_that_takes_too_much_memory_is_stopped() {
-    if !python() {
+fn a_controller_that_uses_too_much_memory_is_stopped() {
+    if !has_python() {
         return;
     }
     let output = run_with("exec:python3 tests/fixtures/controllers/hungry.py", "hungry");
@@ -112,7 +104,7 @@ fn one_that_takes_too_much_memory_is_stopped() {
 }
 
 #[test]
-fn a_command_that_is_not_there_or_is_none_says_so() {
+fn a_command_that_cannot_be_started_or_parsed_is_an_error() {
     let output = run_with("exec:no-such-program --fast", "none");
     assert_eq!(code(&output), 5);
     assert!(message(&output).contains("`no-such-program` could not be started: No such file"), "{}", stderr(&output));
@@ -129,7 +121,8 @@ fn a_command_that_is_not_there_or_is_none_says_so() {
     }
 }
 
-/// Results by sample: the outcome without what names the controller, or the error's message.
+/// Returns the results of a campaign by sample: the outcome without the keys that name the controller, or the error
+/// message.
 fn results(out: &Path) -> BTreeMap<u64, Result<Value, String>> {
     let records = Folder::open(out).records().unwrap().map(Result::unwrap);
     let result = |record: Record| {
@@ -146,27 +139,15 @@ fn results(out: &Path) -> BTreeMap<u64, Result<Value, String>> {
     records.map(result).collect()
 }
 
-fn campaign(controller: &str, out: &Path, samples: &str) -> Output {
+/// Runs a campaign of samples of `low-thw-overtake` with a controller.
+fn campaign(controller: &str, out: &Path, samples: &str, more: &[&str]) -> Output {
     let headline = library("low-thw-overtake");
-    closecall([
-        "campaign",
-        headline.to_str().unwrap(),
-        "-n",
-        samples,
-        "--seed",
-        "1",
-        "--jobs",
-        "3",
-        "--recordings",
-        "1",
-        "--controller",
-        controller,
-        "--out",
-        out.to_str().unwrap(),
-    ])
+    let scenario = ["campaign", headline.to_str().unwrap(), "-n", samples, "--seed", "1", "--jobs", "3"];
+    let output = ["--recordings", "1", "--controller", controller, "--out", out.to_str().unwrap()];
+    closecall(scenario.iter().chain(&output).chain(more))
 }
 
-/// True where two values are the same, numbers within 1e-9.
+/// Returns true if two values are equal, with a tolerance of 1e-9 for numbers.
 fn agree(one: &Value, other: &Value) -> bool {
     match (one, other) {
         (Value::Number(one), Value::Number(other)) => (one.as_f64().unwrap() - other.as_f64().unwrap()).abs() <= 1e-9,
@@ -182,72 +163,58 @@ fn agree(one: &Value, other: &Value) -> bool {
 }
 
 #[test]
-fn the_python_example_reproduces_the_built_in_cruise_control() {
-    if !python() {
+fn the_python_example_behaves_like_the_built_in_cruise_control() {
+    if !has_python() {
         return;
     }
     let folder = folder();
     let (built_in, process) = (folder.path().join("acc"), folder.path().join("exec"));
-    stdout(&campaign("acc", &built_in, "16"), 0);
-    stdout(&campaign("exec:python3 examples/acc_controller.py", &process, "16"), 0);
-    let (built_in, replayed) = (results(&built_in), results(&process));
+    stdout(&campaign("acc", &built_in, "16", &[]), 0);
+    let patient = ["--controller-timeout-ms", "60000"];
+    stdout(&campaign("exec:python3 examples/acc_controller.py", &process, "16", &patient), 0);
+    let (built_in, by_process) = (results(&built_in), results(&process));
     assert!(built_in.values().flatten().any(|outcome| !outcome["collisions"].as_array().unwrap().is_empty()));
     for (sample, outcome) in &built_in {
-        let [one, other] = [outcome, &replayed[sample]].map(|outcome| outcome.as_ref().unwrap());
+        let [one, other] = [outcome, &by_process[sample]].map(|outcome| outcome.as_ref().unwrap());
         assert!(agree(one, other), "sample {sample}: {one} {other}");
     }
-    // The manifest holds the command, so that a replay needs nothing but the folder.
+    // The manifest holds the command, so a replay needs only the folder.
     let output = closecall(["replay", process.to_str().unwrap(), "3"]);
     stdout(&output, 0);
     assert!(stderr(&output).contains("examples/acc_controller.py"), "{}", stderr(&output));
 }
 
-/// The message of each of the five ways in which `sometimes_bad.py` misbehaves.
-const FIVE: [&str; 5] = [
+/// The error messages of the five faults of `sometimes_bad.py`.
+const SOMETIMES_BAD: [&str; 5] = [
     "the process ended (exit status: 3) before its first answer; it last wrote: cannot go on",
-    "the process hangs: no answer in twice the 400 ms allowed",
+    "the process hangs: no answer in twice the 2000 ms allowed",
     "the process answered \"garbage\", which is not JSON",
     "the process asked for an acceleration of NaN m/s², which is not a finite number",
-    "the process answered later than the 400 ms allowed",
+    "the process answered later than the 2000 ms allowed",
 ];
 
 #[test]
-fn five_bad_samples_are_five_errors_and_the_rest_is_right() {
-    if !python() {
+fn faults_in_some_samples_leave_the_other_samples_unchanged() {
+    if !has_python() {
         return;
     }
     let folder = folder();
     let (built_in, process) = (folder.path().join("acc"), folder.path().join("exec"));
-    stdout(&campaign("acc", &built_in, "24"), 0);
-    let headline = library("low-thw-overtake");
-    let output = closecall([
-        "campaign",
-        headline.to_str().unwrap(),
-        "-n",
-        "24",
-        "--seed",
-        "1",
-        "--jobs",
-        "3",
-        "--controller-timeout-ms",
-        "400",
-        "--controller",
-        "exec:python3 tests/fixtures/controllers/sometimes_bad.py 0.6",
-        "--out",
-        process.to_str().unwrap(),
-    ]);
+    stdout(&campaign("acc", &built_in, "24", &[]), 0);
+    let controller = "exec:python3 tests/fixtures/controllers/sometimes_bad.py 3";
+    let output = campaign(controller, &process, "24", &["--controller-timeout-ms", TIMEOUT_MS]);
     assert_eq!(code(&output), 5, "{}", stderr(&output));
     let (built_in, process) = (results(&built_in), results(&process));
-    let mut seen = [0; FIVE.len()];
+    let mut seen = [0; SOMETIMES_BAD.len()];
     for (sample, expected) in &built_in {
         let expected = expected.as_ref().unwrap();
         let cruise_mps = expected["parameters"]["cruise-mps"].as_f64().unwrap();
-        // As the controller reckons from E's first speed.
+        // The controller computes its fault from the ego's first speed in the same way.
         let kind = (cruise_mps * 1000.0).floor() as usize % 8;
-        match (&process[sample], FIVE.get(kind)) {
+        match (&process[sample], SOMETIMES_BAD.get(kind)) {
             (Ok(outcome), None) => assert!(agree(outcome, expected), "sample {sample}"),
-            (Err(message), Some(said)) => {
-                assert!(message.contains(said), "sample {sample}: {message}");
+            (Err(message), Some(expected)) => {
+                assert!(message.contains(expected), "sample {sample}: {message}");
                 seen[kind] += 1;
             }
             (result, _) => panic!("sample {sample}, kind {kind}: {result:?}"),

@@ -1,18 +1,19 @@
-//! What the program ends with.
+//! The exit codes of the program.
 
 use std::fs;
 use std::path::PathBuf;
 
-use crate::support::{closecall, code, folder, headline_with, json, library, stderr, stdout};
+use crate::support::{closecall, code, folder, headline_with, json, library, message, stderr, stdout};
 
-fn written(folder: &tempfile::TempDir, text: &str) -> PathBuf {
+/// Writes a scenario file.
+fn write(folder: &tempfile::TempDir, text: &str) -> PathBuf {
     let path = folder.path().join("scenario.toml");
     fs::write(&path, text).unwrap();
     path
 }
 
 #[test]
-fn the_gate_fails_where_someone_collided_and_passes_where_nobody_did() {
+fn the_gate_fails_with_collisions_and_passes_without() {
     let headline = library("low-thw-overtake");
     let headline = headline.to_str().unwrap();
     let failed = closecall(["campaign", headline, "-n", "60", "--controller", "acc", "--max-collisions", "0"]);
@@ -31,7 +32,7 @@ fn paired_gates_judge_the_arm_under_test() {
     let report = json(&closecall(args.into_iter().chain(["100"])), 0);
     let collisions = |arm: &str| report["controllers"][arm]["collisions"].as_u64().unwrap();
     assert!(collisions("acc") > collisions("mis"));
-    // As many as the arm under test has pass, although the baseline has more.
+    // The gate allows the collisions of the arm under test. The baseline has more, which does not matter.
     let allowed = collisions("mis").to_string();
     stdout(&closecall(args.into_iter().chain([allowed.as_str()])), 0);
 }
@@ -41,10 +42,10 @@ fn a_broken_scenario_names_file_line_and_key() {
     let folder = folder();
     let text = headline_with("friction = 0.9", "friction = -0.9");
     let line = text.lines().position(|line| line.contains("friction = -0.9")).unwrap() + 1;
-    let path = written(&folder, &text);
+    let path = write(&folder, &text);
     let output = closecall(["campaign", path.to_str().unwrap(), "-n", "10"]);
     assert_eq!(code(&output), 3);
-    let message = stderr(&output).replace(['\n', '│'], " ").split_whitespace().collect::<Vec<_>>().join(" ");
+    let message = message(&output);
     assert!(message.contains(&format!("scenario.toml:{line}")), "{message}");
     assert!(message.contains("environment.friction"), "{message}");
     assert!(message.contains("-0.9") && message.contains("0.1 to 1.2"), "{message}");
@@ -52,20 +53,20 @@ fn a_broken_scenario_names_file_line_and_key() {
 }
 
 #[test]
-fn a_folder_that_cannot_be_written_is_found_before_any_work() {
+fn a_folder_that_cannot_be_written_is_an_error_before_the_first_sample() {
     let folder = folder();
     let file = folder.path().join("file");
     fs::write(&file, "in the way").unwrap();
     let out = file.join("out");
     let headline = library("low-thw-overtake");
-    // So many samples would take longer than any test may.
+    // The campaign would not end in any reasonable time.
     let args = ["campaign", headline.to_str().unwrap(), "-n", "100000000", "--out", out.to_str().unwrap()];
     let output = closecall(args);
     assert_eq!(code(&output), 6, "{}", stderr(&output));
 }
 
 #[test]
-fn a_folder_with_something_else_in_it_is_left_alone() {
+fn a_folder_with_other_files_is_not_used() {
     let folder = folder();
     let out = folder.path().join("out");
     fs::create_dir(&out).unwrap();
@@ -83,7 +84,7 @@ fn a_folder_with_something_else_in_it_is_left_alone() {
 }
 
 #[test]
-fn wrong_usage_is_2() {
+fn wrong_usage_ends_with_2() {
     let headline = library("low-thw-overtake");
     let headline = headline.to_str().unwrap();
     for args in [
@@ -111,7 +112,7 @@ fn wrong_usage_is_2() {
 }
 
 #[test]
-fn a_replay_of_what_is_not_there_says_so() {
+fn a_replay_of_a_missing_sample_or_campaign_is_an_error() {
     let folder = folder();
     let out = folder.path().join("out");
     let headline = library("low-thw-overtake");

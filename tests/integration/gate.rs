@@ -1,17 +1,15 @@
-//! Sanity of the gate: it must tell a system that helps from one that does nothing, harms, or comes too late.
+//! The gate distinguishes a controller that helps from one that does nothing, does harm, or acts too late.
 
 use std::num::NonZeroUsize;
-use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Duration;
 
-use closecall_campaign::verdict::Decision;
 use closecall_campaign::execution::Campaign;
 use closecall_campaign::ledger::Inference;
 use closecall_campaign::runner::{Sampling, Work};
-use closecall_campaign::summary::{Counts, Summary};
+use closecall_campaign::summary::Counts;
 use closecall_campaign::validity::CheckPlan;
-use closecall_campaign::verdict::{Evidence, Gates};
+use closecall_campaign::verdict::{Decision, Evidence, Gates};
 use closecall_campaign::workers::Workers;
 use closecall_controllers::{ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack, EgoState};
 use closecall_scenarios::sampling::Design;
@@ -26,14 +24,14 @@ use crate::support::library;
 const SAMPLES: u64 = 200;
 const SEED: u64 = 1;
 
-/// How a controller spoils the commands of the margin increase system.
+/// A fault that a controller adds to the commands of the margin increase system (MIS).
 #[derive(Clone, Copy)]
 enum Fault {
-    /// The margin increase system accelerates where it should brake.
+    /// The MIS accelerates instead of braking.
     SignFlipped,
-    /// It brakes gently all the time.
+    /// The ego always brakes.
     AlwaysBrakes,
-    /// It acts 5 s late.
+    /// The MIS acts 5 s late.
     FiveSecondsLate,
 }
 
@@ -63,7 +61,7 @@ struct Faulty {
     engaged_at: Option<Time>,
 }
 
-/// The constant braking of a controller that always brakes [m/s²].
+/// The acceleration of a controller that always brakes (m/s²).
 const ALWAYS_MPS2: f64 = -2.0;
 
 impl EgoController for Faulty {
@@ -88,6 +86,7 @@ impl EgoController for Faulty {
     }
 }
 
+/// Runs a scenario with the cruise control and with the controller under test.
 fn counts(name: &str, tested: Arc<dyn ControllerFactory>) -> Counts {
     let file = ScenarioFile::load(&library(name), &[]).unwrap();
     let sampling = Sampling { seed: SEED, design: Design::Random, samples: SAMPLES };
@@ -95,18 +94,11 @@ fn counts(name: &str, tested: Arc<dyn ControllerFactory>) -> Counts {
     let arms = vec![arm(BuiltIn::Acc.factory()), arm(tested)];
     let workers = Workers { jobs: NonZeroUsize::MIN.saturating_add(1), sample_timeout: Duration::from_mins(5) };
     let work = Arc::new(Work { file, sampling, arms, checks: CheckPlan::default() });
-    let mut summary = campaign.summary();
-    let campaign = Campaign::new(vec![work.clone()], workers);
-    let taken = campaign.run(None, |next| {
-        summary.push(next.record);
-        ControlFlow::Continue(())
-    });
-    taken.unwrap();
-    summary.total()
+    Campaign::new(vec![work], workers).count().unwrap().total()
 }
 
 #[test]
-fn the_margin_increase_system_prevents_more_than_half_of_the_collisions() {
+fn the_mis_prevents_more_than_half_of_the_collisions() {
     let counts = counts("low-thw-overtake", BuiltIn::Mis.factory());
     let [without, with] = counts.arms[..] else { panic!("two arms") };
     assert_eq!(counts.errors() + counts.invalid, 0);
@@ -120,16 +112,18 @@ fn the_margin_increase_system_prevents_more_than_half_of_the_collisions() {
 }
 
 #[test]
-fn a_controller_that_does_no_more_than_acc_prevents_and_induces_nothing() {
+fn the_cruise_control_alone_prevents_and_induces_no_collision() {
     let counts = counts("low-thw-overtake", BuiltIn::Acc.factory());
     assert_eq!((counts.pairs.prevented, counts.pairs.induced), (0, 0));
     assert!(counts.pairs.both > 0 && counts.pairs.neither > 0);
 }
 
-/// Most by which E may fall below the speed of the vehicle ahead [m/s]: at 1 m/s², until R has arrived.
+/// The most by which the ego may be slower than the lead vehicle (m/s). The MIS, braking at 1 m/s² until the rear
+/// vehicle has arrived, stays below.
 const MAX_SPEED_DEFICIT_MPS: f64 = 15.0;
 
-/// The gate of a regression test: at most half of the collisions without the system, at a bounded price.
+/// Returns true if a controller passes the gate of a regression test: at most half of the collisions without it, and a
+/// bounded speed deficit.
 fn passes(counts: &Counts) -> bool {
     let gates = Gates {
         max_collisions: Some(counts.arms[0].collisions / 2),
@@ -148,19 +142,19 @@ fn passes(counts: &Counts) -> bool {
 }
 
 #[test]
-fn a_flipped_sign_fails() {
+fn a_mis_with_a_flipped_sign_fails() {
     let counts = counts("low-thw-overtake", Arc::new(Fault::SignFlipped));
     assert!(!passes(&counts), "{counts:?}");
 }
 
 #[test]
-fn braking_all_the_time_fails() {
+fn a_controller_that_always_brakes_fails() {
     let counts = counts("low-thw-overtake", Arc::new(Fault::AlwaysBrakes));
     assert!(!passes(&counts), "{counts:?}");
 }
 
 #[test]
-fn acting_five_seconds_late_fails() {
+fn a_mis_that_acts_five_seconds_late_fails() {
     let counts = counts("low-thw-overtake", Arc::new(Fault::FiveSecondsLate));
     assert!(!passes(&counts), "{counts:?}");
 }

@@ -1,11 +1,11 @@
-//! How far a recording can be trusted, and logs that a vehicle makes of itself.
+//! `inspect` reports flaws of trajectory files and reads the logs that a vehicle makes of itself.
 
 use std::fs;
 
 use crate::support::{closecall, code, folder, json, library, stderr, stdout};
 
 #[test]
-fn a_recordings_flaws_are_told_and_rows_that_cannot_be_used_end_with_3() {
+fn flaws_are_reported_and_unusable_rows_end_with_3() {
     let folder = folder();
     let csv = folder.path().join("own.csv");
     let csv = csv.to_str().unwrap();
@@ -30,7 +30,7 @@ fn a_recordings_flaws_are_told_and_rows_that_cannot_be_used_end_with_3() {
 }
 
 #[test]
-fn a_log_in_the_vehicle_has_the_true_lane_changes_beside_it() {
+fn an_in_car_log_has_a_file_of_true_lane_changes_beside_it() {
     let folder = folder();
     let csv = folder.path().join("drive.csv");
     let csv = csv.to_str().unwrap();
@@ -41,7 +41,7 @@ fn a_log_in_the_vehicle_has_the_true_lane_changes_beside_it() {
     let truth = fs::read_to_string(folder.path().join("drive.truth.csv")).unwrap();
     let crossings: Vec<f64> =
         truth.lines().skip(1).map(|line| line.split(',').nth(4).unwrap().parse().unwrap()).collect();
-    assert_eq!(crossings.len(), 3, "one overtaking in each sample");
+    assert_eq!(crossings.len(), 3, "the rear vehicle overtakes once in each sample");
     let report = json(&closecall(["inspect", csv, "--format", "json"]), 0);
     assert_eq!((report["layout"].as_str(), report["period_s"].as_f64()), (Some("in-car"), Some(0.01)));
     let changes = json(&closecall(["lane-changes", csv, "--format", "json"]), 0);
@@ -50,7 +50,7 @@ fn a_log_in_the_vehicle_has_the_true_lane_changes_beside_it() {
         assert!((found - truth).abs() <= 0.3, "{found} instead of {truth}");
     }
     assert_eq!(changes.as_array().unwrap().len(), 3);
-    let nobody = closecall(["record", scenario, "-n", "1", "--in-car=nobody", "-o", csv]);
-    assert_eq!(code(&nobody), 2);
-    assert!(stderr(&nobody).contains("rear"), "the actors are named: {}", stderr(&nobody));
+    let unknown = closecall(["record", scenario, "-n", "1", "--in-car=nobody", "-o", csv]);
+    assert_eq!(code(&unknown), 2);
+    assert!(stderr(&unknown).contains("rear"), "the message does not list the actors: {}", stderr(&unknown));
 }

@@ -1,34 +1,46 @@
-//! The scenarios that ship: each is valid, says where its numbers come from, and does what it promises.
+//! The scenarios of the library are valid, name the source of their numbers, and behave as their descriptions promise.
 
-use std::path::PathBuf;
+use std::path::Path;
 
 use closecall_scenarios::parameters::{ParameterConfig, ParametersConfig, Provenance};
 use closecall_simulation::scenario::ScenarioFile;
 
-use crate::support::{closecall, json, library, stdout};
+use crate::support::{all_of_library, closecall, folder, headline_with, json, library, message, stdout};
 
-fn all() -> Vec<PathBuf> {
-    let folder = library("x").parent().unwrap().to_owned();
-    let mut files: Vec<PathBuf> = std::fs::read_dir(folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().path())
-        .filter(|path| path.extension().is_some_and(|extension| extension == "toml"))
-        .collect();
-    files.sort();
-    files
+/// The smallest number of scenarios that the library holds.
+const LEAST_SCENARIOS: usize = 8;
+
+/// Returns what `check` prints for a valid scenario file.
+fn verdict(path: &Path) -> String {
+    let file = ScenarioFile::load(path, &[]).unwrap();
+    let count = file.space().iter().len();
+    format!("{}: valid, {} with {count} parameters", path.display(), file.config().name)
 }
 
 #[test]
-fn every_scenario_is_valid() {
-    let files = all();
-    assert!(files.len() >= 7);
-    let text = stdout(&closecall(std::iter::once("check").chain(files.iter().map(|file| file.to_str().unwrap()))), 0);
-    assert_eq!(text.lines().filter(|line| line.contains("valid")).count(), files.len());
+fn check_calls_every_scenario_valid() {
+    let files = all_of_library();
+    assert!(files.len() >= LEAST_SCENARIOS, "{files:?}");
+    let text =
+        stdout(&closecall(std::iter::once(Path::new("check")).chain(files.iter().map(|file| file.as_path()))), 0);
+    let expected: Vec<String> = files.iter().map(|path| verdict(path)).collect();
+    assert_eq!(text.lines().collect::<Vec<_>>(), expected);
 }
 
 #[test]
-fn every_distribution_is_labelled() {
-    for path in all() {
+fn check_does_not_call_a_scenario_valid_that_is_not() {
+    let folder = folder();
+    let broken = folder.path().join("broken.toml");
+    std::fs::write(&broken, headline_with("friction = 0.9", "friction = -0.9")).unwrap();
+    let good = library("slow-approach");
+    let output = closecall([Path::new("check"), &broken, &good]);
+    assert_eq!(stdout(&output, 3).lines().collect::<Vec<_>>(), [verdict(&good)]);
+    assert!(message(&output).contains("environment.friction"), "{}", message(&output));
+}
+
+#[test]
+fn every_parameter_is_fitted_or_assumed() {
+    for path in all_of_library() {
         let file = ScenarioFile::load(&path, &[]).unwrap();
         for (name, entry) in file.space().iter() {
             match &entry.provenance {
@@ -41,55 +53,55 @@ fn every_distribution_is_labelled() {
 }
 
 #[test]
-fn every_scenario_is_evidence_for_a_requirement_that_is_written_down() {
-    let listed = include_str!("../../docs/requirements.md");
-    for path in all() {
+fn every_scenario_names_a_requirement_of_the_list() {
+    let list = include_str!("../../docs/requirements.md");
+    for path in all_of_library() {
         let file = ScenarioFile::load(&path, &[]).unwrap();
         let requirements = &file.config().requirements;
         assert!(!requirements.is_empty(), "{}", path.display());
-        for mark in requirements {
-            assert!(listed.contains(&format!("| `{mark}` |")), "{}: {mark}", path.display());
+        for name in requirements {
+            assert!(list.contains(&format!("| `{name}` |")), "{}: {name}", path.display());
         }
     }
 }
 
 #[test]
-fn fitted_distributions_are_those_of_the_committed_fit() {
+fn fitted_distributions_equal_those_of_the_committed_fit() {
     let committed = include_str!("../../scenarios/library/fitted/us101.toml");
     let document: toml::Table = committed.parse().unwrap();
     let tables: Vec<ParametersConfig> =
         ["parameters", "parametric"].map(|table| document[table].clone().try_into().unwrap()).into();
-    let mut fitted = 0;
-    for path in all() {
+    let mut count = 0;
+    for path in all_of_library() {
         let file = ScenarioFile::load(&path, &[]).unwrap();
         for (name, config) in &file.config().parameters.0 {
             if config.fitted.is_none() {
                 continue;
             }
-            fitted += 1;
+            count += 1;
             let names = [name.to_string(), format!("critical-{name}"), format!("short-{name}")];
-            let same = tables
+            let is_committed = tables
                 .iter()
                 .flat_map(|table| &table.0)
                 .any(|(fitted, committed)| names.contains(&fitted.to_string()) && is_cut_of(config, committed));
-            assert!(same, "{}: {name} is not what was fitted", path.display());
+            assert!(is_committed, "{}: {name} is not a distribution of the fit", path.display());
         }
     }
-    assert!(fitted >= 10);
+    assert!(count >= 10, "only {count} fitted distributions");
 }
 
-/// True where a distribution is a fitted one, perhaps cut off.
+/// Returns true if `config` is the distribution `committed`, whether or not it is truncated.
 fn is_cut_of(config: &ParameterConfig, committed: &ParameterConfig) -> bool {
     let form = |config: &ParameterConfig| config.log_normal.map(|log_normal| (log_normal.median, log_normal.sigma));
     config.fitted == committed.fitted && config.empirical == committed.empirical && form(config) == form(committed)
 }
 
-/// Samples of each scenario without a braking front vehicle.
+/// Samples of each scenario in which the lead vehicle does not brake.
 const SAMPLES: &str = "250";
 
 #[test]
-fn nobody_collides_where_the_front_vehicle_does_not_brake() {
-    for path in all() {
+fn the_ego_does_not_collide_if_the_lead_vehicle_does_not_brake() {
+    for path in all_of_library() {
         let file = ScenarioFile::load(&path, &[]).unwrap();
         if !file.config().tags.iter().any(|tag| tag == "no-collision") {
             continue;
@@ -104,7 +116,7 @@ fn nobody_collides_where_the_front_vehicle_does_not_brake() {
 }
 
 #[test]
-fn the_system_stays_off_where_it_should() {
+fn the_mis_does_not_engage_in_scenarios_that_give_no_reason_to() {
     for name in ["left-lane-blocked", "slow-approach", "empty-wet-road"] {
         let path = library(name);
         let args = ["campaign", path.to_str().unwrap(), "-n", "100", "--sensors", "ground-truth", "--format", "json"];
@@ -114,8 +126,8 @@ fn the_system_stays_off_where_it_should() {
 }
 
 #[test]
-fn the_schema_describes_what_is_read() {
-    let schema: serde_json::Value = serde_json::from_str(&stdout(&closecall(["schema"]), 0)).unwrap();
+fn the_schema_has_the_tables_of_a_scenario_file() {
+    let schema = json(&closecall(["schema"]), 0);
     assert_eq!(schema["title"], "ScenarioConfig");
     for key in ["schema-version", "name", "road", "parameters", "actor", "sensors"] {
         assert!(schema["properties"].get(key).is_some(), "{key}");

@@ -1,4 +1,4 @@
-//! The program from outside: its commands, files and exit codes, and what its verdicts rest on.
+//! Tests of the whole program: its commands, files and exit codes, and the evidence behind its verdicts.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
@@ -15,17 +15,17 @@ mod gate;
 mod hidden_lead;
 mod inspect;
 mod library;
-mod looking;
 mod malformed;
 mod own_controller;
 mod paper_figure;
 mod perception;
 mod readme;
-mod recordings;
 mod reenact;
 mod references;
 mod reports;
 mod rerun_files;
 mod statistics;
 mod support;
+mod trajectory_files;
 mod validity;
+mod viewer;

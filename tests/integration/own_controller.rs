@@ -1,4 +1,4 @@
-//! Controllers that plug in: in Rust, from the example's one file.
+//! Controllers written in Rust: the one of the example `own_controller`, and one that panics.
 
 use std::sync::Arc;
 
@@ -13,25 +13,25 @@ use crate::support::library;
 mod example;
 
 #[test]
-fn the_example_drives_e_in_a_campaign() {
+fn the_controller_of_the_example_runs_a_campaign() {
     let file = ScenarioFile::load(&library("low-thw-overtake"), &[]).unwrap();
     let counts = example::against_cruise_control(file, Arc::new(example::RoomMakers), 40).unwrap();
     assert_eq!((counts.samples, counts.errors(), counts.invalid), (40, 0, 0));
-    // It does something: some sample ends otherwise than with the cruise control alone.
+    // The controller has an effect: some sample ends differently than with the cruise control alone.
     assert!(counts.pairs.prevented + counts.pairs.induced > 0, "{counts:?}");
 }
 
-/// Panics in samples in which E starts fast.
+/// An ego stack that panics if the ego is fast.
 struct Panics {
     stack: EgoStack,
 }
 
-/// E's speed from which on it panics [m/s]: about half of the samples.
+/// The speed from which on the controller panics (m/s): about half of the samples reach it.
 const TOO_FAST_MPS: f64 = 31.6;
 
 impl EgoController for Panics {
     fn step(&mut self, input: &EgoInput<'_>) -> Result<EgoCommand, ControllerError> {
-        assert!(input.odometry.speed_mps < TOO_FAST_MPS, "far too fast");
+        assert!(input.odometry.speed_mps < TOO_FAST_MPS, "the ego is too fast");
         self.stack.step(input)
     }
 }
@@ -53,7 +53,7 @@ impl ControllerFactory for PanicsFactory {
 }
 
 #[test]
-fn one_that_panics_spoils_its_own_samples_only() {
+fn a_panic_is_an_error_of_its_own_sample_only() {
     let file = ScenarioFile::load(&library("overtake-without-brake"), &[]).unwrap();
     let counts = example::against_cruise_control(file, Arc::new(PanicsFactory), 24).unwrap();
     let [cruise, tested] = counts.arms[..] else { panic!("two arms") };

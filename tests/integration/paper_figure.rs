@@ -1,4 +1,4 @@
-//! The method's figure, through the scenario that ships: its numbers, and its five moments in their order.
+//! The scenario `paper-figure` reproduces the figure of the paper: its numbers, and its five moments in their order.
 
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_scenarios::sampling::Design;
@@ -11,7 +11,7 @@ use closecall_traffic::{ActorId, Time};
 
 use crate::support::library;
 
-/// E's acceleration at each control step.
+/// The ego's acceleration (m/s²) at each control step.
 #[derive(Default)]
 struct Accelerations(Vec<(Time, f64)>);
 
@@ -23,17 +23,18 @@ impl Observer for Accelerations {
     fn happening(&mut self, _: Time, _: &Happening) {}
 }
 
+/// Runs the scenario, which has no random parameter.
 fn run(controller: BuiltIn) -> (Outcome, Accelerations) {
     let file = ScenarioFile::load(&library("paper-figure"), &[]).unwrap();
     let scenario = concrete(&file, Sampling { seed: 0, design: Design::Random, samples: 1 }, 0).unwrap();
-    let mut seen = Accelerations::default();
+    let mut accelerations = Accelerations::default();
     let arm = Arm { controller: controller.factory(), sensors: None };
-    let outcome = simulate(&scenario, RunKey { seed: 0, sample: 0 }, &arm, &mut seen).unwrap();
-    (outcome, seen)
+    let outcome = simulate(&scenario, RunKey { seed: 0, sample: 0 }, &arm, &mut accelerations).unwrap();
+    (outcome, accelerations)
 }
 
 #[test]
-fn one_metre_per_second_squared_gains_two_seconds() {
+fn a_deceleration_of_one_metre_per_second_squared_gains_two_seconds_of_headway() {
     let (outcome, _) = run(BuiltIn::Mis);
     let mis = outcome.mis.unwrap();
     assert_eq!(mis.goal_in_reach, Some(true));
@@ -44,37 +45,38 @@ fn one_metre_per_second_squared_gains_two_seconds() {
 }
 
 #[test]
-fn the_five_moments_come_in_their_order() {
+fn the_five_moments_occur_in_their_order() {
     let (outcome, _) = run(BuiltIn::Mis);
     let moments: Vec<Moment> = outcome.moments.iter().map(|noted| noted.moment).collect();
     assert_eq!(moments, Moment::ALL);
     assert_eq!(moments.iter().map(|moment| moment.letter()).collect::<String>(), "abcde");
 }
 
-/// The comfort limit, and what the control of the actuators may exceed it by [m/s²].
+/// The comfort limit, and the overshoot of the actuators that is tolerated (m/s²).
 const GENTLE_MPS2: f64 = 1.0 + 0.01;
 
 #[test]
-fn e_does_not_brake_until_r_has_concluded_although_f_brakes() {
-    let (outcome, seen) = run(BuiltIn::Mis);
+fn the_ego_does_not_brake_for_the_lead_vehicle_until_the_rear_vehicle_has_passed() {
+    let (outcome, accelerations) = run(BuiltIn::Mis);
     assert!(outcome.collisions.is_empty(), "{:?}", outcome.collisions);
     let [critical, brakes, concluded] = [Moment::CriticalDistance, Moment::FrontBrakes, Moment::Concluded]
         .map(|moment| outcome.moment(moment).unwrap());
     assert!(critical <= brakes && brakes < concluded);
-    let mut released = 0.0_f64;
-    for (time, acceleration_mps2) in seen.0.iter().filter(|(time, _)| *time <= concluded) {
+    let mut last_mps2 = 0.0_f64;
+    for (time, acceleration_mps2) in accelerations.0.iter().filter(|(time, _)| *time <= concluded) {
         assert!(*acceleration_mps2 >= -GENTLE_MPS2, "{acceleration_mps2} m/s² at {time}");
-        // From the critical distance on the brake is let go, and not touched again.
+        // From the critical distance on, the ego releases the brake and does not apply it again.
         if *time > critical {
-            assert!(*acceleration_mps2 >= released - 1e-6 || released == 0.0, "{acceleration_mps2} m/s² at {time}");
-            released = *acceleration_mps2;
+            assert!(*acceleration_mps2 >= last_mps2 - 1e-6 || last_mps2 == 0.0, "{acceleration_mps2} m/s² at {time}");
+            last_mps2 = *acceleration_mps2;
         }
     }
-    assert!(seen.0.iter().any(|(time, mps2)| *time > concluded && *mps2 < -1.5), "F's braking asks for none of E");
+    let brakes_afterwards = accelerations.0.iter().any(|(time, mps2)| *time > concluded && *mps2 < -1.5);
+    assert!(brakes_afterwards, "the ego never brakes for the lead vehicle, so the test shows nothing");
 }
 
 #[test]
-fn without_the_system_the_same_sample_ends_in_the_cascade() {
+fn without_the_mis_the_same_sample_ends_in_a_rear_end_collision_and_a_second_one() {
     let (outcome, _) = run(BuiltIn::Acc);
     let id = |name| ActorId::new(name).unwrap();
     let first = &outcome.collisions[0];
@@ -82,6 +84,6 @@ fn without_the_system_the_same_sample_ends_in_the_cascade() {
     assert_eq!(first.struck_side, [BoxSide::Rear, BoxSide::Front]);
     assert_eq!(first.closed_by, ClosedBy::Second);
     assert!(outcome.moment(Moment::FrontBrakes).unwrap() < first.time);
-    // The impact pushes E on into F.
+    // The impact pushes the ego into the lead vehicle.
     assert_eq!(outcome.collisions[1].between, [id("ego"), id("front")]);
 }

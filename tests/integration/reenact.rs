@@ -1,14 +1,16 @@
-//! Recorded encounters once more, with the controller under test.
+//! `reenact` repeats a recorded encounter with the controller under test in the ego.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use closecall_testing::data;
 use serde_json::Value;
 
-use crate::support::{closecall, code, data, folder, json, library, stderr, stdout};
+use crate::support::{closecall, code, folder, json, library, stderr, stdout};
 
-/// A recording of our own traffic without the margin increase system: three vehicles for each sample, R the last.
-fn own(folder: &Path) -> PathBuf {
+/// Writes a trajectory file of simulated traffic without the MIS. Each sample has three vehicles, the rear vehicle
+/// last.
+fn own_trajectories(folder: &Path) -> PathBuf {
     let csv = folder.join("own.csv");
     let scenario = library("overtake-without-brake");
     let args = ["record", scenario.to_str().unwrap(), "-n", "4", "--controller", "acc", "-o", csv.to_str().unwrap()];
@@ -16,8 +18,9 @@ fn own(folder: &Path) -> PathBuf {
     csv
 }
 
-fn reenacted(recording: &Path, more: &[&str]) -> Value {
-    let args = ["reenact", recording.to_str().unwrap(), "--format", "json"];
+/// Returns the JSON that `reenact` prints.
+fn reenacted(trajectories: &Path, more: &[&str]) -> Value {
+    let args = ["reenact", trajectories.to_str().unwrap(), "--format", "json"];
     json(&closecall(args.iter().chain(more)), 0)
 }
 
@@ -26,9 +29,9 @@ fn number(found: &Value, half: &str, key: &str) -> f64 {
 }
 
 #[test]
-fn without_the_system_the_run_is_like_the_recording_and_with_it_the_margin_is_larger() {
+fn the_run_is_close_to_the_trajectory_data_without_the_mis_and_has_more_headway_with_it() {
     let folder = folder();
-    let own = own(folder.path());
+    let own = own_trajectories(folder.path());
     for track in ["3", "6", "9", "12"] {
         let acc = reenacted(&own, &["--track", track, "--controller", "acc"]);
         assert_eq!(acc["track_id"].to_string(), track);
@@ -48,9 +51,9 @@ fn without_the_system_the_run_is_like_the_recording_and_with_it_the_margin_is_la
 }
 
 #[test]
-fn with_everyone_as_recorded_the_run_is_the_recording() {
+fn with_all_vehicles_as_recorded_the_run_reproduces_the_trajectory_data() {
     let folder = folder();
-    let own = own(folder.path());
+    let own = own_trajectories(folder.path());
     let toml = folder.path().join("again.toml");
     let path = toml.to_str().unwrap();
     let found = reenacted(&own, &["--track", "3", "--controller", "acc", "--rear", "recorded", "-o", path]);
@@ -58,15 +61,15 @@ fn with_everyone_as_recorded_the_run_is_the_recording() {
         let [recorded, simulated] = ["recorded", "simulated"].map(|half| number(&found, half, key));
         assert!((recorded - simulated).abs() < 0.2, "{key}: {recorded} and {simulated}");
     }
-    // Lane changes at given times have a mirror image, and the simulator's checks look at it.
+    // The checks of the simulator mirror a scenario, lane changes at given times included.
     assert!(fs::read_to_string(&toml).unwrap().contains("lane-changes"));
     stdout(&closecall(["campaign", path, "-n", "1", "--controller", "acc"]), 0);
 }
 
 #[test]
-fn the_scenario_that_is_written_runs_to_the_same_outcome_and_can_be_varied() {
+fn the_written_scenario_has_the_same_outcome_and_can_be_varied() {
     let folder = folder();
-    let own = own(folder.path());
+    let own = own_trajectories(folder.path());
     let toml = folder.path().join("again.toml");
     let path = toml.to_str().unwrap();
     let found = reenacted(&own, &["--track", "6", "-o", path]);
@@ -78,14 +81,14 @@ fn the_scenario_that_is_written_runs_to_the_same_outcome_and_can_be_varied() {
     stdout(&closecall(["campaign", path, "-n", "2", "--paired"]), 0);
     let set = "actor.ego.driver.ego-stack.mis.max-deceleration-mps2=0.2";
     let weaker = reenacted(&own, &["--track", "6", "--set", set]);
-    let gained = |found: &Value| number(found, "simulated", "thw_front_at_crossing_s");
-    assert!(gained(&weaker) < gained(&found), "{} {}", gained(&weaker), gained(&found));
+    let headway_s = |found: &Value| number(found, "simulated", "thw_front_at_crossing_s");
+    assert!(headway_s(&weaker) < headway_s(&found), "{} and {}", headway_s(&weaker), headway_s(&found));
 }
 
 #[test]
-fn what_cannot_be_re_enacted_is_said() {
+fn an_encounter_that_cannot_be_re_enacted_is_refused_with_the_reason() {
     let folder = folder();
-    let own = own(folder.path());
+    let own = own_trajectories(folder.path());
     let own = own.to_str().unwrap();
     let refused = |args: &[&str], expected: i32, words: &[&str]| {
         let output = closecall(std::iter::once(&"reenact").chain(args));
@@ -99,39 +102,39 @@ fn what_cannot_be_re_enacted_is_said() {
     refused(&[own, "-o", own], 2, &["would overwrite"]);
     refused(&[own, "--set", "actor.nobody.start=1"], 2, &["actor.nobody.start"]);
     refused(&[own, "--record-level", "full"], 2, &["--record"]);
-    // R alone on the road: its in-car log has nobody else.
+    // The in-car log of the rear vehicle holds no other vehicle.
     let drive = folder.path().join("drive.csv");
     let drive = drive.to_str().unwrap();
     let scenario = library("overtake-without-brake");
     stdout(&closecall(["record", scenario.to_str().unwrap(), "-n", "1", "--in-car", "-o", drive]), 0);
     refused(&[drive], 3, &["drive.csv", "nobody is ahead of track 1"]);
-    // Without F, which a recording need not have.
+    // A trajectory file need not hold a lead vehicle.
     let text = fs::read_to_string(own).unwrap();
-    let place = text.lines().next().unwrap().split(',').position(|column| column == "track_id").unwrap();
-    let is_front = |line: &&str| line.split(',').nth(place) == Some("2");
-    let without: String = text.lines().filter(|line| !is_front(line)).map(|line| format!("{line}\n")).collect();
-    let alone = folder.path().join("alone.csv");
-    fs::write(&alone, without).unwrap();
-    refused(&[alone.to_str().unwrap(), "--track", "3"], 3, &["track 1, which track 3 is behind", "6, 9, 12"]);
+    let column = text.lines().next().unwrap().split(',').position(|name| name == "track_id").unwrap();
+    let is_lead = |line: &&str| line.split(',').nth(column) == Some("2");
+    let without: String = text.lines().filter(|line| !is_lead(line)).map(|line| format!("{line}\n")).collect();
+    let no_lead = folder.path().join("no-lead.csv");
+    fs::write(&no_lead, without).unwrap();
+    refused(&[no_lead.to_str().unwrap(), "--track", "3"], 3, &["track 1, which track 3 is behind", "6, 9, 12"]);
 }
 
 #[test]
-fn recorded_traffic_is_re_enacted_or_it_is_said_why_not() {
+fn recorded_traffic_is_re_enacted_or_refused_with_the_reason() {
     let Some(data) = data() else { return };
     let ngsim = ["ngsim_us101/trajectories/us101_a.csv", "ngsim_us101/us101_a_ngsim18col_feet.csv"];
-    for recording in ngsim.map(|file| data.join(file)) {
-        let changes = json(&closecall(["lane-changes", recording.to_str().unwrap(), "--format", "json"]), 0);
+    for trajectories in ngsim.map(|file| data.join(file)) {
+        let changes = json(&closecall(["lane-changes", trajectories.to_str().unwrap(), "--format", "json"]), 0);
         let mut count = 0;
         for change in changes.as_array().unwrap() {
             let track = change["track_id"].to_string();
             for rear in ["driver", "recorded"] {
-                let args = ["reenact", recording.to_str().unwrap(), "--track", &track, "--rear", rear];
+                let args = ["reenact", trajectories.to_str().unwrap(), "--track", &track, "--rear", rear];
                 let output = closecall(args);
                 assert!([0, 3].contains(&code(&output)), "{args:?}: {}", stderr(&output));
                 assert_eq!(code(&output) == 3, stderr(&output).contains("failed to re-enact"), "{}", stderr(&output));
                 count += usize::from(code(&output) == 0);
             }
         }
-        assert!(count > changes.as_array().unwrap().len() / 2, "{}: {count}", recording.display());
+        assert!(count > changes.as_array().unwrap().len() / 2, "{}: {count}", trajectories.display());
     }
 }

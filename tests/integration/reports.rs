@@ -1,15 +1,18 @@
-//! What a campaign leaves for people and for CI servers.
+//! The reports of a campaign: an HTML page, a step summary, JUnit and Parquet.
 
 use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use crate::support::{folder, library, skipped, stdout};
+use closecall_testing::browser;
 
+use crate::support::{folder, library, program, stdout};
+
+/// Runs a campaign of two scenarios with 120 samples each. Returns its standard output.
 fn campaign(out: &Path, more: &[&str], summary: Option<&Path>, expected: i32) -> String {
     let scenarios = ["low-thw-overtake", "overtake-without-brake"].map(library);
-    let mut command = Command::new(env!("CARGO_BIN_EXE_closecall"));
-    command.current_dir(env!("CARGO_MANIFEST_DIR")).arg("campaign").args(&scenarios);
+    let mut command = program();
+    command.arg("campaign").args(&scenarios);
     command.args(["-n", "120", "--seed", "1", "--paired"]).args(more).arg("--out").arg(out);
     match summary {
         Some(path) => command.env("GITHUB_STEP_SUMMARY", path),
@@ -18,14 +21,14 @@ fn campaign(out: &Path, more: &[&str], summary: Option<&Path>, expected: i32) ->
     stdout(&command.output().unwrap(), expected)
 }
 
-/// The values of an attribute in a page.
+/// Returns the values of an attribute in a page.
 fn attributes<'a>(page: &'a str, name: &str) -> Vec<&'a str> {
     let opening = format!(" {name}=\"");
-    page.match_indices(&opening).filter_map(|(place, _)| page[place + opening.len()..].split('"').next()).collect()
+    page.match_indices(&opening).filter_map(|(index, _)| page[index + opening.len()..].split('"').next()).collect()
 }
 
 #[test]
-fn the_page_is_alone_and_says_what_the_program_says() {
+fn the_page_loads_nothing_and_holds_the_reasons_of_the_verdict() {
     let folder = folder();
     let out = folder.path().join("out");
     let printed = campaign(&out, &["--max-collisions", "0", "--recordings", "1"], None, 1);
@@ -34,7 +37,7 @@ fn the_page_is_alone_and_says_what_the_program_says() {
         assert!(!page.contains(loaded), "{loaded}");
     }
     assert!(attributes(&page, "src").is_empty());
-    // Links lead to files of this folder, and they are there.
+    // Links lead to existing files of this folder.
     let links = attributes(&page, "href");
     assert!(links.iter().any(|link| link.ends_with(".rrd")), "{links:?}");
     for link in links {
@@ -57,7 +60,7 @@ fn the_page_is_alone_and_says_what_the_program_says() {
     ] {
         assert!(page.contains(part), "{part}");
     }
-    // Every element that is opened is closed.
+    // Every opened element is closed.
     for element in ["table", "tr", "td", "section", "figure", "svg", "div", "p", "ul", "header", "main", "body", "html"]
     {
         let opened = page.matches(&format!("<{element}>")).count() + page.matches(&format!("<{element} ")).count();
@@ -66,14 +69,8 @@ fn the_page_is_alone_and_says_what_the_program_says() {
 }
 
 #[test]
-fn a_browser_shows_the_page() {
-    let Some(browser) = ["chromium", "chromium-browser", "google-chrome"]
-        .into_iter()
-        .find(|name| Command::new(name).arg("--version").output().is_ok_and(|found| found.status.success()))
-    else {
-        skipped("there is no Chromium");
-        return;
-    };
+fn a_browser_shows_every_element_of_the_page() {
+    let Some(browser) = browser() else { return };
     let folder = folder();
     let out = folder.path().join("out");
     campaign(&out, &["--recordings", "0"], None, 0);
@@ -84,7 +81,7 @@ fn a_browser_shows_the_page() {
         .output()
         .unwrap();
     let text = String::from_utf8_lossy(&shown.stdout);
-    // What the browser made of the page: charts with their bars and points, and the verdict as the title.
+    // The browser's document has the verdict as its title, and the charts with their bars and points.
     assert!(text.contains("<title>PASS: low-thw-overtake, overtake-without-brake</title>"), "{text}");
     let file = fs::read_to_string(out.join("report.html")).unwrap();
     for element in ["<svg", "<circle", "<rect", "<table", "<tr"] {
@@ -93,18 +90,18 @@ fn a_browser_shows_the_page() {
 }
 
 #[test]
-fn the_step_summary_is_appended_to_where_one_is_asked_for() {
+fn the_summary_is_appended_to_the_step_summary_of_the_ci_server() {
     let folder = folder();
     let out = folder.path().join("out");
     let summary = folder.path().join("step.md");
-    fs::write(&summary, "what an earlier step said\n").unwrap();
+    fs::write(&summary, "the summary of an earlier step\n").unwrap();
     campaign(&out, &["--recordings", "0"], Some(&summary), 0);
     let text = fs::read_to_string(&summary).unwrap();
     let own = fs::read_to_string(out.join("summary.md")).unwrap();
-    assert_eq!(text, format!("what an earlier step said\n{own}"));
+    assert_eq!(text, format!("the summary of an earlier step\n{own}"));
     assert!(own.starts_with("## Closecall: PASS"), "{own}");
     assert!(own.contains("| low-thw-overtake | mis | 120 |") && own.contains("| MIS-1 | low-thw-overtake ("), "{own}");
-    // Tables are whole: every row has as many cells as its head.
+    // Every row of a table has as many cells as the head.
     for table in own.split("\n\n").filter(|block| block.starts_with('|')) {
         let cells: Vec<usize> = table.lines().map(|line| line.matches('|').count()).collect();
         assert!(cells.iter().all(|count| *count == cells[0]), "{table}");
@@ -112,7 +109,7 @@ fn the_step_summary_is_appended_to_where_one_is_asked_for() {
 }
 
 #[test]
-fn junit_has_a_case_for_every_outcome_and_attachments_that_are_there() {
+fn junit_has_a_case_for_every_outcome_and_attachments_that_exist() {
     let folder = folder();
     let out = folder.path().join("out");
     campaign(&out, &["--recordings", "1"], None, 0);
@@ -123,7 +120,7 @@ fn junit_has_a_case_for_every_outcome_and_attachments_that_are_there() {
     assert!(failures > 0 && xml.contains(&format!("failures=\"{failures}\"")), "{failures}");
     let attached: Vec<&str> = xml
         .match_indices("[[ATTACHMENT|")
-        .filter_map(|(place, opening)| xml[place + opening.len()..].split("]]").next())
+        .filter_map(|(index, opening)| xml[index + opening.len()..].split("]]").next())
         .collect();
     assert!(!attached.is_empty());
     for path in attached {
@@ -132,7 +129,7 @@ fn junit_has_a_case_for_every_outcome_and_attachments_that_are_there() {
 }
 
 #[test]
-fn units_stand_in_the_metadata_of_the_table() {
+fn the_parquet_file_holds_the_units_of_its_columns() {
     let folder = folder();
     let out = folder.path().join("out");
     campaign(&out, &["--recordings", "0"], None, 0);

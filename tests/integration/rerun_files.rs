@@ -1,26 +1,20 @@
-//! Rerun files pass the viewer's own verification.
+//! Recordings of runs pass the verification of the Rerun viewer.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
-use crate::support::{closecall, code, folder, library, skipped, stderr, stdout};
+use closecall_testing::viewer;
 
-/// The viewer's command line, where this machine has it.
-fn rerun() -> Option<PathBuf> {
-    let program = std::env::var_os("CLOSECALL_RERUN").map(PathBuf::from);
-    if program.is_none() {
-        skipped("CLOSECALL_RERUN does not name the Rerun viewer");
-    }
-    program
-}
+use crate::support::{all_of_library, closecall, code, folder, library, program, stderr, stdout};
 
-/// Has the viewer check a file, and look for what the blueprint needs of its timelines.
-fn verify(rerun: &Path, file: &Path) {
+/// Fails if the viewer does not verify a recording, or if the recording lacks a timeline or an entity that its
+/// blueprint shows.
+fn verify(viewer: &Path, file: &Path) {
     let size = std::fs::metadata(file).unwrap().len();
     assert!(size > 10_000 && size < 25_000_000, "{}: {size} bytes", file.display());
-    let verified = Command::new(rerun).args(["rrd", "verify"]).arg(file).output().unwrap();
+    let verified = Command::new(viewer).args(["rrd", "verify"]).arg(file).output().unwrap();
     assert!(verified.status.success(), "{}: {}", file.display(), stderr(&verified));
-    let printed = Command::new(rerun).args(["rrd", "print", "-vv"]).arg(file).output().unwrap();
+    let printed = Command::new(viewer).args(["rrd", "print", "-vv"]).arg(file).output().unwrap();
     let printed = String::from_utf8_lossy(&printed.stdout).into_owned();
     for named in ["until_critical", "time", "step", "/summary", "plots/speed/"] {
         assert!(printed.contains(named), "{}: no `{named}`", file.display());
@@ -28,24 +22,19 @@ fn verify(rerun: &Path, file: &Path) {
 }
 
 #[test]
-fn every_library_scenario_is_recorded_into_a_file_that_verifies() {
-    let Some(rerun) = rerun() else { return };
+fn the_recording_of_every_library_scenario_verifies() {
+    let Some(viewer) = viewer() else { return };
     let folder = folder();
-    let library = library("any");
-    let scenarios = std::fs::read_dir(library.parent().unwrap()).unwrap().map(|entry| entry.unwrap().path());
-    let mut count = 0;
-    for scenario in scenarios.filter(|path| path.extension().is_some_and(|extension| extension == "toml")) {
+    for scenario in all_of_library() {
         let file = folder.path().join(scenario.file_stem().unwrap()).with_extension("rrd");
         stdout(&closecall(["run", scenario.to_str().unwrap(), "--record", file.to_str().unwrap()]), 0);
-        verify(&rerun, &file);
-        count += 1;
+        verify(&viewer, &file);
     }
-    assert!(count >= 8, "{count} scenarios");
 }
 
 #[test]
-fn a_pair_a_full_run_and_recorded_traffic_verify_too() {
-    let Some(rerun) = rerun() else { return };
+fn recordings_of_a_pair_a_full_run_and_recorded_traffic_verify() {
+    let Some(viewer) = viewer() else { return };
     let folder = folder();
     let file = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let (figure, headline) = (library("paper-figure"), library("low-thw-overtake"));
@@ -57,7 +46,7 @@ fn a_pair_a_full_run_and_recorded_traffic_verify_too() {
     stdout(&closecall(["criticality", &own, "--record", &traffic]), 0);
     stdout(&closecall(["reenact", &own, "--record", &beside]), 0);
     for file in [pair, full, traffic, beside] {
-        verify(&rerun, Path::new(&file));
+        verify(&viewer, Path::new(&file));
     }
     let none = closecall(["criticality", &own, "--record", &file("none.rrd"), "--track", "99999"]);
     assert_eq!(code(&none), 2, "{}", stderr(&none));
@@ -65,7 +54,7 @@ fn a_pair_a_full_run_and_recorded_traffic_verify_too() {
 }
 
 #[test]
-fn less_detail_makes_smaller_files() {
+fn a_recording_with_less_detail_is_smaller() {
     let folder = folder();
     let scenario = library("low-thw-overtake");
     let size = |level: &str| {
@@ -80,7 +69,7 @@ fn less_detail_makes_smaller_files() {
 }
 
 #[test]
-fn a_campaign_records_what_is_selected_and_shows_it_on_a_page() {
+fn a_campaign_records_the_selected_samples_and_lists_them_on_a_page() {
     let folder = folder();
     let out = folder.path().join("campaign");
     let scenario = library("low-thw-overtake");
@@ -95,7 +84,7 @@ fn a_campaign_records_what_is_selected_and_shows_it_on_a_page() {
         .collect();
     assert!(files.len() >= 2 && files.len() <= 5, "{files:?}");
     for file in &files {
-        assert!(page.contains(&format!("rerun {file}")), "{file} is not on the page");
+        assert!(page.contains(&format!("rerun {file}")), "the page does not list {file}");
     }
     assert_eq!(page.matches("<svg").count(), files.len());
     assert!(page.contains("--paired") && page.contains("Recorded as worst"));
@@ -105,7 +94,7 @@ fn a_campaign_records_what_is_selected_and_shows_it_on_a_page() {
 }
 
 #[test]
-fn an_encounter_is_plotted_from_a_scenario_and_from_a_campaign() {
+fn a_scenario_and_a_sample_of_a_campaign_give_the_same_figure() {
     let folder = folder();
     let scenario = library("paper-figure");
     let file = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
@@ -132,11 +121,11 @@ fn a_recording_that_cannot_be_written_is_an_error() {
 }
 
 #[test]
-fn a_viewer_s_switch_that_would_lose_the_recording_is_an_error() {
+fn a_setting_of_the_rerun_sdk_that_suppresses_the_recording_is_an_error() {
     let folder = folder();
     let file = folder.path().join("run.rrd");
     let scenario = library("low-thw-overtake");
-    let output = Command::new(env!("CARGO_BIN_EXE_closecall"))
+    let output = program()
         .args(["run", scenario.to_str().unwrap(), "--record", file.to_str().unwrap()])
         .env("RERUN", "off")
         .output()

@@ -1,6 +1,6 @@
-//! The campaign's statistics on a scenario whose probability of a collision is known.
+//! The statistics of a campaign agree with a scenario whose collision probability is known.
 //!
-//! `examples/validate_statistics.rs` is the long form of this.
+//! `examples/validate_statistics.rs` does the same with many more campaigns.
 
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
@@ -13,7 +13,6 @@ use closecall_campaign::ledger::{ArmCounts, Inference};
 use closecall_campaign::probability::{Answer, ProbabilityGate};
 use closecall_campaign::record::Record;
 use closecall_campaign::runner::{Sampling, Work};
-use closecall_campaign::summary::Summary;
 use closecall_campaign::validity::CheckPlan;
 use closecall_campaign::workers::Workers;
 use closecall_scenarios::sampling::Design;
@@ -23,28 +22,28 @@ use closecall_simulation::scenario::ScenarioFile;
 
 use crate::support::{closecall, code, folder, json, library, stderr, stdout};
 
-/// The probability of a collision of the fixture, by construction.
+/// The collision probability of the fixture, by construction.
 const TRUTH: f64 = 0.05;
 
 fn fixture() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/known-probability.toml")
 }
 
-/// Runs one campaign until `stops` says so, and shows every record to `see`.
-fn run(seed: u64, samples: u64, stops: impl Fn(&ArmCounts) -> bool, mut see: impl FnMut(&Record)) -> ArmCounts {
+/// Runs a campaign until `is_over` returns true, and calls `observe` with every journal record.
+fn run(seed: u64, samples: u64, is_over: impl Fn(&ArmCounts) -> bool, mut observe: impl FnMut(&Record)) -> ArmCounts {
     let file = ScenarioFile::load(&fixture(), &[]).unwrap();
     let arms = vec![Arm { controller: BuiltIn::Acc.factory(), sensors: None }];
     let sampling = Sampling { seed, design: Design::Random, samples };
-    let workers = Workers { jobs: NonZeroUsize::new(2).unwrap(), sample_timeout: Duration::from_secs(60) };
+    let workers = Workers { jobs: NonZeroUsize::new(2).unwrap(), sample_timeout: Duration::from_mins(10) };
     let work = Arc::new(Work { file, sampling, arms, checks: CheckPlan::default() });
-    let campaign = Campaign::new(vec![work.clone()], workers);
+    let campaign = Campaign::new(vec![work], workers);
     let mut summary = campaign.summary();
     campaign
-        .run(None, |next| {
-            see(next.record);
-            summary.push(next.record);
+        .run(None, |turn| {
+            observe(turn.record);
+            summary.push(turn.record);
             let counts = summary.total().arms[0];
-            if stops(&counts) { ControlFlow::Break(End::Scenario) } else { ControlFlow::Continue(()) }
+            if is_over(&counts) { ControlFlow::Break(End::Scenario) } else { ControlFlow::Continue(()) }
         })
         .unwrap();
     let total = summary.total();
@@ -53,7 +52,7 @@ fn run(seed: u64, samples: u64, stops: impl Fn(&ArmCounts) -> bool, mut see: imp
 }
 
 #[test]
-fn the_fixture_collides_exactly_where_it_should() {
+fn a_sample_of_the_fixture_collides_if_and_only_if_its_gap_is_short() {
     let mut collisions = 0;
     let counts = run(
         0,
@@ -75,7 +74,7 @@ const CAMPAIGNS: u64 = 1_000;
 const SAMPLES: u64 = 50;
 
 #[test]
-fn intervals_of_a_thousand_campaigns_cover_the_truth() {
+fn the_intervals_of_a_thousand_campaigns_cover_the_true_probability() {
     let covered = (0..CAMPAIGNS)
         .filter(|seed| {
             let counts = run(*seed, SAMPLES, |_| false, |_| {});
@@ -87,7 +86,7 @@ fn intervals_of_a_thousand_campaigns_cover_the_truth() {
 }
 
 #[test]
-fn stopping_at_the_first_favourable_moment_is_seldom_wrong() {
+fn a_campaign_that_stops_at_the_first_answer_is_seldom_wrong() {
     let gate = ProbabilityGate::new(TRUTH, 0.95).unwrap();
     let mut answers = [0_u64; 3];
     for seed in 0..200 {
@@ -106,7 +105,7 @@ fn campaign(more: &[&str]) -> std::process::Output {
 }
 
 #[test]
-fn the_gate_on_the_probability_answers_pass_fail_or_asks_for_more() {
+fn the_gate_on_the_probability_passes_fails_or_is_inconclusive() {
     let passed = json(&campaign(&["-n", "500", "--max-probability", "0.1", "--format", "json"]), 0);
     assert_eq!(passed["verdict"], "PASS");
     let finding = &passed["probabilities"]["known-probability"];
@@ -121,7 +120,7 @@ fn the_gate_on_the_probability_answers_pass_fail_or_asks_for_more() {
 }
 
 #[test]
-fn a_sequential_campaign_is_the_same_on_any_number_of_threads() {
+fn a_sequential_campaign_does_not_depend_on_the_number_of_threads() {
     let results: Vec<_> = ["1", "2"]
         .map(|jobs| {
             let args = ["--max-probability", "0.1", "--until-certain", "--jobs", jobs, "--format", "json"];
@@ -134,7 +133,7 @@ fn a_sequential_campaign_is_the_same_on_any_number_of_threads() {
     let samples = results[0]["samples"].as_u64().unwrap();
     assert!((50..5_000).contains(&samples), "{samples}");
     assert_eq!(results[0]["controllers"]["acc"]["interval_method"], "confidence-sequence");
-    // One sample less, and it is not certain yet.
+    // With one sample less there is no answer yet.
     let before = (samples - 1).to_string();
     let args = ["--max-probability", "0.1", "--until-certain", "-n", &before, "--format", "json"];
     assert_eq!(json(&campaign(&args), 4)["samples"].as_u64(), Some(samples - 1));
@@ -143,15 +142,16 @@ fn a_sequential_campaign_is_the_same_on_any_number_of_threads() {
 #[test]
 fn a_time_budget_ends_a_campaign() {
     let output = campaign(&["--time-budget", "1s", "--max-probability", "0.2", "--format", "json"]);
-    // How far one gets in a second, and so whether there is an answer by then, is the machine's affair.
+    // The number of samples in a second depends on the machine, and so does whether there is an answer by then.
     assert!([0, 4].contains(&code(&output)), "{}", stderr(&output));
     let report = json(&output, code(&output));
     let samples = report["samples"].as_u64().unwrap();
+    // Without a number of samples, a campaign has 1,000,000.
     assert!((1..1_000_000).contains(&samples), "{samples}");
 }
 
 #[test]
-fn every_sample_can_be_checked_and_no_check_breaks() {
+fn a_campaign_that_checks_every_sample_finds_no_fault_of_the_simulator() {
     for name in ["low-thw-overtake", "left-lane-blocked", "slow-approach", "overtake-without-brake"] {
         let path = library(name);
         let args =
@@ -163,7 +163,7 @@ fn every_sample_can_be_checked_and_no_check_breaks() {
 }
 
 #[test]
-fn a_preset_says_how_many_and_what_is_given_beside_it_counts_before_it() {
+fn an_option_beside_a_preset_overrides_it() {
     let path = library("slow-approach");
     let run = |more: &[&str]| {
         let args = ["campaign", path.to_str().unwrap(), "--preset", "pr", "--set", "duration-s=2", "--format", "json"];
@@ -177,7 +177,7 @@ fn a_preset_says_how_many_and_what_is_given_beside_it_counts_before_it() {
 }
 
 #[test]
-fn limits_that_make_no_sense_are_wrong_usage() {
+fn limits_out_of_range_are_wrong_usage() {
     let folder = folder();
     let out = folder.path().join("out");
     let out = out.to_str().unwrap();
@@ -209,7 +209,7 @@ fn limits_that_make_no_sense_are_wrong_usage() {
 }
 
 #[test]
-fn comfort_gates_say_what_they_found() {
+fn comfort_gates_report_the_limit_that_was_exceeded() {
     let path = library("low-thw-overtake");
     let run = |more: &[&str], expected| {
         let args = ["campaign", path.to_str().unwrap(), "-n", "40"];

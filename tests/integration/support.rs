@@ -1,68 +1,77 @@
-//! Running the program, and reading what it leaves.
+//! Runs the program and reads its output.
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use serde_json::Value;
 
-/// The scenario library.
+/// The folder of the repository.
+pub(crate) const ROOT: &str = env!("CARGO_MANIFEST_DIR");
+
+/// Returns the path of a scenario of the library.
 pub(crate) fn library(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/library").join(format!("{name}.toml"))
+    library_folder().join(format!("{name}.toml"))
 }
 
-/// Runs the program in the repository's root.
+/// Returns the paths of all scenarios of the library, in alphabetical order.
+pub(crate) fn all_of_library() -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(library_folder()).expect("the scenario library");
+    let paths = entries.map(|entry| entry.expect("an entry of the scenario library").path());
+    let mut files: Vec<PathBuf> = paths.filter(|path| path.extension().is_some_and(|end| end == "toml")).collect();
+    files.sort();
+    files
+}
+
+fn library_folder() -> PathBuf {
+    Path::new(ROOT).join("scenarios/library")
+}
+
+/// Returns the program, ready to run in the folder of the repository.
+pub(crate) fn program() -> Command {
+    let mut program = Command::new(env!("CARGO_BIN_EXE_closecall"));
+    program.current_dir(ROOT);
+    program
+}
+
+/// Runs the program in the folder of the repository.
 pub(crate) fn closecall<S: AsRef<std::ffi::OsStr>>(args: impl IntoIterator<Item = S>) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_closecall"))
-        .current_dir(env!("CARGO_MANIFEST_DIR"))
-        .args(args)
-        .output()
-        .expect("the program starts")
+    program().args(args).output().expect("the program starts")
 }
 
-/// The exit code of a run of the program.
+/// Returns the exit code of a run of the program.
 pub(crate) fn code(output: &Output) -> i32 {
-    output.status.code().expect("not killed by a signal")
+    output.status.code().expect("no signal ended the program")
 }
 
-/// What the program printed, after a check that it ended as expected.
+/// Returns the standard output of the program. Fails if the program ended with another exit code than `expected`.
 pub(crate) fn stdout(output: &Output, expected: i32) -> String {
     assert_eq!(code(output), expected, "{}", stderr(output));
-    String::from_utf8(output.stdout.clone()).expect("text")
+    String::from_utf8(output.stdout.clone()).expect("the output is text")
 }
 
-/// What the program complained of.
+/// Returns the standard error of the program.
 pub(crate) fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// The JSON that the program printed.
-pub(crate) fn json(output: &Output, expected: i32) -> Value {
-    serde_json::from_str(&stdout(output, expected)).expect("JSON")
+/// Returns the standard error of the program in one line: without the frames and line breaks of its error reports.
+pub(crate) fn message(output: &Output) -> String {
+    stderr(output).replace('│', " ").split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// A folder that is removed with the test.
+/// Returns the JSON value that the program printed. Fails if the program ended with another exit code than `expected`.
+pub(crate) fn json(output: &Output, expected: i32) -> Value {
+    serde_json::from_str(&stdout(output, expected)).expect("the output is JSON")
+}
+
+/// Creates a folder that is removed at the end of the test.
 pub(crate) fn folder() -> tempfile::TempDir {
     tempfile::tempdir().expect("a temporary folder")
 }
 
-/// The headline's text with something replaced.
+/// Returns the text of the scenario `low-thw-overtake` with the first `from` replaced by `to`.
 pub(crate) fn headline_with(from: &str, to: &str) -> String {
-    let text = std::fs::read_to_string(library("low-thw-overtake")).expect("the headline");
-    assert!(text.contains(from), "the headline has no `{from}`");
+    let text = std::fs::read_to_string(library("low-thw-overtake")).expect("the scenario low-thw-overtake");
+    assert!(text.contains(from), "low-thw-overtake has no `{from}`");
     text.replacen(from, to, 1)
-}
-
-/// Recorded traffic, where this machine has it.
-pub(crate) fn data() -> Option<PathBuf> {
-    let folder = std::env::var_os("CLOSECALL_DATA").map(PathBuf::from);
-    if folder.is_none() {
-        skipped("CLOSECALL_DATA is not set");
-    }
-    folder
-}
-
-/// Says that a test is skipped. Written past the test runner's capture, so that it is seen although the test passes.
-pub(crate) fn skipped(why: &str) {
-    writeln!(std::io::stderr(), "skipped: {why}").expect("standard error");
 }

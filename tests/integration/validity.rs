@@ -1,17 +1,15 @@
-//! The checks of the simulator: they find what they are there for, and what they find counts.
+//! The validity checks of the simulator find the faults that they look for, and a finding makes a campaign invalid.
 
 use std::num::NonZeroUsize;
-use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use closecall_campaign::verdict::Decision;
 use closecall_campaign::execution::Campaign;
 use closecall_campaign::runner::{Sampling, Work};
 use closecall_campaign::summary::{Counts, Summary};
 use closecall_campaign::validity::{CheckPlan, Invariance};
-use closecall_campaign::verdict::{Gates, Verdict};
+use closecall_campaign::verdict::{Decision, Gates, Verdict};
 use closecall_campaign::workers::Workers;
 use closecall_controllers::{ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack};
 use closecall_scenarios::sampling::Design;
@@ -22,14 +20,14 @@ use closecall_traffic::Side;
 
 use crate::support::{closecall, folder, json, library, stdout};
 
-/// What a controller must not depend on.
+/// Something that the commands of a controller must not depend on.
 #[derive(Clone, Copy)]
 enum DependsOn {
     Nothing,
-    HowOftenItRan,
-    ItsThread,
-    NumbersOfTracks,
-    LeftAndRight,
+    NumberOfRuns,
+    Thread,
+    TrackIds,
+    OvertakingSide,
 }
 
 struct Flawed {
@@ -58,9 +56,9 @@ struct FlawedStack {
     stack: EgoStack,
 }
 
-/// Far from any collision, too small to matter, and in every bit of the outcome [m/s²].
-const WHIM_MPS2: f64 = -1e-3;
-/// Into the vehicle ahead [m/s²].
+/// A change of the acceleration that is too small to cause a collision, but changes the bits of the outcome (m/s²).
+const SMALL_MPS2: f64 = -1e-3;
+/// An acceleration that leads to a collision with the lead vehicle (m/s²).
 const RECKLESS_MPS2: f64 = 4.0;
 
 impl EgoController for FlawedStack {
@@ -69,51 +67,45 @@ impl EgoController for FlawedStack {
         let acceleration_mps2 = command.acceleration_mps2
             + match self.on {
                 DependsOn::Nothing => 0.0,
-                DependsOn::HowOftenItRan => WHIM_MPS2 * self.run as f64,
-                DependsOn::ItsThread if std::thread::current().name() == Some("check") => WHIM_MPS2,
-                DependsOn::ItsThread => 0.0,
-                DependsOn::NumbersOfTracks => input.tracks.iter().map(|track| WHIM_MPS2 * f64::from(track.id.0)).sum(),
-                DependsOn::LeftAndRight if input.road.overtaking_side() == Side::Left => {
+                DependsOn::NumberOfRuns => SMALL_MPS2 * self.run as f64,
+                DependsOn::Thread if std::thread::current().name() == Some("check") => SMALL_MPS2,
+                DependsOn::Thread => 0.0,
+                DependsOn::TrackIds => input.tracks.iter().map(|track| SMALL_MPS2 * f64::from(track.id.0)).sum(),
+                DependsOn::OvertakingSide if input.road.overtaking_side() == Side::Left => {
                     RECKLESS_MPS2 - command.acceleration_mps2
                 }
-                DependsOn::LeftAndRight => 0.0,
+                DependsOn::OvertakingSide => 0.0,
             };
         Ok(EgoCommand { acceleration_mps2, ..command })
     }
 }
 
-/// The headline with a flawed controller, every sample checked.
+/// Runs `low-thw-overtake` with a flawed controller, and checks every sample.
 fn checked(on: DependsOn) -> Summary {
     let file = ScenarioFile::load(&library("low-thw-overtake"), &[]).unwrap();
     let controller = Arc::new(Flawed { on, runs: AtomicU64::new(0) });
     let arms = vec![Arm { controller, sensors: Some(SensorMode::GroundTruth) }];
     let sampling = Sampling { seed: 5, design: Design::Random, samples: 6 };
-    let workers = Workers { jobs: NonZeroUsize::MIN, sample_timeout: Duration::from_secs(60) };
+    let workers = Workers { jobs: NonZeroUsize::MIN, sample_timeout: Duration::from_mins(10) };
     let work = Arc::new(Work { file, sampling, arms, checks: CheckPlan::new(1.0, 100).unwrap() });
-    let mut summary = campaign.summary();
-    Campaign::new(vec![work.clone()], workers)
-        .run(None, |next| {
-            summary.push(next.record);
-            ControlFlow::Continue(())
-        })
-        .unwrap();
-    summary
+    Campaign::new(vec![work], workers).count().unwrap()
 }
 
-fn found(counts: &Counts) -> Vec<(Invariance, u64)> {
+/// Returns the checks that found a fault, and in how many samples.
+fn findings(counts: &Counts) -> Vec<(Invariance, u64)> {
     counts.checks.broken().collect()
 }
 
 #[test]
-fn each_check_finds_what_it_is_there_for() {
+fn each_check_finds_its_fault() {
     for (on, expected) in [
-        (DependsOn::HowOftenItRan, Invariance::Repetition),
-        (DependsOn::ItsThread, Invariance::Threads),
-        (DependsOn::NumbersOfTracks, Invariance::ActorOrder),
-        (DependsOn::LeftAndRight, Invariance::Mirror),
+        (DependsOn::NumberOfRuns, Invariance::Repetition),
+        (DependsOn::Thread, Invariance::Threads),
+        (DependsOn::TrackIds, Invariance::ActorOrder),
+        (DependsOn::OvertakingSide, Invariance::Mirror),
     ] {
         let summary = checked(on);
-        assert_eq!(found(&summary.total()), [(expected, 6)], "{expected:?}");
+        assert_eq!(findings(&summary.total()), [(expected, 6)], "{expected:?}");
         let judged = summary.judge(Gates::default());
         assert_eq!((judged.verdict, judged.decision), (Verdict::Invalid, Decision::Invalid));
         assert!(judged.reasons[0].contains(expected.finding()), "{:?}", judged.reasons);
@@ -121,13 +113,13 @@ fn each_check_finds_what_it_is_there_for() {
 }
 
 #[test]
-fn a_sound_controller_is_not_found_fault_with() {
+fn no_check_finds_a_fault_of_a_sound_controller() {
     let total = checked(DependsOn::Nothing).total();
-    assert_eq!((found(&total), total.checks.runs, total.invalid), (Vec::new(), 6, 0));
+    assert_eq!((findings(&total), total.checks.runs, total.invalid), (Vec::new(), 6, 0));
 }
 
-/// R brakes between two steps of 10 ms, and gaps are drawn so closely around where it just does or does not hit E that
-/// half the step makes a difference in some samples.
+/// The rear vehicle brakes between two steps of 10 ms. The gaps lie so close to the limit between a collision and none
+/// that half the time step changes the result of some samples.
 const EDGE: &str = r#"
 schema-version = 1
 name = "edge-of-the-step"
@@ -159,7 +151,7 @@ mode = "ground-truth"
 "#;
 
 #[test]
-fn a_verdict_that_flips_at_half_the_step_is_judged_by_its_worse_side_and_bounded() {
+fn a_result_that_flips_at_half_the_time_step_counts_as_a_collision_and_flips_are_limited() {
     let folder = folder();
     let path = folder.path().join("edge.toml");
     std::fs::write(&path, EDGE).unwrap();
@@ -172,15 +164,15 @@ fn a_verdict_that_flips_at_half_the_step_is_judged_by_its_worse_side_and_bounded
     assert!((1..=20).contains(&flips), "{flips}");
     assert!(report["reasons"][0].as_str().unwrap().contains("flipped at half the time step"), "{report}");
     assert_eq!(run(&["--max-flip-rate", "0"], 7)["verdict"], "INVALID");
-    // The same samples, nearly unchecked: the flipped ones that collided only at half the step are missing.
+    // Without the checks, samples that collide only at half the step do not count.
     let unchecked = ["campaign", path, "-n", "400", "--controller", "acc", "--check-at-most", "0", "--format", "json"];
     let collisions = |report: &serde_json::Value| report["controllers"]["acc"]["collisions"].as_u64().unwrap();
-    let as_run = collisions(&json(&closecall(unchecked), 0));
-    assert!(collisions(&report) >= as_run && collisions(&report) <= as_run + flips, "{report}");
+    let unchecked_collisions = collisions(&json(&closecall(unchecked), 0));
+    assert!((unchecked_collisions..=unchecked_collisions + flips).contains(&collisions(&report)), "{report}");
 }
 
 #[test]
-fn people_are_told_how_much_was_checked() {
+fn a_campaign_prints_the_number_of_checked_runs() {
     let path = library("slow-approach");
     let text = stdout(&closecall(["campaign", path.to_str().unwrap(), "-n", "20"]), 0);
     assert!(text.contains("runs, 0 flipped at half the time step"), "{text}");

@@ -118,7 +118,7 @@ impl Lapse {
 
 #[cfg(test)]
 mod tests {
-    use closecall_traffic::{ActorId, stream};
+    use closecall_traffic::{ActorId, PHYSICS_STEP, stream};
 
     use super::*;
 
@@ -131,9 +131,9 @@ mod tests {
                 steps += 1.0;
                 first = first.or(Some(now));
             }
-            now += Time::from_ms(10);
+            now += PHYSICS_STEP;
         }
-        (0.01 * steps, first)
+        (PHYSICS_STEP.s() * steps, first)
     }
 
     #[test]

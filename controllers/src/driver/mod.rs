@@ -14,6 +14,8 @@ mod prescribed;
 mod reaction;
 mod smooth_noise;
 mod speed_keeping;
+#[cfg(test)]
+mod testing;
 mod wiedemann99;
 
 pub use attention::{Lapse, LapseConfig};
@@ -36,6 +38,12 @@ pub(crate) const HARDEST_BRAKING_MPS2: f64 = 8.0;
 
 /// Deceleration at highway speed with the accelerator released (m/s²): engine and air drag, 0.5 to 1 m/s².
 pub(crate) const COASTING_DECELERATION_MPS2: f64 = 0.7;
+
+/// Factor by which a driver brakes harder than necessary in order to keep apart.
+pub(crate) const BRAKING_MARGIN: f64 = 1.2;
+
+/// Speed below which a vehicle counts as standing (m/s).
+pub(crate) const STANDING_MPS: f64 = 0.1;
 
 /// Returns `value`, or an error if it is not finite.
 pub(crate) fn finite(value: f64, what: &'static str, time: Time) -> Result<f64, DriverError> {
@@ -72,42 +80,23 @@ pub struct Lead {
 
 #[cfg(test)]
 mod tests {
-    use closecall_traffic::{ActorId, Check, Indicator, Parameters, Road, Vehicle, VehicleClass, VehicleState, stream};
+    use closecall_traffic::{ActorId, Check, Parameters, stream};
 
+    use super::testing::{car_ahead, with_input};
     use super::*;
 
     #[test]
     fn every_following_driver_refuses_a_neighbour_that_is_not_finite() {
-        let lead = Neighbour {
-            actor: 1,
-            gap_m: f64::NAN,
-            speed_mps: 30.0,
-            acceleration_mps2: 0.0,
-            brake_light: false,
-            indicator: Indicator::Off,
-            class: VehicleClass::Car,
-            length_m: 4.6,
-            width_m: 1.85,
-            lateral_offset_m: 0.0,
-        };
-        let neighbours = Neighbours { in_path: Some(lead), ..Neighbours::default() };
-        let (road, vehicle) = (Road::straight(3), Vehicle::typical(VehicleClass::Car));
-        let own = VehicleState { d_m: -5.625, speed_mps: 30.0, ..VehicleState::default() };
-        let input = DriverInput {
-            time: Time::ZERO,
-            vehicle: &vehicle,
-            own: &own,
-            neighbours: &neighbours,
-            road: &road,
-            changing_to: None,
-            lateral_deviation_m: 0.0,
-            desired_speed_offset_mps: 0.0,
-        };
+        let lead = Lead { gap_m: f64::NAN, speed_mps: 30.0, acceleration_mps2: 0.0 };
+        let neighbours = Neighbours { in_path: Some(car_ahead(lead, false)), ..Neighbours::default() };
         let mut rng = stream(0, 0, &ActorId::new("rear").unwrap(), "driver");
         let none = Parameters::default();
         let wiedemann = Wiedemann99Config::default().check(&none).unwrap();
-        assert!(Wiedemann99Driver::new(wiedemann).step(&input, &mut rng).is_err());
-        assert!(IdmConfig::default().check(&none).unwrap().driver().step(&input, &mut rng).is_err());
+        let mut refuses = |driver: &mut dyn Driver| {
+            with_input(Time::ZERO, &neighbours, |input| driver.step(input, &mut rng).is_err())
+        };
+        assert!(refuses(&mut Wiedemann99Driver::new(wiedemann)));
+        assert!(refuses(&mut IdmConfig::default().check(&none).unwrap().driver()));
         let overtaker = OvertakerConfig {
             cut_out_thw_s: 1.5.into(),
             follow: FollowConfig::Wiedemann99(Wiedemann99Config::default()),
@@ -117,6 +106,6 @@ mod tests {
             lapse: None,
             returns: None,
         };
-        assert!(overtaker.check(&none).unwrap().driver().step(&input, &mut rng).is_err());
+        assert!(refuses(&mut overtaker.check(&none).unwrap().driver()));
     }
 }

@@ -20,7 +20,7 @@
 //!   perceived only gradually, from the change of speed. Until then, a driver who sees the brake light go on assumes a
 //!   moderate deceleration.
 
-use closecall_traffic::{Lane, Side, Stream, Time};
+use closecall_traffic::{Lane, PHYSICS_STEP, Side, Stream, Time};
 
 use super::attention::{Attention, Lapse};
 use super::reaction::MAX_REACTION_S;
@@ -43,12 +43,10 @@ const ASSUMED_BRAKING_MPS2: f64 = 2.0;
 /// Time for which a brake light stands for [`ASSUMED_BRAKING_MPS2`] (s). Afterwards, the perceived deceleration counts.
 const ASSUMED_BRAKING_DURATION_S: f64 = 1.0;
 
-/// Shortest time between two stored observations: the physics step at 100 Hz.
-const OBSERVATION_PERIOD: Time = Time::from_ms(10);
-
-/// Number of stored observations: the longest reaction time at 100 Hz, plus one at either end.
+/// Number of stored observations: those within the longest reaction time, at most one in each physics step, plus one at
+/// either end.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive constant")]
-const MEMORY_CAPACITY: usize = (MAX_REACTION_S * 100.0) as usize + 2;
+const MEMORY_CAPACITY: usize = (MAX_REACTION_S / PHYSICS_STEP.s()).round() as usize + 2;
 
 /// State of another vehicle at the time of an observation.
 #[derive(Clone, Copy, Debug)]
@@ -227,7 +225,7 @@ impl Perception {
 
     fn store(&mut self, input: &DriverInput<'_>) {
         let length = self.memory.len();
-        if length > 0 && input.time - self.observation(length - 1).time < OBSERVATION_PERIOD {
+        if length > 0 && input.time - self.observation(length - 1).time < PHYSICS_STEP {
             return;
         }
         let observation = Observation::of(input, self.side);

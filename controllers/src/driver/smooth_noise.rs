@@ -110,12 +110,12 @@ fn lower_triangle(covariance: &Matrix3<f64>) -> Matrix3<f64> {
 
 #[cfg(test)]
 mod tests {
-    use closecall_traffic::{ActorId, stream};
+    use closecall_traffic::{ActorId, PHYSICS_STEP, stream};
 
     use super::*;
 
     const LAGS_S: [f64; 3] = [4.0, 0.5, 0.3];
-    const STEP_S: f64 = 0.01;
+    const STEP_S: f64 = PHYSICS_STEP.s();
 
     fn rng(seed: u64) -> Stream {
         stream(seed, 0, &ActorId::new("rear").unwrap(), "drift")

@@ -1,21 +1,10 @@
 //! Helpers shared by several tests.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use closecall_scenarios::recordings::{Recording, RecordingError, read_from};
+pub(crate) use closecall_testing::data as data_folder;
 use closecall_traffic::{Lane, Time, Trajectory, TrajectoryPoint, VehicleClass};
-
-/// Returns the folder with recorded traffic. Returns `None` and prints a notice if `CLOSECALL_DATA` is not set.
-pub(crate) fn data_folder() -> Option<PathBuf> {
-    let folder = std::env::var_os("CLOSECALL_DATA").map(PathBuf::from);
-    if folder.is_none() {
-        #[expect(clippy::print_stderr, reason = "a skipped test has to say so")]
-        {
-            eprintln!("skipped: CLOSECALL_DATA is not set");
-        }
-    }
-    folder
-}
 
 /// Reads trajectory data from text.
 pub(crate) fn read_text(text: &[u8]) -> Result<Recording, RecordingError> {

@@ -9,29 +9,48 @@ use closecall_traffic::ClassScores;
 
 use super::LaneGeometry;
 use super::boxes::BoxFit;
+use crate::gaussian::Gaussian;
 
 /// The prior and the size distribution of a class.
 struct ClassModel {
     /// Prior probability.
     prior: f64,
-    /// Mean and standard deviation of the width (m).
-    width_m: [f64; 2],
-    /// Mean and standard deviation of the height (m).
-    height_m: [f64; 2],
-    /// Mean and standard deviation of the length (m).
-    length_m: [f64; 2],
+    /// Width (m).
+    width_m: Gaussian,
+    /// Height (m).
+    height_m: Gaussian,
+    /// Length (m).
+    length_m: Gaussian,
 }
 
 /// Car, truck, motorcycle and background. The sizes are typical of European roads, the priors are shares in motorway
 /// traffic (assumptions).
 const CLASS_MODELS: [ClassModel; 4] = [
-    ClassModel { prior: 0.60, width_m: [1.83, 0.12], height_m: [1.55, 0.25], length_m: [4.5, 0.5] },
-    ClassModel { prior: 0.20, width_m: [2.50, 0.12], height_m: [3.60, 0.50], length_m: [13.0, 4.0] },
-    ClassModel { prior: 0.10, width_m: [0.70, 0.20], height_m: [1.50, 0.20], length_m: [2.2, 0.2] },
-    ClassModel { prior: 0.10, width_m: [1.00, 1.50], height_m: [0.70, 0.60], length_m: [6.0, 10.0] },
+    ClassModel {
+        prior: 0.60,
+        width_m: Gaussian::new(1.83, 0.12),
+        height_m: Gaussian::new(1.55, 0.25),
+        length_m: Gaussian::new(4.5, 0.5),
+    },
+    ClassModel {
+        prior: 0.20,
+        width_m: Gaussian::new(2.50, 0.12),
+        height_m: Gaussian::new(3.60, 0.50),
+        length_m: Gaussian::new(13.0, 4.0),
+    },
+    ClassModel {
+        prior: 0.10,
+        width_m: Gaussian::new(0.70, 0.20),
+        height_m: Gaussian::new(1.50, 0.20),
+        length_m: Gaussian::new(2.2, 0.2),
+    },
+    ClassModel {
+        prior: 0.10,
+        width_m: Gaussian::new(1.00, 1.50),
+        height_m: Gaussian::new(0.70, 0.60),
+        length_m: Gaussian::new(6.0, 10.0),
+    },
 ];
-/// Index of the background class.
-const BACKGROUND: usize = 3;
 /// Tangent of the elevation of the uppermost layer's upper edge.
 const HIGHEST_TAN: f64 = 0.085;
 /// Distance from which the upper part of a vehicle may be missed entirely (m).
@@ -53,7 +72,7 @@ const MIN_SCORE: f64 = 0.005;
 
 /// Returns the typical length and width of a vehicle class (m), which replace the extents that are not seen.
 pub(crate) fn typical_size_m(class: usize) -> [f64; 2] {
-    [CLASS_MODELS[class].length_m[0], CLASS_MODELS[class].width_m[0]]
+    [CLASS_MODELS[class].length_m.mean, CLASS_MODELS[class].width_m.mean]
 }
 
 /// Returns the class scores of a fitted box. `width_seen` is true if both lateral edges were in view.
@@ -62,7 +81,7 @@ pub(crate) fn class_scores(fit: &BoxFit, width_seen: bool, lane: &LaneGeometry) 
     for (log, model) in logs.iter_mut().zip(&CLASS_MODELS) {
         *log = model.prior.ln() + width_log(fit, model, width_seen) + height_log(fit, model) + length_log(fit, model);
     }
-    logs[BACKGROUND] += background_log(fit, lane);
+    logs[ClassScores::BACKGROUND] += background_log(fit, lane);
     let max = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let mut scores = logs.map(|log| (log - max).exp());
     let sum: f64 = scores.iter().sum();
@@ -79,7 +98,7 @@ fn normal_log(deviation: f64, sd: f64) -> f64 {
 
 /// Returns the log likelihood of the visible width.
 fn width_log(fit: &BoxFit, model: &ClassModel, seen: bool) -> f64 {
-    let [width, sd] = model.width_m;
+    let Gaussian { mean: width, sd } = model.width_m;
     let seen_m = fit.width_m() + 0.5 * fit.spacing_m;
     let sd = sd.hypot(0.7 * fit.spacing_m);
     // A hidden edge, or one lost to weak returns, only makes a vehicle look narrower.
@@ -89,7 +108,7 @@ fn width_log(fit: &BoxFit, model: &ClassModel, seen: bool) -> f64 {
 
 /// Returns the log likelihood of the visible height.
 fn height_log(fit: &BoxFit, model: &ClassModel) -> f64 {
-    let [height, sd] = model.height_m;
+    let Gaussian { mean: height, sd } = model.height_m;
     let in_view = 0.6 + fit.range_m * HIGHEST_TAN;
     let half_layer = 0.5 * fit.layer_m();
     let expected = height.min(in_view - half_layer);
@@ -104,7 +123,7 @@ fn height_log(fit: &BoxFit, model: &ClassModel) -> f64 {
 /// Returns the log likelihood of the visible length. Only a length in excess of the class's counts, since a box is at
 /// least as long as its visible part.
 fn length_log(fit: &BoxFit, model: &ClassModel) -> f64 {
-    let [length, sd] = model.length_m;
+    let Gaussian { mean: length, sd } = model.length_m;
     let excess = (fit.length_m() - length).max(0.0);
     -0.5 * (excess / sd.hypot(0.3)).powi(2)
 }

@@ -16,7 +16,7 @@ const OCCLUSION_DEPTH_M: f64 = 1.0;
 /// Standard deviation of an edge's lateral position (columns): the edge lies somewhere within the last step.
 const EDGE_SD_COLUMNS: f64 = 0.3;
 /// Standard deviation of the position of a vehicle's front (m), which is not flat: bumper, plate, bonnet edge.
-const FACE_SD_M: f64 = 0.034;
+pub(crate) const FACE_SD_M: f64 = 0.034;
 /// Standard deviation of the range of a single point (m).
 const POINT_SD_M: f64 = 0.05;
 /// Additional standard deviation of the front if a side is seen too, whose points lie close behind those of the front
@@ -54,7 +54,7 @@ const TRUNCATED_LENGTH_SD_M: f64 = 0.5;
 /// Standard deviation of such a front if the rear end is not seen either (m).
 const TRUNCATED_SD_M: f64 = 3.0;
 /// Distance by which mirrors and wheels may protrude from a vehicle's side (m).
-const SIDE_PROTRUSION_M: f64 = 0.25;
+pub(crate) const SIDE_PROTRUSION_M: f64 = 0.25;
 /// Length of the visible side from which a vehicle's length counts as measured (m).
 const SIDE_SEEN_M: f64 = 3.0;
 /// Spacing of the columns on a side below which the farthest point of the side counts as its end (m).

@@ -15,7 +15,7 @@ pub struct LaneGeometry {
 
 impl LaneGeometry {
     /// Returns the geometry that an error-free map and camera would provide.
-    pub fn of(scene: &Scene<'_>) -> Self {
+    pub fn from_scene(scene: &Scene<'_>) -> Self {
         let state = &scene.ego.state;
         let curvature = scene.road.curvature_per_m();
         Self {

@@ -38,10 +38,14 @@ mod viewpoint;
 
 pub use config::{Lidar, LidarConfig, LidarModel};
 pub use detector::Detector;
+#[cfg(test)]
+pub(crate) use detector::FACE_SD_M;
+pub(crate) use detector::SIDE_PROTRUSION_M;
 pub use lane::LaneGeometry;
 pub use material::Material;
-pub use pattern::{BEAMS, COLUMNS, LAYERS, PERIOD_NS, Pattern};
-pub(crate) use power::extinction_per_m;
+pub use pattern::{BEAMS, COLUMNS, LAYERS, Pattern};
+pub(crate) use pattern::{HALF_FIELD_DEG, HALF_FIELD_TAN};
+pub(crate) use power::{KOSCHMIEDER, extinction_per_m, rain_db_per_km};
 pub use rear::RearLidar;
 pub use scan::{LidarScan, MirrorSide, PointSource, PointTruth, ScanTruth};
 pub use scanner::Scanner;

@@ -19,6 +19,8 @@
 //! cells, 0.6025° apart, without a gap. Its width is assumed to be the finest azimuth step, 0.125°, so that
 //! neighbouring columns touch. 2 × 4 sub-rays of equal weight sample the footprint.
 
+use closecall_traffic::CONTROL_STEP;
+
 use super::MirrorSide;
 
 /// Number of columns in a scan.
@@ -38,15 +40,15 @@ pub(crate) const SUBRAY_ROWS: usize = 4;
 /// Number of sub-rays in a footprint.
 pub(crate) const SUBRAYS: usize = SUBRAY_COLUMNS * SUBRAY_ROWS;
 
-/// Period of the scans (ns): 25 Hz.
-pub const PERIOD_NS: i64 = 40_000_000;
-/// Half the horizontal field of view (°).
-const HALF_FIELD_DEG: f64 = 66.5;
+/// Half of the horizontal field of view (°).
+pub(crate) const HALF_FIELD_DEG: f64 = 66.5;
+/// Tangent of half of the horizontal field of view, rounded.
+pub(crate) const HALF_FIELD_TAN: f64 = 2.2998;
 /// Duration of a sweep over the field of view (ns).
 ///
 /// The mirror has two sides, so it turns by 180° in each period. It deflects a beam by twice its own angle, so it turns
 /// by half of 133° during a sweep.
-pub(crate) const SWEEP_NS: f64 = PERIOD_NS as f64 * HALF_FIELD_DEG / 180.0;
+pub(crate) const SWEEP_NS: f64 = CONTROL_STEP.ns() as f64 * HALF_FIELD_DEG / 180.0;
 
 /// The fine azimuth step (°), which is also the unit that azimuths are counted in.
 const FINE_STEP_DEG: f64 = 0.125;

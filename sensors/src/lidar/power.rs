@@ -36,7 +36,7 @@ const RANGE_SD_M: f32 = 0.03;
 const RANGE_SD_AT_THRESHOLD_M: f32 = 0.09;
 /// Product of extinction and meteorological visibility V, the distance at which contrast falls to 2 %: α = ln 50 / V
 /// (Koschmieder 1924).
-const KOSCHMIEDER: f64 = 3.912;
+pub(crate) const KOSCHMIEDER: f64 = 3.912;
 /// Factor in the extinction of rain at optical wavelengths: 1.076·r^0.67 dB/km at r mm/h (Carbonneau and Wisely 1998).
 const RAIN_DB_PER_KM: f64 = 1.076;
 /// Exponent of the rain rate in that formula.
@@ -83,8 +83,12 @@ impl LinkBudget {
 ///
 /// The two are not added, because a visibility observed in rain already includes the extinction of the rain.
 pub(crate) fn extinction_per_m(environment: &Environment) -> f64 {
-    let rain_db_per_km = RAIN_DB_PER_KM * environment.rain_mm_per_h.powf(RAIN_EXPONENT);
-    (KOSCHMIEDER / environment.visibility_m).max(rain_db_per_km / DB_PER_KM_OVER_PER_M)
+    (KOSCHMIEDER / environment.visibility_m).max(rain_db_per_km(environment) / DB_PER_KM_OVER_PER_M)
+}
+
+/// Returns the extinction of the rain (dB/km).
+pub(crate) fn rain_db_per_km(environment: &Environment) -> f64 {
+    RAIN_DB_PER_KM * environment.rain_mm_per_h.powf(RAIN_EXPONENT)
 }
 
 /// Returns the standard deviation of the measured range (m): 0.03 m for a strong return, 0.1 m at the threshold.

@@ -1,21 +1,13 @@
 //! Guard rails with their posts along both edges of the road.
-//!
-//! The rail is of the usual European type: a W-shaped beam 0.31 m high whose upper edge is 0.75 m above the road, on
-//! posts 4 m apart. It stands 0.75 m from the left edge of the road and, beyond a hard shoulder, 3 m from the right
-//! edge (assumptions within the usual cross-sections of German motorways, RAA 2008).
 
 use closecall_traffic::{PlanePose, Road};
 
 use super::Material::Steel;
 use super::solid::Solid;
+use crate::guard_rail::{BEAM_DEPTH_M, BEAM_TOP_M, LEFT_OFFSET_M, POST_SPACING_M, RIGHT_OFFSET_M};
 
 const BEAM_LOW_M: f64 = 0.44;
-const BEAM_TOP_M: f64 = 0.75;
-const BEAM_DEPTH_M: f64 = 0.08;
-const POST_SPACING_M: f64 = 4.0;
 const POST_WIDTH_M: f64 = 0.10;
-const LEFT_OFFSET_M: f64 = 0.75;
-const RIGHT_OFFSET_M: f64 = 3.0;
 /// Length of the modelled rails behind the ego (m). Beyond this distance steel at so grazing an angle gives no return,
 /// although the rail could still occlude something.
 const RAIL_REACH_M: f64 = 160.0;

@@ -4,13 +4,13 @@
 //! sweep crosses the middle of its vehicle. The error is small: the sweep crosses the width of a vehicle in 0.4 ms at
 //! 30 m and in 4 ms at 3 m, and the vehicle moves relative to the ego by millimetres to centimetres in that time.
 
-use closecall_traffic::{PlanePose, Stream, Time};
+use closecall_traffic::{CONTROL_STEP, PlanePose, Stream, Time};
 use nalgebra::{Isometry3, Point3};
 
 use super::cast::{ActiveParts, ColumnHits, SubRays};
 use super::material::asphalt;
 use super::noise::Noise;
-use super::pattern::{Column, Elevation, LAYERS_PER_GROUP, PERIOD_NS, Pattern, SWEEP_NS};
+use super::pattern::{Column, Elevation, LAYERS_PER_GROUP, Pattern, SWEEP_NS};
 use super::power::{LinkBudget, MIN_POWER};
 use super::receiver::{Receiver, SensorPoseEstimate};
 use super::roadside::{PlacedSolid, append_guard_rails};
@@ -73,7 +73,7 @@ impl Scanner {
 
     /// Returns the mirror side of the scan that ends at `time`. The sides alternate from scan to scan.
     pub fn mirror_side_at(time: Time) -> MirrorSide {
-        if time.ns().div_euclid(PERIOD_NS) % 2 == 0 { MirrorSide::Plus } else { MirrorSide::Minus }
+        if time.ns().div_euclid(CONTROL_STEP.ns()) % 2 == 0 { MirrorSide::Plus } else { MirrorSide::Minus }
     }
 
     /// Scans the scene. The scan ends at the scene's time. Draws exactly one number from `rng`.

@@ -23,11 +23,11 @@
 //!
 //! All other values are assumptions.
 
-use closecall_traffic::{ConfigError, Num, Parameters, Problem, Range};
+use closecall_traffic::{CONTROL_STEP, ConfigError, Num, Parameters, Problem, Range};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::SCAN_PERIOD;
+use crate::lidar::HALF_FIELD_DEG;
 use crate::tracking::lifecycle::{LifecycleRules, MAX_WINDOW};
 
 /// Maximum latency in control steps: 0.4 s.
@@ -99,9 +99,14 @@ struct Defaults {
     speed_sd_mps: Option<f64>,
     latency_s: f64,
     dropout: f64,
-    /// `confirm-hits` and `confirm-window`.
-    confirm: (u8, u8),
+    confirm: Confirmation,
     coast_s: f64,
+}
+
+/// How a track is confirmed: by `hits` measurements within `window` scans.
+struct Confirmation {
+    hits: u8,
+    window: u8,
 }
 
 const DRIFT_TIME_S: f64 = 1.0;
@@ -116,7 +121,7 @@ const FRONT_RADAR: Defaults = Defaults {
     speed_sd_mps: Some(0.1),
     latency_s: 0.08,
     dropout: 0.02,
-    confirm: (3, 5),
+    confirm: Confirmation { hits: 3, window: 5 },
     coast_s: 0.6,
 };
 
@@ -129,20 +134,20 @@ const SURROUND: Defaults = Defaults {
     speed_sd_mps: None,
     latency_s: 0.04,
     dropout: 0.02,
-    confirm: (2, 4),
+    confirm: Confirmation { hits: 2, window: 4 },
     coast_s: 0.3,
 };
 
 const REAR_OBJECT: Defaults = Defaults {
     range_m: 120.0,
-    half_angle_deg: Some(66.5),
+    half_angle_deg: Some(HALF_FIELD_DEG),
     range_sd_m: 0.1,
     lateral_sd_m: 0.15,
     drift_sd_m: 0.1,
     speed_sd_mps: None,
     latency_s: 0.08,
     dropout: 0.05,
-    confirm: (3, 5),
+    confirm: Confirmation { hits: 3, window: 5 },
     coast_s: 1.0,
 };
 
@@ -155,7 +160,7 @@ fn half_angle_not_allowed() -> ConfigError {
 /// Returns the number of whole control steps nearest to `time_s`, which is from 0 to 10 s.
 fn steps(time_s: f64) -> usize {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked to be 0 to 10 s")]
-    let steps = (time_s / SCAN_PERIOD.s()).round() as usize;
+    let steps = (time_s / CONTROL_STEP.s()).round() as usize;
     steps
 }
 
@@ -191,7 +196,7 @@ impl ObjectSensorConfig {
             (Some(num), _) => Some(parameters.number(num, "speed-sd-mps", Range::closed(0.01, 20.0))?),
             (None, default) => default,
         };
-        let longest_s = MAX_LATENCY_STEPS as f64 * SCAN_PERIOD.s();
+        let longest_s = MAX_LATENCY_STEPS as f64 * CONTROL_STEP.s();
         let latency_s = number(&self.latency_s, defaults.latency_s, "latency-s", Range::closed(0.0, longest_s))?;
         let dropout = number(&self.dropout, defaults.dropout, "dropout", Range::closed(0.0, 0.95))?;
         let coast_s = number(&self.coast_s, defaults.coast_s, "coast-s", Range::closed(0.0, 10.0))?;
@@ -206,7 +211,7 @@ impl ObjectSensorConfig {
                 number(&self.lateral_sd_m, defaults.lateral_sd_m, "lateral-sd-m", white_sd)?,
             ],
             drift_sd_m: number(&self.drift_sd_m, defaults.drift_sd_m, "drift-sd-m", Range::closed(0.0, 10.0))?,
-            drift_decay: (-SCAN_PERIOD.s() / drift_time_s).exp(),
+            drift_decay: (-CONTROL_STEP.s() / drift_time_s).exp(),
             speed_sd_mps,
             latency_steps: steps(latency_s),
             dropout,
@@ -216,12 +221,12 @@ impl ObjectSensorConfig {
     }
 
     fn rules(&self, defaults: &Defaults, dropout: f64, coast_steps: usize) -> Result<LifecycleRules, ConfigError> {
-        let window = self.confirm_window.unwrap_or(defaults.confirm.1);
+        let window = self.confirm_window.unwrap_or(defaults.confirm.window);
         if !(1..=MAX_WINDOW).contains(&window) {
             let problem = Problem::WrongCount { value: window.into(), allowed: "a number of scans from 1 to 16" };
             return Err(ConfigError::new("confirm-window", problem));
         }
-        let hits = self.confirm_hits.unwrap_or(defaults.confirm.0);
+        let hits = self.confirm_hits.unwrap_or(defaults.confirm.hits);
         if !(1..=window).contains(&hits) {
             let problem = Problem::WrongCount { value: hits.into(), allowed: "a number from 1 to `confirm-window`" };
             return Err(ConfigError::new("confirm-hits", problem));

@@ -8,13 +8,14 @@
 //! L is the latency in control steps. The vehicle that a measurement belongs to is known, because an object-level
 //! sensor models the output of a sensor with its own tracking. Only the full LiDAR chain can confuse two vehicles.
 
-use closecall_traffic::{ClassScores, Environment, Source, Track, TrackId, VehicleClass};
+use closecall_traffic::{CONTROL_STEP, ClassScores, Environment, Source, Track, TrackId, VehicleClass};
 
 use super::config::{MAX_LATENCY_STEPS, ObjectSensorModel};
 use super::noise::{MeasurementErrors, NoiseKey, TargetNoise};
 use super::visibility::{Direction, Field, Visibility};
 use super::weather::range_in_weather_m;
 use crate::ego_frame::EgoFrame;
+use crate::gaussian::Gaussian;
 use crate::perception::FieldOfView;
 use crate::surroundings::OtherVehicle;
 use crate::tracking::TrackList;
@@ -23,15 +24,9 @@ use crate::tracking::lifecycle::Lifecycle;
 use crate::tracking::motion::{
     ACROSS_MODES, ACROSS_WHITE_MODE, ALONG_MODES, ALONG_WHITE_MODE, EgoRear, Mode, RearVehicle, Situation,
 };
-use crate::tracking::road_filter::in_ego_frame;
-use crate::{Health, SCAN_PERIOD, Scene};
+use crate::tracking::road_filter::{LATERAL_SPEED_PRIOR_SD_MPS, POSITION_PRIOR_SD_M, SPEED_PRIOR_SD_MPS, in_ego_frame};
+use crate::{Health, Scene};
 
-/// Prior standard deviation of a vehicle's speed, whose prior mean is the ego's speed (m/s).
-const SPEED_PRIOR_SD_MPS: f64 = 10.0;
-/// Prior standard deviation of a vehicle's position (m): wide enough to have no influence.
-const POSITION_PRIOR_SD_M: f64 = 1_000.0;
-/// Prior standard deviation of a vehicle's lateral speed (m/s).
-const LATERAL_SPEED_PRIOR_SD_MPS: f64 = 0.7;
 /// Standard deviation of a track's speed above which the track is not confirmed (m/s): no function could act on it yet.
 const SETTLED_SPEED_SD_MPS: f64 = 1.0;
 /// Share of the nominal range below which a sensor counts as degraded.
@@ -128,7 +123,6 @@ impl ObjectSensor {
     /// Measures one scene, and appends to `list` the tracks whose latency has elapsed.
     pub(crate) fn scan(&mut self, input: &ScanInput<'_>, list: &mut TrackList) {
         let size = input.scene.ego.vehicle.dimensions;
-        let ego_size_m = [size.length_m, size.width_m];
         let state = &input.scene.ego.state;
         let ego = EgoRear {
             s_m: state.s_m - 0.5 * size.length_m,
@@ -139,13 +133,13 @@ impl ObjectSensor {
         self.update_range(input.scene.environment);
         let field =
             Field { direction: self.direction, range_m: self.range_m, half_angle_tan: self.model.half_angle_tan };
-        self.visibility.update(self.direction, input.others, ego_size_m);
+        self.visibility.update(self.direction, input.others, &size);
         for other in input.others {
             let index = self.target_index(other.actor);
             let errors = self.targets[index].noise.draw(&self.model);
-            let in_view = self.visibility.sees(&field, other, ego_size_m);
             let errors = errors.mirrored_for(input.scene.road.overtaking_side());
-            self.update_target(index, other, (in_view, errors), &ego, list);
+            let errors = self.visibility.sees(&field, other, &size).then_some(errors);
+            self.update_target(index, other, errors, &ego, list);
             self.report(index, other, input, list);
         }
         self.step += 1;
@@ -181,12 +175,12 @@ impl ObjectSensor {
         })
     }
 
-    /// Predicts and corrects the filters of one vehicle.
+    /// Predicts and corrects the filters of one vehicle. `errors` is `None` if the vehicle is not in view.
     fn update_target(
         &mut self,
         index: usize,
         other: &OtherVehicle,
-        (in_view, errors): (bool, MeasurementErrors),
+        errors: Option<MeasurementErrors>,
         ego: &EgoRear,
         list: &mut TrackList,
     ) {
@@ -194,23 +188,24 @@ impl ObjectSensor {
         if let Some((_, _, [along, across])) = &mut target.filters {
             // The filter estimates the position of the vehicle's centre.
             let AxisEstimate { position_m, speed_mps, .. } = along.estimate();
-            let front_s_m = position_m + 0.5 * other.length_m + speed_mps * SCAN_PERIOD.s();
+            let front_s_m = position_m + 0.5 * other.length_m + speed_mps * CONTROL_STEP.s();
             let situation =
                 Situation::of(&RearVehicle { front_s_m, d_m: across.estimate().position_m, speed_mps }, ego);
             for axis in [along, across] {
-                axis.predict(SCAN_PERIOD.s(), model.drift_decay, situation);
+                axis.predict(CONTROL_STEP.s(), model.drift_decay, situation);
             }
         }
-        if in_view && !errors.is_lost {
+        if let Some(errors) = errors.filter(|errors| !errors.is_lost) {
             let measured_m = [other.road_m[0] + errors.position_m[0], other.road_m[1] + errors.position_m[1]];
             let is_new = target.filters.is_none();
             let (_, lifecycle, [along, across]) = target.filters.get_or_insert_with(|| {
-                let speeds_mps = [[ego.speed_mps, SPEED_PRIOR_SD_MPS], [0.0, LATERAL_SPEED_PRIOR_SD_MPS]];
-                let prior = |axis: usize| {
-                    let position_m = [measured_m[axis], POSITION_PRIOR_SD_M];
-                    AxisFilter::prior(self.modes[axis], position_m, speeds_mps[axis])
+                let along_mps = Gaussian::new(ego.speed_mps, SPEED_PRIOR_SD_MPS);
+                let across_mps = Gaussian::new(0.0, LATERAL_SPEED_PRIOR_SD_MPS);
+                let prior = |axis: usize, speed_mps| {
+                    let position_m = Gaussian::new(measured_m[axis], POSITION_PRIOR_SD_M);
+                    AxisFilter::prior(self.modes[axis], position_m, speed_mps)
                 };
-                (list.new_id(), Lifecycle::first_hit(&model.rules), [prior(0), prior(1)])
+                (list.new_id(), Lifecycle::first_hit(&model.rules), [prior(0, along_mps), prior(1, across_mps)])
             });
             for (road_axis, axis) in [&mut *along, across].into_iter().enumerate() {
                 axis.measure_position(&AxisMeasurement {
@@ -227,7 +222,7 @@ impl ObjectSensor {
                 lifecycle.hit(&model.rules, along.estimate().speed_variance_m2ps2.sqrt() <= SETTLED_SPEED_SD_MPS);
             }
         } else if let Some((_, lifecycle, _)) = &mut target.filters {
-            if in_view {
+            if errors.is_some() {
                 lifecycle.miss(&model.rules)
             } else {
                 lifecycle.skip()
@@ -240,7 +235,7 @@ impl ObjectSensor {
 
     /// Stores the current estimate in the ring buffer, and appends the one stored `latency_steps` ago to `list`.
     fn report(&mut self, index: usize, other: &OtherVehicle, input: &ScanInput<'_>, list: &mut TrackList) {
-        let latency_s = self.model.latency_steps as f64 * SCAN_PERIOD.s();
+        let latency_s = self.model.latency_steps as f64 * CONTROL_STEP.s();
         let target = &mut self.targets[index];
         let length = target.reports.len();
         target.reports[self.step % length] = target.filters.map(|(id, lifecycle, [along, across])| Report {

@@ -1,14 +1,13 @@
 //! Tests of the properties that the controllers rely on: timely confirmation, a consistent covariance, and bitwise
 //! reproducibility.
 
-use closecall_traffic::{ActorId, Environment, Parameters, Road, Source, Time, TrackStatus, VehicleClass};
+use closecall_traffic::{ActorId, CONTROL_STEP, Environment, Parameters, Road, Source, TrackStatus, VehicleClass};
 
 use super::*;
 use crate::SceneVehicle;
-use crate::testing::{scene_vehicle, with_speed};
+use crate::testing::{OWN_LANE_M, scene_vehicle, with_speed};
 
-const OWN_LANE_M: f64 = -5.625;
-const PERIOD_S: f64 = 0.04;
+const PERIOD_S: f64 = CONTROL_STEP.s();
 
 fn key(sample: u64) -> NoiseKey {
     NoiseKey { seed: 1, sample, ego: ActorId::new("ego").unwrap(), actors: [].into() }
@@ -47,7 +46,7 @@ impl Encounter {
     }
 
     fn scene(&self) -> Scene<'_> {
-        let time = Time::from_ms(40) * self.scans;
+        let time = CONTROL_STEP * self.scans;
         Scene { time, road: &self.road, environment: &Environment::CLEAR_DAY, ego: self.ego, others: &self.others }
     }
 

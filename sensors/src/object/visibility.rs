@@ -8,6 +8,9 @@
 //! A slope is the distance to the left divided by the distance outward. Slopes order directions as angles do, without
 //! an arc tangent.
 
+use closecall_traffic::Dimensions;
+use closecall_traffic::metrics::bumper_gap_m;
+
 use crate::surroundings::OtherVehicle;
 
 /// Viewing direction of a sensor.
@@ -60,23 +63,22 @@ pub(super) struct Visibility {
 }
 
 impl Visibility {
-    /// Computes the silhouettes of all vehicles as seen from a sensor of the ego, whose size is `ego_size_m`
-    /// (length, width).
-    pub(super) fn update(&mut self, direction: Direction, others: &[OtherVehicle], ego_size_m: [f64; 2]) {
+    /// Computes the silhouettes of all vehicles as seen from a sensor of the ego, of the size `ego`.
+    pub(super) fn update(&mut self, direction: Direction, others: &[OtherVehicle], ego: &Dimensions) {
         self.silhouettes.clear();
         let outward = match direction {
             Direction::Ahead => 1.0,
             Direction::Behind => -1.0,
             Direction::Around => return,
         };
-        let silhouettes = others.iter().filter_map(|other| silhouette(other, outward, 0.5 * ego_size_m[0]));
+        let silhouettes = others.iter().filter_map(|other| silhouette(other, outward, 0.5 * ego.length_m));
         self.silhouettes.extend(silhouettes);
     }
 
     /// Returns whether `other` is within the field of view, in range, and not hidden.
-    pub(super) fn sees(&mut self, field: &Field, other: &OtherVehicle, ego_size_m: [f64; 2]) -> bool {
+    pub(super) fn sees(&mut self, field: &Field, other: &OtherVehicle, ego: &Dimensions) -> bool {
         if field.direction == Direction::Around {
-            return box_distance_m(other, ego_size_m) <= field.range_m;
+            return box_distance_m(other, ego) <= field.range_m;
         }
         let Some(target) = self.silhouettes.iter().find(|seen| seen.actor == other.actor).copied() else {
             return false;
@@ -117,9 +119,9 @@ fn silhouette(other: &OtherVehicle, outward: f64, mount_m: f64) -> Option<Silhou
 }
 
 /// Returns the distance between the boxes of the ego and of `other`, both taken as parallel (m).
-fn box_distance_m(other: &OtherVehicle, ego_size_m: [f64; 2]) -> f64 {
-    let along_m = other.x_m.abs() - 0.5 * (other.length_m + ego_size_m[0]);
-    let across_m = other.y_m.abs() - 0.5 * (other.width_m + ego_size_m[1]);
+fn box_distance_m(other: &OtherVehicle, ego: &Dimensions) -> f64 {
+    let along_m = bumper_gap_m(other.x_m.abs(), other.length_m, ego.length_m);
+    let across_m = other.y_m.abs() - 0.5 * (other.width_m + ego.width_m);
     along_m.max(0.0).hypot(across_m.max(0.0))
 }
 
@@ -166,12 +168,13 @@ mod tests {
         }
     }
 
+    const EGO: Dimensions = VehicleClass::Car.typical_dimensions();
     const BEHIND: Field = Field { direction: Direction::Behind, range_m: 120.0, half_angle_tan: 2.3 };
 
     fn seen(field: Field, others: &[OtherVehicle]) -> Vec<bool> {
         let mut visibility = Visibility::default();
-        visibility.update(field.direction, others, [4.6, 1.85]);
-        others.iter().map(|other| visibility.sees(&field, other, [4.6, 1.85])).collect()
+        visibility.update(field.direction, others, &EGO);
+        others.iter().map(|other| visibility.sees(&field, other, &EGO)).collect()
     }
 
     #[test]

@@ -55,7 +55,7 @@ fn weight(points: usize) -> f64 {
 /// Returns the log-likelihood ratio of these scores for a vehicle of any class against background, with the same weight
 /// as in [`FusedClass`].
 pub(super) fn vehicle_log_likelihood_ratio(seen: &ClassScores, points: usize) -> f64 {
-    let background = seen.0[3].clamp(MIN_PROBABILITY, 1.0 - MIN_PROBABILITY);
+    let background = seen.0[ClassScores::BACKGROUND].clamp(MIN_PROBABILITY, 1.0 - MIN_PROBABILITY);
     // Under equal priors of the four classes, a vehicle of any class has three times the prior of background.
     weight(points) * ((1.0 - background) / (3.0 * background)).ln()
 }

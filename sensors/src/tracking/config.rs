@@ -1,11 +1,10 @@
 //! Parameters of the tracker: confirmation, coasting and latency.
 
-use closecall_traffic::{Check, ConfigError, Num, Parameters, Problem, Range};
+use closecall_traffic::{CONTROL_STEP, Check, ConfigError, Num, Parameters, Problem, Range};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::lifecycle::{LifecycleRules, MAX_WINDOW};
-use crate::SCAN_PERIOD;
 
 /// The tracker as a scenario file describes it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -54,7 +53,7 @@ impl TrackerModel {
 /// Returns the number of whole scans nearest to `time_s`, which is from 0 to 10 s.
 fn steps(time_s: f64) -> u32 {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked to be 0 to 10 s")]
-    let steps = (time_s / SCAN_PERIOD.s()).round() as u32;
+    let steps = (time_s / CONTROL_STEP.s()).round() as u32;
     steps
 }
 

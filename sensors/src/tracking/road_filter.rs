@@ -8,21 +8,22 @@
 use super::axis::{AxisEstimate, AxisFilter, AxisFit, AxisMeasurement};
 use super::motion::{ACROSS_MODES, ALONG_MODES, EgoRear, RearVehicle, Situation};
 use crate::ego_frame::EgoFrame;
+use crate::gaussian::Gaussian;
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
 /// Prior standard deviation of a vehicle's speed, whose prior mean is the ego's speed (m/s).
 ///
 /// It is wide enough for a parked vehicle, which is at 3 σ.
-const SPEED_PRIOR_SD_MPS: f64 = 10.0;
+pub(crate) const SPEED_PRIOR_SD_MPS: f64 = 10.0;
 /// Prior standard deviation of a vehicle's speed across the road (m/s).
-const LATERAL_SPEED_PRIOR_SD_MPS: f64 = 0.7;
+pub(crate) const LATERAL_SPEED_PRIOR_SD_MPS: f64 = 0.7;
 /// Prior standard deviation of a vehicle's position (m): wide enough to have no influence.
-const POSITION_PRIOR_SD_M: f64 = 1_000.0;
+pub(crate) const POSITION_PRIOR_SD_M: f64 = 1_000.0;
 /// Correlation time of the slow measurement error (s).
-const SLOW_TIME_S: f64 = 5.0;
+pub(crate) const SLOW_TIME_S: f64 = 5.0;
 /// Correlation length of the slow measurement error (m). The error also changes with the distance to the ego, as the
 /// beams wander over the vehicle.
-const SLOW_DISTANCE_M: f64 = 5.0;
+pub(crate) const SLOW_DISTANCE_M: f64 = 5.0;
 /// Standard deviation of half of a vehicle's length (m).
 ///
 /// Cars are 3.6 to 5.2 m long, and a follower shows nothing of its length. Half of the length is therefore within ±0.4
@@ -71,10 +72,12 @@ pub(super) struct RoadFilter {
 impl RoadFilter {
     /// Creates a filter at its first measurement. The prior speed along the road is `speed_mps`.
     pub(super) fn new(measurement: &Measurement, speed_mps: f64) -> Self {
-        let at = |axis: &AxisMeasurement| [axis.position_m, POSITION_PRIOR_SD_M];
+        let at = |axis: &AxisMeasurement| Gaussian::new(axis.position_m, POSITION_PRIOR_SD_M);
+        let along_mps = Gaussian::new(speed_mps, SPEED_PRIOR_SD_MPS);
+        let across_mps = Gaussian::new(0.0, LATERAL_SPEED_PRIOR_SD_MPS);
         let mut filter = Self {
-            along: AxisFilter::prior(ALONG_MODES, at(&measurement.along), [speed_mps, SPEED_PRIOR_SD_MPS]),
-            across: AxisFilter::prior(ACROSS_MODES, at(&measurement.across), [0.0, LATERAL_SPEED_PRIOR_SD_MPS]),
+            along: AxisFilter::prior(ALONG_MODES, at(&measurement.along), along_mps),
+            across: AxisFilter::prior(ACROSS_MODES, at(&measurement.across), across_mps),
         };
         filter.correct(measurement, 0.0);
         filter

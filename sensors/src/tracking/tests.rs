@@ -1,30 +1,27 @@
 //! Tests of the tracker on simulated detections against the true states.
 
 use closecall_traffic::{
-    ActorId, Check, ClassScores, Environment, Parameters, Road, Stream, Time, TrackStatus, VehicleClass, stream,
+    ActorId, CONTROL_STEP, Check, ClassScores, Environment, Parameters, Road, Stream, Time, TrackStatus, VehicleClass,
+    stream,
 };
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
 use super::motion::{ACROSS_MODES, ALONG_MODES, Mode, Situation};
+use super::road_filter::{SLOW_DISTANCE_M, SLOW_TIME_S};
 use super::*;
 use crate::ego_frame::EgoFrame;
+use crate::lidar::FACE_SD_M;
 use crate::surroundings::transform_scene;
-use crate::testing::{scene_vehicle, with_speed};
+use crate::testing::{OWN_LANE_M, scene_vehicle, with_speed};
 use crate::{Detection, Extent, Scene, SceneVehicle};
 
-const OWN_LANE_M: f64 = -5.625;
 const LEFT_LANE_M: f64 = -1.875;
-const PERIOD_S: f64 = 0.04;
+const PERIOD_S: f64 = CONTROL_STEP.s();
 const RANGE_SD_M: f64 = 0.1;
 const LATERAL_SD_M: f64 = 0.15;
-const FACE_SD_M: f64 = 0.034;
 /// Slow share of the lateral error's variance.
 const SLOW_LATERAL_SHARE: f64 = 0.7;
-/// Correlation time of the slow errors (s).
-const SLOW_TIME_S: f64 = 5.0;
-/// Change of the distance to the ego after which the slow errors are decorrelated (m).
-const SLOW_DISTANCE_M: f64 = 5.0;
 
 fn normal(rng: &mut Stream) -> f64 {
     rng.sample(StandardNormal)
@@ -129,7 +126,7 @@ impl Bench {
     /// Performs one scan that detects the vehicles for which `sees` is true, and returns the tracks after it.
     fn scan(&mut self, sees: impl Fn(usize) -> bool) -> &[Track] {
         let (road, ego, others) = (self.road, self.ego, self.others.clone());
-        let time = Time::from_ms(40) * self.scans;
+        let time = CONTROL_STEP * self.scans;
         let scene = Scene { time, road: &road, environment: &Environment::CLEAR_DAY, ego, others: &others };
         let mut truths = Vec::new();
         transform_scene(&scene, &mut truths).unwrap();

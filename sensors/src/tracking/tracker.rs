@@ -15,6 +15,7 @@ use super::road_filter::{Measurement, RoadFilter, in_ego_frame};
 use super::view::{Face, RearView};
 use crate::Detection;
 use crate::ego_frame::EgoFrame;
+use crate::lidar::SIDE_PROTRUSION_M;
 
 /// Speed difference below which a track inside another track's box is a part of the same vehicle (m/s).
 const MAX_PART_SPEED_MPS: f64 = 3.0;
@@ -23,8 +24,6 @@ const MAX_PART_SPEED_MPS: f64 = 3.0;
 /// A car of which one lamp is seen is as wide as a car, and two vehicles never drive side by side in the middle of a
 /// lane.
 const MIN_WHOLE_WIDTH_M: f64 = 1.9;
-/// Maximum distance by which a part, such as a mirror or a wheel, stands out from a vehicle's side (m).
-const SIDE_MARGIN_M: f64 = 0.25;
 /// Maximum distance by which a part stands out ahead of a vehicle's face (m).
 const FRONT_MARGIN_M: f64 = 1.0;
 
@@ -71,7 +70,7 @@ impl TrackState {
         let (length_m, width_m) = self.size_m();
         let [along, across] = self.filter.estimate();
         let is_along = (-length_m..=FRONT_MARGIN_M).contains(&(s_m - along.position_m));
-        let half_width_m = 0.5 * width_m.max(MIN_WHOLE_WIDTH_M) + SIDE_MARGIN_M;
+        let half_width_m = 0.5 * width_m.max(MIN_WHOLE_WIDTH_M) + SIDE_PROTRUSION_M;
         is_along && (d_m - across.position_m).abs() <= half_width_m
     }
 }

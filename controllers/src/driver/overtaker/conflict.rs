@@ -8,10 +8,7 @@
 //! minimum before the driver is clear, the driver must brake so as to stay behind.
 
 use crate::braking::Behind;
-use crate::driver::Lead;
-
-/// Speed below which a vehicle counts as standing (m/s).
-const STANDING_MPS: f64 = 0.1;
+use crate::driver::{Lead, STANDING_MPS};
 
 /// The present course: own speed, vehicle ahead, and the gap to keep.
 #[derive(Clone, Copy, Debug)]

@@ -1,23 +1,19 @@
 //! The overtaking driver: adapts perception, prediction and car-following to the simulation loop.
 
-use closecall_traffic::{Indicator, Lane, Side, Stream, Time};
+use closecall_traffic::{Indicator, Lane, MINIMUM_JERK_PEAK, Side, Stream, Time};
 
 use super::acceptance::{GapAcceptance, Tolerance};
 use super::conflict::Course;
-use super::returning::{indicator, opposite};
 use super::{Overtaker, path};
 use crate::driver::perception::{PerceivedScene, PerceivedVehicle, Perception};
 use crate::driver::wiedemann99::{EmergencyBrakingDetector, brake_for_brake_light, coast_for_brake_light};
 use crate::driver::{
-    Driver, DriverAction, DriverError, DriverInput, DriverNote, HARDEST_BRAKING_MPS2, LaneChange, Wiedemann99Model,
-    check_finite, finite,
+    BRAKING_MARGIN, Driver, DriverAction, DriverError, DriverInput, DriverNote, HARDEST_BRAKING_MPS2, LaneChange,
+    Wiedemann99Model, check_finite, finite,
 };
 
 /// Required braking below which an overtaking driver does not brake (m/s²).
 const TOLERATED_BRAKING_MPS2: f64 = 0.1;
-
-/// Factor by which a driver brakes harder than necessary.
-const BRAKING_MARGIN: f64 = 1.2;
 
 /// Lateral distance between two boxes from which they count as clear (m).
 const LATERAL_CLEARANCE_M: f64 = 0.1;
@@ -30,9 +26,6 @@ const ABORT_DURATION_S: f64 = 3.0;
 
 /// Required braking above which a driver steers more sharply than planned, to be clear earlier (m/s²).
 const EVASIVE_STEERING_FROM_MPS2: f64 = 3.0;
-
-/// Peak second derivative of the quintic, 10/√3: the lateral acceleration peaks at 5.77·width/duration².
-const QUINTIC_PEAK: f64 = 5.773_502_691_896_258;
 
 /// Phase of the overtaking manoeuvre.
 #[derive(Clone, Copy, Debug)]
@@ -147,7 +140,7 @@ pub(super) struct Step<'a> {
 
 impl Step<'_> {
     fn indicator(&self) -> Indicator {
-        indicator(self.side)
+        Indicator::towards(self.side)
     }
 
     /// Returns the perceived vehicle ahead, unless it is the overtaken one: a vehicle observed ahead one reaction time
@@ -298,7 +291,7 @@ impl OvertakerDriver {
         }
         if has_passed(step, overtaken) {
             self.phase = Phase::Passed(CompletedPassing { time: step.input.time, overtaken });
-            self.observe_side(opposite(step.side));
+            self.observe_side(step.side.opposite());
             action.note = Some(DriverNote::Passed);
         }
         action
@@ -360,7 +353,8 @@ impl OvertakerDriver {
 
 /// Replaces `change` by one with evasive steering and returns its command, or `None` if it is not sharper than planned.
 fn evade(step: &Step<'_>, change: &mut Change, ahead: &PerceivedVehicle, settings: &Overtaker) -> Option<LaneChange> {
-    let duration_s = (QUINTIC_PEAK * step.lateral_distance_m(change.target) / settings.evasive_lateral_mps2).sqrt();
+    let duration_s =
+        (MINIMUM_JERK_PEAK * step.lateral_distance_m(change.target) / settings.evasive_lateral_mps2).sqrt();
     // Written so that a lateral acceleration of zero, for which the duration is infinite, means no sharper steering.
     if !(duration_s < settings.duration_s) {
         return None;

@@ -1,15 +1,9 @@
-//! Shape of a lane change: the quintic path with zero lateral speed and acceleration at both ends.
-//!
-//! At the share u of the distance along the road, the lateral share is y(u) = 10u³ − 15u⁴ + 6u⁵.
+//! Shape of a lane change: the minimum-jerk path, whose lateral speed and acceleration are zero at both ends.
+
+use closecall_traffic::minimum_jerk;
 
 /// Number of bisections to invert the shape: 2⁻³⁰ of the path is less than a micrometre.
 const BISECTIONS: u32 = 30;
-
-/// Returns the lateral share of the lane change at the longitudinal share `longitudinal`.
-pub(super) fn lateral_share(longitudinal: f64) -> f64 {
-    let u = longitudinal.clamp(0.0, 1.0);
-    u * u * u * (10.0 + u * (6.0 * u - 15.0))
-}
 
 /// Returns the longitudinal share at which the lateral share `lateral` is reached, 0 for NaN.
 pub(super) fn longitudinal_share(lateral: f64) -> f64 {
@@ -19,7 +13,7 @@ pub(super) fn longitudinal_share(lateral: f64) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..BISECTIONS {
         let middle = 0.5 * (low + high);
-        if lateral_share(middle) < lateral { low = middle } else { high = middle }
+        if minimum_jerk(middle) < lateral { low = middle } else { high = middle }
     }
     0.5 * (low + high)
 }
@@ -30,7 +24,7 @@ mod tests {
 
     #[test]
     fn half_of_the_longitudinal_distance_is_half_of_the_lateral_one() {
-        assert_eq!(lateral_share(0.5), 0.5);
+        assert_eq!(minimum_jerk(0.5), 0.5);
         assert!((longitudinal_share(0.5) - 0.5).abs() < 1e-8);
     }
 
@@ -38,7 +32,7 @@ mod tests {
     fn the_two_shares_are_inverse_functions() {
         for step in 0..=20 {
             let lateral = f64::from(step) / 20.0;
-            assert!((lateral_share(longitudinal_share(lateral)) - lateral).abs() < 1e-8);
+            assert!((minimum_jerk(longitudinal_share(lateral)) - lateral).abs() < 1e-8);
         }
         assert_eq!(longitudinal_share(f64::NAN), 0.0);
     }

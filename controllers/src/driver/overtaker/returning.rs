@@ -1,6 +1,6 @@
 //! The return to the original lane after passing, if the scenario asks for it.
 
-use closecall_traffic::{Check, ConfigError, Indicator, Lane, Num, Parameters, Range, Side, Time};
+use closecall_traffic::{Check, ConfigError, Indicator, Lane, Num, Parameters, Range, Time};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -50,14 +50,14 @@ impl OvertakerDriver {
     /// Drives on in the passing lane, and begins to change back once the scenario and the traffic allow it.
     pub(super) fn drive_on(&mut self, step: &Step<'_>, passing: CompletedPassing) -> DriverAction {
         let mut action = self.cruise(step, step.ahead_except(passing.overtaken));
-        let origin_side = opposite(step.side);
+        let origin_side = step.side.opposite();
         let own_lane = step.input.road.lane_at(step.input.own.d_m);
         let origin = step.input.road.beside(own_lane, origin_side);
         let (Some(returns), Some(origin)) = (self.settings.returns, origin) else { return action };
         if step.input.changing_to.is_some() || step.input.time < passing.time + returns.after {
             return action;
         }
-        action.indicator = indicator(origin_side);
+        action.indicator = Indicator::towards(origin_side);
         let tolerance = Tolerance { follower_headway_s: returns.thw_s, ..Tolerance::TO_START };
         let acceptance = self.gap_acceptance(step, step.speed_mps, tolerance);
         if step.scene.adjacent(origin_side).is_some_and(|lane| acceptance.is_free(lane)) {
@@ -78,25 +78,9 @@ impl OvertakerDriver {
             self.phase = Phase::Approaching;
             self.observe_side(step.side);
         }
-        let in_origin = step.scene.adjacent(opposite(step.side)).and_then(|lane| lane.lead.as_ref());
+        let in_origin = step.scene.adjacent(step.side.opposite()).and_then(|lane| lane.lead.as_ref());
         let ahead = [step.ahead_except(passing.overtaken), in_origin].into_iter().flatten();
         let nearest: Option<&PerceivedVehicle> = ahead.min_by(|a, b| a.lead.gap_m.total_cmp(&b.lead.gap_m));
-        DriverAction { indicator: indicator(opposite(step.side)), ..self.cruise(step, nearest) }
-    }
-}
-
-/// Returns the indicator for a lane change to `side`.
-pub(super) fn indicator(side: Side) -> Indicator {
-    match side {
-        Side::Left => Indicator::Left,
-        Side::Right => Indicator::Right,
-    }
-}
-
-/// Returns the opposite side.
-pub(super) fn opposite(side: Side) -> Side {
-    match side {
-        Side::Left => Side::Right,
-        Side::Right => Side::Left,
+        DriverAction { indicator: Indicator::towards(step.side.opposite()), ..self.cruise(step, nearest) }
     }
 }

@@ -1,46 +1,20 @@
-use closecall_traffic::{ActorId, Check, Indicator, Parameters, Road, Vehicle, VehicleClass, VehicleState, stream};
+use closecall_traffic::{ActorId, Check, PHYSICS_STEP, Parameters, stream};
 
 use super::*;
-use crate::driver::{LapseConfig, Neighbours};
+use crate::driver::testing::{car_ahead, with_input};
+use crate::driver::{LapseConfig, Lead, Neighbours};
 
-const STEP: Time = Time::from_ms(10);
-
-/// Observes a lead vehicle with the given gap, speed, acceleration and brake light from a vehicle at 30 m/s, and
-/// returns it as perceived.
-fn observe(
-    perception: &mut Perception,
-    time: Time,
-    (gap_m, speed_mps, acceleration_mps2, brake_light): (f64, f64, f64, bool),
-) -> PerceivedVehicle {
-    let road = Road::straight(3);
-    let own = VehicleState { s_m: 30.0 * time.s(), d_m: -5.625, speed_mps: 30.0, ..VehicleState::default() };
-    let lead = Neighbour {
-        actor: 1,
-        gap_m,
-        speed_mps,
-        acceleration_mps2,
-        brake_light,
-        indicator: Indicator::Off,
-        class: VehicleClass::Car,
-        length_m: 4.6,
-        width_m: 1.85,
-        lateral_offset_m: 0.0,
-    };
-    let neighbours =
-        Neighbours { own: LaneNeighbours { lead: Some(lead), ..LaneNeighbours::default() }, ..Neighbours::default() };
-    let vehicle = Vehicle::typical(VehicleClass::Car);
-    let input = DriverInput {
-        time,
-        vehicle: &vehicle,
-        own: &own,
-        neighbours: &neighbours,
-        road: &road,
-        changing_to: None,
-        lateral_deviation_m: 0.0,
-        desired_speed_offset_mps: 0.0,
-    };
+/// Observes a lead vehicle with this motion and brake light from a vehicle at 30 m/s, and returns it as perceived.
+fn observe(perception: &mut Perception, time: Time, lead: Lead, brake_light: bool) -> PerceivedVehicle {
+    let own = LaneNeighbours { lead: Some(car_ahead(lead, brake_light)), ..LaneNeighbours::default() };
+    let neighbours = Neighbours { own, ..Neighbours::default() };
     let mut rng = stream(0, 0, &ActorId::new("rear").unwrap(), "driver");
-    perception.observe(&input, &mut rng).ahead.unwrap()
+    with_input(time, &neighbours, |input| perception.observe(input, &mut rng).ahead.unwrap())
+}
+
+/// Returns a lead vehicle that keeps its speed.
+fn steady(gap_m: f64, speed_mps: f64) -> Lead {
+    Lead { gap_m, speed_mps, acceleration_mps2: 0.0 }
 }
 
 #[test]
@@ -49,9 +23,9 @@ fn a_steady_approach_is_extrapolated_exactly() {
     let mut time = Time::ZERO;
     for _ in 0..500 {
         let gap_m = 50.0 - 5.0 * time.s();
-        let seen = observe(&mut perception, time, (gap_m, 25.0, 0.0, false));
+        let seen = observe(&mut perception, time, steady(gap_m, 25.0), false);
         assert!((seen.lead.gap_m - gap_m).abs() < 1e-9 && seen.lead.speed_mps == 25.0, "{seen:?} at {time}");
-        time += STEP;
+        time += PHYSICS_STEP;
     }
 }
 
@@ -62,12 +36,12 @@ fn a_brake_light_is_perceived_after_the_reaction_time_and_implies_an_ordinary_br
     let mut first = None;
     while first.is_none() {
         let on = time >= Time::from_s(2.0);
-        let seen = observe(&mut perception, time, (30.0, 30.0, 0.0, on));
+        let seen = observe(&mut perception, time, steady(30.0, 30.0), on);
         if seen.brake_light {
             assert_eq!(seen.lead.acceleration_mps2, -ASSUMED_BRAKING_MPS2);
             first = Some(time);
         }
-        time += STEP;
+        time += PHYSICS_STEP;
     }
     assert_eq!(first, Some(Time::from_s(2.9)));
 }
@@ -88,9 +62,9 @@ fn a_small_speed_difference_at_a_large_gap_is_not_noticed() {
         (60.0, 29.9, 26.0),
         (30.0, 29.0, 29.0),
     ] {
-        let seen = observe(&mut perception, time, (gap_m, speed_mps, 0.0, false));
+        let seen = observe(&mut perception, time, steady(gap_m, speed_mps), false);
         assert_eq!(seen.lead.speed_mps, perceived_mps, "{gap_m} m, {speed_mps} m/s");
-        time += STEP;
+        time += PHYSICS_STEP;
     }
 }
 
@@ -108,10 +82,10 @@ fn a_full_memory_replaces_its_oldest_observation() {
     let mut perception = Perception::new(MAX_REACTION_S, None);
     let mut time = Time::ZERO;
     for step in 0..2_000_u32 {
-        let seen = observe(&mut perception, time, (f64::from(step), 30.0, 0.0, false));
+        let seen = observe(&mut perception, time, steady(f64::from(step), 30.0), false);
         let due = step.saturating_sub(300);
         assert!((seen.lead.gap_m - f64::from(due)).abs() < 1e-6, "{step}: {seen:?}");
-        time += STEP;
+        time += PHYSICS_STEP;
     }
     assert_eq!(perception.memory.len(), MEMORY_CAPACITY);
     assert_eq!(perception.memory.capacity(), MEMORY_CAPACITY);
@@ -124,10 +98,10 @@ fn a_brake_light_during_a_lapse_is_perceived_one_reaction_time_after_the_lapse()
     let mut perception = Perception::new(0.9, None).with_lapses(Some(lapse));
     let mut time = Time::ZERO;
     let seen = |perception: &mut Perception, time: Time| {
-        observe(perception, time, (30.0, 30.0, 0.0, time >= Time::from_s(2.0))).brake_light
+        observe(perception, time, steady(30.0, 30.0), time >= Time::from_s(2.0)).brake_light
     };
     while !seen(&mut perception, time) {
-        time += STEP;
+        time += PHYSICS_STEP;
     }
     assert_eq!(time, Time::from_s(1.5 + 2.0 + 0.9));
 }

@@ -1,6 +1,6 @@
 //! The prescribed driver: adapts a profile to the simulation loop.
 
-use closecall_traffic::{Indicator, Side, Stream};
+use closecall_traffic::{Indicator, Stream};
 
 use super::Prescribed;
 use super::profile::SpeedProfile;
@@ -58,10 +58,7 @@ impl PrescribedDriver {
         let change = *self.profile.lane_changes.get(self.next_change).filter(|change| input.time >= change.at)?;
         self.next_change += 1;
         let target = input.road.beside(input.road.lane_at(input.own.d_m), change.to)?;
-        self.change_indicator = match change.to {
-            Side::Left => Indicator::Left,
-            Side::Right => Indicator::Right,
-        };
+        self.change_indicator = Indicator::towards(change.to);
         Some(LaneChange { target, duration_s: change.duration_s })
     }
 }

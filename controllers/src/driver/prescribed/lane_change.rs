@@ -32,11 +32,7 @@ pub(super) struct PrescribedLaneChange {
 impl PrescribedLaneChange {
     /// Returns the lane change to the opposite side.
     pub(super) fn mirrored(&self) -> Self {
-        let to = match self.to {
-            Side::Left => Side::Right,
-            Side::Right => Side::Left,
-        };
-        Self { to, ..*self }
+        Self { to: self.to.opposite(), ..*self }
     }
 }
 

@@ -49,7 +49,7 @@
 use super::thresholds::{Regime, Thresholds};
 use super::{Parameters99, Wiedemann99};
 use crate::braking::Behind;
-use crate::driver::{COASTING_DECELERATION_MPS2, HARDEST_BRAKING_MPS2, Lead};
+use crate::driver::{BRAKING_MARGIN, COASTING_DECELERATION_MPS2, HARDEST_BRAKING_MPS2, Lead, STANDING_MPS};
 
 /// Speed at which cc9 holds (m/s): 80 km/h.
 const CC9_SPEED_MPS: f64 = 80.0 / 3.6;
@@ -60,12 +60,6 @@ const MIN_ROOM_M: f64 = 0.5;
 /// Hardest braking to keep the safe gap (m/s²): the upper end of comfortable braking (ISO 15622:2018 allows adaptive
 /// cruise control to brake by up to 3.5 m/s² at speeds above 20 m/s).
 const COMFORTABLE_MPS2: f64 = 3.5;
-
-/// Factor by which a driver brakes harder than necessary in order to keep apart.
-const BRAKING_MARGIN: f64 = 1.2;
-
-/// Speed below which the lead vehicle counts as standing (m/s).
-const STANDING_MPS: f64 = 0.1;
 
 /// Time constant with which the driver approaches the desired speed (s).
 const SPEED_TIME_S: f64 = 1.0;

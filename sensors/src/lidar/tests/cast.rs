@@ -1,6 +1,6 @@
 //! The fast ray cast, compared with brute force.
 
-use closecall_traffic::VehicleClass;
+use closecall_traffic::{CONTROL_STEP, Time, VehicleClass};
 use proptest::prelude::*;
 
 use super::*;
@@ -30,7 +30,7 @@ proptest! {
         setup.others = others;
         setup.road = road_with_guard_rails(curvature);
         setup.ego.pitch_rad = pitch_rad;
-        setup.time = Time::from_ns(if plus { 0 } else { PERIOD_NS });
+        setup.time = if plus { Time::ZERO } else { CONTROL_STEP };
         let mut scanner = Scanner::new(Lidar::default());
         scanner.assert_cast_agrees_with_brute_force(&setup.scene());
     }

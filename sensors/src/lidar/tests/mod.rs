@@ -9,7 +9,7 @@ mod surroundings;
 use super::*;
 use crate::testing::{scene_vehicle, with_speed};
 use crate::{Detection, Scene, SceneVehicle};
-use closecall_traffic::{ActorId, Environment, Road, Stream, Time, VehicleClass, VehicleState, stream};
+use closecall_traffic::{ActorId, CONTROL_STEP, Environment, Road, Stream, Time, VehicleClass, VehicleState, stream};
 
 /// Lateral position of the ego (m), in the middle one of three lanes.
 const LANE_D_M: f64 = -5.625;
@@ -48,7 +48,7 @@ impl TestScene {
 
     /// Scans once and returns the detections. `scan_index` determines the side of the mirror and the noise.
     fn detect(&mut self, lidar: &mut RearLidar, scan_index: i64) -> Vec<Detection> {
-        self.time = Time::from_ns(PERIOD_NS * scan_index);
+        self.time = CONTROL_STEP * scan_index;
         lidar.scan(&self.scene(), &mut random(scan_index.unsigned_abs()));
         lidar.detect().unwrap().to_vec()
     }

@@ -16,9 +16,11 @@
 //! independent. In road coordinates, a vehicle that follows a bend at constant speed moves uniformly, so a bend is not
 //! a manoeuvre.
 
+use closecall_traffic::CONTROL_STEP;
 use nalgebra::{Matrix4, Vector4};
 
 use super::motion::{MODES, Mode, Situation};
+use crate::gaussian::Gaussian;
 
 /// Standard deviation of a vehicle's deviation from the prediction when a manoeuvre has just begun (m): 2.5 m/s² for
 /// 0.4 s.
@@ -27,7 +29,7 @@ use super::motion::{MODES, Mode, Situation};
 /// vehicles in any direction.
 const MANOEUVRE_SD_M: f64 = 0.2;
 /// Maximum step of a prediction over a horizon (s).
-const MAX_STEP_S: f64 = 0.04;
+const MAX_STEP_S: f64 = CONTROL_STEP.s();
 /// Rest of a horizon that is due to rounding (s).
 const ROUNDING_S: f64 = 1e-9;
 
@@ -84,15 +86,14 @@ pub(crate) struct AxisEstimate {
 }
 
 impl AxisFilter {
-    /// Creates a filter before its first measurement. `position_m` and `speed_mps` each hold the prior mean and its
-    /// standard deviation.
-    pub(crate) fn prior(modes: &'static [Mode], position_m: [f64; 2], speed_mps: [f64; 2]) -> Self {
+    /// Creates a filter before its first measurement, with the prior distributions of position and speed.
+    pub(crate) fn prior(modes: &'static [Mode], position_m: Gaussian, speed_mps: Gaussian) -> Self {
         let estimates = std::array::from_fn(|index| {
             let mode = modes.get(index);
             let acceleration_sd = mode.map_or(0.0, |mode| mode.acceleration_sd_mps2);
-            let deviations = Vector4::new(position_m[1], speed_mps[1], acceleration_sd, 1.0);
+            let deviations = Vector4::new(position_m.sd, speed_mps.sd, acceleration_sd, 1.0);
             ModeEstimate {
-                state: Vector4::new(position_m[0], speed_mps[0], 0.0, 0.0),
+                state: Vector4::new(position_m.mean, speed_mps.mean, 0.0, 0.0),
                 covariance: Matrix4::from_diagonal(&deviations.component_mul(&deviations)),
                 probability: mode.map_or(0.0, |mode| mode.prior_probability),
             }

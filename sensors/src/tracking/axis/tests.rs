@@ -1,13 +1,13 @@
 //! Tests of the axis filter on motions and measurements that are drawn from its own model.
 
-use closecall_traffic::{ActorId, Stream, stream};
+use closecall_traffic::{ActorId, CONTROL_STEP, Stream, stream};
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
 use super::super::motion::{ACROSS_MODES, ALONG_MODES, ALONG_WHITE_MODE};
 use super::*;
 
-const STEP_S: f64 = 0.04;
+const STEP_S: f64 = CONTROL_STEP.s();
 const WHITE_SD_M: f64 = 0.1;
 const SLOW_SD_M: f64 = 0.1;
 const SLOW_SHARE: f64 = 0.96;
@@ -29,7 +29,7 @@ impl SimulatedVehicle {
         let mut rng = stream(7, run, &ActorId::new("ego").unwrap(), "axis-test");
         let mode = 0;
         let truth = Vector4::new(50.0, 1.0 * normal(&mut rng), 0.0, normal(&mut rng));
-        Self { rng, truth, mode, filter: AxisFilter::prior(modes, [50.0, 100.0], [0.0, 1.0]) }
+        Self { rng, truth, mode, filter: AxisFilter::prior(modes, Gaussian::new(50.0, 100.0), Gaussian::new(0.0, 1.0)) }
     }
 
     fn advance(&mut self) {
@@ -115,7 +115,7 @@ fn transition_probabilities_sum_to_1_for_any_step() {
 #[test]
 fn predicting_over_a_horizon_equals_predicting_step_by_step() {
     for modes in [ALONG_MODES, ACROSS_MODES] {
-        let filter = AxisFilter::prior(modes, [0.0, 0.1], [0.0, 0.1]);
+        let filter = AxisFilter::prior(modes, Gaussian::new(0.0, 0.1), Gaussian::new(0.0, 0.1));
         let mut stepped = filter;
         for _ in 0..10 {
             stepped.predict(STEP_S, 1.0, Situation::FREE);
@@ -130,13 +130,13 @@ fn predicting_over_a_horizon_equals_predicting_step_by_step() {
             "{predicted:?} {stepped:?}"
         );
     }
-    let here = AxisFilter::prior(ALONG_MODES, [0.0, 0.1], [0.0, 0.1]);
+    let here = AxisFilter::prior(ALONG_MODES, Gaussian::new(0.0, 0.1), Gaussian::new(0.0, 0.1));
     assert_eq!(here.predicted(0.0), here.estimate());
 }
 
 #[test]
 fn a_measurement_that_is_not_a_number_leaves_the_mode_probabilities_unchanged() {
-    let mut filter = AxisFilter::prior(ALONG_MODES, [0.0, 1.0], [0.0, 1.0]);
+    let mut filter = AxisFilter::prior(ALONG_MODES, Gaussian::new(0.0, 1.0), Gaussian::new(0.0, 1.0));
     let before = filter.estimates.map(|estimate| estimate.probability);
     filter.measure_position(&AxisMeasurement {
         position_m: f64::NAN,

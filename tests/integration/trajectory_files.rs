@@ -1,13 +1,15 @@
-//! From recorded traffic to distributions, and back from our own simulation.
+//! The commands that turn trajectory files into lane changes, metrics and distributions: on recorded traffic, and on
+//! trajectory files that the simulation wrote.
 
 use std::fs;
 
+use closecall_testing::data;
 use serde_json::Value;
 
-use crate::support::{closecall, code, data, folder, json, library, stderr, stdout};
+use crate::support::{closecall, code, folder, json, library, stderr, stdout};
 
 #[test]
-fn the_chain_runs_on_a_recording_of_our_own() {
+fn a_trajectory_file_of_the_simulation_gives_its_lane_changes_metrics_and_distributions() {
     let folder = folder();
     let csv = folder.path().join("own.csv");
     let csv = csv.to_str().unwrap();
@@ -17,11 +19,11 @@ fn the_chain_runs_on_a_recording_of_our_own() {
     let changes = json(&closecall(["lane-changes", csv, "--format", "json"]), 0);
     let changes = changes.as_array().unwrap();
     assert!(changes.len() >= 35, "{}", changes.len());
-    // Every lane change of ours goes from lane 2 to lane 1, and takes as long as was sampled.
+    // In this scenario every lane change goes from lane 2 to lane 1, and takes the sampled time.
     let sampling = ["run", scenario.to_str().unwrap(), "--controller", "acc", "--format", "json", "--sample"];
     for change in changes {
         assert_eq!(change["direction"], "left");
-        // Three vehicles per sample, the overtaking one last.
+        // Each sample has three vehicles, the overtaking one last.
         let sample = (change["track_id"].as_u64().unwrap() - 1) / 3;
         let number = sample.to_string();
         let run = json(&closecall(sampling.into_iter().chain([number.as_str()])), 0);
@@ -43,7 +45,7 @@ fn the_chain_runs_on_a_recording_of_our_own() {
 }
 
 #[test]
-fn recorded_traffic_is_read_in_both_layouts() {
+fn recorded_traffic_has_the_same_lane_changes_in_both_layouts() {
     let Some(data) = data() else { return };
     let metres = data.join("ngsim_us101/trajectories/us101_a.csv");
     let feet = data.join("ngsim_us101/us101_a_ngsim18col_feet.csv");
@@ -57,7 +59,7 @@ fn recorded_traffic_is_read_in_both_layouts() {
 }
 
 #[test]
-fn broken_recordings_are_refused_with_file_and_line() {
+fn broken_trajectory_files_are_refused_by_name() {
     let folder = folder();
     let csv = folder.path().join("own.csv");
     let scenario = library("overtake-without-brake");
@@ -67,7 +69,7 @@ fn broken_recordings_are_refused_with_file_and_line() {
     let nan = good.replacen(",1,", ",nan,", 1);
     for (what, content) in [
         ("empty", Vec::new()),
-        ("cut in a line", cut.as_bytes().to_vec()),
+        ("ends within a line", cut.as_bytes().to_vec()),
         ("nan", nan.into_bytes()),
         ("binary", vec![0, 1, 2, 255, 254, 0]),
         ("prose", b"once upon a time\nthere was a car\n".to_vec()),
@@ -82,13 +84,14 @@ fn broken_recordings_are_refused_with_file_and_line() {
     }
 }
 
-/// The true lane changes of an in-car log: direction, crossing, whether both ends were recorded.
+/// Reads the true lane changes of an in-car log: direction, time of the crossing (s), and whether the log holds both
+/// ends.
 fn truth(path: &std::path::Path) -> Vec<(String, f64, bool)> {
     let text = fs::read_to_string(path).unwrap();
     let mut lines = text.lines();
     let header: Vec<&str> = lines.next().unwrap().split(',').collect();
-    let place = |name| header.iter().position(|column| *column == name).unwrap();
-    let [direction, crossing, complete] = ["direction", "crossing_s", "complete"].map(place);
+    let index = |name| header.iter().position(|column| *column == name).unwrap();
+    let [direction, crossing, complete] = ["direction", "crossing_s", "complete"].map(index);
     let row = |line: &str| {
         let fields: Vec<&str> = line.split(',').collect();
         (fields[direction].to_owned(), fields[crossing].parse().unwrap(), fields[complete] == "true")
@@ -97,7 +100,7 @@ fn truth(path: &std::path::Path) -> Vec<(String, f64, bool)> {
 }
 
 #[test]
-fn an_in_car_log_gives_its_true_lane_changes_by_every_criterion_and_bears_an_offset_by_two() {
+fn every_criterion_finds_the_true_lane_changes_of_an_in_car_log_and_two_tolerate_an_offset() {
     let folder = folder();
     let csv = folder.path().join("drive.csv");
     let csv = csv.to_str().unwrap();
@@ -126,10 +129,11 @@ fn an_in_car_log_gives_its_true_lane_changes_by_every_criterion_and_bears_an_off
     let reference = found["reference"].as_f64().unwrap();
     assert!(reference >= truth.len() as f64);
     let levels = found["setup"]["offset_m"].as_array().unwrap();
-    let metre = levels.iter().position(|level| level.as_f64() == Some(1.0)).unwrap();
-    let again = |column: usize| found["offset"][metre][column]["again"].as_f64().unwrap();
-    assert!(again(0) >= 0.95 * reference && again(2) == reference, "{} {}", again(0), again(2));
-    assert!(again(1) <= 0.5 * reference, "{}", again(1));
+    let one_metre = levels.iter().position(|level| level.as_f64() == Some(1.0)).unwrap();
+    let found_again = |column: usize| found["offset"][one_metre][column]["again"].as_f64().unwrap();
+    let [peak, distance, gradient] = [0, 1, 2].map(found_again);
+    assert!(peak >= 0.95 * reference && gradient == reference, "peak {peak}, gradient {gradient}");
+    assert!(distance <= 0.5 * reference, "distance {distance}");
     assert!(found["fails_from_noise_m_per_sqrt_s"]["peak"].as_f64().unwrap() > 0.0);
     for name in ["noise.svg", "offset.svg"] {
         assert!(fs::read_to_string(plots.join(name)).unwrap().contains("gradient: found again"));
@@ -137,7 +141,7 @@ fn an_in_car_log_gives_its_true_lane_changes_by_every_criterion_and_bears_an_off
 }
 
 #[test]
-fn statistics_count_by_class_and_draw_boxes() {
+fn statistics_count_lane_changes_by_class_and_draw_box_plots() {
     let folder = folder();
     let csv = folder.path().join("own.csv");
     let csv = csv.to_str().unwrap();
@@ -158,7 +162,7 @@ fn statistics_count_by_class_and_draw_boxes() {
 }
 
 #[test]
-fn what_a_recording_does_not_have_is_asked_for_in_vain() {
+fn a_criterion_or_a_reference_that_cannot_be_used_is_refused() {
     let folder = folder();
     let csv = folder.path().join("own.csv");
     let csv = csv.to_str().unwrap();
