@@ -138,19 +138,6 @@ fn value(key: &Key, ways: &[Way], all: &[Table], probe: &Probe) -> String {
         }
         Kind::List(element) => match (&**element, link(way, all)) {
             (Kind::Table, Some(link)) => format!("[list of tables]({link})"),
-            (Kind::Tuple(..), _) => {
-                let pair = with(way, Step::Element);
-                let ranges: Vec<String> = probe
-                    .values(&pair)
-                    .into_iter()
-                    .take(1)
-                    .flat_map(|(at, _)| {
-                        (0..2).map(move |index| at.clone().0.into_iter().chain([index_of(index)]).collect())
-                    })
-                    .map(|path| probe.allowed(&closecall::traffic::KeyPath(path), false).unwrap_or_default())
-                    .collect();
-                format!("list of pairs of numbers: {}", ranges.join("; "))
-            }
             _ => name(&key.kind),
         },
         Kind::Either(kinds) => {
@@ -168,10 +155,6 @@ fn value(key: &Key, ways: &[Way], all: &[Table], probe: &Probe) -> String {
     }
 }
 
-fn index_of(index: usize) -> closecall::traffic::Segment {
-    closecall::traffic::Segment::Index(index)
-}
-
 fn name(kind: &Kind) -> String {
     match kind {
         Kind::Number { sampled: true } => "number".to_owned(),
@@ -182,6 +165,7 @@ fn name(kind: &Kind) -> String {
         Kind::Word { sampled: true, .. } => "word or `\"$name\"`".to_owned(),
         Kind::Word { sampled: false, .. } => "word".to_owned(),
         Kind::List(element) | Kind::Tuple(element, _) if **element == Kind::Table => "list of tables".to_owned(),
+        Kind::List(element) if matches!(**element, Kind::Tuple(_, 2)) => "list of pairs of numbers".to_owned(),
         Kind::List(element) => format!("list of {}", plural(element)),
         Kind::Tuple(element, length) => format!("list of {length} {}", plural(element)),
         Kind::Table => "table".to_owned(),
@@ -212,7 +196,7 @@ fn default(key: &Key, stated: Option<String>) -> String {
         (Some(Value::Array(list)), None) if list.is_empty() => "none".to_owned(),
         (Some(Value::Object(map)), None) if map.is_empty() => "none".to_owned(),
         (Some(Value::Object(_)), None) => "its defaults".to_owned(),
-        (Some(value), None) => value.to_string(),
+        (Some(value), None) => value.to_string().trim_end_matches(".0").to_owned(),
         (None, None) => "-".to_owned(),
     }
 }
@@ -225,7 +209,7 @@ fn is_sensor_key(key: &Key, name: &str) -> bool {
 fn is_short(kind: &Kind) -> bool {
     match kind {
         Kind::Table => false,
-        Kind::List(element) => **element != Kind::Table,
+        Kind::List(element) | Kind::Map(element) => **element != Kind::Table,
         _ => true,
     }
 }
@@ -244,7 +228,8 @@ fn words(page: &mut String, table: &Table) -> Result<(), Box<dyn Error>> {
 
 /// The anchor of the table at `way`, or of the first one below it.
 fn link(way: &Way, all: &[Table]) -> Option<String> {
-    let found = all.iter().find(|table| table.ways.iter().any(|known| known.starts_with(way)))?;
+    let depth = |table: &&Table| table.ways.iter().filter(|known| known.starts_with(way)).map(Vec::len).min();
+    let found = all.iter().filter(|table| depth(table).is_some()).min_by_key(depth)?;
     Some(format!("#{}", anchor(&found.ways[0])))
 }
 
@@ -253,12 +238,13 @@ fn with(way: &Way, step: Step) -> Way {
 }
 
 fn parts(way: &Way) -> Vec<&str> {
-    let part = |step| match step {
-        &Step::Element => None,
-        Step::Name => Some("NAME"),
-        Step::Key(key) => Some(key.as_str()),
-    };
-    way.iter().filter_map(part).collect()
+    way.iter()
+        .filter_map(|step| match step {
+            Step::Element => None,
+            Step::Name => Some("NAME"),
+            Step::Key(key) => Some(key.as_str()),
+        })
+        .collect()
 }
 
 /// The path as a file writes it.

@@ -4,6 +4,7 @@
 //! with the range that is allowed.
 
 use std::error::Error;
+use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::PathBuf;
 
 use closecall::simulation::scenario::{ScenarioError, ScenarioFile};
@@ -38,7 +39,7 @@ impl Probe {
     /// Returns the position of a key's first use in the file, comments aside.
     pub(crate) fn position(&self, key: &str) -> usize {
         let is_part = |c: char| c.is_ascii_alphanumeric() || c == '-';
-        let uses = |line: &&str| !line.starts_with('#') && line.split(|c| !is_part(c)).any(|word| word == key);
+        let uses = |line: &&str| !line.starts_with('#') && line.split(|c: char| !is_part(c)).any(|word| word == key);
         let mut start = 0;
         for line in self.text.lines() {
             if uses(&line) {
@@ -149,6 +150,7 @@ fn step_into(step: &Step, path: Vec<Segment>, value: Value) -> Vec<(Vec<Segment>
 
 /// A range as the check says it, in fewer words: `a number from 0.2 to 5` is `0.2 to 5`.
 fn shortened(text: &str, minimum: Option<f64>) -> Option<String> {
+    let text = text.replace(&PI.to_string(), "π").replace(&FRAC_PI_2.to_string(), "π/2");
     // A bound that is the neighbour `min` of the example is that key.
     let named = |bound: &str| match minimum {
         Some(minimum) if bound == minimum.to_string() => "`min`".to_owned(),
@@ -166,6 +168,6 @@ fn shortened(text: &str, minimum: Option<f64>) -> Option<String> {
         Some(Some((low, high))) if low == lowest && high == LIMIT => None,
         Some(Some((low, high))) if high == LIMIT => Some(format!("{} or more", named(low))),
         Some(Some((low, high))) if text.starts_with("a number") => Some(format!("{low} to {high}")),
-        _ => Some(text.to_owned()),
+        _ => Some(text.clone()),
     }
 }

@@ -133,10 +133,8 @@ fn the_files_and_keys_of_a_campaign_are_those_documented() {
     }
 
     let bad = "exec:sh tests/fixtures/controllers/bad.sh dies";
-    let exec = ["campaign", headline, "-n", "5", "--controller", bad, "--sensors", "object", "--out", &at("exec")];
-    program(&exec, 5);
-    let part = ["campaign", headline, "-n", "2", "--partition", "1/2", "--out", &at("part")];
-    program(&part, 0);
+    program(&["campaign", headline, "-n", "5", "--controller", bad, "--sensors", "object", "--out", &at("exec")], 5);
+    program(&["campaign", headline, "-n", "60", "--partition", "1/2", "--out", &at("part")], 0);
     let journals = ["open", "exec"].map(|name| lines(&folder.path().join(name).join("journal.jsonl"), true));
     hold("journal", journals.iter().flatten());
     hold("wall-times", &lines(&out.join("wall-times.jsonl"), false));
