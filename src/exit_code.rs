@@ -78,9 +78,9 @@ impl From<&ScenarioError> for ExitCode {
 impl From<&Judgement> for ExitCode {
     fn from(judged: &Judgement) -> Self {
         match judged.decision {
-            Decision::Pass => Self::Pass,
+            Decision::Pass | Decision::Measured => Self::Pass,
             Decision::Fail => Self::Fail,
-            Decision::Inconclusive => Self::Inconclusive,
+            Decision::Inconclusive | Decision::NotJudged => Self::Inconclusive,
             Decision::SampleError => Self::SampleError,
             Decision::Invalid => Self::Invalid,
         }

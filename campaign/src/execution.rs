@@ -6,11 +6,13 @@ use std::sync::Arc;
 use closecall_scenarios::atomic::WriteError;
 
 use super::folder::{FolderError, LockedFolder, ResumedFiles, TornLine};
+use super::gate::{GateSet, Judge};
 use super::ledger::Inference;
 use super::partition::Partition;
 use super::record::Record;
 use super::runner::Work;
 use super::summary::Summary;
+use super::verdict::{self, Judgement};
 use super::wall_times::WallTime;
 use super::workers::{Finished, Workers, WorkersError};
 
@@ -83,6 +85,22 @@ impl Campaign {
             ControlFlow::Continue(())
         })?;
         Ok(summary)
+    }
+
+    /// Runs every sample, keeps nothing but the counts, and judges them.
+    ///
+    /// # Errors
+    /// [`CampaignError::Workers`] if no threads can be started.
+    pub fn judge(&self, gates: &GateSet) -> Result<(Summary, Judgement), CampaignError> {
+        let mut summary = self.summary();
+        let mut judge = Judge::new(&self.works, gates, self.inference);
+        self.run(None, |next| {
+            summary.push(next.record);
+            judge.push(next.record);
+            ControlFlow::Continue(())
+        })?;
+        let judged = verdict::judge(&summary, &judge, gates.max_flip_rate);
+        Ok((summary, judged))
     }
 
     /// Returns the number of samples of all scenarios.

@@ -19,7 +19,7 @@ pub mod compare;
 pub mod execution;
 pub mod folder;
 mod folder_error;
-pub use closecall_simulation::harm;
+pub mod gate;
 pub mod journal;
 pub mod ledger;
 pub mod lock;
@@ -38,3 +38,5 @@ pub mod validity;
 pub mod verdict;
 pub mod wall_times;
 pub mod workers;
+
+pub use closecall_simulation::harm;

@@ -4,7 +4,7 @@ use closecall_simulation::SampleError;
 use closecall_simulation::outcome::Outcome;
 use serde::{Deserialize, Serialize};
 
-use super::harm::harm;
+use closecall_simulation::harm::harm;
 use super::ledger::Tally;
 use super::validity::ArmChecks;
 

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use closecall_campaign::execution::{Campaign, End, NextRecord};
+use closecall_campaign::gate::GateSet;
 use closecall_campaign::folder::{Folder, TornLine};
 use closecall_campaign::partition::Partition;
 use closecall_campaign::plan::Plan;
@@ -112,7 +113,7 @@ impl CampaignArgs {
 pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
     let tested = args.controller.choice()?;
     let is_paired = args.is_paired(&tested);
-    let gates = args.gates.gates(is_paired, args.design)?;
+    let gates = args.gates.gates(is_paired, args.design, args.plan.preset_gates(is_paired))?;
     let plan = args.plan(controllers(tested, is_paired)?)?;
     let (campaign, manifest) = (plan.campaign(), plan.manifest(std::env::args().collect())?);
     let locked = match &args.out {
@@ -121,11 +122,11 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
     };
     let started = Instant::now();
     let stop = StopRule {
-        until_certain: gates.probability.filter(|_| args.plan.ends_when_certain()),
+        until_certain: gates.probability.as_ref().map(|spec| spec.gate).filter(|_| args.plan.ends_when_certain()),
         time_budget: args.plan.time_budget(),
         scenarios: campaign.works.len(),
     };
-    let mut progress = Progress::new(&campaign, StopMonitor::start(stop));
+    let mut progress = Progress::new(&campaign, &gates, StopMonitor::start(stop));
     let torn = campaign.run(locked.as_ref(), |next| progress.push(next))?;
     progress.bar.finish_and_clear();
     if let Some(TornLine { line, reason }) = torn {
@@ -135,8 +136,8 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
     }
     let wall_s = started.elapsed().as_secs_f64();
     let tally = &progress.tally;
-    let judged = tally.summary.judge(gates);
-    let report = CampaignReport { manifest: &manifest, works: &campaign.works, tally, gates, judged: &judged };
+    let judged = tally.judgement();
+    let report = CampaignReport { manifest: &manifest, works: &campaign.works, tally, judged: &judged };
     match &locked {
         Some(locked) => report.write(&locked.folder, args.record)?,
         None => report.write_without_folder()?,
@@ -162,15 +163,15 @@ struct Progress {
 }
 
 impl Progress {
-    fn new(campaign: &Campaign, stop: StopMonitor) -> Self {
+    fn new(campaign: &Campaign, gates: &GateSet, stop: StopMonitor) -> Self {
         for work in &campaign.works {
             let (name, count, requested) = (&work.file.config().name, work.count(), work.sampling.samples);
             if count != requested {
-                print_error(format_args!("{name}: the grid has {count} samples, {requested} were requested\n"));
+                print_error(format_args!("{name}: {count} of the {requested} requested samples differ, and are run\n"));
             }
         }
         let names = campaign.works.iter().map(|work| work.file.config().name.clone()).collect();
-        Self { names, tally: Tally::new(campaign), stop, bar: progress_bar(campaign.len()) }
+        Self { names, tally: Tally::new(campaign, gates), stop, bar: progress_bar(campaign.len()) }
     }
 
     fn push(&mut self, next: NextRecord<'_>) -> ControlFlow<End> {

@@ -29,6 +29,14 @@ const MAX_SUGGESTED: usize = 10;
 /// The reason for which a command has no result.
 #[derive(Debug, thiserror::Error, Diagnostic)]
 pub enum CliError {
+    /// The project file cannot be used.
+    #[error("failed to read {}: {message}", path.display())]
+    Project {
+        /// The file.
+        path: std::path::PathBuf,
+        /// What is wrong, with the line.
+        message: String,
+    },
     /// A scenario cannot be used.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
@@ -134,6 +142,7 @@ impl From<&CliError> for ExitCode {
             | CliError::Reference(_)
             | CliError::TrafficFilm(_)
             | CliError::NoEncounter { .. }
+            | CliError::Project { .. }
             | CliError::Classifier(_) => Self::InvalidInput,
             CliError::Folder(error) => Self::from(error),
             CliError::Campaign(error) => Self::from(error),

@@ -1,5 +1,6 @@
 //! Results as JSON with stable keys. An absent value is `null`, and the key `…_absent` beside it states the reason.
 
+use closecall_campaign::gate::{Answer, Evaluation, ExpectationResult, GateResult, RequirementResult};
 use closecall_campaign::harm;
 use closecall_campaign::ledger::{Inference, Pairs};
 use closecall_campaign::summary::{Counts, Summary};
@@ -108,7 +109,13 @@ fn mis(mis: &Result<MisSummary, Absent>) -> Value {
 pub(super) fn campaign(summary: &Summary, judged: &Judgement, wall_s: Option<f64>) -> Value {
     let total = summary.total();
     let mut object = counts(summary, &total);
-    object.insert("verdict".to_owned(), json!(judged.verdict));
+    if summary.scenarios.len() > 1 {
+        unpool(&mut object, summary);
+    }
+    object.insert("verdict".to_owned(), json!(judged.verdict()));
+    object.insert("gates".to_owned(), json!(judged.gates.iter().map(gate).collect::<Vec<_>>()));
+    object.insert("requirements".to_owned(), json!(judged.requirements.iter().map(requirement).collect::<Vec<_>>()));
+    object.insert("expectations".to_owned(), json!(judged.expectations.iter().map(expectation).collect::<Vec<_>>()));
     object.insert("reasons".to_owned(), json!(judged.reasons));
     object.insert("probabilities".to_owned(), probabilities(judged));
     object.insert("wall_s".to_owned(), json!(wall_s));
@@ -119,6 +126,70 @@ pub(super) fn campaign(summary: &Summary, judged: &Judgement, wall_s: Option<f64
         .collect();
     object.insert("scenarios".to_owned(), Value::Object(scenarios));
     Value::Object(object)
+}
+
+/// Replaces what would treat several scenarios as one sample. The rate is the mean over the scenarios, each with the same
+/// weight; an interval and a test stand with each scenario.
+fn unpool(object: &mut Map<String, Value>, summary: &Summary) {
+    const REASON: &str = "scenarios are not pooled into one sample: see each scenario";
+    if let Some(Value::Object(controllers)) = object.get_mut("controllers") {
+        for (index, name) in summary.controllers.iter().enumerate() {
+            let Some(Value::Object(controller)) = controllers.get_mut(name) else { continue };
+            controller.insert("collision_rate".to_owned(), json!(summary.mean_collision_rate(index)));
+            controller.insert("collision_rate_weights".to_owned(), json!("each scenario has the same weight"));
+            controller.insert("interval_95".to_owned(), Value::Null);
+            controller.insert("interval_95_absent".to_owned(), json!(REASON));
+        }
+    }
+    if let Some(Value::Object(paired)) = object.get_mut("paired") {
+        paired.insert("mcnemar_p".to_owned(), Value::Null);
+        paired.insert("mcnemar_p_absent".to_owned(), json!(REASON));
+    }
+}
+
+fn gate(gate: &GateResult) -> Value {
+    let Evaluation { value, interval_95, samples, answer } = gate.evaluation;
+    let passed = match answer {
+        Answer::Met => Some(true),
+        Answer::Missed => Some(false),
+        Answer::Open(_) => None,
+    };
+    let mut object = json!({
+        "scenario": gate.scenario,
+        "criterion": gate.expression.to_string(),
+        "subject": gate.expression.subject(),
+        "operator": gate.expression.operator.to_string(),
+        "bound": gate.expression.bound,
+        "value": value,
+        "interval_95": interval_95,
+        "samples": samples,
+        "passed": passed,
+        "source": gate.source.to_string(),
+    });
+    if let Answer::Open(reason) = answer {
+        object["passed_absent"] = json!(reason.text());
+    }
+    object
+}
+
+fn requirement(requirement: &RequirementResult) -> Value {
+    json!({
+        "requirement": requirement.mark,
+        "scenario": requirement.scenario,
+        "result": requirement.standing.word(),
+    })
+}
+
+fn expectation(expectation: &ExpectationResult) -> Value {
+    let expects: Vec<&str> = expectation.expects.iter().map(|flag| flag.measure().name).collect();
+    json!({
+        "scenario": expectation.scenario,
+        "expects": expects,
+        "happened": expectation.happened,
+        "samples": expectation.samples,
+        "share": expectation.share(),
+        "least_share": expectation.least_share,
+    })
 }
 
 fn counts(summary: &Summary, counts: &Counts) -> Map<String, Value> {

@@ -40,12 +40,12 @@ pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
     let works = works(&args.parts[0], parts.manifest())?;
     parts.check(&works)?;
     let is_paired = works.iter().all(|work| work.arms.len() > 1);
-    let gates = args.gates.gates(is_paired, parts.manifest().sampling.design)?;
+    let gates = args.gates.gates(is_paired, parts.manifest().sampling.design, None)?;
     let merged = parts.merge(&works, &args.out, std::env::args().collect())?;
     let saved = SavedCampaign::of(merged.folder.clone())?;
-    let tally = Tally::of(&saved, &works)?;
-    let judged = tally.summary.judge(gates);
-    let report = CampaignReport { manifest: saved.manifest(), works: &works, tally: &tally, gates, judged: &judged };
+    let tally = Tally::of(&saved, &works, &gates)?;
+    let judged = tally.judgement();
+    let report = CampaignReport { manifest: saved.manifest(), works: &works, tally: &tally, judged: &judged };
     report.write(saved.folder(), args.record)?;
     match args.format {
         Format::Json => outln!("{:#}", json::campaign(&tally.summary, &judged, None)),

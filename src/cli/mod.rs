@@ -13,6 +13,7 @@ mod merge;
 mod output;
 mod plan;
 mod plot;
+mod project;
 mod record;
 mod reenact;
 mod render;

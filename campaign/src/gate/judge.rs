@@ -4,11 +4,12 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use closecall_simulation::criteria::{EGO_COLLIDED, FlagName, Measure, Quantity};
+use closecall_scenarios::parameters::Variation;
 use closecall_traffic::Parameters;
 
 use super::evaluate::{Accumulator, value};
 use super::result::{ExpectationResult, GateResult, RequirementResult, Standing};
-use super::set::{GateSet, GateSource, GateSpec, ProbabilitySpec};
+use super::set::{GateSet, GateSpec, ProbabilitySpec};
 use crate::ledger::Inference;
 use crate::record::Record;
 use crate::runner::Work;
@@ -61,8 +62,8 @@ impl Judge {
             let (config, variation) = (work.file.config(), work.file.space().variation());
             Judged {
                 scenario: config.name.clone(),
-                is_varied: variation.is_varied(),
-                seen: (!variation.is_continuous()).then(BTreeSet::new),
+                is_varied: variation != Variation::None,
+                seen: (variation == Variation::Discrete).then(BTreeSet::new),
                 repeated: 0,
                 gates: set.of_scenario(&work.file).iter().map(Gate::new).collect(),
                 probability: set.probability_of(&work.file),
@@ -136,8 +137,7 @@ impl Judge {
         for judged in &self.scenarios {
             for mark in &judged.requirements {
                 let is_check = |gate: &&GateResult| {
-                    gate.scenario.as_deref() == Some(&judged.scenario)
-                        && matches!(&gate.source, GateSource::Requirement(checked) if checked == mark)
+                    gate.scenario.as_deref() == Some(&judged.scenario) && gate.is_of(mark)
                 };
                 let standing = gates.iter().filter(is_check).map(GateResult::standing).max();
                 results.push(RequirementResult {

@@ -56,6 +56,11 @@ impl GateResult {
         }
     }
 
+    /// Returns true if the gate checks the requirement `mark`.
+    pub fn is_of(&self, mark: &str) -> bool {
+        matches!(&self.source, GateSource::Requirement(checked) if checked == mark)
+    }
+
     /// Returns true if the gate has an answer.
     pub fn is_decided(&self) -> bool {
         matches!(self.evaluation.answer, Answer::Met | Answer::Missed)

@@ -14,6 +14,7 @@ use closecall_simulation::criteria::Expression;
 use closecall_simulation::scenario::ScenarioFile;
 
 use crate::probability::ProbabilityGate;
+use crate::verdict::MAX_FLIP_RATE;
 
 /// Where a gate comes from.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -72,7 +73,7 @@ pub struct ProbabilitySpec {
 }
 
 /// The gates that hold for every scenario of a campaign; those of the scenario files come on top.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct GateSet {
     /// The criteria, those that win first.
     pub specs: Vec<GateSpec>,
@@ -80,6 +81,14 @@ pub struct GateSet {
     pub probability: Option<ProbabilitySpec>,
     /// True if nothing is to be judged: the campaign is a measurement.
     pub is_measurement: bool,
+    /// Share of the checked verdicts that may flip at half the time step.
+    pub max_flip_rate: f64,
+}
+
+impl Default for GateSet {
+    fn default() -> Self {
+        Self { specs: Vec::new(), probability: None, is_measurement: false, max_flip_rate: MAX_FLIP_RATE }
+    }
 }
 
 impl GateSet {

@@ -6,6 +6,7 @@ use closecall_statistics::normal::TruncatedStandardNormal;
 use closecall_statistics::quantiles;
 use closecall_traffic::{ConfigError, KeyPath, Problem, Range, Value};
 
+use super::Variation;
 use super::config::{EmpiricalConfig, LogNormalConfig, TruncatedNormalConfig, UniformConfig};
 
 /// Largest magnitude of a number in a distribution. It is far above every quantity of a scenario, and sums and products
@@ -238,6 +239,20 @@ impl Distribution {
             Kind::Choice(weights) => &weights.labels,
             Kind::Fixed(Value::Label(label)) => std::slice::from_ref(label),
             _ => &[],
+        }
+    }
+
+    /// Returns how much the value varies.
+    pub fn variation(&self) -> Variation {
+        match &self.0 {
+            Kind::Choice(weights) if weights.labels.len() > 1 => Variation::Discrete,
+            Kind::Choice(_) | Kind::Fixed(_) => Variation::None,
+            Kind::Uniform { .. } | Kind::TruncatedNormal { .. } | Kind::LogNormal { .. } | Kind::Empirical { .. } => {
+                match self.bounds() {
+                    Some([low, high]) if low < high => Variation::Continuous,
+                    _ => Variation::None,
+                }
+            }
         }
     }
 
