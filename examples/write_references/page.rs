@@ -176,7 +176,7 @@ fn name(kind: &Kind) -> String {
 
 fn plural(kind: &Kind) -> String {
     match kind {
-        Kind::Text => "texts".to_owned(),
+        Kind::List(element) => format!("lists of {}", plural(element)),
         kind => format!("{}s", name(kind)),
     }
 }

@@ -18,6 +18,8 @@ use super::schema::Step;
 const HUGE: f64 = 1e300;
 /// The largest number of a distribution: a bound that only excludes what no quantity of a scenario can be.
 const LIMIT: &str = "1000000000000";
+/// The largest number below 1: a bound that excludes 1.
+const BELOW_ONE: &str = "0.9999999999999999";
 
 /// A scenario that can be changed and checked.
 #[derive(Clone, Debug)]
@@ -158,10 +160,10 @@ fn shortened(text: &str, minimum: Option<f64>) -> Option<String> {
     };
     let lowest = format!("-{LIMIT}");
     if let Some((low, high)) = text.strip_prefix("a number above ").and_then(|rest| rest.split_once(" and up to ")) {
-        return Some(if high == LIMIT {
-            format!("above {}", named(low))
-        } else {
-            format!("above {low}, up to {high}")
+        return Some(match high {
+            LIMIT => format!("above {}", named(low)),
+            BELOW_ONE => format!("above {low}, below 1"),
+            _ => format!("above {low}, up to {high}"),
         });
     }
     match text.split_once(" from ").map(|(_, range)| range.split_once(" to ")) {
