@@ -1,7 +1,7 @@
-//! Simulated seconds per wall second on one core, by depth of the sensor simulation.
+//! Measures simulated seconds per wall-clock second on one core, for each depth of the sensor simulation.
 //!
-//! `cargo bench --bench simulation`: criterion's throughput is given in "elements", which are simulated milliseconds;
-//! the line printed before each gives simulated seconds per wall second.
+//! Run with `cargo bench --bench simulation`. Criterion reports the throughput in "elements", which are simulated
+//! milliseconds. The line printed before each benchmark gives simulated seconds per wall-clock second.
 
 #![expect(clippy::print_stdout, reason = "a benchmark prints its figure")]
 
@@ -16,17 +16,17 @@ use closecall_simulation::scenario::{Scenario, ScenarioFile};
 use closecall_simulation::{Arm, NoObserver, RunKey, simulate};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 
-/// Samples of the headline that are run in one iteration.
+/// Number of samples of the scenario `low-thw-overtake` in one iteration.
 const SAMPLES: u64 = 8;
 
 fn scenarios() -> Vec<Scenario> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/library/low-thw-overtake.toml");
-    let file = ScenarioFile::load(&path, &[]).expect("the headline is valid");
+    let file = ScenarioFile::load(&path, &[]).expect("a valid scenario");
     let sampling = Sampling { seed: 0, design: Design::Random, samples: SAMPLES };
     (0..SAMPLES).map(|sample| concrete(&file, sampling, sample).expect("a valid sample")).collect()
 }
 
-/// Runs every sample and returns the simulated time [s].
+/// Runs every sample and returns the simulated time (s).
 fn run_all(scenarios: &[Scenario], arm: &Arm) -> f64 {
     let run = |(sample, scenario): (usize, &Scenario)| {
         let key = RunKey { seed: 0, sample: sample as u64 };

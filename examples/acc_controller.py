@@ -1,7 +1,12 @@
-"""The built-in `acc` (cruise control, emergency braking) as a process: --controller "exec:python3 examples/acc_controller.py"."""
+"""The built-in controller `acc` (cruise control and emergency braking) as an external process.
+
+Use it with --controller "exec:python3 examples/acc_controller.py".
+"""
 import json, math, sys
 
-def required(v, front, left_m):  # the constant braking that leaves `left_m` to a vehicle that brakes on as it does
+# Returns the constant deceleration (m/s²) that keeps a distance of `left_m` to the vehicle ahead, if that vehicle keeps its
+# deceleration.
+def required(v, front, left_m):
     room, lead, braking = max(front["gap_m"] - left_m, 0.1), front["speed_mps"], -front["acceleration_mps2"]
     removing = (v - lead) * (v - lead) / (2.0 * room) if v > lead else 0.0
     if braking <= 0.0 or lead <= 0.0:
@@ -9,7 +14,8 @@ def required(v, front, left_m):  # the constant braking that leaves `left_m` to 
     to_stop = v * v / (2.0 * (room + lead * lead / (2.0 * braking)))
     return to_stop if v * braking >= lead * to_stop else braking + removing if v > lead else 0.0
 
-def cruise(v, limit, front, acc):  # towards the closing speed that the gap's error allows
+# Returns the acceleration (m/s²) of the cruise control. It controls the closing speed that the error of the gap allows.
+def cruise(v, limit, front, acc):
     a = ((limit if acc["set_speed_mps"] is None else acc["set_speed_mps"]) - v) / 2.0
     if front:
         error, touch = front["gap_m"] - max(acc["time_gap_s"] * v, acc["standstill_gap_m"]), 1.5 / (0.3 * 0.3)
@@ -20,7 +26,8 @@ def cruise(v, limit, front, acc):  # towards the closing speed that the gap's er
         a = min(a, -needed) if needed > 2.0 else a
     return min(max(a, -3.5), 1.5)
 
-def emergency(v, front, aeb, braked):  # how hard to brake, having braked before or not; 0 where there is no need
+# Returns the deceleration (m/s²) of the emergency braking, or 0 if none is needed. `braked`: whether it braked before.
+def emergency(v, front, aeb, braked):
     if braked and v < 0.1:
         return 2.0 if front and front["speed_mps"] < 1.0 else 0.0
     needed = required(v, front, aeb["standstill_gap_m"]) if front else 0.0

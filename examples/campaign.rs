@@ -1,4 +1,4 @@
-//! A campaign from Rust, without the command line.
+//! Runs a campaign from Rust, without the command line.
 //!
 //! ```sh
 //! cargo run --release --example campaign
@@ -14,8 +14,8 @@ use closecall::scenarios::sampling::Design;
 use closecall::simulation::controller::ControllerChoice;
 use closecall::simulation::scenario::ScenarioFile;
 
-/// Runs 20 samples with and without the margin increase system, and judges them by a gate.
-#[expect(clippy::print_stdout, reason = "its output is what it is for")]
+/// Runs 20 samples with and without the margin increase system, and applies a gate to the result.
+#[expect(clippy::print_stdout, reason = "an example prints its result")]
 pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     let library = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/library");
     let scenario = ScenarioFile::load(&library.join("low-thw-overtake.toml"), &[])?;

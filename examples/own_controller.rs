@@ -1,13 +1,13 @@
-//! A controller of one's own, in one file: the controller, the factory that makes one for each sample, and a campaign
-//! that holds it against the built-in cruise control.
+//! A custom controller in one file: the controller, the factory that creates one for each sample, and a campaign that
+//! compares it with the built-in cruise control.
 //!
 //! ```text
 //! cargo run --release --example own_controller [SCENARIO.toml] [SAMPLES]
 //! ```
 //!
-//! `RoomMaker` follows with the built-in cruise control and emergency braking, but takes off half a metre per second
-//! squared while anybody is close behind: what a driver does who feels pressed. It knows nothing of arrival times, and
-//! is no match for the margin increase system.
+//! `RoomMaker` uses the built-in cruise control and emergency braking, but decelerates by at least 0.5 m/s² while a vehicle
+//! is close behind, like a driver that feels pressed. It does not predict when the rear vehicle arrives, and is therefore
+//! no substitute for the margin increase system.
 
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -29,18 +29,19 @@ use closecall_simulation::scenario::ScenarioFile;
 use closecall_simulation::{Arm, ControllerFactory};
 use closecall_traffic::TrackStatus;
 
-/// Time headway behind which it feels pressed [s].
+/// Rear time headway below which the controller decelerates (s).
 const PRESSED_BELOW_S: f64 = 1.5;
 
-/// What it takes off the acceleration then [m/s²].
+/// Smallest deceleration while a vehicle is close behind (m/s²).
 const EASING_MPS2: f64 = 0.5;
 
-/// Makes room while somebody is close behind.
+/// A controller that increases the front gap while a vehicle is close behind.
 struct RoomMaker {
     cruise: EgoStack,
 }
 
 impl RoomMaker {
+    /// Returns whether a confirmed track in the ego's lane is behind it at a short time headway.
     fn is_pressed(input: &EgoInput<'_>) -> bool {
         input.tracks.iter().any(|track| {
             let gap_m = -track.x_m() - 0.5 * (track.length_m + input.odometry.length_m);
@@ -52,7 +53,7 @@ impl RoomMaker {
 
 impl EgoController for RoomMaker {
     fn step(&mut self, input: &EgoInput<'_>) -> Result<EgoCommand, ControllerError> {
-        // The built-in stack refuses what is not finite; a controller that does without it calls `input.check_finite()`.
+        // The built-in stack rejects input that is not finite. A controller without it should call `input.check_finite()`.
         let cruise = self.cruise.step(input)?;
         if !Self::is_pressed(input) || cruise.state == EgoState::EmergencyBraking {
             return Ok(cruise);
@@ -62,7 +63,7 @@ impl EgoController for RoomMaker {
     }
 }
 
-/// Makes one for each sample, so that nothing is carried over.
+/// Creates a controller for each sample, so that no state is carried over between samples.
 pub(crate) struct RoomMakers;
 
 impl ControllerFactory for RoomMakers {
@@ -79,10 +80,10 @@ impl ControllerFactory for RoomMakers {
     }
 }
 
-/// Longest wall time of a sample: one that takes longer is an error of that sample.
+/// Wall-time limit of a sample. A sample that exceeds it ends as an error.
 const SAMPLE_TIMEOUT: Duration = Duration::from_secs(300);
 
-/// Runs a campaign of two arms, `acc` and `tested`, on the same samples.
+/// Runs a campaign of two arms, the built-in `acc` and `tested`, on the same samples.
 pub(crate) fn against_cruise_control(
     file: ScenarioFile,
     tested: Arc<dyn ControllerFactory>,
@@ -96,7 +97,7 @@ pub(crate) fn against_cruise_control(
     Ok(Campaign::new(vec![work], workers).count()?.total())
 }
 
-#[expect(clippy::print_stdout, reason = "its output is what it is for")]
+#[expect(clippy::print_stdout, reason = "an example prints its result")]
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
     let path = arguments.next().map_or_else(|| PathBuf::from("scenarios/library/low-thw-overtake.toml"), PathBuf::from);

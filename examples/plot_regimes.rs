@@ -1,12 +1,12 @@
-//! Draws the regimes of Wiedemann 99 in the plane of speed difference and gap, and one follower's way through it.
+//! Draws the regimes of the Wiedemann 99 model in the plane of speed difference and gap, and the trajectory of a follower.
 //!
 //! ```sh
 //! cargo run --release --example plot_regimes -- docs/wiedemann99-regimes.svg
 //! ```
 //!
-//! The colours are asked of the model itself, for a driver with Vissim's defaults at 30 m/s who has noticed nothing yet;
-//! the lines are its thresholds. The trajectory is that of a driver who comes up at 36 m/s behind a leader at 30 m/s,
-//! with actuators of 0.15 s, over two minutes.
+//! The colours show the regime that the model itself reports, for a driver with the defaults of Vissim behind a lead vehicle
+//! at 30 m/s, before the driver has perceived anything. The lines are the thresholds of the model. The trajectory is that of
+//! a driver that approaches the lead vehicle at 36 m/s, with an actuator lag of 0.15 s, over two minutes.
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -20,10 +20,10 @@ type Plane<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<RangedCoordf64, Ra
 
 const LEAD_MPS: f64 = 30.0;
 const DESIRED_MPS: f64 = 36.0;
-/// Edges of the picture: speed of the lead minus own speed [m/s], and gap [m].
+/// Ranges of the axes: speed of the lead vehicle minus own speed (m/s), and gap (m).
 const OPENING_MPS: (f64, f64) = (-7.0, 5.0);
 const GAP_M: (f64, f64) = (0.0, 110.0);
-/// Size of a coloured cell.
+/// Size of a coloured cell: speed difference (m/s) and gap (m).
 const CELL: (f64, f64) = (0.1, 1.0);
 const SIZE_PX: (u32, u32) = (900, 640);
 const STEP_S: f64 = 0.01;
@@ -41,14 +41,14 @@ fn lead(gap_m: f64) -> Lead {
     Lead { gap_m, speed_mps: LEAD_MPS, acceleration_mps2: 0.0 }
 }
 
-/// The regime of a driver who has noticed nothing yet.
+/// Returns the regime of a driver that has not perceived anything yet.
 fn regime(driver: &Wiedemann99, opening_mps: f64, gap_m: f64) -> Regime {
     let mut model = Wiedemann99Model::new(driver);
     model.acceleration_mps2(LEAD_MPS - opening_mps, DESIRED_MPS, Some(&lead(gap_m)));
     model.regime()
 }
 
-/// The stretches of one row of cells in which the regime is the same: two corners, and the regime.
+/// Splits a row of cells into stretches with the same regime. Returns two opposite corners and the regime of each.
 fn stretches(driver: &Wiedemann99, gap_m: f64) -> Vec<([(f64, f64); 2], Regime)> {
     let mut stretches: Vec<([(f64, f64); 2], Regime)> = Vec::new();
     for opening_mps in steps(OPENING_MPS, CELL.0) {
@@ -62,11 +62,12 @@ fn stretches(driver: &Wiedemann99, gap_m: f64) -> Vec<([(f64, f64); 2], Regime)>
     stretches
 }
 
+/// Returns the values from the start of a range up to its end, at a distance of `step`.
 fn steps((from, to): (f64, f64), step: f64) -> impl Iterator<Item = f64> {
     (0..).map(move |index| from + f64::from(index) * step).take_while(move |value| *value < to)
 }
 
-/// Speed difference [m/s] and gap [m] of a driver who comes up from behind.
+/// Returns the speed difference (m/s) and the gap (m) at each step of a driver that approaches from behind.
 fn approach(driver: &Wiedemann99) -> Vec<(f64, f64)> {
     let mut model = Wiedemann99Model::new(driver);
     let (mut gap_m, mut speed_mps, mut actual_mps2) = (GAP_M.1, DESIRED_MPS, 0.0);
@@ -82,7 +83,7 @@ fn approach(driver: &Wiedemann99) -> Vec<(f64, f64)> {
     way
 }
 
-/// A threshold over the gap or the speed difference, as points of the plane.
+/// Returns the label of each threshold, and its points in the plane.
 fn thresholds(driver: &Wiedemann99) -> Vec<(&'static str, Vec<(f64, f64)>)> {
     let model = Wiedemann99Model::new(driver);
     let over_speed = |of: fn(&closecall_controllers::Thresholds) -> f64| {

@@ -1,10 +1,14 @@
-//! A campaign of 10,000 paired samples that is killed five times at random moments and resumed, with one job and with two,
-//! and one that is shared out among three machines and merged: all must have the same `outcomes.parquet`.
+//! Checks that interrupted and partitioned campaigns give the same `outcomes.parquet` as an undisturbed one.
 //!
-//!     cargo build --release && cargo run --release --example validate_durability -- [SAMPLES] [SEED]
+//! A campaign of 10,000 paired samples is killed five times at random moments and resumed, once with one job and once with
+//! two. Another one is split into three partitions, as for three machines, and merged.
 //!
-//! The moments are drawn from the seed, over the time that the undisturbed campaign takes; where they fall within a
-//! sample, a line or a report is up to the machine.
+//! ```sh
+//! cargo build --release && cargo run --release --example validate_durability -- [SAMPLES] [SEED]
+//! ```
+//!
+//! The seed determines the moments, relative to the duration of the undisturbed campaign. Whether a moment falls into a
+//! sample, a line of the journal or a report depends on the machine.
 
 use std::error::Error;
 use std::io::Write as _;
@@ -18,6 +22,7 @@ use rand::RngExt;
 const KILLS: u64 = 5;
 const PARTS: u64 = 3;
 
+/// The campaign that all variants run.
 struct Setup {
     binary: PathBuf,
     scenario: String,
@@ -39,7 +44,8 @@ impl Setup {
         if status.success() { Ok(started.elapsed()) } else { Err(format!("{status}: {more:?}").into()) }
     }
 
-    /// Kills a campaign after each of the spans, unless it was done before, and lets it end.
+    /// Starts a campaign once for each span and kills it after that span, then resumes it to its end. Returns how often it was
+    /// killed before it had ended.
     fn run_killed(&self, out: &Path, jobs: &str, spans: &[Duration]) -> Result<u32, Box<dyn Error>> {
         let more = ["--jobs", jobs, "--resume"];
         let mut killed = 0;

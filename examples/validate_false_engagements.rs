@@ -1,16 +1,18 @@
-//! How often the margin increase system engages with nobody behind: hours on a wet road with spray and guard rails.
+//! Measures how often the margin increase system engages without a rear vehicle, on a wet road with spray and guard rails.
 //!
 //! ```text
 //! cargo run --release --example validate_false_engagements [HOURS] [SEED] [with|without]
 //! ```
 //!
-//! Runs `empty-wet-road` with all sensors, with the rear camera's classifier and without it (the LiDAR's shapes alone
-//! then say what is a vehicle), for at least so many simulated hours each (10 where not said). Counts engagements, and
-//! the confirmed tracks that were taken for vehicles although nobody was there, with exact Poisson intervals of their
-//! rates (Garwood 1936). Ten hours with both take about 40 minutes of two cores; each may be run alone.
+//! Runs the scenario `empty-wet-road` with all sensors, once with the rear camera's classifier and once without it, for at
+//! least HOURS simulated hours each (default: 10). Without the classifier, only the shapes in the LiDAR's data decide what is
+//! a vehicle. The program counts engagements and false confirmed tracks that were classified as vehicles, with exact Poisson
+//! intervals of their rates (Garwood 1936). Ten hours of both variants take about 40 minutes on two cores; each variant can
+//! be run alone.
 //!
-//! Passes (exit 0) where the 95 % upper bound of the rate of engagements with the classifier lies below 1 per hour.
-#![expect(clippy::print_stdout, reason = "its output is what it is for")]
+//! The validation passes (exit code 0) if the 95 % upper bound of the rate of engagements with the classifier is below 1 per
+//! hour.
+#![expect(clippy::print_stdout, reason = "a validation prints its result")]
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -26,13 +28,13 @@ use closecall_traffic::{Source, Time, TrackId, TrackStatus};
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-/// What may not be reached by the 95 % upper bound [engagements per hour].
+/// Limit that the 95 % upper bound must stay below (engagements per hour).
 const MOST_PER_HOUR: f64 = 1.0;
 /// Confidence of the one-sided bound, and of the two-sided interval.
 const CONFIDENCE: f64 = 0.95;
 const SECONDS_PER_HOUR: f64 = 3_600.0;
 
-/// What was found where nothing is.
+/// Counts over one or more runs.
 #[derive(Clone, Debug, Default)]
 struct Found {
     samples: u64,
@@ -58,7 +60,7 @@ impl Found {
     }
 }
 
-/// Counts in one run. Nobody is behind E, so that every confirmed rear track is a false one.
+/// Counts in one run. There is no rear vehicle, so that every confirmed rear track is false.
 #[derive(Default)]
 struct Counter {
     engagements: u64,
@@ -100,7 +102,8 @@ fn run(file: &ScenarioFile, seed: u64, sample: u64) -> Found {
     }
 }
 
-/// Exact bounds of a rate per hour: the interval's lower and upper end, and the one-sided upper bound (Garwood 1936).
+/// Returns exact bounds of a rate per hour (Garwood 1936): the lower and upper end of the two-sided interval, and the
+/// one-sided upper bound.
 fn rate_bounds(events: u64, hours: f64) -> [f64; 3] {
     let quantile = |freedom: u64, probability: f64| {
         let chi_squared = ChiSquared::new(freedom as f64).expect("positive degrees of freedom");
@@ -120,7 +123,7 @@ fn print(what: &str, events: u64, hours: f64) -> f64 {
     bound
 }
 
-/// Runs samples until the hours are reached, prints what was found, and gives the bound of the engagements' rate.
+/// Runs as many samples as the hours need, prints the counts, and returns the upper bound of the rate of engagements.
 fn study(name: &str, settings: &[Setting], hours: f64, seed: u64) -> f64 {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/library/empty-wet-road.toml");
     let file = ScenarioFile::load(&path, settings).expect("a valid scenario");

@@ -1,12 +1,14 @@
-//! Peak memory of a campaign against its number of samples, as figures and as a chart.
+//! Measures the peak memory of a campaign for several numbers of samples, and draws it as a chart.
 //!
-//!     cargo build --release && cargo run --release --example validate_memory -- [MOST_SAMPLES] [FILE.svg]
+//! ```sh
+//! cargo build --release && cargo run --release --example validate_memory -- [MOST_SAMPLES] [FILE.svg]
+//! ```
 //!
-//! The scenario is the headline with object-level sensors, cut to 2 s, so that a million samples take minutes: what a
-//! campaign keeps of a sample does not depend on how long it is. Every file of the campaign's folder is written. The peak
-//! is the kernel's own account of resident memory (`VmHWM`), read until the program ends; Linux only.
+//! The scenario is `low-thw-overtake` with object-level sensors, cut to 2 s, so that a million samples take minutes. The
+//! memory that a campaign needs for a sample does not depend on the sample's duration. The campaign writes all files of its
+//! folder. The peak is the kernel's value of resident memory (`VmHWM`), read until the program ends; Linux only.
 
-#![expect(clippy::print_stdout, reason = "a program of its own")]
+#![expect(clippy::print_stdout, reason = "a validation prints its result")]
 
 use std::error::Error;
 use std::path::Path;
@@ -15,14 +17,14 @@ use std::time::Duration;
 
 use plotters::prelude::*;
 
-/// What the campaign may need at most [MiB].
+/// Largest allowed peak memory (MiB).
 const LIMIT_MIB: f64 = 500.0;
 const KIB_PER_MIB: f64 = 1_024.0;
-/// Time between two looks at the kernel's account.
+/// Interval at which the kernel's value is read.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
 const SIZE: (u32, u32) = (760, 360);
 
-/// The peak so far [MiB]; nothing once the program has ended.
+/// Returns the peak so far (MiB), or `None` if the program has ended.
 fn peak_mib(process: u32) -> Option<f64> {
     let status = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
@@ -30,6 +32,7 @@ fn peak_mib(process: u32) -> Option<f64> {
     Some(kib / KIB_PER_MIB)
 }
 
+/// Runs a campaign and returns its peak memory (MiB).
 fn measure(samples: u64) -> Result<f64, Box<dyn Error>> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let folder = tempfile::tempdir()?;
@@ -51,6 +54,7 @@ fn measure(samples: u64) -> Result<f64, Box<dyn Error>> {
     if status.success() { Ok(peak) } else { Err(format!("{samples} samples: {status}").into()) }
 }
 
+/// Draws the peak memory (MiB) over the number of samples.
 fn draw(path: &Path, points: &[(u64, f64)]) -> Result<(), Box<dyn Error>> {
     let most = points.last().map_or(1, |point| point.0);
     let first = points.first().map_or(1, |point| point.0);

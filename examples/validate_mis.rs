@@ -1,20 +1,21 @@
-//! What the margin increase system says against what it does, over the library's overtaking scenarios.
+//! Compares what the margin increase system predicts with what it achieves, in the library's overtaking scenarios.
 //!
 //! ```text
 //! cargo run --release --example validate_mis [SAMPLES] [SEED] [ground-truth|object|full] [CURVES.svg]
 //! ```
 //!
-//! For each scenario and band of approach speed: in how many samples it engages; in how many it then says that +2 s is in
-//! reach; and of these in how many the front headway has grown by 1.9 s or more when R comes to the critical distance.
-//! That promise rests on F and R driving on as they do. Where F brakes before R has arrived, or R turns away and the system
-//! releases, nothing was promised any more: these samples are counted apart.
+//! For each scenario and each band of approach speed, the program counts the samples in which the system engages, those in
+//! which it then states that a gain of 2 s in the front time headway is within reach (a promise), and those of them in which
+//! the gain is 1.9 s or more when the rear vehicle reaches the critical distance. The promise assumes that the lead and the
+//! rear vehicle keep their behaviour. If the lead vehicle brakes before the rear vehicle has arrived, or the rear vehicle
+//! turns away and the system releases, the promise is void: these samples are counted separately.
 //!
-//! With the name of a picture, it draws how probably the system has engaged by the time that R has come to a distance, for
-//! each band: with true tracks a step at 100 m, with real perception a curve.
+//! If a file name is given, the program draws, for each band, the probability that the system has engaged before the rear
+//! vehicle has come to a given gap: with true tracks a step at 100 m, with simulated perception a curve.
 //!
-//! With true tracks it passes (exit 0) where no promise was broken. Three scenarios of 1000 samples take a minute of two
-//! cores with true tracks; with all sensors, 40 samples take about as long.
-#![expect(clippy::print_stdout, reason = "its output is what it is for")]
+//! With true tracks, the validation passes (exit code 0) if no promise was broken. Three scenarios of 1000 samples take a
+//! minute on two cores with true tracks; with all sensors, 40 samples take about as long.
+#![expect(clippy::print_stdout, reason = "a validation prints its result")]
 
 use std::error::Error;
 use std::path::Path;
@@ -34,31 +35,33 @@ use rayon::iter::{IntoParallelIterator, ParallelIterator};
 
 const SCENARIOS: [&str; 3] = ["overtake-without-brake", "low-thw-overtake", "low-thw-overtake-at-cut-out"];
 
-/// Edges of the bands of approach speed [km/h].
+/// Edges of the bands of approach speed (km/h).
 const EDGES_KMH: [f64; 5] = [10.0, 20.0, 30.0, 40.0, 51.0];
 
-/// By how much the gain may fall short of the 2 s aimed at [s].
+/// Tolerance of the gain (s).
 const SHORT_BY_S: f64 = 0.1;
 
-/// The gain aimed at [s].
+/// Gain of the front time headway that the system aims at (s).
 const GOAL_S: f64 = 2.0;
 
 const KMH_PER_MPS: f64 = 3.6;
 
-/// One sample.
+/// The result of one sample.
 #[derive(Clone, Copy, Debug, Default)]
 struct Seen {
-    /// R's approach at the start [km/h].
+    /// Closing speed of the rear vehicle at the start (km/h).
     approach_kmh: f64,
-    /// R's true gap at the engagement [m].
+    /// True gap of the rear vehicle at the engagement (m).
     engaged_at_m: Option<f64>,
+    /// Whether the system stated that the gain is within reach.
     promised: bool,
-    /// F braked before R arrived, or the system released before.
+    /// Whether the lead vehicle braked, or the system released, before the rear vehicle arrived.
     called_off: bool,
+    /// Gain of the front time headway up to the critical distance (s).
     gained_s: Option<f64>,
 }
 
-/// Notes R's approach, and its gap at the engagement.
+/// Observes the closing speed of the rear vehicle, and its gap at the engagement.
 #[derive(Default)]
 struct Watch {
     approach_mps: Option<f64>,
@@ -115,7 +118,7 @@ fn run_all(file: &ScenarioFile, mode: SensorMode, samples: u64, seed: u64) -> Ve
     (0..samples).into_par_iter().map(run).collect()
 }
 
-/// Prints a band, and returns how many promises were broken in it.
+/// Prints the counts of a band, and returns the number of broken promises in it.
 fn print(name: &str, seen: &[&Seen]) -> usize {
     let engaged = seen.iter().filter(|one| one.engaged_at_m.is_some()).count();
     let promised: Vec<_> = seen.iter().filter(|one| one.promised).collect();
@@ -135,7 +138,7 @@ fn print(name: &str, seen: &[&Seen]) -> usize {
     kept.len() - reached
 }
 
-/// The bands with their samples.
+/// Returns the name and the samples of each band.
 fn bands(seen: &[Seen]) -> Vec<(String, Vec<&Seen>)> {
     let band = |edges: &[f64]| {
         let inside = |one: &&Seen| edges[0] <= one.approach_kmh && one.approach_kmh < edges[1];
@@ -144,7 +147,7 @@ fn bands(seen: &[Seen]) -> Vec<(String, Vec<&Seen>)> {
     EDGES_KMH.windows(2).map(band).collect()
 }
 
-/// How probably it has engaged by the time that R has come to each distance.
+/// Draws the share of samples that have engaged before the rear vehicle has come to each gap.
 fn draw(path: &Path, title: &str, seen: &[Seen]) -> Result<(), Box<dyn Error>> {
     let root = SVGBackend::new(path, (960, 560)).into_drawing_area();
     root.fill(&WHITE)?;

@@ -1,27 +1,27 @@
-//! How well the rear sensors perceive in the library's scenarios, in the closed loop.
+//! Measures the accuracy of the rear sensors' tracks in the library's scenarios, in the closed loop.
 //!
 //! ```text
 //! cargo run --release --example validate_perception [SAMPLES] [SEED] [object|full]
 //! ```
 //!
-//! The statistic is the mean normalised error squared (NEES) of the confirmed rear tracks' [x, y, vx, vy] with its 95 %
-//! bounds, as `Consistency` of closecall-sensors explains them:
+//! The statistic is the mean normalised error squared (NEES) of the confirmed rear tracks' state (x, y, vx, vy) with its
+//! 95 % bounds, as defined by `Consistency` of closecall-sensors:
 //!
-//! - consistent: within the bounds;
-//! - conservative: below them: errors are smaller than the covariance says;
-//! - overconfident: above: the tracker is surer than it may be;
-//! - undecided: the bounds are too wide to say anything; more samples are needed.
+//! - consistent: the tracker's covariance agrees with its errors;
+//! - conservative: the errors are smaller than the covariance states;
+//! - overconfident: the errors are larger than the covariance states;
+//! - undecided: the bounds are too wide for a statement; more samples are needed.
 //!
-//! Beside it: the same along and across E's axis alone (2 each where consistent), the share of single NEES below χ²₄'s 95 %
-//! quantile (0.95), the root mean square error of the speed, changes of a track's number, and confirmed tracks of nothing
-//! that were taken for vehicles, per hour. Steps after a collision are left out, since a wreck moves like no model. The
-//! tuning used seeds from 101 on; judge with others.
+//! The program also prints the NEES along and across the ego's axis alone (2 each if consistent), the share of single NEES
+//! below the 95 % quantile of χ²₄ (0.95 if consistent), the root mean square error of the speed, the number of changes of a
+//! track's identifier, and the number of false confirmed tracks classified as vehicles per hour. Steps after a collision are
+//! left out, since no motion model describes a wreck. The tracker was tuned with seeds from 101 on; use other seeds here.
 //!
-//! The tracker does not know which scenario it is in. What can be consistent is the whole library, and that decides: the
-//! example exits with 1 where the last line of a sensor is overconfident or undecided. In single scenarios
-//! it is conservative where nobody weaves (`paper-figure`, `overtake-without-brake`), and somewhat overconfident where R
-//! does nothing but follow closely (`rear-follower-stays`).
-#![expect(clippy::print_stdout, reason = "its output is what it is for")]
+//! The tracker does not know which scenario it is in, so that it can only be consistent over the whole library. The
+//! validation therefore fails (exit code 1) if the line `all of them` of a sensor mode is overconfident or undecided. In single
+//! scenarios, the tracker is conservative if no driver weaves (`paper-figure`, `overtake-without-brake`), and somewhat
+//! overconfident if the rear vehicle only follows closely (`rear-follower-stays`).
+#![expect(clippy::print_stdout, reason = "a validation prints its result")]
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -36,7 +36,7 @@ use rayon::prelude::*;
 
 const SECONDS_PER_HOUR: f64 = 3_600.0;
 
-/// What was found in the runs of one scenario, or of all.
+/// Audits of the runs of one scenario, or of all scenarios.
 #[derive(Clone, Default)]
 struct Totals {
     runs: Vec<TrackAudit>,
@@ -56,13 +56,14 @@ fn run_all(file: &ScenarioFile, mode: SensorMode, samples: u64, seed: u64) -> To
     Totals { runs, simulated_s: durations_s.iter().sum() }
 }
 
-/// The normalised errors squared of each sample, whose runs in several scenarios meet the same noise.
+/// Returns the NEES values of each sample. The runs of one sample in several scenarios are pooled, since they share their
+/// noise.
 fn nees_by_sample(runs: &[TrackAudit], samples: usize) -> Vec<Vec<f64>> {
     let of_sample = |sample| runs.iter().skip(sample).step_by(samples).flat_map(|audit| audit.nees.iter().copied());
     (0..samples).map(|sample| of_sample(sample).collect()).collect()
 }
 
-/// Prints a line, and tells what it says of the tracker.
+/// Prints a line, and returns the credibility of the tracker, or `None` if there are too few runs with a track.
 fn print(name: &str, mode: &str, totals: &Totals, samples: usize) -> Option<Credibility> {
     let runs = &totals.runs;
     let hours = totals.simulated_s / SECONDS_PER_HOUR;

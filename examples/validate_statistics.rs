@@ -1,14 +1,14 @@
-//! How often the campaign's statistics are right, on a scenario whose probability of a collision is known.
+//! Measures how often the campaign's statistics are right, on a scenario with a known probability of a collision.
 //!
 //! ```sh
 //! cargo run --release --example validate_statistics -- 1000
 //! ```
 //!
-//! Runs as many campaigns as the argument says (1,000 where there is none), each with a seed of its own, on
-//! `tests/fixtures/known-probability.toml`, whose probability is 0.05 by construction. It ends with 1 where the exact
-//! intervals at 95 % cover the truth in less than 93.5 % of them, or where the sequential mode, looking after every
-//! sample, is ever wrong in more than 5 %: with a gate right at the truth, where both answers are hardest to tell from
-//! chance.
+//! Runs the given number of campaigns (default: 1,000), each with its own seed, on `tests/fixtures/known-probability.toml`,
+//! whose collision probability is 0.05 by construction. The validation fails (exit code 1) if the exact 95 % intervals
+//! contain the true probability in less than 93.5 % of the campaigns, or if the sequential mode, evaluated after every
+//! sample, is ever wrong in more than 5 % of them. The limit of the gate equals the true probability, which is the hardest
+//! case.
 
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
@@ -30,26 +30,27 @@ use closecall_simulation::controller::BuiltIn;
 use closecall_simulation::scenario::ScenarioFile;
 use closecall_statistics::sequence::{evidence_above, evidence_below, is_certain};
 
-/// The probability of a collision in the scenario, by construction.
+/// Collision probability of the scenario, by construction.
 const TRUTH: f64 = 0.05;
-/// How sure the bounds are to be.
+/// Confidence level of the bounds.
 const CONFIDENCE: f64 = 0.95;
-/// Samples of a campaign of fixed length.
+/// Number of samples of a campaign of fixed length.
 const FIXED: u64 = 200;
-/// Most samples of a campaign that stops when it is certain.
+/// Largest number of samples of a sequential campaign, which stops when it is certain.
 const MOST: u64 = 2_000;
-/// Least share of the campaigns whose interval has to cover the truth: two standard errors of 1,000 below 95 %.
+/// Smallest share of campaigns whose interval must contain the true probability: two standard errors of 1,000 campaigns
+/// below 95 %.
 const LEAST_COVERAGE: f64 = 0.935;
 
-/// What one campaign came to.
-struct Came {
+/// The result of one campaign.
+struct CampaignResult {
     counts: ArmCounts,
-    /// True where the confidence sequence had the truth outside at any time.
+    /// Whether the confidence sequence excluded the true probability at any time.
     is_ever_outside: bool,
 }
 
-/// Runs one campaign, until `stops` says so.
-fn run(seed: u64, samples: u64, stops: impl Fn(&ArmCounts) -> bool) -> Result<Came, CampaignError> {
+/// Runs one campaign of at most `samples` samples, until `stops` returns true.
+fn run(seed: u64, samples: u64, stops: impl Fn(&ArmCounts) -> bool) -> Result<CampaignResult, CampaignError> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/known-probability.toml");
     let file = ScenarioFile::load(&path, &[]).expect("the fixture is a valid scenario");
     let arms = vec![Arm { controller: BuiltIn::Acc.factory(), sensors: None }];
@@ -60,11 +61,11 @@ fn run(seed: u64, samples: u64, stops: impl Fn(&ArmCounts) -> bool) -> Result<Ca
     let campaign = Campaign::new(vec![work.clone()], workers);
     let mut summary = campaign.summary();
     let mut is_ever_outside = false;
-    campaign.run(None, |turn| {
-        summary.push(turn.record);
+    campaign.run(None, |next| {
+        summary.push(next.record);
         let counts = summary.total().arms[0];
         let (hits, samples) = (counts.collisions, counts.outcomes);
-        // The truth is outside the two-sided bounds where either side has refuted it.
+        // The two-sided bounds exclude the true probability if either side has refuted it.
         is_ever_outside |= [evidence_below, evidence_above]
             .iter()
             .any(|evidence| is_certain(evidence(hits, samples, TRUTH), 0.5 * (1.0 + CONFIDENCE)));
@@ -72,7 +73,7 @@ fn run(seed: u64, samples: u64, stops: impl Fn(&ArmCounts) -> bool) -> Result<Ca
     })?;
     let total = summary.total();
     assert_eq!((total.errors(), total.invalid, total.checks.flips), (0, 0, 0), "{total:?}");
-    Ok(Came { counts: total.arms[0], is_ever_outside })
+    Ok(CampaignResult { counts: total.arms[0], is_ever_outside })
 }
 
 fn main() -> Result<ExitCode, Box<dyn std::error::Error>> {

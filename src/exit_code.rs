@@ -1,35 +1,35 @@
-//! Exit codes. They carry a verdict or the kind of a failure, never a count.
+//! Exit codes. An exit code is a verdict or the kind of a failure, never a count.
 
 use closecall_campaign::verdict::{Decision, Judgement};
 use closecall_scenarios::atomic::WriteError;
 use closecall_simulation::scenario::ScenarioError;
 
-/// What the program ends with.
+/// The exit code of the program.
 ///
 /// | code | name | meaning |
 /// |---|---|---|
-/// | 0 | pass | done; every gate that was asked for is met |
-/// | 1 | fail | a gate is not met: more collisions than allowed, a regression |
+/// | 0 | pass | the command is done, and every gate is met |
+/// | 1 | fail | a gate is not met: for example more collisions than allowed, or a regression |
 /// | 2 | usage | the command line is wrong |
-/// | 3 | invalid input | a scenario or a recording cannot be used; nothing was run |
-/// | 4 | inconclusive | too few samples for the bound asked for |
-/// | 5 | sample error | some sample ended in an error |
+/// | 3 | invalid input | a scenario, trajectory file or network cannot be used; nothing was run |
+/// | 4 | inconclusive | there are too few samples for the requested bound |
+/// | 5 | sample error | at least one sample ended in an error |
 /// | 6 | i/o | a file or folder cannot be read or written |
 /// | 7 | invalid | a validity check of the simulator failed |
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum ExitCode {
-    /// Done; every gate is met.
+    /// The command is done, and every gate is met.
     Pass = 0,
-    /// More collisions than allowed.
+    /// A gate is not met.
     Fail = 1,
     /// The command line is wrong.
     Usage = 2,
-    /// A scenario or a recording cannot be used.
+    /// A scenario, trajectory file or network cannot be used.
     InvalidInput = 3,
-    /// Too few samples for the bound asked for.
+    /// There are too few samples for the requested bound.
     Inconclusive = 4,
-    /// Some sample ended in an error.
+    /// At least one sample ended in an error.
     SampleError = 5,
     /// A file or folder cannot be read or written.
     Io = 6,
@@ -37,7 +37,7 @@ pub enum ExitCode {
     Invalid = 7,
 }
 
-/// Where several hold, the first of these is the answer.
+/// The exit codes in the order of precedence: if several apply, the first one is returned.
 const PRECEDENCE: [ExitCode; 7] = [
     ExitCode::Io,
     ExitCode::InvalidInput,
@@ -49,10 +49,10 @@ const PRECEDENCE: [ExitCode; 7] = [
 ];
 
 impl ExitCode {
-    /// The one answer where several hold; pass where none does.
+    /// Returns the code with the highest precedence; [`ExitCode::Pass`] if `codes` is empty.
     pub fn first_of(codes: impl IntoIterator<Item = Self>) -> Self {
-        let held: Vec<Self> = codes.into_iter().collect();
-        PRECEDENCE.into_iter().find(|code| held.contains(code)).unwrap_or(Self::Pass)
+        let codes: Vec<Self> = codes.into_iter().collect();
+        PRECEDENCE.into_iter().find(|code| codes.contains(code)).unwrap_or(Self::Pass)
     }
 }
 
@@ -98,7 +98,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_graver_answer_wins() {
+    fn the_code_with_the_highest_precedence_is_returned() {
         assert_eq!(ExitCode::first_of([]), ExitCode::Pass);
         assert_eq!(ExitCode::first_of([ExitCode::Fail, ExitCode::SampleError]), ExitCode::SampleError);
         assert_eq!(ExitCode::first_of([ExitCode::Inconclusive, ExitCode::Fail, ExitCode::Pass]), ExitCode::Fail);

@@ -6,15 +6,15 @@
 //!      ─▶ concrete scenario ─▶ [ world ─▶ measurements ─▶ tracks ─▶ command ─▶ world ]* ─▶ outcome ─▶ verdict
 //! ```
 //!
-//! This crate is the command line: it parses, calls and prints. The work is done in one crate for each step of the way;
-//! imports point from the bottom of this table to its top.
+//! This crate is the command line: it parses the arguments, calls the other crates, and prints the results. Each step
+//! of the way has a crate of its own. A crate imports only crates above it in this table.
 //!
 //! | crate | holds |
 //! |---|---|
-//! | [`traffic`] | the shared nouns and the criticality metrics |
-//! | [`statistics`] | how sure one can be from samples |
+//! | [`traffic`] | the shared data types and the criticality metrics |
+//! | [`statistics`] | confidence bounds, tests and distributions |
 //! | [`scenarios`] | trajectory data, lane changes, distributions, sampling designs |
-//! | [`sensors`] | what the ego vehicle perceives |
+//! | [`sensors`] | the perception of the ego vehicle |
 //! | [`controllers`] | the ego stack and the human drivers |
 //! | [`simulation`] | one run: scenario file, world, closed loop, outcome |
 //! | [`campaign`] | many runs: journal, workers, gates, validity, verdict |

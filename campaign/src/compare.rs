@@ -1,116 +1,147 @@
-//! One campaign against an earlier one, sample by sample: what newly fails, what is fixed, and how the margins moved.
+//! Compares a campaign with an earlier one, sample by sample: new failures, fixed failures, and changes of the margins.
 //!
-//! Both ran the same samples, each in its own arm under test. No statistics are needed to say that a sample that passed
-//! now fails: it can be replayed in both folders.
+//! Both campaigns ran the same samples, each in its own arm under test. If a sample passed and now fails, no statistics
+//! are needed to show it: the sample can be replayed from both folders.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
+use closecall_simulation::outcome::Margins;
 use closecall_traffic::Measured;
 
 use super::folder::{Folder, FolderError};
 use super::record::{ArmRecord, Record};
-use closecall_simulation::outcome::Margins;
 
-/// Two campaigns that cannot be compared.
+/// The reason for which two campaigns cannot be compared.
 #[derive(Debug, thiserror::Error)]
 pub enum CompareError {
     /// A folder cannot be read.
     #[error(transparent)]
     Folder(#[from] FolderError),
-    /// They did not run the same samples.
-    #[error("failed to compare {} with {}: {what}", one.display(), other.display())]
+    /// The campaigns did not run the same samples.
+    #[error("failed to compare {} with {}: {difference}", baseline.display(), current.display())]
     Different {
-        /// The baseline's folder.
-        one: PathBuf,
-        /// The other folder.
-        other: PathBuf,
-        /// What is different.
-        what: String,
+        /// The folder of the earlier campaign.
+        baseline: PathBuf,
+        /// The folder of the later campaign.
+        current: PathBuf,
+        /// The first difference.
+        difference: String,
     },
-    /// A sample of the same number was sampled from something else.
-    #[error("failed to compare: sample {sample} of `{scenario}` is another encounter in {} than in {}: {parameter} differs", one.display(), other.display())]
+    /// The sampled parameters of a sample differ.
+    #[error("failed to compare: sample {sample} of `{scenario}` is another encounter in {} than in {}: {parameter} differs", baseline.display(), current.display())]
     OtherSample {
-        /// The baseline's folder.
-        one: PathBuf,
-        /// The other folder.
-        other: PathBuf,
+        /// The folder of the earlier campaign.
+        baseline: PathBuf,
+        /// The folder of the later campaign.
+        current: PathBuf,
         /// The scenario.
         scenario: String,
         /// The sample.
         sample: u64,
-        /// A parameter with another value.
+        /// The first parameter whose values differ.
         parameter: String,
     },
 }
 
-/// The margins that are compared: the key in reports, and where it lies. Less is closer to a collision.
-type Margin = (&'static str, fn(&Margins) -> Measured);
-const MARGINS: [Margin; 5] = [
-    ("min_thw_front_s", |margins| margins.min_thw_front_s),
-    ("min_thw_rear_s", |margins| margins.min_thw_rear_s),
-    ("min_gap_front_m", |margins| margins.min_gap_front_m),
-    ("min_gap_rear_m", |margins| margins.min_gap_rear_m),
-    ("min_ttc_rear_s", |margins| margins.min_ttc_rear_s),
-];
-
-/// How one margin moved, over the samples that have it in both campaigns.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MarginMove {
-    /// Its key in reports; the unit is its end.
-    pub key: &'static str,
-    /// Samples that have it in both.
-    pub samples: u64,
-    /// Sum over these samples in the baseline.
-    baseline: f64,
-    /// Sum over these samples now.
-    now: f64,
-    /// The sample that lost most, and how much it changed.
-    pub worst: Option<(u64, f64)>,
+/// A margin to compare. A smaller value is closer to a collision.
+struct Margin {
+    /// The key in reports.
+    key: &'static str,
+    /// Returns the margin of a run.
+    value: fn(&Margins) -> Measured,
 }
 
-impl MarginMove {
-    /// Mean in the baseline, and now; nothing of no samples.
-    pub fn means(&self) -> Option<[f64; 2]> {
-        (self.samples > 0).then(|| [self.baseline, self.now].map(|sum| sum / self.samples as f64))
+const MARGINS: [Margin; 5] = [
+    Margin { key: "min_thw_front_s", value: |margins| margins.min_thw_front_s },
+    Margin { key: "min_thw_rear_s", value: |margins| margins.min_thw_rear_s },
+    Margin { key: "min_gap_front_m", value: |margins| margins.min_gap_front_m },
+    Margin { key: "min_gap_rear_m", value: |margins| margins.min_gap_rear_m },
+    Margin { key: "min_ttc_rear_s", value: |margins| margins.min_ttc_rear_s },
+];
+
+/// The change of one margin, over the samples that have it in both campaigns.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MarginChange {
+    /// The key in reports. It ends with the unit.
+    pub key: &'static str,
+    /// Number of samples that have the margin in both campaigns.
+    pub samples: u64,
+    /// Sum over these samples in the baseline.
+    baseline_sum: f64,
+    /// Sum over these samples in the later campaign.
+    current_sum: f64,
+    /// The sample whose margin shrank most.
+    pub worst: Option<SampleChange>,
+}
+
+/// The change of a margin in one sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SampleChange {
+    /// The sample's number.
+    pub sample: u64,
+    /// The margin in the later campaign minus that in the baseline, in the unit of the margin.
+    pub change: f64,
+}
+
+/// The means of a margin, in the unit of the margin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Means {
+    /// The mean in the baseline.
+    pub baseline: f64,
+    /// The mean in the later campaign.
+    pub current: f64,
+}
+
+impl MarginChange {
+    /// Returns the means in both campaigns; `None` if no sample has the margin in both.
+    pub fn means(&self) -> Option<Means> {
+        let mean = |sum: f64| sum / self.samples as f64;
+        (self.samples > 0).then(|| Means { baseline: mean(self.baseline_sum), current: mean(self.current_sum) })
     }
 
-    fn push(&mut self, sample: u64, baseline: f64, now: f64) {
+    fn push(&mut self, sample: u64, baseline: f64, current: f64) {
         self.samples += 1;
-        self.baseline += baseline;
-        self.now += now;
-        let change = now - baseline;
-        if self.worst.is_none_or(|(_, worst)| !(change >= worst)) {
-            self.worst = Some((sample, change));
+        self.baseline_sum += baseline;
+        self.current_sum += current;
+        let change = current - baseline;
+        if self.worst.is_none_or(|worst| !(change >= worst.change)) {
+            self.worst = Some(SampleChange { sample, change });
         }
     }
 }
 
-/// What changed in one scenario.
+/// The changes in one scenario.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScenarioComparison {
-    /// Its name.
+    /// The scenario's name.
     pub scenario: String,
-    /// Samples that both campaigns have.
+    /// Number of samples.
     pub samples: u64,
-    /// Samples with the same outcome to the last bit, but for the controller's name.
+    /// Number of samples whose outcomes agree to the last bit, the controller's name aside.
     pub same: u64,
-    /// Samples in which E collides now, and did not.
+    /// Samples in which the ego collides, and did not collide in the baseline.
     pub newly_failing: Vec<u64>,
-    /// Samples in which E collided, and does not now.
+    /// Samples in which the ego collided in the baseline, and does not collide any more.
     pub fixed: Vec<u64>,
-    /// Samples in which E collides in both.
+    /// Number of samples in which the ego collides in both campaigns.
     pub still_failing: u64,
-    /// Samples that are an error now, and were not.
+    /// Samples that end in an error, and did not in the baseline.
     pub newly_in_error: Vec<u64>,
-    /// Samples that were an error, and are not now.
+    /// Samples that ended in an error in the baseline, and do not any more.
     pub no_longer_in_error: Vec<u64>,
-    /// How the margins moved.
-    pub margins: Vec<MarginMove>,
+    /// The changes of the margins.
+    pub margins: Vec<MarginChange>,
 }
 
 impl ScenarioComparison {
     fn new(scenario: &str) -> Self {
-        let unmoved = |(key, _): Margin| MarginMove { key, samples: 0, baseline: 0.0, now: 0.0, worst: None };
+        let unchanged = |Margin { key, .. }: Margin| MarginChange {
+            key,
+            samples: 0,
+            baseline_sum: 0.0,
+            current_sum: 0.0,
+            worst: None,
+        };
         Self {
             scenario: scenario.to_owned(),
             samples: 0,
@@ -120,14 +151,14 @@ impl ScenarioComparison {
             still_failing: 0,
             newly_in_error: Vec::new(),
             no_longer_in_error: Vec::new(),
-            margins: MARGINS.map(unmoved).to_vec(),
+            margins: MARGINS.map(unchanged).to_vec(),
         }
     }
 
-    fn push(&mut self, sample: u64, baseline: &ArmRecord, now: &ArmRecord) {
+    fn push(&mut self, sample: u64, baseline: &ArmRecord, current: &ArmRecord) {
         self.samples += 1;
-        self.same += u64::from(is_same(baseline, now));
-        match (&baseline.result, &now.result) {
+        self.same += u64::from(is_same(baseline, current));
+        match (&baseline.result, &current.result) {
             (Ok(before), Ok(after)) => {
                 match (before.ego_collided(), after.ego_collided()) {
                     (false, true) => self.newly_failing.push(sample),
@@ -135,16 +166,16 @@ impl ScenarioComparison {
                     (true, true) => self.still_failing += 1,
                     (false, false) => {}
                 }
-                for (moved, (_, of)) in self.margins.iter_mut().zip(MARGINS) {
-                    if let (Ok(before), Ok(after)) = (of(&before.margins), of(&after.margins)) {
-                        moved.push(sample, before, after);
+                for (change, Margin { value, .. }) in self.margins.iter_mut().zip(MARGINS) {
+                    if let (Ok(before), Ok(after)) = (value(&before.margins), value(&after.margins)) {
+                        change.push(sample, before, after);
                     }
                 }
             }
             (Ok(_), Err(_)) => self.newly_in_error.push(sample),
             (Err(_), Ok(after)) => {
                 self.no_longer_in_error.push(sample);
-                // What the baseline cannot vouch for is new.
+                // Without an outcome in the baseline, a collision counts as new.
                 if after.ego_collided() {
                     self.newly_failing.push(sample);
                 }
@@ -154,8 +185,8 @@ impl ScenarioComparison {
     }
 }
 
-fn is_same(baseline: &ArmRecord, now: &ArmRecord) -> bool {
-    match (&baseline.result, &now.result) {
+fn is_same(baseline: &ArmRecord, current: &ArmRecord) -> bool {
+    match (&baseline.result, &current.result) {
         (Ok(before), Ok(after)) => {
             let mut before = before.clone();
             before.controller.clone_from(&after.controller);
@@ -168,28 +199,40 @@ fn is_same(baseline: &ArmRecord, now: &ArmRecord) -> bool {
 /// Compares the arms under test of two campaigns.
 ///
 /// # Errors
-/// [`CompareError`] where a folder cannot be read, or the two did not run the same samples.
-pub fn compare(baseline: &Folder, now: &Folder) -> Result<Vec<ScenarioComparison>, CompareError> {
-    let different =
-        |what: String| CompareError::Different { one: baseline.path().to_owned(), other: now.path().to_owned(), what };
+/// [`CompareError`] if a folder cannot be read, or the campaigns did not run the same samples.
+pub fn compare(baseline: &Folder, current: &Folder) -> Result<Vec<ScenarioComparison>, CompareError> {
+    let different = |difference: String| CompareError::Different {
+        baseline: baseline.path().to_owned(),
+        current: current.path().to_owned(),
+        difference,
+    };
     let mut found: Vec<ScenarioComparison> = Vec::new();
-    let (mut before, mut after) = (baseline.records()?, now.records()?);
+    let (mut earlier, mut later) = (baseline.records()?, current.records()?);
     loop {
-        let (one, other) = match (before.next().transpose()?, after.next().transpose()?) {
+        let (before, after) = match (earlier.next().transpose()?, later.next().transpose()?) {
             (None, None) => return Ok(found),
-            (Some(one), Some(other)) => (one, other),
+            (Some(before), Some(after)) => (before, after),
             (Some(more), None) => return Err(different(format!("only the first has {}", named(&more)))),
             (None, Some(more)) => return Err(different(format!("only the second has {}", named(&more)))),
         };
-        if (&one.scenario, one.sample) != (&other.scenario, other.sample) {
-            return Err(different(format!("where one has {}, the other has {}", named(&one), named(&other))));
+        if (&before.scenario, before.sample) != (&after.scenario, after.sample) {
+            let (first, second) = (named(&before), named(&after));
+            return Err(different(format!("the first has {first}, the second has {second} in its place")));
         }
-        check_same_encounter([baseline.path(), now.path()], &one, &other)?;
-        if found.last().is_none_or(|last| last.scenario != one.scenario) {
-            found.push(ScenarioComparison::new(&one.scenario));
+        if let Some(parameter) = differing_parameter(&before, &after) {
+            return Err(CompareError::OtherSample {
+                baseline: baseline.path().to_owned(),
+                current: current.path().to_owned(),
+                scenario: before.scenario,
+                sample: before.sample,
+                parameter,
+            });
         }
-        if let (Some(scenario), Some(baseline), Some(now)) = (found.last_mut(), one.arms.last(), other.arms.last()) {
-            scenario.push(one.sample, baseline, now);
+        if found.last().is_none_or(|last| last.scenario != before.scenario) {
+            found.push(ScenarioComparison::new(&before.scenario));
+        }
+        if let (Some(scenario), Some(old), Some(new)) = (found.last_mut(), before.arms.last(), after.arms.last()) {
+            scenario.push(before.sample, old, new);
         }
     }
 }
@@ -198,21 +241,12 @@ fn named(record: &Record) -> String {
     format!("sample {} of `{}`", record.sample, record.scenario)
 }
 
-fn check_same_encounter(folders: [&Path; 2], one: &Record, other: &Record) -> Result<(), CompareError> {
+/// Returns the first parameter whose values differ; `None` if all agree, or if a record has no outcome.
+fn differing_parameter(before: &Record, after: &Record) -> Option<String> {
     let parameters = |record: &Record| {
         record.arms.iter().find_map(|arm| arm.result.as_ref().ok().map(|outcome| outcome.parameters.clone()))
     };
-    let (Some(before), Some(after)) = (parameters(one), parameters(other)) else { return Ok(()) };
-    let names = before.iter().chain(after.iter()).map(|(name, _)| name);
-    let differing = names.into_iter().find(|name| before.get(name) != after.get(name));
-    match differing {
-        None => Ok(()),
-        Some(parameter) => Err(CompareError::OtherSample {
-            one: folders[0].to_owned(),
-            other: folders[1].to_owned(),
-            scenario: one.scenario.clone(),
-            sample: one.sample,
-            parameter: parameter.to_string(),
-        }),
-    }
+    let (before, after) = (parameters(before)?, parameters(after)?);
+    let mut names = before.iter().chain(after.iter()).map(|(name, _)| name);
+    names.find(|name| before.get(name) != after.get(name)).map(ToString::to_string)
 }

@@ -1,9 +1,11 @@
-//! A campaign from its first sample to its last, or from where it was stopped.
+//! Runs a campaign from its first sample to its last, or resumes one that was interrupted.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use super::folder::{FolderError, Held, TakenUp};
+use closecall_scenarios::atomic::WriteError;
+
+use super::folder::{FolderError, LockedFolder, ResumedFiles, TornLine};
 use super::ledger::Inference;
 use super::partition::Partition;
 use super::record::Record;
@@ -11,52 +13,51 @@ use super::runner::Work;
 use super::summary::Summary;
 use super::wall_times::WallTime;
 use super::workers::{Finished, Workers, WorkersError};
-use closecall_scenarios::atomic::WriteError;
 
-/// A campaign: its scenarios one after the other, the samples of each in the order of their numbers.
+/// A campaign. Its scenarios run one after the other, and the samples of each scenario in the order of their numbers.
 #[derive(Clone)]
 pub struct Campaign {
-    /// The scenarios.
+    /// The scenarios with their samples and arms.
     pub works: Vec<Arc<Work>>,
-    /// Which part of the samples is run; all of them where absent.
+    /// The part of the samples that is run; `None` for all of them.
     pub partition: Option<Partition>,
-    /// Who runs them.
+    /// The number of worker threads, and the time limit of a sample.
     pub workers: Workers,
-    /// What the number of samples comes from.
+    /// What determines the number of samples.
     pub inference: Inference,
 }
 
-/// A campaign that could not be carried on. What its journal holds is good to go on with.
+/// An error that ends a campaign. The journal stays usable, and the campaign can be resumed from it.
 #[derive(Debug, thiserror::Error)]
 pub enum CampaignError {
     /// The folder cannot be used.
     #[error(transparent)]
     Folder(#[from] FolderError),
-    /// Results cannot be kept.
-    #[error("{0}\nwhat was written before is kept: once there is room, go on with --resume")]
+    /// Results cannot be written.
+    #[error("{0}\nthe results written so far are kept: when there is room again, resume with --resume")]
     Write(#[from] WriteError),
     /// The worker threads could not be started.
     #[error(transparent)]
     Workers(#[from] WorkersError),
 }
 
-/// What ends with a record.
+/// What a caller of [`Campaign::run`] ends after a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
-    /// Its scenario: the next one begins.
+    /// The scenario of the record. The next scenario begins.
     Scenario,
-    /// The campaign.
+    /// The whole campaign.
     Campaign,
 }
 
-/// A record whose turn has come.
+/// A record that [`Campaign::run`] passes on, in the order of the plan.
 #[derive(Clone, Copy, Debug)]
-pub struct Turn<'a> {
-    /// The place of its scenario among the works.
+pub struct NextRecord<'a> {
+    /// Index of the record's scenario in [`Campaign::works`].
     pub work: usize,
     /// The record.
     pub record: &'a Record,
-    /// True where it was run now, false where it was found in the journal.
+    /// True if the sample has just been run, false if the record was read from the journal.
     pub is_new: bool,
 }
 
@@ -77,80 +78,82 @@ impl Campaign {
     /// [`CampaignError::Workers`] if no threads can be started.
     pub fn count(&self) -> Result<Summary, CampaignError> {
         let mut summary = self.summary();
-        self.run(None, |turn| {
-            summary.push(turn.record);
+        self.run(None, |next| {
+            summary.push(next.record);
             ControlFlow::Continue(())
         })?;
         Ok(summary)
     }
 
-    /// How many samples there are in all.
+    /// Returns the number of samples of all scenarios.
     pub fn len(&self) -> u64 {
         self.works.iter().map(|work| work.samples(self.partition).count() as u64).sum()
     }
 
-    /// True where there is no sample at all.
+    /// Returns true if the campaign has no samples.
     pub fn is_empty(&self) -> bool {
         self.works.iter().all(|work| work.samples(self.partition).next().is_none())
     }
 
-    /// Runs what is not in the folder's journal yet; everything where there is no folder. `take` gets every record in the
-    /// order of the plan, those of the journal first; where it breaks, that scenario or the campaign ends with that
-    /// record.
+    /// Runs the samples that the folder's journal does not hold yet; all samples if there is no folder.
     ///
-    /// Answers what was cut off the journal, where its end was torn.
+    /// `on_record` receives every record in the order of the plan, those of the journal first. If it breaks, the
+    /// scenario or the campaign ends after that record.
+    ///
+    /// Returns the line at which the journal was cut off, if it was damaged.
     ///
     /// # Errors
-    /// [`CampaignError`] where the folder cannot be read or written, or no threads can be had.
+    /// [`CampaignError`] if the folder cannot be read or written, or no threads can be started.
     pub fn run(
         &self,
-        held: Option<&Held>,
-        mut take: impl FnMut(Turn<'_>) -> ControlFlow<End>,
-    ) -> Result<Option<(usize, String)>, CampaignError> {
-        let mut place = Place { work: 0, done: 0, all: 0, is_over: false };
-        let mut kept = match held {
-            Some(held) => Some(self.take_up(held, &mut place, &mut take)?),
+        folder: Option<&LockedFolder>,
+        mut on_record: impl FnMut(NextRecord<'_>) -> ControlFlow<End>,
+    ) -> Result<Option<TornLine>, CampaignError> {
+        let mut position = Position { work: 0, done: 0, total: 0, is_over: false };
+        let mut files = match folder {
+            Some(folder) => Some(self.resume(folder, &mut position, &mut on_record)?),
             None => None,
         };
-        if !place.is_over {
-            self.run_from(place, kept.as_mut(), &mut take)?;
+        if !position.is_over {
+            self.run_from(position, files.as_mut(), &mut on_record)?;
         }
-        if let Some(TakenUp { journal, wall_times, .. }) = &mut kept {
+        if let Some(ResumedFiles { journal, wall_times, .. }) = &mut files {
             journal.sync()?;
             wall_times.flush()?;
         }
-        Ok(kept.and_then(|kept| kept.torn))
+        Ok(files.and_then(|files| files.torn))
     }
 
-    /// Hands on what the journal holds.
-    fn take_up(
+    /// Passes on the records of the journal, and moves `position` behind the last one.
+    fn resume(
         &self,
-        held: &Held,
-        place: &mut Place,
-        take: &mut impl FnMut(Turn<'_>) -> ControlFlow<End>,
-    ) -> Result<TakenUp, FolderError> {
+        folder: &LockedFolder,
+        position: &mut Position,
+        on_record: &mut impl FnMut(NextRecord<'_>) -> ControlFlow<End>,
+    ) -> Result<ResumedFiles, FolderError> {
         let mut samples = self.works.first().map(|work| work.samples(self.partition));
-        held.take_up(|record| {
+        folder.resume(|record| {
             loop {
-                let Some(work) = self.works.get(place.work) else { return false };
+                let Some(work) = self.works.get(position.work) else { return false };
                 match samples.as_mut().and_then(Iterator::next) {
                     Some(sample) => {
-                        let fits = !place.is_over && is_of(record, work, sample);
-                        if fits {
-                            place.done += 1;
-                            place.all += 1;
-                            let end = take(Turn { work: place.work, record, is_new: false }).break_value();
-                            place.is_over = end == Some(End::Campaign);
+                        let is_next = !position.is_over && is_of(record, work, sample);
+                        if is_next {
+                            position.done += 1;
+                            position.total += 1;
+                            let next = NextRecord { work: position.work, record, is_new: false };
+                            let end = on_record(next).break_value();
+                            position.is_over = end == Some(End::Campaign);
                             if end == Some(End::Scenario) {
-                                (place.work, place.done) = (place.work + 1, 0);
-                                samples = self.works.get(place.work).map(|work| work.samples(self.partition));
+                                (position.work, position.done) = (position.work + 1, 0);
+                                samples = self.works.get(position.work).map(|work| work.samples(self.partition));
                             }
                         }
-                        return fits;
+                        return is_next;
                     }
                     None => {
-                        (place.work, place.done) = (place.work + 1, 0);
-                        samples = self.works.get(place.work).map(|work| work.samples(self.partition));
+                        (position.work, position.done) = (position.work + 1, 0);
+                        samples = self.works.get(position.work).map(|work| work.samples(self.partition));
                     }
                 }
             }
@@ -159,20 +162,21 @@ impl Campaign {
 
     fn run_from(
         &self,
-        from: Place,
-        mut kept: Option<&mut TakenUp>,
-        take: &mut impl FnMut(Turn<'_>) -> ControlFlow<End>,
+        start: Position,
+        mut files: Option<&mut ResumedFiles>,
+        on_record: &mut impl FnMut(NextRecord<'_>) -> ControlFlow<End>,
     ) -> Result<(), CampaignError> {
-        let (mut place, mut is_over) = (from.all, false);
-        for (number, work) in self.works.iter().enumerate().skip(from.work) {
-            let done = if number == from.work { from.done } else { 0 };
+        let (mut index, mut is_over) = (start.total, false);
+        for (number, work) in self.works.iter().enumerate().skip(start.work) {
+            let done = if number == start.work { start.done } else { 0 };
             let samples = work.samples(self.partition).skip(done);
             self.workers.run(work, samples, |finished: Finished| {
-                if let Some(kept) = kept.as_deref_mut() {
-                    keep(kept, place, &finished)?;
+                if let Some(files) = files.as_deref_mut() {
+                    append(files, index, &finished)?;
                 }
-                place += 1;
-                let end = take(Turn { work: number, record: &finished.record, is_new: true }).break_value();
+                index += 1;
+                let next = NextRecord { work: number, record: &finished.record, is_new: true };
+                let end = on_record(next).break_value();
                 is_over = end == Some(End::Campaign);
                 Ok::<_, CampaignError>(if end.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
             })?;
@@ -184,16 +188,16 @@ impl Campaign {
     }
 }
 
-/// Where a campaign stands.
+/// The next sample of a campaign.
 #[derive(Clone, Copy)]
-struct Place {
-    /// Scenarios that are done.
+struct Position {
+    /// Index of the current scenario: the number of scenarios that are done.
     work: usize,
-    /// Samples of the next one that are done.
+    /// Number of samples of the current scenario that are done.
     done: usize,
-    /// Samples of all that are done.
-    all: u64,
-    /// True where `take` broke off.
+    /// Number of samples of all scenarios that are done.
+    total: u64,
+    /// True if `on_record` has ended the campaign.
     is_over: bool,
 }
 
@@ -204,10 +208,10 @@ fn is_of(record: &Record, work: &Work, sample: u64) -> bool {
         && record.arms.iter().zip(&work.arms).all(|(kept, arm)| kept.controller == arm.controller.name())
 }
 
-fn keep(kept: &mut TakenUp, place: u64, finished: &Finished) -> Result<(), WriteError> {
-    kept.journal.append(&finished.record)?;
-    kept.wall_times.append(&WallTime {
-        place,
+fn append(files: &mut ResumedFiles, index: u64, finished: &Finished) -> Result<(), WriteError> {
+    files.journal.append(&finished.record)?;
+    files.wall_times.append(&WallTime {
+        index,
         scenario: finished.record.scenario.clone(),
         sample: finished.record.sample,
         wall_s: finished.wall_s.clone(),

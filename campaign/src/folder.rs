@@ -1,79 +1,88 @@
-//! A campaign's folder: made before any work is done, complete when it is over, and good to go on with in between.
+//! The folder of a campaign. It is set up before the first sample runs, and an interrupted campaign resumes from it.
 //!
 //! ```text
-//!  manifest.json      how it was made: all that a replay needs
-//!  journal.jsonl      one line per sample, appended as results come (see `journal`)
-//!  wall-times.jsonl   what each sample cost, beside it, since that differs from run to run
-//!  lock               held while a campaign runs
-//!  outcomes.parquet   written from the journal, byte-identical however it was computed
-//!  timings.parquet    wall times
-//!  junit.xml          one case per sample and controller
-//!  report.html        for people; summary.md: the same for a pull request
-//!  recordings/        Rerun files of chosen samples, and a page that shows them
+//!  manifest.json      how the campaign was made: everything that a replay needs
+//!  journal.jsonl      one record per sample, appended as results arrive (see the module `journal`)
+//!  wall-times.jsonl   wall time of each sample; apart from the journal, since it differs from run to run
+//!  lock               locked while a campaign runs
+//!  outcomes.parquet   made from the journal; byte-identical for any number of threads, parts and resumptions
+//!  timings.parquet    wall times as a table
+//!  junit.xml          one test case per sample and controller
+//!  report.html        report for human readers; summary.md: the same for a pull request
+//!  recordings/        recordings (Rerun files) of selected samples, and a page that shows them
 //! ```
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use closecall_scenarios::atomic::is_temporary;
-
-pub use crate::folder_error::FolderError;
+use closecall_scenarios::atomic::{WriteError, is_temporary, write_file};
 
 use super::journal::{self, Entry, Journal};
 use super::lock::Lock;
 use super::manifest::{MANIFEST_VERSION, Manifest};
 use super::record::Record;
-use super::wall_times::WallTimes;
-use closecall_scenarios::atomic::{WriteError, write_file};
+use super::wall_times::{self, WallTime, WallTimes};
+
+pub use crate::folder_error::FolderError;
 
 const MANIFEST: &str = "manifest.json";
 const JOURNAL: &str = "journal.jsonl";
 const WALL_TIMES: &str = "wall-times.jsonl";
 
-/// A campaign's folder.
+/// The folder of a campaign.
 #[derive(Clone, Debug)]
 pub struct Folder {
     path: PathBuf,
 }
 
-/// A folder that is held to run a campaign in.
+/// A campaign's folder that this program has locked, so that it can run a campaign in it.
 #[derive(Debug)]
-pub struct Held {
+pub struct LockedFolder {
     /// The folder.
     pub folder: Folder,
     _lock: Lock,
 }
 
-/// What [`Held::take_up`] found, ready to be appended to.
+/// The files of a campaign that goes on, open for appending. See [`LockedFolder::resume`].
 #[derive(Debug)]
-pub struct TakenUp {
+pub struct ResumedFiles {
     /// The journal.
     pub journal: Journal,
     /// The wall times.
     pub wall_times: WallTimes,
-    /// The line of the journal that was cut off with all after it, and why, where one was.
-    pub torn: Option<(usize, String)>,
+    /// The damaged line from which on the journal was cut off; `None` if every line was readable.
+    pub torn: Option<TornLine>,
+}
+
+/// A line of a journal that is incomplete or damaged.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TornLine {
+    /// The line, counted from 1.
+    pub line: usize,
+    /// What is wrong with it.
+    pub reason: String,
 }
 
 impl Folder {
-    /// The folder of a campaign that is there.
+    /// Returns the folder at `path`. It is not read, and need not exist.
     pub fn open(path: &Path) -> Self {
         Self { path: path.to_owned() }
     }
 
-    /// Makes the folder and writes its manifest; with `resume`, takes one that holds the very same campaign, too.
+    /// Locks a folder for the campaign of `manifest`. Creates the folder and writes the manifest if the folder does not
+    /// exist or is empty. With `resume`, also accepts a folder that already holds the same campaign.
     ///
     /// # Errors
-    /// [`FolderError`] where it cannot be written, holds something else, or another program is at work in it.
-    pub fn hold(path: &Path, manifest: &Manifest, resume: bool) -> Result<Held, FolderError> {
+    /// [`FolderError`] if the folder cannot be written, holds something else, or is locked by another program.
+    pub fn lock(path: &Path, manifest: &Manifest, resume: bool) -> Result<LockedFolder, FolderError> {
         let folder = Self::open(path);
         fs::create_dir_all(path).map_err(|source| WriteError::new(path, source))?;
-        let is_new = folder.holds_nothing()?;
+        let is_new = folder.is_unused()?;
         if !is_new && !folder.file(MANIFEST).exists() {
             return Err(FolderError::NotACampaign { path: path.to_owned() });
         }
-        let lock = Lock::take(path)?;
-        folder.sweep()?;
+        let lock = Lock::acquire(path)?;
+        folder.remove_temporary_files()?;
         if folder.file(MANIFEST).exists() {
             let differences = folder.manifest()?.differences(manifest);
             if !differences.is_empty() {
@@ -85,15 +94,15 @@ impl Folder {
         } else {
             folder.write_manifest(manifest)?;
         }
-        Ok(Held { folder, _lock: lock })
+        Ok(LockedFolder { folder, _lock: lock })
     }
 
-    /// True where the folder has no entry but what a lock leaves.
-    fn holds_nothing(&self) -> Result<bool, FolderError> {
+    /// Returns true if the folder holds at most a lock file and temporary files.
+    fn is_unused(&self) -> Result<bool, FolderError> {
         let fail = |source| FolderError::Read { path: self.path.clone(), source };
         for entry in fs::read_dir(&self.path).map_err(fail)? {
             let name = entry.map_err(fail)?.file_name();
-            // A manifest that was being written when the program was killed.
+            // A temporary file is a manifest whose program was killed while writing it.
             let is_unfinished = is_temporary(&name);
             if !Lock::is_file_name(&name) && !is_unfinished {
                 return Ok(false);
@@ -102,8 +111,8 @@ impl Folder {
         Ok(true)
     }
 
-    /// Removes what a program left behind that was killed while it wrote.
-    fn sweep(&self) -> Result<(), FolderError> {
+    /// Removes the temporary files of a program that was killed while writing.
+    fn remove_temporary_files(&self) -> Result<(), FolderError> {
         let fail = |source| FolderError::Read { path: self.path.clone(), source };
         for entry in fs::read_dir(&self.path).map_err(fail)? {
             let entry = entry.map_err(fail)?;
@@ -121,20 +130,20 @@ impl Folder {
         })
     }
 
-    /// The folder's own path.
+    /// Returns the folder's path.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The path of one of its files.
+    /// Returns the path of a file in the folder.
     pub fn file(&self, name: &str) -> PathBuf {
         self.path.join(name)
     }
 
-    /// How the campaign was made.
+    /// Reads the manifest, which says how the campaign was made.
     ///
     /// # Errors
-    /// [`FolderError`] where there is no manifest, or it is not one of this version's layout.
+    /// [`FolderError`] if there is no manifest, or if its layout has another version than this program's.
     pub fn manifest(&self) -> Result<Manifest, FolderError> {
         let path = self.file(MANIFEST);
         let text = fs::read_to_string(&path).map_err(|source| FolderError::Read { path: path.clone(), source })?;
@@ -151,10 +160,11 @@ impl Folder {
         }
     }
 
-    /// The records of the journal, in their order. A last line that was not written to its end is not one of them.
+    /// Returns the records of the journal in their order. An unfinished last line is skipped.
     ///
     /// # Errors
-    /// [`FolderError`] where it cannot be read; each record is an error of its own where its line is not one.
+    /// [`FolderError`] if the journal cannot be opened. An item of the iterator is an error if its line is damaged or
+    /// cannot be read.
     pub fn records(&self) -> Result<impl Iterator<Item = Result<Record, FolderError>> + use<>, FolderError> {
         let path = self.file(JOURNAL);
         let entries = journal::read(&path).map_err(|source| FolderError::Read { path: path.clone(), source })?;
@@ -168,40 +178,47 @@ impl Folder {
         }))
     }
 
-    /// What each sample cost, in the order of the plan.
+    /// Returns the wall time of each sample, in the order of the plan.
     ///
     /// # Errors
-    /// [`FolderError::Read`] where it cannot be read.
-    pub fn wall_times(&self) -> Result<impl Iterator<Item = super::wall_times::WallTime> + use<>, FolderError> {
+    /// [`FolderError::Read`] if the file cannot be opened.
+    pub fn wall_times(&self) -> Result<impl Iterator<Item = WallTime> + use<>, FolderError> {
         let path = self.file(WALL_TIMES);
-        super::wall_times::read(&path).map_err(|source| FolderError::Read { path, source })
+        wall_times::read(&path).map_err(|source| FolderError::Read { path, source })
     }
 }
 
-impl Held {
-    /// Goes through the records that are there, as long as they are the ones that `plan` begins with, and opens the
-    /// journal behind them. Whatever follows is cut off: it was not written to its end, and will be run again.
+impl LockedFolder {
+    /// Hands each existing record to `is_expected`, and opens the journal for appending behind the last one. A torn
+    /// line is cut off together with everything after it: those samples run again.
+    ///
+    /// `is_expected` returns true if the record is the next one in the plan.
     ///
     /// # Errors
-    /// [`FolderError::Content`] where the journal holds a sample that the plan does not have there; the journal is
-    /// then as it was. Other [`FolderError`]s where something cannot be read or written.
-    pub fn take_up(&self, mut plan: impl FnMut(&Record) -> bool) -> Result<TakenUp, FolderError> {
+    /// [`FolderError::Content`] if `is_expected` returns false for a record; the journal is then unchanged. Other
+    /// [`FolderError`]s if a file cannot be read or written.
+    pub fn resume(&self, mut is_expected: impl FnMut(&Record) -> bool) -> Result<ResumedFiles, FolderError> {
         let path = self.folder.file(JOURNAL);
-        let (mut keep, mut kept, mut torn) = (0, 0_u64, None);
+        let (mut kept_bytes, mut kept_records, mut torn) = (0, 0_u64, None);
         if path.exists() {
             let fail = |source| FolderError::Read { path: path.clone(), source };
-            for (place, entry) in journal::read(&path).map_err(fail)?.enumerate() {
+            for (index, entry) in journal::read(&path).map_err(fail)?.enumerate() {
                 match entry.map_err(fail)? {
-                    Entry::Record { record, end } if plan(&record) => (keep, kept) = (end, kept + 1),
-                    Entry::Record { record, .. } => {
-                        let message = format!("sample {} of `{}` does not belong here", record.sample, record.scenario);
-                        return Err(FolderError::Content { path: path.clone(), line: place + 1, message });
+                    Entry::Record { record, end } if is_expected(&record) => {
+                        (kept_bytes, kept_records) = (end, kept_records + 1);
                     }
-                    Entry::Torn { line, reason, .. } => torn = Some((line, reason)),
+                    Entry::Record { record, .. } => {
+                        let message = format!(
+                            "sample {} of `{}` is not the next sample of the campaign",
+                            record.sample, record.scenario
+                        );
+                        return Err(FolderError::Content { path: path.clone(), line: index + 1, message });
+                    }
+                    Entry::Torn { line, reason, .. } => torn = Some(TornLine { line, reason }),
                 }
             }
         }
-        let wall_times = WallTimes::open(&self.folder.file(WALL_TIMES), kept)?;
-        Ok(TakenUp { journal: Journal::open(&path, keep)?, wall_times, torn })
+        let wall_times = WallTimes::open(&self.folder.file(WALL_TIMES), kept_records)?;
+        Ok(ResumedFiles { journal: Journal::open(&path, kept_bytes)?, wall_times, torn })
     }
 }

@@ -1,27 +1,27 @@
-//! What keeps a campaign's folder from being used.
+//! Why a campaign's folder cannot be used.
 
 use std::io;
 use std::path::PathBuf;
 
 use closecall_scenarios::atomic::WriteError;
 
-/// A campaign's folder that cannot be used. Nothing in it has been changed.
+/// The reason for which a campaign's folder cannot be used. The folder is unchanged.
 #[derive(Debug, thiserror::Error)]
 pub enum FolderError {
-    /// Something cannot be written.
+    /// A file cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
-    /// Something cannot be read.
+    /// A file cannot be read.
     #[error("failed to read {}: {source}", path.display())]
     Read {
         /// The file.
         path: PathBuf,
-        /// The system's reason.
+        /// The error of the operating system.
         source: io::Error,
     },
-    /// The folder holds a campaign already.
+    /// The folder already holds this campaign, and it is not to be resumed.
     #[error(
-        "failed to use {}: it holds a campaign already, and nothing of it is overwritten; go on with it with --resume, name another folder, or delete this one",
+        "failed to use {}: it already holds this campaign, and nothing is overwritten; resume it with --resume, name another folder, or delete this one",
         path.display()
     )]
     AlreadyThere {
@@ -37,24 +37,24 @@ pub enum FolderError {
     OtherCampaign {
         /// The folder.
         path: PathBuf,
-        /// What is different there.
+        /// What differs, one message for each difference.
         differences: Vec<String>,
     },
-    /// The folder holds something that is no campaign.
-    #[error("failed to use {}: it is not empty and holds no campaign; name a new folder", path.display())]
+    /// The folder is not empty, and does not hold a campaign.
+    #[error("failed to use {}: it is not empty and does not hold a campaign; name a new folder", path.display())]
     NotACampaign {
         /// The folder.
         path: PathBuf,
     },
-    /// Another program is at work in the folder.
+    /// Another program has locked the folder.
     #[error("failed to use {}: another campaign is running in it ({holder})", path.display())]
     Busy {
         /// The folder.
         path: PathBuf,
-        /// Who it is.
+        /// The content of the lock file: the process that holds the lock.
         holder: String,
     },
-    /// A file of the folder has content that this program did not write.
+    /// A file of the folder is damaged, or does not belong to the campaign.
     #[error("failed to read {}:{line}: {message}", path.display())]
     Content {
         /// The file.

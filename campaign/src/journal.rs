@@ -1,29 +1,31 @@
-//! The journal: the results of a campaign on disk as they come, one line for each sample, in the order of the plan.
+//! The journal of a campaign: a file to which the record of each sample is appended as one line, in the order of the
+//! plan.
 //!
 //! ```text
 //!  5f1c09a2b7d34e68 {"scenario":"low-thw-overtake","sample":0,"arms":[…]}
 //!  └ checksum of the record          └ the record, as JSON
 //! ```
 //!
-//! Each line is handed to the operating system in one piece as soon as its sample's turn has come, so that a program
-//! that is killed loses no line that it had begun to write, but the last at most. The disk is asked to keep what it
-//! was handed once a second, so that a machine that fails loses a second. Whatever is lost is recognised by its
-//! checksum, cut off, and run again: the same samples give the same lines.
+//! Each line is handed to the operating system in one write. A program that is killed therefore leaves at most the last
+//! line incomplete. Once a second the journal is synchronised to the disk, so that a machine that fails loses about one
+//! second of results. The checksum reveals an incomplete or damaged line. That line and everything after it are cut
+//! off, and their samples run again: the same samples give the same lines.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use super::record::Record;
 use closecall_scenarios::atomic::WriteError;
 
-/// Longest time between two requests to the disk to keep what it was handed.
+use super::record::Record;
+
+/// Longest time between two synchronisations to the disk, while records arrive.
 const SYNC_EVERY: Duration = Duration::from_secs(1);
-/// Hexadecimal digits of a line's checksum: the first 64 bits of BLAKE3.
+/// Length of a line's checksum (hexadecimal digits): the first 64 bits of the BLAKE3 hash.
 const CHECKSUM_DIGITS: usize = 16;
 
-/// A journal that is being written.
+/// A journal that is open for appending.
 #[derive(Debug)]
 pub struct Journal {
     file: File,
@@ -32,10 +34,10 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// Opens a journal to append to, cut to its first `keep` bytes.
+    /// Opens a journal for appending, and cuts it to its first `keep` bytes. Creates the file if there is none.
     ///
     /// # Errors
-    /// [`WriteError`] where it cannot be made or cut.
+    /// [`WriteError`] if the file cannot be created or cut.
     pub fn open(path: &Path, keep: u64) -> Result<Self, WriteError> {
         let fail = |source| WriteError::new(path, source);
         let options = OpenOptions::new().create(true).write(true).truncate(false).open(path);
@@ -48,7 +50,7 @@ impl Journal {
     /// Appends one record.
     ///
     /// # Errors
-    /// [`WriteError`] where the disk does not take it. A part of the line may then stand at the end, which
+    /// [`WriteError`] if the line cannot be written completely. The file may then end with a part of the line, which
     /// [`read`] recognises.
     pub fn append(&mut self, record: &Record) -> Result<(), WriteError> {
         let line = line(record).map_err(|source| WriteError::new(&self.path, source))?;
@@ -56,10 +58,10 @@ impl Journal {
         if self.synced.elapsed() >= SYNC_EVERY { self.sync() } else { Ok(()) }
     }
 
-    /// Has the disk keep what was appended.
+    /// Synchronises the appended records to the disk.
     ///
     /// # Errors
-    /// [`WriteError`] where it does not.
+    /// [`WriteError`] if the operating system reports a failure.
     pub fn sync(&mut self) -> Result<(), WriteError> {
         self.synced = Instant::now();
         self.file.sync_data().map_err(|source| WriteError::new(&self.path, source))
@@ -80,36 +82,37 @@ fn checksum(record: &[u8]) -> String {
     blake3::hash(record).to_hex()[..CHECKSUM_DIGITS].to_owned()
 }
 
-/// A line of a journal.
+/// One line of a journal.
 #[derive(Debug)]
 pub enum Entry {
-    /// A record, and where its line ends in the file [bytes].
+    /// An intact line.
     Record {
         /// The record.
         record: Box<Record>,
-        /// Bytes of the file up to the end of its line.
+        /// Offset of the end of the line in the file (bytes).
         end: u64,
     },
-    /// The rest of the file is no journal: its line was not written to its end, or damaged later.
+    /// An incomplete or damaged line. The rest of the file is not read.
     Torn {
         /// The line, counted from 1.
         line: usize,
         /// What is wrong with it.
         reason: String,
-        /// True where nothing but this one unfinished line follows, as a program leaves it that was killed.
+        /// True if the line is the last one and lacks its end, as a killed program leaves it.
         is_tail: bool,
     },
 }
 
-/// The entries of a journal, in their order; a torn one is the last.
+/// Returns the entries of a journal in their order. The first torn entry is the last one returned.
 ///
 /// # Errors
-/// The system's reason where the file cannot be opened, or read on.
+/// The error of the operating system if the file cannot be opened. An item of the iterator is an error if the file
+/// cannot be read further.
 pub fn read(path: &Path) -> io::Result<Entries> {
     Ok(Entries { reader: BufReader::new(File::open(path)?), end: 0, line: 0, is_over: false, buffer: Vec::new() })
 }
 
-/// The entries of a journal: see [`read`].
+/// An iterator over the entries of a journal: see [`read`].
 #[derive(Debug)]
 pub struct Entries {
     reader: BufReader<File>,
@@ -155,7 +158,7 @@ impl Entries {
 }
 
 fn parse(line: &[u8]) -> Result<Record, String> {
-    let Some(line) = line.strip_suffix(b"\n") else { return Err("the line ends before its time".to_owned()) };
+    let Some(line) = line.strip_suffix(b"\n") else { return Err("the line is incomplete".to_owned()) };
     let (Some(sum), Some(b' '), Some(record)) =
         (line.get(..CHECKSUM_DIGITS), line.get(CHECKSUM_DIGITS), line.get(CHECKSUM_DIGITS + 1..))
     else {
@@ -200,11 +203,11 @@ mod tests {
     }
 
     #[test]
-    fn a_journal_cut_at_any_byte_gives_its_whole_lines_and_continues_to_the_same_bytes() {
+    fn a_journal_cut_at_any_byte_keeps_its_complete_lines_and_is_continued_to_the_same_bytes() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("journal");
         let whole = written(&path);
-        let ends: Vec<usize> = (0..whole.len()).filter(|&place| whole[place] == b'\n').map(|place| place + 1).collect();
+        let ends: Vec<usize> = (0..whole.len()).filter(|&index| whole[index] == b'\n').map(|index| index + 1).collect();
         for cut in 0..=whole.len() {
             std::fs::write(&path, &whole[..cut]).unwrap();
             let complete = ends.iter().filter(|&&end| end <= cut).count();
@@ -218,23 +221,23 @@ mod tests {
     }
 
     #[test]
-    fn a_single_changed_byte_is_found() {
+    fn a_single_changed_byte_is_detected() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("journal");
         let whole = written(&path);
         let second = whole.iter().position(|&byte| byte == b'\n').unwrap() + 1;
-        for place in 0..whole.len() {
+        for index in 0..whole.len() {
             let mut changed = whole.clone();
-            changed[place] ^= 1;
+            changed[index] ^= 1;
             std::fs::write(&path, &changed).unwrap();
             let (found, tail, _) = samples(&path);
-            assert!(found.len() < 3 && tail.is_some(), "byte {place}");
-            assert_eq!(found.is_empty(), place < second, "byte {place}");
+            assert!(found.len() < 3 && tail.is_some(), "byte {index}");
+            assert_eq!(found.is_empty(), index < second, "byte {index}");
         }
     }
 
     #[test]
-    fn a_disk_that_is_full_is_an_error_that_names_the_file() {
+    fn a_full_disk_is_an_error_that_names_the_file() {
         let full = Path::new("/dev/full");
         if !full.exists() {
             return;

@@ -1,13 +1,19 @@
-//! Campaigns: many samples of scenarios, their ledger, and the verdict.
+//! Campaigns: many samples of one or more scenarios, run with one or two controllers, counted, and judged.
 //!
 //! ```text
-//!  scenario files ─▶ plan ─▶ workers ─▶ records in the order of the plan ─▶ ledger ─▶ gates ─▶ verdict
+//!  scenario files ─▶ plan ─▶ workers ─▶ records in the order of the plan ─▶ counts ─▶ gates ─▶ verdict
 //!                     ▲                       └──▶ journal ─▶ Parquet, JUnit, HTML, recordings
 //!                     └──────── resume ◀────────────────┘
 //! ```
 //!
-//! Rates are conditional on the sampled scenario: they say how often a *sampled encounter* ends in a collision, not
-//! how often that happens on a road.
+//! - A *sample* is one concrete scenario, drawn from the distributions of a scenario file. Its number, the seed, and
+//!   the sampling design determine it.
+//! - An *arm* is a controller with its sensors. In a *paired* campaign each sample runs in two arms: the baseline, and
+//!   the arm under test.
+//! - A *record* is the result of one sample in all arms: one line of the [`journal`].
+//!
+//! Rates are conditional on the sampled scenario: they are the share of *sampled encounters* that end in a collision,
+//! not the frequency of collisions on a road.
 
 pub mod compare;
 pub mod execution;

@@ -1,28 +1,31 @@
-//! One campaign at a time in a folder.
+//! A lock that keeps a second program out of a campaign's folder.
 //!
-//! The operating system gives the lock back when the program ends, however it ends: a lock is never left behind.
+//! The operating system releases the lock when the program ends, even if the program is killed. A stale lock cannot
+//! exist.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, Write};
 use std::path::Path;
 
-use super::folder_error::FolderError;
 use closecall_scenarios::atomic::WriteError;
+
+use super::folder_error::FolderError;
 
 const LOCK: &str = "lock";
 
-/// A folder that is held against other programs, for as long as this lives.
+/// A lock on a folder, released when the value is dropped.
 #[derive(Debug)]
 pub struct Lock {
     _file: File,
 }
 
 impl Lock {
-    /// Takes a folder.
+    /// Locks a folder.
     ///
     /// # Errors
-    /// [`FolderError::Busy`] where another program holds it, [`FolderError::Write`] where it cannot be written.
-    pub fn take(folder: &Path) -> Result<Self, FolderError> {
+    /// [`FolderError::Busy`] if another program holds the lock, [`FolderError::Write`] if the lock file cannot be
+    /// written.
+    pub fn acquire(folder: &Path) -> Result<Self, FolderError> {
         let path = folder.join(LOCK);
         let fail = |source| WriteError::new(&path, source);
         let options = OpenOptions::new().create(true).read(true).write(true).truncate(false).open(&path);
@@ -31,18 +34,18 @@ impl Lock {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => {
                 let mut holder = String::new();
-                // Who holds it is told where it can be read; that someone does is certain.
+                // The holder's process id is a courtesy: the folder is locked even if the id cannot be read.
                 drop(file.read_to_string(&mut holder));
                 return Err(FolderError::Busy { path: folder.to_owned(), holder: holder.trim().to_owned() });
             }
             Err(TryLockError::Error(source)) => return Err(fail(source).into()),
         }
-        let told = file.set_len(0).and_then(|()| file.rewind());
-        told.and_then(|()| writeln!(file, "process {}", std::process::id())).map_err(fail)?;
+        let cleared = file.set_len(0).and_then(|()| file.rewind());
+        cleared.and_then(|()| writeln!(file, "process {}", std::process::id())).map_err(fail)?;
         Ok(Self { _file: file })
     }
 
-    /// True for the name of the file that a lock leaves in its folder.
+    /// Returns true if `name` is the name of the lock file, which stays in the folder after the lock is released.
     pub(crate) fn is_file_name(name: &std::ffi::OsStr) -> bool {
         name == LOCK
     }

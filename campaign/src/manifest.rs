@@ -1,9 +1,12 @@
-//! What a campaign's folder says about how it was made: all that a replay needs, and all that its outcomes follow from.
+//! The manifest of a campaign's folder: everything that determines the outcomes and that a replay needs.
 
 use std::fs::File;
 use std::io;
 use std::path::Path;
 
+use closecall_sensors::SensorMode;
+use closecall_simulation::Arm;
+use closecall_simulation::controller::ControllerChoice;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -11,18 +14,15 @@ use super::ledger::Inference;
 use super::partition::Partition;
 use super::runner::Sampling;
 use super::validity::CheckPlan;
-use closecall_sensors::SensorMode;
-use closecall_simulation::Arm;
-use closecall_simulation::controller::ControllerChoice;
 
-/// The layout of a campaign's folder.
+/// The version of the layout of a campaign's folder.
 pub const MANIFEST_VERSION: u32 = 2;
 
-/// Hexadecimal digits of the executable's hash in a version.
+/// Length of the executable's hash in a version (hexadecimal digits).
 const HASH_DIGITS: usize = 16;
 
-/// Returns the version of this very program. Two builds of one release may differ, so the executable's own hash is part
-/// of it.
+/// Returns the version of this program: the release and a hash of the executable, since two builds of one release may
+/// differ.
 pub fn version() -> String {
     let release = env!("CARGO_PKG_VERSION");
     match std::env::current_exe().and_then(|path| file_hash(&path)) {
@@ -31,7 +31,7 @@ pub fn version() -> String {
     }
 }
 
-/// Returns the BLAKE3 hash of a file, which is not held in memory.
+/// Returns the BLAKE3 hash of a file, without loading the file into memory.
 pub(crate) fn file_hash(path: &Path) -> io::Result<blake3::Hash> {
     let mut hasher = blake3::Hasher::new();
     hasher.update_reader(File::open(path)?)?;
@@ -41,67 +41,67 @@ pub(crate) fn file_hash(path: &Path) -> io::Result<blake3::Hash> {
 /// One scenario of a campaign.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ManifestScenario {
-    /// Its name.
+    /// The scenario's name.
     pub name: String,
-    /// The file it was read from.
+    /// The file from which it was read.
     pub path: String,
-    /// BLAKE3 of the text.
+    /// BLAKE3 hash of `text`.
     pub blake3: String,
-    /// The text itself, all settings applied.
+    /// The content of the file, with all settings applied.
     pub text: String,
 }
 
 /// A network that the sensors use.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ManifestModel {
-    /// Its name.
+    /// The network's name.
     pub name: String,
-    /// BLAKE3 of its file.
+    /// BLAKE3 hash of its file.
     pub blake3: String,
-    /// What runs it.
+    /// The inference backend that runs it.
     pub backend: String,
 }
 
-/// How a campaign was made.
+/// Everything that determines the outcomes of a campaign.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Manifest {
-    /// Version of this layout.
+    /// Version of the folder's layout: [`MANIFEST_VERSION`] of the program that wrote it.
     pub manifest_version: u32,
-    /// Version of the program.
+    /// Version of the program: see [`version`].
     pub closecall_version: String,
     /// The scenarios.
     pub scenarios: Vec<ManifestScenario>,
     /// How the samples are drawn.
     pub sampling: Sampling,
-    /// Which part of the samples this folder is for; all of them where absent.
+    /// The part of the samples that this folder is for; `None` for all of them.
     pub partition: Option<Partition>,
-    /// The controllers, the baseline first where the campaign is paired.
+    /// The controllers: the baseline first if the campaign is paired, the one under test last.
     pub arms: Vec<ControllerChoice>,
     /// The sensors; those of each scenario if `None`.
     pub sensors: Option<SensorMode>,
-    /// Which samples are checked.
+    /// The samples that are checked for validity.
     pub checks: CheckPlan,
-    /// What the number of samples comes from.
+    /// What determines the number of samples.
     pub inference: Inference,
     /// The networks that the sensors use.
     pub models: Vec<ManifestModel>,
-    /// Longest wall time of a sample in one arm [s].
+    /// Longest wall time of a sample in one arm (s).
     pub sample_timeout_s: f64,
     /// The command line.
     pub command: Vec<String>,
 }
 
-/// What outcomes do not follow from.
+/// Keys of a manifest that do not affect the outcomes.
 const INCIDENTAL: [&str; 2] = ["command", "path"];
 
 impl Manifest {
-    /// What the two differ in, in words; nothing where both describe the same samples, so that their outcomes are the
-    /// same to the last bit.
+    /// Returns one message for each difference between the two manifests that can affect outcomes. If there is none,
+    /// the outcomes of both campaigns agree to the last bit.
     pub fn differences(&self, other: &Self) -> Vec<String> {
         let mut differences = Vec::new();
         match (serde_json::to_value(self), serde_json::to_value(other)) {
             (Ok(there), Ok(here)) => compare("", &there, &here, &mut differences),
-            // Nothing in a manifest cannot be written; were it so, nothing is known of the two.
+            // Every manifest can be written as JSON; if one could not, the two could not be known to agree.
             _ => differences.push("the manifest cannot be compared".to_owned()),
         }
         differences
@@ -113,7 +113,7 @@ impl Manifest {
         self.arms.iter().map(arm).collect()
     }
 
-    /// The same campaign, not shared out.
+    /// Returns the manifest of the whole campaign, of which this one may describe a part.
     pub fn whole(&self) -> Self {
         Self { partition: None, ..self.clone() }
     }
@@ -130,8 +130,8 @@ fn compare(key: &str, there: &Value, here: &Value, differences: &mut Vec<String>
             }
         }
         (Value::Array(one), Value::Array(other)) if one.len() == other.len() => {
-            for (place, (there, here)) in one.iter().zip(other).enumerate() {
-                let name = there.get("name").and_then(Value::as_str).map_or_else(|| place.to_string(), str::to_owned);
+            for (index, (there, here)) in one.iter().zip(other).enumerate() {
+                let name = there.get("name").and_then(Value::as_str).map_or_else(|| index.to_string(), str::to_owned);
                 compare(&within(&name), there, here, differences);
             }
         }
@@ -145,7 +145,7 @@ fn compare(key: &str, there: &Value, here: &Value, differences: &mut Vec<String>
     }
 }
 
-/// Where two texts begin to differ.
+/// Returns the first line in which two texts differ, in words.
 fn first_difference(there: &str, here: &str) -> Option<String> {
     let (mut one, mut other) = (there.lines(), here.lines());
     let mut line = 0;
@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn what_outcomes_do_not_follow_from_is_no_difference() {
+    fn the_command_and_paths_are_no_differences() {
         let mut other = manifest();
         other.command.push("--jobs=2".to_owned());
         other.scenarios[0].path = "b.toml".to_owned();
@@ -205,7 +205,7 @@ mod tests {
         other.sampling.seed = 2;
         other.partition = Some("1/3".parse().unwrap());
         other.arms = vec![ControllerChoice::Acc, ControllerChoice::Mis];
-        other.sensors = Some("full".to_owned());
+        other.sensors = Some(SensorMode::Full);
         other.sample_timeout_s = 10.0;
         other.scenarios[0].text = "one\nthree\n".to_owned();
         let mut differences = manifest().differences(&other);

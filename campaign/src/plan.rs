@@ -1,9 +1,9 @@
-//! The plan of a campaign: all that its outcomes follow from.
+//! The plan of a campaign: everything that determines its outcomes.
 //!
 //! ```text
 //!  scenario files ┐
 //!  sampling       ├─▶ Plan ─▶ Campaign (runs it)
-//!  controllers    ┘        └─▶ Manifest (keeps it)
+//!  controllers    ┘        └─▶ Manifest (stores it)
 //! ```
 
 use std::path::PathBuf;
@@ -24,10 +24,10 @@ use crate::runner::{Sampling, Work};
 use crate::validity::CheckPlan;
 use crate::workers::Workers;
 
-/// Scenarios that cannot stand in one campaign.
+/// The reason for which scenarios cannot form a campaign.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PlanError {
-    /// Results are filed by the scenario's name, and two scenarios have the same.
+    /// Two scenarios have the same name, by which results are filed.
     #[error("{} and {} have the same name `{name}`", first.display(), second.display())]
     SameName {
         /// One file.
@@ -51,9 +51,9 @@ pub struct Plan {
     pub partition: Option<Partition>,
     /// Which samples are checked for validity.
     pub checks: CheckPlan,
-    /// What the number of samples comes from.
+    /// What determines the number of samples.
     pub inference: Inference,
-    /// Threads, and the time that a sample may take.
+    /// The number of worker threads, and the time limit of a sample.
     pub workers: Workers,
 }
 
@@ -104,7 +104,7 @@ impl Plan {
         }
     }
 
-    /// Returns what a campaign's folder says about this plan. `command` is the command line that asked for it.
+    /// Returns the manifest of the campaign. `command` is the command line that started it.
     ///
     /// # Errors
     /// [`FolderError::Read`] if the inference library that is in use cannot be read.
@@ -132,7 +132,7 @@ impl Plan {
     }
 }
 
-/// The network of the rear camera, and what runs it.
+/// Returns the rear camera's network and the inference backend that runs it.
 fn rear_classifier() -> Result<ManifestModel, FolderError> {
     let backend = match inference_backend() {
         Backend::Tract => "tract".to_owned(),

@@ -190,7 +190,7 @@ impl Missing {
 const DIGITS: i32 = 3;
 
 /// A share in percent, with three significant digits.
-pub(crate) fn percent(share: f64) -> String {
+pub fn percent(share: f64) -> String {
     let value = 100.0 * share;
     if !(value > 0.0) || !value.is_finite() {
         return format!("{value} %");

@@ -1,19 +1,19 @@
-//! One sample of a campaign, as the journal keeps it.
+//! The record of one sample: what the journal of a campaign keeps.
 
+use closecall_simulation::SampleError;
+use closecall_simulation::outcome::Outcome;
 use serde::{Deserialize, Serialize};
 
 use super::harm::harm;
 use super::ledger::Tally;
 use super::validity::ArmChecks;
-use closecall_simulation::SampleError;
-use closecall_simulation::outcome::Outcome;
 
-/// Why a sample has no outcome, as it is kept: the kind is stable, the message is for people.
+/// The reason for which a sample has no outcome.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SampleFailure {
-    /// The kind of error.
+    /// The kind of error: a stable name for programs.
     pub kind: String,
-    /// What happened.
+    /// The message for human readers.
     pub message: String,
 }
 
@@ -23,20 +23,20 @@ impl From<SampleError> for SampleFailure {
     }
 }
 
-/// One sample in one arm.
+/// The result of one sample in one arm.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ArmRecord {
     /// The controller's name.
     pub controller: String,
-    /// What came of it.
+    /// The outcome, or the reason for which there is none.
     pub result: Result<Outcome, SampleFailure>,
-    /// What the validity checks found, where this sample was checked.
+    /// The findings of the validity checks; `None` if this sample was not checked.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub checks: Option<ArmChecks>,
 }
 
 impl ArmRecord {
-    /// The counts of this sample, as it came out.
+    /// Returns what this arm contributes to the counts, before the validity checks are taken into account.
     pub fn tally(&self) -> Tally {
         match &self.result {
             Ok(outcome) => {
@@ -56,32 +56,34 @@ impl ArmRecord {
     }
 }
 
-/// One sample in every arm of a campaign, the baseline first.
+/// The results of one sample in every arm of a campaign.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Record {
     /// The scenario's name.
     pub scenario: String,
     /// The sample's number.
     pub sample: u64,
-    /// The arms.
+    /// The arms: the baseline first if the campaign is paired, the arm under test last.
     pub arms: Vec<ArmRecord>,
 }
 
 impl Record {
-    /// True where a validity check made a difference where none may be.
+    /// Returns true if a validity check other than a flipped verdict failed in any arm.
     pub fn is_invalid(&self) -> bool {
         self.arms.iter().filter_map(|arm| arm.checks.as_ref()).any(|checks| !checks.broken.is_empty())
     }
 
-    /// The counts of each arm, as they are judged: where a verdict flipped at half the time step, the arm under test,
-    /// the last, counts as collided, and the baseline as not. Either speaks worse for the system under test.
+    /// Returns what each arm contributes to the counts that are judged.
+    ///
+    /// If halving the time step flips a verdict, the worse case for the system under test counts: the arm under test
+    /// counts as collided, the baseline as not collided.
     pub fn tallies(&self) -> Vec<Tally> {
         let tested = self.arms.len().saturating_sub(1);
-        let judged = |(place, arm): (usize, &ArmRecord)| {
+        let judged = |(index, arm): (usize, &ArmRecord)| {
             let tally = arm.tally();
             let halved = arm.checks.as_ref().and_then(|checks| checks.collided_at_half_step);
             let worse = |collided: bool| match halved {
-                Some(halved) if place == tested => collided || halved,
+                Some(halved) if index == tested => collided || halved,
                 Some(halved) => collided && halved,
                 None => collided,
             };

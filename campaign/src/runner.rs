@@ -1,28 +1,28 @@
-//! Running one sample in one arm, guarded against whatever the controller does.
+//! Runs one sample in one arm. A panic, for example of the controller, becomes an error of that sample.
 
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;
 
 use closecall_scenarios::sampling::Design;
+use closecall_simulation::outcome::Outcome;
+use closecall_simulation::scenario::{Scenario, ScenarioFile};
+use closecall_simulation::{Arm, NoObserver, Observer, RunKey, SampleError, simulate};
 use closecall_traffic::Check;
 
 use super::partition::Partition;
 use super::record::{ArmRecord, SampleFailure};
-use super::validity::{CheckPlan, Subject};
-use closecall_simulation::outcome::Outcome;
-use closecall_simulation::scenario::{Scenario, ScenarioFile};
-use closecall_simulation::{Arm, NoObserver, Observer, RunKey, SampleError, simulate};
+use super::validity::{CheckPlan, CheckedRun};
 
 /// How the samples of a campaign are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Sampling {
     /// The campaign's seed.
     pub seed: u64,
-    /// How the values of the parameters are laid out.
+    /// The sampling design, which lays out the values of the parameters.
     #[serde(with = "design_by_name")]
     pub design: Design,
-    /// Samples of each scenario.
+    /// Number of samples of each scenario.
     pub samples: u64,
 }
 
@@ -39,6 +39,19 @@ mod design_by_name {
     }
 }
 
+/// A scenario with all that its runs need: how its samples are drawn, and the arms in which each sample runs.
+#[derive(Clone)]
+pub struct Work {
+    /// The scenario.
+    pub file: ScenarioFile,
+    /// How its samples are drawn.
+    pub sampling: Sampling,
+    /// The arms: the baseline first if the campaign is paired, the arm under test last.
+    pub arms: Vec<Arm>,
+    /// The samples that are checked for validity.
+    pub checks: CheckPlan,
+}
+
 impl fmt::Debug for Work {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Work")
@@ -48,44 +61,31 @@ impl fmt::Debug for Work {
     }
 }
 
-/// What is run: a scenario, how its samples are drawn, and the arms that each of them is run in.
-#[derive(Clone)]
-pub struct Work {
-    /// The scenario.
-    pub file: ScenarioFile,
-    /// How its samples are drawn.
-    pub sampling: Sampling,
-    /// The arms, the baseline first.
-    pub arms: Vec<Arm>,
-    /// Which samples are checked.
-    pub checks: CheckPlan,
-}
-
 impl Work {
-    /// How many samples the design has.
+    /// Returns the number of samples of the design. A grid may have another number than was requested.
     pub fn count(&self) -> u64 {
         self.file.space().samples(self.sampling.design, self.sampling.samples)
     }
 
-    /// The numbers of the samples that belong to a part of the campaign, or to all of it, in their order.
+    /// Returns the numbers of the samples in a part of the campaign, or of all samples, in ascending order.
     pub fn samples(&self, part: Option<Partition>) -> impl Iterator<Item = u64> + use<> {
-        (0..self.count()).filter(move |&sample| part.is_none_or(|part| part.has(sample)))
+        (0..self.count()).filter(move |&sample| part.is_none_or(|part| part.contains(sample)))
     }
 
-    /// Runs one sample in one arm, and checks it where its turn has come.
+    /// Runs one sample in one arm, and checks it if the plan of the checks includes it.
     pub(super) fn run(&self, sample: u64, arm: usize) -> ArmRun {
         let arm = &self.arms[arm];
         let key = RunKey { seed: self.sampling.seed, sample };
         let started = Instant::now();
         let scenario = guarded(|| concrete(&self.file, self.sampling, sample));
-        let subject = scenario.as_ref().map(|scenario| Subject { scenario, key, arm });
-        let result = match &subject {
-            Ok(subject) => run_guarded(subject.scenario, key, arm, &mut NoObserver),
+        let run = scenario.as_ref().map(|scenario| CheckedRun { scenario, key, arm });
+        let result = match &run {
+            Ok(run) => run_guarded(run.scenario, key, arm, &mut NoObserver),
             Err(error) => Err((*error).clone()),
         };
         let wall_s = started.elapsed().as_secs_f64();
-        let checks = match (&subject, &result) {
-            (Ok(subject), Ok(outcome)) if self.checks.has(key) => Some(subject.check(outcome)),
+        let checks = match (&run, &result) {
+            (Ok(run), Ok(outcome)) if self.checks.includes(key) => Some(run.check(outcome)),
             _ => None,
         };
         let (controller, result) = (arm.controller.name().to_owned(), result.map_err(SampleFailure::from));
@@ -93,27 +93,27 @@ impl Work {
     }
 }
 
-/// One sample in one arm, with what it cost.
+/// The result of one sample in one arm, with its wall time.
 #[derive(Clone, Debug)]
 pub(super) struct ArmRun {
     pub(super) record: ArmRecord,
-    /// Wall time [s].
+    /// Wall time, without the validity checks (s).
     pub(super) wall_s: f64,
 }
 
-/// The concrete scenario of one sample.
+/// Returns the concrete scenario of one sample.
 ///
 /// # Errors
-/// [`SampleError::Scenario`] where the sampled values contradict each other.
+/// [`SampleError::Scenario`] if the sampled values contradict each other.
 pub fn concrete(file: &ScenarioFile, sampling: Sampling, sample: u64) -> Result<Scenario, SampleError> {
     let parameters = file.space().sample(sampling.design, sampling.seed, sample, sampling.samples);
     file.config().check(&parameters).map_err(SampleError::Scenario)
 }
 
-/// Runs one sample in one arm; a panic is an error of this sample.
+/// Runs one sample in one arm. A panic is returned as an error of the sample.
 ///
 /// # Errors
-/// [`SampleError`] where the sample has no outcome.
+/// [`SampleError`] if the sample has no outcome.
 pub fn run_guarded(
     scenario: &Scenario,
     key: RunKey,

@@ -1,4 +1,4 @@
-//! A campaign that lies in a folder: its plan, read back from the manifest.
+//! A campaign that is saved in a folder: its plan, read back from the manifest.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use crate::folder::{Folder, FolderError};
 use crate::manifest::{Manifest, ManifestScenario};
 use crate::runner::{Work, concrete};
 
-/// A saved campaign that cannot give what is asked of it.
+/// The reason for which a saved campaign cannot provide what was requested.
 #[derive(Debug, thiserror::Error)]
 pub enum SavedError {
     /// The folder cannot be used.
@@ -28,15 +28,15 @@ pub enum SavedError {
     /// The campaign has no scenario of that name.
     #[error("the campaign has no scenario `{name}`, only {}", known.join(", "))]
     UnknownScenario {
-        /// The name that was asked for.
+        /// The requested name.
         name: String,
         /// The names to choose from.
         known: Vec<String>,
     },
-    /// The campaign has no sample of that number.
+    /// The campaign has no sample with that number.
     #[error("there is no sample {sample}: the campaign has samples 0 to {last}")]
     UnknownSample {
-        /// The number that was asked for.
+        /// The requested number.
         sample: u64,
         /// The largest number.
         last: u64,
@@ -44,7 +44,7 @@ pub enum SavedError {
     /// The campaign was not run with that controller.
     #[error("the campaign was not run with `{name}`, only with {}", known.join(", "))]
     UnknownArm {
-        /// The name that was asked for.
+        /// The requested name.
         name: String,
         /// The names to choose from.
         known: Vec<String>,

@@ -1,32 +1,35 @@
-//! Which samples of a campaign are recorded to be looked at.
+//! The selection of samples for which a campaign saves a recording.
 //!
 //! ```text
 //!  worst:5,failures:20,random:3
 //! ```
 //!
-//! *Worst* are the samples of the arm under test with the hardest collisions of E, then those with the smallest time
-//! headways; *failures* the first ones in which E collided; *random* ones show what is usual. All counts are for each
-//! scenario; a count alone is that of failures. A sample that is chosen for several reasons is recorded once.
+//! - *worst*: the samples with the hardest collisions of the ego, then those with the smallest time headways;
+//! - *failures*: the first samples in which the ego collided;
+//! - *random*: samples drawn at random, which show the usual case.
+//!
+//! All of this refers to the arm under test, and the counts are for each scenario. A count alone is the count of
+//! failures. A sample that is selected for several reasons is recorded once.
 
 use std::str::FromStr;
 
+use closecall_simulation::outcome::Outcome;
 use closecall_traffic::{ActorId, Measured, stream};
 use rand::RngExt;
 
 use super::record::{ArmRecord, Record};
-use closecall_simulation::outcome::Outcome;
 
-/// The channel of the random choice.
+/// The channel of the random stream.
 const CHANNEL: &str = "recordings";
 
-/// How many samples of each kind are recorded.
+/// The number of samples of each kind for which a recording is saved.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Selection {
-    /// The most critical ones.
+    /// Number of the most critical samples.
     pub worst: u64,
-    /// The first in which E collided.
+    /// Number of samples in which the ego collided, the first ones.
     pub failures: u64,
-    /// Any.
+    /// Number of samples drawn at random.
     pub random: u64,
 }
 
@@ -64,26 +67,26 @@ impl std::fmt::Display for Selection {
     }
 }
 
-/// One sample that is recorded, and why.
+/// A selected sample, and the reasons for which it was selected.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Chosen {
     /// The sample's number.
     pub sample: u64,
-    /// The kinds that it was chosen for, in words.
+    /// The kinds for which it was selected: `worst`, `failure`, `random`.
     pub reasons: Vec<&'static str>,
 }
 
-/// How bad a sample was; the greatest is the worst.
+/// The severity of a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Severity {
     sample: u64,
-    /// Change of E's velocity in its hardest collision [m/s]; nothing where it did not collide.
+    /// Change of the ego's velocity in its hardest collision (m/s); `None` if the ego did not collide.
     delta_v_mps: Option<f64>,
-    /// Smallest time headway before and behind E [s].
+    /// Smallest time headway in front of and behind the ego (s).
     thw_s: f64,
 }
 
-/// Collects what is needed to choose among the samples of one scenario, record by record.
+/// Selects samples of one scenario, whose records are passed to it one by one.
 #[derive(Debug)]
 pub struct Chooser {
     selection: Selection,
@@ -96,24 +99,25 @@ impl Chooser {
         Self { selection, samples: Vec::new() }
     }
 
-    /// Adds one sample of the scenario; one that ended in an error cannot be recorded, and is left out.
+    /// Adds a sample. A sample that ended in an error is left out, since it cannot be recorded.
     pub fn push(&mut self, record: &Record) {
         if let Some(ArmRecord { result: Ok(outcome), .. }) = record.arms.last() {
             self.samples.push(severity(record.sample, outcome));
         }
     }
 
-    /// Returns the samples to record, the worst first, then in the order of their numbers. `seed` and `ego` key the random
-    /// choice.
+    /// Returns the selected samples: the worst first, then the failures and the random ones, each in the order of their
+    /// numbers. `seed` and `ego` key the random stream.
     pub fn choose(&self, seed: u64, ego: &ActorId) -> Vec<Chosen> {
         let mut chosen: Vec<Chosen> = Vec::new();
-        let mut add = |sample: u64, reason: &'static str| match chosen.iter_mut().find(|it| it.sample == sample) {
+        let mut add = |sample: u64, reason: &'static str| match chosen.iter_mut().find(|chosen| chosen.sample == sample)
+        {
             Some(known) => known.reasons.push(reason),
             None => chosen.push(Chosen { sample, reasons: vec![reason] }),
         };
         let count = |count: u64| usize::try_from(count).unwrap_or(usize::MAX);
         let mut worst: Vec<&Severity> = self.samples.iter().collect();
-        worst.sort_by(|a, b| order(b, a));
+        worst.sort_by(|a, b| compare(b, a));
         worst.iter().take(count(self.selection.worst)).for_each(|severity| add(severity.sample, "worst"));
         let failures = self.samples.iter().filter(|severity| severity.delta_v_mps.is_some());
         failures.take(count(self.selection.failures)).for_each(|severity| add(severity.sample, "failure"));
@@ -136,8 +140,8 @@ fn severity(sample: u64, outcome: &Outcome) -> Severity {
     Severity { sample, delta_v_mps: outcome.ego_delta_v_mps(), thw_s }
 }
 
-/// By collision, then by headway; of two alike the later one is the lesser.
-fn order(a: &Severity, b: &Severity) -> std::cmp::Ordering {
+/// Compares by the change of velocity, then by the time headway. Of two equal samples the earlier one is the worse.
+fn compare(a: &Severity, b: &Severity) -> std::cmp::Ordering {
     let collided = |severity: &Severity| severity.delta_v_mps.unwrap_or(f64::NEG_INFINITY);
     collided(a).total_cmp(&collided(b)).then(b.thw_s.total_cmp(&a.thw_s)).then(b.sample.cmp(&a.sample))
 }
@@ -147,7 +151,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_selection_is_read_and_written() {
+    fn a_selection_is_parsed_and_printed() {
         let read = |text: &str| text.parse::<Selection>();
         assert_eq!(read("worst:5,failures:20,random:3"), Ok(Selection { worst: 5, failures: 20, random: 3 }));
         assert_eq!(read("failures:0"), Ok(Selection::default()));
@@ -166,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn collisions_are_worse_than_near_misses_and_each_sample_comes_once() {
+    fn collisions_are_worse_than_near_misses_and_each_sample_is_selected_once() {
         let samples = [(None, 0.4), (Some(2.0), 0.1), (None, 0.1), (Some(9.0), 0.3)];
         let chosen =
             chooser(Selection { worst: 3, failures: 1, random: 0 }, &samples).choose(0, &ActorId::new("ego").unwrap());
@@ -176,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn a_random_choice_follows_from_the_seed_and_never_repeats() {
+    fn the_seed_determines_the_random_samples_and_none_repeats() {
         let samples = [(None, 1.0); 20];
         let choose = |random, seed| {
             chooser(Selection { worst: 0, failures: 0, random }, &samples).choose(seed, &ActorId::new("ego").unwrap())

@@ -1,4 +1,4 @@
-//! When a campaign stops before its last sample.
+//! The rule by which a campaign stops before its last sample.
 
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
@@ -7,50 +7,52 @@ use crate::execution::End;
 use crate::ledger::ArmCounts;
 use crate::probability::ProbabilityGate;
 
-/// When to stop.
+/// When a campaign stops early.
 #[derive(Clone, Copy, Debug)]
-pub struct Stop {
-    /// The gate whose answer ends a scenario.
-    pub certain: Option<ProbabilityGate>,
-    /// The time for all scenarios together.
-    pub budget: Option<Duration>,
-    /// How many scenarios there are.
+pub struct StopRule {
+    /// A scenario ends as soon as the answer of this gate is certain.
+    pub until_certain: Option<ProbabilityGate>,
+    /// Wall time for all scenarios together.
+    pub time_budget: Option<Duration>,
+    /// Number of scenarios.
     pub scenarios: usize,
 }
 
-/// A watch over when to stop, from the start of the campaign on.
+/// Applies a [`StopRule`] to a running campaign.
 #[derive(Clone, Copy, Debug)]
-pub struct StopWatch {
-    stop: Stop,
+pub struct StopMonitor {
+    rule: StopRule,
     started: Instant,
-    /// The scenario that is run, and when its time is over.
-    running: Option<(usize, Instant)>,
+    /// The index of the current scenario, and its deadline.
+    current: Option<(usize, Instant)>,
 }
 
-impl StopWatch {
-    /// Starts the watch now.
-    pub fn start(stop: Stop) -> Self {
-        Self { stop, started: Instant::now(), running: None }
+impl StopMonitor {
+    /// Returns a monitor whose time budget starts now.
+    pub fn start(rule: StopRule) -> Self {
+        Self { rule, started: Instant::now(), current: None }
     }
 
-    /// Returns whether scenario number `scenario` goes on after samples that came to `counts` in the arm under test.
+    /// Returns `Break` if the scenario with index `scenario` ends here. `counts` are those of its samples so far, in
+    /// the arm under test.
     pub fn observe(&mut self, scenario: usize, counts: &ArmCounts) -> ControlFlow<End> {
-        let is_certain = self.stop.certain.is_some_and(|gate| gate.is_settled(counts, self.stop.scenarios));
+        let is_certain = self.rule.until_certain.is_some_and(|gate| gate.is_settled(counts, self.rule.scenarios));
         if is_certain || self.is_late(scenario) { ControlFlow::Break(End::Scenario) } else { ControlFlow::Continue(()) }
     }
 
-    /// True where the scenario's time is over: an even share of what the scenarios before it have left.
+    /// Returns true if the scenario's time is over. When a scenario begins, the time left is divided evenly among the
+    /// scenarios still to run.
     fn is_late(&mut self, scenario: usize) -> bool {
-        let Some(budget) = self.stop.budget else { return false };
+        let Some(budget) = self.rule.time_budget else { return false };
         let now = Instant::now();
-        let deadline = match self.running {
-            Some((running, deadline)) if running == scenario => deadline,
-            before => {
-                let began = before.map_or(self.started, |_| now);
+        let deadline = match self.current {
+            Some((current, deadline)) if current == scenario => deadline,
+            previous => {
+                let began = previous.map_or(self.started, |_| now);
                 let left = budget.saturating_sub(began - self.started);
-                let to_come = u32::try_from(self.stop.scenarios.saturating_sub(scenario)).unwrap_or(u32::MAX).max(1);
-                let deadline = began + left / to_come;
-                self.running = Some((scenario, deadline));
+                let to_run = u32::try_from(self.rule.scenarios.saturating_sub(scenario)).unwrap_or(u32::MAX).max(1);
+                let deadline = began + left / to_run;
+                self.current = Some((scenario, deadline));
                 deadline
             }
         };
@@ -63,17 +65,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn certainty_ends_a_scenario_and_time_does() {
+    fn a_certain_answer_or_the_time_budget_ends_a_scenario() {
         let gate = ProbabilityGate::new(0.01, 0.95).unwrap();
         let counts = |outcomes, collisions| ArmCounts { outcomes, collisions, ..ArmCounts::default() };
-        let mut watch = StopWatch::start(Stop { certain: Some(gate), budget: None, scenarios: 1 });
-        assert!(watch.observe(0, &counts(100, 0)).is_continue());
-        assert_eq!(watch.observe(0, &counts(10_000, 0)), ControlFlow::Break(End::Scenario));
-        assert_eq!(watch.observe(0, &counts(100, 50)), ControlFlow::Break(End::Scenario));
-        let mut watch = StopWatch::start(Stop { certain: None, budget: Some(Duration::ZERO), scenarios: 2 });
-        assert!(watch.observe(0, &counts(1, 0)).is_break());
+        let mut monitor = StopMonitor::start(StopRule { until_certain: Some(gate), time_budget: None, scenarios: 1 });
+        assert!(monitor.observe(0, &counts(100, 0)).is_continue());
+        assert_eq!(monitor.observe(0, &counts(10_000, 0)), ControlFlow::Break(End::Scenario));
+        assert_eq!(monitor.observe(0, &counts(100, 50)), ControlFlow::Break(End::Scenario));
+        let mut monitor =
+            StopMonitor::start(StopRule { until_certain: None, time_budget: Some(Duration::ZERO), scenarios: 2 });
+        assert!(monitor.observe(0, &counts(1, 0)).is_break());
         let hour = Duration::from_secs(3_600);
-        let mut watch = StopWatch::start(Stop { certain: None, budget: Some(hour), scenarios: 2 });
-        assert!(watch.observe(0, &counts(1, 0)).is_continue());
+        let mut monitor = StopMonitor::start(StopRule { until_certain: None, time_budget: Some(hour), scenarios: 2 });
+        assert!(monitor.observe(0, &counts(1, 0)).is_continue());
     }
 }

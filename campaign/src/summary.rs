@@ -44,7 +44,7 @@ impl Counts {
             let Ok(outcome) = &arm.result else { continue };
             self.simulated_s += outcome.duration.s();
             if let Some(checks) = &arm.checks {
-                self.checks.take(checks, outcome.ego_collided());
+                self.checks.push(checks, outcome.ego_collided());
             }
         }
         self.samples += 1;

@@ -1,7 +1,7 @@
-//! What each sample cost, beside the journal: one line of JSON for each, in the same order.
+//! The wall time of each sample: a file beside the journal, with one line of JSON per sample, in the same order.
 //!
-//! Wall times differ from run to run, so they stand apart from everything that does not. They are for people: they are
-//! written in larger pieces, and a program that is killed loses those of its last second.
+//! Wall times differ from run to run. They therefore have a file of their own, apart from those that are reproducible.
+//! No result depends on them, so their lines are buffered: a program that is killed may lose the last ones.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, BufRead, BufReader, BufWriter, Seek, SeekFrom, Write};
@@ -11,20 +11,21 @@ use serde::{Deserialize, Serialize};
 
 use closecall_scenarios::atomic::WriteError;
 
-/// What one sample cost.
+/// The wall time of one sample.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WallTime {
-    /// Its place in the journal, counted from 0.
-    pub place: u64,
+    /// Index of the sample's record in the journal, counted from 0. The file calls it `place`.
+    #[serde(rename = "place")]
+    pub index: u64,
     /// The scenario's name.
     pub scenario: String,
-    /// Number of the sample.
+    /// The sample's number.
     pub sample: u64,
-    /// Wall time of each arm [s].
+    /// Wall time of each arm (s).
     pub wall_s: Vec<f64>,
 }
 
-/// The wall times of a campaign that is being run.
+/// A file of wall times that is open for appending.
 #[derive(Debug)]
 pub struct WallTimes {
     file: BufWriter<File>,
@@ -32,17 +33,18 @@ pub struct WallTimes {
 }
 
 impl WallTimes {
-    /// Opens the file to append to, cut to the samples before `place` in the journal.
+    /// Opens the file for appending, and cuts it to the samples before `index` in the journal. Creates the file if
+    /// there is none.
     ///
     /// # Errors
-    /// [`WriteError`] where it cannot be made or cut.
-    pub fn open(path: &Path, place: u64) -> Result<Self, WriteError> {
+    /// [`WriteError`] if the file cannot be created or cut.
+    pub fn open(path: &Path, index: u64) -> Result<Self, WriteError> {
         let fail = |source| WriteError::new(path, source);
         let mut file =
             OpenOptions::new().create(true).read(true).write(true).truncate(false).open(path).map_err(fail)?;
         let mut keep = 0;
         for (time, end) in lines(BufReader::new(&file)) {
-            if time.place >= place {
+            if time.index >= index {
                 break;
             }
             keep = end;
@@ -52,33 +54,33 @@ impl WallTimes {
         Ok(Self { file: BufWriter::new(file), path: path.to_owned() })
     }
 
-    /// Appends what one sample cost.
+    /// Appends the wall time of one sample.
     ///
     /// # Errors
-    /// [`WriteError`] where the disk does not take it.
+    /// [`WriteError`] if the line cannot be written.
     pub fn append(&mut self, time: &WallTime) -> Result<(), WriteError> {
         let written = serde_json::to_writer(&mut self.file, time).map_err(io::Error::from);
         written.and_then(|()| self.file.write_all(b"\n")).map_err(|source| WriteError::new(&self.path, source))
     }
 
-    /// Hands everything to the operating system.
+    /// Hands all buffered lines to the operating system.
     ///
     /// # Errors
-    /// [`WriteError`] where the disk does not take it.
+    /// [`WriteError`] if they cannot be written.
     pub fn flush(&mut self) -> Result<(), WriteError> {
         self.file.flush().map_err(|source| WriteError::new(&self.path, source))
     }
 }
 
-/// The wall times that a file holds, up to the first line that is none.
+/// Returns the wall times of a file, up to the first line that cannot be parsed.
 ///
 /// # Errors
-/// The system's reason where it cannot be opened.
+/// The error of the operating system if the file cannot be opened.
 pub fn read(path: &Path) -> io::Result<impl Iterator<Item = WallTime> + use<>> {
     Ok(lines(BufReader::new(File::open(path)?)).map(|(time, _)| time))
 }
 
-/// Each whole line, and where it ends [bytes].
+/// Returns the content of each complete line, and the offset of its end (bytes).
 fn lines(mut reader: impl BufRead) -> impl Iterator<Item = (WallTime, u64)> {
     let (mut end, mut line) = (0, Vec::new());
     std::iter::from_fn(move || {
@@ -94,12 +96,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn times_behind_the_journal_and_torn_lines_are_cut_off() {
+    fn wall_times_without_a_record_and_torn_lines_are_cut_off() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("wall-times.jsonl");
-        let time = |place| WallTime { place, scenario: "s".to_owned(), sample: 10 * place, wall_s: vec![0.5, 0.25] };
+        let time = |index| WallTime { index, scenario: "s".to_owned(), sample: 10 * index, wall_s: vec![0.5, 0.25] };
         let mut times = WallTimes::open(&path, 0).unwrap();
-        (0..4).for_each(|place| times.append(&time(place)).unwrap());
+        (0..4).for_each(|index| times.append(&time(index)).unwrap());
         times.flush().unwrap();
         drop(times);
         let text = std::fs::read(&path).unwrap();

@@ -1,14 +1,16 @@
-//! Many samples at a time, handed on in their order, with a watch over those that never end.
+//! Runs samples on several threads, returns their results in order, and gives up runs that exceed their time limit.
 //!
 //! ```text
-//!  numbers ─▶ window ─▶ jobs ─▶ worker ─▶ results ─▶ put in order ─▶ take
-//!                └────────────── no further than this ──────────────┘
-//!                        watch: a worker that is late is given up, and another takes its place
+//!  sample numbers ─▶ window ─▶ jobs ─▶ worker ─▶ results ─▶ reorder ─▶ caller
+//!                      └────────── at most this many runs ──────────┘
+//!                   watch: a worker that exceeds the time limit is abandoned and replaced
 //! ```
 //!
-//! Runs are begun no more than a window ahead of the last one handed on: that bounds what waits in memory for its turn,
-//! and what a program that is killed has to do again. A thread cannot be ended from outside. One that is late is left
-//! to itself until the program ends: whatever it still answers is thrown away.
+//! A run starts only if it is at most one window ahead of the last result returned. The window bounds the results that
+//! wait in memory, and the runs that a killed program has to repeat.
+//!
+//! A thread cannot be ended from outside. A worker that exceeds the time limit goes on until its run or the program
+//! ends, and its result is discarded.
 
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
@@ -17,29 +19,30 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use super::record::{ArmRecord, Record, SampleFailure};
-use super::runner::{ArmRun, Work};
 use closecall_simulation::SampleError;
 
-/// Runs that each worker may be ahead of the last one handed on.
+use super::record::{ArmRecord, Record, SampleFailure};
+use super::runner::{ArmRun, Work};
+
+/// Number of runs, for each worker, that may be ahead of the last result returned.
 const WINDOW_PER_WORKER: usize = 128;
-/// Longest time between two looks for workers that are late.
+/// Interval at which the time limit of running samples is checked.
 const WATCH_EVERY: Duration = Duration::from_millis(50);
 
-/// How many samples are run at a time, and how long each may take.
+/// The number of worker threads, and the time limit of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Workers {
-    /// Threads.
+    /// Number of threads.
     pub jobs: NonZeroUsize,
-    /// Longest wall time of a sample in one arm; one that takes longer is an error.
+    /// Longest wall time of a sample in one arm. A sample that takes longer is an error.
     pub sample_timeout: Duration,
 }
 
-/// Wall time that a sample may take in one arm unless another is set.
+/// Default time limit of a sample in one arm.
 const SAMPLE_TIMEOUT: Duration = Duration::from_secs(300);
 
 impl Default for Workers {
-    /// One thread for each processor, and 300 s for each sample.
+    /// Returns one thread for each processor, and 300 s for each sample.
     fn default() -> Self {
         let jobs = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
         Self { jobs, sample_timeout: SAMPLE_TIMEOUT }
@@ -50,50 +53,51 @@ impl Default for Workers {
 #[derive(Debug, thiserror::Error)]
 #[error("failed to start {jobs} worker threads: {source}")]
 pub struct WorkersError {
-    /// How many were asked for.
+    /// Number of threads that were requested.
     pub jobs: usize,
-    /// The system's reason.
+    /// The error of the operating system.
     pub source: std::io::Error,
 }
 
-/// A sample with what it cost.
+/// The result of one sample with its wall times.
 #[derive(Clone, Debug)]
 pub struct Finished {
-    /// What came of it.
+    /// The result in every arm.
     pub record: Record,
-    /// Wall time of each arm [s].
+    /// Wall time of each arm (s).
     pub wall_s: Vec<f64>,
 }
 
 impl Workers {
-    /// Runs the given samples, and hands them on in the order given, until `take` breaks off.
+    /// Runs the given samples, and passes each result to `on_finished` in the order of `samples`. Stops when
+    /// `on_finished` breaks.
     ///
     /// # Errors
-    /// Whatever `take` answers, and [`WorkersError`]: no further sample is handed on.
+    /// The error of `on_finished`, or [`WorkersError`]. No further result is passed on then.
     pub fn run<E: From<WorkersError>>(
         &self,
         work: &Arc<Work>,
         samples: impl Iterator<Item = u64>,
-        mut take: impl FnMut(Finished) -> Result<ControlFlow<()>, E>,
+        mut on_finished: impl FnMut(Finished) -> Result<ControlFlow<()>, E>,
     ) -> Result<(), E> {
         let arms = work.arms.len();
         let mut runs = samples.flat_map(|sample| (0..arms).map(move |arm| (sample, arm)));
-        let mut crew = Crew::start(*self, work)?;
-        let mut order = Order { arms, next: 0, waiting: BTreeMap::new() };
+        let mut pool = WorkerPool::new(*self, work)?;
+        let mut order = Reorder { arms, next: 0, waiting: BTreeMap::new() };
         loop {
-            while crew.is_short(order.next)
+            while pool.has_room(order.next)
                 && let Some((sample, arm)) = runs.next()
             {
-                crew.begin(sample, arm);
+                pool.submit(sample, arm);
             }
-            if order.next == crew.begun {
+            if order.next == pool.submitted {
                 return Ok(());
             }
-            for (place, done) in crew.wait()? {
-                order.waiting.insert(place, done);
+            for done in pool.wait()? {
+                order.waiting.insert(done.index, done);
             }
-            while let Some(finished) = order.next_whole(work) {
-                if take(finished)?.is_break() {
+            while let Some(finished) = order.pop(work) {
+                if on_finished(finished)?.is_break() {
                     return Ok(());
                 }
             }
@@ -104,62 +108,70 @@ impl Workers {
 /// One run to be done.
 #[derive(Clone, Copy, Debug)]
 struct Job {
-    place: u64,
+    /// Index in the order of submission.
+    index: u64,
     sample: u64,
     arm: usize,
 }
 
 /// A run that is done.
 struct Done {
+    /// Index in the order of submission.
+    index: u64,
     sample: u64,
     run: ArmRun,
 }
 
-/// What a worker is at, and since when. Whoever empties it answers for that job: the worker, or the watch.
+/// The job of a worker and its start time. Whichever empties the slot reports the job: the worker that has finished it,
+/// or the watch that has found it late.
 type Slot = Arc<Mutex<Option<(Job, Instant)>>>;
 
-/// A panic of the simulation is caught within a run; no lock is held there.
+/// Locks a mutex, poisoned or not: panics of the simulation are caught inside the run, when no lock is held.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-struct Crew {
+struct WorkerPool {
     workers: Workers,
     work: Arc<Work>,
     jobs: Sender<Job>,
-    open: Arc<Mutex<Receiver<Job>>>,
-    answers: Receiver<(u64, Done)>,
-    answer: Sender<(u64, Done)>,
+    job_queue: Arc<Mutex<Receiver<Job>>>,
+    results: Receiver<Done>,
+    result_sender: Sender<Done>,
     slots: Vec<Slot>,
-    begun: u64,
-    watched: Instant,
+    /// Number of runs submitted so far.
+    submitted: u64,
+    /// Time of the last check of the time limits.
+    checked: Instant,
 }
 
-impl Crew {
-    fn start(workers: Workers, work: &Arc<Work>) -> Result<Self, WorkersError> {
-        let ((jobs, open), (answer, answers)) = (channel(), channel());
-        let open = Arc::new(Mutex::new(open));
+impl WorkerPool {
+    fn new(workers: Workers, work: &Arc<Work>) -> Result<Self, WorkersError> {
+        let ((jobs, job_queue), (result_sender, results)) = (channel(), channel());
+        let job_queue = Arc::new(Mutex::new(job_queue));
         let slots = Vec::with_capacity(workers.jobs.get());
-        let (work, watched) = (work.clone(), Instant::now());
-        let mut crew = Self { workers, work, jobs, open, answers, answer, slots, begun: 0, watched };
+        let (work, checked) = (work.clone(), Instant::now());
+        let mut pool = Self { workers, work, jobs, job_queue, results, result_sender, slots, submitted: 0, checked };
         for _ in 0..workers.jobs.get() {
-            let slot = crew.hire()?;
-            crew.slots.push(slot);
+            let slot = pool.spawn()?;
+            pool.slots.push(slot);
         }
-        Ok(crew)
+        Ok(pool)
     }
 
-    /// Starts a thread that works until there are no more jobs, or until it is given up.
-    fn hire(&self) -> Result<Slot, WorkersError> {
+    /// Starts a thread that works until there are no more jobs, or until it is abandoned.
+    fn spawn(&self) -> Result<Slot, WorkersError> {
         let slot = Slot::default();
-        let (own, work, open, answer) = (slot.clone(), self.work.clone(), self.open.clone(), self.answer.clone());
+        let (own_slot, work) = (slot.clone(), self.work.clone());
+        let (job_queue, result_sender) = (self.job_queue.clone(), self.result_sender.clone());
         let body = move || {
             loop {
-                let Ok(job) = lock(&open).recv() else { return };
-                *lock(&own) = Some((job, Instant::now()));
+                let Ok(job) = lock(&job_queue).recv() else { return };
+                *lock(&own_slot) = Some((job, Instant::now()));
                 let run = work.run(job.sample, job.arm);
-                let is_given_up = lock(&own).take().is_none();
-                if is_given_up || answer.send((job.place, Done { sample: job.sample, run })).is_err() {
+                let is_abandoned = lock(&own_slot).take().is_none();
+                let done = Done { index: job.index, sample: job.sample, run };
+                if is_abandoned || result_sender.send(done).is_err() {
                     return;
                 }
             }
@@ -169,69 +181,71 @@ impl Crew {
         Ok(slot)
     }
 
-    /// True where another run may be begun, with all before `handed_on` over.
-    fn is_short(&self, handed_on: u64) -> bool {
+    /// Returns true if another run may be submitted. `returned` is the number of runs whose results have been returned.
+    fn has_room(&self, returned: u64) -> bool {
         let window = WINDOW_PER_WORKER * self.workers.jobs.get();
-        self.begun - handed_on < window as u64
+        self.submitted - returned < window as u64
     }
 
-    fn begin(&mut self, sample: u64, arm: usize) {
-        // The other end is held by this very struct.
-        self.jobs.send(Job { place: self.begun, sample, arm }).ok();
-        self.begun += 1;
+    fn submit(&mut self, sample: u64, arm: usize) {
+        // Sending cannot fail: this struct owns the receiver.
+        self.jobs.send(Job { index: self.submitted, sample, arm }).ok();
+        self.submitted += 1;
     }
 
-    /// Waits for something to be over, or to be late.
-    fn wait(&mut self) -> Result<Vec<(u64, Done)>, WorkersError> {
+    /// Waits until a run has finished or the interval of the watch is over. Returns the finished and the abandoned
+    /// runs.
+    fn wait(&mut self) -> Result<Vec<Done>, WorkersError> {
         let mut done = Vec::new();
-        match self.answers.recv_timeout(WATCH_EVERY) {
-            Ok(answer) => {
-                done.push(answer);
-                done.extend(self.answers.try_iter());
+        match self.results.recv_timeout(WATCH_EVERY) {
+            Ok(result) => {
+                done.push(result);
+                done.extend(self.results.try_iter());
             }
-            // This very struct holds a sender.
+            // `Disconnected` cannot occur: this struct owns a sender.
             Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {}
         }
-        if self.watched.elapsed() >= WATCH_EVERY {
-            self.watched = Instant::now();
-            self.give_up_the_late(&mut done)?;
+        if self.checked.elapsed() >= WATCH_EVERY {
+            self.checked = Instant::now();
+            self.abandon_late_runs(&mut done)?;
         }
         Ok(done)
     }
 
-    fn give_up_the_late(&mut self, done: &mut Vec<(u64, Done)>) -> Result<(), WorkersError> {
+    fn abandon_late_runs(&mut self, done: &mut Vec<Done>) -> Result<(), WorkersError> {
         let limit = self.workers.sample_timeout;
-        for place in 0..self.slots.len() {
-            let late = lock(&self.slots[place]).take_if(|(_, since)| since.elapsed() >= limit);
-            if let Some((job, since)) = late {
+        for index in 0..self.slots.len() {
+            let late = lock(&self.slots[index]).take_if(|(_, started)| started.elapsed() >= limit);
+            if let Some((job, started)) = late {
                 let failure = SampleFailure::from(SampleError::Timeout { limit_s: limit.as_secs_f64() });
                 let controller = self.work.arms[job.arm].controller.name().to_owned();
                 let record = ArmRecord { controller, result: Err(failure), checks: None };
-                let run = ArmRun { record, wall_s: since.elapsed().as_secs_f64() };
-                done.push((job.place, Done { sample: job.sample, run }));
-                self.slots[place] = self.hire()?;
+                let run = ArmRun { record, wall_s: started.elapsed().as_secs_f64() };
+                done.push(Done { index: job.index, sample: job.sample, run });
+                self.slots[index] = self.spawn()?;
             }
         }
         Ok(())
     }
 }
 
-/// Puts what is done in the order in which it was begun.
-struct Order {
+/// Puts finished runs into the order in which they were submitted, and joins the arms of each sample.
+struct Reorder {
     arms: usize,
+    /// Index of the next run to return.
     next: u64,
     waiting: BTreeMap<u64, Done>,
 }
 
-impl Order {
-    /// The next sample, where all of its arms are done.
-    fn next_whole(&mut self, work: &Work) -> Option<Finished> {
-        let places = self.next..self.next + self.arms as u64;
-        if self.arms == 0 || !places.clone().all(|place| self.waiting.contains_key(&place)) {
+impl Reorder {
+    /// Removes and returns the next sample. Returns `None` if a run of that sample is missing.
+    fn pop(&mut self, work: &Work) -> Option<Finished> {
+        let indices = self.next..self.next + self.arms as u64;
+        if self.arms == 0 || !indices.clone().all(|index| self.waiting.contains_key(&index)) {
             return None;
         }
-        self.next = places.end;
-        let done: Vec<Done> = places.filter_map(|place| self.waiting.remove(&place)).collect();
+        self.next = indices.end;
+        let done: Vec<Done> = indices.filter_map(|index| self.waiting.remove(&index)).collect();
         Some(Finished {
             wall_s: done.iter().map(|done| done.run.wall_s).collect(),
             record: Record {

@@ -1,6 +1,6 @@
-//! Text inside markup.
+//! Escaping of text for XML and HTML.
 
-/// Returns the text as it may stand between tags and in quoted attributes.
+/// Escapes `text` for use between tags and in double-quoted attributes.
 pub(crate) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

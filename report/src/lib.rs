@@ -1,10 +1,11 @@
-//! What a run and a campaign leave behind: files to look at, to keep, and to gate on.
+//! The output files of a run and of a campaign: pictures and recordings to view, tables to evaluate, and reports that a
+//! CI gate reads.
 //!
-//! * [`run`](mod@run): one run, or a pair of them: film, Rerun recording, static figure, trace
-//! * [`campaign`]: many runs: HTML page, JUnit, Parquet, Markdown, recordings of chosen samples
-//! * [`traffic`]: trajectory data as an in-car log or as charts
+//! * [`run`](mod@run): output of one run, or of a pair of runs: Rerun recording, static figure, trace
+//! * [`campaign`]: output of many runs: HTML page, JUnit, Parquet, Markdown, recordings of selected samples
+//! * [`traffic`]: simulated traffic as trajectory data, and charts of trajectory data
 //!
-//! This crate is the only one that names rerun, arrow and plotters.
+//! This crate is the only one that uses rerun, arrow and plotters.
 
 pub mod campaign;
 mod charts;

@@ -1,4 +1,4 @@
-//! What all Parquet tables have in common.
+//! Settings that all Parquet tables share.
 
 use std::collections::HashMap;
 
@@ -6,10 +6,12 @@ use arrow::datatypes::{DataType, Field};
 use parquet::basic::Compression;
 use parquet::file::properties::WriterProperties;
 
-/// Rows that are held in memory at a time, and that a reader can skip at a time.
+/// Number of rows in a row group: the unit that a writer holds in memory and that a reader can skip.
 pub(crate) const ROWS_PER_GROUP: usize = 8_192;
 
-/// How every table is written: nothing in it depends on when, where, or by which version of a library.
+/// Returns the writer properties of every table.
+///
+/// The file names neither a time nor a place nor a library version, so that equal rows give equal bytes.
 pub(crate) fn properties() -> WriterProperties {
     WriterProperties::builder()
         .set_created_by("closecall".to_owned())
@@ -18,8 +20,8 @@ pub(crate) fn properties() -> WriterProperties {
         .build()
 }
 
-/// A nullable column; its unit, where it has one, stands in its metadata.
-pub(crate) fn field(name: &str, of: DataType, unit: Option<&str>) -> Field {
+/// Returns a nullable column. Its metadata holds its unit, if it has one.
+pub(crate) fn field(name: &str, data_type: DataType, unit: Option<&str>) -> Field {
     let metadata: HashMap<String, String> = unit.map(|unit| ("unit".to_owned(), unit.to_owned())).into_iter().collect();
-    Field::new(name, of, true).with_metadata(metadata)
+    Field::new(name, data_type, true).with_metadata(metadata)
 }

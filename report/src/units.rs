@@ -1,6 +1,6 @@
-//! Units of measurement, as the end of every name says them.
+//! Units of measurement, read from the suffixes of names.
 
-/// The ends of names, longer ones first where one ends in another, and what they stand for.
+/// The suffixes of names with the units that they stand for. A suffix that ends in another one precedes it.
 const UNITS: [(&str, &str); 14] = [
     ("mm-per-h", "mm/h"),
     ("m-per-h", "m/h"),
@@ -18,12 +18,13 @@ const UNITS: [(&str, &str); 14] = [
     ("s", "s"),
 ];
 
-/// The unit that a name ends with, be its parts joined by `-` or `_`; nothing where the value is a plain number.
+/// Returns the unit that the suffix of a name stands for, or `None` if there is none. The parts of the name may be
+/// joined by `-` or `_`.
 pub(crate) fn unit_of(name: &str) -> Option<&'static str> {
     split(name).1
 }
 
-/// A name for people: `closing-mps` is `closing [m/s]`.
+/// Returns a name as a label for a reader: `closing-mps` becomes `closing [m/s]`.
 pub(crate) fn labelled(name: &str) -> String {
     match split(name) {
         (stem, Some(unit)) => format!("{} [{unit}]", stem.replace(['-', '_'], " ")),
@@ -31,13 +32,14 @@ pub(crate) fn labelled(name: &str) -> String {
     }
 }
 
+/// Splits a name into its stem and the unit of its suffix.
 fn split(name: &str) -> (&str, Option<&'static str>) {
-    let found = UNITS.iter().find_map(|(end, unit)| {
-        // The ends hold hyphens themselves; names of columns have underscores in their place.
-        let stem = name.len().checked_sub(end.len() + 1)?;
+    let found = UNITS.iter().find_map(|(suffix, unit)| {
+        // Suffixes contain hyphens; names of columns have underscores instead.
+        let stem = name.len().checked_sub(suffix.len() + 1)?;
         let tail = name.get(stem..)?;
         let is_joined = tail.starts_with(['-', '_']);
-        (is_joined && tail[1..].replace('_', "-") == *end).then(|| (&name[..stem], Some(*unit)))
+        (is_joined && tail[1..].replace('_', "-") == *suffix).then(|| (&name[..stem], Some(*unit)))
     });
     found.unwrap_or((name, None))
 }
@@ -47,7 +49,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_end_of_a_name_is_its_unit() {
+    fn the_suffix_of_a_name_gives_its_unit() {
         for (name, unit) in [
             ("closing-mps", Some("m/s")),
             ("brake-mps2", Some("m/s²")),

@@ -1,18 +1,19 @@
-//! Feeds the readers of recordings with damaged files, and looks for panics, hangs and results that make no sense.
+//! Feeds damaged files to the readers of trajectory data, and looks for panics, hangs and invalid results.
 //!
 //! ```sh
 //! cargo run --release -p closecall-scenarios --example fuzz_readers -- commonroad 120
 //! cargo run --release -p closecall-scenarios --example fuzz_readers -- all 60 7
 //! ```
 //!
-//! Arguments: the reader (`ngsim`, `csv`, `highd`, `exid`, `commonroad`, `in-car`, or `all`, one after the other), the seconds for
-//! each, and a seed (0 where absent). It starts from the small files in `scenarios/fuzz`, and damages them where the formats
-//! can be damaged: single bytes, fields, columns, lines, tags, blocks moved and repeated, ends cut off, compressed or
-//! not. Half of what it makes is packed with gzip and cut or damaged after that. It needs no special compiler.
+//! Arguments: the reader (`ngsim`, `csv`, `highd`, `exid`, `commonroad`, `in-car`, or `all` for one after the other),
+//! the seconds per reader, and a seed (default 0). The fuzzer starts from the small files in `scenarios/fuzz`. It
+//! changes single bytes, replaces fields, swaps columns, repeats and deletes lines, copies and deletes blocks, replaces
+//! separators, and cuts off ends. It compresses a quarter of the results with gzip, and damages half of those again. It
+//! needs no special compiler.
 //!
-//! What is wrong: a panic; more than two seconds for one file of some kilobytes; a number that is not finite; a track
-//! that is empty, not evenly spaced or as long as no file is; two tracks of one number; an error that does not name the
-//! file. The file that did it is then written, and its path printed.
+//! It reports: a panic; more than two seconds for one file of some kilobytes; a number that is not finite; a track that
+//! is empty, lacks line numbers or is not evenly spaced; two tracks with one number; an error that does not name the
+//! file. It then writes the damaged file and prints its path.
 
 use std::io::{Cursor, Write};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -24,19 +25,19 @@ use closecall_scenarios::recordings::{BadRows, ReadOptions, RecordingError, Trac
 
 const READERS: [&str; 6] = ["ngsim", "csv", "highd", "exid", "commonroad", "in-car"];
 
-/// One file may take this long.
-const SLOW: Duration = Duration::from_secs(2);
+/// Maximum time for one file.
+const MAX_DURATION: Duration = Duration::from_secs(2);
 
-/// What takes longer is tried again so often in all.
-const REPEATED: u32 = 3;
+/// Number of attempts for a file that exceeds the maximum time.
+const ATTEMPTS: u32 = 3;
 
-/// The most damages in one file.
-const MOST_DAMAGES: u64 = 6;
+/// Maximum number of damages per file.
+const MAX_DAMAGES: u64 = 6;
 
-/// What damaged files are not allowed to grow beyond [bytes].
-const LARGEST: usize = 1 << 18;
+/// Maximum size of a damaged file (bytes).
+const MAX_BYTES: usize = 1 << 18;
 
-/// Values that readers have stumbled over, here or elsewhere.
+/// Values at which readers, here or elsewhere, have failed.
 const VALUES: [&str; 30] = [
     "",
     "0",
@@ -70,7 +71,7 @@ const VALUES: [&str; 30] = [
     "<x>",
 ];
 
-/// A small generator of random numbers (SplitMix64), so that a seed names a run.
+/// A small random number generator (SplitMix64), so that a seed reproduces a run.
 struct Random(u64);
 
 impl Random {
@@ -81,43 +82,45 @@ impl Random {
         mixed ^ (mixed >> 31)
     }
 
+    /// Returns a random number below `end`.
     fn below(&mut self, end: usize) -> usize {
         if end == 0 { 0 } else { usize::try_from(self.next() % end as u64).unwrap_or(0) }
     }
 
     fn pick<'t, T>(&mut self, items: &'t [T]) -> Option<&'t T> {
-        let place = self.below(items.len());
-        items.get(place)
+        let index = self.below(items.len());
+        items.get(index)
     }
 
-    /// A place and a length within `bytes`.
+    /// Returns a random range of at most `most` items within `length`.
     fn range(&mut self, length: usize, most: usize) -> std::ops::Range<usize> {
         let start = self.below(length);
         start..(start + self.below(most) + 1).min(length)
     }
 }
 
-/// Where the parts of `bytes` between separators are.
+/// Returns the ranges of the parts of `bytes` between separators.
 fn parts(bytes: &[u8], is_separator: impl Fn(u8) -> bool) -> Vec<std::ops::Range<usize>> {
     let mut start = 0;
     let mut found = Vec::new();
-    for (place, byte) in bytes.iter().enumerate() {
+    for (index, byte) in bytes.iter().enumerate() {
         if is_separator(*byte) {
-            found.push(start..place);
-            start = place + 1;
+            found.push(start..index);
+            start = index + 1;
         }
     }
     found.push(start..bytes.len());
     found
 }
 
+/// Damages `bytes` once, in a random way.
 fn damage(bytes: &mut Vec<u8>, random: &mut Random) {
     let lines = parts(bytes, |byte| byte == b'\n');
     let line = random.pick(&lines).cloned().unwrap_or(0..0);
     match random.below(12) {
         0 => {
-            let place = random.below(bytes.len());
-            if let Some(byte) = bytes.get_mut(place) {
+            let index = random.below(bytes.len());
+            if let Some(byte) = bytes.get_mut(index) {
                 *byte ^= 1 << random.below(8);
             }
         }
@@ -128,17 +131,17 @@ fn damage(bytes: &mut Vec<u8>, random: &mut Random) {
         }
         3 => {
             let block = bytes[random.range(bytes.len(), 200)].to_vec();
-            let place = random.below(bytes.len() + 1);
-            bytes.splice(place..place, block);
+            let index = random.below(bytes.len() + 1);
+            bytes.splice(index..index, block);
         }
-        // A field of a line or the content of an element gets another value.
+        // Replace a field of a line or the content of an element.
         4..=6 => {
             let fields = parts(bytes, |byte| b",; \n<>\"".contains(&byte));
             let field = random.pick(&fields).cloned().unwrap_or(0..0);
             let value = random.pick(&VALUES).copied().unwrap_or_default();
             bytes.splice(field, value.bytes());
         }
-        // A line is repeated, taken away, or moved.
+        // Repeat a line at another position.
         7 => {
             let text = bytes[line.start..(line.end + 1).min(bytes.len())].to_vec();
             let at = random.pick(&lines).map_or(0, |other| other.start);
@@ -148,7 +151,7 @@ fn damage(bytes: &mut Vec<u8>, random: &mut Random) {
         8 => {
             bytes.drain(line.start..(line.end + 1).min(bytes.len()));
         }
-        // Two columns are swapped in every line.
+        // Swap two columns in every line.
         9 => swap_columns(bytes, random),
         10 => {
             let fields = parts(bytes, |byte| b",; \n<>".contains(&byte));
@@ -168,7 +171,7 @@ fn damage(bytes: &mut Vec<u8>, random: &mut Random) {
             *bytes = out;
         }
     }
-    bytes.truncate(LARGEST);
+    bytes.truncate(MAX_BYTES);
 }
 
 fn swap_columns(bytes: &mut Vec<u8>, random: &mut Random) {
@@ -184,7 +187,7 @@ fn swap_columns(bytes: &mut Vec<u8>, random: &mut Random) {
     *bytes = out;
 }
 
-/// Whole files of one reader, to start from: a name and the content.
+/// The intact files of one reader from which fuzzing starts: name and content.
 type Corpus = Vec<(String, Vec<u8>)>;
 
 fn corpus(reader: &str) -> std::io::Result<Corpus> {
@@ -205,7 +208,7 @@ fn packed(bytes: &[u8]) -> Vec<u8> {
     encoder.finish().unwrap_or_default()
 }
 
-/// What is wrong with what a reader gave, if anything.
+/// Returns the first defect in the result of a reader, if any.
 fn judge(tracks: Result<Tracks<'_>, RecordingError>) -> Option<String> {
     let mut tracks = match tracks {
         Ok(tracks) => tracks,
@@ -252,7 +255,7 @@ fn judge_error(error: &RecordingError) -> Option<String> {
     (!error.to_string().contains(&name)).then(|| format!("an error does not name the file: {error}"))
 }
 
-/// One reader, fed for a while.
+/// The state of fuzzing one reader.
 struct Target {
     reader: String,
     corpus: Corpus,
@@ -263,7 +266,7 @@ struct Target {
 impl Target {
     fn damaged(&mut self, bytes: &[u8]) -> Vec<u8> {
         let mut bytes = bytes.to_vec();
-        for _ in 0..1 + self.random.next() % MOST_DAMAGES {
+        for _ in 0..1 + self.random.next() % MAX_DAMAGES {
             damage(&mut bytes, &mut self.random);
         }
         if self.random.below(4) == 0 {
@@ -275,7 +278,7 @@ impl Target {
         bytes
     }
 
-    /// Reads a damaged recording: what is wrong with what comes of it, or a panic.
+    /// Reads a damaged file. Returns the defect found, if any, or the panic.
     fn judged(
         &self,
         (name, bytes): (&String, &[u8]),
@@ -288,7 +291,7 @@ impl Target {
         }
         for (other, whole) in &self.corpus {
             let path = self.folder.path().join(other);
-            // Some file systems wait for the disk where a file is written over.
+            // Some file systems wait for the disk when a file is overwritten.
             drop(std::fs::remove_file(&path));
             std::fs::write(&path, if other == name { bytes } else { whole })?;
         }
@@ -296,7 +299,7 @@ impl Target {
         Ok(catch_unwind(AssertUnwindSafe(|| judge(open(&path, options)))))
     }
 
-    /// One damaged recording: what is wrong with how it is read, and its files.
+    /// Damages and reads one file. Returns the defect, if any, and the damaged file.
     fn once(&mut self) -> std::io::Result<Option<(String, Corpus)>> {
         let which = self.random.below(self.corpus.len());
         let Some((name, bytes)) = self.corpus.get(which).cloned() else { return Ok(None) };
@@ -306,18 +309,18 @@ impl Target {
         let options = ReadOptions { layout: None, bad_rows };
         let mut judged = Ok(None);
         let mut fastest = Duration::MAX;
-        // A machine that is busy elsewhere makes anything slow once.
-        for _ in 0..REPEATED {
+        // On a busy machine, any file may be slow once.
+        for _ in 0..ATTEMPTS {
             let begun = Instant::now();
             judged = self.judged((&name, &bytes), options, window)?;
             fastest = fastest.min(begun.elapsed());
-            if fastest <= SLOW {
+            if fastest <= MAX_DURATION {
                 break;
             }
         }
         let wrong = match judged {
             Err(_) => Some("a panic".to_owned()),
-            Ok(None) if fastest > SLOW => Some(format!("it took {:.1} s", fastest.as_secs_f64())),
+            Ok(None) if fastest > MAX_DURATION => Some(format!("it took {:.1} s", fastest.as_secs_f64())),
             Ok(wrong) => wrong,
         };
         Ok(wrong.map(|wrong| (wrong, vec![(name, bytes)])))

@@ -1,4 +1,4 @@
-//! Makes a synthetic recording of any size, to see that memory stays constant and how fast it is read.
+//! Generates a synthetic trajectory file of any size, to measure memory use and reading speed.
 //!
 //! ```sh
 //! cargo run --release -p closecall-scenarios --example make_recording -- plain 10GB /tmp/big.csv
@@ -6,19 +6,19 @@
 //! /usr/bin/time -v closecall inspect /tmp/big.csv
 //! ```
 //!
-//! Layouts: `plain` (sorted by vehicle), `plain-by-time`, `ngsim` (18 columns in feet, sorted by vehicle). Every vehicle is
-//! on the road for 60 s at 10 Hz, and one in three changes lanes once on a quintic path. Sizes: a number of bytes, with
-//! `MB` or `GB`. The same arguments give the same bytes.
+//! Layouts: `plain` (sorted by vehicle), `plain-by-time`, `ngsim` (18 columns in feet, sorted by vehicle). Each vehicle
+//! is on the road for 60 s at 10 Hz, and one vehicle in three changes lanes once on a quintic path. The size is a
+//! number of bytes, optionally with `MB` or `GB`. The same arguments yield the same bytes.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::process::ExitCode;
 
-/// Time between two frames [s].
+/// Time between two frames (s).
 const PERIOD_S: f64 = 0.1;
-/// Frames of each vehicle.
+/// Number of frames per vehicle.
 const FRAMES: u64 = 600;
-/// A vehicle enters in every so many frames.
+/// Number of frames between the entries of two vehicles.
 const HEADWAY_FRAMES: u64 = 12;
 const LANES: u64 = 5;
 const LANE_M: f64 = 3.5;
@@ -29,13 +29,13 @@ struct Instant {
     vehicle: u64,
     frame: u64,
     s_m: f64,
-    /// Positive to the right of the road's left edge.
+    /// Distance to the right of the road's left edge (m).
     right_m: f64,
     lane: u64,
     speed_mps: f64,
 }
 
-/// Where vehicle `vehicle` is at `frame`, counted from its own first.
+/// Returns the state of a vehicle at `age` frames after its first frame.
 fn instant(vehicle: u64, age: u64) -> Instant {
     let time_s = PERIOD_S * age as f64;
     let lane = 1 + vehicle % LANES;
@@ -49,11 +49,11 @@ fn instant(vehicle: u64, age: u64) -> Instant {
         0 => -shape,
         _ => 0.0,
     };
-    let place = lane as f64 - 0.5 + shift;
+    let lane_position = lane as f64 - 0.5 + shift;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and the number of lanes")]
-    let lane_now = place.floor() as u64 + 1;
+    let lane_now = lane_position.floor() as u64 + 1;
     let frame = vehicle * HEADWAY_FRAMES + age;
-    Instant { vehicle, frame, s_m: speed_mps * time_s, right_m: LANE_M * place, lane: lane_now, speed_mps }
+    Instant { vehicle, frame, s_m: speed_mps * time_s, right_m: LANE_M * lane_position, lane: lane_now, speed_mps }
 }
 
 fn write_plain(file: &mut impl Write, at: &Instant) -> std::io::Result<u64> {

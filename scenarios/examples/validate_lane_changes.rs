@@ -1,19 +1,21 @@
-//! How well each criterion finds lane changes that are known.
+//! Validates each lane-change criterion against known lane changes.
 //!
 //! ```text
 //! CLOSECALL_DATA=DIR cargo run --release -p closecall-scenarios --example validate_lane_changes
 //! ```
 //!
-//! `DIR` holds `ngsim_us101` (trajectories of NGSIM US-101, DOI 10.21949/1504477, in the plain layout, and
-//! `reference_lane_changes.csv`), `ngsim_i80_pairs` and `gps_lane_changes` (T. Driessen, S. Prasad, P. Bazilinskyy, J. de Winter, AHFE 2022).
+//! `DIR` contains `ngsim_us101` (trajectories of NGSIM US-101, DOI 10.21949/1504477, in the plain layout, and
+//! `reference_lane_changes.csv`), `ngsim_i80_pairs` and `gps_lane_changes` (T. Driessen, S. Prasad, P. Bazilinskyy, J.
+//! de Winter, AHFE 2022).
 //!
-//! - US-101: recall over the clear changes with 2 s of track on both sides, precision against all, with exact intervals;
-//!   for all recordings together, for each, and for the halves of the vehicles and of the time, since nothing was tuned
-//!   on one half only if both halves say the same.
-//! - I-80: vehicles that follow another one in one lane for 30 to 74 s. Whatever the peak criterion finds there by the
-//!   shift alone, without asking for the recorded lane, is wrong.
+//! - US-101: recall over the clear lane changes with 2 s of track on both sides, and precision against all listed ones,
+//!   with exact intervals. The figures are given for all files together, for each file, and for halves of the vehicles
+//!   and of the time. Agreement of the halves shows that the criteria are not tuned to one of them.
+//! - I-80: vehicles that follow another one in the same lane for 30 to 74 s. Every lane change that the peak criterion
+//!   finds there by the lateral shift alone, without the recorded lane, is wrong.
 //! - GPS: one car on Dutch motorways, four receivers at 1 Hz, lateral offset to the map-matched road, 58 lane changes
-//!   annotated on video. A found change agrees with an annotated one in the same direction whose middle is within 5 s.
+//!   annotated on video. A detected lane change agrees with an annotated one if it has the same direction and its
+//!   middle is within 5 s.
 #![expect(clippy::print_stdout, reason = "its output is what it is for")]
 
 use std::path::{Path, PathBuf};
@@ -24,7 +26,7 @@ use closecall_scenarios::lane_change::{
 use closecall_scenarios::recordings::{LaneMarkings, Recording, read};
 use closecall_traffic::{Dimensions, Lane, Side, Time, Trajectory, TrajectoryPoint, VehicleClass};
 
-/// A name of a part of the data, and whether a lane change belongs to it: by its track and its time.
+/// The name of a subset of the data, and a predicate that selects lane changes by track number and time (s).
 type Part = (&'static str, fn(u64, f64) -> bool);
 
 const PARTS: [Part; 5] = [
@@ -96,7 +98,7 @@ fn print(part: &str, score: &Score) {
     println!("  {:<12} precision {}, times within {:.2} s", "", score.precision, score.max_time_error_s);
 }
 
-/// Vehicles that stay in one lane.
+/// Counts the vehicles for which the peak criterion invents a lane change, among vehicles that keep their lane.
 fn i80(path: &Path) {
     let packed = std::fs::File::open(path).expect("the pairs");
     let mut reader = csv::Reader::from_reader(flate2::read::MultiGzDecoder::new(packed));
@@ -133,27 +135,28 @@ struct Annotated {
     direction: Side,
 }
 
-/// A reading of one receiver.
+/// One position fix of a receiver.
 struct Fix {
     time_s: f64,
     offset_m: f64,
     speed_mps: f64,
 }
 
-/// An annotated and a found lane change are the same where their middles are this near [s].
+/// Maximum time between the middles of an annotated and a detected lane change that count as the same (s).
 const SAME_S: f64 = 5.0;
 
-/// A step of the offset by more than this is one of the map match, not of the car [m]: two lanes in a second.
+/// Minimum step of the lateral offset that is attributed to the map match instead of the car (m): two lanes in a
+/// second.
 const MAP_JUMP_M: f64 = 5.0;
 
-/// Readings further apart than this are not one track [s].
+/// Maximum time between two position fixes of one track (s).
 const GAP_S: f64 = 2.5;
 
-/// Width of lanes on Dutch motorways [m].
+/// Lane width on Dutch motorways (m).
 const DUTCH_LANE_M: f64 = 3.5;
 
-/// The matched road is taken for the middle of a lane with this many lanes' widths to the left edge of the grid: which lane
-/// it is, the data do not say.
+/// Assumed distance from the matched road to the left edge of the lane grid, in lane widths. The matched road is taken
+/// for the middle of a lane; the data does not say of which one.
 const LANES_TO_THE_LEFT: f64 = 5.5;
 
 fn gps(folder: &Path) {
@@ -190,7 +193,8 @@ fn same(change: &LaneChange, annotated: &Annotated) -> bool {
     change.direction == annotated.direction && (change.midpoint_s - annotated.time_s).abs() <= SAME_S
 }
 
-/// Why lane changes were missed: by how far the recorded position moves from 4 s before to 4 s after the annotation.
+/// Counts why lane changes were missed, by the movement of the recorded position from 4 s before to 4 s after the
+/// annotation.
 fn print_missed(covered: &[&Annotated], found: &[LaneChange], tracks: &[Trajectory]) {
     const AROUND_S: f64 = 4.0;
     let (mut jump, mut against, mut small, mut other) = (0, 0, 0, 0);
@@ -243,7 +247,7 @@ fn fixes(path: &Path) -> Vec<Fix> {
     rows.filter_map(fix).collect()
 }
 
-/// Pieces without gaps and without jumps of the map match. The offset grows to the right.
+/// Splits position fixes into tracks without gaps and without jumps of the map match. The offset grows to the right.
 fn tracks(fixes: &[Fix]) -> Vec<Trajectory> {
     let pieces = fixes.chunk_by(|a, b| {
         b.time_s > a.time_s && b.time_s - a.time_s <= GAP_S && (b.offset_m - a.offset_m).abs() <= MAP_JUMP_M

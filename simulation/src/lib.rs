@@ -1,16 +1,16 @@
-//! One run: a scenario, a seed and an arm go in, an outcome comes out.
+//! Simulates one closed-loop run: a scenario, a seed and an arm (controller and sensors) go in, an outcome comes out.
 //!
 //! ```text
 //!  scenario file ─▶ checked scenario ─▶ [ world ─▶ sensors ─▶ tracks ─▶ command ─▶ world ]* ─▶ outcome
 //! ```
 //!
 //! * [`scenario`]: scenario files, checked into concrete scenarios
-//! * [`controller`]: the controllers that can stand in the ego vehicle, built in or as a process of their own
-//! * [`run`](mod@run): the closed loop, and those who watch it
-//! * [`outcome`]: what a run ends in
+//! * [`controller`]: the controllers that can drive the ego vehicle, built in or as a separate process
+//! * [`run`](mod@run): the closed loop, and the observers of a run
+//! * [`outcome`]: the result of a run
 //!
-//! The outcome follows from the scenario, the seed, the sample and the arm alone, to the last bit. This crate is the only
-//! one that names rapier, inside `world`.
+//! The outcome depends on the scenario, the seed, the sample number and the arm only, down to the last bit. This crate is
+//! the only user of rapier, in its module `world`.
 
 pub mod controller;
 pub mod outcome;

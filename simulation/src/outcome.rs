@@ -1,4 +1,4 @@
-//! What one run ends in: collisions, margins, and what the margin increase system did.
+//! The result of one run: collisions, margins, and what the margin increase system (MIS) did.
 
 use closecall_controllers::Reason;
 use closecall_traffic::geometry::BoxSide;
@@ -17,50 +17,50 @@ pub enum ClosedBy {
     Both,
 }
 
-/// The larger of two, where one that is not a number is the largest of all: it must never look safe.
+/// Returns the larger of two values. NaN counts as larger than every number, so that it never looks safe.
 pub fn worse(one: f64, other: f64) -> f64 {
     if one.is_nan() || one >= other { one } else { other }
 }
 
-/// Part of an encounter with a vehicle that comes up from behind.
+/// Phase of the encounter of the ego with a rear vehicle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Phase {
-    /// It is still far behind, or there is none.
+    /// The rear vehicle is far behind, or there is none.
     #[default]
     Approach,
-    /// It is in E's path at a time headway below [`CRITICAL_THW_S`].
+    /// The rear vehicle follows in the ego's lane at a time headway below [`CRITICAL_THW_S`].
     Critical,
-    /// It has left E's path and is not past E yet.
+    /// The rear vehicle has left the ego's lane and has not passed the ego yet.
     Overtaking,
-    /// It is past.
+    /// The rear vehicle has passed the ego.
     After,
 }
 
-/// Rear time headway below which an encounter is critical [s] (the paper's threshold for THW).
+/// Rear time headway below which an encounter is critical (s) (the paper's threshold for THW).
 pub const CRITICAL_THW_S: f64 = 0.9;
 
-/// Two vehicles touched.
+/// The first contact of two vehicles.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Collision {
-    /// When they first touched.
+    /// Time of the first contact.
     pub time: Time,
-    /// Who, in the order of their names.
+    /// The two vehicles, in the order of their names.
     pub between: [ActorId; 2],
-    /// Which side of each was struck.
+    /// The side of each vehicle that was struck, in the order of `between`.
     pub struck_side: [BoxSide; 2],
-    /// Who closed the gap.
+    /// Which of the two vehicles closed the gap.
     pub closed_by: ClosedBy,
-    /// The part of the encounter it happened in.
+    /// Phase of the encounter in which it happened.
     pub phase: Phase,
-    /// Magnitude of the relative velocity at first touch [m/s].
+    /// Magnitude of the relative velocity at the first contact (m/s).
     pub relative_speed_mps: f64,
-    /// Magnitude of each vehicle's change of velocity through the impact [m/s].
+    /// Magnitude of each vehicle's change of velocity through the impact (m/s), in the order of `between`.
     pub delta_v_mps: [f64; 2],
 }
 
 impl Collision {
-    /// Returns true if `actor` is one of the two vehicles.
+    /// Returns whether `actor` is one of the two vehicles.
     pub fn involves(&self, actor: &ActorId) -> bool {
         self.between.contains(actor)
     }
@@ -72,29 +72,29 @@ impl Collision {
     }
 }
 
-/// A moment of the encounter with a vehicle R that comes up from behind E while E follows F: the paper's figure names
-/// five of them, (a) to (e).
+/// A moment of the encounter in which a rear vehicle R approaches the ego E from behind while the ego follows a lead
+/// vehicle F. The paper's figure names five of them, (a) to (e).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Moment {
-    /// (a) R is within 100 m of E, in E's lane, and approaches at 10 km/h or more.
+    /// (a) The rear vehicle is within 100 m of the ego, in the ego's lane, and approaches at 10 km/h or more.
     RearNear,
-    /// (b) R starts to change lanes in order to overtake.
+    /// (b) The rear vehicle starts to change lanes in order to overtake.
     CutOut,
-    /// (c) R is at the critical distance behind E.
+    /// (c) The rear vehicle is at the critical distance behind the ego.
     CriticalDistance,
-    /// (d) The brake light of F, the vehicle ahead of E, goes on.
+    /// (d) The brake light of the lead vehicle is on.
     FrontBrakes,
-    /// (e) R is past E: it has concluded its overtaking, and E is free to brake.
+    /// (e) The rear vehicle has passed the ego: the overtaking is concluded, and the ego is free to brake.
     Concluded,
 }
 
 impl Moment {
-    /// All of them, in their order.
+    /// All moments, from (a) to (e).
     pub const ALL: [Self; 5] =
         [Self::RearNear, Self::CutOut, Self::CriticalDistance, Self::FrontBrakes, Self::Concluded];
 
-    /// Its letter in the paper's figure.
+    /// Returns the moment's letter in the paper's figure.
     pub const fn letter(self) -> char {
         match self {
             Self::RearNear => 'a',
@@ -105,7 +105,7 @@ impl Moment {
         }
     }
 
-    /// What happens then, as a phrase.
+    /// Returns a short phrase that says what happens.
     pub const fn text(self) -> &'static str {
         match self {
             Self::RearNear => "R comes near",
@@ -117,12 +117,12 @@ impl Moment {
     }
 }
 
-/// A moment with its time.
+/// A moment of the encounter and the time at which it was reached.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MomentAt {
-    /// What happens.
+    /// The moment.
     pub moment: Moment,
-    /// The control step at which it was first so.
+    /// Time of the first control step at which the moment's condition held; the cut-out has the time of a physics step.
     pub time: Time,
 }
 
@@ -130,56 +130,58 @@ pub struct MomentAt {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum EndReason {
-    /// The scenario's duration was over.
+    /// The scenario's duration had passed.
     Duration,
-    /// E and every vehicle near it had come to a stand.
+    /// The ego, its lead vehicle and all vehicles behind it had come to a standstill.
     Standstill,
     /// Two seconds had passed since the first collision.
     Collision,
 }
 
-/// The smallest and largest values of E's margins over a run.
+/// The extreme values of the ego's margins over a run.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Margins {
-    /// Smallest time headway to the vehicle ahead [s].
+    /// Smallest time headway of the ego to the vehicle ahead (s).
     pub min_thw_front_s: Measured,
-    /// Smallest time headway of the vehicle behind to E [s].
+    /// Smallest time headway of the vehicle behind to the ego (s).
     pub min_thw_rear_s: Measured,
-    /// Smallest gap to the vehicle ahead [m].
+    /// Smallest gap to the vehicle ahead (m).
     pub min_gap_front_m: Measured,
-    /// Smallest gap to the vehicle behind [m].
+    /// Smallest gap to the vehicle behind (m).
     pub min_gap_rear_m: Measured,
-    /// Smallest time to collision with the vehicle behind [s].
+    /// Smallest time to collision of the vehicle behind with the ego (s).
     pub min_ttc_rear_s: Measured,
-    /// Largest deceleration of E before any collision of its own [m/s²].
+    /// Largest deceleration of the ego before its first collision (m/s²).
     pub max_deceleration_mps2: f64,
-    /// Largest change of E's acceleration before any collision of its own [m/s³].
+    /// Largest jerk of the ego, as a magnitude, before its first collision (m/s³).
     pub max_jerk_mps3: f64,
-    /// Most by which E was slower than the vehicle ahead, or than at the start where nobody is ahead [m/s]: what a
-    /// margin costs. A controller that brakes without need cannot hide it behind collisions that it avoids.
+    /// Largest amount by which the ego was slower than the vehicle ahead, or than its own speed at the start if there is
+    /// no vehicle ahead (m/s). It is the cost of a margin: it shows unnecessary braking, even if the braking avoids
+    /// collisions.
     pub max_speed_deficit_mps: f64,
 }
 
-/// What the margin increase system did.
+/// What the margin increase system (MIS) did in a run.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MisSummary {
-    /// When it first engaged [s].
+    /// Time of its first engagement (s).
     pub engaged_at_s: Measured,
-    /// When it released after that [s].
+    /// Time of its release after the first engagement (s).
     pub released_at_s: Measured,
-    /// Front time headway at the engagement [s].
+    /// Front time headway of the ego at the engagement (s).
     pub thw_front_at_engagement_s: Measured,
-    /// Front time headway when the vehicle behind was at the critical distance [s].
+    /// Front time headway of the ego when the rear vehicle was at the critical distance (s).
     pub thw_front_at_critical_s: Measured,
-    /// Mean deceleration of E from the engagement to the critical distance, or to the release [m/s²].
+    /// Mean deceleration of the ego from the engagement until the rear vehicle is at the critical distance, or until the
+    /// release (m/s²).
     pub mean_deceleration_mps2: Measured,
-    /// Whether the goal was in reach when it engaged; nothing where it never engaged.
+    /// Whether the planned headway was within reach at the engagement. `None` if it never engaged or stated no plan.
     pub goal_in_reach: Option<bool>,
-    /// Why it engaged, or why it did not at the last control step.
+    /// The reason for the engagement or, if it never engaged, the reason given at the last control step.
     pub reason: Reason,
 }
 
-/// The result of one run. A collision is a result; whatever stops a run from having one is a
+/// The result of one run. A collision is a result, not an error. A run that cannot be completed has no outcome but a
 /// [`SampleError`](crate::SampleError).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
@@ -187,37 +189,37 @@ pub struct Outcome {
     pub scenario: String,
     /// The campaign's seed.
     pub seed: u64,
-    /// The sample's number.
+    /// The sample's number, from 0.
     pub sample: u64,
     /// The ego controller's name.
     pub controller: String,
     /// The ego vehicle's name.
     pub ego: ActorId,
-    /// The sampled values.
+    /// The sampled parameter values.
     pub parameters: Parameters,
     /// Why the run ended.
     pub end: EndReason,
-    /// How long it was.
+    /// Simulated duration of the run.
     pub duration: Time,
-    /// Every first touch of two vehicles, in order of time.
+    /// The first contact of every pair of vehicles that collided, in order of time.
     pub collisions: Vec<Collision>,
-    /// The moments of the encounter that were reached before E collided, in order of time.
+    /// The moments of the encounter that were reached before the ego collided, in order of time.
     #[serde(default)]
     pub moments: Vec<MomentAt>,
-    /// E's margins.
+    /// The extremes of the ego's margins.
     pub margins: Margins,
-    /// What the margin increase system did, where the controller has one.
+    /// What the margin increase system did, or the reason why there is no summary of it.
     pub mis: Result<MisSummary, Absent>,
 }
 
 impl Outcome {
-    /// True where two outcomes are the same to the last bit, signs of zero included.
+    /// Returns whether two outcomes are equal to the last bit, including the signs of zeros.
     pub fn has_same_bits(&self, other: &Self) -> bool {
-        // Floats are written so that they read back exactly: the same text is the same bits.
+        // serde_json writes floats so that they read back exactly, so equal text means equal bits.
         matches!((serde_json::to_string(self), serde_json::to_string(other)), (Ok(one), Ok(two)) if one == two)
     }
 
-    /// When `moment` was, if it was reached.
+    /// Returns the time at which `moment` was reached, or `None` if it was not.
     pub fn moment(&self, moment: Moment) -> Option<Time> {
         self.moments.iter().find(|noted| noted.moment == moment).map(|noted| noted.time)
     }
@@ -232,7 +234,7 @@ impl Outcome {
         self.ego_collisions().filter_map(|collision| collision.delta_v_of(&self.ego)).reduce(worse)
     }
 
-    /// Returns true if the ego itself was in a collision: what gates count.
+    /// Returns whether the ego was part of a collision. Gates count samples for which this holds.
     pub fn ego_collided(&self) -> bool {
         self.ego_collisions().next().is_some()
     }

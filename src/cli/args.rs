@@ -5,35 +5,36 @@ use std::path::Path;
 use clap::{Args, ValueEnum};
 use closecall_scenarios::recordings::{BadRows, LayoutChoice, ReadOptions};
 use closecall_sensors::SensorMode;
-
-use super::CliError;
 use closecall_simulation::Arm;
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::controller::exec::{DEFAULT_MEMORY_MIB, DEFAULT_TIMEOUT_MS, ExecSettings, NAME as EXEC};
 use closecall_simulation::scenario::{ScenarioError, ScenarioFile, Setting};
 
-/// For whom output is written.
+use super::CliError;
+use super::output::print_error;
+
+/// The format of the output.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub(super) enum Format {
-    /// For people
+    /// Text for human readers
     #[default]
     Human,
-    /// For programs: one JSON value, documented and stable
+    /// One JSON value for programs; its keys are documented and stable
     Json,
 }
 
-/// How much of the sensors is simulated.
+/// The depth of the sensor simulation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(super) enum Sensing {
-    /// Point cloud, clustering, tracking
+pub(super) enum SensorsChoice {
+    /// Point clouds, images, clustering, classification and tracking
     Full,
-    /// Objects with range, noise, delay
+    /// Object lists with limited range, noise and delay
     Object,
-    /// Perfect tracks
+    /// Tracks without any error
     GroundTruth,
 }
 
-impl Sensing {
+impl SensorsChoice {
     pub(super) const fn mode(self) -> SensorMode {
         match self {
             Self::Full => SensorMode::Full,
@@ -43,22 +44,23 @@ impl Sensing {
     }
 }
 
-/// Which controller is under test.
+/// The controller under test.
 #[derive(Clone, Debug, Args)]
 pub(super) struct ControllerArgs {
-    /// Controller of the ego vehicle: acc, mis, or exec:COMMAND, a process of your own that reads and answers lines
+    /// Controller of the ego vehicle: `acc`, `mis`, or `exec:COMMAND` for a program of your own, which reads a line per
+    /// control step and answers with a line
     #[arg(long, value_name = "acc|mis|exec:COMMAND", default_value = "mis", value_parser = controller)]
     controller: ControllerChoice,
-    /// With exec: time allowed for each answer [default: 1000]
+    /// Time limit for each answer of an `exec` controller [default: 1000]
     #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u64).range(1..=600_000))]
     controller_timeout_ms: Option<u64>,
-    /// With exec: memory allowed to each process [default: 1024]
+    /// Memory limit of each process of an `exec` controller [default: 1024]
     #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1_048_576))]
     controller_memory_mib: Option<u64>,
 }
 
 impl ControllerArgs {
-    /// The controller with what is allowed to it.
+    /// Returns the controller with its limits.
     pub(super) fn choice(&self) -> Result<ControllerChoice, CliError> {
         let (timeout_ms, memory_mib) = (self.controller_timeout_ms, self.controller_memory_mib);
         match &self.controller {
@@ -67,18 +69,18 @@ impl ControllerArgs {
                 memory_mib: memory_mib.unwrap_or(exec.memory_mib),
                 ..exec.clone()
             })),
-            own if timeout_ms.is_none() && memory_mib.is_none() => Ok(own.clone()),
-            own => Err(CliError::Usage {
+            built_in if timeout_ms.is_none() && memory_mib.is_none() => Ok(built_in.clone()),
+            built_in => Err(CliError::Usage {
                 message: format!(
-                    "--controller-timeout-ms and --controller-memory-mib bound a process, and `{own}` is none: name one \
-                     with --controller exec:COMMAND"
+                    "--controller-timeout-ms and --controller-memory-mib apply to a process, and `{built_in}` is built in: \
+                     name a process with --controller exec:COMMAND"
                 ),
             }),
         }
     }
 }
 
-/// Reads the name of a controller.
+/// Parses the name of a controller.
 fn controller(text: &str) -> Result<ControllerChoice, String> {
     match text.split_once(':') {
         None if text == ControllerChoice::Acc.name() => Ok(ControllerChoice::Acc),
@@ -88,21 +90,21 @@ fn controller(text: &str) -> Result<ControllerChoice, String> {
             let exec = ExecSettings { command: command.to_owned(), timeout_ms, memory_mib };
             match exec.words() {
                 Some(_) => Ok(ControllerChoice::Exec(exec)),
-                None => Err(format!("`{command}` is no command: its quotes do not match, or it is empty")),
+                None => Err(format!("`{command}` is not a command: it is empty, or its quotes do not match")),
             }
         }
-        _ => Err(format!("`{text}` is no controller: there are acc, mis and exec:COMMAND")),
+        _ => Err(format!("`{text}` is not a controller: expected acc, mis or exec:COMMAND")),
     }
 }
 
-/// Who controls E, and what it perceives with.
+/// The controller of the ego vehicle, and its sensors.
 #[derive(Clone, Debug, Args)]
 pub(super) struct ArmArgs {
     #[command(flatten)]
     pub(super) controller: ControllerArgs,
-    /// Depth of the sensor simulation; the scenario's own where absent
+    /// Depth of the sensor simulation [default: that of the scenario]
     #[arg(long, value_enum)]
-    pub(super) sensors: Option<Sensing>,
+    pub(super) sensors: Option<SensorsChoice>,
 }
 
 impl ArmArgs {
@@ -110,14 +112,14 @@ impl ArmArgs {
         Ok(arm(&self.controller.choice()?, self.sensors))
     }
 
-    /// This arm alone; of a pair, the baseline before it.
+    /// Returns this arm; if `paired`, the baseline before it.
     pub(super) fn arms(&self, paired: bool) -> Result<Vec<Arm>, CliError> {
         let controllers = controllers(self.controller.choice()?, paired)?;
         Ok(controllers.iter().map(|controller| arm(controller, self.sensors)).collect())
     }
 }
 
-/// The controllers of a run: the tested one, of a pair after the baseline.
+/// Returns the controllers of a run: the tested one; if `paired`, the baseline before it.
 pub(super) fn controllers(tested: ControllerChoice, paired: bool) -> Result<Vec<ControllerChoice>, CliError> {
     match (paired, tested) {
         (false, tested) => Ok(vec![tested]),
@@ -128,39 +130,39 @@ pub(super) fn controllers(tested: ControllerChoice, paired: bool) -> Result<Vec<
     }
 }
 
-/// An arm of a controller.
-pub(super) fn arm(controller: &ControllerChoice, sensors: Option<Sensing>) -> Arm {
-    Arm { controller: controller.factory(), sensors: sensors.map(Sensing::mode) }
+/// Returns the arm of a controller.
+pub(super) fn arm(controller: &ControllerChoice, sensors: Option<SensorsChoice>) -> Arm {
+    Arm { controller: controller.factory(), sensors: sensors.map(SensorsChoice::mode) }
 }
 
-/// The layout of a recording.
+/// The layout of a trajectory file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum Layout {
-    /// NGSIM's columns in feet
+    /// NGSIM: the columns of the data set, in feet
     Ngsim,
-    /// highD's or exiD's three files
+    /// highD or exiD: three files
     Highd,
     /// CommonRoad XML
     Commonroad,
-    /// The plain CSV that `closecall record` writes
+    /// Plain CSV, as `closecall record` writes it
     Csv,
-    /// A log of one vehicle that sees the lane markings
+    /// Log of a vehicle that measures its distances to the lane markings
     InCar,
 }
 
-/// How a recording is read.
+/// How a trajectory file is read.
 #[derive(Clone, Copy, Debug, Args)]
 pub(super) struct ReadArgs {
-    /// Layout of the recording; told by its content where absent
+    /// Layout of the trajectory file [default: recognised by its content]
     #[arg(long, value_enum)]
     layout: Option<Layout>,
-    /// Leave out rows that cannot be used, and count them, instead of refusing the recording
+    /// Skip and count rows that cannot be used, instead of refusing the file
     #[arg(long)]
     drop_bad_rows: bool,
 }
 
 impl ReadArgs {
-    /// True where rows that cannot be used are left out.
+    /// Returns true if rows that cannot be used are skipped.
     pub(super) fn drops_bad_rows(&self) -> bool {
         self.drop_bad_rows
     }
@@ -177,22 +179,22 @@ impl ReadArgs {
     }
 }
 
-/// Changes of single values.
+/// Changes of single values of a scenario.
 #[derive(Clone, Debug, Args)]
 pub(super) struct SetArgs {
-    /// Change a value of the scenario: a path of keys (`actor.rear.start.behind.gap-m=90`), or a parameter's name
-    /// (`brake-mps2=6`); may be given more than once
+    /// Change a value of the scenario, named by a path of keys (`actor.rear.start.behind.gap-m=90`) or by a parameter
+    /// (`brake-mps2=6`); can be given more than once
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub(super) settings: Vec<Setting>,
 }
 
 impl SetArgs {
-    /// Reads a scenario with these changes, and checks it.
+    /// Reads a scenario, applies the changes, and checks it.
     pub(super) fn load(&self, path: &Path) -> Result<ScenarioFile, ScenarioError> {
         let file = ScenarioFile::load(path, &self.settings)?;
         for name in file.unused_parameters() {
-            super::output::complain(format_args!(
-                "warning: {}: the parameter `{name}` is sampled but used nowhere: write \"${name}\" where its value \
+            print_error(format_args!(
+                "warning: {}: the parameter `{name}` is sampled, but not used: write \"${name}\" where its value \
                  belongs, or remove it\n",
                 path.display()
             ));
@@ -202,7 +204,7 @@ impl SetArgs {
     }
 }
 
-/// A finite number above 0.
+/// Parses a finite number above 0.
 pub(super) fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value > 0.0 && value.is_finite() => Ok(value),

@@ -1,14 +1,14 @@
-//! `closecall check` and `closecall schema`: scenario files without running them.
+//! `closecall check` and `closecall schema`: check and describe scenario files without running them.
 
 use std::path::PathBuf;
 
 use clap::Args;
+use closecall_simulation::scenario::ScenarioConfig;
 
 use super::CliError;
 use super::args::SetArgs;
-use super::output::{complain, outln};
+use super::output::{outln, print_error};
 use crate::exit_code::ExitCode;
-use closecall_simulation::scenario::ScenarioConfig;
 
 /// Arguments of `closecall check`.
 #[derive(Debug, Args)]
@@ -30,7 +30,7 @@ pub(super) fn check(args: &CheckArgs) -> Result<ExitCode, CliError> {
             }
             Err(error) => {
                 codes.push(ExitCode::from(&error));
-                complain(format_args!("{:?}\n", miette::Report::new(CliError::from(error))));
+                print_error(format_args!("{:?}\n", miette::Report::new(CliError::from(error))));
             }
         }
     }

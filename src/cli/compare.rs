@@ -1,41 +1,41 @@
-//! `closecall compare`: a campaign against an earlier one.
+//! `closecall compare`: compares a campaign with an earlier one.
 
 use std::path::PathBuf;
 
 use clap::Args;
+use closecall_campaign::compare::{Means, ScenarioComparison, compare as compare_folders};
+use closecall_campaign::folder::Folder;
 use serde_json::{Map, Value, json};
 
 use super::CliError;
 use super::args::Format;
 use super::output::{out, outln};
 use crate::exit_code::ExitCode;
-use closecall_campaign::compare::{ScenarioComparison, compare as compare_folders};
-use closecall_campaign::folder::Folder;
 
 /// Arguments of `closecall compare`.
 #[derive(Debug, Args)]
 pub(super) struct CompareArgs {
     /// Folder of the earlier campaign
     baseline: PathBuf,
-    /// Folder of the campaign to be judged, of the same samples
+    /// Folder of the campaign to be judged; it must have the same samples
     dir: PathBuf,
-    /// Newly failing samples that are no regression
+    /// Largest number of newly failing samples that does not count as a regression
     #[arg(long, default_value_t = 0, value_name = "K")]
     max_newly_failing: u64,
-    /// Output for people or for programs
+    /// Output format
     #[arg(long, value_enum, default_value_t)]
     format: Format,
 }
 
 pub(super) fn compare(args: &CompareArgs) -> Result<ExitCode, CliError> {
-    let (baseline, now) = (Folder::open(&args.baseline), Folder::open(&args.dir));
-    let manifests = (baseline.manifest()?, now.manifest()?);
-    let notes = manifests.0.differences(&manifests.1);
-    let found = compare_folders(&baseline, &now)?;
+    let (baseline, current) = (Folder::open(&args.baseline), Folder::open(&args.dir));
+    let (baseline_manifest, current_manifest) = (baseline.manifest()?, current.manifest()?);
+    let differences = baseline_manifest.differences(&current_manifest);
+    let found = compare_folders(&baseline, &current)?;
     let code = judge(&found, args.max_newly_failing);
     match args.format {
-        Format::Json => outln!("{:#}", to_json(&found, &notes, code)),
-        Format::Human => print(&found, &notes, code),
+        Format::Json => outln!("{:#}", to_json(&found, &differences, code)),
+        Format::Human => print(&found, &differences, code),
     }
     Ok(code)
 }
@@ -48,7 +48,7 @@ fn judge(found: &[ScenarioComparison], max_newly_failing: u64) -> ExitCode {
     ExitCode::first_of(codes.into_iter().filter(|(holds, _)| *holds).map(|(_, code)| code))
 }
 
-fn word(code: ExitCode) -> &'static str {
+fn verdict(code: ExitCode) -> &'static str {
     match code {
         ExitCode::Pass => "NO REGRESSION",
         ExitCode::SampleError => "NEW ERRORS",
@@ -56,20 +56,20 @@ fn word(code: ExitCode) -> &'static str {
     }
 }
 
-/// Numbers of samples that are listed for people.
-const LISTED: usize = 12;
+/// Largest number of samples that the text output lists.
+const MAX_LISTED: usize = 12;
 
 fn listed(samples: &[u64]) -> String {
-    let mut text: Vec<String> = samples.iter().take(LISTED).map(u64::to_string).collect();
-    if samples.len() > LISTED {
-        text.push(format!("… {} more", samples.len() - LISTED));
+    let mut text: Vec<String> = samples.iter().take(MAX_LISTED).map(u64::to_string).collect();
+    if samples.len() > MAX_LISTED {
+        text.push(format!("… {} more", samples.len() - MAX_LISTED));
     }
     if text.is_empty() { String::new() } else { format!(": {}", text.join(", ")) }
 }
 
-fn print(found: &[ScenarioComparison], notes: &[String], code: ExitCode) {
-    for note in notes {
-        outln!("differs: {note}");
+fn print(found: &[ScenarioComparison], differences: &[String], code: ExitCode) {
+    for difference in differences {
+        outln!("differs: {difference}");
     }
     for scenario in found {
         outln!("{}: {} samples, {} the same to the last bit", scenario.scenario, scenario.samples, scenario.same);
@@ -80,35 +80,36 @@ fn print(found: &[ScenarioComparison], notes: &[String], code: ExitCode) {
             outln!("  {:>6} newly in error{}", scenario.newly_in_error.len(), listed(&scenario.newly_in_error));
         }
         if !scenario.no_longer_in_error.is_empty() {
-            let gone = &scenario.no_longer_in_error;
-            outln!("  {:>6} no longer in error{}", gone.len(), listed(gone));
+            let fixed = &scenario.no_longer_in_error;
+            outln!("  {:>6} no longer in error{}", fixed.len(), listed(fixed));
         }
-        for moved in &scenario.margins {
-            let Some([before, now]) = moved.means() else { continue };
-            out!("  {:<16} mean {before:.3}, now {now:.3} ({:+.3})", moved.key, now - before);
-            if let Some((sample, change)) = moved.worst {
-                out!("; sample {sample} lost most ({change:+.3})");
+        for margin in &scenario.margins {
+            let Some(Means { baseline, current }) = margin.means() else { continue };
+            out!("  {:<16} mean {baseline:.3}, now {current:.3} ({:+.3})", margin.key, current - baseline);
+            if let Some(worst) = margin.worst {
+                out!("; sample {} lost most ({:+.3})", worst.sample, worst.change);
             }
             outln!();
         }
     }
-    outln!("{}", word(code));
+    outln!("{}", verdict(code));
 }
 
-fn to_json(found: &[ScenarioComparison], notes: &[String], code: ExitCode) -> Value {
+fn to_json(found: &[ScenarioComparison], differences: &[String], code: ExitCode) -> Value {
     let scenario = |scenario: &ScenarioComparison| {
         let margins: Map<String, Value> = scenario
             .margins
             .iter()
-            .map(|moved| {
-                let means = moved.means();
-                let of = |place: usize| means.map(|means| means[place]);
-                let (sample, change) = (moved.worst.map(|worst| worst.0), moved.worst.map(|worst| worst.1));
+            .map(|margin| {
+                let means = margin.means();
                 let value = json!({
-                    "samples": moved.samples, "mean_baseline": of(0), "mean": of(1),
-                    "worst_sample": sample, "worst_change": change,
+                    "samples": margin.samples,
+                    "mean_baseline": means.map(|means| means.baseline),
+                    "mean": means.map(|means| means.current),
+                    "worst_sample": margin.worst.map(|worst| worst.sample),
+                    "worst_change": margin.worst.map(|worst| worst.change),
                 });
-                (moved.key.to_owned(), value)
+                (margin.key.to_owned(), value)
             })
             .collect();
         let object = json!({
@@ -125,7 +126,7 @@ fn to_json(found: &[ScenarioComparison], notes: &[String], code: ExitCode) -> Va
     };
     json!({
         "verdict": if code == ExitCode::Pass { "PASS" } else { "FAIL" },
-        "differences": notes,
+        "differences": differences,
         "scenarios": found.iter().map(scenario).collect::<Map<String, Value>>(),
     })
 }

@@ -1,13 +1,5 @@
-//! Whatever keeps a command from its result, and what the program then ends with.
+//! The errors of the commands, and the exit code of each.
 
-use closecall_scenarios::encounter::NoEncounter;
-use closecall_scenarios::lane_change::ReferenceError;
-use closecall_scenarios::recordings::{RecordingError, WriteError as RecordingWriteError};
-use closecall_sensors::camera::ClassifierError;
-use closecall_sensors::camera::dataset::DatasetError;
-use miette::Diagnostic;
-
-use crate::exit_code::ExitCode;
 use closecall_campaign::compare::CompareError;
 use closecall_campaign::execution::CampaignError;
 use closecall_campaign::folder::FolderError;
@@ -20,25 +12,33 @@ use closecall_report::run::film::TrafficFilmError;
 use closecall_report::run::rerun::RecordError;
 use closecall_report::traffic::recording_charts::ChartError;
 use closecall_scenarios::atomic::WriteError;
+use closecall_scenarios::encounter::NoEncounter;
+use closecall_scenarios::lane_change::ReferenceError;
+use closecall_scenarios::recordings::{RecordingError, WriteError as RecordingWriteError};
+use closecall_sensors::camera::ClassifierError;
+use closecall_sensors::camera::dataset::DatasetError;
 use closecall_simulation::SampleError;
 use closecall_simulation::scenario::ScenarioError;
+use miette::Diagnostic;
 
-/// Of the tracks that could be asked for, so many are named.
-const MOST_NAMED: usize = 10;
+use crate::exit_code::ExitCode;
 
-/// A command that has no result.
+/// Largest number of tracks that a message suggests.
+const MAX_SUGGESTED: usize = 10;
+
+/// The reason for which a command has no result.
 #[derive(Debug, thiserror::Error, Diagnostic)]
 pub enum CliError {
     /// A scenario cannot be used.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
-    /// A recording cannot be used.
+    /// A trajectory file cannot be used.
     #[error(transparent)]
     Recording(#[from] RecordingError),
     /// A list of known lane changes cannot be used.
     #[error("failed to use the list of lane changes {0}")]
     Reference(#[from] ReferenceError),
-    /// A recording cannot be written.
+    /// A trajectory file cannot be written.
     #[error(transparent)]
     WriteRecording(#[from] RecordingWriteError),
     /// A campaign's folder cannot be used.
@@ -50,7 +50,7 @@ pub enum CliError {
     /// A chart cannot be drawn.
     #[error(transparent)]
     Chart(#[from] ChartError),
-    /// A Rerun file cannot be written.
+    /// A recording (Rerun file) cannot be written.
     #[error(transparent)]
     Record(#[from] RecordError),
     /// A figure cannot be drawn.
@@ -59,52 +59,52 @@ pub enum CliError {
     /// A recorded lane change cannot be shown.
     #[error(transparent)]
     TrafficFilm(#[from] TrafficFilmError),
-    /// A recorded lane change is no encounter.
-    #[error("failed to re-enact an encounter of {file}: {source}{}", others(possible))]
+    /// A recorded lane change is not an encounter that can be re-enacted.
+    #[error("failed to re-enact an encounter of {file}: {source}{}", suggestion(possible))]
     NoEncounter {
-        /// The recording's file.
+        /// The trajectory file.
         file: String,
-        /// Why.
+        /// The condition that is not met.
         source: NoEncounter,
-        /// The tracks of the recording that can be re-enacted.
+        /// The tracks of the file that can be re-enacted.
         possible: Vec<u64>,
     },
-    /// A set of pictures cannot be written.
+    /// A set of rendered images cannot be written.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
-    /// The inference backend that was asked for cannot be used.
+    /// The requested inference backend cannot be used.
     #[error(transparent)]
     Classifier(#[from] ClassifierError),
-    /// A run has no outcome.
+    /// A sample has no outcome.
     #[error("failed to run sample {sample}: {source}")]
     Sample {
         /// The sample.
         sample: u64,
-        /// Why.
+        /// The reason.
         source: SampleError,
     },
-    /// The command line asks for something that does not exist.
+    /// The arguments are wrong in a way that clap does not detect.
     #[error("{message}")]
     #[diagnostic(help("see `closecall --help`"))]
     Usage {
         /// What is wrong, and what is allowed.
         message: String,
     },
-    /// A campaign could not be carried on.
+    /// A campaign has ended early.
     #[error(transparent)]
     Campaign(#[from] CampaignError),
-    /// Parts do not make a campaign.
+    /// The parts of a campaign cannot be merged.
     #[error(transparent)]
     Merge(#[from] MergeError),
-    /// The scenarios cannot stand in one campaign.
+    /// The scenarios cannot form a campaign.
     #[error(transparent)]
     #[diagnostic(help("see `closecall --help`"))]
     Plan(#[from] PlanError),
-    /// A saved campaign does not have what is asked for.
+    /// A saved campaign cannot provide what was requested.
     #[error(transparent)]
     #[diagnostic(help("see `closecall --help`"))]
     Saved(#[from] SavedError),
-    /// The reports of a campaign cannot be made.
+    /// The reports of a campaign cannot be written.
     #[error(transparent)]
     Report(#[from] ReportError),
     /// Two campaigns cannot be compared.
@@ -112,12 +112,14 @@ pub enum CliError {
     Compare(#[from] CompareError),
 }
 
-/// What else could be asked for with `--track`.
-fn others(possible: &[u64]) -> String {
-    let named: Vec<String> = possible.iter().take(MOST_NAMED).map(u64::to_string).collect();
+/// Returns the tracks that `--track` can name, as the end of a message.
+fn suggestion(possible: &[u64]) -> String {
+    let named: Vec<String> = possible.iter().take(MAX_SUGGESTED).map(u64::to_string).collect();
     match possible.len() {
         0 => String::new(),
-        count if count > MOST_NAMED => format!("; --track can name {count} others, such as {}", named.join(", ")),
+        count if count > MAX_SUGGESTED => {
+            format!("; --track can name {count} other tracks, such as {}", named.join(", "))
+        }
         _ => format!("; --track can name {}", named.join(", ")),
     }
 }
@@ -144,10 +146,10 @@ impl From<&CliError> for ExitCode {
             },
             CliError::Merge(error) => match error {
                 MergeError::Campaign(error) => Self::from(error),
-                MergeError::OutOfPlace { .. } => Self::InvalidInput,
+                MergeError::OutOfOrder { .. } => Self::InvalidInput,
                 MergeError::NotAPart { .. }
-                | MergeError::Foreign { .. }
-                | MergeError::Twice { .. }
+                | MergeError::OtherCampaign { .. }
+                | MergeError::Duplicate { .. }
                 | MergeError::Missing { .. }
                 | MergeError::Incomplete { .. } => Self::Usage,
             },

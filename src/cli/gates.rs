@@ -1,57 +1,60 @@
-//! What a campaign is judged by, on the command line.
+//! The gates by which a campaign is judged, on the command line.
 
 use clap::Args;
+use closecall_campaign::probability::ProbabilityGate;
+use closecall_campaign::verdict::{Gates, MAX_FLIP_RATE};
 use closecall_scenarios::sampling::Design;
 
 use super::CliError;
-use closecall_campaign::probability::ProbabilityGate;
-use closecall_campaign::verdict::{Gates, MAX_FLIP_RATE};
+use super::args::positive;
 
-/// The confidence of the gate on the probability, where nobody says otherwise.
+/// Default confidence of the gate on the probability.
 const CONFIDENCE: f64 = 0.95;
 
 /// The gates of a campaign.
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Gates")]
 pub(super) struct GateArgs {
-    /// Fail where E collides in more samples than this
+    /// Fail if the ego collides in more than K samples
     #[arg(long, value_name = "K")]
     max_collisions: Option<u64>,
-    /// Pass only where the probability of a collision of E is surely no higher than this, in every scenario; 4
-    /// (inconclusive) where the samples do not say
+    /// Pass only if the samples show, for every scenario, that the probability of a collision of the ego is at most P.
+    /// The verdict is inconclusive if they show neither that nor the opposite
     #[arg(long, value_name = "P", value_parser = probability)]
     pub(super) max_probability: Option<f64>,
-    /// With --max-probability: how sure one wants to be, above 0.5 and below 1 [default: 0.95]
+    /// Confidence with which --max-probability is to be shown, above 0.5 and below 1 [default: 0.95]
     #[arg(long, value_name = "C", value_parser = confidence, requires = "max_probability")]
     confidence: Option<f64>,
-    /// In paired campaigns: fail where more collisions than this happen only with the controller under test
+    /// Fail if the ego collides in more than K samples in which it does not collide with the baseline; needs --paired
     #[arg(long, value_name = "K")]
     pub(super) max_induced: Option<u64>,
-    /// Fail where the system engages in a larger share of the samples of any scenario, 0 to 1
+    /// Fail if the margin increase system engages in a larger share (0 to 1) of the samples of any scenario
     #[arg(long, value_name = "SHARE", value_parser = share)]
     max_engagement_rate: Option<f64>,
-    /// Fail where E falls by more than this below the speed of the vehicle ahead, in any sample
-    #[arg(long, value_name = "M/S", value_parser = super::args::positive)]
+    /// Fail if the ego is slower than the lead vehicle by more than this, in any sample
+    #[arg(long, value_name = "M/S", value_parser = positive)]
     max_speed_deficit_mps: Option<f64>,
-    /// Fail where E's acceleration changes faster than this before any collision, in any sample
-    #[arg(long, value_name = "M/S³", alias = "max-jerk-mps3", value_parser = super::args::positive)]
+    /// Fail if the ego's jerk exceeds this in any sample, before a collision of its own
+    #[arg(long, value_name = "M/S³", alias = "max-jerk-mps3", value_parser = positive)]
     max_jerk: Option<f64>,
-    /// The campaign is invalid where more of its checked verdicts flip at half the time step, 0 to 1
+    /// Declare the campaign invalid if a larger share (0 to 1) of its checked verdicts flips at half the time step
     #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = MAX_FLIP_RATE)]
     max_flip_rate: f64,
 }
 
 impl GateArgs {
-    /// The gates, for a campaign with or without a baseline whose samples are laid out by `design`.
+    /// Returns the gates. `is_paired` says whether the campaign has a baseline, `design` is its sampling design.
     pub(super) fn gates(&self, is_paired: bool, design: Design) -> Result<Gates, CliError> {
         if self.max_probability.is_some() && design != Design::Random {
             let message = format!(
-                "--max-probability needs independent samples, which --design {design} does not give: use --design random"
+                "--max-probability needs independent samples, and those of --design {design} are not: use --design random"
             );
             return Err(CliError::Usage { message });
         }
         if self.max_induced.is_some() && !is_paired {
-            let message = "--max-induced needs --paired: induced collisions are known only of pairs".to_owned();
+            let message =
+                "--max-induced needs --paired: without a baseline it is not known which collisions are induced"
+                    .to_owned();
             return Err(CliError::Usage { message });
         }
         Ok(Gates {
@@ -65,7 +68,7 @@ impl GateArgs {
         })
     }
 
-    /// The gate on the probability.
+    /// Returns the gate on the probability of a collision.
     pub(super) fn probability(&self) -> Result<Option<ProbabilityGate>, CliError> {
         let gate = |max| ProbabilityGate::new(max, self.confidence.unwrap_or(CONFIDENCE));
         let usage = |error| CliError::Usage { message: format!("--max-probability: {error}") };
@@ -73,12 +76,12 @@ impl GateArgs {
     }
 }
 
-/// A probability that could be shown: above 0 and below 1.
+/// Parses a probability, above 0 and below 1: 0 and 1 cannot be shown by samples.
 fn probability(text: &str) -> Result<f64, String> {
     between(text, 0.0, "above 0 and below 1")
 }
 
-/// A confidence: above one half and below 1.
+/// Parses a confidence, above 0.5 and below 1.
 fn confidence(text: &str) -> Result<f64, String> {
     between(text, 0.5, "above 0.5 and below 1")
 }
@@ -90,7 +93,7 @@ fn between(text: &str, low: f64, allowed: &str) -> Result<f64, String> {
     }
 }
 
-/// A share: 0 to 1.
+/// Parses a share, 0 to 1.
 pub(super) fn share(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if (0.0..=1.0).contains(&value) => Ok(value),

@@ -1,4 +1,4 @@
-//! `closecall inspect`: how far a recording can be trusted.
+//! `closecall inspect`: reports the flaws of a trajectory file.
 
 use std::path::PathBuf;
 
@@ -8,24 +8,26 @@ use serde_json::{Value, json};
 
 use super::CliError;
 use super::args::{Format, ReadArgs};
-use super::output::{complain, outln};
+use super::output::{outln, print_error};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall inspect`.
 #[derive(Debug, Args)]
 pub(super) struct InspectArgs {
-    /// Recording
-    recording: PathBuf,
+    /// Trajectory file
+    #[arg(value_name = "TRAJECTORY_FILE")]
+    file: PathBuf,
     #[command(flatten)]
     read: ReadArgs,
-    /// Output for people or for programs
+    /// Output format
     #[arg(long, value_enum, default_value_t)]
     format: Format,
 }
 
-/// Tells the flaws of a recording. One whose rows cannot all be used ends with the code that other commands would.
+/// Prints the flaws of a trajectory file. If some rows cannot be used, the exit code is that with which other commands
+/// refuse the file.
 pub(super) fn inspect(args: &InspectArgs) -> Result<ExitCode, CliError> {
-    let mut tracks = open(&args.recording, ReadOptions { bad_rows: BadRows::Drop, ..args.read.options() })?;
+    let mut tracks = open(&args.file, ReadOptions { bad_rows: BadRows::Drop, ..args.read.options() })?;
     let mut inspector = Inspector::default();
     while let Some(track) = tracks.next_track()? {
         inspector.add(&track);
@@ -42,8 +44,8 @@ pub(super) fn inspect(args: &InspectArgs) -> Result<ExitCode, CliError> {
     let first = dropped.reasons().filter_map(|(_, rows)| Some((rows.first_line?, &rows.first))).min();
     let first = first.map(|(line, what)| format!(", line {line}: {what}")).unwrap_or_default();
     let count = dropped.count();
-    complain(format_args!(
-        "{path}{first}\n{count} rows cannot be used: other commands refuse the recording, but with --drop-bad-rows\n"
+    print_error(format_args!(
+        "{path}{first}\n{count} rows cannot be used: other commands refuse the file unless --drop-bad-rows is given\n"
     ));
     Ok(ExitCode::InvalidInput)
 }
@@ -82,18 +84,21 @@ fn print(tracks: &Tracks<'_>, inspector: &Inspector) {
     for (name, flaw) in inspector.flaws().named() {
         match &flaw.first {
             None => outln!("  {:>8}  {name}", flaw.count),
-            Some(place) => {
-                let line = place.line.map(|line| format!("line {line}, ")).unwrap_or_default();
-                let (track, time_s, what) = (place.track_id, place.time_s, &place.what);
+            Some(first) => {
+                let line = first.line.map(|line| format!("line {line}, ")).unwrap_or_default();
+                let (track, time_s, what) = (first.track_id, first.time_s, &first.what);
                 outln!("  {:>8}  {name}; first: {line}track {track} at {time_s:.2} s: {what}", flaw.count);
             }
         }
     }
     if inspector.unchecked_instants() > 0 {
-        outln!("  overlaps were not looked for at {} instants that came too late", inspector.unchecked_instants());
+        outln!(
+            "  overlaps were not checked at {} instants: the other vehicles of those times were no longer in memory",
+            inspector.unchecked_instants()
+        );
     }
     for (reason, rows) in tracks.dropped().reasons() {
         let line = rows.first_line.map(|line| format!("line {line}: ")).unwrap_or_default();
-        outln!("  {:>8}  left out: {reason}; first: {line}{}", rows.count, rows.first);
+        outln!("  {:>8}  skipped: {reason}; first: {line}{}", rows.count, rows.first);
     }
 }

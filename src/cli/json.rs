@@ -1,7 +1,4 @@
-//! Results as JSON with stable keys. A value that does not exist is `null`, with its reason beside it.
-
-use closecall_traffic::{Absent, Measured, Value as ParameterValue};
-use serde_json::{Map, Value, json};
+//! Results as JSON with stable keys. An absent value is `null`, and the key `…_absent` beside it states the reason.
 
 use closecall_campaign::harm;
 use closecall_campaign::ledger::{Inference, Pairs};
@@ -10,9 +7,11 @@ use closecall_campaign::validity::CheckCounts;
 use closecall_campaign::verdict::Judgement;
 use closecall_report::run::film::Course;
 use closecall_simulation::outcome::{Collision, Margins, MisSummary, MomentAt, Outcome};
+use closecall_traffic::{Absent, Measured, Value as ParameterValue};
+use serde_json::{Map, Value, json};
 
-/// Puts a value or its absence under `key`.
-pub(super) fn put(object: &mut Map<String, Value>, key: &str, measured: Measured) {
+/// Inserts a value under `key`, or `null` and the reason for which it is absent.
+fn insert(object: &mut Map<String, Value>, key: &str, measured: Measured) {
     match measured {
         Ok(value) => {
             object.insert(key.to_owned(), json!(value));
@@ -24,7 +23,7 @@ pub(super) fn put(object: &mut Map<String, Value>, key: &str, measured: Measured
     }
 }
 
-/// The object of `run --format json`.
+/// Returns the object of `run --format json`.
 pub(super) fn outcome(outcome: &Outcome) -> Value {
     json!({
         "scenario": outcome.scenario,
@@ -41,15 +40,15 @@ pub(super) fn outcome(outcome: &Outcome) -> Value {
     })
 }
 
-/// How close an encounter was, recorded or simulated.
+/// Returns the margins of an encounter, recorded or simulated.
 pub(super) fn course(course: &Course) -> Value {
     let mut object = Map::new();
-    put(&mut object, "crossing_s", course.crossing_s);
-    put(&mut object, "thw_front_at_crossing_s", course.thw_front_at_crossing_s);
-    put(&mut object, "thw_rear_at_crossing_s", course.thw_rear_at_crossing_s);
-    put(&mut object, "min_thw_front_s", course.min_thw_front_s);
-    put(&mut object, "min_thw_rear_s", course.min_thw_rear_s);
-    put(&mut object, "max_deceleration_mps2", Ok(course.max_deceleration_mps2));
+    insert(&mut object, "crossing_s", course.crossing_s);
+    insert(&mut object, "thw_front_at_crossing_s", course.thw_front_at_crossing_s);
+    insert(&mut object, "thw_rear_at_crossing_s", course.thw_rear_at_crossing_s);
+    insert(&mut object, "min_thw_front_s", course.min_thw_front_s);
+    insert(&mut object, "min_thw_rear_s", course.min_thw_rear_s);
+    insert(&mut object, "max_deceleration_mps2", Ok(course.max_deceleration_mps2));
     Value::Object(object)
 }
 
@@ -74,38 +73,38 @@ fn collision(collision: &Collision) -> Value {
     })
 }
 
-fn moment(noted: &MomentAt) -> Value {
-    json!({ "moment": noted.moment, "letter": noted.moment.letter(), "time_s": noted.time.s() })
+fn moment(at: &MomentAt) -> Value {
+    json!({ "moment": at.moment, "letter": at.moment.letter(), "time_s": at.time.s() })
 }
 
 fn margins(margins: &Margins) -> Value {
     let mut object = Map::new();
-    put(&mut object, "min_thw_front_s", margins.min_thw_front_s);
-    put(&mut object, "min_thw_rear_s", margins.min_thw_rear_s);
-    put(&mut object, "min_gap_front_m", margins.min_gap_front_m);
-    put(&mut object, "min_gap_rear_m", margins.min_gap_rear_m);
-    put(&mut object, "min_ttc_rear_s", margins.min_ttc_rear_s);
-    put(&mut object, "max_deceleration_mps2", Ok(margins.max_deceleration_mps2));
-    put(&mut object, "max_jerk_mps3", Ok(margins.max_jerk_mps3));
-    put(&mut object, "max_speed_deficit_mps", Ok(margins.max_speed_deficit_mps));
+    insert(&mut object, "min_thw_front_s", margins.min_thw_front_s);
+    insert(&mut object, "min_thw_rear_s", margins.min_thw_rear_s);
+    insert(&mut object, "min_gap_front_m", margins.min_gap_front_m);
+    insert(&mut object, "min_gap_rear_m", margins.min_gap_rear_m);
+    insert(&mut object, "min_ttc_rear_s", margins.min_ttc_rear_s);
+    insert(&mut object, "max_deceleration_mps2", Ok(margins.max_deceleration_mps2));
+    insert(&mut object, "max_jerk_mps3", Ok(margins.max_jerk_mps3));
+    insert(&mut object, "max_speed_deficit_mps", Ok(margins.max_speed_deficit_mps));
     Value::Object(object)
 }
 
 fn mis(mis: &Result<MisSummary, Absent>) -> Value {
     let mut object = Map::new();
-    let of = |part: fn(&MisSummary) -> Measured| mis.as_ref().map_err(|absent| *absent).and_then(part);
-    put(&mut object, "engaged_at_s", of(|mis| mis.engaged_at_s));
-    put(&mut object, "released_at_s", of(|mis| mis.released_at_s));
-    put(&mut object, "thw_front_at_engagement_s", of(|mis| mis.thw_front_at_engagement_s));
-    put(&mut object, "thw_front_at_critical_s", of(|mis| mis.thw_front_at_critical_s));
-    put(&mut object, "mean_deceleration_mps2", of(|mis| mis.mean_deceleration_mps2));
+    let of = |value: fn(&MisSummary) -> Measured| mis.as_ref().map_err(|absent| *absent).and_then(value);
+    insert(&mut object, "engaged_at_s", of(|mis| mis.engaged_at_s));
+    insert(&mut object, "released_at_s", of(|mis| mis.released_at_s));
+    insert(&mut object, "thw_front_at_engagement_s", of(|mis| mis.thw_front_at_engagement_s));
+    insert(&mut object, "thw_front_at_critical_s", of(|mis| mis.thw_front_at_critical_s));
+    insert(&mut object, "mean_deceleration_mps2", of(|mis| mis.mean_deceleration_mps2));
     object.insert("goal_in_reach".to_owned(), json!(mis.as_ref().ok().and_then(|mis| mis.goal_in_reach)));
     let reason = mis.as_ref().map_or_else(ToString::to_string, |mis| mis.reason.to_string());
     object.insert("reason".to_owned(), json!(reason));
     Value::Object(object)
 }
 
-/// The object of `campaign --format json`.
+/// Returns the object of `campaign --format json`. `wall_s` is `None` for a merged campaign.
 pub(super) fn campaign(summary: &Summary, judged: &Judgement, wall_s: Option<f64>) -> Value {
     let total = summary.total();
     let mut object = counts(summary, &total);
@@ -176,7 +175,7 @@ fn checks(counts: &CheckCounts) -> Value {
     json!({ "runs": counts.runs, "flips": counts.flips, "flip_rate": counts.flip_rate(), "broken": broken })
 }
 
-/// What the samples say about the probability of a collision, scenario by scenario.
+/// Returns the findings of the gate on the probability of a collision, by scenario.
 fn probabilities(judged: &Judgement) -> Value {
     Value::Object(judged.probabilities.iter().map(|(name, finding)| (name.clone(), json!(finding))).collect())
 }

@@ -1,8 +1,12 @@
-//! `closecall merge`: the parts of a campaign put together and judged.
+//! `closecall merge`: merges the parts of a campaign, and judges the result.
 
 use std::path::PathBuf;
 
 use clap::Args;
+use closecall_campaign::merge::Parts;
+use closecall_campaign::saved::{SavedCampaign, works};
+use closecall_campaign::selection::Selection;
+use closecall_report::campaign::{CampaignReport, Tally};
 
 use super::args::Format;
 use super::gates::GateArgs;
@@ -10,10 +14,6 @@ use super::output::outln;
 use super::summary::{print_counts, print_verdict};
 use super::{CliError, json};
 use crate::exit_code::ExitCode;
-use closecall_campaign::merge::Parts;
-use closecall_campaign::saved::{SavedCampaign, works};
-use closecall_campaign::selection::Selection;
-use closecall_report::campaign::{CampaignReport, Tally};
 
 /// Arguments of `closecall merge`.
 #[derive(Debug, Args)]
@@ -21,16 +21,16 @@ pub(super) struct MergeArgs {
     /// Folders of all parts of one campaign, each made with `campaign --partition I/N`
     #[arg(required = true, value_name = "DIR")]
     parts: Vec<PathBuf>,
-    /// New folder for the whole campaign
+    /// Folder for the whole campaign; it must be new or empty
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Record chosen samples of each scenario as Rerun files, with a page that shows them; `worst:N`, `failures:N` and
-    /// `random:N`, with commas between
+    /// Save recordings (Rerun files) of selected samples of each scenario, and a page that shows them. KIND is `worst`,
+    /// `failures` or `random`
     #[arg(long, alias = "recordings", default_value = "failures:3", value_name = "KIND:N,…")]
     record: Selection,
     #[command(flatten)]
     gates: GateArgs,
-    /// Output for people or for programs
+    /// Output format
     #[arg(long, value_enum, default_value_t)]
     format: Format,
 }
@@ -38,13 +38,11 @@ pub(super) struct MergeArgs {
 pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
     let parts = Parts::open(&args.parts)?;
     let works = works(&args.parts[0], parts.manifest())?;
-    let samples: Vec<(String, u64)> =
-        works.iter().map(|work| (work.file.config().name.clone(), work.count())).collect();
-    parts.check(&samples)?;
+    parts.check(&works)?;
     let is_paired = works.iter().all(|work| work.arms.len() > 1);
     let gates = args.gates.gates(is_paired, parts.manifest().sampling.design)?;
-    let held = parts.merge(&samples, &args.out, std::env::args().collect())?;
-    let saved = SavedCampaign::of(held.folder.clone())?;
+    let merged = parts.merge(&works, &args.out, std::env::args().collect())?;
+    let saved = SavedCampaign::of(merged.folder.clone())?;
     let tally = Tally::of(&saved, &works)?;
     let judged = tally.summary.judge(gates);
     let report = CampaignReport { manifest: saved.manifest(), works: &works, tally: &tally, gates, judged: &judged };

@@ -1,4 +1,4 @@
-//! The command line: what is asked for, and what the program ends with.
+//! The command line: arguments, calls, printed results, and exit codes.
 
 mod args;
 mod campaign;
@@ -14,7 +14,6 @@ mod output;
 mod plan;
 mod plot;
 mod record;
-mod recording;
 mod reenact;
 mod render;
 mod replay;
@@ -22,6 +21,7 @@ mod robustness;
 mod run;
 mod statistics;
 mod summary;
+mod trajectories;
 mod watch;
 
 pub use command::main;

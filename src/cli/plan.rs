@@ -1,26 +1,27 @@
-//! How much of a campaign is run, and how much of that is checked, on the command line.
+//! The number of samples of a campaign, and the samples that are checked, on the command line.
 
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
-
-use super::CliError;
-use super::gates::share;
 use closecall_campaign::ledger::Inference;
 use closecall_campaign::validity::CheckPlan;
 
-/// Samples of each scenario where nobody says otherwise.
-const SAMPLES: u64 = 200;
-/// Most samples of each scenario where the number comes from the outcomes or the clock.
-const MOST_SAMPLES: u64 = 1_000_000;
+use super::CliError;
+use super::gates::share;
 
-/// Settings for an occasion. Whatever is given beside it counts before it.
+/// Default number of samples of each scenario.
+const SAMPLES: u64 = 200;
+/// Default limit of the number of samples of each scenario, if the outcomes or the clock determine the number.
+const MAX_SAMPLES: u64 = 1_000_000;
+
+/// A set of settings for a purpose. Settings that are given explicitly take precedence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Preset {
-    /// For a pull request, in minutes: 1,000 paired samples of each scenario; without a collision they bound its
-    /// probability at 0.3 % with 95 % confidence
+    /// For a pull request, in minutes: 1,000 paired samples of each scenario. If none ends in a collision, its
+    /// probability is at most 0.3 % with 95 % confidence
     Pr,
-    /// For the night: 20,000 paired samples of each scenario; without a collision they bound its probability at 0.015 %
+    /// For a nightly run: 20,000 paired samples of each scenario. If none ends in a collision, its probability is at
+    /// most 0.015 % with 95 % confidence
     Nightly,
 }
 
@@ -33,21 +34,22 @@ impl Preset {
     }
 }
 
-/// How much is run.
+/// The size of a campaign.
 #[derive(Clone, Debug, Args)]
 pub(super) struct PlanArgs {
-    /// Samples of each scenario [default: 200; with --until-certain or --time-budget the most there may be: 1000000]
+    /// Number of samples of each scenario [default: 200]. With --until-certain or --time-budget the largest number
+    /// [default: 1000000]
     #[arg(short = 'n', long = "samples", value_parser = clap::value_parser!(u64).range(1..))]
     samples: Option<u64>,
-    /// Settings for an occasion: number of samples, paired where the controller has a baseline
+    /// Number of samples for a purpose, paired with the baseline unless the controller under test is the baseline
     #[arg(long, value_enum)]
     preset: Option<Preset>,
-    /// With --max-probability: stop each scenario as soon as the samples say whether its probability is low enough, by
-    /// bounds that hold although they are looked at after every sample
+    /// With --max-probability: stop each scenario as soon as its samples show whether its probability is low enough.
+    /// The bounds (confidence sequences) are valid although they are evaluated after every sample
     #[arg(long, requires = "max_probability", conflicts_with_all = ["partition", "max_collisions", "max_induced"])]
     until_certain: bool,
-    /// Stop after this long, such as 90s, 15m or 8h, shared out evenly among the scenarios; the samples that are judged
-    /// are those before the first that was not over
+    /// Stop after this wall time, such as 90s, 15m or 8h, divided evenly among the scenarios. Only the samples before
+    /// the first unfinished one are judged
     #[arg(
         long,
         value_name = "TIME",
@@ -55,53 +57,53 @@ pub(super) struct PlanArgs {
         conflicts_with_all = ["partition", "resume", "max_collisions", "max_induced"]
     )]
     time_budget: Option<Duration>,
-    /// Check this share of the samples for whether the simulator can be believed, above 0 and up to 1; the first four of
-    /// each scenario always are
+    /// Share of the samples in which the validity of the simulator is checked, above 0 and up to 1. The first four
+    /// samples of each scenario are always checked
     #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = CheckPlan::SHARE)]
     check_share: f64,
-    /// Check no more samples of each scenario than this, beside the first four
+    /// Largest number of samples of each scenario that are checked, besides the first four
     #[arg(long, value_name = "N", default_value_t = CheckPlan::AT_MOST)]
     check_at_most: u64,
 }
 
 impl PlanArgs {
-    /// Samples of each scenario, at most.
+    /// Returns the largest number of samples of each scenario.
     pub(super) fn samples(&self) -> u64 {
-        let otherwise = match self.inference() {
+        let default = match self.inference() {
             Inference::FixedSamples => SAMPLES,
-            Inference::Sequential => MOST_SAMPLES,
+            Inference::Sequential => MAX_SAMPLES,
         };
-        self.samples.or(self.preset.map(Preset::samples)).unwrap_or(otherwise)
+        self.samples.or(self.preset.map(Preset::samples)).unwrap_or(default)
     }
 
-    /// True where a preset asks for a baseline.
+    /// Returns true if a preset requests a baseline.
     pub(super) fn wants_pairs(&self) -> bool {
         self.preset.is_some()
     }
 
-    /// What the number of samples comes from.
+    /// Returns what determines the number of samples.
     pub(super) fn inference(&self) -> Inference {
         if self.until_certain || self.time_budget.is_some() { Inference::Sequential } else { Inference::FixedSamples }
     }
 
-    /// True where a scenario ends once its answer is certain.
+    /// Returns true if a scenario ends as soon as the answer of its probability gate is certain.
     pub(super) fn ends_when_certain(&self) -> bool {
         self.until_certain
     }
 
-    /// The time for all scenarios together.
+    /// Returns the wall time for all scenarios together.
     pub(super) fn time_budget(&self) -> Option<Duration> {
         self.time_budget
     }
 
-    /// Which samples are checked.
+    /// Returns the samples that are checked.
     pub(super) fn checks(&self) -> Result<CheckPlan, CliError> {
         CheckPlan::new(self.check_share, self.check_at_most)
             .map_err(|error| CliError::Usage { message: format!("--check-share: {error}") })
     }
 }
 
-/// A time above 0, in seconds, minutes or hours.
+/// Parses a time above 0, in seconds, minutes or hours.
 fn duration(text: &str) -> Result<Duration, String> {
     let units = [("s", 1.0), ("m", 60.0), ("h", 3_600.0)];
     let (number, unit_s) =
@@ -116,7 +118,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn times_have_units() {
+    fn a_time_has_a_unit() {
         assert_eq!(duration("90"), Ok(Duration::from_secs(90)));
         assert_eq!(duration("1.5m"), Ok(Duration::from_secs(90)));
         assert_eq!(duration("2h"), Ok(Duration::from_secs(7_200)));

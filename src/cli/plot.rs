@@ -1,58 +1,58 @@
-//! `closecall plot`: an encounter as a static figure, for a report.
+//! `closecall plot`: draws an encounter as a static figure.
 
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use closecall_scenarios::sampling::Design;
-
-use super::CliError;
-use super::args::{ArmArgs, SetArgs, arm};
-use super::output::outln;
-use crate::exit_code::ExitCode;
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_campaign::saved::SavedCampaign;
 use closecall_report::run::figure::{encounter, png};
 use closecall_report::run::film::{Film, Level, film_arms};
 use closecall_scenarios::atomic::write_file;
+use closecall_scenarios::sampling::Design;
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::scenario::Scenario;
 use closecall_simulation::{Arm, RunKey};
+
+use super::CliError;
+use super::args::{ArmArgs, SetArgs, arm};
+use super::output::outln;
+use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall plot`.
 #[derive(Debug, Args)]
 pub(super) struct PlotArgs {
     /// Scenario file, or the folder of a campaign
     source: PathBuf,
-    /// Number of the sample; for the folder of a campaign it must be given
+    /// Number of the sample; required for the folder of a campaign
     #[arg(value_name = "SAMPLE")]
     number: Option<u64>,
-    /// Number of the sample
+    /// Number of the sample, as an option
     #[arg(long, conflicts_with = "number")]
     sample: Option<u64>,
-    /// Seed of the random numbers; 0 where absent, of a campaign its own
+    /// Seed of the random numbers [default: 0; a campaign has its own seed]
     #[arg(long)]
     seed: Option<u64>,
-    /// Name of the scenario, where the campaign has more than one
+    /// Name of the scenario; required if the campaign has several
     #[arg(long)]
     scenario: Option<String>,
-    /// Draw the run without the margin increase system, too, dashed
+    /// Also draw the run of the baseline controller `acc`, with dashed lines
     #[arg(long)]
     paired: bool,
     #[command(flatten)]
     arm: ArmArgs,
     #[command(flatten)]
     set: SetArgs,
-    /// File to write; its ending says whether it is SVG or PNG
+    /// File to write; its extension, .svg or .png, determines the format
     #[arg(short, long, value_name = "FILE.svg|FILE.png", value_parser = picture)]
     output: PathBuf,
 }
 
-/// A path whose ending says how a picture is written.
+/// Parses the path of a picture, whose extension must be .svg or .png.
 fn picture(text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
     match path.extension().and_then(|extension| extension.to_str()) {
         Some("svg" | "png") => Ok(path),
-        _ => Err(format!("`{text}` ends neither with .svg nor with .png")),
+        _ => Err(format!("`{text}` must end with .svg or .png")),
     }
 }
 
@@ -68,7 +68,9 @@ pub(super) fn plot(args: &PlotArgs) -> Result<ExitCode, CliError> {
 
 fn of_scenario(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
     if args.scenario.is_some() {
-        let message = "--scenario names one of a campaign's scenarios: name the campaign's folder".to_owned();
+        let message =
+            "--scenario chooses a scenario of a campaign: name the campaign's folder instead of a scenario file"
+                .to_owned();
         return Err(CliError::Usage { message });
     }
     let file = args.set.load(&args.source)?;
@@ -78,14 +80,14 @@ fn of_scenario(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
     films(&scenario, RunKey { seed, sample }, &args.arm.arms(args.paired)?)
 }
 
-/// A sample of a campaign, as the campaign ran it: every arm where it was paired.
+/// Films a sample of a campaign as the campaign ran it, in every arm.
 fn of_campaign(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
     if args.seed.is_some() || !args.set.settings.is_empty() {
-        let message = "a campaign has its own seed and settings: leave out --seed and --set".to_owned();
+        let message = "a campaign has its own seed and settings: --seed and --set cannot change them".to_owned();
         return Err(CliError::Usage { message });
     }
     let Some(sample) = args.number.or(args.sample) else {
-        let message = "which sample of the campaign? Name it: closecall plot DIR SAMPLE -o FILE.svg".to_owned();
+        let message = "a campaign has many samples: name one, as in `closecall plot DIR SAMPLE -o FILE.svg`".to_owned();
         return Err(CliError::Usage { message });
     };
     let saved = SavedCampaign::open(&args.source)?;

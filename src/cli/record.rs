@@ -1,28 +1,28 @@
-//! `closecall record`: our own simulated traffic as a recording.
+//! `closecall record`: writes simulated traffic as a trajectory file.
 
 use std::path::PathBuf;
 
 use clap::Args;
+use closecall_campaign::runner::{Sampling, concrete, run_guarded};
 use closecall_controllers::DriverConfig;
+use closecall_report::traffic::in_car::InCarRecorder;
+use closecall_report::traffic::recorder::TrafficRecorder;
 use closecall_scenarios::recordings::{truth_path, write_in_car, write_recording, write_truth};
 use closecall_scenarios::sampling::Design;
+use closecall_simulation::scenario::{ActorConfig, Scenario, ScenarioFile};
+use closecall_simulation::{Observer, RunKey};
 
 use super::CliError;
 use super::args::{ArmArgs, SetArgs};
 use super::output::outln;
 use crate::exit_code::ExitCode;
-use closecall_campaign::runner::{Sampling, concrete, run_guarded};
-use closecall_report::traffic::in_car::InCarRecorder;
-use closecall_report::traffic::traffic::TrafficRecorder;
-use closecall_simulation::scenario::{ActorConfig, Scenario, ScenarioFile};
-use closecall_simulation::{Observer, RunKey};
 
 /// Arguments of `closecall record`.
 #[derive(Debug, Args)]
 pub(super) struct RecordArgs {
     /// Scenario file
     scenario: PathBuf,
-    /// Number of samples, recorded one after the other
+    /// Number of samples; their traffic follows one after the other in the file
     #[arg(short = 'n', long = "samples", default_value_t = 20, value_parser = clap::value_parser!(u64).range(1..=100_000))]
     samples: u64,
     /// Seed of the random numbers
@@ -32,11 +32,11 @@ pub(super) struct RecordArgs {
     arm: ArmArgs,
     #[command(flatten)]
     set: SetArgs,
-    /// Write what one vehicle would record of itself, in the in-car layout, and the true lane changes beside it
-    /// (`FILE.truth.csv`): the vehicle of the actor ACTOR; where none is named, that of the first who overtakes
+    /// Write the in-car log of one vehicle, and its true lane changes in `FILE.truth.csv`. ACTOR is the id of the
+    /// vehicle [default: the first actor with an overtaking driver]
     #[arg(long, value_name = "ACTOR", num_args = 0..=1, require_equals = true)]
     in_car: Option<Option<String>>,
-    /// File to write: the plain CSV layout, or with --in-car the in-car layout
+    /// Trajectory file to write, in the plain CSV layout; with --in-car in the in-car layout
     #[arg(short, long, value_name = "FILE.csv")]
     output: PathBuf,
 }
@@ -68,13 +68,13 @@ fn record_in_car(args: &RecordArgs, actor: Option<&str>) -> Result<ExitCode, Cli
     let chosen = match actor {
         None => actors.iter().find(overtakes).map(|actor| actor.id.to_string()).ok_or_else(|| CliError::Usage {
             message: format!(
-                "no actor overtakes: name one with --in-car=ACTOR, of {}",
+                "no actor has an overtaking driver: name an actor with --in-car=ACTOR, one of {}",
                 ids().collect::<Vec<_>>().join(", ")
             ),
         }),
         Some(name) => ids().find(|id| id == name).ok_or_else(|| CliError::Usage {
             message: format!(
-                "there is no actor `{name}` to record in: it has to be one of {}",
+                "there is no actor `{name}`: --in-car must name one of {}",
                 ids().collect::<Vec<_>>().join(", ")
             ),
         }),
@@ -85,12 +85,12 @@ fn record_in_car(args: &RecordArgs, actor: Option<&str>) -> Result<ExitCode, Cli
     let truth = truth_path(&args.output);
     write_in_car(&log, &args.output)?;
     write_truth(&changes, &truth)?;
-    outln!("{} rows recorded in the vehicle of {chosen} written to {}", log.frames.len(), args.output.display());
+    outln!("{} rows of the in-car log of {chosen} written to {}", log.frames.len(), args.output.display());
     outln!("{} true lane changes written to {}", changes.len(), truth.display());
     Ok(ExitCode::Pass)
 }
 
-/// Runs the samples one after the other, watched by `recorder`.
+/// Runs the samples one after the other, observed by `recorder`.
 fn each_sample<R: Observer>(
     args: &RecordArgs,
     file: &ScenarioFile,

@@ -1,46 +1,47 @@
-//! `closecall reenact`: a recorded encounter once more, with the controller under test in E's place.
+//! `closecall reenact`: simulates a recorded encounter with the controller under test in the ego vehicle.
 
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use closecall_report::run::film::{Comparison, Film, film_encounter};
+use closecall_report::run::rerun::record_films;
+use closecall_scenarios::atomic::write_file;
 use closecall_scenarios::criticality::{CriticalLaneChange, criticality};
 use closecall_scenarios::encounter::{NoEncounter, RecordedEncounter, encounter};
 use closecall_scenarios::filters::smooth;
 use closecall_scenarios::lane_change::LaneChange;
 use closecall_scenarios::recordings::read_with;
+use closecall_simulation::outcome::Outcome;
+use closecall_simulation::scenario::{RearDriver, ScenarioFile, reenact as scenario_of};
+use closecall_simulation::{CONTROL_STEP, RunKey};
 use serde_json::json;
 
 use super::args::{ArmArgs, Format, ReadArgs, SetArgs};
 use super::output::outln;
-use super::recording::refuse_overwriting;
+use super::trajectories::refuse_overwriting;
 use super::watch::{WatchArgs, by_severity, run_filmed};
 use super::{CliError, json};
 use crate::exit_code::ExitCode;
-use closecall_report::run::film::{Comparison, Film, film_encounter};
-use closecall_report::run::rerun::record_films;
-use closecall_scenarios::atomic::write_file;
-use closecall_simulation::outcome::Outcome;
-use closecall_simulation::scenario::{RearDriver, ScenarioFile, reenact as scenario_of};
-use closecall_simulation::{CONTROL_STEP, RunKey};
 
-/// E, F and R: whose speeds are plotted.
+/// Number of vehicles whose speeds are plotted: the ego, the lead vehicle and the rear vehicle.
 const PROTAGONISTS: usize = 3;
 
-/// Who drives R.
+/// What controls the rear vehicle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-enum Rear {
-    /// A human driver who reacts to E, follows as closely as was recorded, and pulls out at the recorded headway
+enum RearChoice {
+    /// A model of a human driver: it reacts to the ego, follows as closely as recorded, and pulls out at the recorded
+    /// headway
     #[default]
     Driver,
-    /// The recorded speeds and the recorded lane change, whatever E does
+    /// The recorded speeds and the recorded lane change, whatever the ego does
     Recorded,
 }
 
-impl From<Rear> for RearDriver {
-    fn from(rear: Rear) -> Self {
+impl From<RearChoice> for RearDriver {
+    fn from(rear: RearChoice) -> Self {
         match rear {
-            Rear::Driver => Self::Driver,
-            Rear::Recorded => Self::Recorded,
+            RearChoice::Driver => Self::Driver,
+            RearChoice::Recorded => Self::Recorded,
         }
     }
 }
@@ -48,16 +49,17 @@ impl From<Rear> for RearDriver {
 /// Arguments of `closecall reenact`.
 #[derive(Debug, Args)]
 pub(super) struct ReenactArgs {
-    /// Recording
-    recording: PathBuf,
+    /// Trajectory file
+    #[arg(value_name = "TRAJECTORY_FILE")]
+    file: PathBuf,
     #[command(flatten)]
     read: ReadArgs,
-    /// The track that changes lanes, R; the most critical one that can be re-enacted where absent
+    /// Track of the rear vehicle, which changes lanes [default: the most critical lane change that can be re-enacted]
     #[arg(long, value_name = "ID")]
     track: Option<u64>,
-    /// Who drives R
+    /// What controls the rear vehicle
     #[arg(long, value_enum, default_value_t)]
-    rear: Rear,
+    rear: RearChoice,
     /// Seed of the random numbers
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -67,26 +69,26 @@ pub(super) struct ReenactArgs {
     set: SetArgs,
     #[command(flatten)]
     watch: WatchArgs,
-    /// Write the scenario, to run and to vary it
+    /// Save the scenario of the encounter, for further runs and variations
     #[arg(short, long, value_name = "FILE.toml")]
     output: Option<PathBuf>,
-    /// Output for people or for programs
+    /// Output format
     #[arg(long, value_enum, default_value_t)]
     format: Format,
 }
 
 pub(super) fn reenact(args: &ReenactArgs) -> Result<ExitCode, CliError> {
-    refuse_overwriting(std::slice::from_ref(&args.recording), args.output.as_deref())?;
-    let recording = smooth(&read_with(&args.recording, args.read.options())?);
+    refuse_overwriting(std::slice::from_ref(&args.file), args.output.as_deref())?;
+    let recording = smooth(&read_with(&args.file, args.read.options())?);
     let changes = criticality(&recording, None);
     let all: Vec<LaneChange> = changes.iter().map(|change| change.lane_change.clone()).collect();
     let found = choose(args, &changes, |change| encounter(&recording, change, &all, CONTROL_STEP))?;
-    let source = format!("{} (track {})", args.recording.display(), found.change.track_id);
+    let source = format!("{} (track {})", args.file.display(), found.change.track_id);
     let file = scenario_of(&found, args.rear.into(), (Path::new(&source), &args.set.settings))?;
     let scenario = file.concrete(&file.space().nominal())?;
     let key = RunKey { seed: args.seed, sample: 0 };
     let (outcome, simulated) = run_filmed(&scenario, key, &args.arm.arm()?, &args.watch)?;
-    let recorded = film_encounter(&found, args.watch.record_level)?;
+    let recorded = film_encounter(&found, args.watch.record_level.into())?;
     let comparison = Comparison::new(&found, &recorded, &simulated);
     let foreword = comparison.markdown(&found, &simulated, args.rear.into());
     let films = [recorded.with_foreword(foreword), simulated].map(|film| film.plotting_first(PROTAGONISTS));
@@ -96,17 +98,18 @@ pub(super) fn reenact(args: &ReenactArgs) -> Result<ExitCode, CliError> {
     if let Some(path) = &args.output {
         write_file(path, |written| written.write_all(text_of(&file, args).as_bytes()))?;
     }
-    print(args.format, &found, (&comparison, &films, &outcome));
+    let reenactment = Reenactment { comparison: &comparison, films: &films, outcome: &outcome };
+    print(args.format, &found, &reenactment);
     Ok(ExitCode::Pass)
 }
 
-/// The encounter of the track that is named, or the most critical one.
+/// Returns the encounter of the named track, or the most critical one.
 fn choose(
     args: &ReenactArgs,
     changes: &[CriticalLaneChange],
     encounter_of: impl Fn(&LaneChange) -> Result<RecordedEncounter, NoEncounter>,
 ) -> Result<RecordedEncounter, CliError> {
-    let file = args.recording.display();
+    let file = args.file.display();
     let mut refused = None;
     for change in by_severity(changes, args.track) {
         match encounter_of(&change.lane_change) {
@@ -115,8 +118,8 @@ fn choose(
         }
     }
     let Some(source) = refused else {
-        let whose = args.track.map_or(String::new(), |track| format!(" of track {track}"));
-        return Err(CliError::Usage { message: format!("{file} has no lane change{whose}: nothing to re-enact") });
+        let of_track = args.track.map_or(String::new(), |track| format!(" of track {track}"));
+        return Err(CliError::Usage { message: format!("{file} has no lane change{of_track} to re-enact") });
     };
     let possible = args.track.map_or(Vec::new(), |_| {
         let tracks = changes.iter().filter(|change| encounter_of(&change.lane_change).is_ok());
@@ -125,13 +128,22 @@ fn choose(
     Err(CliError::NoEncounter { file: file.to_string(), source, possible })
 }
 
-/// The scenario with a heading that says where it comes from.
+/// Returns the text of the scenario with a heading that states its origin.
 fn text_of(file: &ScenarioFile, args: &ReenactArgs) -> String {
     let command = std::iter::once("closecall".to_owned()).chain(std::env::args().skip(1)).collect::<Vec<_>>().join(" ");
-    format!("# Made by `{command}`\n# from {}\n{}", args.recording.display(), file.text())
+    format!("# Made by `{command}`\n# from {}\n{}", args.file.display(), file.text())
 }
 
-fn print(format: Format, found: &RecordedEncounter, (comparison, films, outcome): (&Comparison, &[Film; 2], &Outcome)) {
+/// The simulated run of an encounter beside the recorded one.
+struct Reenactment<'a> {
+    comparison: &'a Comparison,
+    /// The film of the recorded traffic, and that of the simulation.
+    films: &'a [Film; 2],
+    outcome: &'a Outcome,
+}
+
+fn print(format: Format, found: &RecordedEncounter, reenactment: &Reenactment<'_>) {
+    let Reenactment { comparison, films, outcome } = reenactment;
     let [ego, front, rear] = found.protagonists().map(|track| track.track_id);
     match format {
         Format::Json => {
@@ -148,8 +160,8 @@ fn print(format: Format, found: &RecordedEncounter, (comparison, films, outcome)
             outln!("{object:#}");
         }
         Format::Human => {
-            outln!("{}: track {rear} (R) changes lanes behind {ego} (E) behind {front} (F)", found.recording);
-            outln!("from {:.1} s of the recording on, everyone where and as fast as recorded", found.start.s());
+            outln!("{}: rear vehicle: track {rear}; ego: track {ego}; lead vehicle: track {front}", found.recording);
+            outln!("start: {:.1} s of the trajectory file, with recorded positions and speeds", found.start.s());
             outln!("  {:<32} {:>16} {:>16}", "", films[0].arm(), films[1].arm());
             for (name, [recorded, simulated]) in comparison.rows() {
                 outln!("  {name:<32} {recorded:>16} {simulated:>16}");

@@ -1,4 +1,4 @@
-//! `closecall render`: labelled pictures of the rear camera, to train and to judge classifiers.
+//! `closecall render`: renders labelled images of the rear camera, to train and to test classifiers.
 
 use std::path::PathBuf;
 
@@ -11,20 +11,20 @@ use super::args::Format;
 use super::output::outln;
 use crate::exit_code::ExitCode;
 
-/// Whether pictures are for training or for judging.
+/// The purpose of the images.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 enum Purpose {
     /// Body shapes and paints for training
     #[default]
     Training,
-    /// Body shapes and paints that training never sees
+    /// Body shapes and paints that are not used for training
     HeldOut,
 }
 
 /// Arguments of `closecall render`.
 #[derive(Debug, Args)]
 pub(super) struct RenderArgs {
-    /// Folder to write to
+    /// Folder for the images
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
     /// Number of random scenes
@@ -33,13 +33,13 @@ pub(super) struct RenderArgs {
     /// Seed of the random scenes
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Shapes and paints for training, or held-out ones
+    /// Body shapes and paints of the vehicles
     #[arg(long, value_enum, default_value_t)]
     set: Purpose,
-    /// Write the crops that the classifier sees, instead of whole images with COCO annotations
+    /// Write the crops that are the classifier's input, instead of whole images with COCO annotations
     #[arg(long)]
     crops: bool,
-    /// Output for people or for programs
+    /// Output format
     #[arg(long, value_enum, default_value_t)]
     format: Format,
 }
@@ -59,7 +59,7 @@ pub(super) fn render(args: &RenderArgs) -> Result<ExitCode, CliError> {
         Format::Json => outln!("{:#}", json!(summary)),
         Format::Human => {
             let [car, truck, motorcycle, background] = summary.labels;
-            outln!("{} pictures of {} scenes written to {}", summary.pictures, summary.scenes, args.output.display());
+            outln!("{} images of {} scenes written to {}", summary.pictures, summary.scenes, args.output.display());
             outln!("labels: {car} cars, {truck} trucks, {motorcycle} motorcycles, {background} background");
         }
     }

@@ -1,20 +1,20 @@
-//! `closecall replay`: one sample of a campaign again, bit for bit.
+//! `closecall replay`: runs one sample of a campaign again, and compares the outcome bit for bit.
 
 use std::path::PathBuf;
 
 use clap::Args;
-
-use super::CliError;
-use super::args::Format;
-use super::output::complain;
-use super::run::print;
-use super::watch::{WatchArgs, run_watched};
-use crate::exit_code::ExitCode;
 use closecall_campaign::folder::Folder;
 use closecall_campaign::manifest::{Manifest, version};
 use closecall_campaign::saved::SavedCampaign;
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::outcome::Outcome;
+
+use super::CliError;
+use super::args::Format;
+use super::output::print_error;
+use super::run::print;
+use super::watch::{WatchArgs, run_watched};
+use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall replay`.
 #[derive(Debug, Args)]
@@ -23,18 +23,18 @@ pub(super) struct ReplayArgs {
     dir: PathBuf,
     /// Number of the sample
     sample: u64,
-    /// Name of the scenario, where the campaign has more than one
+    /// Name of the scenario; required if the campaign has several
     #[arg(long)]
     scenario: Option<String>,
-    /// The arm to run again; the controller under test where absent
+    /// Controller of the arm to run again [default: the controller under test]
     #[arg(long, value_name = "NAME")]
     controller: Option<String>,
-    /// Run every arm of the campaign again; with --record all in one file
+    /// Run every arm of the campaign again; --record saves all of them in one file
     #[arg(long, conflicts_with = "controller")]
     paired: bool,
     #[command(flatten)]
     watch: WatchArgs,
-    /// Output for people or for programs
+    /// Output format
     #[arg(long, value_enum, default_value_t)]
     format: Format,
 }
@@ -47,7 +47,7 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<ExitCode, CliError> {
         false => vec![saved.arm(args.controller.as_deref())?],
     };
     for arm in &arms {
-        say_what_is_started(saved.manifest(), arm.controller.name());
+        announce_process(saved.manifest(), arm.controller.name());
     }
     let outcomes = run_watched(&scenario, key, &arms, &args.watch)?;
     print(&outcomes, args.format);
@@ -58,26 +58,27 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<ExitCode, CliError> {
     if agrees {
         return Ok(ExitCode::Pass);
     }
-    complain(format_args!(
-        "the replay differs from the campaign's journal: the campaign was made by closecall {}, this is {}\n",
+    print_error(format_args!(
+        "the replay differs from the campaign's journal: closecall {} ran the campaign, this is {}\n",
         saved.manifest().closecall_version,
         version(),
     ));
     Ok(ExitCode::Invalid)
 }
 
-/// A folder may come from somebody else: that it starts a process is not to go unseen.
-fn say_what_is_started(manifest: &Manifest, name: &str) {
+/// Prints the command of an external controller before it starts. The folder may have another author, whose command
+/// must not run unnoticed.
+fn announce_process(manifest: &Manifest, name: &str) {
     for arm in &manifest.arms {
         if let ControllerChoice::Exec(exec) = arm
             && arm.name() == name
         {
-            complain(format_args!("running the controller that the campaign names: {}\n", exec.command));
+            print_error(format_args!("running the controller that the campaign names: {}\n", exec.command));
         }
     }
 }
 
-/// True unless the campaign's journal has another result of this sample, by a single bit.
+/// Returns false if the journal has a result of this sample that differs in any bit. Returns true if it has none.
 fn agrees_with_journal(folder: &Folder, outcome: &Outcome) -> Result<bool, CliError> {
     let Ok(records) = folder.records() else { return Ok(true) };
     for record in records {

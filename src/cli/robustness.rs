@@ -1,8 +1,10 @@
-//! `closecall robustness`: how much noise and offset each criterion for lane changes bears.
+//! `closecall robustness`: studies how much noise and offset each criterion for lane changes tolerates.
 
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use closecall_report::traffic::recording_charts::{Legend, Line, LineChart};
+use closecall_scenarios::atomic::{WriteError, write_file};
 use closecall_scenarios::lane_change::Criterion;
 use closecall_scenarios::recordings::open;
 use closecall_scenarios::robustness::{Cell, Measured, ReferenceKind, Robustness, Setup, Study};
@@ -12,27 +14,25 @@ use super::CliError;
 use super::args::{Format, ReadArgs};
 use super::output::outln;
 use crate::exit_code::ExitCode;
-use closecall_report::traffic::recording_charts::{Legend, Line, LineChart};
-use closecall_scenarios::atomic::{WriteError, write_file};
 
 /// Arguments of `closecall robustness`.
 #[derive(Debug, Args)]
 pub(super) struct RobustnessArgs {
-    /// Recordings, studied together: an in-car log, or recorded traffic
-    #[arg(required = true)]
-    recordings: Vec<PathBuf>,
+    /// Trajectory files, studied together: either in-car logs or recorded traffic
+    #[arg(required = true, value_name = "TRAJECTORY_FILE")]
+    files: Vec<PathBuf>,
     #[command(flatten)]
     read: ReadArgs,
     /// Seed of the noise
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Draws of the noise at each level
+    /// Number of draws of the noise at each level
     #[arg(long, default_value_t = Setup::default().repetitions, value_parser = clap::value_parser!(u64).range(1..=10_000))]
     repetitions: u64,
-    /// Folder for the charts, `noise.svg` and `offset.svg`
+    /// Folder for the charts `noise.svg` and `offset.svg`
     #[arg(long, value_name = "DIR")]
     plot: Option<PathBuf>,
-    /// Output for people or for programs
+    /// Output format
     #[arg(long, value_enum, default_value_t)]
     format: Format,
 }
@@ -40,18 +40,18 @@ pub(super) struct RobustnessArgs {
 pub(super) fn robustness(args: &RobustnessArgs) -> Result<ExitCode, CliError> {
     let setup = Setup { seed: args.seed, repetitions: args.repetitions, ..Setup::default() };
     let mut studies = Vec::new();
-    for path in &args.recordings {
+    for path in &args.files {
         studies.push(study_of(path, &args.read)?);
     }
     let mut found: Option<Robustness> = None;
     for study in &studies {
         let cases = Study::cases(&setup);
-        // In the order of the cases, however many threads there are.
+        // The results are in the order of the cases for any number of threads.
         let results: Vec<Vec<Cell>> = cases.par_iter().map(|case| study.run(case)).collect();
         let one = study.robustness(&setup, &results);
         if let Some(all) = &mut found {
             if !all.add(&one) {
-                let message = "in-car logs and recorded traffic have different references: study them apart";
+                let message = "in-car logs and recorded traffic have different references: study them separately";
                 return Err(CliError::Usage { message: message.to_owned() });
             }
         } else {
@@ -93,11 +93,11 @@ fn print(found: &Robustness) {
         ReferenceKind::RecordedLanes => "recorded lanes",
     };
     let Setup { repetitions, seed, .. } = found.setup;
-    outln!("{} lane changes, by {reference}; undisturbed, of these", found.reference);
+    outln!("{} lane changes, by {reference}; each criterion without noise and offset:", found.reference);
     for (criterion, known) in found.criteria.iter().zip(&found.undisturbed) {
         outln!("  {:<9} finds {known}", criterion.name());
     }
-    outln!("\nfound again / all found / of them invented; noise: mean of {repetitions} draws, seed {seed}");
+    outln!("\nfound again / all found / false ones; noise: mean of {repetitions} draws, seed {seed}");
     let names: Vec<String> = found.criteria.iter().map(|criterion| format!("{:<26}", criterion.name())).collect();
     outln!("\nBrownian noise  {}", names.concat());
     for (level, cells) in found.setup.noise_m_per_sqrt_s.iter().zip(&found.noise) {
@@ -107,7 +107,9 @@ fn print(found: &Robustness) {
     for (level, cells) in found.setup.offset_m.iter().zip(&found.offset) {
         outln!("{level:>8.2} m      {}", row(found, cells));
     }
-    outln!("\n!: more than 5 % lost of what it finds undisturbed, or more than 5 % invented");
+    outln!(
+        "\n!: the criterion loses more than 5 % of what it finds without noise and offset, or more than 5 % are false"
+    );
     for line in failures(found) {
         outln!("{line}");
     }
@@ -121,7 +123,7 @@ fn row(found: &Robustness, cells: &[Cell]) -> String {
     cells.iter().enumerate().map(cell).collect()
 }
 
-/// From which noise on each criterion fails, the first one first.
+/// Returns one line per criterion with the lowest level of noise at which it fails, sorted by that level.
 fn failures(found: &Robustness) -> Vec<String> {
     let mut from: Vec<(Option<f64>, Criterion)> =
         (0..).zip(&found.criteria).map(|(column, criterion)| (found.fails_from_noise(column), *criterion)).collect();
@@ -136,33 +138,38 @@ fn failures(found: &Robustness) -> Vec<String> {
 fn plot(found: &Robustness, folder: &Path) -> Result<(), CliError> {
     std::fs::create_dir_all(folder).map_err(|source| WriteError::new(folder, source))?;
     let levels = &found.setup;
-    let noise = ("Brownian noise [m/√s]", &levels.noise_m_per_sqrt_s, &found.noise);
-    let offset = ("Lateral offset [m]", &levels.offset_m, &found.offset);
-    for (name, legend, (x_name, levels, rows)) in
-        [("noise.svg", Legend::LowerLeft, noise), ("offset.svg", Legend::LowerMiddle, offset)]
-    {
-        let svg = LineChart { legend, ..chart(found, x_name, levels, rows) }.svg()?;
+    let noise = Axis { name: "Brownian noise [m/√s]", levels: &levels.noise_m_per_sqrt_s, rows: &found.noise };
+    let offset = Axis { name: "Lateral offset [m]", levels: &levels.offset_m, rows: &found.offset };
+    for (name, legend, axis) in [("noise.svg", Legend::LowerLeft, noise), ("offset.svg", Legend::LowerMiddle, offset)] {
+        let svg = LineChart { legend, ..chart(found, &axis) }.svg()?;
         write_file(&folder.join(name), |file| file.write_all(svg.as_bytes()))?;
     }
     Ok(())
 }
 
-fn chart(found: &Robustness, x_name: &str, levels: &[f64], rows: &[Vec<Cell>]) -> LineChart {
-    let line = |column: usize, criterion: &Criterion, (value, what): (fn(&Cell) -> f64, &str), faint| Line {
-        name: format!("{}: {what}", criterion.name()),
-        points: levels.iter().zip(rows).map(|(level, cells)| (*level, value(&cells[column]))).collect(),
-        colour: column,
-        faint,
+/// A disturbance, its levels, and the results at each level.
+struct Axis<'a> {
+    name: &'a str,
+    levels: &'a [f64],
+    rows: &'a [Vec<Cell>],
+}
+
+fn chart(found: &Robustness, axis: &Axis<'_>) -> LineChart {
+    let points = |column: usize, value: fn(&Cell) -> f64| -> Vec<(f64, f64)> {
+        axis.levels.iter().zip(axis.rows).map(|(level, cells)| (*level, value(&cells[column]))).collect()
     };
     let lines = found.criteria.iter().enumerate().flat_map(|(column, criterion)| {
+        let name = criterion.name();
+        let again = points(column, |cell| cell.again);
+        let all = points(column, |cell| cell.found);
         [
-            line(column, criterion, (|cell| cell.again, "found again"), false),
-            line(column, criterion, (|cell| cell.found, "all that is found"), true),
+            Line { name: format!("{name}: found again"), points: again, colour: column, faint: false },
+            Line { name: format!("{name}: all that is found"), points: all, colour: column, faint: true },
         ]
     });
     LineChart {
         title: "Lane changes found, by criterion".to_owned(),
-        x_name: x_name.to_owned(),
+        x_name: axis.name.to_owned(),
         y_name: "lane changes".to_owned(),
         lines: lines.collect(),
         level: ("reference".to_owned(), found.reference as f64),

@@ -1,18 +1,18 @@
-//! `closecall run`: one sample of a scenario.
+//! `closecall run`: runs one sample of a scenario.
 
 use std::path::PathBuf;
 
 use clap::Args;
+use closecall_campaign::runner::{Sampling, concrete};
 use closecall_scenarios::sampling::Design;
+use closecall_simulation::RunKey;
+use closecall_simulation::outcome::Outcome;
 
 use super::args::{ArmArgs, Format, SetArgs};
 use super::output::{out, outln};
 use super::watch::{WatchArgs, run_watched};
 use super::{CliError, json};
 use crate::exit_code::ExitCode;
-use closecall_campaign::runner::{Sampling, concrete};
-use closecall_simulation::RunKey;
-use closecall_simulation::outcome::Outcome;
 
 /// Arguments of `closecall run`.
 #[derive(Debug, Args)]
@@ -27,15 +27,15 @@ pub(super) struct RunArgs {
     sample: u64,
     #[command(flatten)]
     arm: ArmArgs,
-    /// Run the sample without the margin increase system too, on the same random numbers; with --record both in one
-    /// file
+    /// Also run the sample with the baseline controller `acc`, on the same random numbers; --record saves both runs in
+    /// one file
     #[arg(long)]
     paired: bool,
     #[command(flatten)]
     set: SetArgs,
     #[command(flatten)]
     watch: WatchArgs,
-    /// Output for people or for programs
+    /// Output format
     #[arg(long, value_enum, default_value_t)]
     format: Format,
 }
@@ -51,7 +51,7 @@ pub(super) fn run(args: &RunArgs) -> Result<ExitCode, CliError> {
     Ok(ExitCode::Pass)
 }
 
-/// Prints the outcome of a run; of a pair, both, the baseline first, as a list.
+/// Prints the outcome of a run, or a list of the outcomes of a pair, the baseline first.
 pub(super) fn print(outcomes: &[Outcome], format: Format) {
     match (format, outcomes) {
         (Format::Json, [outcome]) => outln!("{:#}", json::outcome(outcome)),
@@ -67,7 +67,7 @@ pub(super) fn print(outcomes: &[Outcome], format: Format) {
     }
 }
 
-/// An outcome for people.
+/// Prints an outcome as text for human readers.
 struct Human<'a>(&'a Outcome);
 
 impl std::fmt::Display for Human<'_> {
@@ -86,14 +86,14 @@ impl std::fmt::Display for Human<'_> {
         for (name, value) in outcome.parameters.iter() {
             writeln!(f, "  {name} = {value}")?;
         }
-        for noted in &outcome.moments {
-            writeln!(f, "  ({}) {} at {:.2} s", noted.moment.letter(), noted.moment.text(), noted.time.s())?;
+        for at in &outcome.moments {
+            writeln!(f, "  ({}) {} at {:.2} s", at.moment.letter(), at.moment.text(), at.time.s())?;
         }
         for collision in &outcome.collisions {
             let [first, second] = &collision.between;
             writeln!(
                 f,
-                "  COLLISION at {:.2} s of {first} and {second} at {:.1} m/s, ΔV {:.1} and {:.1} m/s",
+                "  COLLISION of {first} and {second} at {:.2} s, relative speed {:.1} m/s, ΔV {:.1} and {:.1} m/s",
                 collision.time.s(),
                 collision.relative_speed_mps,
                 collision.delta_v_mps[0],
@@ -114,7 +114,7 @@ impl std::fmt::Display for Human<'_> {
             Ok(mis) => {
                 f.write_str(&line("MIS engaged at", mis.engaged_at_s, "s"))?;
                 f.write_str(&line("  front time headway then", mis.thw_front_at_engagement_s, "s"))?;
-                f.write_str(&line("  front time headway in the critical moment", mis.thw_front_at_critical_s, "s"))?;
+                f.write_str(&line("  front time headway at the critical moment", mis.thw_front_at_critical_s, "s"))?;
                 writeln!(f, "  MIS: {}", mis.reason)
             }
             Err(absent) => writeln!(f, "  MIS: {absent}"),

@@ -1,8 +1,10 @@
-//! `closecall statistics`: durations, speeds and counts of recorded lane changes, and what they correlate with.
+//! `closecall statistics`: computes durations, speeds, counts and correlations of recorded lane changes.
 
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use closecall_report::traffic::recording_charts::{BoxChart, BoxOf};
+use closecall_scenarios::atomic::{WriteError, write_file};
 use closecall_scenarios::criticality::{
     BoxNumbers, ClassStatistics, Correlation, CriticalLaneChange, Statistics, criticality, statistics as compute,
 };
@@ -12,34 +14,32 @@ use closecall_scenarios::recordings::{Recording, read_with};
 use super::CliError;
 use super::args::{Format, ReadArgs, positive};
 use super::output::outln;
-use super::recording::refuse_repetition;
+use super::trajectories::refuse_duplicates;
 use crate::exit_code::ExitCode;
-use closecall_report::traffic::recording_charts::{BoxChart, BoxOf};
-use closecall_scenarios::atomic::{WriteError, write_file};
 
 /// Arguments of `closecall statistics`.
 #[derive(Debug, Args)]
 pub(super) struct StatisticsArgs {
-    /// Recordings, counted together
-    #[arg(required = true)]
-    recordings: Vec<PathBuf>,
+    /// Trajectory files, whose lane changes are counted together
+    #[arg(required = true, value_name = "TRAJECTORY_FILE")]
+    files: Vec<PathBuf>,
     #[command(flatten)]
     read: ReadArgs,
-    /// Speed limit [m/s]; 120 km/h where absent
+    /// Speed limit in m/s [default: 120 km/h]
     #[arg(long, value_name = "M/S", value_parser = positive)]
     speed_limit_mps: Option<f64>,
-    /// Folder for the box plots, `duration.svg` and `speed.svg`
+    /// Folder for the box plots `duration.svg` and `speed.svg`
     #[arg(long, value_name = "DIR")]
     plot: Option<PathBuf>,
-    /// Output for people or for programs
+    /// Output format
     #[arg(long, value_enum, default_value_t)]
     format: Format,
 }
 
 pub(super) fn statistics(args: &StatisticsArgs) -> Result<ExitCode, CliError> {
     let read = |path: &PathBuf| read_with(path, args.read.options());
-    let recordings = args.recordings.iter().map(read).collect::<Result<Vec<Recording>, _>>()?;
-    refuse_repetition(&args.recordings, &recordings)?;
+    let recordings = args.files.iter().map(read).collect::<Result<Vec<Recording>, _>>()?;
+    refuse_duplicates(&args.files, &recordings)?;
     let changes = recordings.iter().flat_map(|recording| criticality(&smooth(recording), args.speed_limit_mps));
     let found = compute(&changes.collect::<Vec<CriticalLaneChange>>());
     if let Some(folder) = &args.plot {

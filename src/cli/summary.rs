@@ -1,13 +1,14 @@
-//! What a campaign comes to, for people.
+//! Prints the summary of a campaign as text for human readers.
 
-use super::output::{out, outln};
 use closecall_campaign::harm;
 use closecall_campaign::ledger::{ArmCounts, Inference};
 use closecall_campaign::probability::percent;
 use closecall_campaign::summary::{Counts, Summary};
 use closecall_campaign::verdict::Judgement;
 
-/// Prints the counts of each scenario, and of all.
+use super::output::{out, outln};
+
+/// Prints the counts of each scenario, and of all scenarios together.
 pub(super) fn print_counts(summary: &Summary) {
     for (name, counts) in &summary.scenarios {
         outln!("{name}: {} samples", counts.samples);
@@ -18,9 +19,11 @@ pub(super) fn print_counts(summary: &Summary) {
         print_scenario(summary, &summary.total());
     }
     if summary.inference == Inference::Sequential {
-        outln!("Intervals are confidence sequences: they hold however the number of samples came about.");
+        outln!(
+            "Intervals are confidence sequences: they are valid for any rule that determines the number of samples."
+        );
     }
-    outln!("Rates are conditional on the sampled scenario: they are not the risk of a road.");
+    outln!("Rates are conditional on the sampled scenario: they are not the risk on a road.");
 }
 
 /// Prints the verdict with its reasons.
@@ -68,7 +71,7 @@ fn print_arm(name: &str, arm: &ArmCounts, inference: Inference) {
     if arm.engagements > 0 {
         out!("  {} engaged, goal in reach in {}", arm.engagements, arm.goals_in_reach);
     }
-    out!("  up to {:.1} m/s slower than ahead", arm.max_speed_deficit_mps);
+    out!("  up to {:.1} m/s slower than the lead vehicle", arm.max_speed_deficit_mps);
     if arm.errors > 0 {
         out!("  {} ERRORS", arm.errors);
     }

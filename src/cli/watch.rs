@@ -1,30 +1,30 @@
-//! What is written of a run while it is run again: a Rerun file, a table.
+//! Runs a sample and writes what the command line requests: a recording (Rerun file), a trace (table).
 
 use std::cmp::Ordering::Equal;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use closecall_scenarios::criticality::CriticalLaneChange;
-use closecall_scenarios::filters::SmoothedRecording;
-use closecall_traffic::Time;
-
-use super::CliError;
 use closecall_campaign::runner::run_guarded;
 use closecall_report::run::film::{Film, FilmRecorder, Level, film_lane_change};
 use closecall_report::run::rerun::{check_recordable, record_films, write_films};
 use closecall_report::run::trace::TraceWriter;
+use closecall_scenarios::criticality::CriticalLaneChange;
+use closecall_scenarios::filters::SmoothedRecording;
 use closecall_simulation::outcome::Outcome;
 use closecall_simulation::scenario::Scenario;
 use closecall_simulation::{Arm, Happening, Observer, RunKey, StepView};
+use closecall_traffic::Time;
 
-/// How much of a run is kept.
+use super::CliError;
+
+/// The level of detail of a recording.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-enum RecordLevel {
+pub(super) enum RecordLevel {
     /// States, events and plots
     Events,
-    /// The vehicles and what E takes them for as well
+    /// Additionally the vehicles and the ego's perception of them
     Objects,
-    /// The rear sensors' points and pictures as well, where they are simulated
+    /// Additionally the point clouds and images of the rear sensors, if they are simulated
     #[default]
     Full,
 }
@@ -39,22 +39,23 @@ impl From<RecordLevel> for Level {
     }
 }
 
-/// What to write of a run.
+/// The files to write of a run.
 #[derive(Clone, Debug, Default, Args)]
 pub(super) struct WatchArgs {
-    /// Write a Rerun file to look at
+    /// Save a recording of the run, to be viewed with Rerun
     #[arg(long, value_name = "FILE.rrd")]
     pub(super) record: Option<PathBuf>,
-    /// How much of the run a Rerun file holds
+    /// Level of detail of the recording
     #[arg(long, value_enum, default_value_t, requires = "record")]
-    record_level: RecordLevel,
-    /// Write one row per control step and actor; of a pair, of the controller under test
+    pub(super) record_level: RecordLevel,
+    /// Write a trace: a table with one row per control step and actor. With --paired, of the run of the controller
+    /// under test
     #[arg(long, value_name = "FILE.csv|FILE.parquet", value_parser = table)]
     pub(super) trace: Option<PathBuf>,
 }
 
 impl WatchArgs {
-    /// Finds out before any work is done that what is asked for can be written.
+    /// Checks that the requested files can be written, before any work is done.
     fn check(&self) -> Result<(), CliError> {
         if self.record.is_some() && self.record == self.trace {
             return Err(CliError::Usage { message: "--record and --trace name the same file".to_owned() });
@@ -63,16 +64,16 @@ impl WatchArgs {
     }
 }
 
-/// A path whose ending says how a table is written.
+/// Parses the path of a table, whose extension must be .csv or .parquet.
 fn table(text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
     match path.extension().and_then(|extension| extension.to_str()) {
         Some("csv" | "parquet") => Ok(path),
-        _ => Err(format!("`{text}` ends neither with .csv nor with .parquet")),
+        _ => Err(format!("`{text}` must end with .csv or .parquet")),
     }
 }
 
-/// Runs a sample in each of the arms and writes what is asked for; all arms share one Rerun file.
+/// Runs a sample in each arm, and writes the requested files. All arms share one recording.
 pub(super) fn run_watched(
     scenario: &Scenario,
     key: RunKey,
@@ -83,12 +84,12 @@ pub(super) fn run_watched(
     let mut trace = watch.trace.as_deref().map(TraceWriter::new).transpose()?;
     let mut films = Vec::new();
     let mut outcomes = Vec::new();
-    for (place, arm) in arms.iter().enumerate() {
-        let is_tested = place + 1 == arms.len();
+    for (index, arm) in arms.iter().enumerate() {
+        let is_tested = index + 1 == arms.len();
         let mut recorder =
             watch.record.as_ref().map(|_| FilmRecorder::new(scenario, key, arm, watch.record_level.into()));
-        let mut watchers = Watchers { recorder: recorder.as_mut(), trace: trace.as_mut().filter(|_| is_tested) };
-        let outcome = run_guarded(scenario, key, arm, &mut watchers)
+        let mut observers = Observers { recorder: recorder.as_mut(), trace: trace.as_mut().filter(|_| is_tested) };
+        let outcome = run_guarded(scenario, key, arm, &mut observers)
             .map_err(|source| CliError::Sample { sample: key.sample, source })?;
         films.extend(recorder.map(|recorder| recorder.finish(&outcome)));
         outcomes.push(outcome);
@@ -102,7 +103,7 @@ pub(super) fn run_watched(
     Ok(outcomes)
 }
 
-/// Runs a sample in one arm, writes the trace that is asked for, and keeps a film whether or not it is to be recorded.
+/// Runs a sample in one arm, writes the requested trace, and returns a film of the run. The caller saves the recording.
 pub(super) fn run_filmed(
     scenario: &Scenario,
     key: RunKey,
@@ -112,8 +113,8 @@ pub(super) fn run_filmed(
     watch.check()?;
     let mut trace = watch.trace.as_deref().map(TraceWriter::new).transpose()?;
     let mut recorder = FilmRecorder::new(scenario, key, arm, watch.record_level.into());
-    let mut watchers = Watchers { recorder: Some(&mut recorder), trace: trace.as_mut() };
-    let outcome = run_guarded(scenario, key, arm, &mut watchers)
+    let mut observers = Observers { recorder: Some(&mut recorder), trace: trace.as_mut() };
+    let outcome = run_guarded(scenario, key, arm, &mut observers)
         .map_err(|source| CliError::Sample { sample: key.sample, source })?;
     if let Some(trace) = trace {
         trace.finish()?;
@@ -122,13 +123,13 @@ pub(super) fn run_filmed(
     Ok((outcome, film))
 }
 
-/// Everyone who watches a run from the command line.
-struct Watchers<'a> {
+/// The observers of a run that the command line requests.
+struct Observers<'a> {
     recorder: Option<&'a mut FilmRecorder>,
     trace: Option<&'a mut TraceWriter>,
 }
 
-impl Observer for Watchers<'_> {
+impl Observer for Observers<'_> {
     fn step(&mut self, view: &StepView<'_>) {
         if let Some(recorder) = &mut self.recorder {
             recorder.step(view);
@@ -148,7 +149,7 @@ impl Observer for Watchers<'_> {
     }
 }
 
-/// Writes a film of one lane change of a recording: of `track`, or of the most critical one.
+/// Saves a recording of one lane change of a trajectory file: that of `track`, or the most critical one.
 pub(super) fn record_lane_change(
     path: &Path,
     recording: &SmoothedRecording,
@@ -157,13 +158,14 @@ pub(super) fn record_lane_change(
 ) -> Result<(), CliError> {
     let wanted = by_severity(changes, track);
     let Some(chosen) = wanted.first() else {
-        let whose = track.map_or(String::new(), |track| format!(" of track {track}"));
-        return Err(CliError::Usage { message: format!("the recording has no lane change{whose}: nothing to record") });
+        let of_track = track.map_or(String::new(), |track| format!(" of track {track}"));
+        return Err(CliError::Usage { message: format!("the trajectory file has no lane change{of_track} to record") });
     };
     Ok(record_films(path, &[film_lane_change(recording, chosen)?])?)
 }
 
-/// The lane changes of `track`, or of all, the most critical first; of equals, the later one.
+/// Returns the lane changes of `track`, or of all tracks, the most critical first. Of two equal ones the later is
+/// first.
 pub(super) fn by_severity(changes: &[CriticalLaneChange], track: Option<u64>) -> Vec<&CriticalLaneChange> {
     let is_wanted = |change: &&CriticalLaneChange| track.is_none_or(|track| change.lane_change.track_id == track);
     let mut wanted: Vec<&CriticalLaneChange> = changes.iter().rev().filter(is_wanted).collect();
@@ -171,7 +173,7 @@ pub(super) fn by_severity(changes: &[CriticalLaneChange], track: Option<u64>) ->
     wanted
 }
 
-/// How many metrics are critical, and how near the nearest vehicle came.
+/// Returns the number of critical metrics, and the negative distance to the nearest vehicle (m).
 fn severity(change: &CriticalLaneChange) -> (usize, f64) {
     let critical = change.metrics.named().iter().filter(|(_, metric)| metric.is_critical()).count();
     (critical, -change.metrics.distance_m.value().unwrap_or(f64::INFINITY))

@@ -1,38 +1,38 @@
 //! Probabilities of the binomial distribution.
 //!
-//! A single probability is computed by its deviance and the error of Stirling's formula, after C. Loader, *Fast and
-//! accurate computation of binomial probabilities* (2000): differences of large logarithms, which would cost half of
-//! the digits at a million samples, do not occur. A tail is the sum of single probabilities, each a simple multiple of
-//! its neighbour; the sum is over positive terms alone, and stops where they no longer count.
+//! A single probability is computed from its deviance and the error of Stirling's formula, after C. Loader, *Fast and
+//! accurate computation of binomial probabilities* (2000). This avoids differences of large logarithms, which would lose
+//! half of the digits at a million samples. A tail is the sum of single probabilities, each a simple multiple of its
+//! neighbour. The sum has positive terms only, and stops when further terms no longer change it.
 
 use std::f64::consts::PI;
 
-/// From here on Stirling's series has all digits; below, factorials are exact.
+/// Smallest n for which Stirling's series is accurate to all digits. Factorials of smaller n are exact in `f64`.
 const SERIES_FROM: u64 = 16;
 
-/// Largest relative distance between a count and its mean at which the deviance is summed up as a series.
-const NEAR: f64 = 0.1;
+/// Ratio |x − m|/(x + m) of a count x and its mean m below which the deviance is computed as a series.
+const SERIES_BELOW: f64 = 0.1;
 
-/// By how much ln n! exceeds Stirling's formula ln √(2πn) + n·ln n − n.
+/// Returns the error of Stirling's formula: ln n! − (ln √(2πn) + n·ln n − n).
 fn stirling_error(n: u64) -> f64 {
     let x = n as f64;
     if n < SERIES_FROM {
         let factorial: f64 = (1..=n).map(|factor| factor as f64).product();
         return factorial.ln() - (0.5 * (2.0 * PI * x).ln() + x * x.ln() - x);
     }
-    // The series of Stirling, with Bernoulli numbers over 2j(2j − 1).
+    // Stirling's series: its coefficients are Bernoulli numbers divided by 2j(2j − 1).
     let inverse = 1.0 / x;
     let square = inverse * inverse;
     inverse * (1.0 / 12.0 - square * (1.0 / 360.0 - square * (1.0 / 1_260.0 - square * (1.0 / 1_680.0))))
 }
 
-/// The deviance x·ln(x/m) + m − x of a count x from its mean m, both above 0.
+/// Returns the deviance x·ln(x/m) + m − x of a count x from its mean m, which must both be positive.
 fn deviance(x: f64, mean: f64) -> f64 {
     let (difference, sum) = (x - mean, x + mean);
-    if difference.abs() >= NEAR * sum {
+    if difference.abs() >= SERIES_BELOW * sum {
         return x * (x / mean).ln() + mean - x;
     }
-    // With v = (x − m)/(x + m), ln(x/m) = 2·artanh(v): what cancels is left out.
+    // With v = (x − m)/(x + m), ln(x/m) = 2·artanh(v). The terms that would cancel are left out of the series.
     let v = difference / sum;
     let mut power = 2.0 * x * v;
     let mut total = difference * v;
@@ -47,7 +47,8 @@ fn deviance(x: f64, mean: f64) -> f64 {
     total
 }
 
-/// Probability of exactly `hits` hits in `samples` samples of probability `p`; NaN where `p` is no probability.
+/// Returns the probability of exactly `hits` hits in `samples` samples with probability `p` each. Returns NaN if `p` is not
+/// in \[0, 1\].
 pub fn probability(hits: u64, samples: u64, p: f64) -> f64 {
     if !(0.0..=1.0).contains(&p) {
         return f64::NAN;
@@ -73,10 +74,10 @@ pub fn probability(hits: u64, samples: u64, p: f64) -> f64 {
     logarithm.exp() * (n / (2.0 * PI * k * (n - k))).sqrt()
 }
 
-/// The tail up to and including `hits`, over the probability of `hits` itself: 1 + the ratios of the terms below.
+/// Returns the probability of at most `hits` hits, divided by that of exactly `hits` hits.
 ///
-/// Meant for `hits` at or below the mean, where the terms fall.
-fn tail_over_last(hits: u64, samples: u64, p: f64) -> f64 {
+/// `hits` should be at or below the mean, where the terms of the sum decrease.
+fn lower_tail_ratio(hits: u64, samples: u64, p: f64) -> f64 {
     let odds = (1.0 - p) / p;
     let (mut term, mut sum) = (1.0, 1.0);
     for step in 1..=hits {
@@ -90,7 +91,8 @@ fn tail_over_last(hits: u64, samples: u64, p: f64) -> f64 {
     sum
 }
 
-/// Probability of at most `hits` hits in `samples` samples of probability `p`; NaN where `p` is no probability.
+/// Returns the probability of at most `hits` hits in `samples` samples with probability `p` each. Returns NaN if `p` is not
+/// in \[0, 1\].
 pub fn at_most(hits: u64, samples: u64, p: f64) -> f64 {
     if !(0.0..=1.0).contains(&p) {
         return f64::NAN;
@@ -102,14 +104,15 @@ pub fn at_most(hits: u64, samples: u64, p: f64) -> f64 {
         return if p == 0.0 { 1.0 } else { 0.0 };
     }
     if hits as f64 <= samples as f64 * p {
-        tail_over_last(hits, samples, p) * probability(hits, samples, p)
+        lower_tail_ratio(hits, samples, p) * probability(hits, samples, p)
     } else {
-        // The other tail begins above the mean: small, and free of cancellation here.
+        // The upper tail starts above the mean, so that it is small and the difference does not cancel.
         1.0 - at_least(hits + 1, samples, p)
     }
 }
 
-/// Probability of at least `hits` hits in `samples` samples of probability `p`; NaN where `p` is no probability.
+/// Returns the probability of at least `hits` hits in `samples` samples with probability `p` each. Returns NaN if `p` is
+/// NaN, or if it is outside \[0, 1\] and `hits` does not exceed `samples`.
 pub fn at_least(hits: u64, samples: u64, p: f64) -> f64 {
     if hits > samples {
         return if p.is_nan() { f64::NAN } else { 0.0 };
@@ -118,7 +121,7 @@ pub fn at_least(hits: u64, samples: u64, p: f64) -> f64 {
         return 1.0;
     }
     if hits as f64 >= samples as f64 * p && p > 0.0 && p < 1.0 {
-        upper_tail_over_first(hits, samples, p) * probability(hits, samples, p)
+        upper_tail_ratio(hits, samples, p) * probability(hits, samples, p)
     } else if (0.0..=1.0).contains(&p) {
         1.0 - at_most(hits - 1, samples, p)
     } else {
@@ -126,7 +129,9 @@ pub fn at_least(hits: u64, samples: u64, p: f64) -> f64 {
     }
 }
 
-/// The tail from `hits` on, over the probability of `hits` itself: the other tail's mirror image.
-pub(super) fn upper_tail_over_first(hits: u64, samples: u64, p: f64) -> f64 {
-    tail_over_last(samples - hits, samples, 1.0 - p)
+/// Returns the probability of at least `hits` hits, divided by that of exactly `hits` hits.
+///
+/// `hits` should be at or above the mean, where the terms of the sum decrease.
+pub(super) fn upper_tail_ratio(hits: u64, samples: u64, p: f64) -> f64 {
+    lower_tail_ratio(samples - hits, samples, 1.0 - p)
 }

@@ -1,17 +1,17 @@
-//! How sure one can be of a probability from samples, and of a difference from pairs.
+//! Statistical inference about probabilities from samples, and about the difference of two arms from paired samples.
 //!
 //! ```text
-//!   n fixed in advance ─▶ exact intervals (Clopper–Pearson), exact McNemar test
-//!   looked at on the way ─▶ confidence sequence: valid at every n at once
+//!   number of samples n fixed in advance ─▶ exact intervals (Clopper–Pearson), exact McNemar test
+//!   results inspected during sampling   ─▶ confidence sequence: valid at every n at once
 //! ```
 //!
-//! * [`binomial`]: probabilities of the binomial distribution, to the last few bits
-//! * [`interval`]: exact bounds of a probability at a number of samples that was fixed in advance
-//! * [`sequence`]: bounds that hold at every number of samples at once, and may therefore be looked at all the time
-//! * [`needed`]: how many samples a bound still needs
-//! * [`mcnemar`]: whether pairs differ
+//! * [`binomial`]: probabilities of the binomial distribution, accurate to the last few bits
+//! * [`interval`]: exact bounds of a probability for a number of samples that is fixed in advance
+//! * [`sequence`]: bounds of a probability that hold at every number of samples at once, and may be inspected at any time
+//! * [`needed`]: the number of samples that a bound needs
+//! * [`mcnemar`]: whether two arms differ on the same samples
 //!
-//! Everything here rests on samples that are independent and equally distributed, as those of the random design are.
+//! All methods assume independent, identically distributed samples, as in the random sampling design.
 
 pub mod binomial;
 pub mod interval;

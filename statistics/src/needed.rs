@@ -1,38 +1,44 @@
-//! How many samples a bound still needs.
+//! The number of samples that a bound needs.
 //!
-//! The answer depends on what the further samples will show, which nobody knows; so it is given under two assumptions:
-//! that none of them is a hit, which is the least that can be needed, and that they are hits at the rate observed.
+//! It depends on the results of further samples, which are unknown. It is therefore computed under two assumptions: that
+//! none of them is a hit, which gives the smallest possible number, and that they are hits at the observed rate.
 
-/// Numbers of samples above this are not looked for.
+/// Largest number of samples that is considered.
 pub const MOST_SAMPLES: u64 = 100_000_000;
 
-/// The smallest number of samples, `hits` of them hits, with which `passes`: which has to go from false to true once as
-/// the samples grow. Nothing where that is more than [`MOST_SAMPLES`].
+/// Returns the smallest number of samples for which `passes(hits, samples)` holds, with a fixed number of hits. `passes` must
+/// change from false to true once as the number of samples grows.
+///
+/// Returns `None` if more than [`MOST_SAMPLES`] would be needed.
 pub fn least_samples(hits: u64, passes: impl Fn(u64, u64) -> bool) -> Option<u64> {
-    let most = MOST_SAMPLES.max(hits);
-    first(hits, most, |samples| passes(hits, samples))
+    let max_samples = MOST_SAMPLES.max(hits);
+    first_that_holds(hits, max_samples, |samples| passes(hits, samples))
 }
 
-/// The smallest number of samples with which `passes` where they go on to be hits at the rate of `hits` in `samples`,
-/// rounded up. Nothing where that is more than [`MOST_SAMPLES`], or never.
+/// Returns the smallest number of samples for which `passes(hits, samples)` holds, if further samples are hits at the rate of
+/// `hits` in `samples`. The number of hits is rounded up.
+///
+/// Returns `None` if more than [`MOST_SAMPLES`] would be needed, or if no number suffices.
 pub fn samples_at_rate(hits: u64, samples: u64, passes: impl Fn(u64, u64) -> bool) -> Option<u64> {
     if hits == 0 || samples == 0 {
         return least_samples(hits, passes);
     }
-    // With j hits at that rate there are at most j·n/k samples, and more than (j − 1)·n/k.
-    let with = |total_hits: u64| u128::from(total_hits) * u128::from(samples) / u128::from(hits);
-    let enough =
-        |total_hits: u64| least_samples(total_hits, &passes).is_some_and(|least| u128::from(least) <= with(total_hits));
-    let most_hits = u64::try_from(u128::from(MOST_SAMPLES) * u128::from(hits) / u128::from(samples)).ok()?;
-    let total_hits = first(hits, most_hits.max(hits), enough)?;
-    let before = u64::try_from(with(total_hits - 1)).ok()?;
+    // At the rate of k hits in n samples, j hits mean at most j·n/k samples, and more than (j − 1)·n/k.
+    let max_samples_with = |total_hits: u64| u128::from(total_hits) * u128::from(samples) / u128::from(hits);
+    let is_enough = |total_hits: u64| {
+        least_samples(total_hits, &passes).is_some_and(|least| u128::from(least) <= max_samples_with(total_hits))
+    };
+    let max_hits = u64::try_from(u128::from(MOST_SAMPLES) * u128::from(hits) / u128::from(samples)).ok()?;
+    let total_hits = first_that_holds(hits, max_hits.max(hits), is_enough)?;
+    let before = u64::try_from(max_samples_with(total_hits - 1)).ok()?;
     least_samples(total_hits, &passes).map(|least| least.max(before + 1)).filter(|total| *total <= MOST_SAMPLES)
 }
 
-/// The first number in `from ..= to` with which `holds`, which has to go from false to true once.
+/// Returns the first number in `from ..= to` for which `holds` is true, or `None` if there is none. `holds` must change from
+/// false to true once.
 ///
-/// Looked for by doubling the distance from `from`, then by halving: `holds` may become slow for large numbers.
-fn first(from: u64, to: u64, holds: impl Fn(u64) -> bool) -> Option<u64> {
+/// The search doubles the distance from `from`, then bisects, since `holds` may be slow for large numbers.
+fn first_that_holds(from: u64, to: u64, holds: impl Fn(u64) -> bool) -> Option<u64> {
     if holds(from) {
         return Some(from);
     }

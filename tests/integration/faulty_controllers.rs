@@ -131,9 +131,9 @@ fn run(fault: Option<Fault>, jobs: usize) -> (Vec<Record>, Summary) {
     let campaign = campaign(fault, jobs);
     let mut summary = campaign.summary();
     let mut records = Vec::new();
-    let finished = campaign.run(None, |turn| {
-        summary.push(turn.record);
-        records.push(turn.record.clone());
+    let finished = campaign.run(None, |next| {
+        summary.push(next.record);
+        records.push(next.record.clone());
         ControlFlow::Continue(())
     });
     finished.unwrap();
@@ -183,10 +183,10 @@ fn each_fault_is_an_error_with_its_reason_and_leaves_the_other_samples_unchanged
 
 /// Runs `campaign` in a folder, and stops it after `samples` more samples.
 fn run_part(campaign: &Campaign, path: &Path, samples: usize) {
-    let held = Folder::hold(path, &manifest(campaign), true).unwrap();
+    let locked = Folder::lock(path, &manifest(campaign), true).unwrap();
     let mut left = samples;
-    let finished = campaign.run(Some(&held), |turn| {
-        left = if turn.is_new { left - 1 } else { left };
+    let finished = campaign.run(Some(&locked), |next| {
+        left = if next.is_new { left - 1 } else { left };
         if left == 0 { ControlFlow::Break(End::Campaign) } else { ControlFlow::Continue(()) }
     });
     finished.unwrap();

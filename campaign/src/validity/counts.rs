@@ -1,20 +1,20 @@
-//! What the validity checks found.
+//! The findings of the validity checks.
 
 use serde::{Deserialize, Serialize};
 
-/// A check that must not make a difference.
+/// A change under which the result must stay the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Invariance {
-    /// The same run again.
+    /// The same run is repeated.
     Repetition,
-    /// Another order of the actors.
+    /// The actors are in another order.
     ActorOrder,
-    /// Another number of threads.
+    /// The number of threads differs.
     Threads,
-    /// Left and right exchanged.
+    /// Left and right are exchanged.
     Mirror,
-    /// Half the time step, where it ends in an error.
+    /// The time step is halved; broken if that run ends in an error.
     HalfStep,
 }
 
@@ -22,7 +22,7 @@ impl Invariance {
     /// Every check.
     pub const ALL: [Self; 5] = [Self::Repetition, Self::ActorOrder, Self::Threads, Self::Mirror, Self::HalfStep];
 
-    /// The name in reports.
+    /// Returns the name in reports.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Repetition => "repetition",
@@ -33,7 +33,7 @@ impl Invariance {
         }
     }
 
-    /// What it means that the check found something.
+    /// Returns what a failure of the check means, as a sentence.
     pub const fn finding(self) -> &'static str {
         match self {
             Self::Repetition => "the same run gave another outcome when repeated",
@@ -45,30 +45,30 @@ impl Invariance {
     }
 }
 
-/// What the checks of one sample found in one arm.
+/// The findings of the checks of one sample in one arm.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ArmChecks {
-    /// Whether E collided at half the time step; nothing where that run has no outcome.
+    /// Whether the ego collided at half the time step; `None` if that run has no outcome.
     pub collided_at_half_step: Option<bool>,
-    /// The checks that made a difference where none may be.
+    /// The checks that failed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub broken: Vec<Invariance>,
 }
 
-/// What the checks found in a campaign.
+/// The findings of the checks of a campaign.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CheckCounts {
-    /// Runs that were checked: samples times arms.
+    /// Number of runs that were checked: samples times arms.
     pub runs: u64,
-    /// Verdicts that flipped at half the time step.
+    /// Number of runs whose verdict (collision or none) flipped at half the time step.
     pub flips: u64,
-    /// How often each check made a difference, in the order of [`Invariance::ALL`].
+    /// Number of failures of each check, in the order of [`Invariance::ALL`].
     pub counts: [u64; Invariance::ALL.len()],
 }
 
 impl CheckCounts {
-    /// Takes in what was found about a run in which E did or did not collide.
-    pub fn take(&mut self, found: &ArmChecks, collided: bool) {
+    /// Adds the findings about one run. `collided` says whether the ego collided in that run.
+    pub fn push(&mut self, found: &ArmChecks, collided: bool) {
         self.runs += 1;
         self.flips += u64::from(found.collided_at_half_step.is_some_and(|halved| halved != collided));
         for &check in &found.broken {
@@ -76,24 +76,24 @@ impl CheckCounts {
         }
     }
 
-    /// Counts a check that made a difference.
+    /// Counts a failure of a check.
     pub fn count(&mut self, check: Invariance) {
         for (count, known) in self.counts.iter_mut().zip(Invariance::ALL) {
             *count += u64::from(known == check);
         }
     }
 
-    /// The checks that made a difference, with how often.
+    /// Returns the checks that failed, each with the number of its failures.
     pub fn broken(&self) -> impl Iterator<Item = (Invariance, u64)> {
         Invariance::ALL.into_iter().zip(self.counts).filter(|(_, count)| *count > 0)
     }
 
-    /// Share of the checked verdicts that flipped; nothing where none was checked.
+    /// Returns the share of the checked verdicts that flipped; `None` if none was checked.
     pub fn flip_rate(&self) -> Option<f64> {
         (self.runs > 0).then(|| self.flips as f64 / self.runs as f64)
     }
 
-    /// Adds what was found in another campaign.
+    /// Adds the findings of another campaign or scenario.
     pub fn add(&mut self, other: &Self) {
         self.runs += other.runs;
         self.flips += other.flips;

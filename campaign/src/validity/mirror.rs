@@ -1,19 +1,20 @@
-//! Whether one outcome is the mirror image of another.
+//! Tests whether one outcome is the mirror image of another.
 //!
-//! Mirroring changes how coordinates are rounded, so that bits cannot be asked for; what follows from them can: who
-//! collided with whom, on which sides, and when.
+//! Mirroring changes how coordinates are rounded, so that the bits may differ. The colliding vehicles, the sides that
+//! they struck, and the time of the collision must agree.
 
+use closecall_simulation::outcome::{Collision, Outcome};
 use closecall_traffic::Time;
 use closecall_traffic::geometry::BoxSide;
 
-use closecall_simulation::outcome::{Collision, Outcome};
+/// Largest difference between the collision times of mirrored runs: one step of the vehicles.
+const TOLERANCE: Time = Time::from_ms(10);
 
-/// First touches of mirrored runs are no further apart than one step of the vehicles.
-const SAME_TIME: Time = Time::from_ms(10);
-
-/// True where `image` is the mirror image of `outcome`: the same first collision, on the mirrored sides, or none.
+/// Returns true if `image` is the mirror image of `outcome`: both have the same first collision, on mirrored sides, or
+/// none.
 ///
-/// What follows a first collision depends on how rapier's solver orders its contacts, which has no mirror image.
+/// Later collisions are not compared. They depend on the order in which rapier's solver treats contacts, which has no
+/// mirror image.
 pub(super) fn is_mirror_image(image: &Outcome, outcome: &Outcome) -> bool {
     match (image.collisions.first(), outcome.collisions.first()) {
         (Some(image), Some(original)) => is_mirrored(image, original),
@@ -22,10 +23,10 @@ pub(super) fn is_mirror_image(image: &Outcome, outcome: &Outcome) -> bool {
 }
 
 fn is_mirrored(image: &Collision, original: &Collision) -> bool {
-    let apart_ns = (image.time - original.time).ns().abs();
+    let difference_ns = (image.time - original.time).ns().abs();
     image.between == original.between
         && image.struck_side == original.struck_side.map(mirrored)
-        && apart_ns <= SAME_TIME.ns()
+        && difference_ns <= TOLERANCE.ns()
 }
 
 fn mirrored(side: BoxSide) -> BoxSide {

@@ -1,41 +1,41 @@
-//! One sample run again under changes that must not matter.
+//! Runs one sample again under changes that must not matter.
 
 use std::thread;
 
 use closecall_sensors::SensorMode;
-
-use super::mirror::is_mirror_image;
-use super::{ArmChecks, Invariance};
-use crate::runner::run_guarded;
 use closecall_simulation::outcome::Outcome;
 use closecall_simulation::scenario::Scenario;
 use closecall_simulation::{Arm, NoObserver, RunKey, SampleError};
 
-/// One sample in one arm.
+use super::mirror::is_mirror_image;
+use super::{ArmChecks, Invariance};
+use crate::runner::run_guarded;
+
+/// One sample in one arm, to be checked.
 #[derive(Clone, Copy)]
-pub(crate) struct Subject<'a> {
-    /// What is run.
+pub(crate) struct CheckedRun<'a> {
+    /// The concrete scenario.
     pub(crate) scenario: &'a Scenario,
-    /// Which sample it is.
+    /// The seed and the number of the sample.
     pub(crate) key: RunKey,
-    /// In which arm.
+    /// The arm.
     pub(crate) arm: &'a Arm,
 }
 
 type Run = Result<Outcome, SampleError>;
 
-impl Subject<'_> {
-    /// Checks this sample, which came to `outcome`.
+impl CheckedRun<'_> {
+    /// Checks this run, whose outcome is `outcome`.
     ///
-    /// The order of the actors and the number of threads are changed at once, in one run on a fresh thread beside those
-    /// that the campaign has; only where that makes a difference is it looked for which of the two did.
+    /// One run on a new thread changes the order of the actors and the number of threads together. Only if its outcome
+    /// differs do further runs determine the cause.
     pub(crate) fn check(&self, outcome: &Outcome) -> ArmChecks {
         let reversed = self.scenario.reversed();
-        let (elsewhere, halved) =
-            beside(|| self.run(&reversed, self.arm), || self.run(&self.scenario.at_half_step(), self.arm));
+        let (reordered, halved) =
+            on_new_thread(|| self.run(&reversed, self.arm), || self.run(&self.scenario.at_half_step(), self.arm));
         let mut broken = Vec::new();
-        if !is_same(&elsewhere, outcome) {
-            broken.push(self.culprit(&reversed, outcome));
+        if !is_same(&reordered, outcome) {
+            broken.push(self.cause(&reversed, outcome));
         }
         if !self.is_mirrored(outcome) {
             broken.push(Invariance::Mirror);
@@ -50,22 +50,23 @@ impl Subject<'_> {
         run_guarded(scenario, self.key, arm, &mut NoObserver)
     }
 
-    /// What made the difference. Where no single change does it again, the run does not even repeat itself.
-    fn culprit(&self, reversed: &Scenario, outcome: &Outcome) -> Invariance {
+    /// Returns the change that makes the outcome differ. If no single change does so again, the run is not repeatable.
+    fn cause(&self, reversed: &Scenario, outcome: &Outcome) -> Invariance {
         let differs = |run: Run| !is_same(&run, outcome);
         if differs(self.run(self.scenario, self.arm)) {
             Invariance::Repetition
         } else if differs(self.run(reversed, self.arm)) {
             Invariance::ActorOrder
-        } else if differs(beside(|| self.run(self.scenario, self.arm), || ()).0) {
+        } else if differs(on_new_thread(|| self.run(self.scenario, self.arm), || ()).0) {
             Invariance::Threads
         } else {
             Invariance::Repetition
         }
     }
 
-    /// True where the mirrored world comes to the mirrored outcome, or there is none. The full sensors are replaced by
-    /// object-level ones: the LiDAR's scan pattern has no mirror image.
+    /// Returns true if the mirrored scenario has the mirrored outcome, or if the scenario has no mirror image.
+    ///
+    /// Object-level sensors replace the full sensor simulation, since the LiDAR's scan pattern has no mirror image.
     fn is_mirrored(&self, outcome: &Outcome) -> bool {
         let Some(mirrored) = self.scenario.mirrored() else { return true };
         let mode = self.arm.sensors.unwrap_or(self.scenario.sensors.mode());
@@ -84,12 +85,13 @@ fn is_same(run: &Run, outcome: &Outcome) -> bool {
     run.as_ref().is_ok_and(|again| again.has_same_bits(outcome))
 }
 
-/// Does one thing on a fresh thread while another is done here. Where no thread can be had, both are done here.
-fn beside<T: Send, U>(there: impl Fn() -> T + Sync, here: impl FnOnce() -> U) -> (T, U) {
+/// Runs `there` on a new thread and `here` on this one, at the same time. If no thread can be started, this thread runs
+/// both.
+fn on_new_thread<T: Send, U>(there: impl Fn() -> T + Sync, here: impl FnOnce() -> U) -> (T, U) {
     thread::scope(|scope| {
-        let fresh = thread::Builder::new().name("check".to_owned()).spawn_scoped(scope, &there);
+        let handle = thread::Builder::new().name("check".to_owned()).spawn_scoped(scope, &there);
         let here = here();
-        let there = fresh.ok().and_then(|fresh| fresh.join().ok()).unwrap_or_else(&there);
+        let there = handle.ok().and_then(|handle| handle.join().ok()).unwrap_or_else(&there);
         (there, here)
     })
 }

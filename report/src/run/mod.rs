@@ -1,8 +1,8 @@
-//! One run, or a pair of them.
+//! Output of one run, or of a pair of runs.
 //!
 //! ```text
-//!  simulation ─▶ FilmRecorder ─▶ Film ─▶ rerun (to look at) │ figure (to print)
-//!             └▶ TraceWriter ─▶ CSV or Parquet (to compute with)
+//!  simulation ─▶ FilmRecorder ─▶ Film ─▶ rerun (to view) │ figure (to print)
+//!             └▶ TraceWriter ─▶ CSV or Parquet (to evaluate)
 //! ```
 
 pub mod figure;

@@ -1,4 +1,4 @@
-//! A run as a table: one row for each control step and actor, as CSV or Parquet.
+//! The trace of a run: a table with one row per control step and actor, as CSV or Parquet.
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -13,6 +13,7 @@ use crate::table::{field, properties};
 use closecall_scenarios::atomic::{WriteError, check_writable, write_file};
 use closecall_simulation::{Happening, Observer, StepView};
 
+/// The file format of a trace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Format {
     Csv,
@@ -20,9 +21,9 @@ enum Format {
 }
 
 impl Format {
-    /// By the ending of the file's name.
-    fn of(path: &Path) -> io::Result<Self> {
-        match path.extension().and_then(|ending| ending.to_str()) {
+    /// Returns the format that the extension of `path` stands for.
+    fn from_path(path: &Path) -> io::Result<Self> {
+        match path.extension().and_then(|extension| extension.to_str()) {
             Some("csv") => Ok(Self::Csv),
             Some("parquet") => Ok(Self::Parquet),
             _ => Err(io::Error::new(io::ErrorKind::InvalidInput, "a trace is a file *.csv or *.parquet")),
@@ -30,7 +31,7 @@ impl Format {
     }
 }
 
-/// One actor at one control step.
+/// One row: an actor at a control step.
 #[derive(Clone, Debug)]
 struct Row {
     time: Time,
@@ -44,7 +45,7 @@ struct Row {
     thw_front_s: Measured,
 }
 
-/// Watches a run and writes it as a table. What does not exist is an empty cell, or null.
+/// Observes a run and writes its trace. A value that does not exist is an empty cell in CSV and null in Parquet.
 pub struct TraceWriter {
     path: PathBuf,
     format: Format,
@@ -52,12 +53,12 @@ pub struct TraceWriter {
 }
 
 impl TraceWriter {
-    /// A writer into the file `path`, whose name says the format.
+    /// Creates a writer of the file `path`, whose extension gives the format.
     ///
     /// # Errors
-    /// [`WriteError`] where the name ends neither with `.csv` nor with `.parquet`, or no file can be made there.
+    /// [`WriteError`] if the extension is neither `.csv` nor `.parquet`, or if no file can be created there.
     pub fn new(path: &Path) -> Result<Self, WriteError> {
-        let format = Format::of(path).map_err(|error| WriteError::new(path, error))?;
+        let format = Format::from_path(path).map_err(|error| WriteError::new(path, error))?;
         check_writable(path)?;
         Ok(Self { path: path.to_owned(), format, rows: Vec::new() })
     }
@@ -65,7 +66,7 @@ impl TraceWriter {
     /// Writes the file.
     ///
     /// # Errors
-    /// [`WriteError`] where it cannot be written whole.
+    /// [`WriteError`] if the file cannot be written completely.
     pub fn finish(self) -> Result<(), WriteError> {
         write_file(&self.path, |file| match self.format {
             Format::Csv => write_csv(file, &self.rows),
@@ -93,7 +94,8 @@ impl Observer for TraceWriter {
     fn happening(&mut self, _: Time, _: &Happening) {}
 }
 
-/// Names of actors need no quoting: they are letters, digits and hyphens. Numbers read back to the same bits.
+/// Writes the rows as CSV. The names of actors need no quotes, because they consist of letters, digits and hyphens. The
+/// numbers have enough digits to be read back to the same bits.
 fn write_csv(file: &mut (impl Write + ?Sized), rows: &[Row]) -> io::Result<()> {
     writeln!(file, "time_s,actor,lane,s_m,d_m,speed_mps,acceleration_mps2,gap_front_m,thw_front_s")?;
     for row in rows {
@@ -105,6 +107,7 @@ fn write_csv(file: &mut (impl Write + ?Sized), rows: &[Row]) -> io::Result<()> {
     Ok(())
 }
 
+/// Writes the rows as Parquet, in one record batch.
 fn write_parquet(file: &mut (impl Write + Send + ?Sized), rows: &[Row]) -> io::Result<()> {
     let schema = Arc::new(Schema::new(vec![
         field("time_s", DataType::Float64, Some("s")),
@@ -117,17 +120,17 @@ fn write_parquet(file: &mut (impl Write + Send + ?Sized), rows: &[Row]) -> io::R
         field("gap_front_m", DataType::Float64, Some("m")),
         field("thw_front_s", DataType::Float64, Some("s")),
     ]));
-    let number = |of: fn(&Row) -> Option<f64>| -> ArrayRef { Arc::new(rows.iter().map(of).collect::<Float64Array>()) };
+    let floats = |of: fn(&Row) -> Option<f64>| -> ArrayRef { Arc::new(rows.iter().map(of).collect::<Float64Array>()) };
     let columns = vec![
-        number(|row| Some(row.time.s())),
+        floats(|row| Some(row.time.s())),
         Arc::new(rows.iter().map(|row| Some(row.actor.as_str())).collect::<StringArray>()),
         Arc::new(rows.iter().map(|row| Some(row.lane.0)).collect::<UInt8Array>()),
-        number(|row| Some(row.s_m)),
-        number(|row| Some(row.d_m)),
-        number(|row| Some(row.speed_mps)),
-        number(|row| Some(row.acceleration_mps2)),
-        number(|row| row.gap_front_m.ok()),
-        number(|row| row.thw_front_s.ok()),
+        floats(|row| Some(row.s_m)),
+        floats(|row| Some(row.d_m)),
+        floats(|row| Some(row.speed_mps)),
+        floats(|row| Some(row.acceleration_mps2)),
+        floats(|row| row.gap_front_m.ok()),
+        floats(|row| row.thw_front_s.ok()),
     ];
     let batch = RecordBatch::try_new(schema.clone(), columns).map_err(io::Error::other)?;
     let mut writer = ArrowWriter::try_new(file, schema, Some(properties())).map_err(io::Error::other)?;
@@ -157,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_exist_is_an_empty_cell() {
+    fn an_absent_value_is_an_empty_cell() {
         let mut text = Vec::new();
         write_csv(&mut text, &rows()).unwrap();
         let expected = "time_s,actor,lane,s_m,d_m,speed_mps,acceleration_mps2,gap_front_m,thw_front_s\n\
@@ -167,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn a_parquet_trace_is_the_same_every_time() {
+    fn equal_rows_give_equal_parquet_bytes() {
         let mut first = Vec::new();
         write_parquet(&mut first, &rows()).unwrap();
         let mut second = Vec::new();
@@ -177,9 +180,9 @@ mod tests {
     }
 
     #[test]
-    fn the_name_of_the_file_says_its_format() {
-        assert_eq!(Format::of(Path::new("a/b.csv")).unwrap(), Format::Csv);
-        assert_eq!(Format::of(Path::new("b.parquet")).unwrap(), Format::Parquet);
+    fn the_extension_of_the_file_gives_its_format() {
+        assert_eq!(Format::from_path(Path::new("a/b.csv")).unwrap(), Format::Csv);
+        assert_eq!(Format::from_path(Path::new("b.parquet")).unwrap(), Format::Parquet);
         let error = TraceWriter::new(Path::new("trace.txt")).err().unwrap();
         assert_eq!(error.to_string(), "failed to write trace.txt: a trace is a file *.csv or *.parquet");
     }

@@ -1,7 +1,7 @@
-//! What one simulated vehicle would record of itself: its motion at 100 Hz, and on every fourth step what its bus
-//! carries, with the true lane changes beside it.
+//! The log that one simulated vehicle would record of itself, and the ground truth of its lane changes.
 //!
-//! The log has no noise but the rounding of what is written: studies of robustness add their own, with a seed.
+//! The log holds the vehicle's motion at 100 Hz and, on every fourth step, the signals of its bus. It contains no noise
+//! except the rounding of the written numbers. Robustness studies add noise of their own, from a seed.
 
 use closecall_scenarios::recordings::{BusFrame, InCarFrame, InCarLog, MarkingDistances, TrueLaneChange};
 use closecall_traffic::{Dimensions, Lane, Road, Side, Time, VehicleClass, VehicleState};
@@ -9,13 +9,13 @@ use closecall_traffic::{Dimensions, Lane, Road, Side, Time, VehicleClass, Vehicl
 use closecall_simulation::scenario::Scenario;
 use closecall_simulation::{CONTROL_STEP, Happening, Observer, StepView};
 
-/// Pause between two runs, a gap in the log.
+/// Time between two runs, which leaves a gap in the log.
 const PAUSE: Time = Time::from_ms(10_000);
 
-/// A vehicle that moves sideways faster than this changes lanes, or tries to [m/s].
-const SIDEWAYS_MPS: f64 = 0.01;
+/// Lateral speed above which a vehicle counts as changing lanes, or attempting to (m/s).
+const MIN_LATERAL_SPEED_MPS: f64 = 0.01;
 
-/// Writes the log of one vehicle over several runs, one after the other.
+/// Records the log of one vehicle over several runs, one after the other.
 #[derive(Debug)]
 pub struct InCarRecorder {
     actor: String,
@@ -29,27 +29,33 @@ pub struct InCarRecorder {
 /// The current run.
 #[derive(Debug)]
 struct Run {
+    /// Index of the recorded vehicle among the actors.
     actor: usize,
     road: Road,
+    /// Start of the run on the clock of the log.
     start: Time,
-    /// Nothing is recorded any more once the vehicle was hit: what follows is no driving.
-    is_over: bool,
+    /// True while nothing is recorded: the scenario lacks the actor, or the vehicle has collided and no longer drives.
+    has_ended: bool,
     manoeuvre: Option<Manoeuvre>,
-    before: Option<(Lane, Time)>,
+    /// Lane and time of the previous step.
+    previous: Option<(Lane, Time)>,
 }
 
-/// A movement to one side that has begun.
+/// A lateral movement to one side that has begun.
 #[derive(Clone, Copy, Debug)]
 struct Manoeuvre {
     side: Side,
     start: Time,
-    from_the_beginning: bool,
-    crossings: [Option<Crossing>; MOST_CROSSINGS],
+    /// True if the log contains the start of the movement.
+    start_recorded: bool,
+    /// The lane markings crossed so far.
+    crossings: [Option<Crossing>; MAX_CROSSINGS],
 }
 
-/// Nobody crosses more markings than this in one go.
-const MOST_CROSSINGS: usize = 4;
+/// The largest number of lane markings that one manoeuvre is assumed to cross.
+const MAX_CROSSINGS: usize = 4;
 
+/// The crossing of one lane marking.
 #[derive(Clone, Copy, Debug)]
 struct Crossing {
     from: Lane,
@@ -59,35 +65,42 @@ struct Crossing {
 }
 
 impl InCarRecorder {
-    /// A recorder in the vehicle of `actor`, for runs of scenarios that have it.
+    /// Creates a recorder for the vehicle of the actor named `actor`.
     pub fn new(actor: &str) -> Self {
         let class = VehicleClass::Car;
-        let run =
-            Run { actor: 0, road: Road::straight(1), start: Time::ZERO, is_over: true, manoeuvre: None, before: None };
+        let run = Run {
+            actor: 0,
+            road: Road::straight(1),
+            start: Time::ZERO,
+            has_ended: true,
+            manoeuvre: None,
+            previous: None,
+        };
         let (frames, changes, dimensions) = (Vec::new(), Vec::new(), class.typical_dimensions());
         Self { actor: actor.to_owned(), frames, changes, run, class, dimensions }
     }
 
-    /// Begins the next run. Nothing of it is recorded where the scenario has no such actor.
+    /// Begins the next run. Nothing of it is recorded if the scenario has no such actor.
     pub fn begin(&mut self, scenario: &Scenario) {
         self.end_manoeuvre(false);
-        self.run.is_over = true;
+        self.run.has_ended = true;
         let Some(actor) = scenario.actors.iter().position(|actor| actor.id.as_str() == self.actor) else { return };
         let start = self.frames.last().map_or(Time::ZERO, |frame| frame.time + PAUSE);
-        // Every run starts on the bus's clock, so that the log has one clock.
+        // Every run starts at a multiple of the bus period, so that the bus signals of the whole log share one clock.
         let start = start + Time::from_ns((CONTROL_STEP.ns() - start.ns() % CONTROL_STEP.ns()) % CONTROL_STEP.ns());
         let vehicle = &scenario.actors[actor].vehicle;
         (self.class, self.dimensions) = (vehicle.class, vehicle.dimensions);
-        self.run = Run { actor, road: scenario.road, start, is_over: false, manoeuvre: None, before: None };
+        self.run = Run { actor, road: scenario.road, start, has_ended: false, manoeuvre: None, previous: None };
     }
 
-    /// The log, and what is true about it.
+    /// Returns the log and the true lane changes.
     pub fn finish(mut self) -> (InCarLog, Vec<TrueLaneChange>) {
         self.end_manoeuvre(false);
         (InCarLog { class: self.class, dimensions: self.dimensions, frames: self.frames }, self.changes)
     }
 
-    fn record(&mut self, time: Time, state: &VehicleState) {
+    /// Appends one row to the log.
+    fn push_frame(&mut self, time: Time, state: &VehicleState) {
         let Run { road, start, .. } = self.run;
         let lane = road.lane_at(state.d_m);
         let on_bus = time.is_multiple_of(CONTROL_STEP);
@@ -105,24 +118,24 @@ impl InCarRecorder {
             yaw_rate_radps: state.yaw_rate_radps,
             bus: on_bus.then_some(BusFrame { speed_mps: state.speed_mps, markings }),
         });
-        self.follow(start + time, lane, state);
+        self.update_manoeuvre(start + time, lane, state);
     }
 
-    /// Keeps track of the true lane changes.
-    fn follow(&mut self, time: Time, lane: Lane, state: &VehicleState) {
-        let sideways_mps = state.speed_mps * state.heading_rad.sin();
-        let side = if sideways_mps > 0.0 { Side::Left } else { Side::Right };
-        let is_sideways = sideways_mps.abs() > SIDEWAYS_MPS;
-        if self.run.manoeuvre.is_some_and(|manoeuvre| !is_sideways || manoeuvre.side != side) {
+    /// Updates the current manoeuvre and, when it ends, the true lane changes.
+    fn update_manoeuvre(&mut self, time: Time, lane: Lane, state: &VehicleState) {
+        let lateral_speed_mps = state.speed_mps * state.heading_rad.sin();
+        let side = if lateral_speed_mps > 0.0 { Side::Left } else { Side::Right };
+        let moves_laterally = lateral_speed_mps.abs() > MIN_LATERAL_SPEED_MPS;
+        if self.run.manoeuvre.is_some_and(|manoeuvre| !moves_laterally || manoeuvre.side != side) {
             self.end_manoeuvre(true);
         }
-        let before = self.run.before.replace((lane, time));
-        if is_sideways && self.run.manoeuvre.is_none() {
-            let from_the_beginning = before.is_some();
-            let crossings = [None; MOST_CROSSINGS];
-            self.run.manoeuvre = Some(Manoeuvre { side, start: time, from_the_beginning, crossings });
+        let previous = self.run.previous.replace((lane, time));
+        if moves_laterally && self.run.manoeuvre.is_none() {
+            let start_recorded = previous.is_some();
+            let crossings = [None; MAX_CROSSINGS];
+            self.run.manoeuvre = Some(Manoeuvre { side, start: time, start_recorded, crossings });
         }
-        let Some((from, _)) = before.filter(|(from, _)| *from != lane) else { return };
+        let Some((from, _)) = previous.filter(|(from, _)| *from != lane) else { return };
         if let Some(manoeuvre) = &mut self.run.manoeuvre
             && let Some(free) = manoeuvre.crossings.iter_mut().find(|crossing| crossing.is_none())
         {
@@ -130,9 +143,11 @@ impl InCarRecorder {
         }
     }
 
-    fn end_manoeuvre(&mut self, to_the_end: bool) {
-        let Some(Manoeuvre { side, start, from_the_beginning, crossings }) = self.run.manoeuvre.take() else { return };
-        let end = self.run.before.map_or(start, |(_, time)| time);
+    /// Ends the current manoeuvre, if any, and appends its lane changes. `end_recorded` is true if the vehicle stopped
+    /// moving to that side, false if the run ended first.
+    fn end_manoeuvre(&mut self, end_recorded: bool) {
+        let Some(Manoeuvre { side, start, start_recorded, crossings }) = self.run.manoeuvre.take() else { return };
+        let end = self.run.previous.map_or(start, |(_, time)| time);
         for Crossing { from, to, time, speed_mps } in crossings.into_iter().flatten() {
             self.changes.push(TrueLaneChange {
                 direction: side,
@@ -142,7 +157,7 @@ impl InCarRecorder {
                 crossing_s: time.s(),
                 end_s: end.s(),
                 speed_mps,
-                complete: from_the_beginning && to_the_end,
+                complete: start_recorded && end_recorded,
             });
         }
     }
@@ -153,15 +168,15 @@ impl Observer for InCarRecorder {
 
     fn happening(&mut self, _: Time, what: &Happening) {
         if let Happening::Collision(collision) = what {
-            self.run.is_over |= collision.between.iter().any(|actor| actor.as_str() == self.actor);
+            self.run.has_ended |= collision.between.iter().any(|actor| actor.as_str() == self.actor);
         }
     }
 
     fn moved(&mut self, time: Time, vehicles: &mut dyn Iterator<Item = VehicleState>) {
-        if !self.run.is_over
+        if !self.run.has_ended
             && let Some(state) = vehicles.nth(self.run.actor)
         {
-            self.record(time, &state);
+            self.push_frame(time, &state);
         }
     }
 }

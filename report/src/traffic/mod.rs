@@ -1,4 +1,4 @@
-//! Trajectory data: made by the simulator, or shown as charts.
+//! Simulated traffic written as trajectory data, and charts of trajectory data.
 
 pub mod in_car;
 pub mod recorder;

@@ -1,4 +1,4 @@
-//! Simulated traffic as a recording, in the layout in which recorded traffic is read.
+//! Simulated traffic as trajectory data, in the layout in which recorded traffic is read.
 
 use closecall_scenarios::recordings::Recording;
 use closecall_traffic::{Lane, Time, Trajectory, TrajectoryPoint};
@@ -6,29 +6,31 @@ use closecall_traffic::{Lane, Time, Trajectory, TrajectoryPoint};
 use closecall_simulation::scenario::Scenario;
 use closecall_simulation::{CONTROL_STEP, Happening, Observer, StepView};
 
-/// Pause between two runs, so that vehicles of different runs never meet.
+/// Time between two runs, so that vehicles of different runs never meet.
 const PAUSE: Time = Time::from_ms(10_000);
 
-/// Collects the vehicles of several runs into one recording, one run after the other.
+/// Collects the trajectories of several runs into one trajectory data set, one run after the other.
 #[derive(Debug, Default)]
 pub struct TrafficRecorder {
     trajectories: Vec<Trajectory>,
-    /// Place of the current run's first vehicle.
-    first: usize,
+    /// Index of the first trajectory of the current run.
+    first_index: usize,
+    /// Start of the current run on the clock of the data set.
     start: Time,
+    /// Latest instant recorded so far.
     end: Time,
 }
 
 impl TrafficRecorder {
-    /// Begins the next run.
+    /// Begins the next run, a run of `scenario`.
     pub fn begin(&mut self, scenario: &Scenario) {
-        self.first = self.trajectories.len();
-        self.start = if self.first == 0 { Time::ZERO } else { self.end + PAUSE };
+        self.first_index = self.trajectories.len();
+        self.start = if self.first_index == 0 { Time::ZERO } else { self.end + PAUSE };
         for actor in &scenario.actors {
-            let number = self.trajectories.len() as u64 + 1;
+            let id = self.trajectories.len() as u64 + 1;
             self.trajectories.push(Trajectory {
-                track_id: number,
-                vehicle_id: number,
+                track_id: id,
+                vehicle_id: id,
                 class: actor.vehicle.class,
                 dimensions: actor.vehicle.dimensions,
                 points: Vec::new(),
@@ -36,7 +38,7 @@ impl TrafficRecorder {
         }
     }
 
-    /// The recording of all runs.
+    /// Returns the trajectories of all runs as one data set of this name.
     pub fn finish(self, name: &str) -> Recording {
         Recording::new(name, CONTROL_STEP, self.trajectories)
     }
@@ -46,7 +48,7 @@ impl Observer for TrafficRecorder {
     fn step(&mut self, view: &StepView<'_>) {
         let time = self.start + view.time;
         self.end = time;
-        for (vehicle, trajectory) in view.vehicles.iter().zip(&mut self.trajectories[self.first..]) {
+        for (vehicle, trajectory) in view.vehicles.iter().zip(&mut self.trajectories[self.first_index..]) {
             let state = &vehicle.state;
             let (sin, cos) = state.heading_rad.sin_cos();
             let Lane(lane) = view.scenario.road.lane_at(state.d_m);

@@ -1,33 +1,34 @@
-//! Rows that follow each other to tracks without gaps.
+//! Assembly of consecutive rows into gapless tracks.
 
 use closecall_traffic::{Dimensions, Lane, Time, Trajectory, TrajectoryPoint};
 
-use super::source::{Clock, Refusal, Row};
-use super::{RecordedTrack, RecordingProblem};
+use super::error::RecordingProblem;
+use super::recording::RecordedTrack;
+use super::source::{Clock, ReadError, Row};
 
-/// Steps of time may differ from the period by this share: files round their times.
+/// Permitted deviation of a time step, as a share of the period. Files round their times.
 const UNEVENNESS: f64 = 0.02;
 
-/// What lies between two rows of one vehicle.
+/// The relation between two consecutive rows of one vehicle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Step {
-    /// The next frame.
+    /// The second row is the next frame.
     Next,
-    /// At least one frame is missing.
+    /// At least one frame is missing between the rows.
     Gap,
 }
 
-/// What lies between two rows of one vehicle, of which `row` is the later one in time.
+/// Determines whether `row` is the next frame after `before`. `row` is the later one in time.
 ///
 /// # Errors
-/// Where both stand for the same instant, or time and frame disagree.
-pub(super) fn step(before: &Row, row: &Row, period: Time) -> Result<Step, Refusal> {
+/// Fails if both rows describe the same instant, or if time and frame number disagree.
+pub(super) fn step(before: &Row, row: &Row, period: Time) -> Result<Step, ReadError> {
     let (later, earlier) = if row.line > before.line { (row, before) } else { (before, row) };
     let (frames, step) = (row.frame - before.frame, row.time - before.time);
     if frames == 0 && (step == Time::ZERO || row.clock == Clock::Continuous) {
         let problem =
             RecordingProblem::DuplicateRow { vehicle: row.number, frame: row.frame, first_line: earlier.line };
-        return Err(Refusal::new(later.line, problem));
+        return Err(ReadError::new(later.line, problem));
     }
     let is_near = |count: i64| {
         let off_ns = step.ns().saturating_sub(period.ns().saturating_mul(count));
@@ -47,23 +48,23 @@ pub(super) fn step(before: &Row, row: &Row, period: Time) -> Result<Step, Refusa
         step_s: step.s(),
         needed_s: period.s() * frames as f64,
     };
-    Err(Refusal::new(row.line, problem))
+    Err(ReadError::new(row.line, problem))
 }
 
-/// The track that `rows`, which follow each other without gaps, make up; there is at least one.
-pub(super) fn track(track_id: u64, rows: &[Row], start: Time) -> Option<RecordedTrack> {
+/// Builds the track of `rows`, which follow one another without gaps. Returns `None` if there are no rows.
+pub(super) fn assemble_track(track_id: u64, rows: &[Row], start: Time) -> Option<RecordedTrack> {
     let first = rows.first()?;
     let height_m = first.class.typical_dimensions().height_m;
     let speed = |row: &Row| row.speed_mps;
-    let lateral_speeds: Vec<f64> = (0..rows.len()).map(|k| slope(rows, k, |row| row.d_m)).collect();
+    let lateral_speeds: Vec<f64> = (0..rows.len()).map(|k| derivative(rows, k, |row| row.d_m)).collect();
     let point = |(k, row): (usize, &Row)| TrajectoryPoint {
         time: row.time - start,
         s_m: row.s_m,
         d_m: row.d_m,
         speed_mps: row.speed_mps,
-        acceleration_mps2: row.acceleration_mps2.unwrap_or_else(|| slope(rows, k, speed)),
+        acceleration_mps2: row.acceleration_mps2.unwrap_or_else(|| derivative(rows, k, speed)),
         lateral_speed_mps: lateral_speeds[k],
-        lateral_acceleration_mps2: slope_of(rows, k, |k| lateral_speeds[k]),
+        lateral_acceleration_mps2: derivative_by_index(rows, k, |k| lateral_speeds[k]),
         lane: Lane(row.lane),
     };
     let trajectory = Trajectory {
@@ -81,12 +82,13 @@ pub(super) fn track(track_id: u64, rows: &[Row], start: Time) -> Option<Recorded
     })
 }
 
-/// The derivative of `value` at row `k` by central differences, one-sided at both ends.
-fn slope(rows: &[Row], k: usize, value: impl Fn(&Row) -> f64) -> f64 {
-    slope_of(rows, k, |k| value(&rows[k]))
+/// Returns the derivative of `value` at row `k`, by central differences, one-sided at both ends.
+fn derivative(rows: &[Row], k: usize, value: impl Fn(&Row) -> f64) -> f64 {
+    derivative_by_index(rows, k, |k| value(&rows[k]))
 }
 
-fn slope_of(rows: &[Row], k: usize, value: impl Fn(usize) -> f64) -> f64 {
+/// Works like [`derivative`], for values given by row index.
+fn derivative_by_index(rows: &[Row], k: usize, value: impl Fn(usize) -> f64) -> f64 {
     let (left, right) = (k.saturating_sub(1), (k + 1).min(rows.len() - 1));
     if left == right {
         return 0.0;

@@ -3,34 +3,36 @@
 //! (M. Althoff, M. Koschi, S. Manzinger, "CommonRoad: Composable benchmarks for motion planning on roads", IV 2017; and
 //! the format's documentation.)
 //!
-//! Each state of a dynamic obstacle is a row: number = the obstacle's id, frame = the time step, position = the middle of
-//! its shape. Positions are projected on the road that the lanelets make up, see [`super::lanelets`]; several roads, as
-//! of both directions, are laid 1 km apart beside each other. Static obstacles, planning problems and signs are passed over.
-//! The acceleration is derived where a state has none. Values have to be exact: states that are intervals are refused.
+//! Each state of a dynamic obstacle becomes a row. The row's number is the obstacle's id, its frame is the time step,
+//! and its position is the middle of the obstacle's shape, projected onto the road that the lanelets form; see
+//! `lanelets`. Several roads, such as those of both directions, are shifted 1 km apart. Static obstacles, planning
+//! problems and signs are ignored. If a state has no acceleration, it is derived from neighbouring frames. The reader
+//! rejects states whose values are intervals instead of exact values.
 
 use std::collections::BTreeMap;
 use std::io::BufRead;
 
 use closecall_traffic::{Time, VehicleClass};
 
-use super::fields::{Bounds, Fault, integer, number, wrong_value};
+use super::fields::{Bounds, FieldError, integer, number, wrong_value};
 use super::lanelets::{Lanelet, Roads};
 use super::plain::allowed;
+use super::recording::{Layout, MarkingDistances};
 use super::reference_line::Point;
-use super::source::{About, Clock, Refusal, Row, RowSource};
+use super::source::{Clock, FileInfo, ReadError, Row, RowSource};
 use super::xml::{Node, Xml};
-use super::{Layout, MarkingDistances};
 
+/// The attributes that the reader uses.
 const ATTRIBUTES: &[&str] = &["id", "ref", "drivingDir", "timeStepSize", "benchmarkID"];
-/// From a thousandth of a second on: shorter steps vanish in whole nanoseconds, or make derivatives overflow.
+/// Allowed time step. Shorter steps vanish when rounded to whole nanoseconds, or make derivatives overflow.
 const STEP_S: Bounds = Bounds::closed(0.001, 100.0);
 const PLANE_M: Bounds = allowed::PLANE_M;
 const ANGLE_RAD: Bounds = Bounds::closed(-100.0, 100.0);
 const VELOCITY_MPS: Bounds = Bounds::closed(-150.0, 150.0);
 const LANELET_IDS: (i64, i64) = (-1_000_000_000_000, 1_000_000_000_000);
 
-/// The most points that the lanelets may have: a scenario of some kilometres has some thousands.
-const MOST_POINTS: usize = 200_000;
+/// Maximum number of points of all lanelets. A scenario of some kilometres has some thousands.
+const MAX_POINTS: usize = 200_000;
 
 /// Reads the states of a CommonRoad scenario.
 pub(super) struct CommonRoadSource<R> {
@@ -70,18 +72,20 @@ struct State {
 }
 
 impl<R: BufRead> CommonRoadSource<R> {
+    /// Opens a scenario and reads its root element.
+    ///
     /// # Errors
-    /// Where the root is not that of a CommonRoad scenario.
-    pub(super) fn new(source: R) -> Result<Self, Refusal> {
+    /// Fails if the root element is not that of a CommonRoad scenario.
+    pub(super) fn new(source: R) -> Result<Self, ReadError> {
         let mut xml = Xml::new(source, ATTRIBUTES);
-        let Node::Begin { name, attributes } = xml.next()? else { return xml.refuse("there is no element") };
+        let Node::Begin { name, attributes } = xml.next()? else { return xml.fail("there is no element") };
         if name != "commonRoad" {
-            return xml.refuse(format!("the root element is `{name}`, but `commonRoad` is needed"));
+            return xml.fail(format!("the root element is `{name}`, but `commonRoad` is needed"));
         }
         let mut attributes: BTreeMap<_, _> = attributes.into_iter().collect();
         let step = match attributes.get("timeStepSize") {
-            Some(text) => Time::from_s(at(&xml, number(text, "timeStepSize", STEP_S))?),
-            None => return xml.refuse("`commonRoad` has no attribute `timeStepSize`"),
+            Some(text) => Time::from_s(with_line(&xml, number(text, "timeStepSize", STEP_S))?),
+            None => return xml.fail("`commonRoad` has no attribute `timeStepSize`"),
         };
         Ok(Self {
             xml,
@@ -98,27 +102,28 @@ impl<R: BufRead> CommonRoadSource<R> {
         })
     }
 
-    fn begin(&mut self, name: &str, attributes: &[(&'static str, String)]) -> Result<(), Refusal> {
+    /// Processes the beginning of an element.
+    fn begin(&mut self, name: &str, attributes: &[(&'static str, String)]) -> Result<(), ReadError> {
         let attribute = |wanted| attributes.iter().find(|(known, _)| *known == wanted).map(|(_, text)| text.as_str());
         let depth = self.xml.path().len();
         match name {
             "lanelet" if depth == 2 => {
                 if self.roads.is_some() {
-                    return self.xml.refuse("lanelets have to stand before the obstacles");
+                    return self.xml.fail("lanelets have to stand before the obstacles");
                 }
-                let id = at(&self.xml, integer(attribute("id").unwrap_or_default(), "id", LANELET_IDS))?;
+                let id = with_line(&self.xml, integer(attribute("id").unwrap_or_default(), "id", LANELET_IDS))?;
                 if self.lanelets.contains_key(&id) {
-                    return self.xml.refuse(format!("lanelet {id} stands there twice"));
+                    return self.xml.fail(format!("lanelet {id} stands there twice"));
                 }
                 self.lanelet = Some((id, Lanelet::default()));
             }
             "dynamicObstacle" | "obstacle" if depth == 2 => {
-                let id =
-                    at(&self.xml, integer(attribute("id").unwrap_or_default(), "id", allowed::IDS))?.unsigned_abs();
+                let id = with_line(&self.xml, integer(attribute("id").unwrap_or_default(), "id", allowed::IDS))?
+                    .unsigned_abs();
                 self.obstacle = Some(Obstacle { id, is_dynamic: name == "dynamicObstacle", ..Obstacle::default() });
             }
             "adjacentLeft" | "adjacentRight" | "successor" if depth == 3 => {
-                let other = at(&self.xml, integer(attribute("ref").unwrap_or_default(), "ref", LANELET_IDS));
+                let other = with_line(&self.xml, integer(attribute("ref").unwrap_or_default(), "ref", LANELET_IDS));
                 let is_same = attribute("drivingDir").is_none_or(|direction| direction == "same");
                 let Some((_, lanelet)) = &mut self.lanelet else { return Ok(()) };
                 match name {
@@ -134,8 +139,8 @@ impl<R: BufRead> CommonRoadSource<R> {
         Ok(())
     }
 
-    /// The element at `path` ends, with `text` in it.
-    fn end(&mut self, path: &[&str], text: &str) -> Result<Option<Row>, Refusal> {
+    /// Processes the end of the element at `path`, which contains `text`.
+    fn end(&mut self, path: &[&str], text: &str) -> Result<Option<Row>, ReadError> {
         let checked = match path {
             [_, "lanelet", _, "point", "x"] => number(text, "x", PLANE_M).map(|x_m| self.point.0 = x_m),
             [_, "lanelet", _, "point", "y"] => number(text, "y", PLANE_M).map(|y_m| self.point.1 = y_m),
@@ -146,7 +151,7 @@ impl<R: BufRead> CommonRoadSource<R> {
             [_, "lanelet"] => {
                 if let Some((id, lanelet)) = self.lanelet.take() {
                     if lanelet.left.len() < 2 || lanelet.right.len() < 2 {
-                        return self.xml.refuse(format!("each bound of lanelet {id} needs at least two points"));
+                        return self.xml.fail(format!("each bound of lanelet {id} needs at least two points"));
                     }
                     self.lanelets.insert(id, lanelet);
                 }
@@ -157,17 +162,18 @@ impl<R: BufRead> CommonRoadSource<R> {
             }
             _ => Ok(()),
         };
-        at(&self.xml, checked).map(|()| None)
+        with_line(&self.xml, checked).map(|()| None)
     }
 
-    fn add_point(&mut self, is_left: bool) -> Result<(), Refusal> {
+    /// Adds the point that has just ended to a bound of the current lanelet.
+    fn add_point(&mut self, is_left: bool) -> Result<(), ReadError> {
         let (x_m, y_m) = self.point;
         if !(x_m.is_finite() && y_m.is_finite()) {
-            return self.xml.refuse("a point needs `x` and `y`");
+            return self.xml.fail("a point needs `x` and `y`");
         }
         self.points += 1;
-        if self.points > MOST_POINTS {
-            return self.xml.refuse(format!("the lanelets have more than {MOST_POINTS} points"));
+        if self.points > MAX_POINTS {
+            return self.xml.fail(format!("the lanelets have more than {MAX_POINTS} points"));
         }
         if let Some((_, lanelet)) = &mut self.lanelet {
             if is_left { lanelet.left.push((x_m, y_m)) } else { lanelet.right.push((x_m, y_m)) }
@@ -175,7 +181,8 @@ impl<R: BufRead> CommonRoadSource<R> {
         Ok(())
     }
 
-    fn end_in_obstacle(&mut self, inner: &[&str], text: &str) -> Result<Option<Row>, Refusal> {
+    /// Processes the end of an element inside an obstacle; `inner` is its path within the obstacle.
+    fn end_in_obstacle(&mut self, inner: &[&str], text: &str) -> Result<Option<Row>, ReadError> {
         let Some(obstacle) = &mut self.obstacle else { return Ok(None) };
         let state = &mut self.state;
         let checked = match inner {
@@ -199,13 +206,13 @@ impl<R: BufRead> CommonRoadSource<R> {
             ["trajectory", "state"] | ["initialState"] => return self.row(),
             _ => Ok(()),
         };
-        at(&self.xml, checked).map(|()| None)
+        with_line(&self.xml, checked).map(|()| None)
     }
 
-    /// The row of the state that has just ended.
-    fn row(&mut self) -> Result<Option<Row>, Refusal> {
+    /// Returns the row of the state that has just ended.
+    fn row(&mut self) -> Result<Option<Row>, ReadError> {
         if self.roads.is_none() {
-            self.roads = Some(Roads::of(&std::mem::take(&mut self.lanelets)));
+            self.roads = Some(Roads::from_lanelets(&std::mem::take(&mut self.lanelets)));
         }
         let state = std::mem::take(&mut self.state);
         let (Some(obstacle), Some(roads)) = (&mut self.obstacle, &self.roads) else { return Ok(None) };
@@ -213,22 +220,22 @@ impl<R: BufRead> CommonRoadSource<R> {
             return Ok(None);
         }
         if roads.is_empty() {
-            return self.xml.refuse("there are no lanelets before the first obstacle");
+            return self.xml.fail("there are no lanelets before the first obstacle");
         }
         let (Some(x_m), Some(y_m), Some(frame)) = (state.x_m, state.y_m, state.step) else {
-            return self.xml.refuse("a state needs an exact `time` and a `position` that is a point");
+            return self.xml.fail("a state needs an exact `time` and a `position` that is a point");
         };
         let (Some(heading_rad), Some(velocity_mps)) = (state.heading_rad, state.speed_mps) else {
-            return self.xml.refuse("a state needs an exact `orientation` and `velocity`");
+            return self.xml.fail("a state needs an exact `orientation` and `velocity`");
         };
         let (Some(class), Some(length_m), Some(width_m)) = (obstacle.class, obstacle.length_m, obstacle.width_m) else {
             return self
                 .xml
-                .refuse("an obstacle needs a `type` and a `shape` that is a rectangle or a circle before its states");
+                .fail("an obstacle needs a `type` and a `shape` that is a rectangle or a circle before its states");
         };
-        let road = *obstacle.road.get_or_insert_with(|| roads.choose((x_m, y_m), heading_rad));
-        let Some(place) = roads.place(road, (x_m, y_m)) else { return Ok(None) };
-        let along = (heading_rad - place.heading_rad).cos();
+        let road = *obstacle.road.get_or_insert_with(|| roads.road_at((x_m, y_m), heading_rad));
+        let Some(position) = roads.locate(road, (x_m, y_m)) else { return Ok(None) };
+        let along = (heading_rad - position.heading_rad).cos();
         let (number, period) = (obstacle.id, self.step.unwrap_or_default());
         Ok(Some(Row {
             number,
@@ -237,9 +244,9 @@ impl<R: BufRead> CommonRoadSource<R> {
             frame,
             time: period * frame,
             clock: Clock::Continuous,
-            s_m: place.s_m,
-            d_m: place.d_m,
-            lane: place.lane,
+            s_m: position.s_m,
+            d_m: position.d_m,
+            lane: position.lane,
             speed_mps: velocity_mps * along,
             acceleration_mps2: state.acceleration_mps2.map(|acceleration| acceleration * along),
             length_m,
@@ -251,7 +258,8 @@ impl<R: BufRead> CommonRoadSource<R> {
     }
 }
 
-fn state_value(state: &mut State, value: &[&str], text: &str) -> Result<(), Fault> {
+/// Stores a value of a state.
+fn state_value(state: &mut State, value: &[&str], text: &str) -> Result<(), FieldError> {
     match value {
         ["position", "point", "x"] => state.x_m = Some(number(text, "x", PLANE_M)?),
         ["position", "point", "y"] => state.y_m = Some(number(text, "y", PLANE_M)?),
@@ -266,23 +274,25 @@ fn state_value(state: &mut State, value: &[&str], text: &str) -> Result<(), Faul
     Ok(())
 }
 
-fn at<R: BufRead, T>(xml: &Xml<R>, result: Result<T, Fault>) -> Result<T, Refusal> {
-    result.map_err(|fault| Refusal::new(xml.line(), fault))
+/// Attaches the current line to an error.
+fn with_line<R: BufRead, T>(xml: &Xml<R>, result: Result<T, FieldError>) -> Result<T, ReadError> {
+    result.map_err(|error| ReadError::new(xml.line(), error))
 }
 
-/// CommonRoad's types; what is neither truck nor motorcycle counts as a car.
-fn class(text: &str) -> Result<VehicleClass, Fault> {
+/// Parses CommonRoad's obstacle types. Trucks and buses count as trucks, bicycles and pedestrians as motorcycles, and the
+/// other road users as cars.
+fn class(text: &str) -> Result<VehicleClass, FieldError> {
     match text {
         "car" | "taxi" | "parkedVehicle" | "priorityVehicle" | "unknown" => Ok(VehicleClass::Car),
         "truck" | "bus" => Ok(VehicleClass::Truck),
         "motorcycle" | "bicycle" | "pedestrian" => Ok(VehicleClass::Motorcycle),
-        _ => Err(Fault::at("type", wrong_value(text, "one of CommonRoad's types of road users".to_owned()))),
+        _ => Err(FieldError::at("type", wrong_value(text, "one of CommonRoad's types of road users".to_owned()))),
     }
 }
 
 impl<R: BufRead> RowSource for CommonRoadSource<R> {
-    fn about(&self) -> About {
-        About {
+    fn info(&self) -> FileInfo {
+        FileInfo {
             layout: Layout::Commonroad,
             name: self.name.clone(),
             period: self.step,
@@ -290,7 +300,7 @@ impl<R: BufRead> RowSource for CommonRoadSource<R> {
         }
     }
 
-    fn next_row(&mut self) -> Result<Option<Row>, Refusal> {
+    fn next_row(&mut self) -> Result<Option<Row>, ReadError> {
         while !self.is_over {
             match self.xml.next()? {
                 Node::Begin { name, attributes } => self.begin(&name, &attributes)?,
@@ -308,7 +318,7 @@ impl<R: BufRead> RowSource for CommonRoadSource<R> {
         }
         let is_without_rows = self.roads.is_none();
         if is_without_rows && self.lanelets.is_empty() {
-            return self.xml.refuse("there are neither lanelets nor dynamic obstacles");
+            return self.xml.fail("there are neither lanelets nor dynamic obstacles");
         }
         Ok(None)
     }

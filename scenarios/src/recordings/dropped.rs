@@ -1,55 +1,56 @@
-//! What was left out of a recording, and why.
+//! Rows that the reader skips, and why.
 
 use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::source::Refusal;
+use super::source::ReadError;
 
-/// Rows that were left out, by reason.
+/// The skipped rows, grouped by reason.
 #[derive(Debug, Default, Serialize)]
 #[serde(transparent)]
 pub struct Dropped {
     reasons: BTreeMap<&'static str, DroppedRows>,
     #[serde(skip)]
-    first: Option<Refusal>,
+    first: Option<ReadError>,
 }
 
-/// Rows that were left out for one reason.
+/// The rows skipped for one reason.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct DroppedRows {
-    /// How many.
+    /// Number of rows.
     pub count: u64,
-    /// Line of the first.
+    /// Line of the first of them.
     pub first_line: Option<u64>,
-    /// What is wrong with the first.
+    /// Problem with the first of them.
     pub first: String,
 }
 
 impl Dropped {
-    pub(super) fn add(&mut self, refusal: Refusal) {
+    /// Counts a row that is skipped because of `error`.
+    pub(super) fn add(&mut self, error: ReadError) {
         let first = || {
-            let column = refusal.column.map(|column| format!("column `{column}` ")).unwrap_or_default();
-            DroppedRows { count: 0, first_line: refusal.line, first: format!("{column}{}", refusal.problem) }
+            let column = error.column.map(|column| format!("column `{column}` ")).unwrap_or_default();
+            DroppedRows { count: 0, first_line: error.line, first: format!("{column}{}", error.problem) }
         };
-        self.reasons.entry(refusal.problem.kind()).or_insert_with(first).count += 1;
+        self.reasons.entry(error.problem.kind()).or_insert_with(first).count += 1;
         if self.first.is_none() {
-            self.first = Some(refusal);
+            self.first = Some(error);
         }
     }
 
-    /// The reasons by name, with what they were met for.
+    /// Returns the reasons by name, each with its rows.
     pub fn reasons(&self) -> impl Iterator<Item = (&'static str, &DroppedRows)> {
         self.reasons.iter().map(|(kind, rows)| (*kind, rows))
     }
 
-    /// Number of rows that were left out.
+    /// Returns the number of skipped rows.
     pub fn count(&self) -> u64 {
         self.reasons.values().map(|rows| rows.count).sum()
     }
 
-    /// What keeps the recording from being used as a whole.
-    pub(super) fn take_first(&mut self) -> Option<Refusal> {
+    /// Removes and returns the first error.
+    pub(super) fn take_first(&mut self) -> Option<ReadError> {
         self.first.take()
     }
 }

@@ -1,21 +1,21 @@
-//! What can be wrong with a recording.
+//! Errors of reading and writing trajectory files.
 
 use std::fmt;
 use std::io;
 use std::path::PathBuf;
 
-use super::Layout;
+use super::recording::Layout;
 
-/// A recording that could not be read: nothing of it is used.
+/// An error while reading a trajectory file. None of the file's data is used.
 #[derive(Debug, thiserror::Error)]
 pub struct RecordingError {
-    /// The file.
+    /// Path of the file.
     pub path: PathBuf,
-    /// The line, counted from 1, where one is to blame.
+    /// Line at error, counted from 1, if a single line is.
     pub line: Option<u64>,
-    /// The column's name, where one is to blame.
+    /// Name of the column at error, if a single column is.
     pub column: Option<&'static str>,
-    /// What is wrong.
+    /// The problem itself.
     #[source]
     pub problem: RecordingProblem,
 }
@@ -34,13 +34,13 @@ impl fmt::Display for RecordingError {
 }
 
 impl RecordingError {
-    /// True where the file could not be read at all, as opposed to one whose content is wrong.
+    /// Returns `true` if the file cannot be read at all, as opposed to having wrong content.
     pub fn is_io(&self) -> bool {
         matches!(self.problem, RecordingProblem::Io(_))
     }
 }
 
-/// What is wrong with a recording.
+/// A problem with the content or the reading of a trajectory file.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordingProblem {
     /// The file cannot be opened or read.
@@ -49,39 +49,39 @@ pub enum RecordingProblem {
     /// The compressed stream is damaged or ends too early.
     #[error("the gzip stream is damaged or cut: {0}")]
     Gzip(#[source] io::Error),
-    /// Nothing in it, or a header without rows.
+    /// The file is empty or has only a header.
     #[error("there are no rows; a recording needs at least one")]
     Empty,
-    /// Not a text file.
+    /// The file is not a text file.
     #[error("this is not text; CSV or blank-separated text, or either compressed with gzip, is needed")]
     Binary,
-    /// A line that is no text.
+    /// A line is not valid UTF-8 text.
     #[error("the line is not text in UTF-8")]
     NotText,
-    /// Packed in a way that is not read.
+    /// The file is an archive or uses a compression that is not supported.
     #[error("this is {what}, which is not read; unpack it first, or compress the recording with gzip")]
     Archive {
-        /// What it is.
+        /// Kind of archive or compression.
         what: &'static str,
     },
-    /// Another layout than the one asked for.
+    /// The file has another layout than the caller requires.
     #[error("the content is in the layout {}, not in {asked} as asked for", found.name())]
     OtherLayout {
-        /// The layout that the content tells.
+        /// Layout found in the content.
         found: Layout,
-        /// The layout asked for.
+        /// Layout required by the caller.
         asked: &'static str,
     },
-    /// The last line has no end.
+    /// The last line is not terminated.
     #[error("the last line does not end: the recording may be cut there; if it is whole, end the line")]
     CutLine,
-    /// A line without end.
+    /// A line exceeds the permitted length.
     #[error("the line is longer than {allowed} bytes")]
     LineTooLong {
-        /// The longest that is read.
+        /// Maximum line length (bytes).
         allowed: u64,
     },
-    /// Neither layout fits.
+    /// The first line fits none of the layouts.
     #[error(
         "the first line is neither a header of the plain layout (`track_id, frame, time_s, s_m, …`) or of NGSIM's \
          (`Vehicle_ID, Frame_ID, …`), nor a row of NGSIM's 18 columns; it has {columns} columns and starts with `{start}`"
@@ -89,203 +89,203 @@ pub enum RecordingProblem {
     UnknownLayout {
         /// Number of columns found.
         columns: usize,
-        /// The line's beginning.
+        /// Beginning of the line.
         start: String,
     },
     /// The header lacks a column.
     #[error("the header has no column `{name}`, which the {layout} layout needs")]
     MissingColumn {
-        /// The column.
+        /// Name of the missing column.
         name: &'static str,
-        /// The layout that the rest of the header fits.
+        /// Layout that the rest of the header fits.
         layout: &'static str,
     },
-    /// The header has a column twice.
+    /// The header contains a column twice.
     #[error("the header has the column `{name}` twice")]
     DuplicateColumn {
-        /// The column.
+        /// Name of the column.
         name: String,
     },
-    /// A row that is cut, or has too much.
+    /// A row has too few or too many columns.
     #[error("the row has {found} columns, but {needed} are needed")]
     ColumnCount {
-        /// Number found.
+        /// Number of columns found.
         found: usize,
-        /// Number needed.
+        /// Number of columns required.
         needed: usize,
     },
-    /// A quoted field that does not end.
+    /// A quoted field does not end on its line.
     #[error("a quoted field does not end on its line")]
     OpenQuote,
-    /// A field that is not what the column holds.
+    /// A field holds a value that its column does not allow.
     #[error("is `{value}`, but {allowed} is needed")]
     Value {
-        /// The text found.
+        /// Text found in the field.
         value: String,
-        /// What is allowed.
+        /// Description of the allowed values.
         allowed: String,
     },
-    /// The same instant twice.
+    /// A vehicle has two rows for the same frame.
     #[error(
         "frame {frame} of vehicle {vehicle} stands there twice, first in line {first_line}; one row for each is needed"
     )]
     DuplicateRow {
-        /// The vehicle or track.
+        /// Number of the vehicle or track.
         vehicle: u64,
-        /// The frame.
+        /// Frame number.
         frame: i64,
-        /// The line of the first of them.
+        /// Line of the first of the two rows.
         first_line: u64,
     },
-    /// Time and frame disagree.
+    /// The time step between two rows contradicts their frame numbers.
     #[error(
         "from frame {frame_before} (line {line_before}) to frame {frame} the time of vehicle {vehicle} goes on by \
          {step_s} s, but {needed_s} s is needed, as between the other frames"
     )]
     UnevenTime {
-        /// The vehicle or track.
+        /// Number of the vehicle or track.
         vehicle: u64,
-        /// The earlier frame.
+        /// Frame number of the earlier row.
         frame_before: i64,
-        /// Its line.
+        /// Line of the earlier row.
         line_before: u64,
-        /// The later frame.
+        /// Frame number of the later row.
         frame: i64,
-        /// Time between them as recorded [s].
+        /// Recorded time between the two rows (s).
         step_s: f64,
-        /// Time between them as it should be [s].
+        /// Time between the two rows that their frame numbers require (s).
         needed_s: f64,
     },
-    /// Time that goes back, or stands still, in a log of one vehicle.
+    /// Time decreases or stands still in a log of one vehicle.
     #[error("is {time_s}, after {before_s} in the row before, but time has to go on from row to row")]
     TimeBackwards {
-        /// Time of the row before [s].
+        /// Time of the previous row (s).
         before_s: f64,
-        /// Time of this row [s].
+        /// Time of this row (s).
         time_s: f64,
     },
-    /// A time between two ticks of a log's clock.
+    /// A time in a log lies between two ticks of the log's clock.
     #[error("is {time_s}, but the rows before are {period_s} s apart, and this lies between two of their ticks")]
     OffClock {
-        /// Time of this row [s].
+        /// Time of this row (s).
         time_s: f64,
-        /// Time between two rows [s].
+        /// Time between two rows (s).
         period_s: f64,
     },
-    /// A long recording that is not sorted by vehicle.
+    /// A long file is not sorted by vehicle.
     #[error(
         "vehicle {vehicle} goes on here after rows of others; a recording of more than {rows} rows has to be sorted by \
          vehicle or by time throughout"
     )]
     NotByVehicle {
-        /// The vehicle.
+        /// Number of the vehicle.
         vehicle: u64,
-        /// Longer ones have to be sorted.
+        /// Number of rows above which a file must be sorted.
         rows: usize,
     },
-    /// A long recording that is not sorted by time.
+    /// A long file is not sorted by time.
     #[error(
         "time goes back by {back_s} s; a recording of more than {rows} rows has to be sorted by vehicle or by time \
          throughout"
     )]
     NotByTime {
-        /// By how much [s].
+        /// Amount by which the time decreases (s).
         back_s: f64,
-        /// Longer ones have to be sorted.
+        /// Number of rows above which a file must be sorted.
         rows: usize,
     },
-    /// Tracks that never end.
+    /// Too many rows belong to tracks that are still incomplete.
     #[error("more than {allowed} rows belong to vehicles that are still on the road")]
     TooManyOpen {
-        /// The most that is kept.
+        /// Maximum number of rows held.
         allowed: usize,
     },
-    /// XML that is no CommonRoad scenario.
+    /// The XML is not a readable CommonRoad scenario.
     #[error("this is no CommonRoad scenario that can be read: {what}")]
     Xml {
-        /// What is wrong.
+        /// Description of the problem.
         what: String,
     },
-    /// The rows of a recording of several files, without the others.
+    /// The file is the tracks file of a highD or exiD data set, and its metadata files are missing.
     #[error(
         "the header is that of highD's or exiD's tracks, which need the files with their metadata beside them: \
          NN_tracks.csv, NN_tracksMeta.csv and NN_recordingMeta.csv"
     )]
     NeedsMetadata,
-    /// Traffic that tells no road.
+    /// The road cannot be derived from the traffic, because no vehicle moves.
     #[error("no vehicle moves, so that the road cannot be told from the traffic")]
     NothingMoves,
-    /// Several recordings in one folder.
+    /// A folder contains several data sets.
     #[error(
         "there are {count} recordings in this folder, from {first}_tracks.csv to {last}_tracks.csv: name one of them"
     )]
     SeveralInFolder {
-        /// How many.
+        /// Number of data sets found.
         count: usize,
-        /// What the first one's name begins with.
+        /// File name prefix of the first data set.
         first: String,
-        /// What the last one's name begins with.
+        /// File name prefix of the last data set.
         last: String,
     },
-    /// A table with another number of rows than it has to have.
+    /// A table has a wrong number of rows.
     #[error("there are {found} rows, but {needed} is needed")]
     RowCount {
-        /// Rows found.
+        /// Number of rows found.
         found: usize,
-        /// Rows needed.
+        /// Number of rows required.
         needed: usize,
     },
-    /// A vehicle that stands in the metadata twice.
+    /// A vehicle appears twice in the metadata.
     #[error("vehicle {vehicle} stands there twice, first in line {first_line}")]
     VehicleTwice {
-        /// The vehicle.
+        /// Number of the vehicle.
         vehicle: u64,
-        /// The line of the first of them.
+        /// Line of its first entry.
         first_line: u64,
     },
-    /// A vehicle with another number of rows than the metadata state.
+    /// A vehicle has a different number of rows than its metadata states.
     #[error("vehicle {vehicle} has {found} rows, but {stated} are stated in line {line} of {file}")]
     OtherCount {
-        /// The vehicle.
+        /// Number of the vehicle.
         vehicle: u64,
-        /// Rows found.
+        /// Number of rows found.
         found: u64,
-        /// Rows stated.
+        /// Number of rows stated.
         stated: u64,
-        /// The file with the metadata.
+        /// Name of the metadata file.
         file: String,
-        /// Its line.
+        /// Line in the metadata file.
         line: u64,
     },
-    /// A track with gaps for whose pieces there is no number.
+    /// A track has a gap, but no free track number is left for its pieces.
     #[error("track {track} has a gap, but its number is that of a piece already; numbers of vehicles lie below 10¹²")]
     SplitPiece {
-        /// The track.
+        /// Number of the track.
         track: u64,
     },
-    /// Numbers that no traffic has: units or columns are mixed up.
+    /// Values are implausible for road traffic, which points to mixed-up units or columns.
     #[error("{what} is {found}, but {allowed} is plausible: are units or columns mixed up?")]
     Implausible {
-        /// The quantity.
+        /// Name of the quantity.
         what: &'static str,
-        /// Its value, rounded, with its unit.
+        /// Rounded value with its unit.
         found: String,
-        /// What is plausible.
+        /// Range of plausible values.
         allowed: &'static str,
     },
-    /// Rows of several recordings in one file.
+    /// A file contains rows of several data sets.
     #[error("is `{found}`, but `{first}` is needed as in the first row: one recording for each file")]
     SeveralRecordings {
-        /// The first name.
+        /// Data set name in the first row.
         first: String,
-        /// The other name.
+        /// Data set name in this row.
         found: String,
     },
 }
 
 impl RecordingProblem {
-    /// True where one row is unusable, and the ones behind it need not be.
-    pub(super) fn is_of_row(&self) -> bool {
+    /// Returns `true` if the problem makes only one row unusable.
+    pub(super) fn affects_one_row(&self) -> bool {
         matches!(
             self,
             Self::ColumnCount { .. }
@@ -301,7 +301,7 @@ impl RecordingProblem {
         )
     }
 
-    /// A name for what is wrong with a row, for counting.
+    /// Returns the category of a problem with a row, under which such rows are counted.
     pub(super) fn kind(&self) -> &'static str {
         match self {
             Self::ColumnCount { .. } | Self::CutLine => "cut rows",
@@ -316,35 +316,35 @@ impl RecordingProblem {
     }
 }
 
-/// A recording that could not be written. The file that was there before, if any, is still there.
+/// An error while writing a trajectory file. A file that existed before at the same path is left unchanged.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
     /// The file cannot be written.
     #[error("failed to write the recording {}: {source}", path.display())]
     Io {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// The underlying I/O error.
         source: io::Error,
     },
-    /// A number that is not finite.
+    /// A number is not finite.
     #[error("failed to write the recording: {what} of track {track_id} at {time_s} s is not finite")]
     NotFinite {
-        /// The track.
+        /// Number of the track.
         track_id: u64,
-        /// When [s].
+        /// Time of the point (s).
         time_s: f64,
-        /// The quantity.
+        /// Name of the quantity.
         what: &'static str,
     },
-    /// An instant between two frames.
+    /// The time of a point lies between two frames.
     #[error("failed to write the recording: track {track_id} at {time_s} s lies between two frames of {period_s} s")]
     OffClock {
-        /// The track.
+        /// Number of the track.
         track_id: u64,
-        /// When [s].
+        /// Time of the point (s).
         time_s: f64,
-        /// Time between two frames [s].
+        /// Time between two frames (s).
         period_s: f64,
     },
 }

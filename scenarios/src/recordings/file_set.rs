@@ -1,4 +1,4 @@
-//! The three files of a highD or exiD recording: finding them, and reading those with metadata.
+//! The three files of a highD or exiD data set: locating them and reading the metadata files.
 
 use std::collections::BTreeMap;
 use std::io::BufRead;
@@ -6,42 +6,43 @@ use std::path::{Path, PathBuf};
 
 use closecall_traffic::VehicleClass;
 
-use super::fields::{Bounds, Fault, integer, number, wrong_value};
-use super::layout::Header;
-use super::open::{Digest, at, open_file};
+use super::error::{RecordingError, RecordingProblem};
+use super::fields::{Bounds, FieldError, integer, number, wrong_value};
+use super::header::Header;
+use super::input::{Digest, open_file, with_path};
 use super::plain::allowed;
 use super::rows::{Fields, Lines, Separator};
-use super::source::Refusal;
-use super::{RecordingError, RecordingProblem};
+use super::source::ReadError;
 
-/// The ends of the three files' names.
+/// The suffixes of the three file names.
 const TRACKS: &str = "_tracks.csv";
 const TRACKS_META: &str = "_tracksMeta.csv";
 const RECORDING_META: &str = "_recordingMeta.csv";
 
-/// What compression adds to a name.
+/// The suffix of a compressed file.
 const GZ: &str = ".gz";
 
 const FRAME_RATE_HZ: Bounds = Bounds::closed(1.0, 1_000.0);
+/// Allowed lateral positions of markings (m).
 const MARKING_M: Bounds = Bounds::closed(-1e4, 1e4);
 
-/// The most rows that a vehicle can have.
+/// Allowed number of rows per vehicle.
 const ROWS: (i64, i64) = (0, 1_000_000_000);
 
-/// The three files of one recording.
+/// The three files of one data set.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct FileSet {
     folder: PathBuf,
-    /// What stands before `_tracks.csv`.
+    /// The part of the file names before `_tracks.csv`.
     prefix: String,
 }
 
 impl FileSet {
-    /// The set that `path` means: one of its files, their folder, or what their names begin with. Nothing where `path`
-    /// is a file of another kind.
+    /// Finds the set that `path` denotes: `path` is one of its files, their folder, or the common prefix of their
+    /// names. Returns `None` if `path` is a file of another kind.
     ///
     /// # Errors
-    /// Where a folder has no such set, or several.
+    /// Fails if `path` is a folder that contains no such set, or several.
     pub(super) fn of(path: &Path) -> Result<Option<Self>, RecordingError> {
         if path.is_dir() {
             return Self::in_folder(path).map(Some);
@@ -57,8 +58,9 @@ impl FileSet {
         Ok((!path.exists() && set.path(TRACKS).exists()).then_some(set))
     }
 
+    /// Finds the only set in `folder`.
     fn in_folder(folder: &Path) -> Result<Self, RecordingError> {
-        let io = |error| at(folder, Refusal::of_file(RecordingProblem::Io(error)));
+        let io = |error| with_path(folder, ReadError::of_file(RecordingProblem::Io(error)));
         let mut prefixes = Vec::new();
         for entry in std::fs::read_dir(folder).map_err(io)? {
             let name = entry.map_err(io)?.file_name();
@@ -83,36 +85,36 @@ impl FileSet {
                     last: last.clone(),
                     count: prefixes.len(),
                 };
-                Err(at(folder, Refusal::of_file(problem)))
+                Err(with_path(folder, ReadError::of_file(problem)))
             }
         }
     }
 
-    /// The file with the rows.
+    /// Returns the path of the file with the rows.
     pub(super) fn tracks(&self) -> PathBuf {
         self.path(TRACKS)
     }
 
-    /// A file of the set: the compressed one where only that is there.
+    /// Returns the path of one file of the set. It is the compressed file if only that exists.
     fn path(&self, end: &str) -> PathBuf {
         let plain = self.folder.join(format!("{}{end}", self.prefix));
         let packed = self.folder.join(format!("{}{end}{GZ}", self.prefix));
         if !plain.exists() && packed.exists() { packed } else { plain }
     }
 
-    /// What the two files with metadata say. Hashed with the recording.
+    /// Reads the two metadata files. Their content enters the hash of the data set.
     pub(super) fn meta(&self, digest: &Digest) -> Result<Meta, RecordingError> {
         let (tracks_path, recording_path) = (self.path(TRACKS_META), self.path(RECORDING_META));
         let recording = table(&recording_path, digest, recording_meta)?;
         let [(_, recording)] = <[_; 1]>::try_from(recording).map_err(|rows| {
             let problem = RecordingProblem::RowCount { found: rows.len(), needed: 1 };
-            at(&recording_path, Refusal::of_file(problem))
+            with_path(&recording_path, ReadError::of_file(problem))
         })?;
         let mut vehicles = BTreeMap::new();
         for (line, (id, vehicle)) in table(&tracks_path, digest, vehicle_meta)? {
             if let Some(VehicleMeta { line: first_line, .. }) = vehicles.insert(id, VehicleMeta { line, ..vehicle }) {
                 let problem = RecordingProblem::VehicleTwice { vehicle: id, first_line };
-                return Err(at(&tracks_path, Refusal::new(line, problem)));
+                return Err(with_path(&tracks_path, ReadError::new(line, problem)));
             }
         }
         let file = tracks_path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
@@ -120,38 +122,41 @@ impl FileSet {
     }
 }
 
-/// What the files with metadata say.
+/// The content of both metadata files.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Meta {
     pub(super) recording: RecordingMeta,
     pub(super) vehicles: BTreeMap<u64, VehicleMeta>,
-    /// Name of the file with the vehicles.
+    /// Name of the file that describes the vehicles.
     pub(super) file: String,
 }
 
-/// What `NN_recordingMeta.csv` says.
+/// The content of `NN_recordingMeta.csv`.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct RecordingMeta {
     pub(super) id: String,
+    /// Frames per second (Hz).
     pub(super) frame_rate_hz: f64,
-    /// highD only: from above to below [m].
+    /// Positions y of the upper carriageway's markings in the image frame, from top to bottom (m); highD only.
     pub(super) upper_m: Vec<f64>,
-    /// highD only: from above to below [m].
+    /// Positions y of the lower carriageway's markings in the image frame, from top to bottom (m); highD only.
     pub(super) lower_m: Vec<f64>,
 }
 
-/// What `NN_tracksMeta.csv` says about one vehicle.
+/// The entry of one vehicle in `NN_tracksMeta.csv`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct VehicleMeta {
     pub(super) class: VehicleClass,
-    /// highD only.
+    /// `true` if the vehicle drives on the upper carriageway; highD only.
     pub(super) is_upper: bool,
+    /// Number of rows that the metadata states.
     pub(super) rows: u64,
+    /// Number of rows found so far.
     pub(super) found: u64,
     pub(super) line: u64,
 }
 
-/// One row of a table: the header, its text, its fields.
+/// One row of a metadata table, with the table's header.
 struct Cells<'a> {
     header: &'a Header,
     line: &'a str,
@@ -159,99 +164,101 @@ struct Cells<'a> {
 }
 
 impl<'a> Cells<'a> {
-    /// A field that has to be there; `names` are the spellings in circulation.
-    fn need(&self, names: &[&'static str]) -> Result<&'a str, Fault> {
+    /// Returns a required field. `names` lists the spellings of its column.
+    fn require(&self, names: &[&'static str]) -> Result<&'a str, FieldError> {
         self.find(names).ok_or_else(|| {
             let name = names.first().copied().unwrap_or_default();
             RecordingProblem::MissingColumn { name, layout: "highD or exiD" }.into()
         })
     }
 
+    /// Returns a field, or `None` if the table lacks its column.
     fn find(&self, names: &[&'static str]) -> Option<&'a str> {
         names.iter().find_map(|name| self.header.find(name)).map(|index| self.fields.get(self.line, index))
     }
 }
 
-/// The rows of a small table with a header, each with its line.
+/// Reads the rows of a small table with a header, each with its line number.
 fn table<T>(
     path: &Path,
     digest: &Digest,
-    read: fn(&Cells<'_>) -> Result<T, Fault>,
+    read: fn(&Cells<'_>) -> Result<T, FieldError>,
 ) -> Result<Vec<(u64, T)>, RecordingError> {
-    let input = digest.input(open_file(path)?).map_err(|refusal| at(path, refusal))?;
-    rows(input, read).map_err(|refusal| at(path, refusal))
+    let input = digest.input(open_file(path)?).map_err(|error| with_path(path, error))?;
+    rows(input, read).map_err(|error| with_path(path, error))
 }
 
-fn rows<T>(input: impl BufRead, read: fn(&Cells<'_>) -> Result<T, Fault>) -> Result<Vec<(u64, T)>, Refusal> {
-    let at_line = |(line, problem): (u64, RecordingProblem)| Refusal::new(line, problem);
+fn rows<T>(input: impl BufRead, read: fn(&Cells<'_>) -> Result<T, FieldError>) -> Result<Vec<(u64, T)>, ReadError> {
+    let at_line = |(line, problem): (u64, RecordingProblem)| ReadError::new(line, problem);
     let mut lines = Lines::new(input);
     let mut fields = Fields::default();
     let Some((number, first)) = lines.next().map_err(at_line)? else {
-        return Err(Refusal::of_file(RecordingProblem::Empty));
+        return Err(ReadError::of_file(RecordingProblem::Empty));
     };
-    fields.split(first, Separator::Comma).map_err(|problem| Refusal::new(number, problem))?;
+    fields.split(first, Separator::Comma).map_err(|problem| ReadError::new(number, problem))?;
     let header = Header::new((0..fields.len()).map(|index| fields.get(first, index)));
     let needed = fields.len();
     let mut found = Vec::new();
     while let Some((number, line)) = lines.next().map_err(at_line)? {
-        fields.split(line, Separator::Comma).map_err(|problem| Refusal::new(number, problem))?;
+        fields.split(line, Separator::Comma).map_err(|problem| ReadError::new(number, problem))?;
         if fields.len() != needed {
-            return Err(Refusal::new(number, RecordingProblem::ColumnCount { found: fields.len(), needed }));
+            return Err(ReadError::new(number, RecordingProblem::ColumnCount { found: fields.len(), needed }));
         }
         let row = read(&Cells { header: &header, line, fields: &fields });
-        found.push((number, row.map_err(|fault| Refusal::new(number, fault))?));
-        if lines.is_cut() {
-            return Err(Refusal::new(number, RecordingProblem::CutLine));
+        found.push((number, row.map_err(|error| ReadError::new(number, error))?));
+        if lines.is_unterminated() {
+            return Err(ReadError::new(number, RecordingProblem::CutLine));
         }
     }
     if found.is_empty() {
-        return Err(Refusal::of_file(RecordingProblem::Empty));
+        return Err(ReadError::of_file(RecordingProblem::Empty));
     }
     Ok(found)
 }
 
-fn recording_meta(cells: &Cells<'_>) -> Result<RecordingMeta, Fault> {
+fn recording_meta(cells: &Cells<'_>) -> Result<RecordingMeta, FieldError> {
     Ok(RecordingMeta {
-        id: cells.need(&["id", "recordingId"])?.to_owned(),
-        frame_rate_hz: number(cells.need(&["frameRate"])?, "frameRate", FRAME_RATE_HZ)?,
+        id: cells.require(&["id", "recordingId"])?.to_owned(),
+        frame_rate_hz: number(cells.require(&["frameRate"])?, "frameRate", FRAME_RATE_HZ)?,
         upper_m: markings(cells.find(&["upperLaneMarkings"]).unwrap_or_default(), "upperLaneMarkings")?,
         lower_m: markings(cells.find(&["lowerLaneMarkings"]).unwrap_or_default(), "lowerLaneMarkings")?,
     })
 }
 
-/// `8.51;12.59;16.43`: at least two, rising.
-fn markings(text: &str, column: &'static str) -> Result<Vec<f64>, Fault> {
+/// Parses a list of markings such as `8.51;12.59;16.43`: at least two, rising.
+fn markings(text: &str, column: &'static str) -> Result<Vec<f64>, FieldError> {
     if text.is_empty() {
         return Ok(Vec::new());
     }
     let found = text.split(';').map(|part| number(part.trim(), column, MARKING_M)).collect::<Result<Vec<_>, _>>()?;
     if found.len() < 2 || found.windows(2).any(|pair| pair[0] >= pair[1]) {
-        return Err(Fault::at(column, wrong_value(text, "a list of at least two rising positions".to_owned())));
+        return Err(FieldError::at(column, wrong_value(text, "a list of at least two rising positions".to_owned())));
     }
     Ok(found)
 }
 
-fn vehicle_meta(cells: &Cells<'_>) -> Result<(u64, VehicleMeta), Fault> {
-    let id = integer(cells.need(&["id", "trackId"])?, "id", allowed::IDS)?.unsigned_abs();
-    let rows = integer(cells.need(&["numFrames"])?, "numFrames", ROWS)?.unsigned_abs();
-    let class = class(cells.need(&["class"])?)?;
+fn vehicle_meta(cells: &Cells<'_>) -> Result<(u64, VehicleMeta), FieldError> {
+    let id = integer(cells.require(&["id", "trackId"])?, "id", allowed::IDS)?.unsigned_abs();
+    let rows = integer(cells.require(&["numFrames"])?, "numFrames", ROWS)?.unsigned_abs();
+    let class = class(cells.require(&["class"])?)?;
     let is_upper = match cells.find(&["drivingDirection"]) {
         None | Some("2") => false,
         Some("1") => true,
         Some(other) => {
             let allowed = "1 (towards -x) or 2 (towards +x)".to_owned();
-            return Err(Fault::at("drivingDirection", wrong_value(other, allowed)));
+            return Err(FieldError::at("drivingDirection", wrong_value(other, allowed)));
         }
     };
     Ok((id, VehicleMeta { class, is_upper, rows, found: 0, line: 0 }))
 }
 
-/// highD has cars and trucks; exiD spells them in lower case, and has vans and motorcycles.
-fn class(text: &str) -> Result<VehicleClass, Fault> {
+/// Parses a vehicle class. highD has cars and trucks; exiD spells them in lower case, and also has vans and
+/// motorcycles.
+fn class(text: &str) -> Result<VehicleClass, FieldError> {
     match text.to_ascii_lowercase().as_str() {
         "car" | "van" => Ok(VehicleClass::Car),
         "truck" | "truck_bus" | "bus" | "trailer" => Ok(VehicleClass::Truck),
         "motorcycle" => Ok(VehicleClass::Motorcycle),
-        _ => Err(Fault::at("class", wrong_value(text, "one of car, van, truck, bus, motorcycle".to_owned()))),
+        _ => Err(FieldError::at("class", wrong_value(text, "one of car, van, truck, bus, motorcycle".to_owned()))),
     }
 }

@@ -1,69 +1,73 @@
-//! In-car logs: what one test vehicle records about itself and the lane it is in.
+//! In-car logs: what one test vehicle records about itself and its lane.
 //!
 //! ```text
-//!   ── ── ── ── ── ── ──   marking      ▲ left_marking_m   (distance from the vehicle's centre line, above 0 while
+//!   ── ── ── ── ── ── ──   marking      ▲ left_marking_m   (distance from the vehicle's centre line, positive while
 //!        ┌──────┐                       ▼                    the marking is on that side)
 //!    ────┤  ×   ├─────▶ s              ▲
 //!        └──────┘                       │ right_marking_m
 //!   ── ── ── ── ── ── ──   marking      ▼
 //! ```
 //!
-//! Two rates share one file: the inertial unit's rows (100 Hz: position, heading, acceleration, yaw rate) and, on every
-//! fourth of them, what the vehicle's bus carries (25 Hz: speed and the camera's distances to the markings). Between two
-//! bus frames the bus columns are empty. A log with bus rows only is read as well.
+//! One file contains data at two rates. Every row holds data of the inertial unit (100 Hz: position, heading,
+//! acceleration, yaw rate). Every fourth row also holds data of the vehicle bus (25 Hz: speed, and the distances to the
+//! markings that the camera measures). The bus columns are empty in the rows between two bus frames. A log that has
+//! only bus rows is accepted as well.
 //!
 //! | column | meaning | |
 //! |---|---|---|
-//! | `time_s` | since the start of the log [s], increasing | needed |
-//! | `s_m` | own position along the road [m] | needed |
-//! | `d_left_m` | own lateral position, to the *left* of a fixed line along the road, best the left edge of lane 1 [m] | needed |
-//! | `speed_mps` | bus: own speed [m/s]; empty between bus frames | needed |
-//! | `left_marking_m`, `right_marking_m` | bus: distances to the markings of the own lane [m]; empty where none is seen | needed |
-//! | `accel_mps2` | acceleration along the road [m/s²] | |
-//! | `heading_rad`, `yaw_rate_radps`, `a_lat_mps2` | read for their validity only | |
-//! | `lane_id` | lane, counted from 1 at the left, where the vehicle knows it from a map | |
-//! | `length_m`, `width_m`, `vehicle_class` | the vehicle; a typical car where absent | |
+//! | `time_s` | time since the start of the log (s), increasing | required |
+//! | `s_m` | own position along the road (m) | required |
+//! | `d_left_m` | own lateral position, positive to the *left* of a fixed line along the road, preferably the left edge of lane 1 (m) | required |
+//! | `speed_mps` | bus: own speed (m/s); empty between bus frames | required |
+//! | `left_marking_m`, `right_marking_m` | bus: distances to the markings of the own lane (m); empty if none is seen | required |
+//! | `accel_mps2` | acceleration along the road (m/s²) | |
+//! | `heading_rad`, `yaw_rate_radps`, `a_lat_mps2` | only validated | |
+//! | `lane_id` | lane, counted from 1 at the left, if the vehicle knows it from a map | |
+//! | `length_m`, `width_m`, `vehicle_class` | the vehicle; a typical car if absent | |
 //!
-//! When the vehicle changes lanes, its centre passes over a marking: one distance falls to zero and jumps up by a lane
-//! width, the other the reverse. Where the log has no `lane_id`, these jumps count the lanes, from the one that
-//! `d_left_m` and the lane's width tell for the first frame.
+//! When the vehicle changes lanes, its centre crosses a marking: the distance to that marking falls to zero and then
+//! jumps up by a lane width, while the distance to the other one does the reverse. If the log has no `lane_id`, the
+//! reader counts lanes by these jumps. The first lane follows from `d_left_m` and the lane width.
 //!
-//! Times that lie within a quarter of a period beside a multiple of it are put there; what is missing is a gap.
+//! Times within a quarter of a period of a tick of the clock are moved to that tick. A missing tick is a gap.
 
 use closecall_traffic::{Time, VehicleClass};
 
-use super::fields::{Bounds, Fault, integer, number};
-use super::layout::{Header, TextLayout};
+use super::error::RecordingProblem;
+use super::fields::{Bounds, FieldError, integer, number};
+use super::header::Header;
 use super::plain::{allowed, class};
+use super::recording::{Layout, MarkingDistances};
 use super::rows::Fields;
-use super::source::{About, Clock, Row};
-use super::{Layout, MarkingDistances, RecordingProblem};
+use super::source::{Clock, FileInfo, Row};
+use super::text_layout::TextLayout;
 
-/// A log has one vehicle.
+/// Number of the log's only vehicle.
 const VEHICLE: u64 = 1;
 
-/// What a distance to a marking may be: cameras do not see beyond some lanes [m].
+/// Allowed distance to a marking (m). Cameras do not see further than some lanes.
 const MARKING_M: Bounds = Bounds::closed(-20.0, 20.0);
 const YAW_RATE_RADPS: Bounds = Bounds::closed(-100.0, 100.0);
 
-/// Time beside the clock by up to this share of a period is put on it.
-const JITTER: f64 = 0.25;
+/// Maximum deviation of a time from a tick of the clock, as a share of the period.
+const MAX_JITTER: f64 = 0.25;
 
-/// The left edge of the lane moves by at least this share of a lane width in a change of lanes; noise moves it by less.
-const JUMP_SHARE: f64 = 0.5;
+/// Minimum movement of the lane's left edge in a lane change, as a share of the lane width. Noise moves it by less.
+const MIN_JUMP_SHARE: f64 = 0.5;
 
-/// Lane widths that the sum of both distances can be [m].
+/// Plausible lane widths, given by the sum of both distances (m).
 const LANE_WIDTH_M: std::ops::RangeInclusive<f64> = 2.0..=6.0;
 
-/// Where the quantities of an in-car log stand, and what earlier rows told.
+/// The columns of an in-car log, and the state that earlier rows leave.
 pub(super) struct InCarColumns {
-    places: Places,
+    columns: ColumnIndices,
     clock: LogClock,
     speed_mps: Option<f64>,
-    lane: LaneCount,
+    lane: LaneCounter,
 }
 
-struct Places {
+/// The column indices of an in-car log's quantities.
+struct ColumnIndices {
     time: usize,
     s: usize,
     d: usize,
@@ -75,28 +79,31 @@ struct Places {
     width: Option<usize>,
     class: Option<usize>,
     recording: Option<usize>,
-    unused: Vec<(usize, &'static str, Bounds)>,
+    /// Columns that are only validated.
+    validated_only: Vec<(usize, &'static str, Bounds)>,
 }
 
 impl InCarColumns {
-    /// The names by which the layout is recognised.
+    /// Names of the required columns.
     pub(super) const NAMES: [&str; 6] = ["time_s", "s_m", "d_left_m", "speed_mps", "left_marking_m", "right_marking_m"];
 
-    /// Those that no other layout has.
+    /// Column names that no other layout has.
     pub(super) const OWN_NAMES: [&str; 3] = ["d_left_m", "left_marking_m", "right_marking_m"];
 
+    /// Finds the columns in `header`.
+    ///
     /// # Errors
-    /// Where a column is missing that the reader needs.
+    /// Fails if a required column is missing.
     pub(super) fn new(header: &Header) -> Result<Self, RecordingProblem> {
         let [time, s, d, speed, left, right] = Self::NAMES;
-        let need = |name| header.need(name, "in-car");
+        let need = |name| header.require(name, "in-car");
         let bounded = [
             ("heading_rad", allowed::HEADING_RAD),
             ("yaw_rate_radps", YAW_RATE_RADPS),
             ("a_lat_mps2", allowed::ACCELERATION_MPS2),
         ];
         let present = bounded.into_iter().filter_map(|(name, bounds)| Some((header.find(name)?, name, bounds)));
-        let places = Places {
+        let columns = ColumnIndices {
             time: need(time)?,
             s: need(s)?,
             d: need(d)?,
@@ -108,31 +115,31 @@ impl InCarColumns {
             width: header.find("width_m"),
             class: header.find("vehicle_class"),
             recording: header.find("recording_id"),
-            unused: present.collect(),
+            validated_only: present.collect(),
         };
-        Ok(Self { places, clock: LogClock::default(), speed_mps: None, lane: LaneCount::default() })
+        Ok(Self { columns, clock: LogClock::default(), speed_mps: None, lane: LaneCounter::default() })
     }
 }
 
 impl TextLayout for InCarColumns {
-    fn about(&self) -> About {
-        About { layout: Layout::InCar, name: None, period: self.clock.period, markings: None }
+    fn info(&self) -> FileInfo {
+        FileInfo { layout: Layout::InCar, name: None, period: self.clock.period, markings: None }
     }
 
     fn recording<'l>(&self, line: &'l str, fields: &Fields) -> Option<(&'static str, &'l str)> {
-        self.places.recording.map(|index| ("recording_id", fields.get(line, index)))
+        self.columns.recording.map(|index| ("recording_id", fields.get(line, index)))
     }
 
-    /// Nothing for the rows before the first bus frame: the speed is not known there.
-    fn parse(&mut self, line: &str, fields: &Fields) -> Result<Option<Row>, Fault> {
-        let Places { time, s, d, speed, markings, acceleration, lane, length, width, class: class_at, .. } =
-            self.places;
+    /// Yields no row before the first bus frame, because the speed is still unknown there.
+    fn parse(&mut self, line: &str, fields: &Fields) -> Result<Option<Row>, FieldError> {
+        let ColumnIndices { time, s, d, speed, markings, acceleration, lane, length, width, class: class_at, .. } =
+            self.columns;
         let real = |index, name, bounds| number(fields.get(line, index), name, bounds);
         let optional = |index: usize, name, bounds| match fields.get(line, index) {
             "" => Ok(None),
             text => number(text, name, bounds).map(Some),
         };
-        for &(index, name, bounds) in &self.places.unused {
+        for &(index, name, bounds) in &self.columns.validated_only {
             optional(index, name, bounds)?;
         }
         let (s_m, d_m) = (real(s, "s_m", allowed::POSITION_M)?, real(d, "d_left_m", allowed::LATERAL_M)?);
@@ -150,7 +157,7 @@ impl TextLayout for InCarColumns {
         let mapped = lane.map_or(Ok(None), |index| {
             integer(fields.get(line, index), "lane_id", allowed::LANES).map(|lane| Some(lane.unsigned_abs() as u8))
         })?;
-        let (frame, time) = self.clock.tick(Time::from_s(real(time, "time_s", allowed::TIME_S)?))?;
+        let (frame, time) = self.clock.frame_at(Time::from_s(real(time, "time_s", allowed::TIME_S)?))?;
         let counted = self.lane.count(d_m, marking_distances);
         self.speed_mps = speed_mps.or(self.speed_mps);
         let row = self.speed_mps.map(|speed_mps| Row {
@@ -175,7 +182,7 @@ impl TextLayout for InCarColumns {
     }
 }
 
-/// The log's clock: its period is the first step between two rows.
+/// The clock of the log. Its period is the time between the first two rows.
 #[derive(Default)]
 struct LogClock {
     first: Option<Time>,
@@ -184,14 +191,14 @@ struct LogClock {
 }
 
 impl LogClock {
-    /// The frame that `time` is, and the frame's own time.
-    fn tick(&mut self, time: Time) -> Result<(i64, Time), Fault> {
+    /// Returns the frame number of `time`, and the time of that frame's tick.
+    fn frame_at(&mut self, time: Time) -> Result<(i64, Time), FieldError> {
         let first = *self.first.get_or_insert(time);
         if let Some(latest) = self.latest
             && time <= latest
         {
             let problem = RecordingProblem::TimeBackwards { before_s: latest.s(), time_s: time.s() };
-            return Err(Fault::at("time_s", problem));
+            return Err(FieldError::at("time_s", problem));
         }
         self.latest = Some(time);
         if time == first {
@@ -200,9 +207,9 @@ impl LogClock {
         let period = *self.period.get_or_insert(time - first);
         let frame = ((time - first).ns() + period.ns() / 2).div_euclid(period.ns());
         let on_clock = first + period * frame;
-        if ((time - on_clock).ns().abs() as f64) > JITTER * period.ns() as f64 {
+        if ((time - on_clock).ns().abs() as f64) > MAX_JITTER * period.ns() as f64 {
             let problem = RecordingProblem::OffClock { time_s: time.s(), period_s: period.s() };
-            return Err(Fault::at("time_s", problem));
+            return Err(FieldError::at("time_s", problem));
         }
         Ok((frame, on_clock))
     }
@@ -210,13 +217,14 @@ impl LogClock {
 
 /// Counts lanes by the jumps of the left marking.
 #[derive(Default)]
-struct LaneCount {
+struct LaneCounter {
     lane: Option<i64>,
     left_edge_m: f64,
     width_m: Option<f64>,
 }
 
-impl LaneCount {
+impl LaneCounter {
+    /// Returns the lane after a row with the lateral position `d_m` (m) and the distances in `seen`.
     fn count(&mut self, d_m: f64, seen: MarkingDistances) -> u8 {
         if let (Some(left_m), Some(right_m)) = (seen.left_m, seen.right_m)
             && LANE_WIDTH_M.contains(&(left_m + right_m))
@@ -229,7 +237,7 @@ impl LaneCount {
             let lanes = |metres: f64| (metres / width_m).round() as i64;
             self.lane = Some(match self.lane {
                 None => 1 + lanes(-edge_m),
-                Some(lane) if (self.left_edge_m - edge_m).abs() >= JUMP_SHARE * width_m => {
+                Some(lane) if (self.left_edge_m - edge_m).abs() >= MIN_JUMP_SHARE * width_m => {
                     lane + lanes(self.left_edge_m - edge_m)
                 }
                 Some(lane) => lane,

@@ -1,4 +1,4 @@
-//! From lanelets to roads: a reference line for each, and the lanes beside it.
+//! Construction of roads from lanelets: a reference line for each road, and the lanes beside it.
 //!
 //! ```text
 //!     ●───────────●───────────●    left bounds of the leftmost lanelets: the reference line, d = 0
@@ -8,29 +8,30 @@
 //!     ●───────────●───────────●
 //! ```
 //!
-//! Lanelets that are joined by succession, or lie side by side in the same direction, are one road. Its reference line is
-//! the longest chain of lanelets that have none to their left, weighted with the lanes beside it; beyond its ends it goes
-//! on straight. The lane of a vehicle is that of the lanelet its centre lies in, counted from the left; where it lies in
-//! none of the chain's (on a ramp, beside the road) the lane whose middle is nearest.
+//! Lanelets that are linked as successors, or that lie side by side in the same direction, form one road. The reference
+//! line is the left bound of a chain of lanelets without a left neighbour. Of all such chains, it is the one with the
+//! largest product of length and number of lanes. It continues straight beyond both ends. A vehicle is in the lane of
+//! the lanelet that contains its centre; lanes are counted from the left. If no lanelet of the chain contains the
+//! centre (on a ramp, beside the road), the vehicle is in the lane whose middle is nearest.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use closecall_traffic::Lane;
 
-use super::LaneMarkings;
-use super::reference_line::{Beside, Point, ReferenceLine};
+use super::markings::LaneMarkings;
+use super::reference_line::{Point, Projection, ReferenceLine};
 
-/// How far to the right of one another several roads are laid, so that their vehicles never meet [m].
-const APART_M: f64 = 1_000.0;
+/// Distance by which each road is shifted to the right of the previous one, so that their vehicles never meet (m).
+const SEPARATION_M: f64 = 1_000.0;
 
-/// A piece of a lane.
+/// A section of a lane.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Lanelet {
     pub(super) left: Vec<Point>,
     pub(super) right: Vec<Point>,
-    /// The lanelet to the left, where it is driven in the same direction.
+    /// The lanelet to the left, if it has the same driving direction.
     pub(super) left_id: Option<i64>,
-    /// The lanelet to the right, where it is driven in the same direction.
+    /// The lanelet to the right, if it has the same driving direction.
     pub(super) right_id: Option<i64>,
     pub(super) successors: Vec<i64>,
 }
@@ -43,31 +44,34 @@ pub(super) struct Roads {
 
 /// A position on one of the roads.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct OnRoad {
+pub(super) struct RoadPosition {
+    /// Position along the reference line (m).
     pub(super) s_m: f64,
+    /// Lateral position, positive to the left (m).
     pub(super) d_m: f64,
     pub(super) lane: u8,
-    /// Heading of the road there, in the scenario's plane [rad].
+    /// Heading of the road at the position, in the plane of the scenario (rad).
     pub(super) heading_rad: f64,
 }
 
 #[derive(Clone, Debug)]
 struct Road {
     line: ReferenceLine,
-    /// Outlines with their lanes, from 1 at the left; only those beside the reference line.
+    /// Outlines of the lanelets beside the reference line, each with its lane, counted from 1 at the left.
     lanes: Vec<(u8, Vec<Point>)>,
-    /// All outlines.
+    /// Outlines of all lanelets of the road.
     outlines: Vec<Vec<Point>>,
-    /// Right edge of each lane, as far as it tells [m].
+    /// Right edge of each lane beside the reference line (m).
     right_edges_m: Vec<f64>,
-    /// What is added to the lane and to d, so that roads do not meet.
+    /// Offset of the lane numbers, so that roads share no lane.
     first_lane: u8,
+    /// Offset of the lateral position, so that roads do not meet (m).
     shift_m: f64,
 }
 
 impl Roads {
-    /// The roads that `lanelets` make up, the largest first. Lanelets without extent are passed over.
-    pub(super) fn of(lanelets: &BTreeMap<i64, Lanelet>) -> Self {
+    /// Builds the roads that `lanelets` form, the largest first. Lanelets without extent are ignored.
+    pub(super) fn from_lanelets(lanelets: &BTreeMap<i64, Lanelet>) -> Self {
         let mut found: Vec<(f64, Road)> = components(lanelets).iter().filter_map(|ids| road(lanelets, ids)).collect();
         found.sort_by(|a, b| b.0.total_cmp(&a.0));
         let (mut first_lane, mut shift_m) = (0_u8, 0.0);
@@ -77,7 +81,7 @@ impl Roads {
             let width_m = road.right_edges_m.last().copied().unwrap_or_default();
             roads.push(Road { first_lane, shift_m, ..road });
             first_lane = first_lane.saturating_add(lanes).saturating_add(1);
-            shift_m += width_m - APART_M;
+            shift_m += width_m - SEPARATION_M;
         }
         Self { roads }
     }
@@ -86,22 +90,22 @@ impl Roads {
         self.roads.is_empty()
     }
 
-    /// The markings of all roads.
+    /// Returns the lane markings of all roads.
     pub(super) fn markings(&self) -> LaneMarkings {
         let of_road = |road: &Road| {
             let edges = road.right_edges_m.clone().into_iter().enumerate();
             let (first, shift_m) = (road.first_lane, road.shift_m);
-            // The left edge of a later road's first lane stands as the right edge of the lane that is left out.
+            // The left edge of a later road's first lane is stored as the right edge of the omitted lane before it.
             let left = (first > 0).then_some((Lane(first), shift_m));
             let lane = move |k: usize| Lane(first.saturating_add(u8::try_from(k + 1).unwrap_or(u8::MAX)));
             left.into_iter().chain(edges.map(move |(k, edge_m)| (lane(k), shift_m + edge_m))).collect::<Vec<_>>()
         };
-        LaneMarkings::stated(self.roads.iter().flat_map(of_road))
+        LaneMarkings::from_right_edges(self.roads.iter().flat_map(of_road))
     }
 
-    /// The road that a vehicle at `point` with `heading_rad` is on: the one with a lanelet there that is driven that way,
-    /// or else the one whose reference line is nearest.
-    pub(super) fn choose(&self, point: Point, heading_rad: f64) -> usize {
+    /// Returns the index of the road on which a vehicle at `point` with `heading_rad` drives. The ranking prefers roads
+    /// with the same driving direction, then roads with a lanelet at the point, then the nearest reference line.
+    pub(super) fn road_at(&self, point: Point, heading_rad: f64) -> usize {
         let rank = |road: &Road| {
             let on = road.line.project(point);
             let is_against = (heading_rad - on.heading_rad).cos() < 0.0;
@@ -110,21 +114,21 @@ impl Roads {
         };
         let ranked = self.roads.iter().map(rank).enumerate();
         let best = ranked.min_by(|(_, a), (_, b)| (a.0, a.1).cmp(&(b.0, b.1)).then(a.2.total_cmp(&b.2)));
-        best.map_or(0, |(place, _)| place)
+        best.map_or(0, |(index, _)| index)
     }
 
-    /// Where `point` is on the road that was chosen.
-    pub(super) fn place(&self, road: usize, point: Point) -> Option<OnRoad> {
+    /// Returns the position of `point` on the given road.
+    pub(super) fn locate(&self, road: usize, point: Point) -> Option<RoadPosition> {
         let road = self.roads.get(road)?;
-        let Beside { s_m, d_m, heading_rad } = road.line.project(point);
+        let Projection { s_m, d_m, heading_rad } = road.line.project(point);
         let inside = road.lanes.iter().find(|(_, outline)| contains(outline, point)).map(|(lane, _)| *lane);
         let lane = inside.unwrap_or_else(|| road.nearest_lane(d_m)).saturating_add(road.first_lane);
-        Some(OnRoad { s_m, d_m: d_m + road.shift_m, lane, heading_rad })
+        Some(RoadPosition { s_m, d_m: d_m + road.shift_m, lane, heading_rad })
     }
 }
 
 impl Road {
-    /// The lane whose middle is nearest.
+    /// Returns the lane whose middle is nearest to `d_m`.
     fn nearest_lane(&self, d_m: f64) -> u8 {
         let mut left_m = 0.0;
         let mut nearest = (f64::INFINITY, 1);
@@ -139,7 +143,7 @@ impl Road {
     }
 }
 
-/// Lanelets that are joined by succession or lie side by side.
+/// Groups the lanelets that are linked as successors or lie side by side.
 fn components(lanelets: &BTreeMap<i64, Lanelet>) -> Vec<BTreeSet<i64>> {
     let mut neighbours: BTreeMap<i64, Vec<i64>> = BTreeMap::new();
     for (id, lanelet) in lanelets {
@@ -166,14 +170,15 @@ fn components(lanelets: &BTreeMap<i64, Lanelet>) -> Vec<BTreeSet<i64>> {
     components
 }
 
-/// The road of a component, and its size: length times lanes. Nothing where no lanelet has an extent.
+/// Builds the road of one group of lanelets. Also returns its size, which is length times number of lanes. Returns
+/// `None` if no lanelet has an extent.
 fn road(lanelets: &BTreeMap<i64, Lanelet>, ids: &BTreeSet<i64>) -> Option<(f64, Road)> {
     let leftmost = |id: &&i64| lanelets.get(id).is_some_and(|lanelet| lanelet.left_id.is_none());
     let chains = ids.iter().filter(leftmost).map(|id| chain(lanelets, *id));
     let sized = chains.filter_map(|chain| {
-        let line = line(lanelets, &chain);
+        let line = reference_line(lanelets, &chain);
         let length_m = line.length_m()?;
-        let lanes = chain.iter().map(|id| beside(lanelets, *id).len()).max()?;
+        let lanes = chain.iter().map(|id| side_by_side(lanelets, *id).len()).max()?;
         Some((length_m * lanes as f64, chain, line))
     });
     let (size, chain, line) = sized.max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)))?;
@@ -187,23 +192,25 @@ fn road(lanelets: &BTreeMap<i64, Lanelet>, ids: &BTreeSet<i64>) -> Option<(f64, 
     };
     let mut edges_m: BTreeMap<u8, Vec<f64>> = BTreeMap::new();
     for id in &chain {
-        for (k, lanelet) in beside(lanelets, *id).into_iter().enumerate() {
+        for (k, lanelet) in side_by_side(lanelets, *id).into_iter().enumerate() {
             let lane = u8::try_from(k + 1).unwrap_or(u8::MAX);
             road.lanes.push((lane, outline(lanelet)));
             let right = lanelet.right.iter().map(|point| road.line.project(*point).d_m);
             edges_m.entry(lane).or_default().extend(right);
         }
     }
-    road.right_edges_m = edges_m.into_values().filter_map(middle).collect();
+    road.right_edges_m = edges_m.into_values().filter_map(upper_median).collect();
     Some((size, road))
 }
 
-fn middle(mut values: Vec<f64>) -> Option<f64> {
+/// Returns the median, or the upper of the two middle values.
+fn upper_median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied()
 }
 
-/// The lanelets from `id` on, each the successor of the one before that has none to its left, or else any.
+/// Returns the chain of lanelets that starts with `id`. Each next lanelet is a successor without a left neighbour; the
+/// chain ends where there is none.
 fn chain(lanelets: &BTreeMap<i64, Lanelet>, id: i64) -> Vec<i64> {
     let (mut chain, mut current) = (vec![id], id);
     while let Some(lanelet) = lanelets.get(&current) {
@@ -217,8 +224,8 @@ fn chain(lanelets: &BTreeMap<i64, Lanelet>, id: i64) -> Vec<i64> {
     chain
 }
 
-/// The lanelets side by side from `id` to the right.
-fn beside(lanelets: &BTreeMap<i64, Lanelet>, id: i64) -> Vec<&Lanelet> {
+/// Returns the lanelets side by side from `id` to the right.
+fn side_by_side(lanelets: &BTreeMap<i64, Lanelet>, id: i64) -> Vec<&Lanelet> {
     let (mut seen, mut found, mut current) = (BTreeSet::new(), Vec::new(), Some(id));
     while let Some((id, lanelet)) = current.and_then(|id| Some((id, lanelets.get(&id)?))) {
         if !seen.insert(id) {
@@ -230,17 +237,18 @@ fn beside(lanelets: &BTreeMap<i64, Lanelet>, id: i64) -> Vec<&Lanelet> {
     found
 }
 
-/// The left bounds of a chain.
-fn line(lanelets: &BTreeMap<i64, Lanelet>, chain: &[i64]) -> ReferenceLine {
+/// Returns the reference line along the left bounds of a chain.
+fn reference_line(lanelets: &BTreeMap<i64, Lanelet>, chain: &[i64]) -> ReferenceLine {
     let lanelets = chain.iter().filter_map(|id| lanelets.get(id));
     ReferenceLine::through(lanelets.flat_map(|lanelet| &lanelet.left).copied())
 }
 
+/// Returns the outline of a lanelet as a polygon.
 fn outline(lanelet: &Lanelet) -> Vec<Point> {
     lanelet.left.iter().chain(lanelet.right.iter().rev()).copied().collect()
 }
 
-/// True where `point` lies within the outline: a ray from it crosses the outline an odd number of times.
+/// Returns `true` if `point` lies within the outline: a ray from it crosses the outline an odd number of times.
 fn contains(outline: &[Point], (x, y): Point) -> bool {
     let ends = outline.iter().skip(1).chain(outline.first());
     let crosses =

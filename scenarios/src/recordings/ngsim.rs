@@ -1,28 +1,32 @@
-//! NGSIM's columns: feet, feet per second, milliseconds; the reference point is the middle of the front bumper.
+//! The layout of NGSIM: feet, feet per second, milliseconds. The reference point of a vehicle is the middle of its
+//! front bumper.
 
 use closecall_traffic::{Time, VehicleClass};
 
-use super::fields::{Bounds, Fault, integer, number, wrong_value};
-use super::layout::{Header, TextLayout};
+use super::error::RecordingProblem;
+use super::fields::{Bounds, FieldError, integer, number, wrong_value};
+use super::header::Header;
 use super::plain::allowed;
+use super::recording::{Layout, MarkingDistances};
 use super::rows::Fields;
-use super::source::{About, Clock, Row};
-use super::{Layout, MarkingDistances, RecordingProblem};
+use super::source::{Clock, FileInfo, Row};
+use super::text_layout::TextLayout;
 
-/// The international foot [m].
+/// The international foot (m).
 const FOOT_M: f64 = 0.3048;
 
-/// NGSIM's 10 Hz.
+/// NGSIM's period, at 10 Hz.
 pub(super) const PERIOD: Time = Time::from_ms(100);
 
-/// NGSIM's codes for classes.
+/// NGSIM's codes for vehicle classes.
 const CLASSES: [(i64, VehicleClass); 3] =
     [(1, VehicleClass::Motorcycle), (2, VehicleClass::Car), (3, VehicleClass::Truck)];
 
-/// What the columns allow, in the file's units.
+/// Allowed values of the columns, in the units of the file.
 mod feet {
     use super::{Bounds, FOOT_M, allowed};
 
+    /// Converts a range from metres to feet, rounded to whole feet.
     pub(super) const fn scaled(metres: Bounds) -> Bounds {
         let Bounds { low, high, low_is_allowed } = metres;
         Bounds { low: (low / FOOT_M).round(), high: (high / FOOT_M).round(), low_is_allowed }
@@ -34,11 +38,11 @@ mod feet {
     pub(super) const ACCELERATION: Bounds = scaled(allowed::ACCELERATION_MPS2);
     pub(super) const LENGTH: Bounds = scaled(allowed::LENGTH_M);
     pub(super) const WIDTH: Bounds = scaled(allowed::WIDTH_M);
-    /// Milliseconds up to the year 2100.
+    /// Milliseconds since 1970, up to the year 2100.
     pub(super) const TIME_MS: (i64, i64) = (0, 4_102_444_800_000);
 }
 
-/// Where NGSIM's quantities stand.
+/// The column indices of NGSIM's quantities.
 pub(super) struct NgsimColumns {
     vehicle: usize,
     frame: usize,
@@ -55,7 +59,7 @@ pub(super) struct NgsimColumns {
 }
 
 impl NgsimColumns {
-    /// The names by which the layout is recognised.
+    /// The column names by which the layout is detected.
     pub(super) const NAMES: [&str; 11] = [
         "Vehicle_ID",
         "Frame_ID",
@@ -70,7 +74,7 @@ impl NgsimColumns {
         "Lane_ID",
     ];
 
-    /// The order of the original files, which have no header.
+    /// The column order of the original files, which have no header.
     pub(super) const ORIGINAL: Self = Self {
         vehicle: 0,
         frame: 1,
@@ -86,11 +90,13 @@ impl NgsimColumns {
         location: None,
     };
 
+    /// Finds the columns in `header`.
+    ///
     /// # Errors
-    /// Where a column is missing that the reader needs.
+    /// Fails if a required column is missing.
     pub(super) fn new(header: &Header) -> Result<Self, RecordingProblem> {
         let [vehicle, frame, time, x, y, length, width, class, speed, acceleration, lane] = Self::NAMES;
-        let need = |name| header.need(name, "NGSIM");
+        let need = |name| header.require(name, "NGSIM");
         Ok(Self {
             vehicle: need(vehicle)?,
             frame: need(frame)?,
@@ -107,26 +113,27 @@ impl NgsimColumns {
         })
     }
 
-    /// True where the columns are those of the catalogue's export.
+    /// Returns `true` if the columns are those of the catalogue's export.
     fn is_export(&self) -> bool {
         self.location.is_some()
     }
 }
 
 impl TextLayout for NgsimColumns {
-    fn about(&self) -> About {
+    fn info(&self) -> FileInfo {
         let layout = if self.is_export() { Layout::Ngsim25 } else { Layout::Ngsim18 };
-        About { layout, name: None, period: None, markings: None }
+        FileInfo { layout, name: None, period: None, markings: None }
     }
 
     fn recording<'l>(&self, line: &'l str, fields: &Fields) -> Option<(&'static str, &'l str)> {
         self.location.map(|index| ("Location", fields.get(line, index)))
     }
 
-    fn parse(&mut self, line: &str, fields: &Fields) -> Result<Option<Row>, Fault> {
+    fn parse(&mut self, line: &str, fields: &Fields) -> Result<Option<Row>, FieldError> {
         let whole = |index, name, range| integer(fields.get(line, index), name, range);
-        let metres =
-            |index, name, bounds| -> Result<f64, Fault> { Ok(number(fields.get(line, index), name, bounds)? * FOOT_M) };
+        let metres = |index, name, bounds| -> Result<f64, FieldError> {
+            Ok(number(fields.get(line, index), name, bounds)? * FOOT_M)
+        };
         let vehicle = whole(self.vehicle, "Vehicle_ID", allowed::IDS)?.unsigned_abs();
         let length_m = metres(self.length, "v_Length", feet::LENGTH)?;
         let front_m = metres(self.y, "Local_Y", feet::POSITION)?;
@@ -159,10 +166,10 @@ impl TextLayout for NgsimColumns {
     }
 }
 
-fn class(text: &str) -> Result<VehicleClass, Fault> {
+fn class(text: &str) -> Result<VehicleClass, FieldError> {
     let code = integer(text, "v_Class", (1, 3));
     let named = code.ok().and_then(|code| CLASSES.into_iter().find(|(known, _)| *known == code));
-    named
-        .map(|(_, class)| class)
-        .ok_or_else(|| Fault::at("v_Class", wrong_value(text, "one of 1 (motorcycle), 2 (car), 3 (truck)".to_owned())))
+    named.map(|(_, class)| class).ok_or_else(|| {
+        FieldError::at("v_Class", wrong_value(text, "one of 1 (motorcycle), 2 (car), 3 (truck)".to_owned()))
+    })
 }

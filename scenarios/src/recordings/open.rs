@@ -1,26 +1,21 @@
-//! From a path to tracks: which reader a file needs.
+//! Opening of trajectory files: selects the reader that a file needs.
 
-use std::cell::RefCell;
-use std::fs::File;
-use std::io::{self, BufRead, BufReader, Read};
+use std::io::{BufRead, Read};
 use std::path::Path;
-use std::rc::Rc;
-
-use flate2::bufread::MultiGzDecoder;
 
 use super::commonroad::CommonRoadSource;
-use super::exid::Survey;
+use super::error::{RecordingError, RecordingProblem};
+use super::exid::InferredRoad;
 use super::file_set::FileSet;
+use super::input::{Digest, open_file, with_path};
 use super::order::WINDOW_ROWS;
-use super::source::{Refusal, RowSource};
+use super::recording::Recording;
+use super::rows::io_problem;
+use super::source::{ReadError, RowSource};
 use super::text::TextSource;
 use super::tracks::{ReadOptions, Tracks};
-use super::{Recording, RecordingError, RecordingProblem};
 
-/// The first two bytes of a gzip stream (RFC 1952).
-const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
-
-/// The beginnings of archives and of other compressed files that are not read, and what they are.
+/// The first bytes of unsupported archives and compressed files, with a description of each.
 const ARCHIVES: [(&[u8], &str); 5] = [
     (b"PK\x03\x04", "a ZIP archive"),
     (b"PK\x05\x06", "an empty ZIP archive"),
@@ -31,44 +26,44 @@ const ARCHIVES: [(&[u8], &str); 5] = [
 
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-const BUFFER_BYTES: usize = 1 << 16;
-
-/// Opens a recording to take its tracks one by one. Memory is bounded; see [`WINDOW_ROWS`].
+/// Opens a trajectory file to read its tracks one by one. The memory use is bounded; see [`WINDOW_ROWS`].
 ///
 /// # Errors
-/// [`RecordingError`] with file, line, column and what is allowed.
+/// Returns a [`RecordingError`] with file, line, column and allowed values.
 pub fn open(path: &Path, options: ReadOptions) -> Result<Tracks<'static>, RecordingError> {
     open_window(path, options, WINDOW_ROWS)
 }
 
-/// Reads a whole recording, rows in any order.
+/// Reads a whole trajectory file, with its rows in any order.
 ///
 /// # Errors
-/// [`RecordingError`] with file, line, column and what is allowed.
+/// Returns a [`RecordingError`] with file, line, column and allowed values.
 pub fn read(path: &Path) -> Result<Recording, RecordingError> {
     read_with(path, ReadOptions::default())
 }
 
-/// As [`read`], with the layout or the treatment of bad rows chosen.
+/// Works like [`read`], with a choice of the layout and of the treatment of bad rows.
 ///
 /// # Errors
-/// [`RecordingError`] with file, line, column and what is allowed.
+/// Returns a [`RecordingError`] with file, line, column and allowed values.
 pub fn read_with(path: &Path, options: ReadOptions) -> Result<Recording, RecordingError> {
     open_window(path, options, usize::MAX)?.collect_recording()
 }
 
-/// Reads a recording that is one file from any source of bytes; `path` stands in errors and gives the name.
+/// Reads trajectory data that consists of one file from any byte source. `path` appears in errors and supplies the
+/// name.
 ///
 /// # Errors
-/// [`RecordingError`] with line, column and what is allowed.
+/// Returns a [`RecordingError`] with line, column and allowed values.
 pub fn read_from(source: impl Read, path: &Path) -> Result<Recording, RecordingError> {
     open_from(source, path, ReadOptions::default(), usize::MAX)?.collect_recording()
 }
 
-/// Opens a recording that is one file from any source of bytes; `path` stands in errors and gives the name.
+/// Opens trajectory data that consists of one file from any byte source. `path` appears in errors and supplies the
+/// name. Data of more than `window` rows must be sorted by vehicle or by time.
 ///
 /// # Errors
-/// [`RecordingError`] with line, column and what is allowed.
+/// Returns a [`RecordingError`] with line, column and allowed values.
 pub fn open_from<'a>(
     source: impl Read + 'a,
     path: &Path,
@@ -76,11 +71,12 @@ pub fn open_from<'a>(
     window: usize,
 ) -> Result<Tracks<'a>, RecordingError> {
     let digest = Digest::default();
-    let input = digest.input(source).map_err(|refusal| at(path, refusal))?;
-    let source = choose(input, &options).map_err(|refusal| at(path, refusal))?;
+    let input = digest.input(source).map_err(|error| with_path(path, error))?;
+    let source = reader_for(input, &options).map_err(|error| with_path(path, error))?;
     Tracks::new((path, digest), source, options.bad_rows, window)
 }
 
+/// Opens `path`; data of more than `window` rows must be sorted.
 fn open_window(path: &Path, options: ReadOptions, window: usize) -> Result<Tracks<'static>, RecordingError> {
     match FileSet::of(path)? {
         Some(set) => open_set(&set, options, window),
@@ -88,42 +84,37 @@ fn open_window(path: &Path, options: ReadOptions, window: usize) -> Result<Track
     }
 }
 
-/// Opens one of the recordings that are several files.
+/// Opens a data set that consists of several files.
 fn open_set(set: &FileSet, options: ReadOptions, window: usize) -> Result<Tracks<'static>, RecordingError> {
     let path = set.tracks();
     let digest = Digest::default();
-    let in_tracks = |refusal| at(&path, refusal);
+    let in_tracks = |error| with_path(&path, error);
     let input = digest.input(open_file(&path)?).map_err(in_tracks)?;
-    let source = TextSource::with_meta(input, || set.meta(&digest), || Survey::of(&path));
+    let source = TextSource::with_meta(input, || set.meta(&digest), || InferredRoad::from_traffic(&path));
     let source = source.map_err(|error| error.map_or_else(|other| other, in_tracks))?;
     check_choice(&source, &options).map_err(in_tracks)?;
     Tracks::new((&path, digest), Box::new(source), options.bad_rows, window)
 }
 
-/// Refuses another layout than the one asked for.
-fn check_choice(source: &dyn RowSource, options: &ReadOptions) -> Result<(), Refusal> {
-    let found = source.about().layout;
+/// Rejects a file whose layout differs from the required one.
+fn check_choice(source: &dyn RowSource, options: &ReadOptions) -> Result<(), ReadError> {
+    let found = source.info().layout;
     match options.layout {
         Some(choice) if !choice.includes(found) => {
-            Err(Refusal::of_file(RecordingProblem::OtherLayout { found, asked: choice.name() }))
+            Err(ReadError::of_file(RecordingProblem::OtherLayout { found, asked: choice.name() }))
         }
         _ => Ok(()),
     }
 }
 
-pub(super) fn at(path: &Path, Refusal { line, column, problem }: Refusal) -> RecordingError {
-    RecordingError { path: path.to_owned(), line, column, problem }
-}
-
-pub(super) fn open_file(path: &Path) -> Result<File, RecordingError> {
-    File::open(path).map_err(|error| at(path, Refusal::of_file(RecordingProblem::Io(error))))
-}
-
-/// The reader for what `input` begins with.
-fn choose<'a>(mut input: Box<dyn BufRead + 'a>, options: &ReadOptions) -> Result<Box<dyn RowSource + 'a>, Refusal> {
-    let start = input.fill_buf().map_err(|error| Refusal::of_file(super::rows::io_problem(error)))?;
+/// Selects the reader by the first bytes of `input`.
+fn reader_for<'a>(
+    mut input: Box<dyn BufRead + 'a>,
+    options: &ReadOptions,
+) -> Result<Box<dyn RowSource + 'a>, ReadError> {
+    let start = input.fill_buf().map_err(|error| ReadError::of_file(io_problem(error)))?;
     if let Some((_, what)) = ARCHIVES.into_iter().find(|(magic, _)| start.starts_with(magic)) {
-        return Err(Refusal::of_file(RecordingProblem::Archive { what }));
+        return Err(ReadError::of_file(RecordingProblem::Archive { what }));
     }
     let text = start.strip_prefix(BYTE_ORDER_MARK).unwrap_or(start).trim_ascii_start();
     let source: Box<dyn RowSource + 'a> = if text.starts_with(b"<") {
@@ -133,39 +124,4 @@ fn choose<'a>(mut input: Box<dyn BufRead + 'a>, options: &ReadOptions) -> Result
     };
     check_choice(source.as_ref(), options)?;
     Ok(source)
-}
-
-/// The hash of everything that was read of a recording.
-#[derive(Clone, Default)]
-pub(super) struct Digest(Rc<RefCell<blake3::Hasher>>);
-
-impl Digest {
-    /// `source`, hashed as it is read, and unpacked where it is compressed.
-    pub(super) fn input<'a>(&self, source: impl Read + 'a) -> Result<Box<dyn BufRead + 'a>, Refusal> {
-        let mut hashed = BufReader::with_capacity(BUFFER_BYTES, Hashed { source, digest: self.clone() });
-        let start = hashed.fill_buf().map_err(|error| Refusal::of_file(RecordingProblem::Io(error)))?;
-        Ok(if start.starts_with(&GZIP_MAGIC) {
-            Box::new(BufReader::with_capacity(BUFFER_BYTES, MultiGzDecoder::new(hashed)))
-        } else {
-            Box::new(hashed)
-        })
-    }
-
-    pub(super) fn hex(&self) -> String {
-        self.0.borrow().finalize().to_hex().to_string()
-    }
-}
-
-/// Hashes what is read through it.
-struct Hashed<R> {
-    source: R,
-    digest: Digest,
-}
-
-impl<R: Read> Read for Hashed<R> {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let count = self.source.read(buffer)?;
-        self.digest.0.borrow_mut().update(&buffer[..count]);
-        Ok(count)
-    }
 }

@@ -1,35 +1,37 @@
-//! The order in which a recording's rows come, and what follows from it for the memory it takes.
+//! The order of a file's rows, and what it means for memory use.
 //!
-//! | order | rows that are kept |
+//! | order | rows held in memory |
 //! |---|---|
 //! | any, up to [`WINDOW_ROWS`] rows | all |
-//! | by vehicle: the rows of one vehicle stand together | those of one vehicle |
-//! | by time: no row is earlier than the one before | those of the vehicles that are on the road at that time |
+//! | by vehicle: the rows of one vehicle are consecutive | those of one vehicle |
+//! | by time: no row is earlier than the one before | those of the vehicles on the road at that time |
 //!
-//! NGSIM's original files and highD's are sorted by vehicle. Longer files in no order are refused with the line at which
-//! the order breaks: sorting them needs disk, and `sort` does that better.
+//! NGSIM's original files and highD's are sorted by vehicle. The reader rejects longer unsorted files, with the line at
+//! which the order breaks: sorting them needs disk space, and `sort` does that better.
 
 use std::collections::BTreeMap;
 
 use closecall_traffic::Time;
 
-use super::RecordingProblem;
-use super::source::{Refusal, Row};
+use super::error::RecordingProblem;
+use super::source::{ReadError, Row};
 
-/// Recordings of up to so many rows may be in any order, and the beginning of longer ones, of this length, tells the
-/// period, the start of time, the lane markings and whether the numbers are plausible: about an hour of one vehicle a
-/// second at 10 Hz for 30 s each.
+/// Maximum number of rows of an unsorted file.
+///
+/// In a longer file, the first rows up to this number determine the period, the start time, the lane markings and
+/// whether the numbers are plausible. They cover about an hour of traffic at one vehicle per second, each recorded for
+/// 30 s at 10 Hz.
 pub const WINDOW_ROWS: usize = 1 << 20;
 
-/// The order of a recording that is longer than the window.
+/// The order of the rows in a file that is longer than the window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Order {
     Vehicle,
     Time,
 }
 
-/// The order of `rows`, or where the one that held longer breaks.
-pub(super) fn order_of(rows: &[Row], period: Time) -> Result<Order, Refusal> {
+/// Determines the order of `rows`. If neither order holds, returns the error of the order that breaks later.
+pub(super) fn order_of(rows: &[Row], period: Time) -> Result<Order, ReadError> {
     let mut by_vehicle = VehicleOrder::default();
     let vehicle_breaks = rows.iter().find_map(|row| by_vehicle.check(row, period).err());
     let mut by_time = TimeOrder::default();
@@ -41,7 +43,7 @@ pub(super) fn order_of(rows: &[Row], period: Time) -> Result<Order, Refusal> {
     }
 }
 
-/// Sees to it that the rows of a vehicle stand together.
+/// Checks that the rows of each vehicle are consecutive.
 #[derive(Default)]
 pub(super) struct VehicleOrder {
     current: Option<(u64, Time, Time)>,
@@ -49,16 +51,17 @@ pub(super) struct VehicleOrder {
 }
 
 impl VehicleOrder {
-    /// A vehicle may come back later, as numbers recur, but not go on where it was left.
-    pub(super) fn check(&mut self, row: &Row, period: Time) -> Result<(), Refusal> {
+    /// Checks the next row. A vehicle number may recur later, but its track must not continue after rows of other
+    /// vehicles.
+    pub(super) fn check(&mut self, row: &Row, period: Time) -> Result<(), ReadError> {
         let unsorted = || {
             let problem = RecordingProblem::NotByVehicle { vehicle: row.number, rows: WINDOW_ROWS };
-            Err(Refusal::new(row.line, problem))
+            Err(ReadError::new(row.line, problem))
         };
         match &mut self.current {
             Some((number, origin, time)) if (*number, *origin) == (row.number, row.origin) => {
                 if row.time <= *time {
-                    // Two rows of one frame are a flaw of their own, told where the track is put together.
+                    // Two rows of one frame are a separate problem, which `assemble::step` reports.
                     return if row.time == *time { Ok(()) } else { unsorted() };
                 }
                 *time = row.time;
@@ -80,19 +83,19 @@ impl VehicleOrder {
     }
 }
 
-/// Sees to it that time never goes back.
+/// Checks that time never decreases.
 #[derive(Default)]
 pub(super) struct TimeOrder {
     now: Option<Time>,
 }
 
 impl TimeOrder {
-    /// True where `row` is the first of its instant.
-    pub(super) fn check(&mut self, row: &Row) -> Result<bool, Refusal> {
+    /// Checks the next row. Returns `true` if it is the first row of its instant.
+    pub(super) fn check(&mut self, row: &Row) -> Result<bool, ReadError> {
         let before = self.now.unwrap_or(row.time);
         if row.time < before {
             let back_s = (before - row.time).s();
-            return Err(Refusal::new(row.line, RecordingProblem::NotByTime { back_s, rows: WINDOW_ROWS }));
+            return Err(ReadError::new(row.line, RecordingProblem::NotByTime { back_s, rows: WINDOW_ROWS }));
         }
         self.now = Some(row.time);
         Ok(row.time > before)

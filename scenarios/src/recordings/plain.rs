@@ -2,13 +2,15 @@
 
 use closecall_traffic::{Time, VehicleClass};
 
-use super::fields::{Bounds, Fault, integer, number, wrong_value};
-use super::layout::{Header, TextLayout};
+use super::error::RecordingProblem;
+use super::fields::{Bounds, FieldError, integer, number, wrong_value};
+use super::header::Header;
+use super::recording::{Layout, MarkingDistances};
 use super::rows::Fields;
-use super::source::{About, Clock, Row};
-use super::{Layout, MarkingDistances, RecordingProblem};
+use super::source::{Clock, FileInfo, Row};
+use super::text_layout::TextLayout;
 
-/// Every column of the layout, in the order in which they are written.
+/// All columns of the layout, in the order in which they are written.
 pub(super) const HEADER: [&str; 17] = [
     "recording_id",
     "track_id",
@@ -29,13 +31,14 @@ pub(super) const HEADER: [&str; 17] = [
     "source_scenario",
 ];
 
-/// What each column allows. The bounds are wider than any road vehicle, so that only a broken file meets them.
+/// Allowed values of each column. The ranges exceed what any road vehicle reaches, so that only a broken file violates
+/// them.
 pub(super) mod allowed {
     use super::Bounds;
 
-    /// Numbers of vehicles; above them are those of the pieces of a track with gaps.
+    /// Numbers of vehicles. Higher numbers are those of the pieces of split tracks.
     pub(in super::super) const IDS: (i64, i64) = (0, 999_999_999_999);
-    /// Numbers of tracks: a file that we wrote has pieces.
+    /// Numbers of tracks. They include the numbers of pieces, because files that Closecall writes contain pieces.
     pub(in super::super) const TRACKS: (i64, i64) = (0, 9_000_000_000_000_000);
     pub(in super::super) const FRAMES: (i64, i64) = (0, 1_000_000_000);
     pub(in super::super) const LANES: (i64, i64) = (0, 255);
@@ -50,7 +53,7 @@ pub(super) mod allowed {
     pub(in super::super) const WIDTH_M: Bounds = Bounds::above(0.0, 10.0);
 }
 
-/// Where the quantities of the plain layout stand.
+/// The column indices of the plain layout's quantities.
 pub(super) struct PlainColumns {
     track: usize,
     frame: usize,
@@ -65,18 +68,20 @@ pub(super) struct PlainColumns {
     class: usize,
     vehicle: Option<usize>,
     recording: Option<usize>,
-    /// Read for their validity only: the lateral position tells the heading, and s and d the place.
-    unused: Vec<(usize, &'static str, Bounds)>,
+    /// Columns that are only validated: the lateral position gives the heading, and s and d give the position.
+    validated_only: Vec<(usize, &'static str, Bounds)>,
 }
 
 impl PlainColumns {
-    /// The names by which the layout is recognised.
+    /// The column names by which the layout is detected.
     pub(super) const NAMES: [&str; 17] = HEADER;
 
+    /// Finds the columns in `header`.
+    ///
     /// # Errors
-    /// Where a column is missing that the reader needs.
+    /// Fails if a required column is missing.
     pub(super) fn new(header: &Header) -> Result<Self, RecordingProblem> {
-        let need = |name| header.need(name, "plain");
+        let need = |name| header.require(name, "plain");
         let bounded = [("heading_rel_rad", allowed::HEADING_RAD), ("x_m", allowed::PLANE_M), ("y_m", allowed::PLANE_M)];
         let present = bounded.into_iter().filter_map(|(name, bounds)| Some((header.find(name)?, name, bounds)));
         Ok(Self {
@@ -93,24 +98,24 @@ impl PlainColumns {
             class: need("vehicle_class")?,
             vehicle: header.find("vehicle_id"),
             recording: header.find("recording_id"),
-            unused: present.collect(),
+            validated_only: present.collect(),
         })
     }
 }
 
 impl TextLayout for PlainColumns {
-    fn about(&self) -> About {
-        About { layout: Layout::Plain, name: None, period: None, markings: None }
+    fn info(&self) -> FileInfo {
+        FileInfo { layout: Layout::Plain, name: None, period: None, markings: None }
     }
 
     fn recording<'l>(&self, line: &'l str, fields: &Fields) -> Option<(&'static str, &'l str)> {
         self.recording.map(|index| ("recording_id", fields.get(line, index)))
     }
 
-    fn parse(&mut self, line: &str, fields: &Fields) -> Result<Option<Row>, Fault> {
+    fn parse(&mut self, line: &str, fields: &Fields) -> Result<Option<Row>, FieldError> {
         let whole = |index, name, range| integer(fields.get(line, index), name, range);
         let real = |index, name, bounds| number(fields.get(line, index), name, bounds);
-        for &(index, name, bounds) in &self.unused {
+        for &(index, name, bounds) in &self.validated_only {
             real(index, name, bounds)?;
         }
         let track = whole(self.track, "track_id", allowed::TRACKS)?;
@@ -141,10 +146,11 @@ impl TextLayout for PlainColumns {
     }
 }
 
-pub(super) fn class(text: &str) -> Result<VehicleClass, Fault> {
+/// Parses the name of a vehicle class.
+pub(super) fn class(text: &str) -> Result<VehicleClass, FieldError> {
     let named = VehicleClass::ALL.into_iter().find(|class| class.name() == text);
     named.ok_or_else(|| {
         let words = VehicleClass::ALL.map(VehicleClass::name).join(", ");
-        Fault::at("vehicle_class", wrong_value(text, format!("one of {words}")))
+        FieldError::at("vehicle_class", wrong_value(text, format!("one of {words}")))
     })
 }

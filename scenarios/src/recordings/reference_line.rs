@@ -1,31 +1,31 @@
-//! A line along a road, and where points are beside it.
+//! A reference line along a road, and the projection of points onto it.
 
-/// A point in a plane [m].
+/// A point in a plane (m).
 pub(super) type Point = (f64, f64);
 
-/// Points nearer to each other than this are one [m].
+/// Maximum distance at which two points count as one (m).
 const SAME_POINT_M: f64 = 1e-6;
 
-/// Straight pieces that follow each other; beyond both ends it goes on straight.
+/// A polyline. It continues straight beyond both ends.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct ReferenceLine {
-    /// Points, and the distance along the line to each.
+    /// The points, each with its distance along the line (m).
     points: Vec<(Point, f64)>,
 }
 
-/// A position beside a line.
+/// The position of a point relative to a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Beside {
-    /// Distance along the line [m].
+pub(super) struct Projection {
+    /// Distance along the line (m).
     pub(super) s_m: f64,
-    /// Distance to the left of it [m].
+    /// Distance to the left of the line (m).
     pub(super) d_m: f64,
-    /// Heading of the line there [rad].
+    /// Heading of the line at that position (rad).
     pub(super) heading_rad: f64,
 }
 
 impl ReferenceLine {
-    /// The line through `points`.
+    /// Builds the line through `points`.
     pub(super) fn through(points: impl Iterator<Item = Point>) -> Self {
         let mut line: Vec<(Point, f64)> = Vec::new();
         for point in points {
@@ -42,15 +42,15 @@ impl ReferenceLine {
         Self { points: line }
     }
 
-    /// Its length [m]; nothing where it has no extent.
+    /// Returns the length of the line (m), or `None` if it has no extent.
     pub(super) fn length_m(&self) -> Option<f64> {
         self.points.last().filter(|_| self.points.len() > 1).map(|(_, s_m)| *s_m)
     }
 
-    /// Where a point is beside the line: at the nearest place on it.
-    pub(super) fn project(&self, (x, y): Point) -> Beside {
+    /// Projects a point onto the nearest position of the line.
+    pub(super) fn project(&self, (x, y): Point) -> Projection {
         let last = self.points.len().saturating_sub(2);
-        let mut nearest = (f64::INFINITY, Beside { s_m: 0.0, d_m: 0.0, heading_rad: 0.0 });
+        let mut nearest = (f64::INFINITY, Projection { s_m: 0.0, d_m: 0.0, heading_rad: 0.0 });
         for (k, pair) in self.points.windows(2).enumerate() {
             let (((x0, y0), s0), ((x1, y1), s1)) = (pair[0], pair[1]);
             let length = s1 - s0;
@@ -61,7 +61,7 @@ impl ReferenceLine {
             let distance = (x - x0 - along * ux).hypot(y - y0 - along * uy);
             if distance < nearest.0 {
                 let side = (ux * (y - y0) - uy * (x - x0)).signum();
-                nearest = (distance, Beside { s_m: s0 + along, d_m: side * distance, heading_rad: uy.atan2(ux) });
+                nearest = (distance, Projection { s_m: s0 + along, d_m: side * distance, heading_rad: uy.atan2(ux) });
             }
         }
         nearest.1
@@ -73,12 +73,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn points_are_beside_the_nearest_place_and_ends_go_on_straight() {
+    fn points_project_onto_the_nearest_position_and_the_line_continues_straight() {
         let corner = ReferenceLine::through([(0.0, 0.0), (10.0, 0.0), (10.0, 0.0), (10.0, 10.0)].into_iter());
         assert_eq!(corner.length_m(), Some(20.0));
         let at = |x, y| {
-            let beside = corner.project((x, y));
-            (beside.s_m, beside.d_m)
+            let projection = corner.project((x, y));
+            (projection.s_m, projection.d_m)
         };
         assert_eq!(at(4.0, 1.0), (4.0, 1.0));
         assert_eq!(at(4.0, -2.0), (4.0, -2.0));

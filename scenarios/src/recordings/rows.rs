@@ -1,28 +1,28 @@
-//! Text to rows of fields, one line at a time.
+//! Splitting of text into rows of fields, one line at a time.
 //!
-//! None of the layouts lets a quoted field run over several lines. Reading by lines therefore bounds the memory that a
-//! damaged file can take, and gives the line number of every error.
+//! In none of the layouts does a quoted field span several lines. Reading line by line therefore bounds the memory that
+//! a damaged file can occupy, and gives the line number of every error.
 
 use std::io::{self, BufRead, Read};
 use std::ops::Range;
 
-use super::RecordingProblem;
+use super::error::RecordingProblem;
 
-/// The longest line that is read [bytes]; the layouts' own lines stay below 300.
-const LONGEST_LINE: u64 = 16_384;
+/// Maximum length of a line (bytes). The lines of the supported layouts stay below 300.
+const MAX_LINE_BYTES: u64 = 16_384;
 
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// How fields are told apart.
+/// The separator between fields.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Separator {
-    /// A comma; fields may be in double quotes.
+    /// A comma. Fields may be in double quotes.
     Comma,
     /// One or more blanks or tabs.
     Blank,
 }
 
-/// A source of lines that counts them.
+/// A source of text lines that counts them.
 pub(super) struct Lines<R> {
     source: R,
     buffer: Vec<u8>,
@@ -34,11 +34,12 @@ impl<R: BufRead> Lines<R> {
         Self { source, buffer: Vec::new(), number: 0 }
     }
 
-    /// The next line that is not blank, without its end and without a byte order mark, and its number, counted from 1.
+    /// Returns the next line that is not blank, and its number, counted from 1. The line has neither line end nor byte
+    /// order mark.
     pub(super) fn next(&mut self) -> Result<Option<(u64, &str)>, (u64, RecordingProblem)> {
         loop {
             self.buffer.clear();
-            let read = self.source.by_ref().take(LONGEST_LINE + 1).read_until(b'\n', &mut self.buffer);
+            let read = self.source.by_ref().take(MAX_LINE_BYTES + 1).read_until(b'\n', &mut self.buffer);
             if read.map_err(|error| (self.number + 1, io_problem(error)))? == 0 {
                 return Ok(None);
             }
@@ -49,8 +50,8 @@ impl<R: BufRead> Lines<R> {
             if self.buffer.contains(&0) {
                 return Err((self.number, RecordingProblem::Binary));
             }
-            if self.buffer.len() as u64 > LONGEST_LINE {
-                return Err((self.number, RecordingProblem::LineTooLong { allowed: LONGEST_LINE }));
+            if self.buffer.len() as u64 > MAX_LINE_BYTES {
+                return Err((self.number, RecordingProblem::LineTooLong { allowed: MAX_LINE_BYTES }));
             }
             if !self.buffer.trim_ascii().is_empty() {
                 break;
@@ -64,13 +65,13 @@ impl<R: BufRead> Lines<R> {
         }
     }
 
-    /// True where the latest line has no end, so that its last field may be cut.
-    pub(super) fn is_cut(&self) -> bool {
+    /// Returns `true` if the latest line is not terminated, so that its last field may be cut.
+    pub(super) fn is_unterminated(&self) -> bool {
         self.buffer.last().is_some_and(|byte| *byte != b'\n')
     }
 }
 
-/// An I/O failure, told apart from damaged compression, which the decoder reports in the same type.
+/// Distinguishes an I/O failure from damaged compression, which the decoder reports with the same error type.
 pub(super) fn io_problem(error: io::Error) -> RecordingProblem {
     match error.kind() {
         io::ErrorKind::InvalidInput | io::ErrorKind::InvalidData | io::ErrorKind::UnexpectedEof => {
@@ -80,7 +81,7 @@ pub(super) fn io_problem(error: io::Error) -> RecordingProblem {
     }
 }
 
-/// Where the fields of one line are.
+/// The positions of the fields in one line.
 #[derive(Default)]
 pub(super) struct Fields {
     spans: Vec<Range<usize>>,
@@ -91,12 +92,12 @@ impl Fields {
         self.spans.len()
     }
 
-    /// One field of `line`, without surrounding blanks and quotes.
+    /// Returns one field of `line` without surrounding blanks and quotes.
     pub(super) fn get<'l>(&self, line: &'l str, index: usize) -> &'l str {
         &line[self.spans[index].clone()]
     }
 
-    /// Splits `line`.
+    /// Splits `line` into fields.
     pub(super) fn split(&mut self, line: &str, separator: Separator) -> Result<(), RecordingProblem> {
         self.spans.clear();
         match separator {
@@ -109,14 +110,15 @@ impl Fields {
         }
     }
 
+    /// Splits at the commas outside of double quotes.
     fn split_commas(&mut self, line: &str) -> Result<(), RecordingProblem> {
         let (mut start, mut quoted) = (0, false);
-        for (place, byte) in line.bytes().enumerate() {
+        for (index, byte) in line.bytes().enumerate() {
             match byte {
                 b'"' => quoted = !quoted,
                 b',' if !quoted => {
-                    self.spans.push(span_in(line, unquoted(&line[start..place])));
-                    start = place + 1;
+                    self.spans.push(span_in(line, unquoted(&line[start..index])));
+                    start = index + 1;
                 }
                 _ => {}
             }
@@ -129,12 +131,13 @@ impl Fields {
     }
 }
 
+/// Removes surrounding blanks and double quotes.
 fn unquoted(field: &str) -> &str {
     let field = field.trim();
     field.strip_prefix('"').and_then(|inner| inner.strip_suffix('"')).map_or(field, str::trim)
 }
 
-/// The place of `field`, a slice of `line`.
+/// Returns the byte range of `field`, which is a slice of `line`.
 fn span_in(line: &str, field: &str) -> Range<usize> {
     let start = field.as_ptr() as usize - line.as_ptr() as usize;
     start..start + field.len()
@@ -151,14 +154,14 @@ mod tests {
     }
 
     #[test]
-    fn quotes_hide_commas_and_blanks_join() {
+    fn quoted_commas_do_not_separate_and_blanks_are_merged() {
         assert_eq!(split(r#"352,"1,156", 3 ,"#, Separator::Comma).unwrap(), ["352", "1,156", "3", ""]);
         assert_eq!(split("  1 \t 2   3", Separator::Blank).unwrap(), ["1", "2", "3"]);
         assert!(matches!(split(r#"1,"2,3"#, Separator::Comma), Err(RecordingProblem::OpenQuote)));
     }
 
     #[test]
-    fn lines_are_counted_with_the_blank_ones() {
+    fn blank_lines_count_towards_the_line_number() {
         let mut lines = Lines::new("\u{feff}a\r\n\n  \nb".as_bytes());
         assert_eq!(lines.next().unwrap(), Some((1, "a")));
         assert_eq!(lines.next().unwrap(), Some((4, "b")));
@@ -166,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_without_end_is_refused_without_reading_it() {
+    fn an_endless_line_is_rejected_without_reading_it_whole() {
         let mut lines = Lines::new(io::BufReader::new(io::repeat(b'x')));
         assert!(matches!(lines.next(), Err((1, RecordingProblem::LineTooLong { .. }))));
     }

@@ -1,34 +1,37 @@
-//! What every reader gives: rows in SI units, in the order of the file.
+//! The output of every reader: rows in SI units, in the order of the file.
 //!
 //! ```text
-//!   NGSIM, highD, exiD, plain, in-car (text, by lines) ─┐
-//!                                                        ├─▶ RowSource ─▶ rows ─▶ Tracks (the only way out)
-//!   CommonRoad (XML, by events)                        ─┘
+//!   NGSIM, highD, exiD, plain, in-car (text, line by line) ─┐
+//!                                                           ├─▶ RowSource ─▶ rows ─▶ Tracks (the only exit)
+//!   CommonRoad (XML, event by event)                       ─┘
 //! ```
 //!
-//! A reader holds one line or one XML element at a time; what it needs to know beforehand (the other files of a highD
-//! recording, the lanelets of a CommonRoad scenario) it reads when it is opened.
+//! A reader holds one line or one XML element at a time. When it is opened, it reads the other files of a highD or exiD
+//! data set. A CommonRoad reader also holds the lanelets, which stand before the obstacles in the file.
 
 use closecall_traffic::{Time, VehicleClass};
 
-use super::fields::Fault;
-use super::{LaneMarkings, Layout, MarkingDistances, RecordingProblem};
+use super::error::RecordingProblem;
+use super::fields::FieldError;
+use super::markings::LaneMarkings;
+use super::recording::{Layout, MarkingDistances};
 
-/// Whether frame numbers may start again within one file.
+/// States whether frame numbers may restart within one file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Clock {
-    /// One count of frames for the whole file.
+    /// One count of frames covers the whole file.
     Continuous,
-    /// Original NGSIM files put one behind the other: vehicle and frame numbers recur at later times.
+    /// Concatenated original NGSIM files: vehicle and frame numbers recur at later times.
     MayRestart,
 }
 
 /// One vehicle at one frame, in SI units.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Row {
-    /// Rows of the same number and origin belong to one track, before it is split at gaps.
+    /// Number of the vehicle or track in the file. Rows with the same number and origin form one track before it is
+    /// split at gaps.
     pub(super) number: u64,
-    /// Time of frame 0, where it tells apart several recordings in one file; zero where it does not.
+    /// Time of frame 0 if it distinguishes several data sets in one file, otherwise zero.
     pub(super) origin: Time,
     pub(super) vehicle_id: u64,
     pub(super) frame: i64,
@@ -42,59 +45,63 @@ pub(super) struct Row {
     pub(super) length_m: f64,
     pub(super) width_m: f64,
     pub(super) class: VehicleClass,
-    /// In-car logs only.
+    /// Distances to the lane markings; only in-car logs have them.
     pub(super) marking_distances: MarkingDistances,
     pub(super) line: u64,
 }
 
-/// What a reader knows about its recording before the last row.
+/// What a reader knows about its file before the last row.
 #[derive(Clone, Debug)]
-pub(super) struct About {
+pub(super) struct FileInfo {
     pub(super) layout: Layout,
-    /// The name that the file states, known after the first row at the latest.
+    /// Name that the file states; known after the first row at the latest.
     pub(super) name: Option<String>,
-    /// Time between two frames, where the layout states it.
+    /// Time between two frames, if the layout states it.
     pub(super) period: Option<Time>,
-    /// The lane markings, where the layout states them.
+    /// Lane markings, if the layout states them.
     pub(super) markings: Option<LaneMarkings>,
 }
 
 /// A reader of one layout.
 pub(super) trait RowSource {
-    /// What is known so far.
-    fn about(&self) -> About;
+    /// Returns what is known about the file so far.
+    fn info(&self) -> FileInfo;
 
-    /// The next row in the order of the file; nothing at its end.
+    /// Returns the next row in the order of the file, or `None` at its end.
     ///
     /// # Errors
-    /// The line and what is wrong. After one that [`Refusal::is_of_row`], the next row can be asked for.
-    fn next_row(&mut self) -> Result<Option<Row>, Refusal>;
+    /// Returns the line and the problem. After an error for which [`ReadError::affects_one_row`] holds, the caller can
+    /// ask for the next row.
+    fn next_row(&mut self) -> Result<Option<Row>, ReadError>;
 }
 
-/// An error before it knows its file.
+/// An error while reading a file, before the path of the file is attached.
 #[derive(Debug)]
-pub(super) struct Refusal {
+pub(super) struct ReadError {
     pub(super) line: Option<u64>,
     pub(super) column: Option<&'static str>,
     pub(super) problem: RecordingProblem,
 }
 
-impl Refusal {
+impl ReadError {
+    /// Creates an error that concerns the whole file.
     pub(super) fn of_file(problem: RecordingProblem) -> Self {
         Self { line: None, column: None, problem }
     }
 
-    pub(super) fn new(line: u64, fault: impl Into<Fault>) -> Self {
-        let Fault { column, problem } = fault.into();
+    /// Creates an error in the given line, counted from 1.
+    pub(super) fn new(line: u64, error: impl Into<FieldError>) -> Self {
+        let FieldError { column, problem } = error.into();
         Self { line: Some(line), column, problem }
     }
 
-    pub(super) fn of_fault(fault: Fault) -> Self {
-        Self { line: None, column: fault.column, problem: fault.problem }
+    /// Creates an error in a column without a line, for a problem found at the end of the file.
+    pub(super) fn of_field(error: FieldError) -> Self {
+        Self { line: None, column: error.column, problem: error.problem }
     }
 
-    /// True where only this row is unusable, and reading can go on behind it.
-    pub(super) fn is_of_row(&self) -> bool {
-        self.problem.is_of_row()
+    /// Returns `true` if only this row is unusable and reading can continue after it.
+    pub(super) fn affects_one_row(&self) -> bool {
+        self.problem.affects_one_row()
     }
 }

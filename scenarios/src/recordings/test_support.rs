@@ -1,25 +1,27 @@
-//! Recordings made up for tests.
+//! Synthetic trajectory data for tests.
 
 use closecall_traffic::{Dimensions, Lane, Time, Trajectory, TrajectoryPoint, VehicleClass};
 
-use super::Recording;
+use super::recording::Recording;
 
-/// Time between two frames of made-up recordings.
+/// Time between two frames of the synthetic data.
 pub(crate) const PERIOD: Time = Time::from_ms(100);
 
-/// Lane width of made-up recordings [m].
+/// Lane width of the synthetic road (m).
 pub(crate) const LANE_M: f64 = 3.5;
 
+/// Creates trajectory data from `trajectories`.
 pub(crate) fn recording_of(trajectories: Vec<Trajectory>) -> Recording {
     Recording::new("made-up", PERIOD, trajectories)
 }
 
-/// A car at constant speed in the middle of wherever `d_m` is, from s = `s_m` at time 0.
+/// Creates a car that drives at constant speed at the lateral position `d_m`, from `s_m` at time 0.
 pub(crate) fn straight_track(id: u64, s_m: f64, speed_mps: f64, d_m: f64, frames: i64) -> Trajectory {
     track_along(id, s_m, speed_mps, frames, |_| (d_m, 0.0))
 }
 
-/// A car at constant speed that changes lanes from `from_d_m` to `to_d_m` between two times on a quintic path.
+/// Creates a car that drives at constant speed and changes lanes from `from_d_m` to `to_d_m` on a quintic path. The
+/// change begins at `start_s` and takes `duration_s`.
 pub(crate) fn changing_track(
     id: u64,
     (s_m, speed_mps): (f64, f64),
@@ -35,6 +37,7 @@ pub(crate) fn changing_track(
     })
 }
 
+/// Creates a car at constant speed. `lateral` gives lateral position and lateral speed at a time.
 fn track_along(id: u64, s_m: f64, speed_mps: f64, frames: i64, lateral: impl Fn(f64) -> (f64, f64)) -> Trajectory {
     let point = |frame| {
         let time = PERIOD * frame;

@@ -1,79 +1,81 @@
-//! Readers of text: one row a line.
+//! Readers of text layouts, which have one row per line.
 
 use std::io::BufRead;
 
-use super::exid::Survey;
-use super::fields::Fault;
+use super::error::{RecordingError, RecordingProblem};
+use super::exid::InferredRoad;
+use super::fields::FieldError;
 use super::file_set::Meta;
-use super::layout::{Format, is_of_drone, of_drone, recognise};
+use super::layout::{Format, drone_format, is_drone_header, recognise};
 use super::rows::{Fields, Lines};
-use super::source::{About, Refusal, Row, RowSource};
-use super::{RecordingError, RecordingProblem};
+use super::source::{FileInfo, ReadError, Row, RowSource};
 
-/// The rows of a text file, in any of the layouts that have a row on each line.
+/// The rows of a text file in any layout that has one row per line.
 pub(super) struct TextSource<R> {
     lines: Lines<R>,
     format: Format,
     fields: Fields,
     name: Option<String>,
-    /// The first line, where it is a row already.
+    /// The first line with its number, if it is a row instead of a header.
     first: Option<(u64, String)>,
 }
 
 impl<R: BufRead> TextSource<R> {
+    /// Detects the layout from the first line.
+    ///
     /// # Errors
-    /// Where the first line is that of no layout, or of one that needs other files.
-    pub(super) fn new(source: R) -> Result<Self, Refusal> {
-        let (lines, number, first) = begin(source)?;
-        Self::recognised(lines, number, first)
+    /// Fails if the first line fits no layout, or fits a layout that needs other files.
+    pub(super) fn new(source: R) -> Result<Self, ReadError> {
+        let (lines, number, first) = read_first_line(source)?;
+        Self::with_recognised_layout(lines, number, first)
     }
 
-    /// As [`TextSource::new`], where `meta` can be asked for what is in the other files, and `survey` for what the traffic
-    /// tells about the road.
+    /// Works like [`TextSource::new`], but also reads highD's and exiD's rows. For these layouts, it calls `meta` for
+    /// the content of the metadata files. For exiD it also calls `infer_road`, which derives the road from the traffic.
     pub(super) fn with_meta(
         source: R,
         meta: impl FnOnce() -> Result<Meta, RecordingError>,
-        survey: impl FnOnce() -> Result<Survey, RecordingError>,
-    ) -> Result<Self, Result<Refusal, RecordingError>> {
-        let (lines, number, first) = begin(source).map_err(Ok)?;
-        if !is_of_drone(&first) {
-            return Self::recognised(lines, number, first).map_err(Ok);
+        infer_road: impl FnOnce() -> Result<InferredRoad, RecordingError>,
+    ) -> Result<Self, Result<ReadError, RecordingError>> {
+        let (lines, number, first) = read_first_line(source).map_err(Ok)?;
+        if !is_drone_header(&first) {
+            return Self::with_recognised_layout(lines, number, first).map_err(Ok);
         }
-        let format = of_drone(&first, meta().map_err(Err)?, survey)
-            .map_err(|error| error.map(|problem| Refusal::new(number, problem)))?;
+        let format = drone_format(&first, meta().map_err(Err)?, infer_road)
+            .map_err(|error| error.map(|problem| ReadError::new(number, problem)))?;
         Ok(Self { lines, format, fields: Fields::default(), name: None, first: None })
     }
 
-    fn recognised(lines: Lines<R>, number: u64, first: String) -> Result<Self, Refusal> {
-        let format = recognise(&first).map_err(|problem| Refusal::new(number, problem))?;
+    fn with_recognised_layout(lines: Lines<R>, number: u64, first: String) -> Result<Self, ReadError> {
+        let format = recognise(&first).map_err(|problem| ReadError::new(number, problem))?;
         let first = (!format.has_header).then_some((number, first));
         Ok(Self { lines, format, fields: Fields::default(), name: None, first })
     }
 }
 
-/// The first line, and the lines behind it.
-fn begin<R: BufRead>(source: R) -> Result<(Lines<R>, u64, String), Refusal> {
+/// Reads the first line, and returns it together with the remaining lines.
+fn read_first_line<R: BufRead>(source: R) -> Result<(Lines<R>, u64, String), ReadError> {
     let mut lines = Lines::new(source);
     match lines.next().map_err(at_line)? {
         Some((number, first)) => {
             let first = first.to_owned();
             Ok((lines, number, first))
         }
-        None => Err(Refusal::of_file(RecordingProblem::Empty)),
+        None => Err(ReadError::of_file(RecordingProblem::Empty)),
     }
 }
 
-fn at_line((line, problem): (u64, RecordingProblem)) -> Refusal {
-    Refusal::new(line, problem)
+fn at_line((line, problem): (u64, RecordingProblem)) -> ReadError {
+    ReadError::new(line, problem)
 }
 
 impl<R: BufRead> RowSource for TextSource<R> {
-    fn about(&self) -> About {
-        let about = self.format.columns.about();
-        About { name: self.name.clone().or(about.name.clone()), ..about }
+    fn info(&self) -> FileInfo {
+        let info = self.format.columns.info();
+        FileInfo { name: self.name.clone().or(info.name.clone()), ..info }
     }
 
-    fn next_row(&mut self) -> Result<Option<Row>, Refusal> {
+    fn next_row(&mut self) -> Result<Option<Row>, ReadError> {
         let Self { lines, format, fields, name, first } = self;
         loop {
             let first = first.take();
@@ -82,14 +84,14 @@ impl<R: BufRead> RowSource for TextSource<R> {
                 None => match lines.next().map_err(at_line)? {
                     Some(next) => next,
                     None => {
-                        format.columns.end().map_err(Refusal::of_fault)?;
+                        format.columns.end().map_err(ReadError::of_field)?;
                         return Ok(None);
                     }
                 },
             };
-            let row = parse(line, format, fields, name).map_err(|fault| Refusal::new(number, fault))?;
-            if lines.is_cut() {
-                return Err(Refusal::new(number, RecordingProblem::CutLine));
+            let row = parse(line, format, fields, name).map_err(|error| ReadError::new(number, error))?;
+            if lines.is_unterminated() {
+                return Err(ReadError::new(number, RecordingProblem::CutLine));
             }
             if let Some(row) = row {
                 return Ok(Some(Row { line: number, ..row }));
@@ -103,7 +105,7 @@ fn parse(
     format: &mut Format,
     fields: &mut Fields,
     name: &mut Option<String>,
-) -> Result<Option<Row>, Fault> {
+) -> Result<Option<Row>, FieldError> {
     fields.split(line, format.separator)?;
     let (found, needed) = (fields.len(), format.width);
     if found != needed {
@@ -113,15 +115,15 @@ fn parse(
     format.columns.parse(line, fields)
 }
 
-/// One file holds one recording.
-fn check_name(line: &str, format: &Format, fields: &Fields, name: &mut Option<String>) -> Result<(), Fault> {
+/// Checks that all rows carry the same data set name: one file holds one data set.
+fn check_name(line: &str, format: &Format, fields: &Fields, name: &mut Option<String>) -> Result<(), FieldError> {
     let Some((column, found)) = format.columns.recording(line, fields) else { return Ok(()) };
     match name {
         None => *name = Some(found.to_owned()),
         Some(first) if first == found => {}
         Some(first) => {
             let problem = RecordingProblem::SeveralRecordings { first: first.clone(), found: found.to_owned() };
-            return Err(Fault::at(column, problem));
+            return Err(FieldError::at(column, problem));
         }
     }
     Ok(())

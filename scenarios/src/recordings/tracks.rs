@@ -1,39 +1,42 @@
-//! The way out of every reader: complete tracks, one after the other.
+//! The exit of every reader: complete tracks, one after the other.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use closecall_traffic::Time;
 
-use super::builder::Builder;
+use super::builder::TrackBuilder;
 use super::dropped::Dropped;
-use super::open::Digest;
+use super::error::{RecordingError, RecordingProblem};
+use super::input::Digest;
+use super::markings::LaneMarkings;
+use super::ngsim;
 use super::order::{WINDOW_ROWS, order_of};
 use super::plausible;
-use super::source::{About, Clock, Refusal, Row, RowSource};
-use super::{LaneMarkings, Layout, RecordedTrack, Recording, RecordingError, RecordingProblem, ngsim};
+use super::recording::{Layout, RecordedTrack, Recording};
+use super::source::{Clock, FileInfo, ReadError, Row, RowSource};
 
-/// Times from here on count from 1970, not from the recording's start: one day.
-const EPOCH_TIMES_FROM: Time = Time::from_ms(86_400_000);
+/// Minimum time that counts from 1970 instead of from the start of the file: one day.
+const MIN_EPOCH_TIME: Time = Time::from_ms(86_400_000);
 
-/// Recordings in one file whose times overlap are laid apart by this, so that their vehicles never meet.
-const APART: Time = Time::from_ms(10_000);
+/// Time between two data sets in one file after shifting them, so that their vehicles never meet.
+const SEPARATION: Time = Time::from_ms(10_000);
 
-/// How a recording is read.
+/// Options for reading a trajectory file.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ReadOptions {
-    /// The layout, or the one that the content tells.
+    /// Required layout. If it is `None`, the content determines the layout.
     pub layout: Option<LayoutChoice>,
-    /// What happens to rows that cannot be used.
+    /// Treatment of unusable rows.
     pub bad_rows: BadRows,
 }
 
-/// A layout that is asked for by name.
+/// A layout that a caller can require by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LayoutChoice {
     /// NGSIM's columns.
     Ngsim,
-    /// highD's or exiD's three files.
+    /// The three files of a highD or exiD data set.
     Highd,
     /// CommonRoad XML.
     Commonroad,
@@ -44,7 +47,7 @@ pub enum LayoutChoice {
 }
 
 impl LayoutChoice {
-    /// The name on the command line.
+    /// Returns the name of the layout on the command line.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Ngsim => "ngsim",
@@ -55,7 +58,7 @@ impl LayoutChoice {
         }
     }
 
-    /// True where `layout` is one of those that are meant.
+    /// Returns `true` if `layout` is one of the layouts that the choice covers.
     pub fn includes(self, layout: Layout) -> bool {
         let of = match layout {
             Layout::Plain => Self::Csv,
@@ -68,23 +71,23 @@ impl LayoutChoice {
     }
 }
 
-/// What happens to rows that cannot be used.
+/// Treatment of rows that cannot be used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BadRows {
-    /// The first one ends the reading: nothing of such a recording is used.
+    /// The first such row ends the reading with an error. None of the file's data is used.
     #[default]
     Refuse,
-    /// They are left out and counted, with the reason and the first place.
+    /// Such rows are skipped and counted, with the reason and the line of the first one.
     Drop,
 }
 
-/// The tracks of a recording, each as soon as it is complete.
+/// The tracks of a trajectory file. Each becomes available as soon as it is complete.
 pub struct Tracks<'a> {
     path: PathBuf,
     source: Box<dyn RowSource + 'a>,
     digest: Digest,
     bad_rows: BadRows,
-    builder: Builder,
+    builder: TrackBuilder,
     period: Time,
     markings: LaneMarkings,
     dropped: Dropped,
@@ -93,14 +96,14 @@ pub struct Tracks<'a> {
 }
 
 impl<'a> Tracks<'a> {
-    /// Reads the first `window` rows; all of them where the file is not longer.
+    /// Reads the first `window` rows, or all rows if the file is not longer.
     pub(super) fn new(
         (path, digest): (&Path, Digest),
         source: Box<dyn RowSource + 'a>,
         bad_rows: BadRows,
         window: usize,
     ) -> Result<Self, RecordingError> {
-        let builder = Builder::of_sorted(ngsim::PERIOD, Time::ZERO);
+        let builder = TrackBuilder::for_sorted(ngsim::PERIOD, Time::ZERO);
         let mut tracks = Self {
             path: path.to_owned(),
             source,
@@ -113,72 +116,74 @@ impl<'a> Tracks<'a> {
             rows: 0,
             ended: false,
         };
-        tracks.begin(window).map_err(|refusal| tracks.with_path(refusal))?;
+        tracks.read_window(window).map_err(|error| tracks.with_path(error))?;
         Ok(tracks)
     }
 
-    /// The recording's name: as the file states it, or else the file's name without its extension.
+    /// Returns the name that the file states, or else the file name without its extension.
     pub fn name(&self) -> String {
         let file_name = self.path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
         let stem = || file_name.split('.').next().unwrap_or_default().to_owned();
-        self.source.about().name.unwrap_or_else(stem)
+        self.source.info().name.unwrap_or_else(stem)
     }
 
-    /// The layout.
+    /// Returns the layout.
     pub fn layout(&self) -> Layout {
-        self.source.about().layout
+        self.source.info().layout
     }
 
-    /// Time between two frames.
+    /// Returns the time between two frames.
     pub fn period(&self) -> Time {
         self.period
     }
 
-    /// The lane markings: as the file states them, or else as the tracks among the first [`WINDOW_ROWS`] rows tell them.
+    /// Returns the lane markings that the file states, or else those derived from the tracks among the first
+    /// [`WINDOW_ROWS`] rows.
     pub fn markings(&self) -> &LaneMarkings {
         &self.markings
     }
 
-    /// The file.
+    /// Returns the path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Rows that were read so far.
+    /// Returns the number of rows read so far.
     pub fn rows(&self) -> u64 {
         self.rows
     }
 
-    /// What was left out so far.
+    /// Returns the rows skipped so far.
     pub fn dropped(&self) -> &Dropped {
         &self.dropped
     }
 
-    /// The BLAKE3 hash of what was read so far, in hexadecimal digits: of the whole file after the last track.
+    /// Returns the BLAKE3 hash of the bytes read so far, in hexadecimal digits. After the last track, it covers the
+    /// whole file.
     pub fn hash(&self) -> String {
         self.digest.hex()
     }
 
-    /// The next complete track. After an error there are no more.
+    /// Returns the next complete track. Returns `None` after the last track and after an error.
     ///
     /// # Errors
-    /// [`RecordingError`] with file, line, column and what is allowed.
+    /// Returns a [`RecordingError`] with file, line, column and allowed values.
     pub fn next_track(&mut self) -> Result<Option<RecordedTrack>, RecordingError> {
         let next = self.advance();
         self.ended |= next.is_err();
-        next.map_err(|refusal| self.with_path(refusal))
+        next.map_err(|error| self.with_path(error))
     }
 
-    /// All tracks as one recording.
+    /// Collects all tracks.
     ///
     /// # Errors
-    /// As [`Tracks::next_track`].
+    /// Fails as [`Tracks::next_track`] does.
     pub fn collect_recording(mut self) -> Result<Recording, RecordingError> {
         let mut trajectories = Vec::new();
         while let Some(track) = self.next_track()? {
             trajectories.push(track.trajectory);
         }
-        let About { layout, markings, .. } = self.source.about();
+        let FileInfo { layout, markings, .. } = self.source.info();
         let mut recording = Recording::new(&self.name(), self.period, trajectories);
         if let Some(markings) = markings {
             recording.markings = markings;
@@ -186,7 +191,8 @@ impl<'a> Tracks<'a> {
         Ok(Recording { layout, hash: self.hash(), ..recording })
     }
 
-    fn advance(&mut self) -> Result<Option<RecordedTrack>, Refusal> {
+    /// Reads rows until the next track is complete.
+    fn advance(&mut self) -> Result<Option<RecordedTrack>, ReadError> {
         loop {
             if let Some(track) = self.builder.pop() {
                 return Ok(Some(track));
@@ -204,8 +210,8 @@ impl<'a> Tracks<'a> {
         }
     }
 
-    /// The next row that can be used.
-    fn next_row(&mut self) -> Result<Option<Row>, Refusal> {
+    /// Returns the next usable row.
+    fn next_row(&mut self) -> Result<Option<Row>, ReadError> {
         loop {
             match self.source.next_row() {
                 Ok(Some(row)) => {
@@ -213,28 +219,29 @@ impl<'a> Tracks<'a> {
                     return Ok(Some(row));
                 }
                 Ok(None) => return Ok(None),
-                Err(refusal) => {
+                Err(error) => {
                     self.rows += 1;
-                    self.drop_row(refusal)?;
+                    self.drop_row(error)?;
                 }
             }
         }
     }
 
-    fn push(&mut self, row: Row) -> Result<(), Refusal> {
-        self.builder.push(row).or_else(|refusal| self.drop_row(refusal))
+    fn push(&mut self, row: Row) -> Result<(), ReadError> {
+        self.builder.push(row).or_else(|error| self.drop_row(error))
     }
 
-    /// Leaves a row out where that is asked for, and the rest of the file can still be used.
-    fn drop_row(&mut self, refusal: Refusal) -> Result<(), Refusal> {
-        if self.bad_rows == BadRows::Refuse || !refusal.is_of_row() {
-            return Err(refusal);
+    /// Skips a row if the caller asked for it and the rest of the file is still usable. Otherwise returns the error.
+    fn drop_row(&mut self, error: ReadError) -> Result<(), ReadError> {
+        if self.bad_rows == BadRows::Refuse || !error.affects_one_row() {
+            return Err(error);
         }
-        self.dropped.add(refusal);
+        self.dropped.add(error);
         Ok(())
     }
 
-    fn begin(&mut self, window: usize) -> Result<(), Refusal> {
+    /// Reads the window, determines the period, the start time and the order from it, and creates the builder.
+    fn read_window(&mut self, window: usize) -> Result<(), ReadError> {
         let mut rows = Vec::new();
         while rows.len() < window {
             match self.next_row()? {
@@ -246,29 +253,30 @@ impl<'a> Tracks<'a> {
             }
         }
         if rows.is_empty() {
-            return Err(self.dropped.take_first().unwrap_or(Refusal::of_file(RecordingProblem::Empty)));
+            return Err(self.dropped.take_first().unwrap_or(ReadError::of_file(RecordingProblem::Empty)));
         }
         let beginning = &rows[..rows.len().min(WINDOW_ROWS)];
-        self.period = self.source.about().period.unwrap_or_else(|| period(beginning));
+        self.period = self.source.info().period.unwrap_or_else(|| period(beginning));
         let start = start(beginning);
-        plausible::check(beginning, self.source.about().layout)?;
+        plausible::check(beginning, self.source.info().layout)?;
         if self.ended {
-            lay_apart(&mut rows);
+            separate_data_sets(&mut rows);
             rows.sort_by_key(|row| (row.number, row.origin, row.time, row.frame, row.line));
-            self.builder = Builder::of_sorted(self.period, start);
+            self.builder = TrackBuilder::for_sorted(self.period, start);
         } else {
-            self.builder = Builder::of_stream(self.period, start, order_of(&rows, self.period)?);
+            self.builder = TrackBuilder::for_stream(self.period, start, order_of(&rows, self.period)?);
         }
         rows.into_iter().try_for_each(|row| self.push(row))?;
         if self.ended {
             self.builder.finish()?;
         }
-        let told = || LaneMarkings::of_tracks(self.builder.ready().map(|track| &track.trajectory));
-        self.markings = self.source.about().markings.unwrap_or_else(told);
+        let derived = || LaneMarkings::from_tracks(self.builder.ready().map(|track| &track.trajectory));
+        self.markings = self.source.info().markings.unwrap_or_else(derived);
         Ok(())
     }
 
-    fn with_path(&self, Refusal { line, column, problem }: Refusal) -> RecordingError {
+    /// Attaches the path of the file to an error.
+    fn with_path(&self, ReadError { line, column, problem }: ReadError) -> RecordingError {
         RecordingError { path: self.path.clone(), line, column, problem }
     }
 }
@@ -281,14 +289,15 @@ impl Iterator for Tracks<'_> {
     }
 }
 
-/// The rows of one vehicle in short.
+/// The extent of one vehicle's rows: their number, and the time and frame of the first and the last.
 struct Extent {
     rows: usize,
     first: (Time, i64),
     last: (Time, i64),
 }
 
-/// The mean step of the vehicle with the most rows; NGSIM's, where no vehicle has two frames.
+/// Returns the mean time step of the vehicle with the most rows. Returns NGSIM's period if no vehicle has two frames,
+/// or if frame numbers may restart.
 fn period(rows: &[Row]) -> Time {
     let mut extents: BTreeMap<(u64, Time), Extent> = BTreeMap::new();
     for row in rows {
@@ -306,14 +315,14 @@ fn period(rows: &[Row]) -> Time {
     if may_restart || step_ns <= 0 { ngsim::PERIOD } else { Time::from_ns(step_ns) }
 }
 
-/// What is taken off all times.
+/// Returns the time to subtract from all times: the earliest one if times count from 1970, otherwise zero.
 fn start(rows: &[Row]) -> Time {
     let earliest = rows.iter().map(|row| row.time).min();
-    earliest.filter(|time| *time >= EPOCH_TIMES_FROM).unwrap_or(Time::ZERO)
+    earliest.filter(|time| *time >= MIN_EPOCH_TIME).unwrap_or(Time::ZERO)
 }
 
-/// Shifts recordings of different origin to later times, so that none overlaps the one before.
-fn lay_apart(rows: &mut [Row]) {
+/// Shifts data sets of different origin to later times, so that none overlaps the previous one.
+fn separate_data_sets(rows: &mut [Row]) {
     let mut spans: BTreeMap<Time, (Time, Time)> = BTreeMap::new();
     for row in &*rows {
         let span = spans.entry(row.origin).or_insert((row.time, row.time));
@@ -326,7 +335,7 @@ fn lay_apart(rows: &mut [Row]) {
     let mut free_from = None;
     for (origin, (first, last)) in spans {
         let shift = free_from.map_or(Time::ZERO, |from: Time| (from - first).max(Time::ZERO));
-        free_from = Some(last + shift + APART);
+        free_from = Some(last + shift + SEPARATION);
         shifts.insert(origin, shift);
     }
     for row in rows {

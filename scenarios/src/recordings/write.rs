@@ -1,26 +1,28 @@
-//! Writing the plain layout.
+//! Writer of the plain layout.
 
 use std::io::{self, Write};
 use std::path::Path;
 
 use closecall_traffic::{Dimensions, Time, Trajectory, TrajectoryPoint};
 
+use super::error::WriteError;
 use super::plain::HEADER;
-use super::{Recording, WriteError};
+use super::recording::Recording;
 use crate::atomic::write_atomically;
 
-/// What the column `source_scenario` says.
+/// Value of the column `source_scenario`.
 const SOURCE: &str = "closecall";
 
-/// Times may lie beside a frame by this share of the period.
-const OFF_CLOCK: f64 = 0.01;
+/// Maximum deviation of a time from a frame, as a share of the period.
+const MAX_DEVIATION: f64 = 0.01;
 
-/// Writes `recording` in the plain layout, one row for each (track, frame); `x_m`, `y_m` are those of a straight road.
+/// Writes `recording` in the plain layout, one row per track and frame. `x_m` and `y_m` are those of a straight road.
 ///
-/// Lengths are written to 0.1 mm. The file appears at `path` as a whole, or not at all.
+/// Lengths are rounded to 0.1 mm. The file appears at `path` complete or not at all.
 ///
 /// # Errors
-/// [`WriteError`] where the file cannot be written, a number is not finite, or an instant lies between two frames.
+/// Returns a [`WriteError`] if the file cannot be written, a number is not finite, or an instant lies between two
+/// frames.
 pub fn write_recording(recording: &Recording, path: &Path) -> Result<(), WriteError> {
     let name = recording.name.replace(['"', '\n', '\r', ','], "_");
     write_atomically(path, |file| {
@@ -35,14 +37,14 @@ pub fn write_recording(recording: &Recording, path: &Path) -> Result<(), WriteEr
         Ok(())
     })
     .map_err(|failure| match failure {
-        Failure::Refused(error) => error,
+        Failure::Invalid(error) => error,
         Failure::Io(source) => WriteError::Io { path: path.to_owned(), source },
     })
 }
 
-/// Why writing stopped, before it knows its file.
+/// The reason why writing stopped, before the path of the file is attached.
 enum Failure {
-    Refused(WriteError),
+    Invalid(WriteError),
     Io(io::Error),
 }
 
@@ -54,14 +56,15 @@ impl From<io::Error> for Failure {
 
 impl From<WriteError> for Failure {
     fn from(error: WriteError) -> Self {
-        Self::Refused(error)
+        Self::Invalid(error)
     }
 }
 
+/// Returns the frame number of a point.
 fn frame(track: &Trajectory, point: &TrajectoryPoint, period: Time) -> Result<i64, WriteError> {
     let frames = point.time.s() / period.s();
     let frame = frames.round();
-    if !((frames - frame).abs() <= OFF_CLOCK && frame >= 0.0) {
+    if !((frames - frame).abs() <= MAX_DEVIATION && frame >= 0.0) {
         let (track_id, time_s, period_s) = (track.track_id, point.time.s(), period.s());
         return Err(WriteError::OffClock { track_id, time_s, period_s });
     }

@@ -1,88 +1,91 @@
-//! Writing in-car logs, and what is true beside them.
+//! Writer of in-car logs, and of the true lane changes that belong to them.
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use closecall_traffic::{Dimensions, Side, Time, VehicleClass};
 
-use super::{MarkingDistances, WriteError};
+use super::error::WriteError;
+use super::recording::MarkingDistances;
 use crate::atomic::write_atomically;
 
-/// The columns that are written.
+/// The columns of the log.
 const HEADER: &str = "time_s,s_m,d_left_m,heading_rad,accel_mps2,yaw_rate_radps,speed_mps,left_marking_m,\
                       right_marking_m,length_m,width_m,vehicle_class";
 
+/// The columns of the ground truth.
 const TRUTH_HEADER: &str = "direction,from_lane,to_lane,start_s,crossing_s,end_s,duration_s,speed_mps,complete";
 
-/// What a test vehicle recorded.
+/// The log of a test vehicle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InCarLog {
-    /// Kind of the vehicle.
+    /// Class of the vehicle.
     pub class: VehicleClass,
-    /// Its size.
+    /// Dimensions of the vehicle.
     pub dimensions: Dimensions,
-    /// What it recorded, in the order of time.
+    /// The recorded rows, ordered by time.
     pub frames: Vec<InCarFrame>,
 }
 
 /// One row of an in-car log.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InCarFrame {
-    /// When.
+    /// Time of the row.
     pub time: Time,
-    /// Position of the centre along the road [m].
+    /// Position of the vehicle's centre along the road (m).
     pub s_m: f64,
-    /// Lateral position of the centre, positive to the left, 0 at the left edge of the leftmost lane [m].
+    /// Lateral position of the centre, positive to the left, 0 at the left edge of the leftmost lane (m).
     pub d_m: f64,
-    /// Heading relative to the road, positive to the left [rad].
+    /// Heading relative to the road, positive to the left (rad).
     pub heading_rad: f64,
-    /// Acceleration along the vehicle [m/s²].
+    /// Acceleration along the vehicle's longitudinal axis (m/s²).
     pub acceleration_mps2: f64,
-    /// Yaw rate, positive to the left [rad/s].
+    /// Yaw rate, positive to the left (rad/s).
     pub yaw_rate_radps: f64,
-    /// What the bus carries, on every fourth row.
+    /// Data of the vehicle bus, on every fourth row.
     pub bus: Option<BusFrame>,
 }
 
-/// What a vehicle's bus carries.
+/// The data that the vehicle bus carries.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BusFrame {
-    /// Speed [m/s].
+    /// Speed (m/s).
     pub speed_mps: f64,
-    /// Distances to the markings of the own lane.
+    /// Distances to the markings of the vehicle's own lane.
     pub markings: MarkingDistances,
 }
 
-/// A lane change as it truly was.
+/// The ground truth of one lane change.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrueLaneChange {
-    /// To the left or to the right.
+    /// Direction of the lane change.
     pub direction: Side,
-    /// The lane before.
+    /// Lane before the change.
     pub from_lane: u8,
-    /// The lane after.
+    /// Lane after the change.
     pub to_lane: u8,
-    /// When the vehicle begins to move sideways [s].
+    /// Time at which the vehicle begins to move laterally (s).
     pub start_s: f64,
-    /// First instant with the centre in the other lane [s].
+    /// Time of the first frame with the vehicle's centre in the other lane (s).
     pub crossing_s: f64,
-    /// When it no longer moves sideways [s].
+    /// Time at which the lateral movement ends (s).
     pub end_s: f64,
-    /// Speed at the crossing [m/s].
+    /// Speed at the crossing (m/s).
     pub speed_mps: f64,
-    /// True where start and end were both recorded.
+    /// `true` if the log contains both start and end.
     pub complete: bool,
 }
 
-/// Where the truth about the log at `path` is written: `drive.csv` has `drive.truth.csv` beside it.
+/// Returns the path of the ground truth that belongs to the log at `path`: `drive.csv` has `drive.truth.csv` beside it.
 pub fn truth_path(path: &Path) -> PathBuf {
     path.with_extension("truth.csv")
 }
 
-/// Writes an in-car log, times to 0.1 ms, lengths to 1 mm. The file appears at `path` as a whole, or not at all.
+/// Writes an in-car log, with times rounded to 0.1 ms and lengths to 1 mm. The file appears at `path` complete or not
+/// at all.
 ///
 /// # Errors
-/// [`WriteError`] where the file cannot be written, or a number is not finite.
+/// Returns a [`WriteError`] if the file cannot be written or a number is not finite.
 pub fn write_in_car(log: &InCarLog, path: &Path) -> Result<(), WriteError> {
     for frame in &log.frames {
         check_finite(frame)?;
@@ -94,10 +97,10 @@ pub fn write_in_car(log: &InCarLog, path: &Path) -> Result<(), WriteError> {
     written.map_err(|source| WriteError::Io { path: path.to_owned(), source })
 }
 
-/// Writes what is true about a log. The file appears at `path` as a whole, or not at all.
+/// Writes the true lane changes of a log. The file appears at `path` complete or not at all.
 ///
 /// # Errors
-/// [`WriteError`] where the file cannot be written.
+/// Returns a [`WriteError`] if the file cannot be written.
 pub fn write_truth(changes: &[TrueLaneChange], path: &Path) -> Result<(), WriteError> {
     let written = write_atomically(path, |file| -> io::Result<()> {
         writeln!(file, "{TRUTH_HEADER}")?;

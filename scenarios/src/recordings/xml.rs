@@ -1,8 +1,8 @@
-//! XML by events, with the line of each, within bounds.
+//! Bounded reading of XML by events, with the line number of each event.
 //!
-//! No entity is expanded: a document type declaration is refused, because entities can only be declared there, and with
-//! them a small file that unfolds to gigabytes. Elements nested deeper than any scenario's are refused, and so is a
-//! single tag or text that goes on and on.
+//! The reader expands no entities. It rejects document type declarations, because only they can declare entities, and
+//! entities let a small file expand to gigabytes. It also rejects elements nested deeper than in any scenario, and a
+//! single tag or text that exceeds a maximum length.
 
 use std::cell::Cell;
 use std::io::{self, BufRead, Read};
@@ -11,108 +11,110 @@ use std::rc::Rc;
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
-use super::RecordingProblem;
+use super::error::RecordingProblem;
 use super::rows::io_problem;
-use super::source::Refusal;
+use super::source::ReadError;
 
-/// The deepest nesting that is read; CommonRoad's own is 8.
-const DEEPEST: usize = 64;
+/// Maximum nesting depth; CommonRoad's own is 8.
+const MAX_DEPTH: usize = 64;
 
-/// The longest tag, text or comment [bytes].
-const LONGEST_EVENT: u64 = 1 << 20;
+/// Maximum length of a tag, text or comment (bytes).
+const MAX_EVENT_BYTES: u64 = 1 << 20;
 
-/// What happens next in an XML file.
+/// The next event in an XML file.
 #[derive(Debug)]
 pub(super) enum Node {
-    /// An element begins; its attributes are those that were asked for.
+    /// An element begins. Only the requested attributes are included.
     Begin { name: String, attributes: Vec<(&'static str, String)> },
-    /// An element ends, with the text in it.
+    /// An element ends; `text` is its text.
     End { text: String },
     /// The file ends.
     EndOfFile,
 }
 
-/// An element's name and those of its attributes that are wanted.
-type Begun = (String, Vec<(&'static str, String)>);
+/// The name of an element and its requested attributes.
+type StartTag = (String, Vec<(&'static str, String)>);
 
-/// The elements of an XML file.
+/// The stream of a file's XML elements.
 pub(super) struct Xml<R> {
-    reader: Reader<Guard<R>>,
+    reader: Reader<BoundedSource<R>>,
     buffer: Vec<u8>,
     text: String,
-    /// The names of the elements that have begun and not ended.
+    /// Names of the open elements, the root first.
     path: Vec<String>,
     meter: Rc<Meter>,
-    /// An element without content ends in the next call.
+    /// `true` if the latest element has no content, so that it ends with the next call.
     is_empty: bool,
-    /// Attributes that are wanted.
+    /// Names of the requested attributes.
     wanted: &'static [&'static str],
 }
 
 impl<R: BufRead> Xml<R> {
+    /// Creates a reader that reports the `wanted` attributes.
     pub(super) fn new(source: R, wanted: &'static [&'static str]) -> Self {
         let meter = Rc::<Meter>::default();
-        let reader = Reader::from_reader(Guard { source, meter: Rc::clone(&meter) });
+        let reader = Reader::from_reader(BoundedSource { source, meter: Rc::clone(&meter) });
         let (buffer, text, path) = (Vec::new(), String::new(), Vec::new());
         Self { reader, buffer, text, path, meter, is_empty: false, wanted }
     }
 
-    /// The line that is being read, counted from 1.
+    /// Returns the current line, counted from 1.
     pub(super) fn line(&self) -> u64 {
         self.meter.lines.get() + 1
     }
 
-    /// The names of the elements that have begun and not ended, the root first.
+    /// Returns the names of the open elements, the root first.
     pub(super) fn path(&self) -> &[String] {
         &self.path
     }
 
-    /// Leaves the element whose end was told: the names of the elements down to it.
+    /// Hands over the path of the element that has just ended, from the root down to it.
     pub(super) fn leave(&mut self) -> Vec<String> {
         self.text.clear();
         std::mem::take(&mut self.path)
     }
 
-    /// Goes on in the element around the one that was left.
+    /// Takes back the path from [`Xml::leave`] and continues in the parent of its last element.
     pub(super) fn back_to(&mut self, mut path: Vec<String>) {
         path.pop();
         self.path = path;
     }
 
-    pub(super) fn refuse<T>(&self, what: impl Into<String>) -> Result<T, Refusal> {
-        Err(Refusal::new(self.line(), RecordingProblem::Xml { what: what.into() }))
+    /// Returns an error at the current line.
+    pub(super) fn fail<T>(&self, what: impl Into<String>) -> Result<T, ReadError> {
+        Err(ReadError::new(self.line(), RecordingProblem::Xml { what: what.into() }))
     }
 
-    /// The next node. After an end, [`Xml::leave`] and [`Xml::back_to`] have to be called.
-    pub(super) fn next(&mut self) -> Result<Node, Refusal> {
+    /// Returns the next node. After an end node, the caller must call [`Xml::leave`] and [`Xml::back_to`].
+    pub(super) fn next(&mut self) -> Result<Node, ReadError> {
         if std::mem::take(&mut self.is_empty) {
             return Ok(Node::End { text: String::new() });
         }
         loop {
             self.buffer.clear();
-            self.meter.allowed.set(LONGEST_EVENT);
+            self.meter.allowed.set(MAX_EVENT_BYTES);
             match self.reader.read_event_into(&mut self.buffer) {
                 Ok(Event::Start(start)) => {
-                    let begun = begin(&start, self.wanted);
-                    return self.enter(begun);
+                    let start_tag = parse_start_tag(&start, self.wanted);
+                    return self.enter(start_tag);
                 }
                 Ok(Event::Empty(start)) => {
-                    let begun = begin(&start, self.wanted);
+                    let start_tag = parse_start_tag(&start, self.wanted);
                     self.is_empty = true;
-                    return self.enter(begun);
+                    return self.enter(start_tag);
                 }
                 Ok(Event::End(_)) => return Ok(Node::End { text: std::mem::take(&mut self.text) }),
                 Ok(Event::Text(text)) => match std::str::from_utf8(&text) {
                     Ok(text) => self.text.push_str(text),
-                    Err(_) => return Err(Refusal::new(self.line(), RecordingProblem::Binary)),
+                    Err(_) => return Err(ReadError::new(self.line(), RecordingProblem::Binary)),
                 },
                 Ok(Event::DocType(_)) => {
-                    return self.refuse("a document type declaration is not allowed, as it can declare entities");
+                    return self.fail("a document type declaration is not allowed, as it can declare entities");
                 }
                 Ok(Event::GeneralRef(_)) => self.text.push('&'),
                 Ok(Event::Eof) => {
                     return match self.path.last() {
-                        Some(open) => self.refuse(format!("the file ends inside the element `{open}`: it is cut")),
+                        Some(open) => self.fail(format!("the file ends inside the element `{open}`: it is cut")),
                         None => Ok(Node::EndOfFile),
                     };
                 }
@@ -120,24 +122,25 @@ impl<R: BufRead> Xml<R> {
                 Err(quick_xml::Error::Io(error)) => {
                     let error = io::Error::new(error.kind(), error.to_string());
                     let problem = if self.meter.allowed.get() == 0 {
-                        RecordingProblem::LineTooLong { allowed: LONGEST_EVENT }
+                        RecordingProblem::LineTooLong { allowed: MAX_EVENT_BYTES }
                     } else {
                         io_problem(error)
                     };
-                    return Err(Refusal::new(self.line(), problem));
+                    return Err(ReadError::new(self.line(), problem));
                 }
-                Err(error) => return self.refuse(error.to_string()),
+                Err(error) => return self.fail(error.to_string()),
             }
-            if self.text.len() as u64 > LONGEST_EVENT {
-                return Err(Refusal::new(self.line(), RecordingProblem::LineTooLong { allowed: LONGEST_EVENT }));
+            if self.text.len() as u64 > MAX_EVENT_BYTES {
+                return Err(ReadError::new(self.line(), RecordingProblem::LineTooLong { allowed: MAX_EVENT_BYTES }));
             }
         }
     }
 
-    fn enter(&mut self, begun: Result<Begun, String>) -> Result<Node, Refusal> {
-        let (name, attributes) = begun.or_else(|what| self.refuse(what))?;
-        if self.path.len() >= DEEPEST {
-            return self.refuse(format!("elements are nested deeper than {DEEPEST}"));
+    /// Pushes an element that begins onto the path.
+    fn enter(&mut self, start_tag: Result<StartTag, String>) -> Result<Node, ReadError> {
+        let (name, attributes) = start_tag.or_else(|what| self.fail(what))?;
+        if self.path.len() >= MAX_DEPTH {
+            return self.fail(format!("elements are nested deeper than {MAX_DEPTH}"));
         }
         self.text.clear();
         self.path.push(name.clone());
@@ -145,8 +148,8 @@ impl<R: BufRead> Xml<R> {
     }
 }
 
-/// The name of an element, and the attributes that are wanted.
-fn begin(start: &BytesStart<'_>, wanted: &[&'static str]) -> Result<Begun, String> {
+/// Parses the name of an element and its requested attributes.
+fn parse_start_tag(start: &BytesStart<'_>, wanted: &[&'static str]) -> Result<StartTag, String> {
     let text = |bytes: &[u8]| {
         std::str::from_utf8(bytes).map(str::to_owned).map_err(|_| "a name is no text in UTF-8".to_owned())
     };
@@ -161,20 +164,20 @@ fn begin(start: &BytesStart<'_>, wanted: &[&'static str]) -> Result<Begun, Strin
     Ok((name, attributes))
 }
 
-/// What was read, and what may still be read before the next event.
+/// Counters shared by the XML reader and its source: lines read, and bytes still permitted before the next event.
 #[derive(Default)]
 struct Meter {
     lines: Cell<u64>,
     allowed: Cell<u64>,
 }
 
-/// A source that counts lines and stops where one event is too long.
-struct Guard<R> {
+/// A source that counts lines and stops reading if a single event is too long.
+struct BoundedSource<R> {
     source: R,
     meter: Rc<Meter>,
 }
 
-impl<R: BufRead> Read for Guard<R> {
+impl<R: BufRead> Read for BoundedSource<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let available = self.fill_buf()?;
         let count = available.len().min(buffer.len());
@@ -184,7 +187,7 @@ impl<R: BufRead> Read for Guard<R> {
     }
 }
 
-impl<R: BufRead> BufRead for Guard<R> {
+impl<R: BufRead> BufRead for BoundedSource<R> {
     fn fill_buf(&mut self) -> io::Result<&[u8]> {
         if self.meter.allowed.get() == 0 {
             return Err(io::Error::other("one element or text is too long"));

@@ -1,7 +1,7 @@
-"""Makes scipy.json, the reference values for the filter and the peaks.
+"""Generates scipy.json, the reference values for the low-pass filter and the peak detection.
 
 Run: pip install scipy==1.16.3 numpy && python scenarios/tests/golden/make_golden.py
-Every case holds its signal, so that both sides work on the same bits.
+Every case contains its signal, so that SciPy and Closecall process the same bits.
 """
 
 import json
@@ -12,7 +12,8 @@ from scipy.signal import butter, filtfilt, find_peaks, peak_prominences, peak_wi
 
 OUT = pathlib.Path(__file__).with_name("scipy.json")
 CORNER_HZ = 1.3
-# (w_object / w_lane): car, narrow car on a wide lane, truck, motorcycle, and a vehicle as wide as its lane.
+# Vehicle width divided by lane width: car, narrow car on a wide lane, truck, motorcycle, and a vehicle as wide as its
+# lane.
 WIDTH_SHARES = (1.85 / 3.75, 1.4 / 4.2, 2.55 / 3.4, 0.8 / 3.75, 1.0)
 
 
@@ -22,7 +23,7 @@ def waves(n):
 
 
 def lateral_speed(n, rate_hz, rng):
-    """Quintic lane changes one after the other, with noise, as a lateral speed."""
+    """Returns the lateral speed of consecutive quintic lane changes, with noise."""
     t = np.arange(n) / rate_hz
     speed = 0.05 * rng.standard_normal(n)
     start = 2.0
@@ -42,7 +43,7 @@ def filter_cases(rng):
             for n in (1, 2, 3, 9, 10, 11, 40, 100):
                 for name, signal in (("waves", waves(n)), ("walk", np.cumsum(rng.standard_normal(n)))):
                     padlen = min(padding, n - 1)
-                    # SciPy wants a signal longer than its filter's padding; one value alone is its own steady state.
+                    # SciPy requires a signal longer than the filter's padding. A single value is its own steady state.
                     filtered = signal if n == 1 else filtfilt(b, a, signal, padlen=padlen)
                     cases.append(
                         {
@@ -105,7 +106,7 @@ def peak_cases(rng):
                 "right_bases": right_bases.tolist(),
                 "widths": [],
             }
-            # Thresholds choose among the peaks, and change no width.
+            # The prominence threshold only selects among the peaks and changes no width.
             for share in (*WIDTH_SHARES, 0.0, 2.0) if min_prominence == 0.0 else ():
                 rel_height = 1.0 - share / 2.0
                 widths, levels, left, right = peak_widths(signal, peaks, rel_height=rel_height)

@@ -1,4 +1,4 @@
-//! The committed result of a fit: it can be used, and the data gives it again.
+//! The committed result of a fit: scenarios can use it, and a new fit of the data reproduces it.
 
 use closecall_scenarios::fit::{Heading, fit, to_toml};
 use closecall_scenarios::parameters::ParametersConfig;
@@ -9,7 +9,7 @@ use crate::support::data_folder;
 const COMMITTED: &str = include_str!("../../library/fitted/us101.toml");
 
 #[test]
-fn both_tables_can_be_pasted_into_a_scenario() {
+fn both_parameter_tables_are_valid_in_a_scenario() {
     let document: toml::Table = COMMITTED.parse().unwrap();
     for table in ["parameters", "parametric"] {
         let config: ParametersConfig = document[table].clone().try_into().unwrap();
@@ -23,7 +23,7 @@ fn both_tables_can_be_pasted_into_a_scenario() {
 }
 
 #[test]
-fn the_recordings_give_the_committed_figures() {
+fn a_new_fit_reproduces_the_committed_figures() {
     let Some(folder) = data_folder() else { return };
     let names = ["a", "b", "f", "g", "h", "i"];
     let path = |name| folder.join(format!("ngsim_us101/trajectories/us101_{name}.csv"));

@@ -1,4 +1,4 @@
-//! Filter and peaks against SciPy; `golden/make_golden.py` makes the reference values.
+//! Low-pass filter and peak detection compared with SciPy. `golden/make_golden.py` generates the reference values.
 
 use closecall_scenarios::filters::{CORNER_HZ, LowPass};
 use closecall_scenarios::lane_change::{find_peaks, peak_width};
@@ -46,14 +46,14 @@ fn golden() -> Golden {
     serde_json::from_str(REFERENCE).unwrap()
 }
 
-/// Largest difference of a width, as a share of it.
+/// Maximum error of a width, relative to the width.
 const WIDTH_SHARE: f64 = 1e-9;
 
-/// Largest difference of a filtered value, as a share of the signal's largest.
+/// Maximum error of a filtered value, relative to the largest value of the signal.
 const FILTER_SHARE: f64 = 1e-9;
 
 #[test]
-fn the_filter_is_that_of_scipy() {
+fn the_filter_agrees_with_scipy() {
     let cases = golden().filter;
     assert!(cases.len() > 100);
     for case in cases {
@@ -69,23 +69,23 @@ fn the_filter_is_that_of_scipy() {
 }
 
 #[test]
-fn peaks_prominences_and_bases_are_exactly_those_of_scipy() {
+fn peaks_prominences_and_bases_equal_those_of_scipy() {
     let cases = golden().peaks;
     assert!(cases.iter().map(|case| case.peaks.len()).sum::<usize>() > 500);
     for case in cases {
         let found = find_peaks(&case.signal, case.min_prominence);
-        let places =
+        let indices =
             |value: fn(&closecall_scenarios::lane_change::Peak) -> usize| found.iter().map(value).collect::<Vec<_>>();
-        assert_eq!(places(|peak| peak.index), case.peaks, "{}", case.name);
-        assert_eq!(places(|peak| peak.left_base), case.left_bases, "{}", case.name);
-        assert_eq!(places(|peak| peak.right_base), case.right_bases, "{}", case.name);
+        assert_eq!(indices(|peak| peak.index), case.peaks, "{}", case.name);
+        assert_eq!(indices(|peak| peak.left_base), case.left_bases, "{}", case.name);
+        assert_eq!(indices(|peak| peak.right_base), case.right_bases, "{}", case.name);
         let prominences: Vec<f64> = found.iter().map(|peak| peak.prominence).collect();
         assert_eq!(prominences, case.prominences, "{}", case.name);
     }
 }
 
 #[test]
-fn widths_are_those_of_scipy() {
+fn widths_agree_with_scipy() {
     for case in golden().peaks {
         let found = find_peaks(&case.signal, case.min_prominence);
         for expected in &case.widths {

@@ -1,4 +1,5 @@
-//! In-car logs: two rates in one file, the markings that are seen, and lanes counted by their jumps.
+//! In-car logs: two rates in one file, distances to the visible markings, and lanes counted by the jumps of the
+//! markings.
 
 use std::path::Path;
 
@@ -7,11 +8,11 @@ use closecall_scenarios::recordings::{
 };
 use closecall_traffic::{Time, VehicleClass};
 
-use crate::support::{LANE_M, MadeUp, track};
+use crate::support::{LANE_M, SyntheticLaneChange, track};
 
-/// The log of a made-up vehicle that changes once between lanes 1 and 2.
+/// Creates the log of a synthetic vehicle that changes lanes once between lanes 1 and 2.
 fn log(to_the_left: bool) -> InCarLog {
-    let change = MadeUp { track_id: 1, speed_mps: 30.0, start_s: 5.0, duration_s: 6.0, to_the_left };
+    let change = SyntheticLaneChange { track_id: 1, speed_mps: 30.0, start_s: 5.0, duration_s: 6.0, to_the_left };
     let track = track(change, Time::from_ms(10));
     let frame = |(k, point): (usize, &closecall_traffic::TrajectoryPoint)| {
         let left_m = -LANE_M * f64::from(point.lane.0 - 1) - point.d_m;
@@ -34,6 +35,7 @@ fn log(to_the_left: bool) -> InCarLog {
     }
 }
 
+/// Writes `log` to a file and reads the file.
 fn read_back(log: &InCarLog) -> Vec<RecordedTrack> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("drive.csv");
@@ -48,32 +50,35 @@ fn tracks(path: &Path) -> Vec<RecordedTrack> {
 }
 
 #[test]
-fn what_is_written_reads_back() {
+fn a_written_log_reads_back_unchanged() {
     let log = log(true);
     let [track] = <[RecordedTrack; 1]>::try_from(read_back(&log)).unwrap();
     assert_eq!((track.trajectory.points.len(), track.markings.len()), (2_000, 2_000));
     for ((point, seen), frame) in track.trajectory.points.iter().zip(&track.markings).zip(&log.frames) {
         assert_eq!(point.time, frame.time);
         assert!((point.d_m - frame.d_m).abs() < 1e-3 && (point.s_m - frame.s_m).abs() < 1e-3);
-        assert_eq!(seen.is_seen(), frame.bus.is_some(), "the bus has a quarter of the rows");
+        assert_eq!(seen.is_seen(), frame.bus.is_some(), "a row has marking distances only if it has a bus frame");
     }
 }
 
 #[test]
-fn jumps_of_the_markings_count_the_lanes() {
+fn lanes_are_counted_by_the_jumps_of_the_markings() {
     for to_the_left in [true, false] {
         let [track] = <[RecordedTrack; 1]>::try_from(read_back(&log(to_the_left))).unwrap();
         let lanes: Vec<u8> = track.trajectory.points.iter().map(|point| point.lane.0).collect();
         let (before, after) = if to_the_left { (2, 1) } else { (1, 2) };
         let crossing = lanes.iter().position(|lane| *lane == after).unwrap();
-        assert!(crossing.abs_diff(800) <= 4, "the middle of the lane change, to a bus frame: {crossing}");
+        assert!(
+            crossing.abs_diff(800) <= 4,
+            "the lane changes within one bus frame of the middle of the lane change: {crossing}"
+        );
         assert!(lanes[..crossing].iter().all(|lane| *lane == before));
         assert!(lanes[crossing..].iter().all(|lane| *lane == after));
     }
 }
 
 #[test]
-fn a_gap_parts_the_log() {
+fn a_gap_splits_the_log() {
     let mut log = log(true);
     log.frames.drain(400..600);
     let tracks = read_back(&log);

@@ -1,4 +1,5 @@
-//! Layouts that tell the same: highD's three files, CommonRoad XML and the plain CSV of one recording; and made-up ones.
+//! Layouts that hold the same data: highD's three files, CommonRoad XML and plain CSV. Also synthetic highD and exiD
+//! files.
 
 use std::path::Path;
 
@@ -12,7 +13,7 @@ use closecall_traffic::{Lane, Side, Time};
 use crate::support::data_folder;
 
 #[test]
-fn the_highd_layout_tells_what_the_plain_one_tells() {
+fn the_highd_layout_yields_the_same_data_as_the_plain_layout() {
     let Some(data) = data_folder() else { return };
     let folder = data.join("highd_format_sample");
     let plain = read(&data.join("ngsim_us101/trajectories/us101_h.csv")).unwrap();
@@ -25,19 +26,19 @@ fn the_highd_layout_tells_what_the_plain_one_tells() {
     }
     assert_eq!(highd.trajectories.len(), 27);
     let instants = highd.trajectories.iter().map(|track| track.points.len()).sum::<usize>();
-    assert_eq!(instants, 1_574, "as many as the file has rows");
+    assert_eq!(instants, 1_574, "each row of the file becomes a track point");
     assert!((highd.markings.lane_width_m(Lane(1)).unwrap() - 3.45).abs() < 1e-9);
     let crossings = |recording| {
         detect(&smooth(recording)).iter().map(|change| (change.direction, change.crossing_s)).collect::<Vec<_>>()
     };
     let (one, other) = (crossings(&plain), crossings(&highd));
-    assert_eq!(other.len(), 4, "as many as the lane changes in that file; some rows of the plain one are not in it");
+    assert_eq!(other.len(), 4, "the highD file contains four lane changes; it lacks some rows of the plain file");
     let is_same = |a: &(Side, f64), b: &(Side, f64)| a.0 == b.0 && (a.1 - b.1).abs() <= 0.101;
     assert!(other.iter().all(|b| one.iter().any(|a| is_same(a, b))), "{one:?} {other:?}");
 }
 
 #[test]
-fn commonroad_scenarios_give_the_tracks_of_the_recording_they_are_cut_from() {
+fn commonroad_scenarios_yield_the_tracks_of_the_data_they_are_taken_from() {
     let Some(data) = data_folder() else { return };
     let entries = std::fs::read_dir(data.join("ngsim_us101/commonroad_xml")).unwrap();
     let mut paths: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
@@ -52,7 +53,7 @@ fn commonroad_scenarios_give_the_tracks_of_the_recording_they_are_cut_from() {
         assert!(scenario.trajectories.len() > 1, "{}", path.display());
         for track in &scenario.trajectories {
             rows += track.points.len();
-            // The same vehicle elsewhere: the same number, the same size, the same speeds for a while.
+            // Find the same vehicle in the plain files: same number and same sequence of speeds.
             let found = plain.iter().flat_map(|recording| &recording.trajectories).find_map(|other| {
                 let speeds = |points: &[closecall_traffic::TrajectoryPoint]| {
                     points.iter().map(|point| (point.speed_mps * 10.0).round() as i64).collect::<Vec<_>>()
@@ -82,12 +83,13 @@ fn hand_made_commonroad_scenarios_are_read() {
     let cut_in = read(&data.join("commonroad_crime/OSC_CutIn-1_2_T-1.xml")).unwrap();
     assert_eq!(cut_in.trajectories.len(), 2);
     for track in &cut_in.trajectories {
-        assert!(track.points.iter().all(|point| point.speed_mps >= 0.0), "nobody drives backwards");
+        assert!(track.points.iter().all(|point| point.speed_mps >= 0.0), "no vehicle drives backwards");
         assert!(track.points.windows(2).all(|pair| pair[1].s_m >= pair[0].s_m));
     }
 }
 
-/// Vehicle 1 drives to the left in the upper carriageway, vehicle 2 to the right in the lower one.
+/// Writes a highD data set. Vehicle 1 drives to the left on the upper carriageway, vehicle 2 to the right on the lower
+/// one.
 fn write_both_ways(folder: &Path) {
     let meta = "id,frameRate,upperLaneMarkings,lowerLaneMarkings\n7,25,8.5;12.5;16.5,21.0;25.0;29.0\n";
     std::fs::write(folder.join("07_recordingMeta.csv"), meta).unwrap();
@@ -97,7 +99,7 @@ fn write_both_ways(folder: &Path) {
         "frame,id,x,y,width,height,xVelocity,yVelocity,xAcceleration,yAcceleration,precedingId,laneId\n".to_owned();
     for frame in 1..=30 {
         let x_m = 400.0 - 1.2 * f64::from(frame);
-        // From the lane beside the median (laneId 3) to the outer one.
+        // The vehicle changes from the lane next to the median (laneId 3) to the outer lane.
         let (y_m, lane) = if frame < 16 { (13.5, 3) } else { (9.5, 2) };
         rows += &format!("{frame},1,{x_m:.2},{y_m},4.5,1.8,-30.0,0,0.5,0,0,{lane}\n");
     }
@@ -109,30 +111,34 @@ fn write_both_ways(folder: &Path) {
 }
 
 #[test]
-fn both_carriageways_are_driven_forwards_and_lie_apart() {
+fn both_carriageways_are_driven_forwards_and_are_separated() {
     let folder = tempfile::tempdir().unwrap();
     write_both_ways(folder.path());
     let recording = read(folder.path()).unwrap();
     let [upper, lower] = recording.trajectories.as_slice() else { panic!() };
     for track in [upper, lower] {
         assert!(track.points.iter().all(|point| point.speed_mps > 0.0));
-        assert!(track.points.windows(2).all(|pair| pair[1].s_m > pair[0].s_m), "s rises");
+        assert!(track.points.windows(2).all(|pair| pair[1].s_m > pair[0].s_m), "s increases");
     }
     assert_eq!((upper.points[0].acceleration_mps2, lower.points[0].acceleration_mps2), (-0.5, -0.5));
-    // The lower carriageway has lanes 1 and 2, the median is left out, the upper one has 4 and 5.
+    // The lower carriageway has lanes 1 and 2, lane 3 stands for the median, and the upper carriageway has lanes 4 and
+    // 5.
     assert_eq!(lower.points[0].lane, Lane(2));
-    assert!((lower.points[0].d_m + 6.0).abs() < 1e-9, "27 m is 6 m below the upper marking");
+    assert!(
+        (lower.points[0].d_m + 6.0).abs() < 1e-9,
+        "y = 27 m is 6 m below the uppermost marking of the lower carriageway"
+    );
     assert_eq!((upper.points[0].lane, upper.points[29].lane), (Lane(4), Lane(5)));
     assert!(
         (upper.points[0].d_m + 1_000.0 + 8.0 + 2.1).abs() < 1e-9,
-        "its left edge is 1 km right of the other's right"
+        "the left edge of the upper carriageway is 1 km to the right of the lower one's right edge"
     );
-    assert!(upper.points[29].d_m < upper.points[0].d_m, "it moves to its right");
+    assert!(upper.points[29].d_m < upper.points[0].d_m, "the vehicle moves to its right");
     assert_eq!(recording.markings.lane_width_m(Lane(5)), Some(4.0));
 }
 
 #[test]
-fn a_layout_that_is_asked_for_has_to_be_there() {
+fn a_file_of_another_layout_than_required_is_rejected() {
     let folder = tempfile::tempdir().unwrap();
     write_both_ways(folder.path());
     let path = folder.path().join("07_tracks.csv");
@@ -145,8 +151,9 @@ fn a_layout_that_is_asked_for_has_to_be_there() {
     assert!(matches!(alone.problem, RecordingProblem::NeedsMetadata));
 }
 
-/// A road of two lanes that bends with a radius of 2 km, driven in both directions, in exiD's layout. Vehicle 1 keeps the
-/// right lane, vehicle 2 changes from it to the left one, vehicle 3 keeps the left lane, vehicle 4 drives the other way.
+/// Writes an exiD data set of a road that bends with a radius of 2 km and is driven in both directions. The first direction
+/// has two lanes. Vehicle 1 keeps the right lane, vehicle 2 changes from the right to the left lane, vehicle 3 keeps the
+/// left lane, and vehicle 4 drives in the opposite direction.
 fn write_bent_both_ways(folder: &Path) {
     const RADIUS_M: f64 = 2_000.0;
     const LANE_M: f64 = 3.75;
@@ -165,7 +172,7 @@ fn write_bent_both_ways(folder: &Path) {
             let time_s = 0.04 * f64::from(frame);
             let tau = ((time_s - 3.0) / 4.0).clamp(0.0, 1.0);
             let shape = tau.powi(3) * (10.0 - 15.0 * tau + 6.0 * tau * tau);
-            // To the left of the first direction, 0 in the middle of its right lane.
+            // Offset to the left of the middle of the first direction's right lane.
             let left_m = match vehicle {
                 1 => 0.0,
                 2 => LANE_M * shape,
@@ -188,7 +195,7 @@ fn write_bent_both_ways(folder: &Path) {
 }
 
 #[test]
-fn exids_road_is_told_from_its_traffic() {
+fn the_road_of_exid_data_is_inferred_from_its_traffic() {
     let folder = tempfile::tempdir().unwrap();
     write_bent_both_ways(folder.path());
     let recording = read(folder.path()).unwrap();
@@ -197,7 +204,7 @@ fn exids_road_is_told_from_its_traffic() {
     let lanes = |track: &closecall_traffic::Trajectory| (track.points[0].lane.0, track.points[249].lane.0);
     assert_eq!((lanes(keeps), lanes(changes), lanes(left), lanes(back)), ((2, 2), (2, 1), (1, 1), (4, 4)));
     for track in &recording.trajectories {
-        assert!(track.points.windows(2).all(|pair| pair[1].s_m > pair[0].s_m), "s rises");
+        assert!(track.points.windows(2).all(|pair| pair[1].s_m > pair[0].s_m), "s increases");
     }
     let d_m = |track: &closecall_traffic::Trajectory| track.points[249].d_m;
     assert!((d_m(keeps) + 1.5 * 3.75).abs() < 0.05 && (d_m(changes) + 0.5 * 3.75).abs() < 0.05);

@@ -1,4 +1,4 @@
-//! Broken files: each is refused with line, column and what is allowed.
+//! Malformed files: the reader rejects each with line, column and allowed values.
 
 use std::io::Write as _;
 
@@ -6,7 +6,7 @@ use closecall_scenarios::recordings::{RecordingProblem, read, read_from};
 
 use crate::support::{PLAIN_HEADER, read_text};
 
-/// A row of the plain layout with other values in some columns.
+/// Creates a row of the plain layout with the given columns changed.
 fn row(changes: &[(&str, &str)]) -> String {
     let usual = [
         ("recording_id", "a"),
@@ -36,7 +36,7 @@ fn row(changes: &[(&str, &str)]) -> String {
     usual.map(value).join(",")
 }
 
-/// The row of frame `k` of a car that drives at its recorded speed.
+/// Creates the row of frame `k` of a car that moves at its recorded speed.
 fn moving_row(k: u32) -> String {
     let (time_s, s_m) = (0.1 * f64::from(k), 297.4 + 1.32 * f64::from(k));
     row(&[("frame", &k.to_string()), ("time_s", &format!("{time_s:.1}")), ("s_m", &format!("{s_m:.2}"))])
@@ -50,11 +50,11 @@ const NGSIM_ROW: &str = "1 12 884 1163368300000 54.0 983.7 0 0 16.0 4.9 2 43.6 4
 
 fn ngsim(changes: &[(usize, &str)]) -> String {
     let mut fields: Vec<&str> = NGSIM_ROW.split(' ').collect();
-    changes.iter().for_each(|(place, value)| fields[*place] = value);
+    changes.iter().for_each(|(index, value)| fields[*index] = value);
     fields.join(" ")
 }
 
-/// Text, what the message has to say.
+/// Returns malformed texts, each with the parts that the error message must contain.
 fn cases() -> Vec<(String, Vec<&'static str>)> {
     let one = |column: &'static str, value: &'static str| {
         plain(&[row(&[]), row(&[("frame", "1"), ("time_s", "0.1"), (column, value)])])
@@ -132,7 +132,7 @@ fn cases() -> Vec<(String, Vec<&'static str>)> {
 }
 
 #[test]
-fn each_broken_file_is_refused_with_its_place_and_what_is_allowed() {
+fn each_malformed_file_is_rejected_with_location_and_allowed_values() {
     for (text, needed) in cases() {
         let error = read_text(text.as_bytes()).expect_err(&text);
         let message = error.to_string();
@@ -145,7 +145,7 @@ fn each_broken_file_is_refused_with_its_place_and_what_is_allowed() {
 }
 
 #[test]
-fn what_is_not_text_is_refused() {
+fn files_that_are_not_text_are_rejected() {
     let noise: Vec<u8> = (0..4_000_u32).map(|k| (k.wrapping_mul(2_654_435_761) >> 13) as u8).collect();
     for bytes in [noise.as_slice(), b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", b"track_id,frame\xff\xfe\n1,2\n"] {
         let error = read_text(bytes).unwrap_err();
@@ -159,13 +159,13 @@ fn what_is_not_text_is_refused() {
 }
 
 #[test]
-fn a_cut_gzip_stream_is_refused_and_a_whole_one_read() {
+fn a_truncated_gzip_stream_is_rejected_and_a_complete_one_read() {
     let rows: Vec<String> = (0..50).map(moving_row).collect();
     let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
     encoder.write_all(plain(&rows).as_bytes()).unwrap();
     let packed = encoder.finish().unwrap();
     assert_eq!(read_text(&packed).unwrap().trajectories[0].points.len(), 50);
-    // Two members, one after the other, are one stream: the second repeats the header, which is no row.
+    // Two concatenated gzip members form one stream. The second member repeats the header, which is not a valid row.
     assert_eq!(read_text(&[packed.clone(), packed.clone()].concat()).unwrap_err().line, Some(52));
     for kept in [3, 12, packed.len() / 2, packed.len() - 1] {
         let error = read_text(&packed[..kept]).unwrap_err();
@@ -177,7 +177,7 @@ fn a_cut_gzip_stream_is_refused_and_a_whole_one_read() {
 }
 
 #[test]
-fn what_is_not_there_is_an_io_error() {
+fn a_missing_file_is_an_io_error() {
     let folder = tempfile::tempdir().unwrap();
     for path in [folder.path().join("none.csv"), folder.path().to_owned()] {
         let error = read(&path).unwrap_err();
@@ -187,7 +187,7 @@ fn what_is_not_there_is_an_io_error() {
 }
 
 #[test]
-fn rows_in_any_order_give_the_same_tracks() {
+fn the_row_order_does_not_change_the_tracks() {
     let rows: Vec<String> = (0..40)
         .map(|k| {
             row(&[
@@ -207,7 +207,7 @@ fn rows_in_any_order_give_the_same_tracks() {
 }
 
 #[test]
-fn a_vehicle_that_comes_back_is_another_track_of_the_same_vehicle() {
+fn a_vehicle_that_reappears_gets_a_second_track() {
     let at = |frame: i64, y: &str| {
         ngsim(&[(1, &frame.to_string()), (3, &(1_163_368_300_000 + 100 * frame).to_string()), (5, y)])
     };
@@ -219,7 +219,7 @@ fn a_vehicle_that_comes_back_is_another_track_of_the_same_vehicle() {
     assert_eq!(tracks, [(1, 1, 2), (1_000_000_000_001, 1, 2)]);
     let first = recording.trajectories[0].points[0];
     assert_eq!(first.time.ns(), 0);
-    assert!((first.s_m - 0.3048 * (870.0 - 8.0)).abs() < 1e-9, "the centre lies half a length behind the front");
+    assert!((first.s_m - 0.3048 * (870.0 - 8.0)).abs() < 1e-9, "the centre is half a vehicle length behind the front");
     assert!((first.d_m + 0.3048 * 54.0).abs() < 1e-9, "d is positive to the left");
 }
 
@@ -230,16 +230,20 @@ mod properties {
 
     proptest! {
         #[test]
-        fn no_bytes_make_the_reader_panic(bytes in prop::collection::vec(any::<u8>(), 0..400)) {
+        fn arbitrary_bytes_do_not_make_the_reader_panic(bytes in prop::collection::vec(any::<u8>(), 0..400)) {
             let _ = read_text(&bytes);
         }
 
         #[test]
-        fn no_cut_or_damage_makes_the_reader_panic(cut in 0_usize..900, place in 0_usize..900, byte in any::<u8>()) {
+        fn truncation_and_damage_do_not_make_the_reader_panic(
+            cut in 0_usize..900,
+            index in 0_usize..900,
+            byte in any::<u8>(),
+        ) {
             let rows: Vec<String> = (0..6).map(moving_row).collect();
             let mut bytes = plain(&rows).into_bytes();
             let length = bytes.len();
-            bytes[place % length] = byte;
+            bytes[index % length] = byte;
             bytes.truncate(cut.min(length));
             if let Ok(recording) = read_text(&bytes) {
                 for point in recording.trajectories.iter().flat_map(|track| &track.points) {

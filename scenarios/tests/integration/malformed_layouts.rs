@@ -1,5 +1,5 @@
-//! Broken recordings in highD's layout, in CommonRoad XML, in-car logs, and packed files; and the kinds of mix-ups that
-//! leave every single number legal.
+//! Malformed highD data sets, CommonRoad XML, in-car logs and compressed files. Also mixed-up units and columns that
+//! leave every single number within its allowed range.
 
 use std::io::Read;
 use std::path::Path;
@@ -10,7 +10,8 @@ use closecall_scenarios::recordings::{
 
 use crate::support::{PLAIN_HEADER, read_text};
 
-fn says(error: &RecordingError, needed: &[&str], what: &str) {
+/// Asserts that the error message contains all of `needed`.
+fn assert_mentions(error: &RecordingError, needed: &[&str], what: &str) {
     let message = error.to_string();
     for part in needed {
         assert!(message.contains(part), "{what}: `{message}` does not say `{part}`");
@@ -24,7 +25,7 @@ fn in_car(rows: &[&str]) -> String {
 }
 
 #[test]
-fn broken_in_car_logs_are_refused() {
+fn malformed_in_car_logs_are_rejected() {
     let good = ["0.00,0.0,-5.6,30,1.9,1.8", "0.04,1.2,-5.6,30,1.9,1.8", "0.08,2.4,-5.6,30,1.9,1.8"];
     let with = |row: &str| in_car(&[good[0], good[1], row]);
     assert!(read_text(in_car(&good).as_bytes()).is_ok());
@@ -45,12 +46,12 @@ fn broken_in_car_logs_are_refused() {
         (in_car(&["0,0,0,,1.9,1.8", "0.04,0,0,,1.9,1.8"]), vec!["no rows"]),
     ] {
         let error = read_text(text.as_bytes()).expect_err(&text);
-        says(&error, &needed, &text);
+        assert_mentions(&error, &needed, &text);
         assert!(!error.is_io());
     }
 }
 
-/// Writes a small recording in highD's layout with one text of each file replaced, and reads it.
+/// Writes a small highD data set with one text of one file replaced, and returns the error from reading it.
 fn highd(file: &str, from: &str, to: &str) -> RecordingError {
     let folder = tempfile::tempdir().unwrap();
     let mut rows =
@@ -76,7 +77,7 @@ fn highd(file: &str, from: &str, to: &str) -> RecordingError {
 }
 
 #[test]
-fn broken_recordings_in_highds_layout_are_refused() {
+fn malformed_highd_data_sets_are_rejected() {
     let (tracks, vehicles, recording) = ("07_tracks.csv", "07_tracksMeta.csv", "07_recordingMeta.csv");
     for (file, from, to, needed) in [
         (tracks, "laneId", "lane", vec!["07_tracks.csv, line 1", "no column `laneId`", "highD"]),
@@ -107,31 +108,35 @@ fn broken_recordings_in_highds_layout_are_refused() {
         (vehicles, "2,20,Truck,2\n", "", vec!["07_tracksMeta.csv", "no rows"]),
         (recording, "7,25,", "7,0,", vec!["07_recordingMeta.csv, line 2", "`frameRate`", "1 to 1000"]),
         (recording, "7,25,", "7,nan,", vec!["line 2", "`frameRate`", "is `nan`"]),
-        // A frame rate that is not the recording's: the positions then move at another speed than the speeds say.
+        // A wrong frame rate: the positions then move at another speed than recorded.
         (recording, "7,25,", "7,50,", vec!["07_tracks.csv, line", "0.6 to 1.6"]),
         (recording, "21.0;25.0;29.0", "29.0;25.0;21.0", vec!["`lowerLaneMarkings`", "rising"]),
         (recording, "21.0;25.0;29.0", "", vec!["07_tracks.csv, line 2", "lowerLaneMarkings"]),
         (recording, "\n7,25", "\n8,25,,1;2\n7,25", vec!["2 rows, but 1 is needed"]),
     ] {
         let error = highd(file, from, to);
-        says(&error, &needed, &format!("{file}: {from} -> {to}"));
+        assert_mentions(&error, &needed, &format!("{file}: {from} -> {to}"));
         assert!(!error.is_io(), "{error}");
     }
     for file in [vehicles, recording] {
         let error = highd(file, "", "-");
-        assert!(error.is_io() && error.to_string().contains(file), "a missing file is named: {error}");
+        assert!(error.is_io() && error.to_string().contains(file), "the error names the missing file: {error}");
     }
 }
 
 #[test]
-fn folders_with_no_recording_or_several_are_refused() {
+fn folders_with_no_data_set_or_several_are_rejected() {
     let folder = tempfile::tempdir().unwrap();
     let error = read(folder.path()).unwrap_err();
     assert!(error.is_io() && error.to_string().contains("NN_tracks.csv"), "{error}");
     for name in ["01_tracks.csv", "02_tracks.csv.gz"] {
         std::fs::write(folder.path().join(name), "x").unwrap();
     }
-    says(&read(folder.path()).unwrap_err(), &["2 recordings in this folder", "01_tracks.csv to 02_tracks.csv"], "two");
+    assert_mentions(
+        &read(folder.path()).unwrap_err(),
+        &["2 recordings in this folder", "01_tracks.csv to 02_tracks.csv"],
+        "two",
+    );
 }
 
 fn scenario(inside: &str) -> String {
@@ -162,7 +167,7 @@ fn trajectory(states: &[String]) -> String {
 }
 
 #[test]
-fn broken_commonroad_scenarios_are_refused() {
+fn malformed_commonroad_scenarios_are_rejected() {
     let good = trajectory(&[state("10", "0"), state("12", "1"), state("14", "2")]);
     assert_eq!(read_text(good.as_bytes()).unwrap().trajectories[0].points.len(), 3);
     let bomb = "<!DOCTYPE b [<!ENTITY a \"aaaaaaaaaa\"><!ENTITY b \"&a;&a;&a;&a;&a;&a;&a;&a;\">]>\n<commonRoad timeStepSize=\"0.1\"/>";
@@ -201,24 +206,24 @@ fn broken_commonroad_scenarios_are_refused() {
         (endless_text, vec!["longer than 1048576 bytes"]),
     ] {
         let error = read_text(text.as_bytes()).expect_err(&text[..text.len().min(400)]);
-        says(&error, &needed, &text[..text.len().min(400)]);
+        assert_mentions(&error, &needed, &text[..text.len().min(400)]);
         assert!(!error.is_io(), "{error}");
     }
     let mut not_text = good.into_bytes();
-    let place = not_text.windows(6).position(|part| part == b"<x>12<").unwrap() + 3;
-    not_text[place] = 0xff;
+    let index = not_text.windows(6).position(|part| part == b"<x>12<").unwrap() + 3;
+    not_text[index] = 0xff;
     assert!(read_text(&not_text).is_err());
 }
 
 #[test]
-fn archives_are_named() {
+fn archives_are_rejected_by_name() {
     for (bytes, what) in [
         (&b"PK\x03\x04\x14\0\0\0"[..], "a ZIP archive"),
         (b"BZh91AY&SY", "a bzip2 file"),
         (b"\xfd7zXZ\0\0", "an xz file"),
         (b"\x28\xb5\x2f\xfd\0", "a Zstandard file"),
     ] {
-        says(&read_text(bytes).unwrap_err(), &["made-up.csv", what, "gzip"], what);
+        assert_mentions(&read_text(bytes).unwrap_err(), &["made-up.csv", what, "gzip"], what);
     }
 }
 
@@ -229,10 +234,10 @@ fn packed(source: &mut impl Read) -> Vec<u8> {
 }
 
 #[test]
-fn packed_files_that_hold_nothing_or_too_much_are_refused_in_little_memory() {
+fn compressed_files_with_no_or_too_much_content_are_rejected_in_little_memory() {
     assert!(matches!(read_text(&packed(&mut &b""[..])).unwrap_err().problem, RecordingProblem::Empty));
     assert!(matches!(read_text(&packed(&mut &b"\n\n"[..])).unwrap_err().problem, RecordingProblem::Empty));
-    // 200 MB of one letter in 0.9 MB, as a line, as a line behind a header, and as a tag.
+    // 200 MB of one letter, compressed to 0.9 MB: as a line, as a line after a header, and as a tag.
     for (start, line) in [("", 1), (PLAIN_HEADER, 2), ("<commonRoad ", 1)] {
         let break_at = if start == PLAIN_HEADER { "\n" } else { "" };
         let mut text = start.as_bytes().chain(break_at.as_bytes()).chain(std::io::repeat(b'x').take(200_000_000));
@@ -240,7 +245,7 @@ fn packed_files_that_hold_nothing_or_too_much_are_refused_in_little_memory() {
         assert!(matches!(error.problem, RecordingProblem::LineTooLong { .. }), "{error}");
         assert_eq!(error.line, Some(line));
     }
-    // A packed packed file: only one layer is taken off.
+    // Of a file that is compressed twice, only one layer is decompressed.
     let twice = packed(&mut packed(&mut &b"hello"[..]).as_slice());
     assert!(matches!(read_text(&twice).unwrap_err().problem, RecordingProblem::Binary));
     let mut followed = packed(&mut &b"a,b\n"[..]);
@@ -248,7 +253,7 @@ fn packed_files_that_hold_nothing_or_too_much_are_refused_in_little_memory() {
     assert!(read_text(&followed).is_err());
 }
 
-/// Rows of one vehicle with every field as `edit` leaves it: time, s, d, speed, length, width.
+/// Creates rows of one vehicle. `edit` changes each row's fields: time, s, d, speed, length, width.
 fn drive(edit: impl Fn(&mut [f64; 6])) -> String {
     let mut text = format!("{PLAIN_HEADER}\n");
     for frame in 0..40 {
@@ -264,7 +269,7 @@ fn drive(edit: impl Fn(&mut [f64; 6])) -> String {
 }
 
 #[test]
-fn units_and_columns_that_are_mixed_up_are_noticed() {
+fn mixed_up_units_and_columns_are_detected() {
     const FEET_PER_M: f64 = 1.0 / 0.3048;
     assert!(read_text(drive(|_| {}).as_bytes()).is_ok());
     let steps = ["line", "the median distance between two frames", "units or columns"];
@@ -284,19 +289,19 @@ fn units_and_columns_that_are_mixed_up_are_noticed() {
         ("length and width swapped", drive(|at| at.swap(4, 5)), &["the median length of cars"]),
     ];
     for (what, text, needed) in cases {
-        says(&read_text(text.as_bytes()).expect_err(what), needed, what);
+        assert_mentions(&read_text(text.as_bytes()).expect_err(what), needed, what);
     }
-    // Metres where NGSIM has feet.
+    // Metres instead of NGSIM's feet.
     let metres: String = (0..40)
         .map(|k| {
             format!("1 {k} 40 {} 5.2 {:.2} 0 0 4.6 1.8 2 25.0 0.0 2 0 0 0.0 0.0\n", 100 * k, 50.0 + 2.5 * f64::from(k))
         })
         .collect();
-    says(&read_text(metres.as_bytes()).unwrap_err(), &["the median length of cars", "1.402 m"], "metres");
+    assert_mentions(&read_text(metres.as_bytes()).unwrap_err(), &["the median length of cars", "1.402 m"], "metres");
 }
 
 #[test]
-fn windows_line_ends_and_a_byte_order_mark_change_nothing() {
+fn windows_line_ends_and_a_byte_order_mark_do_not_change_the_data() {
     let text = drive(|_| {});
     let windows = format!("\u{feff}{}", text.replace('\n', "\r\n"));
     let (a, b) = (read_text(text.as_bytes()).unwrap(), read_text(windows.as_bytes()).unwrap());
@@ -304,7 +309,7 @@ fn windows_line_ends_and_a_byte_order_mark_change_nothing() {
 }
 
 #[test]
-fn a_recording_cut_anywhere_in_its_last_row_is_noticed() {
+fn a_truncated_last_row_is_detected() {
     let text = drive(|_| {});
     let last_row = text.trim_end().rfind('\n').unwrap() + 1;
     for cut in last_row + 1..text.len() {
@@ -314,7 +319,7 @@ fn a_recording_cut_anywhere_in_its_last_row_is_noticed() {
 }
 
 #[test]
-fn bad_rows_are_left_out_where_asked_for_and_counted() {
+fn bad_rows_are_skipped_and_counted_on_request() {
     let text = drive(|_| {});
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
     lines[5] = lines[4].clone();
@@ -328,20 +333,20 @@ fn bad_rows_are_left_out_where_asked_for_and_counted() {
         assert_eq!(track.trajectory.vehicle_id, 1);
         pieces += 1;
     }
-    assert_eq!(pieces, 4, "three rows are missing in between");
+    assert_eq!(pieces, 4, "three skipped rows split the track");
     let dropped: Vec<_> = tracks.dropped().reasons().map(|(why, rows)| (why, rows.count, rows.first_line)).collect();
     let expected =
         [("cut rows", 1, Some(21)), ("duplicated rows", 1, Some(6)), ("values that are not allowed", 1, Some(10))];
     assert_eq!(dropped, expected);
-    assert_eq!(read_text(text.as_bytes()).unwrap_err().line, Some(10), "and refused where not");
+    assert_eq!(read_text(text.as_bytes()).unwrap_err().line, Some(10), "by default a bad row ends the reading");
 }
 
-/// A recording of more rows than the window, in the order that `sort` gives the pairs (vehicle, frame).
-fn long_recording(vehicles: u64, frames: u64, place: impl Fn(u64) -> (u64, u64)) -> String {
+/// Creates a file with more rows than the window. `vehicle_and_frame` gives vehicle and frame (from its first) of a row.
+fn long_file(vehicles: u64, frames: u64, vehicle_and_frame: impl Fn(u64) -> (u64, u64)) -> String {
     let mut text =
         "track_id,frame,time_s,s_m,d_m,lane_id,speed_mps,accel_mps2,length_m,width_m,vehicle_class\n".to_owned();
     for k in 0..vehicles * frames {
-        let (vehicle, age) = place(k);
+        let (vehicle, age) = vehicle_and_frame(k);
         let frame = 5 * vehicle + age;
         let time_s = 0.1 * frame as f64;
         text += &format!("{vehicle},{frame},{time_s:.1},{:.1},5.2,2,20,0,4.6,1.8,car\n", 2.0 * age as f64);
@@ -359,33 +364,33 @@ fn open_with_window(text: &str, window: usize) -> Result<Vec<(u64, usize)>, Reco
 }
 
 #[test]
-fn long_recordings_are_streamed_by_vehicle_or_by_time_and_others_refused() {
+fn long_files_are_streamed_if_sorted_and_rejected_otherwise() {
     let (vehicles, frames) = (40, 30);
-    let by_vehicle = long_recording(vehicles, frames, |k| (k / frames, k % frames));
+    let by_vehicle = long_file(vehicles, frames, |k| (k / frames, k % frames));
     let whole = open_with_window(&by_vehicle, usize::MAX).unwrap();
     assert_eq!(whole, (0..vehicles).map(|vehicle| (vehicle, 30)).collect::<Vec<_>>());
     assert_eq!(open_with_window(&by_vehicle, 100).unwrap(), whole);
-    // By time: vehicle v is there in frames 5v to 5v + 29.
+    // Sorted by time: vehicle v is present in frames 5v to 5v + 29.
     let (header, rows) = by_vehicle.split_once('\n').unwrap();
     let mut rows: Vec<&str> = rows.lines().collect();
     rows.sort_by_key(|row| row.split(',').nth(1).unwrap().parse::<u64>().unwrap());
     let by_time = format!("{header}\n{}\n", rows.join("\n"));
     assert_eq!(open_with_window(&by_time, 100).unwrap(), whole);
-    // In no order from the beginning, and from behind the window on.
+    // Unsorted from the first row, and then unsorted only after the window.
     rows.sort_by_key(|row| row.split(',').nth(3).unwrap().parse::<f64>().unwrap() as u64 * 7 % 31);
     let unsorted = format!("{header}\n{}\n", rows.join("\n"));
-    assert_eq!(open_with_window(&unsorted, usize::MAX).unwrap(), whole, "any order, where it is not longer");
+    assert_eq!(open_with_window(&unsorted, usize::MAX).unwrap(), whole, "a short file may be in any order");
     let error = open_with_window(&unsorted, 100).unwrap_err();
-    says(&error, &["line", "sorted by vehicle or by time throughout"], "unsorted");
+    assert_mentions(&error, &["line", "sorted by vehicle or by time throughout"], "unsorted");
     let mut lines: Vec<&str> = by_vehicle.lines().collect();
     lines.swap(200, 900);
     let error = open_with_window(&(lines.join("\n") + "\n"), 100).unwrap_err();
-    assert_eq!(error.line, Some(872), "vehicle 29 was there before: {error}");
-    says(&error, &["sorted by vehicle"], "swapped");
+    assert_eq!(error.line, Some(872), "rows of vehicle 29 come before: {error}");
+    assert_mentions(&error, &["sorted by vehicle"], "swapped");
 }
 
 #[test]
-fn what_is_not_there_is_named() {
+fn missing_files_are_io_errors() {
     let folder = tempfile::tempdir().unwrap();
     for name in ["none.csv", "none.xml", "03_tracks.csv", "03_tracksMeta.csv"] {
         let Err(error) = open(&folder.path().join(name), ReadOptions::default()) else { panic!("{name}") };

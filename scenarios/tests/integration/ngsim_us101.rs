@@ -1,4 +1,4 @@
-//! The recordings of US-101, where the data is there: layouts agree, and lane changes are those of the reference list.
+//! NGSIM's US-101 data, if it is available: the layouts agree, and the detected lane changes match the reference list.
 
 use std::path::Path;
 
@@ -20,7 +20,7 @@ fn spans(tracks: &[Trajectory]) -> Spans {
     tracks.iter().filter_map(|track| Some((track.track_id, track.span()?))).collect()
 }
 
-/// What a criterion reaches over all recordings.
+/// Returns the score of a criterion over all files.
 fn scored(folder: &Path, criterion: Criterion) -> Score {
     let references = read_references(&folder.join("ngsim_us101/reference_lane_changes.csv")).unwrap();
     let mut total = Score::default();
@@ -35,26 +35,27 @@ fn scored(folder: &Path, criterion: Criterion) -> Score {
 }
 
 #[test]
-fn lane_changes_are_those_of_the_reference_list() {
+fn lane_changes_match_the_reference_list() {
     let Some(folder) = data_folder() else { return };
     let Score { recall, precision, max_time_error_s } = scored(&folder, Criterion::Peak);
-    assert!(recall.of >= 10 && precision.of >= 20, "too little data to say: {recall}, {precision}");
+    assert!(recall.of >= 10 && precision.of >= 20, "too little data for a statement: {recall}, {precision}");
     assert!(recall.hits * 100 >= recall.of * 95, "recall {recall}");
     assert!(precision.hits * 100 >= precision.of * 95, "precision {precision}");
     assert!(max_time_error_s <= 0.1, "{max_time_error_s}");
 }
 
 #[test]
-fn what_the_distance_criterion_finds_is_right_but_it_does_not_find_all() {
+fn the_distance_criterion_is_precise_but_misses_some_lane_changes() {
     let Some(folder) = data_folder() else { return };
     let Score { recall, precision, .. } = scored(&folder, Criterion::Distance);
-    // Measured: 13 of 18. Vehicles that ride beside the middle of narrow lanes, or whose track is short, are in no band.
+    // Measured: 13 of 18. The criterion misses vehicles that keep off the middle of narrow lanes and vehicles whose
+    // track is short, because they are in no band.
     assert!(recall.hits * 100 >= recall.of * 60 && recall.hits < recall.of, "recall {recall}");
     assert!(precision.hits * 100 >= precision.of * 95, "precision {precision}");
 }
 
 #[test]
-fn both_layouts_tell_the_same() {
+fn both_layouts_yield_the_same_data() {
     let Some(folder) = data_folder() else { return };
     let plain = read(&folder.join("ngsim_us101/trajectories/us101_a.csv")).unwrap();
     let feet = read(&folder.join("ngsim_us101/us101_a_ngsim18col_feet.csv")).unwrap();
@@ -64,7 +65,7 @@ fn both_layouts_tell_the_same() {
         assert_eq!((a.track_id, a.points.len()), (b.track_id, b.points.len()));
         for (a, b) in a.points.iter().zip(&b.points) {
             assert_eq!((a.time, a.lane), (b.time, b.lane));
-            // Lengths in feet are rounded to a tenth in that file.
+            // That file rounds lengths in feet to one decimal.
             assert!(
                 (a.s_m - b.s_m).abs() < 0.02
                     && (a.d_m - b.d_m).abs() < 0.01
@@ -78,7 +79,7 @@ fn both_layouts_tell_the_same() {
 }
 
 #[test]
-fn the_original_form_without_header_tells_the_same_as_the_one_with_commas() {
+fn the_original_form_without_header_yields_the_same_data_as_the_one_with_commas() {
     let Some(folder) = data_folder() else { return };
     let path = folder.join("ngsim_us101/us101_a_ngsim18col_feet.csv");
     let text = std::fs::read_to_string(&path).unwrap();
@@ -97,7 +98,7 @@ fn the_catalogue_export_is_read() {
 }
 
 #[test]
-fn the_road_is_that_of_the_recordings_description() {
+fn the_road_matches_the_description_of_the_data() {
     let Some(folder) = data_folder() else { return };
     let recording = read(&folder.join("ngsim_us101/trajectories/us101_a.csv")).unwrap();
     assert_eq!(recording.period, Time::from_ms(100));

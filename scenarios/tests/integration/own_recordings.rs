@@ -1,4 +1,4 @@
-//! Our own recordings, written, read back, and put through the whole chain.
+//! Synthetic trajectory data, written to a file, read back, and passed through the whole chain.
 
 use closecall_scenarios::criticality::criticality;
 use closecall_scenarios::filters::smooth;
@@ -8,9 +8,9 @@ use closecall_scenarios::recordings::{Layout, Recording, WriteError, read, write
 use closecall_traffic::{Side, Time};
 use proptest::prelude::*;
 
-use crate::support::{MadeUp, track};
+use crate::support::{SyntheticLaneChange, track};
 
-fn made_up(period: Time, changes: &[MadeUp]) -> Recording {
+fn synthetic(period: Time, changes: &[SyntheticLaneChange]) -> Recording {
     Recording::new("made-up", period, changes.iter().map(|change| track(*change, period)).collect())
 }
 
@@ -21,9 +21,9 @@ fn written_and_read(recording: &Recording) -> Recording {
     read(&path).unwrap()
 }
 
-/// Forty lane changes with durations from 3 to 10.8 s.
-fn forty() -> Vec<MadeUp> {
-    let change = |k: u32| MadeUp {
+/// Returns forty lane changes with durations from 3 to 10.8 s.
+fn forty() -> Vec<SyntheticLaneChange> {
+    let change = |k: u32| SyntheticLaneChange {
         track_id: u64::from(k) + 1,
         speed_mps: 20.0 + 0.3 * f64::from(k),
         start_s: 2.0 + 0.1 * f64::from(k % 7),
@@ -34,10 +34,10 @@ fn forty() -> Vec<MadeUp> {
 }
 
 #[test]
-fn sampled_durations_come_back_within_five_percent() {
+fn detected_durations_are_within_five_percent_of_the_truth() {
     for period_ms in [100, 40, 10] {
         let changes = forty();
-        let found = detect(&smooth(&written_and_read(&made_up(Time::from_ms(period_ms), &changes))));
+        let found = detect(&smooth(&written_and_read(&synthetic(Time::from_ms(period_ms), &changes))));
         assert_eq!(found.len(), changes.len());
         for (found, made) in found.iter().zip(&changes) {
             let error = (found.duration_s - made.duration_s).abs() / made.duration_s;
@@ -54,7 +54,7 @@ fn sampled_durations_come_back_within_five_percent() {
 
 #[test]
 fn the_whole_chain_runs() {
-    let recording = written_and_read(&made_up(Time::from_ms(100), &forty()));
+    let recording = written_and_read(&synthetic(Time::from_ms(100), &forty()));
     let critical = criticality(&smooth(&recording), None);
     assert_eq!(critical.len(), 40);
     let json = serde_json::to_value(&critical[0]).unwrap();
@@ -68,22 +68,22 @@ fn the_whole_chain_runs() {
     assert!((durations.median - 6.9).abs() < 0.35, "{}", durations.median);
     assert_eq!(
         to_toml(&fitted, &Heading::default()),
-        to_toml(&fit(&[written_and_read(&made_up(Time::from_ms(100), &forty()))], 0), &Heading::default())
+        to_toml(&fit(&[written_and_read(&synthetic(Time::from_ms(100), &forty()))], 0), &Heading::default())
     );
 }
 
 #[test]
-fn what_cannot_be_written_leaves_nothing() {
+fn data_that_cannot_be_written_leaves_no_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("recording.csv");
-    let mut not_finite = made_up(Time::from_ms(100), &forty());
+    let mut not_finite = synthetic(Time::from_ms(100), &forty());
     not_finite.trajectories[3].points[7].speed_mps = f64::NAN;
     assert!(matches!(write_recording(&not_finite, &path), Err(WriteError::NotFinite { track_id: 4, .. })));
-    let mut off_clock = made_up(Time::from_ms(100), &forty());
+    let mut off_clock = synthetic(Time::from_ms(100), &forty());
     off_clock.trajectories[0].points[1].time = Time::from_ms(130);
     assert!(matches!(write_recording(&off_clock, &path), Err(WriteError::OffClock { track_id: 1, .. })));
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
-    let nowhere = write_recording(&made_up(Time::from_ms(100), &forty()), &folder.path().join("no/file.csv"));
+    let nowhere = write_recording(&synthetic(Time::from_ms(100), &forty()), &folder.path().join("no/file.csv"));
     assert!(matches!(nowhere, Err(WriteError::Io { .. })));
 }
 
@@ -91,14 +91,14 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(32))]
 
     #[test]
-    fn reading_gives_back_what_was_written(
+    fn written_data_reads_back_unchanged(
         speed_mps in 0.0_f64..60.0,
         start_s in 0.0_f64..5.0,
         duration_s in 2.0_f64..12.0,
         period_ms in prop::sample::select(vec![10_i64, 33, 40, 100]),
     ) {
-        let change = MadeUp { track_id: 5, speed_mps, start_s, duration_s, to_the_left: true };
-        let written = made_up(Time::from_ms(period_ms), &[change]);
+        let change = SyntheticLaneChange { track_id: 5, speed_mps, start_s, duration_s, to_the_left: true };
+        let written = synthetic(Time::from_ms(period_ms), &[change]);
         let read = written_and_read(&written);
         prop_assert_eq!((read.layout, read.period, read.name.as_str()), (Layout::Plain, written.period, "made-up"));
         let (a, b) = (&written.trajectories[0], &read.trajectories[0]);
@@ -106,11 +106,11 @@ proptest! {
         prop_assert_eq!(a.points.len(), b.points.len());
         for (a, b) in a.points.iter().zip(&b.points) {
             prop_assert_eq!((a.time, a.lane), (b.time, b.lane));
-            // Written to four decimals.
+            // The file has four decimals.
             prop_assert!((a.s_m - b.s_m).abs() <= 5.1e-5 && (a.d_m - b.d_m).abs() <= 5.1e-5);
             prop_assert!((a.speed_mps - b.speed_mps).abs() <= 5.1e-5);
         }
-        // What has been read is written alike again.
+        // Data that was read from a file does not change when it is written and read again.
         let again = written_and_read(&read);
         prop_assert_eq!(&again.trajectories[0].points, &b.points);
     }

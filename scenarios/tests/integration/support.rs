@@ -1,4 +1,4 @@
-//! What several tests need.
+//! Helpers shared by several tests.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use closecall_scenarios::recordings::{Recording, RecordingError, read_from};
 pub(crate) use closecall_testing::data as data_folder;
 use closecall_traffic::{Lane, Time, Trajectory, TrajectoryPoint, VehicleClass};
 
-/// Reads a recording from text.
+/// Reads trajectory data from text.
 pub(crate) fn read_text(text: &[u8]) -> Result<Recording, RecordingError> {
     read_from(text, Path::new("made-up.csv"))
 }
@@ -15,9 +15,9 @@ pub(crate) fn read_text(text: &[u8]) -> Result<Recording, RecordingError> {
 pub(crate) const PLAIN_HEADER: &str = "recording_id,track_id,vehicle_id,frame,time_s,s_m,d_m,lane_id,speed_mps,\
      accel_mps2,heading_rel_rad,x_m,y_m,length_m,width_m,vehicle_class,source_scenario";
 
-/// One lane change of a made-up vehicle.
+/// One lane change of a synthetic vehicle.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct MadeUp {
+pub(crate) struct SyntheticLaneChange {
     pub(crate) track_id: u64,
     pub(crate) speed_mps: f64,
     pub(crate) start_s: f64,
@@ -25,11 +25,12 @@ pub(crate) struct MadeUp {
     pub(crate) to_the_left: bool,
 }
 
-/// Lane width of made-up roads [m].
+/// Lane width of synthetic roads (m).
 pub(crate) const LANE_M: f64 = 3.75;
 
-/// A vehicle that changes once between lanes 1 and 2 on a quintic path, recorded for 20 s.
-pub(crate) fn track(change: MadeUp, period: Time) -> Trajectory {
+/// Creates the track of a vehicle that changes lanes once between lanes 1 and 2 on a quintic path. The track lasts 20
+/// s.
+pub(crate) fn track(change: SyntheticLaneChange, period: Time) -> Trajectory {
     const RECORDED_S: f64 = 20.0;
     let (from, to) = if change.to_the_left { (-1.5 * LANE_M, -0.5 * LANE_M) } else { (-0.5 * LANE_M, -1.5 * LANE_M) };
     let point = |frame: i64| {

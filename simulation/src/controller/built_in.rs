@@ -1,4 +1,4 @@
-//! The controllers that ship, by the names that the command line knows.
+//! The built-in controllers, by their names on the command line.
 
 use std::sync::Arc;
 
@@ -6,17 +6,17 @@ use closecall_controllers::{EgoController, EgoSettings, EgoStack};
 
 use crate::run::ControllerFactory;
 
-/// A controller that ships.
+/// A built-in controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum BuiltIn {
     /// The scenario's ego stack without its margin increase system: adaptive cruise control and emergency braking.
     Acc,
-    /// The scenario's whole ego stack.
+    /// The scenario's complete ego stack.
     Mis,
 }
 
 impl BuiltIn {
-    /// The name on the command line and in every report.
+    /// Returns the name on the command line and in reports.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Acc => "acc",
@@ -24,7 +24,7 @@ impl BuiltIn {
         }
     }
 
-    /// The factory of this controller.
+    /// Returns a factory of this controller.
     pub fn factory(self) -> Arc<dyn ControllerFactory> {
         Arc::new(self)
     }

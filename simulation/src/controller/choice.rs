@@ -1,4 +1,4 @@
-//! The controller that a command line or a manifest names.
+//! The choice of a controller on a command line or in a manifest.
 
 use std::fmt;
 use std::sync::Arc;
@@ -9,20 +9,20 @@ use super::BuiltIn;
 use super::exec::{ExecFactory, ExecSettings};
 use crate::run::ControllerFactory;
 
-/// A controller as a manifest keeps it.
+/// A controller, as a campaign's manifest stores it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum ControllerChoice {
     /// The scenario's ego stack without its margin increase system.
     Acc,
-    /// The scenario's whole ego stack.
+    /// The scenario's complete ego stack.
     Mis,
-    /// A process of its own for each sample.
+    /// A separate process for each sample.
     Exec(ExecSettings),
 }
 
 impl ControllerChoice {
-    /// The name in every report.
+    /// Returns the name in reports.
     pub const fn name(&self) -> &'static str {
         match self {
             Self::Acc => BuiltIn::Acc.name(),
@@ -31,7 +31,7 @@ impl ControllerChoice {
         }
     }
 
-    /// The factory of this controller.
+    /// Returns a factory of this controller.
     pub fn factory(&self) -> Arc<dyn ControllerFactory> {
         match self {
             Self::Acc => BuiltIn::Acc.factory(),
@@ -41,7 +41,7 @@ impl ControllerChoice {
     }
 }
 
-/// As it is written after `--controller`.
+/// Writes the controller as it is given to `--controller`.
 impl fmt::Display for ControllerChoice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -56,7 +56,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_manifest_reads_back_what_it_wrote() {
+    fn a_choice_survives_the_round_trip_through_a_manifest() {
         let exec = ExecSettings { command: "python3 'a b.py'".to_owned(), timeout_ms: 250, memory_mib: 64 };
         for choice in [ControllerChoice::Acc, ControllerChoice::Mis, ControllerChoice::Exec(exec)] {
             let text = serde_json::to_string(&choice).unwrap();

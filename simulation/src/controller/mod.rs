@@ -1,13 +1,13 @@
-//! Who controls E: the controllers that ship, and processes that speak a protocol of lines.
+//! The controllers that can drive the ego: built-in ones, and external processes.
 //!
-//! | `--controller` | who |
+//! | `--controller` | controller |
 //! |---|---|
 //! | `acc` | the scenario's ego stack without its margin increase system |
-//! | `mis` | the scenario's whole ego stack |
-//! | `exec:COMMAND` | a process of your own, started afresh for each sample ([`exec`]) |
+//! | `mis` | the scenario's complete ego stack |
+//! | `exec:COMMAND` | an external process, started anew for each sample ([`exec`]) |
 //!
-//! A controller in Rust implements [`EgoController`](closecall_controllers::EgoController) and is handed to a campaign
-//! by a [`ControllerFactory`](crate::run::ControllerFactory): `examples/own_controller.rs` is one in one file.
+//! A controller in Rust implements [`EgoController`](closecall_controllers::EgoController). A campaign creates it through a
+//! [`ControllerFactory`](crate::run::ControllerFactory). `examples/own_controller.rs` is a complete example.
 
 mod built_in;
 mod choice;

@@ -1,4 +1,4 @@
-//! What a run is keyed by: which sample, and which controller and sensors.
+//! Identifies a run: its sample, and its arm (controller and sensors).
 
 use std::sync::Arc;
 
@@ -14,13 +14,13 @@ pub struct RunKey {
     pub sample: u64,
 }
 
-/// Builds the controller under test, one for each run.
+/// Creates the controller under test, a new one for each run.
 pub trait ControllerFactory: Send + Sync {
     /// Returns the name under which outcomes are reported.
     fn name(&self) -> &str;
-    /// Returns true if the controller has a margin increase system to report on.
+    /// Returns whether the controller has a margin increase system whose actions the outcome summarises.
     fn has_mis(&self, settings: &EgoSettings) -> bool;
-    /// Builds a fresh controller with the scenario's settings.
+    /// Creates a new controller with the settings of the scenario's ego stack.
     fn build(&self, settings: &EgoSettings) -> Box<dyn EgoController>;
 }
 
@@ -29,6 +29,6 @@ pub trait ControllerFactory: Send + Sync {
 pub struct Arm {
     /// The controller under test.
     pub controller: Arc<dyn ControllerFactory>,
-    /// The sensors; the scenario's own if `None`.
+    /// The depth of the sensor simulation, or `None` for the scenario's own.
     pub sensors: Option<SensorMode>,
 }

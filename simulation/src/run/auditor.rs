@@ -1,11 +1,12 @@
-//! Holds the tracks of a run against the truth.
+//! Compares the tracks of a run with the ground truth.
 
 use closecall_sensors::{Scene, SceneVehicle, SensorError, TrackAudit};
 use closecall_traffic::Time;
 
 use super::{Happening, Observer, StepView};
 
-/// An observer that audits the confirmed rear tracks of a run, until the first collision: a wreck moves like no model.
+/// An observer that audits the confirmed rear tracks of a run. It stops at the first collision, since no motion model
+/// describes a wreck.
 #[derive(Debug, Default)]
 pub struct TrackAuditor {
     audit: TrackAudit,
@@ -15,10 +16,10 @@ pub struct TrackAuditor {
 }
 
 impl TrackAuditor {
-    /// What was found.
+    /// Returns the audit of the run.
     ///
     /// # Errors
-    /// [`SensorError::NotFinite`] where the truth was not finite in some step.
+    /// [`SensorError::NotFinite`] if the ground truth was not finite in some step.
     pub fn into_audit(self) -> Result<TrackAudit, SensorError> {
         self.error.map_or(Ok(self.audit), Err)
     }

@@ -1,15 +1,14 @@
-//! The loop itself.
+//! The loop of one run.
 
 use super::state::Run;
 use super::{Arm, Observer, RunKey, SampleError};
 use crate::outcome::Outcome;
 use crate::scenario::Scenario;
 
-/// Runs one concrete scenario to its end.
+/// Runs one concrete scenario to its end and returns its outcome.
 ///
 /// # Errors
-/// [`SampleError`] if a controller, a driver or a sensor fails: the sample then has no outcome, and no verdict is given
-/// on it.
+/// [`SampleError`] if the controller, a driver or a sensor fails. The sample then has no outcome.
 pub fn simulate(
     scenario: &Scenario,
     key: RunKey,
@@ -18,15 +17,15 @@ pub fn simulate(
 ) -> Result<Outcome, SampleError> {
     let mut run = Run::new(scenario, key, arm)?;
     loop {
-        run.show_motion(observer);
-        run.look_around(observer);
+        run.report_motion(observer);
+        run.update_surroundings(observer);
         if run.is_control_step() {
             run.perceive_and_control(observer)?;
         }
         if let Some(end) = run.end() {
             return Ok(run.finish(end));
         }
-        run.drive(observer)?;
+        run.decide_actions(observer)?;
         run.advance(observer);
     }
 }

@@ -1,55 +1,55 @@
-//! What keeps a sample from having an outcome.
+//! The errors that keep a sample from having an outcome.
 
 use closecall_controllers::{ControllerError, DriverError};
 use closecall_sensors::SensorError;
 use closecall_traffic::{ActorId, ConfigError, Time};
 
-/// A run that could not be carried to its end. It is an error of this sample: counted, reported, never a pass.
+/// A run that could not be completed. It is an error of this sample: it is counted and reported, and never passes.
 ///
-/// Nothing of the run remains but its key: the same sample can be run again.
+/// Only the key of the run remains; the same sample can be run again.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SampleError {
-    /// The sampled values do not make a valid scenario.
+    /// The sampled parameter values do not result in a valid scenario.
     #[error("failed to make the concrete scenario: {0}")]
     Scenario(ConfigError),
-    /// The sensors could not be set up or failed on the way.
+    /// The sensors could not be set up, or failed during the run.
     #[error("the sensors {0}")]
     Sensors(#[from] SensorError),
     /// The ego controller failed.
     #[error("the ego controller {0}")]
     Controller(#[from] ControllerError),
-    /// The ego controller's command is not a finite number.
+    /// The acceleration that the ego controller commanded is not a finite number.
     #[error("the ego controller asked for an acceleration of {value} m/s² at {time}")]
     Command {
-        /// What it asked for.
+        /// The commanded acceleration (m/s²).
         value: f64,
-        /// When.
+        /// Time of the command.
         time: Time,
     },
     /// A human driver failed.
     #[error("the driver of `{actor}` {source}")]
     Driver {
-        /// Whose driver.
+        /// The driver's vehicle.
         actor: ActorId,
-        /// Why.
+        /// The reason.
         source: DriverError,
     },
-    /// It did not come to its end in time.
+    /// The run exceeded its limit of wall time.
     #[error("no outcome within {limit_s} s of wall time")]
     Timeout {
-        /// Longest wall time that was allowed [s].
+        /// The limit of wall time (s).
         limit_s: f64,
     },
-    /// Something panicked.
+    /// The run panicked.
     #[error("a panic: {message}")]
     Panic {
-        /// What it said.
+        /// The panic's message.
         message: String,
     },
 }
 
 impl SampleError {
-    /// A short word for the kind of error, for reports.
+    /// Returns a one-word name of the kind of error, for reports.
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Scenario(_) => "scenario",

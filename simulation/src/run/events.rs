@@ -1,4 +1,4 @@
-//! The scenario's events: when they set in, and what they then ask of their actor.
+//! The scenario's events in a run: when they are triggered, and which acceleration they then request.
 
 use closecall_traffic::Time;
 use closecall_traffic::metrics::time_headway_s;
@@ -6,64 +6,67 @@ use closecall_traffic::metrics::time_headway_s;
 use crate::scenario::{Brake, Event, Scenario, Trigger};
 use crate::world::World;
 
-/// One event in its course.
-struct Running {
+/// One event and whether it has been triggered.
+struct EventState {
+    /// Index of its actor.
     actor: usize,
     event: Event,
-    /// When it set in.
-    since: Option<Time>,
+    /// Time at which it was triggered.
+    triggered_at: Option<Time>,
 }
 
 /// All events of a run.
 pub(super) struct Events {
-    running: Vec<Running>,
-    /// When each actor started to change lanes in order to overtake.
+    states: Vec<EventState>,
+    /// Time at which each actor started to change lanes in order to overtake.
     cut_outs: Vec<Option<Time>>,
 }
 
-/// How fast a braking actor closes in on its final speed once it is nearly reached [1/s].
+/// Gain of the speed controller that ends a braking at its final speed (1/s).
 const SPEED_GAIN_PER_S: f64 = 4.0;
 
 impl Events {
     pub(super) fn new(scenario: &Scenario) -> Self {
-        let running = scenario
+        let states = scenario
             .actors
             .iter()
             .enumerate()
             .flat_map(|(actor, setup)| {
-                setup.events.iter().map(move |event| Running { actor, event: event.clone(), since: None })
+                setup.events.iter().map(move |event| EventState { actor, event: event.clone(), triggered_at: None })
             })
             .collect();
-        Self { running, cut_outs: vec![None; scenario.actors.len()] }
+        Self { states, cut_outs: vec![None; scenario.actors.len()] }
     }
 
-    /// Notes that `actor` started to change lanes.
-    pub(super) fn cut_out_started(&mut self, actor: usize, time: Time) {
+    /// Notes the time at which `actor` first started to change lanes in order to overtake.
+    pub(super) fn note_cut_out(&mut self, actor: usize, time: Time) {
         self.cut_outs[actor].get_or_insert(time);
     }
 
-    /// Sets in what is due, and calls `started` with the name of each event that does.
-    pub(super) fn update(&mut self, world: &World, mut started: impl FnMut(&str)) {
+    /// Triggers every event whose condition holds for the first time, and calls `on_trigger` with its name.
+    pub(super) fn update(&mut self, world: &World, mut on_trigger: impl FnMut(&str)) {
         let now = world.time();
-        for running in &mut self.running {
-            if running.since.is_none() && is_due(&running.event.when, world, &self.cut_outs, now) {
-                running.since = Some(now);
-                started(running.event.id.as_str());
+        for state in &mut self.states {
+            if state.triggered_at.is_none() && holds(&state.event.when, world, &self.cut_outs, now) {
+                state.triggered_at = Some(now);
+                on_trigger(state.event.id.as_str());
             }
         }
     }
 
-    /// The acceleration that the events ask of `actor`, if any has set in: the hardest.
-    pub(super) fn asked_mps2(&self, actor: usize, world: &World) -> Option<f64> {
-        self.running
+    /// Returns the acceleration that the triggered events of `actor` request (m/s²): the strongest braking among them.
+    /// Returns `None` if no event of `actor` has been triggered.
+    pub(super) fn requested_mps2(&self, actor: usize, world: &World) -> Option<f64> {
+        self.states
             .iter()
-            .filter(|running| running.actor == actor && running.since.is_some())
-            .map(|running| braking_mps2(&running.event.then, world.state(actor).speed_mps))
+            .filter(|state| state.actor == actor && state.triggered_at.is_some())
+            .map(|state| braking_mps2(&state.event.then, world.state(actor).speed_mps))
             .min_by(f64::total_cmp)
     }
 }
 
-fn is_due(when: &Trigger, world: &World, cut_outs: &[Option<Time>], now: Time) -> bool {
+/// Returns whether the condition of a trigger holds at `now`.
+fn holds(when: &Trigger, world: &World, cut_outs: &[Option<Time>], now: Time) -> bool {
     match *when {
         Trigger::At(time) => now >= time,
         Trigger::CutOutStarted { actor, delay } => cut_outs[actor].is_some_and(|since| now >= since + delay),
@@ -77,7 +80,7 @@ fn is_due(when: &Trigger, world: &World, cut_outs: &[Option<Time>], now: Time) -
     }
 }
 
-/// The braking of an event: constant, easing out where the speed asked for is reached.
+/// Returns the acceleration of a braking event (m/s²): constant, and fading out as the final speed is approached.
 fn braking_mps2(brake: &Brake, speed_mps: f64) -> f64 {
     let left_mps = speed_mps - brake.to_speed_mps;
     if brake.to_speed_mps == 0.0 {
@@ -92,7 +95,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn braking_is_constant_and_ends_at_the_speed_asked_for() {
+    fn braking_is_constant_and_ends_at_its_final_speed() {
         let brake = Brake { deceleration_mps2: 5.0, to_speed_mps: 20.0 };
         assert_eq!(braking_mps2(&brake, 30.0), -5.0);
         assert_eq!(braking_mps2(&brake, 20.0), 0.0);

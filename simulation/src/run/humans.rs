@@ -1,4 +1,4 @@
-//! The human drivers of a run, each with random streams of its own.
+//! The human drivers of a run, each with its own random streams.
 
 use closecall_controllers::{CheckedDriver, Driver, Wander, Weave};
 use closecall_traffic::{Road, Stream, stream};
@@ -6,21 +6,23 @@ use closecall_traffic::{Road, Stream, stream};
 use super::RunKey;
 use crate::scenario::{Actor, Scenario};
 
-/// The channels of a human driver's random streams.
+/// Names of the random streams of a human driver.
 const DRIVER_CHANNEL: &str = "driver";
 const LANE_CHANNEL: &str = "lane-keeping";
 const SPEED_CHANNEL: &str = "speed-keeping";
 
-/// One human driver.
+/// The human driver of one vehicle.
 pub(super) struct Human {
+    /// Index of the vehicle in the list of actors.
     pub(super) actor: usize,
     pub(super) driver: Box<dyn Driver>,
     pub(super) rng: Stream,
-    pub(super) wander: Option<Wander>,
+    /// How the desired speed varies in time, or `None` if it is constant.
+    pub(super) desired_speed_noise: Option<Wander>,
 }
 
-/// Everyone but E.
-pub(super) fn humans(scenario: &Scenario, key: RunKey) -> Vec<Human> {
+/// Creates the drivers of all vehicles other than the ego.
+pub(super) fn human_drivers(scenario: &Scenario, key: RunKey) -> Vec<Human> {
     let mut humans = Vec::with_capacity(scenario.actors.len());
     for (actor, setup) in scenario.actors.iter().enumerate() {
         if let CheckedDriver::Human(human) = &setup.driver {
@@ -29,14 +31,14 @@ pub(super) fn humans(scenario: &Scenario, key: RunKey) -> Vec<Human> {
                 actor,
                 driver: human.build(),
                 rng: rng(DRIVER_CHANNEL),
-                wander: setup.speed_keeping.and_then(|keeping| keeping.wander(rng(SPEED_CHANNEL))),
+                desired_speed_noise: setup.speed_keeping.and_then(|keeping| keeping.wander(rng(SPEED_CHANNEL))),
             });
         }
     }
     humans
 }
 
-/// How an actor weaves in a run.
+/// Returns how the driver of an actor weaves in a run, or `None` if the driver does not.
 pub(super) fn weave(actor: &Actor, road: &Road, key: RunKey) -> Option<Weave> {
     let rng = || stream(key.seed, key.sample, &actor.id, LANE_CHANNEL);
     actor.lane_keeping.and_then(|keeping| keeping.weave(road.overtaking_side(), rng()))

@@ -1,4 +1,4 @@
-//! E's margins: at each instant, and their extremes over a run.
+//! The ego's margins: at one instant, and their extremes over a run.
 
 use closecall_controllers::{Neighbour, Neighbours};
 use closecall_traffic::metrics::{time_headway_s, time_to_collision_s};
@@ -7,17 +7,27 @@ use closecall_traffic::{Absent, Measured, VehicleState};
 use super::observer::{Lead, MarginsNow};
 use crate::outcome::Margins;
 
-/// A vehicle that has passed and pulls in counts as the one ahead after this time [s].
+/// Time after which a vehicle that has pulled in ahead counts for the speed deficit (s).
 const SETTLED_LEAD_S: f64 = 1.0;
 
+/// The widths that decide which neighbours are in a vehicle's lane and path.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Widths {
+    /// Width of the vehicle (m).
+    pub(crate) vehicle_m: f64,
+    /// Width of the lanes (m).
+    pub(crate) lane_m: f64,
+}
+
 impl MarginsNow {
-    /// The margins of a vehicle in `own` state among its neighbours, with its own width and that of the lanes.
+    /// Computes the margins of a vehicle with the state `own` among its neighbours.
     ///
-    /// In the lane is whose centre is: a vehicle that overtakes counts as behind until it crosses the marking, and as
-    /// ahead once it has pulled in. Ahead counts, too, what E would hit by driving on.
-    pub(crate) fn new(own: &VehicleState, neighbours: &Neighbours, [own_width_m, lane_width_m]: [f64; 2]) -> Self {
-        let in_lane = |other: &Neighbour| other.lateral_offset_m.abs() < 0.5 * lane_width_m;
-        let overlaps = |other: &Neighbour| other.lateral_offset_m.abs() < 0.5 * (own_width_m + other.width_m);
+    /// A neighbour counts as being in the lane if the lateral distance of the two centres is below half a lane width. An
+    /// overtaking vehicle thus counts as behind until it crosses the marking, and as ahead once it has pulled in. A
+    /// neighbour that the vehicle would hit by driving straight on also counts as ahead.
+    pub(crate) fn new(own: &VehicleState, neighbours: &Neighbours, widths: Widths) -> Self {
+        let in_lane = |other: &Neighbour| other.lateral_offset_m.abs() < 0.5 * widths.lane_m;
+        let overlaps = |other: &Neighbour| other.lateral_offset_m.abs() < 0.5 * (widths.vehicle_m + other.width_m);
         let in_path = neighbours.in_path.filter(|path| path.gap_m >= 0.0 && overlaps(path));
         let ahead = match (neighbours.own.lead.filter(in_lane), in_path) {
             (Some(lead), Some(path)) => Some(if path.gap_m < lead.gap_m { path } else { lead }),
@@ -43,14 +53,24 @@ impl MarginsNow {
     }
 }
 
-/// Collects the extremes of E's margins.
+/// A lead vehicle, and how long it has been the lead vehicle.
+#[derive(Clone, Copy, Debug)]
+struct LeadDuration {
+    /// Index of the vehicle in the list of actors.
+    actor: usize,
+    /// Number of physics steps since the first one in which it was the lead vehicle.
+    steps: u32,
+}
+
+/// Collects the extremes of the ego's margins.
 #[derive(Debug)]
 pub(crate) struct MarginMeter {
     extremes: Margins,
     last_acceleration_mps2: Option<f64>,
-    start_mps: Option<f64>,
-    /// The vehicle ahead, and for how many steps it has been that.
-    lead_for: (usize, u32),
+    /// Speed of the ego at the start (m/s).
+    start_speed_mps: Option<f64>,
+    /// The last lead vehicle, if there was one.
+    last_lead: Option<LeadDuration>,
     step_s: f64,
 }
 
@@ -66,11 +86,11 @@ impl MarginMeter {
             max_jerk_mps3: 0.0,
             max_speed_deficit_mps: 0.0,
         };
-        Self { extremes, last_acceleration_mps2: None, start_mps: None, lead_for: (usize::MAX, 0), step_s }
+        Self { extremes, last_acceleration_mps2: None, start_speed_mps: None, last_lead: None, step_s }
     }
 
-    /// Takes in one physics step of E while it has touched nobody.
-    pub(crate) fn take(&mut self, own: &VehicleState, now: &MarginsNow) {
+    /// Updates the extremes by one physics step. It must not be called after the ego's first collision.
+    pub(crate) fn observe(&mut self, own: &VehicleState, now: &MarginsNow) {
         let extremes = &mut self.extremes;
         keep_least(&mut extremes.min_thw_front_s, now.thw_front_s);
         keep_least(&mut extremes.min_thw_rear_s, now.thw_rear_s);
@@ -78,45 +98,49 @@ impl MarginMeter {
         keep_least(&mut extremes.min_gap_rear_m, now.gap_rear_m);
         keep_least(&mut extremes.min_ttc_rear_s, now.ttc_rear_s);
         extremes.max_deceleration_mps2 = extremes.max_deceleration_mps2.max(-own.acceleration_mps2);
-        // Where the vehicle comes to a stand its deceleration ends at once: that is no jerk of the controller's.
+        // When the vehicle comes to a standstill, its deceleration ends at once. The controller did not cause that jerk.
         if let Some(last_mps2) = self.last_acceleration_mps2.filter(|_| own.speed_mps > 0.0) {
             let jerk_mps3 = (own.acceleration_mps2 - last_mps2).abs() / self.step_s;
             extremes.max_jerk_mps3 = extremes.max_jerk_mps3.max(jerk_mps3);
         }
         self.last_acceleration_mps2 = Some(own.acceleration_mps2);
-        self.take_deficit(own.speed_mps, now.lead);
+        self.observe_speed_deficit(own.speed_mps, now.lead);
     }
 
-    /// Compares E's speed with what is due: the lead's once it has been ahead for a while, or E's own at the start.
-    fn take_deficit(&mut self, own_mps: f64, lead: Result<Lead, Absent>) {
-        let start_mps = *self.start_mps.get_or_insert(own_mps);
-        let due_mps = match lead {
+    /// Compares the ego's speed with a reference: the lead vehicle's speed once it has been ahead for [`SETTLED_LEAD_S`],
+    /// or the ego's own speed at the start if there is no lead vehicle.
+    fn observe_speed_deficit(&mut self, own_mps: f64, lead: Result<Lead, Absent>) {
+        let start_speed_mps = *self.start_speed_mps.get_or_insert(own_mps);
+        let reference_mps = match lead {
             Ok(lead) => {
-                let (same, steps) = self.lead_for;
-                self.lead_for = if same == lead.actor { (same, steps + 1) } else { (lead.actor, 0) };
-                if f64::from(self.lead_for.1) * self.step_s < SETTLED_LEAD_S {
+                let same = self.last_lead.filter(|last| last.actor == lead.actor);
+                let steps = same.map_or(0, |last| last.steps + 1);
+                self.last_lead = Some(LeadDuration { actor: lead.actor, steps });
+                if f64::from(steps) * self.step_s < SETTLED_LEAD_S {
                     return;
                 }
                 lead.speed_mps
             }
-            Err(Absent::NoLead) => start_mps,
+            Err(Absent::NoLead) => start_speed_mps,
             Err(_) => return,
         };
-        self.extremes.max_speed_deficit_mps = self.extremes.max_speed_deficit_mps.max(due_mps - own_mps);
+        self.extremes.max_speed_deficit_mps = self.extremes.max_speed_deficit_mps.max(reference_mps - own_mps);
     }
 
-    /// A collision leaves no margin to the vehicle that was struck ahead or behind.
-    pub(crate) fn touched(&mut self, ahead: bool) {
-        let gap = if ahead { &mut self.extremes.min_gap_front_m } else { &mut self.extremes.min_gap_rear_m };
+    /// Sets the smallest gap to zero after a collision of the ego: the front gap if the other vehicle `is_ahead`, otherwise
+    /// the rear gap.
+    pub(crate) fn note_collision(&mut self, is_ahead: bool) {
+        let gap = if is_ahead { &mut self.extremes.min_gap_front_m } else { &mut self.extremes.min_gap_rear_m };
         *gap = Ok(0.0);
     }
 
+    /// Returns the extremes.
     pub(crate) fn finish(self) -> Margins {
         self.extremes
     }
 }
 
-/// Keeps the lesser of two values; a value beats an absence, and a later absence does not overwrite an earlier one.
+/// Replaces `least` by `now` if that is smaller. A value replaces an absence; an absence never replaces anything.
 fn keep_least(least: &mut Measured, now: Measured) {
     *least = match (*least, now) {
         (Ok(least), Ok(now)) => Ok(least.min(now)),
@@ -130,7 +154,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn absence_never_beats_a_value() {
+    fn an_absence_never_replaces_a_value() {
         let mut least = Err(Absent::NoLead);
         keep_least(&mut least, Ok(2.0));
         keep_least(&mut least, Err(Absent::Standstill));

@@ -1,20 +1,21 @@
-//! What the margin increase system did in a run, summed up from the commands it gave.
+//! Summarises what the margin increase system (MIS) did in a run, from its commands.
 
 use closecall_controllers::{EgoCommand, EgoState, Reason};
 use closecall_traffic::{Absent, Measured, Time};
 
 use crate::outcome::MisSummary;
 
-/// E at one control step, as the summary needs it.
-pub(super) struct EgoNow<'a> {
+/// The ego at one control step, as the summary needs it.
+pub(super) struct MisObservation<'a> {
     pub(super) time: Time,
     pub(super) command: &'a EgoCommand,
     pub(super) speed_mps: f64,
     pub(super) thw_front_s: Measured,
-    /// True at the first step at which the vehicle behind is at the critical distance.
+    /// True only at the first control step at which the rear vehicle is at the critical distance.
     pub(super) is_critical: bool,
 }
 
+/// The ego at the first engagement.
 #[derive(Clone, Copy, Debug)]
 struct Engagement {
     at: Time,
@@ -24,7 +25,7 @@ struct Engagement {
     reason: Reason,
 }
 
-/// Follows the margin increase system through a run.
+/// Observes the margin increase system during a run.
 #[derive(Debug, Default)]
 pub(super) struct MisLog {
     engaged: Option<Engagement>,
@@ -35,8 +36,8 @@ pub(super) struct MisLog {
 }
 
 impl MisLog {
-    /// Takes in one control step.
-    pub(super) fn take(&mut self, now: &EgoNow<'_>) {
+    /// Observes one control step.
+    pub(super) fn observe(&mut self, now: &MisObservation<'_>) {
         self.last_reason = Some(now.command.reason);
         let is_active = matches!(now.command.state, EgoState::Increasing | EgoState::Holding);
         if self.engaged.is_none() && now.command.state == EgoState::Increasing {
@@ -61,7 +62,7 @@ impl MisLog {
         }
     }
 
-    /// The summary, or that the controller has no such system.
+    /// Returns the summary, or [`Absent::NoMis`] if the controller has no margin increase system.
     pub(super) fn finish(self, has_mis: bool) -> Result<MisSummary, Absent> {
         let last_reason = self.last_reason.filter(|_| has_mis).ok_or(Absent::NoMis)?;
         let never = Absent::NeverEngaged;

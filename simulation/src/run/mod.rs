@@ -7,12 +7,13 @@
 //!        └─(25 Hz)─▶ sensors ─▶ tracks ─▶ ego controller ─▶ command ┘
 //! ```
 //!
-//! Drivers, sensors and controller read the state at t; then every vehicle moves to t + dt.
+//! Drivers, sensors and the ego controller read the state at t; then all vehicles move to t + dt.
 
 mod arm;
 mod auditor;
 mod clock;
 mod closed_loop;
+mod ego_input;
 mod error;
 mod events;
 mod humans;

@@ -1,21 +1,22 @@
-//! The five moments of the encounter that the margin increase system exists for, as they truly happen.
+//! Finds the five moments of the encounter for which the margin increase system is made.
 //!
 //! ```text
-//!  (a) R comes near ─▶ (b) R pulls out ─▶ (c) R is at d_c ─▶ (d) F brakes ─▶ (e) R has concluded
-//!      E closes up on F    E slows gently     the margin is there    E need not      E is free to brake
+//!  (a) R comes near ─▶ (b) R pulls out ─▶ (c) R is at d_c ─▶ (d) F brakes ─▶ (e) R has passed E
+//!      E follows F         E slows gently     E has its margin       E need not      E is free to brake
 //! ```
 //!
-//! They are read off the truth and not off the controller, so that runs with and without the system can be compared.
-//! Each is noted once. Only the last four may change their order: F may brake early.
+//! E is the ego, F the lead vehicle, R the rear vehicle, and d_c the critical distance. The moments follow from the
+//! ground truth, not from the controller, so that runs with and without the system can be compared. Each is noted once.
+//! The last four may occur in another order: the lead vehicle may brake early.
 
 use closecall_traffic::Time;
 
 use crate::outcome::{Moment, MomentAt};
 
-/// Rear gap at which the encounter begins [m]: the paper's engaging distance.
+/// Rear gap at or below which the rear vehicle is near (m): the paper's distance of engagement.
 pub(super) const NEAR_GAP_M: f64 = 100.0;
 
-/// Closing speed from which on it is one [m/s]: 10 km/h.
+/// Smallest closing speed at which the rear vehicle counts as approaching (m/s): 10 km/h.
 pub(super) const NEAR_CLOSING_MPS: f64 = 10.0 / 3.6;
 
 /// Collects the moments of a run.
@@ -25,14 +26,14 @@ pub(super) struct Moments {
 }
 
 impl Moments {
-    /// Notes that `moment` is now, if it is the first time.
+    /// Notes that `moment` is reached at `time`, unless it was reached before.
     pub(super) fn note(&mut self, moment: Moment, time: Time) {
         if !self.noted.iter().any(|known| known.moment == moment) {
             self.noted.push(MomentAt { moment, time });
         }
     }
 
-    /// All that were noted, in order of time.
+    /// Returns the moments that were reached, in order of time.
     pub(super) fn finish(mut self) -> Vec<MomentAt> {
         self.noted.sort_by_key(|noted| (noted.time, noted.moment));
         self.noted

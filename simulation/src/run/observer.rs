@@ -1,4 +1,4 @@
-//! What a run shows to those who watch it: recorders, traces, tests.
+//! The interface through which recorders, traces and tests observe a run.
 
 use closecall_controllers::DriverNote;
 use closecall_controllers::{EgoCommand, EgoState, Reason};
@@ -8,69 +8,69 @@ use closecall_traffic::{Absent, Measured, Time, Track, VehicleState};
 use crate::outcome::{Collision, Phase};
 use crate::scenario::Scenario;
 
-/// The vehicle ahead of another.
+/// The lead vehicle of a vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lead {
-    /// Its place in the list of actors.
+    /// Its index in the list of actors.
     pub actor: usize,
-    /// Its speed [m/s].
+    /// Its speed (m/s).
     pub speed_mps: f64,
 }
 
-/// E's margins at one instant, as they truly are.
+/// The true margins of a vehicle at one instant.
 #[derive(Clone, Copy, Debug)]
 pub struct MarginsNow {
-    /// The vehicle ahead, where its centre is in E's lane.
+    /// The lead vehicle, if its centre is in the lane.
     pub lead: Result<Lead, Absent>,
-    /// The vehicle behind, by its place in the list of actors.
+    /// Index of the vehicle behind in the list of actors, if there is one in the lane.
     pub follower: Option<usize>,
-    /// Gap to the vehicle ahead in E's lane or path [m].
+    /// Gap to the vehicle ahead, in the lane or in the path (m).
     pub gap_front_m: Measured,
-    /// Time headway to it [s].
+    /// Time headway to the vehicle ahead (s).
     pub thw_front_s: Measured,
-    /// Gap of the vehicle behind [m].
+    /// Gap to the vehicle behind (m).
     pub gap_rear_m: Measured,
-    /// Time headway of the vehicle behind to E [s].
+    /// Time headway of the vehicle behind (s).
     pub thw_rear_s: Measured,
-    /// Time to collision of the vehicle behind with E [s].
+    /// Time to collision of the vehicle behind (s).
     pub ttc_rear_s: Measured,
 }
 
-/// Everything there is to see at one control step (25 Hz).
+/// The state of a run at one control step (25 Hz).
 pub struct StepView<'a> {
-    /// The instant.
+    /// Time of the step.
     pub time: Time,
-    /// What is being run.
+    /// The scenario of the run.
     pub scenario: &'a Scenario,
-    /// Every vehicle in the order of the scenario's actors, E among them.
+    /// All vehicles including the ego, in the order of the scenario's actors.
     pub vehicles: &'a [SceneVehicle],
-    /// Gap to the vehicle ahead of each actor, and its time headway [m, s].
+    /// Front gap (m) and front time headway (s) of each actor.
     pub fronts: &'a [(Measured, Measured)],
-    /// What E perceives.
+    /// The tracks that the ego perceives.
     pub tracks: &'a [Track],
-    /// The sensors, for what they show beside tracks.
+    /// The ego's sensors, for their output other than tracks.
     pub perception: &'a dyn Perception,
-    /// What E's controller answered.
+    /// The command of the ego controller.
     pub command: &'a EgoCommand,
-    /// E's margins.
+    /// The ego's true margins.
     pub margins: &'a MarginsNow,
-    /// The part of the encounter.
+    /// The phase of the encounter.
     pub phase: Phase,
 }
 
-/// Something that happened at an instant.
+/// Something that happens at one instant of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Happening {
-    /// An event of the scenario set in.
+    /// An event of the scenario was triggered.
     EventTriggered {
         /// The event's name.
         event: String,
     },
-    /// A driver came to a moment of its plan.
+    /// A human driver reports an action.
     DriverNote {
-        /// The driver, by its place in the list of actors.
+        /// Index of the driver's vehicle in the list of actors.
         actor: usize,
-        /// The moment.
+        /// What the driver does.
         note: DriverNote,
     },
     /// The ego stack changed its state.
@@ -79,7 +79,7 @@ pub enum Happening {
         from: EgoState,
         /// The state now.
         to: EgoState,
-        /// Why.
+        /// The reason for the change.
         reason: Reason,
     },
     /// The encounter entered another phase.
@@ -87,21 +87,21 @@ pub enum Happening {
         /// The phase now.
         to: Phase,
     },
-    /// Two vehicles touched. Its change of velocity is not known yet.
+    /// Two vehicles touched for the first time. The changes of velocity are not known yet.
     Collision(Collision),
 }
 
-/// Someone who watches a run.
+/// Observes a run.
 pub trait Observer {
-    /// One control step.
+    /// Called at each control step (25 Hz).
     fn step(&mut self, view: &StepView<'_>);
-    /// Something happened at `time`.
+    /// Called when something happens, with its time.
     fn happening(&mut self, time: Time, what: &Happening);
-    /// One step of the physics (100 Hz): how every vehicle moves at `time`, in the order of the scenario's actors.
+    /// Called at each physics step (100 Hz) with the states of all vehicles, in the order of the scenario's actors.
     fn moved(&mut self, _time: Time, _vehicles: &mut dyn Iterator<Item = VehicleState>) {}
 }
 
-/// Nobody watches.
+/// An observer that ignores everything.
 pub struct NoObserver;
 
 impl Observer for NoObserver {

@@ -1,38 +1,48 @@
-//! The parts of an encounter with a vehicle that comes up from behind.
+//! Determines the phase of the encounter with a rear vehicle.
 //!
 //! ```text
 //!   Approach ──▶ Critical ──▶ Overtaking ──▶ After
-//!      ▲            │ falls back     │ returns behind E
+//!      ▲            │ falls back     │ returns behind the ego
 //!      └────────────┴────────────────┘
 //! ```
 //!
-//! The vehicle in question, the challenger, is the latest one that was behind E in E's lane.
+//! The rear vehicle is the one that was last behind the ego in the ego's lane.
 
 use closecall_traffic::Time;
 
 use crate::outcome::{CRITICAL_THW_S, Phase};
 use crate::world::World;
 
-/// Follows the phase of the encounter, step by step.
+/// The vehicle behind the ego in the ego's lane.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Follower {
+    /// Index of the vehicle in the list of actors.
+    pub(crate) actor: usize,
+    /// Its time headway to the ego (s).
+    pub(crate) thw_s: f64,
+}
+
+/// Tracks the phase of the encounter from step to step.
 #[derive(Debug, Default)]
 pub(crate) struct Encounter {
-    challenger: Option<usize>,
+    /// Index of the rear vehicle in the list of actors.
+    rear: Option<usize>,
     phase: Phase,
     reached_critical_gap: bool,
 }
 
 impl Encounter {
-    /// The phase now.
+    /// Returns the current phase.
     pub(crate) fn phase(&self) -> Phase {
         self.phase
     }
 
-    /// Takes in one step and returns the phase. `follower` is the vehicle behind E in E's lane, with its time headway.
-    pub(crate) fn update(&mut self, world: &World, ego: usize, follower: Option<(usize, f64)>) -> Phase {
-        if let Some((actor, thw_s)) = follower {
-            self.challenger = Some(actor);
+    /// Updates the phase by one step and returns it. `follower` is the vehicle behind the ego in the ego's lane.
+    pub(crate) fn update(&mut self, world: &World, ego: usize, follower: Option<Follower>) -> Phase {
+        if let Some(Follower { actor, thw_s }) = follower {
+            self.rear = Some(actor);
             self.phase = if thw_s < CRITICAL_THW_S { Phase::Critical } else { Phase::Approach };
-        } else if let Some(actor) = self.challenger {
+        } else if let Some(actor) = self.rear {
             self.phase = match self.gap_m(world, ego, actor) {
                 gap_m
                     if gap_m < -(world.vehicle(ego).dimensions.length_m + world.vehicle(actor).dimensions.length_m) =>
@@ -46,22 +56,23 @@ impl Encounter {
         self.phase
     }
 
-    /// True the first time that the challenger, in whatever lane, is `critical_gap_m` or less behind E.
-    pub(crate) fn reaches(&mut self, world: &World, ego: usize, critical_gap_m: f64) -> bool {
+    /// Returns true once: the first time that the rear vehicle, in any lane, is `critical_gap_m` or less behind the ego.
+    pub(crate) fn reaches_critical_gap(&mut self, world: &World, ego: usize, critical_gap_m: f64) -> bool {
         if self.reached_critical_gap {
             return false;
         }
-        let Some(actor) = self.challenger else { return false };
+        let Some(actor) = self.rear else { return false };
         self.reached_critical_gap = self.gap_m(world, ego, actor) <= critical_gap_m;
         self.reached_critical_gap
     }
 
-    /// Gap from the challenger's front to E's rear along the road [m]; negative once the challenger is past that.
+    /// Returns the gap along the road from the front of the rear vehicle `actor` to the rear end of the ego (m). It is
+    /// negative once the front has passed that end.
     fn gap_m(&self, world: &World, ego: usize, actor: usize) -> f64 {
         let half_lengths_m = 0.5 * (world.vehicle(ego).dimensions.length_m + world.vehicle(actor).dimensions.length_m);
         world.state(ego).s_m - world.state(actor).s_m - half_lengths_m
     }
 }
 
-/// How long a run goes on after its first collision: a second impact of the cascade is still seen.
+/// Duration of a run after its first collision, so that a second impact of a pile-up is still observed.
 pub(crate) const AFTER_COLLISION: Time = Time::from_ms(2_000);

@@ -1,24 +1,25 @@
-//! One run: its state, and the parts of a step.
+//! The state of one run, and the parts of its step.
 
 use closecall_controllers::CheckedDriver;
 use closecall_controllers::{
-    DriverInput, DriverNote, EgoCommand, EgoController, EgoInput, EgoState, MisSettings, Neighbours, Odometry,
-    SensorAvailability,
+    DriverInput, DriverNote, EgoCommand, EgoController, EgoInput, EgoState, MisSettings, Neighbours,
 };
-use closecall_sensors::{Health, NoiseKey, Perception, Scene, SceneVehicle};
+use closecall_sensors::{NoiseKey, Perception, Scene, SceneVehicle};
 use closecall_traffic::{Measured, Track};
 
+use super::ego_input::{odometry, sensor_availability};
 use super::events::Events;
-use super::humans::{Human, humans, weave};
-use super::margins::MarginMeter;
-use super::mis_log::{EgoNow, MisLog};
+use super::humans::{Human, human_drivers, weave};
+use super::margins::{MarginMeter, Widths};
+use super::mis_log::{MisLog, MisObservation};
 use super::moments::{Moments, NEAR_CLOSING_MPS, NEAR_GAP_M};
-use super::phase::{AFTER_COLLISION, Encounter};
+use super::phase::{AFTER_COLLISION, Encounter, Follower};
 use super::{Arm, CONTROL_STEP, Happening, MarginsNow, Observer, RunKey, SampleError, StepView};
 use crate::outcome::{EndReason, Moment, Outcome, Phase};
 use crate::scenario::Scenario;
-use crate::world::{Action, Placed, World};
+use crate::world::{Action, InitialVehicle, World};
 
+/// The state of one run.
 pub(super) struct Run<'a> {
     scenario: &'a Scenario,
     key: RunKey,
@@ -33,35 +34,39 @@ pub(super) struct Run<'a> {
     mis: MisLog,
     moments: Moments,
     critical_gap_m: f64,
+    /// The last command of the ego controller.
     command: Option<EgoCommand>,
-    // Buffers, kept from step to step.
+    // Buffers that are reused in each step.
     neighbours: Vec<Neighbours>,
     tracks: Vec<Track>,
     margins: MarginsNow,
     actions: Vec<Action>,
+    /// All vehicles other than the ego, in the order of their names.
     others: Vec<SceneVehicle>,
+    /// All vehicles, in the order of the scenario's actors.
     vehicles: Vec<SceneVehicle>,
+    /// Front gap (m) and front time headway (s) of each actor.
     fronts: Vec<(Measured, Measured)>,
 }
 
 impl<'a> Run<'a> {
     pub(super) fn new(scenario: &'a Scenario, key: RunKey, arm: &'a Arm) -> Result<Self, SampleError> {
-        let placed = scenario
+        let vehicles = scenario
             .actors
             .iter()
-            .map(|actor| Placed {
+            .map(|actor| InitialVehicle {
                 id: actor.id.clone(),
                 vehicle: actor.vehicle,
                 state: actor.start,
                 weave: weave(actor, &scenario.road, key),
             })
             .collect();
-        let world = World::new(scenario.road, scenario.environment.friction, scenario.physics_step, placed);
+        let world = World::new(scenario.road, scenario.environment.friction, scenario.physics_step, vehicles);
         let CheckedDriver::Ego(settings) = &scenario.actors[scenario.ego].driver else {
             unreachable!("a checked scenario has its ego stack at `ego`")
         };
-        let margins =
-            MarginsNow::new(world.state(scenario.ego), &Neighbours::default(), [0.0, scenario.road.lane_width_m()]);
+        let widths = Widths { vehicle_m: 0.0, lane_m: scenario.road.lane_width_m() };
+        let margins = MarginsNow::new(world.state(scenario.ego), &Neighbours::default(), widths);
         let sensors = match arm.sensors {
             Some(mode) => scenario.sensors.with_mode(mode),
             None => scenario.sensors,
@@ -77,7 +82,7 @@ impl<'a> Run<'a> {
                 actors: scenario.actors.iter().map(|actor| actor.id.clone()).collect(),
             })?,
             controller: arm.controller.build(settings),
-            humans: humans(scenario, key),
+            humans: human_drivers(scenario, key),
             events: Events::new(scenario),
             encounter: Encounter::default(),
             meter: MarginMeter::new(scenario.physics_step.s()),
@@ -96,28 +101,30 @@ impl<'a> Run<'a> {
         })
     }
 
+    /// Returns whether sensors and ego controller act at the current time.
     pub(super) fn is_control_step(&self) -> bool {
         self.world.time().is_multiple_of(CONTROL_STEP)
     }
 
-    /// Shows how everyone moves, at each step of the physics.
-    pub(super) fn show_motion(&self, observer: &mut dyn Observer) {
+    /// Reports the states of all vehicles to the observer.
+    pub(super) fn report_motion(&self, observer: &mut dyn Observer) {
         observer.moved(self.world.time(), &mut (0..self.world.len()).map(|actor| *self.world.state(actor)));
     }
 
-    /// Works out who is around whom, E's margins, and the phase of the encounter.
-    pub(super) fn look_around(&mut self, observer: &mut dyn Observer) {
+    /// Updates the neighbours of all vehicles, the ego's margins, and the phase of the encounter.
+    pub(super) fn update_surroundings(&mut self, observer: &mut dyn Observer) {
         for actor in 0..self.world.len() {
             self.neighbours[actor] = self.world.neighbours(actor);
         }
         let ego = self.scenario.ego;
         let own = self.world.state(ego);
-        self.margins = MarginsNow::new(own, &self.neighbours[ego], self.widths_m(ego));
+        self.margins = MarginsNow::new(own, &self.neighbours[ego], self.widths(ego));
         if self.world.is_wrecked(ego) {
             return;
         }
-        self.meter.take(own, &self.margins);
+        self.meter.observe(own, &self.margins);
         let follower = self.margins.follower.zip(self.margins.thw_rear_s.ok());
+        let follower = follower.map(|(actor, thw_s)| Follower { actor, thw_s });
         let before = self.encounter.phase();
         let phase = self.encounter.update(&self.world, ego, follower);
         if phase != before {
@@ -125,10 +132,10 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Lets E measure, and its controller decide, unless E has lost control.
+    /// Runs the ego's sensors and its controller, unless the ego has collided.
     pub(super) fn perceive_and_control(&mut self, observer: &mut dyn Observer) -> Result<(), SampleError> {
         let ego = self.scenario.ego;
-        self.list_vehicles();
+        self.collect_vehicles();
         let time = self.world.time();
         if !self.world.is_wrecked(ego) {
             let scene = Scene {
@@ -143,22 +150,23 @@ impl<'a> Run<'a> {
             self.tracks.extend_from_slice(tracks);
             let input = EgoInput {
                 time,
-                odometry: self.odometry(),
+                odometry: odometry(self.scenario, &self.world),
                 road: &self.scenario.road,
                 tracks: &self.tracks,
-                sensors: availability(self.perception.as_ref()),
+                sensors: sensor_availability(self.perception.as_ref()),
             };
             let command = self.controller.step(&input)?;
             if !command.acceleration_mps2.is_finite() {
                 return Err(SampleError::Command { value: command.acceleration_mps2, time });
             }
-            self.take_command(command, observer);
+            self.accept_command(command, observer);
         }
-        self.show(observer);
+        self.report_step(observer);
         Ok(())
     }
 
-    fn take_command(&mut self, command: EgoCommand, observer: &mut dyn Observer) {
+    /// Stores the command of the ego controller, and notes what follows from it.
+    fn accept_command(&mut self, command: EgoCommand, observer: &mut dyn Observer) {
         let time = self.world.time();
         let from = self.command.map_or(EgoState::Following, |last| last.state);
         if command.state != from {
@@ -167,9 +175,9 @@ impl<'a> Run<'a> {
         }
         self.command = Some(command);
         let ego = self.scenario.ego;
-        let is_critical = self.encounter.reaches(&self.world, ego, self.critical_gap_m);
+        let is_critical = self.encounter.reaches_critical_gap(&self.world, ego, self.critical_gap_m);
         self.note_moments(is_critical);
-        self.mis.take(&EgoNow {
+        self.mis.observe(&MisObservation {
             time,
             command: &command,
             speed_mps: self.world.state(ego).speed_mps,
@@ -178,7 +186,7 @@ impl<'a> Run<'a> {
         });
     }
 
-    /// Notes which moments of the encounter are now.
+    /// Notes the moments of the encounter that are reached now.
     fn note_moments(&mut self, is_critical: bool) {
         let time = self.world.time();
         let own_mps = self.world.state(self.scenario.ego).speed_mps;
@@ -186,11 +194,11 @@ impl<'a> Run<'a> {
             let closing_mps = self.world.state(rear).speed_mps - own_mps;
             self.margins.gap_rear_m.is_ok_and(|gap_m| gap_m <= NEAR_GAP_M) && closing_mps >= NEAR_CLOSING_MPS
         });
-        let brakes = self.margins.lead.is_ok_and(|lead| self.world.state(lead.actor).brake_light);
+        let lead_brakes = self.margins.lead.is_ok_and(|lead| self.world.state(lead.actor).brake_light);
         for (moment, is_now) in [
             (Moment::RearNear, is_near),
             (Moment::CriticalDistance, is_critical),
-            (Moment::FrontBrakes, brakes),
+            (Moment::FrontBrakes, lead_brakes),
             (Moment::Concluded, self.encounter.phase() == Phase::After),
         ] {
             if is_now {
@@ -199,8 +207,8 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Fills the lists of vehicles that sensors and observers see.
-    fn list_vehicles(&mut self) {
+    /// Fills the lists of vehicles for sensors and observers.
+    fn collect_vehicles(&mut self) {
         self.others.clear();
         self.vehicles.clear();
         for actor in 0..self.world.len() {
@@ -212,37 +220,22 @@ impl<'a> Run<'a> {
             };
             self.vehicles.push(vehicle);
         }
-        // The sensors meet the others in the order of their names: what they draw does not depend on the list's order.
+        // The sensors process the vehicles in the order of their names, so that their random draws do not depend on the order
+        // of the list of actors.
         let others = self.world.by_name().iter().filter(|actor| **actor != self.scenario.ego);
         self.others.extend(others.map(|&actor| self.vehicles[actor]));
     }
 
-    /// The width of a vehicle, and that of the lanes [m].
-    fn widths_m(&self, actor: usize) -> [f64; 2] {
-        [self.world.vehicle(actor).dimensions.width_m, self.scenario.road.lane_width_m()]
+    fn widths(&self, actor: usize) -> Widths {
+        Widths { vehicle_m: self.world.vehicle(actor).dimensions.width_m, lane_m: self.scenario.road.lane_width_m() }
     }
 
-    fn odometry(&self) -> Odometry {
-        let ego = self.scenario.ego;
-        let state = self.world.state(ego);
-        let lane = self.scenario.road.lane_at(state.d_m);
-        let size = self.world.vehicle(ego).dimensions;
-        Odometry {
-            speed_mps: state.speed_mps,
-            acceleration_mps2: state.acceleration_mps2,
-            yaw_rate_radps: state.yaw_rate_radps,
-            lane,
-            lane_offset_m: state.d_m - self.scenario.road.lane_centre_m(lane),
-            length_m: size.length_m,
-            width_m: size.width_m,
-        }
-    }
-
-    fn show(&mut self, observer: &mut dyn Observer) {
+    /// Reports the control step to the observer.
+    fn report_step(&mut self, observer: &mut dyn Observer) {
         let Some(command) = &self.command else { return };
         self.fronts.clear();
         for actor in 0..self.world.len() {
-            let now = MarginsNow::new(self.world.state(actor), &self.neighbours[actor], self.widths_m(actor));
+            let now = MarginsNow::new(self.world.state(actor), &self.neighbours[actor], self.widths(actor));
             self.fronts.push((now.gap_front_m, now.thw_front_s));
         }
         observer.step(&StepView {
@@ -258,15 +251,16 @@ impl<'a> Run<'a> {
         });
     }
 
-    /// Lets the human drivers and the scenario's events decide on the state at t.
-    pub(super) fn drive(&mut self, observer: &mut dyn Observer) -> Result<(), SampleError> {
+    /// Determines the actions of all vehicles, from the current state: of the human drivers, of the scenario's events, and
+    /// of the ego controller.
+    pub(super) fn decide_actions(&mut self, observer: &mut dyn Observer) -> Result<(), SampleError> {
         let time = self.world.time();
         self.events.update(&self.world, |event| {
             observer.happening(time, &Happening::EventTriggered { event: event.to_owned() });
         });
         let ego = self.scenario.ego;
-        let asked_mps2 = self.command.map_or(0.0, |command| command.acceleration_mps2);
-        self.actions[ego] = Action { acceleration_mps2: asked_mps2, ..Action::default() };
+        let commanded_mps2 = self.command.map_or(0.0, |command| command.acceleration_mps2);
+        self.actions[ego] = Action { acceleration_mps2: commanded_mps2, ..Action::default() };
         for human in &mut self.humans {
             let actor = human.actor;
             if self.world.is_wrecked(actor) {
@@ -278,9 +272,9 @@ impl<'a> Run<'a> {
                 own: self.world.state(actor),
                 neighbours: &self.neighbours[actor],
                 road: &self.scenario.road,
-                changing_to: self.world.changing_to(actor),
+                changing_to: self.world.lane_change_target(actor),
                 lateral_deviation_m: self.world.lateral_deviation_m(actor),
-                desired_speed_offset_mps: human.wander.as_mut().map_or(0.0, |wander| wander.at(time)),
+                desired_speed_offset_mps: human.desired_speed_noise.as_mut().map_or(0.0, |noise| noise.at(time)),
             };
             let action = human
                 .driver
@@ -288,7 +282,7 @@ impl<'a> Run<'a> {
                 .map_err(|source| SampleError::Driver { actor: self.scenario.actors[actor].id.clone(), source })?;
             if let Some(note) = action.note {
                 if note == DriverNote::CutOutStarted {
-                    self.events.cut_out_started(actor, time);
+                    self.events.note_cut_out(actor, time);
                     if !self.world.is_wrecked(ego) && self.margins.follower == Some(actor) {
                         self.moments.note(Moment::CutOut, time);
                     }
@@ -298,7 +292,7 @@ impl<'a> Run<'a> {
             self.actions[actor] = Action {
                 acceleration_mps2: self
                     .events
-                    .asked_mps2(actor, &self.world)
+                    .requested_mps2(actor, &self.world)
                     .map_or(action.acceleration_mps2, |event_mps2| event_mps2.min(action.acceleration_mps2)),
                 lane_change: action.lane_change,
                 indicator: action.indicator,
@@ -307,21 +301,22 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Moves the world on by one step.
+    /// Moves the world by one step and reports new collisions to the observer.
     pub(super) fn advance(&mut self, observer: &mut dyn Observer) {
         let known = self.world.collisions().len();
         self.world.step(&self.actions, self.encounter.phase());
-        for place in known..self.world.collisions().len() {
-            let collision = &self.world.collisions()[place];
+        for index in known..self.world.collisions().len() {
+            let collision = &self.world.collisions()[index];
             if collision.involves(self.scenario.ego_id()) {
-                let ahead = self.is_ahead_of_ego(place);
-                self.meter.touched(ahead);
+                let is_ahead = self.is_ahead_of_ego(index);
+                self.meter.note_collision(is_ahead);
             }
             observer.happening(collision.time, &Happening::Collision(collision.clone()));
         }
     }
 
-    /// True where the other vehicle of a collision of E has its centre ahead of E's.
+    /// Returns whether the other vehicle of a collision of the ego has its centre ahead of the ego's. `collision` is an
+    /// index into the list of collisions.
     fn is_ahead_of_ego(&self, collision: usize) -> bool {
         let ego = self.scenario.ego;
         let between = &self.world.collisions()[collision].between;
@@ -333,7 +328,7 @@ impl<'a> Run<'a> {
         other.is_some_and(|other| self.world.state(other).s_m > self.world.state(ego).s_m)
     }
 
-    /// Why the run is over, if it is.
+    /// Returns why the run has ended, or `None` if it goes on.
     pub(super) fn end(&self) -> Option<EndReason> {
         let time = self.world.time();
         if let Some(first) = self.world.collisions().first() {
@@ -346,7 +341,8 @@ impl<'a> Run<'a> {
         (time >= self.scenario.duration).then_some(EndReason::Duration)
     }
 
-    /// True where E stands, and so does everyone behind it and the one ahead of it: nothing can happen to E any more.
+    /// Returns whether the ego, its lead vehicle and all vehicles behind it stand still, so that the ego can no longer
+    /// collide.
     fn stands_still(&self) -> bool {
         let ego = self.scenario.ego;
         let own = self.world.state(ego);
@@ -359,6 +355,7 @@ impl<'a> Run<'a> {
             })
     }
 
+    /// Returns the outcome of the run.
     pub(super) fn finish(self, end: EndReason) -> Outcome {
         let CheckedDriver::Ego(settings) = &self.scenario.actors[self.scenario.ego].driver else {
             unreachable!("a checked scenario has its ego stack at `ego`")
@@ -377,14 +374,5 @@ impl<'a> Run<'a> {
             margins: self.meter.finish(),
             mis: self.mis.finish(self.arm.controller.has_mis(settings)),
         }
-    }
-}
-
-fn availability(perception: &dyn Perception) -> SensorAvailability {
-    let health = perception.health();
-    SensorAvailability {
-        front: health.front != Health::Failed,
-        surround: health.surround != Health::Failed,
-        rear: health.rear != Health::Failed,
     }
 }

@@ -1,4 +1,4 @@
-//! Concrete scenarios: every value is a number, and every number is checked.
+//! Concrete scenarios: every value is a number, and every number has been checked.
 
 use closecall_controllers::{CheckedDriver, DriverConfig, HumanDriver, LaneKeeping, SpeedKeeping};
 use closecall_sensors::Sensors;
@@ -18,20 +18,20 @@ use super::placement;
 pub struct Actor {
     /// Its name.
     pub id: ActorId,
-    /// What it is.
+    /// Its class, size and mass.
     pub vehicle: Vehicle,
-    /// Where it starts.
+    /// Its state at time zero.
     pub start: VehicleState,
-    /// Who drives it.
+    /// Its driver: a human driver, or the ego stack.
     pub driver: CheckedDriver,
-    /// How it keeps its lane; exactly where absent.
+    /// How its driver weaves in the lane, or `None` if the driver keeps the lane exactly.
     pub lane_keeping: Option<LaneKeeping>,
-    /// How the speed that its driver wants wanders; not at all where absent.
+    /// How the desired speed of its driver varies, or `None` if it is constant.
     pub speed_keeping: Option<SpeedKeeping>,
     pub(crate) events: Vec<Event>,
 }
 
-/// A concrete scenario: everything is a number, and every number has been checked.
+/// A concrete scenario: every value is a number, and every number has been checked.
 #[derive(Clone, Debug)]
 pub struct Scenario {
     /// Its name.
@@ -44,18 +44,18 @@ pub struct Scenario {
     pub environment: Environment,
     /// The vehicles.
     pub actors: Vec<Actor>,
-    /// The place of E among them.
+    /// Index of the ego in `actors`.
     pub ego: usize,
-    /// What E perceives with.
+    /// The ego's sensors.
     pub sensors: Sensors,
-    /// The sampled values that it was made with.
+    /// The parameter values that it was made with.
     pub parameters: Parameters,
-    /// Step of vehicles and human drivers; a control step is a whole number of them.
+    /// Step of the vehicle dynamics and the human drivers. The control step is a multiple of it.
     pub(crate) physics_step: Time,
 }
 
 impl Scenario {
-    /// E's name.
+    /// Returns the ego's name.
     pub fn ego_id(&self) -> &ActorId {
         &self.actors[self.ego].id
     }
@@ -104,14 +104,14 @@ impl ScenarioConfig {
         self.check_event_names()
     }
 
-    /// Events are told apart by their names in logs and reports, whichever actor they belong to.
+    /// Checks that event names are unique across all actors, since logs and reports identify events by name.
     fn check_event_names(&self) -> Result<(), ConfigError> {
         let mut names = Vec::new();
         for (index, actor) in self.actors.iter().enumerate() {
-            for (place, event) in actor.events.iter().enumerate() {
+            for (event_index, event) in actor.events.iter().enumerate() {
                 if names.contains(&&event.id) {
                     let problem = Problem::Duplicate { value: event.id.to_string() };
-                    let error = ConfigError::new("id", problem).within_index(place).within("event");
+                    let error = ConfigError::new("id", problem).within_index(event_index).within("event");
                     return Err(error.within_index(index).within("actor"));
                 }
                 names.push(&event.id);
@@ -121,18 +121,18 @@ impl ScenarioConfig {
     }
 
     fn check_requirements(&self) -> Result<(), ConfigError> {
-        let is_mark = |mark: &str| {
-            let is_part_of_one = |c: char| c.is_ascii_alphanumeric() || "-._".contains(c);
-            mark.starts_with(|c: char| c.is_ascii_alphanumeric()) && mark.chars().all(is_part_of_one)
+        let is_identifier = |requirement: &str| {
+            let is_allowed = |c: char| c.is_ascii_alphanumeric() || "-._".contains(c);
+            requirement.starts_with(|c: char| c.is_ascii_alphanumeric()) && requirement.chars().all(is_allowed)
         };
-        for (index, mark) in self.requirements.iter().enumerate() {
+        for (index, requirement) in self.requirements.iter().enumerate() {
             let at = |problem| Err(ConfigError::new("requirements", problem).within_index(index));
-            if !is_mark(mark) {
+            if !is_identifier(requirement) {
                 let allowed = "letters, digits, `-`, `.` and `_`, starting with a letter or digit".to_owned();
-                return at(Problem::UnknownWord { value: mark.clone(), allowed });
+                return at(Problem::UnknownWord { value: requirement.clone(), allowed });
             }
-            if self.requirements[..index].contains(mark) {
-                return at(Problem::Duplicate { value: mark.clone() });
+            if self.requirements[..index].contains(requirement) {
+                return at(Problem::Duplicate { value: requirement.clone() });
             }
         }
         Ok(())
@@ -145,19 +145,20 @@ impl ScenarioConfig {
             let vehicle = actor.vehicle.check(parameters).map_err(|error| at(index, error.within("vehicle")))?;
             vehicles.push(vehicle);
         }
-        let states = placement::place(&self.actors, &vehicles, road, parameters)?;
+        let states = placement::initial_states(&self.actors, &vehicles, road, parameters)?;
         let start = events::Start { actors: &self.actors, vehicles: &vehicles, states: &states };
         let mut checked = Vec::with_capacity(self.actors.len());
         for (index, actor) in self.actors.iter().enumerate() {
             let driver = actor.driver.check(parameters).map_err(|error| at(index, error.within("driver")))?;
-            check_reach(&driver, states[index].speed_mps).map_err(|error| at(index, error))?;
+            check_cut_out(&driver, states[index].speed_mps).map_err(|error| at(index, error))?;
             check_lanes(&driver, &states[index], road).map_err(|error| at(index, error))?;
-            let (lane_keeping, speed_keeping) = actor.check_keeping(parameters).map_err(|error| at(index, error))?;
-            check_weave(lane_keeping, states[index].speed_mps, friction).map_err(|error| at(index, error))?;
+            let Keeping { lane_keeping, speed_keeping } =
+                actor.check_keeping(parameters).map_err(|error| at(index, error))?;
+            check_weaving(lane_keeping, states[index].speed_mps, friction).map_err(|error| at(index, error))?;
             let mut events = Vec::with_capacity(actor.events.len());
-            for (place, event) in actor.events.iter().enumerate() {
+            for (event_index, event) in actor.events.iter().enumerate() {
                 let event = event.check(&start, parameters);
-                events.push(event.map_err(|error| at(index, error.within_index(place).within("event")))?);
+                events.push(event.map_err(|error| at(index, error.within_index(event_index).within("event")))?);
             }
             checked.push(Actor {
                 id: actor.id.clone(),
@@ -173,24 +174,27 @@ impl ScenarioConfig {
     }
 }
 
+/// How a driver keeps lane and speed.
+struct Keeping {
+    lane_keeping: Option<LaneKeeping>,
+    speed_keeping: Option<SpeedKeeping>,
+}
+
 impl ActorConfig {
-    /// How the driver keeps lane and speed.
-    fn check_keeping(
-        &self,
-        parameters: &Parameters,
-    ) -> Result<(Option<LaneKeeping>, Option<SpeedKeeping>), ConfigError> {
-        let refused = |key, rule: &str| {
+    /// Checks how the driver keeps lane and speed, and that its kind allows this.
+    fn check_keeping(&self, parameters: &Parameters) -> Result<Keeping, ConfigError> {
+        let reject = |key, rule: &str| {
             Err(ConfigError::new(key, Problem::Contradiction { other: "driver", rule: rule.to_owned() }))
         };
         match &self.driver {
             DriverConfig::EgoStack(_) if self.lane_keeping.is_some() => {
-                return refused("lane-keeping", "the ego stack keeps its lane without weaving");
+                return reject("lane-keeping", "the ego stack keeps its lane without weaving");
             }
             DriverConfig::EgoStack(_) if self.speed_keeping.is_some() => {
-                return refused("speed-keeping", "the ego stack drives as its controller asks");
+                return reject("speed-keeping", "the ego stack drives as its controller asks");
             }
             DriverConfig::Prescribed(_) if self.speed_keeping.is_some() => {
-                return refused("speed-keeping", "a prescribed driver keeps to its list of speeds");
+                return reject("speed-keeping", "a prescribed driver keeps to its list of speeds");
             }
             DriverConfig::Prescribed(_)
             | DriverConfig::EgoStack(_)
@@ -200,15 +204,15 @@ impl ActorConfig {
         }
         let lane_keeping = self.lane_keeping.as_ref().map(|config| config.check(parameters));
         let speed_keeping = self.speed_keeping.as_ref().map(|config| config.check(parameters));
-        Ok((
-            lane_keeping.transpose().map_err(|error| error.within("lane-keeping"))?,
-            speed_keeping.transpose().map_err(|error| error.within("speed-keeping"))?,
-        ))
+        Ok(Keeping {
+            lane_keeping: lane_keeping.transpose().map_err(|error| error.within("lane-keeping"))?,
+            speed_keeping: speed_keeping.transpose().map_err(|error| error.within("speed-keeping"))?,
+        })
     }
 }
 
-/// Refuses a weave that the tyres cannot give at the speed at which its driver starts.
-fn check_weave(keeping: Option<LaneKeeping>, speed_mps: f64, friction: f64) -> Result<(), ConfigError> {
+/// Rejects weaving that needs more lateral acceleration at the initial speed than drivers use on this road.
+fn check_weaving(keeping: Option<LaneKeeping>, speed_mps: f64, friction: f64) -> Result<(), ConfigError> {
     let largest_mps2 = keeping.map_or(0.0, |keeping| 3.0 * keeping.lateral_acceleration_sd_mps2(speed_mps));
     let grip_mps2 = lateral_grip_mps2(friction);
     if largest_mps2 <= grip_mps2 {
@@ -222,8 +226,8 @@ fn check_weave(keeping: Option<LaneKeeping>, speed_mps: f64, friction: f64) -> R
     Err(ConfigError::new("sdlp-m", problem).within("lane-keeping"))
 }
 
-/// Refuses an overtaking driver who never comes as close as it would have to in order to pull out.
-fn check_reach(driver: &CheckedDriver, speed_mps: f64) -> Result<(), ConfigError> {
+/// Rejects an overtaking driver whose following distance never lets it reach the headway at which it cuts out.
+fn check_cut_out(driver: &CheckedDriver, speed_mps: f64) -> Result<(), ConfigError> {
     match driver {
         CheckedDriver::Human(HumanDriver::Overtaker(overtaker)) => {
             overtaker.check_reach(speed_mps).map_err(|error| error.within("overtaker").within("driver"))
@@ -232,7 +236,7 @@ fn check_reach(driver: &CheckedDriver, speed_mps: f64) -> Result<(), ConfigError
     }
 }
 
-/// Refuses a prescribed driver who would change to a lane that the road does not have.
+/// Rejects a prescribed driver that would change to a lane that the road does not have.
 fn check_lanes(driver: &CheckedDriver, start: &VehicleState, road: &Road) -> Result<(), ConfigError> {
     match driver {
         CheckedDriver::Human(HumanDriver::Prescribed(prescribed)) => prescribed
@@ -242,7 +246,7 @@ fn check_lanes(driver: &CheckedDriver, start: &VehicleState, road: &Road) -> Res
     }
 }
 
-/// The place of the one actor with an ego stack.
+/// Returns the index of the only actor with an ego stack.
 fn only_ego(actors: &[Actor]) -> Result<usize, ConfigError> {
     let mut egos = actors.iter().enumerate().filter(|(_, actor)| matches!(actor.driver, CheckedDriver::Ego(_)));
     let needed = "exactly one actor with `driver = { ego-stack = … }`";

@@ -1,4 +1,4 @@
-//! A scenario as its file says it: text that is not checked yet.
+//! The contents of a scenario file, before they are checked.
 
 use closecall_controllers::{DriverConfig, LaneKeepingConfig, SpeedKeepingConfig};
 use closecall_scenarios::parameters::ParametersConfig;
@@ -9,40 +9,40 @@ use serde::{Deserialize, Serialize};
 
 use super::events::EventConfig;
 
-/// The version of the scenario file's layout that this program reads.
+/// The version of the scenario file format that this program reads.
 pub const SCHEMA_VERSION: u32 = 1;
 
 /// A scenario file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ScenarioConfig {
-    /// Version of the layout: 1.
+    /// Version of the file format: 1.
     pub schema_version: u32,
     /// Name: lower-case letters, digits and hyphens.
     pub name: String,
-    /// What the scenario asks, for people.
+    /// Description of the scenario, for readers.
     #[serde(default)]
     pub description: String,
-    /// Words to select and group scenarios by.
+    /// Tags by which scenarios are selected and grouped.
     #[serde(default)]
     pub tags: Vec<String>,
-    /// The requirements that the scenario is evidence for, such as `MIS-1`: reports say which of them are met.
+    /// Identifiers of the requirements that the scenario tests, such as `MIS-1`. Reports state which of them are met.
     #[serde(default)]
     pub requirements: Vec<String>,
-    /// Longest duration of a run [s].
+    /// Longest duration of a run (s).
     pub duration_s: Num,
     /// The road.
     pub road: RoadConfig,
-    /// Light, weather and surface; a clear, dry day where absent.
+    /// Light, weather and road surface. Default: a clear, dry day.
     #[serde(default)]
     pub environment: EnvironmentConfig,
-    /// The sampled values; everything else is fixed.
+    /// The parameters that are sampled. All other values are fixed.
     #[serde(default)]
     pub parameters: ParametersConfig,
-    /// The vehicles; exactly one has an ego stack for a driver.
+    /// The vehicles. Exactly one of them has an ego stack as its driver.
     #[serde(default, rename = "actor")]
     pub actors: Vec<ActorConfig>,
-    /// What E perceives with.
+    /// The ego's sensors.
     #[serde(default)]
     pub sensors: SensorsConfig,
 }
@@ -53,26 +53,26 @@ pub struct ScenarioConfig {
 pub struct ActorConfig {
     /// Name: lower-case letters, digits and hyphens.
     pub id: ActorId,
-    /// What it is.
+    /// Class, size and appearance.
     pub vehicle: VehicleConfig,
-    /// Where it starts.
+    /// Position and speed at the start.
     pub start: StartConfig,
-    /// Who drives it.
+    /// The driver: a human driver model, or the ego stack.
     pub driver: DriverConfig,
-    /// How a human driver weaves in its lane; not at all where absent.
+    /// How a human driver weaves in the lane. Default: it does not.
     pub lane_keeping: Option<LaneKeepingConfig>,
-    /// How the speed that a human driver wants wanders; not at all where absent.
+    /// How the desired speed of a human driver varies. Default: it is constant.
     pub speed_keeping: Option<SpeedKeepingConfig>,
-    /// What happens to it on the way.
+    /// Events that act on this vehicle during the run.
     #[serde(default, rename = "event")]
     pub events: Vec<EventConfig>,
 }
 
-/// Where a vehicle starts.
+/// Position and speed of a vehicle at the start.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum StartConfig {
-    /// At a place on the road.
+    /// At a position on the road.
     Absolute(AbsoluteStartConfig),
     /// Ahead of another actor.
     Ahead(RelativeStartConfig),
@@ -80,32 +80,33 @@ pub enum StartConfig {
     Behind(RelativeStartConfig),
 }
 
-/// A place on the road.
+/// A position on the road, and a speed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct AbsoluteStartConfig {
-    /// The lane, counted from 1 at the left.
+    /// The lane, counted from 1 for the leftmost lane.
     pub lane: Lane,
-    /// Position of the centre along the road [m].
+    /// Position of the vehicle's centre along the road (m).
     pub s_m: Num,
-    /// Speed [m/s].
+    /// Speed (m/s).
     pub speed_mps: Num,
 }
 
-/// A place relative to another actor: one of `gap-m` and `thw-s`, one of `speed-mps` and `closing-mps`.
+/// A position and a speed relative to another actor. Give exactly one of `gap-m` and `thw-s`, and exactly one of `speed-mps`
+/// and `closing-mps`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct RelativeStartConfig {
     /// The other actor.
     pub of: ActorId,
-    /// Gap between the two, bumper to bumper [m]; negative alongside, in another lane.
+    /// Gap between the two vehicles, bumper to bumper (m). It is negative if they overlap lengthwise in different lanes.
     pub gap_m: Option<Num>,
-    /// Time headway between the two [s]: of the other one where this starts ahead, of this one where it starts behind.
+    /// Time headway between the two vehicles (s), with the speed of the vehicle that is behind.
     pub thw_s: Option<Num>,
-    /// Speed [m/s].
+    /// Speed (m/s).
     pub speed_mps: Option<Num>,
-    /// Speed at which the gap closes [m/s].
+    /// Speed at which the gap closes (m/s).
     pub closing_mps: Option<Num>,
-    /// The lane, counted from 1 at the left; the other actor's where absent.
+    /// The lane, counted from 1 for the leftmost lane. Default: the lane of the other actor.
     pub lane: Option<Lane>,
 }

@@ -1,7 +1,7 @@
-//! Changes of single values from the command line: `--set key=value`.
+//! Changes single values of a scenario from the command line: `--set key=value`.
 //!
-//! A setting changes the text of the scenario, so that everything behind it (checking, hashing, the campaign's
-//! manifest, replay) sees one text and needs no second path.
+//! A setting changes the text of the scenario. All later steps (checking, hashing, the campaign's manifest, replay) thus
+//! work on one text and need no special case.
 
 use std::str::FromStr;
 
@@ -9,8 +9,8 @@ use toml_edit::{ArrayOfTables, DocumentMut, Formatted, InlineTable, Item, TableL
 
 /// One `key=value` from the command line.
 ///
-/// The key is a path of keys joined by dots. An actor is named by its id or its place (`actor.rear.…`, `actor.2.…`).
-/// A key without a dot that is the name of a parameter fixes that parameter: `brake-mps2=6`.
+/// The key is a path of keys joined by dots. An actor is identified by its id or by its index, from 0 (`actor.rear.…`,
+/// `actor.2.…`). A key without a dot that is the name of a parameter fixes that parameter: `brake-mps2=6`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Setting {
     key: Vec<String>,
@@ -20,13 +20,13 @@ pub struct Setting {
 /// A setting that cannot be applied.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SettingError {
-    /// Not of the form key=value.
+    /// The text is not of the form key=value.
     #[error("`{text}` is not of the form key=value")]
     Form {
         /// The text found.
         text: String,
     },
-    /// A number that is none.
+    /// The value is NaN or infinite.
     #[error("`{key}={value}`: a finite number is needed")]
     NotFinite {
         /// The key.
@@ -34,14 +34,14 @@ pub enum SettingError {
         /// The value found.
         value: String,
     },
-    /// The key leads nowhere.
+    /// The scenario has no such key.
     #[error("`{key}` leads nowhere: there is no {part}, only {known}")]
     NoSuchKey {
         /// The whole key.
         key: String,
         /// The part that was not found.
         part: String,
-        /// What there is instead.
+        /// The keys that exist there.
         known: String,
     },
 }
@@ -65,10 +65,10 @@ impl FromStr for Setting {
 }
 
 impl Setting {
-    /// Changes the value in `document`.
+    /// Sets the value in `document`.
     ///
     /// # Errors
-    /// [`SettingError::NoSuchKey`] where a part of the key other than the last does not exist.
+    /// [`SettingError::NoSuchKey`] if a part of the key other than the last one does not exist.
     pub(super) fn apply(&self, document: &mut DocumentMut) -> Result<(), SettingError> {
         let value = self.value();
         if let [name] = &self.key[..]
@@ -83,36 +83,36 @@ impl Setting {
             && !document.contains_key(name)
         {
             let parameters = document.get("parameters").and_then(Item::as_table_like).map(keys).unwrap_or_default();
-            return Err(self.lost(
+            return Err(self.no_such_key(
                 &format!("`{name}`"),
                 format!("the parameters {parameters} and the keys {}", keys(document.as_table())),
             ));
         }
-        let Some((last, way)) = self.key.split_last() else { return Ok(()) };
+        let Some((last, parents)) = self.key.split_last() else { return Ok(()) };
         let mut table: &mut dyn TableLike = document.as_table_mut();
-        let mut way = way.iter();
-        while let Some(part) = way.next() {
-            // Below the first level a table may be left out of the file; what it then holds is checked like the rest.
+        let mut parents = parents.iter();
+        while let Some(part) = parents.next() {
+            // Below the first level, a table that the file leaves out is created. Its content is checked like the rest.
             if !table.contains_key(part) && *part != self.key[0] {
                 table.insert(part, Item::Value(Value::InlineTable(InlineTable::new())));
             }
             let known = keys(table);
-            let item = table.get_mut(part).ok_or_else(|| self.lost(&format!("`{part}`"), known))?;
+            let item = table.get_mut(part).ok_or_else(|| self.no_such_key(&format!("`{part}`"), known))?;
             table = match item {
-                Item::ArrayOfTables(tables) => self.element(part, tables, way.next())?,
+                Item::ArrayOfTables(tables) => self.element(part, tables, parents.next())?,
                 item => item
                     .as_table_like_mut()
-                    .ok_or_else(|| self.lost(&format!("table `{part}`"), "a value".to_owned()))?,
+                    .ok_or_else(|| self.no_such_key(&format!("table `{part}`"), "a value".to_owned()))?,
             };
         }
         if table.get(last).is_some_and(Item::is_array_of_tables) {
-            return Err(self.lost(&format!("single `{last}`"), "a list of them".to_owned()));
+            return Err(self.no_such_key(&format!("single `{last}`"), "a list of them".to_owned()));
         }
         table.insert(last, Item::Value(value));
         Ok(())
     }
 
-    /// The element of an array of tables that the next part of the key names, by its id or by its place.
+    /// Returns the element of an array of tables that the next part of the key identifies, by its id or by its index.
     fn element<'a>(
         &self,
         array: &str,
@@ -121,23 +121,23 @@ impl Setting {
     ) -> Result<&'a mut dyn TableLike, SettingError> {
         let ids: Vec<String> =
             tables.iter().map(|table| table.get("id").and_then(Item::as_str).unwrap_or_default().to_owned()).collect();
-        let lost = || {
+        let not_found = || {
             let part = name.map_or_else(|| format!("single `{array}`"), |name| format!("`{name}`"));
-            self.lost(&part, format!("`{array}` with a name and a key: {}", ids.join(", ")))
+            self.no_such_key(&part, format!("`{array}` with a name and a key: {}", ids.join(", ")))
         };
-        let name = name.ok_or_else(lost)?;
-        let place = ids.iter().position(|id| id == name).or_else(|| name.parse().ok()).ok_or_else(lost)?;
-        match tables.get_mut(place) {
+        let name = name.ok_or_else(not_found)?;
+        let index = ids.iter().position(|id| id == name).or_else(|| name.parse().ok()).ok_or_else(not_found)?;
+        match tables.get_mut(index) {
             Some(table) => Ok(table),
-            None => Err(lost()),
+            None => Err(not_found()),
         }
     }
 
-    fn lost(&self, part: &str, known: String) -> SettingError {
+    fn no_such_key(&self, part: &str, known: String) -> SettingError {
         SettingError::NoSuchKey { key: self.key.join("."), part: part.to_owned(), known }
     }
 
-    /// The value as TOML; what is not TOML is taken for a word.
+    /// Returns the value as TOML. A text that is not valid TOML becomes a string.
     fn value(&self) -> Value {
         Value::from_str(&self.value).unwrap_or_else(|_| Value::String(Formatted::new(self.value.clone())))
     }
@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn a_value_is_changed_where_it_stands() {
+    fn a_value_is_changed_in_place() {
         assert!(set("duration-s=30").unwrap().starts_with("duration-s = 30\n[parameters]"));
         assert!(set("actor.rear.start.behind.gap-m=90").unwrap().contains("gap-m = 90"));
         assert!(set("actor.0.start.behind.gap-m=$gap").unwrap().contains("gap-m = \"$gap\""));
@@ -174,9 +174,9 @@ mod tests {
     }
 
     #[test]
-    fn what_leads_nowhere_is_refused() {
-        let lost = ["actor.front.id=1", "actor.7.id=1", "actor=3", "road.lanes=2", "duration-s.x=1", "brake=3"];
-        for text in ["nonsense", "=1", "a=", "duration-s=nan", "duration-s=-inf"].into_iter().chain(lost) {
+    fn an_invalid_setting_or_unknown_key_is_rejected() {
+        let unknown = ["actor.front.id=1", "actor.7.id=1", "actor=3", "road.lanes=2", "duration-s.x=1", "brake=3"];
+        for text in ["nonsense", "=1", "a=", "duration-s=nan", "duration-s=-inf"].into_iter().chain(unknown) {
             assert!(set(text).is_err(), "{text}");
         }
     }

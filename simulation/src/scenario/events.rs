@@ -1,4 +1,4 @@
-//! What happens to a vehicle on the way: a trigger, and what it sets off.
+//! Events that act on a vehicle during a run: a trigger, and its effect.
 
 use closecall_traffic::{ActorId, ConfigError, Num, Parameters, Range, Time, Vehicle, VehicleState};
 use schemars::JsonSchema;
@@ -11,42 +11,43 @@ use super::placement::find_actor;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct EventConfig {
-    /// Name, for the log.
+    /// Name, for logs and reports. It must be unique in the scenario.
     pub id: ActorId,
-    /// When it sets in. It sets in once.
+    /// When the event is triggered. An event is triggered at most once.
     pub when: TriggerConfig,
-    /// What it does.
+    /// The effect of the event.
     pub then: EffectConfig,
 }
 
-/// When an event sets in.
+/// When an event is triggered.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum TriggerConfig {
-    /// At a time after the start [s].
+    /// At a time after the start (s).
     AtS(Num),
-    /// At a time that follows from the start values alone, and is therefore the same whatever E does.
+    /// At a time that depends on the start values only, so that it is the same whatever the ego does.
     NominalEncounter(NominalEncounterConfig),
-    /// When the time headway of `from`, behind, to `to`, ahead in its lane, falls below a value.
+    /// When the time headway of the actor `from` to the actor `to`, ahead of it in its lane, falls below a value.
     ThwBelow(ThwBelowConfig),
     /// When an actor starts to change lanes in order to overtake.
     CutOutStarted(CutOutStartedConfig),
 }
 
-/// A time between the nominal arrival of `from` at 100 m behind `to` (phase 0) and 6 s after their nominal encounter
-/// (phase 1), both at the speeds of the start.
+/// A time relative to the nominal encounter of two actors, which would both keep their start speeds. Phase 0 is the time at
+/// which `from` would arrive 100 m behind `to`, or the start of the run if it starts closer. Phase 1 is 6 s after the time
+/// at which `from` would reach `to`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct NominalEncounterConfig {
-    /// The actor that comes up from behind.
+    /// The actor that approaches from behind.
     pub from: ActorId,
-    /// The actor that it comes up to.
+    /// The actor that it approaches.
     pub to: ActorId,
-    /// 0 to 1.
+    /// Phase between the two times, 0 to 1.
     pub phase: Num,
 }
 
-/// A time headway to fall below.
+/// A threshold of the time headway between two actors.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ThwBelowConfig {
@@ -54,7 +55,7 @@ pub struct ThwBelowConfig {
     pub from: ActorId,
     /// The actor ahead.
     pub to: ActorId,
-    /// Time headway [s].
+    /// Time headway below which the event is triggered (s).
     pub thw_s: Num,
 }
 
@@ -64,15 +65,15 @@ pub struct ThwBelowConfig {
 pub struct CutOutStartedConfig {
     /// The actor that changes lanes.
     pub actor: ActorId,
-    /// How long after the start of its lane change [s]; at once where absent.
+    /// Delay after the start of the lane change (s). Default: 0.
     pub delay_s: Option<Num>,
 }
 
-/// What an event does to its actor.
+/// The effect of an event on its actor.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum EffectConfig {
-    /// Braking at a constant deceleration to a speed, which is then kept.
+    /// Braking at a constant deceleration to a final speed, which is then kept.
     Brake(BrakeConfig),
 }
 
@@ -80,9 +81,9 @@ pub enum EffectConfig {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct BrakeConfig {
-    /// Deceleration [m/s²].
+    /// Deceleration (m/s²).
     pub deceleration_mps2: Num,
-    /// Speed to brake to [m/s]; 0 where absent.
+    /// Final speed (m/s). Default: 0.
     pub to_speed_mps: Option<Num>,
 }
 
@@ -94,7 +95,7 @@ pub(crate) struct Event {
     pub(crate) then: Brake,
 }
 
-/// A checked trigger; actors by their places in the list.
+/// A checked trigger. Actors are indices into the list of actors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Trigger {
     At(Time),
@@ -102,21 +103,21 @@ pub(crate) enum Trigger {
     CutOutStarted { actor: usize, delay: Time },
 }
 
-/// Braking at a constant deceleration to a speed.
+/// Checked braking at a constant deceleration to a final speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Brake {
     pub(crate) deceleration_mps2: f64,
     pub(crate) to_speed_mps: f64,
 }
 
-/// R's distance behind E at which the paper's encounter begins [m].
+/// Gap of the rear vehicle to the ego at which the paper's encounter begins (m).
 const ENCOUNTER_BEGINS_M: f64 = 100.0;
-/// How long after the nominal encounter phase 1 lies [s].
+/// Time from the nominal encounter to phase 1 (s).
 const AFTER_ENCOUNTER_S: f64 = 6.0;
-/// Slowest approach that has a nominal encounter [m/s].
+/// Closing speed above which there is a nominal encounter (m/s).
 const SLOWEST_APPROACH_MPS: f64 = 0.1;
 
-/// What a trigger may refer to.
+/// The actors at the start of a run, to which a trigger may refer. All slices are in the order of the actors.
 pub(super) struct Start<'a> {
     pub(super) actors: &'a [ActorConfig],
     pub(super) vehicles: &'a [Vehicle],
@@ -124,6 +125,7 @@ pub(super) struct Start<'a> {
 }
 
 impl EventConfig {
+    /// Checks the trigger and the effect.
     pub(super) fn check(&self, start: &Start<'_>, parameters: &Parameters) -> Result<Event, ConfigError> {
         Ok(Event {
             id: self.id.clone(),
@@ -176,7 +178,7 @@ fn nominal_time(
     let to = find_actor(start.actors, &config.to, "to")?;
     let phase = parameters.number(&config.phase, "phase", Range::UNIT)?;
     let closing_mps = start.states[from].speed_mps - start.states[to].speed_mps;
-    // A vehicle that does not come up has no nominal encounter.
+    // A vehicle that does not approach has no nominal encounter.
     Range::above(SLOWEST_APPROACH_MPS, 100.0).check(closing_mps, "from")?;
     let half_lengths_m = 0.5 * (start.vehicles[from].dimensions.length_m + start.vehicles[to].dimensions.length_m);
     let gap_m = start.states[to].s_m - start.states[from].s_m - half_lengths_m;

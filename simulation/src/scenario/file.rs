@@ -1,4 +1,4 @@
-//! Reading a scenario file, and saying precisely what is wrong with it.
+//! Reads scenario files. Errors name the file, the line, the key, and what is allowed.
 
 use std::path::{Path, PathBuf};
 
@@ -11,13 +11,13 @@ use super::edit::{Setting, SettingError};
 use super::recorded::RecordedError;
 use super::{Scenario, ScenarioConfig, locate, recorded};
 
-/// How many random samples `check` tries beside the nominal values and the bounds.
-const TRIED_SAMPLES: u64 = 64;
+/// Number of random samples that `check` checks in addition to the nominal values and the bounds.
+const CHECKED_SAMPLES: u64 = 64;
 
-/// A scenario file that cannot be used. Nothing has been run.
+/// A scenario file that cannot be used. No run has been started.
 #[derive(Debug, thiserror::Error)]
 pub enum ScenarioError {
-    /// It cannot be read.
+    /// The file cannot be read.
     #[error("failed to read {}: {source}", path.display())]
     Read {
         /// The file.
@@ -25,7 +25,7 @@ pub enum ScenarioError {
         /// The system's reason.
         source: std::io::Error,
     },
-    /// It is not text.
+    /// The file is not UTF-8 text.
     #[error("failed to read {}: line {line} is not UTF-8 text; a scenario is a TOML file", path.display())]
     NotText {
         /// The file.
@@ -33,13 +33,13 @@ pub enum ScenarioError {
         /// The first line that is not text, counted from 1.
         line: usize,
     },
-    /// It has no content.
+    /// The file is empty.
     #[error("failed to read {}: the file is empty; a scenario needs at least `schema-version`, `name`, `duration-s`, `road` and actors", path.display())]
     Empty {
         /// The file.
         path: PathBuf,
     },
-    /// It is not TOML, or has a key or a value that does not belong there.
+    /// The file is not valid TOML, or has an unknown key or a value of the wrong type.
     #[error("failed to read {}:{line}: {message}", path.display())]
     Syntax {
         /// The file.
@@ -49,24 +49,24 @@ pub enum ScenarioError {
         /// What is wrong and what is allowed.
         message: String,
     },
-    /// A value is out of range, or contradicts another.
+    /// A value is out of range, or contradicts another value.
     #[error("failed to check {}{}: {source}{at}", path.display(), line.map(|line| format!(":{line}")).unwrap_or_default())]
     Value {
         /// The file.
         path: PathBuf,
-        /// The line, counted from 1, where the key stands in the file.
+        /// The line of the key, counted from 1, or `None` if the file does not contain the key.
         line: Option<usize>,
         /// The key and what is wrong with it.
         source: Box<ConfigError>,
-        /// The parameters with which it goes wrong, where it depends on them.
+        /// The parameter values for which the check failed; empty if there are no parameters.
         at: String,
     },
-    /// A `--set` that cannot be applied.
+    /// A setting (`--set`) cannot be applied.
     #[error("failed to apply --set to {}: {source}", path.display())]
     Set {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The error of the setting.
         source: SettingError,
     },
 }
@@ -82,10 +82,11 @@ pub struct ScenarioFile {
 }
 
 impl ScenarioFile {
-    /// Reads a file, changes it by `settings`, and checks its keys.
+    /// Reads a file, applies `settings` to it, and checks its keys.
     ///
     /// # Errors
-    /// [`ScenarioError`] names the file, the line, the key, and what is allowed.
+    /// [`ScenarioError`] if the file cannot be read or parsed, if a setting cannot be applied, or if a distribution is
+    /// invalid.
     pub fn load(path: &Path, settings: &[Setting]) -> Result<Self, ScenarioError> {
         let bytes = std::fs::read(path).map_err(|source| ScenarioError::Read { path: path.to_owned(), source })?;
         let text = String::from_utf8(bytes).map_err(|error| {
@@ -95,18 +96,19 @@ impl ScenarioFile {
         Self::parse(path, &text, settings)
     }
 
-    /// The same for a text that is at hand; `path` serves messages.
+    /// Parses the text of a scenario file, applies `settings` to it, and checks its keys. `path` appears in error messages,
+    /// and trajectory files are found relative to its folder.
     ///
     /// # Errors
-    /// As [`Self::load`].
+    /// [`ScenarioError`], as for [`Self::load`].
     pub fn parse(path: &Path, text: &str, settings: &[Setting]) -> Result<Self, ScenarioError> {
         if text.trim().is_empty() {
             return Err(ScenarioError::Empty { path: path.to_owned() });
         }
-        // The text as it stands is read first, so that errors in the file have the file's own lines.
+        // The unchanged text is parsed first, so that errors in the file have the line numbers of the file.
         let mut config = deserialize(path, text)?;
-        // A setting may replace the only use of a parameter: only what the file itself leaves unused is a slip.
-        let unused = unused(&config, text);
+        // A setting may replace the only use of a parameter. Only a parameter that the file itself does not use is a mistake.
+        let unused = unused_parameters(&config, text);
         let mut text = text.to_owned();
         if !settings.is_empty() {
             text = apply(path, &text, settings)?;
@@ -126,41 +128,41 @@ impl ScenarioFile {
         Ok(Self { path: path.to_owned(), text, config, space, unused })
     }
 
-    /// The file's path, as given.
+    /// Returns the path of the file, as given.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The scenario's text, all settings applied.
+    /// Returns the text of the scenario, with all settings applied.
     pub fn text(&self) -> &str {
         &self.text
     }
 
-    /// The scenario as it is written.
+    /// Returns the contents of the file, with all settings applied.
     pub fn config(&self) -> &ScenarioConfig {
         &self.config
     }
 
-    /// The distributions of its parameters.
+    /// Returns the distributions of the parameters.
     pub fn space(&self) -> &ParameterSpace {
         &self.space
     }
 
-    /// Parameters that are sampled although no value of the file names them: most likely a slip.
+    /// Returns the parameters that no value of the file uses, which is most likely a mistake.
     pub fn unused_parameters(&self) -> &[ParameterName] {
         &self.unused
     }
 
-    /// The name of E, or nothing where no actor has an ego stack.
+    /// Returns the name of the ego, or `None` if no actor has an ego stack.
     pub fn ego_id(&self) -> Option<&ActorId> {
         let is_ego = |driver: &_| matches!(driver, closecall_controllers::DriverConfig::EgoStack(_));
         self.config.actors.iter().find(|actor| is_ego(&actor.driver)).map(|actor| &actor.id)
     }
 
-    /// The concrete scenario with these parameters.
+    /// Returns the concrete scenario with these parameter values.
     ///
     /// # Errors
-    /// [`ScenarioError::Value`] where a value is out of range or contradicts another.
+    /// [`ScenarioError::Value`] if a value is out of range or contradicts another value.
     pub fn concrete(&self, parameters: &Parameters) -> Result<Scenario, ScenarioError> {
         self.config.check(parameters).map_err(|source| {
             let line = locate::line_of(&self.text, &source.path);
@@ -168,17 +170,17 @@ impl ScenarioFile {
         })
     }
 
-    /// Checks the scenario with the median of every parameter, with each parameter at both of its bounds, and with 64
+    /// Checks the scenario with the median of every parameter, with each parameter at each of its bounds, and with 64
     /// random samples.
     ///
     /// # Errors
-    /// The first of these that is not a valid scenario.
+    /// [`ScenarioError::Value`] for the first of these scenarios that is not valid.
     pub fn check(&self) -> Result<(), ScenarioError> {
         for parameters in self.space.extremes() {
             self.concrete(&parameters)?;
         }
-        for index in 0..TRIED_SAMPLES {
-            self.concrete(&self.space.sample(Design::Random, 0, index, TRIED_SAMPLES))?;
+        for index in 0..CHECKED_SAMPLES {
+            self.concrete(&self.space.sample(Design::Random, 0, index, CHECKED_SAMPLES))?;
         }
         Ok(())
     }
@@ -201,7 +203,7 @@ fn apply(path: &Path, text: &str, settings: &[Setting]) -> Result<String, Scenar
     Ok(document.to_string())
 }
 
-/// An error at the first line that speaks of a recording.
+/// Converts an error of recorded traffic. Its line is the first one that contains `recorded`.
 fn recorded_error(path: &Path, text: &str, error: &RecordedError) -> ScenarioError {
     let line = text.lines().position(|line| line.contains("recorded")).map_or(1, |index| index + 1);
     ScenarioError::Syntax { path: path.to_owned(), line, message: format!("`recorded`: {error}") }
@@ -212,13 +214,13 @@ fn deserialize(path: &Path, text: &str) -> Result<ScenarioConfig, ScenarioError>
         let offset = error.span().map_or(0, |span| span.start);
         let line = locate::line_at(text, offset);
         let named = key_at(text, offset).map(|key| format!("`{key}`: ")).unwrap_or_default();
-        let message = format!("{named}{}", in_plain_words(error.message()));
+        let message = format!("{named}{}", without_rust_types(error.message()));
         ScenarioError::Syntax { path: path.to_owned(), line, message }
     })
 }
 
-/// The parameters that are sampled although no value names them.
-fn unused(config: &ScenarioConfig, text: &str) -> Vec<ParameterName> {
+/// Returns the parameters that no value uses.
+fn unused_parameters(config: &ScenarioConfig, text: &str) -> Vec<ParameterName> {
     let Ok(document) = toml::from_str::<toml::Table>(text) else { return Vec::new() };
     let mut used = Vec::new();
     for (_, value) in document.iter().filter(|(key, _)| *key != "parameters") {
@@ -227,7 +229,7 @@ fn unused(config: &ScenarioConfig, text: &str) -> Vec<ParameterName> {
     config.parameters.0.keys().filter(|name| !used.contains(&name.as_str())).cloned().collect()
 }
 
-/// Appends the names of the parameters that stand for values somewhere in `value`.
+/// Appends the names of all parameters that `value` uses.
 fn append_names<'a>(value: &'a toml::Value, names: &mut Vec<&'a str>) {
     match value {
         toml::Value::String(text) => names.extend(text.strip_prefix('$')),
@@ -237,8 +239,8 @@ fn append_names<'a>(value: &'a toml::Value, names: &mut Vec<&'a str>) {
     }
 }
 
-/// The deserialiser's message without the names of this program's types.
-fn in_plain_words(message: &str) -> String {
+/// Returns the deserialiser's message without the names of Rust types.
+fn without_rust_types(message: &str) -> String {
     const WORDS: [(&str, &str); 5] = [
         ("u8", "a whole number from 0 to 255"),
         ("u32", "a whole number, 0 or more"),
@@ -255,7 +257,7 @@ fn in_plain_words(message: &str) -> String {
     }
 }
 
-/// The key that a byte offset lies in or behind, on its line, for messages that have only a position.
+/// Returns the key at a byte offset, or the last key before it on its line, for messages that have only a position.
 fn key_at(text: &str, offset: usize) -> Option<String> {
     let offset = offset.min(text.len());
     let start = text[..offset].rfind(['\n', '{', ',']).map_or(0, |delimiter| delimiter + 1);

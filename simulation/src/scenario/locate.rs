@@ -1,34 +1,36 @@
-//! Where in a file's text a key stands.
+//! Finds the line of a key in the text of a file.
 
 use closecall_traffic::{KeyPath, Segment};
 use toml_edit::{Document, Item, Table, TableLike, Value};
 
-/// The line, counted from 1, of the deepest part of `path` that the text has.
+/// Returns the line, counted from 1, of the deepest part of `path` that the text contains. Returns `None` if the text
+/// contains no part of it.
 pub(super) fn line_of(text: &str, path: &KeyPath) -> Option<usize> {
     let document = Document::parse(text).ok()?;
-    let mut place = Place::Item(document.as_item());
+    let mut node = Node::Item(document.as_item());
     let mut offset = None;
     for segment in &path.0 {
-        let Some((next, at)) = place.descend(segment) else { break };
+        let Some((next, at)) = node.descend(segment) else { break };
         offset = at.or(offset);
-        place = next;
+        node = next;
     }
     offset.map(|offset| line_at(text, offset))
 }
 
-/// The line, counted from 1, of a byte offset.
+/// Returns the line, counted from 1, of a byte offset.
 pub(super) fn line_at(text: &str, offset: usize) -> usize {
     text.bytes().take(offset).filter(|byte| *byte == b'\n').count() + 1
 }
 
-enum Place<'a> {
+/// A node of the parsed text.
+enum Node<'a> {
     Item(&'a Item),
     Table(&'a Table),
     Value(&'a Value),
 }
 
-impl<'a> Place<'a> {
-    /// What lies one segment further, and where in the text.
+impl<'a> Node<'a> {
+    /// Returns the node that `segment` identifies below this one, and its byte offset if it is known.
     fn descend(&self, segment: &Segment) -> Option<(Self, Option<usize>)> {
         match segment {
             Segment::Key(key) => {
@@ -95,7 +97,7 @@ then = { brake = { deceleration-mps2 = -1 } }
     }
 
     #[test]
-    fn what_is_missing_is_found_at_the_table_that_should_have_it() {
+    fn a_missing_key_is_located_at_the_table_that_should_contain_it() {
         assert_eq!(line(&["actor", "1", "vehicle"]), Some(5));
         assert_eq!(line(&["duration-s"]), None);
     }

@@ -1,12 +1,12 @@
-//! Scenarios: from the text of a file to one concrete situation.
+//! Scenarios: from the text of a file to one concrete scenario.
 //!
 //! ```text
 //!  file ─▶ ScenarioFile ─(parameters of one sample)─▶ Scenario ─▶ simulation
-//!            text, checked keys                          numbers, checked ranges
+//!          text, checked keys                         numbers, checked ranges
 //! ```
 //!
-//! A scenario file describes a *logical* scenario: values that are fixed, and parameters that are sampled. With the
-//! parameters of one sample it becomes a *concrete* one, [`Scenario`], which cannot be invalid.
+//! A scenario file describes a *logical* scenario: fixed values, and parameters that are sampled. The parameter values of
+//! one sample turn it into a *concrete* scenario, [`Scenario`], which is valid by construction.
 
 mod checked;
 mod config;

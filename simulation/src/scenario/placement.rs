@@ -1,38 +1,41 @@
-//! Where the vehicles are when a run starts.
+//! Computes the states of the vehicles at the start of a run.
 
 use closecall_traffic::{ActorId, ConfigError, Lane, Num, Parameters, Problem, Range, Road, Vehicle, VehicleState};
 
 use super::config::{ActorConfig, RelativeStartConfig, StartConfig};
 
 const SPEED_RANGE_MPS: Range = Range::closed(0.0, 80.0);
-const PLACE_RANGE_M: Range = Range::closed(-10_000.0, 100_000.0);
+const POSITION_RANGE_M: Range = Range::closed(-10_000.0, 100_000.0);
 const GAP_RANGE_M: Range = Range::closed(-50.0, 1_000.0);
 const THW_RANGE_S: Range = Range::closed(0.0, 60.0);
 const CLOSING_RANGE_MPS: Range = Range::closed(-60.0, 60.0);
 
-/// The state of every actor at time zero, in the order of the actors.
-pub(super) fn place(
+/// Returns the state of every actor at time zero, in the order of the actors.
+///
+/// # Errors
+/// [`ConfigError`] if a value is out of range, if positions depend on each other in a cycle, or if vehicles overlap.
+pub(super) fn initial_states(
     actors: &[ActorConfig],
     vehicles: &[Vehicle],
     road: &Road,
     parameters: &Parameters,
 ) -> Result<Vec<VehicleState>, ConfigError> {
     let mut placed: Vec<Option<VehicleState>> = vec![None; actors.len()];
-    // Each round places the actors whose reference is placed; a round that places nobody has met a circle.
+    // Each round places the actors whose reference has been placed. A round that places no actor has found a cycle.
     while placed.iter().any(Option::is_none) {
         let before = placed.iter().flatten().count();
         for (index, actor) in actors.iter().enumerate() {
             if placed[index].is_none() {
-                let placing = Placing { actors, vehicles, road, parameters, placed: &placed };
-                placed[index] = placing.state(index, actor).map_err(|error| at(index, error))?;
+                let placement = Placement { actors, vehicles, road, parameters, placed: &placed };
+                placed[index] = placement.state(index, actor).map_err(|error| at(index, error))?;
             }
         }
         if placed.iter().flatten().count() == before {
-            return Err(circle(actors, &placed));
+            return Err(cycle_error(actors, &placed));
         }
     }
     let states: Vec<VehicleState> = placed.into_iter().flatten().collect();
-    refuse_overlaps(actors, vehicles, road, &states)?;
+    reject_overlaps(actors, vehicles, road, &states)?;
     Ok(states)
 }
 
@@ -40,7 +43,8 @@ fn at(index: usize, error: ConfigError) -> ConfigError {
     error.within("start").within_index(index).within("actor")
 }
 
-fn circle(actors: &[ActorConfig], placed: &[Option<VehicleState>]) -> ConfigError {
+/// Returns the error that the position of an actor depends on itself.
+fn cycle_error(actors: &[ActorConfig], placed: &[Option<VehicleState>]) -> ConfigError {
     let index = placed.iter().position(Option::is_none).unwrap_or_default();
     let rule = format!("where `{}` starts depends on where it starts itself", actors[index].id);
     let key = match actors[index].start {
@@ -50,7 +54,8 @@ fn circle(actors: &[ActorConfig], placed: &[Option<VehicleState>]) -> ConfigErro
     at(index, ConfigError::new("of", Problem::Contradiction { other: "start", rule }).within(key))
 }
 
-fn refuse_overlaps(
+/// Returns an error if two vehicles overlap.
+fn reject_overlaps(
     actors: &[ActorConfig],
     vehicles: &[Vehicle],
     road: &Road,
@@ -73,23 +78,25 @@ fn refuse_overlaps(
     Ok(())
 }
 
-struct Placing<'a> {
+/// The data from which the state of an actor is computed. All slices are in the order of the actors.
+struct Placement<'a> {
     actors: &'a [ActorConfig],
     vehicles: &'a [Vehicle],
     road: &'a Road,
     parameters: &'a Parameters,
+    /// The states that are known so far.
     placed: &'a [Option<VehicleState>],
 }
 
-impl Placing<'_> {
-    /// The state of one actor, or nothing where its reference is not placed yet.
+impl Placement<'_> {
+    /// Returns the state of one actor, or `None` if its reference has not been placed yet.
     fn state(&self, index: usize, actor: &ActorConfig) -> Result<Option<VehicleState>, ConfigError> {
         match &actor.start {
             StartConfig::Absolute(start) => {
                 let number =
                     |num, key, range| self.parameters.number(num, key, range).map_err(|error| error.within("absolute"));
                 let d_m = self.lane_centre_m(start.lane).map_err(|error| error.within("absolute"))?;
-                let s_m = number(&start.s_m, "s-m", PLACE_RANGE_M)?;
+                let s_m = number(&start.s_m, "s-m", POSITION_RANGE_M)?;
                 let speed_mps = number(&start.speed_mps, "speed-mps", SPEED_RANGE_MPS)?;
                 Ok(Some(VehicleState { s_m, d_m, speed_mps, ..VehicleState::default() }))
             }
@@ -98,27 +105,32 @@ impl Placing<'_> {
         }
     }
 
+    /// Returns the state of an actor relative to its reference. `direction` is 1 if the actor is ahead, -1 if it is behind.
     fn relative(
         &self,
         index: usize,
         start: &RelativeStartConfig,
-        side: f64,
+        direction: f64,
     ) -> Result<Option<VehicleState>, ConfigError> {
         let other = self.find(&start.of)?;
         let Some(reference) = self.placed[other] else { return Ok(None) };
-        // Ahead the gap closes while the other is faster, behind while this one is.
-        let speed_mps = match exactly_one(&start.speed_mps, &start.closing_mps, ["speed-mps", "closing-mps"])? {
-            (key, num, true) => self.parameters.number(num, key, SPEED_RANGE_MPS)?,
-            (key, num, false) => {
-                let closing_mps = self.parameters.number(num, key, CLOSING_RANGE_MPS)?;
-                SPEED_RANGE_MPS.check(reference.speed_mps - side * closing_mps, key)?
+        // The gap closes if the vehicle that is behind is faster.
+        let speed = Alternative { key: "speed-mps", value: start.speed_mps.as_ref() };
+        let closing = Alternative { key: "closing-mps", value: start.closing_mps.as_ref() };
+        let speed_mps = match exactly_one(speed, closing, "one of `speed-mps` and `closing-mps`")? {
+            Given::First(num) => self.parameters.number(num, speed.key, SPEED_RANGE_MPS)?,
+            Given::Second(num) => {
+                let closing_mps = self.parameters.number(num, closing.key, CLOSING_RANGE_MPS)?;
+                SPEED_RANGE_MPS.check(reference.speed_mps - direction * closing_mps, closing.key)?
             }
         };
-        let gap_m = match exactly_one(&start.gap_m, &start.thw_s, ["gap-m", "thw-s"])? {
-            (key, num, true) => self.parameters.number(num, key, GAP_RANGE_M)?,
-            (key, num, false) => {
-                let follower_mps = if side > 0.0 { reference.speed_mps } else { speed_mps };
-                self.parameters.number(num, key, THW_RANGE_S)? * follower_mps
+        let gap = Alternative { key: "gap-m", value: start.gap_m.as_ref() };
+        let thw = Alternative { key: "thw-s", value: start.thw_s.as_ref() };
+        let gap_m = match exactly_one(gap, thw, "one of `gap-m` and `thw-s`")? {
+            Given::First(num) => self.parameters.number(num, gap.key, GAP_RANGE_M)?,
+            Given::Second(num) => {
+                let follower_mps = if direction > 0.0 { reference.speed_mps } else { speed_mps };
+                self.parameters.number(num, thw.key, THW_RANGE_S)? * follower_mps
             }
         };
         let half_lengths_m =
@@ -127,7 +139,7 @@ impl Placing<'_> {
             Some(lane) => self.lane_centre_m(lane)?,
             None => reference.d_m,
         };
-        let s_m = reference.s_m + side * (gap_m + half_lengths_m);
+        let s_m = reference.s_m + direction * (gap_m + half_lengths_m);
         Ok(Some(VehicleState { s_m, d_m, speed_mps, ..VehicleState::default() }))
     }
 
@@ -145,7 +157,7 @@ impl Placing<'_> {
     }
 }
 
-/// The place of the actor that `key` names.
+/// Returns the index of the actor `id`. `key` is the key of the scenario file that names it.
 pub(super) fn find_actor(actors: &[ActorConfig], id: &ActorId, key: &str) -> Result<usize, ConfigError> {
     actors.iter().position(|actor| actor.id == *id).ok_or_else(|| {
         let known = actors.iter().map(|actor| format!("`{}`", actor.id)).collect::<Vec<_>>().join(", ");
@@ -153,23 +165,32 @@ pub(super) fn find_actor(actors: &[ActorConfig], id: &ActorId, key: &str) -> Res
     })
 }
 
-/// The one of two keys that is given: its name, its value, and whether it is the first.
+/// One of two keys of which exactly one must be given.
+#[derive(Clone, Copy)]
+struct Alternative<'a> {
+    key: &'static str,
+    value: Option<&'a Num>,
+}
+
+/// The value of the alternative that is given.
+enum Given<'a> {
+    First(&'a Num),
+    Second(&'a Num),
+}
+
+/// Returns the value of the only alternative that is given. `needed` describes the two in the error if none is.
 fn exactly_one<'a>(
-    first: &'a Option<Num>,
-    second: &'a Option<Num>,
-    keys: [&'static str; 2],
-) -> Result<(&'static str, &'a Num, bool), ConfigError> {
-    match (first, second) {
-        (Some(num), None) => Ok((keys[0], num, true)),
-        (None, Some(num)) => Ok((keys[1], num, false)),
+    first: Alternative<'a>,
+    second: Alternative<'a>,
+    needed: &'static str,
+) -> Result<Given<'a>, ConfigError> {
+    match (first.value, second.value) {
+        (Some(num), None) => Ok(Given::First(num)),
+        (None, Some(num)) => Ok(Given::Second(num)),
         (Some(_), Some(_)) => {
             let rule = "only one of the two may be given".to_owned();
-            Err(ConfigError::new(keys[0], Problem::Contradiction { other: keys[1], rule }))
+            Err(ConfigError::new(first.key, Problem::Contradiction { other: second.key, rule }))
         }
-        (None, None) => {
-            let needed =
-                if keys[0] == "gap-m" { "one of `gap-m` and `thw-s`" } else { "one of `speed-mps` and `closing-mps`" };
-            Err(ConfigError::new(keys[0], Problem::Missing { needed }))
-        }
+        (None, None) => Err(ConfigError::new(first.key, Problem::Missing { needed })),
     }
 }

@@ -1,7 +1,7 @@
-//! Drivers that follow a recorded vehicle: the track is read together with the scenario file.
+//! Drivers that follow a vehicle of recorded traffic. The vehicle's track is read together with the scenario file.
 //!
-//! The track's times and speeds take the place of `recorded` in the scenario's text. Everything behind it (checking,
-//! hashing, a campaign's manifest, replay) sees a profile like any other, and needs the recording no more.
+//! The times and speeds of the track replace `recorded` in the text of the scenario. All later steps (checking, hashing, a
+//! campaign's manifest, replay) work on an ordinary speed profile and do not need the trajectory file.
 
 use std::path::Path;
 
@@ -12,30 +12,30 @@ use toml_edit::{Array, DocumentMut, Item, TableLike, Value};
 
 use super::ScenarioConfig;
 
-/// Why a recorded profile cannot be used.
+/// Why a recorded speed profile cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum RecordedError {
-    /// The recording cannot be read.
+    /// The trajectory file cannot be read.
     #[error("`{actor}` follows a recording: {message}")]
     Recording {
         /// The actor.
         actor: String,
-        /// What is wrong with the recording.
+        /// What is wrong with the trajectory file.
         message: String,
     },
-    /// It has no such track.
+    /// The trajectory file has no such track.
     #[error("`{actor}` follows track {track_id} of {file}, which has {known}")]
     NoSuchTrack {
         /// The actor.
         actor: String,
         /// The track asked for.
         track_id: u64,
-        /// The recording.
+        /// The trajectory file.
         file: String,
-        /// What the recording has.
+        /// The tracks that the file has.
         known: String,
     },
-    /// The place in the text cannot be changed.
+    /// The actor is written in a form in which the text cannot be changed.
     #[error("`{actor}` follows a recording, which needs actors written as [[actor]] and `driver` as a table")]
     Form {
         /// The actor.
@@ -43,13 +43,14 @@ pub(super) enum RecordedError {
     },
 }
 
-/// The text with every `recorded` replaced by its profile, or nothing where there is none.
+/// Returns the text with every `recorded` replaced by its speed profile, or `None` if there is no `recorded`. `path` is the
+/// path of the scenario file.
 pub(super) fn inline(path: &Path, text: &str, config: &ScenarioConfig) -> Result<Option<String>, RecordedError> {
     let mut document: Option<DocumentMut> = None;
     for (index, actor) in config.actors.iter().enumerate() {
         let DriverConfig::Prescribed(prescribed) = &actor.driver else { continue };
         let Some(recorded) = &prescribed.recorded else { continue };
-        let profile = profile(path, actor.id.as_str(), recorded)?;
+        let profile = speed_profile(path, actor.id.as_str(), recorded)?;
         let form = || RecordedError::Form { actor: actor.id.to_string() };
         if document.is_none() {
             document = Some(text.parse().map_err(|_| form())?);
@@ -66,9 +67,9 @@ fn prescribed_table(document: &mut DocumentMut, index: usize) -> Option<&mut dyn
     actor.get_mut("driver")?.as_table_like_mut()?.get_mut("prescribed")?.as_table_like_mut()
 }
 
-/// Pairs of the run's time and the recorded speed.
-fn profile(scenario: &Path, actor: &str, recorded: &RecordedConfig) -> Result<Array, RecordedError> {
-    let trajectory = track(scenario, actor, recorded)?;
+/// Returns pairs of a time of the run (s) and the recorded speed (m/s).
+fn speed_profile(scenario: &Path, actor: &str, recorded: &RecordedConfig) -> Result<Array, RecordedError> {
+    let trajectory = read_track(scenario, actor, recorded)?;
     let begin = trajectory.points.first().map(|point| point.time).unwrap_or_default();
     let from_s = recorded.from_s.unwrap_or(0.0);
     let mut profile = Array::new();
@@ -79,22 +80,23 @@ fn profile(scenario: &Path, actor: &str, recorded: &RecordedConfig) -> Result<Ar
     Ok(profile)
 }
 
-fn track(scenario: &Path, actor: &str, recorded: &RecordedConfig) -> Result<Trajectory, RecordedError> {
+/// Reads the track that `recorded` names.
+fn read_track(scenario: &Path, actor: &str, recorded: &RecordedConfig) -> Result<Trajectory, RecordedError> {
     let path = scenario.parent().unwrap_or(Path::new("")).join(&recorded.file);
-    let broken = |message: String| RecordedError::Recording { actor: actor.to_owned(), message };
-    let mut known: Option<(u64, u64)> = None;
+    let read_error = |message: String| RecordedError::Recording { actor: actor.to_owned(), message };
+    let mut first_and_last_id: Option<(u64, u64)> = None;
     let mut tracks = 0_u64;
-    for track in open(&path, ReadOptions::default()).map_err(|error| broken(error.to_string()))? {
-        let trajectory = track.map_err(|error| broken(error.to_string()))?.trajectory;
+    for track in open(&path, ReadOptions::default()).map_err(|error| read_error(error.to_string()))? {
+        let trajectory = track.map_err(|error| read_error(error.to_string()))?.trajectory;
         if trajectory.track_id == recorded.track_id {
             return Ok(trajectory);
         }
         tracks += 1;
-        let (least, most) = known.unwrap_or((trajectory.track_id, trajectory.track_id));
-        known = Some((least.min(trajectory.track_id), most.max(trajectory.track_id)));
+        let (first, last) = first_and_last_id.unwrap_or((trajectory.track_id, trajectory.track_id));
+        first_and_last_id = Some((first.min(trajectory.track_id), last.max(trajectory.track_id)));
     }
-    let known =
-        known.map_or_else(|| "no tracks".to_owned(), |(least, most)| format!("{tracks} tracks from {least} to {most}"));
+    let known = first_and_last_id
+        .map_or_else(|| "no tracks".to_owned(), |(first, last)| format!("{tracks} tracks from {first} to {last}"));
     let (track_id, file) = (recorded.track_id, recorded.file.clone());
     Err(RecordedError::NoSuchTrack { actor: actor.to_owned(), track_id, file, known })
 }

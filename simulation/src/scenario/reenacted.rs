@@ -1,16 +1,20 @@
-//! A scenario made from a recorded encounter: everyone starts where and as fast as recorded, and E has the ego stack.
+//! Makes a scenario from a recorded encounter. Every vehicle starts at its recorded position and speed, in the middle of its
+//! lane; the ego is driven by the ego stack.
 //!
-//! | who | drives |
+//! | vehicle | driver |
 //! |---|---|
-//! | E | the ego stack: time gap and set speed are those that the recorded driver kept |
-//! | F | as recorded: speeds, and lane changes at their times (`prescribed`) |
-//! | R | [`RearDriver`] |
-//! | who stays ahead of R in another lane | as recorded |
-//! | who stays behind R in the lane it changes to | follows by Wiedemann 99 at the highest speed recorded of it |
+//! | ego | the ego stack, with the time gap and the set speed that the recorded driver kept |
+//! | lead vehicle | recorded speeds and lane changes at their recorded times (`prescribed`) |
+//! | rear vehicle | [`RearDriver`] |
+//! | a vehicle that stays ahead of the rear vehicle in another lane | recorded speeds (`prescribed`) |
+//! | a vehicle that stays behind the rear vehicle in the lane that this changes to | Wiedemann 99, with the highest recorded speed as desired speed |
 //!
-//! Not simulated are all others: those in E's lane, of whom those behind would drive into E where E brakes; those who
-//! change lanes, into gaps that are elsewhere now; those who come into view later, and those who would overlap with
-//! another in the middle of a lane. Everyone starts in the middle of its lane.
+//! All other vehicles are left out:
+//!
+//! * vehicles in the ego's lane: those behind would drive into the ego when it brakes
+//! * vehicles that change lanes, since the gaps that they changed into are elsewhere in the simulation
+//! * vehicles that appear after the start
+//! * vehicles that would overlap with another one in the middle of a lane
 
 use std::path::Path;
 
@@ -27,61 +31,67 @@ use toml_edit::{ArrayOfTables, DocumentMut, Item};
 use super::config::{AbsoluteStartConfig, ActorConfig, SCHEMA_VERSION, ScenarioConfig, StartConfig};
 use super::{ScenarioError, ScenarioFile, Setting};
 
-/// Who drives R.
+/// The driver of the rear vehicle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum RearDriver {
-    /// A human driver who reacts to E, follows as closely as was recorded, and pulls out at the recorded headway
+    /// A human driver model that reacts to the ego, follows as closely as recorded, and cuts out at the recorded headway.
     #[default]
     Driver,
-    /// The recorded speeds and the recorded lane change, whatever E does
+    /// The recorded speeds and the recorded lane change, whatever the ego does.
     Recorded,
 }
 
-/// The names of E, F and R as actors.
+/// The names of the ego, the lead vehicle and the rear vehicle as actors.
 const NAMES: [&str; 3] = ["ego", "front", "rear"];
-/// The human drivers' reaction time [s]: the median of unwarned drivers (Green, Transportation Human Factors 2 (2000)).
+/// The human drivers' reaction time (s): the median of unwarned drivers (Green, Transportation Human Factors 2 (2000)).
 const REACTION_S: f64 = 0.9;
-/// Gap at standstill of Wiedemann's model [m]: its published default.
+/// Gap at standstill of Wiedemann's model (m): its published default.
 const STANDSTILL_GAP_M: f64 = 1.5;
-/// R follows closer than it pulls out, by this factor, so that it gets to pull out.
-const FOLLOWS_CLOSER: f64 = 0.9;
-/// Time gaps that an adaptive cruise control has [s], and durations that a lane change has [s].
-const TIME_GAPS_S: [f64; 2] = [0.2, 5.0];
-const LANE_CHANGES_S: [f64; 2] = [1.5, 20.0];
-/// Where nothing slower was recorded, speeds are taken to be at least this [m/s].
-const SLOWEST_MPS: f64 = 1.0;
-/// Room between two vehicles that start in one lane [m].
-const LEAST_GAP_M: f64 = 0.5;
-/// Values in the file have so many steps per unit.
-const STEPS: f64 = 1_000.0;
+/// Ratio of the rear driver's following headway to its smallest recorded headway. It is below 1, so that the driver reaches
+/// the headway at which it cuts out.
+const FOLLOWING_SHARE: f64 = 0.9;
+/// Smallest and largest time gap of the adaptive cruise control (s).
+const MIN_TIME_GAP_S: f64 = 0.2;
+const MAX_TIME_GAP_S: f64 = 5.0;
+/// Smallest and largest duration of a lane change (s).
+const MIN_LANE_CHANGE_S: f64 = 1.5;
+const MAX_LANE_CHANGE_S: f64 = 20.0;
+/// Lower limit of recorded speeds, if a speed is used as a divisor, a desired speed or a speed limit (m/s).
+const MIN_SPEED_MPS: f64 = 1.0;
+/// Smallest gap between two vehicles that start in the same lane (m).
+const MIN_START_GAP_M: f64 = 0.5;
+/// Number of rounding steps per unit of a value in the file.
+const STEPS_PER_UNIT: f64 = 1_000.0;
 
-/// A vehicle's name as an actor: ego, front, rear, or its track.
-pub fn actor_name(place: usize, vehicle: &Trajectory) -> String {
-    NAMES.get(place).map_or_else(|| format!("track-{}", vehicle.track_id), |name| (*name).to_owned())
+/// Returns the name of a vehicle as an actor: `ego`, `front`, `rear`, or its track. `index` is its index in the encounter's
+/// list of vehicles.
+pub fn actor_name(index: usize, vehicle: &Trajectory) -> String {
+    NAMES.get(index).map_or_else(|| format!("track-{}", vehicle.track_id), |name| (*name).to_owned())
 }
 
-/// The scenario of an encounter, with `settings` applied; `source` names where it comes from in messages.
+/// Returns the scenario of an encounter, with the settings applied. The last argument holds the path that names the source in
+/// error messages, and the settings.
 ///
 /// # Errors
-/// [`ScenarioError`] where the recorded values, or the settings, do not make a scenario.
+/// [`ScenarioError`] if the recorded values or the settings do not result in a valid scenario.
 pub fn reenact(
     encounter: &RecordedEncounter,
     rear: RearDriver,
     (source, settings): (&Path, &[Setting]),
 ) -> Result<ScenarioFile, ScenarioError> {
-    let written = text(encounter, rear);
-    let text = written.map_err(|message| ScenarioError::Syntax { path: source.to_owned(), line: 1, message })?;
+    let text = scenario_text(encounter, rear);
+    let text = text.map_err(|message| ScenarioError::Syntax { path: source.to_owned(), line: 1, message })?;
     let file = ScenarioFile::parse(source, &text, settings)?;
     file.check()?;
     Ok(file)
 }
 
-/// The scenario file; what the format leaves to its defaults is not written.
-fn text(encounter: &RecordedEncounter, rear: RearDriver) -> Result<String, String> {
+/// Returns the text of the scenario file. Keys with their default values are left out.
+fn scenario_text(encounter: &RecordedEncounter, rear: RearDriver) -> Result<String, String> {
     let written = toml::to_string(&config(encounter, rear)?).map_err(|error| error.to_string())?;
     let mut document: DocumentMut = written.parse().map_err(|error: toml_edit::TomlError| error.to_string())?;
-    for left_out in ["requirements", "environment", "parameters", "sensors"] {
-        document.remove(left_out);
+    for default_key in ["requirements", "environment", "parameters", "sensors"] {
+        document.remove(default_key);
     }
     let actors = document.get_mut("actor").and_then(Item::as_array_of_tables_mut);
     actors.into_iter().flat_map(ArrayOfTables::iter_mut).for_each(|actor| {
@@ -90,29 +100,30 @@ fn text(encounter: &RecordedEncounter, rear: RearDriver) -> Result<String, Strin
     Ok(document.to_string())
 }
 
+/// Returns the contents of the scenario file.
 fn config(encounter: &RecordedEncounter, rear: RearDriver) -> Result<ScenarioConfig, String> {
-    let [ego, _, own] = encounter.protagonists();
+    let [ego, _, rear_track] = encounter.protagonists();
     let mut actors = Vec::new();
-    for (place, vehicle) in encounter.vehicles.iter().enumerate() {
-        let driver = match (place, rear) {
+    for (index, vehicle) in encounter.vehicles.iter().enumerate() {
+        let driver = match (index, rear) {
             (EGO, _) => Some(ego_stack(encounter)),
-            (FRONT, _) | (REAR, RearDriver::Recorded) => Some(as_recorded(encounter, vehicle)),
-            (REAR, RearDriver::Driver) => Some(overtaker(encounter)),
-            _ => bystander(encounter, vehicle),
+            (FRONT, _) | (REAR, RearDriver::Recorded) => Some(prescribed_driver(encounter, vehicle)),
+            (REAR, RearDriver::Driver) => Some(overtaking_driver(encounter)),
+            _ => other_driver(encounter, vehicle),
         };
-        let starts = &encounter.vehicles[..place];
+        let earlier_vehicles = &encounter.vehicles[..index];
         if let (Some(driver), Some(start)) = (driver, start_of(&vehicle.trajectory))
-            && (place <= REAR || starts.iter().all(|earlier| is_clear(&earlier.trajectory, start, vehicle)))
+            && (index <= REAR || earlier_vehicles.iter().all(|earlier| is_clear(&earlier.trajectory, start, vehicle)))
         {
-            actors.push(actor(&actor_name(place, &vehicle.trajectory), vehicle, (start, driver))?);
+            actors.push(actor(&actor_name(index, &vehicle.trajectory), vehicle, start, driver)?);
         }
     }
     Ok(ScenarioConfig {
         schema_version: SCHEMA_VERSION,
-        name: format!("reenacted-track-{}", own.track_id),
+        name: format!("reenacted-track-{}", rear_track.track_id),
         description: format!(
             "The encounter of track {} (R) with track {} (E) in {}, from {:.1} s on",
-            own.track_id,
+            rear_track.track_id,
             ego.track_id,
             encounter.recording,
             encounter.start.s()
@@ -124,7 +135,7 @@ fn config(encounter: &RecordedEncounter, rear: RearDriver) -> Result<ScenarioCon
             lanes: encounter.lanes,
             lane_width_m: rounded(encounter.lane_width_m),
             curvature_per_m: Num::Fixed(0.0),
-            speed_limit_mps: rounded(fastest_mps(encounter.vehicles.iter().map(|vehicle| &vehicle.trajectory))),
+            speed_limit_mps: rounded(max_speed_mps(encounter.vehicles.iter().map(|vehicle| &vehicle.trajectory))),
             overtaking_side: encounter.change.direction,
             guard_rails: false,
         },
@@ -135,10 +146,12 @@ fn config(encounter: &RecordedEncounter, rear: RearDriver) -> Result<ScenarioCon
     })
 }
 
+/// Returns an actor with the recorded size and start of a vehicle.
 fn actor(
     name: &str,
     vehicle: &Participant,
-    (start, driver): (&TrajectoryPoint, DriverConfig),
+    start: &TrajectoryPoint,
+    driver: DriverConfig,
 ) -> Result<ActorConfig, String> {
     let size = &vehicle.trajectory.dimensions;
     Ok(ActorConfig {
@@ -166,28 +179,30 @@ fn actor(
     })
 }
 
-/// Where a vehicle is at the start, if it is there by then.
+/// Returns the point of a vehicle at the start of the encounter, or `None` if the vehicle appears later.
 fn start_of(vehicle: &Trajectory) -> Option<&TrajectoryPoint> {
     vehicle.points.first().filter(|point| point.time == Time::ZERO)
 }
 
-/// True where a vehicle that starts at `start` does not touch another one in its lane.
+/// Returns whether a vehicle that starts at `start` keeps a gap to `other`, if both start in the same lane.
 fn is_clear(other: &Trajectory, start: &TrajectoryPoint, vehicle: &Participant) -> bool {
     let half_lengths_m = 0.5 * (other.dimensions.length_m + vehicle.trajectory.dimensions.length_m);
-    start_of(other).is_none_or(|at| at.lane != start.lane || (at.s_m - start.s_m).abs() > half_lengths_m + LEAST_GAP_M)
+    start_of(other)
+        .is_none_or(|at| at.lane != start.lane || (at.s_m - start.s_m).abs() > half_lengths_m + MIN_START_GAP_M)
 }
 
+/// Returns the ego stack. Its time gap is the median time headway recorded before the rear vehicle crosses the lane marking,
+/// its set speed the highest recorded speed.
 fn ego_stack(encounter: &RecordedEncounter) -> DriverConfig {
     let [ego, front, _] = encounter.protagonists();
-    let mut headways_s: Vec<f64> = gaps(ego, front, encounter.crossing)
-        .filter_map(|(gap_m, own_mps)| time_headway_s(gap_m, own_mps).ok())
-        .collect();
+    let mut headways_s: Vec<f64> =
+        gaps(ego, front, encounter.crossing).filter_map(|own| time_headway_s(own.gap_m, own.speed_mps).ok()).collect();
     headways_s.sort_by(f64::total_cmp);
-    let kept_s = headways_s.get(headways_s.len() / 2).copied().unwrap_or(TIME_GAPS_S[1]);
+    let median_s = headways_s.get(headways_s.len() / 2).copied().unwrap_or(MAX_TIME_GAP_S);
     DriverConfig::EgoStack(EgoStackConfig {
         acc: AccConfig {
-            time_gap_s: rounded(kept_s.clamp(TIME_GAPS_S[0], TIME_GAPS_S[1])),
-            set_speed_mps: Some(rounded(fastest_mps([ego]))),
+            time_gap_s: rounded(median_s.clamp(MIN_TIME_GAP_S, MAX_TIME_GAP_S)),
+            set_speed_mps: Some(rounded(max_speed_mps([ego]))),
             standstill_gap_m: None,
         },
         aeb: Some(AebConfig::default()),
@@ -196,61 +211,69 @@ fn ego_stack(encounter: &RecordedEncounter) -> DriverConfig {
     })
 }
 
-/// R as a human driver: as close behind E as was recorded, and as fast.
-fn overtaker(encounter: &RecordedEncounter) -> DriverConfig {
+/// Returns the rear vehicle's driver as a human driver model that follows the ego as closely as recorded, and as fast.
+fn overtaking_driver(encounter: &RecordedEncounter) -> DriverConfig {
     let [ego, _, rear] = encounter.protagonists();
     let cut_out_thw_s = encounter.crossing_thw_s;
-    let start_mps = start_of(rear).map_or(SLOWEST_MPS, |start| start.speed_mps.max(SLOWEST_MPS));
+    let start_mps = start_of(rear).map_or(MIN_SPEED_MPS, |start| start.speed_mps.max(MIN_SPEED_MPS));
     let cc0_m = STANDSTILL_GAP_M.min(0.5 * cut_out_thw_s * start_mps);
     let closest_s = gaps(rear, ego, encounter.crossing)
-        .filter(|(_, own_mps)| *own_mps >= SLOWEST_MPS)
-        .map(|(gap_m, own_mps)| (gap_m - cc0_m) / own_mps)
+        .filter(|own| own.speed_mps >= MIN_SPEED_MPS)
+        .map(|own| (own.gap_m - cc0_m) / own.speed_mps)
         .fold(cut_out_thw_s - cc0_m / start_mps, f64::min);
-    let [shortest_s, longest_s] = LANE_CHANGES_S;
     DriverConfig::Overtaker(OvertakerConfig {
         cut_out_thw_s: rounded(cut_out_thw_s),
         follow: FollowConfig::Wiedemann99(Wiedemann99Config {
             cc0_m: Some(rounded(cc0_m)),
-            cc1_s: Some(rounded((FOLLOWS_CLOSER * closest_s).max(0.0))),
-            desired_speed_mps: Some(rounded(fastest_mps([rear]))),
+            cc1_s: Some(rounded((FOLLOWING_SHARE * closest_s).max(0.0))),
+            desired_speed_mps: Some(rounded(max_speed_mps([rear]))),
             ..Wiedemann99Config::default()
         }),
         reaction_s: ReactionConfig::Value(Num::Fixed(REACTION_S)),
-        lane_change_duration_s: Some(rounded(encounter.change.duration_s.clamp(shortest_s, longest_s))),
+        lane_change_duration_s: Some(rounded(encounter.change.duration_s.clamp(MIN_LANE_CHANGE_S, MAX_LANE_CHANGE_S))),
         evasive_lateral_mps2: None,
         lapse: None,
         returns: None,
     })
 }
 
-/// Gap to `ahead` [m] and own speed [m/s] of a vehicle, up to a time.
-fn gaps(own: &Trajectory, ahead: &Trajectory, until: Time) -> impl Iterator<Item = (f64, f64)> {
-    let half_lengths_m = 0.5 * (own.dimensions.length_m + ahead.dimensions.length_m);
-    let before = own.points.iter().take_while(move |point| point.time < until);
-    before.filter_map(move |point| Some((ahead.at(point.time)?.s_m - point.s_m - half_lengths_m, point.speed_mps)))
+/// The gap of a vehicle to the one ahead, and its own speed, at one instant.
+struct GapAndSpeed {
+    gap_m: f64,
+    speed_mps: f64,
 }
 
-/// Who is neither E, F nor R; nothing for those who are not simulated.
-fn bystander(encounter: &RecordedEncounter, vehicle: &Participant) -> Option<DriverConfig> {
+/// Returns the gap of a vehicle to the vehicle `ahead`, and its speed, at each of its points before `until`.
+fn gaps(own: &Trajectory, ahead: &Trajectory, until: Time) -> impl Iterator<Item = GapAndSpeed> {
+    let half_lengths_m = 0.5 * (own.dimensions.length_m + ahead.dimensions.length_m);
+    let before = own.points.iter().take_while(move |point| point.time < until);
+    before.filter_map(move |point| {
+        let gap_m = ahead.at(point.time)?.s_m - point.s_m - half_lengths_m;
+        Some(GapAndSpeed { gap_m, speed_mps: point.speed_mps })
+    })
+}
+
+/// Returns the driver of a vehicle other than the ego, the lead and the rear vehicle, or `None` if it is not simulated.
+fn other_driver(encounter: &RecordedEncounter, vehicle: &Participant) -> Option<DriverConfig> {
     let (start, rear) = (start_of(&vehicle.trajectory)?, start_of(encounter.protagonists()[REAR])?);
     let stays = vehicle.trajectory.points.iter().all(|point| point.lane == start.lane);
     if !stays || start.lane == encounter.home {
         return None;
     }
     if start.s_m > rear.s_m {
-        return Some(as_recorded(encounter, vehicle));
+        return Some(prescribed_driver(encounter, vehicle));
     }
     (start.lane == encounter.target).then(|| {
         DriverConfig::Wiedemann99(Wiedemann99Config {
-            desired_speed_mps: Some(rounded(fastest_mps([&vehicle.trajectory]))),
+            desired_speed_mps: Some(rounded(max_speed_mps([&vehicle.trajectory]))),
             reaction_s: Some(ReactionConfig::Value(Num::Fixed(REACTION_S))),
             ..Wiedemann99Config::default()
         })
     })
 }
 
-/// The recorded speeds on the recording's common clock, and the recorded lane changes.
-fn as_recorded(encounter: &RecordedEncounter, vehicle: &Participant) -> DriverConfig {
+/// Returns a driver with the recorded speeds, at the times of the common clock, and the recorded lane changes.
+fn prescribed_driver(encounter: &RecordedEncounter, vehicle: &Participant) -> DriverConfig {
     let on_clock = vehicle.trajectory.points.iter().filter(|point| point.time.is_multiple_of(PERIOD));
     let pair = |point: &TrajectoryPoint| [rounded(point.time.s()), rounded(point.speed_mps.max(0.0))];
     let mut free_from_s = 0.0;
@@ -258,10 +281,10 @@ fn as_recorded(encounter: &RecordedEncounter, vehicle: &Participant) -> DriverCo
     for change in &vehicle.changes {
         let at_s = encounter.time_of(change.start_s).s().max(free_from_s);
         let end_s = encounter.time_of(change.end_s).s();
-        let duration_s = (end_s - at_s).clamp(LANE_CHANGES_S[0], LANE_CHANGES_S[1]);
+        let duration_s = (end_s - at_s).clamp(MIN_LANE_CHANGE_S, MAX_LANE_CHANGE_S);
         let (at_s, duration_s) = (to_steps(at_s), to_steps(duration_s));
-        // One step of rounding later than the end, so that the two never overlap.
-        free_from_s = at_s + duration_s + 1.0 / STEPS;
+        // The next lane change starts at least one rounding step after the end of this one, so that they never overlap.
+        free_from_s = at_s + duration_s + 1.0 / STEPS_PER_UNIT;
         lane_changes.push(PrescribedLaneChangeConfig {
             at_s: Num::Fixed(at_s),
             to: change.direction,
@@ -275,9 +298,10 @@ fn as_recorded(encounter: &RecordedEncounter, vehicle: &Participant) -> DriverCo
     })
 }
 
-fn fastest_mps<'a>(vehicles: impl IntoIterator<Item = &'a Trajectory>) -> f64 {
+/// Returns the highest recorded speed of the vehicles (m/s), at least [`MIN_SPEED_MPS`].
+fn max_speed_mps<'a>(vehicles: impl IntoIterator<Item = &'a Trajectory>) -> f64 {
     let speeds = vehicles.into_iter().flat_map(|vehicle| vehicle.points.iter().map(|point| point.speed_mps));
-    speeds.fold(SLOWEST_MPS, f64::max)
+    speeds.fold(MIN_SPEED_MPS, f64::max)
 }
 
 fn rounded(value: f64) -> Num {
@@ -285,5 +309,5 @@ fn rounded(value: f64) -> Num {
 }
 
 fn to_steps(value: f64) -> f64 {
-    (value * STEPS).round() / STEPS
+    (value * STEPS_PER_UNIT).round() / STEPS_PER_UNIT
 }

@@ -1,26 +1,28 @@
-//! The same scenario, changed in ways that must not matter: what the validity checks run.
+//! Variations of a scenario that must not change its outcome. The validity checks run them.
 
 use closecall_traffic::{Indicator, Road, Time, VehicleState};
 
 use super::{Actor, Scenario, Trigger};
 
 impl Scenario {
-    /// The same, with vehicles and human drivers at twice the rate. Sensors and ego controller keep theirs, which are
-    /// properties of the devices, and so do the streams of their errors; drivers draw theirs once in a run.
+    /// Returns the same scenario with half the step of the vehicle dynamics and the human drivers. The rates of the sensors
+    /// and of the ego controller do not change, since they are properties of the devices. The random streams do not change
+    /// either: sensor errors are drawn at the sensors' rate, and drivers draw once in a run.
     #[must_use]
     pub fn at_half_step(&self) -> Self {
         Self { physics_step: Time::from_ns(self.physics_step.ns() / 2), ..self.clone() }
     }
 
-    /// The same, with the list of actors reversed.
+    /// Returns the same scenario with the list of actors in reverse order.
     #[must_use]
     pub fn reversed(&self) -> Self {
         let last = self.actors.len() - 1;
-        let actors = self.actors.iter().rev().map(|actor| actor.renumbered(|place| last - place)).collect();
+        let actors = self.actors.iter().rev().map(|actor| actor.renumbered(|index| last - index)).collect();
         Self { actors, ego: last - self.ego, ..self.clone() }
     }
 
-    /// The mirror image, in which left is right. Nothing on a bend, which has none with positions along its left edge.
+    /// Returns the mirror image, in which left and right are swapped. Returns `None` on a curved road: positions are measured
+    /// along its left edge, so that it has no exact mirror image.
     pub fn mirrored(&self) -> Option<Self> {
         let road = self.road.mirrored()?;
         let mirrored = |actor: &Actor| Actor {
@@ -33,14 +35,16 @@ impl Scenario {
 }
 
 impl Actor {
-    /// The same actor, where others have other places in the list.
-    fn renumbered(&self, place: impl Fn(usize) -> usize) -> Self {
+    /// Returns the same actor with new indices of actors in its events. `new_index` maps the old index to the new one.
+    fn renumbered(&self, new_index: impl Fn(usize) -> usize) -> Self {
         let mut actor = self.clone();
         for event in &mut actor.events {
             event.when = match event.when {
                 Trigger::At(time) => Trigger::At(time),
-                Trigger::ThwBelow { from, to, thw_s } => Trigger::ThwBelow { from: place(from), to: place(to), thw_s },
-                Trigger::CutOutStarted { actor, delay } => Trigger::CutOutStarted { actor: place(actor), delay },
+                Trigger::ThwBelow { from, to, thw_s } => {
+                    Trigger::ThwBelow { from: new_index(from), to: new_index(to), thw_s }
+                }
+                Trigger::CutOutStarted { actor, delay } => Trigger::CutOutStarted { actor: new_index(actor), delay },
             };
         }
         actor
@@ -70,13 +74,13 @@ mod tests {
     use super::*;
 
     fn headline() -> Scenario {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/library/low-thw-overtake-at-cut-out.toml");
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios/library/low-thw-overtake-at-cut-out.toml");
         let file = ScenarioFile::load(&path, &[]).unwrap();
         file.concrete(&file.space().nominal()).unwrap()
     }
 
     #[test]
-    fn twice_reversed_or_mirrored_is_the_same() {
+    fn reversing_or_mirroring_twice_restores_the_scenario() {
         let scenario = headline();
         let reversed = scenario.reversed();
         assert_eq!(reversed.ego_id(), scenario.ego_id());
@@ -103,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bend_has_no_mirror_image() {
+    fn a_curved_road_has_no_mirror_image() {
         let mut scenario = headline();
         scenario.road = scenario.road.with_curvature(0.001);
         assert!(scenario.mirrored().is_none());

@@ -1,11 +1,11 @@
-//! What happens to vehicles after they have touched: rigid bodies that hit, turn and slide.
+//! Moves vehicles that have collided: rigid bodies that hit each other, spin and slide.
 //!
-//! The moment of contact is found by a swept test in `f64` (see [`super::contact`]); this module is given the vehicles
-//! as they touch, and lets rapier2d's solver work out the impact. Rapier computes in `f32`: positions are therefore
-//! relative to the place of the first contact.
+//! A swept test in `f64` finds the moment of contact (see [`super::contact`]). This module receives the vehicles at that
+//! moment and lets rapier2d's solver compute the impact. Rapier computes in `f32`, so positions are relative to that of
+//! the first vehicle that collided.
 //!
-//! During an impact no other force acts, so that momentum is conserved; afterwards the tyres slide. The speeds after
-//! an impact are read when it is over, as an accident reconstruction does.
+//! No other force acts during an impact, so that momentum is conserved; afterwards the tyres slide. The velocities after
+//! an impact are read at its end, as in accident reconstruction.
 
 use nalgebra::Vector2;
 use rapier2d::prelude::*;
@@ -16,49 +16,50 @@ use super::plant::GRAVITY_MPS2;
 const RESTITUTION: f32 = 0.1;
 /// Friction between car bodies (ibid.).
 const BODY_FRICTION: f32 = 0.5;
-/// Share of the road's friction that locked, partly sideways sliding tyres give.
+/// Fraction of the road's friction that locked tyres sliding partly sideways provide.
 const SLIDING_SHARE: f64 = 0.8;
-/// How long an impact lasts: no tyre force acts, and the change of velocity is read at its end [s].
+/// Duration of an impact (s). No tyre force acts during it, and the change of velocity is read at its end.
 pub(super) const IMPACT_DURATION_S: f64 = 0.1;
-/// Radius of gyration of a vehicle as a share of its diagonal, for the friction that brakes its turning.
+/// Radius of gyration of a vehicle as a fraction of its diagonal, for the friction that slows its spin.
 const GYRATION_SHARE: f64 = 0.29;
 
 /// A vehicle's motion in the plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Motion {
-    /// Position of the centre [m].
+    /// Position of the centre (m).
     pub(super) position_m: Vector2<f64>,
-    /// Heading [rad].
+    /// Heading (rad).
     pub(super) yaw_rad: f64,
-    /// Velocity [m/s].
+    /// Velocity (m/s).
     pub(super) velocity_mps: Vector2<f64>,
-    /// Yaw rate [rad/s].
+    /// Yaw rate (rad/s).
     pub(super) yaw_rate_radps: f64,
 }
 
-/// What a body is made of.
+/// Size and mass of a body.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BodySpec {
-    /// Length of the box [m].
+    /// Length of the box (m).
     pub(super) length_m: f64,
-    /// Width of the box [m].
+    /// Width of the box (m).
     pub(super) width_m: f64,
-    /// Mass [kg].
+    /// Mass (kg).
     pub(super) mass_kg: f64,
 }
 
-/// Name of a body in the wreckage.
+/// Identifies a body in [`Wreckage`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct BodyId(RigidBodyHandle);
 
-/// The bodies that have touched, and rapier's solver that moves them.
+/// The vehicles that have collided, and rapier's solver that moves them.
 pub(super) struct Wreckage {
     origin_m: Vector2<f64>,
     friction: f64,
     bodies: RigidBodySet,
     colliders: ColliderSet,
     specs: Vec<(RigidBodyHandle, BodySpec)>,
-    free_of_tyres_s: f64,
+    /// Time until the tyres act again (s).
+    impact_left_s: f64,
     parameters: IntegrationParameters,
     pipeline: PhysicsPipeline,
     islands: IslandManager,
@@ -76,7 +77,7 @@ fn vector(v: Vector2<f64>) -> Vector {
 }
 
 impl Wreckage {
-    /// Nothing yet, around `origin_m`, on a road of this friction.
+    /// Creates a wreckage without bodies. `origin_m` is the origin of rapier's coordinates, `friction` the road's.
     pub(super) fn new(origin_m: Vector2<f64>, friction: f64) -> Self {
         let parameters = IntegrationParameters { max_ccd_substeps: 4, ..IntegrationParameters::default() };
         Self {
@@ -85,7 +86,7 @@ impl Wreckage {
             bodies: RigidBodySet::new(),
             colliders: ColliderSet::new(),
             specs: Vec::new(),
-            free_of_tyres_s: IMPACT_DURATION_S,
+            impact_left_s: IMPACT_DURATION_S,
             parameters,
             pipeline: PhysicsPipeline::new(),
             islands: IslandManager::new(),
@@ -98,7 +99,7 @@ impl Wreckage {
         }
     }
 
-    /// Adds a vehicle that has just touched another.
+    /// Adds a vehicle that has just touched another one, and starts a new impact.
     #[expect(clippy::cast_possible_truncation, reason = "rapier computes in f32")]
     pub(super) fn add(&mut self, spec: BodySpec, motion: &Motion) -> BodyId {
         let body = RigidBodyBuilder::dynamic()
@@ -115,15 +116,15 @@ impl Wreckage {
             .friction(BODY_FRICTION);
         self.colliders.insert_with_parent(collider, handle, &mut self.bodies);
         self.specs.push((handle, spec));
-        self.free_of_tyres_s = IMPACT_DURATION_S;
+        self.impact_left_s = IMPACT_DURATION_S;
         BodyId(handle)
     }
 
-    /// Moves all bodies on by `step_s`.
+    /// Moves all bodies by one step of `step_s`.
     #[expect(clippy::cast_possible_truncation, reason = "rapier computes in f32")]
     pub(super) fn step(&mut self, step_s: f64) {
-        if self.free_of_tyres_s > 0.0 {
-            self.free_of_tyres_s -= step_s;
+        if self.impact_left_s > 0.0 {
+            self.impact_left_s -= step_s;
         } else {
             self.slide(step_s);
         }
@@ -145,7 +146,7 @@ impl Wreckage {
         );
     }
 
-    /// Takes from every body what sliding tyres take in one step.
+    /// Reduces the speed and the yaw rate of every body by what its sliding tyres dissipate in one step.
     #[expect(clippy::cast_possible_truncation, reason = "rapier computes in f32")]
     fn slide(&mut self, step_s: f64) {
         let slowing_mps = (SLIDING_SHARE * self.friction * GRAVITY_MPS2 * step_s) as f32;
@@ -162,7 +163,7 @@ impl Wreckage {
         }
     }
 
-    /// How a body moves now.
+    /// Returns the current motion of a body.
     pub(super) fn motion(&self, id: BodyId) -> Motion {
         let body = &self.bodies[id.0];
         let (position, velocity) = (body.translation(), body.linvel());
@@ -191,40 +192,66 @@ mod tests {
         }
     }
 
-    /// Momentum before and after an impact of `first` from behind into `second`, with a lateral offset.
-    fn momenta(first: (BodySpec, f64), second: (BodySpec, f64), offset_m: f64) -> (Vector2<f64>, Vector2<f64>, f64) {
-        let gap_m = 0.5 * (first.0.length_m + second.0.length_m);
-        let motions = [moving(1_000.0, 0.0, first.1), moving(1_000.0 + gap_m, offset_m, second.1)];
+    /// A vehicle before an impact.
+    #[derive(Clone, Copy)]
+    struct Vehicle {
+        spec: BodySpec,
+        speed_mps: f64,
+    }
+
+    const fn car(speed_mps: f64) -> Vehicle {
+        Vehicle { spec: CAR, speed_mps }
+    }
+
+    const fn truck(speed_mps: f64) -> Vehicle {
+        Vehicle { spec: TRUCK, speed_mps }
+    }
+
+    /// Total momentum before and after an impact (kg·m/s), and the speed at which the vehicles separate (m/s).
+    struct Impact {
+        before: Vector2<f64>,
+        after: Vector2<f64>,
+        separation_mps: f64,
+    }
+
+    /// Runs `rear` into the rear end of `front`, with a lateral offset.
+    fn collide(rear: Vehicle, front: Vehicle, offset_m: f64) -> Impact {
+        let distance_m = 0.5 * (rear.spec.length_m + front.spec.length_m);
+        let motions = [moving(1_000.0, 0.0, rear.speed_mps), moving(1_000.0 + distance_m, offset_m, front.speed_mps)];
         let mut wreckage = Wreckage::new(motions[0].position_m, 0.9);
-        let ids = [wreckage.add(first.0, &motions[0]), wreckage.add(second.0, &motions[1])];
+        let ids = [wreckage.add(rear.spec, &motions[0]), wreckage.add(front.spec, &motions[1])];
         for _ in 0..10 {
             wreckage.step(0.01);
         }
-        let masses = [first.0.mass_kg, second.0.mass_kg];
-        let sum = |velocities: [Vector2<f64>; 2]| velocities[0] * masses[0] + velocities[1] * masses[1];
-        let before = sum([motions[0].velocity_mps, motions[1].velocity_mps]);
-        let after = ids.map(|id| wreckage.motion(id).velocity_mps);
-        (before, sum(after), after[1].x - after[0].x)
+        let momentum = |velocities_mps: [Vector2<f64>; 2]| {
+            velocities_mps[0] * rear.spec.mass_kg + velocities_mps[1] * front.spec.mass_kg
+        };
+        let before = momentum(motions.map(|motion| motion.velocity_mps));
+        let after_mps = ids.map(|id| wreckage.motion(id).velocity_mps);
+        Impact { before, after: momentum(after_mps), separation_mps: after_mps[1].x - after_mps[0].x }
     }
 
     #[test]
     fn momentum_is_conserved_through_the_impact() {
-        for (first, second, offset_m) in [
-            ((CAR, 33.0), (CAR, 20.0), 0.0),
-            ((CAR, 33.0), (CAR, 20.0), 1.2),
-            ((CAR, 33.0), (TRUCK, 22.0), 0.5),
-            ((TRUCK, 25.0), (CAR, 5.0), -0.7),
+        for (rear, front, offset_m) in [
+            (car(33.0), car(20.0), 0.0),
+            (car(33.0), car(20.0), 1.2),
+            (car(33.0), truck(22.0), 0.5),
+            (truck(25.0), car(5.0), -0.7),
         ] {
-            let (before, after, separation_mps) = momenta(first, second, offset_m);
+            let Impact { before, after, separation_mps } = collide(rear, front, offset_m);
             assert!((after - before).norm() < 0.01 * before.norm(), "{before} {after}");
-            assert!(separation_mps > -0.2, "they still run into each other at {separation_mps} m/s");
+            assert!(
+                separation_mps > -0.2,
+                "the vehicles still approach each other: they separate at {separation_mps} m/s"
+            );
         }
     }
 
     #[test]
-    fn a_central_impact_of_equal_cars_shares_the_speed() {
-        let (_, _, separation_mps) = momenta((CAR, 30.0), (CAR, 20.0), 0.0);
-        // 10 m/s closing with a restitution of 0.1.
+    fn equal_cars_separate_after_a_central_impact_as_their_restitution_says() {
+        let Impact { separation_mps, .. } = collide(car(30.0), car(20.0), 0.0);
+        // A closing speed of 10 m/s with a restitution of 0.1.
         assert!((separation_mps - 1.0).abs() < 0.5, "{separation_mps}");
     }
 

@@ -1,12 +1,12 @@
-//! The world: vehicles that drive, touch and collide on a road.
+//! The world: vehicles that drive and collide on a road.
 //!
 //! ```text
-//!  actions ─▶ plant of each vehicle ─▶ boxes before and after ─▶ swept test ─▶ touch ─▶ rapier2d: impact, sliding
+//!  actions ─▶ plant of each vehicle ─▶ boxes before and after ─▶ swept test ─▶ contact ─▶ rapier2d: impact, sliding
 //! ```
 //!
-//! Every vehicle reads the state at t, then all are moved to t + dt. Vehicles that have touched another are wrecks
-//! from then on: their drivers have lost control, and rapier's solver moves them. Physical overlap alone is a
-//! collision, and its moment is judged by a swept test on oriented boxes in `f64`; rapier gives the response.
+//! All drivers read the state at t, then all vehicles are moved to t + dt. A vehicle that has touched another one is a
+//! wreck from then on: its driver has lost control, and rapier's solver moves it. Only physical contact counts as a
+//! collision. A swept test on oriented boxes in `f64` finds its time; rapier computes the response.
 
 mod contact;
 mod impact;
@@ -16,4 +16,4 @@ mod plant;
 mod state;
 
 pub(crate) use plant::lateral_grip_mps2;
-pub(crate) use state::{Action, Placed, World};
+pub(crate) use state::{Action, InitialVehicle, World};

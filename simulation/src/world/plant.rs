@@ -1,66 +1,75 @@
-//! The plant: how one vehicle answers what its driver asks for.
+//! The plant: how one vehicle responds to the commands of its driver.
 //!
 //! ```text
-//!  asked acceleration ─▶ friction limit ─▶ first-order lag ─▶ jerk limit ─▶ speed ─▶ distance travelled
-//!  asked lane change  ─▶ quintic path over that distance ─┬─▶ kinematic bicycle: course, slip, yaw rate
-//!  weave of its driver ─▶ deviation over that distance  ──┘
+//!  commanded acceleration ─▶ friction limit ─▶ first-order lag ─▶ jerk limit ─▶ speed ─▶ distance travelled
+//!  commanded lane change  ─▶ quintic path over that distance ─┬─▶ kinematic bicycle: course, slip, yaw rate
+//!  weaving of the driver  ─▶ deviation over that distance ────┘
 //! ```
 //!
-//! Lag and jerk limits are of the order of published brake-system responses: a passenger car builds up full braking
+//! Lags and jerk limits are of the order of published brake-system responses: a passenger car builds up full braking
 //! in 0.2 to 0.4 s, an air-braked truck in 0.4 to 0.6 s (UN R13 asks for at most 0.6 s to 75 % of the pressure).
-//! The kinematic bicycle (Rajamani, *Vehicle Dynamics and Control*, 2012, ch. 2) is inverted: the path is followed
-//! exactly, and course, slip angle and yaw rate are those that the bicycle needs for it. What the tyres cannot give
-//! is refused when the path is planned: a lane change that would need more lateral acceleration is made longer, and the
-//! scenario's check refuses a weave that would.
+//! The kinematic bicycle (Rajamani, *Vehicle Dynamics and Control*, 2012, ch. 2) is inverted: the vehicle follows the
+//! path exactly, and course, slip angle and yaw rate are those that the bicycle needs for it. The lateral acceleration is
+//! limited when the path is planned: a lane change that would need more than the tyres provide is made longer, and the
+//! check of a scenario rejects weaving that would.
 
 use closecall_controllers::{Deviation, LaneChange, Weave};
 use closecall_traffic::{Indicator, Lane, Road, Vehicle, VehicleClass, VehicleState};
 
 use super::path::{LanePath, LateralState};
 
-/// Gravitational acceleration [m/s²].
+/// Gravitational acceleration (m/s²).
 pub(crate) const GRAVITY_MPS2: f64 = 9.81;
-/// Share of the friction that a driver can use sideways in an evasion without losing the vehicle.
+/// Fraction of the friction that a driver can use laterally in an evasion without losing control.
 const LATERAL_SHARE: f64 = 0.5;
-/// Share of a vehicle's length between its axles.
+/// Wheelbase as a fraction of a vehicle's length.
 const WHEELBASE_SHARE: f64 = 0.6;
-/// A lane change needs some way even at walking pace: twice the steering circle of a car [m].
+/// Shortest distance of a lane change, even at walking pace (m): twice the steering circle of a car.
 const SHORTEST_LANE_CHANGE_M: f64 = 10.0;
-/// Quasi-static dive of the body [rad per m/s²]: about 1.5° at 1 g.
+/// Quasi-static brake dive of the body (rad per m/s²): about 1.5° at 1 g.
 const DIVE_RAD_PER_MPS2: f64 = 0.0027;
 
-/// The lateral acceleration up to which drivers steer on a road of this friction [m/s²].
+/// Returns the largest lateral acceleration that drivers use on a road with this friction (m/s²).
 pub(crate) fn lateral_grip_mps2(friction: f64) -> f64 {
     LATERAL_SHARE * friction * GRAVITY_MPS2
 }
 
-/// What a class of vehicles can do.
+/// Limits of the actuators of a vehicle class.
 #[derive(Clone, Copy, Debug)]
 struct Capability {
-    /// Time constant of the actuators [s].
+    /// Time constant of the actuators (s).
     lag_s: f64,
-    /// Fastest change of acceleration [m/s³].
+    /// Largest jerk, as a magnitude (m/s³).
     jerk_limit_mps3: f64,
-    /// Largest acceleration [m/s²].
-    largest_acceleration_mps2: f64,
-    /// Share of the friction that the brakes can use.
+    /// Largest acceleration (m/s²).
+    max_acceleration_mps2: f64,
+    /// Fraction of the friction that the brakes can use.
     brake_share: f64,
 }
 
 impl Capability {
-    const fn of(class: VehicleClass) -> Self {
+    const fn for_class(class: VehicleClass) -> Self {
         match class {
             VehicleClass::Car => {
-                Self { lag_s: 0.15, jerk_limit_mps3: 40.0, largest_acceleration_mps2: 4.0, brake_share: 1.0 }
+                Self { lag_s: 0.15, jerk_limit_mps3: 40.0, max_acceleration_mps2: 4.0, brake_share: 1.0 }
             }
             VehicleClass::Truck => {
-                Self { lag_s: 0.3, jerk_limit_mps3: 15.0, largest_acceleration_mps2: 1.0, brake_share: 0.75 }
+                Self { lag_s: 0.3, jerk_limit_mps3: 15.0, max_acceleration_mps2: 1.0, brake_share: 0.75 }
             }
             VehicleClass::Motorcycle => {
-                Self { lag_s: 0.15, jerk_limit_mps3: 30.0, largest_acceleration_mps2: 5.0, brake_share: 0.9 }
+                Self { lag_s: 0.15, jerk_limit_mps3: 30.0, max_acceleration_mps2: 5.0, brake_share: 0.9 }
             }
         }
     }
+}
+
+/// A lane change in progress.
+#[derive(Clone, Copy, Debug)]
+struct LaneChangePath {
+    path: LanePath,
+    target: Lane,
+    /// Distance travelled on the path (m).
+    travelled_m: f64,
 }
 
 /// One vehicle under the control of its driver.
@@ -70,22 +79,24 @@ pub(crate) struct Plant {
     brake_light_from_mps2: f64,
     wheelbase_m: f64,
     friction: f64,
+    /// Fraction of the difference to the commanded acceleration that the actuators cover in one step.
     lag_share: f64,
     step_s: f64,
     state: VehicleState,
-    path: Option<(LanePath, Lane)>,
-    travelled_m: f64,
-    /// Where the driver means to be.
-    meant: LateralState,
+    /// The lane change in progress.
+    lane_change: Option<LaneChangePath>,
+    /// The lateral state that the driver intends: on the lane's centre line, or on the path of the lane change.
+    intended: LateralState,
     weave: Option<Weave>,
-    /// The whole way so far, over which the weave is written.
-    way_m: f64,
+    /// Distance travelled along the lane since the start (m): the argument of `weave`.
+    distance_m: f64,
+    /// Deviation from the intended lateral state.
     deviation: Deviation,
 }
 
 impl Plant {
-    /// A vehicle at rest on its lane's centre line or moving along it, about which its driver may weave from now on;
-    /// `friction` is the road's, `step_s` the step.
+    /// Creates a vehicle that stands on the centre line of its lane or moves along it. `weave` is the driver's deviation
+    /// from that line, `friction` the road's, and `step_s` the length of a step.
     pub(crate) fn new(
         vehicle: &Vehicle,
         state: VehicleState,
@@ -93,7 +104,7 @@ impl Plant {
         friction: f64,
         step_s: f64,
     ) -> Self {
-        let capability = Capability::of(vehicle.class);
+        let capability = Capability::for_class(vehicle.class);
         Self {
             capability,
             brake_light_from_mps2: vehicle.brake_light_from_mps2,
@@ -102,115 +113,123 @@ impl Plant {
             lag_share: 1.0 - (-step_s / capability.lag_s).exp(),
             step_s,
             state,
-            path: None,
-            travelled_m: 0.0,
-            meant: LateralState { d_m: state.d_m, ..LateralState::default() },
+            lane_change: None,
+            intended: LateralState { d_m: state.d_m, ..LateralState::default() },
             weave,
-            way_m: 0.0,
+            distance_m: 0.0,
             deviation: Deviation::default(),
         }
     }
 
-    /// The state now.
+    /// Returns the current state.
     pub(crate) fn state(&self) -> &VehicleState {
         &self.state
     }
 
-    /// The target of the lane change under way.
-    pub(crate) fn changing_to(&self) -> Option<Lane> {
-        self.path.map(|(_, target)| target)
+    /// Returns the target lane of the lane change in progress, or `None` if there is none.
+    pub(crate) fn lane_change_target(&self) -> Option<Lane> {
+        self.lane_change.map(|change| change.target)
     }
 
-    /// How far the vehicle is beside the path that its driver means to take, positive to the left [m].
+    /// Returns the lateral deviation from the path that the driver intends, positive to the left (m).
     pub(crate) fn lateral_deviation_m(&self) -> f64 {
         self.deviation.offset_m
     }
 
-    /// Pitch of the body, positive nose down [rad].
+    /// Returns the pitch of the body, positive nose down (rad).
     pub(crate) fn pitch_rad(&self) -> f64 {
         -self.state.acceleration_mps2 * DIVE_RAD_PER_MPS2
     }
 
-    /// Begins a lane change, or directs the one under way elsewhere.
+    /// Starts a lane change, or replaces the one in progress. The path becomes longer than requested if the tyres could not
+    /// provide the lateral acceleration otherwise.
     pub(crate) fn change_lane(&mut self, change: LaneChange, road: &Road) {
         let target_m = road.lane_centre_m(change.target);
-        let wanted_m = change.duration_s * self.state.speed_mps;
-        let mut path = LanePath::new(self.meant, target_m, wanted_m.max(SHORTEST_LANE_CHANGE_M));
-        let bend_limit_per_m =
-            lateral_grip_mps2(self.friction) / (self.state.speed_mps * self.state.speed_mps).max(1.0);
-        // The curvature falls with the square of the length, so that a few stretches by a tenth suffice.
-        while path.largest_bend_per_m() > bend_limit_per_m && path.length_m() < 10.0 * wanted_m.max(100.0) {
-            path = LanePath::new(self.meant, target_m, 1.1 * path.length_m());
+        let requested_m = change.duration_s * self.state.speed_mps;
+        let mut path = LanePath::new(self.intended, target_m, requested_m.max(SHORTEST_LANE_CHANGE_M));
+        let limit_per_m = lateral_grip_mps2(self.friction) / (self.state.speed_mps * self.state.speed_mps).max(1.0);
+        // The second derivative falls with the square of the length, so that a few steps of 10 % suffice.
+        while path.max_second_derivative_per_m() > limit_per_m && path.length_m() < 10.0 * requested_m.max(100.0) {
+            path = LanePath::new(self.intended, target_m, 1.1 * path.length_m());
         }
-        self.path = Some((path, change.target));
-        self.travelled_m = 0.0;
+        self.lane_change = Some(LaneChangePath { path, target: change.target, travelled_m: 0.0 });
     }
 
-    /// Drives one step with the asked acceleration [m/s²], which must be finite.
-    pub(crate) fn step(&mut self, asked_mps2: f64, indicator: Indicator, road: &Road) {
+    /// Moves the vehicle by one step with the commanded acceleration (m/s²), which must be finite.
+    pub(crate) fn step(&mut self, commanded_mps2: f64, indicator: Indicator, road: &Road) {
         let before = self.state;
         let grip_mps2 = self.friction * GRAVITY_MPS2;
         let lateral_mps2 = before.speed_mps * before.yaw_rate_radps;
-        let left_mps2 = (grip_mps2 * grip_mps2 - lateral_mps2 * lateral_mps2).max(0.0).sqrt();
-        let strongest_braking = left_mps2.min(self.capability.brake_share * grip_mps2);
-        let wanted = asked_mps2.clamp(-strongest_braking, self.capability.largest_acceleration_mps2.min(left_mps2));
+        let longitudinal_grip_mps2 = (grip_mps2 * grip_mps2 - lateral_mps2 * lateral_mps2).max(0.0).sqrt();
+        let max_braking_mps2 = longitudinal_grip_mps2.min(self.capability.brake_share * grip_mps2);
+        let max_acceleration_mps2 = self.capability.max_acceleration_mps2.min(longitudinal_grip_mps2);
+        let limited_mps2 = commanded_mps2.clamp(-max_braking_mps2, max_acceleration_mps2);
 
-        let most = self.capability.jerk_limit_mps3 * self.step_s;
-        let acceleration =
-            before.acceleration_mps2 + (self.lag_share * (wanted - before.acceleration_mps2)).clamp(-most, most);
-        let (speed, distance) = advance(before.speed_mps, acceleration, self.step_s);
-        self.state.speed_mps = speed;
-        self.state.acceleration_mps2 = if speed > 0.0 { acceleration } else { 0.0 };
-        self.state.brake_light = asked_mps2 <= -self.brake_light_from_mps2 || (speed == 0.0 && asked_mps2 <= 0.0);
+        let max_change_mps2 = self.capability.jerk_limit_mps3 * self.step_s;
+        let change_mps2 =
+            (self.lag_share * (limited_mps2 - before.acceleration_mps2)).clamp(-max_change_mps2, max_change_mps2);
+        let acceleration_mps2 = before.acceleration_mps2 + change_mps2;
+        let Advance { speed_mps, distance_m } = advance(before.speed_mps, acceleration_mps2, self.step_s);
+        self.state.speed_mps = speed_mps;
+        self.state.acceleration_mps2 = if speed_mps > 0.0 { acceleration_mps2 } else { 0.0 };
+        let holds_at_standstill = speed_mps == 0.0 && commanded_mps2 <= 0.0;
+        self.state.brake_light = commanded_mps2 <= -self.brake_light_from_mps2 || holds_at_standstill;
         self.state.indicator = indicator;
-        self.steer(distance, road);
+        self.steer(distance_m, road);
     }
 
+    /// Moves the vehicle by `distance_m` along its path.
     fn steer(&mut self, distance_m: f64, road: &Road) {
-        // Way along the lane's direction: what the path is written over.
+        // Path and weaving are functions of the distance in the direction of the lane.
         let along_m = distance_m * self.lateral().slope.atan().cos();
-        self.travelled_m += along_m;
-        self.way_m += along_m;
+        self.distance_m += along_m;
         if let Some(weave) = &mut self.weave {
-            self.deviation = weave.at(self.way_m);
+            self.deviation = weave.at(self.distance_m);
         }
-        if let Some((path, _)) = self.path {
-            self.meant = path.at(self.travelled_m);
-            if self.travelled_m >= path.length_m() {
-                self.path = None;
+        if let Some(change) = &mut self.lane_change {
+            change.travelled_m += along_m;
+            self.intended = change.path.at(change.travelled_m);
+            if change.travelled_m >= change.path.length_m() {
+                self.lane_change = None;
             }
         }
-        let LateralState { d_m, slope, bend_per_m } = self.lateral();
+        let LateralState { d_m, slope, second_derivative_per_m } = self.lateral();
         let course_rad = slope.atan();
-        let curvature_per_m = bend_per_m / (1.0 + slope * slope).powf(1.5);
-        // Slip at the box's centre, half a wheelbase ahead of the rear axle.
+        let curvature_per_m = second_derivative_per_m / (1.0 + slope * slope).powf(1.5);
+        // Slip angle at the centre of the box, half a wheelbase ahead of the rear axle.
         let slip_rad = (0.5 * self.wheelbase_m * curvature_per_m).clamp(-0.5, 0.5).asin();
         self.state.d_m = d_m;
         self.state.heading_rad = course_rad - slip_rad;
         self.state.yaw_rate_radps = self.state.speed_mps * (curvature_per_m + road.curvature_per_m());
-        // Off the reference line of a bend, the same way along the lane is another way along the road.
+        // In a curve, a distance along the lane differs from the distance along the road's reference line.
         self.state.s_m += along_m / (1.0 - road.curvature_per_m() * d_m);
     }
 
-    /// Where the vehicle is: beside the path by the deviation.
+    /// Returns the actual lateral state: the intended one plus the deviation.
     fn lateral(&self) -> LateralState {
         LateralState {
-            d_m: self.meant.d_m + self.deviation.offset_m,
-            slope: self.meant.slope + self.deviation.slope,
-            bend_per_m: self.meant.bend_per_m + self.deviation.bend_per_m,
+            d_m: self.intended.d_m + self.deviation.offset_m,
+            slope: self.intended.slope + self.deviation.slope,
+            second_derivative_per_m: self.intended.second_derivative_per_m + self.deviation.bend_per_m,
         }
     }
 }
 
-/// Speed and distance after one step of constant acceleration, stopping for good where the speed reaches zero.
-fn advance(speed_mps: f64, acceleration_mps2: f64, step_s: f64) -> (f64, f64) {
-    let after = speed_mps + acceleration_mps2 * step_s;
-    if after > 0.0 {
-        (after, 0.5 * (speed_mps + after) * step_s)
+/// Speed after one step, and the distance travelled in it.
+struct Advance {
+    speed_mps: f64,
+    distance_m: f64,
+}
+
+/// Advances by one step of constant acceleration. If the speed reaches zero within the step, the vehicle stops there.
+fn advance(speed_mps: f64, acceleration_mps2: f64, step_s: f64) -> Advance {
+    let after_mps = speed_mps + acceleration_mps2 * step_s;
+    if after_mps > 0.0 {
+        Advance { speed_mps: after_mps, distance_m: 0.5 * (speed_mps + after_mps) * step_s }
     } else if speed_mps > 0.0 {
-        (0.0, speed_mps * speed_mps / (-2.0 * acceleration_mps2))
+        Advance { speed_mps: 0.0, distance_m: speed_mps * speed_mps / (-2.0 * acceleration_mps2) }
     } else {
-        (0.0, 0.0)
+        Advance { speed_mps: 0.0, distance_m: 0.0 }
     }
 }
 
@@ -249,42 +268,42 @@ mod tests {
         }
         assert!((-0.9 * GRAVITY_MPS2 - 1e-9..-0.89 * GRAVITY_MPS2).contains(&hardest), "{hardest}");
         assert_eq!(car.state().speed_mps, 0.0);
-        // v²/2µg plus what the lag costs: about 30 m/s for 0.2 s.
+        // The ideal distance is v²/(2µg). The actuator lag adds about 0.2 s at 30 m/s.
         let ideal_m = 30.0 * 30.0 / (2.0 * 0.9 * GRAVITY_MPS2);
         assert!(car.state().s_m > ideal_m && car.state().s_m < ideal_m + 30.0 * 0.35, "{}", car.state().s_m);
     }
 
     #[test]
-    fn a_lane_change_takes_the_asked_time_and_ends_on_the_centre() {
+    fn a_lane_change_takes_the_requested_time_and_ends_on_the_centre() {
         let road = Road::straight(3);
         let mut car = car(30.0);
         car.change_lane(LaneChange { target: Lane(1), duration_s: 5.0 }, &road);
         let mut crossing_s = 0.0;
         for step in 0..500 {
-            assert!(car.changing_to().is_some(), "ended after {step} steps");
+            assert!(car.lane_change_target().is_some(), "ended after {step} steps");
             car.step(0.0, Indicator::Left, &road);
             if car.state().d_m < -3.75 {
                 crossing_s = f64::from(step + 1) * STEP_S;
             }
         }
         car.step(0.0, Indicator::Off, &road);
-        assert!(car.changing_to().is_none());
+        assert!(car.lane_change_target().is_none());
         assert!((crossing_s - 2.5).abs() < 0.05, "{crossing_s}");
         assert!((car.state().d_m + 1.875).abs() < 1e-9);
         assert!(car.state().heading_rad.abs() < 1e-9);
     }
 
     #[test]
-    fn a_lane_change_that_the_tyres_cannot_give_takes_longer() {
+    fn a_lane_change_takes_longer_if_the_tyres_limit_it() {
         let road = Road::straight(3);
         let mut car = car(33.0);
         car.change_lane(LaneChange { target: Lane(1), duration_s: 0.5 }, &road);
-        let mut lateral: f64 = 0.0;
+        let mut largest_mps2: f64 = 0.0;
         for _ in 0..400 {
             car.step(0.0, Indicator::Left, &road);
-            lateral = lateral.max((car.state().speed_mps * car.state().yaw_rate_radps).abs());
+            largest_mps2 = largest_mps2.max((car.state().speed_mps * car.state().yaw_rate_radps).abs());
         }
-        assert!(lateral <= LATERAL_SHARE * 0.9 * GRAVITY_MPS2 * 1.01, "{lateral}");
+        assert!(largest_mps2 <= LATERAL_SHARE * 0.9 * GRAVITY_MPS2 * 1.01, "{largest_mps2}");
         assert!((car.state().d_m + 1.875).abs() < 1e-9);
     }
 
@@ -305,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn one_who_weaves_starts_on_its_path_and_changes_lanes_as_far_beside_it() {
+    fn a_weaving_vehicle_starts_on_its_path_and_keeps_its_deviation_in_a_lane_change() {
         let road = Road::straight(3);
         let (mut straight, mut weaving) = (weaving(None), weaving(weave()));
         assert_eq!(straight.state(), weaving.state());
@@ -318,13 +337,13 @@ mod tests {
             }
             straight.step(0.0, Indicator::Off, &road);
             weaving.step(0.0, Indicator::Off, &road);
-            // Slopes tilt the way along the lane by some millimetres, over which the lane change lies then.
-            let beside_m = weaving.state().d_m - straight.state().d_m;
-            assert!((beside_m - weaving.lateral_deviation_m()).abs() < 0.005, "step {step}: {beside_m}");
-            widest_m = widest_m.max(beside_m.abs());
+            // The slope of the weaving changes the distance along the lane, and so the lane change, by some millimetres.
+            let deviation_m = weaving.state().d_m - straight.state().d_m;
+            assert!((deviation_m - weaving.lateral_deviation_m()).abs() < 0.005, "step {step}: {deviation_m}");
+            widest_m = widest_m.max(deviation_m.abs());
         }
         assert!((0.3..1.2).contains(&widest_m), "{widest_m}");
-        // One who stands stays where it is.
+        // A vehicle at standstill does not move sideways.
         while weaving.state().speed_mps > 0.0 {
             weaving.step(-5.0, Indicator::Off, &road);
         }

@@ -5,38 +5,40 @@ use closecall_traffic::geometry::OrientedBox;
 use closecall_traffic::{ActorId, Indicator, Lane, Road, Time, Vehicle, VehicleState};
 use nalgebra::Vector2;
 
-use super::contact::{self, Touch};
-use super::neighbours;
+use super::contact::{self, StepBoxes, StruckVehicle, Touch};
 use super::impact::{BodyId, BodySpec, IMPACT_DURATION_S, Motion, Wreckage};
+use super::neighbours;
 use super::plant::Plant;
 use crate::outcome::{Collision, Phase};
 
-/// What is asked of one vehicle for one step.
+/// The commands to one vehicle for one step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Action {
-    /// Acceleration [m/s²].
+    /// Commanded acceleration (m/s²).
     pub(crate) acceleration_mps2: f64,
-    /// A lane change to begin.
+    /// A lane change to start.
     pub(crate) lane_change: Option<LaneChange>,
     /// The direction indicator.
     pub(crate) indicator: Indicator,
 }
 
-/// A vehicle to put into the world.
+/// A vehicle as it enters the world.
 #[derive(Clone, Debug)]
-pub(crate) struct Placed {
+pub(crate) struct InitialVehicle {
     /// Its name.
     pub(crate) id: ActorId,
-    /// What it is.
+    /// Its class, size and mass.
     pub(crate) vehicle: Vehicle,
-    /// Where it starts.
+    /// Its state at time zero.
     pub(crate) state: VehicleState,
-    /// How its driver weaves about that.
+    /// The lateral deviation of its driver, or `None` if the driver does not weave.
     pub(crate) weave: Option<Weave>,
 }
 
 enum Body {
+    /// Under the control of its driver.
     Driven(Box<Plant>),
+    /// Moved by rapier's solver after a collision.
     Wrecked { body: BodyId, state: VehicleState },
 }
 
@@ -46,11 +48,15 @@ struct Actor {
     body: Body,
 }
 
-/// An impact whose change of velocity is not settled yet.
+/// An impact that is still in progress, so that its change of velocity is not final.
 struct OpenImpact {
+    /// Index of its collision in the list of collisions.
     collision: usize,
+    /// Indices of the two vehicles in the list of actors.
     pair: [usize; 2],
+    /// Velocities of the two vehicles before the impact (m/s).
     velocities_mps: [Vector2<f64>; 2],
+    /// Time until the impact ends (s).
     left_s: f64,
 }
 
@@ -61,8 +67,8 @@ pub(crate) struct World {
     step: Time,
     time: Time,
     actors: Vec<Actor>,
-    /// The places of the actors in the order of their names: what is done to pairs is done in this order, so that the
-    /// order of the list does not matter.
+    /// Indices of the actors in the order of their names. Pairs are processed in this order, so that the result does not
+    /// depend on the order of the list of actors.
     by_name: Vec<usize>,
     shapes: Vec<OrientedBox>,
     shapes_before: Vec<OrientedBox>,
@@ -74,11 +80,11 @@ pub(crate) struct World {
 }
 
 impl World {
-    /// The vehicles at time zero. They must not overlap: the scenario's check sees to it.
-    pub(crate) fn new(road: Road, friction: f64, step: Time, placed: Vec<Placed>) -> Self {
-        let actors: Vec<Actor> = placed
+    /// Creates the world at time zero. The vehicles must not overlap; the check of the scenario ensures this.
+    pub(crate) fn new(road: Road, friction: f64, step: Time, vehicles: Vec<InitialVehicle>) -> Self {
+        let actors: Vec<Actor> = vehicles
             .into_iter()
-            .map(|Placed { id, vehicle, state, weave }| {
+            .map(|InitialVehicle { id, vehicle, state, weave }| {
                 let body = Body::Driven(Box::new(Plant::new(&vehicle, state, weave, friction, step.s())));
                 Actor { id, vehicle, body }
             })
@@ -104,27 +110,27 @@ impl World {
         world
     }
 
-    /// The time that the states hold for.
+    /// Returns the time of the current states.
     pub(crate) fn time(&self) -> Time {
         self.time
     }
 
-    /// Number of vehicles.
+    /// Returns the number of vehicles.
     pub(crate) fn len(&self) -> usize {
         self.actors.len()
     }
 
-    /// The places of the vehicles in the order of their names.
+    /// Returns the indices of the vehicles in the order of their names.
     pub(crate) fn by_name(&self) -> &[usize] {
         &self.by_name
     }
 
-    /// What a vehicle is.
+    /// Returns the class, size and mass of a vehicle.
     pub(crate) fn vehicle(&self, actor: usize) -> &Vehicle {
         &self.actors[actor].vehicle
     }
 
-    /// Where a vehicle is and how it moves.
+    /// Returns the current state of a vehicle.
     pub(crate) fn state(&self, actor: usize) -> &VehicleState {
         match &self.actors[actor].body {
             Body::Driven(plant) => plant.state(),
@@ -132,7 +138,7 @@ impl World {
         }
     }
 
-    /// Pitch of a vehicle's body, positive nose down [rad].
+    /// Returns the pitch of a vehicle's body, positive nose down (rad).
     pub(crate) fn pitch_rad(&self, actor: usize) -> f64 {
         match &self.actors[actor].body {
             Body::Driven(plant) => plant.pitch_rad(),
@@ -140,15 +146,15 @@ impl World {
         }
     }
 
-    /// The target of a vehicle's lane change under way.
-    pub(crate) fn changing_to(&self, actor: usize) -> Option<Lane> {
+    /// Returns the target lane of a vehicle's lane change in progress, or `None` if there is none.
+    pub(crate) fn lane_change_target(&self, actor: usize) -> Option<Lane> {
         match &self.actors[actor].body {
-            Body::Driven(plant) => plant.changing_to(),
+            Body::Driven(plant) => plant.lane_change_target(),
             Body::Wrecked { .. } => None,
         }
     }
 
-    /// How far a vehicle is beside the path that its driver means to take, positive to the left [m].
+    /// Returns a vehicle's lateral deviation from the path that its driver intends, positive to the left (m).
     pub(crate) fn lateral_deviation_m(&self, actor: usize) -> f64 {
         match &self.actors[actor].body {
             Body::Driven(plant) => plant.lateral_deviation_m(),
@@ -156,22 +162,22 @@ impl World {
         }
     }
 
-    /// True once a vehicle has touched another: its driver has lost control.
+    /// Returns whether a vehicle has touched another one, so that its driver has lost control.
     pub(crate) fn is_wrecked(&self, actor: usize) -> bool {
         matches!(self.actors[actor].body, Body::Wrecked { .. })
     }
 
-    /// The vehicles around one.
+    /// Returns the vehicles around a vehicle.
     pub(crate) fn neighbours(&self, actor: usize) -> Neighbours {
-        neighbours::around(self, actor, &self.road)
+        neighbours::find(self, actor, &self.road)
     }
 
-    /// Every first touch so far, in order of time.
+    /// Returns the collisions so far, in order of time.
     pub(crate) fn collisions(&self) -> &[Collision] {
         &self.collisions
     }
 
-    /// Moves every vehicle on by one step; `actions` in the order of the actors, `phase` for collisions in this step.
+    /// Moves all vehicles by one step. `actions` is in the order of the actors; `phase` is noted in collisions of this step.
     pub(crate) fn step(&mut self, actions: &[Action], phase: Phase) {
         std::mem::swap(&mut self.shapes, &mut self.shapes_before);
         let step_s = self.step.s();
@@ -194,7 +200,7 @@ impl World {
             }
         }
         self.refresh_shapes();
-        self.settle_impacts(step_s);
+        self.update_impacts(step_s);
         self.collide(phase);
         self.time += self.step;
     }
@@ -218,26 +224,33 @@ impl World {
         }
     }
 
-    /// Finds new touches within the step just taken, records them, and hands the vehicles to the solver.
+    /// Finds the pairs that have touched for the first time within the last step, and starts their collisions.
     fn collide(&mut self, phase: Phase) {
         let mut touches = std::mem::take(&mut self.touches);
-        contact::find([&self.shapes_before, &self.shapes], &self.by_name, &self.touched_pairs, &mut touches);
+        let boxes = StepBoxes { before: &self.shapes_before, after: &self.shapes };
+        contact::find(boxes, &self.by_name, &self.touched_pairs, &mut touches);
         for touch in &touches {
-            self.record(touch, phase);
+            self.start_collision(touch, phase);
         }
         self.touches = touches;
     }
 
-    fn record(&mut self, touch: &Touch, phase: Phase) {
+    /// Adds a collision to the list and hands its two vehicles to the solver.
+    fn start_collision(&mut self, touch: &Touch, phase: Phase) {
         let [first, second] = touch.pair;
         let velocities_mps = [self.velocity_mps(first), self.velocity_mps(second)];
-        let shapes = [&self.shapes[first], &self.shapes[second]];
+        let struck = |index: usize| StruckVehicle {
+            shape: &self.shapes[touch.pair[index]],
+            side: touch.struck_side[index],
+            velocity_mps: velocities_mps[index],
+        };
+        let closed_by = contact::closed_by(struck(0), struck(1));
         let since_start = Time::from_s(touch.fraction * self.step.s());
         self.collisions.push(Collision {
             time: self.time + since_start,
             between: [self.actors[first].id.clone(), self.actors[second].id.clone()],
             struck_side: touch.struck_side,
-            closed_by: contact::closed_by(shapes, touch.struck_side, velocities_mps),
+            closed_by,
             phase,
             relative_speed_mps: (velocities_mps[0] - velocities_mps[1]).norm(),
             delta_v_mps: [0.0; 2],
@@ -250,7 +263,7 @@ impl World {
         }
     }
 
-    /// Velocity in the plane [m/s].
+    /// Returns the velocity of a vehicle in the plane (m/s).
     fn velocity_mps(&self, actor: usize) -> Vector2<f64> {
         match &self.actors[actor].body {
             Body::Wrecked { body, .. } => match &self.wreckage {
@@ -258,15 +271,15 @@ impl World {
                 None => Vector2::zeros(),
             },
             Body::Driven(plant) => {
-                // The course: where the box's centre has moved in this step.
+                // The direction of motion is that of the box's centre in this step.
                 let (from, to) = (&self.shapes_before[actor], &self.shapes[actor]);
-                let way = Vector2::new(to.x_m - from.x_m, to.y_m - from.y_m);
-                way.try_normalize(1e-9).map_or_else(Vector2::zeros, |course| course * plant.state().speed_mps)
+                let moved_m = Vector2::new(to.x_m - from.x_m, to.y_m - from.y_m);
+                moved_m.try_normalize(1e-9).map_or_else(Vector2::zeros, |course| course * plant.state().speed_mps)
             }
         }
     }
 
-    /// Hands a driven vehicle to the solver, at the place where it touched after `fraction` of the step.
+    /// Hands a driven vehicle to the solver, at the position that it had after `fraction` of the step.
     fn wreck(&mut self, actor: usize, fraction: f64) {
         if self.is_wrecked(actor) {
             return;
@@ -288,15 +301,15 @@ impl World {
         self.actors[actor].body = Body::Wrecked { body, state };
     }
 
-    /// Reads the change of velocity of every impact that is still going on.
-    fn settle_impacts(&mut self, step_s: f64) {
+    /// Updates the changes of velocity of all impacts in progress, and removes those that have ended.
+    fn update_impacts(&mut self, step_s: f64) {
         let Some(wreckage) = &self.wreckage else { return };
         for impact in &mut self.open_impacts {
             impact.left_s -= step_s;
-            for place in 0..2 {
-                if let Body::Wrecked { body, .. } = &self.actors[impact.pair[place]].body {
-                    let change_mps = wreckage.motion(*body).velocity_mps - impact.velocities_mps[place];
-                    self.collisions[impact.collision].delta_v_mps[place] = change_mps.norm();
+            for index in 0..2 {
+                if let Body::Wrecked { body, .. } = &self.actors[impact.pair[index]].body {
+                    let change_mps = wreckage.motion(*body).velocity_mps - impact.velocities_mps[index];
+                    self.collisions[impact.collision].delta_v_mps[index] = change_mps.norm();
                 }
             }
         }
@@ -304,7 +317,7 @@ impl World {
     }
 }
 
-/// A wreck's state in the road frame; its acceleration follows from its speed before.
+/// Returns the state of a wreck in the road frame. Its acceleration is the change of speed since the state `before`.
 fn road_state(motion: &Motion, road: &Road, before: &VehicleState, step_s: f64) -> VehicleState {
     let (s_m, d_m) = road.road_position_m(motion.position_m.x, motion.position_m.y);
     let speed_mps = motion.velocity_mps.norm();

@@ -1,42 +1,46 @@
-//! A plot over time: axes with round ticks, curves with gaps, levels, and the moments of the encounter.
+//! A line chart: axes with round ticks, curves with gaps, reference levels, and the marked moments of the encounter.
 
-use super::svg::{Anchor, Area, Letters, Stroke, Svg};
+use super::svg::{Anchor, Area, Stroke, Svg, TextStyle};
 
+/// Colour of text and axes.
 pub(super) const INK: &str = "#222222";
+/// Colour of grid lines.
 pub(super) const FAINT: &str = "#dddddd";
+/// Colour of the lines that mark moments.
 pub(super) const MOMENT: &str = "#8a8a8a";
-const TICK_LETTERS: f64 = 10.0;
-const NAME_LETTERS: f64 = 11.0;
-/// Moments closer together than this have their letters at different heights [px].
+const TICK_FONT_SIZE_PX: f64 = 10.0;
+const NAME_FONT_SIZE_PX: f64 = 11.0;
+/// Distance of two moments below which their style are at different heights (px).
 const CLOSE_PX: f64 = 12.0;
-/// Ticks that an axis has about.
-const TICKS: f64 = 5.0;
+/// Approximate number of ticks of an axis.
+const TICK_COUNT: f64 = 5.0;
 
-/// The range of an axis.
+/// The lower and upper end of an axis.
 pub(super) type Range = [f64; 2];
 
-/// One curve; a value that is absent leaves a gap.
+/// A curve. An absent value leaves a gap.
 pub(super) struct Curve<'a> {
     pub(super) name: String,
     pub(super) stroke: Stroke<'a>,
     pub(super) points: Vec<(f64, Option<f64>)>,
 }
 
-/// One plot with all that is in it.
+/// A chart with its contents.
 pub(super) struct Chart<'a> {
     pub(super) name: &'a str,
     pub(super) x: Range,
     pub(super) y: Range,
     pub(super) curves: Vec<Curve<'a>>,
-    /// Levels that values are compared with, with their names.
+    /// Reference levels with their names.
     pub(super) levels: Vec<(f64, String)>,
-    /// Instants with their letters.
+    /// Marked positions on the x axis with their style.
     pub(super) moments: &'a [(f64, char)],
-    /// Written below, where it is not that of the plot beneath.
+    /// Name of the x axis; `None` if the chart below carries it.
     pub(super) x_name: Option<&'a str>,
 }
 
 impl Chart<'_> {
+    /// Draws the chart into `area`.
     pub(super) fn draw(&self, svg: &mut Svg, area: Area) {
         self.axes(svg, area);
         svg.clipped(area, |svg| {
@@ -59,16 +63,16 @@ impl Chart<'_> {
         let mut last_x = f64::NEG_INFINITY;
         let mut is_low = false;
         for &(at, letter) in self.moments.iter().filter(|(at, _)| *at >= self.x[0] && *at <= self.x[1]) {
-            let letters = Letters { size: NAME_LETTERS, colour: INK, anchor: Anchor::Start };
+            let style = TextStyle { size: NAME_FONT_SIZE_PX, colour: INK, anchor: Anchor::Start };
             let x = self.x_of(at, area);
-            // Letters that stand close together take turns in height.
+            // Letters that are close together alternate in height.
             is_low = x - last_x < CLOSE_PX && !is_low;
             last_x = x;
-            svg.text([x + 2.0, area.top + if is_low { 24.0 } else { 12.0 }], &letter.to_string(), letters);
+            svg.text([x + 2.0, area.top + if is_low { 24.0 } else { 12.0 }], &letter.to_string(), style);
         }
         for (level, name) in self.levels.iter().filter(|(level, _)| *level >= self.y[0] && *level <= self.y[1]) {
-            let letters = Letters { size: 9.0, colour: "#d62728", anchor: Anchor::End };
-            svg.text([area.right() - 4.0, self.y_of(*level, area) - 3.0], name, letters);
+            let style = TextStyle { size: 9.0, colour: "#d62728", anchor: Anchor::End };
+            svg.text([area.right() - 4.0, self.y_of(*level, area) - 3.0], name, style);
         }
         self.legend(svg, area);
     }
@@ -82,22 +86,22 @@ impl Chart<'_> {
     }
 
     fn axes(&self, svg: &mut Svg, area: Area) {
-        let letters = |anchor| Letters { size: TICK_LETTERS, colour: INK, anchor };
+        let style = |anchor| TextStyle { size: TICK_FONT_SIZE_PX, colour: INK, anchor };
         for tick in ticks(self.y) {
             let y = self.y_of(tick, area);
             svg.line([area.left, y], [area.right(), y], Stroke::solid(FAINT, 0.6));
-            svg.text([area.left - 5.0, y + 3.5], &shown(tick), letters(Anchor::End));
+            svg.text([area.left - 5.0, y + 3.5], &tick_text(tick), style(Anchor::End));
         }
         for tick in ticks(self.x) {
             let x = self.x_of(tick, area);
             svg.line([x, area.top], [x, area.bottom()], Stroke::solid(FAINT, 0.6));
-            svg.text([x, area.bottom() + 13.0], &shown(tick), letters(Anchor::Middle));
+            svg.text([x, area.bottom() + 13.0], &tick_text(tick), style(Anchor::Middle));
         }
         svg.frame(area, Stroke::solid(INK, 0.8));
-        let name = Letters { size: NAME_LETTERS, colour: INK, anchor: Anchor::Start };
+        let name = TextStyle { size: NAME_FONT_SIZE_PX, colour: INK, anchor: Anchor::Start };
         svg.text([area.left, area.top - 5.0], self.name, name);
         if let Some(x_name) = self.x_name {
-            svg.text([area.right(), area.bottom() + 26.0], x_name, letters(Anchor::End));
+            svg.text([area.right(), area.bottom() + 26.0], x_name, style(Anchor::End));
         }
     }
 
@@ -106,13 +110,13 @@ impl Chart<'_> {
             let y = area.top + 13.0 + 13.0 * row as f64;
             let x = area.right() + 8.0;
             svg.line([x, y - 3.5], [x + 20.0, y - 3.5], curve.stroke);
-            let letters = Letters { size: TICK_LETTERS, colour: INK, anchor: Anchor::Start };
-            svg.text([x + 25.0, y], &curve.name, letters);
+            let style = TextStyle { size: TICK_FONT_SIZE_PX, colour: INK, anchor: Anchor::Start };
+            svg.text([x + 25.0, y], &curve.name, style);
         }
     }
 }
 
-/// The stretches of a curve without gaps.
+/// Splits a curve at its gaps. Pieces of a single point are dropped.
 fn pieces(points: &[(f64, Option<f64>)]) -> Vec<Vec<(f64, f64)>> {
     let mut pieces: Vec<Vec<(f64, f64)>> = vec![Vec::new()];
     for &(x, y) in points {
@@ -126,9 +130,9 @@ fn pieces(points: &[(f64, Option<f64>)]) -> Vec<Vec<(f64, f64)>> {
     pieces
 }
 
-/// Round values within a range: 1, 2 or 5 times a power of ten apart.
+/// Returns the round values within a range. Their distance is 1, 2 or 5 times a power of ten.
 pub(super) fn ticks([low, high]: Range) -> Vec<f64> {
-    let rough = (high - low) / TICKS;
+    let rough = (high - low) / TICK_COUNT;
     if !(rough > 0.0 && rough.is_finite()) {
         return Vec::new();
     }
@@ -144,14 +148,14 @@ pub(super) fn ticks([low, high]: Range) -> Vec<f64> {
     ticks
 }
 
-/// A tick's value without needless digits; no negative zero.
-fn shown(value: f64) -> String {
+/// Returns the text of a tick, without trailing zeros and without a negative zero.
+fn tick_text(value: f64) -> String {
     let text = format!("{value:.2}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
     if text == "-0" { "0".to_owned() } else { text.replace('-', "\u{2212}") }
 }
 
-/// The range of some values, widened to have room; `at_least` is always in it.
+/// Returns a range that contains all finite `values` and the range `at_least`, with some room beyond the values.
 pub(super) fn range_of(values: impl Iterator<Item = f64>, at_least: Range) -> Range {
     let finite = values.filter(|value| value.is_finite());
     let [low, high] = finite.fold(at_least, |[low, high], value| [low.min(value), high.max(value)]);
@@ -164,16 +168,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ticks_are_round_and_within() {
+    fn ticks_are_round_and_within_the_range() {
         assert_eq!(ticks([0.0, 4.2]), [0.0, 1.0, 2.0, 3.0, 4.0]);
         assert_eq!(ticks([-9.0, 4.0]), [-5.0, 0.0]);
         assert_eq!(ticks([1.0, 1.0]), [] as [f64; 0]);
-        assert_eq!(shown(-0.0), "0");
-        assert_eq!(shown(-2.5), "\u{2212}2.5");
+        assert_eq!(tick_text(-0.0), "0");
+        assert_eq!(tick_text(-2.5), "\u{2212}2.5");
     }
 
     #[test]
-    fn a_gap_parts_a_curve() {
+    fn a_gap_splits_a_curve() {
         let points = [
             (0.0, Some(1.0)),
             (1.0, Some(2.0)),

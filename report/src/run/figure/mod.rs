@@ -1,12 +1,13 @@
-//! An encounter as a picture that needs no viewer: for a report, and for the page of a campaign's recordings.
+//! Static figures of an encounter, which need no viewer: for a report, and for the index page of a campaign's
+//! recordings.
 //!
 //! ```text
-//!   Film ─▶ strips of the road (a) … (e) ─┐
-//!        ─▶ trajectories, plots ──────────┴─▶ SVG ─(bundled font)─▶ PNG
+//!   Film ─▶ road strips at (a) … (e) ─┐
+//!        ─▶ trajectories, plots ──────┴─▶ SVG ─(bundled font)─▶ PNG
 //! ```
 //!
-//! The same film gives the same bytes on every machine: the SVG is written by hand, and its text is turned into pixels
-//! with the font that is bundled here (DejaVu Sans, cut down; see `font/`), never with what a machine happens to have.
+//! The same film gives the same bytes on every machine: this module writes the SVG itself, and renders its text with
+//! the bundled font (a subset of DejaVu Sans; see `font/`), never with the fonts of the machine.
 
 mod chart;
 mod colours;

@@ -1,4 +1,4 @@
-//! From an SVG's text to pixels, with the bundled font alone.
+//! Rendering of an SVG picture as PNG, with the bundled font only.
 
 use std::sync::Arc;
 
@@ -8,37 +8,37 @@ use resvg::usvg::{Options, Tree};
 
 use super::svg::FONT;
 
-/// DejaVu Sans, cut down to the characters that figures use; its licence lies beside it.
+/// A subset of DejaVu Sans with the characters that the figures use. Its licence is in the same folder.
 const FONT_FILE: &[u8] = include_bytes!("font/DejaVuSans-subset.ttf");
-/// Pixels for each unit of the picture: sharp enough for print at half a page's width.
+/// Pixels per unit of the SVG: enough for sharp print at half a page's width.
 const SCALE: f32 = 2.0;
 
-/// A picture that could not be turned into pixels.
+/// The reason why a picture cannot be rendered.
 #[derive(Debug, thiserror::Error)]
 pub enum PngError {
-    /// The text is no picture.
+    /// The text is not valid SVG.
     #[error("failed to read the picture: {0}")]
     Svg(#[from] resvg::usvg::Error),
-    /// The picture has no area, or too large a one.
+    /// The area of the picture is zero or too large.
     #[error("failed to draw a picture of {width} by {height} pixels")]
     Size {
-        /// Its width [px].
+        /// Width (px).
         width: u32,
-        /// Its height [px].
+        /// Height (px).
         height: u32,
     },
-    /// The pixels could not be packed.
+    /// The pixels cannot be encoded as PNG.
     #[error("failed to encode the picture: {reason}")]
     Encode {
-        /// The library's reason.
+        /// The reason that the PNG library gives.
         reason: String,
     },
 }
 
-/// The bytes of a PNG file that shows an SVG picture.
+/// Renders an SVG picture and returns the bytes of a PNG file.
 ///
 /// # Errors
-/// [`PngError`] where the text is no picture, or it cannot be drawn.
+/// [`PngError`] if the text is not valid SVG, or the picture cannot be rendered.
 pub fn png(svg: &str) -> Result<Vec<u8>, PngError> {
     let mut fonts = Database::new();
     fonts.load_font_data(FONT_FILE.to_vec());

@@ -1,9 +1,9 @@
-//! The road from above at one instant, in a frame that goes along with E.
+//! A road strip: the road from above at one instant, in a frame that moves with the ego.
 
 use closecall_traffic::{Lane, Measured};
 
 use super::colours::colour;
-use super::svg::{Anchor, Area, Letters, Stroke, Svg};
+use super::svg::{Anchor, Area, Stroke, Svg, TextStyle};
 use crate::run::film::{Film, Frame};
 use closecall_simulation::outcome::CRITICAL_THW_S;
 
@@ -13,20 +13,20 @@ const BRAKE: &str = "#ff1a1a";
 const INDICATOR: &str = "#ffab00";
 const CRITICAL: &str = "#c40018";
 const SAFE: &str = "#1e7d32";
-/// Length of dash and gap of a lane marking in the picture [px].
+/// Lengths of the dashes and gaps of a lane marking in the picture (px).
 const DASH: &str = "9 9";
-/// Letters of names and headways [px].
-const LETTERS: f64 = 10.0;
+/// Font size of names and headways (px).
+const FONT_SIZE_PX: f64 = 10.0;
 
-/// What is shown behind E and ahead of it [m].
+/// Rear and front end of the visible part of the road, relative to the ego (m).
 pub(super) type Reach = [f64; 2];
 
-/// The lanes that any vehicle drives in, widened by nothing: where the picture's rows are [m], from the left edge.
-fn rows_m(film: &Film) -> [f64; 2] {
+/// Returns the lateral positions of the left and the right edge of the road (m), which bound the strip.
+fn road_edges_m(film: &Film) -> [f64; 2] {
     [0.0, film.road.right_edge_m()]
 }
 
-/// A strip in the making.
+/// A strip that is being drawn.
 struct Strip<'a> {
     film: &'a Film,
     frame: &'a Frame,
@@ -34,15 +34,15 @@ struct Strip<'a> {
     reach: Reach,
 }
 
-/// Draws a frame into `area`.
-pub(super) fn draw(svg: &mut Svg, film: &Film, row: usize, (area, reach): (Area, Reach)) {
-    let Some(frame) = film.frames.get(row) else { return };
+/// Draws the frame `frame_index` into `area`.
+pub(super) fn draw(svg: &mut Svg, film: &Film, frame_index: usize, (area, reach): (Area, Reach)) {
+    let Some(frame) = film.frames.get(frame_index) else { return };
     let strip = Strip { film, frame, area, reach };
     svg.rect(area, ASPHALT);
     svg.clipped(area, |svg| {
         strip.lanes(svg);
         strip.gaps(svg);
-        for actor in (0..film.cast.len()).filter(|&actor| film.is_there(actor, row)) {
+        for actor in (0..film.actors.len()).filter(|&actor| film.is_present(actor, frame_index)) {
             strip.vehicle(svg, actor);
         }
         if film.worst_collision().is_some_and(|collision| collision.time <= frame.time) {
@@ -52,14 +52,16 @@ pub(super) fn draw(svg: &mut Svg, film: &Film, row: usize, (area, reach): (Area,
 }
 
 impl Strip<'_> {
+    /// Returns the picture coordinates of a point in the road frame.
     fn at(&self, s_m: f64, d_m: f64) -> [f64; 2] {
         let ahead_m = s_m - self.frame.states[self.film.ego].s_m;
-        let [left_m, right_m] = rows_m(self.film);
+        let [left_m, right_m] = road_edges_m(self.film);
         let along = (ahead_m - self.reach[0]) / (self.reach[1] - self.reach[0]);
         let across = (left_m - d_m) / (left_m - right_m);
         [self.area.left + along * self.area.width, self.area.top + across * self.area.height]
     }
 
+    /// Draws the lane markings and the edges of the road.
     fn lanes(&self, svg: &mut Svg) {
         let road = &self.film.road;
         let own_m = self.frame.states[self.film.ego].s_m;
@@ -69,15 +71,16 @@ impl Strip<'_> {
             let stroke = Stroke { colour: MARKING, width: 1.0, dash: Some(DASH) };
             svg.line(self.at(ends[0], d_m), self.at(ends[1], d_m), stroke);
         }
-        for d_m in rows_m(self.film) {
+        for d_m in road_edges_m(self.film) {
             svg.line(self.at(ends[0], d_m), self.at(ends[1], d_m), Stroke::solid(MARKING, 2.5));
         }
     }
 
-    /// The body with its arrow-like front, its brake light, its indicator and its name.
+    /// Draws the body with its pointed front, the brake light, the indicator, and the name with the speed.
     fn vehicle(&self, svg: &mut Svg, actor: usize) {
-        let (state, member) = (&self.frame.states[actor], &self.film.cast[actor]);
-        let (half_m, side_m) = (0.5 * member.vehicle.dimensions.length_m, 0.5 * member.vehicle.dimensions.width_m);
+        let (state, film_actor) = (&self.frame.states[actor], &self.film.actors[actor]);
+        let (half_m, side_m) =
+            (0.5 * film_actor.vehicle.dimensions.length_m, 0.5 * film_actor.vehicle.dimensions.width_m);
         let corner = |[along, across]: [f64; 2]| self.at(state.s_m + along * half_m, state.d_m + across * side_m);
         let shape = [[-1.0, -1.0], [0.5, -1.0], [1.0, -0.5], [1.0, 0.5], [0.5, 1.0], [-1.0, 1.0]].map(corner);
         let paint = colour(actor, self.film.ego);
@@ -94,16 +97,17 @@ impl Strip<'_> {
             svg.circle(corner([-1.0, side]), 3.0, INDICATOR);
         }
         let [x, _] = corner([0.0, 0.0]);
-        // E's name stands below, the others' above: who passes does not cover it.
+        // The name of the ego is below its body, those of the others are above: a vehicle beside the ego covers
+        // neither.
         let y = if actor == self.film.ego { corner([0.0, -1.0])[1] + 11.0 } else { corner([0.0, 1.0])[1] - 3.0 };
-        let letters = Letters { size: LETTERS, colour: paint, anchor: Anchor::Middle };
-        svg.text([x, y], &format!("{} {:.1} m/s", member.name, state.speed_mps), letters);
+        let style = TextStyle { size: FONT_SIZE_PX, colour: paint, anchor: Anchor::Middle };
+        svg.text([x, y], &format!("{} {:.1} m/s", film_actor.name, state.speed_mps), style);
     }
 
-    /// The gaps before and behind E with their headways.
+    /// Draws the gaps in front of and behind the ego with their time headways.
     fn gaps(&self, svg: &mut Svg) {
         let (own, margins) = (&self.frame.states[self.film.ego], &self.frame.margins);
-        let half_m = 0.5 * self.film.cast[self.film.ego].vehicle.dimensions.length_m;
+        let half_m = 0.5 * self.film.actors[self.film.ego].vehicle.dimensions.length_m;
         let mut draw = |sign: f64, gap_m: Measured, thw_s: Measured| {
             let (Ok(gap_m), Ok(thw_s)) = (gap_m, thw_s) else { return };
             if !(gap_m > 0.0) {
@@ -112,19 +116,19 @@ impl Strip<'_> {
             let colour = if thw_s < CRITICAL_THW_S { CRITICAL } else { SAFE };
             let ends = [half_m, half_m + gap_m].map(|along_m| self.at(own.s_m + sign * along_m, own.d_m));
             svg.line(ends[0], ends[1], Stroke::solid(colour, 2.0));
-            let letters = Letters { size: LETTERS, colour, anchor: Anchor::Middle };
+            let style = TextStyle { size: FONT_SIZE_PX, colour, anchor: Anchor::Middle };
             let middle = [0.5 * (ends[0][0] + ends[1][0]), ends[0][1] - 4.0];
-            svg.text(middle, &format!("{thw_s:.2} s"), letters);
+            svg.text(middle, &format!("{thw_s:.2} s"), style);
         };
         draw(1.0, margins.gap_front_m, margins.thw_front_s);
         draw(-1.0, margins.gap_rear_m, margins.thw_rear_s);
     }
 
-    /// A burst where the first of the two that collided is.
+    /// Draws a burst halfway between the two vehicles of the collision.
     fn impact(&self, svg: &mut Svg) {
         let Some(collision) = self.film.worst_collision() else { return };
-        let of = |name: &str| self.film.cast.iter().position(|member| member.name == name);
-        let ends = collision.between.each_ref().map(|id| of(id.as_str()));
+        let index_of = |name: &str| self.film.actors.iter().position(|actor| actor.name == name);
+        let ends = collision.between.each_ref().map(|id| index_of(id.as_str()));
         let [Some(first), Some(second)] = ends else { return };
         let [a, b] = [first, second].map(|actor| {
             let state = &self.frame.states[actor];

@@ -1,12 +1,12 @@
-//! A picture as text: the few shapes that figures are made of.
+//! A writer of SVG pictures, with the few shapes that the figures need.
 
 use crate::escape::escaped;
 use std::fmt::Write as _;
 
-/// The font of all text; the bundled one where the picture is turned into pixels.
+/// The font of all text. Rendering as PNG uses the bundled font of this name.
 pub(super) const FONT: &str = "DejaVu Sans";
 
-/// A rectangle of the picture [px].
+/// A rectangle of the picture (px).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Area {
     pub(super) left: f64,
@@ -25,12 +25,12 @@ impl Area {
     }
 }
 
-/// How a line is drawn.
+/// The style of a line.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stroke<'a> {
     pub(super) colour: &'a str,
     pub(super) width: f64,
-    /// Lengths of dash and gap; solid where absent.
+    /// Lengths of dashes and gaps (px); `None` for a solid line.
     pub(super) dash: Option<&'a str>,
 }
 
@@ -44,7 +44,7 @@ impl<'a> Stroke<'a> {
     }
 }
 
-/// Where text stands about its point.
+/// The part of a text that its point marks.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Anchor {
     Start,
@@ -52,29 +52,30 @@ pub(super) enum Anchor {
     End,
 }
 
-/// How text is written.
+/// The style of a text.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Letters<'a> {
+pub(super) struct TextStyle<'a> {
     pub(super) size: f64,
     pub(super) colour: &'a str,
     pub(super) anchor: Anchor,
 }
 
-/// A picture in the making.
+/// A picture that is being drawn.
 #[derive(Debug)]
 pub(super) struct Svg {
     size: [f64; 2],
     body: String,
-    clips: usize,
+    /// Number of clip paths so far, which makes their names unique.
+    clip_count: usize,
 }
 
-// Writing to a string cannot fail: results of `write!` are dropped throughout.
+// Writing to a string cannot fail, so that the results of `write!` are ignored.
 impl Svg {
     pub(super) fn new(size: [f64; 2]) -> Self {
-        Self { size, body: String::new(), clips: 0 }
+        Self { size, body: String::new(), clip_count: 0 }
     }
 
-    /// The whole file.
+    /// Returns the text of the SVG file.
     pub(super) fn finish(self) -> String {
         let [width, height] = self.size;
         format!(
@@ -85,6 +86,7 @@ impl Svg {
         )
     }
 
+    /// Draws a filled rectangle.
     pub(super) fn rect(&mut self, area: Area, fill: &str) {
         let Area { left, top, width, height } = area;
         let _ = writeln!(
@@ -93,6 +95,7 @@ impl Svg {
         );
     }
 
+    /// Draws the outline of a rectangle.
     pub(super) fn frame(&mut self, area: Area, stroke: Stroke<'_>) {
         let (right, bottom) = (area.right(), area.bottom());
         let (left, top) = (area.left, area.top);
@@ -118,7 +121,7 @@ impl Svg {
         );
     }
 
-    /// A filled shape.
+    /// Draws a filled polygon with an outline.
     pub(super) fn polygon(&mut self, points: &[[f64; 2]], fill: &str, stroke: Stroke<'_>) {
         let mut text = String::new();
         for [x, y] in points {
@@ -137,8 +140,8 @@ impl Svg {
         let _ = writeln!(self.body, "<circle cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"{radius:.2}\" fill=\"{fill}\"/>");
     }
 
-    pub(super) fn text(&mut self, [x, y]: [f64; 2], text: &str, letters: Letters<'_>) {
-        let anchor = match letters.anchor {
+    pub(super) fn text(&mut self, [x, y]: [f64; 2], text: &str, style: TextStyle<'_>) {
+        let anchor = match style.anchor {
             Anchor::Start => "start",
             Anchor::Middle => "middle",
             Anchor::End => "end",
@@ -146,16 +149,16 @@ impl Svg {
         let _ = writeln!(
             self.body,
             "<text x=\"{x:.2}\" y=\"{y:.2}\" font-size=\"{:.1}\" fill=\"{}\" text-anchor=\"{anchor}\">{}</text>",
-            letters.size,
-            letters.colour,
+            style.size,
+            style.colour,
             escaped(text)
         );
     }
 
-    /// Draws what `draw` does within `area` only.
+    /// Calls `draw` and clips all that it draws to `area`.
     pub(super) fn clipped(&mut self, area: Area, draw: impl FnOnce(&mut Self)) {
-        self.clips += 1;
-        let name = format!("clip{}", self.clips);
+        self.clip_count += 1;
+        let name = format!("clip{}", self.clip_count);
         let Area { left, top, width, height } = area;
         let _ = writeln!(
             self.body,
@@ -172,10 +175,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn text_cannot_become_a_tag() {
+    fn text_is_escaped() {
         let mut svg = Svg::new([10.0, 10.0]);
-        let letters = Letters { size: 8.0, colour: "#000", anchor: Anchor::Start };
-        svg.text([0.0, 0.0], "a < b & \"c\"", letters);
+        let style = TextStyle { size: 8.0, colour: "#000", anchor: Anchor::Start };
+        svg.text([0.0, 0.0], "a < b & \"c\"", style);
         assert!(svg.finish().contains(">a &lt; b &amp; &quot;c&quot;</text>"));
     }
 }

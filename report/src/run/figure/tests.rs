@@ -10,7 +10,7 @@ use closecall_simulation::scenario::ScenarioFile;
 use closecall_simulation::{Arm, RunKey, simulate};
 
 fn films(name: &str, arms: &[ControllerChoice]) -> Vec<Film> {
-    let library = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenarios/library/{name}.toml"));
+    let library = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../scenarios/library/{name}.toml"));
     let file = ScenarioFile::load(&library, &[]).unwrap();
     let sampling = Sampling { seed: 1, design: Design::Random, samples: 1 };
     let scenario = concrete(&file, sampling, 0).unwrap();
@@ -25,17 +25,17 @@ fn films(name: &str, arms: &[ControllerChoice]) -> Vec<Film> {
 }
 
 #[test]
-fn the_methods_figure_shows_all_five_moments_and_the_collision_that_is_prevented() {
+fn the_figure_of_the_papers_scenario_shows_all_five_moments_and_the_prevented_collision() {
     let films = films("paper-figure", &[ControllerChoice::Acc, ControllerChoice::Mis]);
     let text = encounter(&films);
     for letter in ["(a)", "(b)", "(c)", "(d)", "(e)", "COLLISION", "No collision", "critical 0.9 s", "increasing"] {
         assert!(text.contains(letter), "{letter}");
     }
-    assert!(!text.contains("NaN") && !text.contains("inf"), "a number that cannot be drawn");
+    assert!(!text.contains("NaN") && !text.contains("inf"), "the figure contains a number that is not finite");
 }
 
 #[test]
-fn a_picture_turns_into_the_same_pixels_again_with_letters_in_it() {
+fn a_picture_renders_its_text_and_gives_the_same_bytes_each_time() {
     let svg = "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"60\" height=\"20\">\
                <text x=\"2\" y=\"15\" font-size=\"14\" font-family=\"'DejaVu Sans', sans-serif\">ΔV 9.8</text></svg>";
     let bytes = png(svg).unwrap();
@@ -45,7 +45,7 @@ fn a_picture_turns_into_the_same_pixels_again_with_letters_in_it() {
 }
 
 #[test]
-fn a_run_without_anyone_near_has_a_still_and_a_figure_all_the_same() {
+fn a_run_without_other_vehicles_nearby_has_a_still_and_a_figure() {
     let films = films("empty-wet-road", &[ControllerChoice::Mis]);
     for text in [still(&films[0]), encounter(&films)] {
         assert!(text.contains("No collision") && !text.contains("NaN") && !text.contains("inf"));
@@ -53,6 +53,6 @@ fn a_run_without_anyone_near_has_a_still_and_a_figure_all_the_same() {
 }
 
 #[test]
-fn what_is_no_picture_is_an_error() {
+fn invalid_svg_is_an_error() {
     assert!(png("no picture").is_err());
 }

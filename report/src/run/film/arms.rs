@@ -1,4 +1,4 @@
-//! One sample in several arms, a film of each.
+//! Films of one sample in several arms.
 
 use closecall_campaign::runner::run_guarded;
 use closecall_simulation::scenario::Scenario;
@@ -6,7 +6,7 @@ use closecall_simulation::{Arm, RunKey, SampleError};
 
 use super::{Film, FilmRecorder, Level};
 
-/// Runs a sample in each of the arms, and returns a film of each.
+/// Runs one sample in each of `arms` and returns one film per arm, in the same order.
 ///
 /// # Errors
 /// [`SampleError`] if one of the runs has no outcome.

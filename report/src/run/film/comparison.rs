@@ -1,6 +1,7 @@
-//! A recorded encounter and the run that re-enacts it, in the numbers that decide how close it was.
+//! Comparison of a recorded encounter with the run that re-enacts it, by the metrics that say how close it was.
 //!
-//! Both are measured alike: from the start until R crosses the marking, or to E's first collision, or the end.
+//! Both are evaluated over the same part of the encounter: from the start until the rear vehicle crosses the lane
+//! marking. A collision of the ego or the end of the run ends the evaluation earlier.
 
 use std::fmt::Write as _;
 
@@ -12,54 +13,59 @@ use super::{Film, Frame};
 use closecall_simulation::outcome::worse;
 use closecall_simulation::scenario::RearDriver;
 
-/// How close an encounter was.
+/// Metrics of one encounter that say how close it was.
 #[derive(Clone, Copy, Debug)]
 pub struct Course {
-    /// When R crosses the marking [s].
+    /// Time at which the rear vehicle crosses the lane marking (s).
     pub crossing_s: Measured,
-    /// E's time headway to F just before [s].
+    /// Time headway of the ego to the lead vehicle at the last frame before the crossing (s).
     pub thw_front_at_crossing_s: Measured,
-    /// R's time headway to E just before [s].
+    /// Time headway of the rear vehicle to the ego at the last frame before the crossing (s).
     pub thw_rear_at_crossing_s: Measured,
-    /// E's smallest time headway until then [s].
+    /// Smallest time headway of the ego before the crossing (s).
     pub min_thw_front_s: Measured,
-    /// R's smallest time headway to E until then [s].
+    /// Smallest time headway of the rear vehicle to the ego before the crossing (s).
     pub min_thw_rear_s: Measured,
-    /// E's hardest braking until then [m/s²].
+    /// Largest deceleration of the ego before the crossing (m/s²).
     pub max_deceleration_mps2: f64,
 }
 
-/// The recorded encounter and the simulated run.
+/// Metrics of a recorded encounter and of the simulated run that re-enacts it.
 #[derive(Clone, Copy, Debug)]
 pub struct Comparison {
-    /// As recorded.
+    /// Metrics of the recorded encounter.
     pub recorded: Course,
-    /// As simulated.
+    /// Metrics of the simulated run.
     pub simulated: Course,
 }
 
 impl Comparison {
-    /// Measures both films of an encounter. In the scenario E, F and R have the places that they have in the encounter.
+    /// Evaluates both films of an encounter. The ego, the lead and the rear vehicle must have the same indices in the
+    /// simulated film as in the encounter.
     pub fn new(encounter: &RecordedEncounter, recorded: &Film, simulated: &Film) -> Self {
-        let home = encounter.home;
-        let crosses = |frame: &&Frame| simulated.road.lane_at(frame.states[REAR].d_m) != home;
+        let from_lane = encounter.home;
+        let crosses = |frame: &&Frame| simulated.road.lane_at(frame.states[REAR].d_m) != from_lane;
         let crossing = simulated.frames.iter().find(crosses).map(|frame| frame.time);
-        Self { recorded: Course::of(recorded, Some(encounter.crossing)), simulated: Course::of(simulated, crossing) }
+        Self {
+            recorded: Course::measure(recorded, Some(encounter.crossing)),
+            simulated: Course::measure(simulated, crossing),
+        }
     }
 
-    /// The quantities by name, each as recorded and as simulated.
+    /// Returns the name of each metric with its text for the recorded encounter and for the simulated run.
     pub fn rows(&self) -> impl Iterator<Item = (&'static str, [String; 2])> {
-        ROWS.iter().map(|(name, unit, of)| {
-            let shown = |course| match of(course) {
+        ROWS.iter().map(|(name, unit, metric)| {
+            let text = |course| match metric(course) {
                 Ok(value) => format!("{value:.2} {unit}"),
                 Err(Absent::NeverCrossed) => "never".to_owned(),
                 Err(_) => "-".to_owned(),
             };
-            (*name, [shown(&self.recorded), shown(&self.simulated)])
+            (*name, [text(&self.recorded), text(&self.simulated)])
         })
     }
 
-    /// What is compared, what came of it, and what the two have in common, as Markdown.
+    /// Returns the comparison as Markdown: the vehicles, a table of the metrics, and how the run deviates from the
+    /// recorded encounter.
     pub fn markdown(&self, encounter: &RecordedEncounter, simulated: &Film, driver: RearDriver) -> String {
         let [ego, front, rear] = encounter.protagonists().map(|track| track.track_id);
         let (arm, start_s) = (simulated.arm(), encounter.start.s());
@@ -75,14 +81,14 @@ impl Comparison {
             RearDriver::Driver => "R is a human driver who reacts, and pulls out at the recorded headway",
             RearDriver::Recorded => "R drives as recorded, whatever E does",
         };
-        let missing = encounter.vehicles.len().saturating_sub(simulated.cast.len());
-        let left_out = match missing {
+        let missing_count = encounter.vehicles.len().saturating_sub(simulated.actors.len());
+        let missing_text = match missing_count {
             0 => String::new(),
             count => format!("; {count} of the vehicles around are not simulated"),
         };
         let _ = writeln!(
             page,
-            "\nIn the run, F drives as recorded; {rear_driver}{left_out}. The thin outlines are the vehicles of the other \
+            "\nIn the run, F drives as recorded; {rear_driver}{missing_text}. The thin outlines are the vehicles of the other \
              half. Recording: `{}`.\n",
             encounter.recording
         );
@@ -90,7 +96,7 @@ impl Comparison {
     }
 }
 
-/// A quantity of the comparison: its name, its unit, and where it is.
+/// A metric of the comparison: its name, its unit, and the function that reads it.
 type Row = (&'static str, &'static str, fn(&Course) -> Measured);
 
 const ROWS: [Row; 6] = [
@@ -103,33 +109,34 @@ const ROWS: [Row; 6] = [
 ];
 
 impl Course {
-    fn of(film: &Film, crossing: Option<Time>) -> Self {
-        let touched = film.worst_collision().map(|collision| collision.time);
-        let until = [crossing, touched].into_iter().flatten().min();
+    /// Evaluates a film up to `crossing`, the time at which the rear vehicle crosses the marking, if it does.
+    fn measure(film: &Film, crossing: Option<Time>) -> Self {
+        let collided_at = film.worst_collision().map(|collision| collision.time);
+        let until = [crossing, collided_at].into_iter().flatten().min();
         let frames = || film.frames.iter().take_while(|frame| until.is_none_or(|until| frame.time < until));
         let rear = |frame: &Frame| headway_s(film, frame, REAR);
-        // Where E collided before, R has not crossed: what came later is no encounter.
-        let crossing = crossing.filter(|crossing| touched.is_none_or(|touched| *crossing <= touched));
+        // A crossing after the collision is not part of the encounter and does not count.
+        let crossing = crossing.filter(|crossing| collided_at.is_none_or(|collided_at| *crossing <= collided_at));
         let before = frames().last().filter(|_| crossing.is_some());
-        let then = |of: &dyn Fn(&Frame) -> Measured| before.map_or(Err(Absent::NeverCrossed), of);
-        let least = |of: &dyn Fn(&Frame) -> Measured, absent| {
+        let at_crossing = |of: &dyn Fn(&Frame) -> Measured| before.map_or(Err(Absent::NeverCrossed), of);
+        let smallest = |of: &dyn Fn(&Frame) -> Measured, absent| {
             frames().filter_map(|frame| of(frame).ok()).min_by(f64::total_cmp).ok_or(absent)
         };
-        let braking = frames().map(|frame| -frame.states[film.ego].acceleration_mps2);
+        let decelerations = frames().map(|frame| -frame.states[film.ego].acceleration_mps2);
         Self {
             crossing_s: crossing.map(Time::s).ok_or(Absent::NeverCrossed),
-            thw_front_at_crossing_s: then(&|frame| frame.margins.thw_front_s),
-            thw_rear_at_crossing_s: then(&rear),
-            min_thw_front_s: least(&|frame| frame.margins.thw_front_s, Absent::NoLead),
-            min_thw_rear_s: least(&rear, Absent::NoFollower),
-            max_deceleration_mps2: braking.fold(0.0, worse),
+            thw_front_at_crossing_s: at_crossing(&|frame| frame.margins.thw_front_s),
+            thw_rear_at_crossing_s: at_crossing(&rear),
+            min_thw_front_s: smallest(&|frame| frame.margins.thw_front_s, Absent::NoLead),
+            min_thw_rear_s: smallest(&rear, Absent::NoFollower),
+            max_deceleration_mps2: decelerations.fold(0.0, worse),
         }
     }
 }
 
-/// The time headway of a vehicle to E along the road [s], whichever lanes the two are counted to.
+/// Returns the time headway of a vehicle to the ego along the road (s), whichever lanes the two are in.
 fn headway_s(film: &Film, frame: &Frame, actor: usize) -> Measured {
     let (own, other) = (&frame.states[film.ego], &frame.states[actor]);
-    let half_lengths_m = [film.ego, actor].map(|actor| 0.5 * film.cast[actor].vehicle.dimensions.length_m);
+    let half_lengths_m = [film.ego, actor].map(|actor| 0.5 * film.actors[actor].vehicle.dimensions.length_m);
     time_headway_s(own.s_m - other.s_m - half_lengths_m.iter().sum::<f64>(), other.speed_mps)
 }

@@ -1,28 +1,29 @@
-//! A recorded encounter as a film, in E's place the vehicle that was E: to be looked at beside the run that re-enacts it.
+//! The film of a recorded encounter, to be viewed beside the run that re-enacts it.
 //!
-//! Clock, road and places are those of the scenario that is made from the encounter, so that both can be drawn into one
-//! another. Vehicles are shown at the period of the simulation's control steps, interpolated between recorded instants.
+//! The recorded vehicle that the simulated ego replaces is the ego of the film. Clock, road and vehicle indices are
+//! those of the scenario that is made from the encounter, so that one film can be drawn into the other. The frames are
+//! one control step of the simulation apart.
 
 use closecall_scenarios::encounter::{EGO, RecordedEncounter};
 use closecall_traffic::{Environment, Time, Trajectory, Vehicle};
 
-use super::traffic::{frame, rows, straight_road};
-use super::{Film, Level, Member, TrafficFilmError};
+use super::traffic::{frame_at, present_frames, straight_road};
+use super::{Film, FilmActor, Level, TrafficFilmError};
 use closecall_simulation::CONTROL_STEP;
 use closecall_simulation::scenario::actor_name;
 
-/// A film of a recorded encounter, its frames a control step apart.
+/// Returns the film of a recorded encounter, with one frame per control step.
 ///
 /// # Errors
-/// [`TrafficFilmError`] where its lanes make no road.
+/// [`TrafficFilmError::Road`] if no road can be built from the recorded lanes.
 pub fn film_encounter(encounter: &RecordedEncounter, level: Level) -> Result<Film, TrafficFilmError> {
     let tracks: Vec<&Trajectory> = encounter.vehicles.iter().map(|vehicle| &vehicle.trajectory).collect();
     let steps = encounter.end.ns() / CONTROL_STEP.ns();
     let times = || (0..=steps).map(|step| CONTROL_STEP * step);
-    let member = |(place, track): (usize, &&Trajectory)| Member {
-        name: actor_name(place, track),
+    let film_actor = |(index, track): (usize, &&Trajectory)| FilmActor {
+        name: actor_name(index, track),
         vehicle: Vehicle { dimensions: track.dimensions, ..Vehicle::typical(track.class) },
-        rows: rows(track, times()),
+        present_frames: present_frames(track, times()),
         is_plotted: true,
     };
     let [ego, _, rear] = encounter.protagonists();
@@ -33,9 +34,9 @@ pub fn film_encounter(encounter: &RecordedEncounter, level: Level) -> Result<Fil
         period: CONTROL_STEP,
         road: straight_road(encounter.lanes, encounter.lane_width_m)?,
         environment: Environment::CLEAR_DAY,
-        cast: tracks.iter().enumerate().map(member).collect(),
+        actors: tracks.iter().enumerate().map(film_actor).collect(),
         ego: EGO,
-        frames: times().map(|time| frame(&tracks, time)).collect(),
+        frames: times().map(|time| frame_at(&tracks, time)).collect(),
         happenings: Vec::new(),
         notes: notes(encounter),
         acceleration_limits: Vec::new(),
@@ -46,11 +47,11 @@ pub fn film_encounter(encounter: &RecordedEncounter, level: Level) -> Result<Fil
     })
 }
 
-/// The lane changes of the three who make the encounter.
+/// Returns notes about the lane changes of the ego, the lead and the rear vehicle.
 fn notes(encounter: &RecordedEncounter) -> Vec<(Time, String)> {
     let mut notes = Vec::new();
-    for (place, vehicle) in encounter.vehicles.iter().take(encounter.protagonists().len()).enumerate() {
-        let name = actor_name(place, &vehicle.trajectory);
+    for (index, vehicle) in encounter.vehicles.iter().take(encounter.protagonists().len()).enumerate() {
+        let name = actor_name(index, &vehicle.trajectory);
         for change in &vehicle.changes {
             let mut note = |recorded_s: f64, text: &str| {
                 let time = encounter.time_of(recorded_s);

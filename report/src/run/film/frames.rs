@@ -1,4 +1,4 @@
-//! The frames of a film, and what is known of it as a whole.
+//! The film of a run: its frames, its vehicles, and the data of the run as a whole.
 
 use std::ops::Range;
 
@@ -14,31 +14,31 @@ use closecall_simulation::{Happening, MarginsNow};
 
 use super::Scan;
 
-/// Encounters further ahead than this are not looked at [s].
+/// Closest encounters later than this are ignored (s).
 const ENCOUNTER_HORIZON_S: f64 = 10.0;
 
-/// How much of a run is kept.
+/// The level of detail of a film.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {
-    /// States, events and plots
+    /// The states of the vehicles, the events and the plots.
     Events,
-    /// The vehicles and what E takes them for as well
+    /// Also the 3D scene: the vehicles, and what the ego perceives.
     Objects,
-    /// The rear sensors' points and pictures as well, where they are simulated
+    /// Also the LiDAR points and camera images of the rear sensors, if these are simulated.
     #[default]
     Full,
 }
 
-/// One vehicle of a film.
+/// A vehicle of a film.
 #[derive(Clone, Debug)]
-pub struct Member {
-    /// What it is called.
+pub struct FilmActor {
+    /// Name of the actor.
     pub name: String,
-    /// What it is.
+    /// Class and dimensions of the vehicle.
     pub vehicle: Vehicle,
-    /// The frames in which it is there.
-    pub rows: Range<usize>,
-    /// True where its speed and acceleration are plotted.
+    /// Indices of the frames in which the vehicle is present.
+    pub present_frames: Range<usize>,
+    /// True if the plots show its speed and acceleration.
     pub is_plotted: bool,
 }
 
@@ -46,135 +46,144 @@ pub struct Member {
 #[derive(Clone, Debug)]
 pub struct Frame {
     pub(in crate::run) time: Time,
-    /// In the order of the cast; where a vehicle is not there, its nearest state in time.
+    /// States of the vehicles, in the order of [`Film::actors`]. A vehicle that is absent has the nearest of its states
+    /// in time.
     pub(in crate::run) states: Vec<VehicleState>,
-    /// Pitch of each body, positive nose down [rad].
+    /// Pitch of each body, positive nose down (rad).
     pub(in crate::run) pitches_rad: Vec<f64>,
     pub(in crate::run) margins: MarginsNow,
+    /// Tracks that the ego's sensors report; empty below [`Level::Objects`].
     pub(in crate::run) tracks: Vec<Track>,
-    /// What E's controller asked for; nothing where E was recorded on a road.
+    /// Command of the ego's controller; `None` for recorded traffic.
     pub(in crate::run) command: Option<EgoCommand>,
+    /// Phase of the encounter; `None` for recorded traffic.
     pub(in crate::run) phase: Option<Phase>,
+    /// Field of view of the rear sensor; `None` if it is not simulated or below [`Level::Objects`].
     pub(in crate::run) rear_field: Option<FieldOfView>,
+    /// Scan of the rear LiDAR, in the frames whose scan is kept.
     pub(in crate::run) scan: Option<Scan>,
 }
 
-/// A level that a quantity is compared with.
+/// A reference level of a plotted quantity.
 #[derive(Clone, Debug)]
 pub(in crate::run) struct Limit {
     pub(in crate::run) name: String,
     pub(in crate::run) value: f64,
 }
 
-/// A whole run, from the first frame to the outcome.
+/// A whole run, from its first frame to its outcome, or a stretch of recorded traffic.
 #[derive(Clone, Debug)]
 pub struct Film {
     pub(in crate::run) title: String,
-    /// Who controls E: the name of the arm; `recorded` for traffic on a road.
+    /// Name of the arm, which controls the ego; `recorded` for recorded traffic.
     pub(in crate::run) arm: String,
     pub(in crate::run) level: Level,
-    /// Time from one frame to the next.
+    /// Time between two frames.
     pub(in crate::run) period: Time,
     pub(in crate::run) road: Road,
     pub(in crate::run) environment: Environment,
-    pub(in crate::run) cast: Vec<Member>,
-    /// The place of E among them; in recorded traffic, of the vehicle that changes lanes.
+    /// The vehicles, in the order of the scenario's actors.
+    pub(in crate::run) actors: Vec<FilmActor>,
+    /// Index of the ego among the actors. In the film of a recorded lane change, the vehicle that changes lanes is the
+    /// ego.
     pub(in crate::run) ego: usize,
     pub(in crate::run) frames: Vec<Frame>,
     pub(in crate::run) happenings: Vec<(Time, Happening)>,
-    /// What is to be said about instants beside what happened.
+    /// Texts about instants that no happening covers.
     pub(in crate::run) notes: Vec<(Time, String)>,
-    /// Accelerations of E that mean something [m/s²].
+    /// Reference levels of the ego's acceleration (m/s²).
     pub(in crate::run) acceleration_limits: Vec<Limit>,
-    /// The rear camera, where one was simulated, and the key of its noise.
+    /// The rear camera and the key of its noise, if one was simulated.
     pub(in crate::run) camera: Option<(Camera, NoiseKey)>,
-    /// How it ended; nothing for recorded traffic.
+    /// The outcome; `None` for recorded traffic.
     pub(in crate::run) outcome: Option<Outcome>,
-    /// The moment to look at first, where it is known otherwise than from collisions and headways.
+    /// The critical moment, if it follows from something other than collisions and headways.
     pub(in crate::run) highlight: Option<Time>,
-    /// What is to be said before its story, as Markdown.
+    /// Text that precedes the story, in Markdown.
     pub(in crate::run) foreword: String,
 }
 
 impl Film {
-    /// Puts a text in Markdown before the story.
+    /// Sets the text, in Markdown, that precedes the story.
     #[must_use]
     pub fn with_foreword(self, foreword: String) -> Self {
         Self { foreword, ..self }
     }
 
-    /// Plots the speeds and accelerations of the first `count` vehicles only.
+    /// Limits the plots of speed and acceleration to the first `count` vehicles.
     #[must_use]
     pub fn plotting_first(mut self, count: usize) -> Self {
-        for (place, member) in self.cast.iter_mut().enumerate() {
-            member.is_plotted = place < count;
+        for (index, actor) in self.actors.iter_mut().enumerate() {
+            actor.is_plotted = index < count;
         }
         self
     }
 
-    /// What the film is called.
+    /// Returns the title of the film.
     pub fn title(&self) -> &str {
         &self.title
     }
 
-    /// Who controls E; `recorded` for traffic on a road.
+    /// Returns the name of the arm, which controls the ego; `recorded` for recorded traffic.
     pub fn arm(&self) -> &str {
         &self.arm
     }
 
-    /// How the run ended; nothing for recorded traffic.
+    /// Returns the outcome of the run, or `None` for recorded traffic.
     pub fn outcome(&self) -> Option<&Outcome> {
         self.outcome.as_ref()
     }
 
-    /// Every first touch of two vehicles.
+    /// Returns all collisions.
     pub(in crate::run) fn collisions(&self) -> &[Collision] {
         self.outcome.as_ref().map_or(&[], |outcome| &outcome.collisions)
     }
 
-    /// The first collision of E, else of anyone.
+    /// Returns the first collision of the ego or, if there is none, the first collision of any vehicles.
     pub(in crate::run) fn worst_collision(&self) -> Option<&Collision> {
-        let ego = self.cast[self.ego].name.as_str();
+        let ego = self.actors[self.ego].name.as_str();
         let collisions = self.collisions();
         let of_ego = |collision: &&Collision| collision.between.iter().any(|id| id.as_str() == ego);
         collisions.iter().find(of_ego).or(collisions.first())
     }
 
-    /// The times of all frames.
+    /// Returns the times of all frames.
     pub(in crate::run) fn times(&self) -> Vec<Time> {
         self.frames.iter().map(|frame| frame.time).collect()
     }
 
-    /// The frame at `time`, or the last one before it; the first where all are later.
+    /// Returns the last frame at or before `time`, or the first frame if all are later.
     pub(in crate::run) fn frame_at(&self, time: Time) -> Option<&Frame> {
         let after = self.frames.partition_point(|frame| frame.time <= time);
         self.frames.get(after.saturating_sub(1))
     }
 
-    /// The places of all vehicles along the road, from the last to the first [m].
-    pub(in crate::run) fn reach_m(&self) -> (f64, f64) {
-        let places = self.frames.iter().flat_map(|frame| frame.states.iter().map(|state| state.s_m));
-        places.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), s_m| (low.min(s_m), high.max(s_m)))
+    /// Returns the smallest and the largest position of any vehicle along the road (m).
+    pub(in crate::run) fn s_range_m(&self) -> (f64, f64) {
+        let positions = self.frames.iter().flat_map(|frame| frame.states.iter().map(|state| state.s_m));
+        positions.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), s_m| (low.min(s_m), high.max(s_m)))
     }
 
-    /// True where a vehicle is there in a frame.
-    pub(in crate::run) fn is_there(&self, actor: usize, row: usize) -> bool {
-        self.cast[actor].rows.contains(&row)
+    /// Returns true if a vehicle is present in a frame.
+    pub(in crate::run) fn is_present(&self, actor: usize, frame_index: usize) -> bool {
+        self.actors[actor].present_frames.contains(&frame_index)
     }
 
-    /// The closest encounter of E that is ahead in a frame, both vehicles at their present velocities: the soonest.
-    pub(in crate::run) fn encounter(&self, row: usize) -> Option<Encounter> {
-        let frame = &self.frames[row];
-        let own = self.moving(frame, self.ego);
-        let others = (0..self.cast.len()).filter(|&actor| actor != self.ego && self.is_there(actor, row));
-        let ahead =
-            others.filter_map(|actor| closest_encounter(&own, &self.moving(frame, actor), ENCOUNTER_HORIZON_S).ok());
-        ahead.min_by(|a, b| a.ttce_s.total_cmp(&b.ttce_s))
+    /// Returns the ego's closest encounter that comes next after a frame, or `None` if there is none within the
+    /// horizon. Both vehicles are assumed to keep their velocities.
+    pub(in crate::run) fn soonest_encounter(&self, frame_index: usize) -> Option<Encounter> {
+        let frame = &self.frames[frame_index];
+        let own = self.moving_box(frame, self.ego);
+        let others = (0..self.actors.len()).filter(|&actor| actor != self.ego && self.is_present(actor, frame_index));
+        let encounters = others
+            .filter_map(|actor| closest_encounter(&own, &self.moving_box(frame, actor), ENCOUNTER_HORIZON_S).ok());
+        encounters.min_by(|a, b| a.ttce_s.total_cmp(&b.ttce_s))
     }
 
-    pub(super) fn moving(&self, frame: &Frame, actor: usize) -> Moving {
+    /// Returns the box of a vehicle with its velocity in the plane.
+    pub(super) fn moving_box(&self, frame: &Frame, actor: usize) -> Moving {
         let state = &frame.states[actor];
-        let size = &self.cast[actor].vehicle.dimensions;
+        let size = &self.actors[actor].vehicle.dimensions;
         let pose = self.road.plane_pose(state.s_m, state.d_m, state.heading_rad);
         let (sin, cos) = pose.yaw_rad.sin_cos();
         Moving {
@@ -190,19 +199,19 @@ impl Film {
         }
     }
 
-    /// The vehicles of a frame as the sensors saw them, E first in what is returned.
+    /// Returns the ego and the other vehicles of a frame as input of the sensor models.
     pub(in crate::run) fn scene_vehicles(&self, frame: &Frame) -> (SceneVehicle, Vec<SceneVehicle>) {
         let vehicle = |actor: usize| SceneVehicle {
             actor,
-            vehicle: self.cast[actor].vehicle,
+            vehicle: self.actors[actor].vehicle,
             state: frame.states[actor],
             pitch_rad: frame.pitches_rad[actor],
         };
-        let others = (0..self.cast.len()).filter(|&actor| actor != self.ego).map(vehicle).collect();
+        let others = (0..self.actors.len()).filter(|&actor| actor != self.ego).map(vehicle).collect();
         (vehicle(self.ego), others)
     }
 
-    /// The scene of a frame.
+    /// Returns the scene of a frame, as input of the sensor models.
     pub(in crate::run) fn scene<'a>(
         &'a self,
         frame: &Frame,
@@ -212,7 +221,7 @@ impl Film {
         Scene { time: frame.time, road: &self.road, environment: &self.environment, ego, others }
     }
 
-    /// Where a vehicle stands in E's frame: ahead, to the left [m], and its heading [rad].
+    /// Returns the pose of a vehicle in the ego frame: x forward (m), y to the left (m), heading (rad).
     pub(in crate::run) fn in_ego_frame(&self, frame: &Frame, actor: usize) -> [f64; 3] {
         let pose = |state: &VehicleState| self.road.plane_pose(state.s_m, state.d_m, state.heading_rad);
         let (own, other) = (pose(&frame.states[self.ego]), pose(&frame.states[actor]));

@@ -1,14 +1,15 @@
-//! What a run looked like: kept in memory until its outcome is known, since only then is it known what mattered.
+//! A film: everything that the views of one run show, held in memory.
+//!
+//! A run is kept as a whole until its outcome is known, because the outcome decides which moment the views open at.
 //!
 //! ```text
 //!  simulation ─▶ FilmRecorder ─(outcome)─┐
-//!                                        ├─▶ Film ─▶ Rerun file │ static figure │ still picture
+//!                                        ├─▶ Film ─▶ Rerun recording │ static figure │ still picture
 //!  recorded traffic: a lane change, ──────┘
-//!  or an encounter that is re-enacted
+//!  or an encounter to be re-enacted
 //! ```
 //!
-//! A film is the same thing whether its vehicles were simulated or recorded on a road, so that both can be looked at in
-//! the same views.
+//! Films of simulated and of recorded traffic have the same type, so that the same views show both.
 
 mod arms;
 mod comparison;
@@ -24,8 +25,8 @@ pub use arms::film_arms;
 pub use comparison::{Comparison, Course};
 pub use encounter::film_encounter;
 pub(super) use frames::Limit;
-pub use frames::{Film, Frame, Level, Member};
+pub use frames::{Film, FilmActor, Frame, Level};
 pub use recorder::FilmRecorder;
 pub(super) use scan::{NO_CLUSTER, Scan};
-pub(super) use story::{collision_text, note_words, state_word};
+pub(super) use story::{collision_text, driver_note_text, ego_state_name};
 pub use traffic::{TrafficFilmError, film_lane_change};

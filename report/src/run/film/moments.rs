@@ -1,4 +1,4 @@
-//! The instants of a film that matter: the critical one, and the five moments of the encounter, (a) to (e).
+//! The critical moment of a film, and the five moments of its encounter, (a) to (e).
 
 use closecall_traffic::Time;
 
@@ -6,9 +6,14 @@ use super::Film;
 use closecall_simulation::outcome::MomentAt;
 
 impl Film {
-    /// The moment to look at first: when E collided, else anyone; where nobody did, when the vehicle behind was at its
-    /// smallest time headway; in recorded traffic, when the marking was crossed in an encounter, or anyone was closest;
-    /// where there was none of all this, the end, with the whole run before it.
+    /// Returns the critical moment of the film, at which its views open.
+    ///
+    /// This is the first of these that exists:
+    /// 1. the first collision of the ego, else of any vehicles
+    /// 2. in a recorded encounter: the time at which the rear vehicle crosses the lane marking
+    /// 3. in other recorded traffic: the time at which another vehicle is closest to the ego
+    /// 4. in a run: the time of the smallest time headway of the vehicle behind
+    /// 5. the end
     pub fn critical_moment(&self) -> Time {
         if let Some(collision) = self.worst_collision() {
             return collision.time;
@@ -24,26 +29,27 @@ impl Film {
         closest.unwrap_or_else(|| self.end())
     }
 
-    /// The time of the last frame.
+    /// Returns the time of the last frame.
     pub(crate) fn end(&self) -> Time {
         self.frames.last().map_or(Time::ZERO, |frame| frame.time)
     }
 
-    /// The moments of the encounter that were reached, in order of time.
+    /// Returns the moments of the encounter that the run reached, in order of time.
     pub(crate) fn moments(&self) -> &[MomentAt] {
         self.outcome.as_ref().map_or(&[], |outcome| &outcome.moments)
     }
 
-    /// When another vehicle was nearest to E in recorded traffic, from box to box.
+    /// Returns the time at which the distance from the box of the ego to that of another vehicle is smallest.
     fn closest_moment(&self) -> Time {
-        let distance = |row: usize| {
-            let frame = &self.frames[row];
-            let own = self.moving(frame, self.ego).shape;
-            let others = (0..self.cast.len()).filter(|&actor| actor != self.ego && self.is_there(actor, row));
-            others.map(|actor| own.distance_m(&self.moving(frame, actor).shape)).min_by(f64::total_cmp)
+        let distance_m = |frame_index: usize| {
+            let frame = &self.frames[frame_index];
+            let own = self.moving_box(frame, self.ego).shape;
+            let others =
+                (0..self.actors.len()).filter(|&actor| actor != self.ego && self.is_present(actor, frame_index));
+            others.map(|actor| own.distance_m(&self.moving_box(frame, actor).shape)).min_by(f64::total_cmp)
         };
-        let rows = (0..self.frames.len()).filter_map(|row| Some((row, distance(row)?)));
-        let closest = rows.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(row, _)| self.frames[row].time);
+        let distances = (0..self.frames.len()).filter_map(|index| Some((index, distance_m(index)?)));
+        let closest = distances.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(index, _)| self.frames[index].time);
         closest.unwrap_or_else(|| self.end())
     }
 }

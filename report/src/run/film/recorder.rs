@@ -1,45 +1,51 @@
-//! Watches a run and keeps what it sees.
+//! The observer that records the film of a run.
 
 use closecall_controllers::CheckedDriver;
 use closecall_sensors::camera::Pipeline;
 use closecall_sensors::{NoiseKey, SensorMode};
 use closecall_traffic::Time;
 
-use super::{Film, Frame, Level, Limit, Member, Scan};
+use super::{Film, FilmActor, Frame, Level, Limit, Scan};
 use closecall_simulation::outcome::{Outcome, Phase};
 use closecall_simulation::scenario::Scenario;
 use closecall_simulation::{Arm, CONTROL_STEP, Happening, Observer, RunKey, StepView};
 
-/// Acceleration of free fall [m/s²]: friction times this is the hardest braking that the road allows.
+/// Gravitational acceleration (m/s²). Its product with the friction coefficient is the largest deceleration that the
+/// road allows.
 const GRAVITY_MPS2: f64 = 9.81;
 
-/// A run has more than a million points. One scan in so many is kept, denser ones while the vehicle behind is critically
-/// close or overtakes, up to a number; and always the one at the smallest headway.
-const SPARSE: usize = 50;
-const DENSE: usize = 3;
-const MOST_DENSE: usize = 60;
+// A run has more than a million LiDAR points, so that a film keeps only some of its scans: sparse ones throughout,
+// dense ones in the critical and the overtaking phase up to a maximum number, and always the one at the smallest rear
+// headway.
 
-/// Watches a run and makes a film of it.
+/// Number of frames between two kept scans in all phases.
+const SPARSE_SCAN_INTERVAL: usize = 50;
+/// Number of frames between two kept scans in the critical and the overtaking phase.
+const DENSE_SCAN_INTERVAL: usize = 3;
+/// Maximum number of dense scans in a film.
+const MAX_DENSE_SCANS: usize = 60;
+
+/// Observes a run and records its film.
 pub struct FilmRecorder {
     film: Film,
-    dense_scans: usize,
-    /// The smallest rear headway so far [s], with its frame and scan.
+    dense_scan_count: usize,
+    /// The smallest rear headway in the critical phase so far (s), with the index of its frame and its scan.
     closest: Option<(f64, usize, Scan)>,
 }
 
 impl FilmRecorder {
-    /// A recorder of one run.
+    /// Creates a recorder for one run.
     pub fn new(scenario: &Scenario, key: RunKey, arm: &Arm, level: Level) -> Self {
         let name = arm.controller.name();
         let sensors = match arm.sensors {
             Some(mode) => scenario.sensors.with_mode(mode),
             None => scenario.sensors,
         };
-        let sees = sensors.mode() == SensorMode::Full && sensors.camera().pipeline != Pipeline::Off;
-        let member = |actor: &closecall_simulation::scenario::Actor| Member {
+        let has_camera = sensors.mode() == SensorMode::Full && sensors.camera().pipeline != Pipeline::Off;
+        let film_actor = |actor: &closecall_simulation::scenario::Actor| FilmActor {
             name: actor.id.to_string(),
             vehicle: actor.vehicle,
-            rows: 0..usize::MAX,
+            present_frames: 0..usize::MAX,
             is_plotted: true,
         };
         let film = Film {
@@ -49,13 +55,13 @@ impl FilmRecorder {
             period: CONTROL_STEP,
             road: scenario.road,
             environment: scenario.environment,
-            cast: scenario.actors.iter().map(member).collect(),
+            actors: scenario.actors.iter().map(film_actor).collect(),
             ego: scenario.ego,
             frames: Vec::new(),
             happenings: Vec::new(),
             notes: Vec::new(),
             acceleration_limits: limits(scenario, arm),
-            camera: (sees && level == Level::Full).then(|| {
+            camera: (has_camera && level == Level::Full).then(|| {
                 let ego = scenario.ego_id().clone();
                 let actors = scenario.actors.iter().map(|actor| actor.id.clone()).collect();
                 (*sensors.camera(), NoiseKey { seed: key.seed, sample: key.sample, ego, actors })
@@ -64,47 +70,47 @@ impl FilmRecorder {
             highlight: None,
             foreword: String::new(),
         };
-        Self { film, dense_scans: 0, closest: None }
+        Self { film, dense_scan_count: 0, closest: None }
     }
 
-    /// The film, once the run's outcome is known.
+    /// Completes the film with the outcome of the run.
     #[must_use]
     pub fn finish(self, outcome: &Outcome) -> Film {
         let mut film = self.film;
-        let rows = film.frames.len();
-        for member in &mut film.cast {
-            member.rows.end = rows;
+        let frame_count = film.frames.len();
+        for actor in &mut film.actors {
+            actor.present_frames.end = frame_count;
         }
         film.outcome = Some(outcome.clone());
-        if let Some((_, row, scan)) = self.closest
-            && let Some(frame) = film.frames.get_mut(row)
+        if let Some((_, index, scan)) = self.closest
+            && let Some(frame) = film.frames.get_mut(index)
         {
             frame.scan.get_or_insert(scan);
         }
         film
     }
 
-    /// The scan of a step, if it is one to keep.
+    /// Returns the scan of a control step, or `None` if it is not one to keep.
     fn scan(&mut self, view: &StepView<'_>) -> Option<Scan> {
         if self.film.level < Level::Full {
             return None;
         }
-        let row = self.film.frames.len();
+        let index = self.film.frames.len();
         if let Ok(thw_s) = view.margins.thw_rear_s
-            && self.closest.as_ref().is_none_or(|(least_s, ..)| thw_s < *least_s)
+            && self.closest.as_ref().is_none_or(|(smallest_s, ..)| thw_s < *smallest_s)
             && view.phase == Phase::Critical
         {
-            self.closest = Scan::of(view.perception).map(|scan| (thw_s, row, scan));
+            self.closest = Scan::latest(view.perception).map(|scan| (thw_s, index, scan));
         }
         let is_dense = matches!(view.phase, Phase::Critical | Phase::Overtaking)
-            && row.is_multiple_of(DENSE)
-            && self.dense_scans < MOST_DENSE;
-        self.dense_scans += usize::from(is_dense);
-        if is_dense || row.is_multiple_of(SPARSE) { Scan::of(view.perception) } else { None }
+            && index.is_multiple_of(DENSE_SCAN_INTERVAL)
+            && self.dense_scan_count < MAX_DENSE_SCANS;
+        self.dense_scan_count += usize::from(is_dense);
+        if is_dense || index.is_multiple_of(SPARSE_SCAN_INTERVAL) { Scan::latest(view.perception) } else { None }
     }
 }
 
-/// The MIS's comfort limit where the arm has one, and what friction allows.
+/// Returns the comfort limit of the MIS, if the arm has one, and the friction limit.
 fn limits(scenario: &Scenario, arm: &Arm) -> Vec<Limit> {
     let mut limits = Vec::new();
     if let CheckedDriver::Ego(settings) = &scenario.actors[scenario.ego].driver

@@ -1,49 +1,50 @@
-//! One scan of the rear LiDAR, kept small: a run has a thousand of them.
+//! One scan of the rear LiDAR in a compact form, since a run has about a thousand of them.
 
 use closecall_sensors::Detection;
 use closecall_sensors::Perception;
 
-/// Steps of a kept coordinate in a metre. A power of two leaves most bits of a float zero, which packs well; 1/64 m is
-/// a fraction of the noise of a range.
+/// Quantization steps of a stored coordinate per metre. With a power of two most bits of the resulting float are zero,
+/// which compresses well. 1/64 m is a fraction of the range noise.
 const STEPS_PER_M: f32 = 64.0;
-/// The cluster of a point that belongs to none.
+/// Cluster number of a point that belongs to no cluster.
 pub(crate) const NO_CLUSTER: u8 = u8::MAX;
 
-/// The points of a scan in E's frame, and the boxes that were found in it.
+/// The points of a scan in the ego frame, and the boxes fitted to its clusters.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Scan {
+    /// Coordinates of each point, in steps of 1 / [`STEPS_PER_M`] m.
     points: Vec<[i16; 3]>,
-    /// Intensity of each point, 1 as 255; stronger ones are cut off.
+    /// Intensity of each point: 255 stands for 1 and for all larger values.
     pub(crate) intensities: Vec<u8>,
-    /// The box that each point belongs to, or [`NO_CLUSTER`].
+    /// Index of the box that each point belongs to, or [`NO_CLUSTER`].
     pub(crate) clusters: Vec<u8>,
     pub(crate) boxes: Vec<Detection>,
 }
 
 impl Scan {
-    /// The latest scan of these sensors; nothing where they have no LiDAR.
-    pub(super) fn of(perception: &dyn Perception) -> Option<Self> {
+    /// Returns the latest scan of these sensors, or `None` if they have no rear LiDAR.
+    pub(super) fn latest(perception: &dyn Perception) -> Option<Self> {
         let lidar = perception.rear_lidar()?;
         let scan = lidar.latest();
         let points = scan.x_m.iter().zip(&scan.y_m).zip(&scan.z_m);
         let mut clusters = vec![NO_CLUSTER; scan.len()];
         for detection in 0..lidar.detections().len() {
-            let name = u8::try_from(detection % usize::from(NO_CLUSTER)).unwrap_or(0);
+            let cluster = u8::try_from(detection % usize::from(NO_CLUSTER)).unwrap_or(0);
             for &point in lidar.points_of(detection) {
-                clusters[point as usize] = name;
+                clusters[point as usize] = cluster;
             }
         }
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a float cast saturates")]
         Some(Self {
-            points: points.map(|((x, y), z)| [x, y, z].map(|at| (at * STEPS_PER_M) as i16)).collect(),
+            points: points.map(|((x, y), z)| [x, y, z].map(|value_m| (value_m * STEPS_PER_M) as i16)).collect(),
             intensities: scan.intensity.iter().map(|intensity| (intensity * 255.0) as u8).collect(),
             clusters,
             boxes: perception.rear_detections().to_vec(),
         })
     }
 
-    /// The points [m].
+    /// Returns the coordinates of the points (m).
     pub(crate) fn points_m(&self) -> impl Iterator<Item = [f32; 3]> + '_ {
-        self.points.iter().map(|point| point.map(|at| f32::from(at) / STEPS_PER_M))
+        self.points.iter().map(|point| point.map(|steps| f32::from(steps) / STEPS_PER_M))
     }
 }

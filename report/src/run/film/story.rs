@@ -1,4 +1,4 @@
-//! What happened, told in a few sentences that follow from the film alone.
+//! The story of a film: its events as a few sentences.
 
 use closecall_controllers::{DriverNote, EgoState};
 use closecall_traffic::Time;
@@ -9,15 +9,15 @@ use closecall_simulation::outcome::Collision;
 
 /// One sentence of the story.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Line {
+pub(crate) struct StoryLine {
     pub(crate) time: Time,
     pub(crate) text: String,
-    /// True where this is what the run will be remembered for.
-    pub(crate) is_grave: bool,
+    /// True for the most severe events: a collision, or an emergency braking of the ego.
+    pub(crate) is_severe: bool,
 }
 
 impl Film {
-    /// How it ended, in one sentence.
+    /// Returns a summary of how the film ends.
     pub fn headline(&self) -> String {
         let Some(outcome) = &self.outcome else {
             return format!("Recorded traffic: the critical instant is at {:.2} s.", self.critical_moment().s());
@@ -45,7 +45,7 @@ impl Film {
         }
     }
 
-    /// Why the margin increase system acted, or did not, in one sentence; nothing where the arm has none.
+    /// Returns a summary of what the margin increase system did and why, or `None` if the arm has no such system.
     pub fn verdict_on_mis(&self) -> Option<String> {
         let mis = self.outcome.as_ref()?.mis.as_ref().ok()?;
         Some(match mis.engaged_at_s {
@@ -63,46 +63,51 @@ impl Film {
         })
     }
 
-    /// The course of events, one line for each that matters.
-    pub(crate) fn story(&self) -> Vec<Line> {
-        let told = self.happenings.iter().filter_map(|(time, what)| self.line(*time, what));
-        let moments = self.moments().iter().map(|noted| Line {
+    /// Returns the events of the film in order of time, one line each.
+    pub(crate) fn story(&self) -> Vec<StoryLine> {
+        let happenings = self.happenings.iter().filter_map(|(time, what)| self.line(*time, what));
+        let moments = self.moments().iter().map(|noted| StoryLine {
             time: noted.time,
             text: format!("({}) {}", noted.moment.letter(), noted.moment.text()),
-            is_grave: false,
+            is_severe: false,
         });
-        let notes = self.notes.iter().map(|(time, text)| Line { time: *time, text: text.clone(), is_grave: false });
-        let mut lines: Vec<Line> = told.chain(moments).chain(notes).collect();
+        let notes =
+            self.notes.iter().map(|(time, text)| StoryLine { time: *time, text: text.clone(), is_severe: false });
+        let mut lines: Vec<StoryLine> = happenings.chain(moments).chain(notes).collect();
         lines.sort_by_key(|line| line.time);
         lines
     }
 
-    fn line(&self, time: Time, what: &Happening) -> Option<Line> {
-        let plain = |text: String| Some(Line { time, text, is_grave: false });
+    fn line(&self, time: Time, what: &Happening) -> Option<StoryLine> {
+        let plain = |text: String| Some(StoryLine { time, text, is_severe: false });
         match what {
             Happening::EventTriggered { event } => plain(format!("the scenario's event `{event}` sets in")),
-            Happening::DriverNote { actor, note } => plain(format!("{} {}", self.cast[*actor].name, note_words(*note))),
+            Happening::DriverNote { actor, note } => {
+                plain(format!("{} {}", self.actors[*actor].name, driver_note_text(*note)))
+            }
             Happening::EgoStateChanged { to, reason, .. } => {
-                let text = format!("E: {} ({reason})", state_word(*to));
-                Some(Line { time, text, is_grave: *to == EgoState::EmergencyBraking })
+                let text = format!("E: {} ({reason})", ego_state_name(*to));
+                Some(StoryLine { time, text, is_severe: *to == EgoState::EmergencyBraking })
             }
             Happening::PhaseChanged { .. } => None,
-            Happening::Collision(touch) => {
-                let text = format!("COLLISION: {}", collision_text(self.settled(touch)));
-                Some(Line { time, text, is_grave: true })
+            Happening::Collision(reported) => {
+                let text = format!("COLLISION: {}", collision_text(self.collision_in_outcome(reported)));
+                Some(StoryLine { time, text, is_severe: true })
             }
         }
     }
 
-    /// When a collision is reported, the impact is not over; the outcome has its change of velocity.
-    pub(crate) fn settled<'a>(&'a self, touch: &'a Collision) -> &'a Collision {
-        let same = |collision: &&Collision| collision.time == touch.time && collision.between == touch.between;
-        self.collisions().iter().find(same).unwrap_or(touch)
+    /// Returns the collision `reported` as the outcome has it, or `reported` itself if the outcome lacks it.
+    ///
+    /// A collision is reported at first contact, when the changes of velocity are not known yet. The outcome has them.
+    pub(crate) fn collision_in_outcome<'a>(&'a self, reported: &'a Collision) -> &'a Collision {
+        let same = |collision: &&Collision| collision.time == reported.time && collision.between == reported.between;
+        self.collisions().iter().find(same).unwrap_or(reported)
     }
 }
 
-/// What a driver did.
-pub(crate) fn note_words(note: DriverNote) -> &'static str {
+/// Returns what a driver does, as a phrase that follows the name of its vehicle.
+pub(crate) fn driver_note_text(note: DriverNote) -> &'static str {
     match note {
         DriverNote::CutOutStarted => "begins to change lanes to overtake",
         DriverNote::CutOutAborted => "gives up the lane change",
@@ -111,8 +116,8 @@ pub(crate) fn note_words(note: DriverNote) -> &'static str {
     }
 }
 
-/// What a state of the ego stack is called.
-pub(crate) const fn state_word(state: EgoState) -> &'static str {
+/// Returns the name of a state of the ego stack.
+pub(crate) const fn ego_state_name(state: EgoState) -> &'static str {
     match state {
         EgoState::Following => "following",
         EgoState::Increasing => "increasing the margin",
@@ -122,7 +127,7 @@ pub(crate) const fn state_word(state: EgoState) -> &'static str {
     }
 }
 
-/// Who touched whom, how fast, and what it did to each.
+/// Returns the vehicles of a collision, their relative speed, and the change of velocity of each.
 pub(crate) fn collision_text(collision: &Collision) -> String {
     let [first, second] = &collision.between;
     format!(

@@ -1,8 +1,9 @@
-//! A lane change in recorded traffic, as a film: the vehicle that changes lanes takes E's place.
+//! The film of a lane change in recorded traffic. The vehicle that changes lanes is the ego of the film.
 //!
-//! Shown are the smoothed trajectories on which the metrics were worked out, from [`AROUND`] before the lane change to
-//! as long after it, and every vehicle that comes within [`REACH_M`] of it. The road is drawn straight, with lanes of the
-//! typical width that the recording tells. Recordings have no brake lights and no indicators, so none are shown.
+//! The film shows the smoothed trajectories from which the metrics are computed, from [`CONTEXT_TIME`] before the lane
+//! change until the same time after it, with all vehicles that come within [`REACH_M`] of the ego. The road is drawn
+//! straight, with lanes of the typical width in the trajectory data. Trajectory data have no brake lights and no
+//! indicators, so that none are shown.
 
 use closecall_scenarios::criticality::CriticalLaneChange;
 use closecall_scenarios::filters::{PERIOD, SmoothedRecording};
@@ -12,52 +13,53 @@ use closecall_traffic::{
     TrajectoryPoint, Vehicle, VehicleState,
 };
 
-use super::{Film, Frame, Level, Member};
+use super::{Film, FilmActor, Frame, Level};
 use closecall_simulation::{Lead, MarginsNow};
 
-/// Time shown before the lane change starts and after it ends.
-const AROUND: Time = Time::from_ms(2_000);
-/// Vehicles that never come nearer than this along the road are left out [m].
+/// Time shown before the start and after the end of the lane change.
+const CONTEXT_TIME: Time = Time::from_ms(2_000);
+/// Vehicles that never come closer to the ego than this along the road are left out (m).
 const REACH_M: f64 = 150.0;
-/// Lane widths that a road may have [m], and the most lanes.
-const LANE_WIDTHS_M: [f64; 2] = [2.5, 5.0];
-const MOST_LANES: u8 = 8;
-/// Below this speed the direction of movement is noise [m/s].
-const HEADING_FROM_MPS: f64 = 1.0;
-/// The speed limit of the drawn road [m/s]; nothing depends on it.
+/// Smallest and largest lane width that the drawn road may have (m).
+const LANE_WIDTH_RANGE_M: [f64; 2] = [2.5, 5.0];
+/// Largest number of lanes that the drawn road may have.
+const MAX_LANES: u8 = 8;
+/// Speed below which the direction of the velocity is mostly noise, so that the heading is set to 0 (m/s).
+const MIN_HEADING_SPEED_MPS: f64 = 1.0;
+/// Speed limit of the drawn road (m/s). The film does not depend on it.
 const SPEED_LIMIT_MPS: f64 = 120.0 / 3.6;
 
-/// A lane change that cannot be shown.
+/// The reason why recorded traffic cannot be shown as a film.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum TrafficFilmError {
-    /// The recording has no track of that number.
+    /// The trajectory data do not contain the track.
     #[error("the recording has no track {track_id}")]
     NoTrack {
-        /// The number.
+        /// The track id.
         track_id: u64,
     },
-    /// The lanes do not make a road.
+    /// No road can be built from the recorded lanes.
     #[error("the recorded lanes do not make a road: {0}")]
     Road(#[from] ConfigError),
 }
 
-/// A film of one lane change of a recording.
+/// Returns the film of one lane change in trajectory data.
 ///
 /// # Errors
-/// [`TrafficFilmError`] where the recording does not have its track, or its lanes make no road.
+/// [`TrafficFilmError`] if the trajectory data do not contain the track, or no road can be built from its lanes.
 pub fn film_lane_change(recording: &SmoothedRecording, change: &CriticalLaneChange) -> Result<Film, TrafficFilmError> {
     let track_id = change.lane_change.track_id;
     let own = recording.trajectories().find(|track| track.track_id == track_id);
     let own = own.ok_or(TrafficFilmError::NoTrack { track_id })?;
     let (from, to) = (Time::from_s(change.lane_change.start_s), Time::from_s(change.lane_change.end_s));
-    let shown = |point: &&TrajectoryPoint| point.time >= from - AROUND && point.time <= to + AROUND;
-    let instants: Vec<&TrajectoryPoint> = own.points.iter().filter(shown).collect();
-    let tracks = around(recording, own, &instants);
-    let frames = instants.iter().map(|point| frame(&tracks, point.time)).collect();
-    let member = |track: &&Trajectory| Member {
+    let is_shown = |point: &&TrajectoryPoint| point.time >= from - CONTEXT_TIME && point.time <= to + CONTEXT_TIME;
+    let instants: Vec<&TrajectoryPoint> = own.points.iter().filter(is_shown).collect();
+    let tracks = nearby_tracks(recording, own, &instants);
+    let frames = instants.iter().map(|point| frame_at(&tracks, point.time)).collect();
+    let film_actor = |track: &&Trajectory| FilmActor {
         name: format!("track-{}", track.track_id),
         vehicle: Vehicle { dimensions: track.dimensions, ..Vehicle::typical(track.class) },
-        rows: rows(track, instants.iter().map(|point| point.time)),
+        present_frames: present_frames(track, instants.iter().map(|point| point.time)),
         is_plotted: true,
     };
     Ok(Film {
@@ -67,7 +69,7 @@ pub fn film_lane_change(recording: &SmoothedRecording, change: &CriticalLaneChan
         period: PERIOD,
         road: road(recording, &tracks)?,
         environment: Environment::CLEAR_DAY,
-        cast: tracks.iter().map(member).collect(),
+        actors: tracks.iter().map(film_actor).collect(),
         ego: 0,
         frames,
         happenings: Vec::new(),
@@ -80,38 +82,38 @@ pub fn film_lane_change(recording: &SmoothedRecording, change: &CriticalLaneChan
     })
 }
 
-/// The track itself first, then every other one that comes near it.
-fn around<'a>(
+/// Returns the track `own`, followed by all other tracks that come near it.
+fn nearby_tracks<'a>(
     recording: &'a SmoothedRecording,
     own: &'a Trajectory,
     instants: &[&TrajectoryPoint],
 ) -> Vec<&'a Trajectory> {
-    let near = |track: &&Trajectory| {
+    let is_near = |track: &&Trajectory| {
         track.track_id != own.track_id
             && instants.iter().any(|own| track.at(own.time).is_some_and(|at| (at.s_m - own.s_m).abs() < REACH_M))
     };
-    std::iter::once(own).chain(recording.trajectories().filter(near)).collect()
+    std::iter::once(own).chain(recording.trajectories().filter(is_near)).collect()
 }
 
-/// The frames, at `instants`, in which a track is there.
-pub(super) fn rows(track: &Trajectory, instants: impl Iterator<Item = Time>) -> std::ops::Range<usize> {
-    let mut there = instants.enumerate().filter(|(_, time)| track.at(*time).is_some()).map(|(row, _)| row);
-    match there.next() {
-        Some(first) => first..there.last().unwrap_or(first) + 1,
+/// Returns the range of frames in which a track is present, where frame i shows the i-th of `instants`.
+pub(super) fn present_frames(track: &Trajectory, instants: impl Iterator<Item = Time>) -> std::ops::Range<usize> {
+    let mut present = instants.enumerate().filter(|(_, time)| track.at(*time).is_some()).map(|(index, _)| index);
+    match present.next() {
+        Some(first) => first..present.last().unwrap_or(first) + 1,
         None => 0..0,
     }
 }
 
 fn road(recording: &SmoothedRecording, tracks: &[&Trajectory]) -> Result<Road, ConfigError> {
     let lanes = tracks.iter().flat_map(|track| track.points.iter().map(|point| point.lane.0)).max();
-    straight_road(lanes.unwrap_or(1).clamp(1, MOST_LANES), recording.markings.typical_lane_width_m())
+    straight_road(lanes.unwrap_or(1).clamp(1, MAX_LANES), recording.markings.typical_lane_width_m())
 }
 
-/// A straight road to draw recorded traffic on.
+/// Returns a straight road on which recorded traffic is drawn. The lane width is clamped to the permitted range.
 pub(super) fn straight_road(lanes: u8, lane_width_m: f64) -> Result<Road, ConfigError> {
     let config = RoadConfig {
         lanes,
-        lane_width_m: Num::Fixed(lane_width_m.clamp(LANE_WIDTHS_M[0], LANE_WIDTHS_M[1])),
+        lane_width_m: Num::Fixed(lane_width_m.clamp(LANE_WIDTH_RANGE_M[0], LANE_WIDTH_RANGE_M[1])),
         curvature_per_m: Num::Fixed(0.0),
         speed_limit_mps: Num::Fixed(SPEED_LIMIT_MPS),
         overtaking_side: Side::Left,
@@ -120,16 +122,16 @@ pub(super) fn straight_road(lanes: u8, lane_width_m: f64) -> Result<Road, Config
     config.check(&Parameters::default())
 }
 
-/// One instant of recorded vehicles, the first of them E.
-pub(super) fn frame(tracks: &[&Trajectory], time: Time) -> Frame {
+/// Returns the frame of recorded tracks at `time`. The first track is the ego.
+pub(super) fn frame_at(tracks: &[&Trajectory], time: Time) -> Frame {
     let nearest = |track: &Trajectory| {
-        let late = track.points.first().is_none_or(|first| time >= first.time);
-        track.at(time).or(if late { track.points.last() } else { track.points.first() }).copied()
+        let has_begun = track.points.first().is_none_or(|first| time >= first.time);
+        track.at(time).or(if has_begun { track.points.last() } else { track.points.first() }).copied()
     };
     let points: Vec<Option<TrajectoryPoint>> = tracks.iter().map(|track| nearest(track)).collect();
     let states: Vec<VehicleState> = points.iter().map(|point| point.map(state).unwrap_or_default()).collect();
     let present: Vec<(usize, TrajectoryPoint)> =
-        (0..tracks.len()).filter_map(|place| Some((place, tracks[place].at(time).copied()?))).collect();
+        (0..tracks.len()).filter_map(|index| Some((index, tracks[index].at(time).copied()?))).collect();
     Frame {
         time,
         pitches_rad: vec![0.0; states.len()],
@@ -149,40 +151,40 @@ fn state(point: TrajectoryPoint) -> VehicleState {
     VehicleState {
         s_m: point.s_m,
         d_m: point.d_m,
-        heading_rad: if speed_mps < HEADING_FROM_MPS { 0.0 } else { across.atan2(along) },
+        heading_rad: if speed_mps < MIN_HEADING_SPEED_MPS { 0.0 } else { across.atan2(along) },
         speed_mps,
         acceleration_mps2: point.acceleration_mps2,
         ..VehicleState::default()
     }
 }
 
-/// The margins of the vehicle that changes lanes, by the lanes as recorded.
+/// Returns the margins of the first track to the nearest vehicles ahead and behind in its recorded lane.
 fn margins(tracks: &[&Trajectory], present: &[(usize, TrajectoryPoint)]) -> MarginsNow {
-    let own = present.iter().find(|(place, _)| *place == 0).map(|(_, point)| *point);
-    let in_lane = |ahead: bool| {
+    let own = present.iter().find(|(index, _)| *index == 0).map(|(_, point)| *point);
+    let nearest_in_lane = |ahead: bool| {
         let own = own?;
         let others =
-            present.iter().filter(move |(place, at)| *place != 0 && at.lane == own.lane && (at.s_m > own.s_m) == ahead);
+            present.iter().filter(move |(index, at)| *index != 0 && at.lane == own.lane && (at.s_m > own.s_m) == ahead);
         let nearest = others.min_by(|a, b| (a.1.s_m - own.s_m).abs().total_cmp(&(b.1.s_m - own.s_m).abs()))?;
         let lengths_m = tracks[0].dimensions.length_m + tracks[nearest.0].dimensions.length_m;
         Some((nearest.0, nearest.1.speed_mps, (nearest.1.s_m - own.s_m).abs() - 0.5 * lengths_m))
     };
-    let (lead, follower) = (in_lane(true), in_lane(false));
+    let (lead, follower) = (nearest_in_lane(true), nearest_in_lane(false));
     let own_mps = own.map_or(0.0, |own| own.speed_mps);
-    let gap = |found: Option<(usize, f64, f64)>, absent| found.map(|(_, _, gap_m)| gap_m).ok_or(absent);
+    let gap_m = |found: Option<(usize, f64, f64)>, absent| found.map(|(_, _, gap_m)| gap_m).ok_or(absent);
     let behind = follower.ok_or(Absent::NoFollower);
     MarginsNow {
         lead: lead.map(|(actor, speed_mps, _)| Lead { actor, speed_mps }).ok_or(Absent::NoLead),
         follower: follower.map(|(actor, _, _)| actor),
-        gap_front_m: gap(lead, Absent::NoLead),
-        thw_front_s: gap(lead, Absent::NoLead).and_then(|gap_m| time_headway_s(gap_m, own_mps)),
-        gap_rear_m: gap(follower, Absent::NoFollower),
+        gap_front_m: gap_m(lead, Absent::NoLead),
+        thw_front_s: gap_m(lead, Absent::NoLead).and_then(|gap_m| time_headway_s(gap_m, own_mps)),
+        gap_rear_m: gap_m(follower, Absent::NoFollower),
         thw_rear_s: behind.and_then(|(_, speed_mps, gap_m)| time_headway_s(gap_m, speed_mps)),
         ttc_rear_s: behind.and_then(|(_, speed_mps, gap_m)| time_to_collision_s(gap_m, speed_mps, own_mps)),
     }
 }
 
-/// The metrics of the lane change, each at its moment.
+/// Returns notes about the lane change and its metrics, each with the time at which it applies.
 fn notes(change: &CriticalLaneChange) -> Vec<(Time, String)> {
     let found = &change.lane_change;
     let mut notes = vec![

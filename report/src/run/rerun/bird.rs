@@ -1,5 +1,6 @@
-//! The road from above, in a frame that goes along with E: in its direction of travel to the right, stretched across
-//! the road so that lane changes can be seen.
+//! The view from above (bird's-eye view), in a frame that moves with the ego, E. The direction of travel points to the
+//! right. The picture is stretched across the road, so that lane changes are easy to see. F is the lead vehicle, R the
+//! rear vehicle.
 //!
 //! ```text
 //!   ─────────────────────────────────────────────
@@ -19,21 +20,21 @@ use super::vehicles::LABELLED_GAP_M;
 use crate::run::film::{Film, Frame};
 use closecall_simulation::outcome::CRITICAL_THW_S;
 
-/// The road is drawn wider than it is by this factor.
+/// Factor by which the picture is stretched across the road.
 pub(super) const STRETCH: f64 = 2.0;
-/// What is shown ahead of E and behind it [m].
+/// Length of road shown in front of and behind the ego (m).
 pub(super) const REACH_M: f64 = 80.0;
-/// A velocity is drawn as the way that a vehicle goes in this time [s].
+/// A line shows the distance that the vehicle travels in this time (s).
 const ARROW_S: f64 = 0.5;
-/// Where the words about a collision stand, beside the left edge of the road [m].
-const WORDS_D_M: f64 = 1.0;
-/// What is drawn first lies below.
-const LANES: f32 = 0.0;
-const PATHS: f32 = 1.0;
-const BODIES: f32 = 2.0;
-const MARKS: f32 = 3.0;
+/// Lateral position of the text about a collision, beside the left edge of the road (m).
+const COLLISION_TEXT_D_M: f64 = 1.0;
+// Draw orders: a larger one lies above a smaller one.
+const LANE_ORDER: f32 = 0.0;
+const VELOCITY_ORDER: f32 = 1.0;
+const BODY_ORDER: f32 = 2.0;
+const MARK_ORDER: f32 = 3.0;
 
-/// Left and right edge of the road in the picture.
+/// Returns the y coordinates of the left and the right edge of the road in the picture.
 pub(super) fn edges(film: &Film) -> [f64; 2] {
     [0.0, -film.road.right_edge_m() * STRETCH]
 }
@@ -49,11 +50,12 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError>
     write_collisions(writer, film)
 }
 
-/// Where a place of the road lies in the picture.
+/// Returns the picture coordinates of a point in the road frame.
 fn at(film: &Film, frame: &Frame, s_m: f64, d_m: f64) -> [f32; 2] {
     [(s_m - frame.states[film.ego].s_m) as f32, (-d_m * STRETCH) as f32]
 }
 
+/// Writes the edges of the road and the lane markings.
 fn write_lanes(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError> {
     let road = &film.road;
     let lines = (0..=road.lanes()).map(|line| match line {
@@ -66,70 +68,72 @@ fn write_lanes(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError> {
     });
     let edge = |line: u8| line == 0 || line == road.lanes();
     let colours = (0..=road.lanes()).map(|line| if edge(line) { palette::MARKING } else { palette::QUIET });
-    let lanes = LineStrips2D::new(strips).with_colors(colours).with_radii([0.15_f32]).with_draw_order(LANES);
-    writer.fixed("bird/lanes", &lanes)
+    let lanes = LineStrips2D::new(strips).with_colors(colours).with_radii([0.15_f32]).with_draw_order(LANE_ORDER);
+    writer.write_static("bird/lanes", &lanes)
 }
 
-/// One bar for each vehicle that is there, with its name and speed.
+/// Writes a bar for each vehicle that is present, with its name and speed.
 fn write_bodies(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordError> {
-    for (place, member) in film.cast.iter().enumerate().filter(|(_, member)| !member.rows.is_empty()) {
-        let entity = format!("bird/vehicles/{}", member.name);
-        let size = &member.vehicle.dimensions;
+    for (index, actor) in film.actors.iter().enumerate().filter(|(_, actor)| !actor.present_frames.is_empty()) {
+        let entity = format!("bird/vehicles/{}", actor.name);
+        let size = &actor.vehicle.dimensions;
         let fixed = LineStrips2D::update_fields()
-            .with_colors([palette::actor(place, film.ego)])
+            .with_colors([palette::actor(index, film.ego)])
             .with_radii([(0.5 * size.width_m * STRETCH) as f32])
-            .with_draw_order(BODIES)
+            .with_draw_order(BODY_ORDER)
             .with_show_labels(true);
-        writer.fixed(&entity, &fixed)?;
+        writer.write_static(&entity, &fixed)?;
         let half_m = 0.5 * size.length_m;
-        writer.rows(&entity, times, |range| {
+        writer.write_rows(&entity, times, |range| {
             let rows: Vec<usize> = range.collect();
-            let there = || rows.iter().filter(|&&row| member.rows.contains(&row)).map(|&row| &film.frames[row]);
+            let present =
+                || rows.iter().filter(|&&row| actor.present_frames.contains(&row)).map(|&row| &film.frames[row]);
             let bar = |frame: &Frame| {
-                let state = &frame.states[place];
+                let state = &frame.states[index];
                 [-half_m, half_m].map(|along_m| at(film, frame, state.s_m + along_m, state.d_m))
             };
-            let text = |frame: &Frame| format!("{} {:.1} m/s", member.name, frame.states[place].speed_mps);
+            let text = |frame: &Frame| format!("{} {:.1} m/s", actor.name, frame.states[index].speed_mps);
             LineStrips2D::update_fields()
-                .with_strips(there().map(bar))
-                .with_labels(there().map(text))
-                .columns(rows.iter().map(|row| usize::from(member.rows.contains(row))).collect::<Vec<_>>())
+                .with_strips(present().map(bar))
+                .with_labels(present().map(text))
+                .columns(rows.iter().map(|row| usize::from(actor.present_frames.contains(row))).collect::<Vec<_>>())
         })?;
     }
     Ok(())
 }
 
-/// Velocities as lines ahead of the vehicles.
+/// Writes the velocities as lines in front of the vehicles.
 fn write_speeds(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordError> {
     let entity = "bird/velocity";
-    writer.fixed(entity, &LineStrips2D::update_fields().with_radii([0.5_f32]).with_draw_order(PATHS))?;
-    let there = |row: usize| (0..film.cast.len()).filter(move |&actor| film.is_there(actor, row));
-    writer.rows(entity, times, |range| {
-        let all = || range.clone().flat_map(|row| there(row).map(move |actor| (row, actor)));
+    writer
+        .write_static(entity, &LineStrips2D::update_fields().with_radii([0.5_f32]).with_draw_order(VELOCITY_ORDER))?;
+    let present = |row: usize| (0..film.actors.len()).filter(move |&actor| film.is_present(actor, row));
+    writer.write_rows(entity, times, |range| {
+        let all = || range.clone().flat_map(|row| present(row).map(move |actor| (row, actor)));
         let line = |(row, actor): (usize, usize)| {
             let frame: &Frame = &film.frames[row];
             let state = &frame.states[actor];
-            let front_m = 0.5 * film.cast[actor].vehicle.dimensions.length_m;
+            let front_m = 0.5 * film.actors[actor].vehicle.dimensions.length_m;
             let (sin, cos) = state.heading_rad.sin_cos();
-            let way_m = front_m + ARROW_S * state.speed_mps;
+            let arrow_end_m = front_m + ARROW_S * state.speed_mps;
             [
                 at(film, frame, state.s_m + front_m * cos, state.d_m + front_m * sin),
-                at(film, frame, state.s_m + way_m * cos, state.d_m + way_m * sin),
+                at(film, frame, state.s_m + arrow_end_m * cos, state.d_m + arrow_end_m * sin),
             ]
         };
         LineStrips2D::new(all().map(line))
-            .with_colors(all().map(|(_, actor)| palette::faint(palette::actor(actor, film.ego), 170)))
-            .columns(range.clone().map(|row| there(row).count()).collect::<Vec<_>>())
+            .with_colors(all().map(|(_, actor)| palette::with_opacity(palette::actor(actor, film.ego), 170)))
+            .columns(range.clone().map(|row| present(row).count()).collect::<Vec<_>>())
     })
 }
 
-/// Brake lights and indicators that are on.
+/// Writes the brake lights and indicators that are on.
 fn write_lamps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordError> {
     let lit = |row: usize| -> Vec<([f32; 2], Rgba)> {
         let frame = &film.frames[row];
         let mut lamps = Vec::new();
-        for actor in (0..film.cast.len()).filter(|&actor| film.is_there(actor, row)) {
-            let (state, size) = (&frame.states[actor], &film.cast[actor].vehicle.dimensions);
+        for actor in (0..film.actors.len()).filter(|&actor| film.is_present(actor, row)) {
+            let (state, size) = (&frame.states[actor], &film.actors[actor].vehicle.dimensions);
             let rear_m = state.s_m - 0.5 * size.length_m;
             if state.brake_light {
                 lamps.push((at(film, frame, rear_m, state.d_m), palette::BRAKE_LIGHT));
@@ -148,8 +152,8 @@ fn write_lamps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), R
         return Ok(());
     }
     let entity = "bird/lamps";
-    writer.fixed(entity, &Points2D::update_fields().with_radii([1.1_f32]).with_draw_order(MARKS))?;
-    writer.rows(entity, times, |range| {
+    writer.write_static(entity, &Points2D::update_fields().with_radii([1.1_f32]).with_draw_order(MARK_ORDER))?;
+    writer.write_rows(entity, times, |range| {
         let rows = &rows[range];
         Points2D::new(rows.iter().flatten().map(|lamp| lamp.0))
             .with_colors(rows.iter().flatten().map(|lamp| lamp.1))
@@ -157,12 +161,12 @@ fn write_lamps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), R
     })
 }
 
-/// The ends of a gap in the picture, its colour and its headway.
+/// A gap: its ends in the picture, its colour, and the text of its time headway.
 type Gap = ([[f32; 2]; 2], Rgba, String);
 
-/// The gaps before and behind E with their headways, red where these are critical.
+/// Writes the gaps in front of and behind the ego with their time headways. A critical gap is red.
 fn write_gaps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordError> {
-    let half_m = 0.5 * film.cast[film.ego].vehicle.dimensions.length_m;
+    let half_m = 0.5 * film.actors[film.ego].vehicle.dimensions.length_m;
     let gaps = |frame: &Frame| -> Vec<Gap> {
         let own = &frame.states[film.ego];
         let margins = &frame.margins;
@@ -178,9 +182,9 @@ fn write_gaps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), Re
     };
     let rows: Vec<Vec<Gap>> = film.frames.iter().map(gaps).collect();
     let entity = "bird/gaps";
-    let fixed = LineStrips2D::update_fields().with_radii([0.6_f32]).with_draw_order(MARKS).with_show_labels(true);
-    writer.fixed(entity, &fixed)?;
-    writer.rows(entity, times, |range| {
+    let fixed = LineStrips2D::update_fields().with_radii([0.6_f32]).with_draw_order(MARK_ORDER).with_show_labels(true);
+    writer.write_static(entity, &fixed)?;
+    writer.write_rows(entity, times, |range| {
         let rows = &rows[range];
         LineStrips2D::new(rows.iter().flatten().map(|gap| gap.0))
             .with_colors(rows.iter().flatten().map(|gap| gap.1))
@@ -189,7 +193,7 @@ fn write_gaps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), Re
     })
 }
 
-/// Where the confirmed rear tracks say that vehicles are.
+/// Writes the outlines of the confirmed rear tracks that are probably vehicles.
 fn write_tracks(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordError> {
     let outlines = |frame: &Frame| -> Vec<Vec<[f32; 2]>> {
         let own = &frame.states[film.ego];
@@ -212,19 +216,19 @@ fn write_tracks(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), 
     }
     let entity = "bird/tracks";
     let fixed =
-        LineStrips2D::update_fields().with_colors([palette::TRACK]).with_radii([0.35_f32]).with_draw_order(MARKS);
-    writer.fixed(entity, &fixed)?;
-    writer.rows(entity, times, |range| {
+        LineStrips2D::update_fields().with_colors([palette::TRACK]).with_radii([0.35_f32]).with_draw_order(MARK_ORDER);
+    writer.write_static(entity, &fixed)?;
+    writer.write_rows(entity, times, |range| {
         let rows = &rows[range];
         LineStrips2D::new(rows.iter().flatten().map(|outline| outline.iter().copied()))
             .columns(rows.iter().map(Vec::len).collect::<Vec<_>>())
     })
 }
 
-/// A mark from the collision on, where E then is.
+/// Writes a mark on the first vehicle of the worst collision, from the contact on.
 fn write_collisions(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError> {
     let Some(collision) = film.worst_collision() else { return Ok(()) };
-    let struck = film.cast.iter().position(|member| member.name == collision.between[0].as_str());
+    let struck = film.actors.iter().position(|actor| actor.name == collision.between[0].as_str());
     let Some(row) = film.frames.iter().position(|frame| frame.time >= collision.time) else { return Ok(()) };
     let Some(struck) = struck else { return Ok(()) };
     let frames = &film.frames[row..];
@@ -235,15 +239,15 @@ fn write_collisions(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError>
         .with_colors([palette::CRITICAL])
         .with_radii([2.5_f32, 0.1])
         .with_labels([String::new(), text])
-        .with_draw_order(MARKS)
+        .with_draw_order(MARK_ORDER)
         .with_show_labels(true);
-    writer.fixed(entity, &fixed)?;
-    writer.rows(entity, &times, |range| {
+    writer.write_static(entity, &fixed)?;
+    writer.write_rows(entity, &times, |range| {
         let frames = &frames[range];
-        // The words stand beside the road, clear of the vehicles' names.
+        // The text is beside the road, clear of the names of the vehicles.
         let marks = frames.iter().flat_map(|frame| {
             let state = &frame.states[struck];
-            [state.d_m, WORDS_D_M].map(|d_m| at(film, frame, state.s_m, d_m))
+            [state.d_m, COLLISION_TEXT_D_M].map(|d_m| at(film, frame, state.s_m, d_m))
         });
         Points2D::update_fields().with_positions(marks).columns(vec![2; frames.len()])
     })

@@ -1,9 +1,9 @@
-//! The layout that the viewer opens with, stored in the recording itself.
+//! The layout with which the viewer opens a recording (its blueprint), stored in the recording itself.
 //!
 //! ```text
 //!  ┌───────────────────────────────┬───────────────┬───────────────┐
 //!  │                               │ time headway  │ speed         │
-//!  │  3D, from behind and above E  ├───────────────┼───────────────┤
+//!  │  3D, behind and above the ego ├───────────────┼───────────────┤
 //!  │  (of a pair: side by side)    │ gap           │ acceleration  │
 //!  ├───────────────────────────────┼───────────────┼───────────────┤
 //!  │  from above                   │ encounter     │ margin gained │
@@ -12,7 +12,7 @@
 //!  └───────────────┴───────────────┴───────────────────────────────┘
 //! ```
 //!
-//! Only views that have something to show are laid out.
+//! The layout contains only views that have something to show.
 
 mod send;
 
@@ -32,13 +32,14 @@ use rerun::{AsComponents, EntityPath};
 use super::palette;
 use super::stream::OPENING_TIMELINE;
 
-/// Where the eye is and what it looks at, in E's frame [m]: far enough back to see who follows.
+/// Position of the eye of the 3D view in the ego frame (m), far enough back to show vehicles behind the ego.
 const EYE_M: [f32; 3] = [-32.0, 6.0, 12.0];
+/// Point at which the eye looks, in the ego frame (m).
 const TARGET_M: [f32; 3] = [-1.0, 0.0, 0.0];
-/// Room above and below the road from above, for names.
+/// Room for names above and below the road in the view from above (m in the picture).
 const BIRD_MARGIN: f64 = 4.5;
 
-/// Every plot: its entity, its title, and its range where a fixed one helps.
+/// The plots: name of the entity, title, and range of the value axis if it is fixed.
 const PLOTS: [(&str, &str, Option<[f64; 2]>); 6] = [
     ("headway", "Time headway [s]: front orange, rear pink", Some([0.0, 4.0])),
     ("gap", "Gap [m]", Some([0.0, 120.0])),
@@ -48,34 +49,38 @@ const PLOTS: [(&str, &str, Option<[f64; 2]>); 6] = [
     ("margin", "Front headway gained [s]", Some([-1.0, 4.0])),
 ];
 
-/// What there is to show of one film.
+/// The parts of a film that the views can show.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Shown {
-    /// Where its entities lie.
+pub(super) struct FilmContents {
+    /// Prefix of its entity paths.
     pub(super) root: String,
-    /// What its views are called.
+    /// Name of its arm, for the titles of the views.
     pub(super) name: String,
-    /// Layers of the scene that are there, to be switched on by those who want them.
-    pub(super) hidden: Vec<String>,
-    /// The vehicles and the road.
+    /// Entities of the scene that are hidden until the user switches them on.
+    pub(super) hidden_layers: Vec<String>,
+    /// True if the 3D scene and the view from above were written.
     pub(super) has_scene: bool,
-    /// Upper and lower edge of the road from above.
+    /// Upper and lower edge of the road in the view from above.
     pub(super) edges: [f64; 2],
+    /// True if there are camera images.
     pub(super) has_camera: bool,
+    /// True if there are states of the ego stack.
     pub(super) has_states: bool,
-    /// The plots with a curve.
+    /// Names of the plots that have a curve.
     pub(super) plots: Vec<&'static str>,
 }
 
-/// Lays out the views of one recording.
+/// The layout of the views of one recording.
 #[derive(Default)]
 pub(super) struct Layout {
-    /// What the builder has no words for: properties of views, by their place in the blueprint's own store.
+    /// Properties of views that the library's blueprint builder cannot express, each with its path in the blueprint
+    /// store.
     properties: Vec<(EntityPath, Box<dyn AsComponents>)>,
 }
 
 impl Layout {
-    fn blueprint(&mut self, films: &[Shown]) -> Blueprint {
+    /// Returns the blueprint, and collects the properties that it cannot express.
+    fn blueprint(&mut self, films: &[FilmContents]) -> Blueprint {
         let mut left = Vec::new();
         let mut shares = Vec::new();
         let mut add = |view: Option<ContainerLike>, share: f32| {
@@ -95,7 +100,7 @@ impl Layout {
         below.extend(films.iter().filter(|film| film.has_states).map(states));
         add(side_by_side(below), 4.6);
         let left = Vertical::new(left).with_row_shares(shares);
-        let right = Vertical::new([self.plots(films), self.words(films)]).with_row_shares([12.0, 6.0]);
+        let right = Vertical::new([self.plots(films), self.texts(films)]).with_row_shares([12.0, 6.0]);
         let root = Horizontal::new([left.into(), right.into()]).with_column_shares([11.0, 9.0]);
         let time = TimePanel::new()
             .with_state(PanelState::Collapsed)
@@ -109,13 +114,15 @@ impl Layout {
             .with_time_panel(time)
     }
 
-    fn scene(&mut self, film: &Shown) -> ContainerLike {
+    /// Returns the 3D view of a film, which follows the ego.
+    fn scene(&mut self, film: &FilmContents) -> ContainerLike {
         let root = &film.root;
         let view = Spatial3DView::new(titled("Scene", film))
             .with_origin(format!("{root}world/ego"))
             .with_contents([format!("/{root}world/**")])
             .into();
-        for layer in film.hidden.iter().map(|layer| format!("ViewContents/overrides/{root}{layer}/visualizers")) {
+        for layer in film.hidden_layers.iter().map(|layer| format!("ViewContents/overrides/{root}{layer}/visualizers"))
+        {
             self.property(&view, &layer, EntityBehavior::update_fields().with_visible(false));
         }
         let eye = EyeControls3D::new()
@@ -130,7 +137,8 @@ impl Layout {
         view
     }
 
-    fn bird(&mut self, film: &Shown) -> ContainerLike {
+    /// Returns the view from above of a film.
+    fn bird(&mut self, film: &FilmContents) -> ContainerLike {
         let title = titled("From above (across the road twice as wide)", film);
         let view = Spatial2DView::new(title).with_origin(format!("{}bird", film.root)).into();
         let reach = super::bird::REACH_M;
@@ -141,36 +149,37 @@ impl Layout {
         view
     }
 
-    fn camera(&mut self, film: &Shown) -> ContainerLike {
+    fn camera(&mut self, film: &FilmContents) -> ContainerLike {
         Spatial2DView::new(titled("Rear camera", film)).with_origin(format!("{}camera", film.root)).into()
     }
 
-    /// The plots that any film has a curve in; films share them.
-    fn plots(&mut self, films: &[Shown]) -> ContainerLike {
+    /// Returns the plots in which any film has a curve. All films share them.
+    fn plots(&mut self, films: &[FilmContents]) -> ContainerLike {
         let mut columns: [Vec<ContainerLike>; 2] = [Vec::new(), Vec::new()];
-        for (place, (name, title, range)) in PLOTS.into_iter().enumerate() {
-            let having: Vec<&Shown> = films.iter().filter(|film| film.plots.contains(&name)).collect();
-            if having.is_empty() {
+        for (index, (name, title, range)) in PLOTS.into_iter().enumerate() {
+            let films_with_plot: Vec<&FilmContents> = films.iter().filter(|film| film.plots.contains(&name)).collect();
+            if films_with_plot.is_empty() {
                 continue;
             }
-            let contents = having.iter().map(|film| format!("/{}plots/{name}/**", film.root));
+            let contents = films_with_plot.iter().map(|film| format!("/{}plots/{name}/**", film.root));
             let view = TimeSeriesView::new(title).with_origin("/").with_contents(contents).into();
-            // Colours are those of the vehicles throughout: only what has other curves needs a legend.
+            // Curves have the colours of the vehicles, so that only plots with other curves need a legend.
             let is_plain = matches!(name, "gap" | "speed") || (films.len() > 1 && name == "acceleration");
             let legend = PlotLegend::new().with_corner(Corner2D::LeftTop).with_visible(!is_plain);
             self.property(&view, "PlotLegend", legend);
             if let Some([low, high]) = range {
                 self.property(&view, "ScalarAxis", ScalarAxis::new().with_range(Range1D::new(low, high)));
             }
-            columns[place / (PLOTS.len() / 2)].push(view);
+            columns[index / (PLOTS.len() / 2)].push(view);
         }
         let columns = columns.into_iter().filter(|views| !views.is_empty());
         side_by_side(columns.map(|views| Vertical::new(views).into()).collect())
             .unwrap_or_else(|| Vertical::new([]).into())
     }
 
-    /// The story beside the log, without the columns that its colours and words say already.
-    fn words(&mut self, films: &[Shown]) -> ContainerLike {
+    /// Returns the story beside the log. The log shows the texts only: their colours and words make other columns
+    /// redundant.
+    fn texts(&mut self, films: &[FilmContents]) -> ContainerLike {
         let story = TextDocumentView::new("Story").with_origin("summary").into();
         let contents = films.iter().map(|film| format!("/{}log/**", film.root));
         let log = TextLogView::new("Log").with_origin("/").with_contents(contents).into();
@@ -179,6 +188,7 @@ impl Layout {
         Horizontal::new([story, log]).into()
     }
 
+    /// Adds a property of a view.
     fn property(&mut self, view: &ContainerLike, name: &str, property: impl AsComponents + 'static) {
         if let ContainerLike::View(view) = view {
             let path = format!("{}/{name}", view.blueprint_path());
@@ -187,16 +197,17 @@ impl Layout {
     }
 }
 
-fn states(film: &Shown) -> ContainerLike {
+/// Returns the view of the bands of states of a film.
+fn states(film: &FilmContents) -> ContainerLike {
     StateTimelineView::new(titled("States", film)).with_origin(format!("{}states", film.root)).into()
 }
 
-/// The title of a view, with the name of its film where there are several.
-fn titled(title: &str, film: &Shown) -> String {
+/// Returns the title of a view, followed by the name of its arm if there are several films.
+fn titled(title: &str, film: &FilmContents) -> String {
     if film.root.is_empty() { title.to_owned() } else { format!("{title}: {}", film.name) }
 }
 
-/// Views beside each other; a single one needs no frame.
+/// Returns the views side by side. A single view needs no container.
 fn side_by_side(mut views: Vec<ContainerLike>) -> Option<ContainerLike> {
     match views.len() {
         0 => None,

@@ -1,7 +1,7 @@
-//! The shapes of vehicles, drawn once in each vehicle's frame.
+//! The 3D shapes of vehicles, each in the vehicle frame.
 //!
 //! ```text
-//!            ╱▔▔▔▔▔╲            a body is a few frusta: a rectangle below, a rectangle above
+//!            ╱▔▔▔▔▔╲            a body consists of frusta between a lower and an upper rectangle
 //!       ▁▁▁▁╱_______╲▁▁▁
 //!       ▏               ▏ ─▶ x
 //!       ▔▔◯▔▔▔▔▔▔▔▔▔◯▔▔
@@ -12,18 +12,18 @@ use rerun::Mesh3D;
 
 use super::palette::{self, Rgba};
 
-/// A solid between two horizontal rectangles, as shares of the vehicle's half length, half width and height.
+/// A solid between two horizontal rectangles. Lengths are shares of the vehicle's half length, half width and height.
 struct Frustum {
-    /// From the rear to the front, of the lower and of the upper rectangle: −1 is the rear bumper, 1 the front one.
+    /// Rear and front end of the lower and of the upper rectangle: −1 is the rear bumper, 1 the front bumper.
     along: [[f64; 2]; 2],
-    /// Half width, below and above.
+    /// Half width of the lower and of the upper rectangle.
     across: [f64; 2],
-    /// Height, below and above.
+    /// Height of the lower and of the upper rectangle.
     up: [f64; 2],
     colour: Rgba,
 }
 
-/// The shape of `vehicle` in `paint`.
+/// Returns the body of `vehicle`, painted in `paint`.
 pub(super) fn body(vehicle: &Vehicle, paint: Rgba) -> Mesh3D {
     let frusta = match vehicle.class {
         VehicleClass::Car => car(paint),
@@ -97,6 +97,7 @@ fn motorcycle(paint: Rgba) -> Vec<Frustum> {
     ]
 }
 
+/// The triangle mesh of a body that is being built.
 #[derive(Default)]
 struct Solid {
     vertices: Vec<[f32; 3]>,
@@ -106,6 +107,7 @@ struct Solid {
 }
 
 impl Solid {
+    /// Adds the faces of a frustum.
     fn add(&mut self, frustum: &Frustum, size: &Dimensions) {
         let corner = |level: usize, x: usize, left: f64| {
             [
@@ -119,14 +121,15 @@ impl Solid {
         let (below, above) = (ring(0), ring(1));
         for side in 0..4 {
             let next = (side + 1) % 4;
-            self.face([below[side], below[next], above[next], above[side]], frustum.colour);
+            self.add_face([below[side], below[next], above[next], above[side]], frustum.colour);
         }
-        self.face(above, frustum.colour);
-        self.face([below[3], below[2], below[1], below[0]], frustum.colour);
+        self.add_face(above, frustum.colour);
+        self.add_face([below[3], below[2], below[1], below[0]], frustum.colour);
     }
 
-    /// A quadrilateral, counter-clockwise seen from outside, with a normal of its own: flat faces are shaded flat.
-    fn face(&mut self, corners: [[f64; 3]; 4], colour: Rgba) {
+    /// Adds a quadrilateral, whose corners are counter-clockwise as seen from outside. It has vertices and a normal of
+    /// its own, so that it is shaded flat.
+    fn add_face(&mut self, corners: [[f64; 3]; 4], colour: Rgba) {
         #[expect(clippy::cast_possible_truncation, reason = "a vehicle has some hundred vertices")]
         let first = self.vertices.len() as u32;
         let corners = corners.map(nalgebra::Vector3::from);

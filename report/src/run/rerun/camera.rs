@@ -1,8 +1,8 @@
-//! What the rear camera saw, with the windows that the network looked at, and what it took them for.
+//! Images of the rear camera, with the windows that the classifier evaluates and the class that it finds in each.
 //!
-//! In the loop the camera's image is never drawn as a whole. Here it is drawn again, from the same scene and the same
-//! noise: every [`STEP`]-th pixel, at the instants that matter, since a picture costs as much as a hundred control steps.
-//! It stands, with its windows, until the next.
+//! The closed loop never renders a whole camera image. This module renders it afterwards, from the same scene and the
+//! same noise. It renders every [`PIXEL_STEP`]-th pixel, and only at selected instants, since an image costs as much as
+//! a hundred control steps. An image and its windows stay visible until the next image.
 
 use closecall_sensors::camera::{ExposureKey, Frame as Exposure, Lists, PixelRect, RearCamera};
 use closecall_sensors::{Detection, rear_exposures};
@@ -14,67 +14,71 @@ use super::palette::{self, Rgba};
 use super::stream::Writer;
 use crate::run::film::{Film, Frame};
 
-/// One pixel in so many is drawn, in both directions.
-const STEP: u16 = 5;
-/// Rows of the image that are drawn: from above the horizon down to the road just behind E.
-const ROWS: std::ops::Range<u16> = 230..610;
-/// Images are drawn so long before the critical moment, beside the first scan and those at the moments (a) to (e).
-const BEFORE: [Time; 3] = [Time::from_ms(2_000), Time::from_ms(800), Time::ZERO];
+/// Distance between two rendered pixels, in both directions (px).
+const PIXEL_STEP: u16 = 5;
+/// Rendered rows of the image, from above the horizon down to the road just behind the ego (px).
+const PIXEL_ROWS: std::ops::Range<u16> = 230..610;
+/// Times before the critical moment for which an image is rendered, besides the first scan and the moments (a) to (e).
+const TIMES_BEFORE: [Time; 3] = [Time::from_ms(2_000), Time::from_ms(800), Time::ZERO];
 
-/// Writes the images; true where there are any.
+/// Writes the images. Returns true if there are any.
 pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<bool, RecordError> {
     let Some((camera, key)) = &film.camera else { return Ok(false) };
     let camera = RearCamera::new(*camera);
     let fixed = Boxes2D::update_fields().with_radii([-1.5_f32]).with_show_labels(true);
-    writer.fixed("camera/windows", &fixed)?;
+    writer.write_static("camera/windows", &fixed)?;
     let mut lists = Lists::default();
-    let mut drawn = false;
-    for (frame, exposure) in chosen(film, rear_exposures(key)) {
+    let mut has_images = false;
+    for (frame, exposure) in frames_to_render(film, rear_exposures(key)) {
         let image;
-        (image, lists) = draw(film, &camera, frame, (exposure, lists));
-        writer.since("camera", frame.time, &image)?;
+        (image, lists) = render(film, &camera, frame, (exposure, lists));
+        writer.write_from("camera", frame.time, &image)?;
         write_windows(writer, film, &camera, frame)?;
-        drawn = true;
+        has_images = true;
     }
-    Ok(drawn)
+    Ok(has_images)
 }
 
-/// The frames to draw, each with the key of its noise: at every instant that matters the latest one with a scan.
-fn chosen(film: &Film, keys: impl Iterator<Item = ExposureKey>) -> Vec<(&Frame, ExposureKey)> {
+/// Returns the frames to render with the keys of their noise: for each selected instant, the latest frame with a scan.
+fn frames_to_render(film: &Film, keys: impl Iterator<Item = ExposureKey>) -> Vec<(&Frame, ExposureKey)> {
     let critical = film.critical_moment();
-    let instants = BEFORE.iter().map(|&before| critical - before).chain(film.moments().iter().map(|noted| noted.time));
-    let scanned: Vec<usize> = (0..film.frames.len()).filter(|&row| film.frames[row].scan.is_some()).collect();
-    let latest = |time: Time| scanned.iter().rev().find(|&&row| film.frames[row].time <= time).copied();
-    let mut wanted: Vec<usize> = instants.filter_map(latest).chain(scanned.first().copied()).collect();
-    wanted.sort_unstable();
+    let instants =
+        TIMES_BEFORE.iter().map(|&before| critical - before).chain(film.moments().iter().map(|noted| noted.time));
+    let rows_with_scan: Vec<usize> = (0..film.frames.len()).filter(|&row| film.frames[row].scan.is_some()).collect();
+    let latest = |time: Time| rows_with_scan.iter().rev().find(|&&row| film.frames[row].time <= time).copied();
+    let mut selected: Vec<usize> = instants.filter_map(latest).chain(rows_with_scan.first().copied()).collect();
+    selected.sort_unstable();
     let frames = film.frames.iter().zip(keys).enumerate();
-    frames.filter(|(row, _)| wanted.binary_search(row).is_ok()).map(|(_, chosen)| chosen).collect()
+    frames.filter(|(row, _)| selected.binary_search(row).is_ok()).map(|(_, frame_and_key)| frame_and_key).collect()
 }
 
-fn draw(film: &Film, camera: &RearCamera, frame: &Frame, (key, lists): (ExposureKey, Lists)) -> (Image, Lists) {
+/// Renders the image of a frame. The buffers `lists` are passed on to the next image.
+fn render(film: &Film, camera: &RearCamera, frame: &Frame, (key, lists): (ExposureKey, Lists)) -> (Image, Lists) {
     let (ego, others) = film.scene_vehicles(frame);
     let scene = film.scene(frame, ego, &others);
     let mut exposure = Exposure::reusing(lists, camera.camera(), &scene, key, &[PixelRect::IMAGE]);
-    let picture = exposure.preview(STEP, ROWS);
+    let picture = exposure.preview(PIXEL_STEP, PIXEL_ROWS);
     let image = Image::from_rgb24(picture.rgb, [picture.width, picture.height]);
     (image, exposure.into_lists())
 }
 
+/// Writes the windows of the detections of a frame with their classes.
 fn write_windows(writer: &Writer<'_>, film: &Film, camera: &RearCamera, frame: &Frame) -> Result<(), RecordError> {
     let (ego, _) = film.scene_vehicles(frame);
     let boxes = frame.scan.as_ref().map_or(&[][..], |scan| &scan.boxes);
-    let seen: Vec<(&Detection, PixelRect)> =
+    let in_image: Vec<(&Detection, PixelRect)> =
         boxes.iter().filter_map(|found| Some((found, camera.window_of(&ego, found)?))).collect();
-    let scale = 1.0 / f32::from(STEP);
-    let corner = |window: &PixelRect| [window.left as f32 * scale, (window.top as f32 - f32::from(ROWS.start)) * scale];
+    let scale = 1.0 / f32::from(PIXEL_STEP);
+    let corner =
+        |window: &PixelRect| [window.left as f32 * scale, (window.top as f32 - f32::from(PIXEL_ROWS.start)) * scale];
     let size = |window: &PixelRect| [window.width as f32 * scale, window.height as f32 * scale];
     let windows = Boxes2D::from_mins_and_sizes(
-        seen.iter().map(|(_, window)| corner(window)),
-        seen.iter().map(|(_, window)| size(window)),
+        in_image.iter().map(|(_, window)| corner(window)),
+        in_image.iter().map(|(_, window)| size(window)),
     )
-    .with_colors(seen.iter().map(|(found, _)| colour(found)))
-    .with_labels(seen.iter().map(|(found, _)| label(found)));
-    writer.since("camera/windows", frame.time, &windows)
+    .with_colors(in_image.iter().map(|(found, _)| colour(found)))
+    .with_labels(in_image.iter().map(|(found, _)| label(found)));
+    writer.write_from("camera/windows", frame.time, &windows)
 }
 
 fn colour(found: &Detection) -> Rgba {
@@ -86,7 +90,7 @@ fn colour(found: &Detection) -> Rgba {
     }
 }
 
-/// The likeliest class with its score.
+/// Returns the most likely class with its score.
 fn label(found: &Detection) -> String {
     let [car, truck, motorcycle, background] = found.class.0;
     let all = [("car", car), ("truck", truck), ("motorcycle", motorcycle), ("background", background)];

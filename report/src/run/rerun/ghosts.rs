@@ -1,5 +1,6 @@
-//! The vehicles of the other film of a pair, as see-through outlines in the world of this one: where everyone would be
-//! without the system under test, or is in the recording.
+//! Ghosts: the vehicles of one film of a pair, as transparent outlines in the views of the other.
+//!
+//! They show where the vehicles are without the system under test, or in the recorded traffic.
 
 use closecall_traffic::Time;
 use rerun::{Boxes3D, FillMode, LineStrips2D};
@@ -8,48 +9,48 @@ use super::RecordError;
 use super::bird::STRETCH;
 use super::palette;
 use super::stream::Writer;
-use super::vehicles::about_up;
+use super::vehicles::yaw_rotation;
 use crate::run::film::Film;
 
 /// Opacity of an outline.
-const FAINT: u8 = 120;
+const OPACITY: u8 = 120;
 
-/// Writes the vehicles of `other` into the world of `film`, for as long as both last.
+/// Writes the vehicles of `other` into the 3D scene and the view from above of `film`.
 pub(super) fn write(writer: &Writer<'_>, film: &Film, other: &Film) -> Result<(), RecordError> {
-    for (place, _) in other.cast.iter().enumerate().filter(|(_, member)| !member.rows.is_empty()) {
-        write_outline(writer, other, place)?;
+    for (index, _) in other.actors.iter().enumerate().filter(|(_, actor)| !actor.present_frames.is_empty()) {
+        write_outline(writer, other, index)?;
     }
     write_from_above(writer, film, other)
 }
 
-fn write_outline(writer: &Writer<'_>, other: &Film, place: usize) -> Result<(), RecordError> {
-    let member = &other.cast[place];
-    let size = &member.vehicle.dimensions;
-    let entity = format!("world/ghosts/{}", member.name);
+fn write_outline(writer: &Writer<'_>, other: &Film, index: usize) -> Result<(), RecordError> {
+    let actor = &other.actors[index];
+    let size = &actor.vehicle.dimensions;
+    let entity = format!("world/ghosts/{}", actor.name);
     let half = |extent_m: f64| (0.5 * extent_m) as f32;
     let fixed = Boxes3D::update_fields()
         .with_half_sizes([[half(size.length_m), half(size.width_m), half(size.height_m)]])
-        .with_colors([palette::faint(palette::actor(place, other.ego), FAINT)])
+        .with_colors([palette::with_opacity(palette::actor(index, other.ego), OPACITY)])
         .with_fill_mode(FillMode::MajorWireframe)
         .with_radii([0.04_f32])
-        .with_labels([format!("{} ({})", member.name, other.arm)])
-        .with_show_labels(place == other.ego);
-    writer.fixed(&entity, &fixed)?;
+        .with_labels([format!("{} ({})", actor.name, other.arm)])
+        .with_show_labels(index == other.ego);
+    writer.write_static(&entity, &fixed)?;
     let all_times = other.times();
-    let (times, frames) = (&all_times[member.rows.clone()], &other.frames[member.rows.clone()]);
-    writer.rows(&entity, times, |range| {
+    let (times, frames) = (&all_times[actor.present_frames.clone()], &other.frames[actor.present_frames.clone()]);
+    writer.write_rows(&entity, times, |range| {
         let poses = frames[range].iter().map(|frame| {
-            let state = &frame.states[place];
+            let state = &frame.states[index];
             other.road.plane_pose(state.s_m, state.d_m, state.heading_rad)
         });
         let poses: Vec<_> = poses.collect();
         Boxes3D::update_fields()
             .with_centers(poses.iter().map(|pose| [pose.x_m as f32, pose.y_m as f32, half(size.height_m)]))
-            .with_quaternions(poses.iter().map(|pose| about_up(pose.yaw_rad)))
+            .with_quaternions(poses.iter().map(|pose| yaw_rotation(pose.yaw_rad)))
             .columns_of_unit_batches()
     })?;
-    match all_times.get(member.rows.end) {
-        Some(&gone) => writer.gone(&entity, gone),
+    match all_times.get(actor.present_frames.end) {
+        Some(&gone) => writer.write_clear(&entity, gone),
         None => Ok(()),
     }
 }
@@ -58,13 +59,13 @@ fn write_from_above(writer: &Writer<'_>, film: &Film, other: &Film) -> Result<()
     let entity = "bird/ghosts";
     let count = film.frames.len().min(other.frames.len());
     let times: Vec<Time> = film.frames[..count].iter().map(|frame| frame.time).collect();
-    writer.fixed(entity, &LineStrips2D::update_fields().with_radii([0.3_f32]))?;
-    let there = |row: usize| (0..other.cast.len()).filter(move |&place| other.is_there(place, row));
-    writer.rows(entity, &times, |range| {
-        let all = || range.clone().flat_map(|row| there(row).map(move |place| (row, place)));
-        let outline = |(row, place): (usize, usize)| {
+    writer.write_static(entity, &LineStrips2D::update_fields().with_radii([0.3_f32]))?;
+    let present = |row: usize| (0..other.actors.len()).filter(move |&index| other.is_present(index, row));
+    writer.write_rows(entity, &times, |range| {
+        let all = || range.clone().flat_map(|row| present(row).map(move |index| (row, index)));
+        let outline = |(row, index): (usize, usize)| {
             let from_m = film.frames[row].states[film.ego].s_m;
-            let (state, size) = (&other.frames[row].states[place], &other.cast[place].vehicle.dimensions);
+            let (state, size) = (&other.frames[row].states[index], &other.actors[index].vehicle.dimensions);
             let corners = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5]];
             corners.map(|[along, across]: [f64; 2]| {
                 let (s_m, d_m) = (state.s_m + along * size.length_m, state.d_m + across * size.width_m);
@@ -73,7 +74,7 @@ fn write_from_above(writer: &Writer<'_>, film: &Film, other: &Film) -> Result<()
         };
         LineStrips2D::update_fields()
             .with_strips(all().map(outline))
-            .with_colors(all().map(|(_, place)| palette::faint(palette::actor(place, other.ego), FAINT)))
-            .columns(range.clone().map(|row| there(row).count()).collect::<Vec<_>>())
+            .with_colors(all().map(|(_, index)| palette::with_opacity(palette::actor(index, other.ego), OPACITY)))
+            .columns(range.clone().map(|row| present(row).count()).collect::<Vec<_>>())
     })
 }

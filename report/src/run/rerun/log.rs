@@ -1,13 +1,13 @@
-//! What happened, in words, at the moment it happened.
+//! The text log: every happening at the time at which it happened.
 
 use closecall_traffic::Time;
 use rerun::{TextLog, TextLogLevel};
 
 use super::RecordError;
 use super::palette::{self, Rgba};
-use super::plots::phase_word;
+use super::plots::phase_name;
 use super::stream::Writer;
-use crate::run::film::{Film, collision_text, note_words, state_word};
+use crate::run::film::{Film, collision_text, driver_note_text, ego_state_name};
 use closecall_simulation::Happening;
 
 /// One line of the log.
@@ -19,7 +19,8 @@ struct Line {
     text: String,
 }
 
-/// Writes the log of a film; where there are several, each line says whose it is.
+/// Writes the log of a film. Unless the film is the only one of the recording, each line begins with the name of its
+/// arm.
 pub(super) fn write(writer: &Writer<'_>, film: &Film, is_alone: bool) -> Result<(), RecordError> {
     let start = film.frames.first().map_or(Time::ZERO, |frame| frame.time);
     let plain = |entity, time, text| Line { time, entity, level: TextLogLevel::INFO, colour: palette::NEUTRAL, text };
@@ -34,28 +35,29 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film, is_alone: bool) -> Result<
     for line in lines {
         let text = if is_alone { line.text } else { format!("[{}] {}", film.arm, line.text) };
         let row = TextLog::new(text).with_level(line.level).with_color(line.colour);
-        writer.rows(line.entity, &[line.time], |_| row.clone().columns_of_unit_batches())?;
+        writer.write_rows(line.entity, &[line.time], |_| row.clone().columns_of_unit_batches())?;
     }
     Ok(())
 }
 
+/// Returns the log line of a happening.
 fn line(film: &Film, time: Time, what: &Happening) -> Line {
     let info = |entity, colour, text| Line { time, entity, level: TextLogLevel::INFO, colour, text };
     let warn = |entity, colour, text| Line { time, entity, level: TextLogLevel::WARN, colour, text };
     match what {
         Happening::EventTriggered { event } => warn("log/event", palette::WARNING, format!("event `{event}` sets in")),
         Happening::DriverNote { actor, note } => {
-            let name = film.cast.get(*actor).map_or("?", |actor| actor.name.as_str());
+            let name = film.actors.get(*actor).map_or("?", |actor| actor.name.as_str());
             let colour = palette::actor(*actor, film.ego);
-            info("log/driver", colour, format!("{name} {}", note_words(*note)))
+            info("log/driver", colour, format!("{name} {}", driver_note_text(*note)))
         }
         Happening::EgoStateChanged { from, to, reason } => {
-            let text = format!("ego: {} -> {} ({reason})", state_word(*from), state_word(*to));
+            let text = format!("ego: {} -> {} ({reason})", ego_state_name(*from), ego_state_name(*to));
             info("log/ego", palette::EGO, text)
         }
-        Happening::PhaseChanged { to } => info("log/phase", palette::NEUTRAL, format!("phase: {}", phase_word(*to))),
-        Happening::Collision(touch) => {
-            let text = format!("COLLISION: {}", collision_text(film.settled(touch)));
+        Happening::PhaseChanged { to } => info("log/phase", palette::NEUTRAL, format!("phase: {}", phase_name(*to))),
+        Happening::Collision(reported) => {
+            let text = format!("COLLISION: {}", collision_text(film.collision_in_outcome(reported)));
             Line { time, entity: "log/collision", level: TextLogLevel::ERROR, colour: palette::CRITICAL, text }
         }
     }

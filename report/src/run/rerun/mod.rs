@@ -1,14 +1,14 @@
-//! A run, or a pair of them, as a file of the Rerun viewer, with a layout of its own.
+//! Recordings: one film, or a pair of films, as an .rrd file for the Rerun viewer, with a layout of its own.
 //!
 //! ```text
-//!  Film ─▶ road, vehicles, tracks, points │ from above │ camera │ plots │ log │ story │ blueprint ─▶ F.rrd
+//!  Film ─▶ road, vehicles, tracks, points │ from above │ camera │ plots │ log │ story │ blueprint ─▶ FILE.rrd
 //! ```
 //!
-//! A film is written when its outcome is known, in one go and in columns: small, fast, never half there, and opening at
-//! the moment that turned out to be the critical one. Two films share one time line: each has a world of its own, in
-//! which the other's vehicles stand as outlines, and both are drawn into the same plots.
+//! A recording is written as a whole when the outcome of the run is known. It is therefore small and never incomplete,
+//! and it opens at the critical moment. Two films share one timeline and the same plots. Each has a 3D scene of its
+//! own, in which the vehicles of the other film appear as outlines.
 //!
-//! This folder is the only one that names the library.
+//! This folder is the only one that uses the rerun library.
 
 mod bird;
 mod blueprint;
@@ -26,8 +26,5 @@ mod summary;
 mod truth;
 mod vehicles;
 mod write;
-
-#[cfg(test)]
-mod tests;
 
 pub use write::{RecordError, check_recordable, record_films, write_films};

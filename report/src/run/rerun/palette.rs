@@ -1,15 +1,16 @@
-//! Colours: one for each actor in every view, so that a line in a plot and a vehicle on the road can be told together.
+//! The colours of a recording. Each actor has the same colour in all views, so that a vehicle in the scene and its
+//! curves in the plots can be matched.
 
-/// A colour with its opacity, sRGB.
+/// An sRGB colour with its opacity.
 pub(super) type Rgba = [u8; 4];
 
-/// E.
+/// The ego.
 pub(super) const EGO: Rgba = [64, 156, 255, 255];
-/// What is ahead of E: the first of the others, as scenarios name them.
+/// The first of the other actors, by convention the lead vehicle.
 pub(super) const FRONT: Rgba = [255, 176, 59, 255];
-/// What is behind E: the second of the others.
+/// The second of the other actors, by convention the rear vehicle.
 pub(super) const REAR: Rgba = [244, 92, 160, 255];
-/// All others in turn, in the order of the scenario's actors.
+/// Colours of the other actors, in their order. They repeat if there are more actors.
 const OTHERS: [Rgba; 6] =
     [FRONT, REAR, [130, 208, 96, 255], [176, 132, 255, 255], [92, 214, 208, 255], [222, 208, 150, 255]];
 
@@ -35,32 +36,32 @@ pub(super) const WARNING: Rgba = [255, 196, 64, 255];
 pub(super) const NEUTRAL: Rgba = [168, 172, 178, 255];
 pub(super) const QUIET: Rgba = [96, 100, 108, 255];
 
-/// The colour of an actor by its place in the scenario.
-pub(super) fn actor(place: usize, ego: usize) -> Rgba {
-    if place == ego {
+/// Returns the colour of the actor of this index.
+pub(super) fn actor(index: usize, ego: usize) -> Rgba {
+    if index == ego {
         return EGO;
     }
-    let others_before = if place > ego { place - 1 } else { place };
+    let others_before = if index > ego { index - 1 } else { index };
     OTHERS[others_before % OTHERS.len()]
 }
 
-/// The same colour, see-through.
-pub(super) fn faint([red, green, blue, _]: Rgba, opacity: u8) -> Rgba {
+/// Returns the colour with another opacity.
+pub(super) fn with_opacity([red, green, blue, _]: Rgba, opacity: u8) -> Rgba {
     [red, green, blue, opacity]
 }
 
-/// A darker shade of the same colour: of what is compared with.
-pub(super) fn dim([red, green, blue, opacity]: Rgba) -> Rgba {
-    let darker = |channel: u8| (u16::from(channel) * 11 / 20) as u8;
-    [darker(red), darker(green), darker(blue), opacity]
+/// Returns a darker shade of a colour, for the curves of the baseline.
+pub(super) fn darker([red, green, blue, opacity]: Rgba) -> Rgba {
+    let scaled = |channel: u8| (u16::from(channel) * 11 / 20) as u8;
+    [scaled(red), scaled(green), scaled(blue), opacity]
 }
 
-/// The colour of the n-th part of the encounter.
-pub(super) fn moment(place: usize) -> Rgba {
-    OTHERS[(place + 2) % OTHERS.len()]
+/// Returns the colour of the moment of this index.
+pub(super) fn moment(index: usize) -> Rgba {
+    OTHERS[(index + 2) % OTHERS.len()]
 }
 
-/// The colour of the n-th cluster of a scan.
+/// Returns the colour of a cluster of a scan.
 pub(super) fn cluster(number: u8) -> Rgba {
     const CLUSTERS: [Rgba; 7] = [
         [255, 99, 72, 255],
@@ -74,7 +75,7 @@ pub(super) fn cluster(number: u8) -> Rgba {
     CLUSTERS[usize::from(number) % CLUSTERS.len()]
 }
 
-/// The colour of an intensity: dark blue, green, yellow, in eight shades, which pack well.
+/// Returns the colour of an intensity, from dark blue over green to yellow. Eight shades compress well.
 pub(super) fn intensity(intensity: u8) -> Rgba {
     const SHADES: [Rgba; 8] = [
         [68, 1, 84, 255],
@@ -86,7 +87,7 @@ pub(super) fn intensity(intensity: u8) -> Rgba {
         [159, 218, 58, 255],
         [253, 231, 37, 255],
     ];
-    // Most returns are weak: the scale is that of the square root.
+    // Most returns are weak, so that the scale follows the square root.
     let root = f32::from(intensity).sqrt() / f32::from(u8::MAX).sqrt();
     SHADES[((root * 8.0) as usize).min(7)]
 }

@@ -1,10 +1,10 @@
-//! The rear LiDAR's points, in layers that can be switched, and the boxes fitted to the clusters.
+//! The points of the rear LiDAR, in layers that the user can switch, and the boxes fitted to the clusters.
 //!
 //! | layer | points | colour |
 //! |---|---|---|
-//! | `clusters` | those that belong to a box | by box |
-//! | `rejected` | those that belong to none: ground, guard rails, spray, noise | by intensity |
-//! | `intensity` | those of `clusters` again | by intensity: with `rejected`, the raw scan |
+//! | `clusters` | points that belong to a box | by box |
+//! | `rejected` | points that belong to no box: ground, guard rails, spray, noise | by intensity |
+//! | `intensity` | the points of `clusters` again | by intensity; together with `rejected`, the raw scan |
 
 use closecall_sensors::Detection;
 use closecall_traffic::Time;
@@ -13,20 +13,20 @@ use rerun::{Boxes3D, FillMode, Points3D};
 use super::RecordError;
 use super::palette::{self, Rgba};
 use super::stream::Writer;
-use super::vehicles::about_up;
+use super::vehicles::yaw_rotation;
 use crate::run::film::{Film, NO_CLUSTER, Scan};
 
-/// A point is drawn as a ball of this radius [m].
-const POINT_M: f32 = 0.05;
+/// Radius of the ball that shows a point (m).
+const POINT_RADIUS_M: f32 = 0.05;
 
-/// Writes the layers; names those that are there for whoever wants them.
+/// Writes the layers, and returns the entities that the scene hides until the user switches them on.
 pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<Vec<String>, RecordError> {
-    let chosen: Vec<(Time, &Scan)> = chosen(film);
-    if chosen.is_empty() {
+    let kept: Vec<(Time, &Scan)> = kept_scans(film);
+    if kept.is_empty() {
         return Ok(Vec::new());
     }
-    let times: Vec<Time> = chosen.iter().map(|(time, _)| *time).collect();
-    let scans: Vec<&Scan> = chosen.iter().map(|(_, scan)| *scan).collect();
+    let times: Vec<Time> = kept.iter().map(|(time, _)| *time).collect();
+    let scans: Vec<&Scan> = kept.iter().map(|(_, scan)| *scan).collect();
     let is_clustered = |scan: &Scan, point: usize| scan.clusters[point] != NO_CLUSTER;
     let shade = |scan: &Scan, point: usize| palette::intensity(scan.intensities[point]);
     let clusters =
@@ -40,22 +40,23 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<Vec<String>, Rec
     Ok(["intensity", "rejected", "boxes"].map(|layer| format!("world/ego/lidar/{layer}")).to_vec())
 }
 
-/// The scans that were kept, each with its time.
-fn chosen(film: &Film) -> Vec<(Time, &Scan)> {
+/// Returns the scans of a film with their times.
+fn kept_scans(film: &Film) -> Vec<(Time, &Scan)> {
     film.frames.iter().filter_map(|frame| Some((frame.time, frame.scan.as_ref()?))).collect()
 }
 
-/// Points of all scans in one row after the other.
+/// The points of a layer, of all scans one after the other.
 #[derive(Default)]
 struct Layer {
     points_m: Vec<[f32; 3]>,
     colours: Vec<Rgba>,
     /// Number of points of each scan.
     lengths: Vec<usize>,
-    /// Where the points of each scan begin.
+    /// Index of the first point of each scan.
     starts: Vec<usize>,
 }
 
+/// Returns the layer of the points for which `colour` returns a colour.
 fn layer(scans: &[&Scan], colour: impl Fn(&Scan, usize) -> Option<Rgba>) -> Layer {
     let mut layer = Layer::default();
     for scan in scans {
@@ -73,8 +74,8 @@ fn layer(scans: &[&Scan], colour: impl Fn(&Scan, usize) -> Option<Rgba>) -> Laye
 }
 
 fn write_layer(writer: &Writer<'_>, entity: &str, times: &[Time], layer: &Layer) -> Result<(), RecordError> {
-    writer.fixed(entity, &Points3D::update_fields().with_radii([POINT_M]))?;
-    writer.rows(entity, times, |range| {
+    writer.write_static(entity, &Points3D::update_fields().with_radii([POINT_RADIUS_M]))?;
+    writer.write_rows(entity, times, |range| {
         let first = layer.starts[range.start];
         let last = layer.starts.get(range.end).copied().unwrap_or(layer.points_m.len());
         Points3D::update_fields()
@@ -84,6 +85,7 @@ fn write_layer(writer: &Writer<'_>, entity: &str, times: &[Time], layer: &Layer)
     })
 }
 
+/// Writes the boxes fitted to the clusters.
 fn write_boxes(writer: &Writer<'_>, times: &[Time], scans: &[&Scan]) -> Result<(), RecordError> {
     let entity = "world/ego/lidar/boxes";
     let fixed = Boxes3D::update_fields()
@@ -91,8 +93,8 @@ fn write_boxes(writer: &Writer<'_>, times: &[Time], scans: &[&Scan]) -> Result<(
         .with_radii([0.02_f32])
         .with_colors([palette::BOX_FIT])
         .with_show_labels(false);
-    writer.fixed(entity, &fixed)?;
-    writer.rows(entity, times, |range| {
+    writer.write_static(entity, &fixed)?;
+    writer.write_rows(entity, times, |range| {
         let scans = &scans[range];
         let all = || scans.iter().flat_map(|scan| &scan.boxes);
         let half = |extent_m: f64| (0.5 * extent_m) as f32;
@@ -103,7 +105,7 @@ fn write_boxes(writer: &Writer<'_>, times: &[Time], scans: &[&Scan]) -> Result<(
         Boxes3D::update_fields()
             .with_centers(all().map(centre))
             .with_half_sizes(all().map(|found| [half(found.length_m), half(found.width_m), half(found.top_m)]))
-            .with_quaternions(all().map(|found| about_up(found.heading_rad)))
+            .with_quaternions(all().map(|found| yaw_rotation(found.heading_rad)))
             .with_labels(all().map(|found| format!("{} points", found.points)))
             .columns(scans.iter().map(|scan| scan.boxes.len()).collect::<Vec<_>>())
     })

@@ -1,4 +1,4 @@
-//! The road, drawn once: surface, lane markings, guard rails.
+//! The road in the 3D scene: surface, lane markings, guard rails. It is written once per film.
 
 use closecall_traffic::{Lane, Road};
 use rerun::{LineStrips3D, Mesh3D};
@@ -8,30 +8,37 @@ use super::palette::{self, Rgba};
 use super::stream::Writer;
 use crate::run::film::Film;
 
-/// Road shown beyond the first and the last place of any vehicle [m].
+/// Length of road shown beyond the smallest and the largest position of any vehicle (m).
 const MARGIN_M: f64 = 300.0;
-/// Length of the pieces that a curve is drawn with [m]: 3 cm off the arc at the tightest radius.
+/// Length of the straight pieces of a curved road (m). At the tightest radius they deviate from the arc by 3 cm.
 const PIECE_M: f64 = 10.0;
-/// Hard shoulder and verge beside the lanes [m].
+/// Width of the hard shoulder beside the lanes (m).
 const SHOULDER_M: f64 = 2.5;
+/// Width of the verge beside the hard shoulder (m).
 const VERGE_M: f64 = 40.0;
-/// Lane marking of German motorways (RMS): 6 m of line, 12 m apart, 0.15 m wide; edge lines 0.30 m.
+// Lane markings of German motorways (RMS): dashes of 6 m with gaps of 12 m, 0.15 m wide; edge lines 0.30 m wide.
+
+/// Length of a dash (m).
 const DASH_M: f64 = 6.0;
+/// Distance from the start of a dash to that of the next one (m).
 const DASH_PERIOD_M: f64 = 18.0;
 const DASH_WIDTH_M: f64 = 0.15;
 const EDGE_WIDTH_M: f64 = 0.30;
-/// Guard rails: height of the beam, distance of the posts, distance from the edge of the lanes [m].
+/// Height of the guard rail's beam (m).
 const RAIL_HEIGHT_M: f64 = 0.75;
+/// Distance between two posts of the guard rail (m).
 const POST_PERIOD_M: f64 = 4.0;
+/// Lateral distance of the guard rail from the edge of the lanes (m).
 const RAIL_OFFSET_M: f64 = SHOULDER_M - 0.5;
 
-/// Heights that keep what lies flat apart [m].
+/// Height of the verge (m). Flat layers lie at different heights, so that each of them is visible.
 const VERGE_Z_M: f64 = -0.30;
+/// Height of the lane markings (m).
 const MARKING_Z_M: f64 = 0.03;
 
 pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError> {
     let road = &film.road;
-    let (first_m, last_m) = film.reach_m();
+    let (first_m, last_m) = film.s_range_m();
     if !(first_m <= last_m) {
         return Ok(());
     }
@@ -41,15 +48,15 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError>
 
     let mut verge = Ribbons::new(road, VERGE_Z_M);
     verge.add([from_m, to_m], [right_m - VERGE_M, left_m + VERGE_M]);
-    writer.fixed("world/road/verge", &verge.mesh(palette::VERGE))?;
+    writer.write_static("world/road/verge", &verge.mesh(palette::VERGE))?;
 
     let mut surface = Ribbons::new(road, 0.0);
     surface.add([from_m, to_m], [right_m, left_m]);
-    writer.fixed("world/road/surface", &surface.mesh(palette::ROAD))?;
+    writer.write_static("world/road/surface", &surface.mesh(palette::ROAD))?;
 
-    writer.fixed("world/road/markings", &markings(road, [from_m, to_m]).mesh(palette::MARKING))?;
+    writer.write_static("world/road/markings", &markings(road, [from_m, to_m]).mesh(palette::MARKING))?;
     if road.has_guard_rails() {
-        writer.fixed("world/road/guard_rails", &guard_rails(road, [from_m, to_m]))?;
+        writer.write_static("world/road/guard_rails", &guard_rails(road, [from_m, to_m]))?;
     }
     Ok(())
 }
@@ -72,7 +79,7 @@ fn markings(road: &Road, [from_m, to_m]: [f64; 2]) -> Ribbons<'_> {
 fn guard_rails(road: &Road, [from_m, to_m]: [f64; 2]) -> LineStrips3D {
     let mut strips: Vec<Vec<[f32; 3]>> = Vec::new();
     for d_m in [RAIL_OFFSET_M, road.right_edge_m() - RAIL_OFFSET_M] {
-        let along = pieces(road, [from_m, to_m]);
+        let along = piece_ends(road, [from_m, to_m]);
         strips.push(along.iter().map(|&s_m| point(road, s_m, d_m, RAIL_HEIGHT_M)).collect());
         for s_m in multiples(POST_PERIOD_M, [from_m, to_m]) {
             strips.push(vec![point(road, s_m, d_m, 0.0), point(road, s_m, d_m, RAIL_HEIGHT_M)]);
@@ -81,7 +88,7 @@ fn guard_rails(road: &Road, [from_m, to_m]: [f64; 2]) -> LineStrips3D {
     LineStrips3D::new(strips).with_colors([palette::RAIL]).with_radii([0.08_f32])
 }
 
-/// Multiples of `period_m` in a range: what is painted or planted stands at the same places in every recording.
+/// Returns the multiples of `period_m` in a range. Dashes and posts are thus at the same positions in every recording.
 fn multiples(period_m: f64, [from_m, to_m]: [f64; 2]) -> impl Iterator<Item = f64> {
     let first = (from_m / period_m).ceil();
     let mut count = 0.0;
@@ -92,8 +99,8 @@ fn multiples(period_m: f64, [from_m, to_m]: [f64; 2]) -> impl Iterator<Item = f6
     })
 }
 
-/// The ends of the pieces that a stretch of the road is drawn with.
-fn pieces(road: &Road, [from_m, to_m]: [f64; 2]) -> Vec<f64> {
+/// Returns the positions along the road (m) at which a stretch of it is divided into straight pieces.
+fn piece_ends(road: &Road, [from_m, to_m]: [f64; 2]) -> Vec<f64> {
     if road.curvature_per_m() == 0.0 {
         return vec![from_m, to_m];
     }
@@ -107,12 +114,13 @@ fn pieces(road: &Road, [from_m, to_m]: [f64; 2]) -> Vec<f64> {
     ends
 }
 
+/// Returns the scene coordinates (m) of a point in the road frame.
 fn point(road: &Road, s_m: f64, d_m: f64, z_m: f64) -> [f32; 3] {
     let pose = road.plane_pose(s_m, d_m, 0.0);
     [pose.x_m as f32, pose.y_m as f32, z_m as f32]
 }
 
-/// Stretches of the road as flat quadrilaterals.
+/// Flat ribbons along the road, made of quadrilaterals.
 struct Ribbons<'a> {
     road: &'a Road,
     z_m: f64,
@@ -125,16 +133,17 @@ impl<'a> Ribbons<'a> {
         Self { road, z_m, vertices: Vec::new(), triangles: Vec::new() }
     }
 
+    /// Adds a ribbon between two positions along the road and two positions across it.
     fn add(&mut self, along_m: [f64; 2], [right_m, left_m]: [f64; 2]) {
-        let mut before = None;
-        for s_m in pieces(self.road, along_m) {
+        let mut previous = None;
+        for s_m in piece_ends(self.road, along_m) {
             #[expect(clippy::cast_possible_truncation, reason = "a road has far fewer than 2^32 vertices")]
             let here = self.vertices.len() as u32;
             self.vertices.push(point(self.road, s_m, right_m, self.z_m));
             self.vertices.push(point(self.road, s_m, left_m, self.z_m));
-            if let Some(before) = before.replace(here) {
-                self.triangles.push([before, here, here + 1]);
-                self.triangles.push([before, here + 1, before + 1]);
+            if let Some(previous) = previous.replace(here) {
+                self.triangles.push([previous, here, here + 1]);
+                self.triangles.push([previous, here + 1, previous + 1]);
             }
         }
     }

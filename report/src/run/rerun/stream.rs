@@ -1,8 +1,8 @@
-//! Columns of values on the recording's three timelines.
+//! The writer of a film's entities, on the three timelines of the recording.
 //!
-//! `time` and `step` span the whole run. The viewer opens a timeline that it follows at its latest moment, and a file
-//! cannot say where else: so a third timeline, [`OPENING_TIMELINE`], carries what happened up to the critical moment and
-//! nothing later. It is the one that the blueprint chooses.
+//! The timelines `time` and `step` span the whole run. The viewer opens a timeline at its latest moment, and a file
+//! cannot set another one. A third timeline, [`OPENING_TIMELINE`], therefore ends shortly after the critical moment.
+//! The blueprint selects it, so that the viewer opens at the critical moment.
 
 use std::ops::Range;
 
@@ -14,41 +14,43 @@ use rerun::{
 
 use super::RecordError;
 
-/// Simulated time in seconds.
+/// Timeline of the simulated time.
 pub(super) const TIME_TIMELINE: &str = "time";
-/// Number of the control step.
+/// Timeline of the control step numbers.
 pub(super) const STEP_TIMELINE: &str = "step";
-/// Simulated time in seconds, which ends shortly after the critical moment.
+/// Timeline of the simulated time that ends shortly after the critical moment.
 pub(super) const OPENING_TIMELINE: &str = "until_critical";
 
-/// Writes the entities of one recording.
+/// Writes the entities of one film into a recording.
 pub(super) struct Writer<'a> {
     stream: &'a RecordingStream,
     /// The last moment on the opening timeline.
-    opening: Time,
-    /// Where the entities of this film lie: nothing for the only film of a file.
+    opening_end: Time,
+    /// Prefix of the entity paths of this film; empty for the only film of a recording.
     root: String,
-    /// Time of a step.
+    /// Duration of a control step.
     period: Time,
 }
 
 impl<'a> Writer<'a> {
-    pub(super) fn new(stream: &'a RecordingStream, opening: Time, root: &str, period: Time) -> Self {
-        Self { stream, opening, root: root.to_owned(), period }
+    /// Creates the writer of one film whose entity paths begin with `root`.
+    pub(super) fn new(stream: &'a RecordingStream, opening_end: Time, root: &str, period: Time) -> Self {
+        Self { stream, opening_end, root: root.to_owned(), period }
     }
 
-    /// The path of an entity of this film.
+    /// Returns the path of an entity of this film.
     pub(super) fn path(&self, entity: &str) -> String {
         format!("{}{entity}", self.root)
     }
 
-    /// What holds for the whole run.
-    pub(super) fn fixed(&self, entity: &str, what: &impl AsComponents) -> Result<(), RecordError> {
+    /// Writes components that hold for the whole run.
+    pub(super) fn write_static(&self, entity: &str, what: &impl AsComponents) -> Result<(), RecordError> {
         Ok(self.stream.log_static(self.path(entity), what)?)
     }
 
-    /// One row for each of `times`, which ascend; `build` gives the columns of a range of the rows.
-    pub(super) fn rows<C>(
+    /// Writes one row of components for each of `times`, which must ascend. `build` returns the columns of a range of
+    /// rows.
+    pub(super) fn write_rows<C>(
         &self,
         entity: &str,
         times: &[Time],
@@ -57,7 +59,7 @@ impl<'a> Writer<'a> {
     where
         C: Iterator<Item = SerializedComponentColumn>,
     {
-        let until_opening = times.partition_point(|&time| time <= self.opening);
+        let until_opening = times.partition_point(|&time| time <= self.opening_end);
         for range in [0..until_opening, until_opening..times.len()] {
             if range.is_empty() {
                 continue;
@@ -68,8 +70,8 @@ impl<'a> Writer<'a> {
         Ok(())
     }
 
-    /// Something that is so from `time` on, as a whole.
-    pub(super) fn since(&self, entity: &str, time: Time, what: &impl AsComponents) -> Result<(), RecordError> {
+    /// Writes components that hold from `time` on.
+    pub(super) fn write_from(&self, entity: &str, time: Time, what: &impl AsComponents) -> Result<(), RecordError> {
         for timeline in self.timelines(&[time]) {
             let cell = TimeCell::new(timeline.timeline().typ(), timeline.times_raw()[0]);
             self.stream.set_time(*timeline.timeline().name(), cell);
@@ -79,34 +81,35 @@ impl<'a> Writer<'a> {
         Ok(logged?)
     }
 
-    /// An entity that is no longer there from `time` on, with all that belongs to it.
-    pub(super) fn gone(&self, entity: &str, time: Time) -> Result<(), RecordError> {
-        self.rows(entity, &[time], |_| Clear::recursive().columns_of_unit_batches())
+    /// Removes an entity and its children from `time` on.
+    pub(super) fn write_clear(&self, entity: &str, time: Time) -> Result<(), RecordError> {
+        self.write_rows(entity, &[time], |_| Clear::recursive().columns_of_unit_batches())
     }
 
-    /// A series to plot; a value that is absent leaves a gap.
-    pub(super) fn series(&self, entity: &str, times: &[Time], values: &[Option<f64>]) -> Result<(), RecordError> {
-        self.rows(entity, times, |range| {
+    /// Writes the values of a plotted curve. An absent value leaves a gap.
+    pub(super) fn write_series(&self, entity: &str, times: &[Time], values: &[Option<f64>]) -> Result<(), RecordError> {
+        self.write_rows(entity, times, |range| {
             let values = &values[range];
             let lengths: Vec<usize> = values.iter().map(|value| usize::from(value.is_some())).collect();
             Scalars::new(values.iter().flatten().copied()).columns(lengths)
         })
     }
 
+    /// Returns `times` on each timeline. The opening timeline is left out if any of them is later than its end.
     fn timelines(&self, times: &[Time]) -> Vec<TimeColumn> {
         let ns = || times.iter().map(|time| time.ns());
         let mut timelines = vec![
             TimeColumn::new_duration_nanos(TIME_TIMELINE, ns()),
             TimeColumn::new_sequence(STEP_TIMELINE, ns().map(|ns| ns / self.period.ns())),
         ];
-        if times.last().is_some_and(|&last| last <= self.opening) {
+        if times.last().is_some_and(|&last| last <= self.opening_end) {
             timelines.push(TimeColumn::new_duration_nanos(OPENING_TIMELINE, ns()));
         }
         timelines
     }
 }
 
-/// The rows at which a value differs from the row before, and the first.
+/// Returns the indices of the first value and of every value that differs from the one before.
 pub(super) fn changes<T: PartialEq>(values: &[T]) -> Vec<usize> {
     (0..values.len()).filter(|&row| row == 0 || values[row] != values[row - 1]).collect()
 }

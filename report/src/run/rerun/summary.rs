@@ -1,4 +1,4 @@
-//! What the run was, what happened in it and how it ended, as a page of text.
+//! The summary of a recording as a page of text: the story of each run, its outcome, and its metrics.
 
 use std::fmt::Write as _;
 
@@ -6,35 +6,38 @@ use closecall_traffic::Measured;
 
 use crate::run::film::Film;
 
-/// The page, in Markdown: forewords and the verdict first, then the story, then the numbers.
+/// Returns the page in Markdown: the forewords, then the headline and the story of each film, then the table of each
+/// film.
 pub(super) fn markdown(films: &[Film]) -> String {
     let mut page = String::new();
     for film in films {
         page.push_str(&film.foreword);
     }
     for film in films {
-        tell(&mut page, film);
+        push_story(&mut page, film);
     }
     for film in films {
-        numbers(&mut page, film);
+        push_table(&mut page, film);
     }
     page
 }
 
-fn tell(page: &mut String, film: &Film) {
+/// Appends the headline and the story of a film.
+fn push_story(page: &mut String, film: &Film) {
     // Writing to a string cannot fail.
     let _ = write!(page, "### {}\n\n**{}**\n\n", film.title, film.headline());
     if let Some(verdict) = film.verdict_on_mis() {
         let _ = write!(page, "{verdict}\n\n");
     }
     for line in film.story() {
-        let mark = if line.is_grave { "**" } else { "" };
+        let mark = if line.is_severe { "**" } else { "" };
         let _ = writeln!(page, "- {mark}{:.2} s: {}{mark}", line.time.s(), line.text);
     }
     page.push('\n');
 }
 
-fn numbers(page: &mut String, film: &Film) {
+/// Appends the table of a film. Recorded traffic has none.
+fn push_table(page: &mut String, film: &Film) {
     let Some(outcome) = &film.outcome else { return };
     let mut row = |name: &str, value: &dyn std::fmt::Display| {
         let _ = writeln!(page, "| {name} | {value} |");
@@ -45,17 +48,17 @@ fn numbers(page: &mut String, film: &Film) {
     row("seed, sample", &format_args!("{}, {}", outcome.seed, outcome.sample));
     row("duration", &format_args!("{:.2} s", outcome.duration.s()));
     let margins = &outcome.margins;
-    row("smallest front headway", &Shown(margins.min_thw_front_s, "s"));
-    row("smallest rear headway", &Shown(margins.min_thw_rear_s, "s"));
-    row("smallest front gap", &Shown(margins.min_gap_front_m, "m"));
-    row("smallest rear gap", &Shown(margins.min_gap_rear_m, "m"));
+    row("smallest front headway", &WithUnit(margins.min_thw_front_s, "s"));
+    row("smallest rear headway", &WithUnit(margins.min_thw_rear_s, "s"));
+    row("smallest front gap", &WithUnit(margins.min_gap_front_m, "m"));
+    row("smallest rear gap", &WithUnit(margins.min_gap_rear_m, "m"));
     row("hardest braking of ego", &format_args!("{:.2} m/s²", margins.max_deceleration_mps2));
     match &outcome.mis {
         Ok(mis) => {
-            row("MIS engaged at", &Shown(mis.engaged_at_s, "s"));
-            row("front headway then", &Shown(mis.thw_front_at_engagement_s, "s"));
-            row("front headway at the critical distance", &Shown(mis.thw_front_at_critical_s, "s"));
-            row("mean braking", &Shown(mis.mean_deceleration_mps2, "m/s²"));
+            row("MIS engaged at", &WithUnit(mis.engaged_at_s, "s"));
+            row("front headway then", &WithUnit(mis.thw_front_at_engagement_s, "s"));
+            row("front headway at the critical distance", &WithUnit(mis.thw_front_at_critical_s, "s"));
+            row("mean braking", &WithUnit(mis.mean_deceleration_mps2, "m/s²"));
             row("reason", &mis.reason);
         }
         Err(absent) => row("MIS", absent),
@@ -66,10 +69,10 @@ fn numbers(page: &mut String, film: &Film) {
     page.push('\n');
 }
 
-/// A value with its unit, or why there is none.
-struct Shown(Measured, &'static str);
+/// Displays a value with its unit, or the reason for its absence.
+struct WithUnit(Measured, &'static str);
 
-impl std::fmt::Display for Shown {
+impl std::fmt::Display for WithUnit {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self.0 {
             Ok(value) => write!(f, "{value:.2} {}", self.1),

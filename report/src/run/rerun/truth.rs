@@ -1,7 +1,7 @@
-//! Perception held against the truth: vehicles behind E that it knows of, those that it misses, and tracks of nothing.
+//! Comparison of perception with the ground truth behind the ego: known vehicles, missed vehicles, and false tracks.
 //!
-//! A vehicle is known where a confirmed rear track's near face lies within [`MATCH_M`] of its own. It is missed where it
-//! is in the rear sensor's field of view all the same; what is hidden behind another counts as missed too.
+//! A vehicle in the field of view of the rear sensor counts as known if the near face of a confirmed rear track lies
+//! within [`MATCH_DISTANCE_M`] of its own near face. Otherwise it counts as missed, even if another vehicle hides it.
 
 use closecall_sensors::FieldOfView;
 use closecall_traffic::{Source, Time, Track, TrackStatus};
@@ -10,49 +10,49 @@ use rerun::{Boxes3D, FillMode, Quaternion};
 use super::RecordError;
 use super::palette::{self, Rgba};
 use super::stream::Writer;
-use super::vehicles::about_up;
+use super::vehicles::yaw_rotation;
 use crate::run::film::{Film, Frame};
 
-/// Distance of the near faces up to which a track belongs to a vehicle [m], as the audit of tracking has it.
-const MATCH_M: f64 = 3.0;
-/// Boxes of the truth are this much larger than the vehicle, so that they are seen around it [m].
+/// Distance of the near faces up to which a track belongs to a vehicle (m); the same as in the audit of the tracking.
+const MATCH_DISTANCE_M: f64 = 3.0;
+/// Distance of the faces of a ground-truth box from those of the vehicle (m), so that the box is visible around it.
 const CLEARANCE_M: f64 = 0.05;
-/// Boxes of false tracks have no height of their own [m].
+/// Height of the boxes of false tracks (m), since tracks have no height.
 const FALSE_HEIGHT_M: f64 = 1.5;
 
-/// A box in E's frame.
+/// A box in the ego frame.
 #[derive(Clone, Copy)]
 struct Shape {
     centre_m: [f32; 3],
     half_m: [f32; 3],
-    turn: Quaternion,
+    rotation: Quaternion,
 }
 
-/// What is right and wrong in one frame.
+/// The comparison for one frame.
 #[derive(Default)]
-struct Verdict {
+struct FrameComparison {
     known: Vec<Shape>,
     missed: Vec<Shape>,
     false_tracks: Vec<Shape>,
 }
 
-/// A layer: its name, its colour, and which of the shapes are in it.
-type Layer = (&'static str, Rgba, fn(&Verdict) -> &Vec<Shape>);
+/// A layer: its name, its colour, and the function that selects its shapes.
+type Layer = (&'static str, Rgba, fn(&FrameComparison) -> &Vec<Shape>);
 
-/// Writes the layers; names those that are there for whoever wants them.
+/// Writes the layers, and returns the entities that the scene hides until the user switches them on.
 pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<Vec<String>, RecordError> {
     if film.frames.iter().all(|frame| frame.tracks.is_empty() && frame.rear_field.is_none()) {
         return Ok(Vec::new());
     }
     let times = film.times();
-    let verdicts: Vec<Verdict> = film.frames.iter().map(|frame| judge(film, frame)).collect();
+    let comparisons: Vec<FrameComparison> = film.frames.iter().map(|frame| compare(film, frame)).collect();
     let layers: [Layer; 3] = [
-        ("known", palette::TRUTH, |verdict| &verdict.known),
-        ("missed", palette::MISSED, |verdict| &verdict.missed),
-        ("false_tracks", palette::FALSE_TRACK, |verdict| &verdict.false_tracks),
+        ("known", palette::TRUTH, |comparison| &comparison.known),
+        ("missed", palette::MISSED, |comparison| &comparison.missed),
+        ("false_tracks", palette::FALSE_TRACK, |comparison| &comparison.false_tracks),
     ];
     for (name, colour, of) in layers {
-        let shapes: Vec<&Vec<Shape>> = verdicts.iter().map(of).collect();
+        let shapes: Vec<&Vec<Shape>> = comparisons.iter().map(of).collect();
         write_layer(writer, (&format!("world/ego/truth/{name}"), colour), &times, &shapes)?;
     }
     Ok(vec!["world/ego/truth/known".to_owned()])
@@ -66,83 +66,89 @@ fn write_layer(
 ) -> Result<(), RecordError> {
     let fixed =
         Boxes3D::update_fields().with_fill_mode(FillMode::MajorWireframe).with_radii([0.05_f32]).with_colors([colour]);
-    writer.fixed(entity, &fixed)?;
-    // Only frames in which there is something, and the first after them: the rest stays as it is.
+    writer.write_static(entity, &fixed)?;
+    // Rows are written for the frames with shapes and for the frame after them, which clears the shapes.
     let rows: Vec<usize> =
         (0..shapes.len()).filter(|&row| row == 0 || !shapes[row].is_empty() || !shapes[row - 1].is_empty()).collect();
     let times: Vec<Time> = rows.iter().map(|&row| times[row]).collect();
-    writer.rows(entity, &times, |range| {
+    writer.write_rows(entity, &times, |range| {
         let rows = &rows[range];
         let all = || rows.iter().flat_map(|&row| shapes[row]);
         Boxes3D::update_fields()
             .with_centers(all().map(|shape| shape.centre_m))
             .with_half_sizes(all().map(|shape| shape.half_m))
-            .with_quaternions(all().map(|shape| shape.turn))
+            .with_quaternions(all().map(|shape| shape.rotation))
             .columns(rows.iter().map(|&row| shapes[row].len()).collect::<Vec<_>>())
     })
 }
 
-fn judge(film: &Film, frame: &Frame) -> Verdict {
-    let mut verdict = Verdict::default();
+/// Compares the tracks of a frame with the vehicles.
+fn compare(film: &Film, frame: &Frame) -> FrameComparison {
+    let mut comparison = FrameComparison::default();
     let confirmed = |track: &&Track| track.source == Source::Rear && track.status != TrackStatus::Tentative;
     let tracks: Vec<&Track> = frame.tracks.iter().filter(confirmed).collect();
-    let others = (0..film.cast.len()).filter(|&actor| actor != film.ego);
-    let places: Vec<(usize, [f64; 3])> = others.map(|actor| (actor, film.in_ego_frame(frame, actor))).collect();
-    let bumper_m = -0.5 * film.cast[film.ego].vehicle.dimensions.length_m;
-    let length_m = |actor: usize| film.cast[actor].vehicle.dimensions.length_m;
-    for &(actor, place) in &places {
-        let face = face_m(place, length_m(actor));
-        if face[0] > bumper_m || !frame.rear_field.is_none_or(|field| sees(&field, bumper_m, face)) {
+    let others = (0..film.actors.len()).filter(|&actor| actor != film.ego);
+    let poses: Vec<(usize, [f64; 3])> = others.map(|actor| (actor, film.in_ego_frame(frame, actor))).collect();
+    let bumper_m = -0.5 * film.actors[film.ego].vehicle.dimensions.length_m;
+    let length_m = |actor: usize| film.actors[actor].vehicle.dimensions.length_m;
+    for &(actor, pose) in &poses {
+        let face = face_m(pose, length_m(actor));
+        if face[0] > bumper_m || !frame.rear_field.is_none_or(|field| is_in_field(&field, bumper_m, face)) {
             continue;
         }
-        let is_known = tracks.iter().any(|track| near(face, track_face_m(track)));
-        let shape = truth(film, actor, place);
-        if is_known { verdict.known.push(shape) } else { verdict.missed.push(shape) }
+        let is_known = tracks.iter().any(|track| are_close(face, track_face_m(track)));
+        let shape = true_shape(film, actor, pose);
+        if is_known { comparison.known.push(shape) } else { comparison.missed.push(shape) }
     }
     for track in tracks.iter().filter(|track| track.class.vehicle() > 0.5) {
-        let of_any = |&(actor, place): &(usize, [f64; 3])| near(face_m(place, length_m(actor)), track_face_m(track));
-        if !places.iter().any(of_any) {
-            verdict.false_tracks.push(claimed(track));
+        let of_any = |&(actor, pose): &(usize, [f64; 3])| are_close(face_m(pose, length_m(actor)), track_face_m(track));
+        if !poses.iter().any(of_any) {
+            comparison.false_tracks.push(track_shape(track));
         }
     }
-    verdict
+    comparison
 }
 
-fn truth(film: &Film, actor: usize, [x_m, y_m, yaw_rad]: [f64; 3]) -> Shape {
-    let size = &film.cast[actor].vehicle.dimensions;
+/// Returns the box of a vehicle.
+fn true_shape(film: &Film, actor: usize, [x_m, y_m, yaw_rad]: [f64; 3]) -> Shape {
+    let size = &film.actors[actor].vehicle.dimensions;
     let half = |extent_m: f64| (0.5 * extent_m + CLEARANCE_M) as f32;
     Shape {
         centre_m: [x_m as f32, y_m as f32, 0.5 * size.height_m as f32],
         half_m: [half(size.length_m), half(size.width_m), half(size.height_m)],
-        turn: about_up(yaw_rad),
+        rotation: yaw_rotation(yaw_rad),
     }
 }
 
-fn claimed(track: &Track) -> Shape {
+/// Returns the box of a track.
+fn track_shape(track: &Track) -> Shape {
     let half = |extent_m: f64| (0.5 * extent_m) as f32;
     Shape {
         centre_m: [track.x_m() as f32, track.y_m() as f32, half(FALSE_HEIGHT_M)],
         half_m: [half(track.length_m), half(track.width_m), half(FALSE_HEIGHT_M)],
-        turn: about_up(track.heading_rad),
+        rotation: yaw_rotation(track.heading_rad),
     }
 }
 
-/// The middle of the face of a box that is nearest to E [m].
+/// Returns the centre of the face of a box that is nearest to the ego (m).
 fn face_m([x_m, y_m, yaw_rad]: [f64; 3], length_m: f64) -> [f64; 2] {
     let ahead_m = if x_m < 0.0 { 0.5 * length_m } else { -0.5 * length_m };
     let (sin, cos) = yaw_rad.sin_cos();
     [x_m + ahead_m * cos, y_m + ahead_m * sin]
 }
 
+/// Returns the centre of the near face of a track (m).
 fn track_face_m(track: &Track) -> [f64; 2] {
     face_m([track.x_m(), track.y_m(), track.heading_rad], track.length_m)
 }
 
-fn near(one: [f64; 2], other: [f64; 2]) -> bool {
-    (one[0] - other[0]).hypot(one[1] - other[1]) <= MATCH_M
+/// Returns true if two faces are close enough for a track to belong to a vehicle.
+fn are_close(one: [f64; 2], other: [f64; 2]) -> bool {
+    (one[0] - other[0]).hypot(one[1] - other[1]) <= MATCH_DISTANCE_M
 }
 
-fn sees(field: &FieldOfView, bumper_m: f64, [x_m, y_m]: [f64; 2]) -> bool {
+/// Returns true if a point in the ego frame lies in the field of view.
+fn is_in_field(field: &FieldOfView, bumper_m: f64, [x_m, y_m]: [f64; 2]) -> bool {
     let back_m = bumper_m - x_m;
     back_m.hypot(y_m) <= field.range_m && y_m.abs() <= field.half_angle_tan * back_m
 }

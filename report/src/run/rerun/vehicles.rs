@@ -1,4 +1,4 @@
-//! The vehicles on the road: bodies that move, lights, names, and the gaps around E.
+//! The vehicles in the 3D scene: bodies, lights, names, velocities, collisions, and the gaps around the ego.
 
 use closecall_traffic::geometry::BoxSide;
 use closecall_traffic::{Dimensions, Indicator, Measured, Road, Time, VehicleClass, VehicleState};
@@ -11,45 +11,47 @@ use super::stream::{Writer, changes};
 use crate::run::film::{Film, Frame};
 use closecall_simulation::outcome::{CRITICAL_THW_S, Collision};
 
-/// A velocity is drawn as the way that the vehicle goes in this time [s].
+/// An arrow shows the distance that the vehicle travels in this time (s).
 const ARROW_S: f64 = 0.25;
-/// Names stand this high above the roof, arrows half as high [m].
+/// Height of the names above the roof (m). The arrows are half as high above it.
 const LABEL_ABOVE_M: f64 = 0.8;
-/// Words about a collision lie on the road behind it, where no vehicle has its name: the first of them this far behind
-/// the middle of the vehicle that carries it, each further one so much further [m].
-const WORDS_BEHIND_M: [f32; 2] = [11.0, 4.0];
-/// A shorter gap has no room for its headway between the names of the two vehicles [m].
+/// Distance of the text about the first collision behind the centre of the vehicle that carries it (m). The text lies
+/// on the road, clear of the names of the vehicles.
+const COLLISION_TEXT_BEHIND_M: f32 = 11.0;
+/// Distance between the texts about two collisions (m).
+const COLLISION_TEXT_SPACING_M: f32 = 4.0;
+/// Length of a gap below which it has no label, since the names of the two vehicles leave no room (m).
 pub(super) const LABELLED_GAP_M: f64 = 3.0;
-/// Height at which gaps are drawn [m].
+/// Height at which gaps are drawn (m).
 const GAP_Z_M: f64 = 0.5;
 
-/// The entity of an actor.
+/// Returns the path of the entity of an actor.
 pub(super) fn entity(film: &Film, actor: usize) -> String {
-    if actor == film.ego { "world/ego".to_owned() } else { format!("world/vehicles/{}", film.cast[actor].name) }
+    if actor == film.ego { "world/ego".to_owned() } else { format!("world/vehicles/{}", film.actors[actor].name) }
 }
 
 pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError> {
     let all_times = film.times();
-    for (place, actor) in film.cast.iter().enumerate().filter(|(_, actor)| !actor.rows.is_empty()) {
-        let entity = entity(film, place);
-        let colour = palette::actor(place, film.ego);
-        let times = &all_times[actor.rows.clone()];
+    for (index, actor) in film.actors.iter().enumerate().filter(|(_, actor)| !actor.present_frames.is_empty()) {
+        let entity = entity(film, index);
+        let colour = palette::actor(index, film.ego);
+        let times = &all_times[actor.present_frames.clone()];
         let states: Vec<&VehicleState> =
-            film.frames[actor.rows.clone()].iter().map(|frame| &frame.states[place]).collect();
+            film.frames[actor.present_frames.clone()].iter().map(|frame| &frame.states[index]).collect();
         let size = &actor.vehicle.dimensions;
         let body = (format!("{entity}/body"), bodies::body(&actor.vehicle, colour));
-        if actor.rows == (0..all_times.len()) {
-            writer.fixed(&body.0, &body.1)?;
+        if actor.present_frames == (0..all_times.len()) {
+            writer.write_static(&body.0, &body.1)?;
         } else {
-            // What is there for a while only comes and goes with its vehicle.
-            writer.since(&body.0, times[0], &body.1)?;
+            // A body written statically could not disappear with its vehicle.
+            writer.write_from(&body.0, times[0], &body.1)?;
         }
         write_motion(writer, &entity, times, &states, &film.road)?;
         write_velocity(writer, &entity, times, &states, (size, colour))?;
         write_name(writer, &entity, times, &states, (actor.name.as_str(), size, colour))?;
         write_lights(writer, &entity, times, &states, (actor.vehicle.class, size))?;
-        if let Some(&gone) = all_times.get(actor.rows.end) {
-            writer.gone(&entity, gone)?;
+        if let Some(&gone) = all_times.get(actor.present_frames.end) {
+            writer.write_clear(&entity, gone)?;
         }
     }
     write_gaps(writer, film, &all_times)?;
@@ -64,17 +66,17 @@ fn write_motion(
     road: &Road,
 ) -> Result<(), RecordError> {
     let poses: Vec<_> = states.iter().map(|state| road.plane_pose(state.s_m, state.d_m, state.heading_rad)).collect();
-    writer.rows(entity, times, |range| {
+    writer.write_rows(entity, times, |range| {
         let poses = &poses[range];
         Transform3D::update_fields()
             .with_many_translation(poses.iter().map(|pose| [pose.x_m as f32, pose.y_m as f32, 0.0]))
-            .with_many_quaternion(poses.iter().map(|pose| about_up(pose.yaw_rad)))
+            .with_many_quaternion(poses.iter().map(|pose| yaw_rotation(pose.yaw_rad)))
             .columns_of_unit_batches()
     })
 }
 
-/// A rotation about the vertical axis.
-pub(super) fn about_up(yaw_rad: f64) -> Quaternion {
+/// Returns a rotation about the vertical axis.
+pub(super) fn yaw_rotation(yaw_rad: f64) -> Quaternion {
     let (sin, cos) = (0.5 * yaw_rad).sin_cos();
     Quaternion::from_xyzw([0.0, 0.0, sin as f32, cos as f32])
 }
@@ -90,10 +92,10 @@ fn write_velocity(
     let above_m = (size.height_m + 0.5 * LABEL_ABOVE_M) as f32;
     let fixed = Arrows3D::update_fields()
         .with_origins([[0.0, 0.0, above_m]])
-        .with_colors([palette::faint(colour, 220)])
+        .with_colors([palette::with_opacity(colour, 220)])
         .with_radii([0.09_f32]);
-    writer.fixed(&entity, &fixed)?;
-    writer.rows(&entity, times, |range| {
+    writer.write_static(&entity, &fixed)?;
+    writer.write_rows(&entity, times, |range| {
         Arrows3D::update_fields()
             .with_vectors(states[range].iter().map(|state| [(ARROW_S * state.speed_mps) as f32, 0.0, 0.0]))
             .columns_of_unit_batches()
@@ -111,12 +113,12 @@ fn write_name(
     let above_m = (size.height_m + LABEL_ABOVE_M) as f32;
     let fixed =
         Points3D::new([[0.0, 0.0, above_m]]).with_colors([colour]).with_radii([0.05_f32]).with_show_labels(true);
-    writer.fixed(&entity, &fixed)?;
-    // The speed is rounded to what can be told apart, and only what changed is written.
+    writer.write_static(&entity, &fixed)?;
+    // Only a change of the rounded speed gives a new row.
     let texts: Vec<String> = states.iter().map(|state| format!("{name} {:.0} m/s", state.speed_mps)).collect();
     let rows = changes(&texts);
     let times: Vec<Time> = rows.iter().map(|&row| times[row]).collect();
-    writer.rows(&entity, &times, |range| {
+    writer.write_rows(&entity, &times, |range| {
         let texts = rows[range].iter().map(|&row| texts[row].as_str());
         Points3D::update_fields().with_labels(texts).columns_of_unit_batches()
     })
@@ -130,7 +132,7 @@ fn write_lights(
     (class, size): (VehicleClass, &Dimensions),
 ) -> Result<(), RecordError> {
     let (rear_m, front_m) = (-0.5 * size.length_m, 0.5 * size.length_m);
-    // A motorcycle has one brake light; the others have theirs at the corners.
+    // A motorcycle has one brake light in the middle; the other vehicles have two at the corners.
     let side_m = 0.5 * size.width_m - if class == VehicleClass::Motorcycle { 0.5 * size.width_m } else { 0.25 };
     let lamp_m = 0.5 * size.height_m.min(1.8);
     let brake = Lamps {
@@ -149,14 +151,14 @@ fn write_lights(
             half_m: [0.16, 0.12, 0.11],
             colour: palette::INDICATOR,
         };
-        // Lit throughout instead of blinking: a still picture shows it, whenever it is taken.
+        // The indicators do not blink, so that every single frame shows them.
         let lit: Vec<bool> = states.iter().map(|state| state.indicator == side).collect();
         write_lamps(writer, entity, times, &lamps, &lit)?;
     }
     Ok(())
 }
 
-/// A pair of lamps that are on or off together.
+/// A pair of lamps that are switched together.
 struct Lamps {
     name: &'static str,
     at_m: [[f64; 3]; 2],
@@ -177,9 +179,9 @@ fn write_lamps(
     }
     let entity = format!("{entity}/{}", lamps.name);
     let fixed = Boxes3D::update_fields().with_colors([lamps.colour]).with_fill_mode(FillMode::Solid);
-    writer.fixed(&entity, &fixed)?;
+    writer.write_static(&entity, &fixed)?;
     let times: Vec<Time> = rows.iter().map(|&row| times[row]).collect();
-    writer.rows(&entity, &times, |range| {
+    writer.write_rows(&entity, &times, |range| {
         let lengths: Vec<usize> = rows[range].iter().map(|&row| if lit[row] { lamps.at_m.len() } else { 0 }).collect();
         let count = lengths.iter().sum();
         let centres = lamps.at_m.iter().cycle().take(count).map(|at| at.map(|value| value as f32));
@@ -190,9 +192,9 @@ fn write_lamps(
     })
 }
 
-/// The gaps in front of and behind E, from bumper to bumper, with their time headways; red below the critical one.
+/// Writes the gaps in front of and behind the ego, bumper to bumper, with their time headways. A critical gap is red.
 fn write_gaps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordError> {
-    let bumper_m = 0.5 * film.cast[film.ego].vehicle.dimensions.length_m;
+    let bumper_m = 0.5 * film.actors[film.ego].vehicle.dimensions.length_m;
     let front = |frame: &Frame| Gap::new([bumper_m, 1.0], frame.margins.gap_front_m, frame.margins.thw_front_s);
     let rear = |frame: &Frame| Gap::new([-bumper_m, -1.0], frame.margins.gap_rear_m, frame.margins.thw_rear_s);
     let both: [(&str, Vec<Option<Gap>>); 2] = [
@@ -200,8 +202,8 @@ fn write_gaps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), Re
         ("world/ego/gap_rear", film.frames.iter().map(rear).collect()),
     ];
     for (entity, gaps) in both {
-        writer.fixed(entity, &LineStrips3D::update_fields().with_radii([0.06_f32]).with_show_labels(true))?;
-        writer.rows(entity, times, |range| {
+        writer.write_static(entity, &LineStrips3D::update_fields().with_radii([0.06_f32]).with_show_labels(true))?;
+        writer.write_rows(entity, times, |range| {
             let gaps = &gaps[range];
             let lengths: Vec<usize> = gaps.iter().map(|gap| usize::from(gap.is_some())).collect();
             let shown = || gaps.iter().flatten();
@@ -214,6 +216,7 @@ fn write_gaps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), Re
     Ok(())
 }
 
+/// The line that shows a gap.
 struct Gap {
     ends_m: [[f32; 3]; 2],
     colour: Rgba,
@@ -221,7 +224,8 @@ struct Gap {
 }
 
 impl Gap {
-    /// From `bumper_m` on in the direction of `sign`, in E's frame.
+    /// Returns the gap that begins at `bumper_m` and extends in the direction of `sign`, in the ego frame, or `None` if
+    /// there is no positive gap.
     fn new([bumper_m, sign]: [f64; 2], gap_m: Measured, thw_s: Measured) -> Option<Self> {
         let gap_m = gap_m.ok().filter(|&gap_m| gap_m > 0.0)?;
         let is_critical = thw_s.is_ok_and(|thw_s| thw_s < CRITICAL_THW_S);
@@ -239,37 +243,37 @@ impl Gap {
     }
 }
 
-/// What the impact did to each.
+/// Returns the text about a collision, with the change of velocity of each vehicle.
 fn mark_text(collision: &Collision) -> String {
     let ([first, second], [first_mps, second_mps]) = (&collision.between, collision.delta_v_mps);
     format!("COLLISION: ΔV {first} {first_mps:.1}, {second} {second_mps:.1} m/s")
 }
 
-/// A mark on the side of the vehicle that was struck, which it carries on; the changes of velocity on the road behind.
+/// Writes a mark on the struck side of the first vehicle of each collision, and the changes of velocity as a text on
+/// the road behind it. Both move with the vehicle.
 fn write_collisions(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError> {
-    let [first_m, further_m] = WORDS_BEHIND_M;
-    let mut words_m = -first_m;
+    let mut text_x_m = -COLLISION_TEXT_BEHIND_M;
     for (number, collision) in film.collisions().iter().enumerate() {
-        let place = film.cast.iter().position(|actor| actor.name == collision.between[0].as_str());
-        let Some(place) = place else { continue };
-        let size = &film.cast[place].vehicle.dimensions;
+        let index = film.actors.iter().position(|actor| actor.name == collision.between[0].as_str());
+        let Some(index) = index else { continue };
+        let size = &film.actors[index].vehicle.dimensions;
         let at_m = match collision.struck_side[0] {
             BoxSide::Front => [0.5 * size.length_m, 0.0],
             BoxSide::Rear => [-0.5 * size.length_m, 0.0],
             BoxSide::Left => [0.0, 0.5 * size.width_m],
             BoxSide::Right => [0.0, -0.5 * size.width_m],
         };
-        let entity = format!("{}/collision_{}", entity(film, place), number + 1);
+        let entity = format!("{}/collision_{}", entity(film, index), number + 1);
         let [x, y] = at_m.map(|at_m| at_m as f32);
-        let mark = Points3D::new([[x, y, 0.6], [words_m, 0.0, 0.0]])
+        let mark = Points3D::new([[x, y, 0.6], [text_x_m, 0.0, 0.0]])
             .with_colors([palette::CRITICAL])
             .with_radii([0.45_f32, 0.05])
             .with_labels([String::new(), mark_text(collision)])
             .with_show_labels(true);
-        // The first frame at or after the touch: before it the vehicles are still apart.
-        let shown_at = film.frames.iter().map(|frame| frame.time).find(|&time| time >= collision.time);
-        writer.since(&entity, shown_at.unwrap_or(collision.time), &mark)?;
-        words_m -= further_m;
+        // The mark appears at the first frame at or after the contact: in earlier frames the vehicles are still apart.
+        let appears_at = film.frames.iter().map(|frame| frame.time).find(|&time| time >= collision.time);
+        writer.write_from(&entity, appears_at.unwrap_or(collision.time), &mark)?;
+        text_x_m -= COLLISION_TEXT_SPACING_M;
     }
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! Films written into one file, in one go.
+//! Writing films into a recording file.
 
 use std::path::Path;
 
@@ -6,43 +6,43 @@ use closecall_traffic::Time;
 use rerun::sink::MemorySinkStorage;
 use rerun::{MediaType, RecordingStream, RecordingStreamBuilder, RecordingStreamError, TextDocument, ViewCoordinates};
 
-use super::blueprint::{Layout, Shown};
+use super::blueprint::{FilmContents, Layout};
 use super::plots::Role;
 use super::stream::Writer;
 use super::{bird, camera, ghosts, log, perceived, plots, points, road, summary, truth, vehicles};
 use crate::run::film::{Film, Level};
 use closecall_scenarios::atomic::{WriteError, check_writable, write_file};
 
-/// The name under which the viewer keeps its layouts.
+/// The application id, under which the viewer stores its layouts.
 pub(super) const APPLICATION: &str = "closecall";
 
-/// How long after the critical moment the opening timeline ends: an impact and its mark are to be seen.
+/// Time between the critical moment and the end of the opening timeline, so that an impact and its mark are visible.
 const AFTER_CRITICAL: Time = Time::from_ms(200);
 
-/// A run that could not be recorded. There is no file, or the one that was there before.
+/// The reason why a recording cannot be written. A file of that name is then unchanged.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
-    /// The environment switches recording off, which would leave no file and say nothing.
+    /// The environment switches recording off. The library would then write no file and report no error.
     #[error("failed to record: the environment variable RERUN switches recording off; unset it")]
     Disabled,
-    /// The library refused.
+    /// The library reports an error.
     #[error("failed to record: {0}")]
     Stream(#[from] RecordingStreamError),
-    /// The messages could not be encoded.
+    /// The messages cannot be encoded.
     #[error("failed to encode the recording: {reason}")]
     Encode {
-        /// The library's reason.
+        /// The reason that the library gives.
         reason: String,
     },
-    /// The file could not be written.
+    /// The file cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
 }
 
-/// Finds out before any work is done whether a recording can be written.
+/// Checks whether a recording can be written, before the run starts.
 ///
 /// # Errors
-/// [`RecordError`] where recording is switched off, or no file can be made at that place.
+/// [`RecordError`] if recording is switched off, or no file can be created at `path`.
 pub fn check_recordable(path: &Path) -> Result<(), RecordError> {
     if !rerun::decide_logging_enabled(true) {
         return Err(RecordError::Disabled);
@@ -50,69 +50,73 @@ pub fn check_recordable(path: &Path) -> Result<(), RecordError> {
     Ok(check_writable(path)?)
 }
 
-/// Writes one film, or a baseline and the film that is compared with it, into a file.
+/// Writes one film, or a baseline and the film compared with it, into a recording file.
 ///
 /// # Errors
-/// [`RecordError`] where it cannot be written whole.
+/// [`RecordError`] if the file cannot be written completely.
 pub fn write_films(path: &Path, films: &[Film]) -> Result<(), RecordError> {
     let bytes = encode(films)?;
     write_file(path, |file| file.write_all(&bytes))?;
     Ok(())
 }
 
-/// Writes films into a file, unless recording is switched off.
+/// Writes films like [`write_films`], after [`check_recordable`].
 ///
 /// # Errors
-/// [`RecordError`] where it cannot be written whole.
+/// [`RecordError`] if the file cannot be written completely.
 pub fn record_films(path: &Path, films: &[Film]) -> Result<(), RecordError> {
     check_recordable(path)?;
     write_films(path, films)
 }
 
-/// The whole recording as the bytes of a file.
+/// Returns the bytes of the recording file.
 fn encode(films: &[Film]) -> Result<Vec<u8>, RecordError> {
     record(films)?.drain_as_bytes().map_err(|error| RecordError::Encode { reason: error.to_string() })
 }
 
+/// Writes the films and the layout into memory.
 fn record(films: &[Film]) -> Result<MemorySinkStorage, RecordError> {
     let title = films.iter().map(Film::title).collect::<Vec<_>>().join(" and ");
     let (stream, messages) = RecordingStreamBuilder::new(APPLICATION).recording_name(title).memory()?;
     if !stream.is_enabled() {
         return Err(RecordError::Disabled);
     }
-    let opening = opening(films) + AFTER_CRITICAL;
-    let mut shown = Vec::new();
-    for (place, film) in films.iter().enumerate() {
-        let role = match (films.len(), place) {
+    let opening_end = opening_moment(films) + AFTER_CRITICAL;
+    let mut contents = Vec::new();
+    for (index, film) in films.iter().enumerate() {
+        let role = match (films.len(), index) {
             (1, _) => Role::Alone,
             (_, 0) => Role::Baseline,
             _ => Role::Tested,
         };
         let root = if role == Role::Alone { String::new() } else { format!("{}/", film.arm) };
-        let writer = Writer::new(&stream, opening, &root, film.period);
-        shown.push(write_film(&writer, film, (root, role))?);
-        if let Some(ghosts) = ghosts_in(films, place).filter(|_| film.level >= Level::Objects) {
+        let writer = Writer::new(&stream, opening_end, &root, film.period);
+        contents.push(write_film(&writer, film, (root, role))?);
+        if let Some(ghosts) = ghosts_in(films, index).filter(|_| film.level >= Level::Objects) {
             ghosts::write(&writer, film, ghosts)?;
         }
     }
     write_summary(&stream, films)?;
-    Layout::default().send(&stream, &shown)?;
+    Layout::default().send(&stream, &contents)?;
     Ok(messages)
 }
 
-/// The film whose vehicles stand as outlines in another: the baseline's in those that are tested; of recorded traffic and
-/// a run, neither of which is the baseline, each one's in the other.
-fn ghosts_in(films: &[Film], place: usize) -> Option<&Film> {
-    match (films, place) {
+/// Returns the film whose vehicles appear as outlines in the film of this index.
+///
+/// The vehicles of the baseline appear in the tested film, but not the other way round. If one film is recorded traffic
+/// and the other its re-enactment, the vehicles of each appear in the other.
+fn ghosts_in(films: &[Film], index: usize) -> Option<&Film> {
+    match (films, index) {
         (_, 1..) => films.first(),
         ([recorded, simulated], 0) if recorded.outcome.is_none() => Some(simulated),
         _ => None,
     }
 }
 
-/// The moment to open at: the first collision of any film, else what is critical in the last one; beside recorded
-/// traffic, the later of the two, when both encounters have been seen.
-fn opening(films: &[Film]) -> Time {
+/// Returns the moment at which the recording opens: the earliest of the films' worst collisions or, if there is none,
+/// the critical moment of the last film. If the first film is recorded traffic, it is the later of the two critical
+/// moments, so that both encounters are visible.
+fn opening_moment(films: &[Film]) -> Time {
     let collisions = films.iter().filter_map(|film| film.worst_collision().map(|collision| collision.time));
     let critical = || match films {
         [recorded, _] if recorded.outcome.is_none() => films.iter().map(Film::critical_moment).max(),
@@ -121,26 +125,32 @@ fn opening(films: &[Film]) -> Time {
     collisions.min().or_else(critical).unwrap_or(Time::ZERO)
 }
 
-fn write_film(writer: &Writer<'_>, film: &Film, (root, role): (String, Role)) -> Result<Shown, RecordError> {
-    let mut shown = Shown { name: film.arm.clone(), root, edges: bird::edges(film), ..Shown::default() };
+/// Writes a film and returns what its views can show.
+fn write_film(writer: &Writer<'_>, film: &Film, (root, role): (String, Role)) -> Result<FilmContents, RecordError> {
+    let mut contents =
+        FilmContents { name: film.arm.clone(), root, edges: bird::edges(film), ..FilmContents::default() };
     if film.level >= Level::Objects && !film.frames.is_empty() {
-        writer.fixed("world", &ViewCoordinates::FLU())?;
+        writer.write_static("world", &ViewCoordinates::FLU())?;
         road::write(writer, film)?;
         vehicles::write(writer, film)?;
         perceived::write(writer, film)?;
-        shown.hidden.extend(truth::write(writer, film)?);
-        shown.hidden.extend(points::write(writer, film)?);
+        contents.hidden_layers.extend(truth::write(writer, film)?);
+        contents.hidden_layers.extend(points::write(writer, film)?);
         bird::write(writer, film)?;
-        shown.has_scene = true;
-        shown.has_camera = camera::write(writer, film)?;
+        contents.has_scene = true;
+        contents.has_camera = camera::write(writer, film)?;
     }
-    shown.plots = plots::write(writer, film, role)?;
-    shown.has_states = film.frames.iter().any(|frame| frame.command.is_some());
+    contents.plots = plots::write(writer, film, role)?;
+    contents.has_states = film.frames.iter().any(|frame| frame.command.is_some());
     log::write(writer, film, role == Role::Alone)?;
-    Ok(shown)
+    Ok(contents)
 }
 
+/// Writes the summary, which the story view shows.
 fn write_summary(stream: &RecordingStream, films: &[Film]) -> Result<(), RecordError> {
     let summary = TextDocument::new(summary::markdown(films)).with_media_type(MediaType::markdown());
     Ok(stream.log_static("summary", &summary)?)
 }
+
+#[cfg(test)]
+mod tests;

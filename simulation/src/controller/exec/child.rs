@@ -1,8 +1,9 @@
-//! One process, from its start to its end: nothing that it does or omits keeps this one waiting for ever, and it is
-//! always reaped.
+//! One child process, from its start to its end. Every wait has a time limit, whatever the process does, and the process
+//! is always reaped.
 //!
-//! Three threads serve it, each blocked on one pipe: one writes, one reads lines, one drains standard error. So neither
-//! side can wait for the other with a full pipe in each direction. They end with the process, whose pipes then close.
+//! Three threads serve the process, each blocked on one pipe: one writes requests, one reads answers, one drains standard
+//! error. Full pipes in both directions can therefore not block both sides. The threads end with the process, whose pipes
+//! then close.
 
 use std::io::{Read, Write};
 use std::os::unix::process::CommandExt;
@@ -15,85 +16,86 @@ use std::time::{Duration, Instant};
 use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, waitid};
 
 use super::error::ExecError;
-use super::lines::{LONGEST_LINE, Line, Tail, excerpt, read_lines};
+use super::lines::{Line, MAX_LINE_BYTES, Tail, excerpt, read_lines};
 use super::settings::ExecSettings;
 
-/// How often a process that is being waited for has its memory looked at.
-const LOOK_EVERY: Duration = Duration::from_millis(20);
+/// Interval at which the memory of the process is checked while its answer is awaited.
+const MEMORY_CHECK_INTERVAL: Duration = Duration::from_millis(20);
 
-/// How long a process that was told to end may take to do so.
-const FAREWELL: Duration = Duration::from_millis(500);
+/// Time that a process has to end by itself once its standard input is closed or its standard output has ended.
+const EXIT_TIMEOUT: Duration = Duration::from_millis(500);
 
-/// How often it is looked whether it has ended.
-const PEEK_EVERY: Duration = Duration::from_millis(1);
+/// Interval at which a process is polled for its end.
+const EXIT_POLL_INTERVAL: Duration = Duration::from_millis(1);
 
-/// Lines that are read ahead of their use; a process that writes more of them has to wait.
-const LINES_AHEAD: usize = 2;
+/// Number of lines that are buffered. A process that writes more lines than that has to wait.
+const BUFFERED_LINES: usize = 2;
 
-/// Bytes that are read of standard error at a time.
-const CHUNK: usize = 4_096;
+/// Size of the blocks in which standard error is read (bytes).
+const CHUNK_BYTES: usize = 4_096;
 
-/// A process with its pipes.
+/// A child process with its pipes.
 pub(super) struct Child {
     process: process::Child,
-    /// Nothing once it was told that no more is asked of it.
+    /// `None` once the standard input of the process is to be closed.
     requests: Option<Sender<Vec<u8>>>,
     answers: Receiver<Line>,
-    words: Arc<Mutex<Tail>>,
+    /// The end of standard error.
+    stderr: Arc<Mutex<Tail>>,
     /// Disconnected once standard error is closed.
-    words_end: Receiver<()>,
+    stderr_end: Receiver<()>,
     memory_mib: u64,
-    /// Answers so far, the greeting among them.
+    /// Number of answers so far, including the greeting.
     answered: u64,
-    /// True once it has failed, so that it need not be given time to end by itself.
+    /// Whether the process has failed, so that it is killed without time to end by itself.
     has_failed: bool,
     is_reaped: bool,
 }
 
 impl Child {
-    /// Starts the command.
+    /// Starts the process.
     pub(super) fn start(settings: &ExecSettings) -> Result<Self, ExecError> {
-        let command = || ExecError::Command { command: settings.command.clone() };
-        let words = settings.words().ok_or_else(command)?;
-        let (program, arguments) = words.split_first().ok_or_else(command)?;
-        let fail = |source| ExecError::Start { program: program.clone(), source };
+        let invalid_command = || ExecError::Command { command: settings.command.clone() };
+        let words = settings.words().ok_or_else(invalid_command)?;
+        let (program, arguments) = words.split_first().ok_or_else(invalid_command)?;
+        let start_error = |source| ExecError::Start { program: program.clone(), source };
         let mut process = Command::new(program)
             .args(arguments)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
-            // A group of its own, so that whatever it starts can be killed with it.
+            // The process gets its own group, so that its descendants can be killed with it.
             .process_group(0)
             .spawn()
-            .map_err(fail)?;
+            .map_err(start_error)?;
         let pipes = (process.stdin.take(), process.stdout.take(), process.stderr.take());
-        let (requests, to_write) = channel();
-        let (line_sender, answers) = sync_channel(LINES_AHEAD);
-        let (end_sender, words_end) = channel();
-        let words = Arc::new(Mutex::new(Tail::default()));
-        // Made before the threads are, so that the process is killed and reaped if one cannot be started.
+        let (requests, request_receiver) = channel();
+        let (answer_sender, answers) = sync_channel(BUFFERED_LINES);
+        let (end_sender, stderr_end) = channel();
+        let stderr_tail = Arc::new(Mutex::new(Tail::default()));
+        // Created before the threads, so that the process is killed and reaped if a thread cannot be started.
         let mut child = Self {
             process,
             requests: Some(requests),
             answers,
-            words: Arc::clone(&words),
-            words_end,
+            stderr: Arc::clone(&stderr_tail),
+            stderr_end,
             memory_mib: settings.memory_mib,
             answered: 0,
             has_failed: true,
             is_reaped: false,
         };
         if let (Some(stdin), Some(stdout), Some(stderr)) = pipes {
-            serve("write", move || write_all(stdin, &to_write)).map_err(fail)?;
-            serve("read", move || read_lines(stdout, &line_sender)).map_err(fail)?;
-            serve("listen", move || drain(stderr, &words, end_sender)).map_err(fail)?;
+            spawn_thread("write", move || write_all(stdin, &request_receiver)).map_err(start_error)?;
+            spawn_thread("read", move || read_lines(stdout, &answer_sender)).map_err(start_error)?;
+            spawn_thread("listen", move || drain(stderr, &stderr_tail, end_sender)).map_err(start_error)?;
         }
         child.has_failed = false;
         Ok(child)
     }
 
-    /// Sends a line and waits for the answer to it.
-    pub(super) fn ask(&mut self, line: Vec<u8>, limit: Duration) -> Result<Vec<u8>, ExecError> {
+    /// Sends a line and waits for its answer. `limit` is the time limit.
+    pub(super) fn request(&mut self, line: Vec<u8>, limit: Duration) -> Result<Vec<u8>, ExecError> {
         let answer = self.exchange(line, limit);
         match &answer {
             Ok(_) => self.answered += 1,
@@ -103,57 +105,58 @@ impl Child {
     }
 
     fn exchange(&mut self, line: Vec<u8>, limit: Duration) -> Result<Vec<u8>, ExecError> {
-        // Greeting before one is greeted is no offence: what was written then is taken for the answer.
+        // A greeting that the process writes before it is greeted is accepted as the answer to the greeting.
         if self.answered > 0 {
-            self.check_silence()?;
+            self.reject_unrequested_line()?;
         }
-        // Where the writer is gone, the process is, and reading will tell.
+        // If the writing thread is gone, so is the process, which reading then reports.
         if let Some(requests) = &self.requests {
             drop(requests.send(line));
         }
         match self.wait(limit)? {
             Some(answer) => Ok(answer),
-            // One that is late is told from one that hangs.
+            // A second wait distinguishes a late process from one that hangs.
             None => Err(match self.wait(limit)? {
                 Some(_) => ExecError::Late { limit_ms: limit.as_millis(), answered: self.answered },
                 None => {
-                    let (limit_ms, answered, words) = (limit.as_millis(), self.answered, self.words());
-                    ExecError::Hangs { limit_ms, answered, words }
+                    let (limit_ms, answered, stderr) = (limit.as_millis(), self.answered, self.last_lines());
+                    ExecError::Hangs { limit_ms, answered, stderr }
                 }
             }),
         }
     }
 
-    /// Refuses what was written since the last answer: it would be taken for the next one.
-    fn check_silence(&mut self) -> Result<(), ExecError> {
+    /// Returns an error if the process has written a line since its last answer, which would be mistaken for the next one.
+    fn reject_unrequested_line(&mut self) -> Result<(), ExecError> {
         match self.answers.try_recv() {
             Ok(Line::Whole(line)) => Err(ExecError::OutOfTurn { answered: self.answered, line: excerpt(&line) }),
-            Ok(Line::TooLong) => Err(ExecError::LongLine { limit: LONGEST_LINE }),
-            Err(TryRecvError::Disconnected) => Err(self.obituary()),
+            Ok(Line::TooLong) => Err(ExecError::LongLine { limit: MAX_LINE_BYTES }),
+            Err(TryRecvError::Disconnected) => Err(self.exit_error()),
             Err(TryRecvError::Empty) => Ok(()),
         }
     }
 
-    /// The next line, or nothing where none comes in time.
+    /// Returns the next line, or `None` if there is none within the time limit.
     fn wait(&mut self, limit: Duration) -> Result<Option<Vec<u8>>, ExecError> {
         let started = Instant::now();
         loop {
             let left = limit.saturating_sub(started.elapsed());
-            let line = self.answers.recv_timeout(left.min(LOOK_EVERY));
+            let line = self.answers.recv_timeout(left.min(MEMORY_CHECK_INTERVAL));
             if line != Err(RecvTimeoutError::Disconnected) && self.peak_memory_mib() > self.memory_mib {
                 return Err(ExecError::Memory { limit_mib: self.memory_mib });
             }
             match line {
                 Ok(Line::Whole(line)) => return Ok(Some(line)),
-                Ok(Line::TooLong) => return Err(ExecError::LongLine { limit: LONGEST_LINE }),
-                Err(RecvTimeoutError::Disconnected) => return Err(self.obituary()),
+                Ok(Line::TooLong) => return Err(ExecError::LongLine { limit: MAX_LINE_BYTES }),
+                Err(RecvTimeoutError::Disconnected) => return Err(self.exit_error()),
                 Err(RecvTimeoutError::Timeout) if left.is_zero() => return Ok(None),
                 Err(RecvTimeoutError::Timeout) => {}
             }
         }
     }
 
-    /// The most memory that it ever held [MiB]; 0 where the system does not say, as when it has just ended.
+    /// Returns the peak resident memory of the process (MiB), or 0 if the system does not report it, for example because the
+    /// process has just ended.
     fn peak_memory_mib(&self) -> u64 {
         let status = std::fs::read_to_string(format!("/proc/{}/status", self.process.id())).unwrap_or_default();
         let peak_kib = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
@@ -162,35 +165,36 @@ impl Child {
             .map_or(0, |kib| kib.div_ceil(1_024))
     }
 
-    /// Why there is nothing more to read.
-    fn obituary(&mut self) -> ExecError {
-        let (has_ended, answered) = (self.ends_within(FAREWELL), self.answered);
+    /// Returns why standard output has ended: with the process, or before it.
+    fn exit_error(&mut self) -> ExecError {
+        let (has_ended, answered) = (self.ends_within(EXIT_TIMEOUT), self.answered);
         let status = self.reap();
-        // Whatever it wrote before it ended is in the pipe, and read by now or soon.
-        let _ = self.words_end.recv_timeout(FAREWELL);
+        // What the process wrote before its end may still be in the pipe: wait until it is read.
+        let _ = self.stderr_end.recv_timeout(EXIT_TIMEOUT);
         match status {
-            Ok(status) if has_ended => ExecError::Ended { status, answered, words: self.words() },
-            _ => ExecError::Closed { answered, words: self.words() },
+            Ok(status) if has_ended => ExecError::Ended { status, answered, stderr: self.last_lines() },
+            _ => ExecError::Closed { answered, stderr: self.last_lines() },
         }
     }
 
-    fn words(&self) -> String {
-        self.words.lock().map_or_else(|poisoned| poisoned.into_inner().words(), |words| words.words())
+    /// Returns the last lines of standard error.
+    fn last_lines(&self) -> String {
+        self.stderr.lock().map_or_else(|poisoned| poisoned.into_inner().last_lines(), |tail| tail.last_lines())
     }
 
-    /// True where it has ended by itself within `limit`; it is not reaped yet.
+    /// Returns whether the process ends by itself within `limit`. It is not reaped by this.
     fn ends_within(&self, limit: Duration) -> bool {
         let started = Instant::now();
         let options = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
         loop {
-            // An error means that there is nothing to wait for.
+            // An error means that there is no process to wait for.
             if !matches!(waitid(WaitId::Pid(self.pid()), options), Ok(None)) {
                 return true;
             }
             if started.elapsed() >= limit {
                 return false;
             }
-            thread::sleep(PEEK_EVERY);
+            thread::sleep(EXIT_POLL_INTERVAL);
         }
     }
 
@@ -198,9 +202,9 @@ impl Child {
         Pid::from_child(&self.process)
     }
 
-    /// Kills what is left of it, with everything that it has started, and reaps it.
+    /// Kills the process group, and reaps the process.
     fn reap(&mut self) -> std::io::Result<process::ExitStatus> {
-        // While it is not reaped its number stands for it and its group, even where it has ended.
+        // Until it is reaped, its process ID identifies it and its group, even if it has ended.
         if !self.is_reaped {
             let _ = kill_process_group(self.pid(), Signal::KILL);
             self.is_reaped = true;
@@ -211,21 +215,22 @@ impl Child {
 
 impl Drop for Child {
     fn drop(&mut self) {
-        // Its standard input ends with the writer.
+        // The writing thread ends, and closes the standard input of the process.
         self.requests = None;
         if !self.is_reaped && !self.has_failed {
-            self.ends_within(FAREWELL);
+            self.ends_within(EXIT_TIMEOUT);
         }
         drop(self.reap());
     }
 }
 
-fn serve(name: &str, work: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
+fn spawn_thread(name: &str, work: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
     thread::Builder::new().name(format!("controller-{name}")).spawn(work).map(drop)
 }
 
+/// Writes every received line to standard input.
 fn write_all(mut stdin: ChildStdin, lines: &Receiver<Vec<u8>>) {
-    // One that does not read any more is found out by its silence.
+    // A process that no longer reads does not answer, which `request` reports.
     while let Ok(line) = lines.recv() {
         if stdin.write_all(&line).and_then(|()| stdin.flush()).is_err() {
             return;
@@ -233,12 +238,12 @@ fn write_all(mut stdin: ChildStdin, lines: &Receiver<Vec<u8>>) {
     }
 }
 
-/// Reads standard error to its end and keeps the last of it; `end` is dropped then.
-fn drain(mut stderr: impl Read, words: &Mutex<Tail>, end: Sender<()>) {
-    let mut chunk = [0; CHUNK];
+/// Reads standard error to its end into `tail`, then drops `end`.
+fn drain(mut stderr: impl Read, tail: &Mutex<Tail>, end: Sender<()>) {
+    let mut chunk = [0; CHUNK_BYTES];
     while let Ok(read @ 1..) = stderr.read(&mut chunk) {
-        if let Ok(mut words) = words.lock() {
-            words.push(&chunk[..read]);
+        if let Ok(mut tail) = tail.lock() {
+            tail.push(&chunk[..read]);
         }
     }
     drop(end);

@@ -1,4 +1,4 @@
-//! The process as a controller of the loop.
+//! A process as an ego controller of the closed loop.
 
 use std::time::Duration;
 
@@ -10,18 +10,18 @@ use super::settings::ExecSettings;
 use super::{NAME, protocol};
 use crate::run::ControllerFactory;
 
-/// Time for the answer to the first line: an interpreter and its libraries have to be loaded first, perhaps on a busy
-/// machine.
-const START_WITHIN: Duration = Duration::from_secs(10);
+/// Time limit of the answer to the first message. The process may first have to load an interpreter and its libraries,
+/// perhaps on a busy machine.
+const START_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Makes controllers that are processes.
+/// Creates controllers that run as separate processes.
 #[derive(Clone, Debug)]
 pub struct ExecFactory {
     settings: ExecSettings,
 }
 
 impl ExecFactory {
-    /// A factory of processes of this command.
+    /// Creates a factory of processes with these settings.
     pub fn new(settings: ExecSettings) -> Self {
         Self { settings }
     }
@@ -32,50 +32,53 @@ impl ControllerFactory for ExecFactory {
         NAME
     }
 
-    /// The states that the process reports are summed up where the scenario has a margin increase system.
+    /// The outcome summarises the states that the process reports if the scenario has a margin increase system.
     fn has_mis(&self, settings: &EgoSettings) -> bool {
         settings.mis().is_some()
     }
 
     fn build(&self, settings: &EgoSettings) -> Box<dyn EgoController> {
         Box::new(ExecController {
-            exec: self.settings.clone(),
-            ego: *settings,
-            front: FrontFollower::default(),
+            settings: self.settings.clone(),
+            ego_settings: *settings,
+            lead_selector: FrontFollower::default(),
             child: None,
         })
     }
 }
 
-/// A process that controls E in one run. It is started with the first step, and killed with this.
+/// A process that controls the ego in one run. It is started at the first step and ended when this value is dropped.
 struct ExecController {
-    exec: ExecSettings,
-    ego: EgoSettings,
-    front: FrontFollower,
+    settings: ExecSettings,
+    ego_settings: EgoSettings,
+    lead_selector: FrontFollower,
     child: Option<Child>,
 }
 
 impl ExecController {
-    fn ask(&mut self, input: &EgoInput<'_>) -> Result<protocol::Answer, ExecError> {
-        let front = self.front.update(input);
+    /// Sends the message of a control step and returns the answer. Starts the process if there is none yet.
+    fn request(&mut self, input: &EgoInput<'_>) -> Result<protocol::Answer, ExecError> {
+        let front = self.lead_selector.update(input);
         let child = match &mut self.child {
             Some(child) => child,
             None => {
-                let mut child = Child::start(&self.exec)?;
-                let hello = child.ask(protocol::hello(&self.ego, input.road), START_WITHIN.max(self.exec.timeout()))?;
+                let mut child = Child::start(&self.settings)?;
+                let timeout = START_TIMEOUT.max(self.settings.timeout());
+                let hello = child.request(protocol::hello(&self.ego_settings, input.road), timeout)?;
                 protocol::check_hello(&hello)?;
                 self.child.insert(child)
             }
         };
-        protocol::answer(&child.ask(protocol::step(input, front), self.exec.timeout())?)
+        protocol::parse_answer(&child.request(protocol::step(input, front), self.settings.timeout())?)
     }
 }
 
 impl EgoController for ExecController {
     fn step(&mut self, input: &EgoInput<'_>) -> Result<EgoCommand, ControllerError> {
         input.check_finite()?;
-        let answer =
-            self.ask(input).map_err(|error| ControllerError::Own { reason: error.to_string(), time: input.time })?;
+        let answer = self
+            .request(input)
+            .map_err(|error| ControllerError::Own { reason: error.to_string(), time: input.time })?;
         Ok(EgoCommand {
             acceleration_mps2: answer.acceleration_mps2,
             state: answer.state,

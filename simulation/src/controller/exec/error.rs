@@ -1,14 +1,14 @@
-//! What a process can do wrong.
+//! The errors of a controller that runs as a separate process.
 
 use std::io;
 use std::process::ExitStatus;
 
-/// Why a process gave no proper answer. It has been killed, and this sample has no outcome.
+/// Why a process did not give a valid answer. The process has been killed, and the sample has no outcome.
 ///
-/// The messages depend on what the process did, and not on how long it took, so that they repeat.
+/// The messages depend on what the process did, not on how long it took, so that they are reproducible.
 #[derive(Debug, thiserror::Error)]
 pub enum ExecError {
-    /// The command's quotes do not match, or it has no word.
+    /// The quotes of the command do not match, or the command is empty.
     #[error("`{command}` is no command: its quotes do not match, or it is empty")]
     Command {
         /// The command.
@@ -22,57 +22,57 @@ pub enum ExecError {
         /// The system's reason.
         source: io::Error,
     },
-    /// It ended.
-    #[error("the process ended ({status}) {}{}", when(*answered), tail(words))]
+    /// The process ended.
+    #[error("the process ended ({status}) {}{}", when(*answered), last_lines(stderr))]
     Ended {
-        /// How.
+        /// Its exit status.
         status: ExitStatus,
-        /// Answers that it had given, the greeting among them.
+        /// Number of answers before, including the greeting.
         answered: u64,
         /// The last lines of its standard error.
-        words: String,
+        stderr: String,
     },
-    /// It closed its standard output and went on.
-    #[error("the process closed its standard output {}{}", when(*answered), tail(words))]
+    /// The process closed its standard output without ending.
+    #[error("the process closed its standard output {}{}", when(*answered), last_lines(stderr))]
     Closed {
-        /// Answers that it had given, the greeting among them.
+        /// Number of answers before, including the greeting.
         answered: u64,
         /// The last lines of its standard error.
-        words: String,
+        stderr: String,
     },
-    /// It answered, but too late.
+    /// The process answered after the time limit, but within twice the limit.
     #[error("the process answered later than the {limit_ms} ms allowed, {}", when(*answered))]
     Late {
-        /// Time allowed [ms].
+        /// The time limit (ms).
         limit_ms: u128,
-        /// Answers that it had given, the greeting among them.
+        /// Number of answers before, including the greeting.
         answered: u64,
     },
-    /// It hangs.
-    #[error("the process hangs: no answer in twice the {limit_ms} ms allowed, {}{}", when(*answered), tail(words))]
+    /// The process did not answer within twice the time limit.
+    #[error("the process hangs: no answer in twice the {limit_ms} ms allowed, {}{}", when(*answered), last_lines(stderr))]
     Hangs {
-        /// Time allowed [ms].
+        /// The time limit (ms).
         limit_ms: u128,
-        /// Answers that it had given, the greeting among them.
+        /// Number of answers before, including the greeting.
         answered: u64,
         /// The last lines of its standard error.
-        words: String,
+        stderr: String,
     },
-    /// It spoke before it was asked.
+    /// The process wrote a line that is not an answer to a message.
     #[error("the process wrote a line that nobody had asked for, {}: {line:?}", when(*answered))]
     OutOfTurn {
-        /// Answers that it had given, the greeting among them.
+        /// Number of answers before, including the greeting.
         answered: u64,
         /// The beginning of the line.
         line: String,
     },
-    /// A line without an end.
+    /// The process wrote a line that exceeds the length limit.
     #[error("the process answered with a line of more than {limit} bytes")]
     LongLine {
-        /// Most that is read.
+        /// The limit (bytes).
         limit: usize,
     },
-    /// The line is not JSON.
+    /// The line is not a JSON object.
     #[error("the process answered {line:?}, which is not JSON: {reason}")]
     NotJson {
         /// The beginning of the line.
@@ -80,7 +80,7 @@ pub enum ExecError {
         /// What is wrong.
         reason: String,
     },
-    /// A key is absent, or has a value of the wrong kind.
+    /// A key is absent, or its value has the wrong type.
     #[error("the process answered {line:?}: `{key}` must be {expected}, it is {found}")]
     Key {
         /// The beginning of the line.
@@ -95,26 +95,26 @@ pub enum ExecError {
     /// The acceleration is not a finite number.
     #[error("the process asked for an acceleration of {value} m/s², which is not a finite number")]
     NotFinite {
-        /// As it was written.
+        /// The value as the process wrote it.
         value: String,
     },
-    /// It speaks another version.
+    /// The process uses another version of the protocol.
     #[error("the process speaks version {found} of the protocol, this is version {own}")]
     Version {
-        /// Its version.
+        /// The version of the process.
         found: String,
-        /// This one.
+        /// The version of Closecall.
         own: u32,
     },
-    /// It holds too much memory.
+    /// The process exceeded its memory limit.
     #[error("the process holds more than the {limit_mib} MiB of memory allowed")]
     Memory {
-        /// Most that is allowed [MiB].
+        /// The memory limit (MiB).
         limit_mib: u64,
     },
 }
 
-/// When it happened, counted in answers, of which the first is the greeting.
+/// Describes when an error happened by the number of answers before it, of which the first is the greeting.
 fn when(answered: u64) -> String {
     match answered {
         0 => "before its greeting".to_owned(),
@@ -124,6 +124,7 @@ fn when(answered: u64) -> String {
     }
 }
 
-fn tail(words: &str) -> String {
-    if words.is_empty() { String::new() } else { format!("; it last wrote: {words}") }
+/// Returns the part of a message that quotes the last lines of standard error, if there are any.
+fn last_lines(stderr: &str) -> String {
+    if stderr.is_empty() { String::new() } else { format!("; it last wrote: {stderr}") }
 }

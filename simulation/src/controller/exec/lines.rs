@@ -1,31 +1,31 @@
-//! Reading what a process writes, in bounded memory whatever it writes.
+//! Reads the output of a process. The memory needed is bounded, whatever the process writes.
 
 use std::collections::VecDeque;
 use std::io::{self, BufRead, BufReader, Read};
 use std::sync::mpsc::SyncSender;
 
-/// Longest line that is read [bytes].
-pub(super) const LONGEST_LINE: usize = 1 << 20;
+/// Longest line that is accepted (bytes).
+pub(super) const MAX_LINE_BYTES: usize = 1 << 20;
 
-/// What is kept of standard error [bytes].
-const KEPT_WORDS: usize = 2_048;
+/// Number of bytes of standard error that are kept.
+const KEPT_STDERR_BYTES: usize = 2_048;
 
-/// Lines of standard error that an error message repeats.
-const REPEATED_LINES: usize = 5;
+/// Number of lines of standard error that an error message quotes.
+const QUOTED_LINES: usize = 5;
 
-/// Longest excerpt of a line in an error message [characters].
-const EXCERPT: usize = 120;
+/// Longest excerpt of a line in an error message (characters).
+const MAX_EXCERPT_CHARS: usize = 120;
 
 /// A line of standard output.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Line {
-    /// A whole one, without its end.
+    /// A complete line, without its line feed.
     Whole(Vec<u8>),
-    /// One longer than [`LONGEST_LINE`].
+    /// A line longer than [`MAX_LINE_BYTES`].
     TooLong,
 }
 
-/// Hands on every line until there are no more, one is too long, or nobody wants them.
+/// Sends every line to `lines`, until the source ends, a line is too long, or the receiver is gone.
 pub(super) fn read_lines(source: impl Read, lines: &SyncSender<Line>) {
     let mut source = BufReader::new(source);
     loop {
@@ -40,13 +40,14 @@ pub(super) fn read_lines(source: impl Read, lines: &SyncSender<Line>) {
     }
 }
 
-/// The next line; nothing at the end. What follows the last line's end counts as a line only if it is not empty.
+/// Returns the next line, or `None` at the end of the source. Text after the last line feed counts as a line if it is not
+/// empty.
 fn next_line(source: &mut impl BufRead) -> io::Result<Option<Line>> {
     let mut line = Vec::new();
-    source.take(LONGEST_LINE as u64 + 1).read_until(b'\n', &mut line)?;
+    source.take(MAX_LINE_BYTES as u64 + 1).read_until(b'\n', &mut line)?;
     if line.last() == Some(&b'\n') {
         line.pop();
-    } else if line.len() > LONGEST_LINE {
+    } else if line.len() > MAX_LINE_BYTES {
         return Ok(Some(Line::TooLong));
     } else if line.is_empty() {
         return Ok(None);
@@ -54,35 +55,36 @@ fn next_line(source: &mut impl BufRead) -> io::Result<Option<Line>> {
     Ok(Some(Line::Whole(line)))
 }
 
-/// The end of what was written, however much that was.
+/// The last bytes of a stream of any length.
 #[derive(Debug, Default)]
 pub(super) struct Tail(VecDeque<u8>);
 
 impl Tail {
+    /// Appends bytes, and drops the oldest ones beyond [`KEPT_STDERR_BYTES`].
     pub(super) fn push(&mut self, bytes: &[u8]) {
         self.0.extend(bytes);
-        let excess = self.0.len().saturating_sub(KEPT_WORDS);
+        let excess = self.0.len().saturating_sub(KEPT_STDERR_BYTES);
         self.0.drain(..excess);
     }
 
-    /// The last lines, joined.
-    pub(super) fn words(&self) -> String {
+    /// Returns the last non-empty lines, joined into one.
+    pub(super) fn last_lines(&self) -> String {
         let bytes: Vec<u8> = self.0.iter().copied().collect();
         let text = String::from_utf8_lossy(&bytes);
         let mut lines: Vec<&str> = text.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
-        let older = lines.len().saturating_sub(REPEATED_LINES);
+        let older = lines.len().saturating_sub(QUOTED_LINES);
         lines.drain(..older);
-        excerpt_of(&lines.join(" | "), KEPT_WORDS)
+        excerpt_of(&lines.join(" | "), KEPT_STDERR_BYTES)
     }
 }
 
-/// The beginning of a line, for an error message.
+/// Returns the beginning of a line, for an error message.
 pub(super) fn excerpt(line: &[u8]) -> String {
-    excerpt_of(&String::from_utf8_lossy(line), EXCERPT)
+    excerpt_of(&String::from_utf8_lossy(line), MAX_EXCERPT_CHARS)
 }
 
-fn excerpt_of(text: &str, most: usize) -> String {
-    let mut excerpt: String = text.chars().take(most).collect();
+fn excerpt_of(text: &str, max_chars: usize) -> String {
+    let mut excerpt: String = text.chars().take(max_chars).collect();
     if excerpt.len() < text.len() {
         excerpt.push('…');
     }
@@ -103,29 +105,29 @@ mod tests {
     }
 
     #[test]
-    fn lines_are_cut_at_their_ends() {
+    fn the_source_is_split_at_line_feeds() {
         let whole = |text: &str| Line::Whole(text.as_bytes().to_vec());
         assert_eq!(lines_of(b"a\n\nbc"), [whole("a"), whole(""), whole("bc")]);
         assert_eq!(lines_of(b""), []);
     }
 
     #[test]
-    fn a_line_without_an_end_is_not_read_for_ever() {
-        assert_eq!(lines_of(&vec![b'x'; LONGEST_LINE + 1]), [Line::TooLong]);
-        let longest = vec![b'x'; LONGEST_LINE];
+    fn reading_stops_at_a_line_that_is_too_long() {
+        assert_eq!(lines_of(&vec![b'x'; MAX_LINE_BYTES + 1]), [Line::TooLong]);
+        let longest = vec![b'x'; MAX_LINE_BYTES];
         assert_eq!(lines_of(&longest), [Line::Whole(longest.clone())]);
-        // An endless source ends the reading as well.
+        // Reading an endless source without a line feed stops, too.
         let (sender, receiver) = sync_channel(1);
         read_lines(io::repeat(b'x'), &sender);
         assert_eq!(receiver.recv(), Ok(Line::TooLong));
     }
 
     #[test]
-    fn of_standard_error_the_end_is_kept() {
+    fn only_the_end_of_standard_error_is_kept() {
         let mut tail = Tail::default();
         for number in 0..10_000 {
             tail.push(format!("line {number}\n").as_bytes());
         }
-        assert_eq!(tail.words(), "line 9995 | line 9996 | line 9997 | line 9998 | line 9999");
+        assert_eq!(tail.last_lines(), "line 9995 | line 9996 | line 9997 | line 9998 | line 9999");
     }
 }

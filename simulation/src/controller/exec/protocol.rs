@@ -1,4 +1,4 @@
-//! The lines that go out, and what the answers must be.
+//! Writes the messages to a process, and parses its answers.
 
 use closecall_controllers::{EgoInput, EgoSettings, EgoState, Front, Odometry, SensorAvailability};
 use closecall_traffic::{Road, Side, Source, Track, TrackId, TrackStatus};
@@ -12,18 +12,18 @@ use crate::run::CONTROL_STEP;
 /// Version of the protocol.
 pub(super) const PROTOCOL: u32 = 1;
 
-const ACCELERATION: &str = "acceleration_mps2";
-const STATE: &str = "state";
+const ACCELERATION_KEY: &str = "acceleration_mps2";
+const STATE_KEY: &str = "state";
 
 #[derive(Serialize)]
 #[serde(tag = "type", rename_all = "kebab-case")]
 enum Message<'a> {
-    Hello { protocol: u32, control_step_s: f64, settings: &'a EgoSettings, road: RoadLine },
-    Step(StepLine<'a>),
+    Hello { protocol: u32, control_step_s: f64, settings: &'a EgoSettings, road: RoadMessage },
+    Step(StepMessage<'a>),
 }
 
 #[derive(Serialize)]
-struct RoadLine {
+struct RoadMessage {
     lanes: u8,
     lane_width_m: f64,
     curvature_per_m: f64,
@@ -32,17 +32,17 @@ struct RoadLine {
 }
 
 #[derive(Serialize)]
-struct StepLine<'a> {
+struct StepMessage<'a> {
     time_s: f64,
     time_ns: i64,
     odometry: &'a Odometry,
     front: Option<Front>,
-    tracks: Vec<TrackLine>,
+    tracks: Vec<TrackMessage>,
     sensors: SensorAvailability,
 }
 
 #[derive(Serialize)]
-struct TrackLine {
+struct TrackMessage {
     id: TrackId,
     source: Source,
     status: TrackStatus,
@@ -55,13 +55,13 @@ struct TrackLine {
     heading_rad: f64,
     length_m: f64,
     width_m: f64,
-    class: ClassLine,
+    class: ClassMessage,
     existence: f64,
-    lane: LaneLine,
+    lane: LaneMessage,
 }
 
 #[derive(Serialize)]
-struct ClassLine {
+struct ClassMessage {
     car: f64,
     truck: f64,
     motorcycle: f64,
@@ -69,13 +69,13 @@ struct ClassLine {
 }
 
 #[derive(Serialize)]
-struct LaneLine {
+struct LaneMessage {
     left: f64,
     own: f64,
     right: f64,
 }
 
-impl From<&Track> for TrackLine {
+impl From<&Track> for TrackMessage {
     fn from(track: &Track) -> Self {
         let [car, truck, motorcycle, background] = track.class.0;
         let [left, own, right] = track.lane;
@@ -92,58 +92,59 @@ impl From<&Track> for TrackLine {
             heading_rad: track.heading_rad,
             length_m: track.length_m,
             width_m: track.width_m,
-            class: ClassLine { car, truck, motorcycle, background },
+            class: ClassMessage { car, truck, motorcycle, background },
             existence: track.existence,
-            lane: LaneLine { left, own, right },
+            lane: LaneMessage { left, own, right },
         }
     }
 }
 
-/// The first line.
+/// Returns the first message.
 pub(super) fn hello(settings: &EgoSettings, road: &Road) -> Vec<u8> {
-    let road = RoadLine {
+    let road = RoadMessage {
         lanes: road.lanes(),
         lane_width_m: road.lane_width_m(),
         curvature_per_m: road.curvature_per_m(),
         speed_limit_mps: road.speed_limit_mps(),
         overtaking_side: road.overtaking_side(),
     };
-    line(&Message::Hello { protocol: PROTOCOL, control_step_s: CONTROL_STEP.s(), settings, road })
+    to_line(&Message::Hello { protocol: PROTOCOL, control_step_s: CONTROL_STEP.s(), settings, road })
 }
 
-/// The line of a control step.
+/// Returns the message of a control step. `front` is the lead vehicle.
 pub(super) fn step(input: &EgoInput<'_>, front: Option<Front>) -> Vec<u8> {
-    line(&Message::Step(StepLine {
+    to_line(&Message::Step(StepMessage {
         time_s: input.time.s(),
         time_ns: input.time.ns(),
         odometry: &input.odometry,
         front,
-        tracks: input.tracks.iter().map(TrackLine::from).collect(),
+        tracks: input.tracks.iter().map(TrackMessage::from).collect(),
         sensors: input.sensors,
     }))
 }
 
-fn line(message: &Message<'_>) -> Vec<u8> {
-    // Structs of numbers and names cannot fail to be written.
+fn to_line(message: &Message<'_>) -> Vec<u8> {
+    // Serialising structs of numbers and names cannot fail.
     let mut line = serde_json::to_vec(message).unwrap_or_default();
     line.push(b'\n');
     line
 }
 
-/// A proper answer.
+/// A valid answer to a control step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Answer {
     pub(super) acceleration_mps2: f64,
     pub(super) state: EgoState,
 }
 
-/// Checks the answer to the first line.
+/// Checks the answer to the first message.
 pub(super) fn check_hello(line: &[u8]) -> Result<(), ExecError> {
     let object = object(line)?;
     if object.get("type").and_then(Value::as_str) != Some("hello") {
-        return Err(key(line, &object, "type", "\"hello\" in the first answer"));
+        return Err(key_error(line, &object, "type", "\"hello\" in the first answer"));
     }
-    let found = object.get("protocol").ok_or_else(|| key(line, &object, "protocol", "the version of the protocol"))?;
+    let found =
+        object.get("protocol").ok_or_else(|| key_error(line, &object, "protocol", "the version of the protocol"))?;
     if found.as_u64() == Some(PROTOCOL.into()) {
         Ok(())
     } else {
@@ -151,14 +152,16 @@ pub(super) fn check_hello(line: &[u8]) -> Result<(), ExecError> {
     }
 }
 
-/// Reads the answer to a control step.
-pub(super) fn answer(line: &[u8]) -> Result<Answer, ExecError> {
+/// Parses the answer to a control step.
+pub(super) fn parse_answer(line: &[u8]) -> Result<Answer, ExecError> {
     let object = object(line)?;
-    let acceleration_mps2 =
-        object.get(ACCELERATION).and_then(Value::as_f64).ok_or_else(|| key(line, &object, ACCELERATION, "a number"))?;
-    let state = object.get(STATE).and_then(|state| EgoState::deserialize(state).ok()).ok_or_else(|| {
+    let acceleration_mps2 = object
+        .get(ACCELERATION_KEY)
+        .and_then(Value::as_f64)
+        .ok_or_else(|| key_error(line, &object, ACCELERATION_KEY, "a number"))?;
+    let state = object.get(STATE_KEY).and_then(|state| EgoState::deserialize(state).ok()).ok_or_else(|| {
         let states = "one of following, increasing, holding, releasing, emergency-braking";
-        key(line, &object, STATE, states)
+        key_error(line, &object, STATE_KEY, states)
     })?;
     Ok(Answer { acceleration_mps2, state })
 }
@@ -167,7 +170,7 @@ fn object(line: &[u8]) -> Result<Map<String, Value>, ExecError> {
     match serde_json::from_slice(line) {
         Ok(Value::Object(object)) => Ok(object),
         Ok(_) => Err(ExecError::NotJson { line: excerpt(line), reason: "it must be an object".to_owned() }),
-        // JSON knows neither NaN nor infinity, but the writers of many languages do.
+        // JSON has neither NaN nor infinity, but the JSON writers of many languages write them.
         Err(error) => Err(match not_finite(line) {
             Some(value) => ExecError::NotFinite { value },
             None => ExecError::NotJson { line: excerpt(line), reason: error.to_string() },
@@ -175,16 +178,17 @@ fn object(line: &[u8]) -> Result<Map<String, Value>, ExecError> {
     }
 }
 
-/// The acceleration as it is written, where that is a number but not a finite one.
+/// Returns the acceleration as it is written if it is NaN or infinite, otherwise `None`.
 fn not_finite(line: &[u8]) -> Option<String> {
     let text = std::str::from_utf8(line).ok()?;
-    let (_, after) = text.split_once(&format!("\"{ACCELERATION}\""))?;
+    let (_, after) = text.split_once(&format!("\"{ACCELERATION_KEY}\""))?;
     let value = after.trim_start().strip_prefix(':')?.split([',', '}']).next()?.trim();
-    // Rust reads nan, inf and infinity in any case, with a sign.
+    // Rust parses nan, inf and infinity in upper and lower case, with or without a sign.
     value.parse::<f64>().ok().filter(|number| !number.is_finite()).map(|_| excerpt(value.as_bytes()))
 }
 
-fn key(line: &[u8], object: &Map<String, Value>, key: &'static str, expected: &'static str) -> ExecError {
+/// Returns the error that `key` does not have the `expected` value.
+fn key_error(line: &[u8], object: &Map<String, Value>, key: &'static str, expected: &'static str) -> ExecError {
     let found = object.get(key).map_or_else(|| "absent".to_owned(), |value| excerpt(value.to_string().as_bytes()));
     ExecError::Key { line: excerpt(line), key, expected, found }
 }
@@ -194,25 +198,25 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_proper_answer_is_read_to_the_last_bit() {
+    fn a_valid_answer_is_read_to_the_last_bit() {
         let read =
-            answer(br#"{"acceleration_mps2": -0.1234567890123456, "state": "increasing", "more": [1]}"#).unwrap();
+            parse_answer(br#"{"acceleration_mps2": -0.1234567890123456, "state": "increasing", "more": [1]}"#).unwrap();
         assert_eq!(read, Answer { acceleration_mps2: -0.123_456_789_012_345_6, state: EgoState::Increasing });
-        assert_eq!(answer(br#"{"acceleration_mps2": 1, "state": "following"}"#).unwrap().acceleration_mps2, 1.0);
+        assert_eq!(parse_answer(br#"{"acceleration_mps2": 1, "state": "following"}"#).unwrap().acceleration_mps2, 1.0);
     }
 
     #[test]
-    fn what_is_not_finite_is_named() {
+    fn an_acceleration_that_is_not_finite_is_quoted() {
         for value in ["NaN", "nan", "-nan", "Infinity", "-Infinity", "inf", "1e999"] {
             let line = format!("{{\"acceleration_mps2\": {value}, \"state\": \"following\"}}");
-            let error = answer(line.as_bytes()).unwrap_err();
+            let error = parse_answer(line.as_bytes()).unwrap_err();
             assert!(matches!(&error, ExecError::NotFinite { value: named } if named == value), "{value}: {error}");
         }
     }
 
     #[test]
-    fn whatever_else_is_wrong_is_said() {
-        for (line, said) in [
+    fn the_message_states_what_is_wrong() {
+        for (line, stated) in [
             ("", "not JSON"),
             ("hello", "not JSON"),
             ("[1, 2]", "must be an object"),
@@ -222,14 +226,14 @@ mod tests {
             (r#"{"acceleration_mps2": -1}"#, "`state` must be one of following"),
             (r#"{"acceleration_mps2": -1, "state": "driving"}"#, "it is \"driving\""),
         ] {
-            let error = answer(line.as_bytes()).unwrap_err().to_string();
-            assert!(error.contains(said), "{line}: {error}");
+            let error = parse_answer(line.as_bytes()).unwrap_err().to_string();
+            assert!(error.contains(stated), "{line}: {error}");
         }
-        assert!(answer(&[0xff, 0xfe]).is_err());
+        assert!(parse_answer(&[0xff, 0xfe]).is_err());
     }
 
     #[test]
-    fn the_version_must_be_the_same() {
+    fn another_version_is_rejected() {
         assert!(check_hello(br#"{"type":"hello","protocol":1}"#).is_ok());
         let error = check_hello(br#"{"type":"hello","protocol":2}"#).unwrap_err().to_string();
         assert_eq!(error, "the process speaks version 2 of the protocol, this is version 1");

@@ -1,4 +1,4 @@
-//! Sending a layout, with the properties that the library's builder has no words for.
+//! Sending a layout, with the properties that the library's blueprint builder cannot express.
 
 use rerun::blueprint::BlueprintActivation;
 use rerun::external::re_log_types::BlueprintActivationCommand;
@@ -6,11 +6,15 @@ use rerun::log::LogMsg;
 use rerun::{RecordingStream, RecordingStreamBuilder, StoreId, StoreKind};
 
 use super::super::write::{APPLICATION, RecordError};
-use super::{Layout, Shown};
+use super::{FilmContents, Layout};
 
 impl Layout {
-    /// Sends the layout for these films into a recording.
-    pub(in super::super) fn send(mut self, stream: &RecordingStream, films: &[Shown]) -> Result<(), RecordError> {
+    /// Writes the layout for these films into a recording.
+    pub(in super::super) fn send(
+        mut self,
+        stream: &RecordingStream,
+        films: &[FilmContents],
+    ) -> Result<(), RecordError> {
         let blueprint = self.blueprint(films);
         let (carrier, messages) = RecordingStreamBuilder::new(APPLICATION).memory()?;
         blueprint.send(&carrier, BlueprintActivation::default())?;
@@ -24,9 +28,10 @@ impl Layout {
         Ok(())
     }
 
+    /// Returns the properties as messages of the blueprint store `id`.
     fn property_messages(self, id: &StoreId) -> Result<Vec<LogMsg>, RecordError> {
         let (stream, messages) = RecordingStreamBuilder::from_store_id(id).send_properties(false).memory()?;
-        // The blueprint's only timeline, by which the viewer reads it.
+        // The viewer reads a blueprint on its only timeline.
         stream.set_time_sequence("blueprint", 0);
         for (path, property) in self.properties {
             stream.log(path, property.as_ref())?;

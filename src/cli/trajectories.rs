@@ -1,8 +1,9 @@
-//! `closecall lane-changes`, `criticality` and `fit`: from recorded traffic to distributions.
+//! `closecall lane-changes`, `criticality` and `fit`: from trajectory files to distributions.
 
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use closecall_scenarios::atomic::WriteError;
 use closecall_scenarios::criticality::{CriticalLaneChange, criticality as evaluate, shares};
 use closecall_scenarios::filters::smooth;
 use closecall_scenarios::fit::{Heading, fit as fit_distributions, to_toml, write_toml};
@@ -14,21 +15,20 @@ use super::args::{Format, ReadArgs, positive};
 use super::output::{out, outln};
 use super::watch::record_lane_change;
 use crate::exit_code::ExitCode;
-use closecall_scenarios::atomic::WriteError;
 
-/// How lane changes are found.
+/// The criterion by which lane changes are found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub(super) enum By {
+pub(super) enum CriterionChoice {
     /// Peaks of the lateral speed
     #[default]
     Peak,
-    /// Displacement from the lane's centre
+    /// Distance from the centre of the lane
     Distance,
-    /// Jumps of the distances to the markings; in-car logs only
+    /// Jumps of the measured distances to the lane markings; in-car logs only
     Gradient,
 }
 
-impl By {
+impl CriterionChoice {
     const fn criterion(self) -> Criterion {
         match self {
             Self::Peak => Criterion::Peak,
@@ -41,19 +41,20 @@ impl By {
 /// Arguments of `closecall lane-changes`.
 #[derive(Debug, Args)]
 pub(super) struct LaneChangesArgs {
-    /// Recording: NGSIM, highD or exiD, CommonRoad XML, an in-car log, or the plain CSV that `closecall record` writes; gzip
-    /// is accepted
-    recording: PathBuf,
+    /// Trajectory file: NGSIM, highD, exiD, CommonRoad XML, an in-car log, or plain CSV as `closecall record` writes
+    /// it. The file can be compressed by gzip
+    #[arg(value_name = "TRAJECTORY_FILE")]
+    file: PathBuf,
     #[command(flatten)]
     read: ReadArgs,
-    /// How lane changes are found
+    /// Criterion by which lane changes are found
     #[arg(long, value_enum, default_value_t)]
-    criterion: By,
-    /// Known lane changes of this recording, to state recall and precision: CSV with the columns recording_id, track_id,
-    /// time_s, direction, clear
+    criterion: CriterionChoice,
+    /// Known lane changes of the trajectory file, to compute recall and precision: a CSV file with the columns
+    /// recording_id, track_id, time_s, direction, clear
     #[arg(long, value_name = "FILE.csv")]
     reference: Option<PathBuf>,
-    /// Output for people or for programs
+    /// Output format
     #[arg(long, value_enum, default_value_t)]
     format: Format,
 }
@@ -61,20 +62,21 @@ pub(super) struct LaneChangesArgs {
 /// Arguments of `closecall criticality`.
 #[derive(Debug, Args)]
 pub(super) struct CriticalityArgs {
-    /// Recording
-    recording: PathBuf,
+    /// Trajectory file
+    #[arg(value_name = "TRAJECTORY_FILE")]
+    file: PathBuf,
     #[command(flatten)]
     read: ReadArgs,
-    /// Speed limit [m/s]; 120 km/h where absent
+    /// Speed limit in m/s [default: 120 km/h]
     #[arg(long, value_name = "M/S", value_parser = positive)]
     speed_limit_mps: Option<f64>,
-    /// Write a Rerun file of a lane change to look at: of the most critical one, or of the track named with --track
+    /// Save a recording (Rerun file) of one lane change: the most critical one, or that of the track named by --track
     #[arg(long, value_name = "FILE.rrd")]
     record: Option<PathBuf>,
-    /// With --record: the track whose lane change is shown
+    /// Track whose lane change --record saves
     #[arg(long, value_name = "ID", requires = "record")]
     track: Option<u64>,
-    /// Output for people or for programs
+    /// Output format
     #[arg(long, value_enum, default_value_t)]
     format: Format,
 }
@@ -82,39 +84,39 @@ pub(super) struct CriticalityArgs {
 /// Arguments of `closecall fit`.
 #[derive(Debug, Args)]
 pub(super) struct FitArgs {
-    /// Recordings
-    #[arg(required = true)]
-    recordings: Vec<PathBuf>,
+    /// Trajectory files
+    #[arg(required = true, value_name = "TRAJECTORY_FILE")]
+    files: Vec<PathBuf>,
     #[command(flatten)]
     read: ReadArgs,
-    /// File to write
+    /// File to write [default: standard output]
     #[arg(short, long, value_name = "FILE.toml")]
     output: Option<PathBuf>,
-    /// Where the recordings come from, for the file's heading
+    /// Origin of the trajectory files, for the heading of the output
     #[arg(long, default_value = "")]
     provenance: String,
-    /// Seed of the bootstrap
+    /// Seed of the bootstrap, which computes the confidence intervals
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Output for people (the file's text) or for programs
+    /// Output format; without --output, `human` prints the text of the file
     #[arg(long, value_enum, default_value_t)]
     format: Format,
 }
 
 pub(super) fn lane_changes(args: &LaneChangesArgs) -> Result<ExitCode, CliError> {
     let references = args.reference.as_deref().map(read_references).transpose()?;
-    let mut tracks = open(&args.recording, args.read.options())?;
-    if args.criterion == By::Gradient && tracks.layout() != Layout::InCar {
+    let mut tracks = open(&args.file, args.read.options())?;
+    if args.criterion == CriterionChoice::Gradient && tracks.layout() != Layout::InCar {
         let message = format!(
-            "{}: the gradient criterion needs the measured distances to the markings, which only in-car logs have; use \
+            "{}: the gradient criterion needs the measured distances to the lane markings, which only in-car logs have: use \
              `--criterion peak` or `distance`",
-            args.recording.display(),
+            args.file.display(),
         );
         return Err(CliError::Usage { message });
     }
     let detector = Detector::new(Lanes::Recorded, tracks.markings());
     let (mut changes, mut spans, mut count) = (Vec::new(), Spans::new(), 0_u64);
-    // Track by track, so that memory does not grow with the recording.
+    // The tracks are read one by one, so that the memory does not grow with the file.
     while let Some(track) = tracks.next_track()? {
         count += 1;
         changes.extend(detector.detect(args.criterion.criterion(), &track.trajectory, &track.markings));
@@ -133,7 +135,7 @@ pub(super) fn lane_changes(args: &LaneChangesArgs) -> Result<ExitCode, CliError>
         (Format::Json, Some(scored)) => outln!("{:#}", serde_json::json!({ "lane_changes": changes, "score": scored })),
         (Format::Human, scored) => {
             let (rows, period, dropped) = (tracks.rows(), tracks.period(), tracks.dropped().count());
-            outln!("{name}: {count} tracks, {rows} rows every {period}, {dropped} of them left out");
+            outln!("{name}: {count} tracks, {rows} rows every {period}, {dropped} rows skipped");
             list(&changes);
             if let Some(scored) = scored {
                 print_score(&scored);
@@ -200,7 +202,7 @@ fn line(change: &LaneChange) -> String {
 }
 
 pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> {
-    let recording = read_with(&args.recording, args.read.options())?;
+    let recording = read_with(&args.file, args.read.options())?;
     let smoothed = smooth(&recording);
     let changes = evaluate(&smoothed, args.speed_limit_mps);
     if let Some(path) = &args.record {
@@ -238,9 +240,9 @@ fn print_metrics(changes: &[CriticalLaneChange]) {
 
 pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
     let recordings =
-        args.recordings.iter().map(|path| read_with(path, args.read.options())).collect::<Result<Vec<_>, _>>()?;
-    refuse_repetition(&args.recordings, &recordings)?;
-    refuse_overwriting(&args.recordings, args.output.as_deref())?;
+        args.files.iter().map(|path| read_with(path, args.read.options())).collect::<Result<Vec<_>, _>>()?;
+    refuse_duplicates(&args.files, &recordings)?;
+    refuse_overwriting(&args.files, args.output.as_deref())?;
     let fitted = fit_distributions(&recordings, args.seed);
     let command = std::iter::once("closecall".to_owned()).chain(std::env::args().skip(1)).collect::<Vec<_>>().join(" ");
     let heading = Heading { command, provenance: args.provenance.clone() };
@@ -263,24 +265,26 @@ pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
     Ok(ExitCode::Pass)
 }
 
-/// A recording that is given twice would count twice, and make every interval too narrow.
-pub(super) fn refuse_repetition(paths: &[PathBuf], recordings: &[Recording]) -> Result<(), CliError> {
+/// Returns an error if two files have the same content: its lane changes would count twice, and every interval would be
+/// too narrow.
+pub(super) fn refuse_duplicates(paths: &[PathBuf], recordings: &[Recording]) -> Result<(), CliError> {
     for (later, recording) in recordings.iter().enumerate() {
         if let Some(earlier) = recordings[..later].iter().position(|earlier| earlier.hash == recording.hash) {
             let (one, other) = (paths[earlier].display(), paths[later].display());
-            return Err(CliError::Usage { message: format!("{one} and {other} are the same recording") });
+            return Err(CliError::Usage { message: format!("{one} and {other} have the same content") });
         }
     }
     Ok(())
 }
 
+/// Returns an error if `output` is one of the `inputs`.
 pub(super) fn refuse_overwriting(inputs: &[PathBuf], output: Option<&Path>) -> Result<(), CliError> {
     let Some(output) = output else { return Ok(()) };
     let same = |input: &&PathBuf| matches!((input.canonicalize(), output.canonicalize()), (Ok(a), Ok(b)) if a == b);
     match inputs.iter().find(same) {
-        Some(input) => {
-            Err(CliError::Usage { message: format!("--output would overwrite the recording {}", input.display()) })
-        }
+        Some(input) => Err(CliError::Usage {
+            message: format!("--output would overwrite the trajectory file {}", input.display()),
+        }),
         None => Ok(()),
     }
 }

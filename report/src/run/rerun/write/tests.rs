@@ -9,10 +9,10 @@ use closecall_traffic::geometry::BoxSide;
 use rerun::log::{Chunk, LogMsg};
 use rerun::{StoreKind, TimelineName};
 
-use super::stream::{OPENING_TIMELINE, STEP_TIMELINE, TIME_TIMELINE};
+use super::super::stream::{OPENING_TIMELINE, STEP_TIMELINE, TIME_TIMELINE};
 use super::*;
 use crate::run::film::{Comparison, FilmRecorder, film_encounter};
-use crate::traffic::traffic::TrafficRecorder;
+use crate::traffic::recorder::TrafficRecorder;
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::outcome::{ClosedBy, Collision, Phase};
@@ -20,11 +20,11 @@ use closecall_simulation::scenario::{RearDriver, ScenarioFile, reenact};
 use closecall_simulation::{Arm, CONTROL_STEP, RunKey, simulate};
 
 fn library(name: &str) -> ScenarioFile {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/library");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios/library");
     ScenarioFile::load(&folder.join(format!("{name}.toml")), &[]).unwrap()
 }
 
-/// One sample of a scenario of the library, filmed.
+/// Returns the film of one sample of a library scenario.
 fn filmed(name: &str, controller: ControllerChoice, (sensors, level): (Option<SensorMode>, Level)) -> Film {
     let sampling = Sampling { seed: 1, design: Design::Random, samples: 1 };
     let scenario = concrete(&library(name), sampling, 0).unwrap();
@@ -35,11 +35,11 @@ fn filmed(name: &str, controller: ControllerChoice, (sensors, level): (Option<Se
     recorder.finish(&outcome)
 }
 
-fn usual() -> Film {
+fn default_film() -> Film {
     filmed("low-thw-overtake", ControllerChoice::Mis, (None, Level::Full))
 }
 
-/// An encounter of our own traffic without the system, and the same with it.
+/// Returns the films of an encounter in simulated traffic, used as recorded traffic, and of its re-enactment with the MIS.
 fn recorded_and_simulated(level: Level) -> [Film; 2] {
     let (sampling, key) = (Sampling { seed: 1, design: Design::Random, samples: 1 }, RunKey { seed: 1, sample: 0 });
     let arm = |controller: ControllerChoice| Arm { controller: controller.factory(), sensors: None };
@@ -70,14 +70,14 @@ fn chunks(films: &[Film], kind: StoreKind) -> Vec<Chunk> {
         .collect()
 }
 
-/// The latest moment on a timeline [ns].
+/// Returns the latest moment on a timeline (ns).
 fn latest_ns(chunks: &[Chunk], timeline: &'static str) -> i64 {
     let timeline = TimelineName::from_static_str(timeline);
     let columns = chunks.iter().filter_map(|chunk| chunk.timelines().get(&timeline));
     columns.map(|column| column.time_range().max().as_i64()).max().unwrap()
 }
 
-/// Every text that a component of the blueprint holds.
+/// Returns all texts of a component of the blueprint.
 fn texts(chunk: &Chunk, component: &str) -> Vec<String> {
     let mut texts = Vec::new();
     for list in chunk.components().values().filter(|column| column.descriptor.component.as_str() == component) {
@@ -88,7 +88,8 @@ fn texts(chunk: &Chunk, component: &str) -> Vec<String> {
     texts
 }
 
-/// Where the views of a recording look that have nothing there, and the timeline that it opens with.
+/// Returns the number of views, the entities that a view shows but the recording lacks, and the timelines that the
+/// blueprint selects.
 fn empty_views(films: &[Film]) -> (usize, Vec<String>, Vec<String>) {
     let data = chunks(films, StoreKind::Recording);
     let entities: BTreeSet<String> = data.iter().map(|chunk| chunk.entity_path().to_string()).collect();
@@ -103,7 +104,7 @@ fn empty_views(films: &[Film]) -> (usize, Vec<String>, Vec<String>) {
         let named = queries.iter().filter(|query| !inherited(query)).flat_map(|query| query.split_whitespace());
         let named = named.map(|query| query.trim_start_matches('+').trim_end_matches("/**").to_owned());
         let rootless = |origin: &String| origin != "/";
-        empty.extend(origins.into_iter().filter(rootless).chain(named).filter(|place| !has(place)));
+        empty.extend(origins.into_iter().filter(rootless).chain(named).filter(|entity| !has(entity)));
         timelines.extend(texts(&chunk, "TimePanelBlueprint:timeline"));
     }
     (views, empty, timelines)
@@ -111,14 +112,14 @@ fn empty_views(films: &[Film]) -> (usize, Vec<String>, Vec<String>) {
 
 #[test]
 fn every_scenario_of_the_library_fills_every_view_at_every_level() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/library");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios/library");
     let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     let names = files.filter(|path| path.extension().is_some_and(|extension| extension == "toml"));
     for name in names.map(|path| path.file_stem().unwrap().to_str().unwrap().to_owned()) {
         for (level, least) in [(Level::Events, 5), (Level::Objects, 7), (Level::Full, 7)] {
             let films = [filmed(&name, ControllerChoice::Mis, (Some(SensorMode::Object), level))];
             let (views, empty, timelines) = empty_views(&films);
-            assert!(views >= least && empty.is_empty(), "{name}, {level:?}: {views} views, nothing at {empty:?}");
+            assert!(views >= least && empty.is_empty(), "{name}, {level:?}: {views} views, no entity at {empty:?}");
             assert_eq!(timelines, [OPENING_TIMELINE], "{name}, {level:?}");
         }
     }
@@ -129,7 +130,7 @@ fn a_pair_fills_every_view_and_shows_the_baseline_as_ghosts() {
     let film = |controller| filmed("paper-figure", controller, (None, Level::Objects));
     let films = [film(ControllerChoice::Acc), film(ControllerChoice::Mis)];
     let (views, empty, _) = empty_views(&films);
-    assert!(views >= 13 && empty.is_empty(), "{views} views, nothing at {empty:?}");
+    assert!(views >= 13 && empty.is_empty(), "{views} views, no entity at {empty:?}");
     let data = chunks(&films, StoreKind::Recording);
     for entity in ["/mis/world/ghosts/ego", "/mis/bird/ghosts", "/acc/world/ego/collision_1", "/mis/plots/margin/goal"]
     {
@@ -138,19 +139,19 @@ fn a_pair_fills_every_view_and_shows_the_baseline_as_ghosts() {
 }
 
 #[test]
-fn recorded_and_simulated_traffic_share_views_and_time_lines_and_are_each_other_s_ghosts() {
+fn recorded_and_simulated_traffic_share_timelines_and_are_ghosts_of_each_other() {
     for (level, least) in [(Level::Events, 7), (Level::Objects, 12), (Level::Full, 12)] {
         let films = recorded_and_simulated(level);
         let (views, empty, timelines) = empty_views(&films);
-        assert!(views >= least && empty.is_empty(), "{level:?}: {views} views, nothing at {empty:?}");
+        assert!(views >= least && empty.is_empty(), "{level:?}: {views} views, no entity at {empty:?}");
         assert_eq!(timelines, [OPENING_TIMELINE], "{level:?}");
     }
     let films = recorded_and_simulated(Level::Objects);
     let data = chunks(&films, StoreKind::Recording);
-    let half = |root: &str| -> Vec<Chunk> {
+    let chunks_under = |root: &str| -> Vec<Chunk> {
         data.iter().filter(|chunk| chunk.entity_path().to_string().starts_with(root)).cloned().collect()
     };
-    let halves = [half("/recorded/"), half("/mis/")];
+    let halves = [chunks_under("/recorded/"), chunks_under("/mis/")];
     for timeline in [TIME_TIMELINE, STEP_TIMELINE] {
         let [recorded, simulated] = [&halves[0], &halves[1]].map(|half| latest_ns(half, timeline));
         assert_eq!(recorded, simulated, "{timeline}");
@@ -164,7 +165,7 @@ fn recorded_and_simulated_traffic_share_views_and_time_lines_and_are_each_other_
 }
 
 #[test]
-fn full_sensors_show_points_boxes_truth_and_pictures() {
+fn full_sensors_show_points_boxes_ground_truth_and_images() {
     let films = [filmed("low-thw-overtake", ControllerChoice::Mis, (Some(SensorMode::Full), Level::Full))];
     let data = chunks(&films, StoreKind::Recording);
     let entities = [
@@ -189,7 +190,7 @@ fn full_sensors_show_points_boxes_truth_and_pictures() {
 
 #[test]
 fn both_timelines_span_the_run_and_the_opening_one_ends_at_the_critical_moment() {
-    let films = [usual()];
+    let films = [default_film()];
     let chunks = chunks(&films, StoreKind::Recording);
     let (critical, end) = (films[0].critical_moment(), films[0].end());
     let latest = latest_ns(&chunks, OPENING_TIMELINE);
@@ -205,8 +206,8 @@ fn both_timelines_span_the_run_and_the_opening_one_ends_at_the_critical_moment()
 }
 
 #[test]
-fn a_collision_of_ego_is_what_matters_most() {
-    let mut film = usual();
+fn a_collision_of_the_ego_precedes_earlier_ones_of_others() {
+    let mut film = default_film();
     let ids: Vec<_> = library("low-thw-overtake").config().actors.iter().map(|actor| actor.id.clone()).collect();
     let collision = |time, between: [usize; 2]| Collision {
         time,
@@ -234,12 +235,12 @@ fn a_collision_of_ego_is_what_matters_most() {
 }
 
 #[test]
-fn the_file_is_whole_and_alone() {
+fn the_file_is_complete_and_no_temporary_file_remains() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.rrd");
     check_recordable(&path).unwrap();
     assert!(!path.exists());
-    write_films(&path, &[usual()]).unwrap();
+    write_films(&path, &[default_film()]).unwrap();
     assert_eq!(&std::fs::read(&path).unwrap()[..4], b"RRF2");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     let error = check_recordable(&folder.path().join("no/folder.rrd")).unwrap_err();

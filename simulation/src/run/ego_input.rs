@@ -1,0 +1,33 @@
+//! The parts of the ego controller's input that are not tracks.
+
+use closecall_controllers::{Odometry, SensorAvailability};
+use closecall_sensors::{Health, Perception};
+
+use crate::scenario::Scenario;
+use crate::world::World;
+
+/// Returns the ego's own motion, its position in its lane, and its size.
+pub(super) fn odometry(scenario: &Scenario, world: &World) -> Odometry {
+    let state = world.state(scenario.ego);
+    let lane = scenario.road.lane_at(state.d_m);
+    let size = world.vehicle(scenario.ego).dimensions;
+    Odometry {
+        speed_mps: state.speed_mps,
+        acceleration_mps2: state.acceleration_mps2,
+        yaw_rate_radps: state.yaw_rate_radps,
+        lane,
+        lane_offset_m: state.d_m - scenario.road.lane_centre_m(lane),
+        length_m: size.length_m,
+        width_m: size.width_m,
+    }
+}
+
+/// Returns which of the ego's sensors have not failed.
+pub(super) fn sensor_availability(perception: &dyn Perception) -> SensorAvailability {
+    let health = perception.health();
+    SensorAvailability {
+        front: health.front != Health::Failed,
+        surround: health.surround != Health::Failed,
+        rear: health.rear != Health::Failed,
+    }
+}
