@@ -19,7 +19,7 @@ pub mod compare;
 pub mod execution;
 pub mod folder;
 mod folder_error;
-pub mod harm;
+pub use closecall_simulation::harm;
 pub mod journal;
 pub mod ledger;
 pub mod lock;

@@ -15,6 +15,7 @@ use serde::Serialize;
 
 use super::ledger::{ArmCounts, Inference};
 use closecall_statistics::binomial::at_most;
+pub use closecall_statistics::format::percent;
 use closecall_statistics::needed;
 use closecall_statistics::sequence::{evidence_above, evidence_below, is_certain};
 
@@ -186,22 +187,6 @@ impl Missing {
     }
 }
 
-/// Significant digits of a printed share.
-const DIGITS: i32 = 3;
-
-/// A share in percent, with three significant digits.
-pub fn percent(share: f64) -> String {
-    let value = 100.0 * share;
-    if !(value > 0.0) || !value.is_finite() {
-        return format!("{value} %");
-    }
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small number, above 0 by the clamp")]
-    let decimals = (DIGITS - 1 - value.log10().floor() as i32).clamp(0, 9) as usize;
-    let text = format!("{value:.decimals$}");
-    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
-    format!("{text} %")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -292,11 +277,5 @@ mod tests {
         let of_twenty = gate.judge(&counts, 20, Inference::FixedSamples);
         assert!(of_twenty.lower_bound < alone.lower_bound);
         assert_eq!(of_twenty.upper_bound, alone.upper_bound);
-    }
-
-    #[test]
-    fn percentages_have_three_digits() {
-        let texts = [0.009_936_4, 0.01, 0.95, 0.5, 0.000_012_34, 1.0, 0.0].map(percent);
-        assert_eq!(texts, ["0.994 %", "1 %", "95 %", "50 %", "0.00123 %", "100 %", "0 %"]);
     }
 }

@@ -6,7 +6,6 @@ pub mod criticality;
 pub mod encounter;
 pub mod filters;
 pub mod fit;
-pub mod interval;
 pub mod lane_change;
 pub mod parameters;
 pub mod recordings;

@@ -1,6 +1,7 @@
-//! What one track costs: preparing an exposure, drawing a crop, classifying it.
+//! Measures the time that the camera needs for one track: preparing an exposure, rendering a crop, and classifying it.
 //!
-//! `cargo bench -p closecall-sensors --bench camera`; ONNX Runtime instead of tract where `ORT_DYLIB_PATH` names it.
+//! Command: `cargo bench -p closecall-sensors --bench camera`. The classifier runs on ONNX Runtime instead of tract if
+//! `ORT_DYLIB_PATH` gives the path of its library.
 
 use std::hint::black_box;
 
@@ -9,7 +10,7 @@ use closecall_sensors::{Scene, SceneVehicle};
 use closecall_traffic::{Check, Environment, Light, Parameters, Road, Time, Vehicle, VehicleClass, VehicleState};
 use criterion::{Criterion, criterion_group, criterion_main};
 
-/// A follower, and one vehicle in each neighbouring lane.
+/// Returns a rear vehicle in the ego's lane, and one vehicle in each neighbouring lane.
 fn vehicles() -> [SceneVehicle; 3] {
     [(VehicleClass::Car, 465.0, -5.6), (VehicleClass::Truck, 430.0, -9.4), (VehicleClass::Motorcycle, 475.0, -1.9)].map(
         |(class, s_m, d_m)| SceneVehicle {

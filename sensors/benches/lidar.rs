@@ -1,5 +1,7 @@
-//! Time of one scan and of its processing, with R at 3, 30 and 100 m behind E and two more vehicles in view, and the share
-//! that each part has of a whole perception step without the camera.
+//! Measures the time of one LiDAR scan and of its processing, and the share of each part in a perception step without
+//! the camera. A rear vehicle is 3, 30 or 100 m behind the ego, and two more vehicles are in view.
+//!
+//! Command: `cargo bench -p closecall-sensors --bench lidar`.
 #![expect(clippy::print_stdout, reason = "a benchmark prints its figures")]
 
 use std::hint::black_box;
@@ -13,16 +15,19 @@ use closecall_traffic::{
 };
 use criterion::{Criterion, criterion_group, criterion_main};
 
-/// E drives in the middle lane.
+/// Position of the ego along the road (m).
 const EGO_S_M: f64 = 1_000.0;
+/// Lateral position of the ego (m), in the middle one of three lanes.
 const EGO_D_M: f64 = -5.625;
-/// Its rear bumper.
+/// Position of the ego's rear bumper along the road (m).
 const REAR_S_M: f64 = EGO_S_M - 2.3;
+/// Speed of all vehicles (m/s).
 const SPEED_MPS: f64 = 30.0;
-/// Where R is behind E [m].
+/// Gaps between the ego and the rear vehicle (m).
 const GAPS_M: [f64; 3] = [3.0, 30.0, 100.0];
-/// Steps over which shares are measured.
+/// Number of steps over which the shares are measured.
 const STEPS: u32 = 2_000;
+/// Time between two scans.
 const SCAN_PERIOD: Time = Time::from_ms(40);
 
 fn vehicle(actor: usize, class: VehicleClass, s_m: f64, d_m: f64) -> SceneVehicle {
@@ -30,7 +35,8 @@ fn vehicle(actor: usize, class: VehicleClass, s_m: f64, d_m: f64) -> SceneVehicl
     SceneVehicle { actor, vehicle: Vehicle::typical(class), state, pitch_rad: 0.0 }
 }
 
-/// R in E's lane, a truck to the right 40 m behind E, a car to the left 60 m behind E.
+/// Returns the rear vehicle in the ego's lane, a truck in the right lane 40 m behind the ego, and a car in the left
+/// lane 60 m behind it.
 fn others(gap_m: f64) -> [SceneVehicle; 3] {
     [
         vehicle(1, VehicleClass::Car, REAR_S_M - gap_m - 2.3, EGO_D_M),
@@ -39,7 +45,7 @@ fn others(gap_m: f64) -> [SceneVehicle; 3] {
     ]
 }
 
-/// E on a clear day before these others.
+/// Returns a scene with the ego and these other vehicles on a clear day.
 fn scene<'a>(road: &'a Road, others: &'a [SceneVehicle]) -> Scene<'a> {
     let ego = vehicle(0, VehicleClass::Car, EGO_S_M, EGO_D_M);
     Scene { time: Time::ZERO, road, environment: &Environment::CLEAR_DAY, ego, others }
@@ -53,14 +59,14 @@ fn sensors() -> Sensors {
     SensorsConfig::default().check(&Parameters::default()).expect("the defaults are valid")
 }
 
-/// All of perception without the camera.
+/// Creates the full perception chain without the camera.
 fn full() -> FullPerception {
     let key = NoiseKey { seed: 0, sample: 0, ego: ActorId::new("ego").expect("a legal name"), actors: [].into() };
     FullPerception::new(&sensors().full_model(), &key)
 }
 
-/// The rear LiDAR's tracker, which is told of the same boxes scan after scan while E drives on.
-struct Following {
+/// The rear LiDAR's tracker, which receives the same detections in each scan while the ego drives on.
+struct TrackerLoop {
     tracker: Tracker,
     list: TrackList,
     view: RearView,
@@ -68,7 +74,7 @@ struct Following {
     time: Time,
 }
 
-impl Following {
+impl TrackerLoop {
     fn new(road: Road) -> Self {
         let tracker = Tracker::new(sensors().full_model().tracker);
         let field = full().rear_field().expect("a rear sensor has one");
@@ -91,9 +97,9 @@ fn scan_and_detect(criterion: &mut Criterion) {
     for gap_m in GAPS_M {
         let others = others(gap_m);
         let scene = self::scene(&road, &others);
-        let lane = LaneGeometry::of(&scene);
+        let lane = LaneGeometry::from_scene(&scene);
         let (mut scanner, mut detector, mut rng) = (Scanner::new(Lidar::default()), Detector::default(), random());
-        let mut group = criterion.benchmark_group(format!("R at {gap_m} m"));
+        let mut group = criterion.benchmark_group(format!("rear vehicle at {gap_m} m"));
         group.bench_function("scan", |bencher| {
             bencher.iter(|| black_box(scanner.scan(black_box(&scene), &mut rng).len()));
         });
@@ -105,20 +111,21 @@ fn scan_and_detect(criterion: &mut Criterion) {
             bencher.iter(|| black_box(detector.detect(black_box(&scan), &lane).expect("finite points").len()));
         });
         let detections = detector.detect(&scan, &lane).expect("finite points").to_vec();
-        let mut following = Following::new(road);
-        group.bench_function("tracking", |bencher| bencher.iter(|| following.step(black_box(&detections))));
+        let mut tracker_loop = TrackerLoop::new(road);
+        group.bench_function("tracking", |bencher| bencher.iter(|| tracker_loop.step(black_box(&detections))));
         group.finish();
     }
 }
 
-/// Mean time of one of [`STEPS`] calls [µs].
+/// Returns the mean time of a call over [`STEPS`] calls (µs).
 fn mean_us(mut part: impl FnMut()) -> f64 {
     let start = Instant::now();
     (0..STEPS).for_each(|_| part());
     start.elapsed().as_secs_f64() * 1e6 / f64::from(STEPS)
 }
 
-/// Prints each part's mean time, and its share of a perception step without the camera; the radars are in it, too.
+/// Prints the mean time of each part, and its share in a perception step without the camera. The step includes the
+/// radars.
 fn shares(_: &mut Criterion) {
     let road = Road::straight(3);
     println!("\n{STEPS} steps each: time [us] and share of a whole perception step");
@@ -126,15 +133,15 @@ fn shares(_: &mut Criterion) {
     for gap_m in GAPS_M {
         let others = others(gap_m);
         let scene = self::scene(&road, &others);
-        let lane = LaneGeometry::of(&scene);
+        let lane = LaneGeometry::from_scene(&scene);
         let (mut scanner, mut detector, mut rng) = (Scanner::new(Lidar::default()), Detector::default(), random());
         let scan_us = mean_us(|| _ = black_box(scanner.scan(&scene, &mut rng).len()));
         let scan = scanner.scan(&scene, &mut random()).clone();
         let cluster_us = mean_us(|| detector.cluster(black_box(&scan), &lane).expect("finite points"));
         let detect_us = mean_us(|| _ = black_box(detector.detect(&scan, &lane).expect("finite points").len()));
         let detections = detector.detect(&scan, &lane).expect("finite points").to_vec();
-        let mut following = Following::new(road);
-        let track_us = mean_us(|| following.step(black_box(&detections)));
+        let mut tracker_loop = TrackerLoop::new(road);
+        let track_us = mean_us(|| tracker_loop.step(black_box(&detections)));
         let (mut whole, mut time, mut ego, mut others) = (full(), Time::ZERO, scene.ego, others);
         let whole_us = mean_us(|| {
             time += SCAN_PERIOD;

@@ -1,4 +1,4 @@
-//! Renders labelled pictures of the rear camera, for training and for judging classifiers.
+//! Renders labelled images of the rear camera, for the training and the evaluation of classifiers.
 //!
 //! ```text
 //! cargo run --release -p closecall-sensors --example render_dataset -- crops training 9000 0 target/crops/training

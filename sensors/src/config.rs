@@ -1,4 +1,4 @@
-//! The `[sensors]` table: which model of perception, and its numbers.
+//! The `[sensors]` table of a scenario file: the perception mode and the parameters of each sensor model.
 
 use closecall_traffic::{Check, Choice, ConfigError, Parameters};
 use schemars::JsonSchema;
@@ -12,16 +12,17 @@ use crate::{
     Perception, SensorError, TrackerConfig,
 };
 
-/// How much of the sensors is simulated.
+/// Level of detail at which the sensors are simulated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum SensorMode {
-    /// Point clouds behind E, clustered, classified and tracked; object-level sensors ahead and to the sides.
+    /// LiDAR point clouds behind the ego, clustered, classified and tracked; object-level sensors ahead and to the
+    /// sides.
     Full,
-    /// Object-level sensors all round: fast.
+    /// Object-level sensors in all directions: the fast mode.
     #[default]
     Object,
-    /// Perfect tracks.
+    /// Tracks without errors, taken from the true state.
     GroundTruth,
 }
 
@@ -36,23 +37,23 @@ impl SensorMode {
     }
 }
 
-/// The sensors as a scenario file describes them. Everything may be left out.
+/// The sensors as a scenario file describes them. Every key is optional.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct SensorsConfig {
-    /// How much of the sensors is simulated; `object` where absent.
+    /// Level of detail at which the sensors are simulated; `object` by default.
     pub mode: Choice<SensorMode>,
     /// The radar that looks ahead.
     pub front_radar: ObjectSensorConfig,
-    /// The short-range sensors all round.
+    /// The short-range sensors around the ego.
     pub surround: ObjectSensorConfig,
-    /// The object-level stand-in for the rear LiDAR and camera.
+    /// The object-level sensor that replaces the rear LiDAR and camera in mode `object`.
     pub rear_object: ObjectSensorConfig,
     /// The rear LiDAR.
     pub rear_lidar: LidarConfig,
-    /// The rear camera, whose network says what each cluster of the LiDAR is.
+    /// The rear camera, whose network classifies each cluster of the rear LiDAR.
     pub rear_camera: CameraConfig,
-    /// The tracker behind the rear LiDAR.
+    /// The tracker that processes the boxes of the rear LiDAR.
     pub tracker: TrackerConfig,
 }
 
@@ -70,7 +71,7 @@ impl Default for SensorsConfig {
     }
 }
 
-/// Checked sensors.
+/// The checked sensor configuration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sensors {
     mode: SensorMode,
@@ -83,47 +84,47 @@ impl Check for SensorsConfig {
     type Checked = Sensors;
 
     fn check(&self, parameters: &Parameters) -> Result<Sensors, ConfigError> {
-        let named = |key: &'static str| move |error: ConfigError| error.within(key);
+        let within = |key: &'static str| move |error: ConfigError| error.within(key);
         Ok(Sensors {
             mode: parameters.word(&self.mode, "mode")?,
             full: FullModel {
-                front_radar: self.front_radar.check_front_radar(parameters).map_err(named("front-radar"))?,
-                surround: self.surround.check_surround(parameters).map_err(named("surround"))?,
-                rear_lidar: self.rear_lidar.check(parameters).map_err(named("rear-lidar"))?,
-                tracker: self.tracker.check(parameters).map_err(named("tracker"))?,
+                front_radar: self.front_radar.check_front_radar(parameters).map_err(within("front-radar"))?,
+                surround: self.surround.check_surround(parameters).map_err(within("surround"))?,
+                rear_lidar: self.rear_lidar.check(parameters).map_err(within("rear-lidar"))?,
+                tracker: self.tracker.check(parameters).map_err(within("tracker"))?,
             },
-            camera: self.rear_camera.check(parameters).map_err(named("rear-camera"))?,
-            rear_object: self.rear_object.check_rear_object(parameters).map_err(named("rear-object"))?,
+            camera: self.rear_camera.check(parameters).map_err(within("rear-camera"))?,
+            rear_object: self.rear_object.check_rear_object(parameters).map_err(within("rear-object"))?,
         })
     }
 }
 
 impl Sensors {
-    /// How much of the sensors is simulated.
+    /// Returns the level of detail at which the sensors are simulated.
     pub fn mode(&self) -> SensorMode {
         self.mode
     }
 
-    /// The rear camera, whether it is simulated or not.
+    /// Returns the model of the rear camera, which exists in every mode.
     pub fn camera(&self) -> &Camera {
         &self.camera
     }
 
-    /// The models of the whole chain, whether it is simulated or not.
+    /// Returns the models of mode [`SensorMode::Full`], which exist in every mode.
     pub fn full_model(&self) -> FullModel {
         self.full
     }
 
-    /// The same sensors, simulated to another depth, as the command line may ask.
+    /// Returns the same sensors in another mode, such as one given on the command line.
     #[must_use]
     pub fn with_mode(self, mode: SensorMode) -> Self {
         Self { mode, ..self }
     }
 
-    /// The perception of one run, with random streams of its own under `key`.
+    /// Builds the perception of one run, whose random streams are keyed by `key`.
     ///
     /// # Errors
-    /// [`SensorError`] where a model cannot be set up.
+    /// Returns [`SensorError`] if a model cannot be set up.
     pub fn build(&self, key: &NoiseKey) -> Result<Box<dyn Perception>, SensorError> {
         Ok(match self.mode {
             SensorMode::GroundTruth => Box::new(GroundTruth::new()),
@@ -132,12 +133,12 @@ impl Sensors {
                 Box::new(ObjectPerception::new(models, key))
             }
             SensorMode::Full => {
-                let lidar_alone = FullPerception::new(&self.full, key);
+                let perception = FullPerception::new(&self.full, key);
                 match self.camera.pipeline {
-                    Pipeline::Off => Box::new(lidar_alone),
+                    Pipeline::Off => Box::new(perception),
                     Pipeline::CropClassifier => {
                         let classifier = WorkerClassifier::new(self.camera, key);
-                        Box::new(lidar_alone.with_classifier(Box::new(classifier)))
+                        Box::new(perception.with_classifier(Box::new(classifier)))
                     }
                 }
             }
@@ -154,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_table_is_the_default() {
+    fn an_empty_table_gives_the_default() {
         assert_eq!(check("").unwrap(), SensorsConfig::default().check(&Parameters::default()).unwrap());
         assert_eq!(check("mode = \"ground-truth\"").unwrap().mode(), SensorMode::GroundTruth);
     }
@@ -170,13 +171,13 @@ mod tests {
     }
 
     #[test]
-    fn unknown_keys_are_refused() {
+    fn unknown_keys_and_nan_are_rejected() {
         assert!(toml::from_str::<SensorsConfig>("rear-object = { rnage-m = 1.0 }").is_err());
         assert!(toml::from_str::<SensorsConfig>("rear-object = { range-m = nan }").is_err());
     }
 
     #[test]
-    fn text_survives_a_round_trip() {
+    fn config_survives_a_round_trip_through_toml() {
         let config: SensorsConfig =
             toml::from_str("mode = \"object\"\nrear-object = { range-m = \"$range-m\" }").unwrap();
         let again: SensorsConfig = toml::from_str(&toml::to_string(&config).unwrap()).unwrap();

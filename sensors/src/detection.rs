@@ -1,54 +1,57 @@
-//! What one scan yields: boxes, each fitted to one cluster of points.
+//! A detection: a box fitted to one cluster of points of one scan.
 //!
 //! The LiDAR looks back, so it sees the *front* face of a vehicle that follows in the lane, and one side of a vehicle
-//! in a neighbouring lane. Faces that are not seen are filled in from the class's usual size: the faces that *are*
-//! seen are what the tracker may trust, so a detection says which they are.
+//! in a neighbouring lane. The extent of a face that is not seen is assumed from the class's usual size. The tracker
+//! may trust measured extents only, so a detection says which extents are measured.
 
 use closecall_traffic::{ClassScores, Time};
 
-/// How far a face of a fitted box can be trusted.
+/// Origin of one extent (length or width) of a fitted box.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Extent {
-    /// Both ends were seen: the extent is measured.
+    /// Measured: both ends are seen.
     Seen,
-    /// Not wholly seen: the extent is filled in from usual sizes, and is at least what was seen.
+    /// Assumed: not both ends are seen. The extent is the class's usual one, or the seen part if that is larger.
     Assumed,
 }
 
-/// A box fitted to one cluster, in E's vehicle frame at the end of the scan: where the target was at `time`, seen from
-/// where E is at the scan's end.
+/// A box fitted to one cluster, in the ego's vehicle frame at the end of the scan.
+///
+/// The box shows where the target was at `time`, relative to where the ego is at the end of the scan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Detection {
-    /// The time that the position holds for: the points' mean time of measurement, E's motion compensated.
+    /// Time at which the position holds: the mean measurement time of the points, compensated for the ego's motion.
     pub time: Time,
-    /// Middle of the box's face that is nearest to E, ahead of E [m]; negative behind.
+    /// Position ahead of the ego of the middle of the box's nearest face (m); negative behind the ego.
     pub face_x_m: f64,
-    /// Middle of that face, to the left of E [m].
+    /// Position to the left of the ego of the middle of that face (m).
     pub face_y_m: f64,
-    /// Standard deviation of the face's position along the line of sight [m].
+    /// Standard deviation of the face's position along the line of sight (m).
     pub range_sd_m: f64,
-    /// Standard deviation of the face's position across the line of sight [m].
+    /// Standard deviation of the face's position across the line of sight (m).
     pub lateral_sd_m: f64,
-    /// Direction in which the vehicle points, relative to E's heading [rad], in ±π/2: E's own direction of travel.
+    /// Heading of the vehicle relative to the ego's (rad), within ±π/2: it is taken to travel in the ego's direction.
     pub heading_rad: f64,
-    /// Length of the box [m].
+    /// Length of the box (m).
     pub length_m: f64,
-    /// Whether the length was seen.
+    /// Whether the length is measured or assumed.
     pub length: Extent,
-    /// Width of the box [m].
+    /// Width of the box (m).
     pub width_m: f64,
-    /// Whether the width was seen.
+    /// Whether the width is measured or assumed.
     pub width: Extent,
-    /// Height of the highest point above the ground [m].
+    /// Height of the highest point above the ground (m).
     pub top_m: f64,
     /// Number of points in the cluster.
     pub points: usize,
-    /// Class scores from shape alone, or from the camera where one has looked.
+    /// Class scores from the box's shape, or from the camera if it has classified the box.
     pub class: ClassScores,
 }
 
 impl Detection {
-    /// The box's centre (x, y) in E's vehicle frame [m]: half a length behind the face that E sees, for one behind E.
+    /// Returns the box's centre (x, y) in the ego's vehicle frame (m).
+    ///
+    /// The centre lies half a length farther from the ego than the nearest face.
     pub fn centre_m(&self) -> (f64, f64) {
         let away = if self.face_x_m < 0.0 { -0.5 } else { 0.5 } * self.length_m;
         let (sin, cos) = self.heading_rad.sin_cos();

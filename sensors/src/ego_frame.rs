@@ -1,24 +1,25 @@
-//! From road coordinates to E's vehicle frame, and back to lanes.
+//! Transforms between road coordinates and the ego's vehicle frame, and assigns positions to lanes.
 //!
-//! On a road of curvature κ (left edge) the point (s, d) lies, seen along the road's direction at E's own (s₀, d₀), at
+//! A road has the curvature κ at its left edge. The ego is at (s₀, d₀). In axes that are aligned with the road's
+//! direction at the ego, the road point (s, d) lies at (a, b) relative to the ego:
 //!
 //! ```text
 //!   a = (1/κ − d)·sin Δ                        Δ = κ·(s − s₀)
 //!   b = d − d₀ + (1/κ − d)·(1 − cos Δ)
 //! ```
 //!
-//! Written with 2·sin²(Δ/2) for 1 − cos Δ, this loses no digits where κ is small, and no position is ever formed far
-//! from E, so that a run at s = 100 km is as exact as one at s = 0. E's heading relative to the road turns (a, b) into
-//! (x, y).
+//! The code writes 1 − cos Δ as 2·sin²(Δ/2), which loses no digits if κ is small. Every position is formed relative to
+//! the ego, so a run at s = 100 km is as exact as one at s = 0. A rotation by the ego's heading relative to the road
+//! turns (a, b) into (x, y).
 
 use closecall_traffic::{Lane, Road, Side, VehicleState};
 use statrs::function::erf::erfc;
 
-/// Beyond this many standard deviations from a lane's edge a vehicle is counted as certainly on one side of it (the
+/// Number of standard deviations from a lane's edge beyond which a vehicle is certainly on one side of it (the
 /// neglected probability is below 3e-7).
 const CERTAIN_DEVIATIONS: f64 = 5.0;
 
-/// E's vehicle frame at one instant.
+/// The ego's vehicle frame at one instant.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct EgoFrame<'a> {
     road: &'a Road,
@@ -30,14 +31,14 @@ pub(crate) struct EgoFrame<'a> {
     lane: Lane,
 }
 
-/// A point of the road as seen from E.
+/// A point of the road in the ego's vehicle frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RoadPoint {
-    /// Ahead of E [m].
+    /// Distance ahead of the ego (m).
     pub(crate) x_m: f64,
-    /// To the left of E [m].
+    /// Distance to the left of the ego (m).
     pub(crate) y_m: f64,
-    /// Direction of the road there, relative to E's heading [rad].
+    /// Direction of the road at the point, relative to the ego's heading (rad).
     pub(crate) road_yaw_rad: f64,
 }
 
@@ -47,71 +48,79 @@ impl<'a> EgoFrame<'a> {
         Self { road, s_m: ego.s_m, d_m: ego.d_m, heading_rad: ego.heading_rad, sin, cos, lane: road.lane_at(ego.d_m) }
     }
 
-    /// Where the point (s, d) of the road lies in E's frame.
+    /// Transforms the road point (s, d) into the ego's frame.
     pub(crate) fn point(&self, s_m: f64, d_m: f64) -> RoadPoint {
         let curvature = self.road.curvature_per_m();
         let (mut along_m, mut across_m) = (s_m - self.s_m, d_m - self.d_m);
-        let mut bend_rad = 0.0;
+        let mut turn_rad = 0.0;
         if curvature != 0.0 {
-            bend_rad = curvature * along_m;
+            turn_rad = curvature * along_m;
             let radius_m = 1.0 / curvature - d_m;
-            let half_sin = (0.5 * bend_rad).sin();
-            along_m = radius_m * bend_rad.sin();
+            let half_sin = (0.5 * turn_rad).sin();
+            along_m = radius_m * turn_rad.sin();
             across_m += radius_m * 2.0 * half_sin * half_sin;
         }
         RoadPoint {
             x_m: along_m * self.cos + across_m * self.sin,
             y_m: across_m * self.cos - along_m * self.sin,
-            road_yaw_rad: bend_rad - self.heading_rad,
+            road_yaw_rad: turn_rad - self.heading_rad,
         }
     }
 
-    /// The road coordinates (s, d) [m] of a point in E's frame.
+    /// Returns the road coordinates (s, d) (m) of a point in the ego's frame.
     pub(crate) fn road_position_m(&self, x_m: f64, y_m: f64) -> (f64, f64) {
         let along_m = x_m * self.cos - y_m * self.sin;
         let across_m = y_m * self.cos + x_m * self.sin;
         let curvature = self.road.curvature_per_m();
-        let way_m = match curvature {
+        let arc_length_m = match curvature {
             0.0 => along_m,
             _ => (curvature * along_m).atan2(1.0 - curvature * (self.d_m + across_m)) / curvature,
         };
-        (self.s_m + way_m, self.lateral_position_m(x_m, y_m))
+        (self.s_m + arc_length_m, self.lateral_position_m(x_m, y_m))
     }
 
-    /// What a vehicle at `d_m` covers of its own path for each metre of the reference line [1].
-    pub(crate) fn stretch(&self, d_m: f64) -> f64 {
+    /// Returns the length of path that a vehicle at `d_m` covers per metre of the reference line (m/m).
+    pub(crate) fn path_scale(&self, d_m: f64) -> f64 {
         1.0 - self.road.curvature_per_m() * d_m
     }
 
-    /// The lateral road coordinate d [m] of a point in E's frame: what E knows from its lane camera and its map.
+    /// Returns the lateral road coordinate d (m) of a point in the ego's frame.
+    ///
+    /// The ego knows it from its lane camera and its map.
     pub(crate) fn lateral_position_m(&self, x_m: f64, y_m: f64) -> f64 {
         let along_m = x_m * self.cos - y_m * self.sin;
         let across_m = y_m * self.cos + x_m * self.sin;
         let curvature = self.road.curvature_per_m();
-        // Curvature of E's own path parallel to the edge; the quotient is exact for a circle and b for a straight line.
-        let own = curvature / (1.0 - curvature * self.d_m);
-        let offset_m = (2.0 * across_m - own * (along_m * along_m + across_m * across_m))
-            / (1.0 + (own * along_m).hypot(1.0 - own * across_m));
+        // The line through the ego parallel to the road's edge has this curvature. The quotient below is the exact
+        // lateral offset from a circle, and equals `across_m` for a straight line.
+        let line_per_m = curvature / (1.0 - curvature * self.d_m);
+        let offset_m = (2.0 * across_m - line_per_m * (along_m * along_m + across_m * across_m))
+            / (1.0 + (line_per_m * along_m).hypot(1.0 - line_per_m * across_m));
         self.d_m + offset_m
     }
 
-    /// Probability that a centre at `d_m`, known to `sd_m`, is in the lane left of E's, in E's own, right of E's.
+    /// Returns the probabilities that a vehicle is in the lane left of the ego's, in the ego's lane, and in the lane
+    /// right of the ego's.
+    ///
+    /// A vehicle counts as being in a lane if its centre is. The centre lies at `d_m` with the standard deviation
+    /// `sd_m`.
     pub(crate) fn lane_probabilities(&self, d_m: f64, sd_m: f64) -> [f64; 3] {
         let width_m = self.road.lane_width_m();
         let left_edge_m = self.road.lane_centre_m(self.lane) + 0.5 * width_m;
-        // Probability of lying right of each of the four edges, from the left.
-        let right_of = [1.0, 0.0, -1.0, -2.0].map(|lanes| below(left_edge_m + lanes * width_m - d_m, sd_m));
-        let within = |place: usize, exists: bool| if exists { right_of[place] - right_of[place + 1] } else { 0.0 };
+        // Probabilities that the centre lies to the right of each of the four edges of these lanes, from left to right.
+        let right_of = [1.0, 0.0, -1.0, -2.0].map(|lanes| normal_cdf(left_edge_m + lanes * width_m - d_m, sd_m));
+        let in_lane = |index: usize, exists: bool| if exists { right_of[index] - right_of[index + 1] } else { 0.0 };
         [
-            within(0, self.road.beside(self.lane, Side::Left).is_some()),
-            within(1, true),
-            within(2, self.road.beside(self.lane, Side::Right).is_some()),
+            in_lane(0, self.road.beside(self.lane, Side::Left).is_some()),
+            in_lane(1, true),
+            in_lane(2, self.road.beside(self.lane, Side::Right).is_some()),
         ]
     }
 }
 
-/// Probability that a normal deviate of standard deviation `sd` (0 or more) is at most `margin`.
-fn below(margin: f64, sd: f64) -> f64 {
+/// Returns the probability that a normal deviate with mean 0 and standard deviation `sd` (0 or more) is at most
+/// `margin`.
+fn normal_cdf(margin: f64, sd: f64) -> f64 {
     if margin >= CERTAIN_DEVIATIONS * sd {
         1.0
     } else if margin <= -CERTAIN_DEVIATIONS * sd {
@@ -133,7 +142,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn agrees_with_the_plane(
+        fn point_agrees_with_the_poses_in_the_plane(
             ds in -150.0..150.0, d in -11.0..0.0, own_d in -11.0..0.0,
             heading in -0.2..0.2, curvature in -0.0025..0.0025,
         ) {
@@ -150,7 +159,7 @@ mod tests {
         }
 
         #[test]
-        fn the_road_coordinates_come_back(
+        fn road_position_inverts_point(
             ds in -150.0..150.0, d in -11.0..0.0, heading in -0.2..0.2, curvature in -0.0025..0.0025,
         ) {
             let road = Road::straight(3).with_curvature(curvature);
@@ -165,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn lanes_are_relative_to_the_ego() {
+    fn lane_probabilities_are_relative_to_the_ego_lane() {
         let road = Road::straight(3);
         let state = ego(-5.6, 0.0);
         let frame = EgoFrame::new(&road, &state);
@@ -177,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lane_that_is_not_there_holds_nothing() {
+    fn a_lane_that_does_not_exist_has_probability_zero() {
         let road = Road::straight(2);
         let state = ego(-1.9, 0.0);
         let frame = EgoFrame::new(&road, &state);

@@ -1,38 +1,40 @@
-//! Perception without error: what the controller would do if it saw everything as it is.
+//! Perception without errors, which separates faults of the controller from faults of the sensors.
 //!
-//! Used to tell faults of the controller from faults of the sensors. The tracks are exact, at once confirmed, of
-//! certain class, and limited only in distance, so that a function that engages on "a confirmed track behind" does not
-//! engage on a vehicle a kilometre away.
+//! The tracks are exact, confirmed at once, and of certain class. Only their distance is limited, so that a function
+//! that engages on a confirmed track behind the ego does not engage on a vehicle a kilometre away.
 
+use closecall_traffic::metrics::touching_distance_m;
 use closecall_traffic::{ClassScores, Source, Track, TrackId, TrackStatus};
 use nalgebra::{Matrix4, Vector4};
 
-use crate::surroundings::{Other, survey};
+use crate::surroundings::{OtherVehicle, transform_scene};
 use crate::{Perception, Scene, SensorError, SensorHealth};
 
-/// Distance, centre to centre along E's axis, up to which vehicles are reported [m]: the nominal range of the rear LiDAR
-/// and more than that of the front radar.
+/// Distance from centre to centre along the ego's axis up to which vehicles are reported (m).
+///
+/// It is the nominal range of the rear LiDAR and more than that of the front radar.
 const RANGE_M: f64 = 200.0;
 
-/// Perfect tracks of every vehicle within 200 m ahead and behind.
+/// Perception that reports a perfect track of every vehicle within 200 m ahead and behind.
 ///
-/// The source follows from the position: wholly ahead of E is front, wholly behind is rear, alongside is surround. The
-/// number of a track is the actor's place in the scenario and stays the same when the source changes.
+/// A track's source follows from the vehicle's position: front if it is wholly ahead of the ego, rear if wholly behind,
+/// surround if alongside. A track's id is the actor's index in the scenario, and stays the same when the source
+/// changes.
 #[derive(Clone, Debug, Default)]
 pub struct GroundTruth {
-    others: Vec<Other>,
+    others: Vec<OtherVehicle>,
     tracks: Vec<Track>,
 }
 
 impl GroundTruth {
-    /// Perfect perception.
+    /// Creates perfect perception.
     pub fn new() -> Self {
         Self::default()
     }
 }
 
-fn source(other: &Other, ego_length_m: f64) -> Source {
-    let alongside_m = 0.5 * (ego_length_m + other.length_m);
+fn source(other: &OtherVehicle, ego_length_m: f64) -> Source {
+    let alongside_m = touching_distance_m(ego_length_m, other.length_m);
     if other.x_m >= alongside_m {
         Source::Front
     } else if other.x_m <= -alongside_m {
@@ -44,7 +46,7 @@ fn source(other: &Other, ego_length_m: f64) -> Source {
 
 impl Perception for GroundTruth {
     fn step(&mut self, scene: &Scene<'_>) -> Result<&[Track], SensorError> {
-        let frame = survey(scene, &mut self.others)?;
+        let frame = transform_scene(scene, &mut self.others)?;
         self.tracks.clear();
         for other in self.others.iter().filter(|other| other.x_m.abs() <= RANGE_M) {
             #[expect(clippy::cast_possible_truncation, reason = "a scenario has far fewer than 2^32 actors")]
@@ -80,7 +82,7 @@ mod tests {
     use crate::testing::{scene_vehicle, with_speed};
 
     #[test]
-    fn sources_follow_the_position() {
+    fn source_follows_from_the_position() {
         let road = Road::straight(3);
         let ego = scene_vehicle(0, VehicleClass::Car, 500.0, -5.625);
         let others = [
@@ -103,14 +105,14 @@ mod tests {
     }
 
     #[test]
-    fn a_follower_in_a_bend_is_in_the_own_lane() {
+    fn a_follower_in_a_bend_is_in_the_ego_lane() {
         let road = Road::straight(3).with_curvature(0.002);
         let ego = with_speed(scene_vehicle(0, VehicleClass::Car, 500.0, -5.625), 30.0);
         let others = [with_speed(scene_vehicle(1, VehicleClass::Car, 400.0, -5.625), 36.0)];
         let scene = Scene { time: Time::ZERO, road: &road, environment: &Environment::CLEAR_DAY, ego, others: &others };
         let mut perception = GroundTruth::new();
         let track = &perception.step(&scene).unwrap()[0];
-        // 100 m back on a circle of 500 m: seen 9.9 m to the left, turned by 0.2 rad against E.
+        // 100 m back on a circle with a radius of 500 m: 9.9 m to the left, turned by 0.2 rad relative to the ego.
         assert!(track.y_m() > 9.0, "{}", track.y_m());
         assert!((track.heading_rad + 0.2).abs() < 1e-9);
         assert!((track.vx_mps().hypot(track.vy_mps()) - 36.0).abs() < 1e-9);

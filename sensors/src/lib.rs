@@ -1,9 +1,10 @@
-//! What E perceives: rear LiDAR, rear camera, object-level sensors, and the tracker that they feed.
+//! What the ego vehicle perceives: models of its rear LiDAR, rear camera and object-level sensors, and the tracker
+//! behind the rear LiDAR.
 //!
 //! ```text
-//!            ┌ lidar/   scan pattern ─▶ ray cast ─▶ power, noise ─▶ points ─▶ ground removal ─▶ clusters ─▶ boxes ┐
-//!  Scene ────┤ camera/  crop of the image at each cluster ─▶ classifier ─▶ class scores                          ├─▶ tracking/ ─▶ tracks
-//!            └ object   range, noise, latency, field of view (front radar, surround; rear as a simple stand-in)  ┘
+//!            ┌ lidar/   scan pattern ─▶ ray cast ─▶ power, noise ─▶ points ─▶ clusters ─▶ boxes ┐
+//!  Scene ────┤ camera/  image crop at each cluster ─▶ classifier ─▶ class scores                ├─▶ tracking/ ─▶ tracks
+//!            └ object/  range, noise, latency, field of view (front radar, surround, rear sensor) ─▶ tracks
 //! ```
 
 pub mod camera;
@@ -11,7 +12,9 @@ mod config;
 mod detection;
 mod ego_frame;
 mod full;
+mod gaussian;
 mod ground_truth;
+mod guard_rail;
 pub mod lidar;
 mod object;
 mod perception;
@@ -27,7 +30,7 @@ pub use detection::{Detection, Extent};
 pub use full::{DetectionClassifier, FullModel, FullPerception};
 pub use ground_truth::GroundTruth;
 pub use object::{NoiseKey, ObjectPerception, ObjectSensorConfig, ObjectSensorModel};
-pub use perception::{FieldOfView, Health, Perception, SCAN_PERIOD, SensorError, SensorHealth};
+pub use perception::{FieldOfView, Health, Perception, SensorError, SensorHealth};
 pub use scene::{Scene, SceneVehicle};
 pub use tracking::{Consistency, Credibility, NEES_95, TrackAudit, TrackerConfig, TrackerModel};
 pub use worker_classifier::{inference_backend, rear_exposures, use_inference_backend};

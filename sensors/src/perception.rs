@@ -1,98 +1,96 @@
-//! The boundary between the sensors and the loop.
+//! The interface between the sensors and the simulation loop.
 
 use closecall_traffic::{Time, Track};
 
 use crate::lidar::RearLidar;
 use crate::{Detection, Scene};
 
-/// Time from one control step, and one scan, to the next: 25 Hz.
-pub const SCAN_PERIOD: Time = Time::from_ms(40);
-
-/// Whether a group of sensors works.
+/// Operating state of a group of sensors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Health {
-    /// It works.
+    /// The sensors work.
     #[default]
     Ok,
-    /// It works with reduced range or certainty.
+    /// The sensors work with reduced range or certainty.
     Degraded,
-    /// It delivers nothing that could be used.
+    /// The sensors deliver nothing usable.
     Failed,
 }
 
-/// The health of each group of E's sensors.
+/// The health of each group of the ego's sensors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SensorHealth {
     /// The radar that looks ahead.
     pub front: Health,
     /// The short-range sensors to both sides.
     pub surround: Health,
-    /// LiDAR and camera that look back.
+    /// The sensors that look back: LiDAR and camera, or the object-level sensor in their place.
     pub rear: Health,
 }
 
-/// The wedge in which a sensor sees, from its place at the bumper on.
+/// The horizontal field of view of a sensor: a wedge whose apex is the sensor's position at the bumper.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FieldOfView {
-    /// Tangent of half of its angle [1].
+    /// Tangent of half of the opening angle.
     pub half_angle_tan: f64,
-    /// How far it reaches, in the present weather where the model says so [m].
+    /// Range (m); it is the range in the current weather if the sensor's model derives one.
     pub range_m: f64,
 }
 
-/// All of E's sensors with their processing: from the scene to tracks.
+/// All of the ego's sensors with their processing, from the scene to the tracks.
 ///
-/// Called once for each control step (25 Hz), in order of time.
+/// The loop calls [`Perception::step`] once in each control step, in order of time.
 pub trait Perception: Send {
-    /// Measures the scene and returns every track, front, surround and rear.
+    /// Measures the scene and returns the tracks of all sensors: front, surround and rear.
     ///
     /// # Errors
-    /// [`SensorError`] where a model failed; the run then ends as an error, never as a result.
+    /// Returns [`SensorError`] if a model fails. The run then ends with an error, never with a result.
     fn step(&mut self, scene: &Scene<'_>) -> Result<&[Track], SensorError>;
 
-    /// The health of the sensors after the latest step.
+    /// Returns the health of the sensors after the latest step.
     fn health(&self) -> SensorHealth;
 
-    /// The rear LiDAR with its latest points and boxes, for those who show them; none where it is not simulated.
+    /// Returns the rear LiDAR with its latest points and boxes, for display. Returns `None` if it is not simulated.
     fn rear_lidar(&self) -> Option<&RearLidar> {
         None
     }
 
-    /// The boxes found in the latest scan of the rear LiDAR, with the classes that the camera gave them; none where it is
-    /// not simulated.
+    /// Returns the boxes found in the latest scan of the rear LiDAR, with the camera's class scores if the camera is
+    /// simulated. Returns an empty slice if the LiDAR is not simulated.
     fn rear_detections(&self) -> &[Detection] {
         &[]
     }
 
-    /// Where the rear sensor looks from the rear bumper; none where its limits are not simulated.
+    /// Returns the field of view of the rear sensor from the rear bumper. Returns `None` if its limits are not
+    /// simulated.
     fn rear_field(&self) -> Option<FieldOfView> {
         None
     }
 }
 
-/// A sensor model that could not go on. The state of the sensors after it is undefined; the run ends.
+/// The failure of a sensor model. It leaves the sensors in an undefined state and ends the run.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SensorError {
-    /// A number that has to be finite was not.
+    /// A quantity that must be finite is not.
     #[error("failed to measure: {what} is not finite at {time}")]
     NotFinite {
         /// The quantity.
         what: &'static str,
-        /// When.
+        /// The scene's time.
         time: Time,
     },
-    /// The density clustering refused its input.
+    /// The density clustering rejected its input.
     #[error("failed to cluster {points} points: {reason}")]
     Clustering {
         /// Number of points.
         points: usize,
-        /// The library's reason.
+        /// The message of the clustering library.
         reason: String,
     },
-    /// The classifier could not be run.
+    /// The classifier could not be loaded or run.
     #[error("failed to classify: {reason}")]
     Classifier {
-        /// The library's reason.
+        /// The classifier's message.
         reason: String,
     },
 }

@@ -1,21 +1,21 @@
-//! The world as the sensor models see it: the truth that they measure with all their limits.
+//! The true state of the world at one instant: the input of the sensor models.
 
 use closecall_traffic::{Environment, Road, Time, Vehicle, VehicleState};
 
 /// One vehicle of a scene.
 #[derive(Clone, Copy, Debug)]
 pub struct SceneVehicle {
-    /// Its place in the scenario's list of actors: truth labels name it by this.
+    /// Index of the vehicle in the scenario's list of actors; truth labels refer to it.
     pub actor: usize,
-    /// What it is.
+    /// Class and dimensions.
     pub vehicle: Vehicle,
-    /// Where it is and how it moves.
+    /// Position and motion.
     pub state: VehicleState,
-    /// Pitch of the body, positive nose down, as under braking [rad].
+    /// Pitch of the body (rad); positive nose down, as under braking.
     pub pitch_rad: f64,
 }
 
-/// Everything a sensor of E could see at one instant.
+/// The true surroundings of the ego at one instant.
 #[derive(Clone, Copy, Debug)]
 pub struct Scene<'a> {
     /// The instant.
@@ -24,8 +24,8 @@ pub struct Scene<'a> {
     pub road: &'a Road,
     /// Light, weather and surface.
     pub environment: &'a Environment,
-    /// E itself.
+    /// The ego vehicle.
     pub ego: SceneVehicle,
-    /// All the others, in the order of their names.
+    /// All other vehicles, in the order of their names.
     pub others: &'a [SceneVehicle],
 }

@@ -1,8 +1,7 @@
-//! The camera's classifier in the loop: one network for each worker thread.
+//! The camera's classifier in the simulation loop, with one network per worker thread.
 //!
-//! A network takes long to set up and is locked while it runs. A run stays on the thread that it began on, so each
-//! thread keeps one, and hands it to whatever run it is at. The network has no memory: which runs it has served before
-//! does not change what it answers.
+//! A network takes long to set up and is locked while it runs. A run never changes its thread, so each thread keeps one
+//! network and uses it for all of its runs. The network is stateless: earlier runs do not change its results.
 
 use std::cell::RefCell;
 use std::sync::OnceLock;
@@ -13,40 +12,45 @@ use crate::camera::{Backend, Camera, CropClassifier, ExposureKey};
 use crate::full::DetectionClassifier;
 use crate::{Detection, NoiseKey, Scene, SensorError};
 
-/// The channel of the camera's random stream.
+/// Name of the camera's random stream.
 const CHANNEL: &str = "rear-camera";
 
-/// The noise of each exposure of a run's rear camera, scan by scan: with it a picture can be drawn again.
+/// Returns the noise keys of the rear camera's exposures in one run, scan by scan.
+///
+/// With the key of an exposure, its image can be rendered again.
 pub fn rear_exposures(key: &NoiseKey) -> impl Iterator<Item = ExposureKey> + use<> {
     let mut exposures = key.stream(CHANNEL);
     std::iter::repeat_with(move || ExposureKey::draw(&mut exposures))
 }
 
-/// What runs the networks of this process.
+/// The inference backend of this process.
 static BACKEND: OnceLock<Backend> = OnceLock::new();
 
 thread_local! {
+    /// The thread's network with the camera that it was built for.
     static NETWORK: RefCell<Option<(Camera, CropClassifier)>> = const { RefCell::new(None) };
 }
 
-/// Chooses what runs the networks of this process; tract where nobody chooses. Only the first choice counts.
+/// Sets the inference backend of this process; the default is tract.
+///
+/// The call has no effect once a backend was set or used.
 pub fn use_inference_backend(backend: Backend) {
     BACKEND.get_or_init(|| backend);
 }
 
-/// What runs the networks of this process.
+/// Returns the inference backend of this process.
 pub fn inference_backend() -> &'static Backend {
     BACKEND.get_or_init(Backend::default)
 }
 
-/// One run's camera, which looks with its thread's network.
+/// The camera of one run. It classifies with the network of its thread.
 pub(crate) struct WorkerClassifier {
     camera: Camera,
     exposures: Stream,
 }
 
 impl WorkerClassifier {
-    /// The camera of one run, with noise of its own under `key`.
+    /// Creates the camera of one run, whose exposure noise is keyed by `key`.
     pub(crate) fn new(camera: Camera, key: &NoiseKey) -> Self {
         Self { camera, exposures: key.stream(CHANNEL) }
     }
@@ -54,7 +58,7 @@ impl WorkerClassifier {
 
 impl DetectionClassifier for WorkerClassifier {
     fn classify(&mut self, scene: &Scene<'_>, detections: &mut [Detection]) -> Result<(), SensorError> {
-        // Drawn whether anything is seen or not, so that both arms of a pair meet the same exposures.
+        // The key is drawn even if nothing is detected, so that both arms of a pair get the same exposures.
         let key = ExposureKey::draw(&mut self.exposures);
         NETWORK.with_borrow_mut(|slot| {
             if slot.as_ref().is_none_or(|(camera, _)| *camera != self.camera) {

@@ -1,6 +1,6 @@
-//! The rear chain as a whole: how far and how well a vehicle that comes up is tracked, from the point cloud alone.
+//! Tests of the full rear chain: the range and accuracy at which a rear vehicle is tracked.
 //!
-//! Small numbers of runs; `examples/validate_tracking.rs` gives the figures.
+//! The tests use few runs; `examples/validate_tracking.rs` gives the figures.
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
 use closecall_sensors::{Health, NoiseKey, Perception, Scene, SceneVehicle, SensorMode, SensorsConfig, TrackAudit};
@@ -12,7 +12,7 @@ use closecall_traffic::{
 const OWN_LANE_M: f64 = -5.625;
 const SCAN_S: f64 = 0.04;
 
-/// E at 30 m/s and one vehicle behind it in its lane, on a clear day.
+/// The ego at 30 m/s and one rear vehicle in its lane, on a clear day.
 struct Approach {
     road: Road,
     ego: SceneVehicle,
@@ -45,7 +45,7 @@ impl Approach {
         self.ego.state.s_m - self.rear.state.s_m - 0.5 * lengths_m
     }
 
-    /// One control step: the confirmed rear tracks, which `audit` gets to see too.
+    /// Performs one control step, passes the tracks to `audit`, and returns the confirmed rear tracks.
     fn step(&mut self, audit: &mut TrackAudit) -> Vec<Track> {
         let others = [self.rear];
         let time = Time::from_ms(40) * self.scans;
@@ -62,7 +62,8 @@ impl Approach {
         tracks
     }
 
-    /// The gap at which it is first confirmed in E's lane; 0 where it never is before `until_m`.
+    /// Returns the gap at which the rear vehicle is first confirmed in the ego's lane, or 0 if it is not confirmed down
+    /// to a gap of `until_m`.
     fn confirmed_at_m(mut self, until_m: f64) -> f64 {
         let mut audit = TrackAudit::default();
         while self.gap_m() > until_m {
@@ -96,33 +97,33 @@ fn a_motorcycle_is_confirmed_beyond_60_m() {
 }
 
 #[test]
-fn one_vehicle_is_one_track_of_known_speed() {
+fn one_vehicle_gives_one_track_with_an_accurate_speed() {
     for class in VehicleClass::ALL {
         let mut approach = Approach::new(class, 90.0, 40.0, 7);
         let mut audit = TrackAudit::default();
-        let (mut settling, mut numbers) = (25, Vec::new());
+        let (mut settling, mut ids) = (25, Vec::new());
         while approach.gap_m() > 6.0 {
             let tracks = approach.step(&mut audit);
-            numbers.extend(tracks.iter().map(|track| track.id));
+            ids.extend(tracks.iter().map(|track| track.id));
             if !tracks.is_empty() && settling > 0 {
                 settling -= 1;
                 audit = TrackAudit::default();
             }
         }
-        numbers.sort_unstable();
-        numbers.dedup();
-        assert_eq!(numbers.len(), 1, "{class:?}");
+        ids.sort_unstable();
+        ids.dedup();
+        assert_eq!(ids.len(), 1, "{class:?}");
         assert_eq!((audit.id_switches, audit.false_tracks()), (0, 0), "{class:?}");
         let rmse_mps = audit.speed_rmse_mps().unwrap();
         assert!(rmse_mps <= 0.7, "{class:?}: {rmse_mps} m/s");
         let nees = audit.mean_nees().unwrap();
-        // Nobody manoeuvres here, so that the errors are smaller than the covariance must allow for.
+        // No vehicle manoeuvres here, so the errors are smaller than the covariance must allow for.
         assert!(nees < 6.0, "{class:?}: {nees}");
     }
 }
 
 #[test]
-fn nobody_behind_is_no_track() {
+fn an_empty_road_behind_gives_no_track() {
     let mut approach = Approach::new(VehicleClass::Car, 400.0, 0.0, 3);
     let mut audit = TrackAudit::default();
     for _ in 0..100 {
@@ -130,7 +131,7 @@ fn nobody_behind_is_no_track() {
     }
 }
 
-/// The health of the rear sensors after 2 s on an empty road.
+/// Returns the health of the rear sensors after 2 s on an empty road.
 fn health_on_an_empty_road(lidar: &str, environment: &Environment) -> Health {
     let config: SensorsConfig =
         toml::from_str(&format!("mode = \"full\"\nrear-lidar = {{ {lidar} }}\nrear-camera = {{ pipeline = \"off\" }}"))
@@ -148,7 +149,7 @@ fn health_on_an_empty_road(lidar: &str, environment: &Environment) -> Health {
 }
 
 #[test]
-fn a_blocked_window_and_fog_are_visible_and_an_empty_road_is_no_fault() {
+fn health_reports_a_blocked_window_and_fog_but_not_an_empty_road() {
     let day = Environment::CLEAR_DAY;
     let fog = Environment { visibility_m: 100.0, ..day };
     let wet = Environment { rain_mm_per_h: 5.0, water_film_mm: 1.0, friction: 0.6, visibility_m: 3_000.0, ..day };

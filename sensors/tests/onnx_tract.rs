@@ -1,7 +1,7 @@
-//! Tract in this process and ONNX Runtime in Python give the same probabilities for the same crops.
+//! Tests that tract in this process gives the same probabilities as ONNX Runtime in Python for the same crops.
 //!
-//! The crops and Python's answers are files of `onnx_golden/`, written by `training/golden.py`. Another backend needs
-//! another process, and so another test binary: `onnx_runtime.rs`.
+//! `training/golden.py` writes the crops and Python's probabilities to `onnx_golden/`. Another backend needs another
+//! process, and therefore another test binary: `onnx_runtime.rs`.
 
 #[path = "onnx_golden/mod.rs"]
 mod onnx_golden;

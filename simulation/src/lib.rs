@@ -13,12 +13,15 @@
 //! the only user of rapier, in its module `world`.
 
 pub mod controller;
+pub mod criteria;
+pub mod harm;
 pub mod outcome;
 pub mod run;
 pub mod scenario;
 mod world;
 
+pub use closecall_traffic::CONTROL_STEP;
 pub use run::{
-    Arm, CONTROL_STEP, ControllerFactory, Happening, Lead, MarginsNow, NoObserver, Observer, PHYSICS_STEP, RunKey,
-    SampleError, StepView, TrackAuditor, simulate,
+    Arm, ControllerFactory, Happening, Lead, MarginsNow, NoObserver, Observer, RunKey, SampleError, StepView,
+    TrackAuditor, simulate,
 };

@@ -2,6 +2,7 @@
 
 use closecall_controllers::Reason;
 use closecall_traffic::geometry::BoxSide;
+pub use closecall_traffic::metrics::CRITICAL_THW_S;
 use closecall_traffic::{Absent, ActorId, Measured, Parameters, Time};
 use serde::{Deserialize, Serialize};
 
@@ -36,9 +37,6 @@ pub enum Phase {
     /// The rear vehicle has passed the ego.
     After,
 }
-
-/// Rear time headway below which an encounter is critical (s) (the paper's threshold for THW).
-pub const CRITICAL_THW_S: f64 = 0.9;
 
 /// The first contact of two vehicles.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

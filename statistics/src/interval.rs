@@ -48,6 +48,9 @@ pub fn lower_bound(hits: u64, samples: u64, confidence: f64) -> f64 {
     bisect(0.0, estimate, |p| at_least(hits, samples, p) < error).low
 }
 
+/// Coverage of the reported intervals: the least share of repetitions in which they contain the true probability.
+pub const COVERAGE: f64 = 0.95;
+
 /// Returns the two-sided interval \[lower bound, upper bound\]. Each side has an error probability of half of
 /// 1 − `confidence`.
 pub fn clopper_pearson(hits: u64, samples: u64, confidence: f64) -> [f64; 2] {

@@ -6,17 +6,23 @@
 //! ```
 //!
 //! * [`binomial`]: probabilities of the binomial distribution, accurate to the last few bits
+//! * [`format`](mod@format): shares as text
 //! * [`interval`]: exact bounds of a probability for a number of samples that is fixed in advance
 //! * [`sequence`]: bounds of a probability that hold at every number of samples at once, and may be inspected at any time
 //! * [`needed`]: the number of samples that a bound needs
 //! * [`mcnemar`]: whether two arms differ on the same samples
+//! * [`quantiles`]: quantiles of sorted values, and the distribution that they define
+//! * [`normal`]: the truncated normal distribution
 //!
-//! All methods assume independent, identically distributed samples, as in the random sampling design.
+//! All methods for probabilities assume independent, identically distributed samples, as in the random sampling design.
 
 pub mod binomial;
+pub mod format;
 pub mod interval;
 pub mod mcnemar;
 pub mod needed;
+pub mod normal;
+pub mod quantiles;
 pub mod sequence;
 
 #[cfg(test)]

@@ -21,6 +21,7 @@ mod paper_figure;
 mod perception;
 mod readme;
 mod reenact;
+mod references;
 mod reports;
 mod rerun_files;
 mod statistics;

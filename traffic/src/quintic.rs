@@ -1,9 +1,21 @@
 //! Quintic polynomials: smooth transitions between two states.
 
+/// Peak of the second derivative of the minimum-jerk path, 10/√3: on a lane change by `width` within `duration`, the
+/// lateral acceleration peaks at 5.77·width/duration².
+pub const MINIMUM_JERK_PEAK: f64 = 5.773_502_691_896_258;
+
+/// Returns the share of a minimum-jerk path that is covered at the share `u` of its length: 10u³ − 15u⁴ + 6u⁵.
+///
+/// Arguments below 0 and above 1 are taken as 0 and 1. Source: Flash and Hogan, *Journal of Neuroscience* 5 (1985)
+/// 1688–1703.
+pub fn minimum_jerk(u: f64) -> f64 {
+    let u = u.clamp(0.0, 1.0);
+    u * u * u * (10.0 + u * (6.0 * u - 15.0))
+}
+
 /// A quintic polynomial between two states, each with value, first and second derivative.
 ///
-/// If all derivatives at both ends are 0, it is the minimum-jerk path 10p³ − 15p⁴ + 6p⁵ (Flash and Hogan, *Journal of
-/// Neuroscience* 5 (1985) 1688–1703).
+/// If all derivatives at both ends are 0, it is the minimum-jerk path, like [`minimum_jerk`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quintic {
     length: f64,
@@ -58,11 +70,18 @@ mod tests {
     #[test]
     fn with_zero_derivatives_it_is_the_minimum_jerk_path() {
         let path = Quintic::between([-5.625, 0.0, 0.0], [-1.875, 0.0, 0.0], 150.0);
+        for step in 0..=10 {
+            let u = f64::from(step) / 10.0;
+            assert!((path.at(150.0 * u)[0] - (-5.625 + 3.75 * minimum_jerk(u))).abs() < 1e-12);
+        }
         let [middle, slope, bend] = path.at(75.0);
         assert!((middle + 3.75).abs() < 1e-12);
         // The slope in the middle is 15/8 of the mean slope.
         assert!((slope - 1.875 * 3.75 / 150.0).abs() < 1e-12);
         assert!(bend.abs() < 1e-12);
+        // The second derivative peaks at u = (3 − √3)/6.
+        let peak = path.at(150.0 * (3.0 - 3.0_f64.sqrt()) / 6.0)[2];
+        assert!((peak - MINIMUM_JERK_PEAK * 3.75 / (150.0 * 150.0)).abs() < 1e-15);
     }
 
     proptest! {

@@ -27,6 +27,17 @@ pub enum Side {
     Right,
 }
 
+impl Side {
+    /// Returns the opposite side.
+    #[must_use]
+    pub const fn opposite(self) -> Self {
+        match self {
+            Self::Left => Self::Right,
+            Self::Right => Self::Left,
+        }
+    }
+}
+
 /// The number of a lane, counted from 1 at the left.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(transparent)]
@@ -142,10 +153,7 @@ impl Road {
     /// former last lane. Returns `None` for a curved road, because positions are measured along its left edge, which is
     /// the right edge of the mirror image.
     pub fn mirrored(self) -> Option<Self> {
-        let overtaking_side = match self.overtaking_side {
-            Side::Left => Side::Right,
-            Side::Right => Side::Left,
-        };
+        let overtaking_side = self.overtaking_side.opposite();
         (self.curvature_per_m == 0.0).then_some(Self { overtaking_side, ..self })
     }
 

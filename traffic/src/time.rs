@@ -42,7 +42,7 @@ impl Time {
     }
 
     /// Returns the time in seconds, for formulas and output.
-    pub fn s(self) -> f64 {
+    pub const fn s(self) -> f64 {
         self.0 as f64 / NS_PER_S
     }
 

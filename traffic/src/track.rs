@@ -39,6 +39,8 @@ pub enum TrackStatus {
 pub struct ClassScores(pub [f64; 4]);
 
 impl ClassScores {
+    /// Index of the background's score; those of the vehicle classes have the numbers of [`VehicleClass`] as indices.
+    pub const BACKGROUND: usize = VehicleClass::ALL.len();
     /// The scores if nothing is known: all equal.
     pub const UNKNOWN: Self = Self([0.25; 4]);
 
@@ -51,7 +53,7 @@ impl ClassScores {
 
     /// Returns the probability that the object is a vehicle of any class.
     pub fn vehicle(&self) -> f64 {
-        1.0 - self.0[3]
+        1.0 - self.0[Self::BACKGROUND]
     }
 
     /// Returns the most probable vehicle class, whatever the score of the background.

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Check, Choice, ConfigError, Num, Parameters, Range};
+use crate::{Check, Choice, ConfigError, Num, Parameters, Range, Side};
 
 /// The class of a vehicle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
@@ -177,6 +177,27 @@ pub enum Indicator {
     Left,
     /// Blinking to the right.
     Right,
+}
+
+impl Indicator {
+    /// Returns the indicator of a lane change to `side`.
+    #[must_use]
+    pub const fn towards(side: Side) -> Self {
+        match side {
+            Side::Left => Self::Left,
+            Side::Right => Self::Right,
+        }
+    }
+
+    /// Returns the same indicator in a mirror image: left and right are exchanged.
+    #[must_use]
+    pub const fn mirrored(self) -> Self {
+        match self {
+            Self::Left => Self::Right,
+            Self::Right => Self::Left,
+            Self::Off => Self::Off,
+        }
+    }
 }
 
 /// The position and motion of a vehicle in the road frame. The reference point is the centre of its box.

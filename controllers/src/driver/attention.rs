@@ -1,38 +1,39 @@
-//! Lapses of attention: a driver who looks away sees nothing new, and believes that all goes on as it did.
+//! Lapses of attention: a driver who looks away observes nothing new, and assumes that traffic continues unchanged.
 //!
-//! Glances away from the road of more than 2 s double the risk of a crash (Klauer et al., *The Impact of Driver Inattention
-//! on Near-Crash/Crash Risk*, DOT HS 810 594, 2006). A lapse is an event of its own: at a time that the scenario
-//! samples, or at random with a mean time between, drawn from the driver's own stream.
+//! Glances away from the road of more than 2 s double the risk of a crash (Klauer et al., *The Impact of Driver
+//! Inattention on Near-Crash/Crash Risk*, DOT HS 810 594, 2006). A lapse does not depend on the traffic: it begins at a
+//! time that the scenario gives, or at random times with a given mean interval, drawn from the driver's own random
+//! stream.
 
 use closecall_traffic::{Check, ConfigError, Num, Parameters, Problem, Range, Stream, Time};
 use rand::RngExt;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Longest lapse [s].
-const LONGEST_LAPSE_S: f64 = 30.0;
+/// Longest duration of a lapse (s).
+const MAX_LAPSE_S: f64 = 30.0;
 
-/// Lapses of attention as a scenario file describes them: one of `at-s` and `every-s`.
+/// Lapses of attention as a scenario file describes them. Exactly one of `at-s` and `every-s` is given.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct LapseConfig {
-    /// The time at which the driver looks away, once [s].
+    /// Time at which the driver looks away, once (s).
     pub at_s: Option<Num>,
-    /// The mean time between two random lapses [s].
+    /// Mean time from the end of one random lapse to the start of the next (s).
     pub every_s: Option<Num>,
-    /// How long the driver looks away [s].
+    /// Duration for which the driver looks away (s).
     pub duration_s: Num,
 }
 
 /// Checked lapses of attention.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lapse {
-    when: When,
+    timing: LapseTiming,
     duration_s: f64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum When {
+enum LapseTiming {
     Once { at_s: f64 },
     AtRandom { every_s: f64 },
 }
@@ -42,9 +43,11 @@ impl Check for LapseConfig {
 
     fn check(&self, parameters: &Parameters) -> Result<Lapse, ConfigError> {
         let number = |num, key, range| parameters.number(num, key, range).map_err(|error| error.within("lapse"));
-        let when = match (&self.at_s, &self.every_s) {
-            (Some(at), None) => When::Once { at_s: number(at, "at-s", Range::closed(0.0, 3_600.0))? },
-            (None, Some(every)) => When::AtRandom { every_s: number(every, "every-s", Range::closed(0.1, 3_600.0))? },
+        let timing = match (&self.at_s, &self.every_s) {
+            (Some(at), None) => LapseTiming::Once { at_s: number(at, "at-s", Range::closed(0.0, 3_600.0))? },
+            (None, Some(every)) => {
+                LapseTiming::AtRandom { every_s: number(every, "every-s", Range::closed(0.1, 3_600.0))? }
+            }
             (Some(_), Some(_)) => {
                 let rule = "only one of the two may be given".to_owned();
                 let problem = Problem::Contradiction { other: "every-s", rule };
@@ -55,12 +58,13 @@ impl Check for LapseConfig {
                 return Err(ConfigError::new("at-s", Problem::Missing { needed }).within("lapse"));
             }
         };
-        let duration_s = number(&self.duration_s, "duration-s", Range::closed(0.0, LONGEST_LAPSE_S))?;
-        Ok(Lapse { when, duration_s })
+        let duration_s = number(&self.duration_s, "duration-s", Range::closed(0.0, MAX_LAPSE_S))?;
+        Ok(Lapse { timing, duration_s })
     }
 }
 
-/// Checks lapses, which need a driver who perceives: one with a reaction time.
+/// Checks the lapses of a driver. They need a driver with a reaction time (`perceives`): a driver without one uses the
+/// true state of traffic at each step.
 pub(crate) fn check_lapse(
     lapse: Option<&LapseConfig>,
     perceives: bool,
@@ -75,11 +79,11 @@ pub(crate) fn check_lapse(
     }
 }
 
-/// One driver's attention in the course of a run.
+/// State of one driver's attention during a run.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Attention {
     lapse: Option<Lapse>,
-    /// Begin and end of the present or next lapse, once it is known.
+    /// Start and end of the present or next lapse; `None` until it is drawn.
     next: Option<(Time, Time)>,
 }
 
@@ -88,11 +92,11 @@ impl Attention {
         Self { lapse, next: None }
     }
 
-    /// True while the driver looks away.
-    pub(crate) fn is_away(&mut self, now: Time, rng: &mut Stream) -> bool {
+    /// Returns true while the driver looks away.
+    pub(crate) fn is_looking_away(&mut self, now: Time, rng: &mut Stream) -> bool {
         let Some(lapse) = self.lapse else { return false };
         let (begin, end) = *self.next.get_or_insert_with(|| lapse.after(now, rng));
-        if now >= end && matches!(lapse.when, When::AtRandom { .. }) {
+        if now >= end && matches!(lapse.timing, LapseTiming::AtRandom { .. }) {
             self.next = Some(lapse.after(now, rng));
             return false;
         }
@@ -101,12 +105,12 @@ impl Attention {
 }
 
 impl Lapse {
-    /// Begin and end of the next lapse, seen from `now`.
+    /// Returns the start and end of the next lapse after `now`.
     fn after(&self, now: Time, rng: &mut Stream) -> (Time, Time) {
-        let begin = match self.when {
-            When::Once { at_s } => Time::from_s(at_s),
-            // The times between events that come at random are exponential; 1 − u is never 0.
-            When::AtRandom { every_s } => now + Time::from_s(-every_s * (1.0 - rng.random::<f64>()).ln()),
+        let begin = match self.timing {
+            LapseTiming::Once { at_s } => Time::from_s(at_s),
+            // The intervals of a Poisson process are exponential. The argument 1 − u is never 0.
+            LapseTiming::AtRandom { every_s } => now + Time::from_s(-every_s * (1.0 - rng.random::<f64>()).ln()),
         };
         (begin, begin + Time::from_s(self.duration_s))
     }
@@ -114,7 +118,7 @@ impl Lapse {
 
 #[cfg(test)]
 mod tests {
-    use closecall_traffic::{ActorId, stream};
+    use closecall_traffic::{ActorId, PHYSICS_STEP, stream};
 
     use super::*;
 
@@ -123,32 +127,32 @@ mod tests {
         let mut rng = stream(0, 0, &ActorId::new("rear").unwrap(), "driver");
         let (mut now, mut steps, mut first) = (Time::ZERO, 0.0, None);
         while now < Time::from_s(until_s) {
-            if attention.is_away(now, &mut rng) {
+            if attention.is_looking_away(now, &mut rng) {
                 steps += 1.0;
                 first = first.or(Some(now));
             }
-            now += Time::from_ms(10);
+            now += PHYSICS_STEP;
         }
-        (0.01 * steps, first)
+        (PHYSICS_STEP.s() * steps, first)
     }
 
     #[test]
-    fn one_lapse_begins_and_ends_when_it_is_asked_to() {
+    fn a_single_lapse_begins_and_ends_at_the_given_times() {
         let config = LapseConfig { at_s: Some(3.0.into()), every_s: None, duration_s: 1.5.into() };
         let (away_s, first) = away_s(&config, 60.0);
         assert!((away_s - 1.5).abs() < 1e-9 && first == Some(Time::from_s(3.0)), "{away_s} {first:?}");
     }
 
     #[test]
-    fn random_lapses_take_the_share_of_time_that_their_rate_says() {
+    fn random_lapses_take_the_expected_share_of_time() {
         let config = LapseConfig { at_s: None, every_s: Some(8.0.into()), duration_s: 2.0.into() };
         let (away_s, _) = away_s(&config, 20_000.0);
-        // 2,000 lapses: the share 2/(8 + 2) is met within 3 standard deviations of 2 %.
+        // 2,000 lapses: the share is 2/(8 + 2) within 3 standard deviations of 2 % each.
         assert!((away_s / 20_000.0 - 0.2).abs() < 0.012, "{away_s}");
     }
 
     #[test]
-    fn exactly_one_time_is_needed_and_a_driver_who_perceives() {
+    fn lapses_need_exactly_one_timing_and_a_driver_with_a_reaction_time() {
         let none = Parameters::default();
         let config = LapseConfig { at_s: None, every_s: None, duration_s: 2.0.into() };
         assert_eq!(config.check(&none).unwrap_err().path.to_string(), "lapse.at-s");

@@ -1,139 +1,142 @@
-//! The boundary between human drivers and the loop.
+//! The interface between human drivers and the simulation loop.
 //!
-//! A driver is given the truth about the vehicles around; perceiving it late and imperfectly is the driver's own part.
+//! The loop gives a driver the true state of the surrounding vehicles. The driver itself models how a human perceives
+//! that state: with a delay and imprecisely.
 
 use closecall_traffic::{Indicator, Lane, Road, Stream, Time, Vehicle, VehicleClass, VehicleState};
 
 /// Another vehicle near a driver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Neighbour {
-    /// Its place in the scenario's list of actors.
+    /// Index in the scenario's list of actors.
     pub actor: usize,
-    /// Gap bumper to bumper [m]: ahead of or behind the driver; negative where the two overlap lengthwise.
+    /// Bumper-to-bumper gap to the driver's vehicle, ahead or behind (m). Negative if the two overlap longitudinally.
     pub gap_m: f64,
-    /// Its speed along the road [m/s].
+    /// Speed along the road (m/s).
     pub speed_mps: f64,
-    /// Its acceleration [m/s²].
+    /// Acceleration (m/s²).
     pub acceleration_mps2: f64,
-    /// True while its brake light is on.
+    /// True while the brake light is on.
     pub brake_light: bool,
-    /// Its direction indicator.
+    /// Direction indicator.
     pub indicator: Indicator,
-    /// Its kind.
+    /// Vehicle class.
     pub class: VehicleClass,
-    /// Its length [m].
+    /// Length (m).
     pub length_m: f64,
-    /// Its width [m].
+    /// Width (m).
     pub width_m: f64,
-    /// Its lateral position minus the driver's, positive to the left [m].
+    /// Lateral position relative to the driver's vehicle, positive to the left (m).
     pub lateral_offset_m: f64,
 }
 
-/// The vehicles nearest to a driver within one lane. A vehicle is in every lane that its box overlaps.
+/// The vehicles nearest to a driver in one lane. A vehicle counts as being in each lane that its box overlaps.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LaneNeighbours {
-    /// The nearest wholly ahead.
+    /// The nearest vehicle that is entirely ahead.
     pub lead: Option<Neighbour>,
-    /// The nearest wholly behind.
+    /// The nearest vehicle that is entirely behind.
     pub follower: Option<Neighbour>,
-    /// One that overlaps the driver lengthwise.
+    /// A vehicle that overlaps the driver's vehicle longitudinally.
     pub alongside: Option<Neighbour>,
 }
 
-/// The vehicles around a driver.
+/// The vehicles that surround a driver.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Neighbours {
-    /// In the lane that the driver's centre is in.
+    /// In the lane that contains the centre of the driver's vehicle.
     pub own: LaneNeighbours,
-    /// In the lane to the left, where there is one.
+    /// In the lane to the left; `None` if there is no such lane.
     pub left: Option<LaneNeighbours>,
-    /// In the lane to the right, where there is one.
+    /// In the lane to the right; `None` if there is no such lane.
     pub right: Option<LaneNeighbours>,
-    /// The nearest ahead, in any lane, whose box overlaps the driver's own width: what would be hit by driving on.
+    /// The nearest vehicle ahead in any lane whose box overlaps the driver's vehicle laterally: driving straight on
+    /// would hit it.
     pub in_path: Option<Neighbour>,
 }
 
-/// What a human driver is given at each physics step.
+/// The input of a human driver at one physics step.
 #[derive(Clone, Copy, Debug)]
 pub struct DriverInput<'a> {
-    /// The time of this step.
+    /// Time of this step.
     pub time: Time,
     /// The driver's own vehicle.
     pub vehicle: &'a Vehicle,
-    /// Its state.
+    /// State of that vehicle.
     pub own: &'a VehicleState,
-    /// The vehicles around, as they truly are now.
+    /// The surrounding vehicles in their true present state.
     pub neighbours: &'a Neighbours,
     /// The road.
     pub road: &'a Road,
-    /// The lane change under way, if any: its target.
+    /// Target lane of the lane change in progress; `None` if there is none.
     pub changing_to: Option<Lane>,
-    /// How far weaving has carried the vehicle beside the path that the driver means to take, positive to the left [m].
+    /// Lateral deviation from the intended path due to weaving, positive to the left (m).
     pub lateral_deviation_m: f64,
-    /// By how much the speed that the driver wants now differs from the one that it wants in the long run [m/s].
+    /// Present desired speed minus the long-term desired speed (m/s).
     pub desired_speed_offset_mps: f64,
 }
 
 impl DriverInput<'_> {
-    /// The speed wanted now by a driver who wants `usual_mps` in the long run: never less than half of that [m/s].
-    pub(crate) fn desired_now_mps(&self, usual_mps: f64) -> f64 {
-        (usual_mps + self.desired_speed_offset_mps).max(0.5 * usual_mps)
+    /// Returns the present desired speed of a driver with the long-term desired speed `long_term_mps` (m/s). It is at
+    /// least half of the long-term one.
+    pub(crate) fn desired_now_mps(&self, long_term_mps: f64) -> f64 {
+        (long_term_mps + self.desired_speed_offset_mps).max(0.5 * long_term_mps)
     }
 }
 
-/// A lane change to begin now. The plant follows a smooth path to the target lane's centre.
+/// A command to begin a lane change now. The plant follows a smooth path to the centre of the target lane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LaneChange {
-    /// The lane to change to.
+    /// Target lane.
     pub target: Lane,
-    /// Time that the whole path takes at the present speed [s].
+    /// Duration of the whole lane change at the present speed (s).
     pub duration_s: f64,
 }
 
-/// What a human driver does.
+/// The output of a human driver at one physics step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DriverAction {
-    /// Acceleration asked of the vehicle [m/s²]; must be finite.
+    /// Commanded acceleration (m/s²); must be finite.
     pub acceleration_mps2: f64,
-    /// A lane change to begin, or to be directed elsewhere (an abort is a change back).
+    /// A lane change to begin, or a new target for the one in progress (an abort is a lane change back).
     pub lane_change: Option<LaneChange>,
-    /// The direction indicator.
+    /// Direction indicator to show.
     pub indicator: Indicator,
-    /// Something that an event of the scenario or the log may want to know.
+    /// A milestone in the driver's manoeuvre, for scenario events and the log.
     pub note: Option<DriverNote>,
 }
 
-/// A moment in a driver's plan.
+/// A milestone in a driver's manoeuvre.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DriverNote {
-    /// The driver decided to overtake and begins to change lanes.
+    /// The driver begins a lane change, for example in order to overtake.
     CutOutStarted,
-    /// The driver gave up the lane change and steers back.
+    /// The driver aborts the lane change and steers back.
     CutOutAborted,
-    /// The driver has passed the vehicle it overtook.
+    /// The driver has passed the overtaken vehicle.
     Passed,
-    /// The driver brakes as hard as possible.
+    /// The driver begins to brake in an emergency.
     EmergencyBraking,
 }
 
-/// A driver that failed. Its state is undefined afterwards; the run ends as an error.
+/// Error of a driver. The driver's state is undefined afterwards; the run ends as an error.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DriverError {
-    /// A number that has to be finite was not.
+    /// A quantity is infinite or NaN.
     #[error("failed to drive: {what} is not finite at {time}")]
     NotFinite {
-        /// The quantity.
+        /// Name of the quantity.
         what: &'static str,
-        /// When.
+        /// Time of the step that failed.
         time: Time,
     },
 }
 
-/// A human driver: called once for each physics step (100 Hz), in order of time.
+/// A human driver. The loop calls it once per physics step (100 Hz), in order of time.
 pub trait Driver: Send {
-    /// The action for the time until the next physics step.
+    /// Returns the action that holds until the next physics step.
     ///
     /// # Errors
-    /// [`DriverError`] where no action could be worked out.
+    /// Returns a [`DriverError`] if the input or the computed action is not finite.
     fn step(&mut self, input: &DriverInput<'_>, rng: &mut Stream) -> Result<DriverAction, DriverError>;
 }

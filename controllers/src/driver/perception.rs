@@ -1,146 +1,150 @@
-//! What a human driver perceives: late, and coarser than the truth.
+//! What a human driver perceives: the surroundings with a delay, and less precisely than they are.
 //!
 //! ```text
-//!   truth ─▶ memory of glances ─▶ the glance one reaction time ago ─▶ looming threshold ─▶ carried to now ─▶ Lead
-//!            (≤ 100 Hz, 3 s)                                          brake light          (own motion known)
+//!   truth ─▶ memory of observations ─▶ one reaction time ago ─▶ looming threshold ─▶ extrapolated to now ─▶ Lead
+//!            (≤ 100 Hz, 3 s)                                    brake light          (own motion known)
 //! ```
 //!
-//! - *Late.* Everything outside is known as it was one reaction time ago. Drivers make up for part of that delay: they
-//!   know their own motion at once, and expect the others to go on as they seem to (temporal anticipation; Treiber,
-//!   Kesting and Helbing, *Delays, inaccuracies and anticipation in microscopic traffic models*, Physica A 360 (2006)
-//!   71–88). What comes late is a change in how the others drive.
-//! - *Coarse.* A speed difference is noticed only where the visual angle of the vehicle ahead grows or shrinks faster
-//!   than 0.003 rad/s (Hoffmann and Mortimer, *Scaling of relative velocity between vehicles*, Accident Analysis and
-//!   Prevention 28 (1996) 415–421). Below that the vehicle ahead seems to go on as it did, at first at one's own speed;
-//!   what one's own accelerator and brake change is known. Once noticed, the difference is watched, and lost from sight
-//!   only below 0.0006 rad/s, the mean threshold of drivers who attend to it (Michaels, *Perceptual factors in car
-//!   following*, Proc. 2nd Int. Symp. on the Theory of Road Traffic Flow, 1963).
-//! - *Brake light first.* The brake light is seen with the same delay as everything else. The deceleration itself is
-//!   only felt gradually, from the change of speed; until then a driver who sees the light go on assumes a moderate one.
+//! - *Delay.* The driver knows the surroundings as they were one reaction time ago. Drivers compensate for part of that
+//!   delay: they know their own motion at once, and assume that other vehicles continue as perceived (temporal
+//!   anticipation; Treiber, Kesting and Helbing, *Delays, inaccuracies and anticipation in microscopic traffic models*,
+//!   Physica A 360 (2006) 71–88). Only a change in the motion of another vehicle is perceived late.
+//! - *Looming threshold.* A driver notices a speed difference only if the visual angle of the vehicle ahead changes
+//!   faster than 0.003 rad/s (Hoffmann and Mortimer, *Scaling of relative velocity between vehicles*, Accident Analysis
+//!   and Prevention 28 (1996) 415–421). Below that threshold, the driver assumes that the vehicle ahead keeps the
+//!   speed last noticed, initially the driver's own speed. The driver always knows the effect of its own accelerator
+//!   and brake. Once noticed, the difference is attended to until it falls below 0.0006 rad/s, the mean threshold of
+//!   drivers who attend to it (Michaels, *Perceptual factors in car following*, Proc. 2nd Int. Symp. on the Theory of
+//!   Road Traffic Flow, 1963).
+//! - *Brake light.* The brake light is perceived with the same delay as everything else. The deceleration itself is
+//!   perceived only gradually, from the change of speed. Until then, a driver who sees the brake light go on assumes a
+//!   moderate deceleration.
 
-use closecall_traffic::{Lane, Side, Stream, Time};
+use closecall_traffic::{Lane, PHYSICS_STEP, Side, Stream, Time};
 
 use super::attention::{Attention, Lapse};
-use super::reaction::LONGEST_REACTION_S;
+use super::reaction::MAX_REACTION_S;
 use super::{DriverInput, LaneNeighbours, Lead, Neighbour};
 
-/// Slowest growth of the visual angle that is noticed [rad/s] (Hoffmann and Mortimer 1996).
+/// Slowest change of the visual angle that a driver notices (rad/s) (Hoffmann and Mortimer 1996).
 const LOOMING_THRESHOLD_RADPS: f64 = 0.003;
 
-/// Slowest growth that is noticed by a driver who has noticed the difference before, and watches it [rad/s] (Michaels 1963).
-const WATCHED_THRESHOLD_RADPS: f64 = 0.0006;
+/// Slowest change of the visual angle that is still noticed by a driver who already attends to it (rad/s) (Michaels
+/// 1963).
+const ATTENDED_THRESHOLD_RADPS: f64 = 0.0006;
 
-/// Time constant with which a deceleration is felt from the change of speed [s].
-const FEELING_TIME_S: f64 = 0.6;
+/// Time constant of the low-pass filter with which a deceleration is perceived from the change of speed (s).
+const ACCELERATION_TIME_CONSTANT_S: f64 = 0.6;
 
-/// Deceleration assumed when a brake light goes on ahead, before it is felt [m/s²]: an ordinary braking.
+/// Deceleration that a driver assumes when the brake light ahead goes on, before it is perceived (m/s²): an ordinary
+/// braking.
 const ASSUMED_BRAKING_MPS2: f64 = 2.0;
 
-/// How long a brake light stands for [`ASSUMED_BRAKING_MPS2`]; afterwards what is felt counts [s].
-const ASSUMED_BRAKING_FOR_S: f64 = 1.0;
+/// Time for which a brake light stands for [`ASSUMED_BRAKING_MPS2`] (s). Afterwards, the perceived deceleration counts.
+const ASSUMED_BRAKING_DURATION_S: f64 = 1.0;
 
-/// Shortest time between two remembered glances: physics at 100 Hz.
-const GLANCE_PERIOD: Time = Time::from_ms(10);
-
-/// Glances remembered: the longest reaction at 100 Hz, and one at either end.
+/// Number of stored observations: those within the longest reaction time, at most one in each physics step, plus one at
+/// either end.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive constant")]
-const GLANCES: usize = (LONGEST_REACTION_S * 100.0) as usize + 2;
+const MEMORY_CAPACITY: usize = (MAX_REACTION_S / PHYSICS_STEP.s()).round() as usize + 2;
 
-/// Another vehicle as it was at a glance.
+/// State of another vehicle at the time of an observation.
 #[derive(Clone, Copy, Debug)]
-struct Seen {
+struct ObservedVehicle {
     actor: u32,
     brake_light: bool,
     gap_m: f64,
     speed_mps: f64,
     acceleration_mps2: f64,
     width_m: f64,
-    /// Its lateral position on the road [m].
+    /// Lateral position on the road (m).
     d_m: f64,
 }
 
-/// What was seen at one moment.
+/// State of the surroundings at one time.
 #[derive(Clone, Copy, Debug)]
-struct Glance {
+struct Observation {
     time: Time,
     own_s_m: f64,
     own_speed_mps: f64,
     own_lane: Lane,
-    ahead: Option<Seen>,
-    /// The side that was looked to.
+    ahead: Option<ObservedVehicle>,
+    /// The side of the adjacent lane that was observed.
     side: Option<Side>,
-    beside: Option<[Option<Seen>; 3]>,
+    /// Lead vehicle, vehicle alongside and follower in that lane; `None` if there is no such lane.
+    adjacent: Option<[Option<ObservedVehicle>; 3]>,
 }
 
-/// A vehicle as the driver believes it to be now.
+/// A vehicle as the driver perceives it now.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Perceived {
-    /// Its place in the scenario's list of actors.
+pub(crate) struct PerceivedVehicle {
+    /// Index in the scenario's list of actors.
     pub(crate) actor: usize,
-    /// Gap, speed and acceleration as believed.
+    /// Perceived gap, speed and acceleration.
     pub(crate) lead: Lead,
-    /// True while its brake light seems to be on.
+    /// True while the driver perceives its brake light as on.
     pub(crate) brake_light: bool,
-    /// Its width [m].
+    /// Width (m).
     pub(crate) width_m: f64,
-    /// Its lateral position on the road [m].
+    /// Lateral position on the road (m).
     pub(crate) d_m: f64,
 }
 
-/// A lane beside as the driver believes it to be now.
+/// An adjacent lane as the driver perceives it now.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct PassingLane {
-    pub(crate) lead: Option<Perceived>,
+pub(crate) struct PerceivedLane {
+    pub(crate) lead: Option<PerceivedVehicle>,
     pub(crate) alongside: bool,
-    pub(crate) follower: Option<Perceived>,
+    pub(crate) follower: Option<PerceivedVehicle>,
 }
 
-/// Everything that the driver believes now.
+/// The surroundings as the driver perceives them now.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct View {
-    /// The nearest vehicle ahead, in the lane or in the way.
-    pub(crate) ahead: Option<Perceived>,
-    /// The lane on the side that the driver looked to, beside the lane that it was in; absent where there is none.
-    beside: Option<(Side, PassingLane)>,
-    /// The lane that the driver was in at the glance.
+pub(crate) struct PerceivedScene {
+    /// The nearest vehicle ahead, in the driver's lane or in its path.
+    pub(crate) ahead: Option<PerceivedVehicle>,
+    /// The observed side and the lane there, next to the driver's lane at the observation; `None` if there is none.
+    adjacent: Option<(Side, PerceivedLane)>,
+    /// The driver's lane at the observation.
     pub(crate) lane: Lane,
 }
 
-impl View {
-    /// The lane on `side`, where the driver has looked there.
-    pub(crate) fn beside(&self, side: Side) -> Option<&PassingLane> {
-        self.beside.as_ref().filter(|(looked_to, _)| *looked_to == side).map(|(_, lane)| lane)
+impl PerceivedScene {
+    /// Returns the adjacent lane on `side`, or `None` if the driver has not observed that side.
+    pub(crate) fn adjacent(&self, side: Side) -> Option<&PerceivedLane> {
+        self.adjacent.as_ref().filter(|(observed, _)| *observed == side).map(|(_, lane)| lane)
     }
 }
 
-/// The memory and the senses of one driver.
+/// The perception of one driver: memory, attention and estimates.
 #[derive(Clone, Debug)]
 pub(crate) struct Perception {
     reaction: Time,
     attention: Attention,
-    belief: Option<Belief>,
-    /// The side that the driver looks to, if any.
+    speed_estimate: Option<SpeedEstimate>,
+    /// The side whose adjacent lane the driver observes, if any.
     side: Option<Side>,
-    memory: Vec<Glance>,
-    /// Where the oldest glance lies once the memory is full.
+    /// Ring buffer of observations.
+    memory: Vec<Observation>,
+    /// Index of the oldest observation in `memory` once it is full.
     oldest: usize,
-    /// The glance in use, counted from the oldest.
+    /// Index of the observation in use, counted from the oldest.
     current: usize,
-    felt: Felt,
+    acceleration_estimate: AccelerationEstimate,
 }
 
-/// The speed that the vehicle ahead seems to have.
+/// Perceived speed of the vehicle ahead.
 #[derive(Clone, Copy, Debug)]
-struct Belief {
+struct SpeedEstimate {
     actor: u32,
     speed_mps: f64,
-    /// True while the difference to the own speed has been noticed, and is watched.
-    watches: bool,
+    /// True while the driver has noticed the difference to the own speed and attends to it.
+    attended: bool,
 }
 
-/// The deceleration of the vehicle ahead, as it is felt.
+/// Perceived acceleration of the vehicle ahead.
 #[derive(Clone, Copy, Debug)]
-struct Felt {
+struct AccelerationEstimate {
     actor: u32,
     acceleration_mps2: f64,
     light_on_for_s: f64,
@@ -148,131 +152,144 @@ struct Felt {
 }
 
 impl Perception {
-    /// Senses with a reaction time [s]; `side` is the side to look to beside the own lane, if any.
+    /// Creates the perception of a driver with the reaction time `reaction_s` (s). `side` is the side whose adjacent
+    /// lane the driver observes, if any.
     pub(crate) fn new(reaction_s: f64, side: Option<Side>) -> Self {
         Self {
             reaction: Time::from_s(reaction_s),
             attention: Attention::default(),
-            belief: None,
+            speed_estimate: None,
             side,
-            memory: Vec::with_capacity(GLANCES),
+            memory: Vec::with_capacity(MEMORY_CAPACITY),
             oldest: 0,
             current: 0,
-            felt: Felt { actor: u32::MAX, acceleration_mps2: 0.0, light_on_for_s: 0.0, time: Time::ZERO },
+            acceleration_estimate: AccelerationEstimate::new(u32::MAX, Time::ZERO),
         }
     }
 
-    /// The same senses, with lapses of attention.
+    /// Returns the same perception with lapses of attention.
     pub(crate) fn with_lapses(self, lapse: Option<Lapse>) -> Self {
         Self { attention: Attention::new(lapse), ..self }
     }
 
-    /// Looks to another side from now on.
-    pub(crate) fn look_to(&mut self, side: Side) {
+    /// Selects the side whose adjacent lane the driver observes from now on.
+    pub(crate) fn observe_side(&mut self, side: Side) {
         self.side = Some(side);
     }
 
-    /// Takes in the present moment, and returns what the driver believes.
-    pub(crate) fn look(&mut self, input: &DriverInput<'_>, rng: &mut Stream) -> View {
-        // Nobody begins to drive without a look.
-        if !self.attention.is_away(input.time, rng) || self.memory.is_empty() {
-            self.remember(input);
+    /// Stores an observation of the present, unless the driver looks away, and returns what the driver perceives now.
+    pub(crate) fn observe(&mut self, input: &DriverInput<'_>, rng: &mut Stream) -> PerceivedScene {
+        // The first step is always observed: without any observation there is nothing to extrapolate from.
+        if !self.attention.is_looking_away(input.time, rng) || self.memory.is_empty() {
+            self.store(input);
         }
         let due = input.time - self.reaction;
-        while self.current + 1 < self.memory.len() && self.glance(self.current + 1).time <= due {
+        while self.current + 1 < self.memory.len() && self.observation(self.current + 1).time <= due {
             self.current += 1;
         }
-        let glance = *self.glance(self.current);
-        let carry = Carry {
-            elapsed_s: (input.time - glance.time).s(),
-            own_travel_m: input.own.s_m - glance.own_s_m,
-            own_speed_then_mps: glance.own_speed_mps,
+        let observation = *self.observation(self.current);
+        let extrapolation = Extrapolation {
+            elapsed_s: (input.time - observation.time).s(),
+            own_travel_m: input.own.s_m - observation.own_s_m,
+            own_speed_then_mps: observation.own_speed_mps,
         };
-        let believed_mps2 = self.feel(glance.ahead.as_ref(), input.time);
-        let mut ahead = glance.ahead.map(|seen| carry.ahead(&seen, self.believe(&seen, glance.own_speed_mps)));
-        if glance.ahead.is_none() {
-            self.belief = None;
+        let perceived_mps2 = self.estimate_acceleration_mps2(observation.ahead.as_ref(), input.time);
+        let mut ahead = observation.ahead.map(|observed| {
+            extrapolation.ahead(&observed, self.estimate_speed_mps(&observed, observation.own_speed_mps))
+        });
+        if observation.ahead.is_none() {
+            self.speed_estimate = None;
         }
         if let Some(ahead) = &mut ahead {
             let lead = &mut ahead.lead;
-            lead.gap_m += strayed_m(lead.speed_mps, self.felt.acceleration_mps2, carry.elapsed_s);
-            lead.speed_mps = (lead.speed_mps + self.felt.acceleration_mps2 * carry.elapsed_s).max(0.0);
-            lead.acceleration_mps2 = believed_mps2;
+            let estimated_mps2 = self.acceleration_estimate.acceleration_mps2;
+            lead.gap_m += accelerated_displacement_m(lead.speed_mps, estimated_mps2, extrapolation.elapsed_s);
+            lead.speed_mps = (lead.speed_mps + estimated_mps2 * extrapolation.elapsed_s).max(0.0);
+            lead.acceleration_mps2 = perceived_mps2;
         }
-        let beside = glance.side.zip(glance.beside).map(|(side, [lead, alongside, follower])| {
-            let lane = PassingLane {
-                lead: lead.map(|seen| carry.ahead(&seen, carry.at_a_glance_mps(&seen))),
+        let adjacent = observation.side.zip(observation.adjacent).map(|(side, [lead, alongside, follower])| {
+            let lane = PerceivedLane {
+                lead: lead.map(|observed| extrapolation.ahead(&observed, extrapolation.adjacent_speed_mps(&observed))),
                 alongside: alongside.is_some(),
-                follower: follower.map(|seen| carry.behind(&seen)),
+                follower: follower.map(|observed| extrapolation.behind(&observed)),
             };
             (side, lane)
         });
-        View { ahead, beside, lane: glance.own_lane }
+        PerceivedScene { ahead, adjacent, lane: observation.own_lane }
     }
 
-    fn glance(&self, place: usize) -> &Glance {
-        &self.memory[(self.oldest + place) % self.memory.len()]
+    /// Returns the stored observation at `index`, counted from the oldest.
+    fn observation(&self, index: usize) -> &Observation {
+        &self.memory[(self.oldest + index) % self.memory.len()]
     }
 
-    fn remember(&mut self, input: &DriverInput<'_>) {
+    fn store(&mut self, input: &DriverInput<'_>) {
         let length = self.memory.len();
-        if length > 0 && input.time - self.glance(length - 1).time < GLANCE_PERIOD {
+        if length > 0 && input.time - self.observation(length - 1).time < PHYSICS_STEP {
             return;
         }
-        let glance = Glance::of(input, self.side);
-        if length < GLANCES {
-            self.memory.push(glance);
+        let observation = Observation::of(input, self.side);
+        if length < MEMORY_CAPACITY {
+            self.memory.push(observation);
         } else {
-            self.memory[self.oldest] = glance;
-            self.oldest = (self.oldest + 1) % GLANCES;
+            self.memory[self.oldest] = observation;
+            self.oldest = (self.oldest + 1) % MEMORY_CAPACITY;
             self.current = self.current.saturating_sub(1);
         }
     }
 
-    /// The speed of the vehicle ahead as it seems [m/s].
-    fn believe(&mut self, seen: &Seen, own_mps: f64) -> f64 {
-        let known = self.belief.filter(|belief| belief.actor == seen.actor);
-        let Belief { speed_mps, watches, .. } =
-            known.unwrap_or(Belief { actor: seen.actor, speed_mps: own_mps, watches: false });
-        let threshold = if watches { WATCHED_THRESHOLD_RADPS } else { LOOMING_THRESHOLD_RADPS };
-        let watches = seen.growth_radps(own_mps) >= threshold;
-        // What is seen is also noticed where it is not what is expected.
-        let notices = watches || seen.growth_radps(speed_mps) >= LOOMING_THRESHOLD_RADPS;
-        let speed_mps = if notices { seen.speed_mps } else { speed_mps };
-        self.belief = Some(Belief { actor: seen.actor, speed_mps, watches });
+    /// Updates and returns the perceived speed of the vehicle ahead (m/s).
+    fn estimate_speed_mps(&mut self, observed: &ObservedVehicle, own_mps: f64) -> f64 {
+        let known = self.speed_estimate.filter(|estimate| estimate.actor == observed.actor);
+        let SpeedEstimate { speed_mps, attended, .. } =
+            known.unwrap_or(SpeedEstimate { actor: observed.actor, speed_mps: own_mps, attended: false });
+        let threshold = if attended { ATTENDED_THRESHOLD_RADPS } else { LOOMING_THRESHOLD_RADPS };
+        let attended = observed.visual_angle_rate_radps(own_mps) >= threshold;
+        // A driver also notices that the observed speed differs from the one assumed so far.
+        let notices = attended || observed.visual_angle_rate_radps(speed_mps) >= LOOMING_THRESHOLD_RADPS;
+        let speed_mps = if notices { observed.speed_mps } else { speed_mps };
+        self.speed_estimate = Some(SpeedEstimate { actor: observed.actor, speed_mps, attended });
         speed_mps
     }
 
-    /// The acceleration of the vehicle ahead as felt, or as its brake light makes one assume.
-    fn feel(&mut self, seen: Option<&Seen>, now: Time) -> f64 {
-        let Some(seen) = seen else {
-            self.felt.actor = u32::MAX;
+    /// Updates the perceived acceleration of the vehicle ahead and returns the one that the driver reckons with (m/s²):
+    /// the perceived one, or the one that the driver assumes because of the brake light.
+    fn estimate_acceleration_mps2(&mut self, observed: Option<&ObservedVehicle>, now: Time) -> f64 {
+        let estimate = &mut self.acceleration_estimate;
+        let Some(observed) = observed else {
+            estimate.actor = u32::MAX;
             return 0.0;
         };
-        let felt = &mut self.felt;
-        let step_s = (now - felt.time).s();
-        if seen.speed_mps <= 0.0 {
-            // That a vehicle stands is plain to see: it no longer brakes.
-            *felt = Felt { actor: seen.actor, acceleration_mps2: 0.0, light_on_for_s: 0.0, time: now };
+        let step_s = (now - estimate.time).s();
+        if observed.speed_mps <= 0.0 {
+            // A driver sees at once that a vehicle stands: it no longer brakes.
+            *estimate = AccelerationEstimate::new(observed.actor, now);
             return 0.0;
         }
-        if felt.actor == seen.actor {
-            let share = step_s / (FEELING_TIME_S + step_s);
-            felt.acceleration_mps2 += share * (seen.acceleration_mps2 - felt.acceleration_mps2);
-            felt.light_on_for_s = if seen.brake_light { felt.light_on_for_s + step_s } else { 0.0 };
+        if estimate.actor == observed.actor {
+            let share = step_s / (ACCELERATION_TIME_CONSTANT_S + step_s);
+            estimate.acceleration_mps2 += share * (observed.acceleration_mps2 - estimate.acceleration_mps2);
+            estimate.light_on_for_s = if observed.brake_light { estimate.light_on_for_s + step_s } else { 0.0 };
         } else {
-            *felt = Felt { actor: seen.actor, acceleration_mps2: 0.0, light_on_for_s: 0.0, time: now };
+            *estimate = AccelerationEstimate::new(observed.actor, now);
         }
-        felt.time = now;
-        if seen.brake_light && felt.light_on_for_s < ASSUMED_BRAKING_FOR_S {
-            felt.acceleration_mps2.min(-ASSUMED_BRAKING_MPS2)
+        estimate.time = now;
+        if observed.brake_light && estimate.light_on_for_s < ASSUMED_BRAKING_DURATION_S {
+            estimate.acceleration_mps2.min(-ASSUMED_BRAKING_MPS2)
         } else {
-            felt.acceleration_mps2
+            estimate.acceleration_mps2
         }
     }
 }
 
-impl Glance {
+impl AccelerationEstimate {
+    /// An estimate of zero for a vehicle first observed at `time`.
+    fn new(actor: u32, time: Time) -> Self {
+        Self { actor, acceleration_mps2: 0.0, light_on_for_s: 0.0, time }
+    }
+}
+
+impl Observation {
     fn of(input: &DriverInput<'_>, side: Option<Side>) -> Self {
         let near = input.neighbours;
         let own_d_m = input.own.d_m;
@@ -281,25 +298,26 @@ impl Glance {
             (Some(lead), _) => Some(lead),
             (None, in_path) => in_path,
         };
-        let beside: Option<&LaneNeighbours> = match side {
+        let adjacent: Option<&LaneNeighbours> = match side {
             Some(Side::Left) => near.left.as_ref(),
             Some(Side::Right) => near.right.as_ref(),
             None => None,
         };
-        let seen = |neighbour: &Neighbour| Seen::of(neighbour, own_d_m);
+        let observe = |neighbour: &Neighbour| ObservedVehicle::of(neighbour, own_d_m);
         Self {
             time: input.time,
             own_s_m: input.own.s_m,
             own_speed_mps: input.own.speed_mps,
             own_lane: input.road.lane_at(own_d_m),
-            ahead: nearer.map(seen),
+            ahead: nearer.map(observe),
             side,
-            beside: beside.map(|lane| [&lane.lead, &lane.alongside, &lane.follower].map(|n| n.as_ref().map(seen))),
+            adjacent: adjacent
+                .map(|lane| [&lane.lead, &lane.alongside, &lane.follower].map(|n| n.as_ref().map(observe))),
         }
     }
 }
 
-impl Seen {
+impl ObservedVehicle {
     fn of(neighbour: &Neighbour, own_d_m: f64) -> Self {
         Self {
             actor: u32::try_from(neighbour.actor).unwrap_or(u32::MAX - 1),
@@ -312,14 +330,16 @@ impl Seen {
         }
     }
 
-    /// How fast its visual angle grows or shrinks for one who drives at `own_mps` [rad/s]; infinite at a gap of zero.
-    fn growth_radps(&self, own_mps: f64) -> f64 {
+    /// Rate at which the vehicle's visual angle grows or shrinks, observed from a vehicle at `own_mps` (rad/s).
+    /// Infinite at a gap of zero.
+    fn visual_angle_rate_radps(&self, own_mps: f64) -> f64 {
         self.width_m * (self.speed_mps - own_mps).abs() / (self.gap_m * self.gap_m)
     }
 }
 
-/// How much further a vehicle comes in a time than it would at its speed, with an acceleration that ends where it stands [m].
-fn strayed_m(speed_mps: f64, acceleration_mps2: f64, time_s: f64) -> f64 {
+/// Displacement over `time_s` due to an acceleration, relative to motion at constant speed (m). A braking vehicle stops
+/// at standstill; it does not roll backwards.
+fn accelerated_displacement_m(speed_mps: f64, acceleration_mps2: f64, time_s: f64) -> f64 {
     if speed_mps + acceleration_mps2 * time_s >= 0.0 {
         0.5 * acceleration_mps2 * time_s * time_s
     } else {
@@ -327,37 +347,37 @@ fn strayed_m(speed_mps: f64, acceleration_mps2: f64, time_s: f64) -> f64 {
     }
 }
 
-/// Carries a glance over the reaction time to now.
-struct Carry {
+/// Extrapolates an observation over the reaction time to now.
+struct Extrapolation {
     elapsed_s: f64,
     own_travel_m: f64,
     own_speed_then_mps: f64,
 }
 
-impl Carry {
-    /// The speed of a vehicle beside, at which a look is too short to watch it: its own, or the driver's where no
-    /// difference was noticed [m/s].
-    fn at_a_glance_mps(&self, seen: &Seen) -> f64 {
-        let notices = seen.growth_radps(self.own_speed_then_mps) >= LOOMING_THRESHOLD_RADPS;
-        if notices { seen.speed_mps } else { self.own_speed_then_mps }
+impl Extrapolation {
+    /// Perceived speed of a vehicle in the adjacent lane (m/s): its own, or the driver's if no difference is noticed.
+    /// The driver looks there too briefly to attend to a difference.
+    fn adjacent_speed_mps(&self, observed: &ObservedVehicle) -> f64 {
+        let notices = observed.visual_angle_rate_radps(self.own_speed_then_mps) >= LOOMING_THRESHOLD_RADPS;
+        if notices { observed.speed_mps } else { self.own_speed_then_mps }
     }
 
-    fn ahead(&self, seen: &Seen, speed_mps: f64) -> Perceived {
-        self.perceived(seen, speed_mps, seen.gap_m + speed_mps * self.elapsed_s - self.own_travel_m)
+    fn ahead(&self, observed: &ObservedVehicle, speed_mps: f64) -> PerceivedVehicle {
+        self.perceived(observed, speed_mps, observed.gap_m + speed_mps * self.elapsed_s - self.own_travel_m)
     }
 
-    fn behind(&self, seen: &Seen) -> Perceived {
-        let speed_mps = self.at_a_glance_mps(seen);
-        self.perceived(seen, speed_mps, seen.gap_m + self.own_travel_m - speed_mps * self.elapsed_s)
+    fn behind(&self, observed: &ObservedVehicle) -> PerceivedVehicle {
+        let speed_mps = self.adjacent_speed_mps(observed);
+        self.perceived(observed, speed_mps, observed.gap_m + self.own_travel_m - speed_mps * self.elapsed_s)
     }
 
-    fn perceived(&self, seen: &Seen, speed_mps: f64, gap_m: f64) -> Perceived {
-        Perceived {
-            actor: seen.actor as usize,
+    fn perceived(&self, observed: &ObservedVehicle, speed_mps: f64, gap_m: f64) -> PerceivedVehicle {
+        PerceivedVehicle {
+            actor: observed.actor as usize,
             lead: Lead { gap_m, speed_mps, acceleration_mps2: 0.0 },
-            brake_light: seen.brake_light,
-            width_m: seen.width_m,
-            d_m: seen.d_m,
+            brake_light: observed.brake_light,
+            width_m: observed.width_m,
+            d_m: observed.d_m,
         }
     }
 }

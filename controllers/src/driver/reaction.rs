@@ -1,4 +1,4 @@
-//! A driver's reaction time: fixed, a parameter, or drawn once per run from the driver's own stream.
+//! Reaction time of a driver: a fixed value, a parameter, or drawn once per run from the driver's own random stream.
 //!
 //! Brake reaction times of unwarned drivers are log-normal, with medians from 0.7 s (expected) over 0.9 s to 1.3 s
 //! (surprised): Green, *How long does it take to stop?*, Transportation Human Factors 2 (2000) 195–216.
@@ -12,16 +12,16 @@ use serde::de::value::MapAccessDeserializer;
 use serde::de::{self, IntoDeserializer, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
-/// Longest reaction time [s]: the memory of perception is as long as that.
-pub(crate) const LONGEST_REACTION_S: f64 = 3.0;
+/// Longest reaction time (s). The memory of the perception has this length.
+pub(crate) const MAX_REACTION_S: f64 = 3.0;
 
-/// A log-normal distribution by its median and the standard deviation of its logarithm.
+/// A log-normal distribution, given by its median and the standard deviation of its logarithm.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct LogNormalConfig {
-    /// Median, above 0 and up to 3.
+    /// Median (s): above 0, at most 3.
     pub median: Num,
-    /// Standard deviation of the logarithm, 0 to 1.
+    /// Standard deviation of the logarithm: 0 to 1.
     pub sigma: Num,
 }
 
@@ -29,16 +29,16 @@ pub struct LogNormalConfig {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ReactionConfig {
-    /// Drawn once per run from the driver's own random stream.
+    /// A distribution from which the reaction time is drawn once per run.
     LogNormal(LogNormalConfig),
-    /// The value itself, or a parameter that gives it [s].
+    /// The value itself, or a parameter that gives it (s).
     #[serde(untagged)]
     Value(Num),
 }
 
 struct ReactionVisitor;
 
-/// The part of [`ReactionConfig`] that is a table.
+/// The variants of [`ReactionConfig`] that are written as a table.
 #[derive(Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 enum Drawn {
@@ -95,25 +95,25 @@ impl JsonSchema for ReactionConfig {
 /// A checked reaction time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reaction {
-    /// The same in every run [s]: 0 to 3.
+    /// The same value in every run (s): 0 to 3.
     Fixed(f64),
     /// Drawn once per run.
     LogNormal {
-        /// Median [s], above 0.
+        /// Median (s), above 0.
         median_s: f64,
-        /// Standard deviation of the logarithm, 0 or more.
+        /// Standard deviation of the logarithm, at least 0.
         sigma: f64,
     },
 }
 
 impl Reaction {
-    /// The reaction time of one driver in one run [s], never above 3 s.
-    pub fn draw(self, rng: &mut Stream) -> f64 {
+    /// Returns the reaction time of one driver in one run (s), at most 3 s.
+    pub fn draw_s(self, rng: &mut Stream) -> f64 {
         match self {
             Self::Fixed(value) => value,
             Self::LogNormal { median_s, sigma } => {
                 let normal: f64 = StandardNormal.sample(rng);
-                (median_s * (sigma * normal).exp()).min(LONGEST_REACTION_S)
+                (median_s * (sigma * normal).exp()).min(MAX_REACTION_S)
             }
         }
     }
@@ -125,14 +125,14 @@ impl Check for ReactionConfig {
     fn check(&self, parameters: &Parameters) -> Result<Reaction, ConfigError> {
         match self {
             Self::Value(num) => {
-                let value = parameters.number(num, "reaction-s", Range::closed(0.0, LONGEST_REACTION_S))?;
+                let value = parameters.number(num, "reaction-s", Range::closed(0.0, MAX_REACTION_S))?;
                 Ok(Reaction::Fixed(value))
             }
             Self::LogNormal(config) => {
-                let place = |error: ConfigError| error.within("log-normal").within("reaction-s");
-                let range = Range::above(0.0, LONGEST_REACTION_S);
-                let median_s = parameters.number(&config.median, "median", range).map_err(place)?;
-                let sigma = parameters.number(&config.sigma, "sigma", Range::UNIT).map_err(place)?;
+                let locate = |error: ConfigError| error.within("log-normal").within("reaction-s");
+                let range = Range::above(0.0, MAX_REACTION_S);
+                let median_s = parameters.number(&config.median, "median", range).map_err(locate)?;
+                let sigma = parameters.number(&config.sigma, "sigma", Range::UNIT).map_err(locate)?;
                 Ok(Reaction::LogNormal { median_s, sigma })
             }
         }
@@ -146,10 +146,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_drawn_reaction_has_the_median_asked_for() {
+    fn a_drawn_reaction_time_has_the_given_median() {
         let mut rng = stream(0, 0, &ActorId::new("rear").unwrap(), "driver");
         let reaction = Reaction::LogNormal { median_s: 0.9, sigma: 0.3 };
-        let mut drawn: Vec<f64> = (0..4001).map(|_| reaction.draw(&mut rng)).collect();
+        let mut drawn: Vec<f64> = (0..4001).map(|_| reaction.draw_s(&mut rng)).collect();
         drawn.sort_by(f64::total_cmp);
         assert!((drawn[2000] - 0.9).abs() < 0.02, "{}", drawn[2000]);
         // The 84th percentile of a log-normal lies one sigma above the median in the logarithm.
@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn out_of_range_names_the_key() {
+    fn an_error_names_the_key_that_is_out_of_range() {
         let none = Parameters::default();
         let error = ReactionConfig::Value(Num::Fixed(-0.1)).check(&none).unwrap_err();
         assert_eq!(error.path.to_string(), "reaction-s");

@@ -1,28 +1,29 @@
-//! Keeping a speed as humans do: the speed that they want wanders.
+//! Human speed keeping: the desired speed fluctuates around its long-term value.
 //!
-//! Herman, Montroll, Potts and Rothery (*Traffic Dynamics: Analysis of Stability in Car Following*, Operations Research 7
-//! (1959) 86–106) measured the scatter of the acceleration of free drivers, "acceleration noise", as about 0.1 m/s² on a
-//! good road. The wish is white noise behind three lags, the longest that of a driver who looks at the speedometer now
-//! and then. How nearly the vehicle follows it is the driver model's affair.
+//! Herman, Montroll, Potts and Rothery (*Traffic Dynamics: Analysis of Stability in Car Following*, Operations Research
+//! 7 (1959) 86–106) measured the standard deviation of the acceleration of free drivers, "acceleration noise", as about
+//! 0.1 m/s² on a good road. Here the desired speed is white noise filtered by three lags. The longest lag stands for a
+//! driver who checks the speedometer only occasionally. The driver model decides how closely the vehicle follows the
+//! desired speed.
 
 use closecall_traffic::{Check, ConfigError, Num, Parameters, Range, Stream, Time};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::drift::{Drift, derivative_sds};
+use super::smooth_noise::{SmoothNoise, derivative_sds};
 
-/// The lags of the wish [s].
+/// Lags of the desired speed (s).
 const LAGS_S: [f64; 3] = [10.0, 1.0, 1.0];
 
-/// How a driver keeps its speed, as a scenario file describes it.
+/// Speed keeping of a driver as a scenario file describes it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct SpeedKeepingConfig {
-    /// Standard deviation of the rate at which the wanted speed changes [m/s²], from 0 to 0.5; about 0.1 for humans.
+    /// Standard deviation of the rate of change of the desired speed (m/s²): 0 to 0.5; about 0.1 for humans.
     pub acceleration_noise_mps2: Num,
 }
 
-/// A checked way of keeping a speed.
+/// Checked speed keeping.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpeedKeeping {
     acceleration_noise_mps2: f64,
@@ -39,25 +40,25 @@ impl Check for SpeedKeepingConfig {
 }
 
 impl SpeedKeeping {
-    /// The wander of one run, nothing for a driver whose wish is steady.
+    /// Creates the fluctuation of one run, or `None` if the desired speed is constant.
     pub fn wander(&self, rng: Stream) -> Option<Wander> {
         let [rate_per_s, _] = derivative_sds(LAGS_S);
         let sd_mps = self.acceleration_noise_mps2 / rate_per_s;
-        (sd_mps > 0.0).then(|| Wander { drift: Drift::from_rest(sd_mps, LAGS_S, rng) })
+        (sd_mps > 0.0).then(|| Wander { noise: SmoothNoise::from_rest(sd_mps, LAGS_S, rng) })
     }
 }
 
-/// How the speed that one driver wants wanders in the course of a run. It starts at nothing: a scenario says how fast
-/// everybody is at its start.
+/// Generates the fluctuation of one driver's desired speed during a run. It starts at zero, because the scenario gives
+/// the initial speeds.
 #[derive(Clone, Debug)]
 pub struct Wander {
-    drift: Drift,
+    noise: SmoothNoise,
 }
 
 impl Wander {
-    /// What is to be added to the wanted speed at `time`, which never falls from call to call [m/s].
+    /// Returns the offset of the desired speed at `time`, which must not decrease from call to call (m/s).
     pub fn at(&mut self, time: Time) -> f64 {
-        let [offset_mps, ..] = self.drift.at(time.s());
+        let [offset_mps, ..] = self.noise.at(time.s());
         offset_mps
     }
 }
@@ -69,7 +70,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_wish_changes_as_fast_as_asked() {
+    fn the_rate_of_the_desired_speed_has_the_given_standard_deviation() {
         let config = SpeedKeepingConfig { acceleration_noise_mps2: 0.1.into() };
         let rng = stream(1, 0, &ActorId::new("rear").unwrap(), "speed-keeping");
         let mut wander = config.check(&Parameters::default()).unwrap().wander(rng).unwrap();

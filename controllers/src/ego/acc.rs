@@ -12,7 +12,7 @@
 //! faster than a few metres per second.
 //!
 //! If the lead vehicle brakes so that the ego will need more than light constant braking, the ego begins with that
-//! braking at once ([`Behind`]). The stop then has the lowest peak deceleration, and the vehicles behind see the brake
+//! braking at once ([`Front::required_braking_mps2`]). The stop then has the lowest peak deceleration, and the vehicles behind see the brake
 //! light early.
 
 use closecall_traffic::{Check, ConfigError, Num, Parameters, Range};
@@ -20,7 +20,6 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::surroundings::Front;
-use crate::braking::Behind;
 
 /// λ: allowed closing speed per metre of gap error near the desired gap (1/s).
 const ALLOWED_CLOSING_PER_M: f64 = 0.3;
@@ -105,26 +104,13 @@ impl Acc {
             let slower = (allowed_mps + opening_mps) / time_s;
             let faster = (allowed_mps.min(MAX_CLOSING_UP_MPS) + opening_mps) / time_s;
             desired = desired.min(if slower < 0.0 { slower } else { faster.max(0.0) });
-            let required = self.required_mps2(speed_mps, lead);
+            let required = lead.required_braking_mps2(speed_mps, self.standstill_gap_m);
             if required > EARLY_BRAKING_THRESHOLD_MPS2 {
                 desired = desired.min(-required);
             }
         }
         // NaN passes through `clamp`; `EgoStack` refuses it as a command.
         desired.clamp(-MAX_BRAKING_MPS2, MAX_ACCELERATION_MPS2)
-    }
-}
-
-impl Acc {
-    /// Returns the constant braking with which the ego just keeps its standstill gap (m/s²).
-    fn required_mps2(&self, speed_mps: f64, lead: &Front) -> f64 {
-        Behind {
-            speed_mps,
-            lead_mps: lead.speed_mps,
-            lead_mps2: lead.acceleration_mps2,
-            room_m: lead.gap_m - self.standstill_gap_m,
-        }
-        .required_mps2()
     }
 }
 

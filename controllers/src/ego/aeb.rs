@@ -1,7 +1,8 @@
 //! Automatic emergency braking: brakes only if the required deceleration demands it.
 //!
 //! The required deceleration is the constant deceleration with which the ego just keeps a small gap to the lead
-//! vehicle, if that vehicle continues to brake as it does now ([`Behind`]).
+//! vehicle, if that vehicle continues to brake as it does now
+//! ([`Front::required_braking_mps2`]).
 //!
 //! The system starts to brake if the required deceleration exceeds a threshold. It commands the required deceleration
 //! plus a margin, until the required deceleration is below a lower threshold. The friction limit is applied by the
@@ -12,7 +13,6 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::surroundings::Front;
-use crate::braking::Behind;
 
 /// Ratio of commanded to required deceleration.
 const BRAKING_MARGIN: f64 = 1.15;
@@ -70,13 +70,7 @@ impl Check for AebConfig {
 impl Aeb {
     /// Returns the braking that is needed from now on (m/s²); 0 if none is needed.
     pub(crate) fn required_mps2(&self, speed_mps: f64, lead: &Front) -> f64 {
-        Behind {
-            speed_mps,
-            lead_mps: lead.speed_mps,
-            lead_mps2: lead.acceleration_mps2,
-            room_m: lead.gap_m - self.standstill_gap_m,
-        }
-        .required_mps2()
+        lead.required_braking_mps2(speed_mps, self.standstill_gap_m)
     }
 
     /// Returns the braking to apply (m/s²), or `None` if none is due. `was_braking` says whether the system braked at

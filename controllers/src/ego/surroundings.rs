@@ -3,10 +3,12 @@
 //! Tracks give the centres of boxes in the vehicle frame of the ego, whereas gaps are bumper to bumper. A track counts
 //! as being in a lane if the tracker gives that lane a probability of at least one half.
 
-use closecall_traffic::{Side, Source, Time, Track, TrackId, TrackStatus};
+use closecall_traffic::metrics::{bumper_gap_m, touching_distance_m};
+use closecall_traffic::{ClassScores, Side, Source, Time, Track, TrackId, TrackStatus};
 use serde::Serialize;
 
 use super::{EgoInput, Odometry};
+use crate::braking::Behind;
 
 /// Probability from which on a track counts as real, as being in a lane, or as a vehicle.
 const LIKELY: f64 = 0.5;
@@ -37,6 +39,20 @@ pub struct Front {
     pub speed_mps: f64,
     /// Acceleration of the lead vehicle, smoothed from its speed (m/s²).
     pub acceleration_mps2: f64,
+}
+
+impl Front {
+    /// Returns the constant braking with which the ego at `speed_mps` just keeps a gap of `standstill_gap_m` to the lead
+    /// vehicle (m/s²); 0 if none is needed.
+    pub(crate) fn required_braking_mps2(&self, speed_mps: f64, standstill_gap_m: f64) -> f64 {
+        Behind {
+            speed_mps,
+            lead_mps: self.speed_mps,
+            lead_mps2: self.acceleration_mps2,
+            room_m: self.gap_m - standstill_gap_m,
+        }
+        .required_mps2()
+    }
 }
 
 #[cfg(test)]
@@ -84,7 +100,7 @@ impl RearVehicle {
 
     /// Returns true if the whole vehicle is ahead of the ego. Its overtaking is then complete, whatever the ego does.
     pub(crate) fn is_past(&self, odometry: &Odometry) -> bool {
-        self.x_m > 0.5 * (self.length_m + odometry.length_m)
+        self.x_m > touching_distance_m(self.length_m, odometry.length_m)
     }
 
     /// Returns true if `track` belongs to this vehicle, perhaps as seen by another sensor during a lane change. A
@@ -162,7 +178,7 @@ impl LeadCandidate {
         let moved_m = (0.5 * (self.speed_mps + speed_mps) - odometry.speed_mps) * since_s;
         Front {
             track: self.id,
-            gap_m: self.x_m + moved_m - 0.5 * (self.length_m + odometry.length_m),
+            gap_m: bumper_gap_m(self.x_m + moved_m, self.length_m, odometry.length_m),
             speed_mps,
             acceleration_mps2: self.acceleration_mps2,
         }
@@ -251,13 +267,13 @@ fn exists(track: &Track) -> bool {
 fn is_classified(track: &Track) -> bool {
     let scores = track.class.0;
     let best = scores[track.class.best_vehicle_class() as usize];
-    track.class.vehicle() >= LIKELY && best > scores[3]
+    track.class.vehicle() >= LIKELY && best > scores[ClassScores::BACKGROUND]
 }
 
 pub(crate) fn rear_vehicle_from(track: &Track, input: &EgoInput<'_>) -> RearVehicle {
     RearVehicle {
         track: track.id,
-        gap_m: -track.x_m() - 0.5 * (track.length_m + input.odometry.length_m),
+        gap_m: bumper_gap_m(-track.x_m(), track.length_m, input.odometry.length_m),
         x_m: track.x_m(),
         y_m: track.y_m(),
         length_m: track.length_m,
@@ -306,7 +322,7 @@ pub(crate) fn passing_lane(input: &EgoInput<'_>, rear: &RearVehicle) -> PassingL
         if rear.matches(track) || !exists(track) || !(track.lane[passing_lane_index(side)] >= LIKELY) {
             continue;
         }
-        let apart_m = 0.5 * (track.length_m + rear.length_m) + MIN_SPACING_M;
+        let apart_m = touching_distance_m(track.length_m, rear.length_m) + MIN_SPACING_M;
         let ahead_m = track.x_m() - rear.x_m;
         let opening_mps = track.vx_mps() - rear.speed_mps;
         if keeps_apart(ahead_m + opening_mps * from_s, ahead_m + opening_mps * until_s, apart_m) {

@@ -1,4 +1,4 @@
-//! The files that a campaign leaves in its folder once it is over, all made from its journal.
+//! The files that a campaign writes into its folder at the end, all of them made from its journal.
 
 use std::fs::OpenOptions;
 use std::io::Write;
@@ -28,12 +28,12 @@ use super::tally::Tally;
 use super::timings::{Timing, write_timings};
 use crate::run::rerun::RecordError;
 
-/// Samples that are listed as the slowest.
+/// Number of samples that are listed as the slowest.
 const SLOWEST: usize = 10;
-/// The variable that names the file where GitHub's runners look for the summary of a step.
+/// The environment variable with the path of the file that GitHub's runners show as the summary of a step.
 const STEP_SUMMARY: &str = "GITHUB_STEP_SUMMARY";
 
-/// A report that could not be made. The journal is untouched.
+/// A report that cannot be made. The journal stays as it is.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
     /// The folder cannot be read.
@@ -48,26 +48,26 @@ pub enum ReportError {
     /// A recording cannot be written.
     #[error(transparent)]
     Recording(#[from] RecordError),
-    /// A sample that had an outcome has none when it is run again to be recorded.
+    /// A sample that had an outcome has none when it is run again for its recording.
     #[error("failed to run sample {sample}: {source}")]
     Sample {
-        /// The sample.
+        /// The sample's number.
         sample: u64,
         /// Why it has no outcome.
         source: SampleError,
     },
 }
 
-/// A campaign that is over, with its verdict.
+/// A finished campaign with its verdict.
 #[derive(Clone, Copy, Debug)]
 pub struct CampaignReport<'a> {
     /// How the campaign was made.
     pub manifest: &'a Manifest,
     /// The scenarios with their arms.
     pub works: &'a [Arc<Work>],
-    /// The counts, and what the page shows beside them.
+    /// The counts, and what the reports show beside them.
     pub tally: &'a Tally,
-    /// The gates that it was judged by.
+    /// The gates that judged the campaign.
     pub gates: Gates,
     /// The verdict.
     pub judged: &'a Judgement,
@@ -77,7 +77,7 @@ impl CampaignReport<'_> {
     /// Writes every file into the folder, with recordings of the selected samples.
     ///
     /// # Errors
-    /// [`ReportError`] if the journal cannot be read or a file cannot be written; files that exist are whole.
+    /// [`ReportError`] if the journal cannot be read or a file cannot be written; the files that exist are complete.
     pub fn write(&self, folder: &Folder, selection: Selection) -> Result<(), ReportError> {
         let files = self.scenario_files();
         let nominal: Vec<_> = files.iter().map(|file| file.space().nominal()).collect();
@@ -101,7 +101,7 @@ impl CampaignReport<'_> {
         self.append_step_summary(Some(folder), &recorded)
     }
 
-    /// Tells a CI server about a campaign that has no folder.
+    /// Appends the summary of a campaign without a folder to the file of the CI server.
     ///
     /// # Errors
     /// [`ReportError::Write`] if the CI server's file cannot be written.
@@ -168,7 +168,7 @@ fn keep_slowest(slowest: &mut Vec<Timing>, timing: &Timing) {
     }
 }
 
-/// Returns the wall times, one row for each arm.
+/// Returns the wall times of all samples, one for each arm.
 fn timings(folder: &Folder, manifest: &Manifest) -> Result<impl Iterator<Item = Timing> + use<>, FolderError> {
     let controllers: Vec<String> = manifest.arms.iter().map(|arm| arm.name().to_owned()).collect();
     Ok(folder.wall_times()?.flat_map(move |time| {
@@ -182,7 +182,7 @@ fn timings(folder: &Folder, manifest: &Manifest) -> Result<impl Iterator<Item = 
     }))
 }
 
-/// Returns the journal's records, one row for each arm.
+/// Returns the rows of all journal records, one for each arm.
 fn rows(
     folder: &Folder,
     manifest: &Manifest,

@@ -1,8 +1,8 @@
-//! A campaign as JUnit XML, which every CI server shows: one suite for each scenario, one case for each sample and
-//! controller. A collision of E is a failure, a sample without an outcome an error.
+//! A campaign as JUnit XML, which CI servers show: one suite for each scenario, one case for each sample and controller. A
+//! collision of the ego is a failure, a sample without an outcome is an error.
 //!
-//! The file is written case by case, so that its length costs no memory, and depends on the outcomes alone: it holds no
-//! wall-clock times.
+//! The file is written case by case, so that memory does not grow with the number of cases. It depends on the outcomes
+//! alone and holds no wall-clock times.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -14,36 +14,36 @@ use super::outcomes::OutcomeRow;
 use closecall_scenarios::atomic::{WriteError, write_file};
 use closecall_simulation::outcome::Collision;
 
-/// The counts of one suite, which stand before its cases.
+/// The counts of one suite. The file states them before the cases.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SuiteTotals {
     /// The scenario's name.
     pub scenario: String,
-    /// Cases.
+    /// The number of cases.
     pub tests: usize,
-    /// Cases with a collision of E.
+    /// The number of cases with a collision of the ego.
     pub failures: usize,
-    /// Cases without an outcome.
+    /// The number of cases without an outcome.
     pub errors: usize,
 }
 
-/// Writes the file. Each row comes with the path of its recording, where there is one, relative to the file's folder;
-/// the rows of a scenario follow each other, in the order of `suites`.
+/// Writes the file. Each row has the path of its recording, if there is one, relative to the file's folder. The rows are
+/// grouped by scenario, in the order of `suites`.
 ///
 /// # Errors
-/// The first error of `rows`, or [`WriteError`]; a file of that name is then as it was.
+/// The first error of `rows`, or [`WriteError`]. An existing file then stays as it is.
 pub fn write_junit<E: From<WriteError>>(
     path: &Path,
     suites: &[SuiteTotals],
     rows: impl IntoIterator<Item = Result<(OutcomeRow, Option<String>), E>>,
 ) -> Result<(), E> {
-    let mut broken = None;
+    let mut row_error = None;
     let written = write_file(path, |file| {
-        let rows = rows.into_iter().map_while(|row| row.map_err(|error| broken = Some(error)).ok());
+        let rows = rows.into_iter().map_while(|row| row.map_err(|error| row_error = Some(error)).ok());
         report(file, suites, rows)?;
-        if broken.is_some() { Err(io::Error::other("a row is an error")) } else { Ok(()) }
+        if row_error.is_some() { Err(io::Error::other("a row is an error")) } else { Ok(()) }
     });
-    match broken {
+    match row_error {
         Some(error) => Err(error),
         None => Ok(written?),
     }
@@ -92,8 +92,8 @@ fn totals<'a>(element: &'a str, suite: &SuiteTotals) -> BytesStart<'a> {
 fn case<W: Write>(xml: &mut Writer<W>, row: &OutcomeRow, recording: Option<&str>) -> io::Result<()> {
     let name = format!("sample {}, {}", row.sample, row.controller);
     let mut start = BytesStart::new("testcase");
-    start.push_attribute(("name", legal(&name).as_str()));
-    start.push_attribute(("classname", legal(&row.scenario).as_str()));
+    start.push_attribute(("name", legal_xml(&name).as_str()));
+    start.push_attribute(("classname", legal_xml(&row.scenario).as_str()));
     xml.write_event(Event::Start(start))?;
     let (seed, sample) = (row.seed.to_string(), row.sample.to_string());
     let mut properties = vec![("seed", seed.as_str()), ("sample", &sample), ("controller", &row.controller)];
@@ -101,23 +101,23 @@ fn case<W: Write>(xml: &mut Writer<W>, row: &OutcomeRow, recording: Option<&str>
     xml.write_event(Event::Start(BytesStart::new("properties")))?;
     for (name, value) in properties {
         let property = xml.create_element("property").with_attribute(("name", name));
-        property.with_attribute(("value", legal(value).as_str())).write_empty()?;
+        property.with_attribute(("value", legal_xml(value).as_str())).write_empty()?;
     }
     xml.write_event(Event::End(BytesEnd::new("properties")))?;
-    if let Some((element, kind, message)) = trouble(row) {
-        let element = xml.create_element(element).with_attribute(("message", legal(&message).as_str()));
-        element.with_attribute(("type", legal(&kind).as_str())).write_empty()?;
+    if let Some((element, kind, message)) = problem(row) {
+        let element = xml.create_element(element).with_attribute(("message", legal_xml(&message).as_str()));
+        element.with_attribute(("type", legal_xml(&kind).as_str())).write_empty()?;
     }
     if let Some(recording) = recording {
-        // JUnit has no attachments; this line is what CI servers read instead.
-        let text = legal(&format!("[[ATTACHMENT|{recording}]]"));
+        // JUnit has no attachments. CI servers read this line instead.
+        let text = legal_xml(&format!("[[ATTACHMENT|{recording}]]"));
         xml.create_element("system-out").write_text_content(BytesText::new(&text))?;
     }
     xml.write_event(Event::End(BytesEnd::new("testcase")))
 }
 
-/// The element that says what is wrong, its type and its message; nothing where all is well.
-fn trouble(row: &OutcomeRow) -> Option<(&'static str, String, String)> {
+/// Returns the name, the type and the message of the element for a failure or an error, or `None` if the case passes.
+fn problem(row: &OutcomeRow) -> Option<(&'static str, String, String)> {
     match (&row.result, row.ego_collision()) {
         (Err(error), _) => Some(("error", error.kind.clone(), error.message.clone())),
         (Ok(_), Some(collision)) => Some(("failure", "collision".to_owned(), message(collision))),
@@ -125,8 +125,8 @@ fn trouble(row: &OutcomeRow) -> Option<(&'static str, String, String)> {
     }
 }
 
-/// A text without the characters that XML cannot carry at all, not even escaped.
-fn legal(text: &str) -> String {
+/// Returns the text without the characters that XML does not allow, not even escaped.
+fn legal_xml(text: &str) -> String {
     let is_legal = |c: char| matches!(c, '\t' | '\n' | '\r' | '\u{20}'..='\u{fffd}' | '\u{10000}'..);
     text.chars().map(|c| if is_legal(c) { c } else { char::REPLACEMENT_CHARACTER }).collect()
 }
@@ -170,15 +170,15 @@ mod tests {
         rows[2].scenario = "other".to_owned();
         let suites = [suite("low-thw-overtake", [2, 1, 0]), suite("other", [1, 0, 1])];
         let text = written(&suites, rows.clone()).unwrap();
-        let place = |part: &str| text.find(part).unwrap();
-        assert!(place("<testsuite name=\"other\"") > place("sample 0, mis"));
-        assert!(place("sample 1, mis") > place("<testsuite name=\"other\""));
+        let position = |part: &str| text.find(part).unwrap();
+        assert!(position("<testsuite name=\"other\"") > position("sample 0, mis"));
+        assert!(position("sample 1, mis") > position("<testsuite name=\"other\""));
         assert!(text.contains("<testsuites name=\"closecall\" tests=\"3\" skipped=\"0\" errors=\"1\" failures=\"1\">"));
-        assert!(written(&suites[..1], rows).is_err(), "no case is dropped");
+        assert!(written(&suites[..1], rows).is_err(), "a row without a suite is an error");
     }
 
     #[test]
-    fn what_a_controller_says_is_always_legal_xml() {
+    fn a_message_of_a_controller_is_always_legal_xml() {
         let mut rows = rows();
         if let Err(failure) = &mut rows[2].result {
             failure.message = "a bell \u{7}, an escape \u{1b}[31m, ]]> & <tags>\nand a second line".to_owned();

@@ -1,4 +1,4 @@
-//! A campaign in Markdown, short enough for a pull request.
+//! The summary of a campaign in Markdown, short enough for a pull request.
 
 use std::path::Path;
 
@@ -8,20 +8,21 @@ use closecall_campaign::harm;
 use closecall_campaign::ledger::Inference;
 use closecall_campaign::summary::{Counts, Summary};
 use closecall_scenarios::atomic::{WriteError, write_file};
+use closecall_statistics::format::percent;
 
-/// Samples that are listed for each scenario.
+/// Largest number of samples that are listed for each scenario.
 const LISTED: usize = 5;
 
 /// Writes the summary into a file of its own.
 ///
 /// # Errors
-/// [`WriteError`] where the file cannot be written; a file of that name is then as it was.
+/// [`WriteError`] if the file cannot be written. An existing file then stays as it is.
 pub fn write_markdown(path: &Path, findings: &Findings<'_>) -> Result<(), WriteError> {
     let text = markdown(findings);
     write_file(path, |file| file.write_all(text.as_bytes()))
 }
 
-/// The summary.
+/// Returns the summary.
 pub fn markdown(findings: &Findings<'_>) -> String {
     let mut text = format!("## Closecall: {}\n\n", findings.judged.verdict);
     for reason in &findings.judged.reasons {
@@ -35,7 +36,7 @@ pub fn markdown(findings: &Findings<'_>) -> String {
     }
     let (sampling, version) = (findings.manifest.sampling, &findings.manifest.closecall_version);
     text.push_str(&format!(
-        "<sub>Rates are conditional on the sampled scenario: they are not the risk of a road. Seed {}, {} design, \
+        "<sub>Rates are conditional on the sampled scenario: they are not the risk on a road. Seed {}, {} design, \
          closecall {version}.</sub>\n",
         sampling.seed, sampling.design,
     ));
@@ -43,20 +44,22 @@ pub fn markdown(findings: &Findings<'_>) -> String {
 }
 
 fn counts(summary: &Summary) -> String {
-    let mut text = "| scenario | controller | samples | collisions | rate | 95 % | errors |\n\
+    let mut text = "| scenario | controller | samples | collisions | rate | 95 % interval | errors |\n\
                     |---|---|---:|---:|---:|---|---:|\n"
         .to_owned();
     let total = (summary.scenarios.len() > 1).then(|| ("all".to_owned(), summary.total()));
     for (name, counts) in summary.scenarios.iter().chain(&total) {
         for (controller, arm) in summary.controllers.iter().zip(&counts.arms) {
-            let [low, high] = arm.interval_95(summary.inference).map(|bound| 100.0 * bound);
-            let rate = arm.collision_rate().map_or_else(|| "-".to_owned(), |rate| format!("{:.2} %", 100.0 * rate));
+            let [low, high] = arm.interval_95(summary.inference);
+            let rate = arm.collision_rate().map_or_else(|| "-".to_owned(), percent);
             text.push_str(&format!(
-                "| {} | {} | {} | {} | {rate} | {low:.2} to {high:.2} % | {} |\n",
+                "| {} | {} | {} | {} | {rate} | {} to {} | {} |\n",
                 cell(name),
                 cell(controller),
                 arm.outcomes,
                 arm.collisions,
+                percent(low),
+                percent(high),
                 arm.errors,
             ));
         }
@@ -70,9 +73,9 @@ fn counts(summary: &Summary) -> String {
 
 fn pairs(total: &Counts, inference: Inference) -> String {
     let pairs = &total.pairs;
-    let sure = pairs.mcnemar_p(inference).map_or_else(String::new, |p| format!(" Exact McNemar p {p:.1e}."));
+    let p_value = pairs.mcnemar_p(inference).map_or_else(String::new, |p| format!(" Exact McNemar p {p:.1e}."));
     format!(
-        "**{} prevented, {} induced**, {} in both arms, {} in neither.{sure} Harm: {:.3} prevented, {:.3} induced ({}).\n\n",
+        "**{} prevented, {} induced**, {} in both arms, {} in neither.{p_value} Harm: {:.3} prevented, {:.3} induced ({}).\n\n",
         pairs.prevented,
         pairs.induced,
         pairs.both,
@@ -87,15 +90,15 @@ fn requirements(findings: &Findings<'_>) -> String {
     if findings.requirements.is_empty() {
         return String::new();
     }
-    let mut text = "| requirement | scenarios | result |\n|---|---|---|\n".to_owned();
+    let mut text = "| requirement | scenarios (samples with a collision) | result |\n|---|---|---|\n".to_owned();
     for requirement in findings.requirements {
         let scenarios: Vec<String> = requirement
             .evidence
             .iter()
             .map(|evidence| format!("{} ({} of {})", evidence.scenario, evidence.collisions, evidence.samples))
             .collect();
-        let (mark, result) = (cell(&requirement.mark), requirement.standing().word());
-        text.push_str(&format!("| {mark} | {} | {result} |\n", cell(&scenarios.join(", "))));
+        let (id, result) = (cell(&requirement.id), requirement.status().word());
+        text.push_str(&format!("| {id} | {} | {result} |\n", cell(&scenarios.join(", "))));
     }
     text.push('\n');
     text
@@ -121,7 +124,7 @@ fn worst(findings: &Findings<'_>, scenario: &ScenarioOverview) -> String {
         return text;
     }
     text.push_str(&format!(
-        "<details><summary>Worst collisions in {}</summary>\n\n| sample | E's ΔV | with | again |\n|---:|---:|---|---|\n",
+        "<details><summary>Worst collisions in {}</summary>\n\n| sample | ego's ΔV | with | command to run it again |\n|---:|---:|---|---|\n",
         cell(&scenario.name)
     ));
     for sample in collided {
@@ -134,7 +137,7 @@ fn worst(findings: &Findings<'_>, scenario: &ScenarioOverview) -> String {
     text
 }
 
-/// A text that does not break the table that it stands in.
+/// Returns the text as it may stand in a cell of a table.
 fn cell(text: &str) -> String {
     text.replace('|', "\\|").replace(['\n', '\r'], " ").replace('<', "&lt;")
 }

@@ -8,13 +8,12 @@
 
 mod files;
 pub mod findings;
-pub mod html;
+mod html;
 pub mod junit;
 pub mod markdown;
 pub mod outcomes;
 pub mod overview;
 mod recordings;
-pub mod recordings_index;
 pub mod requirements;
 mod tally;
 pub mod timings;

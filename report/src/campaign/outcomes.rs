@@ -1,8 +1,8 @@
 //! The table of a campaign's outcomes, as Parquet: one row for each sample and controller.
 //!
-//! The file depends on the rows alone: the same rows give the same bytes, whoever worked them out, and in what order.
-//! Nothing in it tells when or where it was written. Units stand in the metadata of the columns. A margin that does
-//! not exist is null, with the reason in the column `<margin>_absent`.
+//! The file depends on the rows alone: the same rows give the same bytes, however they were computed. It does not state
+//! when or where it was written. The units are in the metadata of the columns. A margin that does not exist is null, and
+//! the column `<margin>_absent` gives the reason.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -33,7 +33,7 @@ pub struct OutcomeRow {
     pub sample: u64,
     /// The controller's name.
     pub controller: String,
-    /// What came of it.
+    /// The outcome, or the error that the sample ended in.
     pub result: Result<Outcome, SampleFailure>,
 }
 
@@ -42,22 +42,22 @@ impl OutcomeRow {
         self.result.as_ref().ok()
     }
 
-    /// The first collision of E.
+    /// Returns the first collision of the ego.
     pub fn ego_collision(&self) -> Option<&Collision> {
         self.outcome()?.ego_collisions().next()
     }
 }
 
-/// What a parameter's column holds.
+/// The type of a parameter's column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ParameterKind {
     /// Numbers.
     Number,
-    /// Words, and numbers as text where a parameter is both.
+    /// Text. If a parameter has numbers and labels, the numbers are written as text.
     Label,
 }
 
-/// The columns for the parameters of several scenarios, in the order of their names.
+/// Returns the columns for the parameters of several scenarios, in the order of their names.
 pub fn parameter_columns<'a>(
     parameters: impl IntoIterator<Item = &'a Parameters>,
 ) -> BTreeMap<ParameterName, ParameterKind> {
@@ -75,10 +75,10 @@ pub fn parameter_columns<'a>(
     columns
 }
 
-/// Writes the table, group by group as the rows come.
+/// Writes the table. The rows are written in groups, so that memory is bounded.
 ///
 /// # Errors
-/// The first error of `rows`, or [`WriteError`]; a file of that name is then as it was.
+/// The first error of `rows`, or [`WriteError`]. An existing file then stays as it is.
 pub fn write_outcomes<E: From<WriteError>>(
     path: &Path,
     parameters: &BTreeMap<ParameterName, ParameterKind>,
@@ -87,7 +87,7 @@ pub fn write_outcomes<E: From<WriteError>>(
     let columns = columns(parameters);
     let schema = Arc::new(Schema::new(columns.iter().map(Column::field).collect::<Vec<_>>()));
     let mut rows = rows.fuse();
-    let mut broken = None;
+    let mut row_error = None;
     let written = write_file(path, |file| {
         let options = properties().into_builder().set_key_value_metadata(Some(units(&columns))).build();
         let mut writer = ArrowWriter::try_new(file, schema.clone(), Some(options)).map_err(io::Error::other)?;
@@ -96,7 +96,7 @@ pub fn write_outcomes<E: From<WriteError>>(
             let group = match group {
                 Ok(group) => group,
                 Err(error) => {
-                    broken = Some(error);
+                    row_error = Some(error);
                     return Err(io::Error::other("a row is an error"));
                 }
             };
@@ -110,23 +110,23 @@ pub fn write_outcomes<E: From<WriteError>>(
         writer.close().map_err(io::Error::other)?;
         Ok(())
     });
-    match broken {
+    match row_error {
         Some(error) => Err(error),
         None => Ok(written?),
     }
 }
 
-/// The units once more, for readers that do not decode Arrow's own schema: one entry for each column that has one.
+/// Returns the units once more, for readers that do not decode Arrow's own schema: one entry for each column with a unit.
 fn units(columns: &[Column]) -> Vec<KeyValue> {
     let unit =
         |column: &Column| column.unit.map(|unit| KeyValue::new(format!("unit:{}", column.name), unit.to_owned()));
     columns.iter().filter_map(unit).collect()
 }
 
-/// One value of a row, if it has it.
+/// Returns one value of a row, or `None` if the row lacks it.
 type Cell<T> = Box<dyn Fn(&OutcomeRow) -> Option<T>>;
 
-/// What a column takes from a row.
+/// How the cells of a column are computed from the rows.
 enum Cells {
     Text(Cell<String>),
     Number(Cell<f64>),
@@ -161,7 +161,7 @@ impl Column {
     }
 }
 
-/// A table in the making.
+/// The columns of the table, in order.
 #[derive(Default)]
 struct Columns(Vec<Column>);
 
@@ -182,13 +182,13 @@ impl Columns {
         self.0.push(Column { name: name.to_owned(), unit: Some(unit), cells: Cells::Number(Box::new(of)) });
     }
 
-    /// A value and, beside it, why there is none.
+    /// Adds a column for a value, and one for the reason of its absence.
     fn measured(&mut self, name: &str, unit: &'static str, of: fn(&Outcome) -> Measured) {
         self.number(name, unit, move |row| of(row.outcome()?).ok());
         self.text(&format!("{name}_absent"), move |row| of(row.outcome()?).err().map(|absent| absent.to_string()));
     }
 
-    /// The same of the margin increase system.
+    /// Adds the same two columns for a value of the margin increase system.
     fn mis(&mut self, name: &str, unit: &'static str, of: fn(&MisSummary) -> Measured) {
         let measured = move |outcome: &Outcome| outcome.mis.as_ref().map_err(|absent| *absent).and_then(of);
         self.number(name, unit, move |row| measured(row.outcome()?).ok());
@@ -222,7 +222,7 @@ fn key_columns(columns: &mut Columns) {
     columns.number("duration_s", "s", |row| Some(row.outcome()?.duration.s()));
 }
 
-/// The name says which parameter, and its end the unit.
+/// Adds the column of a parameter. The end of the parameter's name is its unit.
 fn parameter_column(columns: &mut Columns, name: &ParameterName, kind: ParameterKind) {
     let (column, unit) = (format!("param:{name}"), unit_of(name.as_str()));
     let name = name.clone();
@@ -245,11 +245,11 @@ fn collision_columns(columns: &mut Columns) {
     columns.flag("ego_collided", |row| Some(row.outcome()?.ego_collided()));
     let first = |row: &OutcomeRow| row.outcome()?.collisions.first().cloned();
     columns.number("collision_time_s", "s", move |row| Some(first(row)?.time.s()));
-    for (place, which) in ["first", "second"].into_iter().enumerate() {
-        columns.text(&format!("collision_between_{which}"), move |row| Some(first(row)?.between[place].to_string()));
-        columns.text(&format!("collision_struck_side_{which}"), move |row| word(&first(row)?.struck_side[place]));
+    for (index, which) in ["first", "second"].into_iter().enumerate() {
+        columns.text(&format!("collision_between_{which}"), move |row| Some(first(row)?.between[index].to_string()));
+        columns.text(&format!("collision_struck_side_{which}"), move |row| word(&first(row)?.struck_side[index]));
         columns
-            .number(&format!("collision_delta_v_{which}_mps"), "m/s", move |row| Some(first(row)?.delta_v_mps[place]));
+            .number(&format!("collision_delta_v_{which}_mps"), "m/s", move |row| Some(first(row)?.delta_v_mps[index]));
     }
     columns.text("collision_closed_by", move |row| word(&first(row)?.closed_by));
     columns.text("collision_phase", move |row| word(&first(row)?.phase));
@@ -281,7 +281,7 @@ fn mis_columns(columns: &mut Columns) {
     });
 }
 
-/// A word of a value list, as it stands in JSON too.
+/// Returns the name of an enum's variant, as JSON writes it too.
 fn word(of: &impl Serialize) -> Option<String> {
     serde_json::to_value(of).ok()?.as_str().map(str::to_owned)
 }

@@ -1,4 +1,4 @@
-//! Recordings of chosen samples of a campaign, with a page that shows them.
+//! Recordings of selected samples of a campaign, and the page that shows them.
 
 use std::fs;
 
@@ -10,17 +10,17 @@ use closecall_simulation::scenario::ScenarioFile;
 
 use super::files::ReportError;
 use super::findings::Recordings;
-use super::recordings_index::{IndexEntry, write_index};
+use super::html::{IndexEntry, write_index};
 use crate::run::figure::still;
 use crate::run::film::{Level, film_arms};
 use crate::run::rerun::record_films;
 
 /// The folder of the recordings within a campaign's folder.
 pub(super) const RECORDINGS: &str = "recordings";
-/// The page that shows them.
+/// The page of the recordings, in their folder.
 pub(super) const INDEX: &str = "index.html";
 
-/// Runs the chosen samples again, all arms of each into one file, and writes the page.
+/// Runs the selected samples again, records all arms of each in one file, and writes the page.
 pub(super) fn record(
     folder: &Folder,
     scenarios: &[&ScenarioFile],
@@ -28,7 +28,7 @@ pub(super) fn record(
 ) -> Result<Recordings, ReportError> {
     let saved = SavedCampaign::of(folder.clone())?;
     let path = folder.file(RECORDINGS);
-    // The recordings of an earlier, identical campaign may have been others.
+    // An earlier, identical campaign may have recorded other samples.
     if path.exists() {
         fs::remove_dir_all(&path).map_err(|source| WriteError::new(&path, source))?;
     }

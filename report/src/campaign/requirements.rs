@@ -1,4 +1,4 @@
-//! Which requirements the scenarios of a campaign are evidence for, and how they fare by the gates that were set.
+//! The requirements that the scenarios of a campaign name, each with its result by the gates that were set.
 
 use std::collections::BTreeMap;
 
@@ -6,23 +6,23 @@ use closecall_campaign::summary::Summary;
 use closecall_campaign::verdict::{Gates, Verdict};
 use closecall_simulation::scenario::ScenarioFile;
 
-/// How something fares, graver answers last.
+/// The result of a scenario or a requirement, in the order of gravity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Standing {
+pub enum Status {
     /// Every gate is met.
     Pass,
-    /// No gate was set: nothing was judged.
+    /// No gate was set, so that nothing was judged.
     NotJudged,
-    /// Too few samples to say.
+    /// There are too few samples for an answer.
     Inconclusive,
-    /// The campaign cannot be believed.
+    /// A validity check of the simulator failed, so that no result counts.
     Invalid,
-    /// Some gate is not met.
+    /// A gate is not met.
     Fail,
 }
 
-impl Standing {
-    /// The word for it.
+impl Status {
+    /// Returns the word that reports use.
     pub const fn word(self) -> &'static str {
         match self {
             Self::Pass => "PASS",
@@ -34,62 +34,62 @@ impl Standing {
     }
 }
 
-/// One scenario as evidence.
+/// The result of one scenario that names a requirement.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Evidence {
     /// The scenario's name.
     pub scenario: String,
-    /// Samples of the arm under test with an outcome.
+    /// The number of samples of the arm under test that have an outcome.
     pub samples: u64,
-    /// Those in which E collided.
+    /// The number of these samples in which the ego collided.
     pub collisions: u64,
-    /// How it fares.
-    pub standing: Standing,
+    /// The scenario's result.
+    pub status: Status,
 }
 
 /// One requirement.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Requirement {
-    /// Its mark.
-    pub mark: String,
+    /// The requirement's identifier, as the scenario files write it.
+    pub id: String,
     /// The scenarios that name it.
     pub evidence: Vec<Evidence>,
 }
 
 impl Requirement {
-    /// The gravest of what its scenarios say.
-    pub fn standing(&self) -> Standing {
-        self.evidence.iter().map(|evidence| evidence.standing).max().unwrap_or(Standing::NotJudged)
+    /// Returns the gravest result of its scenarios.
+    pub fn status(&self) -> Status {
+        self.evidence.iter().map(|evidence| evidence.status).max().unwrap_or(Status::NotJudged)
     }
 }
 
-/// The requirements that the scenarios name, in the order of their marks. Each scenario is judged alone.
+/// Returns the requirements that the scenarios name, in the order of their identifiers. Each scenario is judged alone.
 pub fn requirements<'a>(
     files: impl IntoIterator<Item = &'a ScenarioFile>,
     summary: &Summary,
     gates: Gates,
 ) -> Vec<Requirement> {
-    let mut by_mark: BTreeMap<String, Vec<Evidence>> = BTreeMap::new();
+    let mut by_id: BTreeMap<String, Vec<Evidence>> = BTreeMap::new();
     for file in files {
         let name = &file.config().name;
         let Some(counted) = summary.scenarios.iter().find(|(counted, _)| counted == name) else { continue };
         let alone = Summary { scenarios: vec![counted.clone()], ..summary.clone() };
         let tested = counted.1.arms.last().copied().unwrap_or_default();
-        let standing = match alone.judge(gates).verdict {
-            Verdict::Pass if gates == Gates::default() => Standing::NotJudged,
-            Verdict::Pass => Standing::Pass,
-            Verdict::Fail => Standing::Fail,
-            Verdict::Inconclusive => Standing::Inconclusive,
-            Verdict::Invalid => Standing::Invalid,
+        let status = match alone.judge(gates).verdict {
+            Verdict::Pass if gates == Gates::default() => Status::NotJudged,
+            Verdict::Pass => Status::Pass,
+            Verdict::Fail => Status::Fail,
+            Verdict::Inconclusive => Status::Inconclusive,
+            Verdict::Invalid => Status::Invalid,
         };
-        for mark in &file.config().requirements {
-            by_mark.entry(mark.clone()).or_default().push(Evidence {
+        for id in &file.config().requirements {
+            by_id.entry(id.clone()).or_default().push(Evidence {
                 scenario: name.clone(),
                 samples: tested.outcomes,
                 collisions: tested.collisions,
-                standing,
+                status,
             });
         }
     }
-    by_mark.into_iter().map(|(mark, evidence)| Requirement { mark, evidence }).collect()
+    by_id.into_iter().map(|(id, evidence)| Requirement { id, evidence }).collect()
 }

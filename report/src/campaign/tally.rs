@@ -1,4 +1,4 @@
-//! The one place that every record of a campaign goes through on its way to the reports.
+//! The single pass over a campaign's journal that feeds both the verdict and the reports.
 
 use std::sync::Arc;
 
@@ -10,10 +10,10 @@ use closecall_campaign::summary::Summary;
 
 use super::overview::Overview;
 
-/// The counts of a campaign, and what its report shows beside them.
+/// The counts of a campaign, and what its reports show beside them.
 #[derive(Clone, Debug)]
 pub struct Tally {
-    /// The counts that are judged.
+    /// The counts that the gates judge.
     pub summary: Summary,
     /// Distributions, maps and the worst samples.
     pub overview: Overview,
@@ -42,7 +42,7 @@ impl Tally {
         Self { summary, overview }
     }
 
-    /// Counts a record.
+    /// Adds a journal record.
     pub fn push(&mut self, record: &Record) {
         self.summary.push(record);
         self.overview.push(record);

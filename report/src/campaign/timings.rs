@@ -1,4 +1,5 @@
-//! Wall times of a campaign's samples, as Parquet: in a file of their own, since they differ from run to run.
+//! The wall times of a campaign's samples, as Parquet. They have a file of their own because they differ in each
+//! repetition.
 
 use std::io;
 use std::path::Path;
@@ -11,23 +12,23 @@ use parquet::arrow::ArrowWriter;
 use crate::table::{ROWS_PER_GROUP, field, properties};
 use closecall_scenarios::atomic::{WriteError, write_file};
 
-/// What one sample cost in one arm.
+/// The wall time of one sample in one arm.
 #[derive(Clone, Debug)]
 pub struct Timing {
     /// The scenario's name.
     pub scenario: String,
-    /// Number of the sample.
+    /// The sample's number.
     pub sample: u64,
     /// The controller's name.
     pub controller: String,
-    /// Wall time [s].
+    /// Wall time (s).
     pub wall_s: f64,
 }
 
-/// Writes the table, one row for each sample and controller, group by group as they come.
+/// Writes the table, one row for each sample and controller. The rows are written in groups, so that memory is bounded.
 ///
 /// # Errors
-/// [`WriteError`] where the file cannot be written; a file of that name is then as it was.
+/// [`WriteError`] if the file cannot be written. An existing file then stays as it is.
 pub fn write_timings(path: &Path, timings: impl Iterator<Item = Timing>) -> Result<(), WriteError> {
     let schema = Arc::new(Schema::new(vec![
         field("scenario", DataType::Utf8, None),

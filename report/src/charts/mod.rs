@@ -1,8 +1,15 @@
-//! Charts of a campaign, as SVG that stands inside a page.
+//! Charts, drawn with plotters: those of a campaign's page, and the style of all.
+//!
+//! * `bars`: bars in the cells of a table
+//! * `distribution`: distributions of margins and of sampled values
+//! * `map`: the outcome over two parameters
+//! * [`style`]: sizes, fonts, colours and axes
 
+mod bars;
 mod distribution;
 mod map;
-mod style;
+pub(crate) mod style;
 
+pub(super) use bars::{balance, rate};
 pub(super) use distribution::{coverage, margin};
 pub(super) use map::outcome_map;

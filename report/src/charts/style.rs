@@ -1,49 +1,213 @@
-//! What the charts share: colours, sizes, and how one is drawn into a text.
+//! What all charts share: their sizes, fonts and colours, their axes, and how a chart becomes SVG.
+//!
+//! SVG carries its own text, so that no font has to be installed. Equal values give equal bytes.
 
 use std::io;
+use std::ops::Range;
 
+use maud::{Markup, PreEscaped};
 use plotters::coord::Shift;
+use plotters::coord::ranged1d::BoldPoints;
+use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 
 use crate::campaign::overview::Fate;
 
-/// A chart in the making.
-pub(super) type Canvas<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+/// The surface that a chart is drawn on.
+pub(crate) type Canvas<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+/// A chart with its axes, to which series are added.
+pub(crate) type Plot<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+/// The result of drawing.
+pub(crate) type Drawn<T = ()> = Result<T, DrawingAreaErrorKind<io::Error>>;
 
-/// Size of letters [px].
-pub(super) const LABEL_PX: i32 = 13;
-pub(super) const DESCRIPTION_PX: i32 = 15;
-/// Grey of axes and grids.
-pub(super) const AXIS: RGBColor = RGBColor(0x55, 0x5f, 0x6b);
+/// Size of a chart that stands beside others (px).
+pub(super) const SMALL_PX: (u32, u32) = (420, 220);
+/// Size of a chart that stands alone on a page (px).
+pub(super) const LARGE_PX: (u32, u32) = (760, 460);
+/// Size of a chart in a file of its own (px).
+pub(crate) const FILE_PX: (u32, u32) = (860, 520);
+
+/// Margin around a chart (px).
+const MARGIN_PX: u32 = 8;
+/// Margin on the right, where half of the last label of the horizontal axis stands (px).
+const RIGHT_MARGIN_PX: u32 = 20;
+/// Font of all text.
+const FONT: &str = "sans-serif";
+/// Font sizes, as plotters counts them: letters come out smaller by a factor of 1.24 (px).
+const LABEL_PX: i32 = 13;
+const NAME_PX: i32 = 15;
+const TITLE_PX: i32 = 20;
+/// Width of one letter of a label (px).
+const LETTER_PX: f64 = 6.2;
+/// Height of the area below the chart, for labels and the name of the axis (px).
+const BELOW_PX: u32 = 42;
+/// Width of the area to the left of the chart, without the labels (px).
+const BESIDE_PX: u32 = 14;
+
+/// Colour of axes and of their text.
+const AXIS: RGBColor = RGBColor(0x55, 0x5f, 0x6b);
+/// Colour of grid lines.
 pub(super) const GRID: RGBColor = RGBColor(0xe3, 0xe7, 0xec);
+/// Shade of cells in which samples collide.
+pub(super) const COLLISIONS: RGBColor = RGBColor(0xd3, 0x54, 0x00);
+const GREY: RGBColor = RGBColor(0xb5, 0xbf, 0xca);
+const BLUE: RGBColor = RGBColor(0x1f, 0x77, 0xb4);
+const ORANGE: RGBColor = RGBColor(0xe6, 0x7e, 0x22);
+const RED: RGBColor = RGBColor(0xb0, 0x00, 0x20);
+const NEARLY_BLACK: RGBColor = RGBColor(0x11, 0x11, 0x11);
 
-/// The colour of each fate. They differ in lightness too, and none is told from another by red against green alone.
-pub(super) const fn colour(fate: Fate) -> RGBColor {
+/// Returns the colour of a fate. The colours differ in lightness too, and none differs from another by red against
+/// green alone.
+pub(crate) const fn fate_colour(fate: Fate) -> RGBColor {
     match fate {
-        Fate::Passed => RGBColor(0xb5, 0xbf, 0xca),
-        Fate::Prevented => RGBColor(0x1f, 0x77, 0xb4),
-        Fate::Failed => RGBColor(0xe6, 0x7e, 0x22),
-        Fate::Induced => RGBColor(0xb0, 0x00, 0x20),
-        Fate::Error => RGBColor(0x11, 0x11, 0x11),
+        Fate::Passed => GREY,
+        Fate::Prevented => BLUE,
+        Fate::Failed => ORANGE,
+        Fate::Induced => RED,
+        Fate::Error => NEARLY_BLACK,
     }
 }
 
-/// The colour of an arm: the one under test stands out.
-pub(super) const fn arm_colour(is_tested: bool) -> RGBColor {
-    if is_tested { RGBColor(0x1f, 0x77, 0xb4) } else { RGBColor(0xe6, 0x7e, 0x22) }
+/// Returns the colour of an arm: one for the arm under test, one for the baseline.
+pub(crate) const fn arm_colour(is_tested: bool) -> RGBColor {
+    if is_tested { BLUE } else { ORANGE }
 }
 
-/// Draws a chart of this size [px].
-pub(super) fn draw(
-    size: (u32, u32),
-    paint: impl FnOnce(&Canvas<'_>) -> Result<(), Box<dyn std::error::Error>>,
-) -> io::Result<String> {
-    let mut svg = String::new();
-    let canvas = SVGBackend::with_string(&mut svg, size).into_drawing_area();
-    let painted = paint(&canvas).and_then(|()| Ok(canvas.present()?));
+/// Returns the colour of a series, from a set that colour-blind readers can tell apart: M. Okabe and K. Ito, Color
+/// Universal Design (2008).
+pub(crate) const fn series_colour(index: usize) -> RGBColor {
+    match index % 4 {
+        0 => RGBColor(0, 114, 178),
+        1 => RGBColor(213, 94, 0),
+        2 => RGBColor(0, 158, 115),
+        _ => RGBColor(204, 121, 167),
+    }
+}
+
+/// Returns a colour as a style sheet writes it.
+pub(crate) fn css(RGBColor(red, green, blue): RGBColor) -> String {
+    format!("#{red:02x}{green:02x}{blue:02x}")
+}
+
+/// Returns the style of the text in a legend.
+pub(crate) fn legend_text<'a>() -> TextStyle<'a> {
+    (FONT, LABEL_PX).into_font().color(&BLACK)
+}
+
+/// One axis of a chart.
+pub(crate) struct ChartAxis<'a> {
+    /// What the axis shows, with its unit; empty if nothing is written beside the axis.
+    pub(crate) name: &'a str,
+    /// The values at its ends.
+    pub(crate) range: Range<f64>,
+    /// The largest number of labels.
+    pub(crate) labels: usize,
+    /// The text at a value; empty if the value has no label.
+    pub(crate) text: Box<dyn Fn(&f64) -> String + 'a>,
+    /// True if a line crosses the chart at each label.
+    pub(crate) has_grid: bool,
+}
+
+impl ChartAxis<'_> {
+    /// Returns the number of letters in the longest label.
+    fn longest_label(&self) -> usize {
+        let values = RangedCoordf64::from(self.range.clone()).key_points(BoldPoints(self.labels));
+        values.iter().map(|value| (self.text)(value).chars().count()).max().unwrap_or(0)
+    }
+}
+
+/// Returns a text for values between `low` and `high`, with as many digits as a hundredth of the range needs.
+pub(crate) fn number_text(low: f64, high: f64) -> impl Fn(&f64) -> String {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few digits")]
+    let digits = (2.0 - (high - low).log10().floor()).clamp(0.0, 6.0) as usize;
+    move |value| {
+        let text = format!("{value:.digits$}");
+        let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+        if text == "-0" { "0".to_owned() } else { text.to_owned() }
+    }
+}
+
+/// Draws the axes with their labels and names, and the title if there is one.
+pub(crate) fn axes<'a, 'b>(
+    canvas: &'a Canvas<'b>,
+    title: Option<&str>,
+    x: &ChartAxis<'_>,
+    y: &ChartAxis<'_>,
+) -> Drawn<Plot<'a, 'b>> {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few hundred pixels")]
+    let labels_px = (LETTER_PX * y.longest_label() as f64).ceil() as u32;
+    let name_px = if y.name.is_empty() { 0 } else { NAME_PX.unsigned_abs() + 2 };
+    let mut builder = ChartBuilder::on(canvas);
+    if let Some(title) = title {
+        builder.caption(title, (FONT, TITLE_PX));
+    }
+    let mut plot = builder
+        .margin(MARGIN_PX)
+        .margin_right(RIGHT_MARGIN_PX)
+        .x_label_area_size(BELOW_PX)
+        .y_label_area_size(BESIDE_PX + name_px + labels_px)
+        .build_cartesian_2d(x.range.clone(), y.range.clone())?;
+    let mut mesh = plot.configure_mesh();
+    if !x.has_grid {
+        mesh.disable_x_mesh();
+    }
+    if !y.has_grid {
+        mesh.disable_y_mesh();
+    }
+    mesh.light_line_style(TRANSPARENT)
+        .bold_line_style(GRID)
+        .axis_style(AXIS)
+        .label_style((FONT, LABEL_PX).into_font().color(&AXIS))
+        .axis_desc_style((FONT, NAME_PX).into_font().color(&AXIS))
+        .x_labels(x.labels)
+        .y_labels(y.labels)
+        .x_label_formatter(&x.text)
+        .y_label_formatter(&y.text)
+        .x_desc(x.name)
+        .y_desc(y.name)
+        .draw()?;
+    Ok(plot)
+}
+
+/// Returns the SVG of a chart of this size (px).
+pub(crate) fn svg(size_px: (u32, u32), paint: impl FnOnce(&Canvas<'_>) -> Drawn) -> Drawn<String> {
+    let mut text = String::new();
+    let canvas = SVGBackend::with_string(&mut text, size_px).into_drawing_area();
+    let drawn = paint(&canvas).and_then(|()| canvas.present());
     drop(canvas);
-    painted.map_err(|error| io::Error::other(error.to_string()))?;
-    // The size follows the page; the picture's own is the largest.
-    let fixed = format!("width=\"{}\" height=\"{}\"", size.0, size.1);
-    Ok(svg.replacen(&fixed, &format!("style=\"max-width:{}px\"", size.0), 1))
+    drawn.map(|()| text)
+}
+
+/// Returns a chart that stands inside a page: it shrinks with the page, and is at most this large (px).
+pub(super) fn inline(size_px: (u32, u32), paint: impl FnOnce(&Canvas<'_>) -> Drawn) -> io::Result<Markup> {
+    sized(size_px, &format!("style=\"max-width:{}px\"", size_px.0), paint)
+}
+
+/// Returns a chart with other attributes in the place of its width and height.
+pub(super) fn sized(
+    size_px: (u32, u32),
+    attributes: &str,
+    paint: impl FnOnce(&Canvas<'_>) -> Drawn,
+) -> io::Result<Markup> {
+    let text = svg(size_px, paint).map_err(|error| io::Error::other(error.to_string()))?;
+    let own = format!("width=\"{}\" height=\"{}\"", size_px.0, size_px.1);
+    Ok(PreEscaped(text.replacen(&own, attributes, 1)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn labels_have_the_digits_that_the_axis_needs() {
+        assert_eq!(number_text(0.0, 3.0)(&0.5), "0.5");
+        assert_eq!(number_text(0.0, 2_000.0)(&1_250.0), "1250");
+        assert_eq!(number_text(-0.01, 0.01)(&-0.0), "0");
+    }
+
+    #[test]
+    fn a_chart_on_a_page_shrinks_with_the_page() {
+        let chart = inline(SMALL_PX, |canvas| canvas.draw(&Circle::new((5, 5), 2, BLACK))).unwrap().into_string();
+        assert!(chart.starts_with("<svg style=\"max-width:420px\" viewBox=\"0 0 420 220\""), "{chart}");
+    }
 }

@@ -1,37 +1,43 @@
-//! Charts as SVG: lines over a level, and boxes by class.
-//!
-//! SVG carries its own text, so no font has to be there; equal values give equal bytes.
+//! Charts of statistics over trajectory data, each in an SVG file of its own: lines over a reference level, and box plots
+//! by vehicle class.
 
-use plotters::coord::Shift;
+use std::ops::Range;
+
 use plotters::prelude::*;
 
-/// Width and height of a chart [px].
-const SIZE_PX: (u32, u32) = (860, 520);
+use crate::charts::style::{Canvas, ChartAxis, Drawn, FILE_PX, axes, legend_text, number_text, series_colour, svg};
 
-/// A chart that could not be drawn.
+/// Opacity of a faint line.
+const FAINT_OPACITY: f64 = 0.35;
+/// Length of a line in the legend (px).
+const LEGEND_LINE_PX: i32 = 18;
+/// Largest number of labels on an axis of numbers.
+const LABELS: usize = 10;
+
+/// A chart that cannot be drawn.
 #[derive(Debug, thiserror::Error)]
 #[error("failed to draw the chart \"{title}\": {message}")]
 pub struct ChartError {
-    /// Its title.
+    /// The chart's title.
     pub title: String,
     /// The drawing library's reason.
     pub message: String,
 }
 
-/// One line, with its name.
+/// One line of a chart.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Line {
-    /// What the legend says.
+    /// The name in the legend.
     pub name: String,
-    /// Points from left to right.
+    /// The points, in rising order of x. Points that are not finite are left out.
     pub points: Vec<(f64, f64)>,
-    /// Which colour; lines that belong together share it.
+    /// The index of the colour. Lines that belong together share a colour.
     pub colour: usize,
-    /// True for what only accompanies another line.
+    /// True if the line is drawn pale, beside a line that matters more.
     pub faint: bool,
 }
 
-/// Where a legend covers nothing.
+/// The position of the legend, to be chosen so that it covers no line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Legend {
     /// At the bottom, on the left.
@@ -43,26 +49,26 @@ pub enum Legend {
 /// Lines over a common axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LineChart {
-    /// Above the chart.
+    /// The title above the chart.
     pub title: String,
-    /// Below the horizontal axis, with its unit.
+    /// The name of the horizontal axis, with its unit.
     pub x_name: String,
-    /// Beside the vertical axis, with its unit.
+    /// The name of the vertical axis, with its unit.
     pub y_name: String,
     /// The lines.
     pub lines: Vec<Line>,
-    /// A level that is drawn across, with its name.
+    /// The name and the value of a reference level, which is drawn as a dashed line.
     pub level: (String, f64),
-    /// Where the legend stands.
+    /// The position of the legend.
     pub legend: Legend,
 }
 
-/// The five numbers of a box, in rising order.
+/// One box of a box plot.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BoxOf {
-    /// Below the box.
+    /// The name below the box.
     pub name: String,
-    /// Lower whisker, lower quartile, median, upper quartile, upper whisker.
+    /// Lower whisker, lower quartile, median, upper quartile and upper whisker.
     pub five: [f64; 5],
     /// Values beyond the whiskers.
     pub outliers: Vec<f64>,
@@ -71,117 +77,106 @@ pub struct BoxOf {
 /// Boxes side by side.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BoxChart {
-    /// Above the chart.
+    /// The title above the chart.
     pub title: String,
-    /// Beside the vertical axis, with its unit.
+    /// The name of the vertical axis, with its unit.
     pub y_name: String,
     /// The boxes, from left to right.
     pub boxes: Vec<BoxOf>,
 }
 
-type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
-
 impl LineChart {
-    /// The chart as the text of an SVG file.
+    /// Returns the chart as the text of an SVG file.
     ///
     /// # Errors
-    /// [`ChartError`] where the drawing library fails.
+    /// [`ChartError`] if the drawing library fails.
     pub fn svg(&self) -> Result<String, ChartError> {
-        svg(&self.title, |area| self.draw(area))
+        file(&self.title, |canvas| self.draw(canvas))
     }
 
-    fn draw(&self, area: &Area<'_>) -> Drawn {
+    fn draw(&self, canvas: &Canvas<'_>) -> Drawn {
         let points = || self.lines.iter().flat_map(|line| line.points.iter().copied());
-        let x = range(points().map(|point| point.0), None);
-        let y = range(points().map(|point| point.1).chain([self.level.1]), Some(0.0));
-        let mut chart = ChartBuilder::on(area)
-            .caption(&self.title, ("sans-serif", 20))
-            .margin(14)
-            .x_label_area_size(46)
-            .y_label_area_size(60)
-            .build_cartesian_2d(x.clone(), y)?;
-        chart.configure_mesh().x_desc(&self.x_name).y_desc(&self.y_name).light_line_style(WHITE).draw()?;
-        let level = [(x.start, self.level.1), (x.end, self.level.1)];
-        chart
-            .draw_series(DashedLineSeries::new(level, 4, 4, BLACK.stroke_width(1)))?
+        let x = number_axis(&self.x_name, range(points().map(|point| point.0), None));
+        let y = number_axis(&self.y_name, range(points().map(|point| point.1).chain([self.level.1]), Some(0.0)));
+        let ends = [x.range.start, x.range.end];
+        let mut plot = axes(canvas, Some(&self.title), &x, &y)?;
+        let legend_line =
+            |style: ShapeStyle| move |(x, y): (i32, i32)| PathElement::new([(x, y), (x + LEGEND_LINE_PX, y)], style);
+        let level = ends.map(|x| (x, self.level.1));
+        plot.draw_series(DashedLineSeries::new(level, 4, 4, BLACK.stroke_width(1)))?
             .label(&self.level.0)
-            .legend(|(x, y)| PathElement::new([(x, y), (x + 18, y)], BLACK));
+            .legend(legend_line(BLACK.stroke_width(1)));
         for line in &self.lines {
-            let style = colour(line.colour).mix(if line.faint { 0.35 } else { 1.0 }).stroke_width(2);
-            chart
-                .draw_series(LineSeries::new(line.points.iter().copied(), style).point_size(3))?
+            let opacity = if line.faint { FAINT_OPACITY } else { 1.0 };
+            let style = series_colour(line.colour).mix(opacity).stroke_width(2);
+            let points = line.points.iter().copied().filter(|(x, y)| x.is_finite() && y.is_finite());
+            plot.draw_series(LineSeries::new(points, style).point_size(3))?
                 .label(&line.name)
-                .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style));
+                .legend(legend_line(style));
         }
         let position = match self.legend {
             Legend::LowerLeft => SeriesLabelPosition::LowerLeft,
             Legend::LowerMiddle => SeriesLabelPosition::LowerMiddle,
         };
-        chart
-            .configure_series_labels()
+        plot.configure_series_labels()
             .position(position)
+            .label_font(legend_text())
             .background_style(WHITE.mix(0.85))
             .border_style(BLACK.mix(0.3))
-            .draw()?;
-        Ok(())
+            .draw()
     }
 }
 
 impl BoxChart {
-    /// The chart as the text of an SVG file.
+    /// Returns the chart as the text of an SVG file.
     ///
     /// # Errors
-    /// [`ChartError`] where the drawing library fails.
+    /// [`ChartError`] if the drawing library fails.
     pub fn svg(&self) -> Result<String, ChartError> {
-        svg(&self.title, |area| self.draw(area))
+        file(&self.title, |canvas| self.draw(canvas))
     }
 
-    fn draw(&self, area: &Area<'_>) -> Drawn {
-        let values = self.boxes.iter().flat_map(|one| one.five.iter().chain(&one.outliers).copied());
-        let y = range(values, Some(0.0));
-        let mut chart = ChartBuilder::on(area)
-            .caption(&self.title, ("sans-serif", 20))
-            .margin(14)
-            .x_label_area_size(46)
-            .y_label_area_size(60)
-            .build_cartesian_2d(-0.5..self.boxes.len() as f64 - 0.5, y)?;
-        let name = |x: &f64| {
-            let place = x.round();
-            let is_middle = (x - place).abs() < 1e-9 && place >= 0.0;
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small whole number")]
-            let found = is_middle.then(|| self.boxes.get(place as usize)).flatten();
-            found.map_or(String::new(), |one| one.name.clone())
+    fn draw(&self, canvas: &Canvas<'_>) -> Drawn {
+        let x = ChartAxis {
+            name: "",
+            range: -0.5..self.boxes.len() as f64 - 0.5,
+            labels: 2 * self.boxes.len() + 1,
+            text: Box::new(|x: &f64| self.name_at(*x)),
+            has_grid: false,
         };
-        chart
-            .configure_mesh()
-            .disable_x_mesh()
-            .x_labels(2 * self.boxes.len() + 1)
-            .x_label_formatter(&name)
-            .y_desc(&self.y_name)
-            .light_line_style(WHITE)
-            .draw()?;
-        for (place, one) in self.boxes.iter().enumerate() {
-            chart.draw_series(elements(place, one))?;
-            let dot = |value: &f64| Circle::new((place as f64, *value), 3, colour(place).stroke_width(1));
-            chart.draw_series(one.outliers.iter().map(dot))?;
+        let values = self.boxes.iter().flat_map(|one| one.five.iter().chain(&one.outliers).copied());
+        let y = number_axis(&self.y_name, range(values, Some(0.0)));
+        let mut plot = axes(canvas, Some(&self.title), &x, &y)?;
+        for (index, one) in self.boxes.iter().enumerate() {
+            plot.draw_series(elements(index, one))?;
+            let dot = |value: &f64| Circle::new((index as f64, *value), 3, series_colour(index).stroke_width(1));
+            plot.draw_series(one.outliers.iter().map(dot))?;
         }
         Ok(())
     }
+
+    /// Returns the name of the box at `x`; empty if `x` is between two boxes.
+    fn name_at(&self, x: f64) -> String {
+        let nearest = x.round();
+        let is_middle = (x - nearest).abs() < 1e-9 && nearest >= 0.0;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small whole number")]
+        let found = is_middle.then(|| self.boxes.get(nearest as usize)).flatten();
+        found.map_or(String::new(), |one| one.name.clone())
+    }
 }
 
-/// The box, its median and its whiskers.
-fn elements<'a>(place: usize, one: &BoxOf) -> Vec<DynElement<'static, SVGBackend<'a>, (f64, f64)>> {
+/// Returns the box, its median and its whiskers.
+fn elements<'a>(index: usize, one: &BoxOf) -> Vec<DynElement<'static, SVGBackend<'a>, (f64, f64)>> {
     const HALF_BOX: f64 = 0.22;
     const HALF_CAP: f64 = 0.1;
-    let x = place as f64;
+    let x = index as f64;
     let [low, quarter, median, three_quarters, high] = one.five;
     let style = BLACK.stroke_width(1);
     let line = |a: (f64, f64), b: (f64, f64)| PathElement::new(vec![a, b], style).into_dyn();
+    let corners = [(x - HALF_BOX, quarter), (x + HALF_BOX, three_quarters)];
     vec![
-        Rectangle::new([(x - HALF_BOX, quarter), (x + HALF_BOX, three_quarters)], colour(place).mix(0.45).filled())
-            .into_dyn(),
-        Rectangle::new([(x - HALF_BOX, quarter), (x + HALF_BOX, three_quarters)], style).into_dyn(),
+        Rectangle::new(corners, series_colour(index).mix(0.45).filled()).into_dyn(),
+        Rectangle::new(corners, style).into_dyn(),
         PathElement::new(vec![(x - HALF_BOX, median), (x + HALF_BOX, median)], BLACK.stroke_width(3)).into_dyn(),
         line((x, low), (x, quarter)),
         line((x, three_quarters), (x, high)),
@@ -190,19 +185,20 @@ fn elements<'a>(place: usize, one: &BoxOf) -> Vec<DynElement<'static, SVGBackend
     ]
 }
 
-fn svg(title: &str, draw: impl FnOnce(&Area<'_>) -> Drawn) -> Result<String, ChartError> {
-    let mut text = String::new();
-    let area = SVGBackend::with_string(&mut text, SIZE_PX).into_drawing_area();
-    let drawn = area.fill(&WHITE).and_then(|()| draw(&area)).and_then(|()| area.present());
-    drop(area);
-    match drawn {
-        Ok(()) => Ok(text),
-        Err(error) => Err(ChartError { title: title.to_owned(), message: error.to_string() }),
-    }
+fn number_axis(name: &str, range: Range<f64>) -> ChartAxis<'_> {
+    let text = Box::new(number_text(range.start, range.end));
+    ChartAxis { name, range, labels: LABELS, text, has_grid: true }
 }
 
-/// From the smallest to the largest value with a margin, and `from` in any case; never empty.
-fn range(values: impl Iterator<Item = f64>, from: Option<f64>) -> std::ops::Range<f64> {
+/// Returns the SVG of a chart on a white background.
+fn file(title: &str, draw: impl FnOnce(&Canvas<'_>) -> Drawn) -> Result<String, ChartError> {
+    let drawn = svg(FILE_PX, |canvas| canvas.fill(&WHITE).and_then(|()| draw(canvas)));
+    drawn.map_err(|error| ChartError { title: title.to_owned(), message: error.to_string() })
+}
+
+/// Returns the range from the smallest to the largest finite value, with a margin. The range includes `from` if there is
+/// one, and is never empty.
+fn range(values: impl Iterator<Item = f64>, from: Option<f64>) -> Range<f64> {
     const MARGIN: f64 = 0.06;
     let finite = values.filter(|value| value.is_finite()).chain(from);
     let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
@@ -214,22 +210,12 @@ fn range(values: impl Iterator<Item = f64>, from: Option<f64>) -> std::ops::Rang
     start..high + margin
 }
 
-/// Colours that the colour-blind tell apart: M. Okabe and K. Ito, Color Universal Design (2008).
-const fn colour(index: usize) -> RGBColor {
-    match index % 4 {
-        0 => RGBColor(0, 114, 178),
-        1 => RGBColor(213, 94, 0),
-        2 => RGBColor(0, 158, 115),
-        _ => RGBColor(204, 121, 167),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn a_chart_names_its_lines_and_is_the_same_twice() {
+    fn a_chart_names_its_lines_and_is_the_same_when_drawn_again() {
         let line = |name: &str, colour, faint| Line {
             name: name.to_owned(),
             points: vec![(0.0, 3.0), (1.0, f64::NAN), (2.0, 1.0)],
@@ -252,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn boxes_are_named_and_an_empty_chart_is_still_one() {
+    fn boxes_are_named_and_a_chart_without_boxes_is_drawn() {
         let one = BoxOf { name: "car (n = 9)".to_owned(), five: [1.0, 2.0, 3.0, 4.0, 6.0], outliers: vec![9.0] };
         let chart = |boxes| BoxChart { title: "Durations".to_owned(), y_name: "s".to_owned(), boxes }.svg().unwrap();
         assert!(chart(vec![one.clone()]).contains("car (n = 9)"));

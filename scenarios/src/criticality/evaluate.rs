@@ -1,13 +1,12 @@
 //! Evaluation of the metrics over the window of a lane change.
 
 use closecall_traffic::geometry::OrientedBox;
-use closecall_traffic::metrics::{Moving, closest_encounter, time_headway_s};
+use closecall_traffic::metrics::{CRITICAL_THW_S, Moving, bumper_gap_m, closest_encounter, time_headway_s};
 use closecall_traffic::{Absent, Lane, Time, Trajectory, TrajectoryPoint};
 
 use super::{
     CRITICAL_A_LAT_MPS2, CRITICAL_A_LON_MPS2, CRITICAL_DCE_M, CRITICAL_DISTANCE_M, CRITICAL_SPEED_FACTOR,
-    CRITICAL_THW_S, CRITICAL_TTCE_S, CriticalLaneChange, DEFAULT_SPEED_LIMIT_MPS, ENCOUNTER_HORIZON_S, MetricRecord,
-    Metrics,
+    CRITICAL_TTCE_S, CriticalLaneChange, DEFAULT_SPEED_LIMIT_MPS, ENCOUNTER_HORIZON_S, MetricRecord, Metrics,
 };
 use crate::filters::SmoothedRecording;
 use crate::lane_change::{LaneChange, detect};
@@ -67,7 +66,7 @@ impl<'a> VehicleState<'a> {
     /// Returns the gap from this vehicle's front to the rear of `other` (m), or `None` if `other` is not ahead.
     fn gap_to_m(&self, other: &Self) -> Option<f64> {
         let ahead_m = other.point.s_m - self.point.s_m;
-        let gap_m = ahead_m - 0.5 * (self.track.dimensions.length_m + other.track.dimensions.length_m);
+        let gap_m = bumper_gap_m(ahead_m, self.track.dimensions.length_m, other.track.dimensions.length_m);
         let reach_m = 0.5 * (self.track.dimensions.width_m + other.track.dimensions.width_m);
         let overlaps_across = (other.point.d_m - self.point.d_m).abs() < reach_m;
         (ahead_m > 0.0 && (gap_m >= 0.0 || overlaps_across)).then_some(gap_m)

@@ -50,8 +50,6 @@ pub const CRITICAL_SPEED_FACTOR: f64 = 1.3;
 pub const CRITICAL_A_LON_MPS2: f64 = 8.0;
 /// Magnitude above which the acceleration across the road is critical (m/s²).
 pub const CRITICAL_A_LAT_MPS2: f64 = 8.0;
-/// Time headway below which it is critical (s).
-pub const CRITICAL_THW_S: f64 = 0.9;
 /// Distance at closest encounter below which it is critical (m).
 pub const CRITICAL_DCE_M: f64 = 1.0;
 /// Time to closest encounter below which it is critical (s).

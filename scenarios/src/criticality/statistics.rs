@@ -3,13 +3,13 @@
 //! Durations, speeds and correlations use *complete* lane changes only ([`crate::lane_change`]). The counts include all
 //! lane changes; double ones are also counted separately.
 //!
-//! - **Box plots**: quartiles by linear interpolation between order statistics (Hyndman and Fan's type 7, the default
-//!   of R and NumPy). Whiskers reach to the furthest values within 1.5 interquartile ranges of the box (Tukey); values
+//! - **Box plots**: quartiles by linear interpolation ([`quantile`]). Whiskers reach to the furthest values within 1.5 interquartile ranges of the box (Tukey); values
 //!   beyond are outliers.
 //! - **Correlation**: Pearson's r of the values and Spearman's ρ of their ranks (ties share their mean rank). It covers
 //!   the lane changes for which both quantities have a value, and their number is stated. With fewer than 5 pairs, or
 //!   if a quantity does not vary, there is no coefficient.
 
+use closecall_statistics::quantiles::quantile;
 use closecall_traffic::{Side, VehicleClass};
 use serde::Serialize;
 
@@ -38,9 +38,11 @@ impl BoxNumbers {
     /// Computes the box plot of all finite `values`. Returns `None` if there are none.
     pub fn of(mut values: Vec<f64>) -> Option<Self> {
         values.retain(|value| value.is_finite());
+        if values.is_empty() {
+            return None;
+        }
         values.sort_by(f64::total_cmp);
         let [lower, median, upper] = [0.25, 0.5, 0.75].map(|level| quantile(&values, level));
-        let (lower, median, upper) = (lower?, median?, upper?);
         let reach = WHISKER_RANGES * (upper - lower);
         let is_within = |value: &f64| (lower - reach..=upper + reach).contains(value);
         let within: Vec<f64> = values.iter().copied().filter(is_within).collect();
@@ -48,16 +50,6 @@ impl BoxNumbers {
         let outliers = values.iter().copied().filter(|value| !is_within(value)).collect();
         Some(Self { n: values.len(), mean: values.iter().sum::<f64>() / values.len() as f64, five, outliers })
     }
-}
-
-/// Returns the quantile of `sorted` values at probability `level`, by linear interpolation, or `None` if there are
-/// none.
-fn quantile(sorted: &[f64], level: f64) -> Option<f64> {
-    let position = level * (sorted.len().checked_sub(1)?) as f64;
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and the number of values")]
-    let below = position as usize;
-    let (low, high) = (sorted[below], sorted[(below + 1).min(sorted.len() - 1)]);
-    Some(low + (position - below as f64) * (high - low))
 }
 
 /// Statistics of the lane changes of one vehicle class.

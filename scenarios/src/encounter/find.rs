@@ -1,6 +1,6 @@
 //! Assignment of the roles in an encounter, and its start and end.
 
-use closecall_traffic::metrics::time_headway_s;
+use closecall_traffic::metrics::{bumper_gap_m, time_headway_s};
 use closecall_traffic::{Absent, Lane, Measured, Time, Trajectory, TrajectoryPoint};
 
 use super::frame::{Frame, RoadSection};
@@ -32,7 +32,7 @@ pub fn encounter(
     let origin_m = roles.ego.at(start).map_or(0.0, |point| point.s_m);
     let frame = Frame { start, end, origin_m, road };
     let (track_id, ego_id) = (roles.rear.track_id, roles.ego.track_id);
-    let vehicles = participants(recording, &roles, &frame, (all, period));
+    let vehicles = participants(recording, &roles, &frame, all, period);
     let vehicles = vehicles.ok_or(NoEncounter::LeavesTheRoad { track_id })?;
     let thw_s = roles.headway_s(Time::from_s(change.crossing_s));
     let is_behind = |thw_s: &f64| *thw_s > 0.0 && *thw_s <= LONGEST_THW_S;
@@ -119,8 +119,8 @@ impl<'a> Roles<'a> {
     fn headway_s(&self, time: Time) -> Measured {
         let (rear, ego) = (self.rear.at(time), self.ego.at(time));
         let (rear, ego) = rear.zip(ego).ok_or(Absent::NotRecorded)?;
-        let half_lengths_m = 0.5 * (self.rear.dimensions.length_m + self.ego.dimensions.length_m);
-        time_headway_s(ego.s_m - rear.s_m - half_lengths_m, rear.speed_mps)
+        let gap_m = bumper_gap_m(ego.s_m - rear.s_m, self.rear.dimensions.length_m, self.ego.dimensions.length_m);
+        time_headway_s(gap_m, rear.speed_mps)
     }
 }
 
@@ -145,7 +145,8 @@ fn participants(
     recording: &SmoothedRecording,
     roles: &Roles<'_>,
     frame: &Frame,
-    (all, period): (&[LaneChange], Time),
+    all: &[LaneChange],
+    period: Time,
 ) -> Option<Vec<Participant>> {
     let participant = |track: &Trajectory| {
         let within = |change: &&LaneChange| {

@@ -2,11 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use closecall_traffic::metrics::time_headway_s;
+use closecall_statistics::quantiles::median;
+use closecall_traffic::metrics::{CRITICAL_THW_S, bumper_gap_m, time_headway_s};
 use closecall_traffic::{Lane, Side, Time, Trajectory, TrajectoryPoint};
 
-use super::distribution::median;
-use crate::criticality::CRITICAL_THW_S;
 use crate::filters::{PERIOD, SmoothedRecording};
 use crate::lane_change::{LaneChange, detect};
 
@@ -113,7 +112,7 @@ impl Samples {
     }
 
     /// Adds a headway to quantity `all`, and also to `critical` if it is critical and at least `from_s`.
-    fn push_headway(&mut self, [all, critical]: [Quantity; 2], from_s: f64, thw_s: f64) {
+    fn push_headway(&mut self, all: Quantity, critical: Quantity, from_s: f64, thw_s: f64) {
         self.push(all, thw_s);
         if (from_s..CRITICAL_THW_S).contains(&thw_s) {
             self.push(critical, thw_s);
@@ -146,7 +145,7 @@ fn observe_lane_change(recording: &SmoothedRecording, change: &LaneChange, sampl
     if thw_s > FOLLOWING_THW_S {
         return;
     }
-    samples.push_headway([Quantity::CutOutThw, Quantity::CriticalCutOutThw], 0.0, thw_s);
+    samples.push_headway(Quantity::CutOutThw, Quantity::CriticalCutOutThw, 0.0, thw_s);
     // The closing speed to the same lead vehicle at the start of the manoeuvre, or when both are first recorded.
     let own = &recording.tracks[lead.own_index].trajectory;
     let other = &recording.tracks[lead.lead_index].trajectory;
@@ -185,7 +184,7 @@ fn lead_in(recording: &SmoothedRecording, track_id: u64, lane: Lane, time: Time)
 
 /// Returns the gap between two vehicles, bumper to bumper (m).
 fn gap_m(rear: (&Trajectory, &TrajectoryPoint), front: (&Trajectory, &TrajectoryPoint)) -> f64 {
-    front.1.s_m - rear.1.s_m - 0.5 * (front.0.dimensions.length_m + rear.0.dimensions.length_m)
+    bumper_gap_m(front.1.s_m - rear.1.s_m, front.0.dimensions.length_m, rear.0.dimensions.length_m)
 }
 
 /// Adds the median headway and speed of each pair of vehicles that follow each other for long enough.
@@ -194,8 +193,9 @@ fn observe_following(recording: &SmoothedRecording, samples: &mut Samples) {
     let spans = recording.tracks.iter().filter_map(|track| track.trajectory.span());
     let Some((mut time, last)) = spans.reduce(|(a, b), (c, d)| (a.min(c), b.max(d))) else { return };
     while time <= last {
-        for (pair, thw_s, speed_mps) in following_at(recording, time) {
-            pairs.entry(pair).or_default().push((thw_s, speed_mps));
+        for following in following_at(recording, time) {
+            let instants = pairs.entry((following.own_index, following.lead_index)).or_default();
+            instants.push((following.thw_s, following.speed_mps));
         }
         time += PERIOD;
     }
@@ -204,14 +204,23 @@ fn observe_following(recording: &SmoothedRecording, samples: &mut Samples) {
             continue;
         }
         let (headways, speeds): (Vec<f64>, Vec<f64>) = instants.into_iter().unzip();
-        samples.push_headway([Quantity::FrontThw, Quantity::ShortFrontThw], SHORTEST_ACC_S, median(headways));
+        samples.push_headway(Quantity::FrontThw, Quantity::ShortFrontThw, SHORTEST_ACC_S, median(headways));
         samples.push(Quantity::FollowingSpeed, median(speeds));
     }
 }
 
-/// Returns all pairs of neighbours in one lane of which one follows the other at `time`: the track indices of the
-/// following and the lead vehicle, the headway (s), and the speed of the following vehicle (m/s).
-fn following_at(recording: &SmoothedRecording, time: Time) -> Vec<((usize, usize), f64, f64)> {
+/// A vehicle that follows another one at one instant.
+struct Following {
+    own_index: usize,
+    lead_index: usize,
+    /// Time headway (s).
+    thw_s: f64,
+    /// Speed of the following vehicle (m/s).
+    speed_mps: f64,
+}
+
+/// Returns all pairs of neighbours in one lane of which one follows the other at `time`.
+fn following_at(recording: &SmoothedRecording, time: Time) -> Vec<Following> {
     let mut present: Vec<_> = recording.present_at(time).to_vec();
     present.sort_by(|a, b| {
         let (a, b) = (recording.look_up(*a).1, recording.look_up(*b).1);
@@ -222,7 +231,8 @@ fn following_at(recording: &SmoothedRecording, time: Time) -> Vec<((usize, usize
         let gap_m = gap_m(rear, front);
         let thw_s = time_headway_s(gap_m, rear.1.speed_mps).ok()?;
         let counts = rear.1.lane == front.1.lane && gap_m >= 0.0 && thw_s <= FOLLOWING_THW_S;
-        counts.then_some(((pair[0].track_index, pair[1].track_index), thw_s, rear.1.speed_mps))
+        let [own_index, lead_index] = [pair[0].track_index, pair[1].track_index];
+        counts.then_some(Following { own_index, lead_index, thw_s, speed_mps: rear.1.speed_mps })
     });
     follows.collect()
 }

@@ -83,12 +83,20 @@ fn lane_changes(
     let change = |passed: u8| LaneChange {
         from_lane: step(passed - 1),
         to_lane: step(passed),
-        ..lane_change(sampled, direction, [before.last, crossing(passed), after.first])
+        ..lane_change(sampled, direction, &Samples { start: before.last, crossing: crossing(passed), end: after.first })
     };
     (1..=markings).map(change).collect()
 }
 
-fn lane_change(sampled: &Sampled<'_>, direction: Side, [start, crossing, end]: [usize; 3]) -> LaneChange {
+/// The samples of a track at which a lane change starts, crosses the marking and ends.
+struct Samples {
+    start: usize,
+    crossing: usize,
+    end: usize,
+}
+
+fn lane_change(sampled: &Sampled<'_>, direction: Side, samples: &Samples) -> LaneChange {
+    let &Samples { start, crossing, end } = samples;
     let track = sampled.track;
     let span = [start as f64, end as f64];
     let settled = [span[0] - SETTLED_SAMPLES, span[1] + SETTLED_SAMPLES];

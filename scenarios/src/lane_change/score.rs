@@ -12,11 +12,11 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+use closecall_statistics::interval::{COVERAGE, clopper_pearson};
 use closecall_traffic::{Side, Time};
 use serde::{Deserialize, Serialize};
 
 use super::LaneChange;
-use crate::interval::clopper_pearson;
 
 /// Largest difference between the detected and the listed crossing time (s).
 const AGREEMENT_S: f64 = 0.5;
@@ -80,7 +80,7 @@ pub struct Share {
 
 impl fmt::Display for Share {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [low, high] = clopper_pearson(self.hits, self.of);
+        let [low, high] = clopper_pearson(self.hits, self.of, COVERAGE);
         let percent = 100.0 * self.hits as f64 / self.of as f64;
         write!(f, "{} of {}", self.hits, self.of)?;
         if self.of > 0 {

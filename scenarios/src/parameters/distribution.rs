@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
+use closecall_statistics::normal::TruncatedStandardNormal;
+use closecall_statistics::quantiles;
 use closecall_traffic::{ConfigError, KeyPath, Problem, Range, Value};
 
 use super::config::{EmpiricalConfig, LogNormalConfig, TruncatedNormalConfig, UniformConfig};
-use super::empirical;
-use super::normal::TruncatedStandardNormal;
 
 /// Largest magnitude of a number in a distribution. It is far above every quantity of a scenario, and sums and products
 /// of such numbers stay finite.
@@ -189,7 +189,7 @@ impl Distribution {
                 let index = weights.cumulative.partition_point(|&cumulative| cumulative <= u);
                 Value::Label(weights.labels[index.min(weights.labels.len() - 1)].clone())
             }
-            Kind::Empirical { quantiles } => Value::Number(empirical::quantile(quantiles, u)),
+            Kind::Empirical { quantiles: values } => Value::Number(quantiles::quantile(values, u)),
             Kind::Fixed(value) => value.clone(),
         }
     }
@@ -209,7 +209,7 @@ impl Distribution {
             Kind::TruncatedNormal { mean, sd, standard, .. } => Some(standard.cdf((x - mean) / sd)),
             Kind::LogNormal { .. } if x <= 0.0 => Some(0.0),
             Kind::LogNormal { median, sigma, standard, .. } => Some(standard.cdf((x / median).ln() / sigma)),
-            Kind::Empirical { quantiles } => Some(empirical::cdf(quantiles, x)),
+            Kind::Empirical { quantiles: values } => Some(quantiles::cdf(values, x)),
             Kind::Fixed(Value::Number(value)) => Some(if x < *value { 0.0 } else { 1.0 }),
             Kind::Choice(_) | Kind::Fixed(Value::Label(_)) => None,
         }

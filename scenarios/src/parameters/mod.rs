@@ -17,9 +17,7 @@
 
 mod config;
 mod distribution;
-mod empirical;
 mod finite;
-mod normal;
 mod space;
 #[cfg(test)]
 mod tests;

@@ -10,9 +10,8 @@ use closecall_traffic::{Environment, Light, VehicleState};
 
 use super::Camera;
 use super::mesh::{Emission, Vec3, dot, each};
+use crate::lidar::{KOSCHMIEDER, rain_db_per_km};
 
-/// Koschmieder's constant: ln 50, for a contrast threshold of 2 %.
-const KOSCHMIEDER: f64 = 3.912;
 /// Extinction coefficient that corresponds to 1 dB/km (1/m).
 const PER_METRE_OF_DB_PER_KM: f64 = 1.0 / 4_343.0;
 /// Rain rate from which the sky is fully overcast (mm/h).
@@ -137,8 +136,8 @@ impl Illumination {
         // An overcast sky is grey, about as bright at the zenith as at the horizon, and illuminates from all sides.
         let grey = level.horizon.iter().sum::<f32>() / 3.0;
         let overcast = |clear_value: f32, grey_value: f32| grey_value + (clear_value - grey_value) * clear;
-        let rain_db_per_km = 1.076 * environment.rain_mm_per_h.powf(0.67);
-        let extinction_per_m = KOSCHMIEDER / environment.visibility_m + rain_db_per_km * PER_METRE_OF_DB_PER_KM;
+        let extinction_per_m =
+            KOSCHMIEDER / environment.visibility_m + rain_db_per_km(environment) * PER_METRE_OF_DB_PER_KM;
         let brake = if ego.brake_light { BRAKE_LIGHT } else { 1.0 };
         Self {
             ambient: level.ambient.map(|value| overcast(value, 0.78 * grey)),

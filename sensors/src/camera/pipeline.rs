@@ -7,7 +7,7 @@ use super::{Camera, Crop, ExposureKey, Frame, GroundBox, Lists, PixelRect, RearC
 use crate::{Detection, Scene, SceneVehicle, SensorError};
 
 /// Minimum share of a window that must lie in the image for it to be classified (0 to 1).
-const MIN_SHARE_IN_IMAGE: f64 = 0.6;
+pub(super) const MIN_SHARE_IN_IMAGE: f64 = 0.6;
 /// Lower bound that the fusion applies to each score (0 to 1), so that neither the shape nor the image alone can rule
 /// out a class.
 const MIN_SCORE: f64 = 0.02;

@@ -1,109 +1,119 @@
-//! A box for each cluster, fitted by the faces that E can see.
+//! The fit of a box to each cluster, based on the faces that the sensor sees.
 //!
 //! ```text
-//!            ┌ ─ ─ ─ ─ ─ ─ ─ ─ ─ ┐              u: along the vehicle, towards E for one that follows
-//!            :                   ┃ front face   v: across it, to the left
+//!            ┌ ─ ─ ─ ─ ─ ─ ─ ─ ─ ┐              u: along the vehicle, forward
+//!            :                   ┃ front face   v: across the vehicle, to its left
 //!            :                   ┃ (seen)
-//!            └━━━━━━━━━━━━━━━━━━━┛ ─▶ u         ━ seen,  ─ assumed from the class's usual size
-//!              side face (seen where it stands off E's axis)
+//!            └━━━━━━━━━━━━━━━━━━━┛ ─▶ u         ━ seen,  ─ assumed from the class's typical size
+//!              side face (seen if the vehicle is beside the sensor's axis)
 //! ```
 //!
-//! Vehicles on a motorway point along the road, whose direction E knows; where a side is seen well enough, the heading
-//! is refined about that by the closeness criterion of L-shape fitting (Zhang, Xu, Dong and Dolan 2017, "Efficient
-//! L-shape fitting for vehicle detection using laser scanners").
+//! The heading of a box is the direction of the road, which the ego knows and which vehicles on a motorway follow. If
+//! enough of a side is seen, the heading is refined about that direction by the closeness criterion of L-shape fitting
+//! (Zhang, Xu, Dong and Dolan 2017, "Efficient L-shape fitting for vehicle detection using laser scanners").
 
 use super::{COLUMNS, LAYERS, LaneGeometry, LidarScan};
 
-/// Azimuth step within 15° of the axis, and outside [rad].
+/// Azimuth step within 15° of the sensor's axis (rad).
 const FINE_STEP_RAD: f64 = 0.125 * DEGREE;
+/// Azimuth step outside of that field (rad).
 const COARSE_STEP_RAD: f64 = 0.25 * DEGREE;
+/// Azimuth at which the fine steps end (rad).
 const FINE_FIELD_RAD: f64 = 15.0 * DEGREE;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
-/// Height of a footprint [rad].
-const LAYER_RAD: f64 = 0.6 * DEGREE;
-/// A cluster that reaches one of this many columns at either end may go on outside of the field of view.
+/// Spacing of layers (rad), taken as the height of a footprint.
+const LAYER_STEP_RAD: f64 = 0.6 * DEGREE;
+/// Number of columns at either end of the field of view. A cluster with a point in one of them may extend beyond the
+/// field of view.
 const EDGE_COLUMNS: usize = 4;
-/// Share of the points that may lie before the front face by noise.
-const STRAY_SHARE: usize = 20;
-/// Depth within which points are taken to lie on the front face [m].
+/// One point in this many may lie ahead of the front face because of noise.
+const POINTS_PER_STRAY: usize = 20;
+/// Depth within which points count as lying on the front face (m).
 const FACE_DEPTH_M: f64 = 0.2;
-/// A heading is refined where a side of at least this length is seen [m] with at least this many points.
+/// Length of the visible side from which the heading is refined (m).
 const REFINE_LENGTH_M: f64 = 2.5;
+/// Number of points from which the heading is refined.
 const REFINE_POINTS: usize = 30;
-/// Headings tried on each side of the road's direction, and their spacing [rad].
+/// Number of headings that are tried on each side of the road's direction.
 const HEADINGS: i32 = 6;
+/// Spacing of these headings (rad).
 const HEADING_STEP_RAD: f64 = 1.0 * DEGREE;
-/// How far headings scatter about the road's direction: 3.5 m/s to the side at 100 km/h is 7° [rad] (assumption).
+/// Standard deviation of headings about the road's direction (rad; assumption). A lateral speed of 3.5 m/s at 100 km/h,
+/// for comparison, is 7°.
 const HEADING_SD_RAD: f64 = 2.5 * DEGREE;
-/// Points beyond this distance from either side tell the fit nothing [m].
-const CLOSENESS_MOST_M: f64 = 0.5;
-/// Points used for trying headings.
-const REFINE_WITH: usize = 80;
+/// Maximum distance from a side that counts in the closeness criterion (m). Points farther away carry no information.
+const MAX_CLOSENESS_M: f64 = 0.5;
+/// Maximum number of points that are used to try headings.
+const REFINE_MAX_POINTS: usize = 80;
 
-/// What was seen of a cluster, in the frame of its own box.
+/// The visible extent of a cluster, in the frame of its own box.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Fit {
-    /// Direction of the box relative to E's heading [rad].
+pub(crate) struct BoxFit {
+    /// Heading of the box relative to the ego's heading (rad).
     pub(crate) heading_rad: f64,
-    /// The face nearest to E, along the direction, from E's origin [m].
+    /// Position u of the front face along the box's heading, from the ego's origin (m).
     pub(crate) front_u_m: f64,
-    /// Farthest point seen [m].
+    /// Least position u of the points (m): the rearmost point of the vehicle that is seen.
     pub(crate) rear_u_m: f64,
-    /// Least and greatest position across [m].
+    /// Least and greatest position v across the box's heading (m).
     pub(crate) across_m: [f64; 2],
-    /// Highest and lowest point [m].
+    /// Height of the highest point (m).
     pub(crate) top_m: f64,
+    /// Height of the lowest point (m).
     pub(crate) bottom_m: f64,
-    /// Lowest point on the front face [m].
+    /// Height of the lowest point on the front face (m).
     pub(crate) front_bottom_m: f64,
-    /// Mean received intensity [1].
+    /// Mean intensity of the points, as a reflectivity.
     pub(crate) intensity: f64,
+    /// Number of points.
     pub(crate) points: usize,
-    /// Points on the front face.
+    /// Number of points on the front face.
     pub(crate) front_points: usize,
-    /// Mean time of measurement after the scan's start [ns].
+    /// Mean time of measurement of the points after the scan's start (ns).
     pub(crate) offset_ns: f64,
-    /// Distance from the sensor [m].
+    /// Horizontal distance of the nearest point from the sensor (m).
     pub(crate) range_m: f64,
-    /// Spacing of columns there, across the line of sight [m].
+    /// Spacing of columns at that distance, across the line of sight (m).
     pub(crate) spacing_m: f64,
-    /// Azimuths of its edges as the sensor sees them, to E's left [rad], least first.
+    /// Least and greatest azimuth of the points about the sensor's axis, positive to the ego's left (rad).
     pub(crate) azimuth_rad: [f64; 2],
-    /// Whether its right and its left edge reach the edge of the field of view. Told by the columns: E has moved on since
-    /// the first was measured, so that the azimuth of a near point at the scan's end is not that of its beam.
-    pub(crate) cut: [bool; 2],
+    /// Whether the right and the left edge of the cluster are truncated by the field of view.
+    ///
+    /// This follows from the columns of the points. The azimuth would be wrong: the ego moves on after a column is
+    /// measured, so at the scan's end the azimuth of a near point is no longer that of its beam.
+    pub(crate) truncated: [bool; 2],
 }
 
-impl Fit {
-    /// Fits a box to the points of a cluster, which are given by their places in the scan; at least one.
-    pub(crate) fn to(members: &[u32], scan: &LidarScan, lane: &LaneGeometry) -> Self {
+impl BoxFit {
+    /// Fits a box to the points of a cluster. `members` are their indices in the scan, at least one.
+    pub(crate) fn new(members: &[u32], scan: &LidarScan, lane: &LaneGeometry) -> Self {
         let mean_x = mean(members, &scan.x_m);
         let road_rad = lane.direction_rad(mean_x);
-        let mut fit = Self::along(road_rad, members, scan);
+        let mut fit = Self::with_heading(road_rad, members, scan);
         let side_seen = fit.front_u_m - fit.rear_u_m > REFINE_LENGTH_M;
         if side_seen && members.len() >= REFINE_POINTS {
-            fit = Self::along(refined(road_rad, members, scan), members, scan);
+            fit = Self::with_heading(refined_heading_rad(road_rad, members, scan), members, scan);
         }
         fit
     }
 
-    /// The box in one direction.
-    fn along(heading_rad: f64, members: &[u32], scan: &LidarScan) -> Self {
+    /// Returns the box with a given heading.
+    fn with_heading(heading_rad: f64, members: &[u32], scan: &LidarScan) -> Self {
         let (sin, cos) = heading_rad.sin_cos();
-        let mut fit = Self::empty(heading_rad, members, scan);
+        let mut fit = Self::without_extent(heading_rad, members, scan);
         let sensor_x = f64::from(scan.sensor_x_m);
-        let mut nearest = Nearest::default();
+        let mut nearest = LargestValues::default();
         let (mut far, mut squares) = (f64::INFINITY, f64::INFINITY);
         let mut slopes = [f64::INFINITY, f64::NEG_INFINITY];
         for &member in members {
             let [x, y, z] = point(scan, member);
             let (u, v) = (x * cos + y * sin, y * cos - x * sin);
-            nearest.offer(u, members.len() / STRAY_SHARE);
+            nearest.insert(u, members.len() / POINTS_PER_STRAY);
             far = far.min(u);
             fit.across_m = [fit.across_m[0].min(v), fit.across_m[1].max(v)];
             fit.top_m = fit.top_m.max(z);
             fit.bottom_m = fit.bottom_m.min(z);
-            // Everything lies behind the sensor: the slope grows with the azimuth.
+            // All points are behind the sensor, so the slope increases with the azimuth.
             let slope = y / (sensor_x - x);
             slopes = [slopes[0].min(slope), slopes[1].max(slope)];
             squares = squares.min((sensor_x - x).powi(2) + y * y);
@@ -112,11 +122,12 @@ impl Fit {
         fit.rear_u_m = far;
         fit.range_m = squares.sqrt();
         fit.spacing_m = fit.range_m * column_step_rad(0.5 * (fit.azimuth_rad[0] + fit.azimuth_rad[1]));
-        fit.place_front(nearest.value(), [sin, cos], members, scan);
+        fit.locate_front(nearest.value(), [sin, cos], members, scan);
         fit
     }
 
-    fn empty(heading_rad: f64, members: &[u32], scan: &LidarScan) -> Self {
+    /// Returns a fit whose extents are empty, with the values that do not depend on the heading.
+    fn without_extent(heading_rad: f64, members: &[u32], scan: &LidarScan) -> Self {
         let offsets = members.iter().map(|&member| f64::from(scan.offset_ns[member as usize]));
         Self {
             heading_rad,
@@ -133,12 +144,14 @@ impl Fit {
             range_m: 0.0,
             spacing_m: 0.0,
             azimuth_rad: [0.0; 2],
-            cut: cut(members, scan),
+            truncated: truncated_edges(members, scan),
         }
     }
 
-    /// The front face: the mean of the points about the nearest that is not a stray.
-    fn place_front(&mut self, edge_m: f64, [sin, cos]: [f64; 2], members: &[u32], scan: &LidarScan) {
+    /// Sets the front face to the mean position of the points on it.
+    ///
+    /// `edge_m` is the position u of the foremost point that is not taken for noise.
+    fn locate_front(&mut self, edge_m: f64, [sin, cos]: [f64; 2], members: &[u32], scan: &LidarScan) {
         let (mut sum, mut count) = (0.0, 0_usize);
         for &member in members {
             let [x, y, z] = point(scan, member);
@@ -153,80 +166,82 @@ impl Fit {
         self.front_u_m = if count > 0 { sum / count as f64 } else { edge_m };
     }
 
-    /// Extent across, as seen [m].
+    /// Returns the visible width (m).
     pub(crate) fn width_m(&self) -> f64 {
         self.across_m[1] - self.across_m[0]
     }
 
-    /// Extent along, as seen [m].
+    /// Returns the visible length (m).
     pub(crate) fn length_m(&self) -> f64 {
         (self.front_u_m - self.rear_u_m).max(0.0)
     }
 
-    /// Spacing of layers at this distance [m].
+    /// Returns the spacing of layers at this distance (m).
     pub(crate) fn layer_m(&self) -> f64 {
-        self.range_m * LAYER_RAD
+        self.range_m * LAYER_STEP_RAD
     }
 
-    /// True where the cluster reaches the edge of the field of view.
-    pub(crate) fn is_cut(&self) -> bool {
-        self.cut[0] || self.cut[1]
+    /// Returns true if the field of view truncates the cluster.
+    pub(crate) fn is_truncated(&self) -> bool {
+        self.truncated[0] || self.truncated[1]
     }
 }
 
-/// Whether points come from the outermost columns on the right and on the left of E; the sweep begins on the left.
-fn cut(members: &[u32], scan: &LidarScan) -> [bool; 2] {
+/// Returns whether any point comes from the outermost columns on the ego's right, and on its left. The sweep begins on
+/// the left.
+fn truncated_edges(members: &[u32], scan: &LidarScan) -> [bool; 2] {
     let columns = members.iter().map(|&member| usize::from(scan.beam[member as usize]) / LAYERS);
     let (first, last) = columns.fold((COLUMNS, 0), |(first, last), column| (first.min(column), last.max(column)));
     [last >= COLUMNS - EDGE_COLUMNS, first < EDGE_COLUMNS]
 }
 
-/// The greatest values offered, for a quantile near the top.
+/// The largest of the inserted values, which yield a quantile near the maximum.
 #[derive(Clone, Copy, Debug)]
-struct Nearest {
-    kept: [f64; Self::MOST],
+struct LargestValues {
+    values: [f64; Self::CAPACITY],
     rank: usize,
 }
 
-impl Default for Nearest {
+impl Default for LargestValues {
     fn default() -> Self {
-        Self { kept: [f64::NEG_INFINITY; Self::MOST], rank: 0 }
+        Self { values: [f64::NEG_INFINITY; Self::CAPACITY], rank: 0 }
     }
 }
 
-impl Nearest {
-    const MOST: usize = 6;
+impl LargestValues {
+    const CAPACITY: usize = 6;
 
-    /// Takes one value, when the `rank`-th greatest is asked for (0: the greatest; at most 5).
-    fn offer(&mut self, value: f64, rank: usize) {
-        self.rank = rank.min(Self::MOST - 1);
+    /// Inserts a value. `rank` selects the value that is wanted: 0 for the largest, 5 at most.
+    fn insert(&mut self, value: f64, rank: usize) {
+        self.rank = rank.min(Self::CAPACITY - 1);
         let mut value = value;
-        for kept in &mut self.kept[..=self.rank] {
-            if value > *kept {
-                std::mem::swap(&mut value, kept);
+        for slot in &mut self.values[..=self.rank] {
+            if value > *slot {
+                std::mem::swap(&mut value, slot);
             }
         }
     }
 
+    /// Returns the value of the selected rank.
     fn value(&self) -> f64 {
-        self.kept[self.rank]
+        self.values[self.rank]
     }
 }
 
-/// The direction about `road_rad` in which the points lie closest to the two sides of a rectangle.
-fn refined(road_rad: f64, members: &[u32], scan: &LidarScan) -> f64 {
-    let stride = members.len().div_ceil(REFINE_WITH);
+/// Returns the heading near `road_rad` for which the points are closest to the sides of a rectangle (rad).
+fn refined_heading_rad(road_rad: f64, members: &[u32], scan: &LidarScan) -> f64 {
+    let stride = members.len().div_ceil(REFINE_MAX_POINTS);
     let mut best = (f64::INFINITY, road_rad);
     for step in -HEADINGS..=HEADINGS {
         let turned = f64::from(step) * HEADING_STEP_RAD;
         let (sin, cos) = (road_rad + turned).sin_cos();
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        let across = |member: u32| {
+        let rotated = |member: u32| {
             let [x, y, _] = point(scan, member);
             [x * cos + y * sin, y * cos - x * sin]
         };
         for &member in members.iter().step_by(stride) {
-            let at = across(member);
+            let at = rotated(member);
             for axis in 0..2 {
                 low[axis] = low[axis].min(at[axis]);
                 high[axis] = high[axis].max(at[axis]);
@@ -234,10 +249,10 @@ fn refined(road_rad: f64, members: &[u32], scan: &LidarScan) -> f64 {
         }
         let mut cost = 0.5 * (turned / HEADING_SD_RAD).powi(2);
         for &member in members.iter().step_by(stride) {
-            let at = across(member);
+            let at = rotated(member);
             let side = (at[1] - low[1]).min(high[1] - at[1]);
             let end = (at[0] - low[0]).min(high[0] - at[0]);
-            cost += side.min(end).min(CLOSENESS_MOST_M);
+            cost += side.min(end).min(MAX_CLOSENESS_M);
         }
         if cost < best.0 {
             best = (cost, road_rad + turned);
@@ -246,7 +261,7 @@ fn refined(road_rad: f64, members: &[u32], scan: &LidarScan) -> f64 {
     best.1
 }
 
-/// Spacing of columns at an azimuth about the sensor's axis [rad].
+/// Returns the spacing of columns at an azimuth about the sensor's axis (rad).
 fn column_step_rad(azimuth_rad: f64) -> f64 {
     if azimuth_rad.abs() < FINE_FIELD_RAD { FINE_STEP_RAD } else { COARSE_STEP_RAD }
 }

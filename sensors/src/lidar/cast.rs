@@ -1,22 +1,24 @@
-//! The ray cast: which face each sub-ray meets first.
+//! The ray cast: finds the face that each sub-ray hits first.
 //!
-//! For one column the directions of all sub-rays of a group share cos φ and sin φ, so that m·d is a constant plus
-//! m_z·tan θ: two operations for each of the eight sub-rays of a beam, side by side in vector registers. The columns and
-//! layers that a solid can touch are found beforehand from its bounds; [`by_brute_force`] tries everything instead, and
-//! a property test holds the two to the same bits.
+//! A face is given by the vector m of [`targets`](super::targets), a direction by the vector d. Within a column the
+//! sub-rays of a group that lie above each other share cos φ and sin φ. The product m·d is then a constant plus
+//! m_z·tan(θ): two operations for each of the eight sub-rays of a beam, which run side by side in vector registers.
+//!
+//! The columns and layers that can hit a solid follow from its bounds, and only these are tried. `by_brute_force` tries
+//! all of them, and a property test requires the same result to the bit.
 
-use super::pattern::{ACROSS, Column, Elevation, LAYERS, LAYERS_PER_GROUP, SUBRAYS, UPWARD};
+use super::pattern::{Column, Elevation, LAYERS, LAYERS_PER_GROUP, SUBRAY_COLUMNS, SUBRAY_ROWS, SUBRAYS};
 use super::targets::{FaceRange, Part, Targets};
 
-/// No face was met.
+/// The face index of a sub-ray that hits nothing.
 pub(crate) const NO_FACE: u32 = u32::MAX;
 
-/// What the sub-rays of one beam meet first.
+/// The first hits of the sub-rays of a beam.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct BeamHits {
-    /// Inverse of the horizontal distance [1/m], 0 where nothing is met.
+    /// Inverse of the horizontal distance of each hit (1/m), or 0 if the sub-ray hits nothing.
     pub(crate) inverse: [f32; SUBRAYS],
-    /// The face, as an index; [`NO_FACE`] where nothing is met.
+    /// Index of the face that each sub-ray hits, or [`NO_FACE`].
     pub(crate) face: [u32; SUBRAYS],
 }
 
@@ -24,120 +26,127 @@ impl BeamHits {
     pub(crate) const NONE: Self = Self { inverse: [0.0; SUBRAYS], face: [NO_FACE; SUBRAYS] };
 }
 
-/// What the beams of one column meet first.
+/// The first hits of the beams of a column.
 #[derive(Clone, Debug)]
 pub(crate) struct ColumnHits {
+    /// First hits of the beam of each layer.
     pub(crate) beams: [BeamHits; LAYERS],
-    /// The layers that some solid may have met, as bits.
-    pub(crate) touched: u16,
-    /// The layers that may see the road: all below this one.
+    /// Bit mask of the layers that were tested against at least one solid.
+    pub(crate) tested: u16,
+    /// Number of layers, counted from the lowest, that may receive a return from the road.
     pub(crate) ground_below: usize,
 }
 
 impl Default for ColumnHits {
     fn default() -> Self {
-        Self { beams: [BeamHits::NONE; LAYERS], touched: 0, ground_below: 0 }
+        Self { beams: [BeamHits::NONE; LAYERS], tested: 0, ground_below: 0 }
     }
 }
 
 impl ColumnHits {
-    /// Forgets the previous column.
+    /// Resets the hits for the next column.
     pub(crate) fn clear(&mut self) {
         for layer in 0..LAYERS {
-            if self.is_touched(layer) {
+            if self.is_tested(layer) {
                 self.beams[layer] = BeamHits::NONE;
             }
         }
-        self.touched = 0;
+        self.tested = 0;
         self.ground_below = 0;
     }
 
-    /// True where some solid may have met the beam of this layer.
-    pub(crate) fn is_touched(&self, layer: usize) -> bool {
-        self.touched >> layer & 1 == 1
+    /// Returns true if this layer was tested against at least one solid.
+    pub(crate) fn is_tested(&self, layer: usize) -> bool {
+        self.tested >> layer & 1 == 1
     }
 
-    /// Lets the beams of a column meet one solid.
+    /// Intersects the beams of a column with a solid.
     pub(crate) fn cast(&mut self, column: &Column, elevations: &[Elevation], part: &Part, targets: &Targets) {
         for layer in part.layers.clone() {
             let group = layer / LAYERS_PER_GROUP;
-            let ray = Fan { cos: column.cos[group], sin: column.sin[group], tan: elevations[layer].tan };
-            self.meet(layer, &ray, part.faces, targets);
+            let subrays = SubRays { cos: column.cos[group], sin: column.sin[group], tan: elevations[layer].tan };
+            self.intersect(layer, &subrays, part.faces, targets);
         }
     }
 
-    /// Lets the beam of one layer meet one solid.
+    /// Intersects the beam of a layer with a solid.
     #[inline]
-    pub(crate) fn meet(&mut self, layer: usize, fan: &Fan, faces: FaceRange, targets: &Targets) {
-        fan.meet(faces, targets, &mut self.beams[layer]);
-        self.touched |= 1 << layer;
+    pub(crate) fn intersect(&mut self, layer: usize, subrays: &SubRays, faces: FaceRange, targets: &Targets) {
+        subrays.intersect(faces, targets, &mut self.beams[layer]);
+        self.tested |= 1 << layer;
     }
 }
 
-/// Which sub-ray a lane is: across and upward. Neighbours in range are neighbours in the lanes.
+/// Returns the position (across, upward) of a sub-ray in the footprint. Sub-rays of the same height, whose ranges are
+/// most alike, have successive indices.
 #[inline(always)]
-pub(crate) const fn place(lane: usize) -> (usize, usize) {
-    (lane % ACROSS, lane / ACROSS)
+pub(crate) const fn subray_position(subray: usize) -> (usize, usize) {
+    (subray % SUBRAY_COLUMNS, subray / SUBRAY_COLUMNS)
 }
 
-/// The sub-rays of one beam.
+/// The directions of the sub-rays of a beam.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Fan {
-    pub(crate) cos: [f32; ACROSS],
-    pub(crate) sin: [f32; ACROSS],
-    pub(crate) tan: [f32; UPWARD],
+pub(crate) struct SubRays {
+    /// Cosines of the azimuths.
+    pub(crate) cos: [f32; SUBRAY_COLUMNS],
+    /// Sines of the azimuths.
+    pub(crate) sin: [f32; SUBRAY_COLUMNS],
+    /// Tangents of the elevations.
+    pub(crate) tan: [f32; SUBRAY_ROWS],
 }
 
-impl Fan {
-    /// m·d of each sub-ray.
+impl SubRays {
+    /// Returns the inverse horizontal distance m·d at which each sub-ray meets the plane of a face (1/m).
     #[inline(always)]
-    pub(crate) fn along(&self, inverse: [f32; 3]) -> [f32; SUBRAYS] {
-        let level: [f32; ACROSS] =
+    pub(crate) fn inverse_distances(&self, inverse: [f32; 3]) -> [f32; SUBRAYS] {
+        let horizontal: [f32; SUBRAY_COLUMNS] =
             std::array::from_fn(|across| inverse[0] * self.cos[across] + inverse[1] * self.sin[across]);
-        std::array::from_fn(|lane| {
-            let (across, upward) = place(lane);
-            level[across] + inverse[2] * self.tan[upward]
+        std::array::from_fn(|subray| {
+            let (across, upward) = subray_position(subray);
+            horizontal[across] + inverse[2] * self.tan[upward]
         })
     }
 
-    /// Keeps in `hits` what is nearer: what was met before, or this solid. Where both are equally near, the former.
+    /// Replaces the hits of those sub-rays that meet this solid at a shorter distance. At equal distance the earlier
+    /// hit stays.
     #[inline(always)]
-    fn meet(&self, faces: FaceRange, targets: &Targets, hits: &mut BeamHits) {
+    fn intersect(&self, faces: FaceRange, targets: &Targets, hits: &mut BeamHits) {
         let mut nearest = [f32::INFINITY; SUBRAYS];
-        let mut by = [NO_FACE; SUBRAYS];
-        for (face, index) in targets.faces[faces.towards()].iter().zip(faces.first..) {
-            let along = self.along(face.inverse);
-            for lane in 0..SUBRAYS {
-                by[lane] = if along[lane] < nearest[lane] { index } else { by[lane] };
-                nearest[lane] = if along[lane] < nearest[lane] { along[lane] } else { nearest[lane] };
+        let mut nearest_face = [NO_FACE; SUBRAYS];
+        for (face, index) in targets.faces[faces.front_facing()].iter().zip(faces.first..) {
+            let planes = self.inverse_distances(face.inverse);
+            for subray in 0..SUBRAYS {
+                nearest_face[subray] = if planes[subray] < nearest[subray] { index } else { nearest_face[subray] };
+                nearest[subray] = if planes[subray] < nearest[subray] { planes[subray] } else { nearest[subray] };
             }
         }
-        let mut farthest = [0.0_f32; SUBRAYS];
-        for face in &targets.faces[faces.away()] {
-            let along = self.along(face.inverse);
-            for lane in 0..SUBRAYS {
-                farthest[lane] = if along[lane] > farthest[lane] { along[lane] } else { farthest[lane] };
+        let mut entered_after = [0.0_f32; SUBRAYS];
+        for face in &targets.faces[faces.back_facing()] {
+            let planes = self.inverse_distances(face.inverse);
+            for subray in 0..SUBRAYS {
+                entered_after[subray] =
+                    if planes[subray] > entered_after[subray] { planes[subray] } else { entered_after[subray] };
             }
         }
-        for lane in 0..SUBRAYS {
-            let met = nearest[lane] > farthest[lane] && nearest[lane] > hits.inverse[lane];
-            hits.inverse[lane] = if met { nearest[lane] } else { hits.inverse[lane] };
-            hits.face[lane] = if met { by[lane] } else { hits.face[lane] };
+        for subray in 0..SUBRAYS {
+            let is_nearer = nearest[subray] > entered_after[subray] && nearest[subray] > hits.inverse[subray];
+            hits.inverse[subray] = if is_nearer { nearest[subray] } else { hits.inverse[subray] };
+            hits.face[subray] = if is_nearer { nearest_face[subray] } else { hits.face[subray] };
         }
     }
 }
 
-/// The parts that a sweep over the columns has to try at each of them.
+/// The solids whose bounds contain the current column of a sweep over all columns.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Active {
-    /// Parts in order of their first column, then of their index.
+pub(crate) struct ActiveParts {
+    /// Indices of all parts, in order of their first column, then of their index.
     queue: Vec<usize>,
     next: usize,
     parts: Vec<usize>,
 }
 
-impl Active {
-    /// Starts a sweep.
+impl ActiveParts {
+    /// Starts a sweep at column 0.
     pub(crate) fn start(&mut self, targets: &Targets) {
         self.queue.clear();
         self.queue.extend(0..targets.parts.len());
@@ -146,21 +155,21 @@ impl Active {
         self.parts.clear();
     }
 
-    /// The parts for the next column, in order of their index.
-    pub(crate) fn at(&mut self, column: usize, targets: &Targets) -> &[usize] {
+    /// Advances to `column` and returns the parts whose bounds contain it, in order of their index.
+    pub(crate) fn advance_to(&mut self, column: usize, targets: &Targets) -> &[usize] {
         self.parts.retain(|&part| targets.parts[part].columns.end > column);
         while let Some(&part) = self.queue.get(self.next)
             && targets.parts[part].columns.start <= column
         {
-            let place = self.parts.partition_point(|&other| other < part);
-            self.parts.insert(place, part);
+            let position = self.parts.partition_point(|&other| other < part);
+            self.parts.insert(position, part);
             self.next += 1;
         }
         &self.parts
     }
 }
 
-/// The same for every beam and every solid, whatever the bounds say.
+/// Returns the hits of a column, with every beam tested against every solid regardless of its bounds.
 #[cfg(test)]
 pub(crate) fn by_brute_force(column: &Column, elevations: &[Elevation], targets: &Targets) -> ColumnHits {
     let mut hits = ColumnHits::default();

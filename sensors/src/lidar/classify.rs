@@ -1,106 +1,135 @@
-//! What a box looks like: class scores from its shape alone.
+//! The classification of a box by its shape alone.
 //!
-//! Bayes' rule over independent normal likelihoods of width, height and length, given what the scan could have shown
-//! at that distance: far away a footprint is as high as a car, and the outermost columns may be lost. Background is
-//! what stands beside the carriageway, what sends back too little, or what is too low or too thin.
+//! Bayes' rule combines independent normal likelihoods of width, height and length. The likelihoods allow for what a
+//! scan can show at the distance of the box: far away, a footprint is as high as a car, and the outermost columns may
+//! be lost. The background class covers objects that stand beside the carriageway, return too little light, or are too
+//! low or too thin.
 
 use closecall_traffic::ClassScores;
 
 use super::LaneGeometry;
-use super::boxes::Fit;
+use super::boxes::BoxFit;
+use crate::gaussian::Gaussian;
 
-/// Usual size of a class and how it scatters.
-struct Kind {
+/// The prior and the size distribution of a class.
+struct ClassModel {
+    /// Prior probability.
     prior: f64,
-    /// Width and its standard deviation [m].
-    width_m: [f64; 2],
-    /// Height and its standard deviation [m].
-    height_m: [f64; 2],
-    /// Length and its standard deviation [m].
-    length_m: [f64; 2],
+    /// Width (m).
+    width_m: Gaussian,
+    /// Height (m).
+    height_m: Gaussian,
+    /// Length (m).
+    length_m: Gaussian,
 }
 
-/// Cars, trucks, motorcycles, background; sizes as on European roads (assumptions; shares of motorway traffic).
-const KINDS: [Kind; 4] = [
-    Kind { prior: 0.60, width_m: [1.83, 0.12], height_m: [1.55, 0.25], length_m: [4.5, 0.5] },
-    Kind { prior: 0.20, width_m: [2.50, 0.12], height_m: [3.60, 0.50], length_m: [13.0, 4.0] },
-    Kind { prior: 0.10, width_m: [0.70, 0.20], height_m: [1.50, 0.20], length_m: [2.2, 0.2] },
-    Kind { prior: 0.10, width_m: [1.00, 1.50], height_m: [0.70, 0.60], length_m: [6.0, 10.0] },
+/// Car, truck, motorcycle and background. The sizes are typical of European roads, the priors are shares in motorway
+/// traffic (assumptions).
+const CLASS_MODELS: [ClassModel; 4] = [
+    ClassModel {
+        prior: 0.60,
+        width_m: Gaussian::new(1.83, 0.12),
+        height_m: Gaussian::new(1.55, 0.25),
+        length_m: Gaussian::new(4.5, 0.5),
+    },
+    ClassModel {
+        prior: 0.20,
+        width_m: Gaussian::new(2.50, 0.12),
+        height_m: Gaussian::new(3.60, 0.50),
+        length_m: Gaussian::new(13.0, 4.0),
+    },
+    ClassModel {
+        prior: 0.10,
+        width_m: Gaussian::new(0.70, 0.20),
+        height_m: Gaussian::new(1.50, 0.20),
+        length_m: Gaussian::new(2.2, 0.2),
+    },
+    ClassModel {
+        prior: 0.10,
+        width_m: Gaussian::new(1.00, 1.50),
+        height_m: Gaussian::new(0.70, 0.60),
+        length_m: Gaussian::new(6.0, 10.0),
+    },
 ];
-const BACKGROUND: usize = 3;
-/// Elevation of the uppermost layer's upper edge [tangent].
+/// Tangent of the elevation of the uppermost layer's upper edge.
 const HIGHEST_TAN: f64 = 0.085;
-/// Distance from which on the upper half of a vehicle may be missed [m].
+/// Distance from which the upper part of a vehicle may be missed entirely (m).
 const LOST_TOP_M: f64 = 100.0;
-/// Distance beyond the edge line at which only background is to be expected [m], and how sharply it begins.
+/// Distance beyond the road's edge from which only background is expected (m).
 const VERGE_M: f64 = 0.3;
+/// Width of the transition to that region (m).
 const VERGE_SOFTNESS_M: f64 = 0.2;
-/// Odds for background right beside the carriageway and beyond.
+/// Factor on the odds of background well beside the carriageway.
 const VERGE_ODDS: f64 = 1e4;
-/// Mean intensity of a cluster below which it is probably spray [1].
+/// Mean intensity below which a cluster is probably spray.
 const FAINT_INTENSITY: f64 = 0.03;
-/// Up to where spray is looked for [m].
+/// Distance up to which clusters are checked for spray (m).
 const FAINT_REACH_M: f64 = 20.0;
+/// Factor on the odds of background for a cluster of such low intensity.
 const FAINT_ODDS: f64 = 30.0;
-/// No score is lower: shape alone proves nothing.
-const LEAST_SCORE: f64 = 0.005;
+/// Minimum score of each class, because shape alone cannot rule out a class.
+const MIN_SCORE: f64 = 0.005;
 
-/// Usual length and width of a vehicle class [m], by which unseen faces are filled in.
-pub(crate) fn usual_size_m(class: usize) -> [f64; 2] {
-    [KINDS[class].length_m[0], KINDS[class].width_m[0]]
+/// Returns the typical length and width of a vehicle class (m), which replace the extents that are not seen.
+pub(crate) fn typical_size_m(class: usize) -> [f64; 2] {
+    [CLASS_MODELS[class].length_m.mean, CLASS_MODELS[class].width_m.mean]
 }
 
-/// Class scores of a fitted box. `width_seen`: both edges were in view.
-pub(crate) fn scores(fit: &Fit, width_seen: bool, lane: &LaneGeometry) -> ClassScores {
+/// Returns the class scores of a fitted box. `width_seen` is true if both lateral edges were in view.
+pub(crate) fn class_scores(fit: &BoxFit, width_seen: bool, lane: &LaneGeometry) -> ClassScores {
     let mut logs = [0.0; 4];
-    for (log, kind) in logs.iter_mut().zip(&KINDS) {
-        *log = kind.prior.ln() + width_log(fit, kind, width_seen) + height_log(fit, kind) + length_log(fit, kind);
+    for (log, model) in logs.iter_mut().zip(&CLASS_MODELS) {
+        *log = model.prior.ln() + width_log(fit, model, width_seen) + height_log(fit, model) + length_log(fit, model);
     }
-    logs[BACKGROUND] += background_log(fit, lane);
-    let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let mut scores = logs.map(|log| (log - most).exp());
+    logs[ClassScores::BACKGROUND] += background_log(fit, lane);
+    let max = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let mut scores = logs.map(|log| (log - max).exp());
     let sum: f64 = scores.iter().sum();
     for score in &mut scores {
-        *score = LEAST_SCORE + (1.0 - 4.0 * LEAST_SCORE) * *score / sum;
+        *score = MIN_SCORE + (1.0 - 4.0 * MIN_SCORE) * *score / sum;
     }
     ClassScores(scores)
 }
 
-/// Logarithm of a normal density up to a constant.
+/// Returns the logarithm of a normal density, up to a constant.
 fn normal_log(deviation: f64, sd: f64) -> f64 {
     -0.5 * (deviation / sd).powi(2) - sd.ln()
 }
 
-fn width_log(fit: &Fit, kind: &Kind, seen: bool) -> f64 {
-    let [width, sd] = kind.width_m;
+/// Returns the log likelihood of the visible width.
+fn width_log(fit: &BoxFit, model: &ClassModel, seen: bool) -> f64 {
+    let Gaussian { mean: width, sd } = model.width_m;
     let seen_m = fit.width_m() + 0.5 * fit.spacing_m;
     let sd = sd.hypot(0.7 * fit.spacing_m);
-    // An edge that is hidden, or lost to weak returns, only makes it look narrower.
+    // A hidden edge, or one lost to weak returns, only makes a vehicle look narrower.
     let lost = if seen { fit.spacing_m } else { width };
     if seen_m < width { normal_log(width - seen_m, sd.hypot(lost)) } else { normal_log(seen_m - width, sd) }
 }
 
-fn height_log(fit: &Fit, kind: &Kind) -> f64 {
-    let [height, sd] = kind.height_m;
+/// Returns the log likelihood of the visible height.
+fn height_log(fit: &BoxFit, model: &ClassModel) -> f64 {
+    let Gaussian { mean: height, sd } = model.height_m;
     let in_view = 0.6 + fit.range_m * HIGHEST_TAN;
     let half_layer = 0.5 * fit.layer_m();
     let expected = height.min(in_view - half_layer);
     let sd = sd.hypot(half_layer).hypot(0.1);
-    // From afar one layer may be all that is met, and the upper part of a car is glass, which sends little back.
+    // From afar a single layer may hit the vehicle, and the upper part of a car is glass, which returns little light.
     let lost = height * (fit.range_m / LOST_TOP_M).min(1.0);
     let deviation = fit.top_m - expected;
-    // One sided: losing the top is no better explained by a class that could lose more of it.
+    // Neither branch is normalised: a class is not penalised because its top can be lost more easily.
     if deviation < 0.0 { -0.5 * (deviation / sd.hypot(lost)).powi(2) } else { -0.5 * (deviation / sd).powi(2) }
 }
 
-/// A box is at least as long as what was seen of it.
-fn length_log(fit: &Fit, kind: &Kind) -> f64 {
-    let [length, sd] = kind.length_m;
+/// Returns the log likelihood of the visible length. Only a length in excess of the class's counts, since a box is at
+/// least as long as its visible part.
+fn length_log(fit: &BoxFit, model: &ClassModel) -> f64 {
+    let Gaussian { mean: length, sd } = model.length_m;
     let excess = (fit.length_m() - length).max(0.0);
     -0.5 * (excess / sd.hypot(0.3)).powi(2)
 }
 
-fn background_log(fit: &Fit, lane: &LaneGeometry) -> f64 {
+/// Returns the additional log odds of background, from the lateral position and the intensity.
+fn background_log(fit: &BoxFit, lane: &LaneGeometry) -> f64 {
     let (sin, cos) = fit.heading_rad.sin_cos();
     let mean_v = 0.5 * (fit.across_m[0] + fit.across_m[1]);
     let (x, y) = (fit.front_u_m * cos - mean_v * sin, fit.front_u_m * sin + mean_v * cos);

@@ -1,41 +1,42 @@
-//! The rear LiDAR's configuration: from text to something that cannot be invalid.
+//! The rear LiDAR's configuration: the text of a scenario file, and the checked value that it becomes.
 
 use closecall_traffic::{Check, Choice, ConfigError, Num, Parameters, Range};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The scanners that are modelled.
+/// A LiDAR model that can be simulated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum LidarModel {
-    /// Valeo SCALA, second generation.
+    /// The second generation of the Valeo SCALA.
     #[serde(rename = "scala-2")]
     Scala2,
 }
 
-/// The rear LiDAR as a scenario file describes it.
+/// The rear LiDAR as described in a scenario file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct LidarConfig {
-    /// Which scanner.
+    /// Model of the LiDAR.
     pub model: Choice<LidarModel>,
-    /// Height of its centre above the ground [m].
+    /// Height of the sensor's centre above the ground (m).
     pub mount_height_m: Num,
-    /// Upward tilt of its axis against E's body [rad].
+    /// Upward tilt of the sensor's axis relative to the ego's body (rad).
     pub tilt_rad: Num,
-    /// Range at which a target of 50 % reflectivity that fills the beam is detected with probability 0.5, in air
-    /// that does not attenuate [m].
+    /// Nominal range (m): the range at which a target of 50 % reflectivity that fills the beam is detected with
+    /// probability 0.5, in air that does not attenuate.
     pub nominal_range_m: Num,
-    /// Share of returns that are lost whatever their power [1].
+    /// Share of returns (0 to 1) that are lost regardless of their power.
     pub dropout: Num,
-    /// Standard deviation of the pitch by which E levels its points [rad].
+    /// Standard deviation of the error of the pitch angle that the ego uses to level its points (rad).
     pub levelling_sd_rad: Num,
-    /// Share of the light that the sensor's window lets through each way [1]: 1 clean, 0 blocked by snow or mud.
+    /// Share of the light (0 to 1) that the sensor's window transmits each way: 1 if clean, 0 if blocked by snow or
+    /// mud.
     pub window_transmission: Num,
 }
 
 impl Default for LidarConfig {
-    /// In the rear bumper. No tilt: at 100 m the two layers next to the axis, one on each mirror side, then lie at
-    /// −0.24° and +0.24°, which are the two halves of a car's painted front as seen from 0.6 m.
+    /// Returns a sensor in the rear bumper without tilt. On each mirror side, one layer then lies next to the axis, at
+    /// −0.24° or +0.24°. At 100 m these two elevations meet the two halves of a car's painted front as seen from 0.6 m.
     fn default() -> Self {
         Self {
             model: Choice::Fixed(LidarModel::Scala2),
@@ -49,7 +50,7 @@ impl Default for LidarConfig {
     }
 }
 
-/// A checked rear LiDAR.
+/// A checked rear LiDAR configuration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lidar {
     pub(crate) model: LidarModel,
@@ -79,7 +80,7 @@ impl Check for LidarConfig {
 }
 
 impl Default for Lidar {
-    /// What an empty table gives.
+    /// Returns the configuration that an empty table gives.
     fn default() -> Self {
         Self {
             model: LidarModel::Scala2,
@@ -103,14 +104,14 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_value_is_named_with_its_key() {
+    fn an_error_names_the_invalid_value_and_its_key() {
         let config = LidarConfig { mount_height_m: Num::Fixed(f64::NAN), ..LidarConfig::default() };
         let error = config.check(&Parameters::default()).unwrap_err();
         assert_eq!(error.to_string(), "`mount-height-m` is NaN, but a number from 0.2 to 2.5 is needed");
     }
 
     #[test]
-    fn the_model_is_written_as_in_the_scenario_file() {
+    fn the_model_name_is_read_from_a_scenario_file() {
         let config: LidarConfig = toml::from_str("model = \"scala-2\"\nmount-height-m = 0.7").unwrap();
         assert_eq!(config, LidarConfig { mount_height_m: Num::Fixed(0.7), ..LidarConfig::default() });
     }

@@ -1,119 +1,127 @@
-//! From points to detections: selection, clustering, boxes, classes.
+//! The detector: turns a scan into detections, by point selection, clustering, box fitting and classification.
 
 use closecall_traffic::{ClassScores, Time, VehicleClass};
 
-use super::boxes::Fit;
-use super::classify::{scores, usual_size_m};
+use super::boxes::BoxFit;
+use super::classify::{class_scores, typical_size_m};
 use super::clustering::{Clustering, NOISE};
-use super::ground::{Candidate, select};
+use super::ground::{Candidate, select_candidates};
 use super::{LaneGeometry, LidarScan};
 use crate::{Detection, Extent, SensorError};
 
-/// Neighbouring edges of two clusters within this many columns: the nearer one may hide the other.
-const HIDING_COLUMNS: f64 = 3.0;
-/// The nearer one has to be nearer by this [m].
-const HIDING_DEPTH_M: f64 = 1.0;
-/// Width that an edge keeps uncertain, in columns: it lies somewhere within the last step.
+/// Number of columns between the edges of two clusters within which the nearer cluster may occlude the other.
+const OCCLUSION_COLUMNS: f64 = 3.0;
+/// Difference in range from which a cluster may occlude another (m).
+const OCCLUSION_DEPTH_M: f64 = 1.0;
+/// Standard deviation of an edge's lateral position (columns): the edge lies somewhere within the last step.
 const EDGE_SD_COLUMNS: f64 = 0.3;
-/// How well the front of a vehicle is defined: bumper, plate, bonnet edge [m].
-const FACE_SD_M: f64 = 0.034;
-/// Noise of one range [m].
+/// Standard deviation of the position of a vehicle's front (m), which is not flat: bumper, plate, bonnet edge.
+pub(crate) const FACE_SD_M: f64 = 0.034;
+/// Standard deviation of the range of a single point (m).
 const POINT_SD_M: f64 = 0.05;
-/// The same where a side is seen too, whose points lie close behind the front's [m].
+/// Additional standard deviation of the front if a side is seen too, whose points lie close behind those of the front
+/// (m).
 const CORNER_SD_M: f64 = 0.05;
-/// What a side that is seen adds across: mirrors and wheels stand out from it [m].
+/// Additional lateral standard deviation if a side is seen, from which mirrors and wheels protrude (m).
 const SIDE_SD_M: f64 = 0.02;
-/// The outermost columns are lost to weak returns the farther the likelier: the edges' uncertainty grows by this share
-/// at 100 m, and with the square of the distance [1].
-const LOST_EDGE_SHARE: f64 = 0.6;
-const LOST_EDGE_M: f64 = 100.0;
-/// The least that is claimed across the line of sight [m].
-const LEAST_LATERAL_SD_M: f64 = 0.004;
-/// Where the lowest footprint on a front begins above this, only a car's cabin was seen [m], and its bumper stands
-/// before that by so much on average, with this scatter [m].
-const CABIN_FROM_M: f64 = 0.95;
-const BONNET_M: f64 = 0.9;
-const BONNET_SD_M: f64 = 0.6;
-/// From here on few beams meet the wheel, the lamp and the fairing of a motorcycle, and the rider behind them may be
-/// all that is seen [m]: how far the front then stands before it on average, and the scatter [m].
-const RIDER_FROM_M: f64 = 28.0;
-const RIDER_M: f64 = 0.2;
-const RIDER_SD_M: f64 = 0.2;
-/// Nearer than that, the wheel's tread may send too little back [m].
+/// Relative increase of an edge's standard deviation at [`LOST_EDGE_RANGE_M`].
+///
+/// The probability that the outermost columns are lost to weak returns grows with distance. The increase is
+/// proportional to the square of the distance.
+const LOST_EDGE_GROWTH: f64 = 0.6;
+/// Distance that [`LOST_EDGE_GROWTH`] refers to (m).
+const LOST_EDGE_RANGE_M: f64 = 100.0;
+/// Minimum lateral standard deviation of a detection (m).
+const MIN_LATERAL_SD_M: f64 = 0.004;
+/// Height of the lowest footprint on a car's front above which only the cabin was seen (m).
+const CABIN_ONLY_FROM_M: f64 = 0.95;
+/// Mean distance by which a car's bumper is ahead of its cabin (m).
+const BUMPER_OFFSET_M: f64 = 0.9;
+/// Standard deviation of that distance (m).
+const BUMPER_OFFSET_SD_M: f64 = 0.6;
+/// Distance from which only the rider of a motorcycle may be seen (m), because few beams hit the wheel, the lamp and
+/// the fairing.
+const RIDER_ONLY_FROM_M: f64 = 28.0;
+/// Mean distance by which a motorcycle's front is then ahead of the points that are seen (m).
+const RIDER_OFFSET_M: f64 = 0.2;
+/// Standard deviation of that distance (m).
+const RIDER_OFFSET_SD_M: f64 = 0.2;
+/// Additional standard deviation of a nearer motorcycle's front (m), because the wheel's tread may return too little
+/// light.
 const WHEEL_SD_M: f64 = 0.08;
-/// Uncertainty of a front that lies outside of the field of view: the scatter of lengths where the rear end is seen,
-/// else anywhere along the vehicle [m].
-const CUT_LENGTH_SD_M: f64 = 0.5;
-const CUT_SD_M: f64 = 3.0;
-/// How far parts of a vehicle may stand out from its side [m]: mirrors, wheels.
-const PROUD_SIDE_M: f64 = 0.25;
-/// A length is measured where at least this much of a side is seen [m].
+/// Standard deviation of a front outside of the field of view if the rear end is seen (m): that of vehicle lengths.
+const TRUNCATED_LENGTH_SD_M: f64 = 0.5;
+/// Standard deviation of such a front if the rear end is not seen either (m).
+const TRUNCATED_SD_M: f64 = 3.0;
+/// Distance by which mirrors and wheels may protrude from a vehicle's side (m).
+pub(crate) const SIDE_PROTRUSION_M: f64 = 0.25;
+/// Length of the visible side from which a vehicle's length counts as measured (m).
 const SIDE_SEEN_M: f64 = 3.0;
-/// The farthest point of a side tells its end only where columns meet it closer than this [m].
+/// Spacing of the columns on a side below which the farthest point of the side counts as its end (m).
 const SIDE_SPACING_M: f64 = 0.5;
 
-/// From scans to detections. Keeps no state from scan to scan but memory.
+/// The detector of the rear LiDAR. It keeps no state from scan to scan except allocated memory.
 #[derive(Clone, Debug, Default)]
 pub struct Detector {
     candidates: Vec<Candidate>,
     clustering: Clustering,
-    /// Places of the candidates in the scan, cluster by cluster.
+    /// Indices of the clustered points in the scan, cluster by cluster.
     members: Vec<u32>,
-    /// Where each cluster begins in `members`; one more at the end.
+    /// Index in `members` at which each cluster begins, followed by the length of `members`.
     starts: Vec<u32>,
-    fits: Vec<Fit>,
-    /// For each cluster the one that it belongs to, mostly itself.
-    hosts: Vec<u32>,
+    fits: Vec<BoxFit>,
+    /// For each cluster, the cluster whose vehicle it is part of: usually itself.
+    parents: Vec<u32>,
     detections: Vec<Detection>,
 }
 
 impl Detector {
-    /// Finds boxes in a scan.
+    /// Detects boxes in a scan.
     ///
     /// # Errors
-    /// [`SensorError::NotFinite`] at a point that is not finite, [`SensorError::Clustering`] where the clustering
-    /// refuses its input.
+    /// Returns [`SensorError::NotFinite`] if a point is not finite, and [`SensorError::Clustering`] if the clustering
+    /// rejects its input.
     pub fn detect(&mut self, scan: &LidarScan, lane: &LaneGeometry) -> Result<&[Detection], SensorError> {
         self.detections.clear();
         self.cluster(scan, lane)?;
         self.fit(scan, lane);
-        if self.find_hosts(lane) {
-            self.clustering.merge(&self.hosts);
-            self.gather();
-            // The front and the sides are those of the host; the parts behind them would only blur them.
-            let mut hosts = self.hosts.iter().zip(0..).map(|(&host, own)| host == own);
-            self.fits.retain(|_| hosts.next().unwrap_or(false));
+        if self.find_parents(lane) {
+            self.clustering.merge(&self.parents);
+            self.group_by_cluster();
+            // Front and sides are those of the parent cluster. The parts behind them would only blur the fit.
+            let mut parents = self.parents.iter().zip(0..).map(|(&parent, own)| parent == own);
+            self.fits.retain(|_| parents.next().unwrap_or(false));
         }
         for index in 0..self.fits.len() {
-            let hidden = hidden_edges(index, &self.fits);
+            let hidden = occluded_edges(index, &self.fits);
             self.detections.push(detection(&self.fits[index], hidden, scan.start, lane));
         }
         Ok(&self.detections)
     }
 
-    /// The boxes found in the latest scan.
+    /// Returns the boxes detected in the latest scan.
     pub fn latest(&self) -> &[Detection] {
         &self.detections
     }
 
-    /// The places in the scan of the points of one detection.
+    /// Returns the indices of one detection's points in the scan.
     pub fn points_of(&self, detection: usize) -> &[u32] {
         &self.members[self.starts[detection] as usize..self.starts[detection + 1] as usize]
     }
 
-    /// Selects points and labels them: the part that takes most of the time.
+    /// Selects points and assigns them to clusters. This step takes most of the detector's time.
     ///
     /// # Errors
-    /// As [`Detector::detect`].
+    /// Returns the errors of [`Detector::detect`].
     pub fn cluster(&mut self, scan: &LidarScan, lane: &LaneGeometry) -> Result<(), SensorError> {
-        select(scan, lane, scan.end, &mut self.candidates)?;
+        select_candidates(scan, lane, scan.end, &mut self.candidates)?;
         self.clustering.run(&self.candidates)?;
-        self.gather();
+        self.group_by_cluster();
         Ok(())
     }
 
-    /// Sorts the candidates by cluster.
-    fn gather(&mut self) {
+    /// Groups the indices of the candidates by cluster.
+    fn group_by_cluster(&mut self) {
         let count = self.clustering.count;
         self.starts.clear();
         self.starts.resize(count + 1, 0);
@@ -133,74 +141,80 @@ impl Detector {
                 *next += 1;
             }
         }
-        // Filling has moved each start to the next cluster's: move them back.
+        // The loop above has advanced each start to that of the next cluster. Shift them back.
         self.starts.rotate_right(1);
         self.starts[0] = 0;
     }
 
+    /// Fits a box to each cluster.
     fn fit(&mut self, scan: &LidarScan, lane: &LaneGeometry) {
         self.fits.clear();
         for cluster in 0..self.clustering.count {
             let members = &self.members[self.starts[cluster] as usize..self.starts[cluster + 1] as usize];
-            self.fits.push(Fit::to(members, scan, lane));
+            self.fits.push(BoxFit::new(members, scan, lane));
         }
     }
 }
 
 impl Detector {
-    /// Finds clusters within the box of a vehicle before them: what is seen below a truck's cabin, or past a rider.
-    /// True where there is one.
-    fn find_hosts(&mut self, lane: &LaneGeometry) -> bool {
-        self.hosts.clear();
+    /// Finds the clusters that are part of a nearer cluster's vehicle, such as points below a truck's cabin or past a
+    /// rider.
+    ///
+    /// Returns true if there is such a cluster.
+    fn find_parents(&mut self, lane: &LaneGeometry) -> bool {
+        self.parents.clear();
         for (index, (fit, own)) in self.fits.iter().zip(0..).enumerate() {
-            let holds = |other: &usize| *other != index && holds(&self.fits[*other], fit, lane);
-            let host = (0..self.fits.len()).find(holds);
+            let is_parent = |other: &usize| *other != index && contains(&self.fits[*other], fit, lane);
+            let parent = (0..self.fits.len()).find(is_parent);
             #[expect(clippy::cast_possible_truncation, reason = "fewer clusters than points")]
-            self.hosts.push(host.map_or(own, |host| host as u32));
+            self.parents.push(parent.map_or(own, |parent| parent as u32));
         }
-        self.hosts.iter().zip(0..).any(|(&host, own)| host != own)
+        self.parents.iter().zip(0..).any(|(&parent, own)| parent != own)
     }
 }
 
-/// True where `part` lies behind the front of `whole` and within the size that its class usually has.
-fn holds(whole: &Fit, part: &Fit, lane: &LaneGeometry) -> bool {
+/// Returns true if `part` lies behind the front of `whole` and within the typical size of its class.
+fn contains(whole: &BoxFit, part: &BoxFit, lane: &LaneGeometry) -> bool {
     if part.range_m <= whole.range_m || part.points >= whole.points {
         return false;
     }
-    let class = scores(whole, true, lane);
-    let [length, width] = usual_size_m(class.best_vehicle_class() as usize);
+    let class = class_scores(whole, true, lane);
+    let [length, width] = typical_size_m(class.best_vehicle_class() as usize);
     let (sin, cos) = (part.heading_rad - whole.heading_rad).sin_cos();
     let across = 0.5 * (part.across_m[0] + part.across_m[1]);
     let (u, v) = (part.front_u_m * cos - across * sin, part.front_u_m * sin + across * cos);
     let middle = 0.5 * (whole.across_m[0] + whole.across_m[1]);
     let reach = length.max(whole.length_m());
     let half = 0.5 * width.max(whole.width_m());
-    // A wheel or a mirror stands out from the side, and the middle of the front is known to a column.
-    let half = half + PROUD_SIDE_M + whole.spacing_m;
+    // Wheels and mirrors protrude from the side, and the middle of the front is known only to one column.
+    let half = half + SIDE_PROTRUSION_M + whole.spacing_m;
     class.vehicle() > 0.5 && u <= whole.front_u_m && u >= whole.front_u_m - reach && (v - middle).abs() <= half
 }
 
-/// Whether the edge at least and at greatest azimuth is hidden by a nearer cluster, or cut by the field of view.
-fn hidden_edges(index: usize, fits: &[Fit]) -> [bool; 2] {
+/// Returns whether the edge at the least and at the greatest azimuth is occluded by a nearer cluster or truncated by
+/// the field of view.
+fn occluded_edges(index: usize, fits: &[BoxFit]) -> [bool; 2] {
     let fit = &fits[index];
-    let margin = HIDING_COLUMNS * fit.spacing_m / fit.range_m.max(1.0);
+    let margin = OCCLUSION_COLUMNS * fit.spacing_m / fit.range_m.max(1.0);
     let hides = |edge: f64| {
         fits.iter().enumerate().any(|(other, nearer)| {
             other != index
-                && nearer.range_m + HIDING_DEPTH_M < fit.range_m
+                && nearer.range_m + OCCLUSION_DEPTH_M < fit.range_m
                 && nearer.azimuth_rad[0] - margin < edge
                 && edge < nearer.azimuth_rad[1] + margin
         })
     };
-    [0, 1].map(|side| hides(fit.azimuth_rad[side]) || fit.cut[side])
+    [0, 1].map(|side| hides(fit.azimuth_rad[side]) || fit.truncated[side])
 }
 
-fn detection(fit: &Fit, hidden: [bool; 2], start: Time, lane: &LaneGeometry) -> Detection {
-    // Seen from the rear, what lies to E's right in azimuth lies to the vehicle's right too: least v, least azimuth.
+/// Returns the detection for a fitted box. `hidden` tells whether its edge at the least and at the greatest azimuth is
+/// hidden.
+fn detection(fit: &BoxFit, hidden: [bool; 2], start: Time, lane: &LaneGeometry) -> Detection {
+    // Vehicles point in about the same direction as the ego: the edge at the least azimuth is also that at the least v.
     let width_seen = !hidden[0] && !hidden[1];
-    let class = scores(fit, width_seen, lane);
-    let [usual_length, usual_width] = usual_size_m(class.best_vehicle_class() as usize);
-    let across = across(fit, hidden, usual_width);
+    let class = class_scores(fit, width_seen, lane);
+    let [typical_length, typical_width] = typical_size_m(class.best_vehicle_class() as usize);
+    let across = across(fit, hidden, typical_width);
     let length_seen = has_seen_length(fit);
     let (front_u_m, range_sd_m) = front(fit, &class);
     let (sin, cos) = fit.heading_rad.sin_cos();
@@ -213,7 +227,7 @@ fn detection(fit: &Fit, hidden: [bool; 2], start: Time, lane: &LaneGeometry) -> 
         range_sd_m,
         lateral_sd_m: across.sd_m,
         heading_rad: fit.heading_rad,
-        length_m: if length_seen { fit.length_m() } else { usual_length.max(fit.length_m()) },
+        length_m: if length_seen { fit.length_m() } else { typical_length.max(fit.length_m()) },
         length: if length_seen { Extent::Seen } else { Extent::Assumed },
         width_m: across.width_m,
         width: across.extent,
@@ -223,29 +237,31 @@ fn detection(fit: &Fit, hidden: [bool; 2], start: Time, lane: &LaneGeometry) -> 
     }
 }
 
-/// The front face along the box, and its standard deviation [m].
-fn front(fit: &Fit, class: &ClassScores) -> (f64, f64) {
+/// Returns the position of the front face along the box's heading, and its standard deviation (m).
+fn front(fit: &BoxFit, class: &ClassScores) -> (f64, f64) {
     let face_sd_m = if sees_side(fit) { FACE_SD_M.hypot(CORNER_SD_M) } else { FACE_SD_M };
     let sd = face_sd_m.hypot(POINT_SD_M / (fit.front_points.max(1) as f64).sqrt());
-    if fit.is_cut() {
-        // Wholly or in part beside E: the rear end tells where the front is, as well as lengths are known.
-        let [usual_length, _] = usual_size_m(class.best_vehicle_class() as usize);
-        return match sees_rear(fit) && fit.length_m() < usual_length {
-            true => (fit.rear_u_m + usual_length, CUT_LENGTH_SD_M),
-            false => (fit.front_u_m, CUT_SD_M),
+    if fit.is_truncated() {
+        // The vehicle is partly or entirely beside the ego. The front follows from the rear end and the typical length.
+        let [typical_length, _] = typical_size_m(class.best_vehicle_class() as usize);
+        return match sees_rear(fit) && fit.length_m() < typical_length {
+            true => (fit.rear_u_m + typical_length, TRUNCATED_LENGTH_SD_M),
+            false => (fit.front_u_m, TRUNCATED_SD_M),
         };
     }
     match class.best_vehicle_class() {
-        VehicleClass::Car if fit.front_bottom_m - 0.5 * fit.layer_m() > CABIN_FROM_M => {
-            (fit.front_u_m + BONNET_M, sd.hypot(BONNET_SD_M))
+        VehicleClass::Car if fit.front_bottom_m - 0.5 * fit.layer_m() > CABIN_ONLY_FROM_M => {
+            (fit.front_u_m + BUMPER_OFFSET_M, sd.hypot(BUMPER_OFFSET_SD_M))
         }
-        VehicleClass::Motorcycle if fit.range_m > RIDER_FROM_M => (fit.front_u_m + RIDER_M, sd.hypot(RIDER_SD_M)),
+        VehicleClass::Motorcycle if fit.range_m > RIDER_ONLY_FROM_M => {
+            (fit.front_u_m + RIDER_OFFSET_M, sd.hypot(RIDER_OFFSET_SD_M))
+        }
         VehicleClass::Motorcycle => (fit.front_u_m, sd.hypot(WHEEL_SD_M)),
         VehicleClass::Car | VehicleClass::Truck => (fit.front_u_m, sd),
     }
 }
 
-/// Width and middle across.
+/// The lateral extent of a box: its middle, with standard deviation, and its width.
 struct Across {
     middle_m: f64,
     sd_m: f64,
@@ -253,17 +269,18 @@ struct Across {
     extent: Extent,
 }
 
-fn across(fit: &Fit, [right_hidden, left_hidden]: [bool; 2], usual_m: f64) -> Across {
+/// Returns the lateral extent of a box from its visible edges and the typical width of its class.
+fn across(fit: &BoxFit, [right_hidden, left_hidden]: [bool; 2], typical_m: f64) -> Across {
     let [right, left] = fit.across_m;
     let seen = left - right;
-    let lost_share = LOST_EDGE_SHARE * (fit.range_m / LOST_EDGE_M).powi(2);
+    let lost_share = LOST_EDGE_GROWTH * (fit.range_m / LOST_EDGE_RANGE_M).powi(2);
     let edge_sd = EDGE_SD_COLUMNS * fit.spacing_m * (1.0 + lost_share);
-    let missing = (usual_m - seen).max(0.0);
+    let missing = (typical_m - seen).max(0.0);
     let (middle_m, sd_m) = match (right_hidden, left_hidden) {
-        // Weak returns may have lost columns on either side.
+        // Weak returns may have lost columns on both sides alike.
         (false, false) => (0.5 * (left + right), edge_sd / f64::sqrt(2.0)),
-        (true, false) => (left - 0.5 * seen.max(usual_m), edge_sd),
-        (false, true) => (right + 0.5 * seen.max(usual_m), edge_sd),
+        (true, false) => (left - 0.5 * seen.max(typical_m), edge_sd),
+        (false, true) => (right + 0.5 * seen.max(typical_m), edge_sd),
         (true, true) => (0.5 * (left + right), edge_sd),
     };
     let lost = missing / f64::sqrt(12.0);
@@ -275,25 +292,25 @@ fn across(fit: &Fit, [right_hidden, left_hidden]: [bool; 2], usual_m: f64) -> Ac
     };
     let width_m = match extent {
         Extent::Seen => seen + 0.5 * fit.spacing_m,
-        Extent::Assumed => seen.max(usual_m),
+        Extent::Assumed => seen.max(typical_m),
     };
     let side_sd_m = if sees_side(fit) { SIDE_SD_M } else { 0.0 };
-    Across { middle_m, sd_m: sd_m.max(LEAST_LATERAL_SD_M).hypot(side_sd_m), width_m, extent }
+    Across { middle_m, sd_m: sd_m.max(MIN_LATERAL_SD_M).hypot(side_sd_m), width_m, extent }
 }
 
-/// True where a box stands so far to one side that the sensor sees that side of it.
-fn sees_side(fit: &Fit) -> bool {
+/// Returns true if the box is so far to one side of the sensor's axis that one of its sides is visible.
+fn sees_side(fit: &BoxFit) -> bool {
     fit.azimuth_rad[0] > 0.0 || fit.azimuth_rad[1] < 0.0
 }
 
-/// True where a side is seen to its end.
-fn has_seen_length(fit: &Fit) -> bool {
-    !fit.is_cut() && fit.length_m() >= SIDE_SEEN_M && sees_rear(fit)
+/// Returns true if a side is visible to its end.
+fn has_seen_length(fit: &BoxFit) -> bool {
+    !fit.is_truncated() && fit.length_m() >= SIDE_SEEN_M && sees_rear(fit)
 }
 
-/// True where columns meet the side so closely that its farthest point is the rear end.
-fn sees_rear(fit: &Fit) -> bool {
-    // Columns meet a side at distance r and lateral offset y every Δφ·r²/y.
+/// Returns true if the columns hit the side so densely that its farthest point is the rear end.
+fn sees_rear(fit: &BoxFit) -> bool {
+    // At distance r and lateral offset y, columns with the azimuth step Δφ hit a side every Δφ·r²/y.
     let (sin, cos) = fit.heading_rad.sin_cos();
     let middle = 0.5 * (fit.across_m[0] + fit.across_m[1]);
     let (x, y) = (fit.rear_u_m * cos - middle * sin, fit.rear_u_m * sin + middle * cos);

@@ -1,30 +1,30 @@
-//! From sub-rays to echoes: what the receiver can tell apart along one beam.
+//! Echoes: the pulses that the receiver can distinguish along a beam.
 //!
-//! Sub-rays that end within the length of one pulse add up to one echo, whose power is the sum of their shares; where a
-//! beam is split by an edge, or spread over the road at a grazing angle, there are several, each the weaker.
+//! Sub-rays that end within the length of one pulse add up to one echo. Its power is the sum of their contributions. A
+//! beam that is split by an edge, or spread over the road at a grazing angle, gives several weaker echoes.
 
-use super::cast::{BeamHits, NO_FACE, place};
-use super::pattern::{ACROSS, Elevation, SUBRAYS, UPWARD};
-use super::power::Link;
+use super::cast::{BeamHits, NO_FACE, subray_position};
+use super::pattern::{Elevation, SUBRAY_COLUMNS, SUBRAY_ROWS, SUBRAYS};
+use super::power::LinkBudget;
 use super::targets::Face;
 
-/// Length in range that one pulse of about 5 ns takes up: c·τ/2 [m].
+/// Length of a pulse in range, c·τ/2 (m), for a duration τ of about 5 ns.
 pub(crate) const PULSE_M: f32 = 0.75;
-/// Share of each sub-ray in the footprint.
+/// Share of a sub-ray in the footprint.
 const SHARE: f32 = 1.0 / SUBRAYS as f32;
 
-/// One echo.
+/// An echo of a beam.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Echo {
-    /// Distance, weighted by power [m].
+    /// Mean distance of its sub-rays, weighted by power (m).
     pub(crate) range_m: f32,
-    /// Power that would be received without the air's attenuation [thresholds].
+    /// Received power without the air's attenuation, in multiples of the detection threshold.
     pub(crate) power: f32,
-    /// The face that sends most of it.
+    /// Index of the face that contributes the strongest sub-ray.
     pub(crate) face: u32,
 }
 
-/// The echoes of one beam in order of range.
+/// The echoes of a beam, in order of range.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Echoes {
     list: [Echo; SUBRAYS],
@@ -38,41 +38,43 @@ impl Echoes {
         &self.list[..self.count]
     }
 
-    /// The echoes of what the sub-rays met.
-    pub(crate) fn of(hits: &BeamHits, elevation: &Elevation, faces: &[Face], link: &Link) -> Self {
-        let mut lanes = [Echo::default(); SUBRAYS];
+    /// Returns the echoes of the faces that the sub-rays hit.
+    pub(crate) fn of(hits: &BeamHits, elevation: &Elevation, faces: &[Face], link: &LinkBudget) -> Self {
+        let mut subray_echoes = [Echo::default(); SUBRAYS];
         let (mut nearest, mut farthest) = (f32::INFINITY, 0.0_f32);
-        for (lane, echo) in lanes.iter_mut().enumerate() {
-            let face = hits.face[lane];
+        for (subray, echo) in subray_echoes.iter_mut().enumerate() {
+            let face = hits.face[subray];
             if face != NO_FACE {
                 let strength = SHARE * link.gain_m2 * faces[face as usize].strength_m;
-                *echo = subray_echo(hits.inverse[lane] * elevation.cos[place(lane).1], strength, face);
+                *echo = subray_echo(hits.inverse[subray] * elevation.cos[subray_position(subray).1], strength, face);
                 nearest = nearest.min(echo.range_m);
                 farthest = farthest.max(echo.range_m);
             }
         }
         let mut echoes = Self::NONE;
-        // Mostly all of them end within one pulse; a lane that met nothing adds nothing to the sums.
+        // Usually all sub-rays end within one pulse. A sub-ray that hits nothing adds nothing to the sums.
         if farthest <= nearest + PULSE_M {
             if farthest > 0.0 {
-                echoes.list[0] = sum(&lanes);
+                echoes.list[0] = sum(&subray_echoes);
                 echoes.count = 1;
             }
             return echoes;
         }
-        for echo in lanes.into_iter().filter(|echo| echo.range_m > 0.0) {
+        for echo in subray_echoes.into_iter().filter(|echo| echo.range_m > 0.0) {
             echoes.insert(echo);
         }
         echoes.merged()
     }
 
-    /// The echoes of a beam that meets nothing but the road: face 0. The two sides of the footprint are alike, and what
-    /// lies higher in it lies farther away.
-    pub(crate) fn of_ground([cos, sin]: [f32; 2], elevation: &Elevation, ground: &Face, link: &Link) -> Self {
-        let strength = ACROSS as f32 * SHARE * link.gain_m2 * ground.strength_m;
+    /// Returns the echoes of a beam that hits only the road, which is face 0.
+    ///
+    /// The two columns of sub-rays count as equal. A higher sub-ray hits the road farther away, so the echoes are
+    /// already in order of range.
+    pub(crate) fn of_ground([cos, sin]: [f32; 2], elevation: &Elevation, ground: &Face, link: &LinkBudget) -> Self {
+        let strength = SUBRAY_COLUMNS as f32 * SHARE * link.gain_m2 * ground.strength_m;
         let level = ground.inverse[0] * cos + ground.inverse[1] * sin;
         let mut met = Self::NONE;
-        for upward in 0..UPWARD {
+        for upward in 0..SUBRAY_ROWS {
             let inverse = level + ground.inverse[2] * elevation.tan[upward];
             if !(inverse > 0.0) {
                 break;
@@ -83,25 +85,25 @@ impl Echoes {
         met.merged()
     }
 
-    /// Insertion sort: eight at most, and mostly in order already.
+    /// Inserts an echo in order of range. There are at most eight, and they mostly arrive in order.
     #[inline(always)]
     fn insert(&mut self, echo: Echo) {
-        let mut place = self.count;
-        while place > 0 && self.list[place - 1].range_m > echo.range_m {
-            self.list[place] = self.list[place - 1];
-            place -= 1;
+        let mut index = self.count;
+        while index > 0 && self.list[index - 1].range_m > echo.range_m {
+            self.list[index] = self.list[index - 1];
+            index -= 1;
         }
-        self.list[place] = echo;
+        self.list[index] = echo;
         self.count += 1;
     }
 
-    /// Adds up what lies within one pulse's length of the first of each group.
+    /// Merges each echo with those that follow it within the length of one pulse.
     #[inline(always)]
     fn merged(mut self) -> Self {
         let (mut from, mut echoes) = (0, 0);
         while from < self.count {
-            let most = self.list[from].range_m + PULSE_M;
-            let within = self.list[from..self.count].iter().take_while(|echo| echo.range_m <= most).count();
+            let end_m = self.list[from].range_m + PULSE_M;
+            let within = self.list[from..self.count].iter().take_while(|echo| echo.range_m <= end_m).count();
             self.list[echoes] = sum(&self.list[from..from + within]);
             echoes += 1;
             from += within;
@@ -111,7 +113,7 @@ impl Echoes {
     }
 }
 
-/// One echo out of several.
+/// Returns the sum of several echoes as one echo.
 #[inline(always)]
 fn sum(parts: &[Echo]) -> Echo {
     let (mut power, mut moment, mut strongest) = (0.0, 0.0, Echo::default());
@@ -126,8 +128,10 @@ fn sum(parts: &[Echo]) -> Echo {
     Echo { range_m, power, face: strongest.face }
 }
 
-/// What one sub-ray alone sends back: strength [thresholds · m³] over the third power of the range, since cos γ is the
-/// plane's distance over the range.
+/// Returns the echo of a single sub-ray at the inverse range `per_range` (1/m).
+///
+/// Its power is `strength` (thresholds · m³) over the third power of the range: two powers for the spreading of the
+/// light, and one because cos γ is the distance of the face's plane over the range.
 #[inline(always)]
 fn subray_echo(per_range: f32, strength: f32, face: u32) -> Echo {
     Echo { range_m: 1.0 / per_range, power: strength * per_range * per_range * per_range, face }
@@ -145,15 +149,15 @@ mod tests {
 
     fn echoes(ranges_m: [Option<f32>; SUBRAYS]) -> Vec<(f32, f32)> {
         let mut hits = BeamHits::NONE;
-        for (lane, range_m) in ranges_m.into_iter().enumerate() {
+        for (subray, range_m) in ranges_m.into_iter().enumerate() {
             if let Some(range_m) = range_m {
-                hits.inverse[lane] = 1.0 / range_m;
-                hits.face[lane] = 0;
+                hits.inverse[subray] = 1.0 / range_m;
+                hits.face[subray] = 0;
             }
         }
-        let level = Elevation { centre: [0.0, 1.0], tan: [0.0; UPWARD], cos: [1.0; UPWARD] };
-        let link = Link::new(&Lidar::default(), &Environment::CLEAR_DAY);
-        // At 10 m each sub-ray sends 1/8 of gain·ρ·cos γ/R² with ρ·cos γ = 1.
+        let level = Elevation { centre: [0.0, 1.0], tan: [0.0; SUBRAY_ROWS], cos: [1.0; SUBRAY_ROWS] };
+        let link = LinkBudget::new(&Lidar::default(), &Environment::CLEAR_DAY);
+        // At 10 m each sub-ray contributes 1/8 of gain·ρ·cos γ/R² with ρ·cos γ = 1.
         let found = Echoes::of(&hits, &level, &[face(10.0)], &link);
         let unit = link.gain_m2 / 100.0;
         found.as_slice().iter().map(|echo| (echo.range_m, echo.power / unit)).collect()
@@ -173,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_within_a_pulse_is_one_echo() {
+    fn targets_within_one_pulse_length_give_one_echo() {
         let one = echoes([10.0, 10.7, 10.2, 10.4, 10.1, 10.3, 10.5, 10.6].map(Some));
         assert_eq!(one.len(), 1);
         assert!(one[0].0 > 10.2 && one[0].0 < 10.4, "{one:?}");

@@ -1,53 +1,55 @@
-//! Which points may belong to a vehicle: within the region of interest, and not on the ground.
+//! Selection of the points that may belong to a vehicle: those in the region of interest that are not on the ground.
 //!
-//! The road sends back only where the beams meet it steeply enough: within some 20 m at the usual mounting height. Up
-//! to [`GROUND_REACH_M`] a point near z = 0 is therefore taken as ground; beyond, a low point is kept: it can only come
-//! from something that stands on the road, and its height, that of the beam's centre, may be off by half a footprint.
+//! The road returns light only where beams meet it steeply enough: within about 20 m at the usual mounting height. A
+//! point near z = 0 therefore counts as ground up to [`GROUND_REACH_M`]. Beyond that distance a low point is kept,
+//! since it can only originate from an object on the road. Its height is that of the beam's centre, and may be off by
+//! half a footprint.
 
 use closecall_traffic::Time;
 
 use super::{LaneGeometry, LidarScan};
 use crate::SensorError;
 
-/// Where the road may send something back, from the sensor [m].
+/// Distance from the sensor up to which the road may give returns (m).
 const GROUND_REACH_M: f32 = 40.0;
-/// Height below which a point counts as ground, at the sensor [m].
+/// Height below which a point counts as ground, at distance zero (m).
 const GROUND_M: f32 = 0.10;
-/// What the height gains per metre of distance: three standard deviations of the levelling's error, and the footprint,
-/// whose near edge sends more than its far edge [rad].
+/// Increase of that height per metre of distance (rad). It covers three standard deviations of the levelling error, and
+/// the footprint, whose near edge returns more light than its far edge.
 const GROUND_SLOPE: f32 = 0.005;
-/// Half the width of the region of interest about E's path: two lanes to each side [m].
+/// Half the width of the region of interest about the ego's path (m): two lanes to each side.
 const HALF_WIDTH_M: f32 = 9.5;
-/// Points farther behind the sensor than this are not used [m].
+/// Distance behind the sensor beyond which points are not used (m).
 const REACH_M: f32 = 200.0;
-/// Near returns weaker than this come from droplets: a tyre at 60° still shows 0.025 (low-intensity outlier removal,
-/// after Park et al. 2020, "Fast and accurate desnowing algorithm for LiDAR point clouds").
+/// Intensity below which a near return is taken for a droplet. A tyre at 60° still has 0.025. The method is
+/// low-intensity outlier removal after Park et al. 2020, "Fast and accurate desnowing algorithm for LiDAR point
+/// clouds".
 const DROPLET_INTENSITY: f32 = 0.02;
-/// Up to where droplets are looked for [m].
+/// Distance up to which returns are checked for droplets (m).
 const DROPLET_REACH_M: f32 = 15.0;
 
 /// A point that may belong to a vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Candidate {
-    /// Its place in the scan.
+    /// Index of the point in the scan.
     pub(crate) index: u32,
-    /// Behind the sensor, along E's axis [m].
+    /// Distance behind the sensor along the ego's axis (m).
     pub(crate) back_m: f32,
-    /// To the left of E's path [m].
+    /// Lateral offset from the ego's path, positive to the left (m).
     pub(crate) left_m: f32,
 }
 
-/// Collects into `kept` what may belong to vehicles.
+/// Writes the points that may belong to vehicles into `candidates`.
 ///
 /// # Errors
-/// [`SensorError::NotFinite`] at a point that is not finite.
-pub(crate) fn select(
+/// Returns [`SensorError::NotFinite`] if a point is not finite.
+pub(crate) fn select_candidates(
     scan: &LidarScan,
     lane: &LaneGeometry,
     time: Time,
-    kept: &mut Vec<Candidate>,
+    candidates: &mut Vec<Candidate>,
 ) -> Result<(), SensorError> {
-    kept.clear();
+    candidates.clear();
     #[expect(clippy::cast_possible_truncation, reason = "points are in single precision")]
     let (slope, bend) = (-lane.heading_rad as f32, 0.5 * lane.curvature_per_m as f32);
     let points = scan.x_m.iter().zip(&scan.y_m).zip(&scan.z_m).zip(&scan.intensity);
@@ -62,7 +64,7 @@ pub(crate) fn select(
         let ground = range_m < GROUND_REACH_M && z < GROUND_M + GROUND_SLOPE * range_m;
         let droplet = range_m < DROPLET_REACH_M && intensity < DROPLET_INTENSITY;
         if inside && !ground && !droplet {
-            kept.push(Candidate { index, back_m, left_m });
+            candidates.push(Candidate { index, back_m, left_m });
         }
     }
     Ok(())
@@ -83,12 +85,12 @@ mod tests {
             scan.intensity.push(intensity);
         }
         let mut kept = Vec::new();
-        select(&scan, &LANE, Time::ZERO, &mut kept)?;
+        select_candidates(&scan, &LANE, Time::ZERO, &mut kept)?;
         Ok(kept.into_iter().map(|candidate| candidate.index).collect())
     }
 
     #[test]
-    fn ground_outsiders_and_droplets_are_left_out() {
+    fn ground_distant_points_and_droplets_are_removed() {
         let points = [
             [-12.0, 0.0, 0.05, 0.1],
             [-12.0, 0.0, 0.40, 0.1],
@@ -100,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn a_point_that_is_no_number_is_an_error() {
+    fn a_point_with_a_nan_coordinate_is_an_error() {
         assert!(kept(&[[-12.0, f32::NAN, 0.4, 0.1]]).is_err());
     }
 }

@@ -1,14 +1,15 @@
-//! What surfaces are made of, and how much of the laser's light they send back.
+//! The materials of surfaces and their reflectivity for the laser's light.
 //!
-//! A reflectivity is that of a Lambertian surface which would send back as much at the laser's wavelength, 905 nm, seen
-//! at a right angle. Where no measurement is named, the value is an assumption within what is usual for the material.
+//! The reflectivity of a material is that of a Lambertian surface that returns the same power at the laser's
+//! wavelength, 905 nm, at normal incidence. If no measurement is cited, the value is an assumption within the usual
+//! range for the material.
 
 use closecall_traffic::{Appearance, Environment};
 
 /// The material of a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Material {
-    /// Painted sheet metal; its reflectivity is the vehicle's own.
+    /// Painted sheet metal, whose reflectivity is set for each vehicle.
     Paint,
     /// A window.
     Glass,
@@ -32,34 +33,36 @@ pub enum Material {
     Water,
 }
 
-/// Windows let through or mirror away nearly all; what comes back is dust and the edge of the dashboard (assumption).
+/// Windows transmit nearly all light or reflect it away from the sensor. Only dust and the edge of the dashboard return
+/// light (assumption).
 const GLASS: f64 = 0.05;
-/// A retro-reflector of R_A [cd/(lx·m²)] looks like a Lambertian surface of ρ = π·R_A. New plates have some tens
-/// (ISO 7591 sets the minimum); 20 is assumed for one in use.
+/// A retro-reflector with the coefficient R_A (cd/(lx·m²)) looks like a Lambertian surface of ρ = π·R_A. New plates
+/// have some tens (ISO 7591 sets the minimum). 20 is assumed for a plate in use.
 const PLATE: f64 = std::f64::consts::PI * 20.0;
-/// A clear lens before a reflector (assumption).
+/// A clear lens in front of a reflector (assumption).
 const LAMP: f64 = 1.0;
-/// Carbon black (assumption, in line with what dark rubber shows in the near infrared).
+/// Rubber with carbon black (assumption, in line with the reflectivity of dark rubber in the near infrared).
 const TYRE: f64 = 0.05;
 /// Dark moulded plastic (assumption).
 const PLASTIC: f64 = 0.10;
-/// Textiles stay bright in the near infrared, even dark ones (assumption).
+/// Textiles are bright in the near infrared, even if they look dark (assumption).
 const TEXTILE: f64 = 0.35;
-/// Coated fabric of usual colours (assumption).
+/// Coated fabric in usual colours (assumption).
 const TARPAULIN: f64 = 0.5;
-/// Weathered zinc, diffuse share (assumption).
+/// Weathered zinc; only its diffuse reflection counts (assumption).
 const STEEL: f64 = 0.35;
 /// Worn asphalt in the near infrared: 0.1 to 0.2 (Herold and Roberts 2005, "Spectral characteristics of asphalt road
 /// aging and deterioration").
 const ASPHALT: f64 = 0.15;
-/// A wet rough surface reflects about half as much diffusely (Lekner and Dorf 1988, "Why some things are darker when
-/// wet"); a closed film mirrors the rest away from a sensor at a grazing angle.
+/// Factor on the reflectivity of a wet road. A wet rough surface reflects diffusely about half as much as a dry one
+/// (Lekner and Dorf 1988, "Why some things are darker when wet"). A closed film of water also reflects light away from
+/// a sensor at a grazing angle.
 const WET_SHARE: f64 = 0.4;
-/// Height of water at which the surface counts as wholly wet [mm].
+/// Height of the water film from which the surface counts as fully wet (mm).
 const WET_FILM_MM: f64 = 0.2;
 
 impl Material {
-    /// Equivalent Lambertian reflectivity [1] on a vehicle of this appearance, in this weather.
+    /// Returns the equivalent Lambertian reflectivity on a vehicle of this appearance, in this weather.
     pub fn reflectivity(self, appearance: &Appearance, environment: &Environment) -> f64 {
         match self {
             Self::Paint => appearance.paint_reflectivity,
@@ -77,7 +80,7 @@ impl Material {
     }
 }
 
-/// Reflectivity of the road [1]: the wetter, the darker.
+/// Returns the reflectivity of the road, which decreases with the height of the water film.
 pub(crate) fn asphalt(environment: &Environment) -> f64 {
     let wetness = (environment.water_film_mm / WET_FILM_MM).clamp(0.0, 1.0);
     ASPHALT * (1.0 - (1.0 - WET_SHARE) * wetness)

@@ -1,4 +1,4 @@
-//! The rear LiDAR: from the scene to points, and from points to boxes.
+//! The rear LiDAR: a sensor model that turns a scene into points, and a processing chain that turns points into boxes.
 //!
 //! ```text
 //!  Scene ─▶ solids (shapes, roadside) ─▶ targets ─▶ cast ─▶ echoes ─▶ receiver ─▶ LidarScan      the sensor
@@ -7,7 +7,7 @@
 //!  Detections ◀─ classify ◀─ boxes ◀─ clustering (linfa) ◀─ thinning ◀─ ground, region of interest   the processing
 //! ```
 //!
-//! The two halves share nothing but the [`LidarScan`].
+//! The two halves share only the [`LidarScan`]: the processing chain has no access to the scene.
 
 mod boxes;
 mod cast;
@@ -38,11 +38,15 @@ mod viewpoint;
 
 pub use config::{Lidar, LidarConfig, LidarModel};
 pub use detector::Detector;
+#[cfg(test)]
+pub(crate) use detector::FACE_SD_M;
+pub(crate) use detector::SIDE_PROTRUSION_M;
 pub use lane::LaneGeometry;
 pub use material::Material;
-pub use pattern::{BEAMS, COLUMNS, LAYERS, PERIOD_NS, Pattern};
-pub(crate) use power::extinction_per_m;
+pub use pattern::{BEAMS, COLUMNS, LAYERS, Pattern};
+pub(crate) use pattern::{HALF_FIELD_DEG, HALF_FIELD_TAN};
+pub(crate) use power::{KOSCHMIEDER, extinction_per_m, rain_db_per_km};
 pub use rear::RearLidar;
-pub use scan::{LidarScan, Mirror, PointSource, PointTruth, ScanTruth};
+pub use scan::{LidarScan, MirrorSide, PointSource, PointTruth, ScanTruth};
 pub use scanner::Scanner;
 pub use segmentation::SegmentationReport;

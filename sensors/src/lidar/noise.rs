@@ -1,60 +1,71 @@
-//! Noise of one scan, addressed by beam instead of drawn in turn.
+//! The noise of a scan. Its random numbers are addressed by beam instead of drawn in sequence.
 //!
-//! Each scan draws one key from its random stream; every number then follows from (key, beam, purpose) through a
-//! 64-bit mix (the finaliser of SplitMix64, Steele et al. 2014). A vehicle more or less in the scene thus leaves the
-//! noise of all other beams as it was, which is what paired runs need.
+//! Each scan draws one key from its random stream. Every number then follows from (key, beam, purpose) through a 64-bit
+//! mix (the finaliser of SplitMix64, Steele et al. 2014). An additional vehicle in the scene therefore does not change
+//! the noise of the beams that do not hit it, as paired runs require.
 
 use closecall_traffic::Stream;
 use rand::Rng;
 
-/// What a number is used for.
+/// The purpose of a random number.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Purpose {
+    /// Noise of the received power.
     Detection = 0,
+    /// Error of the measured range.
     Range = 1,
+    /// Loss of a return regardless of its power.
     Dropout = 2,
+    /// Density of a clump of droplets in a spray plume.
     Plume = 3,
+    /// Optical depth at which spray returns the light.
     Depth = 4,
+    /// Error of the measured pitch of the ego.
     Levelling = 5,
+    /// Optical depth at which fog returns the light.
     FogDepth = 6,
+    /// Density of a clump of droplets in fog.
     FogClump = 7,
 }
 
+/// Number of purposes.
 const PURPOSES: u64 = 8;
 /// 2⁶⁴ divided by the golden ratio, the increment of SplitMix64.
 const INCREMENT: u64 = 0x9e37_79b9_7f4a_7c15;
-/// Scales a sum of four uniform numbers of variance 1/12 each to variance 1.
+/// Factor that scales a sum of four uniform numbers, of variance 1/12 each, to variance 1.
 const SQRT_3: f32 = 1.732_050_8;
 
-/// The noise of one scan.
+/// The noise of a scan.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Noise {
     key: u64,
 }
 
 impl Noise {
-    /// A new key from the stream: exactly one draw for each scan.
+    /// Draws the key of a scan from the stream, as exactly one number.
     pub(crate) fn draw(rng: &mut Stream) -> Self {
         Self { key: rng.next_u64() }
     }
 
+    /// Returns 64 random bits for a beam and a purpose.
     fn bits(self, beam: usize, purpose: Purpose) -> u64 {
-        let place = beam as u64 * PURPOSES + purpose as u64 + 1;
-        let mut z = self.key.wrapping_add(place.wrapping_mul(INCREMENT));
+        let counter = beam as u64 * PURPOSES + purpose as u64 + 1;
+        let mut z = self.key.wrapping_add(counter.wrapping_mul(INCREMENT));
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         z ^ (z >> 31)
     }
 
-    /// Uniform in the open interval from 0 to 1.
+    /// Returns a number that is uniform in the open interval from 0 to 1.
     pub(crate) fn uniform(self, beam: usize, purpose: Purpose) -> f32 {
         ((self.bits(beam, purpose) >> 41) as u32 as f32 + 0.5) * (1.0 / 8_388_608.0)
     }
 
-    /// Nearly normal with mean 0 and standard deviation 1: the sum of four uniform numbers, hence within ±3.47.
+    /// Returns an approximately normal number with mean 0 and standard deviation 1: a sum of four uniform numbers,
+    /// hence within ±3.47.
     ///
-    /// Quicker than an exact normal number, and the same on every machine. The missing tails do not matter where the
-    /// result is one point among several.
+    /// It is faster than an exact normal number, and the same on every machine. The missing tails do not matter for the
+    /// measurement of a single point among several.
     pub(crate) fn normal(self, beam: usize, purpose: Purpose) -> f32 {
         let bits = self.bits(beam, purpose);
         let sum = (bits & 0xffff) as u32
@@ -76,12 +87,12 @@ mod tests {
     }
 
     #[test]
-    fn moments_are_those_of_a_standard_normal() {
+    fn moments_match_the_standard_normal_distribution() {
         let draws: Vec<f64> = (0..100_000).map(|beam| noise().normal(beam, Purpose::Range).into()).collect();
         let n = draws.len() as f64;
         let mean = draws.iter().sum::<f64>() / n;
         let variance = draws.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n;
-        // Four standard errors each.
+        // The tolerances are four standard errors.
         assert!(mean.abs() < 4.0 / n.sqrt(), "{mean}");
         assert!((variance - 1.0).abs() < 4.0 * (2.0 / n).sqrt(), "{variance}");
         let beyond_two = draws.iter().filter(|x| x.abs() > 2.0).count() as f64 / n;
@@ -89,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn uniform_numbers_stay_inside_and_purposes_differ() {
+    fn uniform_numbers_stay_in_the_open_interval_and_differ_by_purpose() {
         for beam in 0..10_000 {
             let value = noise().uniform(beam, Purpose::Dropout);
             assert!(value > 0.0 && value < 1.0);

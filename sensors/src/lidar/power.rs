@@ -1,83 +1,97 @@
-//! How much light comes back, and what the receiver makes of it.
+//! The link budget: received power, detection threshold and range noise.
 //!
-//! Received power of a surface element that takes up the share f of the footprint, at range R and incidence angle γ:
+//! A surface element of reflectivity ρ covers the share f of the footprint, at range R and incidence angle γ. With the
+//! extinction coefficient α of the air, its received power is
 //!
 //! ```text
 //!   P ∝ f · ρ · cos γ · exp(−2·α·R) / R²
 //! ```
 //!
-//! Powers are counted in units of the detection threshold. The receiver adds normal noise of 1/T of the threshold and
-//! reports a return where the sum exceeds the threshold: at P = 1 with probability 0.5, at P = 1.26 with 0.9. That one
-//! step gives the detection probability, its dependence on everything in the formula, and intensities that scatter.
+//! Powers are in multiples of the detection threshold. The receiver adds normal noise with a standard deviation of 1/T
+//! of the threshold. It reports a return if the sum exceeds the threshold: with probability 0.5 at P = 1, and with 0.9
+//! at P = 1.26. This single step yields the detection probability, its dependence on all terms of the formula, and the
+//! scatter of the intensities.
 //!
 //! Calibration: P = 1 for a surface of reflectivity 0.5 that faces the sensor and fills the footprint at the nominal
-//! range (200 m), in air that does not attenuate. A surface of 0.8 is then detected with probability 0.9 up to 226 m,
-//! and one of 0.1 up to 80 m.
+//! range (200 m), in air that does not attenuate. A surface of reflectivity 0.8 is then detected with probability 0.9
+//! up to 226 m, and one of reflectivity 0.1 up to 80 m.
 
 use closecall_traffic::Environment;
 
 use super::Lidar;
 
-/// Threshold over the standard deviation of the receiver's noise, T. At 5 a scan of 10⁴ beams with 10² independent
-/// range cells each has a false alarm every third scan; they are not modelled.
+/// Ratio T of the detection threshold to the standard deviation of the receiver's noise.
+///
+/// With T = 5, a scan of 10⁴ beams with 10² independent range cells each has a false alarm every third time. False
+/// alarms are not modelled.
 pub(crate) const THRESHOLD_OVER_NOISE: f32 = 5.0;
-/// Power below which the noise, which stays within 3.47 standard deviations, cannot lift a return above the threshold.
-pub(crate) const LEAST_POWER: f32 = 1.0 - 3.47 / THRESHOLD_OVER_NOISE;
-/// Reflectivity of the target of the nominal range [1].
+/// Power below which a return cannot be detected: the noise stays within 3.47 standard deviations, and cannot raise the
+/// return above the threshold.
+pub(crate) const MIN_POWER: f32 = 1.0 - 3.47 / THRESHOLD_OVER_NOISE;
+/// Reflectivity of the target that defines the nominal range.
 const NOMINAL_REFLECTIVITY: f64 = 0.5;
-/// Standard deviation of range at high power [m], and what is added at the threshold.
+/// Standard deviation of the measured range at high power (m).
 const RANGE_SD_M: f32 = 0.03;
+/// Additional standard deviation of the measured range at the detection threshold (m), independent of the former.
 const RANGE_SD_AT_THRESHOLD_M: f32 = 0.09;
-/// Meteorological visibility is the distance at which contrast falls to 2 %: α = ln 50 / V (Koschmieder 1924).
-const KOSCHMIEDER: f64 = 3.912;
-/// Extinction of rain at optical wavelengths: 1.076·r^0.67 dB/km at r mm/h (Carbonneau and Wisely 1998).
+/// Product of extinction and meteorological visibility V, the distance at which contrast falls to 2 %: α = ln 50 / V
+/// (Koschmieder 1924).
+pub(crate) const KOSCHMIEDER: f64 = 3.912;
+/// Factor in the extinction of rain at optical wavelengths: 1.076·r^0.67 dB/km at r mm/h (Carbonneau and Wisely 1998).
 const RAIN_DB_PER_KM: f64 = 1.076;
+/// Exponent of the rain rate in that formula.
 const RAIN_EXPONENT: f64 = 0.67;
-/// Decibels per neper of power, times metres per kilometre.
+/// Extinction in dB/km that corresponds to an extinction of 1/m: decibels per neper of power, times metres per
+/// kilometre.
 const DB_PER_KM_OVER_PER_M: f64 = 4_342.944_819;
 
-/// Extinction below which the air sends nothing back that could be told from noise [1/m]: a visibility of 1 km.
+/// Extinction below which backscatter from the air cannot be distinguished from noise (1/m): a visibility of 1 km.
 const FOG_FROM_PER_M: f32 = 0.004;
 
-/// The link between surface and receiver in one weather.
+/// The link budget between a surface and the receiver in given weather.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Link {
-    /// Power of ρ·cos γ·f = 1 at 1 m without attenuation [thresholds · m²].
+pub(crate) struct LinkBudget {
+    /// Received power for ρ·cos γ·f = 1 at 1 m without attenuation (thresholds · m²).
     pub(crate) gain_m2: f32,
-    /// Extinction coefficient of the air α [1/m].
+    /// Extinction coefficient α of the air (1/m).
     pub(crate) extinction_per_m: f32,
 }
 
-impl Link {
+impl LinkBudget {
+    /// Returns the link budget of a LiDAR in this weather.
     #[expect(clippy::cast_possible_truncation, reason = "powers need no more than single precision")]
     pub(crate) fn new(lidar: &Lidar, environment: &Environment) -> Self {
         Self {
-            // Out through the window, and back.
+            // The window attenuates the light on the way out and on the way back.
             gain_m2: ((lidar.nominal_range_m * lidar.window_transmission).powi(2) / NOMINAL_REFLECTIVITY) as f32,
             extinction_per_m: extinction_per_m(environment) as f32,
         }
     }
 
-    /// True where the air holds enough droplets to send something back.
+    /// Returns true if the air contains enough droplets for detectable backscatter.
     pub(crate) fn has_fog(&self) -> bool {
         self.extinction_per_m >= FOG_FROM_PER_M
     }
 
-    /// Share of the light that is left after the way out and back over `range_m`.
+    /// Returns the share of the light that remains after the way out and back over `range_m`.
     pub(crate) fn transmission(&self, range_m: f32) -> f32 {
         (-2.0 * self.extinction_per_m * range_m).exp()
     }
 }
 
-/// Extinction of the air [1/m]: what the visibility gives, or what the rain alone gives, whichever is more.
+/// Returns the extinction coefficient of the air (1/m): the greater of the values for the visibility and for the rain.
 ///
-/// A visibility that was observed in rain has the rain's extinction in it, hence not the sum.
+/// The two are not added, because a visibility observed in rain already includes the extinction of the rain.
 pub(crate) fn extinction_per_m(environment: &Environment) -> f64 {
-    let rain_db_per_km = RAIN_DB_PER_KM * environment.rain_mm_per_h.powf(RAIN_EXPONENT);
-    (KOSCHMIEDER / environment.visibility_m).max(rain_db_per_km / DB_PER_KM_OVER_PER_M)
+    (KOSCHMIEDER / environment.visibility_m).max(rain_db_per_km(environment) / DB_PER_KM_OVER_PER_M)
 }
 
-/// Standard deviation of the measured range [m]: 0.03 m for a strong return, 0.1 m at the threshold.
+/// Returns the extinction of the rain (dB/km).
+pub(crate) fn rain_db_per_km(environment: &Environment) -> f64 {
+    RAIN_DB_PER_KM * environment.rain_mm_per_h.powf(RAIN_EXPONENT)
+}
+
+/// Returns the standard deviation of the measured range (m): 0.03 m for a strong return, 0.1 m at the threshold.
 pub(crate) fn range_sd_m(power: f32) -> f32 {
     let weak = RANGE_SD_AT_THRESHOLD_M / power.max(1.0);
     (RANGE_SD_M * RANGE_SD_M + weak * weak).sqrt()
@@ -89,7 +103,7 @@ mod tests {
 
     #[test]
     fn the_nominal_target_is_at_the_threshold() {
-        let link = Link::new(&Lidar::default(), &Environment::CLEAR_DAY);
+        let link = LinkBudget::new(&Lidar::default(), &Environment::CLEAR_DAY);
         assert!((link.gain_m2 * 0.5 / (200.0 * 200.0) - 1.0).abs() < 1e-6);
     }
 
@@ -103,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn weak_returns_are_less_certain() {
+    fn weak_returns_have_a_larger_range_error() {
         assert!((range_sd_m(1.0) - 0.0949).abs() < 1e-3);
         assert!((range_sd_m(100.0) - 0.03).abs() < 1e-3);
     }

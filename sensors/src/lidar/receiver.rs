@@ -1,37 +1,38 @@
-//! The receiver: which echoes are detected, and where E believes them to be.
+//! The receiver: decides which echoes are detected, and computes the points that are reported for them.
 //!
-//! Of each beam the first and the last detected echo are reported. Their distance goes along the *centre* of the beam:
-//! the sensor cannot know which part of the footprint sent it.
+//! The first and the last detected echo of each beam are reported. Their points lie on the *centre* line of the beam,
+//! because the sensor cannot know which part of the footprint returned the light.
 
-use super::cast::{ColumnHits, Fan};
+use super::cast::{ColumnHits, SubRays};
 use super::echo::{Echo, Echoes};
 use super::noise::{Noise, Purpose};
-use super::pattern::{ACROSS, BEAMS, Column, Elevation, LAYERS, LAYERS_PER_GROUP, UPWARD};
-use super::power::{LEAST_POWER, Link, THRESHOLD_OVER_NOISE, range_sd_m};
+use super::pattern::{BEAMS, Column, Elevation, LAYERS, LAYERS_PER_GROUP, SUBRAY_COLUMNS, SUBRAY_ROWS};
+use super::power::{LinkBudget, MIN_POWER, THRESHOLD_OVER_NOISE, range_sd_m};
 use super::soft::{self, Plume, SoftEcho};
 use super::targets::Targets;
-use super::viewpoint::{Deskew, sensor_m};
+use super::viewpoint::{Deskew, sensor_position_m};
 use super::{Lidar, LidarScan, Material, PointSource, PointTruth, ScanTruth};
 use crate::Scene;
 
-/// The brightest target that the receiver can still tell from a brighter one, as a reflectivity [1].
-const MOST_INTENSITY: f32 = 4.0;
+/// Intensity at which the receiver saturates, as a reflectivity.
+const MAX_INTENSITY: f32 = 4.0;
 
-/// Where E believes the sensor to be: its pitch is measured with an error.
+/// The sensor's pose as the ego estimates it: the pitch is measured with an error.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Placement {
+pub(crate) struct SensorPoseEstimate {
     sensor_m: [f32; 3],
     cos: f32,
     sin: f32,
     deskew: [f32; 4],
 }
 
-impl Placement {
+impl SensorPoseEstimate {
     #[expect(clippy::cast_possible_truncation, reason = "points are in single precision")]
+    /// Returns the estimate for the end of the sweep, with a random error of the pitch.
     pub(crate) fn new(scene: &Scene<'_>, lidar: &Lidar, noise: Noise) -> Self {
         let error_rad = lidar.levelling_sd_rad * f64::from(noise.normal(BEAMS, Purpose::Levelling));
         let pitch_rad = scene.ego.pitch_rad + error_rad;
-        let sensor = sensor_m(0.5 * scene.ego.vehicle.dimensions.length_m, lidar.mount_height_m, pitch_rad);
+        let sensor = sensor_position_m(0.5 * scene.ego.vehicle.dimensions.length_m, lidar.mount_height_m, pitch_rad);
         let (sin, cos) = (pitch_rad + lidar.tilt_rad).sin_cos();
         Self {
             sensor_m: [sensor.x as f32, sensor.y as f32, sensor.z as f32],
@@ -41,18 +42,19 @@ impl Placement {
         }
     }
 
+    /// Returns the longitudinal position of the sensor in the ego's frame (m).
     pub(crate) fn sensor_x_m(&self) -> f32 {
         self.sensor_m[0]
     }
 
-    /// The same at another instant of the sweep.
+    /// Returns this estimate for another instant of the sweep.
     #[expect(clippy::cast_possible_truncation, reason = "points are in single precision")]
-    pub(crate) fn at(&self, deskew: Deskew) -> Self {
+    pub(crate) fn deskewed(&self, deskew: Deskew) -> Self {
         Self { deskew: [deskew.cos as f32, deskew.sin as f32, deskew.x_m as f32, deskew.y_m as f32], ..*self }
     }
 
-    /// A point of the sensor's frame in E's frame at the end of the sweep [m].
-    fn point_m(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
+    /// Transforms a point from the sensor's frame to the ego's frame at the end of the sweep (m).
+    fn ego_frame_point_m(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
         let ahead = self.sensor_m[0] - self.cos * x + self.sin * z;
         let left = self.sensor_m[1] - y;
         let above = self.sensor_m[2] + self.sin * x + self.cos * z;
@@ -61,9 +63,9 @@ impl Placement {
     }
 }
 
-/// A return that may be reported.
+/// A return that reaches the receiver and may be detected.
 #[derive(Clone, Copy, Debug)]
-struct Candidate {
+struct PotentialReturn {
     range_m: f32,
     power: f32,
     source: PointSource,
@@ -72,31 +74,33 @@ struct Candidate {
 
 /// A detected return.
 #[derive(Clone, Copy, Debug)]
-struct Return {
-    candidate: Candidate,
+struct DetectedReturn {
+    potential: PotentialReturn,
     measured_m: f32,
     measured_power: f32,
 }
 
-/// The receiver during one column.
+/// The receiver and its inputs for one column.
 pub(crate) struct Receiver<'a> {
-    pub(crate) index: usize,
+    /// Index of the column.
+    pub(crate) column_index: usize,
     pub(crate) column: &'a Column,
     pub(crate) elevations: &'a [Elevation],
-    pub(crate) placement: Placement,
+    pub(crate) pose: SensorPoseEstimate,
     pub(crate) targets: &'a Targets,
     pub(crate) plumes: &'a [Plume],
-    pub(crate) link: &'a Link,
+    pub(crate) link: &'a LinkBudget,
     pub(crate) noise: Noise,
+    /// Share of returns that are lost regardless of their power.
     pub(crate) dropout: f32,
 }
 
 impl Receiver<'_> {
-    /// Appends what is detected in this column.
+    /// Appends the detected returns of this column to the scan and to its ground truth.
     pub(crate) fn receive(&self, hits: &ColumnHits, scan: &mut LidarScan, truth: &mut ScanTruth) {
         let in_air = !self.plumes.is_empty() || self.link.has_fog();
         for (layer, elevation) in self.elevations.iter().enumerate() {
-            let echoes = if hits.is_touched(layer) {
+            let echoes = if hits.is_tested(layer) {
                 Echoes::of(&hits.beams[layer], elevation, &self.targets.faces, self.link)
             } else if layer < hits.ground_below {
                 let centre = self.column.centre[layer / LAYERS_PER_GROUP];
@@ -112,32 +116,33 @@ impl Receiver<'_> {
                 self.detect(layer, echoes.as_slice(), |_| 1.0, None)
             };
             for found in found.into_iter().flatten() {
-                self.report(layer, &found, scan, truth);
+                self.append(layer, &found, scan, truth);
             }
         }
     }
 
-    fn detect_in_air(&self, layer: usize, echoes: &[Echo]) -> [Option<Return>; 2] {
+    /// Returns the detected returns of a beam if there are droplets in the air.
+    fn detect_in_air(&self, layer: usize, echoes: &[Echo]) -> [Option<DetectedReturn>; 2] {
         let [cos, sin] = self.column.centre[layer / LAYERS_PER_GROUP];
         let tan = self.elevations[layer].centre[0];
-        let centre = Fan { cos: [cos; ACROSS], sin: [sin; ACROSS], tan: [tan; UPWARD] };
-        let beam = self.index * LAYERS + layer;
-        let droplets = soft::droplets(beam, &centre, self.plumes, (self.targets, self.link, self.noise));
+        let centre = SubRays { cos: [cos; SUBRAY_COLUMNS], sin: [sin; SUBRAY_COLUMNS], tan: [tan; SUBRAY_ROWS] };
+        let beam = self.column_index * LAYERS + layer;
+        let droplets = soft::droplet_effect(beam, &centre, self.plumes, (self.targets, self.link, self.noise));
         self.detect(layer, echoes, |range_m| droplets.transmission(range_m), droplets.echo)
     }
 
-    /// The first and the last detected return, the latter where it is another one.
+    /// Returns the first and the last detected return. The second is `None` if there is only one.
     fn detect(
         &self,
         layer: usize,
         echoes: &[Echo],
         transmission: impl Fn(f32) -> f32,
         soft: Option<SoftEcho>,
-    ) -> [Option<Return>; 2] {
-        let beam = self.index * LAYERS + layer;
+    ) -> [Option<DetectedReturn>; 2] {
+        let beam = self.column_index * LAYERS + layer;
         let mut found = [None, None];
         let before_hard = |soft: &SoftEcho| echoes.first().is_none_or(|echo| soft.range_m < echo.range_m);
-        let soft = soft.filter(before_hard).map(|soft| Candidate {
+        let soft = soft.filter(before_hard).map(|soft| PotentialReturn {
             range_m: soft.range_m,
             power: soft.power,
             source: soft.source,
@@ -145,15 +150,15 @@ impl Receiver<'_> {
         });
         let hard = echoes.iter().map(|echo| {
             let face = &self.targets.faces[echo.face as usize];
-            // The air can only take away: what is too weak without it needs no exponential.
-            let is_strong = echo.power > LEAST_POWER;
+            // The air can only attenuate: an echo that is too weak without attenuation needs no exponential.
+            let is_strong = echo.power > MIN_POWER;
             let through =
                 if is_strong { self.link.transmission(echo.range_m) * transmission(echo.range_m) } else { 1.0 };
             let power = echo.power * through;
-            Candidate { range_m: echo.range_m, power, source: face.source, material: face.material }
+            PotentialReturn { range_m: echo.range_m, power, source: face.source, material: face.material }
         });
-        for (place, candidate) in soft.into_iter().chain(hard).enumerate() {
-            if let Some(detected) = self.detected(place * BEAMS + beam, candidate) {
+        for (index, potential) in soft.into_iter().chain(hard).enumerate() {
+            if let Some(detected) = self.detect_one(index * BEAMS + beam, potential) {
                 if found[0].is_none() {
                     found[0] = Some(detected);
                 } else {
@@ -164,33 +169,34 @@ impl Receiver<'_> {
         found
     }
 
-    /// The return, where noise lets it pass the threshold.
-    fn detected(&self, address: usize, candidate: Candidate) -> Option<Return> {
-        if !(candidate.power > LEAST_POWER) {
+    /// Returns the measurement if the power with noise exceeds the threshold and the return is not dropped.
+    fn detect_one(&self, address: usize, potential: PotentialReturn) -> Option<DetectedReturn> {
+        if !(potential.power > MIN_POWER) {
             return None;
         }
-        let measured_power = candidate.power + self.noise.normal(address, Purpose::Detection) / THRESHOLD_OVER_NOISE;
+        let measured_power = potential.power + self.noise.normal(address, Purpose::Detection) / THRESHOLD_OVER_NOISE;
         if !(measured_power > 1.0) || self.noise.uniform(address, Purpose::Dropout) < self.dropout {
             return None;
         }
         let error = range_sd_m(measured_power) * self.noise.normal(address, Purpose::Range);
-        Some(Return { candidate, measured_m: candidate.range_m + error, measured_power })
+        Some(DetectedReturn { potential, measured_m: potential.range_m + error, measured_power })
     }
 
-    fn report(&self, layer: usize, found: &Return, scan: &mut LidarScan, truth: &mut ScanTruth) {
+    /// Appends a detected return to the scan and to its ground truth.
+    fn append(&self, layer: usize, found: &DetectedReturn, scan: &mut LidarScan, truth: &mut ScanTruth) {
         let [cos, sin] = self.column.centre[layer / LAYERS_PER_GROUP];
         let [tan, cosine] = self.elevations[layer].centre;
         let level = found.measured_m * cosine;
-        let [x, y, z] = self.placement.point_m([level * cos, level * sin, level * tan]);
+        let [x, y, z] = self.pose.ego_frame_point_m([level * cos, level * sin, level * tan]);
         scan.x_m.push(x);
         scan.y_m.push(y);
         scan.z_m.push(z);
         let square = found.measured_m * found.measured_m;
-        scan.intensity.push((found.measured_power * square / self.link.gain_m2).min(MOST_INTENSITY));
+        scan.intensity.push((found.measured_power * square / self.link.gain_m2).min(MAX_INTENSITY));
         scan.offset_ns.push(self.column.offset_ns);
         #[expect(clippy::cast_possible_truncation, reason = "653 columns of 16 layers")]
-        scan.beam.push((self.index * LAYERS + layer) as u16);
-        let Candidate { range_m, source, material, .. } = found.candidate;
+        scan.beam.push((self.column_index * LAYERS + layer) as u16);
+        let PotentialReturn { range_m, source, material, .. } = found.potential;
         truth.points.push(PointTruth { source, material, range_m });
     }
 }

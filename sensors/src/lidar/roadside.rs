@@ -1,32 +1,27 @@
 //! Guard rails with their posts along both edges of the road.
-//!
-//! A rail of the usual European kind: a W-shaped beam 0.31 m high whose upper edge stands 0.75 m above the road, on
-//! posts 4 m apart. It stands 0.75 m from the left edge and, past a hard shoulder, 3 m from the right one (assumptions
-//! within the usual cross-sections of German motorways, RAA 2008).
 
 use closecall_traffic::{PlanePose, Road};
 
 use super::Material::Steel;
 use super::solid::Solid;
+use crate::guard_rail::{BEAM_DEPTH_M, BEAM_TOP_M, LEFT_OFFSET_M, POST_SPACING_M, RIGHT_OFFSET_M};
 
 const BEAM_LOW_M: f64 = 0.44;
-const BEAM_TOP_M: f64 = 0.75;
-const BEAM_DEPTH_M: f64 = 0.08;
-const POST_SPACING_M: f64 = 4.0;
 const POST_WIDTH_M: f64 = 0.10;
-const LEFT_OFFSET_M: f64 = 0.75;
-const RIGHT_OFFSET_M: f64 = 3.0;
-/// Beyond this distance nothing comes back from steel at so grazing an angle; it could still hide something.
+/// Length of the modelled rails behind the ego (m). Beyond this distance steel at so grazing an angle gives no return,
+/// although the rail could still occlude something.
 const RAIL_REACH_M: f64 = 160.0;
+/// Length behind the ego on which posts are modelled (m).
 const POST_REACH_M: f64 = 60.0;
-/// Chords of a bent rail [m]: 4 cm off the arc at the tightest curvature that a road may have.
+/// Length of the chords that approximate a curved rail (m). At the tightest curvature that a road may have, a chord is
+/// 4 cm off the arc.
 const CHORD_M: f64 = 12.0;
 
-/// A solid with the pose of its frame in the plane.
-pub(super) type Placed = (Solid, PlanePose);
+/// A solid, and the pose of its frame in the plane.
+pub(super) type PlacedSolid = (Solid, PlanePose);
 
-/// Appends the rails behind the road position `s_m`.
-pub(super) fn append_guard_rails(road: &Road, s_m: f64, placed: &mut Vec<Placed>) {
+/// Appends the guard rails behind the road position `s_m`.
+pub(super) fn append_guard_rails(road: &Road, s_m: f64, placed: &mut Vec<PlacedSolid>) {
     let chord = if road.curvature_per_m() == 0.0 { RAIL_REACH_M } else { CHORD_M };
     for (d_m, outward) in [(LEFT_OFFSET_M, 1.0), (road.right_edge_m() - RIGHT_OFFSET_M, -1.0)] {
         let mut from = s_m - RAIL_REACH_M;
@@ -35,15 +30,15 @@ pub(super) fn append_guard_rails(road: &Road, s_m: f64, placed: &mut Vec<Placed>
             let half = 0.5 * (to - from);
             let depth = [0.0, outward * BEAM_DEPTH_M];
             let low = [-half, depth[0].min(depth[1]), BEAM_LOW_M];
-            let beam = Solid::block(low, [half, depth[0].max(depth[1]), BEAM_TOP_M], Steel);
+            let beam = Solid::cuboid(low, [half, depth[0].max(depth[1]), BEAM_TOP_M], Steel);
             placed.push((beam, road.plane_pose(0.5 * (from + to), d_m, 0.0)));
             from = to;
         }
-        // Posts stand still: their places are multiples of the spacing along the road.
+        // Posts are fixed to the road: their positions along it are multiples of the spacing, wherever the ego is.
         let mut index = ((s_m - POST_REACH_M) / POST_SPACING_M).ceil();
         while index * POST_SPACING_M < s_m {
             let half = 0.5 * POST_WIDTH_M;
-            let post = Solid::block([-half, -half, 0.0], [half, half, BEAM_LOW_M], Steel);
+            let post = Solid::cuboid([-half, -half, 0.0], [half, half, BEAM_LOW_M], Steel);
             let d_post = d_m + outward * (BEAM_DEPTH_M + half);
             placed.push((post, road.plane_pose(index * POST_SPACING_M, d_post, 0.0)));
             index += 1.0;

@@ -1,60 +1,61 @@
-//! What the scanner delivers, and, apart from it, the truth behind each point.
+//! The scanner's output: a scan, and separately the ground truth of each of its points.
 
 use closecall_traffic::Time;
 
 use super::Material;
 
-/// The side of the two-sided mirror that deflects a scan.
+/// The side of the two-sided mirror that deflects the beams of a scan.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Mirror {
-    /// The side that lifts the layers: + in the pattern's formula.
+pub enum MirrorSide {
+    /// The side that raises the layers: + in the pattern's formula.
     #[default]
     Plus,
-    /// The side that lowers them.
+    /// The side that lowers the layers: − in the pattern's formula.
     Minus,
 }
 
-/// One scan as a structure of arrays, all of the same length; one entry for each return.
+/// A LiDAR scan as a structure of arrays. All arrays have the same length: one entry for each return.
 ///
-/// Coordinates are in E's vehicle frame *at the scan's end*: E's own motion during the sweep, and its measured pitch,
-/// are compensated. Others have moved meanwhile: a point is where its target was when it was measured.
-/// A beam that is split gives two returns, the nearer first.
+/// Coordinates are in the ego's vehicle frame *at the scan's end*: the ego's motion during the sweep and its measured
+/// pitch are compensated. The motion of other vehicles is not: a point lies where its target was when the point was
+/// measured. A beam that is split by an edge gives two returns, the nearer one first.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LidarScan {
-    /// When the first column was measured.
+    /// Time at which the first column was measured.
     pub start: Time,
-    /// When the last column was measured; the coordinates hold for E's pose at this time.
+    /// Time at which the last column was measured. The coordinates refer to the ego's pose at this time.
     pub end: Time,
-    /// Side of the mirror.
-    pub mirror: Mirror,
-    /// Where the sensor is, ahead of E's origin [m]; negative, at the rear bumper.
+    /// Side of the mirror that deflected this scan.
+    pub mirror_side: MirrorSide,
+    /// Longitudinal position of the sensor in the ego's frame (m): negative, because it is in the rear bumper.
     pub sensor_x_m: f32,
-    /// Ahead of E [m]; negative behind.
+    /// Longitudinal position of each point (m), negative behind the ego's origin.
     pub x_m: Vec<f32>,
-    /// To the left of E [m].
+    /// Lateral position of each point (m), positive to the left.
     pub y_m: Vec<f32>,
-    /// Above the ground [m].
+    /// Height of each point above the ground (m).
     pub z_m: Vec<f32>,
-    /// Received power × range², as the reflectivity of a target that faces the sensor and fills the beam [1].
+    /// Intensity of each point: received power × range², scaled to the reflectivity of a target that faces the sensor
+    /// and fills the beam.
     pub intensity: Vec<f32>,
-    /// Time of measurement after `start` [ns].
+    /// Time of measurement of each point after `start` (ns).
     pub offset_ns: Vec<u32>,
-    /// Beam: column · 16 + layer.
+    /// Beam of each point, as column · 16 + layer.
     pub beam: Vec<u16>,
 }
 
 impl LidarScan {
-    /// Number of points.
+    /// Returns the number of points.
     pub fn len(&self) -> usize {
         self.x_m.len()
     }
 
-    /// True for a scan without a point.
+    /// Returns true if the scan has no points.
     pub fn is_empty(&self) -> bool {
         self.x_m.is_empty()
     }
 
-    /// Removes every point, keeping the memory.
+    /// Removes all points but keeps the allocated memory.
     pub(crate) fn clear(&mut self) {
         self.x_m.clear();
         self.y_m.clear();
@@ -65,10 +66,10 @@ impl LidarScan {
     }
 }
 
-/// What a point truly comes from.
+/// The object that a point originates from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PointSource {
-    /// A vehicle: its place in the scenario's list of actors.
+    /// A vehicle, given by its index in the scenario's list of actors.
     Actor(usize),
     /// The road's surface.
     Ground,
@@ -80,20 +81,20 @@ pub enum PointSource {
     Fog,
 }
 
-/// The truth of one point.
+/// The ground truth of one point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointTruth {
-    /// What it comes from.
+    /// Object that the point originates from.
     pub source: PointSource,
-    /// What the surface is made of.
+    /// Material of the surface.
     pub material: Material,
-    /// Distance from the sensor without noise [m].
+    /// True distance from the sensor, without noise (m).
     pub range_m: f32,
 }
 
-/// The truth behind each point of a scan, in the same order. No perception sees it.
+/// The ground truth of the points of a scan, in the same order. The processing chain has no access to it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ScanTruth {
-    /// One entry for each point.
+    /// Ground truth of each point.
     pub points: Vec<PointTruth>,
 }

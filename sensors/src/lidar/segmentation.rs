@@ -1,53 +1,54 @@
-//! How well clusters agree with the truth: vehicles split into several, or several merged into one.
+//! Segmentation quality: compares clusters with the ground truth, and counts vehicles that are split into several
+//! clusters or merged into one.
 
 use super::{PointSource, ScanTruth};
 
-/// Points of a vehicle in a cluster, or in a scan, below which they are not counted.
-const FEWEST_POINTS: usize = 3;
+/// A vehicle with fewer points than this in a cluster, or in a scan, is not counted there.
+const MIN_POINTS: usize = 3;
 
-/// Counts over scans.
+/// Segmentation errors, counted over several scans.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SegmentationReport {
-    /// Vehicles with enough points to be found, summed over the scans.
+    /// Vehicles with enough points to be detected, summed over the scans.
     pub vehicles: usize,
-    /// Of these, those whose points lie in more than one cluster.
+    /// Number of these vehicles whose points lie in more than one cluster.
     pub over_segmented: usize,
-    /// Of these, those with no cluster of their own or shared.
+    /// Number of these vehicles whose points lie in no cluster.
     pub missed: usize,
-    /// Clusters that hold more than one vehicle.
+    /// Clusters that contain more than one vehicle.
     pub under_segmented: usize,
-    /// Clusters of which most points come from no vehicle.
+    /// Clusters most of whose points do not originate from a vehicle.
     pub background: usize,
 }
 
 impl SegmentationReport {
-    /// Adds one scan. `clusters` yields the places in the scan of each cluster's points.
-    pub fn add<'a>(&mut self, truth: &ScanTruth, clusters: impl Iterator<Item = &'a [u32]>) {
+    /// Adds one scan. `clusters` yields the indices of each cluster's points in the scan.
+    pub fn observe<'a>(&mut self, truth: &ScanTruth, clusters: impl Iterator<Item = &'a [u32]>) {
         let mut in_scan: Vec<(usize, usize)> = Vec::new();
         count(truth.points.iter().map(|point| point.source), &mut in_scan);
-        in_scan.retain(|&(_, points)| points >= FEWEST_POINTS);
-        let mut pieces = vec![0_usize; in_scan.len()];
-        let mut held: Vec<(usize, usize)> = Vec::new();
+        in_scan.retain(|&(_, points)| points >= MIN_POINTS);
+        let mut clusters_with = vec![0_usize; in_scan.len()];
+        let mut in_cluster: Vec<(usize, usize)> = Vec::new();
         for members in clusters {
-            held.clear();
-            count(members.iter().map(|&member| truth.points[member as usize].source), &mut held);
-            let from_vehicles: usize = held.iter().map(|&(_, points)| points).sum();
-            held.retain(|&(_, points)| points >= FEWEST_POINTS);
+            in_cluster.clear();
+            count(members.iter().map(|&member| truth.points[member as usize].source), &mut in_cluster);
+            let from_vehicles: usize = in_cluster.iter().map(|&(_, points)| points).sum();
+            in_cluster.retain(|&(_, points)| points >= MIN_POINTS);
             self.background += usize::from(2 * from_vehicles < members.len());
-            self.under_segmented += usize::from(held.len() > 1);
-            for &(actor, _) in &held {
-                if let Some(place) = in_scan.iter().position(|&(other, _)| other == actor) {
-                    pieces[place] += 1;
+            self.under_segmented += usize::from(in_cluster.len() > 1);
+            for &(actor, _) in &in_cluster {
+                if let Some(index) = in_scan.iter().position(|&(other, _)| other == actor) {
+                    clusters_with[index] += 1;
                 }
             }
         }
         self.vehicles += in_scan.len();
-        self.over_segmented += pieces.iter().filter(|&&pieces| pieces > 1).count();
-        self.missed += pieces.iter().filter(|&&pieces| pieces == 0).count();
+        self.over_segmented += clusters_with.iter().filter(|&&n| n > 1).count();
+        self.missed += clusters_with.iter().filter(|&&n| n == 0).count();
     }
 }
 
-/// Counts points by actor, in order of first appearance.
+/// Counts the points of each actor. The actors are in order of first appearance.
 fn count(sources: impl Iterator<Item = PointSource>, counts: &mut Vec<(usize, usize)>) {
     for source in sources {
         if let PointSource::Actor(actor) = source {
@@ -65,7 +66,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn splits_merges_and_misses_are_counted() {
+    fn counts_split_merged_and_missed_vehicles() {
         let of = |actor: Option<usize>| PointTruth {
             source: actor.map_or(PointSource::Ground, PointSource::Actor),
             material: Material::Paint,
@@ -73,10 +74,10 @@ mod tests {
         };
         let actors = [0, 0, 0, 0, 0, 0, 1, 1, 1, 2, 2, 2, 3, 3, 3].map(Some).into_iter().chain([None; 3]);
         let truth = ScanTruth { points: actors.map(of).collect() };
-        // 0 is split; 1 and 2 are merged; 3 is missed; the last cluster is ground.
+        // Actor 0 is split, actors 1 and 2 are merged, and actor 3 is missed. The last cluster is ground.
         let clusters: [&[u32]; 4] = [&[0, 1, 2], &[3, 4, 5], &[6, 7, 8, 9, 10, 11], &[15, 16, 17]];
         let mut report = SegmentationReport::default();
-        report.add(&truth, clusters.into_iter());
+        report.observe(&truth, clusters.into_iter());
         let expected =
             SegmentationReport { vehicles: 4, over_segmented: 1, missed: 1, under_segmented: 1, background: 1 };
         assert_eq!(report, expected);

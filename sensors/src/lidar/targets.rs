@@ -1,14 +1,16 @@
-//! The solids of a scene as the sensor sees them: faces in the sensor's frame, prepared for the ray cast.
+//! The solids of a scene, as faces in the sensor's frame that are prepared for the ray cast.
 //!
-//! All rays start in the origin of the sensor's frame. A face n·p ≤ w is therefore kept as m = n/w: along a direction d
-//! the plane is met at distance t with 1/t = m·d. In *inverse* distance u = 1/t a convex solid is met where
+//! All rays start at the origin of the sensor's frame. A face is the half-space n·p ≤ w with the outward unit normal n.
+//! It is stored as m = n/w: a ray of direction d meets the plane of the face at the distance t with 1/t = m·d. In terms
+//! of the *inverse* distance u = 1/t, a ray is inside a convex solid if
 //!
 //! ```text
-//!   u ≤ m·d  for each face that looks to the sensor (w < 0; the origin lies outside of it)
-//!   u ≥ m·d  for each other face,    and u > 0
+//!   u ≤ m·d  for each front-facing face (w < 0: the sensor is on its outer side)
+//!   u ≥ m·d  for each back-facing face,    and u > 0
 //! ```
 //!
-//! so that the nearest point of the solid is the least m·d over the faces that look to the sensor, without a division.
+//! The nearest point of the solid is therefore at the minimum of m·d over the front-facing faces. No division is
+//! needed.
 
 use std::ops::Range;
 
@@ -16,123 +18,132 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::pattern::Pattern;
 use super::solid::{Solid, SolidFace};
-use super::{Material, Mirror, PointSource};
+use super::{Material, MirrorSide, PointSource};
 
-/// A face closer to the sensor's centre than this is taken to be at this distance [m], so that n/w stays finite.
-const LEAST_OFFSET_M: f64 = 1e-4;
-/// Widening of a solid's bounds against rounding in single precision [°].
+/// Minimum distance of a face's plane from the sensor's centre (m). Nearer planes are moved to it, so that n/w stays
+/// finite.
+const MIN_OFFSET_M: f64 = 1e-4;
+/// Margin added to a solid's bounds to cover rounding in single precision (°).
 const BOUND_MARGIN_DEG: f64 = 0.02;
-/// Bounds of elevation use a horizontal distance shortened by this share, for the tilt of the sensor's frame.
+/// Factor on the horizontal distance in the bounds of elevation, which covers the tilt of the sensor's frame.
 const DISTANCE_MARGIN: f64 = 0.98;
-/// The least horizontal distance that bounds of elevation are worked out with [m].
-const LEAST_DISTANCE_M: f64 = 0.05;
+/// Minimum horizontal distance in the bounds of elevation (m).
+const MIN_DISTANCE_M: f64 = 0.05;
 
-/// One face, ready for the ray cast.
+/// A face, prepared for the ray cast.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Face {
-    /// n/w [1/m].
+    /// The vector m = n/w (1/m).
     pub(crate) inverse: [f32; 3],
-    /// |w| [m].
+    /// Distance |w| of the plane from the sensor (m).
     #[cfg(test)]
     pub(crate) offset_m: f32,
-    /// ρ·|w| [m]: times the inverse range this is ρ·cos γ.
+    /// ρ·|w| (m), with the reflectivity ρ. Times the inverse range it gives ρ·cos γ, with the incidence angle γ.
     pub(crate) strength_m: f32,
     pub(crate) material: Material,
     pub(crate) source: PointSource,
 }
 
-/// The faces of one solid within [`Targets::faces`].
+/// The faces of a solid, as ranges of indices in [`Targets::faces`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FaceRange {
-    /// Faces that look to the sensor: `first..turned`; the others: `turned..end`.
+    /// The front-facing faces are `first..first_back`, the back-facing ones `first_back..end`.
     pub(crate) first: u32,
-    pub(crate) turned: u32,
+    pub(crate) first_back: u32,
     pub(crate) end: u32,
 }
 
 impl FaceRange {
-    /// The faces that look to the sensor, as indices.
-    pub(crate) fn towards(self) -> Range<usize> {
-        self.first as usize..self.turned as usize
+    /// Returns the indices of the front-facing faces.
+    pub(crate) fn front_facing(self) -> Range<usize> {
+        self.first as usize..self.first_back as usize
     }
 
-    /// The faces turned away from it, as indices.
-    pub(crate) fn away(self) -> Range<usize> {
-        self.turned as usize..self.end as usize
+    /// Returns the indices of the back-facing faces.
+    pub(crate) fn back_facing(self) -> Range<usize> {
+        self.first_back as usize..self.end as usize
     }
 }
 
-/// One solid: its faces, and the beams that may meet it.
+/// A convex solid of the scene: its faces, and the columns and layers that may hit it.
 #[derive(Clone, Debug)]
 pub(crate) struct Part {
     pub(crate) faces: FaceRange,
+    /// Columns that may hit the solid.
     pub(crate) columns: Range<usize>,
+    /// Layers that may hit the solid.
     pub(crate) layers: Range<usize>,
 }
 
-/// What the faces of one thing have in common.
+/// The surface properties that all faces of an object have in common.
 #[derive(Clone, Copy)]
-pub(crate) struct Finish<'a> {
+pub(crate) struct Surface<'a> {
     pub(crate) source: PointSource,
-    /// Reflectivity of each material [1].
+    /// Reflectivity of each material.
     pub(crate) reflectivity: &'a dyn Fn(Material) -> f64,
 }
 
-/// The beams of one scan, for finding those that a solid may meet.
+/// The beams of a scan, used to find those that may hit a solid.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Beams<'a> {
     pub(crate) pattern: &'a Pattern,
-    pub(crate) mirror: Mirror,
+    pub(crate) mirror_side: MirrorSide,
 }
 
-/// All solids of a scene. The memory is reused from scan to scan.
+/// All solids of a scene. The allocated memory is reused from scan to scan.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Targets {
+    /// Faces of all solids and plumes. The first is the road's surface.
     pub(crate) faces: Vec<Face>,
+    /// Solids that at least one beam may hit.
     pub(crate) parts: Vec<Part>,
 }
 
 impl Targets {
+    /// Removes all faces and solids but keeps the allocated memory.
     pub(crate) fn clear(&mut self) {
         self.faces.clear();
         self.parts.clear();
     }
 
-    /// Appends a solid, unless no beam can meet it from outside.
-    pub(crate) fn push(&mut self, beams: Beams<'_>, solid: &Solid, pose: &Isometry3<f64>, finish: Finish<'_>) {
+    /// Appends a solid, unless no beam can hit it from outside.
+    pub(crate) fn push(&mut self, beams: Beams<'_>, solid: &Solid, pose: &Isometry3<f64>, surface: Surface<'_>) {
         let bounds = Bounds::of(solid, pose);
         let columns = beams.pattern.columns_between(bounds.azimuth_deg[0], bounds.azimuth_deg[1]);
-        let layers = Pattern::layers_between(beams.mirror, bounds.elevation_deg[0], bounds.elevation_deg[1]);
+        let layers = Pattern::layers_between(beams.mirror_side, bounds.elevation_deg[0], bounds.elevation_deg[1]);
         if columns.is_empty() || layers.is_empty() {
             return;
         }
-        let faces = self.push_faces(solid, pose, finish);
-        if !faces.towards().is_empty() {
+        let faces = self.push_faces(solid, pose, surface);
+        if !faces.front_facing().is_empty() {
             self.parts.push(Part { faces, columns, layers });
         }
     }
 
-    /// Appends the road's surface, z = 0 of the plane.
-    pub(crate) fn push_ground(&mut self, sensor_from_plane: &Isometry3<f64>, finish: Finish<'_>) {
+    /// Appends the road's surface, which is z = 0 in the plane's frame.
+    pub(crate) fn push_ground(&mut self, sensor_from_plane: &Isometry3<f64>, surface: Surface<'_>) {
         let up = sensor_from_plane.rotation * Vector3::z();
         let face = (up, up.dot(&sensor_from_plane.translation.vector), Material::Asphalt);
-        self.faces.push(prepared(face, finish));
+        self.faces.push(prepare_face(face, surface));
     }
 
-    /// Appends the faces of a solid with this pose in the sensor's frame, those that look to the sensor first.
+    /// Appends the faces of a solid with this pose in the sensor's frame, the front-facing ones first.
     #[expect(clippy::cast_possible_truncation, reason = "4 billion faces do not fit into memory")]
-    pub(crate) fn push_faces(&mut self, solid: &Solid, pose: &Isometry3<f64>, finish: Finish<'_>) -> FaceRange {
+    pub(crate) fn push_faces(&mut self, solid: &Solid, pose: &Isometry3<f64>, surface: Surface<'_>) -> FaceRange {
         let first = self.faces.len() as u32;
-        self.faces.extend(placed_faces(solid, pose).filter(|face| face.1 < 0.0).map(|face| prepared(face, finish)));
-        let turned = self.faces.len() as u32;
-        self.faces.extend(placed_faces(solid, pose).filter(|face| face.1 >= 0.0).map(|face| prepared(face, finish)));
-        FaceRange { first, turned, end: self.faces.len() as u32 }
+        self.faces
+            .extend(placed_faces(solid, pose).filter(|face| face.1 < 0.0).map(|face| prepare_face(face, surface)));
+        let first_back = self.faces.len() as u32;
+        self.faces
+            .extend(placed_faces(solid, pose).filter(|face| face.1 >= 0.0).map(|face| prepare_face(face, surface)));
+        FaceRange { first, first_back, end: self.faces.len() as u32 }
     }
 }
 
-/// A face in the sensor's frame: unit normal, distance w of its plane [m], material.
+/// A face in the sensor's frame: unit normal, signed distance w of its plane (m), material.
 type PlacedFace = (Vector3<f64>, f64, Material);
 
+/// Transforms the faces of a solid to the sensor's frame.
 fn placed_faces(solid: &Solid, pose: &Isometry3<f64>) -> impl Iterator<Item = PlacedFace> {
     let turn = pose.rotation.to_rotation_matrix();
     let origin = pose.translation.vector;
@@ -143,20 +154,20 @@ fn placed_faces(solid: &Solid, pose: &Isometry3<f64>) -> impl Iterator<Item = Pl
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "the ray cast is in single precision: 1e-5 m at 200 m")]
-fn prepared((normal, offset_m, material): PlacedFace, finish: Finish<'_>) -> Face {
-    let offset_m = if offset_m < 0.0 { offset_m.min(-LEAST_OFFSET_M) } else { offset_m.max(LEAST_OFFSET_M) };
+fn prepare_face((normal, offset_m, material): PlacedFace, surface: Surface<'_>) -> Face {
+    let offset_m = if offset_m < 0.0 { offset_m.min(-MIN_OFFSET_M) } else { offset_m.max(MIN_OFFSET_M) };
     let inverse = normal / offset_m;
     Face {
         inverse: [inverse.x as f32, inverse.y as f32, inverse.z as f32],
         #[cfg(test)]
         offset_m: offset_m.abs() as f32,
-        strength_m: ((finish.reflectivity)(material) * offset_m.abs()) as f32,
+        strength_m: ((surface.reflectivity)(material) * offset_m.abs()) as f32,
         material,
-        source: finish.source,
+        source: surface.source,
     }
 }
 
-/// Azimuths and elevations between which a solid lies, in the sensor's frame [°]; rather too wide than too narrow.
+/// Conservative bounds of a solid's azimuth and elevation in the sensor's frame (°): too wide rather than too narrow.
 struct Bounds {
     azimuth_deg: [f64; 2],
     elevation_deg: [f64; 2],
@@ -170,12 +181,13 @@ impl Bounds {
         };
         let [bottom, top] = fold(|corner| corner.z);
         let far = fold(|corner| corner.x.hypot(corner.y))[1];
-        let near = (distance_m(solid, pose) * DISTANCE_MARGIN).max(LEAST_DISTANCE_M);
-        let above = |z: f64, least: f64, most: f64| (z / if z > 0.0 { least } else { most }).atan().to_degrees();
-        // The azimuth jumps by a full turn where the solid crosses the half-plane before E's rear.
+        let near = (distance_m(solid, pose) * DISTANCE_MARGIN).max(MIN_DISTANCE_M);
+        let above = |z: f64, near_m: f64, far_m: f64| (z / if z > 0.0 { near_m } else { far_m }).atan().to_degrees();
+        // The azimuth jumps by 360° if the solid crosses the half-plane y = 0, x ≤ 0, which extends forward from the
+        // sensor.
         let crosses = fold(|corner| corner.x)[0] <= 0.0 && {
-            let [right, left] = fold(|corner| corner.y);
-            right <= 0.0 && left >= 0.0
+            let [min_y, max_y] = fold(|corner| corner.y);
+            min_y <= 0.0 && max_y >= 0.0
         };
         let azimuth = if crosses { [-180.0, 180.0] } else { fold(|corner| corner.y.atan2(corner.x).to_degrees()) };
         Self {
@@ -192,7 +204,7 @@ fn corners(solid: &Solid) -> [Point3<f64>; 8] {
     })
 }
 
-/// Horizontal distance of the sensor from the solid's box [m], seen in the solid's own frame.
+/// Returns the horizontal distance between the sensor and the solid's bounding box (m), in the solid's own frame.
 fn distance_m(solid: &Solid, pose: &Isometry3<f64>) -> f64 {
     let sensor = pose.inverse() * Point3::origin();
     let beyond = |axis: usize| (solid.low[axis] - sensor[axis]).max(sensor[axis] - solid.high[axis]).max(0.0);

@@ -1,15 +1,18 @@
-//! Where the sensor is and where it looks, at each instant of a sweep.
+//! The position and the axis of the sensor at each instant of a sweep.
 //!
-//! Frames: the *plane*; *E's vehicle frame*, level, origin on the ground below E's centre; the *sensor's frame*, which
-//! looks back: x along its axis, y to E's right, z up, both tilted with E's body.
+//! Three frames are used:
+//! - the *plane*, in which the road lies;
+//! - the ego's *vehicle frame*: level, with its origin on the ground below the ego's centre;
+//! - the *sensor's frame*: x backward along the sensor's axis, y to the ego's right, z up. It tilts with the ego's
+//!   body.
 //!
 //! ```text
-//!        level frame of E            x_s = (−cos a, 0, sin a)
+//!        ego's vehicle frame         x_s = (−cos a, 0, sin a)
 //!          z                         y_s = (0, −1, 0)               a = pitch (nose down) + tilt
 //!          │   x ──▶ travel          z_s = (sin a, 0, cos a)
 //! ```
 //!
-//! A nose-down pitch p turns E's body about its origin: the rear rises, and the beams turn up by p.
+//! A nose-down pitch p turns the ego's body about its origin: the rear rises, and the beams turn up by p.
 
 use closecall_traffic::PlanePose;
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
@@ -17,28 +20,34 @@ use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vect
 use super::Lidar;
 use crate::Scene;
 
-/// E at the end of a sweep, and how it moved during it.
+/// The pose of the ego and its sensor at the end of a sweep, and the ego's motion during the sweep.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Viewpoint {
     ego: PlanePose,
     speed_mps: f64,
     yaw_rate_radps: f64,
-    /// The sensor in E's level frame [m].
-    pub(crate) sensor_m: Vector3<f64>,
-    /// Angle of the sensor's axis above the horizontal [rad].
+    /// Position of the sensor in the ego's vehicle frame (m).
+    pub(crate) sensor_position_m: Vector3<f64>,
+    /// Angle of the sensor's axis above the horizontal (rad).
     pub(crate) axis_rad: f64,
 }
 
-/// A planar motion of E from one instant of the sweep to its end: turns and shifts a point of the earlier frame.
+/// The ego's motion from an instant of the sweep to its end, as a rotation and a translation that transform a point
+/// from the earlier vehicle frame to the one at the end.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Deskew {
+    /// Cosine of the angle of rotation.
     pub(crate) cos: f64,
+    /// Sine of the angle of rotation.
     pub(crate) sin: f64,
+    /// Longitudinal translation (m).
     pub(crate) x_m: f64,
+    /// Lateral translation (m).
     pub(crate) y_m: f64,
 }
 
 impl Viewpoint {
+    /// Returns the viewpoint for a sweep that ends at the scene's time.
     pub(crate) fn new(scene: &Scene<'_>, lidar: &Lidar) -> Self {
         let ego = &scene.ego;
         let state = &ego.state;
@@ -46,57 +55,67 @@ impl Viewpoint {
             ego: scene.road.plane_pose(state.s_m, state.d_m, state.heading_rad),
             speed_mps: state.speed_mps,
             yaw_rate_radps: state.yaw_rate_radps,
-            sensor_m: sensor_m(0.5 * ego.vehicle.dimensions.length_m, lidar.mount_height_m, ego.pitch_rad),
+            sensor_position_m: sensor_position_m(
+                0.5 * ego.vehicle.dimensions.length_m,
+                lidar.mount_height_m,
+                ego.pitch_rad,
+            ),
             axis_rad: ego.pitch_rad + lidar.tilt_rad,
         }
     }
 
-    /// E's pose `before_s` before the end of the sweep, by its speed and yaw rate.
-    fn ego_at(&self, before_s: f64) -> PlanePose {
-        let turned = self.yaw_rate_radps * before_s;
+    /// Returns the ego's pose `before_end_s` before the end of the sweep, extrapolated from its speed and yaw rate.
+    fn ego_at(&self, before_end_s: f64) -> PlanePose {
+        let turned = self.yaw_rate_radps * before_end_s;
         let (sin, cos) = (self.ego.yaw_rad - 0.5 * turned).sin_cos();
-        let way = self.speed_mps * before_s;
-        PlanePose { x_m: self.ego.x_m - way * cos, y_m: self.ego.y_m - way * sin, yaw_rad: self.ego.yaw_rad - turned }
+        let distance_m = self.speed_mps * before_end_s;
+        PlanePose {
+            x_m: self.ego.x_m - distance_m * cos,
+            y_m: self.ego.y_m - distance_m * sin,
+            yaw_rad: self.ego.yaw_rad - turned,
+        }
     }
 
-    /// From the plane to the sensor's frame, `before_s` before the end of the sweep.
-    pub(crate) fn sensor_from_plane(&self, before_s: f64) -> Isometry3<f64> {
-        let level_from_plane = in_plane(self.ego_at(before_s), 0.0).inverse();
+    /// Returns the transform from the plane to the sensor's frame, `before_end_s` before the end of the sweep.
+    pub(crate) fn sensor_from_plane(&self, before_end_s: f64) -> Isometry3<f64> {
+        let level_from_plane = plane_from_body(self.ego_at(before_end_s), 0.0).inverse();
         let turn = UnitQuaternion::from_rotation_matrix(&sensor_axes(self.axis_rad));
-        Isometry3::from_parts(Translation3::from(-(turn * self.sensor_m)), turn) * level_from_plane
+        Isometry3::from_parts(Translation3::from(-(turn * self.sensor_position_m)), turn) * level_from_plane
     }
 
-    /// What carries a point from E's frame `before_s` before the end of the sweep to E's frame at its end.
-    pub(crate) fn deskew(&self, before_s: f64) -> Deskew {
-        let turned = self.yaw_rate_radps * before_s;
-        let way = self.speed_mps * before_s;
+    /// Returns the transform from the ego's frame `before_end_s` before the end of the sweep to its frame at the end.
+    pub(crate) fn deskew(&self, before_end_s: f64) -> Deskew {
+        let turned = self.yaw_rate_radps * before_end_s;
+        let distance_m = self.speed_mps * before_end_s;
         let (sin, cos) = small_sin_cos(turned);
         let (half_sin, half_cos) = small_sin_cos(0.5 * turned);
-        Deskew { cos, sin: -sin, x_m: -way * half_cos, y_m: way * half_sin }
+        Deskew { cos, sin: -sin, x_m: -distance_m * half_cos, y_m: distance_m * half_sin }
     }
 }
 
-/// Sine and cosine of what E turns by during a sweep: at most some hundredths, for which these series err by less than
-/// 1e-10.
+/// Returns the sine and cosine of the angle by which the ego turns during a sweep.
+///
+/// The angle is at most some hundredths of a radian. For such angles the error of these series is below 1e-10.
 fn small_sin_cos(angle_rad: f64) -> (f64, f64) {
     let square = angle_rad * angle_rad;
     (angle_rad * (1.0 - square / 6.0), 1.0 - 0.5 * square * (1.0 - square / 12.0))
 }
 
-/// The sensor in E's level frame [m], mounted `back_m` behind E's origin.
-pub(crate) fn sensor_m(back_m: f64, height_m: f64, pitch_rad: f64) -> Vector3<f64> {
+/// Returns the position in the ego's vehicle frame of a sensor that is mounted `back_m` behind the ego's origin (m).
+pub(crate) fn sensor_position_m(back_m: f64, height_m: f64, pitch_rad: f64) -> Vector3<f64> {
     let (sin, cos) = pitch_rad.sin_cos();
     Vector3::new(-back_m * cos + height_m * sin, 0.0, back_m * sin + height_m * cos)
 }
 
-/// The rotation from E's level frame to the sensor's, whose axis points `axis_rad` above the horizontal.
+/// Returns the rotation from the ego's vehicle frame to the frame of a sensor whose axis points `axis_rad` above the
+/// horizontal.
 fn sensor_axes(axis_rad: f64) -> Rotation3<f64> {
     let (sin, cos) = axis_rad.sin_cos();
     Rotation3::from_matrix_unchecked(Matrix3::new(-cos, 0.0, sin, 0.0, -1.0, 0.0, sin, 0.0, cos))
 }
 
-/// From the frame of a thing at `pose`, pitched nose down by `pitch_rad`, to the plane.
-pub(crate) fn in_plane(pose: PlanePose, pitch_rad: f64) -> Isometry3<f64> {
+/// Returns the transform to the plane from the frame of a body at `pose`, pitched nose down by `pitch_rad`.
+pub(crate) fn plane_from_body(pose: PlanePose, pitch_rad: f64) -> Isometry3<f64> {
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), pose.yaw_rad)
         * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), pitch_rad);
     Isometry3::from_parts(Translation3::new(pose.x_m, pose.y_m, 0.0), turn)
@@ -120,27 +139,28 @@ mod tests {
     }
 
     #[test]
-    fn a_thing_behind_lies_on_the_axis() {
+    fn a_point_straight_behind_the_sensor_lies_on_its_axis() {
         let seen = viewpoint(0.0, 0.0, 0.0).sensor_from_plane(0.0) * Point3::new(-12.3, -5.6, 0.6);
         assert!((seen - Point3::new(10.0, 0.0, 0.0)).norm() < 1e-12, "{seen}");
     }
 
     #[test]
-    fn braking_lifts_the_sensor_and_turns_it_up() {
+    fn braking_raises_the_sensor_and_tilts_it_upward() {
         let pitch = 0.02;
         let view = viewpoint(0.0, 0.0, pitch);
-        assert!((view.sensor_m.z - (0.6 * pitch.cos() + 2.3 * pitch.sin())).abs() < 1e-12);
+        assert!((view.sensor_position_m.z - (0.6 * pitch.cos() + 2.3 * pitch.sin())).abs() < 1e-12);
         // A point at the sensor's own height, 10 m back, now lies below the axis by p.
-        let seen = view.sensor_from_plane(0.0) * Point3::new(view.sensor_m.x - 10.0, -5.6, view.sensor_m.z);
+        let seen =
+            view.sensor_from_plane(0.0) * Point3::new(view.sensor_position_m.x - 10.0, -5.6, view.sensor_position_m.z);
         assert!((seen.z.atan2(seen.x) + pitch).abs() < 1e-12);
     }
 
     #[test]
-    fn deskewing_undoes_the_motion_of_e() {
+    fn deskewing_compensates_the_motion_of_the_ego() {
         let view = viewpoint(30.0, 0.1, 0.0);
         let (before, point) = (0.0123, Point3::new(-40.0, -2.0, 0.0));
-        let earlier = in_plane(view.ego_at(before), 0.0).inverse() * point;
-        let latest = in_plane(view.ego_at(0.0), 0.0).inverse() * point;
+        let earlier = plane_from_body(view.ego_at(before), 0.0).inverse() * point;
+        let latest = plane_from_body(view.ego_at(0.0), 0.0).inverse() * point;
         let to = view.deskew(before);
         let x = to.cos * earlier.x - to.sin * earlier.y + to.x_m;
         let y = to.sin * earlier.x + to.cos * earlier.y + to.y_m;

@@ -1,81 +1,87 @@
-//! The numbers of one object-level sensor, as text and checked.
+//! The parameters of one object-level sensor: the text configuration and the checked model.
 //!
-//! Every key may be left out; each sensor has its own usual values, given in the table below with where they come from.
+//! Every key is optional. The table lists each sensor's default values with their sources.
 //!
 //! | key | front radar | surround | rear object |
 //! |---|---|---|---|
-//! | `range-m` | 150 | 14 [2] | 120 [3] |
-//! | `half-angle-deg` | 45 [1] | all round | 66.5 [3] |
-//! | `range-sd-m` | 0.1 [1] | 0.1 [2] | 0.1 [3] |
+//! | `range-m` | 150 | 14 (b) | 120 (c) |
+//! | `half-angle-deg` | 45 (a) | all directions | 66.5 (c) |
+//! | `range-sd-m` | 0.1 (a) | 0.1 (b) | 0.1 (c) |
 //! | `lateral-sd-m` | 0.3 | 0.15 | 0.15 |
 //! | `drift-sd-m` | 0.1 | 0.05 | 0.1 |
 //! | `drift-time-s` | 1.0 | 1.0 | 1.0 |
-//! | `speed-sd-mps` | 0.1 [1] | not measured | not measured |
-//! | `latency-s` | 0.08 [1] | 0.04 | 0.08 |
+//! | `speed-sd-mps` | 0.1 (a) | not measured | not measured |
+//! | `latency-s` | 0.08 (a) | 0.04 | 0.08 |
 //! | `dropout` | 0.02 | 0.02 | 0.05 |
 //!
-//! [1] of the order of long-range radars such as Continental's ARS 408-21, with its 72 ms cycle; the half-angle is that
-//! of its near scan. [2] Autoliv's 24 GHz short-range module NB24G1V2 (user's manual, blind spot mode): 0.5 to 14 m, error
-//! ±0.2 m, taken as two standard deviations. [3] a stand-in for the rear LiDAR with its tracker: the field of view is
-//! Valeo SCALA Gen 2's, the range that at which a usual car is confirmed. All others are assumptions.
+//! - (a) Of the order of long-range radars such as Continental's ARS 408-21, with its 72 ms cycle; the half-angle is that
+//!   of its near scan.
+//! - (b) Autoliv's 24 GHz short-range module NB24G1V2 (user's manual, blind spot mode): 0.5 to 14 m, error ±0.2 m, taken
+//!   as two standard deviations.
+//! - (c) This sensor replaces the rear LiDAR with its tracker. The field of view is Valeo SCALA Gen 2's. The range is the
+//!   one at which a usual car is confirmed.
+//!
+//! All other values are assumptions.
 
-use closecall_traffic::{ConfigError, Num, Parameters, Problem, Range};
+use closecall_traffic::{CONTROL_STEP, ConfigError, Num, Parameters, Problem, Range};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::SCAN_PERIOD;
+use crate::lidar::HALF_FIELD_DEG;
 use crate::tracking::lifecycle::{LifecycleRules, MAX_WINDOW};
 
-/// Longest latency that is simulated, in control steps: 0.4 s.
+/// Maximum latency in control steps: 0.4 s.
 pub(super) const MAX_LATENCY_STEPS: usize = 10;
 
-/// Probability that clutter confirms a wrong track in one scan, assumed for the existence probability.
+/// Probability that clutter gives a wrong track a measurement in one scan; an assumption that enters the existence
+/// probability.
 const CLUTTER_PROBABILITY: f64 = 0.05;
 
-/// An object-level sensor as a scenario file describes it. Keys left out have the sensor's usual values.
+/// An object-level sensor as a scenario file describes it. Absent keys have the sensor's default values.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct ObjectSensorConfig {
-    /// Distance from the bumper up to which the nearest face of a vehicle is seen on a clear day [m].
+    /// Distance from the bumper to a vehicle's nearest face up to which the vehicle is seen on a clear day (m).
     pub range_m: Option<Num>,
-    /// Half of the horizontal field of view [deg]; not for the surround sensors, which look all round.
+    /// Half of the horizontal field of view (deg); not allowed for the surround sensors, which see in all directions.
     pub half_angle_deg: Option<Num>,
-    /// Standard deviation of each measured position along the road [m].
+    /// Standard deviation of the white error of each measured position along the road (m).
     pub range_sd_m: Option<Num>,
-    /// Standard deviation of each measured position across the road [m].
+    /// Standard deviation of the white error of each measured position across the road (m).
     pub lateral_sd_m: Option<Num>,
-    /// Standard deviation of the slowly varying part of the position error, along and across [m].
+    /// Standard deviation of the slowly varying part of the position error, along and across the road (m).
     pub drift_sd_m: Option<Num>,
-    /// Correlation time of that part [s].
+    /// Correlation time of the slowly varying part of the position error (s).
     pub drift_time_s: Option<Num>,
-    /// Standard deviation of each measured speed along the road [m/s]; where absent, front: 0.1, others: not measured.
+    /// Standard deviation of each measured speed along the road (m/s). If absent, the front radar has 0.1, and the
+    /// other sensors do not measure speed.
     pub speed_sd_mps: Option<Num>,
-    /// Age of a measurement when the controller gets it [s]; rounded to whole control steps of 40 ms.
+    /// Age of a measurement when the controller receives it (s), rounded to whole control steps of 40 ms.
     pub latency_s: Option<Num>,
-    /// Probability that a measurement of a visible vehicle is lost [1].
+    /// Probability that a measurement of a visible vehicle is lost.
     pub dropout: Option<Num>,
-    /// Measurements that confirm a track, out of the latest `confirm-window`.
+    /// Number of measurements in the latest `confirm-window` scans that confirm a track.
     pub confirm_hits: Option<u8>,
-    /// See `confirm-hits`; 1 to 16.
+    /// Number of latest scans in which `confirm-hits` are counted: 1 to 16.
     pub confirm_window: Option<u8>,
-    /// Time for which a confirmed track that is no longer measured is kept [s].
+    /// Time for which a confirmed track is kept without further measurements (s).
     pub coast_s: Option<Num>,
-    /// Probability that the reported class gives to the true one [1].
+    /// Probability that the reported class scores assign to the true class.
     pub class_confidence: Option<Num>,
 }
 
-/// A checked object-level sensor.
+/// The checked parameters of an object-level sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ObjectSensorModel {
     pub(super) range_m: f64,
-    /// Tangent of half of the field of view; infinite for all round.
+    /// Tangent of half of the field of view; infinite if the sensor sees in all directions.
     pub(super) half_angle_tan: f64,
-    /// White noise along and across the road [m].
+    /// Standard deviations of the white noise along and across the road (m).
     pub(super) white_sd_m: [f64; 2],
     pub(super) drift_sd_m: f64,
-    /// Share of the drift that is left after one scan [1].
+    /// Share of the drift that remains after one scan.
     pub(super) drift_decay: f64,
-    /// `None` where speed is not measured [m/s].
+    /// Standard deviation of the measured speed (m/s); `None` if speed is not measured.
     pub(super) speed_sd_mps: Option<f64>,
     pub(super) latency_steps: usize,
     pub(super) dropout: f64,
@@ -83,8 +89,8 @@ pub struct ObjectSensorModel {
     pub(super) class_confidence: f64,
 }
 
-/// The usual values of one sensor, in the units of the configuration.
-struct Usual {
+/// The default values of one sensor, in the units of the configuration.
+struct Defaults {
     range_m: f64,
     half_angle_deg: Option<f64>,
     range_sd_m: f64,
@@ -93,14 +99,20 @@ struct Usual {
     speed_sd_mps: Option<f64>,
     latency_s: f64,
     dropout: f64,
-    confirm: (u8, u8),
+    confirm: Confirmation,
     coast_s: f64,
+}
+
+/// How a track is confirmed: by `hits` measurements within `window` scans.
+struct Confirmation {
+    hits: u8,
+    window: u8,
 }
 
 const DRIFT_TIME_S: f64 = 1.0;
 const CLASS_CONFIDENCE: f64 = 0.97;
 
-const FRONT_RADAR: Usual = Usual {
+const FRONT_RADAR: Defaults = Defaults {
     range_m: 150.0,
     half_angle_deg: Some(45.0),
     range_sd_m: 0.1,
@@ -109,11 +121,11 @@ const FRONT_RADAR: Usual = Usual {
     speed_sd_mps: Some(0.1),
     latency_s: 0.08,
     dropout: 0.02,
-    confirm: (3, 5),
+    confirm: Confirmation { hits: 3, window: 5 },
     coast_s: 0.6,
 };
 
-const SURROUND: Usual = Usual {
+const SURROUND: Defaults = Defaults {
     range_m: 14.0,
     half_angle_deg: None,
     range_sd_m: 0.1,
@@ -122,32 +134,33 @@ const SURROUND: Usual = Usual {
     speed_sd_mps: None,
     latency_s: 0.04,
     dropout: 0.02,
-    confirm: (2, 4),
+    confirm: Confirmation { hits: 2, window: 4 },
     coast_s: 0.3,
 };
 
-const REAR_OBJECT: Usual = Usual {
+const REAR_OBJECT: Defaults = Defaults {
     range_m: 120.0,
-    half_angle_deg: Some(66.5),
+    half_angle_deg: Some(HALF_FIELD_DEG),
     range_sd_m: 0.1,
     lateral_sd_m: 0.15,
     drift_sd_m: 0.1,
     speed_sd_mps: None,
     latency_s: 0.08,
     dropout: 0.05,
-    confirm: (3, 5),
+    confirm: Confirmation { hits: 3, window: 5 },
     coast_s: 1.0,
 };
 
-fn all_round() -> ConfigError {
+/// Returns the error for a `half-angle-deg` of a sensor that sees in all directions.
+fn half_angle_not_allowed() -> ConfigError {
     let rule = "the surround sensors look all round".to_owned();
     ConfigError::new("half-angle-deg", Problem::Contradiction { other: "surround", rule })
 }
 
-/// The number of whole control steps nearest to `time_s`, which is 0 or more and short.
+/// Returns the number of whole control steps nearest to `time_s`, which is from 0 to 10 s.
 fn steps(time_s: f64) -> usize {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked to be 0 to 10 s")]
-    let steps = (time_s / SCAN_PERIOD.s()).round() as usize;
+    let steps = (time_s / CONTROL_STEP.s()).round() as usize;
     steps
 }
 
@@ -164,13 +177,13 @@ impl ObjectSensorConfig {
         self.check_against(&REAR_OBJECT, parameters)
     }
 
-    fn check_against(&self, usual: &Usual, parameters: &Parameters) -> Result<ObjectSensorModel, ConfigError> {
-        let number = |num: &Option<Num>, usual: f64, key: &str, range: Range| match num {
+    fn check_against(&self, defaults: &Defaults, parameters: &Parameters) -> Result<ObjectSensorModel, ConfigError> {
+        let number = |num: &Option<Num>, default: f64, key: &str, range: Range| match num {
             Some(num) => parameters.number(num, key, range),
-            None => Ok(usual),
+            None => Ok(default),
         };
-        let half_angle_tan = match usual.half_angle_deg {
-            None if self.half_angle_deg.is_some() => return Err(all_round()),
+        let half_angle_tan = match defaults.half_angle_deg {
+            None if self.half_angle_deg.is_some() => return Err(half_angle_not_allowed()),
             None => f64::INFINITY,
             Some(deg) => {
                 let deg = number(&self.half_angle_deg, deg, "half-angle-deg", Range::above(0.0, 85.0))?;
@@ -179,41 +192,41 @@ impl ObjectSensorConfig {
         };
         let white_sd = Range::closed(0.01, 10.0);
         let drift_time_s = number(&self.drift_time_s, DRIFT_TIME_S, "drift-time-s", Range::above(0.0, 100.0))?;
-        let speed_sd_mps = match (&self.speed_sd_mps, usual.speed_sd_mps) {
+        let speed_sd_mps = match (&self.speed_sd_mps, defaults.speed_sd_mps) {
             (Some(num), _) => Some(parameters.number(num, "speed-sd-mps", Range::closed(0.01, 20.0))?),
-            (None, usual) => usual,
+            (None, default) => default,
         };
-        let longest_s = MAX_LATENCY_STEPS as f64 * SCAN_PERIOD.s();
-        let latency_s = number(&self.latency_s, usual.latency_s, "latency-s", Range::closed(0.0, longest_s))?;
-        let dropout = number(&self.dropout, usual.dropout, "dropout", Range::closed(0.0, 0.95))?;
-        let coast_s = number(&self.coast_s, usual.coast_s, "coast-s", Range::closed(0.0, 10.0))?;
+        let longest_s = MAX_LATENCY_STEPS as f64 * CONTROL_STEP.s();
+        let latency_s = number(&self.latency_s, defaults.latency_s, "latency-s", Range::closed(0.0, longest_s))?;
+        let dropout = number(&self.dropout, defaults.dropout, "dropout", Range::closed(0.0, 0.95))?;
+        let coast_s = number(&self.coast_s, defaults.coast_s, "coast-s", Range::closed(0.0, 10.0))?;
         let class_confidence = &self.class_confidence;
         let class_confidence =
             number(class_confidence, CLASS_CONFIDENCE, "class-confidence", Range::closed(0.25, 1.0))?;
         Ok(ObjectSensorModel {
-            range_m: number(&self.range_m, usual.range_m, "range-m", Range::above(0.0, 500.0))?,
+            range_m: number(&self.range_m, defaults.range_m, "range-m", Range::above(0.0, 500.0))?,
             half_angle_tan,
             white_sd_m: [
-                number(&self.range_sd_m, usual.range_sd_m, "range-sd-m", white_sd)?,
-                number(&self.lateral_sd_m, usual.lateral_sd_m, "lateral-sd-m", white_sd)?,
+                number(&self.range_sd_m, defaults.range_sd_m, "range-sd-m", white_sd)?,
+                number(&self.lateral_sd_m, defaults.lateral_sd_m, "lateral-sd-m", white_sd)?,
             ],
-            drift_sd_m: number(&self.drift_sd_m, usual.drift_sd_m, "drift-sd-m", Range::closed(0.0, 10.0))?,
-            drift_decay: (-SCAN_PERIOD.s() / drift_time_s).exp(),
+            drift_sd_m: number(&self.drift_sd_m, defaults.drift_sd_m, "drift-sd-m", Range::closed(0.0, 10.0))?,
+            drift_decay: (-CONTROL_STEP.s() / drift_time_s).exp(),
             speed_sd_mps,
             latency_steps: steps(latency_s),
             dropout,
-            rules: self.rules(usual, dropout, steps(coast_s))?,
+            rules: self.rules(defaults, dropout, steps(coast_s))?,
             class_confidence,
         })
     }
 
-    fn rules(&self, usual: &Usual, dropout: f64, coast_steps: usize) -> Result<LifecycleRules, ConfigError> {
-        let window = self.confirm_window.unwrap_or(usual.confirm.1);
+    fn rules(&self, defaults: &Defaults, dropout: f64, coast_steps: usize) -> Result<LifecycleRules, ConfigError> {
+        let window = self.confirm_window.unwrap_or(defaults.confirm.window);
         if !(1..=MAX_WINDOW).contains(&window) {
             let problem = Problem::WrongCount { value: window.into(), allowed: "a number of scans from 1 to 16" };
             return Err(ConfigError::new("confirm-window", problem));
         }
-        let hits = self.confirm_hits.unwrap_or(usual.confirm.0);
+        let hits = self.confirm_hits.unwrap_or(defaults.confirm.hits);
         if !(1..=window).contains(&hits) {
             let problem = Problem::WrongCount { value: hits.into(), allowed: "a number from 1 to `confirm-window`" };
             return Err(ConfigError::new("confirm-hits", problem));
@@ -221,10 +234,10 @@ impl ObjectSensorConfig {
         Ok(LifecycleRules {
             confirm_hits: hits.into(),
             confirm_window: window.into(),
-            // The scan after the time is over deletes the track.
+            // The first scan after the coasting time deletes the track.
             #[expect(clippy::cast_possible_truncation, reason = "10 s of coasting are 250 scans")]
-            lost_after: coast_steps as u32 + 1,
-            // A sensor without dropouts may still miss, or one miss would end a track for certain.
+            delete_after_misses: coast_steps as u32 + 1,
+            // The limit below 1 keeps a single miss from making existence impossible for a sensor without dropouts.
             detection_probability: (1.0 - dropout).min(0.99),
             clutter_probability: CLUTTER_PROBABILITY,
         })

@@ -1,13 +1,17 @@
-//! Object-level sensors: what a radar, or a LiDAR with its own tracking, delivers, without the physics in between.
+//! Object-level sensors: models of the tracks that a radar, or a LiDAR with its own tracking, delivers.
 //!
-//! Three of them look ahead, all round, and behind. Each has a field of view, a range, errors (white and slowly
-//! varying), a latency, losses, and a filter whose covariance is what the errors make it. The rear one stands in for
-//! LiDAR and camera where a campaign is to run fast, and like them it sees less far in fog and rain; the other two serve
-//! the full chain as well.
+//! They leave out the physics of the measurement. One sensor looks ahead, one around the ego, and one behind. Each has
+//! a field of view, a range, errors (white and slowly varying), a latency, lost measurements, and a filter whose
+//! covariance follows from the errors. The rear sensor replaces LiDAR and camera in fast campaigns. Like them, it has a
+//! shorter range in fog and rain. The other two sensors are part of the full chain, too.
 //!
-//! Deviations from real sensors, on purpose: which measurement belongs to which vehicle is known; extents are the true
-//! ones; there are no ghost objects; the radar's angle error does not grow with range; and E's own motion and its place
-//! in the lane are known exactly (odometry and map).
+//! The models deviate from real sensors on purpose:
+//!
+//! - The vehicle that a measurement belongs to is known.
+//! - Lengths and widths are the true ones.
+//! - There are no ghost objects.
+//! - The radar's angle error does not grow with range.
+//! - The ego's own motion and its position in the lane are known exactly (odometry and map).
 
 mod config;
 mod noise;
@@ -21,22 +25,23 @@ pub use noise::NoiseKey;
 use closecall_traffic::Track;
 
 use crate::perception::FieldOfView;
-use crate::surroundings::{Other, survey};
+use crate::surroundings::{OtherVehicle, transform_scene};
 use crate::tracking::TrackList;
 use crate::{Perception, Scene, SensorError, SensorHealth};
-pub(crate) use sensor::{DEGRADED_SHARE, ObjectSensor, ScanView};
+pub(crate) use sensor::{DEGRADED_SHARE, ObjectSensor, ScanInput};
 pub(crate) use weather::range_in_weather_m;
 
-/// Perception by object-level sensors alone.
+/// Perception by object-level sensors only.
 #[derive(Clone, Debug)]
 pub struct ObjectPerception {
     sensors: [ObjectSensor; 3],
-    others: Vec<Other>,
+    others: Vec<OtherVehicle>,
     list: TrackList,
 }
 
 impl ObjectPerception {
-    /// Front radar, surround and rear sensor, with streams of their own under `key`.
+    /// Creates the front radar, the surround sensors and the rear sensor (`models` in this order), with random streams
+    /// keyed by `key`.
     pub fn new(models: [ObjectSensorModel; 3], key: &NoiseKey) -> Self {
         let [front, surround, rear] = models;
         Self {
@@ -53,11 +58,11 @@ impl ObjectPerception {
 
 impl Perception for ObjectPerception {
     fn step(&mut self, scene: &Scene<'_>) -> Result<&[Track], SensorError> {
-        let frame = survey(scene, &mut self.others)?;
+        let frame = transform_scene(scene, &mut self.others)?;
         self.list.tracks.clear();
-        let view = ScanView { scene, frame: &frame, others: &self.others };
+        let input = ScanInput { scene, frame: &frame, others: &self.others };
         for sensor in &mut self.sensors {
-            sensor.scan(&view, &mut self.list);
+            sensor.scan(&input, &mut self.list);
         }
         Ok(&self.list.tracks)
     }

@@ -1,13 +1,13 @@
-//! What the controllers rely on: confirmed in time, honest errors, and the same bits for the same seed.
+//! Tests of the properties that the controllers rely on: timely confirmation, a consistent covariance, and bitwise
+//! reproducibility.
 
-use closecall_traffic::{ActorId, Environment, Parameters, Road, Source, Time, TrackStatus, VehicleClass};
+use closecall_traffic::{ActorId, CONTROL_STEP, Environment, Parameters, Road, Source, TrackStatus, VehicleClass};
 
 use super::*;
 use crate::SceneVehicle;
-use crate::testing::{scene_vehicle, with_speed};
+use crate::testing::{OWN_LANE_M, scene_vehicle, with_speed};
 
-const OWN_LANE_M: f64 = -5.625;
-const PERIOD_S: f64 = 0.04;
+const PERIOD_S: f64 = CONTROL_STEP.s();
 
 fn key(sample: u64) -> NoiseKey {
     NoiseKey { seed: 1, sample, ego: ActorId::new("ego").unwrap(), actors: [].into() }
@@ -24,7 +24,7 @@ fn perception(sample: u64) -> ObjectPerception {
     ObjectPerception::new(models, &key(sample))
 }
 
-/// E at 30 m/s, one vehicle ahead, and one that comes up from behind at 40 m/s.
+/// The ego at 30 m/s, a lead vehicle at the same speed, and a rear vehicle that approaches at 40 m/s.
 struct Encounter {
     road: Road,
     ego: SceneVehicle,
@@ -46,30 +46,30 @@ impl Encounter {
     }
 
     fn scene(&self) -> Scene<'_> {
-        let time = Time::from_ms(40) * self.scans;
+        let time = CONTROL_STEP * self.scans;
         Scene { time, road: &self.road, environment: &Environment::CLEAR_DAY, ego: self.ego, others: &self.others }
     }
 
     fn advance(&mut self) {
         self.scans += 1;
         for vehicle in std::iter::once(&mut self.ego).chain(&mut self.others) {
-            let stretch = 1.0 - self.road.curvature_per_m() * vehicle.state.d_m;
-            vehicle.state.s_m += vehicle.state.speed_mps / stretch * PERIOD_S;
+            let path_scale = 1.0 - self.road.curvature_per_m() * vehicle.state.d_m;
+            vehicle.state.s_m += vehicle.state.speed_mps / path_scale * PERIOD_S;
         }
     }
 }
 
-fn of(tracks: &[Track], source: Source) -> Option<&Track> {
+fn confirmed_track(tracks: &[Track], source: Source) -> Option<&Track> {
     tracks.iter().find(|track| track.source == source && track.status != TrackStatus::Tentative)
 }
 
 #[test]
-fn the_follower_is_confirmed_before_100_m() {
+fn the_rear_vehicle_is_confirmed_beyond_100_m() {
     for sample in 0..50 {
         let (mut encounter, mut perception) = (Encounter::new(), perception(sample));
         let at_m = loop {
             let tracks = perception.step(&encounter.scene()).unwrap();
-            if let Some(track) = of(tracks, Source::Rear) {
+            if let Some(track) = confirmed_track(tracks, Source::Rear) {
                 break -track.x_m();
             }
             encounter.advance();
@@ -78,7 +78,7 @@ fn the_follower_is_confirmed_before_100_m() {
     }
 }
 
-/// Normalised error squared of the rear track over position and speed, after two seconds of tracking.
+/// Returns the normalised error squared of the rear track's position and velocity after 100 scans.
 fn rear_error_squared(sample: u64, curvature_per_m: f64) -> f64 {
     let (mut encounter, mut perception) = (Encounter::new(), perception(sample));
     encounter.road = encounter.road.with_curvature(curvature_per_m);
@@ -88,27 +88,27 @@ fn rear_error_squared(sample: u64, curvature_per_m: f64) -> f64 {
     }
     let scene = encounter.scene();
     let mut others = Vec::new();
-    survey(&scene, &mut others).unwrap();
+    transform_scene(&scene, &mut others).unwrap();
     let truth = others[1];
-    let track = of(perception.step(&scene).unwrap(), Source::Rear).unwrap();
+    let track = confirmed_track(perception.step(&scene).unwrap(), Source::Rear).unwrap();
     let error = track.state
         - nalgebra::Vector4::new(truth.x_m, truth.y_m, truth.speed_mps * truth.cos, truth.speed_mps * truth.sin);
     (error.transpose() * track.covariance.try_inverse().unwrap() * error)[0]
 }
 
 #[test]
-fn the_reported_covariance_covers_the_errors() {
+fn the_covariance_covers_the_errors() {
     for curvature_per_m in [0.0, 0.001] {
         let samples = 200;
         let mean = (0..samples).map(|sample| rear_error_squared(sample, curvature_per_m)).sum::<f64>() / samples as f64;
-        // A vehicle that does not manoeuvre at all is followed better than the process noise allows for: at most 4, the
-        // number of dimensions, and not absurdly less.
+        // The vehicle does not manoeuvre, so its errors are smaller than the process noise allows for: about 4, the
+        // number of dimensions, at most, but not much less.
         assert!((1.0..4.4).contains(&mean), "mean normalised error squared {mean} at curvature {curvature_per_m}");
     }
 }
 
 #[test]
-fn the_radar_follows_a_braking_lead() {
+fn the_radar_follows_a_braking_lead_vehicle() {
     let (mut encounter, mut perception) = (Encounter::new(), perception(3));
     for _ in 0..75 {
         perception.step(&encounter.scene()).unwrap();
@@ -120,14 +120,14 @@ fn the_radar_follows_a_braking_lead() {
         perception.step(&encounter.scene()).unwrap();
     }
     let truth_mps = encounter.others[0].state.speed_mps;
-    let track = of(perception.step(&encounter.scene()).unwrap(), Source::Front).unwrap().clone();
-    // Two scans of latency at 6 m/s² are 0.48 m/s; the filter may add as much again.
+    let track = confirmed_track(perception.step(&encounter.scene()).unwrap(), Source::Front).unwrap().clone();
+    // A latency of two scans at 6 m/s² makes an error of 0.48 m/s; the filter may add as much again.
     assert!((track.vx_mps() - truth_mps).abs() < 1.2, "{} {truth_mps}", track.vx_mps());
     assert_eq!(track.lane, [0.0, 1.0, 0.0]);
 }
 
 #[test]
-fn the_same_key_gives_the_same_bits_and_another_does_not() {
+fn the_same_key_gives_the_same_bits_and_another_key_other_bits() {
     let run = |sample| {
         let (mut encounter, mut perception) = (Encounter::new(), perception(sample));
         let mut bits = Vec::new();
@@ -144,7 +144,7 @@ fn the_same_key_gives_the_same_bits_and_another_does_not() {
 }
 
 #[test]
-fn another_vehicle_does_not_shift_the_errors_about_the_first() {
+fn another_vehicle_does_not_change_the_errors_of_the_first() {
     let rear = |with_third: bool| {
         let (mut encounter, mut perception) = (Encounter::new(), perception(9));
         if with_third {
@@ -162,7 +162,7 @@ fn another_vehicle_does_not_shift_the_errors_about_the_first() {
 }
 
 #[test]
-fn a_hidden_vehicle_coasts_and_is_then_forgotten() {
+fn the_track_of_a_hidden_vehicle_coasts_and_is_then_deleted() {
     let (mut encounter, mut perception) = (Encounter::new(), perception(2));
     encounter.others[1].state.speed_mps = 30.0;
     encounter.others[1].state.s_m = 940.0;
@@ -170,7 +170,7 @@ fn a_hidden_vehicle_coasts_and_is_then_forgotten() {
         perception.step(&encounter.scene()).unwrap();
         encounter.advance();
     }
-    // E is at 1,030 m now, the follower at 970 m: a truck stands between, all at once.
+    // The ego is at 1,030 m, the rear vehicle at 970 m. A truck appears between them.
     encounter.others.push(with_speed(scene_vehicle(3, VehicleClass::Truck, 1_005.0, OWN_LANE_M), 30.0));
     let mut coasted = 0;
     for _ in 0..60 {

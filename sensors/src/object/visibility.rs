@@ -1,75 +1,84 @@
-//! Which vehicles an object-level sensor sees: field of view, range, and vehicles that hide each other.
+//! Visibility of vehicles for an object-level sensor: field of view, range, and occlusion by other vehicles.
 //!
 //! ```text
 //!        sensor at the bumper ▷ ─ ─ ─ ─ ─ ─ ─ ─ high ▕▔▔▔▏
-//!                              `─ ─ ─ ─ ─ ─ ─ ─ low  ▕▁▁▁▏   a box covers the slopes low … high, from `near` on
+//!                              `─ ─ ─ ─ ─ ─ ─ ─ low  ▕▁▁▁▏   a box covers the slopes low … high from `near_m` on
 //! ```
 //!
-//! Slopes (left over outward) order the directions as angles do and need no arc tangent.
+//! A slope is the distance to the left divided by the distance outward. Slopes order directions as angles do, without
+//! an arc tangent.
 
-use crate::surroundings::Other;
+use closecall_traffic::Dimensions;
+use closecall_traffic::metrics::bumper_gap_m;
 
-/// Where a sensor looks.
+use crate::surroundings::OtherVehicle;
+
+/// Viewing direction of a sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum View {
+pub(super) enum Direction {
     /// From the front bumper, ahead.
     Ahead,
-    /// All round the body.
+    /// In all directions, from the ego's body.
     Around,
     /// From the rear bumper, back.
     Behind,
 }
 
-/// How far and how wide a sensor sees.
+/// Field of view and range of a sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Field {
-    pub(super) view: View,
-    /// Distance from the bumper, or the body, to the nearest face [m].
+    pub(super) direction: Direction,
+    /// Maximum distance from the bumper, or from the body, to a vehicle's nearest face (m).
     pub(super) range_m: f64,
-    /// Tangent of half of the field of view [1].
+    /// Tangent of half of the field of view.
     pub(super) half_angle_tan: f64,
 }
 
-/// A vehicle is detected where at least this share of its angular width is in view (assumption: a quarter of a car's
-/// rear still returns more than the thresholds of radar or LiDAR need).
+/// Share of a vehicle's angular width that must be in view for a detection (assumption: a quarter of a car's rear still
+/// returns more than the thresholds of radar or LiDAR need).
 const NEEDED_SHARE: f64 = 0.25;
 
-/// Parts of a box nearer to the sensor's plane than this are seen as if at this distance, so that slopes stay finite [m].
+/// Least outward distance for which slopes are computed (m). Parts of a box that are nearer to the sensor's plane are
+/// treated as if at this distance, so that slopes stay finite.
 const MIN_OUTWARD_M: f64 = 0.1;
 
-/// The directions that one vehicle covers.
+/// The range of slopes that one vehicle covers.
 #[derive(Clone, Copy, Debug)]
 struct Silhouette {
     actor: usize,
+    /// Outward distance of the nearest corner (m).
     near_m: f64,
+    /// Least slope.
     low: f64,
+    /// Greatest slope.
     high: f64,
 }
 
-/// The vehicles that one sensor sees, worked out for each scan in memory that is used again.
+/// The visibility of all vehicles for one sensor, computed for each scan in reused memory.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Visibility {
     silhouettes: Vec<Silhouette>,
+    /// The parts of one vehicle's range of slopes that nearer vehicles cover.
     covered: Vec<(f64, f64)>,
 }
 
 impl Visibility {
-    /// Looks at all vehicles from a sensor of E, whose size is `ego_m` (length, width).
-    pub(super) fn look(&mut self, view: View, others: &[Other], ego_m: [f64; 2]) {
+    /// Computes the silhouettes of all vehicles as seen from a sensor of the ego, of the size `ego`.
+    pub(super) fn update(&mut self, direction: Direction, others: &[OtherVehicle], ego: &Dimensions) {
         self.silhouettes.clear();
-        let outward = match view {
-            View::Ahead => 1.0,
-            View::Behind => -1.0,
-            View::Around => return,
+        let outward = match direction {
+            Direction::Ahead => 1.0,
+            Direction::Behind => -1.0,
+            Direction::Around => return,
         };
-        let silhouettes = others.iter().filter_map(|other| silhouette(other, outward, 0.5 * ego_m[0]));
+        let silhouettes = others.iter().filter_map(|other| silhouette(other, outward, 0.5 * ego.length_m));
         self.silhouettes.extend(silhouettes);
     }
 
-    /// True where `other` is within the field of view, in range, and not hidden.
-    pub(super) fn sees(&mut self, field: &Field, other: &Other, ego_m: [f64; 2]) -> bool {
-        if field.view == View::Around {
-            return box_distance_m(other, ego_m) <= field.range_m;
+    /// Returns whether `other` is within the field of view, in range, and not hidden.
+    pub(super) fn sees(&mut self, field: &Field, other: &OtherVehicle, ego: &Dimensions) -> bool {
+        if field.direction == Direction::Around {
+            return box_distance_m(other, ego) <= field.range_m;
         }
         let Some(target) = self.silhouettes.iter().find(|seen| seen.actor == other.actor).copied() else {
             return false;
@@ -90,9 +99,10 @@ impl Visibility {
     }
 }
 
-/// The directions that `other` covers, seen from the bumper at `mount_m` from E's centre; none where it lies wholly on
-/// the other side.
-fn silhouette(other: &Other, outward: f64, mount_m: f64) -> Option<Silhouette> {
+/// Returns the silhouette of `other`, seen from the bumper at the distance `mount_m` from the ego's centre.
+///
+/// Returns `None` if `other` lies wholly on the inner side of the sensor's plane.
+fn silhouette(other: &OtherVehicle, outward: f64, mount_m: f64) -> Option<Silhouette> {
     let (ahead_m, left_m) = (0.5 * other.length_m, 0.5 * other.width_m);
     let corners = [(ahead_m, left_m), (ahead_m, -left_m), (-ahead_m, left_m), (-ahead_m, -left_m)];
     let mut seen = Silhouette { actor: other.actor, near_m: f64::INFINITY, low: f64::INFINITY, high: -f64::INFINITY };
@@ -108,14 +118,14 @@ fn silhouette(other: &Other, outward: f64, mount_m: f64) -> Option<Silhouette> {
     (far_m > MIN_OUTWARD_M).then_some(seen)
 }
 
-/// Distance between E's box and `other`'s, both taken as parallel [m].
-fn box_distance_m(other: &Other, ego_m: [f64; 2]) -> f64 {
-    let along_m = other.x_m.abs() - 0.5 * (other.length_m + ego_m[0]);
-    let across_m = other.y_m.abs() - 0.5 * (other.width_m + ego_m[1]);
+/// Returns the distance between the boxes of the ego and of `other`, both taken as parallel (m).
+fn box_distance_m(other: &OtherVehicle, ego: &Dimensions) -> f64 {
+    let along_m = bumper_gap_m(other.x_m.abs(), other.length_m, ego.length_m);
+    let across_m = other.y_m.abs() - 0.5 * (other.width_m + ego.width_m);
     along_m.max(0.0).hypot(across_m.max(0.0))
 }
 
-/// Total width of the union of intervals; sorts them.
+/// Returns the total width of the union of `intervals`, which it sorts.
 fn union_width(intervals: &mut [(f64, f64)]) -> f64 {
     intervals.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     let mut width = 0.0;
@@ -136,13 +146,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_union_counts_overlaps_once() {
+    fn union_width_counts_overlaps_once() {
         assert_eq!(union_width(&mut [(2.0, 3.0), (0.0, 1.0), (0.5, 1.5), (0.6, 0.7)]), 2.5);
         assert_eq!(union_width(&mut []), 0.0);
     }
 
-    fn car(actor: usize, x_m: f64, y_m: f64) -> Other {
-        Other {
+    fn car(actor: usize, x_m: f64, y_m: f64) -> OtherVehicle {
+        OtherVehicle {
             actor,
             class: VehicleClass::Car,
             length_m: 4.6,
@@ -158,26 +168,27 @@ mod tests {
         }
     }
 
-    const BEHIND: Field = Field { view: View::Behind, range_m: 120.0, half_angle_tan: 2.3 };
+    const EGO: Dimensions = VehicleClass::Car.typical_dimensions();
+    const BEHIND: Field = Field { direction: Direction::Behind, range_m: 120.0, half_angle_tan: 2.3 };
 
-    fn seen(field: Field, others: &[Other]) -> Vec<bool> {
+    fn seen(field: Field, others: &[OtherVehicle]) -> Vec<bool> {
         let mut visibility = Visibility::default();
-        visibility.look(field.view, others, [4.6, 1.85]);
-        others.iter().map(|other| visibility.sees(&field, other, [4.6, 1.85])).collect()
+        visibility.update(field.direction, others, &EGO);
+        others.iter().map(|other| visibility.sees(&field, other, &EGO)).collect()
     }
 
     #[test]
-    fn the_nearer_hides_the_farther() {
+    fn a_nearer_vehicle_hides_a_farther_one_in_line() {
         let in_line = [car(1, -60.0, 0.0), car(2, -20.0, 0.0), car(3, -60.0, 3.75), car(4, 30.0, 0.0)];
         assert_eq!(seen(BEHIND, &in_line), [false, true, true, false]);
-        assert_eq!(seen(Field { view: View::Ahead, ..BEHIND }, &in_line), [false, false, false, true]);
-        assert_eq!(seen(BEHIND, &[car(1, -127.0, 0.0)]), [false], "beyond its range");
-        assert_eq!(seen(BEHIND, &[car(1, -5.0, 8.0)]), [false], "too far to the side");
+        assert_eq!(seen(Field { direction: Direction::Ahead, ..BEHIND }, &in_line), [false, false, false, true]);
+        assert_eq!(seen(BEHIND, &[car(1, -127.0, 0.0)]), [false], "beyond the range");
+        assert_eq!(seen(BEHIND, &[car(1, -5.0, 8.0)]), [false], "outside the field of view");
     }
 
     #[test]
-    fn surround_sees_what_is_near_the_body() {
-        let around = Field { view: View::Around, range_m: 14.0, half_angle_tan: f64::INFINITY };
+    fn surround_sensors_see_vehicles_near_the_ego_body() {
+        let around = Field { direction: Direction::Around, range_m: 14.0, half_angle_tan: f64::INFINITY };
         let others = [car(1, 0.0, 3.75), car(2, 18.0, 3.75), car(3, 19.5, 0.0), car(4, -15.0, -3.75)];
         assert_eq!(seen(around, &others), [true, true, false, true]);
     }

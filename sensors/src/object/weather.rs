@@ -1,26 +1,26 @@
-//! How fog and rain shorten the range of an optical sensor.
+//! Range of an optical sensor in fog and rain.
 //!
-//! A target is just detected where its power ρ·exp(−2αR)/R² is that at the nominal range R₀ on a clear day (extinction
-//! α₀), so that ln R + αR = ln R₀ + α₀R₀. The left side grows with R and is concave: Newton's method from a value that is
-//! too small approaches the solution from below.
+//! The range R in the extinction α is the distance at which the received power ρ·exp(−2αR)/R² equals the power at the
+//! nominal range R₀ on a clear day (extinction α₀). It follows that ln R + αR = ln R₀ + α₀R₀. The left side grows with
+//! R and is concave, so Newton's method approaches the solution from below if it starts below.
 
 use closecall_traffic::Environment;
 
 use crate::lidar::extinction_per_m;
 
-/// Newton steps; the error is below a millimetre from 20 m of visibility on after seven.
+/// Number of Newton steps. After seven, the error is below a millimetre for visibilities of 20 m and more.
 const STEPS: usize = 12;
 
-/// The range [m] in this weather of an optical sensor that reaches `clear_m` on a clear day.
-pub(crate) fn range_in_weather_m(clear_m: f64, environment: &Environment) -> f64 {
+/// Returns the range (m) in this weather of an optical sensor whose range on a clear day is `clear_range_m`.
+pub(crate) fn range_in_weather_m(clear_range_m: f64, environment: &Environment) -> f64 {
     let clear_per_m = extinction_per_m(&Environment::CLEAR_DAY);
     let excess_per_m = extinction_per_m(environment) - clear_per_m;
     if excess_per_m <= 0.0 {
-        return clear_m;
+        return clear_range_m;
     }
     let per_m = clear_per_m + excess_per_m;
-    let goal = clear_m.ln() + clear_per_m * clear_m;
-    let mut range_m = clear_m * (-excess_per_m * clear_m).exp();
+    let goal = clear_range_m.ln() + clear_per_m * clear_range_m;
+    let mut range_m = clear_range_m * (-excess_per_m * clear_range_m).exp();
     for _ in 0..STEPS {
         range_m += (goal - range_m.ln() - per_m * range_m) / (1.0 / range_m + per_m);
     }
@@ -36,7 +36,7 @@ mod tests {
     }
 
     #[test]
-    fn fog_shortens_the_range_by_the_power_law() {
+    fn range_in_fog_follows_the_power_law() {
         assert_eq!(range_in_weather_m(120.0, &fog(20_000.0)), 120.0);
         let mut last_m = 120.0;
         for visibility_m in [5_000.0, 1_000.0, 300.0, 100.0, 20.0] {

@@ -1,60 +1,67 @@
-//! Which detection belongs to which track: gate, then the assignment of least total cost.
+//! Association of detections with tracks: gating, then the assignment with the least total cost.
 //!
-//! The cost of a pair is its negative log-likelihood up to constants, d² + ln det S, d the Mahalanobis distance and S the
-//! innovation's covariance, with room for a manoeuvre that has just begun. A pair is allowed where d² is below the gate. Each track may also stay without a detection
-//! at the cost of one at the edge of the gate, so that a far-fetched pair is not forced. The optimum is found by the
-//! Kuhn–Munkres algorithm of the `pathfinding` crate, on integers, so that the result does not depend on rounding.
+//! The cost of a pair is its negative log-likelihood up to constants, d² + ln det S. Here d is the Mahalanobis distance
+//! and S the innovation covariance, enlarged for a manoeuvre that has just begun. A pair is allowed if d² does not
+//! exceed the gate. A track may also stay without a detection, at the cost of a detection at the edge of the gate, so
+//! that an implausible pair is never forced. The Kuhn–Munkres algorithm of the `pathfinding` crate finds the optimum.
+//! It works on integers, so that the result does not depend on rounding.
 
 use pathfinding::prelude::{Matrix, kuhn_munkres_min};
 
 use super::axis::AxisFit;
 use super::road_filter::{Measurement, RoadFilter};
 
-/// A true pair lies outside of the gate once in a thousand scans, and even less often near by, where the room for a manoeuvre
-/// is most of S: χ² of 2 degrees of freedom.
+/// Gate for d²: the 99.9 % quantile of χ² with 2 degrees of freedom.
+///
+/// A true pair lies outside of the gate once in a thousand scans. It does so even less often at short range, where the
+/// allowance for a manoeuvre dominates S.
 pub(super) const GATE: f64 = 13.8;
 
-/// Integer cost per unit of log-likelihood.
+/// Integer cost per unit of d² + ln det S.
 const COST_SCALE: f64 = 1_000.0;
 
-/// More than any sum of allowed costs: marks pairs outside of the gate.
+/// Cost of a pair outside of the gate: more than any sum of allowed costs.
 const FORBIDDEN: i64 = 1_000_000_000;
 
+/// Converts a cost to an integer that is far below [`FORBIDDEN`].
 fn to_integer(cost: f64) -> i64 {
     #[expect(clippy::cast_possible_truncation, reason = "a float cast saturates, far above any gated cost")]
     let cost = (cost * COST_SCALE).round() as i64;
     cost.clamp(-FORBIDDEN / 1_000, FORBIDDEN / 1_000)
 }
 
-/// The detection of each track, given with its half length, in `assigned`: its place in `measurements`, or nothing.
+/// Writes into `assigned` the index in `measurements` of each track's detection, or `None` if it has none.
+///
+/// Each track is given by its filter and half of its length (m).
 pub(super) fn assign<'a>(
     tracks: impl ExactSizeIterator<Item = (&'a RoadFilter, f64)>,
     measurements: &[Measurement],
     assigned: &mut Vec<Option<usize>>,
 ) {
     assigned.clear();
-    let (rows, real) = (tracks.len(), measurements.len());
-    if rows == 0 || real == 0 {
+    let (rows, detections) = (tracks.len(), measurements.len());
+    if rows == 0 || detections == 0 {
         assigned.resize(rows, None);
         return;
     }
-    // One more column for each track: its own "no detection".
-    let mut costs = Matrix::new(rows, real + rows, FORBIDDEN);
-    for (row, (track, half_m)) in tracks.enumerate() {
-        let mut widest = f64::NEG_INFINITY;
+    // The additional column of each track stands for "no detection".
+    let mut costs = Matrix::new(rows, detections + rows, FORBIDDEN);
+    for (row, (track, half_length_m)) in tracks.enumerate() {
+        let mut largest_log_variance = f64::NEG_INFINITY;
         for (column, measurement) in measurements.iter().enumerate() {
-            let axes = track.fit(measurement, half_m);
+            let axes = track.fit(measurement, half_length_m);
             let sum = |of: fn(&AxisFit) -> f64| of(&axes[0]) + of(&axes[1]);
-            if sum(|axis| axis.distance) <= GATE {
+            if sum(|axis| axis.squared_distance) <= GATE {
                 costs[(row, column)] = to_integer(sum(|axis| axis.cost));
-                widest = widest.max(sum(|axis| axis.log_variance));
+                largest_log_variance = largest_log_variance.max(sum(|axis| axis.log_variance));
             }
         }
-        costs[(row, real + row)] = if widest.is_finite() { to_integer(GATE + widest) } else { 0 };
+        costs[(row, detections + row)] =
+            if largest_log_variance.is_finite() { to_integer(GATE + largest_log_variance) } else { 0 };
     }
     let (_, columns) = kuhn_munkres_min(&costs);
     assigned.extend(columns.iter().enumerate().map(|(row, &column)| {
-        let allowed = column < real && costs[(row, column)] < FORBIDDEN;
+        let allowed = column < detections && costs[(row, column)] < FORBIDDEN;
         allowed.then_some(column)
     }));
 }
@@ -67,11 +74,11 @@ mod tests {
     use super::*;
 
     fn track(s_m: f64, d_m: f64) -> RoadFilter {
-        RoadFilter::first(&measurement(s_m, d_m), 0.0)
+        RoadFilter::new(&measurement(s_m, d_m), 0.0)
     }
 
     fn measurement(s_m: f64, d_m: f64) -> Measurement {
-        let axis = |position_m| AxisMeasurement { position_m, white_sd_m: 0.5, slow_sd_m: 0.0, lever_s: 0.0 };
+        let axis = |position_m| AxisMeasurement { position_m, white_sd_m: 0.5, slow_sd_m: 0.0, time_offset_s: 0.0 };
         Measurement { along: axis(s_m), across: axis(d_m) }
     }
 
@@ -82,15 +89,15 @@ mod tests {
     }
 
     #[test]
-    fn the_best_sum_wins_over_the_best_pair() {
-        // The first track is nearest to measurement 1, but then the second would have none.
+    fn the_least_total_cost_wins_over_the_best_single_pair() {
+        // The first track is nearest to measurement 1, but taking it would leave the second track without one.
         let tracks = [track(0.0, 0.0), track(2.0, 0.0)];
         let measurements = [measurement(-1.2, 0.0), measurement(0.9, 0.0)];
         assert_eq!(assignment(&tracks, &measurements), [Some(0), Some(1)]);
     }
 
     #[test]
-    fn nothing_is_assigned_beyond_the_gate() {
+    fn measurements_outside_of_the_gate_are_not_assigned() {
         let tracks = [track(0.0, 0.0), track(50.0, 0.0)];
         assert_eq!(assignment(&tracks, &[measurement(51.0, 0.2)]), [None, Some(0)]);
         assert_eq!(assignment(&tracks, &[]), [None, None]);
@@ -100,7 +107,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn no_detection_is_used_twice(
+        fn no_detection_is_assigned_twice(
             tracks in prop::collection::vec((-10.0..10.0, -4.0..4.0), 0..8),
             detections in prop::collection::vec((-10.0..10.0, -4.0..4.0), 0..8),
         ) {

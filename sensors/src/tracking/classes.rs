@@ -1,41 +1,42 @@
-//! What a track is: class scores of many scans fused by Bayes' rule.
+//! The class of a track: class scores of many scans, fused by Bayes' rule.
 //!
-//! Each look multiplies the probabilities by its scores, which are probabilities under equal priors and so in
-//! proportion to the likelihoods. The errors of successive looks at the same vehicle are alike (same distance, same
-//! light, same shape), so each counts only for a share of an independent one.
+//! Each scan multiplies the probabilities by its scores. The scores are probabilities under equal priors, and therefore
+//! proportional to the likelihoods. The errors of successive scans of a vehicle are correlated (same distance, light
+//! and shape), so each scan counts only as a share of an independent observation.
 
 use closecall_traffic::ClassScores;
 
-/// Share of an independent look that one scan is worth [1]; assumption: about three scans make one.
-const LOOK_WEIGHT: f64 = 0.3;
+/// Weight of one scan relative to an independent observation; assumption: about three scans make one observation.
+const SCAN_WEIGHT: f64 = 0.3;
 
-/// Points from which on the shape of a box is worth a whole look; fewer could be one lamp of a dark car (assumption).
-const SHAPELY_POINTS: f64 = 12.0;
+/// Number of points from which on a box has the full weight of a scan; fewer could be one lamp of a dark car
+/// (assumption).
+const FULL_WEIGHT_POINTS: f64 = 12.0;
 
-/// No class falls below this, so that later evidence can bring it back [1].
-const LEAST_PROBABILITY: f64 = 1e-3;
+/// Least probability of a class, so that later evidence can raise it again.
+const MIN_PROBABILITY: f64 = 1e-3;
 
-/// The fused probabilities of [car, truck, motorcycle, background].
+/// The fused probabilities of car, truck, motorcycle and background, in this order.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FusedClass {
     scores: [f64; 4],
 }
 
 impl FusedClass {
-    /// Before the first look.
+    /// Creates the probabilities before the first observation.
     pub(super) const fn unknown() -> Self {
         Self { scores: ClassScores::UNKNOWN.0 }
     }
 
-    /// Takes in the scores of one look at so many points.
-    pub(super) fn look(&mut self, seen: &ClassScores, points: usize) {
+    /// Updates the probabilities with the scores `seen` of a box of `points` points.
+    pub(super) fn update(&mut self, seen: &ClassScores, points: usize) {
         let weight = weight(points);
         for (score, seen) in self.scores.iter_mut().zip(seen.0) {
-            *score *= seen.max(LEAST_PROBABILITY).powf(weight);
+            *score *= seen.max(MIN_PROBABILITY).powf(weight);
         }
         for _ in 0..2 {
             let sum: f64 = self.scores.iter().sum();
-            self.scores = self.scores.map(|score| (score / sum).max(LEAST_PROBABILITY));
+            self.scores = self.scores.map(|score| (score / sum).max(MIN_PROBABILITY));
         }
         let sum: f64 = self.scores.iter().sum();
         self.scores = self.scores.map(|score| score / sum);
@@ -46,15 +47,16 @@ impl FusedClass {
     }
 }
 
-/// Share of an independent look that a box of so many points is worth [1].
+/// Returns the weight of a box of `points` points relative to an independent observation.
 fn weight(points: usize) -> f64 {
-    LOOK_WEIGHT * (points as f64 / SHAPELY_POINTS).min(1.0)
+    SCAN_WEIGHT * (points as f64 / FULL_WEIGHT_POINTS).min(1.0)
 }
 
-/// ln of how much likelier these scores are for a vehicle of any class than for background, tempered like a look.
+/// Returns the log-likelihood ratio of these scores for a vehicle of any class against background, with the same weight
+/// as in [`FusedClass`].
 pub(super) fn vehicle_log_likelihood_ratio(seen: &ClassScores, points: usize) -> f64 {
-    let background = seen.0[3].clamp(LEAST_PROBABILITY, 1.0 - LEAST_PROBABILITY);
-    // Under equal priors a vehicle of some class has three times the prior of background.
+    let background = seen.0[ClassScores::BACKGROUND].clamp(MIN_PROBABILITY, 1.0 - MIN_PROBABILITY);
+    // Under equal priors of the four classes, a vehicle of any class has three times the prior of background.
     weight(points) * ((1.0 - background) / (3.0 * background)).ln()
 }
 
@@ -65,35 +67,35 @@ mod tests {
     use super::*;
 
     #[test]
-    fn looks_add_up_and_can_be_reversed() {
+    fn evidence_accumulates_and_can_be_reversed() {
         let mut fused = FusedClass::unknown();
         let truck = ClassScores([0.2, 0.6, 0.1, 0.1]);
         for _ in 0..10 {
-            fused.look(&truck, 50);
+            fused.update(&truck, 50);
         }
         assert!(fused.scores().0[1] > 0.9);
         for _ in 0..30 {
-            fused.look(&ClassScores::certain(VehicleClass::Motorcycle), 50);
+            fused.update(&ClassScores::certain(VehicleClass::Motorcycle), 50);
         }
         assert_eq!(fused.scores().best_vehicle_class(), VehicleClass::Motorcycle);
         assert!((fused.scores().0.iter().sum::<f64>() - 1.0).abs() < 1e-12);
     }
 
     #[test]
-    fn three_points_say_less_than_thirty() {
+    fn three_points_weigh_less_than_thirty() {
         let (mut few, mut many) = (FusedClass::unknown(), FusedClass::unknown());
         let seen = ClassScores([0.1, 0.1, 0.7, 0.1]);
-        few.look(&seen, 3);
-        many.look(&seen, 30);
+        few.update(&seen, 3);
+        many.update(&seen, 30);
         assert!(few.scores().0[2] > 0.25 && few.scores().0[2] < many.scores().0[2]);
     }
 
     #[test]
-    fn knowing_nothing_changes_nothing() {
+    fn unknown_scores_leave_the_class_unchanged() {
         let mut fused = FusedClass::unknown();
-        fused.look(&ClassScores([0.7, 0.1, 0.1, 0.1]), 50);
+        fused.update(&ClassScores([0.7, 0.1, 0.1, 0.1]), 50);
         let before = fused.scores();
-        fused.look(&ClassScores::UNKNOWN, 50);
+        fused.update(&ClassScores::UNKNOWN, 50);
         for (a, b) in before.0.iter().zip(fused.scores().0) {
             assert!((a - b).abs() < 1e-12);
         }

@@ -1,25 +1,25 @@
-//! When the tracker believes, and when it gives up.
+//! Parameters of the tracker: confirmation, coasting and latency.
 
-use closecall_traffic::{Check, ConfigError, Num, Parameters, Problem, Range};
+use closecall_traffic::{CONTROL_STEP, Check, ConfigError, Num, Parameters, Problem, Range};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::lifecycle::{LifecycleRules, MAX_WINDOW};
-use crate::SCAN_PERIOD;
 
 /// The tracker as a scenario file describes it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct TrackerConfig {
-    /// Detections that confirm a track, out of the latest `confirm-window` scans.
+    /// Number of detections in the latest `confirm-window` scans that confirm a track.
     pub confirm_hits: u8,
-    /// See `confirm-hits`; 1 to 16. 3 of 6 holds where one side of the mirror misses a far, low car.
+    /// Number of latest scans in which `confirm-hits` are counted: 1 to 16. The default of 3 hits in 6 scans confirms a
+    /// distant low car even if it is detected with one side of the mirror only.
     pub confirm_window: u8,
-    /// Time for which a confirmed track that is no longer detected is kept [s].
+    /// Time for which a confirmed track is kept without further detections (s).
     pub coast_s: Num,
-    /// Time from the end of a scan to its tracks [s]; rounded to whole control steps of 40 ms.
+    /// Time from the end of a scan to its tracks (s), rounded to whole control steps of 40 ms.
     pub latency_s: Num,
-    /// Standard deviation of a track's speed along its heading above which it is not confirmed yet [m/s].
+    /// Standard deviation of a track's speed along the road above which the track is not confirmed (m/s).
     pub settled_speed_sd_mps: Num,
 }
 
@@ -44,24 +44,25 @@ pub struct TrackerModel {
 }
 
 impl TrackerModel {
-    /// Whole control steps from the end of a scan to its tracks.
+    /// Returns the number of whole control steps from the end of a scan to its tracks.
     pub(crate) fn latency_steps(&self) -> usize {
         self.latency_steps as usize
     }
 }
 
-/// The number of whole scans nearest to `time_s`, which is 0 or more and short.
+/// Returns the number of whole scans nearest to `time_s`, which is from 0 to 10 s.
 fn steps(time_s: f64) -> u32 {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked to be 0 to 10 s")]
-    let steps = (time_s / SCAN_PERIOD.s()).round() as u32;
+    let steps = (time_s / CONTROL_STEP.s()).round() as u32;
     steps
 }
 
-/// Longest latency that is simulated [s].
+/// Maximum latency (s).
 const MAX_LATENCY_S: f64 = 0.4;
-/// Probability that a scan detects a vehicle in view: between one of two scans (far, low) and all (near).
+/// Probability that a scan detects a vehicle in view: between one in two scans (distant low vehicle) and every scan
+/// (near).
 const DETECTION_PROBABILITY: f64 = 0.75;
-/// Probability that clutter gives a detection inside the gate of a wrong track.
+/// Probability that clutter gives a detection inside the gate of a false track in one scan.
 const CLUTTER_PROBABILITY: f64 = 0.1;
 
 impl Check for TrackerConfig {
@@ -85,7 +86,7 @@ impl Check for TrackerConfig {
             rules: LifecycleRules {
                 confirm_hits: self.confirm_hits.into(),
                 confirm_window: self.confirm_window.into(),
-                lost_after: steps(coast_s) + 1,
+                delete_after_misses: steps(coast_s) + 1,
                 detection_probability: DETECTION_PROBABILITY,
                 clutter_probability: CLUTTER_PROBABILITY,
             },

@@ -1,84 +1,90 @@
-//! When a track is believed: confirmation by M hits in N scans, coasting over misses, deletion, and the probability
-//! that there is anything at all.
+//! Lifecycle of a track: confirmation by M hits in N scans, coasting over misses, deletion, and the existence
+//! probability.
 //!
-//! The probability follows Bayes on the two hypotheses "a vehicle" and "clutter that happened to be there": with P_D the
-//! probability that a scan sees a vehicle in view and P_F that clutter gives another detection inside the gate, a hit
-//! multiplies the odds by P_D/P_F and a miss by (1 − P_D)/(1 − P_F) (Bar-Shalom, Willett, Tian: *Tracking and Data
-//! Fusion*, 2011, chapter on track-score functions; here the score is kept as log-odds).
+//! The existence probability follows from Bayes' rule for the two hypotheses "vehicle" and "clutter". P_D is the
+//! probability that a scan detects a vehicle in view, and P_F the probability that clutter gives a detection inside the
+//! gate. A hit multiplies the odds by P_D/P_F, and a miss by (1 − P_D)/(1 − P_F) (Bar-Shalom, Willett, Tian: *Tracking
+//! and Data Fusion*, 2011, chapter on track-score functions; here the score is kept as log-odds).
 
 use closecall_traffic::TrackStatus;
 
-/// Scans that the history holds.
+/// Maximum number of scans in the confirmation window.
 pub(crate) const MAX_WINDOW: u8 = 16;
 
-/// Log-odds are kept within ±this, so that a track that was seen a thousand times can still die: existence 0.9999.
+/// Maximum absolute value of the log-odds (an existence probability of 0.9999), so that misses can still lower it
+/// for a track that was detected a thousand times.
 const MAX_LOG_ODDS: f64 = 9.2;
 
-/// Even odds at the first detection.
-const FIRST_LOG_ODDS: f64 = 0.0;
+/// Log-odds of existence before the first detection: even odds.
+const INITIAL_LOG_ODDS: f64 = 0.0;
 
-/// The rules, checked where the configuration is.
+/// The rules of confirmation and deletion. The sensor's configuration checks the values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct LifecycleRules {
-    /// Hits that confirm (M).
+    /// Number of hits that confirm a track (M).
     pub(crate) confirm_hits: u32,
-    /// Latest scans in which they must lie (N), 1 to [`MAX_WINDOW`].
+    /// Number of latest scans in which the hits are counted (N): 1 to [`MAX_WINDOW`].
     pub(crate) confirm_window: u32,
-    /// Misses in a row after which a confirmed track is deleted.
-    pub(crate) lost_after: u32,
-    /// Probability that a scan sees a vehicle in view.
+    /// Number of successive scans without a hit after which a confirmed track is deleted.
+    pub(crate) delete_after_misses: u32,
+    /// Probability that a scan detects a vehicle in view (P_D).
     pub(crate) detection_probability: f64,
-    /// Probability that clutter gives a detection inside the gate.
+    /// Probability that clutter gives a detection inside the gate (P_F).
     pub(crate) clutter_probability: f64,
 }
 
-/// What has happened to one track so far.
+/// The lifecycle state of one track.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lifecycle {
-    /// One bit for each scan, the latest lowest.
+    /// One bit per scan, 1 for a hit; the lowest bit is the latest scan.
     history: u32,
+    /// Number of latest successive scans without a hit.
     misses: u32,
     confirmed: bool,
+    /// Log-odds of existence.
     log_odds: f64,
 }
 
 impl Lifecycle {
-    /// A track at its first detection.
+    /// Creates the lifecycle of a track at its first detection.
     pub(crate) fn first_hit(rules: &LifecycleRules) -> Self {
-        let mut lifecycle = Self { history: 0, misses: 0, confirmed: false, log_odds: FIRST_LOG_ODDS };
+        let mut lifecycle = Self { history: 0, misses: 0, confirmed: false, log_odds: INITIAL_LOG_ODDS };
         lifecycle.hit(rules, true);
         lifecycle
     }
 
-    /// The scan saw it. It may be confirmed only where `is_settled`.
+    /// Adds a scan that detected the track. The scan can confirm the track only if `is_settled`.
     pub(crate) fn hit(&mut self, rules: &LifecycleRules, is_settled: bool) {
         self.history = self.history << 1 | 1;
         self.misses = 0;
         self.confirmed |= is_settled && self.hits_in_window(rules) >= rules.confirm_hits;
-        self.weigh((rules.detection_probability / rules.clutter_probability).ln());
+        self.add_evidence((rules.detection_probability / rules.clutter_probability).ln());
     }
 
-    /// The scan could have seen it and did not.
+    /// Adds a scan that did not detect the track, although it was in view.
     pub(crate) fn miss(&mut self, rules: &LifecycleRules) {
-        self.unseen();
-        self.weigh(((1.0 - rules.detection_probability) / (1.0 - rules.clutter_probability)).ln());
+        self.skip();
+        self.add_evidence(((1.0 - rules.detection_probability) / (1.0 - rules.clutter_probability)).ln());
     }
 
-    /// The scan could not have seen it: hidden or out of view. That says nothing against it, but it cannot coast forever.
-    pub(crate) fn unseen(&mut self) {
+    /// Adds a scan that could not detect the track, because it was hidden or out of view.
+    ///
+    /// Such a scan leaves the existence probability unchanged, but counts against the coasting time.
+    pub(crate) fn skip(&mut self) {
         self.history <<= 1;
         self.misses += 1;
     }
 
-    /// Multiplies the odds that it exists by exp(`log_likelihood_ratio`).
-    pub(crate) fn weigh(&mut self, log_likelihood_ratio: f64) {
+    /// Multiplies the odds of existence by exp(`log_likelihood_ratio`).
+    pub(crate) fn add_evidence(&mut self, log_likelihood_ratio: f64) {
         self.log_odds = (self.log_odds + log_likelihood_ratio).clamp(-MAX_LOG_ODDS, MAX_LOG_ODDS);
     }
 
-    /// True where it is time to forget it: a tentative track that can no longer reach M of N, or one lost for too long.
-    pub(crate) fn is_dead(&self, rules: &LifecycleRules) -> bool {
+    /// Returns whether the track has ended: a tentative track that can no longer reach M hits in N scans, or a
+    /// confirmed track that was not detected for too long.
+    pub(crate) fn should_delete(&self, rules: &LifecycleRules) -> bool {
         if self.confirmed {
-            self.misses >= rules.lost_after
+            self.misses >= rules.delete_after_misses
         } else {
             self.misses > rules.confirm_window - rules.confirm_hits
         }
@@ -92,7 +98,7 @@ impl Lifecycle {
         }
     }
 
-    /// Probability that there is anything at all.
+    /// Returns the existence probability.
     pub(crate) fn existence(&self) -> f64 {
         1.0 / (1.0 + (-self.log_odds).exp())
     }
@@ -109,25 +115,25 @@ mod tests {
     const RULES: LifecycleRules = LifecycleRules {
         confirm_hits: 3,
         confirm_window: 5,
-        lost_after: 4,
+        delete_after_misses: 4,
         detection_probability: 0.9,
         clutter_probability: 0.05,
     };
 
     #[test]
-    fn alternate_misses_still_confirm() {
+    fn a_track_missed_in_every_other_scan_is_confirmed() {
         let mut track = Lifecycle::first_hit(&RULES);
         for _ in 0..2 {
             assert_eq!(track.status(), TrackStatus::Tentative);
             track.miss(&RULES);
-            assert!(!track.is_dead(&RULES));
+            assert!(!track.should_delete(&RULES));
             track.hit(&RULES, true);
         }
         assert_eq!(track.status(), TrackStatus::Confirmed);
     }
 
     #[test]
-    fn a_confirmed_track_coasts_and_then_dies() {
+    fn a_confirmed_track_coasts_and_then_ends() {
         let mut track = Lifecycle::first_hit(&RULES);
         track.hit(&RULES, true);
         track.hit(&RULES, true);
@@ -135,23 +141,23 @@ mod tests {
         for _ in 0..3 {
             track.miss(&RULES);
             assert_eq!(track.status(), TrackStatus::Coasting);
-            assert!(!track.is_dead(&RULES));
+            assert!(!track.should_delete(&RULES));
         }
         assert!(track.existence() < seen);
         track.miss(&RULES);
-        assert!(track.is_dead(&RULES));
+        assert!(track.should_delete(&RULES));
     }
 
     #[test]
-    fn being_hidden_does_not_lower_existence() {
+    fn a_hidden_track_keeps_its_existence_probability() {
         let mut track = Lifecycle::first_hit(&RULES);
         let seen = track.existence();
-        track.unseen();
+        track.skip();
         assert_eq!(track.existence().to_bits(), seen.to_bits());
     }
 
     #[test]
-    fn an_unsettled_track_waits() {
+    fn a_track_is_not_confirmed_before_it_is_settled() {
         let mut track = Lifecycle::first_hit(&RULES);
         for _ in 0..4 {
             track.hit(&RULES, false);

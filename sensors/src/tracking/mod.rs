@@ -1,15 +1,15 @@
-//! From detections to tracks: association, filter, extent, class, lifecycle.
+//! Multi-object tracking of the rear LiDAR's detections: association, filter, extent, class and lifecycle.
 //!
 //! ```text
 //!  detections of one scan ─▶ road axes ─▶ gate, assign ─▶ filter, extent, class ─▶ confirm / coast / delete
-//!                                ▲                                                       │
-//!                      E's odometry, the map                    predict to now, E's frame ▼ tracks
+//!                                ▲                                                        │
+//!                      ego odometry and map                      tracks ◀─ ego frame ◀─ predict to now
 //! ```
 //!
-//! What is followed is the middle of the face that E sees (a follower's front), not the centre of the box: the face is
-//! measured, and the gap to it is what counts; half a length further lies the centre, as well as the length is known.
-//! State and noise live in road axes, so that neither E's braking and turning nor a bend of the road is a manoeuvre of
-//! the others.
+//! Along the road, a track follows the middle of the face that the ego sees (a follower's front), not the centre of the
+//! box: the face is measured, and it defines the gap. The centre lies half a length behind it, with the uncertainty of
+//! the length. State and noise are in road axes, so that neither the ego's braking and turning nor a bend of the road
+//! looks like a manoeuvre of another vehicle.
 
 mod association;
 mod audit;
@@ -33,7 +33,7 @@ pub use view::RearView;
 
 use closecall_traffic::{Track, TrackId};
 
-/// The tracks of all sensors of E as they are reported, and the next free number.
+/// The reported tracks of all sensors of the ego, and the next free track id.
 #[derive(Clone, Debug, Default)]
 pub struct TrackList {
     /// The tracks of the latest step.
@@ -42,7 +42,7 @@ pub struct TrackList {
 }
 
 impl TrackList {
-    /// A number that no track of this run has had.
+    /// Returns an id that no track of this run has had.
     pub(crate) fn new_id(&mut self) -> TrackId {
         let id = TrackId(self.next_id);
         self.next_id += 1;

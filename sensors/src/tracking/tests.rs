@@ -1,85 +1,83 @@
-//! The tracker on simulated detections, held against the truth that they were drawn from.
+//! Tests of the tracker on simulated detections against the true states.
 
 use closecall_traffic::{
-    ActorId, Check, ClassScores, Environment, Parameters, Road, Stream, Time, TrackStatus, VehicleClass, stream,
+    ActorId, CONTROL_STEP, Check, ClassScores, Environment, Parameters, Road, Stream, Time, TrackStatus, VehicleClass,
+    stream,
 };
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
-use super::motion::{ACROSS, ALONG, Mode, Situation};
+use super::motion::{ACROSS_MODES, ALONG_MODES, Mode, Situation};
+use super::road_filter::{SLOW_DISTANCE_M, SLOW_TIME_S};
 use super::*;
 use crate::ego_frame::EgoFrame;
-use crate::surroundings::survey;
-use crate::testing::{scene_vehicle, with_speed};
+use crate::lidar::FACE_SD_M;
+use crate::surroundings::transform_scene;
+use crate::testing::{OWN_LANE_M, scene_vehicle, with_speed};
 use crate::{Detection, Extent, Scene, SceneVehicle};
 
-const OWN_LANE_M: f64 = -5.625;
 const LEFT_LANE_M: f64 = -1.875;
-const PERIOD_S: f64 = 0.04;
+const PERIOD_S: f64 = CONTROL_STEP.s();
 const RANGE_SD_M: f64 = 0.1;
 const LATERAL_SD_M: f64 = 0.15;
-const FACE_SD_M: f64 = 0.034;
-/// The share of the lateral error's variance that stays for a while.
+/// Slow share of the lateral error's variance.
 const SLOW_LATERAL_SHARE: f64 = 0.7;
-/// A slow error is gone after so much time [s], or so much closing in [m].
-const SLOW_TIME_S: f64 = 5.0;
-const SLOW_WAY_M: f64 = 5.0;
 
 fn normal(rng: &mut Stream) -> f64 {
     rng.sample(StandardNormal)
 }
 
-/// How a vehicle with nothing before it moves along one axis, as the tracker's modes say.
+/// The motion of a vehicle with a free lane ahead along one axis, drawn from the tracker's modes.
 struct Motion {
     modes: &'static [Mode],
     mode: usize,
     acceleration_mps2: f64,
-    /// By how much it is faster than at the start [m/s].
+    /// Speed minus the speed at the start (m/s).
     speed_mps: f64,
 }
 
 impl Motion {
     fn new(modes: &'static [Mode], rng: &mut Stream) -> Self {
-        let priors = modes.iter().map(|mode| mode.prior);
-        let mode = one_of(priors, rng).unwrap();
+        let priors = modes.iter().map(|mode| mode.prior_probability);
+        let mode = draw_index(priors, rng).unwrap();
         Self { modes, mode, acceleration_mps2: modes[mode].acceleration_sd_mps2 * normal(rng), speed_mps: 0.0 }
     }
 
-    fn go_on(&mut self, rng: &mut Stream) {
+    fn advance(&mut self, rng: &mut Stream) {
         let rates_per_s = self.modes[self.mode].rates_per_s(Situation::FREE);
-        self.mode = one_of(rates_per_s.iter().map(|rate| rate * PERIOD_S), rng).unwrap_or(self.mode);
+        self.mode = draw_index(rates_per_s.iter().map(|rate| rate * PERIOD_S), rng).unwrap_or(self.mode);
         let mode = &self.modes[self.mode];
-        let persists = if mode.persistence_s > 0.0 { (-PERIOD_S / mode.persistence_s).exp() } else { 0.0 };
-        let kick_mps2 = mode.acceleration_sd_mps2 * (1.0 - persists * persists).sqrt() * normal(rng);
-        self.acceleration_mps2 = persists * self.acceleration_mps2 + kick_mps2;
-        let white_mps = (mode.white_m2ps3 * PERIOD_S).sqrt() * normal(rng);
-        let calmed_mps = (-PERIOD_S / mode.calming_s).exp() * self.speed_mps;
-        self.speed_mps = calmed_mps + self.acceleration_mps2 * PERIOD_S + white_mps;
+        let persistence = if mode.persistence_s > 0.0 { (-PERIOD_S / mode.persistence_s).exp() } else { 0.0 };
+        let increment_mps2 = mode.acceleration_sd_mps2 * (1.0 - persistence * persistence).sqrt() * normal(rng);
+        self.acceleration_mps2 = persistence * self.acceleration_mps2 + increment_mps2;
+        let white_mps = (mode.white_density_m2ps3 * PERIOD_S).sqrt() * normal(rng);
+        let decayed_mps = (-PERIOD_S / mode.speed_decay_s).exp() * self.speed_mps;
+        self.speed_mps = decayed_mps + self.acceleration_mps2 * PERIOD_S + white_mps;
     }
 }
 
-/// Draws a place with these probabilities; nothing with what is left to 1.
-fn one_of(probabilities: impl Iterator<Item = f64>, rng: &mut Stream) -> Option<usize> {
-    let mut left = rng.random::<f64>();
-    for (place, probability) in probabilities.enumerate() {
-        left -= probability;
-        if left < 0.0 {
-            return Some(place);
+/// Draws an index with these probabilities; returns `None` with the remaining probability.
+fn draw_index(probabilities: impl Iterator<Item = f64>, rng: &mut Stream) -> Option<usize> {
+    let mut remaining = rng.random::<f64>();
+    for (index, probability) in probabilities.enumerate() {
+        remaining -= probability;
+        if remaining < 0.0 {
+            return Some(index);
         }
     }
     None
 }
 
-/// E and others in motion, with the tracker that follows them.
+/// A simulated scene of the ego and other vehicles, with the tracker under test.
 struct Bench {
     road: Road,
     ego: SceneVehicle,
     others: Vec<SceneVehicle>,
     scans: i64,
     rng: Stream,
-    /// By how much the face that is seen stands before the box's, and to its side: the slow part of the error [m].
+    /// Slow error of the detected face: ahead along the vehicle, and across the line of sight (m).
     slow_m: [f64; 2],
-    /// How those who manoeuvre move, along and across.
+    /// Motion of the manoeuvring vehicles along and across the road.
     motion: [Motion; 2],
     tracker: Tracker,
     list: TrackList,
@@ -92,7 +90,7 @@ impl Bench {
         let mut rng = stream(3, sample, &ActorId::new("ego").unwrap(), "tracker-test");
         Self {
             slow_m: [FACE_SD_M, SLOW_LATERAL_SHARE.sqrt() * LATERAL_SD_M].map(|sd_m| sd_m * normal(&mut rng)),
-            motion: [ALONG, ACROSS].map(|modes| Motion::new(modes, &mut rng)),
+            motion: [ALONG_MODES, ACROSS_MODES].map(|modes| Motion::new(modes, &mut rng)),
             road: Road::straight(3),
             ego: with_speed(scene_vehicle(0, VehicleClass::Car, 1_000.0, OWN_LANE_M), 30.0),
             others,
@@ -104,18 +102,19 @@ impl Bench {
         }
     }
 
-    /// Everybody goes on by one scan; with `manoeuvre` the others accelerate, coast, weave and brake as in traffic.
+    /// Moves all vehicles by one scan period. With `manoeuvre`, the others accelerate, coast, weave and brake as in
+    /// traffic.
     fn advance(&mut self, manoeuvre: bool) {
         self.scans += 1;
         for vehicle in self.others.iter_mut().chain([&mut self.ego]) {
             let state = &mut vehicle.state;
-            let stretch = 1.0 - self.road.curvature_per_m() * state.d_m;
-            state.s_m += PERIOD_S * state.speed_mps * state.heading_rad.cos() / stretch;
+            let path_scale = 1.0 - self.road.curvature_per_m() * state.d_m;
+            state.s_m += PERIOD_S * state.speed_mps * state.heading_rad.cos() / path_scale;
             state.d_m += PERIOD_S * state.speed_mps * state.heading_rad.sin();
         }
         if manoeuvre {
             let before_mps = self.motion[0].speed_mps;
-            self.motion.iter_mut().for_each(|motion| motion.go_on(&mut self.rng));
+            self.motion.iter_mut().for_each(|motion| motion.advance(&mut self.rng));
             let [along, across] = &self.motion;
             for vehicle in &mut self.others {
                 vehicle.state.speed_mps += along.speed_mps - before_mps;
@@ -124,18 +123,18 @@ impl Bench {
         }
     }
 
-    /// One scan that sees those vehicles for which `sees` is true, and the tracks after it.
+    /// Performs one scan that detects the vehicles for which `sees` is true, and returns the tracks after it.
     fn scan(&mut self, sees: impl Fn(usize) -> bool) -> &[Track] {
         let (road, ego, others) = (self.road, self.ego, self.others.clone());
-        let time = Time::from_ms(40) * self.scans;
+        let time = CONTROL_STEP * self.scans;
         let scene = Scene { time, road: &road, environment: &Environment::CLEAR_DAY, ego, others: &others };
         let mut truths = Vec::new();
-        survey(&scene, &mut truths).unwrap();
+        transform_scene(&scene, &mut truths).unwrap();
         let mut detections = Vec::new();
         let closing_mps = others.first().map_or(0.0, |other| (other.state.speed_mps - ego.state.speed_mps).abs());
-        let left = (-PERIOD_S / SLOW_TIME_S - closing_mps * PERIOD_S / SLOW_WAY_M).exp();
+        let slow_share = (-PERIOD_S / SLOW_TIME_S - closing_mps * PERIOD_S / SLOW_DISTANCE_M).exp();
         for (slow_m, sd_m) in self.slow_m.iter_mut().zip([FACE_SD_M, SLOW_LATERAL_SHARE.sqrt() * LATERAL_SD_M]) {
-            *slow_m = left * *slow_m + (1.0 - left * left).sqrt() * sd_m * normal(&mut self.rng);
+            *slow_m = slow_share * *slow_m + (1.0 - slow_share * slow_share).sqrt() * sd_m * normal(&mut self.rng);
         }
         let white_lateral_m = (1.0 - SLOW_LATERAL_SHARE).sqrt() * LATERAL_SD_M;
         let white_range_m = (RANGE_SD_M * RANGE_SD_M - FACE_SD_M * FACE_SD_M).sqrt();
@@ -177,7 +176,7 @@ fn follower(s_m: f64, d_m: f64, speed_mps: f64) -> SceneVehicle {
 }
 
 #[test]
-fn normalised_errors_squared_are_within_their_95_percent_bounds() {
+fn the_mean_nees_is_within_its_95_percent_bounds() {
     let nees_after_3_s = |sample| {
         let mut bench = Bench::new(sample, vec![follower(900.0, OWN_LANE_M, 32.0)]);
         for _ in 0..75 {
@@ -189,12 +188,12 @@ fn normalised_errors_squared_are_within_their_95_percent_bounds() {
         bench.audit.nees
     };
     let runs: Vec<Vec<f64>> = (0..3_000).map(nees_after_3_s).collect();
-    let found = Consistency::of(&runs).unwrap();
-    assert_eq!(found.credibility(), Credibility::Consistent, "{found:?}");
+    let consistency = Consistency::of(&runs).unwrap();
+    assert_eq!(consistency.credibility(), Credibility::Consistent, "{consistency:?}");
 }
 
 #[test]
-fn a_lane_change_is_followed_under_one_number() {
+fn a_track_keeps_its_id_through_a_lane_change() {
     let runs = 20_u32;
     let mut sum = 0.0;
     for sample in 0..runs {
@@ -203,16 +202,16 @@ fn a_lane_change_is_followed_under_one_number() {
             bench.scan(|_| true);
             bench.advance(false);
         }
-        // 3.75 m within 4 s, at first as if nothing happened.
-        let number = bench.list.tracks[0].id;
+        // A lane change of 3.75 m in 4 s, with a smooth start.
+        let id = bench.list.tracks[0].id;
         bench.audit = TrackAudit::default();
         for step in 0..100 {
-            let way = f64::from(step) / 100.0;
-            let lateral_mps = 3.75 / 4.0 * 30.0 * way * way * (1.0 - way) * (1.0 - way);
+            let progress = f64::from(step) / 100.0;
+            let lateral_mps = 3.75 / 4.0 * 30.0 * progress * progress * (1.0 - progress) * (1.0 - progress);
             bench.others[0].state.heading_rad = (lateral_mps / 32.0).atan();
             bench.advance(false);
             let tracks = bench.scan(|_| true);
-            assert_eq!((tracks.len(), tracks[0].id), (1, number), "{step} of run {sample}");
+            assert_eq!((tracks.len(), tracks[0].id), (1, id), "scan {step} of run {sample}");
         }
         assert!(bench.list.tracks[0].lane[0] > 0.99, "{:?}", bench.list.tracks[0].lane);
         sum += bench.audit.mean_nees().unwrap();
@@ -222,7 +221,7 @@ fn a_lane_change_is_followed_under_one_number() {
 }
 
 #[test]
-fn speed_is_known_after_a_second() {
+fn the_speed_error_is_small_after_about_a_second() {
     let mut audit = TrackAudit::default();
     for sample in 0..40 {
         let mut bench = Bench::new(sample, vec![follower(890.0, OWN_LANE_M, 40.0)]);
@@ -240,7 +239,7 @@ fn speed_is_known_after_a_second() {
 }
 
 #[test]
-fn the_egos_braking_and_turning_is_no_motion_of_others() {
+fn braking_and_turning_of_the_ego_does_not_disturb_other_tracks() {
     let mut bench = Bench::new(1, vec![follower(950.0, OWN_LANE_M, 30.0)]);
     for _ in 0..50 {
         bench.scan(|_| true);
@@ -260,7 +259,7 @@ fn the_egos_braking_and_turning_is_no_motion_of_others() {
 }
 
 #[test]
-fn alternate_misses_confirm_and_keep_the_number() {
+fn a_vehicle_missed_in_every_other_scan_is_confirmed_and_keeps_its_id() {
     let mut bench = Bench::new(2, vec![follower(870.0, OWN_LANE_M, 36.0)]);
     let mut confirmed_after = None;
     for step in 0..150 {
@@ -278,7 +277,7 @@ fn alternate_misses_confirm_and_keep_the_number() {
 }
 
 #[test]
-fn side_by_side_in_a_bend_the_numbers_stay() {
+fn two_vehicles_in_neighbouring_lanes_of_a_bend_keep_their_ids() {
     let mut left = follower(940.0, LEFT_LANE_M, 34.0);
     left.actor = 2;
     let mut bench = Bench::new(4, vec![follower(960.0, OWN_LANE_M, 30.0), left]);
@@ -294,7 +293,7 @@ fn side_by_side_in_a_bend_the_numbers_stay() {
 }
 
 #[test]
-fn a_track_coasts_behind_a_nearer_one_without_losing_belief() {
+fn a_track_hidden_by_a_nearer_one_coasts_and_keeps_its_existence_probability() {
     let mut near = follower(980.0, OWN_LANE_M, 30.0);
     near.actor = 2;
     let mut bench = Bench::new(5, vec![follower(940.0, OWN_LANE_M, 30.0), near]);
@@ -311,7 +310,7 @@ fn a_track_coasts_behind_a_nearer_one_without_losing_belief() {
     }
     let back = bench.scan(|_| true);
     assert_eq!((back[0].id, back[0].status), (TrackId(0), TrackStatus::Confirmed));
-    // The nearer one in plain view would have lost belief, and then its track.
+    // The nearer vehicle is in view: without detections it loses its existence probability, and then its track.
     for _ in 0..30 {
         bench.advance(false);
         bench.scan(|actor| actor == 1);
@@ -320,7 +319,7 @@ fn a_track_coasts_behind_a_nearer_one_without_losing_belief() {
 }
 
 #[test]
-fn a_detection_that_is_not_finite_starts_nothing() {
+fn a_detection_that_is_not_finite_starts_no_track() {
     let mut bench = Bench::new(6, vec![follower(f64::MAX, OWN_LANE_M, 30.0)]);
     assert!(bench.scan(|_| true).iter().all(|track| track.state.iter().all(|x| x.is_finite())));
 }

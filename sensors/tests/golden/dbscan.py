@@ -1,10 +1,10 @@
-"""Labels point sets with scikit-learn's DBSCAN, for comparison with ours.
+"""Labels point sets with scikit-learn's DBSCAN, as a reference for the DBSCAN of this project.
 
     python -m venv venv && venv/bin/pip install scikit-learn==1.9.1
     venv/bin/python sensors/tests/golden/dbscan.py > sensors/tests/golden/dbscan.csv
 
-Written by this script alone; `lidar::clustering::dbscan` reads it in its tests. Coordinates have three decimals, so that both
-sides read the same numbers. A label of -1 is noise.
+The tests of `lidar::clustering::dbscan` read the file, and only this script writes it. Coordinates have three decimals, so
+that both sides read the same numbers. A label of -1 is noise.
 """
 
 import numpy as np
@@ -12,7 +12,7 @@ from sklearn.cluster import DBSCAN
 
 
 def vehicles(rng, count):
-    """Fronts and sides like those that a scan shows in the stretched plane, with strays."""
+    """Returns fronts and sides of vehicles as a scan shows them in the stretched plane, with stray points."""
     parts = []
     for _ in range(count):
         centre = rng.uniform([0, -12], [90, 12])

@@ -1,11 +1,11 @@
-//! A few crops, and what the shipped network says of them in Python's ONNX Runtime.
+//! A few crops, and the class probabilities that the shipped network gives for them in Python's ONNX Runtime.
 
 use closecall_sensors::camera::{CHANNELS, CROP_PX, Classifier, Crop};
 
-/// Backends add up in different orders; they must agree within this.
+/// Maximum difference of a probability. Backends sum in different orders.
 const TOLERANCE: f64 = 1e-4;
 
-/// Fails where the classifier and Python differ on any crop.
+/// Asserts that the classifier and Python agree on every crop.
 pub(crate) fn assert_agrees(classifier: &mut Classifier) {
     let crops = include_bytes!("crops.rgb").chunks_exact(CROP_PX * CROP_PX * CHANNELS);
     let answers: Vec<Vec<f64>> = include_str!("scores.csv")
@@ -14,11 +14,11 @@ pub(crate) fn assert_agrees(classifier: &mut Classifier) {
         .map(|line| line.split(',').map(|score| score.parse().expect("a number")).collect())
         .collect();
     assert!(answers.len() >= 8 && answers.len() == crops.len(), "{} answers", answers.len());
-    for (place, (rgb, wanted)) in crops.zip(&answers).enumerate() {
+    for (index, (rgb, expected)) in crops.zip(&answers).enumerate() {
         let crop = Crop { rgb: rgb.to_vec(), ..Crop::default() };
-        let got = classifier.classify(&crop).expect("the network runs").0;
-        for (got, wanted) in got.iter().zip(wanted) {
-            assert!((got - wanted).abs() <= TOLERANCE, "crop {place}: {got} instead of {wanted}");
+        let actual = classifier.classify(&crop).expect("the network runs").0;
+        for (actual, expected) in actual.iter().zip(expected) {
+            assert!((actual - expected).abs() <= TOLERANCE, "crop {index}: {actual} instead of {expected}");
         }
     }
 }

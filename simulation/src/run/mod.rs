@@ -11,7 +11,6 @@
 
 mod arm;
 mod auditor;
-mod clock;
 mod closed_loop;
 mod ego_input;
 mod error;
@@ -26,7 +25,6 @@ mod state;
 
 pub use arm::{Arm, ControllerFactory, RunKey};
 pub use auditor::TrackAuditor;
-pub use clock::{CONTROL_STEP, PHYSICS_STEP};
 pub use closed_loop::simulate;
 pub use error::SampleError;
 pub use observer::{Happening, Lead, MarginsNow, NoObserver, Observer, StepView};

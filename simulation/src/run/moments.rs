@@ -13,12 +13,6 @@ use closecall_traffic::Time;
 
 use crate::outcome::{Moment, MomentAt};
 
-/// Rear gap at or below which the rear vehicle is near (m): the paper's distance of engagement.
-pub(super) const NEAR_GAP_M: f64 = 100.0;
-
-/// Smallest closing speed at which the rear vehicle counts as approaching (m/s): 10 km/h.
-pub(super) const NEAR_CLOSING_MPS: f64 = 10.0 / 3.6;
-
 /// Collects the moments of a run.
 #[derive(Debug, Default)]
 pub(super) struct Moments {

@@ -9,8 +9,9 @@
 //! The rear vehicle is the one that was last behind the ego in the ego's lane.
 
 use closecall_traffic::Time;
+use closecall_traffic::metrics::{CRITICAL_THW_S, bumper_gap_m};
 
-use crate::outcome::{CRITICAL_THW_S, Phase};
+use crate::outcome::Phase;
 use crate::world::World;
 
 /// The vehicle behind the ego in the ego's lane.
@@ -69,8 +70,8 @@ impl Encounter {
     /// Returns the gap along the road from the front of the rear vehicle `actor` to the rear end of the ego (m). It is
     /// negative once the front has passed that end.
     fn gap_m(&self, world: &World, ego: usize, actor: usize) -> f64 {
-        let half_lengths_m = 0.5 * (world.vehicle(ego).dimensions.length_m + world.vehicle(actor).dimensions.length_m);
-        world.state(ego).s_m - world.state(actor).s_m - half_lengths_m
+        let [ego_m, actor_m] = [ego, actor].map(|index| world.vehicle(index).dimensions.length_m);
+        bumper_gap_m(world.state(ego).s_m - world.state(actor).s_m, ego_m, actor_m)
     }
 }
 

@@ -5,16 +5,16 @@ use closecall_controllers::{
     DriverInput, DriverNote, EgoCommand, EgoController, EgoInput, EgoState, MisSettings, Neighbours,
 };
 use closecall_sensors::{NoiseKey, Perception, Scene, SceneVehicle};
-use closecall_traffic::{Measured, Track};
+use closecall_traffic::{CONTROL_STEP, ENGAGEMENT_CLOSING_MPS, ENGAGEMENT_GAP_M, Measured, Track};
 
 use super::ego_input::{odometry, sensor_availability};
 use super::events::Events;
 use super::humans::{Human, human_drivers, weave};
 use super::margins::{MarginMeter, Widths};
 use super::mis_log::{MisLog, MisObservation};
-use super::moments::{Moments, NEAR_CLOSING_MPS, NEAR_GAP_M};
+use super::moments::Moments;
 use super::phase::{AFTER_COLLISION, Encounter, Follower};
-use super::{Arm, CONTROL_STEP, Happening, MarginsNow, Observer, RunKey, SampleError, StepView};
+use super::{Arm, Happening, MarginsNow, Observer, RunKey, SampleError, StepView};
 use crate::outcome::{EndReason, Moment, Outcome, Phase};
 use crate::scenario::Scenario;
 use crate::world::{Action, InitialVehicle, World};
@@ -192,7 +192,8 @@ impl<'a> Run<'a> {
         let own_mps = self.world.state(self.scenario.ego).speed_mps;
         let is_near = self.margins.follower.is_some_and(|rear| {
             let closing_mps = self.world.state(rear).speed_mps - own_mps;
-            self.margins.gap_rear_m.is_ok_and(|gap_m| gap_m <= NEAR_GAP_M) && closing_mps >= NEAR_CLOSING_MPS
+            self.margins.gap_rear_m.is_ok_and(|gap_m| gap_m <= ENGAGEMENT_GAP_M)
+                && closing_mps >= ENGAGEMENT_CLOSING_MPS
         });
         let lead_brakes = self.margins.lead.is_ok_and(|lead| self.world.state(lead.actor).brake_light);
         for (moment, is_now) in [

@@ -3,10 +3,10 @@
 use closecall_controllers::{CheckedDriver, DriverConfig, HumanDriver, LaneKeeping, SpeedKeeping};
 use closecall_sensors::Sensors;
 use closecall_traffic::{
-    ActorId, Check, ConfigError, Environment, Parameters, Problem, Range, Road, Time, Vehicle, VehicleState,
+    ActorId, Check, ConfigError, Environment, PHYSICS_STEP, Parameters, Problem, Range, Road, Time, Vehicle,
+    VehicleState,
 };
 
-use crate::run::PHYSICS_STEP;
 use crate::world::lateral_grip_mps2;
 
 use super::config::{ActorConfig, SCHEMA_VERSION, ScenarioConfig};

@@ -1,6 +1,7 @@
 //! Events that act on a vehicle during a run: a trigger, and its effect.
 
-use closecall_traffic::{ActorId, ConfigError, Num, Parameters, Range, Time, Vehicle, VehicleState};
+use closecall_traffic::metrics::bumper_gap_m;
+use closecall_traffic::{ActorId, ConfigError, ENGAGEMENT_GAP_M, Num, Parameters, Range, Time, Vehicle, VehicleState};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -110,8 +111,6 @@ pub(crate) struct Brake {
     pub(crate) to_speed_mps: f64,
 }
 
-/// Gap of the rear vehicle to the ego at which the paper's encounter begins (m).
-const ENCOUNTER_BEGINS_M: f64 = 100.0;
 /// Time from the nominal encounter to phase 1 (s).
 const AFTER_ENCOUNTER_S: f64 = 6.0;
 /// Closing speed above which there is a nominal encounter (m/s).
@@ -180,9 +179,9 @@ fn nominal_time(
     let closing_mps = start.states[from].speed_mps - start.states[to].speed_mps;
     // A vehicle that does not approach has no nominal encounter.
     Range::above(SLOWEST_APPROACH_MPS, 100.0).check(closing_mps, "from")?;
-    let half_lengths_m = 0.5 * (start.vehicles[from].dimensions.length_m + start.vehicles[to].dimensions.length_m);
-    let gap_m = start.states[to].s_m - start.states[from].s_m - half_lengths_m;
-    let begins_s = ((gap_m - ENCOUNTER_BEGINS_M) / closing_mps).max(0.0);
+    let lengths_m = [from, to].map(|index| start.vehicles[index].dimensions.length_m);
+    let gap_m = bumper_gap_m(start.states[to].s_m - start.states[from].s_m, lengths_m[0], lengths_m[1]);
+    let begins_s = ((gap_m - ENGAGEMENT_GAP_M) / closing_mps).max(0.0);
     let ends_s = (gap_m / closing_mps).max(begins_s) + AFTER_ENCOUNTER_S;
     Ok(Trigger::At(Time::from_s(begins_s + phase * (ends_s - begins_s))))
 }

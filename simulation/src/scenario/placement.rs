@@ -1,5 +1,6 @@
 //! Computes the states of the vehicles at the start of a run.
 
+use closecall_traffic::metrics::touching_distance_m;
 use closecall_traffic::{ActorId, ConfigError, Lane, Num, Parameters, Problem, Range, Road, Vehicle, VehicleState};
 
 use super::config::{ActorConfig, RelativeStartConfig, StartConfig};
@@ -133,13 +134,12 @@ impl Placement<'_> {
                 self.parameters.number(num, thw.key, THW_RANGE_S)? * follower_mps
             }
         };
-        let half_lengths_m =
-            0.5 * (self.vehicles[index].dimensions.length_m + self.vehicles[other].dimensions.length_m);
+        let [own, other] = [index, other].map(|index| self.vehicles[index].dimensions.length_m);
         let d_m = match start.lane {
             Some(lane) => self.lane_centre_m(lane)?,
             None => reference.d_m,
         };
-        let s_m = reference.s_m + direction * (gap_m + half_lengths_m);
+        let s_m = reference.s_m + direction * (gap_m + touching_distance_m(own, other));
         Ok(Some(VehicleState { s_m, d_m, speed_mps, ..VehicleState::default() }))
     }
 

@@ -24,7 +24,7 @@ use closecall_controllers::{
 };
 use closecall_scenarios::encounter::{EGO, FRONT, Participant, REAR, RecordedEncounter};
 use closecall_scenarios::filters::PERIOD;
-use closecall_traffic::metrics::time_headway_s;
+use closecall_traffic::metrics::{time_headway_s, touching_distance_m};
 use closecall_traffic::{ActorId, Choice, Num, RoadConfig, Time, Trajectory, TrajectoryPoint, VehicleConfig};
 use toml_edit::{ArrayOfTables, DocumentMut, Item};
 
@@ -186,9 +186,8 @@ fn start_of(vehicle: &Trajectory) -> Option<&TrajectoryPoint> {
 
 /// Returns whether a vehicle that starts at `start` keeps a gap to `other`, if both start in the same lane.
 fn is_clear(other: &Trajectory, start: &TrajectoryPoint, vehicle: &Participant) -> bool {
-    let half_lengths_m = 0.5 * (other.dimensions.length_m + vehicle.trajectory.dimensions.length_m);
-    start_of(other)
-        .is_none_or(|at| at.lane != start.lane || (at.s_m - start.s_m).abs() > half_lengths_m + MIN_START_GAP_M)
+    let touching_m = touching_distance_m(other.dimensions.length_m, vehicle.trajectory.dimensions.length_m);
+    start_of(other).is_none_or(|at| at.lane != start.lane || (at.s_m - start.s_m).abs() > touching_m + MIN_START_GAP_M)
 }
 
 /// Returns the ego stack. Its time gap is the median time headway recorded before the rear vehicle crosses the lane marking,

@@ -1,6 +1,6 @@
 //! Variations of a scenario that must not change its outcome. The validity checks run them.
 
-use closecall_traffic::{Indicator, Road, Time, VehicleState};
+use closecall_traffic::{Road, Time, VehicleState};
 
 use super::{Actor, Scenario, Trigger};
 
@@ -52,16 +52,11 @@ impl Actor {
 }
 
 fn mirrored(state: &VehicleState, road: &Road) -> VehicleState {
-    let indicator = match state.indicator {
-        Indicator::Left => Indicator::Right,
-        Indicator::Right => Indicator::Left,
-        Indicator::Off => Indicator::Off,
-    };
     VehicleState {
         d_m: road.right_edge_m() - state.d_m,
         heading_rad: -state.heading_rad,
         yaw_rate_radps: -state.yaw_rate_radps,
-        indicator,
+        indicator: state.indicator.mirrored(),
         ..*state
     }
 }

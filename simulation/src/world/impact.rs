@@ -7,10 +7,9 @@
 //! No other force acts during an impact, so that momentum is conserved; afterwards the tyres slide. The velocities after
 //! an impact are read at its end, as in accident reconstruction.
 
+use closecall_traffic::GRAVITY_MPS2;
 use nalgebra::Vector2;
 use rapier2d::prelude::*;
-
-use super::plant::GRAVITY_MPS2;
 
 /// Restitution of car bodies at the speeds of severe impacts (Brach and Brach, *Vehicle Accident Analysis*, 2011).
 const RESTITUTION: f32 = 0.1;

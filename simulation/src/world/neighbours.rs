@@ -1,6 +1,7 @@
 //! Finds the vehicles around a vehicle, lane by lane.
 
 use closecall_controllers::{LaneNeighbours, Neighbour, Neighbours};
+use closecall_traffic::metrics::bumper_gap_m;
 use closecall_traffic::{Lane, Road, Side};
 
 use super::World;
@@ -75,7 +76,7 @@ impl Candidate {
         let half_width_m = half_extent_across_m(size.length_m, size.width_m, state.heading_rad);
         let neighbour = Neighbour {
             actor: other,
-            gap_m: ahead_m.abs() - 0.5 * (own_size.length_m + size.length_m),
+            gap_m: bumper_gap_m(ahead_m.abs(), own_size.length_m, size.length_m),
             speed_mps: state.speed_mps,
             acceleration_mps2: state.acceleration_mps2,
             brake_light: state.brake_light,

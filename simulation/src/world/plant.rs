@@ -14,12 +14,10 @@
 //! check of a scenario rejects weaving that would.
 
 use closecall_controllers::{Deviation, LaneChange, Weave};
-use closecall_traffic::{Indicator, Lane, Road, Vehicle, VehicleClass, VehicleState};
+use closecall_traffic::{GRAVITY_MPS2, Indicator, Lane, Road, Vehicle, VehicleClass, VehicleState};
 
 use super::path::{LanePath, LateralState};
 
-/// Gravitational acceleration (m/s²).
-pub(crate) const GRAVITY_MPS2: f64 = 9.81;
 /// Fraction of the friction that a driver can use laterally in an evasion without losing control.
 const LATERAL_SHARE: f64 = 0.5;
 /// Wheelbase as a fraction of a vehicle's length.
@@ -236,11 +234,11 @@ fn advance(speed_mps: f64, acceleration_mps2: f64, step_s: f64) -> Advance {
 #[cfg(test)]
 mod tests {
     use closecall_controllers::LaneKeepingConfig;
-    use closecall_traffic::{ActorId, Check, Parameters, Side, stream};
+    use closecall_traffic::{ActorId, Check, PHYSICS_STEP, Parameters, Side, stream};
 
     use super::*;
 
-    const STEP_S: f64 = 0.01;
+    const STEP_S: f64 = PHYSICS_STEP.s();
 
     fn weaving(weave: Option<Weave>) -> Plant {
         let state = VehicleState { speed_mps: 30.0, d_m: -5.625, ..VehicleState::default() };

@@ -2,6 +2,21 @@
 
 use crate::{Absent, Measured};
 
+/// Time headway below which it is critical (s); the paper's threshold.
+pub const CRITICAL_THW_S: f64 = 0.9;
+
+/// Returns the distance between the centres of two vehicles of these lengths (m) if one touches the other from behind.
+pub const fn touching_distance_m(length_m: f64, other_length_m: f64) -> f64 {
+    0.5 * (length_m + other_length_m)
+}
+
+/// Returns the gap, bumper to bumper, between two vehicles whose centres are `distance_m` apart along the road (m).
+///
+/// It is negative if the two overlap along the road.
+pub const fn bumper_gap_m(distance_m: f64, length_m: f64, other_length_m: f64) -> f64 {
+    distance_m - touching_distance_m(length_m, other_length_m)
+}
+
 /// Returns the time headway (s): the time that a vehicle at `speed_mps` needs to cover its gap to the vehicle ahead.
 ///
 /// The result is 0 if the two vehicles overlap along the road.

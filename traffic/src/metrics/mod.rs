@@ -3,7 +3,8 @@
 //! Each metric is a pure function of one moment: it takes positions, sizes and velocities, and returns one value or the
 //! reason for its absence ([`Absent`](crate::Absent)). No metric rounds, stores, or searches by stepping through time.
 //!
-//! - [`time_headway_s`], [`time_to_collision_s`], [`required_deceleration_mps2`]: a vehicle that follows another.
+//! - [`bumper_gap_m`], [`time_headway_s`], [`time_to_collision_s`], [`required_deceleration_mps2`]: a vehicle that follows
+//!   another.
 //! - [`arrival_time_s`]: time until a faster follower arrives while the own vehicle brakes.
 //! - [`time_to_touch_s`], [`closest_encounter`]: two oriented boxes in the plane.
 //!
@@ -18,5 +19,8 @@ mod plane;
 #[cfg(test)]
 mod tests;
 
-pub use following::{arrival_time_s, required_deceleration_mps2, time_headway_s, time_to_collision_s};
+pub use following::{
+    CRITICAL_THW_S, arrival_time_s, bumper_gap_m, required_deceleration_mps2, time_headway_s, time_to_collision_s,
+    touching_distance_m,
+};
 pub use plane::{Encounter, Moving, closest_encounter, time_to_touch_s};

@@ -1,86 +1,89 @@
-//! Is the passing lane free enough to change into it?
+//! Gap acceptance: whether an adjacent lane is free enough to change into it.
 
-use crate::driver::perception::{PassingLane, Perceived};
+use crate::driver::perception::{PerceivedLane, PerceivedVehicle};
 
-/// Gap below which no one changes lanes in front of a follower, whatever its speed [m].
-const LEAST_FOLLOWER_GAP_M: f64 = 3.0;
+/// Smallest gap to a follower that a driver accepts, whatever its speed (m).
+const MIN_FOLLOWER_GAP_M: f64 = 3.0;
 
-/// Time headway that is left to a follower in the passing lane [s].
+/// Time headway left to a follower in the passing lane (s).
 const FOLLOWER_HEADWAY_S: f64 = 0.3;
 
-/// By how much a lead in the passing lane has to be faster than the vehicle to be overtaken, to be worth following [m/s].
-const GAIN_MPS: f64 = 1.0;
+/// Speed by which a lead vehicle in the passing lane must exceed the one to overtake to be worth following (m/s).
+const MIN_GAIN_MPS: f64 = 1.0;
 
-/// Share of the accepted braking below which a slow lead in the passing lane is too far ahead to matter [1].
-const DOES_NOT_MATTER: f64 = 0.25;
+/// Share of the accepted own braking below which a slow lead vehicle in the passing lane is too far ahead to matter.
+const IRRELEVANT_LEAD_BRAKING_SHARE: f64 = 0.25;
 
-/// What braking an overtaking driver accepts, of itself and of the follower in the passing lane.
+/// Braking that an overtaking driver accepts, of itself and of the follower in the adjacent lane.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tolerance {
-    /// Of itself, for a slower lead in the passing lane [m/s²].
+    /// Accepted own braking behind a slower lead vehicle in the adjacent lane (m/s²).
     pub(super) own_mps2: f64,
-    /// Of the follower in the passing lane [m/s²].
+    /// Accepted braking of the follower in the adjacent lane (m/s²).
     pub(super) follower_mps2: f64,
-    /// Time headway that is left to that follower [s].
+    /// Time headway left to that follower (s).
     pub(super) follower_headway_s: f64,
 }
 
 impl Tolerance {
-    /// To pull out. A follower is not made to brake by more than 2 m/s² (the safety criterion of MOBIL: Kesting, Treiber
-    /// and Helbing, Transportation Research Record 1999 (2007) 86–94, with half of its limit of 4 m/s²).
+    /// Tolerance for pulling out. A follower need not brake by more than 2 m/s² (the safety criterion of MOBIL:
+    /// Kesting, Treiber and Helbing, Transportation Research Record 1999 (2007) 86–94, with half of its limit of 4
+    /// m/s²).
     pub(super) const TO_START: Self =
         Self { own_mps2: 1.0, follower_mps2: 2.0, follower_headway_s: FOLLOWER_HEADWAY_S };
-    /// To go on once pulled out: MOBIL's limit itself.
-    pub(super) const TO_GO_ON: Self =
+    /// Tolerance for continuing after pulling out: MOBIL's limit itself.
+    pub(super) const TO_CONTINUE: Self =
         Self { own_mps2: 3.0, follower_mps2: 4.0, follower_headway_s: FOLLOWER_HEADWAY_S };
 }
 
-/// The overtaking driver's own side of the question.
+/// The criterion by which a driver accepts an adjacent lane.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Intent {
-    /// Own speed [m/s].
+pub(super) struct GapAcceptance {
+    /// Own speed (m/s).
     pub(super) speed_mps: f64,
-    /// Speed of the vehicle to be overtaken [m/s].
-    pub(super) slow_mps: f64,
-    /// Own safe gap at its present speed [m].
+    /// Speed of the vehicle to overtake (m/s).
+    pub(super) overtaken_mps: f64,
+    /// Own safe gap at the present speed (m).
     pub(super) safe_gap_m: f64,
-    /// What braking is accepted.
+    /// Accepted braking.
     pub(super) tolerance: Tolerance,
 }
 
-impl Intent {
-    /// True where the passing lane is free enough, and it is worth to change into it.
-    pub(super) fn accepts(&self, lane: &PassingLane) -> bool {
-        self.allows(lane) && lane.lead.as_ref().is_none_or(|lead| self.gains(lead))
+impl GapAcceptance {
+    /// Returns true if the lane is free enough and a change into it is worthwhile.
+    pub(super) fn accepts(&self, lane: &PerceivedLane) -> bool {
+        self.is_free(lane) && lane.lead.as_ref().is_none_or(|lead| self.gains_speed(lead))
     }
 
-    /// True where a lane is free enough.
-    pub(super) fn allows(&self, lane: &PassingLane) -> bool {
+    /// Returns true if the lane is free enough.
+    pub(super) fn is_free(&self, lane: &PerceivedLane) -> bool {
         !lane.alongside
-            && lane.lead.as_ref().is_none_or(|lead| self.allows_lead(lead))
+            && lane.lead.as_ref().is_none_or(|lead| self.accepts_lead(lead))
             && lane.follower.as_ref().is_none_or(|follower| self.accepts_follower(follower))
     }
 
-    fn room_and_closing(&self, seen: &Perceived) -> (f64, f64) {
-        (seen.lead.gap_m - self.safe_gap_m, (self.speed_mps - seen.lead.speed_mps).max(0.0))
+    /// Returns the distance to a lead vehicle beyond the safe gap (m) and the closing speed (m/s).
+    fn room_and_closing(&self, vehicle: &PerceivedVehicle) -> (f64, f64) {
+        (vehicle.lead.gap_m - self.safe_gap_m, (self.speed_mps - vehicle.lead.speed_mps).max(0.0))
     }
 
-    fn allows_lead(&self, seen: &Perceived) -> bool {
-        let (room_m, closing_mps) = self.room_and_closing(seen);
+    fn accepts_lead(&self, vehicle: &PerceivedVehicle) -> bool {
+        let (room_m, closing_mps) = self.room_and_closing(vehicle);
         room_m > 0.0 && closing_mps * closing_mps <= 2.0 * room_m * self.tolerance.own_mps2
     }
 
-    /// A lead in the passing lane that is no faster than the vehicle to be overtaken gains nothing, unless it is so far
-    /// ahead that it will not matter.
-    fn gains(&self, seen: &Perceived) -> bool {
-        let (room_m, closing_mps) = self.room_and_closing(seen);
-        seen.lead.speed_mps >= self.slow_mps + GAIN_MPS
-            || room_m > closing_mps * closing_mps / (2.0 * DOES_NOT_MATTER * self.tolerance.own_mps2)
+    /// Returns true if the change gains speed: the lead vehicle in the lane is faster than the vehicle to overtake, or
+    /// so far ahead that it does not matter.
+    fn gains_speed(&self, vehicle: &PerceivedVehicle) -> bool {
+        let (room_m, closing_mps) = self.room_and_closing(vehicle);
+        vehicle.lead.speed_mps >= self.overtaken_mps + MIN_GAIN_MPS
+            || room_m > closing_mps * closing_mps / (2.0 * IRRELEVANT_LEAD_BRAKING_SHARE * self.tolerance.own_mps2)
     }
 
-    fn accepts_follower(&self, seen: &Perceived) -> bool {
-        let room_m = seen.lead.gap_m - LEAST_FOLLOWER_GAP_M - self.tolerance.follower_headway_s * seen.lead.speed_mps;
-        let closing_mps = (seen.lead.speed_mps - self.speed_mps).max(0.0);
+    fn accepts_follower(&self, vehicle: &PerceivedVehicle) -> bool {
+        let room_m =
+            vehicle.lead.gap_m - MIN_FOLLOWER_GAP_M - self.tolerance.follower_headway_s * vehicle.lead.speed_mps;
+        let closing_mps = (vehicle.lead.speed_mps - self.speed_mps).max(0.0);
         room_m > 0.0 && closing_mps * closing_mps <= 2.0 * room_m * self.tolerance.follower_mps2
     }
 }
@@ -90,33 +93,34 @@ mod tests {
     use super::*;
     use crate::driver::Lead;
 
-    fn seen(gap_m: f64, speed_mps: f64) -> Perceived {
+    fn vehicle(gap_m: f64, speed_mps: f64) -> PerceivedVehicle {
         let lead = Lead { gap_m, speed_mps, acceleration_mps2: 0.0 };
-        Perceived { actor: 3, lead, brake_light: false, width_m: 1.85, d_m: -1.875 }
+        PerceivedVehicle { actor: 3, lead, brake_light: false, width_m: 1.85, d_m: -1.875 }
     }
 
-    const INTENT: Intent = Intent { speed_mps: 38.0, slow_mps: 30.0, safe_gap_m: 4.0, tolerance: Tolerance::TO_START };
+    const ACCEPTANCE: GapAcceptance =
+        GapAcceptance { speed_mps: 38.0, overtaken_mps: 30.0, safe_gap_m: 4.0, tolerance: Tolerance::TO_START };
 
     #[test]
-    fn an_empty_lane_is_accepted_and_one_alongside_is_not() {
-        assert!(INTENT.accepts(&PassingLane::default()));
-        assert!(!INTENT.accepts(&PassingLane { alongside: true, ..PassingLane::default() }));
+    fn an_empty_lane_is_accepted_and_a_vehicle_alongside_is_not() {
+        assert!(ACCEPTANCE.accepts(&PerceivedLane::default()));
+        assert!(!ACCEPTANCE.accepts(&PerceivedLane { alongside: true, ..PerceivedLane::default() }));
     }
 
     #[test]
-    fn a_slow_or_near_lead_is_not_accepted() {
-        let lane = |lead| PassingLane { lead: Some(lead), ..PassingLane::default() };
-        assert!(INTENT.accepts(&lane(seen(30.0, 38.0))));
-        assert!(!INTENT.accepts(&lane(seen(30.0, 29.0))));
-        assert!(!INTENT.accepts(&lane(seen(3.0, 40.0))));
-        assert!(!INTENT.accepts(&lane(seen(f64::NAN, 40.0))));
+    fn a_slow_or_near_lead_vehicle_is_not_accepted() {
+        let lane = |lead| PerceivedLane { lead: Some(lead), ..PerceivedLane::default() };
+        assert!(ACCEPTANCE.accepts(&lane(vehicle(30.0, 38.0))));
+        assert!(!ACCEPTANCE.accepts(&lane(vehicle(30.0, 29.0))));
+        assert!(!ACCEPTANCE.accepts(&lane(vehicle(3.0, 40.0))));
+        assert!(!ACCEPTANCE.accepts(&lane(vehicle(f64::NAN, 40.0))));
     }
 
     #[test]
     fn a_fast_or_near_follower_is_not_accepted() {
-        let lane = |follower| PassingLane { follower: Some(follower), ..PassingLane::default() };
-        assert!(INTENT.accepts(&lane(seen(40.0, 40.0))));
-        assert!(!INTENT.accepts(&lane(seen(10.0, 40.0))));
-        assert!(!INTENT.accepts(&lane(seen(40.0, 55.0))));
+        let lane = |follower| PerceivedLane { follower: Some(follower), ..PerceivedLane::default() };
+        assert!(ACCEPTANCE.accepts(&lane(vehicle(40.0, 40.0))));
+        assert!(!ACCEPTANCE.accepts(&lane(vehicle(10.0, 40.0))));
+        assert!(!ACCEPTANCE.accepts(&lane(vehicle(40.0, 55.0))));
     }
 }

@@ -1,4 +1,4 @@
-//! What an overtaking driver is given by the scenario.
+//! Configuration of an overtaking driver.
 
 use closecall_traffic::{Check, ConfigError, Num, Parameters, Problem, Range};
 use schemars::JsonSchema;
@@ -10,21 +10,22 @@ use crate::driver::attention::{Lapse, LapseConfig, check_lapse};
 use crate::driver::reaction::{Reaction, ReactionConfig};
 use crate::driver::{Wiedemann99, Wiedemann99Config};
 
-/// Duration of a whole lane change where the scenario gives none [s]: the recorded mean.
+/// Default duration of a whole lane change (s): the mean in recorded traffic.
 const DEFAULT_DURATION_S: f64 = 6.8;
 
-/// Lateral acceleration that a driver accepts to get clear sooner, where the scenario gives none [m/s²].
+/// Default lateral acceleration that a driver accepts in evasive steering, to be clear earlier (m/s²).
 ///
-/// In need, drivers brake far more than they steer, and use little of the grip sideways (Adams, *Review of the literature
-/// on obstacle avoidance maneuvers: braking versus steering*, UMTRI-94-19, 1994). Chosen on tuning seeds: with 0 the
-/// encounter without a margin increase system ends in a collision in 37 % of samples, with 1 in 23 %, with 2 in 10 %.
+/// In an emergency, drivers brake far more than they steer, and use little of the lateral grip (Adams, *Review of the
+/// literature on obstacle avoidance maneuvers: braking versus steering*, UMTRI-94-19, 1994). The value is chosen on
+/// tuning seeds: without a margin increase system, the encounter ends in a collision in 37 % of the samples with 0, in
+/// 23 % with 1, and in 10 % with 2.
 const DEFAULT_EVASIVE_LATERAL_MPS2: f64 = 1.0;
 
-/// How an overtaking driver follows.
+/// Car-following model of an overtaking driver.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum FollowConfig {
-    /// By Wiedemann 99.
+    /// The Wiedemann 99 model.
     Wiedemann99(Wiedemann99Config),
 }
 
@@ -32,20 +33,21 @@ pub enum FollowConfig {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct OvertakerConfig {
-    /// Time headway to the vehicle ahead when the driver's centre crosses the lane marking [s].
+    /// Time headway to the vehicle ahead when the centre of the driver's vehicle crosses the lane marking (s).
     pub cut_out_thw_s: Num,
-    /// How it follows while it cannot overtake; its safe gap is also the least it accepts while pulling out.
+    /// Car-following model while the driver cannot overtake. Its safe gap is also the smallest gap that the driver
+    /// accepts while pulling out.
     pub follow: FollowConfig,
-    /// Reaction time [s].
+    /// Reaction time (s).
     pub reaction_s: ReactionConfig,
-    /// Time that the whole lane change takes [s]; 6.8.
+    /// Duration of the whole lane change (s). Default: 6.8.
     pub lane_change_duration_s: Option<Num>,
-    /// Lateral acceleration that it accepts in need, to get clear sooner than it had meant to [m/s²]; 1. With 0 it only
-    /// brakes.
+    /// Lateral acceleration accepted in evasive steering, to be clear earlier than planned (m/s²). Default: 1. With 0,
+    /// the driver only brakes.
     pub evasive_lateral_mps2: Option<Num>,
-    /// Lapses of attention; none where absent.
+    /// Lapses of attention. Default: none.
     pub lapse: Option<LapseConfig>,
-    /// That it changes back to the lane that it came from, once it has passed; it stays where absent.
+    /// Return to the original lane after passing. Without it, the driver stays in the passing lane.
     pub returns: Option<ReturnConfig>,
 }
 
@@ -62,14 +64,15 @@ pub struct Overtaker {
 }
 
 impl Overtaker {
-    /// Checks that a driver following a vehicle at `speed_mps` comes close enough to reach its cut-out headway.
+    /// Checks that a driver who follows a vehicle at `speed_mps` comes close enough to reach the cut-out time headway.
     ///
     /// # Errors
-    /// Names the key where the safe gap cc0 + cc1·v is longer than the cut-out headway's gap at this speed.
+    /// Returns a [`ConfigError`] that names the key if the safe gap cc0 + cc1·v exceeds the gap of the cut-out time
+    /// headway at this speed.
     pub fn check_reach(&self, speed_mps: f64) -> Result<(), ConfigError> {
         let following_m = self.follow.safe_gap_m(speed_mps);
         let wanted_m = self.cut_out_thw_s * speed_mps;
-        // Written so that NaN is refused.
+        // Written so that NaN is an error.
         if following_m <= wanted_m {
             return Ok(());
         }
@@ -80,7 +83,7 @@ impl Overtaker {
         Err(ConfigError::new("cut-out-thw-s", Problem::Contradiction { other: "follow", rule }))
     }
 
-    /// A driver for one run.
+    /// Creates a driver for one run.
     pub(crate) fn driver(&self) -> OvertakerDriver {
         OvertakerDriver::new(*self)
     }
@@ -89,16 +92,16 @@ impl Overtaker {
 impl Check for OvertakerConfig {
     type Checked = Overtaker;
 
-    /// What holds at any speed is checked here; [`Overtaker::check_reach`] checks the rest, once speeds are known.
+    /// Checks what does not depend on speeds. [`Overtaker::check_reach`] checks the rest once the speeds are known.
     fn check(&self, parameters: &Parameters) -> Result<Overtaker, ConfigError> {
         let cut_out_thw_s = parameters.number(&self.cut_out_thw_s, "cut-out-thw-s", Range::above(0.0, 5.0))?;
         let FollowConfig::Wiedemann99(config) = &self.follow;
-        let inside = |error: ConfigError| error.within("wiedemann99").within("follow");
-        let follow = config.check(parameters).map_err(inside)?;
+        let locate = |error: ConfigError| error.within("wiedemann99").within("follow");
+        let follow = config.check(parameters).map_err(locate)?;
         if follow.reaction.is_some() {
             let rule = "the overtaking driver has one reaction time, which stands beside `follow`".to_owned();
             let problem = Problem::Contradiction { other: "overtaker.reaction-s", rule };
-            return Err(inside(ConfigError::new("reaction-s", problem)));
+            return Err(locate(ConfigError::new("reaction-s", problem)));
         }
         if follow.parameters.cc1_s >= cut_out_thw_s {
             let rule =
@@ -142,11 +145,11 @@ mod tests {
     }
 
     #[test]
-    fn a_following_distance_that_never_lets_it_cut_out_is_refused() {
+    fn a_safe_gap_above_the_cut_out_gap_is_refused() {
         let none = Parameters::default();
         let error = config(0.3, 0.9).check(&none).unwrap_err();
         assert_eq!(error.path.to_string(), "cut-out-thw-s");
-        // 1.5 m + 0.05 s · 30 m/s is 3 m; 0.15 s are 4.5 m at 30 m/s, but only 2.25 m at 15 m/s, where it keeps 2.25 m.
+        // At 30 m/s the safe gap is 1.5 m + 0.05 s · 30 m/s = 3 m, and 0.15 s are 4.5 m. At 15 m/s both are 2.25 m.
         let driver = config(0.15, 0.05).check(&none).unwrap();
         assert_eq!(driver.check_reach(30.0), Ok(()));
         assert!(driver.check_reach(10.0).is_err());

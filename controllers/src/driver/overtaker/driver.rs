@@ -1,88 +1,85 @@
-//! The overtaking driver in the loop.
+//! The overtaking driver: adapts perception, prediction and car-following to the simulation loop.
 
-use closecall_traffic::{Indicator, Lane, Side, Stream, Time};
+use closecall_traffic::{Indicator, Lane, MINIMUM_JERK_PEAK, Side, Stream, Time};
 
-use super::acceptance::{Intent, Tolerance};
+use super::acceptance::{GapAcceptance, Tolerance};
 use super::conflict::Course;
-use super::returning::{indicator, opposite};
 use super::{Overtaker, path};
-use crate::driver::perception::{Perceived, Perception, View};
-use crate::driver::wiedemann99::{Emergency, brake_for_light, lift_off_for_light};
+use crate::driver::perception::{PerceivedScene, PerceivedVehicle, Perception};
+use crate::driver::wiedemann99::{EmergencyBrakingDetector, brake_for_brake_light, coast_for_brake_light};
 use crate::driver::{
-    Driver, DriverAction, DriverError, DriverInput, DriverNote, HARDEST_BRAKING_MPS2, LaneChange, Wiedemann99Model,
-    check_finite, finite,
+    BRAKING_MARGIN, Driver, DriverAction, DriverError, DriverInput, DriverNote, HARDEST_BRAKING_MPS2, LaneChange,
+    Wiedemann99Model, check_finite, finite,
 };
 
-/// Braking below which a driver who is about to be clear does not bother [m/s²].
+/// Required braking below which an overtaking driver does not brake (m/s²).
 const TOLERATED_BRAKING_MPS2: f64 = 0.1;
 
-/// By how much a driver brakes harder than it thinks necessary [1].
-const BRAKING_MARGIN: f64 = 1.2;
+/// Lateral distance between two boxes from which they count as clear (m).
+const LATERAL_CLEARANCE_M: f64 = 0.1;
 
-/// Room sideways between two boxes that counts as clear [m].
-const CLEAR_SIDEWAYS_M: f64 = 0.1;
+/// Time before pulling out from which a driver signals (s): a choice, of the order of three flashes of an indicator.
+const SIGNALLING_TIME_S: f64 = 2.0;
 
-/// How long before pulling out a driver signals [s]: a choice, of the order of the three flashes of an indicator.
-const SIGNALS_BEFORE_S: f64 = 2.0;
+/// Duration of the change back to the original lane after an abort (s).
+const ABORT_DURATION_S: f64 = 3.0;
 
-/// Duration of a change back into the own lane [s].
-const CHANGE_BACK_S: f64 = 3.0;
+/// Required braking above which a driver steers more sharply than planned, to be clear earlier (m/s²).
+const EVASIVE_STEERING_FROM_MPS2: f64 = 3.0;
 
-/// Braking from which on a driver steers more sharply than it had meant to, to get clear sooner [m/s²].
-const SHARPER_STEERING_FROM_MPS2: f64 = 3.0;
-
-/// Largest second derivative of the quintic: 10/√3, so that a path of width w and duration T peaks at 5.77·w/T².
-const QUINTIC_PEAK: f64 = 5.773_502_691_896_258;
-
-/// What the driver is about.
+/// Phase of the overtaking manoeuvre.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Phase {
-    /// Comes up behind, or follows.
+    /// Approaches the vehicle ahead, or follows it.
     Approaching,
     /// Changes to the passing lane.
     Changing(Change),
-    /// Changes back.
-    Aborting { home: Lane },
-    /// Drives past in the passing lane.
+    /// Aborts, and changes back to the original lane.
+    Aborting { origin: Lane },
+    /// Passes the overtaken vehicle in the passing lane.
     Overtaking { overtaken: Option<usize> },
-    /// Has passed.
-    Passed(Past),
-    /// Changes back to the lane that it came from.
-    Returning { home: Lane, past: Past },
+    /// Has passed the overtaken vehicle.
+    Passed(CompletedPassing),
+    /// Changes back to the original lane.
+    Returning { origin: Lane, passing: CompletedPassing },
 }
 
-/// What is behind.
+/// A completed passing.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Past {
-    /// Since when.
-    pub(super) since: Time,
-    /// Which vehicle.
+pub(super) struct CompletedPassing {
+    /// Time at which the overtaken vehicle was passed.
+    pub(super) time: Time,
+    /// Index of the overtaken vehicle.
     pub(super) overtaken: Option<usize>,
 }
 
-/// A lane change under way.
+/// A lane change in progress.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Change {
-    home: Lane,
+    origin: Lane,
     target: Lane,
     overtaken: Option<usize>,
     start_s_m: f64,
-    way_m: f64,
-    /// Where the path begins [m], and how far it leads sideways [m].
+    /// Length of the path along the road (m).
+    length_m: f64,
+    /// Lateral position of the start of the path (m).
     start_d_m: f64,
-    sideways_m: f64,
-    /// Share of the way at which the driver is clear of the vehicle it overtakes.
+    /// Lateral distance from start to end of the path (m).
+    lateral_distance_m: f64,
+    /// Share of the length at which the driver is laterally clear of the overtaken vehicle.
     clear_at: f64,
-    sharpened: bool,
+    /// True once the driver has steered more sharply than planned.
+    evasive: bool,
 }
 
 impl Change {
-    fn way_to_clear_m(&self, s_m: f64) -> f64 {
-        self.clear_at * self.way_m - (s_m - self.start_s_m)
+    /// Returns the distance from `s_m` to the point at which the driver is laterally clear (m).
+    fn distance_to_clear_m(&self, s_m: f64) -> f64 {
+        self.clear_at * self.length_m - (s_m - self.start_s_m)
     }
 }
 
-/// A human who overtakes.
+/// A human driver who overtakes.
 #[derive(Clone, Debug)]
 pub(crate) struct OvertakerDriver {
     pub(super) settings: Overtaker,
@@ -90,7 +87,7 @@ pub(crate) struct OvertakerDriver {
     desired_mps: Option<f64>,
     perception: Option<Perception>,
     pub(super) phase: Phase,
-    emergency: Emergency,
+    emergency: EmergencyBrakingDetector,
 }
 
 impl OvertakerDriver {
@@ -101,7 +98,7 @@ impl OvertakerDriver {
             desired_mps: settings.follow.desired_speed_mps,
             perception: None,
             phase: Phase::Approaching,
-            emergency: Emergency::default(),
+            emergency: EmergencyBrakingDetector::default(),
         }
     }
 }
@@ -112,89 +109,90 @@ impl Driver for OvertakerDriver {
         let speed_mps = input.own.speed_mps;
         let desired_mps = input.desired_now_mps(*self.desired_mps.get_or_insert(speed_mps));
         let (reaction, side) = (self.settings.reaction, input.road.overtaking_side());
-        let new = || Perception::new(reaction.draw(rng), Some(side)).with_lapses(self.settings.lapse);
-        let view = self.perception.get_or_insert_with(new).look(input, rng);
-        let moment = Moment { input, view: &view, side, speed_mps, desired_mps };
+        let new = || Perception::new(reaction.draw_s(rng), Some(side)).with_lapses(self.settings.lapse);
+        let scene = self.perception.get_or_insert_with(new).observe(input, rng);
+        let step = Step { input, scene: &scene, side, speed_mps, desired_mps };
         let mut action = match self.phase {
-            Phase::Approaching => self.approach(&moment),
-            Phase::Changing(change) => self.change(&moment, change),
-            Phase::Aborting { home } => self.abort(&moment, home),
-            Phase::Overtaking { overtaken } => self.overtake(&moment, overtaken),
-            Phase::Passed(past) => self.cruise_past(&moment, past),
-            Phase::Returning { home, past } => self.change_back(&moment, home, past),
+            Phase::Approaching => self.approach(&step),
+            Phase::Changing(change) => self.continue_change(&step, change),
+            Phase::Aborting { origin } => self.abort(&step, origin),
+            Phase::Overtaking { overtaken } => self.overtake(&step, overtaken),
+            Phase::Passed(passing) => self.drive_on(&step, passing),
+            Phase::Returning { origin, passing } => self.return_to_origin(&step, origin, passing),
         };
         action.acceleration_mps2 =
             finite(action.acceleration_mps2, "acceleration of an overtaking driver", input.time)?;
-        let emergency = self.emergency.note(action.acceleration_mps2);
+        let emergency = self.emergency.detect(action.acceleration_mps2);
         action.note = action.note.or(emergency);
         Ok(action)
     }
 }
 
-/// One step's input, and what the driver makes of it.
-pub(super) struct Moment<'a> {
+/// The input of one step and how the driver perceives it.
+pub(super) struct Step<'a> {
     pub(super) input: &'a DriverInput<'a>,
-    pub(super) view: &'a View,
-    /// The side on which one overtakes.
+    pub(super) scene: &'a PerceivedScene,
+    /// Side of the passing lane.
     pub(super) side: Side,
     pub(super) speed_mps: f64,
     desired_mps: f64,
 }
 
-impl Moment<'_> {
+impl Step<'_> {
     fn indicator(&self) -> Indicator {
-        indicator(self.side)
+        Indicator::towards(self.side)
     }
 
-    /// The vehicle ahead, unless it is the overtaken one: what was seen ahead a reaction time ago may be passed by now.
-    pub(super) fn ahead_but(&self, overtaken: Option<usize>) -> Option<&Perceived> {
-        self.view.ahead.as_ref().filter(|seen| Some(seen.actor) != overtaken)
+    /// Returns the perceived vehicle ahead, unless it is the overtaken one: a vehicle observed ahead one reaction time
+    /// ago may have been passed since.
+    pub(super) fn ahead_except(&self, overtaken: Option<usize>) -> Option<&PerceivedVehicle> {
+        self.scene.ahead.as_ref().filter(|vehicle| Some(vehicle.actor) != overtaken)
     }
 
-    /// Where the path that the driver means to take is now [m].
+    /// Returns the present lateral position of the intended path (m).
     fn path_d_m(&self) -> f64 {
         self.input.own.d_m - self.input.lateral_deviation_m
     }
 
-    /// Way across the road from there to the middle of `target` [m].
-    fn sideways_m(&self, target: Lane) -> f64 {
+    /// Returns the lateral distance from the intended path to the centre of `target` (m).
+    fn lateral_distance_m(&self, target: Lane) -> f64 {
         (self.input.road.lane_centre_m(target) - self.path_d_m()).abs()
     }
 
-    /// A lane change from here to `target`, to be clear of `ahead`.
-    fn change(&self, home: Lane, target: Lane, ahead: Option<&Perceived>, duration_s: f64) -> Change {
+    /// Plans a lane change from the present position to `target`, past the vehicle `ahead`.
+    fn plan_change(&self, origin: Lane, target: Lane, ahead: Option<&PerceivedVehicle>, duration_s: f64) -> Change {
         let start_d_m = self.path_d_m();
         let mut change = Change {
-            home,
+            origin,
             target,
             overtaken: ahead.map(|ahead| ahead.actor),
             start_s_m: self.input.own.s_m,
-            way_m: self.speed_mps * duration_s,
+            length_m: self.speed_mps * duration_s,
             start_d_m,
-            sideways_m: self.sideways_m(target),
+            lateral_distance_m: self.lateral_distance_m(target),
             clear_at: 0.0,
-            sharpened: false,
+            evasive: false,
         };
         change.clear_at = ahead.map_or(0.0, |ahead| self.clear_at(&change, ahead));
         change
     }
 
-    /// Share of the way at which the driver is clear of `ahead`.
-    fn clear_at(&self, change: &Change, ahead: &Perceived) -> f64 {
-        let apart_m = 0.5 * (self.input.vehicle.dimensions.width_m + ahead.width_m) + CLEAR_SIDEWAYS_M;
-        path::along((apart_m + self.beyond_start_m(change, ahead.d_m)) / change.sideways_m)
+    /// Returns the share of the length at which the driver is laterally clear of `ahead`.
+    fn clear_at(&self, change: &Change, ahead: &PerceivedVehicle) -> f64 {
+        let apart_m = 0.5 * (self.input.vehicle.dimensions.width_m + ahead.width_m) + LATERAL_CLEARANCE_M;
+        path::longitudinal_share((apart_m + self.lateral_from_start_m(change, ahead.d_m)) / change.lateral_distance_m)
     }
 
-    /// Share of the way at which the driver's centre is over the marking between the two lanes.
+    /// Returns the share of the length at which the centre of the driver's vehicle crosses the lane marking.
     fn crossing_at(&self, change: &Change) -> f64 {
         let road = self.input.road;
-        let marking_m = 0.5 * (road.lane_centre_m(change.home) + road.lane_centre_m(change.target));
-        path::along(self.beyond_start_m(change, marking_m) / change.sideways_m)
+        let marking_m = 0.5 * (road.lane_centre_m(change.origin) + road.lane_centre_m(change.target));
+        path::longitudinal_share(self.lateral_from_start_m(change, marking_m) / change.lateral_distance_m)
     }
 
-    /// How far `d_m` is from the start of a change, towards its target, for a driver who stays as far beside its path as it
-    /// is now [m].
-    fn beyond_start_m(&self, change: &Change, d_m: f64) -> f64 {
+    /// Returns the lateral distance from the start of a change to `d_m`, positive towards its target (m), for a driver
+    /// who keeps the present deviation from the intended path.
+    fn lateral_from_start_m(&self, change: &Change, d_m: f64) -> f64 {
         let to_the_left_m = d_m - change.start_d_m - self.input.lateral_deviation_m;
         match self.side {
             Side::Left => to_the_left_m,
@@ -204,178 +202,189 @@ impl Moment<'_> {
 }
 
 impl OvertakerDriver {
-    fn approach(&mut self, moment: &Moment<'_>) -> DriverAction {
-        let home = moment.input.road.lane_at(moment.input.own.d_m);
-        let target = moment.input.road.beside(home, moment.side);
+    /// Keeps the speed and pulls out in time, if the passing lane is free; follows the vehicle ahead otherwise.
+    fn approach(&mut self, step: &Step<'_>) -> DriverAction {
+        let origin = step.input.road.lane_at(step.input.own.d_m);
+        let target = step.input.road.beside(origin, step.side);
         let (Some(ahead), Some(target), Some(lane)) =
-            (moment.view.ahead.as_ref(), target, moment.view.beside(moment.side))
+            (step.scene.ahead.as_ref(), target, step.scene.adjacent(step.side))
         else {
-            return self.cruise(moment, moment.view.ahead.as_ref());
+            return self.cruise(step, step.scene.ahead.as_ref());
         };
-        let intent = self.intent(moment, ahead.lead.speed_mps, Tolerance::TO_START);
-        let wants_to = moment.desired_mps > ahead.lead.speed_mps;
-        if !wants_to || !intent.accepts(lane) {
-            return self.cruise(moment, Some(ahead));
+        let acceptance = self.gap_acceptance(step, ahead.lead.speed_mps, Tolerance::TO_START);
+        let wants_to_overtake = step.desired_mps > ahead.lead.speed_mps;
+        if !wants_to_overtake || !acceptance.accepts(lane) {
+            return self.cruise(step, Some(ahead));
         }
-        let change = moment.change(home, target, Some(ahead), self.settings.duration_s);
-        let course = self.course(moment, ahead, change.clear_at * change.way_m);
-        let keep_mps2 = self.model.acceleration_mps2(moment.speed_mps, moment.desired_mps, None);
-        let keep_mps2 = lift_off_for_light(keep_mps2, moment.speed_mps, Some(ahead));
-        let crossing_m = moment.crossing_at(&change) * change.way_m;
+        let change = step.plan_change(origin, target, Some(ahead), self.settings.duration_s);
+        let course = self.course(step, ahead, change.clear_at * change.length_m);
+        let keep_mps2 = self.model.acceleration_mps2(step.speed_mps, step.desired_mps, None);
+        let keep_mps2 = coast_for_brake_light(keep_mps2, step.speed_mps, Some(ahead));
+        let crossing_m = step.crossing_at(&change) * change.length_m;
         let slowing_mps2 = (-keep_mps2).max(0.0);
         let pull_out = course.thw_after_s(crossing_m, slowing_mps2) <= self.settings.cut_out_thw_s
-            || course.gap_after_m(course.way_to_clear_m) <= course.least_gap_m;
+            || course.gap_after_m(course.distance_to_clear_m) <= course.min_gap_m;
         if !pull_out {
-            let soon_m = crossing_m + SIGNALS_BEFORE_S * moment.speed_mps;
-            let signals = course.thw_after_s(soon_m, slowing_mps2) <= self.settings.cut_out_thw_s;
-            let indicator = if signals { moment.indicator() } else { Indicator::Off };
+            let signalling_m = crossing_m + SIGNALLING_TIME_S * step.speed_mps;
+            let signals = course.thw_after_s(signalling_m, slowing_mps2) <= self.settings.cut_out_thw_s;
+            let indicator = if signals { step.indicator() } else { Indicator::Off };
             return DriverAction { acceleration_mps2: keep_mps2, indicator, ..DriverAction::default() };
         }
         self.phase = Phase::Changing(change);
         DriverAction {
-            acceleration_mps2: braked(keep_mps2, &course),
+            acceleration_mps2: limited_by_course_mps2(keep_mps2, &course),
             lane_change: Some(LaneChange { target, duration_s: self.settings.duration_s }),
-            indicator: moment.indicator(),
+            indicator: step.indicator(),
             note: Some(DriverNote::CutOutStarted),
         }
     }
 
-    fn change(&mut self, moment: &Moment<'_>, mut change: Change) -> DriverAction {
-        let own = moment.input.own;
-        let over_the_marking = moment.input.road.lane_at(own.d_m) == change.target;
-        let overtaken = self.overtaken(moment, change.overtaken);
+    /// Continues the lane change to the passing lane, or aborts it.
+    fn continue_change(&mut self, step: &Step<'_>, mut change: Change) -> DriverAction {
+        let own = step.input.own;
+        let in_target_lane = step.input.road.lane_at(own.d_m) == change.target;
+        let overtaken = self.overtaken(step, change.overtaken);
         if let Some(ahead) = overtaken {
-            change.clear_at = moment.clear_at(&change, ahead);
+            change.clear_at = step.clear_at(&change, ahead);
         }
-        let way_to_clear_m = change.way_to_clear_m(own.s_m);
-        if over_the_marking && way_to_clear_m <= 0.0 {
+        let distance_to_clear_m = change.distance_to_clear_m(own.s_m);
+        if in_target_lane && distance_to_clear_m <= 0.0 {
             self.phase = Phase::Overtaking { overtaken: change.overtaken };
-            return self.overtake(moment, change.overtaken);
+            return self.overtake(step, change.overtaken);
         }
-        if !over_the_marking && self.must_abort(moment, overtaken) {
-            self.phase = Phase::Aborting { home: change.home };
-            let back = LaneChange { target: change.home, duration_s: CHANGE_BACK_S };
-            let following = self.cruise(moment, moment.view.ahead.as_ref());
+        if !in_target_lane && self.must_abort(step, overtaken) {
+            self.phase = Phase::Aborting { origin: change.origin };
+            let back = LaneChange { target: change.origin, duration_s: ABORT_DURATION_S };
+            let following = self.cruise(step, step.scene.ahead.as_ref());
             return DriverAction { lane_change: Some(back), note: Some(DriverNote::CutOutAborted), ..following };
         }
-        let beside = self.follow_in_target(moment, change.target, overtaken);
-        let wanted = lift_off_for_light(beside, moment.speed_mps, overtaken.filter(|_| way_to_clear_m > 0.0));
+        let following_mps2 = self.follow_in_target(step, change.target, overtaken);
+        let requested_mps2 =
+            coast_for_brake_light(following_mps2, step.speed_mps, overtaken.filter(|_| distance_to_clear_m > 0.0));
         let mut action =
-            DriverAction { acceleration_mps2: wanted, indicator: moment.indicator(), ..DriverAction::default() };
+            DriverAction { acceleration_mps2: requested_mps2, indicator: step.indicator(), ..DriverAction::default() };
         if let Some(ahead) = overtaken {
-            let course = self.course(moment, ahead, way_to_clear_m);
-            if !change.sharpened && course.needed_braking_mps2() > SHARPER_STEERING_FROM_MPS2 {
-                action.lane_change = sharpen(moment, &mut change, ahead, &self.settings);
+            let course = self.course(step, ahead, distance_to_clear_m);
+            if !change.evasive && course.required_braking_mps2() > EVASIVE_STEERING_FROM_MPS2 {
+                action.lane_change = evade(step, &mut change, ahead, &self.settings);
             }
-            action.acceleration_mps2 = braked(wanted, &self.course(moment, ahead, change.way_to_clear_m(own.s_m)));
+            action.acceleration_mps2 =
+                limited_by_course_mps2(requested_mps2, &self.course(step, ahead, change.distance_to_clear_m(own.s_m)));
         }
         self.phase = Phase::Changing(change);
         action
     }
 
-    fn abort(&mut self, moment: &Moment<'_>, home: Lane) -> DriverAction {
-        if moment.input.changing_to != Some(home) {
+    /// Follows the vehicle ahead until the driver is back in the original lane.
+    fn abort(&mut self, step: &Step<'_>, origin: Lane) -> DriverAction {
+        if step.input.changing_to != Some(origin) {
             self.phase = Phase::Approaching;
         }
-        self.cruise(moment, moment.view.ahead.as_ref())
+        self.cruise(step, step.scene.ahead.as_ref())
     }
 
-    fn overtake(&mut self, moment: &Moment<'_>, overtaken: Option<usize>) -> DriverAction {
-        let mut action = self.cruise(moment, moment.ahead_but(overtaken));
-        if moment.input.changing_to.is_some() {
-            action.indicator = moment.indicator();
+    /// Drives past the overtaken vehicle in the passing lane.
+    fn overtake(&mut self, step: &Step<'_>, overtaken: Option<usize>) -> DriverAction {
+        let mut action = self.cruise(step, step.ahead_except(overtaken));
+        if step.input.changing_to.is_some() {
+            action.indicator = step.indicator();
         }
-        if has_passed(moment, overtaken) {
-            self.phase = Phase::Passed(Past { since: moment.input.time, overtaken });
-            self.look_to(opposite(moment.side));
+        if has_passed(step, overtaken) {
+            self.phase = Phase::Passed(CompletedPassing { time: step.input.time, overtaken });
+            self.observe_side(step.side.opposite());
             action.note = Some(DriverNote::Passed);
         }
         action
     }
 
-    /// Looks to a side from now on.
-    pub(super) fn look_to(&mut self, side: Side) {
-        if let Some(senses) = &mut self.perception {
-            senses.look_to(side);
+    /// Selects the side whose adjacent lane the driver observes from now on.
+    pub(super) fn observe_side(&mut self, side: Side) {
+        if let Some(perception) = &mut self.perception {
+            perception.observe_side(side);
         }
     }
 
-    /// Drives on, or follows `ahead` by Wiedemann 99.
-    pub(super) fn cruise(&mut self, moment: &Moment<'_>, ahead: Option<&Perceived>) -> DriverAction {
-        let lead = ahead.map(|seen| &seen.lead);
-        let wanted = self.model.acceleration_mps2(moment.speed_mps, moment.desired_mps, lead);
-        DriverAction { acceleration_mps2: brake_for_light(wanted, moment.speed_mps, ahead), ..DriverAction::default() }
+    /// Drives freely, or follows `ahead` by the Wiedemann 99 model.
+    pub(super) fn cruise(&mut self, step: &Step<'_>, ahead: Option<&PerceivedVehicle>) -> DriverAction {
+        let lead = ahead.map(|vehicle| &vehicle.lead);
+        let requested_mps2 = self.model.acceleration_mps2(step.speed_mps, step.desired_mps, lead);
+        let acceleration_mps2 = brake_for_brake_light(requested_mps2, step.speed_mps, ahead);
+        DriverAction { acceleration_mps2, ..DriverAction::default() }
     }
 
-    /// The acceleration that suits the vehicle ahead in the lane that the driver is changing to.
-    fn follow_in_target(&mut self, moment: &Moment<'_>, target: Lane, overtaken: Option<&Perceived>) -> f64 {
-        let overtaken = overtaken.map(|seen| seen.actor);
-        let seen = if moment.view.lane == target {
-            moment.view.ahead.as_ref().filter(|seen| Some(seen.actor) != overtaken)
+    /// Returns the acceleration behind the lead vehicle in the target lane (m/s²).
+    fn follow_in_target(&mut self, step: &Step<'_>, target: Lane, overtaken: Option<&PerceivedVehicle>) -> f64 {
+        let overtaken = overtaken.map(|vehicle| vehicle.actor);
+        let vehicle = if step.scene.lane == target {
+            step.scene.ahead.as_ref().filter(|vehicle| Some(vehicle.actor) != overtaken)
         } else {
-            moment.view.beside(moment.side).and_then(|lane| lane.lead.as_ref())
+            step.scene.adjacent(step.side).and_then(|lane| lane.lead.as_ref())
         };
-        self.model.acceleration_mps2(moment.speed_mps, moment.desired_mps, seen.map(|seen| &seen.lead))
+        self.model.acceleration_mps2(step.speed_mps, step.desired_mps, vehicle.map(|vehicle| &vehicle.lead))
     }
 
-    fn must_abort(&self, moment: &Moment<'_>, overtaken: Option<&Perceived>) -> bool {
-        let Some((ahead, lane)) = overtaken.zip(moment.view.beside(moment.side)) else { return false };
-        !self.intent(moment, ahead.lead.speed_mps, Tolerance::TO_GO_ON).accepts(lane)
+    /// Returns true if the driver is no longer willing to change to the passing lane.
+    fn must_abort(&self, step: &Step<'_>, overtaken: Option<&PerceivedVehicle>) -> bool {
+        let Some((ahead, lane)) = overtaken.zip(step.scene.adjacent(step.side)) else { return false };
+        !self.gap_acceptance(step, ahead.lead.speed_mps, Tolerance::TO_CONTINUE).accepts(lane)
     }
 
-    /// The vehicle that is being overtaken, while it is the nearest ahead.
-    fn overtaken<'a>(&self, moment: &Moment<'a>, actor: Option<usize>) -> Option<&'a Perceived> {
-        moment.view.ahead.as_ref().filter(|seen| Some(seen.actor) == actor)
+    /// Returns the vehicle that is being overtaken while it is the nearest one ahead.
+    fn overtaken<'a>(&self, step: &Step<'a>, actor: Option<usize>) -> Option<&'a PerceivedVehicle> {
+        step.scene.ahead.as_ref().filter(|vehicle| Some(vehicle.actor) == actor)
     }
 
-    pub(super) fn intent(&self, moment: &Moment<'_>, slow_mps: f64, tolerance: Tolerance) -> Intent {
-        Intent {
-            speed_mps: moment.speed_mps,
-            slow_mps,
-            safe_gap_m: self.settings.follow.safe_gap_m(moment.speed_mps),
+    /// Returns the criterion by which the driver accepts an adjacent lane.
+    pub(super) fn gap_acceptance(&self, step: &Step<'_>, overtaken_mps: f64, tolerance: Tolerance) -> GapAcceptance {
+        GapAcceptance {
+            speed_mps: step.speed_mps,
+            overtaken_mps,
+            safe_gap_m: self.settings.follow.safe_gap_m(step.speed_mps),
             tolerance,
         }
     }
 
-    fn course(&self, moment: &Moment<'_>, ahead: &Perceived, way_to_clear_m: f64) -> Course {
-        let least_gap_m = self.settings.follow.safe_gap_m(ahead.lead.speed_mps);
-        Course { speed_mps: moment.speed_mps, lead: ahead.lead, way_to_clear_m, least_gap_m }
+    /// Returns the present course relative to the vehicle `ahead`.
+    fn course(&self, step: &Step<'_>, ahead: &PerceivedVehicle, distance_to_clear_m: f64) -> Course {
+        let min_gap_m = self.settings.follow.safe_gap_m(ahead.lead.speed_mps);
+        Course { speed_mps: step.speed_mps, lead: ahead.lead, distance_to_clear_m, min_gap_m }
     }
 }
 
-/// Steers as sharply as a human does in need, where that is sharper than planned.
-fn sharpen(moment: &Moment<'_>, change: &mut Change, ahead: &Perceived, settings: &Overtaker) -> Option<LaneChange> {
-    let duration_s = (QUINTIC_PEAK * moment.sideways_m(change.target) / settings.evasive_lateral_mps2).sqrt();
-    // Written so that no lateral acceleration at all, for which the duration is infinite, means no sharper steering.
+/// Replaces `change` by one with evasive steering and returns its command, or `None` if it is not sharper than planned.
+fn evade(step: &Step<'_>, change: &mut Change, ahead: &PerceivedVehicle, settings: &Overtaker) -> Option<LaneChange> {
+    let duration_s =
+        (MINIMUM_JERK_PEAK * step.lateral_distance_m(change.target) / settings.evasive_lateral_mps2).sqrt();
+    // Written so that a lateral acceleration of zero, for which the duration is infinite, means no sharper steering.
     if !(duration_s < settings.duration_s) {
         return None;
     }
-    let sharper = Change { sharpened: true, ..moment.change(change.home, change.target, Some(ahead), duration_s) };
-    let s_m = moment.input.own.s_m;
-    if sharper.way_to_clear_m(s_m) >= change.way_to_clear_m(s_m) {
+    let sharper = Change { evasive: true, ..step.plan_change(change.origin, change.target, Some(ahead), duration_s) };
+    let s_m = step.input.own.s_m;
+    if sharper.distance_to_clear_m(s_m) >= change.distance_to_clear_m(s_m) {
         return None;
     }
     *change = sharper;
     Some(LaneChange { target: change.target, duration_s })
 }
 
-/// `wanted`, or the braking that the course needs.
-fn braked(wanted_mps2: f64, course: &Course) -> f64 {
-    let needed = course.needed_braking_mps2();
-    if needed > TOLERATED_BRAKING_MPS2 {
-        wanted_mps2.min(-(BRAKING_MARGIN * needed).min(HARDEST_BRAKING_MPS2))
+/// Returns `requested_mps2`, lowered to the braking that the course requires (with a margin) if it exceeds that.
+fn limited_by_course_mps2(requested_mps2: f64, course: &Course) -> f64 {
+    let required_mps2 = course.required_braking_mps2();
+    if required_mps2 > TOLERATED_BRAKING_MPS2 {
+        requested_mps2.min(-(BRAKING_MARGIN * required_mps2).min(HARDEST_BRAKING_MPS2))
     } else {
-        wanted_mps2
+        requested_mps2
     }
 }
 
-/// True once the overtaken vehicle is wholly behind, in the lane beside.
-fn has_passed(moment: &Moment<'_>, overtaken: Option<usize>) -> bool {
-    let near = moment.input.neighbours;
-    let beside = match moment.side {
+/// Returns true once the overtaken vehicle is entirely behind in the adjacent lane.
+fn has_passed(step: &Step<'_>, overtaken: Option<usize>) -> bool {
+    let near = step.input.neighbours;
+    let adjacent = match step.side {
         Side::Left => near.right.as_ref(),
         Side::Right => near.left.as_ref(),
     };
-    let follower = beside.and_then(|lane| lane.follower.as_ref());
+    let follower = adjacent.and_then(|lane| lane.follower.as_ref());
     overtaken.is_some() && follower.map(|follower| follower.actor) == overtaken
 }

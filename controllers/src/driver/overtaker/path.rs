@@ -1,25 +1,19 @@
-//! The shape of a lane change: the quintic with no speed and acceleration sideways at either end.
-//!
-//! y(u) = 10u³ − 15u⁴ + 6u⁵ of the way sideways at the share u of the way along the road.
+//! Shape of a lane change: the minimum-jerk path, whose lateral speed and acceleration are zero at both ends.
 
-/// Bisections when the shape is inverted: 2⁻³⁰ of the path is a micrometre.
+use closecall_traffic::minimum_jerk;
+
+/// Number of bisections to invert the shape: 2⁻³⁰ of the path is less than a micrometre.
 const BISECTIONS: u32 = 30;
 
-/// Share of the way sideways at the share `along` of the way along.
-pub(super) fn sideways(along: f64) -> f64 {
-    let u = along.clamp(0.0, 1.0);
-    u * u * u * (10.0 + u * (6.0 * u - 15.0))
-}
-
-/// Share of the way along at which the share `across` of the way sideways is reached.
-pub(super) fn along(across: f64) -> f64 {
-    if !(across > 0.0) {
+/// Returns the longitudinal share at which the lateral share `lateral` is reached, 0 for NaN.
+pub(super) fn longitudinal_share(lateral: f64) -> f64 {
+    if !(lateral > 0.0) {
         return 0.0;
     }
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..BISECTIONS {
         let middle = 0.5 * (low + high);
-        if sideways(middle) < across { low = middle } else { high = middle }
+        if minimum_jerk(middle) < lateral { low = middle } else { high = middle }
     }
     0.5 * (low + high)
 }
@@ -29,17 +23,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn half_way_along_is_half_way_across() {
-        assert_eq!(sideways(0.5), 0.5);
-        assert!((along(0.5) - 0.5).abs() < 1e-8);
+    fn half_of_the_longitudinal_distance_is_half_of_the_lateral_one() {
+        assert_eq!(minimum_jerk(0.5), 0.5);
+        assert!((longitudinal_share(0.5) - 0.5).abs() < 1e-8);
     }
 
     #[test]
-    fn the_inverse_is_one() {
+    fn the_two_shares_are_inverse_functions() {
         for step in 0..=20 {
-            let across = f64::from(step) / 20.0;
-            assert!((sideways(along(across)) - across).abs() < 1e-8);
+            let lateral = f64::from(step) / 20.0;
+            assert!((minimum_jerk(longitudinal_share(lateral)) - lateral).abs() < 1e-8);
         }
-        assert_eq!(along(f64::NAN), 0.0);
+        assert_eq!(longitudinal_share(f64::NAN), 0.0);
     }
 }

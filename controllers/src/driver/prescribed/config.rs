@@ -1,4 +1,4 @@
-//! What a prescribed driver is given by the scenario.
+//! Configuration of a prescribed driver.
 
 use closecall_traffic::{Check, ConfigError, Lane, Num, Parameters, Problem, Range, Side};
 use schemars::JsonSchema;
@@ -6,47 +6,49 @@ use serde::{Deserialize, Serialize};
 
 use super::driver::PrescribedDriver;
 use super::lane_change::{PrescribedLaneChange, PrescribedLaneChangeConfig, check_lane_changes};
-use super::profile::{SpeedProfile, Step};
+use super::profile::{AccelerationStep, SpeedProfile};
 
-/// Latest time of a profile [s].
-pub(super) const LATEST_S: f64 = 1e6;
+/// Latest time in a profile (s).
+pub(super) const MAX_TIME_S: f64 = 1e6;
 
-/// Fastest that a profile goes [m/s].
-const FASTEST_MPS: f64 = 100.0;
+/// Highest speed in a profile (m/s).
+const MAX_SPEED_MPS: f64 = 100.0;
 
-/// A profile as a scenario file describes it: exactly one of the first three keys, and lane changes where there are any.
+/// A prescribed driver as a scenario file describes it: exactly one of the first three keys, and optional lane changes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct PrescribedConfig {
-    /// Pairs of time [s] and speed [m/s], times rising; linear in between, constant before and after.
+    /// Pairs of time (s) and speed (m/s), with increasing times. The speed is linear in between, constant before and
+    /// after.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub profile: Option<Vec<[Num; 2]>>,
-    /// Pairs of time [s] and acceleration [m/s²], times rising; each holds until the next, and before the first there is
-    /// none. From the speed at the start; braking ends at standstill, accelerating at 100 m/s.
+    /// Pairs of time (s) and acceleration (m/s²), with increasing times. Each acceleration holds until the next; before
+    /// the first it is zero. The driver starts at the initial speed; braking ends at standstill, accelerating at
+    /// 100 m/s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub acceleration_profile: Option<Vec<[Num; 2]>>,
-    /// The speeds of a recorded vehicle.
+    /// The speeds of a vehicle in recorded traffic.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub recorded: Option<RecordedConfig>,
-    /// Changes to the lane beside, each at a time, the next no earlier than the one before has ended.
+    /// Changes to an adjacent lane at given times. Each begins no earlier than the one before ends.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub lane_changes: Vec<PrescribedLaneChangeConfig>,
 }
 
-/// A track of a recording, which is read together with the scenario file and takes the place of `profile` in its text.
+/// A track of a trajectory file, in place of `profile`. It is read together with the scenario file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct RecordedConfig {
-    /// The recording's file, from the scenario file's folder.
+    /// Path of the trajectory file, relative to the folder of the scenario file.
     pub file: String,
-    /// The number of the track.
+    /// Number of the track in that file.
     pub track_id: u64,
-    /// The time of the run at which the track begins [s]; 0 where absent.
+    /// Time in the run at which the track begins (s). Default: 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub from_s: Option<f64>,
 }
 
-/// A checked profile: at least one point, times rising; and the lane changes on the way.
+/// A checked prescribed driver: a profile with at least one point and increasing times, and lane changes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Prescribed {
     points: Points,
@@ -56,11 +58,11 @@ pub struct Prescribed {
 #[derive(Clone, Debug, PartialEq)]
 enum Points {
     Speeds(SpeedProfile),
-    Accelerations(Vec<Step>),
+    Accelerations(Vec<AccelerationStep>),
 }
 
 impl PrescribedConfig {
-    /// A profile of times [s] and speeds [m/s].
+    /// Creates a profile from pairs of time (s) and speed (m/s).
     pub fn speeds(points: &[[f64; 2]]) -> Self {
         let profile = points.iter().map(|pair| pair.map(Num::Fixed)).collect();
         Self { profile: Some(profile), ..Self::default() }
@@ -87,11 +89,14 @@ impl PrescribedConfig {
             }
             (None, Some(pairs), None) => {
                 let steps = check_pairs(pairs, "acceleration-profile", &ACCELERATION, parameters)?;
-                let steps = steps.into_iter().map(|(from_s, rate_mps2)| Step { from_s, rate_mps2 }).collect();
+                let steps = steps
+                    .into_iter()
+                    .map(|(from_s, acceleration_mps2)| AccelerationStep { from_s, acceleration_mps2 })
+                    .collect();
                 Ok(Points::Accelerations(steps))
             }
             (None, None, Some(_)) => {
-                let needed = "the recording's speeds, which are read together with a scenario file";
+                let needed = "the speeds of the recorded track, which are read together with a scenario file";
                 Err(ConfigError::new("recorded", Problem::Missing { needed }))
             }
             (None, None, None) => {
@@ -112,7 +117,7 @@ impl PrescribedConfig {
     }
 }
 
-/// The second value of each pair.
+/// Key, valid range and requirement of the second value in each pair.
 struct Quantity {
     key: &'static str,
     range: Range,
@@ -121,7 +126,7 @@ struct Quantity {
 
 const SPEED: Quantity = Quantity {
     key: "speed-mps",
-    range: Range::closed(0.0, FASTEST_MPS),
+    range: Range::closed(0.0, MAX_SPEED_MPS),
     needed: "at least one pair of time and speed",
 };
 
@@ -141,53 +146,53 @@ fn check_pairs(
         return Err(ConfigError::new(key, Problem::Missing { needed: quantity.needed }));
     }
     let mut points: Vec<(f64, f64)> = Vec::with_capacity(pairs.len());
-    for (place, [time, value]) in pairs.iter().enumerate() {
-        let here = |error: ConfigError| error.within_index(place).within(key);
+    for (index, [time, value]) in pairs.iter().enumerate() {
+        let locate = |error: ConfigError| error.within_index(index).within(key);
         let earliest = match points.last() {
-            Some((last, _)) => Range::above(*last, LATEST_S),
-            None => Range::closed(0.0, LATEST_S),
+            Some((last, _)) => Range::above(*last, MAX_TIME_S),
+            None => Range::closed(0.0, MAX_TIME_S),
         };
-        let time_s = parameters.number(time, "time-s", earliest).map_err(here)?;
-        points.push((time_s, parameters.number(value, quantity.key, quantity.range).map_err(here)?));
+        let time_s = parameters.number(time, "time-s", earliest).map_err(locate)?;
+        points.push((time_s, parameters.number(value, quantity.key, quantity.range).map_err(locate)?));
     }
     Ok(points)
 }
 
 impl Prescribed {
-    /// The profile of one who drives at `start_mps` at time zero.
+    /// Returns the speeds of a vehicle that drives at `start_mps` at time zero.
     pub(super) fn speeds_from(&self, start_mps: f64) -> SpeedProfile {
         match &self.points {
             Points::Speeds(profile) => profile.clone(),
-            Points::Accelerations(steps) => SpeedProfile::integrated(start_mps, steps, FASTEST_MPS),
+            Points::Accelerations(steps) => SpeedProfile::integrated(start_mps, steps, MAX_SPEED_MPS),
         }
     }
 
-    /// Checks that there is a lane for each lane change of a vehicle that starts in lane `start` of `lanes`.
+    /// Checks that a target lane exists for each lane change of a vehicle that starts in lane `start` of `lanes` lanes.
     ///
     /// # Errors
-    /// Names the lane change that would leave the road.
+    /// Returns a [`ConfigError`] that names the first lane change that would leave the road.
     pub fn check_lanes(&self, start: Lane, lanes: u8) -> Result<(), ConfigError> {
         let mut lane = start.0;
-        for (place, change) in self.lane_changes.iter().enumerate() {
-            let beside = match change.to {
+        for (index, change) in self.lane_changes.iter().enumerate() {
+            let target = match change.to {
                 Side::Left => lane.checked_sub(1).filter(|lane| *lane >= 1),
                 Side::Right => lane.checked_add(1).filter(|lane| *lane <= lanes),
             };
             let rule = || format!("lane {lane} of {lanes} has no lane on that side, counted from 1 at the left");
             let off_road = || ConfigError::new("to", Problem::Contradiction { other: "start", rule: rule() });
-            lane = beside.ok_or_else(|| off_road().within_index(place).within("lane-changes"))?;
+            lane = target.ok_or_else(|| off_road().within_index(index).within("lane-changes"))?;
         }
         Ok(())
     }
 
-    /// The same in the mirrored world, in which left is right.
+    /// Returns the same driver with left and right exchanged.
     #[must_use]
     pub(crate) fn mirrored(&self) -> Self {
         let lane_changes = self.lane_changes.iter().map(PrescribedLaneChange::mirrored).collect();
         Self { lane_changes, ..self.clone() }
     }
 
-    /// A driver for one run.
+    /// Creates a driver for one run.
     pub(crate) fn driver(&self) -> PrescribedDriver {
         PrescribedDriver::new(self.clone())
     }
@@ -202,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn times_that_do_not_rise_are_refused_with_their_place() {
+    fn times_that_do_not_increase_are_refused_with_their_index() {
         let none = Parameters::default();
         let twice = [[0.0, 3.0], [0.0, 2.0]];
         let error = PrescribedConfig::speeds(&twice).check(&none).unwrap_err();
@@ -226,8 +231,9 @@ mod tests {
         assert_eq!(path(PrescribedConfig { profile: None, recorded: recorded.clone(), ..both.clone() }), "recorded");
         assert_eq!(path(PrescribedConfig { acceleration_profile: None, recorded, ..both }), "recorded");
     }
+
     #[test]
-    fn lane_changes_stay_on_the_road_and_follow_each_other() {
+    fn lane_changes_stay_on_the_road_and_do_not_overlap() {
         let none = Parameters::default();
         let change = |at_s: f64, to| PrescribedLaneChangeConfig { at_s: at_s.into(), to, duration_s: 5.0.into() };
         let config = |lane_changes| PrescribedConfig { lane_changes, ..PrescribedConfig::speeds(&[[0.0, 30.0]]) };

@@ -1,27 +1,27 @@
-//! Lane changes at given times.
+//! Lane changes at prescribed times.
 
 use closecall_traffic::{ConfigError, Num, Parameters, Range, Side, Time};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::config::LATEST_S;
+use super::config::MAX_TIME_S;
 
-/// How long a lane change may take [s].
+/// Valid durations of a lane change (s).
 const DURATION_S: Range = Range::closed(1.5, 20.0);
 
-/// A lane change as a scenario file describes it.
+/// A prescribed lane change as a scenario file describes it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct PrescribedLaneChangeConfig {
-    /// When it begins [s].
+    /// Time at which the lane change begins (s).
     pub at_s: Num,
-    /// To which side.
+    /// Side of the target lane.
     pub to: Side,
-    /// Time that the whole lane change takes at the speed at which it begins [s]: 1.5 to 20.
+    /// Duration of the whole lane change at the speed at which it begins (s): 1.5 to 20.
     pub duration_s: Num,
 }
 
-/// A checked lane change.
+/// A checked prescribed lane change.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PrescribedLaneChange {
     pub(super) at: Time,
@@ -30,31 +30,28 @@ pub(super) struct PrescribedLaneChange {
 }
 
 impl PrescribedLaneChange {
+    /// Returns the lane change to the opposite side.
     pub(super) fn mirrored(&self) -> Self {
-        let to = match self.to {
-            Side::Left => Side::Right,
-            Side::Right => Side::Left,
-        };
-        Self { to, ..*self }
+        Self { to: self.to.opposite(), ..*self }
     }
 }
 
-/// Checks lane changes one after the other, each from the end of the one before on.
+/// Checks the lane changes in their order. Each must begin after the end of the one before.
 pub(super) fn check_lane_changes(
     configs: &[PrescribedLaneChangeConfig],
     parameters: &Parameters,
 ) -> Result<Vec<PrescribedLaneChange>, ConfigError> {
-    let mut ends_s = 0.0;
+    let mut previous_end_s = 0.0;
     let mut checked = Vec::with_capacity(configs.len());
-    for (place, config) in configs.iter().enumerate() {
+    for (index, config) in configs.iter().enumerate() {
         let number = |num, key, range| {
             parameters
                 .number(num, key, range)
-                .map_err(|error: ConfigError| error.within_index(place).within("lane-changes"))
+                .map_err(|error: ConfigError| error.within_index(index).within("lane-changes"))
         };
-        let at_s = number(&config.at_s, "at-s", Range::closed(ends_s, LATEST_S))?;
+        let at_s = number(&config.at_s, "at-s", Range::closed(previous_end_s, MAX_TIME_S))?;
         let duration_s = number(&config.duration_s, "duration-s", DURATION_S)?;
-        ends_s = at_s + duration_s;
+        previous_end_s = at_s + duration_s;
         checked.push(PrescribedLaneChange { at: Time::from_s(at_s), to: config.to, duration_s });
     }
     Ok(checked)

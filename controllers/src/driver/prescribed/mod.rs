@@ -1,13 +1,13 @@
-//! A driver that follows a profile, whatever the others do.
+//! A driver that follows a prescribed profile and does not react to other vehicles.
 //!
 //! ```text
-//!   profile               times and speeds, linear in between ─────────────┐
-//!   acceleration-profile  times and accelerations, each held ─ integrated ─┼─▶ speed wanted, and its slope ─▶ acceleration
-//!   recorded              a track of a recording's file ── read with the ──┘
-//!                                                          scenario file
+//!   profile               times and speeds, linear in between ───────────────┐
+//!   acceleration-profile  times and accelerations, each held ── integrated ──┼─▶ speed and slope ─▶ acceleration
+//!   recorded              a track of a trajectory file ── read together ─────┘
+//!                                                         with the scenario file
 //! ```
 //!
-//! It changes lanes where `lane-changes` says so, on the smooth path that all vehicles take.
+//! The driver changes lanes at the times in `lane-changes`, on the same smooth path as all vehicles.
 
 mod config;
 mod driver;

@@ -1,44 +1,45 @@
-//! Speed over time: linear between points, constant before the first and after the last.
+//! Speed as a function of time: linear between points, constant before the first and after the last.
 
-/// An acceleration that holds from a time on.
+/// An acceleration that holds from a given time on.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Step {
+pub(super) struct AccelerationStep {
     pub(super) from_s: f64,
-    pub(super) rate_mps2: f64,
+    pub(super) acceleration_mps2: f64,
 }
 
-/// At least one point, times not falling.
+/// A speed profile: at least one point, with times that do not decrease.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct SpeedProfile {
-    /// Times [s] and speeds [m/s].
+    /// Times (s) and speeds (m/s).
     points: Vec<(f64, f64)>,
 }
 
 impl SpeedProfile {
-    /// A profile through `points`, of which there has to be one.
+    /// Creates a profile through `points`, which must not be empty.
     pub(super) fn new(points: Vec<(f64, f64)>) -> Self {
-        debug_assert!(!points.is_empty(), "a profile has a point");
+        debug_assert!(!points.is_empty(), "a profile has at least one point");
         Self { points }
     }
 
-    /// The speeds of one who starts at `start_mps` and accelerates step by step, between standstill and `fastest_mps`.
-    pub(super) fn integrated(start_mps: f64, steps: &[Step], fastest_mps: f64) -> Self {
+    /// Integrates the accelerations `steps` from the speed `start_mps`, limited to speeds from 0 to `max_mps`.
+    pub(super) fn integrated(start_mps: f64, steps: &[AccelerationStep], max_mps: f64) -> Self {
         let mut points = vec![(0.0, start_mps)];
-        for (place, step) in steps.iter().enumerate() {
+        for (index, step) in steps.iter().enumerate() {
             let &(time_s, speed_mps) = points.last().unwrap_or(&(0.0, start_mps));
             if step.from_s > time_s {
                 points.push((step.from_s, speed_mps));
             }
-            let limit_mps = if step.rate_mps2 < 0.0 { 0.0 } else { fastest_mps.max(speed_mps) };
-            let until_limit_s = if step.rate_mps2 == 0.0 { 0.0 } else { (limit_mps - speed_mps) / step.rate_mps2 };
-            let next_s = steps.get(place + 1).map_or(f64::INFINITY, |next| next.from_s);
-            let lasts_s = until_limit_s.min(next_s - step.from_s);
-            points.push((step.from_s + lasts_s, speed_mps + step.rate_mps2 * lasts_s));
+            let limit_mps = if step.acceleration_mps2 < 0.0 { 0.0 } else { max_mps.max(speed_mps) };
+            let until_limit_s =
+                if step.acceleration_mps2 == 0.0 { 0.0 } else { (limit_mps - speed_mps) / step.acceleration_mps2 };
+            let next_s = steps.get(index + 1).map_or(f64::INFINITY, |next| next.from_s);
+            let duration_s = until_limit_s.min(next_s - step.from_s);
+            points.push((step.from_s + duration_s, speed_mps + step.acceleration_mps2 * duration_s));
         }
         Self { points }
     }
 
-    /// Speed [m/s] and its slope [m/s²] at `time_s`.
+    /// Returns the speed (m/s) and its slope (m/s²) at `time_s`.
     pub(super) fn at(&self, time_s: f64) -> (f64, f64) {
         let after = self.points.partition_point(|(time, _)| *time <= time_s);
         match (after.checked_sub(1).map(|before| self.points[before]), self.points.get(after)) {
@@ -47,7 +48,7 @@ impl SpeedProfile {
                 (v0 + slope * (time_s - t0), slope)
             }
             (Some((_, speed)), None) | (None, Some(&(_, speed))) => (speed, 0.0),
-            (None, None) => unreachable!("a profile has a point"),
+            (None, None) => unreachable!("a profile has at least one point"),
         }
     }
 }
@@ -57,7 +58,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn speeds_are_linear_in_between_and_constant_outside() {
+    fn speeds_are_linear_between_points_and_constant_outside() {
         let profile = SpeedProfile::new(vec![(1.0, 30.0), (3.0, 20.0)]);
         assert_eq!(profile.at(0.0), (30.0, 0.0));
         assert_eq!(profile.at(2.0), (25.0, -5.0));
@@ -65,8 +66,8 @@ mod tests {
     }
 
     #[test]
-    fn accelerations_add_up_and_end_at_standstill() {
-        let step = |from_s, rate_mps2| Step { from_s, rate_mps2 };
+    fn accelerations_are_integrated_between_standstill_and_the_maximum_speed() {
+        let step = |from_s, acceleration_mps2| AccelerationStep { from_s, acceleration_mps2 };
         let steps = [step(1.0, -5.0), step(3.0, 0.0), step(4.0, 2.5), step(6.0, -10.0), step(20.0, 1.0)];
         let profile = SpeedProfile::integrated(30.0, &steps, 22.0);
         let expected =

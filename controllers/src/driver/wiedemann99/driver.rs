@@ -1,54 +1,55 @@
-//! The model in the loop: perception before it, the loop's types around it.
+//! The Wiedemann 99 driver: adapts perception and model to the simulation loop.
 
 use closecall_traffic::Stream;
 
 use super::{Wiedemann99, Wiedemann99Model};
-use crate::driver::perception::{Perceived, Perception};
+use crate::driver::perception::{PerceivedVehicle, Perception};
 use crate::driver::{
-    Driver, DriverAction, DriverError, DriverInput, DriverNote, HARDEST_BRAKING_MPS2, LIFT_OFF_MPS2, Lead,
+    COASTING_DECELERATION_MPS2, Driver, DriverAction, DriverError, DriverInput, DriverNote, HARDEST_BRAKING_MPS2, Lead,
     check_finite, finite,
 };
 
-/// Share of the hardest braking from which on a driver brakes in an emergency.
-const EMERGENCY_SHARE: f64 = 0.75;
+/// Share of the hardest braking above which braking counts as emergency braking.
+const EMERGENCY_BRAKING_SHARE: f64 = 0.75;
 
-/// Time headway within which a brake light ahead concerns a driver [s].
-const LIGHT_CONCERNS_WITHIN_S: f64 = 3.0;
+/// Time headway below which a driver releases the accelerator because of a brake light ahead (s).
+const COASTING_FOR_LIGHT_THW_S: f64 = 3.0;
 
-/// Time headway within which a driver brakes for a brake light ahead instead of waiting for what comes of it [s]: up to
-/// about that the headways of car-following are observed (Fancher et al., *Intelligent Cruise Control Field Operational
-/// Test*, DOT HS 808 849, 1998).
-const LIGHT_IS_FOLLOWED_WITHIN_S: f64 = 2.0;
+/// Time headway below which a driver brakes because of a brake light ahead, instead of only releasing the accelerator
+/// (s): about the upper end of the headways observed in car-following (Fancher et al., *Intelligent Cruise Control
+/// Field Operational Test*, DOT HS 808 849, 1998).
+const BRAKING_FOR_LIGHT_THW_S: f64 = 2.0;
 
-/// From this speed difference on the vehicle ahead pulls away, whatever its brake light shows [m/s].
-const PULLS_AWAY_MPS: f64 = 2.0;
+/// Speed difference above which the vehicle ahead pulls away, so that its brake light does not matter (m/s).
+const PULLING_AWAY_MPS: f64 = 2.0;
 
-/// A human who follows by Wiedemann 99 and stays in its lane.
+/// A human driver who follows the lead vehicle by the Wiedemann 99 model and stays in the lane.
 #[derive(Clone, Debug)]
 pub struct Wiedemann99Driver {
     settings: Wiedemann99,
     model: Wiedemann99Model,
     desired_mps: Option<f64>,
     perception: Option<Perception>,
-    emergency: Emergency,
+    emergency: EmergencyBrakingDetector,
 }
 
 impl Wiedemann99Driver {
-    /// A driver for one run.
+    /// Creates a driver for one run.
     pub fn new(settings: Wiedemann99) -> Self {
         Self {
             settings,
             model: Wiedemann99Model::new(&settings),
             desired_mps: settings.desired_speed_mps,
             perception: None,
-            emergency: Emergency::default(),
+            emergency: EmergencyBrakingDetector::default(),
         }
     }
 
-    fn lead(&mut self, input: &DriverInput<'_>, rng: &mut Stream) -> Option<Perceived> {
+    /// Observes the surroundings and returns the perceived vehicle ahead, if any.
+    fn observe_ahead(&mut self, input: &DriverInput<'_>, rng: &mut Stream) -> Option<PerceivedVehicle> {
         let reaction = self.settings.reaction?;
-        let new = || Perception::new(reaction.draw(rng), None).with_lapses(self.settings.lapse);
-        self.perception.get_or_insert_with(new).look(input, rng).ahead
+        let new = || Perception::new(reaction.draw_s(rng), None).with_lapses(self.settings.lapse);
+        self.perception.get_or_insert_with(new).observe(input, rng).ahead
     }
 }
 
@@ -56,23 +57,28 @@ impl Driver for Wiedemann99Driver {
     fn step(&mut self, input: &DriverInput<'_>, rng: &mut Stream) -> Result<DriverAction, DriverError> {
         check_finite(input)?;
         let speed_mps = input.own.speed_mps;
-        let usual_mps = *self.desired_mps.get_or_insert_with(|| usually_desired_mps(input));
-        let desired_mps = input.desired_now_mps(usual_mps);
+        let long_term_mps = *self.desired_mps.get_or_insert_with(|| default_desired_mps(input));
+        let desired_mps = input.desired_now_mps(long_term_mps);
         let mut acceleration_mps2 = if self.settings.reaction.is_some() {
-            let ahead = self.lead(input, rng);
-            let wanted = self.model.acceleration_mps2(speed_mps, desired_mps, ahead.as_ref().map(|seen| &seen.lead));
-            brake_for_light(wanted, speed_mps, ahead.as_ref())
+            let ahead = self.observe_ahead(input, rng);
+            let requested_mps2 =
+                self.model.acceleration_mps2(speed_mps, desired_mps, ahead.as_ref().map(|vehicle| &vehicle.lead));
+            brake_for_brake_light(requested_mps2, speed_mps, ahead.as_ref())
         } else {
-            let lead = nearest(input);
+            let lead = nearest_lead(input);
             self.model.acceleration_mps2(speed_mps, desired_mps, lead.as_ref())
         };
         acceleration_mps2 = finite(acceleration_mps2, "acceleration of a follower", input.time)?;
-        Ok(DriverAction { acceleration_mps2, note: self.emergency.note(acceleration_mps2), ..DriverAction::default() })
+        Ok(DriverAction {
+            acceleration_mps2,
+            note: self.emergency.detect(acceleration_mps2),
+            ..DriverAction::default()
+        })
     }
 }
 
-/// The nearer of the vehicle ahead in the lane and the one in the way, as it truly is.
-pub(crate) fn nearest(input: &DriverInput<'_>) -> Option<Lead> {
+/// Returns the true state of the nearest vehicle ahead, in the lane or in the path.
+pub(crate) fn nearest_lead(input: &DriverInput<'_>) -> Option<Lead> {
     let near = input.neighbours;
     let pair = [near.own.lead.as_ref(), near.in_path.as_ref()];
     pair.into_iter().flatten().min_by(|a, b| a.gap_m.total_cmp(&b.gap_m)).map(|neighbour| Lead {
@@ -82,47 +88,52 @@ pub(crate) fn nearest(input: &DriverInput<'_>) -> Option<Lead> {
     })
 }
 
-/// The speed that a follower wants where its scenario names none [m/s]: the road's limit, or its own speed at the start if
-/// that is higher.
-pub(crate) fn usually_desired_mps(input: &DriverInput<'_>) -> f64 {
+/// Returns the desired speed of a driver whose scenario gives none (m/s): the larger of the road's speed limit and the
+/// vehicle's own speed. It is called at the first step.
+pub(crate) fn default_desired_mps(input: &DriverInput<'_>) -> f64 {
     input.own.speed_mps.max(input.road.speed_limit_mps())
 }
 
-/// Takes the foot off the accelerator where the vehicle ahead shows its brake light and is near.
-pub(crate) fn lift_off_for_light(wanted_mps2: f64, speed_mps: f64, ahead: Option<&Perceived>) -> f64 {
+/// Returns `requested_mps2`, or at most the acceleration with released accelerator if a near vehicle ahead shows its
+/// brake light.
+pub(crate) fn coast_for_brake_light(requested_mps2: f64, speed_mps: f64, ahead: Option<&PerceivedVehicle>) -> f64 {
     match ahead {
-        Some(seen)
-            if seen.brake_light
-                && seen.lead.gap_m < LIGHT_CONCERNS_WITHIN_S * speed_mps
-                && seen.lead.speed_mps < speed_mps + PULLS_AWAY_MPS =>
+        Some(vehicle)
+            if vehicle.brake_light
+                && vehicle.lead.gap_m < COASTING_FOR_LIGHT_THW_S * speed_mps
+                && vehicle.lead.speed_mps < speed_mps + PULLING_AWAY_MPS =>
         {
-            wanted_mps2.min(-LIFT_OFF_MPS2)
+            requested_mps2.min(-COASTING_DECELERATION_MPS2)
         }
-        _ => wanted_mps2,
+        _ => requested_mps2,
     }
 }
 
-/// The same for one who follows: where the vehicle ahead is so near that it is followed, one brakes like it at once, and
-/// works out afterwards what is needed.
-pub(crate) fn brake_for_light(wanted_mps2: f64, speed_mps: f64, ahead: Option<&Perceived>) -> f64 {
-    let lifted_mps2 = lift_off_for_light(wanted_mps2, speed_mps, ahead);
+/// Limits the acceleration as [`coast_for_brake_light`] does. If the vehicle ahead is near enough to be followed, the
+/// driver also brakes at least as hard as that vehicle: humans brake first, and assess afterwards how hard they need
+/// to.
+pub(crate) fn brake_for_brake_light(requested_mps2: f64, speed_mps: f64, ahead: Option<&PerceivedVehicle>) -> f64 {
+    let limited_mps2 = coast_for_brake_light(requested_mps2, speed_mps, ahead);
     match ahead {
-        Some(seen) if lifted_mps2 <= -LIFT_OFF_MPS2 && seen.brake_light => {
-            let follows = seen.lead.gap_m < LIGHT_IS_FOLLOWED_WITHIN_S * speed_mps;
-            if follows { lifted_mps2.min(seen.lead.acceleration_mps2) } else { lifted_mps2 }
+        Some(vehicle) if limited_mps2 <= -COASTING_DECELERATION_MPS2 && vehicle.brake_light => {
+            let follows = vehicle.lead.gap_m < BRAKING_FOR_LIGHT_THW_S * speed_mps;
+            if follows { limited_mps2.min(vehicle.lead.acceleration_mps2) } else { limited_mps2 }
         }
-        _ => lifted_mps2,
+        _ => limited_mps2,
     }
 }
 
-/// Says once when a driver begins to brake as hard as it can.
+/// Detects the start of emergency braking.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Emergency(bool);
+pub(crate) struct EmergencyBrakingDetector {
+    brakes: bool,
+}
 
-impl Emergency {
-    pub(crate) fn note(&mut self, acceleration_mps2: f64) -> Option<DriverNote> {
-        let before = self.0;
-        self.0 = acceleration_mps2 <= -EMERGENCY_SHARE * HARDEST_BRAKING_MPS2;
-        (self.0 && !before).then_some(DriverNote::EmergencyBraking)
+impl EmergencyBrakingDetector {
+    /// Returns [`DriverNote::EmergencyBraking`] at the first step at which `acceleration_mps2` is emergency braking.
+    pub(crate) fn detect(&mut self, acceleration_mps2: f64) -> Option<DriverNote> {
+        let before = self.brakes;
+        self.brakes = acceleration_mps2 <= -EMERGENCY_BRAKING_SHARE * HARDEST_BRAKING_MPS2;
+        (self.brakes && !before).then_some(DriverNote::EmergencyBraking)
     }
 }

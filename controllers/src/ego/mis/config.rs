@@ -1,6 +1,6 @@
 //! The parameters of the margin increase system.
 
-use closecall_traffic::{Check, ConfigError, Num, Parameters, Range};
+use closecall_traffic::{Check, ConfigError, ENGAGEMENT_CLOSING_MPS, ENGAGEMENT_GAP_M, Num, Parameters, Range};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -60,8 +60,8 @@ impl MisSettings {
         critical_gap_m: 5.0,
         thw_gain_s: 2.0,
         short_thw_s: 1.5,
-        engage_gap_m: 100.0,
-        engage_closing_mps: 10.0 / 3.6,
+        engage_gap_m: ENGAGEMENT_GAP_M,
+        engage_closing_mps: ENGAGEMENT_CLOSING_MPS,
         hold_s: 2.0,
         worst_front_braking_mps2: 8.0,
     };

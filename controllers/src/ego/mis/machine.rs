@@ -1,5 +1,6 @@
 //! The state machine of the margin increase system.
 
+use closecall_traffic::metrics::CRITICAL_THW_S;
 use closecall_traffic::{Absent, Time, TrackId};
 
 use super::{ArrivalPrediction, BrakingResponse, Encounter, MisPlan, MisSettings};
@@ -28,10 +29,6 @@ const REASSOCIATION_DISTANCE_M: f64 = 5.0;
 
 /// Largest difference of their speeds (m/s).
 const REASSOCIATION_SPEED_MPS: f64 = 3.0;
-
-/// Time headway below which a rear vehicle is critically near (s): the threshold of the criticality metrics. A rear
-/// vehicle that changes lanes at a longer headway needs no margin.
-const CRITICAL_THW_S: f64 = 0.9;
 
 /// Speed below which the time headway of the ego is meaningless (m/s).
 const MIN_THW_SPEED_MPS: f64 = 1.0;

@@ -120,22 +120,12 @@ impl ArrivalPrediction {
 mod tests {
     use proptest::prelude::*;
 
+    use super::super::tests::encounters;
     use super::*;
 
     /// Build-up at the comfort limit, with the actuators of a car.
     const CAR: BrakingResponse =
         BrakingResponse { commanded_mps2: 0.0, braking_mps2: 0.0, build_up_mps3: 2.0, release_mps3: 3.0, lag_s: 0.15 };
-
-    prop_compose! {
-        fn encounters()(
-            ego_mps in 15.0..40.0, thw in 0.3..1.5, lead in -3.0..3.0, rear_gap_m in 6.0..120.0, closing_mps in 0.5..20.0,
-        ) -> Encounter {
-            Encounter {
-                ego_mps, front_gap_m: thw * ego_mps, lead_mps: ego_mps + lead, rear_gap_m, closing_mps,
-                critical_gap_m: 5.0,
-            }
-        }
-    }
 
     prop_compose! {
         fn responses()(commanded in 0.0..1.5, now in -0.5..1.5) -> BrakingResponse {

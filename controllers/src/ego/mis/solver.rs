@@ -114,6 +114,7 @@ impl Encounter {
 mod tests {
     use proptest::prelude::*;
 
+    use super::super::tests::encounters;
     use super::*;
 
     /// The reference point: the paper's figure.
@@ -152,17 +153,6 @@ mod tests {
     fn at_the_critical_distance_the_goal_is_out_of_reach() {
         let solution = Encounter { rear_gap_m: 4.0, ..REFERENCE }.solve(2.7, 1.0).unwrap();
         assert_eq!(solution, Solution { deceleration_mps2: 1.0, in_reach: false });
-    }
-
-    prop_compose! {
-        fn encounters()(
-            ego_mps in 15.0..40.0, thw in 0.3..1.5, lead in -3.0..3.0, rear_gap_m in 6.0..120.0, closing_mps in 0.5..20.0,
-        ) -> Encounter {
-            Encounter {
-                ego_mps, front_gap_m: thw * ego_mps, lead_mps: ego_mps + lead, rear_gap_m, closing_mps,
-                critical_gap_m: 5.0,
-            }
-        }
     }
 
     /// Returns the smallest braking on a fine grid that reaches the goal.

@@ -1,6 +1,87 @@
-use super::text::escape;
+//! The page of a small campaign that is run here.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use closecall_campaign::manifest::Manifest;
+use closecall_campaign::plan::Plan;
+use closecall_campaign::runner::Sampling;
+use closecall_campaign::verdict::Gates;
+use closecall_scenarios::sampling::Design;
+use closecall_sensors::SensorMode;
+use closecall_simulation::controller::ControllerChoice;
+use closecall_simulation::scenario::ScenarioFile;
+
+use super::page::campaign;
+use crate::campaign::Tally;
+use crate::campaign::findings::{Findings, Recordings};
+use crate::campaign::requirements::requirements;
+use crate::campaign::timings::Timing;
+
+/// Returns the page of 30 samples with and without the margin increase system.
+fn page() -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios/library/low-thw-overtake.toml");
+    let file = ScenarioFile::load(&path, &[]).unwrap();
+    let sampling = Sampling { seed: 1, design: Design::Random, samples: 30 };
+    let controllers = vec![ControllerChoice::Acc, ControllerChoice::Mis];
+    let mut plan = Plan::new(vec![file], sampling, controllers).unwrap();
+    plan.sensors = Some(SensorMode::GroundTruth);
+    let (running, manifest): (_, Manifest) = (plan.campaign(), plan.manifest(vec!["closecall".to_owned()]).unwrap());
+    let mut tally = Tally::new(&running);
+    running
+        .run(None, |turn| {
+            tally.push(turn.record);
+            ControlFlow::Continue(())
+        })
+        .unwrap();
+    let gates = Gates { max_collisions: Some(0), ..Gates::default() };
+    let judged = tally.summary.judge(gates);
+    let files: Vec<&ScenarioFile> = running.works.iter().map(|work| &work.file).collect();
+    let requirements = requirements(files.iter().copied(), &tally.summary, gates);
+    let (scenario, controller) = ("low-thw-overtake".to_owned(), "mis".to_owned());
+    let worst = tally.overview.scenarios[0].worst[0].sample;
+    let key = (scenario.clone(), worst, controller.clone());
+    let recordings: Recordings = [(key, "recordings/low-thw-overtake-1.rrd".to_owned())].into_iter().collect();
+    let findings = Findings {
+        manifest: &manifest,
+        files: &files,
+        summary: &tally.summary,
+        judged: &judged,
+        requirements: &requirements,
+        overview: &tally.overview,
+        recordings: &recordings,
+        gallery: Some("recordings/index.html"),
+        slowest: &[Timing { scenario, sample: 1, controller, wall_s: 0.25 }],
+    };
+    campaign(&findings).unwrap().into_string()
+}
 
 #[test]
-fn no_text_is_taken_for_markup() {
-    assert_eq!(escape("<b a=\"1\" b='2'>&"), "&lt;b a=&quot;1&quot; b=&#39;2&#39;&gt;&amp;");
+fn a_campaigns_page_has_all_parts_and_loads_nothing() {
+    let page = page();
+    for part in [
+        "Collisions of the ego",
+        "What the controller under test changes",
+        "Requirements",
+        "Worst samples",
+        "recordings/low-thw-overtake-1.rrd",
+        "Outcome map",
+        "Margins of the ego",
+        "Coverage of the sampled values",
+        "Slowest samples",
+        "How it was made",
+        "closing [m/s]",
+    ] {
+        assert!(page.contains(part), "{part}");
+    }
+    for loaded in ["<script", "<link", "<iframe", "<img", "url(", "@import", "http-equiv"] {
+        assert!(!page.contains(loaded), "{loaded}");
+    }
+    for element in ["table", "tr", "td", "section", "figure", "svg", "div", "p", "ul", "header", "main", "body", "html"]
+    {
+        let opened = page.matches(&format!("<{element}>")).count() + page.matches(&format!("<{element} ")).count();
+        assert_eq!(opened, page.matches(&format!("</{element}>")).count(), "{element}");
+    }
+    // Two arms, and the balance of pairs; one map, the margins and the coverage of each parameter.
+    assert!(page.matches("<svg").count() > 3 + 1 + 8, "{}", page.matches("<svg").count());
 }

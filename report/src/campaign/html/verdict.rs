@@ -1,11 +1,13 @@
-//! The verdict, and the requirements.
+//! The verdict with its reasons, and the requirements.
 
-use super::text::{Html, cell, element, escape, number};
+use maud::{Markup, html};
+
+use super::page::{number, number_heads, table, text_heads};
 use crate::campaign::findings::Findings;
-use crate::campaign::requirements::Standing;
+use crate::campaign::requirements::Status;
 use closecall_campaign::verdict::Verdict;
 
-fn class_of(verdict: Verdict) -> &'static str {
+const fn verdict_class(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Pass => "pass",
         Verdict::Fail => "fail",
@@ -14,70 +16,65 @@ fn class_of(verdict: Verdict) -> &'static str {
     }
 }
 
-pub(super) fn write(html: &mut Html, findings: &Findings<'_>) {
-    let (judged, manifest) = (findings.judged, findings.manifest);
-    let controllers = findings.summary.controllers.join(" against ");
-    html.raw(&format!("<header class=\"{}\">", class_of(judged.verdict)));
-    html.classed("p", "verdict", judged.verdict);
-    html.raw("<div>");
-    let names: Vec<&str> = findings.files.iter().map(|file| file.config().name.as_str()).collect();
-    html.element("h1", names.join(", "));
-    let sampling = manifest.sampling;
-    let part = manifest.partition.map(|part| format!(", part {part}")).unwrap_or_default();
+/// Returns the head of the page: the verdict, what was run, and the reasons.
+pub(super) fn header(findings: &Findings<'_>) -> Markup {
+    let (judged, sampling) = (findings.judged, findings.manifest.sampling);
     let samples = findings.summary.total().samples;
-    html.classed(
-        "p",
-        "what",
-        format!(
-            "{controllers}: {samples} {}, {} design, seed {}{part}",
-            if samples == 1 { "sample" } else { "samples" },
-            sampling.design,
-            sampling.seed,
-        ),
-    );
-    html.raw("<ul>");
-    for reason in &judged.reasons {
-        html.element("li", reason);
-    }
-    html.raw("</ul></div></header>");
-}
-
-fn standing_class(standing: Standing) -> &'static str {
-    match standing {
-        Standing::Pass => "pass",
-        Standing::NotJudged => "open",
-        Standing::Inconclusive => "inconclusive",
-        Standing::Invalid => "invalid",
-        Standing::Fail => "fail",
-    }
-}
-
-pub(super) fn requirements(html: &mut Html, findings: &Findings<'_>) {
-    if findings.requirements.is_empty() {
-        return;
-    }
-    html.element("h2", "Requirements");
-    html.table(&["requirement", "scenario", "#samples", "#collisions", "scenario's result", "result"]);
-    for requirement in findings.requirements {
-        let rows = requirement.evidence.len();
-        for (place, evidence) in requirement.evidence.iter().enumerate() {
-            let badge = |standing: Standing| {
-                format!("<td>{}</td>", element("span", &format!("badge {}", standing_class(standing)), standing.word()))
-            };
-            let spanning = |cell: String| cell.replacen("<td", &format!("<td rowspan=\"{rows}\""), 1);
-            let mut cells = Vec::new();
-            if place == 0 {
-                cells.push(spanning(format!("<td><strong>{}</strong></td>", escape(&requirement.mark))));
+    html! {
+        header.(verdict_class(judged.verdict)) {
+            p.verdict { (judged.verdict.to_string()) }
+            div {
+                h1 { (findings.scenario_names()) }
+                p.what {
+                    (findings.summary.controllers.join(" against ")) ": "
+                    (samples) @if samples == 1 { " sample, " } @else { " samples, " }
+                    (sampling.design.to_string()) " design, seed " (sampling.seed)
+                    @if let Some(part) = findings.manifest.partition { ", part " (part.to_string()) }
+                }
+                ul { @for reason in &judged.reasons { li { (reason) } } }
             }
-            cells.push(cell(&evidence.scenario));
-            cells.push(number(evidence.samples));
-            cells.push(number(evidence.collisions));
-            cells.push(badge(evidence.standing));
-            if place == 0 {
-                cells.push(spanning(badge(requirement.standing())));
-            }
-            html.row("", &cells);
         }
     }
-    html.end_table();
+}
+
+const fn status_class(status: Status) -> &'static str {
+    match status {
+        Status::Pass => "pass",
+        Status::NotJudged => "open",
+        Status::Inconclusive => "inconclusive",
+        Status::Invalid => "invalid",
+        Status::Fail => "fail",
+    }
+}
+
+fn badge(status: Status) -> Markup {
+    html! { span.badge.(status_class(status)) { (status.word()) } }
+}
+
+/// Returns the table of requirements; empty if the scenarios name none.
+pub(super) fn requirements(findings: &Findings<'_>) -> Markup {
+    if findings.requirements.is_empty() {
+        return Markup::default();
+    }
+    let head = html! {
+        (text_heads(&["requirement", "scenario"]))
+        (number_heads(&["samples", "collisions"]))
+        (text_heads(&["scenario's result", "result"]))
+    };
+    let rows = html! {
+        @for requirement in findings.requirements {
+            @let evidence_count = requirement.evidence.len();
+            @for (index, evidence) in requirement.evidence.iter().enumerate() {
+                tr {
+                    @if index == 0 { td rowspan=(evidence_count) { strong { (requirement.id) } } }
+                    td { (evidence.scenario) }
+                    (number(evidence.samples))
+                    (number(evidence.collisions))
+                    td { (badge(evidence.status)) }
+                    @if index == 0 { td rowspan=(evidence_count) { (badge(requirement.status())) } }
+                }
+            }
+        }
+    };
+    html! { h2 { "Requirements" } (table(&head, &rows)) }
 }

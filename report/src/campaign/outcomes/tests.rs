@@ -62,7 +62,7 @@ fn outcome(sample: u64, controller: &str) -> Outcome {
     }
 }
 
-/// A collision, a success, an error.
+/// Returns a row with a collision, one without, and one with an error.
 pub(crate) fn rows() -> Vec<OutcomeRow> {
     let row = |sample, controller: &str, result| OutcomeRow {
         scenario: "low-thw-overtake".to_owned(),
@@ -128,7 +128,7 @@ fn more_rows_than_a_group_keep_their_order() {
 }
 
 #[test]
-fn an_error_among_the_rows_leaves_the_old_file() {
+fn an_error_among_the_rows_leaves_the_existing_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.parquet");
     std::fs::write(&path, "old").unwrap();
@@ -139,7 +139,7 @@ fn an_error_among_the_rows_leaves_the_old_file() {
 }
 
 #[test]
-fn a_parameter_that_is_a_label_anywhere_is_text() {
+fn a_parameter_that_is_a_label_in_any_scenario_is_text() {
     let mut mixed = Parameters::default();
     mixed.insert(ParameterName::new("rear-class").unwrap(), Value::Number(1.0));
     let columns = parameter_columns([&mixed, &parameters("truck")]);

@@ -1,34 +1,34 @@
-//! The values of one parameter, laid out along an axis.
+//! The axis of one parameter: its range or its labels, divided into cells of equal width.
 
 use closecall_scenarios::parameters::Distribution;
 use closecall_traffic::Value;
 
-/// Probability that is left out at each end of a distribution without bounds.
+/// Probability beyond each end of the axis, if the distribution has no bounds.
 const TAIL: f64 = 1e-3;
 
-/// One parameter that varies.
+/// The axis of a parameter that varies.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Axis {
     /// Numbers from `low` to `high`.
     Numbers {
         /// The parameter's name.
         name: String,
-        /// The smallest.
+        /// The smallest value.
         low: f64,
-        /// The largest.
+        /// The largest value.
         high: f64,
     },
     /// Labels.
     Labels {
         /// The parameter's name.
         name: String,
-        /// The labels, in their order.
+        /// The labels, in the order of the scenario file.
         labels: Vec<String>,
     },
 }
 
 impl Axis {
-    /// The axis of a parameter; nothing where it does not vary.
+    /// Returns the axis of a parameter, or `None` if the parameter does not vary.
     pub(super) fn of(name: &str, distribution: &Distribution) -> Option<Self> {
         let name = name.to_owned();
         if !distribution.labels().is_empty() {
@@ -46,15 +46,16 @@ impl Axis {
         (low < high).then_some(Self::Numbers { name, low, high })
     }
 
-    /// The parameter's name.
+    /// Returns the parameter's name.
     pub fn name(&self) -> &str {
         match self {
             Self::Numbers { name, .. } | Self::Labels { name, .. } => name,
         }
     }
 
-    /// Which of `cells` equal parts a value lies in; values beyond the ends count with the ends. Labels have a part
-    /// each, and share the last where there are more of them than parts.
+    /// Returns the index of the cell that a value lies in, if the axis is divided into `cells` cells. Values beyond the
+    /// ends of the axis belong to the outermost cells. Each label has a cell; labels beyond the number of cells share the
+    /// last cell. Returns `None` if the value is not on the axis.
     pub fn cell(&self, value: &Value, cells: usize) -> Option<usize> {
         let last = cells.checked_sub(1)?;
         match (self, value) {
@@ -65,13 +66,13 @@ impl Axis {
                 share.is_finite().then(|| cell.min(last))
             }
             (Self::Labels { labels, .. }, Value::Label(label)) => {
-                labels.iter().position(|known| known == label).map(|place| place.min(last))
+                labels.iter().position(|known| known == label).map(|index| index.min(last))
             }
             _ => None,
         }
     }
 
-    /// How many of `cells` parts can be told apart.
+    /// Returns the number of cells in use, at most `cells`: labels need no more cells than there are labels.
     pub fn cells(&self, cells: usize) -> usize {
         match self {
             Self::Numbers { .. } => cells,
@@ -79,18 +80,18 @@ impl Axis {
         }
     }
 
-    /// Where a value lies along the axis: a number itself, a label at its place.
+    /// Returns the position of a value along the axis: the number itself, or the index of the label.
     pub fn position(&self, value: &Value) -> Option<f64> {
         match (self, value) {
             (Self::Numbers { .. }, Value::Number(number)) => Some(*number),
             (Self::Labels { labels, .. }, Value::Label(label)) => {
-                labels.iter().position(|known| known == label).map(|place| place as f64)
+                labels.iter().position(|known| known == label).map(|index| index as f64)
             }
             _ => None,
         }
     }
 
-    /// The ends of the axis; labels stand at whole numbers, half a step inside.
+    /// Returns the positions of both ends. Labels stand at whole numbers, the outermost half a step from the ends.
     pub fn ends(&self) -> [f64; 2] {
         match self {
             Self::Numbers { low, high, .. } => [*low, *high],

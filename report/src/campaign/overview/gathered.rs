@@ -5,7 +5,7 @@ use closecall_simulation::scenario::ScenarioFile;
 
 use super::ScenarioOverview;
 
-/// What a report shows of a campaign.
+/// What a report shows of a campaign beside the counts.
 #[derive(Clone, Debug)]
 pub struct Overview {
     /// The scenarios, in their order.
@@ -13,13 +13,14 @@ pub struct Overview {
 }
 
 impl Overview {
-    /// Nothing yet. `files` are the scenarios, `arms` the names of the controllers, the one under test last.
+    /// Returns an overview without samples. `files` are the scenarios; `arms` are the names of the controllers, the one
+    /// under test last.
     pub fn new<'a>(files: impl IntoIterator<Item = &'a ScenarioFile>, arms: &[String]) -> Self {
         let scenario = |file: &ScenarioFile| ScenarioOverview::new(&file.config().name, file.space(), arms);
         Self { scenarios: files.into_iter().map(scenario).collect() }
     }
 
-    /// Takes in one record.
+    /// Adds a journal record.
     pub fn push(&mut self, record: &Record) {
         if let Some(scenario) = self.scenarios.iter_mut().find(|scenario| scenario.name == record.scenario) {
             scenario.push(record);

@@ -1,22 +1,22 @@
-//! How the margins of E are distributed.
+//! The distributions of the ego's margins.
 
 use closecall_traffic::Measured;
 
 use closecall_simulation::outcome::Outcome;
 
-/// Bins of a distribution.
+/// Number of bins of a distribution.
 pub const BINS: usize = 40;
 
-/// One margin: its range is the same in every report, so that reports can be laid side by side.
+/// One margin. Its range is the same in every report, so that reports can be compared.
 #[derive(Clone, Copy, Debug)]
 pub struct MarginKind {
-    /// Its key in the other reports; the end is the unit.
+    /// The key in the other reports; it ends with the unit.
     pub key: &'static str,
-    /// What it is called.
+    /// The name on the page, with the unit.
     pub title: &'static str,
-    /// The largest value that is shown apart.
+    /// The upper end of the range, in the margin's unit. Larger values belong to the last bin.
     pub high: f64,
-    of: fn(&Outcome) -> Measured,
+    value: fn(&Outcome) -> Measured,
 }
 
 /// The margins that are shown.
@@ -25,69 +25,69 @@ pub const MARGINS: [MarginKind; 8] = [
         key: "min_thw_front_s",
         title: "smallest front time headway [s]",
         high: 3.0,
-        of: |outcome| outcome.margins.min_thw_front_s,
+        value: |outcome| outcome.margins.min_thw_front_s,
     },
     MarginKind {
         key: "min_thw_rear_s",
         title: "smallest rear time headway [s]",
         high: 1.5,
-        of: |outcome| outcome.margins.min_thw_rear_s,
+        value: |outcome| outcome.margins.min_thw_rear_s,
     },
     MarginKind {
         key: "min_gap_rear_m",
         title: "smallest rear gap [m]",
         high: 40.0,
-        of: |outcome| outcome.margins.min_gap_rear_m,
+        value: |outcome| outcome.margins.min_gap_rear_m,
     },
     MarginKind {
         key: "min_ttc_rear_s",
         title: "smallest rear time to collision [s]",
         high: 10.0,
-        of: |outcome| outcome.margins.min_ttc_rear_s,
+        value: |outcome| outcome.margins.min_ttc_rear_s,
     },
     MarginKind {
         key: "min_gap_front_m",
         title: "smallest front gap [m]",
         high: 60.0,
-        of: |outcome| outcome.margins.min_gap_front_m,
+        value: |outcome| outcome.margins.min_gap_front_m,
     },
     MarginKind {
         key: "max_deceleration_mps2",
         title: "largest deceleration [m/s²]",
         high: 10.0,
-        of: |outcome| Ok(outcome.margins.max_deceleration_mps2),
+        value: |outcome| Ok(outcome.margins.max_deceleration_mps2),
     },
     MarginKind {
         key: "max_jerk_mps3",
         title: "largest jerk [m/s³]",
         high: 40.0,
-        of: |outcome| Ok(outcome.margins.max_jerk_mps3),
+        value: |outcome| Ok(outcome.margins.max_jerk_mps3),
     },
     MarginKind {
         key: "max_speed_deficit_mps",
-        title: "most slower than the vehicle ahead [m/s]",
+        title: "largest speed below the vehicle ahead [m/s]",
         high: 20.0,
-        of: |outcome| Ok(outcome.margins.max_speed_deficit_mps),
+        value: |outcome| Ok(outcome.margins.max_speed_deficit_mps),
     },
 ];
 
 /// The distribution of one margin in one arm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MarginBins {
-    /// How many samples lie in each of [`BINS`] equal parts from 0 to the kind's largest value; beyond it counts as the
-    /// last.
+    /// The number of samples in each of [`BINS`] bins of equal width from 0 to the upper end of the margin's range. The
+    /// last bin also counts larger values.
     pub counts: [u64; BINS],
-    /// Samples that have no such margin.
+    /// The number of samples that have no such margin.
     pub absent: u64,
 }
 
 impl MarginBins {
     pub(super) const EMPTY: Self = Self { counts: [0; BINS], absent: 0 };
 
-    pub(super) fn take(&mut self, kind: &MarginKind, outcome: &Outcome) {
-        match (kind.of)(outcome) {
+    pub(super) fn push(&mut self, kind: &MarginKind, outcome: &Outcome) {
+        match (kind.value)(outcome) {
             Ok(value) => {
-                // What is not a number counts as the smallest margin: it never looks safe.
+                // A value that is not a number counts as the smallest margin, so that it never looks safe.
                 let share = if value.is_nan() { 0.0 } else { (value / kind.high).clamp(0.0, 1.0) };
                 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to the bins")]
                 let bin = (share * BINS as f64) as usize;

@@ -1,11 +1,12 @@
-//! What a report shows of a campaign, gathered record by record in memory that does not grow with their number.
+//! What a report shows of a campaign beside the counts. It is gathered from the journal, record by record, in an amount of
+//! memory that does not depend on the number of records.
 //!
 //! ```text
-//!  records ─▶ counts by arm             (JUnit's totals)
-//!          ─▶ bins of every margin      (distributions)
-//!          ─▶ bins of every parameter and pair of parameters (coverage, outcome map)
-//!          ─▶ a few samples drawn evenly (points of the map)
-//!          ─▶ the worst samples, the first errors
+//!  records ─▶ counts of each arm         (totals of JUnit)
+//!          ─▶ bins of each margin        (distributions)
+//!          ─▶ bins of each parameter and of each pair of parameters (coverage, outcome map)
+//!          ─▶ an even choice of samples  (points of the map)
+//!          ─▶ the worst samples, and the first error of each kind
 //! ```
 
 mod axis;
@@ -23,4 +24,4 @@ pub use gathered::Overview;
 pub use margins::{BINS, MARGINS, MarginBins, MarginKind};
 pub use pairs::{CELLS, PairBins};
 pub use sample::{Fate, Point, WorstSample};
-pub use scenario::{ArmTotals, ErrorKind, ScenarioOverview};
+pub use scenario::{ArmTotals, ErrorGroup, ScenarioOverview};

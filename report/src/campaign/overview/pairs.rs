@@ -1,18 +1,19 @@
-//! Which two parameters the outcome depends on most.
+//! The pair of parameters that the outcome depends on most.
 
 use closecall_traffic::Parameters;
 
 use super::Axis;
 
-/// Parts of each axis.
+/// Number of cells along each axis.
 pub const CELLS: usize = 8;
 
-/// How many samples lie in each cell of two parameters' plane, and in how many of them anybody's E collided.
+/// The number of samples in each cell of the plane of two parameters, and of those in which the ego of any arm collides.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PairBins {
-    /// Places of the two among the axes.
+    /// The indices of both parameters among the axes.
     pub axes: [usize; 2],
-    /// Samples, and those with a collision in some arm, by the cell of the first and of the second parameter.
+    /// The number of samples, and of samples with a collision in any arm, by the cell of the first and of the second
+    /// parameter.
     pub cells: [[[u64; 2]; CELLS]; CELLS],
 }
 
@@ -21,7 +22,7 @@ impl PairBins {
         Self { axes, cells: [[[0; 2]; CELLS]; CELLS] }
     }
 
-    pub(super) fn take(&mut self, axes: &[Axis], parameters: &[Option<usize>], collided: bool) {
+    pub(super) fn push(&mut self, axes: &[Axis], parameters: &[Option<usize>], collided: bool) {
         let [one, other] = self.axes;
         if let (Some(x), Some(y)) = (parameters[one], parameters[other]) {
             debug_assert!(axes.len() == parameters.len());
@@ -31,10 +32,10 @@ impl PairBins {
         }
     }
 
-    /// How much the two parameters tell of the outcome [nat]: the mutual information between the cell and whether there
-    /// was a collision, less the amount that chance alone is expected to show (G. A. Miller, *Note on the bias of
-    /// information estimates*, 1955).
-    pub fn information(&self) -> f64 {
+    /// Returns how much the two parameters tell about the outcome (nat): the mutual information between the cell and
+    /// whether there was a collision, less the amount that chance alone is expected to show (G. A. Miller, *Note on the
+    /// bias of information estimates*, 1955).
+    pub fn information_nat(&self) -> f64 {
         let cells = || self.cells.iter().flatten().filter(|[samples, _]| *samples > 0);
         let samples: u64 = cells().map(|[samples, _]| samples).sum();
         let collisions: u64 = cells().map(|[_, collisions]| collisions).sum();
@@ -42,12 +43,12 @@ impl PairBins {
             return 0.0;
         }
         let total = samples as f64;
-        let within: f64 = cells().map(|[n, k]| *n as f64 / total * entropy(*k as f64 / *n as f64)).sum();
+        let within: f64 = cells().map(|[n, k]| *n as f64 / total * entropy_nat(*k as f64 / *n as f64)).sum();
         let by_chance = (cells().count() as f64 - 1.0) / (2.0 * total);
-        entropy(collisions as f64 / total) - within - by_chance
+        entropy_nat(collisions as f64 / total) - within - by_chance
     }
 
-    /// Cells that have a sample, and cells that there are.
+    /// Returns the number of cells with a sample, and the number of all cells.
     pub fn coverage(&self, axes: &[Axis]) -> [usize; 2] {
         let [one, other] = self.axes;
         let hit = self.cells.iter().flatten().filter(|[samples, _]| *samples > 0).count();
@@ -55,13 +56,13 @@ impl PairBins {
     }
 }
 
-/// Entropy of a yes that has this probability [nat].
-fn entropy(probability: f64) -> f64 {
+/// Returns the entropy of an event that has this probability (nat).
+fn entropy_nat(probability: f64) -> f64 {
     let term = |p: f64| if p > 0.0 { -p * p.ln() } else { 0.0 };
     term(probability) + term(1.0 - probability)
 }
 
-/// The cell of each parameter.
+/// Returns the cell of each parameter, `None` for a parameter that the sample lacks.
 pub(super) fn cells_of(axes: &[Axis], parameters: &Parameters) -> Vec<Option<usize>> {
     let cell = |axis: &Axis| {
         let value = parameters.iter().find(|(name, _)| name.as_str() == axis.name())?.1;

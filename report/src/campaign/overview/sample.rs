@@ -1,4 +1,4 @@
-//! Single samples that a report shows: what became of them, and which are the worst.
+//! Single samples that a report shows: their fate, and which of them are the worst.
 
 use std::cmp::Ordering;
 
@@ -7,28 +7,28 @@ use closecall_traffic::{ActorId, Parameters};
 use closecall_campaign::record::Record;
 use closecall_simulation::outcome::{Outcome, Phase};
 
-/// What became of a sample.
+/// The outcome of a sample over all arms, in the order of gravity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Fate {
-    /// E does not collide in any arm.
+    /// The ego does not collide in any arm.
     Passed,
-    /// E collides in the baseline alone.
+    /// The ego collides in the baseline alone.
     Prevented,
-    /// E collides in the arm under test, and in the baseline where there is one.
+    /// The ego collides in the arm under test, and in the baseline if there is one.
     Failed,
-    /// E collides in the arm under test, and not in the baseline.
+    /// The ego collides in the arm under test, but not in the baseline.
     Induced,
-    /// Some arm ended in an error.
+    /// An arm ended in an error.
     Error,
 }
 
 impl Fate {
-    /// Every fate.
+    /// All fates, in the order of gravity.
     pub const ALL: [Self; 5] = [Self::Passed, Self::Prevented, Self::Failed, Self::Induced, Self::Error];
 
-    /// What became of a record.
+    /// Returns the fate of the sample of a journal record.
     pub fn of(record: &Record) -> Self {
-        let collided = |place: usize| record.arms[place].result.as_ref().ok().map(|outcome| outcome.ego_collided());
+        let collided = |arm: usize| record.arms[arm].result.as_ref().ok().map(|outcome| outcome.ego_collided());
         let Some(tested) = record.arms.len().checked_sub(1) else { return Self::Error };
         if record.arms.iter().any(|arm| arm.result.is_err()) {
             return Self::Error;
@@ -43,7 +43,7 @@ impl Fate {
         }
     }
 
-    /// What it is called; a campaign without a baseline has no pairs to speak of.
+    /// Returns the name of the fate in reports. It depends on whether the campaign has a baseline.
     pub const fn word(self, is_paired: bool) -> &'static str {
         match (self, is_paired) {
             (Self::Passed, _) => "no collision",
@@ -59,27 +59,28 @@ impl Fate {
 /// One sample of the outcome map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Point {
-    /// Its number.
+    /// The sample's number.
     pub sample: u64,
-    /// What became of it.
+    /// Its fate.
     pub fate: Fate,
     /// The sampled values.
     pub parameters: Parameters,
 }
 
-/// One of the worst samples in the arm under test: induced collisions first, then the other ones, each by E's change of
-/// velocity, then the narrowest escapes, by the smallest time to collision with the vehicle behind.
+/// One of the worst samples of the arm under test. Induced collisions come first, then the other collisions, each in
+/// falling order of the ego's change of velocity; then samples without a collision, in rising order of the smallest time to
+/// collision with the vehicle behind.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WorstSample {
-    /// Its number.
+    /// The sample's number.
     pub sample: u64,
-    /// What became of it.
+    /// Its fate.
     pub fate: Fate,
-    /// Largest change of velocity of E [m/s]; nothing where it did not collide.
+    /// The ego's largest change of velocity (m/s); `None` if the ego did not collide.
     pub delta_v_mps: Option<f64>,
-    /// With whom E collided first, and in which phase.
+    /// The actor that the ego collided with first, and the phase of the encounter.
     pub collision: Option<(ActorId, Phase)>,
-    /// The outcome.
+    /// The outcome in the arm under test.
     pub outcome: Box<Outcome>,
 }
 
@@ -99,7 +100,8 @@ impl WorstSample {
         })
     }
 
-    /// Worse ones first; of equals the one with the smaller number. A value that is not a number is the worst.
+    /// Compares two samples: the worse one is less. Of equal samples, the one with the smaller number is less. A value that
+    /// is not a number is the worst.
     pub(super) fn order(&self, other: &Self) -> Ordering {
         let ttc_s = |sample: &Self| sample.outcome.margins.min_ttc_rear_s.unwrap_or(f64::INFINITY);
         let by_collision = match (self.delta_v_mps, other.delta_v_mps) {

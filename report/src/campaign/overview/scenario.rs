@@ -10,57 +10,58 @@ use super::sample::{Fate, Point, WorstSample};
 use super::{Axis, CELLS};
 use closecall_campaign::record::{ArmRecord, Record};
 
-/// Points of each fate that the outcome map shows at most.
+/// Largest number of points of each fate in the outcome map.
 const MOST_POINTS: usize = 400;
-/// Samples that are listed as the worst.
+/// Largest number of samples that are listed as the worst.
 const MOST_WORST: usize = 12;
 
 /// Counts of one arm.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ArmTotals {
-    /// Samples.
+    /// The number of samples.
     pub samples: usize,
-    /// Samples in which E collided.
+    /// The number of samples in which the ego collided.
     pub failures: usize,
-    /// Samples that ended in an error.
+    /// The number of samples that ended in an error.
     pub errors: usize,
 }
 
-/// One kind of error.
+/// The errors of one kind.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ErrorKind {
-    /// How many samples ended in it.
+pub struct ErrorGroup {
+    /// The number of samples that ended in such an error.
     pub count: u64,
-    /// The first of them.
+    /// The number of the first such sample.
     pub first_sample: u64,
-    /// What it said.
+    /// The message of the first error.
     pub message: String,
 }
 
-/// What a report shows of one scenario.
+/// What a report shows of one scenario beside the counts.
 #[derive(Clone, Debug)]
 pub struct ScenarioOverview {
-    /// Its name.
+    /// The scenario's name.
     pub name: String,
     /// The controllers, the one under test last.
     pub arms: Vec<String>,
     /// The counts of each arm.
     pub totals: Vec<ArmTotals>,
-    /// The parameters that vary.
+    /// The axes of the parameters that vary.
     pub axes: Vec<Axis>,
-    /// Samples of each fate, in each part of each axis.
+    /// For each axis: the number of samples of each fate in each cell.
     pub coverage: Vec<[[u64; Fate::ALL.len()]; CELLS]>,
-    /// Every two of the parameters.
+    /// All pairs of axes.
     pub pairs: Vec<PairBins>,
     /// The distribution of each margin of [`MARGINS`] in each arm.
     pub margins: Vec<Vec<MarginBins>>,
-    /// The worst samples of the arm under test, the worst first.
+    /// The worst samples of the arm under test, beginning with the worst.
     pub worst: Vec<WorstSample>,
     /// Errors by arm and kind.
-    pub errors: BTreeMap<(String, String), ErrorKind>,
-    /// Samples by fate and a hash of their number: the first of each fate are drawn evenly from all.
+    pub errors: BTreeMap<(String, String), ErrorGroup>,
+    /// The samples with the smallest hashes of their number, for each fate: an even choice of all samples.
     points: BTreeMap<(Fate, u64), Point>,
-    kept: [usize; Fate::ALL.len()],
+    /// The number of points of each fate.
+    point_counts: [usize; Fate::ALL.len()],
 }
 
 impl ScenarioOverview {
@@ -79,55 +80,55 @@ impl ScenarioOverview {
             worst: Vec::with_capacity(MOST_WORST + 1),
             errors: BTreeMap::new(),
             points: BTreeMap::new(),
-            kept: [0; Fate::ALL.len()],
+            point_counts: [0; Fate::ALL.len()],
         }
     }
 
-    /// True where a baseline stands beside the arm under test.
+    /// Returns true if there is a baseline beside the arm under test.
     pub fn is_paired(&self) -> bool {
         self.arms.len() > 1
     }
 
-    /// Samples of each fate.
+    /// Returns an even choice of the samples of each fate, in the order of gravity.
     pub fn points(&self) -> impl Iterator<Item = &Point> {
         self.points.values()
     }
 
-    /// The two parameters that tell most of the outcome; nothing where fewer than two vary.
+    /// Returns the pair of parameters that tells the most about the outcome, or `None` if fewer than two parameters vary.
     pub fn map(&self) -> Option<&PairBins> {
-        let better = |one: &&PairBins, other: &&PairBins| one.information().total_cmp(&other.information());
-        // Of equals the last would be taken: the order is turned round, so that it is the first.
+        let better = |one: &&PairBins, other: &&PairBins| one.information_nat().total_cmp(&other.information_nat());
+        // `max_by` returns the last of equal elements: the order is reversed to get the first.
         self.pairs.iter().rev().max_by(better)
     }
 
     pub(super) fn push(&mut self, record: &Record) {
         let fate = Fate::of(record);
-        for (place, arm) in record.arms.iter().enumerate().take(self.arms.len()) {
-            self.push_arm(place, record.sample, arm);
+        for (index, arm) in record.arms.iter().enumerate().take(self.arms.len()) {
+            self.push_arm(index, record.sample, arm);
         }
         self.push_parameters(record, fate);
         if let Some(sample) = WorstSample::of(record) {
-            let place = self.worst.partition_point(|worse| worse.order(&sample).is_lt());
-            if place < MOST_WORST {
-                self.worst.insert(place, sample);
+            let index = self.worst.partition_point(|worse| worse.order(&sample).is_lt());
+            if index < MOST_WORST {
+                self.worst.insert(index, sample);
                 self.worst.truncate(MOST_WORST);
             }
         }
     }
 
-    fn push_arm(&mut self, place: usize, sample: u64, arm: &ArmRecord) {
-        let totals = &mut self.totals[place];
+    fn push_arm(&mut self, index: usize, sample: u64, arm: &ArmRecord) {
+        let totals = &mut self.totals[index];
         totals.samples += 1;
         match &arm.result {
             Ok(outcome) => {
                 totals.failures += usize::from(outcome.ego_collided());
                 for (kind, bins) in MARGINS.iter().zip(&mut self.margins) {
-                    bins[place].take(kind, outcome);
+                    bins[index].push(kind, outcome);
                 }
             }
             Err(failure) => {
                 totals.errors += 1;
-                let first = || ErrorKind { count: 0, first_sample: sample, message: failure.message.clone() };
+                let first = || ErrorGroup { count: 0, first_sample: sample, message: failure.message.clone() };
                 self.errors.entry((arm.controller.clone(), failure.kind.clone())).or_insert_with(first).count += 1;
             }
         }
@@ -143,27 +144,28 @@ impl ScenarioOverview {
         }
         let collided = matches!(fate, Fate::Prevented | Fate::Failed | Fate::Induced);
         for pair in &mut self.pairs {
-            pair.take(&self.axes, &cells, collided);
+            pair.push(&self.axes, &cells, collided);
         }
-        self.keep(Point { sample: record.sample, fate, parameters: outcome.parameters.clone() });
+        self.push_point(Point { sample: record.sample, fate, parameters: outcome.parameters.clone() });
     }
 
-    /// Keeps the points with the smallest hashes: a random choice that does not depend on the order.
-    fn keep(&mut self, point: Point) {
+    /// Adds a point, and removes the one with the largest hash if there are too many: a random choice that does not depend
+    /// on the order of the samples.
+    fn push_point(&mut self, point: Point) {
         let fate = point.fate;
         let hash = closecall_campaign::partition::split_mix(point.sample);
-        let kept = &mut self.kept[fate as usize];
-        if *kept == MOST_POINTS {
+        let count = &mut self.point_counts[fate as usize];
+        if *count == MOST_POINTS {
             let of_fate = (fate, 0)..=(fate, u64::MAX);
             let Some(largest) = self.points.range(of_fate).next_back().map(|(key, _)| *key) else { return };
             if largest.1 <= hash {
                 return;
             }
             self.points.remove(&largest);
-            *kept -= 1;
+            *count -= 1;
         }
         if self.points.insert((fate, hash), point).is_none() {
-            *kept += 1;
+            *count += 1;
         }
     }
 }

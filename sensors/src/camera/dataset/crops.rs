@@ -2,21 +2,18 @@
 
 use std::fmt::Write;
 
-use closecall_traffic::{Light, Stream};
+use closecall_traffic::{ClassScores, Light, Stream};
 use rand::RngExt;
 
 use super::{DatasetSummary, RandomScene};
+use crate::camera::pipeline::MIN_SHARE_IN_IMAGE;
 use crate::camera::{Crop, ExposureKey, Frame, GroundBox, PixelRect, RearCamera};
 use crate::{Scene, SceneVehicle};
 
-/// Minimum share of a window that must lie in the image (0 to 1).
-const MIN_SHARE_IN_IMAGE: f64 = 0.6;
 /// Minimum unoccluded share of a vehicle for it to be labelled (0 to 1).
 const MIN_VISIBLE_SHARE: f64 = 0.55;
 /// Maximum share of a background window that any vehicle may fill (0 to 1).
 const MAX_VEHICLE_SHARE: f64 = 0.10;
-/// Class label of the background.
-const BACKGROUND: usize = 3;
 /// Number of background windows drawn in one scene.
 const BACKGROUND_WINDOWS: usize = 3;
 
@@ -58,7 +55,7 @@ impl Crops {
             frame.crop(window, &mut crop);
             let max_share = (0..scene.others.len()).map(|other| frame.instance_share(other)).fold(0.0, f64::max);
             if max_share <= MAX_VEHICLE_SHARE {
-                self.push(scene, BACKGROUND, &cluster_box, &crop, summary);
+                self.push(scene, ClassScores::BACKGROUND, &cluster_box, &crop, summary);
                 let _ = writeln!(self.csv, ",,{}", window.width);
             }
         }

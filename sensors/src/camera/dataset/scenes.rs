@@ -2,9 +2,10 @@
 
 use std::f64::consts::PI;
 
+use closecall_traffic::metrics::bumper_gap_m;
 use closecall_traffic::{
-    Check, Choice, ConfigError, Dimensions, Environment, Indicator, Lane, Light, Num, Parameters, Road, RoadConfig,
-    Side, Stream, Time, Vehicle, VehicleClass, VehicleState,
+    CONTROL_STEP, Check, Choice, ConfigError, Dimensions, Environment, Indicator, Lane, Light, Num, Parameters, Road,
+    RoadConfig, Side, Stream, Time, Vehicle, VehicleClass, VehicleState,
 };
 use rand::RngExt;
 
@@ -47,7 +48,7 @@ impl RandomScene {
         let pitch_rad = rng.random_range(-0.012..0.012);
         let ego = SceneVehicle { actor: 0, vehicle: Vehicle::typical(VehicleClass::Car), state, pitch_rad };
         let mut scene = Self {
-            time: Time::from_ms(40 * rng.random_range(0..1_000)),
+            time: CONTROL_STEP * rng.random_range(0..1_000),
             road,
             environment,
             camera,
@@ -93,8 +94,8 @@ impl RandomScene {
 }
 
 fn have_clearance(a: &SceneVehicle, b: &SceneVehicle) -> bool {
-    let along =
-        (a.state.s_m - b.state.s_m).abs() - (a.vehicle.dimensions.length_m + b.vehicle.dimensions.length_m) / 2.0;
+    let lengths_m = [a, b].map(|vehicle| vehicle.vehicle.dimensions.length_m);
+    let along = bumper_gap_m((a.state.s_m - b.state.s_m).abs(), lengths_m[0], lengths_m[1]);
     let across =
         (a.state.d_m - b.state.d_m).abs() - (a.vehicle.dimensions.width_m + b.vehicle.dimensions.width_m) / 2.0;
     along > MIN_GAP_M || across > 0.3

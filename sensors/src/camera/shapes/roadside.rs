@@ -1,19 +1,16 @@
 //! Roadside furniture: guard rails with their posts, delineator posts, and gantries with signs.
 //!
 //! The positions depend only on the road (multiples of a spacing along s), so that the furniture passes by as the ego
-//! drives. Dimensions follow German practice: rails are 0.75 m high with posts every 4 m, and delineators stand every
-//! 50 m.
+//! drives. Delineators stand every 50 m, as is German practice.
 
 use closecall_traffic::Road;
 
 use crate::camera::hash::{mix_at, unit};
 use crate::camera::mesh::{Mesh, Surface, Vec3};
+use crate::guard_rail::{BEAM_DEPTH_M, BEAM_TOP_M, LEFT_OFFSET_M, POST_SPACING_M, RIGHT_OFFSET_M};
 
-/// Lateral distance of the guard rails beyond the left edge of the lanes, and beyond their right edge with the hard
-/// shoulder in between (m). The LiDAR model places the rails at the same positions.
-const RAIL_OFFSET_M: [f64; 2] = [0.79, 3.04];
-/// Distance between the posts of a rail (m).
-const POST_SPACING_M: f64 = 4.0;
+/// Lateral distance of the middle of the guard rails beyond the left and the right edge of the road (m).
+const RAIL_OFFSET_M: [f64; 2] = [LEFT_OFFSET_M + 0.5 * BEAM_DEPTH_M, RIGHT_OFFSET_M + 0.5 * BEAM_DEPTH_M];
 /// Distance between delineator posts (m).
 const DELINEATOR_SPACING_M: f64 = 50.0;
 /// Mean distance between gantries (m).
@@ -97,7 +94,7 @@ fn rail(bodies: &mut Vec<Roadside>, s_m: f64, d_m: f64) {
     for piece in PIECES_M.windows(2) {
         let half_m = ((piece[1] - piece[0]) / 2.0) as f32;
         let s_m = s_m - (piece[0] + piece[1]) / 2.0;
-        bodies.push(Roadside { s_m, d_m, extent_m: [half_m, 0.03, 0.75], kind: Kind::Beam });
+        bodies.push(Roadside { s_m, d_m, extent_m: [half_m, 0.03, BEAM_TOP_M as f32], kind: Kind::Beam });
     }
     for index in spacing_indices(s_m, POST_SPACING_M, MAX_POST_DISTANCE_M) {
         let s_m = f64::from(index) * POST_SPACING_M;

@@ -1,8 +1,8 @@
-//! `linfa-clustering`'s DBSCAN, on an exact grid index of our own.
+//! DBSCAN of `linfa-clustering`, with an exact grid index as its neighbour search.
 //!
-//! linfa searches neighbours through an index that it is given, but does not tell it the radius: ours is told. Its
-//! labels are those of scikit-learn (`tests/golden/dbscan.py`), whose convention it shares: a neighbour is at the radius
-//! or nearer.
+//! linfa searches neighbours through an index that its caller supplies, but does not pass the radius to the index. The
+//! index here receives the radius at its creation. The labels agree with those of scikit-learn
+//! (`tests/golden/dbscan.py`), which uses the same convention: a neighbour is at most the radius away.
 
 use linfa::Float;
 use linfa::ParamGuard;
@@ -12,23 +12,26 @@ use linfa_nn::distance::{Distance, L2Dist};
 use linfa_nn::{BuildError, NearestNeighbour, NearestNeighbourIndex, NnError};
 use ndarray::{Array2, ArrayBase, ArrayView1, ArrayView2, Data, Ix2};
 
-/// DBSCAN on the rows of a matrix of two columns. A neighbour is at `radius` or nearer; a core point has `core_points`
-/// neighbours, itself among them.
+/// Returns the cluster of each row of a matrix with two columns, or `None` for noise.
+///
+/// A neighbour is at most `radius` away. A core point has at least `core_points` neighbours, itself included.
 pub(super) fn dbscan(rows: &Array2<f64>, radius: f64, core_points: usize) -> Result<Vec<Option<usize>>, String> {
     let params = Dbscan::params_with(core_points, L2Dist, Grid { cell: radius }).tolerance(radius);
     let params = params.check().map_err(|error| error.to_string())?;
     Ok(params.transform(rows).to_vec())
 }
 
-/// A nearest-neighbour search on a uniform grid of square cells, for points in a plane: exact, and quick where the
-/// range searched is about the cell's size. It measures Euclidean distances, whatever distance it is given.
+/// A nearest-neighbour search for points in a plane, on a uniform grid of square cells.
+///
+/// The search is exact. It is fast if the search range is about the size of a cell. It always uses the Euclidean
+/// distance and ignores the distance that linfa passes to it.
 #[derive(Clone, Copy, Debug)]
 struct Grid {
     cell: f64,
 }
 
 impl NearestNeighbour for Grid {
-    /// Any other number of columns than two is refused as a wrong dimension.
+    /// Returns [`BuildError::ZeroDimension`] if the batch does not have two columns.
     fn from_batch_with_leaf_size<'a, F: Float, DT: Data<Elem = F>, D: 'a + Distance<F>>(
         &self,
         batch: &'a ArrayBase<DT, Ix2>,
@@ -42,21 +45,21 @@ impl NearestNeighbour for Grid {
     }
 }
 
-/// Neighbours for which memory is taken beforehand.
+/// Number of neighbours for which memory is allocated in advance.
 const NEIGHBOURS: usize = 128;
-/// The most cells along each axis; points spread wider get larger cells.
-const MOST_CELLS: f64 = 256.0;
+/// Maximum number of cells along each axis. Points that are spread wider get larger cells.
+const MAX_CELLS: f64 = 256.0;
 
-/// Points sorted by the cell that they lie in.
+/// The index of a batch of points: the points, sorted by cell.
 #[derive(Debug)]
 struct GridIndex<'a, F: Float> {
     batch: ArrayView2<'a, F>,
     low: [f64; 2],
     cell: f64,
     size: [usize; 2],
-    /// Where each cell begins in `sorted`; one more at the end.
+    /// Index in `sorted` at which each cell begins, followed by the length of `sorted`.
     starts: Vec<u32>,
-    /// Coordinates and row.
+    /// Coordinates and row of each point, in order of the cells.
     sorted: Vec<([f64; 2], u32)>,
 }
 
@@ -75,16 +78,16 @@ impl<'a, F: Float> GridIndex<'a, F> {
             }
         }
         let extent = (high[0] - low[0]).max(high[1] - low[1]).max(0.0);
-        let cell = cell.max(extent / MOST_CELLS);
+        let cell = cell.max(extent / MAX_CELLS);
         let mut index = Self { batch, low, cell, size: [1; 2], starts: Vec::new(), sorted: Vec::new() };
-        index.size = [0, 1].map(|axis| index.place(high[axis], axis, usize::MAX) + 1);
-        index.sort(points);
+        index.size = [0, 1].map(|axis| index.cell_along(high[axis], axis, usize::MAX) + 1);
+        index.sort_into_cells(points);
         index
     }
 
-    /// Sorts by counting.
+    /// Sorts the points by cell, with a counting sort.
     #[expect(clippy::cast_possible_truncation, reason = "a scan has at most 20,000 points")]
-    fn sort<I: Iterator<Item = [f64; 2]>>(&mut self, points: impl Fn() -> I) {
+    fn sort_into_cells<I: Iterator<Item = [f64; 2]>>(&mut self, points: impl Fn() -> I) {
         self.starts.resize(self.size[0] * self.size[1] + 1, 0);
         for point in points() {
             let cell = self.cell_of(point);
@@ -102,23 +105,24 @@ impl<'a, F: Float> GridIndex<'a, F> {
         }
     }
 
-    /// The cell along one axis, at most `most`.
+    /// Returns the index of the cell along one axis, at most `max`.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates, NaN gives 0, then clamped")]
-    fn place(&self, value: f64, axis: usize, most: usize) -> usize {
-        (((value - self.low[axis]) / self.cell) as usize).min(most)
+    fn cell_along(&self, value: f64, axis: usize, max: usize) -> usize {
+        (((value - self.low[axis]) / self.cell) as usize).min(max)
     }
 
+    /// Returns the index of the cell that contains a point.
     fn cell_of(&self, point: [f64; 2]) -> usize {
-        let [column, row] = [0, 1].map(|axis| self.place(point[axis], axis, self.size[axis] - 1));
+        let [column, row] = [0, 1].map(|axis| self.cell_along(point[axis], axis, self.size[axis] - 1));
         column * self.size[1] + row
     }
 
     /// Calls `each` with the squared distance and the row of each point within `range`.
-    fn visit(&self, point: [f64; 2], range: f64, mut each: impl FnMut(f64, usize)) {
+    fn for_each_within(&self, point: [f64; 2], range: f64, mut each: impl FnMut(f64, usize)) {
         let square = range * range;
         let span = |axis: usize| {
-            let most = self.size[axis] - 1;
-            self.place(point[axis] - range, axis, most)..=self.place(point[axis] + range, axis, most)
+            let max = self.size[axis] - 1;
+            self.cell_along(point[axis] - range, axis, max)..=self.cell_along(point[axis] + range, axis, max)
         };
         for column in span(0) {
             let rows = span(1);
@@ -139,7 +143,7 @@ impl<F: Float> NearestNeighbourIndex<F> for GridIndex<'_, F> {
     fn k_nearest(&self, point: ArrayView1<'_, F>, k: usize) -> Result<Vec<(ArrayView1<'_, F>, usize)>, NnError> {
         let at = coordinates(point)?;
         let mut found = Vec::with_capacity(self.sorted.len());
-        self.visit(at, f64::INFINITY, |distance, row| found.push((distance, row)));
+        self.for_each_within(at, f64::INFINITY, |distance, row| found.push((distance, row)));
         found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         found.truncate(k);
         Ok(found.into_iter().map(|(_, row)| (self.batch.row(row).reborrow(), row)).collect())
@@ -147,11 +151,12 @@ impl<F: Float> NearestNeighbourIndex<F> for GridIndex<'_, F> {
 
     fn within_range(&self, point: ArrayView1<'_, F>, range: F) -> Result<Vec<(ArrayView1<'_, F>, usize)>, NnError> {
         let mut found = Vec::with_capacity(NEIGHBOURS);
-        self.visit(coordinates(point)?, to_f64(range), |_, row| found.push((self.batch.row(row), row)));
+        self.for_each_within(coordinates(point)?, to_f64(range), |_, row| found.push((self.batch.row(row), row)));
         Ok(found)
     }
 }
 
+/// Returns the coordinates of a point, or [`NnError::WrongDimension`] if it does not have two.
 fn coordinates<F: Float>(point: ArrayView1<'_, F>) -> Result<[f64; 2], NnError> {
     if point.len() == 2 { Ok([to_f64(point[0]), to_f64(point[1])]) } else { Err(NnError::WrongDimension) }
 }
@@ -164,7 +169,7 @@ mod tests {
 
     use super::*;
 
-    /// One set of points of the golden file with the labels of scikit-learn.
+    /// A set of points of the golden file, with the labels of scikit-learn.
     struct GoldenSet<'a> {
         name: &'a str,
         radius: f64,
@@ -174,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn labels_are_those_of_scikit_learn_up_to_their_numbers() {
+    fn clusters_match_scikit_learn_up_to_numbering() {
         let golden = include_str!("../../../tests/golden/dbscan.csv");
         let mut sets: Vec<GoldenSet<'_>> = Vec::new();
         for line in golden.lines().skip(1) {
@@ -200,12 +205,12 @@ mod tests {
             }
             pairs.sort_unstable();
             pairs.dedup();
-            // One to one: each of our labels meets one of theirs, and the other way round.
+            // The mapping is one to one: each label corresponds to one of scikit-learn's, and vice versa.
             let clusters = expected.iter().max().unwrap() + 1;
             assert!(clusters > 1, "{name}");
             assert_eq!(pairs.len(), usize::try_from(clusters).unwrap(), "{name}");
-            for (place, pair) in pairs.iter().enumerate() {
-                assert_eq!(pair.0, place, "{name}");
+            for (index, pair) in pairs.iter().enumerate() {
+                assert_eq!(pair.0, index, "{name}");
                 assert!(pair.1 >= 0 && pairs.iter().filter(|other| other.1 == pair.1).count() == 1, "{name}");
             }
         }

@@ -1,19 +1,21 @@
-//! Density clustering, by DBSCAN (`linfa-clustering`) in a stretched plane.
+//! Density-based clustering by DBSCAN (`linfa-clustering`) in a stretched plane.
 //!
-//! Points of one vehicle lie millimetres apart at 3 m and metres apart at 100 m, where a layer on the bumper and the
-//! next on the windscreen differ by 2 m in depth. One radius cannot serve both. The points are therefore clustered in a
-//! plane that is stretched so that the radius, 1 there, is in metres
+//! Points of one vehicle lie millimetres apart at 3 m and metres apart at 100 m, where one layer on the bumper and the
+//! next on the windscreen differ by 2 m in depth. No single radius suits both distances. The points are therefore
+//! clustered in a plane that is stretched such that a radius of 1 in it corresponds, in metres, to
 //!
 //! ```text
-//!   along the road   e_x = 0.8 m + 0.015·r      (0.8 m near, 2.3 m at 100 m: less than any gap between vehicles that
-//!   across the road  e_y = 0.5 m + 0.005·r       follow each other there, and between vehicles side by side: 1.6 m)
+//!   along the road   e_x = 0.8 m + 0.015·r      0.8 m near, 2.3 m at 100 m: less than any gap between followers
+//!   across the road  e_y = 0.5 m + 0.005·r      less than 1.6 m between vehicles side by side
 //! ```
 //!
-//! with r the distance behind the sensor: X = ∫dr/e_x = ln(1 + b·r/a)/b, and Y = y/e_y, y relative to E's path.
+//! with r the distance behind the sensor. The stretched coordinates of a point, whose lateral offset from the ego's
+//! path is y, are X = ∫dr/e_x = ln(1 + b·r/a)/b for e_x = a + b·r, and Y = y/e_y.
 //!
-//! Where more points than make a core point share a small cell, the surplus is left out, and gets the cell's label
-//! afterwards: they are all core points of one cluster anyway. Thinning so never joins what DBSCAN would keep apart; it
-//! may part what hangs together only by gaps of more than 0.43 of the radius (two diagonals of a cell less than it).
+//! The points are thinned first. If a small cell contains more points than make a core point, the surplus is left out
+//! and receives the label of the cell afterwards: all points of such a cell are core points of the same cluster anyway.
+//! Thinning never joins clusters that DBSCAN would keep apart. It may split a cluster that is connected only by gaps of
+//! more than 0.43 of the radius, which is the radius less two diagonals of a cell.
 
 mod dbscan;
 
@@ -23,38 +25,42 @@ use ndarray::Array2;
 use super::ground::Candidate;
 use crate::SensorError;
 
-/// Radius along the road: at the sensor [m], and its gain with distance [1].
+/// Radius along the road at the sensor (m).
 const ALONG_M: f32 = 0.8;
+/// Increase of that radius per metre of distance.
 const ALONG_GAIN: f32 = 0.015;
-/// Radius across the road: at the sensor [m], and its gain with distance [1].
+/// Radius across the road at the sensor (m).
 const ACROSS_M: f32 = 0.5;
+/// Increase of that radius per metre of distance.
 const ACROSS_GAIN: f32 = 0.005;
-/// Points within the radius, itself among them, that make a point a core point.
+/// Number of points within the radius, the point itself included, that make a point a core point.
 pub(crate) const CORE_POINTS: usize = 3;
-/// The radius in the stretched plane.
+/// Radius in the stretched plane.
 const RADIUS: f64 = 1.0;
-/// Cells for thinning, per radius: all points of one cell are within the radius of each other.
+/// Number of thinning cells per radius. All points of a cell are within the radius of each other.
 const CELLS_PER_RADIUS: f32 = 5.0;
-/// Extent of the grid of cells: covers the region of interest.
+/// Number of thinning cells along the road, which cover the region of interest.
 const CELLS_ALONG: usize = 525;
+/// Number of thinning cells across the road, which cover the region of interest.
 const CELLS_ACROSS: usize = 200;
 
 /// Label of a point that belongs to no cluster.
 pub(crate) const NOISE: u32 = u32::MAX;
 
-/// Labels for points, with the memory that working them out takes.
+/// The cluster labels of the candidates, and the working memory of the clustering.
 #[derive(Clone, Debug)]
 pub(crate) struct Clustering {
-    /// For each candidate its cluster, or [`NOISE`].
+    /// Cluster of each candidate, or [`NOISE`].
     pub(crate) labels: Vec<u32>,
     /// Number of clusters.
     pub(crate) count: usize,
-    /// Number of candidates in each cell, up to [`CORE_POINTS`], and the row of the latest.
+    /// For each cell, the number of candidates that were kept, at most [`CORE_POINTS`], and the row of the latest.
     cells: Vec<(u8, u32)>,
-    /// The cell of each candidate.
+    /// Cell of each candidate.
     cell_of: Vec<u32>,
-    /// The row of each candidate in the matrix for linfa; that of another in the same cell where it was left out.
+    /// Row of each candidate in `rows`. A candidate that was left out has the row of another one in the same cell.
     row_of: Vec<u32>,
+    /// Stretched coordinates of the candidates that were kept: the rows of the matrix for linfa.
     rows: Vec<f64>,
 }
 
@@ -72,10 +78,10 @@ impl Default for Clustering {
 }
 
 impl Clustering {
-    /// Labels the candidates.
+    /// Assigns the candidates to clusters.
     ///
     /// # Errors
-    /// [`SensorError::Clustering`] where linfa refuses.
+    /// Returns [`SensorError::Clustering`] if linfa rejects its input.
     pub(crate) fn run(&mut self, candidates: &[Candidate]) -> Result<(), SensorError> {
         self.thin(candidates);
         self.labels.clear();
@@ -89,7 +95,7 @@ impl Clustering {
         let rows = Array2::from_shape_vec(shape, std::mem::take(&mut self.rows));
         let rows = rows.map_err(|error| refused(error.to_string()))?;
         let labels = dbscan(&rows, RADIUS, CORE_POINTS).map_err(refused)?;
-        self.count = labels.iter().flatten().max().map_or(0, |most| most + 1);
+        self.count = labels.iter().flatten().max().map_or(0, |max| max + 1);
         #[expect(clippy::cast_possible_truncation, reason = "fewer clusters than points")]
         let label = |row: &u32| labels[*row as usize].map_or(NOISE, |label| label as u32);
         self.labels.extend(self.row_of.iter().map(label));
@@ -97,20 +103,21 @@ impl Clustering {
         Ok(())
     }
 
-    /// Joins clusters: each to its host, which is another cluster or itself; hosts of hosts count.
-    pub(crate) fn merge(&mut self, hosts: &[u32]) {
+    /// Merges each cluster into its parent, which is another cluster or itself. Chains of parents are followed to their
+    /// end.
+    pub(crate) fn merge(&mut self, parents: &[u32]) {
         let root = |label: u32| {
             let mut root = label;
-            // A host is nearer than what it holds, so that the chain ends.
-            while hosts[root as usize] != root {
-                root = hosts[root as usize];
+            // The chain ends, because a parent is nearer than its children.
+            while parents[root as usize] != root {
+                root = parents[root as usize];
             }
             root
         };
         let mut next = 0;
-        let mut renumbered = vec![NOISE; hosts.len()];
-        for (label, &host) in (0..).zip(hosts) {
-            if label == host {
+        let mut renumbered = vec![NOISE; parents.len()];
+        for (label, &parent) in (0..).zip(parents) {
+            if label == parent {
                 renumbered[label as usize] = next;
                 next += 1;
             }
@@ -121,13 +128,13 @@ impl Clustering {
         self.count = next as usize;
     }
 
-    /// Stretches the plane, and leaves out surplus points.
+    /// Converts the candidates to the stretched plane, and leaves out the surplus points of each cell.
     fn thin(&mut self, candidates: &[Candidate]) {
         self.rows.clear();
         self.row_of.clear();
         self.cell_of.clear();
         for candidate in candidates {
-            let [along, across] = stretched(candidate);
+            let [along, across] = to_stretched_plane(candidate);
             let cell = cell(along, across);
             #[expect(clippy::cast_possible_truncation, reason = "a grid of 105,000 cells, a scan of 20,000 points")]
             self.cell_of.push(cell as u32);
@@ -147,12 +154,14 @@ impl Clustering {
     }
 }
 
-fn stretched(candidate: &Candidate) -> [f32; 2] {
+/// Returns the coordinates (X, Y) of a candidate in the stretched plane.
+fn to_stretched_plane(candidate: &Candidate) -> [f32; 2] {
     let along = (ALONG_GAIN / ALONG_M * candidate.back_m).ln_1p() / ALONG_GAIN;
     [along, candidate.left_m / (ACROSS_M + ACROSS_GAIN * candidate.back_m)]
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a float cast saturates, then clamped")]
+/// Returns the index of the thinning cell at a point of the stretched plane.
 fn cell(along: f32, across: f32) -> usize {
     let column = (along * CELLS_PER_RADIUS) as usize;
     let row = (across * CELLS_PER_RADIUS + 0.5 * CELLS_ACROSS as f32) as usize;
@@ -176,11 +185,12 @@ mod tests {
     }
 
     #[test]
-    fn vehicles_side_by_side_and_behind_each_other_stay_apart_at_any_range() {
+    fn neighbouring_vehicles_form_separate_clusters_at_any_range() {
         for back in [2.0, 10.0, 30.0, 60.0, 100.0, 145.0_f32] {
             let column_m = (back * 0.002_2).max(0.05);
             let mut points = Vec::new();
-            // Own lane, left lane (1.9 m between the sides), and a follower one radius and a half behind the first.
+            // One vehicle in the ego's lane, one in the left lane with 1.9 m between their sides, and one behind the
+            // first at a distance of 1.5 radii and 0.5 m.
             for (at, left) in [(back, 0.0), (back, 3.75), (back + 1.5 * (ALONG_M + ALONG_GAIN * back) + 0.5, 0.0)] {
                 let mut across = -0.92;
                 while across < 0.92 {
@@ -196,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn three_columns_of_a_motorcycle_are_a_cluster_and_two_are_not() {
+    fn three_columns_of_a_motorcycle_form_a_cluster_and_two_do_not() {
         assert_eq!(labels(&[(100.0, 0.0), (100.0, 0.22), (100.0, 0.44)]), [0, 0, 0]);
         assert_eq!(labels(&[(100.0, 0.0), (100.0, 0.22)]), [NOISE, NOISE]);
         assert_eq!(labels(&[]), [] as [u32; 0]);
@@ -208,18 +218,19 @@ mod tests {
 
     proptest! {
         #[test]
-        fn thinning_joins_nothing_and_parts_only_what_hangs_loosely_together(
+        fn thinning_joins_no_clusters_and_splits_only_loosely_connected_ones(
             points in plane(),
             copies in 1..6_usize,
         ) {
-            // Crowded cells: each point several times over.
+            // Several copies of each point make the cells crowded.
             let points: Vec<_> = points.iter().flat_map(|&point| vec![point; copies]).collect();
-            let rows: Vec<f64> = candidates(&points).iter().flat_map(|at| stretched(at).map(f64::from)).collect();
+            let stretched = |at: &Candidate| to_stretched_plane(at).map(f64::from);
+            let rows: Vec<f64> = candidates(&points).iter().flat_map(stretched).collect();
             let rows = Array2::from_shape_vec((points.len(), 2), rows).unwrap();
             let thinned = labels(&points);
             let whole = dbscan(&rows, RADIUS, CORE_POINTS).unwrap();
             let tight = dbscan(&rows, 0.43, CORE_POINTS).unwrap();
-            // A point on the border of two clusters may go to either: only core points are compared.
+            // A point on the border of two clusters may belong to either, so only core points are compared.
             let neighbours = |at: usize, radius: f64| {
                 let distance = |to: usize| (rows[[at, 0]] - rows[[to, 0]]).hypot(rows[[at, 1]] - rows[[to, 1]]);
                 (0..points.len()).filter(|&to| distance(to) <= radius).count()

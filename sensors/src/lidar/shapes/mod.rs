@@ -1,4 +1,4 @@
-//! Shapes of vehicles: a few convex solids each, with the materials that a LiDAR tells apart.
+//! The shapes of vehicles: a few convex solids each, with the materials that matter for a LiDAR.
 //!
 //! ```text
 //!            ____                      ┌──┐┌────────────────┐            o  helmet
@@ -7,8 +7,8 @@
 //!       (o)      (o)    wheels           o      o o     ooo            O  O  wheels
 //! ```
 //!
-//! Each follows the vehicle's own length, width and height; proportions are those of usual models, read off drawings,
-//! not of one model. Everything is in the vehicle's frame: x forward, z = 0 on the ground.
+//! Each shape is scaled to the vehicle's own length, width and height. The proportions are typical values read off
+//! drawings, not those of a specific model. All coordinates are in the vehicle's frame: x forward, z = 0 on the ground.
 
 mod car;
 mod motorcycle;
@@ -30,8 +30,8 @@ pub(crate) fn append_solids(vehicle: &Vehicle, solids: &mut Vec<Solid>) {
 
 /// Appends a block and its mirror image on the other side of y = 0.
 fn append_pair(low: [f64; 3], high: [f64; 3], material: Material, solids: &mut Vec<Solid>) {
-    solids.push(Solid::block(low, high, material));
-    solids.push(Solid::block([low[0], -high[1], low[2]], [high[0], -low[1], high[2]], material));
+    solids.push(Solid::cuboid(low, high, material));
+    solids.push(Solid::cuboid([low[0], -high[1], low[2]], [high[0], -low[1], high[2]], material));
 }
 
 #[cfg(test)]
@@ -41,7 +41,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_shape_fills_its_box_and_stays_within_it() {
+    fn every_shape_fills_its_bounding_box() {
         for class in VehicleClass::ALL {
             for body_shape in 0..8 {
                 let mut vehicle = Vehicle::typical(class);

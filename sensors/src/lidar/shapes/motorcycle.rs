@@ -1,4 +1,4 @@
-//! Motorcycles with their riders: naked, and with a fairing. They bear no plate in front.
+//! The shapes of motorcycles with their riders: with and without a fairing. They have no plate in front.
 
 use closecall_traffic::Vehicle;
 
@@ -8,7 +8,7 @@ use crate::lidar::solid::{HalfWidth, Solid, corner};
 
 const WHEEL_DIAMETER_M: f64 = 0.62;
 const TYRE_HALF_WIDTH_M: f64 = 0.07;
-/// Half the width of the front above the wheel: fork and lamp, or a fairing [m].
+/// Half the width of the front above the wheel (m): of fork and lamp, and of a fairing.
 const FRONT_HALF_WIDTHS_M: [f64; 2] = [0.13, 0.27];
 const TORSO_HALF_WIDTH_M: f64 = 0.25;
 const HELMET_HALF_WIDTH_M: f64 = 0.14;
@@ -20,12 +20,12 @@ pub(super) fn append(vehicle: &Vehicle, solids: &mut Vec<Solid>) {
     let shape = usize::from(vehicle.appearance.body_shape) % FRONT_HALF_WIDTHS_M.len();
     for from in [-front, front - WHEEL_DIAMETER_M] {
         let low = [from, -TYRE_HALF_WIDTH_M, 0.0];
-        solids.push(Solid::block(low, [from + WHEEL_DIAMETER_M, TYRE_HALF_WIDTH_M, WHEEL_DIAMETER_M], Tyre));
+        solids.push(Solid::cuboid(low, [from + WHEEL_DIAMETER_M, TYRE_HALF_WIDTH_M, WHEEL_DIAMETER_M], Tyre));
     }
     append_front(front, half, FRONT_HALF_WIDTHS_M[shape].min(half), solids);
     // Engine and seat.
-    solids.push(Solid::block([-front + 0.4, -0.2, 0.25], [front - 0.65, 0.2, 0.55], Plastic));
-    solids.push(Solid::block([-front + 0.15, -0.17, 0.55], [front - 0.7, 0.17, 0.85], Paint));
+    solids.push(Solid::cuboid([-front + 0.4, -0.2, 0.25], [front - 0.65, 0.2, 0.55], Plastic));
+    solids.push(Solid::cuboid([-front + 0.15, -0.17, 0.55], [front - 0.7, 0.17, 0.85], Paint));
     append_rider(front, top, solids);
 }
 
@@ -37,7 +37,7 @@ fn append_front(front: f64, half: f64, half_width: f64, solids: &mut Vec<Solid>)
         corner(front - 0.75, 0.62, Plastic),
     ];
     solids.push(Solid::prism(&fairing, HalfWidth { bottom_m: half_width, top_m: 0.7 * half_width }, Paint));
-    solids.push(Solid::block([front - 0.25, -0.09, 0.74], [front - 0.12, 0.09, 0.88], Lamp));
+    solids.push(Solid::cuboid([front - 0.25, -0.09, 0.74], [front - 0.12, 0.09, 0.88], Lamp));
     // Handlebar with hands and mirrors.
     append_pair([front - 0.75, 0.2, 0.95], [front - 0.60, half, 1.07], Textile, solids);
 }
@@ -54,5 +54,5 @@ fn append_rider(front: f64, top: f64, solids: &mut Vec<Solid>) {
     // Thighs and knees.
     append_pair([front - 1.35, 0.14, 0.55], [front - 0.80, 0.30, 0.80], Textile, solids);
     let [low, high] = [front - 1.20, front - 0.92];
-    solids.push(Solid::block([low, -HELMET_HALF_WIDTH_M, chin], [high, HELMET_HALF_WIDTH_M, top], Textile));
+    solids.push(Solid::cuboid([low, -HELMET_HALF_WIDTH_M, chin], [high, HELMET_HALF_WIDTH_M, top], Textile));
 }

@@ -1,4 +1,4 @@
-//! Trucks: tractor with semi-trailer, rigid truck.
+//! The shapes of trucks: tractor with semi-trailer, and rigid truck.
 
 use closecall_traffic::Vehicle;
 
@@ -6,20 +6,22 @@ use super::append_pair;
 use crate::lidar::Material::{Glass, Lamp, Paint, Plastic, Plate, Tarpaulin, Tyre};
 use crate::lidar::solid::{HalfWidth, Solid, corner};
 
-/// Length of the tractor's or the truck's cabin [m].
+/// Length of the cabin (m).
 const CABIN_M: f64 = 2.3;
-/// Free space between the cabin and the load [m]: a semi-trailer has to turn, a box does not.
+/// Gap between the cabin and the load (m): of a semi-trailer, which needs space to turn, and of a rigid truck's box.
 const GAPS_M: [f64; 2] = [0.7, 0.15];
-/// Underside of the cabin, and of the load [m].
+/// Height of the cabin's underside (m).
 const CABIN_FLOOR_M: f64 = 0.35;
+/// Height of the load's underside (m).
 const LOAD_FLOOR_M: f64 = 1.1;
-/// Height of the cabin's roof [share of the height].
+/// Height of the cabin's roof (share of the height).
 const CABIN_TOP: f64 = 0.95;
-/// Windscreen from and to [share of the cabin's top].
+/// Heights of the windscreen's lower and upper edge (share of the height of the cabin's roof).
 const SCREEN: [f64; 2] = [0.50, 0.78];
 const WHEEL_DIAMETER_M: f64 = 1.0;
 const TYRE_WIDTH_M: f64 = 0.3;
-/// Lateral guard between the axles, required by UN Regulation 73, from and to [m].
+/// Heights of the lower and upper edge of the lateral guards between the axles (m). UN Regulation 73 requires the
+/// guards.
 const GUARD_M: [f64; 2] = [0.5, 0.95];
 
 pub(super) fn append(vehicle: &Vehicle, solids: &mut Vec<Solid>) {
@@ -28,9 +30,9 @@ pub(super) fn append(vehicle: &Vehicle, solids: &mut Vec<Solid>) {
     let gap = GAPS_M[usize::from(vehicle.appearance.body_shape) % GAPS_M.len()];
     append_cabin(front, half, CABIN_TOP * top, solids);
     let load_front = (front - CABIN_M - gap).max(-front + 0.5);
-    solids.push(Solid::block([-front, -half, LOAD_FLOOR_M.min(0.5 * top)], [load_front, half, top], Tarpaulin));
-    // The frame, a meter wide, joins cabin and load.
-    solids.push(Solid::block([-front + 0.3, -0.5, 0.6], [front - CABIN_M, 0.5, LOAD_FLOOR_M.min(0.5 * top)], Plastic));
+    solids.push(Solid::cuboid([-front, -half, LOAD_FLOOR_M.min(0.5 * top)], [load_front, half, top], Tarpaulin));
+    // The chassis frame, a metre wide, joins the cabin and the load.
+    solids.push(Solid::cuboid([-front + 0.3, -0.5, 0.6], [front - CABIN_M, 0.5, LOAD_FLOOR_M.min(0.5 * top)], Plastic));
     append_running_gear(front, half, load_front, solids);
 }
 
@@ -48,12 +50,12 @@ fn append_cabin(front: f64, half: f64, top: f64, solids: &mut Vec<Solid>) {
     ];
     solids.push(Solid::prism(&profile, HalfWidth::straight(half - 0.02), Paint));
     let base = front - 0.2;
-    solids.push(Solid::block([base, -0.7 * half, 0.75], [front - 0.01, 0.7 * half, screen[0] - 0.3], Plastic));
-    solids.push(Solid::block([base, -0.26, 0.50], [front, 0.26, 0.61], Plate));
+    solids.push(Solid::cuboid([base, -0.7 * half, 0.75], [front - 0.01, 0.7 * half, screen[0] - 0.3], Plastic));
+    solids.push(Solid::cuboid([base, -0.26, 0.50], [front, 0.26, 0.61], Plate));
     append_pair([base, 0.66 * half, 0.55], [front - 0.01, 0.95 * half, 0.80], Lamp, solids);
 }
 
-/// Wheels and the guards between them.
+/// Appends the wheels and the lateral guards between them.
 fn append_running_gear(front: f64, half: f64, load_front: f64, solids: &mut Vec<Solid>) {
     let rear = -front;
     let length = 2.0 * front;

@@ -1,4 +1,4 @@
-//! Boxes and clusters against the truth.
+//! Boxes and clusters, compared with the ground truth.
 
 use closecall_traffic::VehicleClass;
 
@@ -6,18 +6,18 @@ use super::*;
 use crate::Extent;
 
 #[test]
-fn the_stated_deviations_of_faces_are_those_that_occur() {
+fn reported_standard_deviations_match_the_errors_of_the_front_face() {
     for class in VehicleClass::ALL {
         let (mut along, mut across, mut n) = (0.0, 0.0, 0.0);
         for step in 0..120_i32 {
             let gap = 4.0 + 0.75 * f64::from(step);
             let left = [0.0, 3.75, -3.75, 0.7][step as usize % 4];
-            let mut stage = Stage::new().with(class, gap, left);
+            let mut setup = TestScene::new().with(class, gap, left);
             let mut lidar = RearLidar::new(Lidar::default());
-            let found = stage.look(&mut lidar, step.into());
-            let Some((box_, dx, dy)) = first_face(&stage, &found) else { continue };
-            along += (dx / box_.range_sd_m).powi(2);
-            across += (dy / box_.lateral_sd_m).powi(2);
+            let found = setup.detect(&mut lidar, step.into());
+            let Some((detection, dx, dy)) = first_vehicle_error(&setup, &found) else { continue };
+            along += (dx / detection.range_sd_m).powi(2);
+            across += (dy / detection.lateral_sd_m).powi(2);
             n += 1.0;
         }
         let (along, across) = (f64::sqrt(along / n), f64::sqrt(across / n));
@@ -28,37 +28,37 @@ fn the_stated_deviations_of_faces_are_those_that_occur() {
 }
 
 #[test]
-fn classes_and_widths_are_told_by_shape() {
+fn class_and_width_follow_from_the_shape() {
     for class in VehicleClass::ALL {
         for body_shape in 0..4 {
             for gap in [4.0, 10.0, 25.0, 50.0] {
-                let mut stage = Stage::new().with(class, gap, 0.0);
-                stage.others[0].vehicle.appearance.body_shape = body_shape;
-                let found = stage.look(&mut RearLidar::new(Lidar::default()), 1);
-                let (box_, ..) = first_face(&stage, &found).unwrap();
-                assert_eq!(box_.class.best_vehicle_class(), class, "{body_shape} at {gap} m: {box_:?}");
-                assert!(box_.class.vehicle() > 0.6, "{body_shape} at {gap} m: {box_:?}");
-                assert_eq!(box_.width, Extent::Seen);
+                let mut setup = TestScene::new().with(class, gap, 0.0);
+                setup.others[0].vehicle.appearance.body_shape = body_shape;
+                let found = setup.detect(&mut RearLidar::new(Lidar::default()), 1);
+                let (detection, ..) = first_vehicle_error(&setup, &found).unwrap();
+                assert_eq!(detection.class.best_vehicle_class(), class, "{body_shape} at {gap} m: {detection:?}");
+                assert!(detection.class.vehicle() > 0.6, "{body_shape} at {gap} m: {detection:?}");
+                assert_eq!(detection.width, Extent::Seen);
                 let width = class.typical_dimensions().width_m;
-                assert!((box_.width_m - width).abs() < 0.35, "{} for {width} at {gap} m", box_.width_m);
+                assert!((detection.width_m - width).abs() < 0.35, "{} for {width} at {gap} m", detection.width_m);
             }
         }
     }
 }
 
 #[test]
-fn clusters_are_vehicles() {
+fn each_vehicle_forms_one_cluster() {
     let mut report = SegmentationReport::default();
     let mut lidar = RearLidar::new(Lidar::default());
     for step in 0..60_i32 {
         let along = f64::from(step);
-        let mut stage = Stage::new()
+        let mut setup = TestScene::new()
             .with(VehicleClass::Car, 2.0 + 1.5 * along, 0.0)
             .with(VehicleClass::Truck, 5.0 + along, -3.75)
             .with(VehicleClass::Motorcycle, 60.0 - along, 3.75)
             .with(VehicleClass::Car, 25.0 + 1.2 * along, 3.75);
-        stage.look(&mut lidar, step.into());
-        lidar.report(&mut report);
+        setup.detect(&mut lidar, step.into());
+        lidar.add_to_report(&mut report);
     }
     assert!(report.vehicles > 180, "{report:?}");
     let share = |count: usize| count as f64 / report.vehicles as f64;

@@ -1,6 +1,6 @@
-//! The quick ray cast against brute force.
+//! The fast ray cast, compared with brute force.
 
-use closecall_traffic::VehicleClass;
+use closecall_traffic::{CONTROL_STEP, Time, VehicleClass};
 use proptest::prelude::*;
 
 use super::*;
@@ -22,16 +22,16 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(32))]
 
     #[test]
-    fn brute_force_and_the_quick_cast_agree(
+    fn the_fast_ray_cast_agrees_with_brute_force(
         others in prop::collection::vec(placed_vehicle(), 0..5),
         (curvature, pitch_rad, plus) in (-0.0025..0.0025_f64, -0.04..0.04_f64, any::<bool>()),
     ) {
-        let mut stage = Stage::new();
-        stage.others = others;
-        stage.road = guarded(curvature);
-        stage.ego.pitch_rad = pitch_rad;
-        stage.time = Time::from_ns(if plus { 0 } else { PERIOD_NS });
+        let mut setup = TestScene::new();
+        setup.others = others;
+        setup.road = road_with_guard_rails(curvature);
+        setup.ego.pitch_rad = pitch_rad;
+        setup.time = if plus { Time::ZERO } else { CONTROL_STEP };
         let mut scanner = Scanner::new(Lidar::default());
-        scanner.assert_cast_agrees_with_brute_force(&stage.scene());
+        scanner.assert_cast_agrees_with_brute_force(&setup.scene());
     }
 }

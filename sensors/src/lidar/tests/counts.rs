@@ -1,14 +1,14 @@
-//! Points on a vehicle, against counts of the pattern by hand and against the physics of range.
+//! Numbers of points on a vehicle, compared with the scan pattern, with real scans and with the link budget.
 
 use closecall_traffic::{Environment, VehicleClass};
 
 use super::*;
 
-/// Beams whose centres meet the upright rectangle, by the formula of the pattern alone.
-fn hand_count(mirror: Mirror, distance_m: f64, half_width_m: f64, [low_m, high_m]: [f64; 2]) -> usize {
+/// Returns the number of beams whose centres hit an upright rectangle, from the formula of the scan pattern alone.
+fn hand_count(mirror_side: MirrorSide, distance_m: f64, half_width_m: f64, [low_m, high_m]: [f64; 2]) -> usize {
     let pattern = Pattern::scala_2();
     let meets = |&beam: &u16| {
-        let (azimuth, elevation) = pattern.direction_rad(mirror, beam);
+        let (azimuth, elevation) = pattern.direction_rad(mirror_side, beam);
         let height = 0.6 + distance_m / azimuth.cos() * elevation.tan();
         (distance_m * azimuth.tan()).abs() < half_width_m && height > low_m && height < high_m
     };
@@ -16,23 +16,28 @@ fn hand_count(mirror: Mirror, distance_m: f64, half_width_m: f64, [low_m, high_m
 }
 
 #[test]
-fn the_counts_on_a_truck_are_those_of_the_pattern() {
+fn point_counts_on_a_truck_match_the_scan_pattern() {
     for gap_m in [3.0, 10.0, 30.0, 60.0] {
-        let mut stage = Stage::new().with(VehicleClass::Truck, gap_m, 0.0);
+        let mut setup = TestScene::new().with(VehicleClass::Truck, gap_m, 0.0);
         let mut lidar = RearLidar::new(Lidar { dropout: 0.0, ..Lidar::default() });
-        for look in 0..2 {
-            stage.look(&mut lidar, look);
-            let mirror = lidar.latest().mirror;
+        for scan_index in 0..2 {
+            setup.detect(&mut lidar, scan_index);
+            let mirror_side = lidar.latest().mirror_side;
             let points = lidar.latest().beam.iter().zip(&lidar.truth().points);
             let on = points.filter(|(_, point)| point.source == PointSource::Actor(1));
             let mut beams: Vec<u16> = on.map(|(&beam, _)| beam).collect();
             beams.dedup();
-            // The cabin's front is 2.51 m wide and reaches from 0.35 m to 3.8 m: at least the beams whose centres meet
-            // it, and at most those whose footprints touch the vehicle, wheels and load taken in.
+            // The cabin's front is 2.51 m wide and extends from 0.35 m to 3.8 m. The count is at least the number of
+            // beams whose centres hit the front, and at most the number whose footprints touch the vehicle, including
+            // its wheels and its load.
             let footprint = [gap_m * 0.0625_f64.to_radians(), gap_m * 0.3_f64.to_radians()];
-            let least = hand_count(mirror, gap_m, 1.255, [0.35, 3.8]);
-            let most =
-                hand_count(mirror, gap_m, 1.275 + 1.2 * footprint[0], [-1.2 * footprint[1], 4.0 + 1.2 * footprint[1]]);
+            let least = hand_count(mirror_side, gap_m, 1.255, [0.35, 3.8]);
+            let most = hand_count(
+                mirror_side,
+                gap_m,
+                1.275 + 1.2 * footprint[0],
+                [-1.2 * footprint[1], 4.0 + 1.2 * footprint[1]],
+            );
             assert!((least..=most).contains(&beams.len()), "{} not in {least}..={most} at {gap_m} m", beams.len());
             assert!(most as f64 / least as f64 - 1.0 < 0.6, "{least} {most}");
         }
@@ -40,25 +45,25 @@ fn the_counts_on_a_truck_are_those_of_the_pattern() {
 }
 
 #[test]
-fn the_counts_on_a_car_are_those_that_recordings_show() {
+fn point_counts_on_a_car_match_real_scans() {
     for gap_m in [3.0, 4.0, 5.0] {
-        let points = Stage::new().with(VehicleClass::Car, gap_m, 0.0).mean_points();
+        let points = TestScene::new().with(VehicleClass::Car, gap_m, 0.0).mean_points();
         assert!((2_500.0..=4_100.0).contains(&points), "{points} at {gap_m} m");
     }
-    let points = Stage::new().with(VehicleClass::Car, 30.0, 0.0).mean_points();
-    // 28 columns by the 4 or 5 layers between 0.18 m and 1.5 m.
+    let points = TestScene::new().with(VehicleClass::Car, 30.0, 0.0).mean_points();
+    // 28 columns times the 4 or 5 layers between 0.18 m and 1.5 m.
     assert!((100.0..=160.0).contains(&points), "{points}");
-    let points = Stage::new().with(VehicleClass::Car, 100.0, 0.0).mean_points();
+    let points = TestScene::new().with(VehicleClass::Car, 100.0, 0.0).mean_points();
     assert!((5.0..=20.0).contains(&points), "{points}");
 }
 
 #[test]
 fn a_motorcycle_at_100_m_fills_three_columns() {
-    let mut stage = Stage::new().with(VehicleClass::Motorcycle, 100.0, 0.0);
-    // A receiver that misses nothing shows the geometry alone.
+    let mut setup = TestScene::new().with(VehicleClass::Motorcycle, 100.0, 0.0);
+    // With a receiver that misses no return, only the geometry counts.
     let mut lidar = RearLidar::new(Lidar { dropout: 0.0, nominal_range_m: 500.0, ..Lidar::default() });
-    for look in 0..2 {
-        stage.look(&mut lidar, look);
+    for scan_index in 0..2 {
+        setup.detect(&mut lidar, scan_index);
         let points = lidar.latest().beam.iter().zip(&lidar.truth().points);
         let on = points.filter(|(_, point)| point.source == PointSource::Actor(1));
         let mut columns: Vec<usize> = on.map(|(&beam, _)| usize::from(beam) / LAYERS).collect();
@@ -69,17 +74,17 @@ fn a_motorcycle_at_100_m_fills_three_columns() {
 }
 
 #[test]
-fn dark_paint_rain_and_fog_shorten_the_sight() {
+fn dark_paint_rain_and_fog_reduce_the_point_count() {
     let seen = |reflectivity: f64, environment: Environment, gap_m: f64| {
-        let mut stage = Stage::new().with(VehicleClass::Car, gap_m, 0.0);
-        stage.environment = environment;
-        stage.others[0].vehicle.appearance.paint_reflectivity = reflectivity;
-        stage.mean_points()
+        let mut setup = TestScene::new().with(VehicleClass::Car, gap_m, 0.0);
+        setup.environment = environment;
+        setup.others[0].vehicle.appearance.paint_reflectivity = reflectivity;
+        setup.mean_points()
     };
     let clear = Environment::CLEAR_DAY;
     let rain = Environment { rain_mm_per_h: 50.0, ..clear };
     let fog = |visibility_m| Environment { visibility_m, ..clear };
-    // At 90 m every step makes a difference; two-way transmission: rain 0.54, fog of 200 m 0.03.
+    // At 90 m each step has an effect. The two-way transmission is 0.54 in rain, and 0.03 in fog of 200 m visibility.
     let counts = [
         seen(0.8, clear, 90.0),
         seen(0.5, clear, 90.0),
@@ -92,29 +97,31 @@ fn dark_paint_rain_and_fog_shorten_the_sight() {
     assert!(fogs.windows(2).all(|pair| pair[0] > pair[1]), "{fogs:?}");
 }
 
-/// Share of scans in which the first of the others is found as a vehicle, over gaps from `from_m` on.
+/// Returns the share of 60 scans in which the first of the other vehicles is detected as a vehicle, at gaps from
+/// `from_m` to about 10 m more.
 fn found_share(class: VehicleClass, reflectivity: f64, environment: Environment, from_m: f64) -> f64 {
     let mut lidar = RearLidar::new(Lidar::default());
     let mut found = 0;
-    for look in 0..60_i32 {
-        let mut stage = Stage::new().with(class, from_m + 0.17 * f64::from(look), 0.3 * f64::from(look % 5 - 2));
-        stage.environment = environment;
-        stage.others[0].vehicle.appearance.paint_reflectivity = reflectivity;
-        let boxes = stage.look(&mut lidar, look.into());
-        let vehicle = |(box_, ..): (Detection, f64, f64)| box_.class.vehicle() > 0.5;
-        found += u32::from(first_face(&stage, &boxes).is_some_and(vehicle));
+    for scan_index in 0..60_i32 {
+        let mut setup =
+            TestScene::new().with(class, from_m + 0.17 * f64::from(scan_index), 0.3 * f64::from(scan_index % 5 - 2));
+        setup.environment = environment;
+        setup.others[0].vehicle.appearance.paint_reflectivity = reflectivity;
+        let boxes = setup.detect(&mut lidar, scan_index.into());
+        let vehicle = |(detection, ..): (Detection, f64, f64)| detection.class.vehicle() > 0.5;
+        found += u32::from(first_vehicle_error(&setup, &boxes).is_some_and(vehicle));
     }
     f64::from(found) / 60.0
 }
 
 #[test]
-fn ranges_of_detection_follow_from_the_physics() {
+fn detection_ranges_follow_from_reflectivity_and_visibility() {
     let clear = Environment::CLEAR_DAY;
     let fog = Environment { visibility_m: 100.0, ..clear };
     let car = |reflectivity, environment, from_m| found_share(VehicleClass::Car, reflectivity, environment, from_m);
     assert!(car(0.5, clear, 90.0) > 0.95);
     assert!(car(0.5, clear, 100.0) > 0.75);
-    // Half of the scans, one side of the mirror, are enough to confirm a track.
+    // Half of the scans, those of one mirror side, are enough to confirm a track.
     assert!(car(0.5, clear, 120.0) > 0.2);
     assert!(car(0.1, clear, 60.0) > 0.9 && car(0.1, clear, 100.0) < 0.2);
     assert!(car(0.5, fog, 30.0) > 0.8 && car(0.5, fog, 70.0) < 0.2);

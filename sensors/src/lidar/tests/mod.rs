@@ -1,4 +1,4 @@
-//! The rear LiDAR as a whole: what it sees of vehicles at known places.
+//! Tests of the rear LiDAR as a whole, with vehicles at known positions.
 
 mod boxes;
 mod cast;
@@ -9,15 +9,17 @@ mod surroundings;
 use super::*;
 use crate::testing::{scene_vehicle, with_speed};
 use crate::{Detection, Scene, SceneVehicle};
-use closecall_traffic::{ActorId, Environment, Road, Stream, Time, VehicleClass, VehicleState, stream};
+use closecall_traffic::{ActorId, CONTROL_STEP, Environment, Road, Stream, Time, VehicleClass, VehicleState, stream};
 
-/// E's lane is the middle one of three.
+/// Lateral position of the ego (m), in the middle one of three lanes.
 const LANE_D_M: f64 = -5.625;
+/// Speed of the ego and of the other vehicles (m/s).
 const SPEED_MPS: f64 = 30.0;
-/// From E's origin to its rear bumper [m].
-const REAR_M: f64 = 2.3;
+/// Distance of the rear bumper from the ego's origin (m).
+const REAR_BUMPER_M: f64 = 2.3;
 
-struct Stage {
+/// A scene for the tests, with the ego and other vehicles on a straight road by default.
+struct TestScene {
     time: Time,
     road: Road,
     environment: Environment,
@@ -25,16 +27,16 @@ struct Stage {
     others: Vec<SceneVehicle>,
 }
 
-impl Stage {
+impl TestScene {
     fn new() -> Self {
         let ego = with_speed(scene_vehicle(0, VehicleClass::Car, 1_000.0, LANE_D_M), SPEED_MPS);
         Self { time: Time::ZERO, road: Road::straight(3), environment: Environment::CLEAR_DAY, ego, others: Vec::new() }
     }
 
-    /// With a vehicle whose front is `gap_m` behind E's rear, `left_m` to the left of E, as fast as E.
+    /// Adds a vehicle whose front is `gap_m` behind the ego's rear and `left_m` to its left, at the ego's speed.
     fn with(mut self, class: VehicleClass, gap_m: f64, left_m: f64) -> Self {
         let half = 0.5 * class.typical_dimensions().length_m;
-        let s_m = self.ego.state.s_m - REAR_M - gap_m - half;
+        let s_m = self.ego.state.s_m - REAR_BUMPER_M - gap_m - half;
         let vehicle = scene_vehicle(self.others.len() + 1, class, s_m, LANE_D_M + left_m);
         self.others.push(with_speed(vehicle, SPEED_MPS));
         self
@@ -44,19 +46,19 @@ impl Stage {
         Scene { time: self.time, road: &self.road, environment: &self.environment, ego: self.ego, others: &self.others }
     }
 
-    /// Looks once, at the side of the mirror that belongs to `look`, with noise that does too.
-    fn look(&mut self, lidar: &mut RearLidar, look: i64) -> Vec<Detection> {
-        self.time = Time::from_ns(PERIOD_NS * look);
-        lidar.scan(&self.scene(), &mut random(look.unsigned_abs()));
+    /// Scans once and returns the detections. `scan_index` determines the side of the mirror and the noise.
+    fn detect(&mut self, lidar: &mut RearLidar, scan_index: i64) -> Vec<Detection> {
+        self.time = CONTROL_STEP * scan_index;
+        lidar.scan(&self.scene(), &mut random(scan_index.unsigned_abs()));
         lidar.detect().unwrap().to_vec()
     }
 
-    /// Points on the first of the others, mean over 20 scans.
+    /// Returns the mean number of points on the first of the other vehicles over 20 scans.
     fn mean_points(&mut self) -> f64 {
         let mut lidar = RearLidar::new(Lidar::default());
         let mut points = 0;
-        for look in 0..20 {
-            self.look(&mut lidar, look);
+        for scan_index in 0..20 {
+            self.detect(&mut lidar, scan_index);
             points += count(lidar.truth(), PointSource::Actor(1));
         }
         points as f64 / 20.0
@@ -71,23 +73,24 @@ fn count(truth: &ScanTruth, source: PointSource) -> usize {
     truth.points.iter().filter(|point| point.source == source).count()
 }
 
-fn guarded(curvature_per_m: f64) -> Road {
+fn road_with_guard_rails(curvature_per_m: f64) -> Road {
     let text = format!("lanes = 3\nguard-rails = true\ncurvature-per-m = {curvature_per_m:.6}");
     let config: closecall_traffic::RoadConfig = toml::from_str(&text).unwrap();
     closecall_traffic::Check::check(&config, &closecall_traffic::Parameters::default()).unwrap()
 }
 
-/// Detections that belong to the first of the others, with its true face.
-fn first_face(stage: &Stage, found: &[Detection]) -> Option<(Detection, f64, f64)> {
-    let state: &VehicleState = &stage.others[0].state;
-    let half = 0.5 * stage.others[0].vehicle.dimensions.length_m;
-    let near = |box_: &&Detection| {
-        let since_s = (stage.time - box_.time).s();
-        let x = state.s_m + half - SPEED_MPS * since_s - stage.ego.state.s_m;
-        (box_.face_x_m - x).abs() < 2.5 && (box_.face_y_m - (state.d_m - LANE_D_M)).abs() < 1.5
+/// Returns the detection of the first of the other vehicles, and the longitudinal and lateral error of its front face
+/// (m).
+fn first_vehicle_error(setup: &TestScene, found: &[Detection]) -> Option<(Detection, f64, f64)> {
+    let state: &VehicleState = &setup.others[0].state;
+    let half = 0.5 * setup.others[0].vehicle.dimensions.length_m;
+    let near = |detection: &&Detection| {
+        let since_s = (setup.time - detection.time).s();
+        let x = state.s_m + half - SPEED_MPS * since_s - setup.ego.state.s_m;
+        (detection.face_x_m - x).abs() < 2.5 && (detection.face_y_m - (state.d_m - LANE_D_M)).abs() < 1.5
     };
-    let box_ = found.iter().find(near)?;
-    let since_s = (stage.time - box_.time).s();
-    let x = state.s_m + half - SPEED_MPS * since_s - stage.ego.state.s_m;
-    Some((box_.clone(), box_.face_x_m - x, box_.face_y_m - (state.d_m - LANE_D_M)))
+    let detection = found.iter().find(near)?;
+    let since_s = (setup.time - detection.time).s();
+    let x = state.s_m + half - SPEED_MPS * since_s - setup.ego.state.s_m;
+    Some((detection.clone(), detection.face_x_m - x, detection.face_y_m - (state.d_m - LANE_D_M)))
 }

@@ -1,17 +1,17 @@
-//! Bends, motion during the sweep, and repeatability to the bit.
+//! Curved roads, motion during the sweep, and bit-for-bit repeatability.
 
 use closecall_traffic::{Road, VehicleClass};
 
 use super::*;
 
 #[test]
-fn a_bend_bends_the_boxes_with_it() {
-    let mut stage = Stage::new().with(VehicleClass::Car, 60.0, 0.0);
-    stage.road = Road::straight(3).with_curvature(0.0025);
+fn boxes_follow_the_curvature_of_the_road() {
+    let mut setup = TestScene::new().with(VehicleClass::Car, 60.0, 0.0);
+    setup.road = Road::straight(3).with_curvature(0.0025);
     let mut lidar = RearLidar::new(Lidar::default());
-    let found = stage.look(&mut lidar, 0);
+    let found = setup.detect(&mut lidar, 0);
     assert_eq!(found.len(), 1);
-    // Chord of a circle of 394 m radius... of E's lane: y = κ·x²/2 with κ = 0.0025/(1 + 0.0025·5.625).
+    // The ego's path is a circle of curvature κ = 0.0025/(1 + 0.0025·5.625) per metre: y = κ·x²/2.
     let kappa = 0.0025 / (1.0 + 0.0025 * 5.625);
     let expected = 0.5 * kappa * found[0].face_x_m.powi(2);
     assert!((found[0].face_y_m - expected).abs() < 0.2, "{} for {expected}", found[0].face_y_m);
@@ -19,31 +19,31 @@ fn a_bend_bends_the_boxes_with_it() {
 }
 
 #[test]
-fn what_stands_still_is_where_it_stands_at_the_end_of_the_scan() {
-    let mut stage = Stage::new().with(VehicleClass::Truck, 30.0, 0.0);
-    stage.others[0].state.speed_mps = 0.0;
+fn a_static_target_is_measured_at_its_position_at_the_end_of_the_scan() {
+    let mut setup = TestScene::new().with(VehicleClass::Truck, 30.0, 0.0);
+    setup.others[0].state.speed_mps = 0.0;
     let mut lidar = RearLidar::new(Lidar::default());
-    let found = stage.look(&mut lidar, 5);
-    assert!((found[0].face_x_m + REAR_M + 30.0).abs() < 0.1, "{}", found[0].face_x_m);
-    // What drives is where it was when it was measured.
-    stage.others[0].state.speed_mps = SPEED_MPS;
-    let found = stage.look(&mut lidar, 5);
-    let since_s = (stage.time - found[0].time).s();
+    let found = setup.detect(&mut lidar, 5);
+    assert!((found[0].face_x_m + REAR_BUMPER_M + 30.0).abs() < 0.1, "{}", found[0].face_x_m);
+    // A moving target is detected at its position at the time of measurement.
+    setup.others[0].state.speed_mps = SPEED_MPS;
+    let found = setup.detect(&mut lidar, 5);
+    let since_s = (setup.time - found[0].time).s();
     assert!((0.006..0.009).contains(&since_s), "{since_s}");
-    let expected = -REAR_M - 30.0 - SPEED_MPS * since_s;
+    let expected = -REAR_BUMPER_M - 30.0 - SPEED_MPS * since_s;
     assert!((found[0].face_x_m - expected).abs() < 0.1, "{} for {expected}", found[0].face_x_m);
 }
 
 #[test]
-fn scans_are_the_same_to_the_bit_whatever_was_scanned_before() {
-    let mut stage = Stage::new().with(VehicleClass::Car, 12.0, 0.3).with(VehicleClass::Truck, 40.0, -3.75);
-    stage.road = guarded(0.001);
-    stage.environment.water_film_mm = 0.5;
+fn scans_do_not_depend_on_earlier_scans() {
+    let mut setup = TestScene::new().with(VehicleClass::Car, 12.0, 0.3).with(VehicleClass::Truck, 40.0, -3.75);
+    setup.road = road_with_guard_rails(0.001);
+    setup.environment.water_film_mm = 0.5;
     let mut fresh = RearLidar::new(Lidar::default());
-    let first = stage.look(&mut fresh, 3);
+    let first = setup.detect(&mut fresh, 3);
     let mut used = RearLidar::new(Lidar::default());
-    Stage::new().with(VehicleClass::Motorcycle, 3.0, 0.0).look(&mut used, 8);
-    let second = stage.look(&mut used, 3);
+    TestScene::new().with(VehicleClass::Motorcycle, 3.0, 0.0).detect(&mut used, 8);
+    let second = setup.detect(&mut used, 3);
     let bits = |lidar: &RearLidar| -> Vec<u32> {
         let scan = lidar.latest();
         let columns = [&scan.x_m, &scan.y_m, &scan.z_m, &scan.intensity];
@@ -55,12 +55,12 @@ fn scans_are_the_same_to_the_bit_whatever_was_scanned_before() {
 }
 
 #[test]
-fn another_vehicle_leaves_the_noise_of_other_beams_alone() {
-    let mut alone = Stage::new().with(VehicleClass::Car, 20.0, 0.0);
-    let mut beside = Stage::new().with(VehicleClass::Car, 20.0, 0.0).with(VehicleClass::Car, 20.0, 7.0);
+fn another_vehicle_does_not_change_the_noise_of_other_beams() {
+    let mut alone = TestScene::new().with(VehicleClass::Car, 20.0, 0.0);
+    let mut beside = TestScene::new().with(VehicleClass::Car, 20.0, 0.0).with(VehicleClass::Car, 20.0, 7.0);
     let (mut a, mut b) = (RearLidar::new(Lidar::default()), RearLidar::new(Lidar::default()));
-    alone.look(&mut a, 0);
-    beside.look(&mut b, 0);
+    alone.detect(&mut a, 0);
+    beside.detect(&mut b, 0);
     let points = |lidar: &RearLidar| -> Vec<(u16, u32)> {
         let scan = lidar.latest();
         let on = |&at: &usize| lidar.truth().points[at].source == PointSource::Actor(1);

@@ -5,23 +5,23 @@ use closecall_traffic::VehicleClass;
 use super::*;
 
 #[test]
-fn vehicles_hide_each_other() {
-    let mut stage = Stage::new().with(VehicleClass::Motorcycle, 40.0, 0.0).with(VehicleClass::Truck, 10.0, 0.0);
+fn vehicles_occlude_each_other() {
+    let mut setup = TestScene::new().with(VehicleClass::Motorcycle, 40.0, 0.0).with(VehicleClass::Truck, 10.0, 0.0);
     let mut lidar = RearLidar::new(Lidar::default());
-    stage.look(&mut lidar, 0);
+    setup.detect(&mut lidar, 0);
     assert_eq!(count(lidar.truth(), PointSource::Actor(1)), 0);
-    stage.others.pop();
-    stage.look(&mut lidar, 0);
+    setup.others.pop();
+    setup.detect(&mut lidar, 0);
     assert!(count(lidar.truth(), PointSource::Actor(1)) > 10);
 }
 
 #[test]
-fn pitch_under_braking_moves_the_beams_and_levelling_undoes_it() {
-    let mut stage = Stage::new().with(VehicleClass::Truck, 30.0, 0.0);
+fn pitch_under_braking_moves_the_beams_and_levelling_compensates_it() {
+    let mut setup = TestScene::new().with(VehicleClass::Truck, 30.0, 0.0);
     let mut lidar = RearLidar::new(Lidar { levelling_sd_rad: 0.0, ..Lidar::default() });
     let mut means = |pitch_rad: f64| {
-        stage.ego.pitch_rad = pitch_rad;
-        stage.look(&mut lidar, 0);
+        setup.ego.pitch_rad = pitch_rad;
+        setup.detect(&mut lidar, 0);
         let scan = lidar.latest();
         let lowest = (0..scan.len()).filter(|&at| lidar.truth().points[at].material == Material::Plate);
         let (mut layers, mut heights, mut n) = (0.0, 0.0, 0.0);
@@ -41,17 +41,17 @@ fn pitch_under_braking_moves_the_beams_and_levelling_undoes_it() {
 }
 
 #[test]
-fn wet_roads_raise_spray_behind_e_and_dry_ones_do_not() {
-    let mut stage = Stage::new().with(VehicleClass::Car, 20.0, 0.0);
+fn there_is_spray_behind_the_ego_on_wet_roads_only() {
+    let mut setup = TestScene::new().with(VehicleClass::Car, 20.0, 0.0);
     let mut lidar = RearLidar::new(Lidar::default());
     let mut spray = |film_mm: f64, speed_mps: f64| {
-        stage.environment.water_film_mm = film_mm;
-        stage.ego.state.speed_mps = speed_mps;
-        let found = stage.look(&mut lidar, 0);
+        setup.environment.water_film_mm = film_mm;
+        setup.ego.state.speed_mps = speed_mps;
+        let found = setup.detect(&mut lidar, 0);
         let points: Vec<_> = lidar.truth().points.iter().filter(|at| at.source == PointSource::Spray).collect();
         assert!(points.iter().all(|point| point.range_m < 15.0));
-        // Spray hides nobody, and is no vehicle.
-        assert_eq!(found.iter().filter(|box_| box_.class.vehicle() > 0.5).count(), 1, "{found:?}");
+        // Spray neither occludes the vehicle nor is detected as one.
+        assert_eq!(found.iter().filter(|detection| detection.class.vehicle() > 0.5).count(), 1, "{found:?}");
         points.len()
     };
     assert_eq!(spray(0.0, 30.0), 0);
@@ -61,25 +61,25 @@ fn wet_roads_raise_spray_behind_e_and_dry_ones_do_not() {
 }
 
 #[test]
-fn fog_sends_false_returns_and_is_no_vehicle() {
-    let mut stage = Stage::new();
-    stage.environment.visibility_m = 60.0;
+fn fog_gives_false_returns_that_are_not_classified_as_vehicles() {
+    let mut setup = TestScene::new();
+    setup.environment.visibility_m = 60.0;
     let mut lidar = RearLidar::new(Lidar::default());
-    let found = stage.look(&mut lidar, 0);
+    let found = setup.detect(&mut lidar, 0);
     assert!(count(lidar.truth(), PointSource::Fog) > 20);
-    assert!(found.iter().all(|box_| box_.class.vehicle() < 0.5), "{found:?}");
+    assert!(found.iter().all(|detection| detection.class.vehicle() < 0.5), "{found:?}");
 }
 
 #[test]
-fn guard_rails_are_seen_and_told_from_vehicles() {
+fn guard_rails_give_returns_but_no_vehicle_detections() {
     for curvature in [0.0, 0.0025, -0.0025] {
-        let mut stage = Stage::new().with(VehicleClass::Car, 30.0, 0.0).with(VehicleClass::Car, 20.0, -3.75);
-        stage.road = guarded(curvature);
+        let mut setup = TestScene::new().with(VehicleClass::Car, 30.0, 0.0).with(VehicleClass::Car, 20.0, -3.75);
+        setup.road = road_with_guard_rails(curvature);
         let mut lidar = RearLidar::new(Lidar::default());
-        for look in 0..2 {
-            let found = stage.look(&mut lidar, look);
+        for scan_index in 0..2 {
+            let found = setup.detect(&mut lidar, scan_index);
             assert!(count(lidar.truth(), PointSource::GuardRail) > 50, "{curvature}");
-            let vehicles: Vec<_> = found.iter().filter(|box_| box_.class.vehicle() > 0.5).collect();
+            let vehicles: Vec<_> = found.iter().filter(|detection| detection.class.vehicle() > 0.5).collect();
             assert_eq!(vehicles.len(), 2, "{curvature}: {vehicles:?}");
         }
     }

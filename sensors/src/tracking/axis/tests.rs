@@ -1,13 +1,13 @@
-//! The filter of one axis on motions and measurements that its own model draws.
+//! Tests of the axis filter on motions and measurements that are drawn from its own model.
 
-use closecall_traffic::{ActorId, Stream, stream};
+use closecall_traffic::{ActorId, CONTROL_STEP, Stream, stream};
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
-use super::super::motion::{ACROSS, ALONG, ALONG_WHITE};
+use super::super::motion::{ACROSS_MODES, ALONG_MODES, ALONG_WHITE_MODE};
 use super::*;
 
-const STEP_S: f64 = 0.04;
+const STEP_S: f64 = CONTROL_STEP.s();
 const WHITE_SD_M: f64 = 0.1;
 const SLOW_SD_M: f64 = 0.1;
 const SLOW_SHARE: f64 = 0.96;
@@ -16,34 +16,34 @@ fn normal(rng: &mut Stream) -> f64 {
     rng.sample(StandardNormal)
 }
 
-/// A vehicle and its filter, which goes through the modes as the model says.
-struct Twin {
+/// A simulated vehicle, whose modes, motion and measurements follow the filter's model, with its filter.
+struct SimulatedVehicle {
     rng: Stream,
     truth: Vector4<f64>,
     mode: usize,
     filter: AxisFilter,
 }
 
-impl Twin {
+impl SimulatedVehicle {
     fn new(modes: &'static [Mode], run: u64) -> Self {
         let mut rng = stream(7, run, &ActorId::new("ego").unwrap(), "axis-test");
         let mode = 0;
         let truth = Vector4::new(50.0, 1.0 * normal(&mut rng), 0.0, normal(&mut rng));
-        Self { rng, truth, mode, filter: AxisFilter::prior(modes, [50.0, 100.0], [0.0, 1.0]) }
+        Self { rng, truth, mode, filter: AxisFilter::prior(modes, Gaussian::new(50.0, 100.0), Gaussian::new(0.0, 1.0)) }
     }
 
     fn advance(&mut self) {
         let modes = self.filter.modes;
         let mut draw: f64 = self.rng.random();
-        for (to, rate) in modes[self.mode].to_per_s.iter().enumerate().filter(|(to, _)| *to < modes.len()) {
+        for (to, rate) in modes[self.mode].switch_rates_per_s.iter().enumerate().filter(|(to, _)| *to < modes.len()) {
             draw -= rate * STEP_S;
             if draw < 0.0 && to != self.mode {
                 self.mode = to;
                 break;
             }
         }
-        // The filter's own step, with noise drawn by the factor of its covariance.
-        let mut step = Estimate { state: self.truth, covariance: Matrix4::zeros(), probability: 1.0 };
+        // The filter's prediction gives the mean of the next state, and its covariance the noise.
+        let mut step = ModeEstimate { state: self.truth, covariance: Matrix4::zeros(), probability: 1.0 };
         step.predict(&modes[self.mode], STEP_S, SLOW_SHARE);
         let tiny = Matrix4::identity() * 1e-15;
         let factor = (step.covariance + tiny).cholesky().unwrap().l();
@@ -55,15 +55,16 @@ impl Twin {
     fn measure(&mut self) {
         let error_m = SLOW_SD_M * self.truth[3] + WHITE_SD_M * normal(&mut self.rng);
         let position_m = self.truth[0] + error_m;
-        let measurement = AxisMeasurement { position_m, white_sd_m: WHITE_SD_M, slow_sd_m: SLOW_SD_M, lever_s: 0.0 };
+        let measurement =
+            AxisMeasurement { position_m, white_sd_m: WHITE_SD_M, slow_sd_m: SLOW_SD_M, time_offset_s: 0.0 };
         self.filter.measure_position(&measurement);
     }
 
-    /// Normalised error squared of position and speed.
+    /// Returns the NEES of position and speed.
     fn nees(&self) -> f64 {
-        let now = self.filter.now();
+        let now = self.filter.estimate();
         let (dp, dv) = (self.truth[0] - now.position_m, self.truth[1] - now.speed_mps);
-        let (pp, pv, vv) = (now.position_m2, now.position_speed_m2ps, now.speed_m2ps2);
+        let (pp, pv, vv) = (now.position_variance_m2, now.position_speed_covariance_m2ps, now.speed_variance_m2ps2);
         (vv * dp * dp - 2.0 * pv * dp * dv + pp * dv * dv) / (pp * vv - pv * pv)
     }
 }
@@ -71,40 +72,40 @@ impl Twin {
 fn mean_nees(modes: &'static [Mode], runs: u32) -> f64 {
     let sum: f64 = (0..runs)
         .map(|run| {
-            let mut twin = Twin::new(modes, run.into());
-            twin.measure();
+            let mut vehicle = SimulatedVehicle::new(modes, run.into());
+            vehicle.measure();
             for _ in 0..100 {
-                twin.advance();
-                twin.measure();
+                vehicle.advance();
+                vehicle.measure();
             }
-            twin.nees()
+            vehicle.nees()
         })
         .sum();
     sum / f64::from(runs)
 }
 
 #[test]
-fn one_mode_is_consistent_despite_the_slow_error() {
+fn a_single_mode_is_consistent_despite_the_slow_error() {
     let runs = 1_000;
     // The mean of n χ² variables of 2 degrees of freedom has the standard deviation 2/√n.
-    let deviation = (mean_nees(ALONG_WHITE, runs) - 2.0) / (2.0 / f64::from(runs).sqrt());
+    let deviation = (mean_nees(ALONG_WHITE_MODE, runs) - 2.0) / (2.0 / f64::from(runs).sqrt());
     assert!(deviation.abs() < 3.0, "{deviation} standard deviations from 2");
 }
 
 #[test]
 fn switching_modes_are_nearly_consistent() {
-    // Mixing the modes is an approximation, and a mixture has longer tails than a normal distribution.
-    for modes in [ALONG, ACROSS] {
+    // Mixing the modes is an approximation, and a mixture has heavier tails than a normal distribution.
+    for modes in [ALONG_MODES, ACROSS_MODES] {
         let mean = mean_nees(modes, 600);
         assert!((1.6..2.6).contains(&mean), "{mean}");
     }
 }
 
 #[test]
-fn probabilities_of_switching_are_probabilities_after_any_time() {
+fn transition_probabilities_sum_to_1_for_any_step() {
     for rates_per_s in [[0.0, 7.7, 0.5], [0.0; MODES]] {
         for step_s in [0.0, 0.04, 1.0, 100.0] {
-            let shares: Vec<f64> = (0..MODES).map(|to| switches(&rates_per_s, 0, to, step_s)).collect();
+            let shares: Vec<f64> = (0..MODES).map(|to| transition_probability(&rates_per_s, 0, to, step_s)).collect();
             assert!(shares.iter().all(|share| (0.0..=1.0).contains(share)), "{shares:?}");
             assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{shares:?}");
         }
@@ -112,27 +113,38 @@ fn probabilities_of_switching_are_probabilities_after_any_time() {
 }
 
 #[test]
-fn looking_ahead_is_as_uncertain_as_having_gone_there() {
-    for modes in [ALONG, ACROSS] {
-        let filter = AxisFilter::prior(modes, [0.0, 0.1], [0.0, 0.1]);
-        let mut gone = filter;
+fn predicting_over_a_horizon_equals_predicting_step_by_step() {
+    for modes in [ALONG_MODES, ACROSS_MODES] {
+        let filter = AxisFilter::prior(modes, Gaussian::new(0.0, 0.1), Gaussian::new(0.0, 0.1));
+        let mut stepped = filter;
         for _ in 0..10 {
-            gone.predict(STEP_S, 1.0, Situation::FREE);
+            stepped.predict(STEP_S, 1.0, Situation::FREE);
         }
-        let (ahead, gone) = (filter.ahead(10.0 * STEP_S), gone.now());
-        assert!((ahead.speed_m2ps2 / gone.speed_m2ps2 - 1.0).abs() < 1e-9, "{ahead:?} {gone:?}");
-        assert!((ahead.position_m2 / gone.position_m2 - 1.0).abs() < 1e-9, "{ahead:?} {gone:?}");
+        let (predicted, stepped) = (filter.predicted(10.0 * STEP_S), stepped.estimate());
+        assert!(
+            (predicted.speed_variance_m2ps2 / stepped.speed_variance_m2ps2 - 1.0).abs() < 1e-9,
+            "{predicted:?} {stepped:?}"
+        );
+        assert!(
+            (predicted.position_variance_m2 / stepped.position_variance_m2 - 1.0).abs() < 1e-9,
+            "{predicted:?} {stepped:?}"
+        );
     }
-    let here = AxisFilter::prior(ALONG, [0.0, 0.1], [0.0, 0.1]);
-    assert_eq!(here.ahead(0.0), here.now());
+    let here = AxisFilter::prior(ALONG_MODES, Gaussian::new(0.0, 0.1), Gaussian::new(0.0, 0.1));
+    assert_eq!(here.predicted(0.0), here.estimate());
 }
 
 #[test]
-fn a_measurement_that_is_no_number_teaches_no_mode() {
-    let mut filter = AxisFilter::prior(ALONG, [0.0, 1.0], [0.0, 1.0]);
+fn a_measurement_that_is_not_a_number_leaves_the_mode_probabilities_unchanged() {
+    let mut filter = AxisFilter::prior(ALONG_MODES, Gaussian::new(0.0, 1.0), Gaussian::new(0.0, 1.0));
     let before = filter.estimates.map(|estimate| estimate.probability);
-    filter.measure_position(&AxisMeasurement { position_m: f64::NAN, white_sd_m: 1.0, slow_sd_m: 0.0, lever_s: 0.0 });
+    filter.measure_position(&AxisMeasurement {
+        position_m: f64::NAN,
+        white_sd_m: 1.0,
+        slow_sd_m: 0.0,
+        time_offset_s: 0.0,
+    });
     assert_eq!(filter.estimates.map(|estimate| estimate.probability), before);
-    // And nothing that follows looks safe.
-    assert!(filter.now().position_m.is_nan());
+    // The estimate must not look valid afterwards.
+    assert!(filter.estimate().position_m.is_nan());
 }

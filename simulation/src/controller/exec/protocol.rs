@@ -1,13 +1,12 @@
 //! Writes the messages to a process, and parses its answers.
 
 use closecall_controllers::{EgoInput, EgoSettings, EgoState, Front, Odometry, SensorAvailability};
-use closecall_traffic::{Road, Side, Source, Track, TrackId, TrackStatus};
+use closecall_traffic::{CONTROL_STEP, Road, Side, Source, Track, TrackId, TrackStatus};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 use super::error::ExecError;
 use super::lines::excerpt;
-use crate::run::CONTROL_STEP;
 
 /// Version of the protocol.
 pub(super) const PROTOCOL: u32 = 1;

@@ -8,7 +8,7 @@ fn settings(cc1_s: f64) -> Wiedemann99 {
     Wiedemann99 { parameters, desired_speed_mps: None, reaction: None, lapse: None }
 }
 
-/// A follower behind a leader: gap, own speed, own acceleration after the actuators' lag of 0.15 s.
+/// A driver behind a lead vehicle. The actual acceleration follows the desired one with the actuator lag of 0.15 s.
 #[derive(Clone, Copy)]
 struct Pair {
     gap_m: f64,
@@ -16,7 +16,7 @@ struct Pair {
     actual_mps2: f64,
 }
 
-/// Drives behind a leader with the given acceleration over time; returns the gaps at each step.
+/// Simulates 120 s behind a lead vehicle with the given acceleration over time, and returns the gap at each step.
 fn drive(cc1_s: f64, mut pair: Pair, mut lead_mps: f64, step_s: f64, lead_mps2: impl Fn(f64) -> f64) -> Vec<f64> {
     let mut model = Wiedemann99Model::new(&settings(cc1_s));
     let steps = (120.0 / step_s).round() as usize;
@@ -24,8 +24,8 @@ fn drive(cc1_s: f64, mut pair: Pair, mut lead_mps: f64, step_s: f64, lead_mps2: 
     for step in 0..steps {
         let lead_mps2 = if lead_mps > 0.0 { lead_mps2(step as f64 * step_s) } else { 0.0 };
         let lead = Lead { gap_m: pair.gap_m, speed_mps: lead_mps, acceleration_mps2: lead_mps2 };
-        let wanted = model.acceleration_mps2(pair.speed_mps, 36.0, Some(&lead));
-        pair.actual_mps2 += (step_s / 0.15).min(1.0) * (wanted - pair.actual_mps2);
+        let requested_mps2 = model.acceleration_mps2(pair.speed_mps, 36.0, Some(&lead));
+        pair.actual_mps2 += (step_s / 0.15).min(1.0) * (requested_mps2 - pair.actual_mps2);
         let own_mps = (pair.speed_mps + step_s * pair.actual_mps2).max(0.0);
         let lead_next_mps = f64::max(lead_mps + step_s * lead_mps2, 0.0);
         pair.gap_m += 0.5 * step_s * (lead_mps + lead_next_mps - own_mps - pair.speed_mps);
@@ -38,7 +38,7 @@ fn drive(cc1_s: f64, mut pair: Pair, mut lead_mps: f64, step_s: f64, lead_mps2: 
 const APPROACH: Pair = Pair { gap_m: 120.0, speed_mps: 36.0, actual_mps2: 0.0 };
 
 #[test]
-fn behind_a_constant_leader_the_gap_settles_into_its_band() {
+fn behind_a_lead_vehicle_at_constant_speed_the_gap_settles_into_its_band() {
     for speed_mps in [20.0, 30.0] {
         for cc1_s in [0.2, 0.4, 0.6, 0.9, 1.5] {
             let safe_m = 1.5 + cc1_s * speed_mps;
@@ -47,7 +47,8 @@ fn behind_a_constant_leader_the_gap_settles_into_its_band() {
                 let settled = &gaps[gaps.len() / 2..];
                 let least = settled.iter().copied().fold(f64::INFINITY, f64::min);
                 let most = settled.iter().copied().fold(0.0, f64::max);
-                // A quarter of a metre of overshoot at the coarsest step; none at steps up to 0.04 s but what the lag costs.
+                // The coarsest step allows an overshoot of 0.25 m. At steps up to 0.04 s, only the actuator lag causes
+                // overshoot.
                 let overshoot_m = if step_s > 0.05 { 0.25 } else { 0.1 };
                 assert!(
                     least > safe_m - overshoot_m && most < safe_m + 4.0 + overshoot_m,
@@ -61,7 +62,7 @@ fn behind_a_constant_leader_the_gap_settles_into_its_band() {
 }
 
 #[test]
-fn it_does_not_run_into_a_braking_leader() {
+fn it_does_not_hit_a_braking_lead_vehicle() {
     for cc1_s in [0.4, 0.9, 1.5] {
         let start = Pair { gap_m: 2.5 + cc1_s * 30.0, speed_mps: 30.0, actual_mps2: 0.0 };
         for braking in [2.0, 4.0, 6.0] {
@@ -81,7 +82,7 @@ fn free_acceleration_is_cc8_at_standstill_and_cc9_at_80_kmh() {
 }
 
 #[test]
-fn each_regime_is_where_the_table_says() {
+fn the_regimes_agree_with_the_table() {
     let mut model = Wiedemann99Model::new(&settings(0.9));
     let mut regime = |gap_m, opening_mps| {
         let lead = Lead { gap_m, speed_mps: 30.0 + opening_mps, acceleration_mps2: 0.0 };
@@ -95,7 +96,7 @@ fn each_regime_is_where_the_table_says() {
     assert_eq!(regime(15.0, -5.0), Regime::Emergency);
 }
 
-/// Gap at every fifth of a second during the approach and the first swings of following [m].
+/// Returns the gap every 0.2 s during the approach and the first oscillations of following (m).
 fn approach_gaps(cc1_s: f64, speed_mps: f64, step_s: f64) -> Vec<f64> {
     let gaps = drive(cc1_s, APPROACH, speed_mps, step_s, |_| 0.0);
     let every = (0.2 / step_s).round() as usize;
@@ -103,16 +104,16 @@ fn approach_gaps(cc1_s: f64, speed_mps: f64, step_s: f64) -> Vec<f64> {
 }
 
 #[test]
-fn smaller_steps_converge() {
+fn the_trajectory_converges_with_smaller_steps() {
     for (cc1_s, speed_mps) in [(0.2, 20.0), (0.4, 30.0), (0.9, 30.0), (1.5, 20.0)] {
         let reference = approach_gaps(cc1_s, speed_mps, 0.0025);
         let mut errors_m = Vec::new();
         for step_s in [0.1, 0.04, 0.02, 0.01] {
-            let pairs = approach_gaps(cc1_s, speed_mps, step_s);
-            let worst = pairs.iter().zip(&reference).map(|(gap, exact)| (gap - exact).abs()).fold(0.0, f64::max);
+            let gaps = approach_gaps(cc1_s, speed_mps, step_s);
+            let worst = gaps.iter().zip(&reference).map(|(gap, exact)| (gap - exact).abs()).fold(0.0, f64::max);
             errors_m.push(worst);
         }
-        // First order: the error is bounded by a constant times the step, and falls with it.
+        // First-order convergence: the error is bounded by a constant times the step.
         for (error, step_s) in errors_m.iter().zip([0.1, 0.04, 0.02, 0.01]) {
             assert!(*error < 10.0 * step_s, "cc1 {cc1_s} s, {speed_mps} m/s: {errors_m:?}");
         }
@@ -121,22 +122,24 @@ fn smaller_steps_converge() {
 }
 
 #[test]
-fn a_driver_who_notices_late_that_it_closes_in_does_not_brake_hard_at_the_safe_gap() {
+fn a_driver_who_notices_closing_late_does_not_brake_hard_at_the_safe_gap() {
     let mut model = Wiedemann99Model::new(&settings(1.5));
     let lead = Lead { gap_m: 46.6, speed_mps: 30.0, acceleration_mps2: 0.0 };
-    // 0.1 m above the safe gap, 4 m/s too fast: 160 m/s² would keep the safe gap.
-    let wanted = model.acceleration_mps2(34.0, 36.0, Some(&lead));
+    // 0.1 m above the safe gap and 4 m/s too fast: keeping the safe gap would need 160 m/s².
+    let requested_mps2 = model.acceleration_mps2(34.0, 36.0, Some(&lead));
     assert_eq!(model.regime(), Regime::Approaching);
-    assert!((wanted + COMFORTABLE_MPS2).abs() < 1e-12, "{wanted}");
+    assert!((requested_mps2 + COMFORTABLE_MPS2).abs() < 1e-12, "{requested_mps2}");
 }
 
 proptest! {
-    /// The acceleration has no step at the safe gap, for whatever one closes in with.
+    /// The acceleration is continuous across the safe gap at every closing speed.
     #[test]
-    fn nothing_jumps_at_the_safe_gap(closing in 1.0..15.0, lead_mps in 0.0..40.0, lead_mps2 in -8.0..0.0, cc1 in 0.0..2.0) {
+    fn the_acceleration_is_continuous_at_the_safe_gap(
+        closing in 1.0..15.0, lead_mps in 0.0..40.0, lead_mps2 in -8.0..0.0, cc1 in 0.0..2.0,
+    ) {
         let at = |gap_m: f64| {
             let lead = Lead { gap_m, speed_mps: lead_mps, acceleration_mps2: lead_mps2 };
-            // One step to notice, one to answer.
+            // The first step makes the driver notice the closing; the second one reacts.
             let mut model = Wiedemann99Model::new(&settings(cc1));
             model.acceleration_mps2(lead_mps + 30.0, 60.0, Some(&lead));
             (model.acceleration_mps2(lead_mps + closing, 60.0, Some(&lead)), model.regime())
@@ -152,7 +155,7 @@ proptest! {
         gap in -5.0..200.0, speed in 0.0..50.0, lead_mps in 0.0..50.0, lead_mps2 in -10.0..5.0, cc1 in 0.0..2.0,
     ) {
         let lead = Lead { gap_m: gap, speed_mps: lead_mps, acceleration_mps2: lead_mps2 };
-        let wanted = Wiedemann99Model::new(&settings(cc1)).acceleration_mps2(speed, 36.0, Some(&lead));
-        prop_assert!((-HARDEST_BRAKING_MPS2..=3.5).contains(&wanted), "{wanted}");
+        let requested_mps2 = Wiedemann99Model::new(&settings(cc1)).acceleration_mps2(speed, 36.0, Some(&lead));
+        prop_assert!((-HARDEST_BRAKING_MPS2..=3.5).contains(&requested_mps2), "{requested_mps2}");
     }
 }

@@ -17,7 +17,7 @@ fn braking_grows_within_the_jerk_limit() {
     let mut last = 0.0;
     for _ in 0..40 {
         let now = bench.step().acceleration_mps2;
-        assert!((last - now) <= 2.0 * 0.04 + 1e-9, "{last} to {now}");
+        assert!((last - now) <= 2.0 * CONTROL_STEP.s() + 1e-9, "{last} to {now}");
         last = now;
     }
     assert_eq!(last, -1.0);

@@ -185,7 +185,7 @@ fn commands_stay_within_the_comfort_limits() {
         bench.rear().lane = if rear_m > -10.0 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
         let now_mps2 = bench.step().acceleration_mps2;
         assert!((-1.0..=0.8).contains(&now_mps2), "{now_mps2}");
-        let jerk_mps3 = (now_mps2 - last_mps2) / 0.04;
+        let jerk_mps3 = (now_mps2 - last_mps2) / CONTROL_STEP.s();
         assert!((-2.0 - 1e-9..=3.0 + 1e-9).contains(&jerk_mps3), "step {step}: {jerk_mps3}");
         last_mps2 = now_mps2;
     }

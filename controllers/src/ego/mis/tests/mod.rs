@@ -4,16 +4,31 @@ mod engaging;
 mod holding;
 mod releasing;
 
-use closecall_traffic::{ClassScores, Lane, Road, Source, Time, Track, TrackId, TrackStatus, VehicleClass};
+use closecall_traffic::{
+    CONTROL_STEP, ClassScores, Lane, Road, Source, Time, Track, TrackId, TrackStatus, VehicleClass,
+};
 
-use super::MisSettings;
+use proptest::prelude::*;
+
+use super::{Encounter, MisSettings};
 use crate::ego::{
     Acc, ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack, EgoState, Odometry, Reason,
     SensorAvailability,
 };
 
 const CAR_M: f64 = 4.6;
-const PERIOD: Time = Time::from_ms(40);
+
+prop_compose! {
+    /// Encounters of all kinds, with the paper's critical gap.
+    pub(super) fn encounters()(
+        ego_mps in 15.0..40.0, thw in 0.3..1.5, lead in -3.0..3.0, rear_gap_m in 6.0..120.0, closing_mps in 0.5..20.0,
+    ) -> Encounter {
+        Encounter {
+            ego_mps, front_gap_m: thw * ego_mps, lead_mps: ego_mps + lead, rear_gap_m, closing_mps,
+            critical_gap_m: 5.0,
+        }
+    }
+}
 
 /// A test bench in which every condition for engaging holds: the ego drives at 30 m/s, the lead vehicle is at 21 m, and
 /// the rear vehicle is at 90 m and 8 m/s faster.
@@ -93,7 +108,7 @@ impl Bench {
             width_m: 1.85,
         };
         let (time, road) = (self.time, &self.road);
-        self.time += PERIOD;
+        self.time += CONTROL_STEP;
         self.stack.step(&EgoInput { time, odometry, road, tracks: &self.tracks, sensors: self.sensors })
     }
 

@@ -10,7 +10,7 @@
 
 use std::collections::BTreeMap;
 
-use closecall_simulation::outcome::{Outcome, worse};
+use crate::outcome::{Outcome, worse};
 use closecall_traffic::ActorId;
 
 /// The definition of the harm and its source, for reports.

@@ -25,7 +25,7 @@ fn quantile(probability: f64) -> f64 {
 
 /// The standard normal distribution, truncated at two bounds, of which either may be infinite.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct TruncatedStandardNormal {
+pub struct TruncatedStandardNormal {
     /// Lower bound (standard deviations).
     low: f64,
     /// Upper bound (standard deviations).
@@ -40,14 +40,14 @@ pub(super) struct TruncatedStandardNormal {
 
 impl TruncatedStandardNormal {
     /// Truncates the distribution at `low` and `high`. Returns `None` if no probability is left between them.
-    pub(super) fn new(low: f64, high: f64) -> Option<Self> {
+    pub fn new(low: f64, high: f64) -> Option<Self> {
         let mass = probability_between(low, high);
         // A division by a subnormal mass would lose digits.
         (mass >= f64::MIN_POSITIVE).then(|| Self { low, high, below_low: below(low), above_high: below(-high), mass })
     }
 
     /// Returns the quantile of the truncated distribution at probability `u`.
-    pub(super) fn quantile(&self, u: f64) -> f64 {
+    pub fn quantile(&self, u: f64) -> f64 {
         let from_below = self.below_low + u * self.mass;
         let from_above = self.above_high + (1.0 - u) * self.mass;
         let z = if from_below <= from_above { quantile(from_below) } else { -quantile(from_above) };
@@ -55,7 +55,7 @@ impl TruncatedStandardNormal {
     }
 
     /// Returns the cumulative probability of the truncated distribution at `z`.
-    pub(super) fn cdf(&self, z: f64) -> f64 {
+    pub fn cdf(&self, z: f64) -> f64 {
         (probability_between(self.low, z.clamp(self.low, self.high)) / self.mass).clamp(0.0, 1.0)
     }
 }

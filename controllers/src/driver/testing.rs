@@ -1,0 +1,35 @@
+//! Inputs for the tests of the drivers.
+
+use closecall_traffic::{Indicator, Road, Time, Vehicle, VehicleClass, VehicleState};
+
+use super::{DriverInput, Lead, Neighbour, Neighbours};
+
+/// Returns a car with this gap and motion, straight ahead of a driver.
+pub(super) fn car_ahead(lead: Lead, brake_light: bool) -> Neighbour {
+    Neighbour {
+        actor: 1,
+        gap_m: lead.gap_m,
+        speed_mps: lead.speed_mps,
+        acceleration_mps2: lead.acceleration_mps2,
+        brake_light,
+        indicator: Indicator::Off,
+        class: VehicleClass::Car,
+        length_m: 4.6,
+        width_m: 1.85,
+        lateral_offset_m: 0.0,
+    }
+}
+
+/// Passes `check` the input of a car that drives at 30 m/s in the middle of three lanes and keeps its lane.
+pub(super) fn with_input<T>(time: Time, neighbours: &Neighbours, check: impl FnOnce(&DriverInput<'_>) -> T) -> T {
+    check(&DriverInput {
+        time,
+        vehicle: &Vehicle::typical(VehicleClass::Car),
+        own: &VehicleState { s_m: 30.0 * time.s(), d_m: -5.625, speed_mps: 30.0, ..VehicleState::default() },
+        neighbours,
+        road: &Road::straight(3),
+        changing_to: None,
+        lateral_deviation_m: 0.0,
+        desired_speed_offset_mps: 0.0,
+    })
+}

@@ -1,0 +1,56 @@
+//! What a repetition of the campaign needs, and the sources of the sampled values.
+
+use closecall_scenarios::parameters::Provenance;
+use maud::{Markup, html};
+
+use super::page::{table, text_heads};
+use crate::campaign::findings::Findings;
+use crate::units::labelled;
+
+/// Returns the versions, the command, the files and the sampling, then the sources of each scenario's parameters.
+pub(super) fn provenance(findings: &Findings<'_>) -> Markup {
+    let rows = html! {
+        @for (what, value) in entries(findings) { tr { td { (what) } td { code { (value) } } } }
+    };
+    html! {
+        h2 { "How it was made" }
+        (table(&text_heads(&["", ""]), &rows))
+        @for file in findings.files {
+            @if file.space().iter().len() > 0 {
+                h3 { "Where the values of " (file.config().name) " come from" }
+                @let rows = html! {
+                    @for (name, entry) in file.space().iter() {
+                        @let (kind, source) = source_of(&entry.provenance);
+                        tr { td { (labelled(name.as_str())) } td { (kind) } td { (source) } }
+                    }
+                };
+                (table(&text_heads(&["parameter", "", "from"]), &rows))
+            }
+        }
+    }
+}
+
+fn entries(findings: &Findings<'_>) -> Vec<(&'static str, String)> {
+    let manifest = findings.manifest;
+    let mut entries = vec![("closecall", manifest.closecall_version.clone()), ("command", manifest.command.join(" "))];
+    for scenario in &manifest.scenarios {
+        entries.push(("scenario", format!("{} ({}), BLAKE3 {}", scenario.name, scenario.path, scenario.blake3)));
+    }
+    let sampling = manifest.sampling;
+    let sensors = manifest.sensors.map_or_else(|| "those of the scenario".to_owned(), |mode| mode.name().to_owned());
+    entries.push(("seed", sampling.seed.to_string()));
+    entries.push(("design", format!("{}, {} samples asked for", sampling.design, sampling.samples)));
+    entries.push(("sensors", sensors));
+    for model in &manifest.models {
+        entries.push(("network", format!("{} on {}, BLAKE3 {}", model.name, model.backend, model.blake3)));
+    }
+    entries
+}
+
+fn source_of(provenance: &Provenance) -> (&'static str, String) {
+    match provenance {
+        Provenance::Fitted(fitted) => ("fitted", format!("{} cases of {}", fitted.n, fitted.source)),
+        Provenance::Assumed(why) => ("assumed", why.clone()),
+        Provenance::Unstated => ("not stated", String::new()),
+    }
+}

@@ -1,0 +1,103 @@
+//! The page of a campaign's recordings: a picture of each critical moment beside its numbers, and the commands that open
+//! the recording and run the sample again.
+
+use std::path::Path;
+
+use closecall_traffic::Measured;
+use maud::{Markup, PreEscaped, html};
+
+use super::page::{document, table};
+use closecall_scenarios::atomic::{WriteError, write_file};
+use closecall_simulation::outcome::Outcome;
+
+/// One recorded sample.
+#[derive(Clone, Debug)]
+pub(in crate::campaign) struct IndexEntry {
+    /// The scenario's name.
+    pub(in crate::campaign) scenario: String,
+    /// The sample's number.
+    pub(in crate::campaign) sample: u64,
+    /// Why it was recorded, in words.
+    pub(in crate::campaign) reasons: Vec<&'static str>,
+    /// The recording's file, relative to the page.
+    pub(in crate::campaign) file: String,
+    /// The command that runs the sample again.
+    pub(in crate::campaign) replay: String,
+    /// For each arm: how the run ended in one sentence, and what the system under test did.
+    pub(in crate::campaign) story: Vec<String>,
+    /// The critical moment, as SVG.
+    pub(in crate::campaign) still: String,
+    /// The outcome of each arm, the baseline first.
+    pub(in crate::campaign) outcomes: Vec<Outcome>,
+}
+
+/// Writes the page.
+///
+/// # Errors
+/// [`WriteError`] if the page cannot be written.
+pub(in crate::campaign) fn write_index(path: &Path, entries: &[IndexEntry]) -> Result<(), WriteError> {
+    let page = page(entries).into_string();
+    write_file(path, |file| file.write_all(page.as_bytes()))
+}
+
+fn page(entries: &[IndexEntry]) -> Markup {
+    let body = html! {
+        h1 { "Recordings" }
+        p {
+            (entries.len()) " recorded samples. Each picture shows the critical moment from above: the vehicles drive to "
+            "the right, and the road is drawn wider than it is. The recordings open in the Rerun viewer 0.36:"
+        }
+        pre { "pip install rerun-sdk==0.36.3" }
+        @for entry in entries { (section(entry)) }
+    };
+    document("Recordings", &body)
+}
+
+fn section(entry: &IndexEntry) -> Markup {
+    html! {
+        section.recording id={ (entry.scenario) "-" (entry.sample) } {
+            figure { (PreEscaped(&entry.still)) }
+            div {
+                h2 { (entry.scenario) " · sample " (entry.sample) }
+                p { "Recorded as " (entry.reasons.join(", ")) "." }
+                @for line in &entry.story { p.failure[line.contains("COLLISION")] { (line) } }
+                (numbers(&entry.outcomes))
+                p { "Open it, from this page's folder:" }
+                pre { "rerun " (entry.file) }
+                p { "Run it again, from the folder that the campaign was run in:" }
+                pre { (entry.replay) }
+            }
+        }
+    }
+}
+
+type Number = (&'static str, fn(&Outcome) -> String);
+
+const NUMBERS: [Number; 6] = [
+    ("collisions", |outcome| outcome.collisions.len().to_string()),
+    ("hardest impact [m/s]", |outcome| {
+        let speeds = outcome.collisions.iter().map(|collision| collision.relative_speed_mps);
+        speeds.max_by(f64::total_cmp).map_or("-".to_owned(), |speed_mps| format!("{speed_mps:.1}"))
+    }),
+    ("smallest front headway [s]", |outcome| measured(outcome.margins.min_thw_front_s)),
+    ("smallest rear headway [s]", |outcome| measured(outcome.margins.min_thw_rear_s)),
+    ("hardest braking [m/s²]", |outcome| format!("{:.1}", outcome.margins.max_deceleration_mps2)),
+    ("MIS engaged at [s]", |outcome| outcome.mis.as_ref().map_or("-".to_owned(), |mis| measured(mis.engaged_at_s))),
+];
+
+fn measured(value: Measured) -> String {
+    value.map_or_else(|absent| absent.to_string(), |value| format!("{value:.2}"))
+}
+
+fn numbers(outcomes: &[Outcome]) -> Markup {
+    let head = html! {
+        th {}
+        @for outcome in outcomes { th { (outcome.controller) } }
+    };
+    let rows = html! {
+        @for (name, value) in NUMBERS {
+            tr { td { (name) } @for outcome in outcomes { td { (value(outcome)) } } }
+        }
+    };
+    table(&head, &rows)
+}

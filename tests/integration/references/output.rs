@@ -1,0 +1,228 @@
+//! `docs/output.md` against the files, columns and keys that small campaigns and runs write.
+
+use std::collections::BTreeSet;
+use std::fs::File;
+use std::path::Path;
+
+use parquet::basic::{LogicalType, Type};
+use parquet::file::reader::{FileReader, SerializedFileReader};
+use serde_json::Value;
+
+use super::documented::{document, hold, rows};
+use crate::support::{closecall, folder, json, library, stdout};
+
+/// A list of objects as its objects.
+fn each(value: &Value) -> Vec<&Value> {
+    value.as_array().map_or_else(|| vec![value], |list| list.iter().collect())
+}
+
+fn program(args: &[&str], code: i32) -> Value {
+    let words: Vec<String> =
+        args.iter().map(ToString::to_string).chain(["--format", "json"].map(str::to_owned)).collect();
+    json(&closecall(words), code)
+}
+
+/// The columns of a Parquet file, each with its type and its unit.
+fn columns(path: &Path) -> Vec<[String; 3]> {
+    let reader = SerializedFileReader::new(File::open(path).unwrap()).unwrap();
+    let metadata = reader.metadata().file_metadata();
+    let unit = |name: &str| {
+        let known = metadata.key_value_metadata()?.iter().find(|entry| entry.key == format!("unit:{name}"))?;
+        known.value.clone()
+    };
+    let columns = metadata.schema_descr().columns().iter().map(|column| {
+        let kind = match (column.physical_type(), column.logical_type_ref()) {
+            (Type::BYTE_ARRAY, Some(LogicalType::String)) => "text",
+            (Type::DOUBLE, _) => "number",
+            (Type::INT64 | Type::INT32, _) => "count",
+            (Type::BOOLEAN, _) => "flag",
+            (other, _) => panic!("{}: {other}", column.name()),
+        };
+        [column.name().to_owned(), kind.to_owned(), unit(column.name()).unwrap_or_default()]
+    });
+    columns.collect()
+}
+
+/// The documented columns of a table, each with its type and its unit.
+fn documented_columns(table: &str) -> Vec<[String; 3]> {
+    let rows = rows(&format!("columns: {table} -->"));
+    rows.iter().map(|cells| [cells[0].trim_matches('`').to_owned(), cells[1].clone(), cells[2].clone()]).collect()
+}
+
+#[test]
+fn the_columns_of_a_campaign_s_tables_are_those_documented() {
+    let folder = folder();
+    let out = folder.path().join("out");
+    let args = ["campaign", library("low-thw-overtake").to_str().unwrap(), "-n", "4", "--out", out.to_str().unwrap()]
+        .map(str::to_owned);
+    stdout(&closecall(args), 0);
+    let (parameters, written): (Vec<_>, Vec<_>) =
+        columns(&out.join("outcomes.parquet")).into_iter().partition(|[name, ..]| name.starts_with("param:"));
+    let (patterns, expected): (Vec<_>, Vec<_>) =
+        documented_columns("outcomes.parquet").into_iter().partition(|[name, ..]| name.starts_with("param:"));
+    assert_eq!(written, expected);
+    for kind in patterns.iter().map(|[_, kind, _]| kind) {
+        assert!(parameters.iter().any(|[_, written, _]| written == kind), "no parameter is a {kind}");
+    }
+    assert!(parameters.iter().all(|[_, kind, _]| patterns.iter().any(|[_, known, _]| known == kind)));
+    // The unit of this table stands in Arrow's metadata alone.
+    let names = |columns: Vec<[String; 3]>| columns.into_iter().map(|[name, kind, _]| [name, kind]).collect::<Vec<_>>();
+    assert_eq!(names(columns(&out.join("timings.parquet"))), names(documented_columns("timings.parquet")));
+}
+
+#[test]
+fn the_columns_of_a_trace_are_those_documented() {
+    let folder = folder();
+    let expected: Vec<String> = documented_columns("trace").into_iter().map(|[name, ..]| name).collect();
+    let at = |name: &str| folder.path().join(name);
+    for name in ["trace.csv", "trace.parquet"] {
+        let path = at(name);
+        let args =
+            ["run", library("paper-figure").to_str().unwrap(), "--trace", path.to_str().unwrap()].map(str::to_owned);
+        stdout(&closecall(args), 0);
+    }
+    let text = std::fs::read_to_string(at("trace.csv")).unwrap();
+    assert_eq!(text.lines().next().unwrap().split(',').collect::<Vec<_>>(), expected);
+    let written: Vec<String> = columns(&at("trace.parquet")).into_iter().map(|[name, ..]| name).collect();
+    assert_eq!(written, expected);
+}
+
+/// The records of a file with one JSON value on each line, behind a checksum if it has one.
+fn lines(path: &Path, has_checksum: bool) -> Vec<Value> {
+    let text = std::fs::read_to_string(path).unwrap();
+    let record = |line: &str| if has_checksum { line.split_once(' ').unwrap().1.to_owned() } else { line.to_owned() };
+    text.lines().map(|line| serde_json::from_str(&record(line)).unwrap()).collect()
+}
+
+/// The files of a folder, by their paths below it.
+fn files(folder: &Path, below: &str) -> BTreeSet<String> {
+    let entries = std::fs::read_dir(folder.join(below)).unwrap().map(|entry| entry.unwrap());
+    entries
+        .flat_map(|entry| {
+            let name = format!("{below}{}", entry.file_name().to_str().unwrap());
+            if entry.path().is_dir() { files(folder, &format!("{name}/")) } else { BTreeSet::from([name]) }
+        })
+        .collect()
+}
+
+#[test]
+fn the_files_and_keys_of_a_campaign_are_those_documented() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (headline, harmless) = (library("low-thw-overtake"), library("overtake-without-brake"));
+    let (headline, harmless) = (headline.to_str().unwrap(), harmless.to_str().unwrap());
+    let both = ["campaign", headline, harmless, "-n", "10", "--seed", "1"];
+    let with = |more: &[&str], code| program(&[&both[..], more].concat(), code);
+    // Few samples leave a strict bound open; a loose one is certain after some of them, which the clock may not decide.
+    let open = with(&["--paired", "--max-probability", "0.01", "--out", &at("open"), "--record", "worst:1"], 4);
+    let certain = with(&["--paired", "--max-probability", "0.6", "--until-certain"], 0);
+    hold("campaign", [&open, &certain]);
+
+    let out = folder.path().join("open");
+    let documented: Vec<String> = rows("files -->").iter().map(|cells| cells[0].trim_matches('`').to_owned()).collect();
+    let is_file = |pattern: &str, path: &str| match pattern.split_once("{scenario}-{sample}") {
+        Some((before, after)) => path.starts_with(before) && path.ends_with(after),
+        None => pattern == path,
+    };
+    let written = files(&out, "");
+    for path in &written {
+        assert!(documented.iter().any(|pattern| is_file(pattern, path)), "{path} is not documented");
+    }
+    for pattern in &documented {
+        assert!(written.iter().any(|path| is_file(pattern, path)), "{pattern} is not written");
+    }
+
+    let bad = "exec:sh tests/fixtures/controllers/bad.sh dies";
+    let exec = ["campaign", headline, "-n", "5", "--controller", bad, "--sensors", "object", "--out", &at("exec")];
+    program(&exec, 5);
+    let part = ["campaign", headline, "-n", "2", "--partition", "1/2", "--out", &at("part")];
+    program(&part, 0);
+    let journals = ["open", "exec"].map(|name| lines(&folder.path().join(name).join("journal.jsonl"), true));
+    hold("journal", journals.iter().flatten());
+    hold("wall-times", &lines(&out.join("wall-times.jsonl"), false));
+    let manifests = ["open", "exec", "part"].map(|name| {
+        let text = std::fs::read_to_string(folder.path().join(name).join("manifest.json")).unwrap();
+        serde_json::from_str::<Value>(&text).unwrap()
+    });
+    hold("manifest", &manifests);
+
+    program(&["campaign", headline, "-n", "30", "--seed", "1", "--controller", "acc", "--out", &at("acc")], 0);
+    program(&["campaign", headline, "-n", "30", "--seed", "1", "--out", &at("mis")], 0);
+    let fixed = program(&["compare", &at("acc"), &at("mis")], 0);
+    let failing = program(&["compare", &at("mis"), &at("acc")], 1);
+    hold("compare", [&fixed, &failing]);
+    let replayed = program(&["replay", &at("open"), "3", "--scenario", "low-thw-overtake", "--paired"], 0);
+    let run = program(&["run", headline, "--paired"], 0);
+    hold("run", each(&run).into_iter().chain(each(&replayed)));
+}
+
+#[test]
+fn the_keys_of_the_commands_on_trajectory_data_are_those_documented() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let csv = at("own.csv");
+    let scenario = library("overtake-without-brake");
+    let record =
+        ["record", scenario.to_str().unwrap(), "-n", "20", "--controller", "acc", "-o", &csv].map(str::to_owned);
+    stdout(&closecall(record), 0);
+    let changes = program(&["lane-changes", &csv], 0);
+    hold("lane-changes", each(&changes));
+    let list = at("list.csv");
+    let first = &changes[0];
+    let known = format!("overtake-without-brake,{},{},left,1\n", first["track_id"], first["crossing_s"]);
+    std::fs::write(&list, format!("recording_id,track_id,time_s,direction,clear\n{known}")).unwrap();
+    hold("lane-changes-scored", [&program(&["lane-changes", &csv, "--reference", &list], 0)]);
+    // Of few vehicles some metrics have no value, and some quantities too few.
+    let few = at("few.csv");
+    let record =
+        ["record", scenario.to_str().unwrap(), "-n", "1", "--controller", "acc", "-o", &few].map(str::to_owned);
+    stdout(&closecall(record), 0);
+    let alone = at("alone.csv");
+    alone_in(&few, first["track_id"].as_u64().unwrap(), &alone);
+    let (many, one) = (program(&["criticality", &csv], 0), program(&["criticality", &alone], 0));
+    hold("criticality", each(&many).into_iter().chain(each(&one)));
+    hold("reenact", [&program(&["reenact", &csv], 0)]);
+    hold("fit", [&program(&["fit", &csv], 0), &program(&["fit", &few], 0)]);
+    hold("statistics", [&program(&["statistics", &csv], 0)]);
+    hold("robustness", [&program(&["robustness", &few, "--repetitions", "1"], 0)]);
+    let broken = at("broken.csv");
+    std::fs::write(&broken, BROKEN).unwrap();
+    let dropped = program(&["inspect", &broken, "--drop-bad-rows"], 0);
+    hold("inspect", [&program(&["inspect", &csv], 0), &dropped]);
+    hold("render", [&program(&["render", "-n", "1", "-o", &at("pictures")], 0)]);
+}
+
+/// Leaves one vehicle of a trajectory file.
+fn alone_in(from: &str, track_id: u64, to: &str) {
+    let text = std::fs::read_to_string(from).unwrap();
+    let mut lines = text.lines();
+    let header = lines.next().unwrap();
+    let column = header.split(',').position(|name| name == "track_id").unwrap();
+    let is_kept = |line: &&str| line.split(',').nth(column) == Some(track_id.to_string().as_str());
+    let kept: Vec<&str> = std::iter::once(header).chain(lines.filter(is_kept)).collect();
+    std::fs::write(to, kept.join("\n") + "\n").unwrap();
+}
+
+/// A vehicle that jumps, and a row that is not a number.
+const BROKEN: &str = "\
+track_id,frame,time_s,s_m,d_m,lane_id,speed_mps,accel_mps2,length_m,width_m,vehicle_class
+1,0,0.00,0.00,5.2,2,30,,4.5,1.8,car
+1,1,0.04,1.20,5.2,2,30,,4.5,1.8,car
+1,2,0.08,52.40,5.2,2,30,,4.5,1.8,car
+1,3,0.12,53.60,5.2,2,30,,4.5,1.8,car
+1,4,0.16,54.80,5.2,2,30,,4.5,1.8,car
+1,5,0.20,x,5.2,2,30,,4.5,1.8,car
+1,6,0.24,57.20,5.2,2,30,,4.5,1.8,car
+";
+
+#[test]
+fn the_exit_codes_are_those_of_the_help() {
+    let help = stdout(&closecall(["--help"]), 0);
+    let listed = help.split_once("Exit codes:").unwrap().1.lines().filter_map(|line| line.split_whitespace().next());
+    let text = document();
+    let table = text.split_once("## Exit codes").unwrap().1;
+    let rows = table.lines().skip_while(|line| !line.starts_with('|')).take_while(|line| line.starts_with('|'));
+    let documented: Vec<&str> =
+        rows.skip(2).map(|row| row.trim_matches('|').split('|').next().unwrap().trim()).collect();
+    assert_eq!(documented, listed.collect::<Vec<_>>());
+}

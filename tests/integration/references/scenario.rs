@@ -1,0 +1,88 @@
+//! `docs/scenario.md` against its generator, and what it states against the program.
+
+use closecall_traffic::{KeyPath, Segment};
+
+use crate::support::{closecall, stdout};
+
+#[path = "../../../examples/write_references/main.rs"]
+mod write_references;
+
+use write_references::{
+    ANNOTATED, EVERY_KEY, Kind, PAGE, Probe, SENSOR_DEFAULTS, SENSORS, Step, at_root, default_in, scenario_page,
+    tables, title,
+};
+
+#[test]
+fn the_scenario_reference_is_what_its_generator_writes() {
+    let written = scenario_page().unwrap();
+    assert!(
+        std::fs::read_to_string(at_root(PAGE)).unwrap() == written,
+        "{PAGE} is out of date: run `cargo run --release --example write_references` and commit the file"
+    );
+}
+
+#[test]
+fn the_examples_of_the_scenario_reference_are_valid() {
+    for path in [ANNOTATED, EVERY_KEY] {
+        let text = stdout(&closecall(["check", path]), 0);
+        assert!(text.contains("valid"), "{text}");
+    }
+}
+
+#[test]
+fn every_key_of_a_scenario_has_a_description_and_an_example() {
+    let probe = Probe::new().unwrap();
+    let schema = schemars::schema_for!(closecall::simulation::scenario::ScenarioConfig);
+    for table in tables(schema.as_value(), &|key| probe.position(key)) {
+        for key in &table.keys {
+            assert!(!key.description.is_empty(), "{}: {}", title(&table.ways[0]), key.name);
+            let used = table.ways.iter().any(|way| {
+                let inner: Vec<_> = way.iter().cloned().chain([Step::Key(key.name.clone())]).collect();
+                !probe.values(&inner).is_empty()
+            });
+            assert!(used, "{EVERY_KEY} does not use `{}` of {}", key.name, title(&table.ways[0]));
+        }
+    }
+}
+
+#[test]
+fn the_defaults_that_the_scenario_reference_states_are_those_of_the_program() {
+    let probe = Probe::new().unwrap();
+    let schema = schemars::schema_for!(closecall::simulation::scenario::ScenarioConfig);
+    let mut checked = 0;
+    for table in tables(schema.as_value(), &|key| probe.position(key)) {
+        for key in table.keys.iter().filter(|key| matches!(key.kind, Kind::Number { .. } | Kind::Whole)) {
+            let stated = default_in(&key.description).map(|found| found.value);
+            let Some(stated) = stated.and_then(|text| number(&text, &key.kind)) else { continue };
+            for way in &table.ways {
+                let inner: Vec<_> = way.iter().cloned().chain([Step::Key(key.name.clone())]).collect();
+                let Some((at, _)) = probe.values(&inner).into_iter().next() else { continue };
+                assert!(probe.is_default(&at, &stated).unwrap(), "{at}: {stated} is not the default");
+                checked += 1;
+            }
+        }
+    }
+    assert!(checked >= 30, "only {checked} defaults were found in the doc comments");
+    for (key, values) in SENSOR_DEFAULTS {
+        for (sensor, value) in SENSORS.iter().zip(values) {
+            let Some(value) = value else { continue };
+            let at = KeyPath(["sensors", sensor, key].map(|part| Segment::Key(part.to_owned())).to_vec());
+            let value = if key.starts_with("confirm-") {
+                #[expect(clippy::cast_possible_truncation, reason = "a small whole number")]
+                toml::Value::Integer(value as i64)
+            } else {
+                toml::Value::Float(value)
+            };
+            assert!(probe.is_default(&at, &value).unwrap(), "{at}: {value} is not the default");
+        }
+    }
+}
+
+/// A stated default as a value of the file. The minus sign of prose is another character than that of a file.
+fn number(text: &str, kind: &Kind) -> Option<toml::Value> {
+    let plain = text.replace('−', "-");
+    match kind {
+        Kind::Whole => plain.parse().ok().map(toml::Value::Integer),
+        _ => plain.parse().ok().map(toml::Value::Float),
+    }
+}
