@@ -131,9 +131,9 @@ fn run(fault: Option<Fault>, jobs: usize) -> (Vec<Record>, Summary) {
     let campaign = campaign(fault, jobs);
     let mut summary = campaign.summary();
     let mut records = Vec::new();
-    let finished = campaign.run(None, |turn| {
-        summary.push(turn.record);
-        records.push(turn.record.clone());
+    let finished = campaign.run(None, |next| {
+        summary.push(next.record);
+        records.push(next.record.clone());
         ControlFlow::Continue(())
     });
     finished.unwrap();
@@ -185,8 +185,8 @@ fn each_fault_is_an_error_with_its_reason_and_leaves_the_other_samples_unchanged
 fn run_part(campaign: &Campaign, path: &Path, samples: usize) {
     let locked = Folder::lock(path, &manifest(campaign), true).unwrap();
     let mut left = samples;
-    let finished = campaign.run(Some(&locked), |turn| {
-        left = if turn.is_new { left - 1 } else { left };
+    let finished = campaign.run(Some(&locked), |next| {
+        left = if next.is_new { left - 1 } else { left };
         if left == 0 { ControlFlow::Break(End::Campaign) } else { ControlFlow::Continue(()) }
     });
     finished.unwrap();

@@ -39,9 +39,9 @@ fn run(seed: u64, samples: u64, is_over: impl Fn(&ArmCounts) -> bool, mut observ
     let campaign = Campaign::new(vec![work], workers);
     let mut summary = campaign.summary();
     campaign
-        .run(None, |turn| {
-            observe(turn.record);
-            summary.push(turn.record);
+        .run(None, |next| {
+            observe(next.record);
+            summary.push(next.record);
             let counts = summary.total().arms[0];
             if is_over(&counts) { ControlFlow::Break(End::Scenario) } else { ControlFlow::Continue(()) }
         })
