@@ -27,9 +27,9 @@ fn point_counts_on_a_truck_match_the_scan_pattern() {
             let on = points.filter(|(_, point)| point.source == PointSource::Actor(1));
             let mut beams: Vec<u16> = on.map(|(&beam, _)| beam).collect();
             beams.dedup();
-            // The cabin's front is 2.51 m wide and extends from 0.35 m to 3.8 m. The count is at least the number of
-            // beams whose centres hit the front, and at most the number whose footprints touch the vehicle, including
-            // its wheels and its load.
+            // The cab's front is 2.51 m wide and extends from 0.35 m to 3.6 m; what passes up to 0.2 m above it hits the
+            // load. The count is at least the number of beams whose centres hit either, and at most the number whose
+            // footprints touch the vehicle, including its wheels.
             let footprint = [gap_m * 0.0625_f64.to_radians(), gap_m * 0.3_f64.to_radians()];
             let least = hand_count(mirror_side, gap_m, 1.255, [0.35, 3.8]);
             let most = hand_count(
