@@ -16,7 +16,8 @@ use closecall_campaign::record::{Record, SampleFailure};
 use closecall_campaign::runner::{Sampling, Work};
 use closecall_campaign::summary::Summary;
 use closecall_campaign::validity::CheckPlan;
-use closecall_campaign::verdict::{Decision, Gates, Verdict};
+use closecall_campaign::gate::{GateSet, Judge};
+use closecall_campaign::verdict::{Decision, Judgement, MAX_FLIP_RATE, Verdict, judge};
 use closecall_campaign::workers::Workers;
 use closecall_controllers::{ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack};
 use closecall_scenarios::sampling::Design;
@@ -169,9 +170,9 @@ fn each_fault_is_an_error_with_its_reason_and_leaves_the_other_samples_unchanged
             }
             assert_eq!(record.arms[0], sound.arms[0], "the other arm differs in sample {}", record.sample);
         }
-        let judged = summary.judge(Gates::default());
+        let judged = judged(&summary, &campaign(Some(fault), 1));
         assert_eq!(judged.decision, Decision::SampleError, "{fault:?}");
-        assert_ne!(judged.verdict, Verdict::Pass, "{fault:?}");
+        assert_eq!(judged.verdict(), Some(Verdict::Error), "{fault:?}");
         assert_eq!(summary.total().errors(), failed.len() as u64);
         failed_by_fault.push(failed);
     }
@@ -179,6 +180,11 @@ fn each_fault_is_an_error_with_its_reason_and_leaves_the_other_samples_unchanged
         failed_by_fault.iter().all(|failed| *failed == failed_by_fault[0]),
         "the faults hit different samples: {failed_by_fault:?}"
     );
+}
+
+/// Judges a summary without gates.
+fn judged(summary: &Summary, campaign: &Campaign) -> Judgement {
+    judge(summary, &Judge::new(&campaign.works, &GateSet::default(), campaign.inference), MAX_FLIP_RATE)
 }
 
 /// Runs `campaign` in a folder, and stops it after `samples` more samples.

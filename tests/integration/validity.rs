@@ -9,7 +9,9 @@ use closecall_campaign::execution::Campaign;
 use closecall_campaign::runner::{Sampling, Work};
 use closecall_campaign::summary::{Counts, Summary};
 use closecall_campaign::validity::{CheckPlan, Invariance};
-use closecall_campaign::verdict::{Decision, Gates, Verdict};
+use closecall_campaign::gate::{GateSet, Judge};
+use closecall_campaign::ledger::Inference;
+use closecall_campaign::verdict::{Decision, Judgement, MAX_FLIP_RATE, Verdict, judge};
 use closecall_campaign::workers::Workers;
 use closecall_controllers::{ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack};
 use closecall_scenarios::sampling::Design;
@@ -96,6 +98,11 @@ fn findings(counts: &Counts) -> Vec<(Invariance, u64)> {
     counts.checks.broken().collect()
 }
 
+/// Judges a summary without gates.
+fn judged(summary: &Summary) -> Judgement {
+    judge(summary, &Judge::new(&[], &GateSet::default(), Inference::FixedSamples), MAX_FLIP_RATE)
+}
+
 #[test]
 fn each_check_finds_its_fault() {
     for (on, expected) in [
@@ -106,8 +113,8 @@ fn each_check_finds_its_fault() {
     ] {
         let summary = checked(on);
         assert_eq!(findings(&summary.total()), [(expected, 6)], "{expected:?}");
-        let judged = summary.judge(Gates::default());
-        assert_eq!((judged.verdict, judged.decision), (Verdict::Invalid, Decision::Invalid));
+        let judged = judged(&summary);
+        assert_eq!((judged.verdict(), judged.decision), (Some(Verdict::Invalid), Decision::Invalid));
         assert!(judged.reasons[0].contains(expected.finding()), "{:?}", judged.reasons);
     }
 }

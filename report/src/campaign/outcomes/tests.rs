@@ -9,6 +9,7 @@ use closecall_traffic::{Absent, Time};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
 use super::*;
+use closecall_traffic::ActorId;
 use closecall_simulation::outcome::{ClosedBy, EndReason, Margins, Phase};
 
 fn parameters(rear_class: &str) -> Parameters {

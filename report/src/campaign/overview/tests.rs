@@ -2,6 +2,9 @@ use std::path::Path;
 
 use closecall_traffic::{Absent, ParameterName, Parameters, Value};
 
+use closecall_campaign::record::Record;
+use closecall_simulation::scenario::ScenarioFile;
+
 use super::*;
 use crate::campaign::outcomes::tests::rows;
 use closecall_campaign::record::{ArmRecord, SampleFailure};
