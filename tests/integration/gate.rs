@@ -122,6 +122,7 @@ impl EgoController for Faulty {
             acceleration_mps2,
             state: EgoState::Increasing,
             reason: Reason::Engaged,
+            ..command
         };
         let accelerated = |acceleration_mps2: f64| EgoCommand { acceleration_mps2, ..command };
         Ok(match self.fault {

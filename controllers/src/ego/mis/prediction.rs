@@ -274,9 +274,9 @@ mod tests {
             assert_eq!(solution, Solution { deceleration_mps2: 1.0, in_reach: false });
         }
         let broken = BrakingResponse { braking_mps2: f64::NAN, ..CAR };
-        assert!(!ArrivalPrediction { encounter, response: broken }.solve(2.7, 1.0).unwrap().in_reach);
+        assert!(!ArrivalPrediction { encounter: REFERENCE, response: broken }.solve(2.7, 1.0).unwrap().in_reach);
         assert_eq!(
-            ArrivalPrediction { encounter: Encounter { closing_mps: f64::NAN, ..encounter }, response: CAR }
+            ArrivalPrediction { encounter: Encounter { closing_mps: f64::NAN, ..REFERENCE }, response: CAR }
                 .solve(2.7, 1.0),
             None
         );
