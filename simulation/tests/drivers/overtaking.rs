@@ -95,15 +95,16 @@ fn it_stays_in_the_passing_lane_if_the_scenario_does_not_say_so() {
 #[test]
 fn it_gives_up_and_brakes_if_the_gap_closes() {
     let cut_out_s = Overtaker::TYPICAL.drive("", 60.0).noted_s(REAR, DriverNote::CutOutStarted).unwrap();
-    // A motorcycle in the passing lane, 30 m behind at the same speed, accelerates as soon as the other pulls out. A car of
-    // the simulation accelerates at 4 m/s² at most.
+    // A motorcycle in the passing lane, 20 m behind at the same speed, accelerates as soon as the other pulls out. A car of
+    // the simulation accelerates at 4 m/s² at most. From 30 m behind, the driver gives up 0.25 m before the marking, at a
+    // lateral speed of 1.4 m/s. The plant keeps that speed at first, so that the centre gets 0.4 m past the marking.
     let (from_s, to_s) = (cut_out_s + 0.1, cut_out_s + 2.1);
     let shoots = format!(
         r#"
 [[actor]]
 id = "shoots"
 vehicle = {{ class = "motorcycle" }}
-start = {{ behind = {{ of = "rear", gap-m = 30.0, speed-mps = 36.0, lane = 1 }} }}
+start = {{ behind = {{ of = "rear", gap-m = 20.0, speed-mps = 36.0, lane = 1 }} }}
 driver = {{ prescribed = {{ acceleration-profile = [[{from_s:?}, 5.0], [{to_s:?}, 0.0]] }} }}
 "#
     );
