@@ -2,7 +2,7 @@
 """Trajectories of SUMO's Wiedemann 99 follower, as an independent reference for ours.
 
     pip install eclipse-sumo==1.28.0
-    python controllers/tests/golden/wiedemann99_sumo.py
+    python simulation/tests/golden/wiedemann99_sumo.py
 
 writes `wiedemann99_sumo.csv` beside this script: one row for every logged instant of every case, with the leader's
 speed, the follower's speed and the gap bumper to bumper. The leader's speed is prescribed in every step; the follower
