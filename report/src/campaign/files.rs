@@ -82,7 +82,7 @@ impl CampaignReport<'_> {
         let files = self.scenario_files();
         let nominal: Vec<_> = files.iter().map(|file| file.space().nominal()).collect();
         let rows = || rows(folder, self.manifest);
-        write_outcomes(&folder.file("outcomes.parquet"), &parameter_columns(&nominal), rows()?)?;
+        write_outcomes(&folder.file("outcomes.parquet"), Some(self.manifest), &parameter_columns(&nominal), rows()?)?;
         let mut slowest = Vec::with_capacity(SLOWEST + 1);
         let timings = timings(folder, self.manifest)?.inspect(|timing| keep_slowest(&mut slowest, timing));
         write_timings(&folder.file("timings.parquet"), timings)?;
