@@ -81,7 +81,9 @@ pub struct ScenarioBaseline {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BaselineError {
     /// The two have nothing in common that could be compared.
-    #[error("failed to compare with the baseline: {what} is {baseline} in the baseline, {current} in the campaign; save a new baseline")]
+    #[error(
+        "failed to compare with the baseline: {what} is {baseline} in the baseline, {current} in the campaign; save a new baseline"
+    )]
     Different {
         /// What differs.
         what: String,

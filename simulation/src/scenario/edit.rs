@@ -173,7 +173,10 @@ mod tests {
     fn a_value_is_changed_in_place() {
         assert!(set("duration-s=30").unwrap().starts_with("duration-s = 30\n[parameters]"));
         assert!(set("actor.rear.start.behind.gap-m=90").unwrap().contains("gap-m = 90"));
-        assert_eq!("actor.rear.start.behind.gap-m = 90".parse::<Setting>().unwrap().to_string(), "actor.rear.start.behind.gap-m=90");
+        assert_eq!(
+            "actor.rear.start.behind.gap-m = 90".parse::<Setting>().unwrap().to_string(),
+            "actor.rear.start.behind.gap-m=90"
+        );
         assert!(set("actor.0.start.behind.gap-m=$gap").unwrap().contains("gap-m = \"$gap\""));
         assert!(set("parameters.brake-mps2.uniform.min=5").unwrap().contains("min = 5"));
     }
@@ -185,7 +188,9 @@ mod tests {
 
     #[test]
     fn a_misspelt_part_is_answered_with_a_suggestion() {
-        for (text, expected) in [("duration=3", "duration-s"), ("actor.raer.id=x", "rear"), ("brake-mps=3", "brake-mps2")] {
+        for (text, expected) in
+            [("duration=3", "duration-s"), ("actor.raer.id=x", "rear"), ("brake-mps=3", "brake-mps2")]
+        {
             let message = set(text).unwrap_err().to_string();
             assert!(message.ends_with(&format!("; did you mean `{expected}`?")), "{message}");
         }

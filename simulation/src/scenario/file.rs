@@ -72,6 +72,17 @@ pub enum ScenarioError {
     },
 }
 
+impl ScenarioError {
+    /// Returns the line of the error, counted from 1, or `None` if it has none.
+    pub const fn line(&self) -> Option<usize> {
+        match self {
+            Self::NotText { line, .. } | Self::Syntax { line, .. } => Some(*line),
+            Self::Value { line, .. } => *line,
+            Self::Read { .. } | Self::Empty { .. } | Self::Set { .. } => None,
+        }
+    }
+}
+
 /// A scenario file whose keys have been checked.
 #[derive(Clone, Debug)]
 pub struct ScenarioFile {
