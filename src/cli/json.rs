@@ -36,7 +36,9 @@ pub(super) fn stamped(mut value: Value, seed: Option<u64>, settings: Option<&[Se
     };
     let version = version();
     for object in objects.into_iter().filter_map(Value::as_object_mut) {
-        let mut add = |key: &str, value: Value| drop(object.entry(key.to_owned()).or_insert(value));
+        let mut add = |key: &str, value: Value| {
+            object.entry(key.to_owned()).or_insert(value);
+        };
         add("schema_version", json!(SCHEMA_VERSION));
         add("closecall_version", json!(version));
         if let Some(seed) = seed {

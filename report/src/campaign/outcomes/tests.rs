@@ -5,7 +5,7 @@ use arrow::datatypes::{Float64Type, UInt64Type};
 use arrow::util::display::array_value_to_string;
 use closecall_controllers::Reason;
 use closecall_traffic::geometry::BoxSide;
-use closecall_traffic::{Absent, Time};
+use closecall_traffic::{Absent, ActorId, Time};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
 use super::*;
