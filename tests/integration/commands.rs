@@ -16,7 +16,8 @@ fn run_in(folder: &Path, args: &[&str]) -> std::process::Output {
 fn a_new_user_gets_from_an_empty_folder_to_a_campaign() {
     let folder = folder();
     let written = stdout(&run_in(folder.path(), &["init"]), 0);
-    for path in ["closecall.toml", ".github/workflows/closecall.yml", ".gitlab-ci.yml", "scenarios/late-overtake.toml"] {
+    for path in ["closecall.toml", ".github/workflows/closecall.yml", ".gitlab-ci.yml", "scenarios/late-overtake.toml"]
+    {
         assert!(written.contains(&format!("written: ./{path}")), "{written}");
         assert!(folder.path().join(path).is_file(), "{path}");
     }
@@ -141,7 +142,8 @@ fn a_baseline_names_what_newly_fails() {
     let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     for controller in ["acc", "mis"] {
         let out = at(controller);
-        let args = ["campaign", "low-thw-overtake", "-n", "30", "--seed", "1", "--controller", controller, "--out", &out];
+        let args =
+            ["campaign", "low-thw-overtake", "-n", "30", "--seed", "1", "--controller", controller, "--out", &out];
         assert!([0, 1, 4].contains(&code(&closecall(args))));
     }
     let file = at("baseline.json");

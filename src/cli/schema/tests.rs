@@ -1,3 +1,7 @@
+use std::sync::LazyLock;
+
+use closecall_traffic::ActorId;
+
 use super::super::library;
 use super::*;
 
@@ -39,6 +43,11 @@ fn broken(root: &Value, schema: &Value, value: &Value) -> Option<String> {
         .or_else(|| rule(schema.get("enum").is_none_or(|words| words.as_array().unwrap().contains(value)), "enum"))
         .or_else(|| rule(schema.get("anyOf").is_none() || holding("anyOf") > 0, "anyOf"))
         .or_else(|| rule(schema.get("oneOf").is_none() || holding("oneOf") == 1, "oneOf"))
+        .or_else(|| {
+            let (pattern, text) = (schema["pattern"].as_str()?, value.as_str()?);
+            let name = if pattern.starts_with("^\\$") { text.strip_prefix('$') } else { Some(text) };
+            rule(name.is_some_and(|name| ActorId::new(name).is_ok()), "pattern")
+        })
         .or_else(|| bound("minimum", |number, bound| number >= bound))
         .or_else(|| bound("exclusiveMinimum", |number, bound| number > bound))
         .or_else(|| bound("maximum", |number, bound| number <= bound))
@@ -60,9 +69,10 @@ fn broken(root: &Value, schema: &Value, value: &Value) -> Option<String> {
 }
 
 fn verdict(text: &str) -> Option<String> {
-    let schema = strict_schema();
+    static SCHEMA: LazyLock<Value> = LazyLock::new(strict_schema);
+    let schema = &*SCHEMA;
     let value = serde_json::to_value(text.parse::<Table>().unwrap()).unwrap();
-    broken(&schema, &schema, &value)
+    broken(schema, schema, &value)
 }
 
 #[test]
