@@ -15,6 +15,7 @@
 //! Rates are conditional on the sampled scenario: they are the share of *sampled encounters* that end in a collision,
 //! not the frequency of collisions on a road.
 
+pub mod baseline;
 pub mod compare;
 pub mod execution;
 pub mod folder;

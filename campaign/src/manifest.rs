@@ -107,6 +107,22 @@ impl Manifest {
         differences
     }
 
+    /// Returns the manifest as JSON without what does not affect the outcomes: the command line, the paths of the
+    /// scenario files, the partition, and the hash of the executable. It is the same for a campaign that ran in one go,
+    /// in parts or with interruptions. Returns `None` if it cannot be written as JSON.
+    pub fn determining_json(&self) -> Option<String> {
+        let mut whole = self.whole();
+        if let Some(end) = whole.closecall_version.find('+') {
+            whole.closecall_version.truncate(end);
+        }
+        let mut value = serde_json::to_value(whole).ok()?;
+        value.as_object_mut()?.remove("command");
+        for scenario in value.get_mut("scenarios")?.as_array_mut()? {
+            scenario.as_object_mut()?.remove("path");
+        }
+        serde_json::to_string(&value).ok()
+    }
+
     /// Returns the arms, the baseline first.
     pub fn arms(&self) -> Vec<Arm> {
         let arm = |controller: &ControllerChoice| Arm { controller: controller.factory(), sensors: self.sensors };
@@ -196,6 +212,8 @@ mod tests {
         other.command.push("--jobs=2".to_owned());
         other.scenarios[0].path = "b.toml".to_owned();
         assert_eq!(manifest().differences(&other), Vec::<String>::new());
+        other.partition = Some("1/3".parse().unwrap());
+        assert_eq!(manifest().determining_json(), other.determining_json());
     }
 
     #[test]

@@ -22,8 +22,10 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::args::{ControllerArgs, Format, SensorsChoice, SetArgs, controllers, positive};
 use super::gates::GateArgs;
-use super::output::{outln, print_error};
+use super::heartbeat::Heartbeat;
+use super::output::{outln, print_error, print_report_files};
 use super::plan::PlanArgs;
+use super::source::expand;
 use super::summary::{print_counts, print_verdict};
 use super::{CliError, json};
 use crate::exit_code::ExitCode;
@@ -31,7 +33,7 @@ use crate::exit_code::ExitCode;
 /// Arguments of `closecall campaign`.
 #[derive(Debug, Args)]
 pub(super) struct CampaignArgs {
-    /// Scenario files
+    /// Scenario files, folders of them, names of scenarios of the library, or `-` for standard input
     #[arg(required = true)]
     scenarios: Vec<PathBuf>,
     #[command(flatten)]
@@ -74,7 +76,7 @@ pub(super) struct CampaignArgs {
     #[command(flatten)]
     set: SetArgs,
     /// Output format
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = clap::builder::Resettable::Reset)]
     format: Format,
 }
 
@@ -99,7 +101,7 @@ impl CampaignArgs {
 
     /// Reads and checks every scenario.
     fn plan(&self, controllers: Vec<ControllerChoice>) -> Result<Plan, CliError> {
-        let files = self.scenarios.iter().map(|path| self.set.load(path)).collect::<Result<Vec<_>, _>>()?;
+        let files = expand(&self.scenarios)?.iter().map(|path| self.set.load(path)).collect::<Result<Vec<_>, _>>()?;
         let mut plan = Plan::new(files, self.sampling(), controllers)?;
         plan.sensors = self.sensors.map(SensorsChoice::mode);
         plan.partition = self.partition;
@@ -143,13 +145,23 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
         None => report.write_without_folder()?,
     }
     match args.format {
-        Format::Json => outln!("{:#}", json::campaign(&tally.summary, &judged, Some(wall_s))),
+        Format::Json => outln!(
+            "{:#}",
+            json::stamped(
+                json::campaign(&tally.summary, &judged, Some(wall_s)),
+                Some(args.seed),
+                Some(&args.set.settings)
+            )
+        ),
         Format::Human => {
             print_counts(&tally.summary);
             let (simulated_s, jobs) = (tally.summary.total().simulated_s, campaign.workers.jobs);
             outln!("{simulated_s:.0} simulated seconds in {wall_s:.1} s on {jobs} threads");
             print_verdict(&judged);
         }
+    }
+    if let Some(locked) = &locked {
+        print_report_files(&locked.folder);
     }
     Ok(ExitCode::from(&judged))
 }
@@ -160,6 +172,7 @@ struct Progress {
     tally: Tally,
     stop: StopMonitor,
     bar: ProgressBar,
+    _heartbeat: Heartbeat,
 }
 
 impl Progress {
@@ -171,7 +184,8 @@ impl Progress {
             }
         }
         let names = campaign.works.iter().map(|work| work.file.config().name.clone()).collect();
-        Self { names, tally: Tally::new(campaign, gates), stop, bar: progress_bar(campaign.len()) }
+        let bar = progress_bar(campaign.len());
+        Self { names, tally: Tally::new(campaign, gates), stop, _heartbeat: Heartbeat::start(&bar), bar }
     }
 
     fn push(&mut self, next: NextRecord<'_>) -> ControlFlow<End> {

@@ -2,14 +2,14 @@
 
 use std::path::PathBuf;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use closecall_sensors::camera::{Backend, Classifier};
 use closecall_sensors::use_inference_backend;
 
 use super::output::print_error;
 use super::{
-    CliError, campaign, check, compare, inspect, merge, plot, record, reenact, render, replay, robustness, run,
-    statistics, trajectories,
+    CliError, baseline, campaign, check, compare, generate, inspect, library, merge, new, plot, record, reenact,
+    render, replay, robustness, run, schema, statistics, trajectories, watching,
 };
 use crate::exit_code::ExitCode;
 
@@ -42,6 +42,14 @@ Exit codes:
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Write a commented scenario to start from
+    New(new::NewArgs),
+    /// Write the files of a repository of scenarios, with CI jobs for GitHub and GitLab. No file is overwritten
+    Init(new::InitArgs),
+    /// List the scenarios of the library with their questions, requirements and gates
+    List(library::ListArgs),
+    /// Check a scenario at every change of its file, and run a few samples of it
+    Watch(watching::WatchingArgs),
     /// Run one sample of a scenario
     Run(run::RunArgs),
     /// Run many samples of one or more scenarios, and judge the result by gates
@@ -50,6 +58,8 @@ enum Command {
     Merge(merge::MergeArgs),
     /// Compare a campaign with an earlier one, sample by sample
     Compare(compare::CompareArgs),
+    /// Keep the results of a campaign in a small file, and compare later campaigns with it
+    Baseline(baseline::BaselineArgs),
     /// Run one sample of a campaign again, and check that it gives the same bits
     Replay(replay::ReplayArgs),
     /// Check scenario files without running them
@@ -76,6 +86,10 @@ enum Command {
     Plot(plot::PlotArgs),
     /// Render labelled images of the rear camera
     Render(render::RenderArgs),
+    /// Print a script that completes commands and options in a shell
+    Completions(generate::CompletionsArgs),
+    /// Print the manual page, or write one for each command
+    Man(generate::ManArgs),
 }
 
 /// Runs the program with the arguments of the process.
@@ -117,13 +131,18 @@ fn choose_backend(onnxruntime: Option<PathBuf>) -> Result<(), CliError> {
 
 fn dispatch(command: Command) -> Result<ExitCode, CliError> {
     match command {
+        Command::New(args) => new::new(&args),
+        Command::Init(args) => new::init(&args),
+        Command::List(args) => library::list(&args),
+        Command::Watch(args) => watching::watch(&args),
         Command::Run(args) => run::run(&args),
         Command::Campaign(args) => campaign::campaign(&args),
         Command::Merge(args) => merge::merge(&args),
         Command::Compare(args) => compare::compare(&args),
+        Command::Baseline(args) => baseline::baseline(&args),
         Command::Replay(args) => replay::replay(&args),
         Command::Check(args) => check::check(&args),
-        Command::Schema => check::schema(),
+        Command::Schema => schema::schema(),
         Command::Inspect(args) => inspect::inspect(&args),
         Command::LaneChanges(args) => trajectories::lane_changes(&args),
         Command::Criticality(args) => trajectories::criticality(&args),
@@ -134,5 +153,7 @@ fn dispatch(command: Command) -> Result<ExitCode, CliError> {
         Command::Record(args) => record::record(&args),
         Command::Plot(args) => plot::plot(&args),
         Command::Render(args) => render::render(&args),
+        Command::Completions(args) => generate::completions(&args, Cli::command()),
+        Command::Man(args) => generate::man(&args, Cli::command()),
     }
 }

@@ -1,5 +1,6 @@
 //! The errors of the commands, and the exit code of each.
 
+use closecall_campaign::baseline::BaselineError;
 use closecall_campaign::compare::CompareError;
 use closecall_campaign::execution::CampaignError;
 use closecall_campaign::folder::FolderError;
@@ -115,6 +116,9 @@ pub enum CliError {
     /// The reports of a campaign cannot be written.
     #[error(transparent)]
     Report(#[from] ReportError),
+    /// A campaign cannot be compared with a baseline.
+    #[error(transparent)]
+    Baseline(#[from] BaselineError),
     /// Two campaigns cannot be compared.
     #[error(transparent)]
     Compare(#[from] CompareError),
@@ -173,7 +177,7 @@ impl From<&CliError> for ExitCode {
             | CliError::WriteRecording(_)
             | CliError::Dataset(_) => Self::Io,
             CliError::Sample { .. } => Self::SampleError,
-            CliError::Usage { .. } | CliError::Plan(_) => Self::Usage,
+            CliError::Usage { .. } | CliError::Plan(_) | CliError::Baseline(_) => Self::Usage,
         }
     }
 }

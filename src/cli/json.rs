@@ -3,11 +3,13 @@
 use closecall_campaign::gate::{Answer, Evaluation, ExpectationResult, GateResult, RequirementResult};
 use closecall_campaign::harm;
 use closecall_campaign::ledger::{Inference, Pairs};
+use closecall_campaign::manifest::version;
 use closecall_campaign::summary::{Counts, Summary};
 use closecall_campaign::validity::CheckCounts;
 use closecall_campaign::verdict::Judgement;
 use closecall_report::run::film::Course;
 use closecall_simulation::outcome::{Collision, Margins, MisSummary, MomentAt, Outcome};
+use closecall_simulation::scenario::Setting;
 use closecall_traffic::{Absent, Measured, Value as ParameterValue};
 use serde_json::{Map, Value, json};
 
@@ -22,6 +24,32 @@ fn insert(object: &mut Map<String, Value>, key: &str, measured: Measured) {
             object.insert(format!("{key}_absent"), json!(absent.to_string()));
         }
     }
+}
+
+/// The version of the keys of `--format json`. It changes if a key changes its meaning, not if one is added.
+const SCHEMA_VERSION: u32 = 1;
+
+/// Adds how an output was made: to an object, or to each object of a list. Keys that are there already stay.
+pub(super) fn stamped(mut value: Value, seed: Option<u64>, settings: Option<&[Setting]>) -> Value {
+    let objects = match &mut value {
+        Value::Array(list) => list.iter_mut().collect(),
+        one => vec![one],
+    };
+    let version = version();
+    for object in objects.into_iter().filter_map(Value::as_object_mut) {
+        let mut add = |key: &str, value: Value| {
+            object.entry(key.to_owned()).or_insert(value);
+        };
+        add("schema_version", json!(SCHEMA_VERSION));
+        add("closecall_version", json!(version));
+        if let Some(seed) = seed {
+            add("seed", json!(seed));
+        }
+        if let Some(settings) = settings {
+            add("settings", settings.iter().map(ToString::to_string).collect());
+        }
+    }
+    value
 }
 
 /// Returns the object of `run --format json`.

@@ -1,15 +1,20 @@
 //! The command line: arguments, calls, printed results, and exit codes.
 
 mod args;
+mod baseline;
 mod campaign;
 mod check;
 mod command;
 mod compare;
 mod error;
 mod gates;
+mod generate;
+mod heartbeat;
 mod inspect;
 mod json;
+mod library;
 mod merge;
+mod new;
 mod output;
 mod plan;
 mod plot;
@@ -20,10 +25,13 @@ mod render;
 mod replay;
 mod robustness;
 mod run;
+mod schema;
+mod source;
 mod statistics;
 mod summary;
 mod trajectories;
 mod watch;
+mod watching;
 
 pub use command::main;
 pub use error::CliError;

@@ -7,6 +7,7 @@ use closecall_campaign::ledger::Inference;
 use closecall_campaign::validity::CheckPlan;
 
 use super::CliError;
+use super::args::count;
 use super::gates::{PresetGates, share};
 
 /// Default number of samples of each scenario.
@@ -47,7 +48,7 @@ impl Preset {
 pub(super) struct PlanArgs {
     /// Number of samples of each scenario [default: 200]. With --until-certain or --time-budget the largest number
     /// [default: 1000000]
-    #[arg(short = 'n', long = "samples", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(short = 'n', long = "samples", allow_negative_numbers = true, value_parser = count)]
     samples: Option<u64>,
     /// Number of samples for a purpose, paired with the baseline unless the controller under test is the baseline
     #[arg(long, value_enum)]

@@ -21,7 +21,7 @@ use crate::exit_code::ExitCode;
 /// Arguments of `closecall plot`.
 #[derive(Debug, Args)]
 pub(super) struct PlotArgs {
-    /// Scenario file, or the folder of a campaign
+    /// Scenario file, name of a scenario of the library, or the folder of a campaign
     source: PathBuf,
     /// Number of the sample; required for the folder of a campaign
     #[arg(value_name = "SAMPLE")]

@@ -13,17 +13,17 @@ use closecall_simulation::scenario::{ActorConfig, Scenario, ScenarioFile};
 use closecall_simulation::{Observer, RunKey};
 
 use super::CliError;
-use super::args::{ArmArgs, SetArgs};
+use super::args::{ArmArgs, SetArgs, count};
 use super::output::outln;
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall record`.
 #[derive(Debug, Args)]
 pub(super) struct RecordArgs {
-    /// Scenario file
+    /// Scenario file, name of a scenario of the library, or `-` for standard input
     scenario: PathBuf,
     /// Number of samples; their traffic follows one after the other in the file
-    #[arg(short = 'n', long = "samples", default_value_t = 20, value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    #[arg(short = 'n', long = "samples", default_value_t = 20, allow_negative_numbers = true, value_parser = sample_count)]
     samples: u64,
     /// Seed of the random numbers
     #[arg(long, default_value_t = 0)]
@@ -39,6 +39,17 @@ pub(super) struct RecordArgs {
     /// Trajectory file to write, in the plain CSV layout; with --in-car in the in-car layout
     #[arg(short, long, value_name = "FILE.csv")]
     output: PathBuf,
+}
+
+/// Largest number of samples in one trajectory file.
+const MAX_SAMPLES: u64 = 100_000;
+
+/// Parses a number of samples that fit into one trajectory file.
+fn sample_count(text: &str) -> Result<u64, String> {
+    match count(text)? {
+        number if number <= MAX_SAMPLES => Ok(number),
+        number => Err(format!("`{number}` is too large: a trajectory file holds up to {MAX_SAMPLES} samples")),
+    }
 }
 
 pub(super) fn record(args: &RecordArgs) -> Result<ExitCode, CliError> {

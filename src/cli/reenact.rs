@@ -157,7 +157,7 @@ fn print(format: Format, found: &RecordedEncounter, reenactment: &Reenactment<'_
                 "simulated": json::course(&comparison.simulated),
                 "outcome": json::outcome(outcome),
             });
-            outln!("{object:#}");
+            outln!("{:#}", json::stamped(object, Some(outcome.seed), None));
         }
         Format::Human => {
             outln!("{}: rear vehicle: track {rear}; ego: track {ego}; lead vehicle: track {front}", found.recording);

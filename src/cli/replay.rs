@@ -50,7 +50,7 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<ExitCode, CliError> {
         announce_process(saved.manifest(), arm.controller.name());
     }
     let outcomes = run_watched(&scenario, key, &arms, &args.watch)?;
-    print(&outcomes, args.format);
+    print(&outcomes, args.format, None);
     let mut agrees = true;
     for outcome in &outcomes {
         agrees &= agrees_with_journal(saved.folder(), outcome)?;

@@ -12,7 +12,8 @@ use rayon::prelude::*;
 
 use super::CliError;
 use super::args::{Format, ReadArgs};
-use super::output::outln;
+use super::json::stamped;
+use super::output::{outln, print_written};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall robustness`.
@@ -63,7 +64,7 @@ pub(super) fn robustness(args: &RobustnessArgs) -> Result<ExitCode, CliError> {
         plot(&found, folder)?;
     }
     match args.format {
-        Format::Json => outln!("{:#}", json(&found)),
+        Format::Json => outln!("{:#}", stamped(json(&found), None, None)),
         Format::Human => print(&found),
     }
     Ok(ExitCode::Pass)
@@ -142,7 +143,9 @@ fn plot(found: &Robustness, folder: &Path) -> Result<(), CliError> {
     let offset = Axis { name: "Lateral offset [m]", levels: &levels.offset_m, rows: &found.offset };
     for (name, legend, axis) in [("noise.svg", Legend::LowerLeft, noise), ("offset.svg", Legend::LowerMiddle, offset)] {
         let svg = LineChart { legend, ..chart(found, &axis) }.svg()?;
-        write_file(&folder.join(name), |file| file.write_all(svg.as_bytes()))?;
+        let path = folder.join(name);
+        write_file(&path, |file| file.write_all(svg.as_bytes()))?;
+        print_written(&path);
     }
     Ok(())
 }

@@ -12,6 +12,7 @@ use closecall_scenarios::recordings::{Layout, Recording, open, quality, read_wit
 
 use super::CliError;
 use super::args::{Format, ReadArgs, positive};
+use super::json::stamped;
 use super::output::{out, outln};
 use super::watch::record_lane_change;
 use crate::exit_code::ExitCode;
@@ -131,8 +132,10 @@ pub(super) fn lane_changes(args: &LaneChangesArgs) -> Result<ExitCode, CliError>
         score(&changes, &listed, &spans)
     });
     match (args.format, scored) {
-        (Format::Json, None) => outln!("{:#}", serde_json::json!(changes)),
-        (Format::Json, Some(scored)) => outln!("{:#}", serde_json::json!({ "lane_changes": changes, "score": scored })),
+        (Format::Json, None) => outln!("{:#}", stamped(serde_json::json!(changes), None, None)),
+        (Format::Json, Some(scored)) => {
+            outln!("{:#}", stamped(serde_json::json!({ "lane_changes": changes, "score": scored }), None, None));
+        }
         (Format::Human, scored) => {
             let (rows, period, dropped) = (tracks.rows(), tracks.period(), tracks.dropped().count());
             outln!("{name}: {count} tracks, {rows} rows every {period}, {dropped} rows skipped");
@@ -209,7 +212,7 @@ pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> 
         record_lane_change(path, &smoothed, &changes, args.track)?;
     }
     match args.format {
-        Format::Json => outln!("{:#}", serde_json::json!(changes)),
+        Format::Json => outln!("{:#}", stamped(serde_json::json!(changes), None, None)),
         Format::Human => {
             describe(&recording);
             print_metrics(&changes);
@@ -250,7 +253,7 @@ pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
         write_toml(&fitted, &heading, path).map_err(|source| WriteError::new(path, source))?;
     }
     match (args.format, &args.output) {
-        (Format::Json, _) => outln!("{:#}", json(&fitted)),
+        (Format::Json, _) => outln!("{:#}", stamped(json(&fitted), None, None)),
         (Format::Human, None) => out!("{}", to_toml(&fitted, &heading)),
         (Format::Human, Some(path)) => {
             for quantity in &fitted.fitted {

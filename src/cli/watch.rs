@@ -16,6 +16,7 @@ use closecall_simulation::{Arm, Happening, Observer, RunKey, StepView};
 use closecall_traffic::Time;
 
 use super::CliError;
+use super::output::print_written;
 
 /// The level of detail of a recording.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -96,9 +97,13 @@ pub(super) fn run_watched(
     }
     if let Some(path) = &watch.record {
         write_films(path, &films)?;
+        print_written(path);
     }
     if let Some(trace) = trace {
         trace.finish()?;
+    }
+    if let Some(path) = &watch.trace {
+        print_written(path);
     }
     Ok(outcomes)
 }
@@ -161,7 +166,9 @@ pub(super) fn record_lane_change(
         let of_track = track.map_or(String::new(), |track| format!(" of track {track}"));
         return Err(CliError::Usage { message: format!("the trajectory file has no lane change{of_track} to record") });
     };
-    Ok(record_films(path, &[film_lane_change(recording, chosen)?])?)
+    record_films(path, &[film_lane_change(recording, chosen)?])?;
+    print_written(path);
+    Ok(())
 }
 
 /// Returns the lane changes of `track`, or of all tracks, the most critical first. Of two equal ones the later is

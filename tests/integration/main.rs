@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 mod campaign_example;
+mod commands;
 mod comparison;
 mod determinism;
 mod drivers;

@@ -135,7 +135,7 @@ fn the_parquet_file_holds_the_units_of_its_columns() {
     campaign(&out, &["--recordings", "0"], None, 0);
     let bytes = fs::read(out.join("outcomes.parquet")).unwrap();
     let text = String::from_utf8_lossy(&bytes);
-    for key in ["unit:param:closing-mps", "unit:min_ttc_rear_s", "unit:max_jerk_mps3"] {
+    for key in ["unit:param_closing_mps", "closecall:manifest", "unit:min_ttc_rear_s", "unit:max_jerk_mps3"] {
         assert!(text.contains(key), "{key}");
     }
 }

@@ -70,6 +70,7 @@ mod trajectory;
 mod vehicle;
 
 pub mod metrics;
+pub mod suggest;
 
 pub use absent::{Absent, Measured};
 pub use actor::{ActorId, InvalidActorId};

@@ -80,7 +80,7 @@ impl CampaignReport<'_> {
         let files = self.scenario_files();
         let nominal: Vec<_> = files.iter().map(|file| file.space().nominal()).collect();
         let rows = || rows(folder, self.manifest);
-        write_outcomes(&folder.file("outcomes.parquet"), &parameter_columns(&nominal), rows()?)?;
+        write_outcomes(&folder.file("outcomes.parquet"), Some(self.manifest), &parameter_columns(&nominal), rows()?)?;
         let mut slowest = Vec::with_capacity(SLOWEST + 1);
         let mut wall_s: Vec<(String, f64)> = files.iter().map(|file| (file.config().name.clone(), 0.0)).collect();
         let timings = timings(folder, self.manifest)?.inspect(|timing| {

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use closecall_scenarios::parameters::ParameterSpace;
 use closecall_scenarios::sampling::Design;
+use closecall_traffic::suggest::hint;
 use closecall_traffic::{ActorId, Check, ConfigError, ParameterName, Parameters};
 use toml_edit::DocumentMut;
 
@@ -69,6 +70,17 @@ pub enum ScenarioError {
         /// The error of the setting.
         source: SettingError,
     },
+}
+
+impl ScenarioError {
+    /// Returns the line of the error, counted from 1, or `None` if it has none.
+    pub const fn line(&self) -> Option<usize> {
+        match self {
+            Self::NotText { line, .. } | Self::Syntax { line, .. } => Some(*line),
+            Self::Value { line, .. } => *line,
+            Self::Read { .. } | Self::Empty { .. } | Self::Set { .. } => None,
+        }
+    }
 }
 
 /// A scenario file whose keys have been checked.
@@ -214,7 +226,7 @@ fn deserialize(path: &Path, text: &str) -> Result<ScenarioConfig, ScenarioError>
         let offset = error.span().map_or(0, |span| span.start);
         let line = locate::line_at(text, offset);
         let named = key_at(text, offset).map(|key| format!("`{key}`: ")).unwrap_or_default();
-        let message = format!("{named}{}", without_rust_types(error.message()));
+        let message = format!("{named}{}{}", without_rust_types(error.message()), suggestion(error.message()));
         ScenarioError::Syntax { path: path.to_owned(), line, message }
     })
 }
@@ -236,6 +248,16 @@ fn append_names<'a>(value: &'a toml::Value, names: &mut Vec<&'a str>) {
         toml::Value::Array(values) => values.iter().for_each(|value| append_names(value, names)),
         toml::Value::Table(table) => table.iter().for_each(|(_, value)| append_names(value, names)),
         _ => {}
+    }
+}
+
+/// Returns the known word that the message's first word resembles, as the end of the message. The message is serde's:
+/// "unknown field `x`, expected one of `a`, `b`".
+fn suggestion(message: &str) -> String {
+    let is_unknown_word = message.starts_with("unknown field ") || message.starts_with("unknown variant ");
+    match (message.split('`').nth(1), message.split_once("expected ")) {
+        (Some(word), Some((_, known))) if is_unknown_word => hint(word, known),
+        _ => String::new(),
     }
 }
 
@@ -265,4 +287,20 @@ fn key_at(text: &str, offset: usize) -> Option<String> {
     let key = line.split('=').next()?.trim();
     let is_key = !key.is_empty() && key.chars().all(|c| c.is_alphanumeric() || "-_.\"".contains(c));
     is_key.then(|| key.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_misspelt_key_or_word_is_answered_with_a_suggestion() {
+        let parse = |text: &str| ScenarioFile::parse(Path::new("a.toml"), text, &[]).unwrap_err().to_string();
+        let message = parse("schema-version = 1\nname = 'a'\nduration = 3\n");
+        assert!(message.starts_with("failed to read a.toml:3: "), "{message}");
+        assert!(message.ends_with("; did you mean `duration-s`?"), "{message}");
+        let message = parse("schema-version = 1\nroad = { lanes = 3, overtaking-side = 'lefft' }\n");
+        assert!(message.ends_with("; did you mean `left`?"), "{message}");
+        assert!(!parse("schema-version = 1\nzzz = 3\n").contains("did you mean"));
+    }
 }

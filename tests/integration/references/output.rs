@@ -66,9 +66,9 @@ fn the_columns_of_a_campaign_s_tables_are_those_documented() {
     .map(str::to_owned);
     stdout(&closecall(args), 0);
     let (parameters, written): (Vec<_>, Vec<_>) =
-        columns(&out.join("outcomes.parquet")).into_iter().partition(|[name, ..]| name.starts_with("param:"));
+        columns(&out.join("outcomes.parquet")).into_iter().partition(|[name, ..]| name.starts_with("param_"));
     let (patterns, expected): (Vec<_>, Vec<_>) =
-        documented_columns("outcomes.parquet").into_iter().partition(|[name, ..]| name.starts_with("param:"));
+        documented_columns("outcomes.parquet").into_iter().partition(|[name, ..]| name.starts_with("param_"));
     assert_eq!(written, expected);
     for kind in patterns.iter().map(|[_, kind, _]| kind) {
         assert!(parameters.iter().any(|[_, written, _]| written == kind), "no parameter is a {kind}");
@@ -120,7 +120,7 @@ fn the_files_and_keys_of_a_campaign_are_those_documented() {
     let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let (headline, harmless) = (library("low-thw-overtake"), library("overtake-without-brake"));
     let (headline, harmless) = (headline.to_str().unwrap(), harmless.to_str().unwrap());
-    let both = ["campaign", headline, harmless, "-n", "10", "--seed", "1"];
+    let both = ["campaign", headline, harmless, "-n", "10", "--seed", "1", "--set", "duration-s=60"];
     let with = |more: &[&str], code| program(&[&both[..], more].concat(), code);
     // Few samples leave a strict bound open; a loose one is certain after some of them, which the clock may not decide.
     let open = with(&["--paired", "--max-probability", "0.01", "--out", &at("open"), "--record", "worst:1"], 4);
@@ -169,8 +169,16 @@ fn the_files_and_keys_of_a_campaign_are_those_documented() {
     let fixed = program(&["compare", &at("acc"), &at("mis")], 0);
     let failing = program(&["compare", &at("mis"), &at("acc")], 1);
     hold("compare", [&fixed, &failing]);
+    let baseline = at("baseline.json");
+    stdout(&closecall(["baseline", "save", &at("mis"), &baseline]), 0);
+    let saved: Value = serde_json::from_str(&std::fs::read_to_string(&baseline).unwrap()).unwrap();
+    hold("baseline-file", [&saved]);
+    hold("baseline", [&program(&["baseline", "compare", &at("acc"), &baseline], 1)]);
+    hold("list", [&program(&["list"], 0)]);
+    std::fs::write(at("bad.toml"), "nme = 'a'\n").unwrap();
+    hold("check", [&program(&["check", headline, &at("bad.toml"), "--set", "duration-s=60"], 3)]);
     let replayed = program(&["replay", &at("open"), "3", "--scenario", "low-thw-overtake", "--paired"], 0);
-    let run = program(&["run", headline, "--paired"], 0);
+    let run = program(&["run", headline, "--paired", "--set", "brake-mps2=6"], 0);
     hold("run", each(&run).into_iter().chain(each(&replayed)));
 }
 
