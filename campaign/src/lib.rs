@@ -17,6 +17,7 @@
 
 pub mod compare;
 pub mod execution;
+pub mod fingerprint;
 pub mod folder;
 mod folder_error;
 pub mod harm;
@@ -29,6 +30,7 @@ pub mod partition;
 pub mod plan;
 pub mod probability;
 pub mod record;
+mod repair;
 pub mod runner;
 pub mod saved;
 pub mod selection;

@@ -12,7 +12,8 @@ use rayon::prelude::*;
 
 use super::CliError;
 use super::args::{Format, ReadArgs};
-use super::output::outln;
+use super::output::{outln, print_error};
+use super::protect::{of_trajectories, protect};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall robustness`.
@@ -38,6 +39,10 @@ pub(super) struct RobustnessArgs {
 }
 
 pub(super) fn robustness(args: &RobustnessArgs) -> Result<ExitCode, CliError> {
+    let charts = args.plot.as_ref().map(|folder| ["noise.svg", "offset.svg"].map(|name| folder.join(name)));
+    for chart in charts.iter().flatten() {
+        protect(&of_trajectories(&args.files), &[("--plot", Some(chart))])?;
+    }
     let setup = Setup { seed: args.seed, repetitions: args.repetitions, ..Setup::default() };
     let mut studies = Vec::new();
     for path in &args.files {
@@ -65,6 +70,10 @@ pub(super) fn robustness(args: &RobustnessArgs) -> Result<ExitCode, CliError> {
     match args.format {
         Format::Json => outln!("{:#}", json(&found)),
         Format::Human => print(&found),
+    }
+    if found.reference == 0 {
+        print_error(format_args!("there is no lane change in the trajectory files: nothing was studied\n"));
+        return Ok(ExitCode::Inconclusive);
     }
     Ok(ExitCode::Pass)
 }

@@ -14,6 +14,7 @@ use closecall_scenarios::recordings::{Recording, read_with};
 use super::CliError;
 use super::args::{Format, ReadArgs, positive};
 use super::output::outln;
+use super::protect::{of_trajectories, protect};
 use super::trajectories::refuse_duplicates;
 use crate::exit_code::ExitCode;
 
@@ -37,6 +38,10 @@ pub(super) struct StatisticsArgs {
 }
 
 pub(super) fn statistics(args: &StatisticsArgs) -> Result<ExitCode, CliError> {
+    let charts = args.plot.as_ref().map(|folder| ["duration.svg", "speed.svg"].map(|name| folder.join(name)));
+    for chart in charts.iter().flatten() {
+        protect(&of_trajectories(&args.files), &[("--plot", Some(chart))])?;
+    }
     let read = |path: &PathBuf| read_with(path, args.read.options());
     let recordings = args.files.iter().map(read).collect::<Result<Vec<Recording>, _>>()?;
     refuse_duplicates(&args.files, &recordings)?;

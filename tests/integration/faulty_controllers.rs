@@ -123,6 +123,8 @@ fn manifest(campaign: &Campaign) -> Manifest {
         inference: Inference::default(),
         models: Vec::new(),
         sample_timeout_s: WATCHDOG.as_secs_f64(),
+        controllers: Vec::new(),
+        working_folder: None,
         command: Vec::new(),
     }
 }

@@ -31,12 +31,17 @@ impl ExecFactory {
     }
 }
 
-/// Starts a process, greets it, and returns what it states about itself in its first answer.
+/// Starts a process in the given folder, or in that of this program, greets it, and returns what it states about itself in its first answer.
 ///
 /// # Errors
 /// [`ExecError`] if the process cannot be started, or does not give a valid first answer.
-pub fn identify(settings: &ExecSettings, ego_settings: &EgoSettings, road: &Road) -> Result<Identity, ExecError> {
-    greet(settings, None, ego_settings, road).map(|(_, identity)| identity)
+pub fn identify(
+    settings: &ExecSettings,
+    folder: Option<&Path>,
+    ego_settings: &EgoSettings,
+    road: &Road,
+) -> Result<Identity, ExecError> {
+    greet(settings, folder, ego_settings, road).map(|(_, identity)| identity)
 }
 
 /// Starts a process, and greets it.
