@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 mod campaign_example;
+mod changed_controller;
 mod comparison;
 mod determinism;
 mod drivers;
@@ -13,6 +14,7 @@ mod exit_codes;
 mod faulty_controllers;
 mod gate;
 mod hidden_lead;
+mod inputs;
 mod inspect;
 mod library;
 mod malformed;
@@ -24,6 +26,7 @@ mod reenact;
 mod references;
 mod reports;
 mod rerun_files;
+mod signals;
 mod statistics;
 mod support;
 mod trajectory_files;
