@@ -39,13 +39,14 @@ const KILL_TIMEOUT: Duration = Duration::from_secs(1);
 const POLL_INTERVAL: Duration = Duration::from_micros(200);
 
 /// Waits for the end of standard input, which is the end of Closecall, and kills every process whose environment holds
-/// the first argument.
+/// the first argument. The exit status of `grep` says nothing: it is that of the last file that cannot be read.
 const GUARD: &str = r#"
 trap '' HUP INT TERM
 read -r end
 round=0
 while [ $round -lt 50 ]; do
-    found=$(grep -lsF "$1" /proc/[0-9]*/environ) || exit 0
+    found=$(grep -lsF "$1" /proc/[0-9]*/environ)
+    [ -n "$found" ] || exit 0
     for file in $found; do
         process=${file#/proc/}
         kill -KILL "${process%/environ}"
