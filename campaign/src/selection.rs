@@ -127,7 +127,8 @@ impl Chooser {
         worst.sort_by(|a, b| compare(b, a));
         worst.iter().take(count(self.selection.worst)).for_each(|severity| add(severity.sample, "worst"));
         let all = self.samples.iter().filter(|severity| severity.delta_v_mps.is_some());
-        let (induced, others): (Vec<&Severity>, Vec<&Severity>) = all.partition(|severity| severity.is_safe_in_baseline);
+        let (induced, others): (Vec<&Severity>, Vec<&Severity>) =
+            all.partition(|severity| severity.is_safe_in_baseline);
         let failures = induced.into_iter().chain(others);
         failures.take(count(self.selection.failures)).for_each(|severity| add(severity.sample, "failure"));
         let mut left: Vec<u64> = self.samples.iter().map(|severity| severity.sample).collect();

@@ -39,7 +39,8 @@ Exit codes:
   5  at least one sample ended in an error
   6  a file or folder cannot be read or written
   7  invalid: a validity check of the simulator failed
-  130, 143  ended by Ctrl-C (SIGINT) or SIGTERM";
+  130  ended by Ctrl-C (SIGINT)
+  143  ended by SIGTERM";
 
 #[derive(Debug, Subcommand)]
 enum Command {

@@ -135,7 +135,7 @@ fn the_files_and_keys_of_a_campaign_are_those_documented() {
     let bad = "exec:sh tests/fixtures/controllers/bad.sh dies";
     let exec = ["campaign", headline, "-n", "5", "--controller", bad, "--sensors", "object", "--out", &at("exec")];
     program(&exec, 5);
-    let part = ["campaign", headline, "-n", "2", "--partition", "1/2", "--out", &at("part")];
+    let part = ["campaign", headline, "-n", "2", "--partition", "1/2", "--sensors", "full", "--out", &at("part")];
     program(&part, 0);
     let journals = ["open", "exec"].map(|name| lines(&folder.path().join(name).join("journal.jsonl"), true));
     hold("journal", journals.iter().flatten());
