@@ -7,9 +7,9 @@
 use std::error::Error;
 use std::path::Path;
 
+use closecall::campaign::gate::GateSet;
 use closecall::campaign::plan::Plan;
 use closecall::campaign::runner::Sampling;
-use closecall::campaign::gate::GateSet;
 use closecall::scenarios::sampling::Design;
 use closecall::simulation::controller::ControllerChoice;
 use closecall::simulation::scenario::ScenarioFile;

@@ -18,6 +18,7 @@
 pub mod baseline;
 pub mod compare;
 pub mod execution;
+pub mod fingerprint;
 pub mod folder;
 mod folder_error;
 pub mod gate;
@@ -30,6 +31,7 @@ pub mod partition;
 pub mod plan;
 pub mod probability;
 pub mod record;
+mod repair;
 pub mod runner;
 pub mod saved;
 pub mod selection;

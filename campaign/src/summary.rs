@@ -129,7 +129,8 @@ impl Summary {
     /// Returns the mean over the scenarios of an arm's collision rate, each scenario with the same weight; `None` if a scenario
     /// has no outcome.
     pub fn mean_collision_rate(&self, arm: usize) -> Option<f64> {
-        let rates: Option<Vec<f64>> = self.scenarios.iter().map(|(_, counts)| counts.arms.get(arm)?.collision_rate()).collect();
+        let rates: Option<Vec<f64>> =
+            self.scenarios.iter().map(|(_, counts)| counts.arms.get(arm)?.collision_rate()).collect();
         rates.filter(|rates| !rates.is_empty()).map(|rates| rates.iter().sum::<f64>() / rates.len() as f64)
     }
 }

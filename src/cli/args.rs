@@ -1,6 +1,6 @@
 //! Arguments that several commands share.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use closecall_scenarios::recordings::{BadRows, LayoutChoice, ReadOptions};
@@ -14,6 +14,7 @@ use closecall_traffic::suggest::hint;
 
 use super::CliError;
 use super::output::print_error;
+use super::protect::of_controller;
 use super::source;
 
 /// The format of the output.
@@ -116,6 +117,11 @@ pub(super) struct ArmArgs {
 }
 
 impl ArmArgs {
+    /// Returns the files that the command of the controller names.
+    pub(super) fn files(&self) -> Vec<PathBuf> {
+        of_controller(&self.controller.controller)
+    }
+
     pub(super) fn arm(&self) -> Result<Arm, CliError> {
         Ok(arm(&self.controller.choice()?, self.sensors))
     }

@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use closecall_campaign::execution::{Campaign, End, NextRecord};
+use closecall_campaign::folder::Folder;
 use closecall_campaign::gate::GateSet;
-use closecall_campaign::folder::{Folder, TornLine};
 use closecall_campaign::partition::Partition;
 use closecall_campaign::plan::Plan;
 use closecall_campaign::runner::Sampling;
@@ -21,8 +21,11 @@ use closecall_simulation::controller::ControllerChoice;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::args::{ControllerArgs, Format, SensorsChoice, SetArgs, controllers, positive};
+use super::backend::check_backend;
+use super::ending::{EndArgs, EndRule, Ending, print_resumption};
 use super::gates::GateArgs;
 use super::heartbeat::Heartbeat;
+use super::interrupt::{received, stop_gracefully};
 use super::output::{outln, print_error, print_report_files};
 use super::plan::PlanArgs;
 use super::source::expand;
@@ -74,6 +77,8 @@ pub(super) struct CampaignArgs {
     #[command(flatten)]
     gates: GateArgs,
     #[command(flatten)]
+    end: EndArgs,
+    #[command(flatten)]
     set: SetArgs,
     /// Output format
     #[arg(long, value_enum, default_value_t, help_heading = clap::builder::Resettable::Reset)]
@@ -117,24 +122,26 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
     let is_paired = args.is_paired(&tested);
     let gates = args.gates.gates(is_paired, args.design, args.plan.preset_gates(is_paired))?;
     let plan = args.plan(controllers(tested, is_paired)?)?;
-    let (campaign, manifest) = (plan.campaign(), plan.manifest(std::env::args().collect())?);
+    check_backend(plan.uses_classifier())?;
+    let (mut campaign, manifest) = (plan.campaign(), plan.manifest(std::env::args().collect())?);
     let locked = match &args.out {
         Some(path) => Some(Folder::lock(path, &manifest, args.resume)?),
         None => None,
     };
+    campaign.retry_errors = args.end.retry_errors;
+    stop_gracefully(&campaign.stop);
     let started = Instant::now();
     let stop = StopRule {
         until_certain: gates.probability.as_ref().map(|spec| spec.gate).filter(|_| args.plan.ends_when_certain()),
         time_budget: args.plan.time_budget(),
         scenarios: campaign.works.len(),
     };
-    let mut progress = Progress::new(&campaign, &gates, StopMonitor::start(stop));
-    let torn = campaign.run(locked.as_ref(), |next| progress.push(next))?;
+    let mut progress = Progress::new(&campaign, &gates, StopMonitor::start(stop), EndRule::new(args.end));
+    let resumption = campaign.run(locked.as_ref(), |next| progress.push(next))?;
     progress.bar.finish_and_clear();
-    if let Some(TornLine { line, reason }) = torn {
-        print_error(format_args!(
-            "the journal was torn at line {line} ({reason}): the samples from there on were run again\n"
-        ));
+    print_resumption(&resumption);
+    if let Some(ending) = received().map(Ending::Signal).or(progress.end.ending.take()) {
+        return Ok(ending.print(args.format, &campaign, &progress.tally.summary, args.out.as_deref()));
     }
     let wall_s = started.elapsed().as_secs_f64();
     let tally = &progress.tally;
@@ -171,12 +178,13 @@ struct Progress {
     names: Vec<String>,
     tally: Tally,
     stop: StopMonitor,
+    end: EndRule,
     bar: ProgressBar,
     _heartbeat: Heartbeat,
 }
 
 impl Progress {
-    fn new(campaign: &Campaign, gates: &GateSet, stop: StopMonitor) -> Self {
+    fn new(campaign: &Campaign, gates: &GateSet, stop: StopMonitor, end: EndRule) -> Self {
         for work in &campaign.works {
             let (name, count, requested) = (&work.file.config().name, work.count(), work.sampling.samples);
             if count != requested {
@@ -185,7 +193,7 @@ impl Progress {
         }
         let names = campaign.works.iter().map(|work| work.file.config().name.clone()).collect();
         let bar = progress_bar(campaign.len());
-        Self { names, tally: Tally::new(campaign, gates), stop, _heartbeat: Heartbeat::start(&bar), bar }
+        Self { names, tally: Tally::new(campaign, gates), stop, end, _heartbeat: Heartbeat::start(&bar), bar }
     }
 
     fn push(&mut self, next: NextRecord<'_>) -> ControlFlow<End> {
@@ -195,6 +203,7 @@ impl Progress {
             // Records read from the journal say nothing about how long the rest will take.
             self.bar.reset_eta();
         }
+        self.end.observe(next.record)?;
         let tested = self.tally.summary.tested(&self.names[next.work]);
         tested.map_or(ControlFlow::Continue(()), |tested| self.stop.observe(next.work, tested))
     }

@@ -3,13 +3,13 @@
 use std::path::PathBuf;
 
 use clap::{CommandFactory, Parser, Subcommand};
-use closecall_sensors::camera::{Backend, Classifier};
-use closecall_sensors::use_inference_backend;
+use closecall_simulation::controller::exec::{adopt_orphans, end_all};
 
+use super::backend::choose_backend;
 use super::output::print_error;
 use super::{
-    CliError, baseline, campaign, check, compare, generate, inspect, library, merge, new, plot, record, reenact,
-    render, replay, robustness, run, schema, statistics, trajectories, watching,
+    CliError, baseline, campaign, check, compare, generate, inspect, interrupt, library, merge, new, plot, record,
+    reenact, render, replay, robustness, run, schema, statistics, trajectories, watching,
 };
 use crate::exit_code::ExitCode;
 
@@ -24,7 +24,7 @@ struct Cli {
     #[command(subcommand)]
     command: Command,
     /// Shared library of ONNX Runtime (1.24 or later), to run the rear camera's network on it instead of the built-in
-    /// backend tract
+    /// backend tract. It is loaded only if the network is used
     #[arg(long, global = true, value_name = "PATH", env = "ORT_DYLIB_PATH")]
     onnxruntime: Option<PathBuf>,
 }
@@ -38,7 +38,9 @@ Exit codes:
   4  inconclusive: there are too few samples for the requested bound
   5  at least one sample ended in an error
   6  a file or folder cannot be read or written
-  7  invalid: a validity check of the simulator failed";
+  7  invalid: a validity check of the simulator failed
+  130  ended by Ctrl-C (SIGINT)
+  143  ended by SIGTERM";
 
 #[derive(Debug, Subcommand)]
 enum Command {
@@ -108,7 +110,12 @@ pub fn main() -> ExitCode {
             return if error.print().is_ok() { code } else { ExitCode::Io };
         }
     };
-    match choose_backend(cli.onnxruntime).and_then(|()| dispatch(cli.command)) {
+    adopt_orphans();
+    interrupt::watch();
+    choose_backend(cli.onnxruntime.as_deref());
+    let result = dispatch(cli.command);
+    end_all();
+    match result {
         Ok(code) => code,
         Err(error) => {
             let code = ExitCode::from(&error);
@@ -116,17 +123,6 @@ pub fn main() -> ExitCode {
             code
         }
     }
-}
-
-/// Chooses the inference backend of the rear camera's network. A named ONNX Runtime is loaded at once, so that a bad
-/// path is reported before any work is done.
-fn choose_backend(onnxruntime: Option<PathBuf>) -> Result<(), CliError> {
-    let backend = Backend::choose(onnxruntime.as_deref(), None);
-    if backend != Backend::Tract {
-        Classifier::shipped(&backend)?;
-    }
-    use_inference_backend(backend);
-    Ok(())
 }
 
 fn dispatch(command: Command) -> Result<ExitCode, CliError> {

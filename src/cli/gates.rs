@@ -81,8 +81,7 @@ impl GateArgs {
         design: Design,
         preset: Option<PresetGates>,
     ) -> Result<GateSet, CliError> {
-        let mut set =
-            GateSet { is_measurement: self.no_gate, max_flip_rate: self.max_flip_rate, ..GateSet::default() };
+        let mut set = GateSet { is_measurement: self.no_gate, max_flip_rate: self.max_flip_rate, ..GateSet::default() };
         for (expression, scope) in self.criteria()? {
             if expression.needs_pairs() && !is_paired {
                 let message = format!("`{expression}` compares with a baseline: it needs --paired");

@@ -1,16 +1,19 @@
 //! The command line: arguments, calls, printed results, and exit codes.
 
 mod args;
+mod backend;
 mod baseline;
 mod campaign;
 mod check;
 mod command;
 mod compare;
+mod ending;
 mod error;
 mod gates;
 mod generate;
 mod heartbeat;
 mod inspect;
+mod interrupt;
 mod json;
 mod library;
 mod merge;
@@ -19,6 +22,7 @@ mod output;
 mod plan;
 mod plot;
 mod project;
+mod protect;
 mod record;
 mod reenact;
 mod render;

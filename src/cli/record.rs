@@ -14,7 +14,9 @@ use closecall_simulation::{Observer, RunKey};
 
 use super::CliError;
 use super::args::{ArmArgs, SetArgs, count};
+use super::backend::check_backend_of;
 use super::output::outln;
+use super::protect::{of_scenario, protect};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall record`.
@@ -61,6 +63,7 @@ pub(super) fn record(args: &RecordArgs) -> Result<ExitCode, CliError> {
 
 fn record_traffic(args: &RecordArgs) -> Result<ExitCode, CliError> {
     let file = args.set.load(&args.scenario)?;
+    protect(&[of_scenario(&file), args.arm.files()].concat(), &[("--output", Some(&args.output))])?;
     let mut recorder = TrafficRecorder::default();
     each_sample(args, &file, &mut recorder, TrafficRecorder::begin)?;
     let recording = recorder.finish(&file.config().name);
@@ -73,6 +76,9 @@ fn record_traffic(args: &RecordArgs) -> Result<ExitCode, CliError> {
 
 fn record_in_car(args: &RecordArgs, actor: Option<&str>) -> Result<ExitCode, CliError> {
     let file = args.set.load(&args.scenario)?;
+    let truth = truth_path(&args.output);
+    let outputs = [("--output", Some(args.output.as_path())), ("--in-car", Some(truth.as_path()))];
+    protect(&[of_scenario(&file), args.arm.files()].concat(), &outputs)?;
     let actors = &file.config().actors;
     let overtakes = |actor: &&ActorConfig| matches!(actor.driver, DriverConfig::Overtaker(_));
     let ids = || actors.iter().map(|actor| actor.id.to_string());
@@ -93,7 +99,6 @@ fn record_in_car(args: &RecordArgs, actor: Option<&str>) -> Result<ExitCode, Cli
     let mut recorder = InCarRecorder::new(&chosen);
     each_sample(args, &file, &mut recorder, InCarRecorder::begin)?;
     let (log, changes) = recorder.finish();
-    let truth = truth_path(&args.output);
     write_in_car(&log, &args.output)?;
     write_truth(&changes, &truth)?;
     outln!("{} rows of the in-car log of {chosen} written to {}", log.frames.len(), args.output.display());
@@ -113,6 +118,7 @@ fn each_sample<R: Observer>(
     for sample in 0..args.samples {
         let fail = |source| CliError::Sample { sample, source };
         let scenario = concrete(file, sampling, sample).map_err(fail)?;
+        check_backend_of(&scenario, std::slice::from_ref(&arm))?;
         begin(recorder, &scenario);
         run_guarded(&scenario, RunKey { seed: args.seed, sample }, &arm, recorder).map_err(fail)?;
     }

@@ -13,7 +13,8 @@ use rayon::prelude::*;
 use super::CliError;
 use super::args::{Format, ReadArgs};
 use super::json::stamped;
-use super::output::{outln, print_written};
+use super::output::{outln, print_error, print_written};
+use super::protect::{of_trajectories, protect};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall robustness`.
@@ -39,6 +40,10 @@ pub(super) struct RobustnessArgs {
 }
 
 pub(super) fn robustness(args: &RobustnessArgs) -> Result<ExitCode, CliError> {
+    let charts = args.plot.as_ref().map(|folder| ["noise.svg", "offset.svg"].map(|name| folder.join(name)));
+    for chart in charts.iter().flatten() {
+        protect(&of_trajectories(&args.files), &[("--plot", Some(chart))])?;
+    }
     let setup = Setup { seed: args.seed, repetitions: args.repetitions, ..Setup::default() };
     let mut studies = Vec::new();
     for path in &args.files {
@@ -66,6 +71,10 @@ pub(super) fn robustness(args: &RobustnessArgs) -> Result<ExitCode, CliError> {
     match args.format {
         Format::Json => outln!("{:#}", stamped(json(&found), None, None)),
         Format::Human => print(&found),
+    }
+    if found.reference == 0 {
+        print_error(format_args!("there is no lane change in the trajectory files: nothing was studied\n"));
+        return Ok(ExitCode::Inconclusive);
     }
     Ok(ExitCode::Pass)
 }

@@ -11,6 +11,7 @@ use closecall_simulation::scenario::Setting;
 
 use super::args::{ArmArgs, Format, SetArgs};
 use super::output::{out, outln};
+use super::protect::{of_scenario, protect};
 use super::watch::{WatchArgs, run_watched};
 use super::{CliError, json};
 use crate::exit_code::ExitCode;
@@ -43,6 +44,7 @@ pub(super) struct RunArgs {
 
 pub(super) fn run(args: &RunArgs) -> Result<ExitCode, CliError> {
     let file = args.set.load(&args.scenario)?;
+    protect(&[of_scenario(&file), args.arm.files()].concat(), &args.watch.outputs())?;
     let sampling = Sampling { seed: args.seed, design: Design::Random, samples: args.sample.saturating_add(1) };
     let fail = |source| CliError::Sample { sample: args.sample, source };
     let scenario = concrete(&file, sampling, args.sample).map_err(fail)?;

@@ -15,6 +15,7 @@ use super::CliError;
 use super::args::{Format, ReadArgs, positive};
 use super::json::stamped;
 use super::output::{outln, print_written};
+use super::protect::{of_trajectories, protect};
 use super::trajectories::refuse_duplicates;
 use crate::exit_code::ExitCode;
 
@@ -38,6 +39,10 @@ pub(super) struct StatisticsArgs {
 }
 
 pub(super) fn statistics(args: &StatisticsArgs) -> Result<ExitCode, CliError> {
+    let charts = args.plot.as_ref().map(|folder| ["duration.svg", "speed.svg"].map(|name| folder.join(name)));
+    for chart in charts.iter().flatten() {
+        protect(&of_trajectories(&args.files), &[("--plot", Some(chart))])?;
+    }
     let read = |path: &PathBuf| read_with(path, args.read.options());
     let recordings = args.files.iter().map(read).collect::<Result<Vec<Recording>, _>>()?;
     refuse_duplicates(&args.files, &recordings)?;

@@ -1,6 +1,6 @@
 //! `closecall lane-changes`, `criticality` and `fit`: from trajectory files to distributions.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use closecall_scenarios::atomic::WriteError;
@@ -14,6 +14,7 @@ use super::CliError;
 use super::args::{Format, ReadArgs, positive};
 use super::json::stamped;
 use super::output::{out, outln};
+use super::protect::{of_trajectories, protect, recording as recording_path};
 use super::watch::record_lane_change;
 use crate::exit_code::ExitCode;
 
@@ -72,7 +73,7 @@ pub(super) struct CriticalityArgs {
     #[arg(long, value_name = "M/S", value_parser = positive)]
     speed_limit_mps: Option<f64>,
     /// Save a recording (Rerun file) of one lane change: the most critical one, or that of the track named by --track
-    #[arg(long, value_name = "FILE.rrd")]
+    #[arg(long, value_name = "FILE.rrd", value_parser = recording_path)]
     record: Option<PathBuf>,
     /// Track whose lane change --record saves
     #[arg(long, value_name = "ID", requires = "record")]
@@ -205,6 +206,7 @@ fn line(change: &LaneChange) -> String {
 }
 
 pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> {
+    protect(&of_trajectories(std::slice::from_ref(&args.file)), &[("--record", args.record.as_deref())])?;
     let recording = read_with(&args.file, args.read.options())?;
     let smoothed = smooth(&recording);
     let changes = evaluate(&smoothed, args.speed_limit_mps);
@@ -242,10 +244,10 @@ fn print_metrics(changes: &[CriticalLaneChange]) {
 }
 
 pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
+    protect(&of_trajectories(&args.files), &[("--output", args.output.as_deref())])?;
     let recordings =
         args.files.iter().map(|path| read_with(path, args.read.options())).collect::<Result<Vec<_>, _>>()?;
     refuse_duplicates(&args.files, &recordings)?;
-    refuse_overwriting(&args.files, args.output.as_deref())?;
     let fitted = fit_distributions(&recordings, args.seed);
     let command = std::iter::once("closecall".to_owned()).chain(std::env::args().skip(1)).collect::<Vec<_>>().join(" ");
     let heading = Heading { command, provenance: args.provenance.clone() };
@@ -278,18 +280,6 @@ pub(super) fn refuse_duplicates(paths: &[PathBuf], recordings: &[Recording]) -> 
         }
     }
     Ok(())
-}
-
-/// Returns an error if `output` is one of the `inputs`.
-pub(super) fn refuse_overwriting(inputs: &[PathBuf], output: Option<&Path>) -> Result<(), CliError> {
-    let Some(output) = output else { return Ok(()) };
-    let same = |input: &&PathBuf| matches!((input.canonicalize(), output.canonicalize()), (Ok(a), Ok(b)) if a == b);
-    match inputs.iter().find(same) {
-        Some(input) => Err(CliError::Usage {
-            message: format!("--output would overwrite the trajectory file {}", input.display()),
-        }),
-        None => Ok(()),
-    }
 }
 
 fn json(fitted: &closecall_scenarios::fit::FittedDistributions) -> serde_json::Value {

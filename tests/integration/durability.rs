@@ -140,6 +140,59 @@ fn samples_after_a_damaged_journal_record_are_run_again() {
 }
 
 #[test]
+fn a_damaged_journal_record_costs_only_its_own_sample() {
+    let folder = folder();
+    let whole = undisturbed(folder.path());
+    let intact = bytes(&whole, "journal.jsonl");
+    let table = bytes(&whole, "outcomes.parquet");
+    let ends: Vec<usize> = (0..intact.len()).filter(|index| intact[*index] == b'\n').collect();
+    // A byte of a line, the line feed that ends one, and a line feed inside one.
+    for (index, byte) in [(ends[100] - 30, b'#'), (ends[200], b'#'), (ends[300] - 30, b'\n')] {
+        let mut damaged = intact.clone();
+        damaged[index] = byte;
+        // The line before the damaged one ends here: from there to the end, no other line may be run again.
+        fs::write(whole.join("journal.jsonl"), &damaged).unwrap();
+        let times = fs::read_to_string(whole.join("wall-times.jsonl")).unwrap();
+        let resumed = closecall(args(&whole, &["--resume"]));
+        stdout(&resumed, 0);
+        assert!(stderr(&resumed).contains("its sample was run again"), "{}", stderr(&resumed));
+        assert!(bytes(&whole, "journal.jsonl") == intact, "byte {index}");
+        assert!(bytes(&whole, "outcomes.parquet") == table, "byte {index}");
+        // The wall time of a sample that is run again differs.
+        let now = fs::read_to_string(whole.join("wall-times.jsonl")).unwrap();
+        let changed = times.lines().zip(now.lines()).filter(|(before, after)| before != after).count();
+        assert!(times.lines().count() == SAMPLES && now.lines().count() == SAMPLES && changed <= 2, "{changed}");
+    }
+}
+
+#[test]
+fn samples_that_ended_in_an_error_are_run_again_on_request() {
+    let folder = folder();
+    let out = folder.path().join("out");
+    let (marker, script) = (folder.path().join("works"), folder.path().join("ctl.sh"));
+    let text = format!(
+        "[ -e '{}' ] || exit 3\necho '{{\"type\":\"hello\",\"protocol\":1}}'\nread -r line\n\
+         while read -r line; do echo '{{\"acceleration_mps2\":0.0,\"state\":\"following\"}}'; done\n",
+        marker.display()
+    );
+    fs::write(&script, text).unwrap();
+    let controller = format!("exec:sh {}", script.display());
+    let scenario = library("low-thw-overtake");
+    let campaign = |more: &[&str]| {
+        let fixed = ["campaign", scenario.to_str().unwrap(), "-n", "4", "--out", out.to_str().unwrap()];
+        let controller = ["--record", "failures:0", "--controller", &controller, "--controller-timeout-ms", "60000"];
+        closecall(fixed.iter().chain(&controller).chain(more))
+    };
+    assert_eq!(code(&campaign(&[])), 5);
+    fs::write(&marker, "").unwrap();
+    assert_eq!(code(&campaign(&["--resume"])), 5, "errors are kept");
+    let retried = campaign(&["--resume", "--retry-errors"]);
+    assert_ne!(code(&retried), 5, "{}", stderr(&retried));
+    assert!(stderr(&retried).contains("4 samples that had ended in an error were run again"), "{}", stderr(&retried));
+    assert_eq!(code(&campaign(&["--retry-errors"])), 2, "only with --resume");
+}
+
+#[test]
 fn two_campaigns_cannot_use_a_folder_at_the_same_time() {
     let folder = folder();
     let out = folder.path().join("out");

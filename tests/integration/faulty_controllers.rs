@@ -10,13 +10,13 @@ use std::time::Duration;
 
 use closecall_campaign::execution::{Campaign, End};
 use closecall_campaign::folder::Folder;
+use closecall_campaign::gate::{GateSet, Judge};
 use closecall_campaign::ledger::Inference;
 use closecall_campaign::manifest::{MANIFEST_VERSION, Manifest, ManifestScenario};
 use closecall_campaign::record::{Record, SampleFailure};
 use closecall_campaign::runner::{Sampling, Work};
 use closecall_campaign::summary::Summary;
 use closecall_campaign::validity::CheckPlan;
-use closecall_campaign::gate::{GateSet, Judge};
 use closecall_campaign::verdict::{Decision, Judgement, MAX_FLIP_RATE, Verdict, judge};
 use closecall_campaign::workers::Workers;
 use closecall_controllers::{ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack};
@@ -124,6 +124,8 @@ fn manifest(campaign: &Campaign) -> Manifest {
         inference: Inference::default(),
         models: Vec::new(),
         sample_timeout_s: WATCHDOG.as_secs_f64(),
+        controllers: Vec::new(),
+        working_folder: None,
         command: Vec::new(),
     }
 }

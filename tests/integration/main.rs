@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 mod campaign_example;
+mod changed_controller;
 mod commands;
 mod comparison;
 mod determinism;
@@ -14,6 +15,7 @@ mod exit_codes;
 mod faulty_controllers;
 mod gate;
 mod hidden_lead;
+mod inputs;
 mod inspect;
 mod library;
 mod malformed;
@@ -25,6 +27,7 @@ mod reenact;
 mod references;
 mod reports;
 mod rerun_files;
+mod signals;
 mod statistics;
 mod support;
 mod trajectory_files;

@@ -6,11 +6,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use closecall_campaign::execution::Campaign;
+use closecall_campaign::gate::{GateSet, Judge};
+use closecall_campaign::ledger::Inference;
 use closecall_campaign::runner::{Sampling, Work};
 use closecall_campaign::summary::{Counts, Summary};
 use closecall_campaign::validity::{CheckPlan, Invariance};
-use closecall_campaign::gate::{GateSet, Judge};
-use closecall_campaign::ledger::Inference;
 use closecall_campaign::verdict::{Decision, Judgement, MAX_FLIP_RATE, Verdict, judge};
 use closecall_campaign::workers::Workers;
 use closecall_controllers::{ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack};

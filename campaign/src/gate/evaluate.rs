@@ -104,8 +104,8 @@ impl Accumulator {
     pub fn evaluate(&self, is_paired: bool, is_varied: bool, inference: Inference) -> Evaluation {
         let Expression { aggregate, operator, bound, .. } = self.expression;
         let (hits, samples) = (self.hits, self.samples);
-        let interval_95 = (aggregate.is_of_flag() && samples > 0 && is_varied)
-            .then(|| inference.interval_95(hits, samples));
+        let interval_95 =
+            (aggregate.is_of_flag() && samples > 0 && is_varied).then(|| inference.interval_95(hits, samples));
         let value = (samples > 0 || aggregate == Aggregate::Count).then(|| self.value(inference)).flatten();
         let open = |reason| Evaluation { value, interval_95, samples, answer: Answer::Open(reason) };
         if self.expression.needs_pairs() && !is_paired {

@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use closecall_simulation::criteria::{EGO_COLLIDED, FlagName, Measure, Quantity};
 use closecall_scenarios::parameters::Variation;
+use closecall_simulation::criteria::{EGO_COLLIDED, FlagName, Measure, Quantity};
 use closecall_traffic::Parameters;
 
 use super::evaluate::{Accumulator, value};
@@ -136,9 +136,8 @@ impl Judge {
         let mut results = Vec::new();
         for judged in &self.scenarios {
             for mark in &judged.requirements {
-                let is_check = |gate: &&GateResult| {
-                    gate.scenario.as_deref() == Some(&judged.scenario) && gate.is_of(mark)
-                };
+                let is_check =
+                    |gate: &&GateResult| gate.scenario.as_deref() == Some(&judged.scenario) && gate.is_of(mark);
                 let standing = gates.iter().filter(is_check).map(GateResult::standing).max();
                 results.push(RequirementResult {
                     mark: mark.clone(),

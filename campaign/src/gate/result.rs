@@ -151,6 +151,11 @@ impl fmt::Display for ExpectationResult {
         let (happened, samples) = (self.happened, self.samples);
         let share = self.share().map_or("none".to_owned(), percent);
         let least = percent(self.least_share);
-        write!(f, "{}: {} in {happened} of {samples} samples ({share}, at least {least} expected)", self.scenario, names.join(" and "))
+        write!(
+            f,
+            "{}: {} in {happened} of {samples} samples ({share}, at least {least} expected)",
+            self.scenario,
+            names.join(" and ")
+        )
     }
 }

@@ -123,7 +123,9 @@ fn case<W: Write>(xml: &mut Writer<W>, row: &OutcomeRow, recording: Option<&str>
 fn problem(row: &OutcomeRow, tested: &str) -> Option<(&'static str, String, String)> {
     match (&row.result, row.ego_collision()) {
         (Err(error), _) => Some(("error", error.kind.clone(), error.message.clone())),
-        (Ok(_), Some(collision)) if row.controller == tested => Some(("failure", "collision".to_owned(), message(collision))),
+        (Ok(_), Some(collision)) if row.controller == tested => {
+            Some(("failure", "collision".to_owned(), message(collision)))
+        }
         (Ok(_), _) => None,
     }
 }

@@ -47,7 +47,10 @@ impl std::str::FromStr for FlagName {
     fn from_str(text: &str) -> Result<Self, String> {
         match Measure::named(text) {
             Some(measure) if measure.kind == MeasureKind::Flag => Ok(Self(measure)),
-            _ => Err(format!("`{text}` is not something that can be expected of a run; there are {}", names().join(", "))),
+            _ => Err(format!(
+                "`{text}` is not something that can be expected of a run; there are {}",
+                names().join(", ")
+            )),
         }
     }
 }

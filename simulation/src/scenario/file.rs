@@ -1,5 +1,7 @@
 //! Reads scenario files. Errors name the file, the line, the key, and what is allowed.
 
+use std::fs::File;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use closecall_scenarios::parameters::ParameterSpace;
@@ -14,6 +16,9 @@ use super::{Scenario, ScenarioConfig, locate, recorded};
 
 /// Number of random samples that `check` checks in addition to the nominal values and the bounds.
 const CHECKED_SAMPLES: u64 = 64;
+
+/// Largest size of a scenario file (bytes). A scenario with minutes of recorded speeds has about 1 MiB.
+const MAX_FILE_BYTES: u64 = 64 << 20;
 
 /// A scenario file that cannot be used. No run has been started.
 #[derive(Debug, thiserror::Error)]
@@ -33,6 +38,14 @@ pub enum ScenarioError {
         path: PathBuf,
         /// The first line that is not text, counted from 1.
         line: usize,
+    },
+    /// The file is larger than any scenario.
+    #[error("failed to read {}: the file is larger than {limit_mib} MiB; a scenario is a TOML file of a few KiB", path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// The largest size (MiB).
+        limit_mib: u64,
     },
     /// The file is empty.
     #[error("failed to read {}: the file is empty; a scenario needs at least `schema-version`, `name`, `duration-s`, `road` and actors", path.display())]
@@ -78,7 +91,7 @@ impl ScenarioError {
         match self {
             Self::NotText { line, .. } | Self::Syntax { line, .. } => Some(*line),
             Self::Value { line, .. } => *line,
-            Self::Read { .. } | Self::Empty { .. } | Self::Set { .. } => None,
+            Self::Read { .. } | Self::TooLarge { .. } | Self::Empty { .. } | Self::Set { .. } => None,
         }
     }
 }
@@ -91,6 +104,7 @@ pub struct ScenarioFile {
     config: ScenarioConfig,
     space: ParameterSpace,
     unused: Vec<ParameterName>,
+    trajectory_files: Vec<PathBuf>,
 }
 
 impl ScenarioFile {
@@ -100,7 +114,10 @@ impl ScenarioFile {
     /// [`ScenarioError`] if the file cannot be read or parsed, if a setting cannot be applied, or if a distribution is
     /// invalid.
     pub fn load(path: &Path, settings: &[Setting]) -> Result<Self, ScenarioError> {
-        let bytes = std::fs::read(path).map_err(|source| ScenarioError::Read { path: path.to_owned(), source })?;
+        let bytes = read_bounded(path).map_err(|source| ScenarioError::Read { path: path.to_owned(), source })?;
+        if bytes.len() as u64 > MAX_FILE_BYTES {
+            return Err(ScenarioError::TooLarge { path: path.to_owned(), limit_mib: MAX_FILE_BYTES >> 20 });
+        }
         let text = String::from_utf8(bytes).map_err(|error| {
             let line = locate::line_at(&String::from_utf8_lossy(error.as_bytes()), error.utf8_error().valid_up_to());
             ScenarioError::NotText { path: path.to_owned(), line }
@@ -126,6 +143,7 @@ impl ScenarioFile {
             text = apply(path, &text, settings)?;
             config = deserialize(path, &text)?;
         }
+        let trajectory_files = recorded::files(path, &config);
         if let Some(inlined) =
             recorded::inline(path, &text, &config).map_err(|error| recorded_error(path, &text, &error))?
         {
@@ -137,12 +155,17 @@ impl ScenarioFile {
             let line = locate::line_of(&text, &source.path);
             ScenarioError::Value { path: path.to_owned(), line, source: Box::new(source), at: String::new() }
         })?;
-        Ok(Self { path: path.to_owned(), text, config, space, unused })
+        Ok(Self { path: path.to_owned(), text, config, space, unused, trajectory_files })
     }
 
     /// Returns the path of the file, as given.
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// Returns the trajectory files that the file names.
+    pub fn trajectory_files(&self) -> &[PathBuf] {
+        &self.trajectory_files
     }
 
     /// Returns the text of the scenario, with all settings applied.
@@ -196,6 +219,13 @@ impl ScenarioFile {
         }
         Ok(())
     }
+}
+
+/// Reads a file, or the first bytes of it if it is larger than [`MAX_FILE_BYTES`].
+fn read_bounded(path: &Path) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    File::open(path)?.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes)?;
+    Ok(bytes)
 }
 
 fn describe(parameters: &Parameters) -> String {

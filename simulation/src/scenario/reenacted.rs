@@ -31,7 +31,7 @@ use toml_edit::{ArrayOfTables, DocumentMut, Item};
 
 use crate::criteria::GateConfig;
 
-use super::config::{EXPECTS_SHARE, AbsoluteStartConfig, ActorConfig, SCHEMA_VERSION, ScenarioConfig, StartConfig};
+use super::config::{AbsoluteStartConfig, ActorConfig, EXPECTS_SHARE, SCHEMA_VERSION, ScenarioConfig, StartConfig};
 use super::{ScenarioError, ScenarioFile, Setting};
 
 /// The driver of the rear vehicle.

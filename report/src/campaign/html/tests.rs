@@ -3,10 +3,10 @@
 use std::ops::ControlFlow;
 use std::path::Path;
 
+use closecall_campaign::gate::GateSet;
 use closecall_campaign::manifest::Manifest;
 use closecall_campaign::plan::Plan;
 use closecall_campaign::runner::Sampling;
-use closecall_campaign::gate::GateSet;
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::ControllerChoice;
