@@ -10,7 +10,6 @@ use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
 use super::*;
 use closecall_simulation::outcome::{ClosedBy, EndReason, Margins, Phase};
-use closecall_traffic::ActorId;
 
 fn parameters(rear_class: &str) -> Parameters {
     let values = [("closing-mps", Value::Number(6.5)), ("rear-class", Value::Label(rear_class.to_owned()))];

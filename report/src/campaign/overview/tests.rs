@@ -2,7 +2,6 @@ use std::path::Path;
 
 use closecall_traffic::{Absent, ParameterName, Parameters, Value};
 
-use closecall_campaign::record::Record;
 use closecall_simulation::scenario::ScenarioFile;
 
 use super::*;
