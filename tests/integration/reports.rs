@@ -109,11 +109,11 @@ fn the_summary_is_appended_to_the_step_summary_of_the_ci_server() {
 }
 
 #[test]
-fn junit_has_a_case_for_every_outcome_and_attachments_that_exist() {
+fn the_samples_have_a_case_for_every_outcome_and_attachments_that_exist() {
     let folder = folder();
     let out = folder.path().join("out");
     campaign(&out, &["--recordings", "1"], None, 0);
-    let xml = fs::read_to_string(out.join("junit.xml")).unwrap();
+    let xml = fs::read_to_string(out.join("samples.xml")).unwrap();
     assert_eq!(xml.matches("<testcase ").count(), 2 * 2 * 120);
     assert!(xml.contains("<testsuites name=\"closecall\" tests=\"480\""));
     let failures = xml.matches("<failure ").count();
@@ -126,6 +126,18 @@ fn junit_has_a_case_for_every_outcome_and_attachments_that_exist() {
     for path in attached {
         assert!(out.join(path).is_file(), "{path}");
     }
+}
+
+#[test]
+fn junit_fails_for_failed_gates_and_for_nothing_else() {
+    let folder = folder();
+    let out = folder.path().join("out");
+    campaign(&out, &["--recordings", "0", "--gate", "count(ego_collided) <= 0"], None, 1);
+    let xml = fs::read_to_string(out.join("junit.xml")).unwrap();
+    // The headline has collisions with the system; the scenario without braking has none.
+    assert_eq!(xml.matches("<failure ").count(), 1, "{xml}");
+    assert!(xml.contains("low-thw-overtake: count(ego_collided) &lt;= 0"), "{xml}");
+    assert_eq!(xml.matches("<error ").count(), 0, "{xml}");
 }
 
 #[test]

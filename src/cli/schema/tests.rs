@@ -1,5 +1,6 @@
 use std::sync::LazyLock;
 
+use closecall_simulation::criteria::Expression;
 use closecall_traffic::ActorId;
 
 use super::super::library;
@@ -46,7 +47,13 @@ fn broken(root: &Value, schema: &Value, value: &Value) -> Option<String> {
         .or_else(|| {
             let (pattern, text) = (schema["pattern"].as_str()?, value.as_str()?);
             let name = if pattern.starts_with("^\\$") { text.strip_prefix('$') } else { Some(text) };
-            rule(name.is_some_and(|name| ActorId::new(name).is_ok()), "pattern")
+            let is_criterion = pattern.contains("(<=|>=)");
+            let is_matched = if is_criterion {
+                text.parse::<Expression>().is_ok()
+            } else {
+                name.is_some_and(|name| ActorId::new(name).is_ok())
+            };
+            rule(is_matched, "pattern")
         })
         .or_else(|| bound("minimum", |number, bound| number >= bound))
         .or_else(|| bound("exclusiveMinimum", |number, bound| number > bound))
