@@ -70,7 +70,7 @@ enum Fault {
 /// The faults, and a requirement that each violates; `None` if the campaign itself ends in errors.
 const FAULTS: [(Fault, Option<&str>); 11] = [
     (Fault::SignFlipped, Some("MIS-1")),
-    (Fault::NeverBrakes, Some("MIS-3")),
+    (Fault::NeverBrakes, Some("MIS-1")),
     (Fault::AlwaysBrakes, Some("MIS-6")),
     (Fault::MisOff, Some("MIS-7")),
     (Fault::EngagesAlways, Some("MIS-5")),
