@@ -164,7 +164,7 @@ fn rear_classifier() -> Result<ManifestModel, FolderError> {
     let backend = match inference_backend() {
         Backend::Tract => "tract".to_owned(),
         Backend::OnnxRuntime(library) => {
-            let hash = file_hash(&library).map_err(|source| FolderError::Read { path: library.clone(), source })?;
+            let hash = file_hash(library).map_err(|source| FolderError::Read { path: library.clone(), source })?;
             format!("onnxruntime, blake3 {hash}")
         }
     };

@@ -43,6 +43,7 @@ Exit codes:
   143  ended by SIGTERM";
 
 #[derive(Debug, Subcommand)]
+#[expect(clippy::large_enum_variant, reason = "there is one command, for as long as the program runs")]
 enum Command {
     /// Write a commented scenario to start from
     New(new::NewArgs),
