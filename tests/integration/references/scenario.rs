@@ -27,7 +27,6 @@ const SENSORS: [&str; 3] = ["front-radar", "surround", "rear-object"];
 #[test]
 fn the_scenario_reference_is_what_its_generator_writes() {
     let written = scenario_page().unwrap();
-    std::fs::write("/work/tmp/ref/scenario.md", &written).unwrap(); // TEMPORARY
     assert!(
         std::fs::read_to_string(at_root(PAGE)).unwrap() == written,
         "{PAGE} is out of date: run `cargo run --release --example write_references` and commit the file"
