@@ -90,11 +90,11 @@ fn the_defaults_that_the_scenario_reference_states_are_those_of_the_program() {
     }
 }
 
-/// True if the scenario with `value` at `at` is the scenario without any value there.
+/// True if the scenario with `value` at `at` is the scenario without any value there, or is refused for the same reason.
 fn is_default(probe: &Probe, at: &KeyPath, value: &toml::Value) -> bool {
     let concrete = |value: Option<toml::Value>| {
-        let file = probe.check(&probe.with(at, value).unwrap()).unwrap();
-        format!("{:?}", file.concrete(&file.space().nominal()).unwrap())
+        let file = probe.check(&probe.with(at, value).unwrap()).map_err(|error| error.to_string())?;
+        Ok::<_, String>(format!("{:?}", file.concrete(&file.space().nominal()).unwrap()))
     };
     concrete(Some(value.clone())) == concrete(None)
 }
