@@ -28,7 +28,7 @@ use std::process::ExitCode;
 
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_scenarios::sampling::Design;
-use closecall_sensors::{Consistency, Credibility, NEES_95, SensorMode, TrackAudit};
+use closecall_sensors::{Consistency, Credibility, NEES_QUANTILE_95, SensorMode, TrackAudit};
 use closecall_simulation::controller::BuiltIn;
 use closecall_simulation::scenario::ScenarioFile;
 use closecall_simulation::{Arm, RunKey, TrackAuditor, simulate};
@@ -76,7 +76,7 @@ fn print(name: &str, mode: &str, totals: &Totals, samples: usize) -> Option<Cred
     let steps: usize = runs.iter().map(|audit| audit.nees.len()).sum();
     let mean = |of: &dyn Fn(&TrackAudit) -> f64| runs.iter().map(of).sum::<f64>() / steps as f64;
     let by_axis = [0, 1].map(|axis| mean(&|audit| audit.nees_by_axis.iter().map(|nees| nees[axis]).sum()));
-    let below = mean(&|audit| audit.nees.iter().filter(|&&nees| nees < NEES_95).count() as f64);
+    let below = mean(&|audit| audit.nees.iter().filter(|&&nees| nees < NEES_QUANTILE_95).count() as f64);
     let rmse_mps = mean(&|audit| audit.speed_error_sum_m2ps2).sqrt();
     let [low, high] = found.bounds();
     let word = match found.credibility() {

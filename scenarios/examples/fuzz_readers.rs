@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use closecall_scenarios::recordings::{BadRows, ReadOptions, RecordingError, Tracks, open, open_from};
+use closecall_scenarios::trajectory_data::{BadRows, ReadOptions, Tracks, TrajectoryFileError, open, open_from};
 
 const READERS: [&str; 6] = ["ngsim", "csv", "highd", "exid", "commonroad", "in-car"];
 
@@ -209,7 +209,7 @@ fn packed(bytes: &[u8]) -> Vec<u8> {
 }
 
 /// Returns the first defect in the result of a reader, if any.
-fn judge(tracks: Result<Tracks<'_>, RecordingError>) -> Option<String> {
+fn judge(tracks: Result<Tracks<'_>, TrajectoryFileError>) -> Option<String> {
     let mut tracks = match tracks {
         Ok(tracks) => tracks,
         Err(error) => return judge_error(&error),
@@ -250,7 +250,7 @@ fn judge(tracks: Result<Tracks<'_>, RecordingError>) -> Option<String> {
     }
 }
 
-fn judge_error(error: &RecordingError) -> Option<String> {
+fn judge_error(error: &TrajectoryFileError) -> Option<String> {
     let name = error.path.file_name()?.to_string_lossy().into_owned();
     (!error.to_string().contains(&name)).then(|| format!("an error does not name the file: {error}"))
 }
@@ -304,7 +304,7 @@ impl Target {
         let which = self.random.below(self.corpus.len());
         let Some((name, bytes)) = self.corpus.get(which).cloned() else { return Ok(None) };
         let bytes = self.damaged(&bytes);
-        let bad_rows = if self.random.below(2) == 0 { BadRows::Refuse } else { BadRows::Drop };
+        let bad_rows = if self.random.below(2) == 0 { BadRows::Reject } else { BadRows::Skip };
         let window = [usize::MAX, 1 << 20, 16][self.random.below(3)];
         let options = ReadOptions { layout: None, bad_rows };
         let mut judged = Ok(None);

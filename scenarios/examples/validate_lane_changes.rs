@@ -21,9 +21,10 @@
 use std::path::{Path, PathBuf};
 
 use closecall_scenarios::lane_change::{
-    Criterion, Detector, LaneChange, Lanes, MIN_SHIFT_M, ReferenceChange, Score, Share, Spans, read_references, score,
+    Criterion, HitRate, LaneChange, LaneChangeDetector, LaneReliability, MIN_SHIFT_M, ReferenceChange, Score,
+    TrackSpans, read_references, score,
 };
-use closecall_scenarios::recordings::{LaneMarkings, Recording, read};
+use closecall_scenarios::trajectory_data::{LaneMarkings, TrajectoryData, read};
 use closecall_traffic::{Dimensions, Lane, Side, Time, Trajectory, TrajectoryPoint, VehicleClass};
 
 /// The name of a subset of the data, and a predicate that selects lane changes by track number and time (s).
@@ -39,7 +40,7 @@ const PARTS: [Part; 5] = [
 
 fn main() {
     let data =
-        PathBuf::from(std::env::var_os("CLOSECALL_DATA").expect("CLOSECALL_DATA names the folder of recordings"));
+        PathBuf::from(std::env::var_os("CLOSECALL_DATA").expect("CLOSECALL_DATA names the folder of trajectory files"));
     us101(&data.join("ngsim_us101"));
     i80(&data.join("ngsim_i80_pairs/i80_leader_follower_pairs.csv.gz"));
     gps(&data.join("gps_lane_changes"));
@@ -52,44 +53,44 @@ fn us101(folder: &Path) {
         .map(|entry| entry.expect("an entry").path())
         .collect();
     paths.sort();
-    let recordings: Vec<Recording> = paths.iter().map(|path| read(path).expect("a recording")).collect();
+    let data_sets: Vec<TrajectoryData> = paths.iter().map(|path| read(path).expect("a trajectory file")).collect();
     for criterion in [Criterion::Peak, Criterion::Distance] {
         println!("US-101, {} criterion", criterion.name());
-        let found: Vec<Vec<LaneChange>> = recordings.iter().map(|recording| found(recording, criterion)).collect();
+        let found: Vec<Vec<LaneChange>> = data_sets.iter().map(|data| found(data, criterion)).collect();
         for part in PARTS {
             let mut total = Score::default();
-            for (recording, found) in recordings.iter().zip(&found) {
-                total.add(&scored(recording, found, &references, part.1));
+            for (data, found) in data_sets.iter().zip(&found) {
+                total.add(&scored(data, found, &references, part.1));
             }
             print(part.0, &total);
         }
-        for (recording, found) in recordings.iter().zip(&found) {
-            print(&recording.name, &scored(recording, found, &references, |_, _| true));
+        for (data, found) in data_sets.iter().zip(&found) {
+            print(&data.name, &scored(data, found, &references, |_, _| true));
         }
     }
 }
 
-fn found(recording: &Recording, criterion: Criterion) -> Vec<LaneChange> {
-    let detector = Detector::new(Lanes::Recorded, &recording.markings);
-    recording.trajectories.iter().flat_map(|track| detector.detect(criterion, track, &[])).collect()
+fn found(data: &TrajectoryData, criterion: Criterion) -> Vec<LaneChange> {
+    let detector = LaneChangeDetector::new(LaneReliability::Reliable, &data.markings);
+    data.trajectories.iter().flat_map(|track| detector.detect(criterion, track, &[])).collect()
 }
 
 fn scored(
-    recording: &Recording,
+    data: &TrajectoryData,
     found: &[LaneChange],
     references: &[ReferenceChange],
     belongs: fn(u64, f64) -> bool,
 ) -> Score {
     let listed: Vec<&ReferenceChange> = references
         .iter()
-        .filter(|listed| listed.recording_id == recording.name && belongs(listed.track_id, listed.time_s))
+        .filter(|listed| listed.recording_id == data.name && belongs(listed.track_id, listed.time_s))
         .collect();
     let found: Vec<LaneChange> =
         found.iter().filter(|change| belongs(change.track_id, change.crossing_s)).cloned().collect();
-    score(&found, &listed, &spans(&recording.trajectories))
+    score(&found, &listed, &spans(&data.trajectories))
 }
 
-fn spans(tracks: &[Trajectory]) -> Spans {
+fn spans(tracks: &[Trajectory]) -> TrackSpans {
     tracks.iter().filter_map(|track| Some((track.track_id, track.span()?))).collect()
 }
 
@@ -117,10 +118,10 @@ fn i80(path: &Path) {
             lane: Lane(1),
         });
     }
-    let detector = Detector::new(Lanes::Doubtful, &LaneMarkings::default());
+    let detector = LaneChangeDetector::new(LaneReliability::Unreliable, &LaneMarkings::default());
     let tracks: Vec<Trajectory> = followers.into_values().zip(1..).map(|(points, id)| car(id, points)).collect();
     let wrong = tracks.iter().filter(|track| !detector.detect(Criterion::Peak, track, &[]).is_empty()).count();
-    let share = Share { hits: wrong as u64, of: tracks.len() as u64 };
+    let share = HitRate { hits: wrong as u64, of: tracks.len() as u64 };
     println!("I-80, vehicles that keep their lane; a lane change is invented for {share}");
 }
 
@@ -171,7 +172,7 @@ fn gps(folder: &Path) {
             .collect();
         println!("  {receiver}: {} fixes in {} pieces, {} changes covered", fixes.len(), tracks.len(), covered.len());
         for criterion in [Criterion::Peak, Criterion::Distance] {
-            let detector = Detector::new(Lanes::Doubtful, &LaneMarkings::default());
+            let detector = LaneChangeDetector::new(LaneReliability::Unreliable, &LaneMarkings::default());
             let found: Vec<LaneChange> =
                 tracks.iter().flat_map(|track| detector.detect(criterion, track, &[])).collect();
             print_gps(criterion, &covered, &found);
@@ -183,8 +184,8 @@ fn gps(folder: &Path) {
 fn print_gps(criterion: Criterion, covered: &[&Annotated], found: &[LaneChange]) {
     let recalled = covered.iter().filter(|annotated| found.iter().any(|change| same(change, annotated))).count();
     let right = found.iter().filter(|change| covered.iter().any(|annotated| same(change, annotated))).count();
-    let recall = Share { hits: recalled as u64, of: covered.len() as u64 };
-    let precision = Share { hits: right as u64, of: found.len() as u64 };
+    let recall = HitRate { hits: recalled as u64, of: covered.len() as u64 };
+    let precision = HitRate { hits: right as u64, of: found.len() as u64 };
     println!("    {:<9} recall {recall}", criterion.name());
     println!("    {:<9} precision {precision}", "");
 }

@@ -8,6 +8,6 @@ pub mod filters;
 pub mod fit;
 pub mod lane_change;
 pub mod parameters;
-pub mod recordings;
 pub mod robustness;
 pub mod sampling;
+pub mod trajectory_data;

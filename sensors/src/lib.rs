@@ -33,5 +33,5 @@ pub use ground_truth::GroundTruth;
 pub use object::{NoiseKey, ObjectPerception, ObjectSensorConfig, ObjectSensorModel};
 pub use perception::{FieldOfView, Health, Perception, SensorError, SensorHealth};
 pub use scene::{Scene, SceneVehicle};
-pub use tracking::{Consistency, Credibility, NEES_95, TrackAudit, TrackerConfig, TrackerModel};
-pub use worker_classifier::{inference_backend, rear_exposures, use_inference_backend};
+pub use tracking::{Consistency, Credibility, NEES_QUANTILE_95, TrackAudit, TrackerConfig, TrackerModel};
+pub use worker_classifier::{inference_backend, rear_exposures, set_inference_backend};

@@ -34,7 +34,7 @@ thread_local! {
 /// Sets the inference backend of this process; the default is tract.
 ///
 /// The call has no effect once a backend was set or used.
-pub fn use_inference_backend(backend: Backend) {
+pub fn set_inference_backend(backend: Backend) {
     BACKEND.get_or_init(|| backend);
 }
 

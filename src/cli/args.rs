@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use closecall_scenarios::recordings::{BadRows, LayoutChoice, ReadOptions};
+use closecall_scenarios::trajectory_data::{BadRows, LayoutChoice, ReadOptions};
 use closecall_sensors::SensorMode;
 use closecall_simulation::Arm;
 use closecall_simulation::controller::ControllerChoice;
@@ -189,7 +189,7 @@ impl ReadArgs {
             Layout::Csv => LayoutChoice::Csv,
             Layout::InCar => LayoutChoice::InCar,
         });
-        ReadOptions { layout, bad_rows: if self.drop_bad_rows { BadRows::Drop } else { BadRows::Refuse } }
+        ReadOptions { layout, bad_rows: if self.drop_bad_rows { BadRows::Skip } else { BadRows::Reject } }
     }
 }
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use closecall_sensors::camera::{Backend, Classifier};
-use closecall_sensors::{SensorMode, inference_backend, use_inference_backend};
+use closecall_sensors::{SensorMode, inference_backend, set_inference_backend};
 use closecall_simulation::Arm;
 use closecall_simulation::scenario::Scenario;
 
@@ -11,7 +11,7 @@ use super::CliError;
 
 /// Chooses the backend without loading it.
 pub(super) fn choose_backend(onnxruntime: Option<&Path>) {
-    use_inference_backend(Backend::choose(onnxruntime, None));
+    set_inference_backend(Backend::choose(onnxruntime, None));
 }
 
 /// Loads the chosen backend, so that a bad path is reported before any work is done. Does nothing if `is_used` is false.

@@ -10,12 +10,12 @@ use closecall_campaign::saved::SavedError;
 use closecall_report::campaign::ReportError;
 use closecall_report::run::figure::PngError;
 use closecall_report::run::film::TrafficFilmError;
-use closecall_report::run::rerun::RecordError;
-use closecall_report::traffic::recording_charts::ChartError;
+use closecall_report::run::rerun::RecordingError;
+use closecall_report::traffic::trajectory_charts::ChartError;
 use closecall_scenarios::atomic::WriteError;
 use closecall_scenarios::encounter::NoEncounter;
 use closecall_scenarios::lane_change::ReferenceError;
-use closecall_scenarios::recordings::{RecordingError, WriteError as RecordingWriteError};
+use closecall_scenarios::trajectory_data::{TrajectoryFileError, WriteError as TrajectoryWriteError};
 use closecall_sensors::camera::ClassifierError;
 use closecall_sensors::camera::dataset::DatasetError;
 use closecall_simulation::SampleError;
@@ -43,13 +43,13 @@ pub enum CliError {
     Scenario(#[from] ScenarioError),
     /// A trajectory file cannot be used.
     #[error(transparent)]
-    Recording(#[from] RecordingError),
+    TrajectoryData(#[from] TrajectoryFileError),
     /// A list of known lane changes cannot be used.
     #[error("failed to use the list of lane changes {0}")]
     Reference(#[from] ReferenceError),
     /// A trajectory file cannot be written.
     #[error(transparent)]
-    WriteRecording(#[from] RecordingWriteError),
+    WriteRecording(#[from] TrajectoryWriteError),
     /// A campaign's folder cannot be used.
     #[error(transparent)]
     Folder(#[from] FolderError),
@@ -61,7 +61,7 @@ pub enum CliError {
     Chart(#[from] ChartError),
     /// A recording (Rerun file) cannot be written.
     #[error(transparent)]
-    Record(#[from] RecordError),
+    Record(#[from] RecordingError),
     /// A figure cannot be drawn.
     #[error(transparent)]
     Figure(#[from] PngError),
@@ -140,9 +140,9 @@ impl From<&CliError> for ExitCode {
     fn from(error: &CliError) -> Self {
         match error {
             CliError::Scenario(error) => Self::from(error),
-            CliError::Recording(error) if error.is_io() => Self::Io,
+            CliError::TrajectoryData(error) if error.is_io() => Self::Io,
             CliError::Reference(error) if error.is_io() => Self::Io,
-            CliError::Recording(_)
+            CliError::TrajectoryData(_)
             | CliError::Reference(_)
             | CliError::TrafficFilm(_)
             | CliError::NoEncounter { .. }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use closecall_scenarios::recordings::{BadRows, Inspector, ReadOptions, Tracks, open};
+use closecall_scenarios::trajectory_data::{BadRows, QualityInspector, ReadOptions, Tracks, open};
 use serde_json::{Value, json};
 
 use super::CliError;
@@ -28,8 +28,8 @@ pub(super) struct InspectArgs {
 /// Prints the flaws of a trajectory file. If some rows cannot be used, the exit code is that with which other commands
 /// refuse the file.
 pub(super) fn inspect(args: &InspectArgs) -> Result<ExitCode, CliError> {
-    let mut tracks = open(&args.file, ReadOptions { bad_rows: BadRows::Drop, ..args.read.options() })?;
-    let mut inspector = Inspector::default();
+    let mut tracks = open(&args.file, ReadOptions { bad_rows: BadRows::Skip, ..args.read.options() })?;
+    let mut inspector = QualityInspector::default();
     while let Some(track) = tracks.next_track()? {
         inspector.add(&track);
     }
@@ -51,8 +51,8 @@ pub(super) fn inspect(args: &InspectArgs) -> Result<ExitCode, CliError> {
     Ok(ExitCode::InvalidInput)
 }
 
-fn report(tracks: &Tracks<'_>, inspector: &Inspector) -> Value {
-    let quality = inspector.quality();
+fn report(tracks: &Tracks<'_>, inspector: &QualityInspector) -> Value {
+    let quality = inspector.count_flaws();
     let span = inspector.span();
     json!({
         "name": tracks.name(),
@@ -65,14 +65,14 @@ fn report(tracks: &Tracks<'_>, inspector: &Inspector) -> Value {
         "first_s": span.map(|(first, _)| first.s()),
         "last_s": span.map(|(_, last)| last.s()),
         "flaws": inspector.flaws(),
-        "overlaps_unchecked_instants": inspector.unchecked_instants(),
+        "overlaps_unchecked_instants": inspector.unchecked_points(),
         "dropped": tracks.dropped(),
         "usable": tracks.dropped().count() == 0,
     })
 }
 
-fn print(tracks: &Tracks<'_>, inspector: &Inspector) {
-    let quality = inspector.quality();
+fn print(tracks: &Tracks<'_>, inspector: &QualityInspector) {
+    let quality = inspector.count_flaws();
     outln!("{} ({})", tracks.name(), tracks.layout().name());
     outln!(
         "  {} rows; {} tracks of {} vehicles, {} instants every {:.3} s",
@@ -92,10 +92,10 @@ fn print(tracks: &Tracks<'_>, inspector: &Inspector) {
             }
         }
     }
-    if inspector.unchecked_instants() > 0 {
+    if inspector.unchecked_points() > 0 {
         outln!(
             "  overlaps were not checked at {} instants: the other vehicles of those times were no longer in memory",
-            inspector.unchecked_instants()
+            inspector.unchecked_points()
         );
     }
     for (reason, rows) in tracks.dropped().reasons() {

@@ -7,7 +7,7 @@ use closecall_campaign::manifest::version;
 use closecall_campaign::summary::{Counts, Summary};
 use closecall_campaign::validity::CheckCounts;
 use closecall_campaign::verdict::Judgement;
-use closecall_report::run::film::Course;
+use closecall_report::run::film::EncounterMetrics;
 use closecall_simulation::outcome::{Collision, Margins, MisSummary, MomentAt, Outcome};
 use closecall_simulation::scenario::Setting;
 use closecall_traffic::{Absent, Measured, Value as ParameterValue};
@@ -70,7 +70,7 @@ pub(super) fn outcome(outcome: &Outcome) -> Value {
 }
 
 /// Returns the margins of an encounter, recorded or simulated.
-pub(super) fn course(course: &Course) -> Value {
+pub(super) fn course(course: &EncounterMetrics) -> Value {
     let mut object = Map::new();
     insert(&mut object, "crossing_s", course.crossing_s);
     insert(&mut object, "thw_front_at_crossing_s", course.thw_front_at_crossing_s);

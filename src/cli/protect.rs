@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use closecall_campaign::fingerprint::named_files;
-use closecall_scenarios::recordings::input_files;
+use closecall_scenarios::trajectory_data::input_files;
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::scenario::ScenarioFile;
 

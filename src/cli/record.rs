@@ -7,8 +7,8 @@ use closecall_campaign::runner::{Sampling, concrete, run_guarded};
 use closecall_controllers::DriverConfig;
 use closecall_report::traffic::in_car::InCarRecorder;
 use closecall_report::traffic::recorder::TrafficRecorder;
-use closecall_scenarios::recordings::{truth_path, write_in_car, write_recording, write_truth};
 use closecall_scenarios::sampling::Design;
+use closecall_scenarios::trajectory_data::{ground_truth_path, write_ground_truth, write_in_car, write_trajectories};
 use closecall_simulation::scenario::{ActorConfig, Scenario, ScenarioFile};
 use closecall_simulation::{Observer, RunKey};
 
@@ -69,14 +69,14 @@ fn record_traffic(args: &RecordArgs) -> Result<ExitCode, CliError> {
     let recording = recorder.finish(&file.config().name);
     let (tracks, instants) =
         (recording.trajectories.len(), recording.trajectories.iter().map(|track| track.points.len()).sum::<usize>());
-    write_recording(&recording, &args.output)?;
+    write_trajectories(&recording, &args.output)?;
     outln!("{tracks} vehicles, {instants} instants written to {}", args.output.display());
     Ok(ExitCode::Pass)
 }
 
 fn record_in_car(args: &RecordArgs, actor: Option<&str>) -> Result<ExitCode, CliError> {
     let file = args.set.load(&args.scenario)?;
-    let truth = truth_path(&args.output);
+    let truth = ground_truth_path(&args.output);
     let outputs = [("--output", Some(args.output.as_path())), ("--in-car", Some(truth.as_path()))];
     protect(&[of_scenario(&file), args.arm.files()].concat(), &outputs)?;
     let actors = &file.config().actors;
@@ -100,7 +100,7 @@ fn record_in_car(args: &RecordArgs, actor: Option<&str>) -> Result<ExitCode, Cli
     each_sample(args, &file, &mut recorder, InCarRecorder::begin)?;
     let (log, changes) = recorder.finish();
     write_in_car(&log, &args.output)?;
-    write_truth(&changes, &truth)?;
+    write_ground_truth(&changes, &truth)?;
     outln!("{} rows of the in-car log of {chosen} written to {}", log.frames.len(), args.output.display());
     outln!("{} true lane changes written to {}", changes.len(), truth.display());
     Ok(ExitCode::Pass)

@@ -3,14 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use closecall_report::run::film::{Comparison, Film, film_encounter};
-use closecall_report::run::rerun::record_films;
+use closecall_report::run::film::{EncounterComparison, Film, film_encounter};
+use closecall_report::run::rerun::write_recording;
 use closecall_scenarios::atomic::write_file;
 use closecall_scenarios::criticality::{CriticalLaneChange, criticality};
 use closecall_scenarios::encounter::{NoEncounter, RecordedEncounter, encounter};
 use closecall_scenarios::filters::smooth;
 use closecall_scenarios::lane_change::LaneChange;
-use closecall_scenarios::recordings::read_with;
+use closecall_scenarios::trajectory_data::read_with;
 use closecall_simulation::outcome::Outcome;
 use closecall_simulation::scenario::{RearDriver, ScenarioFile, reenact as scenario_of};
 use closecall_simulation::{CONTROL_STEP, RunKey};
@@ -91,11 +91,11 @@ pub(super) fn reenact(args: &ReenactArgs) -> Result<ExitCode, CliError> {
     let key = RunKey { seed: args.seed, sample: 0 };
     let (outcome, simulated) = run_filmed(&scenario, key, &args.arm.arm()?, &args.watch)?;
     let recorded = film_encounter(&found, args.watch.record_level.into())?;
-    let comparison = Comparison::new(&found, &recorded, &simulated);
+    let comparison = EncounterComparison::new(&found, &recorded, &simulated);
     let foreword = comparison.markdown(&found, &simulated, args.rear.into());
-    let films = [recorded.with_foreword(foreword), simulated].map(|film| film.plotting_first(PROTAGONISTS));
+    let films = [recorded.with_foreword(foreword), simulated].map(|film| film.with_plots_of_first(PROTAGONISTS));
     if let Some(path) = &args.watch.record {
-        record_films(path, &films)?;
+        write_recording(path, &films)?;
     }
     if let Some(path) = &args.output {
         write_file(path, |written| written.write_all(text_of(&file, args).as_bytes()))?;
@@ -138,7 +138,7 @@ fn text_of(file: &ScenarioFile, args: &ReenactArgs) -> String {
 
 /// The simulated run of an encounter beside the recorded one.
 struct Reenactment<'a> {
-    comparison: &'a Comparison,
+    comparison: &'a EncounterComparison,
     /// The film of the recorded traffic, and that of the simulation.
     films: &'a [Film; 2],
     outcome: &'a Outcome,
@@ -146,11 +146,11 @@ struct Reenactment<'a> {
 
 fn print(format: Format, found: &RecordedEncounter, reenactment: &Reenactment<'_>) {
     let Reenactment { comparison, films, outcome } = reenactment;
-    let [ego, front, rear] = found.protagonists().map(|track| track.track_id);
+    let [ego, front, rear] = found.ego_lead_rear().map(|track| track.track_id);
     match format {
         Format::Json => {
             let object = json!({
-                "recording": found.recording,
+                "trajectory_data": found.data_name,
                 "track_id": rear,
                 "ego_track_id": ego,
                 "front_track_id": front,
@@ -162,7 +162,7 @@ fn print(format: Format, found: &RecordedEncounter, reenactment: &Reenactment<'_
             outln!("{:#}", json::stamped(object, Some(outcome.seed), None));
         }
         Format::Human => {
-            outln!("{}: rear vehicle: track {rear}; ego: track {ego}; lead vehicle: track {front}", found.recording);
+            outln!("{}: rear vehicle: track {rear}; ego: track {ego}; lead vehicle: track {front}", found.data_name);
             outln!("start: {:.1} s of the trajectory file, with recorded positions and speeds", found.start.s());
             outln!("  {:<32} {:>16} {:>16}", "", films[0].arm(), films[1].arm());
             for (name, [recorded, simulated]) in comparison.rows() {
@@ -170,7 +170,7 @@ fn print(format: Format, found: &RecordedEncounter, reenactment: &Reenactment<'_
             }
             let simulated = &films[1];
             outln!("{}: {}", simulated.arm(), simulated.headline());
-            if let Some(verdict) = simulated.verdict_on_mis() {
+            if let Some(verdict) = simulated.mis_summary() {
                 outln!("{}: {verdict}", simulated.arm());
             }
         }

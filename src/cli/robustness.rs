@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use closecall_report::traffic::recording_charts::{Legend, Line, LineChart};
+use closecall_report::traffic::trajectory_charts::{Legend, Line, LineChart};
 use closecall_scenarios::atomic::{WriteError, write_file};
 use closecall_scenarios::lane_change::Criterion;
-use closecall_scenarios::recordings::open;
-use closecall_scenarios::robustness::{Cell, Measured, ReferenceKind, Robustness, Setup, Study};
+use closecall_scenarios::robustness::{CriterionCounts, Measured, ReferenceKind, Robustness, Setup, Study};
+use closecall_scenarios::trajectory_data::open;
 use rayon::prelude::*;
 
 use super::CliError;
@@ -53,7 +53,7 @@ pub(super) fn robustness(args: &RobustnessArgs) -> Result<ExitCode, CliError> {
     for study in &studies {
         let cases = Study::cases(&setup);
         // The results are in the order of the cases for any number of threads.
-        let results: Vec<Vec<Cell>> = cases.par_iter().map(|case| study.run(case)).collect();
+        let results: Vec<Vec<CriterionCounts>> = cases.par_iter().map(|case| study.run(case)).collect();
         let one = study.robustness(&setup, &results);
         if let Some(all) = &mut found {
             if !all.add(&one) {
@@ -91,7 +91,8 @@ fn study_of(path: &Path, read: &ReadArgs) -> Result<Study, CliError> {
 
 fn json(found: &Robustness) -> serde_json::Value {
     let fails = found.criteria.iter().enumerate();
-    let fails = fails.map(|(column, criterion)| (criterion.name().to_owned(), found.fails_from_noise(column).into()));
+    let fails =
+        fails.map(|(column, criterion)| (criterion.name().to_owned(), found.failing_noise_m_per_sqrt_s(column).into()));
     let mut value = serde_json::json!(found);
     value["fails_from_noise_m_per_sqrt_s"] = serde_json::Value::Object(fails.collect());
     value
@@ -125,8 +126,8 @@ fn print(found: &Robustness) {
     }
 }
 
-fn row(found: &Robustness, cells: &[Cell]) -> String {
-    let cell = |(criterion, cell): (usize, &Cell)| {
+fn row(found: &Robustness, cells: &[CriterionCounts]) -> String {
+    let cell = |(criterion, cell): (usize, &CriterionCounts)| {
         let mark = if found.fails(criterion, cell) { "!" } else { " " };
         format!("{:<26}", format!("{:>6.1} /{:>6.1} /{:>5.1} {mark}", cell.again, cell.found, cell.invented))
     };
@@ -135,8 +136,10 @@ fn row(found: &Robustness, cells: &[Cell]) -> String {
 
 /// Returns one line per criterion with the lowest level of noise at which it fails, sorted by that level.
 fn failures(found: &Robustness) -> Vec<String> {
-    let mut from: Vec<(Option<f64>, Criterion)> =
-        (0..).zip(&found.criteria).map(|(column, criterion)| (found.fails_from_noise(column), *criterion)).collect();
+    let mut from: Vec<(Option<f64>, Criterion)> = (0..)
+        .zip(&found.criteria)
+        .map(|(column, criterion)| (found.failing_noise_m_per_sqrt_s(column), *criterion))
+        .collect();
     from.sort_by(|a, b| a.0.unwrap_or(f64::INFINITY).total_cmp(&b.0.unwrap_or(f64::INFINITY)));
     let line = |(level, criterion): &(Option<f64>, Criterion)| match level {
         Some(level) => format!("{} first fails at a noise of {level} m/√s", criterion.name()),
@@ -163,11 +166,11 @@ fn plot(found: &Robustness, folder: &Path) -> Result<(), CliError> {
 struct Axis<'a> {
     name: &'a str,
     levels: &'a [f64],
-    rows: &'a [Vec<Cell>],
+    rows: &'a [Vec<CriterionCounts>],
 }
 
 fn chart(found: &Robustness, axis: &Axis<'_>) -> LineChart {
-    let points = |column: usize, value: fn(&Cell) -> f64| -> Vec<(f64, f64)> {
+    let points = |column: usize, value: fn(&CriterionCounts) -> f64| -> Vec<(f64, f64)> {
         axis.levels.iter().zip(axis.rows).map(|(level, cells)| (*level, value(&cells[column]))).collect()
     };
     let lines = found.criteria.iter().enumerate().flat_map(|(column, criterion)| {

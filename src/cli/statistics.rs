@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use closecall_report::traffic::recording_charts::{BoxChart, BoxOf};
+use closecall_report::traffic::trajectory_charts::{BoxChart, BoxSummary};
 use closecall_scenarios::atomic::{WriteError, write_file};
 use closecall_scenarios::criticality::{
-    BoxNumbers, ClassStatistics, Correlation, CriticalLaneChange, Statistics, criticality, statistics as compute,
+    BoxPlot, ClassStatistics, Correlation, CriticalLaneChange, Statistics, criticality, statistics as compute,
 };
 use closecall_scenarios::filters::smooth;
-use closecall_scenarios::recordings::{Recording, read_with};
+use closecall_scenarios::trajectory_data::{TrajectoryData, read_with};
 
 use super::CliError;
 use super::args::{Format, ReadArgs, positive};
@@ -44,9 +44,9 @@ pub(super) fn statistics(args: &StatisticsArgs) -> Result<ExitCode, CliError> {
         protect(&of_trajectories(&args.files), &[("--plot", Some(chart))])?;
     }
     let read = |path: &PathBuf| read_with(path, args.read.options());
-    let recordings = args.files.iter().map(read).collect::<Result<Vec<Recording>, _>>()?;
-    refuse_duplicates(&args.files, &recordings)?;
-    let changes = recordings.iter().flat_map(|recording| criticality(&smooth(recording), args.speed_limit_mps));
+    let data_sets = args.files.iter().map(read).collect::<Result<Vec<TrajectoryData>, _>>()?;
+    refuse_duplicates(&args.files, &data_sets)?;
+    let changes = data_sets.iter().flat_map(|data| criticality(&smooth(data), args.speed_limit_mps));
     let found = compute(&changes.collect::<Vec<CriticalLaneChange>>());
     if let Some(folder) = &args.plot {
         plot(&found, folder)?;
@@ -80,9 +80,9 @@ fn print(found: &Statistics) {
     }
 }
 
-fn print_box(class: &ClassStatistics, what: &str, numbers: Option<&BoxNumbers>) {
+fn print_box(class: &ClassStatistics, what: &str, numbers: Option<&BoxPlot>) {
     let name = class.vehicle_class.name();
-    let Some(BoxNumbers { n, mean, five: [low, quarter, median, three_quarters, high], .. }) = numbers else { return };
+    let Some(BoxPlot { n, mean, five: [low, quarter, median, three_quarters, high], .. }) = numbers else { return };
     outln!(
         "{name:<6} {what:<13} {n:>5} {mean:>7.2} {low:>7.2} {quarter:>9.2} {median:>6.2} {three_quarters:>6.2} {high:>7.2}"
     );
@@ -90,8 +90,8 @@ fn print_box(class: &ClassStatistics, what: &str, numbers: Option<&BoxNumbers>) 
 
 fn plot(found: &Statistics, folder: &Path) -> Result<(), CliError> {
     std::fs::create_dir_all(folder).map_err(|source| WriteError::new(folder, source))?;
-    let duration: fn(&ClassStatistics) -> Option<&BoxNumbers> = |class| class.duration_s.as_ref();
-    let speed: fn(&ClassStatistics) -> Option<&BoxNumbers> = |class| class.speed_mps.as_ref();
+    let duration: fn(&ClassStatistics) -> Option<&BoxPlot> = |class| class.duration_s.as_ref();
+    let speed: fn(&ClassStatistics) -> Option<&BoxPlot> = |class| class.speed_mps.as_ref();
     for (name, title, y_name, value) in [
         ("duration.svg", "Duration of complete lane changes", "duration [s]", duration),
         ("speed.svg", "Speed at the crossing of complete lane changes", "speed [m/s]", speed),
@@ -105,7 +105,7 @@ fn plot(found: &Statistics, folder: &Path) -> Result<(), CliError> {
     Ok(())
 }
 
-fn box_of(class: &ClassStatistics, numbers: &BoxNumbers) -> BoxOf {
+fn box_of(class: &ClassStatistics, numbers: &BoxPlot) -> BoxSummary {
     let name = format!("{} (n = {})", class.vehicle_class.name(), numbers.n);
-    BoxOf { name, five: numbers.five, outliers: numbers.outliers.clone() }
+    BoxSummary { name, five: numbers.five, outliers: numbers.outliers.clone() }
 }

@@ -7,14 +7,16 @@ use closecall_scenarios::atomic::WriteError;
 use closecall_scenarios::criticality::{CriticalLaneChange, criticality as evaluate, shares};
 use closecall_scenarios::filters::smooth;
 use closecall_scenarios::fit::{Heading, fit as fit_distributions, to_toml, write_toml};
-use closecall_scenarios::lane_change::{Criterion, Detector, LaneChange, Lanes, Score, Spans, read_references, score};
-use closecall_scenarios::recordings::{Layout, Recording, open, quality, read_with};
+use closecall_scenarios::lane_change::{
+    Criterion, LaneChange, LaneChangeDetector, LaneReliability, Score, TrackSpans, read_references, score,
+};
+use closecall_scenarios::trajectory_data::{Layout, TrajectoryData, count_flaws, open, read_with};
 
 use super::CliError;
 use super::args::{Format, ReadArgs, positive};
 use super::json::stamped;
 use super::output::{out, outln};
-use super::protect::{of_trajectories, protect, recording as recording_path};
+use super::protect::{of_trajectories, protect, recording as trajectory_path};
 use super::watch::record_lane_change;
 use crate::exit_code::ExitCode;
 
@@ -73,7 +75,7 @@ pub(super) struct CriticalityArgs {
     #[arg(long, value_name = "M/S", value_parser = positive)]
     speed_limit_mps: Option<f64>,
     /// Save a recording (Rerun file) of one lane change: the most critical one, or that of the track named by --track
-    #[arg(long, value_name = "FILE.rrd", value_parser = recording_path)]
+    #[arg(long, value_name = "FILE.rrd", value_parser = trajectory_path)]
     record: Option<PathBuf>,
     /// Track whose lane change --record saves
     #[arg(long, value_name = "ID", requires = "record")]
@@ -116,8 +118,8 @@ pub(super) fn lane_changes(args: &LaneChangesArgs) -> Result<ExitCode, CliError>
         );
         return Err(CliError::Usage { message });
     }
-    let detector = Detector::new(Lanes::Recorded, tracks.markings());
-    let (mut changes, mut spans, mut count) = (Vec::new(), Spans::new(), 0_u64);
+    let detector = LaneChangeDetector::new(LaneReliability::Reliable, tracks.markings());
+    let (mut changes, mut spans, mut count) = (Vec::new(), TrackSpans::new(), 0_u64);
     // The tracks are read one by one, so that the memory does not grow with the file.
     while let Some(track) = tracks.next_track()? {
         count += 1;
@@ -165,15 +167,15 @@ fn print_score(score: &Score) {
     outln!("crossing times differ by at most {:.2} s", score.max_time_error_s);
 }
 
-fn describe(recording: &Recording) {
-    let quality = quality(recording);
+fn describe(data: &TrajectoryData) {
+    let quality = count_flaws(data);
     outln!(
         "{}: {} tracks of {} vehicles, {} instants every {}; {} gaps, {} jumps, {} overlaps",
-        recording.name,
+        data.name,
         quality.tracks,
         quality.vehicles,
         quality.instants,
-        recording.period,
+        data.period,
         quality.gaps,
         quality.jumps,
         quality.overlaps,
@@ -207,8 +209,8 @@ fn line(change: &LaneChange) -> String {
 
 pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> {
     protect(&of_trajectories(std::slice::from_ref(&args.file)), &[("--record", args.record.as_deref())])?;
-    let recording = read_with(&args.file, args.read.options())?;
-    let smoothed = smooth(&recording);
+    let data = read_with(&args.file, args.read.options())?;
+    let smoothed = smooth(&data);
     let changes = evaluate(&smoothed, args.speed_limit_mps);
     if let Some(path) = &args.record {
         record_lane_change(path, &smoothed, &changes, args.track)?;
@@ -216,7 +218,7 @@ pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> 
     match args.format {
         Format::Json => outln!("{:#}", stamped(serde_json::json!(changes), None, None)),
         Format::Human => {
-            describe(&recording);
+            describe(&data);
             print_metrics(&changes);
         }
     }
@@ -245,10 +247,10 @@ fn print_metrics(changes: &[CriticalLaneChange]) {
 
 pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
     protect(&of_trajectories(&args.files), &[("--output", args.output.as_deref())])?;
-    let recordings =
+    let data_sets =
         args.files.iter().map(|path| read_with(path, args.read.options())).collect::<Result<Vec<_>, _>>()?;
-    refuse_duplicates(&args.files, &recordings)?;
-    let fitted = fit_distributions(&recordings, args.seed);
+    refuse_duplicates(&args.files, &data_sets)?;
+    let fitted = fit_distributions(&data_sets, args.seed);
     let command = std::iter::once("closecall".to_owned()).chain(std::env::args().skip(1)).collect::<Vec<_>>().join(" ");
     let heading = Heading { command, provenance: args.provenance.clone() };
     if let Some(path) = &args.output {
@@ -272,9 +274,9 @@ pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
 
 /// Returns an error if two files have the same content: its lane changes would count twice, and every interval would be
 /// too narrow.
-pub(super) fn refuse_duplicates(paths: &[PathBuf], recordings: &[Recording]) -> Result<(), CliError> {
-    for (later, recording) in recordings.iter().enumerate() {
-        if let Some(earlier) = recordings[..later].iter().position(|earlier| earlier.hash == recording.hash) {
+pub(super) fn refuse_duplicates(paths: &[PathBuf], data_sets: &[TrajectoryData]) -> Result<(), CliError> {
+    for (later, data) in data_sets.iter().enumerate() {
+        if let Some(earlier) = data_sets[..later].iter().position(|earlier| earlier.hash == data.hash) {
             let (one, other) = (paths[earlier].display(), paths[later].display());
             return Err(CliError::Usage { message: format!("{one} and {other} have the same content") });
         }
@@ -294,7 +296,7 @@ fn json(fitted: &closecall_scenarios::fit::FittedDistributions) -> serde_json::V
     };
     let too_few = |(quantity, n): &(closecall_scenarios::fit::Quantity, usize)| serde_json::json!({ "name": quantity.name(), "n": n });
     serde_json::json!({
-        "recordings": fitted.recordings.iter().map(|(name, _)| name).collect::<Vec<_>>(),
+        "trajectory_data": fitted.data_sets.iter().map(|(name, _)| name).collect::<Vec<_>>(),
         "seed": fitted.seed,
         "fitted": fitted.fitted.iter().map(quantity).collect::<Vec<_>>(),
         "too_few": fitted.too_few.iter().map(too_few).collect::<Vec<_>>(),

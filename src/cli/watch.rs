@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use closecall_campaign::runner::run_guarded;
 use closecall_report::run::film::{Film, FilmRecorder, Level, film_lane_change};
-use closecall_report::run::rerun::{check_recordable, record_films, write_films};
+use closecall_report::run::rerun::{check_recording_possible, write_recording, write_recording_unchecked};
 use closecall_report::run::trace::TraceWriter;
 use closecall_scenarios::criticality::CriticalLaneChange;
-use closecall_scenarios::filters::SmoothedRecording;
+use closecall_scenarios::filters::SmoothedTrajectoryData;
 use closecall_simulation::outcome::Outcome;
 use closecall_simulation::scenario::Scenario;
 use closecall_simulation::{Arm, Happening, Observer, RunKey, StepView};
@@ -65,7 +65,7 @@ impl WatchArgs {
 
     /// Checks that the requested files can be written, before any work is done.
     fn check(&self) -> Result<(), CliError> {
-        Ok(self.record.as_deref().map(check_recordable).transpose().map(drop)?)
+        Ok(self.record.as_deref().map(check_recording_possible).transpose().map(drop)?)
     }
 }
 
@@ -101,7 +101,7 @@ pub(super) fn run_watched(
         outcomes.push(outcome);
     }
     if let Some(path) = &watch.record {
-        write_films(path, &films)?;
+        write_recording_unchecked(path, &films)?;
         print_written(path);
     }
     if let Some(trace) = trace {
@@ -163,7 +163,7 @@ impl Observer for Observers<'_> {
 /// Saves a recording of one lane change of a trajectory file: that of `track`, or the most critical one.
 pub(super) fn record_lane_change(
     path: &Path,
-    recording: &SmoothedRecording,
+    recording: &SmoothedTrajectoryData,
     changes: &[CriticalLaneChange],
     track: Option<u64>,
 ) -> Result<(), CliError> {
@@ -172,7 +172,7 @@ pub(super) fn record_lane_change(
         let of_track = track.map_or(String::new(), |track| format!(" of track {track}"));
         return Err(CliError::Usage { message: format!("the trajectory file has no lane change{of_track} to record") });
     };
-    record_films(path, &[film_lane_change(recording, chosen)?])?;
+    write_recording(path, &[film_lane_change(recording, chosen)?])?;
     print_written(path);
     Ok(())
 }

@@ -2,7 +2,7 @@
 
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_scenarios::sampling::Design;
-use closecall_sensors::{Consistency, Credibility, NEES_95, SensorMode};
+use closecall_sensors::{Consistency, Credibility, NEES_QUANTILE_95, SensorMode};
 use closecall_simulation::controller::BuiltIn;
 use closecall_simulation::scenario::ScenarioFile;
 use closecall_simulation::{Arm, RunKey, TrackAuditor, simulate};
@@ -32,7 +32,7 @@ fn assert_consistent(mode: SensorMode, samples: u64) {
     assert_eq!(found.credibility(), Credibility::Consistent, "{found:?}");
     // The mean does not consist of a few large errors among many small ones.
     let all: Vec<f64> = runs.concat();
-    let below = all.iter().filter(|&&nees| nees < NEES_95).count() as f64 / all.len() as f64;
+    let below = all.iter().filter(|&&nees| nees < NEES_QUANTILE_95).count() as f64 / all.len() as f64;
     assert!((0.92..0.97).contains(&below), "a share of {below} is below the 95 % quantile");
 }
 

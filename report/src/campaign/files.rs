@@ -26,7 +26,7 @@ use super::recordings::{INDEX, RECORDINGS, record};
 use super::samples_xml::{SuiteTotals, write_samples};
 use super::tally::Tally;
 use super::timings::{Timing, write_timings};
-use crate::run::rerun::RecordError;
+use crate::run::rerun::RecordingError;
 
 /// Number of samples that are listed as the slowest.
 const SLOWEST: usize = 10;
@@ -47,7 +47,7 @@ pub enum ReportError {
     Write(#[from] WriteError),
     /// A recording cannot be written.
     #[error(transparent)]
-    Recording(#[from] RecordError),
+    Recording(#[from] RecordingError),
     /// A sample that had an outcome has none when it is run again for its recording.
     #[error("failed to run sample {sample}: {source}")]
     Sample {

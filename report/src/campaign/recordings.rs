@@ -13,7 +13,7 @@ use super::findings::Recordings;
 use super::html::{IndexEntry, write_index};
 use crate::run::figure::still;
 use crate::run::film::{Level, film_arms};
-use crate::run::rerun::record_films;
+use crate::run::rerun::write_recording;
 
 /// The folder of the recordings within a campaign's folder.
 pub(super) const RECORDINGS: &str = "recordings";
@@ -70,7 +70,7 @@ fn record_one(saved: &SavedCampaign, scenario: &str, chosen: &Chosen) -> Result<
     let films = film_arms(&concrete, key, &saved.manifest().arms(), Level::Full)
         .map_err(|source| ReportError::Sample { sample, source })?;
     let file = format!("{scenario}-{sample}.rrd");
-    record_films(&saved.folder().file(&format!("{RECORDINGS}/{file}")), &films)?;
+    write_recording(&saved.folder().file(&format!("{RECORDINGS}/{file}")), &films)?;
     let paired = if films.len() > 1 { " --paired" } else { "" };
     let replay = format!(
         "closecall replay {} {sample} --scenario {scenario}{paired} --record {file}",
@@ -78,7 +78,7 @@ fn record_one(saved: &SavedCampaign, scenario: &str, chosen: &Chosen) -> Result<
     );
     let story = films.iter().flat_map(|film| {
         let arm = film.arm();
-        [Some(film.headline()), film.verdict_on_mis()].into_iter().flatten().map(move |line| format!("{arm}: {line}"))
+        [Some(film.headline()), film.mis_summary()].into_iter().flatten().map(move |line| format!("{arm}: {line}"))
     });
     Ok(IndexEntry {
         scenario: scenario.to_owned(),

@@ -3,7 +3,7 @@
 //! The log holds the vehicle's motion at 100 Hz and, on every fourth step, the signals of its bus. It contains no noise
 //! except the rounding of the written numbers. Robustness studies add noise of their own, from a seed.
 
-use closecall_scenarios::recordings::{BusFrame, InCarFrame, InCarLog, MarkingDistances, TrueLaneChange};
+use closecall_scenarios::trajectory_data::{BusFrame, InCarFrame, InCarLog, MarkingDistances, TrueLaneChange};
 use closecall_traffic::{Dimensions, Lane, Road, Side, Time, VehicleClass, VehicleState};
 
 use closecall_simulation::scenario::Scenario;

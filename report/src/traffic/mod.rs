@@ -2,4 +2,4 @@
 
 pub mod in_car;
 pub mod recorder;
-pub mod recording_charts;
+pub mod trajectory_charts;

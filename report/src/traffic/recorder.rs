@@ -1,6 +1,6 @@
 //! Simulated traffic as trajectory data, in the layout in which recorded traffic is read.
 
-use closecall_scenarios::recordings::Recording;
+use closecall_scenarios::trajectory_data::TrajectoryData;
 use closecall_traffic::{Lane, Time, Trajectory, TrajectoryPoint};
 
 use closecall_simulation::scenario::Scenario;
@@ -39,8 +39,8 @@ impl TrafficRecorder {
     }
 
     /// Returns the trajectories of all runs as one data set of this name.
-    pub fn finish(self, name: &str) -> Recording {
-        Recording::new(name, CONTROL_STEP, self.trajectories)
+    pub fn finish(self, name: &str) -> TrajectoryData {
+        TrajectoryData::new(name, CONTROL_STEP, self.trajectories)
     }
 }
 

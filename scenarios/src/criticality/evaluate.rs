@@ -6,41 +6,40 @@ use closecall_traffic::{Absent, Lane, Time, Trajectory, TrajectoryPoint};
 
 use super::{
     CRITICAL_A_LAT_MPS2, CRITICAL_A_LON_MPS2, CRITICAL_DCE_M, CRITICAL_DISTANCE_M, CRITICAL_SPEED_FACTOR,
-    CRITICAL_TTCE_S, CriticalLaneChange, DEFAULT_SPEED_LIMIT_MPS, ENCOUNTER_HORIZON_S, MetricRecord, Metrics,
+    CRITICAL_TTCE_S, CriticalLaneChange, DEFAULT_SPEED_LIMIT_MPS, ENCOUNTER_HORIZON_S, MetricResult, Metrics,
 };
-use crate::filters::SmoothedRecording;
+use crate::filters::SmoothedTrajectoryData;
 use crate::lane_change::{LaneChange, detect};
 
 /// Speed below which a vehicle is assumed to point along the road, because its direction of movement is noise (m/s).
 const HEADING_FROM_MPS: f64 = 1.0;
 
-/// Detects all lane changes of `recording` and evaluates their metrics.
+/// Detects all lane changes of `data` and evaluates their metrics.
 ///
 /// `speed_limit_mps` is `None` if the speed limit is not known.
-pub fn criticality(recording: &SmoothedRecording, speed_limit_mps: Option<f64>) -> Vec<CriticalLaneChange> {
-    let evaluated = detect(recording).into_iter().filter_map(|lane_change| {
-        let metrics = evaluate(recording, &lane_change, speed_limit_mps)?;
+pub fn criticality(data: &SmoothedTrajectoryData, speed_limit_mps: Option<f64>) -> Vec<CriticalLaneChange> {
+    let evaluated = detect(data).into_iter().filter_map(|lane_change| {
+        let metrics = evaluate(data, &lane_change, speed_limit_mps)?;
         Some(CriticalLaneChange { lane_change, metrics })
     });
     evaluated.collect()
 }
 
-/// Evaluates the metrics of one lane change. Returns `None` if `recording` does not have its track.
+/// Evaluates the metrics of one lane change. Returns `None` if `data` does not have its track.
 ///
 /// `speed_limit_mps` is `None` if the speed limit is not known.
 pub fn evaluate(
-    recording: &SmoothedRecording,
+    data: &SmoothedTrajectoryData,
     lane_change: &LaneChange,
     speed_limit_mps: Option<f64>,
 ) -> Option<Metrics> {
-    let own_index = recording.place_of(lane_change.track_id)?;
-    let own = &recording.tracks[own_index].trajectory;
+    let own_index = data.track_index(lane_change.track_id)?;
+    let own = &data.tracks[own_index].trajectory;
     let (start, end) = (Time::from_s(lane_change.start_s), Time::from_s(lane_change.end_s));
     let mut extremes = Extremes::default();
     for point in own.points.iter().filter(|point| point.time >= start && point.time <= end) {
-        let others = recording.present_at(point.time).iter().filter(|presence| presence.track_index != own_index);
-        let others: Vec<VehicleState<'_>> =
-            others.map(|&presence| VehicleState::new(recording.look_up(presence))).collect();
+        let others = data.present_at(point.time).iter().filter(|presence| presence.track_index != own_index);
+        let others: Vec<VehicleState<'_>> = others.map(|&presence| VehicleState::new(data.look_up(presence))).collect();
         extremes.observe(&VehicleState::new((own, point)), &others, Lane(lane_change.to_lane));
     }
     Some(extremes.metrics(speed_limit_mps.unwrap_or(DEFAULT_SPEED_LIMIT_MPS)))
@@ -82,12 +81,12 @@ struct Extreme {
 }
 
 /// Returns the result of a metric: its most critical value, or the reason `otherwise` if there is none.
-fn metric_record(extreme: Option<Extreme>, otherwise: Absent, is_critical: impl Fn(f64) -> bool) -> MetricRecord {
+fn metric_record(extreme: Option<Extreme>, otherwise: Absent, is_critical: impl Fn(f64) -> bool) -> MetricResult {
     match extreme {
         Some(Extreme { value, opponent, time_s }) => {
-            MetricRecord::Value { value, opponent, time_s, critical: is_critical(value) }
+            MetricResult::Value { value, opponent, time_s, critical: is_critical(value) }
         }
-        None => MetricRecord::Absent { absent: otherwise },
+        None => MetricResult::Absent { absent: otherwise },
     }
 }
 
@@ -184,21 +183,21 @@ mod tests {
     use super::*;
     use crate::criticality::shares;
     use crate::filters::smooth;
-    use crate::recordings::test_support::{changing_track, recording_of, straight_track};
+    use crate::trajectory_data::test_support::{changing_track, straight_track, trajectory_data_of};
 
     /// A lane change from lane 2 to lane 1 between 3 and 8 s at 30 m/s, evaluated against `others`.
     fn evaluated(others: Vec<Trajectory>) -> CriticalLaneChange {
         let mut tracks = vec![changing_track(1, (0.0, 30.0), (-5.25, -1.75), (3.0, 5.0), 110)];
         tracks.extend(others);
-        let mut found = criticality(&smooth(&recording_of(tracks)), None);
+        let mut found = criticality(&smooth(&trajectory_data_of(tracks)), None);
         assert_eq!(found.len(), 1);
         found.remove(0)
     }
 
-    fn absent(record: MetricRecord) -> Option<Absent> {
+    fn absent(record: MetricResult) -> Option<Absent> {
         match record {
-            MetricRecord::Absent { absent } => Some(absent),
-            MetricRecord::Value { .. } => None,
+            MetricResult::Absent { absent } => Some(absent),
+            MetricResult::Value { .. } => None,
         }
     }
 
@@ -255,8 +254,8 @@ mod tests {
     #[test]
     fn the_speed_limit_decides_whether_a_speed_is_critical() {
         let track = changing_track(1, (0.0, 45.0), (-5.25, -1.75), (3.0, 5.0), 110);
-        let recording = smooth(&recording_of(vec![track]));
-        let by_limit = |limit| criticality(&recording, limit)[0].metrics.speed_mps.is_critical();
+        let data = smooth(&trajectory_data_of(vec![track]));
+        let by_limit = |limit| criticality(&data, limit)[0].metrics.speed_mps.is_critical();
         assert!(by_limit(None) && !by_limit(Some(36.1)));
     }
 

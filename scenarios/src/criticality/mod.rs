@@ -38,9 +38,9 @@ mod shares;
 mod statistics;
 
 pub use evaluate::{criticality, evaluate};
-pub use record::{CriticalLaneChange, MetricRecord, Metrics};
+pub use record::{CriticalLaneChange, MetricResult, Metrics};
 pub use shares::{CriticalShare, CriticalShares, shares};
-pub use statistics::{BoxNumbers, ClassStatistics, Correlation, Statistics, statistics};
+pub use statistics::{BoxPlot, ClassStatistics, Correlation, Statistics, statistics};
 
 /// Distance between two vehicles below which it is critical (m).
 pub const CRITICAL_DISTANCE_M: f64 = 1.0;

@@ -8,7 +8,7 @@ use crate::lane_change::LaneChange;
 /// The result of one metric for one lane change.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
-pub enum MetricRecord {
+pub enum MetricResult {
     /// The most critical value.
     Value {
         /// The value, in the metric's unit.
@@ -27,7 +27,7 @@ pub enum MetricRecord {
     },
 }
 
-impl MetricRecord {
+impl MetricResult {
     /// Returns true if there is a value and it is beyond the threshold.
     pub fn is_critical(&self) -> bool {
         matches!(self, Self::Value { critical: true, .. })
@@ -46,24 +46,24 @@ impl MetricRecord {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Metrics {
     /// Smallest distance from box to box (m).
-    pub distance_m: MetricRecord,
+    pub distance_m: MetricResult,
     /// Largest speed (m/s).
-    pub speed_mps: MetricRecord,
+    pub speed_mps: MetricResult,
     /// Largest magnitude of the acceleration along the road (m/s²).
-    pub a_lon_mps2: MetricRecord,
+    pub a_lon_mps2: MetricResult,
     /// Largest magnitude of the acceleration across the road (m/s²).
-    pub a_lat_mps2: MetricRecord,
+    pub a_lat_mps2: MetricResult,
     /// Smallest time headway (s).
-    pub thw_s: MetricRecord,
+    pub thw_s: MetricResult,
     /// Smallest distance at closest encounter (m).
-    pub dce_m: MetricRecord,
+    pub dce_m: MetricResult,
     /// Smallest time to closest encounter (s).
-    pub ttce_s: MetricRecord,
+    pub ttce_s: MetricResult,
 }
 
 impl Metrics {
     /// Returns all seven metrics with their names, in a fixed order.
-    pub fn named(&self) -> [(&'static str, MetricRecord); 7] {
+    pub fn named(&self) -> [(&'static str, MetricResult); 7] {
         [
             ("distance_m", self.distance_m),
             ("speed_mps", self.speed_mps),

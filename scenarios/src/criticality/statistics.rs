@@ -23,7 +23,7 @@ const WHISKER_RANGES: f64 = 1.5;
 
 /// The numbers that define a box plot, in the unit of its values.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct BoxNumbers {
+pub struct BoxPlot {
     /// Number of values.
     pub n: usize,
     /// Mean of the values.
@@ -34,7 +34,7 @@ pub struct BoxNumbers {
     pub outliers: Vec<f64>,
 }
 
-impl BoxNumbers {
+impl BoxPlot {
     /// Computes the box plot of all finite `values`. Returns `None` if there are none.
     pub fn of(mut values: Vec<f64>) -> Option<Self> {
         values.retain(|value| value.is_finite());
@@ -66,9 +66,9 @@ pub struct ClassStatistics {
     /// Number of lane changes that are part of a double one.
     pub double: usize,
     /// Durations of the complete lane changes (s).
-    pub duration_s: Option<BoxNumbers>,
+    pub duration_s: Option<BoxPlot>,
     /// Speeds of the complete lane changes when the centre crosses the marking (m/s).
-    pub speed_mps: Option<BoxNumbers>,
+    pub speed_mps: Option<BoxPlot>,
 }
 
 /// The correlation of two quantities.
@@ -114,8 +114,8 @@ fn class_statistics(changes: &[CriticalLaneChange], vehicle_class: VehicleClass)
         to_the_left: all.iter().filter(|change| change.direction == Side::Left).count(),
         complete: complete.len(),
         double: all.iter().filter(|change| change.double).count(),
-        duration_s: BoxNumbers::of(complete.iter().map(|change| change.duration_s).collect()),
-        speed_mps: BoxNumbers::of(complete.iter().map(|change| change.speed_mps).collect()),
+        duration_s: BoxPlot::of(complete.iter().map(|change| change.duration_s).collect()),
+        speed_mps: BoxPlot::of(complete.iter().map(|change| change.speed_mps).collect()),
     })
 }
 
@@ -179,16 +179,16 @@ mod tests {
     use super::*;
     use crate::criticality::criticality;
     use crate::filters::smooth;
-    use crate::recordings::test_support::{changing_track, recording_of};
+    use crate::trajectory_data::test_support::{changing_track, trajectory_data_of};
 
     #[test]
     fn box_plots_match_numpy() {
-        let found = BoxNumbers::of(vec![7.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 30.0]).unwrap();
+        let found = BoxPlot::of(vec![7.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 30.0]).unwrap();
         // NumPy: percentile([1, 2, 3, 4, 5, 6, 7, 30], [25, 50, 75]) = 2.75, 4.5, 6.25.
         assert_eq!((found.n, found.mean, found.five), (8, 7.25, [1.0, 2.75, 4.5, 6.25, 7.0]));
         assert_eq!(found.outliers, [30.0]);
-        assert_eq!(BoxNumbers::of(vec![2.0]).unwrap().five, [2.0; 5]);
-        assert_eq!(BoxNumbers::of(vec![f64::NAN]), None);
+        assert_eq!(BoxPlot::of(vec![2.0]).unwrap().five, [2.0; 5]);
+        assert_eq!(BoxPlot::of(vec![f64::NAN]), None);
     }
 
     #[test]
@@ -208,7 +208,7 @@ mod tests {
             let duration_s = 3.0 + 0.5 * k as f64;
             changing_track(k + 1, (0.0, 40.0 - 2.0 * k as f64), (-5.25, -1.75), (3.0, duration_s), 160)
         };
-        let changes = criticality(&smooth(&recording_of((0..8).map(track).collect())), None);
+        let changes = criticality(&smooth(&trajectory_data_of((0..8).map(track).collect())), None);
         let found = statistics(&changes);
         let [cars] = &found.classes[..] else { panic!("one class") };
         assert_eq!((cars.lane_changes, cars.to_the_left, cars.complete, cars.double), (8, 8, 8, 0));

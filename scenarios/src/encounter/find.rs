@@ -5,41 +5,42 @@ use closecall_traffic::{Absent, Lane, Measured, Time, Trajectory, TrajectoryPoin
 
 use super::frame::{Frame, RoadSection};
 use super::{
-    EGO, LEAD_IN, LEAD_OUT, LONGEST_THW_S, NoEncounter, Participant, REACH_M, RecordedEncounter, SHORTEST_APPROACH,
+    EGO_INDEX, LEAD_IN, LEAD_OUT, LONGEST_THW_S, NoEncounter, Participant, REACH_M, RecordedEncounter,
+    SHORTEST_APPROACH,
 };
-use crate::filters::{PERIOD, SmoothedRecording};
+use crate::filters::{PERIOD, SmoothedTrajectoryData};
 use crate::lane_change::LaneChange;
 
 /// Extracts the encounter around the lane change `change`, with a trajectory point at every `period`.
 ///
-/// `all` holds all lane changes of `recording`. The period of the common clock must be a multiple of `period`.
+/// `all` holds all lane changes of `data`. The period of the common clock must be a multiple of `period`.
 ///
 /// # Errors
 /// Returns [`NoEncounter`] if there is no ego or lead vehicle, if the three vehicles are not recorded together for long
 /// enough, if the rear vehicle is not close behind the ego vehicle at the crossing, or if they do not share a valid
 /// road.
 pub fn encounter(
-    recording: &SmoothedRecording,
+    data: &SmoothedTrajectoryData,
     change: &LaneChange,
     all: &[LaneChange],
     period: Time,
 ) -> Result<RecordedEncounter, NoEncounter> {
-    let roles = Roles::of(recording, change)?;
-    let start = roles.start(recording, change)?;
-    let road = RoadSection::of(recording, roles.rear, change)?;
+    let roles = Roles::of(data, change)?;
+    let start = roles.start(data, change)?;
+    let road = RoadSection::of(data, roles.rear, change)?;
     let last = roles.ego.span().map_or(start, |(_, last)| last);
     let end = last.min(on_clock(Time::from_s(change.end_s) + LEAD_OUT));
     let origin_m = roles.ego.at(start).map_or(0.0, |point| point.s_m);
     let frame = Frame { start, end, origin_m, road };
     let (track_id, ego_id) = (roles.rear.track_id, roles.ego.track_id);
-    let vehicles = participants(recording, &roles, &frame, all, period);
+    let vehicles = participants(data, &roles, &frame, all, period);
     let vehicles = vehicles.ok_or(NoEncounter::LeavesTheRoad { track_id })?;
     let thw_s = roles.headway_s(Time::from_s(change.crossing_s));
     let is_behind = |thw_s: &f64| *thw_s > 0.0 && *thw_s <= LONGEST_THW_S;
     let not_behind = NoEncounter::NotBehind { track_id, ego_id, thw_s, longest_s: LONGEST_THW_S };
     let crossing_thw_s = thw_s.ok().filter(is_behind).ok_or(not_behind)?;
     Ok(RecordedEncounter {
-        recording: recording.name.clone(),
+        data_name: data.name.clone(),
         change: change.clone(),
         start,
         crossing: Time::from_s(change.crossing_s) - start,
@@ -69,10 +70,10 @@ struct Roles<'a> {
 
 impl<'a> Roles<'a> {
     /// Assigns the roles at the start of the lane change `change`.
-    fn of(recording: &'a SmoothedRecording, change: &LaneChange) -> Result<Self, NoEncounter> {
+    fn of(data: &'a SmoothedTrajectoryData, change: &LaneChange) -> Result<Self, NoEncounter> {
         let track_id = change.track_id;
-        let index = recording.place_of(track_id).ok_or(NoEncounter::NoTrack { track_id })?;
-        let track = &recording.tracks[index];
+        let index = data.track_index(track_id).ok_or(NoEncounter::NoTrack { track_id })?;
+        let track = &data.tracks[index];
         let rear = &track.trajectory;
         let crossing = Time::from_s(change.crossing_s);
         let stays = track.stays.iter().filter(|stay| stay.lane.0 == change.from_lane && stay.first < crossing);
@@ -83,16 +84,16 @@ impl<'a> Roles<'a> {
         let change_start = on_clock(begins.unwrap_or(crossing) + PERIOD - Time::from_ns(1));
         let no_ego = NoEncounter::NoEgo { track_id, lane: change.from_lane };
         let lane = Lane(change.from_lane);
-        let ego = next_ahead(recording, rear, lane, change_start).ok_or(no_ego)?;
+        let ego = next_ahead(data, rear, lane, change_start).ok_or(no_ego)?;
         let no_lead = NoEncounter::NoLead { track_id, ego_id: ego.track_id };
-        let lead = next_ahead(recording, ego, lane, change_start).ok_or(no_lead)?;
+        let lead = next_ahead(data, ego, lane, change_start).ok_or(no_lead)?;
         Ok(Self { ego, lead, rear, change_start })
     }
 
     /// Returns the earliest instant from which the three vehicles keep their order in the lane without interruption.
-    fn start(&self, recording: &SmoothedRecording, change: &LaneChange) -> Result<Time, NoEncounter> {
+    fn start(&self, data: &SmoothedTrajectoryData, change: &LaneChange) -> Result<Time, NoEncounter> {
         let lane = Lane(change.from_lane);
-        let next_id = |own: &Trajectory, time: Time| next_ahead(recording, own, lane, time).map(|track| track.track_id);
+        let next_id = |own: &Trajectory, time: Time| next_ahead(data, own, lane, time).map(|track| track.track_id);
         let in_order = |time: Time| {
             next_id(self.rear, time) == Some(self.ego.track_id) && next_id(self.ego, time) == Some(self.lead.track_id)
         };
@@ -126,13 +127,13 @@ impl<'a> Roles<'a> {
 
 /// Returns the nearest vehicle ahead of `own` in `lane`, or `None` if there is none or `own` is not in that lane.
 fn next_ahead<'a>(
-    recording: &'a SmoothedRecording,
+    data: &'a SmoothedTrajectoryData,
     own: &Trajectory,
     lane: Lane,
     time: Time,
 ) -> Option<&'a Trajectory> {
     let here: &TrajectoryPoint = own.at(time).filter(|point| point.lane == lane)?;
-    let others = recording.present_at(time).iter().map(|&presence| recording.look_up(presence));
+    let others = data.present_at(time).iter().map(|&presence| data.look_up(presence));
     let ahead =
         others.filter(|(track, point)| track.track_id != own.track_id && point.lane == lane && point.s_m > here.s_m);
     ahead.min_by(|a, b| a.1.s_m.total_cmp(&b.1.s_m)).map(|(track, _)| track)
@@ -142,7 +143,7 @@ fn next_ahead<'a>(
 ///
 /// Returns `None` if one of the three leaves the road.
 fn participants(
-    recording: &SmoothedRecording,
+    data: &SmoothedTrajectoryData,
     roles: &Roles<'_>,
     frame: &Frame,
     all: &[LaneChange],
@@ -156,15 +157,15 @@ fn participants(
         let trajectory = frame.view(track, period)?;
         Some(Participant { trajectory, changes: all.iter().filter(within).cloned().collect() })
     };
-    let protagonists = [roles.ego, roles.lead, roles.rear];
-    let mut vehicles: Vec<Participant> = protagonists.into_iter().map(participant).collect::<Option<_>>()?;
-    let ego = vehicles[EGO].trajectory.clone();
+    let ego_lead_rear = [roles.ego, roles.lead, roles.rear];
+    let mut vehicles: Vec<Participant> = ego_lead_rear.into_iter().map(participant).collect::<Option<_>>()?;
+    let ego = vehicles[EGO_INDEX].trajectory.clone();
     let is_near = |other: &Participant| {
         let distance_m = |point: &TrajectoryPoint| Some((point.s_m - ego.at(point.time)?.s_m).abs());
         other.trajectory.points.iter().filter_map(distance_m).any(|distance_m| distance_m < REACH_M)
     };
-    let is_other = |track: &&Trajectory| protagonists.iter().all(|role| role.track_id != track.track_id);
-    let others = recording.trajectories().filter(is_other).filter_map(participant);
+    let is_other = |track: &&Trajectory| ego_lead_rear.iter().all(|role| role.track_id != track.track_id);
+    let others = data.trajectories().filter(is_other).filter_map(participant);
     vehicles.extend(others.filter(is_near));
     Some(vehicles)
 }

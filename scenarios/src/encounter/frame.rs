@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use closecall_traffic::{Lane, Time, Trajectory, TrajectoryPoint};
 
 use super::NoEncounter;
-use crate::filters::{SmoothedRecording, resample};
+use crate::filters::{SmoothedTrajectoryData, resample};
 use crate::lane_change::LaneChange;
 
 /// Smallest and largest lane width of a road (m).
@@ -41,13 +41,13 @@ pub(super) struct RoadSection {
 impl RoadSection {
     /// Finds the road on which the vehicle `own` makes the lane change `change`.
     pub(super) fn of(
-        recording: &SmoothedRecording,
+        data: &SmoothedTrajectoryData,
         own: &Trajectory,
         change: &LaneChange,
     ) -> Result<Self, NoEncounter> {
         let mut known: BTreeSet<u8> =
-            recording.trajectories().flat_map(|track| &track.points).map(|point| point.lane.0).collect();
-        known.extend((1..=u8::MAX).filter(|&lane| recording.markings.right_edge_m(Lane(lane)).is_some()));
+            data.trajectories().flat_map(|track| &track.points).map(|point| point.lane.0).collect();
+        known.extend((1..=u8::MAX).filter(|&lane| data.markings.right_edge_m(Lane(lane)).is_some()));
         known.extend([change.from_lane, change.to_lane]);
         let left = change.from_lane.min(change.to_lane);
         let first = (1..=left).rev().take_while(|lane| known.contains(lane)).last().unwrap_or(left);
@@ -56,8 +56,8 @@ impl RoadSection {
         if lanes > MAX_LANES {
             return Err(NoEncounter::TooManyLanes { track_id: change.track_id, lanes, most: MAX_LANES });
         }
-        let lane_width_m = recording.markings.typical_lane_width_m().clamp(LANE_WIDTHS_M[0], LANE_WIDTHS_M[1]);
-        let crossed_m = recording.markings.right_edge_m(Lane(left));
+        let lane_width_m = data.markings.typical_lane_width_m().clamp(LANE_WIDTHS_M[0], LANE_WIDTHS_M[1]);
+        let crossed_m = data.markings.right_edge_m(Lane(left));
         let crossed_m = crossed_m.or_else(|| own.at(Time::from_s(change.crossing_s)).map(|point| point.d_m));
         let left_edge_m = crossed_m.unwrap_or(0.0) + f64::from(left - first + 1) * lane_width_m;
         Ok(Self { first, lanes, lane_width_m, left_edge_m })

@@ -45,11 +45,11 @@ pub const REACH_M: f64 = 150.0;
 pub const LONGEST_THW_S: f64 = 5.0;
 
 /// Index of the ego vehicle in [`RecordedEncounter::vehicles`].
-pub const EGO: usize = 0;
+pub const EGO_INDEX: usize = 0;
 /// Index of the lead vehicle in [`RecordedEncounter::vehicles`].
-pub const FRONT: usize = 1;
+pub const LEAD_INDEX: usize = 1;
 /// Index of the rear vehicle in [`RecordedEncounter::vehicles`].
-pub const REAR: usize = 2;
+pub const REAR_INDEX: usize = 2;
 
 /// One vehicle of an encounter.
 #[derive(Clone, Debug)]
@@ -64,7 +64,7 @@ pub struct Participant {
 #[derive(Clone, Debug)]
 pub struct RecordedEncounter {
     /// Name of the trajectory data set.
-    pub recording: String,
+    pub data_name: String,
     /// Lane change of the rear vehicle, with the time and the lane numbers of the trajectory data.
     pub change: LaneChange,
     /// Time of the trajectory data at time 0 of the encounter.
@@ -90,8 +90,8 @@ pub struct RecordedEncounter {
 
 impl RecordedEncounter {
     /// Returns the trajectories of the ego, the lead and the rear vehicle, in this order.
-    pub fn protagonists(&self) -> [&Trajectory; 3] {
-        [EGO, FRONT, REAR].map(|index| &self.vehicles[index].trajectory)
+    pub fn ego_lead_rear(&self) -> [&Trajectory; 3] {
+        [EGO_INDEX, LEAD_INDEX, REAR_INDEX].map(|index| &self.vehicles[index].trajectory)
     }
 
     /// Converts a time of the trajectory data (s) to the clock of the encounter.
@@ -104,7 +104,7 @@ impl RecordedEncounter {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NoEncounter {
     /// The trajectory data does not contain the track.
-    #[error("the recording has no track {track_id}")]
+    #[error("the trajectory file has no track {track_id}")]
     NoTrack {
         /// Track id of the rear vehicle.
         track_id: u64,

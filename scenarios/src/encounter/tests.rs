@@ -3,7 +3,7 @@ use closecall_traffic::{CONTROL_STEP, Lane, Time, Trajectory};
 use super::*;
 use crate::filters::smooth;
 use crate::lane_change::detect;
-use crate::recordings::test_support::{changing_track, recording_of, straight_track};
+use crate::trajectory_data::test_support::{changing_track, straight_track, trajectory_data_of};
 
 /// Rear vehicle that changes from lane 2 to lane 1 between 10 and 15 s, 150 m behind the ego vehicle and 10 m/s faster
 /// than the ego and the lead vehicle.
@@ -12,10 +12,10 @@ fn rear() -> Trajectory {
 }
 
 fn found(others: Vec<Trajectory>) -> Result<RecordedEncounter, NoEncounter> {
-    let recording = smooth(&recording_of(std::iter::once(rear()).chain(others).collect()));
-    let changes = detect(&recording);
+    let data = smooth(&trajectory_data_of(std::iter::once(rear()).chain(others).collect()));
+    let changes = detect(&data);
     let change = changes.iter().find(|change| change.track_id == 3).unwrap();
-    encounter(&recording, change, &changes, CONTROL_STEP)
+    encounter(&data, change, &changes, CONTROL_STEP)
 }
 
 /// Ego and lead vehicle, 30 m apart.
@@ -26,9 +26,9 @@ fn ego_and_lead() -> Vec<Trajectory> {
 #[test]
 fn roles_clock_and_road_are_assigned() {
     let found = found(ego_and_lead()).unwrap();
-    assert_eq!(found.protagonists().map(|track| track.track_id), [1, 2, 3]);
+    assert_eq!(found.ego_lead_rear().map(|track| track.track_id), [1, 2, 3]);
     assert_eq!((found.start, found.lanes, found.home, found.target), (Time::ZERO, 2, Lane(2), Lane(1)));
-    let [ego, _, rear] = found.protagonists();
+    let [ego, _, rear] = found.ego_lead_rear();
     assert!(ego.points[0].s_m.abs() < 1e-6 && (rear.points[0].s_m + 150.0).abs() < 1e-6);
     assert!(ego.points.windows(2).all(|pair| pair[1].time - pair[0].time == CONTROL_STEP));
     // The gap at the crossing is the initial 150 m less 10 m/s times the elapsed time and a vehicle's length.
@@ -46,7 +46,7 @@ fn the_encounter_starts_once_the_ego_follows_the_lead() {
     between.points.retain(|point| point.time < Time::from_s(5.0));
     let found = found(ego_and_lead().into_iter().chain([between]).collect()).unwrap();
     assert!((found.start.s() - 5.0).abs() < 0.5, "{}", found.start);
-    assert_eq!(found.protagonists().map(|track| track.track_id), [1, 2, 3]);
+    assert_eq!(found.ego_lead_rear().map(|track| track.track_id), [1, 2, 3]);
 }
 
 #[test]

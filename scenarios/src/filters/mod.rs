@@ -38,5 +38,5 @@ mod stays;
 
 pub use butterworth::LowPass;
 pub(crate) use resample::resample;
-pub use smooth::{CORNER_HZ, PERIOD, Presence, SmoothedRecording, SmoothedTrack, smooth, smooth_track};
+pub use smooth::{CORNER_HZ, PERIOD, Presence, SmoothedTrack, SmoothedTrajectoryData, smooth, smooth_track};
 pub use stays::{Stay, stays_of};

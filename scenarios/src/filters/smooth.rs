@@ -5,7 +5,7 @@ use closecall_traffic::{Time, Trajectory, TrajectoryPoint};
 use super::butterworth::LowPass;
 use super::resample::resample;
 use super::stays::{Stay, period_of, stays_of};
-use crate::recordings::{LaneMarkings, Recording};
+use crate::trajectory_data::{LaneMarkings, TrajectoryData};
 
 /// Period of the common clock, which runs at 5 Hz.
 pub const PERIOD: Time = Time::from_ms(200);
@@ -27,7 +27,7 @@ pub struct SmoothedTrack {
 
 /// Trajectory data on the common clock, with smoothed positions and their derivatives.
 #[derive(Clone, Debug)]
-pub struct SmoothedRecording {
+pub struct SmoothedTrajectoryData {
     /// Name of the trajectory data set.
     pub name: String,
     /// Lateral positions of the lane markings.
@@ -38,7 +38,7 @@ pub struct SmoothedRecording {
     present: Vec<Vec<Presence>>,
 }
 
-/// One vehicle at one instant, as indices into [`SmoothedRecording::tracks`].
+/// One vehicle at one instant, as indices into [`SmoothedTrajectoryData::tracks`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Presence {
     /// Index of the track.
@@ -48,16 +48,10 @@ pub struct Presence {
 }
 
 /// Smooths every track and resamples it to the common clock.
-pub fn smooth(recording: &Recording) -> SmoothedRecording {
-    let tracks: Vec<_> = recording.trajectories.iter().filter_map(smooth_track).collect();
+pub fn smooth(data: &TrajectoryData) -> SmoothedTrajectoryData {
+    let tracks: Vec<_> = data.trajectories.iter().filter_map(smooth_track).collect();
     let (first_tick, present) = presence_by_tick(&tracks);
-    SmoothedRecording {
-        name: recording.name.clone(),
-        markings: recording.markings.clone(),
-        tracks,
-        first_tick,
-        present,
-    }
+    SmoothedTrajectoryData { name: data.name.clone(), markings: data.markings.clone(), tracks, first_tick, present }
 }
 
 /// Smooths one track and resamples it to the common clock.
@@ -81,7 +75,7 @@ pub fn smooth_track(track: &Trajectory) -> Option<SmoothedTrack> {
     Some(SmoothedTrack { trajectory, stays: stays_of(track) })
 }
 
-impl SmoothedRecording {
+impl SmoothedTrajectoryData {
     /// Returns all vehicles present at the clock instant nearest to `time`, in order of their track ids.
     pub fn present_at(&self, time: Time) -> &[Presence] {
         let tick = tick_of(time) - self.first_tick;
@@ -100,7 +94,7 @@ impl SmoothedRecording {
     }
 
     /// Returns the index of track `track_id` in [`Self::tracks`], or `None` if there is no such track.
-    pub fn place_of(&self, track_id: u64) -> Option<usize> {
+    pub fn track_index(&self, track_id: u64) -> Option<usize> {
         self.tracks.binary_search_by_key(&track_id, |track| track.trajectory.track_id).ok()
     }
 }
@@ -179,11 +173,11 @@ fn derivative(values: &[f64], period: Time) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recordings::test_support::{recording_of, straight_track};
+    use crate::trajectory_data::test_support::{straight_track, trajectory_data_of};
 
     #[test]
     fn constant_speed_passes_unchanged() {
-        let smoothed = smooth(&recording_of(vec![straight_track(1, 0.0, 25.0, -1.75, 80)]));
+        let smoothed = smooth(&trajectory_data_of(vec![straight_track(1, 0.0, 25.0, -1.75, 80)]));
         for point in &smoothed.tracks[0].trajectory.points {
             assert!((point.speed_mps - 25.0).abs() < 1e-9 && point.acceleration_mps2.abs() < 1e-6);
             assert!(point.lateral_speed_mps.abs() < 1e-9 && (point.s_m - 25.0 * point.time.s()).abs() < 1e-6);
@@ -194,7 +188,7 @@ mod tests {
     fn a_vehicle_is_present_exactly_while_it_is_recorded() {
         let mut late = straight_track(2, 0.0, 20.0, -5.0, 3);
         late.points.iter_mut().for_each(|point| point.time += Time::from_s(1.0));
-        let smoothed = smooth(&recording_of(vec![straight_track(1, 0.0, 25.0, -1.75, 11), late]));
+        let smoothed = smooth(&trajectory_data_of(vec![straight_track(1, 0.0, 25.0, -1.75, 11), late]));
         let track_ids = |s| {
             let present = smoothed.present_at(Time::from_s(s)).iter();
             present.map(|&presence| smoothed.look_up(presence).0.track_id).collect::<Vec<_>>()

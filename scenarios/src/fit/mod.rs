@@ -42,13 +42,13 @@ pub use observe::{Quantity, Samples, observe};
 pub use toml_text::{Heading, to_toml, write_toml};
 
 use crate::filters::smooth;
-use crate::recordings::Recording;
+use crate::trajectory_data::TrajectoryData;
 
 /// The fitted distributions of all quantities, over all trajectory data sets.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FittedDistributions {
     /// Name and BLAKE3 hash of each trajectory file.
-    pub recordings: Vec<(String, String)>,
+    pub data_sets: Vec<(String, String)>,
     /// Seed of the bootstrap.
     pub seed: u64,
     /// One entry for each quantity with enough values.
@@ -57,11 +57,11 @@ pub struct FittedDistributions {
     pub too_few: Vec<(Quantity, usize)>,
 }
 
-/// Fits the distributions of all quantities to `recordings`; `seed` is the seed of the bootstrap.
-pub fn fit(recordings: &[Recording], seed: u64) -> FittedDistributions {
+/// Fits the distributions of all quantities to `data_sets`; `seed` is the seed of the bootstrap.
+pub fn fit(data_sets: &[TrajectoryData], seed: u64) -> FittedDistributions {
     let mut samples = Samples::default();
-    for recording in recordings {
-        samples.extend(observe(&smooth(recording)));
+    for data in data_sets {
+        samples.extend(observe(&smooth(data)));
     }
     let (mut fitted, mut too_few) = (Vec::new(), Vec::new());
     for quantity in Quantity::ALL {
@@ -71,6 +71,6 @@ pub fn fit(recordings: &[Recording], seed: u64) -> FittedDistributions {
             None => too_few.push((quantity, values.len())),
         }
     }
-    let recordings = recordings.iter().map(|recording| (recording.name.clone(), recording.hash.clone())).collect();
-    FittedDistributions { recordings, seed, fitted, too_few }
+    let data_sets = data_sets.iter().map(|data| (data.name.clone(), data.hash.clone())).collect();
+    FittedDistributions { data_sets, seed, fitted, too_few }
 }

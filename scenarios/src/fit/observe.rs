@@ -6,7 +6,7 @@ use closecall_statistics::quantiles::median;
 use closecall_traffic::metrics::{CRITICAL_THW_S, bumper_gap_m, time_headway_s};
 use closecall_traffic::{Lane, Side, Time, Trajectory, TrajectoryPoint};
 
-use crate::filters::{PERIOD, SmoothedRecording};
+use crate::filters::{PERIOD, SmoothedTrajectoryData};
 use crate::lane_change::{LaneChange, detect};
 
 /// Largest headway at which a vehicle counts as following (s); see the module documentation.
@@ -121,16 +121,16 @@ impl Samples {
 }
 
 /// Extracts the values of all quantities from one trajectory data set.
-pub fn observe(recording: &SmoothedRecording) -> Samples {
+pub fn observe(data: &SmoothedTrajectoryData) -> Samples {
     let mut samples = Samples::default();
-    for change in detect(recording) {
-        observe_lane_change(recording, &change, &mut samples);
+    for change in detect(data) {
+        observe_lane_change(data, &change, &mut samples);
     }
-    observe_following(recording, &mut samples);
+    observe_following(data, &mut samples);
     samples
 }
 
-fn observe_lane_change(recording: &SmoothedRecording, change: &LaneChange, samples: &mut Samples) {
+fn observe_lane_change(data: &SmoothedTrajectoryData, change: &LaneChange, samples: &mut Samples) {
     samples.push(Quantity::CrossingSpeed, change.speed_mps);
     if change.complete {
         samples.push(Quantity::LaneChangeDuration, change.duration_s);
@@ -140,15 +140,15 @@ fn observe_lane_change(recording: &SmoothedRecording, change: &LaneChange, sampl
         return;
     }
     let crossing = Time::from_s(change.crossing_s);
-    let Some(lead) = lead_in(recording, change.track_id, Lane(change.from_lane), crossing) else { return };
+    let Some(lead) = lead_in(data, change.track_id, Lane(change.from_lane), crossing) else { return };
     let Ok(thw_s) = time_headway_s(lead.gap_m, lead.own.speed_mps) else { return };
     if thw_s > FOLLOWING_THW_S {
         return;
     }
     samples.push_headway(Quantity::CutOutThw, Quantity::CriticalCutOutThw, 0.0, thw_s);
     // The closing speed to the same lead vehicle at the start of the manoeuvre, or when both are first recorded.
-    let own = &recording.tracks[lead.own_index].trajectory;
-    let other = &recording.tracks[lead.lead_index].trajectory;
+    let own = &data.tracks[lead.own_index].trajectory;
+    let other = &data.tracks[lead.lead_index].trajectory;
     let Some((earliest, _)) = own.span().zip(other.span()).map(|(a, b)| (a.0.max(b.0), ())) else { return };
     let start = Time::from_s(change.start_s).max(earliest).min(crossing);
     if let Some((own, other)) = own.at(start).zip(other.at(start)) {
@@ -169,12 +169,12 @@ struct LeadPair<'a> {
 }
 
 /// Returns track `track_id` and the nearest vehicle in `lane` that is entirely ahead of it at `time`.
-fn lead_in(recording: &SmoothedRecording, track_id: u64, lane: Lane, time: Time) -> Option<LeadPair<'_>> {
-    let present = recording.present_at(time);
-    let own = present.iter().find(|presence| recording.look_up(**presence).0.track_id == track_id)?;
-    let (own_track, own_point) = recording.look_up(*own);
+fn lead_in(data: &SmoothedTrajectoryData, track_id: u64, lane: Lane, time: Time) -> Option<LeadPair<'_>> {
+    let present = data.present_at(time);
+    let own = present.iter().find(|presence| data.look_up(**presence).0.track_id == track_id)?;
+    let (own_track, own_point) = data.look_up(*own);
     let ahead = present.iter().filter(|presence| presence.track_index != own.track_index).filter_map(|presence| {
-        let (track, point) = recording.look_up(*presence);
+        let (track, point) = data.look_up(*presence);
         let gap_m = gap_m((own_track, own_point), (track, point));
         (point.lane == lane && gap_m >= 0.0).then_some((gap_m, presence.track_index))
     });
@@ -188,12 +188,12 @@ fn gap_m(rear: (&Trajectory, &TrajectoryPoint), front: (&Trajectory, &Trajectory
 }
 
 /// Adds the median headway and speed of each pair of vehicles that follow each other for long enough.
-fn observe_following(recording: &SmoothedRecording, samples: &mut Samples) {
+fn observe_following(data: &SmoothedTrajectoryData, samples: &mut Samples) {
     let mut pairs: BTreeMap<(usize, usize), Vec<(f64, f64)>> = BTreeMap::new();
-    let spans = recording.tracks.iter().filter_map(|track| track.trajectory.span());
+    let spans = data.tracks.iter().filter_map(|track| track.trajectory.span());
     let Some((mut time, last)) = spans.reduce(|(a, b), (c, d)| (a.min(c), b.max(d))) else { return };
     while time <= last {
-        for following in following_at(recording, time) {
+        for following in following_at(data, time) {
             let instants = pairs.entry((following.own_index, following.lead_index)).or_default();
             instants.push((following.thw_s, following.speed_mps));
         }
@@ -220,14 +220,14 @@ struct Following {
 }
 
 /// Returns all pairs of neighbours in one lane of which one follows the other at `time`.
-fn following_at(recording: &SmoothedRecording, time: Time) -> Vec<Following> {
-    let mut present: Vec<_> = recording.present_at(time).to_vec();
+fn following_at(data: &SmoothedTrajectoryData, time: Time) -> Vec<Following> {
+    let mut present: Vec<_> = data.present_at(time).to_vec();
     present.sort_by(|a, b| {
-        let (a, b) = (recording.look_up(*a).1, recording.look_up(*b).1);
+        let (a, b) = (data.look_up(*a).1, data.look_up(*b).1);
         a.lane.cmp(&b.lane).then(a.s_m.total_cmp(&b.s_m))
     });
     let follows = present.windows(2).filter_map(|pair| {
-        let (rear, front) = (recording.look_up(pair[0]), recording.look_up(pair[1]));
+        let (rear, front) = (data.look_up(pair[0]), data.look_up(pair[1]));
         let gap_m = gap_m(rear, front);
         let thw_s = time_headway_s(gap_m, rear.1.speed_mps).ok()?;
         let counts = rear.1.lane == front.1.lane && gap_m >= 0.0 && thw_s <= FOLLOWING_THW_S;
@@ -241,13 +241,13 @@ fn following_at(recording: &SmoothedRecording, time: Time) -> Vec<Following> {
 mod tests {
     use super::*;
     use crate::filters::smooth;
-    use crate::recordings::test_support::{changing_track, recording_of, straight_track};
+    use crate::trajectory_data::test_support::{changing_track, straight_track, trajectory_data_of};
 
     /// A vehicle at 30 m/s changes lanes to the left behind a lead vehicle at 26 m/s.
     fn overtaking() -> Samples {
         let own = changing_track(1, (0.0, 30.0), (-5.25, -1.75), (3.0, 5.0), 110);
         let lead = straight_track(2, 40.0, 26.0, -5.25, 110);
-        observe(&smooth(&recording_of(vec![own, lead])))
+        observe(&smooth(&trajectory_data_of(vec![own, lead])))
     }
 
     #[test]
@@ -265,7 +265,7 @@ mod tests {
     fn each_pair_that_follows_long_enough_gives_one_value() {
         let pair = |frames| {
             let lead = straight_track(2, 44.5, 20.0, -1.75, frames);
-            observe(&smooth(&recording_of(vec![straight_track(1, 0.0, 20.0, -1.75, frames), lead])))
+            observe(&smooth(&trajectory_data_of(vec![straight_track(1, 0.0, 20.0, -1.75, frames), lead])))
         };
         assert_eq!(pair(18).values(Quantity::FrontThw), [0.0; 0]);
         let samples = pair(20);
@@ -276,6 +276,6 @@ mod tests {
     #[test]
     fn a_vehicle_with_a_long_headway_does_not_follow() {
         let tracks = vec![straight_track(1, 0.0, 20.0, -1.75, 50), straight_track(2, 70.0, 20.0, -1.75, 50)];
-        assert!(observe(&smooth(&recording_of(tracks))).values(Quantity::FrontThw).is_empty());
+        assert!(observe(&smooth(&trajectory_data_of(tracks))).values(Quantity::FrontThw).is_empty());
     }
 }

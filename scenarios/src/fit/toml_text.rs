@@ -23,7 +23,7 @@ pub struct Heading {
 pub fn to_toml(result: &FittedDistributions, heading: &Heading) -> String {
     let mut text = String::new();
     push_heading(&mut text, result, heading);
-    let source = result.recordings.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ");
+    let source = result.data_sets.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ");
     text.push_str("\n[parameters]\n");
     for fitted in &result.fitted {
         push_line(&mut text, &format!("# {}", fitted.quantity.meaning()));
@@ -69,8 +69,8 @@ fn push_heading(text: &mut String, result: &FittedDistributions, heading: &Headi
         }
     }
     push_line(text, &format!("# seed of the bootstrap: {}", result.seed));
-    push_line(text, "# recordings, with the BLAKE3 hash of each file:");
-    for (name, hash) in &result.recordings {
+    push_line(text, "# trajectory files, with the BLAKE3 hash of each file:");
+    for (name, hash) in &result.data_sets {
         push_line(text, &format!("#   {} {hash}", one_line(name)));
     }
 }
@@ -123,7 +123,7 @@ mod tests {
         let fitted =
             [Quantity::CutOutThw, Quantity::CrossingSpeed].map(|q| FittedQuantity::new(q, &values, 3).unwrap());
         FittedDistributions {
-            recordings: vec![("a \"quoted\"\nname".to_owned(), "ab12".to_owned())],
+            data_sets: vec![("a \"quoted\"\nname".to_owned(), "ab12".to_owned())],
             seed: 3,
             fitted: fitted.to_vec(),
             too_few: vec![(Quantity::Closing, 2)],

@@ -10,8 +10,8 @@ use super::double::mark_doubles;
 use super::geometry::LaneGrid;
 use super::gradient;
 use super::manoeuvre::{MIN_SHIFT_M, Manoeuvre, Sampled, height_share, manoeuvres, quintic_width_share};
-use crate::filters::{PERIOD, SmoothedRecording, SmoothedTrack, smooth_track, stays_of};
-use crate::recordings::{LaneMarkings, MarkingDistances};
+use crate::filters::{PERIOD, SmoothedTrack, SmoothedTrajectoryData, smooth_track, stays_of};
+use crate::trajectory_data::{LaneMarkings, MarkingDistances};
 
 /// Largest distance from a crossing to the manoeuvre that it belongs to, if it lies outside (samples): 1 s. Vehicles
 /// pause on a marking, and the start and end of a manoeuvre are estimates.
@@ -45,17 +45,17 @@ impl Criterion {
 
 /// Whether the recorded lane of a vehicle is reliable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Lanes {
+pub enum LaneReliability {
     /// Reliable: the peak criterion requires a change of the recorded lane.
-    Recorded,
+    Reliable,
     /// Unreliable: the peak criterion requires a lateral shift by most of a lane and ignores the recorded lane.
-    Doubtful,
+    Unreliable,
 }
 
 /// Detects the lane changes of one track at a time.
 #[derive(Clone, Debug)]
-pub struct Detector {
-    lanes: Lanes,
+pub struct LaneChangeDetector {
+    lanes: LaneReliability,
     grid: LaneGrid,
     lane_width_m: f64,
 }
@@ -70,14 +70,14 @@ struct TrackData<'a> {
 }
 
 /// Detects the lane changes of all tracks by the peak criterion, in order of track id and time.
-pub fn detect(recording: &SmoothedRecording) -> Vec<LaneChange> {
-    let detector = Detector::new(Lanes::Recorded, &recording.markings);
-    recording.tracks.iter().flat_map(|track| detector.by_recorded_lane(track)).collect()
+pub fn detect(data: &SmoothedTrajectoryData) -> Vec<LaneChange> {
+    let detector = LaneChangeDetector::new(LaneReliability::Reliable, &data.markings);
+    data.tracks.iter().flat_map(|track| detector.by_recorded_lane(track)).collect()
 }
 
-impl Detector {
+impl LaneChangeDetector {
     /// Creates a detector for tracks on the road with these `markings`.
-    pub fn new(lanes: Lanes, markings: &LaneMarkings) -> Self {
+    pub fn new(lanes: LaneReliability, markings: &LaneMarkings) -> Self {
         Self { lanes, grid: LaneGrid::new(markings), lane_width_m: markings.typical_lane_width_m() }
     }
 
@@ -92,7 +92,7 @@ impl Detector {
         recorded: &Trajectory,
         distances: &[MarkingDistances],
     ) -> Vec<LaneChange> {
-        let by_lane = (criterion, self.lanes) == (Criterion::Peak, Lanes::Recorded);
+        let by_lane = (criterion, self.lanes) == (Criterion::Peak, LaneReliability::Reliable);
         if by_lane && crossings(&stays_of(recorded)).is_empty() {
             return Vec::new();
         }
@@ -123,8 +123,8 @@ impl Detector {
         let track = &smoothed.trajectory;
         let width_m = || gradient::lane_width_m(recorded, distances).unwrap_or(self.lane_width_m);
         let mut found = match (criterion, self.lanes) {
-            (Criterion::Peak, Lanes::Recorded) => by_crossings(track, &crossings(&smoothed.stays), width_m()),
-            (Criterion::Peak, Lanes::Doubtful) => by_shift(track, width_m()),
+            (Criterion::Peak, LaneReliability::Reliable) => by_crossings(track, &crossings(&smoothed.stays), width_m()),
+            (Criterion::Peak, LaneReliability::Unreliable) => by_shift(track, width_m()),
             (Criterion::Distance, _) if distances.is_empty() => {
                 by_distance(track, |k| self.grid.at(track.points[k].d_m))
             }
@@ -231,10 +231,10 @@ mod tests {
 
     use super::*;
     use crate::filters::smooth;
-    use crate::recordings::test_support::{changing_track, recording_of, straight_track};
+    use crate::trajectory_data::test_support::{changing_track, straight_track, trajectory_data_of};
 
     fn found(track: Trajectory) -> Vec<LaneChange> {
-        detect(&smooth(&recording_of(vec![track])))
+        detect(&smooth(&trajectory_data_of(vec![track])))
     }
 
     #[test]
@@ -323,8 +323,9 @@ mod tests {
     fn by_distance_with_offset(offset_m: f64) -> Vec<LaneChange> {
         let mut track = changing_track(1, (0.0, 30.0), (-5.25, -1.75), (4.0, 6.0), 150);
         track.points.iter_mut().for_each(|point| point.d_m += offset_m);
-        let markings = recording_of(vec![changing_track(2, (0.0, 30.0), (-5.25, -1.75), (4.0, 6.0), 150)]).markings;
-        Detector::new(Lanes::Doubtful, &markings).detect(Criterion::Distance, &track, &[])
+        let markings =
+            trajectory_data_of(vec![changing_track(2, (0.0, 30.0), (-5.25, -1.75), (4.0, 6.0), 150)]).markings;
+        LaneChangeDetector::new(LaneReliability::Unreliable, &markings).detect(Criterion::Distance, &track, &[])
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use closecall_traffic::Lane;
 
-use crate::recordings::LaneMarkings;
+use crate::trajectory_data::LaneMarkings;
 
 /// Number of lanes in a grid: more than any carriageway has.
 const LANES: u8 = 16;
@@ -54,7 +54,7 @@ impl LaneGrid {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recordings::DEFAULT_LANE_WIDTH_M;
+    use crate::trajectory_data::DEFAULT_LANE_WIDTH_M;
 
     #[test]
     fn unknown_markings_are_filled_in() {

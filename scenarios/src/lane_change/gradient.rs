@@ -4,7 +4,7 @@ use closecall_traffic::{Lane, Side, Time, Trajectory};
 
 use super::crossings::Crossing;
 use super::geometry::LaneGeometry;
-use crate::recordings::MarkingDistances;
+use crate::trajectory_data::MarkingDistances;
 
 /// Least change of a distance between two frames that counts as a jump, as a share of the lane width (-).
 const JUMP_SHARE: f64 = 0.5;

@@ -85,10 +85,10 @@ mod score;
 use closecall_traffic::{Side, VehicleClass};
 use serde::Serialize;
 
-pub use detect::{Criterion, Detector, Lanes, detect};
+pub use detect::{Criterion, LaneChangeDetector, LaneReliability, detect};
 pub use manoeuvre::{MIN_PROMINENCE_MPS, MIN_SHIFT_M, quintic_width_share};
 pub use peaks::{Peak, Width, find_peaks, peak_width};
-pub use score::{ReferenceChange, ReferenceError, Score, Share, Spans, read_references, score};
+pub use score::{HitRate, ReferenceChange, ReferenceError, Score, TrackSpans, read_references, score};
 
 /// A detected lane change.
 #[derive(Clone, Debug, PartialEq, Serialize)]

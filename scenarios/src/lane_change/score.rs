@@ -83,14 +83,14 @@ pub fn read_references(path: &Path) -> Result<Vec<ReferenceChange>, ReferenceErr
 
 /// A share, as a number of hits among trials.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Share {
+pub struct HitRate {
     /// Number of hits.
     pub hits: u64,
     /// Number of trials.
     pub of: u64,
 }
 
-impl fmt::Display for Share {
+impl fmt::Display for HitRate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [low, high] = clopper_pearson(self.hits, self.of, COVERAGE);
         let percent = 100.0 * self.hits as f64 / self.of as f64;
@@ -105,10 +105,10 @@ impl fmt::Display for Share {
 /// The score of a detector.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Score {
-    /// Share of the listed lane changes that must be detected and are.
-    pub recall: Share,
-    /// Share of the detected lane changes that are listed.
-    pub precision: Share,
+    /// HitRate of the listed lane changes that must be detected and are.
+    pub recall: HitRate,
+    /// HitRate of the detected lane changes that are listed.
+    pub precision: HitRate,
     /// Largest difference of the crossing times of a match (s).
     pub max_time_error_s: f64,
 }
@@ -125,10 +125,10 @@ impl Score {
 }
 
 /// First and last instant of each track, by track id.
-pub type Spans = BTreeMap<u64, (Time, Time)>;
+pub type TrackSpans = BTreeMap<u64, (Time, Time)>;
 
 /// Scores the lane changes `found` against those `listed` for the same trajectory data, whose tracks cover `spans`.
-pub fn score(found: &[LaneChange], listed: &[&ReferenceChange], spans: &Spans) -> Score {
+pub fn score(found: &[LaneChange], listed: &[&ReferenceChange], spans: &TrackSpans) -> Score {
     let required: Vec<_> = listed.iter().filter(|listed| must_be_detected(listed, spans)).collect();
     let recalled = required.iter().filter(|listed| found.iter().any(|change| error_s(change, listed).is_some()));
     let errors = found
@@ -136,8 +136,8 @@ pub fn score(found: &[LaneChange], listed: &[&ReferenceChange], spans: &Spans) -
         .filter_map(|change| listed.iter().filter_map(|listed| error_s(change, listed)).min_by(f64::total_cmp));
     let errors: Vec<f64> = errors.collect();
     Score {
-        recall: Share { hits: recalled.count() as u64, of: required.len() as u64 },
-        precision: Share { hits: errors.len() as u64, of: found.len() as u64 },
+        recall: HitRate { hits: recalled.count() as u64, of: required.len() as u64 },
+        precision: HitRate { hits: errors.len() as u64, of: found.len() as u64 },
         max_time_error_s: errors.into_iter().fold(0.0, f64::max),
     }
 }
@@ -150,7 +150,7 @@ fn error_s(found: &LaneChange, listed: &ReferenceChange) -> Option<f64> {
 }
 
 /// Returns true if a listed lane change counts for recall.
-fn must_be_detected(listed: &ReferenceChange, spans: &Spans) -> bool {
+fn must_be_detected(listed: &ReferenceChange, spans: &TrackSpans) -> bool {
     let Some((first, last)) = spans.get(&listed.track_id) else { return false };
     listed.clear == 1
         && listed.time_s - first.s() >= ON_EACH_SIDE_S - ROUNDING_S
@@ -162,7 +162,7 @@ mod tests {
     use super::*;
     use crate::filters::smooth;
     use crate::lane_change::detect;
-    use crate::recordings::test_support::{changing_track, recording_of};
+    use crate::trajectory_data::test_support::{changing_track, trajectory_data_of};
 
     fn listed(track_id: u64, time_s: f64, direction: Side) -> ReferenceChange {
         ReferenceChange { recording_id: "made-up".to_owned(), track_id, time_s, direction, clear: 1 }
@@ -171,17 +171,17 @@ mod tests {
     #[test]
     fn a_mismatch_lowers_both_recall_and_precision() {
         let track = |id| changing_track(id, (0.0, 30.0), (-5.25, -1.75), (4.0, 6.0), 150);
-        let recording = recording_of(vec![track(1), track(2), track(3)]);
-        let found = detect(&smooth(&recording));
+        let data = trajectory_data_of(vec![track(1), track(2), track(3)]);
+        let found = detect(&smooth(&data));
         let list = [
             listed(1, 7.4, Side::Left),
             listed(2, 7.0, Side::Right),
             listed(3, 7.8, Side::Left),
             listed(3, 1.0, Side::Left),
         ];
-        let spans = recording.trajectories.iter().filter_map(|track| Some((track.track_id, track.span()?))).collect();
+        let spans = data.trajectories.iter().filter_map(|track| Some((track.track_id, track.span()?))).collect();
         let scored = score(&found, &list.iter().collect::<Vec<_>>(), &spans);
-        assert_eq!((scored.recall, scored.precision), (Share { hits: 1, of: 3 }, Share { hits: 1, of: 3 }));
+        assert_eq!((scored.recall, scored.precision), (HitRate { hits: 1, of: 3 }, HitRate { hits: 1, of: 3 }));
         assert!((scored.max_time_error_s - 0.3).abs() <= 0.21, "{}", scored.max_time_error_s);
     }
 

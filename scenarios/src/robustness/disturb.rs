@@ -3,7 +3,7 @@
 use closecall_traffic::{ActorId, Trajectory, stream};
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::recordings::MarkingDistances;
+use crate::trajectory_data::MarkingDistances;
 
 /// A disturbance of the lateral position of all vehicles.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,7 +74,7 @@ impl<'a> Brownian<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recordings::test_support::straight_track;
+    use crate::trajectory_data::test_support::straight_track;
 
     #[test]
     fn the_noise_has_the_given_intensity_and_all_levels_share_one_path() {

@@ -29,4 +29,4 @@ mod disturb;
 mod study;
 
 pub use disturb::Disturbance;
-pub use study::{Case, Cell, FAILING_SHARE, Measured, ReferenceKind, Robustness, Setup, Study};
+pub use study::{CriterionCounts, Experiment, FAILING_SHARE, Measured, ReferenceKind, Robustness, Setup, Study};

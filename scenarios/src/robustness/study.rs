@@ -4,10 +4,10 @@ use closecall_traffic::Trajectory;
 use serde::Serialize;
 
 use super::disturb::{Disturbance, Repetition};
-use crate::lane_change::{Criterion, Detector, LaneChange, Lanes};
-use crate::recordings::{LaneMarkings, MarkingDistances};
+use crate::lane_change::{Criterion, LaneChange, LaneChangeDetector, LaneReliability};
+use crate::trajectory_data::{LaneMarkings, MarkingDistances};
 
-/// Share of missed or of invented lane changes above which a criterion fails (-), relative to the number that it
+/// HitRate of missed or of invented lane changes above which a criterion fails (-), relative to the number that it
 /// detects undisturbed.
 pub const FAILING_SHARE: f64 = 0.05;
 
@@ -55,8 +55,8 @@ pub enum ReferenceKind {
 pub struct Study {
     tracks: Vec<Measured>,
     criteria: Vec<Criterion>,
-    /// Detector that does not rely on the recorded lanes.
-    detector: Detector,
+    /// LaneChangeDetector that does not rely on the recorded lanes.
+    detector: LaneChangeDetector,
     /// Reference lane changes of each track.
     reference: Vec<Vec<LaneChange>>,
     /// For each track, each of its reference lane changes and each criterion: true if it is detected undisturbed.
@@ -66,14 +66,14 @@ pub struct Study {
 
 /// One experiment: a disturbance and a repetition of its noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Case {
+pub struct Experiment {
     disturbance: Disturbance,
     repetition: Repetition,
 }
 
 /// The counts of one criterion in one experiment, or their mean over several.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Cell {
+pub struct CriterionCounts {
     /// Number of detected lane changes.
     pub found: f64,
     /// Number of reference lane changes that the criterion detects undisturbed and also detects here.
@@ -91,12 +91,12 @@ impl Study {
         } else {
             (ReferenceKind::RecordedLanes, Criterion::Peak, vec![Criterion::Peak, Criterion::Distance])
         };
-        let reference_detector = Detector::new(Lanes::Recorded, markings);
+        let reference_detector = LaneChangeDetector::new(LaneReliability::Reliable, markings);
         let reference: Vec<_> = tracks
             .iter()
             .map(|(track, distances)| reference_detector.detect(reference_criterion, track, distances))
             .collect();
-        let detector = Detector::new(Lanes::Doubtful, markings);
+        let detector = LaneChangeDetector::new(LaneReliability::Unreliable, markings);
         let undisturbed = tracks.iter().zip(&reference).map(|((track, distances), reference)| {
             let found = detector.detect_by_each(&criteria, track, distances);
             let by_criteria = |change: &LaneChange| {
@@ -124,20 +124,21 @@ impl Study {
     }
 
     /// Returns all experiments of `setup`: first those with noise, level by level, then those with an offset.
-    pub fn cases(setup: &Setup) -> Vec<Case> {
+    pub fn cases(setup: &Setup) -> Vec<Experiment> {
         let noise = setup.noise_m_per_sqrt_s.iter().flat_map(|&noise_m_per_sqrt_s| {
             let disturbance = Disturbance { offset_m: 0.0, noise_m_per_sqrt_s };
             (0..setup.repetitions).map(move |number| (disturbance, number))
         });
         let offsets = setup.offset_m.iter();
         let offsets = offsets.map(|&offset_m| (Disturbance { offset_m, noise_m_per_sqrt_s: 0.0 }, 0));
-        let case = |(disturbance, number)| Case { disturbance, repetition: Repetition { seed: setup.seed, number } };
+        let case =
+            |(disturbance, number)| Experiment { disturbance, repetition: Repetition { seed: setup.seed, number } };
         noise.chain(offsets).map(case).collect()
     }
 
     /// Runs one experiment and returns one cell for each criterion.
-    pub fn run(&self, case: &Case) -> Vec<Cell> {
-        let mut cells = vec![Cell::default(); self.criteria.len()];
+    pub fn run(&self, case: &Experiment) -> Vec<CriterionCounts> {
+        let mut cells = vec![CriterionCounts::default(); self.criteria.len()];
         let references = self.reference.iter().zip(&self.undisturbed);
         for ((track, distances), (reference, undisturbed)) in self.tracks.iter().zip(references) {
             let (track, distances) = case.disturbance.apply(track, distances, case.repetition);
@@ -156,7 +157,7 @@ impl Study {
     }
 
     /// Combines the `results` of all experiments of `setup`, which are in the order of [`Self::cases`].
-    pub fn robustness(&self, setup: &Setup, results: &[Vec<Cell>]) -> Robustness {
+    pub fn robustness(&self, setup: &Setup, results: &[Vec<CriterionCounts>]) -> Robustness {
         let (noise, offsets) = results.split_at(results.len() - setup.offset_m.len());
         let repetitions = usize::try_from(setup.repetitions).unwrap_or(usize::MAX).max(1);
         let noise = noise.chunks(repetitions).map(|repeated| self.mean(repeated)).collect();
@@ -172,12 +173,12 @@ impl Study {
     }
 
     /// Returns the mean cell of each criterion over repeated experiments.
-    fn mean(&self, repeated: &[Vec<Cell>]) -> Vec<Cell> {
+    fn mean(&self, repeated: &[Vec<CriterionCounts>]) -> Vec<CriterionCounts> {
         let n = repeated.len() as f64;
-        let mean_of = |criterion: usize, value: fn(&Cell) -> f64| {
+        let mean_of = |criterion: usize, value: fn(&CriterionCounts) -> f64| {
             repeated.iter().map(|cells| value(&cells[criterion])).sum::<f64>() / n
         };
-        let cell = |criterion| Cell {
+        let cell = |criterion| CriterionCounts {
             found: mean_of(criterion, |cell| cell.found),
             again: mean_of(criterion, |cell| cell.again),
             invented: mean_of(criterion, |cell| cell.invented),
@@ -186,7 +187,7 @@ impl Study {
     }
 }
 
-impl Cell {
+impl CriterionCounts {
     /// Adds the counts of one track: the lane changes that were `found`, all `reference` ones, and the `required` ones,
     /// which the criterion detects undisturbed.
     fn count(&mut self, found: &[LaneChange], reference: &[LaneChange], required: &[&LaneChange]) {
@@ -217,9 +218,9 @@ pub struct Robustness {
     /// The criteria.
     pub criteria: Vec<Criterion>,
     /// One row for each noise level: the means over the repetitions.
-    pub noise: Vec<Vec<Cell>>,
+    pub noise: Vec<Vec<CriterionCounts>>,
     /// One row for each offset.
-    pub offset: Vec<Vec<Cell>>,
+    pub offset: Vec<Vec<CriterionCounts>>,
 }
 
 impl Robustness {
@@ -243,7 +244,7 @@ impl Robustness {
     }
 
     /// Returns true if the criterion in column `criterion` fails with the counts of `cell`.
-    pub fn fails(&self, criterion: usize, cell: &Cell) -> bool {
+    pub fn fails(&self, criterion: usize, cell: &CriterionCounts) -> bool {
         let required = self.undisturbed[criterion] as f64;
         let allowed = FAILING_SHARE * required;
         !(required - cell.again <= allowed && cell.invented <= allowed)
@@ -251,7 +252,7 @@ impl Robustness {
 
     /// Returns the lowest noise intensity at which the criterion in column `criterion` fails (m/√s), or `None` if it
     /// fails at no level.
-    pub fn fails_from_noise(&self, criterion: usize) -> Option<f64> {
+    pub fn failing_noise_m_per_sqrt_s(&self, criterion: usize) -> Option<f64> {
         let levels = self.setup.noise_m_per_sqrt_s.iter().zip(&self.noise);
         levels.filter(|(_, cells)| self.fails(criterion, &cells[criterion])).map(|(level, _)| *level).next()
     }

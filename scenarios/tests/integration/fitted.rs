@@ -2,7 +2,7 @@
 
 use closecall_scenarios::fit::{Heading, fit, to_toml};
 use closecall_scenarios::parameters::ParametersConfig;
-use closecall_scenarios::recordings::read;
+use closecall_scenarios::trajectory_data::read;
 
 use crate::support::data_folder;
 
@@ -27,8 +27,8 @@ fn a_new_fit_reproduces_the_committed_figures() {
     let Some(folder) = data_folder() else { return };
     let names = ["a", "b", "f", "g", "h", "i"];
     let path = |name| folder.join(format!("ngsim_us101/trajectories/us101_{name}.csv"));
-    let recordings: Vec<_> = names.iter().map(|name| read(&path(name)).unwrap()).collect();
-    let text = to_toml(&fit(&recordings, 0), &Heading::default());
-    let from_recordings_on = |text: &str| text.split_once("# recordings").unwrap().1.to_owned();
+    let data_sets: Vec<_> = names.iter().map(|name| read(&path(name)).unwrap()).collect();
+    let text = to_toml(&fit(&data_sets, 0), &Heading::default());
+    let from_recordings_on = |text: &str| text.split_once("# trajectory files").unwrap().1.to_owned();
     assert_eq!(from_recordings_on(&text), from_recordings_on(COMMITTED));
 }

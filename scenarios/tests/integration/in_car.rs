@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use closecall_scenarios::recordings::{
+use closecall_scenarios::trajectory_data::{
     BusFrame, InCarFrame, InCarLog, Layout, MarkingDistances, ReadOptions, RecordedTrack, open, write_in_car,
 };
 use closecall_traffic::{Time, VehicleClass};

@@ -5,8 +5,8 @@ use std::path::Path;
 
 use closecall_scenarios::filters::smooth;
 use closecall_scenarios::lane_change::detect;
-use closecall_scenarios::recordings::{
-    Layout, LayoutChoice, ReadOptions, Recording, RecordingProblem, open, read, read_from, read_with,
+use closecall_scenarios::trajectory_data::{
+    Layout, LayoutChoice, ReadOptions, TrajectoryData, TrajectoryFileProblem, open, read, read_from, read_with,
 };
 use closecall_traffic::{Lane, Side, Time};
 
@@ -28,9 +28,8 @@ fn the_highd_layout_yields_the_same_data_as_the_plain_layout() {
     let instants = highd.trajectories.iter().map(|track| track.points.len()).sum::<usize>();
     assert_eq!(instants, 1_574, "each row of the file becomes a track point");
     assert!((highd.markings.lane_width_m(Lane(1)).unwrap() - 3.45).abs() < 1e-9);
-    let crossings = |recording| {
-        detect(&smooth(recording)).iter().map(|change| (change.direction, change.crossing_s)).collect::<Vec<_>>()
-    };
+    let crossings =
+        |data| detect(&smooth(data)).iter().map(|change| (change.direction, change.crossing_s)).collect::<Vec<_>>();
     let (one, other) = (crossings(&plain), crossings(&highd));
     assert_eq!(other.len(), 4, "the highD file contains four lane changes; it lacks some rows of the plain file");
     let is_same = |a: &(Side, f64), b: &(Side, f64)| a.0 == b.0 && (a.1 - b.1).abs() <= 0.101;
@@ -43,7 +42,7 @@ fn commonroad_scenarios_yield_the_tracks_of_the_data_they_are_taken_from() {
     let entries = std::fs::read_dir(data.join("ngsim_us101/commonroad_xml")).unwrap();
     let mut paths: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
     paths.sort();
-    let plain: Vec<Recording> = ["a", "b", "f", "g", "h", "i"]
+    let plain: Vec<TrajectoryData> = ["a", "b", "f", "g", "h", "i"]
         .map(|name| read(&data.join(format!("ngsim_us101/trajectories/us101_{name}.csv"))).unwrap())
         .into();
     let (mut compared, mut same_lane, mut rows) = (0, 0, 0);
@@ -54,7 +53,7 @@ fn commonroad_scenarios_yield_the_tracks_of_the_data_they_are_taken_from() {
         for track in &scenario.trajectories {
             rows += track.points.len();
             // Find the same vehicle in the plain files: same number and same sequence of speeds.
-            let found = plain.iter().flat_map(|recording| &recording.trajectories).find_map(|other| {
+            let found = plain.iter().flat_map(|data| &data.trajectories).find_map(|other| {
                 let speeds = |points: &[closecall_traffic::TrajectoryPoint]| {
                     points.iter().map(|point| (point.speed_mps * 10.0).round() as i64).collect::<Vec<_>>()
                 };
@@ -114,8 +113,8 @@ fn write_both_ways(folder: &Path) {
 fn both_carriageways_are_driven_forwards_and_are_separated() {
     let folder = tempfile::tempdir().unwrap();
     write_both_ways(folder.path());
-    let recording = read(folder.path()).unwrap();
-    let [upper, lower] = recording.trajectories.as_slice() else { panic!() };
+    let data = read(folder.path()).unwrap();
+    let [upper, lower] = data.trajectories.as_slice() else { panic!() };
     for track in [upper, lower] {
         assert!(track.points.iter().all(|point| point.speed_mps > 0.0));
         assert!(track.points.windows(2).all(|pair| pair[1].s_m > pair[0].s_m), "s increases");
@@ -134,7 +133,7 @@ fn both_carriageways_are_driven_forwards_and_are_separated() {
         "the left edge of the upper carriageway is 1 km to the right of the lower one's right edge"
     );
     assert!(upper.points[29].d_m < upper.points[0].d_m, "the vehicle moves to its right");
-    assert_eq!(recording.markings.lane_width_m(Lane(5)), Some(4.0));
+    assert_eq!(data.markings.lane_width_m(Lane(5)), Some(4.0));
 }
 
 #[test]
@@ -148,7 +147,7 @@ fn a_file_of_another_layout_than_required_is_rejected() {
     assert!(error.to_string().contains("the layout highd, not in ngsim as asked for"), "{error}");
     assert!(open(&path, ReadOptions::default()).is_ok());
     let alone = read_from(std::fs::File::open(&path).unwrap(), &path).unwrap_err();
-    assert!(matches!(alone.problem, RecordingProblem::NeedsMetadata));
+    assert!(matches!(alone.problem, TrajectoryFileProblem::NeedsMetadata));
 }
 
 /// Writes an exiD data set of a road that bends with a radius of 2 km and is driven in both directions. The first direction
@@ -198,18 +197,18 @@ fn write_bent_both_ways(folder: &Path) {
 fn the_road_of_exid_data_is_inferred_from_its_traffic() {
     let folder = tempfile::tempdir().unwrap();
     write_bent_both_ways(folder.path());
-    let recording = read(folder.path()).unwrap();
-    assert_eq!((recording.layout, recording.period), (Layout::Exid, Time::from_ms(40)));
-    let [keeps, changes, left, back] = recording.trajectories.as_slice() else { panic!() };
+    let data = read(folder.path()).unwrap();
+    assert_eq!((data.layout, data.period), (Layout::Exid, Time::from_ms(40)));
+    let [keeps, changes, left, back] = data.trajectories.as_slice() else { panic!() };
     let lanes = |track: &closecall_traffic::Trajectory| (track.points[0].lane.0, track.points[249].lane.0);
     assert_eq!((lanes(keeps), lanes(changes), lanes(left), lanes(back)), ((2, 2), (2, 1), (1, 1), (4, 4)));
-    for track in &recording.trajectories {
+    for track in &data.trajectories {
         assert!(track.points.windows(2).all(|pair| pair[1].s_m > pair[0].s_m), "s increases");
     }
     let d_m = |track: &closecall_traffic::Trajectory| track.points[249].d_m;
     assert!((d_m(keeps) + 1.5 * 3.75).abs() < 0.05 && (d_m(changes) + 0.5 * 3.75).abs() < 0.05);
     assert!((d_m(back) + 2.0 * 3.75 + 1_000.0 + 0.5 * 3.75).abs() < 0.05, "{}", d_m(back));
-    let found = detect(&smooth(&recording));
+    let found = detect(&smooth(&data));
     assert_eq!(found.iter().map(|change| change.track_id).collect::<Vec<_>>(), [2]);
     assert!((found[0].crossing_s - 5.0).abs() < 0.2, "{}", found[0].crossing_s);
 }

@@ -9,6 +9,6 @@ mod layouts;
 mod malformed;
 mod malformed_layouts;
 mod ngsim_us101;
-mod own_recordings;
+mod own_trajectory_files;
 mod robustness;
 mod support;

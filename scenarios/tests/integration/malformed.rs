@@ -2,7 +2,7 @@
 
 use std::io::Write as _;
 
-use closecall_scenarios::recordings::{RecordingProblem, read, read_from};
+use closecall_scenarios::trajectory_data::{TrajectoryFileProblem, read, read_from};
 
 use crate::support::{PLAIN_HEADER, read_text};
 
@@ -91,7 +91,7 @@ fn cases() -> Vec<(String, Vec<&'static str>)> {
         (one("frame", "99999999999999999999"), vec!["line 3", "`frame`"]),
         (one("lane_id", "900"), vec!["line 3", "`lane_id`", "from 0 to 255"]),
         (one("vehicle_class", "tank"), vec!["line 3", "`vehicle_class`", "car, truck, motorcycle"]),
-        (one("recording_id", "b"), vec!["line 3", "`recording_id`", "`b`", "`a`", "one recording for each file"]),
+        (one("recording_id", "b"), vec!["line 3", "`recording_id`", "`b`", "`a`", "one data set for each file"]),
         (one("accel_mps2", "?"), vec!["line 3", "`accel_mps2`"]),
         (second(&[]), vec!["line 3", "frame 0 of vehicle 1 stands there twice", "line 2"]),
         (second(&[("time_s", "5.0")]), vec!["line 3", "stands there twice"]),
@@ -136,7 +136,7 @@ fn each_malformed_file_is_rejected_with_location_and_allowed_values() {
     for (text, needed) in cases() {
         let error = read_text(text.as_bytes()).expect_err(&text);
         let message = error.to_string();
-        assert!(message.starts_with("failed to read the recording made-up.csv"), "{message}");
+        assert!(message.starts_with("failed to read the trajectory file made-up.csv"), "{message}");
         for part in needed {
             assert!(message.contains(part), "`{message}` does not say `{part}`\nfor {text}");
         }
@@ -149,13 +149,13 @@ fn files_that_are_not_text_are_rejected() {
     let noise: Vec<u8> = (0..4_000_u32).map(|k| (k.wrapping_mul(2_654_435_761) >> 13) as u8).collect();
     for bytes in [noise.as_slice(), b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", b"track_id,frame\xff\xfe\n1,2\n"] {
         let error = read_text(bytes).unwrap_err();
-        assert!(matches!(error.problem, RecordingProblem::Binary), "{error}");
+        assert!(matches!(error.problem, TrajectoryFileProblem::Binary), "{error}");
     }
     let mut late = plain(&[row(&[])]).into_bytes();
     late.extend_from_slice(b"a,1,\xc3\x28\n");
     assert_eq!(read_text(&late).unwrap_err().line, Some(3));
     let endless = read_text(&vec![b'7'; 100_000]).unwrap_err();
-    assert!(matches!(endless.problem, RecordingProblem::LineTooLong { .. }), "{endless}");
+    assert!(matches!(endless.problem, TrajectoryFileProblem::LineTooLong { .. }), "{endless}");
 }
 
 #[test]
@@ -169,7 +169,7 @@ fn a_truncated_gzip_stream_is_rejected_and_a_complete_one_read() {
     assert_eq!(read_text(&[packed.clone(), packed.clone()].concat()).unwrap_err().line, Some(52));
     for kept in [3, 12, packed.len() / 2, packed.len() - 1] {
         let error = read_text(&packed[..kept]).unwrap_err();
-        assert!(matches!(error.problem, RecordingProblem::Gzip(_)), "{kept}: {error}");
+        assert!(matches!(error.problem, TrajectoryFileProblem::Gzip(_)), "{kept}: {error}");
     }
     let mut damaged = packed.clone();
     damaged[packed.len() / 2] ^= 0x55;
@@ -212,12 +212,12 @@ fn a_vehicle_that_reappears_gets_a_second_track() {
         ngsim(&[(1, &frame.to_string()), (3, &(1_163_368_300_000 + 100 * frame).to_string()), (5, y)])
     };
     let text = [at(5, "900"), at(2, "880"), at(1, "870"), at(6, "910")].join("\n") + "\n";
-    let recording = read_from(text.as_bytes(), "x/i80.txt".as_ref()).unwrap();
-    assert_eq!(recording.name, "i80");
+    let data = read_from(text.as_bytes(), "x/i80.txt".as_ref()).unwrap();
+    assert_eq!(data.name, "i80");
     let tracks: Vec<_> =
-        recording.trajectories.iter().map(|track| (track.track_id, track.vehicle_id, track.points.len())).collect();
+        data.trajectories.iter().map(|track| (track.track_id, track.vehicle_id, track.points.len())).collect();
     assert_eq!(tracks, [(1, 1, 2), (1_000_000_000_001, 1, 2)]);
-    let first = recording.trajectories[0].points[0];
+    let first = data.trajectories[0].points[0];
     assert_eq!(first.time.ns(), 0);
     assert!((first.s_m - 0.3048 * (870.0 - 8.0)).abs() < 1e-9, "the centre is half a vehicle length behind the front");
     assert!((first.d_m + 0.3048 * 54.0).abs() < 1e-9, "d is positive to the left");
@@ -245,8 +245,8 @@ mod properties {
             let length = bytes.len();
             bytes[index % length] = byte;
             bytes.truncate(cut.min(length));
-            if let Ok(recording) = read_text(&bytes) {
-                for point in recording.trajectories.iter().flat_map(|track| &track.points) {
+            if let Ok(data) = read_text(&bytes) {
+                for point in data.trajectories.iter().flat_map(|track| &track.points) {
                     prop_assert!(point.s_m.is_finite() && point.d_m.is_finite() && point.speed_mps.is_finite());
                 }
             }

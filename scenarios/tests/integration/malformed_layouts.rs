@@ -4,14 +4,14 @@
 use std::io::Read;
 use std::path::Path;
 
-use closecall_scenarios::recordings::{
-    BadRows, ReadOptions, RecordingError, RecordingProblem, open, open_from, read, read_from,
+use closecall_scenarios::trajectory_data::{
+    BadRows, ReadOptions, TrajectoryFileError, TrajectoryFileProblem, open, open_from, read, read_from,
 };
 
 use crate::support::{PLAIN_HEADER, read_text};
 
 /// Asserts that the error message contains all of `needed`.
-fn assert_mentions(error: &RecordingError, needed: &[&str], what: &str) {
+fn assert_mentions(error: &TrajectoryFileError, needed: &[&str], what: &str) {
     let message = error.to_string();
     for part in needed {
         assert!(message.contains(part), "{what}: `{message}` does not say `{part}`");
@@ -52,7 +52,7 @@ fn malformed_in_car_logs_are_rejected() {
 }
 
 /// Writes a small highD data set with one text of one file replaced, and returns the error from reading it.
-fn highd(file: &str, from: &str, to: &str) -> RecordingError {
+fn highd(file: &str, from: &str, to: &str) -> TrajectoryFileError {
     let folder = tempfile::tempdir().unwrap();
     let mut rows =
         "frame,id,x,y,width,height,xVelocity,yVelocity,xAcceleration,yAcceleration,precedingId,laneId\n".to_owned();
@@ -78,7 +78,7 @@ fn highd(file: &str, from: &str, to: &str) -> RecordingError {
 
 #[test]
 fn malformed_highd_data_sets_are_rejected() {
-    let (tracks, vehicles, recording) = ("07_tracks.csv", "07_tracksMeta.csv", "07_recordingMeta.csv");
+    let (tracks, vehicles, data) = ("07_tracks.csv", "07_tracksMeta.csv", "07_recordingMeta.csv");
     for (file, from, to, needed) in [
         (tracks, "laneId", "lane", vec!["07_tracks.csv, line 1", "no column `laneId`", "highD"]),
         (tracks, "3,2,13.5", "3,9,13.5", vec!["line 4", "`id`", "is `9`", "07_tracksMeta.csv"]),
@@ -106,19 +106,19 @@ fn malformed_highd_data_sets_are_rejected() {
         ),
         (vehicles, "numFrames", "frames", vec!["line 2", "no column `numFrames`"]),
         (vehicles, "2,20,Truck,2\n", "", vec!["07_tracksMeta.csv", "no rows"]),
-        (recording, "7,25,", "7,0,", vec!["07_recordingMeta.csv, line 2", "`frameRate`", "1 to 1000"]),
-        (recording, "7,25,", "7,nan,", vec!["line 2", "`frameRate`", "is `nan`"]),
+        (data, "7,25,", "7,0,", vec!["07_recordingMeta.csv, line 2", "`frameRate`", "1 to 1000"]),
+        (data, "7,25,", "7,nan,", vec!["line 2", "`frameRate`", "is `nan`"]),
         // A wrong frame rate: the positions then move at another speed than recorded.
-        (recording, "7,25,", "7,50,", vec!["07_tracks.csv, line", "0.6 to 1.6"]),
-        (recording, "21.0;25.0;29.0", "29.0;25.0;21.0", vec!["`lowerLaneMarkings`", "rising"]),
-        (recording, "21.0;25.0;29.0", "", vec!["07_tracks.csv, line 2", "lowerLaneMarkings"]),
-        (recording, "\n7,25", "\n8,25,,1;2\n7,25", vec!["2 rows, but 1 is needed"]),
+        (data, "7,25,", "7,50,", vec!["07_tracks.csv, line", "0.6 to 1.6"]),
+        (data, "21.0;25.0;29.0", "29.0;25.0;21.0", vec!["`lowerLaneMarkings`", "rising"]),
+        (data, "21.0;25.0;29.0", "", vec!["07_tracks.csv, line 2", "lowerLaneMarkings"]),
+        (data, "\n7,25", "\n8,25,,1;2\n7,25", vec!["2 rows, but 1 is needed"]),
     ] {
         let error = highd(file, from, to);
         assert_mentions(&error, &needed, &format!("{file}: {from} -> {to}"));
         assert!(!error.is_io(), "{error}");
     }
-    for file in [vehicles, recording] {
+    for file in [vehicles, data] {
         let error = highd(file, "", "-");
         assert!(error.is_io() && error.to_string().contains(file), "the error names the missing file: {error}");
     }
@@ -134,7 +134,7 @@ fn folders_with_no_data_set_or_several_are_rejected() {
     }
     assert_mentions(
         &read(folder.path()).unwrap_err(),
-        &["2 recordings in this folder", "01_tracks.csv to 02_tracks.csv"],
+        &["2 data sets in this folder", "01_tracks.csv to 02_tracks.csv"],
         "two",
     );
 }
@@ -235,19 +235,19 @@ fn packed(source: &mut impl Read) -> Vec<u8> {
 
 #[test]
 fn compressed_files_with_no_or_too_much_content_are_rejected_in_little_memory() {
-    assert!(matches!(read_text(&packed(&mut &b""[..])).unwrap_err().problem, RecordingProblem::Empty));
-    assert!(matches!(read_text(&packed(&mut &b"\n\n"[..])).unwrap_err().problem, RecordingProblem::Empty));
+    assert!(matches!(read_text(&packed(&mut &b""[..])).unwrap_err().problem, TrajectoryFileProblem::Empty));
+    assert!(matches!(read_text(&packed(&mut &b"\n\n"[..])).unwrap_err().problem, TrajectoryFileProblem::Empty));
     // 200 MB of one letter, compressed to 0.9 MB: as a line, as a line after a header, and as a tag.
     for (start, line) in [("", 1), (PLAIN_HEADER, 2), ("<commonRoad ", 1)] {
         let break_at = if start == PLAIN_HEADER { "\n" } else { "" };
         let mut text = start.as_bytes().chain(break_at.as_bytes()).chain(std::io::repeat(b'x').take(200_000_000));
         let error = read_text(&packed(&mut text)).unwrap_err();
-        assert!(matches!(error.problem, RecordingProblem::LineTooLong { .. }), "{error}");
+        assert!(matches!(error.problem, TrajectoryFileProblem::LineTooLong { .. }), "{error}");
         assert_eq!(error.line, Some(line));
     }
     // Of a file that is compressed twice, only one layer is decompressed.
     let twice = packed(&mut packed(&mut &b"hello"[..]).as_slice());
-    assert!(matches!(read_text(&twice).unwrap_err().problem, RecordingProblem::Binary));
+    assert!(matches!(read_text(&twice).unwrap_err().problem, TrajectoryFileProblem::Binary));
     let mut followed = packed(&mut &b"a,b\n"[..]);
     followed.extend_from_slice(b"rubbish behind the end");
     assert!(read_text(&followed).is_err());
@@ -326,7 +326,7 @@ fn bad_rows_are_skipped_and_counted_on_request() {
     lines[9] = lines[9].replace("25.000", "fast");
     lines[20] = "a,1,1".to_owned();
     let text = lines.join("\n") + "\n";
-    let options = ReadOptions { bad_rows: BadRows::Drop, ..ReadOptions::default() };
+    let options = ReadOptions { bad_rows: BadRows::Skip, ..ReadOptions::default() };
     let mut tracks = open_from(text.as_bytes(), Path::new("made-up.csv"), options, usize::MAX).unwrap();
     let mut pieces = 0;
     while let Some(track) = tracks.next_track().unwrap() {
@@ -354,7 +354,7 @@ fn long_file(vehicles: u64, frames: u64, vehicle_and_frame: impl Fn(u64) -> (u64
     text
 }
 
-fn open_with_window(text: &str, window: usize) -> Result<Vec<(u64, usize)>, RecordingError> {
+fn open_with_window(text: &str, window: usize) -> Result<Vec<(u64, usize)>, TrajectoryFileError> {
     let tracks = open_from(text.as_bytes(), Path::new("made-up.csv"), ReadOptions::default(), window)?;
     let mut found = tracks
         .map(|track| track.map(|track| (track.trajectory.track_id, track.trajectory.points.len())))

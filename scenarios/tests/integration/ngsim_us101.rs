@@ -3,20 +3,22 @@
 use std::path::Path;
 
 use closecall_scenarios::filters::smooth;
-use closecall_scenarios::lane_change::{Criterion, Detector, Lanes, Score, Spans, detect, read_references, score};
-use closecall_scenarios::recordings::{Layout, Recording, quality, read};
+use closecall_scenarios::lane_change::{
+    Criterion, LaneChangeDetector, LaneReliability, Score, TrackSpans, detect, read_references, score,
+};
+use closecall_scenarios::trajectory_data::{Layout, TrajectoryData, count_flaws, read};
 use closecall_traffic::{Lane, Time, Trajectory};
 
 use crate::support::data_folder;
 
-fn recordings(folder: &Path) -> Vec<Recording> {
+fn data_sets(folder: &Path) -> Vec<TrajectoryData> {
     let entries = std::fs::read_dir(folder.join("ngsim_us101/trajectories")).unwrap();
     let mut paths: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
     paths.sort();
     paths.iter().map(|path| read(path).unwrap()).collect()
 }
 
-fn spans(tracks: &[Trajectory]) -> Spans {
+fn spans(tracks: &[Trajectory]) -> TrackSpans {
     tracks.iter().filter_map(|track| Some((track.track_id, track.span()?))).collect()
 }
 
@@ -24,10 +26,10 @@ fn spans(tracks: &[Trajectory]) -> Spans {
 fn scored(folder: &Path, criterion: Criterion) -> Score {
     let references = read_references(&folder.join("ngsim_us101/reference_lane_changes.csv")).unwrap();
     let mut total = Score::default();
-    for recording in recordings(folder) {
-        let listed: Vec<_> = references.iter().filter(|listed| listed.recording_id == recording.name).collect();
-        let detector = Detector::new(Lanes::Recorded, &recording.markings);
-        let tracks = &recording.trajectories;
+    for data in data_sets(folder) {
+        let listed: Vec<_> = references.iter().filter(|listed| listed.recording_id == data.name).collect();
+        let detector = LaneChangeDetector::new(LaneReliability::Reliable, &data.markings);
+        let tracks = &data.trajectories;
         let found: Vec<_> = tracks.iter().flat_map(|track| detector.detect(criterion, track, &[])).collect();
         total.add(&score(&found, &listed, &spans(tracks)));
     }
@@ -73,8 +75,7 @@ fn both_layouts_yield_the_same_data() {
             );
         }
     }
-    let crossings =
-        |recording| detect(&smooth(recording)).iter().map(|c| (c.track_id, c.crossing_s)).collect::<Vec<_>>();
+    let crossings = |data| detect(&smooth(data)).iter().map(|c| (c.track_id, c.crossing_s)).collect::<Vec<_>>();
     assert_eq!(crossings(&plain), crossings(&feet));
 }
 
@@ -84,7 +85,7 @@ fn the_original_form_without_header_yields_the_same_data_as_the_one_with_commas(
     let path = folder.join("ngsim_us101/us101_a_ngsim18col_feet.csv");
     let text = std::fs::read_to_string(&path).unwrap();
     let blank: String = text.lines().skip(1).map(|line| line.replace(',', "   ") + "\r\n").collect();
-    let original = closecall_scenarios::recordings::read_from(blank.as_bytes(), &path).unwrap();
+    let original = closecall_scenarios::trajectory_data::read_from(blank.as_bytes(), &path).unwrap();
     assert_eq!(original.trajectories, read(&path).unwrap().trajectories);
 }
 
@@ -92,21 +93,21 @@ fn the_original_form_without_header_yields_the_same_data_as_the_one_with_commas(
 fn the_catalogue_export_is_read() {
     let Some(folder) = data_folder() else { return };
     let path = folder.join("ngsim_raw_format_sample/ngsim_socrata_first_1000_rows_peachtree.csv");
-    let recording = read(&path).unwrap();
-    assert_eq!((recording.layout, recording.name.as_str()), (Layout::Ngsim25, "peachtree"));
-    assert_eq!(quality(&recording).instants, 1_000);
+    let data = read(&path).unwrap();
+    assert_eq!((data.layout, data.name.as_str()), (Layout::Ngsim25, "peachtree"));
+    assert_eq!(count_flaws(&data).instants, 1_000);
 }
 
 #[test]
 fn the_road_matches_the_description_of_the_data() {
     let Some(folder) = data_folder() else { return };
-    let recording = read(&folder.join("ngsim_us101/trajectories/us101_a.csv")).unwrap();
-    assert_eq!(recording.period, Time::from_ms(100));
+    let data = read(&folder.join("ngsim_us101/trajectories/us101_a.csv")).unwrap();
+    assert_eq!(data.period, Time::from_ms(100));
     for (lane, edge_m) in [(1, 3.5), (2, 6.9), (3, 10.1), (4, 13.5), (5, 17.2)] {
-        let found = recording.markings.right_edge_m(Lane(lane)).unwrap();
+        let found = data.markings.right_edge_m(Lane(lane)).unwrap();
         assert!((found + edge_m).abs() < 0.2, "lane {lane}: {found}");
     }
-    assert!((recording.markings.typical_lane_width_m() - 3.4).abs() < 0.1);
-    let found = quality(&recording);
+    assert!((data.markings.typical_lane_width_m() - 3.4).abs() < 0.1);
+    let found = count_flaws(&data);
     assert_eq!((found.vehicles, found.tracks, found.instants), (92, 105, 11_221));
 }

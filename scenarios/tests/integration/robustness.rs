@@ -1,8 +1,8 @@
 //! Robustness of each lane-change criterion: on synthetic in-car logs with known ground truth, and on US-101.
 
-use closecall_scenarios::lane_change::{Criterion, Detector, Lanes};
-use closecall_scenarios::recordings::{LaneMarkings, MarkingDistances, open};
-use closecall_scenarios::robustness::{Cell, Measured, ReferenceKind, Robustness, Setup, Study};
+use closecall_scenarios::lane_change::{Criterion, LaneChangeDetector, LaneReliability};
+use closecall_scenarios::robustness::{CriterionCounts, Measured, ReferenceKind, Robustness, Setup, Study};
+use closecall_scenarios::trajectory_data::{LaneMarkings, MarkingDistances, open};
 use closecall_traffic::{Lane, Time};
 
 use crate::support::{LANE_M, SyntheticLaneChange, data_folder, track};
@@ -47,7 +47,7 @@ fn logs() -> Vec<(SyntheticLaneChange, Measured)> {
 }
 
 fn studied(study: &Study, setup: &Setup) -> Robustness {
-    let results: Vec<Vec<Cell>> = Study::cases(setup).iter().map(|case| study.run(case)).collect();
+    let results: Vec<Vec<CriterionCounts>> = Study::cases(setup).iter().map(|case| study.run(case)).collect();
     study.robustness(setup, &results)
 }
 
@@ -57,7 +57,7 @@ fn short_setup() -> Setup {
 
 #[test]
 fn the_gradient_criterion_finds_the_true_lane_changes() {
-    let detector = Detector::new(Lanes::Recorded, &LaneMarkings::default());
+    let detector = LaneChangeDetector::new(LaneReliability::Reliable, &LaneMarkings::default());
     for (truth, (trajectory, seen)) in logs() {
         let found = detector.detect(Criterion::Gradient, &trajectory, &seen);
         let [found] = &found[..] else { panic!("{} instead of 1", found.len()) };
@@ -91,7 +91,7 @@ fn an_offset_makes_only_the_distance_criterion_miss_lane_changes() {
 fn with_growing_noise_the_peak_criterion_fails_first() {
     let study = Study::new(logs().into_iter().map(|(_, log)| log).collect(), &LaneMarkings::default());
     let found = studied(&study, &short_setup());
-    let fails = |column| found.fails_from_noise(column);
+    let fails = |column| found.failing_noise_m_per_sqrt_s(column);
     let (Some(peak), gradient) = (fails(0), fails(2)) else {
         panic!("the peak criterion withstands every noise level")
     };

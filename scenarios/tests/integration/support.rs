@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use closecall_scenarios::recordings::{Recording, RecordingError, read_from};
+use closecall_scenarios::trajectory_data::{TrajectoryData, TrajectoryFileError, read_from};
 pub(crate) use closecall_testing::data as data_folder;
 use closecall_traffic::{Lane, Time, Trajectory, TrajectoryPoint, VehicleClass};
 
 /// Reads trajectory data from text.
-pub(crate) fn read_text(text: &[u8]) -> Result<Recording, RecordingError> {
+pub(crate) fn read_text(text: &[u8]) -> Result<TrajectoryData, TrajectoryFileError> {
     read_from(text, Path::new("made-up.csv"))
 }
 

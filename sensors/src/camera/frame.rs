@@ -44,7 +44,7 @@ pub(super) type Bounds = [f32; 4];
 /// The triangles of one body.
 pub(super) struct Object {
     pub(super) bounds: Bounds,
-    /// For each moment, the range of the body's triangles in [`Lists::triangles`].
+    /// For each moment, the range of the body's triangles in [`FrameBuffers::triangles`].
     pub(super) triangles: [std::ops::Range<usize>; MOMENTS],
 }
 
@@ -60,12 +60,12 @@ pub struct Frame {
     pub(super) travelled_m: [f32; MOMENTS],
     /// Yaw of the ego in the plane (rad).
     pub(super) ego_yaw_rad: f32,
-    pub(super) lists: Lists,
+    pub(super) lists: FrameBuffers,
 }
 
 /// The buffers of a frame, which the next frame can reuse to avoid allocations.
 #[derive(Default)]
-pub struct Lists {
+pub struct FrameBuffers {
     pub(super) objects: Vec<Object>,
     pub(super) triangles: [Vec<ScreenTriangle>; MOMENTS],
     pub(super) faces: Vec<Shade>,
@@ -75,13 +75,13 @@ pub struct Lists {
     pub(super) visibility: [Visibility; MOMENTS],
 }
 
-impl std::fmt::Debug for Lists {
+impl std::fmt::Debug for FrameBuffers {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Lists").field("faces", &self.faces.len()).finish_non_exhaustive()
+        f.debug_struct("FrameBuffers").field("faces", &self.faces.len()).finish_non_exhaustive()
     }
 }
 
-impl Lists {
+impl FrameBuffers {
     fn clear(&mut self) {
         self.objects.clear();
         self.triangles.iter_mut().for_each(Vec::clear);
@@ -95,12 +95,12 @@ impl Lists {
 impl Frame {
     /// Prepares the exposure for rendering within the rectangles `regions`. Pixels outside of them are not valid.
     pub fn new(camera: &Camera, scene: &Scene<'_>, key: ExposureKey, regions: &[PixelRect]) -> Self {
-        Self::reusing(Lists::default(), camera, scene, key, regions)
+        Self::with_buffers(FrameBuffers::default(), camera, scene, key, regions)
     }
 
     /// Prepares the exposure like [`Frame::new`], but reuses the buffers of an earlier frame.
-    pub fn reusing(
-        mut lists: Lists,
+    pub fn with_buffers(
+        mut lists: FrameBuffers,
         camera: &Camera,
         scene: &Scene<'_>,
         key: ExposureKey,
@@ -141,7 +141,7 @@ impl Frame {
     }
 
     /// Returns the buffers, for reuse by the next frame.
-    pub fn into_lists(self) -> Lists {
+    pub fn into_buffers(self) -> FrameBuffers {
         self.lists
     }
 

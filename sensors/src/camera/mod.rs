@@ -32,7 +32,7 @@ mod window;
 
 pub use classifier::{Backend, Classifier, ClassifierError, SHIPPED_MODEL};
 pub use config::{Camera, CameraConfig, Pipeline, Sun, SunConfig};
-pub use frame::{Frame, Lists};
+pub use frame::{Frame, FrameBuffers};
 pub use image::{CHANNELS, CROP_PX, Crop, Image, LabelledImage};
 pub use pinhole::{GroundBox, HEIGHT_PX, PixelRect, WIDTH_PX};
 pub use pipeline::CropClassifier;

@@ -3,7 +3,7 @@
 use closecall_traffic::ClassScores;
 
 use super::classifier::{Backend, Classifier, ClassifierError};
-use super::{Camera, Crop, ExposureKey, Frame, GroundBox, Lists, PixelRect, RearCamera};
+use super::{Camera, Crop, ExposureKey, Frame, FrameBuffers, GroundBox, PixelRect, RearCamera};
 use crate::{Detection, Scene, SceneVehicle, SensorError};
 
 /// Minimum share of a window that must lie in the image for it to be classified (0 to 1).
@@ -20,7 +20,7 @@ pub struct CropClassifier {
     camera: RearCamera,
     classifier: Classifier,
     crop: Crop,
-    lists: Lists,
+    lists: FrameBuffers,
 }
 
 impl CropClassifier {
@@ -30,7 +30,7 @@ impl CropClassifier {
     /// Returns a [`ClassifierError`] if the backend cannot be set up.
     pub fn new(camera: Camera, backend: &Backend) -> Result<Self, ClassifierError> {
         let classifier = Classifier::shipped(backend)?;
-        Ok(Self { camera: RearCamera::new(camera), classifier, crop: Crop::default(), lists: Lists::default() })
+        Ok(Self { camera: RearCamera::new(camera), classifier, crop: Crop::default(), lists: FrameBuffers::default() })
     }
 
     /// Classifies every detection that lies in the image, and fuses the network's scores with the class scores that
@@ -51,13 +51,14 @@ impl CropClassifier {
         let visible: Vec<(usize, PixelRect)> = detections
             .iter()
             .enumerate()
-            .filter_map(|(index, detection)| Some((index, self.camera.window_of(&scene.ego, detection)?)))
+            .filter_map(|(index, detection)| Some((index, self.camera.detection_window(&scene.ego, detection)?)))
             .collect();
         if visible.is_empty() {
             return Ok(0);
         }
         let windows: Vec<PixelRect> = visible.iter().map(|(_, window)| *window).collect();
-        let mut frame = Frame::reusing(std::mem::take(&mut self.lists), self.camera.camera(), scene, key, &windows);
+        let mut frame =
+            Frame::with_buffers(std::mem::take(&mut self.lists), self.camera.camera(), scene, key, &windows);
         for (index, window) in &visible {
             frame.crop(*window, &mut self.crop);
             let image_scores = self
@@ -66,7 +67,7 @@ impl CropClassifier {
                 .map_err(|error| SensorError::Classifier { reason: error.to_string() })?;
             detections[*index].class = fuse(&detections[*index].class, &image_scores);
         }
-        self.lists = frame.into_lists();
+        self.lists = frame.into_buffers();
         Ok(visible.len())
     }
 }
@@ -74,7 +75,7 @@ impl CropClassifier {
 impl RearCamera {
     /// Returns the window of the image that the network classifies for a detection. Returns `None` if too little of the
     /// window lies in the image.
-    pub fn window_of(&self, ego: &SceneVehicle, detection: &Detection) -> Option<PixelRect> {
+    pub fn detection_window(&self, ego: &SceneVehicle, detection: &Detection) -> Option<PixelRect> {
         let (x_m, y_m) = detection.centre_m();
         let object = GroundBox {
             x_m,

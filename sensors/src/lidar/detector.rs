@@ -105,7 +105,7 @@ impl Detector {
     }
 
     /// Returns the indices of one detection's points in the scan.
-    pub fn points_of(&self, detection: usize) -> &[u32] {
+    pub fn point_indices_of(&self, detection: usize) -> &[u32] {
         &self.members[self.starts[detection] as usize..self.starts[detection + 1] as usize]
     }
 

@@ -52,13 +52,13 @@ impl RearLidar {
     }
 
     /// Returns the indices of one detection's points in the latest scan.
-    pub fn points_of(&self, detection: usize) -> &[u32] {
-        self.detector.points_of(detection)
+    pub fn point_indices_of(&self, detection: usize) -> &[u32] {
+        self.detector.point_indices_of(detection)
     }
 
     /// Adds the latest scan to a report on the segmentation quality.
     pub fn add_to_report(&self, report: &mut SegmentationReport) {
-        let clusters = (0..self.detector.latest().len()).map(|detection| self.detector.points_of(detection));
+        let clusters = (0..self.detector.latest().len()).map(|detection| self.detector.point_indices_of(detection));
         report.observe(self.scanner.truth(), clusters);
     }
 }

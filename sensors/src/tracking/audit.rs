@@ -18,7 +18,7 @@ const MATCH_DISTANCE_M: f64 = 3.0;
 const KEPT_DEVIATIONS: f64 = 3.0;
 
 /// Upper bound of 95 % of a consistent filter's NEES values: the quantile of χ² with 4 degrees of freedom.
-pub const NEES_95: f64 = 9.488;
+pub const NEES_QUANTILE_95: f64 = 9.488;
 
 /// The vehicle that one track is matched with.
 #[derive(Clone, Copy, Debug)]

@@ -25,7 +25,7 @@ pub(crate) mod road_filter;
 mod tracker;
 mod view;
 
-pub use audit::{NEES_95, TrackAudit};
+pub use audit::{NEES_QUANTILE_95, TrackAudit};
 pub use config::{TrackerConfig, TrackerModel};
 pub use consistency::{Consistency, Credibility};
 pub use tracker::{Tracker, TrackerScan};

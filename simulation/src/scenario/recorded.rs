@@ -6,7 +6,7 @@
 use std::path::{Path, PathBuf};
 
 use closecall_controllers::{DriverConfig, RecordedConfig};
-use closecall_scenarios::recordings::{ReadOptions, open};
+use closecall_scenarios::trajectory_data::{ReadOptions, open};
 use closecall_traffic::Trajectory;
 use toml_edit::{Array, DocumentMut, Item, TableLike, Value};
 
@@ -16,8 +16,8 @@ use super::ScenarioConfig;
 #[derive(Debug, thiserror::Error)]
 pub(super) enum RecordedError {
     /// The trajectory file cannot be read.
-    #[error("`{actor}` follows a recording: {message}")]
-    Recording {
+    #[error("`{actor}` follows a trajectory file: {message}")]
+    TrajectoryData {
         /// The actor.
         actor: String,
         /// What is wrong with the trajectory file.
@@ -36,7 +36,7 @@ pub(super) enum RecordedError {
         known: String,
     },
     /// The actor is written in a form in which the text cannot be changed.
-    #[error("`{actor}` follows a recording, which needs actors written as [[actor]] and `driver` as a table")]
+    #[error("`{actor}` follows a trajectory file, which needs actors written as [[actor]] and `driver` as a table")]
     Form {
         /// The actor.
         actor: String,
@@ -92,7 +92,7 @@ fn speed_profile(scenario: &Path, actor: &str, recorded: &RecordedConfig) -> Res
 /// Reads the track that `recorded` names.
 fn read_track(scenario: &Path, actor: &str, recorded: &RecordedConfig) -> Result<Trajectory, RecordedError> {
     let path = scenario.parent().unwrap_or(Path::new("")).join(&recorded.file);
-    let read_error = |message: String| RecordedError::Recording { actor: actor.to_owned(), message };
+    let read_error = |message: String| RecordedError::TrajectoryData { actor: actor.to_owned(), message };
     let mut first_and_last_id: Option<(u64, u64)> = None;
     let mut tracks = 0_u64;
     for track in open(&path, ReadOptions::default()).map_err(|error| read_error(error.to_string()))? {

@@ -23,7 +23,7 @@ use closecall_controllers::{
     AccConfig, AebConfig, DriverConfig, EgoStackConfig, FollowConfig, MisConfig, OvertakerConfig, PrescribedConfig,
     PrescribedLaneChangeConfig, ReactionConfig, Wiedemann99Config,
 };
-use closecall_scenarios::encounter::{EGO, FRONT, Participant, REAR, RecordedEncounter};
+use closecall_scenarios::encounter::{EGO_INDEX, LEAD_INDEX, Participant, REAR_INDEX, RecordedEncounter};
 use closecall_scenarios::filters::PERIOD;
 use closecall_traffic::metrics::{time_headway_s, touching_distance_m};
 use closecall_traffic::{ActorId, Choice, Num, RoadConfig, Time, Trajectory, TrajectoryPoint, VehicleConfig};
@@ -105,18 +105,19 @@ fn scenario_text(encounter: &RecordedEncounter, rear: RearDriver) -> Result<Stri
 
 /// Returns the contents of the scenario file.
 fn config(encounter: &RecordedEncounter, rear: RearDriver) -> Result<ScenarioConfig, String> {
-    let [ego, _, rear_track] = encounter.protagonists();
+    let [ego, _, rear_track] = encounter.ego_lead_rear();
     let mut actors = Vec::new();
     for (index, vehicle) in encounter.vehicles.iter().enumerate() {
         let driver = match (index, rear) {
-            (EGO, _) => Some(ego_stack(encounter)),
-            (FRONT, _) | (REAR, RearDriver::Recorded) => Some(prescribed_driver(encounter, vehicle)),
-            (REAR, RearDriver::Driver) => Some(overtaking_driver(encounter)),
+            (EGO_INDEX, _) => Some(ego_stack(encounter)),
+            (LEAD_INDEX, _) | (REAR_INDEX, RearDriver::Recorded) => Some(prescribed_driver(encounter, vehicle)),
+            (REAR_INDEX, RearDriver::Driver) => Some(overtaking_driver(encounter)),
             _ => other_driver(encounter, vehicle),
         };
         let earlier_vehicles = &encounter.vehicles[..index];
         if let (Some(driver), Some(start)) = (driver, start_of(&vehicle.trajectory))
-            && (index <= REAR || earlier_vehicles.iter().all(|earlier| is_clear(&earlier.trajectory, start, vehicle)))
+            && (index <= REAR_INDEX
+                || earlier_vehicles.iter().all(|earlier| is_clear(&earlier.trajectory, start, vehicle)))
         {
             actors.push(actor(&actor_name(index, &vehicle.trajectory), vehicle, start, driver)?);
         }
@@ -128,7 +129,7 @@ fn config(encounter: &RecordedEncounter, rear: RearDriver) -> Result<ScenarioCon
             "The encounter of track {} (R) with track {} (E) in {}, from {:.1} s on",
             rear_track.track_id,
             ego.track_id,
-            encounter.recording,
+            encounter.data_name,
             encounter.start.s()
         ),
         tags: vec!["reenacted".to_owned()],
@@ -200,7 +201,7 @@ fn is_clear(other: &Trajectory, start: &TrajectoryPoint, vehicle: &Participant) 
 /// Returns the ego stack. Its time gap is the median time headway recorded before the rear vehicle crosses the lane marking,
 /// its set speed the highest recorded speed.
 fn ego_stack(encounter: &RecordedEncounter) -> DriverConfig {
-    let [ego, front, _] = encounter.protagonists();
+    let [ego, front, _] = encounter.ego_lead_rear();
     let mut headways_s: Vec<f64> =
         gaps(ego, front, encounter.crossing).filter_map(|own| time_headway_s(own.gap_m, own.speed_mps).ok()).collect();
     headways_s.sort_by(f64::total_cmp);
@@ -219,7 +220,7 @@ fn ego_stack(encounter: &RecordedEncounter) -> DriverConfig {
 
 /// Returns the rear vehicle's driver as a human driver model that follows the ego as closely as recorded, and as fast.
 fn overtaking_driver(encounter: &RecordedEncounter) -> DriverConfig {
-    let [ego, _, rear] = encounter.protagonists();
+    let [ego, _, rear] = encounter.ego_lead_rear();
     let cut_out_thw_s = encounter.crossing_thw_s;
     let start_mps = start_of(rear).map_or(MIN_SPEED_MPS, |start| start.speed_mps.max(MIN_SPEED_MPS));
     let cc0_m = STANDSTILL_GAP_M.min(0.5 * cut_out_thw_s * start_mps);
@@ -261,7 +262,7 @@ fn gaps(own: &Trajectory, ahead: &Trajectory, until: Time) -> impl Iterator<Item
 
 /// Returns the driver of a vehicle other than the ego, the lead and the rear vehicle, or `None` if it is not simulated.
 fn other_driver(encounter: &RecordedEncounter, vehicle: &Participant) -> Option<DriverConfig> {
-    let (start, rear) = (start_of(&vehicle.trajectory)?, start_of(encounter.protagonists()[REAR])?);
+    let (start, rear) = (start_of(&vehicle.trajectory)?, start_of(encounter.ego_lead_rear()[REAR_INDEX])?);
     let stays = vehicle.trajectory.points.iter().all(|point| point.lane == start.lane);
     if !stays || start.lane == encounter.home {
         return None;

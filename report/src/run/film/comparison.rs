@@ -1,11 +1,11 @@
-//! Comparison of a recorded encounter with the run that re-enacts it, by the metrics that say how close it was.
+//! EncounterComparison of a recorded encounter with the run that re-enacts it, by the metrics that say how close it was.
 //!
 //! Both are evaluated over the same part of the encounter: from the start until the rear vehicle crosses the lane
 //! marking. A collision of the ego or the end of the run ends the evaluation earlier.
 
 use std::fmt::Write as _;
 
-use closecall_scenarios::encounter::{REAR, RecordedEncounter};
+use closecall_scenarios::encounter::{REAR_INDEX, RecordedEncounter};
 use closecall_traffic::metrics::time_headway_s;
 use closecall_traffic::{Absent, Measured, Time};
 
@@ -15,7 +15,7 @@ use closecall_simulation::scenario::RearDriver;
 
 /// Metrics of one encounter that say how close it was.
 #[derive(Clone, Copy, Debug)]
-pub struct Course {
+pub struct EncounterMetrics {
     /// Time at which the rear vehicle crosses the lane marking (s).
     pub crossing_s: Measured,
     /// Time headway of the ego to the lead vehicle at the last frame before the crossing (s).
@@ -32,23 +32,23 @@ pub struct Course {
 
 /// Metrics of a recorded encounter and of the simulated run that re-enacts it.
 #[derive(Clone, Copy, Debug)]
-pub struct Comparison {
+pub struct EncounterComparison {
     /// Metrics of the recorded encounter.
-    pub recorded: Course,
+    pub recorded: EncounterMetrics,
     /// Metrics of the simulated run.
-    pub simulated: Course,
+    pub simulated: EncounterMetrics,
 }
 
-impl Comparison {
+impl EncounterComparison {
     /// Evaluates both films of an encounter. The ego, the lead and the rear vehicle must have the same indices in the
     /// simulated film as in the encounter.
     pub fn new(encounter: &RecordedEncounter, recorded: &Film, simulated: &Film) -> Self {
         let from_lane = encounter.home;
-        let crosses = |frame: &&Frame| simulated.road.lane_at(frame.states[REAR].d_m) != from_lane;
+        let crosses = |frame: &&Frame| simulated.road.lane_at(frame.states[REAR_INDEX].d_m) != from_lane;
         let crossing = simulated.frames.iter().find(crosses).map(|frame| frame.time);
         Self {
-            recorded: Course::measure(recorded, Some(encounter.crossing)),
-            simulated: Course::measure(simulated, crossing),
+            recorded: EncounterMetrics::measure(recorded, Some(encounter.crossing)),
+            simulated: EncounterMetrics::measure(simulated, crossing),
         }
     }
 
@@ -67,7 +67,7 @@ impl Comparison {
     /// Returns the comparison as Markdown: the vehicles, a table of the metrics, and how the run deviates from the
     /// recorded encounter.
     pub fn markdown(&self, encounter: &RecordedEncounter, simulated: &Film, driver: RearDriver) -> String {
-        let [ego, front, rear] = encounter.protagonists().map(|track| track.track_id);
+        let [ego, front, rear] = encounter.ego_lead_rear().map(|track| track.track_id);
         let (arm, start_s) = (simulated.arm(), encounter.start.s());
         let mut page = format!(
             "### Recorded beside {arm}\n\n**Track {rear} (R) behind {ego} (E) behind {front} (F): both halves start alike, at \
@@ -89,15 +89,15 @@ impl Comparison {
         let _ = writeln!(
             page,
             "\nIn the run, F drives as recorded; {rear_driver}{missing_text}. The thin outlines are the vehicles of the other \
-             half. Recording: `{}`.\n",
-            encounter.recording
+             half. TrajectoryData: `{}`.\n",
+            encounter.data_name
         );
         page
     }
 }
 
 /// A metric of the comparison: its name, its unit, and the function that reads it.
-type Row = (&'static str, &'static str, fn(&Course) -> Measured);
+type Row = (&'static str, &'static str, fn(&EncounterMetrics) -> Measured);
 
 const ROWS: [Row; 6] = [
     ("R crosses the marking at", "s", |course| course.crossing_s),
@@ -108,13 +108,13 @@ const ROWS: [Row; 6] = [
     ("R's smallest headway until then", "s", |course| course.min_thw_rear_s),
 ];
 
-impl Course {
+impl EncounterMetrics {
     /// Evaluates a film up to `crossing`, the time at which the rear vehicle crosses the marking, if it does.
     fn measure(film: &Film, crossing: Option<Time>) -> Self {
         let collided_at = film.worst_collision().map(|collision| collision.time);
         let until = [crossing, collided_at].into_iter().flatten().min();
         let frames = || film.frames.iter().take_while(|frame| until.is_none_or(|until| frame.time < until));
-        let rear = |frame: &Frame| headway_s(film, frame, REAR);
+        let rear = |frame: &Frame| headway_s(film, frame, REAR_INDEX);
         // A crossing after the collision is not part of the encounter and does not count.
         let crossing = crossing.filter(|crossing| collided_at.is_none_or(|collided_at| *crossing <= collided_at));
         let before = frames().last().filter(|_| crossing.is_some());

@@ -4,7 +4,7 @@
 //! those of the scenario that is made from the encounter, so that one film can be drawn into the other. The frames are
 //! one control step of the simulation apart.
 
-use closecall_scenarios::encounter::{EGO, RecordedEncounter};
+use closecall_scenarios::encounter::{EGO_INDEX, RecordedEncounter};
 use closecall_traffic::{Environment, Time, Trajectory, Vehicle};
 
 use super::traffic::{frame_at, present_frames, straight_road};
@@ -26,16 +26,16 @@ pub fn film_encounter(encounter: &RecordedEncounter, level: Level) -> Result<Fil
         present_frames: present_frames(track, times()),
         is_plotted: true,
     };
-    let [ego, _, rear] = encounter.protagonists();
+    let [ego, _, rear] = encounter.ego_lead_rear();
     Ok(Film {
-        title: format!("{}: track {} behind track {}", encounter.recording, rear.track_id, ego.track_id),
+        title: format!("{}: track {} behind track {}", encounter.data_name, rear.track_id, ego.track_id),
         arm: "recorded".to_owned(),
         level,
         period: CONTROL_STEP,
         road: straight_road(encounter.lanes, encounter.lane_width_m)?,
         environment: Environment::CLEAR_DAY,
         actors: tracks.iter().enumerate().map(film_actor).collect(),
-        ego: EGO,
+        ego: EGO_INDEX,
         frames: times().map(|time| frame_at(&tracks, time)).collect(),
         happenings: Vec::new(),
         notes: notes(encounter),
@@ -50,7 +50,7 @@ pub fn film_encounter(encounter: &RecordedEncounter, level: Level) -> Result<Fil
 /// Returns notes about the lane changes of the ego, the lead and the rear vehicle.
 fn notes(encounter: &RecordedEncounter) -> Vec<(Time, String)> {
     let mut notes = Vec::new();
-    for (index, vehicle) in encounter.vehicles.iter().take(encounter.protagonists().len()).enumerate() {
+    for (index, vehicle) in encounter.vehicles.iter().take(encounter.ego_lead_rear().len()).enumerate() {
         let name = actor_name(index, &vehicle.trajectory);
         for change in &vehicle.changes {
             let mut note = |recorded_s: f64, text: &str| {

@@ -112,7 +112,7 @@ impl Film {
 
     /// Limits the plots of speed and acceleration to the first `count` vehicles.
     #[must_use]
-    pub fn plotting_first(mut self, count: usize) -> Self {
+    pub fn with_plots_of_first(mut self, count: usize) -> Self {
         for (index, actor) in self.actors.iter_mut().enumerate() {
             actor.is_plotted = index < count;
         }

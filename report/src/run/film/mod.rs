@@ -22,7 +22,7 @@ mod story;
 mod traffic;
 
 pub use arms::film_arms;
-pub use comparison::{Comparison, Course};
+pub use comparison::{EncounterComparison, EncounterMetrics};
 pub use encounter::film_encounter;
 pub(super) use frames::Limit;
 pub use frames::{Film, FilmActor, Frame, Level};

@@ -30,7 +30,7 @@ impl Scan {
         let mut clusters = vec![NO_CLUSTER; scan.len()];
         for detection in 0..lidar.detections().len() {
             let cluster = u8::try_from(detection % usize::from(NO_CLUSTER)).unwrap_or(0);
-            for &point in lidar.points_of(detection) {
+            for &point in lidar.point_indices_of(detection) {
                 clusters[point as usize] = cluster;
             }
         }

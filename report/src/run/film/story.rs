@@ -46,7 +46,7 @@ impl Film {
     }
 
     /// Returns a summary of what the margin increase system did and why, or `None` if the arm has no such system.
-    pub fn verdict_on_mis(&self) -> Option<String> {
+    pub fn mis_summary(&self) -> Option<String> {
         let mis = self.outcome.as_ref()?.mis.as_ref().ok()?;
         Some(match mis.engaged_at_s {
             Ok(engaged_at_s) => {

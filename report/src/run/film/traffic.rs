@@ -6,7 +6,7 @@
 //! indicators, so that none are shown.
 
 use closecall_scenarios::criticality::CriticalLaneChange;
-use closecall_scenarios::filters::{PERIOD, SmoothedRecording};
+use closecall_scenarios::filters::{PERIOD, SmoothedTrajectoryData};
 use closecall_traffic::metrics::{time_headway_s, time_to_collision_s};
 use closecall_traffic::{
     Absent, Check, ConfigError, Environment, Num, Parameters, Road, RoadConfig, Side, Time, Trajectory,
@@ -47,7 +47,10 @@ pub enum TrafficFilmError {
 ///
 /// # Errors
 /// [`TrafficFilmError`] if the trajectory data do not contain the track, or no road can be built from its lanes.
-pub fn film_lane_change(recording: &SmoothedRecording, change: &CriticalLaneChange) -> Result<Film, TrafficFilmError> {
+pub fn film_lane_change(
+    recording: &SmoothedTrajectoryData,
+    change: &CriticalLaneChange,
+) -> Result<Film, TrafficFilmError> {
     let track_id = change.lane_change.track_id;
     let own = recording.trajectories().find(|track| track.track_id == track_id);
     let own = own.ok_or(TrafficFilmError::NoTrack { track_id })?;
@@ -84,7 +87,7 @@ pub fn film_lane_change(recording: &SmoothedRecording, change: &CriticalLaneChan
 
 /// Returns the track `own`, followed by all other tracks that come near it.
 fn nearby_tracks<'a>(
-    recording: &'a SmoothedRecording,
+    recording: &'a SmoothedTrajectoryData,
     own: &'a Trajectory,
     instants: &[&TrajectoryPoint],
 ) -> Vec<&'a Trajectory> {
@@ -104,7 +107,7 @@ pub(super) fn present_frames(track: &Trajectory, instants: impl Iterator<Item = 
     }
 }
 
-fn road(recording: &SmoothedRecording, tracks: &[&Trajectory]) -> Result<Road, ConfigError> {
+fn road(recording: &SmoothedTrajectoryData, tracks: &[&Trajectory]) -> Result<Road, ConfigError> {
     let lanes = tracks.iter().flat_map(|track| track.points.iter().map(|point| point.lane.0)).max();
     straight_road(lanes.unwrap_or(1).clamp(1, MAX_LANES), recording.markings.typical_lane_width_m())
 }
@@ -193,7 +196,7 @@ fn notes(change: &CriticalLaneChange) -> Vec<(Time, String)> {
         (Time::from_s(found.end_s), "the lane change ends".to_owned()),
     ];
     for (name, metric) in change.metrics.named() {
-        if let closecall_scenarios::criticality::MetricRecord::Value { value, opponent, time_s, critical } = metric {
+        if let closecall_scenarios::criticality::MetricResult::Value { value, opponent, time_s, critical } = metric {
             let against = opponent.map_or(String::new(), |track| format!(" against track {track}"));
             let mark = if critical { ": CRITICAL" } else { "" };
             notes.push((Time::from_s(time_s), format!("most critical {name} {value:.2}{against}{mark}")));

@@ -13,7 +13,7 @@
 use closecall_traffic::{Indicator, Lane, Source, Time, TrackStatus};
 use rerun::{LineStrips2D, Points2D};
 
-use super::RecordError;
+use super::RecordingError;
 use super::palette::{self, Rgba};
 use super::stream::Writer;
 use super::vehicles::LABELLED_GAP_M;
@@ -39,7 +39,7 @@ pub(super) fn edges(film: &Film) -> [f64; 2] {
     [0.0, -film.road.right_edge_m() * STRETCH]
 }
 
-pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError> {
+pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingError> {
     let times = film.times();
     write_lanes(writer, film)?;
     write_bodies(writer, film, &times)?;
@@ -56,7 +56,7 @@ fn at(film: &Film, frame: &Frame, s_m: f64, d_m: f64) -> [f32; 2] {
 }
 
 /// Writes the edges of the road and the lane markings.
-fn write_lanes(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError> {
+fn write_lanes(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingError> {
     let road = &film.road;
     let lines = (0..=road.lanes()).map(|line| match line {
         0 => 0.0,
@@ -73,7 +73,7 @@ fn write_lanes(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError> {
 }
 
 /// Writes a bar for each vehicle that is present, with its name and speed.
-fn write_bodies(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordError> {
+fn write_bodies(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordingError> {
     for (index, actor) in film.actors.iter().enumerate().filter(|(_, actor)| !actor.present_frames.is_empty()) {
         let entity = format!("bird/vehicles/{}", actor.name);
         let size = &actor.vehicle.dimensions;
@@ -103,7 +103,7 @@ fn write_bodies(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), 
 }
 
 /// Writes the velocities as lines in front of the vehicles.
-fn write_speeds(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordError> {
+fn write_speeds(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordingError> {
     let entity = "bird/velocity";
     writer
         .write_static(entity, &LineStrips2D::update_fields().with_radii([0.5_f32]).with_draw_order(VELOCITY_ORDER))?;
@@ -128,7 +128,7 @@ fn write_speeds(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), 
 }
 
 /// Writes the brake lights and indicators that are on.
-fn write_lamps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordError> {
+fn write_lamps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordingError> {
     let lit = |row: usize| -> Vec<([f32; 2], Rgba)> {
         let frame = &film.frames[row];
         let mut lamps = Vec::new();
@@ -165,7 +165,7 @@ fn write_lamps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), R
 type Gap = ([[f32; 2]; 2], Rgba, String);
 
 /// Writes the gaps in front of and behind the ego with their time headways. A critical gap is red.
-fn write_gaps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordError> {
+fn write_gaps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordingError> {
     let half_m = 0.5 * film.actors[film.ego].vehicle.dimensions.length_m;
     let gaps = |frame: &Frame| -> Vec<Gap> {
         let own = &frame.states[film.ego];
@@ -194,7 +194,7 @@ fn write_gaps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), Re
 }
 
 /// Writes the outlines of the confirmed rear tracks that are probably vehicles.
-fn write_tracks(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordError> {
+fn write_tracks(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordingError> {
     let outlines = |frame: &Frame| -> Vec<Vec<[f32; 2]>> {
         let own = &frame.states[film.ego];
         let is_shown = |track: &&closecall_traffic::Track| {
@@ -226,7 +226,7 @@ fn write_tracks(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), 
 }
 
 /// Writes a mark on the first vehicle of the worst collision, from the contact on.
-fn write_collisions(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError> {
+fn write_collisions(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingError> {
     let Some(collision) = film.worst_collision() else { return Ok(()) };
     let struck = film.actors.iter().position(|actor| actor.name == collision.between[0].as_str());
     let Some(row) = film.frames.iter().position(|frame| frame.time >= collision.time) else { return Ok(()) };

@@ -4,12 +4,12 @@
 //! same noise. It renders every [`PIXEL_STEP`]-th pixel, and only at selected instants, since an image costs as much as
 //! a hundred control steps. An image and its windows stay visible until the next image.
 
-use closecall_sensors::camera::{ExposureKey, Frame as Exposure, Lists, PixelRect, RearCamera};
+use closecall_sensors::camera::{ExposureKey, Frame as Exposure, FrameBuffers, PixelRect, RearCamera};
 use closecall_sensors::{Detection, rear_exposures};
 use closecall_traffic::{Time, VehicleClass};
 use rerun::{Boxes2D, Image};
 
-use super::RecordError;
+use super::RecordingError;
 use super::palette::{self, Rgba};
 use super::stream::Writer;
 use crate::run::film::{Film, Frame};
@@ -22,12 +22,12 @@ const PIXEL_ROWS: std::ops::Range<u16> = 230..610;
 const TIMES_BEFORE: [Time; 3] = [Time::from_ms(2_000), Time::from_ms(800), Time::ZERO];
 
 /// Writes the images. Returns true if there are any.
-pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<bool, RecordError> {
+pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<bool, RecordingError> {
     let Some((camera, key)) = &film.camera else { return Ok(false) };
     let camera = RearCamera::new(*camera);
     let fixed = Boxes2D::update_fields().with_radii([-1.5_f32]).with_show_labels(true);
     writer.write_static("camera/windows", &fixed)?;
-    let mut lists = Lists::default();
+    let mut lists = FrameBuffers::default();
     let mut has_images = false;
     for (frame, exposure) in frames_to_render(film, rear_exposures(key)) {
         let image;
@@ -53,21 +53,26 @@ fn frames_to_render(film: &Film, keys: impl Iterator<Item = ExposureKey>) -> Vec
 }
 
 /// Renders the image of a frame. The buffers `lists` are passed on to the next image.
-fn render(film: &Film, camera: &RearCamera, frame: &Frame, (key, lists): (ExposureKey, Lists)) -> (Image, Lists) {
+fn render(
+    film: &Film,
+    camera: &RearCamera,
+    frame: &Frame,
+    (key, lists): (ExposureKey, FrameBuffers),
+) -> (Image, FrameBuffers) {
     let (ego, others) = film.scene_vehicles(frame);
     let scene = film.scene(frame, ego, &others);
-    let mut exposure = Exposure::reusing(lists, camera.camera(), &scene, key, &[PixelRect::IMAGE]);
+    let mut exposure = Exposure::with_buffers(lists, camera.camera(), &scene, key, &[PixelRect::IMAGE]);
     let picture = exposure.preview(PIXEL_STEP, PIXEL_ROWS);
     let image = Image::from_rgb24(picture.rgb, [picture.width, picture.height]);
-    (image, exposure.into_lists())
+    (image, exposure.into_buffers())
 }
 
 /// Writes the windows of the detections of a frame with their classes.
-fn write_windows(writer: &Writer<'_>, film: &Film, camera: &RearCamera, frame: &Frame) -> Result<(), RecordError> {
+fn write_windows(writer: &Writer<'_>, film: &Film, camera: &RearCamera, frame: &Frame) -> Result<(), RecordingError> {
     let (ego, _) = film.scene_vehicles(frame);
     let boxes = frame.scan.as_ref().map_or(&[][..], |scan| &scan.boxes);
     let in_image: Vec<(&Detection, PixelRect)> =
-        boxes.iter().filter_map(|found| Some((found, camera.window_of(&ego, found)?))).collect();
+        boxes.iter().filter_map(|found| Some((found, camera.detection_window(&ego, found)?))).collect();
     let scale = 1.0 / f32::from(PIXEL_STEP);
     let corner =
         |window: &PixelRect| [window.left as f32 * scale, (window.top as f32 - f32::from(PIXEL_ROWS.start)) * scale];

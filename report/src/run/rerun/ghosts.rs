@@ -5,7 +5,7 @@
 use closecall_traffic::Time;
 use rerun::{Boxes3D, FillMode, LineStrips2D};
 
-use super::RecordError;
+use super::RecordingError;
 use super::bird::STRETCH;
 use super::palette;
 use super::stream::Writer;
@@ -16,14 +16,14 @@ use crate::run::film::Film;
 const OPACITY: u8 = 120;
 
 /// Writes the vehicles of `other` into the 3D scene and the view from above of `film`.
-pub(super) fn write(writer: &Writer<'_>, film: &Film, other: &Film) -> Result<(), RecordError> {
+pub(super) fn write(writer: &Writer<'_>, film: &Film, other: &Film) -> Result<(), RecordingError> {
     for (index, _) in other.actors.iter().enumerate().filter(|(_, actor)| !actor.present_frames.is_empty()) {
         write_outline(writer, other, index)?;
     }
     write_from_above(writer, film, other)
 }
 
-fn write_outline(writer: &Writer<'_>, other: &Film, index: usize) -> Result<(), RecordError> {
+fn write_outline(writer: &Writer<'_>, other: &Film, index: usize) -> Result<(), RecordingError> {
     let actor = &other.actors[index];
     let size = &actor.vehicle.dimensions;
     let entity = format!("world/ghosts/{}", actor.name);
@@ -55,7 +55,7 @@ fn write_outline(writer: &Writer<'_>, other: &Film, index: usize) -> Result<(), 
     }
 }
 
-fn write_from_above(writer: &Writer<'_>, film: &Film, other: &Film) -> Result<(), RecordError> {
+fn write_from_above(writer: &Writer<'_>, film: &Film, other: &Film) -> Result<(), RecordingError> {
     let entity = "bird/ghosts";
     let count = film.frames.len().min(other.frames.len());
     let times: Vec<Time> = film.frames[..count].iter().map(|frame| frame.time).collect();

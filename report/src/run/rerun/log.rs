@@ -3,7 +3,7 @@
 use closecall_traffic::Time;
 use rerun::{TextLog, TextLogLevel};
 
-use super::RecordError;
+use super::RecordingError;
 use super::palette::{self, Rgba};
 use super::plots::phase_name;
 use super::stream::Writer;
@@ -21,7 +21,7 @@ struct Line {
 
 /// Writes the log of a film. Unless the film is the only one of the recording, each line begins with the name of its
 /// arm.
-pub(super) fn write(writer: &Writer<'_>, film: &Film, is_alone: bool) -> Result<(), RecordError> {
+pub(super) fn write(writer: &Writer<'_>, film: &Film, is_alone: bool) -> Result<(), RecordingError> {
     let start = film.frames.first().map_or(Time::ZERO, |frame| frame.time);
     let plain = |entity, time, text| Line { time, entity, level: TextLogLevel::INFO, colour: palette::NEUTRAL, text };
     let mut lines = vec![plain("log/run", start, film.title.clone())];

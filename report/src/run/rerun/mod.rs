@@ -27,4 +27,4 @@ mod truth;
 mod vehicles;
 mod write;
 
-pub use write::{RecordError, check_recordable, record_films, write_films};
+pub use write::{RecordingError, check_recording_possible, write_recording, write_recording_unchecked};

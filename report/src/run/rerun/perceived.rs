@@ -7,7 +7,7 @@ use closecall_traffic::{Source, Time, Track, TrackStatus};
 use nalgebra::{Matrix2, SymmetricEigen};
 use rerun::{Boxes3D, Ellipsoids3D, FillMode, LineStrips3D, Quaternion};
 
-use super::RecordError;
+use super::RecordingError;
 use super::palette::{self, Rgba};
 use super::stream::{Writer, changes};
 use super::vehicles::yaw_rotation;
@@ -36,7 +36,7 @@ const PATH_Z_M: f32 = 0.12;
 /// The groups of sensors, with the names of their entities.
 const SOURCES: [(Source, &str); 3] = [(Source::Front, "front"), (Source::Surround, "surround"), (Source::Rear, "rear")];
 
-pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError> {
+pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingError> {
     let times = film.times();
     write_rear_field(writer, film, &times)?;
     for (source, name) in SOURCES {
@@ -60,7 +60,7 @@ fn write_predictions(
     entity: &str,
     times: &[Time],
     tracks: &[Vec<Track>],
-) -> Result<(), RecordError> {
+) -> Result<(), RecordingError> {
     writer.write_static(entity, &LineStrips3D::update_fields().with_radii([0.05_f32]))?;
     let is_shown = |track: &&Track| track.status != TrackStatus::Tentative && track.class.vehicle() >= 0.5;
     writer.write_rows(entity, times, |range| {
@@ -78,7 +78,7 @@ fn write_predictions(
 }
 
 /// Writes the predicted path of the ego, at the acceleration that its controller commands.
-fn write_own_path(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordError> {
+fn write_own_path(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordingError> {
     if film.frames.iter().any(|frame| frame.command.is_none()) {
         return Ok(());
     }
@@ -104,7 +104,7 @@ fn predicted_distance_m(speed_mps: f64, acceleration_mps2: f64) -> f64 {
 }
 
 /// Writes the outline of the field of view of the rear sensor, which begins at the rear bumper.
-fn write_rear_field(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordError> {
+fn write_rear_field(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordingError> {
     let fields: Vec<Option<FieldOfView>> = film.frames.iter().map(|frame| frame.rear_field).collect();
     if fields.iter().all(Option::is_none) {
         return Ok(());
@@ -135,7 +135,7 @@ fn edge(field: &FieldOfView, bumper_m: f64) -> Vec<[f32; 3]> {
 }
 
 /// Writes the boxes of the tracks.
-fn write_boxes(writer: &Writer<'_>, entity: &str, times: &[Time], tracks: &[Vec<Track>]) -> Result<(), RecordError> {
+fn write_boxes(writer: &Writer<'_>, entity: &str, times: &[Time], tracks: &[Vec<Track>]) -> Result<(), RecordingError> {
     // The viewer shows the label of the box under the pointer. All labels at once would hide the scene.
     let fixed = Boxes3D::update_fields()
         .with_fill_mode(FillMode::MajorWireframe)
@@ -157,7 +157,12 @@ fn write_boxes(writer: &Writer<'_>, entity: &str, times: &[Time], tracks: &[Vec<
 }
 
 /// Writes the ellipses of the position covariances.
-fn write_ellipses(writer: &Writer<'_>, entity: &str, times: &[Time], tracks: &[Vec<Track>]) -> Result<(), RecordError> {
+fn write_ellipses(
+    writer: &Writer<'_>,
+    entity: &str,
+    times: &[Time],
+    tracks: &[Vec<Track>],
+) -> Result<(), RecordingError> {
     let fixed = Ellipsoids3D::update_fields().with_fill_mode(FillMode::MajorWireframe).with_line_radii([0.02_f32]);
     writer.write_static(entity, &fixed)?;
     writer.write_rows(entity, times, |range| {

@@ -6,7 +6,7 @@ use closecall_traffic::Time;
 use closecall_traffic::metrics::Encounter;
 use rerun::{SeriesLines, StateChange, StateConfiguration};
 
-use super::RecordError;
+use super::RecordingError;
 use super::palette::{self, Rgba};
 use super::stream::{Writer, changes};
 use crate::run::film::{Film, Frame, ego_state_name};
@@ -32,7 +32,7 @@ pub(super) enum Role {
 pub(super) type PlotNames = Vec<&'static str>;
 
 /// Writes all curves and bands of a film, and returns the names of the plots that have a curve.
-pub(super) fn write(writer: &Writer<'_>, film: &Film, role: Role) -> Result<PlotNames, RecordError> {
+pub(super) fn write(writer: &Writer<'_>, film: &Film, role: Role) -> Result<PlotNames, RecordingError> {
     let plots = Plots { writer, film, role, times: film.times() };
     let mut names = PlotNames::new();
     let mut note = |name: &'static str, has_curve: bool| names.extend(has_curve.then_some(name));
@@ -69,12 +69,12 @@ impl Plots<'_> {
         entity: &str,
         style: &CurveStyle<'_>,
         of: impl Fn(&Frame) -> Option<f64>,
-    ) -> Result<bool, RecordError> {
+    ) -> Result<bool, RecordingError> {
         self.series(entity, style, &self.film.frames.iter().map(of).collect::<Vec<_>>())
     }
 
     /// Writes a curve of `values`, one per frame. Returns true if it has any value.
-    fn series(&self, entity: &str, style: &CurveStyle<'_>, values: &[Option<f64>]) -> Result<bool, RecordError> {
+    fn series(&self, entity: &str, style: &CurveStyle<'_>, values: &[Option<f64>]) -> Result<bool, RecordingError> {
         if values.iter().all(Option::is_none) {
             return Ok(false);
         }
@@ -84,7 +84,7 @@ impl Plots<'_> {
     }
 
     /// Writes name and style of a curve.
-    fn write_style(&self, entity: &str, curve: &CurveStyle<'_>) -> Result<(), RecordError> {
+    fn write_style(&self, entity: &str, curve: &CurveStyle<'_>) -> Result<(), RecordingError> {
         let name = match self.role {
             Role::Alone => curve.name.to_owned(),
             Role::Baseline | Role::Tested => format!("{} ({})", curve.name, self.film.arm),
@@ -99,7 +99,7 @@ impl Plots<'_> {
 
     /// Writes a reference level from the first to the last frame. The baseline writes none, since the tested film has
     /// the same.
-    fn level(&self, entity: &str, name: &str, level: f64) -> Result<(), RecordError> {
+    fn level(&self, entity: &str, name: &str, level: f64) -> Result<(), RecordingError> {
         if self.role == Role::Baseline {
             return Ok(());
         }
@@ -110,7 +110,7 @@ impl Plots<'_> {
     }
 
     /// Writes the time headways in front of and behind the ego.
-    fn headways(&self) -> Result<bool, RecordError> {
+    fn headways(&self) -> Result<bool, RecordingError> {
         let front = CurveStyle { name: "front", colour: palette::FRONT, width: LINE_WIDTH };
         let front = self.curve("plots/headway/front", &front, |frame| frame.margins.thw_front_s.ok())?;
         let rear = CurveStyle { name: "rear", colour: palette::REAR, width: LINE_WIDTH };
@@ -122,7 +122,7 @@ impl Plots<'_> {
     }
 
     /// Writes the gaps in front of and behind the ego, and the rear gap as the MIS estimates it.
-    fn gaps(&self) -> Result<bool, RecordError> {
+    fn gaps(&self) -> Result<bool, RecordingError> {
         let front = CurveStyle { name: "front", colour: palette::FRONT, width: LINE_WIDTH };
         let front = self.curve("plots/gap/front", &front, |frame| frame.margins.gap_front_m.ok())?;
         let rear = CurveStyle { name: "rear", colour: palette::REAR, width: LINE_WIDTH };
@@ -133,7 +133,7 @@ impl Plots<'_> {
     }
 
     /// Writes the next closest encounter at the present velocities, in the ground truth and as the MIS estimates it.
-    fn encounter(&self) -> Result<bool, RecordError> {
+    fn encounter(&self) -> Result<bool, RecordingError> {
         let encounters: Vec<Option<Encounter>> =
             (0..self.times.len()).map(|row| self.film.soonest_encounter(row)).collect();
         let of = |of: fn(&Encounter) -> f64| encounters.iter().map(|at| at.as_ref().map(of)).collect::<Vec<_>>();
@@ -156,7 +156,7 @@ impl Plots<'_> {
     }
 
     /// Writes speeds and accelerations of the vehicles, the commanded acceleration of the ego, and its limits.
-    fn motion(&self) -> Result<(), RecordError> {
+    fn motion(&self) -> Result<(), RecordingError> {
         for (index, actor) in self.film.actors.iter().enumerate().filter(|(_, actor)| actor.is_plotted) {
             let colour = palette::actor(index, self.film.ego);
             let style = CurveStyle { name: &actor.name, colour, width: LINE_WIDTH };
@@ -177,7 +177,7 @@ impl Plots<'_> {
     }
 
     /// Writes the front time headway gained since the MIS first engaged, with its goal.
-    fn margin(&self) -> Result<bool, RecordError> {
+    fn margin(&self) -> Result<bool, RecordingError> {
         let is_increasing = |frame: &&Frame| frame.command.is_some_and(|command| command.state == EgoState::Increasing);
         let first = self.film.frames.iter().find(is_increasing);
         let start = first.and_then(|frame| Some((frame.time, frame.margins.thw_front_s.ok()?, plan(frame))));
@@ -194,7 +194,7 @@ impl Plots<'_> {
     }
 
     /// Writes the bands: the state of the MIS, the phase, the moments, and the brake lights.
-    fn states(&self) -> Result<(), RecordError> {
+    fn states(&self) -> Result<(), RecordingError> {
         let frames = &self.film.frames;
         if frames.iter().all(|frame| frame.command.is_some()) {
             let state = |frame: &Frame| frame.command.map_or("", |command| ego_state_name(command.state));
@@ -214,7 +214,7 @@ impl Plots<'_> {
     }
 
     /// Writes a band that shows the latest of the moments (a) to (e) at each time.
-    fn moments(&self) -> Result<(), RecordError> {
+    fn moments(&self) -> Result<(), RecordingError> {
         let moments = self.film.moments();
         if moments.is_empty() {
             return Ok(());
@@ -233,7 +233,7 @@ impl Plots<'_> {
     }
 
     /// Writes a band with one state name per frame.
-    fn band(&self, entity: &str, words: &[&str], colours: &[(&str, Rgba)]) -> Result<(), RecordError> {
+    fn band(&self, entity: &str, words: &[&str], colours: &[(&str, Rgba)]) -> Result<(), RecordingError> {
         let configuration = StateConfiguration::new()
             .with_values(colours.iter().map(|(word, _)| *word))
             .with_labels(colours.iter().map(|(word, _)| *word))

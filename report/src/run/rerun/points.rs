@@ -10,7 +10,7 @@ use closecall_sensors::Detection;
 use closecall_traffic::Time;
 use rerun::{Boxes3D, FillMode, Points3D};
 
-use super::RecordError;
+use super::RecordingError;
 use super::palette::{self, Rgba};
 use super::stream::Writer;
 use super::vehicles::yaw_rotation;
@@ -20,7 +20,7 @@ use crate::run::film::{Film, NO_CLUSTER, Scan};
 const POINT_RADIUS_M: f32 = 0.05;
 
 /// Writes the layers, and returns the entities that the scene hides until the user switches them on.
-pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<Vec<String>, RecordError> {
+pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<Vec<String>, RecordingError> {
     let kept: Vec<(Time, &Scan)> = kept_scans(film);
     if kept.is_empty() {
         return Ok(Vec::new());
@@ -73,7 +73,7 @@ fn layer(scans: &[&Scan], colour: impl Fn(&Scan, usize) -> Option<Rgba>) -> Laye
     layer
 }
 
-fn write_layer(writer: &Writer<'_>, entity: &str, times: &[Time], layer: &Layer) -> Result<(), RecordError> {
+fn write_layer(writer: &Writer<'_>, entity: &str, times: &[Time], layer: &Layer) -> Result<(), RecordingError> {
     writer.write_static(entity, &Points3D::update_fields().with_radii([POINT_RADIUS_M]))?;
     writer.write_rows(entity, times, |range| {
         let first = layer.starts[range.start];
@@ -86,7 +86,7 @@ fn write_layer(writer: &Writer<'_>, entity: &str, times: &[Time], layer: &Layer)
 }
 
 /// Writes the boxes fitted to the clusters.
-fn write_boxes(writer: &Writer<'_>, times: &[Time], scans: &[&Scan]) -> Result<(), RecordError> {
+fn write_boxes(writer: &Writer<'_>, times: &[Time], scans: &[&Scan]) -> Result<(), RecordingError> {
     let entity = "world/ego/lidar/boxes";
     let fixed = Boxes3D::update_fields()
         .with_fill_mode(FillMode::MajorWireframe)

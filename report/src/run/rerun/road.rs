@@ -3,7 +3,7 @@
 use closecall_traffic::{Lane, Road};
 use rerun::{LineStrips3D, Mesh3D};
 
-use super::RecordError;
+use super::RecordingError;
 use super::palette::{self, Rgba};
 use super::stream::Writer;
 use crate::run::film::Film;
@@ -36,7 +36,7 @@ const VERGE_Z_M: f64 = -0.30;
 /// Height of the lane markings (m).
 const MARKING_Z_M: f64 = 0.03;
 
-pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError> {
+pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingError> {
     let road = &film.road;
     let (first_m, last_m) = film.s_range_m();
     if !(first_m <= last_m) {

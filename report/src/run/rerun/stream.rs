@@ -12,7 +12,7 @@ use rerun::{
     SerializedComponentColumn, TimeCell, TimeColumn,
 };
 
-use super::RecordError;
+use super::RecordingError;
 
 /// Timeline of the simulated time.
 pub(super) const TIME_TIMELINE: &str = "time";
@@ -44,7 +44,7 @@ impl<'a> Writer<'a> {
     }
 
     /// Writes components that hold for the whole run.
-    pub(super) fn write_static(&self, entity: &str, what: &impl AsComponents) -> Result<(), RecordError> {
+    pub(super) fn write_static(&self, entity: &str, what: &impl AsComponents) -> Result<(), RecordingError> {
         Ok(self.stream.log_static(self.path(entity), what)?)
     }
 
@@ -55,7 +55,7 @@ impl<'a> Writer<'a> {
         entity: &str,
         times: &[Time],
         build: impl Fn(Range<usize>) -> SerializationResult<C>,
-    ) -> Result<(), RecordError>
+    ) -> Result<(), RecordingError>
     where
         C: Iterator<Item = SerializedComponentColumn>,
     {
@@ -71,7 +71,7 @@ impl<'a> Writer<'a> {
     }
 
     /// Writes components that hold from `time` on.
-    pub(super) fn write_from(&self, entity: &str, time: Time, what: &impl AsComponents) -> Result<(), RecordError> {
+    pub(super) fn write_from(&self, entity: &str, time: Time, what: &impl AsComponents) -> Result<(), RecordingError> {
         for timeline in self.timelines(&[time]) {
             let cell = TimeCell::new(timeline.timeline().typ(), timeline.times_raw()[0]);
             self.stream.set_time(*timeline.timeline().name(), cell);
@@ -82,12 +82,17 @@ impl<'a> Writer<'a> {
     }
 
     /// Removes an entity and its children from `time` on.
-    pub(super) fn write_clear(&self, entity: &str, time: Time) -> Result<(), RecordError> {
+    pub(super) fn write_clear(&self, entity: &str, time: Time) -> Result<(), RecordingError> {
         self.write_rows(entity, &[time], |_| Clear::recursive().columns_of_unit_batches())
     }
 
     /// Writes the values of a plotted curve. An absent value leaves a gap.
-    pub(super) fn write_series(&self, entity: &str, times: &[Time], values: &[Option<f64>]) -> Result<(), RecordError> {
+    pub(super) fn write_series(
+        &self,
+        entity: &str,
+        times: &[Time],
+        values: &[Option<f64>],
+    ) -> Result<(), RecordingError> {
         self.write_rows(entity, times, |range| {
             let values = &values[range];
             let lengths: Vec<usize> = values.iter().map(|value| usize::from(value.is_some())).collect();

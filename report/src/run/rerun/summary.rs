@@ -26,7 +26,7 @@ pub(super) fn markdown(films: &[Film]) -> String {
 fn push_story(page: &mut String, film: &Film) {
     // Writing to a string cannot fail.
     let _ = write!(page, "### {}\n\n**{}**\n\n", film.title, film.headline());
-    if let Some(verdict) = film.verdict_on_mis() {
+    if let Some(verdict) = film.mis_summary() {
         let _ = write!(page, "{verdict}\n\n");
     }
     for line in film.story() {

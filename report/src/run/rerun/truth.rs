@@ -1,4 +1,4 @@
-//! Comparison of perception with the ground truth behind the ego: known vehicles, missed vehicles, and false tracks.
+//! EncounterComparison of perception with the ground truth behind the ego: known vehicles, missed vehicles, and false tracks.
 //!
 //! A vehicle in the field of view of the rear sensor counts as known if the near face of a confirmed rear track lies
 //! within [`MATCH_DISTANCE_M`] of its own near face. Otherwise it counts as missed, even if another vehicle hides it.
@@ -7,7 +7,7 @@ use closecall_sensors::FieldOfView;
 use closecall_traffic::{Source, Time, Track, TrackStatus};
 use rerun::{Boxes3D, FillMode, Quaternion};
 
-use super::RecordError;
+use super::RecordingError;
 use super::palette::{self, Rgba};
 use super::stream::Writer;
 use super::vehicles::yaw_rotation;
@@ -40,7 +40,7 @@ struct FrameComparison {
 type Layer = (&'static str, Rgba, fn(&FrameComparison) -> &Vec<Shape>);
 
 /// Writes the layers, and returns the entities that the scene hides until the user switches them on.
-pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<Vec<String>, RecordError> {
+pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<Vec<String>, RecordingError> {
     if film.frames.iter().all(|frame| frame.tracks.is_empty() && frame.rear_field.is_none()) {
         return Ok(Vec::new());
     }
@@ -63,7 +63,7 @@ fn write_layer(
     (entity, colour): (&str, Rgba),
     times: &[Time],
     shapes: &[&Vec<Shape>],
-) -> Result<(), RecordError> {
+) -> Result<(), RecordingError> {
     let fixed =
         Boxes3D::update_fields().with_fill_mode(FillMode::MajorWireframe).with_radii([0.05_f32]).with_colors([colour]);
     writer.write_static(entity, &fixed)?;

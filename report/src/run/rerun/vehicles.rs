@@ -4,7 +4,7 @@ use closecall_traffic::geometry::BoxSide;
 use closecall_traffic::{Dimensions, Indicator, Measured, Road, Time, VehicleClass, VehicleState};
 use rerun::{Arrows3D, Boxes3D, FillMode, LineStrips3D, Points3D, Quaternion, Transform3D};
 
-use super::RecordError;
+use super::RecordingError;
 use super::bodies;
 use super::palette::{self, Rgba};
 use super::stream::{Writer, changes};
@@ -30,7 +30,7 @@ pub(super) fn entity(film: &Film, actor: usize) -> String {
     if actor == film.ego { "world/ego".to_owned() } else { format!("world/vehicles/{}", film.actors[actor].name) }
 }
 
-pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError> {
+pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingError> {
     let all_times = film.times();
     for (index, actor) in film.actors.iter().enumerate().filter(|(_, actor)| !actor.present_frames.is_empty()) {
         let entity = entity(film, index);
@@ -64,7 +64,7 @@ fn write_motion(
     times: &[Time],
     states: &[&VehicleState],
     road: &Road,
-) -> Result<(), RecordError> {
+) -> Result<(), RecordingError> {
     let poses: Vec<_> = states.iter().map(|state| road.plane_pose(state.s_m, state.d_m, state.heading_rad)).collect();
     writer.write_rows(entity, times, |range| {
         let poses = &poses[range];
@@ -87,7 +87,7 @@ fn write_velocity(
     times: &[Time],
     states: &[&VehicleState],
     (size, colour): (&Dimensions, Rgba),
-) -> Result<(), RecordError> {
+) -> Result<(), RecordingError> {
     let entity = format!("{entity}/velocity");
     let above_m = (size.height_m + 0.5 * LABEL_ABOVE_M) as f32;
     let fixed = Arrows3D::update_fields()
@@ -108,7 +108,7 @@ fn write_name(
     times: &[Time],
     states: &[&VehicleState],
     (name, size, colour): (&str, &Dimensions, Rgba),
-) -> Result<(), RecordError> {
+) -> Result<(), RecordingError> {
     let entity = format!("{entity}/name");
     let above_m = (size.height_m + LABEL_ABOVE_M) as f32;
     let fixed =
@@ -130,7 +130,7 @@ fn write_lights(
     times: &[Time],
     states: &[&VehicleState],
     (class, size): (VehicleClass, &Dimensions),
-) -> Result<(), RecordError> {
+) -> Result<(), RecordingError> {
     let (rear_m, front_m) = (-0.5 * size.length_m, 0.5 * size.length_m);
     // A motorcycle has one brake light in the middle; the other vehicles have two at the corners.
     let side_m = 0.5 * size.width_m - if class == VehicleClass::Motorcycle { 0.5 * size.width_m } else { 0.25 };
@@ -172,7 +172,7 @@ fn write_lamps(
     times: &[Time],
     lamps: &Lamps,
     lit: &[bool],
-) -> Result<(), RecordError> {
+) -> Result<(), RecordingError> {
     let rows = changes(lit);
     if !lit.contains(&true) {
         return Ok(());
@@ -193,7 +193,7 @@ fn write_lamps(
 }
 
 /// Writes the gaps in front of and behind the ego, bumper to bumper, with their time headways. A critical gap is red.
-fn write_gaps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordError> {
+fn write_gaps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordingError> {
     let bumper_m = 0.5 * film.actors[film.ego].vehicle.dimensions.length_m;
     let front = |frame: &Frame| Gap::new([bumper_m, 1.0], frame.margins.gap_front_m, frame.margins.thw_front_s);
     let rear = |frame: &Frame| Gap::new([-bumper_m, -1.0], frame.margins.gap_rear_m, frame.margins.thw_rear_s);
@@ -251,7 +251,7 @@ fn mark_text(collision: &Collision) -> String {
 
 /// Writes a mark on the struck side of the first vehicle of each collision, and the changes of velocity as a text on
 /// the road behind it. Both move with the vehicle.
-fn write_collisions(writer: &Writer<'_>, film: &Film) -> Result<(), RecordError> {
+fn write_collisions(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingError> {
     let mut text_x_m = -COLLISION_TEXT_BEHIND_M;
     for (number, collision) in film.collisions().iter().enumerate() {
         let index = film.actors.iter().position(|actor| actor.name == collision.between[0].as_str());

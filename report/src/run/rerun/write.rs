@@ -21,7 +21,7 @@ const AFTER_CRITICAL: Time = Time::from_ms(200);
 
 /// The reason why a recording cannot be written. A file of that name is then unchanged.
 #[derive(Debug, thiserror::Error)]
-pub enum RecordError {
+pub enum RecordingError {
     /// The environment switches recording off. The library would then write no file and report no error.
     #[error("failed to record: the environment variable RERUN switches recording off; unset it")]
     Disabled,
@@ -42,10 +42,10 @@ pub enum RecordError {
 /// Checks whether a recording can be written, before the run starts.
 ///
 /// # Errors
-/// [`RecordError`] if recording is switched off, or no file can be created at `path`.
-pub fn check_recordable(path: &Path) -> Result<(), RecordError> {
+/// [`RecordingError`] if recording is switched off, or no file can be created at `path`.
+pub fn check_recording_possible(path: &Path) -> Result<(), RecordingError> {
     if !rerun::decide_logging_enabled(true) {
-        return Err(RecordError::Disabled);
+        return Err(RecordingError::Disabled);
     }
     Ok(check_writable(path)?)
 }
@@ -53,33 +53,33 @@ pub fn check_recordable(path: &Path) -> Result<(), RecordError> {
 /// Writes one film, or a baseline and the film compared with it, into a recording file.
 ///
 /// # Errors
-/// [`RecordError`] if the file cannot be written completely.
-pub fn write_films(path: &Path, films: &[Film]) -> Result<(), RecordError> {
+/// [`RecordingError`] if the file cannot be written completely.
+pub fn write_recording_unchecked(path: &Path, films: &[Film]) -> Result<(), RecordingError> {
     let bytes = encode(films)?;
     write_file(path, |file| file.write_all(&bytes))?;
     Ok(())
 }
 
-/// Writes films like [`write_films`], after [`check_recordable`].
+/// Writes films like [`write_recording_unchecked`], after [`check_recording_possible`].
 ///
 /// # Errors
-/// [`RecordError`] if the file cannot be written completely.
-pub fn record_films(path: &Path, films: &[Film]) -> Result<(), RecordError> {
-    check_recordable(path)?;
-    write_films(path, films)
+/// [`RecordingError`] if the file cannot be written completely.
+pub fn write_recording(path: &Path, films: &[Film]) -> Result<(), RecordingError> {
+    check_recording_possible(path)?;
+    write_recording_unchecked(path, films)
 }
 
 /// Returns the bytes of the recording file.
-fn encode(films: &[Film]) -> Result<Vec<u8>, RecordError> {
-    record(films)?.drain_as_bytes().map_err(|error| RecordError::Encode { reason: error.to_string() })
+fn encode(films: &[Film]) -> Result<Vec<u8>, RecordingError> {
+    record(films)?.drain_as_bytes().map_err(|error| RecordingError::Encode { reason: error.to_string() })
 }
 
 /// Writes the films and the layout into memory.
-fn record(films: &[Film]) -> Result<MemorySinkStorage, RecordError> {
+fn record(films: &[Film]) -> Result<MemorySinkStorage, RecordingError> {
     let title = films.iter().map(Film::title).collect::<Vec<_>>().join(" and ");
     let (stream, messages) = RecordingStreamBuilder::new(APPLICATION).recording_name(title).memory()?;
     if !stream.is_enabled() {
-        return Err(RecordError::Disabled);
+        return Err(RecordingError::Disabled);
     }
     let opening_end = opening_moment(films) + AFTER_CRITICAL;
     let mut contents = Vec::new();
@@ -126,7 +126,7 @@ fn opening_moment(films: &[Film]) -> Time {
 }
 
 /// Writes a film and returns what its views can show.
-fn write_film(writer: &Writer<'_>, film: &Film, (root, role): (String, Role)) -> Result<FilmContents, RecordError> {
+fn write_film(writer: &Writer<'_>, film: &Film, (root, role): (String, Role)) -> Result<FilmContents, RecordingError> {
     let mut contents =
         FilmContents { name: film.arm.clone(), root, edges: bird::edges(film), ..FilmContents::default() };
     if film.level >= Level::Objects && !film.frames.is_empty() {
@@ -147,7 +147,7 @@ fn write_film(writer: &Writer<'_>, film: &Film, (root, role): (String, Role)) ->
 }
 
 /// Writes the summary, which the story view shows.
-fn write_summary(stream: &RecordingStream, films: &[Film]) -> Result<(), RecordError> {
+fn write_summary(stream: &RecordingStream, films: &[Film]) -> Result<(), RecordingError> {
     let summary = TextDocument::new(summary::markdown(films)).with_media_type(MediaType::markdown());
     Ok(stream.log_static("summary", &summary)?)
 }

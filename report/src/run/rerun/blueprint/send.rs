@@ -5,7 +5,7 @@ use rerun::external::re_log_types::BlueprintActivationCommand;
 use rerun::log::LogMsg;
 use rerun::{RecordingStream, RecordingStreamBuilder, StoreId, StoreKind};
 
-use super::super::write::{APPLICATION, RecordError};
+use super::super::write::{APPLICATION, RecordingError};
 use super::{FilmContents, Layout};
 
 impl Layout {
@@ -14,14 +14,14 @@ impl Layout {
         mut self,
         stream: &RecordingStream,
         films: &[FilmContents],
-    ) -> Result<(), RecordError> {
+    ) -> Result<(), RecordingError> {
         let blueprint = self.blueprint(films);
         let (carrier, messages) = RecordingStreamBuilder::new(APPLICATION).memory()?;
         blueprint.send(&carrier, BlueprintActivation::default())?;
         let mut messages: Vec<LogMsg> = messages.take();
         messages.retain(|message| message.store_id().kind() == StoreKind::Blueprint && !is_activation(message));
         let Some(id) = messages.first().map(|message| message.store_id().clone()) else {
-            return Err(RecordError::Disabled);
+            return Err(RecordingError::Disabled);
         };
         messages.extend(self.property_messages(&id)?);
         stream.send_blueprint(messages, BlueprintActivationCommand::make_active(id));
@@ -29,7 +29,7 @@ impl Layout {
     }
 
     /// Returns the properties as messages of the blueprint store `id`.
-    fn property_messages(self, id: &StoreId) -> Result<Vec<LogMsg>, RecordError> {
+    fn property_messages(self, id: &StoreId) -> Result<Vec<LogMsg>, RecordingError> {
         let (stream, messages) = RecordingStreamBuilder::from_store_id(id).send_properties(false).memory()?;
         // The viewer reads a blueprint on its only timeline.
         stream.set_time_sequence("blueprint", 0);

@@ -11,7 +11,7 @@ use rerun::{StoreKind, TimelineName};
 
 use super::super::stream::{OPENING_TIMELINE, STEP_TIMELINE, TIME_TIMELINE};
 use super::*;
-use crate::run::film::{Comparison, FilmRecorder, film_encounter};
+use crate::run::film::{EncounterComparison, FilmRecorder, film_encounter};
 use crate::traffic::recorder::TrafficRecorder;
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_simulation::controller::ControllerChoice;
@@ -55,7 +55,8 @@ fn recorded_and_simulated(level: Level) -> [Film; 2] {
     let mut recorder = FilmRecorder::new(&again, key, &arm(ControllerChoice::Mis), level);
     let outcome = simulate(&again, key, &arm(ControllerChoice::Mis), &mut recorder).unwrap();
     let (recorded, simulated) = (film_encounter(&found, level).unwrap(), recorder.finish(&outcome));
-    let foreword = Comparison::new(&found, &recorded, &simulated).markdown(&found, &simulated, RearDriver::Driver);
+    let foreword =
+        EncounterComparison::new(&found, &recorded, &simulated).markdown(&found, &simulated, RearDriver::Driver);
     [recorded.with_foreword(foreword), simulated]
 }
 
@@ -238,11 +239,11 @@ fn a_collision_of_the_ego_precedes_earlier_ones_of_others() {
 fn the_file_is_complete_and_no_temporary_file_remains() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.rrd");
-    check_recordable(&path).unwrap();
+    check_recording_possible(&path).unwrap();
     assert!(!path.exists());
-    write_films(&path, &[default_film()]).unwrap();
+    write_recording_unchecked(&path, &[default_film()]).unwrap();
     assert_eq!(&std::fs::read(&path).unwrap()[..4], b"RRF2");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
-    let error = check_recordable(&folder.path().join("no/folder.rrd")).unwrap_err();
+    let error = check_recording_possible(&folder.path().join("no/folder.rrd")).unwrap_err();
     assert!(error.to_string().contains("no/folder.rrd"), "{error}");
 }

@@ -1,0 +1,148 @@
+//! Assembly of ordered rows into complete tracks.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use closecall_traffic::Time;
+
+use super::assemble::{Step, assemble_track, step};
+use super::data::RecordedTrack;
+use super::error::TrajectoryFileProblem;
+use super::order::{Order, TimeOrder, VehicleOrder};
+use super::source::{ReadError, Row};
+
+/// Offset between the numbers of a split track's pieces.
+///
+/// The second piece of vehicle 884 is track 1,000,000,000,884, and so on. This number depends neither on the rest of
+/// the file nor on the order of its rows. Vehicle numbers lie below this offset.
+pub const PIECE_STRIDE: u64 = 1_000_000_000_000;
+
+/// Maximum number of rows held for incomplete tracks. Three million rows cover 8 hours at 100 Hz.
+const MAX_OPEN_ROWS: usize = 3 << 20;
+
+/// Builds tracks from rows.
+pub(super) struct TrackBuilder {
+    period: Time,
+    start: Time,
+    order: OrderCheck,
+    /// Rows of incomplete tracks without a gap, by vehicle number and origin.
+    open: BTreeMap<(u64, Time), Vec<Row>>,
+    open_rows: usize,
+    max_open_rows: usize,
+    /// Number of pieces completed so far, by vehicle number.
+    pieces: BTreeMap<u64, u64>,
+    ready: VecDeque<RecordedTrack>,
+}
+
+/// The check of the row order that the builder applies.
+enum OrderCheck {
+    Sorted,
+    Vehicle(VehicleOrder),
+    Time(TimeOrder),
+}
+
+impl TrackBuilder {
+    /// Creates a builder for rows that are already sorted by vehicle and time.
+    pub(super) fn for_sorted(period: Time, start: Time) -> Self {
+        Self {
+            period,
+            start,
+            order: OrderCheck::Sorted,
+            open: BTreeMap::new(),
+            open_rows: 0,
+            max_open_rows: usize::MAX,
+            pieces: BTreeMap::new(),
+            ready: VecDeque::new(),
+        }
+    }
+
+    /// Creates a builder for rows that arrive in `order`, which it checks.
+    pub(super) fn for_stream(period: Time, start: Time, order: Order) -> Self {
+        let order = match order {
+            Order::Vehicle => OrderCheck::Vehicle(VehicleOrder::default()),
+            Order::Time => OrderCheck::Time(TimeOrder::default()),
+        };
+        Self { order, max_open_rows: MAX_OPEN_ROWS, ..Self::for_sorted(period, start) }
+    }
+
+    /// Adds the next row.
+    ///
+    /// # Errors
+    /// Fails if the order breaks, if too many rows are held, or if the row contradicts the previous one. The row is
+    /// then left out.
+    pub(super) fn push(&mut self, row: Row) -> Result<(), ReadError> {
+        let key = (row.number, row.origin);
+        match &mut self.order {
+            OrderCheck::Sorted => self.close_all_but(key)?,
+            OrderCheck::Vehicle(order) => {
+                order.check(&row, self.period)?;
+                self.close_all_but(key)?;
+            }
+            OrderCheck::Time(order) => {
+                if order.check(&row)? {
+                    self.close_before(row.time)?;
+                }
+            }
+        }
+        let rows = self.open.entry(key).or_default();
+        if let Some(before) = rows.last()
+            && step(before, &row, self.period)? == Step::Gap
+        {
+            let complete = std::mem::take(rows);
+            self.close(&complete)?;
+        }
+        self.open_rows += 1;
+        if self.open_rows > self.max_open_rows {
+            return Err(ReadError::new(row.line, TrajectoryFileProblem::TooManyOpen { allowed: self.max_open_rows }));
+        }
+        self.open.entry(key).or_default().push(row);
+        Ok(())
+    }
+
+    /// Removes and returns the next complete track.
+    pub(super) fn pop(&mut self) -> Option<RecordedTrack> {
+        self.ready.pop_front()
+    }
+
+    /// Returns the complete tracks that [`TrackBuilder::pop`] has not removed yet.
+    pub(super) fn ready(&self) -> impl Iterator<Item = &RecordedTrack> {
+        self.ready.iter()
+    }
+
+    /// Completes all tracks.
+    pub(super) fn finish(&mut self) -> Result<(), ReadError> {
+        let open = std::mem::take(&mut self.open);
+        open.into_values().try_for_each(|rows| self.close(&rows))
+    }
+
+    /// Completes all tracks unless the track of `key` is among the incomplete ones.
+    fn close_all_but(&mut self, key: (u64, Time)) -> Result<(), ReadError> {
+        if self.open.contains_key(&key) { Ok(()) } else { self.finish() }
+    }
+
+    /// Completes the tracks that have no row at the frame before `now`.
+    fn close_before(&mut self, now: Time) -> Result<(), ReadError> {
+        let missed = now - self.period - Time::from_ns(self.period.ns() / 2);
+        let is_over = |rows: &Vec<Row>| rows.last().is_none_or(|row| row.time < missed);
+        let over: Vec<_> = self.open.iter().filter(|(_, rows)| is_over(rows)).map(|(key, _)| *key).collect();
+        over.into_iter().try_for_each(|key| self.open.remove(&key).map_or(Ok(()), |rows| self.close(&rows)))
+    }
+
+    /// Completes one track from its rows.
+    fn close(&mut self, rows: &[Row]) -> Result<(), ReadError> {
+        self.open_rows = self.open_rows.saturating_sub(rows.len());
+        let Some(first) = rows.first() else { return Ok(()) };
+        let pieces = self.pieces.entry(first.number).or_default();
+        let piece = *pieces;
+        *pieces += 1;
+        if first.number >= PIECE_STRIDE && piece > 0 {
+            // The number already belongs to a piece of a split track, so no number is left for its own pieces.
+            return Err(ReadError::new(first.line, TrajectoryFileProblem::SplitPiece { track: first.number }));
+        }
+        let track_id = first.number + piece * PIECE_STRIDE;
+        if piece > 0 && self.pieces.contains_key(&track_id) {
+            return Err(ReadError::new(first.line, TrajectoryFileProblem::SplitPiece { track: track_id }));
+        }
+        self.ready.extend(assemble_track(track_id, rows, self.start));
+        Ok(())
+    }
+}

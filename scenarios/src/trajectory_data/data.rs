@@ -1,0 +1,96 @@
+//! The trajectory data of one road: its tracks, its layout and its lane markings.
+
+use closecall_traffic::{Time, Trajectory};
+use serde::Serialize;
+
+use super::markings::LaneMarkings;
+
+/// The layout of a trajectory file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Layout {
+    /// CSV in metres.
+    Plain,
+    /// NGSIM's 18 columns in feet.
+    Ngsim18,
+    /// The 25 columns of NGSIM's catalogue export.
+    Ngsim25,
+    /// The three files of a highD data set.
+    Highd,
+    /// The three files of an exiD data set.
+    Exid,
+    /// CommonRoad XML.
+    Commonroad,
+    /// A log of one vehicle that sees the lane markings.
+    InCar,
+}
+
+impl Layout {
+    /// Returns the name of the layout, as it appears in JSON.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Plain => "plain",
+            Self::Ngsim18 => "ngsim18",
+            Self::Ngsim25 => "ngsim25",
+            Self::Highd => "highd",
+            Self::Exid => "exid",
+            Self::Commonroad => "commonroad",
+            Self::InCar => "in-car",
+        }
+    }
+}
+
+/// Distances to the markings of the vehicle's own lane, as its camera measures them.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MarkingDistances {
+    /// Distance from the vehicle's centre line to the left marking (m). It is positive while the marking is on the
+    /// left.
+    pub left_m: Option<f64>,
+    /// Distance from the vehicle's centre line to the right marking (m). It is positive while the marking is on the
+    /// right.
+    pub right_m: Option<f64>,
+}
+
+impl MarkingDistances {
+    /// Returns `true` if the camera sees at least one marking.
+    pub fn is_seen(&self) -> bool {
+        self.left_m.is_some() || self.right_m.is_some()
+    }
+}
+
+/// A gapless track, as a reader yields it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RecordedTrack {
+    /// The movement of the vehicle.
+    pub trajectory: Trajectory,
+    /// Line number in the file for each point of the trajectory, counted from 1.
+    pub lines: Vec<u64>,
+    /// Distances to the markings for each point of the trajectory, from in-car logs. Empty for other layouts.
+    pub markings: Vec<MarkingDistances>,
+}
+
+/// The trajectory data of one road.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrajectoryData {
+    /// Name that the file states, or else the file name without its extension.
+    pub name: String,
+    /// Layout from which the data was read or in which it is to be written.
+    pub layout: Layout,
+    /// Time between two frames.
+    pub period: Time,
+    /// Positions of the lane markings, as far as they are known.
+    pub markings: LaneMarkings,
+    /// The tracks, sorted by track number.
+    pub trajectories: Vec<Trajectory>,
+    /// BLAKE3 hash of the file content in hexadecimal digits. Empty if the data does not come from a file.
+    pub hash: String,
+}
+
+impl TrajectoryData {
+    /// Creates trajectory data from `trajectories`, sorts them by track number and derives the lane markings from them.
+    pub fn new(name: &str, period: Time, mut trajectories: Vec<Trajectory>) -> Self {
+        trajectories.sort_by_key(|track| track.track_id);
+        let markings = LaneMarkings::from_trajectories(&trajectories);
+        Self { name: name.to_owned(), layout: Layout::Plain, period, markings, trajectories, hash: String::new() }
+    }
+}

@@ -1,0 +1,360 @@
+//! Errors of reading and writing trajectory files.
+
+use std::fmt;
+use std::io;
+use std::path::PathBuf;
+
+use super::data::Layout;
+
+/// An error while reading a trajectory file. None of the file's data is used.
+#[derive(Debug, thiserror::Error)]
+pub struct TrajectoryFileError {
+    /// Path of the file.
+    pub path: PathBuf,
+    /// Line at error, counted from 1, if a single line is.
+    pub line: Option<u64>,
+    /// Name of the column at error, if a single column is.
+    pub column: Option<&'static str>,
+    /// The problem itself.
+    #[source]
+    pub problem: TrajectoryFileProblem,
+}
+
+impl fmt::Display for TrajectoryFileError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "failed to read the trajectory file {}", self.path.display())?;
+        if let Some(line) = self.line {
+            write!(f, ", line {line}")?;
+        }
+        if let Some(column) = &self.column {
+            write!(f, ", column `{column}`")?;
+        }
+        write!(f, ": {}", self.problem)
+    }
+}
+
+impl TrajectoryFileError {
+    /// Returns `true` if the file cannot be read at all, as opposed to having wrong content.
+    pub fn is_io(&self) -> bool {
+        matches!(self.problem, TrajectoryFileProblem::Io(_))
+    }
+}
+
+/// A problem with the content or the reading of a trajectory file.
+#[derive(Debug, thiserror::Error)]
+pub enum TrajectoryFileProblem {
+    /// The file cannot be opened or read.
+    #[error("{0}")]
+    Io(#[source] io::Error),
+    /// The compressed stream is damaged or ends too early.
+    #[error("the gzip stream is damaged or cut: {0}")]
+    Gzip(#[source] io::Error),
+    /// The file is empty or has only a header.
+    #[error("there are no rows; a trajectory file needs at least one")]
+    Empty,
+    /// The file is not a text file.
+    #[error("this is not text; CSV or blank-separated text, or either compressed with gzip, is needed")]
+    Binary,
+    /// A line is not valid UTF-8 text.
+    #[error("the line is not text in UTF-8")]
+    NotText,
+    /// The file is an archive or uses a compression that is not supported.
+    #[error("this is {what}, which is not read; unpack it first, or compress the trajectory file with gzip")]
+    Archive {
+        /// Kind of archive or compression.
+        what: &'static str,
+    },
+    /// The file has another layout than the caller requires.
+    #[error("the content is in the layout {}, not in {asked} as asked for", found.name())]
+    OtherLayout {
+        /// Layout found in the content.
+        found: Layout,
+        /// Layout required by the caller.
+        asked: &'static str,
+    },
+    /// The last line is not terminated.
+    #[error("the last line does not end: the trajectory file may be cut there; if it is whole, end the line")]
+    CutLine,
+    /// A line exceeds the permitted length.
+    #[error("the line is longer than {allowed} bytes")]
+    LineTooLong {
+        /// Maximum line length (bytes).
+        allowed: u64,
+    },
+    /// The file has more rows than are read at once.
+    #[error(
+        "it has more than {allowed} rows; `lane-changes` and `inspect` read it piece by piece, other commands need a part of it"
+    )]
+    TooManyRows {
+        /// Maximum number of rows.
+        allowed: usize,
+    },
+    /// The first line fits none of the layouts.
+    #[error(
+        "the first line is neither a header of the plain layout (`track_id, frame, time_s, s_m, …`) or of NGSIM's \
+         (`Vehicle_ID, Frame_ID, …`), nor a row of NGSIM's 18 columns; it has {columns} columns and starts with `{start}`"
+    )]
+    UnknownLayout {
+        /// Number of columns found.
+        columns: usize,
+        /// Beginning of the line.
+        start: String,
+    },
+    /// The header lacks a column.
+    #[error("the header has no column `{name}`, which the {layout} layout needs")]
+    MissingColumn {
+        /// Name of the missing column.
+        name: &'static str,
+        /// Layout that the rest of the header fits.
+        layout: &'static str,
+    },
+    /// The header contains a column twice.
+    #[error("the header has the column `{name}` twice")]
+    DuplicateColumn {
+        /// Name of the column.
+        name: String,
+    },
+    /// A row has too few or too many columns.
+    #[error("the row has {found} columns, but {needed} are needed")]
+    ColumnCount {
+        /// Number of columns found.
+        found: usize,
+        /// Number of columns required.
+        needed: usize,
+    },
+    /// A quoted field does not end on its line.
+    #[error("a quoted field does not end on its line")]
+    OpenQuote,
+    /// A field holds a value that its column does not allow.
+    #[error("is `{value}`, but {allowed} is needed")]
+    Value {
+        /// Text found in the field.
+        value: String,
+        /// Description of the allowed values.
+        allowed: String,
+    },
+    /// A vehicle has two rows for the same frame.
+    #[error(
+        "frame {frame} of vehicle {vehicle} stands there twice, first in line {first_line}; one row for each is needed"
+    )]
+    DuplicateRow {
+        /// Number of the vehicle or track.
+        vehicle: u64,
+        /// Frame number.
+        frame: i64,
+        /// Line of the first of the two rows.
+        first_line: u64,
+    },
+    /// The time step between two rows contradicts their frame numbers.
+    #[error(
+        "from frame {frame_before} (line {line_before}) to frame {frame} the time of vehicle {vehicle} goes on by \
+         {step_s} s, but {needed_s} s is needed, as between the other frames"
+    )]
+    UnevenTime {
+        /// Number of the vehicle or track.
+        vehicle: u64,
+        /// Frame number of the earlier row.
+        frame_before: i64,
+        /// Line of the earlier row.
+        line_before: u64,
+        /// Frame number of the later row.
+        frame: i64,
+        /// Recorded time between the two rows (s).
+        step_s: f64,
+        /// Time between the two rows that their frame numbers require (s).
+        needed_s: f64,
+    },
+    /// Time decreases or stands still in a log of one vehicle.
+    #[error("is {time_s}, after {before_s} in the row before, but time has to go on from row to row")]
+    TimeBackwards {
+        /// Time of the previous row (s).
+        before_s: f64,
+        /// Time of this row (s).
+        time_s: f64,
+    },
+    /// A time in a log lies between two ticks of the log's clock.
+    #[error("is {time_s}, but the rows before are {period_s} s apart, and this lies between two of their ticks")]
+    OffClock {
+        /// Time of this row (s).
+        time_s: f64,
+        /// Time between two rows (s).
+        period_s: f64,
+    },
+    /// A long file is not sorted by vehicle.
+    #[error(
+        "vehicle {vehicle} goes on here after rows of others; a data of more than {rows} rows has to be sorted by \
+         vehicle or by time throughout"
+    )]
+    NotByVehicle {
+        /// Number of the vehicle.
+        vehicle: u64,
+        /// Number of rows above which a file must be sorted.
+        rows: usize,
+    },
+    /// A long file is not sorted by time.
+    #[error(
+        "time goes back by {back_s} s; a data of more than {rows} rows has to be sorted by vehicle or by time \
+         throughout"
+    )]
+    NotByTime {
+        /// Amount by which the time decreases (s).
+        back_s: f64,
+        /// Number of rows above which a file must be sorted.
+        rows: usize,
+    },
+    /// Too many rows belong to tracks that are still incomplete.
+    #[error("more than {allowed} rows belong to vehicles that are still on the road")]
+    TooManyOpen {
+        /// Maximum number of rows held.
+        allowed: usize,
+    },
+    /// The XML is not a readable CommonRoad scenario.
+    #[error("this is no CommonRoad scenario that can be read: {what}")]
+    Xml {
+        /// Description of the problem.
+        what: String,
+    },
+    /// The file is the tracks file of a highD or exiD data set, and its metadata files are missing.
+    #[error(
+        "the header is that of highD's or exiD's tracks, which need the files with their metadata beside them: \
+         NN_tracks.csv, NN_tracksMeta.csv and NN_recordingMeta.csv"
+    )]
+    NeedsMetadata,
+    /// The road cannot be derived from the traffic, because no vehicle moves.
+    #[error("no vehicle moves, so that the road cannot be told from the traffic")]
+    NothingMoves,
+    /// A folder contains several data sets.
+    #[error(
+        "there are {count} data sets in this folder, from {first}_tracks.csv to {last}_tracks.csv: name one of them"
+    )]
+    SeveralInFolder {
+        /// Number of data sets found.
+        count: usize,
+        /// File name prefix of the first data set.
+        first: String,
+        /// File name prefix of the last data set.
+        last: String,
+    },
+    /// A table has a wrong number of rows.
+    #[error("there are {found} rows, but {needed} is needed")]
+    RowCount {
+        /// Number of rows found.
+        found: usize,
+        /// Number of rows required.
+        needed: usize,
+    },
+    /// A vehicle appears twice in the metadata.
+    #[error("vehicle {vehicle} stands there twice, first in line {first_line}")]
+    VehicleTwice {
+        /// Number of the vehicle.
+        vehicle: u64,
+        /// Line of its first entry.
+        first_line: u64,
+    },
+    /// A vehicle has a different number of rows than its metadata states.
+    #[error("vehicle {vehicle} has {found} rows, but {stated} are stated in line {line} of {file}")]
+    OtherCount {
+        /// Number of the vehicle.
+        vehicle: u64,
+        /// Number of rows found.
+        found: u64,
+        /// Number of rows stated.
+        stated: u64,
+        /// Name of the metadata file.
+        file: String,
+        /// Line in the metadata file.
+        line: u64,
+    },
+    /// A track has a gap, but no free track number is left for its pieces.
+    #[error("track {track} has a gap, but its number is that of a piece already; numbers of vehicles lie below 10¹²")]
+    SplitPiece {
+        /// Number of the track.
+        track: u64,
+    },
+    /// Values are implausible for road traffic, which points to mixed-up units or columns.
+    #[error("{what} is {found}, but {allowed} is plausible: are units or columns mixed up?")]
+    Implausible {
+        /// Name of the quantity.
+        what: &'static str,
+        /// Rounded value with its unit.
+        found: String,
+        /// Range of plausible values.
+        allowed: &'static str,
+    },
+    /// A file contains rows of several data sets.
+    #[error("is `{found}`, but `{first}` is needed as in the first row: one data set for each file")]
+    SeveralRecordings {
+        /// Data set name in the first row.
+        first: String,
+        /// Data set name in this row.
+        found: String,
+    },
+}
+
+impl TrajectoryFileProblem {
+    /// Returns `true` if the problem makes only one row unusable.
+    pub(super) fn affects_one_row(&self) -> bool {
+        matches!(
+            self,
+            Self::ColumnCount { .. }
+                | Self::OpenQuote
+                | Self::Value { .. }
+                | Self::DuplicateRow { .. }
+                | Self::UnevenTime { .. }
+                | Self::TimeBackwards { .. }
+                | Self::OffClock { .. }
+                | Self::CutLine
+                | Self::OtherCount { .. }
+                | Self::NotText
+        )
+    }
+
+    /// Returns the category of a problem with a row, under which such rows are counted.
+    pub(super) fn kind(&self) -> &'static str {
+        match self {
+            Self::ColumnCount { .. } | Self::CutLine => "cut rows",
+            Self::OpenQuote | Self::NotText => "rows that are no text",
+            Self::Value { .. } => "values that are not allowed",
+            Self::DuplicateRow { .. } => "duplicated rows",
+            Self::UnevenTime { .. } | Self::OffClock { .. } => "times off the clock",
+            Self::TimeBackwards { .. } => "times that go back",
+            Self::OtherCount { .. } => "vehicles with rows missing",
+            _ => "other",
+        }
+    }
+}
+
+/// An error while writing a trajectory file. A file that existed before at the same path is left unchanged.
+#[derive(Debug, thiserror::Error)]
+pub enum WriteError {
+    /// The file cannot be written.
+    #[error("failed to write the trajectory file {}: {source}", path.display())]
+    Io {
+        /// Path of the file.
+        path: PathBuf,
+        /// The underlying I/O error.
+        source: io::Error,
+    },
+    /// A number is not finite.
+    #[error("failed to write the trajectory file: {what} of track {track_id} at {time_s} s is not finite")]
+    NotFinite {
+        /// Number of the track.
+        track_id: u64,
+        /// Time of the point (s).
+        time_s: f64,
+        /// Name of the quantity.
+        what: &'static str,
+    },
+    /// The time of a point lies between two frames.
+    #[error(
+        "failed to write the trajectory file: track {track_id} at {time_s} s lies between two frames of {period_s} s"
+    )]
+    OffClock {
+        /// Number of the track.
+        track_id: u64,
+        /// Time of the point (s).
+        time_s: f64,
+        /// Time between two frames (s).
+        period_s: f64,
+    },
+}

@@ -1,0 +1,90 @@
+//! Trajectory data (recorded road traffic): reading it, judging its quality, and writing it.
+//!
+//! ```text
+//!   file (plain or gzip) ─▶ reader of its layout ─▶ rows in SI units ─▶ gapless tracks, one by one ─▶ TrajectoryData
+//!                           (one line or element at a time)          (in memory: incomplete ones)     (all tracks)
+//! ```
+//!
+//! The content of a file determines its layout; the file's name does not. `docs/trajectory-data.md` describes all
+//! layouts for users:
+//!
+//! | layout | content | module |
+//! |---|---|---|
+//! | plain | CSV with a header, in metres, one row per track and frame; [`write_trajectories`] writes it | `plain` |
+//! | NGSIM | 18 columns in feet, with or without a header; or the 25 columns of the catalogue's export (DOI 10.21949/1504477) | `ngsim` |
+//! | highD, exiD | three files per recorded data set | `highd`, `exid`, `file_set` |
+//! | CommonRoad | XML with lanelets and dynamic obstacles | `commonroad`, `lanelets` |
+//! | in-car | log of one vehicle that sees the lane markings; [`write_in_car`] writes it | `in_car` |
+//!
+//! # What the readers do
+//!
+//! - They convert units to SI. `d` is positive to the left and 0 at the left edge of the leftmost lane. NGSIM's
+//!   `Local_Y` is the middle of the front bumper, so the reader subtracts half the vehicle length to get the centre of
+//!   the box. `Local_X` stays as it is: during a lane change at a heading of 0.05 rad, the front is 0.1 m beside the
+//!   centre, which is below NGSIM's own accuracy.
+//! - They split the rows of a vehicle wherever a frame is missing, because NGSIM reuses vehicle numbers after gaps. The
+//!   first piece keeps the vehicle's number; later pieces add multiples of [`PIECE_STRIDE`] to it.
+//! - The catalogue's export joins several data sets of one location in which vehicle numbers recur. The reader tells
+//!   them apart by the time of frame 0. If their clocks overlap, it shifts them one behind the other, so that their
+//!   vehicles never meet. (Files longer than [`WINDOW_ROWS`] rows are not shifted, because their time spans are unknown
+//!   before the end of the file.)
+//! - NGSIM times are in milliseconds. If they count from 1970, the reader counts them from the first instant instead.
+//! - Finite differences between neighbouring frames supply the quantities that a layout lacks: lateral speed, lateral
+//!   acceleration, and the acceleration if its field is empty.
+//! - The readers reject everything else with line, column and allowed values, including mixed-up units and columns
+//!   (`plausible`). They neither guess nor repair. They skip and count unusable rows only if the caller asks for it
+//!   ([`BadRows::Skip`]).
+//!
+//! # Memory
+//!
+//! [`open`] yields complete tracks one by one. It holds the rows of incomplete tracks and some dozen bytes per vehicle.
+//! Therefore, files longer than [`WINDOW_ROWS`] rows must be sorted by vehicle or by time; see `order`. [`read`] holds
+//! the whole file, in any row order: criticality needs all of it, because every vehicle may be an opponent.
+
+mod assemble;
+mod builder;
+mod commonroad;
+mod data;
+mod error;
+mod exid;
+mod fields;
+mod file_set;
+mod header;
+mod highd;
+mod in_car;
+mod input;
+mod lanelets;
+mod layout;
+mod markings;
+mod ngsim;
+mod open;
+mod order;
+mod plain;
+mod plausible;
+mod quality;
+mod reference_line;
+mod rows;
+mod skipped_rows;
+mod source;
+#[cfg(test)]
+pub(crate) mod test_support;
+mod text;
+mod text_layout;
+mod tracks;
+mod write;
+mod write_in_car;
+mod xml;
+
+pub use builder::PIECE_STRIDE;
+pub use data::{Layout, MarkingDistances, RecordedTrack, TrajectoryData};
+pub use error::{TrajectoryFileError, TrajectoryFileProblem, WriteError};
+pub use markings::{DEFAULT_LANE_WIDTH_M, LaneMarkings};
+pub use open::{input_files, open, open_from, read, read_from, read_with};
+pub use order::WINDOW_ROWS;
+pub use quality::{Flaw, FlawCounts, FlawLocation, Flaws, QualityInspector, count_flaws};
+pub use skipped_rows::{SkippedRows, SkippedRowsByReason};
+pub use tracks::{BadRows, LayoutChoice, ReadOptions, Tracks};
+pub use write::write_trajectories;
+pub use write_in_car::{
+    BusFrame, InCarFrame, InCarLog, TrueLaneChange, ground_truth_path, write_ground_truth, write_in_car,
+};

@@ -1,0 +1,135 @@
+//! Opening of trajectory files: selects the reader that a file needs.
+
+use std::io::{BufRead, Read};
+use std::path::{Path, PathBuf};
+
+use super::commonroad::CommonRoadSource;
+use super::data::TrajectoryData;
+use super::error::{TrajectoryFileError, TrajectoryFileProblem};
+use super::exid::InferredRoad;
+use super::file_set::FileSet;
+use super::input::{Digest, open_file, with_path};
+use super::order::WINDOW_ROWS;
+use super::rows::io_problem;
+use super::source::{ReadError, RowSource};
+use super::text::TextSource;
+use super::tracks::{ReadOptions, Tracks};
+
+/// The first bytes of unsupported archives and compressed files, with a description of each.
+const ARCHIVES: [(&[u8], &str); 5] = [
+    (b"PK\x03\x04", "a ZIP archive"),
+    (b"PK\x05\x06", "an empty ZIP archive"),
+    (b"BZh", "a bzip2 file"),
+    (b"\xfd7zXZ\0", "an xz file"),
+    (b"\x28\xb5\x2f\xfd", "a Zstandard file"),
+];
+
+const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
+/// Opens a trajectory file to read its tracks one by one. The memory use is bounded; see [`WINDOW_ROWS`].
+///
+/// # Errors
+/// Returns a [`TrajectoryFileError`] with file, line, column and allowed values.
+pub fn open(path: &Path, options: ReadOptions) -> Result<Tracks<'static>, TrajectoryFileError> {
+    open_window(path, options, WINDOW_ROWS)
+}
+
+/// Reads a whole trajectory file, with its rows in any order.
+///
+/// # Errors
+/// Returns a [`TrajectoryFileError`] with file, line, column and allowed values.
+pub fn read(path: &Path) -> Result<TrajectoryData, TrajectoryFileError> {
+    read_with(path, ReadOptions::default())
+}
+
+/// Works like [`read`], with a choice of the layout and of the treatment of bad rows.
+///
+/// # Errors
+/// Returns a [`TrajectoryFileError`] with file, line, column and allowed values.
+pub fn read_with(path: &Path, options: ReadOptions) -> Result<TrajectoryData, TrajectoryFileError> {
+    open_window(path, options, usize::MAX)?.collect_all()
+}
+
+/// Reads trajectory data that consists of one file from any byte source. `path` appears in errors and supplies the
+/// name.
+///
+/// # Errors
+/// Returns a [`TrajectoryFileError`] with line, column and allowed values.
+pub fn read_from(source: impl Read, path: &Path) -> Result<TrajectoryData, TrajectoryFileError> {
+    open_from(source, path, ReadOptions::default(), usize::MAX)?.collect_all()
+}
+
+/// Opens trajectory data that consists of one file from any byte source. `path` appears in errors and supplies the
+/// name. Data of more than `window` rows must be sorted by vehicle or by time.
+///
+/// # Errors
+/// Returns a [`TrajectoryFileError`] with line, column and allowed values.
+pub fn open_from<'a>(
+    source: impl Read + 'a,
+    path: &Path,
+    options: ReadOptions,
+    window: usize,
+) -> Result<Tracks<'a>, TrajectoryFileError> {
+    let digest = Digest::default();
+    let input = digest.input(source).map_err(|error| with_path(path, error))?;
+    let source = reader_for(input, &options).map_err(|error| with_path(path, error))?;
+    Tracks::new((path, digest), source, options.bad_rows, window)
+}
+
+/// Returns the files that are read for `path`: several for a highD or exiD data set.
+pub fn input_files(path: &Path) -> Vec<PathBuf> {
+    match FileSet::of(path) {
+        Ok(Some(set)) => set.files().to_vec(),
+        Ok(None) | Err(_) => vec![path.to_owned()],
+    }
+}
+
+/// Opens `path`; data of more than `window` rows must be sorted.
+fn open_window(path: &Path, options: ReadOptions, window: usize) -> Result<Tracks<'static>, TrajectoryFileError> {
+    match FileSet::of(path)? {
+        Some(set) => open_set(&set, options, window),
+        None => open_from(open_file(path)?, path, options, window),
+    }
+}
+
+/// Opens a data set that consists of several files.
+fn open_set(set: &FileSet, options: ReadOptions, window: usize) -> Result<Tracks<'static>, TrajectoryFileError> {
+    let path = set.tracks();
+    let digest = Digest::default();
+    let in_tracks = |error| with_path(&path, error);
+    let input = digest.input(open_file(&path)?).map_err(in_tracks)?;
+    let source = TextSource::with_meta(input, || set.meta(&digest), || InferredRoad::from_traffic(&path));
+    let source = source.map_err(|error| error.map_or_else(|other| other, in_tracks))?;
+    check_choice(&source, &options).map_err(in_tracks)?;
+    Tracks::new((&path, digest), Box::new(source), options.bad_rows, window)
+}
+
+/// Rejects a file whose layout differs from the required one.
+fn check_choice(source: &dyn RowSource, options: &ReadOptions) -> Result<(), ReadError> {
+    let found = source.info().layout;
+    match options.layout {
+        Some(choice) if !choice.includes(found) => {
+            Err(ReadError::of_file(TrajectoryFileProblem::OtherLayout { found, asked: choice.name() }))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Selects the reader by the first bytes of `input`.
+fn reader_for<'a>(
+    mut input: Box<dyn BufRead + 'a>,
+    options: &ReadOptions,
+) -> Result<Box<dyn RowSource + 'a>, ReadError> {
+    let start = input.fill_buf().map_err(|error| ReadError::of_file(io_problem(error)))?;
+    if let Some((_, what)) = ARCHIVES.into_iter().find(|(magic, _)| start.starts_with(magic)) {
+        return Err(ReadError::of_file(TrajectoryFileProblem::Archive { what }));
+    }
+    let text = start.strip_prefix(BYTE_ORDER_MARK).unwrap_or(start).trim_ascii_start();
+    let source: Box<dyn RowSource + 'a> = if text.starts_with(b"<") {
+        Box::new(CommonRoadSource::new(input)?)
+    } else {
+        Box::new(TextSource::new(input)?)
+    };
+    check_choice(source.as_ref(), options)?;
+    Ok(source)
+}

@@ -1,0 +1,156 @@
+//! The plain layout: CSV in metres, d positive to the right.
+
+use closecall_traffic::{Time, VehicleClass};
+
+use super::data::{Layout, MarkingDistances};
+use super::error::TrajectoryFileProblem;
+use super::fields::{Bounds, FieldError, integer, number, wrong_value};
+use super::header::Header;
+use super::rows::Fields;
+use super::source::{Clock, FileInfo, Row};
+use super::text_layout::TextLayout;
+
+/// All columns of the layout, in the order in which they are written.
+pub(super) const HEADER: [&str; 17] = [
+    "recording_id",
+    "track_id",
+    "vehicle_id",
+    "frame",
+    "time_s",
+    "s_m",
+    "d_m",
+    "lane_id",
+    "speed_mps",
+    "accel_mps2",
+    "heading_rel_rad",
+    "x_m",
+    "y_m",
+    "length_m",
+    "width_m",
+    "vehicle_class",
+    "source_scenario",
+];
+
+/// Allowed values of each column. The ranges exceed what any road vehicle reaches, so that only a broken file violates
+/// them.
+pub(super) mod allowed {
+    use super::Bounds;
+
+    /// Numbers of vehicles. Higher numbers are those of the pieces of split tracks.
+    pub(in super::super) const IDS: (i64, i64) = (0, 999_999_999_999);
+    /// Numbers of tracks. They include the numbers of pieces, because files that Closecall writes contain pieces.
+    pub(in super::super) const TRACKS: (i64, i64) = (0, 9_000_000_000_000_000);
+    pub(in super::super) const FRAMES: (i64, i64) = (0, 1_000_000_000);
+    pub(in super::super) const LANES: (i64, i64) = (0, 255);
+    pub(in super::super) const TIME_S: Bounds = Bounds::closed(0.0, 1e7);
+    pub(in super::super) const POSITION_M: Bounds = Bounds::closed(-1e6, 1e6);
+    pub(in super::super) const LATERAL_M: Bounds = Bounds::closed(-1e3, 1e3);
+    pub(in super::super) const SPEED_MPS: Bounds = Bounds::closed(0.0, 150.0);
+    pub(in super::super) const ACCELERATION_MPS2: Bounds = Bounds::closed(-1e3, 1e3);
+    pub(in super::super) const HEADING_RAD: Bounds = Bounds::closed(-3.2, 3.2);
+    pub(in super::super) const PLANE_M: Bounds = Bounds::closed(-1e7, 1e7);
+    pub(in super::super) const LENGTH_M: Bounds = Bounds::above(0.0, 60.0);
+    pub(in super::super) const WIDTH_M: Bounds = Bounds::above(0.0, 10.0);
+}
+
+/// The column indices of the plain layout's quantities.
+pub(super) struct PlainColumns {
+    track: usize,
+    frame: usize,
+    time: usize,
+    s: usize,
+    d: usize,
+    lane: usize,
+    speed: usize,
+    acceleration: usize,
+    length: usize,
+    width: usize,
+    class: usize,
+    vehicle: Option<usize>,
+    data: Option<usize>,
+    /// Columns that are only validated: the lateral position gives the heading, and s and d give the position.
+    validated_only: Vec<(usize, &'static str, Bounds)>,
+}
+
+impl PlainColumns {
+    /// The column names by which the layout is detected.
+    pub(super) const NAMES: [&str; 17] = HEADER;
+
+    /// Finds the columns in `header`.
+    ///
+    /// # Errors
+    /// Fails if a required column is missing.
+    pub(super) fn new(header: &Header) -> Result<Self, TrajectoryFileProblem> {
+        let need = |name| header.require(name, "plain");
+        let bounded = [("heading_rel_rad", allowed::HEADING_RAD), ("x_m", allowed::PLANE_M), ("y_m", allowed::PLANE_M)];
+        let present = bounded.into_iter().filter_map(|(name, bounds)| Some((header.find(name)?, name, bounds)));
+        Ok(Self {
+            track: need("track_id")?,
+            frame: need("frame")?,
+            time: need("time_s")?,
+            s: need("s_m")?,
+            d: need("d_m")?,
+            lane: need("lane_id")?,
+            speed: need("speed_mps")?,
+            acceleration: need("accel_mps2")?,
+            length: need("length_m")?,
+            width: need("width_m")?,
+            class: need("vehicle_class")?,
+            vehicle: header.find("vehicle_id"),
+            data: header.find("recording_id"),
+            validated_only: present.collect(),
+        })
+    }
+}
+
+impl TextLayout for PlainColumns {
+    fn info(&self) -> FileInfo {
+        FileInfo { layout: Layout::Plain, name: None, period: None, markings: None }
+    }
+
+    fn data<'l>(&self, line: &'l str, fields: &Fields) -> Option<(&'static str, &'l str)> {
+        self.data.map(|index| ("recording_id", fields.get(line, index)))
+    }
+
+    fn parse(&mut self, line: &str, fields: &Fields) -> Result<Option<Row>, FieldError> {
+        let whole = |index, name, range| integer(fields.get(line, index), name, range);
+        let real = |index, name, bounds| number(fields.get(line, index), name, bounds);
+        for &(index, name, bounds) in &self.validated_only {
+            real(index, name, bounds)?;
+        }
+        let track = whole(self.track, "track_id", allowed::TRACKS)?;
+        let vehicle = self.vehicle.map_or(Ok(track), |index| whole(index, "vehicle_id", allowed::TRACKS))?;
+        let acceleration = match fields.get(line, self.acceleration) {
+            "" => None,
+            text => Some(number(text, "accel_mps2", allowed::ACCELERATION_MPS2)?),
+        };
+        let row = Row {
+            number: track.unsigned_abs(),
+            origin: Time::ZERO,
+            vehicle_id: vehicle.unsigned_abs(),
+            frame: whole(self.frame, "frame", allowed::FRAMES)?,
+            time: Time::from_s(real(self.time, "time_s", allowed::TIME_S)?),
+            clock: Clock::Continuous,
+            s_m: real(self.s, "s_m", allowed::POSITION_M)?,
+            d_m: -real(self.d, "d_m", allowed::LATERAL_M)?,
+            lane: whole(self.lane, "lane_id", allowed::LANES)?.unsigned_abs() as u8,
+            speed_mps: real(self.speed, "speed_mps", allowed::SPEED_MPS)?,
+            acceleration_mps2: acceleration,
+            length_m: real(self.length, "length_m", allowed::LENGTH_M)?,
+            width_m: real(self.width, "width_m", allowed::WIDTH_M)?,
+            class: class(fields.get(line, self.class))?,
+            marking_distances: MarkingDistances::default(),
+            line: 0,
+        };
+        Ok(Some(row))
+    }
+}
+
+/// Parses the name of a vehicle class.
+pub(super) fn class(text: &str) -> Result<VehicleClass, FieldError> {
+    let named = VehicleClass::ALL.into_iter().find(|class| class.name() == text);
+    named.ok_or_else(|| {
+        let words = VehicleClass::ALL.map(VehicleClass::name).join(", ");
+        FieldError::at("vehicle_class", wrong_value(text, format!("one of {words}")))
+    })
+}

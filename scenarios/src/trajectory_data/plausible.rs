@@ -1,0 +1,76 @@
+//! Plausibility check that detects mixed-up units and columns in trajectory data.
+//!
+//! A single number may be odd, and many of NGSIM's are. The check therefore judges medians over the beginning of the
+//! file.
+//!
+//! | quantity | plausible | detects |
+//! |---|---|---|
+//! | median length of cars | 2 to 12 m | feet instead of metres and the reverse, swapped length and width |
+//! | median width of cars | 1 to 3 m | the same |
+//! | median of (distance between two frames) / (speed · time) | 0.6 to 1.6 | km/h, mph or ft/s instead of m/s (3.6, 2.2, 3.3), a wrong frame rate, swapped s and d, traffic that drives backwards |
+
+use std::collections::BTreeMap;
+
+use closecall_traffic::{Time, VehicleClass};
+
+use super::data::Layout;
+use super::error::TrajectoryFileProblem;
+use super::source::{ReadError, Row};
+
+/// Minimum speed of a vehicle for its steps to count (m/s). At lower speeds, position noise hides a wrong unit.
+const MIN_SPEED_MPS: f64 = 5.0;
+
+/// Minimum number of steps between frames for their median to be judged.
+const MIN_STEPS: usize = 10;
+
+/// Rejects rows whose medians are implausible for road traffic.
+pub(super) fn check(rows: &[Row], layout: Layout) -> Result<(), ReadError> {
+    let cars = || rows.iter().filter(|row| row.class == VehicleClass::Car);
+    // In-car logs need not state the size of their vehicle, and that single vehicle may have any size.
+    if layout != Layout::InCar {
+        let lengths = cars().map(|row| (row.length_m, row.line)).collect();
+        check_median(lengths, (2.0, 12.0), ("the median length of cars", "m", "2 to 12 m"))?;
+        let widths = cars().map(|row| (row.width_m, row.line)).collect();
+        check_median(widths, (1.0, 3.0), ("the median width of cars", "m", "1 to 3 m"))?;
+    }
+    let steps = steps(rows);
+    if steps.len() < MIN_STEPS {
+        return Ok(());
+    }
+    let what = "the median distance between two frames, as a share of what the recorded speed makes,";
+    check_median(steps, (0.6, 1.6), (what, "", "0.6 to 1.6"))
+}
+
+/// Returns, for each step between two frames, the travelled distance as a share of what the speed predicts, and the
+/// line of the later row.
+fn steps(rows: &[Row]) -> Vec<(f64, u64)> {
+    let mut latest: BTreeMap<(u64, Time), &Row> = BTreeMap::new();
+    let mut steps = Vec::new();
+    for row in rows {
+        let Some(before) = latest.insert((row.number, row.origin), row) else { continue };
+        let (time_s, speed_mps) = ((row.time - before.time).s(), 0.5 * (row.speed_mps + before.speed_mps));
+        let follows = row.frame == before.frame + 1 && time_s > 0.0;
+        if follows && speed_mps > MIN_SPEED_MPS {
+            steps.push(((row.s_m - before.s_m) / (speed_mps * time_s), row.line));
+        }
+    }
+    steps
+}
+
+/// Rejects `values` if their median lies outside `low..=high`. The error names the line of the median.
+fn check_median(
+    mut values: Vec<(f64, u64)>,
+    (low, high): (f64, f64),
+    (what, unit, allowed): (&'static str, &str, &'static str),
+) -> Result<(), ReadError> {
+    if values.is_empty() {
+        return Ok(());
+    }
+    let middle = values.len() / 2;
+    let (median, line) = *values.select_nth_unstable_by(middle, |a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).1;
+    if median >= low && median <= high {
+        return Ok(());
+    }
+    let found = format!("{median:.3} {unit}").trim_end().to_owned();
+    Err(ReadError::new(line, TrajectoryFileProblem::Implausible { what, found, allowed }))
+}

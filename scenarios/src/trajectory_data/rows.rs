@@ -1,0 +1,176 @@
+//! Splitting of text into rows of fields, one line at a time.
+//!
+//! In none of the layouts does a quoted field span several lines. Reading line by line therefore bounds the memory that
+//! a damaged file can occupy, and gives the line number of every error.
+
+use std::io::{self, BufRead, Read};
+use std::ops::Range;
+
+use super::error::TrajectoryFileProblem;
+
+/// Maximum length of a line (bytes). The lines of the supported layouts stay below 300.
+const MAX_LINE_BYTES: u64 = 16_384;
+
+const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
+/// The separator between fields.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Separator {
+    /// A comma. Fields may be in double quotes.
+    Comma,
+    /// One or more blanks or tabs.
+    Blank,
+}
+
+/// A source of text lines that counts them.
+pub(super) struct Lines<R> {
+    source: R,
+    buffer: Vec<u8>,
+    number: u64,
+}
+
+impl<R: BufRead> Lines<R> {
+    pub(super) fn new(source: R) -> Self {
+        Self { source, buffer: Vec::new(), number: 0 }
+    }
+
+    /// Returns the next line that is not blank, and its number, counted from 1. The line has neither line end nor byte
+    /// order mark.
+    pub(super) fn next(&mut self) -> Result<Option<(u64, &str)>, (u64, TrajectoryFileProblem)> {
+        loop {
+            self.buffer.clear();
+            let read = self.source.by_ref().take(MAX_LINE_BYTES + 1).read_until(b'\n', &mut self.buffer);
+            if read.map_err(|error| (self.number + 1, io_problem(error)))? == 0 {
+                return Ok(None);
+            }
+            self.number += 1;
+            if self.number == 1 && self.buffer.starts_with(BYTE_ORDER_MARK) {
+                self.buffer.drain(..BYTE_ORDER_MARK.len());
+            }
+            if self.buffer.contains(&0) {
+                return Err((self.number, TrajectoryFileProblem::Binary));
+            }
+            if self.buffer.len() as u64 > MAX_LINE_BYTES {
+                return Err((self.number, TrajectoryFileProblem::LineTooLong { allowed: MAX_LINE_BYTES }));
+            }
+            if !self.buffer.trim_ascii().is_empty() {
+                break;
+            }
+        }
+
+        match std::str::from_utf8(&self.buffer) {
+            Ok(line) => Ok(Some((self.number, line.trim()))),
+            Err(_) if self.number == 1 => Err((self.number, TrajectoryFileProblem::Binary)),
+            Err(_) => Err((self.number, TrajectoryFileProblem::NotText)),
+        }
+    }
+
+    /// Returns `true` if the latest line is not terminated, so that its last field may be cut.
+    pub(super) fn is_unterminated(&self) -> bool {
+        self.buffer.last().is_some_and(|byte| *byte != b'\n')
+    }
+}
+
+/// Distinguishes an I/O failure from damaged compression, which the decoder reports with the same error type.
+pub(super) fn io_problem(error: io::Error) -> TrajectoryFileProblem {
+    match error.kind() {
+        io::ErrorKind::InvalidInput | io::ErrorKind::InvalidData | io::ErrorKind::UnexpectedEof => {
+            TrajectoryFileProblem::Gzip(error)
+        }
+        _ => TrajectoryFileProblem::Io(error),
+    }
+}
+
+/// The positions of the fields in one line.
+#[derive(Default)]
+pub(super) struct Fields {
+    spans: Vec<Range<usize>>,
+}
+
+impl Fields {
+    pub(super) fn len(&self) -> usize {
+        self.spans.len()
+    }
+
+    /// Returns one field of `line` without surrounding blanks and quotes.
+    pub(super) fn get<'l>(&self, line: &'l str, index: usize) -> &'l str {
+        &line[self.spans[index].clone()]
+    }
+
+    /// Splits `line` into fields.
+    pub(super) fn split(&mut self, line: &str, separator: Separator) -> Result<(), TrajectoryFileProblem> {
+        self.spans.clear();
+        match separator {
+            Separator::Comma => self.split_commas(line),
+            Separator::Blank => {
+                let spans = line.split_ascii_whitespace().map(|field| span_in(line, field));
+                self.spans.extend(spans);
+                Ok(())
+            }
+        }
+    }
+
+    /// Splits at the commas outside of double quotes.
+    fn split_commas(&mut self, line: &str) -> Result<(), TrajectoryFileProblem> {
+        let (mut start, mut quoted) = (0, false);
+        for (index, byte) in line.bytes().enumerate() {
+            match byte {
+                b'"' => quoted = !quoted,
+                b',' if !quoted => {
+                    self.spans.push(span_in(line, unquoted(&line[start..index])));
+                    start = index + 1;
+                }
+                _ => {}
+            }
+        }
+        if quoted {
+            return Err(TrajectoryFileProblem::OpenQuote);
+        }
+        self.spans.push(span_in(line, unquoted(&line[start..])));
+        Ok(())
+    }
+}
+
+/// Removes surrounding blanks and double quotes.
+fn unquoted(field: &str) -> &str {
+    let field = field.trim();
+    field.strip_prefix('"').and_then(|inner| inner.strip_suffix('"')).map_or(field, str::trim)
+}
+
+/// Returns the byte range of `field`, which is a slice of `line`.
+fn span_in(line: &str, field: &str) -> Range<usize> {
+    let start = field.as_ptr() as usize - line.as_ptr() as usize;
+    start..start + field.len()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn split(line: &str, separator: Separator) -> Result<Vec<String>, TrajectoryFileProblem> {
+        let mut fields = Fields::default();
+        fields.split(line, separator)?;
+        Ok((0..fields.len()).map(|index| fields.get(line, index).to_owned()).collect())
+    }
+
+    #[test]
+    fn quoted_commas_do_not_separate_and_blanks_are_merged() {
+        assert_eq!(split(r#"352,"1,156", 3 ,"#, Separator::Comma).unwrap(), ["352", "1,156", "3", ""]);
+        assert_eq!(split("  1 \t 2   3", Separator::Blank).unwrap(), ["1", "2", "3"]);
+        assert!(matches!(split(r#"1,"2,3"#, Separator::Comma), Err(TrajectoryFileProblem::OpenQuote)));
+    }
+
+    #[test]
+    fn blank_lines_count_towards_the_line_number() {
+        let mut lines = Lines::new("\u{feff}a\r\n\n  \nb".as_bytes());
+        assert_eq!(lines.next().unwrap(), Some((1, "a")));
+        assert_eq!(lines.next().unwrap(), Some((4, "b")));
+        assert_eq!(lines.next().unwrap(), None);
+    }
+
+    #[test]
+    fn an_endless_line_is_rejected_without_reading_it_whole() {
+        let mut lines = Lines::new(io::BufReader::new(io::repeat(b'x')));
+        assert!(matches!(lines.next(), Err((1, TrajectoryFileProblem::LineTooLong { .. }))));
+    }
+}

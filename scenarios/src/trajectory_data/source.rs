@@ -1,0 +1,107 @@
+//! The output of every reader: rows in SI units, in the order of the file.
+//!
+//! ```text
+//!   NGSIM, highD, exiD, plain, in-car (text, line by line) ─┐
+//!                                                           ├─▶ RowSource ─▶ rows ─▶ Tracks (the only exit)
+//!   CommonRoad (XML, event by event)                       ─┘
+//! ```
+//!
+//! A reader holds one line or one XML element at a time. When it is opened, it reads the other files of a highD or exiD
+//! data set. A CommonRoad reader also holds the lanelets, which stand before the obstacles in the file.
+
+use closecall_traffic::{Time, VehicleClass};
+
+use super::data::{Layout, MarkingDistances};
+use super::error::TrajectoryFileProblem;
+use super::fields::FieldError;
+use super::markings::LaneMarkings;
+
+/// States whether frame numbers may restart within one file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Clock {
+    /// One count of frames covers the whole file.
+    Continuous,
+    /// Concatenated original NGSIM files: vehicle and frame numbers recur at later times.
+    MayRestart,
+}
+
+/// One vehicle at one frame, in SI units.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Row {
+    /// Number of the vehicle or track in the file. Rows with the same number and origin form one track before it is
+    /// split at gaps.
+    pub(super) number: u64,
+    /// Time of frame 0 if it distinguishes several data sets in one file, otherwise zero.
+    pub(super) origin: Time,
+    pub(super) vehicle_id: u64,
+    pub(super) frame: i64,
+    pub(super) time: Time,
+    pub(super) clock: Clock,
+    pub(super) s_m: f64,
+    pub(super) d_m: f64,
+    pub(super) lane: u8,
+    pub(super) speed_mps: f64,
+    pub(super) acceleration_mps2: Option<f64>,
+    pub(super) length_m: f64,
+    pub(super) width_m: f64,
+    pub(super) class: VehicleClass,
+    /// Distances to the lane markings; only in-car logs have them.
+    pub(super) marking_distances: MarkingDistances,
+    pub(super) line: u64,
+}
+
+/// What a reader knows about its file before the last row.
+#[derive(Clone, Debug)]
+pub(super) struct FileInfo {
+    pub(super) layout: Layout,
+    /// Name that the file states; known after the first row at the latest.
+    pub(super) name: Option<String>,
+    /// Time between two frames, if the layout states it.
+    pub(super) period: Option<Time>,
+    /// Lane markings, if the layout states them.
+    pub(super) markings: Option<LaneMarkings>,
+}
+
+/// A reader of one layout.
+pub(super) trait RowSource {
+    /// Returns what is known about the file so far.
+    fn info(&self) -> FileInfo;
+
+    /// Returns the next row in the order of the file, or `None` at its end.
+    ///
+    /// # Errors
+    /// Returns the line and the problem. After an error for which [`ReadError::affects_one_row`] holds, the caller can
+    /// ask for the next row.
+    fn next_row(&mut self) -> Result<Option<Row>, ReadError>;
+}
+
+/// An error while reading a file, before the path of the file is attached.
+#[derive(Debug)]
+pub(super) struct ReadError {
+    pub(super) line: Option<u64>,
+    pub(super) column: Option<&'static str>,
+    pub(super) problem: TrajectoryFileProblem,
+}
+
+impl ReadError {
+    /// Creates an error that concerns the whole file.
+    pub(super) fn of_file(problem: TrajectoryFileProblem) -> Self {
+        Self { line: None, column: None, problem }
+    }
+
+    /// Creates an error in the given line, counted from 1.
+    pub(super) fn new(line: u64, error: impl Into<FieldError>) -> Self {
+        let FieldError { column, problem } = error.into();
+        Self { line: Some(line), column, problem }
+    }
+
+    /// Creates an error in a column without a line, for a problem found at the end of the file.
+    pub(super) fn of_field(error: FieldError) -> Self {
+        Self { line: None, column: error.column, problem: error.problem }
+    }
+
+    /// Returns `true` if only this row is unusable and reading can continue after it.
+    pub(super) fn affects_one_row(&self) -> bool {
+        self.problem.affects_one_row()
+    }
+}

@@ -1,0 +1,29 @@
+//! The interface of the text layouts, which have one row per line.
+
+use super::fields::FieldError;
+use super::rows::Fields;
+use super::source::{FileInfo, Row};
+
+/// The columns of one text layout.
+pub(super) trait TextLayout {
+    /// Returns what is known about the file so far, apart from a name that the rows state.
+    fn info(&self) -> FileInfo;
+
+    /// Returns the column that names the data set and its value in this row, or `None` if the layout has no such
+    /// column.
+    fn data<'l>(&self, line: &'l str, fields: &Fields) -> Option<(&'static str, &'l str)>;
+
+    /// Parses one line into a row in SI units. Returns `None` if the line yields no row.
+    ///
+    /// # Errors
+    /// Returns the column and the problem.
+    fn parse(&mut self, line: &str, fields: &Fields) -> Result<Option<Row>, FieldError>;
+
+    /// Checks, at the end of the file, that nothing is missing.
+    ///
+    /// # Errors
+    /// Returns what is missing. Each further call returns the next missing item.
+    fn end(&mut self) -> Result<(), FieldError> {
+        Ok(())
+    }
+}

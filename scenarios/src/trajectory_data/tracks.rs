@@ -1,0 +1,350 @@
+//! The exit of every reader: complete tracks, one after the other.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use closecall_traffic::Time;
+
+use super::builder::TrackBuilder;
+use super::data::{Layout, RecordedTrack, TrajectoryData};
+use super::error::{TrajectoryFileError, TrajectoryFileProblem};
+use super::input::Digest;
+use super::markings::LaneMarkings;
+use super::ngsim;
+use super::order::{WINDOW_ROWS, order_of};
+use super::plausible;
+use super::skipped_rows::SkippedRows;
+use super::source::{Clock, FileInfo, ReadError, Row, RowSource};
+
+/// Minimum time that counts from 1970 instead of from the start of the file: one day.
+const MIN_EPOCH_TIME: Time = Time::from_ms(86_400_000);
+
+/// Time between two data sets in one file after shifting them, so that their vehicles never meet.
+const SEPARATION: Time = Time::from_ms(10_000);
+
+/// Largest number of rows that are held at once: four times the rows of all NGSIM motorway data, about 8 GiB.
+const MAX_ROWS: usize = 50_000_000;
+
+/// Options for reading a trajectory file.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ReadOptions {
+    /// Required layout. If it is `None`, the content determines the layout.
+    pub layout: Option<LayoutChoice>,
+    /// Treatment of unusable rows.
+    pub bad_rows: BadRows,
+}
+
+/// A layout that a caller can require by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LayoutChoice {
+    /// NGSIM's columns.
+    Ngsim,
+    /// The three files of a highD or exiD data set.
+    Highd,
+    /// CommonRoad XML.
+    Commonroad,
+    /// The plain layout.
+    Csv,
+    /// A log of one vehicle that sees the lane markings.
+    InCar,
+}
+
+impl LayoutChoice {
+    /// Returns the name of the layout on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Ngsim => "ngsim",
+            Self::Highd => "highd",
+            Self::Commonroad => "commonroad",
+            Self::Csv => "csv",
+            Self::InCar => "in-car",
+        }
+    }
+
+    /// Returns `true` if `layout` is one of the layouts that the choice covers.
+    pub fn includes(self, layout: Layout) -> bool {
+        let of = match layout {
+            Layout::Plain => Self::Csv,
+            Layout::Ngsim18 | Layout::Ngsim25 => Self::Ngsim,
+            Layout::Highd | Layout::Exid => Self::Highd,
+            Layout::Commonroad => Self::Commonroad,
+            Layout::InCar => Self::InCar,
+        };
+        of == self
+    }
+}
+
+/// Treatment of rows that cannot be used.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum BadRows {
+    /// The first such row ends the reading with an error. None of the file's data is used.
+    #[default]
+    Reject,
+    /// Such rows are skipped and counted, with the reason and the line of the first one.
+    Skip,
+}
+
+/// The tracks of a trajectory file. Each becomes available as soon as it is complete.
+pub struct Tracks<'a> {
+    path: PathBuf,
+    source: Box<dyn RowSource + 'a>,
+    digest: Digest,
+    bad_rows: BadRows,
+    builder: TrackBuilder,
+    period: Time,
+    markings: LaneMarkings,
+    dropped: SkippedRows,
+    rows: u64,
+    ended: bool,
+}
+
+impl<'a> Tracks<'a> {
+    /// Reads the first `window` rows, or all rows if the file is not longer.
+    pub(super) fn new(
+        (path, digest): (&Path, Digest),
+        source: Box<dyn RowSource + 'a>,
+        bad_rows: BadRows,
+        window: usize,
+    ) -> Result<Self, TrajectoryFileError> {
+        let builder = TrackBuilder::for_sorted(ngsim::PERIOD, Time::ZERO);
+        let mut tracks = Self {
+            path: path.to_owned(),
+            source,
+            digest,
+            bad_rows,
+            builder,
+            period: ngsim::PERIOD,
+            markings: LaneMarkings::default(),
+            dropped: SkippedRows::default(),
+            rows: 0,
+            ended: false,
+        };
+        tracks.read_window(window).map_err(|error| tracks.with_path(error))?;
+        Ok(tracks)
+    }
+
+    /// Returns the name that the file states, or else the file name without its extension.
+    pub fn name(&self) -> String {
+        let file_name = self.path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        let stem = || file_name.split('.').next().unwrap_or_default().to_owned();
+        self.source.info().name.unwrap_or_else(stem)
+    }
+
+    /// Returns the layout.
+    pub fn layout(&self) -> Layout {
+        self.source.info().layout
+    }
+
+    /// Returns the time between two frames.
+    pub fn period(&self) -> Time {
+        self.period
+    }
+
+    /// Returns the lane markings that the file states, or else those derived from the tracks among the first
+    /// [`WINDOW_ROWS`] rows.
+    pub fn markings(&self) -> &LaneMarkings {
+        &self.markings
+    }
+
+    /// Returns the path of the file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Returns the number of rows read so far.
+    pub fn rows(&self) -> u64 {
+        self.rows
+    }
+
+    /// Returns the rows skipped so far.
+    pub fn dropped(&self) -> &SkippedRows {
+        &self.dropped
+    }
+
+    /// Returns the BLAKE3 hash of the bytes read so far, in hexadecimal digits. After the last track, it covers the
+    /// whole file.
+    pub fn hash(&self) -> String {
+        self.digest.hex()
+    }
+
+    /// Returns the next complete track. Returns `None` after the last track and after an error.
+    ///
+    /// # Errors
+    /// Returns a [`TrajectoryFileError`] with file, line, column and allowed values.
+    pub fn next_track(&mut self) -> Result<Option<RecordedTrack>, TrajectoryFileError> {
+        let next = self.advance();
+        self.ended |= next.is_err();
+        next.map_err(|error| self.with_path(error))
+    }
+
+    /// Collects all tracks.
+    ///
+    /// # Errors
+    /// Fails as [`Tracks::next_track`] does.
+    pub fn collect_all(mut self) -> Result<TrajectoryData, TrajectoryFileError> {
+        let mut trajectories = Vec::new();
+        while let Some(track) = self.next_track()? {
+            trajectories.push(track.trajectory);
+        }
+        let FileInfo { layout, markings, .. } = self.source.info();
+        let mut data = TrajectoryData::new(&self.name(), self.period, trajectories);
+        if let Some(markings) = markings {
+            data.markings = markings;
+        }
+        Ok(TrajectoryData { layout, hash: self.hash(), ..data })
+    }
+
+    /// Reads rows until the next track is complete.
+    fn advance(&mut self) -> Result<Option<RecordedTrack>, ReadError> {
+        loop {
+            if let Some(track) = self.builder.pop() {
+                return Ok(Some(track));
+            }
+            if self.ended {
+                return Ok(None);
+            }
+            match self.next_row()? {
+                Some(row) => self.push(row)?,
+                None => {
+                    self.ended = true;
+                    self.builder.finish()?;
+                }
+            }
+        }
+    }
+
+    /// Returns the next usable row.
+    fn next_row(&mut self) -> Result<Option<Row>, ReadError> {
+        loop {
+            match self.source.next_row() {
+                Ok(Some(row)) => {
+                    self.rows += 1;
+                    return Ok(Some(row));
+                }
+                Ok(None) => return Ok(None),
+                Err(error) => {
+                    self.rows += 1;
+                    self.drop_row(error)?;
+                }
+            }
+        }
+    }
+
+    fn push(&mut self, row: Row) -> Result<(), ReadError> {
+        self.builder.push(row).or_else(|error| self.drop_row(error))
+    }
+
+    /// Skips a row if the caller asked for it and the rest of the file is still usable. Otherwise returns the error.
+    fn drop_row(&mut self, error: ReadError) -> Result<(), ReadError> {
+        if self.bad_rows == BadRows::Reject || !error.affects_one_row() {
+            return Err(error);
+        }
+        self.dropped.add(error);
+        Ok(())
+    }
+
+    /// Reads the window, determines the period, the start time and the order from it, and creates the builder.
+    fn read_window(&mut self, window: usize) -> Result<(), ReadError> {
+        let mut rows = Vec::new();
+        while rows.len() < window {
+            if rows.len() >= MAX_ROWS {
+                return Err(ReadError::of_file(TrajectoryFileProblem::TooManyRows { allowed: MAX_ROWS }));
+            }
+            match self.next_row()? {
+                Some(row) => rows.push(row),
+                None => {
+                    self.ended = true;
+                    break;
+                }
+            }
+        }
+        if rows.is_empty() {
+            return Err(self.dropped.take_first().unwrap_or(ReadError::of_file(TrajectoryFileProblem::Empty)));
+        }
+        let beginning = &rows[..rows.len().min(WINDOW_ROWS)];
+        self.period = self.source.info().period.unwrap_or_else(|| period(beginning));
+        let start = start(beginning);
+        plausible::check(beginning, self.source.info().layout)?;
+        if self.ended {
+            separate_data_sets(&mut rows);
+            rows.sort_by_key(|row| (row.number, row.origin, row.time, row.frame, row.line));
+            self.builder = TrackBuilder::for_sorted(self.period, start);
+        } else {
+            self.builder = TrackBuilder::for_stream(self.period, start, order_of(&rows, self.period)?);
+        }
+        rows.into_iter().try_for_each(|row| self.push(row))?;
+        if self.ended {
+            self.builder.finish()?;
+        }
+        let derived = || LaneMarkings::from_tracks(self.builder.ready().map(|track| &track.trajectory));
+        self.markings = self.source.info().markings.unwrap_or_else(derived);
+        Ok(())
+    }
+
+    /// Attaches the path of the file to an error.
+    fn with_path(&self, ReadError { line, column, problem }: ReadError) -> TrajectoryFileError {
+        TrajectoryFileError { path: self.path.clone(), line, column, problem }
+    }
+}
+
+impl Iterator for Tracks<'_> {
+    type Item = Result<RecordedTrack, TrajectoryFileError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.next_track().transpose()
+    }
+}
+
+/// The extent of one vehicle's rows: their number, and the time and frame of the first and the last.
+struct Extent {
+    rows: usize,
+    first: (Time, i64),
+    last: (Time, i64),
+}
+
+/// Returns the mean time step of the vehicle with the most rows. Returns NGSIM's period if no vehicle has two frames,
+/// or if frame numbers may restart.
+fn period(rows: &[Row]) -> Time {
+    let mut extents: BTreeMap<(u64, Time), Extent> = BTreeMap::new();
+    for row in rows {
+        let at = (row.time, row.frame);
+        let extent = extents.entry((row.number, row.origin)).or_insert(Extent { rows: 0, first: at, last: at });
+        extent.rows += 1;
+        extent.first = extent.first.min(at);
+        extent.last = extent.last.max(at);
+    }
+    let longest = extents.values().rev().max_by_key(|extent| extent.rows);
+    let Some(Extent { first, last, .. }) = longest else { return ngsim::PERIOD };
+    let frames = last.1 - first.1;
+    let step_ns = if frames > 0 { (last.0 - first.0).ns() / frames } else { 0 };
+    let may_restart = rows.first().is_some_and(|row| row.clock == Clock::MayRestart);
+    if may_restart || step_ns <= 0 { ngsim::PERIOD } else { Time::from_ns(step_ns) }
+}
+
+/// Returns the time to subtract from all times: the earliest one if times count from 1970, otherwise zero.
+fn start(rows: &[Row]) -> Time {
+    let earliest = rows.iter().map(|row| row.time).min();
+    earliest.filter(|time| *time >= MIN_EPOCH_TIME).unwrap_or(Time::ZERO)
+}
+
+/// Shifts data sets of different origin to later times, so that none overlaps the previous one.
+fn separate_data_sets(rows: &mut [Row]) {
+    let mut spans: BTreeMap<Time, (Time, Time)> = BTreeMap::new();
+    for row in &*rows {
+        let span = spans.entry(row.origin).or_insert((row.time, row.time));
+        *span = (span.0.min(row.time), span.1.max(row.time));
+    }
+    if spans.len() < 2 {
+        return;
+    }
+    let mut shifts = BTreeMap::new();
+    let mut free_from = None;
+    for (origin, (first, last)) in spans {
+        let shift = free_from.map_or(Time::ZERO, |from: Time| (from - first).max(Time::ZERO));
+        free_from = Some(last + shift + SEPARATION);
+        shifts.insert(origin, shift);
+    }
+    for row in rows {
+        row.time += shifts.get(&row.origin).copied().unwrap_or_default();
+    }
+}
