@@ -34,43 +34,11 @@
 //! values. With fewer than 5 values nothing is fitted.
 
 mod distribution;
+mod fitted;
 mod observe;
 mod toml_text;
 
 pub use distribution::{FittedQuantity, Form, GoodnessOfFit, MIN_VALUES};
+pub use fitted::{FittedDistributions, fit};
 pub use observe::{Quantity, Samples, observe};
 pub use toml_text::{Heading, to_toml, write_toml};
-
-use crate::filters::smooth;
-use crate::trajectory_data::TrajectoryData;
-
-/// The fitted distributions of all quantities, over all trajectory data sets.
-#[derive(Clone, Debug, PartialEq)]
-pub struct FittedDistributions {
-    /// Name and BLAKE3 hash of each trajectory file.
-    pub data_sets: Vec<(String, String)>,
-    /// Seed of the bootstrap.
-    pub seed: u64,
-    /// One entry for each quantity with enough values.
-    pub fitted: Vec<FittedQuantity>,
-    /// The quantities with too few values, each with the number of its values.
-    pub too_few: Vec<(Quantity, usize)>,
-}
-
-/// Fits the distributions of all quantities to `data_sets`; `seed` is the seed of the bootstrap.
-pub fn fit(data_sets: &[TrajectoryData], seed: u64) -> FittedDistributions {
-    let mut samples = Samples::default();
-    for data in data_sets {
-        samples.extend(observe(&smooth(data)));
-    }
-    let (mut fitted, mut too_few) = (Vec::new(), Vec::new());
-    for quantity in Quantity::ALL {
-        let values = samples.values(quantity);
-        match FittedQuantity::new(quantity, values, seed) {
-            Some(distribution) => fitted.push(distribution),
-            None => too_few.push((quantity, values.len())),
-        }
-    }
-    let data_sets = data_sets.iter().map(|data| (data.name.clone(), data.hash.clone())).collect();
-    FittedDistributions { data_sets, seed, fitted, too_few }
-}

@@ -72,6 +72,7 @@
 //! - *double*: another lane change of the same vehicle in the same direction begins before this one ends, or one peak
 //!   carries the vehicle over two markings. Both lane changes are listed.
 
+mod change;
 mod crossings;
 mod detect;
 mod distance;
@@ -82,50 +83,8 @@ mod manoeuvre;
 mod peaks;
 mod score;
 
-use closecall_traffic::{Side, VehicleClass};
-use serde::Serialize;
-
+pub use change::LaneChange;
 pub use detect::{Criterion, LaneChangeDetector, LaneReliability, detect};
 pub use manoeuvre::{MIN_PROMINENCE_MPS, MIN_SHIFT_M, quintic_width_share};
 pub use peaks::{Peak, Width, find_peaks, peak_width};
 pub use score::{HitRate, ReferenceChange, ReferenceError, Score, TrackSpans, read_references, score};
-
-/// A detected lane change.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct LaneChange {
-    /// Track id in the trajectory data.
-    pub track_id: u64,
-    /// Vehicle id in the trajectory data.
-    pub vehicle_id: u64,
-    /// Vehicle class: car, truck or motorcycle.
-    pub vehicle_class: VehicleClass,
-    /// Direction: to the left or to the right.
-    pub direction: Side,
-    /// Number of the old lane.
-    pub from_lane: u8,
-    /// Number of the new lane.
-    pub to_lane: u8,
-    /// Start of the manoeuvre (s). It may lie before the track if the lane change is not complete.
-    pub start_s: f64,
-    /// Time at which half of the recorded lateral shift is done (s).
-    pub midpoint_s: f64,
-    /// First instant with the centre in the new lane (s).
-    pub crossing_s: f64,
-    /// End of the manoeuvre (s). It may lie after the track if the lane change is not complete.
-    pub end_s: f64,
-    /// Duration of the whole manoeuvre (s).
-    pub duration_s: f64,
-    /// Width of the peak of lateral speed (s), about 0.7 of the duration; by the distance criterion the duration
-    /// itself.
-    pub width_s: f64,
-    /// Speed along the road at the crossing (m/s).
-    pub speed_mps: f64,
-    /// Largest lateral speed, positive in the direction of the lane change (m/s).
-    pub peak_lateral_speed_mps: f64,
-    /// Lateral shift from start to end, as far as recorded, positive in the direction of the lane change (m).
-    pub lateral_shift_m: f64,
-    /// True if the lane change is part of a double one; see the module documentation.
-    pub double: bool,
-    /// True if the whole manoeuvre was recorded, shifts the vehicle by at least 2.5 m, and is not part of a double one.
-    pub complete: bool,
-}

@@ -1,11 +1,15 @@
 //! Tests of the properties that the controllers rely on: timely confirmation, a consistent covariance, and bitwise
 //! reproducibility.
 
-use closecall_traffic::{ActorId, CONTROL_STEP, Environment, Parameters, Road, Source, TrackStatus, VehicleClass};
+use closecall_traffic::{
+    ActorId, CONTROL_STEP, Environment, Parameters, Road, Source, Track, TrackStatus, VehicleClass,
+};
 
 use super::*;
 use crate::SceneVehicle;
+use crate::surroundings::transform_scene;
 use crate::testing::{OWN_LANE_M, scene_vehicle, with_speed};
+use crate::{Perception, Scene};
 
 const PERIOD_S: f64 = CONTROL_STEP.s();
 

@@ -22,33 +22,15 @@ pub(crate) mod lifecycle;
 mod measurement;
 pub(crate) mod motion;
 pub(crate) mod road_filter;
+#[cfg(test)]
+mod tests;
+mod track_list;
 mod tracker;
 mod view;
 
 pub use audit::{NEES_QUANTILE_95, TrackAudit};
 pub use config::{TrackerConfig, TrackerModel};
 pub use consistency::{Consistency, Credibility};
+pub use track_list::TrackList;
 pub use tracker::{Tracker, TrackerScan};
 pub use view::RearView;
-
-use closecall_traffic::{Track, TrackId};
-
-/// The reported tracks of all sensors of the ego, and the next free track id.
-#[derive(Clone, Debug, Default)]
-pub struct TrackList {
-    /// The tracks of the latest step.
-    pub(crate) tracks: Vec<Track>,
-    next_id: u32,
-}
-
-impl TrackList {
-    /// Returns an id that no track of this run has had.
-    pub(crate) fn new_id(&mut self) -> TrackId {
-        let id = TrackId(self.next_id);
-        self.next_id += 1;
-        id
-    }
-}
-
-#[cfg(test)]
-mod tests;

@@ -5,7 +5,8 @@
 use closecall_traffic::{BodyShape, VehicleClass};
 use serde::Serialize;
 
-use super::{DatasetOptions, DatasetSummary, RandomScene};
+use super::scenes::RandomScene;
+use super::{DatasetOptions, DatasetSummary};
 use crate::camera::LabelledImage;
 
 #[derive(Serialize)]

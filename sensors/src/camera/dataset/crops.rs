@@ -5,7 +5,8 @@ use std::fmt::Write;
 use closecall_traffic::{ClassScores, Light, Stream};
 use rand::RngExt;
 
-use super::{DatasetSummary, RandomScene};
+use super::DatasetSummary;
+use super::scenes::RandomScene;
 use crate::camera::pipeline::MIN_SHARE_IN_IMAGE;
 use crate::camera::{Crop, ExposureKey, Frame, GroundBox, PixelRect, RearCamera};
 use crate::{Scene, SceneVehicle};

@@ -48,7 +48,4 @@ pub use controller::{ExecFactory, identify};
 pub use error::ExecError;
 pub use processes::{adopt_orphans, end_all};
 pub use protocol::Identity;
-pub use settings::{DEFAULT_MEMORY_MIB, DEFAULT_TIMEOUT_MS, ExecSettings};
-
-/// The name of an external controller in reports, and the prefix of its `--controller` argument.
-pub const NAME: &str = "exec";
+pub use settings::{DEFAULT_MEMORY_MIB, DEFAULT_TIMEOUT_MS, ExecSettings, NAME};

@@ -4,6 +4,9 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
+/// The name of an external controller in reports, and the prefix of its `--controller` argument.
+pub const NAME: &str = "exec";
+
 /// Default time limit of one answer (ms): 25 control steps, longer than the pauses of an interpreter.
 pub const DEFAULT_TIMEOUT_MS: u64 = 1_000;
 

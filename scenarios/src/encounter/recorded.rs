@@ -1,0 +1,153 @@
+//! An encounter of recorded traffic, and why a lane change is none.
+
+use crate::lane_change::LaneChange;
+use closecall_traffic::{Lane, Measured, Time, Trajectory};
+
+/// Longest part of an encounter before the lane change begins.
+pub const LEAD_IN: Time = Time::from_ms(20_000);
+/// Part of an encounter after the lane change ends.
+pub const LEAD_OUT: Time = Time::from_ms(6_000);
+/// Shortest time from the start of an encounter to the crossing: a shorter approach is not informative.
+pub const SHORTEST_APPROACH: Time = Time::from_ms(2_000);
+/// Distance to the ego vehicle along the road below which another vehicle belongs to the encounter (m).
+pub const REACH_M: f64 = 150.0;
+/// Longest time headway of the rear vehicle to the ego vehicle at the crossing (s): beyond it, the rear vehicle is not
+/// considered to change lanes because of the ego vehicle.
+pub const LONGEST_THW_S: f64 = 5.0;
+
+/// Index of the ego vehicle in [`RecordedEncounter::vehicles`].
+pub const EGO_INDEX: usize = 0;
+/// Index of the lead vehicle in [`RecordedEncounter::vehicles`].
+pub const LEAD_INDEX: usize = 1;
+/// Index of the rear vehicle in [`RecordedEncounter::vehicles`].
+pub const REAR_INDEX: usize = 2;
+
+/// One vehicle of an encounter.
+#[derive(Clone, Debug)]
+pub struct Participant {
+    /// Its trajectory, in the frame of the encounter.
+    pub trajectory: Trajectory,
+    /// Its lane changes, with the time and the lane numbers of the trajectory data.
+    pub changes: Vec<LaneChange>,
+}
+
+/// An encounter from trajectory data.
+#[derive(Clone, Debug)]
+pub struct RecordedEncounter {
+    /// Name of the trajectory data set.
+    pub data_name: String,
+    /// Lane change of the rear vehicle, with the time and the lane numbers of the trajectory data.
+    pub change: LaneChange,
+    /// Time of the trajectory data at time 0 of the encounter.
+    pub start: Time,
+    /// Time of the encounter at which the centre of the rear vehicle crosses the marking.
+    pub crossing: Time,
+    /// Time of the encounter at its end.
+    pub end: Time,
+    /// Time headway of the rear vehicle to the ego vehicle at the crossing (s).
+    pub crossing_thw_s: f64,
+    /// Number of lanes of the road.
+    pub lanes: u8,
+    /// Width of each lane (m).
+    pub lane_width_m: f64,
+    /// Lane that the rear vehicle leaves.
+    pub home: Lane,
+    /// Lane that the rear vehicle changes to.
+    pub target: Lane,
+    /// The ego, lead and rear vehicle, then all other vehicles that come near the ego vehicle, in order of their track
+    /// ids.
+    pub vehicles: Vec<Participant>,
+}
+
+impl RecordedEncounter {
+    /// Returns the trajectories of the ego, the lead and the rear vehicle, in this order.
+    pub fn ego_lead_rear(&self) -> [&Trajectory; 3] {
+        [EGO_INDEX, LEAD_INDEX, REAR_INDEX].map(|index| &self.vehicles[index].trajectory)
+    }
+
+    /// Converts a time of the trajectory data (s) to the clock of the encounter.
+    pub fn time_of(&self, recorded_s: f64) -> Time {
+        Time::from_s(recorded_s) - self.start
+    }
+}
+
+/// The reason why a lane change is not an encounter. Track ids and lanes are those of the trajectory data.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum NoEncounter {
+    /// The trajectory data does not contain the track.
+    #[error("the trajectory file has no track {track_id}")]
+    NoTrack {
+        /// Track id of the rear vehicle.
+        track_id: u64,
+    },
+    /// No vehicle is ahead of the rear vehicle.
+    #[error(
+        "no vehicle is ahead of track {track_id} in lane {lane} when its lane change begins: there is no ego vehicle"
+    )]
+    NoEgo {
+        /// Track id of the rear vehicle.
+        track_id: u64,
+        /// The lane that the rear vehicle leaves.
+        lane: u8,
+    },
+    /// No vehicle is ahead of the ego vehicle.
+    #[error(
+        "no vehicle is ahead of track {ego_id}, the ego vehicle in front of track {track_id}: without a lead vehicle \
+         there is no margin to increase"
+    )]
+    NoLead {
+        /// Track id of the rear vehicle.
+        track_id: u64,
+        /// Track id of the ego vehicle.
+        ego_id: u64,
+    },
+    /// The three vehicles are not recorded together for long enough before the crossing.
+    #[error(
+        "track {track_id} behind track {ego_id} behind track {front_id} is recorded for {recorded_s:.1} s before it \
+         crosses the marking; {needed_s:.1} s are needed"
+    )]
+    TooShort {
+        /// Track id of the rear vehicle.
+        track_id: u64,
+        /// Track id of the ego vehicle.
+        ego_id: u64,
+        /// Track id of the lead vehicle.
+        front_id: u64,
+        /// Time for which they are recorded together (s).
+        recorded_s: f64,
+        /// Least time that is required (s).
+        needed_s: f64,
+    },
+    /// The rear vehicle is not close behind the ego vehicle when it crosses the marking.
+    #[error(
+        "as track {track_id} crosses the marking, its headway to track {ego_id} is {}: it has to be above 0 and at most \
+         {longest_s:.0} s",
+        match thw_s { Ok(thw_s) => format!("{thw_s:.2} s"), Err(absent) => format!("none ({absent})") }
+    )]
+    NotBehind {
+        /// Track id of the rear vehicle.
+        track_id: u64,
+        /// Track id of the ego vehicle.
+        ego_id: u64,
+        /// Time headway of the rear vehicle at the crossing (s).
+        thw_s: Measured,
+        /// Longest time headway that is accepted (s).
+        longest_s: f64,
+    },
+    /// One of the three vehicles is also recorded outside the lanes of the road.
+    #[error("track {track_id}, or one of the two ahead of it, leaves the road on which it changes lanes")]
+    LeavesTheRoad {
+        /// Track id of the rear vehicle.
+        track_id: u64,
+    },
+    /// The road has more lanes than a road is allowed to have.
+    #[error("the road of track {track_id} has {lanes} lanes; at most {most} are possible")]
+    TooManyLanes {
+        /// Track id of the rear vehicle.
+        track_id: u64,
+        /// Number of lanes.
+        lanes: u8,
+        /// Largest number of lanes that is allowed.
+        most: u8,
+    },
+}

@@ -1,0 +1,56 @@
+//! Perception by object-level sensors only.
+
+use super::sensor::{ObjectSensor, ScanInput};
+use super::{NoiseKey, ObjectSensorModel};
+use crate::perception::FieldOfView;
+use crate::surroundings::{OtherVehicle, transform_scene};
+use crate::tracking::TrackList;
+use crate::{Perception, Scene, SensorError, SensorHealth};
+use closecall_traffic::Track;
+
+/// Perception by object-level sensors only.
+#[derive(Clone, Debug)]
+pub struct ObjectPerception {
+    sensors: [ObjectSensor; 3],
+    others: Vec<OtherVehicle>,
+    list: TrackList,
+}
+
+impl ObjectPerception {
+    /// Creates the front radar, the surround sensors and the rear sensor (`models` in this order), with random streams
+    /// keyed by `key`.
+    pub fn new(models: [ObjectSensorModel; 3], key: &NoiseKey) -> Self {
+        let [front, surround, rear] = models;
+        Self {
+            sensors: [
+                ObjectSensor::front_radar(front, key),
+                ObjectSensor::surround(surround, key),
+                ObjectSensor::rear_object(rear, key),
+            ],
+            others: Vec::new(),
+            list: TrackList::default(),
+        }
+    }
+}
+
+impl Perception for ObjectPerception {
+    fn step(&mut self, scene: &Scene<'_>) -> Result<&[Track], SensorError> {
+        let frame = transform_scene(scene, &mut self.others)?;
+        self.list.tracks.clear();
+        let input = ScanInput { scene, frame: &frame, others: &self.others };
+        for sensor in &mut self.sensors {
+            sensor.scan(&input, &mut self.list);
+        }
+        Ok(&self.list.tracks)
+    }
+
+    fn health(&self) -> SensorHealth {
+        let [front, surround, rear] = &self.sensors;
+        SensorHealth { front: front.health(), surround: surround.health(), rear: rear.health() }
+    }
+
+    fn rear_field(&self) -> Option<FieldOfView> {
+        let [_, _, rear] = &self.sensors;
+        Some(rear.field_of_view())
+    }
+}
