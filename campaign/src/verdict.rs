@@ -12,6 +12,7 @@
 //!
 //! If several hold, the first of the table decides.
 
+use std::collections::BTreeSet;
 use std::fmt;
 
 use closecall_statistics::format::percent;
@@ -159,6 +160,10 @@ pub fn judge(summary: &Summary, judge: &Judge, max_flip_rate: f64) -> Judgement 
             Standing::Fail => found.add(Decision::Fail, gate.to_string()),
         }
     }
+    for subject in undecidable(&gates) {
+        let reason = format!("{subject} has no value in any scenario, so that the gate on it says nothing");
+        found.add(Decision::Inconclusive, reason);
+    }
     let requirements = judge.requirements(&gates);
     let has_criteria = |requirement: &RequirementResult| {
         gates
@@ -181,6 +186,16 @@ pub fn judge(summary: &Summary, judge: &Judge, max_flip_rate: f64) -> Judgement 
         Decision::first_of(&found.decisions).unwrap_or(Decision::Pass)
     };
     Judgement { decision, reasons: found.reasons, gates, requirements, expectations, probabilities }
+}
+
+/// Returns the subjects of the gates that somebody set and that no scenario decides: there is no sample in which they have a
+/// value. A gate that says nothing does not pass.
+fn undecidable(gates: &[GateResult]) -> BTreeSet<String> {
+    let set = || gates.iter().filter(|gate| !matches!(gate.source, GateSource::Requirement(_)));
+    let subjects = |gate: &GateResult| gate.expression.subject();
+    let decided: BTreeSet<String> =
+        set().filter(|gate| gate.standing() != Standing::NotChecked).map(subjects).collect();
+    set().map(subjects).filter(|subject| !decided.contains(subject)).collect()
 }
 
 /// Returns true if the gates say something: a gate that somebody set is decided, or every check of every requirement is. A

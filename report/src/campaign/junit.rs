@@ -3,7 +3,7 @@
 //!
 //! | case | passes | fails | error | skipped |
 //! |---|---|---|---|---|
-//! | gate, requirement check | met | not met | the samples do not decide it | it cannot be checked in this campaign |
+//! | gate, requirement check | met | not met | the samples do not decide it | it cannot be checked in this campaign, or the campaign is only measured |
 //! | probability gate | shown | refuted | not decided | |
 //! | `verdict` | PASS, measured | | ERROR, INVALID, INCONCLUSIVE, NOT JUDGED | FAIL: the gates say it |
 //!
@@ -44,14 +44,15 @@ struct Case {
 const CAMPAIGN_SUITE: &str = "campaign";
 
 fn cases(judged: &Judgement) -> Vec<Case> {
+    let is_measured = judged.verdict().is_none();
     let gate = |gate: &GateResult| Case {
         suite: gate.scenario.clone().unwrap_or_else(|| CAMPAIGN_SUITE.to_owned()),
         name: gate.name(),
         status: match gate.standing() {
             Standing::Pass => Status::Passed,
-            Standing::Fail => Status::Failed,
-            Standing::Inconclusive => Status::Error,
-            Standing::NotChecked => Status::Skipped,
+            Standing::Fail if !is_measured => Status::Failed,
+            Standing::Inconclusive if !is_measured => Status::Error,
+            Standing::Fail | Standing::Inconclusive | Standing::NotChecked => Status::Skipped,
         },
         message: gate.to_string(),
     };
