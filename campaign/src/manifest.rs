@@ -51,6 +51,9 @@ pub struct ManifestScenario {
     pub blake3: String,
     /// The content of the file, with all settings applied.
     pub text: String,
+    /// The settings, each as `key=value`.
+    #[serde(default)]
+    pub settings: Vec<String>,
 }
 
 /// A network that the sensors use.
@@ -100,7 +103,9 @@ pub struct Manifest {
 }
 
 /// Keys of a manifest that do not affect the outcomes, or whose differences are worded elsewhere.
-const INCIDENTAL: [&str; 4] = ["command", "path", "working_folder", "controllers"];
+const INCIDENTAL: [&str; 3] = ["command", "working_folder", "controllers"];
+/// Keys of a scenario in a manifest that do not affect the outcomes, which follow from its text.
+const INCIDENTAL_OF_SCENARIO: [&str; 2] = ["path", "settings"];
 
 impl Manifest {
     /// Returns one message for each difference between the two manifests that can affect outcomes. If there is none,
@@ -116,6 +121,11 @@ impl Manifest {
         differences
     }
 
+    /// Returns the settings, each as `key=value`: `--set` applies to every scenario.
+    pub fn settings(&self) -> &[String] {
+        self.scenarios.first().map_or(&[], |scenario| &scenario.settings)
+    }
+
     /// Returns the manifest as JSON without what does not affect the outcomes: the command line, the paths of the
     /// scenario files, the partition, and the hash of the executable. It is the same for a campaign that ran in one go,
     /// in parts or with interruptions. Returns `None` if it cannot be written as JSON.
@@ -127,7 +137,9 @@ impl Manifest {
         let mut value = serde_json::to_value(whole).ok()?;
         value.as_object_mut()?.remove("command");
         for scenario in value.get_mut("scenarios")?.as_array_mut()? {
-            scenario.as_object_mut()?.remove("path");
+            for name in INCIDENTAL_OF_SCENARIO {
+                scenario.as_object_mut()?.remove(name);
+            }
         }
         serde_json::to_string(&value).ok()
     }
@@ -169,7 +181,12 @@ fn compare(key: &str, there: &Value, here: &Value, differences: &mut Vec<String>
     match (there, here) {
         (Value::Object(one), Value::Object(other)) => {
             let names = one.keys().chain(other.keys().filter(|name| !one.contains_key(*name)));
-            for name in names.filter(|name| !INCIDENTAL.contains(&name.as_str())) {
+            let incidental: &[&str] = match key.split_once('.') {
+                None if key.is_empty() => &INCIDENTAL,
+                Some(("scenarios", _)) => &INCIDENTAL_OF_SCENARIO,
+                _ => &[],
+            };
+            for name in names.filter(|name| !incidental.contains(&name.as_str())) {
                 let part = |of: &serde_json::Map<String, Value>| of.get(name).cloned().unwrap_or(Value::Null);
                 compare(&within(name), &part(one), &part(other), differences);
             }
@@ -210,6 +227,7 @@ fn first_difference(there: &str, here: &str) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use closecall_scenarios::sampling::Design;
+    use closecall_simulation::controller::exec::ExecSettings;
 
     use super::*;
 
@@ -222,6 +240,7 @@ mod tests {
                 path: "a.toml".to_owned(),
                 blake3: "11".to_owned(),
                 text: "one\ntwo\n".to_owned(),
+                settings: Vec::new(),
             }],
             sampling: Sampling { seed: 1, design: Design::Random, samples: 10 },
             partition: None,
@@ -245,6 +264,16 @@ mod tests {
         assert_eq!(manifest().differences(&other), Vec::<String>::new());
         other.partition = Some("1/3".parse().unwrap());
         assert_eq!(manifest().determining_json(), other.determining_json());
+    }
+
+    #[test]
+    fn another_command_of_a_controller_is_a_difference() {
+        let with = |command: &str| {
+            let exec = ExecSettings { command: command.to_owned(), timeout_ms: 1_000, memory_mib: 1_024 };
+            Manifest { arms: vec![ControllerChoice::Exec(exec)], ..manifest() }
+        };
+        let differences = with("python3 a.py").differences(&with("python3 a.py --fast"));
+        assert!(differences.len() == 1 && differences[0].contains("--fast"), "{differences:?}");
     }
 
     #[test]

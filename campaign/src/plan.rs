@@ -139,6 +139,7 @@ impl Plan {
             path: file.path().display().to_string(),
             blake3: blake3::hash(file.text().as_bytes()).to_string(),
             text: file.text().to_owned(),
+            settings: file.settings().iter().map(ToString::to_string).collect(),
         };
         Ok(Manifest {
             manifest_version: MANIFEST_VERSION,

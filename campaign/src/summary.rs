@@ -6,6 +6,7 @@ use closecall_simulation::Arm;
 
 use super::ledger::{ArmCounts, Inference, Pairs};
 use super::record::Record;
+use super::repeats::Repeats;
 use super::runner::Work;
 use super::validity::CheckCounts;
 
@@ -24,6 +25,8 @@ pub struct Counts {
     pub checks: CheckCounts,
     /// Simulated time of all runs (s).
     pub simulated_s: f64,
+    /// Samples that repeat the parameters of an earlier one. They count in `invalid`, `checks` and `simulated_s` only.
+    pub repeated: u64,
 }
 
 impl Counts {
@@ -31,13 +34,18 @@ impl Counts {
         Self { arms: vec![ArmCounts::default(); arms], ..Self::default() }
     }
 
-    fn push(&mut self, record: &Record) {
-        let tallies = record.tallies();
-        for (counts, tally) in self.arms.iter_mut().zip(&tallies) {
-            counts.push(*tally);
-        }
-        if let [baseline, tested] = &tallies[..] {
-            self.pairs.push(baseline, tested);
+    fn push(&mut self, record: &Record, is_repeated: bool) {
+        if is_repeated {
+            self.repeated += 1;
+        } else {
+            let tallies = record.tallies();
+            for (counts, tally) in self.arms.iter_mut().zip(&tallies) {
+                counts.push(*tally);
+            }
+            if let [baseline, tested] = &tallies[..] {
+                self.pairs.push(baseline, tested);
+            }
+            self.samples += 1;
         }
         for arm in &record.arms {
             let Ok(outcome) = &arm.result else { continue };
@@ -46,7 +54,6 @@ impl Counts {
                 self.checks.push(checks, outcome.ego_collided());
             }
         }
-        self.samples += 1;
         self.invalid += u64::from(record.is_invalid());
     }
 
@@ -59,6 +66,7 @@ impl Counts {
         self.invalid += other.invalid;
         self.checks.add(&other.checks);
         self.simulated_s += other.simulated_s;
+        self.repeated += other.repeated;
     }
 
     /// Returns the number of errors, in any arm.
@@ -76,6 +84,8 @@ pub struct Summary {
     pub scenarios: Vec<(String, Counts)>,
     /// What determines the numbers of samples.
     pub inference: Inference,
+    /// Which samples of each scenario are new evidence.
+    repeats: Vec<Repeats>,
 }
 
 impl Summary {
@@ -83,15 +93,18 @@ impl Summary {
     /// are the names of the scenarios in the order of the plan.
     pub fn new(controllers: Vec<String>, scenarios: impl IntoIterator<Item = String>) -> Self {
         let arms = controllers.len();
-        let scenarios = scenarios.into_iter().map(|name| (name, Counts::new(arms))).collect();
-        Self { controllers, scenarios, inference: Inference::default() }
+        let scenarios: Vec<_> = scenarios.into_iter().map(|name| (name, Counts::new(arms))).collect();
+        let repeats = vec![Repeats::default(); scenarios.len()];
+        Self { controllers, scenarios, inference: Inference::default(), repeats }
     }
 
     /// Returns a summary without samples of what is run.
     pub fn of(works: &[Arc<Work>]) -> Self {
         let name = |arm: &Arm| arm.controller.name().to_owned();
         let controllers = works.first().map_or_else(Vec::new, |work| work.arms.iter().map(name).collect());
-        Self::new(controllers, works.iter().map(|work| work.file.config().name.clone()))
+        let mut summary = Self::new(controllers, works.iter().map(|work| work.file.config().name.clone()));
+        summary.repeats = works.iter().map(|work| Repeats::of(work.file.space())).collect();
+        summary
     }
 
     /// Returns the same summary for another rule that determines the numbers of samples.
@@ -102,8 +115,9 @@ impl Summary {
 
     /// Counts a sample. A record of a scenario that is not in the plan is not counted.
     pub fn push(&mut self, record: &Record) {
-        if let Some((_, counts)) = self.scenarios.iter_mut().find(|(name, _)| *name == record.scenario) {
-            counts.push(record);
+        let mut scenarios = self.scenarios.iter_mut().zip(&mut self.repeats);
+        if let Some(((_, counts), repeats)) = scenarios.find(|((name, _), _)| *name == record.scenario) {
+            counts.push(record, !repeats.counts(record));
         }
     }
 

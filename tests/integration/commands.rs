@@ -99,6 +99,20 @@ fn each_json_output_states_how_it_was_made() {
 }
 
 #[test]
+fn settings_stand_in_every_report() {
+    let folder = folder();
+    let out = folder.path().join("out");
+    let args = ["campaign", "paper-figure", "--set", "duration-s=20", "--no-gate", "--out", out.to_str().unwrap()];
+    stdout(&closecall(args), 0);
+    for name in ["report.html", "summary.md", "junit.xml", "manifest.json"] {
+        let text = std::fs::read_to_string(out.join(name)).unwrap();
+        // The command line alone, which a merge replaces, would not do.
+        let settings = text.replace("--set duration-s=20 --no-gate", "");
+        assert!(settings.contains("duration-s=20"), "{name}");
+    }
+}
+
+#[test]
 fn the_paths_of_written_files_are_printed() {
     let folder = folder();
     let out = folder.path().join("out");

@@ -115,6 +115,7 @@ fn manifest(campaign: &Campaign) -> Manifest {
             path: String::new(),
             blake3: String::new(),
             text: file.text().to_owned(),
+            settings: Vec::new(),
         }],
         sampling: campaign.works[0].sampling,
         partition: None,

@@ -20,6 +20,7 @@ mod inputs;
 mod inspect;
 mod library;
 mod malformed;
+mod nothing_checked;
 mod own_controller;
 mod paper_figure;
 mod perception;

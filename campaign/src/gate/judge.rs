@@ -1,17 +1,16 @@
 //! Judges a campaign, record by record.
 
-use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use closecall_scenarios::parameters::Variation;
 use closecall_simulation::criteria::{EGO_COLLIDED, FlagName, Measure, Quantity};
-use closecall_traffic::Parameters;
 
 use super::evaluate::{Accumulator, value};
 use super::result::{ExpectationResult, GateResult, RequirementResult, Standing};
 use super::set::{GateSet, GateSpec, ProbabilitySpec};
 use crate::ledger::Inference;
 use crate::record::Record;
+use crate::repeats::Repeats;
 use crate::runner::Work;
 
 /// A gate that is being judged.
@@ -32,9 +31,7 @@ impl Gate {
 struct Judged {
     scenario: String,
     is_varied: bool,
-    /// The parameters that were seen already, if the scenario samples from finitely many: a repeated encounter is no new
-    /// evidence.
-    seen: Option<BTreeSet<String>>,
+    repeats: Repeats,
     repeated: u64,
     gates: Vec<Gate>,
     probability: Option<ProbabilitySpec>,
@@ -63,7 +60,7 @@ impl Judge {
             Judged {
                 scenario: config.name.clone(),
                 is_varied: variation != Variation::None,
-                seen: (variation == Variation::Discrete).then(BTreeSet::new),
+                repeats: Repeats::of(work.file.space()),
                 repeated: 0,
                 gates: set.of_scenario(&work.file).iter().map(Gate::new).collect(),
                 probability: set.probability_of(&work.file),
@@ -86,7 +83,8 @@ impl Judge {
     /// Adds one sample. A record of a scenario that is not in the plan does not count.
     pub fn push(&mut self, record: &Record) {
         let Some(judged) = self.scenarios.iter_mut().find(|judged| judged.scenario == record.scenario) else { return };
-        if judged.is_repeated(record) {
+        if !judged.repeats.counts(record) {
+            judged.repeated += 1;
             return;
         }
         judged.observe_expectations(record);
@@ -164,16 +162,6 @@ impl Judge {
 }
 
 impl Judged {
-    fn is_repeated(&mut self, record: &Record) -> bool {
-        let Some(seen) = &mut self.seen else { return false };
-        let Some(parameters) = record.arms.iter().find_map(|arm| Some(&arm.result.as_ref().ok()?.parameters)) else {
-            return false;
-        };
-        let is_new = seen.insert(key(parameters));
-        self.repeated += u64::from(!is_new);
-        !is_new
-    }
-
     /// A run that the ego's collision ended counts as one in which everything happened: what it would have come to is not
     /// known, and it is no pass.
     fn observe_expectations(&mut self, record: &Record) {
@@ -192,8 +180,4 @@ impl Judged {
         });
         self.happened += u64::from(happened);
     }
-}
-
-fn key(parameters: &Parameters) -> String {
-    parameters.iter().map(|(name, value)| format!("{name}={value:?};")).collect()
 }

@@ -35,8 +35,14 @@ pub fn markdown(findings: &Findings<'_>) -> String {
         text.push_str(&worst(findings, scenario));
     }
     let (sampling, version) = (findings.manifest.sampling, &findings.manifest.closecall_version);
+    let settings: String = findings
+        .manifest
+        .settings()
+        .iter()
+        .map(|setting| format!(", <code>--set {}</code>", in_line(setting)))
+        .collect();
     text.push_str(&format!(
-        "<sub>Rates are conditional on the sampled scenario: they are not the risk on a road. Seed {}, {} design, \
+        "<sub>Rates are conditional on the sampled scenario: they are not the risk on a road. Seed {}, {} design{settings}, \
          closecall {version}.</sub>\n",
         sampling.seed, sampling.design,
     ));
@@ -132,6 +138,11 @@ fn worst(findings: &Findings<'_>, scenario: &ScenarioOverview) -> String {
     }
     text.push_str("\n</details>\n\n");
     text
+}
+
+/// Returns text for HTML within a line.
+fn in_line(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace(['\n', '\r'], " ")
 }
 
 /// Returns the text as it may stand in a cell of a table.

@@ -105,6 +105,7 @@ pub struct ScenarioFile {
     space: ParameterSpace,
     unused: Vec<ParameterName>,
     trajectory_files: Vec<PathBuf>,
+    settings: Vec<Setting>,
 }
 
 impl ScenarioFile {
@@ -155,7 +156,7 @@ impl ScenarioFile {
             let line = locate::line_of(&text, &source.path);
             ScenarioError::Value { path: path.to_owned(), line, source: Box::new(source), at: String::new() }
         })?;
-        Ok(Self { path: path.to_owned(), text, config, space, unused, trajectory_files })
+        Ok(Self { path: path.to_owned(), text, config, space, unused, trajectory_files, settings: settings.to_vec() })
     }
 
     /// Returns the path of the file, as given.
@@ -166,6 +167,11 @@ impl ScenarioFile {
     /// Returns the trajectory files that the file names.
     pub fn trajectory_files(&self) -> &[PathBuf] {
         &self.trajectory_files
+    }
+
+    /// Returns the settings that were applied to the file.
+    pub fn settings(&self) -> &[Setting] {
+        &self.settings
     }
 
     /// Returns the text of the scenario, with all settings applied.

@@ -1,0 +1,108 @@
+//! No combination of options passes a campaign in which nothing was checked.
+
+use std::path::{Path, PathBuf};
+
+use crate::support::{closecall, code, folder, json, library, stderr, stdout};
+
+/// Options that gate, and options that do not, each with a value that everything meets.
+const OPTIONS: [&[&str]; 20] = [
+    &["--max-collisions", "1000"],
+    &["--max-other-collisions", "1000"],
+    &["--max-induced", "1000"],
+    &["--min-prevented", "0"],
+    &["--max-harm", "1000"],
+    &["--min-rear-thw", "0.0001"],
+    &["--max-engagement-rate", "1"],
+    &["--max-speed-deficit-mps", "1000"],
+    &["--max-jerk", "1000"],
+    &["--max-probability", "0.999"],
+    &["--max-probability", "0.999", "--until-certain"],
+    &["--gate", "p99(min_ttc_rear_s) >= 0"],
+    &["--max-flip-rate", "1"],
+    &["--check-at-most", "0"],
+    &["--fail-fast"],
+    &["--max-errors", "5"],
+    &["--sensors", "object"],
+    &["--preset", "pr"],
+    &["--design", "sobol"],
+    &["--time-budget", "1s"],
+];
+
+/// Writes a scenario of the library without gates, requirements, checks and expectations.
+fn bare(folder: &Path, name: &str) -> PathBuf {
+    let text = std::fs::read_to_string(library(name)).unwrap();
+    let (before, rest) = text.split_once("[checks]").unwrap();
+    let (_, after) = rest.split_once("\n[").unwrap();
+    let is_kept = |line: &&str| !line.starts_with("requirements") && !line.starts_with("expects");
+    let before: Vec<&str> = before.lines().filter(is_kept).collect();
+    let path = folder.join("bare.toml");
+    std::fs::write(&path, format!("{}\n[{after}", before.join("\n"))).unwrap();
+    path
+}
+
+#[test]
+fn two_seconds_in_which_nothing_happens_pass_no_gate() {
+    for name in ["low-thw-overtake", "overtake-without-brake", "slow-approach", "rear-follower-stays"] {
+        for options in OPTIONS {
+            let path = library(name);
+            let args = ["campaign", path.to_str().unwrap(), "-n", "4", "--paired", "--set", "duration-s=2"];
+            let output = closecall(args.iter().chain(options));
+            // Some options exclude each other; nothing else is accepted.
+            assert!([2, 4, 7].contains(&code(&output)), "{name} {options:?}: {} {}", code(&output), stderr(&output));
+        }
+    }
+}
+
+#[test]
+fn a_campaign_without_gates_and_checks_is_not_judged() {
+    let folder = folder();
+    let path = bare(folder.path(), "low-thw-overtake");
+    let run = |more: &[&str]| closecall(["campaign", path.to_str().unwrap(), "-n", "4"].iter().chain(more));
+    for options in OPTIONS.iter().filter(|options| !options[0].starts_with("--max-") && options[0] != "--gate") {
+        let output = run(options);
+        let gates = ["--min-prevented", "--min-rear-thw"].contains(&options[0]);
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(gates || code(&output) == 4, "{options:?}: {} {text} {}", code(&output), stderr(&output));
+        assert!(gates || options[0] == "--preset" || text.contains("NOT JUDGED"), "{options:?}: {text}");
+    }
+    stdout(&run(&["--no-gate"]), 0);
+    // One gate is enough, if it says something.
+    assert!(stdout(&run(&["--max-collisions", "4"]), 0).contains("PASS"));
+}
+
+#[test]
+fn a_gate_on_what_no_sample_has_does_not_pass() {
+    let path = library("slow-approach");
+    // The margin increase system never engages there, so that no headway is gained.
+    let judged = |gate: &str| {
+        let path = path.to_str().unwrap();
+        let args = ["campaign", path, "-n", "4", "--paired", "--max-collisions", "4", "--gate", gate];
+        stdout(&closecall(args), 4)
+    };
+    assert!(judged("mean(thw_gain_s) >= 0").contains("no sample has this value"));
+    let text = judged("share(prevented | baseline.ego_collided) >= 0");
+    assert!(text.contains("share(prevented | baseline.ego_collided) has no value in any scenario"), "{text}");
+}
+
+#[test]
+fn copies_of_one_sample_are_one_sample() {
+    let args = ["campaign", "paper-figure", "-n", "1000", "--paired", "--max-probability", "0.3", "--format", "json"];
+    let report = json(&closecall(args), 4);
+    assert_eq!(report["samples"], 1);
+    assert!(report["probabilities"].as_object().unwrap().is_empty(), "no bound is claimed: {report}");
+    // A grid repeats the values of a label; each vector of parameters counts once.
+    let folder = folder();
+    let text = std::fs::read_to_string(library("paper-figure")).unwrap();
+    let path = folder.path().join("coin.toml");
+    let coin = "[parameters]\nrear-class = { choice = { car = 1, truck = 1 }, assumed = \"either\" }\n\n[[actor]]";
+    let text = text.replacen("[[actor]]", coin, 1);
+    let (before, rear) = text.split_once("id = \"rear\"").unwrap();
+    let rear = rear.replacen("class = \"car\"", "class = \"$rear-class\"", 1);
+    std::fs::write(&path, format!("{before}id = \"rear\"{rear}")).unwrap();
+    let args = ["campaign", path.to_str().unwrap(), "-n", "64", "--max-probability", "0.3", "--format", "json"];
+    let report = json(&closecall(args), 4);
+    let reasons = report["reasons"].to_string();
+    assert!(reasons.contains("62 samples have the parameters of an earlier one"), "{reasons}");
+    assert_eq!(report["samples"], 2, "{report}");
+    assert_eq!(report["controllers"]["mis"]["interval_95"][1].as_f64().map(|high| high > 0.8), Some(true), "{report}");
+}
