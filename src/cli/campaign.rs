@@ -18,6 +18,7 @@ use closecall_campaign::workers::Workers;
 use closecall_report::campaign::{CampaignReport, Tally};
 use closecall_scenarios::sampling::Design;
 use closecall_simulation::controller::ControllerChoice;
+use closecall_simulation::scenario::source::expand;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::args::{ControllerArgs, Format, SensorsChoice, SetArgs, controllers, positive};
@@ -28,7 +29,6 @@ use super::heartbeat::Heartbeat;
 use super::interrupt::{received, stop_gracefully};
 use super::output::{outln, print_error, print_report_files};
 use super::plan::PlanArgs;
-use super::source::expand;
 use super::summary::{print_counts, print_verdict};
 use super::{CliError, json};
 use crate::exit_code::ExitCode;

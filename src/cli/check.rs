@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use closecall_simulation::scenario::source::expand;
 use closecall_simulation::scenario::{ScenarioError, ScenarioFile};
 use serde_json::{Value, json};
 
@@ -10,7 +11,6 @@ use super::CliError;
 use super::args::{Format, SetArgs};
 use super::json::stamped;
 use super::output::{outln, print_error};
-use super::source::expand;
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall check`.

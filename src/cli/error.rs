@@ -20,6 +20,8 @@ use closecall_sensors::camera::ClassifierError;
 use closecall_sensors::camera::dataset::DatasetError;
 use closecall_simulation::SampleError;
 use closecall_simulation::scenario::ScenarioError;
+use closecall_simulation::scenario::library::UnknownScenario;
+use closecall_simulation::scenario::source::SourceError;
 use miette::Diagnostic;
 
 use crate::exit_code::ExitCode;
@@ -122,6 +124,24 @@ pub enum CliError {
     /// Two campaigns cannot be compared.
     #[error(transparent)]
     Compare(#[from] CompareError),
+}
+
+impl From<SourceError> for CliError {
+    fn from(error: SourceError) -> Self {
+        match error {
+            SourceError::Scenario(error) => Self::Scenario(error),
+            SourceError::StandardInputTwice => Self::Usage { message: error.to_string() },
+            SourceError::NoScenario { .. } => {
+                Self::Usage { message: format!("{error}: `closecall new NAME` writes one") }
+            }
+        }
+    }
+}
+
+impl From<UnknownScenario> for CliError {
+    fn from(error: UnknownScenario) -> Self {
+        Self::Usage { message: error.to_string() }
+    }
 }
 
 /// Returns the tracks that `--track` can name, as the end of a message.

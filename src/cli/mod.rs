@@ -30,7 +30,6 @@ mod replay;
 mod robustness;
 mod run;
 mod schema;
-mod source;
 mod statistics;
 mod summary;
 mod trajectories;

@@ -1,8 +1,8 @@
 //! Tests of the tracker on simulated detections against the true states.
 
 use closecall_traffic::{
-    ActorId, CONTROL_STEP, Check, ClassScores, Environment, Parameters, Road, Stream, Track, TrackId, TrackStatus, VehicleClass,
-    stream,
+    ActorId, CONTROL_STEP, Check, ClassScores, Environment, Parameters, Road, Stream, Track, TrackId, TrackStatus,
+    VehicleClass, stream,
 };
 use rand::RngExt;
 use rand_distr::StandardNormal;

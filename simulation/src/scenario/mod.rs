@@ -13,10 +13,12 @@ mod config;
 mod edit;
 mod events;
 mod file;
+pub mod library;
 mod locate;
 mod placement;
 mod recorded;
 mod reenacted;
+pub mod source;
 mod variation;
 
 pub use checked::{Actor, Scenario};

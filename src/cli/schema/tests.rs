@@ -1,9 +1,9 @@
 use std::sync::LazyLock;
 
 use closecall_simulation::criteria::Expression;
+use closecall_simulation::scenario::library;
 use closecall_traffic::ActorId;
 
-use super::super::library;
 use super::*;
 
 /// Returns the first rule of `schema` that `value` breaks, for the keywords that the schema of scenarios uses.
