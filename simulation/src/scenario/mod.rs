@@ -18,6 +18,7 @@ mod locate;
 mod placement;
 mod recorded;
 mod reenacted;
+mod schema;
 pub mod source;
 mod variation;
 
@@ -30,3 +31,4 @@ pub use events::{
 };
 pub use file::{ScenarioError, ScenarioFile};
 pub use reenacted::{RearDriver, actor_name, reenact};
+pub use schema::strict_schema;
