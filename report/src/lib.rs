@@ -3,6 +3,7 @@
 //!
 //! * [`run`](mod@run): output of one run, or of a pair of runs: Rerun recording, static figure, trace
 //! * [`campaign`]: output of many runs: HTML page, JUnit, Parquet, Markdown, recordings of selected samples
+//! * [`json`]: results as JSON with stable keys
 //! * [`traffic`]: simulated traffic as trajectory data, and charts of trajectory data
 //!
 //! This crate is the only one that uses rerun, arrow and plotters.
@@ -10,6 +11,7 @@
 pub mod campaign;
 mod charts;
 mod escape;
+pub mod json;
 pub mod run;
 mod table;
 pub mod traffic;

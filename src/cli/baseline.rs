@@ -5,13 +5,13 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 use closecall_campaign::baseline::{BASELINE_VERSION, Baseline, BaselineComparison, ScenarioBaselineComparison};
 use closecall_campaign::folder::{Folder, FolderError};
+use closecall_report::json::stamped;
 use closecall_scenarios::atomic::write_file;
 use serde_json::{Value, json};
 
 use super::CliError;
 use super::args::Format;
 use super::gates::share;
-use super::json::stamped;
 use super::output::{listed, outln};
 use crate::exit_code::ExitCode;
 

@@ -16,11 +16,13 @@ use closecall_campaign::selection::Selection;
 use closecall_campaign::stop::{StopMonitor, StopRule};
 use closecall_campaign::workers::Workers;
 use closecall_report::campaign::{CampaignReport, Tally};
+use closecall_report::json;
 use closecall_scenarios::sampling::Design;
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::scenario::source::expand;
 use indicatif::{ProgressBar, ProgressStyle};
 
+use super::CliError;
 use super::args::{ControllerArgs, Format, SensorsChoice, SetArgs, controllers, positive};
 use super::backend::check_backend;
 use super::ending::{EndArgs, EndRule, Ending, print_resumption};
@@ -30,7 +32,6 @@ use super::interrupt::{received, stop_gracefully};
 use super::output::{outln, print_error, print_report_files};
 use super::plan::PlanArgs;
 use super::summary::{print_counts, print_verdict};
-use super::{CliError, json};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall campaign`.

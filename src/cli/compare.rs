@@ -5,11 +5,11 @@ use std::path::PathBuf;
 use clap::Args;
 use closecall_campaign::compare::{Means, ScenarioComparison, compare as compare_folders};
 use closecall_campaign::folder::Folder;
+use closecall_report::json::stamped;
 use serde_json::{Map, Value, json};
 
 use super::CliError;
 use super::args::Format;
-use super::json::stamped;
 use super::output::{listed, out, outln};
 use crate::exit_code::ExitCode;
 

@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use closecall_report::json::stamped;
 use closecall_scenarios::trajectory_data::{BadRows, QualityInspector, ReadOptions, Tracks, open};
 use serde_json::{Value, json};
 
 use super::CliError;
 use super::args::{Format, ReadArgs};
-use super::json::stamped;
 use super::output::{outln, print_error};
 use crate::exit_code::ExitCode;
 

@@ -1,12 +1,12 @@
 //! `closecall list`: the scenario library, which is part of the program.
 
 use clap::Args;
+use closecall_report::json::stamped;
 use closecall_simulation::scenario::library::entries;
 use serde_json::json;
 
 use super::CliError;
 use super::args::Format;
-use super::json::stamped;
 use super::output::outln;
 use crate::exit_code::ExitCode;
 

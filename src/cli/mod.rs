@@ -14,7 +14,6 @@ mod generate;
 mod heartbeat;
 mod inspect;
 mod interrupt;
-mod json;
 mod library;
 mod merge;
 mod new;

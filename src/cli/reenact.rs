@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use closecall_report::json;
 use closecall_report::run::film::{EncounterComparison, Film, film_encounter};
 use closecall_report::run::rerun::write_recording;
 use closecall_scenarios::atomic::write_file;
@@ -16,11 +17,11 @@ use closecall_simulation::scenario::{RearDriver, ScenarioFile, reenact as scenar
 use closecall_simulation::{CONTROL_STEP, RunKey};
 use serde_json::json;
 
+use super::CliError;
 use super::args::{ArmArgs, Format, ReadArgs, SetArgs};
 use super::output::outln;
 use super::protect::{of_trajectories, protect};
 use super::watch::{WatchArgs, by_severity, run_filmed};
-use super::{CliError, json};
 use crate::exit_code::ExitCode;
 
 /// Number of vehicles whose speeds are plotted: the ego, the lead vehicle and the rear vehicle.
@@ -155,8 +156,8 @@ fn print(format: Format, found: &RecordedEncounter, reenactment: &Reenactment<'_
                 "ego_track_id": ego,
                 "front_track_id": front,
                 "start_s": found.start.s(),
-                "recorded": json::course(&comparison.recorded),
-                "simulated": json::course(&comparison.simulated),
+                "recorded": json::encounter_metrics(&comparison.recorded),
+                "simulated": json::encounter_metrics(&comparison.simulated),
                 "outcome": json::outcome(outcome),
             });
             outln!("{:#}", json::stamped(object, Some(outcome.seed), None));

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use closecall_report::json::stamped;
 use closecall_report::traffic::trajectory_charts::{Legend, Line, LineChart};
 use closecall_scenarios::atomic::{WriteError, write_file};
 use closecall_scenarios::lane_change::Criterion;
@@ -12,7 +13,6 @@ use rayon::prelude::*;
 
 use super::CliError;
 use super::args::{Format, ReadArgs};
-use super::json::stamped;
 use super::output::{outln, print_error, print_written};
 use super::protect::{of_trajectories, protect};
 use crate::exit_code::ExitCode;

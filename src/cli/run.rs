@@ -4,16 +4,17 @@ use std::path::PathBuf;
 
 use clap::Args;
 use closecall_campaign::runner::{Sampling, concrete};
+use closecall_report::json;
 use closecall_scenarios::sampling::Design;
 use closecall_simulation::RunKey;
 use closecall_simulation::outcome::Outcome;
 use closecall_simulation::scenario::Setting;
 
+use super::CliError;
 use super::args::{ArmArgs, Format, SetArgs};
 use super::output::{out, outln};
 use super::protect::{of_scenario, protect};
 use super::watch::{WatchArgs, run_watched};
-use super::{CliError, json};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall run`.

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use closecall_report::json::stamped;
 use closecall_report::traffic::trajectory_charts::{BoxChart, BoxSummary};
 use closecall_scenarios::atomic::{WriteError, write_file};
 use closecall_scenarios::criticality::{
@@ -13,7 +14,6 @@ use closecall_scenarios::trajectory_data::{TrajectoryData, read_with};
 
 use super::CliError;
 use super::args::{Format, ReadArgs, positive};
-use super::json::stamped;
 use super::output::{outln, print_written};
 use super::protect::{of_trajectories, protect};
 use super::trajectories::refuse_duplicates;

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use closecall_report::json::stamped;
 use closecall_scenarios::atomic::WriteError;
 use closecall_scenarios::criticality::{CriticalLaneChange, criticality as evaluate, shares};
 use closecall_scenarios::filters::smooth;
@@ -14,7 +15,6 @@ use closecall_scenarios::trajectory_data::{Layout, TrajectoryData, count_flaws, 
 
 use super::CliError;
 use super::args::{Format, ReadArgs, positive};
-use super::json::stamped;
 use super::output::{out, outln};
 use super::protect::{of_trajectories, protect, recording as trajectory_path};
 use super::watch::record_lane_change;

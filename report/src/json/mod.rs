@@ -1,0 +1,11 @@
+//! Results as JSON with stable keys, as the command line prints them.
+//!
+//! An absent value is `null`, and the key `…_absent` beside it states the reason. The units are part of the keys.
+
+mod campaign;
+mod outcome;
+mod stamp;
+
+pub use campaign::campaign;
+pub use outcome::{encounter_metrics, outcome};
+pub use stamp::stamped;
