@@ -32,6 +32,7 @@ pub mod plan;
 pub mod probability;
 pub mod record;
 mod repair;
+pub mod repository;
 pub mod runner;
 pub mod saved;
 pub mod selection;
