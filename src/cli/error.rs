@@ -4,6 +4,7 @@ use closecall_campaign::baseline::BaselineError;
 use closecall_campaign::compare::CompareError;
 use closecall_campaign::execution::CampaignError;
 use closecall_campaign::folder::FolderError;
+use closecall_campaign::gate::ProjectError;
 use closecall_campaign::merge::MergeError;
 use closecall_campaign::plan::PlanError;
 use closecall_campaign::saved::SavedError;
@@ -33,13 +34,8 @@ const MAX_SUGGESTED: usize = 10;
 #[derive(Debug, thiserror::Error, Diagnostic)]
 pub enum CliError {
     /// The project file cannot be used.
-    #[error("failed to read {}: {message}", path.display())]
-    Project {
-        /// The file.
-        path: std::path::PathBuf,
-        /// What is wrong, with the line.
-        message: String,
-    },
+    #[error(transparent)]
+    Project(#[from] ProjectError),
     /// A scenario cannot be used.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
@@ -166,7 +162,7 @@ impl From<&CliError> for ExitCode {
             | CliError::Reference(_)
             | CliError::TrafficFilm(_)
             | CliError::NoEncounter { .. }
-            | CliError::Project { .. }
+            | CliError::Project(_)
             | CliError::Classifier(_) => Self::InvalidInput,
             CliError::Folder(error) => Self::from(error),
             CliError::Campaign(error) => Self::from(error),

@@ -20,7 +20,6 @@ mod new;
 mod output;
 mod plan;
 mod plot;
-mod project;
 mod protect;
 mod record;
 mod reenact;
