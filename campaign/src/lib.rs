@@ -17,6 +17,7 @@
 
 pub mod baseline;
 pub mod compare;
+pub mod end_rule;
 pub mod execution;
 pub mod fingerprint;
 pub mod folder;
