@@ -5,7 +5,9 @@
 mod campaign;
 mod outcome;
 mod stamp;
+mod trajectory_data;
 
 pub use campaign::campaign;
 pub use outcome::{encounter_metrics, outcome};
 pub use stamp::stamped;
+pub use trajectory_data::{fitted, quality, robustness};
