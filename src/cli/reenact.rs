@@ -7,7 +7,7 @@ use closecall_report::json;
 use closecall_report::run::film::{EncounterComparison, Film, film_encounter};
 use closecall_report::run::rerun::write_recording;
 use closecall_scenarios::atomic::write_file;
-use closecall_scenarios::criticality::{CriticalLaneChange, criticality};
+use closecall_scenarios::criticality::{CriticalLaneChange, by_severity, criticality};
 use closecall_scenarios::encounter::{NoEncounter, RecordedEncounter, encounter};
 use closecall_scenarios::filters::smooth;
 use closecall_scenarios::lane_change::LaneChange;
@@ -21,7 +21,7 @@ use super::CliError;
 use super::args::{ArmArgs, Format, ReadArgs, SetArgs};
 use super::output::outln;
 use super::protect::{of_trajectories, protect};
-use super::watch::{WatchArgs, by_severity, run_filmed};
+use super::watch::{WatchArgs, run_filmed};
 use crate::exit_code::ExitCode;
 
 /// Number of vehicles whose speeds are plotted: the ego, the lead vehicle and the rear vehicle.
