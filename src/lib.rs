@@ -18,7 +18,7 @@
 //! | [`controllers`] | the ego stack and the human drivers |
 //! | [`simulation`] | one run: scenario file, world, closed loop, outcome |
 //! | [`campaign`] | many runs: journal, workers, gates, validity, verdict |
-//! | [`report`] | Rerun recordings, figures, Parquet, JUnit, HTML |
+//! | [`report`] | Rerun recordings, figures, Parquet, JUnit, HTML, JSON |
 //!
 //! `examples/campaign.rs` runs a campaign without the command line.
 

@@ -11,12 +11,15 @@
 //! its changes can be reviewed. [`compare`](mod@crate::compare) compares two whole folders instead, bit for bit.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
+use closecall_scenarios::atomic::{WriteError, write_file};
 use closecall_scenarios::sampling::Design;
 use closecall_simulation::outcome::Margins;
 use closecall_statistics::quantiles::quantile;
 use closecall_traffic::Measured;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use crate::folder::{Folder, FolderError};
 use crate::record::ArmRecord;
@@ -119,6 +122,33 @@ impl Baseline {
             design: manifest.sampling.design,
             controller: manifest.arms.last().map(ToString::to_string).unwrap_or_default(),
             scenarios: collected.into_iter().map(|(name, scenario)| (name, scenario.finish())).collect(),
+        })
+    }
+
+    /// Reads a file that [`Baseline::write`] has written.
+    ///
+    /// # Errors
+    /// [`FolderError`] if the file cannot be read, or is not a baseline of version [`BASELINE_VERSION`].
+    pub fn read(path: &Path) -> Result<Self, FolderError> {
+        let text =
+            std::fs::read_to_string(path).map_err(|source| FolderError::Read { path: path.to_owned(), source })?;
+        let content = |line, message| FolderError::Content { path: path.to_owned(), line, message };
+        // The version comes first: another layout has other keys.
+        let value: Value = serde_json::from_str(&text).map_err(|error| content(error.line(), error.to_string()))?;
+        if value["schema_version"] != BASELINE_VERSION {
+            return Err(content(1, format!("the file is not a baseline of version {BASELINE_VERSION}")));
+        }
+        serde_json::from_value(value).map_err(|error| content(1, error.to_string()))
+    }
+
+    /// Writes the baseline as a JSON file. An existing file is replaced.
+    ///
+    /// # Errors
+    /// [`WriteError`] if the file cannot be written; a file of that name is then unchanged.
+    pub fn write(&self, path: &Path) -> Result<(), WriteError> {
+        write_file(path, |out| {
+            serde_json::to_writer_pretty(&mut *out, self)?;
+            out.write_all(b"\n")
         })
     }
 

@@ -17,6 +17,7 @@
 
 pub mod baseline;
 pub mod compare;
+pub mod end_rule;
 pub mod execution;
 pub mod fingerprint;
 pub mod folder;
@@ -33,6 +34,7 @@ pub mod probability;
 pub mod record;
 mod repair;
 mod repeats;
+pub mod repository;
 pub mod runner;
 pub mod saved;
 pub mod selection;

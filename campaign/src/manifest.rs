@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use closecall_sensors::SensorMode;
 use closecall_simulation::Arm;
 use closecall_simulation::controller::ControllerChoice;
-use closecall_simulation::scenario::Scenario;
+use closecall_simulation::scenario::{Scenario, Setting};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -121,9 +121,10 @@ impl Manifest {
         differences
     }
 
-    /// Returns the settings, each as `key=value`: `--set` applies to every scenario.
-    pub fn settings(&self) -> &[String] {
-        self.scenarios.first().map_or(&[], |scenario| &scenario.settings)
+    /// Returns the settings: `--set` applies to every scenario.
+    pub fn settings(&self) -> Vec<Setting> {
+        let texts = self.scenarios.first().map_or(&[][..], |scenario| &scenario.settings);
+        texts.iter().filter_map(|text| text.parse().ok()).collect()
     }
 
     /// Returns the manifest as JSON without what does not affect the outcomes: the command line, the paths of the

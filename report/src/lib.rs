@@ -3,13 +3,15 @@
 //!
 //! * [`run`](mod@run): output of one run, or of a pair of runs: Rerun recording, static figure, trace
 //! * [`campaign`]: output of many runs: HTML page, JUnit, Parquet, Markdown, recordings of selected samples
-//! * [`traffic`]: simulated traffic as trajectory data, and charts of trajectory data
+//! * [`json`]: results as JSON with stable keys
+//! * [`traffic`]: simulated traffic as trajectory data, and texts and charts of what was found in trajectory data
 //!
 //! This crate is the only one that uses rerun, arrow and plotters.
 
 pub mod campaign;
 mod charts;
 mod escape;
+pub mod json;
 pub mod run;
 mod table;
 pub mod traffic;

@@ -9,5 +9,6 @@ pub mod fit;
 pub mod lane_change;
 pub mod parameters;
 pub mod robustness;
+pub mod same_file;
 pub mod sampling;
 pub mod trajectory_data;

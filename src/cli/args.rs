@@ -8,14 +8,13 @@ use closecall_sensors::SensorMode;
 use closecall_simulation::Arm;
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::controller::exec::{DEFAULT_MEMORY_MIB, DEFAULT_TIMEOUT_MS, ExecSettings, NAME as EXEC};
-use closecall_simulation::scenario::{ScenarioError, ScenarioFile, Setting};
+use closecall_simulation::scenario::{ScenarioError, ScenarioFile, Setting, source};
 
 use closecall_traffic::suggest::hint;
 
 use super::CliError;
 use super::output::print_error;
 use super::protect::of_controller;
-use super::source;
 
 /// The format of the output.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]

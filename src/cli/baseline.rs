@@ -1,17 +1,16 @@
 //! `closecall baseline`: keeps the results of a campaign in a small file, and compares later campaigns with it.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
-use closecall_campaign::baseline::{BASELINE_VERSION, Baseline, BaselineComparison, ScenarioBaselineComparison};
-use closecall_campaign::folder::{Folder, FolderError};
-use closecall_scenarios::atomic::write_file;
-use serde_json::{Value, json};
+use closecall_campaign::baseline::{Baseline, BaselineComparison, ScenarioBaselineComparison};
+use closecall_campaign::folder::Folder;
+use closecall_report::json::stamped;
+use serde_json::json;
 
 use super::CliError;
 use super::args::Format;
 use super::gates::share;
-use super::json::stamped;
 use super::output::{listed, outln};
 use crate::exit_code::ExitCode;
 
@@ -54,16 +53,13 @@ pub(super) fn baseline(args: &BaselineArgs) -> Result<ExitCode, CliError> {
     }
 }
 
-fn save(dir: &std::path::Path, file: &std::path::Path) -> Result<ExitCode, CliError> {
+fn save(dir: &Path, file: &Path) -> Result<ExitCode, CliError> {
     // Only a baseline is replaced: another file may be an input.
     if file.exists() {
-        read(file)?;
+        Baseline::read(file)?;
     }
     let baseline = Baseline::of(&Folder::open(dir))?;
-    write_file(file, |out| {
-        serde_json::to_writer_pretty(&mut *out, &baseline)?;
-        out.write_all(b"\n")
-    })?;
+    baseline.write(file)?;
     for (name, scenario) in &baseline.scenarios {
         let (samples, collisions, errors) = (scenario.samples, scenario.collisions, scenario.errors);
         outln!("{name}: {samples} samples, {collisions} collisions, {errors} errors");
@@ -72,27 +68,8 @@ fn save(dir: &std::path::Path, file: &std::path::Path) -> Result<ExitCode, CliEr
     Ok(ExitCode::Pass)
 }
 
-fn read(file: &std::path::Path) -> Result<Baseline, CliError> {
-    let path = || file.to_owned();
-    let text = std::fs::read_to_string(file).map_err(|source| FolderError::Read { path: path(), source })?;
-    let content = |line, message| FolderError::Content { path: path(), line, message };
-    // The version comes first: another layout has other keys.
-    let value: Value = serde_json::from_str(&text).map_err(|error| content(error.line(), error.to_string()))?;
-    if value["schema_version"] != BASELINE_VERSION {
-        let message = format!("the file is not a baseline of version {BASELINE_VERSION}");
-        return Err(content(1, message).into());
-    }
-    let read = serde_json::from_value(value).map_err(|error| content(1, error.to_string()))?;
-    Ok(read)
-}
-
-fn compare(
-    dir: &std::path::Path,
-    file: &std::path::Path,
-    tolerance: f64,
-    format: Format,
-) -> Result<ExitCode, CliError> {
-    let (before, current) = (read(file)?, Baseline::of(&Folder::open(dir))?);
+fn compare(dir: &Path, file: &Path, tolerance: f64, format: Format) -> Result<ExitCode, CliError> {
+    let (before, current) = (Baseline::read(file)?, Baseline::of(&Folder::open(dir))?);
     let found = before.compare(&current, tolerance)?;
     let code = if found.is_regression() { ExitCode::Fail } else { ExitCode::Pass };
     match format {
@@ -110,7 +87,7 @@ fn compare(
     Ok(code)
 }
 
-fn print(found: &BaselineComparison, file: &std::path::Path) {
+fn print(found: &BaselineComparison, file: &Path) {
     for ScenarioBaselineComparison { scenario, newly_failing, fixed, margins } in &found.scenarios {
         outln!("{scenario}");
         outln!("  {:>6} newly failing{}", newly_failing.len(), listed(newly_failing));

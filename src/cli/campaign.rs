@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use clap::Args;
+use closecall_campaign::end_rule::EndMonitor;
 use closecall_campaign::execution::{Campaign, End, NextRecord};
 use closecall_campaign::folder::Folder;
 use closecall_campaign::gate::GateSet;
@@ -16,21 +17,22 @@ use closecall_campaign::selection::Selection;
 use closecall_campaign::stop::{StopMonitor, StopRule};
 use closecall_campaign::workers::Workers;
 use closecall_report::campaign::{CampaignReport, Tally};
+use closecall_report::json;
 use closecall_scenarios::sampling::Design;
 use closecall_simulation::controller::ControllerChoice;
+use closecall_simulation::scenario::source::expand;
 use indicatif::{ProgressBar, ProgressStyle};
 
+use super::CliError;
 use super::args::{ControllerArgs, Format, SensorsChoice, SetArgs, controllers, positive};
 use super::backend::check_backend;
-use super::ending::{EndArgs, EndRule, Ending, print_resumption};
+use super::ending::{EndArgs, Ending, print_resumption};
 use super::gates::GateArgs;
 use super::heartbeat::Heartbeat;
 use super::interrupt::{received, stop_gracefully};
 use super::output::{outln, print_error, print_report_files};
 use super::plan::PlanArgs;
-use super::source::expand;
 use super::summary::{print_counts, print_verdict};
-use super::{CliError, json};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall campaign`.
@@ -136,11 +138,11 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
         time_budget: args.plan.time_budget(),
         scenarios: campaign.works.len(),
     };
-    let mut progress = Progress::new(&campaign, &gates, StopMonitor::start(stop), EndRule::new(args.end));
+    let mut progress = Progress::new(&campaign, &gates, StopMonitor::start(stop), EndMonitor::new(args.end.rule()));
     let resumption = campaign.run(locked.as_ref(), |next| progress.push(next))?;
     progress.bar.finish_and_clear();
     print_resumption(&resumption);
-    if let Some(ending) = received().map(Ending::Signal).or(progress.end.ending.take()) {
+    if let Some(ending) = received().map(Ending::Signal).or_else(|| progress.end.into_ending().map(Ending::Rule)) {
         return Ok(ending.print(args.format, &campaign, &progress.tally.summary, args.out.as_deref()));
     }
     let wall_s = started.elapsed().as_secs_f64();
@@ -178,13 +180,13 @@ struct Progress {
     names: Vec<String>,
     tally: Tally,
     stop: StopMonitor,
-    end: EndRule,
+    end: EndMonitor,
     bar: ProgressBar,
     _heartbeat: Heartbeat,
 }
 
 impl Progress {
-    fn new(campaign: &Campaign, gates: &GateSet, stop: StopMonitor, end: EndRule) -> Self {
+    fn new(campaign: &Campaign, gates: &GateSet, stop: StopMonitor, end: EndMonitor) -> Self {
         for work in &campaign.works {
             let (name, count, requested) = (&work.file.config().name, work.count(), work.sampling.samples);
             if count != requested {

@@ -3,14 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use closecall_report::json::stamped;
+use closecall_simulation::scenario::source::expand;
 use closecall_simulation::scenario::{ScenarioError, ScenarioFile};
 use serde_json::{Value, json};
 
 use super::CliError;
 use super::args::{Format, SetArgs};
-use super::json::stamped;
 use super::output::{outln, print_error};
-use super::source::expand;
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall check`.

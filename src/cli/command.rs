@@ -139,7 +139,7 @@ fn dispatch(command: Command) -> Result<ExitCode, CliError> {
         Command::Baseline(args) => baseline::baseline(&args),
         Command::Replay(args) => replay::replay(&args),
         Command::Check(args) => check::check(&args),
-        Command::Schema => schema::schema(),
+        Command::Schema => Ok(schema::schema()),
         Command::Inspect(args) => inspect::inspect(&args),
         Command::LaneChanges(args) => trajectories::lane_changes(&args),
         Command::Criticality(args) => trajectories::criticality(&args),

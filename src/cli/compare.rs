@@ -5,11 +5,10 @@ use std::path::PathBuf;
 use clap::Args;
 use closecall_campaign::compare::{Means, ScenarioComparison, compare as compare_folders};
 use closecall_campaign::folder::Folder;
-use serde_json::{Map, Value, json};
+use closecall_report::json::{self, stamped};
 
 use super::CliError;
 use super::args::Format;
-use super::json::stamped;
 use super::output::{listed, out, outln};
 use crate::exit_code::ExitCode;
 
@@ -36,7 +35,14 @@ pub(super) fn compare(args: &CompareArgs) -> Result<ExitCode, CliError> {
     let code = judge(&found, args.max_newly_failing);
     match args.format {
         Format::Json => {
-            outln!("{:#}", stamped(to_json(&found, &differences, code), Some(current_manifest.sampling.seed), None))
+            outln!(
+                "{:#}",
+                stamped(
+                    json::comparison(&found, &differences, code == ExitCode::Pass),
+                    Some(current_manifest.sampling.seed),
+                    None
+                )
+            )
         }
         Format::Human => print(&found, &differences, code),
     }
@@ -85,40 +91,4 @@ fn print(found: &[ScenarioComparison], differences: &[String], code: ExitCode) {
         }
     }
     outln!("{}", verdict(code));
-}
-
-fn to_json(found: &[ScenarioComparison], differences: &[String], code: ExitCode) -> Value {
-    let scenario = |scenario: &ScenarioComparison| {
-        let margins: Map<String, Value> = scenario
-            .margins
-            .iter()
-            .map(|margin| {
-                let means = margin.means();
-                let value = json!({
-                    "samples": margin.samples,
-                    "mean_baseline": means.map(|means| means.baseline),
-                    "mean": means.map(|means| means.current),
-                    "worst_sample": margin.worst.map(|worst| worst.sample),
-                    "worst_change": margin.worst.map(|worst| worst.change),
-                });
-                (margin.key.to_owned(), value)
-            })
-            .collect();
-        let object = json!({
-            "samples": scenario.samples,
-            "same": scenario.same,
-            "newly_failing": scenario.newly_failing,
-            "fixed": scenario.fixed,
-            "still_failing": scenario.still_failing,
-            "newly_in_error": scenario.newly_in_error,
-            "no_longer_in_error": scenario.no_longer_in_error,
-            "margins": margins,
-        });
-        (scenario.scenario.clone(), object)
-    };
-    json!({
-        "verdict": if code == ExitCode::Pass { "PASS" } else { "FAIL" },
-        "differences": differences,
-        "scenarios": found.iter().map(scenario).collect::<Map<String, Value>>(),
-    })
 }

@@ -1,12 +1,11 @@
 //! The ends of a campaign before its last sample: a signal, a failing sample, too many errors. Such a campaign has no
 //! verdict and no reports. Its journal is complete up to its end, and the command that resumes it is printed.
 
-use std::ops::ControlFlow;
 use std::path::Path;
 
 use clap::Args;
-use closecall_campaign::execution::{Campaign, End, ResumeReport};
-use closecall_campaign::record::Record;
+use closecall_campaign::end_rule::{EarlyEnd, EndRule};
+use closecall_campaign::execution::{Campaign, ResumeReport};
 use closecall_campaign::summary::Summary;
 use serde_json::json;
 
@@ -36,37 +35,14 @@ pub(super) struct EndArgs {
 pub(super) enum Ending {
     /// A signal has stopped it.
     Signal(Signal),
-    /// A sample has failed.
-    Failure { scenario: String, sample: u64, is_error: bool },
-    /// Too many samples have ended in an error.
-    Errors { errors: u64 },
+    /// The rule of the command line has ended it.
+    Rule(EarlyEnd),
 }
 
-/// Applies [`EndArgs`] to a running campaign.
-#[derive(Clone, Debug)]
-pub(super) struct EndRule {
-    args: EndArgs,
-    errors: u64,
-    pub(super) ending: Option<Ending>,
-}
-
-impl EndRule {
-    pub(super) fn new(args: EndArgs) -> Self {
-        Self { args, errors: 0, ending: None }
-    }
-
-    /// Returns `Break` if the campaign ends after this record.
-    pub(super) fn observe(&mut self, record: &Record) -> ControlFlow<End> {
-        let is_error = record.arms.iter().any(|arm| arm.result.is_err());
-        let has_collided = record.tallies().last().is_some_and(|tested| tested.collided == Some(true));
-        self.errors += u64::from(is_error);
-        if self.args.fail_fast && (is_error || has_collided) {
-            let (scenario, sample) = (record.scenario.clone(), record.sample);
-            self.ending = Some(Ending::Failure { scenario, sample, is_error });
-        } else if self.args.max_errors.is_some_and(|most| self.errors > most) {
-            self.ending = Some(Ending::Errors { errors: self.errors });
-        }
-        if self.ending.is_some() { ControlFlow::Break(End::Campaign) } else { ControlFlow::Continue(()) }
+impl EndArgs {
+    /// Returns the rule that ends the campaign early.
+    pub(super) const fn rule(&self) -> EndRule {
+        EndRule { fail_fast: self.fail_fast, max_errors: self.max_errors }
     }
 }
 
@@ -74,26 +50,22 @@ impl Ending {
     fn exit_code(&self) -> ExitCode {
         match self {
             Self::Signal(signal) => signal.exit_code(),
-            Self::Failure { is_error: false, .. } => ExitCode::Fail,
-            Self::Failure { is_error: true, .. } | Self::Errors { .. } => ExitCode::SampleError,
+            Self::Rule(EarlyEnd::Failure { is_error: false, .. }) => ExitCode::Fail,
+            Self::Rule(EarlyEnd::Failure { is_error: true, .. } | EarlyEnd::Errors { .. }) => ExitCode::SampleError,
         }
     }
 
     fn message(&self) -> String {
         match self {
             Self::Signal(signal) => signal.name().to_owned(),
-            Self::Failure { scenario, sample, is_error } => {
-                let what = if *is_error { "ended in an error" } else { "has a collision of the ego" };
-                format!("sample {sample} of {scenario} {what}")
-            }
-            Self::Errors { errors } => format!("{errors} samples ended in an error"),
+            Self::Rule(ending) => ending.to_string(),
         }
     }
 
     /// Prints the counts so far, and how to go on. `out` is the campaign's folder.
     pub(super) fn print(&self, format: Format, campaign: &Campaign, summary: &Summary, out: Option<&Path>) -> ExitCode {
         let (done, of, message) = (summary.total().samples, campaign.len(), self.message());
-        let resume = out.map(|_| resume_command(std::env::args(), matches!(self, Self::Errors { .. })));
+        let resume = out.map(|_| resume_command(std::env::args(), matches!(self, Self::Rule(EarlyEnd::Errors { .. }))));
         match format {
             Format::Json => {
                 let ended = json!({ "ended_early": message, "samples": done, "of": of, "resume": resume });
@@ -104,7 +76,7 @@ impl Ending {
                 outln!("ENDED EARLY, without a verdict: {message}; {done} of {of} samples are done");
                 match (&resume, out) {
                     (Some(resume), Some(out)) => {
-                        if let Self::Failure { scenario, sample, .. } = self {
+                        if let Self::Rule(EarlyEnd::Failure { scenario, sample, .. }) = self {
                             let out = quoted(&out.display().to_string());
                             outln!(
                                 "look:   closecall replay {out} {sample} --scenario {scenario} --record failure.rrd"

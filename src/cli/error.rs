@@ -4,6 +4,7 @@ use closecall_campaign::baseline::BaselineError;
 use closecall_campaign::compare::CompareError;
 use closecall_campaign::execution::CampaignError;
 use closecall_campaign::folder::FolderError;
+use closecall_campaign::gate::ProjectError;
 use closecall_campaign::merge::MergeError;
 use closecall_campaign::plan::PlanError;
 use closecall_campaign::saved::SavedError;
@@ -20,6 +21,8 @@ use closecall_sensors::camera::ClassifierError;
 use closecall_sensors::camera::dataset::DatasetError;
 use closecall_simulation::SampleError;
 use closecall_simulation::scenario::ScenarioError;
+use closecall_simulation::scenario::library::UnknownScenario;
+use closecall_simulation::scenario::source::SourceError;
 use miette::Diagnostic;
 
 use crate::exit_code::ExitCode;
@@ -31,13 +34,8 @@ const MAX_SUGGESTED: usize = 10;
 #[derive(Debug, thiserror::Error, Diagnostic)]
 pub enum CliError {
     /// The project file cannot be used.
-    #[error("failed to read {}: {message}", path.display())]
-    Project {
-        /// The file.
-        path: std::path::PathBuf,
-        /// What is wrong, with the line.
-        message: String,
-    },
+    #[error(transparent)]
+    Project(#[from] ProjectError),
     /// A scenario cannot be used.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
@@ -124,6 +122,24 @@ pub enum CliError {
     Compare(#[from] CompareError),
 }
 
+impl From<SourceError> for CliError {
+    fn from(error: SourceError) -> Self {
+        match error {
+            SourceError::Scenario(error) => Self::Scenario(error),
+            SourceError::StandardInputTwice => Self::Usage { message: error.to_string() },
+            SourceError::NoScenario { .. } => {
+                Self::Usage { message: format!("{error}: `closecall new NAME` writes one") }
+            }
+        }
+    }
+}
+
+impl From<UnknownScenario> for CliError {
+    fn from(error: UnknownScenario) -> Self {
+        Self::Usage { message: error.to_string() }
+    }
+}
+
 /// Returns the tracks that `--track` can name, as the end of a message.
 fn suggestion(possible: &[u64]) -> String {
     let named: Vec<String> = possible.iter().take(MAX_SUGGESTED).map(u64::to_string).collect();
@@ -146,7 +162,7 @@ impl From<&CliError> for ExitCode {
             | CliError::Reference(_)
             | CliError::TrafficFilm(_)
             | CliError::NoEncounter { .. }
-            | CliError::Project { .. }
+            | CliError::Project(_)
             | CliError::Classifier(_) => Self::InvalidInput,
             CliError::Folder(error) => Self::from(error),
             CliError::Campaign(error) => Self::from(error),

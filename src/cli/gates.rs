@@ -1,7 +1,7 @@
 //! The gates by which a campaign is judged, on the command line and in the project file.
 
 use clap::Args;
-use closecall_campaign::gate::{GateSet, GateSource, GateSpec, ProbabilitySpec, Scope};
+use closecall_campaign::gate::{GateSet, GateSource, GateSpec, ProbabilitySpec, ProjectFile, Scope};
 use closecall_campaign::probability::ProbabilityGate;
 use closecall_campaign::verdict::MAX_FLIP_RATE;
 use closecall_scenarios::sampling::Design;
@@ -9,7 +9,6 @@ use closecall_simulation::criteria::Expression;
 
 use super::CliError;
 use super::args::positive;
-use super::project::ProjectFile;
 
 /// The gates of a campaign.
 #[derive(Clone, Debug, Args)]
@@ -97,7 +96,8 @@ impl GateArgs {
                 set.push(GateSpec { expression, source, scope });
             }
         }
-        if let Some(project) = ProjectFile::find()? {
+        let here = std::env::current_dir().ok();
+        if let Some(project) = here.map(|folder| ProjectFile::find(&folder)).transpose()?.flatten() {
             project.add_to(&mut set)?;
         }
         if set.probability.is_some() && design != Design::Random {

@@ -3,13 +3,13 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use closecall_scenarios::trajectory_data::{BadRows, QualityInspector, ReadOptions, Tracks, open};
-use serde_json::{Value, json};
+use closecall_report::json::{self, stamped};
+use closecall_report::traffic::quality::QualityText;
+use closecall_scenarios::trajectory_data::{BadRows, QualityInspector, ReadOptions, open};
 
 use super::CliError;
 use super::args::{Format, ReadArgs};
-use super::json::stamped;
-use super::output::{outln, print_error};
+use super::output::{out, outln, print_error};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall inspect`.
@@ -34,8 +34,8 @@ pub(super) fn inspect(args: &InspectArgs) -> Result<ExitCode, CliError> {
         inspector.add(&track);
     }
     match args.format {
-        Format::Json => outln!("{:#}", stamped(report(&tracks, &inspector), None, None)),
-        Format::Human => print(&tracks, &inspector),
+        Format::Json => outln!("{:#}", stamped(json::quality(&tracks, &inspector), None, None)),
+        Format::Human => out!("{}", QualityText { tracks: &tracks, inspector: &inspector }),
     }
     let dropped = tracks.dropped();
     if dropped.count() == 0 || args.read.drops_bad_rows() {
@@ -49,57 +49,4 @@ pub(super) fn inspect(args: &InspectArgs) -> Result<ExitCode, CliError> {
         "{path}{first}\n{count} rows cannot be used: other commands refuse the file unless --drop-bad-rows is given\n"
     ));
     Ok(ExitCode::InvalidInput)
-}
-
-fn report(tracks: &Tracks<'_>, inspector: &QualityInspector) -> Value {
-    let quality = inspector.count_flaws();
-    let span = inspector.span();
-    json!({
-        "name": tracks.name(),
-        "layout": tracks.layout(),
-        "period_s": tracks.period().s(),
-        "rows": tracks.rows(),
-        "tracks": quality.tracks,
-        "vehicles": quality.vehicles,
-        "instants": quality.instants,
-        "first_s": span.map(|(first, _)| first.s()),
-        "last_s": span.map(|(_, last)| last.s()),
-        "flaws": inspector.flaws(),
-        "overlaps_unchecked_instants": inspector.unchecked_points(),
-        "dropped": tracks.dropped(),
-        "usable": tracks.dropped().count() == 0,
-    })
-}
-
-fn print(tracks: &Tracks<'_>, inspector: &QualityInspector) {
-    let quality = inspector.count_flaws();
-    outln!("{} ({})", tracks.name(), tracks.layout().name());
-    outln!(
-        "  {} rows; {} tracks of {} vehicles, {} instants every {:.3} s",
-        tracks.rows(),
-        quality.tracks,
-        quality.vehicles,
-        quality.instants,
-        tracks.period().s()
-    );
-    for (name, flaw) in inspector.flaws().named() {
-        match &flaw.first {
-            None => outln!("  {:>8}  {name}", flaw.count),
-            Some(first) => {
-                let line = first.line.map(|line| format!("line {line}, ")).unwrap_or_default();
-                let (track, time_s, what) = (first.track_id, first.time_s, &first.what);
-                outln!("  {:>8}  {name}; first: {line}track {track} at {time_s:.2} s: {what}", flaw.count);
-            }
-        }
-    }
-    if inspector.unchecked_points() > 0 {
-        outln!(
-            "  overlaps were not checked at {} instants: the other vehicles of those times were no longer in memory",
-            inspector.unchecked_points()
-        );
-    }
-    for (reason, rows) in tracks.dropped().reasons() {
-        let line = rows.first_line.map(|line| format!("line {line}: ")).unwrap_or_default();
-        outln!("  {:>8}  skipped: {reason}; first: {line}{}", rows.count, rows.first);
-    }
 }

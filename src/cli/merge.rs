@@ -7,12 +7,13 @@ use closecall_campaign::merge::Parts;
 use closecall_campaign::saved::{SavedCampaign, works};
 use closecall_campaign::selection::Selection;
 use closecall_report::campaign::{CampaignReport, Tally};
+use closecall_report::json;
 
+use super::CliError;
 use super::args::Format;
 use super::gates::GateArgs;
 use super::output::{outln, print_report_files};
 use super::summary::{print_counts, print_verdict};
-use super::{CliError, json};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall merge`.
@@ -50,7 +51,11 @@ pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
     match args.format {
         Format::Json => outln!(
             "{:#}",
-            json::stamped(json::campaign(&tally.summary, &judged, None), Some(saved.manifest().sampling.seed), None)
+            json::stamped(
+                json::campaign(&tally.summary, &judged, None),
+                Some(saved.manifest().sampling.seed),
+                Some(&saved.manifest().settings())
+            )
         ),
         Format::Human => {
             print_counts(&tally.summary);

@@ -2,9 +2,10 @@
 
 use std::fmt::Arguments;
 use std::io::{ErrorKind, Write, stderr, stdout};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use closecall_campaign::folder::Folder;
+use closecall_scenarios::atomic::{WriteError, write_file};
 
 use crate::exit_code::ExitCode;
 
@@ -28,6 +29,16 @@ pub(super) fn print_error(text: Arguments<'_>) {
 /// Prints to standard error which file was written. Standard output may be read by a program.
 pub(super) fn print_written(path: &Path) {
     print_error(format_args!("written: {}\n", path.display()));
+}
+
+/// Writes charts (SVG) into a folder, which is created if it does not exist, and prints their paths to standard error.
+pub(super) fn write_charts(folder: &Path, paths: &[PathBuf], charts: &[String]) -> Result<(), WriteError> {
+    std::fs::create_dir_all(folder).map_err(|source| WriteError::new(folder, source))?;
+    for (path, svg) in paths.iter().zip(charts) {
+        write_file(path, |file| file.write_all(svg.as_bytes()))?;
+        print_written(path);
+    }
+    Ok(())
 }
 
 /// The files of a campaign's folder that a reader opens first.

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use closecall_campaign::fingerprint::named_files;
+use closecall_scenarios::same_file::is_same_file;
 use closecall_scenarios::trajectory_data::input_files;
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::scenario::ScenarioFile;
@@ -25,26 +26,6 @@ pub(super) fn protect(inputs: &[PathBuf], outputs: &[Output<'_>]) -> Result<(), 
         }
     }
     Ok(())
-}
-
-/// Returns true if two paths lead to the same file, which need not exist.
-fn is_same_file(one: &Path, other: &Path) -> bool {
-    #[cfg(unix)]
-    if let (Ok(one), Ok(other)) = (one.metadata(), other.metadata()) {
-        use std::os::unix::fs::MetadataExt as _;
-        // Two names of one file, by a hard link.
-        return (one.dev(), one.ino()) == (other.dev(), other.ino());
-    }
-    one == other || matches!((canonical(one), canonical(other)), (Some(one), Some(other)) if one == other)
-}
-
-/// Returns the canonical path of a file, which need not exist if its folder does.
-fn canonical(path: &Path) -> Option<PathBuf> {
-    let in_folder = || {
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        Some(folder.canonicalize().ok()?.join(path.file_name()?))
-    };
-    path.canonicalize().ok().or_else(in_folder)
 }
 
 /// Returns the files from which a scenario was read.
@@ -86,21 +67,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_input_is_recognised_under_any_path() -> std::io::Result<()> {
-        let folder = tempfile::tempdir()?;
-        let path = |name: &str| folder.path().join(name);
-        std::fs::create_dir(path("sub"))?;
-        std::fs::write(path("a.toml"), "")?;
-        std::fs::hard_link(path("a.toml"), path("hard.toml"))?;
-        #[cfg(unix)]
-        std::os::unix::fs::symlink(path("a.toml"), path("soft.toml"))?;
-        let inputs = [path("a.toml")];
-        for same in ["a.toml", "sub/../a.toml", "hard.toml", "soft.toml"] {
-            assert!(protect(&inputs, &[("--output", Some(&path(same)))]).is_err(), "{same}");
-        }
-        assert!(protect(&inputs, &[("--output", Some(&path("b.toml"))), ("--trace", None)]).is_ok());
-        let (one, other) = (path("new.csv"), path("sub/../new.csv"));
-        assert!(protect(&inputs, &[("--record", Some(&one)), ("--trace", Some(&other))]).is_err());
-        Ok(())
+    fn an_output_is_neither_an_input_nor_another_output() {
+        let [input, new] = ["a.toml", "new.csv"].map(Path::new);
+        let inputs = [input.to_owned()];
+        assert!(protect(&inputs, &[("--output", Some(input))]).is_err());
+        assert!(protect(&inputs, &[("--output", Some(new)), ("--trace", None)]).is_ok());
+        assert!(protect(&inputs, &[("--record", Some(new)), ("--trace", Some(new))]).is_err());
     }
 }

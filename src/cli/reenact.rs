@@ -3,10 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use closecall_report::json;
 use closecall_report::run::film::{EncounterComparison, Film, film_encounter};
 use closecall_report::run::rerun::write_recording;
 use closecall_scenarios::atomic::write_file;
-use closecall_scenarios::criticality::{CriticalLaneChange, criticality};
+use closecall_scenarios::criticality::{CriticalLaneChange, by_severity, criticality};
 use closecall_scenarios::encounter::{NoEncounter, RecordedEncounter, encounter};
 use closecall_scenarios::filters::smooth;
 use closecall_scenarios::lane_change::LaneChange;
@@ -16,11 +17,11 @@ use closecall_simulation::scenario::{RearDriver, ScenarioFile, reenact as scenar
 use closecall_simulation::{CONTROL_STEP, RunKey};
 use serde_json::json;
 
+use super::CliError;
 use super::args::{ArmArgs, Format, ReadArgs, SetArgs};
 use super::output::outln;
 use super::protect::{of_trajectories, protect};
-use super::watch::{WatchArgs, by_severity, run_filmed};
-use super::{CliError, json};
+use super::watch::{WatchArgs, run_filmed};
 use crate::exit_code::ExitCode;
 
 /// Number of vehicles whose speeds are plotted: the ego, the lead vehicle and the rear vehicle.
@@ -155,8 +156,8 @@ fn print(format: Format, found: &RecordedEncounter, reenactment: &Reenactment<'_
                 "ego_track_id": ego,
                 "front_track_id": front,
                 "start_s": found.start.s(),
-                "recorded": json::course(&comparison.recorded),
-                "simulated": json::course(&comparison.simulated),
+                "recorded": json::encounter_metrics(&comparison.recorded),
+                "simulated": json::encounter_metrics(&comparison.simulated),
                 "outcome": json::outcome(outcome),
             });
             outln!("{:#}", json::stamped(object, Some(outcome.seed), None));

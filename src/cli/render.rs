@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use closecall_report::json::stamped;
 use closecall_sensors::camera::dataset::{Content, DatasetOptions, Set, render_dataset};
 use serde_json::json;
 
 use super::CliError;
 use super::args::{Format, count};
-use super::json::stamped;
 use super::output::outln;
 use crate::exit_code::ExitCode;
 

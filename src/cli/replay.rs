@@ -57,7 +57,7 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<ExitCode, CliError> {
         print_error(format_args!("{change}\n"));
     }
     let outcomes = run_watched(&scenario, key, &arms, &args.watch)?;
-    print(&outcomes, args.format, None);
+    print(&outcomes, args.format, Some(&saved.manifest().settings()));
     let mut agrees = true;
     for outcome in &outcomes {
         agrees &= agrees_with_journal(saved.folder(), outcome)?;

@@ -3,17 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use closecall_report::traffic::trajectory_charts::{Legend, Line, LineChart};
-use closecall_scenarios::atomic::{WriteError, write_file};
-use closecall_scenarios::lane_change::Criterion;
-use closecall_scenarios::robustness::{CriterionCounts, Measured, ReferenceKind, Robustness, Setup, Study};
+use closecall_report::json::{self, stamped};
+use closecall_report::traffic::robustness::{ROBUSTNESS_CHARTS, RobustnessText, robustness_charts};
+use closecall_scenarios::robustness::{CriterionCounts, Measured, Robustness, Setup, Study};
 use closecall_scenarios::trajectory_data::open;
 use rayon::prelude::*;
 
 use super::CliError;
 use super::args::{Format, ReadArgs};
-use super::json::stamped;
-use super::output::{outln, print_error, print_written};
+use super::output::{out, outln, print_error, write_charts};
 use super::protect::{of_trajectories, protect};
 use crate::exit_code::ExitCode;
 
@@ -40,7 +38,7 @@ pub(super) struct RobustnessArgs {
 }
 
 pub(super) fn robustness(args: &RobustnessArgs) -> Result<ExitCode, CliError> {
-    let charts = args.plot.as_ref().map(|folder| ["noise.svg", "offset.svg"].map(|name| folder.join(name)));
+    let charts = args.plot.as_ref().map(|folder| ROBUSTNESS_CHARTS.map(|name| folder.join(name)));
     for chart in charts.iter().flatten() {
         protect(&of_trajectories(&args.files), &[("--plot", Some(chart))])?;
     }
@@ -65,12 +63,12 @@ pub(super) fn robustness(args: &RobustnessArgs) -> Result<ExitCode, CliError> {
         }
     }
     let Some(found) = found else { return Ok(ExitCode::Pass) };
-    if let Some(folder) = &args.plot {
-        plot(&found, folder)?;
+    if let (Some(folder), Some(paths)) = (&args.plot, &charts) {
+        write_charts(folder, paths, &robustness_charts(&found)?)?;
     }
     match args.format {
-        Format::Json => outln!("{:#}", stamped(json(&found), None, None)),
-        Format::Human => print(&found),
+        Format::Json => outln!("{:#}", stamped(json::robustness(&found), None, None)),
+        Format::Human => out!("{}", RobustnessText(&found)),
     }
     if found.reference == 0 {
         print_error(format_args!("there is no lane change in the trajectory files: nothing was studied\n"));
@@ -87,107 +85,4 @@ fn study_of(path: &Path, read: &ReadArgs) -> Result<Study, CliError> {
     }
     measured.sort_by_key(|(track, _)| track.track_id);
     Ok(Study::new(measured, tracks.markings()))
-}
-
-fn json(found: &Robustness) -> serde_json::Value {
-    let fails = found.criteria.iter().enumerate();
-    let fails =
-        fails.map(|(column, criterion)| (criterion.name().to_owned(), found.failing_noise_m_per_sqrt_s(column).into()));
-    let mut value = serde_json::json!(found);
-    value["fails_from_noise_m_per_sqrt_s"] = serde_json::Value::Object(fails.collect());
-    value
-}
-
-fn print(found: &Robustness) {
-    let reference = match found.reference_kind {
-        ReferenceKind::Gradient => "jumps of the distances to the markings",
-        ReferenceKind::RecordedLanes => "recorded lanes",
-    };
-    let Setup { repetitions, seed, .. } = found.setup;
-    outln!("{} lane changes, by {reference}; each criterion without noise and offset:", found.reference);
-    for (criterion, known) in found.criteria.iter().zip(&found.undisturbed) {
-        outln!("  {:<9} finds {known}", criterion.name());
-    }
-    outln!("\nfound again / all found / false ones; noise: mean of {repetitions} draws, seed {seed}");
-    let names: Vec<String> = found.criteria.iter().map(|criterion| format!("{:<26}", criterion.name())).collect();
-    outln!("\nBrownian noise  {}", names.concat());
-    for (level, cells) in found.setup.noise_m_per_sqrt_s.iter().zip(&found.noise) {
-        outln!("{level:>8.2} m/√s   {}", row(found, cells));
-    }
-    outln!("\nlateral offset  {}", names.concat());
-    for (level, cells) in found.setup.offset_m.iter().zip(&found.offset) {
-        outln!("{level:>8.2} m      {}", row(found, cells));
-    }
-    outln!(
-        "\n!: the criterion loses more than 5 % of what it finds without noise and offset, or more than 5 % are false"
-    );
-    for line in failures(found) {
-        outln!("{line}");
-    }
-}
-
-fn row(found: &Robustness, cells: &[CriterionCounts]) -> String {
-    let cell = |(criterion, cell): (usize, &CriterionCounts)| {
-        let mark = if found.fails(criterion, cell) { "!" } else { " " };
-        format!("{:<26}", format!("{:>6.1} /{:>6.1} /{:>5.1} {mark}", cell.again, cell.found, cell.invented))
-    };
-    cells.iter().enumerate().map(cell).collect()
-}
-
-/// Returns one line per criterion with the lowest level of noise at which it fails, sorted by that level.
-fn failures(found: &Robustness) -> Vec<String> {
-    let mut from: Vec<(Option<f64>, Criterion)> = (0..)
-        .zip(&found.criteria)
-        .map(|(column, criterion)| (found.failing_noise_m_per_sqrt_s(column), *criterion))
-        .collect();
-    from.sort_by(|a, b| a.0.unwrap_or(f64::INFINITY).total_cmp(&b.0.unwrap_or(f64::INFINITY)));
-    let line = |(level, criterion): &(Option<f64>, Criterion)| match level {
-        Some(level) => format!("{} first fails at a noise of {level} m/√s", criterion.name()),
-        None => format!("{} fails at no level of noise", criterion.name()),
-    };
-    from.iter().map(line).collect()
-}
-
-fn plot(found: &Robustness, folder: &Path) -> Result<(), CliError> {
-    std::fs::create_dir_all(folder).map_err(|source| WriteError::new(folder, source))?;
-    let levels = &found.setup;
-    let noise = Axis { name: "Brownian noise [m/√s]", levels: &levels.noise_m_per_sqrt_s, rows: &found.noise };
-    let offset = Axis { name: "Lateral offset [m]", levels: &levels.offset_m, rows: &found.offset };
-    for (name, legend, axis) in [("noise.svg", Legend::LowerLeft, noise), ("offset.svg", Legend::LowerMiddle, offset)] {
-        let svg = LineChart { legend, ..chart(found, &axis) }.svg()?;
-        let path = folder.join(name);
-        write_file(&path, |file| file.write_all(svg.as_bytes()))?;
-        print_written(&path);
-    }
-    Ok(())
-}
-
-/// A disturbance, its levels, and the results at each level.
-struct Axis<'a> {
-    name: &'a str,
-    levels: &'a [f64],
-    rows: &'a [Vec<CriterionCounts>],
-}
-
-fn chart(found: &Robustness, axis: &Axis<'_>) -> LineChart {
-    let points = |column: usize, value: fn(&CriterionCounts) -> f64| -> Vec<(f64, f64)> {
-        axis.levels.iter().zip(axis.rows).map(|(level, cells)| (*level, value(&cells[column]))).collect()
-    };
-    let lines = found.criteria.iter().enumerate().flat_map(|(column, criterion)| {
-        let name = criterion.name();
-        let again = points(column, |cell| cell.again);
-        let all = points(column, |cell| cell.found);
-        [
-            Line { name: format!("{name}: found again"), points: again, colour: column, faint: false },
-            Line { name: format!("{name}: all that is found"), points: all, colour: column, faint: true },
-        ]
-    });
-    LineChart {
-        title: "Lane changes found, by criterion".to_owned(),
-        x_name: axis.name.to_owned(),
-        y_name: "lane changes".to_owned(),
-        lines: lines.collect(),
-        level: ("reference".to_owned(), found.reference as f64),
-        legend: Legend::LowerLeft,
-    }
 }

@@ -3,18 +3,19 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use closecall_report::json::{self, stamped};
+use closecall_report::traffic::lane_changes::{CriticalityText, LaneChangesText, ScoreText};
 use closecall_scenarios::atomic::WriteError;
-use closecall_scenarios::criticality::{CriticalLaneChange, criticality as evaluate, shares};
+use closecall_scenarios::criticality::criticality as evaluate;
 use closecall_scenarios::filters::smooth;
 use closecall_scenarios::fit::{Heading, fit as fit_distributions, to_toml, write_toml};
 use closecall_scenarios::lane_change::{
-    Criterion, LaneChange, LaneChangeDetector, LaneReliability, Score, TrackSpans, read_references, score,
+    Criterion, LaneChange, LaneChangeDetector, LaneReliability, TrackSpans, read_references, score,
 };
-use closecall_scenarios::trajectory_data::{Layout, TrajectoryData, count_flaws, open, read_with};
+use closecall_scenarios::trajectory_data::{Layout, TrajectoryData, open, read_with};
 
 use super::CliError;
 use super::args::{Format, ReadArgs, positive};
-use super::json::stamped;
 use super::output::{out, outln};
 use super::protect::{of_trajectories, protect, recording as trajectory_path};
 use super::watch::record_lane_change;
@@ -142,69 +143,13 @@ pub(super) fn lane_changes(args: &LaneChangesArgs) -> Result<ExitCode, CliError>
         (Format::Human, scored) => {
             let (rows, period, dropped) = (tracks.rows(), tracks.period(), tracks.dropped().count());
             outln!("{name}: {count} tracks, {rows} rows every {period}, {dropped} rows skipped");
-            list(&changes);
+            out!("{}", LaneChangesText(&changes));
             if let Some(scored) = scored {
-                print_score(&scored);
+                out!("{}", ScoreText(&scored));
             }
         }
     }
     Ok(ExitCode::Pass)
-}
-
-fn list(changes: &[LaneChange]) {
-    outln!("track  class       direction  lanes      start    middle  crossing       end  duration     speed");
-    for change in changes {
-        outln!("{}", line(change));
-    }
-    let complete = changes.iter().filter(|change| change.complete).count();
-    let double = changes.iter().filter(|change| change.double).count();
-    outln!("{} lane changes, {complete} of them complete, {double} of them parts of double ones", changes.len());
-}
-
-fn print_score(score: &Score) {
-    outln!("recall     {}", score.recall);
-    outln!("precision  {}", score.precision);
-    outln!("crossing times differ by at most {:.2} s", score.max_time_error_s);
-}
-
-fn describe(data: &TrajectoryData) {
-    let quality = count_flaws(data);
-    outln!(
-        "{}: {} tracks of {} vehicles, {} instants every {}; {} gaps, {} jumps, {} overlaps",
-        data.name,
-        quality.tracks,
-        quality.vehicles,
-        quality.instants,
-        data.period,
-        quality.gaps,
-        quality.jumps,
-        quality.overlaps,
-    );
-}
-
-fn line(change: &LaneChange) -> String {
-    let direction = match change.direction {
-        closecall_traffic::Side::Left => "left",
-        closecall_traffic::Side::Right => "right",
-    };
-    let mark = match (change.complete, change.double) {
-        (true, _) => "complete",
-        (false, true) => "double",
-        (false, false) => "",
-    };
-    format!(
-        "{:>5}  {:<10}  {direction:<9}  {} to {}  {:>7.2} s {:>7.2} s {:>7.2} s {:>7.2} s {:>7.2} s  {:>4.1} m/s  {mark}",
-        change.track_id,
-        change.vehicle_class.name(),
-        change.from_lane,
-        change.to_lane,
-        change.start_s,
-        change.midpoint_s,
-        change.crossing_s,
-        change.end_s,
-        change.duration_s,
-        change.speed_mps,
-    )
 }
 
 pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> {
@@ -217,32 +162,9 @@ pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> 
     }
     match args.format {
         Format::Json => outln!("{:#}", stamped(serde_json::json!(changes), None, None)),
-        Format::Human => {
-            describe(&data);
-            print_metrics(&changes);
-        }
+        Format::Human => out!("{}", CriticalityText { data: &data, changes: &changes }),
     }
     Ok(ExitCode::Pass)
-}
-
-fn print_metrics(changes: &[CriticalLaneChange]) {
-    for change in changes {
-        outln!("{}", line(&change.lane_change));
-        for (name, metric) in change.metrics.named() {
-            let mark = if metric.is_critical() { "  CRITICAL" } else { "" };
-            match metric.value() {
-                Some(value) => outln!("         {name:<12} {value:>9.2}{mark}"),
-                None => outln!("         {name:<12}         -"),
-            }
-        }
-    }
-    let shares = shares(changes);
-    outln!("of {} lane changes, critical:", shares.lane_changes);
-    for share in &shares.metrics {
-        let percent = share.share.map_or("-".to_owned(), |share| format!("{:.0} %", 100.0 * share));
-        outln!("  {:<12} {:>4}  {percent:>6}  ({} absent)", share.metric, share.critical, share.absent);
-    }
-    outln!("  {:<12} {:>4}", "any", shares.any);
 }
 
 pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
@@ -257,7 +179,7 @@ pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
         write_toml(&fitted, &heading, path).map_err(|source| WriteError::new(path, source))?;
     }
     match (args.format, &args.output) {
-        (Format::Json, _) => outln!("{:#}", stamped(json(&fitted), None, None)),
+        (Format::Json, _) => outln!("{:#}", stamped(json::fitted(&fitted), None, None)),
         (Format::Human, None) => out!("{}", to_toml(&fitted, &heading)),
         (Format::Human, Some(path)) => {
             for quantity in &fitted.fitted {
@@ -282,23 +204,4 @@ pub(super) fn refuse_duplicates(paths: &[PathBuf], data_sets: &[TrajectoryData])
         }
     }
     Ok(())
-}
-
-fn json(fitted: &closecall_scenarios::fit::FittedDistributions) -> serde_json::Value {
-    let quantity = |quantity: &closecall_scenarios::fit::FittedQuantity| {
-        serde_json::json!({
-            "name": quantity.quantity.name(),
-            "n": quantity.n,
-            "median": quantity.median,
-            "interval_95": quantity.interval_95,
-            "quantiles": quantity.quantiles,
-        })
-    };
-    let too_few = |(quantity, n): &(closecall_scenarios::fit::Quantity, usize)| serde_json::json!({ "name": quantity.name(), "n": n });
-    serde_json::json!({
-        "trajectory_data": fitted.data_sets.iter().map(|(name, _)| name).collect::<Vec<_>>(),
-        "seed": fitted.seed,
-        "fitted": fitted.fitted.iter().map(quantity).collect::<Vec<_>>(),
-        "too_few": fitted.too_few.iter().map(too_few).collect::<Vec<_>>(),
-    })
 }

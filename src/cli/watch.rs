@@ -1,6 +1,5 @@
 //! Runs a sample and writes what the command line requests: a recording (Rerun file), a trace (table).
 
-use std::cmp::Ordering::Equal;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
@@ -8,7 +7,7 @@ use closecall_campaign::runner::run_guarded;
 use closecall_report::run::film::{Film, FilmRecorder, Level, film_lane_change};
 use closecall_report::run::rerun::{check_recording_possible, write_recording, write_recording_unchecked};
 use closecall_report::run::trace::TraceWriter;
-use closecall_scenarios::criticality::CriticalLaneChange;
+use closecall_scenarios::criticality::{CriticalLaneChange, by_severity};
 use closecall_scenarios::filters::SmoothedTrajectoryData;
 use closecall_simulation::outcome::Outcome;
 use closecall_simulation::scenario::Scenario;
@@ -175,19 +174,4 @@ pub(super) fn record_lane_change(
     write_recording(path, &[film_lane_change(recording, chosen)?])?;
     print_written(path);
     Ok(())
-}
-
-/// Returns the lane changes of `track`, or of all tracks, the most critical first. Of two equal ones the later is
-/// first.
-pub(super) fn by_severity(changes: &[CriticalLaneChange], track: Option<u64>) -> Vec<&CriticalLaneChange> {
-    let is_wanted = |change: &&CriticalLaneChange| track.is_none_or(|track| change.lane_change.track_id == track);
-    let mut wanted: Vec<&CriticalLaneChange> = changes.iter().rev().filter(is_wanted).collect();
-    wanted.sort_by(|a, b| severity(b).partial_cmp(&severity(a)).unwrap_or(Equal));
-    wanted
-}
-
-/// Returns the number of critical metrics, and the negative distance to the nearest vehicle (m).
-fn severity(change: &CriticalLaneChange) -> (usize, f64) {
-    let critical = change.metrics.named().iter().filter(|(_, metric)| metric.is_critical()).count();
-    (critical, -change.metrics.distance_m.value().unwrap_or(f64::INFINITY))
 }

@@ -7,12 +7,12 @@ use clap::Args;
 use closecall_campaign::runner::{Sampling, concrete, run_guarded};
 use closecall_scenarios::sampling::Design;
 use closecall_simulation::outcome::Outcome;
+use closecall_simulation::scenario::source::existing;
 use closecall_simulation::{NoObserver, RunKey};
 
 use super::CliError;
 use super::args::{ArmArgs, SetArgs, count};
 use super::output::{outln, print_error};
-use super::source::existing;
 use crate::exit_code::ExitCode;
 
 /// Time between two looks at the file.

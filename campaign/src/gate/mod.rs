@@ -6,10 +6,12 @@
 
 mod evaluate;
 mod judge;
+mod project;
 mod result;
 mod set;
 
 pub use evaluate::{Accumulator, Answer, Evaluation, OpenReason};
 pub use judge::Judge;
+pub use project::{ProjectError, ProjectFile};
 pub use result::{ExpectationResult, GateResult, RequirementResult, Standing};
 pub use set::{GateSet, GateSource, GateSpec, ProbabilitySpec, Scope};

@@ -132,7 +132,7 @@ fn properties<W: Write>(xml: &mut Writer<W>, findings: &Findings<'_>, suite: &st
         ("closecall".to_owned(), manifest.closecall_version.clone()),
         ("command".to_owned(), manifest.command.join(" ")),
     ];
-    properties.extend(manifest.settings().iter().map(|setting| ("setting".to_owned(), setting.clone())));
+    properties.extend(manifest.settings().iter().map(|setting| ("setting".to_owned(), setting.to_string())));
     if let Some((_, counts)) = findings.summary.scenarios.iter().find(|(name, _)| name == suite) {
         properties.push(("samples".to_owned(), counts.samples.to_string()));
         for (controller, arm) in findings.summary.controllers.iter().zip(&counts.arms) {

@@ -2,10 +2,12 @@
 //!
 //! ```text
 //!  simulation ─▶ FilmRecorder ─▶ Film ─▶ rerun (to view) │ figure (to print)
-//!             └▶ TraceWriter ─▶ CSV or Parquet (to evaluate)
+//!             ├▶ TraceWriter ─▶ CSV or Parquet (to evaluate)
+//!             └▶ Outcome ─▶ text
 //! ```
 
 pub mod figure;
 pub mod film;
 pub mod rerun;
+pub mod text;
 pub mod trace;

@@ -1,5 +1,9 @@
-//! Simulated traffic written as trajectory data, and charts of trajectory data.
+//! Simulated traffic written as trajectory data, and what was found in trajectory data: texts and charts.
 
 pub mod in_car;
+pub mod lane_changes;
+pub mod quality;
 pub mod recorder;
+pub mod robustness;
+pub mod statistics;
 pub mod trajectory_charts;

@@ -34,12 +34,14 @@
 
 mod evaluate;
 mod record;
+mod severity;
 mod shares;
 mod statistics;
 mod thresholds;
 
 pub use evaluate::{criticality, evaluate};
 pub use record::{CriticalLaneChange, MetricResult, Metrics};
+pub use severity::by_severity;
 pub use shares::{CriticalShare, CriticalShares, shares};
 pub use statistics::{BoxPlot, ClassStatistics, Correlation, Statistics, statistics};
 pub use thresholds::{

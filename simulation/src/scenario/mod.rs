@@ -13,10 +13,13 @@ mod config;
 mod edit;
 mod events;
 mod file;
+pub mod library;
 mod locate;
 mod placement;
 mod recorded;
 mod reenacted;
+mod schema;
+pub mod source;
 mod variation;
 
 pub use checked::{Actor, Scenario};
@@ -28,3 +31,4 @@ pub use events::{
 };
 pub use file::{ScenarioError, ScenarioFile};
 pub use reenacted::{RearDriver, actor_name, reenact};
+pub use schema::strict_schema;

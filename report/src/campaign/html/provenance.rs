@@ -41,8 +41,8 @@ fn entries(findings: &Findings<'_>) -> Vec<(&'static str, String)> {
     entries.push(("seed", sampling.seed.to_string()));
     entries.push(("design", format!("{}, {} samples asked for", sampling.design, sampling.samples)));
     entries.push(("sensors", sensors));
-    if !manifest.settings().is_empty() {
-        entries.push(("settings", manifest.settings().join(", ")));
+    for setting in manifest.settings() {
+        entries.push(("setting", setting.to_string()));
     }
     for model in &manifest.models {
         entries.push(("network", format!("{} on {}, BLAKE3 {}", model.name, model.backend, model.blake3)));

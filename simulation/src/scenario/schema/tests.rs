@@ -1,10 +1,10 @@
 use std::sync::LazyLock;
 
-use closecall_simulation::criteria::Expression;
 use closecall_traffic::ActorId;
 
 use super::super::library;
 use super::*;
+use crate::criteria::Expression;
 
 /// Returns the first rule of `schema` that `value` breaks, for the keywords that the schema of scenarios uses.
 fn broken(root: &Value, schema: &Value, value: &Value) -> Option<String> {
@@ -84,7 +84,7 @@ fn verdict(text: &str) -> Option<String> {
 
 #[test]
 fn every_valid_scenario_satisfies_the_schema() {
-    let annotated = include_str!("../../../docs/scenario/annotated.toml");
+    let annotated = include_str!("../../../../docs/scenario/annotated.toml");
     for text in library::names().filter_map(library::text).chain([EVERY_KEY, annotated]) {
         assert_eq!(verdict(text), None, "{text}");
     }

@@ -1,140 +1,15 @@
-//! Results as JSON with stable keys. An absent value is `null`, and the key `…_absent` beside it states the reason.
+//! The result of a campaign as JSON.
 
 use closecall_campaign::gate::{Answer, Evaluation, ExpectationResult, GateResult, RequirementResult};
 use closecall_campaign::harm;
 use closecall_campaign::ledger::{Inference, Pairs};
-use closecall_campaign::manifest::version;
 use closecall_campaign::summary::{Counts, Summary};
 use closecall_campaign::validity::CheckCounts;
 use closecall_campaign::verdict::Judgement;
-use closecall_report::run::film::EncounterMetrics;
-use closecall_simulation::outcome::{Collision, Margins, MisSummary, MomentAt, Outcome};
-use closecall_simulation::scenario::Setting;
-use closecall_traffic::{Absent, Measured, Value as ParameterValue};
 use serde_json::{Map, Value, json};
 
-/// Inserts a value under `key`, or `null` and the reason for which it is absent.
-fn insert(object: &mut Map<String, Value>, key: &str, measured: Measured) {
-    match measured {
-        Ok(value) => {
-            object.insert(key.to_owned(), json!(value));
-        }
-        Err(absent) => {
-            object.insert(key.to_owned(), Value::Null);
-            object.insert(format!("{key}_absent"), json!(absent.to_string()));
-        }
-    }
-}
-
-/// The version of the keys of `--format json`. It changes if a key changes its meaning, not if one is added.
-const SCHEMA_VERSION: u32 = 1;
-
-/// Adds how an output was made: to an object, or to each object of a list. Keys that are there already stay.
-pub(super) fn stamped(mut value: Value, seed: Option<u64>, settings: Option<&[Setting]>) -> Value {
-    let objects = match &mut value {
-        Value::Array(list) => list.iter_mut().collect(),
-        one => vec![one],
-    };
-    let version = version();
-    for object in objects.into_iter().filter_map(Value::as_object_mut) {
-        let mut add = |key: &str, value: Value| {
-            object.entry(key.to_owned()).or_insert(value);
-        };
-        add("schema_version", json!(SCHEMA_VERSION));
-        add("closecall_version", json!(version));
-        if let Some(seed) = seed {
-            add("seed", json!(seed));
-        }
-        if let Some(settings) = settings {
-            add("settings", settings.iter().map(ToString::to_string).collect());
-        }
-    }
-    value
-}
-
-/// Returns the object of `run --format json`.
-pub(super) fn outcome(outcome: &Outcome) -> Value {
-    json!({
-        "scenario": outcome.scenario,
-        "seed": outcome.seed,
-        "sample": outcome.sample,
-        "controller": outcome.controller,
-        "end": outcome.end,
-        "duration_s": outcome.duration.s(),
-        "parameters": parameters(outcome),
-        "collisions": outcome.collisions.iter().map(collision).collect::<Vec<_>>(),
-        "moments": outcome.moments.iter().map(moment).collect::<Vec<_>>(),
-        "margins": margins(&outcome.margins),
-        "mis": mis(&outcome.mis),
-    })
-}
-
-/// Returns the margins of an encounter, recorded or simulated.
-pub(super) fn course(course: &EncounterMetrics) -> Value {
-    let mut object = Map::new();
-    insert(&mut object, "crossing_s", course.crossing_s);
-    insert(&mut object, "thw_front_at_crossing_s", course.thw_front_at_crossing_s);
-    insert(&mut object, "thw_rear_at_crossing_s", course.thw_rear_at_crossing_s);
-    insert(&mut object, "min_thw_front_s", course.min_thw_front_s);
-    insert(&mut object, "min_thw_rear_s", course.min_thw_rear_s);
-    insert(&mut object, "max_deceleration_mps2", Ok(course.max_deceleration_mps2));
-    Value::Object(object)
-}
-
-fn parameters(outcome: &Outcome) -> Map<String, Value> {
-    let value = |value: &ParameterValue| match value {
-        ParameterValue::Number(number) => json!(number),
-        ParameterValue::Label(label) => json!(label),
-    };
-    outcome.parameters.iter().map(|(name, parameter)| (name.to_string(), value(parameter))).collect()
-}
-
-fn collision(collision: &Collision) -> Value {
-    let [first, second] = &collision.between;
-    json!({
-        "time_s": collision.time.s(),
-        "between": collision.between,
-        "struck_side": collision.struck_side,
-        "closed_by": collision.closed_by,
-        "phase": collision.phase,
-        "relative_speed_mps": collision.relative_speed_mps,
-        "delta_v_mps": { first.as_str(): collision.delta_v_mps[0], second.as_str(): collision.delta_v_mps[1] },
-    })
-}
-
-fn moment(at: &MomentAt) -> Value {
-    json!({ "moment": at.moment, "letter": at.moment.letter(), "time_s": at.time.s() })
-}
-
-fn margins(margins: &Margins) -> Value {
-    let mut object = Map::new();
-    insert(&mut object, "min_thw_front_s", margins.min_thw_front_s);
-    insert(&mut object, "min_thw_rear_s", margins.min_thw_rear_s);
-    insert(&mut object, "min_gap_front_m", margins.min_gap_front_m);
-    insert(&mut object, "min_gap_rear_m", margins.min_gap_rear_m);
-    insert(&mut object, "min_ttc_rear_s", margins.min_ttc_rear_s);
-    insert(&mut object, "max_deceleration_mps2", Ok(margins.max_deceleration_mps2));
-    insert(&mut object, "max_jerk_mps3", Ok(margins.max_jerk_mps3));
-    insert(&mut object, "max_speed_deficit_mps", Ok(margins.max_speed_deficit_mps));
-    Value::Object(object)
-}
-
-fn mis(mis: &Result<MisSummary, Absent>) -> Value {
-    let mut object = Map::new();
-    let of = |value: fn(&MisSummary) -> Measured| mis.as_ref().map_err(|absent| *absent).and_then(value);
-    insert(&mut object, "engaged_at_s", of(|mis| mis.engaged_at_s));
-    insert(&mut object, "released_at_s", of(|mis| mis.released_at_s));
-    insert(&mut object, "thw_front_at_engagement_s", of(|mis| mis.thw_front_at_engagement_s));
-    insert(&mut object, "thw_front_at_critical_s", of(|mis| mis.thw_front_at_critical_s));
-    insert(&mut object, "mean_deceleration_mps2", of(|mis| mis.mean_deceleration_mps2));
-    object.insert("goal_in_reach".to_owned(), json!(mis.as_ref().ok().and_then(|mis| mis.goal_in_reach)));
-    let reason = mis.as_ref().map_or_else(ToString::to_string, |mis| mis.reason.to_string());
-    object.insert("reason".to_owned(), json!(reason));
-    Value::Object(object)
-}
-
-/// Returns the object of `campaign --format json`. `wall_s` is `None` for a merged campaign.
-pub(super) fn campaign(summary: &Summary, judged: &Judgement, wall_s: Option<f64>) -> Value {
+/// Returns the counts of a campaign and its verdict. `wall_s` is its wall time (s), `None` for a merged campaign.
+pub fn campaign(summary: &Summary, judged: &Judgement, wall_s: Option<f64>) -> Value {
     let total = summary.total();
     let mut object = counts(summary, &total);
     if summary.scenarios.len() > 1 {

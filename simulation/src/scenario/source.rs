@@ -1,4 +1,4 @@
-//! Where the scenarios of a command come from: files, folders, standard input, or the library inside the program.
+//! Where a scenario comes from: a file, a folder, standard input, or the library inside the program.
 //!
 //! | argument | scenario |
 //! |---|---|
@@ -10,26 +10,44 @@
 use std::io::{Error, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
-use closecall_simulation::scenario::{ScenarioError, ScenarioFile, Setting};
 use closecall_traffic::suggest::nearest;
 
-use super::CliError;
-use super::library;
+use super::{ScenarioError, ScenarioFile, Setting, library};
 
 /// The argument that stands for standard input.
 const STANDARD_INPUT: &str = "-";
-/// Folder in which a repository keeps its scenarios.
-pub(super) const SCENARIOS: &str = "scenarios";
-/// The settings of a repository: a TOML file that is no scenario.
-pub(super) const REPOSITORY_SETTINGS: &str = "closecall.toml";
+/// The folder in which a repository keeps its scenarios.
+pub const SCENARIOS: &str = "scenarios";
+/// The name of a project file, which holds the settings of a repository: a TOML file that is no scenario.
+pub const PROJECT_FILE: &str = "closecall.toml";
 /// Largest length of a scenario on standard input (bytes).
 const MAX_LENGTH: u64 = 16 * 1024 * 1024;
 
+/// The reason for which arguments do not name scenarios.
+#[derive(Debug, thiserror::Error)]
+pub enum SourceError {
+    /// Standard input is named more than once.
+    #[error("`-` is standard input, and can be given once")]
+    StandardInputTwice,
+    /// A folder has no scenario file.
+    #[error("{} contains no scenario file (*.toml)", folder.display())]
+    NoScenario {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// A folder cannot be read.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
+}
+
 /// Returns the scenarios that the arguments of a command name: each folder is replaced by the scenario files in it.
-pub(super) fn expand(paths: &[PathBuf]) -> Result<Vec<PathBuf>, CliError> {
+///
+/// # Errors
+/// [`SourceError`] if standard input is named twice, or if a folder cannot be read or has no scenario file.
+pub fn expand(paths: &[PathBuf]) -> Result<Vec<PathBuf>, SourceError> {
     let inputs = paths.iter().filter(|path| path.as_os_str() == STANDARD_INPUT).count();
     if inputs > 1 {
-        return Err(CliError::Usage { message: "`-` is standard input, and can be given once".to_owned() });
+        return Err(SourceError::StandardInputTwice);
     }
     let mut expanded = Vec::new();
     for path in paths {
@@ -42,27 +60,29 @@ pub(super) fn expand(paths: &[PathBuf]) -> Result<Vec<PathBuf>, CliError> {
     Ok(expanded)
 }
 
-fn scenario_files(folder: &Path) -> Result<Vec<PathBuf>, CliError> {
+fn scenario_files(folder: &Path) -> Result<Vec<PathBuf>, SourceError> {
     let fail = |source| ScenarioError::Read { path: folder.to_owned(), source };
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(fail)? {
         let path = entry.map_err(fail)?.path();
         let is_toml = path.extension().is_some_and(|extension| extension == "toml");
-        if is_toml && path.is_file() && !path.ends_with(REPOSITORY_SETTINGS) {
+        if is_toml && path.is_file() && !path.ends_with(PROJECT_FILE) {
             files.push(path);
         }
     }
     if files.is_empty() {
-        let message =
-            format!("{} contains no scenario file (*.toml): `closecall new NAME` writes one", folder.display());
-        return Err(CliError::Usage { message });
+        return Err(SourceError::NoScenario { folder: folder.to_owned() });
     }
     files.sort();
     Ok(files)
 }
 
 /// Reads the scenario that one argument names, and applies the settings.
-pub(super) fn load(path: &Path, settings: &[Setting]) -> Result<ScenarioFile, ScenarioError> {
+///
+/// # Errors
+/// [`ScenarioError`] if there is no such scenario, or if it is not valid. A name close to one of the library is answered
+/// with that name.
+pub fn load(path: &Path, settings: &[Setting]) -> Result<ScenarioFile, ScenarioError> {
     if path.as_os_str() == STANDARD_INPUT {
         return from_standard_input(settings);
     }
@@ -86,7 +106,7 @@ pub(super) fn load(path: &Path, settings: &[Setting]) -> Result<ScenarioFile, Sc
 }
 
 /// Returns the file that `path` names, with or without its extension and folder; `None` if there is none.
-pub(super) fn existing(path: &Path) -> Option<PathBuf> {
+pub fn existing(path: &Path) -> Option<PathBuf> {
     let is_name = path.components().count() == 1 && path.extension().is_none();
     let file = path.with_extension("toml");
     let named = [file.clone(), Path::new(SCENARIOS).join(file)];
@@ -124,7 +144,7 @@ mod tests {
         let found = expand(&[folder.path().to_owned(), PathBuf::from("-")]).unwrap();
         assert_eq!(found, [folder.path().join("a.toml"), folder.path().join("b.toml"), PathBuf::from("-")]);
         let empty = tempfile::tempdir().unwrap();
-        assert!(expand(&[empty.path().to_owned()]).unwrap_err().to_string().contains("closecall new"));
+        assert!(expand(&[empty.path().to_owned()]).unwrap_err().to_string().contains("contains no scenario file"));
         assert!(expand(&[PathBuf::from("-"), PathBuf::from("-")]).is_err());
     }
 

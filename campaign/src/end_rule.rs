@@ -1,0 +1,113 @@
+//! Rules that end a campaign before its last sample: at the first failing sample, or after too many errors.
+//!
+//! Such a campaign has no verdict. Its journal is complete up to its end, and the campaign can be resumed.
+
+use std::fmt;
+use std::ops::ControlFlow;
+
+use crate::execution::End;
+use crate::record::Record;
+
+/// When a campaign ends before its last sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct EndRule {
+    /// True if the first failing sample ends the campaign: the ego collides under the controller under test, or a
+    /// controller ends in an error.
+    pub fail_fast: bool,
+    /// Largest number of samples that may end in an error; `None` for any number.
+    pub max_errors: Option<u64>,
+}
+
+/// The sample or the samples that have ended a campaign early.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum EarlyEnd {
+    /// A sample has failed.
+    Failure {
+        /// The name of the scenario.
+        scenario: String,
+        /// The sample.
+        sample: u64,
+        /// True if the sample ended in an error, false if the ego collided.
+        is_error: bool,
+    },
+    /// Too many samples have ended in an error.
+    Errors {
+        /// Number of samples that have ended in an error.
+        errors: u64,
+    },
+}
+
+impl fmt::Display for EarlyEnd {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Failure { scenario, sample, is_error: true } => {
+                write!(f, "sample {sample} of {scenario} ended in an error")
+            }
+            Self::Failure { scenario, sample, is_error: false } => {
+                write!(f, "sample {sample} of {scenario} has a collision of the ego")
+            }
+            Self::Errors { errors } => write!(f, "{errors} samples ended in an error"),
+        }
+    }
+}
+
+/// Applies an [`EndRule`] to the records of a running campaign.
+#[derive(Clone, Debug)]
+pub struct EndMonitor {
+    rule: EndRule,
+    errors: u64,
+    ending: Option<EarlyEnd>,
+}
+
+impl EndMonitor {
+    /// Returns a monitor that has seen no record.
+    pub const fn new(rule: EndRule) -> Self {
+        Self { rule, errors: 0, ending: None }
+    }
+
+    /// Counts a record. Returns `Break` if the campaign ends after it.
+    pub fn observe(&mut self, record: &Record) -> ControlFlow<End> {
+        let is_error = record.arms.iter().any(|arm| arm.result.is_err());
+        let has_collided = record.tallies().last().is_some_and(|tested| tested.collided == Some(true));
+        self.errors += u64::from(is_error);
+        if self.rule.fail_fast && (is_error || has_collided) {
+            let (scenario, sample) = (record.scenario.clone(), record.sample);
+            self.ending = Some(EarlyEnd::Failure { scenario, sample, is_error });
+        } else if self.rule.max_errors.is_some_and(|most| self.errors > most) {
+            self.ending = Some(EarlyEnd::Errors { errors: self.errors });
+        }
+        if self.ending.is_some() { ControlFlow::Break(End::Campaign) } else { ControlFlow::Continue(()) }
+    }
+
+    /// Returns what has ended the campaign early, or `None` if nothing has.
+    pub fn into_ending(self) -> Option<EarlyEnd> {
+        self.ending
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::{ArmRecord, SampleFailure};
+
+    fn error(sample: u64) -> Record {
+        let failure = SampleFailure { kind: "panic".to_owned(), message: "m".to_owned() };
+        let arm = ArmRecord { controller: "mis".to_owned(), result: Err(failure), checks: None };
+        Record { scenario: "s".to_owned(), sample, arms: vec![arm] }
+    }
+
+    #[test]
+    fn the_first_error_ends_a_campaign_that_fails_fast() {
+        let mut monitor = EndMonitor::new(EndRule { fail_fast: true, max_errors: None });
+        assert!(monitor.observe(&error(3)).is_break());
+        assert_eq!(monitor.into_ending().unwrap().to_string(), "sample 3 of s ended in an error");
+    }
+
+    #[test]
+    fn a_campaign_ends_when_more_samples_than_allowed_have_ended_in_an_error() {
+        let mut monitor = EndMonitor::new(EndRule { fail_fast: false, max_errors: Some(1) });
+        assert!(monitor.observe(&error(0)).is_continue());
+        assert!(monitor.observe(&error(1)).is_break());
+        assert_eq!(monitor.into_ending(), Some(EarlyEnd::Errors { errors: 2 }));
+    }
+}

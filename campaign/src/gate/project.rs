@@ -1,0 +1,99 @@
+//! The project file, `closecall.toml`: gates for every campaign that is run in a folder or below it.
+
+use std::path::{Path, PathBuf};
+
+use closecall_simulation::criteria::GateConfig;
+use closecall_simulation::scenario::source::PROJECT_FILE;
+use serde::Deserialize;
+
+use super::{GateSet, GateSource, GateSpec, ProbabilitySpec, Scope};
+use crate::probability::ProbabilityGate;
+
+/// A project file that cannot be used.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("failed to read {}: {message}", path.display())]
+pub struct ProjectError {
+    /// The file.
+    pub path: PathBuf,
+    /// What is wrong, with the line.
+    pub message: String,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+struct ProjectConfig {
+    #[serde(default)]
+    gate: GateConfig,
+}
+
+/// A project file that has been read.
+#[derive(Debug)]
+pub struct ProjectFile {
+    path: PathBuf,
+    gate: GateConfig,
+}
+
+impl ProjectFile {
+    /// Reads the project file of `folder`, or of the nearest folder above it. Returns `None` if there is none.
+    ///
+    /// # Errors
+    /// [`ProjectError`] if the file cannot be read, or has an unknown key or an invalid criterion.
+    pub fn find(folder: &Path) -> Result<Option<Self>, ProjectError> {
+        let found = folder.ancestors().map(|folder| folder.join(PROJECT_FILE)).find(|path| path.is_file());
+        found.map(|path| Self::read(&path)).transpose()
+    }
+
+    fn read(path: &Path) -> Result<Self, ProjectError> {
+        let fail = |message: String| ProjectError { path: path.to_owned(), message };
+        let text = std::fs::read_to_string(path).map_err(|error| fail(error.to_string()))?;
+        let config: ProjectConfig = toml::from_str(&text).map_err(|error| fail(error.to_string()))?;
+        Ok(Self { path: path.to_owned(), gate: config.gate })
+    }
+
+    /// Adds the gates that no gate of the set, which are those of the command line and of a preset, replaces.
+    ///
+    /// # Errors
+    /// [`ProjectError`] if the largest probability or its confidence is out of range.
+    pub fn add_to(self, set: &mut GateSet) -> Result<(), ProjectError> {
+        let source = GateSource::ProjectFile(self.path.clone());
+        for expression in self.gate.require {
+            // A bound for all scenarios together replaces one for each.
+            let is_replaced = set.specs.iter().any(|spec| spec.expression.subject() == expression.subject());
+            if !is_replaced {
+                set.push(GateSpec { expression, source: source.clone(), scope: Scope::EachScenario });
+            }
+        }
+        if let (None, Some(max)) = (&set.probability, self.gate.max_probability) {
+            let confidence = self.gate.confidence.unwrap_or(ProbabilityGate::CONFIDENCE);
+            let gate = ProbabilityGate::new(max, confidence)
+                .map_err(|error| ProjectError { path: self.path, message: error.to_string() })?;
+            set.probability = Some(ProbabilitySpec { gate, source });
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_project_file_adds_what_the_set_does_not_have() {
+        let root = tempfile::tempdir().unwrap();
+        let below = root.path().join("a/b");
+        std::fs::create_dir_all(&below).unwrap();
+        let text = "[gate]\nrequire = ['count(ego_collided) <= 0', 'max(max_jerk_mps3) <= 3']\n";
+        std::fs::write(root.path().join(PROJECT_FILE), text).unwrap();
+        let mut set = GateSet::of(["count(ego_collided) <= 5".parse().unwrap()]);
+        ProjectFile::find(&below).unwrap().unwrap().add_to(&mut set).unwrap();
+        let gates: Vec<String> = set.specs.iter().map(|spec| spec.expression.to_string()).collect();
+        assert_eq!(gates, ["count(ego_collided) <= 5", "max(max_jerk_mps3) <= 3"]);
+    }
+
+    #[test]
+    fn an_unknown_key_is_refused() {
+        let root = tempfile::tempdir().unwrap();
+        std::fs::write(root.path().join(PROJECT_FILE), "[gates]\n").unwrap();
+        assert!(ProjectFile::find(root.path()).unwrap_err().message.contains("gates"));
+    }
+}

@@ -1,0 +1,111 @@
+//! The files of a repository of scenarios: a commented scenario, the project file, and CI jobs for GitHub and GitLab.
+
+use std::fs::OpenOptions;
+use std::io::{ErrorKind, Write};
+use std::path::{Path, PathBuf};
+
+use closecall_scenarios::atomic::WriteError;
+use closecall_simulation::scenario::source::{PROJECT_FILE, SCENARIOS};
+
+const SCENARIO: &str = include_str!("repository/scenario.toml");
+const PROJECT: &str = include_str!("repository/closecall.toml");
+const GITHUB: &str = include_str!("../../docs/ci/github.yml");
+const GITLAB: &str = include_str!("../../docs/ci/gitlab.yml");
+
+/// The name of the scenario in the template.
+const TEMPLATE_NAME: &str = "NAME";
+/// The name of the first scenario of a repository.
+const FIRST_SCENARIO: &str = "late-overtake";
+
+/// Where a CI job finds Closecall.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Installation<'a> {
+    /// The Git URL.
+    pub url: &'a str,
+    /// The commit or tag.
+    pub rev: &'a str,
+}
+
+/// Returns the commented template of a scenario, with the name `name`.
+pub fn scenario_template(name: &str) -> String {
+    SCENARIO.replace(&format!("name = \"{TEMPLATE_NAME}\""), &format!("name = \"{name}\""))
+}
+
+/// Returns the file of a new scenario: in the folder of scenarios if the working folder is a repository, else in the
+/// working folder itself.
+pub fn scenario_path(name: &str) -> PathBuf {
+    let file = PathBuf::from(format!("{name}.toml"));
+    let is_repository = Path::new(PROJECT_FILE).is_file() && Path::new(SCENARIOS).is_dir();
+    if is_repository { Path::new(SCENARIOS).join(file) } else { file }
+}
+
+/// Returns the files of a repository in `folder`, each with its text. A scenario is among them only if the folder has
+/// none yet.
+pub fn repository_files(folder: &Path, installation: Installation<'_>) -> Vec<(PathBuf, String)> {
+    let installed = |text: &str| text.replace("@URL@", installation.url).replace("@REV@", installation.rev);
+    let scenarios = folder.join(SCENARIOS);
+    let mut files = vec![
+        (folder.join(PROJECT_FILE), PROJECT.to_owned()),
+        (folder.join(".github/workflows/closecall.yml"), installed(GITHUB)),
+        (folder.join(".gitlab-ci.yml"), installed(GITLAB)),
+    ];
+    if !has_scenario(&scenarios) {
+        files.push((scenarios.join(format!("{FIRST_SCENARIO}.toml")), scenario_template(FIRST_SCENARIO)));
+    }
+    files
+}
+
+fn has_scenario(folder: &Path) -> bool {
+    let Ok(entries) = std::fs::read_dir(folder) else { return false };
+    entries.flatten().any(|entry| entry.path().extension().is_some_and(|extension| extension == "toml"))
+}
+
+/// Writes a file that does not exist yet, and its folder. Returns false if the file exists: it is then unchanged.
+///
+/// # Errors
+/// [`WriteError`] if the folder or the file cannot be written.
+pub fn create(path: &Path, text: &str) -> Result<bool, WriteError> {
+    let fail = |source| WriteError::new(path, source);
+    if let Some(folder) = path.parent() {
+        std::fs::create_dir_all(folder).map_err(fail)?;
+    }
+    match OpenOptions::new().write(true).create_new(true).open(path) {
+        Ok(mut file) => file.write_all(text.as_bytes()).map(|()| true).map_err(fail),
+        Err(error) if error.kind() == ErrorKind::AlreadyExists => Ok(false),
+        Err(error) => Err(fail(error)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use closecall_simulation::scenario::ScenarioFile;
+
+    use super::*;
+
+    #[test]
+    fn the_template_is_valid() {
+        let file = ScenarioFile::parse(Path::new("mine.toml"), &scenario_template("mine"), &[]).unwrap();
+        file.check().unwrap();
+        assert_eq!(file.config().name, "mine");
+        assert!(file.unused_parameters().is_empty());
+    }
+
+    #[test]
+    fn an_existing_file_is_never_overwritten() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a/b.toml");
+        assert!(create(&path, "first").unwrap());
+        assert!(!create(&path, "second").unwrap());
+        assert_eq!(std::fs::read_to_string(path).unwrap(), "first");
+    }
+
+    #[test]
+    fn the_first_scenario_is_written_only_into_an_empty_repository() {
+        let folder = tempfile::tempdir().unwrap();
+        let files = || repository_files(folder.path(), Installation { url: "URL", rev: "REV" });
+        assert_eq!(files().len(), 4);
+        assert!(files().iter().all(|(_, text)| !text.contains("@URL@") && !text.contains("@REV@")));
+        create(&folder.path().join(SCENARIOS).join("mine.toml"), "").unwrap();
+        assert_eq!(files().len(), 3);
+    }
+}

@@ -1,0 +1,101 @@
+//! The outcome of a run as JSON.
+
+use closecall_simulation::outcome::{Collision, Margins, MisSummary, MomentAt, Outcome};
+use closecall_traffic::{Absent, Measured, Value as ParameterValue};
+use serde_json::{Map, Value, json};
+
+use crate::run::film::EncounterMetrics;
+
+/// Inserts a value under `key`, or `null` and the reason for which it is absent.
+fn insert(object: &mut Map<String, Value>, key: &str, measured: Measured) {
+    match measured {
+        Ok(value) => {
+            object.insert(key.to_owned(), json!(value));
+        }
+        Err(absent) => {
+            object.insert(key.to_owned(), Value::Null);
+            object.insert(format!("{key}_absent"), json!(absent.to_string()));
+        }
+    }
+}
+
+/// Returns the outcome of a run in one arm.
+pub fn outcome(outcome: &Outcome) -> Value {
+    json!({
+        "scenario": outcome.scenario,
+        "seed": outcome.seed,
+        "sample": outcome.sample,
+        "controller": outcome.controller,
+        "end": outcome.end,
+        "duration_s": outcome.duration.s(),
+        "parameters": parameters(outcome),
+        "collisions": outcome.collisions.iter().map(collision).collect::<Vec<_>>(),
+        "moments": outcome.moments.iter().map(moment).collect::<Vec<_>>(),
+        "margins": margins(&outcome.margins),
+        "mis": mis(&outcome.mis),
+    })
+}
+
+/// Returns the metrics of an encounter, recorded or simulated.
+pub fn encounter_metrics(metrics: &EncounterMetrics) -> Value {
+    let mut object = Map::new();
+    insert(&mut object, "crossing_s", metrics.crossing_s);
+    insert(&mut object, "thw_front_at_crossing_s", metrics.thw_front_at_crossing_s);
+    insert(&mut object, "thw_rear_at_crossing_s", metrics.thw_rear_at_crossing_s);
+    insert(&mut object, "min_thw_front_s", metrics.min_thw_front_s);
+    insert(&mut object, "min_thw_rear_s", metrics.min_thw_rear_s);
+    insert(&mut object, "max_deceleration_mps2", Ok(metrics.max_deceleration_mps2));
+    Value::Object(object)
+}
+
+fn parameters(outcome: &Outcome) -> Map<String, Value> {
+    let value = |value: &ParameterValue| match value {
+        ParameterValue::Number(number) => json!(number),
+        ParameterValue::Label(label) => json!(label),
+    };
+    outcome.parameters.iter().map(|(name, parameter)| (name.to_string(), value(parameter))).collect()
+}
+
+fn collision(collision: &Collision) -> Value {
+    let [first, second] = &collision.between;
+    json!({
+        "time_s": collision.time.s(),
+        "between": collision.between,
+        "struck_side": collision.struck_side,
+        "closed_by": collision.closed_by,
+        "phase": collision.phase,
+        "relative_speed_mps": collision.relative_speed_mps,
+        "delta_v_mps": { first.as_str(): collision.delta_v_mps[0], second.as_str(): collision.delta_v_mps[1] },
+    })
+}
+
+fn moment(at: &MomentAt) -> Value {
+    json!({ "moment": at.moment, "letter": at.moment.letter(), "time_s": at.time.s() })
+}
+
+fn margins(margins: &Margins) -> Value {
+    let mut object = Map::new();
+    insert(&mut object, "min_thw_front_s", margins.min_thw_front_s);
+    insert(&mut object, "min_thw_rear_s", margins.min_thw_rear_s);
+    insert(&mut object, "min_gap_front_m", margins.min_gap_front_m);
+    insert(&mut object, "min_gap_rear_m", margins.min_gap_rear_m);
+    insert(&mut object, "min_ttc_rear_s", margins.min_ttc_rear_s);
+    insert(&mut object, "max_deceleration_mps2", Ok(margins.max_deceleration_mps2));
+    insert(&mut object, "max_jerk_mps3", Ok(margins.max_jerk_mps3));
+    insert(&mut object, "max_speed_deficit_mps", Ok(margins.max_speed_deficit_mps));
+    Value::Object(object)
+}
+
+fn mis(mis: &Result<MisSummary, Absent>) -> Value {
+    let mut object = Map::new();
+    let of = |value: fn(&MisSummary) -> Measured| mis.as_ref().map_err(|absent| *absent).and_then(value);
+    insert(&mut object, "engaged_at_s", of(|mis| mis.engaged_at_s));
+    insert(&mut object, "released_at_s", of(|mis| mis.released_at_s));
+    insert(&mut object, "thw_front_at_engagement_s", of(|mis| mis.thw_front_at_engagement_s));
+    insert(&mut object, "thw_front_at_critical_s", of(|mis| mis.thw_front_at_critical_s));
+    insert(&mut object, "mean_deceleration_mps2", of(|mis| mis.mean_deceleration_mps2));
+    object.insert("goal_in_reach".to_owned(), json!(mis.as_ref().ok().and_then(|mis| mis.goal_in_reach)));
+    let reason = mis.as_ref().map_or_else(ToString::to_string, |mis| mis.reason.to_string());
+    object.insert("reason".to_owned(), json!(reason));
+    Value::Object(object)
+}

@@ -1,0 +1,57 @@
+//! What was found in trajectory data as JSON.
+
+use closecall_scenarios::fit::{FittedDistributions, FittedQuantity, Quantity};
+use closecall_scenarios::robustness::Robustness;
+use closecall_scenarios::trajectory_data::{QualityInspector, Tracks};
+use serde_json::{Value, json};
+
+/// Returns the flaws of a trajectory file. `inspector` has seen all of `tracks`.
+pub fn quality(tracks: &Tracks<'_>, inspector: &QualityInspector) -> Value {
+    let quality = inspector.count_flaws();
+    let span = inspector.span();
+    json!({
+        "name": tracks.name(),
+        "layout": tracks.layout(),
+        "period_s": tracks.period().s(),
+        "rows": tracks.rows(),
+        "tracks": quality.tracks,
+        "vehicles": quality.vehicles,
+        "instants": quality.instants,
+        "first_s": span.map(|(first, _)| first.s()),
+        "last_s": span.map(|(_, last)| last.s()),
+        "flaws": inspector.flaws(),
+        "overlaps_unchecked_instants": inspector.unchecked_points(),
+        "dropped": tracks.dropped(),
+        "usable": tracks.dropped().count() == 0,
+    })
+}
+
+/// Returns the results of a robustness study, with the lowest level of noise at which each criterion fails.
+pub fn robustness(found: &Robustness) -> Value {
+    let fails = found.criteria.iter().enumerate();
+    let fails =
+        fails.map(|(column, criterion)| (criterion.name().to_owned(), found.failing_noise_m_per_sqrt_s(column).into()));
+    let mut value = json!(found);
+    value["fails_from_noise_m_per_sqrt_s"] = Value::Object(fails.collect());
+    value
+}
+
+/// Returns the median and the quantiles of each fitted quantity, and the quantities with too few values to fit.
+pub fn fitted(fitted: &FittedDistributions) -> Value {
+    let quantity = |quantity: &FittedQuantity| {
+        json!({
+            "name": quantity.quantity.name(),
+            "n": quantity.n,
+            "median": quantity.median,
+            "interval_95": quantity.interval_95,
+            "quantiles": quantity.quantiles,
+        })
+    };
+    let too_few = |(quantity, n): &(Quantity, usize)| json!({ "name": quantity.name(), "n": n });
+    json!({
+        "trajectory_data": fitted.data_sets.iter().map(|(name, _)| name).collect::<Vec<_>>(),
+        "seed": fitted.seed,
+        "fitted": fitted.fitted.iter().map(quantity).collect::<Vec<_>>(),
+        "too_few": fitted.too_few.iter().map(too_few).collect::<Vec<_>>(),
+    })
+}

@@ -1,0 +1,62 @@
+//! The outcome of a run as text.
+
+use std::fmt;
+
+use closecall_simulation::outcome::Outcome;
+use closecall_traffic::Measured;
+
+/// The outcome of a run as text for human readers, over several lines.
+#[derive(Clone, Copy, Debug)]
+pub struct OutcomeText<'a>(pub &'a Outcome);
+
+impl fmt::Display for OutcomeText<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let outcome = self.0;
+        writeln!(
+            f,
+            "{} · {} · seed {} · sample {} · ended at {} ({})",
+            outcome.scenario,
+            outcome.controller,
+            outcome.seed,
+            outcome.sample,
+            outcome.duration,
+            serde_json::to_string(&outcome.end).unwrap_or_default().trim_matches('"'),
+        )?;
+        for (name, value) in outcome.parameters.iter() {
+            writeln!(f, "  {name} = {value}")?;
+        }
+        for at in &outcome.moments {
+            writeln!(f, "  ({}) {} at {:.2} s", at.moment.letter(), at.moment.text(), at.time.s())?;
+        }
+        for collision in &outcome.collisions {
+            let [first, second] = &collision.between;
+            writeln!(
+                f,
+                "  COLLISION of {first} and {second} at {:.2} s, relative speed {:.1} m/s, ΔV {:.1} and {:.1} m/s",
+                collision.time.s(),
+                collision.relative_speed_mps,
+                collision.delta_v_mps[0],
+                collision.delta_v_mps[1],
+            )?;
+        }
+        if outcome.collisions.is_empty() {
+            writeln!(f, "  no collision")?;
+        }
+        let line = |name: &str, value: Measured, unit: &str| match value {
+            Ok(value) => format!("  {name}: {value:.2} {unit}\n"),
+            Err(absent) => format!("  {name}: none, {absent}\n"),
+        };
+        f.write_str(&line("smallest front time headway", outcome.margins.min_thw_front_s, "s"))?;
+        f.write_str(&line("smallest rear time headway", outcome.margins.min_thw_rear_s, "s"))?;
+        f.write_str(&line("largest deceleration", Ok(outcome.margins.max_deceleration_mps2), "m/s²"))?;
+        match &outcome.mis {
+            Ok(mis) => {
+                f.write_str(&line("MIS engaged at", mis.engaged_at_s, "s"))?;
+                f.write_str(&line("  front time headway then", mis.thw_front_at_engagement_s, "s"))?;
+                f.write_str(&line("  front time headway at the critical moment", mis.thw_front_at_critical_s, "s"))?;
+                writeln!(f, "  MIS: {}", mis.reason)
+            }
+            Err(absent) => writeln!(f, "  MIS: {absent}"),
+        }
+    }
+}

@@ -1,0 +1,118 @@
+//! Recorded lane changes as text for human readers: a table, how well they match known ones, and how critical each is.
+
+use std::fmt;
+
+use closecall_scenarios::criticality::{CriticalLaneChange, shares};
+use closecall_scenarios::lane_change::{LaneChange, Score};
+use closecall_scenarios::trajectory_data::{TrajectoryData, count_flaws};
+use closecall_traffic::Side;
+
+/// Lane changes as a table, with their number.
+#[derive(Clone, Copy, Debug)]
+pub struct LaneChangesText<'a>(pub &'a [LaneChange]);
+
+impl fmt::Display for LaneChangesText<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let changes = self.0;
+        writeln!(
+            f,
+            "track  class       direction  lanes      start    middle  crossing       end  duration     speed"
+        )?;
+        for change in changes {
+            writeln!(f, "{}", line(change))?;
+        }
+        let complete = changes.iter().filter(|change| change.complete).count();
+        let double = changes.iter().filter(|change| change.double).count();
+        writeln!(
+            f,
+            "{} lane changes, {complete} of them complete, {double} of them parts of double ones",
+            changes.len()
+        )?;
+        Ok(())
+    }
+}
+
+/// How well the lane changes that were found match known ones.
+#[derive(Clone, Copy, Debug)]
+pub struct ScoreText<'a>(pub &'a Score);
+
+impl fmt::Display for ScoreText<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let score = self.0;
+        writeln!(f, "recall     {}", score.recall)?;
+        writeln!(f, "precision  {}", score.precision)?;
+        writeln!(f, "crossing times differ by at most {:.2} s", score.max_time_error_s)?;
+        Ok(())
+    }
+}
+
+/// The metrics of each lane change of a trajectory file, and how often each metric is critical.
+#[derive(Clone, Copy, Debug)]
+pub struct CriticalityText<'a> {
+    /// The trajectory file.
+    pub data: &'a TrajectoryData,
+    /// Its lane changes.
+    pub changes: &'a [CriticalLaneChange],
+}
+
+impl fmt::Display for CriticalityText<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { data, changes } = *self;
+        let quality = count_flaws(data);
+        writeln!(
+            f,
+            "{}: {} tracks of {} vehicles, {} instants every {}; {} gaps, {} jumps, {} overlaps",
+            data.name,
+            quality.tracks,
+            quality.vehicles,
+            quality.instants,
+            data.period,
+            quality.gaps,
+            quality.jumps,
+            quality.overlaps,
+        )?;
+        for change in changes {
+            writeln!(f, "{}", line(&change.lane_change))?;
+            for (name, metric) in change.metrics.named() {
+                let mark = if metric.is_critical() { "  CRITICAL" } else { "" };
+                match metric.value() {
+                    Some(value) => writeln!(f, "         {name:<12} {value:>9.2}{mark}")?,
+                    None => writeln!(f, "         {name:<12}         -")?,
+                }
+            }
+        }
+        let shares = shares(changes);
+        writeln!(f, "of {} lane changes, critical:", shares.lane_changes)?;
+        for share in &shares.metrics {
+            let percent = share.share.map_or("-".to_owned(), |share| format!("{:.0} %", 100.0 * share));
+            writeln!(f, "  {:<12} {:>4}  {percent:>6}  ({} absent)", share.metric, share.critical, share.absent)?;
+        }
+        writeln!(f, "  {:<12} {:>4}", "any", shares.any)?;
+        Ok(())
+    }
+}
+
+fn line(change: &LaneChange) -> String {
+    let direction = match change.direction {
+        Side::Left => "left",
+        Side::Right => "right",
+    };
+    let mark = match (change.complete, change.double) {
+        (true, _) => "complete",
+        (false, true) => "double",
+        (false, false) => "",
+    };
+    format!(
+        "{:>5}  {:<10}  {direction:<9}  {} to {}  {:>7.2} s {:>7.2} s {:>7.2} s {:>7.2} s {:>7.2} s  {:>4.1} m/s  {mark}",
+        change.track_id,
+        change.vehicle_class.name(),
+        change.from_lane,
+        change.to_lane,
+        change.start_s,
+        change.midpoint_s,
+        change.crossing_s,
+        change.end_s,
+        change.duration_s,
+        change.speed_mps,
+    )
+}

@@ -1,0 +1,153 @@
+//! The scenario library: the files of `scenarios/library`, which are part of the program.
+
+use std::path::PathBuf;
+
+use closecall_traffic::suggest::nearest;
+use serde::Serialize;
+use toml::{Table, Value};
+
+use super::{ScenarioError, ScenarioFile};
+
+/// Embeds scenarios of `scenarios/library`, by their names.
+macro_rules! embedded {
+    ($($name:literal),* $(,)?) => {
+        [$(($name, include_str!(concat!("../../../scenarios/library/", $name, ".toml")))),*]
+    };
+}
+
+/// The scenarios of the library, each with its name and its text, in alphabetical order.
+const LIBRARY: [(&str, &str); 8] = embedded![
+    "empty-wet-road",
+    "left-lane-blocked",
+    "low-thw-overtake",
+    "low-thw-overtake-at-cut-out",
+    "overtake-without-brake",
+    "paper-figure",
+    "rear-follower-stays",
+    "slow-approach",
+];
+
+/// A name that is not that of a scenario of the library.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the library has no scenario `{name}`, only {known}{}", suggestion(name))]
+pub struct UnknownScenario {
+    /// The name.
+    pub name: String,
+    /// The names of the library, separated by commas.
+    pub known: String,
+}
+
+fn suggestion(name: &str) -> String {
+    nearest(name, names()).map(|known| format!("; did you mean `{known}`?")).unwrap_or_default()
+}
+
+/// A scenario of the library, as a list of the library describes it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct LibraryEntry {
+    /// The scenario's name.
+    pub name: &'static str,
+    /// The question that the scenario answers.
+    pub question: String,
+    /// The tags.
+    pub tags: Vec<String>,
+    /// The requirements that the scenario tests.
+    pub requirements: Vec<String>,
+    /// Number of sampled parameters.
+    pub parameters: usize,
+    /// The criteria of the table `[gate]`, as the file writes them.
+    pub gates: Vec<String>,
+}
+
+impl LibraryEntry {
+    fn new(name: &'static str, text: &str) -> Result<Self, ScenarioError> {
+        let file = ScenarioFile::parse(&path(name), text, &[])?;
+        let config = file.config();
+        Ok(Self {
+            name,
+            question: config.description.clone(),
+            tags: config.tags.clone(),
+            requirements: config.requirements.clone(),
+            parameters: file.space().iter().len(),
+            gates: gates(text),
+        })
+    }
+}
+
+/// Returns the names of the scenarios, in alphabetical order.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    LIBRARY.into_iter().map(|(name, _)| name)
+}
+
+/// Returns the text of a scenario, or `None` if the library has no scenario of that name.
+pub fn text(name: &str) -> Option<&'static str> {
+    LIBRARY.into_iter().find(|(known, _)| *known == name).map(|(_, text)| text)
+}
+
+/// Returns the path by which messages and manifests name a scenario of the library. No such file is read.
+pub fn path(name: &str) -> PathBuf {
+    PathBuf::from(format!("library/{name}.toml"))
+}
+
+/// Describes every scenario of the library, in alphabetical order of the names.
+///
+/// # Errors
+/// [`ScenarioError`] if an embedded scenario is invalid, which is a defect of the program.
+pub fn entries() -> Result<Vec<LibraryEntry>, ScenarioError> {
+    LIBRARY.into_iter().map(|(name, text)| LibraryEntry::new(name, text)).collect()
+}
+
+/// Returns the text of the scenario `from` of the library, under the name `name`.
+///
+/// # Errors
+/// [`UnknownScenario`] if the library has no scenario `from`.
+pub fn copy_of(from: &str, name: &str) -> Result<String, UnknownScenario> {
+    let text = text(from)
+        .ok_or_else(|| UnknownScenario { name: from.to_owned(), known: names().collect::<Vec<_>>().join(", ") })?;
+    Ok(text.replace(&format!("name = \"{from}\""), &format!("name = \"{name}\"")))
+}
+
+/// Returns the gates that the text of a scenario sets.
+fn gates(text: &str) -> Vec<String> {
+    let Ok(document) = text.parse::<Table>() else { return Vec::new() };
+    let required = document.get("gate").and_then(|gate| gate.get("require")).and_then(Value::as_array);
+    required.into_iter().flatten().filter_map(Value::as_str).map(str::to_owned).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    #[test]
+    fn the_library_holds_every_scenario_of_its_folder() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios/library");
+        let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+        let scenarios = files.filter(|path| path.extension().is_some_and(|extension| extension == "toml"));
+        let mut expected: Vec<String> =
+            scenarios.map(|path| path.file_stem().unwrap().to_str().unwrap().to_owned()).collect();
+        expected.sort();
+        assert_eq!(names().collect::<Vec<_>>(), expected);
+        for (entry, (name, text)) in entries().unwrap().into_iter().zip(LIBRARY) {
+            assert_eq!(entry.name, ScenarioFile::parse(&path(name), text, &[]).unwrap().config().name);
+            assert!(entry.question.ends_with('?'), "{name}: {}", entry.question);
+        }
+    }
+
+    #[test]
+    fn gates_are_those_of_the_text() {
+        assert_eq!(gates("[gate]\nrequire = ['count(ego_collided) <= 0']\n"), ["count(ego_collided) <= 0"]);
+        assert_eq!(gates("name = 'a'\n"), Vec::<String>::new());
+    }
+
+    #[test]
+    fn every_copy_is_valid_under_its_new_name() {
+        for text in names().map(|name| copy_of(name, "mine").unwrap()) {
+            let file = ScenarioFile::parse(Path::new("mine.toml"), &text, &[]).unwrap();
+            file.check().unwrap();
+            assert_eq!(file.config().name, "mine");
+            assert!(file.unused_parameters().is_empty());
+        }
+        assert!(copy_of("paper-figur", "mine").unwrap_err().to_string().contains("did you mean `paper-figure`?"));
+    }
+}
