@@ -73,15 +73,20 @@ fn a_campaign_without_gates_and_checks_is_not_judged() {
 #[test]
 fn a_gate_on_what_no_sample_has_does_not_pass() {
     let path = library("slow-approach");
-    // The margin increase system never engages there, so that no headway is gained.
-    let judged = |gate: &str| {
+    // The margin increase system never engages there, and the baseline never collides.
+    for gate in ["mean(thw_gain_s) >= 0", "share(prevented | baseline.ego_collided) >= 0"] {
         let path = path.to_str().unwrap();
         let args = ["campaign", path, "-n", "4", "--paired", "--max-collisions", "4", "--gate", gate];
-        stdout(&closecall(args), 4)
-    };
-    assert!(judged("mean(thw_gain_s) >= 0").contains("no sample has this value"));
-    let text = judged("share(prevented | baseline.ego_collided) >= 0");
-    assert!(text.contains("share(prevented | baseline.ego_collided) has no value in any scenario"), "{text}");
+        assert!(stdout(&closecall(args), 4).contains("no sample has this value"), "{gate}");
+    }
+    // A gate of the file that compares with a baseline says nothing of a campaign without one.
+    let folder = folder();
+    let text = std::fs::read_to_string(&path).unwrap();
+    let gated = folder.path().join("gated.toml");
+    std::fs::write(&gated, text.replacen("[checks]", "[gate]\nrequire = [\"count(induced) <= 0\"]\n\n[checks]", 1))
+        .unwrap();
+    let text = stdout(&closecall(["campaign", gated.to_str().unwrap(), "-n", "4", "--max-collisions", "4"]), 4);
+    assert!(text.contains("count(induced) has no value in any scenario"), "{text}");
 }
 
 #[test]
