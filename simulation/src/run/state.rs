@@ -19,6 +19,10 @@ use crate::outcome::{EndReason, Moment, Outcome, Phase};
 use crate::scenario::Scenario;
 use crate::world::{Action, InitialVehicle, World};
 
+/// Number of scans of the ego's sensors before the start of a run: one second, in which tracks are confirmed and settle.
+/// Without it, the ego would start without a lead vehicle and accelerate.
+const SCANS_BEFORE_START: i64 = 25;
+
 /// The state of one run.
 pub(super) struct Run<'a> {
     scenario: &'a Scenario,
@@ -71,7 +75,7 @@ impl<'a> Run<'a> {
             Some(mode) => scenario.sensors.with_mode(mode),
             None => scenario.sensors,
         };
-        Ok(Self {
+        let mut run = Self {
             scenario,
             key,
             arm,
@@ -98,7 +102,27 @@ impl<'a> Run<'a> {
             vehicles: Vec::with_capacity(world.len()),
             fronts: Vec::with_capacity(world.len()),
             world,
-        })
+        };
+        run.settle_sensors()?;
+        Ok(run)
+    }
+
+    /// Runs the ego's sensors over the time before the start, in which all vehicles keep the speed at which they start.
+    fn settle_sensors(&mut self) -> Result<(), SampleError> {
+        self.collect_vehicles();
+        for scan in (1..=SCANS_BEFORE_START).rev() {
+            let time = CONTROL_STEP * -scan;
+            let before = |vehicle: &SceneVehicle| {
+                let mut vehicle = *vehicle;
+                vehicle.state.s_m += vehicle.state.speed_mps * time.s();
+                vehicle
+            };
+            let others: Vec<SceneVehicle> = self.others.iter().map(before).collect();
+            let ego = before(&self.vehicles[self.scenario.ego]);
+            let (road, environment) = (&self.scenario.road, &self.scenario.environment);
+            self.perception.step(&Scene { time, road, environment, ego, others: &others })?;
+        }
+        Ok(())
     }
 
     /// Returns whether sensors and ego controller act at the current time.

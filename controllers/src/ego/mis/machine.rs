@@ -113,7 +113,7 @@ pub(crate) struct Situation<'a> {
     pub(crate) input: &'a EgoInput<'a>,
     pub(crate) lead: Option<&'a Front>,
     pub(crate) automated: bool,
-    /// The last commanded acceleration (m/s²).
+    /// The last comfort command (m/s²).
     pub(crate) commanded_mps2: f64,
     /// The desired gap of the ACC (m).
     pub(crate) acc_gap_m: f64,

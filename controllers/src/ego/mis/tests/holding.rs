@@ -32,7 +32,10 @@ fn holding_needs_room_for_the_worst_braking_of_the_lead_vehicle() {
     bench.lead().state[2] = 20.0;
     let command = bench.step();
     assert_eq!((command.state, command.reason), (EgoState::Releasing, Reason::NoRoomToHold));
-    assert!(command.acceleration_mps2 < -3.0, "{command:?}");
+    // The ACC brakes as hard as it may, within its jerk limit.
+    assert!(command.acceleration_mps2 < 0.0, "{command:?}");
+    let command = bench.step_for(3.5 / 2.5);
+    assert_eq!(command.acceleration_mps2, -3.5);
 }
 
 /// Finds the gaps at which the ego may just hold by time-stepping the worst case: the lead vehicle brakes at 8 m/s² at

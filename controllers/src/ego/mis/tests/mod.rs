@@ -1,5 +1,6 @@
 //! Tests of each condition and transition, on the whole ego stack with hand-made tracks.
 
+mod emergency;
 mod engaging;
 mod holding;
 mod releasing;
