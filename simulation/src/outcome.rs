@@ -71,7 +71,8 @@ impl Collision {
 }
 
 /// A moment of the encounter in which a rear vehicle R approaches the ego E from behind while the ego follows a lead
-/// vehicle F. The paper's figure names five of them, (a) to (e).
+/// vehicle F. The letters (a) to (e) are those of Closecall's own figures. The paper's figure counts otherwise: its (a) is
+/// the hazard without the system, and its (e) the rear vehicle about 5 m behind the ego, which is (c) here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Moment {
@@ -92,7 +93,7 @@ impl Moment {
     pub const ALL: [Self; 5] =
         [Self::RearNear, Self::CutOut, Self::CriticalDistance, Self::FrontBrakes, Self::Concluded];
 
-    /// Returns the moment's letter in the paper's figure.
+    /// Returns the moment's letter in Closecall's figures.
     pub const fn letter(self) -> char {
         match self {
             Self::RearNear => 'a',

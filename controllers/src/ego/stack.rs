@@ -4,7 +4,7 @@
 //! |---|---|
 //! | follow | ACC, within its jerk limit |
 //! | brake by a | the smaller of that and −a, which is approached within the jerk limits of the MIS |
-//! | hold | keep the speed, whatever the ACC requests |
+//! | hold at a | −a, whatever the ACC requests; a is 0 from the critical gap on |
 //! | release | ACC, its acceleration limited, and raised within the jerk limit for releasing the brake |
 //!
 //! The result is the *comfort command*. Emergency braking overrides it if it requests more braking. The jerk limits hold
@@ -74,7 +74,7 @@ impl EgoStack {
         let acceleration_mps2 = match decision.request {
             Request::Follow => acc_mps2,
             Request::Brake(braking) => acc_mps2.min((-braking).max(lowest).min(highest)),
-            Request::Hold => highest.min(0.0).max(lowest),
+            Request::Hold(braking) => (-braking).max(lowest).min(highest),
             Request::Release => acc_mps2.min(RELEASE_ACCELERATION_MPS2).min(highest),
         };
         EgoCommand { acceleration_mps2, state: decision.state, reason: decision.reason, plan: decision.plan }

@@ -1,7 +1,7 @@
 //! The state machine of the margin increase system.
 
 use closecall_traffic::metrics::CRITICAL_THW_S;
-use closecall_traffic::{Absent, Time, TrackId};
+use closecall_traffic::{Absent, GRAVITY_MPS2, Time, TrackId};
 
 use super::{ArrivalPrediction, BrakingResponse, Encounter, MisPlan, MisSettings};
 use crate::ego::surroundings::{
@@ -9,50 +9,57 @@ use crate::ego::surroundings::{
 };
 use crate::ego::{EgoInput, EgoState, Reason};
 
-/// Multiple of the engaging gap beyond which the rear vehicle has fallen back.
+/// Multiple of the engaging gap beyond which the rear vehicle has fallen back: an assumption; 1.1 to 1.5 are plausible.
 const FELL_BACK_GAP_RATIO: f64 = 1.2;
 
 /// Number of standard deviations by which the measured closing speed must exceed the one for engaging: 95 %, one-sided.
 /// A track whose speed has not settled yet does not engage; a track without error engages at once.
 const CONFIDENCE_SD: f64 = 1.645;
-/// Share of the engaging closing speed below which the rear vehicle counts as following.
+/// Share of the engaging closing speed below which the rear vehicle counts as following: an assumption; 0.2 to 0.8 are
+/// plausible.
 const FOLLOWING_SPEED_SHARE: f64 = 0.5;
 
-/// Time for which the rear vehicle must follow before the system releases: shorter intervals may be disturbances.
+/// Time for which the rear vehicle must follow before the system releases: shorter intervals may be disturbances. An
+/// assumption; 0.5 to 2 s are plausible.
 const FOLLOWING_DELAY: Time = Time::from_ms(1_000);
 
-/// Time for which a lost track, or a passing lane that is no longer known to be free, is tolerated.
+/// Time for which a lost track, or a passing lane that is no longer known to be free, is tolerated: an assumption;
+/// 0.2 to 1 s are plausible.
 const LOSS_TIMEOUT: Time = Time::from_ms(500);
 
-/// Largest distance between a new track and the expected position of the lost one to be taken for it (m).
+/// Largest distance between a new track and the expected position of the lost one to be taken for it (m): an
+/// assumption; 3 to 8 are plausible.
 const REASSOCIATION_DISTANCE_M: f64 = 5.0;
 
-/// Largest difference of their speeds (m/s).
+/// Largest difference of their speeds (m/s): an assumption; 2 to 5 are plausible.
 const REASSOCIATION_SPEED_MPS: f64 = 3.0;
 
 /// Speed below which the time headway of the ego is meaningless (m/s).
 const MIN_THW_SPEED_MPS: f64 = 1.0;
 
-/// Delay until braking takes effect: one control step and the actuators (s).
+/// Delay until braking takes effect: one control step, and twice the lag of the actuators, rounded down (s). An
+/// assumption; 0.2 to 0.5 are plausible.
 const BRAKING_DELAY_S: f64 = 0.3;
 
-/// Braking that the ego is sure to achieve (m/s²): what a wet road allows (friction 0.6).
-const ASSURED_BRAKING_MPS2: f64 = 6.0;
+/// Braking that the ego is sure to achieve (m/s²): what a wet road allows, with a friction of 0.6 (an assumption; 0.5 to
+/// 0.7 are plausible).
+const ASSURED_BRAKING_MPS2: f64 = 0.6 * GRAVITY_MPS2;
 
-/// Gap to be left behind a standing lead vehicle (m).
+/// Gap to be left behind a standing lead vehicle (m): an assumption; 1 to 5 are plausible.
 const STANDSTILL_GAP_M: f64 = 2.0;
 
-/// Jerk with which braking is released (m/s³).
+/// Jerk with which braking is released (m/s³): an assumption; 2 to 5 are plausible.
 pub(crate) const BRAKE_RELEASE_JERK_MPS3: f64 = 3.0;
 
-/// Time constant of the actuators, as the ego knows it (s).
+/// Time constant of the actuators, as the ego knows it (s): that of the simulated car; published responses of car brakes
+/// are 0.1 to 0.3 s.
 const ACTUATOR_LAG_S: f64 = 0.15;
 
 /// Largest shortfall at which the goal still counts as in reach (s). A margin that falls short by 0.1 s is still called
 /// reached; the difference covers effects that the prediction does not model, such as the control steps.
 const GOAL_TOLERANCE_S: f64 = 0.08;
 
-/// Multiple of the gap of the ACC within which the margin counts as returned.
+/// Multiple of the gap of the ACC within which the margin counts as returned: an assumption; 1.05 to 1.5 are plausible.
 const RETURNED_GAP_RATIO: f64 = 1.2;
 
 /// The request of the system to the arbitration.
@@ -62,8 +69,8 @@ pub(crate) enum Request {
     Follow,
     /// Brake by this much (m/s²), or harder if the ACC does.
     Brake(f64),
-    /// Keep the speed, whatever the ACC requests.
-    Hold,
+    /// Brake by this much (m/s²), whatever the ACC requests; 0 keeps the speed.
+    Hold(f64),
     /// Close the gap to the lead vehicle gently.
     Release,
 }
@@ -173,8 +180,10 @@ impl Mis {
                 (Request::Brake(braking_mps2), EgoState::Increasing)
             }
             State::Holding(target, _) => {
-                plan = Some(self.plan(situation, &target).0);
-                (Request::Hold, EgoState::Holding)
+                let (new_plan, braking_mps2) = self.plan(situation, &target);
+                plan = Some(new_plan);
+                let is_critical = target.rear.gap_m <= self.settings.critical_gap_m;
+                (Request::Hold(if is_critical { 0.0 } else { braking_mps2 }), EgoState::Holding)
             }
             State::Releasing => (Request::Release, EgoState::Releasing),
         };
@@ -261,13 +270,10 @@ impl Mis {
             release(Reason::RearPassed)
         } else if !rear.in_own_lane() && rear.gap_m > CRITICAL_THW_S * rear.speed_mps {
             release(Reason::RearChangedLane)
+        } else if let Some(reason) = self.reason_to_hold(situation, rear) {
+            Some((State::Holding(*target, now), reason))
         } else if rear.gap_m <= settings.critical_gap_m {
-            match situation.lead {
-                Some(lead) if self.has_room(situation.speed_mps(), lead) => {
-                    Some((State::Holding(*target, now), Reason::CriticalDistance))
-                }
-                _ => release(Reason::NoRoomToHold),
-            }
+            release(if settings.hold_s > 0.0 { Reason::NoRoomToHold } else { Reason::HoldExpired })
         } else if rear.gap_m > FELL_BACK_GAP_RATIO * settings.engage_gap_m {
             release(Reason::RearFellBack)
         } else if now - target.last_approached > FOLLOWING_DELAY {
@@ -297,6 +303,20 @@ impl Mis {
             Some(_) => return None,
         };
         Some((State::Releasing, reason))
+    }
+
+    /// Returns why holding begins now: the rear vehicle crosses the marking or is at the critical gap, and there is room.
+    /// Returns `None` if it does not begin.
+    fn reason_to_hold(&self, situation: &Situation<'_>, rear: &RearVehicle) -> Option<Reason> {
+        let reason = if rear.gap_m <= self.settings.critical_gap_m {
+            Reason::CriticalDistance
+        } else if !rear.in_own_lane() {
+            Reason::RearCrosses
+        } else {
+            return None;
+        };
+        let has_room = situation.lead.is_some_and(|lead| self.has_room(situation.speed_mps(), lead));
+        (has_room && self.settings.hold_s > 0.0).then_some(reason)
     }
 
     /// Returns true if the ego can stop behind the lead vehicle in case that brakes at its worst from now on.

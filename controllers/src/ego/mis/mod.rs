@@ -43,7 +43,8 @@
 //! | | releasing | the rear vehicle is entirely ahead of the ego | `RearPassed` |
 //! | | releasing | the rear vehicle has left the lane of the ego at a time headway above 0.9 s | `RearChangedLane` |
 //! | | holding | d_R ≤ `critical-gap-m`, in the lane of the ego or beside it, and there is room | `CriticalDistance` |
-//! | | releasing | the same, but there is no room | `NoRoomToHold` |
+//! | | holding | the rear vehicle has left the lane of the ego, and there is room | `RearCrosses` |
+//! | | releasing | d_R ≤ `critical-gap-m`, but there is no room, or `hold-s` is 0 | `NoRoomToHold`, `HoldExpired` |
 //! | | releasing | d_R > 1.2 × `engage-gap-m` | `RearFellBack` |
 //! | | releasing | Δv < ½ `engage-closing-mps` for 1 s | `RearFollows` |
 //! | | releasing | the passing lane is occupied | `PassingLaneOccupied` |
@@ -55,7 +56,7 @@
 //! | any | emergency braking | only emergency braking avoids a collision with the lead vehicle; it overrides the command, and the states continue beneath it | `BrakingRequired` |
 //!
 //! There is *room* if the ego can stop 2 m behind the lead vehicle in the following case: the lead vehicle brakes at
-//! `worst-front-braking-mps2` from now on to a standstill, and the ego brakes at 6 m/s² (what a wet road allows) from
+//! `worst-front-braking-mps2` from now on to a standstill, and the ego brakes at 5.9 m/s² (what a wet road allows) from
 //! 0.3 s later on.
 //!
 //! Hysteresis: the system engages at a rear gap of 100 m, and the rear vehicle has fallen back at 120 m. It engages at
@@ -68,12 +69,16 @@
 //!
 //! | state | command | acceleration | jerk |
 //! |---|---|---|---|
-//! | following | ACC | ACC's | ACC's |
+//! | following | ACC | ACC's | ACC's: 2.5 m/s³ from 20 m/s on |
 //! | increasing | the smaller of the ACC's acceleration and −a*, planned afresh at every step | a* ≤ `max-deceleration-mps2` | braking grows by `max-jerk-mps3`, falls by 3 m/s³ |
-//! | holding | the brake is released; the ACC is ignored | 0 | the same |
+//! | holding | −a* until d_R ≤ `critical-gap-m`, then the brake is released; the ACC is ignored | a*, then 0 | the same |
 //! | releasing | ACC, limited | ≤ 0.8 m/s² | rises by 3 m/s³ |
 //!
-//! Braking by the ACC, up to 3.5 m/s², passes in all states but holding; emergency braking always passes.
+//! Braking by the ACC, up to 3.5 m/s², passes in all states but holding; emergency braking always passes. The jerk limits
+//! hold for the comfort command, beneath emergency braking.
+//!
+//! *Holding* is the paper's critical time: for `hold-s` the ego uses up its margin instead of braking for the lead vehicle.
+//! It begins when the centre of the rear vehicle crosses the marking, or at the critical gap if that comes first.
 //!
 //! | limit | default | key |
 //! |---|---|---|
@@ -96,8 +101,8 @@
 //! the rear vehicle keep their speeds; the plan is computed afresh at every step.
 //!
 //! The rear vehicle crosses the marking at a time headway of 0.15 to 0.4 s, mostly before it reaches d_c. The ego
-//! nevertheless continues its plan until d_c: stopping at the marking leaves as many collisions, but reaches the goal
-//! in half as many samples (16 % instead of 34 %, tuning seeds). A rear vehicle that leaves the lane at a time headway
+//! nevertheless continues its plan until d_c, because the goal is a time headway at d_c; from the marking on it no longer
+//! brakes harder than planned. A rear vehicle that leaves the lane at a time headway
 //! of 0.9 s or more needs no margin.
 //!
 //! # Why 1 m/s², and d_c = 5 m

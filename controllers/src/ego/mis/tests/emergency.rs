@@ -8,13 +8,7 @@ use crate::ego::AebConfig;
 impl Bench {
     fn with_emergency_braking() -> Self {
         let aeb = AebConfig::default().check(&Parameters::default()).unwrap();
-        let mut bench = Self::new();
-        bench.stack = EgoStack::new(EgoSettings {
-            acc: Acc { time_gap_s: 0.7, set_speed_mps: None, standstill_gap_m: 3.0 },
-            aeb: Some(aeb),
-            mis: Some(MisSettings::PAPER),
-            automated: true,
-        });
+        let mut bench = Self::with_settings(EgoSettings { aeb: Some(aeb), ..Self::SETTINGS });
         assert_eq!(bench.step().state, EgoState::Increasing);
         bench
     }
