@@ -7,6 +7,7 @@ mod comparison;
 mod determinism;
 mod drivers;
 mod durability;
+mod encounter_models;
 mod engagement;
 mod exec_controller;
 mod exit_codes;
