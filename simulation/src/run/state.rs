@@ -14,14 +14,11 @@ use super::margins::{MarginMeter, Widths};
 use super::mis_log::{MisLog, MisObservation};
 use super::moments::Moments;
 use super::phase::{AFTER_COLLISION, Encounter, Follower};
+use super::settling::settle_sensors;
 use super::{Arm, Happening, MarginsNow, Observer, RunKey, SampleError, StepView};
 use crate::outcome::{EndReason, Moment, Outcome, Phase};
 use crate::scenario::Scenario;
 use crate::world::{Action, InitialVehicle, World};
-
-/// Number of scans of the ego's sensors before the start of a run: one second, in which tracks are confirmed and settle.
-/// Without it, the ego would start without a lead vehicle and accelerate.
-const SCANS_BEFORE_START: i64 = 25;
 
 /// The state of one run.
 pub(super) struct Run<'a> {
@@ -103,26 +100,10 @@ impl<'a> Run<'a> {
             fronts: Vec::with_capacity(world.len()),
             world,
         };
-        run.settle_sensors()?;
+        run.collect_vehicles();
+        let ego = run.vehicles[scenario.ego];
+        settle_sensors(run.perception.as_mut(), scenario, ego, &run.others)?;
         Ok(run)
-    }
-
-    /// Runs the ego's sensors over the time before the start, in which all vehicles keep the speed at which they start.
-    fn settle_sensors(&mut self) -> Result<(), SampleError> {
-        self.collect_vehicles();
-        for scan in (1..=SCANS_BEFORE_START).rev() {
-            let time = CONTROL_STEP * -scan;
-            let before = |vehicle: &SceneVehicle| {
-                let mut vehicle = *vehicle;
-                vehicle.state.s_m += vehicle.state.speed_mps * time.s();
-                vehicle
-            };
-            let others: Vec<SceneVehicle> = self.others.iter().map(before).collect();
-            let ego = before(&self.vehicles[self.scenario.ego]);
-            let (road, environment) = (&self.scenario.road, &self.scenario.environment);
-            self.perception.step(&Scene { time, road, environment, ego, others: &others })?;
-        }
-        Ok(())
     }
 
     /// Returns whether sensors and ego controller act at the current time.

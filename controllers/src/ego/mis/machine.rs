@@ -1,8 +1,9 @@
 //! The state machine of the margin increase system.
 
 use closecall_traffic::metrics::CRITICAL_THW_S;
-use closecall_traffic::{Absent, GRAVITY_MPS2, Time, TrackId};
+use closecall_traffic::{Absent, Time, TrackId};
 
+use super::room::has_room;
 use super::{ArrivalPrediction, BrakingResponse, Encounter, MisPlan, MisSettings};
 use crate::ego::surroundings::{
     Front, PassingLane, RearVehicle, nearest_rear_vehicle, passing_lane, rear_vehicle_from,
@@ -36,17 +37,6 @@ const REASSOCIATION_SPEED_MPS: f64 = 3.0;
 
 /// Speed below which the time headway of the ego is meaningless (m/s).
 const MIN_THW_SPEED_MPS: f64 = 1.0;
-
-/// Delay until braking takes effect: one control step, and twice the lag of the actuators, rounded down (s). An
-/// assumption; 0.2 to 0.5 are plausible.
-const BRAKING_DELAY_S: f64 = 0.3;
-
-/// Braking that the ego is sure to achieve (m/s²): what a wet road allows, with a friction of 0.6 (an assumption; 0.5 to
-/// 0.7 are plausible).
-const ASSURED_BRAKING_MPS2: f64 = 0.6 * GRAVITY_MPS2;
-
-/// Gap to be left behind a standing lead vehicle (m): an assumption; 1 to 5 are plausible.
-const STANDSTILL_GAP_M: f64 = 2.0;
 
 /// Jerk with which braking is released (m/s³): an assumption; 2 to 5 are plausible.
 pub(crate) const BRAKE_RELEASE_JERK_MPS3: f64 = 3.0;
@@ -299,7 +289,9 @@ impl Mis {
             Some(_) if target.rear.is_past(&situation.input.odometry) => Reason::RearPassed,
             Some(_) if now - target.last_seen > LOSS_TIMEOUT => Reason::RearLost,
             Some(_) if (now - since).s() >= self.settings.hold_s => Reason::HoldExpired,
-            Some(lead) if !self.has_room(situation.speed_mps(), lead) => Reason::NoRoomToHold,
+            Some(lead) if !has_room(situation.speed_mps(), lead, self.settings.worst_front_braking_mps2) => {
+                Reason::NoRoomToHold
+            }
             Some(_) => return None,
         };
         Some((State::Releasing, reason))
@@ -315,15 +307,10 @@ impl Mis {
         } else {
             return None;
         };
-        let has_room = situation.lead.is_some_and(|lead| self.has_room(situation.speed_mps(), lead));
+        let has_room = situation
+            .lead
+            .is_some_and(|lead| has_room(situation.speed_mps(), lead, self.settings.worst_front_braking_mps2));
         (has_room && self.settings.hold_s > 0.0).then_some(reason)
-    }
-
-    /// Returns true if the ego can stop behind the lead vehicle in case that brakes at its worst from now on.
-    fn has_room(&self, speed_mps: f64, lead: &Front) -> bool {
-        let lead_stopping_m = lead.speed_mps * lead.speed_mps / (2.0 * self.settings.worst_front_braking_mps2);
-        let own_stopping_m = speed_mps * BRAKING_DELAY_S + speed_mps * speed_mps / (2.0 * ASSURED_BRAKING_MPS2);
-        lead.gap_m + lead_stopping_m - own_stopping_m > STANDSTILL_GAP_M
     }
 
     /// Returns the build-up of the ego's braking from now on.

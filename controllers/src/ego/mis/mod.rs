@@ -127,6 +127,7 @@ mod machine;
 mod plan;
 mod prediction;
 mod response;
+mod room;
 mod solver;
 #[cfg(test)]
 mod tests;
