@@ -7,9 +7,9 @@
 use std::error::Error;
 use std::path::Path;
 
+use closecall::campaign::gate::GateSet;
 use closecall::campaign::plan::Plan;
 use closecall::campaign::runner::Sampling;
-use closecall::campaign::verdict::Gates;
 use closecall::scenarios::sampling::Design;
 use closecall::simulation::controller::ControllerChoice;
 use closecall::simulation::scenario::ScenarioFile;
@@ -21,9 +21,9 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     let scenario = ScenarioFile::load(&library.join("low-thw-overtake.toml"), &[])?;
     let sampling = Sampling { seed: 1, design: Design::Random, samples: 20 };
     let plan = Plan::new(vec![scenario], sampling, vec![ControllerChoice::Acc, ControllerChoice::Mis])?;
-    let summary = plan.campaign().count()?;
+    let gates = GateSet::of(["count(induced) <= 1".parse()?]);
+    let (summary, judged) = plan.campaign().judge(&gates)?;
     let pairs = summary.total().pairs;
-    let judged = summary.judge(Gates { max_induced: Some(1), ..Gates::default() });
-    println!("{} prevented, {} induced: {}", pairs.prevented, pairs.induced, judged.verdict);
+    println!("{} prevented, {} induced: {}", pairs.prevented, pairs.induced, judged.word());
     Ok(())
 }

@@ -9,7 +9,6 @@
 //! is close behind, like a driver that feels pressed. It does not predict when the rear vehicle arrives, and is therefore
 //! no substitute for the margin increase system.
 
-use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::thread::available_parallelism;
@@ -17,7 +16,7 @@ use std::time::Duration;
 
 use closecall_campaign::execution::{Campaign, CampaignError};
 use closecall_campaign::runner::{Sampling, Work};
-use closecall_campaign::summary::{Counts, Summary};
+use closecall_campaign::summary::Counts;
 use closecall_campaign::validity::CheckPlan;
 use closecall_campaign::workers::Workers;
 use closecall_controllers::{

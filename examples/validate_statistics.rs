@@ -21,7 +21,6 @@ use closecall_campaign::execution::{Campaign, CampaignError, End};
 use closecall_campaign::ledger::{ArmCounts, Inference};
 use closecall_campaign::probability::{Answer, ProbabilityGate};
 use closecall_campaign::runner::{Sampling, Work};
-use closecall_campaign::summary::Summary;
 use closecall_campaign::validity::CheckPlan;
 use closecall_campaign::workers::Workers;
 use closecall_scenarios::sampling::Design;

@@ -16,6 +16,8 @@ use closecall_simulation::scenario::ScenarioError;
 /// | 5 | sample error | at least one sample ended in an error |
 /// | 6 | i/o | a file or folder cannot be read or written |
 /// | 7 | invalid | a validity check of the simulator failed |
+/// | 130 | interrupted | Ctrl-C (SIGINT) ended the command |
+/// | 143 | terminated | SIGTERM ended the command |
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum ExitCode {
@@ -35,10 +37,16 @@ pub enum ExitCode {
     Io = 6,
     /// A validity check of the simulator failed.
     Invalid = 7,
+    /// Ctrl-C ended the command: 128 plus the number of SIGINT.
+    Interrupted = 130,
+    /// SIGTERM ended the command: 128 plus its number.
+    Terminated = 143,
 }
 
 /// The exit codes in the order of precedence: if several apply, the first one is returned.
-const PRECEDENCE: [ExitCode; 7] = [
+const PRECEDENCE: [ExitCode; 9] = [
+    ExitCode::Interrupted,
+    ExitCode::Terminated,
     ExitCode::Io,
     ExitCode::InvalidInput,
     ExitCode::SampleError,
@@ -68,6 +76,7 @@ impl From<&ScenarioError> for ExitCode {
             ScenarioError::Set { .. } => Self::Usage,
             ScenarioError::Read { .. } => Self::Io,
             ScenarioError::NotText { .. }
+            | ScenarioError::TooLarge { .. }
             | ScenarioError::Empty { .. }
             | ScenarioError::Syntax { .. }
             | ScenarioError::Value { .. } => Self::InvalidInput,
@@ -78,9 +87,9 @@ impl From<&ScenarioError> for ExitCode {
 impl From<&Judgement> for ExitCode {
     fn from(judged: &Judgement) -> Self {
         match judged.decision {
-            Decision::Pass => Self::Pass,
+            Decision::Pass | Decision::Measured => Self::Pass,
             Decision::Fail => Self::Fail,
-            Decision::Inconclusive => Self::Inconclusive,
+            Decision::Inconclusive | Decision::NotJudged => Self::Inconclusive,
             Decision::SampleError => Self::SampleError,
             Decision::Invalid => Self::Invalid,
         }

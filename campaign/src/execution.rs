@@ -6,11 +6,15 @@ use std::sync::Arc;
 use closecall_scenarios::atomic::WriteError;
 
 use super::folder::{FolderError, LockedFolder, ResumedFiles, TornLine};
+use super::gate::{GateSet, Judge};
 use super::ledger::Inference;
 use super::partition::Partition;
 use super::record::Record;
+use super::repair::{Repair, key_of, repair};
 use super::runner::Work;
+use super::stop::StopFlag;
 use super::summary::Summary;
+use super::verdict::{self, Judgement};
 use super::wall_times::WallTime;
 use super::workers::{Finished, Workers, WorkersError};
 
@@ -25,6 +29,21 @@ pub struct Campaign {
     pub workers: Workers,
     /// What determines the number of samples.
     pub inference: Inference,
+    /// True if samples of the journal that ended in an error are run again.
+    pub retry_errors: bool,
+    /// A request from outside to start no further samples.
+    pub stop: StopFlag,
+}
+
+/// What was found in the journal of a campaign that goes on.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ResumeReport {
+    /// The line at which the journal was cut off: it and everything after it was damaged.
+    pub torn: Option<TornLine>,
+    /// Damaged lines before intact ones. Their samples were run again, and all other lines were kept.
+    pub damaged: Vec<TornLine>,
+    /// Number of samples that had ended in an error, and were run again.
+    pub retried: u64,
 }
 
 /// An error that ends a campaign. The journal stays usable, and the campaign can be resumed from it.
@@ -64,7 +83,8 @@ pub struct NextRecord<'a> {
 impl Campaign {
     /// Returns a campaign that runs every sample of the given scenarios.
     pub fn new(works: Vec<Arc<Work>>, workers: Workers) -> Self {
-        Self { works, partition: None, workers, inference: Inference::default() }
+        let (inference, stop) = (Inference::default(), StopFlag::default());
+        Self { works, partition: None, workers, inference, retry_errors: false, stop }
     }
 
     /// Returns a summary of no samples yet.
@@ -85,6 +105,22 @@ impl Campaign {
         Ok(summary)
     }
 
+    /// Runs every sample, keeps nothing but the counts, and judges them.
+    ///
+    /// # Errors
+    /// [`CampaignError::Workers`] if no threads can be started.
+    pub fn judge(&self, gates: &GateSet) -> Result<(Summary, Judgement), CampaignError> {
+        let mut summary = self.summary();
+        let mut judge = Judge::new(&self.works, gates, self.inference);
+        self.run(None, |next| {
+            summary.push(next.record);
+            judge.push(next.record);
+            ControlFlow::Continue(())
+        })?;
+        let judged = verdict::judge(&summary, &judge, gates.max_flip_rate);
+        Ok((summary, judged))
+    }
+
     /// Returns the number of samples of all scenarios.
     pub fn len(&self) -> u64 {
         self.works.iter().map(|work| work.samples(self.partition).count() as u64).sum()
@@ -100,7 +136,9 @@ impl Campaign {
     /// `on_record` receives every record in the order of the plan, those of the journal first. If it breaks, the
     /// scenario or the campaign ends after that record.
     ///
-    /// Returns the line at which the journal was cut off, if it was damaged.
+    /// If [`Self::stop`] is set, no further sample starts, and the campaign ends with the samples that are done.
+    ///
+    /// Returns what was found in the journal.
     ///
     /// # Errors
     /// [`CampaignError`] if the folder cannot be read or written, or no threads can be started.
@@ -108,7 +146,19 @@ impl Campaign {
         &self,
         folder: Option<&LockedFolder>,
         mut on_record: impl FnMut(NextRecord<'_>) -> ControlFlow<End>,
-    ) -> Result<Option<TornLine>, CampaignError> {
+    ) -> Result<ResumeReport, CampaignError> {
+        let Repair { damaged, retried } = folder.map(|folder| repair(self, folder)).transpose()?.unwrap_or_default();
+        let mut report = ResumeReport { torn: None, damaged, retried };
+        if let Some(folder) = folder.filter(|folder| self.stop.is_set() && folder.journal_path().exists()) {
+            // Damaged lines may be left: the journal is read, but not opened for appending, which would cut it.
+            for record in folder.folder.records()?.map_while(Result::ok) {
+                let Some((work, _)) = key_of(self, &record) else { break };
+                if on_record(NextRecord { work, record: &record, is_new: false }).is_break() {
+                    break;
+                }
+            }
+            return Ok(report);
+        }
         let mut position = Position { work: 0, done: 0, total: 0, is_over: false };
         let mut files = match folder {
             Some(folder) => Some(self.resume(folder, &mut position, &mut on_record)?),
@@ -121,7 +171,8 @@ impl Campaign {
             journal.sync()?;
             wall_times.flush()?;
         }
-        Ok(files.and_then(|files| files.torn))
+        report.torn = files.and_then(|files| files.torn);
+        Ok(report)
     }
 
     /// Passes on the records of the journal, and moves `position` behind the last one.
@@ -170,7 +221,7 @@ impl Campaign {
         for (number, work) in self.works.iter().enumerate().skip(start.work) {
             let done = if number == start.work { start.done } else { 0 };
             let samples = work.samples(self.partition).skip(done);
-            self.workers.run(work, samples, |finished: Finished| {
+            self.workers.run(work, samples, &self.stop, |finished: Finished| {
                 if let Some(files) = files.as_deref_mut() {
                     append(files, index, &finished)?;
                 }
@@ -180,7 +231,7 @@ impl Campaign {
                 is_over = end == Some(End::Campaign);
                 Ok::<_, CampaignError>(if end.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
             })?;
-            if is_over {
+            if is_over || self.stop.is_set() {
                 break;
             }
         }

@@ -189,6 +189,16 @@ impl Folder {
 }
 
 impl LockedFolder {
+    /// Returns the path of the journal.
+    pub(super) fn journal_path(&self) -> PathBuf {
+        self.folder.file(JOURNAL)
+    }
+
+    /// Returns the path of the file of wall times.
+    pub(super) fn wall_times_path(&self) -> PathBuf {
+        self.folder.file(WALL_TIMES)
+    }
+
     /// Hands each existing record to `is_expected`, and opens the journal for appending behind the last one. A torn
     /// line is cut off together with everything after it: those samples run again.
     ///

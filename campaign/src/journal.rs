@@ -8,8 +8,8 @@
 //!
 //! Each line is handed to the operating system in one write. A program that is killed therefore leaves at most the last
 //! line incomplete. Once a second the journal is synchronised to the disk, so that a machine that fails loses about one
-//! second of results. The checksum reveals an incomplete or damaged line. That line and everything after it are cut
-//! off, and their samples run again: the same samples give the same lines.
+//! second of results. The checksum reveals an incomplete or damaged line. The
+//! samples of such lines run again, and the same samples give the same lines.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
@@ -68,7 +68,7 @@ impl Journal {
     }
 }
 
-fn line(record: &Record) -> io::Result<Vec<u8>> {
+pub(super) fn line(record: &Record) -> io::Result<Vec<u8>> {
     let mut line = vec![b'0'; CHECKSUM_DIGITS];
     line.push(b' ');
     serde_json::to_writer(&mut line, record)?;
@@ -157,7 +157,7 @@ impl Entries {
     }
 }
 
-fn parse(line: &[u8]) -> Result<Record, String> {
+pub(super) fn parse(line: &[u8]) -> Result<Record, String> {
     let Some(line) = line.strip_suffix(b"\n") else { return Err("the line is incomplete".to_owned()) };
     let (Some(sum), Some(b' '), Some(record)) =
         (line.get(..CHECKSUM_DIGITS), line.get(CHECKSUM_DIGITS), line.get(CHECKSUM_DIGITS + 1..))

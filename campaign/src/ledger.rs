@@ -1,4 +1,4 @@
-//! Counts over the samples of a campaign, with how sure they are.
+//! Counts over the samples of a campaign, with their confidence intervals.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,19 +8,19 @@ use closecall_statistics::{interval, mcnemar, sequence};
 /// Share of repetitions in which a reported interval covers the true probability, at least.
 const COVERAGE: f64 = 0.95;
 
-/// What the number of samples came from: which bounds of a probability hold.
+/// The rule that determines the number of samples. It decides which bounds of a probability are valid.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Inference {
-    /// It was fixed in advance: exact intervals (Clopper–Pearson).
+    /// The number is fixed in advance: exact intervals (Clopper–Pearson).
     #[default]
     FixedSamples,
-    /// It came from the outcomes or the clock: a confidence sequence, valid however one stops.
+    /// The number follows from the outcomes or the clock: a confidence sequence, valid for every stopping rule.
     Sequential,
 }
 
 impl Inference {
-    /// The one-sided upper bound of a probability.
+    /// Returns the one-sided upper bound of a probability.
     pub fn upper_bound(self, hits: u64, samples: u64, confidence: f64) -> f64 {
         match self {
             Self::FixedSamples => interval::upper_bound(hits, samples, confidence),
@@ -28,7 +28,7 @@ impl Inference {
         }
     }
 
-    /// The one-sided lower bound of a probability.
+    /// Returns the one-sided lower bound of a probability.
     pub fn lower_bound(self, hits: u64, samples: u64, confidence: f64) -> f64 {
         match self {
             Self::FixedSamples => interval::lower_bound(hits, samples, confidence),
@@ -36,7 +36,7 @@ impl Inference {
         }
     }
 
-    /// The two-sided interval at 95 %.
+    /// Returns the two-sided interval at 95 %.
     pub fn interval_95(self, hits: u64, samples: u64) -> [f64; 2] {
         match self {
             Self::FixedSamples => interval::clopper_pearson(hits, samples, COVERAGE),
@@ -44,7 +44,7 @@ impl Inference {
         }
     }
 
-    /// The name of the method, for reports.
+    /// Returns the name of the method, for reports.
     pub const fn method(self) -> &'static str {
         match self {
             Self::FixedSamples => "clopper-pearson",
@@ -58,47 +58,47 @@ impl Inference {
 pub struct ArmCounts {
     /// Samples with an outcome.
     pub outcomes: u64,
-    /// Samples in which E collided, as judged: where the validity checks flipped a verdict, the one that speaks worse
-    /// for the system under test.
+    /// Samples in which the ego collides, as judged: if the validity checks flip a verdict, the one that speaks worse for
+    /// the system under test.
     pub collisions: u64,
     /// Samples that ended in an error.
     pub errors: u64,
-    /// Samples in which the margin increase system engaged.
+    /// Samples in which the margin increase system engages.
     pub engagements: u64,
-    /// Engagements whose goal was in reach.
+    /// Engagements whose goal is in reach.
     pub goals_in_reach: u64,
-    /// Most by which E was slower than the vehicle ahead in any sample [m/s].
+    /// Largest speed deficit of the ego to the lead vehicle in any sample (m/s).
     pub max_speed_deficit_mps: f64,
-    /// Largest jerk of E in any sample, before any collision of its own [m/s³].
+    /// Largest jerk of the ego in any sample, before any collision of its own (m/s³).
     pub max_jerk_mps3: f64,
-    /// Largest change of velocity of E in any sample [m/s].
+    /// Largest change of the ego's velocity in any sample (m/s).
     pub max_delta_v_mps: f64,
-    /// Harm of all samples: see [`super::harm`].
+    /// Sum of the harm of all samples: see [`super::harm`].
     pub harm: f64,
 }
 
-/// What came of one sample in one arm.
+/// The result of one sample in one arm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tally {
-    /// Whether E collided, as judged; nothing where the sample ended in an error.
+    /// Whether the ego collides, as judged; `None` if the sample ended in an error.
     pub collided: Option<bool>,
-    /// Whether the margin increase system engaged.
+    /// Whether the margin increase system engages.
     pub engaged: bool,
-    /// Whether its goal was in reach when it did.
+    /// Whether its goal is in reach when it engages.
     pub goal_in_reach: bool,
-    /// Most by which E was slower than the vehicle ahead [m/s].
+    /// Largest speed deficit of the ego to the lead vehicle (m/s).
     pub speed_deficit_mps: f64,
-    /// Largest jerk of E [m/s³].
+    /// Largest jerk of the ego (m/s³).
     pub jerk_mps3: f64,
-    /// Largest change of velocity of E [m/s].
+    /// Largest change of the ego's velocity (m/s).
     pub delta_v_mps: f64,
-    /// Harm of the collisions, E's and others'.
+    /// Harm of all collisions, those of the ego and those of others.
     pub harm: f64,
 }
 
 impl ArmCounts {
-    /// Takes in one sample.
-    pub fn take(&mut self, tally: Tally) {
+    /// Adds one sample.
+    pub fn push(&mut self, tally: Tally) {
         match tally.collided {
             Some(collided) => {
                 self.outcomes += 1;
@@ -114,7 +114,7 @@ impl ArmCounts {
         self.harm += tally.harm;
     }
 
-    /// Adds the counts of another campaign.
+    /// Adds the counts of other samples.
     pub fn add(&mut self, other: &Self) {
         self.outcomes += other.outcomes;
         self.collisions += other.collisions;
@@ -127,12 +127,12 @@ impl ArmCounts {
         self.harm += other.harm;
     }
 
-    /// Share of the samples with an outcome in which E collided; nothing of no samples.
+    /// Returns the share of the samples with an outcome in which the ego collides; `None` of no samples.
     pub fn collision_rate(&self) -> Option<f64> {
         self.share(self.collisions)
     }
 
-    /// Share of the samples with an outcome in which the system engaged; nothing of no samples.
+    /// Returns the share of the samples with an outcome in which the system engages; `None` of no samples.
     pub fn engagement_rate(&self) -> Option<f64> {
         self.share(self.engagements)
     }
@@ -141,7 +141,7 @@ impl ArmCounts {
         (self.outcomes > 0).then(|| count as f64 / self.outcomes as f64)
     }
 
-    /// The interval of the probability of a collision, given the sampled scenario.
+    /// Returns the 95 % interval of the probability of a collision, given the sampled scenario.
     pub fn interval_95(&self, inference: Inference) -> [f64; 2] {
         inference.interval_95(self.collisions, self.outcomes)
     }
@@ -150,23 +150,23 @@ impl ArmCounts {
 /// Pairs of the same sample without and with the system under test.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pairs {
-    /// Collision without it, none with it.
+    /// Collision without the system, none with it.
     pub prevented: u64,
-    /// None without it, collision with it.
+    /// No collision without the system, collision with it.
     pub induced: u64,
     /// Collision either way.
     pub both: u64,
     /// No collision either way.
     pub neither: u64,
-    /// Harm that was less with it, over the samples in which it was less.
+    /// Harm saved by the system, over the samples in which it saves harm.
     pub prevented_harm: f64,
-    /// Harm that was more with it, over the samples in which it was more.
+    /// Harm added by the system, over the samples in which it adds harm.
     pub induced_harm: f64,
 }
 
 impl Pairs {
-    /// Takes in one pair that has both outcomes.
-    pub fn take(&mut self, baseline: &Tally, tested: &Tally) {
+    /// Adds one pair. A pair without both outcomes does not count.
+    pub fn push(&mut self, baseline: &Tally, tested: &Tally) {
         match (baseline.collided, tested.collided) {
             (Some(true), Some(false)) => self.prevented += 1,
             (Some(false), Some(true)) => self.induced += 1,
@@ -182,7 +182,7 @@ impl Pairs {
         }
     }
 
-    /// Adds the pairs of another campaign.
+    /// Adds other pairs.
     pub fn add(&mut self, other: &Self) {
         self.prevented += other.prevented;
         self.induced += other.induced;
@@ -192,8 +192,8 @@ impl Pairs {
         self.induced_harm += other.induced_harm;
     }
 
-    /// How rare a split at least as uneven would be if the arms were alike (exact McNemar test, two-sided). It holds for
-    /// a number of samples that was fixed in advance alone.
+    /// Returns the probability of a split at least as uneven if the arms are alike (exact McNemar test, two-sided). It is
+    /// valid only for a number of samples that is fixed in advance; `None` otherwise.
     pub fn mcnemar_p(&self, inference: Inference) -> Option<f64> {
         (inference == Inference::FixedSamples).then(|| mcnemar::two_sided_p(self.prevented, self.induced))
     }
@@ -206,7 +206,7 @@ mod tests {
     #[test]
     fn an_error_is_never_a_pass() {
         let mut counts = ArmCounts::default();
-        counts.take(Tally { collided: None, ..Tally::default() });
+        counts.push(Tally { collided: None, ..Tally::default() });
         assert_eq!((counts.outcomes, counts.errors), (0, 1));
         assert_eq!(counts.collision_rate(), None);
     }
@@ -215,7 +215,7 @@ mod tests {
     fn what_is_not_a_number_stays_the_worst() {
         let mut counts = ArmCounts::default();
         for jerk_mps3 in [3.0, f64::NAN, 5.0] {
-            counts.take(Tally { collided: Some(false), jerk_mps3, ..Tally::default() });
+            counts.push(Tally { collided: Some(false), jerk_mps3, ..Tally::default() });
         }
         assert!(counts.max_jerk_mps3.is_nan());
     }
@@ -224,9 +224,9 @@ mod tests {
     fn pairs_weigh_harm_apart_from_counts() {
         let tally = |collided, harm| Tally { collided: Some(collided), harm, ..Tally::default() };
         let mut pairs = Pairs::default();
-        pairs.take(&tally(true, 0.5), &tally(false, 0.0));
-        pairs.take(&tally(true, 0.25), &tally(true, 1.0));
-        pairs.take(&tally(false, 0.0), &Tally::default());
+        pairs.push(&tally(true, 0.5), &tally(false, 0.0));
+        pairs.push(&tally(true, 0.25), &tally(true, 1.0));
+        pairs.push(&tally(false, 0.0), &Tally::default());
         assert_eq!((pairs.prevented, pairs.induced, pairs.both, pairs.neither), (1, 0, 1, 0));
         assert_eq!((pairs.prevented_harm, pairs.induced_harm), (0.5, 0.75));
         assert_eq!(pairs.mcnemar_p(Inference::FixedSamples), Some(1.0));

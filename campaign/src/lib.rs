@@ -15,11 +15,13 @@
 //! Rates are conditional on the sampled scenario: they are the share of *sampled encounters* that end in a collision,
 //! not the frequency of collisions on a road.
 
+pub mod baseline;
 pub mod compare;
 pub mod execution;
+pub mod fingerprint;
 pub mod folder;
 mod folder_error;
-pub mod harm;
+pub mod gate;
 pub mod journal;
 pub mod ledger;
 pub mod lock;
@@ -29,6 +31,7 @@ pub mod partition;
 pub mod plan;
 pub mod probability;
 pub mod record;
+mod repair;
 pub mod runner;
 pub mod saved;
 pub mod selection;
@@ -38,3 +41,5 @@ pub mod validity;
 pub mod verdict;
 pub mod wall_times;
 pub mod workers;
+
+pub use closecall_simulation::harm;

@@ -2,14 +2,16 @@
 
 use std::fs::File;
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use closecall_sensors::SensorMode;
 use closecall_simulation::Arm;
 use closecall_simulation::controller::ControllerChoice;
+use closecall_simulation::scenario::Scenario;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use super::fingerprint::{self, Fingerprint};
 use super::ledger::Inference;
 use super::partition::Partition;
 use super::runner::Sampling;
@@ -87,12 +89,18 @@ pub struct Manifest {
     pub models: Vec<ManifestModel>,
     /// Longest wall time of a sample in one arm (s).
     pub sample_timeout_s: f64,
+    /// What identifies the controllers that run as processes.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub controllers: Vec<Fingerprint>,
+    /// The folder in which the program ran, to which paths in the command of a controller are relative.
+    #[serde(default)]
+    pub working_folder: Option<PathBuf>,
     /// The command line.
     pub command: Vec<String>,
 }
 
-/// Keys of a manifest that do not affect the outcomes.
-const INCIDENTAL: [&str; 2] = ["command", "path"];
+/// Keys of a manifest that do not affect the outcomes, or whose differences are worded elsewhere.
+const INCIDENTAL: [&str; 4] = ["command", "path", "working_folder", "controllers"];
 
 impl Manifest {
     /// Returns one message for each difference between the two manifests that can affect outcomes. If there is none,
@@ -104,12 +112,49 @@ impl Manifest {
             // Every manifest can be written as JSON; if one could not, the two could not be known to agree.
             _ => differences.push("the manifest cannot be compared".to_owned()),
         }
+        differences.extend(fingerprint::differences(&self.controllers, &other.controllers));
         differences
+    }
+
+    /// Returns the manifest as JSON without what does not affect the outcomes: the command line, the paths of the
+    /// scenario files, the partition, and the hash of the executable. It is the same for a campaign that ran in one go,
+    /// in parts or with interruptions. Returns `None` if it cannot be written as JSON.
+    pub fn determining_json(&self) -> Option<String> {
+        let mut whole = self.whole();
+        if let Some(end) = whole.closecall_version.find('+') {
+            whole.closecall_version.truncate(end);
+        }
+        let mut value = serde_json::to_value(whole).ok()?;
+        value.as_object_mut()?.remove("command");
+        for scenario in value.get_mut("scenarios")?.as_array_mut()? {
+            scenario.as_object_mut()?.remove("path");
+        }
+        serde_json::to_string(&value).ok()
+    }
+
+    /// Returns the folder in which the controllers of the campaign run, or `None` if it no longer exists.
+    pub fn controller_folder(&self) -> Option<&Path> {
+        self.working_folder.as_deref().filter(|folder| folder.is_dir())
+    }
+
+    /// Returns one message for each difference between the controllers of the campaign and those that its commands start
+    /// now.
+    pub fn changed_controllers(&self, scenario: &Scenario) -> Vec<String> {
+        let now = self.arms.iter().filter_map(|arm| match arm {
+            ControllerChoice::Exec(settings) => {
+                Some(Fingerprint::of(settings, self.controller_folder(), Some(scenario)))
+            }
+            ControllerChoice::Acc | ControllerChoice::Mis => None,
+        });
+        fingerprint::differences(&self.controllers, &now.collect::<Vec<_>>())
     }
 
     /// Returns the arms, the baseline first.
     pub fn arms(&self) -> Vec<Arm> {
-        let arm = |controller: &ControllerChoice| Arm { controller: controller.factory(), sensors: self.sensors };
+        let arm = |controller: &ControllerChoice| Arm {
+            controller: controller.factory_in(self.controller_folder()),
+            sensors: self.sensors,
+        };
         self.arms.iter().map(arm).collect()
     }
 
@@ -186,6 +231,8 @@ mod tests {
             inference: Inference::default(),
             models: Vec::new(),
             sample_timeout_s: 300.0,
+            controllers: Vec::new(),
+            working_folder: None,
             command: vec!["closecall".to_owned()],
         }
     }
@@ -196,6 +243,8 @@ mod tests {
         other.command.push("--jobs=2".to_owned());
         other.scenarios[0].path = "b.toml".to_owned();
         assert_eq!(manifest().differences(&other), Vec::<String>::new());
+        other.partition = Some("1/3".parse().unwrap());
+        assert_eq!(manifest().determining_json(), other.determining_json());
     }
 
     #[test]

@@ -14,13 +14,16 @@ use closecall_sensors::{SensorMode, inference_backend};
 use closecall_simulation::Arm;
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::scenario::ScenarioFile;
+use closecall_traffic::Choice;
 
 use crate::execution::Campaign;
+use crate::fingerprint::Fingerprint;
 use crate::folder::FolderError;
 use crate::ledger::Inference;
 use crate::manifest::{MANIFEST_VERSION, Manifest, ManifestModel, ManifestScenario, file_hash, version};
 use crate::partition::Partition;
 use crate::runner::{Sampling, Work};
+use crate::stop::StopFlag;
 use crate::validity::CheckPlan;
 use crate::workers::Workers;
 
@@ -101,7 +104,29 @@ impl Plan {
             partition: self.partition,
             workers: self.workers,
             inference: self.inference,
+            retry_errors: false,
+            stop: StopFlag::default(),
         }
+    }
+
+    /// Returns true if some sample may need the rear camera's network.
+    pub fn uses_classifier(&self) -> bool {
+        let may_be_full = |file: &ScenarioFile| match (self.sensors, &file.config().sensors.mode) {
+            (Some(mode), _) => mode == SensorMode::Full,
+            (None, Choice::Fixed(mode)) => *mode == SensorMode::Full,
+            (None, Choice::Parameter(_)) => true,
+        };
+        self.scenarios.iter().any(may_be_full)
+    }
+
+    /// Returns what identifies the controllers that run as processes.
+    fn fingerprints(&self) -> Vec<Fingerprint> {
+        let nominal = self.scenarios.first().and_then(|file| file.concrete(&file.space().nominal()).ok());
+        let exec = |controller: &ControllerChoice| match controller {
+            ControllerChoice::Exec(settings) => Some(Fingerprint::of(settings, None, nominal.as_ref())),
+            ControllerChoice::Acc | ControllerChoice::Mis => None,
+        };
+        self.controllers.iter().filter_map(exec).collect()
     }
 
     /// Returns the manifest of the campaign. `command` is the command line that started it.
@@ -125,7 +150,9 @@ impl Plan {
             sensors: self.sensors,
             checks: self.checks,
             inference: self.inference,
-            models: vec![rear_classifier()?],
+            models: if self.uses_classifier() { vec![rear_classifier()?] } else { Vec::new() },
+            controllers: self.fingerprints(),
+            working_folder: std::env::current_dir().ok(),
             sample_timeout_s: self.workers.sample_timeout.as_secs_f64(),
             command,
         })
@@ -137,7 +164,7 @@ fn rear_classifier() -> Result<ManifestModel, FolderError> {
     let backend = match inference_backend() {
         Backend::Tract => "tract".to_owned(),
         Backend::OnnxRuntime(library) => {
-            let hash = file_hash(&library).map_err(|source| FolderError::Read { path: library.clone(), source })?;
+            let hash = file_hash(library).map_err(|source| FolderError::Read { path: library.clone(), source })?;
             format!("onnxruntime, blake3 {hash}")
         }
     };

@@ -44,6 +44,9 @@ pub enum GateError {
 }
 
 impl ProbabilityGate {
+    /// Confidence unless another is asked for (-).
+    pub const CONFIDENCE: f64 = 0.95;
+
     /// A gate at `max`, between 0 and 1, with a confidence between ½ and 1.
     ///
     /// # Errors

@@ -4,9 +4,9 @@ use closecall_simulation::SampleError;
 use closecall_simulation::outcome::Outcome;
 use serde::{Deserialize, Serialize};
 
-use super::harm::harm;
 use super::ledger::Tally;
 use super::validity::ArmChecks;
+use closecall_simulation::harm::harm;
 
 /// The reason for which a sample has no outcome.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]

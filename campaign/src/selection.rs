@@ -5,7 +5,8 @@
 //! ```
 //!
 //! - *worst*: the samples with the hardest collisions of the ego, then those with the smallest time headways;
-//! - *failures*: the first samples in which the ego collided;
+//! - *failures*: the first samples in which the ego collided. Those that the system induced, in which the ego of the
+//!   baseline did not collide, precede all others;
 //! - *random*: samples drawn at random, which show the usual case.
 //!
 //! All of this refers to the arm under test, and the counts are for each scenario. A count alone is the count of
@@ -84,6 +85,8 @@ struct Severity {
     delta_v_mps: Option<f64>,
     /// Smallest time headway in front of and behind the ego (s).
     thw_s: f64,
+    /// True if the ego of the baseline did not collide.
+    is_safe_in_baseline: bool,
 }
 
 /// Selects samples of one scenario, whose records are passed to it one by one.
@@ -102,7 +105,11 @@ impl Chooser {
     /// Adds a sample. A sample that ended in an error is left out, since it cannot be recorded.
     pub fn push(&mut self, record: &Record) {
         if let Some(ArmRecord { result: Ok(outcome), .. }) = record.arms.last() {
-            self.samples.push(severity(record.sample, outcome));
+            let is_safe_in_baseline = match &record.arms[..] {
+                [baseline, _] => baseline.result.as_ref().is_ok_and(|outcome| !outcome.ego_collided()),
+                _ => false,
+            };
+            self.samples.push(Severity { is_safe_in_baseline, ..severity(record.sample, outcome) });
         }
     }
 
@@ -119,7 +126,10 @@ impl Chooser {
         let mut worst: Vec<&Severity> = self.samples.iter().collect();
         worst.sort_by(|a, b| compare(b, a));
         worst.iter().take(count(self.selection.worst)).for_each(|severity| add(severity.sample, "worst"));
-        let failures = self.samples.iter().filter(|severity| severity.delta_v_mps.is_some());
+        let all = self.samples.iter().filter(|severity| severity.delta_v_mps.is_some());
+        let (induced, others): (Vec<&Severity>, Vec<&Severity>) =
+            all.partition(|severity| severity.is_safe_in_baseline);
+        let failures = induced.into_iter().chain(others);
         failures.take(count(self.selection.failures)).for_each(|severity| add(severity.sample, "failure"));
         let mut left: Vec<u64> = self.samples.iter().map(|severity| severity.sample).collect();
         let mut rng = stream(seed, 0, ego, CHANNEL);
@@ -137,7 +147,7 @@ fn severity(sample: u64, outcome: &Outcome) -> Severity {
     let finite = |value: Measured| value.ok().filter(|value| value.is_finite());
     let margins = [outcome.margins.min_thw_front_s, outcome.margins.min_thw_rear_s];
     let thw_s = margins.into_iter().filter_map(finite).fold(f64::INFINITY, f64::min);
-    Severity { sample, delta_v_mps: outcome.ego_delta_v_mps(), thw_s }
+    Severity { sample, delta_v_mps: outcome.ego_delta_v_mps(), thw_s, is_safe_in_baseline: false }
 }
 
 /// Compares by the change of velocity, then by the time headway. Of two equal samples the earlier one is the worse.
@@ -165,7 +175,13 @@ mod tests {
 
     fn chooser(selection: Selection, samples: &[(Option<f64>, f64)]) -> Chooser {
         let samples = samples.iter().zip(0..);
-        let samples = samples.map(|(&(delta_v_mps, thw_s), sample)| Severity { sample, delta_v_mps, thw_s }).collect();
+        let severity = |(&(delta_v_mps, thw_s), sample): (&(Option<f64>, f64), u64)| Severity {
+            sample,
+            delta_v_mps,
+            thw_s,
+            is_safe_in_baseline: false,
+        };
+        let samples = samples.map(severity).collect();
         Chooser { selection, samples }
     }
 
@@ -177,6 +193,18 @@ mod tests {
         let numbers: Vec<u64> = chosen.iter().map(|chosen| chosen.sample).collect();
         assert_eq!(numbers, [3, 1, 2]);
         assert_eq!(chosen[1].reasons, ["worst", "failure"]);
+    }
+
+    #[test]
+    fn induced_failures_precede_all_others() {
+        let mut chooser = chooser(
+            Selection { worst: 0, failures: 2, random: 0 },
+            &[(Some(9.0), 0.1), (Some(2.0), 0.1), (Some(1.0), 0.1)],
+        );
+        chooser.samples[2].is_safe_in_baseline = true;
+        let chosen = chooser.choose(0, &ActorId::new("ego").unwrap());
+        let numbers: Vec<u64> = chosen.iter().map(|chosen| chosen.sample).collect();
+        assert_eq!(numbers, [2, 0]);
     }
 
     #[test]

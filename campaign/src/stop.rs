@@ -1,11 +1,29 @@
 //! The rule by which a campaign stops before its last sample.
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use crate::execution::End;
 use crate::ledger::ArmCounts;
 use crate::probability::ProbabilityGate;
+
+/// A request from outside to start no further samples. Clones share the request.
+#[derive(Clone, Debug, Default)]
+pub struct StopFlag(Arc<AtomicBool>);
+
+impl StopFlag {
+    /// Requests the stop.
+    pub fn set(&self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+
+    /// Returns true if the stop was requested.
+    pub fn is_set(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+}
 
 /// When a campaign stops early.
 #[derive(Clone, Copy, Debug)]

@@ -1,4 +1,4 @@
-//! What a campaign comes to: the counts of each scenario and of all.
+//! The counts of a campaign: of each scenario, and of all together.
 
 use std::sync::Arc;
 
@@ -8,22 +8,21 @@ use super::ledger::{ArmCounts, Inference, Pairs};
 use super::record::Record;
 use super::runner::Work;
 use super::validity::CheckCounts;
-use super::verdict::{Evidence, Gates, Judgement};
 
 /// The counts of one scenario, or of all.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Counts {
-    /// The counts of each arm, the baseline first where the campaign is paired.
+    /// The counts of each arm, the baseline first if the campaign is paired.
     pub arms: Vec<ArmCounts>,
     /// Pairs of baseline and tested arm.
     pub pairs: Pairs,
     /// Samples that were run.
     pub samples: u64,
-    /// Samples in which a validity check made a difference where none may be.
+    /// Samples in which a validity check made a difference that it must not make.
     pub invalid: u64,
     /// What the validity checks found.
     pub checks: CheckCounts,
-    /// Simulated time of all runs [s].
+    /// Simulated time of all runs (s).
     pub simulated_s: f64,
 }
 
@@ -35,10 +34,10 @@ impl Counts {
     fn push(&mut self, record: &Record) {
         let tallies = record.tallies();
         for (counts, tally) in self.arms.iter_mut().zip(&tallies) {
-            counts.take(*tally);
+            counts.push(*tally);
         }
         if let [baseline, tested] = &tallies[..] {
-            self.pairs.take(baseline, tested);
+            self.pairs.push(baseline, tested);
         }
         for arm in &record.arms {
             let Ok(outcome) = &arm.result else { continue };
@@ -62,20 +61,20 @@ impl Counts {
         self.simulated_s += other.simulated_s;
     }
 
-    /// Errors in any arm.
+    /// Returns the number of errors, in any arm.
     pub fn errors(&self) -> u64 {
         self.arms.iter().map(|arm| arm.errors).sum()
     }
 }
 
-/// What a campaign comes to.
+/// The counts of a campaign.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Summary {
     /// The controllers, in the order of the arms.
     pub controllers: Vec<String>,
     /// The counts of each scenario, by name.
     pub scenarios: Vec<(String, Counts)>,
-    /// What the numbers of samples came from.
+    /// What determines the numbers of samples.
     pub inference: Inference,
 }
 
@@ -95,7 +94,7 @@ impl Summary {
         Self::new(controllers, works.iter().map(|work| work.file.config().name.clone()))
     }
 
-    /// The same, where the numbers of samples come from something else.
+    /// Returns the same summary for another rule that determines the numbers of samples.
     #[must_use]
     pub fn with_inference(self, inference: Inference) -> Self {
         Self { inference, ..self }
@@ -113,7 +112,7 @@ impl Summary {
         self.scenarios.iter().find(|(name, _)| name == scenario)?.1.arms.last()
     }
 
-    /// The counts of all scenarios together.
+    /// Returns the counts of all scenarios together. They are sums: scenarios are never pooled into one sample.
     pub fn total(&self) -> Counts {
         let mut total = Counts::new(self.controllers.len());
         for (_, counts) in &self.scenarios {
@@ -122,27 +121,16 @@ impl Summary {
         total
     }
 
-    /// True where a baseline stands beside the arm under test.
+    /// Returns true if a baseline stands beside the arm under test.
     pub fn is_paired(&self) -> bool {
         self.controllers.len() == 2
     }
 
-    /// Judges the arm under test, the last one.
-    pub fn judge(&self, gates: Gates) -> Judgement {
-        let total = self.total();
-        let tested = total.arms.last().copied().unwrap_or_default();
-        let scenarios: Vec<(&str, &ArmCounts)> = self
-            .scenarios
-            .iter()
-            .filter_map(|(name, counts)| counts.arms.last().map(|tested| (name.as_str(), tested)))
-            .collect();
-        gates.judge(&Evidence {
-            tested: &tested,
-            scenarios: &scenarios,
-            errors: total.errors(),
-            checks: &total.checks,
-            pairs: self.is_paired().then_some(&total.pairs),
-            inference: self.inference,
-        })
+    /// Returns the mean over the scenarios of an arm's collision rate, each scenario with the same weight; `None` if a scenario
+    /// has no outcome.
+    pub fn mean_collision_rate(&self, arm: usize) -> Option<f64> {
+        let rates: Option<Vec<f64>> =
+            self.scenarios.iter().map(|(_, counts)| counts.arms.get(arm)?.collision_rate()).collect();
+        rates.filter(|rates| !rates.is_empty()).map(|rates| rates.iter().sum::<f64>() / rates.len() as f64)
     }
 }

@@ -1,225 +1,264 @@
-//! Whether a campaign passes its gates.
+//! The verdict of a campaign: what its gates, requirements, expectations and validity checks come to.
+//!
+//! | finding | decision | verdict | exit code |
+//! |---|---|---|---|
+//! | a sample ended in an error | [`Decision::SampleError`] | ERROR | 5 |
+//! | a validity check failed, or what a scenario expects did not happen | [`Decision::Invalid`] | INVALID | 7 |
+//! | a gate or the check of a requirement is not met | [`Decision::Fail`] | FAIL | 1 |
+//! | the samples do not decide a gate | [`Decision::Inconclusive`] | INCONCLUSIVE | 4 |
+//! | no gate and no requirement was checked | [`Decision::NotJudged`] | NOT JUDGED | 4 |
+//! | every gate that was checked is met | [`Decision::Pass`] | PASS | 0 |
+//! | the campaign is a measurement (`--no-gate`) | [`Decision::Measured`] | none | 0 |
+//!
+//! If several hold, the first of the table decides.
 
 use std::fmt;
 
+use closecall_statistics::format::percent;
 use serde::Serialize;
 
-use super::ledger::{ArmCounts, Inference, Pairs};
-use super::probability::{Answer, Finding, ProbabilityGate, percent};
+use super::gate::{ExpectationResult, GateResult, GateSource, Judge, RequirementResult, Standing};
+use super::probability::{Answer, Finding};
+use super::summary::Summary;
 use super::validity::CheckCounts;
 
-/// Share of the checked verdicts that may flip at half the time step, where nobody says otherwise.
+/// Default of the share of checked verdicts that may flip at half the time step (-).
 pub const MAX_FLIP_RATE: f64 = 0.05;
 
-/// What a campaign is judged by. Gates count samples in which E collided, in the arm under test.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Gates {
-    /// Most samples with a collision of E.
-    pub max_collisions: Option<u64>,
-    /// Most probable a collision of E may be, in each scenario.
-    pub probability: Option<ProbabilityGate>,
-    /// Most samples in which E collides only with the system under test.
-    pub max_induced: Option<u64>,
-    /// Largest share of the samples in which the system may engage, in each scenario.
-    pub max_engagement_rate: Option<f64>,
-    /// Most by which E may fall below the speed of the vehicle ahead, in any sample [m/s].
-    pub max_speed_deficit_mps: Option<f64>,
-    /// Largest jerk of E in any sample [m/s³].
-    pub max_jerk_mps3: Option<f64>,
-    /// Share of the checked verdicts that may flip at half the time step, rounded up to whole samples.
-    pub max_flip_rate: f64,
+/// The answer of a campaign.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub enum Verdict {
+    /// Every gate that was checked is met, and at least one was.
+    #[serde(rename = "PASS")]
+    Pass,
+    /// Some gate is not met.
+    #[serde(rename = "FAIL")]
+    Fail,
+    /// The samples do not decide a gate.
+    #[serde(rename = "INCONCLUSIVE")]
+    Inconclusive,
+    /// No gate and no requirement was checked.
+    #[serde(rename = "NOT JUDGED")]
+    NotJudged,
+    /// Some sample ended in an error.
+    #[serde(rename = "ERROR")]
+    Error,
+    /// The campaign cannot be believed.
+    #[serde(rename = "INVALID")]
+    Invalid,
 }
 
-impl Default for Gates {
-    fn default() -> Self {
-        Self {
-            max_collisions: None,
-            probability: None,
-            max_induced: None,
-            max_engagement_rate: None,
-            max_speed_deficit_mps: None,
-            max_jerk_mps3: None,
-            max_flip_rate: MAX_FLIP_RATE,
+impl Verdict {
+    /// Returns the word for reports.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Pass => "PASS",
+            Self::Fail => "FAIL",
+            Self::Inconclusive => "INCONCLUSIVE",
+            Self::NotJudged => "NOT JUDGED",
+            Self::Error => "ERROR",
+            Self::Invalid => "INVALID",
         }
     }
 }
 
-/// The answer of a campaign.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "UPPERCASE")]
-pub enum Verdict {
-    /// Every gate is met.
-    Pass,
-    /// Some gate is not met.
-    Fail,
-    /// Too few samples to say.
-    Inconclusive,
-    /// The campaign cannot be believed.
-    Invalid,
-}
-
 impl fmt::Display for Verdict {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Pass => "PASS",
-            Self::Fail => "FAIL",
-            Self::Inconclusive => "INCONCLUSIVE",
-            Self::Invalid => "INVALID",
-        })
+        f.write_str(self.word())
     }
 }
 
 /// The finding that decides a judgement. If several hold, the first of [`Decision::PRECEDENCE`] decides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Decision {
-    /// Every gate is met.
+    /// Every gate that was checked is met.
     Pass,
     /// Some gate is not met.
     Fail,
-    /// There are too few samples to say.
+    /// The samples do not decide a gate.
     Inconclusive,
+    /// Nothing was checked.
+    NotJudged,
     /// Some sample ended in an error.
     SampleError,
-    /// A validity check of the simulator failed.
+    /// The campaign cannot be believed.
     Invalid,
+    /// The campaign is a measurement, and nothing is judged.
+    Measured,
 }
 
 impl Decision {
     /// The findings in the order in which they decide.
-    pub const PRECEDENCE: [Self; 4] = [Self::SampleError, Self::Invalid, Self::Fail, Self::Inconclusive];
+    pub const PRECEDENCE: [Self; 5] =
+        [Self::SampleError, Self::Invalid, Self::Fail, Self::Inconclusive, Self::NotJudged];
 
-    fn first_of(found: &[Self]) -> Self {
-        Self::PRECEDENCE.into_iter().find(|decision| found.contains(decision)).unwrap_or(Self::Pass)
+    fn first_of(found: &[Self]) -> Option<Self> {
+        Self::PRECEDENCE.into_iter().find(|decision| found.contains(decision))
+    }
+
+    /// Returns the verdict, or `None` for a measurement.
+    pub const fn verdict(self) -> Option<Verdict> {
+        match self {
+            Self::Pass => Some(Verdict::Pass),
+            Self::Fail => Some(Verdict::Fail),
+            Self::Inconclusive => Some(Verdict::Inconclusive),
+            Self::NotJudged => Some(Verdict::NotJudged),
+            Self::SampleError => Some(Verdict::Error),
+            Self::Invalid => Some(Verdict::Invalid),
+            Self::Measured => None,
+        }
     }
 }
 
-/// A verdict with its reasons.
+/// A verdict with all that it rests on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Judgement {
-    /// The answer.
-    pub verdict: Verdict,
-    /// Every reason for it, in sentences.
-    pub reasons: Vec<String>,
     /// The finding that decides, which the exit code follows.
     pub decision: Decision,
-    /// What the samples of each scenario say about its probability, where that was asked.
+    /// Every reason for it, in sentences.
+    pub reasons: Vec<String>,
+    /// Every gate and every check of a requirement, with its answer.
+    pub gates: Vec<GateResult>,
+    /// How each requirement fares in each scenario that names it.
+    pub requirements: Vec<RequirementResult>,
+    /// Whether what the scenarios expect of their runs happened.
+    pub expectations: Vec<ExpectationResult>,
+    /// What the samples of each scenario say about the probability of a collision, if that was asked.
     pub probabilities: Vec<(String, Finding)>,
 }
 
-/// What is judged.
-#[derive(Clone, Copy, Debug)]
-pub struct Evidence<'a> {
-    /// The arm under test, over all scenarios.
-    pub tested: &'a ArmCounts,
-    /// The arm under test in each scenario, by name.
-    pub scenarios: &'a [(&'a str, &'a ArmCounts)],
-    /// Errors in any arm.
-    pub errors: u64,
-    /// What the validity checks found.
-    pub checks: &'a CheckCounts,
-    /// Pairs with the baseline, where there is one.
-    pub pairs: Option<&'a Pairs>,
-    /// What the number of samples came from.
-    pub inference: Inference,
+impl Judgement {
+    /// Returns the verdict, or `None` for a measurement.
+    pub const fn verdict(&self) -> Option<Verdict> {
+        self.decision.verdict()
+    }
+
+    /// Returns the word for reports; a measurement has no verdict.
+    pub fn word(&self) -> &'static str {
+        self.verdict().map_or("measured, not judged", Verdict::word)
+    }
 }
 
-impl Gates {
-    /// Judges a campaign.
-    pub fn judge(&self, evidence: &Evidence<'_>) -> Judgement {
-        let mut found = Found::default();
-        if evidence.errors > 0 {
-            found.add(Decision::SampleError, format!("{} ended in an error", samples(evidence.errors)));
-        }
-        self.judge_validity(evidence.checks, &mut found);
-        if evidence.tested.outcomes == 0 {
-            found.add(Decision::Inconclusive, "no sample has an outcome".to_owned());
-        }
-        let probabilities = self.judge_probability(evidence, &mut found);
-        self.judge_counts(evidence, &mut found);
-        self.judge_comfort(evidence, &mut found);
-        if (Self { max_flip_rate: MAX_FLIP_RATE, ..*self }) == Self::default() {
-            found.note("no gate was set: nothing was judged but that every sample has an outcome".to_owned());
-        }
-        let decision = Decision::first_of(&found.decisions);
-        Judgement { verdict: verdict(decision, &found.decisions), reasons: found.reasons, decision, probabilities }
+/// Judges a campaign by the evidence that a judge has gathered. `max_flip_rate` is the share of checked verdicts that may
+/// flip at half the time step.
+pub fn judge(summary: &Summary, judge: &Judge, max_flip_rate: f64) -> Judgement {
+    let mut found = Found::default();
+    let total = summary.total();
+    if total.errors() > 0 {
+        found.add(Decision::SampleError, format!("{} ended in an error", samples(total.errors())));
     }
+    judge_validity(&total.checks, max_flip_rate, &mut found);
+    let expectations = judge_expectations(judge, &mut found);
+    judge_samples(summary, judge, &mut found);
+    let probabilities = judge_probabilities(summary, judge, &mut found);
+    let gates = judge.gates();
+    for gate in &gates {
+        match gate.standing() {
+            Standing::Pass | Standing::NotChecked => found.note(gate.to_string()),
+            Standing::Inconclusive => found.add(Decision::Inconclusive, gate.to_string()),
+            Standing::Fail => found.add(Decision::Fail, gate.to_string()),
+        }
+    }
+    let requirements = judge.requirements(&gates);
+    let has_criteria = |requirement: &RequirementResult| {
+        gates
+            .iter()
+            .any(|gate| gate.scenario.as_deref() == Some(&requirement.scenario) && gate.is_of(&requirement.mark))
+    };
+    for requirement in requirements.iter().filter(|requirement| !has_criteria(requirement)) {
+        found.note(format!("not checked: {}: {}: it has no criteria", requirement.scenario, requirement.mark));
+    }
+    let is_judged = !probabilities.is_empty() || is_judged(&gates);
+    let decision = if judge.is_measurement() {
+        // Errors, and a simulator that cannot be believed, spoil a measurement, too.
+        let spoils = |decision: &Decision| matches!(decision, Decision::SampleError | Decision::Invalid);
+        Decision::first_of(&found.decisions).filter(spoils).unwrap_or(Decision::Measured)
+    } else {
+        if !is_judged {
+            let what = "no gate was set and no requirement was checked: set a gate, or measure without a verdict with --no-gate";
+            found.add(Decision::NotJudged, what.to_owned());
+        }
+        Decision::first_of(&found.decisions).unwrap_or(Decision::Pass)
+    };
+    Judgement { decision, reasons: found.reasons, gates, requirements, expectations, probabilities }
+}
 
-    fn judge_validity(&self, checks: &CheckCounts, found: &mut Found) {
-        for (check, count) in checks.broken() {
-            found.add(Decision::Invalid, format!("{}: {} of {} checked", check.finding(), count, checks.runs));
-        }
-        if checks.flips == 0 {
-            return;
-        }
-        let allowed = allowed_flips(self.max_flip_rate, checks.runs);
-        let sentence = format!(
-            "{} of {} checked verdicts flipped at half the time step, {allowed} allowed ({} of them, rounded up)",
-            checks.flips,
-            checks.runs,
-            percent(self.max_flip_rate)
-        );
-        if checks.flips > allowed { found.add(Decision::Invalid, sentence) } else { found.note(sentence) }
-    }
+/// Returns true if the gates say something: a gate that somebody set is decided, or every check of every requirement is. A
+/// requirement that is checked in part is not checked.
+fn is_judged(gates: &[GateResult]) -> bool {
+    let is_check = |gate: &&GateResult| matches!(gate.source, GateSource::Requirement(_));
+    let (checks, set): (Vec<&GateResult>, Vec<&GateResult>) = gates.iter().partition(is_check);
+    set.iter().any(|gate| gate.is_decided())
+        || (!checks.is_empty() && checks.iter().all(|gate| gate.standing() != Standing::NotChecked))
+}
 
-    fn judge_probability(&self, evidence: &Evidence<'_>, found: &mut Found) -> Vec<(String, Finding)> {
-        let Some(gate) = &self.probability else { return Vec::new() };
-        let count = evidence.scenarios.len();
-        let judge = |&(name, counts): &(&str, &ArmCounts)| {
-            let finding = gate.judge(counts, count, evidence.inference);
-            let sentence = format!("{name}: {}", finding.sentence(counts));
-            match finding.answer {
-                Answer::Below => found.note(sentence),
-                Answer::Above => found.add(Decision::Fail, sentence),
-                Answer::Open => found.add(Decision::Inconclusive, sentence),
-            }
-            (name.to_owned(), finding)
-        };
-        evidence.scenarios.iter().map(judge).collect()
+fn judge_validity(checks: &CheckCounts, max_flip_rate: f64, found: &mut Found) {
+    for (check, count) in checks.broken() {
+        found.add(Decision::Invalid, format!("{}: {} of {} checked", check.finding(), count, checks.runs));
     }
+    if checks.flips == 0 {
+        return;
+    }
+    let allowed = allowed_flips(max_flip_rate, checks.runs);
+    let sentence = format!(
+        "{} of {} checked verdicts flipped at half the time step, {allowed} allowed ({} of them, rounded up)",
+        checks.flips,
+        checks.runs,
+        percent(max_flip_rate)
+    );
+    if checks.flips > allowed { found.add(Decision::Invalid, sentence) } else { found.note(sentence) }
+}
 
-    fn judge_counts(&self, evidence: &Evidence<'_>, found: &mut Found) {
-        let collisions = evidence.tested.collisions;
-        if let Some(allowed) = self.max_collisions {
-            let sentence = format!("E collided in {}, {allowed} allowed", samples(collisions));
-            found.judge(collisions <= allowed, sentence);
-        }
-        match (self.max_induced, evidence.pairs) {
-            (Some(allowed), Some(pairs)) => {
-                let sentence = format!("{} induced, {allowed} allowed", collisions_of(pairs.induced));
-                found.judge(pairs.induced <= allowed, sentence);
-            }
-            (Some(_), None) => {
-                let sentence = "induced collisions are known only of paired samples".to_owned();
-                found.add(Decision::Inconclusive, sentence);
-            }
-            (None, _) => {}
+fn judge_expectations(judge: &Judge, found: &mut Found) -> Vec<ExpectationResult> {
+    let expectations = judge.expectations();
+    for expectation in &expectations {
+        if expectation.is_met() {
+            found.note(format!("happened as expected: {expectation}"));
+        } else if expectation.samples > 0 {
+            found.add(Decision::Invalid, format!("what the scenario is about did not happen: {expectation}"));
         }
     }
+    expectations
+}
 
-    fn judge_comfort(&self, evidence: &Evidence<'_>, found: &mut Found) {
-        if let Some(allowed) = self.max_engagement_rate {
-            for (name, counts) in evidence.scenarios {
-                let Some(rate) = counts.engagement_rate() else { continue };
-                let (engaged, outcomes) = (counts.engagements, counts.outcomes);
-                let (rate_percent, allowed_percent) = (percent(rate), percent(allowed));
-                let sentence = format!(
-                    "{name}: the system engaged in {engaged} of {outcomes} samples ({rate_percent}), {allowed_percent} allowed"
-                );
-                found.judge(rate <= allowed, sentence);
-            }
+/// Judges whether there are samples at all.
+fn judge_samples(summary: &Summary, judge: &Judge, found: &mut Found) {
+    let outcomes = |tested: Option<u64>| tested.unwrap_or_default();
+    if outcomes(summary.total().arms.last().map(|tested| tested.outcomes)) == 0 {
+        found.add(Decision::Inconclusive, "no sample has an outcome".to_owned());
+        return;
+    }
+    for (name, counts) in &summary.scenarios {
+        if counts.samples == 0 {
+            found.add(Decision::Inconclusive, format!("{name}: no sample was run"));
         }
-        if let Some(allowed_mps) = self.max_speed_deficit_mps {
-            let most_mps = evidence.tested.max_speed_deficit_mps;
-            let sentence =
-                format!("E was up to {most_mps:.1} m/s slower than the vehicle ahead, {allowed_mps} m/s allowed");
-            found.judge(most_mps <= allowed_mps, sentence);
-        }
-        if let Some(allowed_mps3) = self.max_jerk_mps3 {
-            let most_mps3 = evidence.tested.max_jerk_mps3;
-            let sentence = format!("E's jerk reached {most_mps3:.1} m/s³, {allowed_mps3} m/s³ allowed");
-            found.judge(most_mps3 <= allowed_mps3, sentence);
+        let repeated = judge.repeated(name);
+        if repeated > 0 {
+            found.note(format!("{name}: {} have the parameters of an earlier one and do not count", samples(repeated)));
         }
     }
+}
+
+fn judge_probabilities(summary: &Summary, judge: &Judge, found: &mut Found) -> Vec<(String, Finding)> {
+    let specs: Vec<_> = judge.probabilities().collect();
+    let mut findings = Vec::new();
+    for (name, spec) in &specs {
+        let Some(counts) = summary.tested(name) else { continue };
+        if !judge.is_varied(name) {
+            let sentence = format!("{name}: no parameter varies, so that no probability can be bounded");
+            found.add(Decision::Inconclusive, sentence);
+            continue;
+        }
+        let finding = spec.gate.judge(counts, specs.len(), summary.inference);
+        let sentence = format!("{name}: {} (from {})", finding.sentence(counts), spec.source);
+        match finding.answer {
+            Answer::Below => found.note(sentence),
+            Answer::Above => found.add(Decision::Fail, sentence),
+            Answer::Open => found.add(Decision::Inconclusive, sentence),
+        }
+        findings.push(((*name).to_owned(), finding));
+    }
+    findings
 }
 
 /// Reasons and what they decide, as they are found.
@@ -238,28 +277,9 @@ impl Found {
         self.decisions.push(decision);
         self.reasons.push(reason);
     }
-
-    /// Notes the reason either way. A comparison with something that is not a number is false, and so fails.
-    fn judge(&mut self, is_met: bool, reason: String) {
-        if is_met { self.note(reason) } else { self.add(Decision::Fail, reason) }
-    }
 }
 
-/// The verdict that goes with a decision, if all of `found` hold.
-fn verdict(decision: Decision, found: &[Decision]) -> Verdict {
-    match decision {
-        Decision::Pass => Verdict::Pass,
-        Decision::Fail => Verdict::Fail,
-        Decision::Inconclusive => Verdict::Inconclusive,
-        Decision::Invalid => Verdict::Invalid,
-        // An error of a sample leaves open what that sample would have ended in.
-        Decision::SampleError if found.contains(&Decision::Invalid) => Verdict::Invalid,
-        Decision::SampleError if found.contains(&Decision::Fail) => Verdict::Fail,
-        Decision::SampleError => Verdict::Inconclusive,
-    }
-}
-
-/// How many of `checked` verdicts may flip: the share, rounded up to whole ones.
+/// Returns how many of `checked` verdicts may flip: the share, rounded up to whole ones.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count of samples")]
 fn allowed_flips(max_flip_rate: f64, checked: u64) -> u64 {
     (max_flip_rate * checked as f64).ceil() as u64
@@ -269,110 +289,5 @@ fn samples(count: u64) -> String {
     if count == 1 { "1 sample".to_owned() } else { format!("{count} samples") }
 }
 
-fn collisions_of(count: u64) -> String {
-    if count == 1 { "1 collision".to_owned() } else { format!("{count} collisions") }
-}
-
 #[cfg(test)]
-mod tests {
-    use super::super::validity::Invariance;
-    use super::*;
-
-    /// Judges 100 samples of one scenario.
-    fn judge(gates: Gates, tested: ArmCounts, errors: u64, checks: &CheckCounts) -> Judgement {
-        let tested = ArmCounts { outcomes: 100, ..tested };
-        let scenarios = [("low", &tested)];
-        let inference = Inference::FixedSamples;
-        gates.judge(&Evidence { tested: &tested, scenarios: &scenarios, errors, checks, pairs: None, inference })
-    }
-
-    fn collided(gates: Gates, collisions: u64, errors: u64) -> Judgement {
-        judge(gates, ArmCounts { collisions, ..ArmCounts::default() }, errors, &CheckCounts::default())
-    }
-
-    const THREE: Gates = Gates {
-        max_collisions: Some(3),
-        probability: None,
-        max_induced: None,
-        max_engagement_rate: None,
-        max_speed_deficit_mps: None,
-        max_jerk_mps3: None,
-        max_flip_rate: MAX_FLIP_RATE,
-    };
-
-    #[test]
-    fn the_gate_counts_samples_with_a_collision() {
-        assert_eq!(collided(THREE, 3, 0).decision, Decision::Pass);
-        assert_eq!(collided(THREE, 4, 0).decision, Decision::Fail);
-    }
-
-    #[test]
-    fn an_error_is_graver_than_a_collision_and_never_passes() {
-        let errors = collided(THREE, 0, 1);
-        assert_eq!((errors.decision, errors.verdict), (Decision::SampleError, Verdict::Inconclusive));
-        let both = collided(THREE, 4, 1);
-        assert_eq!((both.decision, both.verdict), (Decision::SampleError, Verdict::Fail));
-    }
-
-    #[test]
-    fn a_campaign_without_outcomes_does_not_pass() {
-        let tested = ArmCounts::default();
-        let judged = Gates::default().judge(&Evidence {
-            tested: &tested,
-            scenarios: &[],
-            errors: 0,
-            checks: &CheckCounts::default(),
-            pairs: None,
-            inference: Inference::FixedSamples,
-        });
-        assert_eq!(judged.decision, Decision::Inconclusive);
-    }
-
-    #[test]
-    fn the_probability_gate_passes_fails_or_asks_for_more() {
-        let gates = |max| Gates { probability: ProbabilityGate::new(max, 0.95).ok(), ..Gates::default() };
-        assert_eq!(collided(gates(0.03), 0, 0).decision, Decision::Pass);
-        assert_eq!(collided(gates(0.03), 8, 0).decision, Decision::Fail);
-        let open = collided(gates(0.01), 0, 0);
-        assert_eq!((open.decision, open.verdict), (Decision::Inconclusive, Verdict::Inconclusive));
-        assert!(open.reasons[0].contains("199 more samples"), "{:?}", open.reasons);
-        // A count that fails is graver than a bound that is still open.
-        let failed = collided(Gates { max_collisions: Some(0), ..gates(0.05) }, 2, 0);
-        assert_eq!((failed.decision, failed.verdict), (Decision::Fail, Verdict::Fail));
-    }
-
-    #[test]
-    fn comfort_and_engagements_are_judged_and_what_is_not_a_number_fails() {
-        let gates = Gates { max_jerk_mps3: Some(10.0), max_engagement_rate: Some(0.05), ..Gates::default() };
-        let with = |max_jerk_mps3, engagements| {
-            let tested = ArmCounts { max_jerk_mps3, engagements, ..ArmCounts::default() };
-            judge(gates, tested, 0, &CheckCounts::default()).decision
-        };
-        assert_eq!(with(10.0, 5), Decision::Pass);
-        assert_eq!(with(10.1, 5), Decision::Fail);
-        assert_eq!(with(10.0, 6), Decision::Fail);
-        assert_eq!(with(f64::NAN, 0), Decision::Fail);
-    }
-
-    #[test]
-    fn flips_are_bounded_and_a_broken_check_is_invalid() {
-        let flipped = |flips| {
-            let checks = CheckCounts { runs: 40, flips, ..CheckCounts::default() };
-            judge(Gates::default(), ArmCounts::default(), 0, &checks)
-        };
-        assert_eq!(flipped(2).decision, Decision::Pass, "5 % of 40");
-        assert_eq!((flipped(3).decision, flipped(3).verdict), (Decision::Invalid, Verdict::Invalid));
-        let mut checks = CheckCounts { runs: 40, ..CheckCounts::default() };
-        checks.count(Invariance::ActorOrder);
-        let broken = judge(THREE, ArmCounts { collisions: 9, ..ArmCounts::default() }, 0, &checks);
-        assert_eq!((broken.decision, broken.verdict), (Decision::Invalid, Verdict::Invalid));
-        assert!(broken.reasons[0].contains("order of the actors"), "{:?}", broken.reasons);
-    }
-
-    #[test]
-    fn no_flip_at_all_can_be_asked_for() {
-        let gates = Gates { max_flip_rate: 0.0, ..Gates::default() };
-        let checks = CheckCounts { runs: 5, flips: 1, ..CheckCounts::default() };
-        assert_eq!(judge(gates, ArmCounts::default(), 0, &checks).decision, Decision::Invalid);
-    }
-}
+mod tests;

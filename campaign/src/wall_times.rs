@@ -3,13 +3,16 @@
 //! Wall times differ from run to run. They therefore have a file of their own, apart from those that are reproducible.
 //! No result depends on them, so their lines are buffered: a program that is killed may lose the last ones.
 
+use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
 use std::io::{self, BufRead, BufReader, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use closecall_scenarios::atomic::WriteError;
+use closecall_scenarios::atomic::{WriteError, write_file};
+
+use super::workers::Finished;
 
 /// The wall time of one sample.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -70,6 +73,30 @@ impl WallTimes {
     pub fn flush(&mut self) -> Result<(), WriteError> {
         self.file.flush().map_err(|source| WriteError::new(&self.path, source))
     }
+}
+
+/// Replaces the wall times of samples that were run again. The other lines stay as they are.
+///
+/// # Errors
+/// [`WriteError`] if the file cannot be read or written.
+pub(super) fn replace<'a>(path: &Path, run_again: impl Iterator<Item = &'a Finished>) -> Result<(), WriteError> {
+    let new: BTreeMap<(&str, u64), &[f64]> = run_again
+        .map(|finished| ((finished.record.scenario.as_str(), finished.record.sample), finished.wall_s.as_slice()))
+        .collect();
+    if !path.exists() {
+        return Ok(());
+    }
+    let times: Vec<WallTime> = read(path).map_err(|source| WriteError::new(path, source))?.collect();
+    write_file(path, |file| {
+        for mut time in times {
+            if let Some(wall_s) = new.get(&(time.scenario.as_str(), time.sample)) {
+                time.wall_s = wall_s.to_vec();
+            }
+            serde_json::to_writer(&mut *file, &time)?;
+            file.write_all(b"\n")?;
+        }
+        Ok(())
+    })
 }
 
 /// Returns the wall times of a file, up to the first line that cannot be parsed.

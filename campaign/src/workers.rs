@@ -23,9 +23,12 @@ use closecall_simulation::SampleError;
 
 use super::record::{ArmRecord, Record, SampleFailure};
 use super::runner::{ArmRun, Work};
+use super::stop::StopFlag;
 
 /// Number of runs, for each worker, that may be ahead of the last result returned.
 const WINDOW_PER_WORKER: usize = 128;
+/// Time that running samples have to end after a stop was requested. Those that take longer are run again on resuming.
+const STOP_TIMEOUT: Duration = Duration::from_secs(5);
 /// Interval at which the time limit of running samples is checked.
 const WATCH_EVERY: Duration = Duration::from_millis(50);
 
@@ -70,7 +73,7 @@ pub struct Finished {
 
 impl Workers {
     /// Runs the given samples, and passes each result to `on_finished` in the order of `samples`. Stops when
-    /// `on_finished` breaks.
+    /// `on_finished` breaks. If `stop` is set, no further sample starts, and those that run are given a few seconds.
     ///
     /// # Errors
     /// The error of `on_finished`, or [`WorkersError`]. No further result is passed on then.
@@ -78,14 +81,20 @@ impl Workers {
         &self,
         work: &Arc<Work>,
         samples: impl Iterator<Item = u64>,
+        stop: &StopFlag,
         mut on_finished: impl FnMut(Finished) -> Result<ControlFlow<()>, E>,
     ) -> Result<(), E> {
         let arms = work.arms.len();
         let mut runs = samples.flat_map(|sample| (0..arms).map(move |arm| (sample, arm)));
-        let mut pool = WorkerPool::new(*self, work)?;
+        let mut pool = WorkerPool::new(*self, work, stop)?;
         let mut order = Reorder { arms, next: 0, waiting: BTreeMap::new() };
+        let mut stopped: Option<Instant> = None;
         loop {
-            while pool.has_room(order.next)
+            if stop.is_set() {
+                stopped.get_or_insert_with(Instant::now);
+            }
+            while stopped.is_none()
+                && pool.has_room(order.next)
                 && let Some((sample, arm)) = runs.next()
             {
                 pool.submit(sample, arm);
@@ -93,13 +102,19 @@ impl Workers {
             if order.next == pool.submitted {
                 return Ok(());
             }
-            for done in pool.wait()? {
+            let is_idle = pool.is_idle();
+            let results = pool.wait()?;
+            let is_over = stopped.is_some_and(|at| is_idle && results.is_empty() || at.elapsed() >= STOP_TIMEOUT);
+            for done in results {
                 order.waiting.insert(done.index, done);
             }
             while let Some(finished) = order.pop(work) {
                 if on_finished(finished)?.is_break() {
                     return Ok(());
                 }
+            }
+            if is_over {
+                return Ok(());
             }
         }
     }
@@ -134,6 +149,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 struct WorkerPool {
     workers: Workers,
     work: Arc<Work>,
+    stop: StopFlag,
     jobs: Sender<Job>,
     job_queue: Arc<Mutex<Receiver<Job>>>,
     results: Receiver<Done>,
@@ -146,12 +162,13 @@ struct WorkerPool {
 }
 
 impl WorkerPool {
-    fn new(workers: Workers, work: &Arc<Work>) -> Result<Self, WorkersError> {
+    fn new(workers: Workers, work: &Arc<Work>, stop: &StopFlag) -> Result<Self, WorkersError> {
         let ((jobs, job_queue), (result_sender, results)) = (channel(), channel());
         let job_queue = Arc::new(Mutex::new(job_queue));
         let slots = Vec::with_capacity(workers.jobs.get());
-        let (work, checked) = (work.clone(), Instant::now());
-        let mut pool = Self { workers, work, jobs, job_queue, results, result_sender, slots, submitted: 0, checked };
+        let (work, stop, checked) = (work.clone(), stop.clone(), Instant::now());
+        let mut pool =
+            Self { workers, work, stop, jobs, job_queue, results, result_sender, slots, submitted: 0, checked };
         for _ in 0..workers.jobs.get() {
             let slot = pool.spawn()?;
             pool.slots.push(slot);
@@ -162,11 +179,14 @@ impl WorkerPool {
     /// Starts a thread that works until there are no more jobs, or until it is abandoned.
     fn spawn(&self) -> Result<Slot, WorkersError> {
         let slot = Slot::default();
-        let (own_slot, work) = (slot.clone(), self.work.clone());
+        let (own_slot, work, stop) = (slot.clone(), self.work.clone(), self.stop.clone());
         let (job_queue, result_sender) = (self.job_queue.clone(), self.result_sender.clone());
         let body = move || {
             loop {
                 let Ok(job) = lock(&job_queue).recv() else { return };
+                if stop.is_set() {
+                    return;
+                }
                 *lock(&own_slot) = Some((job, Instant::now()));
                 let run = work.run(job.sample, job.arm);
                 let is_abandoned = lock(&own_slot).take().is_none();
@@ -185,6 +205,11 @@ impl WorkerPool {
     fn has_room(&self, returned: u64) -> bool {
         let window = WINDOW_PER_WORKER * self.workers.jobs.get();
         self.submitted - returned < window as u64
+    }
+
+    /// Returns true if no worker is running a sample.
+    fn is_idle(&self) -> bool {
+        self.slots.iter().all(|slot| lock(slot).is_none())
     }
 
     fn submit(&mut self, sample: u64, arm: usize) {

@@ -6,14 +6,13 @@ use std::fmt::Write;
 use closecall::simulation::scenario::ScenarioConfig;
 use serde_json::Value;
 
+use super::files::{ANNOTATED, at_root};
 use super::probe::Probe;
 use super::schema::{Key, Kind, Step, Table, Way, tables};
 use super::text::Described;
 
-/// The tables that describe an object-level sensor, in the order of the columns of [`SENSOR_DEFAULTS`].
-pub(crate) const SENSORS: [&str; 3] = ["front-radar", "surround", "rear-object"];
-
-/// What the object-level sensors do by default. A sensor without a default does not have the property.
+/// The defaults of the object-level sensors: of the front radar, the surround sensors and the rear object-level sensor. A
+/// sensor without a default does not have the property.
 pub(crate) const SENSOR_DEFAULTS: [(&str, [Option<f64>; 3]); 13] = [
     ("range-m", [Some(150.0), Some(14.0), Some(120.0)]),
     ("half-angle-deg", [Some(45.0), None, Some(66.5)]),
@@ -65,7 +64,7 @@ pub(crate) fn scenario_page() -> Result<String, Box<dyn Error>> {
     let probe = Probe::new()?;
     let schema = schemars::schema_for!(ScenarioConfig);
     let tables = tables(schema.as_value(), &|key| probe.position(key));
-    let annotated = std::fs::read_to_string(super::at_root(super::ANNOTATED))?;
+    let annotated = std::fs::read_to_string(at_root(ANNOTATED))?;
     let mut page = format!("{INTRODUCTION}```toml\n{annotated}```\n{READING}");
     writeln!(page, "## The tables\n")?;
     for table in &tables {
@@ -83,7 +82,7 @@ fn section(page: &mut String, table: &Table, all: &[Table], probe: &Probe) -> Re
     let titles: Vec<String> = table.ways.iter().map(|way| format!("`{}`", title(way))).collect();
     let way = &table.ways[0];
     writeln!(page, "\n<a id=\"{}\"></a>\n\n### {}\n", anchor(way), titles.join(", "))?;
-    let Described { meaning, .. } = Described::new("", &table.description);
+    let Described { meaning, .. } = Described::new("", &table.description, false);
     if !meaning.is_empty() {
         writeln!(page, "{meaning}\n")?;
     }
@@ -99,19 +98,17 @@ fn section(page: &mut String, table: &Table, all: &[Table], probe: &Probe) -> Re
 }
 
 fn row(page: &mut String, table: &Table, key: &Key, all: &[Table], probe: &Probe) -> Result<(), Box<dyn Error>> {
-    let described = Described::new(&key.name, &key.description);
+    let is_number = !table.is_choice && matches!(key.kind, Kind::Number { .. } | Kind::Either(_));
+    let described = Described::new(&key.name, &key.description, is_number);
     let inner: Vec<Way> = table.ways.iter().map(|way| with(way, Step::Key(key.name.clone()))).collect();
     let found = inner.iter().flat_map(|way| probe.values(way)).next();
-    let value = value(key, &inner[0], all, probe);
+    let value = value(key, &inner, all, probe);
     let meaning = described.meaning.replace('|', "\\|");
     if table.is_choice {
         writeln!(page, "| `{}` | {value} | {meaning} |", key.name)?;
         return Ok(());
     }
-    let unit = match key.kind {
-        Kind::Number { .. } | Kind::Either(_) => described.unit.as_deref().unwrap_or(""),
-        _ => "",
-    };
+    let unit = described.unit.as_deref().unwrap_or("");
     let example = match found {
         Some((_, example)) if is_short(&key.kind) => format!("`{example}`"),
         _ => String::new(),
@@ -125,33 +122,22 @@ fn row(page: &mut String, table: &Table, key: &Key, all: &[Table], probe: &Probe
     Ok(())
 }
 
-/// What a key holds, and what is allowed there.
-fn value(key: &Key, way: &Way, all: &[Table], probe: &Probe) -> String {
-    let range = |way: &Way, is_whole| {
-        let found = probe.values(way).into_iter().find(|(_, value)| !value.is_array() && !value.is_table());
+/// What a key holds, and what is allowed there. `ways` are all of its places.
+fn value(key: &Key, ways: &[Way], all: &[Table], probe: &Probe) -> String {
+    let way = &ways[0];
+    let range = |is_whole| {
+        let mut values = ways.iter().flat_map(|way| probe.values(way));
+        let found = values.find(|(_, value)| !value.is_array() && !value.is_table());
         found.and_then(|(at, _)| probe.allowed(&at, is_whole))
     };
     let ranged = |name: String, range: Option<String>| range.map_or(name.clone(), |range| format!("{name}, {range}"));
     match &key.kind {
-        Kind::Number { .. } | Kind::Whole => ranged(name(&key.kind), range(way, key.kind == Kind::Whole)),
+        Kind::Number { .. } | Kind::Whole => ranged(name(&key.kind), range(key.kind == Kind::Whole)),
         Kind::Table | Kind::Map(_) => {
             link(way, all).map_or(name(&key.kind), |link| format!("[{}]({link})", name(&key.kind)))
         }
         Kind::List(element) => match (&**element, link(way, all)) {
             (Kind::Table, Some(link)) => format!("[list of tables]({link})"),
-            (Kind::Tuple(..), _) => {
-                let pair = with(way, Step::Element);
-                let ranges: Vec<String> = probe
-                    .values(&pair)
-                    .into_iter()
-                    .take(1)
-                    .flat_map(|(at, _)| {
-                        (0..2).map(move |index| at.clone().0.into_iter().chain([index_of(index)]).collect())
-                    })
-                    .map(|path| probe.allowed(&closecall::traffic::KeyPath(path), false).unwrap_or_default())
-                    .collect();
-                format!("list of pairs of numbers: {}", ranges.join("; "))
-            }
             _ => name(&key.kind),
         },
         Kind::Either(kinds) => {
@@ -159,7 +145,7 @@ fn value(key: &Key, way: &Way, all: &[Table], probe: &Probe) -> String {
                 .iter()
                 .map(|kind| match (kind, link(way, all)) {
                     (Kind::Table, Some(link)) => format!("[table]({link})"),
-                    (Kind::Number { .. }, _) => ranged(name(kind), range(way, false)),
+                    (Kind::Number { .. }, _) => ranged(name(kind), range(false)),
                     _ => name(kind),
                 })
                 .collect();
@@ -167,10 +153,6 @@ fn value(key: &Key, way: &Way, all: &[Table], probe: &Probe) -> String {
         }
         kind => name(kind),
     }
-}
-
-fn index_of(index: usize) -> closecall::traffic::Segment {
-    closecall::traffic::Segment::Index(index)
 }
 
 fn name(kind: &Kind) -> String {
@@ -183,6 +165,7 @@ fn name(kind: &Kind) -> String {
         Kind::Word { sampled: true, .. } => "word or `\"$name\"`".to_owned(),
         Kind::Word { sampled: false, .. } => "word".to_owned(),
         Kind::List(element) | Kind::Tuple(element, _) if **element == Kind::Table => "list of tables".to_owned(),
+        Kind::List(element) if matches!(**element, Kind::Tuple(_, 2)) => "list of pairs of numbers".to_owned(),
         Kind::List(element) => format!("list of {}", plural(element)),
         Kind::Tuple(element, length) => format!("list of {length} {}", plural(element)),
         Kind::Table => "table".to_owned(),
@@ -193,7 +176,7 @@ fn name(kind: &Kind) -> String {
 
 fn plural(kind: &Kind) -> String {
     match kind {
-        Kind::Text => "texts".to_owned(),
+        Kind::List(element) => format!("lists of {}", plural(element)),
         kind => format!("{}s", name(kind)),
     }
 }
@@ -211,8 +194,9 @@ fn default(key: &Key, stated: Option<String>) -> String {
         (Some(Value::String(word)), None) if word.is_empty() => "empty".to_owned(),
         (Some(Value::String(word)), None) => format!("`{word}`"),
         (Some(Value::Array(list)), None) if list.is_empty() => "none".to_owned(),
+        (Some(Value::Object(map)), None) if map.is_empty() => "none".to_owned(),
         (Some(Value::Object(_)), None) => "its defaults".to_owned(),
-        (Some(value), None) => value.to_string(),
+        (Some(value), None) => value.to_string().trim_end_matches(".0").to_owned(),
         (None, None) => "-".to_owned(),
     }
 }
@@ -225,7 +209,7 @@ fn is_sensor_key(key: &Key, name: &str) -> bool {
 fn is_short(kind: &Kind) -> bool {
     match kind {
         Kind::Table => false,
-        Kind::List(element) => **element != Kind::Table,
+        Kind::List(element) | Kind::Map(element) => **element != Kind::Table,
         _ => true,
     }
 }
@@ -244,7 +228,8 @@ fn words(page: &mut String, table: &Table) -> Result<(), Box<dyn Error>> {
 
 /// The anchor of the table at `way`, or of the first one below it.
 fn link(way: &Way, all: &[Table]) -> Option<String> {
-    let found = all.iter().find(|table| table.ways.iter().any(|known| known.starts_with(way)))?;
+    let depth = |table: &&Table| table.ways.iter().filter(|known| known.starts_with(way)).map(Vec::len).min();
+    let found = all.iter().filter(|table| depth(table).is_some()).min_by_key(depth)?;
     Some(format!("#{}", anchor(&found.ways[0])))
 }
 
@@ -253,12 +238,13 @@ fn with(way: &Way, step: Step) -> Way {
 }
 
 fn parts(way: &Way) -> Vec<&str> {
-    let part = |step| match step {
-        &Step::Element => None,
-        Step::Name => Some("NAME"),
-        Step::Key(key) => Some(key.as_str()),
-    };
-    way.iter().filter_map(part).collect()
+    way.iter()
+        .filter_map(|step| match step {
+            Step::Element => None,
+            Step::Name => Some("NAME"),
+            Step::Key(key) => Some(key.as_str()),
+        })
+        .collect()
 }
 
 /// The path as a file writes it.

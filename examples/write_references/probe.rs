@@ -1,21 +1,25 @@
 //! What the checks of a scenario allow, asked of the checks themselves.
 //!
 //! The scenario that uses every key is changed in one place and checked again. A number far beyond any range is refused
-//! with the range that is allowed; a default that is stated is right if the scenario with it is the scenario without it.
+//! with the range that is allowed.
 
 use std::error::Error;
+use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::PathBuf;
 
 use closecall::simulation::scenario::{ScenarioError, ScenarioFile};
 use closecall::traffic::{KeyPath, Problem, Segment};
 use toml::{Table, Value};
 
+use super::files::{EVERY_KEY, at_root};
 use super::schema::Step;
 
 /// Larger than every number that a scenario allows.
 const HUGE: f64 = 1e300;
 /// The largest number of a distribution: a bound that only excludes what no quantity of a scenario can be.
 const LIMIT: &str = "1000000000000";
+/// The largest number below 1: a bound that excludes 1.
+const BELOW_ONE: &str = "0.9999999999999999";
 
 /// A scenario that can be changed and checked.
 #[derive(Clone, Debug)]
@@ -28,7 +32,7 @@ pub(crate) struct Probe {
 impl Probe {
     /// Reads the scenario that uses every key.
     pub(crate) fn new() -> Result<Self, Box<dyn Error>> {
-        let path = super::at_root(super::EVERY_KEY);
+        let path = at_root(EVERY_KEY);
         let text = std::fs::read_to_string(&path)?;
         let table = text.parse()?;
         Ok(Self { path, text, table })
@@ -37,7 +41,7 @@ impl Probe {
     /// Returns the position of a key's first use in the file, comments aside.
     pub(crate) fn position(&self, key: &str) -> usize {
         let is_part = |c: char| c.is_ascii_alphanumeric() || c == '-';
-        let uses = |line: &&str| !line.starts_with('#') && line.split(|c| !is_part(c)).any(|word| word == key);
+        let uses = |line: &&str| !line.starts_with('#') && line.split(|c: char| !is_part(c)).any(|word| word == key);
         let mut start = 0;
         for line in self.text.lines() {
             if uses(&line) {
@@ -80,24 +84,15 @@ impl Probe {
         shortened(&text, minimum)
     }
 
-    /// Returns true if the scenario with `value` at `at` is the same as without any value there.
-    pub(crate) fn is_default(&self, at: &KeyPath, value: &Value) -> Result<bool, Box<dyn Error>> {
-        let concrete = |value: Option<Value>| -> Result<String, Box<dyn Error>> {
-            let table = self.with(at, value).ok_or("the key cannot be set")?;
-            let file = self.check(&table)?;
-            Ok(format!("{:?}", file.concrete(&file.space().nominal())?))
-        };
-        Ok(concrete(Some(value.clone()))? == concrete(None)?)
-    }
-
-    fn check(&self, table: &Table) -> Result<ScenarioFile, ScenarioError> {
+    /// Reads and checks a changed scenario.
+    pub(crate) fn check(&self, table: &Table) -> Result<ScenarioFile, ScenarioError> {
         let file = ScenarioFile::parse(&self.path, &table.to_string(), &[])?;
         file.check()?;
         Ok(file)
     }
 
-    /// The scenario with another value at `at`, or with none.
-    fn with(&self, at: &KeyPath, value: Option<Value>) -> Option<Table> {
+    /// Returns the scenario with another value at `at`, or with none; `None` if there is no such place.
+    pub(crate) fn with(&self, at: &KeyPath, value: Option<Value>) -> Option<Table> {
         let mut root = Value::Table(self.table.clone());
         let (last, way) = at.0.split_last()?;
         let mut place = &mut root;
@@ -157,6 +152,7 @@ fn step_into(step: &Step, path: Vec<Segment>, value: Value) -> Vec<(Vec<Segment>
 
 /// A range as the check says it, in fewer words: `a number from 0.2 to 5` is `0.2 to 5`.
 fn shortened(text: &str, minimum: Option<f64>) -> Option<String> {
+    let text = text.replace(&PI.to_string(), "π").replace(&FRAC_PI_2.to_string(), "π/2");
     // A bound that is the neighbour `min` of the example is that key.
     let named = |bound: &str| match minimum {
         Some(minimum) if bound == minimum.to_string() => "`min`".to_owned(),
@@ -164,16 +160,16 @@ fn shortened(text: &str, minimum: Option<f64>) -> Option<String> {
     };
     let lowest = format!("-{LIMIT}");
     if let Some((low, high)) = text.strip_prefix("a number above ").and_then(|rest| rest.split_once(" and up to ")) {
-        return Some(if high == LIMIT {
-            format!("above {}", named(low))
-        } else {
-            format!("above {low}, up to {high}")
+        return Some(match high {
+            LIMIT => format!("above {}", named(low)),
+            BELOW_ONE => format!("above {low}, below 1"),
+            _ => format!("above {low}, up to {high}"),
         });
     }
     match text.split_once(" from ").map(|(_, range)| range.split_once(" to ")) {
         Some(Some((low, high))) if low == lowest && high == LIMIT => None,
         Some(Some((low, high))) if high == LIMIT => Some(format!("{} or more", named(low))),
         Some(Some((low, high))) if text.starts_with("a number") => Some(format!("{low} to {high}")),
-        _ => Some(text.to_owned()),
+        _ => Some(text.clone()),
     }
 }

@@ -141,7 +141,7 @@ impl<'a> Reader<'a> {
     fn reference(&self, schema: &Value) -> Option<(&'a str, &'a Value)> {
         let name = schema["$ref"].as_str()?.strip_prefix("#/$defs/")?;
         let (name, target) = self.definitions.as_object()?.get_key_value(name)?;
-        Some((name, target))
+        Some((name.as_str(), target))
     }
 
     fn key(&self, property: &Property<'a>) -> Key {
@@ -192,15 +192,18 @@ impl<'a> Reader<'a> {
                 _ => Kind::List(element),
             };
         }
-        match () {
-            () if schema["additionalProperties"].is_object() => {
-                Kind::Map(Box::new(self.kind(&schema["additionalProperties"])))
-            }
-            () if is("integer") => Kind::Whole,
-            () if is("number") && is("string") => Kind::Either(vec![Kind::Number { sampled: false }, Kind::Text]),
-            () if is("number") => Kind::Number { sampled: false },
-            () if is("boolean") => Kind::Flag,
-            () => Kind::Text,
+        if schema["additionalProperties"].is_object() {
+            Kind::Map(Box::new(self.kind(&schema["additionalProperties"])))
+        } else if is("integer") {
+            Kind::Whole
+        } else if is("number") && is("string") {
+            Kind::Either(vec![Kind::Number { sampled: false }, Kind::Text])
+        } else if is("number") {
+            Kind::Number { sampled: false }
+        } else if is("boolean") {
+            Kind::Flag
+        } else {
+            Kind::Text
         }
     }
 }
@@ -232,7 +235,7 @@ fn properties(schema: &Value) -> (Vec<Property<'_>>, bool) {
 }
 
 fn alternatives(schema: &Value) -> impl Iterator<Item = &Value> {
-    ["anyOf", "oneOf"].into_iter().filter_map(|key| schema[key].as_array()).flatten()
+    ["anyOf", "oneOf"].into_iter().filter_map(move |key| schema[key].as_array()).flatten()
 }
 
 /// The first paragraph of a doc comment, in one line.

@@ -20,6 +20,16 @@ const ENDS: [(&str, &str); 12] = [
     ("-s", "s"),
 ];
 
+/// What the page itself says of everything on it.
+const SELF_EVIDENT: [&str; 6] = [
+    ", as a scenario file describes them",
+    ", as a scenario file describes it",
+    " as a scenario file describes them",
+    " as a scenario file describes it",
+    " as described in a scenario file",
+    " (-)",
+];
+
 /// A doc comment, taken apart.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Described {
@@ -32,21 +42,18 @@ pub(crate) struct Described {
 }
 
 impl Described {
-    /// Takes a doc comment of the key `name` apart.
-    pub(crate) fn new(name: &str, description: &str) -> Self {
-        let plain = description
-            .replace(", as a scenario file describes them", "")
-            .replace(", as a scenario file describes it", "")
-            .replace(" as a scenario file describes them", "")
-            .replace(" as a scenario file describes it", "")
-            .replace("[`", "`")
-            .replace("`]", "`");
+    /// Takes a doc comment of the key `name` apart. `is_number` says whether the key has a unit of its own.
+    pub(crate) fn new(name: &str, description: &str, is_number: bool) -> Self {
+        let mut plain = description.replace("[`", "`").replace("`]", "`");
+        for phrase in SELF_EVIDENT {
+            plain = plain.replace(phrase, "");
+        }
         let (meaning, default) = match default_in(&plain) {
             Some(found) => (found.rest, Some(found.value)),
             None => (plain, None),
         };
-        let by_name = ENDS.iter().find(|(end, _)| name.ends_with(end)).map(|(_, unit)| (*unit).to_owned());
-        let written = UNITS.iter().find(|unit| meaning.contains(&format!(" ({unit})")));
+        let by_name = ENDS.iter().find(|(end, _)| is_number && name.ends_with(end)).map(|(_, unit)| (*unit).to_owned());
+        let written = UNITS.iter().find(|unit| is_number && meaning.contains(&format!(" ({unit})")));
         let unit = by_name.or(written.filter(|unit| **unit != "0 to 1").map(|unit| (*unit).to_owned()));
         let meaning = match written {
             Some(unit) => meaning.replacen(&format!(" ({unit})"), "", 1),

@@ -20,8 +20,13 @@ pub(crate) fn properties() -> WriterProperties {
         .build()
 }
 
-/// Returns a nullable column. Its metadata holds its unit, if it has one.
+/// Returns a column whose cells may be null. Its metadata holds its unit, if it has one.
 pub(crate) fn field(name: &str, data_type: DataType, unit: Option<&str>) -> Field {
     let metadata: HashMap<String, String> = unit.map(|unit| ("unit".to_owned(), unit.to_owned())).into_iter().collect();
     Field::new(name, data_type, true).with_metadata(metadata)
+}
+
+/// Returns a column in which every row has a value.
+pub(crate) fn required(name: &str, data_type: DataType, unit: Option<&str>) -> Field {
+    field(name, data_type, unit).with_nullable(false)
 }

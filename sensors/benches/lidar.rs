@@ -11,7 +11,8 @@ use closecall_sensors::lidar::{Detector, LaneGeometry, Lidar, Scanner};
 use closecall_sensors::tracking::{RearView, TrackList, Tracker, TrackerScan};
 use closecall_sensors::{Detection, FullPerception, NoiseKey, Perception, Scene, SceneVehicle, Sensors, SensorsConfig};
 use closecall_traffic::{
-    ActorId, Check, Environment, Parameters, Road, Stream, Time, Vehicle, VehicleClass, VehicleState, stream,
+    ActorId, CONTROL_STEP, Check, Environment, Parameters, Road, Stream, Time, Vehicle, VehicleClass, VehicleState,
+    stream,
 };
 use criterion::{Criterion, criterion_group, criterion_main};
 
@@ -27,8 +28,6 @@ const SPEED_MPS: f64 = 30.0;
 const GAPS_M: [f64; 3] = [3.0, 30.0, 100.0];
 /// Number of steps over which the shares are measured.
 const STEPS: u32 = 2_000;
-/// Time between two scans.
-const SCAN_PERIOD: Time = Time::from_ms(40);
 
 fn vehicle(actor: usize, class: VehicleClass, s_m: f64, d_m: f64) -> SceneVehicle {
     let state = VehicleState { s_m, d_m, speed_mps: SPEED_MPS, ..VehicleState::default() };
@@ -84,7 +83,7 @@ impl TrackerLoop {
     }
 
     fn step(&mut self, detections: &[Detection]) {
-        self.time += SCAN_PERIOD;
+        self.time += CONTROL_STEP;
         let s_m = EGO_S_M + SPEED_MPS * self.time.s();
         let ego = VehicleState { s_m, d_m: EGO_D_M, speed_mps: SPEED_MPS, ..VehicleState::default() };
         let scan = TrackerScan { time: self.time, road: &self.road, ego, view: self.view, detections };
@@ -144,8 +143,8 @@ fn shares(_: &mut Criterion) {
         let track_us = mean_us(|| tracker_loop.step(black_box(&detections)));
         let (mut whole, mut time, mut ego, mut others) = (full(), Time::ZERO, scene.ego, others);
         let whole_us = mean_us(|| {
-            time += SCAN_PERIOD;
-            others.iter_mut().chain([&mut ego]).for_each(|vehicle| vehicle.state.s_m += SPEED_MPS * SCAN_PERIOD.s());
+            time += CONTROL_STEP;
+            others.iter_mut().chain([&mut ego]).for_each(|vehicle| vehicle.state.s_m += SPEED_MPS * CONTROL_STEP.s());
             let scene = Scene { time, ego, ..self::scene(&road, &others) };
             black_box(whole.step(&scene).expect("finite").len());
         });

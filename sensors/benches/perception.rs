@@ -3,7 +3,9 @@
 use std::hint::black_box;
 
 use closecall_sensors::{NoiseKey, Scene, SceneVehicle, SensorMode, SensorsConfig};
-use closecall_traffic::{ActorId, Check, Environment, Parameters, Road, Time, Vehicle, VehicleClass, VehicleState};
+use closecall_traffic::{
+    ActorId, CONTROL_STEP, Check, Environment, Parameters, Road, Vehicle, VehicleClass, VehicleState,
+};
 use criterion::{Criterion, criterion_group, criterion_main};
 
 fn vehicle(actor: usize, s_m: f64, d_m: f64) -> SceneVehicle {
@@ -28,7 +30,7 @@ fn perception(criterion: &mut Criterion) {
             bench.iter(|| {
                 scans += 1;
                 let scene = Scene {
-                    time: Time::from_ms(40) * scans,
+                    time: CONTROL_STEP * scans,
                     road: &road,
                     environment: &Environment::CLEAR_DAY,
                     ego: vehicle(0, 1_000.0, -5.6),

@@ -19,9 +19,10 @@
 #![expect(clippy::print_stdout, reason = "an example prints its results")]
 
 use closecall_sensors::{NoiseKey, Scene, SceneVehicle, SensorMode, Sensors, SensorsConfig, TrackAudit};
+use closecall_traffic::metrics::{bumper_gap_m, touching_distance_m};
 use closecall_traffic::{
-    ActorId, Check, Environment, Parameters, Road, RoadConfig, Source, Time, TrackStatus, Vehicle, VehicleClass,
-    VehicleState,
+    ActorId, CONTROL_STEP, Check, Environment, Parameters, Road, RoadConfig, Source, TrackStatus, Vehicle,
+    VehicleClass, VehicleState,
 };
 
 /// Number of approaches for each type of target.
@@ -36,8 +37,6 @@ const OWN_LANE_M: f64 = -5.625;
 const START_GAP_M: f64 = 190.0;
 /// Gap at the end of an approach (m).
 const LAST_GAP_M: f64 = 5.0;
-/// Time between two scans (s).
-const SCAN_S: f64 = 0.04;
 /// Number of scans with a confirmed track after which errors count.
 const SETTLING_SCANS: usize = 25;
 
@@ -88,18 +87,18 @@ fn approach(case: &Case, sensors: &Sensors, [seed, sample]: [u64; 2], result: &m
     let mut ego = vehicle(0, VehicleClass::Car, 1_000.0, EGO_MPS);
     let mut rear = vehicle(1, case.class, 0.0, EGO_MPS + closing_mps);
     rear.vehicle.appearance.paint_reflectivity = case.paint;
-    let half_lengths_m = 0.5 * (ego.vehicle.dimensions.length_m + rear.vehicle.dimensions.length_m);
+    let [ego_m, rear_m] = [ego, rear].map(|vehicle| vehicle.vehicle.dimensions.length_m);
     // The offset varies the distances at which each side of the alternating mirror scans the vehicle.
-    rear.state.s_m = ego.state.s_m - half_lengths_m - START_GAP_M - 0.37 * sample as f64;
+    rear.state.s_m = ego.state.s_m - touching_distance_m(ego_m, rear_m) - START_GAP_M - 0.37 * sample as f64;
     let (mut audit, mut settled, mut confirmed_scans) = (TrackAudit::default(), TrackAudit::default(), 0);
     let mut confirmed_at_m = 0.0;
     for scan in 0.. {
-        let gap_m = ego.state.s_m - rear.state.s_m - half_lengths_m;
+        let gap_m = bumper_gap_m(ego.state.s_m - rear.state.s_m, ego_m, rear_m);
         if gap_m < LAST_GAP_M {
             break;
         }
         let others = [rear];
-        let time = Time::from_ms(40) * scan;
+        let time = CONTROL_STEP * scan;
         let scene = Scene { time, road: &road, environment: &case.environment, ego, others: &others };
         let tracks = perception.step(&scene).expect("finite");
         audit.observe(tracks, &scene).expect("finite");
@@ -116,8 +115,8 @@ fn approach(case: &Case, sensors: &Sensors, [seed, sample]: [u64; 2], result: &m
         if confirmed_scans > SETTLING_SCANS {
             settled.observe(tracks, &scene).expect("finite");
         }
-        ego.state.s_m += ego.state.speed_mps * SCAN_S;
-        rear.state.s_m += rear.state.speed_mps * SCAN_S;
+        ego.state.s_m += ego.state.speed_mps * CONTROL_STEP.s();
+        rear.state.s_m += rear.state.speed_mps * CONTROL_STEP.s();
     }
     result.confirmed_at_m.push(confirmed_at_m);
     result.false_tracks += audit.false_tracks();

@@ -7,6 +7,7 @@
 //!            └ object/  range, noise, latency, field of view (front radar, surround, rear sensor) ─▶ tracks
 //! ```
 
+mod bodies;
 pub mod camera;
 mod config;
 mod detection;

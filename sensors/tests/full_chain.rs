@@ -4,13 +4,13 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
 use closecall_sensors::{Health, NoiseKey, Perception, Scene, SceneVehicle, SensorMode, SensorsConfig, TrackAudit};
+use closecall_traffic::metrics::{bumper_gap_m, touching_distance_m};
 use closecall_traffic::{
-    ActorId, Check, Environment, Parameters, Road, Source, Time, Track, TrackStatus, Vehicle, VehicleClass,
+    ActorId, CONTROL_STEP, Check, Environment, Parameters, Road, Source, Track, TrackStatus, Vehicle, VehicleClass,
     VehicleState,
 };
 
 const OWN_LANE_M: f64 = -5.625;
-const SCAN_S: f64 = 0.04;
 
 /// The ego at 30 m/s and one rear vehicle in its lane, on a clear day.
 struct Approach {
@@ -28,27 +28,27 @@ impl Approach {
             SceneVehicle { actor, vehicle: Vehicle::typical(class), state, pitch_rad: 0.0 }
         };
         let ego = vehicle(0, VehicleClass::Car, 1_000.0, 30.0);
-        let half_lengths_m = 0.5 * (4.6 + class.typical_dimensions().length_m);
+        let touching_m = touching_distance_m(ego.vehicle.dimensions.length_m, class.typical_dimensions().length_m);
         let key = NoiseKey { seed: 5, sample, ego: ActorId::new("ego").unwrap(), actors: [].into() };
         let sensors = SensorsConfig::default().check(&Parameters::default()).unwrap().with_mode(SensorMode::Full);
         Self {
             road: Road::straight(3),
             ego,
-            rear: vehicle(1, class, 1_000.0 - gap_m - half_lengths_m, 30.0 + closing_kmh / 3.6),
+            rear: vehicle(1, class, 1_000.0 - gap_m - touching_m, 30.0 + closing_kmh / 3.6),
             perception: sensors.build(&key).unwrap(),
             scans: 0,
         }
     }
 
     fn gap_m(&self) -> f64 {
-        let lengths_m = self.ego.vehicle.dimensions.length_m + self.rear.vehicle.dimensions.length_m;
-        self.ego.state.s_m - self.rear.state.s_m - 0.5 * lengths_m
+        let [ego_m, rear_m] = [&self.ego, &self.rear].map(|vehicle| vehicle.vehicle.dimensions.length_m);
+        bumper_gap_m(self.ego.state.s_m - self.rear.state.s_m, ego_m, rear_m)
     }
 
     /// Performs one control step, passes the tracks to `audit`, and returns the confirmed rear tracks.
     fn step(&mut self, audit: &mut TrackAudit) -> Vec<Track> {
         let others = [self.rear];
-        let time = Time::from_ms(40) * self.scans;
+        let time = CONTROL_STEP * self.scans;
         let environment = &Environment::CLEAR_DAY;
         let scene = Scene { time, road: &self.road, environment, ego: self.ego, others: &others };
         let tracks = self.perception.step(&scene).unwrap();
@@ -57,7 +57,7 @@ impl Approach {
         let tracks = tracks.iter().filter(confirmed).cloned().collect();
         self.scans += 1;
         for vehicle in [&mut self.ego, &mut self.rear] {
-            vehicle.state.s_m += vehicle.state.speed_mps * SCAN_S;
+            vehicle.state.s_m += vehicle.state.speed_mps * CONTROL_STEP.s();
         }
         tracks
     }
@@ -142,7 +142,7 @@ fn health_on_an_empty_road(lidar: &str, environment: &Environment) -> Health {
     let state = VehicleState { s_m: 1_000.0, d_m: OWN_LANE_M, speed_mps: 30.0, ..VehicleState::default() };
     let ego = SceneVehicle { actor: 0, vehicle: Vehicle::typical(VehicleClass::Car), state, pitch_rad: 0.0 };
     for scan in 0..50 {
-        let scene = Scene { time: Time::from_ms(40) * scan, road: &road, environment, ego, others: &[] };
+        let scene = Scene { time: CONTROL_STEP * scan, road: &road, environment, ego, others: &[] };
         perception.step(&scene).unwrap();
     }
     perception.health().rear

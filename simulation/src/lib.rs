@@ -13,6 +13,8 @@
 //! the only user of rapier, in its module `world`.
 
 pub mod controller;
+pub mod criteria;
+pub mod harm;
 pub mod outcome;
 pub mod run;
 pub mod scenario;

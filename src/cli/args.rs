@@ -1,6 +1,6 @@
 //! Arguments that several commands share.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use closecall_scenarios::recordings::{BadRows, LayoutChoice, ReadOptions};
@@ -10,8 +10,12 @@ use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::controller::exec::{DEFAULT_MEMORY_MIB, DEFAULT_TIMEOUT_MS, ExecSettings, NAME as EXEC};
 use closecall_simulation::scenario::{ScenarioError, ScenarioFile, Setting};
 
+use closecall_traffic::suggest::hint;
+
 use super::CliError;
 use super::output::print_error;
+use super::protect::of_controller;
+use super::source;
 
 /// The format of the output.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -93,7 +97,12 @@ fn controller(text: &str) -> Result<ControllerChoice, String> {
                 None => Err(format!("`{command}` is not a command: it is empty, or its quotes do not match")),
             }
         }
-        _ => Err(format!("`{text}` is not a controller: expected acc, mis or exec:COMMAND")),
+        _ => {
+            let known = "`acc`, `mis` or `exec:COMMAND`";
+            let word = text.split(':').next().unwrap_or_default();
+            let suggestion = hint(word, "`acc`, `mis`, `exec`");
+            Err(format!("`{text}` is not a controller: expected {known}{suggestion}"))
+        }
     }
 }
 
@@ -108,6 +117,11 @@ pub(super) struct ArmArgs {
 }
 
 impl ArmArgs {
+    /// Returns the files that the command of the controller names.
+    pub(super) fn files(&self) -> Vec<PathBuf> {
+        of_controller(&self.controller.controller)
+    }
+
     pub(super) fn arm(&self) -> Result<Arm, CliError> {
         Ok(arm(&self.controller.choice()?, self.sensors))
     }
@@ -184,19 +198,19 @@ impl ReadArgs {
 pub(super) struct SetArgs {
     /// Change a value of the scenario, named by a path of keys (`actor.rear.start.behind.gap-m=90`) or by a parameter
     /// (`brake-mps2=6`); can be given more than once
-    #[arg(long = "set", value_name = "KEY=VALUE")]
+    #[arg(long = "set", value_name = "KEY=VALUE", help_heading = clap::builder::Resettable::Reset)]
     pub(super) settings: Vec<Setting>,
 }
 
 impl SetArgs {
     /// Reads a scenario, applies the changes, and checks it.
     pub(super) fn load(&self, path: &Path) -> Result<ScenarioFile, ScenarioError> {
-        let file = ScenarioFile::load(path, &self.settings)?;
+        let file = source::load(path, &self.settings)?;
         for name in file.unused_parameters() {
             print_error(format_args!(
                 "warning: {}: the parameter `{name}` is sampled, but not used: write \"${name}\" where its value \
                  belongs, or remove it\n",
-                path.display()
+                file.path().display()
             ));
         }
         file.check()?;
@@ -209,5 +223,37 @@ pub(super) fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
         _ => Err(format!("`{text}` is not a number above 0")),
+    }
+}
+
+/// Parses a number of samples or scenes: a whole number above 0.
+pub(super) fn count(text: &str) -> Result<u64, String> {
+    let reason = match text.parse::<i128>() {
+        Ok(number) if number > 0 => return u64::try_from(number).map_err(|_| format!("`{text}` is too large")),
+        Ok(0) => "is no sample at all",
+        Ok(_) => "is negative",
+        Err(_) => "is not a whole number",
+    };
+    Err(format!("`{text}` {reason}: a whole number of 1 or more is needed"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_count_is_a_whole_number_above_zero() {
+        assert_eq!(count("200"), Ok(200));
+        for (text, reason) in [("-5", "is negative"), ("0", "no sample"), ("1.5", "not a whole number"), ("", "whole")]
+        {
+            assert!(count(text).unwrap_err().contains(reason), "{text}");
+        }
+        assert!(count("99999999999999999999999").unwrap_err().contains("too large"));
+    }
+
+    #[test]
+    fn a_misspelt_controller_is_answered_with_a_suggestion() {
+        assert!(controller("miss").unwrap_err().ends_with("; did you mean `mis`?"));
+        assert!(controller("exce:python3 a.py").unwrap_err().ends_with("; did you mean `exec`?"));
     }
 }

@@ -7,7 +7,8 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use closecall_campaign::execution::{Campaign, End, NextRecord};
-use closecall_campaign::folder::{Folder, TornLine};
+use closecall_campaign::folder::Folder;
+use closecall_campaign::gate::GateSet;
 use closecall_campaign::partition::Partition;
 use closecall_campaign::plan::Plan;
 use closecall_campaign::runner::Sampling;
@@ -20,9 +21,14 @@ use closecall_simulation::controller::ControllerChoice;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::args::{ControllerArgs, Format, SensorsChoice, SetArgs, controllers, positive};
+use super::backend::check_backend;
+use super::ending::{EndArgs, EndRule, Ending, print_resumption};
 use super::gates::GateArgs;
-use super::output::{outln, print_error};
+use super::heartbeat::Heartbeat;
+use super::interrupt::{received, stop_gracefully};
+use super::output::{outln, print_error, print_report_files};
 use super::plan::PlanArgs;
+use super::source::expand;
 use super::summary::{print_counts, print_verdict};
 use super::{CliError, json};
 use crate::exit_code::ExitCode;
@@ -30,7 +36,7 @@ use crate::exit_code::ExitCode;
 /// Arguments of `closecall campaign`.
 #[derive(Debug, Args)]
 pub(super) struct CampaignArgs {
-    /// Scenario files
+    /// Scenario files, folders of them, names of scenarios of the library, or `-` for standard input
     #[arg(required = true)]
     scenarios: Vec<PathBuf>,
     #[command(flatten)]
@@ -71,9 +77,11 @@ pub(super) struct CampaignArgs {
     #[command(flatten)]
     gates: GateArgs,
     #[command(flatten)]
+    end: EndArgs,
+    #[command(flatten)]
     set: SetArgs,
     /// Output format
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = clap::builder::Resettable::Reset)]
     format: Format,
 }
 
@@ -98,7 +106,7 @@ impl CampaignArgs {
 
     /// Reads and checks every scenario.
     fn plan(&self, controllers: Vec<ControllerChoice>) -> Result<Plan, CliError> {
-        let files = self.scenarios.iter().map(|path| self.set.load(path)).collect::<Result<Vec<_>, _>>()?;
+        let files = expand(&self.scenarios)?.iter().map(|path| self.set.load(path)).collect::<Result<Vec<_>, _>>()?;
         let mut plan = Plan::new(files, self.sampling(), controllers)?;
         plan.sensors = self.sensors.map(SensorsChoice::mode);
         plan.partition = self.partition;
@@ -112,43 +120,55 @@ impl CampaignArgs {
 pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
     let tested = args.controller.choice()?;
     let is_paired = args.is_paired(&tested);
-    let gates = args.gates.gates(is_paired, args.design)?;
+    let gates = args.gates.gates(is_paired, args.design, args.plan.preset_gates(is_paired))?;
     let plan = args.plan(controllers(tested, is_paired)?)?;
-    let (campaign, manifest) = (plan.campaign(), plan.manifest(std::env::args().collect())?);
+    check_backend(plan.uses_classifier())?;
+    let (mut campaign, manifest) = (plan.campaign(), plan.manifest(std::env::args().collect())?);
     let locked = match &args.out {
         Some(path) => Some(Folder::lock(path, &manifest, args.resume)?),
         None => None,
     };
+    campaign.retry_errors = args.end.retry_errors;
+    stop_gracefully(&campaign.stop);
     let started = Instant::now();
     let stop = StopRule {
-        until_certain: gates.probability.filter(|_| args.plan.ends_when_certain()),
+        until_certain: gates.probability.as_ref().map(|spec| spec.gate).filter(|_| args.plan.ends_when_certain()),
         time_budget: args.plan.time_budget(),
         scenarios: campaign.works.len(),
     };
-    let mut progress = Progress::new(&campaign, StopMonitor::start(stop));
-    let torn = campaign.run(locked.as_ref(), |next| progress.push(next))?;
+    let mut progress = Progress::new(&campaign, &gates, StopMonitor::start(stop), EndRule::new(args.end));
+    let resumption = campaign.run(locked.as_ref(), |next| progress.push(next))?;
     progress.bar.finish_and_clear();
-    if let Some(TornLine { line, reason }) = torn {
-        print_error(format_args!(
-            "the journal was torn at line {line} ({reason}): the samples from there on were run again\n"
-        ));
+    print_resumption(&resumption);
+    if let Some(ending) = received().map(Ending::Signal).or(progress.end.ending.take()) {
+        return Ok(ending.print(args.format, &campaign, &progress.tally.summary, args.out.as_deref()));
     }
     let wall_s = started.elapsed().as_secs_f64();
     let tally = &progress.tally;
-    let judged = tally.summary.judge(gates);
-    let report = CampaignReport { manifest: &manifest, works: &campaign.works, tally, gates, judged: &judged };
+    let judged = tally.judgement();
+    let report = CampaignReport { manifest: &manifest, works: &campaign.works, tally, judged: &judged };
     match &locked {
         Some(locked) => report.write(&locked.folder, args.record)?,
         None => report.write_without_folder()?,
     }
     match args.format {
-        Format::Json => outln!("{:#}", json::campaign(&tally.summary, &judged, Some(wall_s))),
+        Format::Json => outln!(
+            "{:#}",
+            json::stamped(
+                json::campaign(&tally.summary, &judged, Some(wall_s)),
+                Some(args.seed),
+                Some(&args.set.settings)
+            )
+        ),
         Format::Human => {
             print_counts(&tally.summary);
             let (simulated_s, jobs) = (tally.summary.total().simulated_s, campaign.workers.jobs);
             outln!("{simulated_s:.0} simulated seconds in {wall_s:.1} s on {jobs} threads");
             print_verdict(&judged);
         }
+    }
+    if let Some(locked) = &locked {
+        print_report_files(&locked.folder);
     }
     Ok(ExitCode::from(&judged))
 }
@@ -158,19 +178,22 @@ struct Progress {
     names: Vec<String>,
     tally: Tally,
     stop: StopMonitor,
+    end: EndRule,
     bar: ProgressBar,
+    _heartbeat: Heartbeat,
 }
 
 impl Progress {
-    fn new(campaign: &Campaign, stop: StopMonitor) -> Self {
+    fn new(campaign: &Campaign, gates: &GateSet, stop: StopMonitor, end: EndRule) -> Self {
         for work in &campaign.works {
             let (name, count, requested) = (&work.file.config().name, work.count(), work.sampling.samples);
             if count != requested {
-                print_error(format_args!("{name}: the grid has {count} samples, {requested} were requested\n"));
+                print_error(format_args!("{name}: {count} of the {requested} requested samples differ, and are run\n"));
             }
         }
         let names = campaign.works.iter().map(|work| work.file.config().name.clone()).collect();
-        Self { names, tally: Tally::new(campaign), stop, bar: progress_bar(campaign.len()) }
+        let bar = progress_bar(campaign.len());
+        Self { names, tally: Tally::new(campaign, gates), stop, end, _heartbeat: Heartbeat::start(&bar), bar }
     }
 
     fn push(&mut self, next: NextRecord<'_>) -> ControlFlow<End> {
@@ -180,6 +203,7 @@ impl Progress {
             // Records read from the journal say nothing about how long the rest will take.
             self.bar.reset_eta();
         }
+        self.end.observe(next.record)?;
         let tested = self.tally.summary.tested(&self.names[next.work]);
         tested.map_or(ControlFlow::Continue(()), |tested| self.stop.observe(next.work, tested))
     }

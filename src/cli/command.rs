@@ -2,14 +2,14 @@
 
 use std::path::PathBuf;
 
-use clap::{Parser, Subcommand};
-use closecall_sensors::camera::{Backend, Classifier};
-use closecall_sensors::use_inference_backend;
+use clap::{CommandFactory, Parser, Subcommand};
+use closecall_simulation::controller::exec::{adopt_orphans, end_all};
 
+use super::backend::choose_backend;
 use super::output::print_error;
 use super::{
-    CliError, campaign, check, compare, inspect, merge, plot, record, reenact, render, replay, robustness, run,
-    statistics, trajectories,
+    CliError, baseline, campaign, check, compare, generate, inspect, interrupt, library, merge, new, plot, record,
+    reenact, render, replay, robustness, run, schema, statistics, trajectories, watching,
 };
 use crate::exit_code::ExitCode;
 
@@ -24,7 +24,7 @@ struct Cli {
     #[command(subcommand)]
     command: Command,
     /// Shared library of ONNX Runtime (1.24 or later), to run the rear camera's network on it instead of the built-in
-    /// backend tract
+    /// backend tract. It is loaded only if the network is used
     #[arg(long, global = true, value_name = "PATH", env = "ORT_DYLIB_PATH")]
     onnxruntime: Option<PathBuf>,
 }
@@ -38,10 +38,21 @@ Exit codes:
   4  inconclusive: there are too few samples for the requested bound
   5  at least one sample ended in an error
   6  a file or folder cannot be read or written
-  7  invalid: a validity check of the simulator failed";
+  7  invalid: a validity check of the simulator failed
+  130  ended by Ctrl-C (SIGINT)
+  143  ended by SIGTERM";
 
 #[derive(Debug, Subcommand)]
+#[expect(clippy::large_enum_variant, reason = "there is one command, for as long as the program runs")]
 enum Command {
+    /// Write a commented scenario to start from
+    New(new::NewArgs),
+    /// Write the files of a repository of scenarios, with CI jobs for GitHub and GitLab. No file is overwritten
+    Init(new::InitArgs),
+    /// List the scenarios of the library with their questions, requirements and gates
+    List(library::ListArgs),
+    /// Check a scenario at every change of its file, and run a few samples of it
+    Watch(watching::WatchingArgs),
     /// Run one sample of a scenario
     Run(run::RunArgs),
     /// Run many samples of one or more scenarios, and judge the result by gates
@@ -50,6 +61,8 @@ enum Command {
     Merge(merge::MergeArgs),
     /// Compare a campaign with an earlier one, sample by sample
     Compare(compare::CompareArgs),
+    /// Keep the results of a campaign in a small file, and compare later campaigns with it
+    Baseline(baseline::BaselineArgs),
     /// Run one sample of a campaign again, and check that it gives the same bits
     Replay(replay::ReplayArgs),
     /// Check scenario files without running them
@@ -76,6 +89,10 @@ enum Command {
     Plot(plot::PlotArgs),
     /// Render labelled images of the rear camera
     Render(render::RenderArgs),
+    /// Print a script that completes commands and options in a shell
+    Completions(generate::CompletionsArgs),
+    /// Print the manual page, or write one for each command
+    Man(generate::ManArgs),
 }
 
 /// Runs the program with the arguments of the process.
@@ -94,7 +111,12 @@ pub fn main() -> ExitCode {
             return if error.print().is_ok() { code } else { ExitCode::Io };
         }
     };
-    match choose_backend(cli.onnxruntime).and_then(|()| dispatch(cli.command)) {
+    adopt_orphans();
+    interrupt::watch();
+    choose_backend(cli.onnxruntime.as_deref());
+    let result = dispatch(cli.command);
+    end_all();
+    match result {
         Ok(code) => code,
         Err(error) => {
             let code = ExitCode::from(&error);
@@ -104,26 +126,20 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// Chooses the inference backend of the rear camera's network. A named ONNX Runtime is loaded at once, so that a bad
-/// path is reported before any work is done.
-fn choose_backend(onnxruntime: Option<PathBuf>) -> Result<(), CliError> {
-    let backend = Backend::choose(onnxruntime.as_deref(), None);
-    if backend != Backend::Tract {
-        Classifier::shipped(&backend)?;
-    }
-    use_inference_backend(backend);
-    Ok(())
-}
-
 fn dispatch(command: Command) -> Result<ExitCode, CliError> {
     match command {
+        Command::New(args) => new::new(&args),
+        Command::Init(args) => new::init(&args),
+        Command::List(args) => library::list(&args),
+        Command::Watch(args) => watching::watch(&args),
         Command::Run(args) => run::run(&args),
         Command::Campaign(args) => campaign::campaign(&args),
         Command::Merge(args) => merge::merge(&args),
         Command::Compare(args) => compare::compare(&args),
+        Command::Baseline(args) => baseline::baseline(&args),
         Command::Replay(args) => replay::replay(&args),
         Command::Check(args) => check::check(&args),
-        Command::Schema => check::schema(),
+        Command::Schema => schema::schema(),
         Command::Inspect(args) => inspect::inspect(&args),
         Command::LaneChanges(args) => trajectories::lane_changes(&args),
         Command::Criticality(args) => trajectories::criticality(&args),
@@ -134,5 +150,7 @@ fn dispatch(command: Command) -> Result<ExitCode, CliError> {
         Command::Record(args) => record::record(&args),
         Command::Plot(args) => plot::plot(&args),
         Command::Render(args) => render::render(&args),
+        Command::Completions(args) => generate::completions(&args, Cli::command()),
+        Command::Man(args) => generate::man(&args, Cli::command()),
     }
 }

@@ -9,7 +9,8 @@ use serde_json::{Map, Value, json};
 
 use super::CliError;
 use super::args::Format;
-use super::output::{out, outln};
+use super::json::stamped;
+use super::output::{listed, out, outln};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall compare`.
@@ -34,7 +35,9 @@ pub(super) fn compare(args: &CompareArgs) -> Result<ExitCode, CliError> {
     let found = compare_folders(&baseline, &current)?;
     let code = judge(&found, args.max_newly_failing);
     match args.format {
-        Format::Json => outln!("{:#}", to_json(&found, &differences, code)),
+        Format::Json => {
+            outln!("{:#}", stamped(to_json(&found, &differences, code), Some(current_manifest.sampling.seed), None))
+        }
         Format::Human => print(&found, &differences, code),
     }
     Ok(code)
@@ -54,17 +57,6 @@ fn verdict(code: ExitCode) -> &'static str {
         ExitCode::SampleError => "NEW ERRORS",
         _ => "REGRESSION",
     }
-}
-
-/// Largest number of samples that the text output lists.
-const MAX_LISTED: usize = 12;
-
-fn listed(samples: &[u64]) -> String {
-    let mut text: Vec<String> = samples.iter().take(MAX_LISTED).map(u64::to_string).collect();
-    if samples.len() > MAX_LISTED {
-        text.push(format!("… {} more", samples.len() - MAX_LISTED));
-    }
-    if text.is_empty() { String::new() } else { format!(": {}", text.join(", ")) }
 }
 
 fn print(found: &[ScenarioComparison], differences: &[String], code: ExitCode) {

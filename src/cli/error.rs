@@ -1,5 +1,6 @@
 //! The errors of the commands, and the exit code of each.
 
+use closecall_campaign::baseline::BaselineError;
 use closecall_campaign::compare::CompareError;
 use closecall_campaign::execution::CampaignError;
 use closecall_campaign::folder::FolderError;
@@ -29,6 +30,14 @@ const MAX_SUGGESTED: usize = 10;
 /// The reason for which a command has no result.
 #[derive(Debug, thiserror::Error, Diagnostic)]
 pub enum CliError {
+    /// The project file cannot be used.
+    #[error("failed to read {}: {message}", path.display())]
+    Project {
+        /// The file.
+        path: std::path::PathBuf,
+        /// What is wrong, with the line.
+        message: String,
+    },
     /// A scenario cannot be used.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
@@ -107,6 +116,9 @@ pub enum CliError {
     /// The reports of a campaign cannot be written.
     #[error(transparent)]
     Report(#[from] ReportError),
+    /// A campaign cannot be compared with a baseline.
+    #[error(transparent)]
+    Baseline(#[from] BaselineError),
     /// Two campaigns cannot be compared.
     #[error(transparent)]
     Compare(#[from] CompareError),
@@ -134,6 +146,7 @@ impl From<&CliError> for ExitCode {
             | CliError::Reference(_)
             | CliError::TrafficFilm(_)
             | CliError::NoEncounter { .. }
+            | CliError::Project { .. }
             | CliError::Classifier(_) => Self::InvalidInput,
             CliError::Folder(error) => Self::from(error),
             CliError::Campaign(error) => Self::from(error),
@@ -164,7 +177,7 @@ impl From<&CliError> for ExitCode {
             | CliError::WriteRecording(_)
             | CliError::Dataset(_) => Self::Io,
             CliError::Sample { .. } => Self::SampleError,
-            CliError::Usage { .. } | CliError::Plan(_) => Self::Usage,
+            CliError::Usage { .. } | CliError::Plan(_) | CliError::Baseline(_) => Self::Usage,
         }
     }
 }

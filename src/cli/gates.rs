@@ -1,23 +1,34 @@
-//! The gates by which a campaign is judged, on the command line.
+//! The gates by which a campaign is judged, on the command line and in the project file.
 
 use clap::Args;
+use closecall_campaign::gate::{GateSet, GateSource, GateSpec, ProbabilitySpec, Scope};
 use closecall_campaign::probability::ProbabilityGate;
-use closecall_campaign::verdict::{Gates, MAX_FLIP_RATE};
+use closecall_campaign::verdict::MAX_FLIP_RATE;
 use closecall_scenarios::sampling::Design;
+use closecall_simulation::criteria::Expression;
 
 use super::CliError;
 use super::args::positive;
-
-/// Default confidence of the gate on the probability.
-const CONFIDENCE: f64 = 0.95;
+use super::project::ProjectFile;
 
 /// The gates of a campaign.
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Gates")]
 pub(super) struct GateArgs {
+    /// Require this of the samples of each scenario, such as "p1(min_ttc_rear_s) >= 1.0" or
+    /// "lower(prevented | baseline.ego_collided) >= 0.5"; can be repeated. docs/campaigns.md lists aggregates and measures
+    #[arg(long = "gate", value_name = "CRITERION")]
+    require: Vec<Expression>,
+    /// Measure only: no gate is judged, and there is no verdict
+    #[arg(long, conflicts_with_all = ["require", "max_collisions", "max_other_collisions", "max_probability", "max_induced",
+        "min_prevented", "max_harm", "min_rear_thw", "max_engagement_rate", "max_speed_deficit_mps", "max_jerk"])]
+    no_gate: bool,
     /// Fail if the ego collides in more than K samples
     #[arg(long, value_name = "K")]
     max_collisions: Option<u64>,
+    /// Fail if vehicles other than the ego collide with each other in more than K samples
+    #[arg(long, value_name = "K")]
+    max_other_collisions: Option<u64>,
     /// Pass only if the samples show, for every scenario, that the probability of a collision of the ego is at most P.
     /// The verdict is inconclusive if they show neither that nor the opposite
     #[arg(long, value_name = "P", value_parser = probability)]
@@ -28,6 +39,16 @@ pub(super) struct GateArgs {
     /// Fail if the ego collides in more than K samples in which it does not collide with the baseline; needs --paired
     #[arg(long, value_name = "K")]
     pub(super) max_induced: Option<u64>,
+    /// Pass only if, in every scenario, at least this share (0 to 1) of the baseline's collisions is prevented, with 95 %
+    /// confidence; needs --paired
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    min_prevented: Option<f64>,
+    /// Fail if the harm of all samples of any scenario exceeds this, in expected driver deaths
+    #[arg(long, value_name = "HARM", value_parser = positive)]
+    max_harm: Option<f64>,
+    /// Fail if the time headway of the rear vehicle falls below this in any sample
+    #[arg(long, value_name = "S", value_parser = positive)]
+    min_rear_thw: Option<f64>,
     /// Fail if the margin increase system engages in a larger share (0 to 1) of the samples of any scenario
     #[arg(long, value_name = "SHARE", value_parser = share)]
     max_engagement_rate: Option<f64>,
@@ -42,38 +63,81 @@ pub(super) struct GateArgs {
     max_flip_rate: f64,
 }
 
+/// The gates that a preset adds.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PresetGates {
+    /// The preset's name.
+    pub(super) name: &'static str,
+    /// The criteria.
+    pub(super) require: &'static [&'static str],
+}
+
 impl GateArgs {
-    /// Returns the gates. `is_paired` says whether the campaign has a baseline, `design` is its sampling design.
-    pub(super) fn gates(&self, is_paired: bool, design: Design) -> Result<Gates, CliError> {
-        if self.max_probability.is_some() && design != Design::Random {
+    /// Returns the gates: those of the command line, then those of a preset, then those of the project file. `is_paired` says
+    /// whether the campaign has a baseline, `design` is its sampling design.
+    pub(super) fn gates(
+        &self,
+        is_paired: bool,
+        design: Design,
+        preset: Option<PresetGates>,
+    ) -> Result<GateSet, CliError> {
+        let mut set = GateSet { is_measurement: self.no_gate, max_flip_rate: self.max_flip_rate, ..GateSet::default() };
+        for (expression, scope) in self.criteria()? {
+            if expression.needs_pairs() && !is_paired {
+                let message = format!("`{expression}` compares with a baseline: it needs --paired");
+                return Err(CliError::Usage { message });
+            }
+            set.push(GateSpec { expression, source: GateSource::CommandLine, scope });
+        }
+        set.probability = self.probability()?.map(|gate| ProbabilitySpec { gate, source: GateSource::CommandLine });
+        if let Some(preset) = preset {
+            for text in preset.require {
+                let expression = criterion(text)?;
+                let (source, scope) = (GateSource::Preset(preset.name), Scope::EachScenario);
+                set.push(GateSpec { expression, source, scope });
+            }
+        }
+        if let Some(project) = ProjectFile::find()? {
+            project.add_to(&mut set)?;
+        }
+        if set.probability.is_some() && design != Design::Random {
             let message = format!(
                 "--max-probability needs independent samples, and those of --design {design} are not: use --design random"
             );
             return Err(CliError::Usage { message });
         }
-        if self.max_induced.is_some() && !is_paired {
-            let message =
-                "--max-induced needs --paired: without a baseline it is not known which collisions are induced"
-                    .to_owned();
-            return Err(CliError::Usage { message });
-        }
-        Ok(Gates {
-            max_collisions: self.max_collisions,
-            probability: self.probability()?,
-            max_induced: self.max_induced,
-            max_engagement_rate: self.max_engagement_rate,
-            max_speed_deficit_mps: self.max_speed_deficit_mps,
-            max_jerk_mps3: self.max_jerk,
-            max_flip_rate: self.max_flip_rate,
-        })
+        Ok(set)
+    }
+
+    /// Returns the criteria that the options stand for.
+    fn criteria(&self) -> Result<Vec<(Expression, Scope)>, CliError> {
+        let each = |text: String| Ok::<_, CliError>((criterion(&text)?, Scope::EachScenario));
+        let all = |text: String| Ok::<_, CliError>((criterion(&text)?, Scope::AllScenarios));
+        let own = self.require.iter().map(|&expression| Ok((expression, Scope::EachScenario)));
+        let options = [
+            self.max_collisions.map(|most| all(format!("count(ego_collided) <= {most}"))),
+            self.max_other_collisions.map(|most| all(format!("count(others_collided) <= {most}"))),
+            self.max_induced.map(|most| all(format!("count(induced) <= {most}"))),
+            self.min_prevented.map(|least| each(format!("lower(prevented | baseline.ego_collided) >= {least}"))),
+            self.max_harm.map(|most| each(format!("sum(harm) <= {most}"))),
+            self.min_rear_thw.map(|least| each(format!("min(min_thw_rear_s) >= {least}"))),
+            self.max_engagement_rate.map(|most| each(format!("share(engaged) <= {most}"))),
+            self.max_speed_deficit_mps.map(|most| each(format!("max(max_speed_deficit_mps) <= {most}"))),
+            self.max_jerk.map(|most| each(format!("max(max_jerk_mps3) <= {most}"))),
+        ];
+        own.chain(options.into_iter().flatten()).collect()
     }
 
     /// Returns the gate on the probability of a collision.
     pub(super) fn probability(&self) -> Result<Option<ProbabilityGate>, CliError> {
-        let gate = |max| ProbabilityGate::new(max, self.confidence.unwrap_or(CONFIDENCE));
+        let gate = |max| ProbabilityGate::new(max, self.confidence.unwrap_or(ProbabilityGate::CONFIDENCE));
         let usage = |error| CliError::Usage { message: format!("--max-probability: {error}") };
         self.max_probability.map(gate).transpose().map_err(usage)
     }
+}
+
+fn criterion(text: &str) -> Result<Expression, CliError> {
+    text.parse().map_err(|error| CliError::Usage { message: format!("{error}") })
 }
 
 /// Parses a probability, above 0 and below 1: 0 and 1 cannot be shown by samples.

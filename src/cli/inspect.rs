@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 
 use super::CliError;
 use super::args::{Format, ReadArgs};
+use super::json::stamped;
 use super::output::{outln, print_error};
 use crate::exit_code::ExitCode;
 
@@ -33,7 +34,7 @@ pub(super) fn inspect(args: &InspectArgs) -> Result<ExitCode, CliError> {
         inspector.add(&track);
     }
     match args.format {
-        Format::Json => outln!("{:#}", report(&tracks, &inspector)),
+        Format::Json => outln!("{:#}", stamped(report(&tracks, &inspector), None, None)),
         Format::Human => print(&tracks, &inspector),
     }
     let dropped = tracks.dropped();

@@ -1,12 +1,15 @@
 //! Results as JSON with stable keys. An absent value is `null`, and the key `…_absent` beside it states the reason.
 
+use closecall_campaign::gate::{Answer, Evaluation, ExpectationResult, GateResult, RequirementResult};
 use closecall_campaign::harm;
 use closecall_campaign::ledger::{Inference, Pairs};
+use closecall_campaign::manifest::version;
 use closecall_campaign::summary::{Counts, Summary};
 use closecall_campaign::validity::CheckCounts;
 use closecall_campaign::verdict::Judgement;
 use closecall_report::run::film::Course;
 use closecall_simulation::outcome::{Collision, Margins, MisSummary, MomentAt, Outcome};
+use closecall_simulation::scenario::Setting;
 use closecall_traffic::{Absent, Measured, Value as ParameterValue};
 use serde_json::{Map, Value, json};
 
@@ -21,6 +24,32 @@ fn insert(object: &mut Map<String, Value>, key: &str, measured: Measured) {
             object.insert(format!("{key}_absent"), json!(absent.to_string()));
         }
     }
+}
+
+/// The version of the keys of `--format json`. It changes if a key changes its meaning, not if one is added.
+const SCHEMA_VERSION: u32 = 1;
+
+/// Adds how an output was made: to an object, or to each object of a list. Keys that are there already stay.
+pub(super) fn stamped(mut value: Value, seed: Option<u64>, settings: Option<&[Setting]>) -> Value {
+    let objects = match &mut value {
+        Value::Array(list) => list.iter_mut().collect(),
+        one => vec![one],
+    };
+    let version = version();
+    for object in objects.into_iter().filter_map(Value::as_object_mut) {
+        let mut add = |key: &str, value: Value| {
+            object.entry(key.to_owned()).or_insert(value);
+        };
+        add("schema_version", json!(SCHEMA_VERSION));
+        add("closecall_version", json!(version));
+        if let Some(seed) = seed {
+            add("seed", json!(seed));
+        }
+        if let Some(settings) = settings {
+            add("settings", settings.iter().map(ToString::to_string).collect());
+        }
+    }
+    value
 }
 
 /// Returns the object of `run --format json`.
@@ -108,7 +137,13 @@ fn mis(mis: &Result<MisSummary, Absent>) -> Value {
 pub(super) fn campaign(summary: &Summary, judged: &Judgement, wall_s: Option<f64>) -> Value {
     let total = summary.total();
     let mut object = counts(summary, &total);
-    object.insert("verdict".to_owned(), json!(judged.verdict));
+    if summary.scenarios.len() > 1 {
+        unpool(&mut object, summary);
+    }
+    object.insert("verdict".to_owned(), json!(judged.verdict()));
+    object.insert("gates".to_owned(), json!(judged.gates.iter().map(gate).collect::<Vec<_>>()));
+    object.insert("requirements".to_owned(), json!(judged.requirements.iter().map(requirement).collect::<Vec<_>>()));
+    object.insert("expectations".to_owned(), json!(judged.expectations.iter().map(expectation).collect::<Vec<_>>()));
     object.insert("reasons".to_owned(), json!(judged.reasons));
     object.insert("probabilities".to_owned(), probabilities(judged));
     object.insert("wall_s".to_owned(), json!(wall_s));
@@ -119,6 +154,70 @@ pub(super) fn campaign(summary: &Summary, judged: &Judgement, wall_s: Option<f64
         .collect();
     object.insert("scenarios".to_owned(), Value::Object(scenarios));
     Value::Object(object)
+}
+
+/// Replaces what would treat several scenarios as one sample. The rate is the mean over the scenarios, each with the same
+/// weight; an interval and a test stand with each scenario.
+fn unpool(object: &mut Map<String, Value>, summary: &Summary) {
+    const REASON: &str = "scenarios are not pooled into one sample: see each scenario";
+    if let Some(Value::Object(controllers)) = object.get_mut("controllers") {
+        for (index, name) in summary.controllers.iter().enumerate() {
+            let Some(Value::Object(controller)) = controllers.get_mut(name) else { continue };
+            controller.insert("collision_rate".to_owned(), json!(summary.mean_collision_rate(index)));
+            controller.insert("collision_rate_weights".to_owned(), json!("each scenario has the same weight"));
+            controller.insert("interval_95".to_owned(), Value::Null);
+            controller.insert("interval_95_absent".to_owned(), json!(REASON));
+        }
+    }
+    if let Some(Value::Object(paired)) = object.get_mut("paired") {
+        paired.insert("mcnemar_p".to_owned(), Value::Null);
+        paired.insert("mcnemar_p_absent".to_owned(), json!(REASON));
+    }
+}
+
+fn gate(gate: &GateResult) -> Value {
+    let Evaluation { value, interval_95, samples, answer } = gate.evaluation;
+    let passed = match answer {
+        Answer::Met => Some(true),
+        Answer::Missed => Some(false),
+        Answer::Open(_) => None,
+    };
+    let mut object = json!({
+        "scenario": gate.scenario,
+        "criterion": gate.expression.to_string(),
+        "subject": gate.expression.subject(),
+        "operator": gate.expression.operator.to_string(),
+        "bound": gate.expression.bound,
+        "value": value,
+        "interval_95": interval_95,
+        "samples": samples,
+        "passed": passed,
+        "source": gate.source.to_string(),
+    });
+    if let Answer::Open(reason) = answer {
+        object["passed_absent"] = json!(reason.text());
+    }
+    object
+}
+
+fn requirement(requirement: &RequirementResult) -> Value {
+    json!({
+        "requirement": requirement.mark,
+        "scenario": requirement.scenario,
+        "result": requirement.standing.word(),
+    })
+}
+
+fn expectation(expectation: &ExpectationResult) -> Value {
+    let expects: Vec<&str> = expectation.expects.iter().map(|flag| flag.measure().name).collect();
+    json!({
+        "scenario": expectation.scenario,
+        "expects": expects,
+        "happened": expectation.happened,
+        "samples": expectation.samples,
+        "share": expectation.share(),
+        "least_share": expectation.least_share,
+    })
 }
 
 fn counts(summary: &Summary, counts: &Counts) -> Map<String, Value> {

@@ -10,7 +10,7 @@ use closecall_report::campaign::{CampaignReport, Tally};
 
 use super::args::Format;
 use super::gates::GateArgs;
-use super::output::outln;
+use super::output::{outln, print_report_files};
 use super::summary::{print_counts, print_verdict};
 use super::{CliError, json};
 use crate::exit_code::ExitCode;
@@ -31,7 +31,7 @@ pub(super) struct MergeArgs {
     #[command(flatten)]
     gates: GateArgs,
     /// Output format
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = clap::builder::Resettable::Reset)]
     format: Format,
 }
 
@@ -40,19 +40,23 @@ pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
     let works = works(&args.parts[0], parts.manifest())?;
     parts.check(&works)?;
     let is_paired = works.iter().all(|work| work.arms.len() > 1);
-    let gates = args.gates.gates(is_paired, parts.manifest().sampling.design)?;
+    let gates = args.gates.gates(is_paired, parts.manifest().sampling.design, None)?;
     let merged = parts.merge(&works, &args.out, std::env::args().collect())?;
     let saved = SavedCampaign::of(merged.folder.clone())?;
-    let tally = Tally::of(&saved, &works)?;
-    let judged = tally.summary.judge(gates);
-    let report = CampaignReport { manifest: saved.manifest(), works: &works, tally: &tally, gates, judged: &judged };
+    let tally = Tally::of(&saved, &works, &gates)?;
+    let judged = tally.judgement();
+    let report = CampaignReport { manifest: saved.manifest(), works: &works, tally: &tally, judged: &judged };
     report.write(saved.folder(), args.record)?;
     match args.format {
-        Format::Json => outln!("{:#}", json::campaign(&tally.summary, &judged, None)),
+        Format::Json => outln!(
+            "{:#}",
+            json::stamped(json::campaign(&tally.summary, &judged, None), Some(saved.manifest().sampling.seed), None)
+        ),
         Format::Human => {
             print_counts(&tally.summary);
             print_verdict(&judged);
         }
     }
+    print_report_files(saved.folder());
     Ok(ExitCode::from(&judged))
 }

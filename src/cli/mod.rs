@@ -1,28 +1,41 @@
 //! The command line: arguments, calls, printed results, and exit codes.
 
 mod args;
+mod backend;
+mod baseline;
 mod campaign;
 mod check;
 mod command;
 mod compare;
+mod ending;
 mod error;
 mod gates;
+mod generate;
+mod heartbeat;
 mod inspect;
+mod interrupt;
 mod json;
+mod library;
 mod merge;
+mod new;
 mod output;
 mod plan;
 mod plot;
+mod project;
+mod protect;
 mod record;
 mod reenact;
 mod render;
 mod replay;
 mod robustness;
 mod run;
+mod schema;
+mod source;
 mod statistics;
 mod summary;
 mod trajectories;
 mod watch;
+mod watching;
 
 pub use command::main;
 pub use error::CliError;

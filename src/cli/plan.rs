@@ -7,7 +7,8 @@ use closecall_campaign::ledger::Inference;
 use closecall_campaign::validity::CheckPlan;
 
 use super::CliError;
-use super::gates::share;
+use super::args::count;
+use super::gates::{PresetGates, share};
 
 /// Default number of samples of each scenario.
 const SAMPLES: u64 = 200;
@@ -26,6 +27,14 @@ enum Preset {
 }
 
 impl Preset {
+    /// Returns the gates that the preset sets on a paired campaign: the system must induce hardly any collision.
+    const fn gates(self) -> PresetGates {
+        match self {
+            Self::Pr => PresetGates { name: "pr", require: &["upper(induced) <= 0.01"] },
+            Self::Nightly => PresetGates { name: "nightly", require: &["upper(induced) <= 0.005"] },
+        }
+    }
+
     const fn samples(self) -> u64 {
         match self {
             Self::Pr => 1_000,
@@ -39,7 +48,7 @@ impl Preset {
 pub(super) struct PlanArgs {
     /// Number of samples of each scenario [default: 200]. With --until-certain or --time-budget the largest number
     /// [default: 1000000]
-    #[arg(short = 'n', long = "samples", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(short = 'n', long = "samples", allow_negative_numbers = true, value_parser = count)]
     samples: Option<u64>,
     /// Number of samples for a purpose, paired with the baseline unless the controller under test is the baseline
     #[arg(long, value_enum)]
@@ -67,6 +76,11 @@ pub(super) struct PlanArgs {
 }
 
 impl PlanArgs {
+    /// Returns the gates of the preset, if there is one and the campaign is paired.
+    pub(super) fn preset_gates(&self, is_paired: bool) -> Option<PresetGates> {
+        self.preset.filter(|_| is_paired).map(Preset::gates)
+    }
+
     /// Returns the largest number of samples of each scenario.
     pub(super) fn samples(&self) -> u64 {
         let default = match self.inference() {

@@ -15,13 +15,15 @@ use closecall_simulation::{Arm, RunKey};
 
 use super::CliError;
 use super::args::{ArmArgs, SetArgs, arm};
+use super::backend::check_backend_of;
 use super::output::outln;
+use super::protect::{of_campaign as files_of_campaign, of_scenario as files_of, protect};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall plot`.
 #[derive(Debug, Args)]
 pub(super) struct PlotArgs {
-    /// Scenario file, or the folder of a campaign
+    /// Scenario file, name of a scenario of the library, or the folder of a campaign
     source: PathBuf,
     /// Number of the sample; required for the folder of a campaign
     #[arg(value_name = "SAMPLE")]
@@ -74,6 +76,7 @@ fn of_scenario(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
         return Err(CliError::Usage { message });
     }
     let file = args.set.load(&args.source)?;
+    protect(&[files_of(&file), args.arm.files()].concat(), &[("--output", Some(&args.output))])?;
     let (seed, sample) = (args.seed.unwrap_or(0), args.number.or(args.sample).unwrap_or(0));
     let sampling = Sampling { seed, design: Design::Random, samples: sample.saturating_add(1) };
     let scenario = concrete(&file, sampling, sample).map_err(|source| CliError::Sample { sample, source })?;
@@ -90,6 +93,7 @@ fn of_campaign(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
         let message = "a campaign has many samples: name one, as in `closecall plot DIR SAMPLE -o FILE.svg`".to_owned();
         return Err(CliError::Usage { message });
     };
+    protect(&files_of_campaign(&args.source), &[("--output", Some(&args.output))])?;
     let saved = SavedCampaign::open(&args.source)?;
     let (scenario, key) = saved.sample(args.scenario.as_deref(), sample)?;
     let mut arms = saved.manifest().arms();
@@ -100,6 +104,7 @@ fn of_campaign(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
 }
 
 fn films(scenario: &Scenario, key: RunKey, arms: &[Arm]) -> Result<Vec<Film>, CliError> {
+    check_backend_of(scenario, arms)?;
     film_arms(scenario, key, arms, Level::Objects).map_err(|source| CliError::Sample { sample: key.sample, source })
 }
 

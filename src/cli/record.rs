@@ -13,17 +13,19 @@ use closecall_simulation::scenario::{ActorConfig, Scenario, ScenarioFile};
 use closecall_simulation::{Observer, RunKey};
 
 use super::CliError;
-use super::args::{ArmArgs, SetArgs};
+use super::args::{ArmArgs, SetArgs, count};
+use super::backend::check_backend_of;
 use super::output::outln;
+use super::protect::{of_scenario, protect};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall record`.
 #[derive(Debug, Args)]
 pub(super) struct RecordArgs {
-    /// Scenario file
+    /// Scenario file, name of a scenario of the library, or `-` for standard input
     scenario: PathBuf,
     /// Number of samples; their traffic follows one after the other in the file
-    #[arg(short = 'n', long = "samples", default_value_t = 20, value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    #[arg(short = 'n', long = "samples", default_value_t = 20, allow_negative_numbers = true, value_parser = sample_count)]
     samples: u64,
     /// Seed of the random numbers
     #[arg(long, default_value_t = 0)]
@@ -41,6 +43,17 @@ pub(super) struct RecordArgs {
     output: PathBuf,
 }
 
+/// Largest number of samples in one trajectory file.
+const MAX_SAMPLES: u64 = 100_000;
+
+/// Parses a number of samples that fit into one trajectory file.
+fn sample_count(text: &str) -> Result<u64, String> {
+    match count(text)? {
+        number if number <= MAX_SAMPLES => Ok(number),
+        number => Err(format!("`{number}` is too large: a trajectory file holds up to {MAX_SAMPLES} samples")),
+    }
+}
+
 pub(super) fn record(args: &RecordArgs) -> Result<ExitCode, CliError> {
     match &args.in_car {
         None => record_traffic(args),
@@ -50,6 +63,7 @@ pub(super) fn record(args: &RecordArgs) -> Result<ExitCode, CliError> {
 
 fn record_traffic(args: &RecordArgs) -> Result<ExitCode, CliError> {
     let file = args.set.load(&args.scenario)?;
+    protect(&[of_scenario(&file), args.arm.files()].concat(), &[("--output", Some(&args.output))])?;
     let mut recorder = TrafficRecorder::default();
     each_sample(args, &file, &mut recorder, TrafficRecorder::begin)?;
     let recording = recorder.finish(&file.config().name);
@@ -62,6 +76,9 @@ fn record_traffic(args: &RecordArgs) -> Result<ExitCode, CliError> {
 
 fn record_in_car(args: &RecordArgs, actor: Option<&str>) -> Result<ExitCode, CliError> {
     let file = args.set.load(&args.scenario)?;
+    let truth = truth_path(&args.output);
+    let outputs = [("--output", Some(args.output.as_path())), ("--in-car", Some(truth.as_path()))];
+    protect(&[of_scenario(&file), args.arm.files()].concat(), &outputs)?;
     let actors = &file.config().actors;
     let overtakes = |actor: &&ActorConfig| matches!(actor.driver, DriverConfig::Overtaker(_));
     let ids = || actors.iter().map(|actor| actor.id.to_string());
@@ -82,7 +99,6 @@ fn record_in_car(args: &RecordArgs, actor: Option<&str>) -> Result<ExitCode, Cli
     let mut recorder = InCarRecorder::new(&chosen);
     each_sample(args, &file, &mut recorder, InCarRecorder::begin)?;
     let (log, changes) = recorder.finish();
-    let truth = truth_path(&args.output);
     write_in_car(&log, &args.output)?;
     write_truth(&changes, &truth)?;
     outln!("{} rows of the in-car log of {chosen} written to {}", log.frames.len(), args.output.display());
@@ -102,6 +118,7 @@ fn each_sample<R: Observer>(
     for sample in 0..args.samples {
         let fail = |source| CliError::Sample { sample, source };
         let scenario = concrete(file, sampling, sample).map_err(fail)?;
+        check_backend_of(&scenario, std::slice::from_ref(&arm))?;
         begin(recorder, &scenario);
         run_guarded(&scenario, RunKey { seed: args.seed, sample }, &arm, recorder).map_err(fail)?;
     }

@@ -18,7 +18,7 @@ use serde_json::json;
 
 use super::args::{ArmArgs, Format, ReadArgs, SetArgs};
 use super::output::outln;
-use super::trajectories::refuse_overwriting;
+use super::protect::{of_trajectories, protect};
 use super::watch::{WatchArgs, by_severity, run_filmed};
 use super::{CliError, json};
 use crate::exit_code::ExitCode;
@@ -78,7 +78,9 @@ pub(super) struct ReenactArgs {
 }
 
 pub(super) fn reenact(args: &ReenactArgs) -> Result<ExitCode, CliError> {
-    refuse_overwriting(std::slice::from_ref(&args.file), args.output.as_deref())?;
+    let inputs = [of_trajectories(std::slice::from_ref(&args.file)), args.arm.files()].concat();
+    let [record, trace] = args.watch.outputs();
+    protect(&inputs, &[("--output", args.output.as_deref()), record, trace])?;
     let recording = smooth(&read_with(&args.file, args.read.options())?);
     let changes = criticality(&recording, None);
     let all: Vec<LaneChange> = changes.iter().map(|change| change.lane_change.clone()).collect();
@@ -157,7 +159,7 @@ fn print(format: Format, found: &RecordedEncounter, reenactment: &Reenactment<'_
                 "simulated": json::course(&comparison.simulated),
                 "outcome": json::outcome(outcome),
             });
-            outln!("{object:#}");
+            outln!("{:#}", json::stamped(object, Some(outcome.seed), None));
         }
         Format::Human => {
             outln!("{}: rear vehicle: track {rear}; ego: track {ego}; lead vehicle: track {front}", found.recording);

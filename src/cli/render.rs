@@ -7,7 +7,8 @@ use closecall_sensors::camera::dataset::{Content, DatasetOptions, Set, render_da
 use serde_json::json;
 
 use super::CliError;
-use super::args::Format;
+use super::args::{Format, count};
+use super::json::stamped;
 use super::output::outln;
 use crate::exit_code::ExitCode;
 
@@ -28,7 +29,7 @@ pub(super) struct RenderArgs {
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
     /// Number of random scenes
-    #[arg(short = 'n', long = "scenes", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(short = 'n', long = "scenes", default_value_t = 20, allow_negative_numbers = true, value_parser = scene_count)]
     scenes: u32,
     /// Seed of the random scenes
     #[arg(long, default_value_t = 0)]
@@ -44,6 +45,11 @@ pub(super) struct RenderArgs {
     format: Format,
 }
 
+/// Parses a number of scenes.
+fn scene_count(text: &str) -> Result<u32, String> {
+    u32::try_from(count(text)?).map_err(|_| format!("`{text}` is too large"))
+}
+
 pub(super) fn render(args: &RenderArgs) -> Result<ExitCode, CliError> {
     let options = DatasetOptions {
         set: match args.set {
@@ -56,7 +62,7 @@ pub(super) fn render(args: &RenderArgs) -> Result<ExitCode, CliError> {
     };
     let summary = render_dataset(&options, &args.output)?;
     match args.format {
-        Format::Json => outln!("{:#}", json!(summary)),
+        Format::Json => outln!("{:#}", stamped(json!(summary), Some(args.seed), None)),
         Format::Human => {
             let [car, truck, motorcycle, background] = summary.labels;
             outln!("{} images of {} scenes written to {}", summary.pictures, summary.scenes, args.output.display());

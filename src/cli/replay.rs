@@ -12,6 +12,7 @@ use closecall_simulation::outcome::Outcome;
 use super::CliError;
 use super::args::Format;
 use super::output::print_error;
+use super::protect::{of_campaign, of_controller, protect};
 use super::run::print;
 use super::watch::{WatchArgs, run_watched};
 use crate::exit_code::ExitCode;
@@ -41,6 +42,8 @@ pub(super) struct ReplayArgs {
 
 pub(super) fn replay(args: &ReplayArgs) -> Result<ExitCode, CliError> {
     let saved = SavedCampaign::open(&args.dir)?;
+    let controllers = saved.manifest().arms.iter().flat_map(of_controller);
+    protect(&of_campaign(&args.dir).into_iter().chain(controllers).collect::<Vec<_>>(), &args.watch.outputs())?;
     let (scenario, key) = saved.sample(args.scenario.as_deref(), args.sample)?;
     let arms = match args.paired {
         true => saved.manifest().arms(),
@@ -49,8 +52,12 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<ExitCode, CliError> {
     for arm in &arms {
         announce_process(saved.manifest(), arm.controller.name());
     }
+    let changes = saved.manifest().changed_controllers(&scenario);
+    for change in &changes {
+        print_error(format_args!("{change}\n"));
+    }
     let outcomes = run_watched(&scenario, key, &arms, &args.watch)?;
-    print(&outcomes, args.format);
+    print(&outcomes, args.format, None);
     let mut agrees = true;
     for outcome in &outcomes {
         agrees &= agrees_with_journal(saved.folder(), outcome)?;
@@ -58,11 +65,13 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<ExitCode, CliError> {
     if agrees {
         return Ok(ExitCode::Pass);
     }
-    print_error(format_args!(
-        "the replay differs from the campaign's journal: closecall {} ran the campaign, this is {}\n",
-        saved.manifest().closecall_version,
-        version(),
-    ));
+    let (there, here) = (&saved.manifest().closecall_version, version());
+    let cause = match &changes[..] {
+        [] if *there == here => "the program and the files of the controllers have not changed".to_owned(),
+        [] => format!("closecall {there} ran the campaign, this is {here}"),
+        changes => changes.join("; "),
+    };
+    print_error(format_args!("the replay differs from the campaign's journal: {cause}\n"));
     Ok(ExitCode::Invalid)
 }
 

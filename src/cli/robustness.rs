@@ -12,7 +12,9 @@ use rayon::prelude::*;
 
 use super::CliError;
 use super::args::{Format, ReadArgs};
-use super::output::outln;
+use super::json::stamped;
+use super::output::{outln, print_error, print_written};
+use super::protect::{of_trajectories, protect};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall robustness`.
@@ -38,6 +40,10 @@ pub(super) struct RobustnessArgs {
 }
 
 pub(super) fn robustness(args: &RobustnessArgs) -> Result<ExitCode, CliError> {
+    let charts = args.plot.as_ref().map(|folder| ["noise.svg", "offset.svg"].map(|name| folder.join(name)));
+    for chart in charts.iter().flatten() {
+        protect(&of_trajectories(&args.files), &[("--plot", Some(chart))])?;
+    }
     let setup = Setup { seed: args.seed, repetitions: args.repetitions, ..Setup::default() };
     let mut studies = Vec::new();
     for path in &args.files {
@@ -63,8 +69,12 @@ pub(super) fn robustness(args: &RobustnessArgs) -> Result<ExitCode, CliError> {
         plot(&found, folder)?;
     }
     match args.format {
-        Format::Json => outln!("{:#}", json(&found)),
+        Format::Json => outln!("{:#}", stamped(json(&found), None, None)),
         Format::Human => print(&found),
+    }
+    if found.reference == 0 {
+        print_error(format_args!("there is no lane change in the trajectory files: nothing was studied\n"));
+        return Ok(ExitCode::Inconclusive);
     }
     Ok(ExitCode::Pass)
 }
@@ -142,7 +152,9 @@ fn plot(found: &Robustness, folder: &Path) -> Result<(), CliError> {
     let offset = Axis { name: "Lateral offset [m]", levels: &levels.offset_m, rows: &found.offset };
     for (name, legend, axis) in [("noise.svg", Legend::LowerLeft, noise), ("offset.svg", Legend::LowerMiddle, offset)] {
         let svg = LineChart { legend, ..chart(found, &axis) }.svg()?;
-        write_file(&folder.join(name), |file| file.write_all(svg.as_bytes()))?;
+        let path = folder.join(name);
+        write_file(&path, |file| file.write_all(svg.as_bytes()))?;
+        print_written(&path);
     }
     Ok(())
 }

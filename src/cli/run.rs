@@ -7,9 +7,11 @@ use closecall_campaign::runner::{Sampling, concrete};
 use closecall_scenarios::sampling::Design;
 use closecall_simulation::RunKey;
 use closecall_simulation::outcome::Outcome;
+use closecall_simulation::scenario::Setting;
 
 use super::args::{ArmArgs, Format, SetArgs};
 use super::output::{out, outln};
+use super::protect::{of_scenario, protect};
 use super::watch::{WatchArgs, run_watched};
 use super::{CliError, json};
 use crate::exit_code::ExitCode;
@@ -17,7 +19,7 @@ use crate::exit_code::ExitCode;
 /// Arguments of `closecall run`.
 #[derive(Debug, Args)]
 pub(super) struct RunArgs {
-    /// Scenario file
+    /// Scenario file, name of a scenario of the library, or `-` for standard input
     scenario: PathBuf,
     /// Seed of the random numbers
     #[arg(long, default_value_t = 0)]
@@ -42,22 +44,24 @@ pub(super) struct RunArgs {
 
 pub(super) fn run(args: &RunArgs) -> Result<ExitCode, CliError> {
     let file = args.set.load(&args.scenario)?;
+    protect(&[of_scenario(&file), args.arm.files()].concat(), &args.watch.outputs())?;
     let sampling = Sampling { seed: args.seed, design: Design::Random, samples: args.sample.saturating_add(1) };
     let fail = |source| CliError::Sample { sample: args.sample, source };
     let scenario = concrete(&file, sampling, args.sample).map_err(fail)?;
     let key = RunKey { seed: args.seed, sample: args.sample };
     let outcomes = run_watched(&scenario, key, &args.arm.arms(args.paired)?, &args.watch)?;
-    print(&outcomes, args.format);
+    print(&outcomes, args.format, Some(&args.set.settings));
     Ok(ExitCode::Pass)
 }
 
-/// Prints the outcome of a run, or a list of the outcomes of a pair, the baseline first.
-pub(super) fn print(outcomes: &[Outcome], format: Format) {
+/// Prints the outcome of a run, or a list of the outcomes of a pair, the baseline first. `settings` are those of the
+/// command line, if it can have any.
+pub(super) fn print(outcomes: &[Outcome], format: Format, settings: Option<&[Setting]>) {
     match (format, outcomes) {
-        (Format::Json, [outcome]) => outln!("{:#}", json::outcome(outcome)),
+        (Format::Json, [outcome]) => outln!("{:#}", json::stamped(json::outcome(outcome), None, settings)),
         (Format::Json, outcomes) => {
             let both: Vec<_> = outcomes.iter().map(json::outcome).collect();
-            outln!("{:#}", serde_json::Value::Array(both));
+            outln!("{:#}", json::stamped(serde_json::Value::Array(both), None, settings));
         }
         (Format::Human, outcomes) => {
             for outcome in outcomes {

@@ -13,7 +13,9 @@ use closecall_scenarios::recordings::{Recording, read_with};
 
 use super::CliError;
 use super::args::{Format, ReadArgs, positive};
-use super::output::outln;
+use super::json::stamped;
+use super::output::{outln, print_written};
+use super::protect::{of_trajectories, protect};
 use super::trajectories::refuse_duplicates;
 use crate::exit_code::ExitCode;
 
@@ -37,6 +39,10 @@ pub(super) struct StatisticsArgs {
 }
 
 pub(super) fn statistics(args: &StatisticsArgs) -> Result<ExitCode, CliError> {
+    let charts = args.plot.as_ref().map(|folder| ["duration.svg", "speed.svg"].map(|name| folder.join(name)));
+    for chart in charts.iter().flatten() {
+        protect(&of_trajectories(&args.files), &[("--plot", Some(chart))])?;
+    }
     let read = |path: &PathBuf| read_with(path, args.read.options());
     let recordings = args.files.iter().map(read).collect::<Result<Vec<Recording>, _>>()?;
     refuse_duplicates(&args.files, &recordings)?;
@@ -46,7 +52,7 @@ pub(super) fn statistics(args: &StatisticsArgs) -> Result<ExitCode, CliError> {
         plot(&found, folder)?;
     }
     match args.format {
-        Format::Json => outln!("{:#}", serde_json::json!(found)),
+        Format::Json => outln!("{:#}", stamped(serde_json::json!(found), None, None)),
         Format::Human => print(&found),
     }
     Ok(ExitCode::Pass)
@@ -92,7 +98,9 @@ fn plot(found: &Statistics, folder: &Path) -> Result<(), CliError> {
     ] {
         let boxes = found.classes.iter().filter_map(|class| Some(box_of(class, value(class)?))).collect();
         let svg = BoxChart { title: title.to_owned(), y_name: y_name.to_owned(), boxes }.svg()?;
-        write_file(&folder.join(name), |file| file.write_all(svg.as_bytes()))?;
+        let path = folder.join(name);
+        write_file(&path, |file| file.write_all(svg.as_bytes()))?;
+        print_written(&path);
     }
     Ok(())
 }

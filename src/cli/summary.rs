@@ -8,15 +8,11 @@ use closecall_campaign::verdict::Judgement;
 
 use super::output::{out, outln};
 
-/// Prints the counts of each scenario, and of all scenarios together.
+/// Prints the counts of each scenario. Scenarios are never pooled into one sample.
 pub(super) fn print_counts(summary: &Summary) {
     for (name, counts) in &summary.scenarios {
         outln!("{name}: {} samples", counts.samples);
         print_scenario(summary, counts);
-    }
-    if summary.scenarios.len() > 1 {
-        outln!("all scenarios");
-        print_scenario(summary, &summary.total());
     }
     if summary.inference == Inference::Sequential {
         outln!(
@@ -28,7 +24,7 @@ pub(super) fn print_counts(summary: &Summary) {
 
 /// Prints the verdict with its reasons.
 pub(super) fn print_verdict(judged: &Judgement) {
-    outln!("{}", judged.verdict);
+    outln!("{}", judged.word());
     for reason in &judged.reasons {
         outln!("  {reason}");
     }

@@ -1,6 +1,6 @@
 //! `closecall lane-changes`, `criticality` and `fit`: from trajectory files to distributions.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use closecall_scenarios::atomic::WriteError;
@@ -12,7 +12,9 @@ use closecall_scenarios::recordings::{Layout, Recording, open, quality, read_wit
 
 use super::CliError;
 use super::args::{Format, ReadArgs, positive};
+use super::json::stamped;
 use super::output::{out, outln};
+use super::protect::{of_trajectories, protect, recording as recording_path};
 use super::watch::record_lane_change;
 use crate::exit_code::ExitCode;
 
@@ -71,7 +73,7 @@ pub(super) struct CriticalityArgs {
     #[arg(long, value_name = "M/S", value_parser = positive)]
     speed_limit_mps: Option<f64>,
     /// Save a recording (Rerun file) of one lane change: the most critical one, or that of the track named by --track
-    #[arg(long, value_name = "FILE.rrd")]
+    #[arg(long, value_name = "FILE.rrd", value_parser = recording_path)]
     record: Option<PathBuf>,
     /// Track whose lane change --record saves
     #[arg(long, value_name = "ID", requires = "record")]
@@ -131,8 +133,10 @@ pub(super) fn lane_changes(args: &LaneChangesArgs) -> Result<ExitCode, CliError>
         score(&changes, &listed, &spans)
     });
     match (args.format, scored) {
-        (Format::Json, None) => outln!("{:#}", serde_json::json!(changes)),
-        (Format::Json, Some(scored)) => outln!("{:#}", serde_json::json!({ "lane_changes": changes, "score": scored })),
+        (Format::Json, None) => outln!("{:#}", stamped(serde_json::json!(changes), None, None)),
+        (Format::Json, Some(scored)) => {
+            outln!("{:#}", stamped(serde_json::json!({ "lane_changes": changes, "score": scored }), None, None));
+        }
         (Format::Human, scored) => {
             let (rows, period, dropped) = (tracks.rows(), tracks.period(), tracks.dropped().count());
             outln!("{name}: {count} tracks, {rows} rows every {period}, {dropped} rows skipped");
@@ -202,6 +206,7 @@ fn line(change: &LaneChange) -> String {
 }
 
 pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> {
+    protect(&of_trajectories(std::slice::from_ref(&args.file)), &[("--record", args.record.as_deref())])?;
     let recording = read_with(&args.file, args.read.options())?;
     let smoothed = smooth(&recording);
     let changes = evaluate(&smoothed, args.speed_limit_mps);
@@ -209,7 +214,7 @@ pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> 
         record_lane_change(path, &smoothed, &changes, args.track)?;
     }
     match args.format {
-        Format::Json => outln!("{:#}", serde_json::json!(changes)),
+        Format::Json => outln!("{:#}", stamped(serde_json::json!(changes), None, None)),
         Format::Human => {
             describe(&recording);
             print_metrics(&changes);
@@ -239,10 +244,10 @@ fn print_metrics(changes: &[CriticalLaneChange]) {
 }
 
 pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
+    protect(&of_trajectories(&args.files), &[("--output", args.output.as_deref())])?;
     let recordings =
         args.files.iter().map(|path| read_with(path, args.read.options())).collect::<Result<Vec<_>, _>>()?;
     refuse_duplicates(&args.files, &recordings)?;
-    refuse_overwriting(&args.files, args.output.as_deref())?;
     let fitted = fit_distributions(&recordings, args.seed);
     let command = std::iter::once("closecall".to_owned()).chain(std::env::args().skip(1)).collect::<Vec<_>>().join(" ");
     let heading = Heading { command, provenance: args.provenance.clone() };
@@ -250,7 +255,7 @@ pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
         write_toml(&fitted, &heading, path).map_err(|source| WriteError::new(path, source))?;
     }
     match (args.format, &args.output) {
-        (Format::Json, _) => outln!("{:#}", json(&fitted)),
+        (Format::Json, _) => outln!("{:#}", stamped(json(&fitted), None, None)),
         (Format::Human, None) => out!("{}", to_toml(&fitted, &heading)),
         (Format::Human, Some(path)) => {
             for quantity in &fitted.fitted {
@@ -275,18 +280,6 @@ pub(super) fn refuse_duplicates(paths: &[PathBuf], recordings: &[Recording]) -> 
         }
     }
     Ok(())
-}
-
-/// Returns an error if `output` is one of the `inputs`.
-pub(super) fn refuse_overwriting(inputs: &[PathBuf], output: Option<&Path>) -> Result<(), CliError> {
-    let Some(output) = output else { return Ok(()) };
-    let same = |input: &&PathBuf| matches!((input.canonicalize(), output.canonicalize()), (Ok(a), Ok(b)) if a == b);
-    match inputs.iter().find(same) {
-        Some(input) => Err(CliError::Usage {
-            message: format!("--output would overwrite the trajectory file {}", input.display()),
-        }),
-        None => Ok(()),
-    }
 }
 
 fn json(fitted: &closecall_scenarios::fit::FittedDistributions) -> serde_json::Value {

@@ -16,6 +16,9 @@ use closecall_simulation::{Arm, Happening, Observer, RunKey, StepView};
 use closecall_traffic::Time;
 
 use super::CliError;
+use super::backend::check_backend_of;
+use super::output::print_written;
+use super::protect::{Output, recording};
 
 /// The level of detail of a recording.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -43,7 +46,7 @@ impl From<RecordLevel> for Level {
 #[derive(Clone, Debug, Default, Args)]
 pub(super) struct WatchArgs {
     /// Save a recording of the run, to be viewed with Rerun
-    #[arg(long, value_name = "FILE.rrd")]
+    #[arg(long, value_name = "FILE.rrd", value_parser = recording)]
     pub(super) record: Option<PathBuf>,
     /// Level of detail of the recording
     #[arg(long, value_enum, default_value_t, requires = "record")]
@@ -55,11 +58,13 @@ pub(super) struct WatchArgs {
 }
 
 impl WatchArgs {
+    /// Returns the files to write.
+    pub(super) fn outputs(&self) -> [Output<'_>; 2] {
+        [("--record", self.record.as_deref()), ("--trace", self.trace.as_deref())]
+    }
+
     /// Checks that the requested files can be written, before any work is done.
     fn check(&self) -> Result<(), CliError> {
-        if self.record.is_some() && self.record == self.trace {
-            return Err(CliError::Usage { message: "--record and --trace name the same file".to_owned() });
-        }
         Ok(self.record.as_deref().map(check_recordable).transpose().map(drop)?)
     }
 }
@@ -81,6 +86,7 @@ pub(super) fn run_watched(
     watch: &WatchArgs,
 ) -> Result<Vec<Outcome>, CliError> {
     watch.check()?;
+    check_backend_of(scenario, arms)?;
     let mut trace = watch.trace.as_deref().map(TraceWriter::new).transpose()?;
     let mut films = Vec::new();
     let mut outcomes = Vec::new();
@@ -96,9 +102,13 @@ pub(super) fn run_watched(
     }
     if let Some(path) = &watch.record {
         write_films(path, &films)?;
+        print_written(path);
     }
     if let Some(trace) = trace {
         trace.finish()?;
+    }
+    if let Some(path) = &watch.trace {
+        print_written(path);
     }
     Ok(outcomes)
 }
@@ -111,6 +121,7 @@ pub(super) fn run_filmed(
     watch: &WatchArgs,
 ) -> Result<(Outcome, Film), CliError> {
     watch.check()?;
+    check_backend_of(scenario, std::slice::from_ref(arm))?;
     let mut trace = watch.trace.as_deref().map(TraceWriter::new).transpose()?;
     let mut recorder = FilmRecorder::new(scenario, key, arm, watch.record_level.into());
     let mut observers = Observers { recorder: Some(&mut recorder), trace: trace.as_mut() };
@@ -161,7 +172,9 @@ pub(super) fn record_lane_change(
         let of_track = track.map_or(String::new(), |track| format!(" of track {track}"));
         return Err(CliError::Usage { message: format!("the trajectory file has no lane change{of_track} to record") });
     };
-    Ok(record_films(path, &[film_lane_change(recording, chosen)?])?)
+    record_films(path, &[film_lane_change(recording, chosen)?])?;
+    print_written(path);
+    Ok(())
 }
 
 /// Returns the lane changes of `track`, or of all tracks, the most critical first. Of two equal ones the later is

@@ -18,7 +18,7 @@ const PAUSE: Duration = Duration::from_millis(1);
 
 fn args(out: &Path, more: &[&str]) -> Vec<String> {
     let scenario = library("low-thw-overtake");
-    let all = ["campaign", scenario.to_str().unwrap(), "--seed", "11", "--paired", "--recordings", "1"];
+    let all = ["campaign", scenario.to_str().unwrap(), "--seed", "11", "--paired", "--recordings", "1", "--no-gate"];
     let samples = SAMPLES.to_string();
     let fixed = ["-n", &samples, "--out", out.to_str().unwrap()];
     all.iter().chain(&fixed).chain(more).map(|arg| (*arg).to_owned()).collect()
@@ -78,7 +78,7 @@ fn undisturbed(folder: &Path) -> std::path::PathBuf {
     out
 }
 
-const REPORTS: [&str; 3] = ["journal.jsonl", "outcomes.parquet", "junit.xml"];
+const REPORTS: [&str; 3] = ["journal.jsonl", "outcomes.parquet", "samples.xml"];
 
 #[test]
 fn a_campaign_that_is_killed_and_resumed_repeatedly_ends_in_the_same_bytes() {
@@ -137,6 +137,59 @@ fn samples_after_a_damaged_journal_record_are_run_again() {
     stdout(&resumed, 0);
     assert!(stderr(&resumed).contains("checksum"), "{}", stderr(&resumed));
     assert!(bytes(&whole, "journal.jsonl") == intact);
+}
+
+#[test]
+fn a_damaged_journal_record_costs_only_its_own_sample() {
+    let folder = folder();
+    let whole = undisturbed(folder.path());
+    let intact = bytes(&whole, "journal.jsonl");
+    let table = bytes(&whole, "outcomes.parquet");
+    let ends: Vec<usize> = (0..intact.len()).filter(|index| intact[*index] == b'\n').collect();
+    // A byte of a line, the line feed that ends one, and a line feed inside one.
+    for (index, byte) in [(ends[100] - 30, b'#'), (ends[200], b'#'), (ends[300] - 30, b'\n')] {
+        let mut damaged = intact.clone();
+        damaged[index] = byte;
+        // The line before the damaged one ends here: from there to the end, no other line may be run again.
+        fs::write(whole.join("journal.jsonl"), &damaged).unwrap();
+        let times = fs::read_to_string(whole.join("wall-times.jsonl")).unwrap();
+        let resumed = closecall(args(&whole, &["--resume"]));
+        stdout(&resumed, 0);
+        assert!(stderr(&resumed).contains("its sample was run again"), "{}", stderr(&resumed));
+        assert!(bytes(&whole, "journal.jsonl") == intact, "byte {index}");
+        assert!(bytes(&whole, "outcomes.parquet") == table, "byte {index}");
+        // The wall time of a sample that is run again differs.
+        let now = fs::read_to_string(whole.join("wall-times.jsonl")).unwrap();
+        let changed = times.lines().zip(now.lines()).filter(|(before, after)| before != after).count();
+        assert!(times.lines().count() == SAMPLES && now.lines().count() == SAMPLES && changed <= 2, "{changed}");
+    }
+}
+
+#[test]
+fn samples_that_ended_in_an_error_are_run_again_on_request() {
+    let folder = folder();
+    let out = folder.path().join("out");
+    let (marker, script) = (folder.path().join("works"), folder.path().join("ctl.sh"));
+    let text = format!(
+        "[ -e '{}' ] || exit 3\necho '{{\"type\":\"hello\",\"protocol\":1}}'\nread -r line\n\
+         while read -r line; do echo '{{\"acceleration_mps2\":0.0,\"state\":\"following\"}}'; done\n",
+        marker.display()
+    );
+    fs::write(&script, text).unwrap();
+    let controller = format!("exec:sh {}", script.display());
+    let scenario = library("low-thw-overtake");
+    let campaign = |more: &[&str]| {
+        let fixed = ["campaign", scenario.to_str().unwrap(), "-n", "4", "--no-gate", "--out", out.to_str().unwrap()];
+        let controller = ["--record", "failures:0", "--controller", &controller, "--controller-timeout-ms", "60000"];
+        closecall(fixed.iter().chain(&controller).chain(more))
+    };
+    assert_eq!(code(&campaign(&[])), 5);
+    fs::write(&marker, "").unwrap();
+    assert_eq!(code(&campaign(&["--resume"])), 5, "errors are kept");
+    let retried = campaign(&["--resume", "--retry-errors"]);
+    assert_ne!(code(&retried), 5, "{}", stderr(&retried));
+    assert!(stderr(&retried).contains("4 samples that had ended in an error were run again"), "{}", stderr(&retried));
+    assert_eq!(code(&campaign(&["--retry-errors"])), 2, "only with --resume");
 }
 
 #[test]

@@ -72,13 +72,14 @@ fn a_folder_with_other_files_is_not_used() {
     fs::create_dir(&out).unwrap();
     fs::write(out.join("thesis.tex"), "do not lose this").unwrap();
     let headline = library("low-thw-overtake");
-    let run = |out: &str| closecall(["campaign", headline.to_str().unwrap(), "-n", "2", "--out", out]);
+    let run = |out: &str| closecall(["campaign", headline.to_str().unwrap(), "-n", "2", "--no-gate", "--out", out]);
     assert_eq!(code(&run(out.to_str().unwrap())), 2);
     assert_eq!(fs::read_dir(&out).unwrap().count(), 1);
     let other = folder.path().join("other");
     stdout(&run(other.to_str().unwrap()), 0);
     let manifest = fs::read(other.join("manifest.json")).unwrap();
-    let again = closecall(["campaign", headline.to_str().unwrap(), "-n", "3", "--out", other.to_str().unwrap()]);
+    let again =
+        closecall(["campaign", headline.to_str().unwrap(), "-n", "3", "--no-gate", "--out", other.to_str().unwrap()]);
     assert_eq!(code(&again), 2, "{}", stderr(&again));
     assert_eq!(fs::read(other.join("manifest.json")).unwrap(), manifest);
 }
@@ -116,7 +117,10 @@ fn a_replay_of_a_missing_sample_or_campaign_is_an_error() {
     let folder = folder();
     let out = folder.path().join("out");
     let headline = library("low-thw-overtake");
-    stdout(&closecall(["campaign", headline.to_str().unwrap(), "-n", "4", "--out", out.to_str().unwrap()]), 0);
+    stdout(
+        &closecall(["campaign", headline.to_str().unwrap(), "-n", "4", "--no-gate", "--out", out.to_str().unwrap()]),
+        0,
+    );
     assert_eq!(code(&closecall(["replay", out.to_str().unwrap(), "4"])), 2);
     assert_eq!(code(&closecall(["replay", folder.path().to_str().unwrap(), "0"])), 6);
     fs::write(out.join("manifest.json"), "{\"manifest_version\": 1").unwrap();

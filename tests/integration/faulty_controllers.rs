@@ -10,13 +10,14 @@ use std::time::Duration;
 
 use closecall_campaign::execution::{Campaign, End};
 use closecall_campaign::folder::Folder;
+use closecall_campaign::gate::{GateSet, Judge};
 use closecall_campaign::ledger::Inference;
 use closecall_campaign::manifest::{MANIFEST_VERSION, Manifest, ManifestScenario};
 use closecall_campaign::record::{Record, SampleFailure};
 use closecall_campaign::runner::{Sampling, Work};
 use closecall_campaign::summary::Summary;
 use closecall_campaign::validity::CheckPlan;
-use closecall_campaign::verdict::{Decision, Gates, Verdict};
+use closecall_campaign::verdict::{Decision, Judgement, MAX_FLIP_RATE, Verdict, judge};
 use closecall_campaign::workers::Workers;
 use closecall_controllers::{ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack};
 use closecall_scenarios::sampling::Design;
@@ -123,6 +124,8 @@ fn manifest(campaign: &Campaign) -> Manifest {
         inference: Inference::default(),
         models: Vec::new(),
         sample_timeout_s: WATCHDOG.as_secs_f64(),
+        controllers: Vec::new(),
+        working_folder: None,
         command: Vec::new(),
     }
 }
@@ -131,9 +134,9 @@ fn run(fault: Option<Fault>, jobs: usize) -> (Vec<Record>, Summary) {
     let campaign = campaign(fault, jobs);
     let mut summary = campaign.summary();
     let mut records = Vec::new();
-    let finished = campaign.run(None, |turn| {
-        summary.push(turn.record);
-        records.push(turn.record.clone());
+    let finished = campaign.run(None, |next| {
+        summary.push(next.record);
+        records.push(next.record.clone());
         ControlFlow::Continue(())
     });
     finished.unwrap();
@@ -169,9 +172,9 @@ fn each_fault_is_an_error_with_its_reason_and_leaves_the_other_samples_unchanged
             }
             assert_eq!(record.arms[0], sound.arms[0], "the other arm differs in sample {}", record.sample);
         }
-        let judged = summary.judge(Gates::default());
+        let judged = judged(&summary, &campaign(Some(fault), 1));
         assert_eq!(judged.decision, Decision::SampleError, "{fault:?}");
-        assert_ne!(judged.verdict, Verdict::Pass, "{fault:?}");
+        assert_eq!(judged.verdict(), Some(Verdict::Error), "{fault:?}");
         assert_eq!(summary.total().errors(), failed.len() as u64);
         failed_by_fault.push(failed);
     }
@@ -181,12 +184,17 @@ fn each_fault_is_an_error_with_its_reason_and_leaves_the_other_samples_unchanged
     );
 }
 
+/// Judges a summary without gates.
+fn judged(summary: &Summary, campaign: &Campaign) -> Judgement {
+    judge(summary, &Judge::new(&campaign.works, &GateSet::default(), campaign.inference), MAX_FLIP_RATE)
+}
+
 /// Runs `campaign` in a folder, and stops it after `samples` more samples.
 fn run_part(campaign: &Campaign, path: &Path, samples: usize) {
     let locked = Folder::lock(path, &manifest(campaign), true).unwrap();
     let mut left = samples;
-    let finished = campaign.run(Some(&locked), |turn| {
-        left = if turn.is_new { left - 1 } else { left };
+    let finished = campaign.run(Some(&locked), |next| {
+        left = if next.is_new { left - 1 } else { left };
         if left == 0 { ControlFlow::Break(End::Campaign) } else { ControlFlow::Continue(()) }
     });
     finished.unwrap();

@@ -1,17 +1,20 @@
-//! The gate distinguishes a controller that helps from one that does nothing, does harm, or acts too late.
+//! Ten deliberately bad controllers against the library with its own requirement checks: each fails or is not judged, and the
+//! requirement that it violates is named. The margin increase system (MIS) itself passes.
 
 use std::num::NonZeroUsize;
 use std::sync::Arc;
 use std::time::Duration;
 
 use closecall_campaign::execution::Campaign;
-use closecall_campaign::ledger::Inference;
+use closecall_campaign::gate::{GateSet, Standing};
 use closecall_campaign::runner::{Sampling, Work};
-use closecall_campaign::summary::Counts;
+use closecall_campaign::summary::Summary;
 use closecall_campaign::validity::CheckPlan;
-use closecall_campaign::verdict::{Decision, Evidence, Gates};
+use closecall_campaign::verdict::{Decision, Judgement};
 use closecall_campaign::workers::Workers;
-use closecall_controllers::{ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack, EgoState};
+use closecall_controllers::{
+    ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack, EgoState, Reason,
+};
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::BuiltIn;
@@ -21,27 +24,67 @@ use closecall_traffic::Time;
 
 use crate::support::library;
 
-const SAMPLES: u64 = 200;
+const SAMPLES: u64 = 150;
+/// Samples of each scenario with a fault: enough to fail.
+const FAULT_SAMPLES: u64 = 40;
 const SEED: u64 = 1;
+/// Every scenario of the library.
+const LIBRARY: [&str; 8] = [
+    "low-thw-overtake",
+    "low-thw-overtake-at-cut-out",
+    "overtake-without-brake",
+    "left-lane-blocked",
+    "rear-follower-stays",
+    "slow-approach",
+    "empty-wet-road",
+    "paper-figure",
+];
 
-/// A fault that a controller adds to the commands of the margin increase system (MIS).
-#[derive(Clone, Copy)]
+/// A fault that a controller adds to the commands of the MIS.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Fault {
     /// The MIS accelerates instead of braking.
     SignFlipped,
+    /// The ego never brakes.
+    NeverBrakes,
     /// The ego always brakes.
     AlwaysBrakes,
+    /// The cruise control alone, which says that it has a MIS.
+    MisOff,
+    /// The MIS says that it is engaged at every step, and brakes gently.
+    EngagesAlways,
+    /// The MIS engages in every run from 5 s on, whether a rear vehicle is there or not.
+    EngagesOnNothing,
     /// The MIS acts 5 s late.
     FiveSecondsLate,
+    /// The MIS gains a quarter of the margin.
+    GoalOfHalfASecond,
+    /// The MIS releases one control step after it engages.
+    ReleasesAtOnce,
+    /// The commands jump between braking and accelerating.
+    Random,
+    /// One command in 1,000 is not a number.
+    NotANumber,
 }
+
+/// The faults, and a requirement that each violates; `None` if the campaign itself ends in errors.
+const FAULTS: [(Fault, Option<&str>); 11] = [
+    (Fault::SignFlipped, Some("MIS-1")),
+    (Fault::NeverBrakes, Some("MIS-1")),
+    (Fault::AlwaysBrakes, Some("MIS-6")),
+    (Fault::MisOff, Some("MIS-7")),
+    (Fault::EngagesAlways, Some("MIS-5")),
+    (Fault::EngagesOnNothing, Some("MIS-5")),
+    (Fault::FiveSecondsLate, Some("MIS-7")),
+    (Fault::GoalOfHalfASecond, Some("MIS-7")),
+    (Fault::ReleasesAtOnce, Some("MIS-7")),
+    (Fault::Random, Some("MIS-7")),
+    (Fault::NotANumber, None),
+];
 
 impl ControllerFactory for Fault {
     fn name(&self) -> &str {
-        match self {
-            Self::SignFlipped => "sign-flipped",
-            Self::AlwaysBrakes => "always-brakes",
-            Self::FiveSecondsLate => "late",
-        }
+        "faulty"
     }
 
     fn has_mis(&self, settings: &EgoSettings) -> bool {
@@ -50,7 +93,7 @@ impl ControllerFactory for Fault {
 
     fn build(&self, settings: &EgoSettings) -> Box<dyn EgoController> {
         let without = EgoStack::new(settings.without_mis());
-        Box::new(Faulty { fault: *self, stack: EgoStack::new(*settings), without, engaged_at: None })
+        Box::new(Faulty { fault: *self, stack: EgoStack::new(*settings), without, engaged_at: None, steps: 0 })
     }
 }
 
@@ -59,102 +102,113 @@ struct Faulty {
     stack: EgoStack,
     without: EgoStack,
     engaged_at: Option<Time>,
+    steps: u64,
 }
 
 /// The acceleration of a controller that always brakes (m/s²).
 const ALWAYS_MPS2: f64 = -2.0;
+/// The gentle braking of one that engages without a reason (m/s²).
+const GENTLE_MPS2: f64 = -0.5;
+/// How late the late one is.
+const LATE: Time = Time::from_ms(5_000);
 
 impl EgoController for Faulty {
     fn step(&mut self, input: &EgoInput<'_>) -> Result<EgoCommand, ControllerError> {
         let command = self.stack.step(input)?;
         let base = self.without.step(input)?;
-        let is_active = matches!(command.state, EgoState::Increasing | EgoState::Holding);
-        if is_active {
+        self.steps += 1;
+        if matches!(command.state, EgoState::Increasing | EgoState::Holding) {
             self.engaged_at.get_or_insert(input.time);
         }
+        let engaged = |acceleration_mps2: f64| EgoCommand {
+            acceleration_mps2,
+            state: EgoState::Increasing,
+            reason: Reason::Engaged,
+            ..command
+        };
+        let accelerated = |acceleration_mps2: f64| EgoCommand { acceleration_mps2, ..command };
         Ok(match self.fault {
-            Fault::SignFlipped if command.state == EgoState::Increasing => {
-                EgoCommand { acceleration_mps2: -command.acceleration_mps2, ..command }
-            }
+            Fault::SignFlipped if command.state == EgoState::Increasing => accelerated(-command.acceleration_mps2),
             Fault::SignFlipped => command,
-            Fault::AlwaysBrakes => EgoCommand { acceleration_mps2: base.acceleration_mps2.min(ALWAYS_MPS2), ..command },
+            Fault::NeverBrakes => accelerated(command.acceleration_mps2.max(0.0)),
+            Fault::AlwaysBrakes => accelerated(base.acceleration_mps2.min(ALWAYS_MPS2)),
+            Fault::MisOff => base,
+            Fault::EngagesAlways => engaged(base.acceleration_mps2.min(GENTLE_MPS2)),
+            Fault::EngagesOnNothing if input.time >= LATE => engaged(base.acceleration_mps2.min(GENTLE_MPS2)),
+            Fault::EngagesOnNothing => base,
             Fault::FiveSecondsLate => match self.engaged_at {
-                Some(since) if input.time >= since + Time::from_ms(5_000) => command,
+                Some(since) if input.time >= since + LATE => command,
                 _ => EgoCommand { state: command.state, ..base },
             },
+            Fault::GoalOfHalfASecond if command.state == EgoState::Increasing => {
+                accelerated(base.acceleration_mps2.min(0.25 * command.acceleration_mps2))
+            }
+            Fault::GoalOfHalfASecond => command,
+            Fault::ReleasesAtOnce => match self.engaged_at {
+                Some(since) if input.time == since => command,
+                _ => EgoCommand { state: base.state, ..base },
+            },
+            Fault::Random if self.steps.is_multiple_of(7) => accelerated(ALWAYS_MPS2),
+            Fault::Random if self.steps.is_multiple_of(3) => accelerated(-ALWAYS_MPS2),
+            Fault::Random => base,
+            Fault::NotANumber if self.steps.is_multiple_of(1_000) => accelerated(f64::NAN),
+            Fault::NotANumber => command,
         })
     }
 }
 
-/// Runs a scenario with the cruise control and with the controller under test.
-fn counts(name: &str, tested: Arc<dyn ControllerFactory>) -> Counts {
-    let file = ScenarioFile::load(&library(name), &[]).unwrap();
-    let sampling = Sampling { seed: SEED, design: Design::Random, samples: SAMPLES };
-    let arm = |controller| Arm { controller, sensors: Some(SensorMode::Object) };
-    let arms = vec![arm(BuiltIn::Acc.factory()), arm(tested)];
-    let workers = Workers { jobs: NonZeroUsize::MIN.saturating_add(1), sample_timeout: Duration::from_mins(5) };
-    let work = Arc::new(Work { file, sampling, arms, checks: CheckPlan::default() });
-    Campaign::new(vec![work], workers).count().unwrap().total()
+/// Runs scenarios with the cruise control and with the controller under test, and judges them by their own checks.
+fn judged(names: &[&str], tested: &Arc<dyn ControllerFactory>, samples: u64) -> (Summary, Judgement) {
+    let sampling = Sampling { seed: SEED, design: Design::Random, samples };
+    let arm = |controller| Arm { controller, sensors: Some(SensorMode::GroundTruth) };
+    let work = |name: &&str| {
+        let file = ScenarioFile::load(&library(name), &[]).unwrap();
+        let arms = vec![arm(BuiltIn::Acc.factory()), arm(tested.clone())];
+        Arc::new(Work { file, sampling, arms, checks: CheckPlan::default() })
+    };
+    let workers = Workers { jobs: NonZeroUsize::MIN.saturating_add(1), sample_timeout: Duration::from_mins(10) };
+    Campaign::new(names.iter().map(work).collect(), workers).judge(&GateSet::default()).unwrap()
+}
+
+/// Returns the requirements that are not met.
+fn violated(judged: &Judgement) -> Vec<&str> {
+    let failed = judged.requirements.iter().filter(|requirement| requirement.standing == Standing::Fail);
+    failed.map(|requirement| requirement.mark.as_str()).collect()
 }
 
 #[test]
-fn the_mis_prevents_more_than_half_of_the_collisions() {
-    let counts = counts("low-thw-overtake", BuiltIn::Mis.factory());
-    let [without, with] = counts.arms[..] else { panic!("two arms") };
-    assert_eq!(counts.errors() + counts.invalid, 0);
-    let share = without.collision_rate().unwrap();
-    assert!((0.15..=0.5).contains(&share), "{share}");
-    assert!(2 * with.collisions <= without.collisions, "{counts:?}");
-    assert!(passes(&counts), "{counts:?}");
-    assert!(counts.pairs.prevented > counts.pairs.induced);
-    assert_eq!(counts.pairs.prevented + counts.pairs.both, without.collisions);
-    assert_eq!(counts.pairs.induced + counts.pairs.both, with.collisions);
+fn the_mis_passes_every_requirement_of_the_library() {
+    let (summary, judged) = judged(&LIBRARY, &BuiltIn::Mis.factory(), SAMPLES);
+    assert_eq!(judged.decision, Decision::Pass, "{:#?}", judged.reasons);
+    assert!(judged.requirements.iter().all(|requirement| requirement.standing == Standing::Pass));
+    let headline = &summary.scenarios[0].1;
+    assert!(headline.pairs.prevented > headline.pairs.induced);
+    assert_eq!(headline.pairs.prevented + headline.pairs.both, headline.arms[0].collisions);
+    assert_eq!(headline.pairs.induced + headline.pairs.both, headline.arms[1].collisions);
+}
+
+#[test]
+fn each_bad_controller_violates_a_requirement_that_is_named() {
+    let mut wrong = Vec::new();
+    for (fault, requirement) in FAULTS {
+        let tested: Arc<dyn ControllerFactory> = Arc::new(fault);
+        let (_, judged) = judged(&LIBRARY, &tested, FAULT_SAMPLES);
+        let is_found = match requirement {
+            Some(mark) => judged.decision == Decision::Fail && violated(&judged).contains(&mark),
+            None => judged.decision == Decision::SampleError,
+        };
+        if !is_found {
+            wrong.push(format!("{fault:?}: {:?}, {:?}", judged.decision, violated(&judged)));
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
 #[test]
 fn the_cruise_control_alone_prevents_and_induces_no_collision() {
-    let counts = counts("low-thw-overtake", BuiltIn::Acc.factory());
-    assert_eq!((counts.pairs.prevented, counts.pairs.induced), (0, 0));
-    assert!(counts.pairs.both > 0 && counts.pairs.neither > 0);
-}
-
-/// The most by which the ego may be slower than the lead vehicle (m/s). The MIS, braking at 1 m/s² until the rear
-/// vehicle has arrived, stays below.
-const MAX_SPEED_DEFICIT_MPS: f64 = 15.0;
-
-/// Returns true if a controller passes the gate of a regression test: at most half of the collisions without it, and a
-/// bounded speed deficit.
-fn passes(counts: &Counts) -> bool {
-    let gates = Gates {
-        max_collisions: Some(counts.arms[0].collisions / 2),
-        max_speed_deficit_mps: Some(MAX_SPEED_DEFICIT_MPS),
-        ..Gates::default()
-    };
-    let evidence = Evidence {
-        tested: &counts.arms[1],
-        scenarios: &[],
-        errors: counts.errors(),
-        checks: &counts.checks,
-        pairs: Some(&counts.pairs),
-        inference: Inference::FixedSamples,
-    };
-    gates.judge(&evidence).decision == Decision::Pass
-}
-
-#[test]
-fn a_mis_with_a_flipped_sign_fails() {
-    let counts = counts("low-thw-overtake", Arc::new(Fault::SignFlipped));
-    assert!(!passes(&counts), "{counts:?}");
-}
-
-#[test]
-fn a_controller_that_always_brakes_fails() {
-    let counts = counts("low-thw-overtake", Arc::new(Fault::AlwaysBrakes));
-    assert!(!passes(&counts), "{counts:?}");
-}
-
-#[test]
-fn a_mis_that_acts_five_seconds_late_fails() {
-    let counts = counts("low-thw-overtake", Arc::new(Fault::FiveSecondsLate));
-    assert!(!passes(&counts), "{counts:?}");
+    let (summary, judged) = judged(&["low-thw-overtake"], &BuiltIn::Acc.factory(), SAMPLES);
+    let pairs = summary.total().pairs;
+    assert_eq!((pairs.prevented, pairs.induced), (0, 0));
+    assert!(pairs.both > 0 && pairs.neither > 0);
+    assert_eq!(violated(&judged), ["MIS-1"]);
 }

@@ -3,6 +3,8 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 mod campaign_example;
+mod changed_controller;
+mod commands;
 mod comparison;
 mod determinism;
 mod drivers;
@@ -14,6 +16,7 @@ mod exit_codes;
 mod faulty_controllers;
 mod gate;
 mod hidden_lead;
+mod inputs;
 mod inspect;
 mod library;
 mod malformed;
@@ -25,6 +28,7 @@ mod reenact;
 mod references;
 mod reports;
 mod rerun_files;
+mod signals;
 mod statistics;
 mod support;
 mod trajectory_files;

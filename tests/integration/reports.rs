@@ -46,7 +46,8 @@ fn the_page_loads_nothing_and_holds_the_reasons_of_the_verdict() {
     let reasons: Vec<&str> = printed.lines().skip_while(|line| *line != "FAIL").skip(1).map(str::trim).collect();
     assert!(!reasons.is_empty());
     for reason in reasons {
-        assert!(page.contains(reason), "{reason}");
+        let escaped = reason.replace('<', "&lt;").replace('>', "&gt;");
+        assert!(page.contains(&escaped), "{reason}");
     }
     for part in [
         "Requirements",
@@ -100,7 +101,10 @@ fn the_summary_is_appended_to_the_step_summary_of_the_ci_server() {
     let own = fs::read_to_string(out.join("summary.md")).unwrap();
     assert_eq!(text, format!("the summary of an earlier step\n{own}"));
     assert!(own.starts_with("## Closecall: PASS"), "{own}");
-    assert!(own.contains("| low-thw-overtake | mis | 120 |") && own.contains("| MIS-1 | low-thw-overtake ("), "{own}");
+    assert!(
+        own.contains("| low-thw-overtake | mis | 120 |") && own.contains("| MIS-1 | low-thw-overtake | met |"),
+        "{own}"
+    );
     // Every row of a table has as many cells as the head.
     for table in own.split("\n\n").filter(|block| block.starts_with('|')) {
         let cells: Vec<usize> = table.lines().map(|line| line.matches('|').count()).collect();
@@ -109,11 +113,11 @@ fn the_summary_is_appended_to_the_step_summary_of_the_ci_server() {
 }
 
 #[test]
-fn junit_has_a_case_for_every_outcome_and_attachments_that_exist() {
+fn the_samples_have_a_case_for_every_outcome_and_attachments_that_exist() {
     let folder = folder();
     let out = folder.path().join("out");
     campaign(&out, &["--recordings", "1"], None, 0);
-    let xml = fs::read_to_string(out.join("junit.xml")).unwrap();
+    let xml = fs::read_to_string(out.join("samples.xml")).unwrap();
     assert_eq!(xml.matches("<testcase ").count(), 2 * 2 * 120);
     assert!(xml.contains("<testsuites name=\"closecall\" tests=\"480\""));
     let failures = xml.matches("<failure ").count();
@@ -129,13 +133,25 @@ fn junit_has_a_case_for_every_outcome_and_attachments_that_exist() {
 }
 
 #[test]
+fn junit_fails_for_failed_gates_and_for_nothing_else() {
+    let folder = folder();
+    let out = folder.path().join("out");
+    campaign(&out, &["--recordings", "0", "--gate", "count(ego_collided) <= 0"], None, 1);
+    let xml = fs::read_to_string(out.join("junit.xml")).unwrap();
+    // The headline has collisions with the system; the scenario without braking has none.
+    assert_eq!(xml.matches("<failure ").count(), 1, "{xml}");
+    assert!(xml.contains("low-thw-overtake: count(ego_collided) &lt;= 0"), "{xml}");
+    assert_eq!(xml.matches("<error ").count(), 0, "{xml}");
+}
+
+#[test]
 fn the_parquet_file_holds_the_units_of_its_columns() {
     let folder = folder();
     let out = folder.path().join("out");
     campaign(&out, &["--recordings", "0"], None, 0);
     let bytes = fs::read(out.join("outcomes.parquet")).unwrap();
     let text = String::from_utf8_lossy(&bytes);
-    for key in ["unit:param:closing-mps", "unit:min_ttc_rear_s", "unit:max_jerk_mps3"] {
+    for key in ["unit:param_closing_mps", "closecall:manifest", "unit:min_ttc_rear_s", "unit:max_jerk_mps3"] {
         assert!(text.contains(key), "{key}");
     }
 }

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use crate::suggest::hint;
 use crate::{Absent, ParameterName, Parameters};
 
 /// A configuration as written in a file, which can be checked into a value that cannot be invalid.
@@ -62,7 +63,7 @@ pub enum Problem {
         allowed: &'static str,
     },
     /// `$name` refers to a parameter that does not exist.
-    #[error("names the parameter `${name}`, which [parameters] does not have; it has {known}")]
+    #[error("names the parameter `${name}`, which [parameters] does not have; it has {known}{}", hint(name.as_str(), known))]
     UnknownParameter {
         /// The name found.
         name: ParameterName,
@@ -80,7 +81,7 @@ pub enum Problem {
         needed: &'static str,
     },
     /// A label is not in the list of allowed ones.
-    #[error("is `{value}`, but one of {allowed} is needed")]
+    #[error("is `{value}`, but one of {allowed} is needed{}", hint(value, allowed))]
     UnknownWord {
         /// The label found.
         value: String,
@@ -88,7 +89,7 @@ pub enum Problem {
         allowed: String,
     },
     /// A name refers to an actor that does not exist.
-    #[error("names the actor `{value}`, but the actors are {known}")]
+    #[error("names the actor `{value}`, but the actors are {known}{}", hint(value, known))]
     UnknownActor {
         /// The name found.
         value: String,
@@ -172,6 +173,21 @@ impl Range {
 
     /// The range of shares and probabilities: 0 to 1.
     pub const UNIT: Self = Self::closed(0.0, 1.0);
+
+    /// Returns the lower bound.
+    pub const fn low(self) -> f64 {
+        self.low
+    }
+
+    /// Returns the upper bound, which the range includes.
+    pub const fn high(self) -> f64 {
+        self.high
+    }
+
+    /// Returns true if the range includes its lower bound.
+    pub const fn includes_low(self) -> bool {
+        self.low_is_allowed
+    }
 
     /// Returns true if `value` lies in the range; false for NaN.
     pub fn contains(self, value: f64) -> bool {

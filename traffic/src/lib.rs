@@ -54,6 +54,7 @@
 
 mod absent;
 mod actor;
+mod body_shape;
 mod check;
 mod constants;
 mod environment;
@@ -69,9 +70,11 @@ mod trajectory;
 mod vehicle;
 
 pub mod metrics;
+pub mod suggest;
 
 pub use absent::{Absent, Measured};
 pub use actor::{ActorId, InvalidActorId};
+pub use body_shape::BodyShape;
 pub use check::{Check, ConfigError, KeyPath, Problem, Range, Segment};
 pub use constants::{CONTROL_STEP, ENGAGEMENT_CLOSING_MPS, ENGAGEMENT_GAP_M, GRAVITY_MPS2, PHYSICS_STEP};
 pub use environment::{Environment, EnvironmentConfig, Light};

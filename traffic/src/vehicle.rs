@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Check, Choice, ConfigError, Num, Parameters, Range, Side};
+use crate::{BodyShape, Check, Choice, ConfigError, Num, Parameters, Problem, Range, Side};
 
 /// The class of a vehicle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
@@ -67,8 +67,8 @@ pub struct Appearance {
     pub paint_reflectivity: f64,
     /// Colour of the paint, sRGB.
     pub paint_rgb: [u8; 3],
-    /// Index of the body shape within the class, taken modulo the number of shapes.
-    pub body_shape: u8,
+    /// Body shape.
+    pub body_shape: BodyShape,
 }
 
 /// A vehicle as a scenario file describes it.
@@ -77,11 +77,11 @@ pub struct Appearance {
 pub struct VehicleConfig {
     /// Car, truck or motorcycle.
     pub class: Choice<VehicleClass>,
-    /// Length (m); typical of the class if absent.
+    /// Length (m); usual for `body-shape` or typical of the class if absent.
     pub length_m: Option<Num>,
-    /// Width (m); typical of the class if absent.
+    /// Width (m); usual for `body-shape` or typical of the class if absent.
     pub width_m: Option<Num>,
-    /// Height (m); typical of the class if absent.
+    /// Height (m); usual for `body-shape` or typical of the class if absent.
     pub height_m: Option<Num>,
     /// Mass (kg); typical of the class if absent.
     pub mass_kg: Option<Num>,
@@ -89,8 +89,9 @@ pub struct VehicleConfig {
     pub paint_reflectivity: Option<Num>,
     /// Colour of the paint, sRGB; grey if absent.
     pub paint_rgb: Option<[u8; 3]>,
-    /// Index of the body shape within the class; 0 if absent.
-    pub body_shape: Option<u8>,
+    /// Body shape, which must belong to the class. If it is given, length, width and height are those that are usual for
+    /// it, unless they are given, too; `saloon`, `tarpaulin-trailer` or `naked-bike` if absent.
+    pub body_shape: Option<Choice<BodyShape>>,
     /// Deceleration at which the brake light switches on (m/s²), 0.7 to 1.3; 0.7 if absent.
     pub brake_light_from_mps2: Option<Num>,
 }
@@ -121,9 +122,28 @@ impl Vehicle {
             class,
             dimensions: class.typical_dimensions(),
             mass_kg: class.typical_mass_kg(),
-            appearance: Appearance { paint_reflectivity: 0.5, paint_rgb: [128, 128, 132], body_shape: 0 },
+            appearance: Appearance {
+                paint_reflectivity: 0.5,
+                paint_rgb: [128, 128, 132],
+                body_shape: BodyShape::of_class(class)[0],
+            },
             brake_light_from_mps2: BRAKE_LIGHT_MPS2[0],
         }
+    }
+}
+
+impl VehicleConfig {
+    /// Returns the body shape, or `None` if it is not given.
+    fn check_body_shape(&self, class: VehicleClass, parameters: &Parameters) -> Result<Option<BodyShape>, ConfigError> {
+        const KEY: &str = "body-shape";
+        let Some(choice) = &self.body_shape else { return Ok(None) };
+        let shape = parameters.word(choice, KEY)?;
+        if shape.class() == class {
+            return Ok(Some(shape));
+        }
+        let allowed: Vec<String> = BodyShape::of_class(class).iter().map(|shape| format!("`{shape}`")).collect();
+        let rule = format!("a {} has one of the shapes {}, not `{shape}`", class.name(), allowed.join(", "));
+        Err(ConfigError::new(KEY, Problem::Contradiction { other: "class", rule }))
     }
 }
 
@@ -136,8 +156,9 @@ impl Check for VehicleConfig {
             Some(num) => parameters.number(num, key, range),
             None => Ok(typical),
         };
-        let size = typical.dimensions;
         let look = typical.appearance;
+        let body_shape = self.check_body_shape(typical.class, parameters)?;
+        let size = body_shape.map_or(typical.dimensions, BodyShape::usual_dimensions);
         Ok(Vehicle {
             class: typical.class,
             dimensions: Dimensions {
@@ -154,7 +175,7 @@ impl Check for VehicleConfig {
                     look.paint_reflectivity,
                 )?,
                 paint_rgb: self.paint_rgb.unwrap_or(look.paint_rgb),
-                body_shape: self.body_shape.unwrap_or(look.body_shape),
+                body_shape: body_shape.unwrap_or(look.body_shape),
             },
             brake_light_from_mps2: or_typical(
                 &self.brake_light_from_mps2,
@@ -219,4 +240,49 @@ pub struct VehicleState {
     pub brake_light: bool,
     /// State of the direction indicator.
     pub indicator: Indicator,
+}
+
+#[cfg(test)]
+mod tests {
+    use serde::de::IntoDeserializer;
+    use serde::de::value::{self, StrDeserializer};
+
+    use super::*;
+
+    fn car(body_shape: Option<BodyShape>) -> VehicleConfig {
+        VehicleConfig {
+            class: Choice::Fixed(VehicleClass::Car),
+            length_m: None,
+            width_m: None,
+            height_m: None,
+            mass_kg: None,
+            paint_reflectivity: None,
+            paint_rgb: None,
+            body_shape: body_shape.map(Choice::Fixed),
+            brake_light_from_mps2: None,
+        }
+    }
+
+    #[test]
+    fn a_body_shape_brings_its_usual_dimensions_and_has_a_default() {
+        let none = Parameters::default();
+        let van = car(Some(BodyShape::Van)).check(&none).unwrap();
+        assert_eq!((van.appearance.body_shape, van.dimensions.height_m), (BodyShape::Van, 2.2));
+        let usual = car(None).check(&none).unwrap();
+        assert_eq!(usual, Vehicle::typical(VehicleClass::Car));
+        assert_eq!(usual.appearance.body_shape, BodyShape::Saloon);
+    }
+
+    #[test]
+    fn a_body_shape_of_another_class_and_an_unknown_word_are_refused_with_what_is_allowed() {
+        let error = car(Some(BodyShape::Coach)).check(&Parameters::default()).unwrap_err().to_string();
+        assert_eq!(
+            error,
+            "`body-shape` contradicts `class`: a car has one of the shapes `saloon`, `hatchback`, `estate`, `coupe`, \
+             `suv`, `van`, `city-car`, `minivan`, `pickup`, not `coach`"
+        );
+        let word: StrDeserializer<'_, value::Error> = "limousine".into_deserializer();
+        let error = Choice::<BodyShape>::deserialize(word).unwrap_err().to_string();
+        assert!(error.contains("limousine") && error.contains("`saloon`, `hatchback`"), "{error}");
+    }
 }

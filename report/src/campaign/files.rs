@@ -11,19 +11,19 @@ use closecall_campaign::record::{ArmRecord, Record};
 use closecall_campaign::runner::Work;
 use closecall_campaign::saved::SavedError;
 use closecall_campaign::selection::Selection;
-use closecall_campaign::verdict::{Gates, Judgement};
+use closecall_campaign::verdict::Judgement;
 use closecall_scenarios::atomic::WriteError;
 use closecall_simulation::SampleError;
 use closecall_simulation::scenario::ScenarioFile;
 
 use super::findings::{Findings, Recordings};
 use super::html::write_html;
-use super::junit::{SuiteTotals, write_junit};
+use super::junit::write_junit;
 use super::markdown::{markdown, write_markdown};
 use super::outcomes::{OutcomeRow, parameter_columns, write_outcomes};
 use super::overview::ScenarioOverview;
 use super::recordings::{INDEX, RECORDINGS, record};
-use super::requirements::requirements;
+use super::samples_xml::{SuiteTotals, write_samples};
 use super::tally::Tally;
 use super::timings::{Timing, write_timings};
 use crate::run::rerun::RecordError;
@@ -67,8 +67,6 @@ pub struct CampaignReport<'a> {
     pub works: &'a [Arc<Work>],
     /// The counts, and what the reports show beside them.
     pub tally: &'a Tally,
-    /// The gates that judged the campaign.
-    pub gates: Gates,
     /// The verdict.
     pub judged: &'a Judgement,
 }
@@ -82,9 +80,15 @@ impl CampaignReport<'_> {
         let files = self.scenario_files();
         let nominal: Vec<_> = files.iter().map(|file| file.space().nominal()).collect();
         let rows = || rows(folder, self.manifest);
-        write_outcomes(&folder.file("outcomes.parquet"), &parameter_columns(&nominal), rows()?)?;
+        write_outcomes(&folder.file("outcomes.parquet"), Some(self.manifest), &parameter_columns(&nominal), rows()?)?;
         let mut slowest = Vec::with_capacity(SLOWEST + 1);
-        let timings = timings(folder, self.manifest)?.inspect(|timing| keep_slowest(&mut slowest, timing));
+        let mut wall_s: Vec<(String, f64)> = files.iter().map(|file| (file.config().name.clone(), 0.0)).collect();
+        let timings = timings(folder, self.manifest)?.inspect(|timing| {
+            keep_slowest(&mut slowest, timing);
+            if let Some((_, sum_s)) = wall_s.iter_mut().find(|(name, _)| *name == timing.scenario) {
+                *sum_s += timing.wall_s;
+            }
+        });
         write_timings(&folder.file("timings.parquet"), timings)?;
         let recorded = record(folder, &files, selection)?;
         let with_recordings = rows()?.map(|row| {
@@ -93,8 +97,10 @@ impl CampaignReport<'_> {
                 (row, recording)
             })
         });
-        write_junit(&folder.file("junit.xml"), &self.suites(), with_recordings)?;
+        let tested = self.tally.summary.controllers.last().map_or("", String::as_str);
+        write_samples(&folder.file("samples.xml"), &self.suites(), tested, with_recordings)?;
         self.with_findings(&files, Some(folder), &recorded, &slowest, |findings| {
+            write_junit(&folder.file("junit.xml"), findings, &wall_s)?;
             write_html(&folder.file("report.html"), findings)?;
             write_markdown(&folder.file("summary.md"), findings)
         })?;
@@ -117,7 +123,7 @@ impl CampaignReport<'_> {
         let suite = |scenario: &ScenarioOverview| SuiteTotals {
             scenario: scenario.name.clone(),
             tests: scenario.totals.iter().map(|arm| arm.samples).sum(),
-            failures: scenario.totals.iter().map(|arm| arm.failures).sum(),
+            failures: scenario.totals.last().map_or(0, |tested| tested.failures),
             errors: scenario.totals.iter().map(|arm| arm.errors).sum(),
         };
         self.tally.overview.scenarios.iter().map(suite).collect()
@@ -132,7 +138,6 @@ impl CampaignReport<'_> {
         write: impl FnOnce(&Findings<'_>) -> T,
     ) -> T {
         let summary = &self.tally.summary;
-        let requirements = requirements(files.iter().copied(), summary, self.gates);
         let gallery = format!("{RECORDINGS}/{INDEX}");
         let has_gallery = folder.is_some_and(|folder| folder.file(&gallery).exists());
         write(&Findings {
@@ -140,7 +145,6 @@ impl CampaignReport<'_> {
             files,
             summary,
             judged: self.judged,
-            requirements: &requirements,
             overview: &self.tally.overview,
             recordings,
             gallery: has_gallery.then_some(gallery.as_str()),

@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 
 use super::overview::Overview;
-use super::requirements::Requirement;
 use super::timings::Timing;
 use closecall_campaign::manifest::Manifest;
 use closecall_campaign::summary::Summary;
@@ -25,8 +24,6 @@ pub struct Findings<'a> {
     pub summary: &'a Summary,
     /// The verdict.
     pub judged: &'a Judgement,
-    /// The requirements that the scenarios name.
-    pub requirements: &'a [Requirement],
     /// Distributions, maps and the worst samples.
     pub overview: &'a Overview,
     /// The recorded samples.

@@ -1,199 +1,166 @@
-//! A campaign as JUnit XML, which CI servers show: one suite for each scenario, one case for each sample and controller. A
-//! collision of the ego is a failure, a sample without an outcome is an error.
+//! The verdict of a campaign as JUnit XML, which CI servers show: one suite for each scenario, one case for each gate and each
+//! check of a requirement.
 //!
-//! The file is written case by case, so that memory does not grow with the number of cases. It depends on the outcomes
-//! alone and holds no wall-clock times.
+//! | case | passes | fails | error | skipped |
+//! |---|---|---|---|---|
+//! | gate, requirement check | met | not met | the samples do not decide it | it cannot be checked in this campaign |
+//! | probability gate | shown | refuted | not decided | |
+//! | `verdict` | PASS, measured | | ERROR, INVALID, INCONCLUSIVE, NOT JUDGED | FAIL: the gates say it |
+//!
+//! The failures are the failed gates and requirement checks, and nothing else. Samples stand in `samples.xml`.
 
 use std::io::{self, Write};
 use std::path::Path;
 
-use quick_xml::Writer;
-use quick_xml::events::{BytesDecl, BytesEnd, BytesStart, BytesText, Event};
-
-use super::outcomes::OutcomeRow;
+use closecall_campaign::gate::{GateResult, Standing};
+use closecall_campaign::probability::Answer;
+use closecall_campaign::verdict::{Judgement, Verdict};
 use closecall_scenarios::atomic::{WriteError, write_file};
-use closecall_simulation::outcome::Collision;
+use quick_xml::Writer;
+use quick_xml::events::{BytesDecl, BytesEnd, BytesStart, Event};
 
-/// The counts of one suite. The file states them before the cases.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct SuiteTotals {
-    /// The scenario's name.
-    pub scenario: String,
-    /// The number of cases.
-    pub tests: usize,
-    /// The number of cases with a collision of the ego.
-    pub failures: usize,
-    /// The number of cases without an outcome.
-    pub errors: usize,
+use super::findings::Findings;
+use super::samples_xml::legal_xml;
+
+/// The answer of one case.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Status {
+    Passed,
+    Failed,
+    Error,
+    Skipped,
 }
 
-/// Writes the file. Each row has the path of its recording, if there is one, relative to the file's folder. The rows are
-/// grouped by scenario, in the order of `suites`.
+/// One case: a gate, the check of a requirement, or the verdict.
+#[derive(Clone, Debug)]
+struct Case {
+    suite: String,
+    name: String,
+    status: Status,
+    message: String,
+}
+
+/// The suite of what concerns all scenarios together.
+const CAMPAIGN_SUITE: &str = "campaign";
+
+fn cases(judged: &Judgement) -> Vec<Case> {
+    let gate = |gate: &GateResult| Case {
+        suite: gate.scenario.clone().unwrap_or_else(|| CAMPAIGN_SUITE.to_owned()),
+        name: gate.name(),
+        status: match gate.standing() {
+            Standing::Pass => Status::Passed,
+            Standing::Fail => Status::Failed,
+            Standing::Inconclusive => Status::Error,
+            Standing::NotChecked => Status::Skipped,
+        },
+        message: gate.to_string(),
+    };
+    let mut cases: Vec<Case> = judged.gates.iter().map(gate).collect();
+    for (scenario, finding) in &judged.probabilities {
+        cases.push(Case {
+            suite: scenario.clone(),
+            name: format!("{scenario}: probability of a collision at most {}", finding.max),
+            status: match finding.answer {
+                Answer::Below => Status::Passed,
+                Answer::Above => Status::Failed,
+                Answer::Open => Status::Error,
+            },
+            message: format!("between {} and {}", finding.lower_bound, finding.upper_bound),
+        });
+    }
+    cases.push(Case {
+        suite: CAMPAIGN_SUITE.to_owned(),
+        name: "verdict".to_owned(),
+        status: match judged.verdict() {
+            None | Some(Verdict::Pass) => Status::Passed,
+            Some(Verdict::Fail) => Status::Skipped,
+            Some(Verdict::Error | Verdict::Invalid | Verdict::Inconclusive | Verdict::NotJudged) => Status::Error,
+        },
+        message: format!("{}: {}", judged.word(), judged.reasons.join("; ")),
+    });
+    cases
+}
+
+/// Writes the file. `wall_s` is the wall time of the samples of each scenario (s), by name.
 ///
 /// # Errors
-/// The first error of `rows`, or [`WriteError`]. An existing file then stays as it is.
-pub fn write_junit<E: From<WriteError>>(
-    path: &Path,
-    suites: &[SuiteTotals],
-    rows: impl IntoIterator<Item = Result<(OutcomeRow, Option<String>), E>>,
-) -> Result<(), E> {
-    let mut row_error = None;
-    let written = write_file(path, |file| {
-        let rows = rows.into_iter().map_while(|row| row.map_err(|error| row_error = Some(error)).ok());
-        report(file, suites, rows)?;
-        if row_error.is_some() { Err(io::Error::other("a row is an error")) } else { Ok(()) }
-    });
-    match row_error {
-        Some(error) => Err(error),
-        None => Ok(written?),
-    }
+/// [`WriteError`] if the file cannot be written. An existing file then stays as it is.
+pub fn write_junit(path: &Path, findings: &Findings<'_>, wall_s: &[(String, f64)]) -> Result<(), WriteError> {
+    write_file(path, |file| report(file, findings, wall_s))
 }
 
-fn report(
-    file: impl Write,
-    suites: &[SuiteTotals],
-    rows: impl Iterator<Item = (OutcomeRow, Option<String>)>,
-) -> io::Result<()> {
+fn report(file: impl Write, findings: &Findings<'_>, wall_s: &[(String, f64)]) -> io::Result<()> {
+    let cases = cases(findings.judged);
     let mut xml = Writer::new_with_indent(file, b' ', 4);
     xml.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
-    let sum = |of: fn(&SuiteTotals) -> usize| suites.iter().map(of).sum::<usize>();
-    let all = SuiteTotals {
-        scenario: "closecall".to_owned(),
-        tests: sum(|suite| suite.tests),
-        failures: sum(|suite| suite.failures),
-        errors: sum(|suite| suite.errors),
-    };
-    xml.write_event(Event::Start(totals("testsuites", &all)))?;
-    let mut rows = rows.peekable();
-    for suite in suites {
-        xml.write_event(Event::Start(totals("testsuite", suite)))?;
-        while let Some((row, recording)) = rows.next_if(|(row, _)| row.scenario == suite.scenario) {
-            case(&mut xml, &row, recording.as_deref())?;
+    let all: Vec<&Case> = cases.iter().collect();
+    let total_s = wall_s.iter().map(|(_, wall_s)| wall_s).sum();
+    xml.write_event(Event::Start(totals("testsuites", "closecall", &all, total_s)))?;
+    let scenarios = findings.files.iter().map(|file| file.config().name.clone());
+    for suite in scenarios.chain([CAMPAIGN_SUITE.to_owned()]) {
+        let of_suite: Vec<&Case> = cases.iter().filter(|case| case.suite == suite).collect();
+        let suite_s = wall_s.iter().find(|(name, _)| *name == suite).map_or(0.0, |(_, wall_s)| *wall_s);
+        xml.write_event(Event::Start(totals("testsuite", &suite, &of_suite, suite_s)))?;
+        properties(&mut xml, findings, &suite)?;
+        for case in of_suite {
+            write_case(&mut xml, case)?;
         }
         xml.write_event(Event::End(BytesEnd::new("testsuite")))?;
-    }
-    if let Some((row, _)) = rows.next() {
-        return Err(io::Error::other(format!("`{}` is not among the suites", row.scenario)));
     }
     xml.write_event(Event::End(BytesEnd::new("testsuites")))?;
     xml.into_inner().write_all(b"\n")
 }
 
-fn totals<'a>(element: &'a str, suite: &SuiteTotals) -> BytesStart<'a> {
+fn totals<'a>(element: &'a str, name: &'a str, cases: &[&Case], wall_s: f64) -> BytesStart<'a> {
+    let count = |status| cases.iter().filter(|case| case.status == status).count().to_string();
     let mut start = BytesStart::new(element);
-    start.push_attribute(("name", suite.scenario.as_str()));
-    for (key, count) in [("tests", suite.tests), ("skipped", 0), ("errors", suite.errors), ("failures", suite.failures)]
-    {
-        start.push_attribute((key, count.to_string().as_str()));
-    }
+    start.push_attribute(("name", name));
+    start.push_attribute(("tests", cases.len().to_string().as_str()));
+    start.push_attribute(("skipped", count(Status::Skipped).as_str()));
+    start.push_attribute(("errors", count(Status::Error).as_str()));
+    start.push_attribute(("failures", count(Status::Failed).as_str()));
+    start.push_attribute(("time", format!("{wall_s:.3}").as_str()));
     start
 }
 
-fn case<W: Write>(xml: &mut Writer<W>, row: &OutcomeRow, recording: Option<&str>) -> io::Result<()> {
-    let name = format!("sample {}, {}", row.sample, row.controller);
-    let mut start = BytesStart::new("testcase");
-    start.push_attribute(("name", legal_xml(&name).as_str()));
-    start.push_attribute(("classname", legal_xml(&row.scenario).as_str()));
-    xml.write_event(Event::Start(start))?;
-    let (seed, sample) = (row.seed.to_string(), row.sample.to_string());
-    let mut properties = vec![("seed", seed.as_str()), ("sample", &sample), ("controller", &row.controller)];
-    properties.extend(recording.map(|recording| ("attachment", recording)));
+/// Writes what a suite rests on: seed, settings, and the counts of each controller.
+fn properties<W: Write>(xml: &mut Writer<W>, findings: &Findings<'_>, suite: &str) -> io::Result<()> {
+    let manifest = findings.manifest;
+    let mut properties = vec![
+        ("seed".to_owned(), manifest.sampling.seed.to_string()),
+        ("closecall".to_owned(), manifest.closecall_version.clone()),
+        ("command".to_owned(), manifest.command.join(" ")),
+    ];
+    if let Some((_, counts)) = findings.summary.scenarios.iter().find(|(name, _)| name == suite) {
+        properties.push(("samples".to_owned(), counts.samples.to_string()));
+        for (controller, arm) in findings.summary.controllers.iter().zip(&counts.arms) {
+            properties.push((format!("{controller}.collisions"), arm.collisions.to_string()));
+            properties.push((format!("{controller}.errors"), arm.errors.to_string()));
+        }
+    }
     xml.write_event(Event::Start(BytesStart::new("properties")))?;
     for (name, value) in properties {
-        let property = xml.create_element("property").with_attribute(("name", name));
-        property.with_attribute(("value", legal_xml(value).as_str())).write_empty()?;
+        let property = xml.create_element("property").with_attribute(("name", name.as_str()));
+        property.with_attribute(("value", legal_xml(&value).as_str())).write_empty()?;
     }
-    xml.write_event(Event::End(BytesEnd::new("properties")))?;
-    if let Some((element, kind, message)) = problem(row) {
-        let element = xml.create_element(element).with_attribute(("message", legal_xml(&message).as_str()));
-        element.with_attribute(("type", legal_xml(&kind).as_str())).write_empty()?;
-    }
-    if let Some(recording) = recording {
-        // JUnit has no attachments. CI servers read this line instead.
-        let text = legal_xml(&format!("[[ATTACHMENT|{recording}]]"));
-        xml.create_element("system-out").write_text_content(BytesText::new(&text))?;
+    xml.write_event(Event::End(BytesEnd::new("properties")))
+}
+
+fn write_case<W: Write>(xml: &mut Writer<W>, case: &Case) -> io::Result<()> {
+    let mut start = BytesStart::new("testcase");
+    start.push_attribute(("name", legal_xml(&case.name).as_str()));
+    start.push_attribute(("classname", legal_xml(&case.suite).as_str()));
+    start.push_attribute(("time", "0.000"));
+    xml.write_event(Event::Start(start))?;
+    let element = match case.status {
+        Status::Passed => None,
+        Status::Failed => Some("failure"),
+        Status::Error => Some("error"),
+        Status::Skipped => Some("skipped"),
+    };
+    if let Some(element) = element {
+        let element = xml.create_element(element).with_attribute(("message", legal_xml(&case.message).as_str()));
+        element.with_attribute(("type", "gate")).write_empty()?;
     }
     xml.write_event(Event::End(BytesEnd::new("testcase")))
-}
-
-/// Returns the name, the type and the message of the element for a failure or an error, or `None` if the case passes.
-fn problem(row: &OutcomeRow) -> Option<(&'static str, String, String)> {
-    match (&row.result, row.ego_collision()) {
-        (Err(error), _) => Some(("error", error.kind.clone(), error.message.clone())),
-        (Ok(_), Some(collision)) => Some(("failure", "collision".to_owned(), message(collision))),
-        (Ok(_), None) => None,
-    }
-}
-
-/// Returns the text without the characters that XML does not allow, not even escaped.
-fn legal_xml(text: &str) -> String {
-    let is_legal = |c: char| matches!(c, '\t' | '\n' | '\r' | '\u{20}'..='\u{fffd}' | '\u{10000}'..);
-    text.chars().map(|c| if is_legal(c) { c } else { char::REPLACEMENT_CHARACTER }).collect()
-}
-
-fn message(collision: &Collision) -> String {
-    let [first, second] = &collision.between;
-    let [first_mps, second_mps] = collision.delta_v_mps;
-    format!(
-        "{first} and {second} collided at {} with {:.2} m/s; change of velocity {first_mps:.2} and {second_mps:.2} m/s",
-        collision.time, collision.relative_speed_mps,
-    )
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::outcomes::tests::rows;
-    use super::*;
-
-    fn suite(scenario: &str, [tests, failures, errors]: [usize; 3]) -> SuiteTotals {
-        SuiteTotals { scenario: scenario.to_owned(), tests, failures, errors }
-    }
-
-    fn written(suites: &[SuiteTotals], rows: Vec<OutcomeRow>) -> io::Result<String> {
-        let recorded = |row: OutcomeRow| {
-            let recording = (row.ego_collision().is_some()).then(|| "recordings/0.rrd".to_owned());
-            (row, recording)
-        };
-        let mut file = Vec::new();
-        report(&mut file, suites, rows.into_iter().map(recorded))?;
-        Ok(String::from_utf8(file).unwrap())
-    }
-
-    #[test]
-    fn a_collision_fails_and_an_error_is_an_error() {
-        insta::assert_snapshot!(written(&[suite("low-thw-overtake", [3, 1, 1])], rows()).unwrap());
-    }
-
-    #[test]
-    fn one_suite_for_each_scenario() {
-        let mut rows = rows();
-        rows[2].scenario = "other".to_owned();
-        let suites = [suite("low-thw-overtake", [2, 1, 0]), suite("other", [1, 0, 1])];
-        let text = written(&suites, rows.clone()).unwrap();
-        let position = |part: &str| text.find(part).unwrap();
-        assert!(position("<testsuite name=\"other\"") > position("sample 0, mis"));
-        assert!(position("sample 1, mis") > position("<testsuite name=\"other\""));
-        assert!(text.contains("<testsuites name=\"closecall\" tests=\"3\" skipped=\"0\" errors=\"1\" failures=\"1\">"));
-        assert!(written(&suites[..1], rows).is_err(), "a row without a suite is an error");
-    }
-
-    #[test]
-    fn a_message_of_a_controller_is_always_legal_xml() {
-        let mut rows = rows();
-        if let Err(failure) = &mut rows[2].result {
-            failure.message = "a bell \u{7}, an escape \u{1b}[31m, ]]> & <tags>\nand a second line".to_owned();
-        }
-        let text = written(&[suite("low-thw-overtake", [3, 1, 1])], rows).unwrap();
-        assert!(!text.contains(['\u{7}', '\u{1b}']) && text.contains("&lt;tags&gt;"), "{text}");
-        let mut reader = quick_xml::Reader::from_str(&text);
-        loop {
-            match reader.read_event().unwrap() {
-                Event::Eof => break,
-                Event::Start(start) | Event::Empty(start) => {
-                    start.attributes().for_each(|attribute| drop(attribute.unwrap()));
-                }
-                _ => {}
-            }
-        }
-    }
 }

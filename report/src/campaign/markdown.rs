@@ -24,7 +24,7 @@ pub fn write_markdown(path: &Path, findings: &Findings<'_>) -> Result<(), WriteE
 
 /// Returns the summary.
 pub fn markdown(findings: &Findings<'_>) -> String {
-    let mut text = format!("## Closecall: {}\n\n", findings.judged.verdict);
+    let mut text = format!("## Closecall: {}\n\n", findings.judged.word());
     for reason in &findings.judged.reasons {
         text.push_str(&format!("- {reason}\n"));
     }
@@ -47,8 +47,7 @@ fn counts(summary: &Summary) -> String {
     let mut text = "| scenario | controller | samples | collisions | rate | 95 % interval | errors |\n\
                     |---|---|---:|---:|---:|---|---:|\n"
         .to_owned();
-    let total = (summary.scenarios.len() > 1).then(|| ("all".to_owned(), summary.total()));
-    for (name, counts) in summary.scenarios.iter().chain(&total) {
+    for (name, counts) in &summary.scenarios {
         for (controller, arm) in summary.controllers.iter().zip(&counts.arms) {
             let [low, high] = arm.interval_95(summary.inference);
             let rate = arm.collision_rate().map_or_else(|| "-".to_owned(), percent);
@@ -66,13 +65,15 @@ fn counts(summary: &Summary) -> String {
     }
     text.push('\n');
     if summary.is_paired() {
-        text.push_str(&pairs(&summary.total(), summary.inference));
+        for (name, counts) in &summary.scenarios {
+            text.push_str(&format!("{}: {}", cell(name), pairs(counts, summary.inference)));
+        }
     }
     text
 }
 
-fn pairs(total: &Counts, inference: Inference) -> String {
-    let pairs = &total.pairs;
+fn pairs(counts: &Counts, inference: Inference) -> String {
+    let pairs = &counts.pairs;
     let p_value = pairs.mcnemar_p(inference).map_or_else(String::new, |p| format!(" Exact McNemar p {p:.1e}."));
     format!(
         "**{} prevented, {} induced**, {} in both arms, {} in neither.{p_value} Harm: {:.3} prevented, {:.3} induced ({}).\n\n",
@@ -87,18 +88,14 @@ fn pairs(total: &Counts, inference: Inference) -> String {
 }
 
 fn requirements(findings: &Findings<'_>) -> String {
-    if findings.requirements.is_empty() {
+    let requirements = &findings.judged.requirements;
+    if requirements.is_empty() {
         return String::new();
     }
-    let mut text = "| requirement | scenarios (samples with a collision) | result |\n|---|---|---|\n".to_owned();
-    for requirement in findings.requirements {
-        let scenarios: Vec<String> = requirement
-            .evidence
-            .iter()
-            .map(|evidence| format!("{} ({} of {})", evidence.scenario, evidence.collisions, evidence.samples))
-            .collect();
-        let (id, result) = (cell(&requirement.id), requirement.status().word());
-        text.push_str(&format!("| {id} | {} | {result} |\n", cell(&scenarios.join(", "))));
+    let mut text = "| requirement | scenario | result |\n|---|---|---|\n".to_owned();
+    for requirement in requirements {
+        let (mark, scenario) = (cell(&requirement.mark), cell(&requirement.scenario));
+        text.push_str(&format!("| {mark} | {scenario} | {} |\n", requirement.standing.word()));
     }
     text.push('\n');
     text

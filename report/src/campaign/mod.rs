@@ -14,7 +14,7 @@ pub mod markdown;
 pub mod outcomes;
 pub mod overview;
 mod recordings;
-pub mod requirements;
+pub mod samples_xml;
 mod tally;
 pub mod timings;
 

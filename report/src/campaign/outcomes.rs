@@ -1,7 +1,8 @@
 //! The table of a campaign's outcomes, as Parquet: one row for each sample and controller.
 //!
 //! The file depends on the rows alone: the same rows give the same bytes, however they were computed. It does not state
-//! when or where it was written. The units are in the metadata of the columns. A margin that does not exist is null, and
+//! when or where it was written. The units are in the metadata of the columns, and the manifest in that of the file. The
+//! names of the columns consist of lower-case letters, digits and underscores, so that SQL needs no quotes. A margin that does not exist is null, and
 //! the column `<margin>_absent` gives the reason.
 
 use std::collections::BTreeMap;
@@ -16,8 +17,9 @@ use parquet::arrow::ArrowWriter;
 use parquet::file::metadata::KeyValue;
 use serde::Serialize;
 
-use crate::table::{ROWS_PER_GROUP, field, properties};
+use crate::table::{ROWS_PER_GROUP, field, properties, required};
 use crate::units::unit_of;
+use closecall_campaign::manifest::Manifest;
 use closecall_campaign::record::SampleFailure;
 use closecall_scenarios::atomic::{WriteError, write_file};
 use closecall_simulation::outcome::{Collision, MisSummary, Outcome};
@@ -75,12 +77,16 @@ pub fn parameter_columns<'a>(
     columns
 }
 
-/// Writes the table. The rows are written in groups, so that memory is bounded.
+/// The key under which the metadata of the file holds the manifest, as JSON.
+pub const MANIFEST_KEY: &str = "closecall:manifest";
+
+/// Writes the table, with the `manifest` of the campaign in its metadata. The rows are written in groups, so that memory is bounded.
 ///
 /// # Errors
 /// The first error of `rows`, or [`WriteError`]. An existing file then stays as it is.
 pub fn write_outcomes<E: From<WriteError>>(
     path: &Path,
+    manifest: Option<&Manifest>,
     parameters: &BTreeMap<ParameterName, ParameterKind>,
     rows: impl Iterator<Item = Result<OutcomeRow, E>>,
 ) -> Result<(), E> {
@@ -89,7 +95,7 @@ pub fn write_outcomes<E: From<WriteError>>(
     let mut rows = rows.fuse();
     let mut row_error = None;
     let written = write_file(path, |file| {
-        let options = properties().into_builder().set_key_value_metadata(Some(units(&columns))).build();
+        let options = properties().into_builder().set_key_value_metadata(Some(metadata(&columns, manifest))).build();
         let mut writer = ArrowWriter::try_new(file, schema.clone(), Some(options)).map_err(io::Error::other)?;
         loop {
             let group: Result<Vec<OutcomeRow>, E> = rows.by_ref().take(ROWS_PER_GROUP).collect();
@@ -116,6 +122,16 @@ pub fn write_outcomes<E: From<WriteError>>(
     }
 }
 
+/// Returns the metadata of the file: the units, and the manifest as far as it determines the outcomes. A part of a
+/// campaign, or another command line, would change the bytes, but not the outcomes.
+fn metadata(columns: &[Column], manifest: Option<&Manifest>) -> Vec<KeyValue> {
+    let mut entries = units(columns);
+    if let Some(text) = manifest.and_then(Manifest::determining_json) {
+        entries.push(KeyValue::new(MANIFEST_KEY.to_owned(), text));
+    }
+    entries
+}
+
 /// Returns the units once more, for readers that do not decode Arrow's own schema: one entry for each column with a unit.
 fn units(columns: &[Column]) -> Vec<KeyValue> {
     let unit =
@@ -125,6 +141,9 @@ fn units(columns: &[Column]) -> Vec<KeyValue> {
 
 /// Returns one value of a row, or `None` if the row lacks it.
 type Cell<T> = Box<dyn Fn(&OutcomeRow) -> Option<T>>;
+
+/// The columns in which every row has a value, even if the sample ended in an error.
+const REQUIRED: [&str; 5] = ["scenario", "seed", "sample", "controller", "status"];
 
 /// How the cells of a column are computed from the rows.
 enum Cells {
@@ -148,7 +167,11 @@ impl Column {
             Cells::Count(_) => DataType::UInt64,
             Cells::Flag(_) => DataType::Boolean,
         };
-        field(&self.name, of, self.unit)
+        if REQUIRED.contains(&self.name.as_str()) {
+            required(&self.name, of, self.unit)
+        } else {
+            field(&self.name, of, self.unit)
+        }
     }
 
     fn array(&self, rows: &[OutcomeRow]) -> ArrayRef {
@@ -222,9 +245,14 @@ fn key_columns(columns: &mut Columns) {
     columns.number("duration_s", "s", |row| Some(row.outcome()?.duration.s()));
 }
 
+/// Returns the name of a parameter's column: `param_closing_mps` for the parameter `closing-mps`.
+fn parameter_column_name(name: &ParameterName) -> String {
+    format!("param_{}", name.as_str().replace('-', "_"))
+}
+
 /// Adds the column of a parameter. The end of the parameter's name is its unit.
 fn parameter_column(columns: &mut Columns, name: &ParameterName, kind: ParameterKind) {
-    let (column, unit) = (format!("param:{name}"), unit_of(name.as_str()));
+    let (column, unit) = (parameter_column_name(name), unit_of(name.as_str()));
     let name = name.clone();
     match kind {
         ParameterKind::Number => {

@@ -3,10 +3,12 @@
 use std::sync::Arc;
 
 use closecall_campaign::execution::Campaign;
+use closecall_campaign::gate::{GateSet, Judge};
 use closecall_campaign::record::Record;
 use closecall_campaign::runner::Work;
 use closecall_campaign::saved::{SavedCampaign, SavedError};
 use closecall_campaign::summary::Summary;
+use closecall_campaign::verdict::{Judgement, judge};
 
 use super::overview::Overview;
 
@@ -15,36 +17,46 @@ use super::overview::Overview;
 pub struct Tally {
     /// The counts that the gates judge.
     pub summary: Summary,
+    /// The evidence for gates, requirements and expectations.
+    pub judge: Judge,
     /// Distributions, maps and the worst samples.
     pub overview: Overview,
+    max_flip_rate: f64,
 }
 
 impl Tally {
-    /// Returns a tally without samples.
-    pub fn new(campaign: &Campaign) -> Self {
-        Self::with(campaign.summary(), &campaign.works)
+    /// Returns a tally without samples, to be judged by `gates`.
+    pub fn new(campaign: &Campaign, gates: &GateSet) -> Self {
+        Self::with(campaign.summary(), &campaign.works, gates)
     }
 
-    /// Returns the tally of every record in a campaign's journal.
+    /// Returns the tally of every record in a campaign's journal, to be judged by `gates`.
     ///
     /// # Errors
     /// [`SavedError`] if the journal cannot be read.
-    pub fn of(saved: &SavedCampaign, works: &[Arc<Work>]) -> Result<Self, SavedError> {
-        let mut tally = Self::with(Summary::of(works).with_inference(saved.manifest().inference), works);
+    pub fn of(saved: &SavedCampaign, works: &[Arc<Work>], gates: &GateSet) -> Result<Self, SavedError> {
+        let mut tally = Self::with(Summary::of(works).with_inference(saved.manifest().inference), works, gates);
         for record in saved.folder().records()? {
             tally.push(&record?);
         }
         Ok(tally)
     }
 
-    fn with(summary: Summary, works: &[Arc<Work>]) -> Self {
+    fn with(summary: Summary, works: &[Arc<Work>], gates: &GateSet) -> Self {
+        let judge = Judge::new(works, gates, summary.inference);
         let overview = Overview::new(works.iter().map(|work| &work.file), &summary.controllers);
-        Self { summary, overview }
+        Self { summary, judge, overview, max_flip_rate: gates.max_flip_rate }
     }
 
     /// Adds a journal record.
     pub fn push(&mut self, record: &Record) {
         self.summary.push(record);
+        self.judge.push(record);
         self.overview.push(record);
+    }
+
+    /// Returns the judgement of the records so far.
+    pub fn judgement(&self) -> Judgement {
+        judge(&self.summary, &self.judge, self.max_flip_rate)
     }
 }

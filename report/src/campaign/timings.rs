@@ -9,7 +9,7 @@ use arrow::array::{ArrayRef, Float64Array, RecordBatch, StringArray, UInt64Array
 use arrow::datatypes::{DataType, Schema};
 use parquet::arrow::ArrowWriter;
 
-use crate::table::{ROWS_PER_GROUP, field, properties};
+use crate::table::{ROWS_PER_GROUP, properties, required};
 use closecall_scenarios::atomic::{WriteError, write_file};
 
 /// The wall time of one sample in one arm.
@@ -31,10 +31,10 @@ pub struct Timing {
 /// [`WriteError`] if the file cannot be written. An existing file then stays as it is.
 pub fn write_timings(path: &Path, timings: impl Iterator<Item = Timing>) -> Result<(), WriteError> {
     let schema = Arc::new(Schema::new(vec![
-        field("scenario", DataType::Utf8, None),
-        field("sample", DataType::UInt64, None),
-        field("controller", DataType::Utf8, None),
-        field("wall_s", DataType::Float64, Some("s")),
+        required("scenario", DataType::Utf8, None),
+        required("sample", DataType::UInt64, None),
+        required("controller", DataType::Utf8, None),
+        required("wall_s", DataType::Float64, Some("s")),
     ]));
     let mut timings = timings.fuse();
     write_file(path, |file| {

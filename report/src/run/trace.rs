@@ -9,7 +9,7 @@ use arrow::datatypes::{DataType, Schema};
 use closecall_traffic::{ActorId, Lane, Measured, Time};
 use parquet::arrow::ArrowWriter;
 
-use crate::table::{field, properties};
+use crate::table::{field, properties, required};
 use closecall_scenarios::atomic::{WriteError, check_writable, write_file};
 use closecall_simulation::{Happening, Observer, StepView};
 
@@ -110,13 +110,13 @@ fn write_csv(file: &mut (impl Write + ?Sized), rows: &[Row]) -> io::Result<()> {
 /// Writes the rows as Parquet, in one record batch.
 fn write_parquet(file: &mut (impl Write + Send + ?Sized), rows: &[Row]) -> io::Result<()> {
     let schema = Arc::new(Schema::new(vec![
-        field("time_s", DataType::Float64, Some("s")),
-        field("actor", DataType::Utf8, None),
-        field("lane", DataType::UInt8, None),
-        field("s_m", DataType::Float64, Some("m")),
-        field("d_m", DataType::Float64, Some("m")),
-        field("speed_mps", DataType::Float64, Some("m/s")),
-        field("acceleration_mps2", DataType::Float64, Some("m/s²")),
+        required("time_s", DataType::Float64, Some("s")),
+        required("actor", DataType::Utf8, None),
+        required("lane", DataType::UInt8, None),
+        required("s_m", DataType::Float64, Some("m")),
+        required("d_m", DataType::Float64, Some("m")),
+        required("speed_mps", DataType::Float64, Some("m/s")),
+        required("acceleration_mps2", DataType::Float64, Some("m/s²")),
         field("gap_front_m", DataType::Float64, Some("m")),
         field("thw_front_s", DataType::Float64, Some("s")),
     ]));

@@ -1,11 +1,9 @@
-use closecall_traffic::{Lane, Time, Trajectory};
+use closecall_traffic::{CONTROL_STEP, Lane, Time, Trajectory};
 
 use super::*;
 use crate::filters::smooth;
 use crate::lane_change::detect;
 use crate::recordings::test_support::{changing_track, recording_of, straight_track};
-
-const PERIOD: Time = Time::from_ms(40);
 
 /// Rear vehicle that changes from lane 2 to lane 1 between 10 and 15 s, 150 m behind the ego vehicle and 10 m/s faster
 /// than the ego and the lead vehicle.
@@ -17,7 +15,7 @@ fn found(others: Vec<Trajectory>) -> Result<RecordedEncounter, NoEncounter> {
     let recording = smooth(&recording_of(std::iter::once(rear()).chain(others).collect()));
     let changes = detect(&recording);
     let change = changes.iter().find(|change| change.track_id == 3).unwrap();
-    encounter(&recording, change, &changes, PERIOD)
+    encounter(&recording, change, &changes, CONTROL_STEP)
 }
 
 /// Ego and lead vehicle, 30 m apart.
@@ -32,7 +30,7 @@ fn roles_clock_and_road_are_assigned() {
     assert_eq!((found.start, found.lanes, found.home, found.target), (Time::ZERO, 2, Lane(2), Lane(1)));
     let [ego, _, rear] = found.protagonists();
     assert!(ego.points[0].s_m.abs() < 1e-6 && (rear.points[0].s_m + 150.0).abs() < 1e-6);
-    assert!(ego.points.windows(2).all(|pair| pair[1].time - pair[0].time == PERIOD));
+    assert!(ego.points.windows(2).all(|pair| pair[1].time - pair[0].time == CONTROL_STEP));
     // The gap at the crossing is the initial 150 m less 10 m/s times the elapsed time and a vehicle's length.
     assert!((found.crossing.s() - 12.5).abs() < 0.2, "{}", found.crossing);
     assert!((found.crossing_thw_s - (150.0 - 10.0 * found.crossing.s() - 4.5) / 30.0).abs() < 0.1);

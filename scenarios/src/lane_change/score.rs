@@ -10,6 +10,8 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::fs::File;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use closecall_statistics::interval::{COVERAGE, clopper_pearson};
@@ -26,6 +28,9 @@ const ON_EACH_SIDE_S: f64 = 2.0;
 
 /// Tolerance of time differences, because times in files are rounded (s).
 const ROUNDING_S: f64 = 1e-6;
+
+/// Largest size of a reference list (bytes): about a million lane changes.
+const MAX_REFERENCE_BYTES: u64 = 64 << 20;
 
 /// A lane change of the reference list.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -65,7 +70,14 @@ impl ReferenceError {
 /// Returns a [`ReferenceError`] with the file, the line and the required columns.
 pub fn read_references(path: &Path) -> Result<Vec<ReferenceChange>, ReferenceError> {
     let fail = |source| ReferenceError { path: path.to_owned(), source };
-    let mut reader = csv::Reader::from_path(path).map_err(fail)?;
+    let file = File::open(path).map_err(|error| fail(error.into()))?;
+    let mut bytes = Vec::new();
+    file.take(MAX_REFERENCE_BYTES + 1).read_to_end(&mut bytes).map_err(|error| fail(error.into()))?;
+    if bytes.len() as u64 > MAX_REFERENCE_BYTES {
+        let message = format!("the file is larger than {} MiB", MAX_REFERENCE_BYTES >> 20);
+        return Err(fail(io::Error::new(io::ErrorKind::InvalidData, message).into()));
+    }
+    let mut reader = csv::Reader::from_reader(&bytes[..]);
     reader.deserialize().collect::<Result<_, _>>().map_err(fail)
 }
 

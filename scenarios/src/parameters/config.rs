@@ -82,24 +82,6 @@ pub struct UniformConfig {
     pub max: f64,
 }
 
-/// A normal distribution, truncated at two bounds, in the parameter's unit.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case", deny_unknown_fields)]
-pub struct TruncatedNormalConfig {
-    /// Mean before truncation.
-    #[serde(deserialize_with = "finite::number")]
-    pub mean: f64,
-    /// Standard deviation before truncation, above 0.
-    #[serde(deserialize_with = "finite::number")]
-    pub sd: f64,
-    /// Smallest value.
-    #[serde(deserialize_with = "finite::number")]
-    pub min: f64,
-    /// Largest value, above the smallest.
-    #[serde(deserialize_with = "finite::number")]
-    pub max: f64,
-}
-
 /// A log-normal distribution, which may be truncated at either end, in the parameter's unit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
@@ -116,6 +98,24 @@ pub struct LogNormalConfig {
     /// Largest value; unbounded if absent.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "finite::option")]
     pub max: Option<f64>,
+}
+
+/// A normal distribution, truncated at two bounds, in the parameter's unit.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct TruncatedNormalConfig {
+    /// Mean before truncation.
+    #[serde(deserialize_with = "finite::number")]
+    pub mean: f64,
+    /// Standard deviation before truncation, above 0.
+    #[serde(deserialize_with = "finite::number")]
+    pub sd: f64,
+    /// Smallest value.
+    #[serde(deserialize_with = "finite::number")]
+    pub min: f64,
+    /// Largest value, above the smallest.
+    #[serde(deserialize_with = "finite::number")]
+    pub max: f64,
 }
 
 /// A distribution given by its quantiles, in the parameter's unit.

@@ -6,6 +6,7 @@ use closecall_statistics::normal::TruncatedStandardNormal;
 use closecall_statistics::quantiles;
 use closecall_traffic::{ConfigError, KeyPath, Problem, Range, Value};
 
+use super::Variation;
 use super::config::{EmpiricalConfig, LogNormalConfig, TruncatedNormalConfig, UniformConfig};
 
 /// Largest magnitude of a number in a distribution. It is far above every quantity of a scenario, and sums and products
@@ -87,12 +88,15 @@ impl Distribution {
     /// Creates a log-normal distribution, which may be truncated at either end.
     ///
     /// # Errors
-    /// Returns an error unless all numbers are finite and positive, and some probability is left between the bounds.
+    /// Returns an error unless all numbers are finite, all but `min` positive, `min` is not negative, and some
+    /// probability is left between the bounds.
     pub fn log_normal(config: &LogNormalConfig) -> Result<Self, ConfigError> {
         let median = POSITIVE.check(config.median, "median")?;
         let sigma = Range::above(0.0, LARGEST_SIGMA).check(config.sigma, "sigma")?;
         let max = config.max.map(|max| POSITIVE.check(max, "max")).transpose()?;
-        let min = config.min.map(|min| POSITIVE.check(min, "min")).transpose()?;
+        let min = config.min.map(|min| at_least(0.0).check(min, "min")).transpose()?;
+        // A log-normal value is positive: 0 cuts nothing off.
+        let min = min.filter(|&min| min > 0.0);
         let high = max.map_or(f64::INFINITY, |max| (max / median).ln() / sigma);
         let low = min.map_or(f64::NEG_INFINITY, |min| (min / median).ln() / sigma);
         let standard = TruncatedStandardNormal::new(low, high).ok_or_else(|| {
@@ -238,6 +242,20 @@ impl Distribution {
             Kind::Choice(weights) => &weights.labels,
             Kind::Fixed(Value::Label(label)) => std::slice::from_ref(label),
             _ => &[],
+        }
+    }
+
+    /// Returns how much the value varies.
+    pub fn variation(&self) -> Variation {
+        match &self.0 {
+            Kind::Choice(weights) if weights.labels.len() > 1 => Variation::Discrete,
+            Kind::Choice(_) | Kind::Fixed(_) => Variation::None,
+            Kind::Uniform { .. } | Kind::TruncatedNormal { .. } | Kind::LogNormal { .. } | Kind::Empirical { .. } => {
+                match self.bounds() {
+                    Some([low, high]) if low < high => Variation::Continuous,
+                    _ => Variation::None,
+                }
+            }
         }
     }
 

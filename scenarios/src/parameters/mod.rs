@@ -27,4 +27,4 @@ pub use config::{
     UniformConfig,
 };
 pub use distribution::Distribution;
-pub use space::{ParameterSpace, Provenance, SpaceEntry};
+pub use space::{ParameterSpace, Provenance, SpaceEntry, Variation};

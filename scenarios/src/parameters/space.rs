@@ -34,6 +34,17 @@ pub struct SpaceEntry {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ParameterSpace(BTreeMap<ParameterName, SpaceEntry>);
 
+/// How much sampled values vary, in rising order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Variation {
+    /// They are always the same.
+    None,
+    /// They take finitely many values, so that independent samples repeat each other.
+    Discrete,
+    /// They come from a continuum.
+    Continuous,
+}
+
 impl ParameterSpace {
     /// Iterates over all parameters in the order of their names.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = (&ParameterName, &SpaceEntry)> {
@@ -43,6 +54,12 @@ impl ParameterSpace {
     /// Returns the parameter `name`, or `None` if there is none.
     pub fn get(&self, name: &ParameterName) -> Option<&SpaceEntry> {
         self.0.get(name)
+    }
+
+    /// Returns how much the parameters vary.
+    pub fn variation(&self) -> Variation {
+        let variations = self.0.values().map(|entry| entry.distribution.variation());
+        variations.max().unwrap_or(Variation::None)
     }
 
     /// Returns the nominal value of every parameter: the median, or the most probable label.

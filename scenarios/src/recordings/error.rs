@@ -81,6 +81,14 @@ pub enum RecordingProblem {
         /// Maximum line length (bytes).
         allowed: u64,
     },
+    /// The file has more rows than are read at once.
+    #[error(
+        "it has more than {allowed} rows; `lane-changes` and `inspect` read it piece by piece, other commands need a part of it"
+    )]
+    TooManyRows {
+        /// Maximum number of rows.
+        allowed: usize,
+    },
     /// The first line fits none of the layouts.
     #[error(
         "the first line is neither a header of the plain layout (`track_id, frame, time_s, s_m, …`) or of NGSIM's \

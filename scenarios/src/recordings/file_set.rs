@@ -95,6 +95,11 @@ impl FileSet {
         self.path(TRACKS)
     }
 
+    /// Returns the paths of all files of the set.
+    pub(super) fn files(&self) -> [PathBuf; 3] {
+        [TRACKS, TRACKS_META, RECORDING_META].map(|end| self.path(end))
+    }
+
     /// Returns the path of one file of the set. It is the compressed file if only that exists.
     fn path(&self, end: &str) -> PathBuf {
         let plain = self.folder.join(format!("{}{end}", self.prefix));

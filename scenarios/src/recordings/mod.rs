@@ -79,7 +79,7 @@ pub use builder::PIECE_STRIDE;
 pub use dropped::{Dropped, DroppedRows};
 pub use error::{RecordingError, RecordingProblem, WriteError};
 pub use markings::{DEFAULT_LANE_WIDTH_M, LaneMarkings};
-pub use open::{open, open_from, read, read_from, read_with};
+pub use open::{input_files, open, open_from, read, read_from, read_with};
 pub use order::WINDOW_ROWS;
 pub use quality::{Flaw, FlawLocation, Flaws, Inspector, Quality, quality};
 pub use recording::{Layout, MarkingDistances, RecordedTrack, Recording};

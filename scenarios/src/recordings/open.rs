@@ -1,7 +1,7 @@
 //! Opening of trajectory files: selects the reader that a file needs.
 
 use std::io::{BufRead, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::commonroad::CommonRoadSource;
 use super::error::{RecordingError, RecordingProblem};
@@ -74,6 +74,14 @@ pub fn open_from<'a>(
     let input = digest.input(source).map_err(|error| with_path(path, error))?;
     let source = reader_for(input, &options).map_err(|error| with_path(path, error))?;
     Tracks::new((path, digest), source, options.bad_rows, window)
+}
+
+/// Returns the files that are read for `path`: several for a highD or exiD data set.
+pub fn input_files(path: &Path) -> Vec<PathBuf> {
+    match FileSet::of(path) {
+        Ok(Some(set)) => set.files().to_vec(),
+        Ok(None) | Err(_) => vec![path.to_owned()],
+    }
 }
 
 /// Opens `path`; data of more than `window` rows must be sorted.

@@ -22,6 +22,9 @@ const MIN_EPOCH_TIME: Time = Time::from_ms(86_400_000);
 /// Time between two data sets in one file after shifting them, so that their vehicles never meet.
 const SEPARATION: Time = Time::from_ms(10_000);
 
+/// Largest number of rows that are held at once: four times the rows of all NGSIM motorway data, about 8 GiB.
+const MAX_ROWS: usize = 50_000_000;
+
 /// Options for reading a trajectory file.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ReadOptions {
@@ -244,6 +247,9 @@ impl<'a> Tracks<'a> {
     fn read_window(&mut self, window: usize) -> Result<(), ReadError> {
         let mut rows = Vec::new();
         while rows.len() < window {
+            if rows.len() >= MAX_ROWS {
+                return Err(ReadError::of_file(RecordingProblem::TooManyRows { allowed: MAX_ROWS }));
+            }
             match self.next_row()? {
                 Some(row) => rows.push(row),
                 None => {

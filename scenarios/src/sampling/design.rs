@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{grid, random, sobol};
-use crate::parameters::ParameterSpace;
+use crate::parameters::{ParameterSpace, Variation};
 
 /// The sampling design: how a parameter space is sampled.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
@@ -61,9 +61,10 @@ impl FromStr for Design {
 
 impl ParameterSpace {
     /// Returns the number of samples of a design if up to `n` are requested: `n`, or the size of the largest grid
-    /// within `n`.
+    /// within `n`. If no parameter varies, all samples are the same encounter, and there is one.
     pub fn samples(&self, design: Design, n: u64) -> u64 {
         match design {
+            _ if self.variation() == Variation::None => n.min(1),
             Design::Random | Design::Sobol => n,
             Design::Grid => grid::Grid::within(self, n).points(),
         }

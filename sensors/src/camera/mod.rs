@@ -37,4 +37,6 @@ pub use image::{CHANNELS, CROP_PX, Crop, Image, LabelledImage};
 pub use pinhole::{GroundBox, HEIGHT_PX, PixelRect, WIDTH_PX};
 pub use pipeline::CropClassifier;
 pub use rear_camera::{ExposureKey, RearCamera};
-pub use shapes::{HELD_OUT_SHAPES, SHAPE_COUNTS, usual_dimensions};
+pub use shapes::HELD_OUT_SHAPES;
+#[cfg(test)]
+pub(crate) use shapes::vehicle as vehicle_mesh;

@@ -50,3 +50,5 @@ pub use rear::RearLidar;
 pub use scan::{LidarScan, MirrorSide, PointSource, PointTruth, ScanTruth};
 pub use scanner::Scanner;
 pub use segmentation::SegmentationReport;
+#[cfg(test)]
+pub(crate) use shapes::append_solids;

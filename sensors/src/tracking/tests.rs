@@ -1,8 +1,7 @@
 //! Tests of the tracker on simulated detections against the true states.
 
 use closecall_traffic::{
-    ActorId, CONTROL_STEP, Check, ClassScores, Environment, Parameters, Road, Stream, Time, TrackStatus, VehicleClass,
-    stream,
+    ActorId, CONTROL_STEP, Check, ClassScores, Environment, Parameters, Road, Stream, TrackStatus, VehicleClass, stream,
 };
 use rand::RngExt;
 use rand_distr::StandardNormal;

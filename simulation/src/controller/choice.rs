@@ -1,6 +1,7 @@
 //! The choice of a controller on a command line or in a manifest.
 
 use std::fmt;
+use std::path::Path;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
@@ -33,10 +34,15 @@ impl ControllerChoice {
 
     /// Returns a factory of this controller.
     pub fn factory(&self) -> Arc<dyn ControllerFactory> {
+        self.factory_in(None)
+    }
+
+    /// Returns a factory of this controller. A process runs in the given folder, or in that of this program.
+    pub fn factory_in(&self, folder: Option<&Path>) -> Arc<dyn ControllerFactory> {
         match self {
             Self::Acc => BuiltIn::Acc.factory(),
             Self::Mis => BuiltIn::Mis.factory(),
-            Self::Exec(settings) => Arc::new(ExecFactory::new(settings.clone())),
+            Self::Exec(settings) => Arc::new(ExecFactory::new(settings.clone(), folder)),
         }
     }
 }

@@ -13,6 +13,9 @@ use super::config::{ActorConfig, SCHEMA_VERSION, ScenarioConfig};
 use super::events::{self, Event};
 use super::placement;
 
+/// Largest probability or confidence that a gate may ask for: the largest number below 1 (-).
+const BELOW_ONE: f64 = 1.0 - 0.5 * f64::EPSILON;
+
 /// One vehicle of a concrete scenario.
 #[derive(Clone, Debug)]
 pub struct Actor {
@@ -95,6 +98,7 @@ impl ScenarioConfig {
             return Err(ConfigError::new("name", Problem::UnknownWord { value: self.name.clone(), allowed }));
         }
         self.check_requirements()?;
+        self.check_criteria()?;
         for (index, actor) in self.actors.iter().enumerate() {
             if self.actors[..index].iter().any(|earlier| earlier.id == actor.id) {
                 let problem = Problem::Duplicate { value: actor.id.to_string() };
@@ -134,6 +138,25 @@ impl ScenarioConfig {
             if self.requirements[..index].contains(requirement) {
                 return at(Problem::Duplicate { value: requirement.clone() });
             }
+        }
+        Ok(())
+    }
+
+    /// Checks the criteria beyond their syntax: every check belongs to a requirement, and shares are from 0 to 1.
+    fn check_criteria(&self) -> Result<(), ConfigError> {
+        for mark in self.checks.keys() {
+            if !self.requirements.contains(mark) {
+                let allowed = format!("one of the `requirements`: {}", self.requirements.join(", "));
+                let problem = Problem::UnknownWord { value: mark.clone(), allowed };
+                return Err(ConfigError::new(mark, problem).within("checks"));
+            }
+        }
+        Range::closed(0.0, 1.0).check(self.expects_share, "expects-share")?;
+        if let Some(max) = self.gate.max_probability {
+            Range::above(0.0, BELOW_ONE).check(max, "max-probability").map_err(|error| error.within("gate"))?;
+        }
+        if let Some(confidence) = self.gate.confidence {
+            Range::above(0.5, BELOW_ONE).check(confidence, "confidence").map_err(|error| error.within("gate"))?;
         }
         Ok(())
     }

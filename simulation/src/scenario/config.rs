@@ -1,5 +1,7 @@
 //! The contents of a scenario file, before they are checked.
 
+use std::collections::BTreeMap;
+
 use closecall_controllers::{DriverConfig, LaneKeepingConfig, SpeedKeepingConfig};
 use closecall_scenarios::parameters::ParametersConfig;
 use closecall_sensors::SensorsConfig;
@@ -8,6 +10,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::events::EventConfig;
+use crate::criteria::{Expression, FlagName, GateConfig};
 
 /// The version of the scenario file format that this program reads.
 pub const SCHEMA_VERSION: u32 = 1;
@@ -29,6 +32,19 @@ pub struct ScenarioConfig {
     /// Identifiers of the requirements that the scenario tests, such as `MIS-1`. Reports state which of them are met.
     #[serde(default)]
     pub requirements: Vec<String>,
+    /// The criteria that check each requirement, by its mark: `MIS-2 = ["upper(induced) <= 0.02"]`. They are judged in every
+    /// campaign, whatever its gates; a requirement without criteria is not checked.
+    #[serde(default)]
+    pub checks: BTreeMap<String, Vec<Expression>>,
+    /// The gates of campaigns with this scenario.
+    #[serde(default)]
+    pub gate: GateConfig,
+    /// What must happen in a run for it to count, such as `lead_braked`. A campaign in which it happens too seldom is invalid.
+    #[serde(default)]
+    pub expects: Vec<FlagName>,
+    /// Least share of the samples in which everything that is expected must happen (-). Default: 0.95.
+    #[serde(default = "default_expects_share")]
+    pub expects_share: f64,
     /// Longest duration of a run (s).
     pub duration_s: Num,
     /// The road.
@@ -45,6 +61,13 @@ pub struct ScenarioConfig {
     /// The ego's sensors.
     #[serde(default)]
     pub sensors: SensorsConfig,
+}
+
+/// Share of the samples in which what is expected must happen unless the file says otherwise (-).
+pub(super) const EXPECTS_SHARE: f64 = 0.95;
+
+const fn default_expects_share() -> f64 {
+    EXPECTS_SHARE
 }
 
 /// One vehicle with its driver.

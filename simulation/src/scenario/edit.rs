@@ -3,8 +3,10 @@
 //! A setting changes the text of the scenario. All later steps (checking, hashing, the campaign's manifest, replay) thus
 //! work on one text and need no special case.
 
+use std::fmt;
 use std::str::FromStr;
 
+use closecall_traffic::suggest::hint;
 use toml_edit::{ArrayOfTables, DocumentMut, Formatted, InlineTable, Item, TableLike, Value};
 
 /// One `key=value` from the command line.
@@ -35,7 +37,7 @@ pub enum SettingError {
         value: String,
     },
     /// The scenario has no such key.
-    #[error("`{key}` leads nowhere: there is no {part}, only {known}")]
+    #[error("`{key}` leads nowhere: there is no {part}, only {known}{}", hint(part.trim_matches('`'), known))]
     NoSuchKey {
         /// The whole key.
         key: String,
@@ -44,6 +46,12 @@ pub enum SettingError {
         /// The keys that exist there.
         known: String,
     },
+}
+
+impl fmt::Display for Setting {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}={}", self.key.join("."), self.value)
+    }
 }
 
 impl FromStr for Setting {
@@ -123,6 +131,7 @@ impl Setting {
             tables.iter().map(|table| table.get("id").and_then(Item::as_str).unwrap_or_default().to_owned()).collect();
         let not_found = || {
             let part = name.map_or_else(|| format!("single `{array}`"), |name| format!("`{name}`"));
+            let ids: Vec<String> = ids.iter().map(|id| format!("`{id}`")).collect();
             self.no_such_key(&part, format!("`{array}` with a name and a key: {}", ids.join(", ")))
         };
         let name = name.ok_or_else(not_found)?;
@@ -164,6 +173,10 @@ mod tests {
     fn a_value_is_changed_in_place() {
         assert!(set("duration-s=30").unwrap().starts_with("duration-s = 30\n[parameters]"));
         assert!(set("actor.rear.start.behind.gap-m=90").unwrap().contains("gap-m = 90"));
+        assert_eq!(
+            "actor.rear.start.behind.gap-m = 90".parse::<Setting>().unwrap().to_string(),
+            "actor.rear.start.behind.gap-m=90"
+        );
         assert!(set("actor.0.start.behind.gap-m=$gap").unwrap().contains("gap-m = \"$gap\""));
         assert!(set("parameters.brake-mps2.uniform.min=5").unwrap().contains("min = 5"));
     }
@@ -171,6 +184,16 @@ mod tests {
     #[test]
     fn a_parameter_is_fixed_by_its_name() {
         assert!(set("brake-mps2=6.5").unwrap().contains("brake-mps2 = { fixed = 6.5 }"));
+    }
+
+    #[test]
+    fn a_misspelt_part_is_answered_with_a_suggestion() {
+        for (text, expected) in
+            [("duration=3", "duration-s"), ("actor.raer.id=x", "rear"), ("brake-mps=3", "brake-mps2")]
+        {
+            let message = set(text).unwrap_err().to_string();
+            assert!(message.ends_with(&format!("; did you mean `{expected}`?")), "{message}");
+        }
     }
 
     #[test]

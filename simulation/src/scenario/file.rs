@@ -1,9 +1,12 @@
 //! Reads scenario files. Errors name the file, the line, the key, and what is allowed.
 
+use std::fs::File;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use closecall_scenarios::parameters::ParameterSpace;
 use closecall_scenarios::sampling::Design;
+use closecall_traffic::suggest::hint;
 use closecall_traffic::{ActorId, Check, ConfigError, ParameterName, Parameters};
 use toml_edit::DocumentMut;
 
@@ -13,6 +16,9 @@ use super::{Scenario, ScenarioConfig, locate, recorded};
 
 /// Number of random samples that `check` checks in addition to the nominal values and the bounds.
 const CHECKED_SAMPLES: u64 = 64;
+
+/// Largest size of a scenario file (bytes). A scenario with minutes of recorded speeds has about 1 MiB.
+const MAX_FILE_BYTES: u64 = 64 << 20;
 
 /// A scenario file that cannot be used. No run has been started.
 #[derive(Debug, thiserror::Error)]
@@ -32,6 +38,14 @@ pub enum ScenarioError {
         path: PathBuf,
         /// The first line that is not text, counted from 1.
         line: usize,
+    },
+    /// The file is larger than any scenario.
+    #[error("failed to read {}: the file is larger than {limit_mib} MiB; a scenario is a TOML file of a few KiB", path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// The largest size (MiB).
+        limit_mib: u64,
     },
     /// The file is empty.
     #[error("failed to read {}: the file is empty; a scenario needs at least `schema-version`, `name`, `duration-s`, `road` and actors", path.display())]
@@ -71,6 +85,17 @@ pub enum ScenarioError {
     },
 }
 
+impl ScenarioError {
+    /// Returns the line of the error, counted from 1, or `None` if it has none.
+    pub const fn line(&self) -> Option<usize> {
+        match self {
+            Self::NotText { line, .. } | Self::Syntax { line, .. } => Some(*line),
+            Self::Value { line, .. } => *line,
+            Self::Read { .. } | Self::TooLarge { .. } | Self::Empty { .. } | Self::Set { .. } => None,
+        }
+    }
+}
+
 /// A scenario file whose keys have been checked.
 #[derive(Clone, Debug)]
 pub struct ScenarioFile {
@@ -79,6 +104,7 @@ pub struct ScenarioFile {
     config: ScenarioConfig,
     space: ParameterSpace,
     unused: Vec<ParameterName>,
+    trajectory_files: Vec<PathBuf>,
 }
 
 impl ScenarioFile {
@@ -88,7 +114,10 @@ impl ScenarioFile {
     /// [`ScenarioError`] if the file cannot be read or parsed, if a setting cannot be applied, or if a distribution is
     /// invalid.
     pub fn load(path: &Path, settings: &[Setting]) -> Result<Self, ScenarioError> {
-        let bytes = std::fs::read(path).map_err(|source| ScenarioError::Read { path: path.to_owned(), source })?;
+        let bytes = read_bounded(path).map_err(|source| ScenarioError::Read { path: path.to_owned(), source })?;
+        if bytes.len() as u64 > MAX_FILE_BYTES {
+            return Err(ScenarioError::TooLarge { path: path.to_owned(), limit_mib: MAX_FILE_BYTES >> 20 });
+        }
         let text = String::from_utf8(bytes).map_err(|error| {
             let line = locate::line_at(&String::from_utf8_lossy(error.as_bytes()), error.utf8_error().valid_up_to());
             ScenarioError::NotText { path: path.to_owned(), line }
@@ -114,6 +143,7 @@ impl ScenarioFile {
             text = apply(path, &text, settings)?;
             config = deserialize(path, &text)?;
         }
+        let trajectory_files = recorded::files(path, &config);
         if let Some(inlined) =
             recorded::inline(path, &text, &config).map_err(|error| recorded_error(path, &text, &error))?
         {
@@ -125,12 +155,17 @@ impl ScenarioFile {
             let line = locate::line_of(&text, &source.path);
             ScenarioError::Value { path: path.to_owned(), line, source: Box::new(source), at: String::new() }
         })?;
-        Ok(Self { path: path.to_owned(), text, config, space, unused })
+        Ok(Self { path: path.to_owned(), text, config, space, unused, trajectory_files })
     }
 
     /// Returns the path of the file, as given.
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// Returns the trajectory files that the file names.
+    pub fn trajectory_files(&self) -> &[PathBuf] {
+        &self.trajectory_files
     }
 
     /// Returns the text of the scenario, with all settings applied.
@@ -186,6 +221,13 @@ impl ScenarioFile {
     }
 }
 
+/// Reads a file, or the first bytes of it if it is larger than [`MAX_FILE_BYTES`].
+fn read_bounded(path: &Path) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    File::open(path)?.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
 fn describe(parameters: &Parameters) -> String {
     let values: Vec<String> = parameters.iter().map(|(name, value)| format!("{name} = {value}")).collect();
     if values.is_empty() { String::new() } else { format!(" (with {})", values.join(", ")) }
@@ -214,7 +256,7 @@ fn deserialize(path: &Path, text: &str) -> Result<ScenarioConfig, ScenarioError>
         let offset = error.span().map_or(0, |span| span.start);
         let line = locate::line_at(text, offset);
         let named = key_at(text, offset).map(|key| format!("`{key}`: ")).unwrap_or_default();
-        let message = format!("{named}{}", without_rust_types(error.message()));
+        let message = format!("{named}{}{}", without_rust_types(error.message()), suggestion(error.message()));
         ScenarioError::Syntax { path: path.to_owned(), line, message }
     })
 }
@@ -236,6 +278,16 @@ fn append_names<'a>(value: &'a toml::Value, names: &mut Vec<&'a str>) {
         toml::Value::Array(values) => values.iter().for_each(|value| append_names(value, names)),
         toml::Value::Table(table) => table.iter().for_each(|(_, value)| append_names(value, names)),
         _ => {}
+    }
+}
+
+/// Returns the known word that the message's first word resembles, as the end of the message. The message is serde's:
+/// "unknown field `x`, expected one of `a`, `b`".
+fn suggestion(message: &str) -> String {
+    let is_unknown_word = message.starts_with("unknown field ") || message.starts_with("unknown variant ");
+    match (message.split('`').nth(1), message.split_once("expected ")) {
+        (Some(word), Some((_, known))) if is_unknown_word => hint(word, known),
+        _ => String::new(),
     }
 }
 
@@ -265,4 +317,20 @@ fn key_at(text: &str, offset: usize) -> Option<String> {
     let key = line.split('=').next()?.trim();
     let is_key = !key.is_empty() && key.chars().all(|c| c.is_alphanumeric() || "-_.\"".contains(c));
     is_key.then(|| key.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_misspelt_key_or_word_is_answered_with_a_suggestion() {
+        let parse = |text: &str| ScenarioFile::parse(Path::new("a.toml"), text, &[]).unwrap_err().to_string();
+        let message = parse("schema-version = 1\nname = 'a'\nduration = 3\n");
+        assert!(message.starts_with("failed to read a.toml:3: "), "{message}");
+        assert!(message.ends_with("; did you mean `duration-s`?"), "{message}");
+        let message = parse("schema-version = 1\nroad = { lanes = 3, overtaking-side = 'lefft' }\n");
+        assert!(message.ends_with("; did you mean `left`?"), "{message}");
+        assert!(!parse("schema-version = 1\nzzz = 3\n").contains("did you mean"));
+    }
 }

@@ -3,7 +3,7 @@
 //! The times and speeds of the track replace `recorded` in the text of the scenario. All later steps (checking, hashing, a
 //! campaign's manifest, replay) work on an ordinary speed profile and do not need the trajectory file.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use closecall_controllers::{DriverConfig, RecordedConfig};
 use closecall_scenarios::recordings::{ReadOptions, open};
@@ -60,6 +60,15 @@ pub(super) fn inline(path: &Path, text: &str, config: &ScenarioConfig) -> Result
         table.insert("profile", Item::Value(Value::Array(profile)));
     }
     Ok(document.map(|document| document.to_string()))
+}
+
+/// Returns the trajectory files that a scenario names.
+pub(super) fn files(path: &Path, config: &ScenarioConfig) -> Vec<PathBuf> {
+    let recorded = config.actors.iter().filter_map(|actor| match &actor.driver {
+        DriverConfig::Prescribed(prescribed) => prescribed.recorded.as_ref(),
+        _ => None,
+    });
+    recorded.map(|recorded| path.parent().unwrap_or(Path::new("")).join(&recorded.file)).collect()
 }
 
 fn prescribed_table(document: &mut DocumentMut, index: usize) -> Option<&mut dyn TableLike> {

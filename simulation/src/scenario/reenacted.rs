@@ -16,6 +16,7 @@
 //! * vehicles that appear after the start
 //! * vehicles that would overlap with another one in the middle of a lane
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use closecall_controllers::{
@@ -28,7 +29,9 @@ use closecall_traffic::metrics::{time_headway_s, touching_distance_m};
 use closecall_traffic::{ActorId, Choice, Num, RoadConfig, Time, Trajectory, TrajectoryPoint, VehicleConfig};
 use toml_edit::{ArrayOfTables, DocumentMut, Item};
 
-use super::config::{AbsoluteStartConfig, ActorConfig, SCHEMA_VERSION, ScenarioConfig, StartConfig};
+use crate::criteria::GateConfig;
+
+use super::config::{AbsoluteStartConfig, ActorConfig, EXPECTS_SHARE, SCHEMA_VERSION, ScenarioConfig, StartConfig};
 use super::{ScenarioError, ScenarioFile, Setting};
 
 /// The driver of the rear vehicle.
@@ -130,6 +133,10 @@ fn config(encounter: &RecordedEncounter, rear: RearDriver) -> Result<ScenarioCon
         ),
         tags: vec!["reenacted".to_owned()],
         requirements: Vec::new(),
+        checks: BTreeMap::new(),
+        gate: GateConfig::default(),
+        expects: Vec::new(),
+        expects_share: EXPECTS_SHARE,
         duration_s: rounded(encounter.end.s()),
         road: RoadConfig {
             lanes: encounter.lanes,

@@ -43,9 +43,12 @@ fn documented(name: &str) -> Vec<Documented> {
         })
         .collect();
     for include in includes.split(" + ").filter(|include| !include.is_empty()) {
-        let (prefix, section) = include.rsplit_once('.').map_or(("", include), |(prefix, section)| (prefix, section));
+        // A question mark says that the test holds these keys elsewhere, and need not see each of them here.
+        let (path, is_rare) = include.strip_suffix('?').map_or((include, false), |path| (path, true));
+        let (prefix, section) = path.rsplit_once('.').unwrap_or(("", path));
         all.extend(documented(section).into_iter().map(|one| Documented {
             pattern: if prefix.is_empty() { one.pattern } else { format!("{prefix}.{}", one.pattern) },
+            is_rare: one.is_rare || is_rare,
             ..one
         }));
     }

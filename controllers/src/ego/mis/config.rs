@@ -4,8 +4,8 @@ use closecall_traffic::{Check, ConfigError, ENGAGEMENT_CLOSING_MPS, ENGAGEMENT_G
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The margin increase system as a scenario file describes it. An absent value takes the default of
-/// [`MisSettings::PAPER`].
+/// The margin increase system as a scenario file describes it. Absent keys have the values of
+/// the paper.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct MisConfig {

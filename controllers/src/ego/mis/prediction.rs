@@ -120,7 +120,7 @@ impl ArrivalPrediction {
 mod tests {
     use proptest::prelude::*;
 
-    use super::super::tests::encounters;
+    use super::super::tests::{REFERENCE, encounters};
     use super::*;
 
     /// Build-up at the comfort limit, with the actuators of a car.
@@ -267,24 +267,16 @@ mod tests {
 
     #[test]
     fn with_nan_the_goal_is_out_of_reach() {
-        let encounter = Encounter {
-            ego_mps: 30.0,
-            front_gap_m: 21.0,
-            lead_mps: 30.0,
-            rear_gap_m: 100.0,
-            closing_mps: 24.0 / 3.6,
-            critical_gap_m: 5.0,
-        };
         for broken in
-            [Encounter { front_gap_m: f64::NAN, ..encounter }, Encounter { rear_gap_m: f64::NAN, ..encounter }]
+            [Encounter { front_gap_m: f64::NAN, ..REFERENCE }, Encounter { rear_gap_m: f64::NAN, ..REFERENCE }]
         {
             let solution = ArrivalPrediction { encounter: broken, response: CAR }.solve(2.7, 1.0).unwrap();
             assert_eq!(solution, Solution { deceleration_mps2: 1.0, in_reach: false });
         }
         let broken = BrakingResponse { braking_mps2: f64::NAN, ..CAR };
-        assert!(!ArrivalPrediction { encounter, response: broken }.solve(2.7, 1.0).unwrap().in_reach);
+        assert!(!ArrivalPrediction { encounter: REFERENCE, response: broken }.solve(2.7, 1.0).unwrap().in_reach);
         assert_eq!(
-            ArrivalPrediction { encounter: Encounter { closing_mps: f64::NAN, ..encounter }, response: CAR }
+            ArrivalPrediction { encounter: Encounter { closing_mps: f64::NAN, ..REFERENCE }, response: CAR }
                 .solve(2.7, 1.0),
             None
         );

@@ -114,18 +114,8 @@ impl Encounter {
 mod tests {
     use proptest::prelude::*;
 
-    use super::super::tests::encounters;
+    use super::super::tests::{REFERENCE, encounters};
     use super::*;
-
-    /// The reference point: the paper's figure.
-    const REFERENCE: Encounter = Encounter {
-        ego_mps: 30.0,
-        front_gap_m: 21.0,
-        lead_mps: 30.0,
-        rear_gap_m: 100.0,
-        closing_mps: 24.0 / 3.6,
-        critical_gap_m: 5.0,
-    };
 
     #[test]
     fn the_reference_point_needs_one_metre_per_second_squared() {

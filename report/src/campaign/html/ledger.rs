@@ -15,10 +15,8 @@ use closecall_statistics::format::percent;
 /// Returns the collisions of each arm, and of pairs of arms if the campaign is paired.
 pub(super) fn collisions(findings: &Findings<'_>) -> io::Result<Markup> {
     let summary = findings.summary;
-    let mut scenarios: Vec<(String, Counts)> = summary.scenarios.clone();
-    if scenarios.len() > 1 {
-        scenarios.push(("all scenarios".to_owned(), summary.total()));
-    }
+    // Scenarios are never pooled into one sample: each has a row of its own.
+    let scenarios = &summary.scenarios;
     let arms = || scenarios.iter().flat_map(|(_, counts)| &counts.arms);
     // All bars have one scale, so that they can be compared.
     let most = arms().map(|arm| arm.interval_95(summary.inference)[1]).fold(0.0, f64::max);
@@ -29,7 +27,7 @@ pub(super) fn collisions(findings: &Findings<'_>) -> io::Result<Markup> {
         (number_heads(&["largest ΔV [m/s]", "engaged", "goal in reach", "errors"]))
     };
     let rows = html! {
-        @for (name, counts) in &scenarios {
+        @for (name, counts) in scenarios {
             @for (index, (controller, arm)) in summary.controllers.iter().zip(&counts.arms).enumerate() {
                 @let is_tested = index + 1 == counts.arms.len();
                 tr.tested[is_tested] {
@@ -43,7 +41,7 @@ pub(super) fn collisions(findings: &Findings<'_>) -> io::Result<Markup> {
     Ok(html! {
         h2 { "Collisions of the ego" }
         (table(&head, &rows))
-        @if summary.is_paired() { (pairs(&scenarios, summary.inference)?) }
+        @if summary.is_paired() { (pairs(scenarios, summary.inference)?) }
         p.note {
             "Rates are conditional on the sampled scenario: they say how often a sampled encounter ends in a collision of "
             "the ego, not how often this happens on a road."

@@ -23,10 +23,11 @@ pub(in crate::campaign) fn write_html(path: &Path, findings: &Findings<'_>) -> R
 
 /// Returns the page of a campaign.
 pub(super) fn campaign(findings: &Findings<'_>) -> io::Result<Markup> {
-    let title = format!("{}: {}", findings.judged.verdict, findings.scenario_names());
+    let title = format!("{}: {}", findings.judged.word(), findings.scenario_names());
     let body = html! {
         (verdict::header(findings))
         (ledger::collisions(findings)?)
+        (verdict::gates(findings))
         (verdict::requirements(findings))
         (ledger::validity(findings))
         @for overview in &findings.overview.scenarios { (scenario::section(findings, overview)?) }

@@ -44,7 +44,8 @@ fn page(entries: &[IndexEntry]) -> Markup {
     let body = html! {
         h1 { "Recordings" }
         p {
-            (entries.len()) " recorded samples. Each picture shows the critical moment from above: the vehicles drive to "
+            (entries.len()) @if entries.len() == 1 { " recorded sample. " } @else { " recorded samples. " }
+            "Each picture shows the critical moment from above: the vehicles drive to "
             "the right, and the road is drawn wider than it is. The recordings open in the Rerun viewer 0.36:"
         }
         pre { "pip install rerun-sdk==0.36.3" }

@@ -3,10 +3,10 @@
 use std::ops::ControlFlow;
 use std::path::Path;
 
+use closecall_campaign::gate::GateSet;
 use closecall_campaign::manifest::Manifest;
 use closecall_campaign::plan::Plan;
 use closecall_campaign::runner::Sampling;
-use closecall_campaign::verdict::Gates;
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::ControllerChoice;
@@ -15,7 +15,6 @@ use closecall_simulation::scenario::ScenarioFile;
 use super::page::campaign;
 use crate::campaign::Tally;
 use crate::campaign::findings::{Findings, Recordings};
-use crate::campaign::requirements::requirements;
 use crate::campaign::timings::Timing;
 
 /// Returns the page of 30 samples with and without the margin increase system.
@@ -27,17 +26,16 @@ fn page() -> String {
     let mut plan = Plan::new(vec![file], sampling, controllers).unwrap();
     plan.sensors = Some(SensorMode::GroundTruth);
     let (running, manifest): (_, Manifest) = (plan.campaign(), plan.manifest(vec!["closecall".to_owned()]).unwrap());
-    let mut tally = Tally::new(&running);
+    let gates = GateSet::of(["count(ego_collided) <= 0".parse().unwrap()]);
+    let mut tally = Tally::new(&running, &gates);
     running
         .run(None, |turn| {
             tally.push(turn.record);
             ControlFlow::Continue(())
         })
         .unwrap();
-    let gates = Gates { max_collisions: Some(0), ..Gates::default() };
-    let judged = tally.summary.judge(gates);
+    let judged = tally.judgement();
     let files: Vec<&ScenarioFile> = running.works.iter().map(|work| &work.file).collect();
-    let requirements = requirements(files.iter().copied(), &tally.summary, gates);
     let (scenario, controller) = ("low-thw-overtake".to_owned(), "mis".to_owned());
     let worst = tally.overview.scenarios[0].worst[0].sample;
     let key = (scenario.clone(), worst, controller.clone());
@@ -47,7 +45,6 @@ fn page() -> String {
         files: &files,
         summary: &tally.summary,
         judged: &judged,
-        requirements: &requirements,
         overview: &tally.overview,
         recordings: &recordings,
         gallery: Some("recordings/index.html"),

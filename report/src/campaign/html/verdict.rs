@@ -4,15 +4,17 @@ use maud::{Markup, html};
 
 use super::page::{number, number_heads, table, text_heads};
 use crate::campaign::findings::Findings;
-use crate::campaign::requirements::Status;
+use closecall_campaign::gate::{Evaluation, Standing};
 use closecall_campaign::verdict::Verdict;
+use closecall_statistics::format::percent;
 
-const fn verdict_class(verdict: Verdict) -> &'static str {
+const fn verdict_class(verdict: Option<Verdict>) -> &'static str {
     match verdict {
-        Verdict::Pass => "pass",
-        Verdict::Fail => "fail",
-        Verdict::Inconclusive => "inconclusive",
-        Verdict::Invalid => "invalid",
+        Some(Verdict::Pass) => "pass",
+        Some(Verdict::Fail) => "fail",
+        Some(Verdict::Inconclusive | Verdict::NotJudged) => "inconclusive",
+        Some(Verdict::Invalid | Verdict::Error) => "invalid",
+        None => "open",
     }
 }
 
@@ -21,8 +23,8 @@ pub(super) fn header(findings: &Findings<'_>) -> Markup {
     let (judged, sampling) = (findings.judged, findings.manifest.sampling);
     let samples = findings.summary.total().samples;
     html! {
-        header.(verdict_class(judged.verdict)) {
-            p.verdict { (judged.verdict.to_string()) }
+        header.(verdict_class(judged.verdict())) {
+            p.verdict { (judged.word()) }
             div {
                 h1 { (findings.scenario_names()) }
                 p.what {
@@ -37,42 +39,60 @@ pub(super) fn header(findings: &Findings<'_>) -> Markup {
     }
 }
 
-const fn status_class(status: Status) -> &'static str {
-    match status {
-        Status::Pass => "pass",
-        Status::NotJudged => "open",
-        Status::Inconclusive => "inconclusive",
-        Status::Invalid => "invalid",
-        Status::Fail => "fail",
+const fn standing_class(standing: Standing) -> &'static str {
+    match standing {
+        Standing::Pass => "pass",
+        Standing::NotChecked => "open",
+        Standing::Inconclusive => "inconclusive",
+        Standing::Fail => "fail",
     }
 }
 
-fn badge(status: Status) -> Markup {
-    html! { span.badge.(status_class(status)) { (status.word()) } }
+fn badge(standing: Standing) -> Markup {
+    html! { span.badge.(standing_class(standing)) { (standing.word()) } }
+}
+
+/// Returns the table of gates and requirement checks; empty if there is none.
+pub(super) fn gates(findings: &Findings<'_>) -> Markup {
+    let gates = &findings.judged.gates;
+    if gates.is_empty() {
+        return Markup::default();
+    }
+    let head = html! {
+        (text_heads(&["scenario", "gate", "result"]))
+        (number_heads(&["value", "share, 95 %", "samples"]))
+        (text_heads(&["from"]))
+    };
+    let rows = html! {
+        @for gate in gates {
+            @let Evaluation { value, interval_95, samples, .. } = gate.evaluation;
+            tr {
+                td { (gate.scenario.as_deref().unwrap_or("all scenarios")) }
+                td { code { (gate.expression.to_string()) } }
+                td { (badge(gate.standing())) }
+                (number(value.map_or_else(|| "-".to_owned(), |value| format!("{value:.4}"))))
+                (number(interval_95.map_or_else(String::new, |[low, high]| format!("{} to {}", percent(low), percent(high)))))
+                (number(samples))
+                td { (gate.source.to_string()) }
+            }
+        }
+    };
+    html! { h2 { "Gates" } (table(&head, &rows)) }
 }
 
 /// Returns the table of requirements; empty if the scenarios name none.
 pub(super) fn requirements(findings: &Findings<'_>) -> Markup {
-    if findings.requirements.is_empty() {
+    let requirements = &findings.judged.requirements;
+    if requirements.is_empty() {
         return Markup::default();
     }
-    let head = html! {
-        (text_heads(&["requirement", "scenario"]))
-        (number_heads(&["samples", "collisions"]))
-        (text_heads(&["scenario's result", "result"]))
-    };
+    let head = text_heads(&["requirement", "scenario", "result"]);
     let rows = html! {
-        @for requirement in findings.requirements {
-            @let evidence_count = requirement.evidence.len();
-            @for (index, evidence) in requirement.evidence.iter().enumerate() {
-                tr {
-                    @if index == 0 { td rowspan=(evidence_count) { strong { (requirement.id) } } }
-                    td { (evidence.scenario) }
-                    (number(evidence.samples))
-                    (number(evidence.collisions))
-                    td { (badge(evidence.status)) }
-                    @if index == 0 { td rowspan=(evidence_count) { (badge(requirement.status())) } }
-                }
+        @for requirement in requirements {
+            tr {
+                td { strong { (requirement.mark) } }
+                td { (requirement.scenario) }
+                td { (badge(requirement.standing)) }
             }
         }
     };

@@ -5,7 +5,7 @@ use arrow::datatypes::{Float64Type, UInt64Type};
 use arrow::util::display::array_value_to_string;
 use closecall_controllers::Reason;
 use closecall_traffic::geometry::BoxSide;
-use closecall_traffic::{Absent, Time};
+use closecall_traffic::{Absent, ActorId, Time};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
 use super::*;
@@ -78,7 +78,7 @@ pub(crate) fn rows() -> Vec<OutcomeRow> {
 fn write(folder: &Path, name: &str, rows: Vec<OutcomeRow>) -> std::path::PathBuf {
     let path = folder.join(name);
     let columns = parameter_columns(rows.iter().filter_map(|row| Some(&row.outcome()?.parameters)));
-    write_outcomes(&path, &columns, rows.into_iter().map(Ok::<_, WriteError>)).unwrap();
+    write_outcomes(&path, None, &columns, rows.into_iter().map(Ok::<_, WriteError>)).unwrap();
     path
 }
 
@@ -133,7 +133,7 @@ fn an_error_among_the_rows_leaves_the_existing_file() {
     let path = folder.path().join("a.parquet");
     std::fs::write(&path, "old").unwrap();
     let rows = rows().into_iter().map(Ok).chain([Err(WriteError::new(Path::new("journal"), io::Error::other("cut")))]);
-    let error = write_outcomes(&path, &BTreeMap::new(), rows).unwrap_err();
+    let error = write_outcomes(&path, None, &BTreeMap::new(), rows).unwrap_err();
     assert_eq!(error.to_string(), "failed to write journal: cut");
     assert_eq!(std::fs::read(&path).unwrap(), b"old");
 }
@@ -145,4 +145,15 @@ fn a_parameter_that_is_a_label_in_any_scenario_is_text() {
     let columns = parameter_columns([&mixed, &parameters("truck")]);
     let kinds: Vec<(&str, ParameterKind)> = columns.iter().map(|(name, kind)| (name.as_str(), *kind)).collect();
     assert_eq!(kinds, [("closing-mps", ParameterKind::Number), ("rear-class", ParameterKind::Label)]);
+}
+
+#[test]
+fn no_column_needs_quotes_in_sql_and_those_with_a_value_in_each_row_are_not_nullable() {
+    let folder = tempfile::tempdir().unwrap();
+    let batches = read(&write(folder.path(), "a.parquet", rows()));
+    for field in batches[0].schema().fields() {
+        let is_plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
+        assert!(field.name().chars().all(is_plain), "{}", field.name());
+        assert_eq!(field.is_nullable(), !REQUIRED.contains(&field.name().as_str()), "{}", field.name());
+    }
 }

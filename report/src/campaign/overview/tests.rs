@@ -2,9 +2,11 @@ use std::path::Path;
 
 use closecall_traffic::{Absent, ParameterName, Parameters, Value};
 
+use closecall_simulation::scenario::ScenarioFile;
+
 use super::*;
 use crate::campaign::outcomes::tests::rows;
-use closecall_campaign::record::{ArmRecord, SampleFailure};
+use closecall_campaign::record::{ArmRecord, Record, SampleFailure};
 
 fn file() -> ScenarioFile {
     let text = include_str!("../../../../scenarios/library/low-thw-overtake.toml");

@@ -2,7 +2,7 @@
 //! follow <https://cocodataset.org/#format-data>. Masks are uncompressed run lengths in column-major order, and the
 //! first run counts zeros.
 
-use closecall_traffic::VehicleClass;
+use closecall_traffic::{BodyShape, VehicleClass};
 use serde::Serialize;
 
 use super::{DatasetOptions, DatasetSummary, RandomScene};
@@ -45,7 +45,7 @@ struct Annotation {
     iscrowd: u8,
     segmentation: RunLengths,
     distance_m: f64,
-    body_shape: u8,
+    body_shape: BodyShape,
 }
 
 #[derive(Serialize)]

@@ -4,13 +4,13 @@ use std::f64::consts::PI;
 
 use closecall_traffic::metrics::bumper_gap_m;
 use closecall_traffic::{
-    CONTROL_STEP, Check, Choice, ConfigError, Dimensions, Environment, Indicator, Lane, Light, Num, Parameters, Road,
-    RoadConfig, Side, Stream, Time, Vehicle, VehicleClass, VehicleState,
+    BodyShape, CONTROL_STEP, Check, Choice, ConfigError, Dimensions, Environment, Indicator, Lane, Light, Num,
+    Parameters, Road, RoadConfig, Side, Stream, Time, Vehicle, VehicleClass, VehicleState,
 };
 use rand::RngExt;
 
 use super::Set;
-use crate::camera::{Camera, CameraConfig, HELD_OUT_SHAPES, Pipeline, SHAPE_COUNTS, SunConfig, usual_dimensions};
+use crate::camera::{Camera, CameraConfig, HELD_OUT_SHAPES, Pipeline, SunConfig};
 use crate::{Scene, SceneVehicle};
 
 /// Range of the distance from the ego's centre back to the front of a vehicle (m).
@@ -71,7 +71,7 @@ impl RandomScene {
         let mut vehicle = Vehicle::typical(class);
         vehicle.appearance.body_shape = shape(set, class, rng);
         vehicle.appearance.paint_rgb = paint(set, rng);
-        vehicle.dimensions = dimensions(class, vehicle.appearance.body_shape, rng);
+        vehicle.dimensions = dimensions(vehicle.appearance.body_shape, rng);
         for _ in 0..MAX_ATTEMPTS {
             let lane = Lane(rng.random_range(1..=self.road.lanes()));
             let gap = vehicle.dimensions.length_m / 2.0 + rng.random_range(BEHIND_M);
@@ -149,13 +149,17 @@ fn camera(rng: &mut Stream) -> Result<Camera, ConfigError> {
     config.check(&Parameters::default())
 }
 
-fn shape(set: Set, class: VehicleClass, rng: &mut Stream) -> u8 {
-    let held_out = HELD_OUT_SHAPES[class as usize];
+fn shape(set: Set, class: VehicleClass, rng: &mut Stream) -> BodyShape {
+    let all = BodyShape::of_class(class);
     match set {
-        Set::HeldOut => held_out[rng.random_range(0..held_out.len())],
+        Set::HeldOut => {
+            let held_out: Vec<BodyShape> = HELD_OUT_SHAPES.into_iter().filter(|shape| shape.class() == class).collect();
+            held_out[rng.random_range(0..held_out.len())]
+        }
         Set::Training => loop {
-            let shape = rng.random_range(0..SHAPE_COUNTS[class as usize]);
-            if !held_out.contains(&shape) {
+            // The type of the range decides what is drawn: with `u8`, the data set is the one of the shipped network.
+            let shape = all[usize::from(rng.random_range(0..all.len() as u8))];
+            if !HELD_OUT_SHAPES.contains(&shape) {
                 return shape;
             }
         },
@@ -164,8 +168,8 @@ fn shape(set: Set, class: VehicleClass, rng: &mut Stream) -> u8 {
 
 /// Draws the dimensions of a vehicle. A third of the vehicles have about the typical size of the class regardless of
 /// their shape, as in a scenario file that does not state the size.
-fn dimensions(class: VehicleClass, shape: u8, rng: &mut Stream) -> Dimensions {
-    let usual = if rng.random_bool(1.0 / 3.0) { class.typical_dimensions() } else { usual_dimensions(class, shape) };
+fn dimensions(shape: BodyShape, rng: &mut Stream) -> Dimensions {
+    let usual = if rng.random_bool(1.0 / 3.0) { shape.class().typical_dimensions() } else { shape.usual_dimensions() };
     Dimensions {
         length_m: usual.length_m * rng.random_range(0.93..1.07),
         width_m: usual.width_m * rng.random_range(0.95..1.05),

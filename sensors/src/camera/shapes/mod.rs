@@ -1,54 +1,40 @@
 //! Body shapes: the geometry of vehicles of each class and of roadside furniture.
 //!
-//! A shape is a set of proportions that is scaled to the vehicle's box, so that the camera sees the same extents as the
-//! LiDAR measures. The shapes in [`HELD_OUT_SHAPES`] never appear in training: the model card evaluates the classifier
-//! on them.
+//! The LiDAR builds its bodies from the same [`Proportions`], so that both see the same extents. The shapes in
+//! [`HELD_OUT_SHAPES`] never appear in training: the model card evaluates the classifier on them.
 
 mod car;
 mod motorcycle;
 mod roadside;
 mod truck;
 
-use closecall_traffic::{Dimensions, Vehicle, VehicleClass};
+use closecall_traffic::{BodyShape, Dimensions, Vehicle};
 
 use super::mesh::{Mesh, Surface, Vec3};
+use crate::bodies::Proportions;
 
 pub(crate) use roadside::roadside;
 
-/// Number of body shapes of each class, in the order of [`VehicleClass::ALL`].
-pub const SHAPE_COUNTS: [u8; 3] = [car::SHAPES.len() as u8, truck::SHAPES.len() as u8, motorcycle::SHAPES.len() as u8];
-
-/// The indices of the shapes of each class that are reserved for evaluation, in the order of [`VehicleClass::ALL`].
-pub const HELD_OUT_SHAPES: [&[u8]; 3] = [&[3, 7], &[2, 5], &[2, 4]];
+/// The body shapes that are reserved for evaluation.
+pub const HELD_OUT_SHAPES: [BodyShape; 6] =
+    [BodyShape::Coupe, BodyShape::Minivan, BodyShape::Tanker, BodyShape::Coach, BodyShape::Tourer, BodyShape::Chopper];
 
 /// Builds the body of a vehicle in its own frame.
 pub(crate) fn vehicle(vehicle: &Vehicle) -> Mesh {
     let look = &vehicle.appearance;
     let paint = Surface::plain(look.paint_rgb.map(linear), 0.6);
-    let body = Body { size: vehicle.dimensions, paint, shape: look.body_shape };
-    match vehicle.class {
-        VehicleClass::Car => car::mesh(&body),
-        VehicleClass::Truck => truck::mesh(&body),
-        VehicleClass::Motorcycle => motorcycle::mesh(&body),
+    let body = Body { size: vehicle.dimensions, paint };
+    match Proportions::of(look.body_shape) {
+        Proportions::Car(shape) => car::mesh(&body, shape),
+        Proportions::Truck(shape) => truck::mesh(&body, shape),
+        Proportions::Motorcycle(shape) => motorcycle::mesh(&body, shape),
     }
-}
-
-/// Returns the usual dimensions of a body shape. The index `shape` is taken modulo the number of shapes.
-pub fn usual_dimensions(class: VehicleClass, shape: u8) -> Dimensions {
-    let index = usize::from(shape % SHAPE_COUNTS[class as usize]);
-    let [length_m, width_m, height_m] = match class {
-        VehicleClass::Car => car::SHAPES[index].usual_m,
-        VehicleClass::Truck => truck::SHAPES[index].usual_m,
-        VehicleClass::Motorcycle => motorcycle::SHAPES[index].usual_m,
-    };
-    Dimensions { length_m, width_m, height_m }
 }
 
 /// The parameters from which a body is built.
 struct Body {
     size: Dimensions,
     paint: Surface,
-    shape: u8,
 }
 
 impl Body {
@@ -66,6 +52,8 @@ fn linear(value: u8) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    use closecall_traffic::VehicleClass;
+
     use super::*;
 
     /// Maximum overhang of mirrors and handlebars beyond the box (m).
@@ -74,22 +62,22 @@ mod tests {
     #[test]
     fn every_shape_fills_its_box_and_exceeds_it_only_by_mirrors_and_handlebars() {
         for class in VehicleClass::ALL {
-            for shape in 0..SHAPE_COUNTS[class as usize] {
+            for &shape in BodyShape::of_class(class) {
                 let mut typical = Vehicle::typical(class);
                 typical.appearance.body_shape = shape;
-                typical.dimensions = usual_dimensions(class, shape);
+                typical.dimensions = shape.usual_dimensions();
                 let mesh = vehicle(&typical);
                 let size = typical.dimensions;
                 let half = [size.length_m / 2.0, size.width_m / 2.0].map(|half| half as f32);
                 let extent = |axis: usize| mesh.vertices.iter().map(|v| v[axis].abs()).fold(0.0, f32::max);
                 for axis in [0, 1] {
-                    let name = format!("{class:?} {shape} axis {axis}: {} of {}", extent(axis), half[axis]);
+                    let name = format!("{shape} axis {axis}: {} of {}", extent(axis), half[axis]);
                     assert!(extent(axis) <= half[axis] + OVERHANG_M, "{name}");
                     assert!(extent(axis) >= half[axis] - 0.05, "{name}");
                 }
                 let top = extent(2);
-                assert!((top - size.height_m as f32).abs() < 0.12, "{class:?} {shape} top {top} of {}", size.height_m);
-                assert!(!mesh.lamps.is_empty(), "{class:?} {shape} has no lamps");
+                assert!((top - size.height_m as f32).abs() < 0.12, "{shape} top {top} of {}", size.height_m);
+                assert!(!mesh.lamps.is_empty(), "{shape} has no lamps");
             }
         }
     }
@@ -97,9 +85,8 @@ mod tests {
     #[test]
     fn held_out_shapes_exist_and_leave_enough_to_train_on() {
         for class in VehicleClass::ALL {
-            let held_out = HELD_OUT_SHAPES[class as usize];
-            assert!(held_out.iter().all(|shape| *shape < SHAPE_COUNTS[class as usize]));
-            assert!(usize::from(SHAPE_COUNTS[class as usize]) >= held_out.len() + 3);
+            let held_out = HELD_OUT_SHAPES.iter().filter(|shape| shape.class() == class).count();
+            assert!(held_out > 0 && BodyShape::of_class(class).len() >= held_out + 3);
         }
     }
 }

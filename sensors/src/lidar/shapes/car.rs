@@ -1,75 +1,12 @@
-//! The shapes of passenger cars: saloon, hatchback or estate, sport utility vehicle, van.
+//! The shapes of passenger cars: a hull, a cabin with windows on top of it, and the details of the front.
 
-use closecall_traffic::Vehicle;
+use closecall_traffic::Dimensions;
 
 use super::append_pair;
+use crate::bodies::{CarProportions, GREENHOUSE_FOOT_HALF_WIDTH};
 use crate::lidar::Material::{Glass, Lamp, Paint, Plastic, Plate, Tyre};
 use crate::lidar::solid::{HalfWidth, Solid, corner};
 
-/// The proportions of a car's body.
-struct Body {
-    /// Height of the bonnet's front edge (share of the height).
-    nose: f64,
-    /// Height of the belt line, where the windows begin (share of the height).
-    belt: f64,
-    /// Distance of the windscreen's foot from the front end (share of the length).
-    screen_foot: f64,
-    /// Distance of the roof's front edge from the front end (share of the length).
-    roof_front: f64,
-    /// Distance of the roof's rear edge from the rear end (share of the length).
-    roof_rear: f64,
-    /// Distance of the rear window's foot from the rear end (share of the length).
-    rear_foot: f64,
-    /// Height of the bumper's lower edge (m).
-    ground_clearance_m: f64,
-}
-
-/// The body shapes, which `Appearance::body_shape` selects.
-const BODIES: [Body; 4] = [
-    // Saloon.
-    Body {
-        nose: 0.53,
-        belt: 0.65,
-        screen_foot: 0.26,
-        roof_front: 0.43,
-        roof_rear: 0.27,
-        rear_foot: 0.10,
-        ground_clearance_m: 0.18,
-    },
-    // Hatchback or estate.
-    Body {
-        nose: 0.53,
-        belt: 0.64,
-        screen_foot: 0.24,
-        roof_front: 0.41,
-        roof_rear: 0.08,
-        rear_foot: 0.02,
-        ground_clearance_m: 0.18,
-    },
-    // Sport utility vehicle.
-    Body {
-        nose: 0.58,
-        belt: 0.66,
-        screen_foot: 0.25,
-        roof_front: 0.41,
-        roof_rear: 0.07,
-        rear_foot: 0.02,
-        ground_clearance_m: 0.24,
-    },
-    // Van.
-    Body {
-        nose: 0.54,
-        belt: 0.60,
-        screen_foot: 0.16,
-        roof_front: 0.31,
-        roof_rear: 0.03,
-        rear_foot: 0.01,
-        ground_clearance_m: 0.20,
-    },
-];
-
-/// Inward lean of the windows: by how much the roof is narrower than the belt line on each side (share of the width).
-const TUMBLEHOME: f64 = 0.09;
 /// Protrusion of the plate from the painted front (m). Grille and lamps protrude by half of it.
 const PROTRUSION_M: f64 = 0.01;
 /// European plate: 520 × 110 mm (Council Regulation (EC) No 2411/98 gives its layout).
@@ -80,32 +17,30 @@ const TYRE_WIDTH_M: f64 = 0.21;
 /// Distance of each axle from the nearer end of the car (share of the length).
 const OVERHANG: f64 = 0.19;
 
-pub(super) fn append(vehicle: &Vehicle, solids: &mut Vec<Solid>) {
-    let size = vehicle.dimensions;
+pub(super) fn append(size: &Dimensions, shape: &CarProportions, solids: &mut Vec<Solid>) {
     let (front, half, top) = (0.5 * size.length_m, 0.5 * size.width_m, size.height_m);
-    let body = &BODIES[usize::from(vehicle.appearance.body_shape) % BODIES.len()];
-    let (nose, belt, floor) = (body.nose * top, body.belt * top, body.ground_clearance_m);
-    let from_front = |share: f64| front - share * size.length_m;
-    let from_rear = |share: f64| -front + share * size.length_m;
+    let [nose, belt, floor] = [shape.nose, shape.belt, shape.clearance].map(|share| f64::from(share) * top);
+    let from_front = |share: f32| front - f64::from(share) * size.length_m;
     // The plate ends exactly at the front end of the bounding box, so the painted body begins behind it.
     let skin = front - PROTRUSION_M;
     let hull = [
         corner(skin - 0.04, floor, Paint),
         corner(skin, 0.5 * (floor + nose), Paint),
         corner(skin - 0.06, nose, Paint),
-        corner(from_front(body.screen_foot), belt, Paint),
+        corner(from_front(shape.cowl), belt, Paint),
         corner(-front, belt, Paint),
         corner(-front, floor, Plastic),
     ];
     solids.push(Solid::prism(&hull, HalfWidth::straight(half), Paint));
     let cabin = [
-        corner(from_front(body.screen_foot), belt, Glass),
-        corner(from_front(body.roof_front), top, Paint),
-        corner(from_rear(body.roof_rear), top, Glass),
-        corner(from_rear(body.rear_foot), belt, Paint),
+        corner(from_front(shape.cowl), belt, Glass),
+        corner(from_front(shape.roof_front), top, Paint),
+        corner(from_front(shape.roof_rear), top, Glass),
+        corner(from_front(shape.deck), belt, Paint),
     ];
-    let taper = HalfWidth { bottom_m: 0.97 * half, top_m: (0.97 - 2.0 * TUMBLEHOME) * half };
-    solids.push(Solid::prism(&cabin, taper, Glass));
+    let [bottom_m, top_m] =
+        [GREENHOUSE_FOOT_HALF_WIDTH, shape.roof_half_width].map(|share| f64::from(share) * size.width_m);
+    solids.push(Solid::prism(&cabin, HalfWidth { bottom_m, top_m }, Glass));
     append_front(front, half, [floor, nose], solids);
     append_wheels(front, half, size.length_m, solids);
 }

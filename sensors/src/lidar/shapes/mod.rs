@@ -7,24 +7,26 @@
 //!       (o)      (o)    wheels           o      o o     ooo            O  O  wheels
 //! ```
 //!
-//! Each shape is scaled to the vehicle's own length, width and height. The proportions are typical values read off
-//! drawings, not those of a specific model. All coordinates are in the vehicle's frame: x forward, z = 0 on the ground.
+//! The camera builds its bodies from the same [`Proportions`], so that both see the same extents. All coordinates are in
+//! the vehicle's frame: x forward, z = 0 on the ground.
 
 mod car;
 mod motorcycle;
 mod truck;
 
-use closecall_traffic::{Vehicle, VehicleClass};
+use closecall_traffic::Vehicle;
 
 use super::Material;
 use super::solid::Solid;
+use crate::bodies::Proportions;
 
 /// Appends the solids of a vehicle, in its own frame.
 pub(crate) fn append_solids(vehicle: &Vehicle, solids: &mut Vec<Solid>) {
-    match vehicle.class {
-        VehicleClass::Car => car::append(vehicle, solids),
-        VehicleClass::Truck => truck::append(vehicle, solids),
-        VehicleClass::Motorcycle => motorcycle::append(vehicle, solids),
+    let size = &vehicle.dimensions;
+    match Proportions::of(vehicle.appearance.body_shape) {
+        Proportions::Car(shape) => car::append(size, shape, solids),
+        Proportions::Truck(shape) => truck::append(size, shape, solids),
+        Proportions::Motorcycle(shape) => motorcycle::append(size, shape, solids),
     }
 }
 
@@ -36,16 +38,16 @@ fn append_pair(low: [f64; 3], high: [f64; 3], material: Material, solids: &mut V
 
 #[cfg(test)]
 mod tests {
-    use closecall_traffic::Vehicle;
+    use closecall_traffic::{BodyShape, VehicleClass};
 
     use super::*;
 
     #[test]
     fn every_shape_fills_its_bounding_box() {
         for class in VehicleClass::ALL {
-            for body_shape in 0..8 {
+            for &shape in BodyShape::of_class(class) {
                 let mut vehicle = Vehicle::typical(class);
-                vehicle.appearance.body_shape = body_shape;
+                vehicle.appearance.body_shape = shape;
                 let mut solids = Vec::new();
                 append_solids(&vehicle, &mut solids);
                 let size = vehicle.dimensions;
@@ -53,11 +55,11 @@ mod tests {
                 let most = |axis: usize| solids.iter().map(|solid| solid.high[axis]).fold(f64::MIN, f64::max);
                 let least = |axis: usize| solids.iter().map(|solid| solid.low[axis]).fold(f64::MAX, f64::min);
                 for (axis, half) in half.into_iter().enumerate() {
-                    assert!((most(axis) - half).abs() < 0.03, "{class:?} {body_shape}: {} for {half}", most(axis));
-                    assert!((least(axis) + half).abs() < 0.03, "{class:?} {body_shape}");
+                    assert!((most(axis) - half).abs() < 0.03, "{shape}: {} for {half}", most(axis));
+                    assert!((least(axis) + half).abs() < 0.03, "{shape}");
                 }
-                assert!((most(2) - size.height_m).abs() < 0.03, "{class:?} {body_shape}: {}", most(2));
-                assert!(least(2) >= 0.0 && least(2) < 0.05, "{class:?} {body_shape}: wheels stand on the ground");
+                assert!((most(2) - size.height_m).abs() < 0.03, "{shape}: {}", most(2));
+                assert!(least(2) >= 0.0 && least(2) < 0.05, "{shape}: wheels stand on the ground");
             }
         }
     }

@@ -1,6 +1,6 @@
 //! Boxes and clusters, compared with the ground truth.
 
-use closecall_traffic::VehicleClass;
+use closecall_traffic::{BodyShape, VehicleClass};
 
 use super::*;
 use crate::Extent;
@@ -30,7 +30,7 @@ fn reported_standard_deviations_match_the_errors_of_the_front_face() {
 #[test]
 fn class_and_width_follow_from_the_shape() {
     for class in VehicleClass::ALL {
-        for body_shape in 0..4 {
+        for &body_shape in BodyShape::of_class(class) {
             for gap in [4.0, 10.0, 25.0, 50.0] {
                 let mut setup = TestScene::new().with(class, gap, 0.0);
                 setup.others[0].vehicle.appearance.body_shape = body_shape;

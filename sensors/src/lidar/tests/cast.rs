@@ -1,15 +1,15 @@
 //! The fast ray cast, compared with brute force.
 
-use closecall_traffic::{CONTROL_STEP, Time, VehicleClass};
+use closecall_traffic::{BodyShape, CONTROL_STEP, Time, VehicleClass};
 use proptest::prelude::*;
 
 use super::*;
 
 fn placed_vehicle() -> impl Strategy<Value = SceneVehicle> {
-    let class = prop::sample::select(VehicleClass::ALL.to_vec());
-    (class, -130.0..8.0_f64, -9.0..9.0_f64, -0.4..0.4_f64, -0.03..0.03_f64, 0..4_u8).prop_map(
-        |(class, along, left, heading_rad, pitch_rad, body_shape)| {
-            let mut vehicle = scene_vehicle(1, class, 1_000.0 + along, LANE_D_M + left);
+    let shape = prop::sample::select(VehicleClass::ALL.map(BodyShape::of_class).concat());
+    (shape, -130.0..8.0_f64, -9.0..9.0_f64, -0.4..0.4_f64, -0.03..0.03_f64).prop_map(
+        |(body_shape, along, left, heading_rad, pitch_rad)| {
+            let mut vehicle = scene_vehicle(1, body_shape.class(), 1_000.0 + along, LANE_D_M + left);
             vehicle.state.heading_rad = heading_rad;
             vehicle.pitch_rad = pitch_rad;
             vehicle.vehicle.appearance.body_shape = body_shape;

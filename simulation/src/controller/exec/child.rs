@@ -6,17 +6,18 @@
 //! then close.
 
 use std::io::{Read, Write};
-use std::os::unix::process::CommandExt;
+use std::path::Path;
 use std::process::{self, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError, channel, sync_channel};
 use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, waitid};
+use rustix::process::{Pid, WaitId, WaitIdOptions, waitid};
 
 use super::error::ExecError;
 use super::lines::{Line, MAX_LINE_BYTES, Tail, excerpt, read_lines};
+use super::processes::{self, Entry};
 use super::settings::ExecSettings;
 
 /// Interval at which the memory of the process is checked while its answer is awaited.
@@ -49,25 +50,27 @@ pub(super) struct Child {
     answered: u64,
     /// Whether the process has failed, so that it is killed without time to end by itself.
     has_failed: bool,
-    is_reaped: bool,
+    /// The entry in the registry of processes; `None` once the process is reaped.
+    entry: Option<Entry>,
 }
 
 impl Child {
-    /// Starts the process.
-    pub(super) fn start(settings: &ExecSettings) -> Result<Self, ExecError> {
+    /// Starts the process in the given folder, or in that of this program.
+    pub(super) fn start(settings: &ExecSettings, folder: Option<&Path>) -> Result<Self, ExecError> {
         let invalid_command = || ExecError::Command { command: settings.command.clone() };
         let words = settings.words().ok_or_else(invalid_command)?;
         let (program, arguments) = words.split_first().ok_or_else(invalid_command)?;
         let start_error = |source| ExecError::Start { program: program.clone(), source };
-        let mut process = Command::new(program)
-            .args(arguments)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            // The process gets its own group, so that its descendants can be killed with it.
-            .process_group(0)
-            .spawn()
-            .map_err(start_error)?;
+        let mut command = match folder {
+            // A path is relative to the folder. A bare name is looked for in PATH.
+            Some(folder) if program.contains('/') => Command::new(folder.join(program)),
+            _ => Command::new(program),
+        };
+        if let Some(folder) = folder {
+            command.current_dir(folder);
+        }
+        command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let (mut process, entry) = processes::start(&mut command).map_err(start_error)?;
         let pipes = (process.stdin.take(), process.stdout.take(), process.stderr.take());
         let (requests, request_receiver) = channel();
         let (answer_sender, answers) = sync_channel(BUFFERED_LINES);
@@ -83,7 +86,7 @@ impl Child {
             memory_mib: settings.memory_mib,
             answered: 0,
             has_failed: true,
-            is_reaped: false,
+            entry: Some(entry),
         };
         if let (Some(stdin), Some(stdout), Some(stderr)) = pipes {
             spawn_thread("write", move || write_all(stdin, &request_receiver)).map_err(start_error)?;
@@ -202,14 +205,12 @@ impl Child {
         Pid::from_child(&self.process)
     }
 
-    /// Kills the process group, and reaps the process.
+    /// Kills the process with its descendants, and reaps it.
     fn reap(&mut self) -> std::io::Result<process::ExitStatus> {
-        // Until it is reaped, its process ID identifies it and its group, even if it has ended.
-        if !self.is_reaped {
-            let _ = kill_process_group(self.pid(), Signal::KILL);
-            self.is_reaped = true;
+        match self.entry.take() {
+            Some(entry) => processes::end(&mut self.process, &entry),
+            None => self.process.wait(),
         }
-        self.process.wait()
     }
 }
 
@@ -217,7 +218,7 @@ impl Drop for Child {
     fn drop(&mut self) {
         // The writing thread ends, and closes the standard input of the process.
         self.requests = None;
-        if !self.is_reaped && !self.has_failed {
+        if self.entry.is_some() && !self.has_failed {
             self.ends_within(EXIT_TIMEOUT);
         }
         drop(self.reap());

@@ -1,11 +1,14 @@
 //! A process as an ego controller of the closed loop.
 
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use closecall_controllers::{ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, FrontFollower, Reason};
+use closecall_traffic::Road;
 
 use super::child::Child;
 use super::error::ExecError;
+use super::protocol::Identity;
 use super::settings::ExecSettings;
 use super::{NAME, protocol};
 use crate::run::ControllerFactory;
@@ -18,13 +21,41 @@ const START_TIMEOUT: Duration = Duration::from_secs(10);
 #[derive(Clone, Debug)]
 pub struct ExecFactory {
     settings: ExecSettings,
+    folder: Option<PathBuf>,
 }
 
 impl ExecFactory {
-    /// Creates a factory of processes with these settings.
-    pub fn new(settings: ExecSettings) -> Self {
-        Self { settings }
+    /// Creates a factory of processes with these settings. They run in the given folder, or in that of this program.
+    pub fn new(settings: ExecSettings, folder: Option<&Path>) -> Self {
+        Self { settings, folder: folder.map(Path::to_owned) }
     }
+}
+
+/// Starts a process in the given folder, or in that of this program, greets it, and returns what it states about itself in its first answer.
+///
+/// # Errors
+/// [`ExecError`] if the process cannot be started, or does not give a valid first answer.
+pub fn identify(
+    settings: &ExecSettings,
+    folder: Option<&Path>,
+    ego_settings: &EgoSettings,
+    road: &Road,
+) -> Result<Identity, ExecError> {
+    greet(settings, folder, ego_settings, road).map(|(_, identity)| identity)
+}
+
+/// Starts a process, and greets it.
+fn greet(
+    settings: &ExecSettings,
+    folder: Option<&Path>,
+    ego_settings: &EgoSettings,
+    road: &Road,
+) -> Result<(Child, Identity), ExecError> {
+    let mut child = Child::start(settings, folder)?;
+    let timeout = START_TIMEOUT.max(settings.timeout());
+    let hello = child.request(protocol::hello(ego_settings, road), timeout)?;
+    let identity = protocol::check_hello(&hello)?;
+    Ok((child, identity))
 }
 
 impl ControllerFactory for ExecFactory {
@@ -40,6 +71,7 @@ impl ControllerFactory for ExecFactory {
     fn build(&self, settings: &EgoSettings) -> Box<dyn EgoController> {
         Box::new(ExecController {
             settings: self.settings.clone(),
+            folder: self.folder.clone(),
             ego_settings: *settings,
             lead_selector: FrontFollower::default(),
             child: None,
@@ -50,6 +82,7 @@ impl ControllerFactory for ExecFactory {
 /// A process that controls the ego in one run. It is started at the first step and ended when this value is dropped.
 struct ExecController {
     settings: ExecSettings,
+    folder: Option<PathBuf>,
     ego_settings: EgoSettings,
     lead_selector: FrontFollower,
     child: Option<Child>,
@@ -62,10 +95,7 @@ impl ExecController {
         let child = match &mut self.child {
             Some(child) => child,
             None => {
-                let mut child = Child::start(&self.settings)?;
-                let timeout = START_TIMEOUT.max(self.settings.timeout());
-                let hello = child.request(protocol::hello(&self.ego_settings, input.road), timeout)?;
-                protocol::check_hello(&hello)?;
+                let (child, _) = greet(&self.settings, self.folder.as_deref(), &self.ego_settings, input.road)?;
                 self.child.insert(child)
             }
         };

@@ -9,7 +9,8 @@
 //! COMMAND is split into words by the rules of a shell, including quotes, but no shell is started. Each sample starts a new
 //! process, so that no state is carried over between samples; with several jobs, several processes run at once. At the end
 //! of the sample, Closecall closes the process's standard input. If the process has not ended half a second later, it is
-//! killed with its whole process group. A sample that never calls its controller starts no process.
+//! killed. Its descendants are killed with it: its process group and, if the program has called [`adopt_orphans`], also
+//! those that have left the group. A sample that never calls its controller starts no process.
 //!
 //! # Protocol, version 1
 //! Each message is one line of JSON in UTF-8, at most 1 MiB long and terminated by `\n`. Numbers are written so that reading
@@ -18,7 +19,8 @@
 //! 1. Closecall sends `{"type":"hello","protocol":1,"control_step_s":0.04,"settings":{…},"road":{…}}`. `settings` are those of the
 //!    scenario's `ego-stack` (`acc`, `aeb`, `mis`, `automated`; `null` where absent), `road` has `lanes`, `lane_width_m`,
 //!    `curvature_per_m`, `speed_limit_mps` and `overtaking_side`.
-//! 2. The process answers `{"type":"hello","protocol":1}` within 10 s, or within the timeout of 4. if that is longer.
+//! 2. The process answers `{"type":"hello","protocol":1}` within 10 s, or within the timeout of 4. if that is longer. The
+//!    answer may have `name` and `version`, which a campaign keeps: it is not resumed with a process that states others.
 //! 3. At each control step, Closecall sends `{"type":"step","time_s":…,"time_ns":…,"odometry":{…},"front":{…}|null,"tracks":[…],
 //!    "sensors":{…}}`. `odometry` has the fields of [`Odometry`](closecall_controllers::Odometry), `front` those of
 //!    [`Front`](closecall_controllers::Front): the lead vehicle, selected as in the built-in controllers. A track has
@@ -38,11 +40,14 @@ mod child;
 mod controller;
 mod error;
 mod lines;
+mod processes;
 mod protocol;
 mod settings;
 
-pub use controller::ExecFactory;
+pub use controller::{ExecFactory, identify};
 pub use error::ExecError;
+pub use processes::{adopt_orphans, end_all};
+pub use protocol::Identity;
 pub use settings::{DEFAULT_MEMORY_MIB, DEFAULT_TIMEOUT_MS, ExecSettings};
 
 /// The name of an external controller in reports, and the prefix of its `--controller` argument.

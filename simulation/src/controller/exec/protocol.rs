@@ -136,8 +136,19 @@ pub(super) struct Answer {
     pub(super) state: EgoState,
 }
 
-/// Checks the answer to the first message.
-pub(super) fn check_hello(line: &[u8]) -> Result<(), ExecError> {
+/// What a process states about itself in its first answer.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Identity {
+    /// Its name.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Its version.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub version: Option<String>,
+}
+
+/// Checks the answer to the first message, and returns what the process states about itself.
+pub(super) fn check_hello(line: &[u8]) -> Result<Identity, ExecError> {
     let object = object(line)?;
     if object.get("type").and_then(Value::as_str) != Some("hello") {
         return Err(key_error(line, &object, "type", "\"hello\" in the first answer"));
@@ -145,7 +156,12 @@ pub(super) fn check_hello(line: &[u8]) -> Result<(), ExecError> {
     let found =
         object.get("protocol").ok_or_else(|| key_error(line, &object, "protocol", "the version of the protocol"))?;
     if found.as_u64() == Some(PROTOCOL.into()) {
-        Ok(())
+        let stated = |key| match object.get(key) {
+            None | Some(Value::Null) => None,
+            Some(Value::String(text)) => Some(excerpt(text.as_bytes())),
+            Some(other) => Some(excerpt(other.to_string().as_bytes())),
+        };
+        Ok(Identity { name: stated("name"), version: stated("version") })
     } else {
         Err(ExecError::Version { found: found.to_string(), own: PROTOCOL })
     }
@@ -233,7 +249,9 @@ mod tests {
 
     #[test]
     fn another_version_is_rejected() {
-        assert!(check_hello(br#"{"type":"hello","protocol":1}"#).is_ok());
+        assert_eq!(check_hello(br#"{"type":"hello","protocol":1}"#).unwrap(), Identity::default());
+        let identity = check_hello(br#"{"type":"hello","protocol":1,"name":"mine","version":2.5}"#).unwrap();
+        assert_eq!(identity, Identity { name: Some("mine".to_owned()), version: Some("2.5".to_owned()) });
         let error = check_hello(br#"{"type":"hello","protocol":2}"#).unwrap_err().to_string();
         assert_eq!(error, "the process speaks version 2 of the protocol, this is version 1");
         assert!(check_hello(br#"{"type":"hello"}"#).unwrap_err().to_string().contains("absent"));

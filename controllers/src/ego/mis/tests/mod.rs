@@ -19,6 +19,16 @@ use crate::ego::{
 
 const CAR_M: f64 = 4.6;
 
+/// The reference point: the paper's figure.
+pub(super) const REFERENCE: Encounter = Encounter {
+    ego_mps: 30.0,
+    front_gap_m: 21.0,
+    lead_mps: 30.0,
+    rear_gap_m: 100.0,
+    closing_mps: 24.0 / 3.6,
+    critical_gap_m: 5.0,
+};
+
 prop_compose! {
     /// Encounters of all kinds, with the paper's critical gap.
     pub(super) fn encounters()(

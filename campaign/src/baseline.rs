@@ -1,0 +1,343 @@
+//! The baseline of a repository: a small file with the results of a campaign, against which later campaigns are
+//! compared.
+//!
+//! ```text
+//!  campaign's folder ─▶ Baseline ─▶ baseline.json, committed with the scenarios
+//!                                        │
+//!  later campaign's folder ─▶ Baseline ──┴─▶ BaselineComparison: newly failing, fixed, margins that shrank
+//! ```
+//!
+//! The file holds counts, the numbers of the failing samples, and quantiles of the margins, so that it stays small and
+//! its changes can be reviewed. [`compare`](mod@crate::compare) compares two whole folders instead, bit for bit.
+
+use std::collections::BTreeMap;
+
+use closecall_scenarios::sampling::Design;
+use closecall_simulation::outcome::Margins;
+use closecall_statistics::quantiles::quantile;
+use closecall_traffic::Measured;
+use serde::{Deserialize, Serialize};
+
+use crate::folder::{Folder, FolderError};
+use crate::record::ArmRecord;
+
+/// The version of the layout of a baseline file.
+pub const BASELINE_VERSION: u32 = 1;
+
+/// The probabilities of the quantiles that are kept. Small quantiles describe the runs closest to a collision.
+const PROBABILITIES: [(&str, f64); 4] = [("min", 0.0), ("p01", 0.01), ("p05", 0.05), ("p50", 0.5)];
+
+/// A change of a margin up to this much is no regression (s or m): it is below what a report shows.
+const SMALLEST_CHANGE: f64 = 0.01;
+
+/// A margin of a run, by its key in reports. A smaller value is closer to a collision.
+type Margin = (&'static str, fn(&Margins) -> Measured);
+
+const MARGINS: [Margin; 5] = [
+    ("min_thw_front_s", |margins| margins.min_thw_front_s),
+    ("min_thw_rear_s", |margins| margins.min_thw_rear_s),
+    ("min_gap_front_m", |margins| margins.min_gap_front_m),
+    ("min_gap_rear_m", |margins| margins.min_gap_rear_m),
+    ("min_ttc_rear_s", |margins| margins.min_ttc_rear_s),
+];
+
+/// The results of a campaign, as far as a repository keeps them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Baseline {
+    /// Version of the layout: [`BASELINE_VERSION`].
+    pub schema_version: u32,
+    /// Version of the program that ran the campaign.
+    pub closecall_version: String,
+    /// The campaign's seed.
+    pub seed: u64,
+    /// The sampling design.
+    pub design: Design,
+    /// The controller under test.
+    pub controller: String,
+    /// The results of each scenario, by its name.
+    pub scenarios: BTreeMap<String, ScenarioBaseline>,
+}
+
+/// The results of one scenario.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ScenarioBaseline {
+    /// BLAKE3 hash of the scenario's text.
+    pub blake3: String,
+    /// Number of samples.
+    pub samples: u64,
+    /// Number of samples in which the ego collides.
+    pub collisions: u64,
+    /// Number of samples that end in an error.
+    pub errors: u64,
+    /// The samples in which the ego collides or that end in an error, in ascending order.
+    pub failing: Vec<u64>,
+    /// Quantiles of each margin, over the samples that have it (s or m).
+    pub margins: BTreeMap<String, BTreeMap<String, f64>>,
+}
+
+/// The reason for which a campaign cannot be compared with a baseline.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum BaselineError {
+    /// The two have nothing in common that could be compared.
+    #[error(
+        "failed to compare with the baseline: {what} is {baseline} in the baseline, {current} in the campaign; save a new baseline"
+    )]
+    Different {
+        /// What differs.
+        what: String,
+        /// Its value in the baseline.
+        baseline: String,
+        /// Its value in the campaign.
+        current: String,
+    },
+}
+
+impl Baseline {
+    /// Returns the results of the arm under test of a campaign.
+    ///
+    /// # Errors
+    /// [`FolderError`] if the folder cannot be read.
+    pub fn of(folder: &Folder) -> Result<Self, FolderError> {
+        let manifest = folder.manifest()?;
+        let mut collected: BTreeMap<String, Collected> = manifest
+            .scenarios
+            .iter()
+            .map(|scenario| (scenario.name.clone(), Collected::new(scenario.blake3.clone())))
+            .collect();
+        for record in folder.records()? {
+            let record = record?;
+            if let (Some(scenario), Some(arm)) = (collected.get_mut(&record.scenario), record.arms.last()) {
+                scenario.push(record.sample, arm);
+            }
+        }
+        Ok(Self {
+            schema_version: BASELINE_VERSION,
+            closecall_version: manifest.closecall_version.clone(),
+            seed: manifest.sampling.seed,
+            design: manifest.sampling.design,
+            controller: manifest.arms.last().map(ToString::to_string).unwrap_or_default(),
+            scenarios: collected.into_iter().map(|(name, scenario)| (name, scenario.finish())).collect(),
+        })
+    }
+
+    /// Compares a later campaign with this baseline. A margin regresses if one of its quantiles falls by more than the
+    /// share `tolerance` of its value, and by more than 0.01 (s or m).
+    ///
+    /// # Errors
+    /// [`BaselineError`] if the campaigns did not run the same samples.
+    pub fn compare(&self, current: &Self, tolerance: f64) -> Result<BaselineComparison, BaselineError> {
+        let same = |what: &str, baseline: String, current: String| match baseline == current {
+            true => Ok(()),
+            false => Err(BaselineError::Different { what: what.to_owned(), baseline, current }),
+        };
+        same("the version of the layout", self.schema_version.to_string(), current.schema_version.to_string())?;
+        same("the seed", self.seed.to_string(), current.seed.to_string())?;
+        same("the sampling design", self.design.to_string(), current.design.to_string())?;
+        let mut compared = Vec::new();
+        for (name, before) in &self.scenarios {
+            let missing = || BaselineError::Different {
+                what: format!("the scenario `{name}`"),
+                baseline: "included".to_owned(),
+                current: "missing".to_owned(),
+            };
+            let after = current.scenarios.get(name).ok_or_else(missing)?;
+            same(&format!("the hash of `{name}`"), before.blake3.clone(), after.blake3.clone())?;
+            let samples = format!("the number of samples of `{name}`");
+            same(&samples, before.samples.to_string(), after.samples.to_string())?;
+            compared.push(compare(name, before, after, tolerance));
+        }
+        let is_new = |name: &&String| !self.scenarios.contains_key(*name);
+        let new_scenarios = current.scenarios.keys().filter(is_new).cloned().collect();
+        Ok(BaselineComparison { scenarios: compared, new_scenarios })
+    }
+}
+
+fn compare(
+    name: &str,
+    before: &ScenarioBaseline,
+    after: &ScenarioBaseline,
+    tolerance: f64,
+) -> ScenarioBaselineComparison {
+    let only_in = |one: &[u64], other: &[u64]| one.iter().filter(|sample| !other.contains(sample)).copied().collect();
+    let mut margins = Vec::new();
+    for (margin, quantiles) in &before.margins {
+        for (quantile, &baseline) in quantiles {
+            let Some(&current) = after.margins.get(margin).and_then(|now| now.get(quantile)) else { continue };
+            let lost = baseline - current;
+            if lost > SMALLEST_CHANGE && lost > tolerance * baseline.abs() {
+                let (margin, quantile) = (margin.clone(), quantile.clone());
+                margins.push(MarginRegression { margin, quantile, baseline, current });
+            }
+        }
+    }
+    ScenarioBaselineComparison {
+        scenario: name.to_owned(),
+        newly_failing: only_in(&after.failing, &before.failing),
+        fixed: only_in(&before.failing, &after.failing),
+        margins,
+    }
+}
+
+/// A later campaign compared with a baseline.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct BaselineComparison {
+    /// The scenarios of the baseline.
+    pub scenarios: Vec<ScenarioBaselineComparison>,
+    /// The scenarios that the baseline does not have.
+    pub new_scenarios: Vec<String>,
+}
+
+impl BaselineComparison {
+    /// Returns true if a sample newly fails or a margin regresses.
+    pub fn is_regression(&self) -> bool {
+        self.scenarios.iter().any(|scenario| !scenario.newly_failing.is_empty() || !scenario.margins.is_empty())
+    }
+
+    /// Returns true if a sample that failed does not fail any more.
+    pub fn has_fixed(&self) -> bool {
+        self.scenarios.iter().any(|scenario| !scenario.fixed.is_empty())
+    }
+}
+
+/// One scenario of a later campaign compared with a baseline.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ScenarioBaselineComparison {
+    /// The scenario's name.
+    pub scenario: String,
+    /// Samples that fail, and did not in the baseline.
+    pub newly_failing: Vec<u64>,
+    /// Samples that failed in the baseline, and do not any more.
+    pub fixed: Vec<u64>,
+    /// The quantiles of margins that fell by more than the tolerance.
+    pub margins: Vec<MarginRegression>,
+}
+
+/// A quantile of a margin that has fallen.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MarginRegression {
+    /// The margin's key in reports. It ends with the unit.
+    pub margin: String,
+    /// The quantile: `min`, `p01`, `p05` or `p50`.
+    pub quantile: String,
+    /// Its value in the baseline, in the unit of the margin.
+    pub baseline: f64,
+    /// Its value in the later campaign, in the unit of the margin.
+    pub current: f64,
+}
+
+/// The samples of one scenario while a folder is read.
+#[derive(Debug)]
+struct Collected {
+    result: ScenarioBaseline,
+    values: [Vec<f64>; MARGINS.len()],
+}
+
+impl Collected {
+    fn new(blake3: String) -> Self {
+        Self { result: ScenarioBaseline { blake3, ..ScenarioBaseline::default() }, values: Default::default() }
+    }
+
+    fn push(&mut self, sample: u64, arm: &ArmRecord) {
+        let result = &mut self.result;
+        result.samples += 1;
+        match &arm.result {
+            Ok(outcome) => {
+                if outcome.ego_collided() {
+                    result.collisions += 1;
+                    result.failing.push(sample);
+                }
+                for (values, (_, value)) in self.values.iter_mut().zip(MARGINS) {
+                    values.extend(value(&outcome.margins).ok());
+                }
+            }
+            Err(_) => {
+                result.errors += 1;
+                result.failing.push(sample);
+            }
+        }
+    }
+
+    fn finish(mut self) -> ScenarioBaseline {
+        for (values, (key, _)) in self.values.iter_mut().zip(MARGINS) {
+            if !values.is_empty() {
+                values.sort_by(f64::total_cmp);
+                let quantiles = PROBABILITIES.map(|(name, u)| (name.to_owned(), quantile(values, u)));
+                self.result.margins.insert(key.to_owned(), quantiles.into());
+            }
+        }
+        self.result.failing.sort_unstable();
+        self.result
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn baseline(failing: &[u64], gap_m: f64) -> Baseline {
+        let margins = BTreeMap::from([("min_gap_rear_m".to_owned(), BTreeMap::from([("p05".to_owned(), gap_m)]))]);
+        let scenario = ScenarioBaseline {
+            blake3: "11".to_owned(),
+            samples: 10,
+            collisions: failing.len() as u64,
+            failing: failing.to_vec(),
+            margins,
+            ..ScenarioBaseline::default()
+        };
+        Baseline {
+            schema_version: BASELINE_VERSION,
+            closecall_version: "0.1.0".to_owned(),
+            seed: 1,
+            design: Design::Random,
+            controller: "mis".to_owned(),
+            scenarios: BTreeMap::from([("headline".to_owned(), scenario)]),
+        }
+    }
+
+    #[test]
+    fn newly_failing_and_fixed_samples_are_named() {
+        let found = baseline(&[2, 5], 4.0).compare(&baseline(&[5, 7], 4.0), 0.05).unwrap();
+        assert_eq!((&found.scenarios[0].newly_failing[..], &found.scenarios[0].fixed[..]), (&[7][..], &[2][..]));
+        assert!(found.is_regression() && found.has_fixed());
+        assert!(!baseline(&[2], 4.0).compare(&baseline(&[2], 4.0), 0.0).unwrap().is_regression());
+    }
+
+    #[test]
+    fn a_margin_regresses_only_beyond_the_tolerance() {
+        let regresses = |before, after, tolerance| {
+            baseline(&[], before).compare(&baseline(&[], after), tolerance).unwrap().is_regression()
+        };
+        assert!(regresses(4.0, 3.7, 0.05));
+        assert!(!regresses(4.0, 3.9, 0.05));
+        assert!(!regresses(4.0, 5.0, 0.0));
+        assert!(!regresses(0.005, 0.0, 0.0), "a change that no report shows is no regression");
+        assert!(regresses(0.0, -1.0, 0.5), "a baseline of zero leaves no share");
+    }
+
+    #[test]
+    fn other_samples_cannot_be_compared() {
+        let before = baseline(&[], 4.0);
+        let changes: [fn(&mut Baseline); 4] = [
+            |other| other.seed = 2,
+            |other| other.design = Design::Sobol,
+            |other| other.scenarios.clear(),
+            |other| other.scenarios.values_mut().for_each(|scenario| scenario.blake3 = "22".to_owned()),
+        ];
+        for change in changes {
+            let mut other = before.clone();
+            change(&mut other);
+            assert!(before.compare(&other, 0.05).is_err());
+        }
+        let mut more = before.clone();
+        more.scenarios.insert("another".to_owned(), ScenarioBaseline::default());
+        assert_eq!(before.compare(&more, 0.05).unwrap().new_scenarios, ["another"]);
+    }
+
+    #[test]
+    fn a_baseline_reads_back() {
+        let written = serde_json::to_string_pretty(&baseline(&[3], 4.0)).unwrap();
+        assert_eq!(serde_json::from_str::<Baseline>(&written).unwrap(), baseline(&[3], 4.0));
+    }
+}

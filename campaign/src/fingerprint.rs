@@ -1,0 +1,160 @@
+//! What identifies a controller that runs as a process: the files that its command names, and what it states about
+//! itself. A campaign keeps it, so that a changed controller is noticed when the campaign is resumed or replayed.
+//!
+//! Files that the command does not name, such as the modules that a script imports, are not covered. A controller that
+//! has such files states a `version` in its first answer, or names them in its command.
+
+use std::path::{Path, PathBuf};
+
+use closecall_controllers::CheckedDriver;
+use closecall_simulation::controller::exec::{ExecSettings, Identity, identify};
+use closecall_simulation::scenario::Scenario;
+use serde::{Deserialize, Serialize};
+
+use super::manifest::file_hash;
+
+/// Number of digits of a hash that a message quotes.
+const QUOTED_DIGITS: usize = 12;
+
+/// A file that a command names.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FileHash {
+    /// The path, as the command names it.
+    pub name: String,
+    /// BLAKE3 hash of its content.
+    pub blake3: String,
+}
+
+/// What identifies a controller that runs as a process.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Fingerprint {
+    /// The command.
+    pub command: String,
+    /// The files that the command names, in its order. The program is among them if it is found.
+    pub files: Vec<FileHash>,
+    /// What the process states about itself in its first answer.
+    pub identity: Identity,
+}
+
+impl Fingerprint {
+    /// Returns the fingerprint of a controller that runs in the given folder, or in that of this program. The process is
+    /// started once and greeted with the values of `scenario`. A process that cannot be greeted has no identity.
+    pub fn of(settings: &ExecSettings, folder: Option<&Path>, scenario: Option<&Scenario>) -> Self {
+        let hash = |(name, path): (String, PathBuf)| {
+            // A file that cannot be read has no hash: it differs from one that can.
+            let blake3 = file_hash(&path).map_or_else(|error| error.to_string(), |hash| hash.to_string());
+            FileHash { name, blake3 }
+        };
+        let greeted = scenario.and_then(|scenario| match &scenario.actors[scenario.ego].driver {
+            CheckedDriver::Ego(ego) => identify(settings, folder, ego, &scenario.road).ok(),
+            CheckedDriver::Human(_) => None,
+        });
+        Self {
+            command: settings.command.clone(),
+            files: named_files(settings, folder).into_iter().map(hash).collect(),
+            identity: greeted.unwrap_or_default(),
+        }
+    }
+
+    /// Returns one message for each difference. `self` is the fingerprint of the earlier controller.
+    pub fn differences(&self, now: &Self) -> Vec<String> {
+        let hash_in = |files: &[FileHash], name: &str| {
+            files.iter().find(|file| file.name == name).map(|file| file.blake3.clone())
+        };
+        let names = self.files.iter().chain(now.files.iter().filter(|file| hash_in(&self.files, &file.name).is_none()));
+        let mut differences = Vec::new();
+        for FileHash { name, .. } in names {
+            let (there, here) = (hash_in(&self.files, name), hash_in(&now.files, name));
+            if there != here {
+                let quoted = |hash: Option<String>| match hash {
+                    Some(hash) => format!("BLAKE3 {}…", hash.chars().take(QUOTED_DIGITS).collect::<String>()),
+                    None => "absent".to_owned(),
+                };
+                let (there, here) = (quoted(there), quoted(here));
+                differences.push(format!("the controller's file {name} has changed: {there} there, {here} here"));
+            }
+        }
+        let stated = [
+            ("name", &self.identity.name, &now.identity.name),
+            ("version", &self.identity.version, &now.identity.version),
+        ];
+        for (key, there, here) in stated.into_iter().filter(|(_, there, here)| there != here) {
+            let quoted = |text: &Option<String>| text.as_ref().map_or("none".to_owned(), |text| format!("`{text}`"));
+            differences.push(format!(
+                "the controller states another {key}: {} there, {} here",
+                quoted(there),
+                quoted(here)
+            ));
+        }
+        differences
+    }
+}
+
+/// Returns one message for each difference between controllers with the same command.
+pub(crate) fn differences(there: &[Fingerprint], here: &[Fingerprint]) -> Vec<String> {
+    let same = |one: &Fingerprint| here.iter().find(|other| other.command == one.command);
+    there.iter().filter_map(|one| Some(one.differences(same(one)?))).flatten().collect()
+}
+
+/// Returns the existing files that the command names, each as it is named and with its path: whole words, and what follows
+/// `=` in a word. The program is looked for in `PATH` if it is named without a folder.
+pub fn named_files(settings: &ExecSettings, folder: Option<&Path>) -> Vec<(String, PathBuf)> {
+    let words = settings.words().unwrap_or_default();
+    let mut files: Vec<(String, PathBuf)> = Vec::new();
+    for (index, word) in words.iter().enumerate() {
+        let names = [Some(word.as_str()), word.split_once('=').map(|(_, value)| value)];
+        for name in names.into_iter().flatten().filter(|name| !name.is_empty()) {
+            let in_folder = || folder.map_or_else(|| PathBuf::from(name), |folder| folder.join(name));
+            let path = if index == 0 && !name.contains('/') { in_search_path(name) } else { Some(in_folder()) };
+            if let Some(path) = path.filter(|path| path.is_file())
+                && !files.iter().any(|(known, _)| known == name)
+            {
+                files.push((name.to_owned(), path));
+            }
+        }
+    }
+    files
+}
+
+/// Returns the program of that name in the folders of `PATH`.
+fn in_search_path(name: &str) -> Option<PathBuf> {
+    let folders = std::env::var_os("PATH")?;
+    std::env::split_paths(&folders).map(|folder| folder.join(name)).find(|path| path.is_file())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn settings(command: &str) -> ExecSettings {
+        ExecSettings { command: command.to_owned(), timeout_ms: 1, memory_mib: 1 }
+    }
+
+    #[test]
+    fn files_are_whole_words_and_values_of_options() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["a.py", "b.json"] {
+            std::fs::write(folder.path().join(name), name).unwrap();
+        }
+        let files = named_files(&settings("sh a.py --config=b.json c.txt a.py ."), Some(folder.path()));
+        let names: Vec<&str> = files.iter().map(|(name, _)| name.as_str()).collect();
+        assert_eq!(names, ["sh", "a.py", "b.json"]);
+    }
+
+    #[test]
+    fn a_changed_file_and_a_changed_version_are_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let script = folder.path().join("a.py");
+        std::fs::write(&script, "1").unwrap();
+        let of = || Fingerprint::of(&settings("sh a.py"), Some(folder.path()), None);
+        let before = of();
+        assert_eq!(before.differences(&of()), Vec::<String>::new());
+        std::fs::write(&script, "2").unwrap();
+        let mut now = of();
+        now.identity.version = Some("2".to_owned());
+        let differences = before.differences(&now);
+        assert!(differences[0].starts_with("the controller's file a.py has changed: BLAKE3 "), "{differences:?}");
+        assert_eq!(differences[1], "the controller states another version: none there, `2` here");
+        assert_eq!(differences.len(), 2);
+    }
+}

@@ -1,0 +1,189 @@
+//! Evaluates one gate over the samples of one scenario.
+
+use closecall_simulation::criteria::{Aggregate, EGO_COLLIDED, Expression, Measure, PairFlag, Quantity};
+use closecall_statistics::quantiles::quantile;
+
+use crate::ledger::Inference;
+use crate::record::Record;
+
+/// Confidence of `lower` and `upper`, and of the reported intervals.
+const CONFIDENCE: f64 = 0.95;
+
+/// The result of one gate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Answer {
+    /// The bound is satisfied.
+    Met,
+    /// The bound is not satisfied.
+    Missed,
+    /// The samples do not decide.
+    Open(OpenReason),
+}
+
+/// Why a gate is not decided.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OpenReason {
+    /// There are too few samples for the confidence that is asked for.
+    TooFewSamples,
+    /// No sample has the value that is judged.
+    NoSamples,
+    /// The gate compares arms, and the campaign has no baseline.
+    NotPaired,
+    /// No parameter varies, so that a bound of a probability means nothing.
+    NothingVaries,
+}
+
+impl OpenReason {
+    /// Returns the reason in words.
+    pub const fn text(self) -> &'static str {
+        match self {
+            Self::TooFewSamples => "too few samples to decide",
+            Self::NoSamples => "no sample has this value",
+            Self::NotPaired => "it needs --paired",
+            Self::NothingVaries => "no parameter varies, so that no probability can be bounded",
+        }
+    }
+}
+
+/// The value of a gate, with its interval.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Evaluation {
+    /// The value of the left-hand side; `None` if no sample has it.
+    pub value: Option<f64>,
+    /// The two-sided 95 % interval of the share, for gates of flags.
+    pub interval_95: Option<[f64; 2]>,
+    /// Samples that count: those that have the quantity, and satisfy the condition.
+    pub samples: u64,
+    /// Whether the bound is satisfied.
+    pub answer: Answer,
+}
+
+/// Gathers what a gate needs, sample by sample.
+#[derive(Clone, Debug)]
+pub struct Accumulator {
+    expression: Expression,
+    hits: u64,
+    samples: u64,
+    sum: f64,
+    smallest: Option<f64>,
+    largest: Option<f64>,
+    /// Every value, for percentiles only.
+    values: Vec<f64>,
+}
+
+impl Accumulator {
+    /// Returns an accumulator without samples.
+    pub fn new(expression: Expression) -> Self {
+        Self { expression, hits: 0, samples: 0, sum: 0.0, smallest: None, largest: None, values: Vec::new() }
+    }
+
+    /// Adds one sample. A sample without the value, or without the condition, does not count.
+    pub fn push(&mut self, record: &Record) {
+        if let Some(condition) = self.expression.condition
+            && value(condition, record) != Some(1.0)
+        {
+            return;
+        }
+        let Some(value) = value(self.expression.quantity, record) else { return };
+        self.samples += 1;
+        self.hits += u64::from(value == 1.0);
+        self.sum += value;
+        // A value that is not a number is both the smallest and the largest: it never satisfies a bound.
+        let keep = |known: Option<f64>, is_beyond: fn(f64, f64) -> bool| match known {
+            Some(known) if known.is_nan() || !(value.is_nan() || is_beyond(value, known)) => Some(known),
+            _ => Some(value),
+        };
+        self.smallest = keep(self.smallest, |value, known| value < known);
+        self.largest = keep(self.largest, |value, known| value > known);
+        if matches!(self.expression.aggregate, Aggregate::Percentile(_)) {
+            self.values.push(value);
+        }
+    }
+
+    /// Returns the result. `is_varied` is false if no parameter of the scenario varies.
+    pub fn evaluate(&self, is_paired: bool, is_varied: bool, inference: Inference) -> Evaluation {
+        let Expression { aggregate, operator, bound, .. } = self.expression;
+        let (hits, samples) = (self.hits, self.samples);
+        let interval_95 =
+            (aggregate.is_of_flag() && samples > 0 && is_varied).then(|| inference.interval_95(hits, samples));
+        let value = (samples > 0 || aggregate == Aggregate::Count).then(|| self.value(inference)).flatten();
+        let open = |reason| Evaluation { value, interval_95, samples, answer: Answer::Open(reason) };
+        if self.expression.needs_pairs() && !is_paired {
+            return open(OpenReason::NotPaired);
+        }
+        let is_bound = matches!(aggregate, Aggregate::Lower | Aggregate::Upper);
+        if is_bound && !is_varied {
+            return open(OpenReason::NothingVaries);
+        }
+        let Some(found) = value.filter(|_| samples > 0) else { return open(OpenReason::NoSamples) };
+        let answer = if operator.holds(found, bound) {
+            Answer::Met
+        } else if is_bound && self.is_undecided(inference) {
+            Answer::Open(OpenReason::TooFewSamples)
+        } else {
+            Answer::Missed
+        };
+        Evaluation { value, interval_95, samples, answer }
+    }
+
+    /// Returns true if the bound of the share on the other side still satisfies the gate: more samples may decide.
+    fn is_undecided(&self, inference: Inference) -> bool {
+        let other = match self.expression.aggregate {
+            Aggregate::Lower => inference.upper_bound(self.hits, self.samples, CONFIDENCE),
+            _ => inference.lower_bound(self.hits, self.samples, CONFIDENCE),
+        };
+        self.expression.operator.holds(other, self.expression.bound)
+    }
+
+    fn value(&self, inference: Inference) -> Option<f64> {
+        let (hits, samples) = (self.hits, self.samples);
+        match self.expression.aggregate {
+            Aggregate::Count => Some(hits as f64),
+            Aggregate::Share => Some(hits as f64 / samples as f64),
+            Aggregate::Lower => Some(inference.lower_bound(hits, samples, CONFIDENCE)),
+            Aggregate::Upper => Some(inference.upper_bound(hits, samples, CONFIDENCE)),
+            Aggregate::Min => self.smallest,
+            Aggregate::Max => self.largest,
+            Aggregate::Mean => Some(self.sum / samples as f64),
+            Aggregate::Sum => Some(self.sum),
+            Aggregate::Percentile(percent) => percentile(&self.values, percent),
+        }
+    }
+}
+
+/// Returns the percentile of values. Any value that is not a number makes the result not a number.
+fn percentile(values: &[f64], percent: f64) -> Option<f64> {
+    if values.iter().any(|value| value.is_nan()) {
+        return Some(f64::NAN);
+    }
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    (!sorted.is_empty()).then(|| quantile(&sorted, 0.01 * percent))
+}
+
+/// Returns the value of a quantity in one sample; `None` if the sample does not have it.
+///
+/// Collisions of the ego are those that are judged: if the validity checks flipped a verdict, the one that speaks worse for
+/// the system under test.
+pub(crate) fn value(quantity: Quantity, record: &Record) -> Option<f64> {
+    let is = |holds: bool| if holds { 1.0 } else { 0.0 };
+    let tested = record.arms.len().checked_sub(1)?;
+    let collided = |index: usize| record.tallies().get(index)?.collided;
+    let of = |index: usize, measure: &Measure| match record.arms.get(index)?.result.as_ref() {
+        Ok(_) if measure.name == EGO_COLLIDED => collided(index).map(is),
+        Ok(outcome) => measure.of(outcome),
+        Err(_) => None,
+    };
+    match quantity {
+        Quantity::Tested(measure) => of(tested, measure),
+        Quantity::Baseline(measure) if tested > 0 => of(0, measure),
+        Quantity::Pair(flag) if tested > 0 => {
+            let (baseline, tested) = (collided(0)?, collided(tested)?);
+            Some(is(match flag {
+                PairFlag::Prevented => baseline && !tested,
+                PairFlag::Induced => tested && !baseline,
+            }))
+        }
+        Quantity::Baseline(_) | Quantity::Pair(_) => None,
+    }
+}

@@ -1,0 +1,199 @@
+//! Judges a campaign, record by record.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use closecall_scenarios::parameters::Variation;
+use closecall_simulation::criteria::{EGO_COLLIDED, FlagName, Measure, Quantity};
+use closecall_traffic::Parameters;
+
+use super::evaluate::{Accumulator, value};
+use super::result::{ExpectationResult, GateResult, RequirementResult, Standing};
+use super::set::{GateSet, GateSpec, ProbabilitySpec};
+use crate::ledger::Inference;
+use crate::record::Record;
+use crate::runner::Work;
+
+/// A gate that is being judged.
+#[derive(Clone, Debug)]
+struct Gate {
+    spec: GateSpec,
+    accumulator: Accumulator,
+}
+
+impl Gate {
+    fn new(spec: &GateSpec) -> Self {
+        Self { accumulator: Accumulator::new(spec.expression), spec: spec.clone() }
+    }
+}
+
+/// What is judged of one scenario.
+#[derive(Clone, Debug)]
+struct Judged {
+    scenario: String,
+    is_varied: bool,
+    /// The parameters that were seen already, if the scenario samples from finitely many: a repeated encounter is no new
+    /// evidence.
+    seen: Option<BTreeSet<String>>,
+    repeated: u64,
+    gates: Vec<Gate>,
+    probability: Option<ProbabilitySpec>,
+    requirements: Vec<String>,
+    expects: Vec<FlagName>,
+    least_share: f64,
+    happened: u64,
+    samples: u64,
+}
+
+/// Gathers the evidence for every gate, requirement and expectation of a campaign.
+#[derive(Clone, Debug)]
+pub struct Judge {
+    is_paired: bool,
+    is_measurement: bool,
+    inference: Inference,
+    scenarios: Vec<Judged>,
+    all: Vec<Gate>,
+}
+
+impl Judge {
+    /// Returns a judge without samples.
+    pub fn new(works: &[Arc<Work>], set: &GateSet, inference: Inference) -> Self {
+        let judged = |work: &Arc<Work>| {
+            let (config, variation) = (work.file.config(), work.file.space().variation());
+            Judged {
+                scenario: config.name.clone(),
+                is_varied: variation != Variation::None,
+                seen: (variation == Variation::Discrete).then(BTreeSet::new),
+                repeated: 0,
+                gates: set.of_scenario(&work.file).iter().map(Gate::new).collect(),
+                probability: set.probability_of(&work.file),
+                requirements: config.requirements.clone(),
+                expects: config.expects.clone(),
+                least_share: config.expects_share,
+                happened: 0,
+                samples: 0,
+            }
+        };
+        Self {
+            is_paired: works.first().is_some_and(|work| work.arms.len() > 1),
+            is_measurement: set.is_measurement,
+            inference,
+            scenarios: works.iter().map(judged).collect(),
+            all: set.of_all().map(Gate::new).collect(),
+        }
+    }
+
+    /// Adds one sample. A record of a scenario that is not in the plan does not count.
+    pub fn push(&mut self, record: &Record) {
+        let Some(judged) = self.scenarios.iter_mut().find(|judged| judged.scenario == record.scenario) else { return };
+        if judged.is_repeated(record) {
+            return;
+        }
+        judged.observe_expectations(record);
+        for gate in judged.gates.iter_mut().chain(&mut self.all) {
+            gate.accumulator.push(record);
+        }
+    }
+
+    /// Returns true if the campaign is a mere measurement.
+    pub const fn is_measurement(&self) -> bool {
+        self.is_measurement
+    }
+
+    /// Returns the samples of a scenario that repeat the parameters of an earlier one, and are not counted as evidence.
+    pub fn repeated(&self, scenario: &str) -> u64 {
+        self.scenarios.iter().find(|judged| judged.scenario == scenario).map_or(0, |judged| judged.repeated)
+    }
+
+    /// Returns true if some parameter of the scenario varies.
+    pub fn is_varied(&self, scenario: &str) -> bool {
+        self.scenarios.iter().any(|judged| judged.scenario == scenario && judged.is_varied)
+    }
+
+    /// Returns the gates on the probability of a collision, by scenario.
+    pub fn probabilities(&self) -> impl Iterator<Item = (&str, &ProbabilitySpec)> {
+        self.scenarios.iter().filter_map(|judged| Some((judged.scenario.as_str(), judged.probability.as_ref()?)))
+    }
+
+    /// Returns the result of every gate and requirement check, scenario by scenario.
+    pub fn gates(&self) -> Vec<GateResult> {
+        let result = |gate: &Gate, scenario: Option<&str>, is_varied: bool| GateResult {
+            scenario: scenario.map(str::to_owned),
+            expression: gate.spec.expression,
+            source: gate.spec.source.clone(),
+            evaluation: gate.accumulator.evaluate(self.is_paired, is_varied, self.inference),
+        };
+        let is_any_varied = self.scenarios.iter().any(|judged| judged.is_varied);
+        let all = self.all.iter().map(|gate| result(gate, None, is_any_varied));
+        let each = self.scenarios.iter().flat_map(|judged| {
+            judged.gates.iter().map(|gate| result(gate, Some(&judged.scenario), judged.is_varied)).collect::<Vec<_>>()
+        });
+        each.chain(all).collect()
+    }
+
+    /// Returns how each requirement fares in each scenario that names it, in the order of the marks.
+    pub fn requirements(&self, gates: &[GateResult]) -> Vec<RequirementResult> {
+        let mut results = Vec::new();
+        for judged in &self.scenarios {
+            for mark in &judged.requirements {
+                let is_check =
+                    |gate: &&GateResult| gate.scenario.as_deref() == Some(&judged.scenario) && gate.is_of(mark);
+                let standing = gates.iter().filter(is_check).map(GateResult::standing).max();
+                results.push(RequirementResult {
+                    mark: mark.clone(),
+                    scenario: judged.scenario.clone(),
+                    standing: standing.unwrap_or(Standing::NotChecked),
+                });
+            }
+        }
+        results.sort_by(|one, other| (&one.mark, &one.scenario).cmp(&(&other.mark, &other.scenario)));
+        results
+    }
+
+    /// Returns whether what the scenarios expect of their runs happened.
+    pub fn expectations(&self) -> Vec<ExpectationResult> {
+        let result = |judged: &Judged| ExpectationResult {
+            scenario: judged.scenario.clone(),
+            expects: judged.expects.clone(),
+            happened: judged.happened,
+            samples: judged.samples,
+            least_share: judged.least_share,
+        };
+        self.scenarios.iter().filter(|judged| !judged.expects.is_empty()).map(result).collect()
+    }
+}
+
+impl Judged {
+    fn is_repeated(&mut self, record: &Record) -> bool {
+        let Some(seen) = &mut self.seen else { return false };
+        let Some(parameters) = record.arms.iter().find_map(|arm| Some(&arm.result.as_ref().ok()?.parameters)) else {
+            return false;
+        };
+        let is_new = seen.insert(key(parameters));
+        self.repeated += u64::from(!is_new);
+        !is_new
+    }
+
+    /// A run that the ego's collision ended counts as one in which everything happened: what it would have come to is not
+    /// known, and it is no pass.
+    fn observe_expectations(&mut self, record: &Record) {
+        if record.arms.iter().any(|arm| arm.result.is_err()) {
+            return;
+        }
+        self.samples += 1;
+        let holds = |quantity: Quantity| value(quantity, record) == Some(1.0);
+        let collided = Measure::named(EGO_COLLIDED);
+        let is_paired = record.arms.len() > 1;
+        let happened = self.expects.iter().all(|flag| {
+            let happened_in = |quantity: fn(&'static Measure) -> Quantity| {
+                holds(quantity(flag.measure())) || collided.is_some_and(|collided| holds(quantity(collided)))
+            };
+            happened_in(Quantity::Tested) && (!is_paired || happened_in(Quantity::Baseline))
+        });
+        self.happened += u64::from(happened);
+    }
+}
+
+fn key(parameters: &Parameters) -> String {
+    parameters.iter().map(|(name, value)| format!("{name}={value:?};")).collect()
+}

@@ -1,0 +1,15 @@
+//! Gates: criteria, where they come from, and how the samples of a campaign answer them.
+//!
+//! ```text
+//!  GateSet ─▶ Judge ─(one record after the other)─▶ Judgement { verdict, gates, requirements, expectations, reasons }
+//! ```
+
+mod evaluate;
+mod judge;
+mod result;
+mod set;
+
+pub use evaluate::{Accumulator, Answer, Evaluation, OpenReason};
+pub use judge::Judge;
+pub use result::{ExpectationResult, GateResult, RequirementResult, Standing};
+pub use set::{GateSet, GateSource, GateSpec, ProbabilitySpec, Scope};

@@ -1,0 +1,161 @@
+//! The results of gates, requirements and expectations.
+
+use std::fmt;
+
+use closecall_simulation::criteria::{Expression, FlagName};
+
+use super::evaluate::{Answer, Evaluation};
+use super::set::GateSource;
+
+/// How a requirement or a gate fares; graver results last.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Standing {
+    /// Every criterion is met.
+    Pass,
+    /// Nothing checks it.
+    NotChecked,
+    /// The samples do not decide.
+    Inconclusive,
+    /// Some criterion is not met.
+    Fail,
+}
+
+impl Standing {
+    /// Returns the word for reports. The words for an undecided campaign are kept for its verdict.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Pass => "met",
+            Self::NotChecked => "not checked",
+            Self::Inconclusive => "open",
+            Self::Fail => "NOT MET",
+        }
+    }
+}
+
+/// One gate with its answer.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GateResult {
+    /// The scenario; `None` if the gate is judged on all scenarios together.
+    pub scenario: Option<String>,
+    /// The criterion.
+    pub expression: Expression,
+    /// Where it comes from.
+    pub source: GateSource,
+    /// Its value and answer.
+    pub evaluation: Evaluation,
+}
+
+impl GateResult {
+    /// Returns how the gate fares.
+    pub fn standing(&self) -> Standing {
+        match self.evaluation.answer {
+            Answer::Met => Standing::Pass,
+            Answer::Missed => Standing::Fail,
+            Answer::Open(super::OpenReason::NotPaired) => Standing::NotChecked,
+            Answer::Open(_) => Standing::Inconclusive,
+        }
+    }
+
+    /// Returns true if the gate checks the requirement `mark`.
+    pub fn is_of(&self, mark: &str) -> bool {
+        matches!(&self.source, GateSource::Requirement(checked) if checked == mark)
+    }
+
+    /// Returns true if the gate has an answer.
+    pub fn is_decided(&self) -> bool {
+        matches!(self.evaluation.answer, Answer::Met | Answer::Missed)
+    }
+
+    /// Returns a name that no other gate of the campaign has.
+    pub fn name(&self) -> String {
+        let scenario = self.scenario.as_deref().unwrap_or("all scenarios");
+        match &self.source {
+            GateSource::Requirement(mark) => format!("{scenario}: {mark}: {}", self.expression),
+            _ => format!("{scenario}: {}", self.expression),
+        }
+    }
+}
+
+impl fmt::Display for GateResult {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Evaluation { value, interval_95, samples, answer } = self.evaluation;
+        write!(f, "{}: {}", self.standing().word(), self.name())?;
+        match value {
+            Some(value) => write!(f, " (is {}", shown(value))?,
+            None => f.write_str(" (has no value")?,
+        }
+        if let Some([low, high]) = interval_95 {
+            write!(f, ", share {} to {} with 95 %", shown(low), shown(high))?;
+        }
+        write!(f, ", {samples} samples")?;
+        if let Answer::Open(reason) = answer {
+            write!(f, "; {}", reason.text())?;
+        }
+        match self.source {
+            // The name says so already.
+            GateSource::Requirement(_) => f.write_str(")"),
+            _ => write!(f, "; from {})", self.source),
+        }
+    }
+}
+
+/// Writes a value with as many digits as tell it apart, and no more than four.
+fn shown(value: f64) -> String {
+    let text = format!("{value:.4}");
+    let short = text.trim_end_matches('0').trim_end_matches('.');
+    if short.is_empty() || short == "-0" { "0".to_owned() } else { short.to_owned() }
+}
+
+/// One requirement in one scenario that is evidence for it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RequirementResult {
+    /// The requirement's mark.
+    pub mark: String,
+    /// The scenario.
+    pub scenario: String,
+    /// How it fares there.
+    pub standing: Standing,
+}
+
+/// Whether what a scenario expects of its runs happened.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExpectationResult {
+    /// The scenario.
+    pub scenario: String,
+    /// What is expected.
+    pub expects: Vec<FlagName>,
+    /// Samples in which all of it happened, in every arm; a run that the ego's collision ended counts.
+    pub happened: u64,
+    /// Samples with an outcome in every arm.
+    pub samples: u64,
+    /// The share that is asked for.
+    pub least_share: f64,
+}
+
+impl ExpectationResult {
+    /// Returns the share of samples in which what is expected happened; `None` of no samples.
+    pub fn share(&self) -> Option<f64> {
+        (self.samples > 0).then(|| self.happened as f64 / self.samples as f64)
+    }
+
+    /// Returns true if the share is as high as is asked for.
+    pub fn is_met(&self) -> bool {
+        self.share().is_some_and(|share| share >= self.least_share)
+    }
+}
+
+impl fmt::Display for ExpectationResult {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let names: Vec<&str> = self.expects.iter().map(|flag| flag.measure().name).collect();
+        let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+        let (happened, samples) = (self.happened, self.samples);
+        let share = self.share().map_or("none".to_owned(), percent);
+        let least = percent(self.least_share);
+        write!(
+            f,
+            "{}: {} in {happened} of {samples} samples ({share}, at least {least} expected)",
+            self.scenario,
+            names.join(" and ")
+        )
+    }
+}

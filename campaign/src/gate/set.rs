@@ -1,0 +1,160 @@
+//! Which criteria a campaign is judged by, and where each of them comes from.
+//!
+//! ```text
+//!  command line ─┐ replaces, for the same left-hand side,
+//!  preset        ├─▶ GateSet ─▶ one gate per criterion and scenario
+//!  closecall.toml│ replaces
+//!  scenario file ┘                      requirement checks of the scenario file: always
+//! ```
+
+use std::fmt;
+use std::path::PathBuf;
+
+use closecall_simulation::criteria::Expression;
+use closecall_simulation::scenario::ScenarioFile;
+
+use crate::probability::ProbabilityGate;
+use crate::verdict::MAX_FLIP_RATE;
+
+/// Where a gate comes from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum GateSource {
+    /// The command line.
+    CommandLine,
+    /// A preset of the command line.
+    Preset(&'static str),
+    /// A project file, `closecall.toml`.
+    ProjectFile(PathBuf),
+    /// The table `[gate]` of the scenario file.
+    Scenario,
+    /// The check of a requirement in the scenario file.
+    Requirement(String),
+}
+
+impl fmt::Display for GateSource {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::CommandLine => f.write_str("command line"),
+            Self::Preset(name) => write!(f, "--preset {name}"),
+            Self::ProjectFile(path) => write!(f, "{}", path.display()),
+            Self::Scenario => f.write_str("scenario file"),
+            Self::Requirement(mark) => write!(f, "requirement {mark}"),
+        }
+    }
+}
+
+/// The samples that a gate is judged on.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Scope {
+    /// The samples of each scenario, one scenario at a time.
+    EachScenario,
+    /// The samples of all scenarios together; for counts only.
+    AllScenarios,
+}
+
+/// One criterion with its origin.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GateSpec {
+    /// The criterion.
+    pub expression: Expression,
+    /// Where it comes from.
+    pub source: GateSource,
+    /// The samples that it is judged on.
+    pub scope: Scope,
+}
+
+/// A gate on the probability of a collision, with its origin.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ProbabilitySpec {
+    /// The gate.
+    pub gate: ProbabilityGate,
+    /// Where it comes from.
+    pub source: GateSource,
+}
+
+/// The gates that hold for every scenario of a campaign; those of the scenario files come on top.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GateSet {
+    /// The criteria, those that win first.
+    pub specs: Vec<GateSpec>,
+    /// The gate on the probability of a collision.
+    pub probability: Option<ProbabilitySpec>,
+    /// True if nothing is to be judged: the campaign is a measurement.
+    pub is_measurement: bool,
+    /// Share of the checked verdicts that may flip at half the time step.
+    pub max_flip_rate: f64,
+}
+
+impl Default for GateSet {
+    fn default() -> Self {
+        Self { specs: Vec::new(), probability: None, is_measurement: false, max_flip_rate: MAX_FLIP_RATE }
+    }
+}
+
+impl GateSet {
+    /// Returns a set of criteria from the command line, each judged on every scenario.
+    pub fn of(expressions: impl IntoIterator<Item = Expression>) -> Self {
+        let mut set = Self::default();
+        for expression in expressions {
+            set.push(GateSpec { expression, source: GateSource::CommandLine, scope: Scope::EachScenario });
+        }
+        set
+    }
+
+    /// Adds a criterion, unless one with the same left-hand side is there already: what is added first wins.
+    pub fn push(&mut self, spec: GateSpec) {
+        let subject = spec.expression.subject();
+        let is_known = |known: &GateSpec| {
+            known.expression.subject() == subject
+                && known.expression.operator == spec.expression.operator
+                && known.scope == spec.scope
+        };
+        if !self.specs.iter().any(is_known) {
+            self.specs.push(spec);
+        }
+    }
+
+    /// Returns the gates of one scenario: those of the campaign, those of its file that these do not replace, and the checks
+    /// of its requirements.
+    pub fn of_scenario(&self, file: &ScenarioFile) -> Vec<GateSpec> {
+        let mut set = Self {
+            specs: self.specs.iter().filter(|spec| spec.scope == Scope::EachScenario).cloned().collect(),
+            ..Self::default()
+        };
+        let scope = Scope::EachScenario;
+        for &expression in &file.config().gate.require {
+            // A bound for all scenarios together replaces that of a scenario.
+            if self.of_all().any(|spec| spec.expression.subject() == expression.subject()) {
+                continue;
+            }
+            set.push(GateSpec { expression, source: GateSource::Scenario, scope: scope.clone() });
+        }
+        let mut specs = if self.is_measurement { Vec::new() } else { set.specs };
+        for (mark, expressions) in &file.config().checks {
+            for &expression in expressions {
+                let source = GateSource::Requirement(mark.clone());
+                specs.push(GateSpec { expression, source, scope: scope.clone() });
+            }
+        }
+        specs
+    }
+
+    /// Returns the criteria that are judged on all scenarios together.
+    pub fn of_all(&self) -> impl Iterator<Item = &GateSpec> {
+        self.specs.iter().filter(|spec| spec.scope == Scope::AllScenarios && !self.is_measurement)
+    }
+
+    /// Returns the gate on the probability of a collision of one scenario.
+    pub fn probability_of(&self, file: &ScenarioFile) -> Option<ProbabilitySpec> {
+        if self.is_measurement {
+            return None;
+        }
+        let of_file = || {
+            let gate = &file.config().gate;
+            let confidence = gate.confidence.unwrap_or(ProbabilityGate::CONFIDENCE);
+            let gate = ProbabilityGate::new(gate.max_probability?, confidence).ok()?;
+            Some(ProbabilitySpec { gate, source: GateSource::Scenario })
+        };
+        self.probability.clone().or_else(of_file)
+    }
+}

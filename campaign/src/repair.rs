@@ -1,0 +1,149 @@
+//! Repairs the journal of a campaign before it is resumed: the samples of damaged lines, and on request those that ended
+//! in an error, are run again, and their lines are put in their places. All other lines are kept.
+//!
+//! The journal is replaced in one step. A program that is killed meanwhile leaves the old one.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
+use std::ops::{ControlFlow, Range};
+use std::path::Path;
+
+use closecall_scenarios::atomic::write_file;
+
+use super::execution::{Campaign, CampaignError};
+use super::folder::{FolderError, LockedFolder, TornLine};
+use super::journal;
+use super::ledger::Inference;
+use super::record::Record;
+use super::wall_times;
+use super::workers::Finished;
+
+/// What has been repaired.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Repair {
+    /// The damaged lines whose samples were run again.
+    pub(super) damaged: Vec<TornLine>,
+    /// Number of samples that had ended in an error, and were run again.
+    pub(super) retried: u64,
+}
+
+/// A sample: the index of its scenario in the campaign, and its number.
+type Key = (usize, u64);
+
+/// A part of a journal that is replaced.
+#[derive(Debug, PartialEq, Eq)]
+struct Redo {
+    bytes: Range<u64>,
+    samples: Vec<Key>,
+    /// The damaged lines; empty if the part is an intact record of an error.
+    damaged: Vec<TornLine>,
+}
+
+/// Repairs the journal of a folder. If the campaign is stopped meanwhile, parts that are not complete stay as they are.
+pub(super) fn repair(campaign: &Campaign, folder: &LockedFolder) -> Result<Repair, CampaignError> {
+    let path = folder.journal_path();
+    if !path.exists() {
+        return Ok(Repair::default());
+    }
+    let read_error = |source| FolderError::Read { path: path.clone(), source };
+    let redos = scan(campaign, &path).map_err(read_error)?;
+    if redos.is_empty() {
+        return Ok(Repair::default());
+    }
+    let results = run_again(campaign, &redos)?;
+    let is_complete = |redo: &&Redo| redo.samples.iter().all(|key| results.contains_key(key));
+    let complete: Vec<&Redo> = redos.iter().filter(is_complete).collect();
+    let mut old = File::open(&path).map_err(read_error)?;
+    write_file(&path, |new| {
+        let mut copied = 0;
+        for redo in &complete {
+            io::copy(&mut Read::by_ref(&mut old).take(redo.bytes.start - copied), new)?;
+            for finished in redo.samples.iter().filter_map(|key| results.get(key)) {
+                new.write_all(&journal::line(&finished.record)?)?;
+            }
+            copied = redo.bytes.end;
+            old.seek(SeekFrom::Start(copied))?;
+        }
+        io::copy(&mut old, new).map(drop)
+    })?;
+    wall_times::replace(&folder.wall_times_path(), results.values())?;
+    let of_error = complete.iter().filter(|redo| redo.damaged.is_empty());
+    Ok(Repair {
+        retried: of_error.map(|redo| redo.samples.len() as u64).sum(),
+        damaged: complete.iter().flat_map(|redo| redo.damaged.clone()).collect(),
+    })
+}
+
+/// Returns the parts of the journal that are to be replaced, in their order. Damaged lines behind the last intact one are
+/// left out: they are cut off when the journal is opened.
+fn scan(campaign: &Campaign, path: &Path) -> io::Result<Vec<Redo>> {
+    let mut reader = BufReader::new(File::open(path)?);
+    let (mut redos, mut damaged, mut buffer) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut last, mut end, mut damaged_from) = (None, 0, 0);
+    for number in 1.. {
+        buffer.clear();
+        let read = reader.read_until(b'\n', &mut buffer)? as u64;
+        if read == 0 {
+            break;
+        }
+        let start = end;
+        end += read;
+        let record = match journal::parse(&buffer) {
+            Ok(record) => record,
+            Err(reason) => {
+                if damaged.is_empty() {
+                    damaged_from = start;
+                }
+                damaged.push(TornLine { line: number, reason });
+                continue;
+            }
+        };
+        let Some(key) = key_of(campaign, &record) else { break };
+        if !damaged.is_empty() {
+            let Some(samples) = between(campaign, last, key) else { break };
+            redos.push(Redo { bytes: damaged_from..start, samples, damaged: std::mem::take(&mut damaged) });
+        }
+        if campaign.retry_errors && record.arms.iter().any(|arm| arm.result.is_err()) {
+            redos.push(Redo { bytes: start..end, samples: vec![key], damaged: Vec::new() });
+        }
+        last = Some(key);
+    }
+    Ok(redos)
+}
+
+/// Returns the sample of a record, or `None` if the campaign has no such scenario.
+pub(super) fn key_of(campaign: &Campaign, record: &Record) -> Option<Key> {
+    let work = campaign.works.iter().position(|work| work.file.config().name == record.scenario)?;
+    Some((work, record.sample))
+}
+
+/// Returns the samples between two others in the order of the plan; from the first sample on if `after` is `None`.
+/// Returns `None` if the plan does not determine them, because the outcomes ended a scenario.
+fn between(campaign: &Campaign, after: Option<Key>, before: Key) -> Option<Vec<Key>> {
+    let first = after.map_or(0, |(work, _)| work);
+    if first != before.0 && campaign.inference == Inference::Sequential {
+        return None;
+    }
+    let mut keys = Vec::new();
+    for (index, work) in campaign.works.iter().enumerate().take(before.0 + 1).skip(first) {
+        let samples = work.samples(campaign.partition).map(|sample| (index, sample));
+        let rest = samples.skip_while(|key| after.is_some_and(|after| *key <= after));
+        keys.extend(rest.take_while(|key| *key < before));
+    }
+    Some(keys)
+}
+
+/// Runs the samples of all parts again.
+fn run_again(campaign: &Campaign, redos: &[Redo]) -> Result<BTreeMap<Key, Finished>, CampaignError> {
+    let mut results = BTreeMap::new();
+    for (index, work) in campaign.works.iter().enumerate() {
+        let keys = redos.iter().flat_map(|redo| &redo.samples).filter(|(work, _)| *work == index);
+        let samples: Vec<u64> = keys.map(|(_, sample)| *sample).collect();
+        campaign.workers.run(work, samples.into_iter(), &campaign.stop, |finished| {
+            results.insert((index, finished.record.sample), finished);
+            Ok::<_, CampaignError>(ControlFlow::Continue(()))
+        })?;
+    }
+    Ok(results)
+}

@@ -1,0 +1,309 @@
+//! The language of gates.
+//!
+//! ```text
+//!  gate      = aggregate "(" quantity [ "|" condition ] ")" operator number
+//!  aggregate = "count" | "share" | "lower" | "upper"          of a flag
+//!            | "min" | "max" | "mean" | "sum" | "p" percent   of a number
+//!  quantity  = [ "baseline." ] measure | pair flag
+//!  condition = [ "baseline." ] flag | pair flag
+//!  operator  = "<=" | ">="
+//! ```
+//!
+//! `p99(min_ttc_rear_s) >= 1.0` asks that the 99th percentile of the smallest time to collision is at least 1 s.
+//! `lower(prevented | baseline.ego_collided) >= 0.5` asks that, of the samples in which the ego collides without the system,
+//! more than half are prevented with 95 % confidence. `lower` and `upper` are the exact one-sided bounds of a share.
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::measure::{MEASURES, Measure, MeasureKind, PairFlag};
+
+/// What is computed from all samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Aggregate {
+    /// The number of samples in which a flag holds.
+    Count,
+    /// The share of samples in which a flag holds.
+    Share,
+    /// The one-sided lower 95 % bound of that share.
+    Lower,
+    /// The one-sided upper 95 % bound of that share.
+    Upper,
+    /// The smallest value.
+    Min,
+    /// The largest value.
+    Max,
+    /// The mean.
+    Mean,
+    /// The sum.
+    Sum,
+    /// A percentile, from 0 to 100.
+    Percentile(f64),
+}
+
+impl Aggregate {
+    /// Returns true if the aggregate is one of a flag, false if it is one of a number.
+    pub const fn is_of_flag(self) -> bool {
+        matches!(self, Self::Count | Self::Share | Self::Lower | Self::Upper)
+    }
+}
+
+/// The value of one sample that is aggregated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Quantity {
+    /// A measure of the arm under test.
+    Tested(&'static Measure),
+    /// A measure of the baseline.
+    Baseline(&'static Measure),
+    /// A flag of the pair.
+    Pair(PairFlag),
+}
+
+impl Quantity {
+    /// Returns true if the quantity exists only in a paired campaign.
+    pub const fn needs_pairs(self) -> bool {
+        matches!(self, Self::Baseline(_) | Self::Pair(_))
+    }
+
+    fn is_flag(self) -> bool {
+        match self {
+            Self::Tested(measure) | Self::Baseline(measure) => measure.kind == MeasureKind::Flag,
+            Self::Pair(_) => true,
+        }
+    }
+}
+
+/// The side of the bound on which the value must lie. The bound itself is allowed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Operator {
+    /// The value is at most the bound.
+    AtMost,
+    /// The value is at least the bound.
+    AtLeast,
+}
+
+impl Operator {
+    /// Returns whether a value satisfies the bound. A value that is not a number never does.
+    pub fn holds(self, value: f64, bound: f64) -> bool {
+        match self {
+            Self::AtMost => value <= bound,
+            Self::AtLeast => value >= bound,
+        }
+    }
+}
+
+/// A gate: an aggregate, and the bound that it must satisfy.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Expression {
+    /// What is computed.
+    pub aggregate: Aggregate,
+    /// Of which value of each sample.
+    pub quantity: Quantity,
+    /// Only samples in which this flag holds count.
+    pub condition: Option<Quantity>,
+    /// The side of the bound.
+    pub operator: Operator,
+    /// The bound.
+    pub bound: f64,
+}
+
+impl Expression {
+    /// Returns true if the gate can be judged in a paired campaign only.
+    pub fn needs_pairs(&self) -> bool {
+        self.quantity.needs_pairs() || self.condition.is_some_and(Quantity::needs_pairs)
+    }
+
+    /// Returns the left-hand side, which identifies what is judged.
+    pub fn subject(&self) -> String {
+        let condition = self.condition.map_or_else(String::new, |condition| format!(" | {condition}"));
+        format!("{}({}{condition})", self.aggregate, self.quantity)
+    }
+}
+
+/// Text that is not a gate.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("`{text}` is not a gate: {problem}")]
+pub struct ExpressionError {
+    /// The text.
+    pub text: String,
+    /// What is wrong, and what is allowed.
+    pub problem: String,
+}
+
+impl FromStr for Expression {
+    type Err = ExpressionError;
+
+    fn from_str(text: &str) -> Result<Self, ExpressionError> {
+        parse(text).map_err(|problem| ExpressionError { text: text.to_owned(), problem })
+    }
+}
+
+const FORM: &str = "it has the form `p99(min_ttc_rear_s) >= 1.0` or `count(ego_collided) <= 0`";
+
+fn parse(text: &str) -> Result<Expression, String> {
+    let (left, operator, right) = match (text.split_once("<="), text.split_once(">=")) {
+        (Some((left, right)), None) => (left, Operator::AtMost, right),
+        (None, Some((left, right))) => (left, Operator::AtLeast, right),
+        _ => return Err(format!("it needs one `<=` or `>=`; {FORM}")),
+    };
+    let bound = match right.trim().parse::<f64>() {
+        Ok(bound) if bound.is_finite() => bound,
+        _ => return Err(format!("the bound `{}` is not a finite number", right.trim())),
+    };
+    let Some((aggregate, inside)) = left.trim().strip_suffix(')').and_then(|left| left.split_once('(')) else {
+        return Err(FORM.to_owned());
+    };
+    let aggregate = parse_aggregate(aggregate.trim())?;
+    let (quantity, condition) = match inside.split_once('|') {
+        Some((quantity, condition)) => (quantity, Some(parse_quantity(condition.trim())?)),
+        None => (inside, None),
+    };
+    let quantity = parse_quantity(quantity.trim())?;
+    if aggregate.is_of_flag() != quantity.is_flag() {
+        let (kind, allowed) = if quantity.is_flag() {
+            ("a flag", "count, share, lower and upper")
+        } else {
+            ("a number", "min, max, mean, sum and percentiles such as p99")
+        };
+        return Err(format!("`{quantity}` is {kind}, which has {allowed}"));
+    }
+    if let Some(condition) = condition.filter(|condition| !condition.is_flag()) {
+        return Err(format!("the condition `{condition}` is not a flag; flags are {}", flag_names()));
+    }
+    let is_share = matches!(aggregate, Aggregate::Share | Aggregate::Lower | Aggregate::Upper);
+    if is_share && !(0.0..=1.0).contains(&bound) {
+        return Err(format!("the bound {bound} of a share is not from 0 to 1"));
+    }
+    Ok(Expression { aggregate, quantity, condition, operator, bound })
+}
+
+fn parse_aggregate(name: &str) -> Result<Aggregate, String> {
+    Ok(match name {
+        "count" => Aggregate::Count,
+        "share" => Aggregate::Share,
+        "lower" => Aggregate::Lower,
+        "upper" => Aggregate::Upper,
+        "min" => Aggregate::Min,
+        "max" => Aggregate::Max,
+        "mean" => Aggregate::Mean,
+        "sum" => Aggregate::Sum,
+        _ => match name.strip_prefix('p').and_then(|percent| percent.parse::<f64>().ok()) {
+            Some(percent) if (0.0..=100.0).contains(&percent) => Aggregate::Percentile(percent),
+            _ => {
+                let known = "count, share, lower, upper, min, max, mean, sum, and p0 to p100";
+                return Err(format!("`{name}` is not an aggregate; there are {known}"));
+            }
+        },
+    })
+}
+
+fn parse_quantity(name: &str) -> Result<Quantity, String> {
+    if let Some(flag) = PairFlag::named(name) {
+        return Ok(Quantity::Pair(flag));
+    }
+    let (in_baseline, measure) = match name.strip_prefix("baseline.") {
+        Some(measure) => (true, measure),
+        None => (false, name),
+    };
+    match Measure::named(measure) {
+        Some(measure) if in_baseline => Ok(Quantity::Baseline(measure)),
+        Some(measure) => Ok(Quantity::Tested(measure)),
+        None => Err(format!("`{name}` is not a measure; there are {}", measure_names())),
+    }
+}
+
+fn measure_names() -> String {
+    let names = MEASURES.iter().map(|measure| measure.name);
+    names.chain(PairFlag::ALL.map(PairFlag::name)).collect::<Vec<_>>().join(", ")
+}
+
+fn flag_names() -> String {
+    let flags = MEASURES.iter().filter(|measure| measure.kind == MeasureKind::Flag).map(|measure| measure.name);
+    flags.chain(PairFlag::ALL.map(PairFlag::name)).collect::<Vec<_>>().join(", ")
+}
+
+impl fmt::Display for Aggregate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Count => f.write_str("count"),
+            Self::Share => f.write_str("share"),
+            Self::Lower => f.write_str("lower"),
+            Self::Upper => f.write_str("upper"),
+            Self::Min => f.write_str("min"),
+            Self::Max => f.write_str("max"),
+            Self::Mean => f.write_str("mean"),
+            Self::Sum => f.write_str("sum"),
+            Self::Percentile(percent) => write!(f, "p{percent}"),
+        }
+    }
+}
+
+impl fmt::Display for Quantity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Tested(measure) => f.write_str(measure.name),
+            Self::Baseline(measure) => write!(f, "baseline.{}", measure.name),
+            Self::Pair(flag) => f.write_str(flag.name()),
+        }
+    }
+}
+
+impl fmt::Display for Operator {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::AtMost => "<=",
+            Self::AtLeast => ">=",
+        })
+    }
+}
+
+impl fmt::Display for Expression {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {} {}", self.subject(), self.operator, self.bound)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_gate_reads_back_as_it_is_written() {
+        for text in [
+            "count(ego_collided) <= 0",
+            "p99(min_ttc_rear_s) >= 1",
+            "p2.5(min_thw_rear_s) >= 0.2",
+            "lower(prevented | baseline.ego_collided) >= 0.5",
+            "upper(induced) <= 0.01",
+            "max(baseline.max_jerk_mps3) <= 5.5",
+            "mean(thw_gain_s | goal_in_reach) >= 1.9",
+        ] {
+            let expression: Expression = text.parse().unwrap();
+            assert_eq!(expression.to_string(), text);
+            assert_eq!(expression.to_string().parse::<Expression>(), Ok(expression));
+        }
+        let spaced: Expression = "  share( engaged|rear_near )>=0.9".parse().unwrap();
+        assert_eq!(spaced.to_string(), "share(engaged | rear_near) >= 0.9");
+    }
+
+    #[test]
+    fn what_is_not_a_gate_is_refused_with_what_is_allowed() {
+        for (text, part) in [
+            ("", "one `<=` or `>="),
+            ("count(ego_collided) < 1", "one `<=` or `>="),
+            ("count(ego_collided) <= nan", "not a finite number"),
+            ("count(ego_collided) <= inf", "not a finite number"),
+            ("count(min_ttc_rear_s) <= 1", "is a number, which has"),
+            ("p99(ego_collided) <= 1", "is a flag, which has"),
+            ("p101(min_ttc_rear_s) <= 1", "not an aggregate"),
+            ("pnan(min_ttc_rear_s) <= 1", "not an aggregate"),
+            ("max(min_ttc) <= 1", "not a measure"),
+            ("max(harm | harm) <= 1", "not a flag"),
+            ("share(engaged) <= 1.5", "not from 0 to 1"),
+            ("count ego_collided <= 1", "has the form"),
+        ] {
+            let error = text.parse::<Expression>().unwrap_err().to_string();
+            assert!(error.contains(part), "{text}: {error}");
+        }
+    }
+}

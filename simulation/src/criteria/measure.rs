@@ -1,0 +1,179 @@
+//! Measures of one sample that a gate can judge.
+//!
+//! A measure has one value per sample and arm, or none. A *flag* is a measure that is 0 or 1. Names are those of the columns
+//! of `outcomes.parquet` where there is one.
+
+use crate::harm::harm;
+use crate::outcome::{EndReason, Margins, MisSummary, Moment, Outcome};
+use closecall_traffic::Measured;
+
+/// Whether a measure counts or quantifies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MeasureKind {
+    /// Something that happened (1) or did not (0).
+    Flag,
+    /// A quantity, in the unit that its name ends with.
+    Number,
+}
+
+/// A measure of one outcome.
+#[derive(Clone, Copy)]
+pub struct Measure {
+    /// The name in gates.
+    pub name: &'static str,
+    /// Whether it counts or quantifies.
+    pub kind: MeasureKind,
+    /// What it means, for people.
+    pub meaning: &'static str,
+    value: fn(&Outcome) -> Option<f64>,
+}
+
+impl std::fmt::Debug for Measure {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name)
+    }
+}
+
+impl PartialEq for Measure {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
+}
+
+impl Measure {
+    /// Returns the value of an outcome, or `None` if the outcome does not have it.
+    pub fn of(&self, outcome: &Outcome) -> Option<f64> {
+        (self.value)(outcome)
+    }
+
+    /// Returns the measure with this name.
+    pub fn named(name: &str) -> Option<&'static Self> {
+        MEASURES.iter().find(|measure| measure.name == name)
+    }
+}
+
+/// The flags of a pair of arms on the same sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PairFlag {
+    /// The ego collides in the baseline alone.
+    Prevented,
+    /// The ego collides in the arm under test alone.
+    Induced,
+}
+
+impl PairFlag {
+    /// All flags.
+    pub const ALL: [Self; 2] = [Self::Prevented, Self::Induced];
+
+    /// Returns the name in gates.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Prevented => "prevented",
+            Self::Induced => "induced",
+        }
+    }
+
+    /// Returns what the flag means, for people.
+    pub const fn meaning(self) -> &'static str {
+        match self {
+            Self::Prevented => "the ego collides in the baseline, and not in the arm under test",
+            Self::Induced => "the ego collides in the arm under test, and not in the baseline",
+        }
+    }
+
+    /// Returns the flag with this name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|flag| flag.name() == name)
+    }
+}
+
+const fn flag(name: &'static str, meaning: &'static str, value: fn(&Outcome) -> Option<f64>) -> Measure {
+    Measure { name, kind: MeasureKind::Flag, meaning, value }
+}
+
+const fn number(name: &'static str, meaning: &'static str, value: fn(&Outcome) -> Option<f64>) -> Measure {
+    Measure { name, kind: MeasureKind::Number, meaning, value }
+}
+
+fn is(happened: bool) -> Option<f64> {
+    Some(if happened { 1.0 } else { 0.0 })
+}
+
+fn reached(outcome: &Outcome, moment: Moment) -> Option<f64> {
+    is(outcome.moment(moment).is_some())
+}
+
+fn margin(outcome: &Outcome, of: fn(&Margins) -> Measured) -> Option<f64> {
+    of(&outcome.margins).ok()
+}
+
+fn mis(outcome: &Outcome, of: fn(&MisSummary) -> Measured) -> Option<f64> {
+    of(outcome.mis.as_ref().ok()?).ok()
+}
+
+/// Front time headway that the ego gained from the engagement to the critical distance (s).
+fn thw_gain_s(outcome: &Outcome) -> Option<f64> {
+    let at_engagement_s = mis(outcome, |mis| mis.thw_front_at_engagement_s)?;
+    Some(mis(outcome, |mis| mis.thw_front_at_critical_s)? - at_engagement_s)
+}
+
+/// The measure that gates judge after the validity checks.
+pub const EGO_COLLIDED: &str = "ego_collided";
+
+/// Every measure.
+pub const MEASURES: &[Measure] = &[
+    flag(EGO_COLLIDED, "the ego collides", |outcome| is(outcome.ego_collided())),
+    flag("others_collided", "two vehicles other than the ego collide with each other", |outcome| {
+        is(outcome.collisions.iter().any(|collision| !collision.involves(&outcome.ego)))
+    }),
+    flag("engaged", "the margin increase system engages", |outcome| {
+        is(outcome.mis.as_ref().is_ok_and(|mis| mis.engaged_at_s.is_ok()))
+    }),
+    flag("goal_in_reach", "the system says, when it engages, that its goal is in reach", |outcome| {
+        is(outcome.mis.as_ref().is_ok_and(|mis| mis.goal_in_reach == Some(true)))
+    }),
+    flag("ended_in_standstill", "the ego and the vehicles near it come to a stop", |outcome| {
+        is(outcome.end == EndReason::Standstill)
+    }),
+    flag("rear_near", "the rear vehicle comes near: within 100 m, at 10 km/h or more", |outcome| {
+        reached(outcome, Moment::RearNear)
+    }),
+    flag("rear_cut_out", "the rear vehicle starts to change lanes in order to overtake", |outcome| {
+        reached(outcome, Moment::CutOut)
+    }),
+    flag("rear_critical", "the rear vehicle reaches the critical distance", |outcome| {
+        reached(outcome, Moment::CriticalDistance)
+    }),
+    flag("rear_passed", "the rear vehicle passes the ego", |outcome| reached(outcome, Moment::Concluded)),
+    flag("lead_braked", "the lead vehicle brakes", |outcome| reached(outcome, Moment::FrontBrakes)),
+    number("min_thw_front_s", "smallest time headway to the lead vehicle", |outcome| {
+        margin(outcome, |margins| margins.min_thw_front_s)
+    }),
+    number("min_thw_rear_s", "smallest time headway of the rear vehicle", |outcome| {
+        margin(outcome, |margins| margins.min_thw_rear_s)
+    }),
+    number("min_gap_front_m", "smallest gap to the lead vehicle", |outcome| {
+        margin(outcome, |margins| margins.min_gap_front_m)
+    }),
+    number("min_gap_rear_m", "smallest gap of the rear vehicle", |outcome| {
+        margin(outcome, |margins| margins.min_gap_rear_m)
+    }),
+    number("min_ttc_rear_s", "smallest time to collision of the rear vehicle", |outcome| {
+        margin(outcome, |margins| margins.min_ttc_rear_s)
+    }),
+    number("max_deceleration_mps2", "largest deceleration of the ego before it collides", |outcome| {
+        Some(outcome.margins.max_deceleration_mps2)
+    }),
+    number("max_jerk_mps3", "largest jerk of the ego before it collides", |outcome| {
+        Some(outcome.margins.max_jerk_mps3)
+    }),
+    number("max_speed_deficit_mps", "most by which the ego is slower than the lead vehicle", |outcome| {
+        Some(outcome.margins.max_speed_deficit_mps)
+    }),
+    number("delta_v_mps", "largest change of the ego's velocity in a collision; 0 if it does not collide", |outcome| {
+        Some(outcome.ego_delta_v_mps().unwrap_or(0.0))
+    }),
+    number("harm", "driver deaths expected from all collisions of the sample", |outcome| Some(harm(outcome))),
+    number("duration_s", "duration of the run", |outcome| Some(outcome.duration.s())),
+    number("thw_gain_s", "front time headway gained from the engagement to the critical distance", thw_gain_s),
+];

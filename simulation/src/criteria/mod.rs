@@ -1,0 +1,16 @@
+//! Pass criteria: what a scenario file, a project file or the command line asks of the outcomes of a campaign.
+//!
+//! ```text
+//!  "p99(min_ttc_rear_s) >= 1.0" ─▶ Expression { aggregate, quantity, condition, operator, bound }
+//!                                                  └─▶ Measure: one value per outcome
+//! ```
+//!
+//! This module holds the language and the measures of one run. The crate `closecall-campaign` evaluates criteria over many.
+
+mod config;
+mod expression;
+mod measure;
+
+pub use config::{FlagName, GateConfig};
+pub use expression::{Aggregate, Expression, ExpressionError, Operator, Quantity};
+pub use measure::{EGO_COLLIDED, MEASURES, Measure, MeasureKind, PairFlag};

@@ -1,0 +1,30 @@
+//! The inference backend of the rear camera's network. It is loaded only by commands that may run the network.
+
+use std::path::Path;
+
+use closecall_sensors::camera::{Backend, Classifier};
+use closecall_sensors::{SensorMode, inference_backend, use_inference_backend};
+use closecall_simulation::Arm;
+use closecall_simulation::scenario::Scenario;
+
+use super::CliError;
+
+/// Chooses the backend without loading it.
+pub(super) fn choose_backend(onnxruntime: Option<&Path>) {
+    use_inference_backend(Backend::choose(onnxruntime, None));
+}
+
+/// Loads the chosen backend, so that a bad path is reported before any work is done. Does nothing if `is_used` is false.
+pub(super) fn check_backend(is_used: bool) -> Result<(), CliError> {
+    let backend = inference_backend();
+    if is_used && *backend != Backend::Tract {
+        Classifier::shipped(backend)?;
+    }
+    Ok(())
+}
+
+/// Works like [`check_backend`], for runs of a scenario.
+pub(super) fn check_backend_of(scenario: &Scenario, arms: &[Arm]) -> Result<(), CliError> {
+    let is_full = |arm: &Arm| arm.sensors.unwrap_or(scenario.sensors.mode()) == SensorMode::Full;
+    check_backend(arms.iter().any(is_full))
+}

@@ -1,0 +1,85 @@
+//! The progress of a long command on a standard error that is no terminal, such as the log of a CI job.
+
+use std::io::IsTerminal;
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use indicatif::ProgressBar;
+
+use super::output::print_error;
+
+/// Time between two lines. CI servers end a job that is silent for ten minutes.
+const INTERVAL: Duration = Duration::from_secs(30);
+
+/// Prints a line about the progress every 30 s until it is dropped. It prints nothing on a terminal, which shows the
+/// progress bar instead.
+pub(super) struct Heartbeat {
+    running: Option<(Sender<()>, JoinHandle<()>)>,
+}
+
+impl Heartbeat {
+    /// Starts to print the progress of `bar`.
+    pub(super) fn start(bar: &ProgressBar) -> Self {
+        if std::io::stderr().is_terminal() {
+            return Self { running: None };
+        }
+        Self::every(INTERVAL, bar, |line| print_error(format_args!("{line}\n")))
+    }
+
+    fn every(interval: Duration, bar: &ProgressBar, print: impl Fn(&str) + Send + 'static) -> Self {
+        let (sender, receiver) = channel();
+        let (bar, started) = (bar.clone(), Instant::now());
+        let thread = std::thread::spawn(move || {
+            while receiver.recv_timeout(interval) == Err(RecvTimeoutError::Timeout) {
+                print(&line(bar.position(), bar.length().unwrap_or_default(), started.elapsed()));
+            }
+        });
+        Self { running: Some((sender, thread)) }
+    }
+}
+
+impl Drop for Heartbeat {
+    fn drop(&mut self) {
+        if let Some((sender, thread)) = self.running.take() {
+            drop(sender);
+            drop(thread.join());
+        }
+    }
+}
+
+fn line(done: u64, all: u64, elapsed: Duration) -> String {
+    let elapsed_s = elapsed.as_secs_f64();
+    let per_second = done as f64 / elapsed_s;
+    let left = match done {
+        0 => String::new(),
+        _ => format!(", {:.0} s left", (all.saturating_sub(done)) as f64 / per_second),
+    };
+    format!("{done} of {all} samples after {elapsed_s:.0} s{left}")
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc::channel;
+
+    use super::*;
+
+    #[test]
+    fn a_line_states_the_progress() {
+        assert_eq!(line(50, 200, Duration::from_secs(10)), "50 of 200 samples after 10 s, 30 s left");
+        assert_eq!(line(0, 200, Duration::from_secs(30)), "0 of 200 samples after 30 s");
+    }
+
+    #[test]
+    fn lines_come_until_the_heartbeat_ends() {
+        let (sender, lines) = channel();
+        let bar = ProgressBar::hidden();
+        bar.set_length(5);
+        let heartbeat =
+            Heartbeat::every(Duration::from_millis(1), &bar, move |line| drop(sender.send(line.to_owned())));
+        assert!(lines.recv().unwrap().starts_with("0 of 5 samples"));
+        drop(heartbeat);
+        while lines.try_recv().is_ok() {}
+        assert!(lines.recv().is_err(), "the thread has ended");
+    }
+}

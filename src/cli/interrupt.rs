@@ -1,0 +1,92 @@
+//! Ctrl-C (SIGINT) and SIGTERM. No process of a controller is left when the program ends.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::thread;
+
+use closecall_campaign::stop::StopFlag;
+use closecall_simulation::controller::exec::end_all;
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
+
+use super::output::print_error;
+use crate::exit_code::ExitCode;
+
+/// A signal that ends the program.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Signal {
+    /// Ctrl-C.
+    Interrupt,
+    /// SIGTERM, as a job scheduler sends it.
+    Terminate,
+}
+
+impl Signal {
+    pub(super) const fn name(self) -> &'static str {
+        match self {
+            Self::Interrupt => "SIGINT",
+            Self::Terminate => "SIGTERM",
+        }
+    }
+
+    /// Returns 128 plus the number of the signal.
+    pub(super) const fn exit_code(self) -> ExitCode {
+        match self {
+            Self::Interrupt => ExitCode::Interrupted,
+            Self::Terminate => ExitCode::Terminated,
+        }
+    }
+}
+
+/// The state that the thread of the signals and the commands share.
+struct State {
+    /// The campaign that a signal stops; `None` if a signal ends the program at once.
+    campaign: Option<StopFlag>,
+    /// The signal that has stopped the campaign.
+    received: Option<Signal>,
+}
+
+static STATE: Mutex<State> = Mutex::new(State { campaign: None, received: None });
+
+fn state() -> MutexGuard<'static, State> {
+    STATE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Starts the thread that receives the signals.
+pub(super) fn watch() {
+    // Without the thread the signals end the program as the system does by default.
+    let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) else { return };
+    let body = move || {
+        for number in signals.forever() {
+            let signal = if number == SIGTERM { Signal::Terminate } else { Signal::Interrupt };
+            let mut state = state();
+            match (&state.campaign, state.received) {
+                (Some(campaign), None) => {
+                    campaign.set();
+                    state.received = Some(signal);
+                    drop(state);
+                    let name = signal.name();
+                    print_error(format_args!(
+                        "\n{name}: running samples are completed; a second signal ends at once\n"
+                    ));
+                }
+                _ => {
+                    end_all();
+                    std::process::exit(signal.exit_code() as i32);
+                }
+            }
+        }
+    };
+    drop(thread::Builder::new().name("signals".to_owned()).spawn(body));
+}
+
+/// From now on the first signal sets `campaign`, and only the second one ends the program.
+pub(super) fn stop_gracefully(campaign: &StopFlag) {
+    state().campaign = Some(campaign.clone());
+}
+
+/// Returns the signal that has stopped the campaign. From now on a signal ends the program at once.
+pub(super) fn received() -> Option<Signal> {
+    let mut state = state();
+    state.campaign = None;
+    state.received.take()
+}

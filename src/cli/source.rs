@@ -1,0 +1,138 @@
+//! Where the scenarios of a command come from: files, folders, standard input, or the library inside the program.
+//!
+//! | argument | scenario |
+//! |---|---|
+//! | `-` | the text of standard input |
+//! | `FILE` | that file |
+//! | `FOLDER` | each `*.toml` directly in it except `closecall.toml`, in alphabetical order |
+//! | `NAME` | `NAME.toml`, else `scenarios/NAME.toml`, else the scenario of the library with that name |
+
+use std::io::{Error, ErrorKind, Read};
+use std::path::{Path, PathBuf};
+
+use closecall_simulation::scenario::{ScenarioError, ScenarioFile, Setting};
+use closecall_traffic::suggest::nearest;
+
+use super::CliError;
+use super::library;
+
+/// The argument that stands for standard input.
+const STANDARD_INPUT: &str = "-";
+/// Folder in which a repository keeps its scenarios.
+pub(super) const SCENARIOS: &str = "scenarios";
+/// The settings of a repository: a TOML file that is no scenario.
+pub(super) const REPOSITORY_SETTINGS: &str = "closecall.toml";
+/// Largest length of a scenario on standard input (bytes).
+const MAX_LENGTH: u64 = 16 * 1024 * 1024;
+
+/// Returns the scenarios that the arguments of a command name: each folder is replaced by the scenario files in it.
+pub(super) fn expand(paths: &[PathBuf]) -> Result<Vec<PathBuf>, CliError> {
+    let inputs = paths.iter().filter(|path| path.as_os_str() == STANDARD_INPUT).count();
+    if inputs > 1 {
+        return Err(CliError::Usage { message: "`-` is standard input, and can be given once".to_owned() });
+    }
+    let mut expanded = Vec::new();
+    for path in paths {
+        if path.is_dir() {
+            expanded.extend(scenario_files(path)?);
+        } else {
+            expanded.push(path.clone());
+        }
+    }
+    Ok(expanded)
+}
+
+fn scenario_files(folder: &Path) -> Result<Vec<PathBuf>, CliError> {
+    let fail = |source| ScenarioError::Read { path: folder.to_owned(), source };
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(fail)? {
+        let path = entry.map_err(fail)?.path();
+        let is_toml = path.extension().is_some_and(|extension| extension == "toml");
+        if is_toml && path.is_file() && !path.ends_with(REPOSITORY_SETTINGS) {
+            files.push(path);
+        }
+    }
+    if files.is_empty() {
+        let message =
+            format!("{} contains no scenario file (*.toml): `closecall new NAME` writes one", folder.display());
+        return Err(CliError::Usage { message });
+    }
+    files.sort();
+    Ok(files)
+}
+
+/// Reads the scenario that one argument names, and applies the settings.
+pub(super) fn load(path: &Path, settings: &[Setting]) -> Result<ScenarioFile, ScenarioError> {
+    if path.as_os_str() == STANDARD_INPUT {
+        return from_standard_input(settings);
+    }
+    if let Some(file) = existing(path) {
+        return ScenarioFile::load(&file, settings);
+    }
+    let name = path.to_str().unwrap_or_default();
+    if let Some(text) = library::text(name) {
+        return ScenarioFile::parse(&library::path(name), text, settings);
+    }
+    match ScenarioFile::load(path, settings) {
+        Err(ScenarioError::Read { path, source }) if source.kind() == ErrorKind::NotFound => {
+            let source = match nearest(name, library::names()) {
+                Some(known) => Error::new(source.kind(), format!("{source}; did you mean `{known}` of the library?")),
+                None => source,
+            };
+            Err(ScenarioError::Read { path, source })
+        }
+        loaded => loaded,
+    }
+}
+
+/// Returns the file that `path` names, with or without its extension and folder; `None` if there is none.
+pub(super) fn existing(path: &Path) -> Option<PathBuf> {
+    let is_name = path.components().count() == 1 && path.extension().is_none();
+    let file = path.with_extension("toml");
+    let named = [file.clone(), Path::new(SCENARIOS).join(file)];
+    if path.exists() {
+        return Some(path.to_owned());
+    }
+    named.into_iter().find(|file| is_name && file.is_file())
+}
+
+fn from_standard_input(settings: &[Setting]) -> Result<ScenarioFile, ScenarioError> {
+    let path = PathBuf::from("<standard input>");
+    let mut bytes = Vec::new();
+    let fail = |source| ScenarioError::Read { path: path.clone(), source };
+    std::io::stdin().lock().take(MAX_LENGTH + 1).read_to_end(&mut bytes).map_err(fail)?;
+    if bytes.len() as u64 > MAX_LENGTH {
+        return Err(fail(Error::new(ErrorKind::InvalidData, "the text is longer than 16 MiB")));
+    }
+    let text = String::from_utf8(bytes).map_err(|error| {
+        let line = error.as_bytes()[..error.utf8_error().valid_up_to()].iter().filter(|byte| **byte == b'\n').count();
+        ScenarioError::NotText { path: path.clone(), line: line + 1 }
+    })?;
+    ScenarioFile::parse(&path, &text, settings)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_stands_for_its_scenario_files() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["b.toml", "a.toml", "closecall.toml", "notes.md"] {
+            std::fs::write(folder.path().join(name), "").unwrap();
+        }
+        let found = expand(&[folder.path().to_owned(), PathBuf::from("-")]).unwrap();
+        assert_eq!(found, [folder.path().join("a.toml"), folder.path().join("b.toml"), PathBuf::from("-")]);
+        let empty = tempfile::tempdir().unwrap();
+        assert!(expand(&[empty.path().to_owned()]).unwrap_err().to_string().contains("closecall new"));
+        assert!(expand(&[PathBuf::from("-"), PathBuf::from("-")]).is_err());
+    }
+
+    #[test]
+    fn a_name_of_the_library_is_a_scenario_and_a_similar_one_a_suggestion() {
+        assert_eq!(load(Path::new("paper-figure"), &[]).unwrap().config().name, "paper-figure");
+        let error = load(Path::new("paper-figur"), &[]).unwrap_err().to_string();
+        assert!(error.contains("did you mean `paper-figure` of the library?"), "{error}");
+        assert!(!load(Path::new("zzz.toml"), &[]).unwrap_err().to_string().contains("did you mean"));
+    }
+}

@@ -1,0 +1,112 @@
+//! `closecall watch`: checks a scenario file at every change, and runs a few samples of it.
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
+
+use clap::Args;
+use closecall_campaign::runner::{Sampling, concrete, run_guarded};
+use closecall_scenarios::sampling::Design;
+use closecall_simulation::outcome::Outcome;
+use closecall_simulation::{NoObserver, RunKey};
+
+use super::CliError;
+use super::args::{ArmArgs, SetArgs, count};
+use super::output::{outln, print_error};
+use super::source::existing;
+use crate::exit_code::ExitCode;
+
+/// Time between two looks at the file.
+const POLL_INTERVAL: Duration = Duration::from_millis(250);
+
+/// Arguments of `closecall watch`.
+#[derive(Debug, Args)]
+pub(super) struct WatchingArgs {
+    /// Scenario file
+    scenario: PathBuf,
+    /// Number of samples to run at every change
+    #[arg(short = 'n', long = "samples", default_value = "5", allow_negative_numbers = true, value_parser = count)]
+    samples: u64,
+    /// Seed of the random numbers
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    #[command(flatten)]
+    arm: ArmArgs,
+    /// Also run every sample with the baseline controller `acc`
+    #[arg(long)]
+    paired: bool,
+    #[command(flatten)]
+    set: SetArgs,
+    /// End after this many rounds [default: go on until Ctrl-C]
+    #[arg(long, value_name = "N")]
+    rounds: Option<u64>,
+}
+
+pub(super) fn watch(args: &WatchingArgs) -> Result<ExitCode, CliError> {
+    let Some(path) = existing(&args.scenario).filter(|path| path.is_file()) else {
+        let message = format!("there is no file {}: `closecall new NAME` writes one", args.scenario.display());
+        return Err(CliError::Usage { message });
+    };
+    let mut seen = None;
+    let mut rounds = 0;
+    let mut code = ExitCode::Pass;
+    while args.rounds.is_none_or(|last| rounds < last) {
+        let state = state(&path);
+        if seen == Some(state) {
+            std::thread::sleep(POLL_INTERVAL);
+            continue;
+        }
+        seen = Some(state);
+        rounds += 1;
+        code = ExitCode::Pass;
+        // An editor may replace the file by another one: for a moment there is none.
+        if state.is_none() {
+            print_error(format_args!("{} is missing\n", path.display()));
+            continue;
+        }
+        if let Err(error) = round(args, &path) {
+            code = ExitCode::from(&error);
+            print_error(format_args!("{:?}\n", miette::Report::new(error)));
+        }
+        if args.rounds.is_none_or(|last| rounds < last) {
+            outln!("watching {} (Ctrl-C ends)\n", path.display());
+        }
+    }
+    Ok(code)
+}
+
+/// Returns the time of the last change and the length of the file; `None` if it does not exist.
+fn state(path: &Path) -> Option<(SystemTime, u64)> {
+    let metadata = std::fs::metadata(path).ok()?;
+    Some((metadata.modified().ok()?, metadata.len()))
+}
+
+/// Checks the file, and runs its first samples.
+fn round(args: &WatchingArgs, path: &Path) -> Result<(), CliError> {
+    let file = args.set.load(path)?;
+    let (name, parameters) = (&file.config().name, file.space().iter().len());
+    outln!("{}: valid, {name} with {parameters} parameters", path.display());
+    let sampling = Sampling { seed: args.seed, design: Design::Random, samples: args.samples };
+    let arms = args.arm.arms(args.paired)?;
+    for sample in 0..args.samples {
+        let fail = |source| CliError::Sample { sample, source };
+        let scenario = concrete(&file, sampling, sample).map_err(fail)?;
+        for arm in &arms {
+            let key = RunKey { seed: args.seed, sample };
+            let outcome = run_guarded(&scenario, key, arm, &mut NoObserver).map_err(fail)?;
+            outln!("  {}", line(&outcome));
+        }
+    }
+    Ok(())
+}
+
+/// Returns an outcome in one line.
+fn line(outcome: &Outcome) -> String {
+    let result = if outcome.ego_collided() { "COLLISION" } else { "no collision" };
+    let rear = outcome.margins.min_gap_rear_m.map_or("-".to_owned(), |gap_m| format!("{gap_m:.1} m"));
+    let engaged = match &outcome.mis {
+        Ok(mis) => mis.engaged_at_s.map_or("not engaged".to_owned(), |time_s| format!("engaged at {time_s:.1} s")),
+        Err(_) => "no MIS".to_owned(),
+    };
+    let (sample, controller) = (outcome.sample, &outcome.controller);
+    format!("sample {sample}  {controller:<5} {result:<12}  smallest rear gap {rear:>7}  {engaged}")
+}

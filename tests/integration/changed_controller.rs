@@ -1,0 +1,57 @@
+//! A controller that was edited between two parts of a campaign is noticed, and the changed file is named.
+
+use std::fs;
+use std::path::Path;
+use std::process::Output;
+
+use crate::support::{closecall, code, folder, library, message, program, stderr, stdout};
+
+/// A controller that never brakes, and states a version.
+const STEADY: &str = r#"#!/bin/sh
+echo '{"type":"hello","protocol":1,"name":"steady","version":"1"}'
+read -r line
+while read -r line; do echo '{"acceleration_mps2":0.0,"state":"following"}'; done
+"#;
+
+/// The command that runs the campaign, in the folder of the controller.
+fn campaign(folder: &Path, more: &[&str]) -> Output {
+    let scenario = library("low-thw-overtake");
+    let fixed =
+        ["campaign", scenario.to_str().unwrap(), "-n", "6", "--no-gate", "--out", "out", "--record", "failures:0"];
+    let controller = ["--controller", "exec:sh steady.sh", "--controller-timeout-ms", "60000"];
+    program().current_dir(folder).args(fixed).args(controller).args(more).output().unwrap()
+}
+
+#[test]
+fn an_edited_controller_is_refused_on_resuming_and_named_by_replay() {
+    let folder = folder();
+    let script = folder.path().join("steady.sh");
+    fs::write(&script, STEADY).unwrap();
+    let first = campaign(folder.path(), &[]);
+    assert!(folder.path().join("out/journal.jsonl").exists(), "{}", stderr(&first));
+    assert_eq!(code(&campaign(folder.path(), &["--resume"])), code(&first));
+
+    fs::write(&script, STEADY.replace("0.0", "-2.0").replace("\"1\"", "\"2\"")).unwrap();
+    let refused = campaign(folder.path(), &["--resume"]);
+    assert_eq!(code(&refused), 2, "{}", stderr(&refused));
+    for named in ["the controller's file steady.sh has changed", "states another version: `1` there, `2` here"] {
+        assert!(message(&refused).contains(named), "{}", stderr(&refused));
+    }
+    let replayed = closecall(["replay", folder.path().join("out").to_str().unwrap(), "0"]);
+    assert_eq!(code(&replayed), 7, "{}", stderr(&replayed));
+    assert!(
+        message(&replayed).contains("differs from the campaign's journal: the controller's file steady.sh has changed"),
+        "{}",
+        stderr(&replayed)
+    );
+}
+
+#[test]
+fn a_replay_runs_the_controller_in_the_folder_of_the_campaign() {
+    let folder = folder();
+    fs::write(folder.path().join("steady.sh"), STEADY).unwrap();
+    campaign(folder.path(), &[]);
+    // Relative to the campaign's folder and to this one, there is no `steady.sh`.
+    let replayed = program().current_dir(folder.path().join("out")).args(["replay", ".", "1"]).output().unwrap();
+    stdout(&replayed, 0);
+}

@@ -1,0 +1,190 @@
+//! The commands around a scenario: `new`, `init`, `list`, `watch`, `baseline`, `completions`, `man`; and what all commands
+//! have in common: where scenarios come from, what they say of their own making, and their answers to misspelt words.
+
+use std::io::Write;
+use std::path::Path;
+use std::process::Stdio;
+
+use crate::support::{closecall, code, folder, json, library, message, program, stderr, stdout};
+
+/// Runs the program in another folder.
+fn run_in(folder: &Path, args: &[&str]) -> std::process::Output {
+    program().current_dir(folder).args(args).output().unwrap()
+}
+
+#[test]
+fn a_new_user_gets_from_an_empty_folder_to_a_campaign() {
+    let folder = folder();
+    let written = stdout(&run_in(folder.path(), &["init"]), 0);
+    for path in ["closecall.toml", ".github/workflows/closecall.yml", ".gitlab-ci.yml", "scenarios/late-overtake.toml"]
+    {
+        assert!(written.contains(&format!("written: ./{path}")), "{written}");
+        assert!(folder.path().join(path).is_file(), "{path}");
+    }
+    assert!(!std::fs::read_to_string(folder.path().join(".gitlab-ci.yml")).unwrap().contains('@'));
+    let written = stdout(&run_in(folder.path(), &["new", "mine"]), 0);
+    assert!(written.starts_with("written: scenarios/mine.toml\n"), "{written}");
+    let args = ["campaign", "mine", "-n", "4", "--format", "json"];
+    let output = run_in(folder.path(), &args);
+    assert!([0, 1, 4].contains(&code(&output)), "{}", stderr(&output));
+    let checked = json(&run_in(folder.path(), &["check", "scenarios", "--format", "json"]), 0);
+    assert_eq!(checked["scenarios"].as_array().unwrap().len(), 2);
+}
+
+#[test]
+fn new_and_init_overwrite_nothing() {
+    let folder = folder();
+    std::fs::write(folder.path().join("mine.toml"), "own").unwrap();
+    std::fs::write(folder.path().join(".gitlab-ci.yml"), "own").unwrap();
+    assert!(message(&run_in(folder.path(), &["new", "mine"])).contains("is not overwritten"));
+    assert_eq!(code(&run_in(folder.path(), &["new", "mine"])), 2);
+    assert!(stdout(&run_in(folder.path(), &["init"]), 0).contains("kept: ./.gitlab-ci.yml"));
+    for name in ["mine.toml", ".gitlab-ci.yml"] {
+        assert_eq!(std::fs::read_to_string(folder.path().join(name)).unwrap(), "own");
+    }
+    let copied = stdout(&run_in(folder.path(), &["new", "other", "--from", "paper-figure", "-o", "x/other.toml"]), 0);
+    assert!(copied.starts_with("written: x/other.toml"), "{copied}");
+    stdout(&run_in(folder.path(), &["check", "x/other.toml"]), 0);
+}
+
+#[test]
+fn the_library_is_listed_and_works_from_anywhere() {
+    let folder = folder();
+    let listed = json(&run_in(folder.path(), &["list", "--format", "json"]), 0);
+    let scenarios = listed["scenarios"].as_array().unwrap();
+    assert!(scenarios.len() >= 8);
+    assert!(scenarios.iter().all(|one| !one["requirements"].as_array().unwrap().is_empty()));
+    let text = stdout(&run_in(folder.path(), &["list"]), 0);
+    assert!(text.contains("paper-figure\n  Does the margin increase system"), "{text}");
+    let run = json(&run_in(folder.path(), &["run", "paper-figure", "--format", "json"]), 0);
+    assert_eq!(run["scenario"], "paper-figure");
+    assert!(message(&run_in(folder.path(), &["run", "paper-figur"])).contains("did you mean `paper-figure`"));
+}
+
+#[test]
+fn a_scenario_is_read_from_standard_input() {
+    let mut child = program()
+        .args(["check", "-"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let text = std::fs::read(library("paper-figure")).unwrap();
+    child.stdin.take().unwrap().write_all(&text).unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert!(stdout(&output, 0).contains("valid, paper-figure"));
+}
+
+#[test]
+fn check_states_each_error_as_json() {
+    let folder = folder();
+    std::fs::write(folder.path().join("bad.toml"), "schema-version = 1\nnme = 'a'\n").unwrap();
+    let found = json(&run_in(folder.path(), &["check", "bad.toml", "paper-figure", "--format", "json"]), 3);
+    assert_eq!((&found["valid"], &found["schema_version"]), (&false.into(), &1.into()));
+    assert_eq!(found["scenarios"][0]["line"], 2);
+    assert!(found["scenarios"][0]["message"].as_str().unwrap().ends_with("did you mean `name`?"));
+    assert_eq!(found["scenarios"][1]["valid"], true);
+}
+
+#[test]
+fn each_json_output_states_how_it_was_made() {
+    let scenario = library("paper-figure");
+    let args = ["campaign", scenario.to_str().unwrap(), "-n", "3", "--seed", "7", "--set", "duration-s=20"];
+    let output = closecall(args.into_iter().chain(["--format", "json"]));
+    let found: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&found["schema_version"], &found["seed"]), (&1.into(), &7.into()));
+    assert_eq!(found["settings"], serde_json::json!(["duration-s=20"]));
+    assert!(found["closecall_version"].as_str().unwrap().starts_with(env!("CARGO_PKG_VERSION")));
+}
+
+#[test]
+fn the_paths_of_written_files_are_printed() {
+    let folder = folder();
+    let out = folder.path().join("out");
+    let args = ["campaign", "paper-figure", "-n", "2", "--out", out.to_str().unwrap()];
+    let output = closecall(args);
+    for name in ["report.html", "junit.xml", "outcomes.parquet"] {
+        assert!(stderr(&output).contains(&format!("written: {}", out.join(name).display())), "{}", stderr(&output));
+    }
+    let trace = folder.path().join("trace.csv");
+    let output = closecall(["run", "paper-figure", "--trace", trace.to_str().unwrap()]);
+    assert!(stderr(&output).contains(&format!("written: {}", trace.display())), "{}", stderr(&output));
+}
+
+#[test]
+fn a_misspelt_or_negative_value_is_explained() {
+    for (args, expected) in [
+        (["run", "paper-figure", "--controller", "miss"], "did you mean `mis`?"),
+        (["run", "paper-figure", "--set", "duration=3"], "did you mean `duration-s`?"),
+        (["campaign", "paper-figure", "-n", "-5"], "`-5` is negative: a whole number of 1 or more is needed"),
+        (["campaign", "paper-figure", "--samples", "1e3"], "is not a whole number"),
+    ] {
+        let output = closecall(args);
+        assert_eq!(code(&output), 2, "{args:?}");
+        assert!(message(&output).contains(expected), "{}", message(&output));
+    }
+}
+
+#[test]
+fn set_does_not_stand_under_the_gates_in_the_help() {
+    let help = stdout(&closecall(["campaign", "--help"]), 0);
+    let (options, gates) = help.split_once("\nGates:").unwrap();
+    for option in ["--set <KEY=VALUE>", "--format <FORMAT>"] {
+        assert!(options.contains(option) && !gates.contains(option), "{option}");
+    }
+    assert!(gates.contains("--max-collisions"));
+}
+
+#[test]
+fn a_baseline_names_what_newly_fails() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    for controller in ["acc", "mis"] {
+        let out = at(controller);
+        let args =
+            ["campaign", "low-thw-overtake", "-n", "30", "--seed", "1", "--controller", controller, "--out", &out];
+        assert!([0, 1, 4].contains(&code(&closecall(args))));
+    }
+    let file = at("baseline.json");
+    stdout(&closecall(["baseline", "save", &at("mis"), &file]), 0);
+    assert!(std::fs::metadata(&file).unwrap().len() < 10_000);
+    assert!(stdout(&closecall(["baseline", "compare", &at("mis"), &file]), 0).ends_with("NO REGRESSION\n"));
+    let found = json(&closecall(["baseline", "compare", &at("acc"), &file, "--format", "json"]), 1);
+    assert!(!found["scenarios"][0]["newly_failing"].as_array().unwrap().is_empty());
+    // A file that is not a baseline is not replaced.
+    let own = at("own.json");
+    std::fs::write(&own, "{}").unwrap();
+    assert_eq!(code(&closecall(["baseline", "save", &at("mis"), &own])), 3);
+    assert_eq!(std::fs::read_to_string(&own).unwrap(), "{}");
+}
+
+#[test]
+fn watch_runs_a_few_samples_of_the_file() {
+    let folder = folder();
+    stdout(&run_in(folder.path(), &["new", "mine"]), 0);
+    let text = stdout(&run_in(folder.path(), &["watch", "mine", "-n", "2", "--rounds", "1"]), 0);
+    assert!(text.starts_with("mine.toml: valid, mine with 5 parameters\n  sample 0  mis"), "{text}");
+    assert_eq!(text.lines().count(), 3);
+    assert_eq!(code(&run_in(folder.path(), &["watch", "absent", "--rounds", "1"])), 2);
+}
+
+#[test]
+fn completions_and_manual_pages_name_every_command() {
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        assert!(stdout(&closecall(["completions", shell]), 0).contains("lane-changes"), "{shell}");
+    }
+    assert!(stdout(&closecall(["man"]), 0).starts_with(".ie \\n(.g"));
+    let folder = folder();
+    let pages = folder.path().join("man");
+    stdout(&closecall(["man", "--out", pages.to_str().unwrap()]), 0);
+    assert!(std::fs::read_to_string(pages.join("closecall-campaign.1")).unwrap().contains("max\\-collisions"));
+}
+
+#[test]
+fn the_schema_states_the_ranges_of_the_check() {
+    let schema = json(&closecall(["schema"]), 0);
+    let duration = &schema["properties"]["duration-s"];
+    assert_eq!((&duration["minimum"], &duration["maximum"]), (&0.1.into(), &3600.0.into()));
+    assert_eq!(schema["additionalProperties"], false);
+}

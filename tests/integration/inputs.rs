@@ -1,0 +1,100 @@
+//! Inputs are neither overwritten nor read without a bound, and what is not used cannot fail.
+
+use std::fs;
+use std::path::Path;
+
+use crate::support::{closecall, code, folder, headline_with, library, message, program, stderr, stdout};
+
+#[test]
+fn no_command_overwrites_an_input() {
+    let folder = folder();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let text = fs::read_to_string(library("low-thw-overtake")).unwrap();
+    let (scenario, traffic, rrd) = (path("sc.toml"), path("traffic.csv"), path("sc.rrd"));
+    fs::write(&scenario, &text).unwrap();
+    fs::hard_link(&scenario, &rrd).unwrap();
+    stdout(&closecall(["record", &scenario, "-n", "2", "-o", &traffic]), 0);
+    let recorded = fs::read(&traffic).unwrap();
+    let script = path("ctl.csv");
+    fs::write(&script, "x").unwrap();
+    let controller = format!("exec:sh {script}");
+    let detour = format!("{}/../{}/sc.toml", path(""), folder.path().file_name().unwrap().to_str().unwrap());
+    let cases: [&[&str]; 9] = [
+        &["record", &scenario, "-o", &scenario],
+        &["record", &scenario, "-o", &detour],
+        &["run", &scenario, "--record", &rrd],
+        &["run", &scenario, "--controller", &controller, "--trace", &script],
+        &["fit", &traffic, "-o", &traffic],
+        &["reenact", &traffic, "-o", &traffic],
+        &["reenact", &traffic, "--trace", &traffic],
+        &["run", &scenario, "--record", &scenario],
+        &["criticality", &traffic, "--record", &traffic],
+    ];
+    for case in cases {
+        let output = closecall(case);
+        assert_eq!(code(&output), 2, "{case:?}: {}", stderr(&output));
+        let said = message(&output);
+        assert!(said.contains("would overwrite the input") || said.contains("must end with .rrd"), "{case:?}: {said}");
+        assert_eq!(fs::read_to_string(&scenario).unwrap(), text, "{case:?}");
+        assert_eq!(fs::read(&traffic).unwrap(), recorded, "{case:?}");
+        assert_eq!(fs::read_to_string(&script).unwrap(), "x", "{case:?}");
+    }
+}
+
+#[test]
+#[cfg(unix)]
+fn an_endless_input_is_refused() {
+    let endless = "/dev/zero";
+    if !Path::new(endless).exists() {
+        return;
+    }
+    let traffic = folder();
+    let csv = traffic.path().join("traffic.csv");
+    stdout(
+        &closecall(["record", library("low-thw-overtake").to_str().unwrap(), "-n", "1", "-o", csv.to_str().unwrap()]),
+        0,
+    );
+    let csv = csv.to_str().unwrap();
+    let cases: [(&[&str], &str); 5] = [
+        (&["check", endless], "larger than 64 MiB"),
+        (&["campaign", endless, "-n", "1"], "larger than 64 MiB"),
+        (&["inspect", endless], "this is not text"),
+        (&["criticality", endless], "this is not text"),
+        (&["lane-changes", csv, "--reference", endless], "larger than 64 MiB"),
+    ];
+    for (case, expected) in cases {
+        let output = closecall(case);
+        assert!([3, 6].contains(&code(&output)), "{case:?}: {}", stderr(&output));
+        assert!(message(&output).contains(expected), "{case:?}: {}", stderr(&output));
+    }
+}
+
+#[test]
+fn the_path_of_onnx_runtime_matters_only_if_the_network_runs() {
+    let scenario = library("low-thw-overtake");
+    let scenario = scenario.to_str().unwrap();
+    let with_bad_path = |args: &[&str]| {
+        program().args(args).env("ORT_DYLIB_PATH", "/no/such/library.so").output().expect("the program starts")
+    };
+    stdout(&with_bad_path(&["check", scenario]), 0);
+    stdout(&with_bad_path(&["run", scenario, "--sensors", "object"]), 0);
+    let campaign = with_bad_path(&["campaign", scenario, "-n", "4", "--sensors", "object"]);
+    assert!(![3, 6].contains(&code(&campaign)), "{}", stderr(&campaign));
+    for needed in [["run", scenario, "--sensors", "full"], ["campaign", scenario, "--sensors", "full"]] {
+        let output = with_bad_path(&needed);
+        assert_eq!(code(&output), 3, "{}", stderr(&output));
+        assert!(message(&output).contains("/no/such/library.so"), "{}", stderr(&output));
+    }
+}
+
+#[test]
+fn a_study_of_no_lane_change_says_so() {
+    let folder = folder();
+    let (scenario, traffic) = (folder.path().join("sc.toml"), folder.path().join("traffic.csv"));
+    fs::write(&scenario, headline_with("duration-s = ", "duration-s = 1.0 # ")).unwrap();
+    let (scenario, traffic) = (scenario.to_str().unwrap(), traffic.to_str().unwrap());
+    stdout(&closecall(["record", scenario, "-n", "1", "-o", traffic]), 0);
+    let output = closecall(["robustness", traffic, "--repetitions", "1"]);
+    assert_eq!(code(&output), 4, "{}", stderr(&output));
+    assert!(message(&output).contains("there is no lane change in the trajectory files"), "{}", stderr(&output));
+}
