@@ -91,7 +91,7 @@ impl std::fmt::Display for Human<'_> {
             writeln!(f, "  {name} = {value}")?;
         }
         for at in &outcome.moments {
-            writeln!(f, "  ({}) {} at {:.2} s", at.moment.letter(), at.moment.text(), at.time.s())?;
+            writeln!(f, "  {} at {:.2} s", at.moment.label(), at.time.s())?;
         }
         for collision in &outcome.collisions {
             let [first, second] = &collision.between;

@@ -79,12 +79,13 @@ fn title(svg: &mut Svg, films: &[Film]) {
     }
 }
 
-/// Returns the instants to show, in order of time, each with its letter and text: the moments that the run reached, and
+/// Returns the instants to show, in order of time, each with its letter and text: the moments of the paper that the run reached, and
 /// the collision. If there are none, instants at equal distances up to the critical moment are returned.
 fn instants(film: &Film) -> Vec<(Time, char, String)> {
     let moments = film.moments().iter();
-    let mut instants: Vec<_> =
-        moments.map(|noted| (noted.time, noted.moment.letter(), noted.moment.text().to_owned())).collect();
+    let mut instants: Vec<_> = moments
+        .filter_map(|noted| Some((noted.time, noted.moment.letter()?, noted.moment.text().to_owned())))
+        .collect();
     if let Some(collision) = film.worst_collision() {
         instants.push((collision.time, '!', "collision".to_owned()));
     } else if instants.is_empty() {

@@ -220,7 +220,7 @@ impl Plots<'_> {
             return Ok(());
         }
         let texts: Vec<String> =
-            moments.iter().map(|noted| format!("({}) {}", noted.moment.letter(), noted.moment.text())).collect();
+            moments.iter().map(|noted| noted.moment.label()).collect();
         let latest = |time: Time| moments.iter().rposition(|noted| noted.time <= time);
         let words: Vec<&str> =
             self.times.iter().map(|&time| latest(time).map_or(BEFORE, |index| texts[index].as_str())).collect();
