@@ -29,7 +29,7 @@ const SAMPLES: u64 = 150;
 const FAULT_SAMPLES: u64 = 40;
 const SEED: u64 = 1;
 /// Every scenario of the library.
-const LIBRARY: [&str; 8] = [
+const LIBRARY: [&str; 12] = [
     "low-thw-overtake",
     "low-thw-overtake-at-cut-out",
     "overtake-without-brake",
@@ -38,6 +38,10 @@ const LIBRARY: [&str; 8] = [
     "slow-approach",
     "empty-wet-road",
     "paper-figure",
+    "lead-brakes-at-any-time",
+    "lead-brakes-partially",
+    "rear-follower-stays-lead-brakes",
+    "cut-in-into-margin",
 ];
 
 /// A fault that a controller adds to the commands of the MIS.
@@ -184,7 +188,8 @@ fn the_mis_passes_every_requirement_of_the_library() {
     let headline = &summary.scenarios[0].1;
     assert!(headline.pairs.prevented > headline.pairs.induced);
     assert_eq!(headline.pairs.prevented + headline.pairs.both, headline.arms[0].collisions);
-    assert_eq!(headline.pairs.induced + headline.pairs.both, headline.arms[1].collisions);
+    let of_others = headline.pairs.induced_of_others + headline.pairs.both_of_others;
+    assert_eq!(headline.pairs.induced + headline.pairs.both, headline.arms[1].collisions + of_others);
 }
 
 #[test]

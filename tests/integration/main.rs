@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+mod assumptions;
 mod campaign_example;
 mod changed_controller;
 mod commands;

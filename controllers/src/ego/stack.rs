@@ -74,7 +74,7 @@ impl EgoStack {
         let acceleration_mps2 = match decision.request {
             Request::Follow => acc_mps2,
             Request::Brake(braking) => acc_mps2.min((-braking).max(lowest).min(highest)),
-            Request::Hold(braking) => (-braking).max(lowest).min(highest),
+            Request::Hold => 0.0_f64.max(lowest).min(highest),
             Request::Release => acc_mps2.min(RELEASE_ACCELERATION_MPS2).min(highest),
         };
         EgoCommand { acceleration_mps2, state: decision.state, reason: decision.reason, plan: decision.plan }

@@ -77,7 +77,9 @@ impl PairFlag {
     pub const fn meaning(self) -> &'static str {
         match self {
             Self::Prevented => "the ego collides in the baseline, and no vehicle collides in the arm under test",
-            Self::Induced => "the ego collides in the arm under test alone, or other vehicles do while none collides in the baseline",
+            Self::Induced => {
+                "the ego collides in the arm under test alone, or other vehicles do while none collides in the baseline"
+            }
         }
     }
 
@@ -142,9 +144,11 @@ pub const MEASURES: &[Measure] = &[
         reached(outcome, Moment::CutOut)
     }),
     flag("rear_crossed", "the rear vehicle leaves the lane of the ego", |outcome| reached(outcome, Moment::Crossed)),
-    flag("hazard", "the lead vehicle brakes, and the ego brakes hard while the rear vehicle is near in its lane", |outcome| {
-        reached(outcome, Moment::Hazard)
-    }),
+    flag(
+        "hazard",
+        "the lead vehicle brakes, and the ego brakes hard while the rear vehicle is near in its lane",
+        |outcome| reached(outcome, Moment::Hazard),
+    ),
     flag("rear_critical", "the rear vehicle reaches the critical distance", |outcome| {
         reached(outcome, Moment::CriticalDistance)
     }),

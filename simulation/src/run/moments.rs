@@ -45,7 +45,8 @@ mod tests {
         moments.note(Moment::FrontBrakes, Time::from_ms(40));
         moments.note(Moment::RearNear, Time::from_ms(40));
         moments.note(Moment::RearNear, Time::from_ms(80));
-        let noted: Vec<_> = moments.finish().iter().map(|noted| (noted.moment.letter().unwrap(), noted.time.ns())).collect();
+        let noted: Vec<_> =
+            moments.finish().iter().map(|noted| (noted.moment.letter().unwrap(), noted.time.ns())).collect();
         assert_eq!(noted, [('b', 40_000_000), ('d', 40_000_000)]);
     }
 }

@@ -59,8 +59,8 @@ pub(crate) enum Request {
     Follow,
     /// Brake by this much (m/s²), or harder if the ACC does.
     Brake(f64),
-    /// Brake by this much (m/s²), whatever the ACC requests; 0 keeps the speed.
-    Hold(f64),
+    /// Keep the speed, whatever the ACC requests.
+    Hold,
     /// Close the gap to the lead vehicle gently.
     Release,
 }
@@ -170,10 +170,8 @@ impl Mis {
                 (Request::Brake(braking_mps2), EgoState::Increasing)
             }
             State::Holding(target, _) => {
-                let (new_plan, braking_mps2) = self.plan(situation, &target);
-                plan = Some(new_plan);
-                let is_critical = target.rear.gap_m <= self.settings.critical_gap_m;
-                (Request::Hold(if is_critical { 0.0 } else { braking_mps2 }), EgoState::Holding)
+                plan = Some(self.plan(situation, &target).0);
+                (Request::Hold, EgoState::Holding)
             }
             State::Releasing => (Request::Release, EgoState::Releasing),
         };

@@ -5,7 +5,7 @@
 //! early and slows the ego down gently beforehand, so that the ego need not brake during the two critical seconds.
 //!
 //! ```text
-//!            every condition holds           rear vehicle at critical gap
+//!            every condition holds           rear vehicle crosses, or at critical gap
 //!  following ─────────────────────▶ increasing ──────────────────────────▶ holding
 //!      ▲                                │ fell back, follows, lost, changed │ past, 2 s over,
 //!      │                                │ lane early, passing lane occupied,│ no room, lost,
@@ -71,7 +71,7 @@
 //! |---|---|---|---|
 //! | following | ACC | ACC's | ACC's: 2.5 m/s³ from 20 m/s on |
 //! | increasing | the smaller of the ACC's acceleration and −a*, planned afresh at every step | a* ≤ `max-deceleration-mps2` | braking grows by `max-jerk-mps3`, falls by 3 m/s³ |
-//! | holding | −a* until d_R ≤ `critical-gap-m`, then the brake is released; the ACC is ignored | a*, then 0 | the same |
+//! | holding | the brake is released; the ACC is ignored | 0 | the same |
 //! | releasing | ACC, limited | ≤ 0.8 m/s² | rises by 3 m/s³ |
 //!
 //! Braking by the ACC, up to 3.5 m/s², passes in all states but holding; emergency braking always passes. The jerk limits
@@ -100,10 +100,10 @@
 //! [`ArrivalPrediction`] solves the same problem with it by a bracketed search. All assume that the lead vehicle and
 //! the rear vehicle keep their speeds; the plan is computed afresh at every step.
 //!
-//! The rear vehicle crosses the marking at a time headway of 0.15 to 0.4 s, mostly before it reaches d_c. The ego
-//! nevertheless continues its plan until d_c, because the goal is a time headway at d_c; from the marking on it no longer
-//! brakes harder than planned. A rear vehicle that leaves the lane at a
-//! time headway of 0.9 s or more needs no margin.
+//! The rear vehicle crosses the marking at a time headway of 0.15 to 0.4 s, mostly before it reaches d_c. If there is room,
+//! the ego stops braking there, although the plan aims at a time headway at d_c: from the marking on, the paper's ego does
+//! not brake in front of the rear vehicle. Without room it continues its plan until d_c. A rear vehicle that leaves the lane
+//! at a time headway of 0.9 s or more needs no margin.
 //!
 //! # Why 1 m/s², and d_c = 5 m
 //! Both are the values of the paper. `cargo run --release --example validate_margin_increase -- 1000 1` measures what
