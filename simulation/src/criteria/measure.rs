@@ -128,6 +128,11 @@ pub const MEASURES: &[Measure] = &[
     flag("others_collided", "two vehicles other than the ego collide with each other", |outcome| {
         is(outcome.others_collided())
     }),
+    flag(
+        "others_collided_alone",
+        "two vehicles other than the ego collide with each other, and the ego does not collide",
+        |outcome| is(outcome.others_collided() && !outcome.ego_collided()),
+    ),
     flag("engaged", "the margin increase system engages", |outcome| {
         is(outcome.mis.as_ref().is_ok_and(|mis| mis.engaged_at_s.is_ok()))
     }),
