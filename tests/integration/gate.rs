@@ -26,7 +26,7 @@ use crate::support::library;
 
 const SAMPLES: u64 = 150;
 /// Samples of each scenario in which a share is judged that is well below one, but not zero: enough to decide.
-const SHARE_SAMPLES: u64 = 600;
+const SHARE_SAMPLES: u64 = 1_200;
 /// Samples of each scenario with a fault: enough to fail.
 const FAULT_SAMPLES: u64 = 40;
 const SEED: u64 = 1;
