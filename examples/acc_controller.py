@@ -52,5 +52,6 @@ for message in map(json.loads, sys.stdin):
         now = message["time_ns"]
         step, before = 0.0 if before is None else 1e-9 * (now - before), now
         comfort = limit_jerk(cruise(v, hello["road"]["speed_limit_mps"], front, settings["acc"]), comfort, v, step)
-        answer = {"acceleration_mps2": min(comfort, -braked if braked else math.inf), "state": "emergency-braking" if braked else "following"}
+        a = min(comfort, -braked if braked else math.inf)
+        answer = {"acceleration_mps2": a, "state": "emergency-braking" if braked else "following"}
     print(json.dumps(answer), flush=True)

@@ -246,7 +246,7 @@ fn partition(folder: &Path, part: &str, more: &[&str]) -> std::path::PathBuf {
 fn merge(parts: &[&Path], out: &Path) -> std::process::Output {
     let mut args: Vec<&str> = vec!["merge"];
     args.extend(parts.iter().map(|part| part.to_str().unwrap()));
-    args.extend(["--out", out.to_str().unwrap(), "--recordings", "1"]);
+    args.extend(["--out", out.to_str().unwrap(), "--recordings", "1", "--no-gate"]);
     closecall(args)
 }
 

@@ -275,7 +275,8 @@ fn collision_columns(columns: &mut Columns) {
     columns.count("collisions", |row| Some(row.outcome()?.collisions.len() as u64));
     columns.flag("ego_collided", |row| Some(row.outcome()?.ego_collided()));
     columns.flag("others_collided", |row| Some(row.outcome()?.others_collided()));
-    let harm_of = |row: &OutcomeRow| Some(harm(row.outcome()?));
+    // Of no collisions, the sum is negative zero.
+    let harm_of = |row: &OutcomeRow| Some(harm(row.outcome()?) + 0.0);
     columns.0.push(Column { name: "harm".to_owned(), unit: None, cells: Cells::Number(Box::new(harm_of)) });
     let first = |row: &OutcomeRow| row.outcome()?.collisions.first().cloned();
     columns.number("collision_time_s", "s", move |row| Some(first(row)?.time.s()));
