@@ -120,7 +120,7 @@ fn the_samples_have_a_case_for_every_outcome_and_attachments_that_exist() {
     campaign(&out, &["--recordings", "1"], None, 0);
     let xml = fs::read_to_string(out.join("samples.xml")).unwrap();
     assert_eq!(xml.matches("<testcase ").count(), 2 * 2 * 240);
-    assert!(xml.contains("<testsuites name=\"closecall\" tests=\"480\""));
+    assert!(xml.contains("<testsuites name=\"closecall\" tests=\"960\""));
     let failures = xml.matches("<failure ").count();
     assert!(failures > 0 && xml.contains(&format!("failures=\"{failures}\"")), "{failures}");
     let attached: Vec<&str> = xml
