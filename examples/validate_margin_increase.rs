@@ -46,11 +46,11 @@ const CRITICAL_GAPS_M: [f64; 2] = [5.0, 10.0];
 /// Default critical gap (m).
 const CRITICAL_GAP_M: f64 = 5.0;
 
-/// Reaction time of a slow rear driver (s). In the scenario the median is 0.9 s.
+/// Reaction time of a slow rear driver (s). In the scenario the median is 1.25 s.
 const SLOW_REACTION_S: f64 = 2.0;
 
 /// Lateral accelerations that the rear driver accepts in evasive steering (m/s²).
-const EVASIVE_MPS2: [f64; 3] = [0.0, 1.0, 2.0];
+const EVASIVE_MPS2: [f64; 4] = [0.0, 1.0, 2.0, 4.3];
 
 const CONFIDENCE: f64 = 0.95;
 

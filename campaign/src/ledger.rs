@@ -82,6 +82,8 @@ pub struct ArmCounts {
 pub struct Tally {
     /// Whether the ego collides, as judged; `None` if the sample ended in an error.
     pub collided: Option<bool>,
+    /// Whether two vehicles other than the ego collide with each other.
+    pub others_collided: bool,
     /// Whether the margin increase system engages.
     pub engaged: bool,
     /// Whether its goal is in reach when it engages.
@@ -147,17 +149,51 @@ impl ArmCounts {
     }
 }
 
+/// What the system under test changes in one sample.
+///
+/// A collision between other vehicles (the rear vehicle runs into the lead vehicle, say) counts against the system: such a
+/// sample is not prevented, and it is induced if nothing collides without the system.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PairFate {
+    /// The ego collides without the system, and no vehicle collides with it.
+    Prevented,
+    /// With the system the ego collides, or other vehicles do; without it the ego does not, or no vehicle does.
+    Induced,
+    /// The ego collides without the system, and the ego or other vehicles collide with it.
+    Both,
+    /// The ego collides in neither arm, and the system adds no collision of others.
+    Neither,
+}
+
+impl PairFate {
+    /// Returns the fate of a sample; `None` if an arm has no outcome.
+    pub fn of(baseline: &Tally, tested: &Tally) -> Option<Self> {
+        Some(match (baseline.collided?, tested.collided?) {
+            (true, true) => Self::Both,
+            (true, false) if tested.others_collided => Self::Both,
+            (true, false) => Self::Prevented,
+            (false, true) => Self::Induced,
+            (false, false) if tested.others_collided && !baseline.others_collided => Self::Induced,
+            (false, false) => Self::Neither,
+        })
+    }
+}
+
 /// Pairs of the same sample without and with the system under test.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pairs {
-    /// Collision without the system, none with it.
+    /// Samples of [`PairFate::Prevented`].
     pub prevented: u64,
-    /// No collision without the system, collision with it.
+    /// Samples of [`PairFate::Induced`].
     pub induced: u64,
-    /// Collision either way.
+    /// Samples of [`PairFate::Both`].
     pub both: u64,
-    /// No collision either way.
+    /// Samples of [`PairFate::Neither`].
     pub neither: u64,
+    /// Of `induced`, those in which only vehicles other than the ego collide with the system.
+    pub induced_of_others: u64,
+    /// Of `both`, those in which only vehicles other than the ego collide with the system.
+    pub both_of_others: u64,
     /// Harm saved by the system, over the samples in which it saves harm.
     pub prevented_harm: f64,
     /// Harm added by the system, over the samples in which it adds harm.
@@ -167,12 +203,19 @@ pub struct Pairs {
 impl Pairs {
     /// Adds one pair. A pair without both outcomes does not count.
     pub fn push(&mut self, baseline: &Tally, tested: &Tally) {
-        match (baseline.collided, tested.collided) {
-            (Some(true), Some(false)) => self.prevented += 1,
-            (Some(false), Some(true)) => self.induced += 1,
-            (Some(true), Some(true)) => self.both += 1,
-            (Some(false), Some(false)) => self.neither += 1,
-            (None, _) | (_, None) => return,
+        let of_others = u64::from(tested.collided == Some(false));
+        match PairFate::of(baseline, tested) {
+            Some(PairFate::Prevented) => self.prevented += 1,
+            Some(PairFate::Induced) => {
+                self.induced += 1;
+                self.induced_of_others += of_others;
+            }
+            Some(PairFate::Both) => {
+                self.both += 1;
+                self.both_of_others += of_others;
+            }
+            Some(PairFate::Neither) => self.neither += 1,
+            None => return,
         }
         let more = tested.harm - baseline.harm;
         if more > 0.0 {
@@ -188,6 +231,8 @@ impl Pairs {
         self.induced += other.induced;
         self.both += other.both;
         self.neither += other.neither;
+        self.induced_of_others += other.induced_of_others;
+        self.both_of_others += other.both_of_others;
         self.prevented_harm += other.prevented_harm;
         self.induced_harm += other.induced_harm;
     }
@@ -231,5 +276,29 @@ mod tests {
         assert_eq!((pairs.prevented_harm, pairs.induced_harm), (0.5, 0.75));
         assert_eq!(pairs.mcnemar_p(Inference::FixedSamples), Some(1.0));
         assert_eq!(pairs.mcnemar_p(Inference::Sequential), None);
+    }
+
+    #[test]
+    fn a_collision_of_others_with_the_system_is_not_a_prevented_one() {
+        let tally = |collided, others_collided| Tally { collided: Some(collided), others_collided, ..Tally::default() };
+        let cases = [
+            (tally(true, false), tally(false, false), PairFate::Prevented),
+            (tally(true, true), tally(false, false), PairFate::Prevented),
+            (tally(true, false), tally(false, true), PairFate::Both),
+            (tally(true, false), tally(true, false), PairFate::Both),
+            (tally(false, false), tally(true, false), PairFate::Induced),
+            (tally(false, true), tally(true, false), PairFate::Induced),
+            (tally(false, false), tally(false, true), PairFate::Induced),
+            (tally(false, true), tally(false, true), PairFate::Neither),
+            (tally(false, true), tally(false, false), PairFate::Neither),
+        ];
+        let mut pairs = Pairs::default();
+        for (baseline, tested, fate) in cases {
+            assert_eq!(PairFate::of(&baseline, &tested), Some(fate), "{baseline:?}, {tested:?}");
+            pairs.push(&baseline, &tested);
+        }
+        assert_eq!((pairs.prevented, pairs.induced, pairs.both, pairs.neither), (2, 3, 2, 2));
+        assert_eq!((pairs.induced_of_others, pairs.both_of_others), (1, 1));
+        assert_eq!(PairFate::of(&Tally::default(), &tally(true, false)), None);
     }
 }

@@ -43,6 +43,7 @@ impl ArmRecord {
                 let mis = outcome.mis.as_ref().ok();
                 Tally {
                     collided: Some(outcome.ego_collided()),
+                    others_collided: outcome.others_collided(),
                     engaged: mis.is_some_and(|mis| mis.engaged_at_s.is_ok()),
                     goal_in_reach: mis.is_some_and(|mis| mis.goal_in_reach == Some(true)),
                     speed_deficit_mps: outcome.margins.max_speed_deficit_mps,

@@ -71,47 +71,70 @@ impl Collision {
 }
 
 /// A moment of the encounter in which a rear vehicle R approaches the ego E from behind while the ego follows a lead
-/// vehicle F. The paper's figure names five of them, (a) to (e).
+/// vehicle F.
+///
+/// The letters follow the paper's figure: (a) is the hazard without the system, and (e) the rear vehicle about 5 m behind the
+/// ego. (b) to (d) lead from the one to the other. Two further moments have no letter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Moment {
-    /// (a) The rear vehicle is within 100 m of the ego, in the ego's lane, and approaches at 10 km/h or more.
+    /// (a) The lead vehicle brakes, and the ego brakes hard while the rear vehicle is near, in the ego's lane: the hazard that
+    /// the system is meant to remove.
+    Hazard,
+    /// (b) The rear vehicle is within 100 m of the ego, in the ego's lane, and approaches at 10 km/h or more.
     RearNear,
-    /// (b) The rear vehicle starts to change lanes in order to overtake.
+    /// (c) The rear vehicle starts to change lanes in order to overtake.
     CutOut,
-    /// (c) The rear vehicle is at the critical distance behind the ego.
-    CriticalDistance,
     /// (d) The brake light of the lead vehicle is on.
     FrontBrakes,
-    /// (e) The rear vehicle has passed the ego: the overtaking is concluded, and the ego is free to brake.
+    /// (e) The rear vehicle is at the critical distance behind the ego.
+    CriticalDistance,
+    /// The centre of the rear vehicle has left the ego's lane.
+    Crossed,
+    /// The rear vehicle has passed the ego: the overtaking is concluded, and the ego is free to brake.
     Concluded,
 }
 
 impl Moment {
-    /// All moments, from (a) to (e).
-    pub const ALL: [Self; 5] =
-        [Self::RearNear, Self::CutOut, Self::CriticalDistance, Self::FrontBrakes, Self::Concluded];
+    /// All moments: (a) to (e), then those without a letter.
+    pub const ALL: [Self; 7] = [
+        Self::Hazard,
+        Self::RearNear,
+        Self::CutOut,
+        Self::FrontBrakes,
+        Self::CriticalDistance,
+        Self::Crossed,
+        Self::Concluded,
+    ];
 
-    /// Returns the moment's letter in the paper's figure.
-    pub const fn letter(self) -> char {
+    /// Returns the moment's letter in the paper's figure; `None` if the figure does not have the moment.
+    pub const fn letter(self) -> Option<char> {
         match self {
-            Self::RearNear => 'a',
-            Self::CutOut => 'b',
-            Self::CriticalDistance => 'c',
-            Self::FrontBrakes => 'd',
-            Self::Concluded => 'e',
+            Self::Hazard => Some('a'),
+            Self::RearNear => Some('b'),
+            Self::CutOut => Some('c'),
+            Self::FrontBrakes => Some('d'),
+            Self::CriticalDistance => Some('e'),
+            Self::Crossed | Self::Concluded => None,
         }
     }
 
     /// Returns a short phrase that says what happens.
     pub const fn text(self) -> &'static str {
         match self {
+            Self::Hazard => "E brakes hard in front of R",
             Self::RearNear => "R comes near",
             Self::CutOut => "R pulls out",
-            Self::CriticalDistance => "R is at the critical distance",
             Self::FrontBrakes => "F brakes",
+            Self::CriticalDistance => "R is at the critical distance",
+            Self::Crossed => "R has left the lane",
             Self::Concluded => "R has concluded",
         }
+    }
+
+    /// Returns the letter in brackets, if there is one, and the phrase.
+    pub fn label(self) -> String {
+        self.letter().map_or_else(|| self.text().to_owned(), |letter| format!("({letter}) {}", self.text()))
     }
 }
 
@@ -230,6 +253,11 @@ impl Outcome {
     /// Returns the ego's largest change of velocity in a collision (m/s), or `None` if it did not collide.
     pub fn ego_delta_v_mps(&self) -> Option<f64> {
         self.ego_collisions().filter_map(|collision| collision.delta_v_of(&self.ego)).reduce(worse)
+    }
+
+    /// Returns whether two vehicles other than the ego collided with each other.
+    pub fn others_collided(&self) -> bool {
+        self.collisions.iter().any(|collision| !collision.involves(&self.ego))
     }
 
     /// Returns whether the ego was part of a collision. Gates count samples for which this holds.

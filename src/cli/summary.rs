@@ -42,6 +42,11 @@ fn print_scenario(summary: &Summary, counts: &Counts) {
             out!("  (exact McNemar p {p:.2e})");
         }
         outln!();
+        let of_others = pairs.induced_of_others + pairs.both_of_others;
+        if of_others > 0 {
+            let tested = summary.controllers.last().map_or("", String::as_str);
+            outln!("  in {of_others} of the induced and both, only vehicles other than the ego collide with {tested}");
+        }
         if counts.arms.iter().any(|arm| arm.harm > 0.0) {
             outln!(
                 "  harm: {:.3} prevented, {:.3} induced ({})",

@@ -276,16 +276,16 @@ fn a_wiedemann_99_driver_keeps_its_gap_in_the_band_of_the_model() {
 fn a_column_of_followers_stops_without_contact_behind_a_lead_vehicle_with_prescribed_accelerations() {
     let mut actors = pair(
         "{ acceleration-profile = [[6.0, 1.1], [9.0, 0.0], [30.0, -5.3]] }",
-        "{ wiedemann99 = { cc1-s = 0.9, reaction-s = 0.7 } }",
+        "{ wiedemann99 = { cc1-s = 0.9, reaction-s = 0.7, hardest-braking-mps2 = 8.0 } }",
     );
     for (id, of, driver) in [
         (
             "second",
             "tail",
-            "{ wiedemann99 = { cc1-s = 0.8, reaction-s = { log-normal = { median = 0.7, sigma = 0.2 } } } }",
+            "{ wiedemann99 = { cc1-s = 0.8, hardest-braking-mps2 = 8.0, reaction-s = { log-normal = { median = 0.7, sigma = 0.2 } } } }",
         ),
-        ("third", "second", "{ idm = { time-gap-s = 1.0, reaction-s = 0.6 } }"),
-        ("fourth", "third", "{ wiedemann99 = { cc1-s = 0.7 } }"),
+        ("third", "second", "{ idm = { time-gap-s = 1.0, reaction-s = 0.6, hardest-braking-mps2 = 8.0 } }"),
+        ("fourth", "third", "{ wiedemann99 = { cc1-s = 0.7, hardest-braking-mps2 = 8.0 } }"),
     ] {
         actors += &format!(
             "[[actor]]\nid = \"{id}\"\nvehicle = {{ class = \"car\" }}\n\

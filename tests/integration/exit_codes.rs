@@ -26,10 +26,10 @@ fn the_gate_fails_with_collisions_and_passes_without() {
 
 #[test]
 fn paired_gates_judge_the_arm_under_test() {
-    let headline = library("low-thw-overtake");
+    let headline = library("low-thw-overtake-at-cut-out");
     let args =
-        ["campaign", headline.to_str().unwrap(), "-n", "100", "--paired", "--format", "json", "--max-collisions"];
-    let report = json(&closecall(args.into_iter().chain(["100"])), 0);
+        ["campaign", headline.to_str().unwrap(), "-n", "200", "--paired", "--format", "json", "--max-collisions"];
+    let report = json(&closecall(args.into_iter().chain(["200"])), 0);
     let collisions = |arm: &str| report["controllers"][arm]["collisions"].as_u64().unwrap();
     assert!(collisions("acc") > collisions("mis"));
     // The gate allows the collisions of the arm under test. The baseline has more, which does not matter.

@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 mod agreement;
+mod assumptions;
 mod campaign_example;
 mod changed_controller;
 mod commands;
@@ -10,6 +11,7 @@ mod comparison;
 mod determinism;
 mod drivers;
 mod durability;
+mod encounter_models;
 mod engagement;
 mod exec_controller;
 mod exit_codes;

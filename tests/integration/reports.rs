@@ -8,12 +8,12 @@ use closecall_testing::browser;
 
 use crate::support::{folder, library, program, stdout};
 
-/// Runs a campaign of two scenarios with 120 samples each. Returns its standard output.
+/// Runs a campaign of two scenarios with 240 samples each. Returns its standard output.
 fn campaign(out: &Path, more: &[&str], summary: Option<&Path>, expected: i32) -> String {
-    let scenarios = ["low-thw-overtake", "overtake-without-brake"].map(library);
+    let scenarios = ["low-thw-overtake-at-cut-out", "overtake-without-brake"].map(library);
     let mut command = program();
     command.arg("campaign").args(&scenarios);
-    command.args(["-n", "120", "--seed", "1", "--paired"]).args(more).arg("--out").arg(out);
+    command.args(["-n", "240", "--seed", "1", "--paired"]).args(more).arg("--out").arg(out);
     match summary {
         Some(path) => command.env("GITHUB_STEP_SUMMARY", path),
         None => command.env_remove("GITHUB_STEP_SUMMARY"),
@@ -83,7 +83,7 @@ fn a_browser_shows_every_element_of_the_page() {
         .unwrap();
     let text = String::from_utf8_lossy(&shown.stdout);
     // The browser's document has the verdict as its title, and the charts with their bars and points.
-    assert!(text.contains("<title>PASS: low-thw-overtake, overtake-without-brake</title>"), "{text}");
+    assert!(text.contains("<title>PASS: low-thw-overtake-at-cut-out, overtake-without-brake</title>"), "{text}");
     let file = fs::read_to_string(out.join("report.html")).unwrap();
     for element in ["<svg", "<circle", "<rect", "<table", "<tr"] {
         assert_eq!(text.matches(element).count(), file.matches(element).count(), "{element}");
@@ -102,7 +102,8 @@ fn the_summary_is_appended_to_the_step_summary_of_the_ci_server() {
     assert_eq!(text, format!("the summary of an earlier step\n{own}"));
     assert!(own.starts_with("## Closecall: PASS"), "{own}");
     assert!(
-        own.contains("| low-thw-overtake | mis | 120 |") && own.contains("| MIS-1 | low-thw-overtake | met |"),
+        own.contains("| low-thw-overtake-at-cut-out | mis | 240 |")
+            && own.contains("| MIS-1 | low-thw-overtake-at-cut-out | met |"),
         "{own}"
     );
     // Every row of a table has as many cells as the head.
@@ -118,8 +119,8 @@ fn the_samples_have_a_case_for_every_outcome_and_attachments_that_exist() {
     let out = folder.path().join("out");
     campaign(&out, &["--recordings", "1"], None, 0);
     let xml = fs::read_to_string(out.join("samples.xml")).unwrap();
-    assert_eq!(xml.matches("<testcase ").count(), 2 * 2 * 120);
-    assert!(xml.contains("<testsuites name=\"closecall\" tests=\"480\""));
+    assert_eq!(xml.matches("<testcase ").count(), 2 * 2 * 240);
+    assert!(xml.contains("<testsuites name=\"closecall\" tests=\"960\""));
     let failures = xml.matches("<failure ").count();
     assert!(failures > 0 && xml.contains(&format!("failures=\"{failures}\"")), "{failures}");
     let attached: Vec<&str> = xml
@@ -140,7 +141,7 @@ fn junit_fails_for_failed_gates_and_for_nothing_else() {
     let xml = fs::read_to_string(out.join("junit.xml")).unwrap();
     // The headline has collisions with the system; the scenario without braking has none.
     assert_eq!(xml.matches("<failure ").count(), 1, "{xml}");
-    assert!(xml.contains("low-thw-overtake: count(ego_collided) &lt;= 0"), "{xml}");
+    assert!(xml.contains("low-thw-overtake-at-cut-out: count(ego_collided) &lt;= 0"), "{xml}");
     assert_eq!(xml.matches("<error ").count(), 0, "{xml}");
 }
 

@@ -211,14 +211,17 @@ fn limits_out_of_range_are_wrong_usage() {
 
 #[test]
 fn comfort_gates_report_the_limit_that_was_exceeded() {
-    let path = library("low-thw-overtake");
+    let path = library("low-thw-overtake-at-cut-out");
     let run = |more: &[&str], expected| {
         let args = ["campaign", path.to_str().unwrap(), "-n", "40"];
         stdout(&closecall(args.iter().chain(more)), expected)
     };
     let jerk = run(&["--max-jerk", "0.5"], 1);
-    assert!(jerk.contains("NOT MET: low-thw-overtake: max(max_jerk_mps3) <= 0.5 (is "), "{jerk}");
+    assert!(jerk.contains("NOT MET: low-thw-overtake-at-cut-out: max(max_jerk_mps3) <= 0.5 (is "), "{jerk}");
     let engagements = run(&["--max-engagement-rate", "0.01"], 1);
-    assert!(engagements.contains("NOT MET: low-thw-overtake: share(engaged) <= 0.01 (is 1, "), "{engagements}");
+    assert!(
+        engagements.contains("NOT MET: low-thw-overtake-at-cut-out: share(engaged) <= 0.01 (is 1, "),
+        "{engagements}"
+    );
     assert!(run(&["--max-engagement-rate", "1", "--max-jerk", "1000"], 0).contains("PASS"));
 }

@@ -134,7 +134,7 @@ duration-s = 1.0
 road = { lanes = 1 }
 
 [parameters]
-gap-m = { uniform = { min = 7.8, max = 8.0 }, assumed = "around where they just touch" }
+gap-m = { uniform = { min = 8.18, max = 8.38 }, assumed = "around where they just touch" }
 
 [[actor]]
 id = "ego"

@@ -3,7 +3,7 @@
 use closecall_simulation::criteria::{Aggregate, EGO_COLLIDED, Expression, Measure, PairFlag, Quantity};
 use closecall_statistics::quantiles::quantile;
 
-use crate::ledger::Inference;
+use crate::ledger::{Inference, PairFate};
 use crate::record::Record;
 
 /// Confidence of `lower` and `upper`, and of the reported intervals.
@@ -178,10 +178,11 @@ pub(crate) fn value(quantity: Quantity, record: &Record) -> Option<f64> {
         Quantity::Tested(measure) => of(tested, measure),
         Quantity::Baseline(measure) if tested > 0 => of(0, measure),
         Quantity::Pair(flag) if tested > 0 => {
-            let (baseline, tested) = (collided(0)?, collided(tested)?);
+            let tallies = record.tallies();
+            let fate = PairFate::of(tallies.first()?, tallies.get(tested)?)?;
             Some(is(match flag {
-                PairFlag::Prevented => baseline && !tested,
-                PairFlag::Induced => tested && !baseline,
+                PairFlag::Prevented => fate == PairFate::Prevented,
+                PairFlag::Induced => fate == PairFate::Induced,
             }))
         }
         Quantity::Baseline(_) | Quantity::Pair(_) => None,

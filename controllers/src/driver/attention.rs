@@ -1,7 +1,7 @@
 //! Lapses of attention: a driver who looks away observes nothing new, and assumes that traffic continues unchanged.
 //!
-//! Glances away from the road of more than 2 s double the risk of a crash (Klauer et al., *The Impact of Driver
-//! Inattention on Near-Crash/Crash Risk*, DOT HS 810 594, 2006). A lapse does not depend on the traffic: it begins at a
+//! Eyes off the road for more than 2 s in total double the risk of a crash or near-crash (Klauer et al., *The Impact of
+//! Driver Inattention on Near-Crash/Crash Risk*, DOT HS 810 594, 2006, as later work quotes it). A lapse does not depend on the traffic: it begins at a
 //! time that the scenario gives, or at random times with a given mean interval, drawn from the driver's own random
 //! stream.
 
@@ -10,7 +10,7 @@ use rand::RngExt;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Longest duration of a lapse (s).
+/// Longest duration of a lapse (s): a limit of the configuration.
 const MAX_LAPSE_S: f64 = 30.0;
 
 /// Lapses of attention as a scenario file describes them. Exactly one of `at-s` and `every-s` is given.

@@ -6,7 +6,7 @@
 //! a = A·(1 − (v/v₀)⁴ − (s*/g)²) with s* = s₀ + max(0, v·T + v·(v − v_l)/(2·√(A·B)))
 //!
 //! Here v is the own speed, v₀ the desired speed, v_l the speed of the lead vehicle and g the gap; [`IdmConfig`]
-//! defines the parameters. Above v₀, the free term brakes with B at most; the published term grows with the fourth
+//! defines the parameters, whose defaults are those of that paper. Above v₀, the free term brakes with B at most; the published term grows with the fourth
 //! power of the speed.
 
 use closecall_traffic::{Check, ConfigError, Num, Parameters, Range, Stream};
@@ -14,12 +14,19 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::attention::{Lapse, LapseConfig, check_lapse};
+use super::pedals::Pedals;
 use super::perception::Perception;
 use super::reaction::{Reaction, ReactionConfig};
 use super::wiedemann99::{EmergencyBrakingDetector, brake_for_brake_light, default_desired_mps, nearest_lead};
-use super::{Driver, DriverAction, DriverError, DriverInput, HARDEST_BRAKING_MPS2, Lead, check_finite, finite};
+use super::{
+    DEFAULT_HARDEST_BRAKING_MPS2, Driver, DriverAction, DriverError, DriverInput, HARDEST_BRAKING_RANGE, Lead,
+    check_finite, finite,
+};
 
-/// Smallest gap that enters the interaction term (m); at a gap of zero the term diverges.
+/// Largest comfortable deceleration that a scenario may give (m/s²): a limit of the configuration.
+const MAX_COMFORTABLE_BRAKING_MPS2: f64 = 8.0;
+
+/// Smallest gap that enters the interaction term (m): numerical; at a gap of zero the term diverges.
 const MIN_GAP_M: f64 = 0.1;
 
 /// The Intelligent Driver Model as a scenario file describes it.
@@ -32,10 +39,12 @@ pub struct IdmConfig {
     pub time_gap_s: Option<Num>,
     /// Gap at standstill s₀ (m). Default: 2.
     pub standstill_gap_m: Option<Num>,
-    /// Maximum acceleration A (m/s²). Default: 1.4.
+    /// Maximum acceleration A (m/s²). Default: 0.73.
     pub acceleration_mps2: Option<Num>,
-    /// Comfortable deceleration B (m/s²). Default: 2.
+    /// Comfortable deceleration B (m/s²). Default: 1.67.
     pub comfortable_braking_mps2: Option<Num>,
+    /// Hardest braking (m/s²): 4 to 9. Default: 6.7.
+    pub hardest_braking_mps2: Option<Num>,
     /// Reaction time (s). Without it, the driver uses the true state of traffic at each step.
     pub reaction_s: Option<ReactionConfig>,
     /// Lapses of attention. Default: none. They need a reaction time.
@@ -50,6 +59,7 @@ pub struct Idm {
     standstill_gap_m: f64,
     acceleration_mps2: f64,
     comfortable_braking_mps2: f64,
+    hardest_braking_mps2: f64,
     reaction: Option<Reaction>,
     lapse: Option<Lapse>,
 }
@@ -64,19 +74,25 @@ impl Check for IdmConfig {
         };
         let desired = self.desired_speed_mps.as_ref();
         let reaction = self.reaction_s.as_ref();
-        let braking = Range::above(0.0, HARDEST_BRAKING_MPS2);
+        let braking = Range::above(0.0, MAX_COMFORTABLE_BRAKING_MPS2);
         Ok(Idm {
             desired_mps: desired
                 .map(|num| parameters.number(num, "desired-speed-mps", Range::above(0.0, 100.0)))
                 .transpose()?,
             time_gap_s: number_or(&self.time_gap_s, "time-gap-s", Range::closed(0.0, 10.0), 1.5)?,
             standstill_gap_m: number_or(&self.standstill_gap_m, "standstill-gap-m", Range::above(0.0, 20.0), 2.0)?,
-            acceleration_mps2: number_or(&self.acceleration_mps2, "acceleration-mps2", Range::above(0.0, 8.0), 1.4)?,
+            acceleration_mps2: number_or(&self.acceleration_mps2, "acceleration-mps2", Range::above(0.0, 8.0), 0.73)?,
             comfortable_braking_mps2: number_or(
                 &self.comfortable_braking_mps2,
                 "comfortable-braking-mps2",
                 braking,
-                2.0,
+                1.67,
+            )?,
+            hardest_braking_mps2: number_or(
+                &self.hardest_braking_mps2,
+                "hardest-braking-mps2",
+                HARDEST_BRAKING_RANGE,
+                DEFAULT_HARDEST_BRAKING_MPS2,
             )?,
             reaction: reaction.map(|config| config.check(parameters)).transpose()?,
             lapse: check_lapse(self.lapse.as_ref(), reaction.is_some(), parameters)?,
@@ -90,12 +106,13 @@ impl Idm {
         IdmDriver {
             model: *self,
             perception: None,
-            emergency: EmergencyBrakingDetector::default(),
+            emergency: EmergencyBrakingDetector::new(self.hardest_braking_mps2),
+            pedals: Pedals::default(),
             desired_mps: self.desired_mps,
         }
     }
 
-    /// Returns the acceleration at `speed_mps` behind `lead` (m/s²). Braking is limited to 8 m/s².
+    /// Returns the acceleration at `speed_mps` behind `lead` (m/s²). Braking is limited to the hardest of the driver.
     fn acceleration_mps2(&self, speed_mps: f64, desired_mps: f64, lead: Option<&Lead>) -> f64 {
         let ratio = if desired_mps > 0.0 { speed_mps / desired_mps } else { f64::from(u8::from(speed_mps > 0.0)) };
         let interaction = lead.map_or(0.0, |lead| {
@@ -107,7 +124,7 @@ impl Idm {
         });
         // A driver above the desired speed brakes no harder than is comfortable.
         let free = (1.0 - ratio.powi(4)).max(-self.comfortable_braking_mps2 / self.acceleration_mps2);
-        (self.acceleration_mps2 * (free - interaction)).max(-HARDEST_BRAKING_MPS2)
+        (self.acceleration_mps2 * (free - interaction)).max(-self.hardest_braking_mps2)
     }
 }
 
@@ -118,6 +135,7 @@ pub(crate) struct IdmDriver {
     desired_mps: Option<f64>,
     perception: Option<Perception>,
     emergency: EmergencyBrakingDetector,
+    pedals: Pedals,
 }
 
 impl Driver for IdmDriver {
@@ -131,7 +149,8 @@ impl Driver for IdmDriver {
             let ahead = self.perception.get_or_insert_with(new).observe(input, rng).ahead;
             let requested_mps2 =
                 self.model.acceleration_mps2(speed_mps, desired_mps, ahead.as_ref().map(|vehicle| &vehicle.lead));
-            brake_for_brake_light(requested_mps2, speed_mps, ahead.as_ref())
+            let requested_mps2 = brake_for_brake_light(requested_mps2, speed_mps, ahead.as_ref());
+            self.pedals.apply_mps2(requested_mps2, input.time)
         } else {
             self.model.acceleration_mps2(speed_mps, desired_mps, nearest_lead(input).as_ref())
         };
@@ -155,7 +174,7 @@ mod tests {
         let gap_m = (2.0 + 20.0 * 1.5) / (1.0 - (20.0_f64 / 33.3).powi(4)).sqrt();
         let lead = Lead { gap_m, speed_mps: 20.0, acceleration_mps2: 0.0 };
         assert!(idm.acceleration_mps2(20.0, 33.3, Some(&lead)).abs() < 1e-12);
-        assert_eq!(idm.acceleration_mps2(30.0, 10.0, None), -2.0);
+        assert_eq!(idm.acceleration_mps2(30.0, 10.0, None), -1.67);
         let nearer = Lead { gap_m: gap_m - 5.0, ..lead };
         assert!(idm.acceleration_mps2(20.0, 33.3, Some(&nearer)) < 0.0);
     }

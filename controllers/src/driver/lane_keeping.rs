@@ -33,8 +33,9 @@ const REFERENCE_SPEED_MPS: f64 = 30.0;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct LaneKeepingConfig {
-    /// Standard deviation of the lateral position, SDLP (m): 0 to 0.5. Sober drivers on highways: about 0.2 m (Verster
-    /// and Roth, *International Journal of General Medicine* 4 (2011) 359–371).
+    /// Standard deviation of the lateral position, SDLP (m): 0 to 0.5. Sober drivers on highways: about 0.2 m, an
+    /// assumption (Verster and Roth, *International Journal of General Medicine* 4 (2011) 359–371, describe the measure;
+    /// the value was not found in a text at hand).
     pub sdlp_m: Num,
 }
 

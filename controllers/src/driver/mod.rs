@@ -9,6 +9,7 @@ mod idm;
 mod interface;
 mod lane_keeping;
 mod overtaker;
+mod pedals;
 mod perception;
 mod prescribed;
 mod reaction;
@@ -30,19 +31,24 @@ pub use reaction::{LogNormalConfig, Reaction, ReactionConfig};
 pub use speed_keeping::{SpeedKeeping, SpeedKeepingConfig, Wander};
 pub use wiedemann99::{Regime, Thresholds, Wiedemann99, Wiedemann99Config, Wiedemann99Driver, Wiedemann99Model};
 
-use closecall_traffic::Time;
+use closecall_traffic::{Range, Time};
 
-/// Hardest braking of a human driver (m/s²): the mean of emergency braking on dry roads (Burg and Moser, Handbuch
-/// Verkehrsunfallrekonstruktion, 2017: 7.5 to 8.5 m/s²).
-pub(crate) const HARDEST_BRAKING_MPS2: f64 = 8.0;
+/// Hardest braking of a human driver if the scenario gives none (m/s²): the mean of car drivers in crashes and
+/// near-crashes, whose distribution is normal with a standard deviation of 1.7 (Markkula, Engström, Lodin, Bärgman and
+/// Victor, *A farewell to brake reaction times?*, Accident Analysis and Prevention 95 (2016) 209–226; parameters in the
+/// authors' code, `gmarkkula/RearEndDriverModels`). Range for an ensemble: 4 to 9.
+pub(crate) const DEFAULT_HARDEST_BRAKING_MPS2: f64 = 6.7;
 
-/// Deceleration at highway speed with the accelerator released (m/s²): engine and air drag, 0.5 to 1 m/s².
+/// Range of the hardest braking of a human driver (m/s²).
+pub(crate) const HARDEST_BRAKING_RANGE: Range = Range::closed(4.0, 9.0);
+
+/// Deceleration at highway speed with the accelerator released (m/s²): an assumption; 0.4 to 1 are plausible.
 pub(crate) const COASTING_DECELERATION_MPS2: f64 = 0.7;
 
-/// Factor by which a driver brakes harder than necessary in order to keep apart.
+/// Factor by which a driver brakes harder than necessary in order to keep apart: an assumption; 1 to 1.5 are plausible.
 pub(crate) const BRAKING_MARGIN: f64 = 1.2;
 
-/// Speed below which a vehicle counts as standing (m/s).
+/// Speed below which a vehicle counts as standing (m/s): numerical.
 pub(crate) const STANDING_MPS: f64 = 0.1;
 
 /// Returns `value`, or an error if it is not finite.

@@ -1,7 +1,17 @@
 //! Reaction time of a driver: a fixed value, a parameter, or drawn once per run from the driver's own random stream.
 //!
-//! Brake reaction times of unwarned drivers are log-normal, with medians from 0.7 s (expected) over 0.9 s to 1.3 s
-//! (surprised): Green, *How long does it take to stop?*, Transportation Human Factors 2 (2000) 195–216.
+//! Green (*How long does it take to stop?*, Transportation Human Factors 2 (2000) 195–216) gives these brake reaction
+//! times:
+//!
+//! | situation | mean |
+//! |---|---|
+//! | expected, the driver is fully aware | 0.70 to 0.75 s |
+//! | unexpected but common, such as the brake lights of the vehicle ahead | about 1.25 s |
+//! | surprise, such as an object that moves into the path | about 1.5 s |
+//!
+//! Urgency shortens them: at a short time to the conflict the median is below 1.0 s (Summala, *Brake reaction times and
+//! driver behavior analysis*, ibid. 217–226). Green gives no distribution. The log-normal form is an assumption, and so
+//! is a σ of 0.3 to 0.4.
 
 use std::fmt;
 
@@ -12,7 +22,7 @@ use serde::de::value::MapAccessDeserializer;
 use serde::de::{self, IntoDeserializer, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
-/// Longest reaction time (s). The memory of the perception has this length.
+/// Longest reaction time (s): an assumption. The memory of the perception has this length.
 pub(crate) const MAX_REACTION_S: f64 = 3.0;
 
 /// A log-normal distribution, given by its median and the standard deviation of its logarithm.

@@ -2,7 +2,7 @@
 //!
 //! Herman, Montroll, Potts and Rothery (*Traffic Dynamics: Analysis of Stability in Car Following*, Operations Research
 //! 7 (1959) 86–106) measured the standard deviation of the acceleration of free drivers, "acceleration noise", as about
-//! 0.1 m/s² on a good road. Here the desired speed is white noise filtered by three lags. The longest lag stands for a
+//! 0.1 m/s² on a good road (the method is theirs; the value was not found in a text at hand). Here the desired speed is white noise filtered by three lags. The longest lag stands for a
 //! driver who checks the speedometer only occasionally. The driver model decides how closely the vehicle follows the
 //! desired speed.
 
@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use super::smooth_noise::{SmoothNoise, derivative_sds};
 
-/// Lags of the desired speed (s).
+/// Lags of the desired speed (s): an assumption; 5 to 20 are plausible for the first.
 const LAGS_S: [f64; 3] = [10.0, 1.0, 1.0];
 
 /// Speed keeping of a driver as a scenario file describes it.

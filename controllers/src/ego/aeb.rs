@@ -14,27 +14,28 @@ use serde::{Deserialize, Serialize};
 
 use super::surroundings::Front;
 
-/// Ratio of commanded to required deceleration.
+/// Ratio of commanded to required deceleration: an assumption; 1 to 1.5 are plausible.
 const BRAKING_MARGIN: f64 = 1.15;
 
-/// Required deceleration below which emergency braking ends (m/s²).
+/// Required deceleration below which emergency braking ends (m/s²): an assumption; 0.5 to 3 are plausible.
 const RELEASE_THRESHOLD_MPS2: f64 = 1.5;
 
-/// Speed below which the ego counts as standing (m/s).
+/// Speed below which the ego counts as standing (m/s): numerical.
 const STANDSTILL_MPS: f64 = 0.1;
 
-/// Braking that holds the ego at standstill (m/s²).
+/// Braking that holds the ego at standstill (m/s²): an assumption without effect on a level road.
 const HOLDING_BRAKE_MPS2: f64 = 2.0;
 
 /// Emergency braking as a scenario file describes it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct AebConfig {
-    /// Required deceleration above which it brakes (m/s²); 4 if absent.
+    /// Required deceleration above which it brakes (m/s²); 4 if absent: an assumption. Regulation (EU) 347/2012
+    /// demands at least this much in the emergency phase of heavy vehicles.
     pub trigger_mps2: Option<Num>,
-    /// Strongest braking (m/s²); 9 if absent.
+    /// Strongest braking (m/s²); 9 if absent: an assumption, the friction of a dry road.
     pub max_deceleration_mps2: Option<Num>,
-    /// Gap to be left at standstill (m); 2 if absent.
+    /// Gap to be left at standstill (m); 2 if absent: an assumption; 1 to 5 are plausible.
     pub standstill_gap_m: Option<Num>,
 }
 

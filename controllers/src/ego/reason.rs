@@ -37,6 +37,8 @@ pub enum Reason {
     Engaged,
     /// All conditions for engaging hold, but the goal is out of reach; the comfort limit is used in full.
     EngagedGoalOutOfReach,
+    /// The rear vehicle crosses the marking in order to overtake.
+    RearCrosses,
     /// The rear vehicle has reached the critical distance.
     CriticalDistance,
     /// The rear vehicle has left the lane of the ego while still far away.
@@ -83,6 +85,7 @@ impl Reason {
             Self::PassingLaneUnknown => "passing lane not known to be free",
             Self::Engaged => "engaged, goal in reach",
             Self::EngagedGoalOutOfReach => "engaged, goal out of reach",
+            Self::RearCrosses => "vehicle behind crosses the marking",
             Self::CriticalDistance => "vehicle behind at the critical distance",
             Self::RearChangedLane => "vehicle behind changed lanes early",
             Self::RearPassed => "vehicle behind is past",

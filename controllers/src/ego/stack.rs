@@ -2,20 +2,25 @@
 //!
 //! | request of the MIS | command |
 //! |---|---|
-//! | follow | ACC |
-//! | brake by a | the smaller of the ACC's acceleration and −a, which is approached within the jerk limits |
-//! | hold | keep the speed, whatever the ACC requests |
+//! | follow | ACC, within its jerk limit |
+//! | brake by a | the smaller of that and −a, which is approached within the jerk limits of the MIS |
+//! | hold at a | −a, whatever the ACC requests; a is 0 from the critical gap on |
 //! | release | ACC, its acceleration limited, and raised within the jerk limit for releasing the brake |
 //!
-//! Emergency braking overrides all of them if it requests more braking.
+//! The result is the *comfort command*. Emergency braking overrides it if it requests more braking. The jerk limits hold
+//! for the comfort command alone, and each step starts from the comfort command of the step before: while emergency
+//! braking acts, the comfort command goes on beneath it, and once emergency braking ends, the ego follows the comfort
+//! command at once. A ramp that started from the command of emergency braking would keep the ego braking for seconds
+//! after the lead vehicle has stopped braking.
 
 use closecall_traffic::Time;
 
 use super::mis::{BRAKE_RELEASE_JERK_MPS3, Mis, Request, Situation};
 use super::surroundings::{Front, FrontFollower};
-use super::{ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoState, Reason};
+use super::{Acc, ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoState, Reason};
 
-/// Largest acceleration while the margin is returned (m/s²).
+/// Largest acceleration while the margin is returned (m/s²): an assumption, half of what the ACC may use; plausible are
+/// 0.5 to 1.5.
 const RELEASE_ACCELERATION_MPS2: f64 = 0.8;
 
 /// The built-in ego stack.
@@ -25,15 +30,15 @@ pub struct EgoStack {
     lead: FrontFollower,
     mis: Option<Mis>,
     emergency_braking: bool,
-    /// Time and value (m/s²) of the last commanded acceleration.
-    last_command: Option<(Time, f64)>,
+    /// Time and value (m/s²) of the last comfort command: the command without emergency braking.
+    last_comfort: Option<(Time, f64)>,
 }
 
 impl EgoStack {
     /// Creates a stack for one run.
     pub fn new(settings: EgoSettings) -> Self {
         let mis = settings.mis.map(Mis::new);
-        Self { settings, lead: FrontFollower::default(), mis, emergency_braking: false, last_command: None }
+        Self { settings, lead: FrontFollower::default(), mis, emergency_braking: false, last_comfort: None }
     }
 
     /// Creates a stack without the margin increase system for one run: the controller `acc`.
@@ -44,7 +49,10 @@ impl EgoStack {
     /// Computes the command of ACC and MIS, with state, reason and plan.
     fn comfort_command(&mut self, input: &EgoInput<'_>, lead: Option<&Front>) -> EgoCommand {
         let speed_mps = input.odometry.speed_mps;
+        let (last_mps2, step_s) =
+            self.last_comfort.map_or((0.0, 0.0), |(time, last_mps2)| (last_mps2, (input.time - time).s()));
         let acc_mps2 = self.settings.acc.acceleration_mps2(speed_mps, input.road.speed_limit_mps(), lead);
+        let acc_mps2 = Acc::limit_jerk_mps2(acc_mps2, last_mps2, speed_mps, step_s);
         let Some(mis) = &mut self.mis else {
             return EgoCommand {
                 acceleration_mps2: acc_mps2,
@@ -53,21 +61,20 @@ impl EgoStack {
                 plan: None,
             };
         };
-        let (last, step_s) = self.last_command.map_or((0.0, 0.0), |(time, last)| (last, (input.time - time).s()));
         let situation = Situation {
             input,
             lead,
-            commanded_mps2: last,
+            commanded_mps2: last_mps2,
             automated: self.settings.automated,
             acc_gap_m: self.settings.acc.desired_gap_m(speed_mps),
         };
         let decision = mis.step(&situation);
-        let lowest = last - mis.settings().max_jerk_mps3 * step_s;
-        let highest = last + BRAKE_RELEASE_JERK_MPS3 * step_s;
+        let lowest = last_mps2 - mis.settings().max_jerk_mps3 * step_s;
+        let highest = last_mps2 + BRAKE_RELEASE_JERK_MPS3 * step_s;
         let acceleration_mps2 = match decision.request {
             Request::Follow => acc_mps2,
             Request::Brake(braking) => acc_mps2.min((-braking).max(lowest).min(highest)),
-            Request::Hold => highest.min(0.0).max(lowest),
+            Request::Hold => 0.0_f64.max(lowest).min(highest),
             Request::Release => acc_mps2.min(RELEASE_ACCELERATION_MPS2).min(highest),
         };
         EgoCommand { acceleration_mps2, state: decision.state, reason: decision.reason, plan: decision.plan }
@@ -79,6 +86,7 @@ impl EgoController for EgoStack {
         input.check_finite()?;
         let lead = self.lead.update(input);
         let mut command = self.comfort_command(input, lead.as_ref());
+        self.last_comfort = Some((input.time, command.acceleration_mps2));
         let speed_mps = input.odometry.speed_mps;
         let braking =
             self.settings.aeb.and_then(|aeb| aeb.braking_mps2(self.emergency_braking, speed_mps, lead.as_ref()));
@@ -93,7 +101,6 @@ impl EgoController for EgoStack {
         if !command.acceleration_mps2.is_finite() {
             return Err(ControllerError::NotFinite { what: "commanded acceleration", time: input.time });
         }
-        self.last_command = Some((input.time, command.acceleration_mps2));
         Ok(command)
     }
 }

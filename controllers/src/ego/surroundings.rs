@@ -13,19 +13,22 @@ use crate::braking::Behind;
 /// Probability from which on a track counts as real, as being in a lane, or as a vehicle.
 const LIKELY: f64 = 0.5;
 
-/// Time constant of the smoothing of the lead vehicle's acceleration (s).
+/// Time constant of the smoothing of the lead vehicle's acceleration (s): an assumption; 0.1 to 0.5 are plausible.
 const ACCELERATION_TIME_CONSTANT_S: f64 = 0.2;
 
-/// Largest plausible acceleration of the lead vehicle (m/s²).
+/// Largest plausible acceleration of the lead vehicle (m/s²): an assumption, the friction of a dry road.
 const MAX_PLAUSIBLE_ACCELERATION_MPS2: f64 = 10.0;
 
-/// Bumper-to-bumper spacing below which two vehicles in the passing lane are in each other's way (m).
+/// Bumper-to-bumper spacing below which two vehicles in the passing lane are in each other's way (m): an
+/// assumption; 5 to 30 are plausible.
 const MIN_SPACING_M: f64 = 15.0;
 
-/// Gap to the ego at which the rear vehicle is expected to enter the passing lane (m).
+/// Gap to the ego at which the rear vehicle is expected to enter the passing lane (m): an assumption; 20 to 60
+/// are plausible.
 const PASSING_LANE_ENTRY_GAP_M: f64 = 40.0;
 
-/// Gap ahead of the ego beyond which the rear vehicle no longer needs the passing lane (m).
+/// Gap ahead of the ego beyond which the rear vehicle no longer needs the passing lane (m): an assumption;
+/// 5 to 30 are plausible.
 const PASSING_LANE_EXIT_GAP_M: f64 = 10.0;
 
 /// The lead vehicle: the vehicle ahead in the lane of the ego.
@@ -68,7 +71,7 @@ const SAME_VEHICLE_LONGITUDINAL_M: f64 = 5.0;
 /// Largest lateral difference between two tracks of one vehicle (m): half of the distance between the centres of two
 /// narrow vehicles side by side.
 const SAME_VEHICLE_LATERAL_M: f64 = 1.0;
-/// Largest difference of speed between two tracks of one vehicle (m/s).
+/// Largest difference of speed between two tracks of one vehicle (m/s): an assumption; 2 to 5 are plausible.
 const SAME_VEHICLE_SPEED_MPS: f64 = 3.0;
 
 /// A rear vehicle.
@@ -125,10 +128,12 @@ pub(crate) enum PassingLane {
     Unknown,
 }
 
-/// Assumed braking of the vehicles ahead (m/s²): it decides which of them leaves the least room to stop.
+/// Assumed braking of the vehicles ahead (m/s²): it decides which of them leaves the least room to stop. An
+/// assumption, the mean of emergency braking on a dry road; 6 to 9 are plausible.
 const WORST_LEAD_BRAKING_MPS2: f64 = 8.0;
 
-/// Time for which a vehicle that vanished from the lane of the ego is assumed to be there still.
+/// Time for which a vehicle that vanished from the lane of the ego is assumed to be there still: an assumption; 0.2 to 1 s are
+/// plausible.
 const TRACK_MEMORY: Time = Time::from_ms(500);
 
 /// A vehicle ahead, followed over the control steps.

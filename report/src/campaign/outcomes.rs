@@ -22,6 +22,8 @@ use crate::units::unit_of;
 use closecall_campaign::manifest::Manifest;
 use closecall_campaign::record::SampleFailure;
 use closecall_scenarios::atomic::{WriteError, write_file};
+use closecall_simulation::criteria::Measure;
+use closecall_simulation::harm::harm;
 use closecall_simulation::outcome::{Collision, MisSummary, Outcome};
 
 /// One sample in one arm.
@@ -228,6 +230,7 @@ fn columns(parameters: &BTreeMap<ParameterName, ParameterKind>) -> Vec<Column> {
         parameter_column(&mut columns, name, *kind);
     }
     collision_columns(&mut columns);
+    encounter_columns(&mut columns);
     margin_columns(&mut columns);
     mis_columns(&mut columns);
     columns.0
@@ -271,6 +274,10 @@ fn parameter_column(columns: &mut Columns, name: &ParameterName, kind: Parameter
 fn collision_columns(columns: &mut Columns) {
     columns.count("collisions", |row| Some(row.outcome()?.collisions.len() as u64));
     columns.flag("ego_collided", |row| Some(row.outcome()?.ego_collided()));
+    columns.flag("others_collided", |row| Some(row.outcome()?.others_collided()));
+    // Of no collisions, the sum is negative zero.
+    let harm_of = |row: &OutcomeRow| Some(harm(row.outcome()?) + 0.0);
+    columns.0.push(Column { name: "harm".to_owned(), unit: None, cells: Cells::Number(Box::new(harm_of)) });
     let first = |row: &OutcomeRow| row.outcome()?.collisions.first().cloned();
     columns.number("collision_time_s", "s", move |row| Some(first(row)?.time.s()));
     for (index, which) in ["first", "second"].into_iter().enumerate() {
@@ -282,6 +289,13 @@ fn collision_columns(columns: &mut Columns) {
     columns.text("collision_closed_by", move |row| word(&first(row)?.closed_by));
     columns.text("collision_phase", move |row| word(&first(row)?.phase));
     columns.number("collision_relative_speed_mps", "m/s", move |row| Some(first(row)?.relative_speed_mps));
+}
+
+/// What happened in the encounter, from the ground truth.
+fn encounter_columns(columns: &mut Columns) {
+    for name in ["rear_near", "rear_cut_out", "rear_crossed", "hazard", "rear_critical", "rear_passed", "lead_braked"] {
+        columns.flag(name, move |row| Some(Measure::named(name)?.of(row.outcome()?)? == 1.0));
+    }
 }
 
 fn margin_columns(columns: &mut Columns) {

@@ -132,6 +132,8 @@ fn paired(pairs: &Pairs, inference: Inference) -> Value {
         "induced": pairs.induced,
         "both": pairs.both,
         "neither": pairs.neither,
+        "induced_of_others": pairs.induced_of_others,
+        "both_of_others": pairs.both_of_others,
         "prevented_harm": pairs.prevented_harm,
         "induced_harm": pairs.induced_harm,
         "harm_weight": harm::WEIGHT,

@@ -26,7 +26,7 @@ impl fmt::Display for OutcomeText<'_> {
             writeln!(f, "  {name} = {value}")?;
         }
         for at in &outcome.moments {
-            writeln!(f, "  ({}) {} at {:.2} s", at.moment.letter(), at.moment.text(), at.time.s())?;
+            writeln!(f, "  {} at {:.2} s", at.moment.label(), at.time.s())?;
         }
         for collision in &outcome.collisions {
             let [first, second] = &collision.between;

@@ -6,7 +6,7 @@
 //! [parameters]
 //! cruise-mps    = { uniform = { min = 30.0, max = 33.2 }, assumed = "speeds of German motorways" }
 //! front-thw-s   = { truncated-normal = { mean = 0.7, sd = 0.15, min = 0.5, max = 0.9 } }
-//! reaction-s    = { log-normal = { median = 0.9, sigma = 0.3, max = 2.5 } }
+//! reaction-s    = { log-normal = { median = 1.25, sigma = 0.3, max = 2.5 } }
 //! cut-out-thw-s = { empirical = { quantiles = [0.15, 0.19, 0.24, 0.31, 0.4] }, fitted = { n = 214, source = "US-101" } }
 //! rear-class    = { choice = { car = 0.8, truck = 0.1, motorcycle = 0.1 } }
 //! brake-mps2    = { fixed = 6.0 }

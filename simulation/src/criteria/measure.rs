@@ -55,9 +55,9 @@ impl Measure {
 /// The flags of a pair of arms on the same sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PairFlag {
-    /// The ego collides in the baseline alone.
+    /// The ego collides in the baseline, and no vehicle collides in the arm under test.
     Prevented,
-    /// The ego collides in the arm under test alone.
+    /// A collision of the ego, or the first of any vehicles, in the arm under test alone.
     Induced,
 }
 
@@ -76,8 +76,10 @@ impl PairFlag {
     /// Returns what the flag means, for people.
     pub const fn meaning(self) -> &'static str {
         match self {
-            Self::Prevented => "the ego collides in the baseline, and not in the arm under test",
-            Self::Induced => "the ego collides in the arm under test, and not in the baseline",
+            Self::Prevented => "the ego collides in the baseline, and no vehicle collides in the arm under test",
+            Self::Induced => {
+                "the ego collides in the arm under test alone, or other vehicles do while none collides in the baseline"
+            }
         }
     }
 
@@ -124,8 +126,13 @@ pub const EGO_COLLIDED: &str = "ego_collided";
 pub const MEASURES: &[Measure] = &[
     flag(EGO_COLLIDED, "the ego collides", |outcome| is(outcome.ego_collided())),
     flag("others_collided", "two vehicles other than the ego collide with each other", |outcome| {
-        is(outcome.collisions.iter().any(|collision| !collision.involves(&outcome.ego)))
+        is(outcome.others_collided())
     }),
+    flag(
+        "others_collided_alone",
+        "two vehicles other than the ego collide with each other, and the ego does not collide",
+        |outcome| is(outcome.others_collided() && !outcome.ego_collided()),
+    ),
     flag("engaged", "the margin increase system engages", |outcome| {
         is(outcome.mis.as_ref().is_ok_and(|mis| mis.engaged_at_s.is_ok()))
     }),
@@ -141,6 +148,12 @@ pub const MEASURES: &[Measure] = &[
     flag("rear_cut_out", "the rear vehicle starts to change lanes in order to overtake", |outcome| {
         reached(outcome, Moment::CutOut)
     }),
+    flag("rear_crossed", "the rear vehicle leaves the lane of the ego", |outcome| reached(outcome, Moment::Crossed)),
+    flag(
+        "hazard",
+        "the lead vehicle brakes, and the ego brakes hard while the rear vehicle is near in its lane",
+        |outcome| reached(outcome, Moment::Hazard),
+    ),
     flag("rear_critical", "the rear vehicle reaches the critical distance", |outcome| {
         reached(outcome, Moment::CriticalDistance)
     }),

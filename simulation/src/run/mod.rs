@@ -21,6 +21,7 @@ mod mis_log;
 mod moments;
 mod observer;
 mod phase;
+mod settling;
 mod state;
 
 pub use arm::{Arm, ControllerFactory, RunKey};

@@ -14,10 +14,15 @@ use super::margins::{MarginMeter, Widths};
 use super::mis_log::{MisLog, MisObservation};
 use super::moments::Moments;
 use super::phase::{AFTER_COLLISION, Encounter, Follower};
+use super::settling::settle_sensors;
 use super::{Arm, Happening, MarginsNow, Observer, RunKey, SampleError, StepView};
 use crate::outcome::{EndReason, Moment, Outcome, Phase};
 use crate::scenario::Scenario;
 use crate::world::{Action, InitialVehicle, World};
+
+/// Deceleration of the ego above which it counts as braking hard (m/s²): an assumption, above the 1 m/s² of the paper's
+/// comfort limit with its overshoot; 1.2 to 3 are plausible.
+const HAZARD_BRAKING_MPS2: f64 = 1.5;
 
 /// The state of one run.
 pub(super) struct Run<'a> {
@@ -71,7 +76,7 @@ impl<'a> Run<'a> {
             Some(mode) => scenario.sensors.with_mode(mode),
             None => scenario.sensors,
         };
-        Ok(Self {
+        let mut run = Self {
             scenario,
             key,
             arm,
@@ -98,7 +103,11 @@ impl<'a> Run<'a> {
             vehicles: Vec::with_capacity(world.len()),
             fronts: Vec::with_capacity(world.len()),
             world,
-        })
+        };
+        run.collect_vehicles();
+        let ego = run.vehicles[scenario.ego];
+        settle_sensors(run.perception.as_mut(), scenario, ego, &run.others)?;
+        Ok(run)
     }
 
     /// Returns whether sensors and ego controller act at the current time.
@@ -196,10 +205,13 @@ impl<'a> Run<'a> {
                 && closing_mps >= ENGAGEMENT_CLOSING_MPS
         });
         let lead_brakes = self.margins.lead.is_ok_and(|lead| self.world.state(lead.actor).brake_light);
+        let brakes_hard = self.world.state(self.scenario.ego).acceleration_mps2 < -HAZARD_BRAKING_MPS2;
         for (moment, is_now) in [
+            (Moment::Hazard, is_near && lead_brakes && brakes_hard),
             (Moment::RearNear, is_near),
             (Moment::CriticalDistance, is_critical),
             (Moment::FrontBrakes, lead_brakes),
+            (Moment::Crossed, matches!(self.encounter.phase(), Phase::Overtaking | Phase::After)),
             (Moment::Concluded, self.encounter.phase() == Phase::After),
         ] {
             if is_now {

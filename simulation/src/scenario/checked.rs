@@ -173,7 +173,6 @@ impl ScenarioConfig {
         let mut checked = Vec::with_capacity(self.actors.len());
         for (index, actor) in self.actors.iter().enumerate() {
             let driver = actor.driver.check(parameters).map_err(|error| at(index, error.within("driver")))?;
-            check_cut_out(&driver, states[index].speed_mps).map_err(|error| at(index, error))?;
             check_lanes(&driver, &states[index], road).map_err(|error| at(index, error))?;
             let Keeping { lane_keeping, speed_keeping } =
                 actor.check_keeping(parameters).map_err(|error| at(index, error))?;
@@ -247,16 +246,6 @@ fn check_weaving(keeping: Option<LaneKeeping>, speed_mps: f64, friction: f64) ->
     );
     let problem = Problem::Contradiction { other: "environment.friction", rule };
     Err(ConfigError::new("sdlp-m", problem).within("lane-keeping"))
-}
-
-/// Rejects an overtaking driver whose following distance never lets it reach the headway at which it cuts out.
-fn check_cut_out(driver: &CheckedDriver, speed_mps: f64) -> Result<(), ConfigError> {
-    match driver {
-        CheckedDriver::Human(HumanDriver::Overtaker(overtaker)) => {
-            overtaker.check_reach(speed_mps).map_err(|error| error.within("overtaker").within("driver"))
-        }
-        _ => Ok(()),
-    }
 }
 
 /// Rejects a prescribed driver that would change to a lane that the road does not have.

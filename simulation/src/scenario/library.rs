@@ -16,14 +16,18 @@ macro_rules! embedded {
 }
 
 /// The scenarios of the library, each with its name and its text, in alphabetical order.
-const LIBRARY: [(&str, &str); 8] = embedded![
+const LIBRARY: [(&str, &str); 12] = embedded![
+    "cut-in-into-margin",
     "empty-wet-road",
+    "lead-brakes-at-any-time",
+    "lead-brakes-partially",
     "left-lane-blocked",
     "low-thw-overtake",
     "low-thw-overtake-at-cut-out",
     "overtake-without-brake",
     "paper-figure",
     "rear-follower-stays",
+    "rear-follower-stays-lead-brakes",
     "slow-approach",
 ];
 

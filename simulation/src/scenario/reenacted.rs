@@ -46,8 +46,9 @@ pub enum RearDriver {
 
 /// The names of the ego, the lead vehicle and the rear vehicle as actors.
 const NAMES: [&str; 3] = ["ego", "front", "rear"];
-/// The human drivers' reaction time (s): the median of unwarned drivers (Green, Transportation Human Factors 2 (2000)).
-const REACTION_S: f64 = 0.9;
+/// The human drivers' reaction time (s): the mean for unexpected but common events, such as the brake lights of the vehicle
+/// ahead (Green, Transportation Human Factors 2 (2000) 195–216).
+const REACTION_S: f64 = 1.25;
 /// Gap at standstill of Wiedemann's model (m): its published default.
 const STANDSTILL_GAP_M: f64 = 1.5;
 /// Ratio of the rear driver's following headway to its smallest recorded headway. It is below 1, so that the driver reaches

@@ -6,8 +6,9 @@
 //!  weaving of the driver  ─▶ deviation over that distance ────┘
 //! ```
 //!
-//! Lags and jerk limits are of the order of published brake-system responses: a passenger car builds up full braking
-//! in 0.2 to 0.4 s, an air-braked truck in 0.4 to 0.6 s (UN R13 asks for at most 0.6 s to 75 % of the pressure).
+//! Lags and jerk limits are assumptions of the order of published brake-system responses: a passenger car or a motorcycle
+//! builds up full braking in 0.1 to 0.3 s, a lorry in 0.2 to 0.4 s, and an articulated lorry in 0.4 to 1.0 s (accident
+//! analysts' tables: nilgens.com, wien.gerichts-sv.at, unfallanalyse.hamburg).
 //! The kinematic bicycle (Rajamani, *Vehicle Dynamics and Control*, 2012, ch. 2) is inverted: the vehicle follows the
 //! path exactly, and course, slip angle and yaw rate are those that the bicycle needs for it. The lateral acceleration is
 //! limited when the path is planned: a lane change that would need more than the tyres provide is made longer, and the
@@ -18,13 +19,14 @@ use closecall_traffic::{GRAVITY_MPS2, Indicator, Lane, Road, Vehicle, VehicleCla
 
 use super::path::{LanePath, LateralState};
 
-/// Fraction of the friction that a driver can use laterally in an evasion without losing control.
+/// Fraction of the friction that a driver can use laterally in an evasion without losing control: an assumption; 0.3 to
+/// 0.8 are plausible.
 const LATERAL_SHARE: f64 = 0.5;
-/// Wheelbase as a fraction of a vehicle's length.
+/// Wheelbase as a fraction of a vehicle's length: an assumption; 0.5 to 0.65 are plausible.
 const WHEELBASE_SHARE: f64 = 0.6;
-/// Shortest distance of a lane change, even at walking pace (m): twice the steering circle of a car.
+/// Shortest distance of a lane change, even at walking pace (m): an assumption, the order of a car's turning circle.
 const SHORTEST_LANE_CHANGE_M: f64 = 10.0;
-/// Quasi-static brake dive of the body (rad per m/s²): about 1.5° at 1 g.
+/// Quasi-static brake dive of the body (rad per m/s²): an assumption, about 1.5° at 1 g.
 const DIVE_RAD_PER_MPS2: f64 = 0.0027;
 
 /// Returns the largest lateral acceleration that drivers use on a road with this friction (m/s²).
@@ -32,7 +34,7 @@ pub(crate) fn lateral_grip_mps2(friction: f64) -> f64 {
     LATERAL_SHARE * friction * GRAVITY_MPS2
 }
 
-/// Limits of the actuators of a vehicle class.
+/// Limits of the actuators of a vehicle class: assumptions.
 #[derive(Clone, Copy, Debug)]
 struct Capability {
     /// Time constant of the actuators (s).

@@ -2,16 +2,19 @@
 
 use crate::driver::perception::{PerceivedLane, PerceivedVehicle};
 
-/// Smallest gap to a follower that a driver accepts, whatever its speed (m).
+/// Smallest gap to a follower that a driver accepts, whatever its speed (m): an assumption; 0.5 (the default of Vissim) to
+/// 5 are plausible.
 const MIN_FOLLOWER_GAP_M: f64 = 3.0;
 
-/// Time headway left to a follower in the passing lane (s).
+/// Time headway left to a follower in the passing lane (s): an assumption; 0 to 1 are plausible.
 const FOLLOWER_HEADWAY_S: f64 = 0.3;
 
-/// Speed by which a lead vehicle in the passing lane must exceed the one to overtake to be worth following (m/s).
+/// Speed by which a lead vehicle in the passing lane must exceed the one to overtake to be worth following (m/s): an
+/// assumption; 0 to 3 are plausible.
 const MIN_GAIN_MPS: f64 = 1.0;
 
-/// Share of the accepted own braking below which a slow lead vehicle in the passing lane is too far ahead to matter.
+/// Share of the accepted own braking below which a slow lead vehicle in the passing lane is too far ahead to matter: an
+/// assumption; 0.1 to 0.5 are plausible.
 const IRRELEVANT_LEAD_BRAKING_SHARE: f64 = 0.25;
 
 /// Braking that an overtaking driver accepts, of itself and of the follower in the adjacent lane.
@@ -26,12 +29,12 @@ pub(super) struct Tolerance {
 }
 
 impl Tolerance {
-    /// Tolerance for pulling out. A follower need not brake by more than 2 m/s² (the safety criterion of MOBIL:
-    /// Kesting, Treiber and Helbing, Transportation Research Record 1999 (2007) 86–94, with half of its limit of 4
-    /// m/s²).
+    /// Tolerance for pulling out. A follower need not brake by more than 2 m/s²: half of the limit of MOBIL's safety
+    /// criterion, 4 m/s² (Kesting, Treiber and Helbing, Transportation Research Record 1999 (2007) 86–94). The half is an
+    /// assumption, as is the own braking; Vissim's defaults are 1 to 4 m/s².
     pub(super) const TO_START: Self =
         Self { own_mps2: 1.0, follower_mps2: 2.0, follower_headway_s: FOLLOWER_HEADWAY_S };
-    /// Tolerance for continuing after pulling out: MOBIL's limit itself.
+    /// Tolerance for continuing after pulling out: MOBIL's limit itself. The own braking is an assumption.
     pub(super) const TO_CONTINUE: Self =
         Self { own_mps2: 3.0, follower_mps2: 4.0, follower_headway_s: FOLLOWER_HEADWAY_S };
 }

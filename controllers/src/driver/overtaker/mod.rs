@@ -11,9 +11,14 @@
 //!
 //! In the phase *approaching* with a free passing lane, the driver keeps its speed: it does not slow down behind a
 //! vehicle that it is about to overtake. It pulls out so that, as far as it can predict, the time headway has the value
-//! given by the scenario when its centre crosses the lane marking. On a quintic path of duration T, that is T/2 after
+//! given by the scenario when its centre crosses the lane marking, or earlier, so that its gap does not fall below its own
+//! safe gap, cc0 + cc1·v. On a quintic path of duration T, that is T/2 after
 //! pulling out. While the passing lane is not free, the driver follows by the Wiedemann 99 model. It signals from two
 //! seconds before it pulls out.
+//!
+//! The brake light of the vehicle ahead makes the driver release the accelerator. If the gap closes as fast as drivers
+//! brake at (a time to collision below 10 s), the driver brakes at least as hard as that vehicle, one reaction time after
+//! the light.
 //!
 //! In all phases, the driver predicts whether its present course would collide with the vehicle ahead before the two
 //! are laterally clear of each other ([`conflict`]). If so, it brakes as hard as necessary, up to the limit of a human,

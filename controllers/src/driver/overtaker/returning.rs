@@ -9,8 +9,7 @@ use super::driver::{CompletedPassing, OvertakerDriver, Phase, Step};
 use crate::driver::perception::PerceivedVehicle;
 use crate::driver::{DriverAction, LaneChange};
 
-/// Default time headway left to the vehicle behind (s): what drivers are taught to leave before they change back, so
-/// that they see the whole overtaken vehicle in the mirror.
+/// Default time headway left to the vehicle behind (s): an assumption; 0.5 to 2 are plausible.
 const DEFAULT_THW_S: f64 = 1.0;
 
 /// The return to the original lane after passing, as a scenario file describes it.

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::driver::attention::{Lapse, LapseConfig, check_lapse};
 use crate::driver::reaction::{Reaction, ReactionConfig};
+use crate::driver::{DEFAULT_HARDEST_BRAKING_MPS2, HARDEST_BRAKING_RANGE};
 
 /// The Wiedemann 99 model as a scenario file describes it. The defaults of cc0 to cc9 are those published for Vissim.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -23,7 +24,7 @@ pub struct Wiedemann99Config {
     pub cc4_mps: Option<Num>,
     /// Opening speed tolerated while following (m/s). Default: 0.35.
     pub cc5_mps: Option<Num>,
-    /// Growth of these two thresholds with the square of the gap (10⁻⁴ rad/s). Default: 11.44.
+    /// Growth of these two thresholds with the square of the gap (10⁻⁴/(m·s)). Default: 11.44.
     pub cc6: Option<Num>,
     /// Acceleration of the oscillation while following (m/s²). Default: 0.25.
     pub cc7_mps2: Option<Num>,
@@ -31,6 +32,8 @@ pub struct Wiedemann99Config {
     pub cc8_mps2: Option<Num>,
     /// Free acceleration at 80 km/h (m/s²). Default: 1.5.
     pub cc9_mps2: Option<Num>,
+    /// Hardest braking (m/s²): 4 to 9. Default: 6.7.
+    pub hardest_braking_mps2: Option<Num>,
     /// Desired speed (m/s). Default: the larger of the road's speed limit and the vehicle's initial speed; for an
     /// overtaking driver, its initial speed.
     pub desired_speed_mps: Option<Num>,
@@ -77,6 +80,7 @@ impl Parameters99 {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wiedemann99 {
     pub(crate) parameters: Parameters99,
+    pub(crate) hardest_braking_mps2: f64,
     pub(crate) desired_speed_mps: Option<f64>,
     pub(crate) reaction: Option<Reaction>,
     pub(crate) lapse: Option<Lapse>,
@@ -113,6 +117,12 @@ impl Check for Wiedemann99Config {
                 cc8_mps2: number_or(&self.cc8_mps2, "cc8-mps2", Range::above(0.0, 8.0), default.cc8_mps2)?,
                 cc9_mps2: number_or(&self.cc9_mps2, "cc9-mps2", Range::above(0.0, 8.0), default.cc9_mps2)?,
             },
+            hardest_braking_mps2: number_or(
+                &self.hardest_braking_mps2,
+                "hardest-braking-mps2",
+                HARDEST_BRAKING_RANGE,
+                DEFAULT_HARDEST_BRAKING_MPS2,
+            )?,
             desired_speed_mps: desired_speed_mps
                 .map(|num| parameters.number(num, "desired-speed-mps", Range::closed(0.0, 100.0)))
                 .transpose()?,

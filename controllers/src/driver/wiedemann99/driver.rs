@@ -3,24 +3,31 @@
 use closecall_traffic::Stream;
 
 use super::{Wiedemann99, Wiedemann99Model};
+use crate::driver::pedals::Pedals;
 use crate::driver::perception::{PerceivedVehicle, Perception};
 use crate::driver::{
-    COASTING_DECELERATION_MPS2, Driver, DriverAction, DriverError, DriverInput, DriverNote, HARDEST_BRAKING_MPS2, Lead,
-    check_finite, finite,
+    COASTING_DECELERATION_MPS2, Driver, DriverAction, DriverError, DriverInput, DriverNote, Lead, check_finite, finite,
 };
 
-/// Share of the hardest braking above which braking counts as emergency braking.
+/// Share of the hardest braking above which braking counts as emergency braking: an assumption; it marks the log only.
 const EMERGENCY_BRAKING_SHARE: f64 = 0.75;
 
-/// Time headway below which a driver releases the accelerator because of a brake light ahead (s).
+/// Time headway below which a driver releases the accelerator because of a brake light ahead (s): an assumption, the
+/// longest headway that drivers keep in car-following (Fancher et al. 1996: 0.6 to 3 s).
 const COASTING_FOR_LIGHT_THW_S: f64 = 3.0;
 
 /// Time headway below which a driver brakes because of a brake light ahead, instead of only releasing the accelerator
-/// (s): about the upper end of the headways observed in car-following (Fancher et al., *Intelligent Cruise Control
-/// Field Operational Test*, DOT HS 808 849, 1998).
+/// (s): an assumption; 1 to 3 are plausible.
 const BRAKING_FOR_LIGHT_THW_S: f64 = 2.0;
 
-/// Speed difference above which the vehicle ahead pulls away, so that its brake light does not matter (m/s).
+/// 1/TTC from which a driver who is about to overtake brakes for a brake light ahead (1/s). Drivers begin ordinary
+/// braking at 0.100 behind a vehicle that brakes at 0.15 g, at 0.132 behind one that brakes at 0.39 g, and at 0.192
+/// behind a standing one, all at 60 mph (Kiefer et al. 2003, as quoted in Markkula's code for HFES 2014). Range: 0.10 to
+/// 0.25.
+const BRAKE_ONSET_PER_S: f64 = 0.10;
+
+/// Speed difference above which the vehicle ahead pulls away, so that its brake light does not matter (m/s): an
+/// assumption; 1 to 4 are plausible.
 const PULLING_AWAY_MPS: f64 = 2.0;
 
 /// A human driver who follows the lead vehicle by the Wiedemann 99 model and stays in the lane.
@@ -31,6 +38,7 @@ pub struct Wiedemann99Driver {
     desired_mps: Option<f64>,
     perception: Option<Perception>,
     emergency: EmergencyBrakingDetector,
+    pedals: Pedals,
 }
 
 impl Wiedemann99Driver {
@@ -41,7 +49,8 @@ impl Wiedemann99Driver {
             model: Wiedemann99Model::new(&settings),
             desired_mps: settings.desired_speed_mps,
             perception: None,
-            emergency: EmergencyBrakingDetector::default(),
+            emergency: EmergencyBrakingDetector::new(settings.hardest_braking_mps2),
+            pedals: Pedals::default(),
         }
     }
 
@@ -63,7 +72,8 @@ impl Driver for Wiedemann99Driver {
             let ahead = self.observe_ahead(input, rng);
             let requested_mps2 =
                 self.model.acceleration_mps2(speed_mps, desired_mps, ahead.as_ref().map(|vehicle| &vehicle.lead));
-            brake_for_brake_light(requested_mps2, speed_mps, ahead.as_ref())
+            let requested_mps2 = brake_for_brake_light(requested_mps2, speed_mps, ahead.as_ref());
+            self.pedals.apply_mps2(requested_mps2, input.time)
         } else {
             let lead = nearest_lead(input);
             self.model.acceleration_mps2(speed_mps, desired_mps, lead.as_ref())
@@ -123,17 +133,38 @@ pub(crate) fn brake_for_brake_light(requested_mps2: f64, speed_mps: f64, ahead: 
     }
 }
 
+/// Limits the acceleration as [`coast_for_brake_light`] does, for a driver who is about to overtake the vehicle ahead. If
+/// the gap closes as fast as drivers brake at, the driver brakes at least as hard as that vehicle, even if steering alone
+/// would avoid it: the brake light says that the prediction may be wrong.
+pub(crate) fn brake_before_overtaking(requested_mps2: f64, speed_mps: f64, ahead: Option<&PerceivedVehicle>) -> f64 {
+    let limited_mps2 = coast_for_brake_light(requested_mps2, speed_mps, ahead);
+    match ahead {
+        Some(vehicle)
+            if vehicle.brake_light
+                && speed_mps - vehicle.lead.speed_mps > BRAKE_ONSET_PER_S * vehicle.lead.gap_m.max(0.0) =>
+        {
+            limited_mps2.min(vehicle.lead.acceleration_mps2)
+        }
+        _ => limited_mps2,
+    }
+}
+
 /// Detects the start of emergency braking.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct EmergencyBrakingDetector {
+    hardest_braking_mps2: f64,
     brakes: bool,
 }
 
 impl EmergencyBrakingDetector {
+    pub(crate) fn new(hardest_braking_mps2: f64) -> Self {
+        Self { hardest_braking_mps2, brakes: false }
+    }
+
     /// Returns [`DriverNote::EmergencyBraking`] at the first step at which `acceleration_mps2` is emergency braking.
     pub(crate) fn detect(&mut self, acceleration_mps2: f64) -> Option<DriverNote> {
         let before = self.brakes;
-        self.brakes = acceleration_mps2 <= -EMERGENCY_BRAKING_SHARE * HARDEST_BRAKING_MPS2;
+        self.brakes = acceleration_mps2 <= -EMERGENCY_BRAKING_SHARE * self.hardest_braking_mps2;
         (self.brakes && !before).then_some(DriverNote::EmergencyBraking)
     }
 }

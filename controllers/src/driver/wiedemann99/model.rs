@@ -6,8 +6,8 @@
 //!
 //! | regime | acceleration |
 //! |---|---|
-//! | emergency | −slowing; braking is at least cc7 and at most 8 m/s² |
-//! | approaching | −slowing; braking is at most 8 m/s² |
+//! | emergency | −slowing; braking is at least cc7 and at most the hardest of the driver |
+//! | approaching | −slowing; braking is at most the hardest of the driver |
 //! | following | ±cc7; the sign changes at the edges of the regime |
 //! | free | from cc8 at standstill linearly to cc9 at 80 km/h, towards the desired speed; not above 0 while g ≤ safe |
 //!
@@ -49,19 +49,19 @@
 use super::thresholds::{Regime, Thresholds};
 use super::{Parameters99, Wiedemann99};
 use crate::braking::Behind;
-use crate::driver::{BRAKING_MARGIN, COASTING_DECELERATION_MPS2, HARDEST_BRAKING_MPS2, Lead, STANDING_MPS};
+use crate::driver::{BRAKING_MARGIN, COASTING_DECELERATION_MPS2, Lead, STANDING_MPS};
 
 /// Speed at which cc9 holds (m/s): 80 km/h.
 const CC9_SPEED_MPS: f64 = 80.0 / 3.6;
 
-/// Smallest distance that enters the deceleration to keep the safe gap (m); at zero it diverges.
+/// Smallest distance that enters the deceleration to keep the safe gap (m): numerical; at zero it diverges.
 const MIN_ROOM_M: f64 = 0.5;
 
-/// Hardest braking to keep the safe gap (m/s²): the upper end of comfortable braking (ISO 15622:2018 allows adaptive
-/// cruise control to brake by up to 3.5 m/s² at speeds above 20 m/s).
+/// Hardest braking to keep the safe gap (m/s²): an assumption, what ISO 15622 allows an adaptive cruise control from
+/// 20 m/s on. Published thresholds of comfort are 2 to 3.4.
 const COMFORTABLE_MPS2: f64 = 3.5;
 
-/// Time constant with which the driver approaches the desired speed (s).
+/// Time constant with which the driver approaches the desired speed (s): an assumption; 0.5 to 3 are plausible.
 const SPEED_TIME_S: f64 = 1.0;
 
 /// Time that the vehicle needs to reverse the oscillation of following (s): twice the actuator lag of 0.15 s, because
@@ -72,6 +72,7 @@ const REVERSAL_TIME_S: f64 = 0.3;
 #[derive(Clone, Copy, Debug)]
 pub struct Wiedemann99Model {
     parameters: Parameters99,
+    hardest_braking_mps2: f64,
     regime: Regime,
     /// True while the oscillation of following accelerates.
     accelerates: bool,
@@ -80,7 +81,12 @@ pub struct Wiedemann99Model {
 impl Wiedemann99Model {
     /// Creates a model with these settings, in the free regime.
     pub fn new(settings: &Wiedemann99) -> Self {
-        Self { parameters: settings.parameters, regime: Regime::Free, accelerates: false }
+        Self {
+            parameters: settings.parameters,
+            hardest_braking_mps2: settings.hardest_braking_mps2,
+            regime: Regime::Free,
+            accelerates: false,
+        }
     }
 
     /// Returns the regime of the latest acceleration.
@@ -96,7 +102,7 @@ impl Wiedemann99Model {
 
     /// Returns the acceleration at `speed_mps` behind `lead`, with the desired speed `desired_mps` (m/s²).
     ///
-    /// For every finite input, braking is at most 8 m/s² and the acceleration at most cc8.
+    /// For every finite input, braking is at most the hardest of the driver and the acceleration at most cc8.
     pub fn acceleration_mps2(&mut self, speed_mps: f64, desired_mps: f64, lead: Option<&Lead>) -> f64 {
         let speed_control_mps2 = ((desired_mps - speed_mps) / SPEED_TIME_S).max(-COASTING_DECELERATION_MPS2);
         let Some(lead) = lead else {
@@ -147,7 +153,7 @@ impl Wiedemann99Model {
         let closing_mps = (speed_mps - lead.speed_mps - safe_gap_shrinking_mps).max(0.0);
         let room_m = (lead.gap_m - thresholds.safe_m - margin_m).max(MIN_ROOM_M);
         let to_keep_safe_gap = closing_mps * closing_mps / (2.0 * room_m);
-        -to_keep_safe_gap.min(COMFORTABLE_MPS2).max(BRAKING_MARGIN * to_keep_apart).min(HARDEST_BRAKING_MPS2)
+        -to_keep_safe_gap.min(COMFORTABLE_MPS2).max(BRAKING_MARGIN * to_keep_apart).min(self.hardest_braking_mps2)
     }
 
     /// Returns the distance in which the oscillation removes a speed difference (m), at most half of the width of the

@@ -37,7 +37,7 @@
 use super::Parameters99;
 use crate::driver::Lead;
 
-/// Unit of cc6 (rad/s).
+/// Unit of cc6 (1/(m·s)) (PTV Vissim user manual, 2022).
 const CC6_UNIT: f64 = 1e-4;
 
 /// The regime of a following driver.

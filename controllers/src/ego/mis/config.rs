@@ -23,7 +23,8 @@ pub struct MisConfig {
     pub engage_gap_m: Option<Num>,
     /// Smallest closing speed of the rear vehicle at which the system engages (m/s); 10 km/h if absent.
     pub engage_closing_mps: Option<Num>,
-    /// Longest time for which the ego does not brake in the critical phase (s); 2 if absent.
+    /// Longest time for which the ego does not brake for the lead vehicle, from the moment at which the rear vehicle
+    /// crosses the marking or is at the critical gap (s): 0 to 10; 2 if absent. With 0, it always may.
     pub hold_s: Option<Num>,
     /// Worst assumed braking of the lead vehicle, which must leave room while holding (m/s²); 8 if absent.
     pub worst_front_braking_mps2: Option<Num>,
@@ -46,14 +47,15 @@ pub struct MisSettings {
     pub engage_gap_m: f64,
     /// Smallest closing speed of the rear vehicle at which the system engages (m/s).
     pub engage_closing_mps: f64,
-    /// Longest time for which the ego does not brake in the critical phase (s).
+    /// Longest time for which the ego does not brake for the lead vehicle in the critical phase (s).
     pub hold_s: f64,
     /// Worst assumed braking of the lead vehicle, which must leave room while holding (m/s²).
     pub worst_front_braking_mps2: f64,
 }
 
 impl MisSettings {
-    /// The paper's values.
+    /// The paper's values. Of them, `max_jerk_mps3`, `short_thw_s` and `worst_front_braking_mps2` are assumptions that the
+    /// paper does not state; 1 to 5 m/s³, 1 to 2 s and 6 to 9 m/s² are plausible.
     pub const PAPER: Self = Self {
         max_deceleration_mps2: 1.0,
         max_jerk_mps3: 2.0,

@@ -3,56 +3,53 @@
 use closecall_traffic::metrics::CRITICAL_THW_S;
 use closecall_traffic::{Absent, Time, TrackId};
 
+use super::room::has_room;
 use super::{ArrivalPrediction, BrakingResponse, Encounter, MisPlan, MisSettings};
 use crate::ego::surroundings::{
     Front, PassingLane, RearVehicle, nearest_rear_vehicle, passing_lane, rear_vehicle_from,
 };
 use crate::ego::{EgoInput, EgoState, Reason};
 
-/// Multiple of the engaging gap beyond which the rear vehicle has fallen back.
+/// Multiple of the engaging gap beyond which the rear vehicle has fallen back: an assumption; 1.1 to 1.5 are plausible.
 const FELL_BACK_GAP_RATIO: f64 = 1.2;
 
 /// Number of standard deviations by which the measured closing speed must exceed the one for engaging: 95 %, one-sided.
 /// A track whose speed has not settled yet does not engage; a track without error engages at once.
 const CONFIDENCE_SD: f64 = 1.645;
-/// Share of the engaging closing speed below which the rear vehicle counts as following.
+/// Share of the engaging closing speed below which the rear vehicle counts as following: an assumption; 0.2 to 0.8 are
+/// plausible.
 const FOLLOWING_SPEED_SHARE: f64 = 0.5;
 
-/// Time for which the rear vehicle must follow before the system releases: shorter intervals may be disturbances.
+/// Time for which the rear vehicle must follow before the system releases: shorter intervals may be disturbances. An
+/// assumption; 0.5 to 2 s are plausible.
 const FOLLOWING_DELAY: Time = Time::from_ms(1_000);
 
-/// Time for which a lost track, or a passing lane that is no longer known to be free, is tolerated.
+/// Time for which a lost track, or a passing lane that is no longer known to be free, is tolerated: an assumption;
+/// 0.2 to 1 s are plausible.
 const LOSS_TIMEOUT: Time = Time::from_ms(500);
 
-/// Largest distance between a new track and the expected position of the lost one to be taken for it (m).
+/// Largest distance between a new track and the expected position of the lost one to be taken for it (m): an
+/// assumption; 3 to 8 are plausible.
 const REASSOCIATION_DISTANCE_M: f64 = 5.0;
 
-/// Largest difference of their speeds (m/s).
+/// Largest difference of their speeds (m/s): an assumption; 2 to 5 are plausible.
 const REASSOCIATION_SPEED_MPS: f64 = 3.0;
 
 /// Speed below which the time headway of the ego is meaningless (m/s).
 const MIN_THW_SPEED_MPS: f64 = 1.0;
 
-/// Delay until braking takes effect: one control step and the actuators (s).
-const BRAKING_DELAY_S: f64 = 0.3;
-
-/// Braking that the ego is sure to achieve (m/s²): what a wet road allows (friction 0.6).
-const ASSURED_BRAKING_MPS2: f64 = 6.0;
-
-/// Gap to be left behind a standing lead vehicle (m).
-const STANDSTILL_GAP_M: f64 = 2.0;
-
-/// Jerk with which braking is released (m/s³).
+/// Jerk with which braking is released (m/s³): an assumption; 2 to 5 are plausible.
 pub(crate) const BRAKE_RELEASE_JERK_MPS3: f64 = 3.0;
 
-/// Time constant of the actuators, as the ego knows it (s).
+/// Time constant of the actuators, as the ego knows it (s): that of the simulated car; published responses of car brakes
+/// are 0.1 to 0.3 s.
 const ACTUATOR_LAG_S: f64 = 0.15;
 
 /// Largest shortfall at which the goal still counts as in reach (s). A margin that falls short by 0.1 s is still called
 /// reached; the difference covers effects that the prediction does not model, such as the control steps.
 const GOAL_TOLERANCE_S: f64 = 0.08;
 
-/// Multiple of the gap of the ACC within which the margin counts as returned.
+/// Multiple of the gap of the ACC within which the margin counts as returned: an assumption; 1.05 to 1.5 are plausible.
 const RETURNED_GAP_RATIO: f64 = 1.2;
 
 /// The request of the system to the arbitration.
@@ -113,7 +110,7 @@ pub(crate) struct Situation<'a> {
     pub(crate) input: &'a EgoInput<'a>,
     pub(crate) lead: Option<&'a Front>,
     pub(crate) automated: bool,
-    /// The last commanded acceleration (m/s²).
+    /// The last comfort command (m/s²).
     pub(crate) commanded_mps2: f64,
     /// The desired gap of the ACC (m).
     pub(crate) acc_gap_m: f64,
@@ -261,13 +258,10 @@ impl Mis {
             release(Reason::RearPassed)
         } else if !rear.in_own_lane() && rear.gap_m > CRITICAL_THW_S * rear.speed_mps {
             release(Reason::RearChangedLane)
+        } else if let Some(reason) = self.reason_to_hold(situation, rear) {
+            Some((State::Holding(*target, now), reason))
         } else if rear.gap_m <= settings.critical_gap_m {
-            match situation.lead {
-                Some(lead) if self.has_room(situation.speed_mps(), lead) => {
-                    Some((State::Holding(*target, now), Reason::CriticalDistance))
-                }
-                _ => release(Reason::NoRoomToHold),
-            }
+            release(if settings.hold_s > 0.0 { Reason::NoRoomToHold } else { Reason::HoldExpired })
         } else if rear.gap_m > FELL_BACK_GAP_RATIO * settings.engage_gap_m {
             release(Reason::RearFellBack)
         } else if now - target.last_approached > FOLLOWING_DELAY {
@@ -293,17 +287,28 @@ impl Mis {
             Some(_) if target.rear.is_past(&situation.input.odometry) => Reason::RearPassed,
             Some(_) if now - target.last_seen > LOSS_TIMEOUT => Reason::RearLost,
             Some(_) if (now - since).s() >= self.settings.hold_s => Reason::HoldExpired,
-            Some(lead) if !self.has_room(situation.speed_mps(), lead) => Reason::NoRoomToHold,
+            Some(lead) if !has_room(situation.speed_mps(), lead, self.settings.worst_front_braking_mps2) => {
+                Reason::NoRoomToHold
+            }
             Some(_) => return None,
         };
         Some((State::Releasing, reason))
     }
 
-    /// Returns true if the ego can stop behind the lead vehicle in case that brakes at its worst from now on.
-    fn has_room(&self, speed_mps: f64, lead: &Front) -> bool {
-        let lead_stopping_m = lead.speed_mps * lead.speed_mps / (2.0 * self.settings.worst_front_braking_mps2);
-        let own_stopping_m = speed_mps * BRAKING_DELAY_S + speed_mps * speed_mps / (2.0 * ASSURED_BRAKING_MPS2);
-        lead.gap_m + lead_stopping_m - own_stopping_m > STANDSTILL_GAP_M
+    /// Returns why holding begins now: the rear vehicle crosses the marking or is at the critical gap, and there is room.
+    /// Returns `None` if it does not begin.
+    fn reason_to_hold(&self, situation: &Situation<'_>, rear: &RearVehicle) -> Option<Reason> {
+        let reason = if rear.gap_m <= self.settings.critical_gap_m {
+            Reason::CriticalDistance
+        } else if !rear.in_own_lane() {
+            Reason::RearCrosses
+        } else {
+            return None;
+        };
+        let has_room = situation
+            .lead
+            .is_some_and(|lead| has_room(situation.speed_mps(), lead, self.settings.worst_front_braking_mps2));
+        (has_room && self.settings.hold_s > 0.0).then_some(reason)
     }
 
     /// Returns the build-up of the ego's braking from now on.

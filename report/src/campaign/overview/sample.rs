@@ -4,6 +4,7 @@ use std::cmp::Ordering;
 
 use closecall_traffic::{ActorId, Parameters};
 
+use closecall_campaign::ledger::PairFate;
 use closecall_campaign::record::Record;
 use closecall_simulation::outcome::{Outcome, Phase};
 
@@ -12,11 +13,12 @@ use closecall_simulation::outcome::{Outcome, Phase};
 pub enum Fate {
     /// The ego does not collide in any arm.
     Passed,
-    /// The ego collides in the baseline alone.
+    /// The ego collides in the baseline, and no vehicle collides in the arm under test.
     Prevented,
-    /// The ego collides in the arm under test, and in the baseline if there is one.
+    /// The ego collides in the arm under test, and in the baseline if there is one. In a pair, a collision of other vehicles in
+    /// the arm under test counts as well.
     Failed,
-    /// The ego collides in the arm under test, but not in the baseline.
+    /// The system under test adds a collision of the ego, or of other vehicles.
     Induced,
     /// An arm ended in an error.
     Error,
@@ -28,18 +30,20 @@ impl Fate {
 
     /// Returns the fate of the sample of a journal record.
     pub fn of(record: &Record) -> Self {
-        let collided = |arm: usize| record.arms[arm].result.as_ref().ok().map(|outcome| outcome.ego_collided());
-        let Some(tested) = record.arms.len().checked_sub(1) else { return Self::Error };
         if record.arms.iter().any(|arm| arm.result.is_err()) {
             return Self::Error;
         }
-        let baseline = (tested > 0).then(|| collided(0)).flatten();
-        match (baseline, collided(tested)) {
-            (Some(true), Some(false)) => Self::Prevented,
-            (Some(false), Some(true)) => Self::Induced,
-            (_, Some(true)) => Self::Failed,
-            (_, Some(false)) => Self::Passed,
-            (_, None) => Self::Error,
+        match &record.arms[..] {
+            [] => Self::Error,
+            [tested] if tested.tally().collided == Some(true) => Self::Failed,
+            [_] => Self::Passed,
+            [baseline, .., tested] => match PairFate::of(&baseline.tally(), &tested.tally()) {
+                Some(PairFate::Prevented) => Self::Prevented,
+                Some(PairFate::Induced) => Self::Induced,
+                Some(PairFate::Both) => Self::Failed,
+                Some(PairFate::Neither) => Self::Passed,
+                None => Self::Error,
+            },
         }
     }
 

@@ -1,7 +1,8 @@
 //! The figure of a whole encounter, laid out like the paper's: the road at the moments (a) to (e), the trajectories in
 //! the road frame, and plots over time with the moments marked.
 //!
-//! If there are two films, the first is the baseline. Its curves are dashed, and its moments are not marked.
+//! If there are two films, the first is the baseline. Its curves are dashed, and its moments are not marked, but the road at
+//! its hazard, moment (a), is shown first.
 
 use closecall_scenarios::criticality::CRITICAL_TTCE_S;
 use closecall_traffic::Time;
@@ -11,7 +12,7 @@ use super::colours::{EGO, FRONT, REAR, colour};
 use super::strip;
 use super::svg::{Anchor, Area, Stroke, Svg, TextStyle};
 use crate::run::film::{Film, Frame, ego_state_name};
-use closecall_simulation::outcome::CRITICAL_THW_S;
+use closecall_simulation::outcome::{CRITICAL_THW_S, Moment};
 
 const WIDTH: f64 = 900.0;
 const LEFT: f64 = 62.0;
@@ -36,12 +37,17 @@ const BASELINE_DASH: &str = "5 3";
 pub fn encounter(films: &[Film]) -> String {
     let Some(film) = films.last() else { return Svg::new([WIDTH, 1.0]).finish() };
     let instants = instants(film);
+    let hazard = films.first().filter(|_| films.len() > 1).and_then(hazard);
     let charts = charts(films);
-    let top_of_charts = 64.0 + STRIP_PERIOD * instants.len() as f64 + 34.0;
+    let mut strips: Vec<(&Film, &Instant)> = instants.iter().map(|instant| (film, instant)).collect();
+    if let Some(hazard) = &hazard {
+        strips.insert(0, (&films[0], hazard));
+    }
+    let top_of_charts = 64.0 + STRIP_PERIOD * strips.len() as f64 + 34.0;
     let height = top_of_charts + CHART_PERIOD * charts.len() as f64 + 3.0 * BAND_HEIGHT + 30.0;
     let mut svg = Svg::new([WIDTH, height]);
     title(&mut svg, films);
-    for (index, (time, letter, text)) in instants.iter().enumerate() {
+    for (index, (film, (time, letter, text))) in strips.into_iter().enumerate() {
         let top = 76.0 + STRIP_PERIOD * index as f64;
         let area = Area { left: LEFT, top, width: INNER, height: STRIP_HEIGHT };
         let frame_index = film.frames.partition_point(|frame| frame.time <= *time).saturating_sub(1);
@@ -79,12 +85,22 @@ fn title(svg: &mut Svg, films: &[Film]) {
     }
 }
 
-/// Returns the instants to show, in order of time, each with its letter and text: the moments that the run reached, and
+/// A time to show, with its letter and text.
+type Instant = (Time, char, String);
+
+/// Returns moment (a) of the baseline, if it reached that.
+fn hazard(baseline: &Film) -> Option<Instant> {
+    let noted = baseline.moments().iter().find(|noted| noted.moment == Moment::Hazard)?;
+    Some((noted.time, noted.moment.letter()?, format!("{} ({})", noted.moment.text(), baseline.arm())))
+}
+
+/// Returns the instants to show, in order of time, each with its letter and text: the moments of the paper that the run reached, and
 /// the collision. If there are none, instants at equal distances up to the critical moment are returned.
-fn instants(film: &Film) -> Vec<(Time, char, String)> {
+fn instants(film: &Film) -> Vec<Instant> {
     let moments = film.moments().iter();
-    let mut instants: Vec<_> =
-        moments.map(|noted| (noted.time, noted.moment.letter(), noted.moment.text().to_owned())).collect();
+    let mut instants: Vec<_> = moments
+        .filter_map(|noted| Some((noted.time, noted.moment.letter()?, noted.moment.text().to_owned())))
+        .collect();
     if let Some(collision) = film.worst_collision() {
         instants.push((collision.time, '!', "collision".to_owned()));
     } else if instants.is_empty() {
@@ -99,7 +115,7 @@ fn instants(film: &Film) -> Vec<(Time, char, String)> {
 }
 
 /// Returns the position of the ego along the road (m) at each instant, with the letter of the instant.
-fn ego_positions(film: &Film, instants: &[(Time, char, String)]) -> Vec<(f64, char)> {
+fn ego_positions(film: &Film, instants: &[Instant]) -> Vec<(f64, char)> {
     let ego_s_m = |time: Time| film.frame_at(time).map(|frame| frame.states[film.ego].s_m);
     instants.iter().filter_map(|(time, letter, _)| Some((ego_s_m(*time)?, *letter))).collect()
 }

@@ -1,4 +1,4 @@
-//! The critical moment of a film, and the five moments of its encounter, (a) to (e).
+//! The critical moment of a film, and the moments of its encounter.
 
 use closecall_traffic::Time;
 

@@ -68,7 +68,7 @@ impl Film {
         let happenings = self.happenings.iter().filter_map(|(time, what)| self.line(*time, what));
         let moments = self.moments().iter().map(|noted| StoryLine {
             time: noted.time,
-            text: format!("({}) {}", noted.moment.letter(), noted.moment.text()),
+            text: noted.moment.label(),
             is_severe: false,
         });
         let notes =

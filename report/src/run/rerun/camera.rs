@@ -18,7 +18,7 @@ use crate::run::film::{Film, Frame};
 const PIXEL_STEP: u16 = 5;
 /// Rendered rows of the image, from above the horizon down to the road just behind the ego (px).
 const PIXEL_ROWS: std::ops::Range<u16> = 230..610;
-/// Times before the critical moment for which an image is rendered, besides the first scan and the moments (a) to (e).
+/// Times before the critical moment for which an image is rendered, besides the first scan and the moments of the encounter.
 const TIMES_BEFORE: [Time; 3] = [Time::from_ms(2_000), Time::from_ms(800), Time::ZERO];
 
 /// Writes the images. Returns true if there are any.

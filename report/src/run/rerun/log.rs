@@ -27,7 +27,7 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film, is_alone: bool) -> Result<
     let mut lines = vec![plain("log/run", start, film.title.clone())];
     lines.extend(film.happenings.iter().map(|(time, what)| line(film, *time, what)));
     lines.extend(film.moments().iter().map(|noted| {
-        let text = format!("({}) {}", noted.moment.letter(), noted.moment.text());
+        let text = noted.moment.label();
         Line { colour: palette::MARKING, ..plain("log/moment", noted.time, text) }
     }));
     lines.extend(film.notes.iter().map(|(time, text)| plain("log/note", *time, text.clone())));

@@ -213,14 +213,13 @@ impl Plots<'_> {
         Ok(())
     }
 
-    /// Writes a band that shows the latest of the moments (a) to (e) at each time.
+    /// Writes a band that shows the latest of the moments of the encounter at each time.
     fn moments(&self) -> Result<(), RecordingError> {
         let moments = self.film.moments();
         if moments.is_empty() {
             return Ok(());
         }
-        let texts: Vec<String> =
-            moments.iter().map(|noted| format!("({}) {}", noted.moment.letter(), noted.moment.text())).collect();
+        let texts: Vec<String> = moments.iter().map(|noted| noted.moment.label()).collect();
         let latest = |time: Time| moments.iter().rposition(|noted| noted.time <= time);
         let words: Vec<&str> =
             self.times.iter().map(|&time| latest(time).map_or(BEFORE, |index| texts[index].as_str())).collect();

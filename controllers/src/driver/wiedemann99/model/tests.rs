@@ -3,9 +3,12 @@ use proptest::prelude::*;
 use super::*;
 use crate::driver::wiedemann99::Wiedemann99;
 
+/// Hardest braking of the driver (m/s²).
+const HARDEST_MPS2: f64 = 8.0;
+
 fn settings(cc1_s: f64) -> Wiedemann99 {
     let parameters = Parameters99 { cc1_s, ..Parameters99::VISSIM };
-    Wiedemann99 { parameters, desired_speed_mps: None, reaction: None, lapse: None }
+    Wiedemann99 { parameters, hardest_braking_mps2: HARDEST_MPS2, desired_speed_mps: None, reaction: None, lapse: None }
 }
 
 /// A driver behind a lead vehicle. The actual acceleration follows the desired one with the actuator lag of 0.15 s.
@@ -156,6 +159,6 @@ proptest! {
     ) {
         let lead = Lead { gap_m: gap, speed_mps: lead_mps, acceleration_mps2: lead_mps2 };
         let requested_mps2 = Wiedemann99Model::new(&settings(cc1)).acceleration_mps2(speed, 36.0, Some(&lead));
-        prop_assert!((-HARDEST_BRAKING_MPS2..=3.5).contains(&requested_mps2), "{requested_mps2}");
+        prop_assert!((-HARDEST_MPS2..=3.5).contains(&requested_mps2), "{requested_mps2}");
     }
 }

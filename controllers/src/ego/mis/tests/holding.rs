@@ -1,5 +1,7 @@
 //! Tests of the engaged system: holding, tolerance of losses, sensor failures, comfort.
 
+use closecall_traffic::GRAVITY_MPS2;
+
 use super::*;
 
 #[test]
@@ -32,11 +34,14 @@ fn holding_needs_room_for_the_worst_braking_of_the_lead_vehicle() {
     bench.lead().state[2] = 20.0;
     let command = bench.step();
     assert_eq!((command.state, command.reason), (EgoState::Releasing, Reason::NoRoomToHold));
-    assert!(command.acceleration_mps2 < -3.0, "{command:?}");
+    // The ACC brakes as hard as it may, within its jerk limit.
+    assert!(command.acceleration_mps2 < 0.0, "{command:?}");
+    let command = bench.step_for(3.5 / 2.5);
+    assert_eq!(command.acceleration_mps2, -3.5);
 }
 
 /// Finds the gaps at which the ego may just hold by time-stepping the worst case: the lead vehicle brakes at 8 m/s² at
-/// once, the ego 0.3 s later at 6 m/s², and 2 m are left.
+/// once, the ego 0.3 s later at 0.6·g, and 2 m are left.
 #[test]
 fn it_holds_exactly_if_the_worst_case_leaves_room() {
     let left_m = |gap_m: f64, lead_mps: f64| {
@@ -45,7 +50,7 @@ fn it_holds_exactly_if_the_worst_case_leaves_room() {
         while ego > 0.0 {
             gap += (lead - ego) * step_s;
             lead = f64::max(lead - 8.0 * step_s, 0.0);
-            ego -= if time_s < 0.3 { 0.0 } else { 6.0 * step_s };
+            ego -= if time_s < 0.3 { 0.0 } else { 0.6 * GRAVITY_MPS2 * step_s };
             time_s += step_s;
         }
         gap
@@ -73,7 +78,8 @@ fn a_rear_vehicle_that_leaves_the_lane_late_stays_the_target_until_it_is_past() 
     bench.rear().lane = [1.0, 0.0, 0.0];
     // 8 m are 0.2 s: the time headway at which the rear vehicle is expected to cross the marking.
     bench.rear().state[0] = -8.0 - CAR_M;
-    assert_eq!(bench.step().state, EgoState::Increasing);
+    let command = bench.step();
+    assert_eq!((command.state, command.reason), (EgoState::Holding, Reason::RearCrosses));
     bench.rear().state[0] = -5.0 - CAR_M;
     assert_eq!(bench.step().state, EgoState::Holding);
     bench.rear().state[0] = 1.1 * CAR_M;
@@ -190,4 +196,41 @@ fn commands_stay_within_the_comfort_limits() {
         last_mps2 = now_mps2;
     }
     assert!(last_mps2 > 0.0, "the margin is returned");
+}
+
+/// Returns how long the ego does not brake for a slower lead vehicle far ahead, once the rear vehicle crosses the marking
+/// (s), at most 12 s.
+fn without_braking_s(hold_s: f64) -> f64 {
+    let mut bench = Bench::with_mis(MisSettings { hold_s, ..MisSettings::PAPER });
+    assert_eq!(bench.step().state, EgoState::Increasing);
+    // At the critical gap, the plan asks for no braking either.
+    bench.rear().lane = [1.0, 0.0, 0.0];
+    bench.rear().state[0] = -4.0 - CAR_M;
+    bench.rear().state[2] = 31.5;
+    bench.lead().state[0] = 75.0 + CAR_M;
+    bench.lead().state[2] = 15.0;
+    let from = bench.time;
+    while bench.step().acceleration_mps2 >= -0.2 && bench.time < from + Time::from_s(12.0) {}
+    (bench.time - from).s()
+}
+
+#[test]
+fn the_holding_time_is_the_time_without_braking() {
+    let [none_s, two_s, ten_s] = [0.0, 2.0, 10.0].map(without_braking_s);
+    assert!(none_s < 0.3, "{none_s}");
+    assert!((two_s - none_s - 2.0).abs() < 0.1, "{two_s}");
+    assert!((ten_s - none_s - 10.0).abs() < 0.1, "{ten_s}");
+}
+
+#[test]
+fn the_brake_is_released_while_the_rear_vehicle_crosses_and_the_acc_is_ignored() {
+    let mut bench = Bench::engaged();
+    bench.step_for(1.0);
+    bench.lead().state[0] = 75.0 + CAR_M;
+    bench.lead().state[2] = 15.0;
+    bench.rear().lane = [1.0, 0.0, 0.0];
+    bench.rear().state[0] = -10.0 - CAR_M;
+    let command = bench.step_for(1.0);
+    assert_eq!((command.state, command.reason), (EgoState::Holding, Reason::RearCrosses));
+    assert_eq!(command.acceleration_mps2, 0.0, "{command:?}");
 }

@@ -1,5 +1,6 @@
 //! Tests of each condition and transition, on the whole ego stack with hand-made tracks.
 
+mod emergency;
 mod engaging;
 mod holding;
 mod releasing;
@@ -75,13 +76,22 @@ impl Bench {
         Self::with_automation(true)
     }
 
+    const SETTINGS: EgoSettings = EgoSettings {
+        acc: Acc { time_gap_s: 0.7, set_speed_mps: None, standstill_gap_m: 3.0 },
+        aeb: None,
+        mis: Some(MisSettings::PAPER),
+        automated: true,
+    };
+
     fn with_automation(automated: bool) -> Self {
-        let settings = EgoSettings {
-            acc: Acc { time_gap_s: 0.7, set_speed_mps: None, standstill_gap_m: 3.0 },
-            aeb: None,
-            mis: Some(MisSettings::PAPER),
-            automated,
-        };
+        Self::with_settings(EgoSettings { automated, ..Self::SETTINGS })
+    }
+
+    fn with_mis(mis: MisSettings) -> Self {
+        Self::with_settings(EgoSettings { mis: Some(mis), ..Self::SETTINGS })
+    }
+
+    fn with_settings(settings: EgoSettings) -> Self {
         Self {
             stack: EgoStack::new(settings),
             time: Time::ZERO,

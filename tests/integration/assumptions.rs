@@ -1,0 +1,56 @@
+//! Every constant of the controllers and drivers that is an assumption stands in the list of `docs/mis.md`, and nothing else.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use crate::support::ROOT;
+
+/// Returns the Rust files below a folder.
+fn sources(folder: &Path) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            files.extend(sources(&path));
+        } else if path.extension().is_some_and(|end| end == "rs") {
+            files.push(path);
+        }
+    }
+    files
+}
+
+/// Returns the constants of a file whose doc comments call them assumptions.
+fn assumed(text: &str) -> Vec<String> {
+    let mut names = Vec::new();
+    let mut docs = String::new();
+    for line in text.lines().map(str::trim) {
+        if let Some(doc) = line.strip_prefix("///") {
+            docs.push_str(doc);
+            continue;
+        }
+        if let Some((_, rest)) = line.split_once("const ")
+            && docs.to_lowercase().contains("assumption")
+            && let Some((name, _)) = rest.split_once(':')
+        {
+            names.push(name.to_owned());
+        }
+        docs.clear();
+    }
+    names
+}
+
+/// Returns the first cells of the table of assumptions.
+fn listed(markdown: &str) -> BTreeSet<String> {
+    let (_, list) = markdown.split_once("## Constants without a source that was looked up").unwrap();
+    let rows = list.lines().filter_map(|line| line.strip_prefix("| `"));
+    rows.filter_map(|row| row.split_once('`')).map(|(name, _)| name.to_owned()).collect()
+}
+
+#[test]
+fn every_assumed_constant_of_the_controllers_is_listed() {
+    let files = sources(&Path::new(ROOT).join("controllers/src"));
+    let assumed: BTreeSet<String> =
+        files.iter().flat_map(|path| assumed(&std::fs::read_to_string(path).unwrap())).collect();
+    assert!(assumed.len() > 40, "{assumed:?}");
+    assert_eq!(listed(include_str!("../../docs/mis.md")), assumed);
+}
