@@ -62,7 +62,7 @@ impl Case {
         self.rows.iter().map(seen).collect()
     }
 
-    /// Returns what the follower of the closed loop does behind the same lead vehicle.
+    /// Returns what the follower of the closed loop does behind the same lead vehicle. It brakes as hard as SUMO's, 8 m/s².
     fn closed_loop(&self) -> Vec<Seen> {
         let profile: Vec<[f64; 2]> = self.rows.iter().map(|row| [row.time_s, row.lead_mps]).collect();
         let (start, cc1_s) = (self.rows[0], self.cc1_s);
@@ -78,7 +78,7 @@ driver = {{ prescribed = {{ profile = {profile:?} }} }}
 id = "follower"
 vehicle = {{ class = "car" }}
 start = {{ behind = {{ of = "lead", gap-m = {:?}, speed-mps = {:?} }} }}
-driver = {{ wiedemann99 = {{ cc1-s = {cc1_s:?}, desired-speed-mps = 36.0 }} }}
+driver = {{ wiedemann99 = {{ cc1-s = {cc1_s:?}, desired-speed-mps = 36.0, hardest-braking-mps2 = 8.0 }} }}
 "#,
             start.lead_mps, start.gap_m, start.follower_mps
         );
