@@ -105,6 +105,18 @@ fn controller(text: &str) -> Result<ControllerChoice, String> {
     }
 }
 
+/// What is simulated of a scenario: its random numbers, the controller of the ego vehicle and its sensors, and settings.
+#[derive(Clone, Debug, Args)]
+pub(super) struct SimulationArgs {
+    /// Seed of the random numbers
+    #[arg(long, default_value_t = 0)]
+    pub(super) seed: u64,
+    #[command(flatten)]
+    pub(super) arm: ArmArgs,
+    #[command(flatten)]
+    pub(super) set: SetArgs,
+}
+
 /// The controller of the ego vehicle, and its sensors.
 #[derive(Clone, Debug, Args)]
 pub(super) struct ArmArgs {

@@ -13,7 +13,7 @@ use closecall_simulation::scenario::{ActorConfig, Scenario, ScenarioFile};
 use closecall_simulation::{Observer, RunKey};
 
 use super::CliError;
-use super::args::{ArmArgs, SetArgs, count};
+use super::args::{SimulationArgs, count};
 use super::backend::check_backend_of;
 use super::output::outln;
 use super::protect::{of_scenario, protect};
@@ -27,13 +27,8 @@ pub(super) struct RecordArgs {
     /// Number of samples; their traffic follows one after the other in the file
     #[arg(short = 'n', long = "samples", default_value_t = 20, allow_negative_numbers = true, value_parser = sample_count)]
     samples: u64,
-    /// Seed of the random numbers
-    #[arg(long, default_value_t = 0)]
-    seed: u64,
     #[command(flatten)]
-    arm: ArmArgs,
-    #[command(flatten)]
-    set: SetArgs,
+    sim: SimulationArgs,
     /// Write the in-car log of one vehicle, and its true lane changes in `FILE.truth.csv`. ACTOR is the id of the
     /// vehicle [default: the first actor with an overtaking driver]
     #[arg(long, value_name = "ACTOR", num_args = 0..=1, require_equals = true)]
@@ -62,8 +57,8 @@ pub(super) fn record(args: &RecordArgs) -> Result<ExitCode, CliError> {
 }
 
 fn record_traffic(args: &RecordArgs) -> Result<ExitCode, CliError> {
-    let file = args.set.load(&args.scenario)?;
-    protect(&[of_scenario(&file), args.arm.files()].concat(), &[("--output", Some(&args.output))])?;
+    let file = args.sim.set.load(&args.scenario)?;
+    protect(&[of_scenario(&file), args.sim.arm.files()].concat(), &[("--output", Some(&args.output))])?;
     let mut recorder = TrafficRecorder::default();
     each_sample(args, &file, &mut recorder, TrafficRecorder::begin)?;
     let recording = recorder.finish(&file.config().name);
@@ -75,10 +70,10 @@ fn record_traffic(args: &RecordArgs) -> Result<ExitCode, CliError> {
 }
 
 fn record_in_car(args: &RecordArgs, actor: Option<&str>) -> Result<ExitCode, CliError> {
-    let file = args.set.load(&args.scenario)?;
+    let file = args.sim.set.load(&args.scenario)?;
     let truth = ground_truth_path(&args.output);
     let outputs = [("--output", Some(args.output.as_path())), ("--in-car", Some(truth.as_path()))];
-    protect(&[of_scenario(&file), args.arm.files()].concat(), &outputs)?;
+    protect(&[of_scenario(&file), args.sim.arm.files()].concat(), &outputs)?;
     let actors = &file.config().actors;
     let overtakes = |actor: &&ActorConfig| matches!(actor.driver, DriverConfig::Overtaker(_));
     let ids = || actors.iter().map(|actor| actor.id.to_string());
@@ -113,14 +108,14 @@ fn each_sample<R: Observer>(
     recorder: &mut R,
     begin: fn(&mut R, &Scenario),
 ) -> Result<(), CliError> {
-    let sampling = Sampling { seed: args.seed, design: Design::Random, samples: args.samples };
-    let arm = args.arm.arm()?;
+    let sampling = Sampling { seed: args.sim.seed, design: Design::Random, samples: args.samples };
+    let arm = args.sim.arm.arm()?;
     for sample in 0..args.samples {
         let fail = |source| CliError::Sample { sample, source };
         let scenario = concrete(file, sampling, sample).map_err(fail)?;
         check_backend_of(&scenario, std::slice::from_ref(&arm))?;
         begin(recorder, &scenario);
-        run_guarded(&scenario, RunKey { seed: args.seed, sample }, &arm, recorder).map_err(fail)?;
+        run_guarded(&scenario, RunKey { seed: args.sim.seed, sample }, &arm, recorder).map_err(fail)?;
     }
     Ok(())
 }

@@ -18,7 +18,7 @@ use closecall_simulation::{CONTROL_STEP, RunKey};
 use serde_json::json;
 
 use super::CliError;
-use super::args::{ArmArgs, Format, ReadArgs, SetArgs};
+use super::args::{Format, ReadArgs, SimulationArgs};
 use super::output::outln;
 use super::protect::{of_trajectories, protect};
 use super::watch::{WatchArgs, run_filmed};
@@ -61,13 +61,8 @@ pub(super) struct ReenactArgs {
     /// What controls the rear vehicle
     #[arg(long, value_enum, default_value_t)]
     rear: RearChoice,
-    /// Seed of the random numbers
-    #[arg(long, default_value_t = 0)]
-    seed: u64,
     #[command(flatten)]
-    arm: ArmArgs,
-    #[command(flatten)]
-    set: SetArgs,
+    sim: SimulationArgs,
     #[command(flatten)]
     watch: WatchArgs,
     /// Save the scenario of the encounter, for further runs and variations
@@ -79,7 +74,7 @@ pub(super) struct ReenactArgs {
 }
 
 pub(super) fn reenact(args: &ReenactArgs) -> Result<ExitCode, CliError> {
-    let inputs = [of_trajectories(std::slice::from_ref(&args.file)), args.arm.files()].concat();
+    let inputs = [of_trajectories(std::slice::from_ref(&args.file)), args.sim.arm.files()].concat();
     let [record, trace] = args.watch.outputs();
     protect(&inputs, &[("--output", args.output.as_deref()), record, trace])?;
     let recording = smooth(&read_with(&args.file, args.read.options())?);
@@ -87,10 +82,10 @@ pub(super) fn reenact(args: &ReenactArgs) -> Result<ExitCode, CliError> {
     let all: Vec<LaneChange> = changes.iter().map(|change| change.lane_change.clone()).collect();
     let found = choose(args, &changes, |change| encounter(&recording, change, &all, CONTROL_STEP))?;
     let source = format!("{} (track {})", args.file.display(), found.change.track_id);
-    let file = scenario_of(&found, args.rear.into(), (Path::new(&source), &args.set.settings))?;
+    let file = scenario_of(&found, args.rear.into(), (Path::new(&source), &args.sim.set.settings))?;
     let scenario = file.concrete(&file.space().nominal())?;
-    let key = RunKey { seed: args.seed, sample: 0 };
-    let (outcome, simulated) = run_filmed(&scenario, key, &args.arm.arm()?, &args.watch)?;
+    let key = RunKey { seed: args.sim.seed, sample: 0 };
+    let (outcome, simulated) = run_filmed(&scenario, key, &args.sim.arm.arm()?, &args.watch)?;
     let recorded = film_encounter(&found, args.watch.record_level.into())?;
     let comparison = EncounterComparison::new(&found, &recorded, &simulated);
     let foreword = comparison.markdown(&found, &simulated, args.rear.into());

@@ -12,7 +12,7 @@ use closecall_simulation::outcome::Outcome;
 use closecall_simulation::scenario::Setting;
 
 use super::CliError;
-use super::args::{ArmArgs, Format, SetArgs};
+use super::args::{Format, SimulationArgs};
 use super::output::{out, outln};
 use super::protect::{of_scenario, protect};
 use super::watch::{WatchArgs, run_watched};
@@ -23,20 +23,15 @@ use crate::exit_code::ExitCode;
 pub(super) struct RunArgs {
     /// Scenario file, name of a scenario of the library, or `-` for standard input
     scenario: PathBuf,
-    /// Seed of the random numbers
-    #[arg(long, default_value_t = 0)]
-    seed: u64,
     /// Number of the sample
     #[arg(long, default_value_t = 0)]
     sample: u64,
     #[command(flatten)]
-    arm: ArmArgs,
+    sim: SimulationArgs,
     /// Also run the sample with the baseline controller `acc`, on the same random numbers; --record saves both runs in
     /// one file
     #[arg(long)]
     paired: bool,
-    #[command(flatten)]
-    set: SetArgs,
     #[command(flatten)]
     watch: WatchArgs,
     /// Output format
@@ -45,14 +40,14 @@ pub(super) struct RunArgs {
 }
 
 pub(super) fn run(args: &RunArgs) -> Result<ExitCode, CliError> {
-    let file = args.set.load(&args.scenario)?;
-    protect(&[of_scenario(&file), args.arm.files()].concat(), &args.watch.outputs())?;
-    let sampling = Sampling { seed: args.seed, design: Design::Random, samples: args.sample.saturating_add(1) };
+    let file = args.sim.set.load(&args.scenario)?;
+    protect(&[of_scenario(&file), args.sim.arm.files()].concat(), &args.watch.outputs())?;
+    let sampling = Sampling { seed: args.sim.seed, design: Design::Random, samples: args.sample.saturating_add(1) };
     let fail = |source| CliError::Sample { sample: args.sample, source };
     let scenario = concrete(&file, sampling, args.sample).map_err(fail)?;
-    let key = RunKey { seed: args.seed, sample: args.sample };
-    let outcomes = run_watched(&scenario, key, &args.arm.arms(args.paired)?, &args.watch)?;
-    print(&outcomes, args.format, Some(&args.set.settings));
+    let key = RunKey { seed: args.sim.seed, sample: args.sample };
+    let outcomes = run_watched(&scenario, key, &args.sim.arm.arms(args.paired)?, &args.watch)?;
+    print(&outcomes, args.format, Some(&args.sim.set.settings));
     Ok(ExitCode::Pass)
 }
 

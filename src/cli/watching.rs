@@ -11,7 +11,7 @@ use closecall_simulation::scenario::source::existing;
 use closecall_simulation::{NoObserver, RunKey};
 
 use super::CliError;
-use super::args::{ArmArgs, SetArgs, count};
+use super::args::{SimulationArgs, count};
 use super::output::{outln, print_error};
 use crate::exit_code::ExitCode;
 
@@ -26,16 +26,11 @@ pub(super) struct WatchingArgs {
     /// Number of samples to run at every change
     #[arg(short = 'n', long = "samples", default_value = "5", allow_negative_numbers = true, value_parser = count)]
     samples: u64,
-    /// Seed of the random numbers
-    #[arg(long, default_value_t = 0)]
-    seed: u64,
     #[command(flatten)]
-    arm: ArmArgs,
+    sim: SimulationArgs,
     /// Also run every sample with the baseline controller `acc`
     #[arg(long)]
     paired: bool,
-    #[command(flatten)]
-    set: SetArgs,
     /// End after this many rounds [default: go on until Ctrl-C]
     #[arg(long, value_name = "N")]
     rounds: Option<u64>,
@@ -82,16 +77,16 @@ fn state(path: &Path) -> Option<(SystemTime, u64)> {
 
 /// Checks the file, and runs its first samples.
 fn round(args: &WatchingArgs, path: &Path) -> Result<(), CliError> {
-    let file = args.set.load(path)?;
+    let file = args.sim.set.load(path)?;
     let (name, parameters) = (&file.config().name, file.space().iter().len());
     outln!("{}: valid, {name} with {parameters} parameters", path.display());
-    let sampling = Sampling { seed: args.seed, design: Design::Random, samples: args.samples };
-    let arms = args.arm.arms(args.paired)?;
+    let sampling = Sampling { seed: args.sim.seed, design: Design::Random, samples: args.samples };
+    let arms = args.sim.arm.arms(args.paired)?;
     for sample in 0..args.samples {
         let fail = |source| CliError::Sample { sample, source };
         let scenario = concrete(&file, sampling, sample).map_err(fail)?;
         for arm in &arms {
-            let key = RunKey { seed: args.seed, sample };
+            let key = RunKey { seed: args.sim.seed, sample };
             let outcome = run_guarded(&scenario, key, arm, &mut NoObserver).map_err(fail)?;
             outln!("  {}", line(&outcome));
         }
