@@ -15,34 +15,15 @@ use std::path::Path;
 
 use closecall_scenarios::atomic::{WriteError, write_file};
 use closecall_scenarios::sampling::Design;
-use closecall_simulation::outcome::Margins;
-use closecall_statistics::quantiles::quantile;
-use closecall_traffic::Measured;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::folder::{Folder, FolderError};
+use crate::margins::{MARGINS, Margin, MarginRegression, quantiles, regressions};
 use crate::record::ArmRecord;
 
 /// The version of the layout of a baseline file.
 pub const BASELINE_VERSION: u32 = 1;
-
-/// The probabilities of the quantiles that are kept. Small quantiles describe the runs closest to a collision.
-const PROBABILITIES: [(&str, f64); 4] = [("min", 0.0), ("p01", 0.01), ("p05", 0.05), ("p50", 0.5)];
-
-/// A change of a margin up to this much is no regression (s or m): it is below what a report shows.
-const SMALLEST_CHANGE: f64 = 0.01;
-
-/// A margin of a run, by its key in reports. A smaller value is closer to a collision.
-type Margin = (&'static str, fn(&Margins) -> Measured);
-
-const MARGINS: [Margin; 5] = [
-    ("min_thw_front_s", |margins| margins.min_thw_front_s),
-    ("min_thw_rear_s", |margins| margins.min_thw_rear_s),
-    ("min_gap_front_m", |margins| margins.min_gap_front_m),
-    ("min_gap_rear_m", |margins| margins.min_gap_rear_m),
-    ("min_ttc_rear_s", |margins| margins.min_ttc_rear_s),
-];
 
 /// The results of a campaign, as far as a repository keeps them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -193,13 +174,8 @@ fn compare(
     let only_in = |one: &[u64], other: &[u64]| one.iter().filter(|sample| !other.contains(sample)).copied().collect();
     let mut margins = Vec::new();
     for (margin, quantiles) in &before.margins {
-        for (quantile, &baseline) in quantiles {
-            let Some(&current) = after.margins.get(margin).and_then(|now| now.get(quantile)) else { continue };
-            let lost = baseline - current;
-            if lost > SMALLEST_CHANGE && lost > tolerance * baseline.abs() {
-                let (margin, quantile) = (margin.clone(), quantile.clone());
-                margins.push(MarginRegression { margin, quantile, baseline, current });
-            }
+        if let Some(now) = after.margins.get(margin) {
+            margins.extend(regressions(margin, quantiles, now, tolerance));
         }
     }
     ScenarioBaselineComparison {
@@ -244,19 +220,6 @@ pub struct ScenarioBaselineComparison {
     pub margins: Vec<MarginRegression>,
 }
 
-/// A quantile of a margin that has fallen.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct MarginRegression {
-    /// The margin's key in reports. It ends with the unit.
-    pub margin: String,
-    /// The quantile: `min`, `p01`, `p05` or `p50`.
-    pub quantile: String,
-    /// Its value in the baseline, in the unit of the margin.
-    pub baseline: f64,
-    /// Its value in the later campaign, in the unit of the margin.
-    pub current: f64,
-}
-
 /// The samples of one scenario while a folder is read.
 #[derive(Debug)]
 struct Collected {
@@ -278,7 +241,7 @@ impl Collected {
                     result.collisions += 1;
                     result.failing.push(sample);
                 }
-                for (values, (_, value)) in self.values.iter_mut().zip(MARGINS) {
+                for (values, Margin { value, .. }) in self.values.iter_mut().zip(MARGINS) {
                     values.extend(value(&outcome.margins).ok());
                 }
             }
@@ -290,11 +253,9 @@ impl Collected {
     }
 
     fn finish(mut self) -> ScenarioBaseline {
-        for (values, (key, _)) in self.values.iter_mut().zip(MARGINS) {
+        for (values, Margin { key, .. }) in self.values.iter_mut().zip(MARGINS) {
             if !values.is_empty() {
-                values.sort_by(f64::total_cmp);
-                let quantiles = PROBABILITIES.map(|(name, u)| (name.to_owned(), quantile(values, u)));
-                self.result.margins.insert(key.to_owned(), quantiles.into());
+                self.result.margins.insert(key.to_owned(), quantiles(values));
             }
         }
         self.result.failing.sort_unstable();

@@ -5,10 +5,8 @@
 
 use std::path::PathBuf;
 
-use closecall_simulation::outcome::Margins;
-use closecall_traffic::Measured;
-
 use super::folder::{Folder, FolderError};
+use super::margins::{MARGINS, Margin, MarginRegression, quantiles, regressions};
 use super::record::{ArmRecord, Record};
 
 /// The reason for which two campaigns cannot be compared.
@@ -43,33 +41,17 @@ pub enum CompareError {
     },
 }
 
-/// A margin to compare. A smaller value is closer to a collision.
-struct Margin {
-    /// The key in reports.
-    key: &'static str,
-    /// Returns the margin of a run.
-    value: fn(&Margins) -> Measured,
-}
-
-const MARGINS: [Margin; 5] = [
-    Margin { key: "min_thw_front_s", value: |margins| margins.min_thw_front_s },
-    Margin { key: "min_thw_rear_s", value: |margins| margins.min_thw_rear_s },
-    Margin { key: "min_gap_front_m", value: |margins| margins.min_gap_front_m },
-    Margin { key: "min_gap_rear_m", value: |margins| margins.min_gap_rear_m },
-    Margin { key: "min_ttc_rear_s", value: |margins| margins.min_ttc_rear_s },
-];
-
 /// The change of one margin, over the samples that have it in both campaigns.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct MarginChange {
     /// The key in reports. It ends with the unit.
     pub key: &'static str,
     /// Number of samples that have the margin in both campaigns.
     pub samples: u64,
-    /// Sum over these samples in the baseline.
-    baseline_sum: f64,
-    /// Sum over these samples in the later campaign.
-    current_sum: f64,
+    /// The values of these samples in the baseline.
+    baseline: Vec<f64>,
+    /// The values of these samples in the later campaign.
+    current: Vec<f64>,
     /// The sample whose margin shrank most.
     pub worst: Option<SampleChange>,
 }
@@ -95,14 +77,19 @@ pub struct Means {
 impl MarginChange {
     /// Returns the means in both campaigns; `None` if no sample has the margin in both.
     pub fn means(&self) -> Option<Means> {
-        let mean = |sum: f64| sum / self.samples as f64;
-        (self.samples > 0).then(|| Means { baseline: mean(self.baseline_sum), current: mean(self.current_sum) })
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / self.samples as f64;
+        (self.samples > 0).then(|| Means { baseline: mean(&self.baseline), current: mean(&self.current) })
+    }
+
+    fn regressions(&self, tolerance: f64) -> Vec<MarginRegression> {
+        let of = |values: &[f64]| quantiles(&mut values.to_vec());
+        regressions(self.key, &of(&self.baseline), &of(&self.current), tolerance)
     }
 
     fn push(&mut self, sample: u64, baseline: f64, current: f64) {
         self.samples += 1;
-        self.baseline_sum += baseline;
-        self.current_sum += current;
+        self.baseline.push(baseline);
+        self.current.push(current);
         let change = current - baseline;
         if self.worst.is_none_or(|worst| !(change >= worst.change)) {
             self.worst = Some(SampleChange { sample, change });
@@ -138,8 +125,8 @@ impl ScenarioComparison {
         let unchanged = |Margin { key, .. }: Margin| MarginChange {
             key,
             samples: 0,
-            baseline_sum: 0.0,
-            current_sum: 0.0,
+            baseline: Vec::new(),
+            current: Vec::new(),
             worst: None,
         };
         Self {
@@ -153,6 +140,12 @@ impl ScenarioComparison {
             no_longer_in_error: Vec::new(),
             margins: MARGINS.map(unchanged).to_vec(),
         }
+    }
+
+    /// Returns the quantiles of margins that fall by more than the share `tolerance` of their value, and by more than 0.01
+    /// (s or m).
+    pub fn margin_regressions(&self, tolerance: f64) -> Vec<MarginRegression> {
+        self.margins.iter().flat_map(|margin| margin.regressions(tolerance)).collect()
     }
 
     fn push(&mut self, sample: u64, baseline: &ArmRecord, current: &ArmRecord) {

@@ -27,6 +27,7 @@ pub mod journal;
 pub mod ledger;
 pub mod lock;
 pub mod manifest;
+pub mod margins;
 pub mod merge;
 pub mod partition;
 pub mod plan;

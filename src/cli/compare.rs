@@ -5,10 +5,12 @@ use std::path::PathBuf;
 use clap::Args;
 use closecall_campaign::compare::{Means, ScenarioComparison, compare as compare_folders};
 use closecall_campaign::folder::Folder;
+use closecall_campaign::margins::MarginRegression;
 use closecall_report::json::{self, stamped};
 
 use super::CliError;
 use super::args::Format;
+use super::gates::share;
 use super::output::{listed, out, outln};
 use crate::exit_code::ExitCode;
 
@@ -22,6 +24,9 @@ pub(super) struct CompareArgs {
     /// Largest number of newly failing samples that does not count as a regression
     #[arg(long, default_value_t = 0, value_name = "K")]
     max_newly_failing: u64,
+    /// Share (0 to 1) by which a quantile of a margin may fall
+    #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = 0.05)]
+    tolerance: f64,
     /// Output format
     #[arg(long, value_enum, default_value_t)]
     format: Format,
@@ -32,26 +37,27 @@ pub(super) fn compare(args: &CompareArgs) -> Result<ExitCode, CliError> {
     let (baseline_manifest, current_manifest) = (baseline.manifest()?, current.manifest()?);
     let differences = baseline_manifest.differences(&current_manifest);
     let found = compare_folders(&baseline, &current)?;
-    let code = judge(&found, args.max_newly_failing);
+    let code = judge(&found, args.max_newly_failing, args.tolerance);
     match args.format {
         Format::Json => {
             outln!(
                 "{:#}",
                 stamped(
-                    json::comparison(&found, &differences, code == ExitCode::Pass),
+                    json::comparison(&found, &differences, args.tolerance, code == ExitCode::Pass),
                     Some(current_manifest.sampling.seed),
                     None
                 )
             )
         }
-        Format::Human => print(&found, &differences, code),
+        Format::Human => print(&found, &differences, args.tolerance, code),
     }
     Ok(code)
 }
 
-fn judge(found: &[ScenarioComparison], max_newly_failing: u64) -> ExitCode {
+fn judge(found: &[ScenarioComparison], max_newly_failing: u64, tolerance: f64) -> ExitCode {
     let newly_failing: usize = found.iter().map(|scenario| scenario.newly_failing.len()).sum();
-    let is_regression = newly_failing as u64 > max_newly_failing;
+    let has_lost_margin = found.iter().any(|scenario| !scenario.margin_regressions(tolerance).is_empty());
+    let is_regression = newly_failing as u64 > max_newly_failing || has_lost_margin;
     let has_new_errors = found.iter().any(|scenario| !scenario.newly_in_error.is_empty());
     let codes = [(is_regression, ExitCode::Fail), (has_new_errors, ExitCode::SampleError)];
     ExitCode::first_of(codes.into_iter().filter(|(holds, _)| *holds).map(|(_, code)| code))
@@ -65,7 +71,7 @@ fn verdict(code: ExitCode) -> &'static str {
     }
 }
 
-fn print(found: &[ScenarioComparison], differences: &[String], code: ExitCode) {
+fn print(found: &[ScenarioComparison], differences: &[String], tolerance: f64, code: ExitCode) {
     for difference in differences {
         outln!("differs: {difference}");
     }
@@ -88,6 +94,9 @@ fn print(found: &[ScenarioComparison], differences: &[String], code: ExitCode) {
                 out!("; sample {} lost most ({:+.3})", worst.sample, worst.change);
             }
             outln!();
+        }
+        for MarginRegression { margin, quantile, baseline, current } in scenario.margin_regressions(tolerance) {
+            outln!("  REGRESSION: {margin} {quantile} {baseline:.3}, now {current:.3}");
         }
     }
     outln!("{}", verdict(code));

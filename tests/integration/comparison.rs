@@ -49,9 +49,9 @@ fn compare_names_newly_failing_and_fixed_samples() {
     assert!(text.contains("REGRESSION") && text.contains("arms"), "{text}");
     assert!(text.contains(&format!("{} newly failing: {}", newly.len(), newly[0])), "{text}");
     let allowed = newly.len().to_string();
-    stdout(&compare(&with, &without, &["--max-newly-failing", &allowed]), 0);
+    stdout(&compare(&with, &without, &["--max-newly-failing", &allowed, "--tolerance", "1"]), 0);
     // With the folders exchanged, the fixed samples are the newly failing ones.
-    let back = json(&compare(&without, &with, &["--format", "json"]), i32::from(!fixed.is_empty()));
+    let back = json(&compare(&without, &with, &["--format", "json", "--tolerance", "1"]), i32::from(!fixed.is_empty()));
     assert_eq!(list(&back["scenarios"]["low-thw-overtake"]["newly_failing"]), fixed);
 }
 
@@ -63,6 +63,31 @@ fn a_campaign_is_no_regression_against_itself() {
     let scenario = &found["scenarios"]["low-thw-overtake"];
     assert_eq!((&scenario["same"], &scenario["samples"]), (&Value::from(30), &Value::from(30)));
     assert_eq!(found["differences"].as_array().map(Vec::len), Some(0));
+}
+
+#[test]
+fn a_margin_that_shrinks_is_a_regression_even_without_a_collision() {
+    let folder = folder();
+    let scenario = library("overtake-without-brake");
+    let args = ["campaign", scenario.to_str().unwrap(), "--seed", "1", "-n", "20", "--recordings", "0", "--no-gate"];
+    let [with, without] = ["mis", "acc"].map(|controller| {
+        let out = folder.path().join(controller);
+        stdout(&closecall(args.iter().chain(&["--controller", controller, "--out", out.to_str().unwrap()])), 0);
+        out
+    });
+    // The rear vehicle comes closer to an ego that brakes.
+    let found = json(&compare(&without, &with, &["--format", "json"]), 1);
+    let scenario = &found["scenarios"]["overtake-without-brake"];
+    assert_eq!(scenario["newly_failing"].as_array().map(Vec::len), Some(0));
+    let lost = scenario["margin_regressions"].as_array().unwrap();
+    assert!(
+        !lost.is_empty() && lost.iter().all(|lost| lost["current"].as_f64() < lost["baseline"].as_f64()),
+        "{lost:?}"
+    );
+    let text = stdout(&compare(&without, &with, &[]), 1);
+    assert!(text.contains("REGRESSION: min_ttc_rear_s p50 "), "{text}");
+    // With a tolerance of 1, a margin may fall to zero.
+    stdout(&compare(&without, &with, &["--tolerance", "1"]), 0);
 }
 
 #[test]

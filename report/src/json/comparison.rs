@@ -3,9 +3,10 @@
 use closecall_campaign::compare::ScenarioComparison;
 use serde_json::{Map, Value, json};
 
-/// Returns what changed from one campaign to a later one, by scenario. `differences` are those of the two manifests, and
-/// `is_pass` says whether the later campaign is accepted.
-pub fn comparison(found: &[ScenarioComparison], differences: &[String], is_pass: bool) -> Value {
+/// Returns what changed from one campaign to a later one, by scenario. `differences` are those of the two manifests,
+/// `tolerance` is the share by which a quantile of a margin may fall, and `is_pass` says whether the later campaign is
+/// accepted.
+pub fn comparison(found: &[ScenarioComparison], differences: &[String], tolerance: f64, is_pass: bool) -> Value {
     let scenario = |scenario: &ScenarioComparison| {
         let margins: Map<String, Value> = scenario
             .margins
@@ -31,12 +32,14 @@ pub fn comparison(found: &[ScenarioComparison], differences: &[String], is_pass:
             "newly_in_error": scenario.newly_in_error,
             "no_longer_in_error": scenario.no_longer_in_error,
             "margins": margins,
+            "margin_regressions": scenario.margin_regressions(tolerance),
         });
         (scenario.scenario.clone(), object)
     };
     json!({
         "verdict": if is_pass { "PASS" } else { "FAIL" },
         "differences": differences,
+        "tolerance": tolerance,
         "scenarios": found.iter().map(scenario).collect::<Map<String, Value>>(),
     })
 }
