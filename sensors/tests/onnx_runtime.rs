@@ -2,7 +2,7 @@
 //!
 //! Needs the shared library of the `onnxruntime` wheel: `CLOSECALL_ONNXRUNTIME=…/onnxruntime/capi/libonnxruntime.so.1.x.y`.
 
-#[path = "onnx_golden/mod.rs"]
+#[path = "onnx_golden/agreement.rs"]
 mod onnx_golden;
 
 use closecall_sensors::camera::{Backend, Classifier};

@@ -3,7 +3,7 @@
 //! `training/golden.py` writes the crops and Python's probabilities to `onnx_golden/`. Another backend needs another
 //! process, and therefore another test binary: `onnx_runtime.rs`.
 
-#[path = "onnx_golden/mod.rs"]
+#[path = "onnx_golden/agreement.rs"]
 mod onnx_golden;
 
 use closecall_sensors::camera::{Backend, Classifier};
