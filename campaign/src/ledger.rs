@@ -225,6 +225,11 @@ impl Pairs {
         }
     }
 
+    /// Returns the number of samples with two outcomes.
+    pub fn samples(&self) -> u64 {
+        self.prevented + self.induced + self.both + self.neither
+    }
+
     /// Adds other pairs.
     pub fn add(&mut self, other: &Self) {
         self.prevented += other.prevented;

@@ -8,13 +8,14 @@
 //!
 //! - A *sample* is one concrete scenario, drawn from the distributions of a scenario file. Its number, the seed, and
 //!   the sampling design determine it.
-//! - An *arm* is a controller with its sensors. In a *paired* campaign each sample runs in two arms: the baseline, and
-//!   the arm under test.
+//! - An *arm* is a controller with its sensors. In a *paired* campaign each sample runs in several arms: the baseline first,
+//!   the arm under test last, and references between them.
 //! - A *record* is the result of one sample in all arms: one line of the [`journal`].
 //!
 //! Rates are conditional on the sampled scenario: they are the share of *sampled encounters* that end in a collision,
 //! not the frequency of collisions on a road.
 
+pub mod arm_pairs;
 pub mod baseline;
 pub mod compare;
 pub mod end_rule;

@@ -80,7 +80,7 @@ pub struct Manifest {
     pub sampling: Sampling,
     /// The part of the samples that this folder is for; `None` for all of them.
     pub partition: Option<Partition>,
-    /// The controllers: the baseline first if the campaign is paired, the one under test last.
+    /// The controllers: the baseline first if there are several, the one under test last, references between them.
     pub arms: Vec<ControllerChoice>,
     /// The sensors; those of each scenario if `None`.
     pub sensors: Option<SensorMode>,
@@ -153,22 +153,20 @@ impl Manifest {
     /// Returns one message for each difference between the controllers of the campaign and those that its commands start
     /// now.
     pub fn changed_controllers(&self, scenario: &Scenario) -> Vec<String> {
-        let now = self.arms.iter().filter_map(|arm| match arm {
-            ControllerChoice::Exec(settings) => {
-                Some(Fingerprint::of(settings, self.controller_folder(), Some(scenario)))
-            }
-            ControllerChoice::Acc | ControllerChoice::Mis => None,
-        });
-        fingerprint::differences(&self.controllers, &now.collect::<Vec<_>>())
+        let fingerprint = |settings| Fingerprint::of(settings, self.controller_folder(), Some(scenario));
+        let now: Vec<_> = self.arms.iter().filter_map(ControllerChoice::exec).map(fingerprint).collect();
+        fingerprint::differences(&self.controllers, &now)
     }
 
     /// Returns the arms, the baseline first.
     pub fn arms(&self) -> Vec<Arm> {
-        let arm = |controller: &ControllerChoice| Arm {
-            controller: controller.factory_in(self.controller_folder()),
-            sensors: self.sensors,
-        };
-        self.arms.iter().map(arm).collect()
+        let controllers = ControllerChoice::factories(&self.arms, self.controller_folder());
+        controllers.into_iter().map(|controller| Arm { controller, sensors: self.sensors }).collect()
+    }
+
+    /// Returns the names of the arms in reports and records.
+    pub fn arm_names(&self) -> Vec<String> {
+        ControllerChoice::names(&self.arms)
     }
 
     /// Returns the manifest of the whole campaign, of which this one may describe a part.

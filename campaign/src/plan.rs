@@ -13,6 +13,7 @@ use closecall_sensors::camera::{Backend, SHIPPED_MODEL};
 use closecall_sensors::{SensorMode, inference_backend};
 use closecall_simulation::Arm;
 use closecall_simulation::controller::ControllerChoice;
+use closecall_simulation::controller::exec::ExecSettings;
 use closecall_simulation::scenario::ScenarioFile;
 use closecall_traffic::Choice;
 
@@ -40,6 +41,12 @@ pub enum PlanError {
         /// The name of both.
         name: String,
     },
+    /// Two arms have the same controller, so that they would have the same outcomes.
+    #[error("`{controller}` is named twice: every arm needs a controller of its own")]
+    SameArm {
+        /// The controller.
+        controller: String,
+    },
 }
 
 /// The plan of a campaign.
@@ -62,10 +69,10 @@ pub struct Plan {
 
 impl Plan {
     /// Returns a plan that runs each sample of each scenario once for each controller. The last controller is the one
-    /// under test; one before it is the baseline.
+    /// under test. If there are several, the first is the baseline, and those between are references.
     ///
     /// # Errors
-    /// [`PlanError`] if two scenarios have the same name.
+    /// [`PlanError`] if two scenarios have the same name, or two arms the same controller.
     pub fn new(
         scenarios: Vec<ScenarioFile>,
         sampling: Sampling,
@@ -76,6 +83,11 @@ impl Plan {
             if let Some(same) = scenarios[..index].iter().find(|earlier| earlier.config().name == *name) {
                 let (first, second) = (same.path().to_owned(), file.path().to_owned());
                 return Err(PlanError::SameName { first, second, name: name.clone() });
+            }
+        }
+        for (index, controller) in controllers.iter().enumerate() {
+            if controllers[..index].contains(controller) {
+                return Err(PlanError::SameArm { controller: controller.to_string() });
             }
         }
         Ok(Self {
@@ -92,11 +104,9 @@ impl Plan {
 
     /// Returns the campaign, ready to run.
     pub fn campaign(&self) -> Campaign {
-        let arms: Vec<Arm> = self
-            .controllers
-            .iter()
-            .map(|controller| Arm { controller: controller.factory(), sensors: self.sensors })
-            .collect();
+        let controllers = ControllerChoice::factories(&self.controllers, None);
+        let arms: Vec<Arm> =
+            controllers.into_iter().map(|controller| Arm { controller, sensors: self.sensors }).collect();
         let (sampling, checks) = (self.sampling, self.checks);
         let work = |file: &ScenarioFile| Arc::new(Work { file: file.clone(), sampling, arms: arms.clone(), checks });
         Campaign {
@@ -122,11 +132,8 @@ impl Plan {
     /// Returns what identifies the controllers that run as processes.
     fn fingerprints(&self) -> Vec<Fingerprint> {
         let nominal = self.scenarios.first().and_then(|file| file.concrete(&file.space().nominal()).ok());
-        let exec = |controller: &ControllerChoice| match controller {
-            ControllerChoice::Exec(settings) => Some(Fingerprint::of(settings, None, nominal.as_ref())),
-            ControllerChoice::Acc | ControllerChoice::Mis => None,
-        };
-        self.controllers.iter().filter_map(exec).collect()
+        let fingerprint = |settings: &ExecSettings| Fingerprint::of(settings, None, nominal.as_ref());
+        self.controllers.iter().filter_map(ControllerChoice::exec).map(fingerprint).collect()
     }
 
     /// Returns the manifest of the campaign. `command` is the command line that started it.

@@ -64,7 +64,7 @@ pub struct Record {
     pub scenario: String,
     /// The sample's number.
     pub sample: u64,
-    /// The arms: the baseline first if the campaign is paired, the arm under test last.
+    /// The arms: the baseline first if there are several, the arm under test last, references between them.
     pub arms: Vec<ArmRecord>,
 }
 
@@ -77,7 +77,7 @@ impl Record {
     /// Returns what each arm contributes to the counts that are judged.
     ///
     /// If halving the time step flips a verdict, the worse case for the system under test counts: the arm under test
-    /// counts as collided, the baseline as not collided.
+    /// counts as collided, the baseline and the references as not collided.
     pub fn tallies(&self) -> Vec<Tally> {
         let tested = self.arms.len().saturating_sub(1);
         let judged = |(index, arm): (usize, &ArmRecord)| {

@@ -46,7 +46,7 @@ pub struct Work {
     pub file: ScenarioFile,
     /// How its samples are drawn.
     pub sampling: Sampling,
-    /// The arms: the baseline first if the campaign is paired, the arm under test last.
+    /// The arms: the baseline first if there are several, the arm under test last, references between them.
     pub arms: Vec<Arm>,
     /// The samples that are checked for validity.
     pub checks: CheckPlan,

@@ -107,11 +107,9 @@ impl SavedCampaign {
     /// # Errors
     /// [`SavedError::UnknownArm`] if the campaign was not run with that controller.
     pub fn arm(&self, name: Option<&str>) -> Result<Arm, SavedError> {
-        let controllers = &self.manifest.arms;
-        let is_meant = |index: &usize| {
-            let controller = &controllers[*index];
-            name.is_none_or(|name| controller.name() == name || controller.to_string() == name)
-        };
+        let (controllers, names) = (&self.manifest.arms, self.manifest.arm_names());
+        let is_meant =
+            |index: &usize| name.is_none_or(|name| names[*index] == name || controllers[*index].to_string() == name);
         let Some(index) = (0..controllers.len()).rev().find(is_meant) else {
             let known = controllers.iter().map(ToString::to_string).collect();
             return Err(SavedError::UnknownArm { name: name.unwrap_or_default().to_owned(), known });

@@ -106,7 +106,7 @@ impl Chooser {
     pub fn push(&mut self, record: &Record) {
         if let Some(ArmRecord { result: Ok(outcome), .. }) = record.arms.last() {
             let is_safe_in_baseline = match &record.arms[..] {
-                [baseline, _] => baseline.result.as_ref().is_ok_and(|outcome| !outcome.ego_collided()),
+                [baseline, .., _] => baseline.result.as_ref().is_ok_and(|outcome| !outcome.ego_collided()),
                 _ => false,
             };
             self.samples.push(Severity { is_safe_in_baseline, ..severity(record.sample, outcome) });

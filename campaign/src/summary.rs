@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use closecall_simulation::Arm;
 
+use super::arm_pairs::ArmPair;
 use super::ledger::{ArmCounts, Inference, Pairs};
 use super::record::Record;
 use super::repeats::Repeats;
@@ -15,8 +16,10 @@ use super::validity::CheckCounts;
 pub struct Counts {
     /// The counts of each arm, the baseline first if the campaign is paired.
     pub arms: Vec<ArmCounts>,
-    /// Pairs of baseline and tested arm.
+    /// Pairs of baseline and tested arm: the first and the last one.
     pub pairs: Pairs,
+    /// All pairs of arms.
+    pub arm_pairs: Vec<ArmPair>,
     /// Samples that were run.
     pub samples: u64,
     /// Samples in which a validity check made a difference that it must not make.
@@ -31,7 +34,7 @@ pub struct Counts {
 
 impl Counts {
     fn new(arms: usize) -> Self {
-        Self { arms: vec![ArmCounts::default(); arms], ..Self::default() }
+        Self { arms: vec![ArmCounts::default(); arms], arm_pairs: ArmPair::all(arms), ..Self::default() }
     }
 
     fn push(&mut self, record: &Record, is_repeated: bool) {
@@ -42,9 +45,10 @@ impl Counts {
             for (counts, tally) in self.arms.iter_mut().zip(&tallies) {
                 counts.push(*tally);
             }
-            if let [baseline, tested] = &tallies[..] {
+            if let [baseline, .., tested] = &tallies[..] {
                 self.pairs.push(baseline, tested);
             }
+            self.arm_pairs.iter_mut().for_each(|pair| pair.push(&tallies));
             self.samples += 1;
         }
         for arm in &record.arms {
@@ -62,6 +66,9 @@ impl Counts {
             sum.add(counts);
         }
         self.pairs.add(&other.pairs);
+        for (sum, pair) in self.arm_pairs.iter_mut().zip(&other.arm_pairs) {
+            sum.pairs.add(&pair.pairs);
+        }
         self.samples += other.samples;
         self.invalid += other.invalid;
         self.checks.add(&other.checks);
@@ -137,7 +144,12 @@ impl Summary {
 
     /// Returns true if a baseline stands beside the arm under test.
     pub fn is_paired(&self) -> bool {
-        self.controllers.len() == 2
+        self.controllers.len() > 1
+    }
+
+    /// Returns true if reference arms stand between the baseline and the arm under test.
+    pub fn has_references(&self) -> bool {
+        self.controllers.len() > 2
     }
 
     /// Returns the mean over the scenarios of an arm's collision rate, each scenario with the same weight; `None` if a scenario

@@ -30,5 +30,5 @@ pub use driver::{
 pub use ego::{
     Acc, AccConfig, Aeb, AebConfig, ArrivalPrediction, BrakingResponse, ControllerError, EgoCommand, EgoController,
     EgoInput, EgoSettings, EgoStack, EgoStackConfig, EgoState, Encounter, Front, FrontFollower, MisConfig, MisPlan,
-    MisSettings, Odometry, Reason, SensorAvailability, Solution,
+    MisSettings, Odometry, R157Driver, Reason, SensorAvailability, Solution,
 };

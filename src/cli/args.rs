@@ -1,20 +1,14 @@
 //! Arguments that several commands share.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use clap::{Args, ValueEnum};
 use closecall_scenarios::trajectory_data::{BadRows, LayoutChoice, ReadOptions};
 use closecall_sensors::SensorMode;
-use closecall_simulation::Arm;
-use closecall_simulation::controller::ControllerChoice;
-use closecall_simulation::controller::exec::{DEFAULT_MEMORY_MIB, DEFAULT_TIMEOUT_MS, ExecSettings, NAME as EXEC};
 use closecall_simulation::scenario::{ScenarioError, ScenarioFile, Setting, source};
 
-use closecall_traffic::suggest::hint;
-
-use super::CliError;
+use super::arms::ArmArgs;
 use super::output::print_error;
-use super::protect::of_controller;
 
 /// The format of the output.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -47,64 +41,6 @@ impl SensorsChoice {
     }
 }
 
-/// The controller under test.
-#[derive(Clone, Debug, Args)]
-pub(super) struct ControllerArgs {
-    /// Controller of the ego vehicle: `acc`, `mis`, or `exec:COMMAND` for a program of your own, which reads a line per
-    /// control step and answers with a line
-    #[arg(long, value_name = "acc|mis|exec:COMMAND", default_value = "mis", value_parser = controller)]
-    controller: ControllerChoice,
-    /// Time limit for each answer of an `exec` controller [default: 1000]
-    #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u64).range(1..=600_000))]
-    controller_timeout_ms: Option<u64>,
-    /// Memory limit of each process of an `exec` controller [default: 1024]
-    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1_048_576))]
-    controller_memory_mib: Option<u64>,
-}
-
-impl ControllerArgs {
-    /// Returns the controller with its limits.
-    pub(super) fn choice(&self) -> Result<ControllerChoice, CliError> {
-        let (timeout_ms, memory_mib) = (self.controller_timeout_ms, self.controller_memory_mib);
-        match &self.controller {
-            ControllerChoice::Exec(exec) => Ok(ControllerChoice::Exec(ExecSettings {
-                timeout_ms: timeout_ms.unwrap_or(exec.timeout_ms),
-                memory_mib: memory_mib.unwrap_or(exec.memory_mib),
-                ..exec.clone()
-            })),
-            built_in if timeout_ms.is_none() && memory_mib.is_none() => Ok(built_in.clone()),
-            built_in => Err(CliError::Usage {
-                message: format!(
-                    "--controller-timeout-ms and --controller-memory-mib apply to a process, and `{built_in}` is built in: \
-                     name a process with --controller exec:COMMAND"
-                ),
-            }),
-        }
-    }
-}
-
-/// Parses the name of a controller.
-fn controller(text: &str) -> Result<ControllerChoice, String> {
-    match text.split_once(':') {
-        None if text == ControllerChoice::Acc.name() => Ok(ControllerChoice::Acc),
-        None if text == ControllerChoice::Mis.name() => Ok(ControllerChoice::Mis),
-        Some((EXEC, command)) => {
-            let (timeout_ms, memory_mib) = (DEFAULT_TIMEOUT_MS, DEFAULT_MEMORY_MIB);
-            let exec = ExecSettings { command: command.to_owned(), timeout_ms, memory_mib };
-            match exec.words() {
-                Some(_) => Ok(ControllerChoice::Exec(exec)),
-                None => Err(format!("`{command}` is not a command: it is empty, or its quotes do not match")),
-            }
-        }
-        _ => {
-            let known = "`acc`, `mis` or `exec:COMMAND`";
-            let word = text.split(':').next().unwrap_or_default();
-            let suggestion = hint(word, "`acc`, `mis`, `exec`");
-            Err(format!("`{text}` is not a controller: expected {known}{suggestion}"))
-        }
-    }
-}
-
 /// What is simulated of a scenario: its random numbers, the controller of the ego vehicle and its sensors, and settings.
 #[derive(Clone, Debug, Args)]
 pub(super) struct SimulationArgs {
@@ -115,49 +51,6 @@ pub(super) struct SimulationArgs {
     pub(super) arm: ArmArgs,
     #[command(flatten)]
     pub(super) set: SetArgs,
-}
-
-/// The controller of the ego vehicle, and its sensors.
-#[derive(Clone, Debug, Args)]
-pub(super) struct ArmArgs {
-    #[command(flatten)]
-    pub(super) controller: ControllerArgs,
-    /// Depth of the sensor simulation [default: that of the scenario]
-    #[arg(long, value_enum)]
-    pub(super) sensors: Option<SensorsChoice>,
-}
-
-impl ArmArgs {
-    /// Returns the files that the command of the controller names.
-    pub(super) fn files(&self) -> Vec<PathBuf> {
-        of_controller(&self.controller.controller)
-    }
-
-    pub(super) fn arm(&self) -> Result<Arm, CliError> {
-        Ok(arm(&self.controller.choice()?, self.sensors))
-    }
-
-    /// Returns this arm; if `paired`, the baseline before it.
-    pub(super) fn arms(&self, paired: bool) -> Result<Vec<Arm>, CliError> {
-        let controllers = controllers(self.controller.choice()?, paired)?;
-        Ok(controllers.iter().map(|controller| arm(controller, self.sensors)).collect())
-    }
-}
-
-/// Returns the controllers of a run: the tested one; if `paired`, the baseline before it.
-pub(super) fn controllers(tested: ControllerChoice, paired: bool) -> Result<Vec<ControllerChoice>, CliError> {
-    match (paired, tested) {
-        (false, tested) => Ok(vec![tested]),
-        (true, ControllerChoice::Acc) => Err(CliError::Usage {
-            message: "--paired compares a controller with `acc`: name another with --controller".to_owned(),
-        }),
-        (true, tested) => Ok(vec![ControllerChoice::Acc, tested]),
-    }
-}
-
-/// Returns the arm of a controller.
-pub(super) fn arm(controller: &ControllerChoice, sensors: Option<SensorsChoice>) -> Arm {
-    Arm { controller: controller.factory(), sensors: sensors.map(SensorsChoice::mode) }
 }
 
 /// The layout of a trajectory file.
@@ -260,11 +153,5 @@ mod tests {
             assert!(count(text).unwrap_err().contains(reason), "{text}");
         }
         assert!(count("99999999999999999999999").unwrap_err().contains("too large"));
-    }
-
-    #[test]
-    fn a_misspelt_controller_is_answered_with_a_suggestion() {
-        assert!(controller("miss").unwrap_err().ends_with("; did you mean `mis`?"));
-        assert!(controller("exce:python3 a.py").unwrap_err().ends_with("; did you mean `exec`?"));
     }
 }

@@ -24,7 +24,8 @@ use closecall_simulation::scenario::source::expand;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::CliError;
-use super::args::{ControllerArgs, Format, SensorsChoice, SetArgs, controllers, positive};
+use super::args::{Format, SensorsChoice, SetArgs, positive};
+use super::arms::{ComparisonArgs, ControllerArgs};
 use super::backend::check_backend;
 use super::ending::{EndArgs, Ending, print_resumption};
 use super::gates::GateArgs;
@@ -54,9 +55,8 @@ pub(super) struct CampaignArgs {
     /// Depth of the sensor simulation [default: that of the scenario]
     #[arg(long, value_enum)]
     sensors: Option<SensorsChoice>,
-    /// Also run every sample with the baseline controller `acc`, on the same random numbers
-    #[arg(long)]
-    paired: bool,
+    #[command(flatten)]
+    comparison: ComparisonArgs,
     /// Number of worker threads [default: one per processor]
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
@@ -88,12 +88,6 @@ pub(super) struct CampaignArgs {
 }
 
 impl CampaignArgs {
-    /// Returns true if the campaign has a baseline: with `--paired`, or with a preset if the controller under test is
-    /// not the baseline itself.
-    fn is_paired(&self, tested: &ControllerChoice) -> bool {
-        self.paired || (self.plan.wants_pairs() && *tested != ControllerChoice::Acc)
-    }
-
     fn sampling(&self) -> Sampling {
         Sampling { seed: self.seed, design: self.design, samples: self.plan.samples() }
     }
@@ -120,10 +114,10 @@ impl CampaignArgs {
 }
 
 pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
-    let tested = args.controller.choice()?;
-    let is_paired = args.is_paired(&tested);
+    let controllers = args.comparison.controllers(&args.controller, args.plan.wants_pairs())?;
+    let is_paired = controllers.len() > 1;
     let gates = args.gates.gates(is_paired, args.design, args.plan.preset_gates(is_paired))?;
-    let plan = args.plan(controllers(tested, is_paired)?)?;
+    let plan = args.plan(controllers)?;
     check_backend(plan.uses_classifier())?;
     let (mut campaign, manifest) = (plan.campaign(), plan.manifest(std::env::args().collect())?);
     let locked = match &args.out {

@@ -1,6 +1,7 @@
 //! The command line: arguments, calls, printed results, and exit codes.
 
 mod args;
+mod arms;
 mod backend;
 mod baseline;
 mod campaign;

@@ -14,7 +14,8 @@ use closecall_simulation::scenario::Scenario;
 use closecall_simulation::{Arm, RunKey};
 
 use super::CliError;
-use super::args::{ArmArgs, SetArgs, arm};
+use super::args::SetArgs;
+use super::arms::{ArmArgs, ComparisonArgs, arm};
 use super::backend::check_backend_of;
 use super::output::outln;
 use super::protect::{of_campaign as files_of_campaign, of_scenario as files_of, protect};
@@ -37,9 +38,8 @@ pub(super) struct PlotArgs {
     /// Name of the scenario; required if the campaign has several
     #[arg(long)]
     scenario: Option<String>,
-    /// Also draw the run of the baseline controller `acc`, with dashed lines
-    #[arg(long)]
-    paired: bool,
+    #[command(flatten)]
+    comparison: ComparisonArgs,
     #[command(flatten)]
     arm: ArmArgs,
     #[command(flatten)]
@@ -76,17 +76,21 @@ fn of_scenario(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
         return Err(CliError::Usage { message });
     }
     let file = args.set.load(&args.source)?;
-    protect(&[files_of(&file), args.arm.files()].concat(), &[("--output", Some(&args.output))])?;
+    protect(&[files_of(&file), args.comparison.files(&args.arm)].concat(), &[("--output", Some(&args.output))])?;
     let (seed, sample) = (args.seed.unwrap_or(0), args.number.or(args.sample).unwrap_or(0));
     let sampling = Sampling { seed, design: Design::Random, samples: sample.saturating_add(1) };
     let scenario = concrete(&file, sampling, sample).map_err(|source| CliError::Sample { sample, source })?;
-    films(&scenario, RunKey { seed, sample }, &args.arm.arms(args.paired)?)
+    films(&scenario, RunKey { seed, sample }, &args.comparison.arms(&args.arm)?)
 }
 
 /// Films a sample of a campaign as the campaign ran it, in every arm.
 fn of_campaign(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
     if args.seed.is_some() || !args.set.settings.is_empty() {
         let message = "a campaign has its own seed and settings: --seed and --set cannot change them".to_owned();
+        return Err(CliError::Usage { message });
+    }
+    if !args.comparison.arms.is_empty() {
+        let message = "a campaign has its own arms, all of which are drawn: --arms cannot change them".to_owned();
         return Err(CliError::Usage { message });
     }
     let Some(sample) = args.number.or(args.sample) else {
@@ -97,7 +101,7 @@ fn of_campaign(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
     let saved = SavedCampaign::open(&args.source)?;
     let (scenario, key) = saved.sample(args.scenario.as_deref(), sample)?;
     let mut arms = saved.manifest().arms();
-    if args.paired && arms.len() < 2 {
+    if args.comparison.paired && arms.len() < 2 {
         arms.insert(0, arm(&ControllerChoice::Acc, args.arm.sensors));
     }
     films(&scenario, key, &arms)

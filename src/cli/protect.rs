@@ -41,10 +41,8 @@ pub(super) fn of_trajectories(paths: &[PathBuf]) -> Vec<PathBuf> {
 
 /// Returns the files that the command of a controller names.
 pub(super) fn of_controller(controller: &ControllerChoice) -> Vec<PathBuf> {
-    match controller {
-        ControllerChoice::Exec(settings) => named_files(settings, None).into_iter().map(|(_, path)| path).collect(),
-        ControllerChoice::Acc | ControllerChoice::Mis => Vec::new(),
-    }
+    let files = controller.exec().map(|settings| named_files(settings, None)).unwrap_or_default();
+    files.into_iter().map(|(_, path)| path).collect()
 }
 
 /// Returns the files of a campaign's folder. Its recordings, which can be made again, are not among them.

@@ -6,7 +6,6 @@ use clap::Args;
 use closecall_campaign::folder::Folder;
 use closecall_campaign::manifest::{Manifest, version};
 use closecall_campaign::saved::SavedCampaign;
-use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::outcome::Outcome;
 
 use super::CliError;
@@ -78,9 +77,9 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<ExitCode, CliError> {
 /// Prints the command of an external controller before it starts. The folder may have another author, whose command
 /// must not run unnoticed.
 fn announce_process(manifest: &Manifest, name: &str) {
-    for arm in &manifest.arms {
-        if let ControllerChoice::Exec(exec) = arm
-            && arm.name() == name
+    for (arm, arm_name) in manifest.arms.iter().zip(manifest.arm_names()) {
+        if let Some(exec) = arm.exec()
+            && arm_name == name
         {
             print_error(format_args!("running the controller that the campaign names: {}\n", exec.command));
         }

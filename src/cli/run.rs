@@ -13,6 +13,7 @@ use closecall_simulation::scenario::Setting;
 
 use super::CliError;
 use super::args::{Format, SimulationArgs};
+use super::arms::ComparisonArgs;
 use super::output::{out, outln};
 use super::protect::{of_scenario, protect};
 use super::watch::{WatchArgs, run_watched};
@@ -28,10 +29,8 @@ pub(super) struct RunArgs {
     sample: u64,
     #[command(flatten)]
     sim: SimulationArgs,
-    /// Also run the sample with the baseline controller `acc`, on the same random numbers; --record saves both runs in
-    /// one file
-    #[arg(long)]
-    paired: bool,
+    #[command(flatten)]
+    comparison: ComparisonArgs,
     #[command(flatten)]
     watch: WatchArgs,
     /// Output format
@@ -41,12 +40,12 @@ pub(super) struct RunArgs {
 
 pub(super) fn run(args: &RunArgs) -> Result<ExitCode, CliError> {
     let file = args.sim.set.load(&args.scenario)?;
-    protect(&[of_scenario(&file), args.sim.arm.files()].concat(), &args.watch.outputs())?;
+    protect(&[of_scenario(&file), args.comparison.files(&args.sim.arm)].concat(), &args.watch.outputs())?;
     let sampling = Sampling { seed: args.sim.seed, design: Design::Random, samples: args.sample.saturating_add(1) };
     let fail = |source| CliError::Sample { sample: args.sample, source };
     let scenario = concrete(&file, sampling, args.sample).map_err(fail)?;
     let key = RunKey { seed: args.sim.seed, sample: args.sample };
-    let outcomes = run_watched(&scenario, key, &args.sim.arm.arms(args.paired)?, &args.watch)?;
+    let outcomes = run_watched(&scenario, key, &args.comparison.arms(&args.sim.arm)?, &args.watch)?;
     print(&outcomes, args.format, Some(&args.sim.set.settings));
     Ok(ExitCode::Pass)
 }

@@ -1,5 +1,6 @@
 //! Prints the summary of a campaign as text for human readers.
 
+use closecall_campaign::arm_pairs::{CORRECTION, pair_results};
 use closecall_campaign::harm;
 use closecall_campaign::ledger::{ArmCounts, Inference};
 use closecall_campaign::probability::percent;
@@ -7,6 +8,9 @@ use closecall_campaign::summary::{Counts, Summary};
 use closecall_campaign::verdict::Judgement;
 
 use super::output::{out, outln};
+
+/// Width of the names of the arms in the output, at least.
+const NAME_WIDTH: usize = 5;
 
 /// Prints the counts of each scenario. Scenarios are never pooled into one sample.
 pub(super) fn print_counts(summary: &Summary) {
@@ -31,8 +35,9 @@ pub(super) fn print_verdict(judged: &Judgement) {
 }
 
 fn print_scenario(summary: &Summary, counts: &Counts) {
+    let width = summary.controllers.iter().map(String::len).fold(NAME_WIDTH, usize::max);
     for (name, arm) in summary.controllers.iter().zip(&counts.arms) {
-        print_arm(name, arm, summary.inference);
+        print_arm(&format!("{name:<width$}"), arm, summary.inference);
     }
     if summary.is_paired() {
         let pairs = counts.pairs;
@@ -56,16 +61,35 @@ fn print_scenario(summary: &Summary, counts: &Counts) {
             );
         }
     }
+    if summary.has_references() {
+        print_arm_pairs(summary, counts);
+    }
     let checks = &counts.checks;
     if let Some(rate) = checks.flip_rate() {
         outln!("  checked: {} runs, {} flipped at half the time step ({})", checks.runs, checks.flips, percent(rate));
     }
 }
 
+/// Prints all pairs of arms.
+fn print_arm_pairs(summary: &Summary, counts: &Counts) {
+    outln!(
+        "  all pairs of arms (95 % intervals of the shares; p: exact McNemar, corrected for the pairs by {CORRECTION}):"
+    );
+    for result in pair_results(summary, counts) {
+        let pairs = result.pairs;
+        let interval = |[low, high]: [f64; 2]| format!("{:.1} to {:.1} %", 100.0 * low, 100.0 * high);
+        out!("    {:<28}", format!("{} -> {}:", result.baseline, result.tested));
+        out!(" {} prevented ({}),", pairs.prevented, interval(result.prevented_95));
+        out!(" {} induced ({}),", pairs.induced, interval(result.induced_95));
+        out!(" {} both, {} neither", pairs.both, pairs.neither);
+        outln!("{}", result.corrected_p.map_or_else(String::new, |p| format!(", p {p:.2e}")));
+    }
+}
+
 fn print_arm(name: &str, arm: &ArmCounts, inference: Inference) {
     let [low, high] = arm.interval_95(inference).map(|bound| 100.0 * bound);
     let rate = arm.collision_rate().map_or("-".to_owned(), |rate| format!("{:.1} %", 100.0 * rate));
-    out!("  {name:<5} {:>6} collisions  {rate:>7}  (95 %: {low:.1} to {high:.1} %)", arm.collisions);
+    out!("  {name} {:>6} collisions  {rate:>7}  (95 %: {low:.1} to {high:.1} %)", arm.collisions);
     if arm.collisions > 0 {
         out!("  delta-v up to {:.1} m/s", arm.max_delta_v_mps);
     }

@@ -12,6 +12,7 @@ use closecall_simulation::{NoObserver, RunKey};
 
 use super::CliError;
 use super::args::{SimulationArgs, count};
+use super::arms::ComparisonArgs;
 use super::output::{outln, print_error};
 use crate::exit_code::ExitCode;
 
@@ -28,9 +29,8 @@ pub(super) struct WatchingArgs {
     samples: u64,
     #[command(flatten)]
     sim: SimulationArgs,
-    /// Also run every sample with the baseline controller `acc`
-    #[arg(long)]
-    paired: bool,
+    #[command(flatten)]
+    comparison: ComparisonArgs,
     /// End after this many rounds [default: go on until Ctrl-C]
     #[arg(long, value_name = "N")]
     rounds: Option<u64>,
@@ -81,7 +81,7 @@ fn round(args: &WatchingArgs, path: &Path) -> Result<(), CliError> {
     let (name, parameters) = (&file.config().name, file.space().iter().len());
     outln!("{}: valid, {name} with {parameters} parameters", path.display());
     let sampling = Sampling { seed: args.sim.seed, design: Design::Random, samples: args.samples };
-    let arms = args.sim.arm.arms(args.paired)?;
+    let arms = args.comparison.arms(&args.sim.arm)?;
     for sample in 0..args.samples {
         let fail = |source| CliError::Sample { sample, source };
         let scenario = concrete(&file, sampling, sample).map_err(fail)?;

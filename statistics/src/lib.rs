@@ -11,6 +11,7 @@
 //! * [`sequence`]: bounds of a probability that hold at every number of samples at once, and may be inspected at any time
 //! * [`needed`]: the number of samples that a bound needs
 //! * [`mcnemar`]: whether two arms differ on the same samples
+//! * [`holm`]: p-values corrected for the number of tests
 //! * [`quantiles`]: quantiles of sorted values, and the distribution that they define
 //! * [`normal`]: the truncated normal distribution
 //!
@@ -18,6 +19,7 @@
 
 pub mod binomial;
 pub mod format;
+pub mod holm;
 pub mod interval;
 pub mod mcnemar;
 pub mod needed;

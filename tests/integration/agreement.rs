@@ -193,10 +193,10 @@ struct Part {
 }
 
 impl Part {
-    /// Runs 12 paired samples of each of the scenarios.
-    fn new(path: PathBuf, scenarios: &[PathBuf]) -> Self {
+    /// Runs 12 samples of each of the scenarios in these arms.
+    fn new(path: PathBuf, scenarios: &[PathBuf], arms: &str) -> Self {
         let paths = scenarios.iter().map(|path| path.to_str().unwrap());
-        let options = ["-n", "12", "--seed", "1", "--paired", "--no-gate", "--partition", "1/1"];
+        let options = ["-n", "12", "--seed", "1", "--arms", arms, "--no-gate", "--partition", "1/1"];
         let args = std::iter::once("campaign").chain(paths).chain(options).chain(["--out", path.to_str().unwrap()]);
         stdout(&closecall(args), 0);
         let saved = SavedCampaign::open(&path).unwrap();
@@ -223,13 +223,17 @@ fn every_output_of_a_campaign_gives_the_same_verdict() {
     let checked = [with_checks(folder.path(), "low-thw-overtake", few), library("overtake-without-brake")];
     std::fs::create_dir(at("unchecked")).unwrap();
     let unchecked = [with_checks(&at("unchecked"), "low-thw-overtake", "")];
-    let parts = [Part::new(at("checked-part"), &checked), Part::new(at("unchecked-part"), &unchecked)];
+    let parts = [
+        Part::new(at("checked-part"), &checked, "acc,mis"),
+        Part::new(at("three-arms"), &checked, "acc,gap-1.6,mis"),
+        Part::new(at("unchecked-part"), &unchecked, "acc,mis"),
+    ];
     let outcomes = parts[0].records.iter().flat_map(|record| &record.arms).filter_map(|arm| arm.result.as_ref().ok());
     let collision = outcomes.flat_map(|outcome| &outcome.collisions).next().expect("a collision").clone();
     let mut found = BTreeSet::new();
     for seed in 0..CAMPAIGNS {
         let random = &mut StdRng::seed_from_u64(seed);
-        let part = &parts[usize::from(seed % 4 == 3)];
+        let part = &parts[[0, 1, 0, 2][(seed % 4) as usize]];
         let (changed, gates) = (synthetic(&part.records, &collision, random), gates(random));
         found.insert(verdict_of(&part.path, &changed, &gates, &at("out")));
     }

@@ -35,6 +35,7 @@ use closecall_traffic::{Check, ConfigError, Num, Parameters, Range};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::following_distance::r157_time_gap_s;
 use super::surroundings::Front;
 
 /// λ: allowed closing speed per metre of gap error near the desired gap (1/s): an assumption; 0.1 to 0.5 are plausible.
@@ -101,6 +102,19 @@ pub struct Acc {
     pub(crate) time_gap_s: f64,
     pub(crate) set_speed_mps: Option<f64>,
     pub(crate) standstill_gap_m: f64,
+    /// How the time gap depends on the speed. A scenario always asks for a constant one.
+    #[serde(skip)]
+    pub(crate) policy: GapPolicy,
+}
+
+/// How the time gap of the adaptive cruise control depends on the speed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum GapPolicy {
+    /// The time gap of the settings, at every speed.
+    #[default]
+    Constant,
+    /// The minimum time gap of UN Regulation 157.
+    R157,
 }
 
 impl Check for AccConfig {
@@ -117,6 +131,7 @@ impl Check for AccConfig {
                 Some(num) => parameters.number(num, "standstill-gap-m", Range::closed(0.5, 20.0))?,
                 None => 3.0,
             },
+            policy: GapPolicy::Constant,
         })
     }
 }
@@ -124,7 +139,20 @@ impl Check for AccConfig {
 impl Acc {
     /// Returns the desired gap at `speed_mps` (m).
     pub(crate) fn desired_gap_m(&self, speed_mps: f64) -> f64 {
-        (self.time_gap_s * speed_mps).max(self.standstill_gap_m)
+        (self.time_gap_at_s(speed_mps) * speed_mps).max(self.standstill_gap_m)
+    }
+
+    /// Returns the strongest braking at `speed_mps` (m/s²).
+    pub(crate) fn max_braking_mps2(&self, speed_mps: f64) -> f64 {
+        MAX_BRAKING_MPS2.at(speed_mps)
+    }
+
+    /// Returns the time gap at `speed_mps` (s).
+    fn time_gap_at_s(&self, speed_mps: f64) -> f64 {
+        match self.policy {
+            GapPolicy::Constant => self.time_gap_s,
+            GapPolicy::R157 => r157_time_gap_s(speed_mps),
+        }
     }
 
     /// Returns the acceleration at `speed_mps` behind `lead`, on a road with the speed limit `limit_mps` (m/s²).
@@ -135,7 +163,7 @@ impl Acc {
             let error_m = lead.gap_m - self.desired_gap_m(speed_mps);
             let opening_mps = lead.speed_mps - speed_mps;
             let allowed_mps = allowed_closing_mps(error_m);
-            let time_s = self.time_gap_s.max(MIN_TIME_CONSTANT_S);
+            let time_s = self.time_gap_at_s(speed_mps).max(MIN_TIME_CONSTANT_S);
             let slower = (allowed_mps + opening_mps) / time_s;
             let faster = (allowed_mps.min(MAX_CLOSING_UP_MPS) + opening_mps) / time_s;
             desired = desired.min(if slower < 0.0 { slower } else { faster.max(0.0) });
@@ -172,7 +200,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const ACC: Acc = Acc { time_gap_s: 0.7, set_speed_mps: None, standstill_gap_m: 3.0 };
+    const ACC: Acc = Acc { time_gap_s: 0.7, set_speed_mps: None, standstill_gap_m: 3.0, policy: GapPolicy::Constant };
 
     #[test]
     fn the_acceleration_is_zero_at_the_desired_gap_and_speed() {

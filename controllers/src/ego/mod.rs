@@ -3,17 +3,22 @@
 
 mod acc;
 mod aeb;
+mod following_distance;
 mod interface;
 mod mis;
+mod r157_driver;
 mod reason;
 mod settings;
 mod stack;
 mod surroundings;
 
+#[cfg(test)]
+pub(crate) use acc::GapPolicy;
 pub use acc::{Acc, AccConfig};
 pub use aeb::{Aeb, AebConfig};
 pub use interface::{ControllerError, EgoCommand, EgoController, EgoInput, EgoState, Odometry, SensorAvailability};
 pub use mis::{ArrivalPrediction, BrakingResponse, Encounter, MisConfig, MisPlan, MisSettings, Solution};
+pub use r157_driver::R157Driver;
 pub use reason::Reason;
 pub use settings::{EgoSettings, EgoStackConfig};
 pub use stack::EgoStack;

@@ -4,6 +4,7 @@ use closecall_traffic::{Check, ConfigError, Parameters};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::acc::GapPolicy;
 use super::{Acc, AccConfig, Aeb, AebConfig, EgoController, EgoStack, MisConfig, MisSettings};
 
 /// The ego stack as a scenario file describes it. An absent function is not part of the stack.
@@ -40,6 +41,31 @@ impl EgoSettings {
     #[must_use]
     pub fn without_mis(self) -> Self {
         Self { mis: None, ..self }
+    }
+
+    /// Returns the same stack without the margin increase system, and with another constant time gap (s): the controllers
+    /// `gap-<seconds>`.
+    #[must_use]
+    pub fn with_time_gap(self, time_gap_s: f64) -> Self {
+        Self { acc: Acc { time_gap_s, policy: GapPolicy::Constant, ..self.acc }, ..self.without_mis() }
+    }
+
+    /// Returns the same stack without the margin increase system, and with the minimum following distance of UN Regulation
+    /// 157: the controller `r157-gap`.
+    #[must_use]
+    pub fn with_r157_gap(self) -> Self {
+        Self { acc: Acc { policy: GapPolicy::R157, ..self.acc }, ..self.without_mis() }
+    }
+
+    /// Returns the same stack with the extended margin increase system, if it has one at all: the controller `mis-extended`.
+    #[must_use]
+    pub fn with_extended_mis(self) -> Self {
+        Self { mis: self.mis.map(MisSettings::extended), ..self }
+    }
+
+    /// Returns the gap that the adaptive cruise control keeps at `speed_mps` (m).
+    pub fn desired_gap_m(&self, speed_mps: f64) -> f64 {
+        self.acc.desired_gap_m(speed_mps)
     }
 
     /// Returns the settings of the margin increase system, or `None` if the stack has none.

@@ -16,6 +16,7 @@ use closecall_scenarios::atomic::WriteError;
 use closecall_simulation::SampleError;
 use closecall_simulation::scenario::ScenarioFile;
 
+use super::arm_pairs::write_arm_pairs;
 use super::findings::{Findings, Recordings};
 use super::html::write_html;
 use super::junit::write_junit;
@@ -99,6 +100,9 @@ impl CampaignReport<'_> {
         });
         let tested = self.tally.summary.controllers.last().map_or("", String::as_str);
         write_samples(&folder.file("samples.xml"), &self.suites(), tested, with_recordings)?;
+        if self.tally.summary.is_paired() {
+            write_arm_pairs(&folder.file("arm_pairs.parquet"), &self.tally.summary)?;
+        }
         self.with_findings(&files, Some(folder), &recorded, &slowest, |findings| {
             write_junit(&folder.file("junit.xml"), findings, &wall_s)?;
             write_html(&folder.file("report.html"), findings)?;
@@ -174,7 +178,7 @@ fn keep_slowest(slowest: &mut Vec<Timing>, timing: &Timing) {
 
 /// Returns the wall times of all samples, one for each arm.
 fn timings(folder: &Folder, manifest: &Manifest) -> Result<impl Iterator<Item = Timing> + use<>, FolderError> {
-    let controllers: Vec<String> = manifest.arms.iter().map(|arm| arm.name().to_owned()).collect();
+    let controllers = manifest.arm_names();
     Ok(folder.wall_times()?.flat_map(move |time| {
         let of_arm = |(controller, wall_s): (&String, f64)| Timing {
             scenario: time.scenario.clone(),

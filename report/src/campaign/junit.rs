@@ -12,8 +12,10 @@
 use std::io::{self, Write};
 use std::path::Path;
 
+use closecall_campaign::arm_pairs::{PairResult, pair_results};
 use closecall_campaign::gate::{GateResult, Standing};
 use closecall_campaign::probability::Answer;
+use closecall_campaign::summary::Counts;
 use closecall_campaign::verdict::{Judgement, Verdict};
 use closecall_scenarios::atomic::{WriteError, write_file};
 use quick_xml::Writer;
@@ -139,6 +141,9 @@ fn properties<W: Write>(xml: &mut Writer<W>, findings: &Findings<'_>, suite: &st
             properties.push((format!("{controller}.collisions"), arm.collisions.to_string()));
             properties.push((format!("{controller}.errors"), arm.errors.to_string()));
         }
+        if findings.summary.has_references() {
+            properties.extend(arm_pair_properties(findings, counts));
+        }
     }
     xml.write_event(Event::Start(BytesStart::new("properties")))?;
     for (name, value) in properties {
@@ -146,6 +151,23 @@ fn properties<W: Write>(xml: &mut Writer<W>, findings: &Findings<'_>, suite: &st
         property.with_attribute(("value", legal_xml(&value).as_str())).write_empty()?;
     }
     xml.write_event(Event::End(BytesEnd::new("properties")))
+}
+
+/// Returns the counts of all pairs of arms: `FROM.TO.prevented` and the like.
+fn arm_pair_properties(findings: &Findings<'_>, counts: &Counts) -> Vec<(String, String)> {
+    let of = |result: PairResult<'_>| {
+        let pairs = result.pairs;
+        let p_value = result.corrected_p.map_or_else(|| "-".to_owned(), |p| p.to_string());
+        let values = [
+            ("prevented", pairs.prevented.to_string()),
+            ("induced", pairs.induced.to_string()),
+            ("both", pairs.both.to_string()),
+            ("neither", pairs.neither.to_string()),
+            ("mcnemar_p_corrected", p_value),
+        ];
+        values.map(|(name, value)| (format!("{}.{}.{name}", result.baseline, result.tested), value))
+    };
+    pair_results(findings.summary, counts).into_iter().flat_map(of).collect()
 }
 
 fn write_case<W: Write>(xml: &mut Writer<W>, case: &Case) -> io::Result<()> {

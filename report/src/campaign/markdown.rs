@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::findings::Findings;
 use super::overview::{ScenarioOverview, WorstSample};
+use closecall_campaign::arm_pairs::{CORRECTION, pair_results};
 use closecall_campaign::harm;
 use closecall_campaign::ledger::Inference;
 use closecall_campaign::summary::{Counts, Summary};
@@ -75,6 +76,40 @@ fn counts(summary: &Summary) -> String {
             text.push_str(&format!("{}: {}", cell(name), pairs(counts, summary.inference)));
         }
     }
+    if summary.has_references() {
+        text.push_str(&arm_pairs(summary));
+    }
+    text
+}
+
+/// Returns the table of all pairs of arms.
+fn arm_pairs(summary: &Summary) -> String {
+    let mut text =
+        "| scenario | from | to | prevented | 95 % | induced | 95 % | both | neither | McNemar p, corrected |\n\
+                    |---|---|---|---:|---|---:|---|---:|---:|---:|\n"
+            .to_owned();
+    for (name, counts) in &summary.scenarios {
+        for result in pair_results(summary, counts) {
+            let interval = |[low, high]: [f64; 2]| format!("{} to {}", percent(low), percent(high));
+            let (pairs, p_value) =
+                (result.pairs, result.corrected_p.map_or_else(|| "-".to_owned(), |p| format!("{p:.1e}")));
+            text.push_str(&format!(
+                "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {p_value} |\n",
+                cell(name),
+                cell(result.baseline),
+                cell(result.tested),
+                pairs.prevented,
+                interval(result.prevented_95),
+                pairs.induced,
+                interval(result.induced_95),
+                pairs.both,
+                pairs.neither,
+            ));
+        }
+    }
+    text.push_str(&format!(
+        "\n<sub>All pairs of arms. Exact McNemar p, corrected for the number of pairs ({CORRECTION}).</sub>\n\n"
+    ));
     text
 }
 

@@ -6,6 +6,7 @@
 //!          └▶ rows ─▶ outcomes.parquet        chosen samples ─▶ recordings/*.rrd
 //! ```
 
+mod arm_pairs;
 mod files;
 pub mod findings;
 mod html;

@@ -1,5 +1,6 @@
 //! The result of a campaign as JSON.
 
+use closecall_campaign::arm_pairs::{CORRECTION, PairResult, pair_results};
 use closecall_campaign::gate::{Answer, Evaluation, ExpectationResult, GateResult, RequirementResult};
 use closecall_campaign::harm;
 use closecall_campaign::ledger::{Inference, Pairs};
@@ -44,6 +45,8 @@ fn unpool(object: &mut Map<String, Value>, summary: &Summary) {
             controller.insert("interval_95_absent".to_owned(), json!(REASON));
         }
     }
+    // The pairs of arms stand with each scenario.
+    object.remove("arm_pairs");
     if let Some(Value::Object(paired)) = object.get_mut("paired") {
         paired.insert("mcnemar_p".to_owned(), Value::Null);
         paired.insert("mcnemar_p_absent".to_owned(), json!(REASON));
@@ -121,6 +124,8 @@ fn counts(summary: &Summary, counts: &Counts) -> Map<String, Value> {
     object.insert("controllers".to_owned(), Value::Object(controllers));
     if summary.is_paired() {
         object.insert("paired".to_owned(), paired(&counts.pairs, summary.inference));
+        let results = pair_results(summary, counts);
+        object.insert("arm_pairs".to_owned(), json!(results.iter().map(arm_pair).collect::<Vec<_>>()));
     }
     object.insert("checks".to_owned(), checks(&counts.checks));
     object
@@ -143,6 +148,25 @@ fn paired(pairs: &Pairs, inference: Inference) -> Value {
         object["mcnemar_p_absent"] = json!("the number of samples was not fixed in advance");
     }
     object
+}
+
+fn arm_pair(result: &PairResult<'_>) -> Value {
+    let pairs = result.pairs;
+    json!({
+        "baseline": result.baseline,
+        "tested": result.tested,
+        "prevented": pairs.prevented,
+        "prevented_interval_95": result.prevented_95,
+        "induced": pairs.induced,
+        "induced_interval_95": result.induced_95,
+        "both": pairs.both,
+        "neither": pairs.neither,
+        "prevented_harm": pairs.prevented_harm,
+        "induced_harm": pairs.induced_harm,
+        "mcnemar_p": result.mcnemar_p,
+        "mcnemar_p_corrected": result.corrected_p,
+        "correction": CORRECTION,
+    })
 }
 
 fn checks(counts: &CheckCounts) -> Value {

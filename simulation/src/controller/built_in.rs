@@ -1,9 +1,11 @@
 //! The built-in controllers, by their names on the command line.
 
+use std::fmt;
 use std::sync::Arc;
 
-use closecall_controllers::{EgoController, EgoSettings, EgoStack};
+use closecall_controllers::{EgoController, EgoSettings, EgoStack, R157Driver};
 
+use super::TimeGap;
 use crate::run::ControllerFactory;
 
 /// A built-in controller.
@@ -13,36 +15,68 @@ pub enum BuiltIn {
     Acc,
     /// The scenario's complete ego stack.
     Mis,
+    /// The scenario's complete ego stack, with a margin increase system that engages earlier and may brake harder.
+    MisExtended,
+    /// As [`BuiltIn::Acc`], with another constant time gap.
+    Gap(TimeGap),
+    /// As [`BuiltIn::Acc`], with the minimum following distance of UN Regulation 157.
+    R157Gap,
+    /// The competent and careful human driver of UN Regulation 157.
+    R157Driver,
+}
+
+/// Writes the name on the command line and in reports.
+impl fmt::Display for BuiltIn {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Acc => f.write_str("acc"),
+            Self::Mis => f.write_str("mis"),
+            Self::MisExtended => f.write_str("mis-extended"),
+            Self::Gap(gap) => write!(f, "gap-{gap}"),
+            Self::R157Gap => f.write_str("r157-gap"),
+            Self::R157Driver => f.write_str("r157-driver"),
+        }
+    }
 }
 
 impl BuiltIn {
-    /// Returns the name on the command line and in reports.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Acc => "acc",
-            Self::Mis => "mis",
-        }
-    }
-
     /// Returns a factory of this controller.
     pub fn factory(self) -> Arc<dyn ControllerFactory> {
-        Arc::new(self)
+        Arc::new(BuiltInFactory { name: self.to_string(), built_in: self })
     }
 }
 
-impl ControllerFactory for BuiltIn {
+/// Creates a built-in controller for each run.
+struct BuiltInFactory {
+    name: String,
+    built_in: BuiltIn,
+}
+
+impl ControllerFactory for BuiltInFactory {
     fn name(&self) -> &str {
-        (*self).name()
+        &self.name
+    }
+
+    fn settings(&self, settings: &EgoSettings) -> EgoSettings {
+        match self.built_in {
+            BuiltIn::Acc => settings.without_mis(),
+            BuiltIn::Mis => *settings,
+            BuiltIn::MisExtended => settings.with_extended_mis(),
+            BuiltIn::Gap(gap) => settings.with_time_gap(gap.s()),
+            BuiltIn::R157Gap => settings.with_r157_gap(),
+            BuiltIn::R157Driver => R157Driver::settings(*settings),
+        }
     }
 
     fn has_mis(&self, settings: &EgoSettings) -> bool {
-        *self == Self::Mis && settings.mis().is_some()
+        self.settings(settings).mis().is_some()
     }
 
     fn build(&self, settings: &EgoSettings) -> Box<dyn EgoController> {
-        match self {
-            Self::Acc => Box::new(EgoStack::new(settings.without_mis())),
-            Self::Mis => Box::new(EgoStack::new(*settings)),
+        let settings = self.settings(settings);
+        match self.built_in {
+            BuiltIn::R157Driver => Box::new(R157Driver::new(settings)),
+            _ => Box::new(EgoStack::new(settings)),
         }
     }
 }

@@ -2,47 +2,108 @@
 
 use std::fmt;
 use std::path::Path;
+use std::str::FromStr;
 use std::sync::Arc;
 
+use closecall_traffic::suggest::hint;
 use serde::{Deserialize, Serialize};
 
-use super::BuiltIn;
-use super::exec::{ExecFactory, ExecSettings};
+use super::exec::{DEFAULT_MEMORY_MIB, DEFAULT_TIMEOUT_MS, ExecFactory, ExecSettings, NAME as EXEC};
+use super::{BuiltIn, TimeGap};
 use crate::run::ControllerFactory;
 
 /// A controller, as a campaign's manifest stores it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+#[serde(into = "Stored", try_from = "Stored")]
 pub enum ControllerChoice {
     /// The scenario's ego stack without its margin increase system.
     Acc,
     /// The scenario's complete ego stack.
     Mis,
+    /// The scenario's complete ego stack with the extended margin increase system.
+    MisExtended,
+    /// The ego stack without its margin increase system, with another constant time gap.
+    Gap(TimeGap),
+    /// The ego stack without its margin increase system, with the minimum following distance of UN Regulation 157.
+    R157Gap,
+    /// The competent and careful human driver of UN Regulation 157.
+    R157Driver,
     /// A separate process for each sample.
     Exec(ExecSettings),
 }
 
+/// The names and forms of the controllers, as messages list them.
+const KNOWN: &str = "`acc`, `mis`, `mis-extended`, `gap-SECONDS`, `r157-gap`, `r157-driver` or `exec:COMMAND`";
+/// The words that are suggested for a misspelt one.
+const WORDS: &str = "`acc`, `mis`, `mis-extended`, `gap-1.2`, `gap-1.6`, `gap-2.0`, `r157-gap`, `r157-driver`, `exec`";
+/// The beginning of the name of a controller with another constant time gap.
+const GAP: &str = "gap-";
+
 impl ControllerChoice {
-    /// Returns the name in reports.
-    pub const fn name(&self) -> &'static str {
-        match self {
-            Self::Acc => BuiltIn::Acc.name(),
-            Self::Mis => BuiltIn::Mis.name(),
-            Self::Exec(_) => super::exec::NAME,
-        }
+    /// Returns the name in reports, if the campaign has no other controller of this name: see [`Self::names`].
+    pub fn name(&self) -> String {
+        self.built_in().map_or_else(|| EXEC.to_owned(), |built_in| built_in.to_string())
+    }
+
+    /// Returns the names of the arms of a campaign. Several processes are numbered, so that each arm has a name of its own.
+    pub fn names(arms: &[Self]) -> Vec<String> {
+        let is_process = |arm: &&Self| arm.exec().is_some();
+        let has_several = arms.iter().filter(is_process).count() > 1;
+        let mut processes = 0;
+        let name = |arm: &Self| {
+            processes += u32::from(arm.exec().is_some());
+            if has_several && arm.exec().is_some() { format!("{EXEC}-{processes}") } else { arm.name() }
+        };
+        arms.iter().map(name).collect()
+    }
+
+    /// Returns the built-in controller, or `None` if this is a process.
+    pub const fn built_in(&self) -> Option<BuiltIn> {
+        Some(match self {
+            Self::Acc => BuiltIn::Acc,
+            Self::Mis => BuiltIn::Mis,
+            Self::MisExtended => BuiltIn::MisExtended,
+            Self::Gap(gap) => BuiltIn::Gap(*gap),
+            Self::R157Gap => BuiltIn::R157Gap,
+            Self::R157Driver => BuiltIn::R157Driver,
+            Self::Exec(_) => return None,
+        })
+    }
+
+    /// Returns the settings of the process, or `None` if this is a built-in controller.
+    pub const fn exec(&self) -> Option<&ExecSettings> {
+        if let Self::Exec(settings) = self { Some(settings) } else { None }
     }
 
     /// Returns a factory of this controller.
     pub fn factory(&self) -> Arc<dyn ControllerFactory> {
-        self.factory_in(None)
+        self.factory_in(None, self.name())
     }
 
-    /// Returns a factory of this controller. A process runs in the given folder, or in that of this program.
-    pub fn factory_in(&self, folder: Option<&Path>) -> Arc<dyn ControllerFactory> {
-        match self {
-            Self::Acc => BuiltIn::Acc.factory(),
-            Self::Mis => BuiltIn::Mis.factory(),
-            Self::Exec(settings) => Arc::new(ExecFactory::new(settings.clone(), folder)),
+    /// Returns a factory of this controller. A process runs in the given folder, or in that of this program, and has the
+    /// given name in reports.
+    pub fn factory_in(&self, folder: Option<&Path>, name: String) -> Arc<dyn ControllerFactory> {
+        match (self.exec(), self.built_in()) {
+            (Some(settings), _) => Arc::new(ExecFactory::new(settings.clone(), folder).named(name)),
+            (None, built_in) => built_in.unwrap_or(BuiltIn::Acc).factory(),
+        }
+    }
+
+    /// Returns a factory for each arm, under the names of [`Self::names`].
+    pub fn factories(arms: &[Self], folder: Option<&Path>) -> Vec<Arc<dyn ControllerFactory>> {
+        arms.iter().zip(Self::names(arms)).map(|(arm, name)| arm.factory_in(folder, name)).collect()
+    }
+}
+
+impl From<BuiltIn> for ControllerChoice {
+    fn from(built_in: BuiltIn) -> Self {
+        match built_in {
+            BuiltIn::Acc => Self::Acc,
+            BuiltIn::Mis => Self::Mis,
+            BuiltIn::MisExtended => Self::MisExtended,
+            BuiltIn::Gap(gap) => Self::Gap(gap),
+            BuiltIn::R157Gap => Self::R157Gap,
+            BuiltIn::R157Driver => Self::R157Driver,
         }
     }
 }
@@ -50,9 +111,100 @@ impl ControllerChoice {
 /// Writes the controller as it is given to `--controller`.
 impl fmt::Display for ControllerChoice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Acc | Self::Mis => f.write_str(self.name()),
-            Self::Exec(settings) => write!(f, "{}:{}", super::exec::NAME, settings.command),
+        match self.exec() {
+            None => f.write_str(&self.name()),
+            Some(settings) => write!(f, "{EXEC}:{}", settings.command),
+        }
+    }
+}
+
+/// A text that names no controller.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum UnknownController {
+    /// There is no controller of this name.
+    #[error("`{text}` is not a controller: expected {KNOWN}{hint}")]
+    Name {
+        /// The text.
+        text: String,
+        /// A suggestion, if some name is similar.
+        hint: String,
+    },
+    /// The time gap of a `gap-SECONDS` is none.
+    #[error(
+        "`{text}` is not a controller: its time gap must be {}, as in `gap-1.2`, `gap-1.6` or `gap-2.0`",
+        TimeGap::ALLOWED
+    )]
+    Gap {
+        /// The text.
+        text: String,
+    },
+    /// The command of an `exec:COMMAND` cannot be split into words.
+    #[error("`{command}` is not a command: it is empty, or its quotes do not match")]
+    Command {
+        /// The command.
+        command: String,
+    },
+}
+
+/// Reads a controller as it is given to `--controller`. A process has the default limits.
+impl FromStr for ControllerChoice {
+    type Err = UnknownController;
+
+    fn from_str(text: &str) -> Result<Self, UnknownController> {
+        if let Some((EXEC, command)) = text.split_once(':') {
+            let (timeout_ms, memory_mib) = (DEFAULT_TIMEOUT_MS, DEFAULT_MEMORY_MIB);
+            let exec = ExecSettings { command: command.to_owned(), timeout_ms, memory_mib };
+            let is_command = exec.words().is_some();
+            return is_command
+                .then_some(Self::Exec(exec))
+                .ok_or_else(|| UnknownController::Command { command: command.to_owned() });
+        }
+        let named = [Self::Acc, Self::Mis, Self::MisExtended, Self::R157Gap, Self::R157Driver];
+        if let Some(found) = named.into_iter().find(|choice| choice.name() == text) {
+            return Ok(found);
+        }
+        match text.strip_prefix(GAP) {
+            Some(seconds) => {
+                seconds.parse().map(Self::Gap).map_err(|()| UnknownController::Gap { text: text.to_owned() })
+            }
+            None => {
+                let word = text.split(':').next().unwrap_or_default();
+                Err(UnknownController::Name { text: text.to_owned(), hint: hint(word, WORDS) })
+            }
+        }
+    }
+}
+
+/// The form in a manifest: the name of a built-in controller, or the settings of a process.
+#[derive(Serialize, Deserialize)]
+#[serde(untagged)]
+enum Stored {
+    BuiltIn(String),
+    Process(StoredProcess),
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredProcess {
+    exec: ExecSettings,
+}
+
+impl From<ControllerChoice> for Stored {
+    fn from(choice: ControllerChoice) -> Self {
+        match choice {
+            ControllerChoice::Exec(exec) => Self::Process(StoredProcess { exec }),
+            built_in => Self::BuiltIn(built_in.name()),
+        }
+    }
+}
+
+impl TryFrom<Stored> for ControllerChoice {
+    type Error = UnknownController;
+
+    fn try_from(stored: Stored) -> Result<Self, UnknownController> {
+        match stored {
+            Stored::BuiltIn(name) => name.parse(),
+            Stored::Process(process) => Ok(Self::Exec(process.exec)),
         }
     }
 }
@@ -61,13 +213,41 @@ impl fmt::Display for ControllerChoice {
 mod tests {
     use super::*;
 
+    fn exec(command: &str) -> ControllerChoice {
+        ControllerChoice::Exec(ExecSettings { command: command.to_owned(), timeout_ms: 250, memory_mib: 64 })
+    }
+
     #[test]
-    fn a_choice_survives_the_round_trip_through_a_manifest() {
-        let exec = ExecSettings { command: "python3 'a b.py'".to_owned(), timeout_ms: 250, memory_mib: 64 };
-        for choice in [ControllerChoice::Acc, ControllerChoice::Mis, ControllerChoice::Exec(exec)] {
+    fn a_choice_survives_the_round_trip_through_a_manifest_and_a_command_line() {
+        for name in ["acc", "mis", "mis-extended", "gap-0.8", "gap-1.6", "gap-2.5", "r157-gap", "r157-driver"] {
+            let choice: ControllerChoice = name.parse().unwrap();
+            assert_eq!((choice.to_string(), choice.name()), (name.to_owned(), name.to_owned()));
+            assert_eq!(choice.built_in().map(ControllerChoice::from), Some(choice.clone()));
             let text = serde_json::to_string(&choice).unwrap();
-            assert_eq!(serde_json::from_str::<ControllerChoice>(&text).unwrap(), choice, "{text}");
+            assert_eq!(text, format!("\"{name}\""));
+            assert_eq!(serde_json::from_str::<ControllerChoice>(&text).unwrap(), choice);
         }
-        assert_eq!(serde_json::to_string(&ControllerChoice::Mis).unwrap(), "\"mis\"");
+        let process = exec("python3 'a b.py'");
+        let text = serde_json::to_string(&process).unwrap();
+        assert!(text.starts_with("{\"exec\":{\"command\":"), "{text}");
+        assert_eq!(serde_json::from_str::<ControllerChoice>(&text).unwrap(), process);
+        assert!(serde_json::from_str::<ControllerChoice>("\"gap-9\"").is_err());
+    }
+
+    #[test]
+    fn what_is_no_controller_is_refused_with_what_is_allowed() {
+        let refusal = |text: &str| text.parse::<ControllerChoice>().unwrap_err().to_string();
+        assert!(refusal("miss").ends_with("; did you mean `mis`?"), "{}", refusal("miss"));
+        assert!(refusal("exce:python3 a.py").ends_with("; did you mean `exec`?"));
+        assert!(refusal("r157-drivr").ends_with("; did you mean `r157-driver`?"));
+        assert!(refusal("gap-3.0").contains("0.8 to 2.5 s in steps of 0.1 s"));
+        assert!(refusal("exec:").contains("it is empty"));
+    }
+
+    #[test]
+    fn several_processes_are_numbered() {
+        let arms = [ControllerChoice::Acc, exec("a"), ControllerChoice::Mis, exec("b")];
+        assert_eq!(ControllerChoice::names(&arms), ["acc", "exec-1", "mis", "exec-2"]);
+        assert_eq!(ControllerChoice::names(&arms[..3]), ["acc", "exec", "mis"]);
     }
 }

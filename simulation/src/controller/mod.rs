@@ -4,14 +4,22 @@
 //! |---|---|
 //! | `acc` | the scenario's ego stack without its margin increase system |
 //! | `mis` | the scenario's complete ego stack |
+//! | `mis-extended` | the same, with a margin increase system that engages earlier and may brake harder |
+//! | `gap-SECONDS` | as `acc`, with another constant time gap |
+//! | `r157-gap` | as `acc`, with the minimum following distance of UN Regulation 157 |
+//! | `r157-driver` | the competent and careful human driver of UN Regulation 157 |
 //! | `exec:COMMAND` | an external process, started anew for each sample ([`exec`]) |
 //!
 //! A controller in Rust implements [`EgoController`](closecall_controllers::EgoController). A campaign creates it through a
 //! [`ControllerFactory`](crate::run::ControllerFactory). `examples/own_controller.rs` is a complete example.
 
+mod arm_list;
 mod built_in;
 mod choice;
 pub mod exec;
+mod time_gap;
 
+pub use arm_list::{ArmList, ArmsError};
 pub use built_in::BuiltIn;
-pub use choice::ControllerChoice;
+pub use choice::{ControllerChoice, UnknownController};
+pub use time_gap::TimeGap;

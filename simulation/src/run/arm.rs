@@ -18,6 +18,11 @@ pub struct RunKey {
 pub trait ControllerFactory: Send + Sync {
     /// Returns the name under which outcomes are reported.
     fn name(&self) -> &str;
+    /// Returns the settings that the controller makes of those of the scenario. If it keeps another gap to the lead vehicle,
+    /// the ego starts as much further back.
+    fn settings(&self, settings: &EgoSettings) -> EgoSettings {
+        *settings
+    }
     /// Returns whether the controller has a margin increase system whose actions the outcome summarises.
     fn has_mis(&self, settings: &EgoSettings) -> bool;
     /// Creates a new controller with the settings of the scenario's ego stack.

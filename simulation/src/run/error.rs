@@ -12,6 +12,21 @@ pub enum SampleError {
     /// The sampled parameter values do not result in a valid scenario.
     #[error("failed to make the concrete scenario: {0}")]
     Scenario(ConfigError),
+    /// The ego cannot start in balance with the gap of its controller, because another vehicle is in the way.
+    #[error(
+        "failed to start the ego at the gap of `{controller}`: it is {moved_m:.1} m from where the scenario places the ego, and \
+         `{actor}` leaves {room_m:.1} m"
+    )]
+    Start {
+        /// The controller.
+        controller: String,
+        /// Distance from the place of the scenario (m).
+        moved_m: f64,
+        /// The vehicle in the way.
+        actor: ActorId,
+        /// The gap to that vehicle at the place of the scenario (m).
+        room_m: f64,
+    },
     /// The sensors could not be set up, or failed during the run.
     #[error("the sensors {0}")]
     Sensors(#[from] SensorError),
@@ -53,6 +68,7 @@ impl SampleError {
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Scenario(_) => "scenario",
+            Self::Start { .. } => "start",
             Self::Sensors(_) => "sensors",
             Self::Controller(_) => "controller",
             Self::Command { .. } => "command",

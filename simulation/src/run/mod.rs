@@ -22,6 +22,7 @@ mod moments;
 mod observer;
 mod phase;
 mod settling;
+mod start;
 mod state;
 
 pub use arm::{Arm, ControllerFactory, RunKey};

@@ -5,7 +5,7 @@ use closecall_controllers::{
     DriverInput, DriverNote, EgoCommand, EgoController, EgoInput, EgoState, MisSettings, Neighbours,
 };
 use closecall_sensors::{NoiseKey, Perception, Scene, SceneVehicle};
-use closecall_traffic::{CONTROL_STEP, ENGAGEMENT_CLOSING_MPS, ENGAGEMENT_GAP_M, Measured, Track};
+use closecall_traffic::{CONTROL_STEP, ENGAGEMENT_CLOSING_MPS, ENGAGEMENT_GAP_M, Measured, Track, VehicleState};
 
 use super::ego_input::{odometry, sensor_availability};
 use super::events::Events;
@@ -15,6 +15,7 @@ use super::mis_log::{MisLog, MisObservation};
 use super::moments::Moments;
 use super::phase::{AFTER_COLLISION, Encounter, Follower};
 use super::settling::settle_sensors;
+use super::start::start_of_ego;
 use super::{Arm, Happening, MarginsNow, Observer, RunKey, SampleError, StepView};
 use crate::outcome::{EndReason, Moment, Outcome, Phase};
 use crate::scenario::Scenario;
@@ -56,20 +57,24 @@ pub(super) struct Run<'a> {
 
 impl<'a> Run<'a> {
     pub(super) fn new(scenario: &'a Scenario, key: RunKey, arm: &'a Arm) -> Result<Self, SampleError> {
-        let vehicles = scenario
-            .actors
-            .iter()
-            .map(|actor| InitialVehicle {
-                id: actor.id.clone(),
-                vehicle: actor.vehicle,
-                state: actor.start,
-                weave: weave(actor, &scenario.road, key),
-            })
-            .collect();
-        let world = World::new(scenario.road, scenario.environment.friction, scenario.physics_step, vehicles);
         let CheckedDriver::Ego(settings) = &scenario.actors[scenario.ego].driver else {
             unreachable!("a checked scenario has its ego stack at `ego`")
         };
+        let world_with = |ego: VehicleState| {
+            let vehicles = scenario.actors.iter().enumerate().map(|(index, actor)| InitialVehicle {
+                id: actor.id.clone(),
+                vehicle: actor.vehicle,
+                state: if index == scenario.ego { ego } else { actor.start },
+                weave: weave(actor, &scenario.road, key),
+            });
+            World::new(scenario.road, scenario.environment.friction, scenario.physics_step, vehicles.collect())
+        };
+        let placed = scenario.actors[scenario.ego].start;
+        let mut world = world_with(placed);
+        let start = start_of_ego(scenario, settings, arm, &world)?;
+        if start != placed {
+            world = world_with(start);
+        }
         let widths = Widths { vehicle_m: 0.0, lane_m: scenario.road.lane_width_m() };
         let margins = MarginsNow::new(world.state(scenario.ego), &Neighbours::default(), widths);
         let sensors = match arm.sensors {

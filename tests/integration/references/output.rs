@@ -60,6 +60,7 @@ fn the_columns_of_a_campaign_s_tables_are_those_documented() {
         "-n",
         "4",
         "--no-gate",
+        "--paired",
         "--out",
         out.to_str().unwrap(),
     ]
@@ -76,7 +77,9 @@ fn the_columns_of_a_campaign_s_tables_are_those_documented() {
     assert!(parameters.iter().all(|[_, kind, _]| patterns.iter().any(|[_, known, _]| known == kind)));
     // The unit of this table stands in Arrow's metadata alone.
     let names = |columns: Vec<[String; 3]>| columns.into_iter().map(|[name, kind, _]| [name, kind]).collect::<Vec<_>>();
-    assert_eq!(names(columns(&out.join("timings.parquet"))), names(documented_columns("timings.parquet")));
+    for table in ["timings.parquet", "arm_pairs.parquet"] {
+        assert_eq!(names(columns(&out.join(table))), names(documented_columns(table)));
+    }
 }
 
 #[test]

@@ -67,6 +67,28 @@ impl MisSettings {
         hold_s: 2.0,
         worst_front_braking_mps2: 8.0,
     };
+
+    /// Rear gap at which the extended system engages (m): an assumption, the range in which sensors to the rear confirm and
+    /// classify a car (the data sheet of the simulated LiDAR states 200 m on good targets); 120 to 200 are plausible.
+    pub const EXTENDED_ENGAGE_GAP_M: f64 = 150.0;
+
+    /// Strongest braking of the extended system (m/s²): an assumption. ISO 15622 allows an adaptive cruise control 3.5 m/s²
+    /// at highway speeds; the system uses little more than half of it, since the rear vehicle must follow it; 1 to 3.5 are
+    /// plausible.
+    pub const EXTENDED_MAX_DECELERATION_MPS2: f64 = 2.0;
+
+    /// Returns the settings of the extended system: it engages earlier and may brake harder. Every other value stays as it is.
+    ///
+    /// Engagement distance and braking limit are the values that determine most how much margin the system gains until the
+    /// rear vehicle arrives. A system that sees or brakes more already keeps its own values.
+    #[must_use]
+    pub const fn extended(self) -> Self {
+        Self {
+            engage_gap_m: self.engage_gap_m.max(Self::EXTENDED_ENGAGE_GAP_M),
+            max_deceleration_mps2: self.max_deceleration_mps2.max(Self::EXTENDED_MAX_DECELERATION_MPS2),
+            ..self
+        }
+    }
 }
 
 impl Check for MisConfig {

@@ -13,8 +13,8 @@ use proptest::prelude::*;
 
 use super::{Encounter, MisSettings};
 use crate::ego::{
-    Acc, ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack, EgoState, Odometry, Reason,
-    SensorAvailability,
+    Acc, ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack, EgoState, GapPolicy, Odometry,
+    Reason, SensorAvailability,
 };
 
 const CAR_M: f64 = 4.6;
@@ -77,7 +77,7 @@ impl Bench {
     }
 
     const SETTINGS: EgoSettings = EgoSettings {
-        acc: Acc { time_gap_s: 0.7, set_speed_mps: None, standstill_gap_m: 3.0 },
+        acc: Acc { time_gap_s: 0.7, set_speed_mps: None, standstill_gap_m: 3.0, policy: GapPolicy::Constant },
         aeb: None,
         mis: Some(MisSettings::PAPER),
         automated: true,

@@ -7,9 +7,10 @@ use maud::{Markup, html};
 use super::page::{number, number_heads, table, text_heads};
 use crate::campaign::findings::Findings;
 use crate::charts;
+use closecall_campaign::arm_pairs::{CORRECTION, pair_results};
 use closecall_campaign::harm;
 use closecall_campaign::ledger::{ArmCounts, Inference};
-use closecall_campaign::summary::Counts;
+use closecall_campaign::summary::{Counts, Summary};
 use closecall_statistics::format::percent;
 
 /// Returns the collisions of each arm, and of pairs of arms if the campaign is paired.
@@ -42,6 +43,7 @@ pub(super) fn collisions(findings: &Findings<'_>) -> io::Result<Markup> {
         h2 { "Collisions of the ego" }
         (table(&head, &rows))
         @if summary.is_paired() { (pairs(scenarios, summary.inference)?) }
+        @if summary.has_references() { (arm_pairs(summary)) }
         p.note {
             "Rates are conditional on the sampled scenario: they say how often a sampled encounter ends in a collision of "
             "the ego, not how often this happens on a road."
@@ -98,6 +100,43 @@ fn pairs(scenarios: &[(String, Counts)], inference: Inference) -> io::Result<Mar
             "valid only if the number of samples was fixed in advance. Harm: " (harm::WEIGHT) "."
         }
     })
+}
+
+/// Returns the table of all pairs of arms.
+fn arm_pairs(summary: &Summary) -> Markup {
+    let head = html! {
+        (text_heads(&["scenario", "from", "to"]))
+        (number_heads(&["prevented", "95 % interval", "induced", "95 % interval", "both", "neither", "McNemar p", "corrected"]))
+    };
+    let interval = |[low, high]: [f64; 2]| format!("{} to {}", percent(low), percent(high));
+    let p_text = |p: Option<f64>| p.map_or_else(|| "-".to_owned(), |p| format!("{p:.1e}"));
+    let rows = html! {
+        @for (name, counts) in &summary.scenarios {
+            @for (index, result) in pair_results(summary, counts).iter().enumerate() {
+                tr {
+                    td { @if index == 0 { (name) } }
+                    td { (result.baseline) }
+                    td { (result.tested) }
+                    (number(result.pairs.prevented))
+                    (number(interval(result.prevented_95)))
+                    (number(result.pairs.induced))
+                    (number(interval(result.induced_95)))
+                    (number(result.pairs.both))
+                    (number(result.pairs.neither))
+                    (number(p_text(result.mcnemar_p)))
+                    (number(p_text(result.corrected_p)))
+                }
+            }
+        }
+    };
+    html! {
+        h2 { "All pairs of arms" }
+        (table(&head, &rows))
+        p.note {
+            "Each arm with each arm before it, on the same samples. Exact McNemar p, corrected for the number of pairs of a "
+            "scenario (" (CORRECTION) "). The intervals are exact, each for its own share of the samples."
+        }
+    }
 }
 
 /// Returns what the validity checks found in each scenario; empty if no run was checked.

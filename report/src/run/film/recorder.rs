@@ -115,7 +115,7 @@ fn limits(scenario: &Scenario, arm: &Arm) -> Vec<Limit> {
     let mut limits = Vec::new();
     if let CheckedDriver::Ego(settings) = &scenario.actors[scenario.ego].driver
         && arm.controller.has_mis(settings)
-        && let Some(mis) = settings.mis()
+        && let Some(mis) = arm.controller.settings(settings).mis()
     {
         limits.push(Limit { name: "MIS comfort limit".to_owned(), value: -mis.max_deceleration_mps2 });
     }

@@ -22,12 +22,19 @@ const START_TIMEOUT: Duration = Duration::from_secs(10);
 pub struct ExecFactory {
     settings: ExecSettings,
     folder: Option<PathBuf>,
+    name: String,
 }
 
 impl ExecFactory {
     /// Creates a factory of processes with these settings. They run in the given folder, or in that of this program.
     pub fn new(settings: ExecSettings, folder: Option<&Path>) -> Self {
-        Self { settings, folder: folder.map(Path::to_owned) }
+        Self { settings, folder: folder.map(Path::to_owned), name: NAME.to_owned() }
+    }
+
+    /// Returns the factory under another name in reports.
+    #[must_use]
+    pub fn named(self, name: String) -> Self {
+        Self { name, ..self }
     }
 }
 
@@ -60,7 +67,7 @@ fn greet(
 
 impl ControllerFactory for ExecFactory {
     fn name(&self) -> &str {
-        NAME
+        &self.name
     }
 
     /// The outcome summarises the states that the process reports if the scenario has a margin increase system.

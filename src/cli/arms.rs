@@ -1,0 +1,138 @@
+//! The controllers of the ego vehicle on the command line: the one under test, and those it is compared with.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use closecall_simulation::Arm;
+use closecall_simulation::controller::exec::ExecSettings;
+use closecall_simulation::controller::{ArmList, ControllerChoice};
+
+use super::CliError;
+use super::args::SensorsChoice;
+use super::protect::of_controller;
+
+/// The controller under test.
+#[derive(Clone, Debug, Args)]
+pub(super) struct ControllerArgs {
+    /// Controller of the ego vehicle: `acc`, `mis`, `mis-extended`, `gap-SECONDS` (cruise control with a longer time gap:
+    /// `gap-1.2`, `gap-1.6`, `gap-2.0`), `r157-gap` (the minimum following distance of UN Regulation 157), `r157-driver` (its
+    /// reference driver), or `exec:COMMAND` for a program of your own, which reads a line per control step and answers with
+    /// a line
+    #[arg(long, value_name = "acc|mis|gap-SECONDS|…|exec:COMMAND", default_value = "mis")]
+    controller: ControllerChoice,
+    /// Time limit for each answer of an `exec` controller [default: 1000]
+    #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u64).range(1..=600_000))]
+    controller_timeout_ms: Option<u64>,
+    /// Memory limit of each process of an `exec` controller [default: 1024]
+    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1_048_576))]
+    controller_memory_mib: Option<u64>,
+}
+
+impl ControllerArgs {
+    /// Returns the controller with its limits.
+    pub(super) fn choice(&self) -> Result<ControllerChoice, CliError> {
+        Ok(self.limited(std::slice::from_ref(&self.controller))?.swap_remove(0))
+    }
+
+    /// Returns the controllers, the processes among them with the limits of the command line.
+    fn limited(&self, controllers: &[ControllerChoice]) -> Result<Vec<ControllerChoice>, CliError> {
+        let (timeout_ms, memory_mib) = (self.controller_timeout_ms, self.controller_memory_mib);
+        let has_process = controllers.iter().any(|controller| controller.exec().is_some());
+        if let (Some(built_in), true, false) =
+            (controllers.last(), timeout_ms.is_some() || memory_mib.is_some(), has_process)
+        {
+            return Err(CliError::Usage {
+                message: format!(
+                    "--controller-timeout-ms and --controller-memory-mib apply to a process, and `{built_in}` is built in: \
+                     name a process with --controller exec:COMMAND"
+                ),
+            });
+        }
+        let limited = |controller: &ControllerChoice| match controller.exec() {
+            Some(exec) => ControllerChoice::Exec(ExecSettings {
+                timeout_ms: timeout_ms.unwrap_or(exec.timeout_ms),
+                memory_mib: memory_mib.unwrap_or(exec.memory_mib),
+                ..exec.clone()
+            }),
+            None => controller.clone(),
+        };
+        Ok(controllers.iter().map(limited).collect())
+    }
+}
+
+/// The controller of the ego vehicle, and its sensors.
+#[derive(Clone, Debug, Args)]
+pub(super) struct ArmArgs {
+    #[command(flatten)]
+    pub(super) controller: ControllerArgs,
+    /// Depth of the sensor simulation [default: that of the scenario]
+    #[arg(long, value_enum)]
+    pub(super) sensors: Option<SensorsChoice>,
+}
+
+impl ArmArgs {
+    /// Returns the files that the command of the controller names.
+    pub(super) fn files(&self) -> Vec<PathBuf> {
+        of_controller(&self.controller.controller)
+    }
+
+    pub(super) fn arm(&self) -> Result<Arm, CliError> {
+        Ok(arm(&self.controller.choice()?, self.sensors))
+    }
+}
+
+/// What the controller under test is compared with.
+#[derive(Clone, Debug, Args)]
+pub(super) struct ComparisonArgs {
+    /// Also run every sample with the baseline controller `acc`, on the same random numbers: short for
+    /// `--arms acc,CONTROLLER`
+    #[arg(long)]
+    pub(super) paired: bool,
+    /// Controllers that run on the same samples and random numbers. The first is the baseline, the last is the one under
+    /// test, those between are references. An `exec:COMMAND` takes the rest of its list: let it stand last, or give --arms
+    /// several times
+    #[arg(long, value_name = "CONTROLLER,CONTROLLER…", conflicts_with_all = ["paired", "controller"])]
+    pub(super) arms: Vec<ArmList>,
+}
+
+impl ComparisonArgs {
+    /// Returns the controllers in the order of the arms. `by_default` compares with the baseline even without `--paired`,
+    /// unless the controller under test is the baseline itself.
+    pub(super) fn controllers(
+        &self,
+        tested: &ControllerArgs,
+        by_default: bool,
+    ) -> Result<Vec<ControllerChoice>, CliError> {
+        if self.arms.is_empty() {
+            return match tested.choice()? {
+                ControllerChoice::Acc if self.paired => Err(CliError::Usage {
+                    message: "--paired compares a controller with `acc`: name another with --controller".to_owned(),
+                }),
+                tested if self.paired || (by_default && tested != ControllerChoice::Acc) => {
+                    Ok(vec![ControllerChoice::Acc, tested])
+                }
+                tested => Ok(vec![tested]),
+            };
+        }
+        let arms = ArmList::joined(&self.arms).map_err(|error| CliError::Usage { message: error.to_string() })?;
+        tested.limited(&arms)
+    }
+
+    /// Returns the arms of a run.
+    pub(super) fn arms(&self, tested: &ArmArgs) -> Result<Vec<Arm>, CliError> {
+        let controllers = ControllerChoice::factories(&self.controllers(&tested.controller, false)?, None);
+        let sensors = tested.sensors.map(SensorsChoice::mode);
+        Ok(controllers.into_iter().map(|controller| Arm { controller, sensors }).collect())
+    }
+
+    /// Returns the files that the commands of the controllers name.
+    pub(super) fn files(&self, tested: &ArmArgs) -> Vec<PathBuf> {
+        let arms = self.arms.iter().flat_map(|list| &list.0).flat_map(of_controller);
+        tested.files().into_iter().chain(arms).collect()
+    }
+}
+
+/// Returns the arm of a controller.
+pub(super) fn arm(controller: &ControllerChoice, sensors: Option<SensorsChoice>) -> Arm {
+    Arm { controller: controller.factory(), sensors: sensors.map(SensorsChoice::mode) }
+}
