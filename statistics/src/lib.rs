@@ -14,6 +14,7 @@
 //! * [`holm`]: p-values corrected for the number of tests
 //! * [`quantiles`]: quantiles of sorted values, and the distribution that they define
 //! * [`normal`]: the truncated normal distribution
+//! * [`sensitivity`]: which input of a function moves its output most
 //!
 //! All methods for probabilities assume independent, identically distributed samples, as in the random sampling design.
 
@@ -25,6 +26,7 @@ pub mod mcnemar;
 pub mod needed;
 pub mod normal;
 pub mod quantiles;
+pub mod sensitivity;
 pub mod sequence;
 
 #[cfg(test)]

@@ -1,0 +1,109 @@
+//! Estimates from independent replicates, with intervals.
+//!
+//! A smooth function of sums, such as a ratio of variances, is evaluated on the sums of all replicates, and again without each
+//! of them. The pseudo-values have the estimate, freed of its bias of the order of one over the number of replicates, as their
+//! mean, and their spread gives its standard error (J. W. Tukey, Annals of Mathematical Statistics 29 (1958) 614; B. Efron and
+//! C. Stein, Annals of Statistics 9 (1981) 586–596). The interval is Student's.
+//!
+//! The points of one scrambled low-discrepancy sequence depend on each other, so that resampling them, as a bootstrap does,
+//! overstates the error. Independent scramblings do not depend on each other. For their mean, Student's interval keeps its
+//! coverage best of the usual intervals, the bootstrap's among them (P. L'Ecuyer, M. K. Nakayama, A. B. Owen and B. Tuffin,
+//! *Confidence intervals for randomized quasi-Monte Carlo estimators*, Winter Simulation Conference 2023).
+
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+use crate::interval::COVERAGE;
+
+/// Number of replicates into which samples are divided. Student's factor is then 4 % above that of infinitely many.
+pub const REPLICATES: usize = 32;
+
+/// An estimate with its interval.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimate {
+    /// The estimate.
+    pub value: f64,
+    /// The 95 % interval. It may reach beyond the range of the quantity, such as below 0 for a share.
+    pub interval_95: [f64; 2],
+}
+
+impl Estimate {
+    /// Returns true if the interval contains `truth`.
+    pub fn covers(&self, truth: f64) -> bool {
+        self.interval_95[0] <= truth && truth <= self.interval_95[1]
+    }
+}
+
+/// Estimates `function` of the sums over all replicates. `None` if the function has no value for the sums of all replicates or
+/// of all but one, or if there are fewer than two replicates.
+pub fn jackknife<const K: usize>(
+    replicates: &[[f64; K]],
+    function: impl Fn(&[f64; K]) -> Option<f64>,
+) -> Option<Estimate> {
+    let count = replicates.len() as f64;
+    let mut all = [0.0; K];
+    for replicate in replicates {
+        for (sum, term) in all.iter_mut().zip(replicate) {
+            *sum += term;
+        }
+    }
+    let of_all = function(&all)?;
+    let pseudo_value = |replicate: &[f64; K]| {
+        let mut others = all;
+        for (sum, term) in others.iter_mut().zip(replicate) {
+            *sum -= term;
+        }
+        Some(count * of_all - (count - 1.0) * function(&others)?)
+    };
+    student(&replicates.iter().map(pseudo_value).collect::<Option<Vec<f64>>>()?)
+}
+
+/// Estimates the mean of independent values, with Student's interval; `None` of fewer than two values.
+pub fn student(values: &[f64]) -> Option<Estimate> {
+    if values.len() < 2 {
+        return None;
+    }
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0);
+    let half_width = student_factor(values.len()) * (variance / count).sqrt();
+    let estimate = Estimate { value: mean, interval_95: [mean - half_width, mean + half_width] };
+    (mean.is_finite() && half_width.is_finite()).then_some(estimate)
+}
+
+/// Returns the factor of the standard error of a mean of `count` values, two or more.
+fn student_factor(count: usize) -> f64 {
+    match StudentsT::new(0.0, 1.0, count as f64 - 1.0) {
+        Ok(distribution) => distribution.inverse_cdf(0.5 * (1.0 + COVERAGE)),
+        Err(_) => f64::NAN,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mean_has_the_textbook_interval() {
+        // t of 4 degrees of freedom at 97.5 %: 2.776; standard deviation of 1 to 5: 1.5811.
+        let estimate = student(&[1.0, 2.0, 3.0, 4.0, 5.0]).unwrap();
+        assert_eq!(estimate.value, 3.0);
+        assert!((estimate.interval_95[1] - 3.0 - 2.776 * 1.5811 / 5.0_f64.sqrt()).abs() < 1e-3);
+        assert_eq!(student(&[1.0]), None);
+    }
+
+    #[test]
+    fn the_jackknife_of_a_mean_is_the_mean_of_the_replicates() {
+        let replicates: Vec<[f64; 2]> = [1.0, 2.0, 4.0, 9.0].iter().map(|sum| [*sum, 1.0]).collect();
+        let estimate = jackknife(&replicates, |[sum, count]| Some(sum / count)).unwrap();
+        let direct = student(&[1.0, 2.0, 4.0, 9.0]).unwrap();
+        assert!((estimate.value - direct.value).abs() < 1e-12);
+        assert!((estimate.interval_95[0] - direct.interval_95[0]).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_has_no_value_without_one_replicate_has_no_estimate() {
+        let replicates = [[1.0, 0.0], [1.0, 2.0]];
+        let ratio = |[above, below]: &[f64; 2]| (*below > 0.0).then(|| above / below);
+        assert_eq!(jackknife(&replicates, ratio), None);
+    }
+}
