@@ -46,7 +46,8 @@ pub(super) fn run(args: &RunArgs) -> Result<ExitCode, CliError> {
     let fail = |source| CliError::Sample { sample: args.sample, source };
     let scenario = concrete(&file, sampling, args.sample).map_err(fail)?;
     let key = RunKey { seed: args.sim.seed, sample: args.sample };
-    let outcomes = run_watched(&scenario, key, &args.sim.arm.arms(args.paired)?, &args.watch)?;
+    let outcomes =
+        run_watched(&scenario, key, &args.sim.arm.arms(args.paired)?, (&args.watch, &args.sim.set.settings))?;
     print(&outcomes, args.format, Some(&args.sim.set.settings));
     Ok(ExitCode::Pass)
 }
