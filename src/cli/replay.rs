@@ -55,7 +55,7 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<ExitCode, CliError> {
     for change in &changes {
         print_error(format_args!("{change}\n"));
     }
-    let outcomes = run_watched(&scenario, key, &arms, &args.watch)?;
+    let outcomes = run_watched(&scenario, key, &arms, (&args.watch, &saved.manifest().settings()))?;
     print(&outcomes, args.format, Some(&saved.manifest().settings()));
     let mut agrees = true;
     for outcome in &outcomes {

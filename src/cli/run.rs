@@ -45,7 +45,8 @@ pub(super) fn run(args: &RunArgs) -> Result<ExitCode, CliError> {
     let fail = |source| CliError::Sample { sample: args.sample, source };
     let scenario = concrete(&file, sampling, args.sample).map_err(fail)?;
     let key = RunKey { seed: args.sim.seed, sample: args.sample };
-    let outcomes = run_watched(&scenario, key, &args.comparison.arms(&args.sim.arm)?, &args.watch)?;
+    let arms = args.comparison.arms(&args.sim.arm)?;
+    let outcomes = run_watched(&scenario, key, &arms, (&args.watch, &args.sim.set.settings))?;
     print(&outcomes, args.format, Some(&args.sim.set.settings));
     Ok(ExitCode::Pass)
 }

@@ -10,7 +10,7 @@ use closecall_report::run::trace::TraceWriter;
 use closecall_scenarios::criticality::{CriticalLaneChange, by_severity};
 use closecall_scenarios::filters::SmoothedTrajectoryData;
 use closecall_simulation::outcome::Outcome;
-use closecall_simulation::scenario::Scenario;
+use closecall_simulation::scenario::{Scenario, Setting};
 use closecall_simulation::{Arm, Happening, Observer, RunKey, StepView};
 use closecall_traffic::Time;
 
@@ -77,12 +77,12 @@ fn table(text: &str) -> Result<PathBuf, String> {
     }
 }
 
-/// Runs a sample in each arm, and writes the requested files. All arms share one recording.
+/// Runs a sample in each arm, and writes the requested files. All arms share one recording, which names `settings`.
 pub(super) fn run_watched(
     scenario: &Scenario,
     key: RunKey,
     arms: &[Arm],
-    watch: &WatchArgs,
+    (watch, settings): (&WatchArgs, &[Setting]),
 ) -> Result<Vec<Outcome>, CliError> {
     watch.check()?;
     check_backend_of(scenario, arms)?;
@@ -96,7 +96,7 @@ pub(super) fn run_watched(
         let mut observers = Observers { recorder: recorder.as_mut(), trace: trace.as_mut().filter(|_| is_tested) };
         let outcome = run_guarded(scenario, key, arm, &mut observers)
             .map_err(|source| CliError::Sample { sample: key.sample, source })?;
-        films.extend(recorder.map(|recorder| recorder.finish(&outcome)));
+        films.extend(recorder.map(|recorder| named(recorder.finish(&outcome), settings)));
         outcomes.push(outcome);
     }
     if let Some(path) = &watch.record {
@@ -110,6 +110,11 @@ pub(super) fn run_watched(
         print_written(path);
     }
     Ok(outcomes)
+}
+
+/// Returns a film that names the settings of the command line.
+fn named(film: Film, settings: &[Setting]) -> Film {
+    film.with_settings(settings.iter().map(ToString::to_string))
 }
 
 /// Runs a sample in one arm, writes the requested trace, and returns a film of the run. The caller saves the recording.

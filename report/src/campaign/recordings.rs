@@ -12,7 +12,7 @@ use super::files::ReportError;
 use super::findings::Recordings;
 use super::html::{IndexEntry, write_index};
 use crate::run::figure::still;
-use crate::run::film::{Level, film_arms};
+use crate::run::film::{Film, Level, film_arms};
 use crate::run::rerun::write_recording;
 
 /// The folder of the recordings within a campaign's folder.
@@ -69,6 +69,9 @@ fn record_one(saved: &SavedCampaign, scenario: &str, chosen: &Chosen) -> Result<
     let (concrete, key) = saved.sample(Some(scenario), sample)?;
     let films = film_arms(&concrete, key, &saved.manifest().arms(), Level::Full)
         .map_err(|source| ReportError::Sample { sample, source })?;
+    let settings = saved.manifest().settings();
+    let named = |film: Film| film.with_settings(settings.iter().map(ToString::to_string));
+    let films: Vec<Film> = films.into_iter().map(named).collect();
     let file = format!("{scenario}-{sample}.rrd");
     write_recording(&saved.folder().file(&format!("{RECORDINGS}/{file}")), &films)?;
     let paired = if films.len() > 1 { " --paired" } else { "" };
@@ -77,7 +80,7 @@ fn record_one(saved: &SavedCampaign, scenario: &str, chosen: &Chosen) -> Result<
         saved.folder().path().display(),
     );
     let story = films.iter().flat_map(|film| {
-        let arm = film.arm();
+        let arm = film.arm_label();
         [Some(film.headline()), film.mis_summary()].into_iter().flatten().map(move |line| format!("{arm}: {line}"))
     });
     Ok(IndexEntry {

@@ -68,17 +68,17 @@ impl EncounterComparison {
     /// recorded encounter.
     pub fn markdown(&self, encounter: &RecordedEncounter, simulated: &Film, driver: RearDriver) -> String {
         let [ego, front, rear] = encounter.ego_lead_rear().map(|track| track.track_id);
-        let (arm, start_s) = (simulated.arm(), encounter.start.s());
+        let (arm, start_s) = (simulated.arm_label(), encounter.start.s());
         let mut page = format!(
-            "### Recorded beside {arm}\n\n**Track {rear} (R) behind {ego} (E) behind {front} (F): both halves start alike, at \
-             {start_s:.1} s of the recording; then {arm} drives E.**\n\n| | recorded | {arm} |\n|---|---|---|\n"
+            "### Recorded beside {arm}\n\n**Track {rear} (R) behind {ego} (E) behind {front} (F). Both start alike at {start_s:.1} s of the trajectory \
+             data.**\n\n| | recorded | {arm} |\n|---|---|---|\n"
         );
         for (name, [recorded, simulated]) in self.rows() {
             // Writing to a string cannot fail.
             let _ = writeln!(page, "| {name} | {recorded} | {simulated} |");
         }
         let rear_driver = match driver {
-            RearDriver::Driver => "R is a human driver who reacts, and pulls out at the recorded headway",
+            RearDriver::Driver => "a model of a human driver drives R and pulls out at the recorded headway",
             RearDriver::Recorded => "R drives as recorded, whatever E does",
         };
         let missing_count = encounter.vehicles.len().saturating_sub(simulated.actors.len());
@@ -89,7 +89,7 @@ impl EncounterComparison {
         let _ = writeln!(
             page,
             "\nIn the run, F drives as recorded; {rear_driver}{missing_text}. The thin outlines are the vehicles of the other \
-             half. TrajectoryData: `{}`.\n",
+             half. Trajectory data: `{}`.\n",
             encounter.data_name
         );
         page

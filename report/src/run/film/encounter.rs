@@ -8,7 +8,7 @@ use closecall_scenarios::encounter::{EGO_INDEX, RecordedEncounter};
 use closecall_traffic::{Environment, Time, Trajectory, Vehicle};
 
 use super::traffic::{frame_at, present_frames, straight_road};
-use super::{Film, FilmActor, Level, TrafficFilmError};
+use super::{Film, FilmActor, Level, Part, TrafficFilmError};
 use closecall_simulation::CONTROL_STEP;
 use closecall_simulation::scenario::actor_name;
 
@@ -24,6 +24,7 @@ pub fn film_encounter(encounter: &RecordedEncounter, level: Level) -> Result<Fil
         name: actor_name(index, track),
         vehicle: Vehicle { dimensions: track.dimensions, ..Vehicle::typical(track.class) },
         present_frames: present_frames(track, times()),
+        part: Part::of_index(index, EGO_INDEX),
         is_plotted: true,
     };
     let [ego, _, rear] = encounter.ego_lead_rear();
@@ -44,6 +45,7 @@ pub fn film_encounter(encounter: &RecordedEncounter, level: Level) -> Result<Fil
         outcome: None,
         highlight: Some(encounter.crossing),
         foreword: String::new(),
+        settings: Vec::new(),
     })
 }
 

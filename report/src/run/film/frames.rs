@@ -13,6 +13,7 @@ use closecall_simulation::outcome::{Collision, Outcome, Phase};
 use closecall_simulation::{Happening, MarginsNow};
 
 use super::Scan;
+use super::knowledge::RearSeen;
 
 /// Closest encounters later than this are ignored (s).
 const ENCOUNTER_HORIZON_S: f64 = 10.0;
@@ -38,8 +39,38 @@ pub struct FilmActor {
     pub vehicle: Vehicle,
     /// Indices of the frames in which the vehicle is present.
     pub present_frames: Range<usize>,
+    /// Its part in what the film shows, which decides its colour.
+    pub part: Part,
     /// True if the plots show its speed and acceleration.
     pub is_plotted: bool,
+}
+
+/// The part of a vehicle in what a film shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// The ego; in the film of a recorded lane change, the vehicle that changes lanes.
+    Ego,
+    /// The lead vehicle.
+    Lead,
+    /// The rear vehicle.
+    Rear,
+    /// Another vehicle of the scenario, with its number among these.
+    Other(usize),
+    /// A vehicle that is part of the traffic around. It is grey and has no name.
+    Background,
+}
+
+impl Part {
+    /// Returns the part of a simulated vehicle: by convention the first vehicle besides the ego is the lead vehicle and
+    /// the second the rear vehicle.
+    pub(super) fn of_index(index: usize, ego: usize) -> Self {
+        match if index > ego { index - 1 } else { index } {
+            _ if index == ego => Self::Ego,
+            0 => Self::Lead,
+            1 => Self::Rear,
+            other => Self::Other(other - 2),
+        }
+    }
 }
 
 /// One instant of a film.
@@ -54,6 +85,8 @@ pub struct Frame {
     pub(in crate::run) margins: MarginsNow,
     /// Tracks that the ego's sensors report; empty below [`Level::Objects`].
     pub(in crate::run) tracks: Vec<Track>,
+    /// The vehicle behind the ego, as its rear sensors know it.
+    pub(in crate::run) rear_seen: Option<RearSeen>,
     /// Command of the ego's controller; `None` for recorded traffic.
     pub(in crate::run) command: Option<EgoCommand>,
     /// Phase of the encounter; `None` for recorded traffic.
@@ -101,6 +134,8 @@ pub struct Film {
     pub(in crate::run) highlight: Option<Time>,
     /// Text that precedes the story, in Markdown.
     pub(in crate::run) foreword: String,
+    /// Settings of the command line, each as `key=value`.
+    pub(in crate::run) settings: Vec<String>,
 }
 
 impl Film {
@@ -110,13 +145,26 @@ impl Film {
         Self { foreword, ..self }
     }
 
-    /// Limits the plots of speed and acceleration to the first `count` vehicles.
+    /// Sets the settings of the command line that the story names.
+    #[must_use]
+    pub fn with_settings(mut self, settings: impl IntoIterator<Item = String>) -> Self {
+        self.settings = settings.into_iter().collect();
+        self
+    }
+
+    /// Makes all vehicles but the first `count` traffic around these: grey, without name and curves.
     #[must_use]
     pub fn with_plots_of_first(mut self, count: usize) -> Self {
-        for (index, actor) in self.actors.iter_mut().enumerate() {
-            actor.is_plotted = index < count;
+        for actor in self.actors.iter_mut().skip(count) {
+            actor.is_plotted = false;
+            actor.part = Part::Background;
         }
         self
+    }
+
+    /// Returns true if a vehicle is named and coloured.
+    pub(in crate::run) fn is_main(&self, actor: usize) -> bool {
+        self.actors[actor].part != Part::Background
     }
 
     /// Returns the title of the film.

@@ -29,6 +29,14 @@ impl Film {
         closest.unwrap_or_else(|| self.end())
     }
 
+    /// Returns the time of the frame that shows the critical moment: of a collision the first frame in which the vehicles
+    /// touch.
+    pub(in crate::run) fn critical_frame_time(&self) -> Time {
+        let critical = self.critical_moment();
+        let at = self.frames.partition_point(|frame| frame.time < critical);
+        self.frames.get(at).map_or_else(|| self.end(), |frame| frame.time)
+    }
+
     /// Returns the time of the last frame.
     pub(crate) fn end(&self) -> Time {
         self.frames.last().map_or(Time::ZERO, |frame| frame.time)

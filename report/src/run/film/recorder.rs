@@ -5,7 +5,8 @@ use closecall_sensors::camera::Pipeline;
 use closecall_sensors::{NoiseKey, SensorMode};
 use closecall_traffic::Time;
 
-use super::{Film, FilmActor, Frame, Level, Limit, Scan};
+use super::knowledge::rear_seen;
+use super::{Film, FilmActor, Frame, Level, Limit, Part, Scan};
 use closecall_simulation::outcome::{Outcome, Phase};
 use closecall_simulation::scenario::Scenario;
 use closecall_simulation::{Arm, CONTROL_STEP, Happening, Observer, RunKey, StepView};
@@ -42,10 +43,11 @@ impl FilmRecorder {
             None => scenario.sensors,
         };
         let has_camera = sensors.mode() == SensorMode::Full && sensors.camera().pipeline != Pipeline::Off;
-        let film_actor = |actor: &closecall_simulation::scenario::Actor| FilmActor {
+        let film_actor = |(index, actor): (usize, &closecall_simulation::scenario::Actor)| FilmActor {
             name: actor.id.to_string(),
             vehicle: actor.vehicle,
             present_frames: 0..usize::MAX,
+            part: Part::of_index(index, scenario.ego),
             is_plotted: true,
         };
         let film = Film {
@@ -55,7 +57,7 @@ impl FilmRecorder {
             period: CONTROL_STEP,
             road: scenario.road,
             environment: scenario.environment,
-            actors: scenario.actors.iter().map(film_actor).collect(),
+            actors: scenario.actors.iter().enumerate().map(film_actor).collect(),
             ego: scenario.ego,
             frames: Vec::new(),
             happenings: Vec::new(),
@@ -69,6 +71,7 @@ impl FilmRecorder {
             outcome: None,
             highlight: None,
             foreword: String::new(),
+            settings: Vec::new(),
         };
         Self { film, dense_scan_count: 0, closest: None }
     }
@@ -128,12 +131,14 @@ impl Observer for FilmRecorder {
     fn step(&mut self, view: &StepView<'_>) {
         let keeps_objects = self.film.level >= Level::Objects;
         let scan = self.scan(view);
+        let ego_length_m = self.film.actors[self.film.ego].vehicle.dimensions.length_m;
         self.film.frames.push(Frame {
             time: view.time,
             states: view.vehicles.iter().map(|vehicle| vehicle.state).collect(),
             pitches_rad: view.vehicles.iter().map(|vehicle| vehicle.pitch_rad).collect(),
             margins: *view.margins,
             tracks: if keeps_objects { view.tracks.to_vec() } else { Vec::new() },
+            rear_seen: rear_seen(view.tracks, ego_length_m),
             command: Some(*view.command),
             phase: Some(view.phase),
             rear_field: view.perception.rear_field().filter(|_| keeps_objects),

@@ -3,7 +3,7 @@
 use closecall_controllers::{DriverNote, EgoState};
 use closecall_traffic::Time;
 
-use super::Film;
+use super::{Film, headway_text};
 use closecall_simulation::Happening;
 use closecall_simulation::outcome::Collision;
 
@@ -32,7 +32,7 @@ impl Film {
             }
             None => {
                 let margin = |name: &str, value: closecall_traffic::Measured| match value {
-                    Ok(thw_s) => format!(" Smallest {name} headway {thw_s:.2} s."),
+                    Ok(thw_s) => format!(" Smallest {name} headway {}.", headway_text(thw_s)),
                     Err(_) => String::new(),
                 };
                 let margins = &outcome.margins;
@@ -73,7 +73,10 @@ impl Film {
         });
         let notes =
             self.notes.iter().map(|(time, text)| StoryLine { time: *time, text: text.clone(), is_severe: false });
-        let mut lines: Vec<StoryLine> = happenings.chain(moments).chain(notes).collect();
+        let known = self.known_spans().into_iter().filter(|span| span.time > self.frames[0].time).map(|span| {
+            StoryLine { time: span.time, text: format!("vehicle behind the ego: {}", span.words()), is_severe: false }
+        });
+        let mut lines: Vec<StoryLine> = happenings.chain(moments).chain(notes).chain(known).collect();
         lines.sort_by_key(|line| line.time);
         lines
     }
@@ -86,7 +89,7 @@ impl Film {
                 plain(format!("{} {}", self.actors[*actor].name, driver_note_text(*note)))
             }
             Happening::EgoStateChanged { to, reason, .. } => {
-                let text = format!("E: {} ({reason})", ego_state_name(*to));
+                let text = format!("ego: {} ({reason})", ego_state_name(*to));
                 Some(StoryLine { time, text, is_severe: *to == EgoState::EmergencyBraking })
             }
             Happening::PhaseChanged { .. } => None,

@@ -5,21 +5,29 @@
 //! straight, with lanes of the typical width in the trajectory data. Trajectory data have no brake lights and no
 //! indicators, so that none are shown.
 
-use closecall_scenarios::criticality::CriticalLaneChange;
+use closecall_scenarios::criticality::{
+    CRITICAL_A_LAT_MPS2, CRITICAL_A_LON_MPS2, CRITICAL_DCE_M, CRITICAL_DISTANCE_M, CRITICAL_SPEED_FACTOR,
+    CRITICAL_TTCE_S, CriticalLaneChange,
+};
 use closecall_scenarios::filters::{PERIOD, SmoothedTrajectoryData};
-use closecall_traffic::metrics::{time_headway_s, time_to_collision_s};
+use closecall_traffic::metrics::{CRITICAL_THW_S, time_headway_s, time_to_collision_s};
 use closecall_traffic::{
     Absent, Check, ConfigError, Environment, Num, Parameters, Road, RoadConfig, Side, Time, Trajectory,
     TrajectoryPoint, Vehicle, VehicleState,
 };
 
-use super::{Film, FilmActor, Frame, Level};
+use super::{Film, FilmActor, Frame, Level, Part};
+use crate::units::labelled;
 use closecall_simulation::{Lead, MarginsNow};
 
 /// Time shown before the start and after the end of the lane change.
 const CONTEXT_TIME: Time = Time::from_ms(2_000);
 /// Vehicles that never come closer to the ego than this along the road are left out (m).
 const REACH_M: f64 = 150.0;
+/// Largest number of vehicles that are named and coloured. All others are the traffic around them.
+const MAX_MAIN: usize = 5;
+/// Largest number of vehicles whose speed and acceleration are plotted.
+const MAX_PLOTTED: usize = 3;
 /// Smallest and largest lane width that the drawn road may have (m).
 const LANE_WIDTH_RANGE_M: [f64; 2] = [2.5, 5.0];
 /// Largest number of lanes that the drawn road may have.
@@ -63,9 +71,10 @@ pub fn film_lane_change(
         name: format!("track-{}", track.track_id),
         vehicle: Vehicle { dimensions: track.dimensions, ..Vehicle::typical(track.class) },
         present_frames: present_frames(track, instants.iter().map(|point| point.time)),
-        is_plotted: true,
+        part: Part::Background,
+        is_plotted: false,
     };
-    Ok(Film {
+    let mut film = Film {
         title: format!("{} · lane change of track {track_id}", recording.name),
         arm: "recorded".to_owned(),
         level: Level::Full,
@@ -82,7 +91,10 @@ pub fn film_lane_change(
         outcome: None,
         highlight: None,
         foreword: String::new(),
-    })
+        settings: Vec::new(),
+    };
+    mark_main(&mut film);
+    Ok(film)
 }
 
 /// Returns the track `own`, followed by all other tracks that come near it.
@@ -96,6 +108,28 @@ fn nearby_tracks<'a>(
             && instants.iter().any(|own| track.at(own.time).is_some_and(|at| (at.s_m - own.s_m).abs() < REACH_M))
     };
     std::iter::once(own).chain(recording.trajectories().filter(is_near)).collect()
+}
+
+/// Gives the vehicle that changes lanes, its neighbours and the nearest others their parts, at the critical moment.
+fn mark_main(film: &mut Film) {
+    let critical = film.critical_moment();
+    let Some(frame) = film.frame_at(critical) else { return };
+    let own_m = frame.states[film.ego].s_m;
+    let row = film.frames.partition_point(|frame| frame.time < critical);
+    let mut parts = vec![(film.ego, Part::Ego)];
+    parts.extend(frame.margins.lead.ok().map(|lead| (lead.actor, Part::Lead)));
+    parts.extend(frame.margins.follower.map(|actor| (actor, Part::Rear)));
+    let mut others: Vec<usize> = (0..film.actors.len())
+        .filter(|&actor| film.is_present(actor, row) && parts.iter().all(|(taken, _)| *taken != actor))
+        .collect();
+    let distance_m = |actor: usize| (frame.states[actor].s_m - own_m).abs();
+    others.sort_by(|&a, &b| distance_m(a).total_cmp(&distance_m(b)));
+    let room = MAX_MAIN.saturating_sub(parts.len());
+    parts.extend(others.into_iter().take(room).enumerate().map(|(number, actor)| (actor, Part::Other(number))));
+    for (number, (actor, part)) in parts.into_iter().enumerate() {
+        film.actors[actor].part = part;
+        film.actors[actor].is_plotted = number < MAX_PLOTTED;
+    }
 }
 
 /// Returns the range of frames in which a track is present, where frame i shows the i-th of `instants`.
@@ -141,6 +175,7 @@ pub(super) fn frame_at(tracks: &[&Trajectory], time: Time) -> Frame {
         margins: margins(tracks, &present),
         states,
         tracks: Vec::new(),
+        rear_seen: None,
         command: None,
         phase: None,
         rear_field: None,
@@ -197,10 +232,26 @@ fn notes(change: &CriticalLaneChange) -> Vec<(Time, String)> {
     ];
     for (name, metric) in change.metrics.named() {
         if let closecall_scenarios::criticality::MetricResult::Value { value, opponent, time_s, critical } = metric {
-            let against = opponent.map_or(String::new(), |track| format!(" against track {track}"));
-            let mark = if critical { ": CRITICAL" } else { "" };
-            notes.push((Time::from_s(time_s), format!("most critical {name} {value:.2}{against}{mark}")));
+            let against = opponent.map_or(String::new(), |track| format!(" to track {track}"));
+            let (label, limit) = described(name);
+            let mark = if critical { "CRITICAL" } else { "not critical" };
+            notes.push((Time::from_s(time_s), format!("{label} {value:.2}{against}: {mark} ({limit})")));
         }
     }
     notes
+}
+
+/// Returns the label of a metric with its unit, and its threshold.
+fn described(name: &str) -> (String, String) {
+    let label = labelled(name);
+    let limit = match name {
+        "distance_m" => format!("threshold {CRITICAL_DISTANCE_M} m"),
+        "speed_mps" => format!("threshold {CRITICAL_SPEED_FACTOR} of the speed limit"),
+        "a_lon_mps2" => format!("threshold {CRITICAL_A_LON_MPS2} m/s²"),
+        "a_lat_mps2" => format!("threshold {CRITICAL_A_LAT_MPS2} m/s²"),
+        "thw_s" => format!("threshold {CRITICAL_THW_S} s"),
+        "dce_m" => format!("threshold {CRITICAL_DCE_M} m"),
+        _ => format!("threshold {CRITICAL_TTCE_S} s"),
+    };
+    (label, limit)
 }

@@ -1,113 +1,205 @@
 //! The view from above (bird's-eye view), in a frame that moves with the ego, E. The direction of travel points to the
-//! right. The picture is stretched across the road, so that lane changes are easy to see. F is the lead vehicle, R the
-//! rear vehicle.
+//! right. F is the lead vehicle, R the rear vehicle.
 //!
 //! ```text
+//!   with MIS · 11.88 s   rear 36.7 m/s · 0.20 s behind
 //!   ─────────────────────────────────────────────
 //!             ▬▬ R ▷▷▷
 //!   ─ ─ ─ ─ ─ ─ ─ ─ ─ ─ ─ ─ ─ ─ ─ ─ ─ ─ ─ ─ ─ ─ ─
-//!                    ├ 0.2 s ┤▬▬ E ▷▷├ 2.7 s ┤▬▬ F
+//!                    ├─────┤▬▬ E ▷▷├────────┤▬▬ F
 //!   ─────────────────────────────────────────────
+//!              ego 21.5 m/s   front 30.0 m/s · 2.66 s ahead
+//!   -20 m        0 m         20 m         40 m
 //! ```
+//!
+//! Of a pair, the roads lie below each other, so that both have one metre axis.
 
-use closecall_traffic::{Indicator, Lane, Source, Time, TrackStatus};
+mod names;
+
+use closecall_traffic::{Indicator, Lane, Measured, Source, Time, TrackStatus};
 use rerun::{LineStrips2D, Points2D};
 
 use super::RecordingError;
 use super::palette::{self, Rgba};
 use super::stream::Writer;
-use super::vehicles::LABELLED_GAP_M;
 use crate::run::film::{Film, Frame};
 use closecall_simulation::outcome::CRITICAL_THW_S;
 
 /// Factor by which the picture is stretched across the road.
-pub(super) const STRETCH: f64 = 2.0;
-/// Length of road shown in front of and behind the ego (m).
-pub(super) const REACH_M: f64 = 80.0;
+const STRETCH: f64 = 1.0;
+/// Rear and front end of the road in the picture, relative to the ego (m).
+pub(super) const X_RANGE_M: [f64; 2] = [-35.0, 75.0];
 /// A line shows the distance that the vehicle travels in this time (s).
 const ARROW_S: f64 = 0.5;
-/// Lateral position of the text about a collision, beside the left edge of the road (m).
-const COLLISION_TEXT_D_M: f64 = 1.0;
+/// Room for the clock and the names above the road (m in the picture).
+const ABOVE_M: f64 = 4.8;
+/// Room for the names below the road (m in the picture).
+const BELOW_M: f64 = 4.6;
+/// Room for the axis below the last road (m in the picture).
+const AXIS_M: f64 = 4.6;
+/// Distance of the clock and the names above from the road (m in the picture). A label hangs below its point.
+const NAMES_ABOVE_M: f64 = 4.4;
+/// Distance of the names below and of the axis from the road (m in the picture).
+const NAMES_BELOW_M: f64 = 0.3;
+const AXIS_BELOW_M: f64 = 5.2;
+/// Distance between two marks of the axis (m).
+const AXIS_STEP_M: i32 = 10;
+/// Marks of the axis that have a number are this many steps apart.
+const AXIS_NUMBERED: i32 = 2;
+/// Width of a letter of a label in a window of 1280 px (m in the picture), and of the room between two labels.
+const LETTER_M: f64 = 0.95;
+const BETWEEN_LABELS_M: f64 = 3.5;
+/// Letters of the clock besides the name of the arm.
+const CLOCK_LETTERS: usize = 10;
 // Draw orders: a larger one lies above a smaller one.
 const LANE_ORDER: f32 = 0.0;
 const VELOCITY_ORDER: f32 = 1.0;
 const BODY_ORDER: f32 = 2.0;
 const MARK_ORDER: f32 = 3.0;
 
-/// Returns the y coordinates of the left and the right edge of the road in the picture.
-pub(super) fn edges(film: &Film) -> [f64; 2] {
-    [0.0, -film.road.right_edge_m() * STRETCH]
+/// The road of one film in the picture.
+#[derive(Clone, Copy)]
+pub(super) struct Canvas<'a> {
+    pub(super) film: &'a Film,
+    /// Position of the left edge of the road across the picture (m in the picture).
+    top_m: f64,
+    /// True if the metre axis is below this road.
+    has_axis: bool,
 }
 
-pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingError> {
-    let times = film.times();
-    write_lanes(writer, film)?;
-    write_bodies(writer, film, &times)?;
-    write_speeds(writer, film, &times)?;
-    write_lamps(writer, film, &times)?;
-    write_gaps(writer, film, &times)?;
-    write_tracks(writer, film, &times)?;
-    write_collisions(writer, film)
+impl<'a> Canvas<'a> {
+    /// Returns the canvases of the films, below each other.
+    pub(super) fn of_films(films: &'a [Film]) -> Vec<Self> {
+        let mut top_m = 0.0;
+        let mut canvases = Vec::new();
+        for (index, film) in films.iter().enumerate() {
+            canvases.push(Self { film, top_m, has_axis: index + 1 == films.len() });
+            top_m += ABOVE_M + BELOW_M - film.road.right_edge_m() * STRETCH;
+        }
+        canvases
+    }
+
+    /// Returns the upper and the lower end of what is drawn (m in the picture).
+    pub(super) fn range_m(&self) -> [f64; 2] {
+        [self.top_m - ABOVE_M, self.bottom_m() + BELOW_M + if self.has_axis { AXIS_M } else { 0.0 }]
+    }
+
+    /// Returns the position of the right edge of the road across the picture (m in the picture).
+    fn bottom_m(&self) -> f64 {
+        self.top_m - self.film.road.right_edge_m() * STRETCH
+    }
+
+    /// Returns the picture coordinates of a point in the road frame.
+    pub(super) fn at(&self, frame: &Frame, s_m: f64, d_m: f64) -> [f32; 2] {
+        [(s_m - frame.states[self.film.ego].s_m) as f32, (self.top_m - d_m * STRETCH) as f32]
+    }
 }
 
-/// Returns the picture coordinates of a point in the road frame.
-fn at(film: &Film, frame: &Frame, s_m: f64, d_m: f64) -> [f32; 2] {
-    [(s_m - frame.states[film.ego].s_m) as f32, (-d_m * STRETCH) as f32]
+pub(super) fn write(writer: &Writer<'_>, canvas: &Canvas<'_>) -> Result<(), RecordingError> {
+    let times = canvas.film.times();
+    write_lanes(writer, canvas)?;
+    if canvas.has_axis {
+        write_axis(writer, canvas)?;
+    }
+    write_clock(writer, canvas, &times)?;
+    write_bodies(writer, canvas, &times)?;
+    names::write(writer, canvas, &times)?;
+    write_speeds(writer, canvas, &times)?;
+    write_lamps(writer, canvas, &times)?;
+    write_gaps(writer, canvas, &times)?;
+    write_tracks(writer, canvas, &times)?;
+    write_collisions(writer, canvas)
 }
 
 /// Writes the edges of the road and the lane markings.
-fn write_lanes(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingError> {
-    let road = &film.road;
+fn write_lanes(writer: &Writer<'_>, canvas: &Canvas<'_>) -> Result<(), RecordingError> {
+    let road = &canvas.film.road;
     let lines = (0..=road.lanes()).map(|line| match line {
         0 => 0.0,
         line => road.lane_centre_m(Lane(line)) - 0.5 * road.lane_width_m(),
     });
     let strips = lines.map(|d_m| {
-        let y = (-d_m * STRETCH) as f32;
-        [[-2.0 * REACH_M as f32, y], [2.0 * REACH_M as f32, y]]
+        let y = (canvas.top_m - d_m * STRETCH) as f32;
+        X_RANGE_M.map(|x_m| [4.0 * x_m as f32, y])
     });
     let edge = |line: u8| line == 0 || line == road.lanes();
     let colours = (0..=road.lanes()).map(|line| if edge(line) { palette::MARKING } else { palette::QUIET });
-    let lanes = LineStrips2D::new(strips).with_colors(colours).with_radii([0.15_f32]).with_draw_order(LANE_ORDER);
+    let lanes = LineStrips2D::new(strips).with_colors(colours).with_radii([0.12_f32]).with_draw_order(LANE_ORDER);
     writer.write_static("bird/lanes", &lanes)
 }
 
-/// Writes a bar for each vehicle that is present, with its name and speed.
-fn write_bodies(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordingError> {
-    for (index, actor) in film.actors.iter().enumerate().filter(|(_, actor)| !actor.present_frames.is_empty()) {
-        let entity = format!("bird/vehicles/{}", actor.name);
-        let size = &actor.vehicle.dimensions;
-        let fixed = LineStrips2D::update_fields()
-            .with_colors([palette::actor(index, film.ego)])
-            .with_radii([(0.5 * size.width_m * STRETCH) as f32])
-            .with_draw_order(BODY_ORDER)
-            .with_show_labels(true);
-        writer.write_static(&entity, &fixed)?;
-        let half_m = 0.5 * size.length_m;
-        writer.write_rows(&entity, times, |range| {
-            let rows: Vec<usize> = range.collect();
-            let present =
-                || rows.iter().filter(|&&row| actor.present_frames.contains(&row)).map(|&row| &film.frames[row]);
-            let bar = |frame: &Frame| {
-                let state = &frame.states[index];
-                [-half_m, half_m].map(|along_m| at(film, frame, state.s_m + along_m, state.d_m))
-            };
-            let text = |frame: &Frame| format!("{} {:.1} m/s", actor.name, frame.states[index].speed_mps);
-            LineStrips2D::update_fields()
-                .with_strips(present().map(bar))
-                .with_labels(present().map(text))
-                .columns(rows.iter().map(|row| usize::from(actor.present_frames.contains(row))).collect::<Vec<_>>())
-        })?;
-    }
-    Ok(())
+/// Writes the metre axis below the road.
+fn write_axis(writer: &Writer<'_>, canvas: &Canvas<'_>) -> Result<(), RecordingError> {
+    let y = (canvas.bottom_m() + AXIS_BELOW_M) as f32;
+    let [first, last] = X_RANGE_M.map(|x_m| (x_m as i32) / AXIS_STEP_M);
+    let marks: Vec<i32> = (first..=last).collect();
+    let x = |mark: i32| (mark * AXIS_STEP_M) as f32;
+    let ends = [[x(first), y], [x(last), y]];
+    let strips = marks.iter().map(|&mark| [[x(mark), y - 0.7], [x(mark), y + 0.7]]);
+    let lines = LineStrips2D::new(std::iter::once(ends).chain(strips))
+        .with_colors([palette::NEUTRAL])
+        .with_radii([0.09_f32])
+        .with_draw_order(LANE_ORDER);
+    writer.write_static("bird/axis", &lines)?;
+    let numbered: Vec<i32> = marks.into_iter().filter(|mark| mark % AXIS_NUMBERED == 0).collect();
+    let numbers = Points2D::new(numbered.iter().map(|&mark| [x(mark), y]))
+        .with_labels(numbered.iter().map(|mark| format!("{} m", mark * AXIS_STEP_M)))
+        .with_colors([palette::NOTE])
+        .with_radii([0.05_f32])
+        .with_show_labels(true);
+    writer.write_static("bird/axis/numbers", &numbers)
+}
+
+/// Returns the room that the clock takes (m in the picture).
+fn clock_m(canvas: &Canvas<'_>) -> f64 {
+    LETTER_M * (canvas.film.arm_label().chars().count() + CLOCK_LETTERS) as f64 + BETWEEN_LABELS_M
+}
+
+/// Writes the name of the arm with the time of the frame. A label is centred at its point.
+fn write_clock(writer: &Writer<'_>, canvas: &Canvas<'_>, times: &[Time]) -> Result<(), RecordingError> {
+    let film = canvas.film;
+    let text = |time: &Time| format!("{} · {:.2} s", film.arm_label(), time.s());
+    let at = [(X_RANGE_M[0] + 0.5 * clock_m(canvas)) as f32, (canvas.top_m - NAMES_ABOVE_M) as f32];
+    let entity = "bird/clock";
+    let fixed = Points2D::new([at]).with_colors([palette::NOTE]).with_radii([0.05_f32]).with_show_labels(true);
+    writer.write_static(entity, &fixed)?;
+    writer.write_rows(entity, times, |range| {
+        Points2D::update_fields().with_labels(times[range].iter().map(text)).columns_of_unit_batches()
+    })
+}
+
+/// Writes a bar for each vehicle that is present.
+fn write_bodies(writer: &Writer<'_>, canvas: &Canvas<'_>, times: &[Time]) -> Result<(), RecordingError> {
+    let entity = "bird/vehicles";
+    let film = canvas.film;
+    writer.write_static(entity, &LineStrips2D::update_fields().with_draw_order(BODY_ORDER))?;
+    let present = |row: usize| (0..film.actors.len()).filter(move |&actor| film.is_present(actor, row));
+    writer.write_rows(entity, times, |range| {
+        let all = || range.clone().flat_map(|row| present(row).map(move |actor| (row, actor)));
+        let width_m = |actor: usize| film.actors[actor].vehicle.dimensions.width_m * STRETCH;
+        let bar = |(row, actor): (usize, usize)| {
+            let frame: &Frame = &film.frames[row];
+            let state = &frame.states[actor];
+            // The ends of a line are round.
+            let half_m = 0.5 * (film.actors[actor].vehicle.dimensions.length_m - width_m(actor)).max(0.1);
+            [-half_m, half_m].map(|along_m| canvas.at(frame, state.s_m + along_m, state.d_m))
+        };
+        LineStrips2D::update_fields()
+            .with_strips(all().map(bar))
+            .with_colors(all().map(|(_, actor)| palette::part(film.actors[actor].part)))
+            .with_radii(all().map(|(_, actor)| (0.5 * width_m(actor)) as f32))
+            .columns(range.clone().map(|row| present(row).count()).collect::<Vec<_>>())
+    })
 }
 
 /// Writes the velocities as lines in front of the vehicles.
-fn write_speeds(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordingError> {
+fn write_speeds(writer: &Writer<'_>, canvas: &Canvas<'_>, times: &[Time]) -> Result<(), RecordingError> {
+    let film = canvas.film;
     let entity = "bird/velocity";
     writer
-        .write_static(entity, &LineStrips2D::update_fields().with_radii([0.5_f32]).with_draw_order(VELOCITY_ORDER))?;
-    let present = |row: usize| (0..film.actors.len()).filter(move |&actor| film.is_present(actor, row));
+        .write_static(entity, &LineStrips2D::update_fields().with_radii([0.35_f32]).with_draw_order(VELOCITY_ORDER))?;
+    let present =
+        |row: usize| (0..film.actors.len()).filter(move |&actor| film.is_main(actor) && film.is_present(actor, row));
     writer.write_rows(entity, times, |range| {
         let all = || range.clone().flat_map(|row| present(row).map(move |actor| (row, actor)));
         let line = |(row, actor): (usize, usize)| {
@@ -117,18 +209,19 @@ fn write_speeds(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), 
             let (sin, cos) = state.heading_rad.sin_cos();
             let arrow_end_m = front_m + ARROW_S * state.speed_mps;
             [
-                at(film, frame, state.s_m + front_m * cos, state.d_m + front_m * sin),
-                at(film, frame, state.s_m + arrow_end_m * cos, state.d_m + arrow_end_m * sin),
+                canvas.at(frame, state.s_m + front_m * cos, state.d_m + front_m * sin),
+                canvas.at(frame, state.s_m + arrow_end_m * cos, state.d_m + arrow_end_m * sin),
             ]
         };
         LineStrips2D::new(all().map(line))
-            .with_colors(all().map(|(_, actor)| palette::with_opacity(palette::actor(actor, film.ego), 170)))
+            .with_colors(all().map(|(_, actor)| palette::with_opacity(palette::part(film.actors[actor].part), 150)))
             .columns(range.clone().map(|row| present(row).count()).collect::<Vec<_>>())
     })
 }
 
 /// Writes the brake lights and indicators that are on.
-fn write_lamps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordingError> {
+fn write_lamps(writer: &Writer<'_>, canvas: &Canvas<'_>, times: &[Time]) -> Result<(), RecordingError> {
+    let film = canvas.film;
     let lit = |row: usize| -> Vec<([f32; 2], Rgba)> {
         let frame = &film.frames[row];
         let mut lamps = Vec::new();
@@ -136,14 +229,14 @@ fn write_lamps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), R
             let (state, size) = (&frame.states[actor], &film.actors[actor].vehicle.dimensions);
             let rear_m = state.s_m - 0.5 * size.length_m;
             if state.brake_light {
-                lamps.push((at(film, frame, rear_m, state.d_m), palette::BRAKE_LIGHT));
+                lamps.push((canvas.at(frame, rear_m, state.d_m), palette::BRAKE_LIGHT));
             }
             let side = match state.indicator {
                 Indicator::Off => continue,
                 Indicator::Left => 0.5,
                 Indicator::Right => -0.5,
             };
-            lamps.push((at(film, frame, rear_m, state.d_m + side * size.width_m), palette::INDICATOR));
+            lamps.push((canvas.at(frame, rear_m, state.d_m + side * size.width_m), palette::INDICATOR));
         }
         lamps
     };
@@ -152,7 +245,7 @@ fn write_lamps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), R
         return Ok(());
     }
     let entity = "bird/lamps";
-    writer.write_static(entity, &Points2D::update_fields().with_radii([1.1_f32]).with_draw_order(MARK_ORDER))?;
+    writer.write_static(entity, &Points2D::update_fields().with_radii([0.8_f32]).with_draw_order(MARK_ORDER))?;
     writer.write_rows(entity, times, |range| {
         let rows = &rows[range];
         Points2D::new(rows.iter().flatten().map(|lamp| lamp.0))
@@ -161,40 +254,40 @@ fn write_lamps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), R
     })
 }
 
-/// A gap: its ends in the picture, its colour, and the text of its time headway.
-type Gap = ([[f32; 2]; 2], Rgba, String);
+/// A gap: its ends in the picture, and its colour.
+type Gap = ([[f32; 2]; 2], Rgba);
 
-/// Writes the gaps in front of and behind the ego with their time headways. A critical gap is red.
-fn write_gaps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordingError> {
+/// Writes the gaps in front of and behind the ego. A critical gap is red.
+fn write_gaps(writer: &Writer<'_>, canvas: &Canvas<'_>, times: &[Time]) -> Result<(), RecordingError> {
+    let film = canvas.film;
     let half_m = 0.5 * film.actors[film.ego].vehicle.dimensions.length_m;
     let gaps = |frame: &Frame| -> Vec<Gap> {
         let own = &frame.states[film.ego];
         let margins = &frame.margins;
         let sides = [(1.0, margins.gap_front_m, margins.thw_front_s), (-1.0, margins.gap_rear_m, margins.thw_rear_s)];
-        let line = |(sign, gap_m, thw_s): (f64, closecall_traffic::Measured, closecall_traffic::Measured)| {
+        let line = |(sign, gap_m, thw_s): (f64, Measured, Measured)| {
             let (gap_m, thw_s) = (gap_m.ok().filter(|&gap_m| gap_m > 0.0)?, thw_s.ok()?);
-            let ends = [half_m, half_m + gap_m].map(|along_m| at(film, frame, own.s_m + sign * along_m, own.d_m));
+            let ends = [half_m, half_m + gap_m].map(|along_m| canvas.at(frame, own.s_m + sign * along_m, own.d_m));
             let colour = if thw_s < CRITICAL_THW_S { palette::CRITICAL } else { palette::SAFE };
-            let text = if gap_m < LABELLED_GAP_M { String::new() } else { format!("{thw_s:.2} s") };
-            Some((ends, colour, text))
+            Some((ends, colour))
         };
         sides.into_iter().filter_map(line).collect()
     };
     let rows: Vec<Vec<Gap>> = film.frames.iter().map(gaps).collect();
     let entity = "bird/gaps";
-    let fixed = LineStrips2D::update_fields().with_radii([0.6_f32]).with_draw_order(MARK_ORDER).with_show_labels(true);
+    let fixed = LineStrips2D::update_fields().with_radii([0.45_f32]).with_draw_order(MARK_ORDER);
     writer.write_static(entity, &fixed)?;
     writer.write_rows(entity, times, |range| {
         let rows = &rows[range];
         LineStrips2D::new(rows.iter().flatten().map(|gap| gap.0))
             .with_colors(rows.iter().flatten().map(|gap| gap.1))
-            .with_labels(rows.iter().flatten().map(|gap| gap.2.as_str()))
             .columns(rows.iter().map(Vec::len).collect::<Vec<_>>())
     })
 }
 
 /// Writes the outlines of the confirmed rear tracks that are probably vehicles.
-fn write_tracks(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordingError> {
+fn write_tracks(writer: &Writer<'_>, canvas: &Canvas<'_>, times: &[Time]) -> Result<(), RecordingError> {
+    let film = canvas.film;
     let outlines = |frame: &Frame| -> Vec<Vec<[f32; 2]>> {
         let own = &frame.states[film.ego];
         let is_shown = |track: &&closecall_traffic::Track| {
@@ -204,7 +297,7 @@ fn write_tracks(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), 
             let (half_m, side_m) = (0.5 * track.length_m, 0.5 * track.width_m);
             let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]];
             let corner = |[along, across]: [f64; 2]| {
-                at(film, frame, own.s_m + track.x_m() + along * half_m, own.d_m + track.y_m() + across * side_m)
+                canvas.at(frame, own.s_m + track.x_m() + along * half_m, own.d_m + track.y_m() + across * side_m)
             };
             corners.map(corner).to_vec()
         };
@@ -216,7 +309,7 @@ fn write_tracks(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), 
     }
     let entity = "bird/tracks";
     let fixed =
-        LineStrips2D::update_fields().with_colors([palette::TRACK]).with_radii([0.35_f32]).with_draw_order(MARK_ORDER);
+        LineStrips2D::update_fields().with_colors([palette::TRACK]).with_radii([0.25_f32]).with_draw_order(MARK_ORDER);
     writer.write_static(entity, &fixed)?;
     writer.write_rows(entity, times, |range| {
         let rows = &rows[range];
@@ -226,7 +319,8 @@ fn write_tracks(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), 
 }
 
 /// Writes a mark on the first vehicle of the worst collision, from the contact on.
-fn write_collisions(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingError> {
+fn write_collisions(writer: &Writer<'_>, canvas: &Canvas<'_>) -> Result<(), RecordingError> {
+    let film = canvas.film;
     let Some(collision) = film.worst_collision() else { return Ok(()) };
     let struck = film.actors.iter().position(|actor| actor.name == collision.between[0].as_str());
     let Some(row) = film.frames.iter().position(|frame| frame.time >= collision.time) else { return Ok(()) };
@@ -235,9 +329,11 @@ fn write_collisions(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingErr
     let times: Vec<Time> = frames.iter().map(|frame| frame.time).collect();
     let entity = "bird/collision";
     let text = format!("COLLISION {:.1} m/s", collision.relative_speed_mps);
+    let half_m = 0.5 * LETTER_M * text.chars().count() as f64;
+    let text_at = [(X_RANGE_M[1] - half_m) as f32, (canvas.top_m - NAMES_ABOVE_M) as f32];
     let fixed = Points2D::update_fields()
         .with_colors([palette::CRITICAL])
-        .with_radii([2.5_f32, 0.1])
+        .with_radii([1.6_f32, 0.05])
         .with_labels([String::new(), text])
         .with_draw_order(MARK_ORDER)
         .with_show_labels(true);
@@ -247,7 +343,7 @@ fn write_collisions(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingErr
         // The text is beside the road, clear of the names of the vehicles.
         let marks = frames.iter().flat_map(|frame| {
             let state = &frame.states[struck];
-            [state.d_m, COLLISION_TEXT_D_M].map(|d_m| at(film, frame, state.s_m, d_m))
+            [canvas.at(frame, state.s_m, state.d_m), text_at]
         });
         Points2D::update_fields().with_positions(marks).columns(vec![2; frames.len()])
     })

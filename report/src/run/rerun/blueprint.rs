@@ -1,53 +1,44 @@
 //! The layout with which the viewer opens a recording (its blueprint), stored in the recording itself.
 //!
 //! ```text
-//!  ┌───────────────────────────────┬───────────────┬───────────────┐
-//!  │                               │ time headway  │ speed         │
-//!  │  3D, behind and above the ego ├───────────────┼───────────────┤
-//!  │  (of a pair: side by side)    │ gap           │ acceleration  │
-//!  ├───────────────────────────────┼───────────────┼───────────────┤
-//!  │  from above                   │ encounter     │ margin gained │
-//!  ├───────────────┬───────────────┼───────────────┴───────────────┤
-//!  │  rear camera  │ states        │  story │ log                  │
-//!  └───────────────┴───────────────┴───────────────────────────────┘
+//!  ┌───────────────────────┬─────────────────────┐      ┌───────────────────────┬─────────────────────┐
+//!  │ verdict               │ time headway        │      │ verdict               │ time headway        │
+//!  ├───────────────────────┤                     │      ├───────────────────────┤                     │
+//!  │ from above            ├─────────────────────┤      │ from above: both arms ├─────────────────────┤
+//!  ├───────────────────────┤ acceleration │ …    │      │ on one metre axis     │ acceleration │ …    │
+//!  │ scene                 ├─────────────────────┤      ├───────────┬───────────┼─────────────────────┤
+//!  │ (and rear camera)     │ states              │      │ scene:    │ scene:    │ states: with MIS    │
+//!  │                       ├─────────────────────┤      │ without   │ with MIS  ├─────────────────────┤
+//!  │                       │ log │ story         │      │ MIS       │           │ states: without │ … │
+//!  └───────────────────────┴─────────────────────┘      └───────────┴───────────┴─────────────────────┘
+//!           one run                                              a pair
 //! ```
 //!
 //! The layout contains only views that have something to show.
 
-mod send;
+mod nodes;
 
-use rerun::blueprint::components::{BackgroundKind, Corner2D, Eye3DKind, PanelState, PlayState};
+use closecall_traffic::Time;
+use rerun::blueprint::components::{BackgroundKind, Eye3DKind};
 use rerun::blueprint::datatypes::{TextLogColumn, TextLogColumnKind};
-use rerun::blueprint::{
-    Blueprint, BlueprintPanel, ContainerLike, Horizontal, SelectionPanel, Spatial2DView, Spatial3DView,
-    StateTimelineView, TextDocumentView, TextLogView, TimePanel, TimeSeriesView, Vertical,
-};
 use rerun::components::Range1D;
-use rerun::datatypes::Range2D;
+use rerun::datatypes::{Range2D, TimeInt, TimeRange, TimeRangeBoundary};
 use rerun::external::re_sdk_types::blueprint::archetypes::{
-    Background, EntityBehavior, EyeControls3D, LineGrid3D, PlotLegend, ScalarAxis, TextLogColumns, VisualBounds2D,
+    Background, EntityBehavior, EyeControls3D, LineGrid3D, PlotLegend, ScalarAxis, TextLogColumns, TimeAxis,
+    VisualBounds2D,
 };
-use rerun::{AsComponents, EntityPath};
 
+use self::nodes::{Node, View, below, beside, tabs};
+use super::RecordingError;
+use super::chunks::Chunks;
 use super::palette;
+use super::plots::Plot;
 use super::stream::OPENING_TIMELINE;
 
-/// Position of the eye of the 3D view in the ego frame (m), far enough back to show vehicles behind the ego.
-const EYE_M: [f32; 3] = [-32.0, 6.0, 12.0];
-/// Point at which the eye looks, in the ego frame (m).
-const TARGET_M: [f32; 3] = [-1.0, 0.0, 0.0];
-/// Room for names above and below the road in the view from above (m in the picture).
-const BIRD_MARGIN: f64 = 4.5;
-
-/// The plots: name of the entity, title, and range of the value axis if it is fixed.
-const PLOTS: [(&str, &str, Option<[f64; 2]>); 6] = [
-    ("headway", "Time headway [s]: front orange, rear pink", Some([0.0, 4.0])),
-    ("gap", "Gap [m]", Some([0.0, 120.0])),
-    ("encounter", "Closest encounter: TTCE [s], DCE [m]", Some([0.0, 10.0])),
-    ("speed", "Speed [m/s]: ego blue", None),
-    ("acceleration", "Acceleration [m/s²]", Some([-10.0, 4.0])),
-    ("margin", "Front headway gained [s]", Some([-1.0, 4.0])),
-];
+/// Position of the eye of the 3D view in the frame of the rig (m): behind, beside and above.
+const EYE_M: [f32; 3] = [-25.0, -17.0, 13.0];
+/// Point at which the eye looks, in the frame of the rig (m).
+const TARGET_M: [f32; 3] = [6.0, 1.0, 0.0];
 
 /// The parts of a film that the views can show.
 #[derive(Clone, Debug, Default)]
@@ -60,158 +51,151 @@ pub(super) struct FilmContents {
     pub(super) hidden_layers: Vec<String>,
     /// True if the 3D scene and the view from above were written.
     pub(super) has_scene: bool,
-    /// Upper and lower edge of the road in the view from above.
-    pub(super) edges: [f64; 2],
+    /// Colour behind the 3D scene.
+    pub(super) sky: palette::Rgba,
+    /// Lowest and highest position across the road in the view from above (m in the picture).
+    pub(super) bird_range: [f64; 2],
     /// True if there are camera images.
     pub(super) has_camera: bool,
     /// True if there are states of the ego stack.
     pub(super) has_states: bool,
-    /// Names of the plots that have a curve.
-    pub(super) plots: Vec<&'static str>,
+    /// The plots that have a curve.
+    pub(super) plots: Vec<Plot>,
+    /// Times of the first and the last frame.
+    pub(super) span: [Time; 2],
+    /// The weather, if it is not that of a clear day.
+    pub(super) weather: Option<String>,
 }
 
-/// The layout of the views of one recording.
-#[derive(Default)]
-pub(super) struct Layout {
-    /// Properties of views that the library's blueprint builder cannot express, each with its path in the blueprint
-    /// store.
-    properties: Vec<(EntityPath, Box<dyn AsComponents>)>,
+/// Returns the chunks of the layout for these films.
+pub(super) fn layout(films: &[FilmContents]) -> Result<Chunks, RecordingError> {
+    let left = below(
+        [Some((2.3, verdict())), bird(films).map(|view| (if films.len() > 1 { 4.2 } else { 2.5 }, view))]
+            .into_iter()
+            .flatten()
+            .chain(scenes(films).map(|view| (if films.len() > 1 { 3.4 } else { 5.0 }, view)))
+            .collect(),
+    );
+    let mut states: Vec<Node> = films.iter().filter(|film| film.has_states).rev().map(states).collect();
+    let mut right = Vec::new();
+    let mut plots = films_plots(films);
+    if !plots.is_empty() {
+        right.push((2.7, plots.remove(0)));
+    }
+    right.extend(tabs(plots).map(|node| (2.1, node)));
+    if !states.is_empty() {
+        right.push((3.3, states.remove(0)));
+    }
+    states.extend([log(films), View::new("TextDocument", "Story", "summary").into()]);
+    right.extend(tabs(states).map(|node| (1.9, node)));
+    let columns = [left.map(|node| (11.0, node)), below(right).map(|node| (9.0, node))];
+    let root = beside(columns.into_iter().flatten().collect());
+    nodes::chunks(root.unwrap_or_else(verdict), OPENING_TIMELINE)
 }
 
-impl Layout {
-    /// Returns the blueprint, and collects the properties that it cannot express.
-    fn blueprint(&mut self, films: &[FilmContents]) -> Blueprint {
-        let mut left = Vec::new();
-        let mut shares = Vec::new();
-        let mut add = |view: Option<ContainerLike>, share: f32| {
-            if let Some(view) = view {
-                left.push(view);
-                shares.push(share);
-            }
-        };
-        let scenes: Vec<ContainerLike> =
-            films.iter().filter(|film| film.has_scene).map(|film| self.scene(film)).collect();
-        add(side_by_side(scenes), 10.0);
-        for film in films.iter().filter(|film| film.has_scene) {
-            add(Some(self.bird(film)), if films.len() > 1 { 2.9 } else { 3.8 });
-        }
-        let cameras = films.iter().filter(|film| film.has_camera);
-        let mut below: Vec<ContainerLike> = cameras.map(|film| self.camera(film)).collect();
-        below.extend(films.iter().filter(|film| film.has_states).map(states));
-        add(side_by_side(below), 4.6);
-        let left = Vertical::new(left).with_row_shares(shares);
-        let right = Vertical::new([self.plots(films), self.texts(films)]).with_row_shares([12.0, 6.0]);
-        let root = Horizontal::new([left.into(), right.into()]).with_column_shares([11.0, 9.0]);
-        let time = TimePanel::new()
-            .with_state(PanelState::Collapsed)
-            .with_timeline(OPENING_TIMELINE)
-            .with_play_state(PlayState::Following);
-        Blueprint::new(root)
-            .with_auto_layout(false)
-            .with_auto_views(false)
-            .with_blueprint_panel(BlueprintPanel::from_state(PanelState::Collapsed))
-            .with_selection_panel(SelectionPanel::from_state(PanelState::Collapsed))
-            .with_time_panel(time)
-    }
+fn verdict() -> Node {
+    View::new("TextDocument", "Verdict", "verdict").into()
+}
 
-    /// Returns the 3D view of a film, which follows the ego.
-    fn scene(&mut self, film: &FilmContents) -> ContainerLike {
-        let root = &film.root;
-        let view = Spatial3DView::new(titled("Scene", film))
-            .with_origin(format!("{root}world/ego"))
-            .with_contents([format!("/{root}world/**")])
-            .into();
-        for layer in film.hidden_layers.iter().map(|layer| format!("ViewContents/overrides/{root}{layer}/visualizers"))
-        {
-            self.property(&view, &layer, EntityBehavior::update_fields().with_visible(false));
-        }
-        let eye = EyeControls3D::new()
-            .with_kind(Eye3DKind::Orbital)
-            .with_position(EYE_M)
-            .with_look_target(TARGET_M)
-            .with_eye_up([0.0, 0.0, 1.0]);
-        self.property(&view, "EyeControls3D", eye);
-        self.property(&view, "LineGrid3D", LineGrid3D::new().with_visible(false));
-        let sky = Background::new(BackgroundKind::SolidColor).with_color(palette::SKY);
-        self.property(&view, "Background", sky);
-        view
-    }
-
-    /// Returns the view from above of a film.
-    fn bird(&mut self, film: &FilmContents) -> ContainerLike {
-        let title = titled("From above (across the road twice as wide)", film);
-        let view = Spatial2DView::new(title).with_origin(format!("{}bird", film.root)).into();
-        let reach = super::bird::REACH_M;
-        let [top, bottom] = film.edges;
-        let bounds =
-            Range2D { x_range: [-reach, reach].into(), y_range: [top - BIRD_MARGIN, bottom + BIRD_MARGIN].into() };
-        self.property(&view, "VisualBounds2D", VisualBounds2D::new(bounds));
-        view
-    }
-
-    fn camera(&mut self, film: &FilmContents) -> ContainerLike {
-        Spatial2DView::new(titled("Rear camera", film)).with_origin(format!("{}camera", film.root)).into()
-    }
-
-    /// Returns the plots in which any film has a curve. All films share them.
-    fn plots(&mut self, films: &[FilmContents]) -> ContainerLike {
-        let mut columns: [Vec<ContainerLike>; 2] = [Vec::new(), Vec::new()];
-        for (index, (name, title, range)) in PLOTS.into_iter().enumerate() {
-            let films_with_plot: Vec<&FilmContents> = films.iter().filter(|film| film.plots.contains(&name)).collect();
-            if films_with_plot.is_empty() {
-                continue;
-            }
-            let contents = films_with_plot.iter().map(|film| format!("/{}plots/{name}/**", film.root));
-            let view = TimeSeriesView::new(title).with_origin("/").with_contents(contents).into();
-            // Curves have the colours of the vehicles, so that only plots with other curves need a legend.
-            let is_plain = matches!(name, "gap" | "speed") || (films.len() > 1 && name == "acceleration");
-            let legend = PlotLegend::new().with_corner(Corner2D::LeftTop).with_visible(!is_plain);
-            self.property(&view, "PlotLegend", legend);
-            if let Some([low, high]) = range {
-                self.property(&view, "ScalarAxis", ScalarAxis::new().with_range(Range1D::new(low, high)));
-            }
-            columns[index / (PLOTS.len() / 2)].push(view);
-        }
-        let columns = columns.into_iter().filter(|views| !views.is_empty());
-        side_by_side(columns.map(|views| Vertical::new(views).into()).collect())
-            .unwrap_or_else(|| Vertical::new([]).into())
-    }
-
-    /// Returns the story beside the log. The log shows the texts only: their colours and words make other columns
-    /// redundant.
-    fn texts(&mut self, films: &[FilmContents]) -> ContainerLike {
-        let story = TextDocumentView::new("Story").with_origin("summary").into();
-        let contents = films.iter().map(|film| format!("/{}log/**", film.root));
-        let log = TextLogView::new("Log").with_origin("/").with_contents(contents).into();
-        let columns = [TextLogColumn { visible: true.into(), kind: TextLogColumnKind::Body }];
-        self.property(&log, "TextLogColumns", TextLogColumns::new().with_text_log_columns(columns));
-        Horizontal::new([story, log]).into()
-    }
-
-    /// Adds a property of a view.
-    fn property(&mut self, view: &ContainerLike, name: &str, property: impl AsComponents + 'static) {
-        if let ContainerLike::View(view) = view {
-            let path = format!("{}/{name}", view.blueprint_path());
-            self.properties.push((path.into(), Box::new(property)));
+/// Returns the 3D views of the films, each with the rear camera if there is one.
+fn scenes(films: &[FilmContents]) -> Option<Node> {
+    let mut nodes = Vec::new();
+    for film in films.iter().filter(|film| film.has_scene) {
+        nodes.push((3.0, scene(film)));
+        if film.has_camera {
+            let camera = View::new("2D", titled("Rear camera", films, film), format!("{}camera", film.root));
+            nodes.push((2.0, camera.into()));
         }
     }
+    beside(nodes)
+}
+
+/// Returns the 3D view of a film, which moves along the road with the ego.
+fn scene(film: &FilmContents) -> Node {
+    let root = &film.root;
+    let mut title = format!("Scene: {}", film.name);
+    if let Some(weather) = &film.weather {
+        title.push_str(&format!(" · {weather}"));
+    }
+    let eye = EyeControls3D::new()
+        .with_kind(Eye3DKind::Orbital)
+        .with_position(EYE_M)
+        .with_look_target(TARGET_M)
+        .with_eye_up([0.0, 0.0, 1.0]);
+    let sky = Background::new(BackgroundKind::SolidColor).with_color(film.sky);
+    let mut view = View::new("3D", title, format!("{root}world/rig"))
+        .with_contents([format!("/{root}world/**")])
+        .with("EyeControls3D", eye)
+        .with("LineGrid3D", LineGrid3D::new().with_visible(false))
+        .with("Background", sky);
+    for layer in &film.hidden_layers {
+        let path = format!("ViewContents/overrides/{root}{layer}/visualizers");
+        view = view.with(path, EntityBehavior::update_fields().with_visible(false));
+    }
+    view.into()
+}
+
+/// Returns the view from above, in which the roads of all films lie below each other on one metre axis.
+fn bird(films: &[FilmContents]) -> Option<Node> {
+    let shown: Vec<&FilmContents> = films.iter().filter(|film| film.has_scene).collect();
+    let low = shown.iter().map(|film| film.bird_range[0]).min_by(f64::total_cmp)?;
+    let high = shown.iter().map(|film| film.bird_range[1]).max_by(f64::total_cmp)?;
+    let view = View::new("2D", "From above · distance from the ego [m]", "/")
+        .with_contents(shown.iter().map(|film| format!("/{}bird/**", film.root)));
+    let bounds = Range2D { x_range: super::bird::X_RANGE_M.into(), y_range: [low, high].into() };
+    let road = Background::new(BackgroundKind::SolidColor).with_color(palette::GROUND);
+    Some(view.with("VisualBounds2D", VisualBounds2D::new(bounds)).with("Background", road).into())
+}
+
+/// Returns the plots in which any film has a curve. All films share them.
+fn films_plots(films: &[FilmContents]) -> Vec<Node> {
+    let mut nodes = Vec::new();
+    for kind in super::plots::KINDS {
+        let of_kind: Vec<(&FilmContents, &Plot)> = films
+            .iter()
+            .flat_map(|film| film.plots.iter().filter(|plot| plot.kind == kind).map(move |plot| (film, plot)))
+            .collect();
+        if of_kind.is_empty() {
+            continue;
+        }
+        let contents = of_kind.iter().map(|(film, _)| format!("/{}plots/{}/**", film.root, kind.name()));
+        let low = of_kind.iter().map(|(_, plot)| plot.range[0]).fold(f64::INFINITY, f64::min);
+        let high = of_kind.iter().map(|(_, plot)| plot.range[1]).fold(f64::NEG_INFINITY, f64::max);
+        let note = if films.len() > 1 { " · thin: " } else { "" };
+        let baseline = films.first().filter(|_| films.len() > 1).map_or("", |film| film.name.as_str());
+        let view = View::new("TimeSeries", format!("{}{note}{baseline}", kind.title()), "/")
+            .with_contents(contents)
+            .with("PlotLegend", PlotLegend::new().with_visible(false))
+            .with("ScalarAxis", ScalarAxis::new().with_range(Range1D::new(low, high)))
+            .with("TimeAxis", whole_run(films));
+        nodes.push(view.into());
+    }
+    nodes
+}
+
+/// Returns a time axis over the longest of the films.
+fn whole_run(films: &[FilmContents]) -> TimeAxis {
+    let start = films.iter().map(|film| film.span[0]).min().unwrap_or(Time::ZERO);
+    let end = films.iter().map(|film| film.span[1]).max().unwrap_or(Time::ZERO);
+    let boundary = |time: Time| TimeRangeBoundary::Absolute(TimeInt(time.ns()));
+    TimeAxis::new().with_view_range(TimeRange { start: boundary(start), end: boundary(end) })
+}
+
+/// Returns the log. It shows the texts only: their colours and words make other columns redundant.
+fn log(films: &[FilmContents]) -> Node {
+    let columns = [TextLogColumn { visible: true.into(), kind: TextLogColumnKind::Body }];
+    View::new("TextLog", "Log", "/")
+        .with_contents(films.iter().map(|film| format!("/{}log/**", film.root)))
+        .with("TextLogColumns", TextLogColumns::new().with_text_log_columns(columns))
+        .into()
 }
 
 /// Returns the view of the bands of states of a film.
-fn states(film: &FilmContents) -> ContainerLike {
-    StateTimelineView::new(titled("States", film)).with_origin(format!("{}states", film.root)).into()
+fn states(film: &FilmContents) -> Node {
+    View::new("StateTimeline", format!("States: {}", film.name), format!("{}states", film.root)).into()
 }
 
 /// Returns the title of a view, followed by the name of its arm if there are several films.
-fn titled(title: &str, film: &FilmContents) -> String {
-    if film.root.is_empty() { title.to_owned() } else { format!("{title}: {}", film.name) }
-}
-
-/// Returns the views side by side. A single view needs no container.
-fn side_by_side(mut views: Vec<ContainerLike>) -> Option<ContainerLike> {
-    match views.len() {
-        0 => None,
-        1 => views.pop(),
-        _ => Some(Horizontal::new(views).into()),
-    }
+fn titled(title: &str, films: &[FilmContents], film: &FilmContents) -> String {
+    if films.len() < 2 { title.to_owned() } else { format!("{title}: {}", film.name) }
 }

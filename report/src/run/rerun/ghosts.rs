@@ -6,7 +6,7 @@ use closecall_traffic::Time;
 use rerun::{Boxes3D, FillMode, LineStrips2D};
 
 use super::RecordingError;
-use super::bird::STRETCH;
+use super::bird::Canvas;
 use super::palette;
 use super::stream::Writer;
 use super::vehicles::yaw_rotation;
@@ -15,12 +15,17 @@ use crate::run::film::Film;
 /// Opacity of an outline.
 const OPACITY: u8 = 120;
 
-/// Writes the vehicles of `other` into the 3D scene and the view from above of `film`.
-pub(super) fn write(writer: &Writer<'_>, film: &Film, other: &Film) -> Result<(), RecordingError> {
-    for (index, _) in other.actors.iter().enumerate().filter(|(_, actor)| !actor.present_frames.is_empty()) {
+/// Writes the vehicles of `other` into the 3D scene and the view from above of a film.
+pub(super) fn write(writer: &Writer<'_>, canvas: &Canvas<'_>, other: &Film) -> Result<(), RecordingError> {
+    for (index, _) in other
+        .actors
+        .iter()
+        .enumerate()
+        .filter(|&(index, actor)| !actor.present_frames.is_empty() && other.is_main(index))
+    {
         write_outline(writer, other, index)?;
     }
-    write_from_above(writer, film, other)
+    write_from_above(writer, canvas, other)
 }
 
 fn write_outline(writer: &Writer<'_>, other: &Film, index: usize) -> Result<(), RecordingError> {
@@ -30,11 +35,11 @@ fn write_outline(writer: &Writer<'_>, other: &Film, index: usize) -> Result<(), 
     let half = |extent_m: f64| (0.5 * extent_m) as f32;
     let fixed = Boxes3D::update_fields()
         .with_half_sizes([[half(size.length_m), half(size.width_m), half(size.height_m)]])
-        .with_colors([palette::with_opacity(palette::actor(index, other.ego), OPACITY)])
+        .with_colors([palette::with_opacity(palette::part(actor.part), OPACITY)])
         .with_fill_mode(FillMode::MajorWireframe)
         .with_radii([0.04_f32])
-        .with_labels([format!("{} ({})", actor.name, other.arm)])
-        .with_show_labels(index == other.ego);
+        .with_labels([format!("{} {}", actor.name, other.arm_label())])
+        .with_show_labels(false);
     writer.write_static(&entity, &fixed)?;
     let all_times = other.times();
     let (times, frames) = (&all_times[actor.present_frames.clone()], &other.frames[actor.present_frames.clone()]);
@@ -55,26 +60,28 @@ fn write_outline(writer: &Writer<'_>, other: &Film, index: usize) -> Result<(), 
     }
 }
 
-fn write_from_above(writer: &Writer<'_>, film: &Film, other: &Film) -> Result<(), RecordingError> {
-    let entity = "bird/ghosts";
+fn write_from_above(writer: &Writer<'_>, canvas: &Canvas<'_>, other: &Film) -> Result<(), RecordingError> {
+    let (film, entity) = (canvas.film, "bird/ghosts");
     let count = film.frames.len().min(other.frames.len());
     let times: Vec<Time> = film.frames[..count].iter().map(|frame| frame.time).collect();
-    writer.write_static(entity, &LineStrips2D::update_fields().with_radii([0.3_f32]))?;
-    let present = |row: usize| (0..other.actors.len()).filter(move |&index| other.is_present(index, row));
+    writer.write_static(entity, &LineStrips2D::update_fields().with_radii([0.2_f32]))?;
+    let present =
+        |row: usize| (0..other.actors.len()).filter(move |&index| other.is_main(index) && other.is_present(index, row));
     writer.write_rows(entity, &times, |range| {
         let all = || range.clone().flat_map(|row| present(row).map(move |index| (row, index)));
         let outline = |(row, index): (usize, usize)| {
-            let from_m = film.frames[row].states[film.ego].s_m;
             let (state, size) = (&other.frames[row].states[index], &other.actors[index].vehicle.dimensions);
             let corners = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5]];
             corners.map(|[along, across]: [f64; 2]| {
                 let (s_m, d_m) = (state.s_m + along * size.length_m, state.d_m + across * size.width_m);
-                [(s_m - from_m) as f32, (-d_m * STRETCH) as f32]
+                canvas.at(&film.frames[row], s_m, d_m)
             })
         };
         LineStrips2D::update_fields()
             .with_strips(all().map(outline))
-            .with_colors(all().map(|(_, index)| palette::with_opacity(palette::actor(index, other.ego), OPACITY)))
+            .with_colors(
+                all().map(|(_, index)| palette::with_opacity(palette::part(other.actors[index].part), OPACITY)),
+            )
             .columns(range.clone().map(|row| present(row).count()).collect::<Vec<_>>())
     })
 }

@@ -7,7 +7,7 @@ use super::RecordingError;
 use super::palette::{self, Rgba};
 use super::plots::phase_name;
 use super::stream::Writer;
-use crate::run::film::{Film, collision_text, driver_note_text, ego_state_name};
+use crate::run::film::{Film, KnownSpan, collision_text, driver_note_text, ego_state_name};
 use closecall_simulation::Happening;
 
 /// One line of the log.
@@ -28,16 +28,49 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film, is_alone: bool) -> Result<
     lines.extend(film.happenings.iter().map(|(time, what)| line(film, *time, what)));
     lines.extend(film.moments().iter().map(|noted| {
         let text = noted.moment.label();
-        Line { colour: palette::MARKING, ..plain("log/moment", noted.time, text) }
+        Line { colour: palette::MOMENT, ..plain("log/moment", noted.time, text) }
     }));
+    lines.extend(known(film));
+    lines.extend(reasons(film));
     lines.extend(film.notes.iter().map(|(time, text)| plain("log/note", *time, text.clone())));
     lines.push(plain("log/run", film.end(), "the run ends here".to_owned()));
     for line in lines {
-        let text = if is_alone { line.text } else { format!("[{}] {}", film.arm, line.text) };
+        let text = if is_alone { line.text } else { format!("[{}] {}", film.arm_label(), line.text) };
         let row = TextLog::new(text).with_level(line.level).with_color(line.colour);
-        writer.write_rows(line.entity, &[line.time], |_| row.clone().columns_of_unit_batches())?;
+        writer.write_curve(line.entity, &[line.time], |_| row.clone().columns_of_unit_batches())?;
     }
     Ok(())
+}
+
+/// Returns a line for each time at which a vehicle behind the ego came into sight or was lost.
+fn known(film: &Film) -> Vec<Line> {
+    let line = |span: KnownSpan| Line {
+        time: span.time,
+        entity: "log/sight",
+        level: TextLogLevel::INFO,
+        colour: palette::TRACK,
+        text: format!("vehicle behind the ego: {}", span.words()),
+    };
+    film.known_spans().into_iter().map(line).collect()
+}
+
+/// Returns a line for each change of the reason that the ego's controller gives without changing its state.
+fn reasons(film: &Film) -> Vec<Line> {
+    let mut lines = Vec::new();
+    for pair in film.frames.windows(2) {
+        let (Some(before), Some(now)) = (pair[0].command, pair[1].command) else { continue };
+        if before.reason == now.reason || before.state != now.state {
+            continue;
+        }
+        lines.push(Line {
+            time: pair[1].time,
+            entity: "log/reason",
+            level: TextLogLevel::INFO,
+            colour: palette::NEUTRAL,
+            text: format!("ego: {}, since {}", ego_state_name(now.state), now.reason),
+        });
+    }
+    lines
 }
 
 /// Returns the log line of a happening.
@@ -48,7 +81,7 @@ fn line(film: &Film, time: Time, what: &Happening) -> Line {
         Happening::EventTriggered { event } => warn("log/event", palette::WARNING, format!("event `{event}` sets in")),
         Happening::DriverNote { actor, note } => {
             let name = film.actors.get(*actor).map_or("?", |actor| actor.name.as_str());
-            let colour = palette::actor(*actor, film.ego);
+            let colour = film.actors.get(*actor).map_or(palette::NEUTRAL, |actor| palette::part(actor.part));
             info("log/driver", colour, format!("{name} {}", driver_note_text(*note)))
         }
         Happening::EgoStateChanged { from, to, reason } => {

@@ -1,6 +1,10 @@
 //! The colours of a recording. Each actor has the same colour in all views, so that a vehicle in the scene and its
 //! curves in the plots can be matched.
 
+use closecall_simulation::outcome::Moment;
+
+use crate::run::film::Part;
+
 /// An sRGB colour with its opacity.
 pub(super) type Rgba = [u8; 4];
 
@@ -10,9 +14,28 @@ pub(super) const EGO: Rgba = [64, 156, 255, 255];
 pub(super) const FRONT: Rgba = [255, 176, 59, 255];
 /// The second of the other actors, by convention the rear vehicle.
 pub(super) const REAR: Rgba = [244, 92, 160, 255];
-/// Colours of the other actors, in their order. They repeat if there are more actors.
-const OTHERS: [Rgba; 6] =
-    [FRONT, REAR, [130, 208, 96, 255], [176, 132, 255, 255], [92, 214, 208, 255], [222, 208, 150, 255]];
+/// Colours of further actors, in their order. They repeat if there are more actors.
+const OTHERS: [Rgba; 4] = [[130, 208, 96, 255], [176, 132, 255, 255], [64, 190, 180, 255], [200, 170, 90, 255]];
+/// A vehicle of the traffic around.
+const BACKGROUND: Rgba = [128, 132, 138, 255];
+/// Colours of the moments of the encounter, in the views that mark them.
+const MOMENTS: [Rgba; 7] = [
+    [214, 69, 65, 255],
+    [120, 144, 200, 255],
+    [176, 132, 255, 255],
+    [214, 140, 40, 255],
+    [64, 170, 160, 255],
+    [112, 150, 80, 255],
+    [140, 140, 150, 255],
+];
+/// A line of text about a moment.
+pub(super) const MOMENT: Rgba = [140, 150, 190, 255];
+/// The ground beside the road in the view from above. It is dark in both themes of the viewer, so that labels are legible.
+pub(super) const GROUND: Rgba = [24, 27, 31, 255];
+/// Fog, as the scene shows it.
+const FOG: Rgba = [196, 200, 204, 255];
+/// Text beside the road.
+pub(super) const NOTE: Rgba = [190, 196, 204, 255];
 
 pub(super) const GLASS: Rgba = [30, 36, 44, 255];
 pub(super) const TYRE: Rgba = [22, 22, 24, 255];
@@ -36,13 +59,22 @@ pub(super) const WARNING: Rgba = [255, 196, 64, 255];
 pub(super) const NEUTRAL: Rgba = [168, 172, 178, 255];
 pub(super) const QUIET: Rgba = [96, 100, 108, 255];
 
-/// Returns the colour of the actor of this index.
-pub(super) fn actor(index: usize, ego: usize) -> Rgba {
-    if index == ego {
-        return EGO;
+/// Returns the colour of a part.
+pub(super) fn part(part: Part) -> Rgba {
+    match part {
+        Part::Ego => EGO,
+        Part::Lead => FRONT,
+        Part::Rear => REAR,
+        Part::Other(number) => OTHERS[number % OTHERS.len()],
+        Part::Background => BACKGROUND,
     }
-    let others_before = if index > ego { index - 1 } else { index };
-    OTHERS[others_before % OTHERS.len()]
+}
+
+/// Returns a colour as it looks through fog that lets this share of the light pass.
+pub(super) fn through_fog(colour: Rgba, share: f64) -> Rgba {
+    std::array::from_fn(|channel| {
+        (f64::from(colour[channel]) * share + f64::from(FOG[channel]) * (1.0 - share)).round() as u8
+    })
 }
 
 /// Returns the colour with another opacity.
@@ -56,22 +88,17 @@ pub(super) fn darker([red, green, blue, opacity]: Rgba) -> Rgba {
     [scaled(red), scaled(green), scaled(blue), opacity]
 }
 
-/// Returns the colour of the moment of this index.
-pub(super) fn moment(index: usize) -> Rgba {
-    OTHERS[(index + 2) % OTHERS.len()]
+/// Returns the colour of a moment of the encounter.
+pub(super) fn moment(moment: Moment) -> Rgba {
+    let index = Moment::ALL.iter().position(|other| *other == moment).unwrap_or(0);
+    MOMENTS[index % MOMENTS.len()]
 }
 
 /// Returns the colour of a cluster of a scan.
 pub(super) fn cluster(number: u8) -> Rgba {
-    const CLUSTERS: [Rgba; 7] = [
-        [255, 99, 72, 255],
-        [46, 213, 115, 255],
-        [83, 182, 255, 255],
-        [255, 221, 89, 255],
-        [214, 120, 255, 255],
-        [72, 219, 251, 255],
-        [255, 159, 243, 255],
-    ];
+    // Hues that no vehicle, track or mark has.
+    const CLUSTERS: [Rgba; 5] =
+        [[255, 240, 120, 255], [168, 255, 96, 255], [200, 160, 255, 255], [120, 255, 200, 255], [255, 214, 190, 255]];
     CLUSTERS[usize::from(number) % CLUSTERS.len()]
 }
 

@@ -1,16 +1,23 @@
-//! Plots over time: curves of margins, speeds and accelerations, and bands of states.
+//! Plots over time: curves of margins, speeds and accelerations, with the moments of the encounter as vertical lines.
+
+mod bands;
+
+pub(super) use self::bands::phase_name;
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
 
 use closecall_controllers::{EgoState, MisPlan};
 use closecall_scenarios::criticality::{CRITICAL_DCE_M, CRITICAL_TTCE_S};
 use closecall_traffic::Time;
 use closecall_traffic::metrics::Encounter;
-use rerun::{SeriesLines, StateChange, StateConfiguration};
+use rerun::SeriesLines;
 
 use super::RecordingError;
 use super::palette::{self, Rgba};
-use super::stream::{Writer, changes};
-use crate::run::film::{Film, Frame, ego_state_name};
-use closecall_simulation::outcome::{CRITICAL_THW_S, Phase};
+use super::stream::Writer;
+use crate::run::film::{Film, Frame};
+use closecall_simulation::outcome::CRITICAL_THW_S;
 
 /// Width of a curve (UI points).
 const LINE_WIDTH: f32 = 2.0;
@@ -28,23 +35,101 @@ pub(super) enum Role {
     Tested,
 }
 
-/// The names of the plots that have a curve.
-pub(super) type PlotNames = Vec<&'static str>;
+/// A plot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    Headway,
+    Acceleration,
+    Speed,
+    Gap,
+    Encounter,
+    Margin,
+}
 
-/// Writes all curves and bands of a film, and returns the names of the plots that have a curve.
-pub(super) fn write(writer: &Writer<'_>, film: &Film, role: Role) -> Result<PlotNames, RecordingError> {
-    let plots = Plots { writer, film, role, times: film.times() };
-    let mut names = PlotNames::new();
-    let mut note = |name: &'static str, has_curve: bool| names.extend(has_curve.then_some(name));
-    note("headway", plots.headways()?);
-    note("gap", plots.gaps()?);
-    note("encounter", plots.encounter()?);
+/// All plots, in their order in the layout.
+pub(super) const KINDS: [Kind; 6] =
+    [Kind::Headway, Kind::Acceleration, Kind::Speed, Kind::Gap, Kind::Margin, Kind::Encounter];
+
+impl Kind {
+    /// Returns the name of its entities.
+    pub(super) const fn name(self) -> &'static str {
+        match self {
+            Self::Headway => "headway",
+            Self::Acceleration => "acceleration",
+            Self::Speed => "speed",
+            Self::Gap => "gap",
+            Self::Encounter => "encounter",
+            Self::Margin => "margin",
+        }
+    }
+
+    /// Returns the title, which names the colours of the curves.
+    pub(super) const fn title(self) -> &'static str {
+        match self {
+            Self::Headway => "Time headway [s] · front orange · rear pink · 0.9 s red",
+            Self::Acceleration => "Acceleration [m/s²] · E blue · F orange · R pink",
+            Self::Speed => "Speed [m/s]",
+            Self::Gap => "Gap [m] · seen grey",
+            Self::Encounter => "TTCE [s] · DCE [m]",
+            Self::Margin => "Headway gained [s]",
+        }
+    }
+
+    /// Returns the smallest span of the value axis, so that noise does not look like an event.
+    const fn least_range(self) -> [f64; 2] {
+        match self {
+            Self::Headway => [0.0, 3.0],
+            Self::Acceleration => [-6.0, 2.0],
+            Self::Speed => [f64::INFINITY, f64::NEG_INFINITY],
+            Self::Gap => [0.0, 60.0],
+            Self::Encounter => [0.0, 10.0],
+            Self::Margin => [-0.5, 2.5],
+        }
+    }
+
+    /// Returns the largest span of the value axis. Curves may leave it.
+    const fn largest_range(self) -> [f64; 2] {
+        match self {
+            Self::Headway => [0.0, 4.0],
+            Self::Acceleration => [-11.0, 5.0],
+            Self::Speed => [0.0, f64::INFINITY],
+            Self::Gap => [0.0, 130.0],
+            Self::Encounter => [0.0, 10.0],
+            Self::Margin => [-1.5, 4.5],
+        }
+    }
+}
+
+/// Least span of the axis of speeds (m/s).
+const LEAST_SPEED_SPAN_MPS: f64 = 12.0;
+/// Room above and below the curves, as a share of their span.
+const AXIS_ROOM: f64 = 0.05;
+
+/// A plot that has a curve, with the range of its value axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Plot {
+    pub(super) kind: Kind,
+    pub(super) range: [f64; 2],
+}
+
+/// Writes all curves and bands of a film, and returns the plots that have a curve.
+pub(super) fn write(writer: &Writer<'_>, film: &Film, role: Role) -> Result<Vec<Plot>, RecordingError> {
+    let plots = Plots { writer, film, role, times: film.times(), spans: RefCell::default() };
+    let mut found = Vec::new();
+    let mut note = |kind: Kind, has_curve: bool| found.extend(has_curve.then_some(kind));
+    note(Kind::Headway, plots.headways()?);
+    note(Kind::Gap, plots.gaps()?);
+    note(Kind::Encounter, plots.encounter()?);
     plots.motion()?;
-    note("speed", true);
-    note("acceleration", true);
-    note("margin", plots.margin()?);
-    plots.states()?;
-    Ok(names)
+    note(Kind::Speed, true);
+    note(Kind::Acceleration, true);
+    note(Kind::Margin, plots.margin()?);
+    let ranges: Vec<Plot> = found.into_iter().map(|kind| Plot { kind, range: plots.range(kind) }).collect();
+    for plot in &ranges {
+        plots.moment_lines(plot)?;
+    }
+    plots.bands()?;
+    Ok(ranges)
 }
 
 /// The writer of the plots of one film.
@@ -53,6 +138,8 @@ struct Plots<'a> {
     film: &'a Film,
     role: Role,
     times: Vec<Time>,
+    /// Smallest and largest value of each plot so far.
+    spans: RefCell<BTreeMap<&'static str, [f64; 2]>>,
 }
 
 /// Name and style of a curve.
@@ -78,16 +165,57 @@ impl Plots<'_> {
         if values.iter().all(Option::is_none) {
             return Ok(false);
         }
+        self.note_span(entity, values);
         self.write_style(entity, style)?;
         self.writer.write_series(entity, &self.times, values)?;
         Ok(true)
+    }
+
+    /// Extends the range of the plot to which `entity` belongs.
+    fn note_span(&self, entity: &str, values: &[Option<f64>]) {
+        let Some(kind) = KINDS.iter().find(|kind| entity.starts_with(&format!("plots/{}/", kind.name()))) else {
+            return;
+        };
+        let mut spans = self.spans.borrow_mut();
+        let span = spans.entry(kind.name()).or_insert([f64::INFINITY, f64::NEG_INFINITY]);
+        for value in values.iter().flatten() {
+            *span = [span[0].min(*value), span[1].max(*value)];
+        }
+    }
+
+    /// Returns the range of the value axis of a plot.
+    fn range(&self, kind: Kind) -> [f64; 2] {
+        let spans = self.spans.borrow();
+        let least = kind.least_range();
+        let [low, high] = spans.get(kind.name()).map_or(least, |span| [span[0].min(least[0]), span[1].max(least[1])]);
+        let lacking = if kind == Kind::Speed { (LEAST_SPEED_SPAN_MPS - (high - low)).max(0.0) } else { 0.0 };
+        let room = AXIS_ROOM * (high - low) + 0.5 * lacking;
+        let largest = kind.largest_range();
+        [(low - room).max(largest[0]), (high + room).min(largest[1])]
+    }
+
+    /// Writes a vertical line at each moment of the encounter. The baseline of a pair writes none.
+    fn moment_lines(&self, plot: &Plot) -> Result<(), RecordingError> {
+        if self.role == Role::Baseline {
+            return Ok(());
+        }
+        for (number, noted) in self.film.moments().iter().enumerate() {
+            let entity = format!("plots/{}/moment_{number}", plot.kind.name());
+            let style = SeriesLines::new()
+                .with_names([noted.moment.label()])
+                .with_colors([palette::moment(noted.moment)])
+                .with_widths([THIN_LINE_WIDTH]);
+            self.writer.write_static(&entity, &style)?;
+            self.writer.write_series(&entity, &[noted.time; 2], &plot.range.map(Some))?;
+        }
+        Ok(())
     }
 
     /// Writes name and style of a curve.
     fn write_style(&self, entity: &str, curve: &CurveStyle<'_>) -> Result<(), RecordingError> {
         let name = match self.role {
             Role::Alone => curve.name.to_owned(),
-            Role::Baseline | Role::Tested => format!("{} ({})", curve.name, self.film.arm),
+            Role::Baseline | Role::Tested => format!("{} {}", curve.name, self.film.arm_label()),
         };
         let (colour, width) = match self.role {
             Role::Baseline => (palette::darker(curve.colour), THIN_LINE_WIDTH),
@@ -158,7 +286,7 @@ impl Plots<'_> {
     /// Writes speeds and accelerations of the vehicles, the commanded acceleration of the ego, and its limits.
     fn motion(&self) -> Result<(), RecordingError> {
         for (index, actor) in self.film.actors.iter().enumerate().filter(|(_, actor)| actor.is_plotted) {
-            let colour = palette::actor(index, self.film.ego);
+            let colour = palette::part(actor.part);
             let style = CurveStyle { name: &actor.name, colour, width: LINE_WIDTH };
             let of = |of: fn(&closecall_traffic::VehicleState) -> f64| {
                 let rows = self.film.frames.iter().enumerate();
@@ -192,91 +320,9 @@ impl Plots<'_> {
         self.curve("plots/margin/goal", &style, |frame| goal_s.filter(|_| frame.time >= since))?;
         Ok(true)
     }
-
-    /// Writes the bands: the state of the MIS, the phase, the moments, and the brake lights.
-    fn states(&self) -> Result<(), RecordingError> {
-        let frames = &self.film.frames;
-        if frames.iter().all(|frame| frame.command.is_some()) {
-            let state = |frame: &Frame| frame.command.map_or("", |command| ego_state_name(command.state));
-            self.band("states/1_mis", &frames.iter().map(state).collect::<Vec<_>>(), &STATE_COLOURS)?;
-            let phase = |frame: &Frame| frame.phase.map_or("", phase_name);
-            self.band("states/2_encounter", &frames.iter().map(phase).collect::<Vec<_>>(), &PHASE_COLOURS)?;
-        }
-        self.moments()?;
-        for (index, actor) in self.film.actors.iter().enumerate() {
-            let braking = frames.iter().map(|frame| frame.states[index].brake_light);
-            let words: Vec<&str> = braking.map(|lit| if lit { BRAKES } else { DRIVES }).collect();
-            if words.contains(&BRAKES) {
-                self.band(&format!("states/4_{}_brake_light", actor.name), &words, &BRAKE_COLOURS)?;
-            }
-        }
-        Ok(())
-    }
-
-    /// Writes a band that shows the latest of the moments of the encounter at each time.
-    fn moments(&self) -> Result<(), RecordingError> {
-        let moments = self.film.moments();
-        if moments.is_empty() {
-            return Ok(());
-        }
-        let texts: Vec<String> = moments.iter().map(|noted| noted.moment.label()).collect();
-        let latest = |time: Time| moments.iter().rposition(|noted| noted.time <= time);
-        let words: Vec<&str> =
-            self.times.iter().map(|&time| latest(time).map_or(BEFORE, |index| texts[index].as_str())).collect();
-        let colours = texts.iter().enumerate().map(|(index, text)| (text.as_str(), palette::moment(index)));
-        self.band(
-            "states/3_moments",
-            &words,
-            &std::iter::once((BEFORE, palette::QUIET)).chain(colours).collect::<Vec<_>>(),
-        )
-    }
-
-    /// Writes a band with one state name per frame.
-    fn band(&self, entity: &str, words: &[&str], colours: &[(&str, Rgba)]) -> Result<(), RecordingError> {
-        let configuration = StateConfiguration::new()
-            .with_values(colours.iter().map(|(word, _)| *word))
-            .with_labels(colours.iter().map(|(word, _)| *word))
-            .with_colors(colours.iter().map(|(_, colour)| *colour));
-        self.writer.write_static(entity, &configuration)?;
-        let rows = changes(words);
-        let times: Vec<Time> = rows.iter().map(|&row| self.times[row]).collect();
-        self.writer.write_rows(entity, &times, |range| {
-            StateChange::new().with_state(rows[range].iter().map(|&row| words[row])).columns_of_unit_batches()
-        })
-    }
 }
 
 /// Returns the plan of the MIS in a frame, if there is one.
 fn plan(frame: &Frame) -> Option<MisPlan> {
     frame.command?.plan
-}
-
-const BEFORE: &str = "-";
-const BRAKES: &str = "on";
-const DRIVES: &str = "off";
-const BRAKE_COLOURS: [(&str, Rgba); 2] = [(BRAKES, palette::BRAKE_LIGHT), (DRIVES, palette::QUIET)];
-
-const STATE_COLOURS: [(&str, Rgba); 5] = [
-    (ego_state_name(EgoState::Following), palette::QUIET),
-    (ego_state_name(EgoState::Increasing), palette::EGO),
-    (ego_state_name(EgoState::Holding), palette::SAFE),
-    (ego_state_name(EgoState::Releasing), palette::NEUTRAL),
-    (ego_state_name(EgoState::EmergencyBraking), palette::CRITICAL),
-];
-
-const PHASE_COLOURS: [(&str, Rgba); 4] = [
-    (phase_name(Phase::Approach), palette::QUIET),
-    (phase_name(Phase::Critical), palette::CRITICAL),
-    (phase_name(Phase::Overtaking), palette::WARNING),
-    (phase_name(Phase::After), palette::NEUTRAL),
-];
-
-/// Returns the name of a phase of the encounter.
-pub(super) const fn phase_name(phase: Phase) -> &'static str {
-    match phase {
-        Phase::Approach => "approach",
-        Phase::Critical => "critical",
-        Phase::Overtaking => "overtaking",
-        Phase::After => "after",
-    }
 }

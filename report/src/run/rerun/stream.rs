@@ -1,55 +1,65 @@
-//! The writer of a film's entities, on the three timelines of the recording.
+//! The writer of a film's entities, on the timelines of the recording.
 //!
-//! The timelines `time` and `step` span the whole run. The viewer opens a timeline at its latest moment, and a file
-//! cannot set another one. A third timeline, [`OPENING_TIMELINE`], therefore ends shortly after the critical moment.
-//! The blueprint selects it, so that the viewer opens at the critical moment.
+//! The timelines `time` and `step` hold the run as it was. A file cannot tell the viewer at which moment to open: the
+//! viewer opens a timeline at its first moment. A third timeline, [`OPENING_TIMELINE`], therefore repeats `time`, but
+//! begins one step earlier with a copy of the critical moment. The file opens at that copy. Playing on from there shows
+//! the whole run, and so does a change to `time`.
+//!
+//! ```text
+//!  opening   ◉ critical moment │ 0.00 s  0.04 s  …  end
+//!  time                        │ 0.00 s  0.04 s  …  end
+//! ```
 
 use std::ops::Range;
 
 use closecall_traffic::Time;
+use rerun::external::re_log_types::EntityPath;
 use rerun::{
-    AsComponents, Clear, RecordingStream, RecordingStreamError, Scalars, SerializationResult,
-    SerializedComponentColumn, TimeCell, TimeColumn,
+    AsComponents, Clear, RecordingStreamError, Scalars, SerializationResult, SerializedComponentColumn, TimeColumn,
 };
 
 use super::RecordingError;
+use super::chunks::Chunks;
+use crate::run::film::Film;
 
 /// Timeline of the simulated time.
 pub(super) const TIME_TIMELINE: &str = "time";
 /// Timeline of the control step numbers.
 pub(super) const STEP_TIMELINE: &str = "step";
-/// Timeline of the simulated time that ends shortly after the critical moment.
-pub(super) const OPENING_TIMELINE: &str = "until_critical";
+/// Timeline of the simulated time that begins with a copy of the critical moment.
+pub(super) const OPENING_TIMELINE: &str = "opening";
 
 /// Writes the entities of one film into a recording.
 pub(super) struct Writer<'a> {
-    stream: &'a RecordingStream,
-    /// The last moment on the opening timeline.
-    opening_end: Time,
-    /// Prefix of the entity paths of this film; empty for the only film of a recording.
+    chunks: &'a Chunks,
+    /// Prefix of the entity paths of this film.
     root: String,
     /// Duration of a control step.
     period: Time,
+    /// Time of the first frame of the recording.
+    start: Time,
+    /// Time of the frame that is copied to the beginning of the opening timeline.
+    critical: Time,
 }
 
 impl<'a> Writer<'a> {
-    /// Creates the writer of one film whose entity paths begin with `root`.
-    pub(super) fn new(stream: &'a RecordingStream, opening_end: Time, root: &str, period: Time) -> Self {
-        Self { stream, opening_end, root: root.to_owned(), period }
+    /// Creates the writer of one film whose entity paths begin with `root`. `start` is the first moment of any film.
+    pub(super) fn new(chunks: &'a Chunks, film: &Film, root: &str, start: Time) -> Self {
+        Self { chunks, critical: film.critical_frame_time(), root: root.to_owned(), period: film.period, start }
     }
 
     /// Returns the path of an entity of this film.
-    pub(super) fn path(&self, entity: &str) -> String {
-        format!("{}{entity}", self.root)
+    pub(super) fn path(&self, entity: &str) -> EntityPath {
+        format!("{}{entity}", self.root).into()
     }
 
     /// Writes components that hold for the whole run.
     pub(super) fn write_static(&self, entity: &str, what: &impl AsComponents) -> Result<(), RecordingError> {
-        Ok(self.stream.log_static(self.path(entity), what)?)
+        self.chunks.push_static(self.path(entity), what)
     }
 
-    /// Writes one row of components for each of `times`, which must ascend. `build` returns the columns of a range of
-    /// rows.
+    /// Writes one row of components for each of `times`, which must ascend, and a copy of the row that holds at the
+    /// critical moment. `build` returns the columns of a range of rows.
     pub(super) fn write_rows<C>(
         &self,
         entity: &str,
@@ -59,31 +69,44 @@ impl<'a> Writer<'a> {
     where
         C: Iterator<Item = SerializedComponentColumn>,
     {
-        let until_opening = times.partition_point(|&time| time <= self.opening_end);
-        for range in [0..until_opening, until_opening..times.len()] {
-            if range.is_empty() {
-                continue;
-            }
-            let columns = build(range.clone()).map_err(RecordingStreamError::from)?;
-            self.stream.send_columns(self.path(entity), self.timelines(&times[range]), columns)?;
+        let until_critical = times.partition_point(|&time| time <= self.critical);
+        if let Some(shown) = until_critical.checked_sub(1) {
+            let columns = build(shown..shown + 1).map_err(RecordingStreamError::from)?;
+            self.chunks.push_columns(self.path(entity), self.copy_time(), columns)?;
+            self.clear_copy(entity, times[0])?;
         }
-        Ok(())
+        self.write_curve(entity, times, build)
+    }
+
+    /// Writes rows like [`Self::write_rows`], without a copy. For data that a view shows over the whole run at once.
+    pub(super) fn write_curve<C>(
+        &self,
+        entity: &str,
+        times: &[Time],
+        build: impl Fn(Range<usize>) -> SerializationResult<C>,
+    ) -> Result<(), RecordingError>
+    where
+        C: Iterator<Item = SerializedComponentColumn>,
+    {
+        if times.is_empty() {
+            return Ok(());
+        }
+        let columns = build(0..times.len()).map_err(RecordingStreamError::from)?;
+        self.chunks.push_columns(self.path(entity), self.timelines(times), columns)
     }
 
     /// Writes components that hold from `time` on.
     pub(super) fn write_from(&self, entity: &str, time: Time, what: &impl AsComponents) -> Result<(), RecordingError> {
-        for timeline in self.timelines(&[time]) {
-            let cell = TimeCell::new(timeline.timeline().typ(), timeline.times_raw()[0]);
-            self.stream.set_time(*timeline.timeline().name(), cell);
+        if time <= self.critical {
+            self.chunks.push_row(self.path(entity), self.copy_time(), what)?;
+            self.clear_copy(entity, time)?;
         }
-        let logged = self.stream.log(self.path(entity), what);
-        self.stream.reset_time();
-        Ok(logged?)
+        self.chunks.push_row(self.path(entity), self.timelines(&[time]), what)
     }
 
     /// Removes an entity and its children from `time` on.
     pub(super) fn write_clear(&self, entity: &str, time: Time) -> Result<(), RecordingError> {
-        self.write_rows(entity, &[time], |_| Clear::recursive().columns_of_unit_batches())
+        self.write_from(entity, time, &Clear::recursive())
     }
 
     /// Writes the values of a plotted curve. An absent value leaves a gap.
@@ -93,24 +116,35 @@ impl<'a> Writer<'a> {
         times: &[Time],
         values: &[Option<f64>],
     ) -> Result<(), RecordingError> {
-        self.write_rows(entity, times, |range| {
+        self.write_curve(entity, times, |range| {
             let values = &values[range];
             let lengths: Vec<usize> = values.iter().map(|value| usize::from(value.is_some())).collect();
             Scalars::new(values.iter().flatten().copied()).columns(lengths)
         })
     }
 
-    /// Returns `times` on each timeline. The opening timeline is left out if any of them is later than its end.
+    /// Removes the copy of an entity whose first row comes after the start of the run.
+    fn clear_copy(&self, entity: &str, first: Time) -> Result<(), RecordingError> {
+        if first <= self.start {
+            return Ok(());
+        }
+        let start = TimeColumn::new_duration_nanos(OPENING_TIMELINE, [self.start.ns()]);
+        self.chunks.push_row(self.path(entity), vec![start], &Clear::flat())
+    }
+
+    /// Returns the moment of the copy.
+    fn copy_time(&self) -> Vec<TimeColumn> {
+        vec![TimeColumn::new_duration_nanos(OPENING_TIMELINE, [(self.start - self.period).ns()])]
+    }
+
+    /// Returns `times` on each timeline.
     fn timelines(&self, times: &[Time]) -> Vec<TimeColumn> {
         let ns = || times.iter().map(|time| time.ns());
-        let mut timelines = vec![
+        vec![
             TimeColumn::new_duration_nanos(TIME_TIMELINE, ns()),
             TimeColumn::new_sequence(STEP_TIMELINE, ns().map(|ns| ns / self.period.ns())),
-        ];
-        if times.last().is_some_and(|&last| last <= self.opening_end) {
-            timelines.push(TimeColumn::new_duration_nanos(OPENING_TIMELINE, ns()));
-        }
-        timelines
+            TimeColumn::new_duration_nanos(OPENING_TIMELINE, ns()),
+        ]
     }
 }
 

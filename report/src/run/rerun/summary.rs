@@ -1,18 +1,31 @@
-//! The summary of a recording as a page of text: the story of each run, its outcome, and its metrics.
+//! The texts of a recording: the verdict, which is read first, and the story with the table of each run.
 
 use std::fmt::Write as _;
 
 use closecall_traffic::Measured;
 
-use crate::run::film::Film;
+use crate::run::film::{Film, PairVerdict, headway_text};
 
-/// Returns the page in Markdown: the forewords, then the headline and the story of each film, then the table of each
-/// film.
-pub(super) fn markdown(films: &[Film]) -> String {
+/// Returns the verdict in Markdown: what happened, how close it was, and what the system did.
+pub(super) fn verdict(films: &[Film]) -> String {
     let mut page = String::new();
-    for film in films {
-        page.push_str(&film.foreword);
+    match (films, Film::pair_verdict(films)) {
+        ([baseline, tested], Some(verdict)) => push_pair(&mut page, [baseline, tested], verdict),
+        _ => {
+            for film in films {
+                page.push_str(&film.foreword);
+            }
+            for film in films.iter().filter(|film| film.outcome.is_some() || films.len() == 1) {
+                push_single(&mut page, film);
+            }
+        }
     }
+    page
+}
+
+/// Returns the story in Markdown: the events of each film, then the table of each film.
+pub(super) fn story(films: &[Film]) -> String {
+    let mut page = String::new();
     for film in films {
         push_story(&mut page, film);
     }
@@ -22,10 +35,72 @@ pub(super) fn markdown(films: &[Film]) -> String {
     page
 }
 
+/// Appends the verdict on a pair.
+fn push_pair(page: &mut String, films: [&Film; 2], verdict: PairVerdict) {
+    // Writing to a string cannot fail.
+    let _ = write!(page, "### {}\n\n", verdict.word());
+    for film in films {
+        if let Some(result) = film.result() {
+            let _ = writeln!(page, "- **{}:** {result}", film.arm_label());
+        }
+    }
+    page.push('\n');
+    let [_, tested] = films;
+    push_system(page, tested);
+    let conditions = conditions(tested);
+    if let Some(outcome) = &tested.outcome {
+        let _ =
+            write!(page, "{} · seed {} · sample {}{conditions}\n\n", outcome.scenario, outcome.seed, outcome.sample);
+    }
+}
+
+/// Appends the verdict on one film.
+fn push_single(page: &mut String, film: &Film) {
+    let word = match (&film.outcome, film.worst_collision()) {
+        (None, _) => "Recorded traffic",
+        (Some(_), Some(_)) => "COLLISION",
+        (Some(_), None) => "NO COLLISION",
+    };
+    let _ = write!(page, "### {word}\n\n");
+    match film.result() {
+        Some(result) => {
+            let _ = write!(page, "**{}:** {result}\n\n", film.arm_label());
+        }
+        None => {
+            let _ = write!(page, "**{}**\n\n", film.title);
+            for (time, note) in &film.notes {
+                let _ = writeln!(page, "- {:.2} s: {note}", time.s());
+            }
+            page.push('\n');
+        }
+    }
+    push_system(page, film);
+    if let Some(outcome) = &film.outcome {
+        let (seed, sample, conditions) = (outcome.seed, outcome.sample, conditions(film));
+        let _ = write!(page, "{} · seed {seed} · sample {sample}{conditions}\n\n", outcome.scenario);
+    }
+}
+
+/// Appends what the system did, and since when it saw the vehicle behind.
+fn push_system(page: &mut String, film: &Film) {
+    let Some(summary) = film.mis_summary() else { return };
+    let sight = film.sight().map_or(String::new(), |sight| format!(" {sight}"));
+    let _ = write!(page, "{summary}{sight}\n\n");
+}
+
+/// Returns the weather and the settings of the command line.
+fn conditions(film: &Film) -> String {
+    let mut text = film.weather().map_or(String::new(), |weather| format!(" · {weather}"));
+    for setting in &film.settings {
+        let _ = write!(text, " · `--set {setting}`");
+    }
+    text
+}
+
 /// Appends the headline and the story of a film.
 fn push_story(page: &mut String, film: &Film) {
-    // Writing to a string cannot fail.
-    let _ = write!(page, "### {}\n\n**{}**\n\n", film.title, film.headline());
+    let (arm, conditions) = (film.arm_label(), conditions(film));
+    let _ = write!(page, "### {arm}: {}{conditions}\n\n**{}**\n\n", film.title, film.headline());
     if let Some(verdict) = film.mis_summary() {
         let _ = write!(page, "{verdict}\n\n");
     }
@@ -48,8 +123,8 @@ fn push_table(page: &mut String, film: &Film) {
     row("seed, sample", &format_args!("{}, {}", outcome.seed, outcome.sample));
     row("duration", &format_args!("{:.2} s", outcome.duration.s()));
     let margins = &outcome.margins;
-    row("smallest front headway", &WithUnit(margins.min_thw_front_s, "s"));
-    row("smallest rear headway", &WithUnit(margins.min_thw_rear_s, "s"));
+    row("smallest front headway", &Headway(margins.min_thw_front_s));
+    row("smallest rear headway", &Headway(margins.min_thw_rear_s));
     row("smallest front gap", &WithUnit(margins.min_gap_front_m, "m"));
     row("smallest rear gap", &WithUnit(margins.min_gap_rear_m, "m"));
     row("hardest braking of ego", &format_args!("{:.2} m/s²", margins.max_deceleration_mps2));
@@ -76,6 +151,18 @@ impl std::fmt::Display for WithUnit {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self.0 {
             Ok(value) => write!(f, "{value:.2} {}", self.1),
+            Err(absent) => write!(f, "({absent})"),
+        }
+    }
+}
+
+/// Displays a headway, or the reason for its absence.
+struct Headway(Measured);
+
+impl std::fmt::Display for Headway {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self.0 {
+            Ok(thw_s) => f.write_str(&headway_text(thw_s)),
             Err(absent) => write!(f, "({absent})"),
         }
     }

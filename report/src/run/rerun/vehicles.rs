@@ -8,22 +8,38 @@ use super::RecordingError;
 use super::bodies;
 use super::palette::{self, Rgba};
 use super::stream::{Writer, changes};
-use crate::run::film::{Film, Frame};
+use crate::run::film::{Film, Frame, Part, headway_text};
 use closecall_simulation::outcome::{CRITICAL_THW_S, Collision};
 
 /// An arrow shows the distance that the vehicle travels in this time (s).
 const ARROW_S: f64 = 0.25;
-/// Height of the names above the roof (m). The arrows are half as high above it.
-const LABEL_ABOVE_M: f64 = 0.8;
+/// Height of the arrows above the roof (m).
+const ARROW_ABOVE_M: f64 = 0.4;
+/// Heights of the names above the roof (m): different ones, so that the names of vehicles that touch do not cover each
+/// other.
+const EGO_LABEL_M: f64 = 0.6;
+const LEAD_LABEL_M: f64 = 5.8;
+const OTHER_LABEL_M: f64 = 1.6;
+const REAR_LABEL_M: f64 = 3.2;
 /// Distance of the text about the first collision behind the centre of the vehicle that carries it (m). The text lies
 /// on the road, clear of the names of the vehicles.
 const COLLISION_TEXT_BEHIND_M: f32 = 11.0;
 /// Distance between the texts about two collisions (m).
 const COLLISION_TEXT_SPACING_M: f32 = 4.0;
-/// Length of a gap below which it has no label, since the names of the two vehicles leave no room (m).
-pub(super) const LABELLED_GAP_M: f64 = 3.0;
+/// Position of the headways beside the ego, to its right and thus nearer to the eye (m).
+const GAP_TEXT_Y_M: f32 = -3.2;
 /// Height at which gaps are drawn (m).
 const GAP_Z_M: f64 = 0.5;
+
+/// Returns the height of the name of a vehicle above its roof (m).
+const fn label_above_m(part: Part) -> f64 {
+    match part {
+        Part::Ego => EGO_LABEL_M,
+        Part::Lead => LEAD_LABEL_M,
+        Part::Rear => REAR_LABEL_M,
+        Part::Other(_) | Part::Background => OTHER_LABEL_M,
+    }
+}
 
 /// Returns the path of the entity of an actor.
 pub(super) fn entity(film: &Film, actor: usize) -> String {
@@ -34,7 +50,7 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingErr
     let all_times = film.times();
     for (index, actor) in film.actors.iter().enumerate().filter(|(_, actor)| !actor.present_frames.is_empty()) {
         let entity = entity(film, index);
-        let colour = palette::actor(index, film.ego);
+        let colour = palette::part(actor.part);
         let times = &all_times[actor.present_frames.clone()];
         let states: Vec<&VehicleState> =
             film.frames[actor.present_frames.clone()].iter().map(|frame| &frame.states[index]).collect();
@@ -47,15 +63,44 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingErr
             writer.write_from(&body.0, times[0], &body.1)?;
         }
         write_motion(writer, &entity, times, &states, &film.road)?;
-        write_velocity(writer, &entity, times, &states, (size, colour))?;
-        write_name(writer, &entity, times, &states, (actor.name.as_str(), size, colour))?;
+        if film.is_main(index) {
+            write_velocity(writer, &entity, times, &states, (size, colour))?;
+            let above_m = size.height_m + label_above_m(actor.part);
+            write_name(writer, &entity, times, &states, (actor.name.as_str(), above_m, colour))?;
+        }
         write_lights(writer, &entity, times, &states, (actor.vehicle.class, size))?;
         if let Some(&gone) = all_times.get(actor.present_frames.end) {
             writer.write_clear(&entity, gone)?;
         }
     }
     write_gaps(writer, film, &all_times)?;
-    write_collisions(writer, film)
+    write_collisions(writer, film)?;
+    write_rig(writer, film, &all_times)
+}
+
+/// Share of the rear gap by which the rig stays behind the ego, so that the rear vehicle is in the picture.
+const RIG_SHARE: f64 = 0.75;
+/// Largest distance of the rig behind the ego (m).
+const MAX_RIG_M: f64 = 80.0;
+
+/// Writes the rig of the scene's eye. It moves along the road with the ego, but does not turn with it. As long as the rear
+/// vehicle is far, the rig stays back.
+fn write_rig(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordingError> {
+    let rear = film.actors.iter().position(|actor| actor.part == Part::Rear);
+    let pose = |frame: &Frame| {
+        let own = &frame.states[film.ego];
+        let gap_m = rear.map_or(0.0, |rear| own.s_m - frame.states[rear].s_m);
+        let s_m = own.s_m - (RIG_SHARE * gap_m).clamp(0.0, MAX_RIG_M);
+        film.road.plane_pose(s_m, 0.5 * film.road.right_edge_m(), 0.0)
+    };
+    let poses: Vec<_> = film.frames.iter().map(pose).collect();
+    writer.write_rows("world/rig", times, |range| {
+        let poses = &poses[range];
+        Transform3D::update_fields()
+            .with_many_translation(poses.iter().map(|pose| [pose.x_m as f32, pose.y_m as f32, 0.0]))
+            .with_many_quaternion(poses.iter().map(|pose| yaw_rotation(pose.yaw_rad)))
+            .columns_of_unit_batches()
+    })
 }
 
 fn write_motion(
@@ -89,7 +134,7 @@ fn write_velocity(
     (size, colour): (&Dimensions, Rgba),
 ) -> Result<(), RecordingError> {
     let entity = format!("{entity}/velocity");
-    let above_m = (size.height_m + 0.5 * LABEL_ABOVE_M) as f32;
+    let above_m = (size.height_m + ARROW_ABOVE_M) as f32;
     let fixed = Arrows3D::update_fields()
         .with_origins([[0.0, 0.0, above_m]])
         .with_colors([palette::with_opacity(colour, 220)])
@@ -107,12 +152,11 @@ fn write_name(
     entity: &str,
     times: &[Time],
     states: &[&VehicleState],
-    (name, size, colour): (&str, &Dimensions, Rgba),
+    (name, above_m, colour): (&str, f64, Rgba),
 ) -> Result<(), RecordingError> {
     let entity = format!("{entity}/name");
-    let above_m = (size.height_m + LABEL_ABOVE_M) as f32;
     let fixed =
-        Points3D::new([[0.0, 0.0, above_m]]).with_colors([colour]).with_radii([0.05_f32]).with_show_labels(true);
+        Points3D::new([[0.0, 0.0, above_m as f32]]).with_colors([colour]).with_radii([0.05_f32]).with_show_labels(true);
     writer.write_static(&entity, &fixed)?;
     // Only a change of the rounded speed gives a new row.
     let texts: Vec<String> = states.iter().map(|state| format!("{name} {:.0} m/s", state.speed_mps)).collect();
@@ -202,15 +246,23 @@ fn write_gaps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), Re
         ("world/ego/gap_rear", film.frames.iter().map(rear).collect()),
     ];
     for (entity, gaps) in both {
-        writer.write_static(entity, &LineStrips3D::update_fields().with_radii([0.06_f32]).with_show_labels(true))?;
+        writer.write_static(entity, &LineStrips3D::update_fields().with_radii([0.06_f32]))?;
+        let text_entity = format!("{entity}/headway");
+        let fixed = Points3D::update_fields().with_radii([0.03_f32]).with_show_labels(true);
+        writer.write_static(&text_entity, &fixed)?;
+        let lengths = |gaps: &[Option<Gap>]| gaps.iter().map(|gap| usize::from(gap.is_some())).collect::<Vec<_>>();
         writer.write_rows(entity, times, |range| {
-            let gaps = &gaps[range];
-            let lengths: Vec<usize> = gaps.iter().map(|gap| usize::from(gap.is_some())).collect();
-            let shown = || gaps.iter().flatten();
+            let shown = || gaps[range.clone()].iter().flatten();
             LineStrips3D::new(shown().map(|gap| gap.ends_m))
                 .with_colors(shown().map(|gap| gap.colour))
+                .columns(lengths(&gaps[range.clone()]))
+        })?;
+        writer.write_rows(&text_entity, times, |range| {
+            let shown = || gaps[range.clone()].iter().flatten();
+            Points3D::new(shown().map(|gap| gap.text_m))
+                .with_colors(shown().map(|gap| gap.colour))
                 .with_labels(shown().map(|gap| gap.text.as_str()))
-                .columns(lengths)
+                .columns(lengths(&gaps[range.clone()]))
         })?;
     }
     Ok(())
@@ -219,6 +271,8 @@ fn write_gaps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), Re
 /// The line that shows a gap.
 struct Gap {
     ends_m: [[f32; 3]; 2],
+    /// Position of the text, beside the lane.
+    text_m: [f32; 3],
     colour: Rgba,
     text: String,
 }
@@ -231,12 +285,12 @@ impl Gap {
         let is_critical = thw_s.is_ok_and(|thw_s| thw_s < CRITICAL_THW_S);
         let end = |x_m: f64| [x_m as f32, 0.0, GAP_Z_M as f32];
         let text = match thw_s {
-            _ if gap_m < LABELLED_GAP_M => String::new(),
-            Ok(thw_s) => format!("{thw_s:.2} s"),
+            Ok(thw_s) => headway_text(thw_s),
             Err(_) => format!("{gap_m:.1} m"),
         };
         Some(Self {
             ends_m: [end(bumper_m), end(bumper_m + sign * gap_m)],
+            text_m: [(bumper_m + 0.5 * sign * gap_m) as f32, GAP_TEXT_Y_M, 0.0],
             colour: if is_critical { palette::CRITICAL } else { palette::SAFE },
             text,
         })

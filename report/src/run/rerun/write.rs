@@ -3,21 +3,18 @@
 use std::path::Path;
 
 use closecall_traffic::Time;
-use rerun::sink::MemorySinkStorage;
-use rerun::{MediaType, RecordingStream, RecordingStreamBuilder, RecordingStreamError, TextDocument, ViewCoordinates};
+use rerun::log::LogMsg;
+use rerun::{MediaType, RecordingStreamError, TextDocument, ViewCoordinates};
 
-use super::blueprint::{FilmContents, Layout};
+use super::blueprint::{self, FilmContents};
+use super::chunks::{self, Chunks};
 use super::plots::Role;
 use super::stream::Writer;
-use super::{bird, camera, ghosts, log, perceived, plots, points, road, summary, truth, vehicles};
+use super::{
+    bird, camera, fog, ghosts, log, palette, perceived, plots, points, properties, road, summary, truth, vehicles,
+};
 use crate::run::film::{Film, Level};
 use closecall_scenarios::atomic::{WriteError, check_writable, write_file};
-
-/// The application id, under which the viewer stores its layouts.
-pub(super) const APPLICATION: &str = "closecall";
-
-/// Time between the critical moment and the end of the opening timeline, so that an impact and its mark are visible.
-const AFTER_CRITICAL: Time = Time::from_ms(200);
 
 /// The reason why a recording cannot be written. A file of that name is then unchanged.
 #[derive(Debug, thiserror::Error)]
@@ -37,6 +34,13 @@ pub enum RecordingError {
     /// The file cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
+}
+
+impl RecordingError {
+    /// Returns the error for a reason that the library gives while encoding.
+    pub(super) fn encode(reason: impl std::fmt::Display) -> Self {
+        Self::Encode { reason: reason.to_string() }
+    }
 }
 
 /// Checks whether a recording can be written, before the run starts.
@@ -71,17 +75,14 @@ pub fn write_recording(path: &Path, films: &[Film]) -> Result<(), RecordingError
 
 /// Returns the bytes of the recording file.
 fn encode(films: &[Film]) -> Result<Vec<u8>, RecordingError> {
-    record(films)?.drain_as_bytes().map_err(|error| RecordingError::Encode { reason: error.to_string() })
+    chunks::encode(&record(films)?)
 }
 
-/// Writes the films and the layout into memory.
-fn record(films: &[Film]) -> Result<MemorySinkStorage, RecordingError> {
-    let title = films.iter().map(Film::title).collect::<Vec<_>>().join(" and ");
-    let (stream, messages) = RecordingStreamBuilder::new(APPLICATION).recording_name(title).memory()?;
-    if !stream.is_enabled() {
-        return Err(RecordingError::Disabled);
-    }
-    let opening_end = opening_moment(films) + AFTER_CRITICAL;
+/// Returns the messages of the films and of the layout.
+fn record(films: &[Film]) -> Result<Vec<LogMsg>, RecordingError> {
+    let data = Chunks::default();
+    let start = films.iter().filter_map(|film| film.frames.first()).map(|frame| frame.time).min();
+    let canvases = bird::Canvas::of_films(films);
     let mut contents = Vec::new();
     for (index, film) in films.iter().enumerate() {
         let role = match (films.len(), index) {
@@ -89,16 +90,26 @@ fn record(films: &[Film]) -> Result<MemorySinkStorage, RecordingError> {
             (_, 0) => Role::Baseline,
             _ => Role::Tested,
         };
-        let root = if role == Role::Alone { String::new() } else { format!("{}/", film.arm) };
-        let writer = Writer::new(&stream, opening_end, &root, film.period);
-        contents.push(write_film(&writer, film, (root, role))?);
+        let root = format!("{}/", film.arm);
+        let writer = Writer::new(&data, film, &root, start.unwrap_or(Time::ZERO));
+        contents.push(write_film(&writer, &canvases[index], (root, role))?);
         if let Some(ghosts) = ghosts_in(films, index).filter(|_| film.level >= Level::Objects) {
-            ghosts::write(&writer, film, ghosts)?;
+            ghosts::write(&writer, &canvases[index], ghosts)?;
         }
     }
-    write_summary(&stream, films)?;
-    Layout::default().send(&stream, &contents)?;
-    Ok(messages)
+    write_texts(&data, films)?;
+    properties::write(&data, films)?;
+    chunks::recording(application(films), blueprint::layout(&contents)?, data)
+}
+
+/// Returns the application id. The viewer keeps one layout per application, so that each kind of recording has its own.
+fn application(films: &[Film]) -> &'static str {
+    match films {
+        [film] if film.outcome.is_none() => "closecall-traffic",
+        [_] => "closecall-run",
+        [recorded, ..] if recorded.outcome.is_none() => "closecall-reenactment",
+        _ => "closecall-pair",
+    }
 }
 
 /// Returns the film whose vehicles appear as outlines in the film of this index.
@@ -113,30 +124,31 @@ fn ghosts_in(films: &[Film], index: usize) -> Option<&Film> {
     }
 }
 
-/// Returns the moment at which the recording opens: the earliest of the films' worst collisions or, if there is none,
-/// the critical moment of the last film. If the first film is recorded traffic, it is the later of the two critical
-/// moments, so that both encounters are visible.
-fn opening_moment(films: &[Film]) -> Time {
-    let collisions = films.iter().filter_map(|film| film.worst_collision().map(|collision| collision.time));
-    let critical = || match films {
-        [recorded, _] if recorded.outcome.is_none() => films.iter().map(Film::critical_moment).max(),
-        _ => films.last().map(Film::critical_moment),
-    };
-    collisions.min().or_else(critical).unwrap_or(Time::ZERO)
-}
-
 /// Writes a film and returns what its views can show.
-fn write_film(writer: &Writer<'_>, film: &Film, (root, role): (String, Role)) -> Result<FilmContents, RecordingError> {
-    let mut contents =
-        FilmContents { name: film.arm.clone(), root, edges: bird::edges(film), ..FilmContents::default() };
+fn write_film(
+    writer: &Writer<'_>,
+    canvas: &bird::Canvas<'_>,
+    (root, role): (String, Role),
+) -> Result<FilmContents, RecordingError> {
+    let film = canvas.film;
+    let mut contents = FilmContents {
+        name: film.arm_label().to_owned(),
+        root,
+        bird_range: canvas.range_m(),
+        weather: film.weather(),
+        sky: palette::through_fog(palette::SKY, fog::clear_share(film)),
+        span: [film.frames.first().map_or(Time::ZERO, |frame| frame.time), film.end()],
+        ..FilmContents::default()
+    };
     if film.level >= Level::Objects && !film.frames.is_empty() {
         writer.write_static("world", &ViewCoordinates::FLU())?;
         road::write(writer, film)?;
+        fog::write(writer, film)?;
         vehicles::write(writer, film)?;
         perceived::write(writer, film)?;
         contents.hidden_layers.extend(truth::write(writer, film)?);
         contents.hidden_layers.extend(points::write(writer, film)?);
-        bird::write(writer, film)?;
+        bird::write(writer, canvas)?;
         contents.has_scene = true;
         contents.has_camera = camera::write(writer, film)?;
     }
@@ -146,10 +158,12 @@ fn write_film(writer: &Writer<'_>, film: &Film, (root, role): (String, Role)) ->
     Ok(contents)
 }
 
-/// Writes the summary, which the story view shows.
-fn write_summary(stream: &RecordingStream, films: &[Film]) -> Result<(), RecordingError> {
-    let summary = TextDocument::new(summary::markdown(films)).with_media_type(MediaType::markdown());
-    Ok(stream.log_static("summary", &summary)?)
+/// Writes the verdict and the story, each of which has a view.
+fn write_texts(data: &Chunks, films: &[Film]) -> Result<(), RecordingError> {
+    for (entity, text) in [("verdict", summary::verdict(films)), ("summary", summary::story(films))] {
+        data.push_static(entity.into(), &TextDocument::new(text).with_media_type(MediaType::markdown()))?;
+    }
+    Ok(())
 }
 
 #[cfg(test)]

@@ -1,0 +1,92 @@
+//! What the ego knew of the vehicle behind it: since when it was tracked, how far away it was then, when it was lost.
+
+use closecall_traffic::{Source, Time, Track, TrackStatus};
+
+use super::{Film, Frame};
+
+/// The vehicle behind the ego, as the rear sensors know it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::run) struct RearSeen {
+    /// Distance from its front to the rear of the ego (m).
+    pub(in crate::run) gap_m: f64,
+}
+
+/// A span of time in which a vehicle behind the ego was or was not known.
+#[derive(Clone, Debug, PartialEq)]
+pub(in crate::run) struct KnownSpan {
+    /// Index of the first frame.
+    pub(in crate::run) first_frame: usize,
+    /// Time of the first frame.
+    pub(in crate::run) time: Time,
+    /// Distance at the beginning (m), if a vehicle was known.
+    pub(in crate::run) from_m: Option<f64>,
+    /// True if a vehicle was known before.
+    is_later: bool,
+}
+
+impl KnownSpan {
+    /// Returns the words for the band of states.
+    pub(in crate::run) fn words(&self) -> String {
+        match (self.from_m, self.is_later) {
+            (Some(from_m), _) => format!("seen from {from_m:.0} m on"),
+            (None, false) => "no vehicle seen".to_owned(),
+            (None, true) => "out of sight".to_owned(),
+        }
+    }
+}
+
+/// Returns the nearest confirmed track of a vehicle behind the ego, or `None` if there is none. A track that has passed
+/// the rear bumper is no longer behind.
+pub(super) fn rear_seen(tracks: &[Track], ego_length_m: f64) -> Option<RearSeen> {
+    let is_known = |track: &&Track| {
+        track.source == Source::Rear && track.status != TrackStatus::Tentative && track.class.vehicle() >= 0.5
+    };
+    let gap_m = |track: &Track| -track.x_m() - 0.5 * (track.length_m + ego_length_m);
+    let gaps = tracks.iter().filter(is_known).map(gap_m).filter(|&gap_m| gap_m > 0.0);
+    gaps.min_by(f64::total_cmp).map(|gap_m| RearSeen { gap_m })
+}
+
+impl Film {
+    /// Returns the spans in which a vehicle behind the ego was or was not known, in order of time. Recorded traffic has
+    /// none.
+    pub(in crate::run) fn known_spans(&self) -> Vec<KnownSpan> {
+        let mut spans: Vec<KnownSpan> = Vec::new();
+        if self.outcome.is_none() {
+            return spans;
+        }
+        for (first_frame, frame) in self.frames.iter().enumerate() {
+            let seen = known(frame);
+            if spans.last().is_none_or(|span| span.from_m.is_some() != seen.is_some()) {
+                let is_later = spans.iter().any(|span| span.from_m.is_some());
+                spans.push(KnownSpan { first_frame, time: frame.time, from_m: seen, is_later });
+            }
+        }
+        spans
+    }
+
+    /// Returns a sentence on when the ego first saw a vehicle behind it, with the weather if that is not clear.
+    pub(in crate::run) fn sight(&self) -> Option<String> {
+        let spans = self.known_spans();
+        if spans.is_empty() {
+            return None;
+        }
+        let weather = self.weather().map_or(String::new(), |weather| format!("; {weather}"));
+        let first = spans.iter().find_map(|span| Some((span.time, span.from_m?)));
+        Some(match first {
+            Some((time, from_m)) if time > self.frames[0].time => {
+                format!("No vehicle was seen behind until {:.2} s ({from_m:.0} m{weather}).", time.s())
+            }
+            Some((_, from_m)) => format!("A vehicle behind was seen from the start ({from_m:.0} m{weather})."),
+            None => format!("No vehicle was seen behind{}.", weather.replacen("; ", " (", 1) + closing(&weather)),
+        })
+    }
+}
+
+/// Returns the bracket that closes the weather, if there is one.
+fn closing(weather: &str) -> &'static str {
+    if weather.is_empty() { "" } else { ")" }
+}
+
+fn known(frame: &Frame) -> Option<f64> {
+    frame.rear_seen.map(|seen| seen.gap_m)
+}

@@ -1,0 +1,118 @@
+//! The verdict on a run or on a pair, in words: which vehicles collided, whether the system prevented it, how close it was.
+
+use closecall_simulation::outcome::{Collision, Outcome};
+use closecall_traffic::Light;
+
+use super::Film;
+
+/// Visibility below which the weather is named (m). Koschmieder's visibility of clear air is far above it.
+const CLEAR_VISIBILITY_M: f64 = 2_000.0;
+
+/// What became of a pair: the baseline beside the arm under test.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PairVerdict {
+    /// The ego collided in the baseline only.
+    Prevented,
+    /// The ego collided in the arm under test only.
+    Induced,
+    /// The ego collided in both arms.
+    Both,
+    /// The ego collided in neither arm.
+    Neither,
+}
+
+impl PairVerdict {
+    /// Returns the verdict on a baseline and the arm under test.
+    pub fn of(baseline: &Outcome, tested: &Outcome) -> Self {
+        match (baseline.ego_collided(), tested.ego_collided()) {
+            (true, false) => Self::Prevented,
+            (false, true) => Self::Induced,
+            (true, true) => Self::Both,
+            (false, false) => Self::Neither,
+        }
+    }
+
+    /// Returns the verdict as one word.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Prevented => "PREVENTED",
+            Self::Induced => "INDUCED",
+            Self::Both => "BOTH COLLIDE",
+            Self::Neither => "NEITHER COLLIDES",
+        }
+    }
+}
+
+impl Film {
+    /// Returns the verdict on a pair of films of runs, or `None` if one of them is recorded traffic.
+    pub fn pair_verdict(films: &[Self]) -> Option<PairVerdict> {
+        match films {
+            [baseline, tested] => Some(PairVerdict::of(baseline.outcome()?, tested.outcome()?)),
+            _ => None,
+        }
+    }
+
+    /// Returns the words for the arm: `without MIS` and `with MIS` for the built-in ego stack, the controller's name for
+    /// others.
+    pub fn arm_label(&self) -> &str {
+        match self.arm.as_str() {
+            "acc" => "without MIS",
+            "mis" => "with MIS",
+            name => name,
+        }
+    }
+
+    /// Returns the collision, or its absence, and the smallest headways. `None` for recorded traffic.
+    pub fn result(&self) -> Option<String> {
+        let outcome = self.outcome.as_ref()?;
+        let collision = match self.worst_collision() {
+            Some(collision) => collided(collision),
+            None => "no collision".to_owned(),
+        };
+        let margins = &outcome.margins;
+        let headways = [("front", margins.min_thw_front_s), ("rear", margins.min_thw_rear_s)];
+        let texts = headways.iter().filter_map(|(name, thw_s)| Some(format!("{name} {}", headway_text(thw_s.ok()?))));
+        let texts: Vec<String> = texts.collect();
+        let headways = if texts.is_empty() { "no vehicle near".to_owned() } else { texts.join(", ") };
+        Some(format!("{collision}; smallest headway: {headways}"))
+    }
+
+    /// Returns the weather and light, or `None` on a clear, dry day.
+    pub(in crate::run) fn weather(&self) -> Option<String> {
+        let weather = &self.environment;
+        let mut parts = Vec::new();
+        match weather.light {
+            Light::Day => (),
+            Light::Dusk => parts.push("dusk".to_owned()),
+            Light::Night => parts.push("night".to_owned()),
+        }
+        if weather.visibility_m < CLEAR_VISIBILITY_M {
+            parts.push(format!("visibility {:.0} m", weather.visibility_m));
+        }
+        if weather.rain_mm_per_h > 0.0 {
+            parts.push(format!("rain {} mm/h", weather.rain_mm_per_h));
+        }
+        if weather.water_film_mm > 0.0 {
+            parts.push(format!("water film {} mm", weather.water_film_mm));
+        }
+        (!parts.is_empty()).then(|| parts.join(", "))
+    }
+}
+
+/// Returns the vehicles of a collision and their relative speed.
+fn collided(collision: &Collision) -> String {
+    let [first, second] = &collision.between;
+    format!(
+        "collision of {first} and {second} at {:.1} m/s ({:.2} s)",
+        collision.relative_speed_mps,
+        collision.time.s()
+    )
+}
+
+/// Largest headway that is written in full (s). Beyond it the vehicles do not influence each other.
+pub(in crate::run) const MAX_WRITTEN_THW_S: f64 = 10.0;
+
+/// Returns a headway as text. A standing follower would otherwise have a headway of hours.
+pub(in crate::run) fn headway_text(thw_s: f64) -> String {
+    if thw_s > MAX_WRITTEN_THW_S { format!("> {MAX_WRITTEN_THW_S:.0} s") } else { format!("{thw_s:.2} s") }
+}

@@ -1,0 +1,125 @@
+//! Typed properties of a recording, for programs that query it: scenario, seed, sample, parameters, and per arm the outcome.
+//!
+//! ```text
+//!  __properties                   name of the recording
+//!  __properties/run               scenario, seed, sample, verdict, settings
+//!  __properties/parameters        one value per sampled parameter
+//!  __properties/arms/ARM          collided, smallest headways, when the MIS engaged, and so on
+//! ```
+//!
+//! The unit is in the name of each property, and in the metadata of its column.
+
+use std::sync::Arc;
+
+use arrow::array::{ArrayRef, BooleanArray, Float64Array, StringArray, UInt64Array};
+use closecall_simulation::outcome::Outcome;
+use closecall_traffic::{Measured, Value};
+use rerun::archetypes::RecordingInfo;
+use rerun::external::re_log_types::EntityPath;
+use rerun::{AnyValues, AsComponents, ComponentIdentifier};
+
+use super::RecordingError;
+use super::chunks::Chunks;
+use crate::run::film::Film;
+
+/// Writes the properties of the recording.
+pub(super) fn write(data: &Chunks, films: &[Film]) -> Result<(), RecordingError> {
+    let title =
+        films.iter().map(|film| format!("{} ({})", film.title, film.arm_label())).collect::<Vec<_>>().join(" and ");
+    data.push_static(EntityPath::properties(), &RecordingInfo::update_fields().with_name(title))?;
+    let Some((film, outcome)) = films.iter().rev().find_map(|film| Some((film, film.outcome.as_ref()?))) else {
+        return Ok(());
+    };
+    let mut run = Properties::default()
+        .text("scenario", &outcome.scenario)
+        .count("seed", outcome.seed)
+        .count("sample", outcome.sample)
+        .text("settings", &film.settings.join(" "));
+    if let Some(verdict) = Film::pair_verdict(films) {
+        run = run.text("verdict", verdict.word());
+    }
+    run.push(data, "run")?;
+    let mut parameters = Properties::default();
+    for (name, value) in outcome.parameters.iter() {
+        parameters = match value {
+            Value::Number(number) => parameters.number(&name.to_string(), Ok(*number)),
+            other => parameters.text(&name.to_string(), &other.to_string()),
+        };
+    }
+    parameters.push(data, "parameters")?;
+    for (film, outcome) in films.iter().filter_map(|film| Some((film, film.outcome.as_ref()?))) {
+        of_arm(film, outcome).push(data, &format!("arms/{}", film.arm))?;
+    }
+    Ok(())
+}
+
+/// Returns the properties of one arm.
+fn of_arm(film: &Film, outcome: &Outcome) -> Properties {
+    let margins = &outcome.margins;
+    let mut properties = Properties::default()
+        .text("controller", &outcome.controller)
+        .flag("ego_collided", outcome.ego_collided())
+        .count("collisions", outcome.collisions.len() as u64)
+        .number("duration_s", Ok(outcome.duration.s()))
+        .number("critical_moment_s", Ok(film.critical_moment().s()))
+        .number("min_thw_front_s", margins.min_thw_front_s)
+        .number("min_thw_rear_s", margins.min_thw_rear_s)
+        .number("min_gap_front_m", margins.min_gap_front_m)
+        .number("min_gap_rear_m", margins.min_gap_rear_m)
+        .number("max_deceleration_mps2", Ok(margins.max_deceleration_mps2));
+    if let Some(collision) = film.worst_collision() {
+        properties = properties
+            .number("collision_time_s", Ok(collision.time.s()))
+            .number("collision_relative_speed_mps", Ok(collision.relative_speed_mps));
+    }
+    if let Ok(mis) = &outcome.mis {
+        properties = properties
+            .number("mis_engaged_at_s", mis.engaged_at_s)
+            .number("mis_thw_front_at_critical_s", mis.thw_front_at_critical_s)
+            .text("mis_reason", &mis.reason.to_string());
+    }
+    properties
+}
+
+/// Values of one entity. A value that does not exist has no column.
+#[derive(Default)]
+struct Properties(Vec<(String, ArrayRef)>);
+
+impl Properties {
+    fn with(mut self, name: &str, array: ArrayRef) -> Self {
+        self.0.push((name.replace('-', "_"), array));
+        self
+    }
+
+    fn text(self, name: &str, text: &str) -> Self {
+        self.with(name, Arc::new(StringArray::from(vec![text])))
+    }
+
+    fn count(self, name: &str, count: u64) -> Self {
+        self.with(name, Arc::new(UInt64Array::from(vec![count])))
+    }
+
+    fn flag(self, name: &str, flag: bool) -> Self {
+        self.with(name, Arc::new(BooleanArray::from(vec![flag])))
+    }
+
+    fn number(self, name: &str, value: Measured) -> Self {
+        match value {
+            Ok(value) => self.with(name, Arc::new(Float64Array::from(vec![value]))),
+            Err(_) => self,
+        }
+    }
+
+    fn push(self, data: &Chunks, entity: &str) -> Result<(), RecordingError> {
+        if self.0.is_empty() {
+            return Ok(());
+        }
+        let mut values = AnyValues::default();
+        for (name, array) in self.0 {
+            let name = ComponentIdentifier::try_new(&name).map_err(RecordingError::encode)?;
+            values = values.with_component_from_data(name, array);
+        }
+        let path: EntityPath = entity.into();
+        data.push_static(EntityPath::properties().join(&path), &values as &dyn AsComponents)
+    }
+}
