@@ -7,7 +7,7 @@ use closecall_report::json;
 use closecall_report::run::film::{EncounterComparison, Film, film_encounter};
 use closecall_report::run::rerun::write_recording;
 use closecall_scenarios::atomic::write_file;
-use closecall_scenarios::criticality::{CriticalLaneChange, by_severity, criticality};
+use closecall_scenarios::criticality::{CriticalLaneChange, Judgement, by_severity, criticality};
 use closecall_scenarios::encounter::{NoEncounter, RecordedEncounter, encounter};
 use closecall_scenarios::filters::smooth;
 use closecall_scenarios::lane_change::LaneChange;
@@ -78,7 +78,7 @@ pub(super) fn reenact(args: &ReenactArgs) -> Result<ExitCode, CliError> {
     let [record, trace] = args.watch.outputs();
     protect(&inputs, &[("--output", args.output.as_deref()), record, trace])?;
     let recording = smooth(&read_with(&args.file, args.read.options())?);
-    let changes = criticality(&recording, None);
+    let changes = criticality(&recording, &Judgement::default());
     let all: Vec<LaneChange> = changes.iter().map(|change| change.lane_change.clone()).collect();
     let found = choose(args, &changes, |change| encounter(&recording, change, &all, CONTROL_STEP))?;
     let source = format!("{} (track {})", args.file.display(), found.change.track_id);

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use closecall_report::json::stamped;
 use closecall_report::traffic::statistics::{STATISTICS_CHARTS, StatisticsText, statistics_charts};
-use closecall_scenarios::criticality::{CriticalLaneChange, criticality, statistics as compute};
+use closecall_scenarios::criticality::{CriticalLaneChange, Judgement, criticality, statistics as compute};
 use closecall_scenarios::filters::smooth;
 use closecall_scenarios::trajectory_data::{TrajectoryData, read_with};
 
@@ -43,7 +43,9 @@ pub(super) fn statistics(args: &StatisticsArgs) -> Result<ExitCode, CliError> {
     let read = |path: &PathBuf| read_with(path, args.read.options());
     let data_sets = args.files.iter().map(read).collect::<Result<Vec<TrajectoryData>, _>>()?;
     refuse_duplicates(&args.files, &data_sets)?;
-    let changes = data_sets.iter().flat_map(|data| criticality(&smooth(data), args.speed_limit_mps));
+    let changes = data_sets.iter().flat_map(|data| {
+        criticality(&smooth(data), &Judgement { speed_limit_mps: args.speed_limit_mps, ttce_alone: false })
+    });
     let found = compute(&changes.collect::<Vec<CriticalLaneChange>>());
     if let (Some(folder), Some(paths)) = (&args.plot, &charts) {
         write_charts(folder, paths, &statistics_charts(&found)?)?;

@@ -6,17 +6,18 @@ use clap::{Args, ValueEnum};
 use closecall_report::json::{self, stamped};
 use closecall_report::traffic::lane_changes::{CriticalityText, LaneChangesText, ScoreText};
 use closecall_scenarios::atomic::WriteError;
-use closecall_scenarios::criticality::criticality as evaluate;
+use closecall_scenarios::criticality::{Counted, Judgement, criticality as evaluate};
 use closecall_scenarios::filters::smooth;
 use closecall_scenarios::fit::{Heading, fit as fit_distributions, to_toml, write_toml};
 use closecall_scenarios::lane_change::{
-    Criterion, LaneChange, LaneChangeDetector, LaneReliability, TrackSpans, read_references, score,
+    Criterion, DetectionBasis, LaneChange, LaneChangeDetector, LaneReliability, ReferenceChange, TrackSpans,
+    read_references, score,
 };
 use closecall_scenarios::trajectory_data::{Layout, TrajectoryData, open, read_with};
 
 use super::CliError;
 use super::args::{Format, ReadArgs, positive};
-use super::output::{out, outln};
+use super::output::{out, outln, print_error};
 use super::protect::{of_trajectories, protect, recording as trajectory_path};
 use super::watch::record_lane_change;
 use crate::exit_code::ExitCode;
@@ -43,6 +44,16 @@ impl CriterionChoice {
     }
 }
 
+/// The lanes by which lane changes are found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(super) enum LanesChoice {
+    /// The lanes that the file states for each vehicle
+    #[default]
+    Recorded,
+    /// None: a lateral shift by most of a lane is a lane change. For files whose lanes are missing or unreliable
+    None,
+}
+
 /// Arguments of `closecall lane-changes`.
 #[derive(Debug, Args)]
 pub(super) struct LaneChangesArgs {
@@ -55,6 +66,9 @@ pub(super) struct LaneChangesArgs {
     /// Criterion by which lane changes are found
     #[arg(long, value_enum, default_value_t)]
     criterion: CriterionChoice,
+    /// Lanes that the peak criterion uses
+    #[arg(long, value_enum, default_value_t)]
+    lanes: LanesChoice,
     /// Known lane changes of the trajectory file, to compute recall and precision: a CSV file with the columns
     /// recording_id, track_id, time_s, direction, clear
     #[arg(long, value_name = "FILE.csv")]
@@ -75,6 +89,12 @@ pub(super) struct CriticalityArgs {
     /// Speed limit in m/s [default: 120 km/h]
     #[arg(long, value_name = "M/S", value_parser = positive)]
     speed_limit_mps: Option<f64>,
+    /// Count all lane changes in the shares, also those cut off, smaller than 2.5 m, or parts of double ones
+    #[arg(long)]
+    all: bool,
+    /// Count a TTCE below 2.6 s as critical by itself, and not only as the condition under which DCE is evaluated
+    #[arg(long)]
+    ttce_alone: bool,
     /// Save a recording (Rerun file) of one lane change: the most critical one, or that of the track named by --track
     #[arg(long, value_name = "FILE.rrd", value_parser = trajectory_path)]
     record: Option<PathBuf>,
@@ -119,22 +139,33 @@ pub(super) fn lane_changes(args: &LaneChangesArgs) -> Result<ExitCode, CliError>
         );
         return Err(CliError::Usage { message });
     }
-    let detector = LaneChangeDetector::new(LaneReliability::Reliable, tracks.markings());
+    if args.criterion != CriterionChoice::Peak && args.lanes == LanesChoice::None {
+        let message = "`--lanes none` is for `--criterion peak`: the other criteria need lanes or markings".to_owned();
+        return Err(CliError::Usage { message });
+    }
+    let name = tracks.name().to_owned();
+    let references = references.map(|all| of_this_file(all, &name, args)).transpose()?;
+    let lanes = match args.lanes {
+        LanesChoice::Recorded => LaneReliability::Reliable,
+        LanesChoice::None => LaneReliability::Unreliable,
+    };
+    let detector = LaneChangeDetector::new(lanes, tracks.markings());
+    let mut basis = DetectionBasis::new(args.criterion.criterion(), lanes, tracks.markings());
     let (mut changes, mut spans, mut count) = (Vec::new(), TrackSpans::new(), 0_u64);
     // The tracks are read one by one, so that the memory does not grow with the file.
     while let Some(track) = tracks.next_track()? {
         count += 1;
+        basis.push(&track.trajectory, &track.markings);
         changes.extend(detector.detect(args.criterion.criterion(), &track.trajectory, &track.markings));
         if references.is_some() {
             spans.extend(track.trajectory.span().map(|span| (track.trajectory.track_id, span)));
         }
     }
     changes.sort_by(|a: &LaneChange, b| a.track_id.cmp(&b.track_id).then(a.crossing_s.total_cmp(&b.crossing_s)));
-    let name = tracks.name();
-    let scored = references.map(|references| {
-        let listed: Vec<_> = references.iter().filter(|listed| listed.recording_id == name).collect();
-        score(&changes, &listed, &spans)
-    });
+    let scored = references.map(|listed| score(&changes, &listed.iter().collect::<Vec<_>>(), &spans));
+    for warning in basis.warnings() {
+        print_error(format_args!("warning: {}: {warning}\n", args.file.display()));
+    }
     match (args.format, scored) {
         (Format::Json, None) => outln!("{:#}", stamped(serde_json::json!(changes), None, None)),
         (Format::Json, Some(scored)) => {
@@ -143,6 +174,7 @@ pub(super) fn lane_changes(args: &LaneChangesArgs) -> Result<ExitCode, CliError>
         (Format::Human, scored) => {
             let (rows, period, dropped) = (tracks.rows(), tracks.period(), tracks.dropped().count());
             outln!("{name}: {count} tracks, {rows} rows every {period}, {dropped} rows skipped");
+            outln!("{basis}");
             out!("{}", LaneChangesText(&changes));
             if let Some(scored) = scored {
                 out!("{}", ScoreText(&scored));
@@ -152,17 +184,39 @@ pub(super) fn lane_changes(args: &LaneChangesArgs) -> Result<ExitCode, CliError>
     Ok(ExitCode::Pass)
 }
 
+/// Returns the known lane changes of the trajectory data `name`, or an error if there are none: a score of nothing would
+/// look like a result.
+fn of_this_file(
+    all: Vec<ReferenceChange>,
+    name: &str,
+    args: &LaneChangesArgs,
+) -> Result<Vec<ReferenceChange>, CliError> {
+    let listed: Vec<_> = all.into_iter().filter(|listed| listed.recording_id == name).collect();
+    if listed.is_empty() {
+        let path = args.reference.as_deref().unwrap_or(&args.file).display();
+        let message =
+            format!("{path}: no row has the recording_id `{name}`, which is the name of {}", args.file.display());
+        return Err(CliError::Usage { message });
+    }
+    Ok(listed)
+}
+
 pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> {
     protect(&of_trajectories(std::slice::from_ref(&args.file)), &[("--record", args.record.as_deref())])?;
     let data = read_with(&args.file, args.read.options())?;
+    for ignored in data.markings.ignored() {
+        print_error(format_args!("warning: {}: {ignored}\n", args.file.display()));
+    }
     let smoothed = smooth(&data);
-    let changes = evaluate(&smoothed, args.speed_limit_mps);
+    let judgement = Judgement { speed_limit_mps: args.speed_limit_mps, ttce_alone: args.ttce_alone };
+    let changes = evaluate(&smoothed, &judgement);
+    let counted = if args.all { Counted::All } else { Counted::Complete };
     if let Some(path) = &args.record {
         record_lane_change(path, &smoothed, &changes, args.track)?;
     }
     match args.format {
         Format::Json => outln!("{:#}", stamped(serde_json::json!(changes), None, None)),
-        Format::Human => out!("{}", CriticalityText { data: &data, changes: &changes }),
+        Format::Human => out!("{}", CriticalityText { data: &data, changes: &changes, counted }),
     }
     Ok(ExitCode::Pass)
 }

@@ -19,6 +19,8 @@ pub fn quality(tracks: &Tracks<'_>, inspector: &QualityInspector) -> Value {
         "instants": quality.instants,
         "first_s": span.map(|(first, _)| first.s()),
         "last_s": span.map(|(_, last)| last.s()),
+        "lane_width_m": tracks.markings().typical_lane_width_m(),
+        "ignored_markings": tracks.markings().ignored(),
         "flaws": inspector.flaws(),
         "overlaps_unchecked_instants": inspector.unchecked_points(),
         "dropped": tracks.dropped(),

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use closecall_scenarios::criticality::{CriticalLaneChange, shares};
+use closecall_scenarios::criticality::{Counted, CriticalLaneChange, shares};
 use closecall_scenarios::lane_change::{LaneChange, Score};
 use closecall_scenarios::trajectory_data::{TrajectoryData, count_flaws};
 use closecall_traffic::Side;
@@ -53,11 +53,13 @@ pub struct CriticalityText<'a> {
     pub data: &'a TrajectoryData,
     /// Its lane changes.
     pub changes: &'a [CriticalLaneChange],
+    /// The lane changes to which the shares refer.
+    pub counted: Counted,
 }
 
 impl fmt::Display for CriticalityText<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { data, changes } = *self;
+        let Self { data, changes, counted } = *self;
         let quality = count_flaws(data);
         writeln!(
             f,
@@ -81,11 +83,20 @@ impl fmt::Display for CriticalityText<'_> {
                 }
             }
         }
-        let shares = shares(changes);
-        writeln!(f, "of {} lane changes, critical:", shares.lane_changes)?;
+        let shares = shares(changes, counted);
+        let kind = if counted == Counted::Complete { "complete lane changes" } else { "lane changes" };
+        let left_out = match shares.left_out {
+            0 => String::new(),
+            number => format!(" ({number} others are left out)"),
+        };
+        writeln!(f, "of {} {kind}{left_out}, critical:", shares.lane_changes)?;
         for share in &shares.metrics {
             let percent = share.share.map_or("-".to_owned(), |share| format!("{:.0} %", 100.0 * share));
-            writeln!(f, "  {:<12} {:>4}  {percent:>6}  ({} absent)", share.metric, share.critical, share.absent)?;
+            let interval = share
+                .interval_95
+                .map_or(String::new(), |[low, high]| format!("95 %: {:.0} to {:.0} %, ", 100.0 * low, 100.0 * high));
+            let (metric, critical, absent) = (share.metric, share.critical, share.absent);
+            writeln!(f, "  {metric:<12} {critical:>4}  {percent:>6}  ({interval}{absent} absent)")?;
         }
         writeln!(f, "  {:<12} {:>4}", "any", shares.any)?;
         Ok(())

@@ -36,6 +36,11 @@ impl fmt::Display for QualityText<'_> {
                 }
             }
         }
+        let markings = tracks.markings();
+        writeln!(f, "  lanes {:.2} m wide", markings.typical_lane_width_m())?;
+        for ignored in markings.ignored() {
+            writeln!(f, "  warning: {ignored}")?;
+        }
         if inspector.unchecked_points() > 0 {
             writeln!(
                 f,

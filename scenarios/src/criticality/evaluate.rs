@@ -14,35 +14,38 @@ use crate::lane_change::{LaneChange, detect};
 /// Speed below which a vehicle is assumed to point along the road, because its direction of movement is noise (m/s).
 const HEADING_FROM_MPS: f64 = 1.0;
 
+/// What counts as critical, beside the thresholds.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Judgement {
+    /// Speed limit (m/s); `None` if it is not known.
+    pub speed_limit_mps: Option<f64>,
+    /// True if a short TTCE is critical by itself. Otherwise TTCE only decides whether DCE is evaluated.
+    pub ttce_alone: bool,
+}
+
 /// Detects all lane changes of `data` and evaluates their metrics.
-///
-/// `speed_limit_mps` is `None` if the speed limit is not known.
-pub fn criticality(data: &SmoothedTrajectoryData, speed_limit_mps: Option<f64>) -> Vec<CriticalLaneChange> {
+pub fn criticality(data: &SmoothedTrajectoryData, judgement: &Judgement) -> Vec<CriticalLaneChange> {
     let evaluated = detect(data).into_iter().filter_map(|lane_change| {
-        let metrics = evaluate(data, &lane_change, speed_limit_mps)?;
+        let metrics = evaluate(data, &lane_change, judgement)?;
         Some(CriticalLaneChange { lane_change, metrics })
     });
     evaluated.collect()
 }
 
 /// Evaluates the metrics of one lane change. Returns `None` if `data` does not have its track.
-///
-/// `speed_limit_mps` is `None` if the speed limit is not known.
-pub fn evaluate(
-    data: &SmoothedTrajectoryData,
-    lane_change: &LaneChange,
-    speed_limit_mps: Option<f64>,
-) -> Option<Metrics> {
+pub fn evaluate(data: &SmoothedTrajectoryData, lane_change: &LaneChange, judgement: &Judgement) -> Option<Metrics> {
     let own_index = data.track_index(lane_change.track_id)?;
     let own = &data.tracks[own_index].trajectory;
-    let (start, end) = (Time::from_s(lane_change.start_s), Time::from_s(lane_change.end_s));
+    // The estimated manoeuvre may end before the crossing, or begin after it: the crossing belongs to the window.
+    let LaneChange { start_s, crossing_s, end_s, .. } = *lane_change;
+    let (start, end) = (Time::from_s(start_s.min(crossing_s)), Time::from_s(end_s.max(crossing_s)));
     let mut extremes = Extremes::default();
     for point in own.points.iter().filter(|point| point.time >= start && point.time <= end) {
         let others = data.present_at(point.time).iter().filter(|presence| presence.track_index != own_index);
         let others: Vec<VehicleState<'_>> = others.map(|&presence| VehicleState::new(data.look_up(presence))).collect();
         extremes.observe(&VehicleState::new((own, point)), &others, Lane(lane_change.to_lane));
     }
-    Some(extremes.metrics(speed_limit_mps.unwrap_or(DEFAULT_SPEED_LIMIT_MPS)))
+    Some(extremes.metrics(judgement))
 }
 
 /// The state of one vehicle at one instant.
@@ -157,7 +160,8 @@ impl Extremes {
         }
     }
 
-    fn metrics(&self, speed_limit_mps: f64) -> Metrics {
+    fn metrics(&self, judgement: &Judgement) -> Metrics {
+        let speed_limit_mps = judgement.speed_limit_mps.unwrap_or(DEFAULT_SPEED_LIMIT_MPS);
         let no_lead = if self.was_standing_behind_lead { Absent::Standstill } else { Absent::NoLead };
         let no_ttce = match (self.has_opponent, self.has_encounter_beyond_horizon) {
             (false, _) => Absent::NoOpponent,
@@ -173,7 +177,7 @@ impl Extremes {
             a_lat_mps2: metric_record(self.a_lat, Absent::NotRecorded, |value| value > CRITICAL_A_LAT_MPS2),
             thw_s: metric_record(self.thw, no_lead, |value| value < CRITICAL_THW_S),
             dce_m: metric_record(self.dce, no_dce, |value| value < CRITICAL_DCE_M),
-            ttce_s: metric_record(self.ttce, no_ttce, |value| value < CRITICAL_TTCE_S),
+            ttce_s: metric_record(self.ttce, no_ttce, |value| judgement.ttce_alone && value < CRITICAL_TTCE_S),
         }
     }
 }
@@ -181,7 +185,7 @@ impl Extremes {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::criticality::shares;
+    use crate::criticality::{Counted, shares};
     use crate::filters::smooth;
     use crate::trajectory_data::test_support::{changing_track, straight_track, trajectory_data_of};
 
@@ -189,7 +193,7 @@ mod tests {
     fn evaluated(others: Vec<Trajectory>) -> CriticalLaneChange {
         let mut tracks = vec![changing_track(1, (0.0, 30.0), (-5.25, -1.75), (3.0, 5.0), 110)];
         tracks.extend(others);
-        let mut found = criticality(&smooth(&trajectory_data_of(tracks)), None);
+        let mut found = criticality(&smooth(&trajectory_data_of(tracks)), &Judgement::default());
         assert_eq!(found.len(), 1);
         found.remove(0)
     }
@@ -239,7 +243,7 @@ mod tests {
     fn a_fast_vehicle_that_approaches_in_the_target_lane_is_an_encounter() {
         let metrics = evaluated(vec![straight_track(2, -70.0, 38.0, -1.75, 110)]).metrics;
         let ttce_s = metrics.ttce_s.value().unwrap();
-        assert!(metrics.ttce_s.is_critical() && ttce_s < 2.6, "{ttce_s}");
+        assert!(ttce_s < 2.6 && !metrics.ttce_s.is_critical(), "TTCE is the gate of DCE: {ttce_s}");
         assert!(metrics.dce_m.is_critical());
         assert_eq!(absent(metrics.thw_s), Some(Absent::NoLead));
     }
@@ -255,17 +259,57 @@ mod tests {
     fn the_speed_limit_decides_whether_a_speed_is_critical() {
         let track = changing_track(1, (0.0, 45.0), (-5.25, -1.75), (3.0, 5.0), 110);
         let data = smooth(&trajectory_data_of(vec![track]));
-        let by_limit = |limit| criticality(&data, limit)[0].metrics.speed_mps.is_critical();
+        let by_limit = |speed_limit_mps| {
+            let judgement = Judgement { speed_limit_mps, ..Judgement::default() };
+            criticality(&data, &judgement)[0].metrics.speed_mps.is_critical()
+        };
         assert!(by_limit(None) && !by_limit(Some(36.1)));
     }
 
     #[test]
-    fn shares_refer_to_all_lane_changes() {
+    fn a_short_ttce_is_critical_by_itself_only_if_asked_for() {
+        let tracks = vec![
+            changing_track(1, (0.0, 30.0), (-5.25, -1.75), (3.0, 5.0), 110),
+            straight_track(2, -70.0, 38.0, -1.75, 110),
+        ];
+        let data = smooth(&trajectory_data_of(tracks));
+        for ttce_alone in [false, true] {
+            let judgement = Judgement { ttce_alone, ..Judgement::default() };
+            assert_eq!(criticality(&data, &judgement)[0].metrics.ttce_s.is_critical(), ttce_alone);
+        }
+    }
+
+    #[test]
+    fn the_window_contains_the_crossing() {
+        // A vehicle ahead in the target lane brakes hard, so that the headway falls with time.
+        let mut lead = straight_track(2, 60.0, 30.0, -1.75, 110);
+        for (k, point) in lead.points.iter_mut().enumerate() {
+            point.s_m -= 0.02 * (k * k) as f64;
+        }
+        let own = changing_track(1, (0.0, 30.0), (-5.25, -1.75), (3.0, 5.0), 110);
+        let data = smooth(&trajectory_data_of(vec![own, lead]));
+        let whole = detect(&data).remove(0);
+        let thw_s =
+            |change: &LaneChange| evaluate(&data, change, &Judgement::default()).unwrap().thw_s.value().unwrap();
+        // The estimated end of a manoeuvre can lie before its crossing.
+        let early = LaneChange { end_s: whole.crossing_s - 1.0, ..whole.clone() };
+        let until_crossing = LaneChange { end_s: whole.crossing_s, ..whole.clone() };
+        assert_eq!(thw_s(&early), thw_s(&until_crossing));
+        assert!(thw_s(&early) > thw_s(&whole));
+    }
+
+    #[test]
+    fn shares_refer_to_complete_lane_changes_unless_all_are_asked_for() {
         let close = evaluated(vec![straight_track(2, 24.0, 30.0, -5.25, 110)]);
-        let counted = shares(&[close, evaluated(Vec::new())]);
-        let thw = counted.metrics.iter().find(|share| share.metric == "thw_s").unwrap();
-        assert_eq!((thw.critical, thw.absent, thw.share), (1, 1, Some(0.5)));
-        assert_eq!((counted.lane_changes, counted.any), (2, 1));
-        assert_eq!(shares(&[]).metrics[0].share, None);
+        let mut cut_off = close.clone();
+        cut_off.lane_change.complete = false;
+        let changes = [close, evaluated(Vec::new()), cut_off];
+        for (counted, critical, of) in [(Counted::Complete, 1, 2), (Counted::All, 2, 3)] {
+            let found = shares(&changes, counted);
+            let thw = found.metrics.iter().find(|share| share.metric == "thw_s").unwrap();
+            assert_eq!((thw.critical, thw.absent, thw.share), (critical, 1, Some(critical as f64 / of as f64)));
+            assert_eq!((found.lane_changes, found.left_out, found.any), (of, 3 - of, critical));
+        }
+        assert_eq!(shares(&[], Counted::All).metrics[0].share, None);
     }
 }

@@ -8,12 +8,12 @@
 //! | `a_lat_mps2` | magnitude of its acceleration across the road           | > 8 m/s²            |
 //! | `thw_s`      | its time headway (THW)                                  | < 0.9 s             |
 //! | `dce_m`      | distance at closest encounter (DCE), if TTCE < 2.6 s    | < 1.0 m             |
-//! | `ttce_s`     | time to closest encounter (TTCE)                        | < 2.6 s             |
+//! | `ttce_s`     | time to closest encounter (TTCE)                        | only if asked for: < 2.6 s |
 //!
 //! # Definitions
 //!
-//! - **Window**: all recorded instants of the common clock from the start to the end of the lane change. The most
-//!   critical of all values in the window, against all opponents, is kept.
+//! - **Window**: all recorded instants of the common clock from the start to the end of the lane change, and the
+//!   crossing if it lies outside. The most critical of all values in the window, against all opponents, is kept.
 //! - **Opponents**: for distance, TTCE and DCE, all other vehicles present at that instant. For THW, the vehicle ahead
 //!   in the lane of the own centre and the vehicle ahead in the target lane, because the lane change has begun within
 //!   the window; the smaller headway of the two counts. A vehicle is ahead if its centre is ahead of the own centre and
@@ -22,7 +22,9 @@
 //!   DCE cover it.
 //! - **TTCE and DCE** apply to two oriented boxes at constant velocity, in continuous time. They are absent if the
 //!   vehicles do not approach each other or if the encounter is more than 10 s ahead. DCE is evaluated only if
-//!   TTCE < 2.6 s.
+//!   TTCE < 2.6 s. A short TTCE is not critical by itself, unless [`Judgement::ttce_alone`] asks for it: vehicles that
+//!   pass each other at a safe distance have one, too.
+//! - **Shares** refer to the complete lane changes, unless [`Counted::All`] asks for all.
 //! - **Magnitudes**: published acceleration thresholds are signed, −8 m/s² for braking; here the magnitude counts.
 //! - **Speed limit**: 120 km/h if it is not known.
 //! - **Geometry**: the road frame is treated as a plane. Over the 50 m that matter, the bend of a motorway of 1 km
@@ -39,10 +41,10 @@ mod shares;
 mod statistics;
 mod thresholds;
 
-pub use evaluate::{criticality, evaluate};
+pub use evaluate::{Judgement, criticality, evaluate};
 pub use record::{CriticalLaneChange, MetricResult, Metrics};
 pub use severity::by_severity;
-pub use shares::{CriticalShare, CriticalShares, shares};
+pub use shares::{Counted, CriticalShare, CriticalShares, shares};
 pub use statistics::{BoxPlot, ClassStatistics, Correlation, Statistics, statistics};
 pub use thresholds::{
     CRITICAL_A_LAT_MPS2, CRITICAL_A_LON_MPS2, CRITICAL_DCE_M, CRITICAL_DISTANCE_M, CRITICAL_SPEED_FACTOR,

@@ -1,8 +1,19 @@
 //! Share of critical lane changes, for each metric.
 
+use closecall_statistics::interval::{COVERAGE, clopper_pearson};
 use serde::Serialize;
 
 use super::CriticalLaneChange;
+
+/// The lane changes that are counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Counted {
+    /// Those that were recorded as a whole, shift the vehicle by at least 2.5 m, and are not part of a double one.
+    #[default]
+    Complete,
+    /// All.
+    All,
+}
 
 /// How often one metric is critical over many lane changes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -13,15 +24,19 @@ pub struct CriticalShare {
     pub critical: usize,
     /// Number of lane changes for which the metric has no value.
     pub absent: usize,
-    /// Critical lane changes as a share of all lane changes (-); `None` if there are no lane changes.
+    /// Critical lane changes as a share of the counted ones (-); `None` if there are none.
     pub share: Option<f64>,
+    /// Exact 95 % interval of the share (Clopper-Pearson) (-).
+    pub interval_95: Option<[f64; 2]>,
 }
 
 /// How often each metric is critical over many lane changes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CriticalShares {
-    /// Number of lane changes.
+    /// Number of lane changes that are counted.
     pub lane_changes: usize,
+    /// Number of lane changes that are left out.
+    pub left_out: usize,
     /// One entry for each metric, in the order of `Metrics::named`.
     pub metrics: Vec<CriticalShare>,
     /// Number of lane changes that are critical by at least one metric.
@@ -29,17 +44,20 @@ pub struct CriticalShares {
 }
 
 /// Counts the critical lane changes by each metric.
-pub fn shares(changes: &[CriticalLaneChange]) -> CriticalShares {
-    let named: Vec<_> = changes.iter().map(|change| change.metrics.named()).collect();
+pub fn shares(changes: &[CriticalLaneChange], counted: Counted) -> CriticalShares {
+    let is_counted = |change: &&CriticalLaneChange| counted == Counted::All || change.lane_change.complete;
+    let named: Vec<_> = changes.iter().filter(is_counted).map(|change| change.metrics.named()).collect();
     let names = ["distance_m", "speed_mps", "a_lon_mps2", "a_lat_mps2", "thw_s", "dce_m", "ttce_s"];
     let metrics = names.into_iter().enumerate().map(|(index, metric)| {
         let critical = named.iter().filter(|metrics| metrics[index].1.is_critical()).count();
         let absent = named.iter().filter(|metrics| metrics[index].1.value().is_none()).count();
         let share = (!named.is_empty()).then(|| critical as f64 / named.len() as f64);
-        CriticalShare { metric, critical, absent, share }
+        let interval_95 = share.map(|_| clopper_pearson(critical as u64, named.len() as u64, COVERAGE));
+        CriticalShare { metric, critical, absent, share, interval_95 }
     });
     CriticalShares {
-        lane_changes: changes.len(),
+        lane_changes: named.len(),
+        left_out: changes.len() - named.len(),
         metrics: metrics.collect(),
         any: named.iter().filter(|metrics| metrics.iter().any(|(_, record)| record.is_critical())).count(),
     }

@@ -177,7 +177,7 @@ fn ranks(values: &[f64]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::criticality::criticality;
+    use crate::criticality::{Judgement, criticality};
     use crate::filters::smooth;
     use crate::trajectory_data::test_support::{changing_track, trajectory_data_of};
 
@@ -208,7 +208,7 @@ mod tests {
             let duration_s = 3.0 + 0.5 * k as f64;
             changing_track(k + 1, (0.0, 40.0 - 2.0 * k as f64), (-5.25, -1.75), (3.0, duration_s), 160)
         };
-        let changes = criticality(&smooth(&trajectory_data_of((0..8).map(track).collect())), None);
+        let changes = criticality(&smooth(&trajectory_data_of((0..8).map(track).collect())), &Judgement::default());
         let found = statistics(&changes);
         let [cars] = &found.classes[..] else { panic!("one class") };
         assert_eq!((cars.lane_changes, cars.to_the_left, cars.complete, cars.double), (8, 8, 8, 0));

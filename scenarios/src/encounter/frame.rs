@@ -8,8 +8,6 @@ use super::NoEncounter;
 use crate::filters::{SmoothedTrajectoryData, resample};
 use crate::lane_change::LaneChange;
 
-/// Smallest and largest lane width of a road (m).
-const LANE_WIDTHS_M: [f64; 2] = [2.5, 5.0];
 /// Largest number of lanes of a road.
 const MAX_LANES: u8 = 8;
 
@@ -56,7 +54,7 @@ impl RoadSection {
         if lanes > MAX_LANES {
             return Err(NoEncounter::TooManyLanes { track_id: change.track_id, lanes, most: MAX_LANES });
         }
-        let lane_width_m = data.markings.typical_lane_width_m().clamp(LANE_WIDTHS_M[0], LANE_WIDTHS_M[1]);
+        let lane_width_m = data.markings.typical_lane_width_m();
         let crossed_m = data.markings.right_edge_m(Lane(left));
         let crossed_m = crossed_m.or_else(|| own.at(Time::from_s(change.crossing_s)).map(|point| point.d_m));
         let left_edge_m = crossed_m.unwrap_or(0.0) + f64::from(left - first + 1) * lane_width_m;

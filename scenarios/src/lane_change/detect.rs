@@ -167,7 +167,7 @@ fn manoeuvre_of<'m>(sampled: &Sampled<'_>, crossing: &Crossing, manoeuvres: &'m 
 fn by_shift(track: &Trajectory, lane_width_m: f64) -> Vec<LaneChange> {
     let Some(sampled) = Sampled::new(track) else { return Vec::new() };
     let mut found: Vec<LaneChange> = Vec::new();
-    for manoeuvre in manoeuvres(track, lane_width_m) {
+    for manoeuvre in sweeps(manoeuvres(track, lane_width_m)) {
         let span = [manoeuvre.start, manoeuvre.end];
         let shift_m = sampled.shift_m(manoeuvre.direction, span);
         if !(shift_m >= MIN_SHIFT_M) {
@@ -188,6 +188,27 @@ fn by_shift(track: &Trajectory, lane_width_m: f64) -> Vec<LaneChange> {
     }
     found.sort_by(|a, b| a.crossing_s.total_cmp(&b.crossing_s));
     found
+}
+
+/// Joins the manoeuvres in one direction that overlap in time: a slow lane change with a pause has several peaks.
+fn sweeps(mut manoeuvres: Vec<Manoeuvre>) -> Vec<Manoeuvre> {
+    manoeuvres.sort_by(|a, b| {
+        (a.direction == Side::Right).cmp(&(b.direction == Side::Right)).then(a.start.total_cmp(&b.start))
+    });
+    let mut joined: Vec<Manoeuvre> = Vec::with_capacity(manoeuvres.len());
+    for next in manoeuvres {
+        match joined.last_mut() {
+            Some(sweep) if sweep.direction == next.direction && next.start < sweep.end => {
+                // The slow ends of the first and the last peak stay as they are.
+                let ends = 0.5 * ((sweep.end - sweep.start - sweep.width) + (next.end - next.start - next.width));
+                sweep.end = sweep.end.max(next.end);
+                sweep.width = sweep.end - sweep.start - ends;
+                sweep.peak_mps = sweep.peak_mps.max(next.peak_mps);
+            }
+            _ => joined.push(next),
+        }
+    }
+    joined
 }
 
 /// Returns the adjacent lane in `direction`. Lane 1 has none to its left; the result is then lane 1 itself.
@@ -289,6 +310,22 @@ mod tests {
         let found = found(changing_track(1, (0.0, 30.0), (-8.75, -1.75), (4.0, 9.0), 180));
         assert_eq!(found.iter().map(|change| (change.from_lane, change.to_lane)).collect::<Vec<_>>(), [(3, 2), (2, 1)]);
         assert!(found.iter().all(|change| !change.complete && change.double));
+    }
+
+    #[test]
+    fn a_slow_lane_change_with_a_pause_is_one_without_lanes() {
+        // Two moves by half a lane, the second of which begins before the first has ended.
+        let mut track = changing_track(1, (0.0, 30.0), (-5.25, -3.5), (3.0, 5.0), 200);
+        let second = changing_track(1, (0.0, 30.0), (0.0, 1.75), (6.5, 5.0), 200);
+        for (point, second) in track.points.iter_mut().zip(&second.points) {
+            point.d_m += second.d_m;
+            point.lane = Lane(1);
+        }
+        let detector = LaneChangeDetector::new(LaneReliability::Unreliable, &Default::default());
+        let found = detector.detect(Criterion::Peak, &track, &[]);
+        let [change] = &found[..] else { panic!("{}", found.len()) };
+        assert!((change.lateral_shift_m - 3.5).abs() < 0.1 && (change.crossing_s - 7.25).abs() < 0.5, "{change:?}");
+        assert!(change.start_s < 3.6 && change.end_s > 10.9, "{change:?}");
     }
 
     /// Detects two lane changes from lane 3 to lane 1, of which the second begins `pause_s` after the first has begun.

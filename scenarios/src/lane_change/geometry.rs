@@ -2,13 +2,10 @@
 
 use closecall_traffic::Lane;
 
-use crate::trajectory_data::LaneMarkings;
+use crate::trajectory_data::{LANE_WIDTHS_M, LaneMarkings};
 
 /// Number of lanes in a grid: more than any carriageway has.
 const LANES: u8 = 16;
-
-/// Least width of a lane (m): a narrower one results from markings that were mistaken for each other.
-const NARROWEST_LANE_M: f64 = 2.0;
 
 /// A lane with its lateral position and width.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,13 +29,17 @@ impl LaneGrid {
     /// Creates the grid from the known markings.
     pub(crate) fn new(markings: &LaneMarkings) -> Self {
         let typical_m = markings.typical_lane_width_m();
+        let mut right_edges_m = Vec::with_capacity(usize::from(LANES));
         let mut left_m = 0.0;
-        let right_edges_m = (1..=LANES).map(|lane| {
-            let known = markings.right_edge_m(Lane(lane)).filter(|edge_m| left_m - edge_m >= NARROWEST_LANE_M);
-            left_m = known.unwrap_or(left_m - typical_m);
-            left_m
-        });
-        Self { right_edges_m: right_edges_m.collect() }
+        while let Some(lane) = u8::try_from(right_edges_m.len() + 1).ok().filter(|lane| *lane <= LANES) {
+            // The lanes up to the next known marking share their width.
+            let known = (lane..=LANES).find_map(|right| Some((right, markings.right_edge_m(Lane(right))?)));
+            let shared = known.map(|(right, edge_m)| (left_m - edge_m) / f64::from(right - lane + 1));
+            let width_m = shared.filter(|width_m| LANE_WIDTHS_M.contains(width_m)).unwrap_or(typical_m);
+            left_m -= width_m;
+            right_edges_m.push(left_m);
+        }
+        Self { right_edges_m }
     }
 
     /// Returns the lane at the lateral position `d_m`, or `None` if there is none.
@@ -55,6 +56,16 @@ impl LaneGrid {
 mod tests {
     use super::*;
     use crate::trajectory_data::DEFAULT_LANE_WIDTH_M;
+
+    #[test]
+    fn lanes_between_known_markings_share_their_width() {
+        let grid = LaneGrid::new(&LaneMarkings::from_right_edges([(Lane(2), -6.8), (Lane(5), -17.3)]));
+        let widths = [-3.0, -5.0, -8.0, -15.0].map(|d_m| grid.at(d_m).unwrap().width_m);
+        assert!(
+            widths.iter().zip([3.4, 3.4, 3.5, 3.5]).all(|(found, width_m)| (found - width_m).abs() < 1e-9),
+            "{widths:?}"
+        );
+    }
 
     #[test]
     fn unknown_markings_are_filled_in() {

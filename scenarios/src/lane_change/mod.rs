@@ -46,7 +46,8 @@
 //!   the highest one. The crossing may also lie up to 1 s before or after a peak, because vehicles pause on a marking.
 //! - If the lane is unreliable (in-car logs have none, and the robustness study displaces vehicles), a manoeuvre is a
 //!   lane change if it shifts the vehicle by at least 2.5 m, which no vehicle does within its lane. The crossing is
-//!   then at half of the shift.
+//!   then at half of the shift. Peaks in one direction whose manoeuvres overlap are one sweep: a slow lane change with a
+//!   pause has two peaks, and remains one.
 //!
 //! # Distance
 //!
@@ -72,6 +73,7 @@
 //! - *double*: another lane change of the same vehicle in the same direction begins before this one ends, or one peak
 //!   carries the vehicle over two markings. Both lane changes are listed.
 
+mod basis;
 mod change;
 mod crossings;
 mod detect;
@@ -83,6 +85,7 @@ mod manoeuvre;
 mod peaks;
 mod score;
 
+pub use basis::DetectionBasis;
 pub use change::LaneChange;
 pub use detect::{Criterion, LaneChangeDetector, LaneReliability, detect};
 pub use manoeuvre::{MIN_PROMINENCE_MPS, MIN_SHIFT_M, quintic_width_share};

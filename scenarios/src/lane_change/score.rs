@@ -105,9 +105,9 @@ impl fmt::Display for HitRate {
 /// The score of a detector.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Score {
-    /// HitRate of the listed lane changes that must be detected and are.
+    /// Share of the listed lane changes that must be detected and are.
     pub recall: HitRate,
-    /// HitRate of the detected lane changes that are listed.
+    /// Share of the detected lane changes that are listed.
     pub precision: HitRate,
     /// Largest difference of the crossing times of a match (s).
     pub max_time_error_s: f64,

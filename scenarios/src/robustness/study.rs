@@ -7,7 +7,7 @@ use super::disturb::{Disturbance, Repetition};
 use crate::lane_change::{Criterion, LaneChange, LaneChangeDetector, LaneReliability};
 use crate::trajectory_data::{LaneMarkings, MarkingDistances};
 
-/// HitRate of missed or of invented lane changes above which a criterion fails (-), relative to the number that it
+/// Share of missed or of invented lane changes above which a criterion fails (-), relative to the number that it
 /// detects undisturbed.
 pub const FAILING_SHARE: f64 = 0.05;
 
@@ -55,7 +55,7 @@ pub enum ReferenceKind {
 pub struct Study {
     tracks: Vec<Measured>,
     criteria: Vec<Criterion>,
-    /// LaneChangeDetector that does not rely on the recorded lanes.
+    /// Detector that does not rely on the recorded lanes.
     detector: LaneChangeDetector,
     /// Reference lane changes of each track.
     reference: Vec<Vec<LaneChange>>,

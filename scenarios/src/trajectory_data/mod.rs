@@ -78,7 +78,7 @@ mod xml;
 pub use builder::PIECE_STRIDE;
 pub use data::{Layout, MarkingDistances, RecordedTrack, TrajectoryData};
 pub use error::{TrajectoryFileError, TrajectoryFileProblem, WriteError};
-pub use markings::{DEFAULT_LANE_WIDTH_M, LaneMarkings};
+pub use markings::{DEFAULT_LANE_WIDTH_M, IgnoredMarking, LANE_WIDTHS_M, LaneMarkings};
 pub use open::{input_files, open, open_from, read, read_from, read_with};
 pub use order::WINDOW_ROWS;
 pub use quality::{Flaw, FlawCounts, FlawLocation, Flaws, QualityInspector, count_flaws};

@@ -1,6 +1,6 @@
 //! Synthetic trajectory data, written to a file, read back, and passed through the whole chain.
 
-use closecall_scenarios::criticality::criticality;
+use closecall_scenarios::criticality::{Judgement, criticality};
 use closecall_scenarios::filters::smooth;
 use closecall_scenarios::fit::{Heading, Quantity, fit, to_toml};
 use closecall_scenarios::lane_change::detect;
@@ -55,7 +55,7 @@ fn detected_durations_are_within_five_percent_of_the_truth() {
 #[test]
 fn the_whole_chain_runs() {
     let data = written_and_read(&synthetic(Time::from_ms(100), &forty()));
-    let critical = criticality(&smooth(&data), None);
+    let critical = criticality(&smooth(&data), &Judgement::default());
     assert_eq!(critical.len(), 40);
     let json = serde_json::to_value(&critical[0]).unwrap();
     for key in ["track_id", "vehicle_class", "direction", "start_s", "crossing_s", "end_s", "duration_s", "speed_mps"] {
