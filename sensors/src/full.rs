@@ -104,8 +104,8 @@ impl FullPerception {
 
     /// Scans the scene and appends its detections to the queue of pending scans.
     fn detect(&mut self, scene: &Scene<'_>) -> Result<(), SensorError> {
-        let is_empty = self.lidar.scan(scene, &mut self.rng).is_empty();
-        self.empty_scans = if is_empty { self.empty_scans.saturating_add(1) } else { 0 };
+        self.lidar.scan(scene, &mut self.rng);
+        self.empty_scans = if self.lidar.is_dark() { self.empty_scans.saturating_add(1) } else { 0 };
         self.health = self.judge_health(scene);
         let found = self.lidar.detect()?;
         // Reuses the memory of a scan that the tracker has processed.

@@ -79,14 +79,6 @@ pub enum SensorError {
         /// The scene's time.
         time: Time,
     },
-    /// The density clustering rejected its input.
-    #[error("failed to cluster {points} points: {reason}")]
-    Clustering {
-        /// Number of points.
-        points: usize,
-        /// The message of the clustering library.
-        reason: String,
-    },
     /// The classifier could not be loaded or run.
     #[error("failed to classify: {reason}")]
     Classifier {

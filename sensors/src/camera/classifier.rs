@@ -18,6 +18,7 @@ use ort::session::builder::GraphOptimizationLevel;
 use ort::value::TensorRef;
 
 use super::image::{CHANNELS, CROP_PX, Crop};
+use super::vector_registers::clear_upper_parts;
 
 /// The ONNX file of the network that ships with Closecall.
 pub const SHIPPED_MODEL: &[u8] = include_bytes!("../../models/rear-classifier.onnx");
@@ -128,7 +129,9 @@ impl Classifier {
         let run = |error: ort::Error| ClassifierError::Run { reason: error.to_string() };
         let shape = [1, CHANNELS, CROP_PX, CROP_PX];
         let input = TensorRef::from_array_view((shape, self.planes.as_slice())).map_err(run)?;
-        let outputs = self.session.run(ort::inputs![input]).map_err(run)?;
+        let outputs = self.session.run(ort::inputs![input]);
+        clear_upper_parts();
+        let outputs = outputs.map_err(run)?;
         let (_, output) = outputs[0].try_extract_tensor::<f32>().map_err(run)?;
         scores_from(output)
     }

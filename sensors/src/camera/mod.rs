@@ -28,6 +28,7 @@ mod rear_camera;
 mod shapes;
 mod sky;
 mod spray;
+mod vector_registers;
 mod window;
 
 pub use classifier::{Backend, Classifier, ClassifierError, SHIPPED_MODEL};

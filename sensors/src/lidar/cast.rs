@@ -35,11 +35,13 @@ pub(crate) struct ColumnHits {
     pub(crate) tested: u16,
     /// Number of layers, counted from the lowest, that may receive a return from the road.
     pub(crate) ground_below: usize,
+    /// Bit mask of those layers whose returns from the bare road are left out.
+    pub(crate) bare: u16,
 }
 
 impl Default for ColumnHits {
     fn default() -> Self {
-        Self { beams: [BeamHits::NONE; LAYERS], tested: 0, ground_below: 0 }
+        Self { beams: [BeamHits::NONE; LAYERS], tested: 0, ground_below: 0, bare: 0 }
     }
 }
 
@@ -53,11 +55,22 @@ impl ColumnHits {
         }
         self.tested = 0;
         self.ground_below = 0;
+        self.bare = 0;
     }
 
     /// Returns true if this layer was tested against at least one solid.
     pub(crate) fn is_tested(&self, layer: usize) -> bool {
         self.tested >> layer & 1 == 1
+    }
+
+    /// Returns true if no layer needs echoes.
+    pub(crate) fn is_bare(&self) -> bool {
+        self.tested == 0 && self.bare.count_ones() as usize == self.ground_below
+    }
+
+    /// Returns true if a layer may receive a return from a solid or from the road that must not be left out.
+    pub(crate) fn needs_echoes(&self, layer: usize) -> bool {
+        self.is_tested(layer) || (layer < self.ground_below && self.bare >> layer & 1 == 0)
     }
 
     /// Intersects the beams of a column with a solid.

@@ -1,4 +1,4 @@
-//! Density-based clustering by DBSCAN (`linfa-clustering`) in a stretched plane.
+//! Density-based clustering by DBSCAN in a stretched plane.
 //!
 //! Points of one vehicle lie millimetres apart at 3 m and metres apart at 100 m, where one layer on the bumper and the
 //! next on the windscreen differ by 2 m in depth. No single radius suits both distances. The points are therefore
@@ -19,11 +19,9 @@
 
 mod dbscan;
 
-use dbscan::dbscan;
-use ndarray::Array2;
+use dbscan::Dbscan;
 
 use super::ground::Candidate;
-use crate::SensorError;
 
 /// Radius along the road at the sensor (m).
 const ALONG_M: f32 = 0.8;
@@ -60,8 +58,9 @@ pub(crate) struct Clustering {
     cell_of: Vec<u32>,
     /// Row of each candidate in `rows`. A candidate that was left out has the row of another one in the same cell.
     row_of: Vec<u32>,
-    /// Stretched coordinates of the candidates that were kept: the rows of the matrix for linfa.
-    rows: Vec<f64>,
+    /// Stretched coordinates of the candidates that were kept.
+    rows: Vec<[f64; 2]>,
+    dbscan: Dbscan,
 }
 
 impl Default for Clustering {
@@ -73,34 +72,19 @@ impl Default for Clustering {
             cell_of: Vec::new(),
             row_of: Vec::new(),
             rows: Vec::new(),
+            dbscan: Dbscan::default(),
         }
     }
 }
 
 impl Clustering {
     /// Assigns the candidates to clusters.
-    ///
-    /// # Errors
-    /// Returns [`SensorError::Clustering`] if linfa rejects its input.
-    pub(crate) fn run(&mut self, candidates: &[Candidate]) -> Result<(), SensorError> {
+    pub(crate) fn run(&mut self, candidates: &[Candidate]) {
         self.thin(candidates);
+        self.count = self.dbscan.run(&self.rows, RADIUS, CORE_POINTS) as usize;
+        let found = &self.dbscan.labels;
         self.labels.clear();
-        self.count = 0;
-        if self.rows.is_empty() {
-            self.labels.resize(candidates.len(), NOISE);
-            return Ok(());
-        }
-        let refused = |reason: String| SensorError::Clustering { points: candidates.len(), reason };
-        let shape = (self.rows.len() / 2, 2);
-        let rows = Array2::from_shape_vec(shape, std::mem::take(&mut self.rows));
-        let rows = rows.map_err(|error| refused(error.to_string()))?;
-        let labels = dbscan(&rows, RADIUS, CORE_POINTS).map_err(refused)?;
-        self.count = labels.iter().flatten().max().map_or(0, |max| max + 1);
-        #[expect(clippy::cast_possible_truncation, reason = "fewer clusters than points")]
-        let label = |row: &u32| labels[*row as usize].map_or(NOISE, |label| label as u32);
-        self.labels.extend(self.row_of.iter().map(label));
-        self.rows = rows.into_raw_vec_and_offset().0;
-        Ok(())
+        self.labels.extend(self.row_of.iter().map(|&row| found[row as usize].unwrap_or(NOISE)));
     }
 
     /// Merges each cluster into its parent, which is another cluster or itself. Chains of parents are followed to their
@@ -142,9 +126,9 @@ impl Clustering {
             if usize::from(*count) < CORE_POINTS {
                 *count += 1;
                 #[expect(clippy::cast_possible_truncation, reason = "a scan has at most 20,000 points")]
-                let next = (self.rows.len() / 2) as u32;
+                let next = self.rows.len() as u32;
                 *row = next;
-                self.rows.extend([f64::from(along), f64::from(across)]);
+                self.rows.push([f64::from(along), f64::from(across)]);
             }
             self.row_of.push(*row);
         }
@@ -180,7 +164,7 @@ mod tests {
 
     fn labels(points: &[(f32, f32)]) -> Vec<u32> {
         let mut clustering = Clustering::default();
-        clustering.run(&candidates(points)).unwrap();
+        clustering.run(&candidates(points));
         clustering.labels
     }
 
@@ -199,7 +183,7 @@ mod tests {
                 }
             }
             let mut clustering = Clustering::default();
-            clustering.run(&candidates(&points)).unwrap();
+            clustering.run(&candidates(&points));
             assert_eq!(clustering.count, 3, "at {back} m");
             assert!(!clustering.labels.contains(&NOISE));
         }
@@ -225,14 +209,17 @@ mod tests {
             // Several copies of each point make the cells crowded.
             let points: Vec<_> = points.iter().flat_map(|&point| vec![point; copies]).collect();
             let stretched = |at: &Candidate| to_stretched_plane(at).map(f64::from);
-            let rows: Vec<f64> = candidates(&points).iter().flat_map(stretched).collect();
-            let rows = Array2::from_shape_vec((points.len(), 2), rows).unwrap();
+            let rows: Vec<[f64; 2]> = candidates(&points).iter().map(stretched).collect();
             let thinned = labels(&points);
-            let whole = dbscan(&rows, RADIUS, CORE_POINTS).unwrap();
-            let tight = dbscan(&rows, 0.43, CORE_POINTS).unwrap();
+            let unthinned = |radius: f64| {
+                let mut dbscan = Dbscan::default();
+                dbscan.run(&rows, radius, CORE_POINTS);
+                dbscan.labels
+            };
+            let (whole, tight) = (unthinned(RADIUS), unthinned(0.43));
             // A point on the border of two clusters may belong to either, so only core points are compared.
             let neighbours = |at: usize, radius: f64| {
-                let distance = |to: usize| (rows[[at, 0]] - rows[[to, 0]]).hypot(rows[[at, 1]] - rows[[to, 1]]);
+                let distance = |to: usize| (rows[at][0] - rows[to][0]).hypot(rows[at][1] - rows[to][1]);
                 (0..points.len()).filter(|&to| distance(to) <= radius).count()
             };
             let core: Vec<bool> = (0..points.len()).map(|at| neighbours(at, 0.43) >= CORE_POINTS).collect();

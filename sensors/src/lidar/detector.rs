@@ -79,8 +79,7 @@ impl Detector {
     /// Detects boxes in a scan.
     ///
     /// # Errors
-    /// Returns [`SensorError::NotFinite`] if a point is not finite, and [`SensorError::Clustering`] if the clustering
-    /// rejects its input.
+    /// Returns [`SensorError::NotFinite`] if a point is not finite.
     pub fn detect(&mut self, scan: &LidarScan, lane: &LaneGeometry) -> Result<&[Detection], SensorError> {
         self.detections.clear();
         self.cluster(scan, lane)?;
@@ -115,7 +114,7 @@ impl Detector {
     /// Returns the errors of [`Detector::detect`].
     pub fn cluster(&mut self, scan: &LidarScan, lane: &LaneGeometry) -> Result<(), SensorError> {
         select_candidates(scan, lane, scan.end, &mut self.candidates)?;
-        self.clustering.run(&self.candidates)?;
+        self.clustering.run(&self.candidates);
         self.group_by_cluster();
         Ok(())
     }

@@ -11,12 +11,12 @@ use super::{LaneGeometry, LidarScan};
 use crate::SensorError;
 
 /// Distance from the sensor up to which the road may give returns (m).
-const GROUND_REACH_M: f32 = 40.0;
+pub(crate) const GROUND_REACH_M: f32 = 40.0;
 /// Height below which a point counts as ground, at distance zero (m).
-const GROUND_M: f32 = 0.10;
+pub(crate) const GROUND_M: f32 = 0.10;
 /// Increase of that height per metre of distance (rad). It covers three standard deviations of the levelling error, and
 /// the footprint, whose near edge returns more light than its far edge.
-const GROUND_SLOPE: f32 = 0.005;
+pub(crate) const GROUND_SLOPE: f32 = 0.005;
 /// Half the width of the region of interest about the ego's path (m): two lanes to each side.
 const HALF_WIDTH_M: f32 = 9.5;
 /// Distance behind the sensor beyond which points are not used (m).

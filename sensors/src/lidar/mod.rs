@@ -4,11 +4,12 @@
 //!  Scene ─▶ solids (shapes, roadside) ─▶ targets ─▶ cast ─▶ echoes ─▶ receiver ─▶ LidarScan      the sensor
 //!                                         pattern ──┘    power, soft, noise          │
 //!                                                                                    ▼
-//!  Detections ◀─ classify ◀─ boxes ◀─ clustering (linfa) ◀─ thinning ◀─ ground, region of interest   the processing
+//!  Detections ◀─ classify ◀─ boxes ◀─ clustering (DBSCAN) ◀─ thinning ◀─ ground, region of interest   the processing
 //! ```
 //!
 //! The two halves share only the [`LidarScan`]: the processing chain has no access to the scene.
 
+mod bare_road;
 mod boxes;
 mod cast;
 mod classify;

@@ -35,6 +35,9 @@ const INCREMENT: u64 = 0x9e37_79b9_7f4a_7c15;
 /// Factor that scales a sum of four uniform numbers, of variance 1/12 each, to variance 1.
 const SQRT_3: f32 = 1.732_050_8;
 
+/// Bound on the magnitude of a normal number: 2·√3.
+pub(crate) const MAX_NORMAL: f32 = 3.465;
+
 /// The noise of a scan.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Noise {

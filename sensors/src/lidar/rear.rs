@@ -36,12 +36,30 @@ impl RearLidar {
         }
     }
 
-    /// Returns the latest scan.
+    /// Returns true if the latest scan has no point, not even one of the road.
+    pub fn is_dark(&mut self) -> bool {
+        self.scanner.is_dark()
+    }
+
+    /// Returns this LiDAR with the complete latest scan: with the points of the bare road, which the simulation leaves
+    /// out because the detector discards them. The detections are the same.
+    ///
+    /// # Errors
+    /// Returns the errors of [`Detector::detect`].
+    pub fn completed(&self) -> Result<Self, SensorError> {
+        let mut completed = self.clone();
+        completed.scanner.complete();
+        completed.detect()?;
+        Ok(completed)
+    }
+
+    /// Returns the latest scan, without the points of the bare road that the detector discards; see
+    /// [`RearLidar::completed`].
     pub fn latest(&self) -> &LidarScan {
         self.scanner.latest()
     }
 
-    /// Returns the ground truth of the latest scan.
+    /// Returns the ground truth of the points of [`RearLidar::latest`].
     pub fn truth(&self) -> &ScanTruth {
         self.scanner.truth()
     }

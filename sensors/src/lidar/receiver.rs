@@ -3,12 +3,12 @@
 //! The first and the last detected echo of each beam are reported. Their points lie on the *centre* line of the beam,
 //! because the sensor cannot know which part of the footprint returned the light.
 
-use super::cast::{ColumnHits, SubRays};
+use super::cast::ColumnHits;
 use super::echo::{Echo, Echoes};
 use super::noise::{Noise, Purpose};
-use super::pattern::{BEAMS, Column, Elevation, LAYERS, LAYERS_PER_GROUP, SUBRAY_COLUMNS, SUBRAY_ROWS};
+use super::pattern::{BEAMS, Column, Elevation, LAYERS, LAYERS_PER_GROUP};
 use super::power::{LinkBudget, MIN_POWER, THRESHOLD_OVER_NOISE, range_sd_m};
-use super::soft::{self, Plume, SoftEcho};
+use super::soft::{self, DropletEffect, Plume, SoftEcho};
 use super::targets::Targets;
 use super::viewpoint::{Deskew, sensor_position_m};
 use super::{Lidar, LidarScan, Material, PointSource, PointTruth, ScanTruth};
@@ -42,6 +42,11 @@ impl SensorPoseEstimate {
         }
     }
 
+    /// Returns the height of the sensor above the road (m).
+    pub(crate) fn sensor_z_m(&self) -> f32 {
+        self.sensor_m[2]
+    }
+
     /// Returns the longitudinal position of the sensor in the ego's frame (m).
     pub(crate) fn sensor_x_m(&self) -> f32 {
         self.sensor_m[0]
@@ -54,7 +59,7 @@ impl SensorPoseEstimate {
     }
 
     /// Transforms a point from the sensor's frame to the ego's frame at the end of the sweep (m).
-    fn ego_frame_point_m(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
+    pub(crate) fn ego_frame_point_m(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
         let ahead = self.sensor_m[0] - self.cos * x + self.sin * z;
         let left = self.sensor_m[1] - y;
         let above = self.sensor_m[2] + self.sin * x + self.cos * z;
@@ -100,15 +105,16 @@ impl Receiver<'_> {
     pub(crate) fn receive(&self, hits: &ColumnHits, scan: &mut LidarScan, truth: &mut ScanTruth) {
         let in_air = !self.plumes.is_empty() || self.link.has_fog();
         for (layer, elevation) in self.elevations.iter().enumerate() {
+            if !hits.needs_echoes(layer) && !(in_air && self.has_droplet_return(layer)) {
+                continue;
+            }
             let echoes = if hits.is_tested(layer) {
                 Echoes::of(&hits.beams[layer], elevation, &self.targets.faces, self.link)
             } else if layer < hits.ground_below {
                 let centre = self.column.centre[layer / LAYERS_PER_GROUP];
                 Echoes::of_ground(centre, elevation, &self.targets.faces[0], self.link)
-            } else if in_air {
-                Echoes::NONE
             } else {
-                continue;
+                Echoes::NONE
             };
             let found = if in_air {
                 self.detect_in_air(layer, echoes.as_slice())
@@ -121,13 +127,22 @@ impl Receiver<'_> {
         }
     }
 
+    /// Returns the effect of the droplets in the air on a beam.
+    fn droplet_effect(&self, layer: usize) -> DropletEffect {
+        let [cos, sin] = self.column.centre[layer / LAYERS_PER_GROUP];
+        let centre = [cos, sin, self.elevations[layer].centre[0]];
+        let beam = self.column_index * LAYERS + layer;
+        soft::droplet_effect(beam, centre, self.plumes, (self.targets, self.link, self.noise))
+    }
+
+    /// Returns true if droplets may give a return on a beam.
+    fn has_droplet_return(&self, layer: usize) -> bool {
+        self.droplet_effect(layer).echo.is_some_and(|echo| echo.power > MIN_POWER)
+    }
+
     /// Returns the detected returns of a beam if there are droplets in the air.
     fn detect_in_air(&self, layer: usize, echoes: &[Echo]) -> [Option<DetectedReturn>; 2] {
-        let [cos, sin] = self.column.centre[layer / LAYERS_PER_GROUP];
-        let tan = self.elevations[layer].centre[0];
-        let centre = SubRays { cos: [cos; SUBRAY_COLUMNS], sin: [sin; SUBRAY_COLUMNS], tan: [tan; SUBRAY_ROWS] };
-        let beam = self.column_index * LAYERS + layer;
-        let droplets = soft::droplet_effect(beam, &centre, self.plumes, (self.targets, self.link, self.noise));
+        let droplets = self.droplet_effect(layer);
         self.detect(layer, echoes, |range_m| droplets.transmission(range_m), droplets.echo)
     }
 

@@ -7,17 +7,18 @@
 use closecall_traffic::{CONTROL_STEP, PlanePose, Stream, Time};
 use nalgebra::{Isometry3, Point3};
 
-use super::cast::{ActiveParts, ColumnHits, SubRays};
+use super::bare_road::{BareRoad, cast_ground};
+use super::cast::{ActiveParts, ColumnHits};
 use super::material::asphalt;
 use super::noise::Noise;
-use super::pattern::{Column, Elevation, LAYERS_PER_GROUP, Pattern, SWEEP_NS};
-use super::power::{LinkBudget, MIN_POWER};
+use super::pattern::{Pattern, SWEEP_NS};
+use super::power::LinkBudget;
 use super::receiver::{Receiver, SensorPoseEstimate};
 use super::roadside::{PlacedSolid, append_guard_rails};
 use super::shapes::append_solids;
 use super::soft::{self, Plume};
 use super::solid::Solid;
-use super::targets::{Beams, Face, FaceRange, Surface, Targets};
+use super::targets::{Beams, Surface, Targets};
 use super::viewpoint::{Viewpoint, plane_from_body};
 use super::{Lidar, LidarScan, Material, MirrorSide, PointSource, ScanTruth};
 use crate::{Scene, SceneVehicle};
@@ -27,7 +28,28 @@ const SWEEP_S: f64 = SWEEP_NS * 1e-9;
 /// Distance of a vehicle's centre beyond which the vehicle is ignored (m). From there only a plate could give a return.
 const MAX_CENTRE_DISTANCE_M: f64 = 300.0;
 
-/// The scanner of the rear LiDAR. It keeps no state from scan to scan except allocated memory.
+/// What a sweep needs besides the targets. It is kept, so that the latest sweep can be repeated.
+#[derive(Clone, Copy, Debug)]
+struct Sweep {
+    mirror_side: MirrorSide,
+    viewpoint: Viewpoint,
+    pose: SensorPoseEstimate,
+    link: LinkBudget,
+    noise: Noise,
+}
+
+/// The extent of a sweep.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Extent {
+    /// All returns.
+    Complete,
+    /// All returns, up to the first column that has one.
+    UntilFirst,
+    /// All returns but those of the bare road that the detector would discard.
+    WithoutBareRoad,
+}
+
+/// The scanner of the rear LiDAR. It keeps no state from scan to scan except the latest sweep and allocated memory.
 #[derive(Clone, Debug)]
 pub struct Scanner {
     lidar: Lidar,
@@ -40,6 +62,7 @@ pub struct Scanner {
     hits: ColumnHits,
     scan: LidarScan,
     truth: ScanTruth,
+    latest: Option<Sweep>,
 }
 
 impl Scanner {
@@ -58,10 +81,11 @@ impl Scanner {
             hits: ColumnHits::default(),
             scan: LidarScan::default(),
             truth: ScanTruth::default(),
+            latest: None,
         }
     }
 
-    /// Returns the latest scan.
+    /// Returns the latest scan, without the points of the bare road that the detector would discard.
     pub fn latest(&self) -> &LidarScan {
         &self.scan
     }
@@ -76,7 +100,25 @@ impl Scanner {
         if time.ns().div_euclid(CONTROL_STEP.ns()) % 2 == 0 { MirrorSide::Plus } else { MirrorSide::Minus }
     }
 
+    /// Adds the points of the bare road that the latest scan leaves out.
+    pub fn complete(&mut self) {
+        self.repeat(Extent::Complete);
+    }
+
+    /// Returns true if the latest scan has no point, not even one of the bare road.
+    pub fn is_dark(&mut self) -> bool {
+        if !self.scan.is_empty() {
+            return false;
+        }
+        self.repeat(Extent::UntilFirst);
+        let is_dark = self.scan.is_empty();
+        self.clear();
+        is_dark
+    }
+
     /// Scans the scene. The scan ends at the scene's time. Draws exactly one number from `rng`.
+    ///
+    /// Points of the bare road that the detector would discard are left out; see [`Scanner::complete`].
     pub fn scan(&mut self, scene: &Scene<'_>, rng: &mut Stream) -> &LidarScan {
         let noise = Noise::draw(rng);
         let mirror_side = Self::mirror_side_at(scene.time);
@@ -85,36 +127,67 @@ impl Scanner {
         let pose = SensorPoseEstimate::new(scene, &self.lidar, noise);
         self.begin(scene.time, mirror_side, &pose);
         let link = LinkBudget::new(&self.lidar, scene.environment);
+        let sweep = Sweep { mirror_side, viewpoint, pose, link, noise };
+        self.latest = Some(sweep);
+        self.sweep(&sweep, Extent::WithoutBareRoad);
+        &self.scan
+    }
+
+    /// Repeats the latest sweep with another extent.
+    fn repeat(&mut self, extent: Extent) {
+        if let Some(sweep) = self.latest {
+            self.clear();
+            self.sweep(&sweep, extent);
+        }
+    }
+
+    /// Sweeps over all columns and appends their returns to the scan.
+    fn sweep(&mut self, of: &Sweep, extent: Extent) {
+        #[expect(clippy::cast_possible_truncation, reason = "a bound of a metre, with a margin")]
+        let max_shift_m = of.viewpoint.max_shift_m(SWEEP_S) as f32;
+        let bare_road = BareRoad::new(&self.targets, &of.link, of.pose, max_shift_m);
+        let omitted = bare_road.as_ref().filter(|_| extent == Extent::WithoutBareRoad);
+        let in_air = !self.plumes.is_empty() || of.link.has_fog();
         self.active.start(&self.targets);
         for index in 0..self.pattern.columns.len() {
             let column = &self.pattern.columns[index];
-            let elevations = self.pattern.elevations(mirror_side, index);
+            let elevations = self.pattern.elevations(of.mirror_side, index);
             self.hits.clear();
             for &part in self.active.advance_to(index, &self.targets) {
                 self.hits.cast(column, elevations, &self.targets.parts[part], &self.targets);
             }
-            cast_ground(column, elevations, &self.targets, &link, &mut self.hits);
+            cast_ground(column, elevations, (&self.targets, &of.link), omitted, &mut self.hits);
+            if !in_air && self.hits.is_bare() {
+                continue;
+            }
             let before_end_s = SWEEP_S - f64::from(column.offset_ns) * 1e-9;
             let receiver = Receiver {
                 column_index: index,
                 column,
                 elevations,
-                pose: pose.deskewed(viewpoint.deskew(before_end_s)),
+                pose: of.pose.deskewed(of.viewpoint.deskew(before_end_s)),
                 targets: &self.targets,
                 plumes: &self.plumes,
-                link: &link,
-                noise,
+                link: &of.link,
+                noise: of.noise,
                 dropout: self.lidar.dropout as f32,
             };
             receiver.receive(&self.hits, &mut self.scan, &mut self.truth);
+            if extent == Extent::UntilFirst && !self.scan.is_empty() {
+                return;
+            }
         }
-        &self.scan
+    }
+
+    /// Removes all points of the scan.
+    fn clear(&mut self) {
+        self.scan.clear();
+        self.truth.points.clear();
     }
 
     /// Clears the scan and sets its times and its mirror side.
     fn begin(&mut self, end: Time, mirror_side: MirrorSide, pose: &SensorPoseEstimate) {
-        self.scan.clear();
-        self.truth.points.clear();
+        self.clear();
         #[expect(clippy::cast_possible_truncation, reason = "a sweep has 14,777,777 ns")]
         let sweep = Time::from_ns(SWEEP_NS as i64);
         self.scan.start = end - sweep;
@@ -186,8 +259,9 @@ impl Scanner {
         }
         let water = |_| 0.0;
         let surface = Surface { source: PointSource::Spray, reflectivity: &water };
+        let columns = Targets::columns_of(&self.pattern, &solid, &placed);
         let faces = self.targets.push_faces(&solid, &placed, surface);
-        self.plumes.push(Plume { faces, extinction_per_m });
+        self.plumes.push(Plume { faces, columns, extinction_per_m });
     }
 }
 
@@ -204,38 +278,11 @@ fn moved_back(pose: PlanePose, vehicle: &SceneVehicle, before_end_s: f64) -> Pla
     PlanePose { x_m: pose.x_m - distance_m * cos, y_m: pose.y_m - distance_m * sin, ..pose }
 }
 
-/// The faces of the road's surface, which is always the first of all faces.
-const GROUND_FACES: FaceRange = FaceRange { first: 0, first_back: 1, end: 1 };
-
-/// Finds the layers of a column that may receive a return from the road, and sets [`ColumnHits::ground_below`].
-///
-/// The layers are tried from the lowest up to the first whose return would be too weak to be detected. Beams that may
-/// also hit a solid are intersected with the road here. For the others the receiver computes the return directly, since
-/// the road, with nothing below it, occludes nothing.
-fn cast_ground(column: &Column, elevations: &[Elevation], targets: &Targets, link: &LinkBudget, hits: &mut ColumnHits) {
-    let ground: &Face = &targets.faces[0];
-    let max_power_m3 = link.gain_m2 * ground.strength_m;
-    for (layer, elevation) in elevations.iter().enumerate() {
-        let group = layer / LAYERS_PER_GROUP;
-        let [cos, sin] = column.centre[group];
-        // The lowest sub-ray hits the road at the shortest distance and at the steepest angle.
-        let inverse = ground.inverse[0] * cos + ground.inverse[1] * sin + ground.inverse[2] * elevation.tan[0];
-        if !(inverse > 0.0 && max_power_m3 * inverse * inverse * inverse > MIN_POWER) {
-            break;
-        }
-        hits.ground_below = layer + 1;
-        if hits.is_tested(layer) {
-            let subrays = SubRays { cos: column.cos[group], sin: column.sin[group], tan: elevation.tan };
-            hits.intersect(layer, &subrays, GROUND_FACES, targets);
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::cast::NO_FACE;
     use super::super::cast::by_brute_force;
-    use super::super::pattern::{LAYERS, SUBRAY_ROWS, SUBRAYS};
+    use super::super::pattern::{Column, Elevation, LAYERS, LAYERS_PER_GROUP, SUBRAY_ROWS, SUBRAYS};
     use super::*;
 
     /// Maximum relative difference between a distance in single and in double precision.

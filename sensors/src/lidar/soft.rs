@@ -16,9 +16,10 @@
 //! "Simulating road spray effects in automotive lidar sensor models"): no spray below 40 to 50 km/h, a strong increase
 //! with speed and water, tens to hundreds of false points, most of them within 10 m behind a vehicle.
 
+use std::ops::Range;
+
 use closecall_traffic::{Environment, Vehicle, VehicleClass};
 
-use super::cast::SubRays;
 use super::echo::PULSE_M;
 use super::noise::{Noise, Purpose};
 use super::pattern::LAYERS;
@@ -54,9 +55,11 @@ const OVERLAP_M: f32 = 2.0;
 const NEAREST_M: f32 = 0.5;
 
 /// A spray plume: a cloud of droplets with sharp bounds.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Plume {
     pub(crate) faces: FaceRange,
+    /// Columns that may cross the plume.
+    pub(crate) columns: Range<usize>,
     /// Mean extinction (1/m).
     pub(crate) extinction_per_m: f32,
 }
@@ -111,10 +114,10 @@ pub(crate) fn spray_plume(vehicle: &Vehicle, speed_mps: f64, environment: &Envir
     Some((Solid::cuboid(low, high, Material::Water), extinction))
 }
 
-/// Returns the effect of the droplets on the beam with this centre.
+/// Returns the effect of the droplets on the beam whose centre has this direction.
 pub(crate) fn droplet_effect(
     beam: usize,
-    centre: &SubRays,
+    centre: [f32; 3],
     plumes: &[Plume],
     of: (&Targets, &LinkBudget, Noise),
 ) -> DropletEffect {
@@ -124,10 +127,10 @@ pub(crate) fn droplet_effect(
     let mut clump = None;
     let depth = noise.uniform(beam, Purpose::Depth);
     let mut has_echo = false;
-    for plume in plumes {
+    let column = beam / LAYERS;
+    for plume in plumes.iter().filter(|plume| plume.columns.contains(&column)) {
         let Some([from, to]) = plume_interval_m(centre, plume.faces, targets) else { continue };
         let clump = *clump.get_or_insert_with(|| {
-            let column = beam / LAYERS;
             let clump_at = (column / CLUMP_COLUMNS) * LAYERS + beam % LAYERS;
             -noise.uniform(clump_at, Purpose::Plume).ln()
         });
@@ -153,9 +156,12 @@ pub(crate) fn droplet_effect(
 }
 
 /// Returns the ranges at which a beam enters and leaves a plume (m), or `None` if it does not cross the plume.
-fn plume_interval_m(centre: &SubRays, faces: FaceRange, targets: &Targets) -> Option<[f32; 2]> {
-    let slant = (1.0 + centre.tan[0] * centre.tan[0]).sqrt();
-    let along = |face: usize| centre.inverse_distances(targets.faces[face].inverse)[0];
+fn plume_interval_m([cos, sin, tan]: [f32; 3], faces: FaceRange, targets: &Targets) -> Option<[f32; 2]> {
+    let slant = (1.0 + tan * tan).sqrt();
+    let along = |face: usize| {
+        let inverse = targets.faces[face].inverse;
+        inverse[0] * cos + inverse[1] * sin + inverse[2] * tan
+    };
     let nearest = faces.front_facing().map(along).fold(1.0 / NEAREST_M, f32::min);
     let farthest = faces.back_facing().map(along).fold(0.0, f32::max);
     (nearest > farthest && farthest > 0.0).then(|| [slant / nearest, slant / farthest])

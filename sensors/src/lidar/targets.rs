@@ -120,6 +120,12 @@ impl Targets {
         }
     }
 
+    /// Returns the columns that may hit a solid with this pose in the sensor's frame.
+    pub(crate) fn columns_of(pattern: &Pattern, solid: &Solid, pose: &Isometry3<f64>) -> Range<usize> {
+        let [low_deg, high_deg] = Bounds::of(solid, pose).azimuth_deg;
+        pattern.columns_between(low_deg, high_deg)
+    }
+
     /// Appends the road's surface, which is z = 0 in the plane's frame.
     pub(crate) fn push_ground(&mut self, sensor_from_plane: &Isometry3<f64>, surface: Surface<'_>) {
         let up = sensor_from_plane.rotation * Vector3::z();

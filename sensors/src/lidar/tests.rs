@@ -1,5 +1,6 @@
 //! Tests of the rear LiDAR as a whole, with vehicles at known positions.
 
+mod bare_road;
 mod boxes;
 mod cast;
 mod counts;
@@ -19,6 +20,7 @@ const SPEED_MPS: f64 = 30.0;
 const REAR_BUMPER_M: f64 = 2.3;
 
 /// A scene for the tests, with the ego and other vehicles on a straight road by default.
+#[derive(Debug)]
 struct TestScene {
     time: Time,
     road: Road,

@@ -83,6 +83,11 @@ impl Viewpoint {
         Isometry3::from_parts(Translation3::from(-(turn * self.sensor_position_m)), turn) * level_from_plane
     }
 
+    /// Returns a bound on the distance by which deskewing moves a point, apart from a rotation about the sensor (m).
+    pub(crate) fn max_shift_m(&self, sweep_s: f64) -> f64 {
+        (self.speed_mps.abs() + self.yaw_rate_radps.abs() * self.sensor_position_m.norm()) * sweep_s
+    }
+
     /// Returns the transform from the ego's frame `before_end_s` before the end of the sweep to its frame at the end.
     pub(crate) fn deskew(&self, before_end_s: f64) -> Deskew {
         let turned = self.yaw_rate_radps * before_end_s;

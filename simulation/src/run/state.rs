@@ -127,9 +127,7 @@ impl<'a> Run<'a> {
 
     /// Updates the neighbours of all vehicles, the ego's margins, and the phase of the encounter.
     pub(super) fn update_surroundings(&mut self, observer: &mut dyn Observer) {
-        for actor in 0..self.world.len() {
-            self.neighbours[actor] = self.world.neighbours(actor);
-        }
+        self.world.find_neighbours(&mut self.neighbours);
         let ego = self.scenario.ego;
         let own = self.world.state(ego);
         self.margins = MarginsNow::new(own, &self.neighbours[ego], self.widths(ego));

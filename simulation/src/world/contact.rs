@@ -5,6 +5,9 @@ use nalgebra::Vector2;
 
 use crate::outcome::ClosedBy;
 
+/// Distance that is added to a vehicle's bounds, to cover rounding (m).
+const MARGIN_M: f64 = 1e-6;
+
 /// The boxes of all vehicles before and after one step, in the order of the list of actors.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StepBoxes<'a> {
@@ -25,27 +28,96 @@ pub(super) struct Touch {
     pub(super) struck_side: [BoxSide; 2],
 }
 
-/// Replaces the content of `found` by the pairs of vehicles that touch within a step and are not among `known`.
+/// A vehicle in a list that is sorted along the plane's x axis.
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    /// Lower and upper bound of the vehicle's position during the step (m).
+    reach_m: [f64; 2],
+    /// Position of the vehicle in the order of the names.
+    rank: usize,
+}
+
+/// Searches the pairs of vehicles that touch. The memory is reused from step to step.
 ///
-/// `by_name` holds the indices of the actors in the order of their names. The pairs are sorted by time; pairs with equal
-/// times are in the order of `by_name`.
-pub(super) fn find(boxes: StepBoxes<'_>, by_name: &[usize], known: &[[usize; 2]], found: &mut Vec<Touch>) {
-    let StepBoxes { before, after } = boxes;
-    found.clear();
-    for (rank, &first) in by_name.iter().enumerate() {
-        for &second in &by_name[rank + 1..] {
-            if known.contains(&[first, second]) {
-                continue;
-            }
-            let contact = first_contact(&before[first], &after[first], &before[second], &after[second]);
-            if let Some(contact) = contact {
-                let struck_side = contact.sides;
-                found.push(Touch { pair: [first, second], fraction: contact.fraction, struck_side });
+/// Only pairs whose bounds along the plane's x axis overlap are tested (sweep and prune: D. Baraff, *Dynamic simulation
+/// of non-penetrating rigid bodies*, Cornell University 1992).
+#[derive(Debug, Default)]
+pub(super) struct ContactSearch {
+    order: Vec<Entry>,
+    /// The positions of a pair in the order of the names, for each element of the result.
+    ranks: Vec<([usize; 2], Touch)>,
+    /// Number of pairs that were tested.
+    #[cfg(test)]
+    tests: usize,
+}
+
+impl ContactSearch {
+    /// Replaces the content of `found` by the pairs of vehicles that touch within a step and are not among `known`.
+    ///
+    /// `by_name` holds the indices of the actors in the order of their names. The pairs are sorted by time; pairs with
+    /// equal times are in the order of `by_name`.
+    pub(super) fn find(
+        &mut self,
+        boxes: StepBoxes<'_>,
+        by_name: &[usize],
+        known: &[[usize; 2]],
+        found: &mut Vec<Touch>,
+    ) {
+        self.sort(boxes, by_name);
+        self.ranks.clear();
+        for (index, one) in self.order.iter().enumerate() {
+            for other in &self.order[index + 1..] {
+                if other.reach_m[0] > one.reach_m[1] {
+                    break;
+                }
+                let ranks = [one.rank.min(other.rank), one.rank.max(other.rank)];
+                let pair @ [first, second] = ranks.map(|rank| by_name[rank]);
+                if known.contains(&pair) {
+                    continue;
+                }
+                #[cfg(test)]
+                {
+                    self.tests += 1;
+                }
+                let StepBoxes { before, after } = boxes;
+                let contact = first_contact(&before[first], &after[first], &before[second], &after[second]);
+                if let Some(contact) = contact {
+                    self.ranks.push((ranks, Touch { pair, fraction: contact.fraction, struck_side: contact.sides }));
+                }
             }
         }
+        self.ranks.sort_by(|(one_ranks, one), (other_ranks, other)| {
+            one.fraction.total_cmp(&other.fraction).then(one_ranks.cmp(other_ranks))
+        });
+        found.clear();
+        found.extend(self.ranks.iter().map(|(_, touch)| *touch));
     }
-    // The sort is stable: pairs that touch at the same time stay in the order of the names.
-    found.sort_by(|one, other| one.fraction.total_cmp(&other.fraction));
+
+    /// Sorts the vehicles by the lower bounds of their positions.
+    fn sort(&mut self, boxes: StepBoxes<'_>, by_name: &[usize]) {
+        if self.order.len() != by_name.len() {
+            self.order.clear();
+            self.order.extend((0..by_name.len()).map(|rank| Entry { reach_m: [0.0; 2], rank }));
+        }
+        // The order hardly changes from step to step, so that the list is almost sorted.
+        for entry in &mut self.order {
+            let actor = by_name[entry.rank];
+            entry.reach_m = reach_m(&boxes.before[actor], &boxes.after[actor]);
+        }
+        self.order
+            .sort_unstable_by(|one, other| one.reach_m[0].total_cmp(&other.reach_m[0]).then(one.rank.cmp(&other.rank)));
+    }
+}
+
+/// Returns bounds of a box's position along the plane's x axis during a step (m). A position that is not a number
+/// reaches everywhere, since [`first_contact`] counts it as a contact.
+fn reach_m(before: &OrientedBox, after: &OrientedBox) -> [f64; 2] {
+    // At least the radius of the circle through the corners, which is half of the diagonal.
+    let radius_m = (0.5 * (before.length_m * before.length_m + before.width_m * before.width_m)).sqrt();
+    let (low, high) = (before.x_m.min(after.x_m) - radius_m, before.x_m.max(after.x_m) + radius_m);
+    // The sum is not a number if any value of a box is not.
+    let sum = [before, after].map(|at| at.x_m + at.y_m + at.yaw_rad + at.length_m + at.width_m).iter().sum::<f64>();
+    if sum.is_finite() { [low - MARGIN_M, high + MARGIN_M] } else { [f64::NEG_INFINITY, f64::INFINITY] }
 }
 
 /// Returns the outward normal of a side of a box, in the plane.
@@ -90,6 +162,8 @@ pub(super) fn closed_by(first: StruckVehicle<'_>, second: StruckVehicle<'_>) -> 
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
 
     fn struck(shape: &OrientedBox, side: BoxSide, velocity_mps: Vector2<f64>) -> StruckVehicle<'_> {
@@ -114,5 +188,73 @@ mod tests {
         let (straight, swerving) = (Vector2::new(30.0, 0.0), Vector2::new(30.0, 1.0));
         let (left, right) = (struck(&left, BoxSide::Right, straight), struck(&right, BoxSide::Left, swerving));
         assert_eq!(closed_by(left, right), ClosedBy::Second);
+    }
+
+    /// Compares every pair of vehicles, in the order of the names.
+    fn by_brute_force(boxes: StepBoxes<'_>, by_name: &[usize], known: &[[usize; 2]]) -> Vec<Touch> {
+        let StepBoxes { before, after } = boxes;
+        let mut found = Vec::new();
+        for (rank, &first) in by_name.iter().enumerate() {
+            for &second in by_name[rank + 1..].iter().filter(|&&second| !known.contains(&[first, second])) {
+                if let Some(at) = first_contact(&before[first], &after[first], &before[second], &after[second]) {
+                    found.push(Touch { pair: [first, second], fraction: at.fraction, struck_side: at.sides });
+                }
+            }
+        }
+        found.sort_by(|one, other| one.fraction.total_cmp(&other.fraction));
+        found
+    }
+
+    fn moving_box() -> impl Strategy<Value = (OrientedBox, OrientedBox)> {
+        let x_m = prop_oneof![40 => 0.0..60.0_f64, 1 => Just(f64::NAN)];
+        (x_m, 0.0..12.0_f64, -3.2..3.2_f64, 1.0..17.0_f64, (-1.0..1.0_f64, -0.3..0.3_f64)).prop_map(
+            |(x_m, y_m, yaw_rad, length_m, (shift_m, turn_rad))| {
+                let from = OrientedBox { x_m, y_m, yaw_rad, length_m, width_m: 2.0 };
+                (from, OrientedBox { x_m: x_m + shift_m, yaw_rad: yaw_rad + turn_rad, ..from })
+            },
+        )
+    }
+
+    proptest! {
+        #[test]
+        fn the_search_finds_what_testing_all_pairs_finds(
+            moving in prop::collection::vec(moving_box(), 0..14),
+            earlier in prop::collection::vec(moving_box(), 14),
+        ) {
+            let boxes = |moving: &[(OrientedBox, OrientedBox)]| -> [Vec<OrientedBox>; 2] {
+                [moving.iter().map(|pair| pair.0).collect(), moving.iter().map(|pair| pair.1).collect()]
+            };
+            let mut search = ContactSearch::default();
+            let by_name: Vec<usize> = (0..moving.len()).rev().collect();
+            let mut found = Vec::new();
+            for moving in [&earlier[..moving.len()], &moving] {
+                let [before, after] = boxes(moving);
+                let boxes = StepBoxes { before: &before, after: &after };
+                let known: &[[usize; 2]] = &[[3, 1]];
+                search.find(boxes, &by_name, known, &mut found);
+                let expected = by_brute_force(boxes, &by_name, known);
+                prop_assert_eq!(&found, &expected);
+            }
+        }
+    }
+
+    #[test]
+    fn the_number_of_tested_pairs_grows_linearly_with_the_number_of_vehicles() {
+        let tested = |number: usize| {
+            let at = |index: usize| OrientedBox {
+                x_m: 15.0 * index as f64,
+                y_m: -1.875 - 3.75 * (index % 3) as f64,
+                yaw_rad: 0.0,
+                length_m: 4.6,
+                width_m: 1.85,
+            };
+            let boxes: Vec<_> = (0..number).map(at).collect();
+            let by_name: Vec<usize> = (0..number).collect();
+            let mut search = ContactSearch::default();
+            search.find(StepBoxes { before: &boxes, after: &boxes }, &by_name, &[], &mut Vec::new());
+            search.tests
+        };
+        // No two of these vehicles are within each other's reach.
+        assert_eq!([tested(10), tested(1_000)], [0, 0]);
     }
 }

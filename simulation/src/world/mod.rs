@@ -13,6 +13,7 @@ mod impact;
 mod neighbours;
 mod path;
 mod plant;
+mod search;
 mod state;
 
 pub(crate) use plant::lateral_grip_mps2;

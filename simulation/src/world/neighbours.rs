@@ -9,24 +9,44 @@ use super::World;
 /// Smallest overlap with a lane at which a vehicle counts as being in it (m). A wheel on the marking does not count.
 const LANE_OVERLAP_M: f64 = 0.2;
 /// Lateral clearance below which two vehicles count as being in each other's path (m).
-const PATH_MARGIN_M: f64 = 0.1;
+pub(super) const PATH_MARGIN_M: f64 = 0.1;
 
-/// Returns the vehicles around `actor`.
+/// The lanes in which a vehicle has neighbours.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LanesAround {
+    pub(super) own: Lane,
+    pub(super) left: Option<Lane>,
+    pub(super) right: Option<Lane>,
+}
+
+impl LanesAround {
+    /// Returns the lanes around a vehicle at the lateral position `d_m`.
+    pub(super) fn new(road: &Road, d_m: f64) -> Self {
+        let own = road.lane_at(d_m);
+        Self { own, left: road.beside(own, Side::Left), right: road.beside(own, Side::Right) }
+    }
+
+    /// Returns the neighbours before any is found.
+    pub(super) fn nobody(&self) -> Neighbours {
+        Neighbours {
+            own: LaneNeighbours::default(),
+            left: self.left.map(|_| LaneNeighbours::default()),
+            right: self.right.map(|_| LaneNeighbours::default()),
+            in_path: None,
+        }
+    }
+}
+
+/// Returns the vehicles around `actor`, which is compared with every other one. [`super::search`] is faster if the
+/// neighbours of all vehicles are needed.
 pub(super) fn find(world: &World, actor: usize, road: &Road) -> Neighbours {
-    let own_lane = road.lane_at(world.state(actor).d_m);
-    let left = road.beside(own_lane, Side::Left);
-    let right = road.beside(own_lane, Side::Right);
-    let mut around = Neighbours {
-        own: LaneNeighbours::default(),
-        left: left.map(|_| LaneNeighbours::default()),
-        right: right.map(|_| LaneNeighbours::default()),
-        in_path: None,
-    };
+    let LanesAround { own: own_lane, left, right } = LanesAround::new(road, world.state(actor).d_m);
+    let mut around = LanesAround { own: own_lane, left, right }.nobody();
     for other in 0..world.len() {
         if other == actor {
             continue;
         }
-        let candidate = Candidate::new(world, actor, other);
+        let candidate = Candidate::new(world, [actor, other], [actor, other].map(|index| half_width_m(world, index)));
         if candidate.is_in(road, own_lane) {
             candidate.insert_into(&mut around.own);
         }
@@ -47,7 +67,7 @@ pub(super) fn find(world: &World, actor: usize, road: &Road) -> Neighbours {
     around
 }
 
-fn keep_nearest(slot: &mut Option<Neighbour>, candidate: Neighbour) {
+pub(super) fn keep_nearest(slot: &mut Option<Neighbour>, candidate: Neighbour) {
     // Two vehicles at the same gap have different lateral positions, unless they overlap. The result therefore does not
     // depend on the order of the list of actors.
     let order = |neighbour: &Neighbour| (neighbour.gap_m, neighbour.lateral_offset_m);
@@ -57,8 +77,8 @@ fn keep_nearest(slot: &mut Option<Neighbour>, candidate: Neighbour) {
 }
 
 /// Another vehicle, relative to the vehicle whose neighbours are determined.
-struct Candidate {
-    neighbour: Neighbour,
+pub(super) struct Candidate {
+    pub(super) neighbour: Neighbour,
     /// Distance along the road from centre to centre, positive ahead (m).
     ahead_m: f64,
     /// Lateral position of its right end (m).
@@ -69,11 +89,12 @@ struct Candidate {
 }
 
 impl Candidate {
-    fn new(world: &World, actor: usize, other: usize) -> Self {
+    /// Creates the second vehicle relative to the first. `half_widths_m` are those of [`half_width_m`].
+    pub(super) fn new(world: &World, [actor, other]: [usize; 2], half_widths_m: [f64; 2]) -> Self {
         let (own, state) = (world.state(actor), world.state(other));
         let (own_size, size) = (world.vehicle(actor).dimensions, world.vehicle(other).dimensions);
         let ahead_m = state.s_m - own.s_m;
-        let half_width_m = half_extent_across_m(size.length_m, size.width_m, state.heading_rad);
+        let [own_half_width_m, half_width_m] = half_widths_m;
         let neighbour = Neighbour {
             actor: other,
             gap_m: bumper_gap_m(ahead_m.abs(), own_size.length_m, size.length_m),
@@ -91,22 +112,20 @@ impl Candidate {
             ahead_m,
             right_m: state.d_m - half_width_m,
             left_m: state.d_m + half_width_m,
-            own_half_width_m: half_extent_across_m(own_size.length_m, own_size.width_m, own.heading_rad),
+            own_half_width_m,
         }
     }
 
     fn is_in(&self, road: &Road, lane: Lane) -> bool {
-        let centre_m = road.lane_centre_m(lane);
-        let half_m = 0.5 * road.lane_width_m() - LANE_OVERLAP_M;
-        self.right_m < centre_m + half_m && self.left_m > centre_m - half_m
+        is_in(road, lane, [self.right_m, self.left_m])
     }
 
-    fn is_in_path(&self) -> bool {
+    pub(super) fn is_in_path(&self) -> bool {
         let half_width_m = 0.5 * (self.left_m - self.right_m);
         self.neighbour.lateral_offset_m.abs() < half_width_m + self.own_half_width_m + PATH_MARGIN_M
     }
 
-    fn insert_into(&self, lane: &mut LaneNeighbours) {
+    pub(super) fn insert_into(&self, lane: &mut LaneNeighbours) {
         if self.neighbour.gap_m < 0.0 {
             keep_nearest(&mut lane.alongside, self.neighbour);
         } else if self.ahead_m > 0.0 {
@@ -117,8 +136,16 @@ impl Candidate {
     }
 }
 
-/// Returns half of the extent of a box across the road (m).
-fn half_extent_across_m(length_m: f64, width_m: f64, heading_rad: f64) -> f64 {
-    let (sin, cos) = heading_rad.sin_cos();
-    0.5 * (length_m * sin.abs() + width_m * cos.abs())
+/// Returns whether a vehicle between these lateral positions, of its right and of its left end, is in a lane.
+pub(super) fn is_in(road: &Road, lane: Lane, [right_m, left_m]: [f64; 2]) -> bool {
+    let centre_m = road.lane_centre_m(lane);
+    let half_m = 0.5 * road.lane_width_m() - LANE_OVERLAP_M;
+    right_m < centre_m + half_m && left_m > centre_m - half_m
+}
+
+/// Returns half of the extent of a vehicle's box across the road (m).
+pub(super) fn half_width_m(world: &World, actor: usize) -> f64 {
+    let (sin, cos) = world.state(actor).heading_rad.sin_cos();
+    let size = world.vehicle(actor).dimensions;
+    0.5 * (size.length_m * sin.abs() + size.width_m * cos.abs())
 }

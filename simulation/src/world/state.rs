@@ -5,10 +5,11 @@ use closecall_traffic::geometry::OrientedBox;
 use closecall_traffic::{ActorId, Indicator, Lane, Road, Time, Vehicle, VehicleState};
 use nalgebra::Vector2;
 
-use super::contact::{self, StepBoxes, StruckVehicle, Touch};
+use super::contact::{self, ContactSearch, StepBoxes, StruckVehicle, Touch};
 use super::impact::{BodyId, BodySpec, IMPACT_DURATION_S, Motion, Wreckage};
 use super::neighbours;
 use super::plant::Plant;
+use super::search::NeighbourSearch;
 use crate::outcome::{Collision, Phase};
 
 /// The commands to one vehicle for one step.
@@ -72,6 +73,8 @@ pub(crate) struct World {
     by_name: Vec<usize>,
     shapes: Vec<OrientedBox>,
     shapes_before: Vec<OrientedBox>,
+    search: NeighbourSearch,
+    contacts: ContactSearch,
     touches: Vec<Touch>,
     touched_pairs: Vec<[usize; 2]>,
     wreckage: Option<Wreckage>,
@@ -100,6 +103,8 @@ impl World {
             shapes: Vec::with_capacity(actors.len()),
             shapes_before: Vec::with_capacity(actors.len()),
             actors,
+            search: NeighbourSearch::default(),
+            contacts: ContactSearch::default(),
             touches: Vec::new(),
             touched_pairs: Vec::new(),
             wreckage: None,
@@ -172,6 +177,13 @@ impl World {
         neighbours::find(self, actor, &self.road)
     }
 
+    /// Replaces `found` by the vehicles around each vehicle, in the order of the actors.
+    pub(crate) fn find_neighbours(&mut self, found: &mut [Neighbours]) {
+        let mut search = std::mem::take(&mut self.search);
+        search.find_all(self, &self.road, found);
+        self.search = search;
+    }
+
     /// Returns the collisions so far, in order of time.
     pub(crate) fn collisions(&self) -> &[Collision] {
         &self.collisions
@@ -228,7 +240,7 @@ impl World {
     fn collide(&mut self, phase: Phase) {
         let mut touches = std::mem::take(&mut self.touches);
         let boxes = StepBoxes { before: &self.shapes_before, after: &self.shapes };
-        contact::find(boxes, &self.by_name, &self.touched_pairs, &mut touches);
+        self.contacts.find(boxes, &self.by_name, &self.touched_pairs, &mut touches);
         for touch in &touches {
             self.start_collision(touch, phase);
         }

@@ -24,7 +24,8 @@ pub(crate) struct Scan {
 impl Scan {
     /// Returns the latest scan of these sensors, or `None` if they have no rear LiDAR.
     pub(super) fn latest(perception: &dyn Perception) -> Option<Self> {
-        let lidar = perception.rear_lidar()?;
+        // The scan of the simulation has clustered without an error before, and so does the complete one.
+        let lidar = perception.rear_lidar()?.completed().ok()?;
         let scan = lidar.latest();
         let points = scan.x_m.iter().zip(&scan.y_m).zip(&scan.z_m);
         let mut clusters = vec![NO_CLUSTER; scan.len()];

@@ -1,7 +1,7 @@
 //! Measures the time of one LiDAR scan and of its processing, and the share of each part in a perception step without
 //! the camera. A rear vehicle is 3, 30 or 100 m behind the ego, and two more vehicles are in view.
 //!
-//! Command: `cargo bench -p closecall-sensors --bench lidar`.
+//! Command: `cargo bench --bench lidar`.
 #![expect(clippy::print_stdout, reason = "a benchmark prints its figures")]
 
 use std::hint::black_box;

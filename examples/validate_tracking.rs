@@ -2,7 +2,7 @@
 //! approaches of a vehicle from behind.
 //!
 //! ```text
-//! cargo run --release -p closecall-sensors --example validate_tracking [SEED]
+//! cargo run --release --example validate_tracking [SEED]
 //! ```
 //!
 //! In each approach a vehicle drives in the ego's lane, 10 to 60 km/h faster than the ego. The output has one line for

@@ -1,6 +1,6 @@
 //! Measures the time that the camera needs for one track: preparing an exposure, rendering a crop, and classifying it.
 //!
-//! Command: `cargo bench -p closecall-sensors --bench camera`. The classifier runs on ONNX Runtime instead of tract if
+//! Command: `cargo bench --bench camera`. The classifier runs on ONNX Runtime instead of tract if
 //! `ORT_DYLIB_PATH` gives the path of its library.
 
 use std::hint::black_box;

@@ -1,0 +1,78 @@
+//! What a scan without the bare road has in common with the complete one.
+
+use closecall_traffic::{BodyShape, VehicleClass};
+use proptest::prelude::*;
+
+use super::*;
+
+fn setup() -> impl Strategy<Value = (TestScene, Lidar)> {
+    let shape = prop::sample::select(VehicleClass::ALL.map(BodyShape::of_class).concat());
+    let vehicle = (shape, -130.0..4.0_f64, -9.0..9.0_f64).prop_map(|(body_shape, along, left)| {
+        let mut vehicle = scene_vehicle(1, body_shape.class(), 1_000.0 + along, LANE_D_M + left);
+        vehicle.vehicle.appearance.body_shape = body_shape;
+        with_speed(vehicle, SPEED_MPS)
+    });
+    let ego = (-0.04..0.04_f64, 0.0..45.0_f64, -0.3..0.3_f64);
+    let air = prop::sample::select(vec![(1e4, 0.0), (1e4, 1.0), (150.0, 0.0)]);
+    // A strong sensor and a large error of the pitch, so that some of the road's points pass for something else.
+    let lidar = (0.2..2.5_f64, prop::sample::select(vec![0.0005, 0.02]), prop::sample::select(vec![200.0, 500.0]));
+    (prop::collection::vec(vehicle, 0..3), ego, air, lidar, any::<bool>()).prop_map(
+        |(others, (pitch_rad, speed_mps, yaw_rate_radps), air, (mount_height_m, levelling_sd_rad, range), rails)| {
+            let mut setup = TestScene::new();
+            setup.others = others;
+            setup.ego.pitch_rad = pitch_rad;
+            setup.ego.state.speed_mps = speed_mps;
+            setup.ego.state.yaw_rate_radps = yaw_rate_radps;
+            (setup.environment.visibility_m, setup.environment.water_film_mm) = air;
+            if rails {
+                setup.road = road_with_guard_rails(0.0);
+            }
+            (setup, Lidar { mount_height_m, levelling_sd_rad, nominal_range_m: range, ..Lidar::default() })
+        },
+    )
+}
+
+/// Returns the bits of each point that satisfies a condition, with its beam.
+fn points(lidar: &RearLidar, keep: impl Fn(usize) -> bool) -> Vec<(u16, [u32; 4])> {
+    let scan = lidar.latest();
+    let bits = |at: usize| [scan.x_m[at], scan.y_m[at], scan.z_m[at], scan.intensity[at]].map(f32::to_bits);
+    (0..scan.len()).filter(|&at| keep(at)).map(|at| (scan.beam[at], bits(at))).collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    #[test]
+    fn a_scan_leaves_out_only_points_that_the_detector_discards((mut setup, model) in setup(), index in 0..1_000_i64) {
+        let mut lidar = RearLidar::new(model);
+        let found = setup.detect(&mut lidar, index);
+        let complete = lidar.completed().unwrap();
+        prop_assert_eq!(complete.detections(), &found[..]);
+        let members = |lidar: &RearLidar| -> Vec<_> {
+            (0..found.len()).map(|at| points(lidar, |point| lidar.point_indices_of(at).contains(&(point as u32)))).collect()
+        };
+        prop_assert_eq!(members(&lidar), members(&complete));
+        let solid = |lidar: &RearLidar| points(lidar, |at| lidar.truth().points[at].source != PointSource::Ground);
+        prop_assert_eq!(solid(&lidar), solid(&complete));
+        prop_assert!(complete.latest().len() >= lidar.latest().len());
+    }
+}
+
+#[test]
+fn nearly_all_points_of_an_empty_road_are_left_out() {
+    let mut lidar = RearLidar::new(Lidar::default());
+    TestScene::new().detect(&mut lidar, 0);
+    let complete = lidar.completed().unwrap().latest().len();
+    assert!(complete > 3_000, "{complete}");
+    assert!(lidar.latest().len() < complete / 20, "{} of {complete}", lidar.latest().len());
+}
+
+#[test]
+fn a_scan_of_the_bare_road_is_not_dark_and_one_behind_a_dirty_window_is() {
+    for (window_transmission, is_dark) in [(1.0, false), (0.0, true)] {
+        let mut lidar = RearLidar::new(Lidar { window_transmission, ..Lidar::default() });
+        TestScene::new().detect(&mut lidar, 0);
+        assert_eq!(lidar.is_dark(), is_dark, "{window_transmission}");
+        assert_eq!(lidar.completed().unwrap().latest().is_empty(), is_dark, "{window_transmission}");
+    }
+}

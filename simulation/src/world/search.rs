@@ -1,0 +1,231 @@
+//! Finds the neighbours of all vehicles, in a time that grows about linearly with their number.
+//!
+//! ```text
+//!   lane 1   ──●──────●───────────●──▶ s      each lane has its vehicles in order along the road: a search starts at the
+//!   lane 2   ─────●──────[own]────●──▶        own position, and goes on in both directions until no vehicle farther away
+//!   lane 3   ●────────●──────●───────▶        can be nearer, bumper to bumper, than the one found
+//! ```
+//!
+//! The result is that of [`super::neighbours::find`] to the bit.
+
+use closecall_controllers::{LaneNeighbours, Neighbour, Neighbours};
+use closecall_traffic::metrics::bumper_gap_m;
+use closecall_traffic::{Lane, Road};
+
+use super::World;
+use super::neighbours::{Candidate, LanesAround, PATH_MARGIN_M, half_width_m, is_in, keep_nearest};
+
+/// A vehicle in a list that is sorted along the road.
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    s_m: f64,
+    actor: usize,
+}
+
+/// The vehicles of a road, sorted along it, lane by lane. The memory is reused from step to step.
+#[derive(Debug, Default)]
+pub(super) struct NeighbourSearch {
+    /// Half of the extent of each vehicle across the road (m).
+    half_widths_m: Vec<f64>,
+    /// All vehicles.
+    order: Vec<Entry>,
+    /// The vehicles in each lane. A vehicle may be in several.
+    lanes: Vec<Vec<Entry>>,
+    /// The vehicles whose path touches each strip. The strips are the lanes at their full width, and what lies beyond
+    /// the road on both sides.
+    strips: Vec<Vec<Entry>>,
+    /// Length of the longest vehicle (m).
+    longest_m: f64,
+    /// Number of pairs of vehicles that were compared.
+    #[cfg(test)]
+    visits: std::cell::Cell<usize>,
+}
+
+impl NeighbourSearch {
+    /// Replaces `found` by the vehicles around each vehicle.
+    pub(super) fn find_all(&mut self, world: &World, road: &Road, found: &mut [Neighbours]) {
+        self.sort(world, road);
+        for (actor, found) in found.iter_mut().enumerate() {
+            *found = self.around(world, actor, road);
+        }
+    }
+
+    /// Sorts the vehicles into the lists.
+    fn sort(&mut self, world: &World, road: &Road) {
+        let lanes = usize::from(road.lanes());
+        self.lanes.resize_with(lanes, Vec::new);
+        self.strips.resize_with(lanes + 2, Vec::new);
+        self.lanes.iter_mut().chain(&mut self.strips).for_each(Vec::clear);
+        self.half_widths_m.clear();
+        self.half_widths_m.extend((0..world.len()).map(|actor| half_width_m(world, actor)));
+        self.longest_m = (0..world.len()).map(|actor| world.vehicle(actor).dimensions.length_m).fold(0.0, f64::max);
+        if self.order.len() != world.len() {
+            self.order.clear();
+            self.order.extend((0..world.len()).map(|actor| Entry { s_m: 0.0, actor }));
+        }
+        // The order hardly changes from step to step, so that the list is almost sorted.
+        for entry in &mut self.order {
+            entry.s_m = world.state(entry.actor).s_m;
+        }
+        self.order.sort_unstable_by(|one, other| one.s_m.total_cmp(&other.s_m).then(one.actor.cmp(&other.actor)));
+        for &entry in &self.order {
+            let [right_m, left_m] = self.sides_m(world, entry.actor);
+            for (lane, list) in (1..).zip(&mut self.lanes) {
+                if is_in(road, Lane(lane), [right_m, left_m]) {
+                    list.push(entry);
+                }
+            }
+            for strip in strips(road, [right_m, left_m]) {
+                self.strips[strip].push(entry);
+            }
+        }
+    }
+
+    /// Returns the lateral positions of the right and of the left end of a vehicle (m).
+    fn sides_m(&self, world: &World, actor: usize) -> [f64; 2] {
+        let d_m = world.state(actor).d_m;
+        [d_m - self.half_widths_m[actor], d_m + self.half_widths_m[actor]]
+    }
+
+    /// Returns the vehicles around `actor`.
+    fn around(&self, world: &World, actor: usize, road: &Road) -> Neighbours {
+        let lanes = LanesAround::new(road, world.state(actor).d_m);
+        let mut around = lanes.nobody();
+        self.fill(world, actor, lanes.own, &mut around.own);
+        if let (Some(lane), Some(slot)) = (lanes.left, &mut around.left) {
+            self.fill(world, actor, lane, slot);
+        }
+        if let (Some(lane), Some(slot)) = (lanes.right, &mut around.right) {
+            self.fill(world, actor, lane, slot);
+        }
+        for strip in strips(road, self.sides_m(world, actor)) {
+            self.fill_path(world, actor, &self.strips[strip], &mut around.in_path);
+        }
+        around
+    }
+
+    /// Fills `slot` with the neighbours of `actor` in a lane.
+    fn fill(&self, world: &World, actor: usize, lane: Lane, slot: &mut LaneNeighbours) {
+        let list = &self.lanes[usize::from(lane.0) - 1];
+        let start = list.partition_point(|entry| entry.s_m < world.state(actor).s_m);
+        for entry in &list[start..] {
+            if self.is_beyond(world, actor, entry, &slot.lead) {
+                break;
+            }
+            self.visit(world, actor, entry, |candidate| candidate.insert_into(slot));
+        }
+        for entry in list[..start].iter().rev() {
+            if self.is_beyond(world, actor, entry, &slot.follower) {
+                break;
+            }
+            self.visit(world, actor, entry, |candidate| candidate.insert_into(slot));
+        }
+    }
+
+    /// Fills `slot` with the nearest vehicle of a strip that is ahead in the path of `actor`.
+    fn fill_path(&self, world: &World, actor: usize, list: &[Entry], slot: &mut Option<Neighbour>) {
+        let start = list.partition_point(|entry| entry.s_m <= world.state(actor).s_m);
+        for entry in &list[start..] {
+            if self.is_beyond(world, actor, entry, slot) {
+                break;
+            }
+            self.visit(world, actor, entry, |candidate| {
+                if candidate.is_in_path() {
+                    keep_nearest(slot, candidate.neighbour);
+                }
+            });
+        }
+    }
+
+    /// Returns whether a vehicle and all farther ones have a greater gap than the neighbour that is known.
+    fn is_beyond(&self, world: &World, actor: usize, entry: &Entry, known: &Option<Neighbour>) -> bool {
+        let distance_m = (entry.s_m - world.state(actor).s_m).abs();
+        let least_gap_m = bumper_gap_m(distance_m, world.vehicle(actor).dimensions.length_m, self.longest_m);
+        known.is_some_and(|known| known.gap_m < least_gap_m)
+    }
+
+    /// Calls `each` with another vehicle, relative to `actor`.
+    fn visit(&self, world: &World, actor: usize, entry: &Entry, each: impl FnOnce(Candidate)) {
+        if entry.actor != actor {
+            #[cfg(test)]
+            self.visits.set(self.visits.get() + 1);
+            let half_widths_m = [actor, entry.actor].map(|index| self.half_widths_m[index]);
+            each(Candidate::new(world, [actor, entry.actor], half_widths_m));
+        }
+    }
+}
+
+/// Returns the indices of the strips that the path of a vehicle between these lateral positions touches.
+fn strips(road: &Road, [right_m, left_m]: [f64; 2]) -> std::ops::RangeInclusive<usize> {
+    let last = f64::from(road.lanes()) + 1.0;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped before the cast")]
+    let strip = |d_m: f64| ((-d_m / road.lane_width_m()).floor() + 1.0).clamp(0.0, last) as usize;
+    strip(left_m + PATH_MARGIN_M)..=strip(right_m - PATH_MARGIN_M)
+}
+
+#[cfg(test)]
+mod tests {
+    use closecall_traffic::{ActorId, PHYSICS_STEP, Vehicle, VehicleClass, VehicleState};
+    use proptest::prelude::*;
+
+    use super::super::neighbours;
+    use super::super::state::InitialVehicle;
+    use super::*;
+
+    fn world(road: Road, vehicles: &[(VehicleClass, f64, f64, f64)]) -> World {
+        let initial = |(index, &(class, s_m, d_m, heading_rad)): (usize, &(VehicleClass, f64, f64, f64))| {
+            let state = VehicleState { s_m, d_m, heading_rad, speed_mps: 30.0, ..VehicleState::default() };
+            let id = ActorId::new(&format!("v{index}")).unwrap();
+            InitialVehicle { id, vehicle: Vehicle::typical(class), state, weave: None }
+        };
+        World::new(road, 0.9, PHYSICS_STEP, vehicles.iter().enumerate().map(initial).collect())
+    }
+
+    fn vehicle() -> impl Strategy<Value = (VehicleClass, f64, f64, f64)> {
+        // Positions on a grid, so that some vehicles overlap or are at the same position.
+        let s_m = prop_oneof![(0..40_i32).prop_map(|cell| 5.0 * f64::from(cell)), 0.0..400.0_f64];
+        let d_m = prop_oneof![prop::sample::select(vec![-1.875, -5.625, -9.375]), -14.0..3.0_f64];
+        (prop::sample::select(VehicleClass::ALL.to_vec()), s_m, d_m, -0.3..0.3_f64)
+    }
+
+    proptest! {
+        #[test]
+        fn the_search_finds_what_comparing_all_pairs_finds(
+            vehicles in prop::collection::vec(vehicle(), 1..30),
+        ) {
+            let road = Road::straight(3);
+            let world = world(road, &vehicles);
+            let mut found = vec![Neighbours::default(); world.len()];
+            let mut search = NeighbourSearch::default();
+            for _ in 0..2 {
+                search.find_all(&world, &road, &mut found);
+                for (actor, found) in found.iter().enumerate() {
+                    prop_assert_eq!(*found, neighbours::find(&world, actor, &road));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_number_of_comparisons_grows_linearly_with_the_number_of_vehicles() {
+        let road = Road::straight(3);
+        let comparisons = |number: usize| {
+            let vehicles: Vec<_> = (0..number)
+                .map(|index| {
+                    let class = if index % 7 == 0 { VehicleClass::Truck } else { VehicleClass::Car };
+                    // Every eleventh vehicle changes lanes, and the others deviate from the centre of their lanes.
+                    let d_m = -1.875 - 3.75 * (index % 3) as f64 + 0.1 * (index % 5) as f64;
+                    let d_m = if index % 11 == 0 { d_m + 1.5 } else { d_m };
+                    (class, 12.0 * index as f64, d_m, 0.0)
+                })
+                .collect();
+            let world = world(road, &vehicles);
+            let mut search = NeighbourSearch::default();
+            search.find_all(&world, &road, &mut vec![Neighbours::default(); number]);
+            search.visits.get()
+        };
+        let (few, many) = (comparisons(50), comparisons(500));
+        assert!(many < 12 * few, "{few} comparisons for 50 vehicles, {many} for 500");
+        assert!(many < 500 * 15, "{many} comparisons for 500 vehicles");
+    }
+}
