@@ -8,7 +8,7 @@
 
 mod files;
 pub mod findings;
-mod html;
+pub(crate) mod html;
 pub mod junit;
 pub mod markdown;
 pub mod outcomes;
