@@ -13,6 +13,7 @@ use closecall_traffic::Check;
 use super::partition::Partition;
 use super::record::{ArmRecord, SampleFailure};
 use super::validity::{CheckPlan, CheckedRun};
+use super::workers::Samples;
 
 /// How the samples of a campaign are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -71,9 +72,19 @@ impl Work {
     pub fn samples(&self, part: Option<Partition>) -> impl Iterator<Item = u64> + use<> {
         (0..self.count()).filter(move |&sample| part.is_none_or(|part| part.contains(sample)))
     }
+}
+
+impl Samples for Work {
+    fn scenario(&self) -> &str {
+        &self.file.config().name
+    }
+
+    fn arms(&self) -> &[Arm] {
+        &self.arms
+    }
 
     /// Runs one sample in one arm, and checks it if the plan of the checks includes it.
-    pub(super) fn run(&self, sample: u64, arm: usize) -> ArmRun {
+    fn run(&self, sample: u64, arm: usize) -> ArmRun {
         let arm = &self.arms[arm];
         let key = RunKey { seed: self.sampling.seed, sample };
         let started = Instant::now();
@@ -95,10 +106,10 @@ impl Work {
 
 /// The result of one sample in one arm, with its wall time.
 #[derive(Clone, Debug)]
-pub(super) struct ArmRun {
-    pub(super) record: ArmRecord,
+pub(crate) struct ArmRun {
+    pub(crate) record: ArmRecord,
     /// Wall time, without the validity checks (s).
-    pub(super) wall_s: f64,
+    pub(crate) wall_s: f64,
 }
 
 /// Returns the concrete scenario of one sample.
@@ -123,7 +134,11 @@ pub fn run_guarded(
     guarded(|| simulate(scenario, key, arm, observer))
 }
 
-fn guarded<T>(run: impl FnOnce() -> Result<T, SampleError>) -> Result<T, SampleError> {
+/// Runs what may panic. A panic is returned as an error of the sample.
+///
+/// # Errors
+/// The error of `run`, or [`SampleError::Panic`].
+pub(crate) fn guarded<T>(run: impl FnOnce() -> Result<T, SampleError>) -> Result<T, SampleError> {
     catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|panic| {
         let message = panic
             .downcast_ref::<&str>()

@@ -19,7 +19,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use closecall_simulation::SampleError;
+use closecall_simulation::{Arm, SampleError};
 
 use super::record::{ArmRecord, Record, SampleFailure};
 use super::runner::{ArmRun, Work};
@@ -71,6 +71,16 @@ pub struct Finished {
     pub wall_s: Vec<f64>,
 }
 
+/// Samples that workers can run.
+pub(crate) trait Samples: Send + Sync + 'static {
+    /// Returns the scenario's name, under which the results are filed.
+    fn scenario(&self) -> &str;
+    /// Returns the arms in which each sample runs.
+    fn arms(&self) -> &[Arm];
+    /// Runs one sample in one arm.
+    fn run(&self, sample: u64, arm: usize) -> ArmRun;
+}
+
 impl Workers {
     /// Runs the given samples, and passes each result to `on_finished` in the order of `samples`. Stops when
     /// `on_finished` breaks. If `stop` is set, no further sample starts, and those that run are given a few seconds.
@@ -82,9 +92,20 @@ impl Workers {
         work: &Arc<Work>,
         samples: impl Iterator<Item = u64>,
         stop: &StopFlag,
+        on_finished: impl FnMut(Finished) -> Result<ControlFlow<()>, E>,
+    ) -> Result<(), E> {
+        self.run_samples(work, samples, stop, on_finished)
+    }
+
+    /// Does the same as [`Self::run`] for samples of any kind.
+    pub(crate) fn run_samples<E: From<WorkersError>, S: Samples>(
+        &self,
+        work: &Arc<S>,
+        samples: impl Iterator<Item = u64>,
+        stop: &StopFlag,
         mut on_finished: impl FnMut(Finished) -> Result<ControlFlow<()>, E>,
     ) -> Result<(), E> {
-        let arms = work.arms.len();
+        let arms = work.arms().len();
         let mut runs = samples.flat_map(|sample| (0..arms).map(move |arm| (sample, arm)));
         let mut pool = WorkerPool::new(*self, work, stop)?;
         let mut order = Reorder { arms, next: 0, waiting: BTreeMap::new() };
@@ -108,7 +129,7 @@ impl Workers {
             for done in results {
                 order.waiting.insert(done.index, done);
             }
-            while let Some(finished) = order.pop(work) {
+            while let Some(finished) = order.pop(&**work) {
                 if on_finished(finished)?.is_break() {
                     return Ok(());
                 }
@@ -146,9 +167,9 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-struct WorkerPool {
+struct WorkerPool<S> {
     workers: Workers,
-    work: Arc<Work>,
+    work: Arc<S>,
     stop: StopFlag,
     jobs: Sender<Job>,
     job_queue: Arc<Mutex<Receiver<Job>>>,
@@ -161,8 +182,8 @@ struct WorkerPool {
     checked: Instant,
 }
 
-impl WorkerPool {
-    fn new(workers: Workers, work: &Arc<Work>, stop: &StopFlag) -> Result<Self, WorkersError> {
+impl<S: Samples> WorkerPool<S> {
+    fn new(workers: Workers, work: &Arc<S>, stop: &StopFlag) -> Result<Self, WorkersError> {
         let ((jobs, job_queue), (result_sender, results)) = (channel(), channel());
         let job_queue = Arc::new(Mutex::new(job_queue));
         let slots = Vec::with_capacity(workers.jobs.get());
@@ -243,7 +264,7 @@ impl WorkerPool {
             let late = lock(&self.slots[index]).take_if(|(_, started)| started.elapsed() >= limit);
             if let Some((job, started)) = late {
                 let failure = SampleFailure::from(SampleError::Timeout { limit_s: limit.as_secs_f64() });
-                let controller = self.work.arms[job.arm].controller.name().to_owned();
+                let controller = self.work.arms()[job.arm].controller.name().to_owned();
                 let record = ArmRecord { controller, result: Err(failure), checks: None };
                 let run = ArmRun { record, wall_s: started.elapsed().as_secs_f64() };
                 done.push(Done { index: job.index, sample: job.sample, run });
@@ -264,7 +285,7 @@ struct Reorder {
 
 impl Reorder {
     /// Removes and returns the next sample. Returns `None` if a run of that sample is missing.
-    fn pop(&mut self, work: &Work) -> Option<Finished> {
+    fn pop(&mut self, work: &impl Samples) -> Option<Finished> {
         let indices = self.next..self.next + self.arms as u64;
         if self.arms == 0 || !indices.clone().all(|index| self.waiting.contains_key(&index)) {
             return None;
@@ -274,7 +295,7 @@ impl Reorder {
         Some(Finished {
             wall_s: done.iter().map(|done| done.run.wall_s).collect(),
             record: Record {
-                scenario: work.file.config().name.clone(),
+                scenario: work.scenario().to_owned(),
                 sample: done.first()?.sample,
                 arms: done.into_iter().map(|done| done.run.record).collect(),
             },

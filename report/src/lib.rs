@@ -4,6 +4,7 @@
 //! * [`run`](mod@run): output of one run, or of a pair of runs: Rerun recording, static figure, trace
 //! * [`campaign`]: output of many runs: HTML page, JUnit, Parquet, Markdown, recordings of selected samples
 //! * [`json`]: results as JSON with stable keys
+//! * [`study`]: output of sensitivity studies and frontiers: tables, charts and pages
 //! * [`traffic`]: simulated traffic as trajectory data, and texts and charts of what was found in trajectory data
 //!
 //! This crate is the only one that uses rerun, arrow and plotters.
@@ -13,6 +14,7 @@ mod charts;
 mod escape;
 pub mod json;
 pub mod run;
+pub mod study;
 mod table;
 pub mod traffic;
 mod units;

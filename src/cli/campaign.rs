@@ -148,14 +148,7 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
         None => report.write_without_folder()?,
     }
     match args.format {
-        Format::Json => outln!(
-            "{:#}",
-            json::stamped(
-                json::campaign(&tally.summary, &judged, Some(wall_s)),
-                Some(args.seed),
-                Some(&args.set.settings)
-            )
-        ),
+        Format::Json => outln!("{:#}", json::campaign_report(&report, Some(wall_s))),
         Format::Human => {
             print_counts(&tally.summary);
             let (simulated_s, jobs) = (tally.summary.total().simulated_s, campaign.workers.jobs);
@@ -206,7 +199,7 @@ impl Progress {
 }
 
 /// Returns a progress bar. It is shown on standard error if that is a terminal.
-fn progress_bar(samples: u64) -> ProgressBar {
+pub(super) fn progress_bar(samples: u64) -> ProgressBar {
     let bar = ProgressBar::new(samples);
     if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} samples, {per_sec}, {eta} left") {
         bar.set_style(style);

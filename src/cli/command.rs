@@ -9,7 +9,7 @@ use super::backend::choose_backend;
 use super::output::print_error;
 use super::{
     CliError, baseline, campaign, check, compare, generate, inspect, interrupt, library, merge, new, plot, record,
-    reenact, render, replay, robustness, run, schema, statistics, trajectories, watching,
+    reenact, render, replay, robustness, run, schema, statistics, study, trajectories, watching,
 };
 use crate::exit_code::ExitCode;
 
@@ -57,6 +57,10 @@ enum Command {
     Run(run::RunArgs),
     /// Run many samples of one or more scenarios, and judge the result by gates
     Campaign(campaign::CampaignArgs),
+    /// Find the assumption that moves the result of a scenario most
+    Sensitivity(study::SensitivityArgs),
+    /// Compare settings of a system: what each prevents, induces, and costs in speed
+    Frontier(study::FrontierArgs),
     /// Merge the parts of a campaign that ran on several machines, and judge the result
     Merge(merge::MergeArgs),
     /// Compare a campaign with an earlier one, sample by sample
@@ -134,6 +138,8 @@ fn dispatch(command: Command) -> Result<ExitCode, CliError> {
         Command::Watch(args) => watching::watch(&args),
         Command::Run(args) => run::run(&args),
         Command::Campaign(args) => campaign::campaign(&args),
+        Command::Sensitivity(args) => study::sensitivity(&args),
+        Command::Frontier(args) => study::frontier(&args),
         Command::Merge(args) => merge::merge(&args),
         Command::Compare(args) => compare::compare(&args),
         Command::Baseline(args) => baseline::baseline(&args),

@@ -8,6 +8,7 @@ use closecall_campaign::gate::ProjectError;
 use closecall_campaign::merge::MergeError;
 use closecall_campaign::plan::PlanError;
 use closecall_campaign::saved::SavedError;
+use closecall_campaign::sensitivity::PlanFailure;
 use closecall_report::campaign::ReportError;
 use closecall_report::run::figure::PngError;
 use closecall_report::run::film::TrafficFilmError;
@@ -107,6 +108,10 @@ pub enum CliError {
     #[error(transparent)]
     #[diagnostic(help("see `closecall --help`"))]
     Plan(#[from] PlanError),
+    /// A sensitivity study cannot be planned.
+    #[error(transparent)]
+    #[diagnostic(help("see `closecall sensitivity --help`"))]
+    Sensitivity(#[from] PlanFailure),
     /// A saved campaign cannot provide what was requested.
     #[error(transparent)]
     #[diagnostic(help("see `closecall --help`"))]
@@ -167,6 +172,8 @@ impl From<&CliError> for ExitCode {
             CliError::Folder(error) => Self::from(error),
             CliError::Campaign(error) => Self::from(error),
             CliError::Saved(error) => Self::from(error),
+            CliError::Sensitivity(PlanFailure::Workers(_)) => Self::Io,
+            CliError::Sensitivity(_) => Self::Usage,
             CliError::Report(error) => match error {
                 ReportError::Folder(error) => Self::from(error),
                 ReportError::Saved(error) => Self::from(error),

@@ -49,14 +49,7 @@ pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
     let report = CampaignReport { manifest: saved.manifest(), works: &works, tally: &tally, judged: &judged };
     report.write(saved.folder(), args.record)?;
     match args.format {
-        Format::Json => outln!(
-            "{:#}",
-            json::stamped(
-                json::campaign(&tally.summary, &judged, None),
-                Some(saved.manifest().sampling.seed),
-                Some(&saved.manifest().settings())
-            )
-        ),
+        Format::Json => outln!("{:#}", json::campaign_report(&report, None)),
         Format::Human => {
             print_counts(&tally.summary);
             print_verdict(&judged);

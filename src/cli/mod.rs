@@ -30,6 +30,7 @@ mod robustness;
 mod run;
 mod schema;
 mod statistics;
+mod study;
 mod summary;
 mod trajectories;
 mod watch;

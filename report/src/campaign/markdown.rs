@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::findings::Findings;
-use super::overview::{ScenarioOverview, WorstSample};
+use super::overview::{FEW_EVENTS, ScenarioOverview, WorstSample};
 use closecall_campaign::arm_pairs::{CORRECTION, pair_results};
 use closecall_campaign::harm;
 use closecall_campaign::ledger::Inference;
@@ -33,6 +33,7 @@ pub fn markdown(findings: &Findings<'_>) -> String {
     text.push_str(&counts(findings.summary));
     text.push_str(&requirements(findings));
     for scenario in &findings.overview.scenarios {
+        text.push_str(&influence(findings, scenario));
         text.push_str(&worst(findings, scenario));
     }
     let (sampling, version) = (findings.manifest.sampling, &findings.manifest.closecall_version);
@@ -137,6 +138,32 @@ fn requirements(findings: &Findings<'_>) -> String {
     for requirement in requirements {
         let (mark, scenario) = (cell(&requirement.mark), cell(&requirement.scenario));
         text.push_str(&format!("| {mark} | {scenario} | {} |\n", requirement.standing.word()));
+    }
+    text.push('\n');
+    text
+}
+
+/// Returns what moves the result of a scenario: the strongest parameters for each event.
+fn influence(findings: &Findings<'_>, scenario: &ScenarioOverview) -> String {
+    let mut text = format!("**What moves the result of {}**", cell(&scenario.name));
+    let events = match scenario.influence.events(findings.manifest.sampling.design) {
+        Ok(events) => events,
+        Err(reason) => return format!("{text}: {reason}.\n\n"),
+    };
+    text.push_str(" (share of the variance that a parameter explains alone)\n\n");
+    for event in events {
+        let found = match &event.parameters {
+            Some(parameters) => {
+                let strongest = parameters.iter().take(LISTED).map(|(name, influence)| {
+                    let [low, high] = influence.index.interval_95;
+                    let value = influence.index.value;
+                    format!("`{name}` {value:.2} ({low:.2} to {high:.2}; {})", event.from_to(influence))
+                });
+                strongest.collect::<Vec<_>>().join(", ")
+            }
+            None => FEW_EVENTS.to_owned(),
+        };
+        text.push_str(&format!("- {}, {} of {}: {found}\n", event.event.title(), event.events, event.samples));
     }
     text.push('\n');
     text

@@ -9,7 +9,7 @@
 mod arm_pairs;
 mod files;
 pub mod findings;
-mod html;
+pub(crate) mod html;
 pub mod junit;
 pub mod markdown;
 pub mod outcomes;

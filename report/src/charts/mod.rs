@@ -3,13 +3,19 @@
 //! * `bars`: bars in the cells of a table
 //! * `distribution`: distributions of margins and of sampled values
 //! * `map`: the outcome over two parameters
+//! * `scatter`: points with intervals, of which some are marked
+//! * `tornado`: which factor moves an output most
 //! * [`style`]: sizes, fonts, colours and axes
 
 mod bars;
 mod distribution;
 mod map;
+mod scatter;
 pub(crate) mod style;
+mod tornado;
 
 pub(super) use bars::{balance, rate};
 pub(super) use distribution::{coverage, margin};
 pub(super) use map::outcome_map;
+pub(crate) use scatter::{ScatterPoint, scatter};
+pub(crate) use tornado::{TornadoBar, tornado};

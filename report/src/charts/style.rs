@@ -94,6 +94,12 @@ pub(crate) fn legend_text<'a>() -> TextStyle<'a> {
     (FONT, LABEL_PX).into_font().color(&BLACK)
 }
 
+/// Returns the style of a label inside a chart, or of a heading.
+pub(super) fn label_text<'a>(is_head: bool) -> TextStyle<'a> {
+    let colour = if is_head { AXIS } else { NEARLY_BLACK };
+    (FONT, LABEL_PX).into_font().color(&colour)
+}
+
 /// One axis of a chart.
 pub(crate) struct ChartAxis<'a> {
     /// What the axis shows, with its unit; empty if nothing is written beside the axis.

@@ -9,6 +9,19 @@ use closecall_campaign::validity::CheckCounts;
 use closecall_campaign::verdict::Judgement;
 use serde_json::{Map, Value, json};
 
+use super::influence::influence;
+use super::stamp::stamped;
+use crate::campaign::CampaignReport;
+
+/// Returns the result of a campaign: its counts, its verdict, what moves its result, and how it was made. `wall_s` is its wall time
+/// (s), `None` for a merged campaign.
+pub fn campaign_report(report: &CampaignReport<'_>, wall_s: Option<f64>) -> Value {
+    let (tally, manifest) = (report.tally, report.manifest);
+    let mut value = campaign(&tally.summary, report.judged, wall_s);
+    value["influence"] = influence(&tally.overview, manifest.sampling.design);
+    stamped(value, Some(manifest.sampling.seed), Some(&manifest.settings()))
+}
+
 /// Returns the counts of a campaign and its verdict. `wall_s` is its wall time (s), `None` for a merged campaign.
 pub fn campaign(summary: &Summary, judged: &Judgement, wall_s: Option<f64>) -> Value {
     let total = summary.total();

@@ -4,12 +4,17 @@
 
 mod campaign;
 mod comparison;
+mod frontier;
+mod influence;
 mod outcome;
+mod sensitivity;
 mod stamp;
 mod trajectory_data;
 
-pub use campaign::campaign;
+pub use campaign::{campaign, campaign_report};
 pub use comparison::comparison;
+pub use frontier::frontier;
 pub use outcome::{encounter_metrics, outcome};
+pub use sensitivity::sensitivity;
 pub use stamp::stamped;
 pub use trajectory_data::{fitted, quality, robustness};

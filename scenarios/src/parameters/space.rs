@@ -67,6 +67,21 @@ impl ParameterSpace {
         self.map(|_, _, distribution| distribution.nominal())
     }
 
+    /// Iterates over the parameters whose values differ between samples, in the order of their names.
+    pub fn varying(&self) -> impl Iterator<Item = (&ParameterName, &SpaceEntry)> {
+        self.iter().filter(|(_, entry)| entry.distribution.variation() != Variation::None)
+    }
+
+    /// Returns the values at a point of the unit cube, which has a coordinate in [0, 1) for each parameter of
+    /// [`Self::varying`]: its quantile there. The other parameters have their only value. A coordinate that is missing is taken as the median.
+    pub fn at(&self, point: &[f64]) -> Parameters {
+        let mut coordinates = point.iter();
+        self.map(|_, _, distribution| match distribution.variation() {
+            Variation::None => distribution.nominal(),
+            _ => coordinates.next().map_or_else(|| distribution.nominal(), |u| distribution.quantile(*u)),
+        })
+    }
+
     /// Returns the nominal values, then variations of them with one parameter at one of its bounds or labels.
     ///
     /// If a scenario is valid for all of these, it passes every check that depends on a single parameter.

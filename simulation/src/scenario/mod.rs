@@ -24,7 +24,7 @@ mod variation;
 
 pub use checked::{Actor, Scenario};
 pub use config::{AbsoluteStartConfig, ActorConfig, RelativeStartConfig, SCHEMA_VERSION, ScenarioConfig, StartConfig};
-pub use edit::Setting;
+pub use edit::{Setting, SettingError};
 pub(crate) use events::{Brake, Event, Trigger};
 pub use events::{
     BrakeConfig, CutOutStartedConfig, EffectConfig, EventConfig, NominalEncounterConfig, ThwBelowConfig, TriggerConfig,

@@ -4,7 +4,7 @@
 //!  report.html
 //!    verdict with its reasons          what decides the exit code
 //!    collisions, pairs, requirements   counts with their intervals
-//!    each scenario                     errors, worst samples, outcome map, margins, coverage
+//!    each scenario                     errors, worst samples, outcome map, what moves the result, margins, coverage
 //!    slowest samples, provenance       what a repetition needs
 //!  recordings/index.html
 //!    each recorded sample              a picture, its numbers, how to open it
@@ -14,8 +14,9 @@
 //! nothing, and runs no script. A campaign's page shows wall times, so that it is not among the files that are
 //! byte-identical in a repetition.
 
+mod influence;
 mod ledger;
-mod page;
+pub(crate) mod page;
 mod provenance;
 mod recordings;
 mod samples;

@@ -38,7 +38,7 @@ pub(super) fn campaign(findings: &Findings<'_>) -> io::Result<Markup> {
 }
 
 /// Returns a whole page.
-pub(super) fn document(title: &str, body: &Markup) -> Markup {
+pub(crate) fn document(title: &str, body: &Markup) -> Markup {
     html! {
         (DOCTYPE)
         html lang="en" {
@@ -54,7 +54,7 @@ pub(super) fn document(title: &str, body: &Markup) -> Markup {
 }
 
 /// Returns a table that scrolls sideways if the page is too narrow; `head` holds cells, `rows` holds rows.
-pub(super) fn table(head: &Markup, rows: &Markup) -> Markup {
+pub(crate) fn table(head: &Markup, rows: &Markup) -> Markup {
     html! {
         div.wide {
             table {
@@ -66,22 +66,22 @@ pub(super) fn table(head: &Markup, rows: &Markup) -> Markup {
 }
 
 /// Returns the heads of columns of text.
-pub(super) fn text_heads(names: &[&str]) -> Markup {
+pub(crate) fn text_heads(names: &[&str]) -> Markup {
     html! { @for name in names { th { (name) } } }
 }
 
 /// Returns the heads of columns of numbers.
-pub(super) fn number_heads(names: &[&str]) -> Markup {
+pub(crate) fn number_heads(names: &[&str]) -> Markup {
     html! { @for name in names { th.number { (name) } } }
 }
 
 /// Returns a cell with a number.
-pub(super) fn number(value: impl Display) -> Markup {
+pub(crate) fn number(value: impl Display) -> Markup {
     html! { td.number { (value.to_string()) } }
 }
 
 /// Returns an entry of a legend, in the colour that the charts use.
-pub(super) fn legend_key(colour: &str, text: &str) -> Markup {
+pub(crate) fn legend_key(colour: &str, text: &str) -> Markup {
     html! { span.key style={ "--key:" (colour) } { (text) } }
 }
 

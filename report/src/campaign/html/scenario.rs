@@ -5,7 +5,7 @@ use std::io;
 use maud::{Markup, html};
 
 use super::page::legend_key;
-use super::samples;
+use super::{influence, samples};
 use crate::campaign::findings::Findings;
 use crate::campaign::overview::{Fate, MARGINS, MarginBins, ScenarioOverview};
 use crate::charts;
@@ -23,6 +23,7 @@ pub(super) fn section(findings: &Findings<'_>, scenario: &ScenarioOverview) -> i
             (samples::errors(scenario))
             (samples::worst(findings, scenario))
             (map(scenario)?)
+            (influence::section(findings, scenario)?)
             (margins(scenario)?)
             (coverage(scenario)?)
         }

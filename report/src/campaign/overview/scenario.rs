@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use closecall_scenarios::parameters::ParameterSpace;
 
+use super::influence::InfluenceCounts;
 use super::margins::{MARGINS, MarginBins};
 use super::pairs::{PairBins, cells_of};
 use super::sample::{Fate, Point, WorstSample};
@@ -54,6 +55,8 @@ pub struct ScenarioOverview {
     pub pairs: Vec<PairBins>,
     /// The distribution of each margin of [`MARGINS`] in each arm.
     pub margins: Vec<Vec<MarginBins>>,
+    /// What each parameter says about each event.
+    pub influence: InfluenceCounts,
     /// The worst samples of the arm under test, beginning with the worst.
     pub worst: Vec<WorstSample>,
     /// Errors by arm and kind.
@@ -76,6 +79,7 @@ impl ScenarioOverview {
             coverage: vec![[[0; Fate::ALL.len()]; CELLS]; axes.len()],
             pairs: pairs.collect(),
             axes,
+            influence: InfluenceCounts::new(space, arms.len() > 1),
             margins: vec![vec![MarginBins::EMPTY; arms.len()]; MARGINS.len()],
             worst: Vec::with_capacity(MOST_WORST + 1),
             errors: BTreeMap::new(),
@@ -107,6 +111,7 @@ impl ScenarioOverview {
             self.push_arm(index, record.sample, arm);
         }
         self.push_parameters(record, fate);
+        self.influence.push(record);
         if let Some(sample) = WorstSample::of(record) {
             let index = self.worst.partition_point(|worse| worse.order(&sample).is_lt());
             if index < MOST_WORST {

@@ -1,0 +1,103 @@
+//! The result of a sensitivity study as JSON.
+
+use closecall_campaign::sensitivity::{
+    Decomposition, Factor, OutputEffects, OutputIndices, RunErrors, Screening, Sensitivity,
+};
+use closecall_statistics::sensitivity::jackknife::Estimate;
+use closecall_statistics::sensitivity::morris::Effects;
+use serde_json::{Map, Value, json};
+
+/// Why an index is absent.
+const NO_INDEX: &str = "the output does not vary, or changes in too few rows";
+/// Why an effect is absent.
+const NO_EFFECT: &str = "too few runs have an output";
+
+/// Returns the result of a sensitivity study.
+pub fn sensitivity(study: &Sensitivity) -> Value {
+    let factor = |factor: &Factor| json!({ "name": factor.name, "kind": factor.kind.name(), "range": factor.range, "source": factor.source });
+    let left_out: Vec<Value> =
+        study.left_out.iter().map(|left| json!({ "key": left.key, "reason": left.reason })).collect();
+    json!({
+        "scenario": study.scenario,
+        "seed": study.seed,
+        "settings": study.settings,
+        "controllers": study.controllers,
+        "greatest": study.greatest().map(|factor| &factor.name),
+        "factors": study.factors.iter().map(factor).collect::<Vec<_>>(),
+        "left_out": left_out,
+        "screening": study.screening.as_ref().map(|found| screening(study, found)),
+        "decomposition": study.decomposition.as_ref().map(|found| decomposition(study, found)),
+        "errors": run_errors(&study.errors()),
+    })
+}
+
+/// Returns the errors of runs.
+pub(super) fn run_errors(errors: &RunErrors) -> Value {
+    let kinds =
+        errors.kinds.iter().map(|(kind, (count, message))| json!({ "kind": kind, "runs": count, "message": message }));
+    json!({ "count": errors.points, "kinds": kinds.collect::<Vec<_>>() })
+}
+
+/// Adds an estimate and its interval, or the reason for which there is none.
+pub(super) fn insert(object: &mut Map<String, Value>, key: &str, estimate: Option<Estimate>, absent: &str) {
+    object.insert(key.to_owned(), json!(estimate.map(|estimate| estimate.value)));
+    object.insert(format!("{key}_interval_95"), json!(estimate.map(|estimate| estimate.interval_95)));
+    if estimate.is_none() {
+        object.insert(format!("{key}_absent"), json!(absent));
+    }
+}
+
+fn screening(study: &Sensitivity, found: &Screening) -> Value {
+    let effects = |OutputEffects { output, of_factors }: &OutputEffects| {
+        let of_factor = |(factor, effects): (&Factor, &Effects)| {
+            let Effects { mu, mu_star, sigma, effects, missing } = effects;
+            let mut object = Map::new();
+            object.insert("factor".to_owned(), json!(factor.name));
+            insert(&mut object, "mu_star", *mu_star, NO_EFFECT);
+            object.insert("mu".to_owned(), json!(mu));
+            object.insert("sigma".to_owned(), json!(sigma));
+            object.insert("effects".to_owned(), json!(effects));
+            object.insert("missing".to_owned(), json!(missing));
+            Value::Object(object)
+        };
+        let effects: Vec<Value> = study.factors.iter().zip(of_factors).map(of_factor).collect();
+        json!({ "output": output.name(), "effects": effects })
+    };
+    json!({
+        "trajectories": found.trajectories,
+        "points": found.points,
+        "errors": found.errors.points,
+        "outputs": found.effects.iter().map(effects).collect::<Vec<_>>(),
+    })
+}
+
+fn decomposition(study: &Sensitivity, found: &Decomposition) -> Value {
+    let of_output = |output: &OutputIndices| {
+        let groups: Vec<Value> = output.order().into_iter().map(|group| indices(study, found, output, group)).collect();
+        json!({ "output": output.output.name(), "mean": output.mean, "indices": groups })
+    };
+    json!({
+        "rows": found.rows,
+        "points": found.points,
+        "errors": found.errors.points,
+        "outputs": found.indices.iter().map(of_output).collect::<Vec<_>>(),
+    })
+}
+
+fn indices(study: &Sensitivity, found: &Decomposition, output: &OutputIndices, group: usize) -> Value {
+    let (of_group, indices) = (&found.groups[group], &output.of_groups[group]);
+    let names: Vec<&str> = of_group.factors.iter().map(|factor| study.factors[*factor].name.as_str()).collect();
+    let mut object = Map::new();
+    object.insert("factors".to_owned(), json!(names));
+    insert(&mut object, "total", indices.total, NO_INDEX);
+    insert(&mut object, "first", indices.first, NO_INDEX);
+    object.insert("changes".to_owned(), json!(indices.changes));
+    object.insert("rows".to_owned(), json!(indices.rows));
+    if let Some(quarters) = &output.quarters[group] {
+        let means: Vec<Option<f64>> = quarters.iter().map(|mean| mean.map(|mean| mean.value)).collect();
+        let intervals: Vec<Option<[f64; 2]>> = quarters.iter().map(|mean| mean.map(|mean| mean.interval_95)).collect();
+        object.insert("quarter_means".to_owned(), json!(means));
+        object.insert("quarter_intervals_95".to_owned(), json!(intervals));
+    }
+    Value::Object(object)
+}

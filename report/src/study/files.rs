@@ -1,0 +1,194 @@
+//! The files of a study: its charts, its page, and its JSON.
+
+use std::fmt::{self, Display, Formatter};
+use std::path::{Path, PathBuf};
+
+use closecall_campaign::frontier::Frontier;
+use closecall_campaign::sensitivity::{FactorKind, RunErrors, Sensitivity};
+use closecall_scenarios::atomic::{WriteError, write_file};
+use maud::{Markup, PreEscaped, html};
+use serde_json::Value;
+
+use super::aligned::{error_lines, mean, with_interval};
+use super::frontier::{FrontierText, HEADS, cells, charts as frontier_charts, short};
+use super::sensitivity::{SensitivityText, conclusion, from_to};
+use super::tornado::charts as tornado_charts;
+use crate::campaign::html::page::{document, number, table, text_heads};
+use crate::json;
+
+/// A study that is shown: as text (`Display`), as JSON, and as files.
+#[derive(Clone, Debug)]
+pub enum Study {
+    /// A sensitivity study.
+    Sensitivity(Sensitivity),
+    /// A frontier.
+    Frontier(Frontier),
+}
+
+impl Display for Study {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Sensitivity(study) => SensitivityText(study).fmt(f),
+            Self::Frontier(frontier) => FrontierText(frontier).fmt(f),
+        }
+    }
+}
+
+impl Study {
+    /// Returns the study as JSON.
+    pub fn json(&self) -> Value {
+        let (value, seed) = match self {
+            Self::Sensitivity(study) => (json::sensitivity(study), study.seed),
+            Self::Frontier(frontier) => (json::frontier(frontier), frontier.seed),
+        };
+        json::stamped(value, Some(seed), None)
+    }
+
+    /// Returns the number of points or runs that ended in an error.
+    pub fn errors(&self) -> u64 {
+        match self {
+            Self::Sensitivity(study) => study.errors().points,
+            Self::Frontier(frontier) => frontier.errors.points,
+        }
+    }
+}
+
+/// Writes the page, the charts and the JSON of a study into a folder, which is created if it does not exist. Returns their paths.
+///
+/// # Errors
+/// [`WriteError`] if a chart cannot be drawn or a file cannot be written.
+pub fn write_study(folder: &Path, study: &Study) -> Result<Vec<PathBuf>, WriteError> {
+    let fail = |source| WriteError::new(folder, source);
+    let (name, chart_name, charts, page) = match study {
+        Study::Sensitivity(study) => {
+            let charts = tornado_charts(study).map_err(fail)?;
+            let page = sensitivity_page(study, &charts);
+            ("sensitivity", "tornado", charts, page)
+        }
+        Study::Frontier(frontier) => {
+            let charts = frontier_charts(frontier).map_err(fail)?;
+            let page = frontier_page(frontier, &charts);
+            ("frontier", "frontier", charts, page)
+        }
+    };
+    std::fs::create_dir_all(folder).map_err(fail)?;
+    let mut files =
+        vec![(format!("{name}.html"), page.into_string()), (format!("{name}.json"), format!("{:#}\n", study.json()))];
+    files.extend(charts.into_iter().map(|(of, svg)| (format!("{chart_name}-{of}.svg"), svg)));
+    let write = |(name, text): (String, String)| {
+        let path = folder.join(name);
+        write_file(&path, |file| file.write_all(text.as_bytes())).map(|()| path)
+    };
+    files.into_iter().map(write).collect()
+}
+
+type Charts = Vec<(&'static str, String)>;
+
+fn errors(errors: &RunErrors, what: &str) -> Markup {
+    html! { @for line in error_lines(errors, what) { p.failure { (line) } } }
+}
+
+fn head(title: &str, settings: &[String], line: &str) -> Markup {
+    html! {
+        header {
+            div {
+                h1 { (title) }
+                p.what { (line) }
+                @for setting in settings { p.note { code { "--set " (setting) } } }
+            }
+        }
+    }
+}
+
+fn sensitivity_page(study: &Sensitivity, charts: &Charts) -> Markup {
+    let title = format!("Sensitivity: {}", study.scenario);
+    let about = format!(
+        "Controllers {}, {} factors, seed {}",
+        study.controllers.join(" and "),
+        study.factors.len(),
+        study.seed
+    );
+    let body = html! {
+        (head(&title, &study.settings, &about))
+        p { strong { (conclusion(study)) } }
+        (errors(&study.errors(), "points"))
+        @for (index, output) in study.outputs.iter().enumerate() {
+            section {
+                h2 { (output.title()) }
+                @if let Some((_, svg)) = charts.get(index) { figure { (PreEscaped(svg)) } }
+                @if let Some(found) = &study.decomposition {
+                    @let of_output = &found.indices[index];
+                    p.note {
+                        "Mean " (mean(*output, of_output.mean)) " over " (found.points) " points, " (found.rows) " rows. The total "
+                        "index is the share of the variance that would be left if only this factor were unknown; the first-order "
+                        "index is the share that it explains alone."
+                    }
+                    (table(&text_heads(&["factor", "total index (95 %)", "first-order index (95 %)", "lowest → highest quarter"]), &html! {
+                        @for group in of_output.order() {
+                            tr {
+                                td { (found.groups[group].label) }
+                                (number(with_interval(of_output.of_groups[group].total)))
+                                (number(with_interval(of_output.of_groups[group].first)))
+                                (number(from_to(of_output, group)))
+                            }
+                        }
+                    }))
+                }
+            }
+        }
+        section {
+            h2 { "Factors" }
+            p.note { "A number of the scenario file is uniformly distributed over its range; a parameter keeps its distribution." }
+            (table(&text_heads(&["factor", "kind", "from", "to", "source"]), &html! {
+                @for factor in &study.factors {
+                    tr {
+                        td { (factor.name) }
+                        td { (factor.kind.name()) }
+                        @let ends = factor.range.map(|ends| ends.map(|end| format!("{end:.4}"))).unwrap_or_default();
+                        @for end in ends { (number(end)) }
+                        td { (factor.source) }
+                    }
+                }
+                @for left in &study.left_out {
+                    tr { td { (left.key) } td { "left out" } td {} td {} td { (left.reason) } }
+                }
+            }))
+            @if study.factors.iter().any(|factor| factor.kind == FactorKind::Chance) {
+                p.note { "Chance is the number that keys the random streams of a run. Both arms always share it." }
+            }
+        }
+    };
+    document(&title, &body)
+}
+
+fn frontier_page(frontier: &Frontier, charts: &Charts) -> Markup {
+    let title = format!("Frontier: {}", frontier.scenario);
+    let (controllers, samples) = (frontier.controllers.join(" and "), frontier.samples);
+    let about = format!("Controllers {controllers}, {samples} samples for each combination, seed {}", frontier.seed);
+    let keys: Vec<&str> = frontier.keys.iter().map(|key| short(key)).collect();
+    let heads: Vec<&str> = [""].into_iter().chain(keys).chain(HEADS).collect();
+    let body = html! {
+        (head(&title, &frontier.settings, &about))
+        (errors(&frontier.errors, "runs"))
+        p.note {
+            "Marked combinations are Pareto-optimal: no other one prevents more, induces less or loses less speed without being worse "
+            "in another of the three. All combinations run the same samples. Lines are 95 % intervals; those that overlap do not tell "
+            "two combinations apart."
+        }
+        @for (_, svg) in charts { figure { (PreEscaped(svg)) } }
+        section {
+            h2 { "Combinations" }
+            (table(&text_heads(&heads), &html! {
+                @for point in &frontier.points {
+                    tr.tested[point.is_optimal] {
+                        td { @if point.is_optimal { "◆" } }
+                        @for value in &point.values { (number(value)) }
+                        @for cell in cells(point) { (number(cell)) }
+                    }
+                }
+            }))
+            p.note { "Keys: " @for key in &frontier.keys { code { (key) } " " } }
+        }
+    };
+    document(&title, &body)
+}

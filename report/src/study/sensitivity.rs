@@ -1,0 +1,129 @@
+//! A sensitivity study as text for the console.
+
+use std::fmt::{self, Display, Formatter};
+
+use closecall_campaign::sensitivity::{Decomposition, Factor, OutputEffects, OutputIndices, Screening, Sensitivity};
+use closecall_statistics::sensitivity::morris::Effects;
+
+use super::aligned::{error_lines, mean, with_interval, write_rows};
+
+/// Largest number of factors that the table of the screening names for each output.
+const LISTED: usize = 12;
+
+/// A study as text.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SensitivityText<'a>(pub(super) &'a Sensitivity);
+
+impl Display for SensitivityText<'_> {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let study = self.0;
+        writeln!(
+            f,
+            "{}: {} factors, controllers {}, seed {}",
+            study.scenario,
+            study.factors.len(),
+            study.controllers.join(" and "),
+            study.seed
+        )?;
+        if let Some(screening) = &study.screening {
+            write_screening(f, study, screening)?;
+        }
+        if let Some(found) = &study.decomposition {
+            write_decomposition(f, found)?;
+        }
+        for line in error_lines(&study.errors(), "points") {
+            writeln!(f, "{line}")?;
+        }
+        writeln!(f, "\n{}", conclusion(study))
+    }
+}
+
+/// Returns the sentence that names the assumption that moves the first output most.
+pub(super) fn conclusion(study: &Sensitivity) -> String {
+    let Some(output) = study.outputs.first() else { return String::new() };
+    let Some(greatest) = study.greatest() else {
+        return format!("No assumption was seen to move the {}.", output.title());
+    };
+    let by = match &study.decomposition {
+        Some(found) => by_index(found, study, greatest),
+        None => "by its elementary effects".to_owned(),
+    };
+    format!("The assumption that moves the {} most is {}: {by}.", output.title(), greatest.name)
+}
+
+fn by_index(found: &Decomposition, study: &Sensitivity, greatest: &Factor) -> String {
+    let group =
+        found.groups.iter().position(|group| matches!(group.factors[..], [one] if study.factors[one] == *greatest));
+    match (found.indices.first(), group) {
+        (Some(first), Some(group)) => {
+            let total = with_interval(first.of_groups[group].total);
+            let runner_up =
+                first.order().into_iter().find(|other| *other != group && found.groups[*other].factors.len() == 1);
+            let is_clear = runner_up.and_then(|other| first.of_groups[other].total).is_none_or(|other| {
+                first.of_groups[group].total.is_some_and(|own| own.interval_95[0] > other.interval_95[1])
+            });
+            let clearly = if is_clear { "" } else { ", an interval that overlaps that of the next factor" };
+            format!("total index {total}{clearly}; {}", from_to(first, group))
+        }
+        _ => "by its total index".to_owned(),
+    }
+}
+
+/// Returns the means of an output in the lowest and in the highest quarter of a factor.
+pub(super) fn from_to(output: &OutputIndices, group: usize) -> String {
+    let Some(quarters) = &output.quarters[group] else { return "-".to_owned() };
+    let of = |quarter: usize| mean(output.output, quarters[quarter].map(|estimate| estimate.value));
+    format!("{} → {}", of(0), of(quarters.len() - 1))
+}
+
+fn write_screening(f: &mut Formatter<'_>, study: &Sensitivity, screening: &Screening) -> fmt::Result {
+    let (trajectories, points) = (screening.trajectories, screening.points);
+    writeln!(f, "\nScreening (Morris): {trajectories} trajectories, {points} points")?;
+    for OutputEffects { output, of_factors } in &screening.effects {
+        let mu_star = |effects: &Effects| effects.mu_star.map_or(0.0, |mu_star| mu_star.value);
+        let mut order: Vec<usize> = (0..of_factors.len()).filter(|index| mu_star(&of_factors[*index]) > 0.0).collect();
+        order.sort_by(|a, b| mu_star(&of_factors[*b]).total_cmp(&mu_star(&of_factors[*a])).then(a.cmp(b)));
+        let hidden = of_factors.len() - order.len().min(LISTED);
+        writeln!(f, "\n{}", output.title())?;
+        let mut rows = vec![["factor", "kind", "μ* (95 %)", "μ", "σ"].map(str::to_owned).to_vec()];
+        rows.extend(order.into_iter().take(LISTED).map(|index| {
+            let (factor, effects) = (&study.factors[index], &of_factors[index]);
+            let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:.3}"));
+            vec![
+                factor.label(),
+                factor.kind.name().to_owned(),
+                with_interval(effects.mu_star),
+                number(effects.mu),
+                number(effects.sigma),
+            ]
+        }));
+        write_rows(f, &rows)?;
+        if hidden > 0 {
+            writeln!(f, "  and {hidden} factors with less or no effect")?;
+        }
+    }
+    Ok(())
+}
+
+fn write_decomposition(f: &mut Formatter<'_>, found: &Decomposition) -> fmt::Result {
+    writeln!(f, "\nDecomposition (Sobol'): {} rows, {} points", found.rows, found.points)?;
+    for output in &found.indices {
+        writeln!(f, "\n{}: mean {}", output.output.title(), mean(output.output, output.mean))?;
+        let heads = ["factor", "total index (95 %)", "first-order index (95 %)", "lowest → highest quarter"];
+        let mut rows = vec![heads.map(str::to_owned).to_vec()];
+        rows.extend(output.order().into_iter().map(|group| {
+            let indices = &output.of_groups[group];
+            vec![
+                found.groups[group].label.clone(),
+                with_interval(indices.total),
+                with_interval(indices.first),
+                from_to(output, group),
+            ]
+        }));
+        write_rows(f, &rows)?;
+        if output.of_groups.iter().all(|indices| indices.total.is_none()) {
+            writeln!(f, "  The output does not vary, or changes too seldom: nothing can be said.")?;
+        }
+    }
+    Ok(())
+}

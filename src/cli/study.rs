@@ -1,0 +1,157 @@
+//! `closecall sensitivity` and `closecall frontier`: studies that vary the assumptions, or the system, of a scenario.
+
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+use clap::Args;
+use closecall_campaign::execution::CampaignError;
+use closecall_campaign::frontier::{FrontierPlan, Grid};
+use closecall_campaign::runner::Sampling;
+use closecall_campaign::sensitivity::{FactorRange, Method, SensitivityPlan};
+use closecall_campaign::stop::StopFlag;
+use closecall_campaign::workers::Workers;
+use closecall_report::study::{Study, write_study};
+use closecall_scenarios::sampling::Design;
+use closecall_simulation::controller::ControllerChoice;
+
+use super::CliError;
+use super::args::{ControllerArgs, Format, SensorsChoice, SetArgs, controllers, count};
+use super::campaign::progress_bar;
+use super::heartbeat::Heartbeat;
+use super::interrupt::{Signal, received, stop_gracefully};
+use super::output::{out, outln, print_written};
+use crate::exit_code::ExitCode;
+
+/// Arguments that both studies share.
+#[derive(Debug, Args)]
+pub(super) struct StudyArgs {
+    /// Scenario file, or name of a scenario of the library
+    scenario: PathBuf,
+    /// Seed of the random numbers
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    #[command(flatten)]
+    controller: ControllerArgs,
+    /// Depth of the sensor simulation [default: that of the scenario]
+    #[arg(long, value_enum)]
+    sensors: Option<SensorsChoice>,
+    /// Number of worker threads [default: one per processor]
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    jobs: Option<u16>,
+    /// Folder for the page, the charts (SVG) and the figures (JSON)
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    set: SetArgs,
+    /// Output format
+    #[arg(long, value_enum, default_value_t, help_heading = clap::builder::Resettable::Reset)]
+    format: Format,
+}
+
+/// Arguments of `closecall sensitivity`.
+#[derive(Debug, Args)]
+pub(super) struct SensitivityArgs {
+    #[command(flatten)]
+    study: StudyArgs,
+    /// Vary a value of the scenario uniformly, named as for --set; can be given more than once
+    #[arg(long = "factor", value_name = "KEY=LOW..HIGH")]
+    factors: Vec<FactorRange>,
+    /// Vary only the sampled parameters and those of --factor, not the list for driver, sensor and controller
+    #[arg(long)]
+    no_default_factors: bool,
+    /// `morris`: only a screening; `sobol`: only a decomposition, by all factors; `both`: by the factors that matter
+    #[arg(long, value_name = "morris|sobol|both", default_value = "both")]
+    method: Method,
+    /// Number of trajectories of the screening, each with a run for every factor
+    #[arg(long, value_name = "N", default_value = "20", value_parser = count)]
+    trajectories: u64,
+    /// Number of rows of the decomposition, each with a run for every factor
+    #[arg(short = 'n', long = "rows", value_name = "N", default_value = "512", value_parser = count)]
+    rows: u64,
+    /// Number of factors that the decomposition keeps apart after the screening
+    #[arg(long, value_name = "N", default_value = "8", value_parser = count)]
+    top: u64,
+}
+
+/// Arguments of `closecall frontier`.
+#[derive(Debug, Args)]
+pub(super) struct FrontierArgs {
+    #[command(flatten)]
+    study: StudyArgs,
+    /// Values of a key, named as for --set, of which all combinations are run; can be given more than once [default:
+    /// braking, engagement distance, goal and critical gap of the margin increase system]
+    #[arg(long = "vary", value_name = "KEY=a,b,…")]
+    vary: Vec<Grid>,
+    /// Number of samples, the same for every combination
+    #[arg(short = 'n', long = "samples", default_value = "200", value_parser = count)]
+    samples: u64,
+}
+
+impl StudyArgs {
+    /// Returns the baseline, unless the controller under test is the baseline itself, and the controller under test.
+    fn controllers(&self) -> Result<Vec<ControllerChoice>, CliError> {
+        let tested = self.controller.choice()?;
+        controllers(tested.clone(), tested != ControllerChoice::Acc)
+    }
+
+    fn workers(&self) -> Workers {
+        let default = Workers::default();
+        Workers { jobs: self.jobs.and_then(|jobs| NonZeroUsize::new(jobs.into())).unwrap_or(default.jobs), ..default }
+    }
+
+    /// Runs a study of this many steps with a progress bar; `None` if a signal has ended it.
+    fn run<T, E>(
+        &self,
+        steps: u64,
+        study: impl FnOnce(&StopFlag, &mut dyn FnMut()) -> Result<Option<T>, E>,
+    ) -> Result<Option<T>, E> {
+        let (stop, bar) = (StopFlag::default(), progress_bar(steps));
+        stop_gracefully(&stop);
+        let _heartbeat = Heartbeat::start(&bar);
+        let found = study(&stop, &mut || bar.inc(1));
+        bar.finish_and_clear();
+        found
+    }
+
+    /// Prints a study, and writes its files. Without a result, a signal has ended it, and nothing is kept.
+    fn print(&self, study: Option<Study>) -> Result<ExitCode, CliError> {
+        let signal = received();
+        let Some(study) = study else {
+            outln!("ENDED EARLY, without a result: nothing was kept");
+            return Ok(signal.map_or(ExitCode::Interrupted, Signal::exit_code));
+        };
+        match self.format {
+            Format::Json => outln!("{:#}", study.json()),
+            Format::Human => out!("{study}"),
+        }
+        if let Some(out) = &self.out {
+            write_study(out, &study)?.iter().for_each(|path| print_written(path));
+        }
+        Ok(if study.errors() > 0 { ExitCode::SampleError } else { ExitCode::Pass })
+    }
+}
+
+pub(super) fn sensitivity(args: &SensitivityArgs) -> Result<ExitCode, CliError> {
+    let (study, number) = (&args.study, |count: u64| usize::try_from(count).unwrap_or(usize::MAX));
+    let (file, sensors) = (study.set.load(&study.scenario)?, study.sensors.map(SensorsChoice::mode));
+    let (named, with_defaults) = (args.factors.clone(), !args.no_default_factors);
+    let mut plan = SensitivityPlan::new(&file, &study.controllers()?, sensors, named, with_defaults)?;
+    plan.method = args.method;
+    (plan.trajectories, plan.rows, plan.top) = (number(args.trajectories), number(args.rows), number(args.top));
+    (plan.seed, plan.workers) = (study.seed, study.workers());
+    let found = study.run(plan.points() as u64, |stop, step| plan.run(stop, step))?;
+    study.print(found.map(Study::Sensitivity))
+}
+
+pub(super) fn frontier(args: &FrontierArgs) -> Result<ExitCode, CliError> {
+    let study = &args.study;
+    let file = study.set.load(&study.scenario)?;
+    let grid = if args.vary.is_empty() { FrontierPlan::default_grid(&file) } else { args.vary.clone() };
+    let sampling = Sampling { seed: study.seed, design: Design::Random, samples: args.samples };
+    let (sensors, workers) = (study.sensors.map(SensorsChoice::mode), study.workers());
+    let controllers = controllers(study.controller.choice()?, true)?;
+    let plan = FrontierPlan { file, grid, sampling, controllers, sensors, workers };
+    let prepared = plan.prepare()?;
+    let found = study.run(prepared.runs(), |stop, step| prepared.run(stop, step)).map_err(CampaignError::from)?;
+    study.print(found.map(Study::Frontier))
+}
