@@ -15,7 +15,8 @@ use closecall_scenarios::sampling::Design;
 use closecall_simulation::controller::ControllerChoice;
 
 use super::CliError;
-use super::args::{ControllerArgs, Format, SensorsChoice, SetArgs, controllers, count};
+use super::args::{Format, SensorsChoice, SetArgs, count};
+use super::arms::ControllerArgs;
 use super::campaign::progress_bar;
 use super::heartbeat::Heartbeat;
 use super::interrupt::{Signal, received, stop_gracefully};
@@ -90,8 +91,10 @@ pub(super) struct FrontierArgs {
 impl StudyArgs {
     /// Returns the baseline, unless the controller under test is the baseline itself, and the controller under test.
     fn controllers(&self) -> Result<Vec<ControllerChoice>, CliError> {
-        let tested = self.controller.choice()?;
-        controllers(tested.clone(), tested != ControllerChoice::Acc)
+        Ok(match self.controller.choice()? {
+            ControllerChoice::Acc => vec![ControllerChoice::Acc],
+            tested => vec![ControllerChoice::Acc, tested],
+        })
     }
 
     fn workers(&self) -> Workers {
@@ -149,7 +152,11 @@ pub(super) fn frontier(args: &FrontierArgs) -> Result<ExitCode, CliError> {
     let grid = if args.vary.is_empty() { FrontierPlan::default_grid(&file) } else { args.vary.clone() };
     let sampling = Sampling { seed: study.seed, design: Design::Random, samples: args.samples };
     let (sensors, workers) = (study.sensors.map(SensorsChoice::mode), study.workers());
-    let controllers = controllers(study.controller.choice()?, true)?;
+    let controllers = study.controllers()?;
+    if controllers.len() < 2 {
+        let message = "a frontier compares a controller with `acc`: name another with --controller".to_owned();
+        return Err(CliError::Usage { message });
+    }
     let plan = FrontierPlan { file, grid, sampling, controllers, sensors, workers };
     let prepared = plan.prepare()?;
     let found = study.run(prepared.runs(), |stop, step| prepared.run(stop, step)).map_err(CampaignError::from)?;
