@@ -11,7 +11,8 @@
 //! for the comfort command alone, and each step starts from the comfort command of the step before: while emergency
 //! braking acts, the comfort command goes on beneath it, and once emergency braking ends, the ego follows the comfort
 //! command at once. A ramp that started from the command of emergency braking would keep the ego braking for seconds
-//! after the lead vehicle has stopped braking.
+//! after the lead vehicle has stopped braking. After emergency braking the MIS takes no further speed while the gap to the lead
+//! vehicle does not close.
 
 use closecall_traffic::Time;
 
@@ -67,6 +68,7 @@ impl EgoStack {
             commanded_mps2: last_mps2,
             automated: self.settings.automated,
             acc_gap_m: self.settings.acc.desired_gap_m(speed_mps),
+            emergency_braking: self.emergency_braking,
         };
         let decision = mis.step(&situation);
         let lowest = last_mps2 - mis.settings().max_jerk_mps3 * step_s;

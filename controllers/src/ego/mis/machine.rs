@@ -84,6 +84,8 @@ struct Target {
     /// The last time at which it approached fast enough not to count as following.
     last_approached: Time,
     last_lane_free: Time,
+    /// Whether emergency braking has acted since the system engaged.
+    has_braked_hard: bool,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -114,6 +116,8 @@ pub(crate) struct Situation<'a> {
     pub(crate) commanded_mps2: f64,
     /// The desired gap of the ACC (m).
     pub(crate) acc_gap_m: f64,
+    /// Whether emergency braking acted at the last control step.
+    pub(crate) emergency_braking: bool,
 }
 
 impl Situation<'_> {
@@ -230,7 +234,8 @@ impl Mis {
         }
         let now = situation.input.time;
         let goal_thw_s = thw_s + settings.thw_gain_s;
-        Ok(Target { rear, goal_thw_s, last_seen: now, last_approached: now, last_lane_free: now })
+        let has_braked_hard = situation.emergency_braking;
+        Ok(Target { rear, goal_thw_s, last_seen: now, last_approached: now, last_lane_free: now, has_braked_hard })
     }
 
     fn transition_from_increasing(&self, situation: &Situation<'_>, target: &mut Target) -> Option<(State, Reason)> {
@@ -337,7 +342,10 @@ impl Mis {
         };
         let prediction = ArrivalPrediction { encounter, response: self.response(situation) };
         let bound = self.settings.max_deceleration_mps2;
-        let solution = situation.lead.and_then(|_| prediction.solve(target.goal_thw_s, bound));
+        let solution = situation
+            .lead
+            .filter(|lead| target.may_cost_speed(lead, ego_mps))
+            .and_then(|_| prediction.solve(target.goal_thw_s, bound));
         let braking = solution.map_or(0.0, |solution| solution.deceleration_mps2);
         let touching = Encounter { critical_gap_m: 0.0, ..encounter };
         let ttce_s = if rear.gap_m <= 0.0 {
@@ -368,8 +376,19 @@ impl Mis {
 }
 
 impl Target {
+    /// Returns true if the ego may slow down for the margin.
+    ///
+    /// Emergency braking is the hazard that the margin was meant for: the rear vehicle has lost the distance that the ego
+    /// needed, its driver brakes or evades, and the plan's assumption that it drives on as before no longer holds. From then
+    /// on the ego slows down in front of it only while the gap ahead closes. While it does not, the margin does not shrink,
+    /// and every further m/s is taken from the driver behind for nothing.
+    fn may_cost_speed(&self, lead: &Front, ego_mps: f64) -> bool {
+        !self.has_braked_hard || lead.speed_mps < ego_mps
+    }
+
     /// Updates the vehicle from its track, or extrapolates it if it has none.
     fn update(&mut self, situation: &Situation<'_>, step_s: f64) {
+        self.has_braked_hard |= situation.emergency_braking;
         let own_mps = situation.speed_mps();
         let expected_m = self.rear.x_m + (self.rear.speed_mps - own_mps) * step_s;
         let by_id = |id: TrackId| situation.input.tracks.iter().find(|track| track.id == id);

@@ -5,10 +5,15 @@ use closecall_traffic::{Check, Parameters};
 use super::*;
 use crate::ego::AebConfig;
 
+/// The settings of the bench, with emergency braking.
+fn with_aeb() -> EgoSettings {
+    let aeb = AebConfig::default().check(&Parameters::default()).unwrap();
+    EgoSettings { aeb: Some(aeb), ..Bench::SETTINGS }
+}
+
 impl Bench {
     fn with_emergency_braking() -> Self {
-        let aeb = AebConfig::default().check(&Parameters::default()).unwrap();
-        let mut bench = Self::with_settings(EgoSettings { aeb: Some(aeb), ..Self::SETTINGS });
+        let mut bench = Self::with_settings(with_aeb());
         assert_eq!(bench.step().state, EgoState::Increasing);
         bench
     }
@@ -36,6 +41,64 @@ fn the_ego_lets_go_of_the_brake_when_emergency_braking_ends() {
     }
     assert_eq!(command.reason, Reason::BrakingDone);
     assert!(command.acceleration_mps2 > -1.5, "{command:?}");
+}
+
+/// Lead vehicles that brake hard once: the gap (m) and the speed (m/s) for each control step.
+fn hard_braking() -> Vec<[f64; 2]> {
+    let far = [[60.0, 30.0]; 10];
+    let near = [[16.0, 20.0]; 8];
+    [&far[..], &near, &[[60.0, 30.0]; 30], &near, &[[30.0, 31.0]; 40]].concat()
+}
+
+/// The comfort command goes on beneath emergency braking. A stack that has emergency braking therefore commands, in every step
+/// in which it does not act, what a stack without it commands. If the ramp that releases the brake started from the command of
+/// emergency braking, the ego would still brake after it.
+#[test]
+fn the_ramp_that_releases_the_brake_starts_from_the_comfort_command() {
+    for mis in [Some(MisSettings::PAPER), None] {
+        let mut with = Bench::with_emergency_braking();
+        with.stack = EgoStack::new(EgoSettings { mis, ..with_aeb() });
+        let mut without = Bench::with_settings(EgoSettings { mis, ..Bench::SETTINGS });
+        with.time = without.time;
+        let (mut braked, mut compared_after) = (0, 0);
+        for [gap_m, lead_mps] in hard_braking() {
+            let [one, other] = [&mut with, &mut without].map(|bench| {
+                // The rear vehicle has passed: nothing but the lead vehicle matters.
+                bench.rear().state[0] = 1.1 * CAR_M;
+                bench.rear().lane = [1.0, 0.0, 0.0];
+                bench.lead().state[0] = gap_m + CAR_M;
+                bench.lead().state[2] = lead_mps;
+                bench.step()
+            });
+            if one.state == EgoState::EmergencyBraking {
+                assert!(one.acceleration_mps2 <= other.acceleration_mps2, "{one:?} {other:?}");
+                braked += 1;
+            } else {
+                assert_eq!(one.acceleration_mps2.to_bits(), other.acceleration_mps2.to_bits(), "{one:?} {other:?}");
+                compared_after += u32::from(braked > 0);
+            }
+        }
+        assert!(braked > 10 && compared_after > 40, "{braked} steps of emergency braking, {compared_after} after it");
+    }
+}
+
+#[test]
+fn after_emergency_braking_the_system_takes_no_more_speed_while_the_front_gap_does_not_close() {
+    let mut bench = Bench::with_emergency_braking();
+    assert!(bench.step_for(1.0).acceleration_mps2 < -0.9, "the margin is out of reach: the system brakes in full");
+    bench.lead().state[0] = 14.0 + CAR_M;
+    bench.lead().state[2] = 22.0;
+    assert_eq!(bench.step_for(0.5).state, EgoState::EmergencyBraking);
+    // The lead vehicle is as fast as the ego again, at a gap that the cruise control need not extend.
+    bench.lead().state[0] = 30.0 + CAR_M;
+    bench.lead().state[2] = 30.5;
+    let command = bench.step_for(2.0);
+    assert_eq!(command.state, EgoState::Increasing);
+    assert!(command.acceleration_mps2 > -0.05, "{command:?}");
+    assert_eq!(command.plan.unwrap().deceleration_mps2, 0.0);
+    // As soon as the gap closes, the margin is worth speed again.
+    bench.lead().state[2] = 29.0;
+    assert!(bench.step_for(1.0).acceleration_mps2 < -0.9);
 }
 
 #[test]
