@@ -31,6 +31,7 @@ mod schema;
 mod statistics;
 mod summary;
 mod trajectories;
+mod view;
 mod watch;
 mod watching;
 

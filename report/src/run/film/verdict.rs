@@ -90,10 +90,10 @@ impl Film {
             parts.push(format!("visibility {:.0} m", weather.visibility_m));
         }
         if weather.rain_mm_per_h > 0.0 {
-            parts.push(format!("rain {} mm/h", weather.rain_mm_per_h));
+            parts.push(format!("rain {:.1} mm/h", weather.rain_mm_per_h));
         }
         if weather.water_film_mm > 0.0 {
-            parts.push(format!("water film {} mm", weather.water_film_mm));
+            parts.push(format!("water film {:.1} mm", weather.water_film_mm));
         }
         (!parts.is_empty()).then(|| parts.join(", "))
     }
