@@ -25,7 +25,7 @@ pub(super) struct ViewArgs {
     #[arg(long)]
     no_open: bool,
     /// Program of the Rerun viewer, which brings its web build, or a folder with that build
-    #[arg(long, value_name = "PATH", env = "CLOSECALL_RERUN", default_value = "rerun")]
+    #[arg(long, value_name = "PATH", env = "CLOSECALL_RERUN", hide_env_values = true, default_value = "rerun")]
     viewer: PathBuf,
 }
 

@@ -49,7 +49,7 @@ fn push_pair(page: &mut String, films: [&Film; 2], verdict: PairVerdict) {
     let conditions = conditions(tested);
     if let Some(outcome) = &tested.outcome {
         let _ =
-            write!(page, "{} · seed {} · sample {}{conditions}\n\n", outcome.scenario, outcome.seed, outcome.sample);
+            writeln!(page, "- {} · seed {} · sample {}{conditions}", outcome.scenario, outcome.seed, outcome.sample);
     }
 }
 

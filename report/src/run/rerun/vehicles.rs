@@ -18,7 +18,7 @@ const ARROW_ABOVE_M: f64 = 0.4;
 /// Heights of the names above the roof (m): different ones, so that the names of vehicles that touch do not cover each
 /// other.
 /// The name of the ego lies on the road, to its right.
-const EGO_LABEL_AT_M: [f32; 3] = [1.5, -3.0, 0.0];
+const EGO_LABEL_AT_M: [f32; 3] = [4.0, -3.0, 0.0];
 const LEAD_LABEL_M: f64 = 5.8;
 const OTHER_LABEL_M: f64 = 1.6;
 const REAR_LABEL_M: f64 = 3.2;
@@ -31,6 +31,8 @@ const COLLISION_TEXT_SPACING_M: f32 = 4.0;
 const GAP_TEXT_Y_M: f32 = -6.0;
 /// Gap below which the vehicles touch and no headway is written (m).
 const TOUCHING_M: f64 = 0.3;
+/// Front gap below which no headway is written, since the name of the ego is there (m).
+const NAMED_GAP_M: f64 = 15.0;
 /// Height at which gaps are drawn (m).
 const GAP_Z_M: f64 = 0.5;
 
@@ -287,7 +289,7 @@ impl Gap {
         let is_critical = thw_s.is_ok_and(|thw_s| thw_s < CRITICAL_THW_S);
         let end = |x_m: f64| [x_m as f32, 0.0, GAP_Z_M as f32];
         let text = match thw_s {
-            _ if gap_m < TOUCHING_M => String::new(),
+            _ if gap_m < if sign > 0.0 { NAMED_GAP_M } else { TOUCHING_M } => String::new(),
             Ok(thw_s) => headway_text(thw_s),
             Err(_) => format!("{gap_m:.1} m"),
         };
