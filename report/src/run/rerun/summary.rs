@@ -4,13 +4,14 @@ use std::fmt::Write as _;
 
 use closecall_traffic::{Measured, Time};
 
-use crate::run::film::{Film, PairVerdict, headway_text};
+use crate::run::film::{Film, fate_word, headway_text};
+use closecall_campaign::ledger::PairFate;
 
 /// Returns the verdict in Markdown: what happened, how close it was, and what the system did.
 pub(super) fn verdict(films: &[Film]) -> String {
     let mut page = String::new();
-    match (films, Film::pair_verdict(films)) {
-        ([baseline, tested], Some(verdict)) => push_pair(&mut page, [baseline, tested], verdict),
+    match (films, Film::pair_fate(films)) {
+        ([baseline, tested], Some(fate)) => push_pair(&mut page, [baseline, tested], fate),
         _ => {
             for film in films {
                 page.push_str(&film.foreword);
@@ -36,9 +37,9 @@ pub(super) fn story(films: &[Film]) -> String {
 }
 
 /// Appends the verdict on a pair.
-fn push_pair(page: &mut String, films: [&Film; 2], verdict: PairVerdict) {
+fn push_pair(page: &mut String, films: [&Film; 2], fate: PairFate) {
     // Writing to a string cannot fail.
-    let _ = write!(page, "### {}\n\n", verdict.word());
+    let _ = write!(page, "### {}\n\n", fate_word(fate));
     for film in films {
         if let Some(result) = film.result() {
             let _ = writeln!(page, "- **{}:** {result}", film.arm_label());
