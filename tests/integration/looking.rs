@@ -43,7 +43,6 @@ fn the_program_of_the_page_reads_a_recording() {
     assert!((property_s - least_s).abs() < 0.006, "{text} {least_s}");
     // The curve has the control steps only.
     assert!(curve_s >= property_s && curve_s < property_s + 0.1, "{text}");
-    assert!(!stderr(&output).contains("legacy"), "{}", stderr(&output));
 }
 
 /// A running server, ended when the value is dropped.

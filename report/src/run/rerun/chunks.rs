@@ -2,7 +2,7 @@
 //!
 //! The library's own stream draws identifiers from the clock and collects rows until a timer ends. Two recordings of the
 //! same run would then differ. Here a chunk has the number of its predecessor plus one, and the recording is named after
-//! the hash of its contents, so that the same run gives the same bytes.
+//! the hash of its texts, so that the same run gives the same bytes.
 
 use std::cell::RefCell;
 
@@ -15,12 +15,7 @@ use rerun::{AsComponents, SerializedComponentColumn, StoreId, StoreKind, TimeCol
 use super::RecordingError;
 
 /// Number of digits of the hash that names a recording.
-const NAME_DIGITS: usize = 16;
-/// Ends of the names of the two stores of a recording.
-const LAYOUT_SUFFIX: &str = "-layout";
-const DATA_SUFFIX: &str = "-data";
-/// Largest number of attempts at an index in a stable order. Each succeeds with a probability of about one half.
-const MAX_ATTEMPTS: u32 = 100;
+const NAME_DIGITS: usize = 32;
 
 /// The chunks of one store, in the order in which they are written.
 #[derive(Default)]
@@ -75,65 +70,39 @@ impl Chunks {
 
 /// Returns the messages of a recording: the layout first, then the data.
 pub(super) fn recording(
-    application: &'static str,
+    (application, name): (&'static str, String),
     layout: Chunks,
     data: Chunks,
 ) -> Result<Vec<LogMsg>, RecordingError> {
-    let unnamed = StoreId::new(StoreKind::Recording, application, "unnamed");
-    let draft = data.messages(&unnamed)?;
-    let name = hash(&draft)?;
-    let id = |kind, suffix| StoreId::new(kind, application, format!("{name}{suffix}"));
-    let (blueprint, recording) = (id(StoreKind::Blueprint, LAYOUT_SUFFIX), id(StoreKind::Recording, DATA_SUFFIX));
+    let id = |kind| StoreId::new(kind, application, name.as_str());
+    let blueprint = id(StoreKind::Blueprint);
     let mut messages = layout.messages(&blueprint)?;
     messages.push(LogMsg::BlueprintActivationCommand(BlueprintActivationCommand::make_active(blueprint)));
-    messages.extend(draft.into_iter().map(|mut message| {
-        message.set_store_id(recording.clone());
-        message
-    }));
+    messages.extend(data.messages(&id(StoreKind::Recording))?);
     Ok(messages)
+}
+
+/// Returns the name of a recording: the first digits of the hash of its texts, which hold all results.
+pub(super) fn name(texts: &[String]) -> String {
+    let mut hasher = blake3::Hasher::new();
+    for text in texts {
+        hasher.update(&(text.len() as u64).to_le_bytes());
+        hasher.update(text.as_bytes());
+    }
+    hasher.finalize().to_hex().chars().take(NAME_DIGITS).collect()
 }
 
 /// Returns the bytes of a recording file.
 ///
-/// The index at the end of the file lists its two stores in the order of a hash table, which the library seeds by chance.
-/// The file is therefore encoded until the layout comes first: twice on average.
+/// The file has no index at its end: the library writes that in an order of chance, and it would take a fifth of the file.
 pub(super) fn encode(messages: &[LogMsg]) -> Result<Vec<u8>, RecordingError> {
-    for _ in 0..MAX_ATTEMPTS {
-        let mut encoder = Encoder::local().map_err(RecordingError::encode)?;
-        let mut length = 0;
-        for message in messages {
-            length += encoder.append(message).map_err(RecordingError::encode)?;
-        }
-        encoder.finish().map_err(RecordingError::encode)?;
-        let bytes = encoder.into_inner().map_err(RecordingError::encode)?;
-        // The header, which `append` does not count, is shorter than any message.
-        let index = bytes.get(usize::try_from(length).unwrap_or(0)..).unwrap_or_default();
-        if is_layout_first(index) {
-            return Ok(bytes);
-        }
-    }
-    Err(RecordingError::encode("the index of the file has no stable order"))
-}
-
-/// Returns true if the index names the layout before the data.
-fn is_layout_first(index: &[u8]) -> bool {
-    let position = |text: &str| index.windows(text.len()).position(|bytes| bytes == text.as_bytes());
-    match (position(LAYOUT_SUFFIX), position(DATA_SUFFIX)) {
-        (Some(layout), Some(data)) => layout < data,
-        _ => true,
-    }
-}
-
-/// Returns the first digits of the hash of the messages.
-fn hash(messages: &[LogMsg]) -> Result<String, RecordingError> {
     let mut encoder = Encoder::local().map_err(RecordingError::encode)?;
     encoder.do_not_emit_footer();
     for message in messages {
         encoder.append(message).map_err(RecordingError::encode)?;
     }
     encoder.finish().map_err(RecordingError::encode)?;
-    let bytes = encoder.into_inner().map_err(RecordingError::encode)?;
-    Ok(blake3::hash(&bytes).to_hex().chars().take(NAME_DIGITS).collect())
+    encoder.into_inner().map_err(RecordingError::encode)
 }
 
 /// Returns the identifier of the chunk of this index. The rows of a chunk have identifiers from its own on.
