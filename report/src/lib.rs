@@ -3,6 +3,7 @@
 //!
 //! * [`run`](mod@run): output of one run, or of a pair of runs: Rerun recording, static figure, trace
 //! * [`campaign`]: output of many runs: HTML page, JUnit, Parquet, Markdown, recordings of selected samples
+//! * [`serve`]: recordings in the browser
 //! * [`json`]: results as JSON with stable keys
 //! * [`study`]: output of sensitivity studies and frontiers: tables, charts and pages
 //! * [`traffic`]: simulated traffic as trajectory data, and texts and charts of what was found in trajectory data
@@ -15,6 +16,7 @@ mod escape;
 pub mod json;
 pub mod run;
 pub mod study;
+pub mod serve;
 mod table;
 pub mod traffic;
 mod units;

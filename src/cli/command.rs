@@ -9,7 +9,7 @@ use super::backend::choose_backend;
 use super::output::print_error;
 use super::{
     CliError, baseline, campaign, check, compare, generate, inspect, interrupt, library, merge, new, plot, record,
-    reenact, render, replay, robustness, run, schema, statistics, study, trajectories, watching,
+    reenact, render, replay, robustness, run, schema, statistics, study, trajectories, view, watching,
 };
 use crate::exit_code::ExitCode;
 
@@ -91,6 +91,8 @@ enum Command {
     Record(record::RecordArgs),
     /// Draw an encounter as a static figure, SVG or PNG
     Plot(plot::PlotArgs),
+    /// Show recordings in the browser, with the web build of an installed Rerun viewer
+    View(view::ViewArgs),
     /// Render labelled images of the rear camera
     Render(render::RenderArgs),
     /// Print a script that completes commands and options in a shell
@@ -155,6 +157,7 @@ fn dispatch(command: Command) -> Result<ExitCode, CliError> {
         Command::Robustness(args) => robustness::robustness(&args),
         Command::Record(args) => record::record(&args),
         Command::Plot(args) => plot::plot(&args),
+        Command::View(args) => view::view(&args),
         Command::Render(args) => render::render(&args),
         Command::Completions(args) => generate::completions(&args, Cli::command()),
         Command::Man(args) => generate::man(&args, Cli::command()),

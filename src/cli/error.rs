@@ -13,6 +13,7 @@ use closecall_report::campaign::ReportError;
 use closecall_report::run::figure::PngError;
 use closecall_report::run::film::TrafficFilmError;
 use closecall_report::run::rerun::RecordingError;
+use closecall_report::serve::{ServeError, ViewerError};
 use closecall_report::traffic::trajectory_charts::ChartError;
 use closecall_scenarios::atomic::WriteError;
 use closecall_scenarios::encounter::NoEncounter;
@@ -61,6 +62,12 @@ pub enum CliError {
     /// A recording (Rerun file) cannot be written.
     #[error(transparent)]
     Record(#[from] RecordingError),
+    /// Recordings cannot be shown in the browser.
+    #[error(transparent)]
+    Serve(#[from] ServeError),
+    /// There is no web viewer.
+    #[error(transparent)]
+    Viewer(#[from] ViewerError),
     /// A figure cannot be drawn.
     #[error(transparent)]
     Figure(#[from] PngError),
@@ -168,6 +175,7 @@ impl From<&CliError> for ExitCode {
             | CliError::TrafficFilm(_)
             | CliError::NoEncounter { .. }
             | CliError::Project(_)
+            | CliError::Serve(ServeError::Nothing { .. })
             | CliError::Classifier(_) => Self::InvalidInput,
             CliError::Folder(error) => Self::from(error),
             CliError::Campaign(error) => Self::from(error),
@@ -196,6 +204,8 @@ impl From<&CliError> for ExitCode {
             CliError::Write(_)
             | CliError::Chart(_)
             | CliError::Record(_)
+            | CliError::Serve(ServeError::Read { .. } | ServeError::Listen { .. })
+            | CliError::Viewer(_)
             | CliError::Figure(_)
             | CliError::WriteRecording(_)
             | CliError::Dataset(_) => Self::Io,

@@ -33,6 +33,7 @@ mod statistics;
 mod study;
 mod summary;
 mod trajectories;
+mod view;
 mod watch;
 mod watching;
 

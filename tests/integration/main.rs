@@ -22,6 +22,7 @@ mod hidden_lead;
 mod inputs;
 mod inspect;
 mod library;
+mod looking;
 mod malformed;
 mod nothing_checked;
 mod own_controller;

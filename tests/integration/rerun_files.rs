@@ -16,7 +16,7 @@ fn verify(viewer: &Path, file: &Path) {
     assert!(verified.status.success(), "{}: {}", file.display(), stderr(&verified));
     let printed = Command::new(viewer).args(["rrd", "print", "-vv"]).arg(file).output().unwrap();
     let printed = String::from_utf8_lossy(&printed.stdout).into_owned();
-    for named in ["until_critical", "time", "step", "/summary", "plots/speed/"] {
+    for named in ["opening", "time", "step", "/verdict", "/summary", "plots/speed/"] {
         assert!(printed.contains(named), "{}: no `{named}`", file.display());
     }
 }
@@ -51,6 +51,19 @@ fn recordings_of_a_pair_a_full_run_and_recorded_traffic_verify() {
     let none = closecall(["criticality", &own, "--record", &file("none.rrd"), "--track", "99999"]);
     assert_eq!(code(&none), 2, "{}", stderr(&none));
     assert!(stderr(&none).contains("no lane change of track 99999"), "{}", stderr(&none));
+}
+
+#[test]
+fn the_same_run_gives_the_same_recording() {
+    let folder = folder();
+    let scenario = library("low-thw-overtake");
+    let written = |name: &str| {
+        let file = folder.path().join(name);
+        let arguments = ["run", scenario.to_str().unwrap(), "--paired", "--record", file.to_str().unwrap()];
+        stdout(&closecall(arguments), 0);
+        std::fs::read(file).unwrap()
+    };
+    assert!(written("one.rrd") == written("two.rrd"), "the two files differ");
 }
 
 #[test]

@@ -15,6 +15,7 @@ pub(super) fn provenance(findings: &Findings<'_>) -> Markup {
     html! {
         h2 { "How it was made" }
         (table(&text_heads(&["", ""]), &rows))
+        p.signature { span { "Reviewed by" } span { "Date" } span { "Signature" } }
         @for file in findings.files {
             @if file.space().iter().len() > 0 {
                 h3 { "Where the values of " (file.config().name) " come from" }

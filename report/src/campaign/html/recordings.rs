@@ -49,10 +49,16 @@ fn page(entries: &[IndexEntry]) -> Markup {
             "the right, and the road is drawn wider than it is. The recordings open in the Rerun viewer 0.36:"
         }
         pre { "pip install rerun-sdk==0.36.3" }
+        p { "Without an installed viewer window, in the browser: " code { "closecall view DIR" } ", with the campaign's folder." }
         @for entry in entries { (section(entry)) }
+        script { (PreEscaped(LINKS)) }
     };
     document("Recordings", &body)
 }
+
+/// Shows the links into the web viewer if `closecall view` serves the page.
+const LINKS: &str = "if (location.protocol === 'http:') for (const link of document.querySelectorAll('a.in-browser')) {
+  link.href = '/viewer/?url=' + encodeURIComponent(link.href); link.hidden = false; }";
 
 fn section(entry: &IndexEntry) -> Markup {
     html! {
@@ -65,6 +71,7 @@ fn section(entry: &IndexEntry) -> Markup {
                 (numbers(&entry.outcomes))
                 p { "Open it, from this page's folder:" }
                 pre { "rerun " (entry.file) }
+                a.in-browser hidden href=(entry.file) { "Open in this browser" }
                 p { "Run it again, from the folder that the campaign was run in:" }
                 pre { (entry.replay) }
             }

@@ -27,6 +27,7 @@ pub(super) fn header(findings: &Findings<'_>) -> Markup {
             p.verdict { (judged.word()) }
             div {
                 h1 { (findings.scenario_names()) }
+                @if let Some(line) = headline(findings) { p.headline { (line) } }
                 p.what {
                     (findings.summary.controllers.join(" against ")) ": "
                     (samples) @if samples == 1 { " sample, " } @else { " samples, " }
@@ -37,6 +38,19 @@ pub(super) fn header(findings: &Findings<'_>) -> Markup {
             }
         }
     }
+}
+
+/// Returns what the system under test changed, in one sentence. `None` if the campaign has no baseline.
+fn headline(findings: &Findings<'_>) -> Option<String> {
+    if !findings.summary.is_paired() {
+        return None;
+    }
+    let pairs = findings.summary.total().pairs;
+    let without = pairs.prevented + pairs.both;
+    Some(format!(
+        "{} of {without} collisions prevented, {} induced; harm prevented {:.3}, induced {:.3}",
+        pairs.prevented, pairs.induced, pairs.prevented_harm, pairs.induced_harm
+    ))
 }
 
 const fn standing_class(standing: Standing) -> &'static str {

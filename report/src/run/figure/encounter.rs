@@ -76,7 +76,7 @@ fn title(svg: &mut Svg, films: &[Film]) {
     svg.text([LEFT, 20.0], &names, style(13.0, INK));
     for (row, film) in films.iter().enumerate() {
         let has_collision = film.worst_collision().is_some();
-        let line = if films.len() > 1 { format!("{}: {}", film.arm(), film.headline()) } else { film.headline() };
+        let line = if films.len() > 1 { format!("{}: {}", film.arm_label(), film.headline()) } else { film.headline() };
         svg.text(
             [LEFT, 36.0 + 14.0 * row as f64],
             &line,
@@ -91,7 +91,7 @@ type Instant = (Time, char, String);
 /// Returns moment (a) of the baseline, if it reached that.
 fn hazard(baseline: &Film) -> Option<Instant> {
     let noted = baseline.moments().iter().find(|noted| noted.moment == Moment::Hazard)?;
-    Some((noted.time, noted.moment.letter()?, format!("{} ({})", noted.moment.text(), baseline.arm())))
+    Some((noted.time, noted.moment.letter()?, format!("{} ({})", noted.moment.text(), baseline.arm_label())))
 }
 
 /// Returns the instants to show, in order of time, each with its letter and text: the moments of the paper that the run reached, and
@@ -216,7 +216,7 @@ fn over_time(
 
 /// Returns the name of a curve, followed by the name of its arm if there are several films.
 fn named(films: &[Film], film_index: usize, name: &str) -> String {
-    if films.len() > 1 { format!("{name} ({})", films[film_index].arm()) } else { name.to_owned() }
+    if films.len() > 1 { format!("{name} ({})", films[film_index].arm_label()) } else { name.to_owned() }
 }
 
 /// Returns the curve of the time to closest encounter for each film.
@@ -293,7 +293,7 @@ fn bands(svg: &mut Svg, films: &[Film], top: f64) {
     for (row, film) in films.iter().enumerate() {
         let y = top + (BAND_HEIGHT + 4.0) * row as f64;
         let style = |colour, anchor| TextStyle { size: 10.0, colour, anchor };
-        svg.text([LEFT - 6.0, y + 12.0], film.arm(), style(INK, Anchor::End));
+        svg.text([LEFT - 6.0, y + 12.0], film.arm_label(), style(INK, Anchor::End));
         let states: Vec<_> = film.frames[frames_shown(films, film)]
             .iter()
             .filter_map(|frame| Some((frame.time.s(), frame.command?.state)))

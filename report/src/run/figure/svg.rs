@@ -140,6 +140,7 @@ impl Svg {
         let _ = writeln!(self.body, "<circle cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"{radius:.2}\" fill=\"{fill}\"/>");
     }
 
+    /// The text has a white halo, so that it is legible on lines.
     pub(super) fn text(&mut self, [x, y]: [f64; 2], text: &str, style: TextStyle<'_>) {
         let anchor = match style.anchor {
             Anchor::Start => "start",
@@ -148,7 +149,8 @@ impl Svg {
         };
         let _ = writeln!(
             self.body,
-            "<text x=\"{x:.2}\" y=\"{y:.2}\" font-size=\"{:.1}\" fill=\"{}\" text-anchor=\"{anchor}\">{}</text>",
+            "<text x=\"{x:.2}\" y=\"{y:.2}\" font-size=\"{:.1}\" fill=\"{}\" text-anchor=\"{anchor}\" paint-order=\"stroke\" \
+             stroke=\"#ffffff\" stroke-width=\"2.5\" stroke-linejoin=\"round\">{}</text>",
             style.size,
             style.colour,
             escaped(text)

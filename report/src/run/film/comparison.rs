@@ -64,18 +64,17 @@ impl EncounterComparison {
         })
     }
 
-    /// Returns the comparison as Markdown: the vehicles, a table of the metrics, and how the run deviates from the
-    /// recorded encounter.
+    /// Returns the comparison as Markdown: the vehicles, the metrics of each side, and how the run deviates from the recorded
+    /// encounter.
     pub fn markdown(&self, encounter: &RecordedEncounter, simulated: &Film, driver: RearDriver) -> String {
         let [ego, front, rear] = encounter.ego_lead_rear().map(|track| track.track_id);
         let (arm, start_s) = (simulated.arm_label(), encounter.start.s());
-        let mut page = format!(
-            "### Recorded beside {arm}\n\n**Track {rear} (R) behind {ego} (E) behind {front} (F). Both start alike at {start_s:.1} s of the trajectory \
-             data.**\n\n| | recorded | {arm} |\n|---|---|---|\n"
-        );
-        for (name, [recorded, simulated]) in self.rows() {
+        let mut page = format!("### Recorded, and {arm}\n\n");
+        for (side, name) in ["recorded", arm].into_iter().enumerate() {
+            let values: Vec<String> =
+                self.rows().take(SHOWN_ROWS).map(|(metric, texts)| format!("{metric} {}", texts[side])).collect();
             // Writing to a string cannot fail.
-            let _ = writeln!(page, "| {name} | {recorded} | {simulated} |");
+            let _ = writeln!(page, "- **{name}:** {}", values.join("; "));
         }
         let rear_driver = match driver {
             RearDriver::Driver => "a model of a human driver drives R and pulls out at the recorded headway",
@@ -88,13 +87,16 @@ impl EncounterComparison {
         };
         let _ = writeln!(
             page,
-            "\nIn the run, F drives as recorded; {rear_driver}{missing_text}. The thin outlines are the vehicles of the other \
-             half. Trajectory data: `{}`.\n",
+            "- Track {rear} (R) behind {ego} (E) behind {front} (F), alike at {start_s:.1} s. F drives as recorded; {rear_driver}{missing_text}. Thin outlines: the other side. Trajectory data: \
+             `{}`.\n",
             encounter.data_name
         );
         page
     }
 }
+
+/// Number of metrics in the text; the command line prints all of them.
+const SHOWN_ROWS: usize = 4;
 
 /// A metric of the comparison: its name, its unit, and the function that reads it.
 type Row = (&'static str, &'static str, fn(&EncounterMetrics) -> Measured);

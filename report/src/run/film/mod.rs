@@ -33,5 +33,4 @@ pub use recorder::FilmRecorder;
 pub(super) use scan::{NO_CLUSTER, Scan};
 pub(super) use story::{collision_text, driver_note_text, ego_state_name};
 pub use traffic::{TrafficFilmError, film_lane_change};
-pub use verdict::PairVerdict;
-pub(super) use verdict::headway_text;
+pub(super) use verdict::{fate_word, headway_text};

@@ -1,5 +1,6 @@
 //! The verdict on a run or on a pair, in words: which vehicles collided, whether the system prevented it, how close it was.
 
+use closecall_campaign::ledger::{PairFate, Tally};
 use closecall_simulation::outcome::{Collision, Outcome};
 use closecall_traffic::Light;
 
@@ -8,46 +9,31 @@ use super::Film;
 /// Visibility below which the weather is named (m). Koschmieder's visibility of clear air is far above it.
 const CLEAR_VISIBILITY_M: f64 = 2_000.0;
 
-/// What became of a pair: the baseline beside the arm under test.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PairVerdict {
-    /// The ego collided in the baseline only.
-    Prevented,
-    /// The ego collided in the arm under test only.
-    Induced,
-    /// The ego collided in both arms.
-    Both,
-    /// The ego collided in neither arm.
-    Neither,
+/// Returns what the system under test changes, by the rule of the campaigns.
+fn fate(baseline: &Outcome, tested: &Outcome) -> Option<PairFate> {
+    let [baseline, tested] = [baseline, tested].map(|outcome| Tally {
+        collided: Some(outcome.ego_collided()),
+        others_collided: outcome.others_collided(),
+        ..Tally::default()
+    });
+    PairFate::of(&baseline, &tested)
 }
 
-impl PairVerdict {
-    /// Returns the verdict on a baseline and the arm under test.
-    pub fn of(baseline: &Outcome, tested: &Outcome) -> Self {
-        match (baseline.ego_collided(), tested.ego_collided()) {
-            (true, false) => Self::Prevented,
-            (false, true) => Self::Induced,
-            (true, true) => Self::Both,
-            (false, false) => Self::Neither,
-        }
-    }
-
-    /// Returns the verdict as one word.
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::Prevented => "PREVENTED",
-            Self::Induced => "INDUCED",
-            Self::Both => "BOTH COLLIDE",
-            Self::Neither => "NEITHER COLLIDES",
-        }
+/// Returns the verdict on a pair as one or two words.
+pub(in crate::run) const fn fate_word(fate: PairFate) -> &'static str {
+    match fate {
+        PairFate::Prevented => "PREVENTED",
+        PairFate::Induced => "INDUCED",
+        PairFate::Both => "BOTH COLLIDE",
+        PairFate::Neither => "NEITHER COLLIDES",
     }
 }
 
 impl Film {
     /// Returns the verdict on a pair of films of runs, or `None` if one of them is recorded traffic.
-    pub fn pair_verdict(films: &[Self]) -> Option<PairVerdict> {
+    pub fn pair_fate(films: &[Self]) -> Option<PairFate> {
         match films {
-            [baseline, tested] => Some(PairVerdict::of(baseline.outcome()?, tested.outcome()?)),
+            [baseline, tested] => fate(baseline.outcome()?, tested.outcome()?),
             _ => None,
         }
     }
@@ -90,10 +76,10 @@ impl Film {
             parts.push(format!("visibility {:.0} m", weather.visibility_m));
         }
         if weather.rain_mm_per_h > 0.0 {
-            parts.push(format!("rain {} mm/h", weather.rain_mm_per_h));
+            parts.push(format!("rain {:.1} mm/h", weather.rain_mm_per_h));
         }
         if weather.water_film_mm > 0.0 {
-            parts.push(format!("water film {} mm", weather.water_film_mm));
+            parts.push(format!("water film {:.1} mm", weather.water_film_mm));
         }
         (!parts.is_empty()).then(|| parts.join(", "))
     }

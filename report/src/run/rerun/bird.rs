@@ -47,8 +47,8 @@ const AXIS_STEP_M: i32 = 10;
 /// Marks of the axis that have a number are this many steps apart.
 const AXIS_NUMBERED: i32 = 2;
 /// Width of a letter of a label in a window of 1280 px (m in the picture), and of the room between two labels.
-const LETTER_M: f64 = 0.95;
-const BETWEEN_LABELS_M: f64 = 3.5;
+const LETTER_M: f64 = 1.15;
+const BETWEEN_LABELS_M: f64 = 1.5;
 /// Letters of the clock besides the name of the arm.
 const CLOCK_LETTERS: usize = 10;
 // Draw orders: a larger one lies above a smaller one.

@@ -70,11 +70,14 @@ pub(super) struct FilmContents {
 /// Returns the chunks of the layout for these films.
 pub(super) fn layout(films: &[FilmContents]) -> Result<Chunks, RecordingError> {
     let left = below(
-        [Some((2.3, verdict())), bird(films).map(|view| (if films.len() > 1 { 4.2 } else { 2.5 }, view))]
-            .into_iter()
-            .flatten()
-            .chain(scenes(films).map(|view| (if films.len() > 1 { 3.4 } else { 5.0 }, view)))
-            .collect(),
+        [
+            Some((verdict_share(films), verdict())),
+            bird(films).map(|view| (if films.len() > 1 { 4.2 } else { 2.5 }, view)),
+        ]
+        .into_iter()
+        .flatten()
+        .chain(scenes(films).map(|view| (if films.len() > 1 { 3.4 } else { 5.0 }, view)))
+        .collect(),
     );
     let mut states: Vec<Node> = films.iter().filter(|film| film.has_states).rev().map(states).collect();
     let mut right = Vec::new();
@@ -93,6 +96,15 @@ pub(super) fn layout(films: &[FilmContents]) -> Result<Chunks, RecordingError> {
     nodes::chunks(root.unwrap_or_else(verdict), OPENING_TIMELINE)
 }
 
+/// Returns the room for the verdict. That on recorded traffic is longer.
+fn verdict_share(films: &[FilmContents]) -> f32 {
+    match films {
+        [film] if !film.has_states => 3.6,
+        [_] => 2.4,
+        _ => 2.9,
+    }
+}
+
 fn verdict() -> Node {
     View::new("TextDocument", "Verdict", "verdict").into()
 }
@@ -101,11 +113,12 @@ fn verdict() -> Node {
 fn scenes(films: &[FilmContents]) -> Option<Node> {
     let mut nodes = Vec::new();
     for film in films.iter().filter(|film| film.has_scene) {
-        nodes.push((3.0, scene(film)));
+        let mut own = vec![(3.0, scene(film))];
         if film.has_camera {
             let camera = View::new("2D", titled("Rear camera", films, film), format!("{}camera", film.root));
-            nodes.push((2.0, camera.into()));
+            own.push((1.6, camera.into()));
         }
+        nodes.extend(below(own).map(|node| (1.0, node)));
     }
     beside(nodes)
 }
@@ -140,7 +153,8 @@ fn bird(films: &[FilmContents]) -> Option<Node> {
     let shown: Vec<&FilmContents> = films.iter().filter(|film| film.has_scene).collect();
     let low = shown.iter().map(|film| film.bird_range[0]).min_by(f64::total_cmp)?;
     let high = shown.iter().map(|film| film.bird_range[1]).max_by(f64::total_cmp)?;
-    let view = View::new("2D", "From above · distance from the ego [m]", "/")
+    let subject = if is_traffic(films) { "vehicle that changes lanes" } else { "ego" };
+    let view = View::new("2D", format!("From above · distance from the {subject} [m]"), "/")
         .with_contents(shown.iter().map(|film| format!("/{}bird/**", film.root)));
     let bounds = Range2D { x_range: super::bird::X_RANGE_M.into(), y_range: [low, high].into() };
     let road = Background::new(BackgroundKind::SolidColor).with_color(palette::GROUND);
@@ -163,7 +177,7 @@ fn films_plots(films: &[FilmContents]) -> Vec<Node> {
         let high = of_kind.iter().map(|(_, plot)| plot.range[1]).fold(f64::NEG_INFINITY, f64::max);
         let note = if films.len() > 1 { " · thin: " } else { "" };
         let baseline = films.first().filter(|_| films.len() > 1).map_or("", |film| film.name.as_str());
-        let view = View::new("TimeSeries", format!("{}{note}{baseline}", kind.title()), "/")
+        let view = View::new("TimeSeries", format!("{}{note}{baseline}", kind.title(is_traffic(films))), "/")
             .with_contents(contents)
             .with("PlotLegend", PlotLegend::new().with_visible(false))
             .with("ScalarAxis", ScalarAxis::new().with_range(Range1D::new(low, high)))
@@ -171,6 +185,11 @@ fn films_plots(films: &[FilmContents]) -> Vec<Node> {
         nodes.push(view.into());
     }
     nodes
+}
+
+/// Returns true if the recording shows recorded traffic only.
+fn is_traffic(films: &[FilmContents]) -> bool {
+    films.iter().all(|film| !film.has_states)
 }
 
 /// Returns a time axis over the longest of the films.

@@ -2,7 +2,7 @@
 //!
 //! The library's own stream draws identifiers from the clock and collects rows until a timer ends. Two recordings of the
 //! same run would then differ. Here a chunk has the number of its predecessor plus one, and the recording is named after
-//! the hash of its contents, so that the same run gives the same bytes.
+//! the hash of its texts, so that the same run gives the same bytes.
 
 use std::cell::RefCell;
 
@@ -70,42 +70,39 @@ impl Chunks {
 
 /// Returns the messages of a recording: the layout first, then the data.
 pub(super) fn recording(
-    application: &'static str,
+    (application, name): (&'static str, String),
     layout: Chunks,
     data: Chunks,
 ) -> Result<Vec<LogMsg>, RecordingError> {
-    let unnamed = StoreId::new(StoreKind::Recording, application, "unnamed");
-    let draft = data.messages(&unnamed)?;
-    let name = hash(&draft)?;
     let id = |kind| StoreId::new(kind, application, name.as_str());
-    let (blueprint, recording) = (id(StoreKind::Blueprint), id(StoreKind::Recording));
+    let blueprint = id(StoreKind::Blueprint);
     let mut messages = layout.messages(&blueprint)?;
     messages.push(LogMsg::BlueprintActivationCommand(BlueprintActivationCommand::make_active(blueprint)));
-    messages.extend(draft.into_iter().map(|mut message| {
-        message.set_store_id(recording.clone());
-        message
-    }));
+    messages.extend(data.messages(&id(StoreKind::Recording))?);
     Ok(messages)
 }
 
-/// Returns the bytes of a recording file.
-pub(super) fn encode(messages: &[LogMsg]) -> Result<Vec<u8>, RecordingError> {
-    encode_all(messages)
+/// Returns the name of a recording: the first digits of the hash of its texts, which hold all results.
+pub(super) fn name(texts: &[String]) -> String {
+    let mut hasher = blake3::Hasher::new();
+    for text in texts {
+        hasher.update(&(text.len() as u64).to_le_bytes());
+        hasher.update(text.as_bytes());
+    }
+    hasher.finalize().to_hex().chars().take(NAME_DIGITS).collect()
 }
 
-/// Returns the bytes of the messages. An index at the end of the file would list its stores in an order of chance.
-fn encode_all(messages: &[LogMsg]) -> Result<Vec<u8>, RecordingError> {
+/// Returns the bytes of a recording file.
+///
+/// The file has no index at its end: the library writes that in an order of chance, and it would take a fifth of the file.
+pub(super) fn encode(messages: &[LogMsg]) -> Result<Vec<u8>, RecordingError> {
     let mut encoder = Encoder::local().map_err(RecordingError::encode)?;
     encoder.do_not_emit_footer();
     for message in messages {
         encoder.append(message).map_err(RecordingError::encode)?;
     }
-    encoder.finish().and_then(|()| encoder.into_inner()).map_err(RecordingError::encode)
-}
-
-/// Returns the first digits of the hash of the messages.
-fn hash(messages: &[LogMsg]) -> Result<String, RecordingError> {
-    Ok(blake3::hash(&encode_all(messages)?).to_hex().chars().take(NAME_DIGITS).collect())
+    encoder.finish().map_err(RecordingError::encode)?;
+    encoder.into_inner().map_err(RecordingError::encode)
 }
 
 /// Returns the identifier of the chunk of this index. The rows of a chunk have identifiers from its own on.

@@ -1,15 +1,16 @@
-//! Fog in the 3D scene: upright curtains around the ego, behind which everything is paler.
+//! Fog in the 3D scene: upright curtains ahead of the ego, behind which everything is paler. The eye looks ahead.
 //!
 //! After Koschmieder, contrast falls with the distance r as exp(-3.912·r/V), with the meteorological visibility V at which 2 %
 //! of it are left. Each curtain takes the share that its distance from the one before accounts for.
 
 use nalgebra::Vector3;
-use rerun::Mesh3D;
+use rerun::{Mesh3D, Transform3D};
 
 use super::RecordingError;
 use super::palette;
 use super::stream::Writer;
-use crate::run::film::Film;
+use super::vehicles::yaw_rotation;
+use crate::run::film::{Film, Frame};
 
 /// Extinction over the visibility: -ln(0.02).
 const KOSCHMIEDER: f64 = 3.912;
@@ -31,7 +32,7 @@ pub(super) fn clear_share(film: &Film) -> f64 {
     if visibility_m >= MAX_VISIBILITY_M { 1.0 } else { visibility_m / MAX_VISIBILITY_M }
 }
 
-/// Writes the curtains ahead of and behind the ego.
+/// Writes the curtains, which move along the road with the ego.
 pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingError> {
     let visibility_m = film.environment.visibility_m;
     if visibility_m >= MAX_VISIBILITY_M {
@@ -41,15 +42,24 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingErr
     let opacity = 1.0 - (-KOSCHMIEDER * step_m / visibility_m).exp();
     let colour = palette::with_opacity(palette::through_fog(palette::SKY, 0.0), (255.0 * opacity) as u8);
     for curtain in 1..=CURTAINS {
-        for (side, name) in [(1.0, "ahead"), (-1.0, "behind")] {
-            let x_m = side * step_m * f64::from(curtain);
-            let corner = |across: f64, up: f64| {
-                Vector3::new(x_m, across * HALF_WIDTH_M, up * HEIGHT_M).map(|value| value as f32).into()
-            };
-            let corners: [[f32; 3]; 4] = [corner(-1.0, -0.1), corner(1.0, -0.1), corner(1.0, 1.0), corner(-1.0, 1.0)];
-            let mesh = Mesh3D::new(corners).with_triangle_indices([[0, 1, 2], [0, 2, 3]]).with_albedo_factor(colour);
-            writer.write_static(&format!("world/fog/{name}_{curtain}"), &mesh)?;
-        }
+        let x_m = step_m * f64::from(curtain);
+        let corner = |across: f64, up: f64| {
+            Vector3::new(x_m, across * HALF_WIDTH_M, up * HEIGHT_M).map(|value| value as f32).into()
+        };
+        let corners: [[f32; 3]; 4] = [corner(-1.0, -0.1), corner(1.0, -0.1), corner(1.0, 1.0), corner(-1.0, 1.0)];
+        let mesh = Mesh3D::new(corners).with_triangle_indices([[0, 1, 2], [0, 2, 3]]).with_albedo_factor(colour);
+        writer.write_static(&format!("world/fog/{curtain}"), &mesh)?;
     }
-    Ok(())
+    let along = |frame: &Frame| {
+        let own = &frame.states[film.ego];
+        film.road.plane_pose(own.s_m, 0.0, 0.0)
+    };
+    let poses: Vec<_> = film.frames.iter().map(along).collect();
+    writer.write_rows("world/fog", &film.times(), |range| {
+        let poses = &poses[range];
+        Transform3D::update_fields()
+            .with_many_translation(poses.iter().map(|pose| [pose.x_m as f32, pose.y_m as f32, 0.0]))
+            .with_many_quaternion(poses.iter().map(|pose| yaw_rotation(pose.yaw_rad)))
+            .columns_of_unit_batches()
+    })
 }

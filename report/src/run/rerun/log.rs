@@ -48,7 +48,7 @@ fn known(film: &Film) -> Vec<Line> {
         time: span.time,
         entity: "log/sight",
         level: TextLogLevel::INFO,
-        colour: palette::TRACK,
+        colour: palette::SIGHT,
         text: format!("vehicle behind the ego: {}", span.words()),
     };
     film.known_spans().into_iter().map(line).collect()
@@ -78,7 +78,7 @@ fn line(film: &Film, time: Time, what: &Happening) -> Line {
     let info = |entity, colour, text| Line { time, entity, level: TextLogLevel::INFO, colour, text };
     let warn = |entity, colour, text| Line { time, entity, level: TextLogLevel::WARN, colour, text };
     match what {
-        Happening::EventTriggered { event } => warn("log/event", palette::WARNING, format!("event `{event}` sets in")),
+        Happening::EventTriggered { event } => warn("log/event", palette::EVENT, format!("event `{event}` sets in")),
         Happening::DriverNote { actor, note } => {
             let name = film.actors.get(*actor).map_or("?", |actor| actor.name.as_str());
             let colour = film.actors.get(*actor).map_or(palette::NEUTRAL, |actor| palette::part(actor.part));

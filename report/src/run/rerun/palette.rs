@@ -30,6 +30,10 @@ const MOMENTS: [Rgba; 7] = [
 ];
 /// A line of text about a moment.
 pub(super) const MOMENT: Rgba = [140, 150, 190, 255];
+/// A line of text about what the ego sees.
+pub(super) const SIGHT: Rgba = [40, 160, 190, 255];
+/// A line of text about an event of the scenario.
+pub(super) const EVENT: Rgba = [214, 150, 30, 255];
 /// The ground beside the road in the view from above. It is dark in both themes of the viewer, so that labels are legible.
 pub(super) const GROUND: Rgba = [24, 27, 31, 255];
 /// Fog, as the scene shows it.
@@ -56,7 +60,7 @@ pub(super) const TRACK: Rgba = [96, 230, 255, 255];
 pub(super) const SAFE: Rgba = [110, 214, 120, 255];
 pub(super) const CRITICAL: Rgba = [255, 64, 64, 255];
 pub(super) const WARNING: Rgba = [255, 196, 64, 255];
-pub(super) const NEUTRAL: Rgba = [168, 172, 178, 255];
+pub(super) const NEUTRAL: Rgba = [138, 142, 148, 255];
 pub(super) const QUIET: Rgba = [96, 100, 108, 255];
 
 /// Returns the colour of a part.

@@ -64,8 +64,10 @@ impl Kind {
     }
 
     /// Returns the title, which names the colours of the curves.
-    pub(super) const fn title(self) -> &'static str {
+    /// In recorded traffic the subject is the vehicle that changes lanes.
+    pub(super) const fn title(self, is_traffic: bool) -> &'static str {
         match self {
+            Self::Acceleration if is_traffic => "Acceleration [m/s²] · subject blue",
             Self::Headway => "Time headway [s] · front orange · rear pink · 0.9 s red",
             Self::Acceleration => "Acceleration [m/s²] · E blue · F orange · R pink",
             Self::Speed => "Speed [m/s]",

@@ -20,7 +20,7 @@ use rerun::{AnyValues, AsComponents, ComponentIdentifier};
 
 use super::RecordingError;
 use super::chunks::Chunks;
-use crate::run::film::Film;
+use crate::run::film::{Film, fate_word};
 
 /// Writes the properties of the recording.
 pub(super) fn write(data: &Chunks, films: &[Film]) -> Result<(), RecordingError> {
@@ -35,8 +35,8 @@ pub(super) fn write(data: &Chunks, films: &[Film]) -> Result<(), RecordingError>
         .count("seed", outcome.seed)
         .count("sample", outcome.sample)
         .text("settings", &film.settings.join(" "));
-    if let Some(verdict) = Film::pair_verdict(films) {
-        run = run.text("verdict", verdict.word());
+    if let Some(fate) = Film::pair_fate(films) {
+        run = run.text("verdict", fate_word(fate));
     }
     run.push(data, "run")?;
     let mut parameters = Properties::default();

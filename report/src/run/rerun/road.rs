@@ -4,6 +4,7 @@ use closecall_traffic::{Lane, Road};
 use rerun::{LineStrips3D, Mesh3D};
 
 use super::RecordingError;
+use super::fog;
 use super::palette::{self, Rgba};
 use super::stream::Writer;
 use crate::run::film::Film;
@@ -46,13 +47,15 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingErr
     let left_m = SHOULDER_M;
     let right_m = road.right_edge_m() - SHOULDER_M;
 
+    // Half of the fog's colour lies on the ground, so that near things stay legible.
+    let tint = |colour| palette::through_fog(colour, 0.5 + 0.5 * fog::clear_share(film));
     let mut verge = Ribbons::new(road, VERGE_Z_M);
     verge.add([from_m, to_m], [right_m - VERGE_M, left_m + VERGE_M]);
-    writer.write_static("world/road/verge", &verge.mesh(palette::VERGE))?;
+    writer.write_static("world/road/verge", &verge.mesh(tint(palette::VERGE)))?;
 
     let mut surface = Ribbons::new(road, 0.0);
     surface.add([from_m, to_m], [right_m, left_m]);
-    writer.write_static("world/road/surface", &surface.mesh(palette::ROAD))?;
+    writer.write_static("world/road/surface", &surface.mesh(tint(palette::ROAD)))?;
 
     writer.write_static("world/road/markings", &markings(road, [from_m, to_m]).mesh(palette::MARKING))?;
     if road.has_guard_rails() {

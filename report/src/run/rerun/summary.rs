@@ -2,21 +2,22 @@
 
 use std::fmt::Write as _;
 
-use closecall_traffic::Measured;
+use closecall_traffic::{Measured, Time};
 
-use crate::run::film::{Film, PairVerdict, headway_text};
+use crate::run::film::{Film, fate_word, headway_text};
+use closecall_campaign::ledger::PairFate;
 
 /// Returns the verdict in Markdown: what happened, how close it was, and what the system did.
 pub(super) fn verdict(films: &[Film]) -> String {
     let mut page = String::new();
-    match (films, Film::pair_verdict(films)) {
-        ([baseline, tested], Some(verdict)) => push_pair(&mut page, [baseline, tested], verdict),
+    match (films, Film::pair_fate(films)) {
+        ([baseline, tested], Some(fate)) => push_pair(&mut page, [baseline, tested], fate),
         _ => {
             for film in films {
                 page.push_str(&film.foreword);
             }
             for film in films.iter().filter(|film| film.outcome.is_some() || films.len() == 1) {
-                push_single(&mut page, film);
+                push_single(&mut page, film, films.len() > 1);
             }
         }
     }
@@ -36,48 +37,51 @@ pub(super) fn story(films: &[Film]) -> String {
 }
 
 /// Appends the verdict on a pair.
-fn push_pair(page: &mut String, films: [&Film; 2], verdict: PairVerdict) {
+fn push_pair(page: &mut String, films: [&Film; 2], fate: PairFate) {
     // Writing to a string cannot fail.
-    let _ = write!(page, "### {}\n\n", verdict.word());
+    let _ = write!(page, "### {}\n\n", fate_word(fate));
     for film in films {
         if let Some(result) = film.result() {
             let _ = writeln!(page, "- **{}:** {result}", film.arm_label());
         }
     }
-    page.push('\n');
     let [_, tested] = films;
     push_system(page, tested);
     let conditions = conditions(tested);
     if let Some(outcome) = &tested.outcome {
         let _ =
-            write!(page, "{} · seed {} · sample {}{conditions}\n\n", outcome.scenario, outcome.seed, outcome.sample);
+            writeln!(page, "- {} · seed {} · sample {}{conditions}", outcome.scenario, outcome.seed, outcome.sample);
     }
 }
 
-/// Appends the verdict on one film.
-fn push_single(page: &mut String, film: &Film) {
+/// Appends the verdict on one film. That of a re-enactment stands below the comparison with the recorded encounter.
+fn push_single(page: &mut String, film: &Film, is_reenactment: bool) {
     let word = match (&film.outcome, film.worst_collision()) {
         (None, _) => "Recorded traffic",
         (Some(_), Some(_)) => "COLLISION",
         (Some(_), None) => "NO COLLISION",
     };
-    let _ = write!(page, "### {word}\n\n");
+    if film.foreword.is_empty() && !is_reenactment {
+        let _ = write!(page, "### {word}\n\n");
+    }
     match film.result() {
         Some(result) => {
-            let _ = write!(page, "**{}:** {result}\n\n", film.arm_label());
+            let _ = writeln!(page, "- **{}:** {result}", film.arm_label());
         }
         None => {
             let _ = write!(page, "**{}**\n\n", film.title);
-            for (time, note) in &film.notes {
+            // What is critical is read first.
+            let is_critical = |note: &&(Time, String)| note.1.contains(": CRITICAL");
+            let critical = film.notes.iter().filter(is_critical);
+            for (time, note) in critical.chain(film.notes.iter().filter(|note| !is_critical(note))) {
                 let _ = writeln!(page, "- {:.2} s: {note}", time.s());
             }
-            page.push('\n');
         }
     }
     push_system(page, film);
     if let Some(outcome) = &film.outcome {
         let (seed, sample, conditions) = (outcome.seed, outcome.sample, conditions(film));
-        let _ = write!(page, "{} · seed {seed} · sample {sample}{conditions}\n\n", outcome.scenario);
+        let _ = writeln!(page, "- {} · seed {seed} · sample {sample}{conditions}", outcome.scenario);
     }
 }
 
@@ -85,7 +89,7 @@ fn push_single(page: &mut String, film: &Film) {
 fn push_system(page: &mut String, film: &Film) {
     let Some(summary) = film.mis_summary() else { return };
     let sight = film.sight().map_or(String::new(), |sight| format!(" {sight}"));
-    let _ = write!(page, "{summary}{sight}\n\n");
+    let _ = writeln!(page, "- {summary}{sight}");
 }
 
 /// Returns the weather and the settings of the command line.

@@ -17,7 +17,8 @@ const ARROW_S: f64 = 0.25;
 const ARROW_ABOVE_M: f64 = 0.4;
 /// Heights of the names above the roof (m): different ones, so that the names of vehicles that touch do not cover each
 /// other.
-const EGO_LABEL_M: f64 = 0.6;
+/// The name of the ego lies on the road, to its right.
+const EGO_LABEL_AT_M: [f32; 3] = [4.0, -3.0, 0.0];
 const LEAD_LABEL_M: f64 = 5.8;
 const OTHER_LABEL_M: f64 = 1.6;
 const REAR_LABEL_M: f64 = 3.2;
@@ -27,17 +28,20 @@ const COLLISION_TEXT_BEHIND_M: f32 = 11.0;
 /// Distance between the texts about two collisions (m).
 const COLLISION_TEXT_SPACING_M: f32 = 4.0;
 /// Position of the headways beside the ego, to its right and thus nearer to the eye (m).
-const GAP_TEXT_Y_M: f32 = -3.2;
+const GAP_TEXT_Y_M: f32 = -6.0;
+/// Gap below which the vehicles touch and no headway is written (m).
+const TOUCHING_M: f64 = 0.3;
+/// Front gap below which no headway is written, since the name of the ego is there (m).
+const NAMED_GAP_M: f64 = 15.0;
 /// Height at which gaps are drawn (m).
 const GAP_Z_M: f64 = 0.5;
 
 /// Returns the height of the name of a vehicle above its roof (m).
 const fn label_above_m(part: Part) -> f64 {
     match part {
-        Part::Ego => EGO_LABEL_M,
         Part::Lead => LEAD_LABEL_M,
         Part::Rear => REAR_LABEL_M,
-        Part::Other(_) | Part::Background => OTHER_LABEL_M,
+        Part::Ego | Part::Other(_) | Part::Background => OTHER_LABEL_M,
     }
 }
 
@@ -66,7 +70,8 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingErr
         if film.is_main(index) {
             write_velocity(writer, &entity, times, &states, (size, colour))?;
             let above_m = size.height_m + label_above_m(actor.part);
-            write_name(writer, &entity, times, &states, (actor.name.as_str(), above_m, colour))?;
+            let at_m = if index == film.ego { EGO_LABEL_AT_M } else { [0.0, 0.0, above_m as f32] };
+            write_name(writer, &entity, times, &states, (actor.name.as_str(), at_m, colour))?;
         }
         write_lights(writer, &entity, times, &states, (actor.vehicle.class, size))?;
         if let Some(&gone) = all_times.get(actor.present_frames.end) {
@@ -152,11 +157,10 @@ fn write_name(
     entity: &str,
     times: &[Time],
     states: &[&VehicleState],
-    (name, above_m, colour): (&str, f64, Rgba),
+    (name, at_m, colour): (&str, [f32; 3], Rgba),
 ) -> Result<(), RecordingError> {
     let entity = format!("{entity}/name");
-    let fixed =
-        Points3D::new([[0.0, 0.0, above_m as f32]]).with_colors([colour]).with_radii([0.05_f32]).with_show_labels(true);
+    let fixed = Points3D::new([at_m]).with_colors([colour]).with_radii([0.05_f32]).with_show_labels(true);
     writer.write_static(&entity, &fixed)?;
     // Only a change of the rounded speed gives a new row.
     let texts: Vec<String> = states.iter().map(|state| format!("{name} {:.0} m/s", state.speed_mps)).collect();
@@ -285,6 +289,7 @@ impl Gap {
         let is_critical = thw_s.is_ok_and(|thw_s| thw_s < CRITICAL_THW_S);
         let end = |x_m: f64| [x_m as f32, 0.0, GAP_Z_M as f32];
         let text = match thw_s {
+            _ if gap_m < if sign > 0.0 { NAMED_GAP_M } else { TOUCHING_M } => String::new(),
             Ok(thw_s) => headway_text(thw_s),
             Err(_) => format!("{gap_m:.1} m"),
         };

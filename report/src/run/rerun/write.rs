@@ -99,7 +99,10 @@ fn record(films: &[Film]) -> Result<Vec<LogMsg>, RecordingError> {
     }
     write_texts(&data, films)?;
     properties::write(&data, films)?;
-    chunks::recording(application(films), blueprint::layout(&contents)?, data)
+    let level = films.iter().map(|film| format!("{:?} {}", film.level, film.frames.len())).collect();
+    let version = env!("CARGO_PKG_VERSION").to_owned();
+    let name = chunks::name(&[version, level, summary::verdict(films), summary::story(films)]);
+    chunks::recording((application(films), name), blueprint::layout(&contents)?, data)
 }
 
 /// Returns the application id. The viewer keeps one layout per application, so that each kind of recording has its own.

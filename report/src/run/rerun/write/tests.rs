@@ -61,7 +61,7 @@ fn recorded_and_simulated(level: Level) -> [Film; 2] {
 }
 
 fn chunks(films: &[Film], kind: StoreKind) -> Vec<Chunk> {
-    let messages = record(films).unwrap().take();
+    let messages = record(films).unwrap();
     let of_kind = messages.iter().filter(|message| message.store_id().kind() == kind);
     of_kind
         .filter_map(|message| match message {
@@ -117,7 +117,7 @@ fn every_scenario_of_the_library_fills_every_view_at_every_level() {
     let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     let names = files.filter(|path| path.extension().is_some_and(|extension| extension == "toml"));
     for name in names.map(|path| path.file_stem().unwrap().to_str().unwrap().to_owned()) {
-        for (level, least) in [(Level::Events, 5), (Level::Objects, 7), (Level::Full, 7)] {
+        for (level, least) in [(Level::Events, 7), (Level::Objects, 9), (Level::Full, 9)] {
             let films = [filmed(&name, ControllerChoice::Mis, (Some(SensorMode::Object), level))];
             let (views, empty, timelines) = empty_views(&films);
             assert!(views >= least && empty.is_empty(), "{name}, {level:?}: {views} views, no entity at {empty:?}");
@@ -141,7 +141,7 @@ fn a_pair_fills_every_view_and_shows_the_baseline_as_ghosts() {
 
 #[test]
 fn recorded_and_simulated_traffic_share_timelines_and_are_ghosts_of_each_other() {
-    for (level, least) in [(Level::Events, 7), (Level::Objects, 12), (Level::Full, 12)] {
+    for (level, least) in [(Level::Events, 8), (Level::Objects, 11), (Level::Full, 11)] {
         let films = recorded_and_simulated(level);
         let (views, empty, timelines) = empty_views(&films);
         assert!(views >= least && empty.is_empty(), "{level:?}: {views} views, no entity at {empty:?}");
@@ -162,7 +162,8 @@ fn recorded_and_simulated_traffic_share_timelines_and_are_ghosts_of_each_other()
     {
         assert!(data.iter().any(|chunk| chunk.entity_path().to_string() == entity), "{entity}");
     }
-    assert!(summary::markdown(&films).starts_with("### Recorded beside mis"));
+    let verdict = summary::verdict(&films);
+    assert!(verdict.starts_with("### Recorded, and with MIS") && verdict.contains("- **recorded:** "), "{verdict}");
 }
 
 #[test]
@@ -170,16 +171,16 @@ fn full_sensors_show_points_boxes_ground_truth_and_images() {
     let films = [filmed("low-thw-overtake", ControllerChoice::Mis, (Some(SensorMode::Full), Level::Full))];
     let data = chunks(&films, StoreKind::Recording);
     let entities = [
-        "/world/ego/lidar/clusters",
-        "/world/ego/lidar/intensity",
-        "/world/ego/lidar/rejected",
-        "/world/ego/lidar/boxes",
-        "/world/ego/tracks/rear/covariance",
-        "/world/ego/truth/known",
-        "/world/ego/truth/missed",
-        "/world/ego/truth/false_tracks",
-        "/camera",
-        "/camera/windows",
+        "/mis/world/ego/lidar/clusters",
+        "/mis/world/ego/lidar/intensity",
+        "/mis/world/ego/lidar/rejected",
+        "/mis/world/ego/lidar/boxes",
+        "/mis/world/ego/tracks/rear/covariance",
+        "/mis/world/ego/truth/known",
+        "/mis/world/ego/truth/missed",
+        "/mis/world/ego/truth/false_tracks",
+        "/mis/camera",
+        "/mis/camera/windows",
     ];
     for entity in entities {
         assert!(data.iter().any(|chunk| chunk.entity_path().to_string() == entity), "{entity}");
@@ -190,20 +191,49 @@ fn full_sensors_show_points_boxes_ground_truth_and_images() {
 }
 
 #[test]
-fn both_timelines_span_the_run_and_the_opening_one_ends_at_the_critical_moment() {
+fn all_timelines_span_the_run_and_the_opening_one_begins_with_the_critical_moment() {
     let films = [default_film()];
     let chunks = chunks(&films, StoreKind::Recording);
-    let (critical, end) = (films[0].critical_moment(), films[0].end());
-    let latest = latest_ns(&chunks, OPENING_TIMELINE);
-    assert!(latest <= (critical + AFTER_CRITICAL).ns() && latest > critical.ns(), "{latest} {critical:?}");
-    assert_eq!(latest_ns(&chunks, TIME_TIMELINE), end.ns());
-    assert_eq!(latest_ns(&chunks, STEP_TIMELINE), end.ns() / films[0].period.ns());
-    for chunk in chunks.iter().filter(|chunk| !chunk.is_static()) {
-        for timeline in [TIME_TIMELINE, STEP_TIMELINE] {
-            let name = TimelineName::from_static_str(timeline);
-            assert!(chunk.timelines().contains_key(&name), "{} lacks {timeline}", chunk.entity_path());
-        }
+    let (film, end) = (&films[0], films[0].end());
+    let after_end = end + film.period;
+    for timeline in [TIME_TIMELINE, OPENING_TIMELINE] {
+        assert_eq!(latest_ns(&chunks, timeline), after_end.ns(), "{timeline}");
     }
+    assert_eq!(latest_ns(&chunks, STEP_TIMELINE), after_end.ns() / film.period.ns());
+    let opening = TimelineName::from_static_str(OPENING_TIMELINE);
+    let copy = (Time::ZERO - film.period).ns();
+    let is_copy = |chunk: &&Chunk| chunk.timelines().get(&opening).is_some_and(|times| times.times_raw() == [copy]);
+    let copies: Vec<&Chunk> = chunks.iter().filter(is_copy).collect();
+    assert!(copies.len() > 10, "{} copies", copies.len());
+    // The copy is on the opening timeline alone, and equals the row of the critical moment.
+    assert!(copies.iter().all(|chunk| chunk.timelines().len() == 1));
+    let clock = copies.iter().find(|chunk| chunk.entity_path().to_string() == "/mis/bird/clock").unwrap();
+    let text = format!("with MIS · {:.2} s", film.critical_frame_time().s());
+    assert_eq!(texts(clock, "Points2D:labels"), [text]);
+}
+
+#[test]
+fn the_same_films_give_the_same_bytes_and_other_films_another_name() {
+    let film = |controller| filmed("paper-figure", controller, (None, Level::Objects));
+    let pair = || [film(ControllerChoice::Acc), film(ControllerChoice::Mis)];
+    assert!(encode(&pair()).unwrap() == encode(&pair()).unwrap());
+    let name = |films: &[Film]| record(films).unwrap().last().unwrap().store_id().clone();
+    let [baseline, tested] = pair();
+    assert_ne!(name(&[baseline]).recording_id(), name(&[tested]).recording_id());
+}
+
+#[test]
+fn the_verdict_on_a_pair_is_its_first_word() {
+    let film = |controller| filmed("paper-figure", controller, (None, Level::Events));
+    let [baseline, tested] = [film(ControllerChoice::Acc), film(ControllerChoice::Mis)];
+    let first = |films: &[Film]| summary::verdict(films).lines().next().unwrap_or_default().to_owned();
+    assert_eq!(first(&[baseline.clone(), tested.clone()]), "### PREVENTED");
+    assert_eq!(first(&[tested.clone(), baseline.clone()]), "### INDUCED");
+    assert_eq!(first(&[baseline.clone(), baseline.clone()]), "### BOTH COLLIDE");
+    assert_eq!(first(&[tested.clone(), tested.clone()]), "### NEITHER COLLIDES");
+    let text = summary::verdict(&[baseline, tested]);
+    assert!(text.contains("- **without MIS:** collision of ego and rear at "), "{text}");
+    assert!(text.contains("- **with MIS:** no collision; smallest headway: front "), "{text}");
 }
 
 #[test]
@@ -232,7 +262,7 @@ fn a_collision_of_the_ego_precedes_earlier_ones_of_others() {
     let film = collide(2_000, [ego, others[1]]);
     assert_eq!(film.critical_moment(), Time::from_ms(2_000));
     let marks = chunks(&[film], StoreKind::Recording);
-    assert!(marks.iter().any(|chunk| chunk.entity_path().to_string() == "/world/ego/collision_2"));
+    assert!(marks.iter().any(|chunk| chunk.entity_path().to_string() == "/mis/world/ego/collision_2"));
 }
 
 #[test]

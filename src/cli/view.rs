@@ -1,0 +1,52 @@
+//! `closecall view`: shows recordings in the browser.
+
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+
+use clap::Args;
+use closecall_report::serve::{Server, WebViewer};
+
+use super::CliError;
+use super::output::{outln, print_error};
+use crate::exit_code::ExitCode;
+
+/// Programs that open an address in the browser.
+const OPENERS: [&str; 3] = ["xdg-open", "open", "explorer.exe"];
+
+/// Arguments of `closecall view`.
+#[derive(Debug, Args)]
+pub(super) struct ViewArgs {
+    /// Recording (.rrd), a folder that has some, or the folder of a campaign
+    path: PathBuf,
+    /// Port on 127.0.0.1; 0 for a free one
+    #[arg(long, default_value_t = 0)]
+    port: u16,
+    /// Only print the address
+    #[arg(long)]
+    no_open: bool,
+    /// Program of the Rerun viewer, which brings its web build, or a folder with that build
+    #[arg(long, value_name = "PATH", env = "CLOSECALL_RERUN", hide_env_values = true, default_value = "rerun")]
+    viewer: PathBuf,
+}
+
+pub(super) fn view(args: &ViewArgs) -> Result<ExitCode, CliError> {
+    Server::check(&args.path)?;
+    let server = Server::new(&args.path, args.port, WebViewer::find(&args.viewer)?)?;
+    outln!("{}", server.address());
+    print_error(format_args!("Ctrl-C ends it\n"));
+    if !args.no_open {
+        open(&server.address());
+    }
+    server.run();
+    Ok(ExitCode::Pass)
+}
+
+/// Opens an address in the browser, if there is a program for that.
+fn open(address: &str) {
+    for program in OPENERS {
+        let silent = Command::new(program).arg(address).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+        if silent.is_ok() {
+            return;
+        }
+    }
+}
