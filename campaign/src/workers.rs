@@ -52,6 +52,14 @@ impl Default for Workers {
     }
 }
 
+impl Workers {
+    /// Returns this number of threads, or one for each processor, and 300 s for each sample.
+    pub fn with_jobs(jobs: Option<u16>) -> Self {
+        let default = Self::default();
+        Self { jobs: jobs.and_then(|jobs| NonZeroUsize::new(jobs.into())).unwrap_or(default.jobs), ..default }
+    }
+}
+
 /// The worker threads could not be started.
 #[derive(Debug, thiserror::Error)]
 #[error("failed to start {jobs} worker threads: {source}")]

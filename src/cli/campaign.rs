@@ -1,6 +1,5 @@
 //! `closecall campaign`: runs many samples of scenarios, and judges the result.
 
-use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -93,11 +92,10 @@ impl CampaignArgs {
     }
 
     fn workers(&self) -> Result<Workers, CliError> {
-        let jobs = self.jobs.and_then(|jobs| NonZeroUsize::new(jobs.into())).unwrap_or(Workers::default().jobs);
         let sample_timeout = Duration::try_from_secs_f64(self.sample_timeout_s).map_err(|_| CliError::Usage {
             message: format!("--sample-timeout-s {}: the time is too long", self.sample_timeout_s),
         })?;
-        Ok(Workers { jobs, sample_timeout })
+        Ok(Workers { sample_timeout, ..Workers::with_jobs(self.jobs) })
     }
 
     /// Reads and checks every scenario.

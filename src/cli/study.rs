@@ -1,6 +1,5 @@
 //! `closecall sensitivity` and `closecall frontier`: studies that vary the assumptions, or the system, of a scenario.
 
-use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -13,10 +12,12 @@ use closecall_campaign::workers::Workers;
 use closecall_report::study::{Study, write_study};
 use closecall_scenarios::sampling::Design;
 use closecall_simulation::controller::ControllerChoice;
+use closecall_simulation::scenario::ScenarioFile;
 
 use super::CliError;
 use super::args::{Format, SensorsChoice, SetArgs, count};
 use super::arms::ControllerArgs;
+use super::backend::check_backend;
 use super::campaign::progress_bar;
 use super::heartbeat::Heartbeat;
 use super::interrupt::{Signal, received, stop_gracefully};
@@ -64,13 +65,13 @@ pub(super) struct SensitivityArgs {
     #[arg(long, value_name = "morris|sobol|both", default_value = "both")]
     method: Method,
     /// Number of trajectories of the screening, each with a run for every factor
-    #[arg(long, value_name = "N", default_value = "20", value_parser = count)]
+    #[arg(long, value_name = "N", default_value = "40", value_parser = clap::value_parser!(u64).range(1..=10_000))]
     trajectories: u64,
     /// Number of rows of the decomposition, each with a run for every factor
-    #[arg(short = 'n', long = "rows", value_name = "N", default_value = "512", value_parser = count)]
+    #[arg(short = 'n', long = "rows", value_name = "N", default_value = "512", value_parser = clap::value_parser!(u64).range(1..=1 << 21))]
     rows: u64,
     /// Number of factors that the decomposition keeps apart after the screening
-    #[arg(long, value_name = "N", default_value = "8", value_parser = count)]
+    #[arg(long, value_name = "N", default_value = "8", value_parser = clap::value_parser!(u64).range(1..=128))]
     top: u64,
 }
 
@@ -89,17 +90,17 @@ pub(super) struct FrontierArgs {
 }
 
 impl StudyArgs {
+    fn file(&self) -> Result<ScenarioFile, CliError> {
+        check_backend(self.sensors == Some(SensorsChoice::Full))?;
+        Ok(self.set.load(&self.scenario)?)
+    }
+
     /// Returns the baseline, unless the controller under test is the baseline itself, and the controller under test.
     fn controllers(&self) -> Result<Vec<ControllerChoice>, CliError> {
         Ok(match self.controller.choice()? {
             ControllerChoice::Acc => vec![ControllerChoice::Acc],
             tested => vec![ControllerChoice::Acc, tested],
         })
-    }
-
-    fn workers(&self) -> Workers {
-        let default = Workers::default();
-        Workers { jobs: self.jobs.and_then(|jobs| NonZeroUsize::new(jobs.into())).unwrap_or(default.jobs), ..default }
     }
 
     /// Runs a study of this many steps with a progress bar; `None` if a signal has ended it.
@@ -136,22 +137,21 @@ impl StudyArgs {
 
 pub(super) fn sensitivity(args: &SensitivityArgs) -> Result<ExitCode, CliError> {
     let (study, number) = (&args.study, |count: u64| usize::try_from(count).unwrap_or(usize::MAX));
-    let (file, sensors) = (study.set.load(&study.scenario)?, study.sensors.map(SensorsChoice::mode));
-    let (named, with_defaults) = (args.factors.clone(), !args.no_default_factors);
-    let mut plan = SensitivityPlan::new(&file, &study.controllers()?, sensors, named, with_defaults)?;
+    let (file, sensors, named) = (study.file()?, study.sensors.map(SensorsChoice::mode), args.factors.clone());
+    let mut plan = SensitivityPlan::new(&file, &study.controllers()?, sensors, named, !args.no_default_factors)?;
     plan.method = args.method;
     (plan.trajectories, plan.rows, plan.top) = (number(args.trajectories), number(args.rows), number(args.top));
-    (plan.seed, plan.workers) = (study.seed, study.workers());
+    (plan.seed, plan.workers) = (study.seed, Workers::with_jobs(study.jobs));
     let found = study.run(plan.points() as u64, |stop, step| plan.run(stop, step))?;
     study.print(found.map(Study::Sensitivity))
 }
 
 pub(super) fn frontier(args: &FrontierArgs) -> Result<ExitCode, CliError> {
     let study = &args.study;
-    let file = study.set.load(&study.scenario)?;
+    let file = study.file()?;
     let grid = if args.vary.is_empty() { FrontierPlan::default_grid(&file) } else { args.vary.clone() };
     let sampling = Sampling { seed: study.seed, design: Design::Random, samples: args.samples };
-    let (sensors, workers) = (study.sensors.map(SensorsChoice::mode), study.workers());
+    let (sensors, workers) = (study.sensors.map(SensorsChoice::mode), Workers::with_jobs(study.jobs));
     let controllers = study.controllers()?;
     if controllers.len() < 2 {
         let message = "a frontier compares a controller with `acc`: name another with --controller".to_owned();

@@ -33,6 +33,7 @@ mod reenact;
 mod references;
 mod reports;
 mod rerun_files;
+mod sensitivity;
 mod signals;
 mod statistics;
 mod support;

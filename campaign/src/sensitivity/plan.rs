@@ -10,6 +10,7 @@ use closecall_sensors::SensorMode;
 use closecall_simulation::Arm;
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::scenario::{ScenarioError, ScenarioFile, SettingError};
+use closecall_statistics::sensitivity::jackknife::REPLICATES;
 use closecall_statistics::sensitivity::saltelli::MAX_FACTORS;
 
 use super::defaults::{LeftOut, factors_of};
@@ -166,7 +167,7 @@ impl SensitivityPlan {
         let settings = file.settings().iter().map(ToString::to_string).collect();
         Ok(Self {
             method: Method::default(),
-            trajectories: 20,
+            trajectories: 40,
             rows: 512,
             top: 8,
             seed: 0,
@@ -182,7 +183,7 @@ impl SensitivityPlan {
     /// Returns the number of points of the stages that are planned.
     pub fn points(&self) -> usize {
         let screening = self.trajectories * (self.factors.len() + 1);
-        let rows = self.rows.div_ceil(32) * 32;
+        let rows = self.rows.div_ceil(REPLICATES) * REPLICATES;
         match self.method {
             Method::Morris => screening,
             Method::Sobol => rows * (self.factors.len() + 2),

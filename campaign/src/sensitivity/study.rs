@@ -2,9 +2,8 @@
 
 use std::sync::Arc;
 
-use closecall_statistics::sensitivity::jackknife::Estimate;
 use closecall_statistics::sensitivity::morris::{Effects, Trajectories};
-use closecall_statistics::sensitivity::saltelli::{Design, Indices, QUARTERS};
+use closecall_statistics::sensitivity::saltelli::{Design, Indices, MainEffect};
 use closecall_traffic::{ActorId, Stream, stream};
 
 use super::defaults::LeftOut;
@@ -95,11 +94,19 @@ pub struct OutputIndices {
     pub mean: Option<f64>,
     /// The indices, in the order of the groups.
     pub of_groups: Vec<Indices>,
-    /// The mean of the output while the factor lies in each quarter of its distribution; `None` for a group of several.
-    pub quarters: Vec<Option<[Option<Estimate>; QUARTERS]>>,
+    /// How each factor moves the mean, in the order of the factors, also of those that are in a group.
+    pub main_effects: Vec<Option<MainEffect>>,
 }
 
 impl OutputIndices {
+    /// Returns the numbers of the factors whose main effect is known, the largest first.
+    pub fn strongest(&self) -> Vec<usize> {
+        let index = |factor: &usize| self.main_effects[*factor].map_or(f64::NEG_INFINITY, |effect| effect.index.value);
+        let mut order: Vec<usize> = (0..self.main_effects.len()).filter(|factor| index(factor).is_finite()).collect();
+        order.sort_by(|a, b| index(b).total_cmp(&index(a)).then(a.cmp(b)));
+        order
+    }
+
     /// Returns the numbers of the groups, the one with the largest total index first, then those without one.
     pub fn order(&self) -> Vec<usize> {
         let total = |group: &usize| self.of_groups[*group].total.map_or(f64::NEG_INFINITY, |total| total.value);
@@ -110,25 +117,21 @@ impl OutputIndices {
 }
 
 impl Sensitivity {
-    /// Returns the factor that moves the first output most: by its total index, else by its elementary effects. Chance and groups
-    /// of several factors are no assumption, and are not returned. `None` if nothing moves the output.
-    pub fn greatest(&self) -> Option<&Factor> {
-        let is_assumption = |factor: &&Factor| factor.kind != FactorKind::Chance;
-        if let Some(found) = &self.decomposition {
-            let first = found.indices.first()?;
-            let moves = |group: &usize| first.of_groups[*group].total.is_some_and(|total| total.value > 0.0);
-            let single =
-                first.order().into_iter().filter(moves).filter_map(|group| match found.groups[group].factors[..] {
-                    [factor] => Some(&self.factors[factor]),
-                    _ => None,
-                });
-            return single.into_iter().find(is_assumption);
-        }
-        let effects = &self.screening.as_ref()?.effects.first()?.of_factors;
-        let mu_star = |index: usize| effects[index].mu_star.map_or(0.0, |mu_star| mu_star.value);
-        let mut factors: Vec<usize> = (0..effects.len()).filter(|index| mu_star(*index) > 0.0).collect();
-        factors.sort_by(|a, b| mu_star(*b).total_cmp(&mu_star(*a)).then(a.cmp(b)));
-        factors.into_iter().map(|index| &self.factors[index]).find(is_assumption)
+    /// Returns the number of the factor that moves the mean of the first output most: by its main effect, else by its elementary
+    /// effects. Chance is no assumption, and is not returned. `None` if nothing was seen to move the output.
+    pub fn greatest(&self) -> Option<usize> {
+        let moves = |factor: usize| match (&self.decomposition, &self.screening) {
+            (Some(found), _) => found.indices.first()?.main_effects[factor].map(|effect| effect.index.value),
+            (None, Some(screening)) => {
+                screening.effects.first()?.of_factors[factor].mu_star.map(|mu_star| mu_star.value)
+            }
+            (None, None) => None,
+        };
+        let is_assumption = |factor: &usize| self.factors[*factor].kind != FactorKind::Chance;
+        let moving = (0..self.factors.len()).filter(is_assumption).filter_map(|factor| Some((factor, moves(factor)?)));
+        let moving = moving.filter(|(_, moved)| *moved > 0.0);
+        // `max_by` returns the last of equal elements: the order is reversed to get the first.
+        moving.rev().max_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(factor, _)| factor)
     }
 
     /// Returns the errors of all runs.
@@ -205,8 +208,10 @@ impl SensitivityPlan {
         let point = move |index| of_runs.point(index);
         let runs = Points { cube: cube.clone(), arms: self.arms.clone(), point };
         let Some(ran) = run(runs, points, self.workers, stop, on_point)? else { return Ok(None) };
-        let indices =
-            outputs.iter().enumerate().map(|(index, output)| of_output(*output, &design, &groups, &ran.of(index)));
+        let indices = outputs
+            .iter()
+            .enumerate()
+            .map(|(index, output)| of_output(*output, &design, self.factors.len(), &ran.of(index)));
         let indices = indices.collect();
         let Ran { errors, .. } = ran;
         Ok(Some(Decomposition { rows: design.rows(), points, errors, groups, indices }))
@@ -264,16 +269,12 @@ fn scores(screening: &Screening) -> Vec<f64> {
     scores
 }
 
-fn of_output(output: Output, design: &Design, groups: &[Group], outputs: &[Option<f64>]) -> OutputIndices {
+fn of_output(output: Output, design: &Design, factors: usize, outputs: &[Option<f64>]) -> OutputIndices {
     let known: Vec<f64> = outputs.iter().flatten().copied().collect();
-    let quarters = groups.iter().map(|group| match group.factors[..] {
-        [factor] => Some(design.means(factor, outputs)),
-        _ => None,
-    });
     OutputIndices {
         output,
         mean: (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64),
         of_groups: design.indices(outputs),
-        quarters: quarters.collect(),
+        main_effects: (0..factors).map(|factor| design.main_effect(factor, outputs)).collect(),
     }
 }

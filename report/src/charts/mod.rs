@@ -18,4 +18,4 @@ pub(super) use bars::{balance, rate};
 pub(super) use distribution::{coverage, margin};
 pub(super) use map::outcome_map;
 pub(crate) use scatter::{ScatterPoint, scatter};
-pub(crate) use tornado::{TornadoBar, tornado};
+pub(crate) use tornado::{TornadoBar, TornadoTexts, tornado};

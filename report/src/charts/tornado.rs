@@ -1,7 +1,10 @@
 //! Tornado charts: which factor moves an output most, the strongest at the top.
 
 use std::io;
+use std::ops::Range;
 
+use plotters::coord::ranged1d::{BoldPoints, Ranged};
+use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
@@ -12,15 +15,13 @@ use super::style::{Canvas, Drawn, GRID, label_text, number_text, svg};
 pub(crate) struct TornadoBar {
     /// The name beside the bar.
     pub(crate) label: String,
-    /// The length of the bar.
-    pub(crate) value: f64,
-    /// The 95 % interval of the length.
-    pub(crate) interval_95: [f64; 2],
-    /// The length of the darker part of the bar, if it has one.
-    pub(crate) inner: Option<f64>,
+    /// Both ends of the bar, the smaller first.
+    pub(crate) ends: [f64; 2],
+    /// The 95 % interval of each end.
+    pub(crate) intervals_95: [[f64; 2]; 2],
     /// The text behind the bar.
     pub(crate) note: String,
-    /// True for a bar that is no single assumption.
+    /// True for a bar that is no assumption, or may have no length.
     pub(crate) is_grey: bool,
 }
 
@@ -39,71 +40,79 @@ const HALF_CROSS_PX: i32 = 5;
 const TOP_PX: i32 = 34;
 const BOTTOM_PX: i32 = 48;
 /// Number of labels of the scale.
-const TICKS: i32 = 5;
-/// The values at which a scale may end.
-const ENDS: [f64; 9] = [0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0];
+const TICKS: usize = 8;
+/// Free space at the ends of the scale, as a share of its range.
+const MARGIN: f64 = 0.04;
 
-const BAR: RGBColor = RGBColor(0x9e, 0xc5, 0xe4);
-const INNER: RGBColor = RGBColor(0x1f, 0x77, 0xb4);
-const GREY_BAR: RGBColor = RGBColor(0xcf, 0xd6, 0xde);
-const GREY_INNER: RGBColor = RGBColor(0x8d, 0x99, 0xa6);
+const BAR: RGBColor = RGBColor(0x1f, 0x77, 0xb4);
+const GREY_BAR: RGBColor = RGBColor(0xb5, 0xbf, 0xca);
 
-/// Returns the SVG of a tornado chart. `heads` are the texts above the names, the bars and the notes; `name` is below the scale.
-pub(crate) fn tornado(bars: &[TornadoBar], heads: [&str; 3], name: &str) -> io::Result<String> {
-    let most = bars.iter().map(|bar| bar.interval_95[1].max(bar.value)).fold(0.0, f64::max);
-    let end = ENDS.into_iter().find(|end| *end >= most).unwrap_or(most);
+/// The texts of a chart.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TornadoTexts<'a> {
+    /// The heads above the names, the bars and the notes.
+    pub(crate) heads: [&'a str; 3],
+    /// The name below the scale.
+    pub(crate) scale: &'a str,
+}
+
+/// Returns the SVG of a tornado chart. A line marks the value `centre`.
+pub(crate) fn tornado(bars: &[TornadoBar], centre: f64, texts: TornadoTexts<'_>) -> io::Result<String> {
+    let ends = || bars.iter().flat_map(|bar| bar.intervals_95).flatten().chain([centre]).filter(|end| end.is_finite());
+    let (low, high) = (ends().fold(f64::INFINITY, f64::min), ends().fold(f64::NEG_INFINITY, f64::max));
+    let margin = MARGIN * (high - low);
+    let scale = if low < high { low - margin..high + margin } else { 0.0..1.0 };
     let rows = i32::try_from(bars.len()).unwrap_or(i32::MAX);
     let bottom_px = TOP_PX + ROW_PX * rows;
     let size = (WIDTH_PX.unsigned_abs(), (bottom_px + BOTTOM_PX).unsigned_abs());
     let drawn = svg(size, |canvas| {
-        draw_scale(canvas, end, bottom_px, name)?;
+        draw_scale(canvas, &scale, bottom_px, texts.scale)?;
         let heads_px = [(NAMES_PX, HPos::Right), (SCALE_PX[0], HPos::Left), (NOTES_PX, HPos::Left)];
-        for (text, (x_px, side)) in heads.iter().zip(heads_px) {
+        for (text, (x_px, side)) in texts.heads.iter().zip(heads_px) {
             draw_text(canvas, text, (x_px, TOP_PX / 2), side, true)?;
         }
         for (bar, row) in bars.iter().zip(0..) {
-            draw_bar(canvas, bar, end, TOP_PX + ROW_PX * row + ROW_PX / 2)?;
+            draw_bar(canvas, bar, &scale, TOP_PX + ROW_PX * row + ROW_PX / 2)?;
         }
-        Ok(())
+        let x = x_px(centre, &scale);
+        canvas.draw(&PathElement::new([(x, TOP_PX), (x, bottom_px)], BLACK))
     });
     drawn.map_err(|error| io::Error::other(error.to_string()))
 }
 
 /// Returns the horizontal position of a value; values beyond the scale are at its ends.
-fn x_px(value: f64, end: f64) -> i32 {
+fn x_px(value: f64, scale: &Range<f64>) -> i32 {
     let [left, right] = SCALE_PX.map(f64::from);
-    let share = (value / end).clamp(0.0, 1.0);
+    let share = ((value - scale.start) / (scale.end - scale.start)).clamp(0.0, 1.0);
     #[expect(clippy::cast_possible_truncation, reason = "within the scale")]
     let x = (left + share * (right - left)).round() as i32;
     x
 }
 
-fn draw_scale(canvas: &Canvas<'_>, end: f64, bottom_px: i32, name: &str) -> Drawn {
-    let text = number_text(0.0, end);
-    for tick in 0..=TICKS {
-        let value = end * f64::from(tick) / f64::from(TICKS);
-        let x = x_px(value, end);
+fn draw_scale(canvas: &Canvas<'_>, scale: &Range<f64>, bottom_px: i32, name: &str) -> Drawn {
+    let text = number_text(scale.start, scale.end);
+    let ticks = RangedCoordf64::from(scale.clone()).key_points(BoldPoints(TICKS));
+    for value in ticks {
+        let x = x_px(value, scale);
         canvas.draw(&PathElement::new([(x, TOP_PX), (x, bottom_px)], GRID))?;
         draw_text(canvas, &text(&value), (x, bottom_px + 12), HPos::Center, false)?;
     }
     draw_text(canvas, name, ((SCALE_PX[0] + SCALE_PX[1]) / 2, bottom_px + 34), HPos::Center, true)
 }
 
-fn draw_bar(canvas: &Canvas<'_>, bar: &TornadoBar, end: f64, y: i32) -> Drawn {
-    let rectangle = |from: f64, to: f64, colour: RGBColor| {
-        let corners = [(x_px(from, end), y - HALF_BAR_PX), (x_px(to, end), y + HALF_BAR_PX)];
-        Rectangle::new(corners, colour.filled())
-    };
-    let [outer, inner] = if bar.is_grey { [GREY_BAR, GREY_INNER] } else { [BAR, INNER] };
+fn draw_bar(canvas: &Canvas<'_>, bar: &TornadoBar, scale: &Range<f64>, y: i32) -> Drawn {
+    let [from, to] = bar.ends.map(|end| x_px(end, scale));
+    let colour = if bar.is_grey { GREY_BAR } else { BAR };
     draw_text(canvas, &bar.label, (NAMES_PX, y), HPos::Right, false)?;
-    canvas.draw(&rectangle(0.0, bar.value, if bar.inner.is_some() { outer } else { inner }))?;
-    if let Some(value) = bar.inner {
-        canvas.draw(&rectangle(0.0, value.min(bar.value), inner))?;
-    }
-    let [low, high] = bar.interval_95.map(|bound| x_px(bound, end));
-    canvas.draw(&PathElement::new([(low, y), (high, y)], BLACK))?;
-    for x in [low, high] {
-        canvas.draw(&PathElement::new([(x, y - HALF_CROSS_PX), (x, y + HALF_CROSS_PX)], BLACK))?;
+    canvas.draw(&Rectangle::new([(from, y - HALF_BAR_PX), (to, y + HALF_BAR_PX)], colour.filled()))?;
+    for interval in bar.intervals_95 {
+        let [low, high] = interval.map(|bound| x_px(bound, scale));
+        if low < high {
+            canvas.draw(&PathElement::new([(low, y), (high, y)], BLACK))?;
+            for x in [low, high] {
+                canvas.draw(&PathElement::new([(x, y - HALF_CROSS_PX), (x, y + HALF_CROSS_PX)], BLACK))?;
+            }
+        }
     }
     draw_text(canvas, &bar.note, (NOTES_PX, y), HPos::Left, false)
 }
@@ -119,20 +128,20 @@ mod tests {
 
     #[test]
     fn a_chart_holds_its_names_and_notes_and_clips_what_is_beyond_the_scale() {
-        let bar = |label: &str, value, interval_95| TornadoBar {
+        let bar = |label: &str, ends: [f64; 2]| TornadoBar {
             label: label.to_owned(),
-            value,
-            interval_95,
-            inner: Some(0.5 * value),
+            ends,
+            intervals_95: ends.map(|end| [end - 0.1, end + 0.1]),
             note: format!("{label}!"),
             is_grey: false,
         };
-        let bars = [bar("steering", 0.6, [0.5, 0.7]), bar("<b>", 0.01, [-0.1, f64::INFINITY])];
-        let text = tornado(&bars, ["factor", "index", "note"], "total index").unwrap();
-        assert!(text.contains("steering!") && text.contains("&lt;b&gt;") && text.contains("total index"), "{text}");
-        assert_eq!(x_px(-0.1, 1.0), SCALE_PX[0]);
-        assert_eq!(x_px(f64::INFINITY, 1.0), SCALE_PX[1]);
-        assert_eq!(text, tornado(&bars, ["factor", "index", "note"], "total index").unwrap());
-        assert!(tornado(&[], ["", "", ""], "").is_ok());
+        let bars = [bar("steering", [0.1, 0.6]), bar("<b>", [0.2, f64::INFINITY])];
+        let texts = TornadoTexts { heads: ["factor", "rate", "note"], scale: "rate [%]" };
+        let text = tornado(&bars, 0.3, texts).unwrap();
+        assert!(text.contains("steering!") && text.contains("&lt;b&gt;") && text.contains("rate [%]"), "{text}");
+        assert_eq!(x_px(-0.1, &(0.0..1.0)), SCALE_PX[0]);
+        assert_eq!(x_px(f64::INFINITY, &(0.0..1.0)), SCALE_PX[1]);
+        assert_eq!(text, tornado(&bars, 0.3, texts).unwrap());
+        assert!(tornado(&[], 0.0, texts).is_ok());
     }
 }

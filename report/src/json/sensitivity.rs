@@ -5,6 +5,7 @@ use closecall_campaign::sensitivity::{
 };
 use closecall_statistics::sensitivity::jackknife::Estimate;
 use closecall_statistics::sensitivity::morris::Effects;
+use closecall_statistics::sensitivity::saltelli::MainEffect;
 use serde_json::{Map, Value, json};
 
 /// Why an index is absent.
@@ -22,7 +23,7 @@ pub fn sensitivity(study: &Sensitivity) -> Value {
         "seed": study.seed,
         "settings": study.settings,
         "controllers": study.controllers,
-        "greatest": study.greatest().map(|factor| &factor.name),
+        "greatest": study.greatest().map(|factor| &study.factors[factor].name),
         "factors": study.factors.iter().map(factor).collect::<Vec<_>>(),
         "left_out": left_out,
         "screening": study.screening.as_ref().map(|found| screening(study, found)),
@@ -74,7 +75,18 @@ fn screening(study: &Sensitivity, found: &Screening) -> Value {
 fn decomposition(study: &Sensitivity, found: &Decomposition) -> Value {
     let of_output = |output: &OutputIndices| {
         let groups: Vec<Value> = output.order().into_iter().map(|group| indices(study, found, output, group)).collect();
-        json!({ "output": output.output.name(), "mean": output.mean, "indices": groups })
+        let effect = |factor: usize| {
+            let MainEffect { index, means } = output.main_effects[factor]?;
+            Some(json!({
+                "factor": study.factors[factor].name,
+                "index": index.value,
+                "interval_95": index.interval_95,
+                "quarter_means": means.map(|mean| mean.value),
+                "quarter_intervals_95": means.map(|mean| mean.interval_95),
+            }))
+        };
+        let effects: Vec<Value> = output.strongest().into_iter().filter_map(effect).collect();
+        json!({ "output": output.output.name(), "mean": output.mean, "main_effects": effects, "indices": groups })
     };
     json!({
         "rows": found.rows,
@@ -93,11 +105,5 @@ fn indices(study: &Sensitivity, found: &Decomposition, output: &OutputIndices, g
     insert(&mut object, "first", indices.first, NO_INDEX);
     object.insert("changes".to_owned(), json!(indices.changes));
     object.insert("rows".to_owned(), json!(indices.rows));
-    if let Some(quarters) = &output.quarters[group] {
-        let means: Vec<Option<f64>> = quarters.iter().map(|mean| mean.map(|mean| mean.value)).collect();
-        let intervals: Vec<Option<[f64; 2]>> = quarters.iter().map(|mean| mean.map(|mean| mean.interval_95)).collect();
-        object.insert("quarter_means".to_owned(), json!(means));
-        object.insert("quarter_intervals_95".to_owned(), json!(intervals));
-    }
     Value::Object(object)
 }

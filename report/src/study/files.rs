@@ -11,7 +11,7 @@ use serde_json::Value;
 
 use super::aligned::{error_lines, mean, with_interval};
 use super::frontier::{FrontierText, HEADS, cells, charts as frontier_charts, short};
-use super::sensitivity::{SensitivityText, conclusion, from_to};
+use super::sensitivity::{SensitivityText, conclusion};
 use super::tornado::charts as tornado_charts;
 use crate::campaign::html::page::{document, number, table, text_heads};
 use crate::json;
@@ -119,17 +119,18 @@ fn sensitivity_page(study: &Sensitivity, charts: &Charts) -> Markup {
                 @if let Some(found) = &study.decomposition {
                     @let of_output = &found.indices[index];
                     p.note {
-                        "Mean " (mean(*output, of_output.mean)) " over " (found.points) " points, " (found.rows) " rows. The total "
-                        "index is the share of the variance that would be left if only this factor were unknown; the first-order "
-                        "index is the share that it explains alone."
+                        "Mean " (mean(*output, of_output.mean)) " over " (found.points) " points. The bars show the smallest and the "
+                        "largest mean over the quarters of a factor's distribution, with 95 % intervals; grey: chance, or an index of "
+                        "the quarters whose interval reaches 0. The table says what moves single samples: the total index is the share of "
+                        "the variance that would be left if only this factor were unknown, the first-order index the share that it "
+                        "explains alone."
                     }
-                    (table(&text_heads(&["factor", "total index (95 %)", "first-order index (95 %)", "lowest → highest quarter"]), &html! {
+                    (table(&text_heads(&["factor", "total index (95 %)", "first-order index (95 %)"]), &html! {
                         @for group in of_output.order() {
                             tr {
                                 td { (found.groups[group].label) }
                                 (number(with_interval(of_output.of_groups[group].total)))
                                 (number(with_interval(of_output.of_groups[group].first)))
-                                (number(from_to(of_output, group)))
                             }
                         }
                     }))

@@ -65,13 +65,16 @@ impl Display for FrontierText<'_> {
     }
 }
 
+/// A value of a point with its interval.
+type Placed = (f64, [f64; 2]);
+
 /// Returns the charts of a frontier with their names.
 pub(super) fn charts(frontier: &Frontier) -> io::Result<Vec<(&'static str, String)>> {
     let percent = |estimate: Option<Estimate>| {
         estimate.map(|Estimate { value, interval_95 }| (100.0 * value, interval_95.map(|bound| 100.0 * bound)))
     };
     let plain = |estimate: Option<Estimate>| estimate.map(|estimate| (estimate.value, estimate.interval_95));
-    let points = |of: &dyn Fn(&Point) -> Option<[(f64, [f64; 2]); 2]>| -> Vec<ScatterPoint> {
+    let points = |of: &dyn Fn(&Point) -> Option<[Placed; 2]>| -> Vec<ScatterPoint> {
         let of_point = |point: &Point| {
             let [(x, across), (y, up)] = of(point)?;
             let label = point.values.join(" · ");

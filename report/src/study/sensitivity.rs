@@ -2,8 +2,11 @@
 
 use std::fmt::{self, Display, Formatter};
 
-use closecall_campaign::sensitivity::{Decomposition, Factor, OutputEffects, OutputIndices, Screening, Sensitivity};
+use closecall_campaign::sensitivity::{
+    Decomposition, FactorKind, OutputEffects, OutputIndices, Screening, Sensitivity,
+};
 use closecall_statistics::sensitivity::morris::Effects;
+use closecall_statistics::sensitivity::saltelli::MainEffect;
 
 use super::aligned::{error_lines, mean, with_interval, write_rows};
 
@@ -29,7 +32,7 @@ impl Display for SensitivityText<'_> {
             write_screening(f, study, screening)?;
         }
         if let Some(found) = &study.decomposition {
-            write_decomposition(f, found)?;
+            write_decomposition(f, study, found)?;
         }
         for line in error_lines(&study.errors(), "points") {
             writeln!(f, "{line}")?;
@@ -44,36 +47,35 @@ pub(super) fn conclusion(study: &Sensitivity) -> String {
     let Some(greatest) = study.greatest() else {
         return format!("No assumption was seen to move the {}.", output.title());
     };
-    let by = match &study.decomposition {
-        Some(found) => by_index(found, study, greatest),
+    let by = match study.decomposition.as_ref().and_then(|found| found.indices.first()) {
+        Some(first) => by_main_effect(study, first, greatest),
         None => "by its elementary effects".to_owned(),
     };
-    format!("The assumption that moves the {} most is {}: {by}.", output.title(), greatest.name)
+    format!("The assumption that moves the {} most is {}: {by}.", output.title(), study.factors[greatest].name)
 }
 
-fn by_index(found: &Decomposition, study: &Sensitivity, greatest: &Factor) -> String {
-    let group =
-        found.groups.iter().position(|group| matches!(group.factors[..], [one] if study.factors[one] == *greatest));
-    match (found.indices.first(), group) {
-        (Some(first), Some(group)) => {
-            let total = with_interval(first.of_groups[group].total);
-            let runner_up =
-                first.order().into_iter().find(|other| *other != group && found.groups[*other].factors.len() == 1);
-            let is_clear = runner_up.and_then(|other| first.of_groups[other].total).is_none_or(|other| {
-                first.of_groups[group].total.is_some_and(|own| own.interval_95[0] > other.interval_95[1])
-            });
-            let clearly = if is_clear { "" } else { ", an interval that overlaps that of the next factor" };
-            format!("total index {total}{clearly}; {}", from_to(first, group))
+fn by_main_effect(study: &Sensitivity, output: &OutputIndices, greatest: usize) -> String {
+    let of = |factor: usize| output.main_effects[factor].map(|effect| effect.index);
+    let is_other = |factor: &usize| *factor != greatest && study.factors[*factor].kind != FactorKind::Chance;
+    let runner_up = output.strongest().into_iter().find(is_other);
+    let doubt = match (of(greatest), runner_up.and_then(|other| Some((other, of(other)?)))) {
+        (Some(own), _) if own.interval_95[0] <= 0.0 => {
+            "; its interval reaches 0, so that chance may explain it".to_owned()
         }
-        _ => "by its total index".to_owned(),
-    }
+        (Some(own), Some((other, next))) if own.interval_95[0] <= next.interval_95[1] => {
+            format!("; its interval overlaps that of {}", study.factors[other].name)
+        }
+        _ => String::new(),
+    };
+    let index = with_interval(of(greatest));
+    format!("{} from its lowest to its highest quarter, index {index}{doubt}", from_to(output, greatest))
 }
 
 /// Returns the means of an output in the lowest and in the highest quarter of a factor.
-pub(super) fn from_to(output: &OutputIndices, group: usize) -> String {
-    let Some(quarters) = &output.quarters[group] else { return "-".to_owned() };
-    let of = |quarter: usize| mean(output.output, quarters[quarter].map(|estimate| estimate.value));
-    format!("{} → {}", of(0), of(quarters.len() - 1))
+pub(super) fn from_to(output: &OutputIndices, factor: usize) -> String {
+    let Some(MainEffect { means, .. }) = output.main_effects[factor] else { return "-".to_owned() };
+    let of = |quarter: usize| mean(output.output, Some(means[quarter].value));
+    format!("{} → {}", of(0), of(means.len() - 1))
 }
 
 fn write_screening(f: &mut Formatter<'_>, study: &Sensitivity, screening: &Screening) -> fmt::Result {
@@ -85,6 +87,10 @@ fn write_screening(f: &mut Formatter<'_>, study: &Sensitivity, screening: &Scree
         order.sort_by(|a, b| mu_star(&of_factors[*b]).total_cmp(&mu_star(&of_factors[*a])).then(a.cmp(b)));
         let hidden = of_factors.len() - order.len().min(LISTED);
         writeln!(f, "\n{}", output.title())?;
+        if order.is_empty() {
+            writeln!(f, "  no effect of any factor was seen")?;
+            continue;
+        }
         let mut rows = vec![["factor", "kind", "μ* (95 %)", "μ", "σ"].map(str::to_owned).to_vec()];
         rows.extend(order.into_iter().take(LISTED).map(|index| {
             let (factor, effects) = (&study.factors[index], &of_factors[index]);
@@ -105,25 +111,29 @@ fn write_screening(f: &mut Formatter<'_>, study: &Sensitivity, screening: &Scree
     Ok(())
 }
 
-fn write_decomposition(f: &mut Formatter<'_>, found: &Decomposition) -> fmt::Result {
+fn write_decomposition(f: &mut Formatter<'_>, study: &Sensitivity, found: &Decomposition) -> fmt::Result {
     writeln!(f, "\nDecomposition (Sobol'): {} rows, {} points", found.rows, found.points)?;
     for output in &found.indices {
         writeln!(f, "\n{}: mean {}", output.output.title(), mean(output.output, output.mean))?;
-        let heads = ["factor", "total index (95 %)", "first-order index (95 %)", "lowest → highest quarter"];
+        if output.of_groups.iter().all(|indices| indices.total.is_none()) {
+            writeln!(f, "  The output does not vary, or changes too seldom: nothing can be said.")?;
+            continue;
+        }
+        let heads = ["what moves the mean", "lowest → highest quarter", "index of the quarters (95 %)"];
+        let mut rows = vec![heads.map(str::to_owned).to_vec()];
+        rows.extend(output.strongest().into_iter().take(LISTED).map(|factor| {
+            let index = output.main_effects[factor].map(|effect| effect.index);
+            vec![study.factors[factor].label(), from_to(output, factor), with_interval(index)]
+        }));
+        write_rows(f, &rows)?;
+        let heads = ["what moves single samples", "total index (95 %)", "first-order index (95 %)"];
         let mut rows = vec![heads.map(str::to_owned).to_vec()];
         rows.extend(output.order().into_iter().map(|group| {
             let indices = &output.of_groups[group];
-            vec![
-                found.groups[group].label.clone(),
-                with_interval(indices.total),
-                with_interval(indices.first),
-                from_to(output, group),
-            ]
+            vec![found.groups[group].label.clone(), with_interval(indices.total), with_interval(indices.first)]
         }));
+        writeln!(f)?;
         write_rows(f, &rows)?;
-        if output.of_groups.iter().all(|indices| indices.total.is_none()) {
-            writeln!(f, "  The output does not vary, or changes too seldom: nothing can be said.")?;
-        }
     }
     Ok(())
 }

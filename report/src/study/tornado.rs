@@ -2,21 +2,20 @@
 
 use std::io;
 
-use closecall_campaign::sensitivity::{
-    Decomposition, FactorKind, OutputEffects, OutputIndices, Screening, Sensitivity,
-};
+use closecall_campaign::sensitivity::{Factor, FactorKind, OutputEffects, OutputIndices, Screening, Sensitivity};
+use closecall_statistics::sensitivity::morris::Effects;
 
 use super::sensitivity::from_to;
-use crate::charts::{TornadoBar, tornado};
+use crate::charts::{TornadoBar, TornadoTexts, tornado};
 
 /// Largest number of bars in a chart.
 const BARS: usize = 14;
 
 /// Returns the charts of a study, with the name of the output of each: of the decomposition if there is one.
 pub(super) fn charts(study: &Sensitivity) -> io::Result<Vec<(&'static str, String)>> {
-    let chart = |output: &OutputIndices, found| Ok((output.output.name(), of_indices(study, found, output)?));
+    let chart = |output: &OutputIndices| Ok((output.output.name(), of_effects_on_mean(study, output)?));
     if let Some(found) = &study.decomposition {
-        return found.indices.iter().map(|output| chart(output, found)).collect();
+        return found.indices.iter().map(chart).collect();
     }
     let effects = |screening: &Screening| {
         screening.effects.iter().map(|output| Ok((output.output.name(), of_effects(study, output)?))).collect()
@@ -24,45 +23,40 @@ pub(super) fn charts(study: &Sensitivity) -> io::Result<Vec<(&'static str, Strin
     study.screening.as_ref().map_or_else(|| Ok(Vec::new()), effects)
 }
 
-fn of_indices(study: &Sensitivity, found: &Decomposition, output: &OutputIndices) -> io::Result<String> {
-    let bar = |group: usize| {
-        let (of_group, indices) = (&found.groups[group], &output.of_groups[group]);
-        let total = indices.total?;
-        let is_grey = !matches!(of_group.factors[..], [one] if study.factors[one].kind != FactorKind::Chance);
+fn of_effects_on_mean(study: &Sensitivity, output: &OutputIndices) -> io::Result<String> {
+    // Events are shown in percent.
+    let unit = if output.output.is_event() { 100.0 } else { 1.0 };
+    let bar = |factor: usize| {
+        let (effect, of_factor) = (output.main_effects[factor]?, &study.factors[factor]);
+        let ends = effect.ends();
         Some(TornadoBar {
-            label: of_group.label.clone(),
-            value: total.value,
-            interval_95: total.interval_95,
-            inner: Some(indices.first.map_or(0.0, |first| first.value)),
-            note: from_to(output, group),
-            is_grey,
+            label: of_factor.label(),
+            ends: ends.map(|end| unit * end.value),
+            intervals_95: ends.map(|end| end.interval_95.map(|bound| unit * bound)),
+            note: from_to(output, factor),
+            is_grey: of_factor.kind == FactorKind::Chance || effect.index.interval_95[0] <= 0.0,
         })
     };
-    let bars: Vec<TornadoBar> = output.order().into_iter().filter_map(bar).take(BARS).collect();
+    let bars: Vec<TornadoBar> = output.strongest().into_iter().filter_map(bar).take(BARS).collect();
     let heads = ["factor", output.output.title(), "lowest → highest quarter"];
-    let name = "share of the variance: total index with its 95 % interval; dark: first order";
-    tornado(&bars, heads, name)
+    let scale = if output.output.is_event() { "[% of the samples]" } else { "mean" };
+    tornado(&bars, unit * output.mean.unwrap_or(0.0), TornadoTexts { heads, scale })
 }
 
 fn of_effects(study: &Sensitivity, output: &OutputEffects) -> io::Result<String> {
-    let mut bars: Vec<TornadoBar> = study
-        .factors
-        .iter()
-        .zip(&output.of_factors)
-        .filter_map(|(factor, effects)| {
-            let mu_star = effects.mu_star.filter(|mu_star| mu_star.value > 0.0)?;
-            Some(TornadoBar {
-                label: factor.label(),
-                value: mu_star.value,
-                interval_95: mu_star.interval_95,
-                inner: None,
-                note: format!("σ {:.2}", effects.sigma.unwrap_or(0.0)),
-                is_grey: factor.kind == FactorKind::Chance,
-            })
+    let bar = |(factor, effects): (&Factor, &Effects)| {
+        let mu_star = effects.mu_star.filter(|mu_star| mu_star.value > 0.0)?;
+        Some(TornadoBar {
+            label: factor.label(),
+            ends: [0.0, mu_star.value],
+            intervals_95: [[0.0; 2], mu_star.interval_95],
+            note: format!("σ {:.2}", effects.sigma.unwrap_or(0.0)),
+            is_grey: factor.kind == FactorKind::Chance,
         })
-        .collect();
-    bars.sort_by(|a, b| b.value.total_cmp(&a.value));
+    };
+    let mut bars: Vec<TornadoBar> = study.factors.iter().zip(&output.of_factors).filter_map(bar).collect();
+    bars.sort_by(|a, b| b.ends[1].total_cmp(&a.ends[1]));
     bars.truncate(BARS);
-    let name = "mean magnitude of the elementary effects, μ*, with its 95 % interval";
-    tornado(&bars, ["factor", output.output.title(), "interactions"], name)
+    let heads = ["factor", output.output.title(), "interactions"];
+    tornado(&bars, 0.0, TornadoTexts { heads, scale: "mean magnitude of the elementary effects, μ*" })
 }

@@ -58,6 +58,26 @@ pub struct Indices {
     pub rows: u64,
 }
 
+/// How one factor moves the mean of the output, whatever the others do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MainEffect {
+    /// Share of the output's variance between the quarters of the factor's distribution. It is a lower bound of the first-order
+    /// index, and has a smaller error, since all points of the design count.
+    pub index: Estimate,
+    /// The mean of the output while the factor lies in the first, second, third and last quarter.
+    pub means: [Estimate; QUARTERS],
+}
+
+impl MainEffect {
+    /// Returns the smallest and the largest of the means.
+    pub fn ends(&self) -> [Estimate; 2] {
+        let by = |a: &&Estimate, b: &&Estimate| a.value.total_cmp(&b.value);
+        let [first, ..] = self.means;
+        let low = self.means.iter().min_by(by).copied().unwrap_or(first);
+        [low, self.means.iter().max_by(by).copied().unwrap_or(first)]
+    }
+}
+
 impl Design {
     /// Returns a design with about `rows` rows, for groups of the factors `0..factors`. The number of rows is raised to a
     /// multiple of [`REPLICATES`].
@@ -95,15 +115,20 @@ impl Design {
     /// # Panics
     /// Panics if `index` is not below [`Self::len`].
     pub fn point(&self, index: usize) -> Vec<f64> {
+        (0..self.factors).map(|factor| self.coordinate(index, factor)).collect()
+    }
+
+    /// Returns one coordinate of a point.
+    fn coordinate(&self, index: usize, factor: usize) -> f64 {
         let (row, column) = (index / self.width(), index % self.width());
         let (scramble, number) = (self.scrambles[row / self.rows], (row % self.rows) as u32);
-        let at = |dimension: usize| f64::from(sobol_burley::sample(number, dimension as u32, scramble)) + HALF_CELL;
-        let is_from_b = |factor: &usize| match column {
+        let is_from_b = match column {
             0 => false,
             1 => true,
-            mixed => self.groups[mixed - 2].contains(factor),
+            mixed => self.groups[mixed - 2].contains(&factor),
         };
-        (0..self.factors).map(|factor| at(if is_from_b(&factor) { self.factors + factor } else { factor })).collect()
+        let dimension = if is_from_b { self.factors + factor } else { factor };
+        f64::from(sobol_burley::sample(number, dimension as u32, scramble)) + HALF_CELL
     }
 
     /// Returns the indices of every group. `outputs` are those of the points, `None` if a run has no output: its row is then
@@ -129,23 +154,32 @@ impl Design {
         sums.indices(is_event)
     }
 
-    /// Returns the mean of the output while a factor lies in the first, second, third and last quarter of its distribution;
-    /// `None` of no outputs there. All points count.
+    /// Returns how a factor moves the mean of the output; `None` if a quarter of its distribution has no outputs, or they do not
+    /// vary. All points count: each coordinate is uniformly distributed in each of them.
     ///
     /// # Panics
     /// Panics if there are fewer outputs than points.
-    pub fn means(&self, factor: usize, outputs: &[Option<f64>]) -> [Option<Estimate>; QUARTERS] {
-        let mut replicates = [[[0.0; 2]; REPLICATES]; QUARTERS];
+    pub fn main_effect(&self, factor: usize, outputs: &[Option<f64>]) -> Option<MainEffect> {
+        // For each replicate and quarter: the number of outputs, their sum, and the sum of their squares.
+        let mut replicates = [[0.0; 3 * QUARTERS]; REPLICATES];
         for (index, output) in outputs.iter().enumerate() {
             let Some(output) = output else { continue };
-            let share = self.point(index)[factor];
+            let share = self.coordinate(index, factor);
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in [0, 1)")]
             let quarter = ((share * QUARTERS as f64) as usize).min(QUARTERS - 1);
-            let [sum, count] = &mut replicates[quarter][index / self.width() / self.rows];
-            *sum += output;
-            *count += 1.0;
+            let sums = &mut replicates[index / self.width() / self.rows];
+            for (sum, term) in sums[3 * quarter..].iter_mut().zip([1.0, *output, output * output]) {
+                *sum += term;
+            }
         }
-        replicates.map(|of_quarter| jackknife(&of_quarter, |[sum, count]| (*count > 0.0).then(|| sum / count)))
+        let mean = |quarter: usize| {
+            jackknife(&replicates, |sums| {
+                let count = sums[3 * quarter];
+                (count > 0.0).then(|| sums[3 * quarter + 1] / count)
+            })
+        };
+        let means = [mean(0)?, mean(1)?, mean(2)?, mean(3)?];
+        Some(MainEffect { index: jackknife(&replicates, share_between)?, means })
     }
 }
 
@@ -210,4 +244,15 @@ fn with(estimate: Option<Estimate>, interval_95: [f64; 2]) -> Option<Estimate> {
 fn variance([count, sum, squares, ..]: &[f64; 5]) -> Option<f64> {
     let variance = squares / (2.0 * count) - (sum / (2.0 * count)).powi(2);
     (variance > 0.0).then_some(variance)
+}
+
+/// Returns the share of the variance between the quarters; `None` if there is none. The sums are the count, the sum and the sum of
+/// the squares of each quarter.
+fn share_between(sums: &[f64; 3 * QUARTERS]) -> Option<f64> {
+    let quarters = || sums.chunks_exact(3).filter(|quarter| quarter[0] > 0.0);
+    let total = |part: usize| quarters().map(|quarter| quarter[part]).sum::<f64>();
+    let (count, mean) = (total(0), total(1) / total(0));
+    let variance = total(2) / count - mean * mean;
+    let between: f64 = quarters().map(|quarter| quarter[0] * (quarter[1] / quarter[0] - mean).powi(2)).sum();
+    (variance > 0.0).then(|| between / count / variance)
 }

@@ -114,14 +114,30 @@ fn a_missing_output_leaves_out_its_row_and_a_constant_output_has_no_index() {
 }
 
 #[test]
-fn the_means_over_the_quarters_of_a_factor_are_the_true_ones() {
-    let (design, outputs) = design(event, 4, one_by_one(4));
-    let means = design.means(0, &outputs).map(Option::unwrap);
+fn the_main_effect_of_a_factor_is_the_true_one() {
     // The event needs the first factor below 0.3, the others below 0.6 and 0.9.
-    for (mean, truth) in means.iter().zip([0.54, 0.2 * 0.54, 0.0, 0.0]) {
-        assert!((mean.value - truth).abs() < 0.01, "{means:?}");
-        assert!(mean.covers(truth), "{means:?}");
+    let truth = [0.54, 0.2 * 0.54, 0.0, 0.0];
+    let p = 0.3 * 0.54;
+    let index = truth.iter().map(|mean| 0.25 * (mean - p) * (mean - p)).sum::<f64>() / (p * (1.0 - p));
+    let (mut of_index, mut of_idle, mut of_means) = (0, 0, [0; 4]);
+    for seed in 0..1_000 {
+        let design = Design::new(4, one_by_one(4), 256, &mut StdRng::seed_from_u64(seed));
+        let outputs = evaluated(&design, event);
+        let effect = design.main_effect(0, &outputs).unwrap();
+        of_index += u32::from(effect.index.covers(index));
+        for ((covered, mean), truth) in of_means.iter_mut().zip(effect.means).zip(truth) {
+            *covered += u32::from(mean.covers(truth));
+        }
+        of_idle += u32::from(design.main_effect(3, &outputs).unwrap().index.covers(0.0));
     }
+    println!("main effect, 1000 repetitions: index {of_index}, means {of_means:?}, idle factor {of_idle}");
+    assert!((930..=975).contains(&of_index), "{of_index}");
+    assert!(of_means[..2].iter().all(|covered| (930..=975).contains(covered)), "{of_means:?}");
+    assert!(of_idle >= 930, "{of_idle}");
+    let (design, outputs) = design(event, 4, one_by_one(4));
+    let [low, high] = design.main_effect(0, &outputs).unwrap().ends();
+    assert!(low.value == 0.0 && (high.value - 0.54).abs() < 0.01);
+    assert_eq!(design.main_effect(0, &vec![Some(1.0); outputs.len()]), None);
 }
 
 #[test]

@@ -266,3 +266,19 @@ fn the_exit_codes_are_those_of_the_help() {
         rows.skip(2).map(|row| row.trim_matches('|').split('|').next().unwrap().trim()).collect();
     assert_eq!(documented, listed.collect::<Vec<_>>());
 }
+
+#[test]
+fn the_keys_of_studies_are_those_documented() {
+    let seeded = |args: &[&str], code| program(&[args, &["--seed", "2", "--set", "duration-s=60"]].concat(), code);
+    let small =
+        ["sensitivity", "low-thw-overtake", "--no-default-factors", "--trajectories", "3", "-n", "32", "--top", "1"];
+    let both = seeded(&small, 0);
+    // No factor of the list applies to all scenarios: some are left out here.
+    let listed = ["sensitivity", "low-thw-overtake", "--method", "morris", "--trajectories", "2"];
+    let listed = seeded(&listed, 0);
+    let sobol = seeded(&[&small[..], &["--method", "sobol", "--controller", "exec:false"]].concat(), 5);
+    hold("sensitivity", [&both, &listed, &sobol]);
+    let frontier = ["frontier", "low-thw-overtake", "-n", "20", "--vary", "actor.ego.driver.ego-stack.mis.hold-s=1,2"];
+    let errors = seeded(&[&frontier[..], &["--controller", "exec:false"]].concat(), 5);
+    hold("frontier", [&seeded(&frontier, 0), &errors]);
+}

@@ -7,7 +7,9 @@ use maud::{Markup, PreEscaped, html};
 use super::page::{number, table, text_heads};
 use crate::campaign::findings::Findings;
 use crate::campaign::overview::{EventInfluence, FEW_EVENTS, ScenarioOverview};
-use crate::charts::{TornadoBar, tornado};
+use crate::charts::{TornadoBar, TornadoTexts, tornado};
+use closecall_statistics::sensitivity::given_data::Influence;
+use closecall_statistics::sensitivity::jackknife::Estimate;
 
 /// Returns the section, with a tornado chart for each event.
 pub(super) fn section(findings: &Findings<'_>, scenario: &ScenarioOverview) -> io::Result<Markup> {
@@ -23,9 +25,10 @@ pub(super) fn section(findings: &Findings<'_>, scenario: &ScenarioOverview) -> i
     Ok(html! {
         h3 { "What moves the result" }
         p.note {
-            "The bars are first-order indices: the share of the variance that is explained by which equally probable part of its "
-            "distribution a parameter lies in, corrected for the share that chance alone explains, with 95 % intervals. Interactions of "
-            "parameters are not in it; `closecall sensitivity` runs a design of its own for them, and for what the scenario does not sample."
+            "The bars show the smallest and the largest rate over equally probable parts of a parameter's distribution, or over its "
+            "labels, with 95 % intervals; the line is the rate of all samples. The index is the share of the variance between the parts, "
+            "less the share that chance puts there (first order). Grey: its interval reaches 0. `closecall sensitivity` runs a design of its "
+            "own for interactions, and for what the scenario does not sample."
         }
         @for event in &events { (of_event(event)?) }
     })
@@ -36,20 +39,23 @@ fn of_event(event: &EventInfluence) -> io::Result<Markup> {
     let Some(parameters) = &event.parameters else {
         return Ok(html! { p { strong { (title) } ": " (FEW_EVENTS) "." } });
     };
-    let bar = |(name, influence): &(String, _)| {
-        let closecall_statistics::sensitivity::given_data::Influence { index, .. } = influence;
-        TornadoBar {
+    let percent = |rate: &Estimate| (100.0 * rate.value, rate.interval_95.map(|bound| 100.0 * bound));
+    let bar = |(name, influence): &(String, Influence)| {
+        let by = |a: &&Estimate, b: &&Estimate| a.value.total_cmp(&b.value);
+        let (low, high) = (influence.rates.iter().min_by(by)?, influence.rates.iter().max_by(by)?);
+        let ((low, low_interval), (high, high_interval)) = (percent(low), percent(high));
+        Some(TornadoBar {
             label: name.clone(),
-            value: index.value,
-            interval_95: index.interval_95,
-            inner: None,
-            note: event.from_to(influence),
-            is_grey: index.interval_95[0] <= 0.0,
-        }
+            ends: [low, high],
+            intervals_95: [low_interval, high_interval],
+            note: format!("{}; index {:.2}", event.from_to(influence), influence.index.value),
+            is_grey: influence.index.interval_95[0] <= 0.0,
+        })
     };
-    let bars: Vec<TornadoBar> = parameters.iter().map(bar).collect();
+    let bars: Vec<TornadoBar> = parameters.iter().filter_map(bar).collect();
     let heads = ["parameter", &title, "lowest → highest part"];
-    let chart = tornado(&bars, heads, "first-order index; grey: its interval reaches 0")?;
+    let texts = TornadoTexts { heads, scale: "smallest and largest rate over the parts of the distribution [%]" };
+    let chart = tornado(&bars, 100.0 * event.events as f64 / event.samples as f64, texts)?;
     Ok(html! {
         figure.map { (PreEscaped(chart)) }
         details {
