@@ -15,10 +15,10 @@ use crate::run::film::{Film, Frame, ego_state_name};
 use closecall_simulation::outcome::{CRITICAL_THW_S, Moment};
 
 const WIDTH: f64 = 900.0;
-const LEFT: f64 = 62.0;
+const LEFT: f64 = 78.0;
 const INNER: f64 = WIDTH - LEFT - LEGEND;
 /// Width of the legend beside the plots (px).
-const LEGEND: f64 = 110.0;
+const LEGEND: f64 = 158.0;
 const STRIP_HEIGHT: f64 = 74.0;
 const STRIP_PERIOD: f64 = 96.0;
 const CHART_HEIGHT: f64 = 112.0;

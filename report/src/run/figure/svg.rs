@@ -69,6 +69,12 @@ pub(super) struct Svg {
     clip_count: usize,
 }
 
+/// Colour of the halos of texts.
+const HALO: &str = "#ffffff";
+/// The halo of a text, drawn below it.
+const HALO_ATTRIBUTES: &str =
+    " paint-order=\"stroke\" stroke=\"#ffffff\" stroke-width=\"2.5\" stroke-linejoin=\"round\"";
+
 // Writing to a string cannot fail, so that the results of `write!` are ignored.
 impl Svg {
     pub(super) fn new(size: [f64; 2]) -> Self {
@@ -147,10 +153,11 @@ impl Svg {
             Anchor::Middle => "middle",
             Anchor::End => "end",
         };
+        // White text stands on dark bars, which need no halo.
+        let halo = if style.colour == HALO { "" } else { HALO_ATTRIBUTES };
         let _ = writeln!(
             self.body,
-            "<text x=\"{x:.2}\" y=\"{y:.2}\" font-size=\"{:.1}\" fill=\"{}\" text-anchor=\"{anchor}\" paint-order=\"stroke\" \
-             stroke=\"#ffffff\" stroke-width=\"2.5\" stroke-linejoin=\"round\">{}</text>",
+            "<text x=\"{x:.2}\" y=\"{y:.2}\" font-size=\"{:.1}\" fill=\"{}\" text-anchor=\"{anchor}\"{halo}>{}</text>",
             style.size,
             style.colour,
             escaped(text)

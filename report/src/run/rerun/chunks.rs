@@ -92,17 +92,22 @@ pub(super) fn name(texts: &[String]) -> String {
     hasher.finalize().to_hex().chars().take(NAME_DIGITS).collect()
 }
 
-/// Returns the bytes of a recording file.
-///
-/// The file has no index at its end: the library writes that in an order of chance, and it would take a fifth of the file.
+/// Returns the bytes of a recording file. The messages of the same run have the same bytes; the index that the library puts
+/// after them lists its columns in an order of chance.
 pub(super) fn encode(messages: &[LogMsg]) -> Result<Vec<u8>, RecordingError> {
-    let mut encoder = Encoder::local().map_err(RecordingError::encode)?;
+    Encoder::encode(messages.iter().map(Ok)).map_err(RecordingError::encode)
+}
+
+/// Returns the bytes of the messages, without an index.
+#[cfg(test)]
+pub(super) fn encode_messages(messages: &[LogMsg]) -> Vec<u8> {
+    let mut encoder = Encoder::local().unwrap();
     encoder.do_not_emit_footer();
     for message in messages {
-        encoder.append(message).map_err(RecordingError::encode)?;
+        encoder.append(message).unwrap();
     }
-    encoder.finish().map_err(RecordingError::encode)?;
-    encoder.into_inner().map_err(RecordingError::encode)
+    encoder.finish().unwrap();
+    encoder.into_inner().unwrap()
 }
 
 /// Returns the identifier of the chunk of this index. The rows of a chunk have identifiers from its own on.
