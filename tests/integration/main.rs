@@ -23,6 +23,7 @@ mod inputs;
 mod inspect;
 mod library;
 mod malformed;
+mod mis_page;
 mod nothing_checked;
 mod own_controller;
 mod paper_figure;
