@@ -125,7 +125,7 @@ fn every_report_holds_all_pairs_as_the_journal_counts_them() {
             let fate = match (of_arm(baseline).ego_collided(), of_arm(tested)) {
                 (true, with) => usize::from(with.ego_collided() || with.others_collided()) * 2,
                 (false, with) if with.ego_collided() => 1,
-                (false, with) => usize::from(!(with.others_collided() && !of_arm(baseline).others_collided())) * 2 + 1,
+                (false, with) => usize::from(!with.others_collided() || of_arm(baseline).others_collided()) * 2 + 1,
             };
             counts[fate] += 1;
         }

@@ -24,7 +24,7 @@ use closecall_traffic::Time;
 
 use crate::support::library;
 
-const SAMPLES: u64 = 150;
+const SAMPLES: u64 = 200;
 /// Samples of each scenario in which a share is judged that is well below one, but not zero: enough to decide.
 const SHARE_SAMPLES: u64 = 1_200;
 /// Samples of each scenario with a fault: enough to fail.

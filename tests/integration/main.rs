@@ -24,6 +24,7 @@ mod inspect;
 mod library;
 mod looking;
 mod malformed;
+mod mis_page;
 mod nothing_checked;
 mod own_controller;
 mod paper_figure;

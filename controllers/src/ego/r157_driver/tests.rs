@@ -14,7 +14,7 @@ fn braking_begins_after_the_delay_and_builds_up_within_its_jerk() {
     assert!(at(0.85) > 0.4 && at(0.85) < 3.0, "{}", at(0.85));
     assert!(braking.windows(2).all(|pair| pair[1] - pair[0] <= BUILD_UP_MPS3 * STEP_S + 1e-12));
     // 0.774 g is reached 0.6 s after the delay.
-    assert!(at(1.2) < HARDEST_BRAKING_MPS2 && at(1.44) == HARDEST_BRAKING_MPS2, "{braking:?}");
+    assert!(at(1.2) < HARDEST_BRAKING_MPS2 && at(1.44) >= HARDEST_BRAKING_MPS2, "{braking:?}");
 }
 
 /// Returns whether the ego hits a vehicle that is `gap_m` ahead in its lane from now on, and slower by `closing_mps`.

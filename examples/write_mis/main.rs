@@ -1,0 +1,42 @@
+//! Writes the tables of `docs/mis.md`: what the margin increase systems and a longer gap change in every scenario of the library.
+//!
+//! ```sh
+//! cargo run --release --example write_mis -- -n 2000 --seed 1001
+//! ```
+//!
+//! The tables stand between two markers, and everything else on the page stays as it is. Each scenario runs once for each
+//! member of the list in `tables`, on the same samples in every arm.
+
+mod tables;
+
+use std::error::Error;
+use std::path::Path;
+use std::time::Instant;
+
+use clap::Parser;
+use tables::{Study, members, page_with};
+
+/// The page, below the folder of the repository.
+const PAGE: &str = "docs/mis.md";
+
+/// The command line.
+#[derive(Parser)]
+struct Args {
+    /// Number of samples of each scenario
+    #[arg(short = 'n', long, default_value_t = 2000, value_parser = clap::value_parser!(u64).range(1..))]
+    samples: u64,
+    /// Seed of the random numbers
+    #[arg(long, default_value_t = 1001)]
+    seed: u64,
+}
+
+#[expect(clippy::print_stdout, reason = "a program on the command line")]
+fn main() -> Result<(), Box<dyn Error>> {
+    let args = Args::parse();
+    let started = Instant::now();
+    let tables = Study { samples: args.samples, seed: args.seed }.tables(&members())?;
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(PAGE);
+    std::fs::write(&path, page_with(&std::fs::read_to_string(&path)?, &tables)?)?;
+    println!("written: {PAGE}, after {:.0} s", started.elapsed().as_secs_f64());
+    Ok(())
+}
