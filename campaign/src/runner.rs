@@ -88,8 +88,9 @@ impl Work {
             (Ok(run), Ok(outcome)) if self.checks.includes(key) => Some(run.check(outcome)),
             _ => None,
         };
+        let check_s = if checks.is_some() { started.elapsed().as_secs_f64() - wall_s } else { 0.0 };
         let (controller, result) = (arm.controller.name().to_owned(), result.map_err(SampleFailure::from));
-        ArmRun { record: ArmRecord { controller, result, checks }, wall_s }
+        ArmRun { record: ArmRecord { controller, result, checks }, wall_s, check_s }
     }
 }
 
@@ -99,6 +100,8 @@ pub(super) struct ArmRun {
     pub(super) record: ArmRecord,
     /// Wall time, without the validity checks (s).
     pub(super) wall_s: f64,
+    /// Wall time of the validity checks (s).
+    pub(super) check_s: f64,
 }
 
 /// Returns the concrete scenario of one sample.

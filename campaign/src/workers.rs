@@ -69,6 +69,8 @@ pub struct Finished {
     pub record: Record,
     /// Wall time of each arm (s).
     pub wall_s: Vec<f64>,
+    /// Wall time of the validity checks in all arms (s).
+    pub check_s: f64,
 }
 
 impl Workers {
@@ -245,7 +247,7 @@ impl WorkerPool {
                 let failure = SampleFailure::from(SampleError::Timeout { limit_s: limit.as_secs_f64() });
                 let controller = self.work.arms[job.arm].controller.name().to_owned();
                 let record = ArmRecord { controller, result: Err(failure), checks: None };
-                let run = ArmRun { record, wall_s: started.elapsed().as_secs_f64() };
+                let run = ArmRun { record, wall_s: started.elapsed().as_secs_f64(), check_s: 0.0 };
                 done.push(Done { index: job.index, sample: job.sample, run });
                 self.slots[index] = self.spawn()?;
             }
@@ -273,6 +275,7 @@ impl Reorder {
         let done: Vec<Done> = indices.filter_map(|index| self.waiting.remove(&index)).collect();
         Some(Finished {
             wall_s: done.iter().map(|done| done.run.wall_s).collect(),
+            check_s: done.iter().map(|done| done.run.check_s).sum(),
             record: Record {
                 scenario: work.file.config().name.clone(),
                 sample: done.first()?.sample,
