@@ -78,6 +78,8 @@ pub struct NextRecord<'a> {
     pub record: &'a Record,
     /// True if the sample has just been run, false if the record was read from the journal.
     pub is_new: bool,
+    /// Wall time of the runs and of their validity checks (s); 0 if the record was read from the journal.
+    pub spent_s: [f64; 2],
 }
 
 impl Campaign {
@@ -153,7 +155,7 @@ impl Campaign {
             // Damaged lines may be left: the journal is read, but not opened for appending, which would cut it.
             for record in folder.folder.records()?.map_while(Result::ok) {
                 let Some((work, _)) = key_of(self, &record) else { break };
-                if on_record(NextRecord { work, record: &record, is_new: false }).is_break() {
+                if on_record(NextRecord { work, record: &record, is_new: false, spent_s: [0.0; 2] }).is_break() {
                     break;
                 }
             }
@@ -192,7 +194,7 @@ impl Campaign {
                         if is_next {
                             position.done += 1;
                             position.total += 1;
-                            let next = NextRecord { work: position.work, record, is_new: false };
+                            let next = NextRecord { work: position.work, record, is_new: false, spent_s: [0.0; 2] };
                             let end = on_record(next).break_value();
                             position.is_over = end == Some(End::Campaign);
                             if end == Some(End::Scenario) {
@@ -226,7 +228,8 @@ impl Campaign {
                     append(files, index, &finished)?;
                 }
                 index += 1;
-                let next = NextRecord { work: number, record: &finished.record, is_new: true };
+                let spent_s = [finished.wall_s.iter().sum(), finished.check_s];
+                let next = NextRecord { work: number, record: &finished.record, is_new: true, spent_s };
                 let end = on_record(next).break_value();
                 is_over = end == Some(End::Campaign);
                 Ok::<_, CampaignError>(if end.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })

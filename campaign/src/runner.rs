@@ -99,8 +99,9 @@ impl Samples for Work {
             (Ok(run), Ok(outcome)) if self.checks.includes(key) => Some(run.check(outcome)),
             _ => None,
         };
+        let check_s = if checks.is_some() { started.elapsed().as_secs_f64() - wall_s } else { 0.0 };
         let (controller, result) = (arm.controller.name().to_owned(), result.map_err(SampleFailure::from));
-        ArmRun { record: ArmRecord { controller, result, checks }, wall_s }
+        ArmRun { record: ArmRecord { controller, result, checks }, wall_s, check_s }
     }
 }
 
@@ -110,6 +111,8 @@ pub(crate) struct ArmRun {
     pub(crate) record: ArmRecord,
     /// Wall time, without the validity checks (s).
     pub(crate) wall_s: f64,
+    /// Wall time of the validity checks (s).
+    pub(crate) check_s: f64,
 }
 
 /// Returns the concrete scenario of one sample.

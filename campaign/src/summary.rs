@@ -91,6 +91,8 @@ pub struct Summary {
     pub scenarios: Vec<(String, Counts)>,
     /// What determines the numbers of samples.
     pub inference: Inference,
+    /// True if the validity checks were switched off.
+    pub is_unchecked: bool,
     /// Which samples of each scenario are new evidence.
     repeats: Vec<Repeats>,
 }
@@ -102,7 +104,7 @@ impl Summary {
         let arms = controllers.len();
         let scenarios: Vec<_> = scenarios.into_iter().map(|name| (name, Counts::new(arms))).collect();
         let repeats = vec![Repeats::default(); scenarios.len()];
-        Self { controllers, scenarios, inference: Inference::default(), repeats }
+        Self { controllers, scenarios, inference: Inference::default(), is_unchecked: false, repeats }
     }
 
     /// Returns a summary without samples of what is run.
@@ -110,6 +112,7 @@ impl Summary {
         let name = |arm: &Arm| arm.controller.name().to_owned();
         let controllers = works.first().map_or_else(Vec::new, |work| work.arms.iter().map(name).collect());
         let mut summary = Self::new(controllers, works.iter().map(|work| work.file.config().name.clone()));
+        summary.is_unchecked = works.iter().any(|work| work.checks.is_off());
         summary.repeats = works.iter().map(|work| Repeats::of(work.file.space())).collect();
         summary
     }

@@ -148,6 +148,9 @@ pub fn judge(summary: &Summary, judge: &Judge, max_flip_rate: f64) -> Judgement 
     if total.errors() > 0 {
         found.add(Decision::SampleError, format!("{} ended in an error", samples(total.errors())));
     }
+    if summary.is_unchecked {
+        found.note("the validity of the simulator was not checked: the checks were switched off".to_owned());
+    }
     judge_validity(&total.checks, max_flip_rate, &mut found);
     let expectations = judge_expectations(judge, &mut found);
     judge_samples(summary, judge, &mut found);

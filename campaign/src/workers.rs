@@ -77,6 +77,8 @@ pub struct Finished {
     pub record: Record,
     /// Wall time of each arm (s).
     pub wall_s: Vec<f64>,
+    /// Wall time of the validity checks in all arms (s).
+    pub check_s: f64,
 }
 
 /// Samples that workers can run.
@@ -274,7 +276,7 @@ impl<S: Samples> WorkerPool<S> {
                 let failure = SampleFailure::from(SampleError::Timeout { limit_s: limit.as_secs_f64() });
                 let controller = self.work.arms()[job.arm].controller.name().to_owned();
                 let record = ArmRecord { controller, result: Err(failure), checks: None };
-                let run = ArmRun { record, wall_s: started.elapsed().as_secs_f64() };
+                let run = ArmRun { record, wall_s: started.elapsed().as_secs_f64(), check_s: 0.0 };
                 done.push(Done { index: job.index, sample: job.sample, run });
                 self.slots[index] = self.spawn()?;
             }
@@ -302,6 +304,7 @@ impl Reorder {
         let done: Vec<Done> = indices.filter_map(|index| self.waiting.remove(&index)).collect();
         Some(Finished {
             wall_s: done.iter().map(|done| done.run.wall_s).collect(),
+            check_s: done.iter().map(|done| done.run.check_s).sum(),
             record: Record {
                 scenario: work.scenario().to_owned(),
                 sample: done.first()?.sample,

@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 
 use closecall_traffic::Stream;
 
-use crate::camera::{Backend, Camera, CropClassifier, ExposureKey};
+use crate::camera::{Backend, Camera, CropClassifier, ExposureKey, ImageMemory};
 use crate::full::DetectionClassifier;
 use crate::{Detection, NoiseKey, Scene, SensorError};
 
@@ -47,12 +47,13 @@ pub fn inference_backend() -> &'static Backend {
 pub(crate) struct WorkerClassifier {
     camera: Camera,
     exposures: Stream,
+    memory: ImageMemory,
 }
 
 impl WorkerClassifier {
     /// Creates the camera of one run, whose exposure noise is keyed by `key`.
     pub(crate) fn new(camera: Camera, key: &NoiseKey) -> Self {
-        Self { camera, exposures: key.stream(CHANNEL) }
+        Self { camera, exposures: key.stream(CHANNEL), memory: ImageMemory::default() }
     }
 }
 
@@ -68,7 +69,7 @@ impl DetectionClassifier for WorkerClassifier {
                 *slot = Some((self.camera, network));
             }
             match slot {
-                Some((_, network)) => network.classify_detections(scene, key, detections).map(|_| ()),
+                Some((_, network)) => network.classify_detections(scene, key, &mut self.memory, detections).map(|_| ()),
                 None => Ok(()),
             }
         })

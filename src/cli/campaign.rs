@@ -151,6 +151,10 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
             print_counts(&tally.summary);
             let (simulated_s, jobs) = (tally.summary.total().simulated_s, campaign.workers.jobs);
             outln!("{simulated_s:.0} simulated seconds in {wall_s:.1} s on {jobs} threads");
+            let [run_s, check_s] = progress.spent_s;
+            if check_s > 0.0 {
+                outln!("{:.0} % of the threads' time went into validity checks", 100.0 * check_s / (run_s + check_s));
+            }
             print_verdict(&judged);
         }
     }
@@ -167,6 +171,8 @@ struct Progress {
     stop: StopMonitor,
     end: EndMonitor,
     bar: ProgressBar,
+    /// Wall time of the runs and of their validity checks (s).
+    spent_s: [f64; 2],
     _heartbeat: Heartbeat,
 }
 
@@ -180,12 +186,14 @@ impl Progress {
         }
         let names = campaign.works.iter().map(|work| work.file.config().name.clone()).collect();
         let bar = progress_bar(campaign.len());
-        Self { names, tally: Tally::new(campaign, gates), stop, end, _heartbeat: Heartbeat::start(&bar), bar }
+        let tally = Tally::new(campaign, gates);
+        Self { names, tally, stop, end, spent_s: [0.0; 2], _heartbeat: Heartbeat::start(&bar), bar }
     }
 
     fn push(&mut self, next: NextRecord<'_>) -> ControlFlow<End> {
         self.tally.push(next.record);
         self.bar.inc(1);
+        self.spent_s = [0, 1].map(|index| self.spent_s[index] + next.spent_s[index]);
         if !next.is_new {
             // Records read from the journal say nothing about how long the rest will take.
             self.bar.reset_eta();

@@ -73,6 +73,9 @@ pub(super) struct PlanArgs {
     /// Largest number of samples of each scenario that are checked, besides the first four
     #[arg(long, value_name = "N", default_value_t = CheckPlan::AT_MOST)]
     check_at_most: u64,
+    /// Check the validity of the simulator in no sample, for measurements of speed. Every report says so
+    #[arg(long, conflicts_with_all = ["check_share", "check_at_most"])]
+    no_validity_checks: bool,
 }
 
 impl PlanArgs {
@@ -112,6 +115,9 @@ impl PlanArgs {
 
     /// Returns the samples that are checked.
     pub(super) fn checks(&self) -> Result<CheckPlan, CliError> {
+        if self.no_validity_checks {
+            return Ok(CheckPlan::off());
+        }
         CheckPlan::new(self.check_share, self.check_at_most)
             .map_err(|error| CliError::Usage { message: format!("--check-share: {error}") })
     }

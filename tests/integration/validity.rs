@@ -187,3 +187,23 @@ fn a_campaign_prints_the_number_of_checked_runs() {
     let text = stdout(&closecall(["campaign", path.to_str().unwrap(), "-n", "20", "--no-gate"]), 0);
     assert!(text.contains("runs, 0 flipped at half the time step"), "{text}");
 }
+
+#[test]
+fn a_campaign_without_validity_checks_says_so_in_every_report() {
+    let (path, folder) = (library("slow-approach"), folder());
+    let out = folder.path().join("out");
+    let scenario = ["campaign", path.to_str().unwrap(), "-n", "3", "--no-gate", "--no-validity-checks"];
+    let text = stdout(&closecall(scenario.iter().chain(&["--out", out.to_str().unwrap()])), 0);
+    let sentence = "the validity of the simulator was not checked";
+    assert!(text.contains(sentence), "{text}");
+    assert!(!text.contains("went into validity checks"), "{text}");
+    for file in ["report.html", "junit.xml"] {
+        assert!(std::fs::read_to_string(out.join(file)).unwrap().contains(sentence), "{file}");
+    }
+    let manifest: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(out.join("manifest.json")).unwrap()).unwrap();
+    assert_eq!(manifest["checks"]["off"], true);
+    let report = json(&closecall(scenario.iter().chain(&["--format", "json"])), 0);
+    assert_eq!(report["checks"]["runs"], 0);
+    assert!(report["reasons"].to_string().contains(sentence), "{report}");
+}

@@ -30,6 +30,9 @@ pub struct CheckPlan {
     one_in: u64,
     /// Largest number of samples of each scenario that are checked, besides the first.
     at_most: u64,
+    /// True if no sample is checked.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    off: bool,
 }
 
 impl CheckPlan {
@@ -49,11 +52,24 @@ impl CheckPlan {
         }
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 or more; a cast saturates")]
         let one_in = (1.0 / share).round() as u64;
-        Ok(Self { one_in, at_most })
+        Ok(Self { one_in, at_most, off: false })
+    }
+
+    /// Returns a plan that checks no sample, for measurements of speed. Every report says so.
+    pub const fn off() -> Self {
+        Self { one_in: 1, at_most: 0, off: true }
+    }
+
+    /// Returns true if no sample is checked.
+    pub const fn is_off(self) -> bool {
+        self.off
     }
 
     /// Returns true if this sample is checked.
     pub fn includes(self, key: RunKey) -> bool {
+        if self.off {
+            return false;
+        }
         let block = key.sample / self.one_in;
         if key.sample < FIRST {
             return true;
@@ -73,7 +89,7 @@ impl Default for CheckPlan {
     fn default() -> Self {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a constant of 100")]
         let one_in = (1.0 / Self::SHARE) as u64;
-        Self { one_in, at_most: Self::AT_MOST }
+        Self { one_in, at_most: Self::AT_MOST, off: false }
     }
 }
 
@@ -99,6 +115,11 @@ mod tests {
         assert!(checked(CheckPlan::default(), 1_000_000).len() <= 1_004);
         assert_eq!(checked(CheckPlan::new(1.0, 7).unwrap(), 100).len(), 7);
         assert_eq!(checked(CheckPlan::new(0.5, 0).unwrap(), 100), [0, 1, 2, 3]);
+    }
+
+    #[test]
+    fn a_plan_without_checks_checks_no_sample() {
+        assert!(checked(CheckPlan::off(), 1_000).is_empty());
     }
 
     #[test]

@@ -85,13 +85,12 @@ fn is_same(run: &Run, outcome: &Outcome) -> bool {
     run.as_ref().is_ok_and(|again| again.has_same_bits(outcome))
 }
 
-/// Runs `there` on a new thread and `here` on this one, at the same time. If no thread can be started, this thread runs
-/// both.
+/// Runs `there` on a new thread and then `here` on this one, so that a check keeps one processor busy. If no thread can
+/// be started, this thread runs both.
 fn on_new_thread<T: Send, U>(there: impl Fn() -> T + Sync, here: impl FnOnce() -> U) -> (T, U) {
     thread::scope(|scope| {
         let handle = thread::Builder::new().name("check".to_owned()).spawn_scoped(scope, &there);
-        let here = here();
         let there = handle.ok().and_then(|handle| handle.join().ok()).unwrap_or_else(&there);
-        (there, here)
+        (there, here())
     })
 }

@@ -3,7 +3,9 @@
 use closecall_traffic::ClassScores;
 
 use super::classifier::{Backend, Classifier, ClassifierError};
+use super::image_memory::ImageMemory;
 use super::{Camera, Crop, ExposureKey, Frame, FrameBuffers, GroundBox, PixelRect, RearCamera};
+use crate::lidar::LaneGeometry;
 use crate::{Detection, Scene, SceneVehicle, SensorError};
 
 /// Minimum share of a window that must lie in the image for it to be classified (0 to 1).
@@ -33,11 +35,12 @@ impl CropClassifier {
         Ok(Self { camera: RearCamera::new(camera), classifier, crop: Crop::default(), lists: FrameBuffers::default() })
     }
 
-    /// Classifies every detection that lies in the image, and fuses the network's scores with the class scores that
-    /// the detection has from its shape. Detections out of view keep their scores. Returns the number of classified
-    /// detections.
+    /// Classifies the detections that lie in the image and on the road, and fuses the network's scores with the class
+    /// scores that a detection has from its shape. Returns the number of crops that the network has classified.
     ///
-    /// `scene` is the scene at the time of the scan, `key` the key of the exposure's noise.
+    /// The network's scores of a detection that `memory` knows are those of its latest crop. Detections out of view, and
+    /// those that lie entirely beside the road, keep their scores. `scene` is the scene at the time of the scan, `key`
+    /// the key of the exposure's noise.
     ///
     /// # Errors
     /// Returns [`SensorError::Classifier`] if the network fails. The scores of the detections before the failure have
@@ -46,29 +49,36 @@ impl CropClassifier {
         &mut self,
         scene: &Scene<'_>,
         key: ExposureKey,
+        memory: &mut ImageMemory,
         detections: &mut [Detection],
     ) -> Result<usize, SensorError> {
-        let visible: Vec<(usize, PixelRect)> = detections
-            .iter()
-            .enumerate()
-            .filter_map(|(index, detection)| Some((index, self.camera.detection_window(&scene.ego, detection)?)))
-            .collect();
-        if visible.is_empty() {
+        let lane = LaneGeometry::from_scene(scene);
+        memory.begin(scene.time);
+        let mut due: Vec<(usize, PixelRect)> = Vec::new();
+        for (index, detection) in detections.iter_mut().enumerate().filter(|(_, at)| !is_beside_road(at, &lane)) {
+            let Some(window) = self.camera.detection_window(&scene.ego, detection) else { continue };
+            match memory.recall(detection) {
+                Some(scores) => detection.class = fuse(&detection.class, &scores),
+                None => due.push((index, window)),
+            }
+        }
+        if due.is_empty() {
             return Ok(0);
         }
-        let windows: Vec<PixelRect> = visible.iter().map(|(_, window)| *window).collect();
+        let windows: Vec<PixelRect> = due.iter().map(|(_, window)| *window).collect();
         let mut frame =
             Frame::with_buffers(std::mem::take(&mut self.lists), self.camera.camera(), scene, key, &windows);
-        for (index, window) in &visible {
+        for (index, window) in &due {
             frame.crop(*window, &mut self.crop);
             let image_scores = self
                 .classifier
                 .classify(&self.crop)
                 .map_err(|error| SensorError::Classifier { reason: error.to_string() })?;
+            memory.store(&detections[*index], image_scores);
             detections[*index].class = fuse(&detections[*index].class, &image_scores);
         }
         self.lists = frame.into_buffers();
-        Ok(visible.len())
+        Ok(due.len())
     }
 }
 
@@ -87,6 +97,13 @@ impl RearCamera {
         };
         self.project(ego, &object).filter(|window| window.share_in_image() >= MIN_SHARE_IN_IMAGE)
     }
+}
+
+/// Returns true if a detection lies entirely beside the road.
+fn is_beside_road(detection: &Detection, lane: &LaneGeometry) -> bool {
+    let left_m = detection.face_y_m - lane.path_y_m(detection.face_x_m);
+    let half_m = 0.5 * detection.width_m;
+    left_m - half_m > lane.edges_m[0] || left_m + half_m < lane.edges_m[1]
 }
 
 /// Fuses the scores from shape and image by their normalised product, which assumes that their errors are independent
@@ -133,7 +150,18 @@ mod tests {
         let (road, environment, ego) = (Road::straight(3), Environment::CLEAR_DAY, vehicle(VehicleClass::Car, 500.0));
         let scene = Scene { time: Time::ZERO, road: &road, environment: &environment, ego, others };
         let mut pipeline = CropClassifier::new(camera, &Backend::Tract).unwrap();
-        pipeline.classify_detections(&scene, ExposureKey(1), detections).unwrap()
+        pipeline.classify_detections(&scene, ExposureKey(1), &mut ImageMemory::default(), detections).unwrap()
+    }
+
+    #[test]
+    fn a_detection_beside_the_road_keeps_its_scores() {
+        let mut detections = [detection(-40.0, 1.0, 0.8)];
+        // The ego is 5.6 m to the right of the road's left edge.
+        detections[0].face_y_m = 6.5;
+        assert_eq!(classify(&[], &mut detections), 0);
+        assert_eq!(detections[0].class, ClassScores::UNKNOWN);
+        detections[0].face_y_m = 6.0;
+        assert_eq!(classify(&[], &mut detections), 1);
     }
 
     #[test]

@@ -30,6 +30,7 @@ mod scan;
 mod scanner;
 mod segmentation;
 mod shapes;
+mod silhouette;
 mod soft;
 mod solid;
 mod targets;

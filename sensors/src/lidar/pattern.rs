@@ -126,6 +126,13 @@ impl Pattern {
         first..end.max(first)
     }
 
+    /// Returns bounds of the azimuths of all sub-rays in a range of columns (°).
+    pub(crate) fn azimuths_deg(&self, columns: &std::ops::Range<usize>) -> [f64; 2] {
+        let half = 0.5 * FOOTPRINT_WIDTH_DEG;
+        let shift = GROUP_SHIFT_DEG * (GROUPS - 1) as f64;
+        [self.columns[columns.start].azimuth_deg - half, self.columns[columns.end - 1].azimuth_deg + shift + half]
+    }
+
     /// Returns the range of layers whose footprints may touch elevations from `low_deg` to `high_deg`.
     pub(crate) fn layers_between(mirror_side: MirrorSide, low_deg: f64, high_deg: f64) -> std::ops::Range<usize> {
         let half = 0.5 * FOOTPRINT_HEIGHT_DEG;

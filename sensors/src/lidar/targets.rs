@@ -17,6 +17,7 @@ use std::ops::Range;
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::pattern::Pattern;
+use super::silhouette::Silhouette;
 use super::solid::{Solid, SolidFace};
 use super::{Material, MirrorSide, PointSource};
 
@@ -24,11 +25,14 @@ use super::{Material, MirrorSide, PointSource};
 /// finite.
 const MIN_OFFSET_M: f64 = 1e-4;
 /// Margin added to a solid's bounds to cover rounding in single precision (°).
-const BOUND_MARGIN_DEG: f64 = 0.02;
+pub(super) const BOUND_MARGIN_DEG: f64 = 0.02;
 /// Factor on the horizontal distance in the bounds of elevation, which covers the tilt of the sensor's frame.
 const DISTANCE_MARGIN: f64 = 0.98;
 /// Minimum horizontal distance in the bounds of elevation (m).
 const MIN_DISTANCE_M: f64 = 0.05;
+
+/// Number of successive columns that share bounds of elevation.
+const BLOCK_COLUMNS: usize = 16;
 
 /// A face, prepared for the ray cast.
 #[derive(Clone, Copy, Debug)]
@@ -65,7 +69,7 @@ impl FaceRange {
     }
 }
 
-/// A convex solid of the scene: its faces, and the columns and layers that may hit it.
+/// A convex solid of the scene, or a range of its columns: its faces, and the columns and layers that may hit it.
 #[derive(Clone, Debug)]
 pub(crate) struct Part {
     pub(crate) faces: FaceRange,
@@ -115,8 +119,24 @@ impl Targets {
             return;
         }
         let faces = self.push_faces(solid, pose, surface);
-        if !faces.front_facing().is_empty() {
+        if faces.front_facing().is_empty() {
+            return;
+        }
+        if columns.len() <= BLOCK_COLUMNS {
             self.parts.push(Part { faces, columns, layers });
+            return;
+        }
+        // A long solid, such as a guard rail, covers few layers in each column, but other layers in other columns.
+        let silhouette = Silhouette::of(solid, pose);
+        for start in columns.clone().step_by(BLOCK_COLUMNS) {
+            let block = start..(start + BLOCK_COLUMNS).min(columns.end);
+            if let Some([low_deg, high_deg]) = silhouette.elevations_deg(beams.pattern.azimuths_deg(&block)) {
+                let narrow = Pattern::layers_between(beams.mirror_side, low_deg, high_deg);
+                let layers = narrow.start.max(layers.start)..narrow.end.min(layers.end);
+                if !layers.is_empty() {
+                    self.parts.push(Part { faces, columns: block, layers });
+                }
+            }
         }
     }
 

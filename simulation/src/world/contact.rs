@@ -3,6 +3,7 @@
 use closecall_traffic::geometry::{BoxSide, OrientedBox, first_contact};
 use nalgebra::Vector2;
 
+use super::search::FEW;
 use crate::outcome::ClosedBy;
 
 /// Distance that is added to a vehicle's bounds, to cover rounding (m).
@@ -98,6 +99,11 @@ impl ContactSearch {
         if self.order.len() != by_name.len() {
             self.order.clear();
             self.order.extend((0..by_name.len()).map(|rank| Entry { reach_m: [0.0; 2], rank }));
+        }
+        if by_name.len() <= FEW {
+            // Testing all pairs is faster, and the order stays that of the names.
+            self.order.iter_mut().for_each(|entry| entry.reach_m = [f64::NEG_INFINITY, f64::INFINITY]);
+            return;
         }
         // The order hardly changes from step to step, so that the list is almost sorted.
         for entry in &mut self.order {

@@ -37,16 +37,16 @@ impl LanesAround {
     }
 }
 
-/// Returns the vehicles around `actor`, which is compared with every other one. [`super::search`] is faster if the
-/// neighbours of all vehicles are needed.
-pub(super) fn find(world: &World, actor: usize, road: &Road) -> Neighbours {
+/// Returns the vehicles around `actor`, which is compared with every other one. `half_width_m` is the function of this
+/// name, or returns its values. [`super::search`] is faster if the neighbours of many vehicles are needed.
+pub(super) fn find(world: &World, actor: usize, road: &Road, half_width_m: impl Fn(usize) -> f64) -> Neighbours {
     let LanesAround { own: own_lane, left, right } = LanesAround::new(road, world.state(actor).d_m);
     let mut around = LanesAround { own: own_lane, left, right }.nobody();
     for other in 0..world.len() {
         if other == actor {
             continue;
         }
-        let candidate = Candidate::new(world, [actor, other], [actor, other].map(|index| half_width_m(world, index)));
+        let candidate = Candidate::new(world, [actor, other], [actor, other].map(&half_width_m));
         if candidate.is_in(road, own_lane) {
             candidate.insert_into(&mut around.own);
         }

@@ -13,7 +13,10 @@ use closecall_traffic::metrics::bumper_gap_m;
 use closecall_traffic::{Lane, Road};
 
 use super::World;
-use super::neighbours::{Candidate, LanesAround, PATH_MARGIN_M, half_width_m, is_in, keep_nearest};
+use super::neighbours::{self, Candidate, LanesAround, PATH_MARGIN_M, half_width_m, is_in, keep_nearest};
+
+/// Number of vehicles up to which it is faster to compare all pairs.
+pub(super) const FEW: usize = 8;
 
 /// A vehicle in a list that is sorted along the road.
 #[derive(Clone, Copy, Debug)]
@@ -44,6 +47,14 @@ pub(super) struct NeighbourSearch {
 impl NeighbourSearch {
     /// Replaces `found` by the vehicles around each vehicle.
     pub(super) fn find_all(&mut self, world: &World, road: &Road, found: &mut [Neighbours]) {
+        self.half_widths_m.clear();
+        self.half_widths_m.extend((0..world.len()).map(|actor| half_width_m(world, actor)));
+        if world.len() <= FEW {
+            for (actor, found) in found.iter_mut().enumerate() {
+                *found = neighbours::find(world, actor, road, |actor| self.half_widths_m[actor]);
+            }
+            return;
+        }
         self.sort(world, road);
         for (actor, found) in found.iter_mut().enumerate() {
             *found = self.around(world, actor, road);
@@ -56,8 +67,6 @@ impl NeighbourSearch {
         self.lanes.resize_with(lanes, Vec::new);
         self.strips.resize_with(lanes + 2, Vec::new);
         self.lanes.iter_mut().chain(&mut self.strips).for_each(Vec::clear);
-        self.half_widths_m.clear();
-        self.half_widths_m.extend((0..world.len()).map(|actor| half_width_m(world, actor)));
         self.longest_m = (0..world.len()).map(|actor| world.vehicle(actor).dimensions.length_m).fold(0.0, f64::max);
         if self.order.len() != world.len() {
             self.order.clear();
@@ -168,7 +177,6 @@ mod tests {
     use closecall_traffic::{ActorId, PHYSICS_STEP, Vehicle, VehicleClass, VehicleState};
     use proptest::prelude::*;
 
-    use super::super::neighbours;
     use super::super::state::InitialVehicle;
     use super::*;
 
@@ -200,7 +208,7 @@ mod tests {
             for _ in 0..2 {
                 search.find_all(&world, &road, &mut found);
                 for (actor, found) in found.iter().enumerate() {
-                    prop_assert_eq!(*found, neighbours::find(&world, actor, &road));
+                    prop_assert_eq!(*found, neighbours::find(&world, actor, &road, |actor| half_width_m(&world, actor)));
                 }
             }
         }

@@ -174,7 +174,7 @@ impl World {
 
     /// Returns the vehicles around a vehicle.
     pub(crate) fn neighbours(&self, actor: usize) -> Neighbours {
-        neighbours::find(self, actor, &self.road)
+        neighbours::find(self, actor, &self.road, |actor| neighbours::half_width_m(self, actor))
     }
 
     /// Replaces `found` by the vehicles around each vehicle, in the order of the actors.
