@@ -3,11 +3,13 @@
 //!
 //! * [`run`](mod@run): output of one run, or of a pair of runs: Rerun recording, static figure, trace
 //! * [`campaign`]: output of many runs: HTML page, JUnit, Parquet, Markdown, recordings of selected samples
+//! * [`calibration`]: the result of a calibration, and the member of a driver ensemble that it gives
 //! * [`json`]: results as JSON with stable keys
 //! * [`traffic`]: simulated traffic as trajectory data, and texts and charts of what was found in trajectory data
 //!
 //! This crate is the only one that uses rerun, arrow and plotters.
 
+pub mod calibration;
 pub mod campaign;
 mod charts;
 mod escape;

@@ -27,12 +27,13 @@ use super::CliError;
 use super::args::{ControllerArgs, Format, SensorsChoice, SetArgs, controllers, positive};
 use super::backend::check_backend;
 use super::ending::{EndArgs, Ending, print_resumption};
+use super::ensemble::EnsembleArgs;
 use super::gates::GateArgs;
 use super::heartbeat::Heartbeat;
 use super::interrupt::{received, stop_gracefully};
 use super::output::{outln, print_error, print_report_files};
 use super::plan::PlanArgs;
-use super::summary::{print_counts, print_verdict};
+use super::summary::{print_counts, print_ensemble, print_verdict, with_ensemble};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall campaign`.
@@ -81,6 +82,8 @@ pub(super) struct CampaignArgs {
     #[command(flatten)]
     end: EndArgs,
     #[command(flatten)]
+    ensemble: EnsembleArgs,
+    #[command(flatten)]
     set: SetArgs,
     /// Output format
     #[arg(long, value_enum, default_value_t, help_heading = clap::builder::Resettable::Reset)]
@@ -109,7 +112,9 @@ impl CampaignArgs {
     /// Reads and checks every scenario.
     fn plan(&self, controllers: Vec<ControllerChoice>) -> Result<Plan, CliError> {
         let files = expand(&self.scenarios)?.iter().map(|path| self.set.load(path)).collect::<Result<Vec<_>, _>>()?;
-        let mut plan = Plan::new(files, self.sampling(), controllers)?;
+        let ensemble = self.ensemble.apply(files)?;
+        let mut plan = Plan::new(ensemble.entries, self.sampling(), controllers)?;
+        plan.without_effect = ensemble.without_effect;
         plan.sensors = self.sensors.map(SensorsChoice::mode);
         plan.partition = self.partition;
         plan.checks = self.plan.checks()?;
@@ -157,7 +162,7 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
         Format::Json => outln!(
             "{:#}",
             json::stamped(
-                json::campaign(&tally.summary, &judged, Some(wall_s)),
+                with_ensemble(json::campaign(&tally.summary, &judged, Some(wall_s)), &tally.summary, &manifest),
                 Some(args.seed),
                 Some(&args.set.settings)
             )
@@ -166,6 +171,7 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
             print_counts(&tally.summary);
             let (simulated_s, jobs) = (tally.summary.total().simulated_s, campaign.workers.jobs);
             outln!("{simulated_s:.0} simulated seconds in {wall_s:.1} s on {jobs} threads");
+            print_ensemble(&tally.summary, &manifest);
             print_verdict(&judged);
         }
     }

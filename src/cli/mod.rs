@@ -3,11 +3,13 @@
 mod args;
 mod backend;
 mod baseline;
+mod calibrate;
 mod campaign;
 mod check;
 mod command;
 mod compare;
 mod ending;
+mod ensemble;
 mod error;
 mod gates;
 mod generate;

@@ -2,9 +2,13 @@
 
 use closecall_campaign::harm;
 use closecall_campaign::ledger::{ArmCounts, Inference};
+use closecall_campaign::manifest::Manifest;
 use closecall_campaign::probability::percent;
 use closecall_campaign::summary::{Counts, Summary};
 use closecall_campaign::verdict::Judgement;
+
+use closecall_report::campaign::{ensemble_json, ensemble_text};
+use serde_json::Value;
 
 use super::output::{out, outln};
 
@@ -20,6 +24,20 @@ pub(super) fn print_counts(summary: &Summary) {
         );
     }
     outln!("Rates are conditional on the sampled scenario: they are not the risk on a road.");
+}
+
+/// Prints the verdict over the driver ensemble, if the campaign has one.
+pub(super) fn print_ensemble(summary: &Summary, manifest: &Manifest) {
+    out!("{}", ensemble_text(summary, manifest));
+}
+
+/// Returns `value` with the verdict over the driver ensemble, if the campaign has one.
+pub(super) fn with_ensemble(mut value: Value, summary: &Summary, manifest: &Manifest) -> Value {
+    let verdicts = ensemble_json(summary, manifest);
+    if verdicts.as_array().is_some_and(|verdicts| !verdicts.is_empty()) {
+        value["ensemble"] = verdicts;
+    }
+    value
 }
 
 /// Prints the verdict with its reasons.

@@ -4,6 +4,7 @@
 
 mod agreement;
 mod assumptions;
+mod calibrate;
 mod campaign_example;
 mod changed_controller;
 mod commands;
@@ -13,6 +14,7 @@ mod drivers;
 mod durability;
 mod encounter_models;
 mod engagement;
+mod ensemble;
 mod exec_controller;
 mod exit_codes;
 mod faulty_controllers;

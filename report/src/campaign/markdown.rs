@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::ensemble::ensemble_markdown;
 use super::findings::Findings;
 use super::overview::{ScenarioOverview, WorstSample};
 use closecall_campaign::harm;
@@ -30,6 +31,7 @@ pub fn markdown(findings: &Findings<'_>) -> String {
     }
     text.push('\n');
     text.push_str(&counts(findings.summary));
+    text.push_str(&ensemble_markdown(findings.summary, findings.manifest));
     text.push_str(&requirements(findings));
     for scenario in &findings.overview.scenarios {
         text.push_str(&worst(findings, scenario));

@@ -6,6 +6,7 @@
 //!          └▶ rows ─▶ outcomes.parquet        chosen samples ─▶ recordings/*.rrd
 //! ```
 
+mod ensemble;
 mod files;
 pub mod findings;
 mod html;
@@ -18,5 +19,6 @@ pub mod samples_xml;
 mod tally;
 pub mod timings;
 
+pub use ensemble::{ensemble_json, ensemble_text};
 pub use files::{CampaignReport, ReportError};
 pub use tally::Tally;

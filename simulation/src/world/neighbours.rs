@@ -21,6 +21,7 @@ pub(super) fn find(world: &World, actor: usize, road: &Road) -> Neighbours {
         left: left.map(|_| LaneNeighbours::default()),
         right: right.map(|_| LaneNeighbours::default()),
         in_path: None,
+        beyond: None,
     };
     for other in 0..world.len() {
         if other == actor {
@@ -44,7 +45,22 @@ pub(super) fn find(world: &World, actor: usize, road: &Road) -> Neighbours {
             keep_nearest(&mut around.in_path, candidate.neighbour);
         }
     }
+    around.beyond = beyond(world, actor, &around);
     around
+}
+
+/// Returns the nearest vehicle ahead of the one that is ahead of `actor`, in the path of that one.
+fn beyond(world: &World, actor: usize, around: &Neighbours) -> Option<Neighbour> {
+    let candidates = [around.own.lead, around.in_path].into_iter().flatten();
+    let ahead = candidates.min_by(|a, b| a.gap_m.total_cmp(&b.gap_m))?;
+    let mut nearest = None;
+    for other in (0..world.len()).filter(|&other| other != actor && other != ahead.actor) {
+        let from_ahead = Candidate::new(world, ahead.actor, other);
+        if from_ahead.ahead_m > 0.0 && from_ahead.neighbour.gap_m >= 0.0 && from_ahead.is_in_path() {
+            keep_nearest(&mut nearest, Candidate::new(world, actor, other).neighbour);
+        }
+    }
+    nearest
 }
 
 fn keep_nearest(slot: &mut Option<Neighbour>, candidate: Neighbour) {

@@ -7,6 +7,7 @@ use std::path::Path;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::{ledger, provenance, samples, scenario, verdict};
+use crate::campaign::ensemble::ensemble_html;
 use crate::campaign::findings::Findings;
 use closecall_scenarios::atomic::{WriteError, write_file};
 
@@ -27,6 +28,7 @@ pub(super) fn campaign(findings: &Findings<'_>) -> io::Result<Markup> {
     let body = html! {
         (verdict::header(findings))
         (ledger::collisions(findings)?)
+        (ensemble_html(findings.summary, findings.manifest))
         (verdict::gates(findings))
         (verdict::requirements(findings))
         (ledger::validity(findings))
@@ -54,7 +56,7 @@ pub(super) fn document(title: &str, body: &Markup) -> Markup {
 }
 
 /// Returns a table that scrolls sideways if the page is too narrow; `head` holds cells, `rows` holds rows.
-pub(super) fn table(head: &Markup, rows: &Markup) -> Markup {
+pub(in crate::campaign) fn table(head: &Markup, rows: &Markup) -> Markup {
     html! {
         div.wide {
             table {
@@ -66,17 +68,17 @@ pub(super) fn table(head: &Markup, rows: &Markup) -> Markup {
 }
 
 /// Returns the heads of columns of text.
-pub(super) fn text_heads(names: &[&str]) -> Markup {
+pub(in crate::campaign) fn text_heads(names: &[&str]) -> Markup {
     html! { @for name in names { th { (name) } } }
 }
 
 /// Returns the heads of columns of numbers.
-pub(super) fn number_heads(names: &[&str]) -> Markup {
+pub(in crate::campaign) fn number_heads(names: &[&str]) -> Markup {
     html! { @for name in names { th.number { (name) } } }
 }
 
 /// Returns a cell with a number.
-pub(super) fn number(value: impl Display) -> Markup {
+pub(in crate::campaign) fn number(value: impl Display) -> Markup {
     html! { td.number { (value.to_string()) } }
 }
 
