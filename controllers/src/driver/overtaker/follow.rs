@@ -9,7 +9,6 @@ use crate::driver::{Idm, IdmConfig, Lead, Wiedemann99, Wiedemann99Config, Wiedem
 /// Car-following model of an overtaking driver.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-#[expect(clippy::large_enum_variant, reason = "a scenario has a handful of them, read once")]
 pub enum FollowConfig {
     /// The Wiedemann 99 model.
     Wiedemann99(Wiedemann99Config),

@@ -136,7 +136,8 @@ fn a_driver_who_anticipates_expects_braking_one_reaction_time_after_the_brake_li
         time += PHYSICS_STEP;
     }
     let seen = seen_before_a_braking_one(&mut full, time);
-    assert!(seen.brake_light && seen.lead.acceleration_mps2 == -ASSUMED_BRAKING_MPS2, "{seen:?}");
+    assert!(seen.brake_light, "{seen:?}");
+    assert_eq!(seen.lead.acceleration_mps2, -ASSUMED_BRAKING_MPS2);
     // The vehicle directly ahead still keeps its speed, and is perceived to.
     assert_eq!(seen.lead.speed_mps, 30.0);
     assert_eq!(seen_before_a_braking_one(&mut half, time).lead.acceleration_mps2, -0.5 * ASSUMED_BRAKING_MPS2);

@@ -246,21 +246,20 @@ fn new_name(document: &mut DocumentMut, path: &[String], key: &str) -> String {
 
 /// Returns the number of values that use the parameter `name`.
 fn uses(item: &Item, name: &str) -> usize {
-    let is_use = |text: &str| text.strip_prefix('$') == Some(name);
     let of_table = |table: &dyn TableLike| table.iter().map(|(_, item)| uses(item, name)).sum();
     match item {
-        Item::Value(value) => uses_in_value(value, name, is_use),
+        Item::Value(value) => uses_in_value(value, name),
         Item::Table(table) => of_table(table),
         Item::ArrayOfTables(tables) => tables.iter().map(|table| of_table(table)).sum(),
         Item::None => 0,
     }
 }
 
-fn uses_in_value(value: &Value, name: &str, is_use: impl Fn(&str) -> bool + Copy) -> usize {
+fn uses_in_value(value: &Value, name: &str) -> usize {
     match value {
-        Value::String(text) => usize::from(is_use(text.value())),
-        Value::Array(values) => values.iter().map(|value| uses_in_value(value, name, is_use)).sum(),
-        Value::InlineTable(table) => table.iter().map(|(_, value)| uses_in_value(value, name, is_use)).sum(),
+        Value::String(text) => usize::from(text.value().strip_prefix('$') == Some(name)),
+        Value::Array(values) => values.iter().map(|value| uses_in_value(value, name)).sum(),
+        Value::InlineTable(table) => table.iter().map(|(_, value)| uses_in_value(value, name)).sum(),
         _ => 0,
     }
 }
