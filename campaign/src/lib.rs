@@ -19,6 +19,7 @@ pub mod arm_pairs;
 pub mod baseline;
 pub mod compare;
 pub mod end_rule;
+pub mod ensemble;
 pub mod execution;
 pub mod fingerprint;
 pub mod folder;

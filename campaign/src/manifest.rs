@@ -98,6 +98,9 @@ pub struct Manifest {
     /// The folder in which the program ran, to which paths in the command of a controller are relative.
     #[serde(default)]
     pub working_folder: Option<PathBuf>,
+    /// Scenarios and members of a driver ensemble that were not run, because the member changes nothing in the scenario.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub without_effect: Vec<(String, String)>,
     /// The command line.
     pub command: Vec<String>,
 }
@@ -251,6 +254,7 @@ mod tests {
             sample_timeout_s: 300.0,
             controllers: Vec::new(),
             working_folder: None,
+            without_effect: Vec::new(),
             command: vec!["closecall".to_owned()],
         }
     }

@@ -65,6 +65,8 @@ pub struct Plan {
     pub inference: Inference,
     /// The number of worker threads, and the time limit of a sample.
     pub workers: Workers,
+    /// Scenarios and members of a driver ensemble that are not run, because the member changes nothing in the scenario.
+    pub without_effect: Vec<(String, String)>,
 }
 
 impl Plan {
@@ -99,6 +101,7 @@ impl Plan {
             checks: CheckPlan::default(),
             inference: Inference::default(),
             workers: Workers::default(),
+            without_effect: Vec::new(),
         })
     }
 
@@ -162,6 +165,7 @@ impl Plan {
             controllers: self.fingerprints(),
             working_folder: std::env::current_dir().ok(),
             sample_timeout_s: self.workers.sample_timeout.as_secs_f64(),
+            without_effect: self.without_effect.clone(),
             command,
         })
     }

@@ -25,7 +25,8 @@ pub use interface::{
     Driver, DriverAction, DriverError, DriverInput, DriverNote, LaneChange, LaneNeighbours, Neighbour, Neighbours,
 };
 pub use lane_keeping::{Deviation, LaneKeeping, LaneKeepingConfig, Weave};
-pub use overtaker::{FollowConfig, Overtaker, OvertakerConfig, Return, ReturnConfig};
+pub use overtaker::{Follow, FollowConfig, Overtaker, OvertakerConfig, Return, ReturnConfig};
+pub use perception::{Evidence, EvidenceConfig, PerceptionConfig, PerceptionSettings};
 pub use prescribed::{Prescribed, PrescribedConfig, PrescribedLaneChangeConfig, RecordedConfig};
 pub use reaction::{LogNormalConfig, Reaction, ReactionConfig};
 pub use speed_keeping::{SpeedKeeping, SpeedKeepingConfig, Wander};
@@ -65,7 +66,7 @@ pub(crate) fn check_finite(input: &DriverInput<'_>) -> Result<(), DriverError> {
     finite(input.desired_speed_offset_mps, "wanted speed", input.time)?;
     let lanes = [Some(&near.own), near.left.as_ref(), near.right.as_ref()];
     let others = lanes.iter().flatten().flat_map(|lane| [&lane.lead, &lane.follower, &lane.alongside]);
-    for other in others.chain([&near.in_path]).flatten() {
+    for other in others.chain([&near.in_path, &near.beyond]).flatten() {
         for value in [other.gap_m, other.speed_mps, other.acceleration_mps2, other.width_m, other.lateral_offset_m] {
             finite(value, "state of a neighbour", input.time)?;
         }
@@ -110,6 +111,8 @@ mod tests {
             lane_change_duration_s: None,
             evasive_lateral_mps2: None,
             lapse: None,
+            perception: None,
+            brake_build_up_mps3: None,
             returns: None,
         };
         assert!(refuses(&mut overtaker.check(&none).unwrap().driver()));

@@ -21,11 +21,12 @@ mod ego;
 
 pub use config::{CheckedDriver, DriverConfig, HumanDriver};
 pub use driver::{
-    Deviation, Driver, DriverAction, DriverError, DriverInput, DriverNote, FollowConfig, Idm, IdmConfig, LaneChange,
-    LaneKeeping, LaneKeepingConfig, LaneNeighbours, Lapse, LapseConfig, Lead, LogNormalConfig, Neighbour, Neighbours,
-    Overtaker, OvertakerConfig, Prescribed, PrescribedConfig, PrescribedLaneChangeConfig, Reaction, ReactionConfig,
-    RecordedConfig, Regime, Return, ReturnConfig, SpeedKeeping, SpeedKeepingConfig, Thresholds, Wander, Weave,
-    Wiedemann99, Wiedemann99Config, Wiedemann99Driver, Wiedemann99Model,
+    Deviation, Driver, DriverAction, DriverError, DriverInput, DriverNote, Evidence, EvidenceConfig, Follow,
+    FollowConfig, Idm, IdmConfig, LaneChange, LaneKeeping, LaneKeepingConfig, LaneNeighbours, Lapse, LapseConfig, Lead,
+    LogNormalConfig, Neighbour, Neighbours, Overtaker, OvertakerConfig, PerceptionConfig, PerceptionSettings,
+    Prescribed, PrescribedConfig, PrescribedLaneChangeConfig, Reaction, ReactionConfig, RecordedConfig, Regime, Return,
+    ReturnConfig, SpeedKeeping, SpeedKeepingConfig, Thresholds, Wander, Weave, Wiedemann99, Wiedemann99Config,
+    Wiedemann99Driver, Wiedemann99Model,
 };
 pub use ego::{
     Acc, AccConfig, Aeb, AebConfig, ArrivalPrediction, BrakingResponse, ControllerError, EgoCommand, EgoController,

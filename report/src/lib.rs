@@ -3,6 +3,7 @@
 //!
 //! * [`run`](mod@run): output of one run, or of a pair of runs: Rerun recording, static figure, trace
 //! * [`campaign`]: output of many runs: HTML page, JUnit, Parquet, Markdown, recordings of selected samples
+//! * [`calibration`]: the result of a calibration, and the member of a driver ensemble that it gives
 //! * [`serve`]: recordings in the browser
 //! * [`json`]: results as JSON with stable keys
 //! * [`study`]: output of sensitivity studies and frontiers: tables, charts and pages
@@ -10,6 +11,7 @@
 //!
 //! This crate is the only one that uses rerun, arrow and plotters.
 
+pub mod calibration;
 pub mod campaign;
 mod charts;
 mod escape;

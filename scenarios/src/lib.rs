@@ -6,6 +6,7 @@ pub mod criticality;
 pub mod encounter;
 pub mod filters;
 pub mod fit;
+pub mod following;
 pub mod lane_change;
 pub mod parameters;
 pub mod robustness;

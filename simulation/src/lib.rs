@@ -7,11 +7,13 @@
 //! * [`scenario`]: scenario files, checked into concrete scenarios
 //! * [`controller`]: the controllers that can drive the ego vehicle, built in or as a separate process
 //! * [`run`](mod@run): the closed loop, and the observers of a run
+//! * [`calibration`]: car-following models fitted to recorded pairs
 //! * [`outcome`]: the result of a run
 //!
 //! The outcome depends on the scenario, the seed, the sample number and the arm only, down to the last bit. This crate is
 //! the only user of rapier, in its module `world`.
 
+pub mod calibration;
 pub mod controller;
 pub mod criteria;
 pub mod harm;

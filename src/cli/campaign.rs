@@ -27,12 +27,13 @@ use super::args::{Format, SensorsChoice, SetArgs, positive};
 use super::arms::{ComparisonArgs, ControllerArgs};
 use super::backend::check_backend;
 use super::ending::{EndArgs, Ending, print_resumption};
+use super::ensemble::EnsembleArgs;
 use super::gates::GateArgs;
 use super::heartbeat::Heartbeat;
 use super::interrupt::{received, stop_gracefully};
 use super::output::{outln, print_error, print_report_files};
 use super::plan::PlanArgs;
-use super::summary::{print_counts, print_verdict};
+use super::summary::{print_counts, print_ensemble, print_verdict};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall campaign`.
@@ -80,6 +81,8 @@ pub(super) struct CampaignArgs {
     #[command(flatten)]
     end: EndArgs,
     #[command(flatten)]
+    ensemble: EnsembleArgs,
+    #[command(flatten)]
     set: SetArgs,
     /// Output format
     #[arg(long, value_enum, default_value_t, help_heading = clap::builder::Resettable::Reset)]
@@ -101,7 +104,9 @@ impl CampaignArgs {
     /// Reads and checks every scenario.
     fn plan(&self, controllers: Vec<ControllerChoice>) -> Result<Plan, CliError> {
         let files = expand(&self.scenarios)?.iter().map(|path| self.set.load(path)).collect::<Result<Vec<_>, _>>()?;
-        let mut plan = Plan::new(files, self.sampling(), controllers)?;
+        let ensemble = self.ensemble.apply(files)?;
+        let mut plan = Plan::new(ensemble.entries, self.sampling(), controllers)?;
+        plan.without_effect = ensemble.without_effect;
         plan.sensors = self.sensors.map(SensorsChoice::mode);
         plan.partition = self.partition;
         plan.checks = self.plan.checks()?;
@@ -155,6 +160,7 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
             if check_s > 0.0 {
                 outln!("{:.0} % of the threads' time went into validity checks", 100.0 * check_s / (run_s + check_s));
             }
+            print_ensemble(&tally.summary, &manifest);
             print_verdict(&judged);
         }
     }

@@ -8,8 +8,8 @@ use closecall_simulation::controller::exec::{adopt_orphans, end_all};
 use super::backend::choose_backend;
 use super::output::print_error;
 use super::{
-    CliError, baseline, campaign, check, compare, generate, inspect, interrupt, library, merge, new, plot, record,
-    reenact, render, replay, robustness, run, schema, statistics, study, trajectories, view, watching,
+    CliError, baseline, calibrate, campaign, check, compare, generate, inspect, interrupt, library, merge, new, plot,
+    record, reenact, render, replay, robustness, run, schema, statistics, study, trajectories, view, watching,
 };
 use crate::exit_code::ExitCode;
 
@@ -85,6 +85,8 @@ enum Command {
     Fit(trajectories::FitArgs),
     /// Compute durations, speeds, counts and correlations of recorded lane changes
     Statistics(statistics::StatisticsArgs),
+    /// Calibrate a car-following model on recorded pairs, and judge it on pairs that were held out
+    Calibrate(calibrate::CalibrateArgs),
     /// Study how much noise and offset the criteria for lane changes tolerate
     Robustness(robustness::RobustnessArgs),
     /// Simulate samples of a scenario, and write their traffic as a trajectory file
@@ -154,6 +156,7 @@ fn dispatch(command: Command) -> Result<ExitCode, CliError> {
         Command::Reenact(args) => reenact::reenact(&args),
         Command::Fit(args) => trajectories::fit(&args),
         Command::Statistics(args) => statistics::statistics(&args),
+        Command::Calibrate(args) => calibrate::calibrate(&args),
         Command::Robustness(args) => robustness::robustness(&args),
         Command::Record(args) => record::record(&args),
         Command::Plot(args) => plot::plot(&args),

@@ -17,6 +17,7 @@ use closecall_report::serve::{ServeError, ViewerError};
 use closecall_report::traffic::trajectory_charts::ChartError;
 use closecall_scenarios::atomic::WriteError;
 use closecall_scenarios::encounter::NoEncounter;
+use closecall_scenarios::following::FollowingError;
 use closecall_scenarios::lane_change::ReferenceError;
 use closecall_scenarios::trajectory_data::{TrajectoryFileError, WriteError as TrajectoryWriteError};
 use closecall_sensors::camera::ClassifierError;
@@ -24,6 +25,7 @@ use closecall_sensors::camera::dataset::DatasetError;
 use closecall_simulation::SampleError;
 use closecall_simulation::scenario::ScenarioError;
 use closecall_simulation::scenario::library::UnknownScenario;
+use closecall_simulation::scenario::member::{ApplyError, MemberError};
 use closecall_simulation::scenario::source::SourceError;
 use miette::Diagnostic;
 
@@ -41,6 +43,15 @@ pub enum CliError {
     /// A scenario cannot be used.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
+    /// A member of a driver ensemble cannot be used.
+    #[error(transparent)]
+    Member(#[from] MemberError),
+    /// A member of a driver ensemble does not fit a scenario.
+    #[error(transparent)]
+    Apply(#[from] ApplyError),
+    /// A file of recorded pairs cannot be used.
+    #[error(transparent)]
+    Following(#[from] FollowingError),
     /// A trajectory file cannot be used.
     #[error(transparent)]
     TrajectoryData(#[from] TrajectoryFileError),
@@ -209,6 +220,9 @@ impl From<&CliError> for ExitCode {
             | CliError::Figure(_)
             | CliError::WriteRecording(_)
             | CliError::Dataset(_) => Self::Io,
+            CliError::Member(MemberError::Read { .. }) | CliError::Following(FollowingError::Read { .. }) => Self::Io,
+            CliError::Member(MemberError::Unknown { .. } | MemberError::SameName { .. }) => Self::Usage,
+            CliError::Member(_) | CliError::Apply(_) | CliError::Following(_) => Self::InvalidInput,
             CliError::Sample { .. } => Self::SampleError,
             CliError::Usage { .. } | CliError::Plan(_) | CliError::Baseline(_) => Self::Usage,
         }

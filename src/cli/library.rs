@@ -3,6 +3,7 @@
 use clap::Args;
 use closecall_report::json::stamped;
 use closecall_simulation::scenario::library::entries;
+use closecall_simulation::scenario::member;
 use serde_json::json;
 
 use super::CliError;
@@ -19,9 +20,9 @@ pub(super) struct ListArgs {
 }
 
 pub(super) fn list(args: &ListArgs) -> Result<ExitCode, CliError> {
-    let listed = entries()?;
+    let (listed, members) = (entries()?, member::entries()?);
     match args.format {
-        Format::Json => outln!("{:#}", stamped(json!({ "scenarios": listed }), None, None)),
+        Format::Json => outln!("{:#}", stamped(json!({ "scenarios": listed, "members": members }), None, None)),
         Format::Human => {
             for scenario in &listed {
                 outln!("{}", scenario.name);
@@ -31,6 +32,8 @@ pub(super) fn list(args: &ListArgs) -> Result<ExitCode, CliError> {
                     outln!("  gate: {gate}");
                 }
             }
+            outln!("\nMembers of the driver ensemble (`closecall campaign SCENARIO --ensemble NAME`):");
+            members.iter().for_each(|member| outln!("{member}"));
             outln!("\nA command takes such a name in place of a file: `closecall run {}`.", listed[0].name);
             outln!("`closecall new NAME --from LIBRARY_NAME` writes a copy to start from.");
         }

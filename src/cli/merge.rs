@@ -13,7 +13,7 @@ use super::CliError;
 use super::args::Format;
 use super::gates::GateArgs;
 use super::output::{outln, print_report_files};
-use super::summary::{print_counts, print_verdict};
+use super::summary::{print_counts, print_ensemble, print_verdict};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall merge`.
@@ -52,6 +52,7 @@ pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
         Format::Json => outln!("{:#}", json::campaign_report(&report, None)),
         Format::Human => {
             print_counts(&tally.summary);
+            print_ensemble(&tally.summary, saved.manifest());
             print_verdict(&judged);
         }
     }

@@ -3,9 +3,12 @@
 use closecall_campaign::arm_pairs::{CORRECTION, pair_results};
 use closecall_campaign::harm;
 use closecall_campaign::ledger::{ArmCounts, Inference};
+use closecall_campaign::manifest::Manifest;
 use closecall_campaign::probability::percent;
 use closecall_campaign::summary::{Counts, Summary};
 use closecall_campaign::verdict::Judgement;
+
+use closecall_report::campaign::ensemble_text;
 
 use super::output::{out, outln};
 
@@ -24,6 +27,11 @@ pub(super) fn print_counts(summary: &Summary) {
         );
     }
     outln!("Rates are conditional on the sampled scenario: they are not the risk on a road.");
+}
+
+/// Prints the verdict over the driver ensemble, if the campaign has one.
+pub(super) fn print_ensemble(summary: &Summary, manifest: &Manifest) {
+    out!("{}", ensemble_text(summary, manifest));
 }
 
 /// Prints the verdict with its reasons.

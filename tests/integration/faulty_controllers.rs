@@ -127,6 +127,7 @@ fn manifest(campaign: &Campaign) -> Manifest {
         sample_timeout_s: WATCHDOG.as_secs_f64(),
         controllers: Vec::new(),
         working_folder: None,
+        without_effect: Vec::new(),
         command: Vec::new(),
     }
 }

@@ -5,6 +5,7 @@
 mod agreement;
 mod arms;
 mod assumptions;
+mod calibrate;
 mod campaign_example;
 mod changed_controller;
 mod commands;
@@ -14,6 +15,7 @@ mod drivers;
 mod durability;
 mod encounter_models;
 mod engagement;
+mod ensemble;
 mod exec_controller;
 mod exit_codes;
 mod faulty_controllers;

@@ -7,6 +7,7 @@
 
 use closecall_traffic::{Check, ConfigError, Num, Parameters, Problem, Range, Stream, Time};
 use rand::RngExt;
+use rand_distr::{Distribution, StandardNormal};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -21,8 +22,11 @@ pub struct LapseConfig {
     pub at_s: Option<Num>,
     /// Mean time from the end of one random lapse to the start of the next (s).
     pub every_s: Option<Num>,
-    /// Duration for which the driver looks away (s).
+    /// Duration for which the driver looks away (s): 0 to 30. With `duration-sigma`, the median of it.
     pub duration_s: Num,
+    /// Standard deviation of the logarithm of the duration, which is then drawn anew for each lapse: 0 to 2. Default:
+    /// each lapse has the same duration.
+    pub duration_sigma: Option<Num>,
 }
 
 /// Checked lapses of attention.
@@ -30,6 +34,7 @@ pub struct LapseConfig {
 pub struct Lapse {
     timing: LapseTiming,
     duration_s: f64,
+    duration_sigma: Option<f64>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,7 +64,9 @@ impl Check for LapseConfig {
             }
         };
         let duration_s = number(&self.duration_s, "duration-s", Range::closed(0.0, MAX_LAPSE_S))?;
-        Ok(Lapse { timing, duration_s })
+        let sigma = self.duration_sigma.as_ref();
+        let duration_sigma = sigma.map(|num| number(num, "duration-sigma", Range::closed(0.0, 2.0))).transpose()?;
+        Ok(Lapse { timing, duration_s, duration_sigma })
     }
 }
 
@@ -112,7 +119,16 @@ impl Lapse {
             // The intervals of a Poisson process are exponential. The argument 1 − u is never 0.
             LapseTiming::AtRandom { every_s } => now + Time::from_s(-every_s * (1.0 - rng.random::<f64>()).ln()),
         };
-        (begin, begin + Time::from_s(self.duration_s))
+        (begin, begin + Time::from_s(self.draw_duration_s(rng)))
+    }
+}
+
+impl Lapse {
+    /// Returns the duration of one lapse (s).
+    fn draw_duration_s(&self, rng: &mut Stream) -> f64 {
+        let Some(sigma) = self.duration_sigma else { return self.duration_s };
+        let normal: f64 = StandardNormal.sample(rng);
+        (self.duration_s * (sigma * normal).exp()).min(MAX_LAPSE_S)
     }
 }
 
@@ -138,23 +154,43 @@ mod tests {
 
     #[test]
     fn a_single_lapse_begins_and_ends_at_the_given_times() {
-        let config = LapseConfig { at_s: Some(3.0.into()), every_s: None, duration_s: 1.5.into() };
+        let config =
+            LapseConfig { at_s: Some(3.0.into()), every_s: None, duration_s: 1.5.into(), duration_sigma: None };
         let (away_s, first) = away_s(&config, 60.0);
         assert!((away_s - 1.5).abs() < 1e-9 && first == Some(Time::from_s(3.0)), "{away_s} {first:?}");
     }
 
     #[test]
     fn random_lapses_take_the_expected_share_of_time() {
-        let config = LapseConfig { at_s: None, every_s: Some(8.0.into()), duration_s: 2.0.into() };
+        let config =
+            LapseConfig { at_s: None, every_s: Some(8.0.into()), duration_s: 2.0.into(), duration_sigma: None };
         let (away_s, _) = away_s(&config, 20_000.0);
         // 2,000 lapses: the share is 2/(8 + 2) within 3 standard deviations of 2 % each.
         assert!((away_s / 20_000.0 - 0.2).abs() < 0.012, "{away_s}");
     }
 
     #[test]
+    fn drawn_durations_have_the_given_median_and_differ() {
+        let config = LapseConfig {
+            at_s: None,
+            every_s: Some(8.0.into()),
+            duration_s: 0.9.into(),
+            duration_sigma: Some(0.5.into()),
+        };
+        let lapse = config.check(&Parameters::default()).unwrap();
+        let mut rng = stream(0, 0, &ActorId::new("rear").unwrap(), "driver");
+        let mut drawn: Vec<f64> = (0..4001).map(|_| lapse.draw_duration_s(&mut rng)).collect();
+        drawn.sort_by(f64::total_cmp);
+        assert!((drawn[2000] - 0.9).abs() < 0.03, "{}", drawn[2000]);
+        assert!((drawn[3366] / drawn[2000] - 0.5_f64.exp()).abs() < 0.05);
+        let wrong = LapseConfig { duration_sigma: Some(3.0.into()), ..config };
+        assert_eq!(wrong.check(&Parameters::default()).unwrap_err().path.to_string(), "lapse.duration-sigma");
+    }
+
+    #[test]
     fn lapses_need_exactly_one_timing_and_a_driver_with_a_reaction_time() {
         let none = Parameters::default();
-        let config = LapseConfig { at_s: None, every_s: None, duration_s: 2.0.into() };
+        let config = LapseConfig { at_s: None, every_s: None, duration_s: 2.0.into(), duration_sigma: None };
         assert_eq!(config.check(&none).unwrap_err().path.to_string(), "lapse.at-s");
         let once = LapseConfig { at_s: Some(1.0.into()), ..config };
         assert!(LapseConfig { every_s: Some(1.0.into()), ..once.clone() }.check(&none).is_err());

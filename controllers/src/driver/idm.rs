@@ -14,8 +14,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::attention::{Lapse, LapseConfig, check_lapse};
-use super::pedals::Pedals;
-use super::perception::Perception;
+use super::pedals::{Pedals, check_brake_build_up};
+use super::perception::{Perception, PerceptionConfig, PerceptionSettings, check_perception};
 use super::reaction::{Reaction, ReactionConfig};
 use super::wiedemann99::{EmergencyBrakingDetector, brake_for_brake_light, default_desired_mps, nearest_lead};
 use super::{
@@ -49,19 +49,25 @@ pub struct IdmConfig {
     pub reaction_s: Option<ReactionConfig>,
     /// Lapses of attention. Default: none. They need a reaction time.
     pub lapse: Option<LapseConfig>,
+    /// How the driver perceives the vehicles ahead. It needs a reaction time.
+    pub perception: Option<PerceptionConfig>,
+    /// Rate at which the driver builds up braking (m/s³): 1 to 100. Default: 12.65. It needs a reaction time.
+    pub brake_build_up_mps3: Option<Num>,
 }
 
 /// The checked Intelligent Driver Model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Idm {
-    desired_mps: Option<f64>,
-    time_gap_s: f64,
+    pub(crate) desired_mps: Option<f64>,
+    pub(crate) time_gap_s: f64,
     standstill_gap_m: f64,
     acceleration_mps2: f64,
     comfortable_braking_mps2: f64,
-    hardest_braking_mps2: f64,
-    reaction: Option<Reaction>,
+    pub(crate) hardest_braking_mps2: f64,
+    pub(crate) reaction: Option<Reaction>,
     lapse: Option<Lapse>,
+    perception: PerceptionSettings,
+    brake_build_up_mps3: f64,
 }
 
 impl Check for IdmConfig {
@@ -96,24 +102,35 @@ impl Check for IdmConfig {
             )?,
             reaction: reaction.map(|config| config.check(parameters)).transpose()?,
             lapse: check_lapse(self.lapse.as_ref(), reaction.is_some(), parameters)?,
+            perception: check_perception(self.perception.as_ref(), reaction.is_some(), parameters)?,
+            brake_build_up_mps3: check_brake_build_up(
+                self.brake_build_up_mps3.as_ref(),
+                reaction.is_some(),
+                parameters,
+            )?,
         })
     }
 }
 
 impl Idm {
+    /// Returns the gap that the driver keeps behind a vehicle at `speed_mps`, s₀ + T·v (m).
+    pub(crate) fn safe_gap_m(&self, speed_mps: f64) -> f64 {
+        self.standstill_gap_m + self.time_gap_s * speed_mps
+    }
+
     /// Creates a driver for one run.
     pub(crate) fn driver(&self) -> IdmDriver {
         IdmDriver {
             model: *self,
             perception: None,
             emergency: EmergencyBrakingDetector::new(self.hardest_braking_mps2),
-            pedals: Pedals::default(),
+            pedals: Pedals::new(self.brake_build_up_mps3),
             desired_mps: self.desired_mps,
         }
     }
 
     /// Returns the acceleration at `speed_mps` behind `lead` (m/s²). Braking is limited to the hardest of the driver.
-    fn acceleration_mps2(&self, speed_mps: f64, desired_mps: f64, lead: Option<&Lead>) -> f64 {
+    pub fn acceleration_mps2(&self, speed_mps: f64, desired_mps: f64, lead: Option<&Lead>) -> f64 {
         let ratio = if desired_mps > 0.0 { speed_mps / desired_mps } else { f64::from(u8::from(speed_mps > 0.0)) };
         let interaction = lead.map_or(0.0, |lead| {
             let closing = speed_mps * (speed_mps - lead.speed_mps);
@@ -145,7 +162,11 @@ impl Driver for IdmDriver {
         let long_term_mps = *self.desired_mps.get_or_insert_with(|| default_desired_mps(input));
         let desired_mps = input.desired_now_mps(long_term_mps);
         let requested_mps2 = if let Some(reaction) = self.model.reaction {
-            let new = || Perception::new(reaction.draw_s(rng), None).with_lapses(self.model.lapse);
+            let new = || {
+                Perception::new(reaction.draw_s(rng), None)
+                    .with_lapses(self.model.lapse)
+                    .with_settings(self.model.perception)
+            };
             let ahead = self.perception.get_or_insert_with(new).observe(input, rng).ahead;
             let requested_mps2 =
                 self.model.acceleration_mps2(speed_mps, desired_mps, ahead.as_ref().map(|vehicle| &vehicle.lead));

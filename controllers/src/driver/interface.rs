@@ -53,6 +53,9 @@ pub struct Neighbours {
     /// The nearest vehicle ahead in any lane whose box overlaps the driver's vehicle laterally: driving straight on
     /// would hit it.
     pub in_path: Option<Neighbour>,
+    /// The nearest vehicle ahead of the one that is ahead (the nearer of the lead vehicle in the own lane and the one in
+    /// the path), in the path of that one: the driver may see its brake light through the windows between.
+    pub beyond: Option<Neighbour>,
 }
 
 /// The input of a human driver at one physics step.

@@ -17,25 +17,52 @@
 //!
 //! The reaction time ends when the braking begins. The release of either pedal is not limited: no source was found.
 
-use closecall_traffic::Time;
+use closecall_traffic::{ConfigError, Num, Parameters, Problem, Range, Time};
 
 use super::COASTING_DECELERATION_MPS2;
 
-/// Largest rate at which a driver builds up braking (m/s³) (UN Regulation 157).
-const BRAKE_BUILD_UP_MPS3: f64 = 12.65;
+/// Largest rate at which a driver builds up braking if the scenario gives none (m/s³) (UN Regulation 157).
+pub(crate) const DEFAULT_BRAKE_BUILD_UP_MPS3: f64 = 12.65;
+
+/// Range of the rate at which a driver builds up braking (m/s³).
+const BRAKE_BUILD_UP_RANGE: Range = Range::closed(1.0, 100.0);
+
+/// Checks the rate at which a driver builds up braking (m/s³). A driver without a reaction time (`perceives` is false)
+/// is not limited, and has none.
+pub(crate) fn check_brake_build_up(
+    rate: Option<&Num>,
+    perceives: bool,
+    parameters: &Parameters,
+) -> Result<f64, ConfigError> {
+    match rate {
+        None => Ok(DEFAULT_BRAKE_BUILD_UP_MPS3),
+        Some(_) if !perceives => {
+            let rule = "without a reaction time the driver brakes as its model asks, at once".to_owned();
+            Err(ConfigError::new("brake-build-up-mps3", Problem::Contradiction { other: "reaction-s", rule }))
+        }
+        Some(num) => parameters.number(num, "brake-build-up-mps3", BRAKE_BUILD_UP_RANGE),
+    }
+}
 
 /// The pedals of one driver.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Pedals {
+    /// Largest rate at which braking builds up (m/s³).
+    build_up_mps3: f64,
     /// Time and acceleration (m/s²) of the last step.
     last: Option<(Time, f64)>,
 }
 
 impl Pedals {
+    /// Creates the pedals of a driver who builds up braking at `build_up_mps3` (m/s³) at most.
+    pub(crate) fn new(build_up_mps3: f64) -> Self {
+        Self { build_up_mps3, last: None }
+    }
+
     /// Returns `requested_mps2`, or the strongest braking that the driver can have built up by `now` (m/s²).
     pub(crate) fn apply_mps2(&mut self, requested_mps2: f64, now: Time) -> f64 {
         let (time, last_mps2) = self.last.unwrap_or((now, 0.0));
-        let strongest_mps2 = last_mps2.min(-COASTING_DECELERATION_MPS2) - BRAKE_BUILD_UP_MPS3 * (now - time).s();
+        let strongest_mps2 = last_mps2.min(-COASTING_DECELERATION_MPS2) - self.build_up_mps3 * (now - time).s();
         // Written so that NaN stays NaN; the driver refuses it.
         let applied_mps2 = if requested_mps2 < strongest_mps2 { strongest_mps2 } else { requested_mps2 };
         self.last = Some((now, applied_mps2));
@@ -51,7 +78,7 @@ mod tests {
 
     #[test]
     fn braking_builds_up_within_six_tenths_of_a_second_and_is_released_at_once() {
-        let mut pedals = Pedals::default();
+        let mut pedals = Pedals::new(DEFAULT_BRAKE_BUILD_UP_MPS3);
         let (mut time, mut applied_mps2) = (Time::ZERO, pedals.apply_mps2(1.0, Time::ZERO));
         assert_eq!(applied_mps2, 1.0);
         let begin = time;
@@ -63,5 +90,15 @@ mod tests {
         assert!(((time - begin).s() - 0.545).abs() < 0.011, "{time}");
         assert_eq!(pedals.apply_mps2(-1.0, time + PHYSICS_STEP), -1.0);
         assert!(pedals.apply_mps2(f64::NAN, time + PHYSICS_STEP).is_nan());
+    }
+
+    #[test]
+    fn a_slower_build_up_brakes_less_at_the_same_time() {
+        let after_half_a_second_mps2 = |build_up_mps3| {
+            let mut pedals = Pedals::new(build_up_mps3);
+            (0..=50).map(|step| pedals.apply_mps2(-9.0, Time::from_ms(10 * step))).fold(0.0, f64::min)
+        };
+        assert!((after_half_a_second_mps2(5.0) + 0.7 + 5.0 * 0.5).abs() < 1e-9);
+        assert_eq!(after_half_a_second_mps2(25.0), -9.0);
     }
 }

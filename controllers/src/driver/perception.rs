@@ -22,12 +22,28 @@
 //! - *Brake light.* The brake light is perceived with the same delay as everything else. The deceleration itself is
 //!   perceived only gradually, from the change of speed. Until then, a driver who sees the brake light go on assumes a
 //!   moderate deceleration.
+//! - *Anticipation.* A driver may look through the vehicle ahead. It then expects that vehicle to brake once it perceives the
+//!   brake light of the one beyond (spatial anticipation; Treiber, Kesting and Helbing 2006).
+//! - *Evidence.* A driver may accumulate looming evidence instead of using the threshold and the brake light:
+//!   see [`evidence`].
+
+mod acceleration;
+mod config;
+mod evidence;
+mod observation;
+
+pub(crate) use config::check_perception;
+pub use config::{PerceptionConfig, PerceptionSettings};
+pub use evidence::{Evidence, EvidenceConfig};
 
 use closecall_traffic::{Lane, PHYSICS_STEP, Side, Stream, Time};
 
+use self::acceleration::AccelerationEstimate;
+use self::evidence::{Belief, Looming};
+use self::observation::{Observation, ObservedVehicle};
 use super::attention::{Attention, Lapse};
 use super::reaction::MAX_REACTION_S;
-use super::{DriverInput, LaneNeighbours, Lead, Neighbour};
+use super::{DriverInput, Lead};
 
 /// Slowest change of the visual angle that a driver can scale (rad/s) (Hoffmann and Mortimer 1996).
 const LOOMING_THRESHOLD_RADPS: f64 = 0.003;
@@ -36,49 +52,13 @@ const LOOMING_THRESHOLD_RADPS: f64 = 0.003;
 /// assumption; 0.0003 to 0.001 are plausible.
 const ATTENDED_THRESHOLD_RADPS: f64 = 0.0006;
 
-/// Time constant of the low-pass filter with which a deceleration is perceived from the change of speed (s): an
-/// assumption; 0.3 to 1 are plausible.
-const ACCELERATION_TIME_CONSTANT_S: f64 = 0.6;
-
-/// Deceleration that a driver assumes when the brake light ahead goes on, before it is perceived (m/s²): an assumption, at
-/// the lower end of comfortable braking (2 to 3.4).
-const ASSUMED_BRAKING_MPS2: f64 = 2.0;
-
-/// Time for which a brake light stands for [`ASSUMED_BRAKING_MPS2`] (s). Afterwards, the perceived deceleration counts. An
-/// assumption; 0.5 to 2 are plausible.
-const ASSUMED_BRAKING_DURATION_S: f64 = 1.0;
+/// Smallest gap by which a difference of speeds is divided (m): numerical; at a gap of zero the ratio diverges.
+const MIN_GAP_M: f64 = 0.1;
 
 /// Number of stored observations: those within the longest reaction time, at most one in each physics step, plus one at
 /// either end.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive constant")]
 const MEMORY_CAPACITY: usize = (MAX_REACTION_S / PHYSICS_STEP.s()).round() as usize + 2;
-
-/// State of another vehicle at the time of an observation.
-#[derive(Clone, Copy, Debug)]
-struct ObservedVehicle {
-    actor: u32,
-    brake_light: bool,
-    gap_m: f64,
-    speed_mps: f64,
-    acceleration_mps2: f64,
-    width_m: f64,
-    /// Lateral position on the road (m).
-    d_m: f64,
-}
-
-/// State of the surroundings at one time.
-#[derive(Clone, Copy, Debug)]
-struct Observation {
-    time: Time,
-    own_s_m: f64,
-    own_speed_mps: f64,
-    own_lane: Lane,
-    ahead: Option<ObservedVehicle>,
-    /// The side of the adjacent lane that was observed.
-    side: Option<Side>,
-    /// Lead vehicle, vehicle alongside and follower in that lane; `None` if there is no such lane.
-    adjacent: Option<[Option<ObservedVehicle>; 3]>,
-}
 
 /// A vehicle as the driver perceives it now.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -136,6 +116,13 @@ pub(crate) struct Perception {
     /// Index of the observation in use, counted from the oldest.
     current: usize,
     acceleration_estimate: AccelerationEstimate,
+    settings: PerceptionSettings,
+    /// Perceived acceleration of the vehicle beyond the one ahead.
+    beyond_estimate: AccelerationEstimate,
+    /// What a driver who accumulates evidence expects of the vehicle ahead.
+    belief: Option<Belief>,
+    /// Time of the observation from which evidence was last accumulated.
+    accumulated: Option<Time>,
 }
 
 /// Perceived speed of the vehicle ahead.
@@ -145,15 +132,6 @@ struct SpeedEstimate {
     speed_mps: f64,
     /// True while the driver has noticed the difference to the own speed and attends to it.
     attended: bool,
-}
-
-/// Perceived acceleration of the vehicle ahead.
-#[derive(Clone, Copy, Debug)]
-struct AccelerationEstimate {
-    actor: u32,
-    acceleration_mps2: f64,
-    light_on_for_s: f64,
-    time: Time,
 }
 
 impl Perception {
@@ -169,7 +147,16 @@ impl Perception {
             oldest: 0,
             current: 0,
             acceleration_estimate: AccelerationEstimate::new(u32::MAX, Time::ZERO),
+            settings: PerceptionSettings::default(),
+            beyond_estimate: AccelerationEstimate::new(u32::MAX, Time::ZERO),
+            belief: None,
+            accumulated: None,
         }
+    }
+
+    /// Returns the same perception with other settings.
+    pub(crate) fn with_settings(self, settings: PerceptionSettings) -> Self {
+        Self { settings, ..self }
     }
 
     /// Returns the same perception with lapses of attention.
@@ -198,19 +185,13 @@ impl Perception {
             own_travel_m: input.own.s_m - observation.own_s_m,
             own_speed_then_mps: observation.own_speed_mps,
         };
-        let perceived_mps2 = self.estimate_acceleration_mps2(observation.ahead.as_ref(), input.time);
-        let mut ahead = observation.ahead.map(|observed| {
-            extrapolation.ahead(&observed, self.estimate_speed_mps(&observed, observation.own_speed_mps))
-        });
-        if observation.ahead.is_none() {
-            self.speed_estimate = None;
-        }
-        if let Some(ahead) = &mut ahead {
-            let lead = &mut ahead.lead;
-            let estimated_mps2 = self.acceleration_estimate.acceleration_mps2;
-            lead.gap_m += accelerated_displacement_m(lead.speed_mps, estimated_mps2, extrapolation.elapsed_s);
-            lead.speed_mps = (lead.speed_mps + estimated_mps2 * extrapolation.elapsed_s).max(0.0);
-            lead.acceleration_mps2 = perceived_mps2;
+        let reckoned_mps2 = self.acceleration_estimate.update_mps2(observation.ahead.as_ref(), input.time);
+        let mut ahead = match self.settings.evidence {
+            None => self.ahead_above_threshold(&observation, &extrapolation, reckoned_mps2),
+            Some(_) => self.ahead_as_believed(&observation, &extrapolation),
+        };
+        if self.settings.anticipation > 0.0 {
+            self.anticipate(&observation, input.time, ahead.as_mut());
         }
         let adjacent = observation.side.zip(observation.adjacent).map(|(side, [lead, alongside, follower])| {
             let lane = PerceivedLane {
@@ -243,6 +224,64 @@ impl Perception {
         }
     }
 
+    /// Returns the vehicle ahead as a driver perceives it who notices speed differences above the looming threshold.
+    fn ahead_above_threshold(
+        &mut self,
+        observation: &Observation,
+        extrapolation: &Extrapolation,
+        reckoned_mps2: f64,
+    ) -> Option<PerceivedVehicle> {
+        let Some(observed) = observation.ahead else {
+            self.speed_estimate = None;
+            return None;
+        };
+        let speed_mps = self.estimate_speed_mps(&observed, observation.own_speed_mps);
+        let estimated_mps2 = self.acceleration_estimate.acceleration_mps2;
+        let mut ahead = extrapolation.braking_ahead(&observed, speed_mps, estimated_mps2);
+        ahead.lead.acceleration_mps2 = reckoned_mps2;
+        Some(ahead)
+    }
+
+    /// Returns the vehicle ahead as a driver perceives it who accumulates evidence. The brake light of that vehicle counts
+    /// once the driver has noticed that it slows down.
+    fn ahead_as_believed(
+        &mut self,
+        observation: &Observation,
+        extrapolation: &Extrapolation,
+    ) -> Option<PerceivedVehicle> {
+        let evidence = self.settings.evidence?;
+        let Some(observed) = observation.ahead else {
+            self.belief = None;
+            return None;
+        };
+        let step_s = self.accumulated.map_or(0.0, |last| (observation.time - last).s());
+        self.accumulated = Some(observation.time);
+        let seen = Looming {
+            actor: observed.actor,
+            gap_m: observed.gap_m,
+            speed_mps: observed.speed_mps,
+            acceleration_mps2: self.acceleration_estimate.acceleration_mps2,
+            step_s,
+        };
+        let belief = Belief::updated(self.belief, evidence, seen, observation.own_speed_mps);
+        self.belief = Some(belief);
+        let mut ahead = extrapolation.braking_ahead(&observed, belief.speed_mps, belief.acceleration_mps2);
+        ahead.lead.acceleration_mps2 = belief.acceleration_mps2;
+        ahead.brake_light = observed.brake_light && belief.acceleration_mps2 < 0.0;
+        Some(ahead)
+    }
+
+    /// Makes the driver expect that the vehicle ahead brakes if the one beyond shows its brake light.
+    fn anticipate(&mut self, observation: &Observation, now: Time, ahead: Option<&mut PerceivedVehicle>) {
+        let beyond_mps2 = self.beyond_estimate.update_mps2(observation.beyond.as_ref(), now);
+        let Some(ahead) = ahead else { return };
+        if observation.beyond.is_some_and(|beyond| beyond.brake_light) {
+            let lead = &mut ahead.lead;
+            lead.acceleration_mps2 = lead.acceleration_mps2.min(self.settings.anticipation * beyond_mps2.min(0.0));
+            ahead.brake_light = true;
+        }
+    }
+
     /// Updates and returns the perceived speed of the vehicle ahead (m/s).
     fn estimate_speed_mps(&mut self, observed: &ObservedVehicle, own_mps: f64) -> f64 {
         let known = self.speed_estimate.filter(|estimate| estimate.actor == observed.actor);
@@ -255,90 +294,6 @@ impl Perception {
         let speed_mps = if notices { observed.speed_mps } else { speed_mps };
         self.speed_estimate = Some(SpeedEstimate { actor: observed.actor, speed_mps, attended });
         speed_mps
-    }
-
-    /// Updates the perceived acceleration of the vehicle ahead and returns the one that the driver reckons with (m/s²):
-    /// the perceived one, or the one that the driver assumes because of the brake light.
-    fn estimate_acceleration_mps2(&mut self, observed: Option<&ObservedVehicle>, now: Time) -> f64 {
-        let estimate = &mut self.acceleration_estimate;
-        let Some(observed) = observed else {
-            estimate.actor = u32::MAX;
-            return 0.0;
-        };
-        let step_s = (now - estimate.time).s();
-        if observed.speed_mps <= 0.0 {
-            // A driver sees at once that a vehicle stands: it no longer brakes.
-            *estimate = AccelerationEstimate::new(observed.actor, now);
-            return 0.0;
-        }
-        if estimate.actor == observed.actor {
-            let share = step_s / (ACCELERATION_TIME_CONSTANT_S + step_s);
-            estimate.acceleration_mps2 += share * (observed.acceleration_mps2 - estimate.acceleration_mps2);
-            estimate.light_on_for_s = if observed.brake_light { estimate.light_on_for_s + step_s } else { 0.0 };
-        } else {
-            *estimate = AccelerationEstimate::new(observed.actor, now);
-        }
-        estimate.time = now;
-        if observed.brake_light && estimate.light_on_for_s < ASSUMED_BRAKING_DURATION_S {
-            estimate.acceleration_mps2.min(-ASSUMED_BRAKING_MPS2)
-        } else {
-            estimate.acceleration_mps2
-        }
-    }
-}
-
-impl AccelerationEstimate {
-    /// An estimate of zero for a vehicle first observed at `time`.
-    fn new(actor: u32, time: Time) -> Self {
-        Self { actor, acceleration_mps2: 0.0, light_on_for_s: 0.0, time }
-    }
-}
-
-impl Observation {
-    fn of(input: &DriverInput<'_>, side: Option<Side>) -> Self {
-        let near = input.neighbours;
-        let own_d_m = input.own.d_m;
-        let nearer = match (near.own.lead.as_ref(), near.in_path.as_ref()) {
-            (Some(lead), Some(in_path)) if in_path.gap_m < lead.gap_m => Some(in_path),
-            (Some(lead), _) => Some(lead),
-            (None, in_path) => in_path,
-        };
-        let adjacent: Option<&LaneNeighbours> = match side {
-            Some(Side::Left) => near.left.as_ref(),
-            Some(Side::Right) => near.right.as_ref(),
-            None => None,
-        };
-        let observe = |neighbour: &Neighbour| ObservedVehicle::of(neighbour, own_d_m);
-        Self {
-            time: input.time,
-            own_s_m: input.own.s_m,
-            own_speed_mps: input.own.speed_mps,
-            own_lane: input.road.lane_at(own_d_m),
-            ahead: nearer.map(observe),
-            side,
-            adjacent: adjacent
-                .map(|lane| [&lane.lead, &lane.alongside, &lane.follower].map(|n| n.as_ref().map(observe))),
-        }
-    }
-}
-
-impl ObservedVehicle {
-    fn of(neighbour: &Neighbour, own_d_m: f64) -> Self {
-        Self {
-            actor: u32::try_from(neighbour.actor).unwrap_or(u32::MAX - 1),
-            brake_light: neighbour.brake_light,
-            gap_m: neighbour.gap_m,
-            speed_mps: neighbour.speed_mps,
-            acceleration_mps2: neighbour.acceleration_mps2,
-            width_m: neighbour.width_m,
-            d_m: own_d_m + neighbour.lateral_offset_m,
-        }
-    }
-
-    /// Rate at which the vehicle's visual angle grows or shrinks, observed from a vehicle at `own_mps` (rad/s).
-    /// Infinite at a gap of zero.
-    fn visual_angle_rate_radps(&self, own_mps: f64) -> f64 {
-        self.width_m * (self.speed_mps - own_mps).abs() / (self.gap_m * self.gap_m)
     }
 }
 
@@ -369,6 +324,15 @@ impl Extrapolation {
 
     fn ahead(&self, observed: &ObservedVehicle, speed_mps: f64) -> PerceivedVehicle {
         self.perceived(observed, speed_mps, observed.gap_m + speed_mps * self.elapsed_s - self.own_travel_m)
+    }
+
+    /// Returns a vehicle ahead that is perceived at `speed_mps` with `acceleration_mps2`, both extrapolated to now.
+    fn braking_ahead(&self, observed: &ObservedVehicle, speed_mps: f64, acceleration_mps2: f64) -> PerceivedVehicle {
+        let mut ahead = self.ahead(observed, speed_mps);
+        let lead = &mut ahead.lead;
+        lead.gap_m += accelerated_displacement_m(lead.speed_mps, acceleration_mps2, self.elapsed_s);
+        lead.speed_mps = (lead.speed_mps + acceleration_mps2 * self.elapsed_s).max(0.0);
+        ahead
     }
 
     fn behind(&self, observed: &ObservedVehicle) -> PerceivedVehicle {

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::ensemble::ensemble_markdown;
 use super::findings::Findings;
 use super::overview::{FEW_EVENTS, ScenarioOverview, WorstSample};
 use closecall_campaign::arm_pairs::{CORRECTION, pair_results};
@@ -31,6 +32,7 @@ pub fn markdown(findings: &Findings<'_>) -> String {
     }
     text.push('\n');
     text.push_str(&counts(findings.summary));
+    text.push_str(&ensemble_markdown(findings.summary, findings.manifest));
     text.push_str(&requirements(findings));
     for scenario in &findings.overview.scenarios {
         text.push_str(&influence(findings, scenario));

@@ -7,6 +7,7 @@
 //! ```
 
 mod arm_pairs;
+mod ensemble;
 mod files;
 pub mod findings;
 pub(crate) mod html;
@@ -19,5 +20,6 @@ pub mod samples_xml;
 mod tally;
 pub mod timings;
 
+pub use ensemble::{ensemble_json, ensemble_text};
 pub use files::{CampaignReport, ReportError};
 pub use tally::Tally;

@@ -11,7 +11,7 @@ use serde_json::{Map, Value, json};
 
 use super::influence::influence;
 use super::stamp::stamped;
-use crate::campaign::CampaignReport;
+use crate::campaign::{CampaignReport, ensemble_json};
 
 /// Returns the result of a campaign: its counts, its verdict, what moves its result, and how it was made. `wall_s` is its wall time
 /// (s), `None` for a merged campaign.
@@ -19,6 +19,10 @@ pub fn campaign_report(report: &CampaignReport<'_>, wall_s: Option<f64>) -> Valu
     let (tally, manifest) = (report.tally, report.manifest);
     let mut value = campaign(&tally.summary, report.judged, wall_s);
     value["influence"] = influence(&tally.overview, manifest.sampling.design);
+    let verdicts = ensemble_json(&tally.summary, manifest);
+    if verdicts.as_array().is_some_and(|verdicts| !verdicts.is_empty()) {
+        value["ensemble"] = verdicts;
+    }
     stamped(value, Some(manifest.sampling.seed), Some(&manifest.settings()))
 }
 

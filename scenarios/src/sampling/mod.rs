@@ -19,3 +19,4 @@ mod sobol;
 mod tests;
 
 pub use design::{Design, UnknownDesign};
+pub use sobol::unit_point;

@@ -31,3 +31,8 @@ pub(super) fn sample(space: &ParameterSpace, seed: u64, index: u64) -> Parameter
         distribution.quantile(f64::from(sobol_burley::sample(point, dimension, scramble)) + HALF_CELL)
     })
 }
+
+/// Returns point `index` of a scrambled Sobol sequence in the open unit cube, for searches that need no seed.
+pub fn unit_point(index: u32, dimensions: usize) -> Vec<f64> {
+    (0..dimensions as u32).map(|dimension| f64::from(sobol_burley::sample(index, dimension, 0)) + HALF_CELL).collect()
+}

@@ -93,7 +93,9 @@ impl ScenarioConfig {
             let problem = Problem::WrongCount { value: self.schema_version.into(), allowed: "schema version 1" };
             return Err(ConfigError::new("schema-version", problem));
         }
-        if ActorId::new(&self.name).is_err() {
+        // The entry of an ensemble is named SCENARIO@MEMBER.
+        let (name, member) = self.name.split_once('@').map_or((&self.name[..], None), |(name, of)| (name, Some(of)));
+        if ActorId::new(name).is_err() || member.is_some_and(|member| ActorId::new(member).is_err()) {
             let allowed = "lower-case letters, digits and hyphens, starting with a letter".to_owned();
             return Err(ConfigError::new("name", Problem::UnknownWord { value: self.name.clone(), allowed }));
         }

@@ -21,7 +21,7 @@ pub const SCHEMA_VERSION: u32 = 1;
 pub struct ScenarioConfig {
     /// Version of the file format: 1.
     pub schema_version: u32,
-    /// Name: lower-case letters, digits and hyphens.
+    /// Name: lower-case letters, digits and hyphens. A campaign over a driver ensemble names its entries SCENARIO@MEMBER.
     pub name: String,
     /// Description of the scenario, for readers.
     #[serde(default)]

@@ -159,6 +159,15 @@ impl ScenarioFile {
         Ok(Self { path: path.to_owned(), text, config, space, unused, trajectory_files, settings: settings.to_vec() })
     }
 
+    /// Returns the same file with another text, whose keys are checked. Settings and trajectory files stay as they are.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] if the text is not a scenario, or if a distribution is invalid.
+    pub(super) fn with_text(&self, text: &str) -> Result<Self, ScenarioError> {
+        let Self { trajectory_files, settings, unused, .. } = self.clone();
+        Ok(Self { trajectory_files, settings, unused, ..Self::parse(&self.path, text, &[])? })
+    }
+
     /// Returns the path of the file, as given.
     pub fn path(&self) -> &Path {
         &self.path

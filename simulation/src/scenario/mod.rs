@@ -15,6 +15,7 @@ mod events;
 mod file;
 pub mod library;
 mod locate;
+pub mod member;
 mod placement;
 mod recorded;
 mod reenacted;

@@ -241,6 +241,8 @@ fn overtaking_driver(encounter: &RecordedEncounter) -> DriverConfig {
         lane_change_duration_s: Some(rounded(encounter.change.duration_s.clamp(MIN_LANE_CHANGE_S, MAX_LANE_CHANGE_S))),
         evasive_lateral_mps2: None,
         lapse: None,
+        perception: None,
+        brake_build_up_mps3: None,
         returns: None,
     })
 }

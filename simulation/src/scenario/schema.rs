@@ -22,6 +22,8 @@ const HUGE: f64 = 1e300;
 const UNBOUNDED: f64 = 1e12;
 /// The pattern of names.
 const NAME_PATTERN: &str = "^[a-z][a-z0-9-]*$";
+/// The pattern of the names of scenarios: SCENARIO, or SCENARIO@MEMBER for an entry of an ensemble.
+const SCENARIO_PATTERN: &str = "^[a-z][a-z0-9-]*(@[a-z][a-z0-9-]*)?$";
 
 /// Returns the JSON Schema of scenario files.
 ///
@@ -46,7 +48,7 @@ pub fn strict_schema() -> Value {
         }
     };
     put("/properties/schema-version", "const", json!(SCHEMA_VERSION));
-    put("/properties/name", "pattern", json!(NAME_PATTERN));
+    put("/properties/name", "pattern", json!(SCENARIO_PATTERN));
     put("/properties/actor", "minItems", json!(1));
     put("/properties/requirements", "uniqueItems", json!(true));
     put("/$defs/ActorId", "pattern", json!(NAME_PATTERN));

@@ -33,6 +33,7 @@ impl LanesAround {
             left: self.left.map(|_| LaneNeighbours::default()),
             right: self.right.map(|_| LaneNeighbours::default()),
             in_path: None,
+            beyond: None,
         }
     }
 }
@@ -64,7 +65,46 @@ pub(super) fn find(world: &World, actor: usize, road: &Road, half_width_m: impl 
             keep_nearest(&mut around.in_path, candidate.neighbour);
         }
     }
+    around.beyond = beyond(world, actor, &around, &half_width_m);
     around
+}
+
+/// Returns the nearest vehicle ahead of the one that is ahead of `actor`, in the path of that one.
+fn beyond(
+    world: &World,
+    actor: usize,
+    around: &Neighbours,
+    half_width_m: impl Fn(usize) -> f64,
+) -> Option<Neighbour> {
+    let ahead = ahead(around)?;
+    let mut nearest = None;
+    for other in 0..world.len() {
+        keep_beyond(&mut nearest, world, [actor, ahead, other], &half_width_m);
+    }
+    nearest
+}
+
+/// Returns the vehicle ahead of the one with these neighbours.
+pub(super) fn ahead(around: &Neighbours) -> Option<usize> {
+    let candidates = [around.own.lead, around.in_path].into_iter().flatten();
+    candidates.min_by(|a, b| a.gap_m.total_cmp(&b.gap_m)).map(|ahead| ahead.actor)
+}
+
+/// Puts a vehicle into `slot` if it is ahead of the vehicle ahead of `actor`, in its path, and nearer than the one there.
+pub(super) fn keep_beyond(
+    slot: &mut Option<Neighbour>,
+    world: &World,
+    [actor, ahead, other]: [usize; 3],
+    half_width_m: impl Fn(usize) -> f64,
+) {
+    if other == actor || other == ahead {
+        return;
+    }
+    let relative = |own: usize| Candidate::new(world, [own, other], [own, other].map(&half_width_m));
+    let from_ahead = relative(ahead);
+    if from_ahead.ahead_m > 0.0 && from_ahead.neighbour.gap_m >= 0.0 && from_ahead.is_in_path() {
+        keep_nearest(slot, relative(actor).neighbour);
+    }
 }
 
 pub(super) fn keep_nearest(slot: &mut Option<Neighbour>, candidate: Neighbour) {

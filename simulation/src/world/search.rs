@@ -13,7 +13,7 @@ use closecall_traffic::metrics::bumper_gap_m;
 use closecall_traffic::{Lane, Road};
 
 use super::World;
-use super::neighbours::{self, Candidate, LanesAround, PATH_MARGIN_M, half_width_m, is_in, keep_nearest};
+use super::neighbours::{self, Candidate, LanesAround, PATH_MARGIN_M, half_width_m, is_in, keep_beyond, keep_nearest};
 
 /// Number of vehicles up to which it is faster to compare all pairs.
 pub(super) const FEW: usize = 8;
@@ -110,7 +110,26 @@ impl NeighbourSearch {
         for strip in strips(road, self.sides_m(world, actor)) {
             self.fill_path(world, actor, &self.strips[strip], &mut around.in_path);
         }
+        if let Some(ahead) = neighbours::ahead(&around) {
+            self.fill_beyond(world, road, [actor, ahead], &mut around.beyond);
+        }
         around
+    }
+
+    /// Fills `slot` with the nearest vehicle in the path of the vehicle ahead of `actor`.
+    fn fill_beyond(&self, world: &World, road: &Road, [actor, ahead]: [usize; 2], slot: &mut Option<Neighbour>) {
+        for strip in strips(road, self.sides_m(world, ahead)) {
+            let list = &self.strips[strip];
+            let start = list.partition_point(|entry| entry.s_m <= world.state(ahead).s_m);
+            for entry in &list[start..] {
+                if self.is_beyond(world, actor, entry, slot) {
+                    break;
+                }
+                #[cfg(test)]
+                self.visits.set(self.visits.get() + 1);
+                keep_beyond(slot, world, [actor, ahead, entry.actor], |index| self.half_widths_m[index]);
+            }
+        }
     }
 
     /// Fills `slot` with the neighbours of `actor` in a lane.

@@ -6,10 +6,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::driver::OvertakerDriver;
+use super::follow::{Follow, FollowConfig};
 use super::returning::{Return, ReturnConfig};
 use crate::driver::attention::{Lapse, LapseConfig, check_lapse};
+use crate::driver::pedals::check_brake_build_up;
+use crate::driver::perception::{PerceptionConfig, PerceptionSettings, check_perception};
 use crate::driver::reaction::{Reaction, ReactionConfig};
-use crate::driver::{Wiedemann99, Wiedemann99Config};
 
 /// Default duration of a whole lane change (s): the mean of 7,192 single lane changes of commuters, with a standard
 /// deviation of 2.0 s (Lee, Olsen and Wierwille, *A Comprehensive Examination of Naturalistic Lane-Changes*, DOT HS 809
@@ -24,14 +26,6 @@ const DEFAULT_DURATION_S: f64 = 6.3;
 /// of the literature on obstacle avoidance maneuvers: braking versus steering*, UMTRI-94-19, 1994); no source for the
 /// share was found. The plant limits the steering to half of the friction, 4.4 m/s² on a dry road.
 const DEFAULT_EVASIVE_LATERAL_MPS2: f64 = 4.3;
-
-/// Car-following model of an overtaking driver.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum FollowConfig {
-    /// The Wiedemann 99 model.
-    Wiedemann99(Wiedemann99Config),
-}
 
 /// An overtaking driver as a scenario file describes it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -53,6 +47,10 @@ pub struct OvertakerConfig {
     pub evasive_lateral_mps2: Option<Num>,
     /// Lapses of attention. Default: none.
     pub lapse: Option<LapseConfig>,
+    /// How the driver perceives the vehicles ahead.
+    pub perception: Option<PerceptionConfig>,
+    /// Rate at which the driver builds up braking (m/s³): 1 to 100. Default: 12.65.
+    pub brake_build_up_mps3: Option<Num>,
     /// Return to the original lane after passing. Without it, the driver stays in the passing lane.
     pub returns: Option<ReturnConfig>,
 }
@@ -61,11 +59,13 @@ pub struct OvertakerConfig {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Overtaker {
     pub(crate) cut_out_thw_s: f64,
-    pub(crate) follow: Wiedemann99,
+    pub(crate) follow: Follow,
     pub(crate) reaction: Reaction,
     pub(crate) duration_s: f64,
     pub(crate) evasive_lateral_mps2: f64,
     pub(crate) lapse: Option<Lapse>,
+    pub(crate) perception: PerceptionSettings,
+    pub(crate) brake_build_up_mps3: f64,
     pub(crate) returns: Option<Return>,
 }
 
@@ -81,18 +81,11 @@ impl Check for OvertakerConfig {
 
     fn check(&self, parameters: &Parameters) -> Result<Overtaker, ConfigError> {
         let cut_out_thw_s = parameters.number(&self.cut_out_thw_s, "cut-out-thw-s", Range::closed(0.0, 5.0))?;
-        let FollowConfig::Wiedemann99(config) = &self.follow;
-        let locate = |error: ConfigError| error.within("wiedemann99").within("follow");
-        let follow = config.check(parameters).map_err(locate)?;
-        if follow.reaction.is_some() {
-            let rule = "the overtaking driver has one reaction time, which stands beside `follow`".to_owned();
-            let problem = Problem::Contradiction { other: "overtaker.reaction-s", rule };
-            return Err(locate(ConfigError::new("reaction-s", problem)));
-        }
-        let cc1_s = follow.parameters.cc1_s;
-        if cc1_s >= CRITICAL_THW_S && cc1_s >= cut_out_thw_s {
+        let follow = self.follow.check(parameters)?;
+        let headway_s = follow.headway_s();
+        if headway_s >= CRITICAL_THW_S && headway_s >= cut_out_thw_s {
             let rule = format!(
-                "cc1 is no less than the cut-out headway, and not below the critical {CRITICAL_THW_S} s: the driver never \
+                "cc1 (the time gap of `idm`) is no less than the cut-out headway, and not below the critical {CRITICAL_THW_S} s: the driver never \
                  comes close"
             );
             return Err(ConfigError::new("cut-out-thw-s", Problem::Contradiction { other: "follow", rule }));
@@ -112,6 +105,8 @@ impl Check for OvertakerConfig {
             duration_s,
             evasive_lateral_mps2,
             lapse: check_lapse(self.lapse.as_ref(), true, parameters)?,
+            perception: check_perception(self.perception.as_ref(), true, parameters)?,
+            brake_build_up_mps3: check_brake_build_up(self.brake_build_up_mps3.as_ref(), true, parameters)?,
             returns: self.returns.as_ref().map(|config| config.check(parameters)).transpose()?,
         })
     }
@@ -120,6 +115,7 @@ impl Check for OvertakerConfig {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::driver::{IdmConfig, Wiedemann99Config};
 
     fn config(cut_out_thw_s: f64, cc1_s: f64) -> OvertakerConfig {
         OvertakerConfig {
@@ -129,6 +125,8 @@ mod tests {
             lane_change_duration_s: None,
             evasive_lateral_mps2: None,
             lapse: None,
+            perception: None,
+            brake_build_up_mps3: None,
             returns: None,
         }
     }
@@ -136,11 +134,27 @@ mod tests {
     #[test]
     fn a_safe_gap_above_the_cut_out_gap_is_allowed() {
         let none = Parameters::default();
-        assert_eq!(config(0.15, 0.2).check(&none).unwrap().follow.parameters.cc1_s, 0.2);
+        assert_eq!(config(0.15, 0.2).check(&none).unwrap().follow.headway_s(), 0.2);
         assert_eq!(config(0.0, 0.2).check(&none).unwrap().cut_out_thw_s, 0.0);
         assert!(config(-0.1, 0.2).check(&none).is_err());
         let error = config(0.3, 0.9).check(&none).unwrap_err();
         assert_eq!(error.path.to_string(), "cut-out-thw-s");
+    }
+
+    #[test]
+    fn the_intelligent_driver_model_gives_the_safe_gap_and_the_braking_of_an_overtaking_driver() {
+        let idm = IdmConfig {
+            time_gap_s: Some(0.2.into()),
+            standstill_gap_m: Some(1.0.into()),
+            hardest_braking_mps2: Some(5.0.into()),
+            ..IdmConfig::default()
+        };
+        let config = OvertakerConfig { follow: FollowConfig::Idm(idm), ..config(0.3, 0.05) };
+        let follow = config.check(&Parameters::default()).unwrap().follow;
+        assert_eq!((follow.safe_gap_m(30.0), follow.hardest_braking_mps2()), (7.0, 5.0));
+        // Braking is limited to the hardest of the driver, however small the gap is.
+        let lead = crate::driver::Lead { gap_m: 0.5, speed_mps: 20.0, acceleration_mps2: 0.0 };
+        assert_eq!(follow.model().acceleration_mps2(30.0, 35.0, Some(&lead)), -5.0);
     }
 
     #[test]

@@ -4,13 +4,13 @@ use closecall_traffic::{Indicator, Lane, MINIMUM_JERK_PEAK, Side, Stream, Time};
 
 use super::acceptance::{GapAcceptance, Tolerance};
 use super::conflict::Course;
+use super::follow::FollowModel;
 use super::{Overtaker, path};
 use crate::driver::pedals::Pedals;
 use crate::driver::perception::{PerceivedScene, PerceivedVehicle, Perception};
 use crate::driver::wiedemann99::{EmergencyBrakingDetector, brake_before_overtaking, brake_for_brake_light};
 use crate::driver::{
-    BRAKING_MARGIN, Driver, DriverAction, DriverError, DriverInput, DriverNote, LaneChange, Wiedemann99Model,
-    check_finite, finite,
+    BRAKING_MARGIN, Driver, DriverAction, DriverError, DriverInput, DriverNote, LaneChange, check_finite, finite,
 };
 
 /// Required braking below which an overtaking driver does not brake (m/s²): an assumption; 0 to 0.5 are plausible.
@@ -87,7 +87,7 @@ impl Change {
 #[derive(Clone, Debug)]
 pub(crate) struct OvertakerDriver {
     pub(super) settings: Overtaker,
-    model: Wiedemann99Model,
+    model: FollowModel,
     desired_mps: Option<f64>,
     perception: Option<Perception>,
     pub(super) phase: Phase,
@@ -99,12 +99,12 @@ impl OvertakerDriver {
     pub(super) fn new(settings: Overtaker) -> Self {
         Self {
             settings,
-            model: Wiedemann99Model::new(&settings.follow),
-            desired_mps: settings.follow.desired_speed_mps,
+            model: settings.follow.model(),
+            desired_mps: settings.follow.desired_mps(),
             perception: None,
             phase: Phase::Approaching,
-            emergency: EmergencyBrakingDetector::new(settings.follow.hardest_braking_mps2),
-            pedals: Pedals::default(),
+            emergency: EmergencyBrakingDetector::new(settings.follow.hardest_braking_mps2()),
+            pedals: Pedals::new(settings.brake_build_up_mps3),
         }
     }
 }
@@ -115,7 +115,8 @@ impl Driver for OvertakerDriver {
         let speed_mps = input.own.speed_mps;
         let desired_mps = input.desired_now_mps(*self.desired_mps.get_or_insert(speed_mps));
         let (reaction, side) = (self.settings.reaction, input.road.overtaking_side());
-        let new = || Perception::new(reaction.draw_s(rng), Some(side)).with_lapses(self.settings.lapse);
+        let (lapse, perception) = (self.settings.lapse, self.settings.perception);
+        let new = || Perception::new(reaction.draw_s(rng), Some(side)).with_lapses(lapse).with_settings(perception);
         let scene = self.perception.get_or_insert_with(new).observe(input, rng);
         let step = Step { input, scene: &scene, side, speed_mps, desired_mps };
         let mut action = match self.phase {
@@ -310,7 +311,7 @@ impl OvertakerDriver {
         }
     }
 
-    /// Drives freely, or follows `ahead` by the Wiedemann 99 model.
+    /// Drives freely, or follows `ahead` by the car-following model.
     pub(super) fn cruise(&mut self, step: &Step<'_>, ahead: Option<&PerceivedVehicle>) -> DriverAction {
         let lead = ahead.map(|vehicle| &vehicle.lead);
         let requested_mps2 = self.model.acceleration_mps2(step.speed_mps, step.desired_mps, lead);
@@ -360,7 +361,7 @@ impl OvertakerDriver {
     fn limited_by_course_mps2(&self, requested_mps2: f64, course: &Course) -> f64 {
         let required_mps2 = course.required_braking_mps2();
         if required_mps2 > TOLERATED_BRAKING_MPS2 {
-            let hardest_mps2 = self.settings.follow.hardest_braking_mps2;
+            let hardest_mps2 = self.settings.follow.hardest_braking_mps2();
             requested_mps2.min(-(BRAKING_MARGIN * required_mps2).min(hardest_mps2))
         } else {
             requested_mps2

@@ -12,8 +12,9 @@
 //! In the phase *approaching* with a free passing lane, the driver keeps its speed: it does not slow down behind a
 //! vehicle that it is about to overtake. It pulls out so that, as far as it can predict, the time headway has the value
 //! given by the scenario when its centre crosses the lane marking, or earlier, so that its gap does not fall below its own
-//! safe gap, cc0 + cc1·v. On a quintic path of duration T, that is T/2 after
-//! pulling out. While the passing lane is not free, the driver follows by the Wiedemann 99 model. It signals from two
+//! safe gap, cc0 + cc1·v (s₀ + T·v with the Intelligent Driver Model). On a quintic path of duration T, that is T/2 after
+//! pulling out. While the passing lane is not free, the driver follows by its
+//! car-following model (Wiedemann 99 or the Intelligent Driver Model). It signals from two
 //! seconds before it pulls out.
 //!
 //! The brake light of the vehicle ahead makes the driver release the accelerator. If the gap closes as fast as drivers
@@ -28,8 +29,10 @@ mod acceptance;
 mod config;
 mod conflict;
 mod driver;
+mod follow;
 mod path;
 mod returning;
 
-pub use config::{FollowConfig, Overtaker, OvertakerConfig};
+pub use config::{Overtaker, OvertakerConfig};
+pub use follow::{Follow, FollowConfig};
 pub use returning::{Return, ReturnConfig};

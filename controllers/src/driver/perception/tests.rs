@@ -1,8 +1,9 @@
 use closecall_traffic::{ActorId, Check, PHYSICS_STEP, Parameters, stream};
 
+use super::acceleration::ASSUMED_BRAKING_MPS2;
 use super::*;
 use crate::driver::testing::{car_ahead, with_input};
-use crate::driver::{LapseConfig, Lead, Neighbours};
+use crate::driver::{LaneNeighbours, LapseConfig, Lead, Neighbour, Neighbours};
 
 /// Observes a lead vehicle with this motion and brake light from a vehicle at 30 m/s, and returns it as perceived.
 fn observe(perception: &mut Perception, time: Time, lead: Lead, brake_light: bool) -> PerceivedVehicle {
@@ -93,7 +94,7 @@ fn a_full_memory_replaces_its_oldest_observation() {
 
 #[test]
 fn a_brake_light_during_a_lapse_is_perceived_one_reaction_time_after_the_lapse() {
-    let lapse = LapseConfig { at_s: Some(1.5.into()), every_s: None, duration_s: 2.0.into() };
+    let lapse = LapseConfig { at_s: Some(1.5.into()), every_s: None, duration_s: 2.0.into(), duration_sigma: None };
     let lapse = lapse.check(&Parameters::default()).unwrap();
     let mut perception = Perception::new(0.9, None).with_lapses(Some(lapse));
     let mut time = Time::ZERO;
@@ -104,4 +105,85 @@ fn a_brake_light_during_a_lapse_is_perceived_one_reaction_time_after_the_lapse()
         time += PHYSICS_STEP;
     }
     assert_eq!(time, Time::from_s(1.5 + 2.0 + 0.9));
+}
+
+/// Returns a driver that looks through the vehicle ahead.
+fn anticipating(anticipation: f64) -> Perception {
+    let config = PerceptionConfig { anticipation: Some(anticipation.into()), evidence: None };
+    Perception::new(0.9, None).with_settings(config.check(&Parameters::default()).unwrap())
+}
+
+/// Returns what a driver perceives at `time` of a steady vehicle ahead if the one beyond brakes at 6 m/s² from 2 s on.
+fn seen_before_a_braking_one(perception: &mut Perception, time: Time) -> PerceivedVehicle {
+    let on = time >= Time::from_s(2.0);
+    let acceleration_mps2 = if on { -6.0 } else { 0.0 };
+    let speed_mps = 30.0 + acceleration_mps2 * (time.s() - 2.0).max(0.0);
+    let own = LaneNeighbours { lead: Some(car_ahead(steady(20.0, 30.0), false)), ..LaneNeighbours::default() };
+    let beyond = Neighbour { actor: 2, ..car_ahead(Lead { gap_m: 50.0, speed_mps, acceleration_mps2 }, on) };
+    let neighbours = Neighbours { own, beyond: Some(beyond), ..Neighbours::default() };
+    let mut rng = stream(0, 0, &ActorId::new("rear").unwrap(), "driver");
+    with_input(time, &neighbours, |input| perception.observe(input, &mut rng).ahead.unwrap())
+}
+
+#[test]
+fn a_driver_who_anticipates_expects_braking_one_reaction_time_after_the_brake_light_beyond() {
+    let [mut none, mut half, mut full] = [0.0, 0.5, 1.0].map(anticipating);
+    let mut time = Time::ZERO;
+    while time < Time::from_s(2.9) {
+        for perception in [&mut none, &mut half, &mut full] {
+            assert!(!seen_before_a_braking_one(perception, time).brake_light, "{time}");
+        }
+        time += PHYSICS_STEP;
+    }
+    let seen = seen_before_a_braking_one(&mut full, time);
+    assert!(seen.brake_light, "{seen:?}");
+    assert_eq!(seen.lead.acceleration_mps2, -ASSUMED_BRAKING_MPS2);
+    // The vehicle directly ahead still keeps its speed, and is perceived to.
+    assert_eq!(seen.lead.speed_mps, 30.0);
+    assert_eq!(seen_before_a_braking_one(&mut half, time).lead.acceleration_mps2, -0.5 * ASSUMED_BRAKING_MPS2);
+    let seen = seen_before_a_braking_one(&mut none, time);
+    assert!(!seen.brake_light && seen.lead.acceleration_mps2 == 0.0, "{seen:?}");
+}
+
+/// Returns the time from the start of braking at `braking_mps2`, 15 m ahead and with its brake light on, until a driver who
+/// accumulates evidence perceives it (s).
+fn noticed_after_s(braking_mps2: f64) -> f64 {
+    let config = PerceptionConfig { anticipation: None, evidence: Some(EvidenceConfig::default()) };
+    let mut perception = Perception::new(0.1, None).with_settings(config.check(&Parameters::default()).unwrap());
+    let mut time = Time::ZERO;
+    loop {
+        let lead = Lead {
+            gap_m: 15.0 - 0.5 * braking_mps2 * time.s() * time.s(),
+            speed_mps: 30.0 - braking_mps2 * time.s(),
+            acceleration_mps2: -braking_mps2,
+        };
+        let seen = observe(&mut perception, time, lead, true);
+        if seen.brake_light {
+            assert!(seen.lead.acceleration_mps2 < 0.0 && seen.lead.speed_mps < 30.0, "{seen:?}");
+            return time.s();
+        }
+        time += PHYSICS_STEP;
+    }
+}
+
+#[test]
+fn accumulated_evidence_is_noticed_later_behind_a_vehicle_that_brakes_gently() {
+    let [hard_s, gentle_s] = [8.0, 1.0].map(noticed_after_s);
+    // ∫(b·t/15 − 0.0155)dt = 0.0888 gives 0.61 s for 8 m/s² and 1.9 s for 1 m/s², plus the delay of 0.1 s.
+    assert!((0.6..0.85).contains(&hard_s) && (1.6..2.1).contains(&gentle_s), "{hard_s} {gentle_s}");
+}
+
+#[test]
+fn a_driver_without_a_reaction_time_has_no_perception_to_set() {
+    let none = Parameters::default();
+    let config = PerceptionConfig { anticipation: Some(1.5.into()), evidence: None };
+    assert_eq!(check_perception(Some(&config), false, &none).unwrap_err().path.to_string(), "perception");
+    let error = check_perception(Some(&config), true, &none).unwrap_err();
+    assert_eq!(error.path.to_string(), "perception.anticipation");
+    let config = PerceptionConfig {
+        anticipation: None,
+        evidence: Some(EvidenceConfig { threshold: None, gating_per_s: Some(0.9.into()) }),
+    };
+    let error = check_perception(Some(&config), true, &none).unwrap_err();
+    assert_eq!(error.path.to_string(), "perception.evidence.gating-per-s");
 }

@@ -5,6 +5,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::driver::attention::{Lapse, LapseConfig, check_lapse};
+use crate::driver::pedals::check_brake_build_up;
+use crate::driver::perception::{PerceptionConfig, PerceptionSettings, check_perception};
 use crate::driver::reaction::{Reaction, ReactionConfig};
 use crate::driver::{DEFAULT_HARDEST_BRAKING_MPS2, HARDEST_BRAKING_RANGE};
 
@@ -43,6 +45,10 @@ pub struct Wiedemann99Config {
     pub reaction_s: Option<ReactionConfig>,
     /// Lapses of attention. Default: none. They need a reaction time.
     pub lapse: Option<LapseConfig>,
+    /// How the driver perceives the vehicles ahead. It needs a reaction time.
+    pub perception: Option<PerceptionConfig>,
+    /// Rate at which the driver builds up braking (m/s³): 1 to 100. Default: 12.65. It needs a reaction time.
+    pub brake_build_up_mps3: Option<Num>,
 }
 
 /// The checked parameters cc0 to cc9.
@@ -84,6 +90,8 @@ pub struct Wiedemann99 {
     pub(crate) desired_speed_mps: Option<f64>,
     pub(crate) reaction: Option<Reaction>,
     pub(crate) lapse: Option<Lapse>,
+    pub(crate) perception: PerceptionSettings,
+    pub(crate) brake_build_up_mps3: f64,
 }
 
 impl Wiedemann99 {
@@ -128,6 +136,12 @@ impl Check for Wiedemann99Config {
                 .transpose()?,
             reaction: reaction.map(|config| config.check(parameters)).transpose()?,
             lapse: check_lapse(self.lapse.as_ref(), reaction.is_some(), parameters)?,
+            perception: check_perception(self.perception.as_ref(), reaction.is_some(), parameters)?,
+            brake_build_up_mps3: check_brake_build_up(
+                self.brake_build_up_mps3.as_ref(),
+                reaction.is_some(),
+                parameters,
+            )?,
         })
     }
 }

@@ -50,14 +50,17 @@ impl Wiedemann99Driver {
             desired_mps: settings.desired_speed_mps,
             perception: None,
             emergency: EmergencyBrakingDetector::new(settings.hardest_braking_mps2),
-            pedals: Pedals::default(),
+            pedals: Pedals::new(settings.brake_build_up_mps3),
         }
     }
 
     /// Observes the surroundings and returns the perceived vehicle ahead, if any.
     fn observe_ahead(&mut self, input: &DriverInput<'_>, rng: &mut Stream) -> Option<PerceivedVehicle> {
         let reaction = self.settings.reaction?;
-        let new = || Perception::new(reaction.draw_s(rng), None).with_lapses(self.settings.lapse);
+        let settings = &self.settings;
+        let new = || {
+            Perception::new(reaction.draw_s(rng), None).with_lapses(settings.lapse).with_settings(settings.perception)
+        };
         self.perception.get_or_insert_with(new).observe(input, rng).ahead
     }
 }

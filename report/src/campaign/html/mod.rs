@@ -26,5 +26,5 @@ mod verdict;
 #[cfg(test)]
 mod tests;
 
-pub(super) use page::write_html;
+pub(super) use page::{number, number_heads, table, text_heads, write_html};
 pub(super) use recordings::{IndexEntry, write_index};

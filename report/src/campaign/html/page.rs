@@ -7,6 +7,7 @@ use std::path::Path;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::{ledger, provenance, samples, scenario, verdict};
+use crate::campaign::ensemble::ensemble_html;
 use crate::campaign::findings::Findings;
 use closecall_scenarios::atomic::{WriteError, write_file};
 
@@ -27,6 +28,7 @@ pub(super) fn campaign(findings: &Findings<'_>) -> io::Result<Markup> {
     let body = html! {
         (verdict::header(findings))
         (ledger::collisions(findings)?)
+        (ensemble_html(findings.summary, findings.manifest))
         (verdict::gates(findings))
         (verdict::requirements(findings))
         (ledger::validity(findings))

@@ -8,7 +8,9 @@ const HARDEST_MPS2: f64 = 8.0;
 
 fn settings(cc1_s: f64) -> Wiedemann99 {
     let parameters = Parameters99 { cc1_s, ..Parameters99::VISSIM };
-    Wiedemann99 { parameters, hardest_braking_mps2: HARDEST_MPS2, desired_speed_mps: None, reaction: None, lapse: None }
+    let none = closecall_traffic::Parameters::default();
+    let default = closecall_traffic::Check::check(&crate::driver::Wiedemann99Config::default(), &none).unwrap();
+    Wiedemann99 { parameters, hardest_braking_mps2: HARDEST_MPS2, ..default }
 }
 
 /// A driver behind a lead vehicle. The actual acceleration follows the desired one with the actuator lag of 0.15 s.

@@ -1,0 +1,224 @@
+//! The verdict of a campaign over a driver ensemble: the median member and the worst member of each scenario.
+//!
+//! Each entry SCENARIO@MEMBER is a scenario of its own, with gates of its own. The verdict here is a statement about the
+//! members of one scenario together: which share of the baseline's collisions is prevented, in which share of the samples
+//! a collision is induced, and how much harm changes. The members are no sample of drivers: no weights are assumed, and no
+//! interval is stated over members. Of an even number of members, the less favourable of the two in the middle is
+//! the median, so that the median is always a member.
+
+use std::collections::BTreeMap;
+
+use crate::ledger::Inference;
+use crate::summary::{Counts, Summary};
+
+/// The sign between the names of scenario and member.
+const SEPARATOR: char = '@';
+
+/// What is compared between members.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// Share of the baseline's collisions of the ego that the system prevents (-).
+    Prevented,
+    /// Share of the samples in which the system induces a collision (-).
+    Induced,
+    /// Mean change of the harm of a sample; negative if the system saves harm.
+    HarmChange,
+    /// Share of the samples in which the ego collides, in a campaign without a baseline (-).
+    Collisions,
+}
+
+impl Quantity {
+    /// Returns the name in reports for programs.
+    pub const fn key(self) -> &'static str {
+        match self {
+            Self::Prevented => "prevented_share",
+            Self::Induced => "induced_share",
+            Self::HarmChange => "harm_change_per_sample",
+            Self::Collisions => "collision_rate",
+        }
+    }
+
+    /// Returns the name in reports for human readers.
+    pub const fn text(self) -> &'static str {
+        match self {
+            Self::Prevented => "prevented share",
+            Self::Induced => "induced share",
+            Self::HarmChange => "change of harm per sample",
+            Self::Collisions => "collision rate",
+        }
+    }
+
+    /// Returns true if the quantity is a share.
+    pub const fn is_share(self) -> bool {
+        !matches!(self, Self::HarmChange)
+    }
+
+    /// Returns the value of one entry and, of a share, its 95 % interval; `None` if it is not defined.
+    fn of(self, counts: &Counts, inference: Inference) -> Option<(f64, Option<[f64; 2]>)> {
+        let share =
+            |hits: u64, of: u64| (of > 0).then(|| (hits as f64 / of as f64, Some(inference.interval_95(hits, of))));
+        let pairs = &counts.pairs;
+        let all = pairs.prevented + pairs.induced + pairs.both + pairs.neither;
+        match self {
+            Self::Prevented => share(pairs.prevented, pairs.prevented + pairs.both),
+            Self::Induced => share(pairs.induced, all),
+            Self::HarmChange => (all > 0).then(|| ((pairs.induced_harm - pairs.prevented_harm) / all as f64, None)),
+            Self::Collisions => counts.arms.last().and_then(|arm| share(arm.collisions, arm.outcomes)),
+        }
+    }
+
+    /// Returns how unfavourable a value is: larger is worse.
+    fn badness(self, value: f64) -> f64 {
+        if self == Self::Prevented { -value } else { value }
+    }
+}
+
+/// The value of one member.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MemberValue {
+    /// The member's name.
+    pub member: String,
+    /// The value.
+    pub value: f64,
+    /// The 95 % interval of a share.
+    pub interval_95: Option<[f64; 2]>,
+}
+
+/// Median and worst member of one quantity.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Spread {
+    /// The quantity.
+    pub quantity: Quantity,
+    /// The member in the middle.
+    pub median: MemberValue,
+    /// The least favourable member.
+    pub worst: MemberValue,
+    /// Members for which the quantity is not defined: nothing collides without the system, say.
+    pub undefined: Vec<String>,
+}
+
+/// The verdict over the ensemble for one scenario.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EnsembleVerdict {
+    /// The scenario's name, without a member.
+    pub scenario: String,
+    /// The members that were run.
+    pub members: Vec<String>,
+    /// The members that change nothing in this scenario, and were not run.
+    pub without_effect: Vec<String>,
+    /// Median and worst of each quantity that is defined for at least one member.
+    pub spreads: Vec<Spread>,
+}
+
+/// Returns the verdict over the ensemble for each scenario of which entries SCENARIO@MEMBER were run. `without_effect`
+/// names pairs of scenario and member that were not run because the member changes nothing.
+pub fn verdicts(summary: &Summary, without_effect: &[(String, String)]) -> Vec<EnsembleVerdict> {
+    let mut scenarios: BTreeMap<&str, Vec<(&str, &Counts)>> = BTreeMap::new();
+    for (name, counts) in &summary.scenarios {
+        if let Some((scenario, member)) = name.split_once(SEPARATOR) {
+            scenarios.entry(scenario).or_default().push((member, counts));
+        }
+    }
+    let quantities: &[Quantity] = match summary.is_paired() {
+        true => &[Quantity::Prevented, Quantity::Induced, Quantity::HarmChange],
+        false => &[Quantity::Collisions],
+    };
+    let verdict = |(scenario, entries): (&str, Vec<(&str, &Counts)>)| EnsembleVerdict {
+        scenario: scenario.to_owned(),
+        members: entries.iter().map(|(member, _)| (*member).to_owned()).collect(),
+        without_effect: without_effect
+            .iter()
+            .filter(|(of, _)| of == scenario)
+            .map(|(_, member)| member.clone())
+            .collect(),
+        spreads: quantities.iter().filter_map(|quantity| spread(*quantity, &entries, summary.inference)).collect(),
+    };
+    scenarios.into_iter().map(verdict).collect()
+}
+
+/// Returns median and worst member, or `None` if the quantity is defined for no member.
+fn spread(quantity: Quantity, entries: &[(&str, &Counts)], inference: Inference) -> Option<Spread> {
+    let mut undefined = Vec::new();
+    let mut values = Vec::new();
+    for (member, counts) in entries {
+        match quantity.of(counts, inference) {
+            Some((value, interval_95)) => {
+                values.push(MemberValue { member: (*member).to_owned(), value, interval_95 });
+            }
+            None => undefined.push((*member).to_owned()),
+        }
+    }
+    values.sort_by(|a, b| {
+        quantity.badness(a.value).total_cmp(&quantity.badness(b.value)).then_with(|| a.member.cmp(&b.member))
+    });
+    let median = values.get(values.len() / 2)?.clone();
+    let worst = values.pop()?;
+    Some(Spread { quantity, median, worst, undefined })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ledger::{ArmCounts, Pairs};
+
+    fn summary(entries: &[(&str, Pairs)]) -> Summary {
+        let names = entries.iter().map(|(name, _)| (*name).to_owned());
+        let mut summary = Summary::new(vec!["acc".to_owned(), "mis".to_owned()], names);
+        for ((_, counts), (_, pairs)) in summary.scenarios.iter_mut().zip(entries) {
+            counts.pairs = *pairs;
+        }
+        summary
+    }
+
+    fn pairs(prevented: u64, induced: u64, both: u64, harm: [f64; 2]) -> Pairs {
+        let neither = 100 - prevented - induced - both;
+        let [prevented_harm, induced_harm] = harm;
+        Pairs { prevented, induced, both, neither, prevented_harm, induced_harm, ..Pairs::default() }
+    }
+
+    #[test]
+    fn median_and_worst_are_members_and_the_less_favourable_of_two_in_the_middle_counts() {
+        let summary = summary(&[
+            ("a@calm", pairs(40, 0, 10, [4.0, 0.0])),
+            ("a@slow", pairs(30, 2, 20, [3.0, 0.5])),
+            ("a@idm", pairs(45, 0, 5, [5.0, 0.0])),
+            ("a@alert", pairs(9, 5, 1, [0.5, 1.0])),
+            ("b", pairs(1, 1, 1, [1.0, 1.0])),
+        ]);
+        let [verdict] = &verdicts(&summary, &[("a".into(), "steer".into()), ("b".into(), "x".into())])[..] else {
+            panic!("one scenario has members")
+        };
+        assert_eq!((verdict.scenario.as_str(), verdict.members.len()), ("a", 4));
+        assert_eq!(verdict.without_effect, ["steer"]);
+        let named = |index: usize| {
+            let spread: &Spread = &verdict.spreads[index];
+            (spread.median.member.as_str(), spread.median.value, spread.worst.member.as_str(), spread.worst.value)
+        };
+        // Prevented: 0.9 idm, 0.9 alert, 0.8 calm, 0.6 slow.
+        assert_eq!(named(0), ("calm", 0.8, "slow", 0.6));
+        assert_eq!(named(1), ("slow", 0.02, "alert", 0.05));
+        assert_eq!(named(2), ("slow", -0.025, "alert", 0.005));
+        let interval = verdict.spreads[0].worst.interval_95.unwrap();
+        assert!(interval[0] < 0.6 && 0.6 < interval[1] && verdict.spreads[2].worst.interval_95.is_none());
+    }
+
+    #[test]
+    fn a_member_without_any_collision_is_named_and_not_ranked() {
+        let summary = summary(&[("a@alert", pairs(0, 0, 0, [0.0; 2])), ("a@slow", pairs(1, 0, 1, [0.1, 0.0]))]);
+        let verdicts = verdicts(&summary, &[]);
+        let prevented = &verdicts[0].spreads[0];
+        assert_eq!((prevented.undefined.clone(), prevented.worst.value), (vec!["alert".to_owned()], 0.5));
+        assert_eq!(verdicts[0].spreads[1].worst.value, 0.0);
+    }
+
+    #[test]
+    fn without_a_baseline_the_collision_rates_are_compared() {
+        let mut summary = Summary::new(vec!["mis".to_owned()], ["a@x".to_owned(), "a@y".to_owned()]);
+        for ((_, counts), collisions) in summary.scenarios.iter_mut().zip([1, 5]) {
+            counts.arms[0] = ArmCounts { outcomes: 10, collisions, ..ArmCounts::default() };
+        }
+        let verdicts = verdicts(&summary, &[]);
+        assert_eq!(verdicts[0].spreads.len(), 1);
+        assert_eq!((verdicts[0].spreads[0].worst.member.as_str(), verdicts[0].spreads[0].worst.value), ("y", 0.5));
+    }
+}

@@ -1,0 +1,202 @@
+//! The result of a calibration: as text, as JSON, and as a member of a driver ensemble.
+
+use closecall_scenarios::following::FollowingData;
+use closecall_simulation::calibration::{Calibration, Errors, ParameterSpec};
+use closecall_statistics::format::percent;
+use closecall_statistics::quantiles::quantile;
+use serde_json::{Map, Value, json};
+
+/// Probabilities of the quantiles over the calibrated pairs (-).
+const PROBABILITIES: [f64; 5] = [0.05, 0.25, 0.5, 0.75, 0.95];
+
+/// What others report, for comparison.
+const LITERATURE: &str = "Kesting and Treiber, Transportation Research Record 2088 (2008): relative errors of 11 to 29 % for several \
+                          models. Zhu et al., Transportation Research Part C 93 (2018) 425-445: of five models the \
+                          Intelligent Driver Model follows best, Wiedemann 99 is harder to calibrate";
+
+/// Returns the quantiles of one parameter over the calibrated pairs.
+fn quantiles_of(calibration: &Calibration, index: usize) -> [f64; 5] {
+    let mut values: Vec<f64> = calibration.pairs.iter().filter_map(|pair| pair.values.get(index).copied()).collect();
+    values.sort_by(f64::total_cmp);
+    PROBABILITIES.map(|u| quantile(&values, u))
+}
+
+fn parameters(calibration: &Calibration) -> impl Iterator<Item = (&'static ParameterSpec, f64, [f64; 5])> + '_ {
+    let specs = calibration.model.parameters().iter().enumerate();
+    specs.zip(&calibration.pooled).map(|((index, spec), pooled)| (spec, *pooled, quantiles_of(calibration, index)))
+}
+
+/// Returns why no pair is left to calibrate.
+pub fn no_pair(data: &FollowingData) -> String {
+    let reasons = data.left_out.iter().take(3).map(|pair| format!("{}: {}", pair.name, pair.reason));
+    let reasons: Vec<String> = reasons.collect();
+    format!(
+        "no pair is left to calibrate: {} can be used, of which the hash of the name holds some out, and {} are left out ({})",
+        data.pairs.len(),
+        data.left_out.len(),
+        reasons.join("; ")
+    )
+}
+
+/// Returns the result as lines of text.
+pub fn text(calibration: &Calibration, data: &FollowingData) -> String {
+    let mut text = format!(
+        "{}: {} pairs calibrated, {} held out, {} left out\n",
+        calibration.model.name(),
+        calibration.pairs.len(),
+        calibration.held_out.len(),
+        data.left_out.len()
+    );
+    for left_out in &data.left_out {
+        text.push_str(&format!("  left out: {}: {}\n", left_out.name, left_out.reason));
+    }
+    text.push_str(&format!("{:<26} {:>8}   {}\n", "parameter", "pooled", "single pairs: 5, 25, 50, 75, 95 %"));
+    for (spec, pooled, quantiles) in parameters(calibration) {
+        let quantiles: Vec<String> = quantiles.iter().map(|value| format!("{value:>8.3}")).collect();
+        text.push_str(&format!("{:<26} {pooled:>8.3}   {}\n", spec.key, quantiles.join(" ")));
+    }
+    text.push_str("spacing error                  pairs   RMSE (m)   relative\n");
+    let mut line = |name: &str, errors: Errors| {
+        text.push_str(&format!(
+            "{name:<30} {:>5}   {:>8.3}   {:>8}\n",
+            errors.pairs,
+            errors.rmse_m,
+            percent(errors.relative)
+        ));
+    };
+    line("single sets, own pairs", calibration.errors_of_single);
+    line("pooled set, calibration pairs", calibration.errors_of_pooled);
+    if let Some(held_out) = calibration.errors_of_held_out {
+        line("pooled set, held-out pairs", held_out);
+    }
+    text.push_str(&format!("literature: {LITERATURE}\n"));
+    if let Some(predictive) = &calibration.predictive {
+        let shown = |values: [f64; 5]| values.map(|value| format!("{value:.2}")).join(", ");
+        text.push_str(&format!(
+            "predictive check on held-out pairs, {} drivers: time headway at 5, 25, 50, 75, 95 % recorded {} s, simulated {} s; \
+             the 90 % band of the gap covers {} of the instants\n",
+            predictive.drivers,
+            shown(predictive.recorded_s),
+            shown(predictive.simulated_s),
+            percent(predictive.coverage),
+        ));
+    }
+    text
+}
+
+/// Returns the result as JSON.
+pub fn json(calibration: &Calibration, data: &FollowingData) -> Value {
+    let errors =
+        |errors: &Errors| json!({ "pairs": errors.pairs, "rmse_m": errors.rmse_m, "relative": errors.relative });
+    let keys: Vec<&str> = calibration.model.parameters().iter().map(|spec| spec.key).collect();
+    let values = |values: &[f64]| -> Map<String, Value> {
+        keys.iter().zip(values).map(|(key, value)| ((*key).to_owned(), json!(value))).collect()
+    };
+    let pairs: Vec<Value> = calibration
+        .pairs
+        .iter()
+        .map(|pair| json!({ "pair": pair.name, "rmse_m": pair.rmse_m, "parameters": values(&pair.values) }))
+        .collect();
+    let predictive = calibration.predictive.as_ref().map(|predictive| {
+        json!({
+            "drivers": predictive.drivers,
+            "probabilities": predictive.probabilities,
+            "recorded_headway_s": predictive.recorded_s,
+            "simulated_headway_s": predictive.simulated_s,
+            "coverage_of_90_percent_band": predictive.coverage,
+        })
+    });
+    let files: Vec<Value> = data
+        .files
+        .iter()
+        .map(|file| json!({ "path": file.path.display().to_string(), "blake3": file.blake3 }))
+        .collect();
+    json!({
+        "model": calibration.model.name(),
+        "files": files,
+        "pooled": values(&calibration.pooled),
+        "pairs": pairs,
+        "held_out": calibration.held_out,
+        "left_out": data.left_out.iter().map(|pair| json!({ "pair": pair.name, "reason": pair.reason })).collect::<Vec<_>>(),
+        "errors": {
+            "single_sets_own_pairs": errors(&calibration.errors_of_single),
+            "pooled_calibration_pairs": errors(&calibration.errors_of_pooled),
+            "pooled_held_out_pairs": calibration.errors_of_held_out.as_ref().map(errors),
+        },
+        "literature": LITERATURE,
+        "predictive": predictive,
+    })
+}
+
+/// Returns a member of a driver ensemble with the pooled parameters, as the text of its file. It leaves headway and desired
+/// speed to the scenario: they are those of the recorded traffic.
+pub fn member(calibration: &Calibration, data: &FollowingData) -> String {
+    let model = calibration.model.name();
+    let files: Vec<String> = data
+        .files
+        .iter()
+        .map(|file| {
+            let name = file.path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+            format!("{name} (blake3 {})", &file.blake3[..16.min(file.blake3.len())])
+        })
+        .collect();
+    let source = format!(
+        "closecall calibrate --model {model}: {} pairs of {}, RMSE of the gap {:.2} m, on {} held-out pairs {}",
+        calibration.pairs.len(),
+        files.join(", "),
+        calibration.errors_of_pooled.rmse_m,
+        calibration.held_out.len(),
+        calibration.errors_of_held_out.map_or_else(|| "-".to_owned(), |errors| format!("{:.2} m", errors.rmse_m)),
+    );
+    let quoted = |text: &str| json!(text).to_string();
+    let mut text = format!(
+        "schema-version = 1\nname = \"calibrated-{model}\"\ndescription = {}\nfollow = {{ model = \"{model}\", source = {} }}\n",
+        quoted("Drivers who follow as in recorded traffic, with one set of parameters for all."),
+        quoted(&source),
+    );
+    for (spec, pooled, _) in parameters(calibration).filter(|(spec, ..)| !spec.is_of_traffic) {
+        text.push_str(&format!(
+            "\n[[set]]\nkey = \"{}\"\nvalue = {pooled:.4}\nsource = {}\n",
+            spec.key,
+            quoted(&source)
+        ));
+    }
+    text.push_str("\n[calibration] # figures for the reader: 5, 25, 50, 75, 95 % over the single pairs\n");
+    for (spec, pooled, quantiles) in parameters(calibration) {
+        let quantiles = quantiles.map(|value| format!("{value:.3}")).join(", ");
+        text.push_str(&format!("{} = {{ pooled = {pooled:.4}, quantiles = [{quantiles}] }}\n", spec.key));
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use closecall_simulation::calibration::{FollowingModel, PairResult};
+    use closecall_simulation::scenario::member::Member;
+
+    use super::*;
+
+    #[test]
+    fn the_member_is_one_that_the_ensemble_takes_and_leaves_the_headway_alone() {
+        let errors = Errors { pairs: 2, rmse_m: 2.5, relative: 0.15 };
+        let values = vec![30.0, 1.25, 2.0, 1.1, 1.8];
+        let pair = |name: &str| PairResult { name: name.to_owned(), values: values.clone(), rmse_m: 2.5 };
+        let calibration = Calibration {
+            model: FollowingModel::Idm,
+            pairs: vec![pair("a"), pair("b")],
+            held_out: vec!["c".to_owned()],
+            pooled: values.clone(),
+            errors_of_single: errors,
+            errors_of_pooled: errors,
+            errors_of_held_out: Some(Errors { rmse_m: 3.25, ..errors }),
+            predictive: None,
+        };
+        let data = FollowingData::default();
+        let member = Member::parse("m.toml".as_ref(), &member(&calibration, &data)).unwrap();
+        assert_eq!(member.name(), "calibrated-idm");
+        let sets: Vec<String> = member.values().into_iter().map(|(set, _)| set).collect();
+        assert_eq!(sets, ["follow = idm", "acceleration-mps2 = 1.1", "comfortable-braking-mps2 = 1.8"]);
+        assert!(text(&calibration, &data).contains("pooled set, held-out pairs         2      3.250       15 %"));
+        assert_eq!(json(&calibration, &data)["errors"]["pooled_held_out_pairs"]["rmse_m"], 3.25);
+    }
+}

@@ -1,0 +1,54 @@
+//! `closecall calibrate`: fits car-following models to recorded pairs.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use closecall_report::{calibration, json::stamped};
+use closecall_scenarios::{atomic::write_file, following::read};
+use closecall_simulation::calibration::{FollowingModel, calibrate as fit};
+
+use super::output::{out, outln};
+use super::protect::protect;
+use super::{CliError, args::Format};
+use crate::exit_code::ExitCode;
+
+/// Arguments of `closecall calibrate`.
+#[derive(Debug, Args)]
+pub(super) struct CalibrateArgs {
+    /// Files of recorded pairs: a table of pairs, or a platoon of the OpenACC database; plain or gzip
+    #[arg(required = true, value_name = "FILE")]
+    files: Vec<PathBuf>,
+    /// Car-following model
+    #[arg(long, value_enum, default_value_t = Model::Idm)]
+    model: Model,
+    /// File for the pooled parameters, as a member of a driver ensemble (`closecall campaign --ensemble FILE`)
+    #[arg(short, long, value_name = "FILE.toml")]
+    output: Option<PathBuf>,
+    /// Output format
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Model {
+    Idm,
+    Wiedemann99,
+}
+
+pub(super) fn calibrate(args: &CalibrateArgs) -> Result<ExitCode, CliError> {
+    protect(&args.files, &[("--output", args.output.as_deref())])?;
+    let data = read(&args.files)?;
+    let model = match args.model {
+        Model::Idm => FollowingModel::Idm,
+        Model::Wiedemann99 => FollowingModel::Wiedemann99,
+    };
+    let result = fit(model, &data).ok_or_else(|| CliError::Usage { message: calibration::no_pair(&data) })?;
+    if let Some(path) = &args.output {
+        write_file(path, |file| file.write_all(calibration::member(&result, &data).as_bytes()))?;
+    }
+    match args.format {
+        Format::Json => outln!("{:#}", stamped(calibration::json(&result, &data), None, None)),
+        Format::Human => out!("{}", calibration::text(&result, &data)),
+    }
+    Ok(ExitCode::Pass)
+}
