@@ -23,7 +23,7 @@ use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::BuiltIn;
 use closecall_simulation::scenario::{ScenarioFile, Setting};
-use closecall_simulation::{Arm, Happening, Observer, RunKey, StepView, simulate};
+use closecall_simulation::{Arm, Observer, RunEvent, RunKey, StepView, simulate};
 use closecall_traffic::{Source, Time, TrackId, TrackStatus};
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -81,8 +81,8 @@ impl Observer for Counter {
         }
     }
 
-    fn happening(&mut self, _: Time, what: &Happening) {
-        let engages = matches!(what, Happening::EgoStateChanged { to: EgoState::Increasing, .. });
+    fn event(&mut self, _: Time, what: &RunEvent) {
+        let engages = matches!(what, RunEvent::EgoStateChanged { to: EgoState::Increasing, .. });
         self.engagements += u64::from(engages);
     }
 }

@@ -1,7 +1,7 @@
 //! Measures the peak memory of a campaign for several numbers of samples, and draws it as a chart.
 //!
 //! ```sh
-//! cargo build --release && cargo run --release --example validate_memory -- [MOST_SAMPLES] [FILE.svg]
+//! cargo build --release && cargo run --release --example validate_memory -- [MAX_SAMPLES] [FILE.svg]
 //! ```
 //!
 //! The scenario is `low-thw-overtake` with object-level sensors, cut to 2 s, so that a million samples take minutes. The

@@ -28,7 +28,7 @@ use closecall_sensors::SensorMode;
 use closecall_simulation::controller::BuiltIn;
 use closecall_simulation::outcome::{Moment, Outcome};
 use closecall_simulation::scenario::ScenarioFile;
-use closecall_simulation::{Arm, Happening, Observer, RunKey, StepView, simulate};
+use closecall_simulation::{Arm, Observer, RunEvent, RunKey, StepView, simulate};
 use closecall_traffic::Time;
 use plotters::prelude::*;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
@@ -81,7 +81,7 @@ impl Observer for Watch {
         }
     }
 
-    fn happening(&mut self, _: Time, _: &Happening) {}
+    fn event(&mut self, _: Time, _: &RunEvent) {}
 }
 
 fn seen(outcome: &Outcome, watch: &Watch) -> Seen {

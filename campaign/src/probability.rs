@@ -112,7 +112,7 @@ impl ProbabilityGate {
         // At a rate that is not below what is allowed no number is enough: there is nothing to look for.
         let is_low = hits as f64 / (samples as f64) < self.max || samples == 0;
         let at_rate = is_low.then(|| needed::samples_at_rate(hits, samples, passes)).flatten();
-        Missing { without_collisions: more(needed::least_samples(hits, passes)), at_observed_rate: more(at_rate) }
+        Missing { without_collisions: more(needed::min_samples(hits, passes)), at_observed_rate: more(at_rate) }
     }
 }
 
@@ -179,7 +179,7 @@ impl Finding {
 impl Missing {
     fn sentence(&self) -> String {
         let Some(least) = self.without_collisions else {
-            return format!("more than {} samples are needed", needed::MOST_SAMPLES);
+            return format!("more than {} samples are needed", needed::MAX_SAMPLES);
         };
         let at_rate = match self.at_observed_rate {
             Some(more) if more == least => return format!("{least} more samples are needed if none of them collides"),

@@ -29,7 +29,7 @@ pub use overtaker::{Follow, FollowConfig, Overtaker, OvertakerConfig, Return, Re
 pub use perception::{Evidence, EvidenceConfig, PerceptionConfig, PerceptionSettings};
 pub use prescribed::{Prescribed, PrescribedConfig, PrescribedLaneChangeConfig, RecordedConfig};
 pub use reaction::{LogNormalConfig, Reaction, ReactionConfig};
-pub use speed_keeping::{SpeedKeeping, SpeedKeepingConfig, Wander};
+pub use speed_keeping::{DesiredSpeedNoise, SpeedKeeping, SpeedKeepingConfig};
 pub use wiedemann99::{Regime, Thresholds, Wiedemann99, Wiedemann99Config, Wiedemann99Driver, Wiedemann99Model};
 
 use closecall_traffic::{Range, Time};

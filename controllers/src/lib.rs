@@ -21,15 +21,15 @@ mod ego;
 
 pub use config::{CheckedDriver, DriverConfig, HumanDriver};
 pub use driver::{
-    Deviation, Driver, DriverAction, DriverError, DriverInput, DriverNote, Evidence, EvidenceConfig, Follow,
-    FollowConfig, Idm, IdmConfig, LaneChange, LaneKeeping, LaneKeepingConfig, LaneNeighbours, Lapse, LapseConfig, Lead,
-    LogNormalConfig, Neighbour, Neighbours, Overtaker, OvertakerConfig, PerceptionConfig, PerceptionSettings,
-    Prescribed, PrescribedConfig, PrescribedLaneChangeConfig, Reaction, ReactionConfig, RecordedConfig, Regime, Return,
-    ReturnConfig, SpeedKeeping, SpeedKeepingConfig, Thresholds, Wander, Weave, Wiedemann99, Wiedemann99Config,
-    Wiedemann99Driver, Wiedemann99Model,
+    DesiredSpeedNoise, Deviation, Driver, DriverAction, DriverError, DriverInput, DriverNote, Evidence, EvidenceConfig,
+    Follow, FollowConfig, Idm, IdmConfig, LaneChange, LaneKeeping, LaneKeepingConfig, LaneNeighbours, Lapse,
+    LapseConfig, Lead, LogNormalConfig, Neighbour, Neighbours, Overtaker, OvertakerConfig, PerceptionConfig,
+    PerceptionSettings, Prescribed, PrescribedConfig, PrescribedLaneChangeConfig, Reaction, ReactionConfig,
+    RecordedConfig, Regime, Return, ReturnConfig, SpeedKeeping, SpeedKeepingConfig, Thresholds, Weave, Wiedemann99,
+    Wiedemann99Config, Wiedemann99Driver, Wiedemann99Model,
 };
 pub use ego::{
     Acc, AccConfig, Aeb, AebConfig, ArrivalPrediction, BrakingResponse, ControllerError, EgoCommand, EgoController,
-    EgoInput, EgoSettings, EgoStack, EgoStackConfig, EgoState, Encounter, Front, FrontFollower, MisConfig, MisPlan,
-    MisSettings, Odometry, R157Driver, Reason, SensorAvailability, Solution,
+    EgoInput, EgoSettings, EgoStack, EgoStackConfig, EgoState, Encounter, Front, LeadVehicleSelector, MisConfig,
+    MisPlan, MisSettings, Odometry, R157Driver, Reason, SensorAvailability, Solution,
 };

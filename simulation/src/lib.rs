@@ -24,6 +24,6 @@ mod world;
 
 pub use closecall_traffic::CONTROL_STEP;
 pub use run::{
-    Arm, ControllerFactory, Happening, Lead, MarginsNow, NoObserver, Observer, RunKey, SampleError, StepView,
+    Arm, ControllerFactory, CurrentMargins, Lead, NoObserver, Observer, RunEvent, RunKey, SampleError, StepView,
     TrackAuditor, simulate,
 };

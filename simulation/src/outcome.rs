@@ -140,7 +140,7 @@ impl Moment {
 
 /// A moment of the encounter and the time at which it was reached.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct MomentAt {
+pub struct ReachedMoment {
     /// The moment.
     pub moment: Moment,
     /// Time of the first control step at which the moment's condition held; the cut-out has the time of a physics step.
@@ -226,7 +226,7 @@ pub struct Outcome {
     pub collisions: Vec<Collision>,
     /// The moments of the encounter that were reached before the ego collided, in order of time.
     #[serde(default)]
-    pub moments: Vec<MomentAt>,
+    pub moments: Vec<ReachedMoment>,
     /// The extremes of the ego's margins.
     pub margins: Margins,
     /// What the margin increase system did, or the reason why there is no summary of it.

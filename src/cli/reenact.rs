@@ -41,7 +41,7 @@ enum RearChoice {
 impl From<RearChoice> for RearDriver {
     fn from(rear: RearChoice) -> Self {
         match rear {
-            RearChoice::Driver => Self::Driver,
+            RearChoice::Driver => Self::Model,
             RearChoice::Recorded => Self::Recorded,
         }
     }

@@ -11,7 +11,7 @@ use closecall_scenarios::criticality::{CriticalLaneChange, by_severity};
 use closecall_scenarios::filters::SmoothedTrajectoryData;
 use closecall_simulation::outcome::Outcome;
 use closecall_simulation::scenario::{Scenario, Setting};
-use closecall_simulation::{Arm, Happening, Observer, RunKey, StepView};
+use closecall_simulation::{Arm, Observer, RunEvent, RunKey, StepView};
 use closecall_traffic::Time;
 
 use super::CliError;
@@ -154,12 +154,12 @@ impl Observer for Observers<'_> {
         }
     }
 
-    fn happening(&mut self, time: Time, what: &Happening) {
+    fn event(&mut self, time: Time, what: &RunEvent) {
         if let Some(recorder) = &mut self.recorder {
-            recorder.happening(time, what);
+            recorder.event(time, what);
         }
         if let Some(trace) = &mut self.trace {
-            trace.happening(time, what);
+            trace.event(time, what);
         }
     }
 }

@@ -72,8 +72,8 @@ fn the_sequence_of_two_million_samples_is_finite() {
 #[test]
 fn the_number_of_needed_samples_agrees_with_known_values() {
     let passes = |hits: u64, samples: u64| interval::upper_bound(hits, samples, 0.95) <= 0.01;
-    assert_eq!(needed::least_samples(0, passes), Some(299));
-    assert_eq!(needed::least_samples(1, passes), Some(473));
+    assert_eq!(needed::min_samples(0, passes), Some(299));
+    assert_eq!(needed::min_samples(1, passes), Some(473));
     // 1 hit in 200 samples is half of the allowed rate. The expected number comes from trying every number.
     let at_rate = needed::samples_at_rate(1, 200, passes).unwrap();
     let expected = (200..).find(|samples: &u64| passes(samples.div_ceil(200), *samples)).unwrap();
@@ -148,7 +148,7 @@ proptest! {
     #[test]
     fn the_number_of_needed_samples_is_sufficient_and_minimal(k in 0_u64..20, p in 0.01..0.4, c in 0.6..0.99) {
         let passes = |hits: u64, samples: u64| interval::upper_bound(hits, samples, c) <= p;
-        let least = needed::least_samples(k, passes).unwrap();
+        let least = needed::min_samples(k, passes).unwrap();
         prop_assert!(passes(k, least) && (least == k || !passes(k, least - 1)));
     }
 }

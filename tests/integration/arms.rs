@@ -11,7 +11,7 @@ use closecall_sensors::SensorMode;
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::outcome::Outcome;
 use closecall_simulation::scenario::ScenarioFile;
-use closecall_simulation::{Arm, Happening, Observer, RunKey, StepView, simulate};
+use closecall_simulation::{Arm, Observer, RunEvent, RunKey, StepView, simulate};
 use closecall_traffic::{Time, VehicleState};
 use serde_json::Value;
 
@@ -217,7 +217,7 @@ impl Observer for Start {
         }
     }
 
-    fn happening(&mut self, _: Time, _: &Happening) {}
+    fn event(&mut self, _: Time, _: &RunEvent) {}
 }
 
 #[test]

@@ -9,7 +9,7 @@ use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::BuiltIn;
 use closecall_simulation::scenario::{Scenario, ScenarioFile};
-use closecall_simulation::{Arm, Happening, Observer, RunKey, StepView, simulate};
+use closecall_simulation::{Arm, Observer, RunEvent, RunKey, StepView, simulate};
 use closecall_traffic::{ParameterName, Time, Value};
 use statrs::distribution::{ContinuousCDF, LogNormal};
 
@@ -109,7 +109,7 @@ impl Observer for BrakeLight {
         }
     }
 
-    fn happening(&mut self, _: Time, _: &Happening) {}
+    fn event(&mut self, _: Time, _: &RunEvent) {}
 }
 
 #[test]
@@ -156,7 +156,7 @@ impl Observer for Crossing {
         self.before = Some((beyond_m, thw_s));
     }
 
-    fn happening(&mut self, _: Time, _: &Happening) {}
+    fn event(&mut self, _: Time, _: &RunEvent) {}
 }
 
 /// Returns the scenario `overtake-without-brake` as it ships, and with a rear vehicle that weaves in its lane and

@@ -8,7 +8,7 @@ use closecall_sensors::SensorMode;
 use closecall_simulation::controller::BuiltIn;
 use closecall_simulation::outcome::Outcome;
 use closecall_simulation::scenario::{Scenario, ScenarioFile, Setting};
-use closecall_simulation::{Arm, Happening, NoObserver, Observer, RunKey, StepView, simulate};
+use closecall_simulation::{Arm, NoObserver, Observer, RunEvent, RunKey, StepView, simulate};
 use closecall_traffic::{CONTROL_STEP, ParameterName, Time, Value};
 
 use crate::support::{all_of_library, library};
@@ -47,7 +47,7 @@ impl Observer for Commands {
         });
     }
 
-    fn happening(&mut self, _: Time, _: &Happening) {}
+    fn event(&mut self, _: Time, _: &RunEvent) {}
 }
 
 /// Returns the commands of the ego up to its first collision.
@@ -172,7 +172,7 @@ impl Observer for RearBrakes {
         self.accelerations.push((view.time, rear.state.acceleration_mps2));
     }
 
-    fn happening(&mut self, _: Time, _: &Happening) {}
+    fn event(&mut self, _: Time, _: &RunEvent) {}
 }
 
 #[test]

@@ -9,7 +9,7 @@ use closecall_sensors::SensorMode;
 use closecall_simulation::controller::BuiltIn;
 use closecall_simulation::outcome::{Moment, Outcome};
 use closecall_simulation::scenario::{ScenarioFile, Setting};
-use closecall_simulation::{Arm, CONTROL_STEP, Happening, Observer, RunKey, StepView, simulate};
+use closecall_simulation::{Arm, CONTROL_STEP, Observer, RunEvent, RunKey, StepView, simulate};
 use closecall_traffic::Time;
 
 use crate::support::library;
@@ -49,7 +49,7 @@ impl Observer for Engagement {
         }
     }
 
-    fn happening(&mut self, _: Time, _: &Happening) {}
+    fn event(&mut self, _: Time, _: &RunEvent) {}
 }
 
 /// Runs samples of a scenario with the MIS and true tracks.

@@ -177,7 +177,7 @@ fn brakes_at_s(config: &Wiedemann99Config, braking_mps2: f64) -> f64 {
             own: &state,
             neighbours: &neighbours,
             road: &road,
-            changing_to: None,
+            lane_change_target: None,
             lateral_deviation_m: 0.0,
             desired_speed_offset_mps: 0.0,
         };

@@ -5,7 +5,7 @@ use closecall_scenarios::sampling::Design;
 use closecall_simulation::controller::BuiltIn;
 use closecall_simulation::outcome::{ClosedBy, Moment, Outcome};
 use closecall_simulation::scenario::ScenarioFile;
-use closecall_simulation::{Arm, Happening, Observer, RunKey, StepView, simulate};
+use closecall_simulation::{Arm, Observer, RunEvent, RunKey, StepView, simulate};
 use closecall_traffic::geometry::BoxSide;
 use closecall_traffic::{ActorId, Time};
 
@@ -20,7 +20,7 @@ impl Observer for Accelerations {
         self.0.push((view.time, view.vehicles[view.scenario.ego].state.acceleration_mps2));
     }
 
-    fn happening(&mut self, _: Time, _: &Happening) {}
+    fn event(&mut self, _: Time, _: &RunEvent) {}
 }
 
 /// Runs the scenario, which has no random parameter.

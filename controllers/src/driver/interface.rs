@@ -72,7 +72,7 @@ pub struct DriverInput<'a> {
     /// The road.
     pub road: &'a Road,
     /// Target lane of the lane change in progress; `None` if there is none.
-    pub changing_to: Option<Lane>,
+    pub lane_change_target: Option<Lane>,
     /// Lateral deviation from the intended path due to weaving, positive to the left (m).
     pub lateral_deviation_m: f64,
     /// Present desired speed minus the long-term desired speed (m/s).

@@ -86,7 +86,7 @@ pub struct Deviation {
     /// First derivative of the deviation with respect to the distance driven (dimensionless).
     pub slope: f64,
     /// Second derivative of the deviation with respect to the distance driven (1/m).
-    pub bend_per_m: f64,
+    pub second_derivative_per_m: f64,
 }
 
 impl Weave {
@@ -96,7 +96,7 @@ impl Weave {
         Deviation {
             offset_m: value,
             slope: first / REFERENCE_SPEED_MPS,
-            bend_per_m: second / (REFERENCE_SPEED_MPS * REFERENCE_SPEED_MPS),
+            second_derivative_per_m: second / (REFERENCE_SPEED_MPS * REFERENCE_SPEED_MPS),
         }
     }
 }
@@ -137,8 +137,9 @@ mod tests {
         let keeping = config.check(&Parameters::default()).unwrap();
         let mut weave = weave(0.2, 3, Side::Left).unwrap();
         let squares = (0..100_000).map(|step| {
-            let bend_per_m = weave.at(f64::from(step) * 0.01 * REFERENCE_SPEED_MPS).bend_per_m;
-            (bend_per_m * REFERENCE_SPEED_MPS * REFERENCE_SPEED_MPS).powi(2)
+            let second_derivative_per_m =
+                weave.at(f64::from(step) * 0.01 * REFERENCE_SPEED_MPS).second_derivative_per_m;
+            (second_derivative_per_m * REFERENCE_SPEED_MPS * REFERENCE_SPEED_MPS).powi(2)
         });
         let sd_mps2 = (squares.sum::<f64>() / 100_000.0).sqrt();
         assert!((0.2..0.35).contains(&sd_mps2), "{sd_mps2}");
@@ -152,7 +153,10 @@ mod tests {
     fn weaving_is_mirrored_on_the_right_and_absent_at_zero_sdlp() {
         let (mut left, mut right) = (weave(0.2, 4, Side::Left).unwrap(), weave(0.2, 4, Side::Right).unwrap());
         let (left, right) = (left.at(400.0), right.at(400.0));
-        assert_eq!((right.offset_m, right.slope, right.bend_per_m), (-left.offset_m, -left.slope, -left.bend_per_m));
+        assert_eq!(
+            (right.offset_m, right.slope, right.second_derivative_per_m),
+            (-left.offset_m, -left.slope, -left.second_derivative_per_m)
+        );
         assert!(weave(0.0, 4, Side::Left).is_none());
         let too_much = LaneKeepingConfig { sdlp_m: 0.6.into() };
         assert_eq!(too_much.check(&Parameters::default()).unwrap_err().path.to_string(), "sdlp-m");

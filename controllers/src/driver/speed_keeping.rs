@@ -41,21 +41,21 @@ impl Check for SpeedKeepingConfig {
 
 impl SpeedKeeping {
     /// Creates the fluctuation of one run, or `None` if the desired speed is constant.
-    pub fn wander(&self, rng: Stream) -> Option<Wander> {
+    pub fn wander(&self, rng: Stream) -> Option<DesiredSpeedNoise> {
         let [rate_per_s, _] = derivative_sds(LAGS_S);
         let sd_mps = self.acceleration_noise_mps2 / rate_per_s;
-        (sd_mps > 0.0).then(|| Wander { noise: SmoothNoise::from_rest(sd_mps, LAGS_S, rng) })
+        (sd_mps > 0.0).then(|| DesiredSpeedNoise { noise: SmoothNoise::from_rest(sd_mps, LAGS_S, rng) })
     }
 }
 
 /// Generates the fluctuation of one driver's desired speed during a run. It starts at zero, because the scenario gives
 /// the initial speeds.
 #[derive(Clone, Debug)]
-pub struct Wander {
+pub struct DesiredSpeedNoise {
     noise: SmoothNoise,
 }
 
-impl Wander {
+impl DesiredSpeedNoise {
     /// Returns the offset of the desired speed at `time`, which must not decrease from call to call (m/s).
     pub fn at(&mut self, time: Time) -> f64 {
         let [offset_mps, ..] = self.noise.at(time.s());

@@ -28,7 +28,7 @@ pub(super) fn with_input<T>(time: Time, neighbours: &Neighbours, check: impl FnO
         own: &VehicleState { s_m: 30.0 * time.s(), d_m: -5.625, speed_mps: 30.0, ..VehicleState::default() },
         neighbours,
         road: &Road::straight(3),
-        changing_to: None,
+        lane_change_target: None,
         lateral_deviation_m: 0.0,
         desired_speed_offset_mps: 0.0,
     })

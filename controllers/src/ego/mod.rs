@@ -22,4 +22,4 @@ pub use r157_driver::R157Driver;
 pub use reason::Reason;
 pub use settings::{EgoSettings, EgoStackConfig};
 pub use stack::EgoStack;
-pub use surroundings::{Front, FrontFollower};
+pub use surroundings::{Front, LeadVehicleSelector};

@@ -19,7 +19,7 @@
 
 use closecall_traffic::{GRAVITY_MPS2, Time};
 
-use super::surroundings::FrontFollower;
+use super::surroundings::LeadVehicleSelector;
 use super::{ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack, EgoState, Front, Reason};
 
 /// Time from the perception of a risk to the beginning of braking (s) (JRC-FSM).
@@ -62,7 +62,7 @@ impl Reaction {
 pub struct R157Driver {
     settings: EgoSettings,
     following: EgoStack,
-    lead: FrontFollower,
+    lead: LeadVehicleSelector,
     reaction: Option<Reaction>,
     last_step: Option<Time>,
 }
@@ -77,7 +77,7 @@ impl R157Driver {
     /// Creates a driver for one run, with the settings of [`Self::settings`].
     pub fn new(settings: EgoSettings) -> Self {
         let following = EgoStack::new(settings);
-        Self { settings, following, lead: FrontFollower::default(), reaction: None, last_step: None }
+        Self { settings, following, lead: LeadVehicleSelector::default(), reaction: None, last_step: None }
     }
 
     /// Returns true if there is a risk: see the module.

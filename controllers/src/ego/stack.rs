@@ -17,7 +17,7 @@
 use closecall_traffic::Time;
 
 use super::mis::{BRAKE_RELEASE_JERK_MPS3, Mis, Request, Situation};
-use super::surroundings::{Front, FrontFollower};
+use super::surroundings::{Front, LeadVehicleSelector};
 use super::{Acc, ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoState, Reason};
 
 /// Largest acceleration while the margin is returned (m/s²): an assumption, half of what the ACC may use; plausible are
@@ -28,7 +28,7 @@ const RELEASE_ACCELERATION_MPS2: f64 = 0.8;
 #[derive(Clone, Debug)]
 pub struct EgoStack {
     settings: EgoSettings,
-    lead: FrontFollower,
+    lead: LeadVehicleSelector,
     mis: Option<Mis>,
     emergency_braking: bool,
     /// Time and value (m/s²) of the last comfort command: the command without emergency braking.
@@ -39,7 +39,7 @@ impl EgoStack {
     /// Creates a stack for one run.
     pub fn new(settings: EgoSettings) -> Self {
         let mis = settings.mis.map(Mis::new);
-        Self { settings, lead: FrontFollower::default(), mis, emergency_braking: false, last_comfort: None }
+        Self { settings, lead: LeadVehicleSelector::default(), mis, emergency_braking: false, last_comfort: None }
     }
 
     /// Creates a stack without the margin increase system for one run: the controller `acc`.

@@ -192,11 +192,11 @@ impl LeadCandidate {
 
 /// Selects the lead vehicle; to be updated at each control step.
 #[derive(Clone, Debug, Default)]
-pub struct FrontFollower {
+pub struct LeadVehicleSelector {
     candidates: Vec<LeadCandidate>,
 }
 
-impl FrontFollower {
+impl LeadVehicleSelector {
     /// Observes the tracks of this step. Returns, of the vehicles ahead in the lane of the ego, the one that leaves the
     /// ego the least room to stop.
     ///

@@ -1,6 +1,6 @@
 //! The outcome of a run as JSON.
 
-use closecall_simulation::outcome::{Collision, Margins, MisSummary, MomentAt, Outcome};
+use closecall_simulation::outcome::{Collision, Margins, MisSummary, Outcome, ReachedMoment};
 use closecall_traffic::{Absent, Measured, Value as ParameterValue};
 use serde_json::{Map, Value, json};
 
@@ -69,7 +69,7 @@ fn collision(collision: &Collision) -> Value {
     })
 }
 
-fn moment(at: &MomentAt) -> Value {
+fn moment(at: &ReachedMoment) -> Value {
     json!({ "moment": at.moment, "letter": at.moment.letter(), "time_s": at.time.s() })
 }
 

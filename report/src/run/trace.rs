@@ -11,7 +11,7 @@ use parquet::arrow::ArrowWriter;
 
 use crate::table::{field, properties, required};
 use closecall_scenarios::atomic::{WriteError, check_writable, write_file};
-use closecall_simulation::{Happening, Observer, StepView};
+use closecall_simulation::{Observer, RunEvent, StepView};
 
 /// The file format of a trace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -91,7 +91,7 @@ impl Observer for TraceWriter {
         }));
     }
 
-    fn happening(&mut self, _: Time, _: &Happening) {}
+    fn event(&mut self, _: Time, _: &RunEvent) {}
 }
 
 /// Writes the rows as CSV. The names of actors need no quotes, because they consist of letters, digits and hyphens. The

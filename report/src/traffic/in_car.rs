@@ -7,7 +7,7 @@ use closecall_scenarios::trajectory_data::{BusFrame, InCarFrame, InCarLog, Marki
 use closecall_traffic::{Dimensions, Lane, Road, Side, Time, VehicleClass, VehicleState};
 
 use closecall_simulation::scenario::Scenario;
-use closecall_simulation::{CONTROL_STEP, Happening, Observer, StepView};
+use closecall_simulation::{CONTROL_STEP, Observer, RunEvent, StepView};
 
 /// Time between two runs, which leaves a gap in the log.
 const PAUSE: Time = Time::from_ms(10_000);
@@ -166,8 +166,8 @@ impl InCarRecorder {
 impl Observer for InCarRecorder {
     fn step(&mut self, _: &StepView<'_>) {}
 
-    fn happening(&mut self, _: Time, what: &Happening) {
-        if let Happening::Collision(collision) = what {
+    fn event(&mut self, _: Time, what: &RunEvent) {
+        if let RunEvent::Collision(collision) = what {
             self.run.has_ended |= collision.between.iter().any(|actor| actor.as_str() == self.actor);
         }
     }

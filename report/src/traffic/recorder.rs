@@ -4,7 +4,7 @@ use closecall_scenarios::trajectory_data::TrajectoryData;
 use closecall_traffic::{Lane, Time, Trajectory, TrajectoryPoint};
 
 use closecall_simulation::scenario::Scenario;
-use closecall_simulation::{CONTROL_STEP, Happening, Observer, StepView};
+use closecall_simulation::{CONTROL_STEP, Observer, RunEvent, StepView};
 
 /// Time between two runs, so that vehicles of different runs never meet.
 const PAUSE: Time = Time::from_ms(10_000);
@@ -65,5 +65,5 @@ impl Observer for TrafficRecorder {
         }
     }
 
-    fn happening(&mut self, _: Time, _: &Happening) {}
+    fn event(&mut self, _: Time, _: &RunEvent) {}
 }

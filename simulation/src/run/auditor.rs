@@ -3,7 +3,7 @@
 use closecall_sensors::{Scene, SceneVehicle, SensorError, TrackAudit};
 use closecall_traffic::Time;
 
-use super::{Happening, Observer, StepView};
+use super::{Observer, RunEvent, StepView};
 
 /// An observer that audits the confirmed rear tracks of a run. It stops at the first collision, since no motion model
 /// describes a wreck.
@@ -44,7 +44,7 @@ impl Observer for TrackAuditor {
         self.error = self.audit.observe(view.tracks, &scene).err();
     }
 
-    fn happening(&mut self, _: Time, what: &Happening) {
-        self.has_collided |= matches!(what, Happening::Collision(_));
+    fn event(&mut self, _: Time, what: &RunEvent) {
+        self.has_collided |= matches!(what, RunEvent::Collision(_));
     }
 }

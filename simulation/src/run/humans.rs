@@ -1,6 +1,6 @@
 //! The human drivers of a run, each with its own random streams.
 
-use closecall_controllers::{CheckedDriver, Driver, Wander, Weave};
+use closecall_controllers::{CheckedDriver, DesiredSpeedNoise, Driver, Weave};
 use closecall_traffic::{Road, Stream, stream};
 
 use super::RunKey;
@@ -18,7 +18,7 @@ pub(super) struct Human {
     pub(super) driver: Box<dyn Driver>,
     pub(super) rng: Stream,
     /// How the desired speed varies in time, or `None` if it is constant.
-    pub(super) desired_speed_noise: Option<Wander>,
+    pub(super) desired_speed_noise: Option<DesiredSpeedNoise>,
 }
 
 /// Creates the drivers of all vehicles other than the ego.

@@ -4,7 +4,7 @@ use closecall_controllers::{Neighbour, Neighbours};
 use closecall_traffic::metrics::{time_headway_s, time_to_collision_s};
 use closecall_traffic::{Absent, Measured, VehicleState};
 
-use super::observer::{Lead, MarginsNow};
+use super::observer::{CurrentMargins, Lead};
 use crate::outcome::Margins;
 
 /// Time after which a vehicle that has pulled in ahead counts for the speed deficit (s).
@@ -19,7 +19,7 @@ pub(crate) struct Widths {
     pub(crate) lane_m: f64,
 }
 
-impl MarginsNow {
+impl CurrentMargins {
     /// Computes the margins of a vehicle with the state `own` among its neighbours.
     ///
     /// A neighbour counts as being in the lane if the lateral distance of the two centres is below half a lane width. An
@@ -90,7 +90,7 @@ impl MarginMeter {
     }
 
     /// Updates the extremes by one physics step. It must not be called after the ego's first collision.
-    pub(crate) fn observe(&mut self, own: &VehicleState, now: &MarginsNow) {
+    pub(crate) fn observe(&mut self, own: &VehicleState, now: &CurrentMargins) {
         let extremes = &mut self.extremes;
         keep_least(&mut extremes.min_thw_front_s, now.thw_front_s);
         keep_least(&mut extremes.min_thw_rear_s, now.thw_rear_s);

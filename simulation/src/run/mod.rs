@@ -29,4 +29,4 @@ pub use arm::{Arm, ControllerFactory, RunKey};
 pub use auditor::TrackAuditor;
 pub use closed_loop::simulate;
 pub use error::SampleError;
-pub use observer::{Happening, Lead, MarginsNow, NoObserver, Observer, StepView};
+pub use observer::{CurrentMargins, Lead, NoObserver, Observer, RunEvent, StepView};

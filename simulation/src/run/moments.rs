@@ -12,24 +12,24 @@
 
 use closecall_traffic::Time;
 
-use crate::outcome::{Moment, MomentAt};
+use crate::outcome::{Moment, ReachedMoment};
 
 /// Collects the moments of a run.
 #[derive(Debug, Default)]
 pub(super) struct Moments {
-    noted: Vec<MomentAt>,
+    noted: Vec<ReachedMoment>,
 }
 
 impl Moments {
     /// Notes that `moment` is reached at `time`, unless it was reached before.
     pub(super) fn note(&mut self, moment: Moment, time: Time) {
         if !self.noted.iter().any(|known| known.moment == moment) {
-            self.noted.push(MomentAt { moment, time });
+            self.noted.push(ReachedMoment { moment, time });
         }
     }
 
     /// Returns the moments that were reached, in order of time.
-    pub(super) fn finish(mut self) -> Vec<MomentAt> {
+    pub(super) fn finish(mut self) -> Vec<ReachedMoment> {
         self.noted.sort_by_key(|noted| (noted.time, noted.moment));
         self.noted
     }

@@ -19,7 +19,7 @@ pub struct Lead {
 
 /// The true margins of a vehicle at one instant.
 #[derive(Clone, Copy, Debug)]
-pub struct MarginsNow {
+pub struct CurrentMargins {
     /// The lead vehicle, if its centre is in the lane.
     pub lead: Result<Lead, Absent>,
     /// Index of the vehicle behind in the list of actors, if there is one in the lane.
@@ -53,14 +53,14 @@ pub struct StepView<'a> {
     /// The command of the ego controller.
     pub command: &'a EgoCommand,
     /// The ego's true margins.
-    pub margins: &'a MarginsNow,
+    pub margins: &'a CurrentMargins,
     /// The phase of the encounter.
     pub phase: Phase,
 }
 
 /// Something that happens at one instant of a run.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Happening {
+pub enum RunEvent {
     /// An event of the scenario was triggered.
     EventTriggered {
         /// The event's name.
@@ -96,7 +96,7 @@ pub trait Observer {
     /// Called at each control step (25 Hz).
     fn step(&mut self, view: &StepView<'_>);
     /// Called when something happens, with its time.
-    fn happening(&mut self, time: Time, what: &Happening);
+    fn event(&mut self, time: Time, what: &RunEvent);
     /// Called at each physics step (100 Hz) with the states of all vehicles, in the order of the scenario's actors.
     fn moved(&mut self, _time: Time, _vehicles: &mut dyn Iterator<Item = VehicleState>) {}
 }
@@ -106,5 +106,5 @@ pub struct NoObserver;
 
 impl Observer for NoObserver {
     fn step(&mut self, _: &StepView<'_>) {}
-    fn happening(&mut self, _: Time, _: &Happening) {}
+    fn event(&mut self, _: Time, _: &RunEvent) {}
 }

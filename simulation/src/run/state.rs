@@ -16,7 +16,7 @@ use super::moments::Moments;
 use super::phase::{AFTER_COLLISION, Encounter, Follower};
 use super::settling::settle_sensors;
 use super::start::start_of_ego;
-use super::{Arm, Happening, MarginsNow, Observer, RunKey, SampleError, StepView};
+use super::{Arm, CurrentMargins, Observer, RunEvent, RunKey, SampleError, StepView};
 use crate::outcome::{EndReason, Moment, Outcome, Phase};
 use crate::scenario::Scenario;
 use crate::world::{Action, InitialVehicle, World};
@@ -45,7 +45,7 @@ pub(super) struct Run<'a> {
     // Buffers that are reused in each step.
     neighbours: Vec<Neighbours>,
     tracks: Vec<Track>,
-    margins: MarginsNow,
+    margins: CurrentMargins,
     actions: Vec<Action>,
     /// All vehicles other than the ego, in the order of their names.
     others: Vec<SceneVehicle>,
@@ -76,7 +76,7 @@ impl<'a> Run<'a> {
             world = world_with(start);
         }
         let widths = Widths { vehicle_m: 0.0, lane_m: scenario.road.lane_width_m() };
-        let margins = MarginsNow::new(world.state(scenario.ego), &Neighbours::default(), widths);
+        let margins = CurrentMargins::new(world.state(scenario.ego), &Neighbours::default(), widths);
         let sensors = match arm.sensors {
             Some(mode) => scenario.sensors.with_mode(mode),
             None => scenario.sensors,
@@ -130,7 +130,7 @@ impl<'a> Run<'a> {
         self.world.find_neighbours(&mut self.neighbours);
         let ego = self.scenario.ego;
         let own = self.world.state(ego);
-        self.margins = MarginsNow::new(own, &self.neighbours[ego], self.widths(ego));
+        self.margins = CurrentMargins::new(own, &self.neighbours[ego], self.widths(ego));
         if self.world.is_wrecked(ego) {
             return;
         }
@@ -140,7 +140,7 @@ impl<'a> Run<'a> {
         let before = self.encounter.phase();
         let phase = self.encounter.update(&self.world, ego, follower);
         if phase != before {
-            observer.happening(self.world.time(), &Happening::PhaseChanged { to: phase });
+            observer.event(self.world.time(), &RunEvent::PhaseChanged { to: phase });
         }
     }
 
@@ -182,8 +182,8 @@ impl<'a> Run<'a> {
         let time = self.world.time();
         let from = self.command.map_or(EgoState::Following, |last| last.state);
         if command.state != from {
-            let changed = Happening::EgoStateChanged { from, to: command.state, reason: command.reason };
-            observer.happening(time, &changed);
+            let changed = RunEvent::EgoStateChanged { from, to: command.state, reason: command.reason };
+            observer.event(time, &changed);
         }
         self.command = Some(command);
         let ego = self.scenario.ego;
@@ -251,7 +251,7 @@ impl<'a> Run<'a> {
         let Some(command) = &self.command else { return };
         self.fronts.clear();
         for actor in 0..self.world.len() {
-            let now = MarginsNow::new(self.world.state(actor), &self.neighbours[actor], self.widths(actor));
+            let now = CurrentMargins::new(self.world.state(actor), &self.neighbours[actor], self.widths(actor));
             self.fronts.push((now.gap_front_m, now.thw_front_s));
         }
         observer.step(&StepView {
@@ -272,7 +272,7 @@ impl<'a> Run<'a> {
     pub(super) fn decide_actions(&mut self, observer: &mut dyn Observer) -> Result<(), SampleError> {
         let time = self.world.time();
         self.events.update(&self.world, |event| {
-            observer.happening(time, &Happening::EventTriggered { event: event.to_owned() });
+            observer.event(time, &RunEvent::EventTriggered { event: event.to_owned() });
         });
         let ego = self.scenario.ego;
         let commanded_mps2 = self.command.map_or(0.0, |command| command.acceleration_mps2);
@@ -288,7 +288,7 @@ impl<'a> Run<'a> {
                 own: self.world.state(actor),
                 neighbours: &self.neighbours[actor],
                 road: &self.scenario.road,
-                changing_to: self.world.lane_change_target(actor),
+                lane_change_target: self.world.lane_change_target(actor),
                 lateral_deviation_m: self.world.lateral_deviation_m(actor),
                 desired_speed_offset_mps: human.desired_speed_noise.as_mut().map_or(0.0, |noise| noise.at(time)),
             };
@@ -303,7 +303,7 @@ impl<'a> Run<'a> {
                         self.moments.note(Moment::CutOut, time);
                     }
                 }
-                observer.happening(time, &Happening::DriverNote { actor, note });
+                observer.event(time, &RunEvent::DriverNote { actor, note });
             }
             self.actions[actor] = Action {
                 acceleration_mps2: self
@@ -327,7 +327,7 @@ impl<'a> Run<'a> {
                 let is_ahead = self.is_ahead_of_ego(index);
                 self.meter.note_collision(is_ahead);
             }
-            observer.happening(collision.time, &Happening::Collision(collision.clone()));
+            observer.event(collision.time, &RunEvent::Collision(collision.clone()));
         }
     }
 

@@ -39,7 +39,7 @@ use super::{ScenarioError, ScenarioFile, Setting};
 pub enum RearDriver {
     /// A human driver model that reacts to the ego, follows as closely as recorded, and cuts out at the recorded headway.
     #[default]
-    Driver,
+    Model,
     /// The recorded speeds and the recorded lane change, whatever the ego does.
     Recorded,
 }
@@ -112,7 +112,7 @@ fn config(encounter: &RecordedEncounter, rear: RearDriver) -> Result<ScenarioCon
         let driver = match (index, rear) {
             (EGO_INDEX, _) => Some(ego_stack(encounter)),
             (LEAD_INDEX, _) | (REAR_INDEX, RearDriver::Recorded) => Some(prescribed_driver(encounter, vehicle)),
-            (REAR_INDEX, RearDriver::Driver) => Some(overtaking_driver(encounter)),
+            (REAR_INDEX, RearDriver::Model) => Some(overtaking_driver(encounter)),
             _ => other_driver(encounter, vehicle),
         };
         let earlier_vehicles = &encounter.vehicles[..index];

@@ -70,12 +70,7 @@ pub(super) fn find(world: &World, actor: usize, road: &Road, half_width_m: impl 
 }
 
 /// Returns the nearest vehicle ahead of the one that is ahead of `actor`, in the path of that one.
-fn beyond(
-    world: &World,
-    actor: usize,
-    around: &Neighbours,
-    half_width_m: impl Fn(usize) -> f64,
-) -> Option<Neighbour> {
+fn beyond(world: &World, actor: usize, around: &Neighbours, half_width_m: impl Fn(usize) -> f64) -> Option<Neighbour> {
     let ahead = ahead(around)?;
     let mut nearest = None;
     for other in 0..world.len() {

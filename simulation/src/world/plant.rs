@@ -210,7 +210,7 @@ impl Plant {
         LateralState {
             d_m: self.intended.d_m + self.deviation.offset_m,
             slope: self.intended.slope + self.deviation.slope,
-            second_derivative_per_m: self.intended.second_derivative_per_m + self.deviation.bend_per_m,
+            second_derivative_per_m: self.intended.second_derivative_per_m + self.deviation.second_derivative_per_m,
         }
     }
 }

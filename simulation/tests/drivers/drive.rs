@@ -7,7 +7,7 @@ use closecall_sensors::SensorMode;
 use closecall_simulation::controller::BuiltIn;
 use closecall_simulation::outcome::Outcome;
 use closecall_simulation::scenario::{Scenario, ScenarioFile};
-use closecall_simulation::{Arm, Happening, Observer, RunKey, StepView, simulate};
+use closecall_simulation::{Arm, Observer, RunEvent, RunKey, StepView, simulate};
 use closecall_traffic::{Lane, PHYSICS_STEP, Parameters, Road, Time, Vehicle, VehicleClass, VehicleState};
 
 /// Time constant with which the acceleration of a car follows the command in the simulation's plant (s).
@@ -29,8 +29,8 @@ struct Recorder {
 impl Observer for Recorder {
     fn step(&mut self, _: &StepView<'_>) {}
 
-    fn happening(&mut self, time: Time, what: &Happening) {
-        if let Happening::DriverNote { actor, note } = what {
+    fn event(&mut self, time: Time, what: &RunEvent) {
+        if let RunEvent::DriverNote { actor, note } = what {
             self.notes.push((time, *actor, *note));
         }
     }

@@ -3,7 +3,7 @@
 
 use closecall_controllers::EgoState;
 use closecall_simulation::controller::BuiltIn;
-use closecall_simulation::{Happening, Observer, RunKey, StepView, simulate};
+use closecall_simulation::{Observer, RunEvent, RunKey, StepView, simulate};
 use closecall_traffic::Time;
 
 use crate::drive::{arm, scenario};
@@ -49,7 +49,7 @@ impl Observer for Figure {
         }
     }
 
-    fn happening(&mut self, _: Time, _: &Happening) {}
+    fn event(&mut self, _: Time, _: &RunEvent) {}
 }
 
 #[test]

@@ -284,7 +284,7 @@ impl OvertakerDriver {
 
     /// Follows the vehicle ahead until the driver is back in the original lane.
     fn abort(&mut self, step: &Step<'_>, origin: Lane) -> DriverAction {
-        if step.input.changing_to != Some(origin) {
+        if step.input.lane_change_target != Some(origin) {
             self.phase = Phase::Approaching;
         }
         self.cruise(step, step.scene.ahead.as_ref())
@@ -293,7 +293,7 @@ impl OvertakerDriver {
     /// Drives past the overtaken vehicle in the passing lane.
     fn overtake(&mut self, step: &Step<'_>, overtaken: Option<usize>) -> DriverAction {
         let mut action = self.cruise(step, step.ahead_except(overtaken));
-        if step.input.changing_to.is_some() {
+        if step.input.lane_change_target.is_some() {
             action.indicator = step.indicator();
         }
         if has_passed(step, overtaken) {

@@ -53,7 +53,7 @@ impl OvertakerDriver {
         let own_lane = step.input.road.lane_at(step.input.own.d_m);
         let origin = step.input.road.beside(own_lane, origin_side);
         let (Some(returns), Some(origin)) = (self.settings.returns, origin) else { return action };
-        if step.input.changing_to.is_some() || step.input.time < passing.time + returns.after {
+        if step.input.lane_change_target.is_some() || step.input.time < passing.time + returns.after {
             return action;
         }
         action.indicator = Indicator::towards(origin_side);
@@ -73,7 +73,7 @@ impl OvertakerDriver {
         origin: Lane,
         passing: CompletedPassing,
     ) -> DriverAction {
-        if step.input.changing_to != Some(origin) {
+        if step.input.lane_change_target != Some(origin) {
             self.phase = Phase::Approaching;
             self.observe_side(step.side);
         }

@@ -42,7 +42,7 @@ impl Driver for PrescribedDriver {
         let requested_mps2 = finite(requested_mps2, "acceleration of a profile", input.time)?;
         let acceleration_mps2 = requested_mps2.clamp(-MAX_BRAKING_MPS2, MAX_ACCELERATION_MPS2);
         let lane_change = self.lane_change(input);
-        let is_changing = lane_change.is_some() || input.changing_to.is_some();
+        let is_changing = lane_change.is_some() || input.lane_change_target.is_some();
         Ok(DriverAction {
             acceleration_mps2,
             indicator: if is_changing { self.change_indicator } else { Indicator::Off },

@@ -77,7 +77,7 @@ impl EncounterComparison {
             let _ = writeln!(page, "- **{name}:** {}", values.join("; "));
         }
         let rear_driver = match driver {
-            RearDriver::Driver => "a model of a human driver drives R and pulls out at the recorded headway",
+            RearDriver::Model => "a model of a human driver drives R and pulls out at the recorded headway",
             RearDriver::Recorded => "R drives as recorded, whatever E does",
         };
         let missing_count = encounter.vehicles.len().saturating_sub(simulated.actors.len());

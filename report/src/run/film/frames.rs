@@ -10,7 +10,7 @@ use closecall_traffic::metrics::{Encounter, Moving, closest_encounter};
 use closecall_traffic::{Environment, Road, Time, Track, Vehicle, VehicleState};
 
 use closecall_simulation::outcome::{Collision, Outcome, Phase};
-use closecall_simulation::{Happening, MarginsNow};
+use closecall_simulation::{CurrentMargins, RunEvent};
 
 use super::Scan;
 use super::knowledge::RearSeen;
@@ -82,7 +82,7 @@ pub struct Frame {
     pub(in crate::run) states: Vec<VehicleState>,
     /// Pitch of each body, positive nose down (rad).
     pub(in crate::run) pitches_rad: Vec<f64>,
-    pub(in crate::run) margins: MarginsNow,
+    pub(in crate::run) margins: CurrentMargins,
     /// Tracks that the ego's sensors report; empty below [`Level::Objects`].
     pub(in crate::run) tracks: Vec<Track>,
     /// The vehicle behind the ego, as its rear sensors know it.
@@ -121,8 +121,8 @@ pub struct Film {
     /// ego.
     pub(in crate::run) ego: usize,
     pub(in crate::run) frames: Vec<Frame>,
-    pub(in crate::run) happenings: Vec<(Time, Happening)>,
-    /// Texts about instants that no happening covers.
+    pub(in crate::run) happenings: Vec<(Time, RunEvent)>,
+    /// Texts about instants that no event covers.
     pub(in crate::run) notes: Vec<(Time, String)>,
     /// Reference levels of the ego's acceleration (m/s²).
     pub(in crate::run) acceleration_limits: Vec<Limit>,

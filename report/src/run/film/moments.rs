@@ -3,7 +3,7 @@
 use closecall_traffic::Time;
 
 use super::Film;
-use closecall_simulation::outcome::MomentAt;
+use closecall_simulation::outcome::ReachedMoment;
 
 impl Film {
     /// Returns the critical moment of the film, at which its views open.
@@ -43,7 +43,7 @@ impl Film {
     }
 
     /// Returns the moments of the encounter that the run reached, in order of time.
-    pub(crate) fn moments(&self) -> &[MomentAt] {
+    pub(crate) fn moments(&self) -> &[ReachedMoment] {
         self.outcome.as_ref().map_or(&[], |outcome| &outcome.moments)
     }
 

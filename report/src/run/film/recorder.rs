@@ -9,7 +9,7 @@ use super::knowledge::rear_seen;
 use super::{Film, FilmActor, Frame, Level, Limit, Part, Scan};
 use closecall_simulation::outcome::{Outcome, Phase};
 use closecall_simulation::scenario::Scenario;
-use closecall_simulation::{Arm, CONTROL_STEP, Happening, Observer, RunKey, StepView};
+use closecall_simulation::{Arm, CONTROL_STEP, Observer, RunEvent, RunKey, StepView};
 
 /// Gravitational acceleration (m/s²). Its product with the friction coefficient is the largest deceleration that the
 /// road allows.
@@ -146,7 +146,7 @@ impl Observer for FilmRecorder {
         });
     }
 
-    fn happening(&mut self, time: Time, what: &Happening) {
+    fn event(&mut self, time: Time, what: &RunEvent) {
         self.film.happenings.push((time, what.clone()));
     }
 }

@@ -4,7 +4,7 @@ use closecall_controllers::{DriverNote, EgoState};
 use closecall_traffic::Time;
 
 use super::{Film, headway_text};
-use closecall_simulation::Happening;
+use closecall_simulation::RunEvent;
 use closecall_simulation::outcome::Collision;
 
 /// One sentence of the story.
@@ -81,19 +81,19 @@ impl Film {
         lines
     }
 
-    fn line(&self, time: Time, what: &Happening) -> Option<StoryLine> {
+    fn line(&self, time: Time, what: &RunEvent) -> Option<StoryLine> {
         let plain = |text: String| Some(StoryLine { time, text, is_severe: false });
         match what {
-            Happening::EventTriggered { event } => plain(format!("the scenario's event `{event}` sets in")),
-            Happening::DriverNote { actor, note } => {
+            RunEvent::EventTriggered { event } => plain(format!("the scenario's event `{event}` sets in")),
+            RunEvent::DriverNote { actor, note } => {
                 plain(format!("{} {}", self.actors[*actor].name, driver_note_text(*note)))
             }
-            Happening::EgoStateChanged { to, reason, .. } => {
+            RunEvent::EgoStateChanged { to, reason, .. } => {
                 let text = format!("ego: {} ({reason})", ego_state_name(*to));
                 Some(StoryLine { time, text, is_severe: *to == EgoState::EmergencyBraking })
             }
-            Happening::PhaseChanged { .. } => None,
-            Happening::Collision(reported) => {
+            RunEvent::PhaseChanged { .. } => None,
+            RunEvent::Collision(reported) => {
                 let text = format!("COLLISION: {}", collision_text(self.collision_in_outcome(reported)));
                 Some(StoryLine { time, text, is_severe: true })
             }

@@ -18,7 +18,7 @@ use closecall_traffic::{
 
 use super::{Film, FilmActor, Frame, Level, Part};
 use crate::units::labelled;
-use closecall_simulation::{Lead, MarginsNow};
+use closecall_simulation::{CurrentMargins, Lead};
 
 /// Time shown before the start and after the end of the lane change.
 const CONTEXT_TIME: Time = Time::from_ms(2_000);
@@ -197,7 +197,7 @@ fn state(point: TrajectoryPoint) -> VehicleState {
 }
 
 /// Returns the margins of the first track to the nearest vehicles ahead and behind in its recorded lane.
-fn margins(tracks: &[&Trajectory], present: &[(usize, TrajectoryPoint)]) -> MarginsNow {
+fn margins(tracks: &[&Trajectory], present: &[(usize, TrajectoryPoint)]) -> CurrentMargins {
     let own = present.iter().find(|(index, _)| *index == 0).map(|(_, point)| *point);
     let nearest_in_lane = |ahead: bool| {
         let own = own?;
@@ -211,7 +211,7 @@ fn margins(tracks: &[&Trajectory], present: &[(usize, TrajectoryPoint)]) -> Marg
     let own_mps = own.map_or(0.0, |own| own.speed_mps);
     let gap_m = |found: Option<(usize, f64, f64)>, absent| found.map(|(_, _, gap_m)| gap_m).ok_or(absent);
     let behind = follower.ok_or(Absent::NoFollower);
-    MarginsNow {
+    CurrentMargins {
         lead: lead.map(|(actor, speed_mps, _)| Lead { actor, speed_mps }).ok_or(Absent::NoLead),
         follower: follower.map(|(actor, _, _)| actor),
         gap_front_m: gap_m(lead, Absent::NoLead),

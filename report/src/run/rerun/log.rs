@@ -1,4 +1,4 @@
-//! The text log: every happening at the time at which it happened.
+//! The text log: every event at the time at which it happened.
 
 use closecall_traffic::Time;
 use rerun::{TextLog, TextLogLevel};
@@ -8,7 +8,7 @@ use super::palette::{self, Rgba};
 use super::plots::phase_name;
 use super::stream::Writer;
 use crate::run::film::{Film, KnownSpan, collision_text, driver_note_text, ego_state_name};
-use closecall_simulation::Happening;
+use closecall_simulation::RunEvent;
 
 /// One line of the log.
 struct Line {
@@ -73,23 +73,23 @@ fn reasons(film: &Film) -> Vec<Line> {
     lines
 }
 
-/// Returns the log line of a happening.
-fn line(film: &Film, time: Time, what: &Happening) -> Line {
+/// Returns the log line of an event.
+fn line(film: &Film, time: Time, what: &RunEvent) -> Line {
     let info = |entity, colour, text| Line { time, entity, level: TextLogLevel::INFO, colour, text };
     let warn = |entity, colour, text| Line { time, entity, level: TextLogLevel::WARN, colour, text };
     match what {
-        Happening::EventTriggered { event } => warn("log/event", palette::EVENT, format!("event `{event}` sets in")),
-        Happening::DriverNote { actor, note } => {
+        RunEvent::EventTriggered { event } => warn("log/event", palette::EVENT, format!("event `{event}` sets in")),
+        RunEvent::DriverNote { actor, note } => {
             let name = film.actors.get(*actor).map_or("?", |actor| actor.name.as_str());
             let colour = film.actors.get(*actor).map_or(palette::NEUTRAL, |actor| palette::part(actor.part));
             info("log/driver", colour, format!("{name} {}", driver_note_text(*note)))
         }
-        Happening::EgoStateChanged { from, to, reason } => {
+        RunEvent::EgoStateChanged { from, to, reason } => {
             let text = format!("ego: {} -> {} ({reason})", ego_state_name(*from), ego_state_name(*to));
             info("log/ego", palette::EGO, text)
         }
-        Happening::PhaseChanged { to } => info("log/phase", palette::NEUTRAL, format!("phase: {}", phase_name(*to))),
-        Happening::Collision(reported) => {
+        RunEvent::PhaseChanged { to } => info("log/phase", palette::NEUTRAL, format!("phase: {}", phase_name(*to))),
+        RunEvent::Collision(reported) => {
             let text = format!("COLLISION: {}", collision_text(film.collision_in_outcome(reported)));
             Line { time, entity: "log/collision", level: TextLogLevel::ERROR, colour: palette::CRITICAL, text }
         }

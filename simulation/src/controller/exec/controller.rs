@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use closecall_controllers::{ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, FrontFollower, Reason};
+use closecall_controllers::{
+    ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, LeadVehicleSelector, Reason,
+};
 use closecall_traffic::Road;
 
 use super::child::Child;
@@ -80,7 +82,7 @@ impl ControllerFactory for ExecFactory {
             settings: self.settings.clone(),
             folder: self.folder.clone(),
             ego_settings: *settings,
-            lead_selector: FrontFollower::default(),
+            lead_selector: LeadVehicleSelector::default(),
             child: None,
         })
     }
@@ -91,7 +93,7 @@ struct ExecController {
     settings: ExecSettings,
     folder: Option<PathBuf>,
     ego_settings: EgoSettings,
-    lead_selector: FrontFollower,
+    lead_selector: LeadVehicleSelector,
     child: Option<Child>,
 }
 

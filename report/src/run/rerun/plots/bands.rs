@@ -1,7 +1,7 @@
 //! Bands of states over time: the ego stack, what the ego knew, the phase, the moments, the brake lights.
 
 use closecall_controllers::EgoState;
-use closecall_simulation::outcome::{MomentAt, Phase};
+use closecall_simulation::outcome::{Phase, ReachedMoment};
 use closecall_traffic::Time;
 use rerun::{StateChange, StateConfiguration};
 
@@ -90,7 +90,8 @@ impl Plots<'_> {
             return Ok(());
         }
         let texts: Vec<String> = moments.iter().map(|noted| noted.moment.label()).collect();
-        let short = |noted: &MomentAt| noted.moment.letter().map_or("·".to_owned(), |letter| format!("({letter})"));
+        let short =
+            |noted: &ReachedMoment| noted.moment.letter().map_or("·".to_owned(), |letter| format!("({letter})"));
         let short: Vec<String> = moments.iter().map(short).collect();
         let latest = |time: Time| moments.iter().rposition(|noted| noted.time <= time);
         let words: Vec<&str> =

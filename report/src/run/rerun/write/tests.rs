@@ -50,13 +50,13 @@ fn recorded_and_simulated(level: Level) -> [Film; 2] {
     let recording = smooth(&traffic.finish("own"));
     let changes = detect(&recording);
     let found = encounter(&recording, &changes[0], &changes, CONTROL_STEP).unwrap();
-    let again = reenact(&found, RearDriver::Driver, (Path::new("own"), &[])).unwrap();
+    let again = reenact(&found, RearDriver::Model, (Path::new("own"), &[])).unwrap();
     let again = again.concrete(&again.space().nominal()).unwrap();
     let mut recorder = FilmRecorder::new(&again, key, &arm(ControllerChoice::Mis), level);
     let outcome = simulate(&again, key, &arm(ControllerChoice::Mis), &mut recorder).unwrap();
     let (recorded, simulated) = (film_encounter(&found, level).unwrap(), recorder.finish(&outcome));
     let foreword =
-        EncounterComparison::new(&found, &recorded, &simulated).markdown(&found, &simulated, RearDriver::Driver);
+        EncounterComparison::new(&found, &recorded, &simulated).markdown(&found, &simulated, RearDriver::Model);
     [recorded.with_foreword(foreword), simulated]
 }
 
