@@ -39,6 +39,7 @@ pub mod record;
 mod repair;
 mod repeats;
 pub mod repository;
+pub mod resume_command;
 pub mod runner;
 pub mod saved;
 pub mod selection;

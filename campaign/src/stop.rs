@@ -78,6 +78,19 @@ impl StopMonitor {
     }
 }
 
+/// Parses a time above 0, in seconds, minutes or hours: `90s`, `15m`, `8h`.
+///
+/// # Errors
+/// What is wrong with the text.
+pub fn duration(text: &str) -> Result<Duration, String> {
+    let units = [("s", 1.0), ("m", 60.0), ("h", 3_600.0)];
+    let (number, unit_s) =
+        units.iter().find_map(|(unit, s)| text.strip_suffix(unit).map(|number| (number, *s))).unwrap_or((text, 1.0));
+    let time = number.parse().ok().filter(|value: &f64| *value > 0.0);
+    time.and_then(|value| Duration::try_from_secs_f64(value * unit_s).ok())
+        .ok_or_else(|| format!("`{text}` is not a time above 0 such as 90s, 15m or 8h"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -96,5 +109,15 @@ mod tests {
         let hour = Duration::from_secs(3_600);
         let mut monitor = StopMonitor::start(StopRule { until_certain: None, time_budget: Some(hour), scenarios: 2 });
         assert!(monitor.observe(0, &counts(1, 0)).is_continue());
+    }
+
+    #[test]
+    fn a_time_has_a_unit() {
+        assert_eq!(duration("90"), Ok(Duration::from_secs(90)));
+        assert_eq!(duration("1.5m"), Ok(Duration::from_secs(90)));
+        assert_eq!(duration("2h"), Ok(Duration::from_secs(7_200)));
+        for text in ["", "0s", "-1m", "nan", "inf", "1d", "m", "1e300h"] {
+            assert!(duration(text).is_err(), "{text}");
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! Whether two paths lead to the same file.
+//! Whether two paths lead to the same file, so that no command overwrites one of its inputs.
 
 use std::path::{Path, PathBuf};
 
@@ -14,6 +14,26 @@ pub fn is_same_file(one: &Path, other: &Path) -> bool {
     one == other || matches!((canonical(one), canonical(other)), (Some(one), Some(other)) if one == other)
 }
 
+/// A file that a command writes, with the option that names it.
+pub type Output<'a> = (&'static str, Option<&'a Path>);
+
+/// Checks that no output is one of the inputs, under whatever path, and that no two outputs are the same file.
+///
+/// # Errors
+/// The options of the output that would do so.
+pub fn check_outputs(inputs: &[PathBuf], outputs: &[Output<'_>]) -> Result<(), String> {
+    let named: Vec<(&str, &Path)> = outputs.iter().filter_map(|(option, path)| Some((*option, (*path)?))).collect();
+    for (index, (option, output)) in named.iter().enumerate() {
+        if let Some(input) = inputs.iter().find(|input| is_same_file(input, output)) {
+            return Err(format!("{option} would overwrite the input {}", input.display()));
+        }
+        if let Some((other, _)) = named[..index].iter().find(|(_, other)| is_same_file(other, output)) {
+            return Err(format!("{other} and {option} name the same file"));
+        }
+    }
+    Ok(())
+}
+
 /// Returns the canonical path of a file, which need not exist if its folder does.
 fn canonical(path: &Path) -> Option<PathBuf> {
     let in_folder = || {
@@ -26,6 +46,15 @@ fn canonical(path: &Path) -> Option<PathBuf> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_output_is_neither_an_input_nor_another_output() {
+        let [input, new] = ["a.toml", "new.csv"].map(Path::new);
+        let inputs = [input.to_owned()];
+        assert!(check_outputs(&inputs, &[("--output", Some(input))]).is_err());
+        assert!(check_outputs(&inputs, &[("--output", Some(new)), ("--trace", None)]).is_ok());
+        assert!(check_outputs(&inputs, &[("--record", Some(new)), ("--trace", Some(new))]).is_err());
+    }
 
     #[test]
     fn a_file_is_recognised_under_any_path() -> std::io::Result<()> {

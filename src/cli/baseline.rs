@@ -3,15 +3,16 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
-use closecall_campaign::baseline::{Baseline, BaselineComparison, ScenarioBaselineComparison};
+use closecall_campaign::baseline::Baseline;
 use closecall_campaign::folder::Folder;
+use closecall_report::campaign::BaselineText;
 use closecall_report::json::stamped;
 use serde_json::json;
 
 use super::CliError;
 use super::args::Format;
 use super::gates::share;
-use super::output::{listed, outln};
+use super::output::{out, outln};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall baseline`.
@@ -82,26 +83,12 @@ fn compare(dir: &Path, file: &Path, tolerance: f64, format: Format) -> Result<Ex
             });
             outln!("{:#}", stamped(object, Some(current.seed), None));
         }
-        Format::Human => print(&found, file),
-    }
-    Ok(code)
-}
-
-fn print(found: &BaselineComparison, file: &Path) {
-    for ScenarioBaselineComparison { scenario, newly_failing, fixed, margins } in &found.scenarios {
-        outln!("{scenario}");
-        outln!("  {:>6} newly failing{}", newly_failing.len(), listed(newly_failing));
-        outln!("  {:>6} fixed{}", fixed.len(), listed(fixed));
-        for regression in margins {
-            let (margin, quantile) = (&regression.margin, &regression.quantile);
-            outln!("  {margin} {quantile}: {:.3} in the baseline, now {:.3}", regression.baseline, regression.current);
+        Format::Human => {
+            out!("{}", BaselineText(&found));
+            if !found.is_regression() && (found.has_fixed() || !found.new_scenarios.is_empty()) {
+                outln!("`closecall baseline save DIR {}` keeps this result", file.display());
+            }
         }
     }
-    for scenario in &found.new_scenarios {
-        outln!("{scenario}: not in the baseline, and not compared");
-    }
-    outln!("{}", if found.is_regression() { "REGRESSION" } else { "NO REGRESSION" });
-    if !found.is_regression() && (found.has_fixed() || !found.new_scenarios.is_empty()) {
-        outln!("`closecall baseline save DIR {}` keeps this result", file.display());
-    }
+    Ok(code)
 }

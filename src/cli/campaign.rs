@@ -15,7 +15,7 @@ use closecall_campaign::runner::Sampling;
 use closecall_campaign::selection::Selection;
 use closecall_campaign::stop::{StopMonitor, StopRule};
 use closecall_campaign::workers::Workers;
-use closecall_report::campaign::{CampaignReport, Tally};
+use closecall_report::campaign::{CampaignReport, CountsText, Tally, VerdictText, ensemble_text};
 use closecall_report::json;
 use closecall_scenarios::sampling::Design;
 use closecall_simulation::controller::ControllerChoice;
@@ -31,9 +31,8 @@ use super::ensemble::EnsembleArgs;
 use super::gates::GateArgs;
 use super::heartbeat::Heartbeat;
 use super::interrupt::{received, stop_gracefully};
-use super::output::{outln, print_error, print_report_files};
+use super::output::{out, outln, print_error, print_report_files};
 use super::plan::PlanArgs;
-use super::summary::{print_counts, print_ensemble, print_verdict};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall campaign`.
@@ -153,15 +152,15 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
     match args.format {
         Format::Json => outln!("{:#}", json::campaign_report(&report, Some(wall_s))),
         Format::Human => {
-            print_counts(&tally.summary);
+            out!("{}", CountsText(&tally.summary));
             let (simulated_s, jobs) = (tally.summary.total().simulated_s, campaign.workers.jobs);
             outln!("{simulated_s:.0} simulated seconds in {wall_s:.1} s on {jobs} threads");
             let [run_s, check_s] = progress.spent_s;
             if check_s > 0.0 {
                 outln!("{:.0} % of the threads' time went into validity checks", 100.0 * check_s / (run_s + check_s));
             }
-            print_ensemble(&tally.summary, &manifest);
-            print_verdict(&judged);
+            out!("{}", ensemble_text(&tally.summary, &manifest));
+            out!("{}", VerdictText(&judged));
         }
     }
     if let Some(locked) = &locked {

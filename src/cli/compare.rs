@@ -3,15 +3,15 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use closecall_campaign::compare::{Means, ScenarioComparison, compare as compare_folders};
+use closecall_campaign::compare::{ScenarioComparison, compare as compare_folders};
 use closecall_campaign::folder::Folder;
-use closecall_campaign::margins::MarginRegression;
+use closecall_report::campaign::ComparisonText;
 use closecall_report::json::{self, stamped};
 
 use super::CliError;
 use super::args::Format;
 use super::gates::share;
-use super::output::{listed, out, outln};
+use super::output::{out, outln};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall compare`.
@@ -49,7 +49,11 @@ pub(super) fn compare(args: &CompareArgs) -> Result<ExitCode, CliError> {
                 )
             )
         }
-        Format::Human => print(&found, &differences, args.tolerance, code),
+        Format::Human => {
+            let (scenarios, differences) = (&found[..], &differences[..]);
+            out!("{}", ComparisonText { scenarios, differences, tolerance: args.tolerance });
+            outln!("{}", verdict(code));
+        }
     }
     Ok(code)
 }
@@ -69,35 +73,4 @@ fn verdict(code: ExitCode) -> &'static str {
         ExitCode::SampleError => "NEW ERRORS",
         _ => "REGRESSION",
     }
-}
-
-fn print(found: &[ScenarioComparison], differences: &[String], tolerance: f64, code: ExitCode) {
-    for difference in differences {
-        outln!("differs: {difference}");
-    }
-    for scenario in found {
-        outln!("{}: {} samples, {} the same to the last bit", scenario.scenario, scenario.samples, scenario.same);
-        outln!("  {:>6} newly failing{}", scenario.newly_failing.len(), listed(&scenario.newly_failing));
-        outln!("  {:>6} fixed{}", scenario.fixed.len(), listed(&scenario.fixed));
-        outln!("  {:>6} failing in both", scenario.still_failing);
-        if !scenario.newly_in_error.is_empty() {
-            outln!("  {:>6} newly in error{}", scenario.newly_in_error.len(), listed(&scenario.newly_in_error));
-        }
-        if !scenario.no_longer_in_error.is_empty() {
-            let fixed = &scenario.no_longer_in_error;
-            outln!("  {:>6} no longer in error{}", fixed.len(), listed(fixed));
-        }
-        for margin in &scenario.margins {
-            let Some(Means { baseline, current }) = margin.means() else { continue };
-            out!("  {:<16} mean {baseline:.3}, now {current:.3} ({:+.3})", margin.key, current - baseline);
-            if let Some(worst) = margin.worst {
-                out!("; sample {} lost most ({:+.3})", worst.sample, worst.change);
-            }
-            outln!();
-        }
-        for MarginRegression { margin, quantile, baseline, current } in scenario.margin_regressions(tolerance) {
-            outln!("  REGRESSION: {margin} {quantile} {baseline:.3}, now {current:.3}");
-        }
-    }
-    outln!("{}", verdict(code));
 }

@@ -6,13 +6,14 @@ use std::path::Path;
 use clap::Args;
 use closecall_campaign::end_rule::{EarlyEnd, EndRule};
 use closecall_campaign::execution::{Campaign, ResumeReport};
+use closecall_campaign::resume_command::{quoted, resume_command};
 use closecall_campaign::summary::Summary;
+use closecall_report::campaign::CountsText;
 use serde_json::json;
 
 use super::args::Format;
 use super::interrupt::Signal;
-use super::output::{outln, print_error};
-use super::summary::print_counts;
+use super::output::{out, outln, print_error};
 use crate::exit_code::ExitCode;
 
 /// When a campaign ends before its last sample.
@@ -72,7 +73,7 @@ impl Ending {
                 outln!("{ended:#}");
             }
             Format::Human => {
-                print_counts(summary);
+                out!("{}", CountsText(summary));
                 outln!("ENDED EARLY, without a verdict: {message}; {done} of {of} samples are done");
                 match (&resume, out) {
                     (Some(resume), Some(out)) => {
@@ -92,22 +93,6 @@ impl Ending {
     }
 }
 
-fn quoted(word: &str) -> String {
-    shlex::try_quote(word).map_or_else(|_| word.to_owned(), |quoted| quoted.into_owned())
-}
-
-/// Returns the command line that resumes this campaign: without the options that would end it at the same sample again.
-fn resume_command(args: impl Iterator<Item = String>, retry_errors: bool) -> String {
-    let mut words: Vec<String> = args.filter(|word| word != "--fail-fast").collect();
-    let wanted = [("--resume", true), ("--retry-errors", retry_errors)];
-    for (option, is_wanted) in wanted {
-        if is_wanted && !words.iter().any(|word| word == option) {
-            words.push(option.to_owned());
-        }
-    }
-    words.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" ")
-}
-
 /// Prints what was found in the journal of a campaign that goes on.
 pub(super) fn print_resumption(report: &ResumeReport) {
     for damaged in &report.damaged {
@@ -122,20 +107,5 @@ pub(super) fn print_resumption(report: &ResumeReport) {
         print_error(format_args!(
             "the journal was torn at line {line} ({reason}): the samples from there on were run again\n"
         ));
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_resume_command_is_the_command_with_quotes_and_resume() {
-        let of = |text: &str, retry| resume_command(shlex::split(text).unwrap_or_default().into_iter(), retry);
-        assert_eq!(
-            of("closecall campaign 'a b.toml' --out x --fail-fast", false),
-            "closecall campaign 'a b.toml' --out x --resume"
-        );
-        assert_eq!(of("c campaign --resume --out x", true), "c campaign --resume --out x --retry-errors");
     }
 }

@@ -24,15 +24,8 @@ pub(super) fn list(args: &ListArgs) -> Result<ExitCode, CliError> {
     match args.format {
         Format::Json => outln!("{:#}", stamped(json!({ "scenarios": listed, "members": members }), None, None)),
         Format::Human => {
-            for scenario in &listed {
-                outln!("{}", scenario.name);
-                outln!("  {}", scenario.question);
-                outln!("  requirements: {}; {} parameters", scenario.requirements.join(", "), scenario.parameters);
-                for gate in &scenario.gates {
-                    outln!("  gate: {gate}");
-                }
-            }
-            outln!("\nMembers of the driver ensemble (`closecall campaign SCENARIO --ensemble NAME`):");
+            listed.iter().for_each(|scenario| outln!("{scenario}"));
+            outln!("Members of the driver ensemble (`closecall campaign SCENARIO --ensemble NAME`):");
             members.iter().for_each(|member| outln!("{member}"));
             outln!("\nA command takes such a name in place of a file: `closecall run {}`.", listed[0].name);
             outln!("`closecall new NAME --from LIBRARY_NAME` writes a copy to start from.");

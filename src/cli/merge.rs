@@ -6,14 +6,13 @@ use clap::Args;
 use closecall_campaign::merge::Parts;
 use closecall_campaign::saved::{SavedCampaign, works};
 use closecall_campaign::selection::Selection;
-use closecall_report::campaign::{CampaignReport, Tally};
+use closecall_report::campaign::{CampaignReport, CountsText, Tally, VerdictText, ensemble_text};
 use closecall_report::json;
 
 use super::CliError;
 use super::args::Format;
 use super::gates::GateArgs;
-use super::output::{outln, print_report_files};
-use super::summary::{print_counts, print_ensemble, print_verdict};
+use super::output::{out, outln, print_report_files};
 use crate::exit_code::ExitCode;
 
 /// Arguments of `closecall merge`.
@@ -51,9 +50,9 @@ pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
     match args.format {
         Format::Json => outln!("{:#}", json::campaign_report(&report, None)),
         Format::Human => {
-            print_counts(&tally.summary);
-            print_ensemble(&tally.summary, saved.manifest());
-            print_verdict(&judged);
+            out!("{}", CountsText(&tally.summary));
+            out!("{}", ensemble_text(&tally.summary, saved.manifest()));
+            out!("{}", VerdictText(&judged));
         }
     }
     print_report_files(saved.folder());

@@ -33,7 +33,6 @@ mod run;
 mod schema;
 mod statistics;
 mod study;
-mod summary;
 mod trajectories;
 mod view;
 mod watch;

@@ -53,18 +53,6 @@ pub(super) fn print_report_files(folder: &Folder) {
     }
 }
 
-/// Largest number of samples that a list in a text names.
-const MAX_LISTED: usize = 12;
-
-/// Returns the samples as the end of a line, `: 3, 7, 12`; an empty text if there are none.
-pub(super) fn listed(samples: &[u64]) -> String {
-    let mut text: Vec<String> = samples.iter().take(MAX_LISTED).map(u64::to_string).collect();
-    if samples.len() > MAX_LISTED {
-        text.push(format!("… {} more", samples.len() - MAX_LISTED));
-    }
-    if text.is_empty() { String::new() } else { format!(": {}", text.join(", ")) }
-}
-
 /// Prints like [`std::print`], but does not panic.
 macro_rules! out {
     ($($part:tt)*) => { $crate::cli::output::print(format_args!($($part)*)) };

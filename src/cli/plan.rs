@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use closecall_campaign::ledger::Inference;
+use closecall_campaign::stop::duration;
 use closecall_campaign::validity::CheckPlan;
 
 use super::CliError;
@@ -120,30 +121,5 @@ impl PlanArgs {
         }
         CheckPlan::new(self.check_share, self.check_at_most)
             .map_err(|error| CliError::Usage { message: format!("--check-share: {error}") })
-    }
-}
-
-/// Parses a time above 0, in seconds, minutes or hours.
-fn duration(text: &str) -> Result<Duration, String> {
-    let units = [("s", 1.0), ("m", 60.0), ("h", 3_600.0)];
-    let (number, unit_s) =
-        units.iter().find_map(|(unit, s)| text.strip_suffix(unit).map(|number| (number, *s))).unwrap_or((text, 1.0));
-    let time = number.parse().ok().filter(|value: &f64| *value > 0.0);
-    time.and_then(|value| Duration::try_from_secs_f64(value * unit_s).ok())
-        .ok_or_else(|| format!("`{text}` is not a time above 0 such as 90s, 15m or 8h"))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_time_has_a_unit() {
-        assert_eq!(duration("90"), Ok(Duration::from_secs(90)));
-        assert_eq!(duration("1.5m"), Ok(Duration::from_secs(90)));
-        assert_eq!(duration("2h"), Ok(Duration::from_secs(7_200)));
-        for text in ["", "0s", "-1m", "nan", "inf", "1d", "m", "1e300h"] {
-            assert!(duration(text).is_err(), "{text}");
-        }
     }
 }

@@ -4,12 +4,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 use closecall_campaign::runner::{Sampling, concrete, run_guarded};
-use closecall_controllers::DriverConfig;
-use closecall_report::traffic::in_car::InCarRecorder;
+use closecall_report::traffic::in_car::{InCarRecorder, recorded_actor};
 use closecall_report::traffic::recorder::TrafficRecorder;
 use closecall_scenarios::sampling::Design;
 use closecall_scenarios::trajectory_data::{ground_truth_path, write_ground_truth, write_in_car, write_trajectories};
-use closecall_simulation::scenario::{ActorConfig, Scenario, ScenarioFile};
+use closecall_simulation::scenario::{Scenario, ScenarioFile};
 use closecall_simulation::{Observer, RunKey};
 
 use super::CliError;
@@ -74,23 +73,7 @@ fn record_in_car(args: &RecordArgs, actor: Option<&str>) -> Result<ExitCode, Cli
     let truth = ground_truth_path(&args.output);
     let outputs = [("--output", Some(args.output.as_path())), ("--in-car", Some(truth.as_path()))];
     protect(&[of_scenario(&file), args.sim.arm.files()].concat(), &outputs)?;
-    let actors = &file.config().actors;
-    let overtakes = |actor: &&ActorConfig| matches!(actor.driver, DriverConfig::Overtaker(_));
-    let ids = || actors.iter().map(|actor| actor.id.to_string());
-    let chosen = match actor {
-        None => actors.iter().find(overtakes).map(|actor| actor.id.to_string()).ok_or_else(|| CliError::Usage {
-            message: format!(
-                "no actor has an overtaking driver: name an actor with --in-car=ACTOR, one of {}",
-                ids().collect::<Vec<_>>().join(", ")
-            ),
-        }),
-        Some(name) => ids().find(|id| id == name).ok_or_else(|| CliError::Usage {
-            message: format!(
-                "there is no actor `{name}`: --in-car must name one of {}",
-                ids().collect::<Vec<_>>().join(", ")
-            ),
-        }),
-    }?;
+    let chosen = recorded_actor(file.config(), actor).map_err(|message| CliError::Usage { message })?;
     let mut recorder = InCarRecorder::new(&chosen);
     each_sample(args, &file, &mut recorder, InCarRecorder::begin)?;
     let (log, changes) = recorder.finish();

@@ -10,10 +10,10 @@ use closecall_scenarios::criticality::{Counted, Judgement, criticality as evalua
 use closecall_scenarios::filters::smooth;
 use closecall_scenarios::fit::{Heading, fit as fit_distributions, to_toml, write_toml};
 use closecall_scenarios::lane_change::{
-    Criterion, DetectionBasis, LaneChange, LaneChangeDetector, LaneReliability, ReferenceChange, TrackSpans,
+    Criterion, DetectionBasis, LaneChange, LaneChangeDetector, LaneReliability, TrackSpans, listed_for,
     read_references, score,
 };
-use closecall_scenarios::trajectory_data::{Layout, TrajectoryData, open, read_with};
+use closecall_scenarios::trajectory_data::{Layout, open, read_with, refuse_duplicates};
 
 use super::CliError;
 use super::args::{Format, ReadArgs, positive};
@@ -144,7 +144,8 @@ pub(super) fn lane_changes(args: &LaneChangesArgs) -> Result<ExitCode, CliError>
         return Err(CliError::Usage { message });
     }
     let name = tracks.name().to_owned();
-    let references = references.map(|all| of_this_file(all, &name, args)).transpose()?;
+    let references = references.map(|all| listed_for(all, &name)).transpose();
+    let references = references.map_err(|message| CliError::Usage { message })?;
     let lanes = match args.lanes {
         LanesChoice::Recorded => LaneReliability::Reliable,
         LanesChoice::None => LaneReliability::Unreliable,
@@ -184,23 +185,6 @@ pub(super) fn lane_changes(args: &LaneChangesArgs) -> Result<ExitCode, CliError>
     Ok(ExitCode::Pass)
 }
 
-/// Returns the known lane changes of the trajectory data `name`, or an error if there are none: a score of nothing would
-/// look like a result.
-fn of_this_file(
-    all: Vec<ReferenceChange>,
-    name: &str,
-    args: &LaneChangesArgs,
-) -> Result<Vec<ReferenceChange>, CliError> {
-    let listed: Vec<_> = all.into_iter().filter(|listed| listed.recording_id == name).collect();
-    if listed.is_empty() {
-        let path = args.reference.as_deref().unwrap_or(&args.file).display();
-        let message =
-            format!("{path}: no row has the recording_id `{name}`, which is the name of {}", args.file.display());
-        return Err(CliError::Usage { message });
-    }
-    Ok(listed)
-}
-
 pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> {
     protect(&of_trajectories(std::slice::from_ref(&args.file)), &[("--record", args.record.as_deref())])?;
     let data = read_with(&args.file, args.read.options())?;
@@ -225,7 +209,7 @@ pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
     protect(&of_trajectories(&args.files), &[("--output", args.output.as_deref())])?;
     let data_sets =
         args.files.iter().map(|path| read_with(path, args.read.options())).collect::<Result<Vec<_>, _>>()?;
-    refuse_duplicates(&args.files, &data_sets)?;
+    refuse_duplicates(&args.files, &data_sets).map_err(|message| CliError::Usage { message })?;
     let fitted = fit_distributions(&data_sets, args.seed);
     let command = std::iter::once("closecall".to_owned()).chain(std::env::args().skip(1)).collect::<Vec<_>>().join(" ");
     let heading = Heading { command, provenance: args.provenance.clone() };
@@ -246,16 +230,4 @@ pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
         }
     }
     Ok(ExitCode::Pass)
-}
-
-/// Returns an error if two files have the same content: its lane changes would count twice, and every interval would be
-/// too narrow.
-pub(super) fn refuse_duplicates(paths: &[PathBuf], data_sets: &[TrajectoryData]) -> Result<(), CliError> {
-    for (later, data) in data_sets.iter().enumerate() {
-        if let Some(earlier) = data_sets[..later].iter().position(|earlier| earlier.hash == data.hash) {
-            let (one, other) = (paths[earlier].display(), paths[later].display());
-            return Err(CliError::Usage { message: format!("{one} and {other} have the same content") });
-        }
-    }
-    Ok(())
 }

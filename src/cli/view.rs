@@ -1,17 +1,13 @@
 //! `closecall view`: shows recordings in the browser.
 
 use std::path::PathBuf;
-use std::process::{Command, Stdio};
 
 use clap::Args;
-use closecall_report::serve::{Server, WebViewer};
+use closecall_report::serve::{Server, WebViewer, open_in_browser};
 
 use super::CliError;
 use super::output::{outln, print_error};
 use crate::exit_code::ExitCode;
-
-/// Programs that open an address in the browser.
-const OPENERS: [&str; 3] = ["xdg-open", "open", "explorer.exe"];
 
 /// Arguments of `closecall view`.
 #[derive(Debug, Args)]
@@ -35,18 +31,8 @@ pub(super) fn view(args: &ViewArgs) -> Result<ExitCode, CliError> {
     outln!("{}", server.address());
     print_error(format_args!("Ctrl-C ends it\n"));
     if !args.no_open {
-        open(&server.address());
+        open_in_browser(&server.address());
     }
     server.run();
     Ok(ExitCode::Pass)
-}
-
-/// Opens an address in the browser, if there is a program for that.
-fn open(address: &str) {
-    for program in OPENERS {
-        let silent = Command::new(program).arg(address).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
-        if silent.is_ok() {
-            return;
-        }
-    }
 }

@@ -5,14 +5,14 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use closecall_campaign::runner::run_guarded;
 use closecall_report::run::film::{Film, FilmRecorder, Level, film_lane_change};
+use closecall_report::run::observers::RunObservers;
 use closecall_report::run::rerun::{check_recording_possible, write_recording, write_recording_unchecked};
 use closecall_report::run::trace::TraceWriter;
 use closecall_scenarios::criticality::{CriticalLaneChange, by_severity};
 use closecall_scenarios::filters::SmoothedTrajectoryData;
 use closecall_simulation::outcome::Outcome;
 use closecall_simulation::scenario::{Scenario, Setting};
-use closecall_simulation::{Arm, Observer, RunEvent, RunKey, StepView};
-use closecall_traffic::Time;
+use closecall_simulation::{Arm, RunKey};
 
 use super::CliError;
 use super::backend::check_backend_of;
@@ -93,7 +93,7 @@ pub(super) fn run_watched(
         let is_tested = index + 1 == arms.len();
         let mut recorder =
             watch.record.as_ref().map(|_| FilmRecorder::new(scenario, key, arm, watch.record_level.into()));
-        let mut observers = Observers { recorder: recorder.as_mut(), trace: trace.as_mut().filter(|_| is_tested) };
+        let mut observers = RunObservers { recorder: recorder.as_mut(), trace: trace.as_mut().filter(|_| is_tested) };
         let outcome = run_guarded(scenario, key, arm, &mut observers)
             .map_err(|source| CliError::Sample { sample: key.sample, source })?;
         films.extend(recorder.map(|recorder| named(recorder.finish(&outcome), settings)));
@@ -128,7 +128,7 @@ pub(super) fn run_filmed(
     check_backend_of(scenario, std::slice::from_ref(arm))?;
     let mut trace = watch.trace.as_deref().map(TraceWriter::new).transpose()?;
     let mut recorder = FilmRecorder::new(scenario, key, arm, watch.record_level.into());
-    let mut observers = Observers { recorder: Some(&mut recorder), trace: trace.as_mut() };
+    let mut observers = RunObservers { recorder: Some(&mut recorder), trace: trace.as_mut() };
     let outcome = run_guarded(scenario, key, arm, &mut observers)
         .map_err(|source| CliError::Sample { sample: key.sample, source })?;
     if let Some(trace) = trace {
@@ -136,32 +136,6 @@ pub(super) fn run_filmed(
     }
     let film = recorder.finish(&outcome);
     Ok((outcome, film))
-}
-
-/// The observers of a run that the command line requests.
-struct Observers<'a> {
-    recorder: Option<&'a mut FilmRecorder>,
-    trace: Option<&'a mut TraceWriter>,
-}
-
-impl Observer for Observers<'_> {
-    fn step(&mut self, view: &StepView<'_>) {
-        if let Some(recorder) = &mut self.recorder {
-            recorder.step(view);
-        }
-        if let Some(trace) = &mut self.trace {
-            trace.step(view);
-        }
-    }
-
-    fn event(&mut self, time: Time, what: &RunEvent) {
-        if let Some(recorder) = &mut self.recorder {
-            recorder.event(time, what);
-        }
-        if let Some(trace) = &mut self.trace {
-            trace.event(time, what);
-        }
-    }
 }
 
 /// Saves a recording of one lane change of a trajectory file: that of `track`, or the most critical one.

@@ -7,6 +7,7 @@
 //! ```
 
 mod arm_pairs;
+mod comparison;
 mod ensemble;
 mod files;
 pub mod findings;
@@ -18,8 +19,11 @@ pub mod overview;
 mod recordings;
 pub mod samples_xml;
 mod tally;
+mod text;
 pub mod timings;
 
+pub use comparison::{BaselineText, ComparisonText};
 pub use ensemble::{ensemble_json, ensemble_text};
 pub use files::{CampaignReport, ReportError};
 pub use tally::Tally;
+pub use text::{CountsText, VerdictText};

@@ -8,6 +8,7 @@
 
 pub mod figure;
 pub mod film;
+pub mod observers;
 pub mod rerun;
 pub mod text;
 pub mod trace;

@@ -9,9 +9,11 @@
 //!
 //! The server listens on the loopback address only and answers GET and HEAD. Nothing outside the folder is given out.
 
+mod browser;
 mod fetch;
 mod server;
 mod web_viewer;
 
+pub use browser::open_in_browser;
 pub use server::{ServeError, Server};
 pub use web_viewer::{ViewerError, WebViewer};

@@ -6,7 +6,8 @@
 use closecall_scenarios::trajectory_data::{BusFrame, InCarFrame, InCarLog, MarkingDistances, TrueLaneChange};
 use closecall_traffic::{Dimensions, Lane, Road, Side, Time, VehicleClass, VehicleState};
 
-use closecall_simulation::scenario::Scenario;
+use closecall_controllers::DriverConfig;
+use closecall_simulation::scenario::{ActorConfig, Scenario, ScenarioConfig};
 use closecall_simulation::{CONTROL_STEP, Observer, RunEvent, StepView};
 
 /// Time between two runs, which leaves a gap in the log.
@@ -14,6 +15,24 @@ const PAUSE: Time = Time::from_ms(10_000);
 
 /// Lateral speed above which a vehicle counts as changing lanes, or attempting to (m/s).
 const MIN_LATERAL_SPEED_MPS: f64 = 0.01;
+
+/// Returns the id of the actor whose log is recorded: `requested`, or else the first one with an overtaking driver.
+///
+/// # Errors
+/// The ids to choose from, if there is no such actor.
+pub fn recorded_actor(scenario: &ScenarioConfig, requested: Option<&str>) -> Result<String, String> {
+    let actors = &scenario.actors;
+    let all = || actors.iter().map(|actor| actor.id.to_string()).collect::<Vec<_>>().join(", ");
+    let overtakes = |actor: &&ActorConfig| matches!(actor.driver, DriverConfig::Overtaker(_));
+    let found = match requested {
+        None => actors.iter().find(overtakes),
+        Some(name) => actors.iter().find(|actor| actor.id.to_string() == name),
+    };
+    found.map(|actor| actor.id.to_string()).ok_or_else(|| match requested {
+        None => format!("no actor has an overtaking driver: name an actor with --in-car=ACTOR, one of {}", all()),
+        Some(name) => format!("there is no actor `{name}`: --in-car must name one of {}", all()),
+    })
+}
 
 /// Records the log of one vehicle over several runs, one after the other.
 #[derive(Debug)]

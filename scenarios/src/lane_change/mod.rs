@@ -90,4 +90,4 @@ pub use change::LaneChange;
 pub use detect::{Criterion, LaneChangeDetector, LaneReliability, detect};
 pub use manoeuvre::{MIN_PROMINENCE_MPS, MIN_SHIFT_M, quintic_width_share};
 pub use peaks::{Peak, Width, find_peaks, peak_width};
-pub use score::{HitRate, ReferenceChange, ReferenceError, Score, TrackSpans, read_references, score};
+pub use score::{HitRate, ReferenceChange, ReferenceError, Score, TrackSpans, listed_for, read_references, score};

@@ -81,6 +81,18 @@ pub fn read_references(path: &Path) -> Result<Vec<ReferenceChange>, ReferenceErr
     reader.deserialize().collect::<Result<_, _>>().map_err(fail)
 }
 
+/// Returns the lane changes of the trajectory data `name`.
+///
+/// # Errors
+/// If there are none: a score of nothing would look like a result.
+pub fn listed_for(references: Vec<ReferenceChange>, name: &str) -> Result<Vec<ReferenceChange>, String> {
+    let listed: Vec<_> = references.into_iter().filter(|listed| listed.recording_id == name).collect();
+    match listed.is_empty() {
+        true => Err(format!("the list of known lane changes has no row whose recording_id is `{name}`")),
+        false => Ok(listed),
+    }
+}
+
 /// A share, as a number of hits among trials.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct HitRate {

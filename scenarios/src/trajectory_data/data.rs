@@ -1,5 +1,7 @@
 //! The trajectory data of one road: its tracks, its layout and its lane markings.
 
+use std::path::PathBuf;
+
 use closecall_traffic::{Time, Trajectory};
 use serde::Serialize;
 
@@ -84,6 +86,21 @@ pub struct TrajectoryData {
     pub trajectories: Vec<Trajectory>,
     /// BLAKE3 hash of the file content in hexadecimal digits. Empty if the data does not come from a file.
     pub hash: String,
+}
+
+/// Checks that no two of the files at `paths`, which hold `data_sets`, have the same content: their lane changes would count
+/// twice, and every interval would be too narrow.
+///
+/// # Errors
+/// The names of the first two such files.
+pub fn refuse_duplicates(paths: &[PathBuf], data_sets: &[TrajectoryData]) -> Result<(), String> {
+    for (later, data) in data_sets.iter().enumerate() {
+        if let Some(earlier) = data_sets[..later].iter().position(|earlier| earlier.hash == data.hash) {
+            let (one, other) = (paths[earlier].display(), paths[later].display());
+            return Err(format!("{one} and {other} have the same content"));
+        }
+    }
+    Ok(())
 }
 
 impl TrajectoryData {

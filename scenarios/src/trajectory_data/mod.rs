@@ -76,7 +76,7 @@ mod write_in_car;
 mod xml;
 
 pub use builder::PIECE_STRIDE;
-pub use data::{Layout, MarkingDistances, RecordedTrack, TrajectoryData};
+pub use data::{Layout, MarkingDistances, RecordedTrack, TrajectoryData, refuse_duplicates};
 pub use error::{TrajectoryFileError, TrajectoryFileProblem, WriteError};
 pub use markings::{DEFAULT_LANE_WIDTH_M, IgnoredMarking, LANE_WIDTHS_M, LaneMarkings};
 pub use open::{input_files, open, open_from, read, read_from, read_with};

@@ -62,6 +62,15 @@ pub struct LibraryEntry {
     pub gates: Vec<String>,
 }
 
+impl std::fmt::Display for LibraryEntry {
+    /// Writes the name, and below it the question, the requirements and the gates, a line each.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { name, question, parameters, .. } = self;
+        writeln!(f, "{name}\n  {question}\n  requirements: {}; {parameters} parameters", self.requirements.join(", "))?;
+        self.gates.iter().try_for_each(|gate| writeln!(f, "  gate: {gate}"))
+    }
+}
+
 impl LibraryEntry {
     fn new(name: &'static str, text: &str) -> Result<Self, ScenarioError> {
         let file = ScenarioFile::parse(&path(name), text, &[])?;

@@ -1,0 +1,128 @@
+//! The result of a campaign as text for human readers.
+
+use std::fmt;
+
+use closecall_campaign::arm_pairs::{CORRECTION, pair_results};
+use closecall_campaign::harm;
+use closecall_campaign::ledger::{ArmCounts, Inference};
+use closecall_campaign::probability::percent;
+use closecall_campaign::summary::{Counts, Summary};
+use closecall_campaign::verdict::Judgement;
+
+/// Width of the names of the arms in the output, at least.
+const NAME_WIDTH: usize = 5;
+
+/// The counts of each scenario. Scenarios are never pooled into one sample.
+#[derive(Clone, Copy, Debug)]
+pub struct CountsText<'a>(pub &'a Summary);
+
+impl fmt::Display for CountsText<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let summary = self.0;
+        for (name, counts) in &summary.scenarios {
+            writeln!(f, "{name}: {} samples", counts.samples)?;
+            write_scenario(f, summary, counts)?;
+        }
+        if summary.inference == Inference::Sequential {
+            writeln!(
+                f,
+                "Intervals are confidence sequences: they are valid for any rule that determines the number of samples."
+            )?;
+        }
+        writeln!(f, "Rates are conditional on the sampled scenario: they are not the risk on a road.")
+    }
+}
+
+/// The verdict with its reasons.
+#[derive(Clone, Copy, Debug)]
+pub struct VerdictText<'a>(pub &'a Judgement);
+
+impl fmt::Display for VerdictText<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{}", self.0.word())?;
+        self.0.reasons.iter().try_for_each(|reason| writeln!(f, "  {reason}"))
+    }
+}
+
+fn write_scenario(f: &mut fmt::Formatter<'_>, summary: &Summary, counts: &Counts) -> fmt::Result {
+    let width = summary.controllers.iter().map(String::len).fold(NAME_WIDTH, usize::max);
+    for (name, arm) in summary.controllers.iter().zip(&counts.arms) {
+        write_arm(f, &format!("{name:<width$}"), arm, summary.inference)?;
+    }
+    if summary.is_paired() {
+        let pairs = counts.pairs;
+        let [prevented, induced] = [pairs.prevented, pairs.induced];
+        write!(f, "  pairs: {prevented} prevented, {induced} induced, {} both, {} neither", pairs.both, pairs.neither)?;
+        if let Some(p) = pairs.mcnemar_p(summary.inference) {
+            write!(f, "  (exact McNemar p {p:.2e})")?;
+        }
+        writeln!(f)?;
+        let of_others = pairs.induced_of_others + pairs.both_of_others;
+        if of_others > 0 {
+            let tested = summary.controllers.last().map_or("", String::as_str);
+            writeln!(
+                f,
+                "  in {of_others} of the induced and both, only vehicles other than the ego collide with {tested}"
+            )?;
+        }
+        if counts.arms.iter().any(|arm| arm.harm > 0.0) {
+            writeln!(
+                f,
+                "  harm: {:.3} prevented, {:.3} induced ({})",
+                pairs.prevented_harm,
+                pairs.induced_harm,
+                harm::WEIGHT
+            )?;
+        }
+    }
+    if summary.has_references() {
+        write_arm_pairs(f, summary, counts)?;
+    }
+    let checks = &counts.checks;
+    if let Some(rate) = checks.flip_rate() {
+        writeln!(
+            f,
+            "  checked: {} runs, {} flipped at half the time step ({})",
+            checks.runs,
+            checks.flips,
+            percent(rate)
+        )?;
+    }
+    Ok(())
+}
+
+/// Writes all pairs of arms.
+fn write_arm_pairs(f: &mut fmt::Formatter<'_>, summary: &Summary, counts: &Counts) -> fmt::Result {
+    writeln!(
+        f,
+        "  all pairs of arms (95 % intervals of the shares; p: exact McNemar, corrected for the pairs by {CORRECTION}):"
+    )?;
+    for result in pair_results(summary, counts) {
+        let pairs = result.pairs;
+        let interval = |[low, high]: [f64; 2]| format!("{:.1} to {:.1} %", 100.0 * low, 100.0 * high);
+        write!(f, "    {:<28}", format!("{} -> {}:", result.baseline, result.tested))?;
+        write!(f, " {} prevented ({}),", pairs.prevented, interval(result.prevented_95))?;
+        write!(f, " {} induced ({}),", pairs.induced, interval(result.induced_95))?;
+        write!(f, " {} both, {} neither", pairs.both, pairs.neither)?;
+        writeln!(f, "{}", result.corrected_p.map_or_else(String::new, |p| format!(", p {p:.2e}")))?;
+    }
+    Ok(())
+}
+
+fn write_arm(f: &mut fmt::Formatter<'_>, name: &str, arm: &ArmCounts, inference: Inference) -> fmt::Result {
+    let [low, high] = arm.interval_95(inference).map(|bound| 100.0 * bound);
+    let rate = arm.collision_rate().map_or("-".to_owned(), |rate| format!("{:.1} %", 100.0 * rate));
+    write!(f, "  {name} {:>6} collisions  {rate:>7}  (95 %: {low:.1} to {high:.1} %)", arm.collisions)?;
+    if arm.collisions > 0 {
+        write!(f, "  delta-v up to {:.1} m/s", arm.max_delta_v_mps)?;
+    }
+    if arm.engagements > 0 {
+        write!(f, "  {} engaged, goal in reach in {}", arm.engagements, arm.goals_in_reach)?;
+    }
+    write!(f, "  up to {:.1} m/s slower than the lead vehicle", arm.max_speed_deficit_mps)?;
+    if arm.errors > 0 {
+        write!(f, "  {} ERRORS", arm.errors)?;
+    }
+    writeln!(f)?;
+    Ok(())
+}
