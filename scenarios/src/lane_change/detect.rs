@@ -9,7 +9,7 @@ use super::distance::by_distance;
 use super::double::mark_doubles;
 use super::geometry::LaneGrid;
 use super::gradient;
-use super::manoeuvre::{MIN_SHIFT_M, Manoeuvre, Sampled, height_share, manoeuvres, quintic_width_share};
+use super::manoeuvre::{MIN_SHIFT_M, Manoeuvre, Sampled, height_share, manoeuvres, quintic_width_share, sweeps};
 use crate::filters::{PERIOD, SmoothedTrack, SmoothedTrajectoryData, smooth_track, stays_of};
 use crate::trajectory_data::{LaneMarkings, MarkingDistances};
 
@@ -188,27 +188,6 @@ fn by_shift(track: &Trajectory, lane_width_m: f64) -> Vec<LaneChange> {
     }
     found.sort_by(|a, b| a.crossing_s.total_cmp(&b.crossing_s));
     found
-}
-
-/// Joins the manoeuvres in one direction that overlap in time: a slow lane change with a pause has several peaks.
-fn sweeps(mut manoeuvres: Vec<Manoeuvre>) -> Vec<Manoeuvre> {
-    manoeuvres.sort_by(|a, b| {
-        (a.direction == Side::Right).cmp(&(b.direction == Side::Right)).then(a.start.total_cmp(&b.start))
-    });
-    let mut joined: Vec<Manoeuvre> = Vec::with_capacity(manoeuvres.len());
-    for next in manoeuvres {
-        match joined.last_mut() {
-            Some(sweep) if sweep.direction == next.direction && next.start < sweep.end => {
-                // The slow ends of the first and the last peak stay as they are.
-                let ends = 0.5 * ((sweep.end - sweep.start - sweep.width) + (next.end - next.start - next.width));
-                sweep.end = sweep.end.max(next.end);
-                sweep.width = sweep.end - sweep.start - ends;
-                sweep.peak_mps = sweep.peak_mps.max(next.peak_mps);
-            }
-            _ => joined.push(next),
-        }
-    }
-    joined
 }
 
 /// Returns the adjacent lane in `direction`. Lane 1 has none to its left; the result is then lane 1 itself.

@@ -66,6 +66,27 @@ fn manoeuvres_to(track: &Trajectory, direction: Side, height_share: f64) -> Vec<
     peaks.into_iter().filter(|peak| peak.height > 0.0).map(manoeuvre).collect()
 }
 
+/// Joins the manoeuvres in one direction that overlap in time: a slow lane change with a pause has several peaks.
+pub(super) fn sweeps(mut manoeuvres: Vec<Manoeuvre>) -> Vec<Manoeuvre> {
+    manoeuvres.sort_by(|a, b| {
+        (a.direction == Side::Right).cmp(&(b.direction == Side::Right)).then(a.start.total_cmp(&b.start))
+    });
+    let mut joined: Vec<Manoeuvre> = Vec::with_capacity(manoeuvres.len());
+    for next in manoeuvres {
+        match joined.last_mut() {
+            Some(sweep) if sweep.direction == next.direction && next.start < sweep.end => {
+                // The slow ends of the first and the last peak stay as they are.
+                let ends = 0.5 * ((sweep.end - sweep.start - sweep.width) + (next.end - next.start - next.width));
+                sweep.end = sweep.end.max(next.end);
+                sweep.width = sweep.end - sweep.start - ends;
+                sweep.peak_mps = sweep.peak_mps.max(next.peak_mps);
+            }
+            _ => joined.push(next),
+        }
+    }
+    joined
+}
+
 /// Returns +1 to the left, where lateral positions increase, and −1 to the right.
 pub(super) const fn sign(direction: Side) -> f64 {
     match direction {

@@ -1,13 +1,12 @@
 //! The state machine of the margin increase system.
 
 use closecall_traffic::metrics::CRITICAL_THW_S;
-use closecall_traffic::{Absent, Time, TrackId};
+use closecall_traffic::{Absent, Time};
 
 use super::room::has_room;
+use super::target::Target;
 use super::{ArrivalPrediction, BrakingResponse, Encounter, MisPlan, MisSettings};
-use crate::ego::surroundings::{
-    Front, PassingLane, RearVehicle, nearest_rear_vehicle, passing_lane, rear_vehicle_from,
-};
+use crate::ego::surroundings::{Front, PassingLane, RearVehicle, nearest_rear_vehicle, passing_lane};
 use crate::ego::{EgoInput, EgoState, Reason};
 
 /// Multiple of the engaging gap beyond which the rear vehicle has fallen back: an assumption; 1.1 to 1.5 are plausible.
@@ -27,13 +26,6 @@ const FOLLOWING_DELAY: Time = Time::from_ms(1_000);
 /// Time for which a lost track, or a passing lane that is no longer known to be free, is tolerated: an assumption;
 /// 0.2 to 1 s are plausible.
 const LOSS_TIMEOUT: Time = Time::from_ms(500);
-
-/// Largest distance between a new track and the expected position of the lost one to be taken for it (m): an
-/// assumption; 3 to 8 are plausible.
-const REASSOCIATION_DISTANCE_M: f64 = 5.0;
-
-/// Largest difference of their speeds (m/s): an assumption; 2 to 5 are plausible.
-const REASSOCIATION_SPEED_MPS: f64 = 3.0;
 
 /// Speed below which the time headway of the ego is meaningless (m/s).
 const MIN_THW_SPEED_MPS: f64 = 1.0;
@@ -74,20 +66,6 @@ pub(crate) struct Decision {
     pub(crate) plan: Option<MisPlan>,
 }
 
-/// The rear vehicle that the system has engaged for.
-#[derive(Clone, Copy, Debug)]
-struct Target {
-    rear: RearVehicle,
-    /// Target front time headway (s).
-    goal_thw_s: f64,
-    last_seen: Time,
-    /// The last time at which it approached fast enough not to count as following.
-    last_approached: Time,
-    last_lane_free: Time,
-    /// Whether emergency braking has acted since the system engaged.
-    has_braked_hard: bool,
-}
-
 #[derive(Clone, Copy, Debug)]
 enum State {
     Following,
@@ -121,7 +99,7 @@ pub(crate) struct Situation<'a> {
 }
 
 impl Situation<'_> {
-    fn speed_mps(&self) -> f64 {
+    pub(super) fn speed_mps(&self) -> f64 {
         self.input.odometry.speed_mps
     }
 
@@ -372,44 +350,5 @@ impl Mis {
                 && predicted_thw.is_some_and(|thw_s| thw_s >= target.goal_thw_s - GOAL_TOLERANCE_S),
         };
         (plan, braking)
-    }
-}
-
-impl Target {
-    /// Returns true if the ego may slow down for the margin.
-    ///
-    /// Emergency braking is the hazard that the margin was meant for: the rear vehicle has lost the distance that the ego
-    /// needed, its driver brakes or evades, and the plan's assumption that it drives on as before no longer holds. From then
-    /// on the ego slows down in front of it only while the gap ahead closes. While it does not, the margin does not shrink,
-    /// and every further m/s is taken from the driver behind for nothing.
-    fn may_cost_speed(&self, lead: &Front, ego_mps: f64) -> bool {
-        !self.has_braked_hard || lead.speed_mps < ego_mps
-    }
-
-    /// Updates the vehicle from its track, or extrapolates it if it has none.
-    fn update(&mut self, situation: &Situation<'_>, step_s: f64) {
-        self.has_braked_hard |= situation.emergency_braking;
-        let own_mps = situation.speed_mps();
-        let expected_m = self.rear.x_m + (self.rear.speed_mps - own_mps) * step_s;
-        let by_id = |id: TrackId| situation.input.tracks.iter().find(|track| track.id == id);
-        let found = by_id(self.rear.track).or_else(|| {
-            situation.input.tracks.iter().find(|track| {
-                (track.x_m() - expected_m).abs() < REASSOCIATION_DISTANCE_M
-                    && (track.vx_mps() - self.rear.speed_mps).abs() < REASSOCIATION_SPEED_MPS
-                    && rear_vehicle_from(track, situation.input).passing_lane
-                        + rear_vehicle_from(track, situation.input).own_lane
-                        >= 0.5
-            })
-        });
-        match found {
-            Some(track) => {
-                self.rear = rear_vehicle_from(track, situation.input);
-                self.last_seen = situation.input.time;
-            }
-            None => {
-                self.rear.gap_m -= expected_m - self.rear.x_m;
-                self.rear.x_m = expected_m;
-            }
-        }
     }
 }

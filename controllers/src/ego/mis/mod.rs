@@ -141,6 +141,7 @@ mod prediction;
 mod response;
 mod room;
 mod solver;
+mod target;
 #[cfg(test)]
 mod tests;
 
