@@ -8,6 +8,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::arm_pairs::ArmPair;
 use crate::ledger::Inference;
 use crate::summary::{Counts, Summary};
 
@@ -54,16 +55,17 @@ impl Quantity {
     }
 
     /// Returns the value of one entry and, of a share, its 95 % interval; `None` if it is not defined.
-    fn of(self, counts: &Counts, inference: Inference) -> Option<(f64, Option<[f64; 2]>)> {
+    fn of(self, counts: &Counts, inference: Inference, tested: usize) -> Option<(f64, Option<[f64; 2]>)> {
         let share =
             |hits: u64, of: u64| (of > 0).then(|| (hits as f64 / of as f64, Some(inference.interval_95(hits, of))));
-        let pairs = &counts.pairs;
+        let with_baseline = |pair: &&ArmPair| (pair.baseline, pair.tested) == (0, tested);
+        let pairs = counts.arm_pairs.iter().find(with_baseline).map_or(&counts.pairs, |pair| &pair.pairs);
         let all = pairs.prevented + pairs.induced + pairs.both + pairs.neither;
         match self {
             Self::Prevented => share(pairs.prevented, pairs.prevented + pairs.both),
             Self::Induced => share(pairs.induced, all),
             Self::HarmChange => (all > 0).then(|| ((pairs.induced_harm - pairs.prevented_harm) / all as f64, None)),
-            Self::Collisions => counts.arms.last().and_then(|arm| share(arm.collisions, arm.outcomes)),
+            Self::Collisions => counts.arms.get(tested).and_then(|arm| share(arm.collisions, arm.outcomes)),
         }
     }
 
@@ -93,6 +95,8 @@ pub struct Spread {
     pub median: MemberValue,
     /// The least favourable member.
     pub worst: MemberValue,
+    /// The values of all members, the most favourable first.
+    pub values: Vec<MemberValue>,
     /// Members for which the quantity is not defined: nothing collides without the system, say.
     pub undefined: Vec<String>,
 }
@@ -110,9 +114,14 @@ pub struct EnsembleVerdict {
     pub spreads: Vec<Spread>,
 }
 
-/// Returns the verdict over the ensemble for each scenario of which entries SCENARIO@MEMBER were run. `without_effect`
-/// names pairs of scenario and member that were not run because the member changes nothing.
+/// Returns the verdict over the ensemble for each scenario of which entries SCENARIO@MEMBER were run, of the arm under test.
+/// `without_effect` names pairs of scenario and member that were not run because the member changes nothing.
 pub fn verdicts(summary: &Summary, without_effect: &[(String, String)]) -> Vec<EnsembleVerdict> {
+    verdicts_of_arm(summary, without_effect, summary.controllers.len().saturating_sub(1))
+}
+
+/// Works like [`verdicts`], for the arm with the index `tested` instead of the last one.
+pub fn verdicts_of_arm(summary: &Summary, without_effect: &[(String, String)], tested: usize) -> Vec<EnsembleVerdict> {
     let mut scenarios: BTreeMap<&str, Vec<(&str, &Counts)>> = BTreeMap::new();
     for (name, counts) in &summary.scenarios {
         if let Some((scenario, member)) = name.split_once(SEPARATOR) {
@@ -131,17 +140,20 @@ pub fn verdicts(summary: &Summary, without_effect: &[(String, String)]) -> Vec<E
             .filter(|(of, _)| of == scenario)
             .map(|(_, member)| member.clone())
             .collect(),
-        spreads: quantities.iter().filter_map(|quantity| spread(*quantity, &entries, summary.inference)).collect(),
+        spreads: quantities
+            .iter()
+            .filter_map(|quantity| spread(*quantity, &entries, summary.inference, tested))
+            .collect(),
     };
     scenarios.into_iter().map(verdict).collect()
 }
 
 /// Returns median and worst member, or `None` if the quantity is defined for no member.
-fn spread(quantity: Quantity, entries: &[(&str, &Counts)], inference: Inference) -> Option<Spread> {
+fn spread(quantity: Quantity, entries: &[(&str, &Counts)], inference: Inference, tested: usize) -> Option<Spread> {
     let mut undefined = Vec::new();
     let mut values = Vec::new();
     for (member, counts) in entries {
-        match quantity.of(counts, inference) {
+        match quantity.of(counts, inference, tested) {
             Some((value, interval_95)) => {
                 values.push(MemberValue { member: (*member).to_owned(), value, interval_95 });
             }
@@ -152,8 +164,8 @@ fn spread(quantity: Quantity, entries: &[(&str, &Counts)], inference: Inference)
         quantity.badness(a.value).total_cmp(&quantity.badness(b.value)).then_with(|| a.member.cmp(&b.member))
     });
     let median = values.get(values.len() / 2)?.clone();
-    let worst = values.pop()?;
-    Some(Spread { quantity, median, worst, undefined })
+    let worst = values.last()?.clone();
+    Some(Spread { quantity, median, worst, values, undefined })
 }
 
 #[cfg(test)]

@@ -1,11 +1,11 @@
 //! Writes the tables of `docs/mis.md`: what the margin increase systems and a longer gap change in every scenario of the library.
 //!
 //! ```sh
-//! cargo run --release --example write_mis -- -n 2000 --seed 1001
+//! cargo run --release --example write_mis -- -n 2000 --member-samples 400 --seed 1001
 //! ```
 //!
-//! The tables stand between two markers, and everything else on the page stays as it is. Each scenario runs once for each
-//! member of the list in `tables`, on the same samples in every arm.
+//! The tables stand between two markers, and everything else on the page stays as it is. Each scenario runs with its own
+//! drivers and with each member of the driver ensemble, on the same samples in every arm.
 
 mod tables;
 
@@ -14,7 +14,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use clap::Parser;
-use tables::{Study, members, page_with};
+use tables::{Study, page_with};
 
 /// The page, below the folder of the repository.
 const PAGE: &str = "docs/mis.md";
@@ -25,6 +25,9 @@ struct Args {
     /// Number of samples of each scenario
     #[arg(short = 'n', long, default_value_t = 2000, value_parser = clap::value_parser!(u64).range(1..))]
     samples: u64,
+    /// Number of samples of each scenario with each member of the driver ensemble
+    #[arg(long, default_value_t = 400, value_parser = clap::value_parser!(u64).range(1..))]
+    member_samples: u64,
     /// Seed of the random numbers
     #[arg(long, default_value_t = 1001)]
     seed: u64,
@@ -34,7 +37,7 @@ struct Args {
 fn main() -> Result<(), Box<dyn Error>> {
     let args = Args::parse();
     let started = Instant::now();
-    let tables = Study { samples: args.samples, seed: args.seed }.tables(&members())?;
+    let tables = Study { samples: args.samples, member_samples: args.member_samples, seed: args.seed }.tables()?;
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(PAGE);
     std::fs::write(&path, page_with(&std::fs::read_to_string(&path)?, &tables)?)?;
     println!("written: {PAGE}, after {:.0} s", started.elapsed().as_secs_f64());
