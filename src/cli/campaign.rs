@@ -154,11 +154,14 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
         Format::Human => {
             out!("{}", CountsText(&tally.summary));
             let (simulated_s, jobs) = (tally.summary.total().simulated_s, campaign.workers.jobs);
-            outln!("{simulated_s:.0} simulated seconds in {wall_s:.1} s on {jobs} threads");
             let [run_s, check_s] = progress.spent_s;
-            if check_s > 0.0 {
-                outln!("{:.0} % of the threads' time went into validity checks", 100.0 * check_s / (run_s + check_s));
-            }
+            let share = 100.0 * check_s / (run_s + check_s);
+            let checks = if check_s > 0.0 {
+                format!(" ({share:.0} % of their time for validity checks)")
+            } else {
+                String::new()
+            };
+            outln!("{simulated_s:.0} simulated seconds in {wall_s:.1} s on {jobs} threads{checks}");
             out!("{}", ensemble_text(&tally.summary, &manifest));
             out!("{}", VerdictText(&judged));
         }

@@ -145,6 +145,9 @@ fn properties<W: Write>(xml: &mut Writer<W>, findings: &Findings<'_>, suite: &st
             properties.extend(arm_pair_properties(findings, counts));
         }
     }
+    if suite == CAMPAIGN_SUITE {
+        properties.extend(findings.judged.reasons.iter().map(|reason| ("reason".to_owned(), reason.to_string())));
+    }
     xml.write_event(Event::Start(BytesStart::new("properties")))?;
     for (name, value) in properties {
         let property = xml.create_element("property").with_attribute(("name", name.as_str()));

@@ -284,7 +284,7 @@ mod tests {
         // A vehicle ahead in the target lane brakes hard, so that the headway falls with time.
         let mut lead = straight_track(2, 60.0, 30.0, -1.75, 110);
         for (k, point) in lead.points.iter_mut().enumerate() {
-            point.s_m -= 0.02 * (k * k) as f64;
+            point.s_m -= 0.004 * (k * k) as f64;
         }
         let own = changing_track(1, (0.0, 30.0), (-5.25, -1.75), (3.0, 5.0), 110);
         let data = smooth(&trajectory_data_of(vec![own, lead]));
@@ -295,7 +295,7 @@ mod tests {
         let early = LaneChange { end_s: whole.crossing_s - 1.0, ..whole.clone() };
         let until_crossing = LaneChange { end_s: whole.crossing_s, ..whole.clone() };
         assert_eq!(thw_s(&early), thw_s(&until_crossing));
-        assert!(thw_s(&early) > thw_s(&whole));
+        assert!(thw_s(&early) > thw_s(&whole), "{} {}", thw_s(&early), thw_s(&whole));
     }
 
     #[test]

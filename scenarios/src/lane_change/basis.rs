@@ -135,6 +135,6 @@ mod tests {
         let track = changing_track(1, (0.0, 30.0), (-5.25, -1.75), (3.0, 5.0), 110);
         let basis = basis(Criterion::Distance, LaneReliability::Reliable, vec![track]);
         assert_eq!(basis.warnings(), [""; 0]);
-        assert!(basis.to_string().starts_with("lanes: 2 recorded, 3.5"), "{basis}");
+        assert!(basis.to_string().starts_with("lanes: 2 recorded, 3.43 m wide, 1 markings known"), "{basis}");
     }
 }

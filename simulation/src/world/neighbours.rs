@@ -103,9 +103,9 @@ pub(super) fn keep_beyond(
 }
 
 pub(super) fn keep_nearest(slot: &mut Option<Neighbour>, candidate: Neighbour) {
-    // Two vehicles at the same gap have different lateral positions, unless they overlap. The result therefore does not
-    // depend on the order of the list of actors.
-    let order = |neighbour: &Neighbour| (neighbour.gap_m, neighbour.lateral_offset_m);
+    // Two vehicles at the same gap have different lateral positions, unless they overlap. The result therefore depends on the
+    // list of actors only if they do.
+    let order = |neighbour: &Neighbour| (neighbour.gap_m, neighbour.lateral_offset_m, neighbour.actor);
     if slot.is_none_or(|known| order(&candidate) < order(&known)) {
         *slot = Some(candidate);
     }

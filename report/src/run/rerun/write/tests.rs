@@ -94,8 +94,11 @@ fn texts(chunk: &Chunk, component: &str) -> Vec<String> {
 fn empty_views(films: &[Film]) -> (usize, Vec<String>, Vec<String>) {
     let data = chunks(films, StoreKind::Recording);
     let entities: BTreeSet<String> = data.iter().map(|chunk| chunk.entity_path().to_string()).collect();
-    let has =
-        |prefix: &str| entities.iter().any(|entity| entity == prefix || entity.starts_with(&format!("{prefix}/")));
+    let has = |path: &str| {
+        // An origin may lack the slash at its start.
+        let path = format!("/{}", path.trim_start_matches('/'));
+        entities.iter().any(|entity| *entity == path || entity.starts_with(&format!("{path}/")))
+    };
     let (mut views, mut empty, mut timelines) = (0, Vec::new(), Vec::new());
     for chunk in chunks(films, StoreKind::Blueprint) {
         let origins = texts(&chunk, "ViewBlueprint:space_origin");
