@@ -59,7 +59,10 @@ impl Quantity {
         let share =
             |hits: u64, of: u64| (of > 0).then(|| (hits as f64 / of as f64, Some(inference.interval_95(hits, of))));
         let with_baseline = |pair: &&ArmPair| (pair.baseline, pair.tested) == (0, tested);
-        let pairs = counts.arm_pairs.iter().find(with_baseline).map_or(&counts.pairs, |pair| &pair.pairs);
+        let pairs = match counts.arm_pairs.iter().find(with_baseline) {
+            Some(pair) if tested + 1 < counts.arms.len() => &pair.pairs,
+            _ => &counts.pairs,
+        };
         let all = pairs.prevented + pairs.induced + pairs.both + pairs.neither;
         match self {
             Self::Prevented => share(pairs.prevented, pairs.prevented + pairs.both),

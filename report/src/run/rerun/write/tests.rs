@@ -158,7 +158,9 @@ fn recorded_and_simulated_traffic_share_timelines_and_are_ghosts_of_each_other()
     let halves = [chunks_under("/recorded/"), chunks_under("/mis/")];
     for timeline in [TIME_TIMELINE, STEP_TIMELINE] {
         let [recorded, simulated] = [&halves[0], &halves[1]].map(|half| latest_ns(half, timeline));
-        assert_eq!(recorded, simulated, "{timeline}");
+        // The last state stays for one period; the recording may end a period earlier than the run.
+        let period = if timeline == STEP_TIMELINE { 1 } else { films[1].period.ns() };
+        assert!((recorded - simulated).abs() <= period, "{timeline}: {recorded} {simulated}");
     }
     assert!(halves.iter().all(|half| latest_ns(half, OPENING_TIMELINE) > 0));
     for entity in ["/recorded/world/ghosts/ego", "/mis/world/ghosts/rear", "/recorded/bird/ghosts", "/mis/bird/ghosts"]
