@@ -21,6 +21,7 @@ pub fn quality(tracks: &Tracks<'_>, inspector: &QualityInspector) -> Value {
         "last_s": span.map(|(_, last)| last.s()),
         "lane_width_m": tracks.markings().typical_lane_width_m(),
         "ignored_markings": tracks.markings().ignored(),
+        "unknown_classes": tracks.unknown_classes(),
         "flaws": inspector.flaws(),
         "overlaps_unchecked_instants": inspector.unchecked_points(),
         "dropped": tracks.dropped(),
