@@ -166,7 +166,7 @@ fn print(format: Format, found: &RecordedEncounter, reenactment: &Reenactment<'_
             }
             let simulated = &films[1];
             outln!("{}: {}", simulated.arm(), simulated.headline());
-            if let Some(verdict) = simulated.mis_summary() {
+            for verdict in simulated.mis_summary().into_iter().chain(comparison.never_crosses()) {
                 outln!("{}: {verdict}", simulated.arm());
             }
         }

@@ -164,7 +164,7 @@ pub(super) fn lane_changes(args: &LaneChangesArgs) -> Result<ExitCode, CliError>
     }
     changes.sort_by(|a: &LaneChange, b| a.track_id.cmp(&b.track_id).then(a.crossing_s.total_cmp(&b.crossing_s)));
     let scored = references.map(|listed| score(&changes, &listed.iter().collect::<Vec<_>>(), &spans));
-    for warning in basis.warnings() {
+    for warning in basis.warnings().into_iter().chain(tracks.unknown_classes().iter().map(ToString::to_string)) {
         print_error(format_args!("warning: {}: {warning}\n", args.file.display()));
     }
     match (args.format, scored) {
@@ -188,8 +188,8 @@ pub(super) fn lane_changes(args: &LaneChangesArgs) -> Result<ExitCode, CliError>
 pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> {
     protect(&of_trajectories(std::slice::from_ref(&args.file)), &[("--record", args.record.as_deref())])?;
     let data = read_with(&args.file, args.read.options())?;
-    for ignored in data.markings.ignored() {
-        print_error(format_args!("warning: {}: {ignored}\n", args.file.display()));
+    for warning in data.warnings() {
+        print_error(format_args!("warning: {}: {warning}\n", args.file.display()));
     }
     let smoothed = smooth(&data);
     let judgement = Judgement { speed_limit_mps: args.speed_limit_mps, ttce_alone: args.ttce_alone };

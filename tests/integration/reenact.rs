@@ -59,7 +59,8 @@ fn with_all_vehicles_as_recorded_the_run_reproduces_the_trajectory_data() {
     let found = reenacted(&own, &["--track", "3", "--controller", "acc", "--rear", "recorded", "-o", path]);
     for key in ["crossing_s", "thw_rear_at_crossing_s", "min_thw_rear_s", "thw_front_at_crossing_s"] {
         let [recorded, simulated] = ["recorded", "simulated"].map(|half| number(&found, half, key));
-        assert!((recorded - simulated).abs() < 0.2, "{key}: {recorded} and {simulated}");
+        let within = if key == "crossing_s" { 0.05 } else { 0.2 };
+        assert!((recorded - simulated).abs() < within, "{key}: {recorded} and {simulated}");
     }
     // The checks of the simulator mirror a scenario, lane changes at given times included.
     assert!(fs::read_to_string(&toml).unwrap().contains("lane-changes"));

@@ -21,6 +21,7 @@ pub fn quality(tracks: &Tracks<'_>, inspector: &QualityInspector) -> Value {
         "last_s": span.map(|(_, last)| last.s()),
         "lane_width_m": tracks.markings().typical_lane_width_m(),
         "ignored_markings": tracks.markings().ignored(),
+        "unknown_classes": tracks.unknown_classes(),
         "flaws": inspector.flaws(),
         "overlaps_unchecked_instants": inspector.unchecked_points(),
         "dropped": tracks.dropped(),
@@ -33,7 +34,13 @@ pub fn robustness(found: &Robustness) -> Value {
     let fails = found.criteria.iter().enumerate();
     let fails =
         fails.map(|(column, criterion)| (criterion.name().to_owned(), found.failing_noise_m_per_sqrt_s(column).into()));
+    let by_draw = found.criteria.iter().enumerate();
+    let by_draw = by_draw
+        .map(|(column, criterion)| (criterion.name().to_owned(), found.failing_noise_by_repetition(column).into()));
     let mut value = json!(found);
+    value["noise_draws"] = value["noise"].take();
+    value["noise"] = json!(found.mean_noise());
+    value["fails_from_noise_by_draw"] = Value::Object(by_draw.collect());
     value["fails_from_noise_m_per_sqrt_s"] = Value::Object(fails.collect());
     value
 }

@@ -41,6 +41,9 @@ impl fmt::Display for QualityText<'_> {
         for ignored in markings.ignored() {
             writeln!(f, "  warning: {ignored}")?;
         }
+        for unknown in tracks.unknown_classes() {
+            writeln!(f, "  warning: {unknown}")?;
+        }
         if inspector.unchecked_points() > 0 {
             writeln!(
                 f,

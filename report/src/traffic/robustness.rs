@@ -2,7 +2,6 @@
 
 use std::fmt;
 
-use closecall_scenarios::lane_change::Criterion;
 use closecall_scenarios::robustness::{CriterionCounts, ReferenceKind, Robustness, Setup};
 
 use super::trajectory_charts::{ChartError, Legend, Line, LineChart};
@@ -23,22 +22,24 @@ impl fmt::Display for RobustnessText<'_> {
         };
         let Setup { repetitions, seed, .. } = found.setup;
         writeln!(f, "{} lane changes, by {reference}; each criterion without noise and offset:", found.reference)?;
-        for (criterion, known) in found.criteria.iter().zip(&found.undisturbed) {
-            writeln!(f, "  {:<9} finds {known}", criterion.name())?;
+        for ((criterion, known), confirmed) in found.criteria.iter().zip(&found.undisturbed).zip(&found.confirmed) {
+            writeln!(f, "  {:<9} finds {known}; {confirmed} of them are among these", criterion.name())?;
         }
-        writeln!(f, "\nfound again / all found / false ones; noise: mean of {repetitions} draws, seed {seed}")?;
-        let names: Vec<String> = found.criteria.iter().map(|criterion| format!("{:<26}", criterion.name())).collect();
+        writeln!(f, "\nfound again / false ones, compared with the criterion without noise and offset")?;
+        writeln!(f, "noise: mean [least, most] of {repetitions} draws, seed {seed}")?;
+        let names: Vec<String> = found.criteria.iter().map(|criterion| format!("{:<40}", criterion.name())).collect();
         writeln!(f, "\nBrownian noise  {}", names.concat())?;
-        for (level, cells) in found.setup.noise_m_per_sqrt_s.iter().zip(&found.noise) {
-            writeln!(f, "{level:>8.2} m/√s   {}", row(found, cells))?;
+        let means = found.mean_noise();
+        for ((level, cells), draws) in found.setup.noise_m_per_sqrt_s.iter().zip(&means).zip(&found.noise) {
+            writeln!(f, "{level:>8.2} m/√s   {}", row(found, cells, draws))?;
         }
         writeln!(f, "\nlateral offset  {}", names.concat())?;
         for (level, cells) in found.setup.offset_m.iter().zip(&found.offset) {
-            writeln!(f, "{level:>8.2} m      {}", row(found, cells))?;
+            writeln!(f, "{level:>8.2} m      {}", row(found, cells, &[]))?;
         }
         writeln!(
             f,
-            "\n!: the criterion loses more than 5 % of what it finds without noise and offset, or more than 5 % are false"
+            "\n!: the criterion loses more than 5 % of what it finds without noise and offset, or as many are false"
         )?;
         for line in failures(found) {
             writeln!(f, "{line}")?;
@@ -47,26 +48,47 @@ impl fmt::Display for RobustnessText<'_> {
     }
 }
 
-fn row(found: &Robustness, cells: &[CriterionCounts]) -> String {
-    let cell = |(criterion, cell): (usize, &CriterionCounts)| {
-        let mark = if found.fails(criterion, cell) { "!" } else { " " };
-        format!("{:<26}", format!("{:>6.1} /{:>6.1} /{:>5.1} {mark}", cell.again, cell.found, cell.invented))
+/// Returns the counts of each criterion, with their range over the draws of the noise if there are several.
+fn row(found: &Robustness, cells: &[CriterionCounts], draws: &[Vec<CriterionCounts>]) -> String {
+    let count = |criterion: usize, value: fn(&CriterionCounts) -> f64| {
+        let mean = value(&cells[criterion]);
+        if draws.len() < 2 {
+            return format!("{mean:>6.1}");
+        }
+        let values = || draws.iter().map(|cells| value(&cells[criterion]));
+        let (least, most) = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
+        format!("{mean:>6.1} [{least}, {most}]")
     };
-    cells.iter().enumerate().map(cell).collect()
+    let cell = |criterion: usize| {
+        let mark = if found.fails(criterion, &cells[criterion]) { "!" } else { " " };
+        let (again, invented) = (count(criterion, |cell| cell.again), count(criterion, |cell| cell.invented));
+        format!("{:<40}", format!("{again} /{invented} {mark}"))
+    };
+    (0..cells.len()).map(cell).collect()
 }
 
 /// Returns one line per criterion with the lowest level of noise at which it fails, sorted by that level.
 fn failures(found: &Robustness) -> Vec<String> {
-    let mut from: Vec<(Option<f64>, Criterion)> = (0..)
-        .zip(&found.criteria)
-        .map(|(column, criterion)| (found.failing_noise_m_per_sqrt_s(column), *criterion))
-        .collect();
-    from.sort_by(|a, b| a.0.unwrap_or(f64::INFINITY).total_cmp(&b.0.unwrap_or(f64::INFINITY)));
-    let line = |(level, criterion): &(Option<f64>, Criterion)| match level {
-        Some(level) => format!("{} first fails at a noise of {level} m/√s", criterion.name()),
-        None => format!("{} fails at no level of noise", criterion.name()),
+    let or_never = |level: Option<f64>| level.unwrap_or(f64::INFINITY);
+    let mut columns: Vec<(usize, Option<f64>)> =
+        (0..found.criteria.len()).map(|column| (column, found.failing_noise_m_per_sqrt_s(column))).collect();
+    columns.sort_by(|a, b| or_never(a.1).total_cmp(&or_never(b.1)));
+    let line = |(column, first): (usize, Option<f64>)| {
+        let name = found.criteria[column].name();
+        if found.undisturbed[column] == 0 {
+            return format!("{name} is not judged: it finds nothing even without noise");
+        }
+        let draws: Vec<f64> = found.failing_noise_by_repetition(column).into_iter().map(or_never).collect();
+        let shown = |level: f64| if level.is_finite() { format!("{level} m/√s") } else { "no level".to_owned() };
+        let (least, most) =
+            (draws.iter().copied().fold(f64::INFINITY, f64::min), draws.into_iter().fold(0.0, f64::max));
+        let single = format!("single draws: {} to {}", shown(least), shown(most));
+        match first {
+            Some(level) => format!("{name} first fails at a noise of {level} m/√s ({single})"),
+            None => format!("{name} fails at no level of noise ({single})"),
+        }
     };
-    from.iter().map(line).collect()
+    columns.into_iter().map(line).collect()
 }
 
 /// Draws the lane changes that each criterion finds, over the levels of noise and of offset. The charts (SVG) are in the
@@ -76,7 +98,8 @@ fn failures(found: &Robustness) -> Vec<String> {
 /// [`ChartError`] if a chart cannot be drawn.
 pub fn robustness_charts(found: &Robustness) -> Result<[String; 2], ChartError> {
     let levels = &found.setup;
-    let noise = Axis { name: "Brownian noise [m/√s]", levels: &levels.noise_m_per_sqrt_s, rows: &found.noise };
+    let means = found.mean_noise();
+    let noise = Axis { name: "Brownian noise [m/√s]", levels: &levels.noise_m_per_sqrt_s, rows: &means };
     let offset = Axis { name: "Lateral offset [m]", levels: &levels.offset_m, rows: &found.offset };
     let draw = |legend, axis| LineChart { legend, ..chart(found, &axis) }.svg();
     Ok([draw(Legend::LowerLeft, noise)?, draw(Legend::LowerMiddle, offset)?])

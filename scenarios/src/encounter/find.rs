@@ -103,12 +103,17 @@ impl<'a> Roles<'a> {
         let crossing = Time::from_s(change.crossing_s);
         let recorded_to = [self.ego, self.lead, self.rear].iter().filter_map(|track| Some(track.span()?.1)).min();
         let until = recorded_to.map_or(start, |last| last.min(crossing));
+        let (track_id, ego_id, front_id) = (self.rear.track_id, self.ego.track_id, self.lead.track_id);
         // The crossing may lie between two instants of the clock, up to one period after the last recorded one.
-        if until < start + SHORTEST_APPROACH || until + PERIOD < crossing {
+        if until + PERIOD < crossing {
+            let missing_s = (crossing - until).s();
+            return Err(NoEncounter::EndsBeforeCrossing { track_id, ego_id, front_id, missing_s });
+        }
+        if until < start + SHORTEST_APPROACH {
             return Err(NoEncounter::TooShort {
-                track_id: self.rear.track_id,
-                ego_id: self.ego.track_id,
-                front_id: self.lead.track_id,
+                track_id,
+                ego_id,
+                front_id,
                 recorded_s: (until - start).s(),
                 needed_s: SHORTEST_APPROACH.s(),
             });
@@ -150,9 +155,10 @@ fn participants(
     period: Time,
 ) -> Option<Vec<Participant>> {
     let participant = |track: &Trajectory| {
+        // The crossing is the first instant in the new lane: a vehicle that crosses at the start is already there.
         let within = |change: &&LaneChange| {
             let crossing = Time::from_s(change.crossing_s);
-            change.track_id == track.track_id && crossing >= frame.start && crossing <= frame.end
+            change.track_id == track.track_id && crossing > frame.start && crossing <= frame.end
         };
         let trajectory = frame.view(track, period)?;
         Some(Participant { trajectory, changes: all.iter().filter(within).cloned().collect() })

@@ -118,6 +118,21 @@ pub enum NoEncounter {
         /// Least time that is required (s).
         needed_s: f64,
     },
+    /// The track of one of the three vehicles ends before the crossing.
+    #[error(
+        "track {track_id} crosses the marking {missing_s:.1} s after the end of its own track, or of track {ego_id} or \
+         {front_id} ahead of it: all three have to be recorded until then"
+    )]
+    EndsBeforeCrossing {
+        /// Track id of the rear vehicle.
+        track_id: u64,
+        /// Track id of the ego vehicle.
+        ego_id: u64,
+        /// Track id of the lead vehicle.
+        front_id: u64,
+        /// Time from the end of the first of the three tracks to the crossing (s).
+        missing_s: f64,
+    },
     /// The rear vehicle is not close behind the ego vehicle when it crosses the marking.
     #[error(
         "as track {track_id} crosses the marking, its headway to track {ego_id} is {}: it has to be above 0 and at most \

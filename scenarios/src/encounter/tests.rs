@@ -74,7 +74,33 @@ fn a_lane_change_that_is_no_encounter_states_the_reason() {
     let late = ego_and_lead().into_iter().map(late).collect();
     let error = message(late);
     assert!(error.contains("no vehicle is ahead") || error.contains("2.0 s are needed"), "{error}");
+    // The lead vehicle is recorded for long enough, but not until the crossing.
+    let mut early_end = ego_and_lead();
+    early_end[1].points.retain(|point| point.time < Time::from_s(11.5));
+    let error = message(early_end);
+    assert!(error.contains("s after the end of its own track") && !error.contains("needed"), "{error}");
     // The rear vehicle has passed the ego vehicle before it crosses the marking.
     let passed = vec![straight_track(1, 110.0, 20.0, -5.25, 250), straight_track(2, 180.0, 20.0, -5.25, 250)];
     assert!(message(passed).contains("has to be above 0"));
+}
+
+#[test]
+fn a_crossing_at_the_start_is_not_repeated() {
+    // The rear vehicle comes from lane 3, and the encounter starts as soon as it is in the lane of the ego vehicle.
+    let mut rear = rear();
+    let from = changing_track(3, (0.0, 30.0), (-8.75, -5.25), (2.0, 4.0), 200);
+    let before = |time: Time| time < Time::from_s(8.0);
+    for (point, from) in rear.points.iter_mut().zip(&from.points) {
+        if before(point.time) {
+            *point = *from;
+        }
+    }
+    let data = smooth(&trajectory_data_of(std::iter::once(rear).chain(ego_and_lead()).collect()));
+    let changes = detect(&data);
+    let of_rear: Vec<_> = changes.iter().filter(|change| change.track_id == 3).collect();
+    let [first, second] = of_rear[..] else { panic!("{of_rear:?}") };
+    let found = encounter(&data, second, &changes, CONTROL_STEP).unwrap();
+    assert_eq!(found.start, Time::from_s(first.crossing_s), "the encounter starts with the crossing");
+    let kept: Vec<_> = found.vehicles[REAR_INDEX].changes.iter().map(|change| change.crossing_s).collect();
+    assert_eq!(kept, [second.crossing_s]);
 }

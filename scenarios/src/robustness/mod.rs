@@ -1,7 +1,7 @@
 //! Robustness of the lane change criteria: how much disturbance each of them tolerates.
 //!
 //! ```text
-//!   recorded lateral position ─▶ + offset, + Brownian noise ─▶ filter ─▶ each criterion ─▶ comparison with reference
+//!   recorded lateral position ─▶ + offset, + Brownian noise ─▶ filter ─▶ each criterion ─▶ comparison with undisturbed
 //! ```
 //!
 //! **Disturbances.** A constant lateral offset (m) represents a camera with a mounting or calibration error, or a map
@@ -12,20 +12,23 @@
 //! differ in nothing else.
 //!
 //! **Reference.** For an in-car log, the reference consists of the undisturbed lane changes by the gradient criterion.
-//! For other trajectory data, it consists of the undisturbed lane changes by the peak criterion with recorded lanes. Of
-//! these, each criterion must detect again those that it detects undisturbed: on short tracks it may not detect all of
-//! them even without disturbance.
+//! For other trajectory data, it consists of the undisturbed lane changes by the peak criterion with recorded lanes. It
+//! tells how many of the lane changes that each criterion detects undisturbed are true. Each criterion is judged by what
+//! it detects undisturbed itself: what it misses or invents even then says nothing about disturbances.
 //!
-//! **Matching.** A reference lane change counts as detected again if a detected one in the same direction on the same
-//! track overlaps it in time. A detected lane change that overlaps no reference lane change is *invented*. The lanes
+//! **Matching.** A lane change counts as detected again if a detected one in the same direction on the same track
+//! overlaps it in time. Each belongs to at most one pair, of which there are as many as possible. A detected lane change
+//! without a partner is *invented*. The lanes
 //! count as unreliable here: the recorded lane tells where the vehicle really was, which a disturbed sensor cannot
 //! measure. Therefore the peak criterion uses the lateral shift alone, the distance criterion uses the disturbed
 //! position relative to the markings, and the gradient criterion uses the disturbed distances ([`crate::lane_change`]).
 //!
 //! **Failure.** A criterion fails if it misses more than 5 % of the lane changes that it detects undisturbed, or if it
-//! invents more than 5 % of their number.
+//! invents more than 5 % of their number. The counts of each repetition of the noise are kept, so that their spread
+//! shows.
 
 mod disturb;
+mod matching;
 mod study;
 
 pub use disturb::Disturbance;

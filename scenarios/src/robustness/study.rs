@@ -4,6 +4,7 @@ use closecall_traffic::Trajectory;
 use serde::Serialize;
 
 use super::disturb::{Disturbance, Repetition};
+use super::matching::matches;
 use crate::lane_change::{Criterion, LaneChange, LaneChangeDetector, LaneReliability};
 use crate::trajectory_data::{LaneMarkings, MarkingDistances};
 
@@ -28,11 +29,13 @@ pub struct Setup {
 }
 
 impl Default for Setup {
-    /// Noise up to 1 m/√s, at which a vehicle drifts by a lane width in a dozen seconds; offsets up to half a lane
+    /// Noise up to 8 m/√s, far beyond any sensor, so that every criterion fails at some level; offsets up to half a lane
     /// width.
     fn default() -> Self {
         Self {
-            noise_m_per_sqrt_s: vec![0.0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0],
+            noise_m_per_sqrt_s: vec![
+                0.0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0,
+            ],
             offset_m: (-6..=6).map(|quarters| 0.25 * f64::from(quarters)).collect(),
             repetitions: 5,
             seed: 0,
@@ -40,7 +43,7 @@ impl Default for Setup {
     }
 }
 
-/// The kind of reference with which the lane changes are compared.
+/// The kind of the reference, which tells how many lane changes there are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ReferenceKind {
@@ -59,8 +62,8 @@ pub struct Study {
     detector: LaneChangeDetector,
     /// Reference lane changes of each track.
     reference: Vec<Vec<LaneChange>>,
-    /// For each track, each of its reference lane changes and each criterion: true if it is detected undisturbed.
-    undisturbed: Vec<Vec<Vec<bool>>>,
+    /// The lane changes that each criterion detects undisturbed, for each track.
+    undisturbed: Vec<Vec<Vec<LaneChange>>>,
     kind: ReferenceKind,
 }
 
@@ -76,9 +79,9 @@ pub struct Experiment {
 pub struct CriterionCounts {
     /// Number of detected lane changes.
     pub found: f64,
-    /// Number of reference lane changes that the criterion detects undisturbed and also detects here.
+    /// Number of lane changes that the criterion detects undisturbed and also detects here.
     pub again: f64,
-    /// Number of detected lane changes that match no reference lane change.
+    /// Number of detected lane changes that match none of those.
     pub invented: f64,
 }
 
@@ -97,14 +100,9 @@ impl Study {
             .map(|(track, distances)| reference_detector.detect(reference_criterion, track, distances))
             .collect();
         let detector = LaneChangeDetector::new(LaneReliability::Unreliable, markings);
-        let undisturbed = tracks.iter().zip(&reference).map(|((track, distances), reference)| {
-            let found = detector.detect_by_each(&criteria, track, distances);
-            let by_criteria = |change: &LaneChange| {
-                found.iter().map(|found| found.iter().any(|found| matches_reference(found, change))).collect()
-            };
-            reference.iter().map(by_criteria).collect()
-        });
-        Self { undisturbed: undisturbed.collect(), tracks, criteria, detector, reference, kind }
+        let undisturbed =
+            tracks.iter().map(|(track, distances)| detector.detect_by_each(&criteria, track, distances)).collect();
+        Self { undisturbed, tracks, criteria, detector, reference, kind }
     }
 
     /// Returns the kind of the reference.
@@ -117,10 +115,22 @@ impl Study {
         self.reference.iter().flatten().count()
     }
 
-    /// Returns, for each criterion, the number of reference lane changes that it detects undisturbed.
+    /// Returns the number of lane changes that each criterion detects undisturbed.
     pub fn undisturbed(&self) -> Vec<usize> {
-        let count = |criterion: usize| self.undisturbed.iter().flatten().filter(|found| found[criterion]).count();
-        (0..self.criteria.len()).map(count).collect()
+        self.sum_by_criterion(|found, _| found.len())
+    }
+
+    /// Returns how many of the lane changes that each criterion detects undisturbed match one of the reference.
+    pub fn confirmed(&self) -> Vec<usize> {
+        self.sum_by_criterion(matches)
+    }
+
+    fn sum_by_criterion(&self, count: impl Fn(&[LaneChange], &[LaneChange]) -> usize) -> Vec<usize> {
+        let of_criterion = |criterion: usize| {
+            let tracks = self.undisturbed.iter().zip(&self.reference);
+            tracks.map(|(found, reference)| count(&found[criterion], reference)).sum()
+        };
+        (0..self.criteria.len()).map(of_criterion).collect()
     }
 
     /// Returns all experiments of `setup`: first those with noise, level by level, then those with an offset.
@@ -139,18 +149,11 @@ impl Study {
     /// Runs one experiment and returns one cell for each criterion.
     pub fn run(&self, case: &Experiment) -> Vec<CriterionCounts> {
         let mut cells = vec![CriterionCounts::default(); self.criteria.len()];
-        let references = self.reference.iter().zip(&self.undisturbed);
-        for ((track, distances), (reference, undisturbed)) in self.tracks.iter().zip(references) {
+        for ((track, distances), undisturbed) in self.tracks.iter().zip(&self.undisturbed) {
             let (track, distances) = case.disturbance.apply(track, distances, case.repetition);
             let found = self.detector.detect_by_each(&self.criteria, &track, &distances);
-            for (criterion, (cell, found)) in cells.iter_mut().zip(&found).enumerate() {
-                let required: Vec<_> = reference
-                    .iter()
-                    .zip(undisturbed)
-                    .filter(|(_, undisturbed)| undisturbed[criterion])
-                    .map(|(change, _)| change)
-                    .collect();
-                cell.count(found, reference, &required);
+            for (cell, (found, undisturbed)) in cells.iter_mut().zip(found.iter().zip(undisturbed)) {
+                cell.count(found, undisturbed);
             }
         }
         cells
@@ -160,48 +163,27 @@ impl Study {
     pub fn robustness(&self, setup: &Setup, results: &[Vec<CriterionCounts>]) -> Robustness {
         let (noise, offsets) = results.split_at(results.len() - setup.offset_m.len());
         let repetitions = usize::try_from(setup.repetitions).unwrap_or(usize::MAX).max(1);
-        let noise = noise.chunks(repetitions).map(|repeated| self.mean(repeated)).collect();
         Robustness {
             reference_kind: self.kind,
             reference: self.reference(),
             undisturbed: self.undisturbed(),
+            confirmed: self.confirmed(),
             setup: setup.clone(),
             criteria: self.criteria.clone(),
-            noise,
+            noise: noise.chunks(repetitions).map(<[_]>::to_vec).collect(),
             offset: offsets.to_vec(),
         }
-    }
-
-    /// Returns the mean cell of each criterion over repeated experiments.
-    fn mean(&self, repeated: &[Vec<CriterionCounts>]) -> Vec<CriterionCounts> {
-        let n = repeated.len() as f64;
-        let mean_of = |criterion: usize, value: fn(&CriterionCounts) -> f64| {
-            repeated.iter().map(|cells| value(&cells[criterion])).sum::<f64>() / n
-        };
-        let cell = |criterion| CriterionCounts {
-            found: mean_of(criterion, |cell| cell.found),
-            again: mean_of(criterion, |cell| cell.again),
-            invented: mean_of(criterion, |cell| cell.invented),
-        };
-        (0..self.criteria.len()).map(cell).collect()
     }
 }
 
 impl CriterionCounts {
-    /// Adds the counts of one track: the lane changes that were `found`, all `reference` ones, and the `required` ones,
-    /// which the criterion detects undisturbed.
-    fn count(&mut self, found: &[LaneChange], reference: &[LaneChange], required: &[&LaneChange]) {
+    /// Adds the counts of one track: the lane changes that were `found` here, and those found `undisturbed`.
+    fn count(&mut self, found: &[LaneChange], undisturbed: &[LaneChange]) {
+        let again = matches(found, undisturbed);
         self.found += found.len() as f64;
-        let is_found = |change: &&&LaneChange| found.iter().any(|found| matches_reference(found, change));
-        self.again += required.iter().filter(is_found).count() as f64;
-        let invented = found.iter().filter(|found| !reference.iter().any(|change| matches_reference(found, change)));
-        self.invented += invented.count() as f64;
+        self.again += again as f64;
+        self.invented += (found.len() - again) as f64;
     }
-}
-
-/// Returns true if a detected lane change has the direction of a reference lane change and overlaps it in time.
-fn matches_reference(found: &LaneChange, reference: &LaneChange) -> bool {
-    found.direction == reference.direction && found.start_s <= reference.end_s && reference.start_s <= found.end_s
 }
 
 /// The result of a robustness study; each row of cells is in the order of `criteria`.
@@ -211,14 +193,16 @@ pub struct Robustness {
     pub reference_kind: ReferenceKind,
     /// Number of reference lane changes.
     pub reference: usize,
-    /// Number of reference lane changes that each criterion detects undisturbed.
+    /// Number of lane changes that each criterion detects undisturbed.
     pub undisturbed: Vec<usize>,
+    /// How many of these match a reference lane change.
+    pub confirmed: Vec<usize>,
     /// Levels, repetitions and seed.
     pub setup: Setup,
     /// The criteria.
     pub criteria: Vec<Criterion>,
-    /// One row for each noise level: the means over the repetitions.
-    pub noise: Vec<Vec<CriterionCounts>>,
+    /// One row for each noise level and repetition.
+    pub noise: Vec<Vec<Vec<CriterionCounts>>>,
     /// One row for each offset.
     pub offset: Vec<Vec<CriterionCounts>>,
 }
@@ -234,26 +218,75 @@ impl Robustness {
         }
         self.reference += other.reference;
         self.undisturbed.iter_mut().zip(&other.undisturbed).for_each(|(own, other)| *own += other);
-        let rows = self.noise.iter_mut().zip(&other.noise).chain(self.offset.iter_mut().zip(&other.offset));
-        for (cell, other) in rows.flat_map(|(row, other)| row.iter_mut().zip(other)) {
-            cell.found += other.found;
-            cell.again += other.again;
-            cell.invented += other.invented;
+        self.confirmed.iter_mut().zip(&other.confirmed).for_each(|(own, other)| *own += other);
+        let noise = self.noise.iter_mut().flatten().zip(other.noise.iter().flatten());
+        for (row, other) in noise.chain(self.offset.iter_mut().zip(&other.offset)) {
+            for (cell, other) in row.iter_mut().zip(other) {
+                cell.found += other.found;
+                cell.again += other.again;
+                cell.invented += other.invented;
+            }
         }
         true
     }
 
-    /// Returns true if the criterion in column `criterion` fails with the counts of `cell`.
+    /// Returns the means over the repetitions: one row for each noise level.
+    pub fn mean_noise(&self) -> Vec<Vec<CriterionCounts>> {
+        let mean = |repetitions: &Vec<Vec<CriterionCounts>>, criterion: usize| {
+            let mean_of = |value: fn(&CriterionCounts) -> f64| {
+                repetitions.iter().map(|cells| value(&cells[criterion])).sum::<f64>() / repetitions.len() as f64
+            };
+            let (found, again) = (mean_of(|cell| cell.found), mean_of(|cell| cell.again));
+            CriterionCounts { found, again, invented: mean_of(|cell| cell.invented) }
+        };
+        let row = |level| (0..self.criteria.len()).map(|criterion| mean(level, criterion)).collect();
+        self.noise.iter().map(row).collect()
+    }
+
+    /// Returns true if the criterion in column `criterion` fails with the counts of `cell`. A criterion that detects
+    /// nothing undisturbed is not judged.
     pub fn fails(&self, criterion: usize, cell: &CriterionCounts) -> bool {
         let required = self.undisturbed[criterion] as f64;
         let allowed = FAILING_SHARE * required;
-        !(required - cell.again <= allowed && cell.invented <= allowed)
+        required > 0.0 && !(required - cell.again <= allowed && cell.invented <= allowed)
     }
 
-    /// Returns the lowest noise intensity at which the criterion in column `criterion` fails (m/√s), or `None` if it
-    /// fails at no level.
+    /// Returns the lowest noise intensity at which the criterion in column `criterion` fails in the mean over the
+    /// repetitions (m/√s), or `None` if it fails at no level.
     pub fn failing_noise_m_per_sqrt_s(&self, criterion: usize) -> Option<f64> {
-        let levels = self.setup.noise_m_per_sqrt_s.iter().zip(&self.noise);
-        levels.filter(|(_, cells)| self.fails(criterion, &cells[criterion])).map(|(level, _)| *level).next()
+        self.first_failing(criterion, &self.mean_noise())
+    }
+
+    /// Works like [`Self::failing_noise_m_per_sqrt_s`], for each repetition by itself.
+    pub fn failing_noise_by_repetition(&self, criterion: usize) -> Vec<Option<f64>> {
+        let repetitions = self.noise.first().map_or(0, Vec::len);
+        let rows = |number: usize| -> Vec<_> { self.noise.iter().map(|level| level[number].clone()).collect() };
+        (0..repetitions).map(|number| self.first_failing(criterion, &rows(number))).collect()
+    }
+
+    fn first_failing(&self, criterion: usize, rows: &[Vec<CriterionCounts>]) -> Option<f64> {
+        let mut levels = self.setup.noise_m_per_sqrt_s.iter().zip(rows);
+        levels.find(|(_, cells)| self.fails(criterion, &cells[criterion])).map(|(level, _)| *level)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::trajectory_data::test_support::changing_track;
+
+    #[test]
+    fn what_is_detected_undisturbed_is_no_failure_and_repetitions_are_kept() {
+        // The recorded lane never changes, so that the reference is empty, but the vehicle moves over by a lane.
+        let mut track = changing_track(1, (0.0, 30.0), (-5.25, -1.75), (4.0, 6.0), 150);
+        track.points.iter_mut().for_each(|point| point.lane = closecall_traffic::Lane(2));
+        let study = Study::new(vec![(track, Vec::new())], &LaneMarkings::default());
+        let setup = Setup { noise_m_per_sqrt_s: vec![0.0, 8.0], offset_m: vec![0.0], repetitions: 3, seed: 1 };
+        let results: Vec<_> = Study::cases(&setup).iter().map(|case| study.run(case)).collect();
+        let found = study.robustness(&setup, &results);
+        assert_eq!((found.reference, found.undisturbed[0], found.confirmed[0]), (0, 1, 0));
+        assert_eq!(found.failing_noise_m_per_sqrt_s(0), Some(8.0));
+        assert_eq!((found.noise.len(), found.noise[1].len()), (2, 3));
+        assert_eq!(found.failing_noise_by_repetition(0).len(), 3);
     }
 }

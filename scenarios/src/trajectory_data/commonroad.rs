@@ -6,7 +6,7 @@
 //! Each state of a dynamic obstacle becomes a row. The row's number is the obstacle's id, its frame is the time step,
 //! and its position is the middle of the obstacle's shape, projected onto the road that the lanelets form; see
 //! `lanelets`. Several roads, such as those of both directions, are shifted 1 km apart. Static obstacles, planning
-//! problems and signs are ignored. If a state has no acceleration, it is derived from neighbouring frames. The reader
+//! problems and signs are ignored. A first state that repeats the initial state is one state. If a state has no acceleration, it is derived from neighbouring frames. The reader
 //! rejects states whose values are intervals instead of exact values.
 
 use std::collections::BTreeMap;
@@ -14,8 +14,9 @@ use std::io::BufRead;
 
 use closecall_traffic::{Time, VehicleClass};
 
+use super::class_names::{UnknownClass, UnknownClasses};
 use super::data::{Layout, MarkingDistances};
-use super::fields::{Bounds, FieldError, integer, number, wrong_value};
+use super::fields::{Bounds, FieldError, integer, number};
 use super::lanelets::{Lanelet, Roads};
 use super::plain::allowed;
 use super::reference_line::Point;
@@ -46,6 +47,7 @@ pub(super) struct CommonRoadSource<R> {
     point: Point,
     obstacle: Option<Obstacle>,
     state: State,
+    unknown_classes: UnknownClasses,
     is_over: bool,
 }
 
@@ -58,10 +60,11 @@ struct Obstacle {
     length_m: Option<f64>,
     width_m: Option<f64>,
     road: Option<usize>,
+    initial: Option<State>,
 }
 
 /// The state that is being read.
-#[derive(Default)]
+#[derive(Clone, Copy, Default, PartialEq)]
 struct State {
     x_m: Option<f64>,
     y_m: Option<f64>,
@@ -98,6 +101,7 @@ impl<R: BufRead> CommonRoadSource<R> {
             point: (f64::NAN, f64::NAN),
             obstacle: None,
             state: State::default(),
+            unknown_classes: UnknownClasses::default(),
             is_over: false,
         })
     }
@@ -190,7 +194,10 @@ impl<R: BufRead> CommonRoadSource<R> {
                 obstacle.is_dynamic = text == "dynamic";
                 Ok(())
             }
-            ["type"] => class(text).map(|class| obstacle.class = Some(class)),
+            ["type"] => {
+                let class = self.unknown_classes.resolve(class_named(text), text, "type");
+                class.map(|class| obstacle.class = Some(class))
+            }
             ["shape", "rectangle", "length"] => {
                 number(text, "length", allowed::LENGTH_M).map(|metres| obstacle.length_m = Some(metres))
             }
@@ -203,7 +210,12 @@ impl<R: BufRead> CommonRoadSource<R> {
             ["trajectory", "state", value @ ..] | ["initialState", value @ ..] if !value.is_empty() => {
                 state_value(state, value, text)
             }
-            ["trajectory", "state"] | ["initialState"] => return self.row(),
+            ["initialState"] => {
+                obstacle.initial = Some(*state);
+                return self.row();
+            }
+            ["trajectory", "state"] if obstacle.initial.is_some_and(|initial| initial.is_repeated_by(state)) => Ok(()),
+            ["trajectory", "state"] => return self.row(),
             _ => Ok(()),
         };
         with_line(&self.xml, checked).map(|()| None)
@@ -258,6 +270,16 @@ impl<R: BufRead> CommonRoadSource<R> {
     }
 }
 
+impl State {
+    /// Returns `true` if `other` states the same values at the same time. Some files repeat the initial state as the first
+    /// state of the trajectory; one of the two may lack the acceleration.
+    fn is_repeated_by(&self, other: &Self) -> bool {
+        let acceleration_mps2 = other.acceleration_mps2.or(self.acceleration_mps2);
+        let own = Self { acceleration_mps2: self.acceleration_mps2.or(acceleration_mps2), ..*self };
+        self.step.is_some() && own == Self { acceleration_mps2, ..*other }
+    }
+}
+
 /// Stores a value of a state.
 fn state_value(state: &mut State, value: &[&str], text: &str) -> Result<(), FieldError> {
     match value {
@@ -279,14 +301,14 @@ fn with_line<R: BufRead, T>(xml: &Xml<R>, result: Result<T, FieldError>) -> Resu
     result.map_err(|error| ReadError::new(xml.line(), error))
 }
 
-/// Parses CommonRoad's obstacle types. Trucks and buses count as trucks, bicycles and pedestrians as motorcycles, and the
-/// other road users as cars.
-fn class(text: &str) -> Result<VehicleClass, FieldError> {
+/// Returns the class of CommonRoad's obstacle types. Trucks and buses count as trucks, bicycles and pedestrians as
+/// motorcycles, and the other road users as cars.
+fn class_named(text: &str) -> Option<VehicleClass> {
     match text {
-        "car" | "taxi" | "parkedVehicle" | "priorityVehicle" | "unknown" => Ok(VehicleClass::Car),
-        "truck" | "bus" => Ok(VehicleClass::Truck),
-        "motorcycle" | "bicycle" | "pedestrian" => Ok(VehicleClass::Motorcycle),
-        _ => Err(FieldError::at("type", wrong_value(text, "one of CommonRoad's types of road users".to_owned()))),
+        "car" | "taxi" | "parkedVehicle" | "priorityVehicle" | "unknown" => Some(VehicleClass::Car),
+        "truck" | "bus" => Some(VehicleClass::Truck),
+        "motorcycle" | "bicycle" | "pedestrian" => Some(VehicleClass::Motorcycle),
+        _ => None,
     }
 }
 
@@ -298,6 +320,10 @@ impl<R: BufRead> RowSource for CommonRoadSource<R> {
             period: self.step,
             markings: self.roads.as_ref().map(Roads::markings),
         }
+    }
+
+    fn unknown_classes(&self) -> &[UnknownClass] {
+        self.unknown_classes.names()
     }
 
     fn next_row(&mut self) -> Result<Option<Row>, ReadError> {

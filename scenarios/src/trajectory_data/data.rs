@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use closecall_traffic::{Time, Trajectory};
 use serde::Serialize;
 
+use super::class_names::UnknownClass;
 use super::markings::LaneMarkings;
 
 /// The layout of a trajectory file.
@@ -86,6 +87,8 @@ pub struct TrajectoryData {
     pub trajectories: Vec<Trajectory>,
     /// BLAKE3 hash of the file content in hexadecimal digits. Empty if the data does not come from a file.
     pub hash: String,
+    /// Unknown names of vehicle classes in the file.
+    pub unknown_classes: Vec<UnknownClass>,
 }
 
 /// Checks that no two of the files at `paths`, which hold `data_sets`, have the same content: their lane changes would count
@@ -108,6 +111,21 @@ impl TrajectoryData {
     pub fn new(name: &str, period: Time, mut trajectories: Vec<Trajectory>) -> Self {
         trajectories.sort_by_key(|track| track.track_id);
         let markings = LaneMarkings::from_trajectories(&trajectories);
-        Self { name: name.to_owned(), layout: Layout::Plain, period, markings, trajectories, hash: String::new() }
+        Self {
+            name: name.to_owned(),
+            layout: Layout::Plain,
+            period,
+            markings,
+            trajectories,
+            hash: String::new(),
+            unknown_classes: Vec::new(),
+        }
+    }
+
+    /// Returns what a reader of results from this data has to know: markings that are not used, and unknown vehicle
+    /// classes.
+    pub fn warnings(&self) -> Vec<String> {
+        let ignored = self.markings.ignored().iter().map(ToString::to_string);
+        ignored.chain(self.unknown_classes.iter().map(ToString::to_string)).collect()
     }
 }

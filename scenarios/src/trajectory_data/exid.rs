@@ -22,6 +22,7 @@ use std::path::Path;
 
 use closecall_traffic::{Lane, Time};
 
+use super::class_names::{UnknownClass, UnknownClasses};
 use super::data::{Layout, MarkingDistances};
 use super::error::{TrajectoryFileError, TrajectoryFileProblem};
 use super::fields::{Bounds, FieldError, integer, number, wrong_value};
@@ -141,6 +142,7 @@ pub(super) struct ExidColumns {
     data: RecordingMeta,
     vehicles: BTreeMap<u64, VehicleMeta>,
     meta_file: String,
+    unknown_classes: UnknownClasses,
     road: InferredRoad,
     /// The vehicle of the previous row and the index of its direction.
     latest: Option<(u64, usize)>,
@@ -152,8 +154,16 @@ impl ExidColumns {
     /// # Errors
     /// Fails if a required column is missing.
     pub(super) fn new(header: &Header, meta: Meta, road: InferredRoad) -> Result<Self, TrajectoryFileProblem> {
-        let Meta { data, vehicles, file } = meta;
-        Ok(Self { columns: ColumnIndices::new(header)?, data, vehicles, meta_file: file, road, latest: None })
+        let Meta { data, vehicles, file, unknown_classes } = meta;
+        Ok(Self {
+            columns: ColumnIndices::new(header)?,
+            data,
+            vehicles,
+            meta_file: file,
+            road,
+            latest: None,
+            unknown_classes,
+        })
     }
 }
 
@@ -319,6 +329,10 @@ impl TextLayout for ExidColumns {
             period: Some(Time::from_s(1.0 / self.data.frame_rate_hz)),
             markings: Some(self.road.markings()),
         }
+    }
+
+    fn unknown_classes(&self) -> &[UnknownClass] {
+        self.unknown_classes.names()
     }
 
     fn data<'l>(&self, line: &'l str, fields: &Fields) -> Option<(&'static str, &'l str)> {

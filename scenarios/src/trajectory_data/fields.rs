@@ -73,6 +73,11 @@ pub(super) fn number(text: &str, column: &'static str, bounds: Bounds) -> Result
     }
 }
 
+/// Parses a finite number within `bounds`. Returns `None` if the field is empty.
+pub(super) fn optional_number(text: &str, column: &'static str, bounds: Bounds) -> Result<Option<f64>, FieldError> {
+    if text.is_empty() { Ok(None) } else { number(text, column, bounds).map(Some) }
+}
+
 /// Parses a whole number within `low..=high`.
 pub(super) fn integer(text: &str, column: &'static str, (low, high): (i64, i64)) -> Result<i64, FieldError> {
     let value = if text.contains(',') { without_separators(text).parse() } else { text.parse() };

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use closecall_traffic::VehicleClass;
 
+use super::class_names::UnknownClasses;
 use super::error::{TrajectoryFileError, TrajectoryFileProblem};
 use super::fields::{Bounds, FieldError, integer, number, wrong_value};
 use super::header::Header;
@@ -116,14 +117,18 @@ impl FileSet {
             with_path(&recording_path, ReadError::of_file(problem))
         })?;
         let mut vehicles = BTreeMap::new();
-        for (line, (id, vehicle)) in table(&tracks_path, digest, vehicle_meta)? {
+        let mut unknown_classes = UnknownClasses::default();
+        for (line, (id, vehicle, class)) in table(&tracks_path, digest, vehicle_meta)? {
+            let resolved = unknown_classes.resolve(class_named(&class), &class, "class");
+            let class = resolved.map_err(|error| with_path(&tracks_path, ReadError::new(line, error)))?;
+            let vehicle = VehicleMeta { class, ..vehicle };
             if let Some(VehicleMeta { line: first_line, .. }) = vehicles.insert(id, VehicleMeta { line, ..vehicle }) {
                 let problem = TrajectoryFileProblem::VehicleTwice { vehicle: id, first_line };
                 return Err(with_path(&tracks_path, ReadError::new(line, problem)));
             }
         }
         let file = tracks_path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-        Ok(Meta { data, vehicles, file })
+        Ok(Meta { data, vehicles, file, unknown_classes })
     }
 }
 
@@ -134,6 +139,7 @@ pub(super) struct Meta {
     pub(super) vehicles: BTreeMap<u64, VehicleMeta>,
     /// Name of the file that describes the vehicles.
     pub(super) file: String,
+    pub(super) unknown_classes: UnknownClasses,
 }
 
 /// The content of `NN_recordingMeta.csv`.
@@ -242,10 +248,11 @@ fn markings(text: &str, column: &'static str) -> Result<Vec<f64>, FieldError> {
     Ok(found)
 }
 
-fn vehicle_meta(cells: &Cells<'_>) -> Result<(u64, VehicleMeta), FieldError> {
+/// Returns the number of a vehicle, its entry, and the name of its class.
+fn vehicle_meta(cells: &Cells<'_>) -> Result<(u64, VehicleMeta, String), FieldError> {
     let id = integer(cells.require(&["id", "trackId"])?, "id", allowed::IDS)?.unsigned_abs();
     let rows = integer(cells.require(&["numFrames"])?, "numFrames", ROWS)?.unsigned_abs();
-    let class = class(cells.require(&["class"])?)?;
+    let class = cells.require(&["class"])?.to_owned();
     let is_upper = match cells.find(&["drivingDirection"]) {
         None | Some("2") => false,
         Some("1") => true,
@@ -254,16 +261,16 @@ fn vehicle_meta(cells: &Cells<'_>) -> Result<(u64, VehicleMeta), FieldError> {
             return Err(FieldError::at("drivingDirection", wrong_value(other, allowed)));
         }
     };
-    Ok((id, VehicleMeta { class, is_upper, rows, found: 0, line: 0 }))
+    Ok((id, VehicleMeta { class: VehicleClass::Car, is_upper, rows, found: 0, line: 0 }, class))
 }
 
-/// Parses a vehicle class. highD has cars and trucks; exiD spells them in lower case, and also has vans and
-/// motorcycles.
-fn class(text: &str) -> Result<VehicleClass, FieldError> {
+/// Returns the vehicle class with this name, if it is known. highD has cars and trucks; exiD spells them in lower case, and
+/// also has vans and motorcycles.
+fn class_named(text: &str) -> Option<VehicleClass> {
     match text.to_ascii_lowercase().as_str() {
-        "car" | "van" => Ok(VehicleClass::Car),
-        "truck" | "truck_bus" | "bus" | "trailer" => Ok(VehicleClass::Truck),
-        "motorcycle" => Ok(VehicleClass::Motorcycle),
-        _ => Err(FieldError::at("class", wrong_value(text, "one of car, van, truck, bus, motorcycle".to_owned()))),
+        "car" | "van" => Some(VehicleClass::Car),
+        "truck" | "truck_bus" | "bus" | "trailer" => Some(VehicleClass::Truck),
+        "motorcycle" => Some(VehicleClass::Motorcycle),
+        _ => None,
     }
 }

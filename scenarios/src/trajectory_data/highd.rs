@@ -26,6 +26,7 @@ use std::collections::BTreeMap;
 
 use closecall_traffic::{Lane, Time};
 
+use super::class_names::{UnknownClass, UnknownClasses};
 use super::data::{Layout, MarkingDistances};
 use super::error::TrajectoryFileProblem;
 use super::fields::{Bounds, FieldError, integer, number, wrong_value};
@@ -60,6 +61,7 @@ pub(super) struct HighdColumns {
     vehicles: BTreeMap<u64, VehicleMeta>,
     /// Name of the file that describes the vehicles, for error messages.
     meta_file: String,
+    unknown_classes: UnknownClasses,
 }
 
 impl HighdColumns {
@@ -79,8 +81,8 @@ impl HighdColumns {
         for (index, name) in columns.iter_mut().zip(Self::NAMES) {
             *index = header.require(name, "highD")?;
         }
-        let Meta { data, vehicles, file } = meta;
-        Ok(Self { columns, data, vehicles, meta_file: file })
+        let Meta { data, vehicles, file, unknown_classes } = meta;
+        Ok(Self { columns, data, vehicles, meta_file: file, unknown_classes })
     }
 
     /// Returns the lane markings of both carriageways in the road frame.
@@ -145,6 +147,10 @@ impl TextLayout for HighdColumns {
             period: Some(Time::from_s(1.0 / self.data.frame_rate_hz)),
             markings: Some(self.markings()),
         }
+    }
+
+    fn unknown_classes(&self) -> &[UnknownClass] {
+        self.unknown_classes.names()
     }
 
     fn data<'l>(&self, _: &'l str, _: &Fields) -> Option<(&'static str, &'l str)> {

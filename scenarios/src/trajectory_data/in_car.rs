@@ -22,22 +22,23 @@
 //! | `left_marking_m`, `right_marking_m` | bus: distances to the markings of the own lane (m); empty if none is seen | required |
 //! | `accel_mps2` | acceleration along the road (m/s²) | |
 //! | `heading_rad`, `yaw_rate_radps`, `a_lat_mps2` | only validated | |
-//! | `lane_id` | lane, counted from 1 at the left, if the vehicle knows it from a map | |
-//! | `length_m`, `width_m`, `vehicle_class` | the vehicle; a typical car if absent | |
+//! | `lane_id` | lane, counted from 1 at the left, if the vehicle knows it from a map; empty if unknown | |
+//! | `length_m`, `width_m`, `vehicle_class` | the vehicle; a typical car if absent or empty | |
 //!
 //! When the vehicle changes lanes, its centre crosses a marking: the distance to that marking falls to zero and then
-//! jumps up by a lane width, while the distance to the other one does the reverse. If the log has no `lane_id`, the
-//! reader counts lanes by these jumps. The first lane follows from `d_left_m` and the lane width.
+//! jumps up by a lane width, while the distance to the other one does the reverse. While the log has no `lane_id`, the
+//! reader counts lanes by these jumps, from the last known lane on. Without one, the first lane follows from `d_left_m` and the lane width.
 //!
 //! Times within a quarter of a period of a tick of the clock are moved to that tick. A missing tick is a gap.
 
 use closecall_traffic::{Time, VehicleClass};
 
+use super::class_names::{UnknownClass, UnknownClasses};
 use super::data::{Layout, MarkingDistances};
 use super::error::TrajectoryFileProblem;
-use super::fields::{Bounds, FieldError, integer, number};
+use super::fields::{Bounds, FieldError, integer, number, optional_number};
 use super::header::Header;
-use super::plain::{allowed, class};
+use super::plain::{allowed, class_named};
 use super::rows::Fields;
 use super::source::{Clock, FileInfo, Row};
 use super::text_layout::TextLayout;
@@ -64,6 +65,7 @@ pub(super) struct InCarColumns {
     clock: LogClock,
     speed_mps: Option<f64>,
     lane: LaneCounter,
+    unknown_classes: UnknownClasses,
 }
 
 /// The column indices of an in-car log's quantities.
@@ -117,7 +119,13 @@ impl InCarColumns {
             data: header.find("recording_id"),
             validated_only: present.collect(),
         };
-        Ok(Self { columns, clock: LogClock::default(), speed_mps: None, lane: LaneCounter::default() })
+        Ok(Self {
+            columns,
+            clock: LogClock::default(),
+            speed_mps: None,
+            lane: LaneCounter::default(),
+            unknown_classes: UnknownClasses::default(),
+        })
     }
 }
 
@@ -130,15 +138,17 @@ impl TextLayout for InCarColumns {
         self.columns.data.map(|index| ("recording_id", fields.get(line, index)))
     }
 
+    fn unknown_classes(&self) -> &[UnknownClass] {
+        self.unknown_classes.names()
+    }
+
     /// Yields no row before the first bus frame, because the speed is still unknown there.
     fn parse(&mut self, line: &str, fields: &Fields) -> Result<Option<Row>, FieldError> {
         let ColumnIndices { time, s, d, speed, markings, acceleration, lane, length, width, class: class_at, .. } =
             self.columns;
         let real = |index, name, bounds| number(fields.get(line, index), name, bounds);
-        let optional = |index: usize, name, bounds| match fields.get(line, index) {
-            "" => Ok(None),
-            text => number(text, name, bounds).map(Some),
-        };
+        let optional = |index: usize, name, bounds| optional_number(fields.get(line, index), name, bounds);
+        let stated = |index: Option<usize>| index.map_or("", |index| fields.get(line, index));
         for &(index, name, bounds) in &self.columns.validated_only {
             optional(index, name, bounds)?;
         }
@@ -150,15 +160,20 @@ impl TextLayout for InCarColumns {
         let speed_mps = optional(speed, "speed_mps", allowed::SPEED_MPS)?;
         let acceleration_mps2 =
             acceleration.map_or(Ok(None), |index| optional(index, "accel_mps2", allowed::ACCELERATION_MPS2))?;
-        let class = class_at.map_or(Ok(VehicleClass::Car), |index| class(fields.get(line, index)))?;
+        let class = match stated(class_at) {
+            "" => VehicleClass::Car,
+            name => self.unknown_classes.resolve(class_named(name), name, "vehicle_class")?,
+        };
         let typical = class.typical_dimensions();
-        let length_m = length.map_or(Ok(typical.length_m), |index| real(index, "length_m", allowed::LENGTH_M))?;
-        let width_m = width.map_or(Ok(typical.width_m), |index| real(index, "width_m", allowed::WIDTH_M))?;
-        let mapped = lane.map_or(Ok(None), |index| {
-            integer(fields.get(line, index), "lane_id", allowed::LANES).map(|lane| Some(lane.unsigned_abs() as u8))
-        })?;
+        let length_m = optional_number(stated(length), "length_m", allowed::LENGTH_M)?.unwrap_or(typical.length_m);
+        let width_m = optional_number(stated(width), "width_m", allowed::WIDTH_M)?.unwrap_or(typical.width_m);
+        let mapped = match stated(lane) {
+            "" => None,
+            text => Some(integer(text, "lane_id", allowed::LANES)?.unsigned_abs() as u8),
+        };
         let (frame, time) = self.clock.frame_at(Time::from_s(real(time, "time_s", allowed::TIME_S)?))?;
         let counted = self.lane.count(d_m, marking_distances);
+        self.lane.correct(mapped);
         self.speed_mps = speed_mps.or(self.speed_mps);
         let row = self.speed_mps.map(|speed_mps| Row {
             number: VEHICLE,
@@ -224,6 +239,11 @@ struct LaneCounter {
 }
 
 impl LaneCounter {
+    /// Replaces the counted lane by a `known` one.
+    fn correct(&mut self, known: Option<u8>) {
+        self.lane = known.map(i64::from).or(self.lane);
+    }
+
     /// Returns the lane after a row with the lateral position `d_m` (m) and the distances in `seen`.
     fn count(&mut self, d_m: f64, seen: MarkingDistances) -> u8 {
         if let (Some(left_m), Some(right_m)) = (seen.left_m, seen.right_m)

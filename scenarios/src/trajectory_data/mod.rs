@@ -31,6 +31,8 @@
 //! - NGSIM times are in milliseconds. If they count from 1970, the reader counts them from the first instant instead.
 //! - Finite differences between neighbouring frames supply the quantities that a layout lacks: lateral speed, lateral
 //!   acceleration, and the acceleration if its field is empty.
+//! - A vehicle class that the reader does not know is read as the nearest known one, and counted
+//!   ([`Tracks::unknown_classes`]).
 //! - The readers reject everything else with line, column and allowed values, including mixed-up units and columns
 //!   (`plausible`). They neither guess nor repair. They skip and count unusable rows only if the caller asks for it
 //!   ([`BadRows::Skip`]).
@@ -43,6 +45,7 @@
 
 mod assemble;
 mod builder;
+mod class_names;
 mod commonroad;
 mod data;
 mod error;
@@ -76,6 +79,7 @@ mod write_in_car;
 mod xml;
 
 pub use builder::PIECE_STRIDE;
+pub use class_names::UnknownClass;
 pub use data::{Layout, MarkingDistances, RecordedTrack, TrajectoryData, refuse_duplicates};
 pub use error::{TrajectoryFileError, TrajectoryFileProblem, WriteError};
 pub use markings::{DEFAULT_LANE_WIDTH_M, IgnoredMarking, LANE_WIDTHS_M, LaneMarkings};

@@ -2,9 +2,10 @@
 
 use closecall_traffic::{Time, VehicleClass};
 
+use super::class_names::{UnknownClass, UnknownClasses};
 use super::data::{Layout, MarkingDistances};
 use super::error::TrajectoryFileProblem;
-use super::fields::{Bounds, FieldError, integer, number, wrong_value};
+use super::fields::{Bounds, FieldError, integer, number, optional_number};
 use super::header::Header;
 use super::rows::Fields;
 use super::source::{Clock, FileInfo, Row};
@@ -70,6 +71,7 @@ pub(super) struct PlainColumns {
     data: Option<usize>,
     /// Columns that are only validated: the lateral position gives the heading, and s and d give the position.
     validated_only: Vec<(usize, &'static str, Bounds)>,
+    unknown_classes: UnknownClasses,
 }
 
 impl PlainColumns {
@@ -99,6 +101,7 @@ impl PlainColumns {
             vehicle: header.find("vehicle_id"),
             data: header.find("recording_id"),
             validated_only: present.collect(),
+            unknown_classes: UnknownClasses::default(),
         })
     }
 }
@@ -112,18 +115,21 @@ impl TextLayout for PlainColumns {
         self.data.map(|index| ("recording_id", fields.get(line, index)))
     }
 
+    fn unknown_classes(&self) -> &[UnknownClass] {
+        self.unknown_classes.names()
+    }
+
     fn parse(&mut self, line: &str, fields: &Fields) -> Result<Option<Row>, FieldError> {
         let whole = |index, name, range| integer(fields.get(line, index), name, range);
         let real = |index, name, bounds| number(fields.get(line, index), name, bounds);
         for &(index, name, bounds) in &self.validated_only {
-            real(index, name, bounds)?;
+            optional_number(fields.get(line, index), name, bounds)?;
         }
         let track = whole(self.track, "track_id", allowed::TRACKS)?;
-        let vehicle = self.vehicle.map_or(Ok(track), |index| whole(index, "vehicle_id", allowed::TRACKS))?;
-        let acceleration = match fields.get(line, self.acceleration) {
-            "" => None,
-            text => Some(number(text, "accel_mps2", allowed::ACCELERATION_MPS2)?),
-        };
+        let stated_vehicle = self.vehicle.filter(|index| !fields.get(line, *index).is_empty());
+        let vehicle = stated_vehicle.map_or(Ok(track), |index| whole(index, "vehicle_id", allowed::TRACKS))?;
+        let acceleration = fields.get(line, self.acceleration);
+        let class = fields.get(line, self.class);
         let row = Row {
             number: track.unsigned_abs(),
             origin: Time::ZERO,
@@ -135,10 +141,10 @@ impl TextLayout for PlainColumns {
             d_m: -real(self.d, "d_m", allowed::LATERAL_M)?,
             lane: whole(self.lane, "lane_id", allowed::LANES)?.unsigned_abs() as u8,
             speed_mps: real(self.speed, "speed_mps", allowed::SPEED_MPS)?,
-            acceleration_mps2: acceleration,
+            acceleration_mps2: optional_number(acceleration, "accel_mps2", allowed::ACCELERATION_MPS2)?,
             length_m: real(self.length, "length_m", allowed::LENGTH_M)?,
             width_m: real(self.width, "width_m", allowed::WIDTH_M)?,
-            class: class(fields.get(line, self.class))?,
+            class: self.unknown_classes.resolve(class_named(class), class, "vehicle_class")?,
             marking_distances: MarkingDistances::default(),
             line: 0,
         };
@@ -146,11 +152,7 @@ impl TextLayout for PlainColumns {
     }
 }
 
-/// Parses the name of a vehicle class.
-pub(super) fn class(text: &str) -> Result<VehicleClass, FieldError> {
-    let named = VehicleClass::ALL.into_iter().find(|class| class.name() == text);
-    named.ok_or_else(|| {
-        let words = VehicleClass::ALL.map(VehicleClass::name).join(", ");
-        FieldError::at("vehicle_class", wrong_value(text, format!("one of {words}")))
-    })
+/// Returns the vehicle class with this name, if there is one.
+pub(super) fn class_named(text: &str) -> Option<VehicleClass> {
+    VehicleClass::ALL.into_iter().find(|class| class.name() == text)
 }

@@ -1,4 +1,16 @@
 //! A reference line along a road, and the projection of points onto it.
+//!
+//! ```text
+//!                 × point
+//!      nearest    ┊ ╲
+//!      position:  ┊  ╲  along the normal, whose direction turns steadily from vertex to vertex
+//!   ●─────────────●───┴──────────●
+//! ```
+//!
+//! At a kink, the nearest position of a polyline jumps for points on the inner side, and stands still for points on the
+//! outer side. Therefore the normal of the line turns linearly along each segment, between the bisectors of the kinks at
+//! its ends. (E. Héry, S. Masi, P. Xu, P. Bonnifait, "Map-based curvilinear coordinates for autonomous vehicles",
+//! ITSC 2017.) Points so far inside a bend that normals cross get the nearest position instead.
 
 /// A point in a plane (m).
 pub(super) type Point = (f64, f64);
@@ -6,11 +18,88 @@ pub(super) type Point = (f64, f64);
 /// Maximum distance at which two points count as one (m).
 const SAME_POINT_M: f64 = 1e-6;
 
+/// Value of 1 + cos θ below which a turn by θ counts as turning back (-): within about 8° of a half turn.
+const TURNS_BACK: f64 = 0.01;
+
 /// A polyline. It continues straight beyond both ends.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct ReferenceLine {
-    /// The points, each with its distance along the line (m).
-    points: Vec<(Point, f64)>,
+    vertices: Vec<Vertex>,
+}
+
+/// A point of the line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Vertex {
+    point: Point,
+    /// Distance along the line (m).
+    s_m: f64,
+    /// Tangent of half the angle by which the line turns to the left here (-).
+    half_turn: f64,
+}
+
+/// A segment between two vertices, and a point in its frame.
+struct Segment {
+    start: Vertex,
+    end: Vertex,
+    length_m: f64,
+    /// Heading of the segment (rad).
+    heading_rad: f64,
+    /// Position of the point along the segment and to its left (m).
+    along_m: f64,
+    left_m: f64,
+    is_first: bool,
+    is_last: bool,
+}
+
+impl Segment {
+    fn new(start: Vertex, end: Vertex, (x_m, y_m): Point) -> Self {
+        let ((x0, y0), (x1, y1)) = (start.point, end.point);
+        let length_m = end.s_m - start.s_m;
+        let (ux, uy) = ((x1 - x0) / length_m, (y1 - y0) / length_m);
+        let (dx, dy) = (x_m - x0, y_m - y0);
+        Self {
+            start,
+            end,
+            length_m,
+            heading_rad: uy.atan2(ux),
+            along_m: dx * ux + dy * uy,
+            left_m: ux * dy - uy * dx,
+            is_first: false,
+            is_last: false,
+        }
+    }
+
+    /// Returns the projection along a normal of this segment, or `None` if none of them leads to the point.
+    fn along_normal(&self) -> Option<Projection> {
+        let is_before = self.is_first && self.along_m < 0.0;
+        if is_before || (self.is_last && self.along_m > self.length_m) {
+            return Some(self.projection(self.along_m, 0.0));
+        }
+        // In the frame of the segment, the tangent at the share λ is (1, m). Its slope m goes from that of the start to
+        // that of the end.
+        let (from, to) = (-self.start.half_turn, self.end.half_turn);
+        let spread_m = self.length_m - self.left_m * (to - from);
+        let share = (self.along_m + self.left_m * from) / spread_m;
+        let is_within = spread_m > 0.0 && (0.0..=1.0).contains(&share);
+        is_within.then(|| self.projection(share * self.length_m, (from + share * (to - from)).atan()))
+    }
+
+    /// Returns the projection onto the nearest position of this segment.
+    fn nearest(&self) -> Projection {
+        let low = if self.is_first { f64::NEG_INFINITY } else { 0.0 };
+        let high = if self.is_last { f64::INFINITY } else { self.length_m };
+        self.projection(self.along_m.clamp(low, high), 0.0)
+    }
+
+    /// Returns the projection onto the position `along_m` (m), at which the line has turned by `turned_rad` (rad) relative
+    /// to the segment.
+    fn projection(&self, along_m: f64, turned_rad: f64) -> Projection {
+        Projection {
+            s_m: self.start.s_m + along_m,
+            d_m: (self.along_m - along_m).hypot(self.left_m).copysign(self.left_m),
+            heading_rad: self.heading_rad + turned_rad,
+        }
+    }
 }
 
 /// The position of a point relative to a line.
@@ -27,45 +116,54 @@ pub(super) struct Projection {
 impl ReferenceLine {
     /// Builds the line through `points`.
     pub(super) fn through(points: impl Iterator<Item = Point>) -> Self {
-        let mut line: Vec<(Point, f64)> = Vec::new();
+        let mut vertices: Vec<Vertex> = Vec::new();
         for point in points {
-            let Some(((x, y), s_m)) = line.last() else {
-                line.push((point, 0.0));
+            let Some(last) = vertices.last() else {
+                vertices.push(Vertex { point, s_m: 0.0, half_turn: 0.0 });
                 continue;
             };
-            let step_m = (point.0 - x).hypot(point.1 - y);
+            let step_m = (point.0 - last.point.0).hypot(point.1 - last.point.1);
             if step_m > SAME_POINT_M {
-                let s_m = s_m + step_m;
-                line.push((point, s_m));
+                let s_m = last.s_m + step_m;
+                vertices.push(Vertex { point, s_m, half_turn: 0.0 });
             }
         }
-        Self { points: line }
+        let turns: Vec<f64> = vertices.windows(3).map(|w| half_turn(w[0].point, w[1].point, w[2].point)).collect();
+        vertices.iter_mut().skip(1).zip(turns).for_each(|(vertex, half_turn)| vertex.half_turn = half_turn);
+        Self { vertices }
     }
 
     /// Returns the length of the line (m), or `None` if it has no extent.
     pub(super) fn length_m(&self) -> Option<f64> {
-        self.points.last().filter(|_| self.points.len() > 1).map(|(_, s_m)| *s_m)
+        self.vertices.last().filter(|_| self.vertices.len() > 1).map(|vertex| vertex.s_m)
     }
 
-    /// Projects a point onto the nearest position of the line.
-    pub(super) fn project(&self, (x, y): Point) -> Projection {
-        let last = self.points.len().saturating_sub(2);
-        let mut nearest = (f64::INFINITY, Projection { s_m: 0.0, d_m: 0.0, heading_rad: 0.0 });
-        for (k, pair) in self.points.windows(2).enumerate() {
-            let (((x0, y0), s0), ((x1, y1), s1)) = (pair[0], pair[1]);
-            let length = s1 - s0;
-            let (ux, uy) = ((x1 - x0) / length, (y1 - y0) / length);
-            let low = if k == 0 { f64::NEG_INFINITY } else { 0.0 };
-            let high = if k == last { f64::INFINITY } else { length };
-            let along = ((x - x0) * ux + (y - y0) * uy).clamp(low, high);
-            let distance = (x - x0 - along * ux).hypot(y - y0 - along * uy);
-            if distance < nearest.0 {
-                let side = (ux * (y - y0) - uy * (x - x0)).signum();
-                nearest = (distance, Projection { s_m: s0 + along, d_m: side * distance, heading_rad: uy.atan2(ux) });
-            }
-        }
-        nearest.1
+    /// Projects a point onto the line: along the normal that leads to it, or, if none does, onto the nearest position.
+    pub(super) fn project(&self, point: Point) -> Projection {
+        let last = self.vertices.len().saturating_sub(2);
+        let nearer = |a: &Projection, b: &Projection| a.d_m.abs().total_cmp(&b.d_m.abs());
+        let segments = || {
+            let pairs = self.vertices.windows(2).enumerate();
+            pairs.map(|(k, pair)| Segment {
+                is_first: k == 0,
+                is_last: k == last,
+                ..Segment::new(pair[0], pair[1], point)
+            })
+        };
+        let along_normals = segments().filter_map(|segment| segment.along_normal()).min_by(nearer);
+        let found = along_normals.or_else(|| segments().map(|segment| segment.nearest()).min_by(nearer));
+        found.unwrap_or(Projection { s_m: 0.0, d_m: 0.0, heading_rad: 0.0 })
     }
+}
+
+/// Returns the tangent of half the angle by which the way from `a` over `b` to `c` turns to the left at `b` (-). A way that
+/// turns back has no bisector; it counts as straight.
+fn half_turn(a: Point, b: Point, c: Point) -> f64 {
+    let (first, second) = ((b.0 - a.0, b.1 - a.1), (c.0 - b.0, c.1 - b.1));
+    let lengths = first.0.hypot(first.1) * second.0.hypot(second.1);
+    let sine = (first.0 * second.1 - first.1 * second.0) / lengths;
+    let one_plus_cosine = 1.0 + (first.0 * second.0 + first.1 * second.1) / lengths;
+    if one_plus_cosine > TURNS_BACK { sine / one_plus_cosine } else { 0.0 }
 }
 
 #[cfg(test)]
@@ -73,18 +171,49 @@ mod tests {
     use super::*;
 
     #[test]
-    fn points_project_onto_the_nearest_position_and_the_line_continues_straight() {
-        let corner = ReferenceLine::through([(0.0, 0.0), (10.0, 0.0), (10.0, 0.0), (10.0, 10.0)].into_iter());
-        assert_eq!(corner.length_m(), Some(20.0));
+    fn the_line_continues_straight_and_segments_without_a_kink_project_onto_the_nearest_position() {
+        let line = ReferenceLine::through([(0.0, 0.0), (10.0, 0.0), (10.0, 0.0), (20.0, 0.0)].into_iter());
+        assert_eq!(line.length_m(), Some(20.0));
         let at = |x, y| {
-            let projection = corner.project((x, y));
+            let projection = line.project((x, y));
             (projection.s_m, projection.d_m)
         };
         assert_eq!(at(4.0, 1.0), (4.0, 1.0));
-        assert_eq!(at(4.0, -2.0), (4.0, -2.0));
+        assert_eq!(at(14.0, -2.0), (14.0, -2.0));
         assert_eq!(at(-3.0, 1.0), (-3.0, 1.0));
-        assert_eq!(at(8.5, 6.0), (16.0, 1.5));
-        assert_eq!(at(11.0, 25.0), (35.0, -1.0));
+        assert_eq!(at(25.0, -1.0), (25.0, -1.0));
         assert_eq!(ReferenceLine::through([(1.0, 1.0), (1.0, 1.0)].into_iter()).length_m(), None);
+    }
+
+    #[test]
+    fn at_a_right_angle_the_bisector_leads_to_the_corner() {
+        let corner = ReferenceLine::through([(0.0, 0.0), (10.0, 0.0), (10.0, 10.0)].into_iter());
+        for point in [(9.0, 1.0), (11.0, -1.0)] {
+            let projection = corner.project(point);
+            assert!((projection.s_m - 10.0).abs() < 1e-12 && (projection.d_m.abs() - 2_f64.sqrt()).abs() < 1e-12);
+            assert!((projection.heading_rad - std::f64::consts::FRAC_PI_4).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_steady_drive_along_a_bend_moves_steadily_at_the_kinks() {
+        // A bend of 400 m radius in chords of 20 m; the vehicle drives 11 m inside or outside of it.
+        let (radius_m, chord_rad) = (400.0_f64, 0.05);
+        let on_circle =
+            |radius_m: f64, angle_rad: f64| (radius_m * angle_rad.sin(), radius_m * (1.0 - angle_rad.cos()));
+        let line = ReferenceLine::through((0..20).map(|k| on_circle(radius_m, chord_rad * f64::from(k))));
+        for left_m in [11.0, -11.0] {
+            let drive = (50..1_800).map(|k| {
+                let (x_m, y_m) = on_circle(radius_m - left_m, 5e-4 * f64::from(k));
+                line.project((x_m, y_m + left_m))
+            });
+            let drive: Vec<Projection> = drive.collect();
+            for pair in drive.windows(2) {
+                let step_m = pair[1].s_m - pair[0].s_m;
+                assert!((step_m - 0.2).abs() < 0.002, "{left_m} m: a step of {step_m} m at {} m", pair[0].s_m);
+                assert!((pair[1].d_m - pair[0].d_m).abs() < 0.01 && (pair[0].d_m - left_m).abs() < 0.15);
+                assert!((pair[1].heading_rad - pair[0].heading_rad).abs() < 0.002);
+            }
+        }
     }
 }

@@ -11,6 +11,7 @@
 
 use closecall_traffic::{Time, VehicleClass};
 
+use super::class_names::UnknownClass;
 use super::data::{Layout, MarkingDistances};
 use super::error::TrajectoryFileProblem;
 use super::fields::FieldError;
@@ -66,6 +67,9 @@ pub(super) struct FileInfo {
 pub(super) trait RowSource {
     /// Returns what is known about the file so far.
     fn info(&self) -> FileInfo;
+
+    /// Returns the unknown names of vehicle classes found so far.
+    fn unknown_classes(&self) -> &[UnknownClass];
 
     /// Returns the next row in the order of the file, or `None` at its end.
     ///

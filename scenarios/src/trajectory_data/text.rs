@@ -2,6 +2,7 @@
 
 use std::io::BufRead;
 
+use super::class_names::UnknownClass;
 use super::error::{TrajectoryFileError, TrajectoryFileProblem};
 use super::exid::InferredRoad;
 use super::fields::FieldError;
@@ -75,6 +76,10 @@ impl<R: BufRead> RowSource for TextSource<R> {
         FileInfo { name: self.name.clone().or(info.name.clone()), ..info }
     }
 
+    fn unknown_classes(&self) -> &[UnknownClass] {
+        self.format.columns.unknown_classes()
+    }
+
     fn next_row(&mut self) -> Result<Option<Row>, ReadError> {
         let Self { lines, format, fields, name, first } = self;
         loop {
@@ -115,10 +120,11 @@ fn parse(
     format.columns.parse(line, fields)
 }
 
-/// Checks that all rows carry the same data set name: one file holds one data set.
+/// Checks that all rows with a data set name carry the same one: one file holds one data set.
 fn check_name(line: &str, format: &Format, fields: &Fields, name: &mut Option<String>) -> Result<(), FieldError> {
     let Some((column, found)) = format.columns.data(line, fields) else { return Ok(()) };
     match name {
+        _ if found.is_empty() => {}
         None => *name = Some(found.to_owned()),
         Some(first) if first == found => {}
         Some(first) => {

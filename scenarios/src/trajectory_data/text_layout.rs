@@ -1,5 +1,6 @@
 //! The interface of the text layouts, which have one row per line.
 
+use super::class_names::UnknownClass;
 use super::fields::FieldError;
 use super::rows::Fields;
 use super::source::{FileInfo, Row};
@@ -18,6 +19,11 @@ pub(super) trait TextLayout {
     /// # Errors
     /// Returns the column and the problem.
     fn parse(&mut self, line: &str, fields: &Fields) -> Result<Option<Row>, FieldError>;
+
+    /// Returns the unknown names of vehicle classes found so far.
+    fn unknown_classes(&self) -> &[UnknownClass] {
+        &[]
+    }
 
     /// Checks, at the end of the file, that nothing is missing.
     ///

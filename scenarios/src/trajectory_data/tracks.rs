@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use closecall_traffic::Time;
 
 use super::builder::TrackBuilder;
+use super::class_names::UnknownClass;
 use super::data::{Layout, RecordedTrack, TrajectoryData};
 use super::error::{TrajectoryFileError, TrajectoryFileProblem};
 use super::input::Digest;
@@ -161,6 +162,11 @@ impl<'a> Tracks<'a> {
         &self.dropped
     }
 
+    /// Returns the unknown names of vehicle classes found so far, and the classes as which they are read.
+    pub fn unknown_classes(&self) -> &[UnknownClass] {
+        self.source.unknown_classes()
+    }
+
     /// Returns the BLAKE3 hash of the bytes read so far, in hexadecimal digits. After the last track, it covers the
     /// whole file.
     pub fn hash(&self) -> String {
@@ -191,7 +197,7 @@ impl<'a> Tracks<'a> {
         if let Some(markings) = markings {
             data.markings = markings;
         }
-        Ok(TrajectoryData { layout, hash: self.hash(), ..data })
+        Ok(TrajectoryData { layout, hash: self.hash(), unknown_classes: self.unknown_classes().to_vec(), ..data })
     }
 
     /// Reads rows until the next track is complete.

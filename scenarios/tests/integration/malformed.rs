@@ -90,7 +90,7 @@ fn cases() -> Vec<(String, Vec<&'static str>)> {
         (one("track_id", "-1"), vec!["line 3", "`track_id`", "a whole number from 0"]),
         (one("frame", "99999999999999999999"), vec!["line 3", "`frame`"]),
         (one("lane_id", "900"), vec!["line 3", "`lane_id`", "from 0 to 255"]),
-        (one("vehicle_class", "tank"), vec!["line 3", "`vehicle_class`", "car, truck, motorcycle"]),
+        (one("vehicle_class", "2"), vec!["line 3", "`vehicle_class`", "car, truck, motorcycle"]),
         (one("recording_id", "b"), vec!["line 3", "`recording_id`", "`b`", "`a`", "one data set for each file"]),
         (one("accel_mps2", "?"), vec!["line 3", "`accel_mps2`"]),
         (second(&[]), vec!["line 3", "frame 0 of vehicle 1 stands there twice", "line 2"]),

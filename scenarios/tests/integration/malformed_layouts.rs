@@ -8,6 +8,8 @@ use closecall_scenarios::trajectory_data::{
     BadRows, ReadOptions, TrajectoryFileError, TrajectoryFileProblem, open, open_from, read, read_from,
 };
 
+use closecall_traffic::VehicleClass;
+
 use crate::support::{PLAIN_HEADER, read_text};
 
 /// Asserts that the error message contains all of `needed`.
@@ -193,7 +195,7 @@ fn malformed_commonroad_scenarios_are_rejected() {
         (good.replace("<exact>1</exact>", "<exact>0</exact>"), vec!["frame 0 of vehicle 3 stands there twice"]),
         (good.replace("<exact>1</exact>", "<exact>-1</exact>"), vec!["line 9", "`time`", "is `-1`"]),
         (good.replace("<exact>1</exact>", "<intervalStart>1</intervalStart>"), vec!["line 9", "an exact `time`"]),
-        (good.replace("<type>car</type>", "<type>spaceship</type>"), vec!["`type`", "is `spaceship`"]),
+        (good.replace("<type>car</type>", "<type>7</type>"), vec!["`type`", "is `7`"]),
         (good.replace("<type>car</type>", ""), vec!["needs a `type`"]),
         (good.replace("<length>4.5</length>", "<length>-4.5</length>"), vec!["`length`", "above 0"]),
         (good.replace("id=\"3\"", "id=\"-3\""), vec!["`id`", "is `-3`"]),
@@ -213,6 +215,50 @@ fn malformed_commonroad_scenarios_are_rejected() {
     let index = not_text.windows(6).position(|part| part == b"<x>12<").unwrap() + 3;
     not_text[index] = 0xff;
     assert!(read_text(&not_text).is_err());
+}
+
+#[test]
+fn an_initial_state_that_is_repeated_as_the_first_state_counts_once() {
+    let initial = |text: String| text.replace("<state>", "<initialState>").replace("</state>", "</initialState>");
+    let states = [state("10", "0"), state("12", "1"), state("14", "2")].concat();
+    let with_initial =
+        |first: String| scenario(&obstacle(&format!("{}<trajectory>{states}</trajectory>", initial(first))));
+    let repeated = read_text(with_initial(state("10", "0")).as_bytes()).unwrap();
+    assert_eq!(repeated.trajectories[0].points.len(), 3);
+    let contradicting = read_text(with_initial(state("10.5", "0")).as_bytes()).unwrap_err();
+    assert_mentions(&contradicting, &["frame 0 of vehicle 3 stands there twice"], "another position");
+}
+
+#[test]
+fn an_unknown_type_is_read_as_the_nearest_class_and_counted() {
+    let text = trajectory(&[state("10", "0"), state("12", "1"), state("14", "2")]).replace("car<", "truckWithTrailer<");
+    let data = read_text(text.as_bytes()).unwrap();
+    assert_eq!(data.trajectories[0].class, VehicleClass::Truck);
+    let warning = "the vehicle class `truckWithTrailer` is unknown and read as truck (1 entry)";
+    assert_eq!(data.warnings(), [warning]);
+}
+
+#[test]
+fn optional_columns_may_be_empty() {
+    let plain = drive(|_| {});
+    let header = PLAIN_HEADER.split(',').collect::<Vec<_>>();
+    let emptied = plain.lines().enumerate().map(|(number, line)| {
+        let cells = line.split(',').zip(&header).map(|(cell, name)| {
+            let is_optional =
+                ["recording_id", "vehicle_id", "heading_rel_rad", "x_m", "y_m", "accel_mps2"].contains(name);
+            if number > 0 && is_optional { "" } else { cell }
+        });
+        cells.collect::<Vec<_>>().join(",") + "\n"
+    });
+    let (full, emptied) =
+        (read_text(plain.as_bytes()).unwrap(), read_text(emptied.collect::<String>().as_bytes()).unwrap());
+    assert_eq!(full.trajectories[0].points.len(), emptied.trajectories[0].points.len());
+    assert_eq!(emptied.trajectories[0].vehicle_id, emptied.trajectories[0].track_id);
+    let optional = ",accel_mps2,heading_rad,lane_id,length_m,width_m,vehicle_class,recording_id";
+    let rows = "0.00,0.0,-5.6,30,1.9,1.8,,,3,,,,\n0.04,1.2,-5.6,30,1.9,1.8,,,,,,,\n";
+    let log = read_text(format!("{IN_CAR}{optional}\n{rows}").as_bytes()).unwrap();
+    assert_eq!(log.trajectories[0].points.iter().map(|point| point.lane.0).collect::<Vec<_>>(), [3, 3]);
+    assert_eq!(log.trajectories[0].dimensions, VehicleClass::Car.typical_dimensions());
 }
 
 #[test]

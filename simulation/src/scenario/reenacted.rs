@@ -4,7 +4,7 @@
 //! | vehicle | driver |
 //! |---|---|
 //! | ego | the ego stack, with the time gap and the set speed that the recorded driver kept |
-//! | lead vehicle | recorded speeds and lane changes at their recorded times (`prescribed`) |
+//! | lead vehicle | recorded speeds and lane changes, which cross the marking when the recorded vehicle does (`prescribed`) |
 //! | rear vehicle | [`RearDriver`] |
 //! | a vehicle that stays ahead of the rear vehicle in another lane | recorded speeds (`prescribed`) |
 //! | a vehicle that stays behind the rear vehicle in the lane that this changes to | Wiedemann 99, with the highest recorded speed as desired speed |
@@ -289,9 +289,14 @@ fn prescribed_driver(encounter: &RecordedEncounter, vehicle: &Participant) -> Dr
     let mut free_from_s = 0.0;
     let mut lane_changes = Vec::new();
     for change in &vehicle.changes {
-        let at_s = encounter.time_of(change.start_s).s().max(free_from_s);
-        let end_s = encounter.time_of(change.end_s).s();
-        let duration_s = (end_s - at_s).clamp(MIN_LANE_CHANGE_S, MAX_LANE_CHANGE_S);
+        let [start_s, crossing_s, end_s] =
+            [change.start_s, change.crossing_s, change.end_s].map(|recorded_s| encounter.time_of(recorded_s).s());
+        let as_recorded = || {
+            let at_s = start_s.max(free_from_s);
+            (at_s, (end_s - at_s).clamp(MIN_LANE_CHANGE_S, MAX_LANE_CHANGE_S))
+        };
+        let crossing = lane_change_across(&vehicle.trajectory, [start_s, crossing_s], free_from_s);
+        let (at_s, duration_s) = crossing.unwrap_or_else(as_recorded);
         let (at_s, duration_s) = (to_steps(at_s), to_steps(duration_s));
         // The next lane change starts at least one rounding step after the end of this one, so that they never overlap.
         free_from_s = at_s + duration_s + 1.0 / STEPS_PER_UNIT;
@@ -308,6 +313,23 @@ fn prescribed_driver(encounter: &RecordedEncounter, vehicle: &Participant) -> Dr
     })
 }
 
+/// Returns the start and the duration (s) of a lane change that crosses the marking when the recorded vehicle does, at
+/// `crossing_s`.
+///
+/// A simulated lane change follows a symmetric path whose length is its duration times the speed at its start, so that it
+/// crosses the marking after half of that length. A recorded one is hardly ever symmetric. Of all starts from `free_from_s` on
+/// for which the duration is possible, the one nearest to the recorded `start_s` is chosen. Returns `None` if there is none.
+fn lane_change_across(vehicle: &Trajectory, [start_s, crossing_s]: [f64; 2], free_from_s: f64) -> Option<(f64, f64)> {
+    let crossing_m = vehicle.at(Time::from_s(crossing_s))?.s_m;
+    let candidate = |point: &TrajectoryPoint| {
+        let duration_s = 2.0 * (crossing_m - point.s_m) / point.speed_mps.max(MIN_SPEED_MPS);
+        let is_possible = (MIN_LANE_CHANGE_S..=MAX_LANE_CHANGE_S).contains(&duration_s);
+        (is_possible && point.time.s() >= free_from_s).then_some((point.time.s(), duration_s))
+    };
+    let starts = vehicle.points.iter().take_while(|point| point.time.s() < crossing_s).filter_map(candidate);
+    starts.min_by(|a, b| (a.0 - start_s).abs().total_cmp(&(b.0 - start_s).abs()))
+}
+
 /// Returns the highest recorded speed of the vehicles (m/s), at least [`MIN_SPEED_MPS`].
 fn max_speed_mps<'a>(vehicles: impl IntoIterator<Item = &'a Trajectory>) -> f64 {
     let speeds = vehicles.into_iter().flat_map(|vehicle| vehicle.points.iter().map(|point| point.speed_mps));
@@ -320,4 +342,51 @@ fn rounded(value: f64) -> Num {
 
 fn to_steps(value: f64) -> f64 {
     (value * STEPS_PER_UNIT).round() / STEPS_PER_UNIT
+}
+
+#[cfg(test)]
+mod tests {
+    use closecall_traffic::{Dimensions, Lane, VehicleClass};
+
+    use super::*;
+
+    /// A vehicle that accelerates from 20 m/s with 1 m/s² for 20 s.
+    fn accelerating() -> Trajectory {
+        let point = |tick: i64| {
+            let time = Time::from_ms(10 * tick);
+            let time_s = time.s();
+            TrajectoryPoint {
+                time,
+                s_m: 20.0 * time_s + 0.5 * time_s * time_s,
+                d_m: -1.75,
+                speed_mps: 20.0 + time_s,
+                acceleration_mps2: 1.0,
+                lateral_speed_mps: 0.0,
+                lateral_acceleration_mps2: 0.0,
+                lane: Lane(1),
+            }
+        };
+        Trajectory {
+            track_id: 1,
+            vehicle_id: 1,
+            class: VehicleClass::Car,
+            dimensions: Dimensions { length_m: 4.5, width_m: 1.8, height_m: 1.5 },
+            points: (0..2_000).map(point).collect(),
+        }
+    }
+
+    #[test]
+    fn a_prescribed_lane_change_is_half_done_at_the_recorded_crossing() {
+        let vehicle = accelerating();
+        let s_m = |time_s: f64| 20.0 * time_s + 0.5 * time_s * time_s;
+        for (start_s, crossing_s) in [(4.0, 9.0), (4.0, 4.2), (0.0, 15.0), (-3.0, 2.5)] {
+            let (at_s, duration_s) = lane_change_across(&vehicle, [start_s, crossing_s], 0.0).unwrap();
+            let half_m = 0.5 * duration_s * (20.0 + at_s);
+            assert!((s_m(at_s) + half_m - s_m(crossing_s)).abs() < 1e-3, "{start_s} {crossing_s}: {at_s} {duration_s}");
+            assert!(at_s >= 0.0 && (MIN_LANE_CHANGE_S..=MAX_LANE_CHANGE_S).contains(&duration_s));
+        }
+        let (at_s, _) = lane_change_across(&vehicle, [4.0, 9.0], 0.0).unwrap();
+        assert!((at_s - 4.0).abs() < 1e-9, "the recorded start is kept if it is possible: {at_s}");
+        assert_eq!(lane_change_across(&vehicle, [4.0, 9.0], 8.9), None, "there is no time left");
+    }
 }

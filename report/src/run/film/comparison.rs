@@ -64,6 +64,16 @@ impl EncounterComparison {
         })
     }
 
+    /// Says that the rear vehicle never crosses the marking in the simulation, if so: the metrics at the crossing are then
+    /// missing, and those until then cover the whole run.
+    pub fn never_crosses(&self) -> Option<String> {
+        (self.simulated.crossing_s == Err(Absent::NeverCrossed)).then(|| {
+            "the rear vehicle never crosses the marking, so that the encounter is not comparable with the recorded one from \
+             the recorded crossing on"
+                .to_owned()
+        })
+    }
+
     /// Returns the comparison as Markdown: the vehicles, the metrics of each side, and how the run deviates from the recorded
     /// encounter.
     pub fn markdown(&self, encounter: &RecordedEncounter, simulated: &Film, driver: RearDriver) -> String {
@@ -80,6 +90,9 @@ impl EncounterComparison {
             RearDriver::Model => "a model of a human driver drives R and pulls out at the recorded headway",
             RearDriver::Recorded => "R drives as recorded, whatever E does",
         };
+        if let Some(warning) = self.never_crosses() {
+            let _ = writeln!(page, "- **{arm}:** {warning}");
+        }
         let missing_count = encounter.vehicles.len().saturating_sub(simulated.actors.len());
         let missing_text = match missing_count {
             0 => String::new(),
