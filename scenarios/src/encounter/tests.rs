@@ -88,7 +88,7 @@ fn a_lane_change_that_is_no_encounter_states_the_reason() {
 fn a_crossing_at_the_start_is_not_repeated() {
     // The rear vehicle comes from lane 3, and the encounter starts as soon as it is in the lane of the ego vehicle.
     let mut rear = rear();
-    let from = changing_track(3, (0.0, 30.0), (-8.75, -5.25), (2.0, 4.0), 200);
+    let from = changing_track(3, (0.0, 30.0), (-8.75, -5.25), (2.15, 4.0), 200);
     let before = |time: Time| time < Time::from_s(8.0);
     for (point, from) in rear.points.iter_mut().zip(&from.points) {
         if before(point.time) {

@@ -97,7 +97,7 @@ fn malformed_highd_data_sets_are_rejected() {
             vec!["vehicle 2 has 19 rows, but 20 are stated", "line 2 of 07_tracksMeta.csv"],
         ),
         (vehicles, "20,Truck", "21,Truck", vec!["20 rows, but 21 are stated"]),
-        (vehicles, "Truck", "Tank", vec!["07_tracksMeta.csv, line 2", "`class`", "is `Tank`"]),
+        (vehicles, "Truck", "7", vec!["07_tracksMeta.csv, line 2", "`class`", "is `7`"]),
         (vehicles, "Truck,2", "Truck,3", vec!["line 2", "`drivingDirection`", "1 (towards -x) or 2"]),
         (vehicles, "Truck,2", "Truck,1", vec!["07_tracks.csv, line 2", "towards -x"]),
         (
