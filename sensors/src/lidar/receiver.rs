@@ -105,7 +105,7 @@ impl Receiver<'_> {
     pub(crate) fn receive(&self, hits: &ColumnHits, scan: &mut LidarScan, truth: &mut ScanTruth) {
         let in_air = !self.plumes.is_empty() || self.link.has_fog();
         for (layer, elevation) in self.elevations.iter().enumerate() {
-            if !hits.needs_echoes(layer) && !(in_air && self.has_droplet_return(layer)) {
+            if !(hits.needs_echoes(layer) || in_air && self.has_droplet_return(layer)) {
                 continue;
             }
             let echoes = if hits.is_tested(layer) {
