@@ -43,5 +43,6 @@ fn tracks_of_the_object_level_sensor_are_consistent() {
 
 #[test]
 fn tracks_of_lidar_and_camera_are_consistent() {
-    assert_consistent(SensorMode::Full, 6);
+    // The share below the quantile scatters by a percent between sets of six samples.
+    assert_consistent(SensorMode::Full, 9);
 }
