@@ -18,6 +18,9 @@ pub(super) type Point = (f64, f64);
 /// Maximum distance at which two points count as one (m).
 const SAME_POINT_M: f64 = 1e-6;
 
+/// Share of a segment by which the foot of a normal may lie outside of it (-): rounding errors are far below it.
+const ROUNDING: f64 = 1e-9;
+
 /// Value of 1 + cos θ below which a turn by θ counts as turning back (-): within about 8° of a half turn.
 const TURNS_BACK: f64 = 0.01;
 
@@ -80,7 +83,8 @@ impl Segment {
         let (from, to) = (-self.start.half_turn, self.end.half_turn);
         let spread_m = self.length_m - self.left_m * (to - from);
         let share = (self.along_m + self.left_m * from) / spread_m;
-        let is_within = spread_m > 0.0 && (0.0..=1.0).contains(&share);
+        // A point on the bisector of a kink belongs to one of its two segments, whatever is rounded.
+        let is_within = spread_m > 0.0 && (-ROUNDING..=1.0 + ROUNDING).contains(&share);
         is_within.then(|| self.projection(share * self.length_m, (from + share * (to - from)).atan()))
     }
 
