@@ -20,7 +20,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     let library = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/library");
     let scenario = ScenarioFile::load(&library.join("low-thw-overtake.toml"), &[])?;
     let sampling = Sampling { seed: 1, design: Design::Random, samples: 20 };
-    let plan = Plan::new(vec![scenario], sampling, vec![ControllerChoice::Acc, ControllerChoice::Mis])?;
+    let plan = Plan::new(vec![scenario], sampling, vec![ControllerChoice::ACC, ControllerChoice::MIS])?;
     let gates = GateSet::of(["count(induced) <= 1".parse()?]);
     let (summary, judged) = plan.campaign().judge(&gates)?;
     let pairs = summary.total().pairs;

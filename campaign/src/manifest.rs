@@ -246,7 +246,7 @@ mod tests {
             }],
             sampling: Sampling { seed: 1, design: Design::Random, samples: 10 },
             partition: None,
-            arms: vec![ControllerChoice::Mis],
+            arms: vec![ControllerChoice::MIS],
             sensors: None,
             checks: CheckPlan::default(),
             inference: Inference::default(),
@@ -285,7 +285,7 @@ mod tests {
         other.closecall_version = "0.1.0+01".to_owned();
         other.sampling.seed = 2;
         other.partition = Some("1/3".parse().unwrap());
-        other.arms = vec![ControllerChoice::Acc, ControllerChoice::Mis];
+        other.arms = vec![ControllerChoice::ACC, ControllerChoice::MIS];
         other.sensors = Some(SensorMode::Full);
         other.sample_timeout_s = 10.0;
         other.scenarios[0].text = "one\nthree\n".to_owned();

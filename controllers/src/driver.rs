@@ -89,7 +89,7 @@ pub struct Lead {
 mod tests {
     use closecall_traffic::{ActorId, Check, Parameters, stream};
 
-    use super::testing::{car_ahead, with_input};
+    use super::testing::{car_ahead, overtaker_config, with_input};
     use super::*;
 
     #[test]
@@ -104,17 +104,7 @@ mod tests {
         };
         assert!(refuses(&mut Wiedemann99Driver::new(wiedemann)));
         assert!(refuses(&mut IdmConfig::default().check(&none).unwrap().driver()));
-        let overtaker = OvertakerConfig {
-            cut_out_thw_s: 1.5.into(),
-            follow: FollowConfig::Wiedemann99(Wiedemann99Config::default()),
-            reaction_s: ReactionConfig::Value(0.9.into()),
-            lane_change_duration_s: None,
-            evasive_lateral_mps2: None,
-            lapse: None,
-            perception: None,
-            brake_build_up_mps3: None,
-            returns: None,
-        };
+        let overtaker = overtaker_config(1.5, 0.9);
         assert!(refuses(&mut overtaker.check(&none).unwrap().driver()));
     }
 }

@@ -105,11 +105,11 @@ impl ComparisonArgs {
     ) -> Result<Vec<ControllerChoice>, CliError> {
         if self.arms.is_empty() {
             return match tested.choice()? {
-                ControllerChoice::Acc if self.paired => Err(CliError::Usage {
+                ControllerChoice::ACC if self.paired => Err(CliError::Usage {
                     message: "--paired compares a controller with `acc`: name another with --controller".to_owned(),
                 }),
-                tested if self.paired || (by_default && tested != ControllerChoice::Acc) => {
-                    Ok(vec![ControllerChoice::Acc, tested])
+                tested if self.paired || (by_default && tested != ControllerChoice::ACC) => {
+                    Ok(vec![ControllerChoice::ACC, tested])
                 }
                 tested => Ok(vec![tested]),
             };

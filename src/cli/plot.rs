@@ -102,7 +102,7 @@ fn of_campaign(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
     let (scenario, key) = saved.sample(args.scenario.as_deref(), sample)?;
     let mut arms = saved.manifest().arms();
     if args.comparison.paired && arms.len() < 2 {
-        arms.insert(0, arm(&ControllerChoice::Acc, args.arm.sensors));
+        arms.insert(0, arm(&ControllerChoice::ACC, args.arm.sensors));
     }
     films(&scenario, key, &arms)
 }

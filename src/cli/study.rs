@@ -98,8 +98,8 @@ impl StudyArgs {
     /// Returns the baseline, unless the controller under test is the baseline itself, and the controller under test.
     fn controllers(&self) -> Result<Vec<ControllerChoice>, CliError> {
         Ok(match self.controller.choice()? {
-            ControllerChoice::Acc => vec![ControllerChoice::Acc],
-            tested => vec![ControllerChoice::Acc, tested],
+            ControllerChoice::ACC => vec![ControllerChoice::ACC],
+            tested => vec![ControllerChoice::ACC, tested],
         })
     }
 

@@ -119,7 +119,7 @@ fn manifest(campaign: &Campaign) -> Manifest {
         }],
         sampling: campaign.works[0].sampling,
         partition: None,
-        arms: vec![ControllerChoice::Acc, ControllerChoice::Mis],
+        arms: vec![ControllerChoice::ACC, ControllerChoice::MIS],
         sensors: None,
         checks: CheckPlan::default(),
         inference: Inference::default(),

@@ -67,6 +67,14 @@ impl Parameters {
         range.check(value, key)
     }
 
+    /// Returns the number that `num` stands for, checked against `range`, or `default` if there is none.
+    ///
+    /// # Errors
+    /// As [`Self::number`].
+    pub fn number_or(&self, num: Option<&Num>, key: &str, range: Range, default: f64) -> Result<f64, ConfigError> {
+        num.map_or(Ok(default), |num| self.number(num, key, range))
+    }
+
     /// Returns the label that `choice` stands for.
     ///
     /// # Errors

@@ -152,10 +152,8 @@ impl Check for VehicleConfig {
 
     fn check(&self, parameters: &Parameters) -> Result<Vehicle, ConfigError> {
         let typical = Vehicle::typical(parameters.word(&self.class, "class")?);
-        let or_typical = |num: &Option<Num>, key, range, typical| match num {
-            Some(num) => parameters.number(num, key, range),
-            None => Ok(typical),
-        };
+        let or_typical =
+            |num: &Option<Num>, key, range, typical| parameters.number_or(num.as_ref(), key, range, typical);
         let look = typical.appearance;
         let body_shape = self.check_body_shape(typical.class, parameters)?;
         let size = body_shape.map_or(typical.dimensions, BodyShape::usual_dimensions);

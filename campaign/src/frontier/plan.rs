@@ -117,7 +117,7 @@ impl FrontierPlan {
 
     /// Returns true if no key of the grid can change the baseline.
     fn shares_baseline(&self) -> bool {
-        self.controllers.first() == Some(&ControllerChoice::Acc)
+        self.controllers.first() == Some(&ControllerChoice::ACC)
             && self.grid.iter().all(|grid| grid.key.contains(OF_SYSTEM))
     }
 
@@ -253,7 +253,7 @@ mod tests {
             file,
             grid,
             sampling: Sampling { seed: 0, design: Default::default(), samples: 10 },
-            controllers: vec![ControllerChoice::Acc, ControllerChoice::Mis],
+            controllers: vec![ControllerChoice::ACC, ControllerChoice::MIS],
             sensors: None,
             workers: Workers::default(),
         };

@@ -43,16 +43,16 @@ pub struct IdmConfig {
     pub acceleration_mps2: Option<Num>,
     /// Comfortable deceleration B (m/s²). Default: 1.67.
     pub comfortable_braking_mps2: Option<Num>,
+    /// Rate at which the driver builds up braking (m/s³): 1 to 100. Default: 12.65. It needs a reaction time.
+    pub brake_build_up_mps3: Option<Num>,
     /// Hardest braking (m/s²): 4 to 9. Default: 6.7.
     pub hardest_braking_mps2: Option<Num>,
     /// Reaction time (s). Without it, the driver uses the true state of traffic at each step.
     pub reaction_s: Option<ReactionConfig>,
-    /// Lapses of attention. Default: none. They need a reaction time.
-    pub lapse: Option<LapseConfig>,
     /// How the driver perceives the vehicles ahead. It needs a reaction time.
     pub perception: Option<PerceptionConfig>,
-    /// Rate at which the driver builds up braking (m/s³): 1 to 100. Default: 12.65. It needs a reaction time.
-    pub brake_build_up_mps3: Option<Num>,
+    /// Lapses of attention. Default: none. They need a reaction time.
+    pub lapse: Option<LapseConfig>,
 }
 
 /// The checked Intelligent Driver Model.
@@ -63,23 +63,22 @@ pub struct Idm {
     standstill_gap_m: f64,
     acceleration_mps2: f64,
     comfortable_braking_mps2: f64,
+    brake_build_up_mps3: f64,
     pub(crate) hardest_braking_mps2: f64,
     pub(crate) reaction: Option<Reaction>,
-    lapse: Option<Lapse>,
     perception: PerceptionSettings,
-    brake_build_up_mps3: f64,
+    lapse: Option<Lapse>,
 }
 
 impl Check for IdmConfig {
     type Checked = Idm;
 
     fn check(&self, parameters: &Parameters) -> Result<Idm, ConfigError> {
-        let number_or = |num: &Option<Num>, key, range, default| match num {
-            Some(num) => parameters.number(num, key, range),
-            None => Ok(default),
-        };
+        let number_or =
+            |num: &Option<Num>, key, range, default| parameters.number_or(num.as_ref(), key, range, default);
         let desired = self.desired_speed_mps.as_ref();
-        let reaction = self.reaction_s.as_ref();
+        let reaction = self.reaction_s.as_ref().map(|config| config.check(parameters)).transpose()?;
+        let reacts = reaction.is_some();
         let braking = Range::above(0.0, MAX_COMFORTABLE_BRAKING_MPS2);
         Ok(Idm {
             desired_mps: desired
@@ -100,14 +99,10 @@ impl Check for IdmConfig {
                 HARDEST_BRAKING_RANGE,
                 DEFAULT_HARDEST_BRAKING_MPS2,
             )?,
-            reaction: reaction.map(|config| config.check(parameters)).transpose()?,
-            lapse: check_lapse(self.lapse.as_ref(), reaction.is_some(), parameters)?,
-            perception: check_perception(self.perception.as_ref(), reaction.is_some(), parameters)?,
-            brake_build_up_mps3: check_brake_build_up(
-                self.brake_build_up_mps3.as_ref(),
-                reaction.is_some(),
-                parameters,
-            )?,
+            reaction,
+            perception: check_perception(self.perception.as_ref(), reacts, parameters)?,
+            lapse: check_lapse(self.lapse.as_ref(), reacts, parameters)?,
+            brake_build_up_mps3: check_brake_build_up(self.brake_build_up_mps3.as_ref(), reacts, parameters)?,
         })
     }
 }

@@ -2,7 +2,23 @@
 
 use closecall_traffic::{Indicator, Road, Time, Vehicle, VehicleClass, VehicleState};
 
-use super::{DriverInput, Lead, Neighbour, Neighbours};
+use super::reaction::ReactionConfig;
+use super::{DriverInput, FollowConfig, Lead, Neighbour, Neighbours, OvertakerConfig, Wiedemann99Config};
+
+/// Returns a driver who pulls out at a time headway of `cut_out_thw_s` and follows with this cc1 (s).
+pub(super) fn overtaker_config(cut_out_thw_s: f64, cc1_s: f64) -> OvertakerConfig {
+    OvertakerConfig {
+        cut_out_thw_s: cut_out_thw_s.into(),
+        follow: FollowConfig::Wiedemann99(Wiedemann99Config { cc1_s: Some(cc1_s.into()), ..Default::default() }),
+        reaction_s: ReactionConfig::Value(0.9.into()),
+        lane_change_duration_s: None,
+        evasive_lateral_mps2: None,
+        lapse: None,
+        perception: None,
+        brake_build_up_mps3: None,
+        returns: None,
+    }
+}
 
 /// Returns a car with this gap and motion, straight ahead of a driver.
 pub(super) fn car_ahead(lead: Lead, brake_light: bool) -> Neighbour {

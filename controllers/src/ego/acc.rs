@@ -127,10 +127,12 @@ impl Check for AccConfig {
             set_speed_mps: set_speed
                 .map(|num| parameters.number(num, "set-speed-mps", Range::above(0.0, 100.0)))
                 .transpose()?,
-            standstill_gap_m: match &self.standstill_gap_m {
-                Some(num) => parameters.number(num, "standstill-gap-m", Range::closed(0.5, 20.0))?,
-                None => 3.0,
-            },
+            standstill_gap_m: parameters.number_or(
+                self.standstill_gap_m.as_ref(),
+                "standstill-gap-m",
+                Range::closed(0.5, 20.0),
+                3.0,
+            )?,
             policy: GapPolicy::Constant,
         })
     }

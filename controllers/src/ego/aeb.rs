@@ -51,10 +51,7 @@ impl Check for AebConfig {
     type Checked = Aeb;
 
     fn check(&self, parameters: &Parameters) -> Result<Aeb, ConfigError> {
-        let or = |num: &Option<Num>, key, range, default| match num {
-            Some(num) => parameters.number(num, key, range),
-            None => Ok(default),
-        };
+        let or = |num: &Option<Num>, key, range, default| parameters.number_or(num.as_ref(), key, range, default);
         Ok(Aeb {
             trigger_mps2: or(&self.trigger_mps2, "trigger-mps2", Range::closed(2.0, 9.0), 4.0)?,
             max_deceleration_mps2: or(

@@ -8,6 +8,7 @@ mod in_car;
 mod layouts;
 mod malformed;
 mod malformed_layouts;
+mod malformed_rows;
 mod ngsim_us101;
 mod own_trajectory_files;
 mod robustness;

@@ -59,3 +59,10 @@ pub(crate) fn track(change: SyntheticLaneChange, period: Time) -> Trajectory {
         points: (0..frames).map(point).collect(),
     }
 }
+/// Asserts that the error message contains all of `needed`.
+pub(crate) fn assert_mentions(error: &TrajectoryFileError, needed: &[&str], what: &str) {
+    let message = error.to_string();
+    for part in needed {
+        assert!(message.contains(part), "{what}: `{message}` does not say `{part}`");
+    }
+}

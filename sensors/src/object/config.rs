@@ -178,9 +178,8 @@ impl ObjectSensorConfig {
     }
 
     fn check_against(&self, defaults: &Defaults, parameters: &Parameters) -> Result<ObjectSensorModel, ConfigError> {
-        let number = |num: &Option<Num>, default: f64, key: &str, range: Range| match num {
-            Some(num) => parameters.number(num, key, range),
-            None => Ok(default),
+        let number = |num: &Option<Num>, default: f64, key: &str, range: Range| {
+            parameters.number_or(num.as_ref(), key, range, default)
         };
         let half_angle_tan = match defaults.half_angle_deg {
             None if self.half_angle_deg.is_some() => return Err(half_angle_not_allowed()),

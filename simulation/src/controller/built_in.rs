@@ -40,6 +40,9 @@ impl fmt::Display for BuiltIn {
 }
 
 impl BuiltIn {
+    /// The controllers whose name has no number.
+    pub(super) const FIXED: [Self; 5] = [Self::Acc, Self::Mis, Self::MisExtended, Self::R157Gap, Self::R157Driver];
+
     /// Returns a factory of this controller.
     pub fn factory(self) -> Arc<dyn ControllerFactory> {
         Arc::new(BuiltInFactory { name: self.to_string(), built_in: self })

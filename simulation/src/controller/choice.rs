@@ -16,18 +16,8 @@ use crate::run::ControllerFactory;
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(into = "Stored", try_from = "Stored")]
 pub enum ControllerChoice {
-    /// The scenario's ego stack without its margin increase system.
-    Acc,
-    /// The scenario's complete ego stack.
-    Mis,
-    /// The scenario's complete ego stack with the extended margin increase system.
-    MisExtended,
-    /// The ego stack without its margin increase system, with another constant time gap.
-    Gap(TimeGap),
-    /// The ego stack without its margin increase system, with the minimum following distance of UN Regulation 157.
-    R157Gap,
-    /// The competent and careful human driver of UN Regulation 157.
-    R157Driver,
+    /// A controller of this program.
+    BuiltIn(BuiltIn),
     /// A separate process for each sample.
     Exec(ExecSettings),
 }
@@ -40,9 +30,17 @@ const WORDS: &str = "`acc`, `mis`, `mis-extended`, `gap-1.2`, `gap-1.6`, `gap-2.
 const GAP: &str = "gap-";
 
 impl ControllerChoice {
+    /// The scenario's ego stack without its margin increase system.
+    pub const ACC: Self = Self::BuiltIn(BuiltIn::Acc);
+    /// The scenario's complete ego stack.
+    pub const MIS: Self = Self::BuiltIn(BuiltIn::Mis);
+
     /// Returns the name in reports, if the campaign has no other controller of this name: see [`Self::names`].
     pub fn name(&self) -> String {
-        self.built_in().map_or_else(|| EXEC.to_owned(), |built_in| built_in.to_string())
+        match self {
+            Self::BuiltIn(built_in) => built_in.to_string(),
+            Self::Exec(_) => EXEC.to_owned(),
+        }
     }
 
     /// Returns the names of the arms of a campaign. Several processes are numbered, so that each arm has a name of its own.
@@ -59,15 +57,7 @@ impl ControllerChoice {
 
     /// Returns the built-in controller, or `None` if this is a process.
     pub const fn built_in(&self) -> Option<BuiltIn> {
-        Some(match self {
-            Self::Acc => BuiltIn::Acc,
-            Self::Mis => BuiltIn::Mis,
-            Self::MisExtended => BuiltIn::MisExtended,
-            Self::Gap(gap) => BuiltIn::Gap(*gap),
-            Self::R157Gap => BuiltIn::R157Gap,
-            Self::R157Driver => BuiltIn::R157Driver,
-            Self::Exec(_) => return None,
-        })
+        if let Self::BuiltIn(built_in) = self { Some(*built_in) } else { None }
     }
 
     /// Returns the settings of the process, or `None` if this is a built-in controller.
@@ -83,9 +73,9 @@ impl ControllerChoice {
     /// Returns a factory of this controller. A process runs in the given folder, or in that of this program, and has the
     /// given name in reports.
     pub fn factory_in(&self, folder: Option<&Path>, name: String) -> Arc<dyn ControllerFactory> {
-        match (self.exec(), self.built_in()) {
-            (Some(settings), _) => Arc::new(ExecFactory::new(settings.clone(), folder).named(name)),
-            (None, built_in) => built_in.unwrap_or(BuiltIn::Acc).factory(),
+        match self {
+            Self::BuiltIn(built_in) => built_in.factory(),
+            Self::Exec(settings) => Arc::new(ExecFactory::new(settings.clone(), folder).named(name)),
         }
     }
 
@@ -97,14 +87,7 @@ impl ControllerChoice {
 
 impl From<BuiltIn> for ControllerChoice {
     fn from(built_in: BuiltIn) -> Self {
-        match built_in {
-            BuiltIn::Acc => Self::Acc,
-            BuiltIn::Mis => Self::Mis,
-            BuiltIn::MisExtended => Self::MisExtended,
-            BuiltIn::Gap(gap) => Self::Gap(gap),
-            BuiltIn::R157Gap => Self::R157Gap,
-            BuiltIn::R157Driver => Self::R157Driver,
-        }
+        Self::BuiltIn(built_in)
     }
 }
 
@@ -159,14 +142,14 @@ impl FromStr for ControllerChoice {
                 .then_some(Self::Exec(exec))
                 .ok_or_else(|| UnknownController::Command { command: command.to_owned() });
         }
-        let named = [Self::Acc, Self::Mis, Self::MisExtended, Self::R157Gap, Self::R157Driver];
-        if let Some(found) = named.into_iter().find(|choice| choice.name() == text) {
-            return Ok(found);
+        if let Some(found) = BuiltIn::FIXED.into_iter().find(|built_in| built_in.to_string() == text) {
+            return Ok(found.into());
         }
         match text.strip_prefix(GAP) {
-            Some(seconds) => {
-                seconds.parse().map(Self::Gap).map_err(|()| UnknownController::Gap { text: text.to_owned() })
-            }
+            Some(seconds) => seconds
+                .parse()
+                .map(|gap| BuiltIn::Gap(gap).into())
+                .map_err(|()| UnknownController::Gap { text: text.to_owned() }),
             None => {
                 let word = text.split(':').next().unwrap_or_default();
                 Err(UnknownController::Name { text: text.to_owned(), hint: hint(word, WORDS) })
@@ -193,7 +176,7 @@ impl From<ControllerChoice> for Stored {
     fn from(choice: ControllerChoice) -> Self {
         match choice {
             ControllerChoice::Exec(exec) => Self::Process(StoredProcess { exec }),
-            built_in => Self::BuiltIn(built_in.name()),
+            ControllerChoice::BuiltIn(built_in) => Self::BuiltIn(built_in.to_string()),
         }
     }
 }
@@ -246,7 +229,7 @@ mod tests {
 
     #[test]
     fn several_processes_are_numbered() {
-        let arms = [ControllerChoice::Acc, exec("a"), ControllerChoice::Mis, exec("b")];
+        let arms = [ControllerChoice::ACC, exec("a"), ControllerChoice::MIS, exec("b")];
         assert_eq!(ControllerChoice::names(&arms), ["acc", "exec-1", "mis", "exec-2"]);
         assert_eq!(ControllerChoice::names(&arms[..3]), ["acc", "exec", "mis"]);
     }

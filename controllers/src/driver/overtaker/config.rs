@@ -90,14 +90,16 @@ impl Check for OvertakerConfig {
             );
             return Err(ConfigError::new("cut-out-thw-s", Problem::Contradiction { other: "follow", rule }));
         }
-        let evasive_lateral_mps2 = match &self.evasive_lateral_mps2 {
-            Some(num) => parameters.number(num, "evasive-lateral-mps2", Range::closed(0.0, 8.0))?,
-            None => DEFAULT_EVASIVE_LATERAL_MPS2,
-        };
-        let duration_s = match &self.lane_change_duration_s {
-            Some(num) => parameters.number(num, "lane-change-duration-s", Range::closed(1.5, 20.0))?,
-            None => DEFAULT_DURATION_S,
-        };
+        let number_or =
+            |num: &Option<Num>, key, range, default| parameters.number_or(num.as_ref(), key, range, default);
+        let evasive_lateral_mps2 = number_or(
+            &self.evasive_lateral_mps2,
+            "evasive-lateral-mps2",
+            Range::closed(0.0, 8.0),
+            DEFAULT_EVASIVE_LATERAL_MPS2,
+        )?;
+        let duration = &self.lane_change_duration_s;
+        let duration_s = number_or(duration, "lane-change-duration-s", Range::closed(1.5, 20.0), DEFAULT_DURATION_S)?;
         Ok(Overtaker {
             cut_out_thw_s,
             follow,
@@ -115,21 +117,8 @@ impl Check for OvertakerConfig {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::driver::testing::overtaker_config as config;
     use crate::driver::{IdmConfig, Wiedemann99Config};
-
-    fn config(cut_out_thw_s: f64, cc1_s: f64) -> OvertakerConfig {
-        OvertakerConfig {
-            cut_out_thw_s: cut_out_thw_s.into(),
-            follow: FollowConfig::Wiedemann99(Wiedemann99Config { cc1_s: Some(cc1_s.into()), ..Default::default() }),
-            reaction_s: ReactionConfig::Value(0.9.into()),
-            lane_change_duration_s: None,
-            evasive_lateral_mps2: None,
-            lapse: None,
-            perception: None,
-            brake_build_up_mps3: None,
-            returns: None,
-        }
-    }
 
     #[test]
     fn a_safe_gap_above_the_cut_out_gap_is_allowed() {

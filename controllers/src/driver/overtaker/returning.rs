@@ -33,9 +33,8 @@ impl Check for ReturnConfig {
     type Checked = Return;
 
     fn check(&self, parameters: &Parameters) -> Result<Return, ConfigError> {
-        let number_or = |num: &Option<Num>, key, range, default| match num {
-            Some(num) => parameters.number(num, key, range).map_err(|error| error.within("returns")),
-            None => Ok(default),
+        let number_or = |num: &Option<Num>, key, range, default| {
+            parameters.number_or(num.as_ref(), key, range, default).map_err(|error| error.within("returns"))
         };
         let after_s = number_or(&self.after_s, "after-s", Range::closed(0.0, 600.0), 0.0)?;
         Ok(Return {

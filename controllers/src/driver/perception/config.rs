@@ -32,10 +32,7 @@ impl Check for PerceptionConfig {
     type Checked = PerceptionSettings;
 
     fn check(&self, parameters: &Parameters) -> Result<PerceptionSettings, ConfigError> {
-        let anticipation = match &self.anticipation {
-            Some(num) => parameters.number(num, "anticipation", Range::UNIT)?,
-            None => 0.0,
-        };
+        let anticipation = parameters.number_or(self.anticipation.as_ref(), "anticipation", Range::UNIT, 0.0)?;
         let evidence = self.evidence.as_ref().map(|config| config.check(parameters)).transpose();
         Ok(PerceptionSettings { anticipation, evidence: evidence.map_err(|error| error.within("evidence"))? })
     }

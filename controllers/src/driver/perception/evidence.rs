@@ -56,10 +56,8 @@ impl Check for EvidenceConfig {
     type Checked = Evidence;
 
     fn check(&self, parameters: &Parameters) -> Result<Evidence, ConfigError> {
-        let number_or = |num: &Option<Num>, key, range, default| match num {
-            Some(num) => parameters.number(num, key, range),
-            None => Ok(default),
-        };
+        let number_or =
+            |num: &Option<Num>, key, range, default| parameters.number_or(num.as_ref(), key, range, default);
         Ok(Evidence {
             threshold: number_or(&self.threshold, "threshold", Range::above(0.0, 2.0), DEFAULT_THRESHOLD)?,
             gating_per_s: number_or(&self.gating_per_s, "gating-per-s", Range::closed(0.0, 0.5), DEFAULT_GATING_PER_S)?,

@@ -106,10 +106,8 @@ impl Check for Wiedemann99Config {
 
     fn check(&self, parameters: &Parameters) -> Result<Wiedemann99, ConfigError> {
         let default = Parameters99::VISSIM;
-        let number_or = |num: &Option<Num>, key, range, default| match num {
-            Some(num) => parameters.number(num, key, range),
-            None => Ok(default),
-        };
+        let number_or =
+            |num: &Option<Num>, key, range, default| parameters.number_or(num.as_ref(), key, range, default);
         let desired_speed_mps = self.desired_speed_mps.as_ref();
         let reaction = self.reaction_s.as_ref();
         Ok(Wiedemann99 {

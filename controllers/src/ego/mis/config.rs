@@ -96,10 +96,7 @@ impl Check for MisConfig {
 
     fn check(&self, parameters: &Parameters) -> Result<MisSettings, ConfigError> {
         let paper = MisSettings::PAPER;
-        let or = |num: &Option<Num>, key, range, default| match num {
-            Some(num) => parameters.number(num, key, range),
-            None => Ok(default),
-        };
+        let or = |num: &Option<Num>, key, range, default| parameters.number_or(num.as_ref(), key, range, default);
         let braking = Range::above(0.0, 9.0);
         Ok(MisSettings {
             max_deceleration_mps2: or(

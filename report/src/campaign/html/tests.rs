@@ -22,7 +22,7 @@ fn page() -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios/library/low-thw-overtake.toml");
     let file = ScenarioFile::load(&path, &[]).unwrap();
     let sampling = Sampling { seed: 1, design: Design::Random, samples: 30 };
-    let controllers = vec![ControllerChoice::Acc, ControllerChoice::Mis];
+    let controllers = vec![ControllerChoice::ACC, ControllerChoice::MIS];
     let mut plan = Plan::new(vec![file], sampling, controllers).unwrap();
     plan.sensors = Some(SensorMode::GroundTruth);
     let (running, manifest): (_, Manifest) = (plan.campaign(), plan.manifest(vec!["closecall".to_owned()]).unwrap());

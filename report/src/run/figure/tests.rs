@@ -26,7 +26,7 @@ fn films(name: &str, arms: &[ControllerChoice]) -> Vec<Film> {
 
 #[test]
 fn the_figure_of_the_papers_scenario_shows_all_five_moments_and_the_prevented_collision() {
-    let films = films("paper-figure", &[ControllerChoice::Acc, ControllerChoice::Mis]);
+    let films = films("paper-figure", &[ControllerChoice::ACC, ControllerChoice::MIS]);
     let text = encounter(&films);
     for letter in ["(a)", "(b)", "(c)", "(d)", "(e)", "COLLISION", "No collision", "critical 0.9 s", "increasing"] {
         assert!(text.contains(letter), "{letter}");
@@ -46,7 +46,7 @@ fn a_picture_renders_its_text_and_gives_the_same_bytes_each_time() {
 
 #[test]
 fn a_run_without_other_vehicles_nearby_has_a_still_and_a_figure() {
-    let films = films("empty-wet-road", &[ControllerChoice::Mis]);
+    let films = films("empty-wet-road", &[ControllerChoice::MIS]);
     for text in [still(&films[0]), encounter(&films)] {
         assert!(text.contains("No collision") && !text.contains("NaN") && !text.contains("inf"));
     }

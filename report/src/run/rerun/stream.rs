@@ -29,6 +29,20 @@ pub(super) const STEP_TIMELINE: &str = "step";
 /// Timeline of the simulated time that begins with a copy of the critical moment.
 pub(super) const OPENING_TIMELINE: &str = "opening";
 
+/// A function that returns the columns of a range of rows.
+pub(super) trait BuildColumns: Fn(Range<usize>) -> SerializationResult<Self::Columns> {
+    /// The columns, one for each component.
+    type Columns: Iterator<Item = SerializedComponentColumn>;
+}
+
+impl<F, C> BuildColumns for F
+where
+    F: Fn(Range<usize>) -> SerializationResult<C>,
+    C: Iterator<Item = SerializedComponentColumn>,
+{
+    type Columns = C;
+}
+
 /// Writes the entities of one film into a recording.
 pub(super) struct Writer<'a> {
     chunks: &'a Chunks,
@@ -60,15 +74,12 @@ impl<'a> Writer<'a> {
 
     /// Writes one row of components for each of `times`, which must ascend, and a copy of the row that holds at the
     /// critical moment. `build` returns the columns of a range of rows.
-    pub(super) fn write_rows<C>(
+    pub(super) fn write_rows(
         &self,
         entity: &str,
         times: &[Time],
-        build: impl Fn(Range<usize>) -> SerializationResult<C>,
-    ) -> Result<(), RecordingError>
-    where
-        C: Iterator<Item = SerializedComponentColumn>,
-    {
+        build: impl BuildColumns,
+    ) -> Result<(), RecordingError> {
         let until_critical = times.partition_point(|&time| time <= self.critical);
         if let Some(shown) = until_critical.checked_sub(1) {
             let columns = build(shown..shown + 1).map_err(RecordingStreamError::from)?;
@@ -79,15 +90,12 @@ impl<'a> Writer<'a> {
     }
 
     /// Writes rows like [`Self::write_rows`], without a copy. For data that a view shows over the whole run at once.
-    pub(super) fn write_curve<C>(
+    pub(super) fn write_curve(
         &self,
         entity: &str,
         times: &[Time],
-        build: impl Fn(Range<usize>) -> SerializationResult<C>,
-    ) -> Result<(), RecordingError>
-    where
-        C: Iterator<Item = SerializedComponentColumn>,
-    {
+        build: impl BuildColumns,
+    ) -> Result<(), RecordingError> {
         if times.is_empty() {
             return Ok(());
         }

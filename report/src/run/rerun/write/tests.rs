@@ -36,7 +36,7 @@ fn filmed(name: &str, controller: ControllerChoice, (sensors, level): (Option<Se
 }
 
 fn default_film() -> Film {
-    filmed("low-thw-overtake", ControllerChoice::Mis, (None, Level::Full))
+    filmed("low-thw-overtake", ControllerChoice::MIS, (None, Level::Full))
 }
 
 /// Returns the films of an encounter in simulated traffic, used as recorded traffic, and of its re-enactment with the MIS.
@@ -46,14 +46,14 @@ fn recorded_and_simulated(level: Level) -> [Film; 2] {
     let scenario = concrete(&library("overtake-without-brake"), sampling, 0).unwrap();
     let mut traffic = TrafficRecorder::default();
     traffic.begin(&scenario);
-    simulate(&scenario, key, &arm(ControllerChoice::Acc), &mut traffic).unwrap();
+    simulate(&scenario, key, &arm(ControllerChoice::ACC), &mut traffic).unwrap();
     let recording = smooth(&traffic.finish("own"));
     let changes = detect(&recording);
     let found = encounter(&recording, &changes[0], &changes, CONTROL_STEP).unwrap();
     let again = reenact(&found, RearDriver::Model, (Path::new("own"), &[])).unwrap();
     let again = again.concrete(&again.space().nominal()).unwrap();
-    let mut recorder = FilmRecorder::new(&again, key, &arm(ControllerChoice::Mis), level);
-    let outcome = simulate(&again, key, &arm(ControllerChoice::Mis), &mut recorder).unwrap();
+    let mut recorder = FilmRecorder::new(&again, key, &arm(ControllerChoice::MIS), level);
+    let outcome = simulate(&again, key, &arm(ControllerChoice::MIS), &mut recorder).unwrap();
     let (recorded, simulated) = (film_encounter(&found, level).unwrap(), recorder.finish(&outcome));
     let foreword =
         EncounterComparison::new(&found, &recorded, &simulated).markdown(&found, &simulated, RearDriver::Model);
@@ -121,7 +121,7 @@ fn every_scenario_of_the_library_fills_every_view_at_every_level() {
     let names = files.filter(|path| path.extension().is_some_and(|extension| extension == "toml"));
     for name in names.map(|path| path.file_stem().unwrap().to_str().unwrap().to_owned()) {
         for (level, least) in [(Level::Events, 7), (Level::Objects, 9), (Level::Full, 9)] {
-            let films = [filmed(&name, ControllerChoice::Mis, (Some(SensorMode::Object), level))];
+            let films = [filmed(&name, ControllerChoice::MIS, (Some(SensorMode::Object), level))];
             let (views, empty, timelines) = empty_views(&films);
             assert!(views >= least && empty.is_empty(), "{name}, {level:?}: {views} views, no entity at {empty:?}");
             assert_eq!(timelines, [OPENING_TIMELINE], "{name}, {level:?}");
@@ -132,7 +132,7 @@ fn every_scenario_of_the_library_fills_every_view_at_every_level() {
 #[test]
 fn a_pair_fills_every_view_and_shows_the_baseline_as_ghosts() {
     let film = |controller| filmed("paper-figure", controller, (None, Level::Objects));
-    let films = [film(ControllerChoice::Acc), film(ControllerChoice::Mis)];
+    let films = [film(ControllerChoice::ACC), film(ControllerChoice::MIS)];
     let (views, empty, _) = empty_views(&films);
     assert!(views >= 13 && empty.is_empty(), "{views} views, no entity at {empty:?}");
     let data = chunks(&films, StoreKind::Recording);
@@ -173,7 +173,7 @@ fn recorded_and_simulated_traffic_share_timelines_and_are_ghosts_of_each_other()
 
 #[test]
 fn full_sensors_show_points_boxes_ground_truth_and_images() {
-    let films = [filmed("low-thw-overtake", ControllerChoice::Mis, (Some(SensorMode::Full), Level::Full))];
+    let films = [filmed("low-thw-overtake", ControllerChoice::MIS, (Some(SensorMode::Full), Level::Full))];
     let data = chunks(&films, StoreKind::Recording);
     let entities = [
         "/mis/world/ego/lidar/clusters",
@@ -220,7 +220,7 @@ fn all_timelines_span_the_run_and_the_opening_one_begins_with_the_critical_momen
 #[test]
 fn the_same_films_give_the_same_bytes_and_other_films_another_name() {
     let film = |controller| filmed("paper-figure", controller, (None, Level::Objects));
-    let pair = || [film(ControllerChoice::Acc), film(ControllerChoice::Mis)];
+    let pair = || [film(ControllerChoice::ACC), film(ControllerChoice::MIS)];
     let bytes = |films: &[Film]| super::chunks::encode_messages(&record(films).unwrap());
     assert!(bytes(&pair()) == bytes(&pair()));
     let name = |films: &[Film]| record(films).unwrap().last().unwrap().store_id().clone();
@@ -231,7 +231,7 @@ fn the_same_films_give_the_same_bytes_and_other_films_another_name() {
 #[test]
 fn the_verdict_on_a_pair_is_its_first_word() {
     let film = |controller| filmed("paper-figure", controller, (None, Level::Events));
-    let [baseline, tested] = [film(ControllerChoice::Acc), film(ControllerChoice::Mis)];
+    let [baseline, tested] = [film(ControllerChoice::ACC), film(ControllerChoice::MIS)];
     let first = |films: &[Film]| summary::verdict(films).lines().next().unwrap_or_default().to_owned();
     assert_eq!(first(&[baseline.clone(), tested.clone()]), "### PREVENTED");
     assert_eq!(first(&[tested.clone(), baseline.clone()]), "### INDUCED");
