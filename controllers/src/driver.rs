@@ -32,16 +32,16 @@ pub use reaction::{LogNormalConfig, Reaction, ReactionConfig};
 pub use speed_keeping::{DesiredSpeedNoise, SpeedKeeping, SpeedKeepingConfig};
 pub use wiedemann99::{Regime, Thresholds, Wiedemann99, Wiedemann99Config, Wiedemann99Driver, Wiedemann99Model};
 
-use closecall_traffic::{Range, Time};
+use closecall_traffic::{ConfigError, Num, Parameters, Range, Time};
 
 /// Hardest braking of a human driver if the scenario gives none (m/s²): the mean of car drivers in crashes and
 /// near-crashes, whose distribution is normal with a standard deviation of 1.7 (Markkula, Engström, Lodin, Bärgman and
 /// Victor, *A farewell to brake reaction times?*, Accident Analysis and Prevention 95 (2016) 209–226; parameters in the
 /// authors' code, `gmarkkula/RearEndDriverModels`). Range for an ensemble: 4 to 9.
-pub(crate) const DEFAULT_HARDEST_BRAKING_MPS2: f64 = 6.7;
+const DEFAULT_HARDEST_BRAKING_MPS2: f64 = 6.7;
 
 /// Range of the hardest braking of a human driver (m/s²).
-pub(crate) const HARDEST_BRAKING_RANGE: Range = Range::closed(4.0, 9.0);
+const HARDEST_BRAKING_RANGE: Range = Range::closed(4.0, 9.0);
 
 /// Deceleration at highway speed with the accelerator released (m/s²): an assumption; 0.4 to 1 are plausible.
 pub(crate) const COASTING_DECELERATION_MPS2: f64 = 0.7;
@@ -51,6 +51,11 @@ pub(crate) const BRAKING_MARGIN: f64 = 1.2;
 
 /// Speed below which a vehicle counts as standing (m/s): numerical.
 pub(crate) const STANDING_MPS: f64 = 0.1;
+
+/// Returns the hardest braking of a human driver (m/s²), from the configuration or by default.
+pub(crate) fn check_hardest_braking(num: Option<&Num>, parameters: &Parameters) -> Result<f64, ConfigError> {
+    parameters.number_or(num, "hardest-braking-mps2", HARDEST_BRAKING_RANGE, DEFAULT_HARDEST_BRAKING_MPS2)
+}
 
 /// Returns `value`, or an error if it is not finite.
 pub(crate) fn finite(value: f64, what: &'static str, time: Time) -> Result<f64, DriverError> {
@@ -87,7 +92,7 @@ pub struct Lead {
 
 #[cfg(test)]
 mod tests {
-    use closecall_traffic::{ActorId, Check, Parameters, stream};
+    use closecall_traffic::{ActorId, Check, stream};
 
     use super::testing::{car_ahead, overtaker_config, with_input};
     use super::*;

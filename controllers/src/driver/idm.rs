@@ -18,10 +18,7 @@ use super::pedals::{Pedals, check_brake_build_up};
 use super::perception::{Perception, PerceptionConfig, PerceptionSettings, check_perception};
 use super::reaction::{Reaction, ReactionConfig};
 use super::wiedemann99::{EmergencyBrakingDetector, brake_for_brake_light, default_desired_mps, nearest_lead};
-use super::{
-    DEFAULT_HARDEST_BRAKING_MPS2, Driver, DriverAction, DriverError, DriverInput, HARDEST_BRAKING_RANGE, Lead,
-    check_finite, finite,
-};
+use super::{Driver, DriverAction, DriverError, DriverInput, Lead, check_finite, check_hardest_braking, finite};
 
 /// Largest comfortable deceleration that a scenario may give (m/s²): a limit of the configuration.
 const MAX_COMFORTABLE_BRAKING_MPS2: f64 = 8.0;
@@ -93,12 +90,7 @@ impl Check for IdmConfig {
                 braking,
                 1.67,
             )?,
-            hardest_braking_mps2: number_or(
-                &self.hardest_braking_mps2,
-                "hardest-braking-mps2",
-                HARDEST_BRAKING_RANGE,
-                DEFAULT_HARDEST_BRAKING_MPS2,
-            )?,
+            hardest_braking_mps2: check_hardest_braking(self.hardest_braking_mps2.as_ref(), parameters)?,
             reaction,
             perception: check_perception(self.perception.as_ref(), reacts, parameters)?,
             lapse: check_lapse(self.lapse.as_ref(), reacts, parameters)?,

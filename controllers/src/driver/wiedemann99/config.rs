@@ -5,10 +5,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::driver::attention::{Lapse, LapseConfig, check_lapse};
+use crate::driver::check_hardest_braking;
 use crate::driver::pedals::check_brake_build_up;
 use crate::driver::perception::{PerceptionConfig, PerceptionSettings, check_perception};
 use crate::driver::reaction::{Reaction, ReactionConfig};
-use crate::driver::{DEFAULT_HARDEST_BRAKING_MPS2, HARDEST_BRAKING_RANGE};
 
 /// The Wiedemann 99 model as a scenario file describes it. The defaults of cc0 to cc9 are those published for Vissim.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -123,12 +123,7 @@ impl Check for Wiedemann99Config {
                 cc8_mps2: number_or(&self.cc8_mps2, "cc8-mps2", Range::above(0.0, 8.0), default.cc8_mps2)?,
                 cc9_mps2: number_or(&self.cc9_mps2, "cc9-mps2", Range::above(0.0, 8.0), default.cc9_mps2)?,
             },
-            hardest_braking_mps2: number_or(
-                &self.hardest_braking_mps2,
-                "hardest-braking-mps2",
-                HARDEST_BRAKING_RANGE,
-                DEFAULT_HARDEST_BRAKING_MPS2,
-            )?,
+            hardest_braking_mps2: check_hardest_braking(self.hardest_braking_mps2.as_ref(), parameters)?,
             desired_speed_mps: desired_speed_mps
                 .map(|num| parameters.number(num, "desired-speed-mps", Range::closed(0.0, 100.0)))
                 .transpose()?,
