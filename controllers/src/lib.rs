@@ -11,6 +11,8 @@
 //! The types keep the ground truth from the ego: an ego controller receives its own odometry and tracks, never the
 //! ground truth. A human driver model receives the ground truth, and itself models delayed perception.
 //!
+//! [`reference`] holds the performance models of UN Regulation 157.
+//!
 //! The `driver` table of a scenario file is a [`DriverConfig`]. Checking it yields a [`CheckedDriver`], from which each
 //! run builds a new driver.
 
@@ -18,6 +20,7 @@ mod braking;
 mod config;
 mod driver;
 mod ego;
+pub mod reference;
 
 pub use config::{CheckedDriver, DriverConfig, HumanDriver};
 pub use driver::{
@@ -31,5 +34,5 @@ pub use driver::{
 pub use ego::{
     Acc, AccConfig, Aeb, AebConfig, ArrivalPrediction, BrakingResponse, ControllerError, EgoCommand, EgoController,
     EgoInput, EgoSettings, EgoStack, EgoStackConfig, EgoState, Encounter, Front, LeadVehicleSelector, MisConfig,
-    MisPlan, MisSettings, Odometry, R157Driver, Reason, SensorAvailability, Solution,
+    MisPlan, MisSettings, Odometry, R157Driver, R157Fuzzy, Reason, SensorAvailability, Solution,
 };

@@ -15,8 +15,8 @@ use super::protect::of_controller;
 #[derive(Clone, Debug, Args)]
 pub(super) struct ControllerArgs {
     /// Controller of the ego vehicle: `acc`, `mis`, `mis-extended`, `gap-SECONDS` (cruise control with a longer time gap:
-    /// `gap-1.2`, `gap-1.6`, `gap-2.0`), `r157-gap` (the minimum following distance of UN Regulation 157), `r157-driver` (its
-    /// reference driver), or `exec:COMMAND` for a program of your own, which reads a line per control step and answers with
+    /// `gap-1.2`, `gap-1.6`, `gap-2.0`), `r157-gap` (the minimum following distance of UN Regulation 157), `r157-driver` and
+    /// `r157-fsm` (its reference models), or `exec:COMMAND` for a program of your own, which reads a line per control step and answers with
     /// a line
     #[arg(long, value_name = "acc|mis|gap-SECONDS|…|exec:COMMAND", default_value = "mis")]
     controller: ControllerChoice,

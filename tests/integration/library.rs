@@ -8,7 +8,7 @@ use closecall_simulation::scenario::ScenarioFile;
 use crate::support::{all_of_library, closecall, folder, headline_with, json, library, message, stdout};
 
 /// The smallest number of scenarios that the library holds.
-const LEAST_SCENARIOS: usize = 12;
+const LEAST_SCENARIOS: usize = 14;
 
 /// Returns what `check` prints for a valid scenario file.
 fn verdict(path: &Path) -> String {

@@ -33,6 +33,7 @@ mod paper_figure;
 mod perception;
 mod readme;
 mod reenact;
+mod reference_models;
 mod references;
 mod reports;
 mod rerun_files;

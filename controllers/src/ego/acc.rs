@@ -37,7 +37,10 @@ use serde::{Deserialize, Serialize};
 
 use super::following_distance::r157_time_gap_s;
 use super::surroundings::Front;
+use crate::reference::following_gap_m;
 
+/// Slowest speed at which a gap counts as a time gap (m/s): numerical.
+const SLOWEST_MPS: f64 = 1.0;
 /// λ: allowed closing speed per metre of gap error near the desired gap (1/s): an assumption; 0.1 to 0.5 are plausible.
 const ALLOWED_CLOSING_PER_M: f64 = 0.3;
 
@@ -115,6 +118,8 @@ pub(crate) enum GapPolicy {
     Constant,
     /// The minimum time gap of UN Regulation 157.
     R157,
+    /// The gap of the fuzzy safety model of UN Regulation 157.
+    FuzzySafety,
 }
 
 impl Check for AccConfig {
@@ -141,7 +146,12 @@ impl Check for AccConfig {
 impl Acc {
     /// Returns the desired gap at `speed_mps` (m).
     pub(crate) fn desired_gap_m(&self, speed_mps: f64) -> f64 {
-        (self.time_gap_at_s(speed_mps) * speed_mps).max(self.standstill_gap_m)
+        match self.policy {
+            GapPolicy::FuzzySafety => following_gap_m(speed_mps),
+            GapPolicy::Constant | GapPolicy::R157 => {
+                (self.time_gap_at_s(speed_mps) * speed_mps).max(self.standstill_gap_m)
+            }
+        }
     }
 
     /// Returns the strongest braking at `speed_mps` (m/s²).
@@ -154,6 +164,7 @@ impl Acc {
         match self.policy {
             GapPolicy::Constant => self.time_gap_s,
             GapPolicy::R157 => r157_time_gap_s(speed_mps),
+            GapPolicy::FuzzySafety => following_gap_m(speed_mps) / speed_mps.max(SLOWEST_MPS),
         }
     }
 

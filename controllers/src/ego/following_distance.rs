@@ -1,37 +1,27 @@
 //! The minimum following distance of UN Regulation 157 (automated lane keeping systems), paragraph 5.2.3.3.
 //!
-//! The distance is the speed multiplied by a minimum time gap. A table gives the time gap at seven speeds; between them it is
-//! interpolated. The table ends at 60 km/h, the speed up to which the original series of the regulation holds. For higher
-//! speeds, the later series refers to the rules of the country.
-//!
-//! The text of the regulation was not at hand. A copy of the paragraph (clause collection of lawinsider.com) shows the first
-//! rows of the table.
+//! The distance is the speed multiplied by a minimum time gap. The text of the regulation was not at hand. A copy of the
+//! paragraph (clause collection of lawinsider.com) shows the first rows of its table: 1.0 s at 7.2 km/h, 1.1 s at 10 km/h, 1.2 s
+//! at 20 km/h. The simulator esmini, which implements the paragraph (`ControllerALKS_R157SM.cpp`), continues them by 0.1 s per
+//! 10 km/h to every higher speed: 1.6 s at 60 km/h, 2.08 s at 30 m/s.
 
-/// Speeds (km/h) and minimum time gaps (s) of the table. The rows from 30 km/h on could not be looked up: an assumption, they
-/// continue those before them by 0.1 s per 10 km/h.
-const TABLE: [(f64, f64); 7] =
-    [(7.2, 1.0), (10.0, 1.1), (20.0, 1.2), (30.0, 1.3), (40.0, 1.4), (50.0, 1.5), (60.0, 1.6)];
-
-/// Rise of the time gap above the last row of the table (s per km/h): an assumption, that of the last rows; 0 to 0.01 are
-/// plausible.
-const RISE_ABOVE_TABLE_S_PER_KMPH: f64 = 0.01;
-
-/// Longest time gap (s): an assumption, the two-second rule of many countries, and the gap at which the reference driver of the
-/// regulation follows in the comparison of the Joint Research Centre (JRC-FSM); 1.8 to 2.4 are plausible.
-const LONGEST_TIME_GAP_S: f64 = 2.0;
+/// Speed and time gap of the first row of the table (km/h, s).
+const FIRST_ROW: (f64, f64) = (7.2, 1.0);
+/// Speed from which the time gap rises in proportion to the speed (km/h).
+const PROPORTIONAL_FROM_KMPH: f64 = 10.0;
+/// Rise of the time gap from there on (s per km/h).
+const RISE_S_PER_KMPH: f64 = 0.01;
 
 /// Returns the minimum time gap at `speed_mps` (s).
 pub(crate) fn r157_time_gap_s(speed_mps: f64) -> f64 {
     let speed_kmph = 3.6 * speed_mps;
-    let [first, .., last] = TABLE;
-    if speed_kmph >= last.0 {
-        return (last.1 + RISE_ABOVE_TABLE_S_PER_KMPH * (speed_kmph - last.0)).min(LONGEST_TIME_GAP_S);
+    let proportional_s = |speed_kmph: f64| 1.0 + RISE_S_PER_KMPH * speed_kmph;
+    if speed_kmph >= PROPORTIONAL_FROM_KMPH {
+        return proportional_s(speed_kmph);
     }
-    let between = |rows: &[(f64, f64)]| {
-        let [(from, low_s), (to, high_s)] = *rows else { return None };
-        (speed_kmph >= from && speed_kmph < to).then(|| low_s + (high_s - low_s) * (speed_kmph - from) / (to - from))
-    };
-    TABLE.windows(2).find_map(between).unwrap_or(first.1)
+    let (first_kmph, first_s) = FIRST_ROW;
+    let share = ((speed_kmph - first_kmph) / (PROPORTIONAL_FROM_KMPH - first_kmph)).max(0.0);
+    first_s + share * (proportional_s(PROPORTIONAL_FROM_KMPH) - first_s)
 }
 
 #[cfg(test)]
@@ -40,13 +30,9 @@ mod tests {
 
     #[test]
     fn the_gap_is_that_of_the_table_and_grows_with_the_speed() {
-        for (speed_kmph, time_gap_s) in TABLE {
+        for (speed_kmph, time_gap_s) in [(0.0, 1.0), (7.2, 1.0), (10.0, 1.1), (20.0, 1.2), (60.0, 1.6), (108.0, 2.08)] {
             assert!((r157_time_gap_s(speed_kmph / 3.6) - time_gap_s).abs() < 1e-9, "{speed_kmph} km/h");
         }
-        assert_eq!(r157_time_gap_s(0.0), 1.0);
-        assert!((r157_time_gap_s(25.0 / 3.6) - 1.25).abs() < 1e-9);
-        assert!((r157_time_gap_s(80.0 / 3.6) - 1.8).abs() < 1e-9);
-        assert_eq!(r157_time_gap_s(130.0 / 3.6), 2.0);
         let gaps: Vec<f64> = (0..400).map(|step| r157_time_gap_s(0.1 * f64::from(step))).collect();
         assert!(gaps.windows(2).all(|pair| pair[0] <= pair[1]), "{gaps:?}");
     }

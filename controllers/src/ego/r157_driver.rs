@@ -4,9 +4,8 @@
 //!  risk ─▶ 0.75 s at 0.4 m/s² (accelerator released) ─▶ braking builds up at 12.65 m/s³ ─▶ 0.774 g, until the risk is over
 //! ```
 //!
-//! The regulation describes a reaction, not a way to follow. The figures are those of JRC-FSM, the implementation of the
-//! European Commission's Joint Research Centre (`utility/vehicle.py`, `utility/models.py`). What the model leaves open is
-//! decided as follows:
+//! The regulation describes a reaction ([`CarefulDriver`](crate::reference::CarefulDriver)), not a way to follow. What the
+//! model leaves open is decided as follows:
 //!
 //! - Without a risk, the driver follows by the law of [`Acc`](super::Acc), 2 s behind the lead vehicle: the gap from which the
 //!   reference driver starts in JRC-FSM's comparison of following.
@@ -17,45 +16,14 @@
 //!
 //! The driver sees the tracks of the ego's sensors, as every controller does. It has no emergency braking system.
 
-use closecall_traffic::{GRAVITY_MPS2, Time};
+use closecall_traffic::Time;
 
 use super::surroundings::LeadVehicleSelector;
 use super::{ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack, EgoState, Front, Reason};
+use crate::reference::{BrakingReaction, CRITICAL_TTC_S};
 
-/// Time from the perception of a risk to the beginning of braking (s) (JRC-FSM).
-const DELAY_S: f64 = 0.75;
-/// Deceleration during the delay (m/s²) (JRC-FSM).
-const RELEASED_ACCELERATOR_MPS2: f64 = 0.4;
-/// Jerk with which braking builds up (m/s³) (JRC-FSM).
-const BUILD_UP_MPS3: f64 = 12.65;
-/// Hardest braking (m/s²) (JRC-FSM).
-const HARDEST_BRAKING_MPS2: f64 = 0.774 * GRAVITY_MPS2;
-/// Time to collision up to which there is a risk (s) (JRC-FSM).
-const CRITICAL_TTC_S: f64 = 2.0;
 /// Time gap at which the driver follows (s) (JRC-FSM).
 const TIME_GAP_S: f64 = 2.0;
-
-/// The reaction to a risk.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Reaction {
-    /// Time for which the risk has been perceived (s).
-    perceived_s: f64,
-    /// Present deceleration (m/s²); 0 without a risk.
-    braking_mps2: f64,
-}
-
-impl Reaction {
-    /// Reacts to a risk for `step_s` more, and returns the deceleration (m/s²).
-    fn advance(&mut self, step_s: f64) -> f64 {
-        self.braking_mps2 = if self.perceived_s < DELAY_S {
-            RELEASED_ACCELERATOR_MPS2
-        } else {
-            (self.braking_mps2 + BUILD_UP_MPS3 * step_s).min(HARDEST_BRAKING_MPS2)
-        };
-        self.perceived_s += step_s;
-        self.braking_mps2
-    }
-}
 
 /// The reference driver as an ego controller.
 #[derive(Clone, Debug)]
@@ -63,7 +31,7 @@ pub struct R157Driver {
     settings: EgoSettings,
     following: EgoStack,
     lead: LeadVehicleSelector,
-    reaction: Option<Reaction>,
+    reaction: Option<BrakingReaction>,
     last_step: Option<Time>,
 }
 
@@ -112,6 +80,3 @@ impl EgoController for R157Driver {
         Ok(command)
     }
 }
-
-#[cfg(test)]
-mod tests;

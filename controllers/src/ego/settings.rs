@@ -57,6 +57,13 @@ impl EgoSettings {
         Self { acc: Acc { policy: GapPolicy::R157, ..self.acc }, ..self.without_mis() }
     }
 
+    /// Returns the stack of the fuzzy safety model of UN Regulation 157: the same cruise control with the gap of the model,
+    /// and nothing else. The model brakes instead of the emergency braking system: the controller `r157-fsm`.
+    #[must_use]
+    pub fn with_fuzzy_safety(self) -> Self {
+        Self { acc: Acc { policy: GapPolicy::FuzzySafety, ..self.acc }, aeb: None, ..self.without_mis() }
+    }
+
     /// Returns the same stack with the extended margin increase system, if it has one at all: the controller `mis-extended`.
     #[must_use]
     pub fn with_extended_mis(self) -> Self {

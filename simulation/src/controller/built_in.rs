@@ -3,7 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 
-use closecall_controllers::{EgoController, EgoSettings, EgoStack, R157Driver};
+use closecall_controllers::{EgoController, EgoSettings, EgoStack, R157Driver, R157Fuzzy};
 
 use super::TimeGap;
 use crate::run::ControllerFactory;
@@ -23,6 +23,8 @@ pub enum BuiltIn {
     R157Gap,
     /// The competent and careful human driver of UN Regulation 157.
     R157Driver,
+    /// The fuzzy safety model of UN Regulation 157.
+    R157Fsm,
 }
 
 /// Writes the name on the command line and in reports.
@@ -35,13 +37,15 @@ impl fmt::Display for BuiltIn {
             Self::Gap(gap) => write!(f, "gap-{gap}"),
             Self::R157Gap => f.write_str("r157-gap"),
             Self::R157Driver => f.write_str("r157-driver"),
+            Self::R157Fsm => f.write_str("r157-fsm"),
         }
     }
 }
 
 impl BuiltIn {
     /// The controllers whose name has no number.
-    pub(super) const FIXED: [Self; 5] = [Self::Acc, Self::Mis, Self::MisExtended, Self::R157Gap, Self::R157Driver];
+    pub(super) const FIXED: [Self; 6] =
+        [Self::Acc, Self::Mis, Self::MisExtended, Self::R157Gap, Self::R157Driver, Self::R157Fsm];
 
     /// Returns a factory of this controller.
     pub fn factory(self) -> Arc<dyn ControllerFactory> {
@@ -68,6 +72,7 @@ impl ControllerFactory for BuiltInFactory {
             BuiltIn::Gap(gap) => settings.with_time_gap(gap.s()),
             BuiltIn::R157Gap => settings.with_r157_gap(),
             BuiltIn::R157Driver => R157Driver::settings(*settings),
+            BuiltIn::R157Fsm => settings.with_fuzzy_safety(),
         }
     }
 
@@ -79,6 +84,7 @@ impl ControllerFactory for BuiltInFactory {
         let settings = self.settings(settings);
         match self.built_in {
             BuiltIn::R157Driver => Box::new(R157Driver::new(settings)),
+            BuiltIn::R157Fsm => Box::new(R157Fuzzy::new(settings)),
             _ => Box::new(EgoStack::new(settings)),
         }
     }

@@ -8,6 +8,7 @@
 //! | `gap-SECONDS` | as `acc`, with another constant time gap |
 //! | `r157-gap` | as `acc`, with the minimum following distance of UN Regulation 157 |
 //! | `r157-driver` | the competent and careful human driver of UN Regulation 157 |
+//! | `r157-fsm` | the fuzzy safety model of UN Regulation 157 |
 //! | `exec:COMMAND` | an external process, started anew for each sample ([`exec`]) |
 //!
 //! A controller in Rust implements [`EgoController`](closecall_controllers::EgoController). A campaign creates it through a
