@@ -7,7 +7,7 @@
 use closecall_sensors::camera::{ExposureKey, Frame as Exposure, FrameBuffers, PixelRect, RearCamera};
 use closecall_sensors::{Detection, rear_exposures};
 use closecall_traffic::{Time, VehicleClass};
-use rerun::{Boxes2D, Image};
+use rerun::{AsComponents, Boxes2D, Image};
 
 use super::RecordingError;
 use super::palette::{self, Rgba};
@@ -28,15 +28,18 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<bool, RecordingE
     let fixed = Boxes2D::update_fields().with_radii([-1.5_f32]).with_show_labels(true);
     writer.write_static("camera/windows", &fixed)?;
     let mut lists = FrameBuffers::default();
-    let mut has_images = false;
+    let (mut images, mut marks) = (Vec::new(), Vec::new());
     for (frame, exposure) in frames_to_render(film, rear_exposures(key)) {
         let image;
         (image, lists) = render(film, &camera, frame, (exposure, lists));
-        writer.write_from("camera", frame.time, &image)?;
-        write_windows(writer, film, &camera, frame)?;
-        has_images = true;
+        images.push((frame.time, image));
+        marks.push((frame.time, windows(film, &camera, frame)));
     }
-    Ok(has_images)
+    let images: Vec<(Time, &dyn AsComponents)> = images.iter().map(|(time, image)| (*time, image as _)).collect();
+    let marks: Vec<(Time, &dyn AsComponents)> = marks.iter().map(|(time, boxes)| (*time, boxes as _)).collect();
+    writer.write_each("camera", &images)?;
+    writer.write_each("camera/windows", &marks)?;
+    Ok(!images.is_empty())
 }
 
 /// Returns the frames to render with the keys of their noise: for each selected instant, the latest frame with a scan.
@@ -67,8 +70,8 @@ fn render(
     (image, exposure.into_buffers())
 }
 
-/// Writes the windows of the detections of a frame with their classes.
-fn write_windows(writer: &Writer<'_>, film: &Film, camera: &RearCamera, frame: &Frame) -> Result<(), RecordingError> {
+/// Returns the windows of the detections of a frame with their classes.
+fn windows(film: &Film, camera: &RearCamera, frame: &Frame) -> Boxes2D {
     let (ego, _) = film.scene_vehicles(frame);
     let boxes = frame.scan.as_ref().map_or(&[][..], |scan| &scan.boxes);
     let in_image: Vec<(&Detection, PixelRect)> =
@@ -77,13 +80,12 @@ fn write_windows(writer: &Writer<'_>, film: &Film, camera: &RearCamera, frame: &
     let corner =
         |window: &PixelRect| [window.left as f32 * scale, (window.top as f32 - f32::from(PIXEL_ROWS.start)) * scale];
     let size = |window: &PixelRect| [window.width as f32 * scale, window.height as f32 * scale];
-    let windows = Boxes2D::from_mins_and_sizes(
+    Boxes2D::from_mins_and_sizes(
         in_image.iter().map(|(_, window)| corner(window)),
         in_image.iter().map(|(_, window)| size(window)),
     )
     .with_colors(in_image.iter().map(|(found, _)| colour(found)))
-    .with_labels(in_image.iter().map(|(found, _)| label(found)));
-    writer.write_from("camera/windows", frame.time, &windows)
+    .with_labels(in_image.iter().map(|(found, _)| label(found)))
 }
 
 fn colour(found: &Detection) -> Rgba {

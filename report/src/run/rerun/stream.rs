@@ -104,12 +104,21 @@ impl<'a> Writer<'a> {
     }
 
     /// Writes components that hold from `time` on.
-    pub(super) fn write_from(&self, entity: &str, time: Time, what: &impl AsComponents) -> Result<(), RecordingError> {
-        if time <= self.critical {
-            self.chunks.push_row(self.path(entity), self.copy_time(), what)?;
-            self.clear_copy(entity, time)?;
+    pub(super) fn write_from(&self, entity: &str, time: Time, what: &dyn AsComponents) -> Result<(), RecordingError> {
+        self.write_each(entity, &[(time, what)])
+    }
+
+    /// Writes several things, of which each holds from its time on until that of the next. The times must ascend.
+    pub(super) fn write_each(&self, entity: &str, whats: &[(Time, &dyn AsComponents)]) -> Result<(), RecordingError> {
+        let until_critical = whats.partition_point(|(time, _)| *time <= self.critical);
+        if let Some(shown) = until_critical.checked_sub(1) {
+            self.chunks.push_row(self.path(entity), self.copy_time(), whats[shown].1)?;
+            self.clear_copy(entity, whats[0].0)?;
         }
-        self.chunks.push_row(self.path(entity), self.timelines(&[time]), what)
+        for (time, what) in whats {
+            self.chunks.push_row(self.path(entity), self.timelines(&[*time]), *what)?;
+        }
+        Ok(())
     }
 
     /// Removes an entity and its children from `time` on.
