@@ -20,11 +20,11 @@ const GRAVITY_MPS2: f64 = 9.81;
 // rear headway.
 
 /// Number of frames between two kept scans in all phases.
-const SPARSE_SCAN_INTERVAL: usize = 50;
+const SPARSE_SCAN_INTERVAL: usize = 100;
 /// Number of frames between two kept scans in the critical and the overtaking phase.
-const DENSE_SCAN_INTERVAL: usize = 3;
+const DENSE_SCAN_INTERVAL: usize = 5;
 /// Maximum number of dense scans in a film.
-const MAX_DENSE_SCANS: usize = 60;
+const MAX_DENSE_SCANS: usize = 40;
 
 /// Observes a run and records its film.
 pub struct FilmRecorder {

@@ -20,6 +20,8 @@ const PIXEL_STEP: u16 = 5;
 const PIXEL_ROWS: std::ops::Range<u16> = 230..610;
 /// Times before the critical moment for which an image is rendered, besides the first scan and the moments of the encounter.
 const TIMES_BEFORE: [Time; 3] = [Time::from_ms(2_000), Time::from_ms(800), Time::ZERO];
+/// Least time between an image and the one before it. That of the critical moment is rendered in any case.
+const LEAST_INTERVAL: Time = Time::from_ms(700);
 
 /// Writes the images. Returns true if there are any.
 pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<bool, RecordingError> {
@@ -51,6 +53,14 @@ fn frames_to_render(film: &Film, keys: impl Iterator<Item = ExposureKey>) -> Vec
     let latest = |time: Time| rows_with_scan.iter().rev().find(|&&row| film.frames[row].time <= time).copied();
     let mut selected: Vec<usize> = instants.filter_map(latest).chain(rows_with_scan.first().copied()).collect();
     selected.sort_unstable();
+    let shown = latest(critical);
+    let mut last: Option<Time> = None;
+    selected.retain(|&row| {
+        let time = film.frames[row].time;
+        let is_kept = Some(row) == shown || last.is_none_or(|last| time - last >= LEAST_INTERVAL);
+        last = if is_kept { Some(time) } else { last };
+        is_kept
+    });
     let frames = film.frames.iter().zip(keys).enumerate();
     frames.filter(|(row, _)| selected.binary_search(row).is_ok()).map(|(_, frame_and_key)| frame_and_key).collect()
 }
@@ -97,8 +107,11 @@ fn colour(found: &Detection) -> Rgba {
     }
 }
 
-/// Returns the most likely class with its score.
+/// Returns the most likely class with its score. What is no vehicle has no label, so that the image stays visible.
 fn label(found: &Detection) -> String {
+    if found.class.vehicle() < 0.5 {
+        return String::new();
+    }
     let [car, truck, motorcycle, background] = found.class.0;
     let all = [("car", car), ("truck", truck), ("motorcycle", motorcycle), ("background", background)];
     let best = all.iter().max_by(|a, b| a.1.total_cmp(&b.1));

@@ -77,6 +77,8 @@ pub fn write_recording(path: &Path, films: &[Film]) -> Result<(), RecordingError
 fn record(films: &[Film]) -> Result<Recording, RecordingError> {
     let data = Chunks::default();
     let start = films.iter().filter_map(|film| film.frames.first()).map(|frame| frame.time).min();
+    let end = films.iter().map(Film::end).max();
+    let span = [start, end].map(|time| time.unwrap_or(Time::ZERO));
     let canvases = bird::Canvas::of_films(films);
     let mut contents = Vec::new();
     for (index, film) in films.iter().enumerate() {
@@ -86,7 +88,7 @@ fn record(films: &[Film]) -> Result<Recording, RecordingError> {
             _ => Role::Tested,
         };
         let root = format!("{}/", film.arm);
-        let writer = Writer::new(&data, film, &root, start.unwrap_or(Time::ZERO));
+        let writer = Writer::new(&data, film, &root, span);
         contents.push(write_film(&writer, &canvases[index], (root, role))?);
         if let Some(ghosts) = ghosts_in(films, index).filter(|_| film.level >= Level::Objects) {
             ghosts::write(&writer, &canvases[index], ghosts)?;
