@@ -25,6 +25,11 @@ pub(in crate::run) struct KnownSpan {
 }
 
 impl KnownSpan {
+    /// Returns the words for a short bar of the band of states.
+    pub(in crate::run) fn short_words(&self) -> String {
+        self.from_m.map_or("none".to_owned(), |from_m| format!("{from_m:.0} m"))
+    }
+
     /// Returns the words for the band of states.
     pub(in crate::run) fn words(&self) -> String {
         match (self.from_m, self.is_later) {

@@ -16,22 +16,24 @@ use closecall_simulation::{Arm, CONTROL_STEP, Observer, RunEvent, RunKey, StepVi
 const GRAVITY_MPS2: f64 = 9.81;
 
 // A run has more than a million LiDAR points, so that a film keeps only some of its scans: sparse ones throughout,
-// dense ones in the critical and the overtaking phase up to a maximum number, and always the one at the smallest rear
-// headway.
+// dense ones in the critical and the overtaking phase up to a maximum number, and always the one nearest to the smallest
+// rear headway.
 
 /// Number of frames between two kept scans in all phases.
-const SPARSE_SCAN_INTERVAL: usize = 50;
+const SPARSE_SCAN_INTERVAL: usize = 100;
 /// Number of frames between two kept scans in the critical and the overtaking phase.
-const DENSE_SCAN_INTERVAL: usize = 3;
+const DENSE_SCAN_INTERVAL: usize = 5;
 /// Maximum number of dense scans in a film.
-const MAX_DENSE_SCANS: usize = 60;
+const MAX_DENSE_SCANS: usize = 40;
 
 /// Observes a run and records its film.
 pub struct FilmRecorder {
     film: Film,
     dense_scan_count: usize,
-    /// The smallest rear headway in the critical phase so far (s), with the index of its frame and its scan.
-    closest: Option<(f64, usize, Scan)>,
+    /// The smallest rear headway in the critical phase so far (s).
+    smallest_s: f64,
+    /// The index of its frame and its scan, unless the frame has the scan.
+    closest: Option<(usize, Scan)>,
 }
 
 impl FilmRecorder {
@@ -73,7 +75,7 @@ impl FilmRecorder {
             foreword: String::new(),
             settings: Vec::new(),
         };
-        Self { film, dense_scan_count: 0, closest: None }
+        Self { film, dense_scan_count: 0, smallest_s: f64::INFINITY, closest: None }
     }
 
     /// Completes the film with the outcome of the run.
@@ -85,7 +87,7 @@ impl FilmRecorder {
             actor.present_frames.end = frame_count;
         }
         film.outcome = Some(outcome.clone());
-        if let Some((_, index, scan)) = self.closest
+        if let Some((index, scan)) = self.closest
             && let Some(frame) = film.frames.get_mut(index)
         {
             frame.scan.get_or_insert(scan);
@@ -99,17 +101,25 @@ impl FilmRecorder {
             return None;
         }
         let index = self.film.frames.len();
-        if let Ok(thw_s) = view.margins.thw_rear_s
-            && self.closest.as_ref().is_none_or(|(smallest_s, ..)| thw_s < *smallest_s)
-            && view.phase == Phase::Critical
-        {
-            self.closest = Scan::latest(view.perception).map(|scan| (thw_s, index, scan));
-        }
-        let is_dense = matches!(view.phase, Phase::Critical | Phase::Overtaking)
-            && index.is_multiple_of(DENSE_SCAN_INTERVAL)
-            && self.dense_scan_count < MAX_DENSE_SCANS;
+        let is_eventful =
+            matches!(view.phase, Phase::Critical | Phase::Overtaking) && index.is_multiple_of(DENSE_SCAN_INTERVAL);
+        let is_dense = is_eventful && self.dense_scan_count < MAX_DENSE_SCANS;
         self.dense_scan_count += usize::from(is_dense);
-        if is_dense || index.is_multiple_of(SPARSE_SCAN_INTERVAL) { Scan::latest(view.perception) } else { None }
+        let scan = if is_dense || index.is_multiple_of(SPARSE_SCAN_INTERVAL) {
+            Scan::latest(view.perception)
+        } else {
+            None
+        };
+        if let Ok(thw_s) = view.margins.thw_rear_s
+            && is_eventful
+            && view.phase == Phase::Critical
+            && thw_s < self.smallest_s
+        {
+            self.smallest_s = thw_s;
+            let own = if scan.is_none() { Scan::latest(view.perception) } else { None };
+            self.closest = own.map(|scan| (index, scan));
+        }
+        scan
     }
 }
 

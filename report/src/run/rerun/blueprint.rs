@@ -72,22 +72,22 @@ pub(super) fn layout(films: &[FilmContents]) -> Result<Chunks, RecordingError> {
     let left = below(
         [
             Some((verdict_share(films), verdict())),
-            bird(films).map(|view| (if films.len() > 1 { 4.2 } else { 2.5 }, view)),
+            bird(films).map(|view| (bird_share(films), view)),
         ]
         .into_iter()
         .flatten()
-        .chain(scenes(films).map(|view| (if films.len() > 1 { 3.4 } else { 5.0 }, view)))
+        .chain(scenes(films).map(|view| (if films.len() > 1 || is_traffic(films) { 3.4 } else { 5.0 }, view)))
         .collect(),
     );
     let mut states: Vec<Node> = films.iter().filter(|film| film.has_states).rev().map(states).collect();
     let mut right = Vec::new();
     let mut plots = films_plots(films);
     if !plots.is_empty() {
-        right.push((2.7, plots.remove(0)));
+        right.push((2.5, plots.remove(0)));
     }
-    right.extend(tabs(plots).map(|node| (2.1, node)));
+    right.extend(tabs(plots).map(|node| (2.4, node)));
     if !states.is_empty() {
-        right.push((3.3, states.remove(0)));
+        right.push((3.2, states.remove(0)));
     }
     states.extend([log(films), View::new("TextDocument", "Story", "summary").into()]);
     right.extend(tabs(states).map(|node| (1.9, node)));
@@ -96,10 +96,19 @@ pub(super) fn layout(films: &[FilmContents]) -> Result<Chunks, RecordingError> {
     nodes::chunks(root.unwrap_or_else(verdict), OPENING_TIMELINE)
 }
 
+/// Returns the room for the view from above: recorded roads have more lanes.
+fn bird_share(films: &[FilmContents]) -> f32 {
+    match films {
+        [_] if is_traffic(films) => 3.4,
+        [_] => 2.5,
+        _ => 4.2,
+    }
+}
+
 /// Returns the room for the verdict. That on recorded traffic is longer.
 fn verdict_share(films: &[FilmContents]) -> f32 {
     match films {
-        [film] if !film.has_states => 3.6,
+        [_] if is_traffic(films) => 3.4,
         [_] => 2.4,
         _ => 2.9,
     }

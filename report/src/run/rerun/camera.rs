@@ -7,7 +7,7 @@
 use closecall_sensors::camera::{ExposureKey, Frame as Exposure, FrameBuffers, PixelRect, RearCamera};
 use closecall_sensors::{Detection, rear_exposures};
 use closecall_traffic::{Time, VehicleClass};
-use rerun::{Boxes2D, Image};
+use rerun::{AsComponents, Boxes2D, Image};
 
 use super::RecordingError;
 use super::palette::{self, Rgba};
@@ -20,6 +20,8 @@ const PIXEL_STEP: u16 = 5;
 const PIXEL_ROWS: std::ops::Range<u16> = 230..610;
 /// Times before the critical moment for which an image is rendered, besides the first scan and the moments of the encounter.
 const TIMES_BEFORE: [Time; 3] = [Time::from_ms(2_000), Time::from_ms(800), Time::ZERO];
+/// Least time between an image and the one before it. That of the critical moment is rendered in any case.
+const LEAST_INTERVAL: Time = Time::from_ms(700);
 
 /// Writes the images. Returns true if there are any.
 pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<bool, RecordingError> {
@@ -28,15 +30,18 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<bool, RecordingE
     let fixed = Boxes2D::update_fields().with_radii([-1.5_f32]).with_show_labels(true);
     writer.write_static("camera/windows", &fixed)?;
     let mut lists = FrameBuffers::default();
-    let mut has_images = false;
+    let (mut images, mut marks) = (Vec::new(), Vec::new());
     for (frame, exposure) in frames_to_render(film, rear_exposures(key)) {
         let image;
         (image, lists) = render(film, &camera, frame, (exposure, lists));
-        writer.write_from("camera", frame.time, &image)?;
-        write_windows(writer, film, &camera, frame)?;
-        has_images = true;
+        images.push((frame.time, image));
+        marks.push((frame.time, windows(film, &camera, frame)));
     }
-    Ok(has_images)
+    let images: Vec<(Time, &dyn AsComponents)> = images.iter().map(|(time, image)| (*time, image as _)).collect();
+    let marks: Vec<(Time, &dyn AsComponents)> = marks.iter().map(|(time, boxes)| (*time, boxes as _)).collect();
+    writer.write_each("camera", &images)?;
+    writer.write_each("camera/windows", &marks)?;
+    Ok(!images.is_empty())
 }
 
 /// Returns the frames to render with the keys of their noise: for each selected instant, the latest frame with a scan.
@@ -48,6 +53,14 @@ fn frames_to_render(film: &Film, keys: impl Iterator<Item = ExposureKey>) -> Vec
     let latest = |time: Time| rows_with_scan.iter().rev().find(|&&row| film.frames[row].time <= time).copied();
     let mut selected: Vec<usize> = instants.filter_map(latest).chain(rows_with_scan.first().copied()).collect();
     selected.sort_unstable();
+    let shown = latest(critical);
+    let mut last: Option<Time> = None;
+    selected.retain(|&row| {
+        let time = film.frames[row].time;
+        let is_kept = Some(row) == shown || last.is_none_or(|last| time - last >= LEAST_INTERVAL);
+        last = if is_kept { Some(time) } else { last };
+        is_kept
+    });
     let frames = film.frames.iter().zip(keys).enumerate();
     frames.filter(|(row, _)| selected.binary_search(row).is_ok()).map(|(_, frame_and_key)| frame_and_key).collect()
 }
@@ -67,8 +80,8 @@ fn render(
     (image, exposure.into_buffers())
 }
 
-/// Writes the windows of the detections of a frame with their classes.
-fn write_windows(writer: &Writer<'_>, film: &Film, camera: &RearCamera, frame: &Frame) -> Result<(), RecordingError> {
+/// Returns the windows of the detections of a frame with their classes.
+fn windows(film: &Film, camera: &RearCamera, frame: &Frame) -> Boxes2D {
     let (ego, _) = film.scene_vehicles(frame);
     let boxes = frame.scan.as_ref().map_or(&[][..], |scan| &scan.boxes);
     let in_image: Vec<(&Detection, PixelRect)> =
@@ -77,13 +90,12 @@ fn write_windows(writer: &Writer<'_>, film: &Film, camera: &RearCamera, frame: &
     let corner =
         |window: &PixelRect| [window.left as f32 * scale, (window.top as f32 - f32::from(PIXEL_ROWS.start)) * scale];
     let size = |window: &PixelRect| [window.width as f32 * scale, window.height as f32 * scale];
-    let windows = Boxes2D::from_mins_and_sizes(
+    Boxes2D::from_mins_and_sizes(
         in_image.iter().map(|(_, window)| corner(window)),
         in_image.iter().map(|(_, window)| size(window)),
     )
     .with_colors(in_image.iter().map(|(found, _)| colour(found)))
-    .with_labels(in_image.iter().map(|(found, _)| label(found)));
-    writer.write_from("camera/windows", frame.time, &windows)
+    .with_labels(in_image.iter().map(|(found, _)| label(found)))
 }
 
 fn colour(found: &Detection) -> Rgba {
@@ -95,8 +107,11 @@ fn colour(found: &Detection) -> Rgba {
     }
 }
 
-/// Returns the most likely class with its score.
+/// Returns the most likely class with its score. What is no vehicle has no label, so that the image stays visible.
 fn label(found: &Detection) -> String {
+    if found.class.vehicle() < 0.5 {
+        return String::new();
+    }
     let [car, truck, motorcycle, background] = found.class.0;
     let all = [("car", car), ("truck", truck), ("motorcycle", motorcycle), ("background", background)];
     let best = all.iter().max_by(|a, b| a.1.total_cmp(&b.1));

@@ -6,11 +6,10 @@
 
 use std::cell::RefCell;
 
-use rerun::external::re_log_encoding::Encoder;
+use rerun::external::re_log_types::EntityPath;
 use rerun::external::re_log_types::external::re_tuid::Tuid;
-use rerun::external::re_log_types::{BlueprintActivationCommand, EntityPath, SetStoreInfo, StoreInfo, StoreSource};
-use rerun::log::{Chunk, ChunkComponents, ChunkId, LogMsg};
-use rerun::{AsComponents, SerializedComponentColumn, StoreId, StoreKind, TimeColumn};
+use rerun::log::{Chunk, ChunkComponents, ChunkId};
+use rerun::{AsComponents, SerializedComponentColumn, TimeColumn};
 
 use super::RecordingError;
 
@@ -53,33 +52,13 @@ impl Chunks {
         Ok(())
     }
 
-    /// Returns the messages that make up the store `id`.
-    fn messages(self, id: &StoreId) -> Result<Vec<LogMsg>, RecordingError> {
-        let chunks = self.0.into_inner();
-        let row_id = tuid(chunks.len());
-        let info = StoreInfo::new(id.clone(), StoreSource::Other("closecall".to_owned()));
-        let mut messages = vec![LogMsg::SetStoreInfo(SetStoreInfo { row_id, info })];
-        // The viewer can show a view only when it knows the fixed properties of its entities.
-        let (fixed, moving): (Vec<_>, Vec<_>) = chunks.into_iter().partition(Chunk::is_static);
-        for chunk in fixed.iter().chain(&moving) {
-            messages.push(LogMsg::ArrowMsg(id.clone(), chunk.to_arrow_msg().map_err(RecordingError::encode)?));
-        }
-        Ok(messages)
+    /// Returns the chunks, those without timelines first: the viewer can show a view only when it knows the fixed
+    /// properties of its entities.
+    pub(super) fn into_ordered(self) -> Vec<Chunk> {
+        let (mut chunks, moving): (Vec<_>, Vec<_>) = self.0.into_inner().into_iter().partition(Chunk::is_static);
+        chunks.extend(moving);
+        chunks
     }
-}
-
-/// Returns the messages of a recording: the layout first, then the data.
-pub(super) fn recording(
-    (application, name): (&'static str, String),
-    layout: Chunks,
-    data: Chunks,
-) -> Result<Vec<LogMsg>, RecordingError> {
-    let id = |kind| StoreId::new(kind, application, name.as_str());
-    let blueprint = id(StoreKind::Blueprint);
-    let mut messages = layout.messages(&blueprint)?;
-    messages.push(LogMsg::BlueprintActivationCommand(BlueprintActivationCommand::make_active(blueprint)));
-    messages.extend(data.messages(&id(StoreKind::Recording))?);
-    Ok(messages)
 }
 
 /// Returns the name of a recording: the first digits of the hash of its texts, which hold all results.
@@ -92,29 +71,12 @@ pub(super) fn name(texts: &[String]) -> String {
     hasher.finalize().to_hex().chars().take(NAME_DIGITS).collect()
 }
 
-/// Returns the bytes of a recording file. The messages of the same run have the same bytes; the index that the library puts
-/// after them lists its columns in an order of chance.
-pub(super) fn encode(messages: &[LogMsg]) -> Result<Vec<u8>, RecordingError> {
-    Encoder::encode(messages.iter().map(Ok)).map_err(RecordingError::encode)
-}
-
-/// Returns the bytes of the messages, without an index.
-#[cfg(test)]
-pub(super) fn encode_messages(messages: &[LogMsg]) -> Vec<u8> {
-    let mut encoder = Encoder::local().unwrap();
-    encoder.do_not_emit_footer();
-    for message in messages {
-        encoder.append(message).unwrap();
-    }
-    encoder.finish().unwrap();
-    encoder.into_inner().unwrap()
-}
-
 /// Returns the identifier of the chunk of this index. The rows of a chunk have identifiers from its own on.
 fn chunk_id(index: usize) -> ChunkId {
     ChunkId::from_tuid(tuid(index))
 }
 
-fn tuid(index: usize) -> Tuid {
+/// Returns the identifier of this number.
+pub(super) fn tuid(index: usize) -> Tuid {
     Tuid::from_nanos_and_inc(index as u64 + 1, 0)
 }

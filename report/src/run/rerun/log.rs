@@ -1,5 +1,7 @@
 //! The text log: every event at the time at which it happened.
 
+use std::collections::BTreeMap;
+
 use closecall_traffic::Time;
 use rerun::{TextLog, TextLogLevel};
 
@@ -34,10 +36,21 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film, is_alone: bool) -> Result<
     lines.extend(reasons(film));
     lines.extend(film.notes.iter().map(|(time, text)| plain("log/note", *time, text.clone())));
     lines.push(plain("log/run", film.end(), "the run ends here".to_owned()));
+    // The lines of an entity make up one chunk.
+    let mut of_entity: BTreeMap<&str, Vec<Line>> = BTreeMap::new();
     for line in lines {
-        let text = if is_alone { line.text } else { format!("[{}] {}", film.arm_label(), line.text) };
-        let row = TextLog::new(text).with_level(line.level).with_color(line.colour);
-        writer.write_curve(line.entity, &[line.time], |_| row.clone().columns_of_unit_batches())?;
+        of_entity.entry(line.entity).or_default().push(line);
+    }
+    let arm = if is_alone { String::new() } else { format!("[{}] ", film.arm_label()) };
+    for (entity, lines) in of_entity {
+        let times: Vec<Time> = lines.iter().map(|line| line.time).collect();
+        writer.write_curve(entity, &times, |_| {
+            TextLog::update_fields()
+                .with_many_text(lines.iter().map(|line| format!("{arm}{}", line.text)))
+                .with_many_level(lines.iter().map(|line| line.level))
+                .with_many_color(lines.iter().map(|line| line.colour))
+                .columns_of_unit_batches()
+        })?;
     }
     Ok(())
 }

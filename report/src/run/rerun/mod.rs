@@ -15,6 +15,7 @@ mod blueprint;
 mod bodies;
 mod camera;
 mod chunks;
+mod encode;
 mod fog;
 mod ghosts;
 mod log;

@@ -236,7 +236,8 @@ impl Plots<'_> {
         let style =
             SeriesLines::new().with_names([name]).with_colors([palette::CRITICAL]).with_widths([THIN_LINE_WIDTH]);
         self.writer.write_static(entity, &style)?;
-        self.writer.write_series(entity, &self.times, &vec![Some(level); self.times.len()])
+        let (Some(&first), Some(&last)) = (self.times.first(), self.times.last()) else { return Ok(()) };
+        self.writer.write_series(entity, &[first, last], &[Some(level); 2])
     }
 
     /// Writes the time headways in front of and behind the ego.

@@ -50,16 +50,22 @@ pub(super) struct Writer<'a> {
     root: String,
     /// Duration of a control step.
     period: Time,
-    /// Time of the first frame of the recording.
-    start: Time,
+    /// Times of the first and the last frame of the recording.
+    span: [Time; 2],
     /// Time of the frame that is copied to the beginning of the opening timeline.
     critical: Time,
 }
 
 impl<'a> Writer<'a> {
-    /// Creates the writer of one film whose entity paths begin with `root`. `start` is the first moment of any film.
-    pub(super) fn new(chunks: &'a Chunks, film: &Film, root: &str, start: Time) -> Self {
-        Self { chunks, critical: film.critical_frame_time(), root: root.to_owned(), period: film.period, start }
+    /// Creates the writer of one film whose entity paths begin with `root`. `span` holds the first and the last moment of any
+    /// film.
+    pub(super) fn new(chunks: &'a Chunks, film: &Film, root: &str, span: [Time; 2]) -> Self {
+        Self { chunks, critical: film.critical_frame_time(), root: root.to_owned(), period: film.period, span }
+    }
+
+    /// Returns the share of the time axis that a duration takes.
+    pub(super) fn share_of_run(&self, duration: Time) -> f64 {
+        duration.s() / (self.span[1] + self.period - self.span[0]).s()
     }
 
     /// Returns the path of an entity of this film.
@@ -104,12 +110,21 @@ impl<'a> Writer<'a> {
     }
 
     /// Writes components that hold from `time` on.
-    pub(super) fn write_from(&self, entity: &str, time: Time, what: &impl AsComponents) -> Result<(), RecordingError> {
-        if time <= self.critical {
-            self.chunks.push_row(self.path(entity), self.copy_time(), what)?;
-            self.clear_copy(entity, time)?;
+    pub(super) fn write_from(&self, entity: &str, time: Time, what: &dyn AsComponents) -> Result<(), RecordingError> {
+        self.write_each(entity, &[(time, what)])
+    }
+
+    /// Writes several things, of which each holds from its time on until that of the next. The times must ascend.
+    pub(super) fn write_each(&self, entity: &str, whats: &[(Time, &dyn AsComponents)]) -> Result<(), RecordingError> {
+        let until_critical = whats.partition_point(|(time, _)| *time <= self.critical);
+        if let Some(shown) = until_critical.checked_sub(1) {
+            self.chunks.push_row(self.path(entity), self.copy_time(), whats[shown].1)?;
+            self.clear_copy(entity, whats[0].0)?;
         }
-        self.chunks.push_row(self.path(entity), self.timelines(&[time]), what)
+        for (time, what) in whats {
+            self.chunks.push_row(self.path(entity), self.timelines(&[*time]), *what)?;
+        }
+        Ok(())
     }
 
     /// Removes an entity and its children from `time` on.
@@ -133,16 +148,16 @@ impl<'a> Writer<'a> {
 
     /// Removes the copy of an entity whose first row comes after the start of the run.
     fn clear_copy(&self, entity: &str, first: Time) -> Result<(), RecordingError> {
-        if first <= self.start {
+        if first <= self.span[0] {
             return Ok(());
         }
-        let start = TimeColumn::new_duration_nanos(OPENING_TIMELINE, [self.start.ns()]);
+        let start = TimeColumn::new_duration_nanos(OPENING_TIMELINE, [self.span[0].ns()]);
         self.chunks.push_row(self.path(entity), vec![start], &Clear::flat())
     }
 
     /// Returns the moment of the copy.
     fn copy_time(&self) -> Vec<TimeColumn> {
-        vec![TimeColumn::new_duration_nanos(OPENING_TIMELINE, [(self.start - self.period).ns()])]
+        vec![TimeColumn::new_duration_nanos(OPENING_TIMELINE, [(self.span[0] - self.period).ns()])]
     }
 
     /// Returns `times` on each timeline.

@@ -27,8 +27,10 @@ const REAR_LABEL_M: f64 = 3.2;
 const COLLISION_TEXT_BEHIND_M: f32 = 11.0;
 /// Distance between the texts about two collisions (m).
 const COLLISION_TEXT_SPACING_M: f32 = 4.0;
-/// Position of the headways beside the ego, to its right and thus nearer to the eye (m).
-const GAP_TEXT_Y_M: f32 = -6.0;
+/// Position of the headways beside the ego (m): the rear one to its right and thus nearer to the eye, the front one to its
+/// left, away from the name of the ego.
+const REAR_TEXT_Y_M: f32 = -6.0;
+const FRONT_TEXT_Y_M: f32 = 7.0;
 /// Gap below which the vehicles touch and no headway is written (m).
 const TOUCHING_M: f64 = 0.3;
 /// Front gap below which no headway is written, since the name of the ego is there (m).
@@ -71,7 +73,10 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingErr
             write_velocity(writer, &entity, times, &states, (size, colour))?;
             let above_m = size.height_m + label_above_m(actor.part);
             let at_m = if index == film.ego { EGO_LABEL_AT_M } else { [0.0, 0.0, above_m as f32] };
-            write_name(writer, &entity, times, &states, (actor.name.as_str(), at_m, colour))?;
+            // Dense recorded traffic has room for three names. The view from above has the others.
+            if film.outcome.is_some() || !matches!(actor.part, Part::Other(_)) {
+                write_name(writer, &entity, times, &states, (actor.name.as_str(), at_m, colour))?;
+            }
         }
         write_lights(writer, &entity, times, &states, (actor.vehicle.class, size))?;
         if let Some(&gone) = all_times.get(actor.present_frames.end) {
@@ -295,7 +300,7 @@ impl Gap {
         };
         Some(Self {
             ends_m: [end(bumper_m), end(bumper_m + sign * gap_m)],
-            text_m: [(bumper_m + 0.5 * sign * gap_m) as f32, GAP_TEXT_Y_M, 0.0],
+            text_m: [(bumper_m + 0.5 * sign * gap_m) as f32, if sign > 0.0 { FRONT_TEXT_Y_M } else { REAR_TEXT_Y_M }, 0.0],
             colour: if is_critical { palette::CRITICAL } else { palette::SAFE },
             text,
         })

@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use closecall_traffic::Time;
-use rerun::log::LogMsg;
 use rerun::{MediaType, RecordingStreamError, TextDocument, ViewCoordinates};
 
 use super::blueprint::{self, FilmContents};
 use super::chunks::{self, Chunks};
+use super::encode::Recording;
 use super::plots::Role;
 use super::stream::Writer;
 use super::{
@@ -59,7 +59,7 @@ pub fn check_recording_possible(path: &Path) -> Result<(), RecordingError> {
 /// # Errors
 /// [`RecordingError`] if the file cannot be written completely.
 pub fn write_recording_unchecked(path: &Path, films: &[Film]) -> Result<(), RecordingError> {
-    let bytes = encode(films)?;
+    let bytes = record(films)?.encode()?;
     write_file(path, |file| file.write_all(&bytes))?;
     Ok(())
 }
@@ -73,15 +73,12 @@ pub fn write_recording(path: &Path, films: &[Film]) -> Result<(), RecordingError
     write_recording_unchecked(path, films)
 }
 
-/// Returns the bytes of the recording file.
-fn encode(films: &[Film]) -> Result<Vec<u8>, RecordingError> {
-    chunks::encode(&record(films)?)
-}
-
-/// Returns the messages of the films and of the layout.
-fn record(films: &[Film]) -> Result<Vec<LogMsg>, RecordingError> {
+/// Returns the recording of the films, with its layout.
+fn record(films: &[Film]) -> Result<Recording, RecordingError> {
     let data = Chunks::default();
     let start = films.iter().filter_map(|film| film.frames.first()).map(|frame| frame.time).min();
+    let end = films.iter().map(Film::end).max();
+    let span = [start, end].map(|time| time.unwrap_or(Time::ZERO));
     let canvases = bird::Canvas::of_films(films);
     let mut contents = Vec::new();
     for (index, film) in films.iter().enumerate() {
@@ -91,7 +88,7 @@ fn record(films: &[Film]) -> Result<Vec<LogMsg>, RecordingError> {
             _ => Role::Tested,
         };
         let root = format!("{}/", film.arm);
-        let writer = Writer::new(&data, film, &root, start.unwrap_or(Time::ZERO));
+        let writer = Writer::new(&data, film, &root, span);
         contents.push(write_film(&writer, &canvases[index], (root, role))?);
         if let Some(ghosts) = ghosts_in(films, index).filter(|_| film.level >= Level::Objects) {
             ghosts::write(&writer, &canvases[index], ghosts)?;
@@ -102,7 +99,7 @@ fn record(films: &[Film]) -> Result<Vec<LogMsg>, RecordingError> {
     let level = films.iter().map(|film| format!("{:?} {}", film.level, film.frames.len())).collect();
     let version = env!("CARGO_PKG_VERSION").to_owned();
     let name = chunks::name(&[version, level, summary::verdict(films), summary::story(films)]);
-    chunks::recording((application(films), name), blueprint::layout(&contents)?, data)
+    Ok(Recording::new((application(films), name), blueprint::layout(&contents)?, data))
 }
 
 /// Returns the application id. The viewer keeps one layout per application, so that each kind of recording has its own.

@@ -1,5 +1,7 @@
 //! Bands of states over time: the ego stack, what the ego knew, the phase, the moments, the brake lights.
 
+use std::collections::BTreeMap;
+
 use closecall_controllers::EgoState;
 use closecall_simulation::outcome::{Phase, ReachedMoment};
 use closecall_traffic::Time;
@@ -15,22 +17,56 @@ const BEFORE: &str = "-";
 const NO_REAR: &str = "no vehicle behind";
 const BRAKES: &str = "on";
 const DRIVES: &str = "off";
-const BRAKE_COLOURS: [(&str, Rgba); 2] = [(BRAKES, palette::BRAKE_LIGHT), (DRIVES, palette::QUIET)];
+/// Letters that fit into a bar as long as the time axis, in a window of 1280 px, and those that its padding takes.
+const AXIS_LETTERS: f64 = 76.0;
+const PADDING_LETTERS: f64 = 1.5;
 
-const STATE_COLOURS: [(&str, Rgba); 5] = [
-    (ego_state_name(EgoState::Following), palette::QUIET),
-    (ego_state_name(EgoState::Increasing), palette::EGO),
-    (ego_state_name(EgoState::Holding), palette::SAFE),
-    (ego_state_name(EgoState::Releasing), palette::NEUTRAL),
-    (ego_state_name(EgoState::EmergencyBraking), palette::CRITICAL),
+/// A state of a band.
+#[derive(Clone, Copy)]
+struct Word<'a> {
+    text: &'a str,
+    /// What a bar shows that is too short for the text.
+    short: &'a str,
+    colour: Rgba,
+}
+
+impl<'a> Word<'a> {
+    const fn new(text: &'a str, short: &'a str, colour: Rgba) -> Self {
+        Self { text, short, colour }
+    }
+
+    /// Returns the state and the label of a bar with room for so many letters. A bar too short for the text has a state
+    /// of its own, since the viewer knows one label per state.
+    fn fitted(&self, letters: f64) -> (String, &'a str) {
+        let fits = |label: &str| label.chars().count() as f64 <= letters;
+        match [self.text, self.short].into_iter().position(fits) {
+            Some(0) => (self.text.to_owned(), self.text),
+            Some(_) => (format!("{} (briefly)", self.text), self.short),
+            None => (format!("{} (for a moment)", self.text), NO_LABEL),
+        }
+    }
+}
+
+/// The label of a bar that is too short for any letter. In place of an empty one the viewer shows the state.
+const NO_LABEL: &str = " ";
+
+const BRAKING: [Word<'static>; 2] =
+    [Word::new(BRAKES, BRAKES, palette::BRAKE_LIGHT), Word::new(DRIVES, DRIVES, palette::QUIET)];
+
+const STATES: [Word<'static>; 5] = [
+    Word::new(ego_state_name(EgoState::Following), "follow", palette::QUIET),
+    Word::new(ego_state_name(EgoState::Increasing), "MIS", palette::EGO),
+    Word::new(ego_state_name(EgoState::Holding), "hold", palette::SAFE),
+    Word::new(ego_state_name(EgoState::Releasing), "rel.", palette::NEUTRAL),
+    Word::new(ego_state_name(EgoState::EmergencyBraking), "AEB", palette::CRITICAL),
 ];
 
-const PHASE_COLOURS: [(&str, Rgba); 5] = [
-    (NO_REAR, palette::QUIET),
-    (phase_name(Phase::Approach), palette::QUIET),
-    (phase_name(Phase::Critical), palette::CRITICAL),
-    (phase_name(Phase::Overtaking), palette::WARNING),
-    (phase_name(Phase::After), palette::NEUTRAL),
+const PHASES: [Word<'static>; 5] = [
+    Word::new(NO_REAR, "none", palette::QUIET),
+    Word::new(phase_name(Phase::Approach), "app.", palette::QUIET),
+    Word::new(phase_name(Phase::Critical), "crit.", palette::CRITICAL),
+    Word::new(phase_name(Phase::Overtaking), "overt.", palette::WARNING),
+    Word::new(phase_name(Phase::After), "after", palette::NEUTRAL),
 ];
 
 /// Returns the name of a phase of the encounter.
@@ -50,21 +86,21 @@ impl Plots<'_> {
         let frames = &self.film.frames;
         if frames.iter().all(|frame| frame.command.is_some()) {
             let state = |frame: &Frame| frame.command.map_or("", |command| ego_state_name(command.state));
-            self.band("states/1_ego", &frames.iter().map(state).collect::<Vec<_>>(), &STATE_COLOURS)?;
+            self.band("states/1_ego", &frames.iter().map(state).collect::<Vec<_>>(), &STATES)?;
             self.sight()?;
             // Without a vehicle behind there is no encounter that could have a phase.
             let phase = |frame: &Frame| match frame.phase {
                 Some(Phase::Approach) if frame.margins.follower.is_none() => NO_REAR,
                 phase => phase.map_or("", phase_name),
             };
-            self.band("states/4_encounter", &frames.iter().map(phase).collect::<Vec<_>>(), &PHASE_COLOURS)?;
+            self.band("states/4_encounter", &frames.iter().map(phase).collect::<Vec<_>>(), &PHASES)?;
         }
         self.moments()?;
         for (index, actor) in self.film.actors.iter().enumerate().filter(|(_, actor)| actor.is_plotted) {
             let braking = frames.iter().map(|frame| frame.states[index].brake_light);
             let words: Vec<&str> = braking.map(|lit| if lit { BRAKES } else { DRIVES }).collect();
             if words.contains(&BRAKES) {
-                self.band(&format!("states/5_brake_light_{}", actor.name), &words, &BRAKE_COLOURS)?;
+                self.band(&format!("states/5_brake_light_{}", actor.name), &words, &BRAKING)?;
             }
         }
         Ok(())
@@ -77,13 +113,15 @@ impl Plots<'_> {
         let span_at = |row: usize| spans.iter().rposition(|span| span.first_frame <= row);
         let words: Vec<&str> =
             (0..self.times.len()).map(|row| span_at(row).map_or("", |index| texts[index].as_str())).collect();
+        let shorts: Vec<String> = spans.iter().map(KnownSpan::short_words).collect();
         let colour = |span: &KnownSpan| if span.from_m.is_some() { palette::SAFE } else { palette::QUIET };
-        let colours: Vec<(&str, Rgba)> =
-            texts.iter().zip(&spans).map(|(text, span)| (text.as_str(), colour(span))).collect();
-        self.band("states/2_rear_seen", &words, &colours)
+        let states: Vec<Word<'_>> = (0..spans.len())
+            .map(|index| Word::new(&texts[index], &shorts[index], colour(&spans[index])))
+            .collect();
+        self.band("states/2_rear_seen", &words, &states)
     }
 
-    /// Writes a band that shows the latest of the moments of the encounter at each time, by its letter.
+    /// Writes a band that shows the latest of the moments of the encounter at each time.
     fn moments(&self) -> Result<(), RecordingError> {
         let moments = self.film.moments();
         if moments.is_empty() {
@@ -96,34 +134,48 @@ impl Plots<'_> {
         let latest = |time: Time| moments.iter().rposition(|noted| noted.time <= time);
         let words: Vec<&str> =
             self.times.iter().map(|&time| latest(time).map_or(BEFORE, |index| texts[index].as_str())).collect();
-        let entity = "states/3_moments";
-        let colours = moments.iter().map(|noted| palette::moment(noted.moment));
-        let configuration = StateConfiguration::new()
-            .with_values(std::iter::once(BEFORE).chain(texts.iter().map(String::as_str)))
-            .with_labels(std::iter::once(BEFORE).chain(short.iter().map(String::as_str)))
-            .with_colors(std::iter::once(palette::QUIET).chain(colours));
-        self.writer.write_static(entity, &configuration)?;
-        self.write_changes(entity, &words)
+        let states = (0..moments.len())
+            .map(|index| Word::new(&texts[index], &short[index], palette::moment(moments[index].moment)))
+            .chain([Word::new(BEFORE, BEFORE, palette::QUIET)]);
+        self.band("states/3_moments", &words, &states.collect::<Vec<_>>())
     }
 
-    /// Writes a band with one state name per frame.
-    fn band(&self, entity: &str, words: &[&str], colours: &[(&str, Rgba)]) -> Result<(), RecordingError> {
-        let configuration = StateConfiguration::new()
-            .with_values(colours.iter().map(|(word, _)| *word))
-            .with_labels(colours.iter().map(|(word, _)| *word))
-            .with_colors(colours.iter().map(|(_, colour)| *colour));
-        self.writer.write_static(entity, &configuration)?;
-        self.write_changes(entity, words)
-    }
-
-    /// Writes the changes of a state, and its end after the last frame.
-    fn write_changes(&self, entity: &str, words: &[&str]) -> Result<(), RecordingError> {
+    /// Writes a band with one state per frame, and its end after the last frame. A bar shows as much of the state's name
+    /// as it has room for.
+    fn band(&self, entity: &str, words: &[&str], states: &[Word<'_>]) -> Result<(), RecordingError> {
         let rows = changes(words);
         let end = self.film.end() + self.film.period;
         let times: Vec<Time> = rows.iter().map(|&row| self.times[row]).chain([end]).collect();
-        let states: Vec<&str> = rows.iter().map(|&row| words[row]).chain([""]).collect();
+        let (mut shown, mut known) = (Vec::new(), BTreeMap::new());
+        for (&row, span) in rows.iter().zip(times.windows(2)) {
+            let word = states.iter().find(|state| state.text == words[row]).copied();
+            let word = word.unwrap_or(Word::new(words[row], words[row], palette::QUIET));
+            let letters = AXIS_LETTERS * self.writer.share_of_run(span[1] - span[0]) - PADDING_LETTERS;
+            let (state, label) = word.fitted(letters);
+            known.insert(state.clone(), (label, word.colour));
+            shown.push(state);
+        }
+        shown.push(String::new());
+        let configuration = StateConfiguration::new()
+            .with_values(known.keys().map(String::as_str))
+            .with_labels(known.values().map(|(label, _)| *label))
+            .with_colors(known.values().map(|(_, colour)| *colour));
+        self.writer.write_static(entity, &configuration)?;
         self.writer.write_curve(entity, &times, |range| {
-            StateChange::new().with_state(states[range].iter().copied()).columns_of_unit_batches()
+            StateChange::new().with_state(shown[range].iter().map(String::as_str)).columns_of_unit_batches()
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bar_shows_as_much_of_a_state_as_it_has_room_for() {
+        let state = STATES[1];
+        assert_eq!(state.fitted(19.0), ("increasing the margin (briefly)".to_owned(), "MIS"));
+        assert_eq!(state.fitted(21.0), ("increasing the margin".to_owned(), "increasing the margin"));
+        assert_eq!(state.fitted(2.9), ("increasing the margin (for a moment)".to_owned(), NO_LABEL));
     }
 }

@@ -6,7 +6,7 @@ use closecall_scenarios::lane_change::detect;
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
 use closecall_traffic::geometry::BoxSide;
-use rerun::log::{Chunk, LogMsg};
+use rerun::log::Chunk;
 use rerun::{StoreKind, TimelineName};
 
 use super::super::stream::{OPENING_TIMELINE, STEP_TIMELINE, TIME_TIMELINE};
@@ -61,14 +61,8 @@ fn recorded_and_simulated(level: Level) -> [Film; 2] {
 }
 
 fn chunks(films: &[Film], kind: StoreKind) -> Vec<Chunk> {
-    let messages = record(films).unwrap();
-    let of_kind = messages.iter().filter(|message| message.store_id().kind() == kind);
-    of_kind
-        .filter_map(|message| match message {
-            LogMsg::ArrowMsg(_, arrow) => Some(Chunk::from_arrow_msg(arrow).unwrap()),
-            _ => None,
-        })
-        .collect()
+    let recording = record(films).unwrap();
+    if kind == StoreKind::Blueprint { recording.layout } else { recording.data }
 }
 
 /// Returns the latest moment on a timeline (ns).
@@ -192,7 +186,7 @@ fn full_sensors_show_points_boxes_ground_truth_and_images() {
     }
     let (_, empty, _) = empty_views(&films);
     assert!(empty.is_empty(), "{empty:?}");
-    assert!(encode(&films).unwrap().len() < 25_000_000);
+    assert!(record(&films).unwrap().encode().unwrap().len() < 25_000_000);
 }
 
 #[test]
@@ -221,11 +215,11 @@ fn all_timelines_span_the_run_and_the_opening_one_begins_with_the_critical_momen
 fn the_same_films_give_the_same_bytes_and_other_films_another_name() {
     let film = |controller| filmed("paper-figure", controller, (None, Level::Objects));
     let pair = || [film(ControllerChoice::ACC), film(ControllerChoice::MIS)];
-    let bytes = |films: &[Film]| super::chunks::encode_messages(&record(films).unwrap());
+    let bytes = |films: &[Film]| record(films).unwrap().encode().unwrap();
     assert!(bytes(&pair()) == bytes(&pair()));
-    let name = |films: &[Film]| record(films).unwrap().last().unwrap().store_id().clone();
+    let name = |films: &[Film]| record(films).unwrap().name;
     let [baseline, tested] = pair();
-    assert_ne!(name(&[baseline]).recording_id(), name(&[tested]).recording_id());
+    assert_ne!(name(&[baseline]), name(&[tested]));
 }
 
 #[test]
