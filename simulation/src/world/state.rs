@@ -7,7 +7,7 @@ use nalgebra::Vector2;
 
 use super::contact::{self, ContactSearch, StepBoxes, StruckVehicle, Touch};
 use super::impact::{BodyId, BodySpec, IMPACT_DURATION_S, Motion, Wreckage};
-use super::neighbours;
+use super::neighbours::{self, Extent};
 use super::plant::Plant;
 use super::search::NeighbourSearch;
 use crate::outcome::{Collision, Phase};
@@ -174,7 +174,10 @@ impl World {
 
     /// Returns the vehicles around a vehicle.
     pub(crate) fn neighbours(&self, actor: usize) -> Neighbours {
-        neighbours::find(self, actor, &self.road, |actor| neighbours::half_width_m(self, actor))
+        let extents: Vec<Extent> = (0..self.len()).map(|actor| Extent::of(self, actor)).collect();
+        let mut found = Neighbours::default();
+        neighbours::find(&extents, actor, &self.road).describe(self, &mut found);
+        found
     }
 
     /// Replaces `found` by the vehicles around each vehicle, in the order of the actors.

@@ -10,7 +10,7 @@
 //! whether any braking reaches the goal. If the lead vehicle is faster still, the headway may fall with the braking.
 //! The range is then scanned from its lower end, and the first braking that reaches the goal is bracketed.
 
-use super::response::BrakingResponse;
+use super::response::{BrakingResponse, BuildUp};
 use super::{Encounter, Solution};
 
 /// Number of parts in which the range is scanned if the headway at arrival may fall with the braking.
@@ -40,11 +40,15 @@ impl ArrivalPrediction {
     ///
     /// Returns `None` if the rear vehicle never arrives.
     pub fn arrival_s(&self, deceleration_mps2: f64) -> Option<f64> {
+        self.arrival_in_s(deceleration_mps2, &mut self.response.towards(deceleration_mps2))
+    }
+
+    fn arrival_in_s(&self, deceleration_mps2: f64, build_up: &mut BuildUp<'_>) -> Option<f64> {
         let Encounter { closing_mps, .. } = self.encounter;
         let distance_m = self.encounter.distance_to_critical_m();
         let mut time_s = self.encounter.arrival_s(deceleration_mps2)?;
         for _ in 0..NEWTON_STEPS {
-            let loss = self.response.loss(deceleration_mps2, time_s);
+            let loss = build_up.loss(time_s);
             let rate_mps = closing_mps + loss.speed_mps;
             if !(rate_mps > 0.0) {
                 return None;
@@ -73,8 +77,9 @@ impl ArrivalPrediction {
     /// means that the ego stops before.
     fn at_arrival(&self, deceleration_mps2: f64) -> Option<(f64, f64)> {
         let Encounter { ego_mps, front_gap_m, lead_mps, .. } = self.encounter;
-        let time_s = self.arrival_s(deceleration_mps2)?;
-        let loss = self.response.loss(deceleration_mps2, time_s);
+        let mut build_up = self.response.towards(deceleration_mps2);
+        let time_s = self.arrival_in_s(deceleration_mps2, &mut build_up)?;
+        let loss = build_up.loss(time_s);
         Some((front_gap_m + (lead_mps - ego_mps) * time_s + loss.distance_m, ego_mps - loss.speed_mps))
     }
 
