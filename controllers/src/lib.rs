@@ -22,7 +22,7 @@ mod ego;
 pub use config::{CheckedDriver, DriverConfig, HumanDriver};
 pub use driver::{
     DesiredSpeedNoise, Deviation, Driver, DriverAction, DriverError, DriverInput, DriverNote, Evidence, EvidenceConfig,
-    Follow, FollowConfig, Idm, IdmConfig, LaneChange, LaneKeeping, LaneKeepingConfig, LaneNeighbours, Lapse,
+    Follow, FollowConfig, Idm, IdmConfig, LaneChange, LaneKeeping, LaneKeepingConfig, LaneNeighbours, Looks, Lapse,
     LapseConfig, Lead, LogNormalConfig, Neighbour, Neighbours, Overtaker, OvertakerConfig, PerceptionConfig,
     PerceptionSettings, Prescribed, PrescribedConfig, PrescribedLaneChangeConfig, Reaction, ReactionConfig,
     RecordedConfig, Regime, Return, ReturnConfig, SpeedKeeping, SpeedKeepingConfig, Thresholds, Weave, Wiedemann99,

@@ -20,7 +20,7 @@ use super::reaction::{Reaction, ReactionConfig};
 use super::wiedemann99::{EmergencyBrakingDetector, brake_for_brake_light, default_desired_mps, nearest_lead};
 use super::{
     DEFAULT_HARDEST_BRAKING_MPS2, Driver, DriverAction, DriverError, DriverInput, HARDEST_BRAKING_RANGE, Lead,
-    check_finite, finite,
+    Looks, check_finite, finite,
 };
 
 /// Largest comfortable deceleration that a scenario may give (m/s²): a limit of the configuration.
@@ -176,6 +176,10 @@ impl Driver for IdmDriver {
             note: self.emergency.detect(acceleration_mps2),
             ..DriverAction::default()
         })
+    }
+
+    fn looks(&self) -> Looks {
+        Looks { beyond: self.model.perception.looks_beyond(), ..Looks::AHEAD }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Finds the vehicles around a vehicle, lane by lane.
 
-use closecall_controllers::{LaneNeighbours, Neighbour, Neighbours};
+use closecall_controllers::{LaneNeighbours, Looks, Neighbour, Neighbours};
 use closecall_traffic::metrics::bumper_gap_m;
 use closecall_traffic::{Lane, Road, Side};
 
@@ -69,10 +69,13 @@ pub(super) struct LanesAround {
 }
 
 impl LanesAround {
-    /// Returns the lanes around a vehicle at the lateral position `d_m`.
-    pub(super) fn new(road: &Road, d_m: f64) -> Self {
+    /// Returns the lanes around a vehicle at the lateral position `d_m`, as far as its driver looks.
+    pub(super) fn new(road: &Road, d_m: f64, looks: Looks) -> Self {
         let own = road.lane_at(d_m);
-        let beside = |side| road.beside(own, side).map(|lane| LaneBand::new(road, lane));
+        let beside = |side| {
+            let lane = if looks.adjacent { road.beside(own, side) } else { None };
+            lane.map(|lane| LaneBand::new(road, lane))
+        };
         Self { own: LaneBand::new(road, own), left: beside(Side::Left), right: beside(Side::Right) }
     }
 
@@ -99,6 +102,7 @@ pub(super) struct Nearest {
 }
 
 impl Nearest {
+    #[inline]
     fn neighbour(&self, world: &World) -> Neighbour {
         let (state, vehicle) = (world.state(self.actor), world.vehicle(self.actor));
         Neighbour {
@@ -125,14 +129,16 @@ pub(super) struct LaneAround {
 }
 
 impl LaneAround {
-    fn neighbours(&self, world: &World) -> LaneNeighbours {
-        let neighbour = |nearest: &Option<Nearest>| nearest.as_ref().map(|nearest| nearest.neighbour(world));
-        LaneNeighbours {
-            lead: neighbour(&self.lead),
-            follower: neighbour(&self.follower),
-            alongside: neighbour(&self.alongside),
-        }
+    fn describe(&self, world: &World, neighbours: &mut LaneNeighbours) {
+        describe(self.lead, world, &mut neighbours.lead);
+        describe(self.follower, world, &mut neighbours.follower);
+        describe(self.alongside, world, &mut neighbours.alongside);
     }
+}
+
+/// Writes the state of the nearest vehicle to `neighbour`.
+fn describe(nearest: Option<Nearest>, world: &World, neighbour: &mut Option<Neighbour>) {
+    *neighbour = nearest.map(|nearest| nearest.neighbour(world));
 }
 
 /// The nearest vehicles around a vehicle: what [`Neighbours`] describes in full.
@@ -154,19 +160,22 @@ impl Around {
 
     /// Writes the states of the vehicles to `neighbours`.
     pub(super) fn describe(&self, world: &World, neighbours: &mut Neighbours) {
-        let neighbour = |nearest: &Option<Nearest>| nearest.as_ref().map(|nearest| nearest.neighbour(world));
-        neighbours.own = self.own.neighbours(world);
-        neighbours.left = self.left.as_ref().map(|lane| lane.neighbours(world));
-        neighbours.right = self.right.as_ref().map(|lane| lane.neighbours(world));
-        neighbours.in_path = neighbour(&self.in_path);
-        neighbours.beyond = neighbour(&self.beyond);
+        self.own.describe(world, &mut neighbours.own);
+        for (lane, slot) in [(&self.left, &mut neighbours.left), (&self.right, &mut neighbours.right)] {
+            match lane {
+                Some(lane) => lane.describe(world, slot.get_or_insert_default()),
+                None => *slot = None,
+            }
+        }
+        describe(self.in_path, world, &mut neighbours.in_path);
+        describe(self.beyond, world, &mut neighbours.beyond);
     }
 }
 
 /// Returns the vehicles around `actor`, which is compared with every other one. [`super::search`] is faster if there are many
 /// vehicles.
-pub(super) fn find(extents: &[Extent], actor: usize, road: &Road) -> Around {
-    let lanes = LanesAround::new(road, extents[actor].d_m);
+pub(super) fn find(extents: &[Extent], actor: usize, road: &Road, looks: Looks) -> Around {
+    let lanes = LanesAround::new(road, extents[actor].d_m, looks);
     let mut around = lanes.nobody();
     for other in (0..extents.len()).filter(|other| *other != actor) {
         let candidate = Candidate::new(extents, [actor, other]);
@@ -185,7 +194,9 @@ pub(super) fn find(extents: &[Extent], actor: usize, road: &Road) -> Around {
             keep_nearest(&mut around.in_path, candidate.nearest);
         }
     }
-    if let Some(ahead) = around.ahead() {
+    if looks.beyond
+        && let Some(ahead) = around.ahead()
+    {
         for other in 0..extents.len() {
             keep_beyond(&mut around.beyond, extents, [actor, ahead, other]);
         }

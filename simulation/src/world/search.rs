@@ -8,7 +8,7 @@
 //!
 //! The result is that of [`super::neighbours::find`] to the bit.
 
-use closecall_controllers::Neighbours;
+use closecall_controllers::{Looks, Neighbours};
 use closecall_traffic::{Lane, Road};
 use closecall_traffic::metrics::bumper_gap_m;
 
@@ -47,16 +47,17 @@ pub(super) struct NeighbourSearch {
 }
 
 impl NeighbourSearch {
-    /// Replaces `found` by the vehicles around each vehicle.
-    pub(super) fn find_all(&mut self, world: &World, road: &Road, found: &mut [Neighbours]) {
+    /// Replaces `found` by the vehicles around each vehicle, as far as each driver looks.
+    pub(super) fn find_all(&mut self, world: &World, road: &Road, looks: &[Looks], found: &mut [Neighbours]) {
         self.extents.clear();
         self.extents.extend((0..world.len()).map(|actor| Extent::of(world, actor)));
         let few = world.len() <= FEW;
         if !few {
             self.sort(road);
         }
-        for (actor, found) in found.iter_mut().enumerate() {
-            let around = if few { neighbours::find(&self.extents, actor, road) } else { self.around(actor, road) };
+        for ((actor, found), looks) in found.iter_mut().enumerate().zip(looks) {
+            let around =
+                if few { neighbours::find(&self.extents, actor, road, *looks) } else { self.around(actor, road, *looks) };
             around.describe(world, found);
         }
     }
@@ -91,8 +92,8 @@ impl NeighbourSearch {
     }
 
     /// Returns the vehicles around `actor`.
-    fn around(&self, actor: usize, road: &Road) -> Around {
-        let lanes = LanesAround::new(road, self.extents[actor].d_m);
+    fn around(&self, actor: usize, road: &Road, looks: Looks) -> Around {
+        let lanes = LanesAround::new(road, self.extents[actor].d_m, looks);
         let mut around = lanes.nobody();
         self.fill(actor, lanes.own, &mut around.own);
         if let (Some(lane), Some(slot)) = (lanes.left, &mut around.left) {
@@ -104,7 +105,9 @@ impl NeighbourSearch {
         for strip in strips(road, self.extents[actor].sides_m()) {
             self.fill_path(actor, &self.strips[strip], &mut around.in_path);
         }
-        if let Some(ahead) = around.ahead() {
+        if looks.beyond
+            && let Some(ahead) = around.ahead()
+        {
             self.fill_beyond(road, [actor, ahead], &mut around.beyond);
         }
         around
@@ -217,10 +220,12 @@ mod tests {
             let world = world(road, &vehicles);
             let mut found = vec![Neighbours::default(); world.len()];
             let mut search = NeighbourSearch::default();
-            for _ in 0..2 {
-                search.find_all(&world, &road, &mut found);
+            for looks in [Looks::AROUND, Looks::AHEAD, Looks::AROUND] {
+                search.find_all(&world, &road, &vec![looks; world.len()], &mut found);
                 for (actor, found) in found.iter().enumerate() {
-                    prop_assert_eq!(*found, world.neighbours(actor));
+                    let all = world.neighbours(actor);
+                    let ahead = Neighbours { left: None, right: None, beyond: None, ..all };
+                    prop_assert_eq!(*found, if looks.adjacent { all } else { ahead });
                 }
             }
         }
@@ -241,7 +246,8 @@ mod tests {
                 .collect();
             let world = world(road, &vehicles);
             let mut search = NeighbourSearch::default();
-            search.find_all(&world, &road, &mut vec![Neighbours::default(); number]);
+            let looks = vec![Looks::AROUND; number];
+            search.find_all(&world, &road, &looks, &mut vec![Neighbours::default(); number]);
             search.visits.get()
         };
         let (few, many) = (comparisons(50), comparisons(500));
