@@ -22,7 +22,8 @@ mod wiedemann99;
 pub use attention::{Lapse, LapseConfig};
 pub use idm::{Idm, IdmConfig};
 pub use interface::{
-    Driver, DriverAction, DriverError, DriverInput, DriverNote, LaneChange, LaneNeighbours, Looks, Neighbour, Neighbours,
+    Driver, DriverAction, DriverError, DriverInput, DriverNote, LaneChange, LaneNeighbours, Looks, Neighbour,
+    Neighbours,
 };
 pub use lane_keeping::{Deviation, LaneKeeping, LaneKeepingConfig, Weave};
 pub use overtaker::{Follow, FollowConfig, Overtaker, OvertakerConfig, Return, ReturnConfig};

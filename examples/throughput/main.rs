@@ -11,7 +11,7 @@
 //! `per_calibration` is the number of simulated seconds in the time of that loop, which makes figures of different machines
 //! comparable. No validity check is run; a campaign's checks come on top.
 //!
-//! The second command counts instructions with Callgrind, see [`instructions`].
+//! The second command counts instructions with Callgrind (Debian's package `valgrind`), see [`instructions`].
 
 #![expect(clippy::print_stdout, reason = "a measurement prints its figures")]
 
@@ -122,8 +122,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     match &arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         [] => time(ROUNDS),
         ["instructions"] => instructions::check(),
+        ["instructions", "write"] => instructions::write(),
         [instructions::RUN, mode, samples] => instructions::run(mode, samples.parse()?),
         [rounds] => time(rounds.parse()?),
-        _ => Err("allowed: a number of rounds, or `instructions`".into()),
+        _ => Err("allowed: a number of rounds, `instructions`, or `instructions write`".into()),
     }
 }

@@ -102,4 +102,3 @@ pub(crate) fn modes() -> Result<Vec<Mode>, Box<dyn Error>> {
     }
     Ok(modes)
 }
-

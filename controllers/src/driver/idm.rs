@@ -19,8 +19,8 @@ use super::perception::{Perception, PerceptionConfig, PerceptionSettings, check_
 use super::reaction::{Reaction, ReactionConfig};
 use super::wiedemann99::{EmergencyBrakingDetector, brake_for_brake_light, default_desired_mps, nearest_lead};
 use super::{
-    DEFAULT_HARDEST_BRAKING_MPS2, Driver, DriverAction, DriverError, DriverInput, HARDEST_BRAKING_RANGE, Lead,
-    Looks, check_finite, finite,
+    DEFAULT_HARDEST_BRAKING_MPS2, Driver, DriverAction, DriverError, DriverInput, HARDEST_BRAKING_RANGE, Lead, Looks,
+    check_finite, finite,
 };
 
 /// Largest comfortable deceleration that a scenario may give (m/s²): a limit of the configuration.

@@ -9,12 +9,13 @@
 //! The result is that of [`super::neighbours::find`] to the bit.
 
 use closecall_controllers::{Looks, Neighbours};
-use closecall_traffic::{Lane, Road};
 use closecall_traffic::metrics::bumper_gap_m;
+use closecall_traffic::{Lane, Road};
 
 use super::World;
 use super::neighbours::{
-    self, Around, Candidate, Extent, LaneAround, LaneBand, LanesAround, Nearest, PATH_MARGIN_M, keep_beyond, keep_nearest,
+    self, Around, Candidate, Extent, LaneAround, LaneBand, LanesAround, Nearest, PATH_MARGIN_M, keep_beyond,
+    keep_nearest,
 };
 
 /// Number of vehicles up to which it is faster to compare all pairs.
@@ -56,8 +57,11 @@ impl NeighbourSearch {
             self.sort(road);
         }
         for ((actor, found), looks) in found.iter_mut().enumerate().zip(looks) {
-            let around =
-                if few { neighbours::find(&self.extents, actor, road, *looks) } else { self.around(actor, road, *looks) };
+            let around = if few {
+                neighbours::find(&self.extents, actor, road, *looks)
+            } else {
+                self.around(actor, road, *looks)
+            };
             around.describe(world, found);
         }
     }

@@ -72,7 +72,8 @@ mod tests {
 
     #[test]
     fn newtons_method_finds_the_cell_wherever_the_shape_is_steep() {
-        let missed = (0..=1_000).map(|step| 0.02 + 0.96 * f64::from(step) / 1_000.0).filter(|at| by_newton(*at).is_none());
+        let missed =
+            (0..=1_000).map(|step| 0.02 + 0.96 * f64::from(step) / 1_000.0).filter(|at| by_newton(*at).is_none());
         // A share on the edge of a cell may be missed.
         assert!(missed.count() <= 2);
     }

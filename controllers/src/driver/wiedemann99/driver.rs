@@ -6,7 +6,8 @@ use super::{Wiedemann99, Wiedemann99Model};
 use crate::driver::pedals::Pedals;
 use crate::driver::perception::{PerceivedVehicle, Perception};
 use crate::driver::{
-    COASTING_DECELERATION_MPS2, Driver, DriverAction, DriverError, DriverInput, DriverNote, Lead, Looks, check_finite, finite,
+    COASTING_DECELERATION_MPS2, Driver, DriverAction, DriverError, DriverInput, DriverNote, Lead, Looks, check_finite,
+    finite,
 };
 
 /// Share of the hardest braking above which braking counts as emergency braking: an assumption; it marks the log only.

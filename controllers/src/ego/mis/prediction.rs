@@ -131,7 +131,7 @@ impl ArrivalPrediction {
         let surplus_s = |braking: f64| self.headway_at_arrival_s(braking).map(|headway_s| headway_s - goal_s);
         let (mut low, mut high) = ((0.0, surplus_s(0.0)?), (enough, surplus_s(enough)?));
         let cells = f64::from(1_u32 << BISECTION_STEPS);
-        let mut estimate = 0.0;
+        let (mut estimate, mut last_missed) = (0.0, None);
         for _ in 0..SECANT_STEPS {
             let last = estimate;
             estimate = high.0 - high.1 * (high.0 - low.0) / (high.1 - low.1);
@@ -139,13 +139,15 @@ impl ArrivalPrediction {
                 break;
             }
             let surplus_s = surplus_s(estimate)?;
-            if surplus_s < 0.0 {
-                low = (estimate, surplus_s);
-                high.1 *= 0.5;
-            } else {
-                high = (estimate, surplus_s);
-                low.1 *= 0.5;
+            let misses = surplus_s < 0.0;
+            // An end that stays twice is given half of its weight, so that both ends approach the root.
+            let stays = last_missed == Some(misses);
+            let (moved, kept) = if misses { (&mut low, &mut high) } else { (&mut high, &mut low) };
+            *moved = (estimate, surplus_s);
+            if stays {
+                kept.1 *= 0.5;
             }
+            last_missed = Some(misses);
         }
         let share = (estimate / enough * cells).floor();
         if !(0.0..cells).contains(&share) {

@@ -162,11 +162,8 @@ fn the_mean_of_position_and_speed_is_that_of_the_whole_mixture() {
     let whole = mixture(estimates, &estimates.map(|estimate| estimate.probability));
     let estimate = vehicle.filter.estimate();
     assert_eq!([estimate.position_m, estimate.speed_mps], [whole.state[0], whole.state[1]]);
-    let covariance = [
-        estimate.position_variance_m2,
-        estimate.position_speed_covariance_m2ps,
-        estimate.speed_variance_m2ps2,
-    ];
+    let covariance =
+        [estimate.position_variance_m2, estimate.position_speed_covariance_m2ps, estimate.speed_variance_m2ps2];
     assert_eq!(covariance, COVARIANCES.map(|at| whole.covariance[at]));
 }
 
