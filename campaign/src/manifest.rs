@@ -1,7 +1,7 @@
 //! The manifest of a campaign's folder: everything that determines the outcomes and that a replay needs.
 
 use std::fs::File;
-use std::io;
+use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use closecall_sensors::SensorMode;
@@ -23,11 +23,14 @@ pub const MANIFEST_VERSION: u32 = 2;
 /// Length of the executable's hash in a version (hexadecimal digits).
 const HASH_DIGITS: usize = 16;
 
+/// Number of parts of the executable that are hashed at the same time.
+const HASH_PARTS: u64 = 8;
+
 /// Returns the version of this program: the release and a hash of the executable, since two builds of one release may
-/// differ.
+/// differ. The hash is that of the hashes of the parts, so that a campaign starts sooner.
 pub fn version() -> String {
     let release = env!("CARGO_PKG_VERSION");
-    match std::env::current_exe().and_then(|path| file_hash(&path)) {
+    match std::env::current_exe().and_then(|path| parts_hash(&path)) {
         Ok(hash) => format!("{release}+{}", &hash.to_hex()[..HASH_DIGITS]),
         Err(_) => release.to_owned(),
     }
@@ -38,6 +41,28 @@ pub(crate) fn file_hash(path: &Path) -> io::Result<blake3::Hash> {
     let mut hasher = blake3::Hasher::new();
     hasher.update_reader(File::open(path)?)?;
     Ok(hasher.finalize())
+}
+
+/// Returns the BLAKE3 hash of the hashes of [`HASH_PARTS`] parts of a file of equal length, without loading the file into
+/// memory.
+fn parts_hash(path: &Path) -> io::Result<blake3::Hash> {
+    let length = path.metadata()?.len().div_ceil(HASH_PARTS);
+    let part_hash = |part: u64| -> io::Result<blake3::Hash> {
+        let mut file = File::open(path)?;
+        file.seek(SeekFrom::Start(part * length))?;
+        let mut hasher = blake3::Hasher::new();
+        hasher.update_reader(file.take(length))?;
+        Ok(hasher.finalize())
+    };
+    std::thread::scope(|scope| {
+        let parts: Vec<_> = (0..HASH_PARTS).map(|part| scope.spawn(move || part_hash(part))).collect();
+        let mut hasher = blake3::Hasher::new();
+        for part in parts {
+            let hash = part.join().map_err(|_| io::Error::other("failed to hash the executable"))??;
+            hasher.update(hash.as_bytes());
+        }
+        Ok(hasher.finalize())
+    })
 }
 
 /// One scenario of a campaign.
@@ -256,6 +281,27 @@ mod tests {
             working_folder: None,
             without_effect: Vec::new(),
             command: vec!["closecall".to_owned()],
+        }
+    }
+
+    #[test]
+    fn the_hash_of_the_parts_covers_every_byte() {
+        let path = tempfile::NamedTempFile::new().unwrap().into_temp_path();
+        let hash_of = |bytes: &[u8]| {
+            std::fs::write(&path, bytes).unwrap();
+            parts_hash(&path).unwrap()
+        };
+        for length in [0, 1, 8, 1_003] {
+            let mut bytes = vec![7; length];
+            let hash = hash_of(&bytes);
+            assert_eq!(hash_of(&bytes), hash);
+            for changed in [0, length / 2, length.saturating_sub(1)].into_iter().filter(|at| *at < length) {
+                bytes[changed] += 1;
+                assert_ne!(hash_of(&bytes), hash);
+                bytes[changed] -= 1;
+            }
+            bytes.push(7);
+            assert_ne!(hash_of(&bytes), hash);
         }
     }
 

@@ -22,7 +22,8 @@ mod wiedemann99;
 pub use attention::{Lapse, LapseConfig};
 pub use idm::{Idm, IdmConfig};
 pub use interface::{
-    Driver, DriverAction, DriverError, DriverInput, DriverNote, LaneChange, LaneNeighbours, Neighbour, Neighbours,
+    Driver, DriverAction, DriverError, DriverInput, DriverNote, LaneChange, LaneNeighbours, Looks, Neighbour,
+    Neighbours,
 };
 pub use lane_keeping::{Deviation, LaneKeeping, LaneKeepingConfig, Weave};
 pub use overtaker::{Follow, FollowConfig, Overtaker, OvertakerConfig, Return, ReturnConfig};
@@ -64,19 +65,32 @@ pub(crate) fn finite(value: f64, what: &'static str, time: Time) -> Result<f64, 
 
 /// Returns an error if any input is not finite. Comparisons and `min` would treat NaN as a safe value.
 pub(crate) fn check_finite(input: &DriverInput<'_>) -> Result<(), DriverError> {
-    let (own, near) = (input.own, input.neighbours);
-    for value in [own.s_m, own.d_m, own.speed_mps, input.lateral_deviation_m] {
-        finite(value, "own state", input.time)?;
-    }
-    finite(input.desired_speed_offset_mps, "wanted speed", input.time)?;
-    let lanes = [Some(&near.own), near.left.as_ref(), near.right.as_ref()];
-    let others = lanes.iter().flatten().flat_map(|lane| [&lane.lead, &lane.follower, &lane.alongside]);
-    for other in others.chain([&near.in_path, &near.beyond]).flatten() {
-        for value in [other.gap_m, other.speed_mps, other.acceleration_mps2, other.width_m, other.lateral_offset_m] {
-            finite(value, "state of a neighbour", input.time)?;
-        }
+    let (own, near, time) = (input.own, input.neighbours, input.time);
+    all_finite([own.s_m, own.d_m, own.speed_mps, input.lateral_deviation_m], "own state", time)?;
+    finite(input.desired_speed_offset_mps, "wanted speed", time)?;
+    check_neighbour(near.in_path.as_ref(), time)?;
+    check_neighbour(near.beyond.as_ref(), time)?;
+    for lane in [Some(&near.own), near.left.as_ref(), near.right.as_ref()].into_iter().flatten() {
+        check_neighbour(lane.lead.as_ref(), time)?;
+        check_neighbour(lane.follower.as_ref(), time)?;
+        check_neighbour(lane.alongside.as_ref(), time)?;
     }
     Ok(())
+}
+
+/// Returns an error if the state of a neighbour is not finite.
+fn check_neighbour(neighbour: Option<&Neighbour>, time: Time) -> Result<(), DriverError> {
+    neighbour.map_or(Ok(()), |near| {
+        let state = [near.gap_m, near.speed_mps, near.acceleration_mps2, near.width_m, near.lateral_offset_m];
+        all_finite(state, "state of a neighbour", time)
+    })
+}
+
+/// Returns an error if any of the values is not finite.
+fn all_finite<const N: usize>(values: [f64; N], what: &'static str, time: Time) -> Result<(), DriverError> {
+    // A finite sum has finite terms. The sum of huge terms may be infinite.
+    let is_finite = values.iter().sum::<f64>().is_finite() || values.iter().all(|value| value.is_finite());
+    if is_finite { Ok(()) } else { Err(DriverError::NotFinite { what, time }) }
 }
 
 /// The lead vehicle as the input of a car-following model.

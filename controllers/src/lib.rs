@@ -26,7 +26,7 @@ pub use config::{CheckedDriver, DriverConfig, HumanDriver};
 pub use driver::{
     DesiredSpeedNoise, Deviation, Driver, DriverAction, DriverError, DriverInput, DriverNote, Evidence, EvidenceConfig,
     Follow, FollowConfig, Idm, IdmConfig, LaneChange, LaneKeeping, LaneKeepingConfig, LaneNeighbours, Lapse,
-    LapseConfig, Lead, LogNormalConfig, Neighbour, Neighbours, Overtaker, OvertakerConfig, PerceptionConfig,
+    LapseConfig, Lead, LogNormalConfig, Looks, Neighbour, Neighbours, Overtaker, OvertakerConfig, PerceptionConfig,
     PerceptionSettings, Prescribed, PrescribedConfig, PrescribedLaneChangeConfig, Reaction, ReactionConfig,
     RecordedConfig, Regime, Return, ReturnConfig, SpeedKeeping, SpeedKeepingConfig, Thresholds, Weave, Wiedemann99,
     Wiedemann99Config, Wiedemann99Driver, Wiedemann99Model,

@@ -46,16 +46,33 @@ pub struct LaneNeighbours {
 pub struct Neighbours {
     /// In the lane that contains the centre of the driver's vehicle.
     pub own: LaneNeighbours,
-    /// In the lane to the left; `None` if there is no such lane.
+    /// In the lane to the left; `None` if there is no such lane, or if the driver does not look there.
     pub left: Option<LaneNeighbours>,
-    /// In the lane to the right; `None` if there is no such lane.
+    /// In the lane to the right; `None` if there is no such lane, or if the driver does not look there.
     pub right: Option<LaneNeighbours>,
     /// The nearest vehicle ahead in any lane whose box overlaps the driver's vehicle laterally: driving straight on
     /// would hit it.
     pub in_path: Option<Neighbour>,
     /// The nearest vehicle ahead of the one that is ahead (the nearer of the lead vehicle in the own lane and the one in
-    /// the path), in the path of that one: the driver may see its brake light through the windows between.
+    /// the path), in the path of that one: the driver may see its brake light through the windows between. `None` if there is
+    /// none, or if the driver does not look that far.
     pub beyond: Option<Neighbour>,
+}
+
+/// The neighbours that a driver takes into account, beside those in its own lane and in its path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Looks {
+    /// Those in the lanes to the left and to the right.
+    pub adjacent: bool,
+    /// The vehicle beyond the one ahead.
+    pub beyond: bool,
+}
+
+impl Looks {
+    /// All neighbours.
+    pub const AROUND: Self = Self { adjacent: true, beyond: true };
+    /// Those in the own lane and in the path alone.
+    pub const AHEAD: Self = Self { adjacent: false, beyond: false };
 }
 
 /// The input of a human driver at one physics step.
@@ -142,4 +159,9 @@ pub trait Driver: Send {
     /// # Errors
     /// Returns a [`DriverError`] if the input or the computed action is not finite.
     fn step(&mut self, input: &DriverInput<'_>, rng: &mut Stream) -> Result<DriverAction, DriverError>;
+
+    /// Returns which neighbours the driver takes into account. The input may lack the others.
+    fn looks(&self) -> Looks {
+        Looks::AROUND
+    }
 }

@@ -190,7 +190,7 @@ impl Perception {
             None => self.ahead_above_threshold(&observation, &extrapolation, reckoned_mps2),
             Some(_) => self.ahead_as_believed(&observation, &extrapolation),
         };
-        if self.settings.anticipation > 0.0 {
+        if self.settings.looks_beyond() {
             self.anticipate(&observation, input.time, ahead.as_mut());
         }
         let adjacent = observation.side.zip(observation.adjacent).map(|(side, [lead, alongside, follower])| {

@@ -238,9 +238,9 @@ impl ObjectSensor {
         let latency_s = self.model.latency_steps as f64 * CONTROL_STEP.s();
         let target = &mut self.targets[index];
         let length = target.reports.len();
-        target.reports[self.step % length] = target.filters.map(|(id, lifecycle, [along, across])| Report {
-            id,
-            lifecycle,
+        target.reports[self.step % length] = target.filters.as_ref().map(|(id, lifecycle, [along, across])| Report {
+            id: *id,
+            lifecycle: *lifecycle,
             along: along.predicted(latency_s),
             across: across.predicted(latency_s),
         });

@@ -42,11 +42,34 @@ struct ModeEstimate {
     probability: f64,
 }
 
+/// Shares of one mode that remain after a step.
+#[derive(Clone, Copy, Debug, Default)]
+struct Remaining {
+    /// Of the correlated acceleration.
+    persistence: f64,
+    /// Of the speed.
+    speed: f64,
+    /// Probability that the mode goes on in a free situation.
+    stays: f64,
+}
+
+impl Remaining {
+    fn after(mode: &Mode, own: usize, step_s: f64) -> Self {
+        Self {
+            persistence: if mode.persistence_s > 0.0 { (-step_s / mode.persistence_s).exp() } else { 0.0 },
+            speed: (-step_s / mode.speed_decay_s).exp(),
+            stays: staying_probability(&mode.rates_per_s(Situation::FREE), own, step_s),
+        }
+    }
+}
+
 /// The filter of one vehicle along one axis.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct AxisFilter {
     modes: &'static [Mode],
     estimates: [ModeEstimate; MODES],
+    /// What remains after a control step, the usual step.
+    usual: [Remaining; MODES],
     /// Situation of the latest prediction.
     situation: Situation,
 }
@@ -98,30 +121,46 @@ impl AxisFilter {
                 probability: mode.map_or(0.0, |mode| mode.prior_probability),
             }
         });
-        Self { modes, estimates, situation: Situation::FREE }
+        let usual = std::array::from_fn(|index| {
+            modes.get(index).map_or_else(Remaining::default, |mode| Remaining::after(mode, index, CONTROL_STEP.s()))
+        });
+        Self { modes, estimates, usual, situation: Situation::FREE }
     }
 
     /// Predicts by `step_s` in this situation, after which the share `slow_share` of the slow error remains.
     pub(crate) fn predict(&mut self, step_s: f64, slow_share: f64, situation: Situation) {
         self.situation = situation;
+        let remaining = if step_s == CONTROL_STEP.s() {
+            self.usual
+        } else {
+            std::array::from_fn(|index| match self.modes.get(index) {
+                Some(mode) => Remaining::after(mode, index, step_s),
+                None => Remaining::default(),
+            })
+        };
         if self.modes.len() > 1 {
-            self.mix(step_s);
+            self.mix(step_s, &remaining);
         }
-        for (estimate, mode) in self.estimates.iter_mut().zip(self.modes) {
-            estimate.predict(mode, step_s, slow_share);
+        for ((estimate, mode), remaining) in self.estimates.iter_mut().zip(self.modes).zip(&remaining) {
+            estimate.predict(mode, step_s, remaining, slow_share);
         }
     }
 
     /// Replaces each mode's estimate by the mixture of the estimates that may switch to the mode within the step.
-    fn mix(&mut self, step_s: f64) {
+    fn mix(&mut self, step_s: f64, remaining: &[Remaining; MODES]) {
         let before = self.estimates;
         let count = self.modes.len();
-        for (to, mixed) in self.estimates.iter_mut().enumerate().take(count) {
-            let weights: [f64; MODES] = std::array::from_fn(|from| {
-                let Some(mode) = self.modes.get(from) else { return 0.0 };
-                before[from].probability * transition_probability(&mode.rates_per_s(self.situation), from, to, step_s)
-            });
-            *mixed = mixture(&before[..count], &weights);
+        let mut weights = [[0.0; MODES]; MODES];
+        for (from, mode) in self.modes.iter().enumerate() {
+            let rates_per_s = mode.rates_per_s(self.situation);
+            let is_free = self.situation == Situation::FREE;
+            let stays = if is_free { remaining[from].stays } else { staying_probability(&rates_per_s, from, step_s) };
+            for (weights, share) in weights.iter_mut().zip(transition_probabilities(&rates_per_s, from, stays)) {
+                weights[from] = before[from].probability * share;
+            }
+        }
+        for (mixed, weights) in self.estimates.iter_mut().zip(&weights).take(count) {
+            *mixed = mixture(&before[..count], weights);
         }
     }
 
@@ -186,25 +225,41 @@ impl AxisFilter {
         }
     }
 
-    /// Returns the mean estimate over the modes.
-    fn combined(&self) -> ModeEstimate {
-        if let [only] = &self.estimates[..self.modes.len()] {
-            return *only;
-        }
-        let weights = self.estimates.map(|estimate| estimate.probability);
-        mixture(&self.estimates[..self.modes.len()], &weights)
-    }
-
-    /// Returns the present estimate of position and speed.
+    /// Returns the present estimate of position and speed: the mean over the modes.
     pub(crate) fn estimate(&self) -> AxisEstimate {
-        let ModeEstimate { state, covariance, .. } = self.combined();
+        let estimates = &self.estimates[..self.modes.len()];
+        let (state, covariance) = match estimates {
+            [only] => ([only.state[0], only.state[1]], COVARIANCES.map(|at| only.covariance[at])),
+            _ => self.mean(estimates),
+        };
         AxisEstimate {
             position_m: state[0],
             speed_mps: state[1],
-            position_variance_m2: covariance[(0, 0)],
-            position_speed_covariance_m2ps: covariance[(0, 1)],
-            speed_variance_m2ps2: covariance[(1, 1)],
+            position_variance_m2: covariance[0],
+            position_speed_covariance_m2ps: covariance[1],
+            speed_variance_m2ps2: covariance[2],
         }
+    }
+
+    /// Returns position and speed of the mixture of all modes, and their [`COVARIANCES`]: the same as [`mixture`].
+    fn mean(&self, estimates: &[ModeEstimate]) -> ([f64; 2], [f64; 3]) {
+        let sum: f64 = self.estimates.iter().map(|estimate| estimate.probability).sum();
+        let mut state = [0.0; 2];
+        for estimate in estimates {
+            let share = estimate.probability / sum;
+            for (index, value) in state.iter_mut().enumerate() {
+                *value += estimate.state[index] * share;
+            }
+        }
+        let mut covariance = [0.0; 3];
+        for estimate in estimates {
+            let share = estimate.probability / sum;
+            for (value, (row, column)) in covariance.iter_mut().zip(COVARIANCES) {
+                let (one, other) = (estimate.state[row] - state[row], estimate.state[column] - state[column]);
+                *value += (estimate.covariance[(row, column)] + one * other) * share;
+            }
+        }
+        (state, covariance)
     }
 
     /// Returns the estimate predicted by `horizon_s`, in the situation of the latest prediction.
@@ -220,51 +275,76 @@ impl AxisFilter {
     }
 }
 
-/// Returns the probability that the mode changes from index `from` to index `to` in a step of `step_s`.
-///
-/// `rates_per_s` are the rates of leaving the mode `from` (1/s). At most one switch per step is considered.
-fn transition_probability(rates_per_s: &[f64; MODES], from: usize, to: usize, step_s: f64) -> f64 {
-    let leaving_per_s: f64 = (0..MODES).filter(|other| *other != from).map(|other| rates_per_s[other]).sum();
-    let stays = (-leaving_per_s * step_s).exp();
-    if from == to {
-        stays
-    } else if leaving_per_s > 0.0 {
-        (1.0 - stays) * rates_per_s[to] / leaving_per_s
-    } else {
-        0.0
-    }
+/// Indices of the variance of the position, its covariance with the speed, and the variance of the speed.
+const COVARIANCES: [(usize, usize); 3] = [(0, 0), (0, 1), (1, 1)];
+
+/// Returns the rate of leaving the mode with the index `from` (1/s), whose rates of switching are `rates_per_s`.
+fn leaving_per_s(rates_per_s: &[f64; MODES], from: usize) -> f64 {
+    (0..MODES).filter(|other| *other != from).map(|other| rates_per_s[other]).sum()
+}
+
+/// Returns the probability that the mode with the index `from` goes on for a step of `step_s`.
+fn staying_probability(rates_per_s: &[f64; MODES], from: usize, step_s: f64) -> f64 {
+    (-leaving_per_s(rates_per_s, from) * step_s).exp()
+}
+
+/// Returns the probabilities that the mode changes from the index `from` to each mode in a step, in which it goes on with the
+/// probability `stays`. At most one switch per step is considered.
+fn transition_probabilities(rates_per_s: &[f64; MODES], from: usize, stays: f64) -> [f64; MODES] {
+    let leaving_per_s = leaving_per_s(rates_per_s, from);
+    std::array::from_fn(|to| {
+        if from == to {
+            stays
+        } else if leaving_per_s > 0.0 {
+            (1.0 - stays) * rates_per_s[to] / leaving_per_s
+        } else {
+            0.0
+        }
+    })
 }
 
 /// Returns the mean and covariance of a mixture; its probability is the sum of the weights.
 fn mixture(estimates: &[ModeEstimate], weights: &[f64; MODES]) -> ModeEstimate {
     let sum: f64 = weights.iter().sum();
+    let shares = weights.map(|weight| weight / sum);
     let mut state = Vector4::zeros();
-    for (estimate, weight) in estimates.iter().zip(weights) {
-        state += estimate.state * (weight / sum);
+    for (estimate, share) in estimates.iter().zip(shares) {
+        state += estimate.state * share;
     }
     let mut covariance = Matrix4::zeros();
-    for (estimate, weight) in estimates.iter().zip(weights) {
+    for (estimate, share) in estimates.iter().zip(shares) {
         let deviation = estimate.state - state;
-        covariance += (estimate.covariance + deviation * deviation.transpose()) * (weight / sum);
+        covariance += (estimate.covariance + deviation * deviation.transpose()) * share;
     }
     ModeEstimate { state, covariance, probability: sum }
 }
 
 impl ModeEstimate {
     /// Predicts by `t` seconds under one mode.
-    fn predict(&mut self, mode: &Mode, t: f64, slow_share: f64) {
-        let persistence = if mode.persistence_s > 0.0 { (-t / mode.persistence_s).exp() } else { 0.0 };
-        let speed_decay = (-t / mode.speed_decay_s).exp();
+    ///
+    /// ```text
+    ///       1  t  t²/2  0        r: share of the speed that remains, q: of the acceleration, s: of the slow error
+    ///   F = 0  r  t     0
+    ///       0  0  q     0        The state x becomes F·x, and its covariance P becomes F·P·Fᵀ. The zeros are left out;
+    ///       0  0  0     s        the order of the sums is that of the full products.
+    /// ```
+    fn predict(&mut self, mode: &Mode, t: f64, remaining: &Remaining, slow_share: f64) {
+        let Remaining { persistence, speed, .. } = *remaining;
         let half = 0.5 * t * t;
-        #[rustfmt::skip]
-        let step = Matrix4::new(
-            1.0, t, half, 0.0,
-            0.0, speed_decay, t, 0.0,
-            0.0, 0.0, persistence, 0.0,
-            0.0, 0.0, 0.0, slow_share,
-        );
-        self.state = step * self.state;
-        self.covariance = step * self.covariance * step.transpose();
+        let propagated = |x: [f64; 4]| {
+            [x[0] + t * x[1] + half * x[2], speed * x[1] + t * x[2], persistence * x[2], slow_share * x[3]]
+        };
+        self.state = propagated(self.state.into()).into();
+        for column in 0..4 {
+            let from = &mut self.covariance.data.0[column];
+            *from = propagated(*from);
+        }
+        for row in 0..4 {
+            let to = propagated([0, 1, 2, 3].map(|column| self.covariance[(row, column)]));
+            for (column, value) in to.into_iter().enumerate() {
+                self.covariance[(row, column)] = value;
+            }
+        }
         let q = mode.white_density_m2ps3;
         let new_share = 1.0 - persistence * persistence;
         self.covariance[(0, 0)] += q * t * t * t / 3.0;

@@ -1,6 +1,6 @@
 //! The human drivers of a run, each with its own random streams.
 
-use closecall_controllers::{CheckedDriver, DesiredSpeedNoise, Driver, Weave};
+use closecall_controllers::{CheckedDriver, DesiredSpeedNoise, Driver, Looks, Weave};
 use closecall_traffic::{Road, Stream, stream};
 
 use super::RunKey;
@@ -36,6 +36,15 @@ pub(super) fn human_drivers(scenario: &Scenario, key: RunKey) -> Vec<Human> {
         }
     }
     humans
+}
+
+/// Returns how far the driver of each of `actors` vehicles looks. All others look ahead only.
+pub(super) fn looks(humans: &[Human], actors: usize) -> Vec<Looks> {
+    let mut looks = vec![Looks::AHEAD; actors];
+    for human in humans {
+        looks[human.actor] = human.driver.looks();
+    }
+    looks
 }
 
 /// Returns how the driver of an actor weaves in a run, or `None` if the driver does not.

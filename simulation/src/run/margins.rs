@@ -26,19 +26,19 @@ impl CurrentMargins {
     /// overtaking vehicle thus counts as behind until it crosses the marking, and as ahead once it has pulled in. A
     /// neighbour that the vehicle would hit by driving straight on also counts as ahead.
     pub(crate) fn new(own: &VehicleState, neighbours: &Neighbours, widths: Widths) -> Self {
-        let in_lane = |other: &Neighbour| other.lateral_offset_m.abs() < 0.5 * widths.lane_m;
-        let overlaps = |other: &Neighbour| other.lateral_offset_m.abs() < 0.5 * (widths.vehicle_m + other.width_m);
-        let in_path = neighbours.in_path.filter(|path| path.gap_m >= 0.0 && overlaps(path));
-        let ahead = match (neighbours.own.lead.filter(in_lane), in_path) {
+        let in_lane = |other: &&Neighbour| other.lateral_offset_m.abs() < 0.5 * widths.lane_m;
+        let overlaps = |other: &&Neighbour| other.lateral_offset_m.abs() < 0.5 * (widths.vehicle_m + other.width_m);
+        let in_path = neighbours.in_path.as_ref().filter(|path| path.gap_m >= 0.0 && overlaps(path));
+        let ahead = match (neighbours.own.lead.as_ref().filter(in_lane), in_path) {
             (Some(lead), Some(path)) => Some(if path.gap_m < lead.gap_m { path } else { lead }),
             (lead, path) => lead.or(path),
         };
-        let behind = neighbours.own.follower.filter(in_lane);
+        let behind = neighbours.own.follower.as_ref().filter(in_lane);
         let gap_front_m = ahead.map(|ahead| ahead.gap_m).ok_or(Absent::NoLead);
         let gap_rear_m = behind.map(|behind| behind.gap_m).ok_or(Absent::NoFollower);
         let behind = behind.ok_or(Absent::NoFollower);
         Self {
-            lead: match neighbours.own.lead {
+            lead: match neighbours.own.lead.as_ref() {
                 Some(lead) if in_lane(&lead) => Ok(Lead { actor: lead.actor, speed_mps: lead.speed_mps }),
                 Some(_) => Err(Absent::BetweenLanes),
                 None => Err(Absent::NoLead),

@@ -2,14 +2,14 @@
 
 use closecall_controllers::CheckedDriver;
 use closecall_controllers::{
-    DriverInput, DriverNote, EgoCommand, EgoController, EgoInput, EgoState, MisSettings, Neighbours,
+    DriverInput, DriverNote, EgoCommand, EgoController, EgoInput, EgoState, Looks, MisSettings, Neighbours,
 };
 use closecall_sensors::{NoiseKey, Perception, Scene, SceneVehicle};
 use closecall_traffic::{CONTROL_STEP, ENGAGEMENT_CLOSING_MPS, ENGAGEMENT_GAP_M, Measured, Track, VehicleState};
 
 use super::ego_input::{odometry, sensor_availability};
 use super::events::Events;
-use super::humans::{Human, human_drivers, weave};
+use super::humans::{Human, human_drivers, looks, weave};
 use super::margins::{MarginMeter, Widths};
 use super::mis_log::{MisLog, MisObservation};
 use super::moments::Moments;
@@ -42,6 +42,8 @@ pub(super) struct Run<'a> {
     critical_gap_m: f64,
     /// The last command of the ego controller.
     command: Option<EgoCommand>,
+    /// How far the driver of each vehicle looks. The ego perceives with its sensors; its margins need the lane and the path.
+    looks: Vec<Looks>,
     // Buffers that are reused in each step.
     neighbours: Vec<Neighbours>,
     tracks: Vec<Track>,
@@ -81,6 +83,7 @@ impl<'a> Run<'a> {
             Some(mode) => scenario.sensors.with_mode(mode),
             None => scenario.sensors,
         };
+        let humans = human_drivers(scenario, key);
         let mut run = Self {
             scenario,
             key,
@@ -92,7 +95,8 @@ impl<'a> Run<'a> {
                 actors: scenario.actors.iter().map(|actor| actor.id.clone()).collect(),
             })?,
             controller: arm.controller.build(settings),
-            humans: human_drivers(scenario, key),
+            looks: looks(&humans, scenario.actors.len()),
+            humans,
             events: Events::new(scenario),
             encounter: Encounter::default(),
             meter: MarginMeter::new(scenario.physics_step.s()),
@@ -127,7 +131,7 @@ impl<'a> Run<'a> {
 
     /// Updates the neighbours of all vehicles, the ego's margins, and the phase of the encounter.
     pub(super) fn update_surroundings(&mut self, observer: &mut dyn Observer) {
-        self.world.find_neighbours(&mut self.neighbours);
+        self.world.find_neighbours(&self.looks, &mut self.neighbours);
         let ego = self.scenario.ego;
         let own = self.world.state(ego);
         self.margins = CurrentMargins::new(own, &self.neighbours[ego], self.widths(ego));

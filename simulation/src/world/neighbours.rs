@@ -1,6 +1,6 @@
 //! Finds the vehicles around a vehicle, lane by lane.
 
-use closecall_controllers::{LaneNeighbours, Neighbour, Neighbours};
+use closecall_controllers::{LaneNeighbours, Looks, Neighbour, Neighbours};
 use closecall_traffic::metrics::bumper_gap_m;
 use closecall_traffic::{Lane, Road, Side};
 
@@ -11,101 +11,214 @@ const LANE_OVERLAP_M: f64 = 0.2;
 /// Lateral clearance below which two vehicles count as being in each other's path (m).
 pub(super) const PATH_MARGIN_M: f64 = 0.1;
 
+/// Position and extent of a vehicle on the road.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Extent {
+    pub(super) s_m: f64,
+    pub(super) d_m: f64,
+    pub(super) length_m: f64,
+    /// Half of the extent of its box across the road (m).
+    half_width_m: f64,
+}
+
+impl Extent {
+    pub(super) fn of(world: &World, actor: usize) -> Self {
+        let (state, size) = (world.state(actor), world.vehicle(actor).dimensions);
+        let half_width_m = if state.heading_rad == 0.0 {
+            0.5 * size.width_m
+        } else {
+            let (sin, cos) = state.heading_rad.sin_cos();
+            0.5 * (size.length_m * sin.abs() + size.width_m * cos.abs())
+        };
+        Self { s_m: state.s_m, d_m: state.d_m, length_m: size.length_m, half_width_m }
+    }
+
+    /// Returns the lateral positions of the right and of the left end (m).
+    pub(super) fn sides_m(&self) -> [f64; 2] {
+        [self.d_m - self.half_width_m, self.d_m + self.half_width_m]
+    }
+}
+
+/// A lane as neighbours see it: a vehicle is in it that reaches between these lateral positions (m).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LaneBand {
+    pub(super) lane: Lane,
+    right_m: f64,
+    left_m: f64,
+}
+
+impl LaneBand {
+    pub(super) fn new(road: &Road, lane: Lane) -> Self {
+        let centre_m = road.lane_centre_m(lane);
+        let half_m = 0.5 * road.lane_width_m() - LANE_OVERLAP_M;
+        Self { lane, right_m: centre_m - half_m, left_m: centre_m + half_m }
+    }
+
+    /// Returns whether a vehicle between these lateral positions, of its right and of its left end, is in the lane.
+    pub(super) fn contains(&self, [right_m, left_m]: [f64; 2]) -> bool {
+        right_m < self.left_m && left_m > self.right_m
+    }
+}
+
 /// The lanes in which a vehicle has neighbours.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LanesAround {
-    pub(super) own: Lane,
-    pub(super) left: Option<Lane>,
-    pub(super) right: Option<Lane>,
+    pub(super) own: LaneBand,
+    pub(super) left: Option<LaneBand>,
+    pub(super) right: Option<LaneBand>,
 }
 
 impl LanesAround {
-    /// Returns the lanes around a vehicle at the lateral position `d_m`.
-    pub(super) fn new(road: &Road, d_m: f64) -> Self {
+    /// Returns the lanes around a vehicle at the lateral position `d_m`, as far as its driver looks.
+    pub(super) fn new(road: &Road, d_m: f64, looks: Looks) -> Self {
         let own = road.lane_at(d_m);
-        Self { own, left: road.beside(own, Side::Left), right: road.beside(own, Side::Right) }
+        let beside = |side| {
+            let lane = if looks.adjacent { road.beside(own, side) } else { None };
+            lane.map(|lane| LaneBand::new(road, lane))
+        };
+        Self { own: LaneBand::new(road, own), left: beside(Side::Left), right: beside(Side::Right) }
     }
 
     /// Returns the neighbours before any is found.
-    pub(super) fn nobody(&self) -> Neighbours {
-        Neighbours {
-            own: LaneNeighbours::default(),
-            left: self.left.map(|_| LaneNeighbours::default()),
-            right: self.right.map(|_| LaneNeighbours::default()),
+    pub(super) fn nobody(&self) -> Around {
+        Around {
+            own: LaneAround::default(),
+            left: self.left.map(|_| LaneAround::default()),
+            right: self.right.map(|_| LaneAround::default()),
             in_path: None,
             beyond: None,
         }
     }
 }
 
-/// Returns the vehicles around `actor`, which is compared with every other one. `half_width_m` is the function of this
-/// name, or returns its values. [`super::search`] is faster if the neighbours of many vehicles are needed.
-pub(super) fn find(world: &World, actor: usize, road: &Road, half_width_m: impl Fn(usize) -> f64) -> Neighbours {
-    let LanesAround { own: own_lane, left, right } = LanesAround::new(road, world.state(actor).d_m);
-    let mut around = LanesAround { own: own_lane, left, right }.nobody();
-    for other in 0..world.len() {
-        if other == actor {
-            continue;
-        }
-        let candidate = Candidate::new(world, [actor, other], [actor, other].map(&half_width_m));
-        if candidate.is_in(road, own_lane) {
-            candidate.insert_into(&mut around.own);
-        }
-        if let (Some(lane), Some(slot)) = (left, &mut around.left)
-            && candidate.is_in(road, lane)
-        {
-            candidate.insert_into(slot);
-        }
-        if let (Some(lane), Some(slot)) = (right, &mut around.right)
-            && candidate.is_in(road, lane)
-        {
-            candidate.insert_into(slot);
-        }
-        if candidate.is_in_path() && candidate.ahead_m > 0.0 {
-            keep_nearest(&mut around.in_path, candidate.neighbour);
+/// A vehicle that is the nearest so far.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Nearest {
+    pub(super) actor: usize,
+    /// Gap, bumper to bumper (m).
+    pub(super) gap_m: f64,
+    /// Lateral position relative to the own vehicle (m).
+    lateral_offset_m: f64,
+}
+
+impl Nearest {
+    #[inline]
+    fn neighbour(&self, world: &World) -> Neighbour {
+        let (state, vehicle) = (world.state(self.actor), world.vehicle(self.actor));
+        Neighbour {
+            actor: self.actor,
+            gap_m: self.gap_m,
+            speed_mps: state.speed_mps,
+            acceleration_mps2: state.acceleration_mps2,
+            brake_light: state.brake_light,
+            indicator: state.indicator,
+            class: vehicle.class,
+            length_m: vehicle.dimensions.length_m,
+            width_m: vehicle.dimensions.width_m,
+            lateral_offset_m: self.lateral_offset_m,
         }
     }
-    around.beyond = beyond(world, actor, &around, &half_width_m);
+}
+
+/// The nearest vehicles in one lane.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct LaneAround {
+    pub(super) lead: Option<Nearest>,
+    pub(super) follower: Option<Nearest>,
+    alongside: Option<Nearest>,
+}
+
+impl LaneAround {
+    fn describe(&self, world: &World, neighbours: &mut LaneNeighbours) {
+        describe(self.lead, world, &mut neighbours.lead);
+        describe(self.follower, world, &mut neighbours.follower);
+        describe(self.alongside, world, &mut neighbours.alongside);
+    }
+}
+
+/// Writes the state of the nearest vehicle to `neighbour`.
+fn describe(nearest: Option<Nearest>, world: &World, neighbour: &mut Option<Neighbour>) {
+    *neighbour = nearest.map(|nearest| nearest.neighbour(world));
+}
+
+/// The nearest vehicles around a vehicle: what [`Neighbours`] describes in full.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Around {
+    pub(super) own: LaneAround,
+    pub(super) left: Option<LaneAround>,
+    pub(super) right: Option<LaneAround>,
+    pub(super) in_path: Option<Nearest>,
+    pub(super) beyond: Option<Nearest>,
+}
+
+impl Around {
+    /// Returns the vehicle ahead: the nearer of the lead vehicle and the one in the path.
+    pub(super) fn ahead(&self) -> Option<usize> {
+        let candidates = [self.own.lead, self.in_path].into_iter().flatten();
+        candidates.min_by(|a, b| a.gap_m.total_cmp(&b.gap_m)).map(|ahead| ahead.actor)
+    }
+
+    /// Writes the states of the vehicles to `neighbours`.
+    pub(super) fn describe(&self, world: &World, neighbours: &mut Neighbours) {
+        self.own.describe(world, &mut neighbours.own);
+        for (lane, slot) in [(&self.left, &mut neighbours.left), (&self.right, &mut neighbours.right)] {
+            match lane {
+                Some(lane) => lane.describe(world, slot.get_or_insert_default()),
+                None => *slot = None,
+            }
+        }
+        describe(self.in_path, world, &mut neighbours.in_path);
+        describe(self.beyond, world, &mut neighbours.beyond);
+    }
+}
+
+/// Returns the vehicles around `actor`, which is compared with every other one. [`super::search`] is faster if there are many
+/// vehicles.
+pub(super) fn find(extents: &[Extent], actor: usize, road: &Road, looks: Looks) -> Around {
+    let lanes = LanesAround::new(road, extents[actor].d_m, looks);
+    let mut around = lanes.nobody();
+    for other in (0..extents.len()).filter(|other| *other != actor) {
+        let candidate = Candidate::new(extents, [actor, other]);
+        let sides_m = extents[other].sides_m();
+        if lanes.own.contains(sides_m) {
+            candidate.insert_into(&mut around.own);
+        }
+        for (band, slot) in [(&lanes.left, &mut around.left), (&lanes.right, &mut around.right)] {
+            if let (Some(band), Some(slot)) = (band, slot)
+                && band.contains(sides_m)
+            {
+                candidate.insert_into(slot);
+            }
+        }
+        if candidate.is_in_path && candidate.ahead_m > 0.0 {
+            keep_nearest(&mut around.in_path, candidate.nearest);
+        }
+    }
+    if looks.beyond
+        && let Some(ahead) = around.ahead()
+    {
+        for other in 0..extents.len() {
+            keep_beyond(&mut around.beyond, extents, [actor, ahead, other]);
+        }
+    }
     around
 }
 
-/// Returns the nearest vehicle ahead of the one that is ahead of `actor`, in the path of that one.
-fn beyond(world: &World, actor: usize, around: &Neighbours, half_width_m: impl Fn(usize) -> f64) -> Option<Neighbour> {
-    let ahead = ahead(around)?;
-    let mut nearest = None;
-    for other in 0..world.len() {
-        keep_beyond(&mut nearest, world, [actor, ahead, other], &half_width_m);
-    }
-    nearest
-}
-
-/// Returns the vehicle ahead of the one with these neighbours.
-pub(super) fn ahead(around: &Neighbours) -> Option<usize> {
-    let candidates = [around.own.lead, around.in_path].into_iter().flatten();
-    candidates.min_by(|a, b| a.gap_m.total_cmp(&b.gap_m)).map(|ahead| ahead.actor)
-}
-
 /// Puts a vehicle into `slot` if it is ahead of the vehicle ahead of `actor`, in its path, and nearer than the one there.
-pub(super) fn keep_beyond(
-    slot: &mut Option<Neighbour>,
-    world: &World,
-    [actor, ahead, other]: [usize; 3],
-    half_width_m: impl Fn(usize) -> f64,
-) {
+pub(super) fn keep_beyond(slot: &mut Option<Nearest>, extents: &[Extent], [actor, ahead, other]: [usize; 3]) {
     if other == actor || other == ahead {
         return;
     }
-    let relative = |own: usize| Candidate::new(world, [own, other], [own, other].map(&half_width_m));
-    let from_ahead = relative(ahead);
-    if from_ahead.ahead_m > 0.0 && from_ahead.neighbour.gap_m >= 0.0 && from_ahead.is_in_path() {
-        keep_nearest(slot, relative(actor).neighbour);
+    let from_ahead = Candidate::new(extents, [ahead, other]);
+    if from_ahead.ahead_m > 0.0 && from_ahead.nearest.gap_m >= 0.0 && from_ahead.is_in_path {
+        keep_nearest(slot, Candidate::new(extents, [actor, other]).nearest);
     }
 }
 
-pub(super) fn keep_nearest(slot: &mut Option<Neighbour>, candidate: Neighbour) {
+pub(super) fn keep_nearest(slot: &mut Option<Nearest>, candidate: Nearest) {
     // Two vehicles at the same gap have different lateral positions, unless they overlap. The result therefore depends on the
     // list of actors only if they do.
-    let order = |neighbour: &Neighbour| (neighbour.gap_m, neighbour.lateral_offset_m, neighbour.actor);
+    let order = |nearest: &Nearest| (nearest.gap_m, nearest.lateral_offset_m, nearest.actor);
     if slot.is_none_or(|known| order(&candidate) < order(&known)) {
         *slot = Some(candidate);
     }
@@ -113,74 +226,33 @@ pub(super) fn keep_nearest(slot: &mut Option<Neighbour>, candidate: Neighbour) {
 
 /// Another vehicle, relative to the vehicle whose neighbours are determined.
 pub(super) struct Candidate {
-    pub(super) neighbour: Neighbour,
+    pub(super) nearest: Nearest,
     /// Distance along the road from centre to centre, positive ahead (m).
     ahead_m: f64,
-    /// Lateral position of its right end (m).
-    right_m: f64,
-    /// Lateral position of its left end (m).
-    left_m: f64,
-    own_half_width_m: f64,
+    /// Whether the two vehicles are in each other's path.
+    pub(super) is_in_path: bool,
 }
 
 impl Candidate {
-    /// Creates the second vehicle relative to the first. `half_widths_m` are those of [`half_width_m`].
-    pub(super) fn new(world: &World, [actor, other]: [usize; 2], half_widths_m: [f64; 2]) -> Self {
-        let (own, state) = (world.state(actor), world.state(other));
-        let (own_size, size) = (world.vehicle(actor).dimensions, world.vehicle(other).dimensions);
-        let ahead_m = state.s_m - own.s_m;
-        let [own_half_width_m, half_width_m] = half_widths_m;
-        let neighbour = Neighbour {
-            actor: other,
-            gap_m: bumper_gap_m(ahead_m.abs(), own_size.length_m, size.length_m),
-            speed_mps: state.speed_mps,
-            acceleration_mps2: state.acceleration_mps2,
-            brake_light: state.brake_light,
-            indicator: state.indicator,
-            class: world.vehicle(other).class,
-            length_m: size.length_m,
-            width_m: size.width_m,
-            lateral_offset_m: state.d_m - own.d_m,
-        };
-        Self {
-            neighbour,
-            ahead_m,
-            right_m: state.d_m - half_width_m,
-            left_m: state.d_m + half_width_m,
-            own_half_width_m,
-        }
+    /// Creates the second vehicle relative to the first.
+    pub(super) fn new(extents: &[Extent], [actor, other]: [usize; 2]) -> Self {
+        let (own, at) = (&extents[actor], &extents[other]);
+        let ahead_m = at.s_m - own.s_m;
+        let gap_m = bumper_gap_m(ahead_m.abs(), own.length_m, at.length_m);
+        let lateral_offset_m = at.d_m - own.d_m;
+        let [right_m, left_m] = at.sides_m();
+        let is_in_path = lateral_offset_m.abs() < 0.5 * (left_m - right_m) + own.half_width_m + PATH_MARGIN_M;
+        Self { nearest: Nearest { actor: other, gap_m, lateral_offset_m }, ahead_m, is_in_path }
     }
 
-    fn is_in(&self, road: &Road, lane: Lane) -> bool {
-        is_in(road, lane, [self.right_m, self.left_m])
-    }
-
-    pub(super) fn is_in_path(&self) -> bool {
-        let half_width_m = 0.5 * (self.left_m - self.right_m);
-        self.neighbour.lateral_offset_m.abs() < half_width_m + self.own_half_width_m + PATH_MARGIN_M
-    }
-
-    pub(super) fn insert_into(&self, lane: &mut LaneNeighbours) {
-        if self.neighbour.gap_m < 0.0 {
-            keep_nearest(&mut lane.alongside, self.neighbour);
+    pub(super) fn insert_into(&self, lane: &mut LaneAround) {
+        let slot = if self.nearest.gap_m < 0.0 {
+            &mut lane.alongside
         } else if self.ahead_m > 0.0 {
-            keep_nearest(&mut lane.lead, self.neighbour);
+            &mut lane.lead
         } else {
-            keep_nearest(&mut lane.follower, self.neighbour);
-        }
+            &mut lane.follower
+        };
+        keep_nearest(slot, self.nearest);
     }
-}
-
-/// Returns whether a vehicle between these lateral positions, of its right and of its left end, is in a lane.
-pub(super) fn is_in(road: &Road, lane: Lane, [right_m, left_m]: [f64; 2]) -> bool {
-    let centre_m = road.lane_centre_m(lane);
-    let half_m = 0.5 * road.lane_width_m() - LANE_OVERLAP_M;
-    right_m < centre_m + half_m && left_m > centre_m - half_m
-}
-
-/// Returns half of the extent of a vehicle's box across the road (m).
-pub(super) fn half_width_m(world: &World, actor: usize) -> f64 {
-    let (sin, cos) = world.state(actor).heading_rad.sin_cos();
-    let size = world.vehicle(actor).dimensions;
-    0.5 * (size.length_m * sin.abs() + size.width_m * cos.abs())
 }

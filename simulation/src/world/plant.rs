@@ -181,7 +181,9 @@ impl Plant {
     /// Moves the vehicle by `distance_m` along its path.
     fn steer(&mut self, distance_m: f64, road: &Road) {
         // Path and weaving are functions of the distance in the direction of the lane.
-        let along_m = distance_m * self.lateral().slope.atan().cos();
+        let slope = self.lateral().slope;
+        // The functions below are exact at zero: most vehicles drive straight on.
+        let along_m = if slope == 0.0 { distance_m } else { distance_m * slope.atan().cos() };
         self.distance_m += along_m;
         if let Some(weave) = &mut self.weave {
             self.deviation = weave.at(self.distance_m);
@@ -194,10 +196,14 @@ impl Plant {
             }
         }
         let LateralState { d_m, slope, second_derivative_per_m } = self.lateral();
-        let course_rad = slope.atan();
-        let curvature_per_m = second_derivative_per_m / (1.0 + slope * slope).powf(1.5);
+        let (course_rad, curvature_per_m) = if slope == 0.0 {
+            (slope, second_derivative_per_m)
+        } else {
+            (slope.atan(), second_derivative_per_m / (1.0 + slope * slope).powf(1.5))
+        };
         // Slip angle at the centre of the box, half a wheelbase ahead of the rear axle.
-        let slip_rad = (0.5 * self.wheelbase_m * curvature_per_m).clamp(-0.5, 0.5).asin();
+        let slip_sin = (0.5 * self.wheelbase_m * curvature_per_m).clamp(-0.5, 0.5);
+        let slip_rad = if slip_sin == 0.0 { slip_sin } else { slip_sin.asin() };
         self.state.d_m = d_m;
         self.state.heading_rad = course_rad - slip_rad;
         self.state.yaw_rate_radps = self.state.speed_mps * (curvature_per_m + road.curvature_per_m());

@@ -8,12 +8,15 @@
 //!
 //! The result is that of [`super::neighbours::find`] to the bit.
 
-use closecall_controllers::{LaneNeighbours, Neighbour, Neighbours};
+use closecall_controllers::{Looks, Neighbours};
 use closecall_traffic::metrics::bumper_gap_m;
 use closecall_traffic::{Lane, Road};
 
 use super::World;
-use super::neighbours::{self, Candidate, LanesAround, PATH_MARGIN_M, half_width_m, is_in, keep_beyond, keep_nearest};
+use super::neighbours::{
+    self, Around, Candidate, Extent, LaneAround, LaneBand, LanesAround, Nearest, PATH_MARGIN_M, keep_beyond,
+    keep_nearest,
+};
 
 /// Number of vehicles up to which it is faster to compare all pairs.
 pub(super) const FEW: usize = 8;
@@ -28,8 +31,8 @@ struct Entry {
 /// The vehicles of a road, sorted along it, lane by lane. The memory is reused from step to step.
 #[derive(Debug, Default)]
 pub(super) struct NeighbourSearch {
-    /// Half of the extent of each vehicle across the road (m).
-    half_widths_m: Vec<f64>,
+    /// Position and extent of each vehicle.
+    extents: Vec<Extent>,
     /// All vehicles.
     order: Vec<Entry>,
     /// The vehicles in each lane. A vehicle may be in several.
@@ -45,140 +48,137 @@ pub(super) struct NeighbourSearch {
 }
 
 impl NeighbourSearch {
-    /// Replaces `found` by the vehicles around each vehicle.
-    pub(super) fn find_all(&mut self, world: &World, road: &Road, found: &mut [Neighbours]) {
-        self.half_widths_m.clear();
-        self.half_widths_m.extend((0..world.len()).map(|actor| half_width_m(world, actor)));
-        if world.len() <= FEW {
-            for (actor, found) in found.iter_mut().enumerate() {
-                *found = neighbours::find(world, actor, road, |actor| self.half_widths_m[actor]);
-            }
-            return;
+    /// Replaces `found` by the vehicles around each vehicle, as far as each driver looks.
+    pub(super) fn find_all(&mut self, world: &World, road: &Road, looks: &[Looks], found: &mut [Neighbours]) {
+        self.extents.clear();
+        self.extents.extend((0..world.len()).map(|actor| Extent::of(world, actor)));
+        let few = world.len() <= FEW;
+        if !few {
+            self.sort(road);
         }
-        self.sort(world, road);
-        for (actor, found) in found.iter_mut().enumerate() {
-            *found = self.around(world, actor, road);
+        for ((actor, found), looks) in found.iter_mut().enumerate().zip(looks) {
+            let around = if few {
+                neighbours::find(&self.extents, actor, road, *looks)
+            } else {
+                self.around(actor, road, *looks)
+            };
+            around.describe(world, found);
         }
     }
 
     /// Sorts the vehicles into the lists.
-    fn sort(&mut self, world: &World, road: &Road) {
+    fn sort(&mut self, road: &Road) {
         let lanes = usize::from(road.lanes());
         self.lanes.resize_with(lanes, Vec::new);
         self.strips.resize_with(lanes + 2, Vec::new);
         self.lanes.iter_mut().chain(&mut self.strips).for_each(Vec::clear);
-        self.longest_m = (0..world.len()).map(|actor| world.vehicle(actor).dimensions.length_m).fold(0.0, f64::max);
-        if self.order.len() != world.len() {
+        self.longest_m = self.extents.iter().map(|extent| extent.length_m).fold(0.0, f64::max);
+        if self.order.len() != self.extents.len() {
             self.order.clear();
-            self.order.extend((0..world.len()).map(|actor| Entry { s_m: 0.0, actor }));
+            self.order.extend((0..self.extents.len()).map(|actor| Entry { s_m: 0.0, actor }));
         }
         // The order hardly changes from step to step, so that the list is almost sorted.
         for entry in &mut self.order {
-            entry.s_m = world.state(entry.actor).s_m;
+            entry.s_m = self.extents[entry.actor].s_m;
         }
         self.order.sort_unstable_by(|one, other| one.s_m.total_cmp(&other.s_m).then(one.actor.cmp(&other.actor)));
         for &entry in &self.order {
-            let [right_m, left_m] = self.sides_m(world, entry.actor);
+            let sides_m = self.extents[entry.actor].sides_m();
             for (lane, list) in (1..).zip(&mut self.lanes) {
-                if is_in(road, Lane(lane), [right_m, left_m]) {
+                if LaneBand::new(road, Lane(lane)).contains(sides_m) {
                     list.push(entry);
                 }
             }
-            for strip in strips(road, [right_m, left_m]) {
+            for strip in strips(road, sides_m) {
                 self.strips[strip].push(entry);
             }
         }
     }
 
-    /// Returns the lateral positions of the right and of the left end of a vehicle (m).
-    fn sides_m(&self, world: &World, actor: usize) -> [f64; 2] {
-        let d_m = world.state(actor).d_m;
-        [d_m - self.half_widths_m[actor], d_m + self.half_widths_m[actor]]
-    }
-
     /// Returns the vehicles around `actor`.
-    fn around(&self, world: &World, actor: usize, road: &Road) -> Neighbours {
-        let lanes = LanesAround::new(road, world.state(actor).d_m);
+    fn around(&self, actor: usize, road: &Road, looks: Looks) -> Around {
+        let lanes = LanesAround::new(road, self.extents[actor].d_m, looks);
         let mut around = lanes.nobody();
-        self.fill(world, actor, lanes.own, &mut around.own);
+        self.fill(actor, lanes.own, &mut around.own);
         if let (Some(lane), Some(slot)) = (lanes.left, &mut around.left) {
-            self.fill(world, actor, lane, slot);
+            self.fill(actor, lane, slot);
         }
         if let (Some(lane), Some(slot)) = (lanes.right, &mut around.right) {
-            self.fill(world, actor, lane, slot);
+            self.fill(actor, lane, slot);
         }
-        for strip in strips(road, self.sides_m(world, actor)) {
-            self.fill_path(world, actor, &self.strips[strip], &mut around.in_path);
+        for strip in strips(road, self.extents[actor].sides_m()) {
+            self.fill_path(actor, &self.strips[strip], &mut around.in_path);
         }
-        if let Some(ahead) = neighbours::ahead(&around) {
-            self.fill_beyond(world, road, [actor, ahead], &mut around.beyond);
+        if looks.beyond
+            && let Some(ahead) = around.ahead()
+        {
+            self.fill_beyond(road, [actor, ahead], &mut around.beyond);
         }
         around
     }
 
     /// Fills `slot` with the nearest vehicle in the path of the vehicle ahead of `actor`.
-    fn fill_beyond(&self, world: &World, road: &Road, [actor, ahead]: [usize; 2], slot: &mut Option<Neighbour>) {
-        for strip in strips(road, self.sides_m(world, ahead)) {
+    fn fill_beyond(&self, road: &Road, [actor, ahead]: [usize; 2], slot: &mut Option<Nearest>) {
+        for strip in strips(road, self.extents[ahead].sides_m()) {
             let list = &self.strips[strip];
-            let start = list.partition_point(|entry| entry.s_m <= world.state(ahead).s_m);
+            let start = list.partition_point(|entry| entry.s_m <= self.extents[ahead].s_m);
             for entry in &list[start..] {
-                if self.is_beyond(world, actor, entry, slot) {
+                if self.is_beyond(actor, entry, slot) {
                     break;
                 }
                 #[cfg(test)]
                 self.visits.set(self.visits.get() + 1);
-                keep_beyond(slot, world, [actor, ahead, entry.actor], |index| self.half_widths_m[index]);
+                keep_beyond(slot, &self.extents, [actor, ahead, entry.actor]);
             }
         }
     }
 
     /// Fills `slot` with the neighbours of `actor` in a lane.
-    fn fill(&self, world: &World, actor: usize, lane: Lane, slot: &mut LaneNeighbours) {
-        let list = &self.lanes[usize::from(lane.0) - 1];
-        let start = list.partition_point(|entry| entry.s_m < world.state(actor).s_m);
+    fn fill(&self, actor: usize, band: LaneBand, slot: &mut LaneAround) {
+        let list = &self.lanes[usize::from(band.lane.0) - 1];
+        let start = list.partition_point(|entry| entry.s_m < self.extents[actor].s_m);
         for entry in &list[start..] {
-            if self.is_beyond(world, actor, entry, &slot.lead) {
+            if self.is_beyond(actor, entry, &slot.lead) {
                 break;
             }
-            self.visit(world, actor, entry, |candidate| candidate.insert_into(slot));
+            self.visit(actor, entry, |candidate| candidate.insert_into(slot));
         }
         for entry in list[..start].iter().rev() {
-            if self.is_beyond(world, actor, entry, &slot.follower) {
+            if self.is_beyond(actor, entry, &slot.follower) {
                 break;
             }
-            self.visit(world, actor, entry, |candidate| candidate.insert_into(slot));
+            self.visit(actor, entry, |candidate| candidate.insert_into(slot));
         }
     }
 
     /// Fills `slot` with the nearest vehicle of a strip that is ahead in the path of `actor`.
-    fn fill_path(&self, world: &World, actor: usize, list: &[Entry], slot: &mut Option<Neighbour>) {
-        let start = list.partition_point(|entry| entry.s_m <= world.state(actor).s_m);
+    fn fill_path(&self, actor: usize, list: &[Entry], slot: &mut Option<Nearest>) {
+        let start = list.partition_point(|entry| entry.s_m <= self.extents[actor].s_m);
         for entry in &list[start..] {
-            if self.is_beyond(world, actor, entry, slot) {
+            if self.is_beyond(actor, entry, slot) {
                 break;
             }
-            self.visit(world, actor, entry, |candidate| {
-                if candidate.is_in_path() {
-                    keep_nearest(slot, candidate.neighbour);
+            self.visit(actor, entry, |candidate| {
+                if candidate.is_in_path {
+                    keep_nearest(slot, candidate.nearest);
                 }
             });
         }
     }
 
     /// Returns whether a vehicle and all farther ones have a greater gap than the neighbour that is known.
-    fn is_beyond(&self, world: &World, actor: usize, entry: &Entry, known: &Option<Neighbour>) -> bool {
-        let distance_m = (entry.s_m - world.state(actor).s_m).abs();
-        let least_gap_m = bumper_gap_m(distance_m, world.vehicle(actor).dimensions.length_m, self.longest_m);
+    fn is_beyond(&self, actor: usize, entry: &Entry, known: &Option<Nearest>) -> bool {
+        let own = &self.extents[actor];
+        let least_gap_m = bumper_gap_m((entry.s_m - own.s_m).abs(), own.length_m, self.longest_m);
         known.is_some_and(|known| known.gap_m < least_gap_m)
     }
 
     /// Calls `each` with another vehicle, relative to `actor`.
-    fn visit(&self, world: &World, actor: usize, entry: &Entry, each: impl FnOnce(Candidate)) {
+    fn visit(&self, actor: usize, entry: &Entry, each: impl FnOnce(Candidate)) {
         if entry.actor != actor {
             #[cfg(test)]
             self.visits.set(self.visits.get() + 1);
-            let half_widths_m = [actor, entry.actor].map(|index| self.half_widths_m[index]);
-            each(Candidate::new(world, [actor, entry.actor], half_widths_m));
+            each(Candidate::new(&self.extents, [actor, entry.actor]));
         }
     }
 }
@@ -224,10 +224,12 @@ mod tests {
             let world = world(road, &vehicles);
             let mut found = vec![Neighbours::default(); world.len()];
             let mut search = NeighbourSearch::default();
-            for _ in 0..2 {
-                search.find_all(&world, &road, &mut found);
+            for looks in [Looks::AROUND, Looks::AHEAD, Looks::AROUND] {
+                search.find_all(&world, &road, &vec![looks; world.len()], &mut found);
                 for (actor, found) in found.iter().enumerate() {
-                    prop_assert_eq!(*found, neighbours::find(&world, actor, &road, |actor| half_width_m(&world, actor)));
+                    let all = world.neighbours(actor);
+                    let ahead = Neighbours { left: None, right: None, beyond: None, ..all };
+                    prop_assert_eq!(*found, if looks.adjacent { all } else { ahead });
                 }
             }
         }
@@ -248,7 +250,8 @@ mod tests {
                 .collect();
             let world = world(road, &vehicles);
             let mut search = NeighbourSearch::default();
-            search.find_all(&world, &road, &mut vec![Neighbours::default(); number]);
+            let looks = vec![Looks::AROUND; number];
+            search.find_all(&world, &road, &looks, &mut vec![Neighbours::default(); number]);
             search.visits.get()
         };
         let (few, many) = (comparisons(50), comparisons(500));

@@ -1,13 +1,13 @@
 //! The state of all vehicles, moved by one step at a time.
 
-use closecall_controllers::{LaneChange, Neighbours, Weave};
+use closecall_controllers::{LaneChange, Looks, Neighbours, Weave};
 use closecall_traffic::geometry::OrientedBox;
 use closecall_traffic::{ActorId, Indicator, Lane, Road, Time, Vehicle, VehicleState};
 use nalgebra::Vector2;
 
 use super::contact::{self, ContactSearch, StepBoxes, StruckVehicle, Touch};
 use super::impact::{BodyId, BodySpec, IMPACT_DURATION_S, Motion, Wreckage};
-use super::neighbours;
+use super::neighbours::{self, Extent};
 use super::plant::Plant;
 use super::search::NeighbourSearch;
 use crate::outcome::{Collision, Phase};
@@ -174,13 +174,17 @@ impl World {
 
     /// Returns the vehicles around a vehicle.
     pub(crate) fn neighbours(&self, actor: usize) -> Neighbours {
-        neighbours::find(self, actor, &self.road, |actor| neighbours::half_width_m(self, actor))
+        let extents: Vec<Extent> = (0..self.len()).map(|actor| Extent::of(self, actor)).collect();
+        let mut found = Neighbours::default();
+        neighbours::find(&extents, actor, &self.road, Looks::AROUND).describe(self, &mut found);
+        found
     }
 
-    /// Replaces `found` by the vehicles around each vehicle, in the order of the actors.
-    pub(crate) fn find_neighbours(&mut self, found: &mut [Neighbours]) {
+    /// Replaces `found` by the vehicles around each vehicle, as far as each driver looks. Both lists are in the order of the
+    /// actors.
+    pub(crate) fn find_neighbours(&mut self, looks: &[Looks], found: &mut [Neighbours]) {
         let mut search = std::mem::take(&mut self.search);
-        search.find_all(self, &self.road, found);
+        search.find_all(self, &self.road, looks, found);
         self.search = search;
     }
 

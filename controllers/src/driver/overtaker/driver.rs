@@ -10,7 +10,7 @@ use crate::driver::pedals::Pedals;
 use crate::driver::perception::{PerceivedScene, PerceivedVehicle, Perception};
 use crate::driver::wiedemann99::{EmergencyBrakingDetector, brake_before_overtaking, brake_for_brake_light};
 use crate::driver::{
-    BRAKING_MARGIN, Driver, DriverAction, DriverError, DriverInput, DriverNote, LaneChange, check_finite, finite,
+    BRAKING_MARGIN, Driver, DriverAction, DriverError, DriverInput, DriverNote, LaneChange, Looks, check_finite, finite,
 };
 
 /// Required braking below which an overtaking driver does not brake (m/s²): an assumption; 0 to 0.5 are plausible.
@@ -132,6 +132,10 @@ impl Driver for OvertakerDriver {
         let emergency = self.emergency.detect(action.acceleration_mps2);
         action.note = action.note.or(emergency);
         Ok(action)
+    }
+
+    fn looks(&self) -> Looks {
+        Looks { beyond: self.settings.perception.looks_beyond(), ..Looks::AROUND }
     }
 }
 

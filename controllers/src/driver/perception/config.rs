@@ -28,6 +28,13 @@ pub struct PerceptionSettings {
     pub(crate) evidence: Option<Evidence>,
 }
 
+impl PerceptionSettings {
+    /// Returns whether the driver looks at the vehicle beyond the one ahead.
+    pub(crate) fn looks_beyond(&self) -> bool {
+        self.anticipation > 0.0
+    }
+}
+
 impl Check for PerceptionConfig {
     type Checked = PerceptionSettings;
 

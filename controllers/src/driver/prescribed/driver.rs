@@ -4,7 +4,7 @@ use closecall_traffic::{Indicator, Stream};
 
 use super::Prescribed;
 use super::profile::SpeedProfile;
-use crate::driver::{Driver, DriverAction, DriverError, DriverInput, DriverNote, LaneChange, finite};
+use crate::driver::{Driver, DriverAction, DriverError, DriverInput, DriverNote, LaneChange, Looks, finite};
 
 /// Gain with which a deviation from the prescribed speed is removed (1/s); well below the actuators' 1/0.15 s.
 const SPEED_GAIN_PER_S: f64 = 2.0;
@@ -49,6 +49,10 @@ impl Driver for PrescribedDriver {
             note: lane_change.map(|_| DriverNote::CutOutStarted),
             lane_change,
         })
+    }
+
+    fn looks(&self) -> Looks {
+        Looks::AHEAD
     }
 }
 

@@ -6,7 +6,8 @@ use super::{Wiedemann99, Wiedemann99Model};
 use crate::driver::pedals::Pedals;
 use crate::driver::perception::{PerceivedVehicle, Perception};
 use crate::driver::{
-    COASTING_DECELERATION_MPS2, Driver, DriverAction, DriverError, DriverInput, DriverNote, Lead, check_finite, finite,
+    COASTING_DECELERATION_MPS2, Driver, DriverAction, DriverError, DriverInput, DriverNote, Lead, Looks, check_finite,
+    finite,
 };
 
 /// Share of the hardest braking above which braking counts as emergency braking: an assumption; it marks the log only.
@@ -87,6 +88,10 @@ impl Driver for Wiedemann99Driver {
             note: self.emergency.detect(acceleration_mps2),
             ..DriverAction::default()
         })
+    }
+
+    fn looks(&self) -> Looks {
+        Looks { beyond: self.settings.perception.looks_beyond(), ..Looks::AHEAD }
     }
 }
 

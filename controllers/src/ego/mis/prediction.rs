@@ -10,7 +10,7 @@
 //! whether any braking reaches the goal. If the lead vehicle is faster still, the headway may fall with the braking.
 //! The range is then scanned from its lower end, and the first braking that reaches the goal is bracketed.
 
-use super::response::BrakingResponse;
+use super::response::{BrakingResponse, BuildUp};
 use super::{Encounter, Solution};
 
 /// Number of parts in which the range is scanned if the headway at arrival may fall with the braking.
@@ -18,6 +18,12 @@ const SCAN_PARTS: u32 = 64;
 
 /// Bisection steps: to 10⁻⁹ of the bound.
 const BISECTION_STEPS: u32 = 30;
+
+/// Largest number of steps of the secant method.
+const SECANT_STEPS: u32 = 14;
+
+/// Change of the estimate at which the secant method ends, in cells of bisection.
+const SECANT_TOLERANCE: f64 = 0.01;
 
 /// Largest number of steps of Newton's method; four are enough for full precision from any start.
 const NEWTON_STEPS: u32 = 12;
@@ -40,11 +46,15 @@ impl ArrivalPrediction {
     ///
     /// Returns `None` if the rear vehicle never arrives.
     pub fn arrival_s(&self, deceleration_mps2: f64) -> Option<f64> {
+        self.arrival_in_s(deceleration_mps2, &mut self.response.towards(deceleration_mps2))
+    }
+
+    fn arrival_in_s(&self, deceleration_mps2: f64, build_up: &mut BuildUp<'_>) -> Option<f64> {
         let Encounter { closing_mps, .. } = self.encounter;
         let distance_m = self.encounter.distance_to_critical_m();
         let mut time_s = self.encounter.arrival_s(deceleration_mps2)?;
         for _ in 0..NEWTON_STEPS {
-            let loss = self.response.loss(deceleration_mps2, time_s);
+            let loss = build_up.loss(time_s);
             let rate_mps = closing_mps + loss.speed_mps;
             if !(rate_mps > 0.0) {
                 return None;
@@ -73,8 +83,9 @@ impl ArrivalPrediction {
     /// means that the ego stops before.
     fn at_arrival(&self, deceleration_mps2: f64) -> Option<(f64, f64)> {
         let Encounter { ego_mps, front_gap_m, lead_mps, .. } = self.encounter;
-        let time_s = self.arrival_s(deceleration_mps2)?;
-        let loss = self.response.loss(deceleration_mps2, time_s);
+        let mut build_up = self.response.towards(deceleration_mps2);
+        let time_s = self.arrival_in_s(deceleration_mps2, &mut build_up)?;
+        let loss = build_up.loss(time_s);
         Some((front_gap_m + (lead_mps - ego_mps) * time_s + loss.distance_m, ego_mps - loss.speed_mps))
     }
 
@@ -94,7 +105,12 @@ impl ArrivalPrediction {
         let at = |part: u32| bound_mps2 * f64::from(part) / f64::from(parts);
         let part = (1..=parts).find(|part| self.reaches_goal(goal_s, at(*part)));
         Some(match part {
-            Some(part) => Solution { deceleration_mps2: self.bisect(goal_s, at(part - 1), at(part)), in_reach: true },
+            Some(part) => {
+                let (too_little, enough) = (at(part - 1), at(part));
+                let by_secant = if parts == 1 { self.by_secant(goal_s, enough) } else { None };
+                let deceleration_mps2 = by_secant.unwrap_or_else(|| self.bisect(goal_s, too_little, enough));
+                Solution { deceleration_mps2, in_reach: true }
+            }
             None => Solution { deceleration_mps2: bound_mps2, in_reach: false },
         })
     }
@@ -104,6 +120,48 @@ impl ArrivalPrediction {
     fn reaches_goal(&self, goal_s: f64, deceleration_mps2: f64) -> bool {
         let enough = |(gap_m, speed_mps)| speed_mps <= 0.0 || gap_m / speed_mps >= goal_s;
         self.at_arrival(deceleration_mps2).is_some_and(enough)
+    }
+
+    /// Returns what [`Self::bisect`] returns for the range from 0 to `enough`, in a third of its steps.
+    ///
+    /// The secant method (the Illinois algorithm) estimates the braking. The cell of bisection that contains the estimate is the
+    /// result if its lower end misses the goal and its upper end reaches it, since the headway grows with the braking. Returns
+    /// `None` if that is not so, or if the ego stops before the arrival at the bound.
+    fn by_secant(&self, goal_s: f64, enough: f64) -> Option<f64> {
+        let surplus_s = |braking: f64| self.headway_at_arrival_s(braking).map(|headway_s| headway_s - goal_s);
+        let (mut low, mut high) = ((0.0, surplus_s(0.0)?), (enough, surplus_s(enough)?));
+        let cells = f64::from(1_u32 << BISECTION_STEPS);
+        let (mut estimate, mut last_missed) = (0.0, None);
+        for _ in 0..SECANT_STEPS {
+            let last = estimate;
+            estimate = high.0 - high.1 * (high.0 - low.0) / (high.1 - low.1);
+            if !((estimate - last).abs() > SECANT_TOLERANCE * enough / cells) {
+                break;
+            }
+            let surplus_s = surplus_s(estimate)?;
+            let misses = surplus_s < 0.0;
+            // An end that stays twice is given half of its weight, so that both ends approach the root.
+            let stays = last_missed == Some(misses);
+            let (moved, kept) = if misses { (&mut low, &mut high) } else { (&mut high, &mut low) };
+            *moved = (estimate, surplus_s);
+            if stays {
+                kept.1 *= 0.5;
+            }
+            last_missed = Some(misses);
+        }
+        let share = (estimate / enough * cells).floor();
+        if !(0.0..cells).contains(&share) {
+            return None;
+        }
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the range of the bits")]
+        let cell = share as u32;
+        // The ends of the cell, rounded as bisection rounds them.
+        let (mut too_little, mut reaching) = (0.0, enough);
+        for bit in (0..BISECTION_STEPS).rev() {
+            let middle = 0.5 * (too_little + reaching);
+            if (cell >> bit) & 1 == 1 { too_little = middle } else { reaching = middle }
+        }
+        (!self.reaches_goal(goal_s, too_little) && self.reaches_goal(goal_s, reaching)).then_some(reaching)
     }
 
     /// Returns the smallest braking that reaches the goal, between one that does not and one that does.
@@ -193,6 +251,19 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(10_000))]
+
+        #[test]
+        fn the_secant_method_ends_in_the_cell_of_bisection(
+            encounter in encounters(), response in responses(), gain in 0.1..3.0, bound in 0.5..3.0,
+        ) {
+            let prediction = ArrivalPrediction { encounter, response };
+            let goal_s = encounter.front_gap_m / encounter.ego_mps + gain;
+            prop_assume!(encounter.ego_mps + encounter.closing_mps >= encounter.lead_mps);
+            prop_assume!(!prediction.reaches_goal(goal_s, 0.0) && prediction.reaches_goal(goal_s, bound));
+            if let Some(braking) = prediction.by_secant(goal_s, bound) {
+                prop_assert_eq!(braking.to_bits(), prediction.bisect(goal_s, 0.0, bound).to_bits());
+            }
+        }
 
         /// Holds if the rear vehicle is at least as fast as the lead vehicle, as in every state in which the system
         /// engages.

@@ -37,7 +37,40 @@ pub(super) struct Loss {
     pub(super) distance_m: f64,
 }
 
+/// The build-up of the braking up to one value.
+pub(super) struct BuildUp<'a> {
+    response: &'a BrakingResponse,
+    braking_mps2: f64,
+    /// Rate at which the command changes (m/s³).
+    jerk_mps3: f64,
+    /// Duration of the whole ramp (s).
+    ramp_s: f64,
+    /// The whole ramp, once a loss after its end was asked for: it does not depend on the time of the loss.
+    whole_ramp: Option<Segment>,
+}
+
+impl BuildUp<'_> {
+    /// Returns the loss after `time_s`.
+    pub(super) fn loss(&mut self, time_s: f64) -> Loss {
+        let Self { response, braking_mps2, jerk_mps3, .. } = *self;
+        let ramp_s = self.ramp_s.min(time_s);
+        let ramp = if ramp_s == self.ramp_s {
+            *self.whole_ramp.get_or_insert_with(|| response.ramp(jerk_mps3, ramp_s))
+        } else {
+            response.ramp(jerk_mps3, ramp_s)
+        };
+        let rest_s = time_s - ramp_s;
+        let level = response.segment(braking_mps2, 0.0, ramp.braking_mps2, rest_s);
+        let commanded_speed = ramp.commanded[0] + level.commanded[0];
+        let commanded_distance = ramp.commanded[1] + ramp.commanded[0] * rest_s + level.commanded[1];
+        let speed_mps = commanded_speed - response.lag_s * (level.braking_mps2 - response.braking_mps2);
+        let braked_m = commanded_distance - response.lag_s * (speed_mps - response.braking_mps2 * time_s);
+        Loss { speed_mps, distance_m: braked_m }
+    }
+}
+
 /// A time segment in which the command changes linearly: the integrals of the command, and the braking at its end.
+#[derive(Clone, Copy, Debug)]
 struct Segment {
     /// ∫c and ∬c (m/s, m).
     commanded: [f64; 2],
@@ -55,20 +88,17 @@ impl BrakingResponse {
         lag_s: 0.0,
     };
 
-    /// Returns the loss after `time_s` if the command goes to `braking_mps2`.
-    pub(super) fn loss(&self, braking_mps2: f64, time_s: f64) -> Loss {
+    /// Returns the build-up if the command goes to `braking_mps2`.
+    pub(super) fn towards(&self, braking_mps2: f64) -> BuildUp<'_> {
         let change = braking_mps2 - self.commanded_mps2;
         let jerk_mps3 = if change >= 0.0 { self.build_up_mps3 } else { -self.release_mps3 };
-        let ramp_s = (change / jerk_mps3).min(time_s);
+        BuildUp { response: self, braking_mps2, jerk_mps3, ramp_s: change / jerk_mps3, whole_ramp: None }
+    }
+
+    fn ramp(&self, jerk_mps3: f64, ramp_s: f64) -> Segment {
         // An immediate change takes no time, whatever the jerk.
         let slope_mps3 = if ramp_s > 0.0 { jerk_mps3 } else { 0.0 };
-        let ramp = self.segment(self.commanded_mps2, slope_mps3, self.braking_mps2, ramp_s);
-        let rest_s = time_s - ramp_s;
-        let level = self.segment(braking_mps2, 0.0, ramp.braking_mps2, rest_s);
-        let commanded_speed = ramp.commanded[0] + level.commanded[0];
-        let commanded_distance = ramp.commanded[1] + ramp.commanded[0] * rest_s + level.commanded[1];
-        let speed_mps = commanded_speed - self.lag_s * (level.braking_mps2 - self.braking_mps2);
-        Loss { speed_mps, distance_m: commanded_distance - self.lag_s * (speed_mps - self.braking_mps2 * time_s) }
+        self.segment(self.commanded_mps2, slope_mps3, self.braking_mps2, ramp_s)
     }
 
     fn segment(&self, commanded_mps2: f64, slope_mps3: f64, braking_mps2: f64, time_s: f64) -> Segment {
@@ -108,7 +138,7 @@ mod tests {
                 x += step_s * (c - x) / lag_s;
                 c = if aim > c { (c + jerk * step_s).min(aim) } else { (c - 3.0 * step_s).max(aim) };
             }
-            let closed = response.loss(aim, time_s);
+            let closed = response.towards(aim).loss(time_s);
             prop_assert!((closed.speed_mps - loss.speed_mps).abs() < 1e-3, "{closed:?} {loss:?}");
             prop_assert!((closed.distance_m - loss.distance_m).abs() < 2e-3, "{closed:?} {loss:?}");
         }
@@ -116,7 +146,7 @@ mod tests {
 
     #[test]
     fn without_ramp_and_lag_the_loss_is_that_of_constant_braking() {
-        let loss = BrakingResponse::IMMEDIATE.loss(1.5, 4.0);
+        let loss = BrakingResponse::IMMEDIATE.towards(1.5).loss(4.0);
         assert_eq!(loss, Loss { speed_mps: 6.0, distance_m: 12.0 });
     }
 }

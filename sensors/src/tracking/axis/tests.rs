@@ -44,7 +44,8 @@ impl SimulatedVehicle {
         }
         // The filter's prediction gives the mean of the next state, and its covariance the noise.
         let mut step = ModeEstimate { state: self.truth, covariance: Matrix4::zeros(), probability: 1.0 };
-        step.predict(&modes[self.mode], STEP_S, SLOW_SHARE);
+        let mode = &modes[self.mode];
+        step.predict(mode, STEP_S, &Remaining::after(mode, self.mode, STEP_S), SLOW_SHARE);
         let tiny = Matrix4::identity() * 1e-15;
         let factor = (step.covariance + tiny).cholesky().unwrap().l();
         let draws = Vector4::from_fn(|_, _| normal(&mut self.rng));
@@ -105,7 +106,7 @@ fn switching_modes_are_nearly_consistent() {
 fn transition_probabilities_sum_to_1_for_any_step() {
     for rates_per_s in [[0.0, 7.7, 0.5], [0.0; MODES]] {
         for step_s in [0.0, 0.04, 1.0, 100.0] {
-            let shares: Vec<f64> = (0..MODES).map(|to| transition_probability(&rates_per_s, 0, to, step_s)).collect();
+            let shares = transition_probabilities(&rates_per_s, 0, staying_probability(&rates_per_s, 0, step_s));
             assert!(shares.iter().all(|share| (0.0..=1.0).contains(share)), "{shares:?}");
             assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{shares:?}");
         }
@@ -147,4 +148,47 @@ fn a_measurement_that_is_not_a_number_leaves_the_mode_probabilities_unchanged() 
     assert_eq!(filter.estimates.map(|estimate| estimate.probability), before);
     // The estimate must not look valid afterwards.
     assert!(filter.estimate().position_m.is_nan());
+}
+
+#[test]
+fn the_mean_of_position_and_speed_is_that_of_the_whole_mixture() {
+    let mut vehicle = SimulatedVehicle::new(ALONG_MODES, 3);
+    vehicle.measure();
+    for _ in 0..50 {
+        vehicle.advance();
+        vehicle.measure();
+    }
+    let estimates = &vehicle.filter.estimates;
+    let whole = mixture(estimates, &estimates.map(|estimate| estimate.probability));
+    let estimate = vehicle.filter.estimate();
+    assert_eq!([estimate.position_m, estimate.speed_mps], [whole.state[0], whole.state[1]]);
+    let covariance =
+        [estimate.position_variance_m2, estimate.position_speed_covariance_m2ps, estimate.speed_variance_m2ps2];
+    assert_eq!(covariance, COVARIANCES.map(|at| whole.covariance[at]));
+}
+
+#[test]
+fn the_prediction_equals_the_full_products_of_the_matrices() {
+    let mut state = ModeEstimate {
+        state: Vector4::new(-50.0, 3.0, -0.7, 0.3),
+        covariance: Matrix4::from_fn(|row, column| 1.0 / (1.0 + (row + column) as f64)),
+        probability: 1.0,
+    };
+    let before = state;
+    let mode = &ACROSS_MODES[0];
+    let remaining = Remaining::after(mode, 0, STEP_S);
+    state.predict(mode, STEP_S, &remaining, SLOW_SHARE);
+    let (t, half) = (STEP_S, 0.5 * STEP_S * STEP_S);
+    #[rustfmt::skip]
+    let step = Matrix4::new(
+        1.0, t, half, 0.0,
+        0.0, remaining.speed, t, 0.0,
+        0.0, 0.0, remaining.persistence, 0.0,
+        0.0, 0.0, 0.0, SLOW_SHARE,
+    );
+    assert_eq!(state.state, step * before.state);
+    let full = step * before.covariance * step.transpose();
+    assert_eq!(state.covariance[(0, 2)], full[(0, 2)]);
+    assert_eq!(state.covariance[(2, 1)], full[(2, 1)]);
+    assert_eq!(state.covariance[(3, 1)], full[(3, 1)]);
 }

@@ -1,0 +1,130 @@
+//! Measures the speed of the whole loop for each depth of the sensor simulation, kind of road and number of vehicles.
+//!
+//! ```sh
+//! cargo run --release --example throughput -- [ROUNDS]
+//! cargo run --release --example throughput -- instructions
+//! ```
+//!
+//! The first command prints one line of JSON per mode, with the simulated seconds per second of processor time. The modes
+//! take turns, so that other programs on the machine disturb all of them alike, and time is that of this thread alone
+//! (`/proc/thread-self/schedstat`; wall time where there is none). Before each mode a fixed loop is timed:
+//! `per_calibration` is the number of simulated seconds in the time of that loop, which makes figures of different machines
+//! comparable. No validity check is run; a campaign's checks come on top.
+//!
+//! The second command counts instructions with Callgrind (Debian's package `valgrind`), see [`instructions`].
+
+#![expect(clippy::print_stdout, reason = "a measurement prints its figures")]
+
+mod instructions;
+mod modes;
+
+use std::error::Error;
+use std::time::Instant;
+
+use closecall_simulation::scenario::Scenario;
+use closecall_traffic::CONTROL_STEP;
+use modes::{Mode, modes};
+use serde_json::json;
+
+/// Number of rounds if none is given.
+const ROUNDS: u32 = 3;
+/// Number of steps of the calibration loop.
+const CALIBRATION_STEPS: u32 = 20_000_000;
+
+/// The time that a mode takes.
+struct Timing {
+    mode: Mode,
+    scenarios: Vec<Scenario>,
+    simulated_s: f64,
+    cpu_s: f64,
+    calibration_s: f64,
+}
+
+impl Timing {
+    fn new(mode: Mode) -> Result<Self, Box<dyn Error>> {
+        let scenarios = mode.scenarios(mode.samples)?;
+        Ok(Self { mode, scenarios, simulated_s: 0.0, cpu_s: 0.0, calibration_s: 0.0 })
+    }
+
+    /// Runs every sample once.
+    fn measure(&mut self) -> Result<(), Box<dyn Error>> {
+        self.calibration_s += timed(calibrate).1;
+        for (sample, scenario) in (0..).zip(&self.scenarios) {
+            let (simulated_s, cpu_s) = timed(|| self.mode.run(scenario, sample));
+            self.simulated_s += simulated_s?;
+            self.cpu_s += cpu_s;
+        }
+        Ok(())
+    }
+
+    fn print(&self, rounds: u32) {
+        let speed = self.simulated_s / self.cpu_s;
+        let calibration_s = self.calibration_s / f64::from(rounds);
+        let line = json!({
+            "mode": self.mode.name,
+            "vehicles": self.scenarios.first().map_or(0, |scenario| scenario.actors.len()),
+            "runs": self.scenarios.len() * rounds as usize,
+            "control_steps": (self.simulated_s / CONTROL_STEP.s()).round(),
+            "simulated_s": self.simulated_s,
+            "cpu_s": self.cpu_s,
+            "simulated_s_per_cpu_s": speed,
+            "calibration_s": calibration_s,
+            "per_calibration": speed * calibration_s,
+        });
+        println!("{line}");
+    }
+}
+
+/// Returns the processor time of this thread (s), or `None` where the kernel does not state it.
+fn thread_s() -> Option<f64> {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
+    text.split_whitespace().next()?.parse::<f64>().ok().map(|ns| ns * 1e-9)
+}
+
+/// Calls `work` and returns its result with the time that it took (s).
+fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
+    let (from, started) = (thread_s(), Instant::now());
+    let result = work();
+    let wall_s = started.elapsed().as_secs_f64();
+    (result, from.zip(thread_s()).map_or(wall_s, |(from, to)| to - from))
+}
+
+/// The calibration loop: integer and floating-point operations that depend on each other, without memory.
+fn calibrate() {
+    let (mut bits, mut sum) = (1_u64, 0.0_f64);
+    for _ in 0..CALIBRATION_STEPS {
+        bits = bits.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        sum = 0.5 * sum + (bits >> 11) as f64;
+    }
+    std::hint::black_box(sum);
+}
+
+/// Times all modes.
+fn time(rounds: u32) -> Result<(), Box<dyn Error>> {
+    let mut timings = modes()?.into_iter().map(Timing::new).collect::<Result<Vec<_>, _>>()?;
+    // The first run of a thread loads the network.
+    if let Some(full) = timings.iter().find(|timing| timing.mode.name == "full") {
+        full.mode.run(&full.scenarios[0], 0)?;
+    }
+    for _ in 0..rounds {
+        for timing in &mut timings {
+            timing.measure()?;
+        }
+    }
+    for timing in &timings {
+        timing.print(rounds);
+    }
+    Ok(())
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    match &arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+        [] => time(ROUNDS),
+        ["instructions"] => instructions::check(),
+        ["instructions", "write"] => instructions::write(),
+        [instructions::RUN, mode, samples] => instructions::run(mode, samples.parse()?),
+        [rounds] => time(rounds.parse()?),
+        _ => Err("allowed: a number of rounds, `instructions`, or `instructions write`".into()),
+    }
+}
