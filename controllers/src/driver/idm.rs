@@ -18,9 +18,7 @@ use super::pedals::{Pedals, check_brake_build_up};
 use super::perception::{Perception, PerceptionConfig, PerceptionSettings, check_perception};
 use super::reaction::{Reaction, ReactionConfig};
 use super::wiedemann99::{EmergencyBrakingDetector, brake_for_brake_light, default_desired_mps, nearest_lead};
-use super::{
-    Driver, DriverAction, DriverError, DriverInput, Lead, Looks, check_finite, check_hardest_braking, finite,
-};
+use super::{Driver, DriverAction, DriverError, DriverInput, Lead, Looks, check_finite, check_hardest_braking, finite};
 
 /// Largest comfortable deceleration that a scenario may give (m/s²): a limit of the configuration.
 const MAX_COMFORTABLE_BRAKING_MPS2: f64 = 8.0;

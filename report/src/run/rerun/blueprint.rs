@@ -19,14 +19,14 @@
 mod nodes;
 
 use closecall_traffic::Time;
-use rerun::blueprint::components::{BackgroundKind, Eye3DKind};
-use rerun::blueprint::datatypes::{TextLogColumn, TextLogColumnKind};
-use rerun::components::Range1D;
-use rerun::datatypes::{Range2D, TimeInt, TimeRange, TimeRangeBoundary};
-use rerun::external::re_sdk_types::blueprint::archetypes::{
+use re_sdk_types::blueprint::archetypes::{
     Background, EntityBehavior, EyeControls3D, LineGrid3D, PlotLegend, ScalarAxis, TextLogColumns, TimeAxis,
     VisualBounds2D,
 };
+use re_sdk_types::blueprint::components::{BackgroundKind, Eye3DKind};
+use re_sdk_types::blueprint::datatypes::{TextLogColumn, TextLogColumnKind};
+use re_sdk_types::components::Range1D;
+use re_sdk_types::datatypes::{Range2D, TimeInt, TimeRange, TimeRangeBoundary};
 
 use self::nodes::{Node, View, below, beside, tabs};
 use super::RecordingError;
@@ -70,14 +70,11 @@ pub(super) struct FilmContents {
 /// Returns the chunks of the layout for these films.
 pub(super) fn layout(films: &[FilmContents]) -> Result<Chunks, RecordingError> {
     let left = below(
-        [
-            Some((verdict_share(films), verdict())),
-            bird(films).map(|view| (bird_share(films), view)),
-        ]
-        .into_iter()
-        .flatten()
-        .chain(scenes(films).map(|view| (if films.len() > 1 || is_traffic(films) { 3.4 } else { 5.0 }, view)))
-        .collect(),
+        [Some((verdict_share(films), verdict())), bird(films).map(|view| (bird_share(films), view))]
+            .into_iter()
+            .flatten()
+            .chain(scenes(films).map(|view| (if films.len() > 1 || is_traffic(films) { 3.4 } else { 5.0 }, view)))
+            .collect(),
     );
     let mut states: Vec<Node> = films.iter().filter(|film| film.has_states).rev().map(states).collect();
     let mut right = Vec::new();

@@ -4,10 +4,10 @@
 //! same noise. It renders every [`PIXEL_STEP`]-th pixel, and only at selected instants, since an image costs as much as
 //! a hundred control steps. An image and its windows stay visible until the next image.
 
+use crate::run::rerun::sdk::{AsComponents, Boxes2D, Image};
 use closecall_sensors::camera::{ExposureKey, Frame as Exposure, FrameBuffers, PixelRect, RearCamera};
 use closecall_sensors::{Detection, rear_exposures};
 use closecall_traffic::{Time, VehicleClass};
-use rerun::{AsComponents, Boxes2D, Image};
 
 use super::RecordingError;
 use super::palette::{self, Rgba};

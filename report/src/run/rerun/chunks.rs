@@ -6,10 +6,10 @@
 
 use std::cell::RefCell;
 
-use rerun::external::re_log_types::EntityPath;
-use rerun::external::re_log_types::external::re_tuid::Tuid;
-use rerun::log::{Chunk, ChunkComponents, ChunkId};
-use rerun::{AsComponents, SerializedComponentColumn, TimeColumn};
+use crate::run::rerun::sdk::{AsComponents, SerializedComponentColumn, TimeColumn};
+use re_sdk::external::re_log_types::EntityPath;
+use re_sdk::external::re_log_types::external::re_tuid::Tuid;
+use re_sdk::log::{Chunk, ChunkComponents, ChunkId};
 
 use super::RecordingError;
 

@@ -8,15 +8,15 @@
 //! process to process. Here the layout comes before the data, and the columns are sorted, so that the same run gives the
 //! same bytes.
 
+use crate::run::rerun::sdk::{StoreId, StoreKind};
 use arrow::datatypes::Schema;
-use rerun::external::re_chunk_store::Span;
-use rerun::external::re_log_encoding::{
+use re_sdk::external::re_log_encoding::{
     Compression, CrateVersion, Encodable, EncodingOptions, MessageHeader, MessageKind, RRD_FOURCC, RawRrdManifest,
     RrdFooter, RrdManifestBuilder, StreamFooter, StreamHeader, ToTransport,
 };
-use rerun::external::re_log_types::{ArrowMsg, BlueprintActivationCommand, SetStoreInfo, StoreInfo, StoreSource};
-use rerun::log::{Chunk, LogMsg};
-use rerun::{StoreId, StoreKind};
+use re_sdk::external::re_log_types::{ArrowMsg, BlueprintActivationCommand, SetStoreInfo, StoreInfo, StoreSource};
+use re_sdk::log::{Chunk, LogMsg};
+use re_span::Span;
 
 use super::RecordingError;
 use super::chunks::{Chunks, tuid};

@@ -25,6 +25,7 @@ mod plots;
 mod points;
 mod properties;
 mod road;
+mod sdk;
 mod stream;
 mod summary;
 mod truth;

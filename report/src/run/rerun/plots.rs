@@ -7,11 +7,11 @@ pub(super) use self::bands::phase_name;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 
+use crate::run::rerun::sdk::SeriesLines;
 use closecall_controllers::{EgoState, MisPlan};
 use closecall_scenarios::criticality::{CRITICAL_DCE_M, CRITICAL_TTCE_S};
 use closecall_traffic::Time;
 use closecall_traffic::metrics::Encounter;
-use rerun::SeriesLines;
 
 use super::RecordingError;
 use super::palette::{self, Rgba};

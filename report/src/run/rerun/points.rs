@@ -6,9 +6,9 @@
 //! | `rejected` | points that belong to no box: ground, guard rails, spray, noise | by intensity |
 //! | `intensity` | the points of `clusters` again | by intensity; together with `rejected`, the raw scan |
 
+use crate::run::rerun::sdk::{Boxes3D, FillMode, Points3D};
 use closecall_sensors::Detection;
 use closecall_traffic::Time;
-use rerun::{Boxes3D, FillMode, Points3D};
 
 use super::RecordingError;
 use super::palette::{self, Rgba};

@@ -11,12 +11,12 @@
 
 use std::sync::Arc;
 
+use crate::run::rerun::sdk::{AnyValues, AsComponents, ComponentIdentifier};
 use arrow::array::{ArrayRef, BooleanArray, Float64Array, StringArray, UInt64Array};
 use closecall_simulation::outcome::Outcome;
 use closecall_traffic::{Measured, Value};
-use rerun::archetypes::RecordingInfo;
-use rerun::external::re_log_types::EntityPath;
-use rerun::{AnyValues, AsComponents, ComponentIdentifier};
+use re_sdk::external::re_log_types::EntityPath;
+use re_sdk_types::archetypes::RecordingInfo;
 
 use super::RecordingError;
 use super::chunks::Chunks;

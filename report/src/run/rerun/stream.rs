@@ -12,11 +12,11 @@
 
 use std::ops::Range;
 
-use closecall_traffic::Time;
-use rerun::external::re_log_types::EntityPath;
-use rerun::{
+use crate::run::rerun::sdk::{
     AsComponents, Clear, RecordingStreamError, Scalars, SerializationResult, SerializedComponentColumn, TimeColumn,
 };
+use closecall_traffic::Time;
+use re_sdk::external::re_log_types::EntityPath;
 
 use super::RecordingError;
 use super::chunks::Chunks;

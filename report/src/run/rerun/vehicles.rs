@@ -1,8 +1,8 @@
 //! The vehicles in the 3D scene: bodies, lights, names, velocities, collisions, and the gaps around the ego.
 
+use crate::run::rerun::sdk::{Arrows3D, Boxes3D, FillMode, LineStrips3D, Points3D, Quaternion, Transform3D};
 use closecall_traffic::geometry::BoxSide;
 use closecall_traffic::{Dimensions, Indicator, Measured, Road, Time, VehicleClass, VehicleState};
-use rerun::{Arrows3D, Boxes3D, FillMode, LineStrips3D, Points3D, Quaternion, Transform3D};
 
 use super::RecordingError;
 use super::bodies;
@@ -300,7 +300,11 @@ impl Gap {
         };
         Some(Self {
             ends_m: [end(bumper_m), end(bumper_m + sign * gap_m)],
-            text_m: [(bumper_m + 0.5 * sign * gap_m) as f32, if sign > 0.0 { FRONT_TEXT_Y_M } else { REAR_TEXT_Y_M }, 0.0],
+            text_m: [
+                (bumper_m + 0.5 * sign * gap_m) as f32,
+                if sign > 0.0 { FRONT_TEXT_Y_M } else { REAR_TEXT_Y_M },
+                0.0,
+            ],
             colour: if is_critical { palette::CRITICAL } else { palette::SAFE },
             text,
         })

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use crate::run::rerun::sdk::{MediaType, RecordingStreamError, TextDocument, ViewCoordinates};
 use closecall_traffic::Time;
-use rerun::{MediaType, RecordingStreamError, TextDocument, ViewCoordinates};
 
 use super::blueprint::{self, FilmContents};
 use super::chunks::{self, Chunks};
@@ -48,7 +48,7 @@ impl RecordingError {
 /// # Errors
 /// [`RecordingError`] if recording is switched off, or no file can be created at `path`.
 pub fn check_recording_possible(path: &Path) -> Result<(), RecordingError> {
-    if !rerun::decide_logging_enabled(true) {
+    if !re_sdk::decide_logging_enabled(true) {
         return Err(RecordingError::Disabled);
     }
     Ok(check_writable(path)?)

@@ -3,15 +3,15 @@
 //! The library's own builder names each node by chance. Here a node is named after its place, so that the same layout
 //! gives the same bytes.
 
+use crate::run::rerun::sdk::{AsComponents, TimeColumn};
 use closecall_traffic::Time;
-use rerun::blueprint::components::{ColumnShare, ContainerKind, PanelState, PlayState, RowShare};
-use rerun::external::re_log_types::EntityPath;
-use rerun::external::re_sdk_types::blueprint::archetypes::{
+use re_sdk::external::re_log_types::EntityPath;
+use re_sdk_types::blueprint::archetypes::{
     ContainerBlueprint, PanelBlueprint, TimePanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint,
 };
-use rerun::external::re_sdk_types::blueprint::components::TimelineName;
-use rerun::external::re_sdk_types::datatypes::Uuid;
-use rerun::{AsComponents, TimeColumn};
+use re_sdk_types::blueprint::components::TimelineName;
+use re_sdk_types::blueprint::components::{ColumnShare, ContainerKind, PanelState, PlayState, RowShare};
+use re_sdk_types::datatypes::Uuid;
 
 use super::super::RecordingError;
 use super::super::chunks::Chunks;

@@ -1,13 +1,14 @@
 use std::collections::BTreeSet;
 
+use crate::run::rerun::sdk::StoreKind;
 use closecall_scenarios::encounter::encounter;
 use closecall_scenarios::filters::smooth;
 use closecall_scenarios::lane_change::detect;
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
 use closecall_traffic::geometry::BoxSide;
-use rerun::log::Chunk;
-use rerun::{StoreKind, TimelineName};
+use re_sdk::TimelineName;
+use re_sdk::log::Chunk;
 
 use super::super::stream::{OPENING_TIMELINE, STEP_TIMELINE, TIME_TIMELINE};
 use super::*;
