@@ -14,8 +14,8 @@
 use closecall_controllers::{CheckedDriver, DriverConfig};
 use closecall_traffic::metrics::touching_distance_m;
 use closecall_traffic::{
-    ActorId, Check, ConfigError, Lane, Num, Parameters, Problem, Range, Road, Stream, Vehicle, VehicleClass,
-    VehicleState, stream,
+    ActorId, Check, ConfigError, KeyPath, Lane, Num, Parameters, Problem, Range, Road, Segment, Stream, Vehicle,
+    VehicleClass, VehicleState, stream,
 };
 use rand::RngExt;
 use rand_distr::{Exp1, StandardNormal};
@@ -167,7 +167,8 @@ impl<'a> Block<'a> {
             if !(1..=road.lanes()).contains(&lane.0) {
                 let allowed = "a lane of this road, counted from 1";
                 let problem = Problem::WrongCount { value: lane.0.into(), allowed };
-                return Err(ConfigError::new("lanes", problem).within_index(index));
+                let path = KeyPath(vec![Segment::Key("lanes".to_owned()), Segment::Index(index)]);
+                return Err(ConfigError { path, problem });
             }
         }
         let driver = config.driver.check(parameters).map_err(|error| error.within("driver"))?;

@@ -111,7 +111,7 @@ fn what_is_wrong_is_named_with_what_is_allowed() {
             "the drivers of the surrounding traffic are human",
         ),
         ("id = 'other'", "id = 'Other'", "busy.toml:"),
-        ("'$day'", "'$dya'", "did you mean `day`?"),
+        ("'$day'", "'$dya'", "names the parameter `$dya`"),
         ("truck = 0.2", "lorry = 0.2", "`truck`"),
         ("car = 0.8, truck = 0.2", "car = 0.0", "`traffic[0].classes.car` is missing: one class with a weight above 0"),
     ] {
