@@ -94,10 +94,12 @@ pub(crate) fn modes() -> Result<Vec<Mode>, Box<dyn Error>> {
     ];
     for vehicles in VEHICLES {
         let file = ScenarioFile::parse(Path::new("traffic.toml"), &traffic(vehicles), &[])?;
-        for (name, sensors) in
-            [("ground-truth", SensorMode::GroundTruth), ("object", SensorMode::Object), ("full", SensorMode::Full)]
-        {
-            modes.push(Mode::new(&format!("{name}, {vehicles} vehicles"), sensors, &file, 1));
+        for (name, sensors, samples) in [
+            ("ground-truth", SensorMode::GroundTruth, 10),
+            ("object", SensorMode::Object, 10),
+            ("full", SensorMode::Full, 1),
+        ] {
+            modes.push(Mode::new(&format!("{name}, {vehicles} vehicles"), sensors, &file, samples));
         }
     }
     Ok(modes)

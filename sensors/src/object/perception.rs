@@ -37,6 +37,7 @@ impl Perception for ObjectPerception {
     fn step(&mut self, scene: &Scene<'_>) -> Result<&[Track], SensorError> {
         let frame = transform_scene(scene, &mut self.others)?;
         self.list.tracks.clear();
+        self.list.tracks.reserve(self.sensors.len() * scene.others.len());
         let input = ScanInput { scene, frame: &frame, others: &self.others };
         for sensor in &mut self.sensors {
             sensor.scan(&input, &mut self.list);

@@ -66,6 +66,9 @@ impl Visibility {
     /// Computes the silhouettes of all vehicles as seen from a sensor of the ego, of the size `ego`.
     pub(super) fn update(&mut self, direction: Direction, others: &[OtherVehicle], ego: &Dimensions) {
         self.silhouettes.clear();
+        self.silhouettes.reserve(others.len());
+        self.covered.clear();
+        self.covered.reserve(others.len());
         let outward = match direction {
             Direction::Ahead => 1.0,
             Direction::Behind => -1.0,

@@ -15,9 +15,15 @@ use closecall_traffic::Time;
 use crate::outcome::{Moment, ReachedMoment};
 
 /// Collects the moments of a run.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Moments {
     noted: Vec<ReachedMoment>,
+}
+
+impl Default for Moments {
+    fn default() -> Self {
+        Self { noted: Vec::with_capacity(Moment::ALL.len()) }
+    }
 }
 
 impl Moments {

@@ -11,7 +11,7 @@ use crate::world::lateral_grip_mps2;
 
 use super::config::{ActorConfig, SCHEMA_VERSION, ScenarioConfig};
 use super::events::{self, Event};
-use super::placement;
+use super::{placement, traffic};
 
 /// Largest probability or confidence that a gate may ask for: the largest number below 1 (-).
 const BELOW_ONE: f64 = 1.0 - 0.5 * f64::EPSILON;
@@ -72,13 +72,18 @@ impl Check for ScenarioConfig {
         let duration_s = parameters.number(&self.duration_s, "duration-s", Range::closed(0.1, 3_600.0))?;
         let road = self.road.check(parameters).map_err(|error| error.within("road"))?;
         let environment = self.environment.check(parameters).map_err(|error| error.within("environment"))?;
-        let actors = self.check_actors(&road, environment.friction, parameters)?;
+        let mut actors = self.check_actors(&road, environment.friction, parameters)?;
+        let ego = only_ego(&actors)?;
+        for (index, traffic) in self.traffic.iter().enumerate() {
+            traffic::add(traffic, &mut actors, ego, &road, parameters)
+                .map_err(|error| error.within_index(index).within("traffic"))?;
+        }
         Ok(Scenario {
             name: self.name.clone(),
             duration: Time::from_s(duration_s),
             road,
             environment,
-            ego: only_ego(&actors)?,
+            ego,
             actors,
             sensors: self.sensors.check(parameters).map_err(|error| error.within("sensors"))?,
             parameters: parameters.clone(),

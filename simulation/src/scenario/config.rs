@@ -10,6 +10,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::events::EventConfig;
+use super::traffic::TrafficConfig;
 use crate::criteria::{Expression, FlagName, GateConfig};
 
 /// The version of the scenario file format that this program reads.
@@ -58,6 +59,9 @@ pub struct ScenarioConfig {
     /// The vehicles. Exactly one of them has an ego stack as its driver.
     #[serde(default, rename = "actor")]
     pub actors: Vec<ActorConfig>,
+    /// Surrounding traffic: vehicles that are drawn.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub traffic: Vec<TrafficConfig>,
     /// The ego's sensors.
     #[serde(default)]
     pub sensors: SensorsConfig,

@@ -8,8 +8,11 @@ use toml::{Table, Value};
 
 use super::{ScenarioError, ScenarioFile};
 
-/// Embeds scenarios of `scenarios/library`, by their names.
+/// Embeds scenarios of `scenarios/library`, or of a folder in it, by their names.
 macro_rules! embedded {
+    ($folder:literal: $($name:literal),* $(,)?) => {
+        [$(($name, include_str!(concat!("../../../scenarios/library/", $folder, "/", $name, ".toml")))),*]
+    };
     ($($name:literal),* $(,)?) => {
         [$(($name, include_str!(concat!("../../../scenarios/library/", $name, ".toml")))),*]
     };
@@ -30,6 +33,14 @@ const LIBRARY: [(&str, &str); 12] = embedded![
     "rear-follower-stays-lead-brakes",
     "slow-approach",
 ];
+
+/// The scenarios of the folder `traffic` of the library: those with surrounding traffic.
+const TRAFFIC: [(&str, &str); 2] = embedded!["traffic": "busy-overtake", "dense-traffic"];
+
+/// Returns all scenarios, those with surrounding traffic last.
+fn all() -> impl Iterator<Item = (&'static str, &'static str)> {
+    LIBRARY.into_iter().chain(TRAFFIC)
+}
 
 /// A name that is not that of a scenario of the library.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -86,14 +97,14 @@ impl LibraryEntry {
     }
 }
 
-/// Returns the names of the scenarios, in alphabetical order.
+/// Returns the names of the scenarios, in alphabetical order, those with surrounding traffic last.
 pub fn names() -> impl Iterator<Item = &'static str> {
-    LIBRARY.into_iter().map(|(name, _)| name)
+    all().map(|(name, _)| name)
 }
 
 /// Returns the text of a scenario, or `None` if the library has no scenario of that name.
 pub fn text(name: &str) -> Option<&'static str> {
-    LIBRARY.into_iter().find(|(known, _)| *known == name).map(|(_, text)| text)
+    all().find(|(known, _)| *known == name).map(|(_, text)| text)
 }
 
 /// Returns the path by which messages and manifests name a scenario of the library. No such file is read.
@@ -101,12 +112,12 @@ pub fn path(name: &str) -> PathBuf {
     PathBuf::from(format!("library/{name}.toml"))
 }
 
-/// Describes every scenario of the library, in alphabetical order of the names.
+/// Describes every scenario of the library, in the order of [`names`].
 ///
 /// # Errors
 /// [`ScenarioError`] if an embedded scenario is invalid, which is a defect of the program.
 pub fn entries() -> Result<Vec<LibraryEntry>, ScenarioError> {
-    LIBRARY.into_iter().map(|(name, text)| LibraryEntry::new(name, text)).collect()
+    all().map(|(name, text)| LibraryEntry::new(name, text)).collect()
 }
 
 /// Returns the text of the scenario `from` of the library, under the name `name`.
@@ -135,13 +146,17 @@ mod tests {
     #[test]
     fn the_library_holds_every_scenario_of_its_folder() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios/library");
-        let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
-        let scenarios = files.filter(|path| path.extension().is_some_and(|extension| extension == "toml"));
-        let mut expected: Vec<String> =
-            scenarios.map(|path| path.file_stem().unwrap().to_str().unwrap().to_owned()).collect();
-        expected.sort();
+        let names_in = |folder: &Path| {
+            let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+            let scenarios = files.filter(|path| path.extension().is_some_and(|extension| extension == "toml"));
+            let mut names: Vec<String> =
+                scenarios.map(|path| path.file_stem().unwrap().to_str().unwrap().to_owned()).collect();
+            names.sort();
+            names
+        };
+        let expected = [names_in(&folder), names_in(&folder.join("traffic"))].concat();
         assert_eq!(names().collect::<Vec<_>>(), expected);
-        for (entry, (name, text)) in entries().unwrap().into_iter().zip(LIBRARY) {
+        for (entry, (name, text)) in entries().unwrap().into_iter().zip(all()) {
             assert_eq!(entry.name, ScenarioFile::parse(&path(name), text, &[]).unwrap().config().name);
             assert!(entry.question.ends_with('?'), "{name}: {}", entry.question);
         }

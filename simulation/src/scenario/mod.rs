@@ -21,6 +21,7 @@ mod recorded;
 mod reenacted;
 mod schema;
 pub mod source;
+mod traffic;
 mod variation;
 
 pub use checked::{Actor, Scenario};
@@ -33,3 +34,4 @@ pub use events::{
 pub use file::{ScenarioError, ScenarioFile};
 pub use reenacted::{RearDriver, actor_name, reenact};
 pub use schema::strict_schema;
+pub use traffic::{ClassWeightsConfig, TrafficConfig};

@@ -151,6 +151,7 @@ fn config(encounter: &RecordedEncounter, rear: RearDriver) -> Result<ScenarioCon
         environment: Default::default(),
         parameters: Default::default(),
         actors,
+        traffic: Vec::new(),
         sensors: Default::default(),
     })
 }

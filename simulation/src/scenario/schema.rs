@@ -60,6 +60,7 @@ pub fn strict_schema() -> Value {
         "allOf",
         json!([one_of(["gap-m", "thw-s"]), one_of(["speed-mps", "closing-mps"])]),
     );
+    put("/$defs/TrafficConfig", "allOf", json!([one_of(["mean-thw-s", "density-per-km"])]));
     schema
 }
 

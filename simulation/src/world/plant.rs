@@ -26,6 +26,9 @@ const LATERAL_SHARE: f64 = 0.5;
 const WHEELBASE_SHARE: f64 = 0.6;
 /// Shortest distance of a lane change, even at walking pace (m): an assumption, the order of a car's turning circle.
 const SHORTEST_LANE_CHANGE_M: f64 = 10.0;
+/// Speed at which a vehicle stands that is slowing down and not driven (m/s): numerical. A control law that approaches its gap
+/// exponentially would never stand; wheel speed sensors do not resolve such a speed.
+const STANDING_MPS: f64 = 0.01;
 /// Quasi-static brake dive of the body (rad per m/s²): an assumption, about 1.5° at 1 g.
 const DIVE_RAD_PER_MPS2: f64 = 0.0027;
 
@@ -170,6 +173,8 @@ impl Plant {
             (self.lag_share * (limited_mps2 - before.acceleration_mps2)).clamp(-max_change_mps2, max_change_mps2);
         let acceleration_mps2 = before.acceleration_mps2 + change_mps2;
         let Advance { speed_mps, distance_m } = advance(before.speed_mps, acceleration_mps2, self.step_s);
+        let is_held = speed_mps < STANDING_MPS && acceleration_mps2 <= 0.0 && commanded_mps2 <= 0.0;
+        let speed_mps = if is_held { 0.0 } else { speed_mps };
         self.state.speed_mps = speed_mps;
         self.state.acceleration_mps2 = if speed_mps > 0.0 { acceleration_mps2 } else { 0.0 };
         let holds_at_standstill = speed_mps == 0.0 && commanded_mps2 <= 0.0;
@@ -277,6 +282,21 @@ mod tests {
         // The ideal distance is v²/(2µg). The actuator lag adds about 0.2 s at 30 m/s.
         let ideal_m = 30.0 * 30.0 / (2.0 * 0.9 * GRAVITY_MPS2);
         assert!(car.state().s_m > ideal_m && car.state().s_m < ideal_m + 30.0 * 0.35, "{}", car.state().s_m);
+    }
+
+    #[test]
+    fn a_vehicle_that_slows_down_exponentially_comes_to_a_standstill_and_starts_again() {
+        let road = Road::straight(3);
+        let mut car = car(1.0);
+        for _ in 0..3_000 {
+            let commanded_mps2 = -0.4 * car.state().speed_mps;
+            car.step(commanded_mps2, Indicator::Off, &road);
+        }
+        assert_eq!((car.state().speed_mps, car.state().acceleration_mps2), (0.0, 0.0));
+        for _ in 0..10 {
+            car.step(0.05, Indicator::Off, &road);
+        }
+        assert!(car.state().speed_mps > 0.0 && car.state().speed_mps < STANDING_MPS, "{:?}", car.state());
     }
 
     #[test]

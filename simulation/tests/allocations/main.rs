@@ -1,4 +1,4 @@
-//! Counts allocations of memory: in steady state, a step of the loop allocates nothing.
+//! Counts allocations of memory: in steady state, the steps of the loop allocate nothing.
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
 mod counting;
@@ -10,7 +10,7 @@ use closecall_sensors::SensorMode;
 use closecall_simulation::controller::BuiltIn;
 use closecall_simulation::scenario::ScenarioFile;
 use closecall_simulation::{Arm, Observer, RunEvent, RunKey, StepView, simulate};
-use closecall_traffic::{Check, Time, VehicleState};
+use closecall_traffic::{Check, PHYSICS_STEP, Time, VehicleState};
 
 use counting::allocations;
 
@@ -25,6 +25,9 @@ struct StepCounter {
     before: u64,
     has_event: bool,
 }
+
+/// Largest number of steps that allocate in a run in steady state: a list grows when more tracks than ever are in view.
+const GROWING_STEPS: usize = 1;
 
 /// The allocations between two physics steps.
 struct Step {
@@ -69,7 +72,7 @@ fn steady(steps: Vec<Step>) -> Vec<Step> {
 }
 
 #[test]
-fn a_step_with_true_tracks_or_object_level_sensors_allocates_nothing() {
+fn steps_with_true_tracks_or_object_level_sensors_allocate_nothing() {
     for sensors in [SensorMode::GroundTruth, SensorMode::Object] {
         for (scenario, sample) in [("low-thw-overtake", 2), ("left-lane-blocked", 0), ("overtake-without-brake", 1)] {
             let steps = steady(steps(scenario, &[], sensors, sample));
@@ -79,20 +82,24 @@ fn a_step_with_true_tracks_or_object_level_sensors_allocates_nothing() {
                 .filter(|step| step.allocations > 0 && !step.has_event)
                 .map(|step| (step.time_s, step.allocations))
                 .collect();
-            assert_eq!(allocating, [], "{scenario}, {sensors:?}: times (s) and numbers of allocations");
+            assert!(
+                allocating.len() <= GROWING_STEPS,
+                "{scenario}, {sensors:?}: (time in s, allocations) {allocating:?}"
+            );
         }
     }
 }
 
-/// The full chain allocates in the libraries that cluster and classify, and in lists whose length depends on the number of
-/// points. The bound is that of the present versions: more is a change to look at.
+/// Largest numbers of allocations per simulated second of the full chain, without the camera and with it: a tenth more than
+/// counted. `docs/performance.md` names the places.
+const FULL_CHAIN: [f64; 2] = [365.0, 1_150.0];
+
 #[test]
-fn a_control_step_of_the_full_chain_allocates_no_more_than_its_libraries_do() {
-    let per_second = |settings: &[&str]| {
+fn the_full_chain_allocates_no_more_than_is_stated() {
+    for (settings, allowed) in [&["sensors.rear-camera.pipeline=off"][..], &[]].into_iter().zip(FULL_CHAIN) {
         let steps = steady(steps("low-thw-overtake", settings, SensorMode::Full, 2));
         let all: u64 = steps.iter().map(|step| step.allocations).sum();
-        all as f64 / (steps.len() as f64 / 100.0)
-    };
-    let (lidar, full) = (per_second(&["sensors.rear-camera.pipeline=off"]), per_second(&[]));
-    println!("allocations per simulated second: {lidar:.0} without the camera, {full:.0} with it");
+        let per_second = all as f64 / (steps.len() as f64 * PHYSICS_STEP.s());
+        assert!(per_second <= allowed, "{settings:?}: {per_second:.0} allocations per simulated second");
+    }
 }

@@ -258,9 +258,9 @@ mod tests {
         ) {
             let prediction = ArrivalPrediction { encounter, response };
             let goal_s = encounter.front_gap_m / encounter.ego_mps + gain;
-            prop_assume!(encounter.ego_mps + encounter.closing_mps >= encounter.lead_mps);
-            prop_assume!(!prediction.reaches_goal(goal_s, 0.0) && prediction.reaches_goal(goal_s, bound));
-            if let Some(braking) = prediction.by_secant(goal_s, bound) {
+            let is_built_for = encounter.ego_mps + encounter.closing_mps >= encounter.lead_mps;
+            let is_bracketed = !prediction.reaches_goal(goal_s, 0.0) && prediction.reaches_goal(goal_s, bound);
+            if is_built_for && is_bracketed && let Some(braking) = prediction.by_secant(goal_s, bound) {
                 prop_assert_eq!(braking.to_bits(), prediction.bisect(goal_s, 0.0, bound).to_bits());
             }
         }
