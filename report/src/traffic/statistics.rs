@@ -16,13 +16,13 @@ pub struct StatisticsText<'a>(pub &'a Statistics);
 impl fmt::Display for StatisticsText<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let found = self.0;
-        writeln!(f, "class       lane changes    left   right  complete  parts of doubles")?;
+        writeln!(f, "class       lane changes    left   right  complete  overlapping  parts of doubles")?;
         for class in &found.classes {
-            let ClassStatistics { vehicle_class, lane_changes, to_the_left, complete, double, .. } = class;
+            let ClassStatistics { vehicle_class, lane_changes, to_the_left, complete, overlapping, double, .. } = class;
             let right = lane_changes - to_the_left;
             writeln!(
                 f,
-                "{:<10} {lane_changes:>13} {to_the_left:>7} {right:>7} {complete:>9} {double:>17}",
+                "{:<10} {lane_changes:>13} {to_the_left:>7} {right:>7} {complete:>9} {overlapping:>12} {double:>17}",
                 vehicle_class.name()
             )?;
         }
