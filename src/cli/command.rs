@@ -9,7 +9,7 @@ use super::backend::choose_backend;
 use super::output::print_error;
 use super::{
     CliError, baseline, calibrate, campaign, check, compare, generate, inspect, interrupt, library, merge, new, plot,
-    record, reenact, render, replay, robustness, run, schema, statistics, study, trajectories, view, watching,
+    record, reenact, render, replay, robustness, run, sample, schema, statistics, study, trajectories, view, watching,
 };
 use crate::exit_code::ExitCode;
 
@@ -81,6 +81,8 @@ enum Command {
     Criticality(trajectories::CriticalityArgs),
     /// Simulate an encounter of recorded traffic with the controller under test in the ego vehicle, and compare the two
     Reenact(reenact::ReenactArgs),
+    /// Sample a recorded lane change: the other vehicles drive as recorded, a parameter of a driver varies
+    Sample(sample::SampleArgs),
     /// Fit the distributions of a logical scenario to trajectory files
     Fit(trajectories::FitArgs),
     /// Compute durations, speeds, counts and correlations of recorded lane changes
@@ -154,6 +156,7 @@ fn dispatch(command: Command) -> Result<ExitCode, CliError> {
         Command::LaneChanges(args) => trajectories::lane_changes(&args),
         Command::Criticality(args) => trajectories::criticality(&args),
         Command::Reenact(args) => reenact::reenact(&args),
+        Command::Sample(args) => sample::sample(&args),
         Command::Fit(args) => trajectories::fit(&args),
         Command::Statistics(args) => statistics::statistics(&args),
         Command::Calibrate(args) => calibrate::calibrate(&args),

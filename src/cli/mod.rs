@@ -30,6 +30,7 @@ mod render;
 mod replay;
 mod robustness;
 mod run;
+mod sample;
 mod schema;
 mod statistics;
 mod study;

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use closecall_campaign::folder::Folder;
 use closecall_scenarios::atomic::{WriteError, write_file};
+use closecall_simulation::scenario::ScenarioFile;
 
 use crate::exit_code::ExitCode;
 
@@ -39,6 +40,16 @@ pub(super) fn write_charts(folder: &Path, paths: &[PathBuf], charts: &[String]) 
         print_written(path);
     }
     Ok(())
+}
+
+/// Returns the command line of this program, as it was called.
+pub(super) fn command_line() -> String {
+    std::iter::once("closecall".to_owned()).chain(std::env::args().skip(1)).collect::<Vec<_>>().join(" ")
+}
+
+/// Returns the text of a scenario that was made from the trajectory file `source`, with a heading that states its origin.
+pub(super) fn made_by(source: &Path, file: &ScenarioFile) -> String {
+    format!("# Made by `{}`\n# from {}\n{}", command_line(), source.display(), file.text())
 }
 
 /// The files of a campaign's folder that a reader opens first.

@@ -17,7 +17,7 @@ use closecall_scenarios::trajectory_data::{Layout, open, read_with, refuse_dupli
 
 use super::CliError;
 use super::args::{Format, ReadArgs, positive};
-use super::output::{out, outln, print_error};
+use super::output::{command_line, out, outln, print_error};
 use super::protect::{of_trajectories, protect, recording as trajectory_path};
 use super::watch::record_lane_change;
 use crate::exit_code::ExitCode;
@@ -89,7 +89,7 @@ pub(super) struct CriticalityArgs {
     /// Speed limit in m/s [default: 120 km/h]
     #[arg(long, value_name = "M/S", value_parser = positive)]
     speed_limit_mps: Option<f64>,
-    /// Count all lane changes in the shares, also those cut off, smaller than 2.5 m, or parts of double ones
+    /// Count all lane changes in the shares, also those cut off, smaller than 2.5 m, or overlapping
     #[arg(long)]
     all: bool,
     /// Count a TTCE below 2.6 s as critical by itself, and not only as the condition under which DCE is evaluated
@@ -211,8 +211,7 @@ pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
         args.files.iter().map(|path| read_with(path, args.read.options())).collect::<Result<Vec<_>, _>>()?;
     refuse_duplicates(&args.files, &data_sets).map_err(|message| CliError::Usage { message })?;
     let fitted = fit_distributions(&data_sets, args.seed);
-    let command = std::iter::once("closecall".to_owned()).chain(std::env::args().skip(1)).collect::<Vec<_>>().join(" ");
-    let heading = Heading { command, provenance: args.provenance.clone() };
+    let heading = Heading { command: command_line(), provenance: args.provenance.clone() };
     if let Some(path) = &args.output {
         write_toml(&fitted, &heading, path).map_err(|source| WriteError::new(path, source))?;
     }

@@ -36,6 +36,7 @@ mod reenact;
 mod references;
 mod reports;
 mod rerun_files;
+mod sampling;
 mod sensitivity;
 mod signals;
 mod statistics;

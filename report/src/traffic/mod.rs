@@ -5,5 +5,6 @@ pub mod lane_changes;
 pub mod quality;
 pub mod recorder;
 pub mod robustness;
+pub mod sampling;
 pub mod statistics;
 pub mod trajectory_charts;

@@ -19,6 +19,7 @@ pub mod member;
 mod placement;
 mod recorded;
 mod reenacted;
+mod sampled;
 mod schema;
 pub mod source;
 mod variation;
@@ -26,10 +27,12 @@ mod variation;
 pub use checked::{Actor, Scenario};
 pub use config::{AbsoluteStartConfig, ActorConfig, RelativeStartConfig, SCHEMA_VERSION, ScenarioConfig, StartConfig};
 pub use edit::{Setting, SettingError};
-pub(crate) use events::{Brake, Event, Trigger};
+pub(crate) use events::{Brake, Effect, Event, Trigger};
 pub use events::{
-    BrakeConfig, CutOutStartedConfig, EffectConfig, EventConfig, NominalEncounterConfig, ThwBelowConfig, TriggerConfig,
+    BrakeConfig, CutOutStartedConfig, EffectConfig, EventConfig, LaneChangeConfig, NominalEncounterConfig,
+    ThwBelowConfig, TriggerConfig,
 };
 pub use file::{ScenarioError, ScenarioFile};
 pub use reenacted::{RearDriver, actor_name, reenact};
+pub use sampled::{SampledEncounter, StepValue, Variation, opp2_of, sampled};
 pub use schema::strict_schema;
