@@ -3,21 +3,20 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use closecall_report::json;
-use closecall_report::run::film::{EncounterComparison, Film, film_encounter};
+use closecall_report::json::stamped;
+use closecall_report::run::film::{EncounterComparison, film_encounter};
 use closecall_report::run::rerun::write_recording;
+use closecall_report::traffic::reenactment::Reenactment;
 use closecall_scenarios::atomic::write_file;
 use closecall_scenarios::encounter::{ChoiceError, RecordedEncounter, choose};
 use closecall_scenarios::filters::smooth;
 use closecall_scenarios::trajectory_data::read_with;
-use closecall_simulation::outcome::Outcome;
 use closecall_simulation::scenario::{RearDriver, reenact as scenario_of};
 use closecall_simulation::{CONTROL_STEP, RunKey};
-use serde_json::json;
 
 use super::CliError;
 use super::args::{Format, ReadArgs, SimulationArgs};
-use super::output::{made_by, outln};
+use super::output::{made_by, out, outln};
 use super::protect::{of_trajectories, protect};
 use super::watch::{WatchArgs, run_filmed};
 use crate::exit_code::ExitCode;
@@ -91,8 +90,11 @@ pub(super) fn reenact(args: &ReenactArgs) -> Result<ExitCode, CliError> {
     if let Some(path) = &args.output {
         write_file(path, |written| written.write_all(made_by(&args.file, &file).as_bytes()))?;
     }
-    let reenactment = Reenactment { comparison: &comparison, films: &films, outcome: &outcome };
-    print(args.format, &found, &reenactment);
+    let reenactment = Reenactment { encounter: &found, comparison: &comparison, films: &films, outcome: &outcome };
+    match args.format {
+        Format::Json => outln!("{:#}", stamped(reenactment.json(), Some(outcome.seed), None)),
+        Format::Human => out!("{reenactment}"),
+    }
     Ok(ExitCode::Pass)
 }
 
@@ -109,45 +111,4 @@ pub(super) fn chosen(path: &Path, read: &ReadArgs, track: Option<u64>) -> Result
             CliError::NoEncounter { file: file.to_string(), source, possible }
         }
     })
-}
-
-/// The simulated run of an encounter beside the recorded one.
-struct Reenactment<'a> {
-    comparison: &'a EncounterComparison,
-    /// The film of the recorded traffic, and that of the simulation.
-    films: &'a [Film; 2],
-    outcome: &'a Outcome,
-}
-
-fn print(format: Format, found: &RecordedEncounter, reenactment: &Reenactment<'_>) {
-    let Reenactment { comparison, films, outcome } = reenactment;
-    let [ego, front, rear] = found.ego_lead_rear().map(|track| track.track_id);
-    match format {
-        Format::Json => {
-            let object = json!({
-                "trajectory_data": found.data_name,
-                "track_id": rear,
-                "ego_track_id": ego,
-                "front_track_id": front,
-                "start_s": found.start.s(),
-                "recorded": json::encounter_metrics(&comparison.recorded),
-                "simulated": json::encounter_metrics(&comparison.simulated),
-                "outcome": json::outcome(outcome),
-            });
-            outln!("{:#}", json::stamped(object, Some(outcome.seed), None));
-        }
-        Format::Human => {
-            outln!("{}: rear vehicle: track {rear}; ego: track {ego}; lead vehicle: track {front}", found.data_name);
-            outln!("start: {:.1} s of the trajectory file, with recorded positions and speeds", found.start.s());
-            outln!("  {:<32} {:>16} {:>16}", "", films[0].arm(), films[1].arm());
-            for (name, [recorded, simulated]) in comparison.rows() {
-                outln!("  {name:<32} {recorded:>16} {simulated:>16}");
-            }
-            let simulated = &films[1];
-            outln!("{}: {}", simulated.arm(), simulated.headline());
-            for verdict in simulated.mis_summary().into_iter().chain(comparison.never_crosses()) {
-                outln!("{}: {verdict}", simulated.arm());
-            }
-        }
-    }
 }

@@ -4,22 +4,23 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use closecall_report::json::{self, stamped};
+use closecall_report::run::film::film_lane_change;
+use closecall_report::run::rerun::write_recording;
 use closecall_report::traffic::lane_changes::{CriticalityText, LaneChangesText, ScoreText};
 use closecall_scenarios::atomic::WriteError;
-use closecall_scenarios::criticality::{Counted, Judgement, criticality as evaluate};
+use closecall_scenarios::criticality::{Counted, Judgement, by_severity, criticality as evaluate};
 use closecall_scenarios::filters::smooth;
 use closecall_scenarios::fit::{Heading, fit as fit_distributions, to_toml, write_toml};
 use closecall_scenarios::lane_change::{
-    Criterion, DetectionBasis, LaneChange, LaneChangeDetector, LaneReliability, TrackSpans, listed_for,
-    read_references, score,
+    Criterion, FoundLaneChanges, LaneReliability, find, listed_for, read_references, score,
 };
 use closecall_scenarios::trajectory_data::{Layout, open, read_with, refuse_duplicates};
 
 use super::CliError;
 use super::args::{Format, ReadArgs, positive};
-use super::output::{command_line, out, outln, print_error};
+use super::output::{command_line, out, outln, print_error, print_written};
 use super::protect::{of_trajectories, protect, recording as trajectory_path};
-use super::watch::record_lane_change;
+
 use crate::exit_code::ExitCode;
 
 /// The criterion by which lane changes are found.
@@ -150,19 +151,8 @@ pub(super) fn lane_changes(args: &LaneChangesArgs) -> Result<ExitCode, CliError>
         LanesChoice::Recorded => LaneReliability::Reliable,
         LanesChoice::None => LaneReliability::Unreliable,
     };
-    let detector = LaneChangeDetector::new(lanes, tracks.markings());
-    let mut basis = DetectionBasis::new(args.criterion.criterion(), lanes, tracks.markings());
-    let (mut changes, mut spans, mut count) = (Vec::new(), TrackSpans::new(), 0_u64);
-    // The tracks are read one by one, so that the memory does not grow with the file.
-    while let Some(track) = tracks.next_track()? {
-        count += 1;
-        basis.push(&track.trajectory, &track.markings);
-        changes.extend(detector.detect(args.criterion.criterion(), &track.trajectory, &track.markings));
-        if references.is_some() {
-            spans.extend(track.trajectory.span().map(|span| (track.trajectory.track_id, span)));
-        }
-    }
-    changes.sort_by(|a: &LaneChange, b| a.track_id.cmp(&b.track_id).then(a.crossing_s.total_cmp(&b.crossing_s)));
+    let FoundLaneChanges { lane_changes: changes, spans, tracks: count, basis } =
+        find(&mut tracks, args.criterion.criterion(), lanes)?;
     let scored = references.map(|listed| score(&changes, &listed.iter().collect::<Vec<_>>(), &spans));
     for warning in basis.warnings().into_iter().chain(tracks.unknown_classes().iter().map(ToString::to_string)) {
         print_error(format_args!("warning: {}: {warning}\n", args.file.display()));
@@ -196,7 +186,14 @@ pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> 
     let changes = evaluate(&smoothed, &judgement);
     let counted = if args.all { Counted::All } else { Counted::Complete };
     if let Some(path) = &args.record {
-        record_lane_change(path, &smoothed, &changes, args.track)?;
+        let chosen = by_severity(&changes, args.track);
+        let Some(chosen) = chosen.first() else {
+            let of_track = args.track.map_or(String::new(), |track| format!(" of track {track}"));
+            let message = format!("the trajectory file has no lane change{of_track} to record");
+            return Err(CliError::Usage { message });
+        };
+        write_recording(path, &[film_lane_change(&smoothed, chosen)?])?;
+        print_written(path);
     }
     match args.format {
         Format::Json => outln!("{:#}", stamped(serde_json::json!(changes), None, None)),

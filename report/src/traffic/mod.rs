@@ -4,6 +4,7 @@ pub mod in_car;
 pub mod lane_changes;
 pub mod quality;
 pub mod recorder;
+pub mod reenactment;
 pub mod robustness;
 pub mod sampling;
 pub mod statistics;
