@@ -8,8 +8,9 @@ use closecall_simulation::controller::exec::{adopt_orphans, end_all};
 use super::backend::choose_backend;
 use super::output::print_error;
 use super::{
-    CliError, baseline, calibrate, campaign, check, compare, generate, inspect, interrupt, library, merge, new, plot,
-    record, reenact, render, replay, robustness, run, sample, schema, statistics, study, trajectories, view, watching,
+    CliError, baseline, calibrate, campaign, check, compare, drift, generate, inspect, interrupt, library, merge, new,
+    plot, record, reenact, render, replay, robustness, run, sample, schema, statistics, study, trajectories, view,
+    watching,
 };
 use crate::exit_code::ExitCode;
 
@@ -85,6 +86,8 @@ enum Command {
     Sample(sample::SampleArgs),
     /// Fit the distributions of a logical scenario to trajectory files
     Fit(trajectories::FitArgs),
+    /// Check whether new trajectory files still match the distributions that a scenario was fitted to
+    Drift(drift::DriftArgs),
     /// Compute durations, speeds, counts and correlations of recorded lane changes
     Statistics(statistics::StatisticsArgs),
     /// Calibrate a car-following model on recorded pairs, and judge it on pairs that were held out
@@ -158,6 +161,7 @@ fn dispatch(command: Command) -> Result<ExitCode, CliError> {
         Command::Reenact(args) => reenact::reenact(&args),
         Command::Sample(args) => sample::sample(&args),
         Command::Fit(args) => trajectories::fit(&args),
+        Command::Drift(args) => drift::drift(&args),
         Command::Statistics(args) => statistics::statistics(&args),
         Command::Calibrate(args) => calibrate::calibrate(&args),
         Command::Robustness(args) => robustness::robustness(&args),

@@ -1,12 +1,14 @@
 //! Prints results and messages. Writing to a pipe whose reader has closed it is not an error.
 
 use std::fmt::Arguments;
-use std::io::{ErrorKind, Write, stderr, stdout};
+use std::io::{ErrorKind, IsTerminal, Write, stderr, stdout};
 use std::path::{Path, PathBuf};
 
 use closecall_campaign::folder::Folder;
+use closecall_report::heartbeat::Heartbeat;
 use closecall_scenarios::atomic::{WriteError, write_file};
 use closecall_simulation::scenario::ScenarioFile;
+use indicatif::ProgressBar;
 
 use crate::exit_code::ExitCode;
 
@@ -40,6 +42,13 @@ pub(super) fn write_charts(folder: &Path, paths: &[PathBuf], charts: &[String]) 
         print_written(path);
     }
     Ok(())
+}
+
+/// Starts to print the progress of `bar` as lines. A terminal shows the bar itself instead.
+pub(super) fn heartbeat(bar: &ProgressBar) -> Option<Heartbeat> {
+    let bar = bar.clone();
+    let progress = move || [bar.position(), bar.length().unwrap_or_default()];
+    (!stderr().is_terminal()).then(|| Heartbeat::start(progress, |line| print_error(format_args!("{line}\n"))))
 }
 
 /// Returns the command line of this program, as it was called.

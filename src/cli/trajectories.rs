@@ -217,7 +217,10 @@ pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
         (Format::Human, None) => out!("{}", to_toml(&fitted, &heading)),
         (Format::Human, Some(path)) => {
             for quantity in &fitted.fitted {
-                outln!("{:<24} n = {:>4}, median {:.3}", quantity.quantity.name(), quantity.n, quantity.median);
+                let fit = quantity.form.map_or("no form suits".to_owned(), |(form, fit)| {
+                    format!("{}: distance {:.3}, p = {:.3}", form.name(), fit.distance, fit.p_value)
+                });
+                outln!("{:<24} n = {:>4}, median {:.3}; {fit}", quantity.quantity.name(), quantity.n, quantity.median);
             }
             for (quantity, n) in &fitted.too_few {
                 outln!("{:<24} n = {n:>4}, too few to fit", quantity.name());

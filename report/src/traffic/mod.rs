@@ -1,5 +1,6 @@
 //! Simulated traffic written as trajectory data, and what was found in trajectory data: texts and charts.
 
+pub mod drift;
 pub mod in_car;
 pub mod lane_changes;
 pub mod quality;
