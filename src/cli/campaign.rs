@@ -27,7 +27,7 @@ use super::CliError;
 use super::args::{Format, SensorsChoice, SetArgs, positive};
 use super::arms::{ComparisonArgs, ControllerArgs};
 use super::backend::check_backend;
-use super::ending::{EndArgs, Ending, print_resumption};
+use super::ending::{EndArgs, Ending};
 use super::ensemble::EnsembleArgs;
 use super::gates::GateArgs;
 use super::interrupt::{received, stop_gracefully};
@@ -137,7 +137,7 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
     let mut progress = Progress::new(&campaign, &gates, StopMonitor::start(stop), EndMonitor::new(args.end.rule()));
     let resumption = campaign.run(locked.as_ref(), |next| progress.push(next))?;
     progress.bar.finish_and_clear();
-    print_resumption(&resumption);
+    resumption.messages().iter().for_each(|message| print_error(format_args!("{message}\n")));
     if let Some(ending) = received().map(Ending::Signal).or_else(|| progress.end.into_ending().map(Ending::Rule)) {
         return Ok(ending.print(args.format, &campaign, &progress.tally.summary, args.out.as_deref()));
     }

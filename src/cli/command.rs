@@ -9,8 +9,8 @@ use super::backend::choose_backend;
 use super::output::print_error;
 use super::{
     CliError, baseline, calibrate, campaign, check, compare, drift, generate, inspect, interrupt, library, merge, new,
-    plot, record, reenact, render, replay, robustness, run, sample, schema, statistics, study, trajectories, view,
-    watching,
+    paper, plot, record, reenact, render, replay, robustness, run, sample, schema, statistics, study, trajectories,
+    view, watching,
 };
 use crate::exit_code::ExitCode;
 
@@ -94,6 +94,8 @@ enum Command {
     Calibrate(calibrate::CalibrateArgs),
     /// Study how much noise and offset the criteria for lane changes tolerate
     Robustness(robustness::RobustnessArgs),
+    /// Draw the figures of the published method on any set of trajectory files, with one page of all
+    Paper(paper::PaperArgs),
     /// Simulate samples of a scenario, and write their traffic as a trajectory file
     Record(record::RecordArgs),
     /// Draw an encounter as a static figure, SVG or PNG
@@ -165,6 +167,7 @@ fn dispatch(command: Command) -> Result<ExitCode, CliError> {
         Command::Statistics(args) => statistics::statistics(&args),
         Command::Calibrate(args) => calibrate::calibrate(&args),
         Command::Robustness(args) => robustness::robustness(&args),
+        Command::Paper(args) => paper::paper(&args),
         Command::Record(args) => record::record(&args),
         Command::Plot(args) => plot::plot(&args),
         Command::View(args) => view::view(&args),

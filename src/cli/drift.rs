@@ -6,7 +6,6 @@ use clap::Args;
 use closecall_campaign::drift::{Fitted, drift as compare};
 use closecall_report::json::stamped;
 use closecall_report::traffic::drift::DriftText;
-use closecall_scenarios::trajectory_data::{read_with, refuse_duplicates};
 
 use super::CliError;
 use super::args::{Format, ReadArgs};
@@ -33,11 +32,7 @@ pub(super) struct DriftArgs {
 }
 
 pub(super) fn drift(args: &DriftArgs) -> Result<ExitCode, CliError> {
-    let fitted = Fitted::read(&args.fitted)?;
-    let data_sets =
-        args.files.iter().map(|path| read_with(path, args.read.options())).collect::<Result<Vec<_>, _>>()?;
-    refuse_duplicates(&args.files, &data_sets).map_err(|message| CliError::Usage { message })?;
-    let found = compare(&fitted, &data_sets, args.seed);
+    let found = compare(&Fitted::read(&args.fitted)?, &args.read.read_all(&args.files)?, args.seed);
     match args.format {
         Format::Json => outln!("{:#}", stamped(serde_json::json!(found), None, None)),
         Format::Human => out!("{}", DriftText(&found)),

@@ -21,6 +21,7 @@ mod library;
 mod merge;
 mod new;
 mod output;
+mod paper;
 mod plan;
 mod plot;
 mod protect;

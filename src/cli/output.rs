@@ -4,7 +4,7 @@ use std::fmt::Arguments;
 use std::io::{ErrorKind, IsTerminal, Write, stderr, stdout};
 use std::path::{Path, PathBuf};
 
-use closecall_campaign::folder::Folder;
+use closecall_campaign::folder::{Folder, REPORT_FILES};
 use closecall_report::heartbeat::Heartbeat;
 use closecall_scenarios::atomic::{WriteError, write_file};
 use closecall_simulation::scenario::ScenarioFile;
@@ -61,16 +61,9 @@ pub(super) fn made_by(source: &Path, file: &ScenarioFile) -> String {
     format!("# Made by `{}`\n# from {}\n{}", command_line(), source.display(), file.text())
 }
 
-/// The files of a campaign's folder that a reader opens first.
-const REPORT_FILES: [&str; 5] = ["report.html", "summary.md", "junit.xml", "outcomes.parquet", "recordings/index.html"];
-
 /// Prints to standard error which reports a campaign's folder holds.
 pub(super) fn print_report_files(folder: &Folder) {
-    for path in REPORT_FILES.map(|name| folder.file(name)) {
-        if path.exists() {
-            print_written(&path);
-        }
-    }
+    REPORT_FILES.map(|name| folder.file(name)).iter().filter(|path| path.exists()).for_each(|path| print_written(path));
 }
 
 /// Prints like [`std::print`], but does not panic.

@@ -42,10 +42,7 @@ pub(super) fn robustness(args: &RobustnessArgs) -> Result<ExitCode, CliError> {
         protect(&of_trajectories(&args.files), &[("--plot", Some(chart))])?;
     }
     let setup = Setup { seed: args.seed, repetitions: args.repetitions, ..Setup::default() };
-    let studied = study(&args.files, args.read.options(), &setup).map_err(|error| match error {
-        RobustnessError::TrajectoryData(source) => CliError::TrajectoryData(source),
-        RobustnessError::Mixed => CliError::Usage { message: error.to_string() },
-    })?;
+    let studied = study(&args.files, args.read.options(), &setup).map_err(refused)?;
     let Some((_, found)) = studied else { return Ok(ExitCode::Pass) };
     if let (Some(folder), Some(paths)) = (&args.plot, &charts) {
         write_charts(folder, paths, &robustness_charts(&found)?)?;
@@ -59,4 +56,12 @@ pub(super) fn robustness(args: &RobustnessArgs) -> Result<ExitCode, CliError> {
         return Ok(ExitCode::Inconclusive);
     }
     Ok(ExitCode::Pass)
+}
+
+/// Returns the error of a study that is not possible.
+pub(super) fn refused(error: RobustnessError) -> CliError {
+    match error {
+        RobustnessError::TrajectoryData(source) => CliError::TrajectoryData(source),
+        RobustnessError::Mixed => CliError::Usage { message: error.to_string() },
+    }
 }

@@ -6,12 +6,12 @@ use clap::Args;
 use closecall_report::json::stamped;
 use closecall_report::run::rerun::write_recording;
 use closecall_report::traffic::sampling::{Sampled, SampledRun, StepError, run_step};
-use closecall_scenarios::atomic::{WriteError, write_file};
+use closecall_scenarios::atomic::write_file;
 use closecall_simulation::scenario::{ScenarioFile, Variation, sampled};
 
 use super::CliError;
 use super::args::{Format, ReadArgs, SetArgs};
-use super::output::{made_by, out, outln, print_written};
+use super::output::{made_by, out, outln, print_written, write_charts};
 use super::protect::{of_trajectories, protect};
 use super::reenact::chosen;
 use crate::exit_code::ExitCode;
@@ -57,8 +57,8 @@ pub(super) struct SampleArgs {
 }
 
 pub(super) fn sample(args: &SampleArgs) -> Result<ExitCode, CliError> {
-    let usage = |message| CliError::Usage { message };
-    let variation = Variation::new(&args.vary, [args.from, args.to], args.steps).map_err(usage)?;
+    let variation = Variation::new(&args.vary, [args.from, args.to], args.steps);
+    let variation = variation.map_err(|message| CliError::Usage { message })?;
     let path = |name: &str| args.output.as_ref().map(|folder| folder.join(name));
     let (svg, rrd) = (path("sample.svg"), path("sample.rrd"));
     let inputs = of_trajectories(std::slice::from_ref(&args.file));
@@ -86,15 +86,12 @@ pub(super) fn sample(args: &SampleArgs) -> Result<ExitCode, CliError> {
         all.runs.push(done.run);
     }
     if let (Some(folder), Some(svg), Some(rrd)) = (&args.output, svg, rrd) {
-        std::fs::create_dir_all(folder).map_err(|source| WriteError::new(folder, source))?;
-        files.sort_by(|a, b| a.0.cmp(&b.0));
+        write_charts(folder, &[svg], &[all.figure()?])?;
+        write_recording(&rrd, &films)?;
+        print_written(&rrd);
         for (name, file) in &files {
             write_file(&folder.join(name), |written| written.write_all(made_by(&args.file, file).as_bytes()))?;
         }
-        let figure = all.figure()?;
-        write_file(&svg, |written| written.write_all(figure.as_bytes()))?;
-        write_recording(&rrd, &films)?;
-        [svg, rrd].iter().for_each(|path| print_written(path));
     }
     match args.format {
         Format::Json => outln!("{:#}", stamped(all.json(), Some(args.seed), None)),

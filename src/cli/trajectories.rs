@@ -6,6 +6,7 @@ use clap::{Args, ValueEnum};
 use closecall_report::json::{self, stamped};
 use closecall_report::run::film::film_lane_change;
 use closecall_report::run::rerun::write_recording;
+use closecall_report::traffic::fit::FitText;
 use closecall_report::traffic::lane_changes::{CriticalityText, LaneChangesText, ScoreText};
 use closecall_scenarios::atomic::WriteError;
 use closecall_scenarios::criticality::{Counted, Judgement, by_severity, criticality as evaluate};
@@ -14,7 +15,7 @@ use closecall_scenarios::fit::{Heading, fit as fit_distributions, to_toml, write
 use closecall_scenarios::lane_change::{
     Criterion, FoundLaneChanges, LaneReliability, find, listed_for, read_references, score,
 };
-use closecall_scenarios::trajectory_data::{Layout, open, read_with, refuse_duplicates};
+use closecall_scenarios::trajectory_data::{Layout, open, read_with};
 
 use super::CliError;
 use super::args::{Format, ReadArgs, positive};
@@ -204,9 +205,7 @@ pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> 
 
 pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
     protect(&of_trajectories(&args.files), &[("--output", args.output.as_deref())])?;
-    let data_sets =
-        args.files.iter().map(|path| read_with(path, args.read.options())).collect::<Result<Vec<_>, _>>()?;
-    refuse_duplicates(&args.files, &data_sets).map_err(|message| CliError::Usage { message })?;
+    let data_sets = args.read.read_all(&args.files)?;
     let fitted = fit_distributions(&data_sets, args.seed);
     let heading = Heading { command: command_line(), provenance: args.provenance.clone() };
     if let Some(path) = &args.output {
@@ -216,15 +215,7 @@ pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
         (Format::Json, _) => outln!("{:#}", stamped(json::fitted(&fitted), None, None)),
         (Format::Human, None) => out!("{}", to_toml(&fitted, &heading)),
         (Format::Human, Some(path)) => {
-            for quantity in &fitted.fitted {
-                let fit = quantity.form.map_or("no form suits".to_owned(), |(form, fit)| {
-                    format!("{}: distance {:.3}, p = {:.3}", form.name(), fit.distance, fit.p_value)
-                });
-                outln!("{:<24} n = {:>4}, median {:.3}; {fit}", quantity.quantity.name(), quantity.n, quantity.median);
-            }
-            for (quantity, n) in &fitted.too_few {
-                outln!("{:<24} n = {n:>4}, too few to fit", quantity.name());
-            }
+            out!("{}", FitText(&fitted));
             outln!("written to {}", path.display());
         }
     }

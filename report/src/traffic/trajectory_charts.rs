@@ -199,20 +199,20 @@ fn elements<'a>(index: usize, one: &BoxSummary) -> Vec<DynElement<'static, SVGBa
     ]
 }
 
-fn number_axis(name: &str, range: Range<f64>) -> ChartAxis<'_> {
+pub(super) fn number_axis(name: &str, range: Range<f64>) -> ChartAxis<'_> {
     let text = Box::new(number_text(range.start, range.end));
     ChartAxis { name, range, labels: LABELS, text, has_grid: true }
 }
 
 /// Returns the SVG of a chart on a white background.
-fn file(title: &str, draw: impl FnOnce(&Canvas<'_>) -> Drawn) -> Result<String, ChartError> {
+pub(super) fn file(title: &str, draw: impl FnOnce(&Canvas<'_>) -> Drawn) -> Result<String, ChartError> {
     let drawn = svg(FILE_PX, |canvas| canvas.fill(&WHITE).and_then(|()| draw(canvas)));
     drawn.map_err(|error| ChartError { title: title.to_owned(), message: error.to_string() })
 }
 
 /// Returns the range from the smallest to the largest finite value, with a margin. The range includes `from` if there is
 /// one, and is never empty.
-fn range(values: impl Iterator<Item = f64>, from: Option<f64>) -> Range<f64> {
+pub(super) fn range(values: impl Iterator<Item = f64>, from: Option<f64>) -> Range<f64> {
     const MARGIN: f64 = 0.06;
     let finite = values.filter(|value| value.is_finite()).chain(from);
     let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
