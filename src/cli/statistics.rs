@@ -25,7 +25,7 @@ pub(super) struct StatisticsArgs {
     /// Speed limit in m/s [default: 120 km/h]
     #[arg(long, value_name = "M/S", value_parser = positive)]
     speed_limit_mps: Option<f64>,
-    /// Folder for the box plots `duration.svg` and `speed.svg`
+    /// Folder for the box plots `duration.svg`, `width.svg` and `speed.svg`
     #[arg(long, value_name = "DIR")]
     plot: Option<PathBuf>,
     /// Output format

@@ -69,6 +69,8 @@ pub struct ClassStatistics {
     pub double: usize,
     /// Durations of the complete lane changes (s).
     pub duration_s: Option<BoxPlot>,
+    /// Widths of the peaks of lateral speed of the complete lane changes (s).
+    pub width_s: Option<BoxPlot>,
     /// Speeds of the complete lane changes when the centre crosses the marking (m/s).
     pub speed_mps: Option<BoxPlot>,
 }
@@ -118,6 +120,7 @@ fn class_statistics(changes: &[CriticalLaneChange], vehicle_class: VehicleClass)
         overlapping: all.iter().filter(|change| change.overlapping).count(),
         double: all.iter().filter(|change| change.double).count(),
         duration_s: BoxPlot::of(complete.iter().map(|change| change.duration_s).collect()),
+        width_s: BoxPlot::of(complete.iter().map(|change| change.width_s).collect()),
         speed_mps: BoxPlot::of(complete.iter().map(|change| change.speed_mps).collect()),
     })
 }
