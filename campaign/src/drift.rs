@@ -16,6 +16,7 @@ use closecall_scenarios::parameters::{ParameterConfig, ParametersConfig};
 use closecall_scenarios::trajectory_data::TrajectoryData;
 use closecall_simulation::scenario::ScenarioError;
 use closecall_statistics::holm;
+use closecall_statistics::quantiles::quantile;
 use closecall_statistics::two_sample::{self, Summary};
 use closecall_traffic::Stream;
 use rand::SeedableRng;
@@ -143,25 +144,24 @@ fn drift_of(fitted: &Fitted, values: impl Fn(Quantity) -> Vec<f64>, p_value: &PV
     let p_values: Vec<f64> = compared.iter().flatten().map(|(_, p_value)| *p_value).collect();
     let level = LEVEL / p_values.len().max(1) as f64;
     let mut corrected = holm::corrected(&p_values).into_iter();
-    let quantity = |(((quantity, summary), new), found): (((&Quantity, &Summary), &Vec<f64>), &Option<(f64, f64)>)| {
+    let mut quantities = Vec::new();
+    for (((quantity, summary), new), found) in fitted.0.iter().zip(&new).zip(&compared) {
         let shift = summary.distance_of_shift(|value| value * (1.0 + STATED_SHIFT));
         let needed = |distance| two_sample::needed(level, summary.n(), distance);
-        QuantityDrift {
+        quantities.push(QuantityDrift {
             name: quantity.name(),
             fitted_n: summary.n(),
             fitted_median: summary.median(),
             n: new.len(),
-            median: (!new.is_empty()).then(|| closecall_statistics::quantiles::quantile(new, 0.5)),
+            median: (!new.is_empty()).then(|| quantile(new, 0.5)),
             distance: found.map(|(distance, _)| distance),
             p_value: found.map(|(_, p_value)| p_value),
             corrected_p_value: found.and_then(|_| corrected.next()),
             found_from: found.map(|_| two_sample::critical_distance(level, summary.n(), new.len())),
             needed: found.and_then(|(distance, _)| needed(distance)),
             needed_for_five_percent: needed(shift),
-        }
-    };
-    let pairs = fitted.0.iter().map(|(quantity, summary)| (quantity, summary));
-    let quantities: Vec<QuantityDrift> = pairs.zip(&new).zip(&compared).map(quantity).collect();
+        });
+    }
     let has_drifted = quantities.iter().filter_map(|one| one.corrected_p_value).any(|p_value| p_value < LEVEL);
     Drift { quantities, is_tested: !p_values.is_empty(), has_drifted }
 }
@@ -177,7 +177,6 @@ fn stream(seed: u64, quantity: Quantity) -> Stream {
 #[cfg(test)]
 mod tests {
     use closecall_statistics::normal::TruncatedStandardNormal;
-    use closecall_statistics::quantiles::quantile;
     use rand::RngExt;
     use rayon::prelude::*;
 

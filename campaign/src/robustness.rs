@@ -1,6 +1,6 @@
 //! Studies of several trajectory files, how much noise and offset the criteria for lane changes tolerate, on all processors.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use closecall_scenarios::robustness::{CriterionCounts, Measured, Robustness, Setup, Study};
 use closecall_scenarios::trajectory_data::{ReadOptions, TrajectoryFileError, open};
@@ -43,7 +43,7 @@ pub fn robustness(
     Ok(all.map(|all| (each, all)))
 }
 
-fn study_of(path: &PathBuf, options: ReadOptions) -> Result<Study, TrajectoryFileError> {
+fn study_of(path: &Path, options: ReadOptions) -> Result<Study, TrajectoryFileError> {
     let mut tracks = open(path, options)?;
     let mut measured: Vec<Measured> = Vec::new();
     while let Some(track) = tracks.next_track()? {

@@ -134,5 +134,5 @@ fn name_at(x: f64) -> String {
     let is_middle = (x - nearest).abs() < 1e-9 && nearest >= 0.0;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small whole number")]
     let name = is_middle.then(|| METRICS.get(nearest as usize)).flatten();
-    name.map_or(String::new(), |name| (*name).split('_').next().unwrap_or(name).to_owned())
+    name.map_or(String::new(), |name| name.rsplit_once('_').map_or(*name, |(name, _unit)| name).to_owned())
 }
