@@ -248,9 +248,7 @@ mod tests {
     #[test]
     fn a_swerve_within_the_lane_is_no_lane_change() {
         let mut track = straight_track(1, 0.0, 25.0, -1.75, 200);
-        for (k, point) in track.points.iter_mut().enumerate() {
-            point.d_m += (0.1 * k as f64).sin();
-        }
+        track.points.iter_mut().enumerate().for_each(|(k, point)| point.d_m += (0.1 * k as f64).sin());
         assert!(found(track).is_empty());
     }
 
@@ -332,12 +330,11 @@ mod tests {
 
     #[test]
     fn overlapping_lane_changes_that_end_in_an_inner_lane_are_not_double() {
-        // From lane 3 to lane 1 in one go, beside a vehicle that shows a fourth lane.
-        let inner = changing_track(1, (0.0, 30.0), (-8.75, -1.75), (4.0, 9.0), 180);
-        let other = changing_track(2, (0.0, 30.0), (-12.25, -8.75), (4.0, 6.0), 180);
-        let found = detect(&smooth(&trajectory_data_of(vec![inner, other])));
-        let flags: Vec<_> = found.iter().map(|change| (change.track_id, change.overlapping, change.double)).collect();
-        assert_eq!(flags, [(1, true, false), (1, true, false), (2, false, false)]);
+        let track = |id, lanes, seconds| changing_track(id, (0.0, 30.0), lanes, (4.0, seconds), 180);
+        let tracks = trajectory_data_of(vec![track(1, (-8.75, -1.75), 9.0), track(2, (-12.25, -8.75), 6.0)]);
+        let found = detect(&smooth(&tracks)).into_iter();
+        let flags = found.map(|change| (change.track_id, change.overlapping, change.double));
+        assert_eq!(flags.collect::<Vec<_>>(), [(1, true, false), (1, true, false), (2, false, false)]);
     }
 
     #[test]

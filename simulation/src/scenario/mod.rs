@@ -18,10 +18,12 @@ mod locate;
 pub mod member;
 mod placement;
 mod recorded;
+mod recorded_values;
 mod reenacted;
 mod sampled;
 mod schema;
 pub mod source;
+mod step_value;
 mod variation;
 
 pub use checked::{Actor, Scenario};
@@ -34,5 +36,6 @@ pub use events::{
 };
 pub use file::{ScenarioError, ScenarioFile};
 pub use reenacted::{RearDriver, actor_name, reenact};
-pub use sampled::{SampledEncounter, StepValue, Variation, opp2_of, sampled};
+pub use sampled::{SampledEncounter, opp2_of, sampled};
 pub use schema::strict_schema;
+pub use step_value::{StepValue, Variation};

@@ -32,6 +32,7 @@ use toml_edit::{Array, ArrayOfTables, DocumentMut, Item};
 use crate::criteria::GateConfig;
 
 use super::config::{AbsoluteStartConfig, ActorConfig, EXPECTS_SHARE, SCHEMA_VERSION, ScenarioConfig, StartConfig};
+use super::recorded_values::{MIN_SPEED_MPS, ROUNDING_STEP, max_speed_mps, rounded, to_steps};
 use super::{ScenarioError, ScenarioFile, Setting};
 
 /// The driver of the rear vehicle.
@@ -60,12 +61,8 @@ const MAX_TIME_GAP_S: f64 = 5.0;
 /// Smallest and largest duration of a lane change (s).
 pub(super) const MIN_LANE_CHANGE_S: f64 = 1.5;
 pub(super) const MAX_LANE_CHANGE_S: f64 = 20.0;
-/// Lower limit of recorded speeds, if a speed is used as a divisor, a desired speed or a speed limit (m/s).
-const MIN_SPEED_MPS: f64 = 1.0;
 /// Smallest gap between two vehicles that start in the same lane (m).
 const MIN_START_GAP_M: f64 = 0.5;
-/// Number of rounding steps per unit of a value in the file.
-const STEPS_PER_UNIT: f64 = 1_000.0;
 
 /// Returns the name of a vehicle as an actor: `ego`, `front`, `rear`, or its track. `index` is its index in the encounter's
 /// list of vehicles.
@@ -309,7 +306,7 @@ pub(super) fn prescribed_driver(encounter: &RecordedEncounter, vehicle: &Partici
         let (at_s, duration_s) = crossing.unwrap_or_else(as_recorded);
         let (at_s, duration_s) = (to_steps(at_s), to_steps(duration_s));
         // The next lane change starts at least one rounding step after the end of this one, so that they never overlap.
-        free_from_s = at_s + duration_s + 1.0 / STEPS_PER_UNIT;
+        free_from_s = at_s + duration_s + ROUNDING_STEP;
         lane_changes.push(PrescribedLaneChangeConfig {
             at_s: Num::Fixed(at_s),
             to: change.direction,
@@ -342,20 +339,6 @@ pub(super) fn lane_change_across(
     };
     let starts = vehicle.points.iter().take_while(|point| point.time.s() < crossing_s).filter_map(candidate);
     starts.min_by(|a, b| (a.0 - start_s).abs().total_cmp(&(b.0 - start_s).abs()))
-}
-
-/// Returns the highest recorded speed of the vehicles (m/s), at least [`MIN_SPEED_MPS`].
-pub(super) fn max_speed_mps<'a>(vehicles: impl IntoIterator<Item = &'a Trajectory>) -> f64 {
-    let speeds = vehicles.into_iter().flat_map(|vehicle| vehicle.points.iter().map(|point| point.speed_mps));
-    speeds.fold(MIN_SPEED_MPS, f64::max)
-}
-
-pub(super) fn rounded(value: f64) -> Num {
-    Num::Fixed(to_steps(value))
-}
-
-pub(super) fn to_steps(value: f64) -> f64 {
-    (value * STEPS_PER_UNIT).round() / STEPS_PER_UNIT
 }
 
 #[cfg(test)]
