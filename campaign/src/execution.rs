@@ -46,6 +46,21 @@ pub struct ResumeReport {
     pub retried: u64,
 }
 
+impl ResumeReport {
+    /// Returns what was found as messages for human readers.
+    pub fn messages(&self) -> Vec<String> {
+        let damaged = self.damaged.iter().map(|TornLine { line, reason }| {
+            format!("line {line} of the journal was damaged ({reason}): its sample was run again")
+        });
+        let retried =
+            (self.retried > 0).then(|| format!("{} samples that had ended in an error were run again", self.retried));
+        let torn = self.torn.iter().map(|TornLine { line, reason }| {
+            format!("the journal was torn at line {line} ({reason}): the samples from there on were run again")
+        });
+        damaged.chain(retried).chain(torn).collect()
+    }
+}
+
 /// An error that ends a campaign. The journal stays usable, and the campaign can be resumed from it.
 #[derive(Debug, thiserror::Error)]
 pub enum CampaignError {

@@ -29,6 +29,10 @@ const MANIFEST: &str = "manifest.json";
 const JOURNAL: &str = "journal.jsonl";
 const WALL_TIMES: &str = "wall-times.jsonl";
 
+/// The reports of a campaign's folder that a reader opens first.
+pub const REPORT_FILES: [&str; 5] =
+    ["report.html", "summary.md", "junit.xml", "outcomes.parquet", "recordings/index.html"];
+
 /// The folder of a campaign.
 #[derive(Clone, Debug)]
 pub struct Folder {

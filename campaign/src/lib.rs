@@ -18,6 +18,7 @@
 pub mod arm_pairs;
 pub mod baseline;
 pub mod compare;
+pub mod drift;
 pub mod end_rule;
 pub mod ensemble;
 pub mod execution;
@@ -40,6 +41,7 @@ mod repair;
 mod repeats;
 pub mod repository;
 pub mod resume_command;
+pub mod robustness;
 pub mod runner;
 pub mod saved;
 pub mod selection;

@@ -5,6 +5,7 @@
 //! * [`campaign`]: output of many runs: HTML page, JUnit, Parquet, Markdown, recordings of selected samples
 //! * [`calibration`]: the result of a calibration, and the member of a driver ensemble that it gives
 //! * [`serve`]: recordings in the browser
+//! * [`heartbeat`]: the progress of a long command as lines of text
 //! * [`json`]: results as JSON with stable keys
 //! * [`study`]: output of sensitivity studies and frontiers: tables, charts and pages
 //! * [`traffic`]: simulated traffic as trajectory data, and texts and charts of what was found in trajectory data
@@ -15,6 +16,7 @@ pub mod calibration;
 pub mod campaign;
 mod charts;
 mod escape;
+pub mod heartbeat;
 pub mod json;
 pub mod run;
 pub mod serve;

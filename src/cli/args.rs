@@ -1,12 +1,15 @@
 //! Arguments that several commands share.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use closecall_scenarios::trajectory_data::{BadRows, LayoutChoice, ReadOptions};
+use closecall_scenarios::trajectory_data::{
+    BadRows, LayoutChoice, ReadOptions, TrajectoryData, read_with, refuse_duplicates,
+};
 use closecall_sensors::SensorMode;
 use closecall_simulation::scenario::{ScenarioError, ScenarioFile, Setting, source};
 
+use super::CliError;
 use super::arms::ArmArgs;
 use super::output::print_error;
 
@@ -83,6 +86,13 @@ impl ReadArgs {
     /// Returns true if rows that cannot be used are skipped.
     pub(super) fn drops_bad_rows(&self) -> bool {
         self.drop_bad_rows
+    }
+
+    /// Reads several trajectory files, none of which may be given twice.
+    pub(super) fn read_all(&self, files: &[PathBuf]) -> Result<Vec<TrajectoryData>, CliError> {
+        let data_sets = files.iter().map(|path| read_with(path, self.options())).collect::<Result<Vec<_>, _>>()?;
+        refuse_duplicates(files, &data_sets).map_err(|message| CliError::Usage { message })?;
+        Ok(data_sets)
     }
 
     pub(super) fn options(&self) -> ReadOptions {

@@ -16,6 +16,7 @@ use closecall_campaign::selection::Selection;
 use closecall_campaign::stop::{StopMonitor, StopRule};
 use closecall_campaign::workers::Workers;
 use closecall_report::campaign::{CampaignReport, CountsText, Tally, VerdictText, ensemble_text};
+use closecall_report::heartbeat::Heartbeat;
 use closecall_report::json;
 use closecall_scenarios::sampling::Design;
 use closecall_simulation::controller::ControllerChoice;
@@ -26,12 +27,11 @@ use super::CliError;
 use super::args::{Format, SensorsChoice, SetArgs, positive};
 use super::arms::{ComparisonArgs, ControllerArgs};
 use super::backend::check_backend;
-use super::ending::{EndArgs, Ending, print_resumption};
+use super::ending::{EndArgs, Ending};
 use super::ensemble::EnsembleArgs;
 use super::gates::GateArgs;
-use super::heartbeat::Heartbeat;
 use super::interrupt::{received, stop_gracefully};
-use super::output::{out, outln, print_error, print_report_files};
+use super::output::{heartbeat, out, outln, print_error, print_report_files};
 use super::plan::PlanArgs;
 use crate::exit_code::ExitCode;
 
@@ -137,7 +137,7 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
     let mut progress = Progress::new(&campaign, &gates, StopMonitor::start(stop), EndMonitor::new(args.end.rule()));
     let resumption = campaign.run(locked.as_ref(), |next| progress.push(next))?;
     progress.bar.finish_and_clear();
-    print_resumption(&resumption);
+    resumption.messages().iter().for_each(|message| print_error(format_args!("{message}\n")));
     if let Some(ending) = received().map(Ending::Signal).or_else(|| progress.end.into_ending().map(Ending::Rule)) {
         return Ok(ending.print(args.format, &campaign, &progress.tally.summary, args.out.as_deref()));
     }
@@ -181,7 +181,7 @@ struct Progress {
     bar: ProgressBar,
     /// Wall time of the runs and of their validity checks (s).
     spent_s: [f64; 2],
-    _heartbeat: Heartbeat,
+    _heartbeat: Option<Heartbeat>,
 }
 
 impl Progress {
@@ -195,7 +195,7 @@ impl Progress {
         let names = campaign.works.iter().map(|work| work.file.config().name.clone()).collect();
         let bar = progress_bar(campaign.len());
         let tally = Tally::new(campaign, gates);
-        Self { names, tally, stop, end, spent_s: [0.0; 2], _heartbeat: Heartbeat::start(&bar), bar }
+        Self { names, tally, stop, end, spent_s: [0.0; 2], _heartbeat: heartbeat(&bar), bar }
     }
 
     fn push(&mut self, next: NextRecord<'_>) -> ControlFlow<End> {

@@ -8,8 +8,9 @@ use closecall_simulation::controller::exec::{adopt_orphans, end_all};
 use super::backend::choose_backend;
 use super::output::print_error;
 use super::{
-    CliError, baseline, calibrate, campaign, check, compare, generate, inspect, interrupt, library, merge, new, plot,
-    record, reenact, render, replay, robustness, run, schema, statistics, study, trajectories, view, watching,
+    CliError, baseline, calibrate, campaign, check, compare, drift, generate, inspect, interrupt, library, merge, new,
+    paper, plot, record, reenact, render, replay, robustness, run, sample, schema, statistics, study, trajectories,
+    view, watching,
 };
 use crate::exit_code::ExitCode;
 
@@ -81,14 +82,20 @@ enum Command {
     Criticality(trajectories::CriticalityArgs),
     /// Simulate an encounter of recorded traffic with the controller under test in the ego vehicle, and compare the two
     Reenact(reenact::ReenactArgs),
+    /// Sample a recorded lane change: the other vehicles drive as recorded, a parameter of a driver varies
+    Sample(sample::SampleArgs),
     /// Fit the distributions of a logical scenario to trajectory files
     Fit(trajectories::FitArgs),
+    /// Check whether new trajectory files still match the distributions that a scenario was fitted to
+    Drift(drift::DriftArgs),
     /// Compute durations, speeds, counts and correlations of recorded lane changes
     Statistics(statistics::StatisticsArgs),
     /// Calibrate a car-following model on recorded pairs, and judge it on pairs that were held out
     Calibrate(calibrate::CalibrateArgs),
     /// Study how much noise and offset the criteria for lane changes tolerate
     Robustness(robustness::RobustnessArgs),
+    /// Draw the figures of the published method on any set of trajectory files, with one page of all
+    Paper(paper::PaperArgs),
     /// Simulate samples of a scenario, and write their traffic as a trajectory file
     Record(record::RecordArgs),
     /// Draw an encounter as a static figure, SVG or PNG
@@ -154,10 +161,13 @@ fn dispatch(command: Command) -> Result<ExitCode, CliError> {
         Command::LaneChanges(args) => trajectories::lane_changes(&args),
         Command::Criticality(args) => trajectories::criticality(&args),
         Command::Reenact(args) => reenact::reenact(&args),
+        Command::Sample(args) => sample::sample(&args),
         Command::Fit(args) => trajectories::fit(&args),
+        Command::Drift(args) => drift::drift(&args),
         Command::Statistics(args) => statistics::statistics(&args),
         Command::Calibrate(args) => calibrate::calibrate(&args),
         Command::Robustness(args) => robustness::robustness(&args),
+        Command::Paper(args) => paper::paper(&args),
         Command::Record(args) => record::record(&args),
         Command::Plot(args) => plot::plot(&args),
         Command::View(args) => view::view(&args),

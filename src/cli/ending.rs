@@ -5,7 +5,7 @@ use std::path::Path;
 
 use clap::Args;
 use closecall_campaign::end_rule::{EarlyEnd, EndRule};
-use closecall_campaign::execution::{Campaign, ResumeReport};
+use closecall_campaign::execution::Campaign;
 use closecall_campaign::resume_command::{quoted, resume_command};
 use closecall_campaign::summary::Summary;
 use closecall_report::campaign::CountsText;
@@ -13,7 +13,7 @@ use serde_json::json;
 
 use super::args::Format;
 use super::interrupt::Signal;
-use super::output::{out, outln, print_error};
+use super::output::{out, outln};
 use crate::exit_code::ExitCode;
 
 /// When a campaign ends before its last sample.
@@ -90,22 +90,5 @@ impl Ending {
             }
         }
         self.exit_code()
-    }
-}
-
-/// Prints what was found in the journal of a campaign that goes on.
-pub(super) fn print_resumption(report: &ResumeReport) {
-    for damaged in &report.damaged {
-        let (line, reason) = (damaged.line, &damaged.reason);
-        print_error(format_args!("line {line} of the journal was damaged ({reason}): its sample was run again\n"));
-    }
-    if report.retried > 0 {
-        print_error(format_args!("{} samples that had ended in an error were run again\n", report.retried));
-    }
-    if let Some(torn) = &report.torn {
-        let (line, reason) = (torn.line, &torn.reason);
-        print_error(format_args!(
-            "the journal was torn at line {line} ({reason}): the samples from there on were run again\n"
-        ));
     }
 }

@@ -1,11 +1,14 @@
 //! Prints results and messages. Writing to a pipe whose reader has closed it is not an error.
 
 use std::fmt::Arguments;
-use std::io::{ErrorKind, Write, stderr, stdout};
+use std::io::{ErrorKind, IsTerminal, Write, stderr, stdout};
 use std::path::{Path, PathBuf};
 
-use closecall_campaign::folder::Folder;
+use closecall_campaign::folder::{Folder, REPORT_FILES};
+use closecall_report::heartbeat::Heartbeat;
 use closecall_scenarios::atomic::{WriteError, write_file};
+use closecall_simulation::scenario::ScenarioFile;
+use indicatif::ProgressBar;
 
 use crate::exit_code::ExitCode;
 
@@ -41,16 +44,26 @@ pub(super) fn write_charts(folder: &Path, paths: &[PathBuf], charts: &[String]) 
     Ok(())
 }
 
-/// The files of a campaign's folder that a reader opens first.
-const REPORT_FILES: [&str; 5] = ["report.html", "summary.md", "junit.xml", "outcomes.parquet", "recordings/index.html"];
+/// Starts to print the progress of `bar` as lines. A terminal shows the bar itself instead.
+pub(super) fn heartbeat(bar: &ProgressBar) -> Option<Heartbeat> {
+    let bar = bar.clone();
+    let progress = move || [bar.position(), bar.length().unwrap_or_default()];
+    (!stderr().is_terminal()).then(|| Heartbeat::start(progress, |line| print_error(format_args!("{line}\n"))))
+}
+
+/// Returns the command line of this program, as it was called.
+pub(super) fn command_line() -> String {
+    std::iter::once("closecall".to_owned()).chain(std::env::args().skip(1)).collect::<Vec<_>>().join(" ")
+}
+
+/// Returns the text of a scenario that was made from the trajectory file `source`, with a heading that states its origin.
+pub(super) fn made_by(source: &Path, file: &ScenarioFile) -> String {
+    format!("# Made by `{}`\n# from {}\n{}", command_line(), source.display(), file.text())
+}
 
 /// Prints to standard error which reports a campaign's folder holds.
 pub(super) fn print_report_files(folder: &Folder) {
-    for path in REPORT_FILES.map(|name| folder.file(name)) {
-        if path.exists() {
-            print_written(&path);
-        }
-    }
+    REPORT_FILES.map(|name| folder.file(name)).iter().filter(|path| path.exists()).for_each(|path| print_written(path));
 }
 
 /// Prints like [`std::print`], but does not panic.

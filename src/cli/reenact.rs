@@ -3,23 +3,20 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use closecall_report::json;
-use closecall_report::run::film::{EncounterComparison, Film, film_encounter};
+use closecall_report::json::stamped;
+use closecall_report::run::film::{EncounterComparison, film_encounter};
 use closecall_report::run::rerun::write_recording;
+use closecall_report::traffic::reenactment::Reenactment;
 use closecall_scenarios::atomic::write_file;
-use closecall_scenarios::criticality::{CriticalLaneChange, Judgement, by_severity, criticality};
-use closecall_scenarios::encounter::{NoEncounter, RecordedEncounter, encounter};
+use closecall_scenarios::encounter::{ChoiceError, RecordedEncounter, choose};
 use closecall_scenarios::filters::smooth;
-use closecall_scenarios::lane_change::LaneChange;
 use closecall_scenarios::trajectory_data::read_with;
-use closecall_simulation::outcome::Outcome;
-use closecall_simulation::scenario::{RearDriver, ScenarioFile, reenact as scenario_of};
+use closecall_simulation::scenario::{RearDriver, reenact as scenario_of};
 use closecall_simulation::{CONTROL_STEP, RunKey};
-use serde_json::json;
 
 use super::CliError;
 use super::args::{Format, ReadArgs, SimulationArgs};
-use super::output::outln;
+use super::output::{made_by, out, outln};
 use super::protect::{of_trajectories, protect};
 use super::watch::{WatchArgs, run_filmed};
 use crate::exit_code::ExitCode;
@@ -77,10 +74,7 @@ pub(super) fn reenact(args: &ReenactArgs) -> Result<ExitCode, CliError> {
     let inputs = [of_trajectories(std::slice::from_ref(&args.file)), args.sim.arm.files()].concat();
     let [record, trace] = args.watch.outputs();
     protect(&inputs, &[("--output", args.output.as_deref()), record, trace])?;
-    let recording = smooth(&read_with(&args.file, args.read.options())?);
-    let changes = criticality(&recording, &Judgement::default());
-    let all: Vec<LaneChange> = changes.iter().map(|change| change.lane_change.clone()).collect();
-    let found = choose(args, &changes, |change| encounter(&recording, change, &all, CONTROL_STEP))?;
+    let found = chosen(&args.file, &args.read, args.track)?;
     let source = format!("{} (track {})", args.file.display(), found.change.track_id);
     let file = scenario_of(&found, args.rear.into(), (Path::new(&source), &args.sim.set.settings))?;
     let scenario = file.concrete(&file.space().nominal())?;
@@ -94,81 +88,27 @@ pub(super) fn reenact(args: &ReenactArgs) -> Result<ExitCode, CliError> {
         write_recording(path, &films)?;
     }
     if let Some(path) = &args.output {
-        write_file(path, |written| written.write_all(text_of(&file, args).as_bytes()))?;
+        write_file(path, |written| written.write_all(made_by(&args.file, &file).as_bytes()))?;
     }
-    let reenactment = Reenactment { comparison: &comparison, films: &films, outcome: &outcome };
-    print(args.format, &found, &reenactment);
+    let reenactment = Reenactment { encounter: &found, comparison: &comparison, films: &films, outcome: &outcome };
+    match args.format {
+        Format::Json => outln!("{:#}", stamped(reenactment.json(), Some(outcome.seed), None)),
+        Format::Human => out!("{reenactment}"),
+    }
     Ok(ExitCode::Pass)
 }
 
-/// Returns the encounter of the named track, or the most critical one.
-fn choose(
-    args: &ReenactArgs,
-    changes: &[CriticalLaneChange],
-    encounter_of: impl Fn(&LaneChange) -> Result<RecordedEncounter, NoEncounter>,
-) -> Result<RecordedEncounter, CliError> {
-    let file = args.file.display();
-    let mut refused = None;
-    for change in by_severity(changes, args.track) {
-        match encounter_of(&change.lane_change) {
-            Ok(found) => return Ok(found),
-            Err(source) => refused = refused.or(Some(source)),
+/// Returns the encounter of the named track of a trajectory file, or the most critical one.
+pub(super) fn chosen(path: &Path, read: &ReadArgs, track: Option<u64>) -> Result<RecordedEncounter, CliError> {
+    let found = choose(&smooth(&read_with(path, read.options())?), track, CONTROL_STEP);
+    let file = path.display();
+    found.map_err(|error| match error {
+        ChoiceError::NoLaneChange => {
+            let of_track = track.map_or(String::new(), |track| format!(" of track {track}"));
+            CliError::Usage { message: format!("{file} has no lane change{of_track} to re-enact") }
         }
-    }
-    let Some(source) = refused else {
-        let of_track = args.track.map_or(String::new(), |track| format!(" of track {track}"));
-        return Err(CliError::Usage { message: format!("{file} has no lane change{of_track} to re-enact") });
-    };
-    let possible = args.track.map_or(Vec::new(), |_| {
-        let tracks = changes.iter().filter(|change| encounter_of(&change.lane_change).is_ok());
-        tracks.map(|change| change.lane_change.track_id).collect()
-    });
-    Err(CliError::NoEncounter { file: file.to_string(), source, possible })
-}
-
-/// Returns the text of the scenario with a heading that states its origin.
-fn text_of(file: &ScenarioFile, args: &ReenactArgs) -> String {
-    let command = std::iter::once("closecall".to_owned()).chain(std::env::args().skip(1)).collect::<Vec<_>>().join(" ");
-    format!("# Made by `{command}`\n# from {}\n{}", args.file.display(), file.text())
-}
-
-/// The simulated run of an encounter beside the recorded one.
-struct Reenactment<'a> {
-    comparison: &'a EncounterComparison,
-    /// The film of the recorded traffic, and that of the simulation.
-    films: &'a [Film; 2],
-    outcome: &'a Outcome,
-}
-
-fn print(format: Format, found: &RecordedEncounter, reenactment: &Reenactment<'_>) {
-    let Reenactment { comparison, films, outcome } = reenactment;
-    let [ego, front, rear] = found.ego_lead_rear().map(|track| track.track_id);
-    match format {
-        Format::Json => {
-            let object = json!({
-                "trajectory_data": found.data_name,
-                "track_id": rear,
-                "ego_track_id": ego,
-                "front_track_id": front,
-                "start_s": found.start.s(),
-                "recorded": json::encounter_metrics(&comparison.recorded),
-                "simulated": json::encounter_metrics(&comparison.simulated),
-                "outcome": json::outcome(outcome),
-            });
-            outln!("{:#}", json::stamped(object, Some(outcome.seed), None));
+        ChoiceError::NoEncounter { source, possible } => {
+            CliError::NoEncounter { file: file.to_string(), source, possible }
         }
-        Format::Human => {
-            outln!("{}: rear vehicle: track {rear}; ego: track {ego}; lead vehicle: track {front}", found.data_name);
-            outln!("start: {:.1} s of the trajectory file, with recorded positions and speeds", found.start.s());
-            outln!("  {:<32} {:>16} {:>16}", "", films[0].arm(), films[1].arm());
-            for (name, [recorded, simulated]) in comparison.rows() {
-                outln!("  {name:<32} {recorded:>16} {simulated:>16}");
-            }
-            let simulated = &films[1];
-            outln!("{}: {}", simulated.arm(), simulated.headline());
-            for verdict in simulated.mis_summary().into_iter().chain(comparison.never_crosses()) {
-                outln!("{}: {verdict}", simulated.arm());
-            }
-        }
-    }
+    })
 }

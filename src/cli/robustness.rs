@@ -1,13 +1,12 @@
 //! `closecall robustness`: studies how much noise and offset each criterion for lane changes tolerates.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
+use closecall_campaign::robustness::{RobustnessError, robustness as study};
 use closecall_report::json::{self, stamped};
 use closecall_report::traffic::robustness::{ROBUSTNESS_CHARTS, RobustnessText, robustness_charts};
-use closecall_scenarios::robustness::{CriterionCounts, Measured, Robustness, Setup, Study};
-use closecall_scenarios::trajectory_data::open;
-use rayon::prelude::*;
+use closecall_scenarios::robustness::Setup;
 
 use super::CliError;
 use super::args::{Format, ReadArgs};
@@ -43,26 +42,8 @@ pub(super) fn robustness(args: &RobustnessArgs) -> Result<ExitCode, CliError> {
         protect(&of_trajectories(&args.files), &[("--plot", Some(chart))])?;
     }
     let setup = Setup { seed: args.seed, repetitions: args.repetitions, ..Setup::default() };
-    let mut studies = Vec::new();
-    for path in &args.files {
-        studies.push(study_of(path, &args.read)?);
-    }
-    let mut found: Option<Robustness> = None;
-    for study in &studies {
-        let cases = Study::cases(&setup);
-        // The results are in the order of the cases for any number of threads.
-        let results: Vec<Vec<CriterionCounts>> = cases.par_iter().map(|case| study.run(case)).collect();
-        let one = study.robustness(&setup, &results);
-        if let Some(all) = &mut found {
-            if !all.add(&one) {
-                let message = "in-car logs and recorded traffic have different references: study them separately";
-                return Err(CliError::Usage { message: message.to_owned() });
-            }
-        } else {
-            found = Some(one);
-        }
-    }
-    let Some(found) = found else { return Ok(ExitCode::Pass) };
+    let studied = study(&args.files, args.read.options(), &setup).map_err(refused)?;
+    let Some((_, found)) = studied else { return Ok(ExitCode::Pass) };
     if let (Some(folder), Some(paths)) = (&args.plot, &charts) {
         write_charts(folder, paths, &robustness_charts(&found)?)?;
     }
@@ -77,12 +58,10 @@ pub(super) fn robustness(args: &RobustnessArgs) -> Result<ExitCode, CliError> {
     Ok(ExitCode::Pass)
 }
 
-fn study_of(path: &Path, read: &ReadArgs) -> Result<Study, CliError> {
-    let mut tracks = open(path, read.options())?;
-    let mut measured: Vec<Measured> = Vec::new();
-    while let Some(track) = tracks.next_track()? {
-        measured.push((track.trajectory, track.markings));
+/// Returns the error of a study that is not possible.
+pub(super) fn refused(error: RobustnessError) -> CliError {
+    match error {
+        RobustnessError::TrajectoryData(source) => CliError::TrajectoryData(source),
+        RobustnessError::Mixed => CliError::Usage { message: error.to_string() },
     }
-    measured.sort_by_key(|(track, _)| track.track_id);
-    Ok(Study::new(measured, tracks.markings()))
 }

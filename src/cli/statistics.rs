@@ -7,7 +7,6 @@ use closecall_report::json::stamped;
 use closecall_report::traffic::statistics::{STATISTICS_CHARTS, StatisticsText, statistics_charts};
 use closecall_scenarios::criticality::{CriticalLaneChange, Judgement, criticality, statistics as compute};
 use closecall_scenarios::filters::smooth;
-use closecall_scenarios::trajectory_data::{TrajectoryData, read_with, refuse_duplicates};
 
 use super::CliError;
 use super::args::{Format, ReadArgs, positive};
@@ -26,7 +25,7 @@ pub(super) struct StatisticsArgs {
     /// Speed limit in m/s [default: 120 km/h]
     #[arg(long, value_name = "M/S", value_parser = positive)]
     speed_limit_mps: Option<f64>,
-    /// Folder for the box plots `duration.svg` and `speed.svg`
+    /// Folder for the box plots `duration.svg`, `width.svg` and `speed.svg`
     #[arg(long, value_name = "DIR")]
     plot: Option<PathBuf>,
     /// Output format
@@ -39,9 +38,7 @@ pub(super) fn statistics(args: &StatisticsArgs) -> Result<ExitCode, CliError> {
     for chart in charts.iter().flatten() {
         protect(&of_trajectories(&args.files), &[("--plot", Some(chart))])?;
     }
-    let read = |path: &PathBuf| read_with(path, args.read.options());
-    let data_sets = args.files.iter().map(read).collect::<Result<Vec<TrajectoryData>, _>>()?;
-    refuse_duplicates(&args.files, &data_sets).map_err(|message| CliError::Usage { message })?;
+    let data_sets = args.read.read_all(&args.files)?;
     let changes = data_sets.iter().flat_map(|data| {
         criticality(&smooth(data), &Judgement { speed_limit_mps: args.speed_limit_mps, ttce_alone: false })
     });

@@ -19,9 +19,8 @@ use super::args::{Format, SensorsChoice, SetArgs, count};
 use super::arms::ControllerArgs;
 use super::backend::check_backend;
 use super::campaign::progress_bar;
-use super::heartbeat::Heartbeat;
 use super::interrupt::{Signal, received, stop_gracefully};
-use super::output::{out, outln, print_written};
+use super::output::{heartbeat, out, outln, print_written};
 use crate::exit_code::ExitCode;
 
 /// Arguments that both studies share.
@@ -111,7 +110,7 @@ impl StudyArgs {
     ) -> Result<Option<T>, E> {
         let (stop, bar) = (StopFlag::default(), progress_bar(steps));
         stop_gracefully(&stop);
-        let _heartbeat = Heartbeat::start(&bar);
+        let _heartbeat = heartbeat(&bar);
         let found = study(&stop, &mut || bar.inc(1));
         bar.finish_and_clear();
         found

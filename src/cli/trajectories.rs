@@ -4,22 +4,24 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use closecall_report::json::{self, stamped};
+use closecall_report::run::film::film_lane_change;
+use closecall_report::run::rerun::write_recording;
+use closecall_report::traffic::fit::FitText;
 use closecall_report::traffic::lane_changes::{CriticalityText, LaneChangesText, ScoreText};
 use closecall_scenarios::atomic::WriteError;
-use closecall_scenarios::criticality::{Counted, Judgement, criticality as evaluate};
+use closecall_scenarios::criticality::{Counted, Judgement, by_severity, criticality as evaluate};
 use closecall_scenarios::filters::smooth;
 use closecall_scenarios::fit::{Heading, fit as fit_distributions, to_toml, write_toml};
 use closecall_scenarios::lane_change::{
-    Criterion, DetectionBasis, LaneChange, LaneChangeDetector, LaneReliability, TrackSpans, listed_for,
-    read_references, score,
+    Criterion, FoundLaneChanges, LaneReliability, find, listed_for, read_references, score,
 };
-use closecall_scenarios::trajectory_data::{Layout, open, read_with, refuse_duplicates};
+use closecall_scenarios::trajectory_data::{Layout, open, read_with};
 
 use super::CliError;
 use super::args::{Format, ReadArgs, positive};
-use super::output::{out, outln, print_error};
+use super::output::{command_line, out, outln, print_error, print_written};
 use super::protect::{of_trajectories, protect, recording as trajectory_path};
-use super::watch::record_lane_change;
+
 use crate::exit_code::ExitCode;
 
 /// The criterion by which lane changes are found.
@@ -89,7 +91,7 @@ pub(super) struct CriticalityArgs {
     /// Speed limit in m/s [default: 120 km/h]
     #[arg(long, value_name = "M/S", value_parser = positive)]
     speed_limit_mps: Option<f64>,
-    /// Count all lane changes in the shares, also those cut off, smaller than 2.5 m, or parts of double ones
+    /// Count all lane changes in the shares, also those cut off, smaller than 2.5 m, or overlapping
     #[arg(long)]
     all: bool,
     /// Count a TTCE below 2.6 s as critical by itself, and not only as the condition under which DCE is evaluated
@@ -150,19 +152,8 @@ pub(super) fn lane_changes(args: &LaneChangesArgs) -> Result<ExitCode, CliError>
         LanesChoice::Recorded => LaneReliability::Reliable,
         LanesChoice::None => LaneReliability::Unreliable,
     };
-    let detector = LaneChangeDetector::new(lanes, tracks.markings());
-    let mut basis = DetectionBasis::new(args.criterion.criterion(), lanes, tracks.markings());
-    let (mut changes, mut spans, mut count) = (Vec::new(), TrackSpans::new(), 0_u64);
-    // The tracks are read one by one, so that the memory does not grow with the file.
-    while let Some(track) = tracks.next_track()? {
-        count += 1;
-        basis.push(&track.trajectory, &track.markings);
-        changes.extend(detector.detect(args.criterion.criterion(), &track.trajectory, &track.markings));
-        if references.is_some() {
-            spans.extend(track.trajectory.span().map(|span| (track.trajectory.track_id, span)));
-        }
-    }
-    changes.sort_by(|a: &LaneChange, b| a.track_id.cmp(&b.track_id).then(a.crossing_s.total_cmp(&b.crossing_s)));
+    let FoundLaneChanges { lane_changes: changes, spans, tracks: count, basis } =
+        find(&mut tracks, args.criterion.criterion(), lanes)?;
     let scored = references.map(|listed| score(&changes, &listed.iter().collect::<Vec<_>>(), &spans));
     for warning in basis.warnings().into_iter().chain(tracks.unknown_classes().iter().map(ToString::to_string)) {
         print_error(format_args!("warning: {}: {warning}\n", args.file.display()));
@@ -196,7 +187,14 @@ pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> 
     let changes = evaluate(&smoothed, &judgement);
     let counted = if args.all { Counted::All } else { Counted::Complete };
     if let Some(path) = &args.record {
-        record_lane_change(path, &smoothed, &changes, args.track)?;
+        let chosen = by_severity(&changes, args.track);
+        let Some(chosen) = chosen.first() else {
+            let of_track = args.track.map_or(String::new(), |track| format!(" of track {track}"));
+            let message = format!("the trajectory file has no lane change{of_track} to record");
+            return Err(CliError::Usage { message });
+        };
+        write_recording(path, &[film_lane_change(&smoothed, chosen)?])?;
+        print_written(path);
     }
     match args.format {
         Format::Json => outln!("{:#}", stamped(serde_json::json!(changes), None, None)),
@@ -207,12 +205,9 @@ pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> 
 
 pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
     protect(&of_trajectories(&args.files), &[("--output", args.output.as_deref())])?;
-    let data_sets =
-        args.files.iter().map(|path| read_with(path, args.read.options())).collect::<Result<Vec<_>, _>>()?;
-    refuse_duplicates(&args.files, &data_sets).map_err(|message| CliError::Usage { message })?;
+    let data_sets = args.read.read_all(&args.files)?;
     let fitted = fit_distributions(&data_sets, args.seed);
-    let command = std::iter::once("closecall".to_owned()).chain(std::env::args().skip(1)).collect::<Vec<_>>().join(" ");
-    let heading = Heading { command, provenance: args.provenance.clone() };
+    let heading = Heading { command: command_line(), provenance: args.provenance.clone() };
     if let Some(path) = &args.output {
         write_toml(&fitted, &heading, path).map_err(|source| WriteError::new(path, source))?;
     }
@@ -220,12 +215,7 @@ pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
         (Format::Json, _) => outln!("{:#}", stamped(json::fitted(&fitted), None, None)),
         (Format::Human, None) => out!("{}", to_toml(&fitted, &heading)),
         (Format::Human, Some(path)) => {
-            for quantity in &fitted.fitted {
-                outln!("{:<24} n = {:>4}, median {:.3}", quantity.quantity.name(), quantity.n, quantity.median);
-            }
-            for (quantity, n) in &fitted.too_few {
-                outln!("{:<24} n = {n:>4}, too few to fit", quantity.name());
-            }
+            out!("{}", FitText(&fitted));
             outln!("written to {}", path.display());
         }
     }

@@ -1,15 +1,13 @@
 //! Runs a sample and writes what the command line requests: a recording (Rerun file), a trace (table).
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use closecall_campaign::runner::run_guarded;
-use closecall_report::run::film::{Film, FilmRecorder, Level, film_lane_change};
+use closecall_report::run::film::{Film, FilmRecorder, Level};
 use closecall_report::run::observers::RunObservers;
-use closecall_report::run::rerun::{check_recording_possible, write_recording, write_recording_unchecked};
+use closecall_report::run::rerun::{check_recording_possible, write_recording_unchecked};
 use closecall_report::run::trace::TraceWriter;
-use closecall_scenarios::criticality::{CriticalLaneChange, by_severity};
-use closecall_scenarios::filters::SmoothedTrajectoryData;
 use closecall_simulation::outcome::Outcome;
 use closecall_simulation::scenario::{Scenario, Setting};
 use closecall_simulation::{Arm, RunKey};
@@ -61,11 +59,6 @@ impl WatchArgs {
     pub(super) fn outputs(&self) -> [Output<'_>; 2] {
         [("--record", self.record.as_deref()), ("--trace", self.trace.as_deref())]
     }
-
-    /// Checks that the requested files can be written, before any work is done.
-    fn check(&self) -> Result<(), CliError> {
-        Ok(self.record.as_deref().map(check_recording_possible).transpose().map(drop)?)
-    }
 }
 
 /// Parses the path of a table, whose extension must be .csv or .parquet.
@@ -84,37 +77,13 @@ pub(super) fn run_watched(
     arms: &[Arm],
     (watch, settings): (&WatchArgs, &[Setting]),
 ) -> Result<Vec<Outcome>, CliError> {
-    watch.check()?;
-    check_backend_of(scenario, arms)?;
-    let mut trace = watch.trace.as_deref().map(TraceWriter::new).transpose()?;
-    let mut films = Vec::new();
-    let mut outcomes = Vec::new();
-    for (index, arm) in arms.iter().enumerate() {
-        let is_tested = index + 1 == arms.len();
-        let mut recorder =
-            watch.record.as_ref().map(|_| FilmRecorder::new(scenario, key, arm, watch.record_level.into()));
-        let mut observers = RunObservers { recorder: recorder.as_mut(), trace: trace.as_mut().filter(|_| is_tested) };
-        let outcome = run_guarded(scenario, key, arm, &mut observers)
-            .map_err(|source| CliError::Sample { sample: key.sample, source })?;
-        films.extend(recorder.map(|recorder| named(recorder.finish(&outcome), settings)));
-        outcomes.push(outcome);
-    }
+    let (outcomes, films) = run(scenario, key, arms, (watch, watch.record.is_some()))?;
     if let Some(path) = &watch.record {
-        write_recording_unchecked(path, &films)?;
-        print_written(path);
+        let named = |film: Film| film.with_settings(settings.iter().map(ToString::to_string));
+        write_recording_unchecked(path, &films.into_iter().map(named).collect::<Vec<_>>())?;
     }
-    if let Some(trace) = trace {
-        trace.finish()?;
-    }
-    if let Some(path) = &watch.trace {
-        print_written(path);
-    }
+    [&watch.record, &watch.trace].into_iter().flatten().for_each(|path| print_written(path));
     Ok(outcomes)
-}
-
-/// Returns a film that names the settings of the command line.
-fn named(film: Film, settings: &[Setting]) -> Film {
-    film.with_settings(settings.iter().map(ToString::to_string))
 }
 
 /// Runs a sample in one arm, writes the requested trace, and returns a film of the run. The caller saves the recording.
@@ -124,33 +93,30 @@ pub(super) fn run_filmed(
     arm: &Arm,
     watch: &WatchArgs,
 ) -> Result<(Outcome, Film), CliError> {
-    watch.check()?;
-    check_backend_of(scenario, std::slice::from_ref(arm))?;
-    let mut trace = watch.trace.as_deref().map(TraceWriter::new).transpose()?;
-    let mut recorder = FilmRecorder::new(scenario, key, arm, watch.record_level.into());
-    let mut observers = RunObservers { recorder: Some(&mut recorder), trace: trace.as_mut() };
-    let outcome = run_guarded(scenario, key, arm, &mut observers)
-        .map_err(|source| CliError::Sample { sample: key.sample, source })?;
-    if let Some(trace) = trace {
-        trace.finish()?;
-    }
-    let film = recorder.finish(&outcome);
-    Ok((outcome, film))
+    let (mut outcomes, mut films) = run(scenario, key, std::slice::from_ref(arm), (watch, true))?;
+    Ok((outcomes.swap_remove(0), films.swap_remove(0)))
 }
 
-/// Saves a recording of one lane change of a trajectory file: that of `track`, or the most critical one.
-pub(super) fn record_lane_change(
-    path: &Path,
-    recording: &SmoothedTrajectoryData,
-    changes: &[CriticalLaneChange],
-    track: Option<u64>,
-) -> Result<(), CliError> {
-    let wanted = by_severity(changes, track);
-    let Some(chosen) = wanted.first() else {
-        let of_track = track.map_or(String::new(), |track| format!(" of track {track}"));
-        return Err(CliError::Usage { message: format!("the trajectory file has no lane change{of_track} to record") });
-    };
-    write_recording(path, &[film_lane_change(recording, chosen)?])?;
-    print_written(path);
-    Ok(())
+/// Runs a sample in each arm, and writes the requested trace. Returns the films if there are to be any.
+fn run(
+    scenario: &Scenario,
+    key: RunKey,
+    arms: &[Arm],
+    (watch, is_filmed): (&WatchArgs, bool),
+) -> Result<(Vec<Outcome>, Vec<Film>), CliError> {
+    watch.record.as_deref().map(check_recording_possible).transpose()?;
+    check_backend_of(scenario, arms)?;
+    let mut trace = watch.trace.as_deref().map(TraceWriter::new).transpose()?;
+    let (mut films, mut outcomes) = (Vec::new(), Vec::new());
+    for (index, arm) in arms.iter().enumerate() {
+        let is_tested = index + 1 == arms.len();
+        let mut recorder = is_filmed.then(|| FilmRecorder::new(scenario, key, arm, watch.record_level.into()));
+        let mut observers = RunObservers { recorder: recorder.as_mut(), trace: trace.as_mut().filter(|_| is_tested) };
+        let outcome = run_guarded(scenario, key, arm, &mut observers)
+            .map_err(|source| CliError::Sample { sample: key.sample, source })?;
+        films.extend(recorder.map(|recorder| recorder.finish(&outcome)));
+        outcomes.push(outcome);
+    }
+    trace.map(TraceWriter::finish).transpose()?;
+    Ok((outcomes, films))
 }

@@ -13,6 +13,7 @@
 //! * [`mcnemar`]: whether two arms differ on the same samples
 //! * [`holm`]: p-values corrected for the number of tests
 //! * [`quantiles`]: quantiles of sorted values, and the distribution that they define
+//! * [`two_sample`]: whether new values come from a fitted distribution
 //! * [`normal`]: the truncated normal distribution
 //! * [`sensitivity`]: which input of a function moves its output most
 //!
@@ -28,6 +29,7 @@ pub mod normal;
 pub mod quantiles;
 pub mod sensitivity;
 pub mod sequence;
+pub mod two_sample;
 
 #[cfg(test)]
 mod tests;

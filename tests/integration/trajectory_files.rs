@@ -156,7 +156,7 @@ fn statistics_count_lane_changes_by_class_and_draw_box_plots() {
     assert_eq!(counted, changes.as_array().unwrap().len() as u64);
     assert!(classes.iter().any(|class| class["duration_s"]["n"].as_u64() > Some(5)));
     assert_eq!(found["correlations"].as_array().unwrap().len(), 15);
-    for name in ["duration.svg", "speed.svg"] {
+    for name in ["duration.svg", "width.svg", "speed.svg"] {
         assert!(fs::read_to_string(plots.join(name)).unwrap().contains("car (n = "));
     }
 }

@@ -76,11 +76,14 @@ pub(crate) const fn arm_colour(is_tested: bool) -> RGBColor {
 /// Returns the colour of a series, from a set that colour-blind readers can tell apart: M. Okabe and K. Ito, Color
 /// Universal Design (2008).
 pub(crate) const fn series_colour(index: usize) -> RGBColor {
-    match index % 4 {
+    match index % 7 {
         0 => RGBColor(0, 114, 178),
         1 => RGBColor(213, 94, 0),
         2 => RGBColor(0, 158, 115),
-        _ => RGBColor(204, 121, 167),
+        3 => RGBColor(204, 121, 167),
+        4 => RGBColor(230, 159, 0),
+        5 => RGBColor(86, 180, 233),
+        _ => BLACK,
     }
 }
 

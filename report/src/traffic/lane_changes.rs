@@ -22,10 +22,11 @@ impl fmt::Display for LaneChangesText<'_> {
             writeln!(f, "{}", line(change))?;
         }
         let complete = changes.iter().filter(|change| change.complete).count();
+        let overlapping = changes.iter().filter(|change| change.overlapping).count();
         let double = changes.iter().filter(|change| change.double).count();
         writeln!(
             f,
-            "{} lane changes, {complete} of them complete, {double} of them parts of double ones",
+            "{} lane changes, {complete} of them complete, {overlapping} overlapping, {double} of them parts of double ones",
             changes.len()
         )?;
         Ok(())
@@ -108,10 +109,11 @@ fn line(change: &LaneChange) -> String {
         Side::Left => "left",
         Side::Right => "right",
     };
-    let mark = match (change.complete, change.double) {
-        (true, _) => "complete",
-        (false, true) => "double",
-        (false, false) => "",
+    let mark = match (change.complete, change.double, change.overlapping) {
+        (true, ..) => "complete",
+        (false, true, _) => "double",
+        (false, false, true) => "overlapping",
+        (false, false, false) => "",
     };
     format!(
         "{:>5}  {:<10}  {direction:<9}  {} to {}  {:>7.2} s {:>7.2} s {:>7.2} s {:>7.2} s {:>7.2} s  {:>4.1} m/s  {mark}",

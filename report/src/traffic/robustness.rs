@@ -130,7 +130,7 @@ fn chart(found: &Robustness, axis: &Axis<'_>) -> LineChart {
         x_name: axis.name.to_owned(),
         y_name: "lane changes".to_owned(),
         lines: lines.collect(),
-        level: ("reference".to_owned(), found.reference as f64),
+        level: Some(("reference".to_owned(), found.reference as f64)),
         legend: Legend::LowerLeft,
     }
 }

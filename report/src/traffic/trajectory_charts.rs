@@ -11,6 +11,10 @@ use crate::charts::style::{Canvas, ChartAxis, Drawn, FILE_PX, axes, legend_text,
 const FAINT_OPACITY: f64 = 0.35;
 /// Length of a line in the legend (px).
 const LEGEND_LINE_PX: i32 = 18;
+/// Width of the area for a legend beside the lines, as a share of the width of the lines (-).
+const LEGEND_SHARE: f64 = 0.2;
+/// Largest number of points of a line that are drawn as dots.
+const MAX_DOTS: usize = 50;
 /// Largest number of labels on an axis of numbers.
 const LABELS: usize = 10;
 
@@ -44,6 +48,8 @@ pub enum Legend {
     LowerLeft,
     /// At the bottom, in the middle.
     LowerMiddle,
+    /// On the right, beside the lines.
+    Right,
 }
 
 /// Lines over a common axis.
@@ -58,7 +64,7 @@ pub struct LineChart {
     /// The lines.
     pub lines: Vec<Line>,
     /// The name and the value of a reference level, which is drawn as a dashed line.
-    pub level: (String, f64),
+    pub level: Option<(String, f64)>,
     /// The position of the legend.
     pub legend: Legend,
 }
@@ -94,29 +100,37 @@ impl LineChart {
         file(&self.title, |canvas| self.draw(canvas))
     }
 
-    fn draw(&self, canvas: &Canvas<'_>) -> Drawn {
+    pub(super) fn draw(&self, canvas: &Canvas<'_>) -> Drawn {
         let points = || self.lines.iter().flat_map(|line| line.points.iter().copied());
-        let x = number_axis(&self.x_name, range(points().map(|point| point.0), None));
-        let y = number_axis(&self.y_name, range(points().map(|point| point.1).chain([self.level.1]), Some(0.0)));
+        let mut x = number_axis(&self.x_name, range(points().map(|point| point.0), None));
+        let level = self.level.iter().map(|level| level.1);
+        let y = number_axis(&self.y_name, range(points().map(|point| point.1).chain(level), Some(0.0)));
         let ends = [x.range.start, x.range.end];
+        if self.legend == Legend::Right {
+            x.range.end += LEGEND_SHARE * (x.range.end - x.range.start);
+        }
         let mut plot = axes(canvas, Some(&self.title), &x, &y)?;
         let legend_line =
             |style: ShapeStyle| move |(x, y): (i32, i32)| PathElement::new([(x, y), (x + LEGEND_LINE_PX, y)], style);
-        let level = ends.map(|x| (x, self.level.1));
-        plot.draw_series(DashedLineSeries::new(level, 4, 4, BLACK.stroke_width(1)))?
-            .label(&self.level.0)
-            .legend(legend_line(BLACK.stroke_width(1)));
+        if let Some((name, level)) = &self.level {
+            let line = ends.map(|x| (x, *level));
+            plot.draw_series(DashedLineSeries::new(line, 4, 4, BLACK.stroke_width(1)))?
+                .label(name)
+                .legend(legend_line(BLACK.stroke_width(1)));
+        }
         for line in &self.lines {
             let opacity = if line.faint { FAINT_OPACITY } else { 1.0 };
             let style = series_colour(line.colour).mix(opacity).stroke_width(2);
             let points = line.points.iter().copied().filter(|(x, y)| x.is_finite() && y.is_finite());
-            plot.draw_series(LineSeries::new(points, style).point_size(3))?
+            let dots_px = if line.points.len() > MAX_DOTS { 0 } else { 3 };
+            plot.draw_series(LineSeries::new(points, style).point_size(dots_px))?
                 .label(&line.name)
                 .legend(legend_line(style));
         }
         let position = match self.legend {
             Legend::LowerLeft => SeriesLabelPosition::LowerLeft,
             Legend::LowerMiddle => SeriesLabelPosition::LowerMiddle,
+            Legend::Right => SeriesLabelPosition::UpperRight,
         };
         plot.configure_series_labels()
             .position(position)
@@ -185,20 +199,20 @@ fn elements<'a>(index: usize, one: &BoxSummary) -> Vec<DynElement<'static, SVGBa
     ]
 }
 
-fn number_axis(name: &str, range: Range<f64>) -> ChartAxis<'_> {
+pub(super) fn number_axis(name: &str, range: Range<f64>) -> ChartAxis<'_> {
     let text = Box::new(number_text(range.start, range.end));
     ChartAxis { name, range, labels: LABELS, text, has_grid: true }
 }
 
 /// Returns the SVG of a chart on a white background.
-fn file(title: &str, draw: impl FnOnce(&Canvas<'_>) -> Drawn) -> Result<String, ChartError> {
+pub(super) fn file(title: &str, draw: impl FnOnce(&Canvas<'_>) -> Drawn) -> Result<String, ChartError> {
     let drawn = svg(FILE_PX, |canvas| canvas.fill(&WHITE).and_then(|()| draw(canvas)));
     drawn.map_err(|error| ChartError { title: title.to_owned(), message: error.to_string() })
 }
 
 /// Returns the range from the smallest to the largest finite value, with a margin. The range includes `from` if there is
 /// one, and is never empty.
-fn range(values: impl Iterator<Item = f64>, from: Option<f64>) -> Range<f64> {
+pub(super) fn range(values: impl Iterator<Item = f64>, from: Option<f64>) -> Range<f64> {
     const MARGIN: f64 = 0.06;
     let finite = values.filter(|value| value.is_finite()).chain(from);
     let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
@@ -227,7 +241,7 @@ mod tests {
             x_name: "level".to_owned(),
             y_name: "count".to_owned(),
             lines: vec![line("peak", 0, false), line("distance", 1, true)],
-            level: ("reference".to_owned(), 3.0),
+            level: Some(("reference".to_owned(), 3.0)),
             legend: Legend::LowerLeft,
         };
         let svg = chart.svg().unwrap();

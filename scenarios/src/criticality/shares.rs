@@ -8,7 +8,7 @@ use super::CriticalLaneChange;
 /// The lane changes that are counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Counted {
-    /// Those that were recorded as a whole, shift the vehicle by at least 2.5 m, and are not part of a double one.
+    /// Those that were recorded as a whole, shift the vehicle by at least 2.5 m, and overlap with no other one.
     #[default]
     Complete,
     /// All.

@@ -1,7 +1,7 @@
 //! Statistics of lane changes: durations, speeds, and correlations with the criticality metrics.
 //!
 //! Durations, speeds and correlations use *complete* lane changes only ([`crate::lane_change`]). The counts include all
-//! lane changes; double ones are also counted separately.
+//! lane changes; overlapping and double ones are also counted separately.
 //!
 //! - **Box plots**: quartiles by linear interpolation ([`quantile`]). Whiskers reach to the furthest values within 1.5 interquartile ranges of the box (Tukey); values
 //!   beyond are outliers.
@@ -63,10 +63,14 @@ pub struct ClassStatistics {
     pub to_the_left: usize,
     /// Number of complete lane changes.
     pub complete: usize,
+    /// Number of lane changes that overlap with another one.
+    pub overlapping: usize,
     /// Number of lane changes that are part of a double one.
     pub double: usize,
     /// Durations of the complete lane changes (s).
     pub duration_s: Option<BoxPlot>,
+    /// Widths of the peaks of lateral speed of the complete lane changes (s).
+    pub width_s: Option<BoxPlot>,
     /// Speeds of the complete lane changes when the centre crosses the marking (m/s).
     pub speed_mps: Option<BoxPlot>,
 }
@@ -113,8 +117,10 @@ fn class_statistics(changes: &[CriticalLaneChange], vehicle_class: VehicleClass)
         lane_changes: all.len(),
         to_the_left: all.iter().filter(|change| change.direction == Side::Left).count(),
         complete: complete.len(),
+        overlapping: all.iter().filter(|change| change.overlapping).count(),
         double: all.iter().filter(|change| change.double).count(),
         duration_s: BoxPlot::of(complete.iter().map(|change| change.duration_s).collect()),
+        width_s: BoxPlot::of(complete.iter().map(|change| change.width_s).collect()),
         speed_mps: BoxPlot::of(complete.iter().map(|change| change.speed_mps).collect()),
     })
 }

@@ -23,12 +23,14 @@
 //! lanes have the typical width of the trajectory data. The marking that the rear vehicle crosses keeps its recorded
 //! lateral position.
 
+mod choose;
 mod find;
 mod frame;
 mod recorded;
 #[cfg(test)]
 mod tests;
 
+pub use choose::{ChoiceError, choose};
 pub use find::encounter;
 pub use recorded::{
     EGO_INDEX, LEAD_IN, LEAD_INDEX, LEAD_OUT, LONGEST_THW_S, NoEncounter, Participant, REACH_M, REAR_INDEX,

@@ -171,6 +171,14 @@ fn moments(values: impl Iterator<Item = f64> + Clone) -> Option<(f64, f64)> {
 }
 
 impl Form {
+    /// Returns the name of the form, as in scenario files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::LogNormal { .. } => "log-normal",
+            Self::TruncatedNormal { .. } => "truncated-normal",
+        }
+    }
+
     fn family(self) -> Family {
         match self {
             Self::LogNormal { .. } => Family::LogNormal,

@@ -37,8 +37,10 @@ pub struct LaneChange {
     pub peak_lateral_speed_mps: f64,
     /// Lateral shift from start to end, as far as recorded, positive in the direction of the lane change (m).
     pub lateral_shift_m: f64,
-    /// True if the lane change is part of a double one; see the module documentation.
+    /// True if another lane change of the vehicle in the same direction overlaps with it in time.
+    pub overlapping: bool,
+    /// True if the lane change is part of a double one: from one outer lane of the road to the other in one go.
     pub double: bool,
-    /// True if the whole manoeuvre was recorded, shifts the vehicle by at least 2.5 m, and is not part of a double one.
+    /// True if the whole manoeuvre was recorded, shifts the vehicle by at least 2.5 m, and overlaps with no other one.
     pub complete: bool,
 }

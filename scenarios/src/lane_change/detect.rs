@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::LaneChange;
 use super::crossings::{Crossing, crossings};
 use super::distance::by_distance;
-use super::double::mark_doubles;
+use super::double::{RoadLanes, mark_doubles};
 use super::geometry::LaneGrid;
 use super::gradient;
 use super::manoeuvre::{MIN_SHIFT_M, Manoeuvre, Sampled, height_share, manoeuvres, quintic_width_share, sweeps};
@@ -57,6 +57,7 @@ pub enum LaneReliability {
 pub struct LaneChangeDetector {
     lanes: LaneReliability,
     grid: LaneGrid,
+    road: RoadLanes,
     lane_width_m: f64,
 }
 
@@ -78,7 +79,8 @@ pub fn detect(data: &SmoothedTrajectoryData) -> Vec<LaneChange> {
 impl LaneChangeDetector {
     /// Creates a detector for tracks on the road with these `markings`.
     pub fn new(lanes: LaneReliability, markings: &LaneMarkings) -> Self {
-        Self { lanes, grid: LaneGrid::new(markings), lane_width_m: markings.typical_lane_width_m() }
+        let (grid, road) = (LaneGrid::new(markings), RoadLanes::new(markings));
+        Self { lanes, grid, road, lane_width_m: markings.typical_lane_width_m() }
     }
 
     /// Detects the lane changes of a track by one criterion, in order of time.
@@ -114,7 +116,7 @@ impl LaneChangeDetector {
 
     fn by_recorded_lane(&self, track: &SmoothedTrack) -> Vec<LaneChange> {
         let mut found = by_crossings(&track.trajectory, &crossings(&track.stays), self.lane_width_m);
-        mark_doubles(&mut found);
+        mark_doubles(&mut found, &self.road);
         found
     }
 
@@ -134,7 +136,7 @@ impl LaneChangeDetector {
             }
             (Criterion::Gradient, _) => by_crossings(track, &gradient::jumps(recorded, distances), width_m()),
         };
-        mark_doubles(&mut found);
+        mark_doubles(&mut found, &self.road);
         found
     }
 }
@@ -220,6 +222,7 @@ fn lane_change(sampled: &Sampled<'_>, manoeuvre: &Manoeuvre, height_share: f64, 
         speed_mps: sampled.point(sampled.sample(crossing.time).round()).speed_mps,
         peak_lateral_speed_mps: manoeuvre.peak_mps,
         lateral_shift_m,
+        overlapping: false,
         double: false,
         complete: is_recorded && lateral_shift_m >= MIN_SHIFT_M,
     }
@@ -245,9 +248,7 @@ mod tests {
     #[test]
     fn a_swerve_within_the_lane_is_no_lane_change() {
         let mut track = straight_track(1, 0.0, 25.0, -1.75, 200);
-        for (k, point) in track.points.iter_mut().enumerate() {
-            point.d_m += (0.1 * k as f64).sin();
-        }
+        track.points.iter_mut().enumerate().for_each(|(k, point)| point.d_m += (0.1 * k as f64).sin());
         assert!(found(track).is_empty());
     }
 
@@ -321,10 +322,19 @@ mod tests {
     #[test]
     fn only_overlapping_lane_changes_are_double() {
         let double = |pause_s| -> Vec<_> {
-            two_to_the_left(pause_s).iter().map(|change| (change.double, change.complete)).collect()
+            two_to_the_left(pause_s).iter().map(|change| (change.overlapping, change.double, change.complete)).collect()
         };
-        assert_eq!(double(3.5), [(true, false); 2]);
-        assert_eq!(double(7.0), [(false, true); 2]);
+        assert_eq!(double(3.5), [(true, true, false); 2]);
+        assert_eq!(double(7.0), [(false, false, true); 2]);
+    }
+
+    #[test]
+    fn overlapping_lane_changes_that_end_in_an_inner_lane_are_not_double() {
+        let track = |id, lanes, seconds| changing_track(id, (0.0, 30.0), lanes, (4.0, seconds), 180);
+        let tracks = trajectory_data_of(vec![track(1, (-8.75, -1.75), 9.0), track(2, (-12.25, -8.75), 6.0)]);
+        let found = detect(&smooth(&tracks)).into_iter();
+        let flags = found.map(|change| (change.track_id, change.overlapping, change.double));
+        assert_eq!(flags.collect::<Vec<_>>(), [(1, true, false), (1, true, false), (2, false, false)]);
     }
 
     #[test]

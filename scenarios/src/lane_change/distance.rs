@@ -119,6 +119,7 @@ fn lane_change(sampled: &Sampled<'_>, direction: Side, samples: &Samples) -> Lan
         speed_mps: track.points[crossing].speed_mps,
         peak_lateral_speed_mps: speeds.fold(f64::NEG_INFINITY, f64::max),
         lateral_shift_m,
+        overlapping: false,
         double: false,
         complete: settled[0] >= 0.0 && settled[1] <= sampled.last() && lateral_shift_m >= MIN_SHIFT_M,
     }

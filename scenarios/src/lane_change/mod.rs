@@ -68,10 +68,12 @@
 //!
 //! # Flags
 //!
-//! - *complete*: start and end were recorded, the shift is at least 2.5 m, and the lane change is not part of a double
-//!   one. Only complete lane changes enter statistics of durations.
-//! - *double*: another lane change of the same vehicle in the same direction begins before this one ends, or one peak
-//!   carries the vehicle over two markings. Both lane changes are listed.
+//! - *complete*: start and end were recorded, the shift is at least 2.5 m, and the lane change does not overlap with
+//!   another one. Only complete lane changes enter statistics of durations.
+//! - *overlapping*: another lane change of the same vehicle in the same direction begins before this one ends, or one
+//!   peak carries the vehicle over two markings. Both lane changes are listed, but neither has a duration of its own.
+//! - *double*: overlapping lane changes that lead from one outer lane of the road to the other in one go. The outer
+//!   lanes are those that the markings show. A road of two lanes has no double lane changes.
 
 mod basis;
 mod change;
@@ -79,6 +81,7 @@ mod crossings;
 mod detect;
 mod distance;
 mod double;
+mod find;
 mod geometry;
 mod gradient;
 mod manoeuvre;
@@ -88,6 +91,7 @@ mod score;
 pub use basis::DetectionBasis;
 pub use change::LaneChange;
 pub use detect::{Criterion, LaneChangeDetector, LaneReliability, detect};
+pub use find::{FoundLaneChanges, find};
 pub use manoeuvre::{MIN_PROMINENCE_MPS, MIN_SHIFT_M, quintic_width_share};
 pub use peaks::{Peak, Width, find_peaks, peak_width};
 pub use score::{HitRate, ReferenceChange, ReferenceError, Score, TrackSpans, listed_for, read_references, score};

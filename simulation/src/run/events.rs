@@ -1,9 +1,10 @@
-//! The scenario's events in a run: when they are triggered, and which acceleration they then request.
+//! The scenario's events in a run: when they are triggered, and which acceleration or lane change they then request.
 
-use closecall_traffic::Time;
+use closecall_controllers::LaneChange;
 use closecall_traffic::metrics::time_headway_s;
+use closecall_traffic::{Road, Time};
 
-use crate::scenario::{Brake, Event, Scenario, Trigger};
+use crate::scenario::{Brake, Effect, Event, Scenario, Trigger};
 use crate::world::World;
 
 /// One event and whether it has been triggered.
@@ -55,13 +56,28 @@ impl Events {
     }
 
     /// Returns the acceleration that the triggered events of `actor` request (m/s²): the strongest braking among them.
-    /// Returns `None` if no event of `actor` has been triggered.
+    /// Returns `None` if no such event of `actor` has been triggered.
     pub(super) fn requested_mps2(&self, actor: usize, world: &World) -> Option<f64> {
         self.states
             .iter()
             .filter(|state| state.actor == actor && state.triggered_at.is_some())
-            .map(|state| braking_mps2(&state.event.then, world.state(actor).speed_mps))
+            .filter_map(|state| match &state.event.then {
+                Effect::Brake(brake) => Some(braking_mps2(brake, world.state(actor).speed_mps)),
+                Effect::LaneChange { .. } => None,
+            })
             .min_by(f64::total_cmp)
+    }
+
+    /// Returns the lane change that an event of `actor` requests now. Returns `None` if there is none, or no such lane.
+    pub(super) fn lane_change(&self, actor: usize, world: &World, road: &Road) -> Option<LaneChange> {
+        let is_now = |state: &&EventState| state.actor == actor && state.triggered_at == Some(world.time());
+        self.states.iter().filter(is_now).find_map(|state| match state.event.then {
+            Effect::Brake(_) => None,
+            Effect::LaneChange { to, duration_s } => {
+                let target = road.beside(road.lane_at(world.state(actor).d_m), to)?;
+                Some(LaneChange { target, duration_s })
+            }
+        })
     }
 }
 

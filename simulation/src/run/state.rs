@@ -317,7 +317,7 @@ impl<'a> Run<'a> {
                     .events
                     .requested_mps2(actor, &self.world)
                     .map_or(action.acceleration_mps2, |event_mps2| event_mps2.min(action.acceleration_mps2)),
-                lane_change: action.lane_change,
+                lane_change: action.lane_change.or(self.events.lane_change(actor, &self.world, &self.scenario.road)),
                 indicator: action.indicator,
             };
         }

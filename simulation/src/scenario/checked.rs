@@ -186,8 +186,14 @@ impl ScenarioConfig {
             check_weaving(lane_keeping, states[index].speed_mps, friction).map_err(|error| at(index, error))?;
             let mut events = Vec::with_capacity(actor.events.len());
             for (event_index, event) in actor.events.iter().enumerate() {
-                let event = event.check(&start, parameters);
-                events.push(event.map_err(|error| at(index, error.within_index(event_index).within("event")))?);
+                let locate = |error: ConfigError| at(index, error.within_index(event_index).within("event"));
+                let event = event.check(&start, parameters).map_err(locate)?;
+                let lane = road.lane_at(states[index].d_m);
+                event
+                    .then
+                    .check_lane_change((&actor.driver, lane), road.lanes())
+                    .map_err(|error| locate(error.within("then")))?;
+                events.push(event);
             }
             checked.push(Actor {
                 id: actor.id.clone(),

@@ -1,7 +1,10 @@
 //! Events that act on a vehicle during a run: a trigger, and its effect.
 
+use closecall_controllers::DriverConfig;
 use closecall_traffic::metrics::bumper_gap_m;
-use closecall_traffic::{ActorId, ConfigError, ENGAGEMENT_GAP_M, Num, Parameters, Range, Time, Vehicle, VehicleState};
+use closecall_traffic::{
+    ActorId, ConfigError, ENGAGEMENT_GAP_M, Lane, Num, Parameters, Problem, Range, Side, Time, Vehicle, VehicleState,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -76,6 +79,8 @@ pub struct CutOutStartedConfig {
 pub enum EffectConfig {
     /// Braking at a constant deceleration to a final speed, which is then kept.
     Brake(BrakeConfig),
+    /// A change to an adjacent lane, for a driver who does not change lanes by itself.
+    LaneChange(LaneChangeConfig),
 }
 
 /// Braking at a constant deceleration.
@@ -88,12 +93,29 @@ pub struct BrakeConfig {
     pub to_speed_mps: Option<Num>,
 }
 
+/// A change to an adjacent lane.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct LaneChangeConfig {
+    /// Side of the target lane.
+    pub to: Side,
+    /// Duration of the whole lane change at the speed at which it begins (s): 1.5 to 20.
+    pub duration_s: Num,
+}
+
 /// A checked event.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Event {
     pub(crate) id: ActorId,
     pub(crate) when: Trigger,
-    pub(crate) then: Brake,
+    pub(crate) then: Effect,
+}
+
+/// A checked effect.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Effect {
+    Brake(Brake),
+    LaneChange { to: Side, duration_s: f64 },
 }
 
 /// A checked trigger. Actors are indices into the list of actors.
@@ -187,15 +209,61 @@ fn nominal_time(
 }
 
 impl EffectConfig {
-    fn check(&self, parameters: &Parameters) -> Result<Brake, ConfigError> {
-        let Self::Brake(config) = self;
-        let number = |num, key, range| parameters.number(num, key, range).map_err(|error| error.within("brake"));
-        Ok(Brake {
-            deceleration_mps2: number(&config.deceleration_mps2, "deceleration-mps2", Range::above(0.0, 12.0))?,
-            to_speed_mps: match &config.to_speed_mps {
-                Some(speed) => number(speed, "to-speed-mps", Range::closed(0.0, 80.0))?,
-                None => 0.0,
-            },
-        })
+    fn check(&self, parameters: &Parameters) -> Result<Effect, ConfigError> {
+        match self {
+            Self::Brake(config) => config.check(parameters).map_err(|error| error.within("brake")),
+            Self::LaneChange(config) => {
+                let duration_s = parameters.number(&config.duration_s, "duration-s", Range::closed(1.5, 20.0));
+                let duration_s = duration_s.map_err(|error| error.within("lane-change"))?;
+                Ok(Effect::LaneChange { to: config.to, duration_s })
+            }
+        }
+    }
+}
+
+impl BrakeConfig {
+    fn check(&self, parameters: &Parameters) -> Result<Effect, ConfigError> {
+        let deceleration_mps2 =
+            parameters.number(&self.deceleration_mps2, "deceleration-mps2", Range::above(0.0, 12.0))?;
+        let to_speed_mps =
+            parameters.number_or(self.to_speed_mps.as_ref(), "to-speed-mps", Range::closed(0.0, 80.0), 0.0)?;
+        Ok(Effect::Brake(Brake { deceleration_mps2, to_speed_mps }))
+    }
+}
+
+impl Effect {
+    /// Returns the same effect with left and right exchanged.
+    #[must_use]
+    pub(crate) fn mirrored(self) -> Self {
+        match self {
+            Self::Brake(_) => self,
+            Self::LaneChange { to, duration_s } => Self::LaneChange { to: to.opposite(), duration_s },
+        }
+    }
+
+    /// Checks that an actor with this driver, which starts in lane `start` of `lanes`, can change lanes.
+    pub(super) fn check_lane_change(
+        self,
+        (driver, start): (&DriverConfig, Lane),
+        lanes: u8,
+    ) -> Result<(), ConfigError> {
+        let Self::LaneChange { to, .. } = self else { return Ok(()) };
+        let refuse = |other, rule: String| Err(ConfigError::new("lane-change", Problem::Contradiction { other, rule }));
+        if !matches!(driver, DriverConfig::Wiedemann99(_) | DriverConfig::Idm(_)) {
+            return refuse(
+                "driver",
+                "only a driver that follows and stays in its lane, `wiedemann99` or `idm`, changes lanes by an event"
+                    .to_owned(),
+            );
+        }
+        let exists = match to {
+            Side::Left => start.0 > 1,
+            Side::Right => start.0 < lanes,
+        };
+        if exists {
+            return Ok(());
+        }
+        let rule = format!("lane {} of {lanes} has no lane on that side, counted from 1 at the left", start.0);
+        refuse("start", rule)
     }
 }

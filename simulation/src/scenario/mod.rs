@@ -18,20 +18,26 @@ mod locate;
 pub mod member;
 mod placement;
 mod recorded;
+mod recorded_values;
 mod reenacted;
+mod sampled;
 mod schema;
 pub mod source;
+mod step_value;
 mod traffic;
 mod variation;
 
 pub use checked::{Actor, Scenario};
 pub use config::{AbsoluteStartConfig, ActorConfig, RelativeStartConfig, SCHEMA_VERSION, ScenarioConfig, StartConfig};
 pub use edit::{Setting, SettingError};
-pub(crate) use events::{Brake, Event, Trigger};
+pub(crate) use events::{Brake, Effect, Event, Trigger};
 pub use events::{
-    BrakeConfig, CutOutStartedConfig, EffectConfig, EventConfig, NominalEncounterConfig, ThwBelowConfig, TriggerConfig,
+    BrakeConfig, CutOutStartedConfig, EffectConfig, EventConfig, LaneChangeConfig, NominalEncounterConfig,
+    ThwBelowConfig, TriggerConfig,
 };
 pub use file::{ScenarioError, ScenarioFile};
 pub use reenacted::{RearDriver, actor_name, reenact};
+pub use sampled::{SampledEncounter, opp2_of, sampled};
 pub use schema::strict_schema;
+pub use step_value::{StepValue, Variation};
 pub use traffic::{ClassWeightsConfig, TrafficConfig};

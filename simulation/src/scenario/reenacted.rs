@@ -27,11 +27,12 @@ use closecall_scenarios::encounter::{EGO_INDEX, LEAD_INDEX, Participant, REAR_IN
 use closecall_scenarios::filters::PERIOD;
 use closecall_traffic::metrics::{time_headway_s, touching_distance_m};
 use closecall_traffic::{ActorId, Choice, Num, RoadConfig, Time, Trajectory, TrajectoryPoint, VehicleConfig};
-use toml_edit::{ArrayOfTables, DocumentMut, Item};
+use toml_edit::{Array, ArrayOfTables, DocumentMut, Item};
 
 use crate::criteria::GateConfig;
 
 use super::config::{AbsoluteStartConfig, ActorConfig, EXPECTS_SHARE, SCHEMA_VERSION, ScenarioConfig, StartConfig};
+use super::recorded_values::{MIN_SPEED_MPS, ROUNDING_STEP, max_speed_mps, rounded, to_steps};
 use super::{ScenarioError, ScenarioFile, Setting};
 
 /// The driver of the rear vehicle.
@@ -48,24 +49,20 @@ pub enum RearDriver {
 const NAMES: [&str; 3] = ["ego", "front", "rear"];
 /// The human drivers' reaction time (s): the mean for unexpected but common events, such as the brake lights of the vehicle
 /// ahead (Green, Transportation Human Factors 2 (2000) 195–216).
-const REACTION_S: f64 = 1.25;
+pub(super) const REACTION_S: f64 = 1.25;
 /// Gap at standstill of Wiedemann's model (m): its published default.
 const STANDSTILL_GAP_M: f64 = 1.5;
 /// Ratio of the rear driver's following headway to its smallest recorded headway. It is below 1, so that the driver reaches
 /// the headway at which it cuts out.
-const FOLLOWING_SHARE: f64 = 0.9;
+pub(super) const FOLLOWING_SHARE: f64 = 0.9;
 /// Smallest and largest time gap of the adaptive cruise control (s).
 const MIN_TIME_GAP_S: f64 = 0.2;
 const MAX_TIME_GAP_S: f64 = 5.0;
 /// Smallest and largest duration of a lane change (s).
-const MIN_LANE_CHANGE_S: f64 = 1.5;
-const MAX_LANE_CHANGE_S: f64 = 20.0;
-/// Lower limit of recorded speeds, if a speed is used as a divisor, a desired speed or a speed limit (m/s).
-const MIN_SPEED_MPS: f64 = 1.0;
+pub(super) const MIN_LANE_CHANGE_S: f64 = 1.5;
+pub(super) const MAX_LANE_CHANGE_S: f64 = 20.0;
 /// Smallest gap between two vehicles that start in the same lane (m).
 const MIN_START_GAP_M: f64 = 0.5;
-/// Number of rounding steps per unit of a value in the file.
-const STEPS_PER_UNIT: f64 = 1_000.0;
 
 /// Returns the name of a vehicle as an actor: `ego`, `front`, `rear`, or its track. `index` is its index in the encounter's
 /// list of vehicles.
@@ -83,7 +80,15 @@ pub fn reenact(
     rear: RearDriver,
     (source, settings): (&Path, &[Setting]),
 ) -> Result<ScenarioFile, ScenarioError> {
-    let text = scenario_text(encounter, rear);
+    written(config(encounter, rear), (source, settings))
+}
+
+/// Returns the scenario file with these contents and the settings applied, and checks it.
+pub(super) fn written(
+    config: Result<ScenarioConfig, String>,
+    (source, settings): (&Path, &[Setting]),
+) -> Result<ScenarioFile, ScenarioError> {
+    let text = config.and_then(|config| scenario_text(&config));
     let text = text.map_err(|message| ScenarioError::Syntax { path: source.to_owned(), line: 1, message })?;
     let file = ScenarioFile::parse(source, &text, settings)?;
     file.check()?;
@@ -91,21 +96,23 @@ pub fn reenact(
 }
 
 /// Returns the text of the scenario file. Keys with their default values are left out.
-fn scenario_text(encounter: &RecordedEncounter, rear: RearDriver) -> Result<String, String> {
-    let written = toml::to_string(&config(encounter, rear)?).map_err(|error| error.to_string())?;
+fn scenario_text(config: &ScenarioConfig) -> Result<String, String> {
+    let written = toml::to_string(config).map_err(|error| error.to_string())?;
     let mut document: DocumentMut = written.parse().map_err(|error: toml_edit::TomlError| error.to_string())?;
     for default_key in ["requirements", "environment", "parameters", "sensors"] {
         document.remove(default_key);
     }
     let actors = document.get_mut("actor").and_then(Item::as_array_of_tables_mut);
-    actors.into_iter().flat_map(ArrayOfTables::iter_mut).for_each(|actor| {
-        actor.remove("event");
-    });
+    for actor in actors.into_iter().flat_map(ArrayOfTables::iter_mut) {
+        if actor.get("event").and_then(Item::as_array).is_some_and(Array::is_empty) {
+            actor.remove("event");
+        }
+    }
     Ok(document.to_string())
 }
 
 /// Returns the contents of the scenario file.
-fn config(encounter: &RecordedEncounter, rear: RearDriver) -> Result<ScenarioConfig, String> {
+pub(super) fn config(encounter: &RecordedEncounter, rear: RearDriver) -> Result<ScenarioConfig, String> {
     let [ego, _, rear_track] = encounter.ego_lead_rear();
     let mut actors = Vec::new();
     for (index, vehicle) in encounter.vehicles.iter().enumerate() {
@@ -157,7 +164,7 @@ fn config(encounter: &RecordedEncounter, rear: RearDriver) -> Result<ScenarioCon
 }
 
 /// Returns an actor with the recorded size and start of a vehicle.
-fn actor(
+pub(super) fn actor(
     name: &str,
     vehicle: &Participant,
     start: &TrajectoryPoint,
@@ -190,12 +197,12 @@ fn actor(
 }
 
 /// Returns the point of a vehicle at the start of the encounter, or `None` if the vehicle appears later.
-fn start_of(vehicle: &Trajectory) -> Option<&TrajectoryPoint> {
+pub(super) fn start_of(vehicle: &Trajectory) -> Option<&TrajectoryPoint> {
     vehicle.points.first().filter(|point| point.time == Time::ZERO)
 }
 
 /// Returns whether a vehicle that starts at `start` keeps a gap to `other`, if both start in the same lane.
-fn is_clear(other: &Trajectory, start: &TrajectoryPoint, vehicle: &Participant) -> bool {
+pub(super) fn is_clear(other: &Trajectory, start: &TrajectoryPoint, vehicle: &Participant) -> bool {
     let touching_m = touching_distance_m(other.dimensions.length_m, vehicle.trajectory.dimensions.length_m);
     start_of(other).is_none_or(|at| at.lane != start.lane || (at.s_m - start.s_m).abs() > touching_m + MIN_START_GAP_M)
 }
@@ -284,7 +291,7 @@ fn other_driver(encounter: &RecordedEncounter, vehicle: &Participant) -> Option<
 }
 
 /// Returns a driver with the recorded speeds, at the times of the common clock, and the recorded lane changes.
-fn prescribed_driver(encounter: &RecordedEncounter, vehicle: &Participant) -> DriverConfig {
+pub(super) fn prescribed_driver(encounter: &RecordedEncounter, vehicle: &Participant) -> DriverConfig {
     let on_clock = vehicle.trajectory.points.iter().filter(|point| point.time.is_multiple_of(PERIOD));
     let pair = |point: &TrajectoryPoint| [rounded(point.time.s()), rounded(point.speed_mps.max(0.0))];
     let mut free_from_s = 0.0;
@@ -300,7 +307,7 @@ fn prescribed_driver(encounter: &RecordedEncounter, vehicle: &Participant) -> Dr
         let (at_s, duration_s) = crossing.unwrap_or_else(as_recorded);
         let (at_s, duration_s) = (to_steps(at_s), to_steps(duration_s));
         // The next lane change starts at least one rounding step after the end of this one, so that they never overlap.
-        free_from_s = at_s + duration_s + 1.0 / STEPS_PER_UNIT;
+        free_from_s = at_s + duration_s + ROUNDING_STEP;
         lane_changes.push(PrescribedLaneChangeConfig {
             at_s: Num::Fixed(at_s),
             to: change.direction,
@@ -320,7 +327,11 @@ fn prescribed_driver(encounter: &RecordedEncounter, vehicle: &Participant) -> Dr
 /// A simulated lane change follows a symmetric path whose length is its duration times the speed at its start, so that it
 /// crosses the marking after half of that length. A recorded one is hardly ever symmetric. Of all starts from `free_from_s` on
 /// for which the duration is possible, the one nearest to the recorded `start_s` is chosen. Returns `None` if there is none.
-fn lane_change_across(vehicle: &Trajectory, [start_s, crossing_s]: [f64; 2], free_from_s: f64) -> Option<(f64, f64)> {
+pub(super) fn lane_change_across(
+    vehicle: &Trajectory,
+    [start_s, crossing_s]: [f64; 2],
+    free_from_s: f64,
+) -> Option<(f64, f64)> {
     let crossing_m = vehicle.at(Time::from_s(crossing_s))?.s_m;
     let candidate = |point: &TrajectoryPoint| {
         let duration_s = 2.0 * (crossing_m - point.s_m) / point.speed_mps.max(MIN_SPEED_MPS);
@@ -329,20 +340,6 @@ fn lane_change_across(vehicle: &Trajectory, [start_s, crossing_s]: [f64; 2], fre
     };
     let starts = vehicle.points.iter().take_while(|point| point.time.s() < crossing_s).filter_map(candidate);
     starts.min_by(|a, b| (a.0 - start_s).abs().total_cmp(&(b.0 - start_s).abs()))
-}
-
-/// Returns the highest recorded speed of the vehicles (m/s), at least [`MIN_SPEED_MPS`].
-fn max_speed_mps<'a>(vehicles: impl IntoIterator<Item = &'a Trajectory>) -> f64 {
-    let speeds = vehicles.into_iter().flat_map(|vehicle| vehicle.points.iter().map(|point| point.speed_mps));
-    speeds.fold(MIN_SPEED_MPS, f64::max)
-}
-
-fn rounded(value: f64) -> Num {
-    Num::Fixed(to_steps(value))
-}
-
-fn to_steps(value: f64) -> f64 {
-    (value * STEPS_PER_UNIT).round() / STEPS_PER_UNIT
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use closecall_traffic::{Road, Time, VehicleState};
 
-use super::{Actor, Scenario, Trigger};
+use super::{Actor, Event, Scenario, Trigger};
 
 impl Scenario {
     /// Returns the same scenario with half the step of the vehicle dynamics and the human drivers. The rates of the sensors
@@ -28,6 +28,7 @@ impl Scenario {
         let mirrored = |actor: &Actor| Actor {
             start: mirrored(&actor.start, &self.road),
             driver: actor.driver.mirrored(),
+            events: actor.events.iter().map(|event| Event { then: event.then.mirrored(), ..event.clone() }).collect(),
             ..actor.clone()
         };
         Some(Self { road, actors: self.actors.iter().map(mirrored).collect(), ..self.clone() })

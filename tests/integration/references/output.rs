@@ -212,7 +212,12 @@ fn the_keys_of_the_commands_on_trajectory_data_are_those_documented() {
     let (many, one) = (program(&["criticality", &csv], 0), program(&["criticality", &alone], 0));
     hold("criticality", each(&many).into_iter().chain(each(&one)));
     hold("reenact", [&program(&["reenact", &csv], 0)]);
+    let sampled = program(&["sample", &csv, "--vary", "cc1", "--from", "1", "--to", "0.5", "--steps", "2"], 0);
+    hold("sample", [&sampled]);
     hold("fit", [&program(&["fit", &csv], 0), &program(&["fit", &few], 0)]);
+    let fitted = at("fitted.toml");
+    stdout(&closecall(["fit", &csv, "-o", &fitted]), 0);
+    hold("drift", [&program(&["drift", &fitted, &csv], 0), &program(&["drift", &fitted, &few], 4)]);
     hold("statistics", [&program(&["statistics", &csv], 0)]);
     hold("robustness", [&program(&["robustness", &few, "--repetitions", "1"], 0)]);
     let broken = at("broken.csv");

@@ -152,6 +152,12 @@ impl Film {
         self
     }
 
+    /// Sets the name of the arm, by which several films in one recording differ.
+    #[must_use]
+    pub fn with_arm(self, arm: String) -> Self {
+        Self { arm, ..self }
+    }
+
     /// Makes all vehicles but the first `count` traffic around these: grey, without name and curves.
     #[must_use]
     pub fn with_plots_of_first(mut self, count: usize) -> Self {

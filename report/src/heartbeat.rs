@@ -1,38 +1,35 @@
-//! The progress of a long command on a standard error that is no terminal, such as the log of a CI job.
+//! The progress of a long command as lines of text, for a standard error that is no terminal, such as the log of a CI job.
 
-use std::io::IsTerminal;
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use indicatif::ProgressBar;
-
-use super::output::print_error;
-
 /// Time between two lines. CI servers end a job that is silent for ten minutes.
 const INTERVAL: Duration = Duration::from_secs(30);
 
-/// Prints a line about the progress every 30 s until it is dropped. It prints nothing on a terminal, which shows the
-/// progress bar instead.
-pub(super) struct Heartbeat {
+/// Prints a line about the progress every 30 s until it is dropped.
+#[derive(Debug)]
+pub struct Heartbeat {
     running: Option<(Sender<()>, JoinHandle<()>)>,
 }
 
 impl Heartbeat {
-    /// Starts to print the progress of `bar`.
-    pub(super) fn start(bar: &ProgressBar) -> Self {
-        if std::io::stderr().is_terminal() {
-            return Self { running: None };
-        }
-        Self::every(INTERVAL, bar, |line| print_error(format_args!("{line}\n")))
+    /// Starts to `print` lines. `progress` returns the number of samples that are done, and that of all samples.
+    pub fn start(progress: impl Fn() -> [u64; 2] + Send + 'static, print: impl Fn(&str) + Send + 'static) -> Self {
+        Self::every(INTERVAL, progress, print)
     }
 
-    fn every(interval: Duration, bar: &ProgressBar, print: impl Fn(&str) + Send + 'static) -> Self {
+    fn every(
+        interval: Duration,
+        progress: impl Fn() -> [u64; 2] + Send + 'static,
+        print: impl Fn(&str) + Send + 'static,
+    ) -> Self {
         let (sender, receiver) = channel();
-        let (bar, started) = (bar.clone(), Instant::now());
+        let started = Instant::now();
         let thread = std::thread::spawn(move || {
             while receiver.recv_timeout(interval) == Err(RecvTimeoutError::Timeout) {
-                print(&line(bar.position(), bar.length().unwrap_or_default(), started.elapsed()));
+                let [done, all] = progress();
+                print(&line(done, all, started.elapsed()));
             }
         });
         Self { running: Some((sender, thread)) }
@@ -73,10 +70,8 @@ mod tests {
     #[test]
     fn lines_come_until_the_heartbeat_ends() {
         let (sender, lines) = channel();
-        let bar = ProgressBar::hidden();
-        bar.set_length(5);
-        let heartbeat =
-            Heartbeat::every(Duration::from_millis(1), &bar, move |line| drop(sender.send(line.to_owned())));
+        let print = move |line: &str| drop(sender.send(line.to_owned()));
+        let heartbeat = Heartbeat::every(Duration::from_millis(1), || [0, 5], print);
         assert!(lines.recv().unwrap().starts_with("0 of 5 samples"));
         drop(heartbeat);
         while lines.try_recv().is_ok() {}

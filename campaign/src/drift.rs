@@ -1,0 +1,268 @@
+//! Drift: whether new traffic still matches the distributions that a scenario was fitted to.
+//!
+//! Each quantity of the fitted file is compared with its values in new trajectory data by a two-sample Kolmogorov–Smirnov
+//! test ([`two_sample`]). The p-values are corrected for the number of tests ([`holm`]), so that the probability of any false
+//! alarm is at most [`LEVEL`].
+//!
+//! Quantities that repeat another one are not tested: the width of the peak of lateral speed follows from the duration, and
+//! the critical headways are a part of all headways. Values of one recording are treated as independent. Vehicles that drive
+//! one behind the other are not quite, so that a platoon can look like drift.
+
+use std::path::Path;
+
+use closecall_scenarios::filters::smooth;
+use closecall_scenarios::fit::{MIN_VALUES, Quantity, Samples, observe};
+use closecall_scenarios::parameters::{ParameterConfig, ParametersConfig};
+use closecall_scenarios::trajectory_data::TrajectoryData;
+use closecall_simulation::scenario::ScenarioError;
+use closecall_statistics::holm;
+use closecall_statistics::quantiles::quantile;
+use closecall_statistics::two_sample::{self, Summary};
+use closecall_traffic::Stream;
+use rand::SeedableRng;
+use serde::Serialize;
+
+/// Level of the test: the largest probability that traffic without drift is called drifted (-).
+pub const LEVEL: f64 = 0.05;
+/// Relative shift for which the needed number of values is stated (-).
+const STATED_SHIFT: f64 = 0.05;
+/// The quantities that are tested.
+const TESTED: [Quantity; 6] = [
+    Quantity::CutOutThw,
+    Quantity::LaneChangeDuration,
+    Quantity::Closing,
+    Quantity::CrossingSpeed,
+    Quantity::FrontThw,
+    Quantity::FollowingSpeed,
+];
+
+/// The fitted quantities of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fitted(Vec<(Quantity, Summary)>);
+
+impl Fitted {
+    /// Reads a file that `closecall fit` wrote, or a scenario whose parameters come from one.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] if the file cannot be read, or holds no fitted quantity.
+    pub fn read(path: &Path) -> Result<Self, ScenarioError> {
+        let read = |source| ScenarioError::Read { path: path.to_owned(), source };
+        let text = std::fs::read_to_string(path).map_err(read)?;
+        Self::parse(&text).map_err(|message| ScenarioError::Syntax { path: path.to_owned(), line: 1, message })
+    }
+
+    fn parse(text: &str) -> Result<Self, String> {
+        let mut document: toml::Table = text.parse().map_err(|error: toml::de::Error| error.message().to_owned())?;
+        let parameters = document.remove("parameters").ok_or("there is no table `parameters`")?;
+        let parameters: ParametersConfig =
+            parameters.try_into().map_err(|error: toml::de::Error| error.message().to_owned())?;
+        let summary = |config: &ParameterConfig| {
+            let n = usize::try_from(config.fitted.as_ref()?.n).ok()?;
+            Summary::new(n, &config.empirical.as_ref()?.quantiles)
+        };
+        let known = |quantity: Quantity| {
+            let found = parameters.0.iter().find(|(name, _)| name.as_str() == quantity.name())?;
+            Some((quantity, summary(found.1)?))
+        };
+        let all: Vec<_> = TESTED.into_iter().filter_map(known).collect();
+        if all.is_empty() {
+            let names: Vec<&str> = TESTED.iter().map(|quantity| quantity.name()).collect();
+            return Err(format!(
+                "no parameter has quantiles that were fitted: one of {} with `empirical` and `fitted` is needed, as `closecall \
+                 fit` writes them",
+                names.join(", ")
+            ));
+        }
+        Ok(Self(all))
+    }
+}
+
+/// The comparison of one quantity.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct QuantityDrift {
+    /// Name of the quantity.
+    pub name: &'static str,
+    /// Number of fitted values.
+    pub fitted_n: usize,
+    /// Median of the fitted values, in the unit of the name.
+    pub fitted_median: f64,
+    /// Number of new values.
+    pub n: usize,
+    /// Median of the new values; `None` if there are none.
+    pub median: Option<f64>,
+    /// Kolmogorov–Smirnov distance (-); `None` if there are too few new values.
+    pub distance: Option<f64>,
+    /// Probability of a larger distance without drift (-).
+    pub p_value: Option<f64>,
+    /// The same, corrected for the number of tests (-).
+    pub corrected_p_value: Option<f64>,
+    /// Distance that is found with these numbers of values (-).
+    pub found_from: Option<f64>,
+    /// Number of new values with which the observed distance would be found; `None` if no number suffices.
+    pub needed: Option<u64>,
+    /// Number of new values with which a shift by 5 % would be found about every second time; `None` if no number suffices.
+    pub needed_for_five_percent: Option<u64>,
+}
+
+/// The comparison of new trajectory data with fitted distributions.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Drift {
+    /// The quantities.
+    pub quantities: Vec<QuantityDrift>,
+    /// True if at least one quantity was tested.
+    pub is_tested: bool,
+    /// True if a corrected p-value is below [`LEVEL`].
+    pub has_drifted: bool,
+}
+
+/// Compares trajectory data with fitted distributions. `seed` is that of the simulated distances.
+pub fn drift(fitted: &Fitted, data_sets: &[TrajectoryData], seed: u64) -> Drift {
+    let mut samples = Samples::default();
+    for data in data_sets {
+        samples.extend(observe(&smooth(data)));
+    }
+    let p_value = |quantity: Quantity, summary: &Summary, new: &[f64]| {
+        two_sample::p_value(summary.distance(new), &summary.simulated(new.len(), &mut stream(seed, quantity)))
+    };
+    drift_of(fitted, |quantity| samples.values(quantity).to_vec(), &p_value)
+}
+
+/// Returns the probability of a larger distance than that of sorted new values.
+type PValue<'a> = dyn Fn(Quantity, &Summary, &[f64]) -> f64 + 'a;
+
+fn drift_of(fitted: &Fitted, values: impl Fn(Quantity) -> Vec<f64>, p_value: &PValue<'_>) -> Drift {
+    let sorted = |quantity| {
+        let mut values = values(quantity);
+        values.sort_by(f64::total_cmp);
+        values
+    };
+    let new: Vec<Vec<f64>> = fitted.0.iter().map(|(quantity, _)| sorted(*quantity)).collect();
+    let compared = fitted.0.iter().zip(&new).map(|((quantity, summary), new)| {
+        (new.len() >= MIN_VALUES).then(|| (summary.distance(new), p_value(*quantity, summary, new)))
+    });
+    let compared: Vec<Option<(f64, f64)>> = compared.collect();
+    let p_values: Vec<f64> = compared.iter().flatten().map(|(_, p_value)| *p_value).collect();
+    let level = LEVEL / p_values.len().max(1) as f64;
+    let mut corrected = holm::corrected(&p_values).into_iter();
+    let mut quantities = Vec::new();
+    for (((quantity, summary), new), found) in fitted.0.iter().zip(&new).zip(&compared) {
+        let shift = summary.distance_of_shift(|value| value * (1.0 + STATED_SHIFT));
+        let needed = |distance| two_sample::needed(level, summary.n(), distance);
+        quantities.push(QuantityDrift {
+            name: quantity.name(),
+            fitted_n: summary.n(),
+            fitted_median: summary.median(),
+            n: new.len(),
+            median: (!new.is_empty()).then(|| quantile(new, 0.5)),
+            distance: found.map(|(distance, _)| distance),
+            p_value: found.map(|(_, p_value)| p_value),
+            corrected_p_value: found.and_then(|_| corrected.next()),
+            found_from: found.map(|_| two_sample::critical_distance(level, summary.n(), new.len())),
+            needed: found.and_then(|(distance, _)| needed(distance)),
+            needed_for_five_percent: needed(shift),
+        });
+    }
+    let has_drifted = quantities.iter().filter_map(|one| one.corrected_p_value).any(|p_value| p_value < LEVEL);
+    Drift { quantities, is_tested: !p_values.is_empty(), has_drifted }
+}
+
+/// Returns the random stream of one quantity, so that a further quantity does not change the others.
+fn stream(seed: u64, quantity: Quantity) -> Stream {
+    let mut hasher = blake3::Hasher::new_derive_key("closecall 2026 simulated distances of drift v1");
+    hasher.update(&seed.to_le_bytes());
+    hasher.update(quantity.name().as_bytes());
+    Stream::from_seed(*hasher.finalize().as_bytes())
+}
+
+#[cfg(test)]
+mod tests {
+    use closecall_statistics::normal::TruncatedStandardNormal;
+    use rand::RngExt;
+    use rayon::prelude::*;
+
+    use super::*;
+
+    /// Number of fitted values of each quantity, and the log-normal distribution that they come from: median and standard
+    /// deviation of the logarithm, close to those of the library's fitted file.
+    const TRUTH: [(Quantity, usize, [f64; 2]); 6] = [
+        (Quantity::CutOutThw, 40, [0.76, 0.58]),
+        (Quantity::LaneChangeDuration, 30, [4.7, 0.38]),
+        (Quantity::Closing, 35, [1.3, 0.9]),
+        (Quantity::CrossingSpeed, 48, [15.3, 0.15]),
+        (Quantity::FrontThw, 270, [1.4, 0.45]),
+        (Quantity::FollowingSpeed, 270, [13.7, 0.2]),
+    ];
+
+    fn drawn(n: usize, [median, sigma]: [f64; 2], rng: &mut Stream) -> Vec<f64> {
+        let normal = TruncatedStandardNormal::new(-6.0, 6.0).unwrap();
+        let mut values: Vec<f64> = (0..n).map(|_| median * (sigma * normal.quantile(rng.random())).exp()).collect();
+        values.sort_by(f64::total_cmp);
+        values
+    }
+
+    /// The share of 1,000 resamplings that are called drifted. In each, values are drawn and reduced to the quantiles of a
+    /// fitted file, and `n` new values of each quantity are drawn and changed by `shift`.
+    fn share_called_drifted(n: usize, shift: impl Fn(Quantity, f64) -> f64 + Sync) -> f64 {
+        let summary = |values: &[f64]| {
+            let levels = 11.min(values.len());
+            let at = |k: usize| quantile(values, k as f64 / (levels - 1) as f64);
+            Summary::new(values.len(), &(0..levels).map(at).collect::<Vec<f64>>()).unwrap()
+        };
+        // The simulated distances depend on the numbers of values only.
+        let simulated = TRUTH.map(|(quantity, fitted_n, truth)| {
+            let any = summary(&drawn(fitted_n, truth, &mut Stream::seed_from_u64(0)));
+            (quantity, any.simulated(n, &mut stream(0, quantity)))
+        });
+        let p_value = |quantity: Quantity, summary: &Summary, new: &[f64]| {
+            let (_, known) = simulated.iter().find(|(known, _)| *known == quantity).unwrap();
+            two_sample::p_value(summary.distance(new), known)
+        };
+        let is_called = |index: &u64| {
+            let mut rng = Stream::seed_from_u64(*index);
+            let mut fit = |(quantity, n, truth)| (quantity, summary(&drawn(n, truth, &mut rng)));
+            let fitted = Fitted(TRUTH.map(&mut fit).to_vec());
+            let new = TRUTH.map(|(quantity, _, truth)| {
+                let values = drawn(n, truth, &mut rng);
+                (quantity, values.into_iter().map(|value| shift(quantity, value)).collect::<Vec<f64>>())
+            });
+            let values = |quantity| new.iter().find(|(known, _)| *known == quantity).unwrap().1.clone();
+            drift_of(&fitted, values, &p_value).has_drifted
+        };
+        (0..1_000_u64).into_par_iter().filter(is_called).count() as f64 / 1_000.0
+    }
+
+    #[test]
+    fn traffic_without_drift_is_called_drifted_in_about_five_percent() {
+        for n in [40, 200] {
+            let share = share_called_drifted(n, |_, value| value);
+            assert!((0.03..=0.07).contains(&share), "{n} values: {share}");
+        }
+    }
+
+    #[test]
+    fn faster_and_closer_traffic_is_found_as_often_as_documented() {
+        let is_speed = |quantity| matches!(quantity, Quantity::CrossingSpeed | Quantity::FollowingSpeed);
+        let faster = |quantity, value: f64| if is_speed(quantity) { 1.05 * value } else { value };
+        let is_headway = |quantity| matches!(quantity, Quantity::CutOutThw | Quantity::FrontThw);
+        let closer = |quantity, value: f64| if is_headway(quantity) { value - 0.1 } else { value };
+        let found = [50, 200, 800].map(|n| {
+            [
+                share_called_drifted(n, |_, value| value),
+                share_called_drifted(n, faster),
+                share_called_drifted(n, closer),
+            ]
+        });
+        let pairs = found.iter().flatten().zip(DOCUMENTED.iter().flatten());
+        assert!(pairs.into_iter().all(|(found, documented)| (found - documented).abs() < 0.02), "{found:?}");
+    }
+
+    /// The table of docs/trajectory-data.md: 50, 200 and 800 new values; no drift, 5 % faster, 0.1 s closer.
+    const DOCUMENTED: [[f64; 3]; 3] = [[0.046, 0.184, 0.104], [0.048, 0.452, 0.216], [0.043, 0.711, 0.394]];
+
+    #[test]
+    fn a_file_without_fitted_quantities_is_refused() {
+        assert!(Fitted::parse("a = 1").unwrap_err().contains("parameters"));
+        assert!(Fitted::parse("[parameters]\nx = { fixed = 1.0 }").unwrap_err().contains("cut-out-thw-s"));
+        assert_eq!(Fitted::parse(include_str!("../../scenarios/library/fitted/us101.toml")).unwrap().0.len(), 6);
+    }
+}

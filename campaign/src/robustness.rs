@@ -1,0 +1,54 @@
+//! Studies of several trajectory files, how much noise and offset the criteria for lane changes tolerate, on all processors.
+
+use std::path::{Path, PathBuf};
+
+use closecall_scenarios::robustness::{CriterionCounts, Measured, Robustness, Setup, Study};
+use closecall_scenarios::trajectory_data::{ReadOptions, TrajectoryFileError, open};
+use rayon::prelude::*;
+
+/// The reason why files cannot be studied.
+#[derive(Debug, thiserror::Error)]
+pub enum RobustnessError {
+    /// A trajectory file cannot be used.
+    #[error(transparent)]
+    TrajectoryData(#[from] TrajectoryFileError),
+    /// The references of the files differ.
+    #[error("in-car logs and recorded traffic have different references: study them separately")]
+    Mixed,
+}
+
+/// Studies trajectory files. Returns the result of each file, and that of all together; `None` if there are no files.
+///
+/// # Errors
+/// [`RobustnessError`] if a file cannot be used, or if the files cannot be studied together.
+pub fn robustness(
+    files: &[PathBuf],
+    options: ReadOptions,
+    setup: &Setup,
+) -> Result<Option<(Vec<Robustness>, Robustness)>, RobustnessError> {
+    let studies = files.iter().map(|path| study_of(path, options)).collect::<Result<Vec<_>, _>>()?;
+    let (mut each, mut all): (Vec<Robustness>, Option<Robustness>) = (Vec::new(), None);
+    for study in &studies {
+        let cases = Study::cases(setup);
+        // The results are in the order of the cases for any number of threads.
+        let results: Vec<Vec<CriterionCounts>> = cases.par_iter().map(|case| study.run(case)).collect();
+        let one = study.robustness(setup, &results);
+        let fits = all.as_mut().is_none_or(|all| all.add(&one));
+        if !fits {
+            return Err(RobustnessError::Mixed);
+        }
+        all.get_or_insert_with(|| one.clone());
+        each.push(one);
+    }
+    Ok(all.map(|all| (each, all)))
+}
+
+fn study_of(path: &Path, options: ReadOptions) -> Result<Study, TrajectoryFileError> {
+    let mut tracks = open(path, options)?;
+    let mut measured: Vec<Measured> = Vec::new();
+    while let Some(track) = tracks.next_track()? {
+        measured.push((track.trajectory, track.markings));
+    }
+    measured.sort_by_key(|(track, _)| track.track_id);
+    Ok(Study::new(measured, tracks.markings()))
+}

@@ -1,0 +1,183 @@
+//! The figures of the published method on any set of trajectory files, as pictures and one page.
+//!
+//! | figure | content | files |
+//! |---|---|---|
+//! | 3 | what each criterion finds over noise and over offset, and where it fails in each trajectory file | `figure-3-noise.svg`, `figure-3-offset.svg` |
+//! | 5 | durations, peak widths and speeds of complete lane changes, by vehicle class and by trajectory file | `figure-5-….svg` |
+//! | 6 | histograms of the seven metrics with their thresholds | `figure-6-….svg` |
+//! | 7 | critical shares to the left and to the right, with exact intervals | `figure-7-shares.svg` |
+
+use closecall_scenarios::criticality::{BoxPlot, CriticalLaneChange, Statistics, statistics};
+use closecall_scenarios::lane_change::LaneChange;
+use closecall_scenarios::robustness::Robustness;
+use maud::{DOCTYPE, PreEscaped, html};
+
+use super::paper_charts::{METRICS, histogram, share_chart};
+use super::robustness::{RobustnessText, robustness_charts};
+use super::statistics::StatisticsText;
+use super::trajectory_charts::{BoxChart, BoxSummary, ChartError};
+
+/// The lane changes of one trajectory file.
+#[derive(Clone, Debug)]
+pub struct RecordedChanges {
+    /// Name of the trajectory data.
+    pub name: String,
+    /// Its lane changes.
+    pub changes: Vec<CriticalLaneChange>,
+}
+
+/// A picture of the page.
+#[derive(Clone, Debug)]
+pub struct Picture {
+    /// Number of the figure in the published method.
+    pub figure: u32,
+    /// Name of the file.
+    pub name: String,
+    /// The picture (SVG).
+    pub svg: String,
+}
+
+/// A quantity of a lane change in a box plot.
+struct Boxed {
+    file: &'static str,
+    title: &'static str,
+    y_name: &'static str,
+    value: fn(&LaneChange) -> f64,
+}
+
+/// The quantities of figure 5.
+const BOXED: [Boxed; 3] = [
+    Boxed { file: "duration", title: "Duration", y_name: "duration [s]", value: |change| change.duration_s },
+    Boxed {
+        file: "width",
+        title: "Width of the peak of lateral speed",
+        y_name: "width [s]",
+        value: |change| change.width_s,
+    },
+    Boxed { file: "speed", title: "Speed at the crossing", y_name: "speed [m/s]", value: |change| change.speed_mps },
+];
+
+/// The figures, with what they are drawn from.
+#[derive(Clone, Debug)]
+pub struct Paper {
+    /// The pictures, in the order of the figures.
+    pub pictures: Vec<Picture>,
+    /// The page (HTML), which holds the pictures.
+    pub page: String,
+}
+
+impl Paper {
+    /// Draws the figures. `robustness` holds the result for each trajectory file, and that of all together.
+    ///
+    /// # Errors
+    /// [`ChartError`] if a figure cannot be drawn.
+    pub fn new(
+        recordings: &[RecordedChanges],
+        robustness: Option<&(Vec<Robustness>, Robustness)>,
+        speed_limit_mps: Option<f64>,
+    ) -> Result<Self, ChartError> {
+        let all: Vec<CriticalLaneChange> = recordings.iter().flat_map(|one| one.changes.iter().cloned()).collect();
+        let mut pictures = Vec::new();
+        let mut push = |figure: u32, name: &str, svg: String| {
+            pictures.push(Picture { figure, name: format!("figure-{figure}-{name}.svg"), svg });
+        };
+        if let Some((_, together)) = robustness {
+            let [noise, offset] = robustness_charts(together)?;
+            push(3, "noise", noise);
+            push(3, "offset", offset);
+        }
+        for boxed in &BOXED {
+            push(5, &format!("{}-by-class", boxed.file), box_chart(boxed, by_class(&all, boxed)).svg()?);
+            push(5, &format!("{}-by-file", boxed.file), box_chart(boxed, by_file(recordings, boxed)).svg()?);
+        }
+        for metric in METRICS {
+            push(6, metric, histogram(&all, metric, speed_limit_mps)?);
+        }
+        push(7, "shares", share_chart(&all)?);
+        let page = page(recordings, &statistics(&all), robustness, &pictures);
+        Ok(Self { pictures, page })
+    }
+}
+
+fn box_chart(boxed: &Boxed, boxes: Vec<BoxSummary>) -> BoxChart {
+    BoxChart { title: format!("{} of complete lane changes", boxed.title), y_name: boxed.y_name.to_owned(), boxes }
+}
+
+fn summary<'a>(name: &str, changes: impl Iterator<Item = &'a CriticalLaneChange>, boxed: &Boxed) -> Option<BoxSummary> {
+    let complete = changes.filter(|change| change.lane_change.complete);
+    let BoxPlot { n, five, outliers, .. } =
+        BoxPlot::of(complete.map(|change| (boxed.value)(&change.lane_change)).collect())?;
+    Some(BoxSummary { name: format!("{name} (n = {n})"), five, outliers })
+}
+
+fn by_class(all: &[CriticalLaneChange], boxed: &Boxed) -> Vec<BoxSummary> {
+    let classes = closecall_traffic::VehicleClass::ALL.into_iter();
+    classes
+        .filter_map(|class| {
+            summary(class.name(), all.iter().filter(|change| change.lane_change.vehicle_class == class), boxed)
+        })
+        .collect()
+}
+
+fn by_file(recordings: &[RecordedChanges], boxed: &Boxed) -> Vec<BoxSummary> {
+    recordings.iter().filter_map(|one| summary(&one.name, one.changes.iter(), boxed)).collect()
+}
+
+/// Returns the lowest level of noise at which each criterion fails, for each trajectory file.
+fn failures(recordings: &[RecordedChanges], each: &[Robustness]) -> Vec<Vec<String>> {
+    let row = |(recording, found): (&RecordedChanges, &Robustness)| {
+        let level = |column: usize| match (found.undisturbed[column], found.failing_noise_m_per_sqrt_s(column)) {
+            (0, _) => "finds nothing".to_owned(),
+            (_, Some(level)) => format!("{level} m/√s"),
+            (_, None) => "no level".to_owned(),
+        };
+        std::iter::once(recording.name.clone()).chain((0..found.criteria.len()).map(level)).collect()
+    };
+    recordings.iter().zip(each).map(row).collect()
+}
+
+fn page(
+    recordings: &[RecordedChanges],
+    found: &Statistics,
+    robustness: Option<&(Vec<Robustness>, Robustness)>,
+    pictures: &[Picture],
+) -> String {
+    let names: Vec<&str> = recordings.iter().map(|one| one.name.as_str()).collect();
+    let figure = |number: u32| pictures.iter().filter(move |picture| picture.figure == number);
+    let drawn = |number: u32| html! { @for picture in figure(number) { div.picture { (PreEscaped(&picture.svg)) } } };
+    html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                title { "Recorded lane changes" }
+                style { (PreEscaped(STYLE)) }
+            }
+            body {
+                h1 { "Recorded lane changes" }
+                p { "Trajectory files: " (names.join(", ")) }
+                @if let Some((each, together)) = robustness {
+                    h2 { "Figure 3: what the criteria tolerate" }
+                    (drawn(3))
+                    h3 { "Lowest level of noise at which a criterion fails" }
+                    table {
+                        tr { th { "trajectory file" } @for criterion in &together.criteria { th { (criterion.name()) } } }
+                        @for row in failures(recordings, each) { tr { @for cell in row { td { (cell) } } } }
+                    }
+                    pre { (RobustnessText(together).to_string()) }
+                }
+                h2 { "Figure 5: durations, peak widths and speeds" }
+                (drawn(5))
+                pre { (StatisticsText(found).to_string()) }
+                h2 { "Figure 6: how often the values of each metric occur" }
+                (drawn(6))
+                h2 { "Figure 7: critical shares to the left and to the right" }
+                (drawn(7))
+            }
+        }
+    }
+    .into_string()
+}
+
+const STYLE: &str = "body{font-family:sans-serif;margin:2rem;max-width:1800px}.picture{display:inline-block}\
+                     td,th{padding:.2rem .8rem;text-align:left}pre{overflow-x:auto}";

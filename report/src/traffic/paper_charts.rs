@@ -1,0 +1,138 @@
+//! Charts of criticality: how often each value of a metric occurs, with its threshold, and the shares of critical lane
+//! changes to the left and to the right.
+
+use closecall_scenarios::criticality::{
+    CRITICAL_A_LAT_MPS2, CRITICAL_A_LON_MPS2, CRITICAL_DCE_M, CRITICAL_DISTANCE_M, CRITICAL_SPEED_FACTOR,
+    CRITICAL_TTCE_S, Counted, CriticalLaneChange, DEFAULT_SPEED_LIMIT_MPS, shares,
+};
+use closecall_traffic::Side;
+use closecall_traffic::metrics::CRITICAL_THW_S;
+use plotters::prelude::*;
+
+use super::trajectory_charts::{ChartError, file, number_axis, range};
+use crate::charts::style::{Canvas, ChartAxis, Drawn, axes, legend_text, series_colour};
+use crate::units::labelled;
+
+/// Number of bars of a histogram.
+const BARS: usize = 20;
+/// Half of the width of a bar of shares, as a share of the distance between two metrics (-).
+const HALF_BAR: f64 = 0.16;
+
+/// Returns the names of the metrics.
+pub(super) const METRICS: [&str; 7] =
+    ["distance_m", "speed_mps", "a_lon_mps2", "a_lat_mps2", "thw_s", "dce_m", "ttce_s"];
+
+/// Returns the value of a metric beyond which it is critical.
+fn threshold(metric: &str, speed_limit_mps: Option<f64>) -> f64 {
+    match metric {
+        "distance_m" => CRITICAL_DISTANCE_M,
+        "speed_mps" => CRITICAL_SPEED_FACTOR * speed_limit_mps.unwrap_or(DEFAULT_SPEED_LIMIT_MPS),
+        "a_lon_mps2" => CRITICAL_A_LON_MPS2,
+        "a_lat_mps2" => CRITICAL_A_LAT_MPS2,
+        "thw_s" => CRITICAL_THW_S,
+        "dce_m" => CRITICAL_DCE_M,
+        _ => CRITICAL_TTCE_S,
+    }
+}
+
+/// Draws how often the values of a metric occur among complete lane changes, with the threshold (SVG).
+///
+/// # Errors
+/// [`ChartError`] if the chart cannot be drawn.
+pub(super) fn histogram(
+    changes: &[CriticalLaneChange],
+    metric: &str,
+    speed_limit_mps: Option<f64>,
+) -> Result<String, ChartError> {
+    let value_of = |change: &CriticalLaneChange| {
+        change.metrics.named().into_iter().find(|(name, _)| *name == metric).and_then(|(_, result)| result.value())
+    };
+    let complete = changes.iter().filter(|change| change.lane_change.complete);
+    let values: Vec<f64> = complete.filter_map(value_of).filter(|value| value.is_finite()).collect();
+    let limit = threshold(metric, speed_limit_mps);
+    let title = format!("{} of {} complete lane changes", labelled(metric), values.len());
+    file(&title, |canvas| draw_histogram(canvas, &title, &labelled(metric), (&values, limit)))
+}
+
+fn draw_histogram(canvas: &Canvas<'_>, title: &str, name: &str, (values, limit): (&[f64], f64)) -> Drawn {
+    let x = number_axis(name, range(values.iter().copied().chain([limit]), Some(0.0)));
+    let (start, width) = (x.range.start, (x.range.end - x.range.start) / BARS as f64);
+    let mut counts = [0_u32; BARS];
+    for value in values {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the range")]
+        let bar = (((value - start) / width) as usize).min(BARS - 1);
+        counts[bar] += 1;
+    }
+    let largest = f64::from(counts.iter().copied().max().unwrap_or(0));
+    let y = number_axis("lane changes", 0.0..(1.1 * largest).max(1.0));
+    let mut plot = axes(canvas, Some(title), &x, &y)?;
+    plot.draw_series(counts.iter().enumerate().map(|(bar, count)| {
+        let left = start + bar as f64 * width;
+        Rectangle::new([(left, 0.0), (left + width, f64::from(*count))], series_colour(0).mix(0.6).filled())
+    }))?;
+    let line = [(limit, 0.0), (limit, y.range.end)];
+    plot.draw_series(DashedLineSeries::new(line, 6, 4, series_colour(1).stroke_width(2)))?
+        .label("critical")
+        .legend(|(x, y)| PathElement::new([(x, y), (x + 18, y)], series_colour(1).stroke_width(2)));
+    plot.configure_series_labels()
+        .position(SeriesLabelPosition::UpperRight)
+        .label_font(legend_text())
+        .background_style(WHITE.mix(0.85))
+        .draw()
+}
+
+/// Draws the shares of critical lane changes by metric, to the left and to the right, with exact 95 % intervals (SVG).
+///
+/// # Errors
+/// [`ChartError`] if the chart cannot be drawn.
+pub(super) fn share_chart(changes: &[CriticalLaneChange]) -> Result<String, ChartError> {
+    let title = "Critical share of complete lane changes, with 95 % intervals";
+    file(title, |canvas| draw_shares(canvas, title, changes))
+}
+
+fn draw_shares(canvas: &Canvas<'_>, title: &str, changes: &[CriticalLaneChange]) -> Drawn {
+    let x = ChartAxis {
+        name: "",
+        range: -0.5..METRICS.len() as f64 - 0.5,
+        labels: 2 * METRICS.len() + 1,
+        text: Box::new(|x: &f64| name_at(*x)),
+        has_grid: false,
+    };
+    let y = number_axis("share [%]", 0.0..100.0);
+    let mut plot = axes(canvas, Some(title), &x, &y)?;
+    for (index, side) in [Side::Left, Side::Right].into_iter().enumerate() {
+        let is_on = |change: &&CriticalLaneChange| change.lane_change.direction == side;
+        let of_side: Vec<CriticalLaneChange> = changes.iter().filter(is_on).cloned().collect();
+        let found = shares(&of_side, Counted::Complete);
+        let colour = series_colour(index);
+        let centre = |metric: usize| metric as f64 + (2.0 * index as f64 - 1.0) * HALF_BAR;
+        let bars = found.metrics.iter().enumerate().filter_map(|(metric, share)| {
+            let corners = [(centre(metric) - HALF_BAR, 0.0), (centre(metric) + HALF_BAR, 100.0 * share.share?)];
+            Some(Rectangle::new(corners, colour.mix(0.6).filled()))
+        });
+        let name = format!("to the {} (n = {})", if side == Side::Left { "left" } else { "right" }, found.lane_changes);
+        plot.draw_series(bars)?
+            .label(name)
+            .legend(move |(x, y)| Rectangle::new([(x, y - 5), (x + 14, y + 5)], colour.mix(0.6).filled()));
+        let intervals = found.metrics.iter().enumerate().filter_map(|(metric, share)| {
+            let [low, high] = share.interval_95?;
+            let points = [(centre(metric), 100.0 * low), (centre(metric), 100.0 * high)];
+            Some(PathElement::new(points, BLACK.stroke_width(1)))
+        });
+        plot.draw_series(intervals)?;
+    }
+    plot.configure_series_labels()
+        .position(SeriesLabelPosition::UpperRight)
+        .label_font(legend_text())
+        .background_style(WHITE.mix(0.85))
+        .draw()
+}
+
+/// Returns the name of the metric at `x`; empty if `x` is between two metrics.
+fn name_at(x: f64) -> String {
+    let nearest = x.round();
+    let is_middle = (x - nearest).abs() < 1e-9 && nearest >= 0.0;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small whole number")]
+    let name = is_middle.then(|| METRICS.get(nearest as usize)).flatten();
+    name.map_or(String::new(), |name| name.rsplit_once('_').map_or(*name, |(name, _unit)| name).to_owned())
+}

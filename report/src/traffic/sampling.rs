@@ -1,0 +1,290 @@
+//! A sampled lane change: for each value of the varied parameter the path of the vehicle that changes lanes, and its time
+//! headways to the vehicle that it overtakes (Opp₁) and to the vehicle that has overtaken it (Opp₂), as a table and a
+//! figure.
+//!
+//! The headway to Opp₁ counts from the start of the lane change until the centre of the vehicle that changes lanes crosses
+//! the marking, as long as Opp₁ is ahead in the same lane. The headway to Opp₂ counts from the start of the encounter to the
+//! end of the lane change, as soon as Opp₂ is ahead in the other lane. At one instant, both headways shrink by the same time
+//! if the vehicle that changes lanes is further ahead. The smallest one to Opp₂ stays the same if Opp₂ is closest before the
+//! lane change, because it overtakes then and drives away.
+
+use std::fmt;
+
+use closecall_campaign::runner::run_guarded;
+use closecall_scenarios::criticality::{Judgement, criticality};
+use closecall_scenarios::encounter::{EGO_INDEX, REAR_INDEX, RecordedEncounter};
+use closecall_scenarios::filters::smooth;
+use closecall_sensors::SensorMode;
+use closecall_simulation::controller::ControllerChoice;
+use closecall_simulation::outcome::Outcome;
+use closecall_simulation::scenario::{SampledEncounter, ScenarioError, StepValue, opp2_of};
+use closecall_simulation::{Arm, RunKey, SampleError};
+use closecall_traffic::metrics::{bumper_gap_m, time_headway_s};
+use closecall_traffic::{Lane, Time, Trajectory, TrajectoryPoint};
+use plotters::prelude::*;
+use serde::Serialize;
+
+use super::recorder::TrafficRecorder;
+use super::trajectory_charts::{ChartError, Legend, Line, LineChart};
+use crate::charts::style::{Canvas, Drawn, svg};
+use crate::run::film::{Film, TrafficFilmError, film_lane_change};
+
+/// Size of the figure with its three charts (px).
+const FIGURE_PX: (u32, u32) = (900, 1_260);
+
+/// One run of a sampled lane change, or the recorded one.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SampledRun {
+    /// The varied parameter with its value; `recorded` for the recorded lane change.
+    pub name: String,
+    /// Value of the varied parameter; `None` for the recorded lane change.
+    pub value: Option<f64>,
+    /// Time at which the centre crosses the marking (s); `None` if it never does.
+    pub crossing_s: Option<f64>,
+    /// Time headway to Opp₁ at the last instant before the crossing (s).
+    pub thw_opp1_at_crossing_s: Option<f64>,
+    /// Time headway to Opp₂ at that instant (s).
+    pub thw_opp2_at_crossing_s: Option<f64>,
+    /// Smallest time headway to Opp₁ (s).
+    pub min_thw_opp1_s: Option<f64>,
+    /// Smallest time headway to Opp₂ (s).
+    pub min_thw_opp2_s: Option<f64>,
+    /// The first collision of the vehicle that changes lanes: the other vehicle and the time (s).
+    pub collision: Option<(String, f64)>,
+    /// Positions of the vehicle that changes lanes: s and d (m).
+    #[serde(skip)]
+    path: Vec<(f64, f64)>,
+    /// Time (s) and time headway (s) to Opp₁ and to Opp₂.
+    #[serde(skip)]
+    thw_s: [Vec<(f64, f64)>; 2],
+}
+
+/// The vehicles of one run whose headways are measured.
+struct Vehicles<'a> {
+    own: &'a Trajectory,
+    opp1: &'a Trajectory,
+    opp2: Option<&'a Trajectory>,
+}
+
+impl SampledRun {
+    /// Evaluates the run of one step. `tracks` are the trajectories of its actors, in their order.
+    pub fn simulated(
+        (name, value): (String, f64),
+        encounter: &RecordedEncounter,
+        step: &SampledEncounter,
+        (tracks, outcome): (&[Trajectory], &Outcome),
+    ) -> Self {
+        let opp2 = step.opp2.map(|index| &tracks[index]);
+        let vehicles = Vehicles { own: &tracks[step.lane_changer], opp1: &tracks[step.opp1], opp2 };
+        let actors = &step.file.config().actors;
+        let own_id = &actors[step.lane_changer].id;
+        let collision = outcome.collisions.iter().find(|collision| collision.involves(own_id));
+        let collision = collision.and_then(|collision| {
+            let other = collision.between.iter().find(|id| *id != own_id)?;
+            Some((other.to_string(), collision.time.s()))
+        });
+        let run = Self::measured(name, &vehicles, [encounter.home, encounter.target], step.lane_change_s);
+        Self { value: Some(value), collision, ..run }
+    }
+
+    /// Evaluates the recorded lane change, with the vehicles of `step`.
+    pub fn recorded(encounter: &RecordedEncounter, step: &SampledEncounter) -> Self {
+        let track = |index: usize| &encounter.vehicles[index].trajectory;
+        let vehicles = Vehicles { own: track(REAR_INDEX), opp1: track(EGO_INDEX), opp2: step.recorded_opp2.map(track) };
+        Self::measured("recorded".to_owned(), &vehicles, [encounter.home, encounter.target], step.lane_change_s)
+    }
+
+    fn measured(name: String, vehicles: &Vehicles<'_>, [home, target]: [Lane; 2], [start_s, end_s]: [f64; 2]) -> Self {
+        let own = vehicles.own;
+        let crossing = own.points.iter().find(|point| point.lane == target).map(|point| point.time);
+        let is_before = |time_s: f64| crossing.is_none_or(|crossing| time_s < crossing.s());
+        let opp1 = headways(own, vehicles.opp1, home, |time_s| time_s >= start_s && is_before(time_s));
+        let opp2 = vehicles.opp2.map(|opp2| headways(own, opp2, target, |time_s| time_s <= end_s)).unwrap_or_default();
+        let last_before = |series: &[(f64, f64)]| {
+            let last = series.iter().rfind(|(time_s, _)| is_before(*time_s));
+            last.map(|(_, thw_s)| *thw_s).filter(|_| crossing.is_some())
+        };
+        let smallest = |series: &[(f64, f64)]| series.iter().map(|(_, thw_s)| *thw_s).min_by(f64::total_cmp);
+        Self {
+            name,
+            value: None,
+            crossing_s: crossing.map(Time::s),
+            thw_opp1_at_crossing_s: last_before(&opp1),
+            thw_opp2_at_crossing_s: last_before(&opp2),
+            min_thw_opp1_s: smallest(&opp1),
+            min_thw_opp2_s: smallest(&opp2),
+            collision: None,
+            path: own.points.iter().map(|point| (point.s_m, point.d_m)).collect(),
+            thw_s: [opp1, opp2],
+        }
+    }
+}
+
+/// Returns the time (s) and the time headway (s) of `own` to `other` at each instant that counts, if `other` is entirely
+/// ahead in `lane`.
+fn headways(own: &Trajectory, other: &Trajectory, lane: Lane, counts: impl Fn(f64) -> bool) -> Vec<(f64, f64)> {
+    let lengths_m = [own.dimensions.length_m, other.dimensions.length_m];
+    let at = |point: &TrajectoryPoint| {
+        let ahead = other.at(point.time).filter(|ahead| ahead.lane == lane)?;
+        let gap_m = bumper_gap_m(ahead.s_m - point.s_m, lengths_m[0], lengths_m[1]);
+        let thw_s = time_headway_s(gap_m, point.speed_mps).ok().filter(|_| gap_m >= 0.0)?;
+        Some((point.time.s(), thw_s))
+    };
+    own.points.iter().filter(|point| counts(point.time.s())).filter_map(at).collect()
+}
+
+/// The run of one step: what was measured, and a film of the lane change.
+#[derive(Clone, Debug)]
+pub struct StepRun {
+    /// What was measured.
+    pub run: SampledRun,
+    /// The film of the lane change; `None` if the vehicle never changes lanes.
+    pub film: Option<Film>,
+}
+
+/// Runs one step of a sampled lane change. The sensors of the ego, which is behind all other vehicles, are not simulated.
+///
+/// # Errors
+/// [`StepError`] if the scenario cannot be run, or if no road can be drawn from its lanes.
+pub fn run_step(
+    encounter: &RecordedEncounter,
+    value: StepValue<'_>,
+    step: &SampledEncounter,
+    seed: u64,
+) -> Result<StepRun, StepError> {
+    let scenario = step.file.concrete(&step.file.space().nominal())?;
+    let arm = Arm { controller: ControllerChoice::ACC.factory(), sensors: Some(SensorMode::GroundTruth) };
+    let mut recorder = TrafficRecorder::default();
+    recorder.begin(&scenario);
+    let outcome = run_guarded(&scenario, RunKey { seed, sample: 0 }, &arm, &mut recorder)?;
+    let data = recorder.finish(&format!("{}, {}", encounter.data_name, value.label()));
+    let run = SampledRun::simulated((value.label(), value.value), encounter, step, (&data.trajectories, &outcome));
+    let smoothed = smooth(&data);
+    let track_id = data.trajectories[step.lane_changer].track_id;
+    let changes = criticality(&smoothed, &Judgement::default());
+    let change = changes.iter().find(|change| change.lane_change.track_id == track_id);
+    let film = change.map(|change| film_lane_change(&smoothed, change)).transpose()?;
+    Ok(StepRun { run, film: film.map(|film| film.with_arm(value.label().replace(" = ", "-"))) })
+}
+
+/// The reason why a step has no run.
+#[derive(Debug, thiserror::Error)]
+pub enum StepError {
+    /// The scenario is not valid.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
+    /// The run has no outcome.
+    #[error(transparent)]
+    Run(#[from] SampleError),
+    /// The lane change cannot be shown.
+    #[error(transparent)]
+    Film(#[from] TrafficFilmError),
+}
+
+/// A sampled lane change: the recorded one, then one run for each value.
+#[derive(Clone, Debug)]
+pub struct Sampled {
+    /// Name of the trajectory data, and the track that changes lanes.
+    pub title: String,
+    /// Tracks of Opp₁, and of Opp₂ if there is one.
+    pub opponents: (u64, Option<u64>),
+    /// The recorded lane change, then the runs.
+    pub runs: Vec<SampledRun>,
+}
+
+impl fmt::Display for Sampled {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (opp1, opp2) = self.opponents;
+        let opp2 = opp2.map_or("no vehicle is ahead in the other lane".to_owned(), |track| format!("track {track}"));
+        writeln!(f, "{}; Opp1: track {opp1}; Opp2: {opp2}", self.title)?;
+        writeln!(f, "                        crosses   smallest THW [s] to   THW [s] then to")?;
+        writeln!(f, "                         at [s]      Opp1      Opp2     Opp1      Opp2")?;
+        for run in &self.runs {
+            let number = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.2}"));
+            write!(
+                f,
+                "{:<22} {:>8} {:>9} {:>9} {:>8} {:>9}",
+                run.name,
+                number(run.crossing_s),
+                number(run.min_thw_opp1_s),
+                number(run.min_thw_opp2_s),
+                number(run.thw_opp1_at_crossing_s),
+                number(run.thw_opp2_at_crossing_s),
+            )?;
+            match &run.collision {
+                Some((other, time_s)) => writeln!(f, "  collides with {other} at {time_s:.2} s")?,
+                None => writeln!(f)?,
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Sampled {
+    /// Creates the sampled lane change of an encounter, without runs.
+    pub fn new(encounter: &RecordedEncounter) -> Self {
+        let [opp1, _, own] = encounter.ego_lead_rear().map(|track| track.track_id);
+        let title = format!("{}: lane change of track {own}", encounter.data_name);
+        Self {
+            title,
+            opponents: (opp1, opp2_of(encounter).map(|index| encounter.vehicles[index].trajectory.track_id)),
+            runs: Vec::new(),
+        }
+    }
+
+    /// Returns the runs as JSON.
+    pub fn json(&self) -> serde_json::Value {
+        let (opp1, opp2) = self.opponents;
+        serde_json::json!({ "title": self.title, "opp1_track_id": opp1, "opp2_track_id": opp2, "runs": self.runs })
+    }
+
+    /// Draws the paths and the two headways of all runs as one figure (SVG).
+    ///
+    /// # Errors
+    /// [`ChartError`] if the figure cannot be drawn.
+    pub fn figure(&self) -> Result<String, ChartError> {
+        let charts = self.charts();
+        let draw = |canvas: &Canvas<'_>| -> Drawn {
+            canvas.fill(&WHITE)?;
+            for (area, chart) in canvas.split_evenly((charts.len(), 1)).iter().zip(&charts) {
+                chart.draw(area)?;
+            }
+            Ok(())
+        };
+        svg(FIGURE_PX, draw).map_err(|error| ChartError { title: self.title.clone(), message: error.to_string() })
+    }
+
+    fn charts(&self) -> Vec<LineChart> {
+        let lines = |points: fn(&SampledRun) -> &Vec<(f64, f64)>| -> Vec<Line> {
+            let line = |(colour, run): (usize, &SampledRun)| Line {
+                name: run.name.clone(),
+                points: points(run).clone(),
+                colour,
+                faint: false,
+            };
+            self.runs.iter().enumerate().map(line).collect()
+        };
+        let chart = |title: &str, [x_name, y_name]: [&str; 2], lines| LineChart {
+            title: title.to_owned(),
+            x_name: x_name.to_owned(),
+            y_name: y_name.to_owned(),
+            lines,
+            level: None,
+            legend: Legend::Right,
+        };
+        let time = "time [s]";
+        vec![
+            chart(&self.title, ["along the road [m]", "across the road [m]"], lines(|run| &run.path)),
+            chart(
+                "Time headway to Opp1, which is overtaken, during the lane change until the crossing",
+                [time, "THW [s]"],
+                lines(|run| &run.thw_s[0]),
+            ),
+            chart(
+                "Time headway to Opp2, as soon as it is ahead in the other lane",
+                [time, "THW [s]"],
+                lines(|run| &run.thw_s[1]),
+            ),
+        ]
+    }
+}

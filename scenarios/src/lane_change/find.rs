@@ -1,0 +1,40 @@
+//! The lane changes of a whole trajectory file, whose tracks are read one by one.
+
+use super::{Criterion, DetectionBasis, LaneChange, LaneChangeDetector, LaneReliability, TrackSpans};
+use crate::trajectory_data::{Tracks, TrajectoryFileError};
+
+/// The lane changes of a trajectory file.
+#[derive(Clone, Debug)]
+pub struct FoundLaneChanges {
+    /// The lane changes, in order of their tracks, then of their crossings.
+    pub lane_changes: Vec<LaneChange>,
+    /// First and last instant of each track.
+    pub spans: TrackSpans,
+    /// Number of tracks.
+    pub tracks: u64,
+    /// What the detection rests on.
+    pub basis: DetectionBasis,
+}
+
+/// Detects the lane changes of a trajectory file. The memory does not grow with the file, apart from some bytes for each
+/// track.
+///
+/// # Errors
+/// [`TrajectoryFileError`] if the file cannot be read or used.
+pub fn find(
+    tracks: &mut Tracks<'_>,
+    criterion: Criterion,
+    lanes: LaneReliability,
+) -> Result<FoundLaneChanges, TrajectoryFileError> {
+    let detector = LaneChangeDetector::new(lanes, tracks.markings());
+    let basis = DetectionBasis::new(criterion, lanes, tracks.markings());
+    let mut found = FoundLaneChanges { lane_changes: Vec::new(), spans: TrackSpans::new(), tracks: 0, basis };
+    while let Some(track) = tracks.next_track()? {
+        found.tracks += 1;
+        found.basis.push(&track.trajectory, &track.markings);
+        found.lane_changes.extend(detector.detect(criterion, &track.trajectory, &track.markings));
+        found.spans.extend(track.trajectory.span().map(|span| (track.trajectory.track_id, span)));
+    }
+    found.lane_changes.sort_by(|a, b| a.track_id.cmp(&b.track_id).then(a.crossing_s.total_cmp(&b.crossing_s)));
+    Ok(found)
+}

@@ -1,0 +1,45 @@
+//! `closecall drift`: whether new traffic still matches fitted distributions.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use closecall_campaign::drift::{Fitted, drift as compare};
+use closecall_report::json::stamped;
+use closecall_report::traffic::drift::DriftText;
+
+use super::CliError;
+use super::args::{Format, ReadArgs};
+use super::output::{out, outln};
+use crate::exit_code::ExitCode;
+
+/// Arguments of `closecall drift`.
+#[derive(Debug, Args)]
+pub(super) struct DriftArgs {
+    /// File that `closecall fit` wrote, or a scenario with parameters from one
+    #[arg(value_name = "FITTED.toml")]
+    fitted: PathBuf,
+    /// Trajectory files of the new traffic
+    #[arg(required = true, value_name = "TRAJECTORY_FILE")]
+    files: Vec<PathBuf>,
+    #[command(flatten)]
+    read: ReadArgs,
+    /// Seed of the simulated distances
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Output format
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+pub(super) fn drift(args: &DriftArgs) -> Result<ExitCode, CliError> {
+    let found = compare(&Fitted::read(&args.fitted)?, &args.read.read_all(&args.files)?, args.seed);
+    match args.format {
+        Format::Json => outln!("{:#}", stamped(serde_json::json!(found), None, None)),
+        Format::Human => out!("{}", DriftText(&found)),
+    }
+    Ok(match (found.is_tested, found.has_drifted) {
+        (_, true) => ExitCode::Fail,
+        (true, false) => ExitCode::Pass,
+        (false, false) => ExitCode::Inconclusive,
+    })
+}

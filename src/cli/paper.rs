@@ -1,0 +1,63 @@
+//! `closecall paper`: the figures of the published method on any set of trajectory files.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use closecall_campaign::robustness::robustness;
+use closecall_report::traffic::paper::{Paper, RecordedChanges};
+use closecall_scenarios::atomic::write_file;
+use closecall_scenarios::criticality::{Judgement, criticality};
+use closecall_scenarios::filters::smooth;
+use closecall_scenarios::robustness::Setup;
+
+use super::CliError;
+use super::args::{ReadArgs, positive};
+use super::output::{print_written, write_charts};
+use super::protect::{of_trajectories, protect};
+use super::robustness::refused;
+use crate::exit_code::ExitCode;
+
+/// Arguments of `closecall paper`.
+#[derive(Debug, Args)]
+pub(super) struct PaperArgs {
+    /// Trajectory files
+    #[arg(required = true, value_name = "TRAJECTORY_FILE")]
+    files: Vec<PathBuf>,
+    #[command(flatten)]
+    read: ReadArgs,
+    /// Speed limit in m/s [default: 120 km/h]
+    #[arg(long, value_name = "M/S", value_parser = positive)]
+    speed_limit_mps: Option<f64>,
+    /// Seed of the noise of figure 3
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Number of draws of the noise at each level; 0 leaves figure 3 out
+    #[arg(long, default_value_t = Setup::default().repetitions, value_parser = clap::value_parser!(u64).range(0..=10_000))]
+    repetitions: u64,
+    /// Folder for the pictures and `index.html`
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+}
+
+pub(super) fn paper(args: &PaperArgs) -> Result<ExitCode, CliError> {
+    let index = args.output.join("index.html");
+    protect(&of_trajectories(&args.files), &[("--output", Some(&index))])?;
+    let data_sets = args.read.read_all(&args.files)?;
+    let judgement = Judgement { speed_limit_mps: args.speed_limit_mps, ttce_alone: false };
+    let recorded = data_sets
+        .iter()
+        .map(|data| RecordedChanges { name: data.name.clone(), changes: criticality(&smooth(data), &judgement) });
+    let recorded: Vec<RecordedChanges> = recorded.collect();
+    let setup = Setup { seed: args.seed, repetitions: args.repetitions, ..Setup::default() };
+    let studied = match args.repetitions {
+        0 => None,
+        _ => robustness(&args.files, args.read.options(), &setup).map_err(refused)?,
+    };
+    let paper = Paper::new(&recorded, studied.as_ref(), args.speed_limit_mps)?;
+    let paths: Vec<PathBuf> = paper.pictures.iter().map(|picture| args.output.join(&picture.name)).collect();
+    let charts: Vec<String> = paper.pictures.into_iter().map(|picture| picture.svg).collect();
+    write_charts(&args.output, &paths, &charts)?;
+    write_file(&index, |file| file.write_all(paper.page.as_bytes()))?;
+    print_written(&index);
+    Ok(ExitCode::Pass)
+}
