@@ -105,11 +105,8 @@ impl FilmRecorder {
             matches!(view.phase, Phase::Critical | Phase::Overtaking) && index.is_multiple_of(DENSE_SCAN_INTERVAL);
         let is_dense = is_eventful && self.dense_scan_count < MAX_DENSE_SCANS;
         self.dense_scan_count += usize::from(is_dense);
-        let scan = if is_dense || index.is_multiple_of(SPARSE_SCAN_INTERVAL) {
-            Scan::latest(view.perception)
-        } else {
-            None
-        };
+        let scan =
+            if is_dense || index.is_multiple_of(SPARSE_SCAN_INTERVAL) { Scan::latest(view.perception) } else { None };
         if let Ok(thw_s) = view.margins.thw_rear_s
             && is_eventful
             && view.phase == Phase::Critical

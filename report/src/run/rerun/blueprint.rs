@@ -70,14 +70,11 @@ pub(super) struct FilmContents {
 /// Returns the chunks of the layout for these films.
 pub(super) fn layout(films: &[FilmContents]) -> Result<Chunks, RecordingError> {
     let left = below(
-        [
-            Some((verdict_share(films), verdict())),
-            bird(films).map(|view| (bird_share(films), view)),
-        ]
-        .into_iter()
-        .flatten()
-        .chain(scenes(films).map(|view| (if films.len() > 1 || is_traffic(films) { 3.4 } else { 5.0 }, view)))
-        .collect(),
+        [Some((verdict_share(films), verdict())), bird(films).map(|view| (bird_share(films), view))]
+            .into_iter()
+            .flatten()
+            .chain(scenes(films).map(|view| (if films.len() > 1 || is_traffic(films) { 3.4 } else { 5.0 }, view)))
+            .collect(),
     );
     let mut states: Vec<Node> = films.iter().filter(|film| film.has_states).rev().map(states).collect();
     let mut right = Vec::new();
@@ -109,7 +106,7 @@ fn bird_share(films: &[FilmContents]) -> f32 {
 fn verdict_share(films: &[FilmContents]) -> f32 {
     match films {
         [_] if is_traffic(films) => 3.4,
-        [_] => 2.4,
+        [_] => 2.6,
         _ => 2.9,
     }
 }

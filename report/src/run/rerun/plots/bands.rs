@@ -115,9 +115,8 @@ impl Plots<'_> {
             (0..self.times.len()).map(|row| span_at(row).map_or("", |index| texts[index].as_str())).collect();
         let shorts: Vec<String> = spans.iter().map(KnownSpan::short_words).collect();
         let colour = |span: &KnownSpan| if span.from_m.is_some() { palette::SAFE } else { palette::QUIET };
-        let states: Vec<Word<'_>> = (0..spans.len())
-            .map(|index| Word::new(&texts[index], &shorts[index], colour(&spans[index])))
-            .collect();
+        let states: Vec<Word<'_>> =
+            (0..spans.len()).map(|index| Word::new(&texts[index], &shorts[index], colour(&spans[index]))).collect();
         self.band("states/2_rear_seen", &words, &states)
     }
 
