@@ -4,7 +4,8 @@
 //!  worst:5,failures:20,random:3
 //! ```
 //!
-//! - *worst*: the samples with the hardest collisions of the ego, then those with the smallest time headways;
+//! - *worst*: the samples with the hardest collisions of the ego, then those with the smallest time headways, without
+//!   uneventful ones, in which no vehicle collides and no moment of the encounter is reached (*random* may draw these);
 //! - *failures*: the first samples in which the ego collided. Those that the system induced, in which the ego of the
 //!   baseline did not collide, precede all others;
 //! - *random*: samples drawn at random, which show the usual case.
@@ -87,6 +88,8 @@ struct Severity {
     thw_s: f64,
     /// True if the ego of the baseline did not collide.
     is_safe_in_baseline: bool,
+    /// True if a vehicle collided or a moment of the encounter was reached.
+    is_eventful: bool,
 }
 
 /// Selects samples of one scenario, whose records are passed to it one by one.
@@ -123,7 +126,7 @@ impl Chooser {
             None => chosen.push(Chosen { sample, reasons: vec![reason] }),
         };
         let count = |count: u64| usize::try_from(count).unwrap_or(usize::MAX);
-        let mut worst: Vec<&Severity> = self.samples.iter().collect();
+        let mut worst: Vec<&Severity> = self.samples.iter().filter(|severity| severity.is_eventful).collect();
         worst.sort_by(|a, b| compare(b, a));
         worst.iter().take(count(self.selection.worst)).for_each(|severity| add(severity.sample, "worst"));
         let all = self.samples.iter().filter(|severity| severity.delta_v_mps.is_some());
@@ -147,7 +150,8 @@ fn severity(sample: u64, outcome: &Outcome) -> Severity {
     let finite = |value: Measured| value.ok().filter(|value| value.is_finite());
     let margins = [outcome.margins.min_thw_front_s, outcome.margins.min_thw_rear_s];
     let thw_s = margins.into_iter().filter_map(finite).fold(f64::INFINITY, f64::min);
-    Severity { sample, delta_v_mps: outcome.ego_delta_v_mps(), thw_s, is_safe_in_baseline: false }
+    let is_eventful = !outcome.collisions.is_empty() || !outcome.moments.is_empty();
+    Severity { sample, delta_v_mps: outcome.ego_delta_v_mps(), thw_s, is_safe_in_baseline: false, is_eventful }
 }
 
 /// Compares by the change of velocity, then by the time headway. Of two equal samples the earlier one is the worse.
@@ -180,6 +184,7 @@ mod tests {
             delta_v_mps,
             thw_s,
             is_safe_in_baseline: false,
+            is_eventful: true,
         };
         let samples = samples.map(severity).collect();
         Chooser { selection, samples }
@@ -193,6 +198,15 @@ mod tests {
         let numbers: Vec<u64> = chosen.iter().map(|chosen| chosen.sample).collect();
         assert_eq!(numbers, [3, 1, 2]);
         assert_eq!(chosen[1].reasons, ["worst", "failure"]);
+    }
+
+    #[test]
+    fn an_uneventful_sample_is_not_among_the_worst() {
+        let selection = Selection { worst: 2, failures: 0, random: 0 };
+        let mut chooser = chooser(selection, &[(None, 0.7), (None, 0.9)]);
+        chooser.samples[0].is_eventful = false;
+        let chosen = chooser.choose(0, &ActorId::new("ego").unwrap());
+        assert_eq!(chosen.iter().map(|chosen| chosen.sample).collect::<Vec<_>>(), [1]);
     }
 
     #[test]

@@ -41,6 +41,7 @@ fn the_program_of_the_page_reads_a_recording() {
     let least_s = tested["margins"]["min_thw_rear_s"].as_f64().unwrap();
     let [property_s, curve_s] = [words[2], words[3]].map(|word| word.parse::<f64>().unwrap());
     assert!((property_s - least_s).abs() < 0.006, "{text} {least_s}");
+    assert_eq!(words[4], "s", "{text}");
     // The curve has the control steps only.
     assert!(curve_s >= property_s && curve_s < property_s + 0.1, "{text}");
 }

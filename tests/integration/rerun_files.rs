@@ -54,20 +54,34 @@ fn recordings_of_a_pair_a_full_run_and_recorded_traffic_verify() {
 }
 
 #[test]
-fn the_same_run_gives_the_same_recording() {
+fn the_same_run_gives_the_same_recording_byte_for_byte() {
     let folder = folder();
     let scenario = library("low-thw-overtake");
-    let written = |name: &str| {
+    let written = |name: &str, more: &[&str]| {
         let file = folder.path().join(name);
-        let arguments = ["run", scenario.to_str().unwrap(), "--paired", "--record", file.to_str().unwrap()];
-        stdout(&closecall(arguments), 0);
+        let arguments = ["run", scenario.to_str().unwrap(), "--record", file.to_str().unwrap()];
+        stdout(&closecall(arguments.iter().chain(more)), 0);
         std::fs::read(file).unwrap()
     };
-    let [one, two] = ["one.rrd", "two.rrd"].map(written);
-    assert_eq!(one.len(), two.len());
-    // The index after the messages, about a fifth of the file, lists its columns in an order of chance.
-    let equal = one.iter().zip(&two).take_while(|(a, b)| a == b).count();
-    assert!(equal as f64 > 0.75 * one.len() as f64, "equal up to byte {equal} of {}", one.len());
+    for more in [["--paired"].as_slice(), ["--sensors", "full"].as_slice()] {
+        let [one, two] = ["one.rrd", "two.rrd"].map(|name| written(name, more));
+        let equal = one.iter().zip(&two).take_while(|(a, b)| a == b).count();
+        assert!(one == two, "{more:?}: equal up to byte {equal} of {} and {}", one.len(), two.len());
+    }
+}
+
+#[test]
+fn recordings_stay_small() {
+    let folder = folder();
+    let scenario = library("paper-figure");
+    let size = |sensors: &str| {
+        let file = folder.path().join(format!("{sensors}.rrd"));
+        let arguments = ["run", scenario.to_str().unwrap(), "--sensors", sensors, "--record", file.to_str().unwrap()];
+        stdout(&closecall(arguments), 0);
+        std::fs::metadata(&file).unwrap().len()
+    };
+    let [objects, full] = ["object", "full"].map(size);
+    assert!(objects < 3_000_000 && full < 5_000_000, "{objects} {full}");
 }
 
 #[test]
@@ -103,7 +117,10 @@ fn a_campaign_records_the_selected_samples_and_lists_them_on_a_page() {
     for file in &files {
         assert!(page.contains(&format!("rerun {file}")), "the page does not list {file}");
     }
-    assert_eq!(page.matches("<svg").count(), files.len());
+    // Each entry has a picture, and both arms in the view that the slider moves.
+    assert_eq!(page.matches("<svg").count(), 3 * files.len());
+    assert_eq!(page.matches("class=\"scrubber\"").count(), files.len());
+    assert!(page.contains("<select name=\"verdict\"><option value=\"\">all</option>"));
     assert!(page.contains("--paired") && page.contains("Recorded as worst"));
     let wrong = closecall(["campaign", scenario.to_str().unwrap(), "-n", "1", "--record", "best:3"]);
     assert_eq!(code(&wrong), 2);

@@ -11,7 +11,7 @@ use closecall_simulation::scenario::ScenarioFile;
 use super::files::ReportError;
 use super::findings::Recordings;
 use super::html::{IndexEntry, write_index};
-use crate::run::figure::still;
+use crate::run::figure::{scrubber, still};
 use crate::run::film::{Film, Level, film_arms};
 use crate::run::rerun::write_recording;
 
@@ -77,7 +77,7 @@ fn record_one(saved: &SavedCampaign, scenario: &str, chosen: &Chosen) -> Result<
     let paired = if films.len() > 1 { " --paired" } else { "" };
     let replay = format!(
         "closecall replay {} {sample} --scenario {scenario}{paired} --record {file}",
-        saved.folder().path().display(),
+        quoted(&saved.folder().path().display().to_string()),
     );
     let story = films.iter().flat_map(|film| {
         let arm = film.arm_label();
@@ -91,6 +91,14 @@ fn record_one(saved: &SavedCampaign, scenario: &str, chosen: &Chosen) -> Result<
         replay,
         story: story.collect(),
         still: films.last().map_or(String::new(), still),
+        scrubber: scrubber(&films),
+        verdict: Film::verdict_word(&films),
         outcomes: films.iter().filter_map(|film| film.outcome().cloned()).collect(),
     })
+}
+
+/// Returns a path as one word of a command.
+fn quoted(path: &str) -> String {
+    let is_plain = |letter: char| letter.is_alphanumeric() || "/._-+:@".contains(letter);
+    if path.chars().all(is_plain) { path.to_owned() } else { format!("'{}'", path.replace('\'', "'\\''")) }
 }

@@ -50,7 +50,8 @@ pub(crate) fn balance(prevented: u64, induced: u64, most: u64) -> io::Result<Mar
 
 fn bar(paint: impl FnOnce(&Canvas<'_>) -> Drawn) -> io::Result<Markup> {
     let (width, height) = SIZE_PX;
-    let attributes = format!("width=\"{width}\" height=\"{height}\" role=\"img\"");
+    let attributes =
+        format!("width=\"{width}\" height=\"{height}\" role=\"img\" aria-label=\"Intervals of the shares\"");
     sized((UNITS_PER_PX * width, UNITS_PER_PX * height), &attributes, paint)
 }
 

@@ -26,7 +26,6 @@ pub(in crate::campaign) fn write_html(path: &Path, findings: &Findings<'_>) -> R
 pub(super) fn campaign(findings: &Findings<'_>) -> io::Result<Markup> {
     let title = format!("{}: {}", findings.judged.word(), findings.scenario_names());
     let body = html! {
-        (verdict::header(findings))
         (ledger::collisions(findings)?)
         (ensemble_html(findings.summary, findings.manifest))
         (verdict::gates(findings))
@@ -36,7 +35,26 @@ pub(super) fn campaign(findings: &Findings<'_>) -> io::Result<Markup> {
         (samples::slowest(findings))
         (provenance::provenance(findings))
     };
-    Ok(document(&title, &body))
+    let (contents, body) = with_contents(&body.into_string());
+    Ok(document(&title, &html! { (verdict::header(findings)) (contents) (body) }))
+}
+
+/// Returns a list of contents, and the page whose headings it names.
+fn with_contents(body: &str) -> (Markup, PreEscaped<String>) {
+    const HEADING: &str = "<h2>";
+    let mut parts = body.split(HEADING);
+    let mut page = parts.next().unwrap_or_default().to_owned();
+    let mut titles = Vec::new();
+    for (number, part) in parts.enumerate() {
+        titles.push(PreEscaped(part.split("</h2>").next().unwrap_or_default()));
+        page.push_str(&format!("<h2 id=\"part-{number}\">{part}"));
+    }
+    let contents = html! {
+        nav aria-label="Contents" {
+            @for (number, title) in titles.iter().enumerate() { a href={ "#part-" (number) } { (title) } }
+        }
+    };
+    (contents, PreEscaped(page))
 }
 
 /// Returns a whole page.
@@ -58,7 +76,7 @@ pub(crate) fn document(title: &str, body: &Markup) -> Markup {
 /// Returns a table that scrolls sideways if the page is too narrow; `head` holds cells, `rows` holds rows.
 pub(crate) fn table(head: &Markup, rows: &Markup) -> Markup {
     html! {
-        div.wide {
+        div.wide tabindex="0" {
             table {
                 thead { tr { (head) } }
                 tbody { (rows) }
@@ -69,7 +87,7 @@ pub(crate) fn table(head: &Markup, rows: &Markup) -> Markup {
 
 /// Returns the heads of columns of text.
 pub(crate) fn text_heads(names: &[&str]) -> Markup {
-    html! { @for name in names { th { (name) } } }
+    html! { @for name in names { @if name.is_empty() { td {} } @else { th { (name) } } } }
 }
 
 /// Returns the heads of columns of numbers.
@@ -90,6 +108,14 @@ pub(crate) fn legend_key(colour: &str, text: &str) -> Markup {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_contents_name_every_heading() {
+        let (contents, page) = with_contents("<p>0</p><h2>One</h2><p>1</p><h2>a &lt; b</h2>");
+        assert_eq!(page.0, "<p>0</p><h2 id=\"part-0\">One</h2><p>1</p><h2 id=\"part-1\">a &lt; b</h2>");
+        let contents = contents.into_string();
+        assert!(contents.contains("<a href=\"#part-0\">One</a><a href=\"#part-1\">a &lt; b</a>"), "{contents}");
+    }
 
     #[test]
     fn text_cannot_become_markup() {

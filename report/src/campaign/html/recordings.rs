@@ -1,6 +1,7 @@
 //! The page of a campaign's recordings: a picture of each critical moment beside its numbers, and the commands that open
 //! the recording and run the sample again.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use closecall_traffic::Measured;
@@ -27,6 +28,10 @@ pub(in crate::campaign) struct IndexEntry {
     pub(in crate::campaign) story: Vec<String>,
     /// The critical moment, as SVG.
     pub(in crate::campaign) still: String,
+    /// The view from above with a slider.
+    pub(in crate::campaign) scrubber: Markup,
+    /// The verdict on the pair, or on the only run.
+    pub(in crate::campaign) verdict: &'static str,
     /// The outcome of each arm, the baseline first.
     pub(in crate::campaign) outcomes: Vec<Outcome>,
 }
@@ -48,32 +53,59 @@ fn page(entries: &[IndexEntry]) -> Markup {
             "Each picture shows the critical moment from above: the vehicles drive to "
             "the right, and the road is drawn wider than it is. The recordings open in the Rerun viewer 0.36:"
         }
-        pre { "pip install rerun-sdk==0.36.3" }
+        pre.command tabindex="0" { "pip install rerun-sdk==0.36.3" }
         p { "Without an installed viewer window, in the browser: " code { "closecall view DIR" } ", with the campaign's folder." }
+        (filters(entries))
         @for entry in entries { (section(entry)) }
-        script { (PreEscaped(LINKS)) }
+        script { (PreEscaped(SCRIPT)) }
     };
     document("Recordings", &body)
 }
 
-/// Shows the links into the web viewer if `closecall view` serves the page.
-const LINKS: &str = "if (location.protocol === 'http:') for (const link of document.querySelectorAll('a.in-browser')) {
-  link.href = '/viewer/?url=' + encodeURIComponent(link.href); link.hidden = false; }";
+/// Shows the links into the web viewer if `closecall view` serves the page, filters the entries, and moves the vehicles.
+const SCRIPT: &str = include_str!("recordings.js");
+
+/// Returns the choices by which the entries can be filtered: verdict, scenario, and the arm whose ego collides.
+fn filters(entries: &[IndexEntry]) -> Markup {
+    let arms = entries.iter().flat_map(|entry| &entry.outcomes).map(|outcome| outcome.controller.clone());
+    let choices: [(&str, &str, BTreeSet<String>); 3] = [
+        ("verdict", "Verdict", entries.iter().map(|entry| entry.verdict.to_owned()).collect()),
+        ("collided", "The ego collides with", arms.collect()),
+        ("scenario", "Scenario", entries.iter().map(|entry| entry.scenario.clone()).collect()),
+    ];
+    html! {
+        form.filters hidden {
+            @for (name, title, values) in &choices {
+                label {
+                    (title) " "
+                    select name=(name) {
+                        option value="" { "all" }
+                        @for value in values { option { (value) } }
+                    }
+                }
+            }
+            output {}
+        }
+    }
+}
 
 fn section(entry: &IndexEntry) -> Markup {
+    let outcomes = entry.outcomes.iter().filter(|outcome| outcome.ego_collided());
+    let collided: Vec<&str> = outcomes.map(|outcome| outcome.controller.as_str()).collect();
     html! {
-        section.recording id={ (entry.scenario) "-" (entry.sample) } {
-            figure { (PreEscaped(&entry.still)) }
+        section.recording id={ (entry.scenario) "-" (entry.sample) } data-verdict=(entry.verdict)
+            data-scenario=(entry.scenario) data-collided=(collided.join(" ")) {
+            figure { (PreEscaped(&entry.still)) (entry.scrubber) }
             div {
-                h2 { (entry.scenario) " · sample " (entry.sample) }
+                h2 { (entry.scenario) " · sample " (entry.sample) " · " (entry.verdict) }
                 p { "Recorded as " (entry.reasons.join(", ")) "." }
                 @for line in &entry.story { p.failure[line.contains("COLLISION")] { (line) } }
                 (numbers(&entry.outcomes))
                 p { "Open it, from this page's folder:" }
-                pre { "rerun " (entry.file) }
+                pre.command tabindex="0" { "rerun " (entry.file) }
                 a.in-browser hidden href=(entry.file) { "Open in this browser" }
                 p { "Run it again, from the folder that the campaign was run in:" }
-                pre { (entry.replay) }
+                pre.command tabindex="0" { (entry.replay) }
             }
         }
     }
@@ -99,7 +131,7 @@ fn measured(value: Measured) -> String {
 
 fn numbers(outcomes: &[Outcome]) -> Markup {
     let head = html! {
-        th {}
+        td {}
         @for outcome in outcomes { th { (outcome.controller) } }
     };
     let rows = html! {

@@ -29,7 +29,7 @@ pub(super) fn worst(findings: &Findings<'_>, scenario: &ScenarioOverview) -> Mar
             "Induced collisions first, then the other collisions, each by the ego's change of velocity; then the narrowest "
             "escapes, by the smallest time to collision with the vehicle behind. To run one again, within this folder:"
         }
-        @if let Some(first) = scenario.worst.first() { pre { (findings.replay(&scenario.name, first.sample)) } }
+        @if let Some(first) = scenario.worst.first() { pre.command tabindex="0" { (findings.replay(&scenario.name, first.sample)) } }
         (table(&head, &rows))
         @if let Some(gallery) = findings.gallery {
             p { a href=(gallery) { "All recordings with pictures of their critical moments" } }

@@ -68,6 +68,9 @@ fn a_campaigns_page_has_all_parts_and_loads_nothing() {
         "Slowest samples",
         "How it was made",
         "closing [m/s]",
+        "<a href=\"#part-0\">Collisions of the ego</a>",
+        "page written on",
+        "prefers-color-scheme: dark",
     ] {
         assert!(page.contains(part), "{part}");
     }

@@ -13,12 +13,14 @@ mod chart;
 mod colours;
 mod encounter;
 mod png;
+mod scrubber;
 mod still;
 mod strip;
 mod svg;
 
 pub use encounter::encounter;
 pub use png::{PngError, png};
+pub(crate) use scrubber::scrubber;
 pub use still::still;
 
 #[cfg(test)]

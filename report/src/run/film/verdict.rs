@@ -30,6 +30,15 @@ pub(in crate::run) const fn fate_word(fate: PairFate) -> &'static str {
 }
 
 impl Film {
+    /// Returns the verdict on a pair, or on a single run, in capital letters.
+    pub(crate) fn verdict_word(films: &[Self]) -> &'static str {
+        match Self::pair_fate(films) {
+            Some(fate) => fate_word(fate),
+            None if films.iter().any(|film| film.worst_collision().is_some()) => "COLLISION",
+            None => "NO COLLISION",
+        }
+    }
+
     /// Returns the verdict on a pair of films of runs, or `None` if one of them is recorded traffic.
     pub fn pair_fate(films: &[Self]) -> Option<PairFate> {
         match films {

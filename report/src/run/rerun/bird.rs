@@ -332,7 +332,7 @@ fn write_collisions(writer: &Writer<'_>, canvas: &Canvas<'_>) -> Result<(), Reco
     let half_m = 0.5 * LETTER_M * text.chars().count() as f64;
     let text_at = [(X_RANGE_M[1] - half_m) as f32, (canvas.top_m - NAMES_ABOVE_M) as f32];
     let fixed = Points2D::update_fields()
-        .with_colors([palette::CRITICAL])
+        .with_colors([palette::CRITICAL, palette::text(palette::CRITICAL)])
         .with_radii([1.6_f32, 0.05])
         .with_labels([String::new(), text])
         .with_draw_order(MARK_ORDER)

@@ -106,7 +106,7 @@ fn bird_share(films: &[FilmContents]) -> f32 {
 fn verdict_share(films: &[FilmContents]) -> f32 {
     match films {
         [_] if is_traffic(films) => 3.4,
-        [_] => 2.4,
+        [_] => 2.6,
         _ => 2.9,
     }
 }

@@ -86,10 +86,16 @@ fn windows(film: &Film, camera: &RearCamera, frame: &Frame) -> Boxes2D {
     let boxes = frame.scan.as_ref().map_or(&[][..], |scan| &scan.boxes);
     let in_image: Vec<(&Detection, PixelRect)> =
         boxes.iter().filter_map(|found| Some((found, camera.detection_window(&ego, found)?))).collect();
+    // A window that reaches beyond the image is cut off: the viewer would make the image smaller until the window fits.
     let scale = 1.0 / f32::from(PIXEL_STEP);
-    let corner =
-        |window: &PixelRect| [window.left as f32 * scale, (window.top as f32 - f32::from(PIXEL_ROWS.start)) * scale];
-    let size = |window: &PixelRect| [window.width as f32 * scale, window.height as f32 * scale];
+    let size_px = [PixelRect::IMAGE.width as f32, f32::from(PIXEL_ROWS.end - PIXEL_ROWS.start)];
+    let ends = |window: &PixelRect| {
+        let start = [window.left as f32, window.top as f32 - f32::from(PIXEL_ROWS.start)];
+        let extent = [window.width as f32, window.height as f32];
+        [0, 1].map(|axis| [start[axis], start[axis] + extent[axis]].map(|end| scale * end.clamp(0.0, size_px[axis])))
+    };
+    let corner = |window: &PixelRect| ends(window).map(|[low, _]| low);
+    let size = |window: &PixelRect| ends(window).map(|[low, high]| high - low);
     Boxes2D::from_mins_and_sizes(
         in_image.iter().map(|(_, window)| corner(window)),
         in_image.iter().map(|(_, window)| size(window)),

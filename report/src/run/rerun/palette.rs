@@ -39,7 +39,7 @@ pub(super) const GROUND: Rgba = [24, 27, 31, 255];
 /// Fog, as the scene shows it.
 const FOG: Rgba = [196, 200, 204, 255];
 /// Text beside the road.
-pub(super) const NOTE: Rgba = [190, 196, 204, 255];
+pub(super) const NOTE: Rgba = [222, 226, 230, 255];
 
 pub(super) const GLASS: Rgba = [30, 36, 44, 255];
 pub(super) const TYRE: Rgba = [22, 22, 24, 255];
@@ -84,6 +84,13 @@ pub(super) fn through_fog(colour: Rgba, share: f64) -> Rgba {
 /// Returns the colour with another opacity.
 pub(super) fn with_opacity([red, green, blue, _]: Rgba, opacity: u8) -> Rgba {
     [red, green, blue, opacity]
+}
+
+/// Returns a paler shade of a colour, for text. The viewer puts text on a box that is dark in its dark theme, and grey in
+/// its light theme.
+pub(super) fn text([red, green, blue, opacity]: Rgba) -> Rgba {
+    let paler = |channel: u8| 255 - (u16::from(255 - channel) * 9 / 20) as u8;
+    [paler(red), paler(green), paler(blue), opacity]
 }
 
 /// Returns a darker shade of a colour, for the curves of the baseline.

@@ -7,20 +7,21 @@
 //!  __properties/arms/ARM          collided, smallest headways, when the MIS engaged, and so on
 //! ```
 //!
-//! The unit is in the name of each property, and in the metadata of its column.
+//! The unit is in the name of each property, and in the metadata of its column, as the type of the component.
 
 use std::sync::Arc;
 
-use crate::run::rerun::sdk::{AnyValues, AsComponents, ComponentIdentifier};
 use arrow::array::{ArrayRef, BooleanArray, Float64Array, StringArray, UInt64Array};
 use closecall_simulation::outcome::Outcome;
 use closecall_traffic::{Measured, Value};
-use re_sdk::external::re_log_types::EntityPath;
 use re_sdk_types::archetypes::RecordingInfo;
+use re_sdk::external::re_log_types::EntityPath;
+use crate::run::rerun::sdk::{AsComponents, ComponentDescriptor, ComponentIdentifier, SerializedComponentBatch};
 
 use super::RecordingError;
 use super::chunks::Chunks;
-use crate::run::film::{Film, fate_word};
+use crate::run::film::Film;
+use crate::units::unit_of;
 
 /// Writes the properties of the recording.
 pub(super) fn write(data: &Chunks, films: &[Film]) -> Result<(), RecordingError> {
@@ -30,83 +31,91 @@ pub(super) fn write(data: &Chunks, films: &[Film]) -> Result<(), RecordingError>
     let Some((film, outcome)) = films.iter().rev().find_map(|film| Some((film, film.outcome.as_ref()?))) else {
         return Ok(());
     };
-    let mut run = Properties::default()
-        .text("scenario", &outcome.scenario)
-        .count("seed", outcome.seed)
-        .count("sample", outcome.sample)
-        .text("settings", &film.settings.join(" "));
-    if let Some(fate) = Film::pair_fate(films) {
-        run = run.text("verdict", fate_word(fate));
-    }
-    run.push(data, "run")?;
+    Properties::default()
+        .text("scenario", &outcome.scenario)?
+        .count("seed", outcome.seed)?
+        .count("sample", outcome.sample)?
+        .text("settings", &film.settings.join(" "))?
+        .text("verdict", Film::verdict_word(films))?
+        .push(data, "run")?;
     let mut parameters = Properties::default();
     for (name, value) in outcome.parameters.iter() {
         parameters = match value {
-            Value::Number(number) => parameters.number(&name.to_string(), Ok(*number)),
-            other => parameters.text(&name.to_string(), &other.to_string()),
+            Value::Number(number) => parameters.number(&name.to_string(), Ok(*number))?,
+            other => parameters.text(&name.to_string(), &other.to_string())?,
         };
     }
     parameters.push(data, "parameters")?;
     for (film, outcome) in films.iter().filter_map(|film| Some((film, film.outcome.as_ref()?))) {
-        of_arm(film, outcome).push(data, &format!("arms/{}", film.arm))?;
+        of_arm(film, outcome)?.push(data, &format!("arms/{}", film.arm))?;
     }
     Ok(())
 }
 
 /// Returns the properties of one arm.
-fn of_arm(film: &Film, outcome: &Outcome) -> Properties {
+fn of_arm(film: &Film, outcome: &Outcome) -> Result<Properties, RecordingError> {
     let margins = &outcome.margins;
     let mut properties = Properties::default()
-        .text("controller", &outcome.controller)
-        .flag("ego_collided", outcome.ego_collided())
-        .count("collisions", outcome.collisions.len() as u64)
-        .number("duration_s", Ok(outcome.duration.s()))
-        .number("critical_moment_s", Ok(film.critical_moment().s()))
-        .number("min_thw_front_s", margins.min_thw_front_s)
-        .number("min_thw_rear_s", margins.min_thw_rear_s)
-        .number("min_gap_front_m", margins.min_gap_front_m)
-        .number("min_gap_rear_m", margins.min_gap_rear_m)
-        .number("max_deceleration_mps2", Ok(margins.max_deceleration_mps2));
+        .text("controller", &outcome.controller)?
+        .flag("ego_collided", outcome.ego_collided())?
+        .count("collisions", outcome.collisions.len() as u64)?
+        .number("duration_s", Ok(outcome.duration.s()))?
+        .number("critical_moment_s", Ok(film.critical_moment().s()))?
+        .number("min_thw_front_s", margins.min_thw_front_s)?
+        .number("min_thw_rear_s", margins.min_thw_rear_s)?
+        .number("min_gap_front_m", margins.min_gap_front_m)?
+        .number("min_gap_rear_m", margins.min_gap_rear_m)?
+        .number("max_deceleration_mps2", Ok(margins.max_deceleration_mps2))?;
     if let Some(collision) = film.worst_collision() {
         properties = properties
-            .number("collision_time_s", Ok(collision.time.s()))
-            .number("collision_relative_speed_mps", Ok(collision.relative_speed_mps));
+            .number("collision_time_s", Ok(collision.time.s()))?
+            .number("collision_relative_speed_mps", Ok(collision.relative_speed_mps))?;
     }
     if let Ok(mis) = &outcome.mis {
         properties = properties
-            .number("mis_engaged_at_s", mis.engaged_at_s)
-            .number("mis_thw_front_at_critical_s", mis.thw_front_at_critical_s)
-            .text("mis_reason", &mis.reason.to_string());
+            .number("mis_engaged_at_s", mis.engaged_at_s)?
+            .number("mis_thw_front_at_critical_s", mis.thw_front_at_critical_s)?
+            .text("mis_reason", &mis.reason.to_string())?;
     }
-    properties
+    Ok(properties)
 }
 
 /// Values of one entity. A value that does not exist has no column.
 #[derive(Default)]
-struct Properties(Vec<(String, ArrayRef)>);
+struct Properties(Vec<SerializedComponentBatch>);
+
+impl AsComponents for Properties {
+    fn as_serialized_batches(&self) -> Vec<SerializedComponentBatch> {
+        self.0.clone()
+    }
+}
 
 impl Properties {
-    fn with(mut self, name: &str, array: ArrayRef) -> Self {
-        self.0.push((name.replace('-', "_"), array));
-        self
+    fn with(mut self, name: &str, array: ArrayRef) -> Result<Self, RecordingError> {
+        let name = name.replace('-', "_");
+        let component = ComponentIdentifier::try_new(&name).map_err(RecordingError::encode)?;
+        let component_type = unit_of(&name).map(Into::into);
+        let descriptor = ComponentDescriptor { archetype: None, component, component_type };
+        self.0.push(SerializedComponentBatch::new(array, descriptor));
+        Ok(self)
     }
 
-    fn text(self, name: &str, text: &str) -> Self {
+    fn text(self, name: &str, text: &str) -> Result<Self, RecordingError> {
         self.with(name, Arc::new(StringArray::from(vec![text])))
     }
 
-    fn count(self, name: &str, count: u64) -> Self {
+    fn count(self, name: &str, count: u64) -> Result<Self, RecordingError> {
         self.with(name, Arc::new(UInt64Array::from(vec![count])))
     }
 
-    fn flag(self, name: &str, flag: bool) -> Self {
+    fn flag(self, name: &str, flag: bool) -> Result<Self, RecordingError> {
         self.with(name, Arc::new(BooleanArray::from(vec![flag])))
     }
 
-    fn number(self, name: &str, value: Measured) -> Self {
+    fn number(self, name: &str, value: Measured) -> Result<Self, RecordingError> {
         match value {
             Ok(value) => self.with(name, Arc::new(Float64Array::from(vec![value]))),
-            Err(_) => self,
+            Err(_) => Ok(self),
         }
     }
 
@@ -114,12 +123,7 @@ impl Properties {
         if self.0.is_empty() {
             return Ok(());
         }
-        let mut values = AnyValues::default();
-        for (name, array) in self.0 {
-            let name = ComponentIdentifier::try_new(&name).map_err(RecordingError::encode)?;
-            values = values.with_component_from_data(name, array);
-        }
         let path: EntityPath = entity.into();
-        data.push_static(EntityPath::properties().join(&path), &values as &dyn AsComponents)
+        data.push_static(EntityPath::properties().join(&path), &self)
     }
 }

@@ -165,7 +165,8 @@ fn write_name(
     (name, at_m, colour): (&str, [f32; 3], Rgba),
 ) -> Result<(), RecordingError> {
     let entity = format!("{entity}/name");
-    let fixed = Points3D::new([at_m]).with_colors([colour]).with_radii([0.05_f32]).with_show_labels(true);
+    let fixed =
+        Points3D::new([at_m]).with_colors([palette::text(colour)]).with_radii([0.05_f32]).with_show_labels(true);
     writer.write_static(&entity, &fixed)?;
     // Only a change of the rounded speed gives a new row.
     let texts: Vec<String> = states.iter().map(|state| format!("{name} {:.0} m/s", state.speed_mps)).collect();
@@ -269,7 +270,7 @@ fn write_gaps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), Re
         writer.write_rows(&text_entity, times, |range| {
             let shown = || gaps[range.clone()].iter().flatten();
             Points3D::new(shown().map(|gap| gap.text_m))
-                .with_colors(shown().map(|gap| gap.colour))
+                .with_colors(shown().map(|gap| palette::text(gap.colour)))
                 .with_labels(shown().map(|gap| gap.text.as_str()))
                 .columns(lengths(&gaps[range.clone()]))
         })?;
@@ -334,7 +335,7 @@ fn write_collisions(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingErr
         let entity = format!("{}/collision_{}", entity(film, index), number + 1);
         let [x, y] = at_m.map(|at_m| at_m as f32);
         let mark = Points3D::new([[x, y, 0.6], [text_x_m, 0.0, 0.0]])
-            .with_colors([palette::CRITICAL])
+            .with_colors([palette::CRITICAL, palette::text(palette::CRITICAL)])
             .with_radii([0.45_f32, 0.05])
             .with_labels([String::new(), mark_text(collision)])
             .with_show_labels(true);

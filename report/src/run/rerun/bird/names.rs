@@ -56,7 +56,12 @@ fn names(canvas: &Canvas<'_>, row: usize) -> Vec<Name> {
                 film.actors[actor].part == Part::Rear || state.d_m - own.d_m > 0.5 * film.road.lane_width_m();
             let headway = headway_of(frame, actor);
             let text = format!("{actor_name} {:.1} m/s{headway}", state.speed_mps);
-            is_shown.then(|| Name { x_m, is_above, text, colour: palette::part(film.actors[actor].part) })
+            is_shown.then(|| Name {
+                x_m,
+                is_above,
+                text,
+                colour: palette::text(palette::part(film.actors[actor].part)),
+            })
         })
         .collect();
     names.sort_by(|a, b| a.x_m.total_cmp(&b.x_m));
