@@ -25,9 +25,6 @@ use crate::world::{Action, InitialVehicle, World};
 /// comfort limit with its overshoot; 1.2 to 3 are plausible.
 const HAZARD_BRAKING_MPS2: f64 = 1.5;
 
-/// Number of tracks of a vehicle for which the list has room from the start: one of each object-level sensor.
-const TRACKS_PER_VEHICLE: usize = 3;
-
 /// The state of one run.
 pub(super) struct Run<'a> {
     scenario: &'a Scenario,
@@ -108,7 +105,8 @@ impl<'a> Run<'a> {
             critical_gap_m: settings.mis().unwrap_or(&MisSettings::PAPER).critical_gap_m,
             command: None,
             neighbours: vec![Neighbours::default(); world.len()],
-            tracks: Vec::with_capacity(TRACKS_PER_VEHICLE * world.len()),
+            // One track of each of the three object-level sensors.
+            tracks: Vec::with_capacity(3 * world.len()),
             margins,
             actions: vec![Action::default(); world.len()],
             others: Vec::with_capacity(world.len()),
