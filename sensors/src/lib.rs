@@ -11,7 +11,6 @@ mod bodies;
 pub mod camera;
 mod config;
 mod detection;
-mod ego_frame;
 mod full;
 mod gaussian;
 mod ground_truth;

@@ -2,8 +2,8 @@
 
 use closecall_traffic::VehicleClass;
 
-use crate::ego_frame::EgoFrame;
 use crate::{Scene, SceneVehicle, SensorError};
+use closecall_traffic::ego_frame::EgoFrame;
 
 /// The true state of another vehicle, in road coordinates and in the ego's frame.
 #[derive(Clone, Copy, Debug)]

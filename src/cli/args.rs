@@ -71,6 +71,26 @@ pub(super) enum Layout {
     InCar,
 }
 
+/// Several trajectory files, taken together.
+#[derive(Clone, Debug, Args)]
+pub(super) struct FilesArgs {
+    /// Trajectory files, whose vehicles are taken together
+    #[arg(required = true, value_name = "TRAJECTORY_FILE")]
+    pub(super) files: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(super) read: ReadArgs,
+}
+
+impl FilesArgs {
+    /// Reads the files, none of which may be given twice.
+    pub(super) fn read_all(&self) -> Result<Vec<TrajectoryData>, CliError> {
+        let options = self.read.options();
+        let data_sets = self.files.iter().map(|path| read_with(path, options)).collect::<Result<Vec<_>, _>>()?;
+        refuse_duplicates(&self.files, &data_sets).map_err(|message| CliError::Usage { message })?;
+        Ok(data_sets)
+    }
+}
+
 /// How a trajectory file is read.
 #[derive(Clone, Copy, Debug, Args)]
 pub(super) struct ReadArgs {
@@ -86,13 +106,6 @@ impl ReadArgs {
     /// Returns true if rows that cannot be used are skipped.
     pub(super) fn drops_bad_rows(&self) -> bool {
         self.drop_bad_rows
-    }
-
-    /// Reads several trajectory files, none of which may be given twice.
-    pub(super) fn read_all(&self, files: &[PathBuf]) -> Result<Vec<TrajectoryData>, CliError> {
-        let data_sets = files.iter().map(|path| read_with(path, self.options())).collect::<Result<Vec<_>, _>>()?;
-        refuse_duplicates(files, &data_sets).map_err(|message| CliError::Usage { message })?;
-        Ok(data_sets)
     }
 
     pub(super) fn options(&self) -> ReadOptions {

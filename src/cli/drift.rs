@@ -8,7 +8,7 @@ use closecall_report::json::stamped;
 use closecall_report::traffic::drift::DriftText;
 
 use super::CliError;
-use super::args::{Format, ReadArgs};
+use super::args::{FilesArgs, Format};
 use super::output::{out, outln};
 use crate::exit_code::ExitCode;
 
@@ -18,11 +18,8 @@ pub(super) struct DriftArgs {
     /// File that `closecall fit` wrote, or a scenario with parameters from one
     #[arg(value_name = "FITTED.toml")]
     fitted: PathBuf,
-    /// Trajectory files of the new traffic
-    #[arg(required = true, value_name = "TRAJECTORY_FILE")]
-    files: Vec<PathBuf>,
     #[command(flatten)]
-    read: ReadArgs,
+    data: FilesArgs,
     /// Seed of the simulated distances
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -32,7 +29,7 @@ pub(super) struct DriftArgs {
 }
 
 pub(super) fn drift(args: &DriftArgs) -> Result<ExitCode, CliError> {
-    let found = compare(&Fitted::read(&args.fitted)?, &args.read.read_all(&args.files)?, args.seed);
+    let found = compare(&Fitted::read(&args.fitted)?, &args.data.read_all()?, args.seed);
     match args.format {
         Format::Json => outln!("{:#}", stamped(serde_json::json!(found), None, None)),
         Format::Human => out!("{}", DriftText(&found)),

@@ -11,7 +11,7 @@ use closecall_scenarios::filters::smooth;
 use closecall_scenarios::robustness::Setup;
 
 use super::CliError;
-use super::args::{ReadArgs, positive};
+use super::args::{FilesArgs, positive};
 use super::output::{print_written, write_charts};
 use super::protect::{of_trajectories, protect};
 use super::robustness::refused;
@@ -20,11 +20,8 @@ use crate::exit_code::ExitCode;
 /// Arguments of `closecall paper`.
 #[derive(Debug, Args)]
 pub(super) struct PaperArgs {
-    /// Trajectory files
-    #[arg(required = true, value_name = "TRAJECTORY_FILE")]
-    files: Vec<PathBuf>,
     #[command(flatten)]
-    read: ReadArgs,
+    data: FilesArgs,
     /// Speed limit in m/s [default: 120 km/h]
     #[arg(long, value_name = "M/S", value_parser = positive)]
     speed_limit_mps: Option<f64>,
@@ -41,8 +38,8 @@ pub(super) struct PaperArgs {
 
 pub(super) fn paper(args: &PaperArgs) -> Result<ExitCode, CliError> {
     let index = args.output.join("index.html");
-    protect(&of_trajectories(&args.files), &[("--output", Some(&index))])?;
-    let data_sets = args.read.read_all(&args.files)?;
+    protect(&of_trajectories(&args.data.files), &[("--output", Some(&index))])?;
+    let data_sets = args.data.read_all()?;
     let judgement = Judgement { speed_limit_mps: args.speed_limit_mps, ttce_alone: false };
     let recorded = data_sets
         .iter()
@@ -51,7 +48,7 @@ pub(super) fn paper(args: &PaperArgs) -> Result<ExitCode, CliError> {
     let setup = Setup { seed: args.seed, repetitions: args.repetitions, ..Setup::default() };
     let studied = match args.repetitions {
         0 => None,
-        _ => robustness(&args.files, args.read.options(), &setup).map_err(refused)?,
+        _ => robustness(&args.data.files, args.data.read.options(), &setup).map_err(refused)?,
     };
     let paper = Paper::new(&recorded, studied.as_ref(), args.speed_limit_mps)?;
     let paths: Vec<PathBuf> = paper.pictures.iter().map(|picture| args.output.join(&picture.name)).collect();

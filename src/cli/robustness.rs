@@ -9,7 +9,7 @@ use closecall_report::traffic::robustness::{ROBUSTNESS_CHARTS, RobustnessText, r
 use closecall_scenarios::robustness::Setup;
 
 use super::CliError;
-use super::args::{Format, ReadArgs};
+use super::args::{FilesArgs, Format};
 use super::output::{out, outln, print_error, write_charts};
 use super::protect::{of_trajectories, protect};
 use crate::exit_code::ExitCode;
@@ -17,11 +17,8 @@ use crate::exit_code::ExitCode;
 /// Arguments of `closecall robustness`.
 #[derive(Debug, Args)]
 pub(super) struct RobustnessArgs {
-    /// Trajectory files, studied together: either in-car logs or recorded traffic
-    #[arg(required = true, value_name = "TRAJECTORY_FILE")]
-    files: Vec<PathBuf>,
     #[command(flatten)]
-    read: ReadArgs,
+    data: FilesArgs,
     /// Seed of the noise
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -39,10 +36,10 @@ pub(super) struct RobustnessArgs {
 pub(super) fn robustness(args: &RobustnessArgs) -> Result<ExitCode, CliError> {
     let charts = args.plot.as_ref().map(|folder| ROBUSTNESS_CHARTS.map(|name| folder.join(name)));
     for chart in charts.iter().flatten() {
-        protect(&of_trajectories(&args.files), &[("--plot", Some(chart))])?;
+        protect(&of_trajectories(&args.data.files), &[("--plot", Some(chart))])?;
     }
     let setup = Setup { seed: args.seed, repetitions: args.repetitions, ..Setup::default() };
-    let studied = study(&args.files, args.read.options(), &setup).map_err(refused)?;
+    let studied = study(&args.data.files, args.data.read.options(), &setup).map_err(refused)?;
     let Some((_, found)) = studied else { return Ok(ExitCode::Pass) };
     if let (Some(folder), Some(paths)) = (&args.plot, &charts) {
         write_charts(folder, paths, &robustness_charts(&found)?)?;

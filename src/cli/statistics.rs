@@ -9,7 +9,7 @@ use closecall_scenarios::criticality::{CriticalLaneChange, Judgement, criticalit
 use closecall_scenarios::filters::smooth;
 
 use super::CliError;
-use super::args::{Format, ReadArgs, positive};
+use super::args::{FilesArgs, Format, positive};
 use super::output::{out, outln, write_charts};
 use super::protect::{of_trajectories, protect};
 use crate::exit_code::ExitCode;
@@ -17,11 +17,8 @@ use crate::exit_code::ExitCode;
 /// Arguments of `closecall statistics`.
 #[derive(Debug, Args)]
 pub(super) struct StatisticsArgs {
-    /// Trajectory files, whose lane changes are counted together
-    #[arg(required = true, value_name = "TRAJECTORY_FILE")]
-    files: Vec<PathBuf>,
     #[command(flatten)]
-    read: ReadArgs,
+    data: FilesArgs,
     /// Speed limit in m/s [default: 120 km/h]
     #[arg(long, value_name = "M/S", value_parser = positive)]
     speed_limit_mps: Option<f64>,
@@ -36,9 +33,9 @@ pub(super) struct StatisticsArgs {
 pub(super) fn statistics(args: &StatisticsArgs) -> Result<ExitCode, CliError> {
     let charts = args.plot.as_ref().map(|folder| STATISTICS_CHARTS.map(|name| folder.join(name)));
     for chart in charts.iter().flatten() {
-        protect(&of_trajectories(&args.files), &[("--plot", Some(chart))])?;
+        protect(&of_trajectories(&args.data.files), &[("--plot", Some(chart))])?;
     }
-    let data_sets = args.read.read_all(&args.files)?;
+    let data_sets = args.data.read_all()?;
     let changes = data_sets.iter().flat_map(|data| {
         criticality(&smooth(data), &Judgement { speed_limit_mps: args.speed_limit_mps, ttce_alone: false })
     });

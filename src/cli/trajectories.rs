@@ -18,7 +18,7 @@ use closecall_scenarios::lane_change::{
 use closecall_scenarios::trajectory_data::{Layout, open, read_with};
 
 use super::CliError;
-use super::args::{Format, ReadArgs, positive};
+use super::args::{FilesArgs, Format, ReadArgs, positive};
 use super::output::{command_line, out, outln, print_error, print_written};
 use super::protect::{of_trajectories, protect, recording as trajectory_path};
 
@@ -111,11 +111,8 @@ pub(super) struct CriticalityArgs {
 /// Arguments of `closecall fit`.
 #[derive(Debug, Args)]
 pub(super) struct FitArgs {
-    /// Trajectory files
-    #[arg(required = true, value_name = "TRAJECTORY_FILE")]
-    files: Vec<PathBuf>,
     #[command(flatten)]
-    read: ReadArgs,
+    data: FilesArgs,
     /// File to write [default: standard output]
     #[arg(short, long, value_name = "FILE.toml")]
     output: Option<PathBuf>,
@@ -204,8 +201,8 @@ pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> 
 }
 
 pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
-    protect(&of_trajectories(&args.files), &[("--output", args.output.as_deref())])?;
-    let data_sets = args.read.read_all(&args.files)?;
+    protect(&of_trajectories(&args.data.files), &[("--output", args.output.as_deref())])?;
+    let data_sets = args.data.read_all()?;
     let fitted = fit_distributions(&data_sets, args.seed);
     let heading = Heading { command: command_line(), provenance: args.provenance.clone() };
     if let Some(path) = &args.output {

@@ -57,6 +57,7 @@ mod actor;
 mod body_shape;
 mod check;
 mod constants;
+pub mod ego_frame;
 mod environment;
 pub mod geometry;
 mod number;

@@ -133,6 +133,21 @@ impl Vehicle {
 }
 
 impl VehicleConfig {
+    /// Returns the configuration of a vehicle that is typical of its class.
+    pub fn typical(class: VehicleClass) -> Self {
+        Self {
+            class: Choice::Fixed(class),
+            length_m: None,
+            width_m: None,
+            height_m: None,
+            mass_kg: None,
+            paint_reflectivity: None,
+            paint_rgb: None,
+            body_shape: None,
+            brake_light_from_mps2: None,
+        }
+    }
+
     /// Returns the body shape, or `None` if it is not given.
     fn check_body_shape(&self, class: VehicleClass, parameters: &Parameters) -> Result<Option<BodyShape>, ConfigError> {
         const KEY: &str = "body-shape";
@@ -248,17 +263,7 @@ mod tests {
     use super::*;
 
     fn car(body_shape: Option<BodyShape>) -> VehicleConfig {
-        VehicleConfig {
-            class: Choice::Fixed(VehicleClass::Car),
-            length_m: None,
-            width_m: None,
-            height_m: None,
-            mass_kg: None,
-            paint_reflectivity: None,
-            paint_rgb: None,
-            body_shape: body_shape.map(Choice::Fixed),
-            brake_light_from_mps2: None,
-        }
+        VehicleConfig { body_shape: body_shape.map(Choice::Fixed), ..VehicleConfig::typical(VehicleClass::Car) }
     }
 
     #[test]

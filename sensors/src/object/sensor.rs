@@ -14,7 +14,6 @@ use super::config::{MAX_LATENCY_STEPS, ObjectSensorModel};
 use super::noise::{MeasurementErrors, NoiseKey, TargetNoise};
 use super::visibility::{Direction, Field, Visibility};
 use super::weather::range_in_weather_m;
-use crate::ego_frame::EgoFrame;
 use crate::gaussian::Gaussian;
 use crate::perception::FieldOfView;
 use crate::surroundings::OtherVehicle;
@@ -26,6 +25,7 @@ use crate::tracking::motion::{
 };
 use crate::tracking::road_filter::{LATERAL_SPEED_PRIOR_SD_MPS, POSITION_PRIOR_SD_M, SPEED_PRIOR_SD_MPS, in_ego_frame};
 use crate::{Health, Scene};
+use closecall_traffic::ego_frame::EgoFrame;
 
 /// Standard deviation of a track's speed above which the track is not confirmed (m/s): no function could act on it yet.
 const SETTLED_SPEED_SD_MPS: f64 = 1.0;

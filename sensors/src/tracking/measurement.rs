@@ -10,7 +10,7 @@ use closecall_traffic::{Time, VehicleClass};
 use super::axis::AxisMeasurement;
 use super::road_filter::Measurement;
 use crate::Detection;
-use crate::ego_frame::EgoFrame;
+use closecall_traffic::ego_frame::EgoFrame;
 
 /// Standard deviation of the slow error along the line of sight, by vehicle class (m).
 ///

@@ -7,8 +7,8 @@
 
 use super::axis::{AxisEstimate, AxisFilter, AxisFit, AxisMeasurement};
 use super::motion::{ACROSS_MODES, ALONG_MODES, EgoRear, RearVehicle, Situation};
-use crate::ego_frame::EgoFrame;
 use crate::gaussian::Gaussian;
+use closecall_traffic::ego_frame::EgoFrame;
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
 /// Prior standard deviation of a vehicle's speed, whose prior mean is the ego's speed (m/s).

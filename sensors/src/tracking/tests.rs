@@ -10,11 +10,11 @@ use rand_distr::StandardNormal;
 use super::motion::{ACROSS_MODES, ALONG_MODES, Mode, Situation};
 use super::road_filter::{SLOW_DISTANCE_M, SLOW_TIME_S};
 use super::*;
-use crate::ego_frame::EgoFrame;
 use crate::lidar::FACE_SD_M;
 use crate::surroundings::transform_scene;
 use crate::testing::{OWN_LANE_M, scene_vehicle, with_speed};
 use crate::{Detection, Extent, Scene, SceneVehicle};
+use closecall_traffic::ego_frame::EgoFrame;
 
 const LEFT_LANE_M: f64 = -1.875;
 const PERIOD_S: f64 = CONTROL_STEP.s();

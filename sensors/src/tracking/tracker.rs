@@ -14,8 +14,8 @@ use super::motion::EgoRear;
 use super::road_filter::{Measurement, RoadFilter, in_ego_frame};
 use super::view::{Face, RearView};
 use crate::Detection;
-use crate::ego_frame::EgoFrame;
 use crate::lidar::SIDE_PROTRUSION_M;
+use closecall_traffic::ego_frame::EgoFrame;
 
 /// Speed difference below which a track inside another track's box is a part of the same vehicle (m/s).
 const MAX_PART_SPEED_MPS: f64 = 3.0;

@@ -26,7 +26,7 @@ use closecall_controllers::{
 use closecall_scenarios::encounter::{EGO_INDEX, LEAD_INDEX, Participant, REAR_INDEX, RecordedEncounter};
 use closecall_scenarios::filters::PERIOD;
 use closecall_traffic::metrics::{time_headway_s, touching_distance_m};
-use closecall_traffic::{ActorId, Choice, Num, RoadConfig, Time, Trajectory, TrajectoryPoint, VehicleConfig};
+use closecall_traffic::{ActorId, Num, RoadConfig, Time, Trajectory, TrajectoryPoint, VehicleConfig};
 use toml_edit::{Array, ArrayOfTables, DocumentMut, Item};
 
 use crate::criteria::GateConfig;
@@ -174,15 +174,10 @@ pub(super) fn actor(
     Ok(ActorConfig {
         id: ActorId::new(name).map_err(|error| error.to_string())?,
         vehicle: VehicleConfig {
-            class: Choice::Fixed(vehicle.trajectory.class),
             length_m: Some(rounded(size.length_m)),
             width_m: Some(rounded(size.width_m)),
             height_m: Some(rounded(size.height_m)),
-            mass_kg: None,
-            paint_reflectivity: None,
-            paint_rgb: None,
-            body_shape: None,
-            brake_light_from_mps2: None,
+            ..VehicleConfig::typical(vehicle.trajectory.class)
         },
         start: StartConfig::Absolute(AbsoluteStartConfig {
             lane: start.lane,

@@ -29,9 +29,7 @@ use closecall_controllers::{
     Wiedemann99Config,
 };
 use closecall_scenarios::encounter::{EGO_INDEX, Participant, REAR_INDEX, RecordedEncounter};
-use closecall_traffic::{
-    ActorId, Choice, Lane, Num, Side, Time, Trajectory, TrajectoryPoint, VehicleClass, VehicleConfig,
-};
+use closecall_traffic::{ActorId, Lane, Num, Side, Time, Trajectory, TrajectoryPoint, VehicleClass, VehicleConfig};
 
 use super::config::{AbsoluteStartConfig, ActorConfig, ScenarioConfig, StartConfig};
 use super::events::{EffectConfig, EventConfig, LaneChangeConfig, TriggerConfig};
@@ -250,17 +248,7 @@ fn ego(encounter: &RecordedEncounter, others: &[&Participant]) -> Result<ActorCo
     };
     Ok(ActorConfig {
         id: ActorId::new("ego").map_err(|error| error.to_string())?,
-        vehicle: VehicleConfig {
-            class: Choice::Fixed(VehicleClass::Car),
-            length_m: None,
-            width_m: None,
-            height_m: None,
-            mass_kg: None,
-            paint_reflectivity: None,
-            paint_rgb: None,
-            body_shape: None,
-            brake_light_from_mps2: None,
-        },
+        vehicle: VehicleConfig::typical(VehicleClass::Car),
         start: StartConfig::Absolute(AbsoluteStartConfig {
             lane: encounter.home,
             s_m: rounded(last_m - EGO_DISTANCE_M),

@@ -393,10 +393,7 @@ fn evade(step: &Step<'_>, change: &mut Change, ahead: &PerceivedVehicle, setting
 /// Returns true once the overtaken vehicle is entirely behind in the adjacent lane.
 fn has_passed(step: &Step<'_>, overtaken: Option<usize>) -> bool {
     let near = step.input.neighbours;
-    let adjacent = match step.side {
-        Side::Left => near.right.as_ref(),
-        Side::Right => near.left.as_ref(),
-    };
+    let adjacent = if step.side == Side::Left { near.right.as_ref() } else { near.left.as_ref() };
     let follower = adjacent.and_then(|lane| lane.follower.as_ref());
     overtaken.is_some() && follower.map(|follower| follower.actor) == overtaken
 }

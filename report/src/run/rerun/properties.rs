@@ -11,12 +11,12 @@
 
 use std::sync::Arc;
 
+use crate::run::rerun::sdk::{AsComponents, ComponentDescriptor, ComponentIdentifier, SerializedComponentBatch};
 use arrow::array::{ArrayRef, BooleanArray, Float64Array, StringArray, UInt64Array};
 use closecall_simulation::outcome::Outcome;
 use closecall_traffic::{Measured, Value};
-use re_sdk_types::archetypes::RecordingInfo;
 use re_sdk::external::re_log_types::EntityPath;
-use crate::run::rerun::sdk::{AsComponents, ComponentDescriptor, ComponentIdentifier, SerializedComponentBatch};
+use re_sdk_types::archetypes::RecordingInfo;
 
 use super::RecordingError;
 use super::chunks::Chunks;

@@ -4,10 +4,9 @@
 
 pub(super) use re_sdk::log::TimeColumn;
 pub(super) use re_sdk::{
-    AsComponents, ComponentIdentifier, RecordingStreamError, SerializationResult, SerializedComponentColumn, StoreId,
-    StoreKind,
+    AsComponents, ComponentDescriptor, ComponentIdentifier, RecordingStreamError, SerializationResult,
+    SerializedComponentBatch, SerializedComponentColumn, StoreId, StoreKind,
 };
-pub(super) use re_sdk_types::AnyValues;
 pub(super) use re_sdk_types::archetypes::*;
 pub(super) use re_sdk_types::components::{FillMode, MediaType, TextLogLevel};
 pub(super) use re_sdk_types::datatypes::Quaternion;

@@ -12,7 +12,7 @@
 //! the ego, so a run at s = 100 km is as exact as one at s = 0. A rotation by the ego's heading relative to the road
 //! turns (a, b) into (x, y).
 
-use closecall_traffic::{Lane, Road, Side, VehicleState};
+use crate::{Lane, Road, Side, VehicleState};
 use statrs::function::erf::erfc;
 
 /// Number of standard deviations from a lane's edge beyond which a vehicle is certainly on one side of it (the
@@ -21,7 +21,7 @@ const CERTAIN_DEVIATIONS: f64 = 5.0;
 
 /// The ego's vehicle frame at one instant.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct EgoFrame<'a> {
+pub struct EgoFrame<'a> {
     road: &'a Road,
     s_m: f64,
     d_m: f64,
@@ -33,23 +33,24 @@ pub(crate) struct EgoFrame<'a> {
 
 /// A point of the road in the ego's vehicle frame.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct RoadPoint {
+pub struct RoadPoint {
     /// Distance ahead of the ego (m).
-    pub(crate) x_m: f64,
+    pub x_m: f64,
     /// Distance to the left of the ego (m).
-    pub(crate) y_m: f64,
+    pub y_m: f64,
     /// Direction of the road at the point, relative to the ego's heading (rad).
-    pub(crate) road_yaw_rad: f64,
+    pub road_yaw_rad: f64,
 }
 
 impl<'a> EgoFrame<'a> {
-    pub(crate) fn new(road: &'a Road, ego: &VehicleState) -> Self {
+    /// Creates the frame of an ego with this state.
+    pub fn new(road: &'a Road, ego: &VehicleState) -> Self {
         let (sin, cos) = ego.heading_rad.sin_cos();
         Self { road, s_m: ego.s_m, d_m: ego.d_m, heading_rad: ego.heading_rad, sin, cos, lane: road.lane_at(ego.d_m) }
     }
 
     /// Transforms the road point (s, d) into the ego's frame.
-    pub(crate) fn point(&self, s_m: f64, d_m: f64) -> RoadPoint {
+    pub fn point(&self, s_m: f64, d_m: f64) -> RoadPoint {
         let curvature = self.road.curvature_per_m();
         let (mut along_m, mut across_m) = (s_m - self.s_m, d_m - self.d_m);
         let mut turn_rad = 0.0;
@@ -68,7 +69,7 @@ impl<'a> EgoFrame<'a> {
     }
 
     /// Returns the road coordinates (s, d) (m) of a point in the ego's frame.
-    pub(crate) fn road_position_m(&self, x_m: f64, y_m: f64) -> (f64, f64) {
+    pub fn road_position_m(&self, x_m: f64, y_m: f64) -> (f64, f64) {
         let along_m = x_m * self.cos - y_m * self.sin;
         let across_m = y_m * self.cos + x_m * self.sin;
         let curvature = self.road.curvature_per_m();
@@ -80,14 +81,14 @@ impl<'a> EgoFrame<'a> {
     }
 
     /// Returns the length of path that a vehicle at `d_m` covers per metre of the reference line (m/m).
-    pub(crate) fn path_scale(&self, d_m: f64) -> f64 {
+    pub fn path_scale(&self, d_m: f64) -> f64 {
         1.0 - self.road.curvature_per_m() * d_m
     }
 
     /// Returns the lateral road coordinate d (m) of a point in the ego's frame.
     ///
     /// The ego knows it from its lane camera and its map.
-    pub(crate) fn lateral_position_m(&self, x_m: f64, y_m: f64) -> f64 {
+    pub fn lateral_position_m(&self, x_m: f64, y_m: f64) -> f64 {
         let along_m = x_m * self.cos - y_m * self.sin;
         let across_m = y_m * self.cos + x_m * self.sin;
         let curvature = self.road.curvature_per_m();
@@ -104,7 +105,7 @@ impl<'a> EgoFrame<'a> {
     ///
     /// A vehicle counts as being in a lane if its centre is. The centre lies at `d_m` with the standard deviation
     /// `sd_m`.
-    pub(crate) fn lane_probabilities(&self, d_m: f64, sd_m: f64) -> [f64; 3] {
+    pub fn lane_probabilities(&self, d_m: f64, sd_m: f64) -> [f64; 3] {
         let width_m = self.road.lane_width_m();
         let left_edge_m = self.road.lane_centre_m(self.lane) + 0.5 * width_m;
         // Probabilities that the centre lies to the right of each of the four edges of these lanes, from left to right.
