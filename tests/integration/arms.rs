@@ -237,7 +237,8 @@ fn in_every_arm_the_ego_starts_in_balance_and_all_other_vehicles_start_as_in_the
                 start
             };
             let baseline = start("acc");
-            for (name, gap_s) in [("gap-1.6", 1.6), ("r157-gap", 2.0), ("r157-driver", 2.0), ("r157-fsm", 2.0)] {
+            let r157_s = 1.0 + 0.036 * baseline.states[scenario.ego].speed_mps;
+            for (name, gap_s) in [("gap-1.6", 1.6), ("r157-gap", r157_s), ("r157-driver", 2.0), ("r157-fsm", 2.0)] {
                 let found = start(name);
                 let context = format!("{}, sample {sample}, {name}", path.display());
                 for (actor, (one, other)) in baseline.states.iter().zip(&found.states).enumerate() {

@@ -79,7 +79,10 @@ fn fitted_distributions_equal_those_of_the_committed_fit() {
                 continue;
             }
             count += 1;
-            let names = [name.to_string(), format!("critical-{name}"), format!("short-{name}")];
+            // A headway of another vehicle is drawn from the fitted headways to the vehicle ahead.
+            let name = name.to_string();
+            let of_front = name.split_once('-').map_or(String::new(), |(_, quantity)| format!("front-{quantity}"));
+            let names = [name.clone(), format!("critical-{name}"), format!("short-{name}"), of_front];
             let is_committed = tables
                 .iter()
                 .flat_map(|table| &table.0)
