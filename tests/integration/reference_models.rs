@@ -24,7 +24,7 @@ fn the_models_have_the_published_outcomes_of_cut_ins() {
 #[test]
 fn a_table_without_a_column_or_a_number_is_refused() {
     let header = "model,ego_speed_kmh,cut_in_speed_kmh,front_distance_m,lateral_speed_mps,crash\n";
-    let row = |crash: &str| format!("{header}RSS,,,,,\nFSM,60,10,5,1.5,{crash}\n");
+    let row = |crash: &str| format!("{header}RSS,,,,,\nFSM,60,10,8,1.5,{crash}\n");
     let found = compare(row("1").as_bytes()).unwrap();
     assert_eq!(found.map(|model| (model.cases, model.same)), [(0, 0), (1, 1)]);
     let found = compare(row("0").as_bytes()).unwrap();

@@ -105,11 +105,12 @@ mod tests {
 
     #[test]
     fn near_and_fast_cut_ins_end_in_collisions_and_far_ones_do_not() {
-        let near = CutIn { speed_mps: 60.0 / 3.6, other_speed_mps: 10.0 / 3.6, gap_m: 5.0, lateral_mps: 1.5 };
+        let near = CutIn { speed_mps: 60.0 / 3.6, other_speed_mps: 10.0 / 3.6, gap_m: 25.0, lateral_mps: 0.8 };
         assert_eq!(collides(near), [true, true]);
         assert_eq!(collides(CutIn { gap_m: 59.0, ..near }), [false, false]);
         assert_eq!(collides(CutIn { lateral_mps: 0.0, ..near }), [false, false], "the other vehicle stays in its lane");
+        assert_eq!(collides(CutIn { gap_m: 5.0, ..near }), [false, false], "passed before it is there");
         // The fuzzy model sees the vehicle come while the careful driver still waits for it to overlap.
-        assert_eq!(collides(CutIn { gap_m: 25.0, lateral_mps: 0.8, ..near }), [true, false]);
+        assert_eq!(collides(CutIn { lateral_mps: 1.5, ..near }), [true, false]);
     }
 }

@@ -19,7 +19,7 @@ macro_rules! embedded {
 }
 
 /// The scenarios of the library, each with its name and its text, in alphabetical order.
-const LIBRARY: [(&str, &str); 12] = embedded![
+const LIBRARY: [(&str, &str); 14] = embedded![
     "cut-in-into-margin",
     "empty-wet-road",
     "lead-brakes-at-any-time",
@@ -31,6 +31,8 @@ const LIBRARY: [(&str, &str); 12] = embedded![
     "paper-figure",
     "rear-follower-stays",
     "rear-follower-stays-lead-brakes",
+    "rear-vehicle-is-followed",
+    "rear-vehicles-one-after-another",
     "slow-approach",
 ];
 
