@@ -11,7 +11,7 @@
 //! The types keep the ground truth from the ego: an ego controller receives its own odometry and tracks, never the
 //! ground truth. A human driver model receives the ground truth, and itself models delayed perception.
 //!
-//! [`reference`] holds the performance models of UN Regulation 157.
+//! [`reference`](mod@reference) holds the performance models of UN Regulation 157.
 //!
 //! The `driver` table of a scenario file is a [`DriverConfig`]. Checking it yields a [`CheckedDriver`], from which each
 //! run builds a new driver.
