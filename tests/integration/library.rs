@@ -81,8 +81,12 @@ fn fitted_distributions_equal_those_of_the_committed_fit() {
             count += 1;
             // A headway of another vehicle is drawn from the fitted headways to the vehicle ahead.
             let name = name.to_string();
-            let of_front = name.split_once('-').map_or(String::new(), |(_, quantity)| format!("front-{quantity}"));
-            let names = [name.clone(), format!("critical-{name}"), format!("short-{name}"), of_front];
+            let of_front = name.split_once('-').map(|(_, quantity)| format!("front-{quantity}"));
+            let names: Vec<String> = [Some(name.clone()), of_front]
+                .iter()
+                .flatten()
+                .flat_map(|name| [name.clone(), format!("critical-{name}"), format!("short-{name}")])
+                .collect();
             let is_committed = tables
                 .iter()
                 .flat_map(|table| &table.0)
