@@ -306,8 +306,9 @@ pub(crate) fn nearest_rear_vehicle(input: &EgoInput<'_>) -> Option<RearVehicle> 
     Some(rear_vehicle_from(best, input))
 }
 
-/// Determines whether the passing lane is free for `rear` to overtake the ego, with all vehicles at constant speed.
-pub(crate) fn passing_lane(input: &EgoInput<'_>, rear: &RearVehicle) -> PassingLane {
+/// Determines whether the passing lane is free for `rear` to overtake the ego, with all vehicles at constant speed. A
+/// vehicle behind `rear` must keep at least `follower_headway_s` (s) to it.
+pub(crate) fn passing_lane(input: &EgoInput<'_>, rear: &RearVehicle, follower_headway_s: f64) -> PassingLane {
     let side = input.road.overtaking_side();
     if input.road.beside(input.odometry.lane, side).is_none() {
         return PassingLane::None;
@@ -327,10 +328,14 @@ pub(crate) fn passing_lane(input: &EgoInput<'_>, rear: &RearVehicle) -> PassingL
         if rear.matches(track) || !exists(track) || !(track.lane[passing_lane_index(side)] >= LIKELY) {
             continue;
         }
-        let apart_m = touching_distance_m(track.length_m, rear.length_m) + MIN_SPACING_M;
+        let touching_m = touching_distance_m(track.length_m, rear.length_m);
+        let spacing = Spacing {
+            ahead_m: touching_m + MIN_SPACING_M,
+            behind_m: touching_m + MIN_SPACING_M.max(follower_headway_s * track.vx_mps()),
+        };
         let ahead_m = track.x_m() - rear.x_m;
         let opening_mps = track.vx_mps() - rear.speed_mps;
-        if keeps_apart(ahead_m + opening_mps * from_s, ahead_m + opening_mps * until_s, apart_m) {
+        if spacing.is_kept(ahead_m + opening_mps * from_s, ahead_m + opening_mps * until_s) {
             continue;
         }
         if is_established(track) {
@@ -341,8 +346,18 @@ pub(crate) fn passing_lane(input: &EgoInput<'_>, rear: &RearVehicle) -> PassingL
     state
 }
 
-/// Returns true if a signed distance that changes linearly from `first_m` to `last_m` stays beyond `apart_m` on one
-/// side.
-fn keeps_apart(first_m: f64, last_m: f64, apart_m: f64) -> bool {
-    (first_m > apart_m && last_m > apart_m) || (first_m < -apart_m && last_m < -apart_m)
+/// Distances between the centres of two vehicles at which they are not in each other's way.
+struct Spacing {
+    /// To a vehicle ahead (m).
+    ahead_m: f64,
+    /// To a vehicle behind (m).
+    behind_m: f64,
+}
+
+impl Spacing {
+    /// Returns true if a distance that changes linearly from `first_m` to `last_m`, positive ahead, stays large enough on
+    /// one side.
+    fn is_kept(&self, first_m: f64, last_m: f64) -> bool {
+        first_m.min(last_m) > self.ahead_m || first_m.max(last_m) < -self.behind_m
+    }
 }

@@ -123,6 +123,41 @@ driver = {{ prescribed = {{ acceleration-profile = [[{from_s:?}, 5.0], [{to_s:?}
     assert!(drive.noted_s(REAR, DriverNote::Passed).is_some_and(|passed_s| passed_s > back_s));
 }
 
+#[test]
+fn it_follows_the_vehicle_that_it_overtakes_if_that_one_changes_lanes_in_front() {
+    // The slower vehicle comes into the driver's way after the driver has begun to pull out, 1.2 s behind it.
+    let pulls_out = |at_s: f64| {
+        format!(
+            r#"
+[[actor]]
+id = "slow"
+vehicle = {{ class = "car" }}
+start = {{ absolute = {{ lane = 2, s-m = 200.0, speed-mps = 28.0 }} }}
+driver = {{ prescribed = {{ profile = [[0.0, 28.0]], lane-changes = [{{ at-s = {at_s:?}, to = "left", duration-s = 4.0 }}] }} }}
+
+[[actor]]
+id = "rear"
+vehicle = {{ class = "car" }}
+start = {{ behind = {{ of = "slow", gap-m = 90.0, speed-mps = 36.0 }} }}
+
+[actor.driver.overtaker]
+cut-out-thw-s = 1.2
+reaction-s = 0.8
+lane-change-duration-s = 5.0
+follow = {{ wiedemann99 = {{ cc1-s = 0.9 }} }}
+"#
+        )
+    };
+    let begins_s = Drive::new(&pulls_out(50.0), 60.0).noted_s(REAR, DriverNote::CutOutStarted).unwrap();
+    let drive = Drive::new(&pulls_out(begins_s + 1.5), 60.0);
+    assert_eq!(drive.outcome.collisions, []);
+    assert_eq!([SLOW, REAR].map(|actor| drive.lane(actor, 59.9)), [Lane(1); 2]);
+    assert!(drive.noted_s(REAR, DriverNote::Passed).is_none());
+    let [slow, rear] = [SLOW, REAR].map(|actor| drive.at(actor, 59.9));
+    assert!((rear.speed_mps - 28.0).abs() < 1.5, "{}", rear.speed_mps);
+    assert!((15.0..60.0).contains(&gap_m(slow, rear)), "{}", gap_m(slow, rear));
+}
+
 /// Returns the time at which a follower commands more than 1 m/s² of braking, if the vehicle ahead brakes at 3 s (s).
 fn answers_at_s(lapse: &str) -> f64 {
     let brakes = r#"

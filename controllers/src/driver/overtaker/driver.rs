@@ -154,10 +154,14 @@ impl Step<'_> {
         Indicator::towards(self.side)
     }
 
-    /// Returns the perceived vehicle ahead, unless it is the overtaken one: a vehicle observed ahead one reaction time
-    /// ago may have been passed since.
+    /// Returns the perceived vehicle ahead, unless it is the overtaken one beside the driver's path: a vehicle observed
+    /// ahead one reaction time ago, in the original lane, may have been passed since. An overtaken vehicle that comes
+    /// into the driver's path is an ordinary lead vehicle.
     pub(super) fn ahead_except(&self, overtaken: Option<usize>) -> Option<&PerceivedVehicle> {
-        self.scene.ahead.as_ref().filter(|vehicle| Some(vehicle.actor) != overtaken)
+        let DriverInput { own, vehicle, .. } = self.input;
+        let in_path =
+            |ahead: &PerceivedVehicle| (ahead.d_m - own.d_m).abs() < 0.5 * (vehicle.dimensions.width_m + ahead.width_m);
+        self.scene.ahead.as_ref().filter(|ahead| Some(ahead.actor) != overtaken || in_path(ahead))
     }
 
     /// Returns the present lateral position of the intended path (m).
@@ -269,7 +273,7 @@ impl OvertakerDriver {
             let following = self.cruise(step, step.scene.ahead.as_ref());
             return DriverAction { lane_change: Some(back), note: Some(DriverNote::CutOutAborted), ..following };
         }
-        let following_mps2 = self.follow_in_target(step, change.target, overtaken);
+        let following_mps2 = self.follow_in_target(step, &change);
         let requested_mps2 =
             brake_before_overtaking(following_mps2, step.speed_mps, overtaken.filter(|_| distance_to_clear_m > 0.0));
         let mut action =
@@ -324,10 +328,9 @@ impl OvertakerDriver {
     }
 
     /// Returns the acceleration behind the lead vehicle in the target lane (m/s²).
-    fn follow_in_target(&mut self, step: &Step<'_>, target: Lane, overtaken: Option<&PerceivedVehicle>) -> f64 {
-        let overtaken = overtaken.map(|vehicle| vehicle.actor);
-        let vehicle = if step.scene.lane == target {
-            step.scene.ahead.as_ref().filter(|vehicle| Some(vehicle.actor) != overtaken)
+    fn follow_in_target(&mut self, step: &Step<'_>, change: &Change) -> f64 {
+        let vehicle = if step.scene.lane == change.target {
+            step.ahead_except(change.overtaken)
         } else {
             step.scene.adjacent(step.side).and_then(|lane| lane.lead.as_ref())
         };

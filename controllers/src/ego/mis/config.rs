@@ -28,6 +28,9 @@ pub struct MisConfig {
     pub hold_s: Option<Num>,
     /// Worst assumed braking of the lead vehicle, which must leave room while holding (m/s²); 8 if absent.
     pub worst_front_braking_mps2: Option<Num>,
+    /// Smallest time headway from the rear vehicle to a vehicle behind it in the passing lane with which that lane counts
+    /// as free (s); 0 if absent. A vehicle within 15 m is in the way in any case.
+    pub follower_headway_s: Option<Num>,
 }
 
 /// The checked parameters of the margin increase system.
@@ -51,6 +54,9 @@ pub struct MisSettings {
     pub hold_s: f64,
     /// Worst assumed braking of the lead vehicle, which must leave room while holding (m/s²).
     pub worst_front_braking_mps2: f64,
+    /// Smallest time headway from the rear vehicle to a vehicle behind it in the passing lane with which that lane counts
+    /// as free (s).
+    pub follower_headway_s: f64,
 }
 
 impl MisSettings {
@@ -66,6 +72,7 @@ impl MisSettings {
         engage_closing_mps: ENGAGEMENT_CLOSING_MPS,
         hold_s: 2.0,
         worst_front_braking_mps2: 8.0,
+        follower_headway_s: 0.0,
     };
 
     /// Rear gap at which the extended system engages (m): an assumption, the range in which sensors to the rear confirm and
@@ -77,15 +84,23 @@ impl MisSettings {
     /// plausible.
     pub const EXTENDED_MAX_DECELERATION_MPS2: f64 = 2.0;
 
-    /// Returns the settings of the extended system: it engages earlier and may brake harder. Every other value stays as it is.
+    /// Smallest time headway of a vehicle behind the rear vehicle in the passing lane with which the extended system takes
+    /// that lane for free (s): an assumption, the distance that automated lane changes must leave to the vehicle behind in
+    /// UN Regulation No. 79 (1 s, once speeds are equal); 0.5 to 2 are plausible. A rear vehicle that cannot pull out stays
+    /// behind an ego that has become slower.
+    pub const EXTENDED_FOLLOWER_HEADWAY_S: f64 = 1.0;
+
+    /// Returns the settings of the extended system: it engages earlier, may brake harder, and does not act if another
+    /// vehicle closes the way of the rear vehicle. Every other value stays as it is.
     ///
     /// Engagement distance and braking limit are the values that determine most how much margin the system gains until the
-    /// rear vehicle arrives. A system that sees or brakes more already keeps its own values.
+    /// rear vehicle arrives. A system with larger values already keeps its own.
     #[must_use]
     pub const fn extended(self) -> Self {
         Self {
             engage_gap_m: self.engage_gap_m.max(Self::EXTENDED_ENGAGE_GAP_M),
             max_deceleration_mps2: self.max_deceleration_mps2.max(Self::EXTENDED_MAX_DECELERATION_MPS2),
+            follower_headway_s: self.follower_headway_s.max(Self::EXTENDED_FOLLOWER_HEADWAY_S),
             ..self
         }
     }
@@ -122,6 +137,12 @@ impl Check for MisConfig {
                 "worst-front-braking-mps2",
                 braking,
                 paper.worst_front_braking_mps2,
+            )?,
+            follower_headway_s: or(
+                &self.follower_headway_s,
+                "follower-headway-s",
+                Range::closed(0.0, 5.0),
+                paper.follower_headway_s,
             )?,
         })
     }

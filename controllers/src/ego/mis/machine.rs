@@ -204,7 +204,7 @@ impl Mis {
         if !(least_speed_mps - situation.speed_mps() >= settings.engage_closing_mps) {
             return Err(Reason::RearNotApproaching);
         }
-        match passing_lane(situation.input, &rear) {
+        match passing_lane(situation.input, &rear, settings.follower_headway_s) {
             PassingLane::Free => {}
             PassingLane::None => return Err(Reason::NoPassingLane),
             PassingLane::Occupied => return Err(Reason::PassingLaneOccupied),
@@ -225,7 +225,7 @@ impl Mis {
             target.last_approached = now;
         }
         let lane = if rear.in_own_lane() && closing_mps > 0.0 {
-            passing_lane(situation.input, rear)
+            passing_lane(situation.input, rear, settings.follower_headway_s)
         } else {
             PassingLane::Free
         };

@@ -91,6 +91,7 @@
 //! | jerk | 2 m/s³ | `max-jerk-mps3` |
 //! | holding | 2 s | `hold-s` |
 //! | worst braking of the lead vehicle while holding | 8 m/s² | `worst-front-braking-mps2` |
+//! | time headway of a vehicle behind the rear vehicle in a free passing lane | 0 s: 15 m | `follower-headway-s` |
 //!
 //! # The plan
 //! a* is the smallest braking with which THW_F, when the rear vehicle reaches d_c, equals the time headway at engaging
