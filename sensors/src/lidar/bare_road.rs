@@ -18,7 +18,7 @@
 use super::cast::{ColumnHits, SubRays};
 use super::ground::{GROUND_M, GROUND_REACH_M, GROUND_SLOPE};
 use super::noise::MAX_NORMAL;
-use super::pattern::{Column, Elevation, LAYERS_PER_GROUP};
+use super::pattern::{CentreLines, Column, Elevation, LAYERS_PER_GROUP, ROAD_LAYERS};
 use super::power::{LinkBudget, MIN_POWER, range_sd_m};
 use super::receiver::SensorPoseEstimate;
 use super::targets::{FaceRange, Targets};
@@ -59,17 +59,64 @@ impl BareRoad {
         is_near.then_some(Self { pose, max_error_m, max_shift_m })
     }
 
-    /// Returns true if every point that a beam may give counts as ground. `per_distance` is the inverse horizontal
-    /// distance at which the lowest sub-ray meets the road (1/m).
-    fn counts_as_ground(&self, [cos, sin]: [f32; 2], elevation: &Elevation, per_distance: f32) -> bool {
-        let nearest_m = 1.0 / (per_distance * elevation.cos[0]) - self.max_error_m;
-        let [tan, cosine] = elevation.centre;
+    /// Returns true if all points that a column may give count as ground, provided that its beams meet nothing but the
+    /// road. False if the uppermost of the tested layers may give a point, too: the layers above it are not tested.
+    ///
+    /// Written without branches, so that the layers are tested side by side in vector registers.
+    pub(crate) fn covers(&self, lines: &CentreLines, road: &Road) -> bool {
+        let mut kept = [false; ROAD_LAYERS];
+        for (layer, kept) in kept.iter_mut().enumerate() {
+            let azimuth = [lines.cos[layer], lines.sin[layer]];
+            let per_distance = road.per_distance(azimuth, lines.lowest_tan[layer]);
+            let counts = self.counts_as_ground(
+                azimuth,
+                [lines.tan[layer], lines.cosine[layer]],
+                per_distance * lines.lowest_cosine[layer],
+            );
+            *kept = road.is_detectable(per_distance) & (!counts | (layer + 1 == ROAD_LAYERS));
+        }
+        kept == [false; ROAD_LAYERS]
+    }
+
+    /// Returns true if every point that a beam may give counts as ground. `azimuth` has the cosine and sine of the azimuth
+    /// of its centre line, `elevation` the tangent and cosine of its elevation. `per_range` is the inverse range at which
+    /// the lowest sub-ray meets the road (1/m).
+    #[inline(always)]
+    fn counts_as_ground(&self, [cos, sin]: [f32; 2], [tan, cosine]: [f32; 2], per_range: f32) -> bool {
+        let nearest_m = 1.0 / per_range - self.max_error_m;
         let level_m = nearest_m * cosine;
         let [_, _, height_m] = self.pose.ego_frame_point_m([level_m * cos, level_m * sin, level_m * tan]);
         let fall_m = self.pose.sensor_z_m() - height_m;
         let ground_m = GROUND_M + GROUND_SLOPE * (LEVEL_SHARE * nearest_m - self.max_shift_m) - MARGIN_M;
         // The comparisons are false for NaN.
-        height_m < ground_m && fall_m > 0.0 && fall_m < MAX_SLOPE * nearest_m
+        (height_m < ground_m) & (fall_m > 0.0) & (fall_m < MAX_SLOPE * nearest_m)
+    }
+}
+
+/// The surface of the road in one scan.
+pub(crate) struct Road {
+    /// Vector m of its plane (1/m), see [`targets`](super::targets).
+    inverse: [f32; 3],
+    /// Received power of a return, if multiplied by the cube of the inverse distance (thresholds · m³), at most.
+    max_power_m3: f32,
+}
+
+impl Road {
+    pub(crate) fn new(targets: &Targets, link: &LinkBudget) -> Self {
+        let ground = &targets.faces[0];
+        Self { inverse: ground.inverse, max_power_m3: link.gain_m2 * ground.strength_m }
+    }
+
+    /// Returns the inverse horizontal distance at which a sub-ray meets the road (1/m).
+    #[inline(always)]
+    fn per_distance(&self, [cos, sin]: [f32; 2], tan: f32) -> f32 {
+        self.inverse[0] * cos + self.inverse[1] * sin + self.inverse[2] * tan
+    }
+
+    /// Returns true if a beam may receive a return whose lowest sub-ray meets the road at this inverse distance (1/m).
+    #[inline(always)]
+    fn is_detectable(&self, per_distance: f32) -> bool {
+        (per_distance > 0.0) & (self.max_power_m3 * per_distance * per_distance * per_distance > MIN_POWER)
     }
 }
 
@@ -82,25 +129,24 @@ impl BareRoad {
 pub(crate) fn cast_ground(
     column: &Column,
     elevations: &[Elevation],
-    (targets, link): (&Targets, &LinkBudget),
+    (targets, road): (&Targets, &Road),
     omitted: Option<&BareRoad>,
     hits: &mut ColumnHits,
 ) {
-    let ground = &targets.faces[0];
-    let max_power_m3 = link.gain_m2 * ground.strength_m;
     for (layer, elevation) in elevations.iter().enumerate() {
         let group = layer / LAYERS_PER_GROUP;
-        let [cos, sin] = column.centre[group];
         // The lowest sub-ray hits the road at the shortest distance and at the steepest angle.
-        let inverse = ground.inverse[0] * cos + ground.inverse[1] * sin + ground.inverse[2] * elevation.tan[0];
-        if !(inverse > 0.0 && max_power_m3 * inverse * inverse * inverse > MIN_POWER) {
+        let per_distance = road.per_distance(column.centre[group], elevation.tan[0]);
+        if !road.is_detectable(per_distance) {
             break;
         }
         hits.ground_below = layer + 1;
         if hits.is_tested(layer) {
             let subrays = SubRays { cos: column.cos[group], sin: column.sin[group], tan: elevation.tan };
             hits.intersect(layer, &subrays, GROUND_FACES, targets);
-        } else if omitted.is_some_and(|road| road.counts_as_ground([cos, sin], elevation, inverse)) {
+        } else if omitted.is_some_and(|bare| {
+            bare.counts_as_ground(column.centre[group], elevation.centre, per_distance * elevation.cos[0])
+        }) {
             hits.bare |= 1 << layer;
         }
     }

@@ -89,6 +89,40 @@ pub(crate) struct Elevation {
     pub(crate) cos: [f32; SUBRAY_ROWS],
 }
 
+/// Number of layers, from the lowest, that may meet the road near enough to return light, at the usual heights and tilts.
+pub(crate) const ROAD_LAYERS: usize = 8;
+
+/// The centre lines and the lowest sub-rays of the lowest beams of a column, for a test of several layers at once.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct CentreLines {
+    /// Cosines of the azimuths.
+    pub(crate) cos: [f32; ROAD_LAYERS],
+    /// Sines of the azimuths.
+    pub(crate) sin: [f32; ROAD_LAYERS],
+    /// Tangents of the elevations of the centre lines.
+    pub(crate) tan: [f32; ROAD_LAYERS],
+    /// Cosines of the elevations of the centre lines.
+    pub(crate) cosine: [f32; ROAD_LAYERS],
+    /// Tangents of the elevations of the lowest sub-rays.
+    pub(crate) lowest_tan: [f32; ROAD_LAYERS],
+    /// Cosines of the elevations of the lowest sub-rays.
+    pub(crate) lowest_cosine: [f32; ROAD_LAYERS],
+}
+
+impl CentreLines {
+    fn new(column: &Column, elevations: &[Elevation]) -> Self {
+        let of_layer = |value: fn(&Elevation) -> f32| std::array::from_fn(|layer| value(&elevations[layer]));
+        Self {
+            cos: std::array::from_fn(|layer| column.centre[layer / LAYERS_PER_GROUP][0]),
+            sin: std::array::from_fn(|layer| column.centre[layer / LAYERS_PER_GROUP][1]),
+            tan: of_layer(|elevation| elevation.centre[0]),
+            cosine: of_layer(|elevation| elevation.centre[1]),
+            lowest_tan: of_layer(|elevation| elevation.tan[0]),
+            lowest_cosine: of_layer(|elevation| elevation.cos[0]),
+        }
+    }
+}
+
 /// The scan pattern: all beams of both mirror sides, in the sensor's frame.
 ///
 /// A direction is stored as (cos φ, sin φ, tan θ). The horizontal part of this vector has length 1: multiplied by a
@@ -98,23 +132,34 @@ pub struct Pattern {
     pub(crate) columns: Vec<Column>,
     /// Elevations of all beams, for each mirror side.
     elevations: [Vec<Elevation>; 2],
+    /// Centre lines of all columns, for each mirror side.
+    centre_lines: [Vec<CentreLines>; 2],
 }
 
 impl Pattern {
     /// Returns the pattern of the Valeo SCALA Gen 2.
     pub fn scala_2() -> Self {
         let columns: Vec<Column> = azimuth_steps().map(|steps| column(f64::from(steps) * FINE_STEP_DEG)).collect();
-        let elevations = [MirrorSide::Plus, MirrorSide::Minus].map(|mirror_side| {
+        let elevations: [Vec<Elevation>; 2] = [MirrorSide::Plus, MirrorSide::Minus].map(|mirror_side| {
             let of =
                 |column: &Column| (0..LAYERS).map(|layer| elevation(layer, column.azimuth_deg, mirror_side)).collect();
             columns.iter().flat_map::<Vec<Elevation>, _>(of).collect()
         });
-        Self { columns, elevations }
+        let centre_lines = [&elevations[0], &elevations[1]].map(|elevations| {
+            let of_columns = columns.iter().zip(elevations.chunks_exact(LAYERS));
+            of_columns.map(|(column, elevations)| CentreLines::new(column, elevations)).collect()
+        });
+        Self { columns, elevations, centre_lines }
     }
 
     /// Returns the elevations of the 16 beams of a column.
     pub(crate) fn elevations(&self, mirror_side: MirrorSide, column: usize) -> &[Elevation] {
         &self.elevations[mirror_side as usize][column * LAYERS..(column + 1) * LAYERS]
+    }
+
+    /// Returns the centre lines of the lowest beams of a column.
+    pub(crate) fn centre_lines(&self, mirror_side: MirrorSide, column: usize) -> &CentreLines {
+        &self.centre_lines[mirror_side as usize][column]
     }
 
     /// Returns the range of columns whose footprints may touch azimuths from `low_deg` to `high_deg`.

@@ -7,7 +7,7 @@
 use closecall_traffic::{CONTROL_STEP, PlanePose, Stream, Time};
 use nalgebra::{Isometry3, Point3};
 
-use super::bare_road::{BareRoad, cast_ground};
+use super::bare_road::{BareRoad, Road, cast_ground};
 use super::cast::{ActiveParts, ColumnHits};
 use super::material::asphalt;
 use super::noise::Noise;
@@ -147,16 +147,24 @@ impl Scanner {
         let max_shift_m = of.viewpoint.max_shift_m(SWEEP_S) as f32;
         let bare_road = BareRoad::new(&self.targets, &of.link, of.pose, max_shift_m);
         let omitted = bare_road.as_ref().filter(|_| extent == Extent::WithoutBareRoad);
+        let road = Road::new(&self.targets, &of.link);
         let in_air = !self.plumes.is_empty() || of.link.has_fog();
         self.active.start(&self.targets);
         for index in 0..self.pattern.columns.len() {
+            let parts = self.active.advance_to(index, &self.targets);
+            if !in_air
+                && parts.is_empty()
+                && omitted.is_some_and(|bare| bare.covers(self.pattern.centre_lines(of.mirror_side, index), &road))
+            {
+                continue;
+            }
             let column = &self.pattern.columns[index];
             let elevations = self.pattern.elevations(of.mirror_side, index);
             self.hits.clear();
-            for &part in self.active.advance_to(index, &self.targets) {
+            for &part in parts {
                 self.hits.cast(column, elevations, &self.targets.parts[part], &self.targets);
             }
-            cast_ground(column, elevations, (&self.targets, &of.link), omitted, &mut self.hits);
+            cast_ground(column, elevations, (&self.targets, &road), omitted, &mut self.hits);
             if !in_air && self.hits.is_bare() {
                 continue;
             }
