@@ -54,6 +54,11 @@ impl Measurement {
         AxisMeasurement { time_offset_s, slow_sd_m: self.across.slow_sd_m.hypot(offset_sd_m), ..self.across }
     }
 
+    /// Returns the variances of the slow error along and across the road (m²).
+    fn slow_m2(&self) -> [f64; 2] {
+        [self.along, self.across].map(|axis| axis.slow_sd_m * axis.slow_sd_m)
+    }
+
     /// Returns whether all values are finite.
     pub(super) fn is_finite(&self) -> bool {
         [&self.along, &self.across]
@@ -67,6 +72,10 @@ impl Measurement {
 pub(super) struct RoadFilter {
     along: AxisFilter,
     across: AxisFilter,
+    /// Variance of the slow error along and across the road, as it is smoothed over the measurements (m²).
+    slow_m2: [f64; 2],
+    /// Share of the slow error that remains since the latest measurement.
+    slow_share: f64,
 }
 
 impl RoadFilter {
@@ -78,6 +87,8 @@ impl RoadFilter {
         let mut filter = Self {
             along: AxisFilter::prior(ALONG_MODES, at(&measurement.along), along_mps),
             across: AxisFilter::prior(ACROSS_MODES, at(&measurement.across), across_mps),
+            slow_m2: measurement.slow_m2(),
+            slow_share: 1.0,
         };
         filter.correct(measurement, 0.0);
         filter
@@ -93,18 +104,39 @@ impl RoadFilter {
             Situation::of(&RearVehicle { front_s_m, d_m: across.position_m, speed_mps: along.speed_mps }, ego);
         self.along.predict(step_s, slow_share, situation);
         self.across.predict(step_s, slow_share, situation);
+        self.slow_share *= slow_share;
     }
 
     /// Corrects the filter with a measurement of the face, which lies half a length of `half_length_m` ahead of the
     /// centre.
     pub(super) fn correct(&mut self, measurement: &Measurement, half_length_m: f64) {
+        let new_share = 1.0 - self.slow_share;
+        for (smoothed, latest) in self.slow_m2.iter_mut().zip(measurement.slow_m2()) {
+            *smoothed += new_share * (latest - *smoothed);
+        }
+        self.slow_share = 1.0;
+        let measurement = self.smoothed(measurement);
         let across = measurement.across_for(half_length_m, &self.estimate());
         self.along.measure_position(&measurement.along);
         self.across.measure_position(&across);
     }
 
+    /// Returns the measurement with the smoothed standard deviations of the slow error.
+    ///
+    /// The slow error is part of the state in units of its standard deviation, and stays the same while the two sides of the
+    /// mirror alternate. Their boxes have different standard deviations. With these, the filter would take the difference
+    /// between the two sides for information on the slow error.
+    fn smoothed(&self, measurement: &Measurement) -> Measurement {
+        let with = |axis: AxisMeasurement, slow_m2: f64| AxisMeasurement { slow_sd_m: slow_m2.sqrt(), ..axis };
+        Measurement {
+            along: with(measurement.along, self.slow_m2[0]),
+            across: with(measurement.across, self.slow_m2[1]),
+        }
+    }
+
     /// Returns how well a measurement fits, along and across the road, for half a length of `half_length_m`.
     pub(super) fn fit(&self, measurement: &Measurement, half_length_m: f64) -> [AxisFit; 2] {
+        let measurement = self.smoothed(measurement);
         let across = measurement.across_for(half_length_m, &self.estimate());
         [self.along.fit(&measurement.along), self.across.fit(&across)]
     }

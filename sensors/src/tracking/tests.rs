@@ -1,5 +1,7 @@
 //! Tests of the tracker on simulated detections against the true states.
 
+mod fixed_gap;
+
 use closecall_traffic::{
     ActorId, CONTROL_STEP, Check, ClassScores, Environment, Parameters, Road, Stream, Track, TrackId, TrackStatus,
     VehicleClass, stream,
