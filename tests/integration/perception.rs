@@ -11,8 +11,8 @@ use rayon::prelude::*;
 use crate::support::all_of_library;
 
 const SEED: u64 = 7;
-/// Tag of the scenarios in which several vehicles drive close behind each other behind the ego.
-const SEVERAL_BEHIND: &str = "several-behind";
+/// Scenario in which the full chain has tracks with large errors.
+const HIDDEN_VEHICLES: &str = "rear-vehicles-one-after-another";
 
 /// Returns the normalised estimation errors squared (NEES) of a run.
 fn nees(file: &ScenarioFile, sample: u64, mode: SensorMode) -> Vec<f64> {
@@ -28,11 +28,12 @@ fn nees(file: &ScenarioFile, sample: u64, mode: SensorMode) -> Vec<f64> {
 /// those of the full chain are smaller by more than a quarter.
 fn assert_consistent(mode: SensorMode, samples: u64) {
     let mut files: Vec<_> = all_of_library().iter().map(|path| ScenarioFile::load(path, &[]).unwrap()).collect();
-    // With several vehicles close behind each other, some tracks of the full chain have large errors: over the whole library,
-    // nine samples have a mean of 10.7 ± 15.0 where 4 is consistent.
+    // In one of nine samples, a car stands still for 14 s, partly hidden by a motorcycle 4 m behind the ego. The visible part
+    // of its front is up to 0.3 m to one side, and the box claims a few centimetres: the NEES across the road is 240 there,
+    // and below 2 in each of the others.
     if mode == SensorMode::Full {
-        files.retain(|file| file.config().tags.iter().all(|tag| tag != SEVERAL_BEHIND));
-        assert!(files.len() >= 12);
+        files.retain(|file| file.config().name != HIDDEN_VEHICLES);
+        assert!(files.len() >= 13);
     }
     // A sample has the same noise in all scenarios: its runs together count as one independent value.
     let of_sample = |sample| files.iter().flat_map(|file| nees(file, sample, mode)).collect();
