@@ -7,7 +7,7 @@ pub(super) use self::bands::phase_name;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 
-use crate::run::rerun::sdk::SeriesLines;
+use crate::run::rerun::sdk::{Scalars, SeriesLines};
 use closecall_controllers::{EgoState, MisPlan};
 use closecall_scenarios::criticality::{CRITICAL_DCE_M, CRITICAL_TTCE_S};
 use closecall_traffic::Time;
@@ -201,16 +201,29 @@ impl Plots<'_> {
         if self.role == Role::Baseline {
             return Ok(());
         }
-        for (number, noted) in self.film.moments().iter().enumerate() {
-            let entity = format!("plots/{}/moment_{number}", plot.kind.name());
-            let style = SeriesLines::new()
-                .with_names([noted.moment.label()])
-                .with_colors([palette::moment(noted.moment)])
-                .with_widths([THIN_LINE_WIDTH]);
-            self.writer.write_static(&entity, &style)?;
-            self.writer.write_series(&entity, &[noted.time; 2], &plot.range.map(Some))?;
+        let moments = self.film.moments();
+        if moments.is_empty() {
+            return Ok(());
         }
-        Ok(())
+        let entity = format!("plots/{}/moments", plot.kind.name());
+        let style = SeriesLines::new()
+            .with_names(moments.iter().map(|noted| noted.moment.label()))
+            .with_colors(moments.iter().map(|noted| palette::moment(noted.moment)))
+            .with_widths(moments.iter().map(|_| THIN_LINE_WIDTH));
+        self.writer.write_static(&entity, &style)?;
+        // One series per moment in one entity. A series has values in the two rows of its moment alone.
+        let rows: Vec<(Time, usize, f64)> = moments
+            .iter()
+            .enumerate()
+            .flat_map(|(number, noted)| plot.range.map(|end| (noted.time, number, end)))
+            .collect();
+        let times: Vec<Time> = rows.iter().map(|row| row.0).collect();
+        self.writer.write_curve(&entity, &times, |range| {
+            let values = rows[range].iter().flat_map(|&(_, shown, end)| {
+                (0..moments.len()).map(move |number| if number == shown { end } else { f64::NAN })
+            });
+            Scalars::new(values).columns(vec![moments.len(); times.len()])
+        })
     }
 
     /// Writes name and style of a curve.
