@@ -21,7 +21,7 @@ const PIXEL_ROWS: std::ops::Range<u16> = 230..610;
 /// Times before the critical moment for which an image is rendered, besides the first scan and the moments of the encounter.
 const TIMES_BEFORE: [Time; 3] = [Time::from_ms(2_000), Time::from_ms(800), Time::ZERO];
 /// Least time between an image and the one before it. That of the critical moment is rendered in any case.
-const LEAST_INTERVAL: Time = Time::from_ms(700);
+const LEAST_INTERVAL: Time = Time::from_ms(1_500);
 
 /// Writes the images. Returns true if there are any.
 pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<bool, RecordingError> {
