@@ -211,12 +211,12 @@ impl Plots<'_> {
             .with_colors(moments.iter().map(|noted| palette::moment(noted.moment)))
             .with_widths(moments.iter().map(|_| THIN_LINE_WIDTH));
         self.writer.write_static(&entity, &style)?;
+        // The view of a pair can show more than the range of this film.
+        let largest = plot.kind.largest_range();
+        let ends = [0, 1].map(|end| if largest[end].is_finite() { largest[end] } else { plot.range[end] });
         // One series per moment in one entity. A series has values in the two rows of its moment alone.
-        let rows: Vec<(Time, usize, f64)> = moments
-            .iter()
-            .enumerate()
-            .flat_map(|(number, noted)| plot.range.map(|end| (noted.time, number, end)))
-            .collect();
+        let rows: Vec<(Time, usize, f64)> =
+            moments.iter().enumerate().flat_map(|(number, noted)| ends.map(|end| (noted.time, number, end))).collect();
         let times: Vec<Time> = rows.iter().map(|row| row.0).collect();
         self.writer.write_curve(&entity, &times, |range| {
             let values = rows[range].iter().flat_map(|&(_, shown, end)| {

@@ -75,7 +75,8 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingErr
             let at_m = if index == film.ego { EGO_LABEL_AT_M } else { [0.0, 0.0, above_m as f32] };
             // Dense recorded traffic has room for three names. The view from above has the others.
             if film.outcome.is_some() || !matches!(actor.part, Part::Other(_)) {
-                write_name(writer, &entity, times, &states, (actor.name.as_str(), at_m, colour))?;
+                let texts = names(film, index);
+                write_name(writer, &entity, times, &texts, (at_m, colour))?;
             }
         }
         write_lights(writer, &entity, times, &states, (actor.vehicle.class, size))?;
@@ -157,20 +158,33 @@ fn write_velocity(
     })
 }
 
+/// Returns the name of a vehicle with its rounded speed, for each frame in which it is present. A vehicle that touches the
+/// ego has none: the names would lie on each other, and the collision's text has both.
+fn names(film: &Film, actor: usize) -> Vec<String> {
+    let name = film.actors[actor].name.as_str();
+    let text = |frame: &Frame| {
+        let distance_m = || film.moving_box(frame, actor).shape.distance_m(&film.moving_box(frame, film.ego).shape);
+        if actor != film.ego && film.outcome.is_some() && distance_m() < TOUCHING_M {
+            return String::new();
+        }
+        format!("{name} {:.0} m/s", frame.states[actor].speed_mps)
+    };
+    film.frames[film.actors[actor].present_frames.clone()].iter().map(text).collect()
+}
+
 fn write_name(
     writer: &Writer<'_>,
     entity: &str,
     times: &[Time],
-    states: &[&VehicleState],
-    (name, at_m, colour): (&str, [f32; 3], Rgba),
+    texts: &[String],
+    (at_m, colour): ([f32; 3], Rgba),
 ) -> Result<(), RecordingError> {
     let entity = format!("{entity}/name");
     let fixed =
         Points3D::new([at_m]).with_colors([palette::text(colour)]).with_radii([0.05_f32]).with_show_labels(true);
     writer.write_static(&entity, &fixed)?;
     // Only a change of the rounded speed gives a new row.
-    let texts: Vec<String> = states.iter().map(|state| format!("{name} {:.0} m/s", state.speed_mps)).collect();
-    let rows = changes(&texts);
+    let rows = changes(texts);
     let times: Vec<Time> = rows.iter().map(|&row| times[row]).collect();
     writer.write_rows(&entity, &times, |range| {
         let texts = rows[range].iter().map(|&row| texts[row].as_str());
