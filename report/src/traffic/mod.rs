@@ -5,7 +5,7 @@ pub mod fit;
 pub mod in_car;
 pub mod lane_changes;
 pub mod paper;
-mod paper_charts;
+pub mod paper_charts;
 pub mod quality;
 pub mod recorder;
 pub mod reenactment;

@@ -271,6 +271,9 @@ impl Sampled {
             lines,
             level: None,
             legend: Legend::Right,
+            bands: Vec::new(),
+            marks: Vec::new(),
+            most: None,
         };
         let time = "time [s]";
         vec![
