@@ -7,7 +7,7 @@
 //! * [`heartbeat`]: the progress of a long command as lines of text
 //! * [`json`]: results as JSON with stable keys
 //! * [`study`]: output of sensitivity studies and frontiers: tables, charts and pages
-//! * [`traffic`]: simulated traffic as trajectory data, and texts and charts of what was found in trajectory data
+//! * [`traffic`]: texts and charts of what was found in trajectory data
 //!
 //! This crate is the only one that uses rerun, arrow and plotters.
 

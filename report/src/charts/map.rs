@@ -18,7 +18,8 @@ const SMALL_POINT_PX: i32 = 2;
 /// Width over which the points at one label are spread, in steps between labels.
 const SPREAD: f64 = 0.6;
 
-/// Draws the map of two parameters. The shade of a cell is the share of its samples with a collision in any arm. Points
+/// Draws the map of two parameters. The shade of a cell is the share of its samples with a collision in the arm under
+/// test. Points
 /// are samples.
 pub(crate) fn outcome_map(scenario: &ScenarioOverview, pair: &PairBins) -> io::Result<Markup> {
     let [across, up] = pair.axes.map(|index| &scenario.axes[index]);
@@ -36,6 +37,12 @@ pub(crate) fn outcome_map(scenario: &ScenarioOverview, pair: &PairBins) -> io::R
         }
         Ok(())
     })
+}
+
+/// Returns the colour of a cell with this share of samples with a collision, as a style sheet writes it.
+pub(crate) fn cell_css(share: f64) -> String {
+    let RGBColor(red, green, blue) = COLLISIONS;
+    format!("rgba({red}, {green}, {blue}, {:.2})", LARGEST_OPACITY * share)
 }
 
 fn draw_cells(plot: &mut Plot<'_, '_>, pair: &PairBins, across: &Axis, up: &Axis) -> Drawn {

@@ -140,12 +140,15 @@ struct Axis<'a> {
 /// Counts above this multiple of the reference are not shown, so that those that decide are legible.
 const MOST: f64 = 1.5;
 
+/// Number of levels that are shown beyond that at which the last criterion fails.
+const LEVELS_BEYOND: usize = 3;
+
 fn chart(found: &Robustness, axis: &Axis<'_>) -> LineChart {
-    // Beyond the level after that at which the last criterion fails, nothing changes.
+    // Far beyond the level at which the last criterion fails, nothing is to be seen.
     let fails_at = axis.failing.iter().map(|levels| levels.iter().copied().fold(f64::NEG_INFINITY, f64::max));
     let last = fails_at.fold(f64::NEG_INFINITY, f64::max);
     let all_fail = axis.failing.iter().all(|levels| !levels.is_empty());
-    let shown = axis.levels.iter().filter(|level| !all_fail || **level <= last).count() + 1;
+    let shown = axis.levels.iter().filter(|level| !all_fail || **level <= last).count() + LEVELS_BEYOND;
     let shown = shown.min(axis.levels.len());
     let points = |column: usize, value: fn(&CriterionCounts) -> f64| -> Vec<(f64, f64)> {
         let levels = axis.levels.iter().zip(axis.rows).take(shown);

@@ -25,8 +25,8 @@ const DOT_OPACITY: f64 = 0.7;
 const DOTS: f64 = 0.36;
 /// The golden ratio, whose multiples spread the dots evenly.
 const GOLDEN: f64 = 0.618_033_988_749_895;
-/// Least width of a box with its name (px).
-const BOX_PX: u32 = 130;
+/// Width of a letter of a box's name with the room between two names (px).
+const LETTER_PX: usize = 7;
 
 /// A chart that cannot be drawn.
 #[derive(Debug, thiserror::Error)]
@@ -216,7 +216,9 @@ impl BoxChart {
     /// # Errors
     /// [`ChartError`] if the drawing library fails.
     pub fn svg(&self) -> Result<String, ChartError> {
-        let width = FILE_PX.0.max(u32::try_from(self.boxes.len()).unwrap_or(u32::MAX).saturating_mul(BOX_PX));
+        let longest = self.boxes.iter().map(|one| one.name.chars().count()).max().unwrap_or(0);
+        let boxes_px = self.boxes.len().saturating_mul(longest.saturating_mul(LETTER_PX));
+        let width = FILE_PX.0.max(u32::try_from(boxes_px).unwrap_or(u32::MAX));
         sized_file(&self.title, (width, FILE_PX.1), |canvas| self.draw(canvas))
     }
 

@@ -7,12 +7,12 @@ use super::Axis;
 /// Number of cells along each axis.
 pub const CELLS: usize = 8;
 
-/// The number of samples in each cell of the plane of two parameters, and of those in which the ego of any arm collides.
+/// The number of samples in each cell of the plane of two parameters, and of those with a collision in the arm under test.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PairBins {
     /// The indices of both parameters among the axes.
     pub axes: [usize; 2],
-    /// The number of samples, and of samples with a collision in any arm, by the cell of the first and of the second
+    /// The number of samples, and of samples with a collision in the arm under test, by the cell of the first and of the second
     /// parameter.
     pub cells: [[[u64; 2]; CELLS]; CELLS],
 }

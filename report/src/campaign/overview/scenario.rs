@@ -147,7 +147,7 @@ impl ScenarioOverview {
                 counts[*cell][fate as usize] += 1;
             }
         }
-        let collided = matches!(fate, Fate::Prevented | Fate::Failed | Fate::Induced);
+        let collided = matches!(fate, Fate::Failed | Fate::Induced);
         for pair in &mut self.pairs {
             pair.push(&self.axes, &cells, collided);
         }

@@ -80,9 +80,10 @@ impl EncounterComparison {
         let [ego, front, rear] = encounter.ego_lead_rear().map(|track| track.track_id);
         let (arm, start_s) = (simulated.arm_label(), encounter.start.s());
         let mut page = format!("### Recorded, and {arm}\n\n");
-        for (side, name) in [(&self.recorded, "recorded"), (&self.simulated, arm)] {
+        let result = simulated.result().map_or(String::new(), |result| format!("{result}; "));
+        for (side, name, result) in [(&self.recorded, "recorded", ""), (&self.simulated, arm, &result)] {
             // Writing to a string cannot fail.
-            let _ = writeln!(page, "- **{name}:** {}", side.sentence());
+            let _ = writeln!(page, "- **{name}:** {result}{}", side.sentence());
         }
         let rear_driver = match driver {
             RearDriver::Model => "R drives like a human",

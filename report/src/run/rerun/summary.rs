@@ -68,6 +68,8 @@ fn push_single(page: &mut String, film: &Film, is_reenactment: bool) {
         let _ = write!(page, "### {word}\n\n");
     }
     match film.result() {
+        // The comparison has it.
+        Some(_) if is_reenactment => {}
         Some(result) => {
             let _ = writeln!(page, "- **{}:** {result}", film.arm_label());
         }

@@ -18,7 +18,7 @@ const ARROW_ABOVE_M: f64 = 0.4;
 /// Heights of the names above the roof (m): different ones, so that the names of vehicles that touch do not cover each
 /// other.
 /// The name of the ego lies on the road, to its right.
-const EGO_LABEL_AT_M: [f32; 3] = [4.0, -3.0, 0.0];
+const EGO_LABEL_AT_M: [f32; 3] = [5.0, -5.0, 0.0];
 const LEAD_LABEL_M: f64 = 5.8;
 const OTHER_LABEL_M: f64 = 1.6;
 const REAR_LABEL_M: f64 = 3.2;

@@ -13,11 +13,11 @@ use re_sdk::log::Chunk;
 use super::super::stream::{OPENING_TIMELINE, STEP_TIMELINE, TIME_TIMELINE};
 use super::*;
 use crate::run::film::{EncounterComparison, FilmRecorder, film_encounter};
-use crate::traffic::recorder::TrafficRecorder;
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::outcome::{ClosedBy, Collision, Phase};
 use closecall_simulation::scenario::{RearDriver, ScenarioFile, reenact};
+use closecall_simulation::trajectories::TrafficRecorder;
 use closecall_simulation::{Arm, CONTROL_STEP, RunKey, simulate};
 
 fn library(name: &str) -> ScenarioFile {
