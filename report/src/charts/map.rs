@@ -50,7 +50,7 @@ fn draw_cells(plot: &mut Plot<'_, '_>, pair: &PairBins, across: &Axis, up: &Axis
     let (columns, rows) = (across.cells(CELLS), up.cells(CELLS));
     let (width, height) = ((right - left) / columns as f64, (top - bottom) / rows as f64);
     for (column, cells) in pair.cells.iter().enumerate().take(columns) {
-        for (row, [samples, collisions]) in cells.iter().enumerate().take(rows) {
+        for (row, [samples, _, collisions]) in cells.iter().enumerate().take(rows) {
             if *collisions > 0 {
                 let share = *collisions as f64 / *samples as f64;
                 let (x, y) = (left + column as f64 * width, bottom + row as f64 * height);

@@ -35,6 +35,8 @@ const FRONT_TEXT_Y_M: f32 = 7.0;
 const TOUCHING_M: f64 = 0.3;
 /// Front gap below which no headway is written, since the name of the ego is there (m).
 const NAMED_GAP_M: f64 = 15.0;
+/// Share of the rear gap that is added to it.
+const NAMED_GAP_SHARE: f64 = 0.4;
 /// Height at which gaps are drawn (m).
 const GAP_Z_M: f64 = 0.5;
 
@@ -263,8 +265,14 @@ fn write_lamps(
 /// Writes the gaps in front of and behind the ego, bumper to bumper, with their time headways. A critical gap is red.
 fn write_gaps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordingError> {
     let bumper_m = 0.5 * film.actors[film.ego].vehicle.dimensions.length_m;
-    let front = |frame: &Frame| Gap::new([bumper_m, 1.0], frame.margins.gap_front_m, frame.margins.thw_front_s);
-    let rear = |frame: &Frame| Gap::new([-bumper_m, -1.0], frame.margins.gap_rear_m, frame.margins.thw_rear_s);
+    let front = |frame: &Frame| {
+        let (gap_m, thw_s) = (frame.margins.gap_front_m, frame.margins.thw_front_s);
+        // From farther back the names of the ego and of the lead vehicle are closer together.
+        let named_m = NAMED_GAP_M + NAMED_GAP_SHARE * frame.margins.gap_rear_m.unwrap_or(0.0).clamp(0.0, MAX_RIG_M);
+        Gap::new([bumper_m, 1.0], gap_m, thw_s, named_m)
+    };
+    let rear =
+        |frame: &Frame| Gap::new([-bumper_m, -1.0], frame.margins.gap_rear_m, frame.margins.thw_rear_s, TOUCHING_M);
     let both: [(&str, Vec<Option<Gap>>); 2] = [
         ("world/ego/gap_front", film.frames.iter().map(front).collect()),
         ("world/ego/gap_rear", film.frames.iter().map(rear).collect()),
@@ -303,13 +311,13 @@ struct Gap {
 
 impl Gap {
     /// Returns the gap that begins at `bumper_m` and extends in the direction of `sign`, in the ego frame, or `None` if
-    /// there is no positive gap.
-    fn new([bumper_m, sign]: [f64; 2], gap_m: Measured, thw_s: Measured) -> Option<Self> {
+    /// there is no positive gap. Below `named_m` it has no text.
+    fn new([bumper_m, sign]: [f64; 2], gap_m: Measured, thw_s: Measured, named_m: f64) -> Option<Self> {
         let gap_m = gap_m.ok().filter(|&gap_m| gap_m > 0.0)?;
         let is_critical = thw_s.is_ok_and(|thw_s| thw_s < CRITICAL_THW_S);
         let end = |x_m: f64| [x_m as f32, 0.0, GAP_Z_M as f32];
         let text = match thw_s {
-            _ if gap_m < if sign > 0.0 { NAMED_GAP_M } else { TOUCHING_M } => String::new(),
+            _ if gap_m < named_m => String::new(),
             Ok(thw_s) => headway_text(thw_s),
             Err(_) => format!("{gap_m:.1} m"),
         };

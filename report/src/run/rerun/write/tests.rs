@@ -179,8 +179,8 @@ fn full_sensors_show_points_boxes_ground_truth_and_images() {
         "/mis/world/ego/truth/known",
         "/mis/world/ego/truth/missed",
         "/mis/world/ego/truth/false_tracks",
-        "/mis/camera",
-        "/mis/camera/windows",
+        "/mis/world/ego/camera",
+        "/mis/world/ego/camera/windows",
     ];
     for entity in entities {
         assert!(data.iter().any(|chunk| chunk.entity_path().to_string() == entity), "{entity}");
