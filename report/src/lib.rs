@@ -4,11 +4,10 @@
 //! * [`run`](mod@run): output of one run, or of a pair of runs: Rerun recording, static figure, trace
 //! * [`campaign`]: output of many runs: HTML page, JUnit, Parquet, Markdown, recordings of selected samples
 //! * [`calibration`]: the result of a calibration, and the member of a driver ensemble that it gives
-//! * [`serve`]: recordings in the browser
 //! * [`heartbeat`]: the progress of a long command as lines of text
 //! * [`json`]: results as JSON with stable keys
 //! * [`study`]: output of sensitivity studies and frontiers: tables, charts and pages
-//! * [`traffic`]: simulated traffic as trajectory data, and texts and charts of what was found in trajectory data
+//! * [`traffic`]: texts and charts of what was found in trajectory data
 //!
 //! This crate is the only one that uses rerun, arrow and plotters.
 
@@ -19,7 +18,6 @@ mod escape;
 pub mod heartbeat;
 pub mod json;
 pub mod run;
-pub mod serve;
 pub mod study;
 mod table;
 pub mod traffic;

@@ -9,6 +9,7 @@
 //! * [`run`](mod@run): the closed loop, and the observers of a run
 //! * [`calibration`]: car-following models fitted to recorded pairs
 //! * [`outcome`]: the result of a run
+//! * [`trajectories`]: simulated traffic as trajectory data
 //!
 //! The outcome depends on the scenario, the seed, the sample number and the arm only, down to the last bit. This crate is
 //! the only user of rapier, in its module `world`.
@@ -20,6 +21,7 @@ pub mod harm;
 pub mod outcome;
 pub mod run;
 pub mod scenario;
+pub mod trajectories;
 mod world;
 
 pub use closecall_traffic::CONTROL_STEP;

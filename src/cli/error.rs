@@ -10,10 +10,9 @@ use closecall_campaign::plan::PlanError;
 use closecall_campaign::saved::SavedError;
 use closecall_campaign::sensitivity::PlanFailure;
 use closecall_report::campaign::ReportError;
-use closecall_report::run::figure::PngError;
+use closecall_report::run::figure::PictureError;
 use closecall_report::run::film::TrafficFilmError;
 use closecall_report::run::rerun::RecordingError;
-use closecall_report::serve::{ServeError, ViewerError};
 use closecall_report::traffic::trajectory_charts::ChartError;
 use closecall_scenarios::atomic::WriteError;
 use closecall_scenarios::encounter::NoEncounter;
@@ -27,6 +26,7 @@ use closecall_simulation::scenario::ScenarioError;
 use closecall_simulation::scenario::library::UnknownScenario;
 use closecall_simulation::scenario::member::{ApplyError, MemberError};
 use closecall_simulation::scenario::source::SourceError;
+use closecall_viewer::{ServeError, ViewerError};
 use miette::Diagnostic;
 
 use crate::exit_code::ExitCode;
@@ -81,7 +81,7 @@ pub enum CliError {
     Viewer(#[from] ViewerError),
     /// A figure cannot be drawn.
     #[error(transparent)]
-    Figure(#[from] PngError),
+    Figure(#[from] PictureError),
     /// A recorded lane change cannot be shown.
     #[error(transparent)]
     TrafficFilm(#[from] TrafficFilmError),
@@ -186,7 +186,7 @@ impl From<&CliError> for ExitCode {
             | CliError::TrafficFilm(_)
             | CliError::NoEncounter { .. }
             | CliError::Project(_)
-            | CliError::Serve(ServeError::Nothing { .. })
+            | CliError::Serve(ServeError::Nothing { .. } | ServeError::Foreign { .. })
             | CliError::Classifier(_) => Self::InvalidInput,
             CliError::Folder(error) => Self::from(error),
             CliError::Campaign(error) => Self::from(error),

@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 use closecall_campaign::robustness::robustness;
-use closecall_report::traffic::paper::{Paper, RecordedChanges};
+use closecall_report::traffic::paper::Paper;
+use closecall_report::traffic::statistics::RecordedChanges;
 use closecall_scenarios::atomic::write_file;
 use closecall_scenarios::criticality::{Judgement, criticality};
 use closecall_scenarios::filters::smooth;

@@ -1,13 +1,12 @@
 //! `closecall plot`: draws an encounter as a static figure.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_campaign::saved::SavedCampaign;
-use closecall_report::run::figure::{encounter, png};
+use closecall_report::run::figure::{PictureFile, encounter, parse_width_mm};
 use closecall_report::run::film::{Film, Level, film_arms};
-use closecall_scenarios::atomic::write_file;
 use closecall_scenarios::sampling::Design;
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::scenario::Scenario;
@@ -44,27 +43,21 @@ pub(super) struct PlotArgs {
     arm: ArmArgs,
     #[command(flatten)]
     set: SetArgs,
-    /// File to write; its extension, .svg or .png, determines the format
-    #[arg(short, long, value_name = "FILE.svg|FILE.png", value_parser = picture)]
-    output: PathBuf,
-}
-
-/// Parses the path of a picture, whose extension must be .svg or .png.
-fn picture(text: &str) -> Result<PathBuf, String> {
-    let path = PathBuf::from(text);
-    match path.extension().and_then(|extension| extension.to_str()) {
-        Some("svg" | "png") => Ok(path),
-        _ => Err(format!("`{text}` must end with .svg or .png")),
-    }
+    /// File to write; its extension, .svg, .png or .pdf, determines the format
+    #[arg(short, long, value_name = "FILE.svg|FILE.png|FILE.pdf", value_parser = PictureFile::parse)]
+    output: PictureFile,
+    /// Width on paper in mm, from 50 to 1200; of a PNG file at 300 pixels per inch [default: 900 px of CSS, 238 mm]
+    #[arg(long, value_name = "MM", value_parser = parse_width_mm)]
+    width_mm: Option<f32>,
 }
 
 pub(super) fn plot(args: &PlotArgs) -> Result<ExitCode, CliError> {
     let films = if args.source.is_dir() { of_campaign(args)? } else { of_scenario(args)? };
-    write_picture(&args.output, &encounter(&films))?;
+    args.output.write(&encounter(&films), args.width_mm)?;
     for film in &films {
         outln!("{}: {}", film.title(), film.headline());
     }
-    outln!("written to {}", args.output.display());
+    outln!("written to {}", args.output.path().display());
     Ok(ExitCode::Pass)
 }
 
@@ -76,7 +69,7 @@ fn of_scenario(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
         return Err(CliError::Usage { message });
     }
     let file = args.set.load(&args.source)?;
-    protect(&[files_of(&file), args.comparison.files(&args.arm)].concat(), &[("--output", Some(&args.output))])?;
+    protect(&[files_of(&file), args.comparison.files(&args.arm)].concat(), &[("--output", Some(args.output.path()))])?;
     let (seed, sample) = (args.seed.unwrap_or(0), args.number.or(args.sample).unwrap_or(0));
     let sampling = Sampling { seed, design: Design::Random, samples: sample.saturating_add(1) };
     let scenario = concrete(&file, sampling, sample).map_err(|source| CliError::Sample { sample, source })?;
@@ -97,7 +90,7 @@ fn of_campaign(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
         let message = "a campaign has many samples: name one, as in `closecall plot DIR SAMPLE -o FILE.svg`".to_owned();
         return Err(CliError::Usage { message });
     };
-    protect(&files_of_campaign(&args.source), &[("--output", Some(&args.output))])?;
+    protect(&files_of_campaign(&args.source), &[("--output", Some(args.output.path()))])?;
     let saved = SavedCampaign::open(&args.source)?;
     let (scenario, key) = saved.sample(args.scenario.as_deref(), sample)?;
     let mut arms = saved.manifest().arms();
@@ -110,14 +103,4 @@ fn of_campaign(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
 fn films(scenario: &Scenario, key: RunKey, arms: &[Arm]) -> Result<Vec<Film>, CliError> {
     check_backend_of(scenario, arms)?;
     film_arms(scenario, key, arms, Level::Objects).map_err(|source| CliError::Sample { sample: key.sample, source })
-}
-
-fn write_picture(path: &Path, svg: &str) -> Result<(), CliError> {
-    if path.extension().is_some_and(|extension| extension == "png") {
-        let bytes = png(svg)?;
-        write_file(path, |file| file.write_all(&bytes))?;
-    } else {
-        write_file(path, |file| file.write_all(svg.as_bytes()))?;
-    }
-    Ok(())
 }

@@ -4,11 +4,10 @@ use std::path::PathBuf;
 
 use clap::Args;
 use closecall_campaign::runner::{Sampling, concrete, run_guarded};
-use closecall_report::traffic::in_car::{InCarRecorder, recorded_actor};
-use closecall_report::traffic::recorder::TrafficRecorder;
 use closecall_scenarios::sampling::Design;
 use closecall_scenarios::trajectory_data::{ground_truth_path, write_ground_truth, write_in_car, write_trajectories};
 use closecall_simulation::scenario::{Scenario, ScenarioFile};
+use closecall_simulation::trajectories::{InCarRecorder, TrafficRecorder, recorded_actor};
 use closecall_simulation::{Observer, RunKey};
 
 use super::CliError;

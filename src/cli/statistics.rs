@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use clap::Args;
 use closecall_report::json::stamped;
-use closecall_report::traffic::statistics::{STATISTICS_CHARTS, StatisticsText, statistics_charts};
+use closecall_report::traffic::statistics::{RecordedChanges, STATISTICS_CHARTS, StatisticsText, statistics_charts};
 use closecall_scenarios::criticality::{CriticalLaneChange, Judgement, criticality, statistics as compute};
 use closecall_scenarios::filters::smooth;
+use closecall_scenarios::trajectory_data::TrajectoryData;
 
 use super::CliError;
 use super::args::{FilesArgs, Format, positive};
@@ -36,12 +37,13 @@ pub(super) fn statistics(args: &StatisticsArgs) -> Result<ExitCode, CliError> {
         protect(&of_trajectories(&args.data.files), &[("--plot", Some(chart))])?;
     }
     let data_sets = args.data.read_all()?;
-    let changes = data_sets.iter().flat_map(|data| {
-        criticality(&smooth(data), &Judgement { speed_limit_mps: args.speed_limit_mps, ttce_alone: false })
-    });
-    let found = compute(&changes.collect::<Vec<CriticalLaneChange>>());
+    let judgement = Judgement { speed_limit_mps: args.speed_limit_mps, ttce_alone: false };
+    let changes =
+        |data: TrajectoryData| RecordedChanges { changes: criticality(&smooth(&data), &judgement), name: data.name };
+    let recordings: Vec<RecordedChanges> = data_sets.into_iter().map(changes).collect();
+    let found = compute(&recordings.iter().flat_map(|one| one.changes.clone()).collect::<Vec<CriticalLaneChange>>());
     if let (Some(folder), Some(paths)) = (&args.plot, &charts) {
-        write_charts(folder, paths, &statistics_charts(&found)?)?;
+        write_charts(folder, paths, &statistics_charts(&recordings)?)?;
     }
     match args.format {
         Format::Json => outln!("{:#}", stamped(serde_json::json!(found), None, None)),

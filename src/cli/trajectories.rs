@@ -8,6 +8,7 @@ use closecall_report::run::film::film_lane_change;
 use closecall_report::run::rerun::write_recording;
 use closecall_report::traffic::fit::FitText;
 use closecall_report::traffic::lane_changes::{CriticalityText, LaneChangesText, ScoreText};
+use closecall_report::traffic::paper_charts::{CRITICALITY_CHARTS, criticality_charts};
 use closecall_scenarios::atomic::WriteError;
 use closecall_scenarios::criticality::{Counted, Judgement, by_severity, criticality as evaluate};
 use closecall_scenarios::filters::smooth;
@@ -19,7 +20,7 @@ use closecall_scenarios::trajectory_data::{Layout, open, read_with};
 
 use super::CliError;
 use super::args::{FilesArgs, Format, ReadArgs, positive};
-use super::output::{command_line, out, outln, print_error, print_written};
+use super::output::{command_line, out, outln, print_error, print_written, write_charts};
 use super::protect::{of_trajectories, protect, recording as trajectory_path};
 
 use crate::exit_code::ExitCode;
@@ -103,6 +104,9 @@ pub(super) struct CriticalityArgs {
     /// Track whose lane change --record saves
     #[arg(long, value_name = "ID", requires = "record")]
     track: Option<u64>,
+    /// Folder for a histogram of each metric with its threshold: `thw_s.svg`, `dce_m.svg` and so on
+    #[arg(long, value_name = "DIR")]
+    plot: Option<PathBuf>,
     /// Output format
     #[arg(long, value_enum, default_value_t)]
     format: Format,
@@ -174,7 +178,12 @@ pub(super) fn lane_changes(args: &LaneChangesArgs) -> Result<ExitCode, CliError>
 }
 
 pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> {
-    protect(&of_trajectories(std::slice::from_ref(&args.file)), &[("--record", args.record.as_deref())])?;
+    let inputs = of_trajectories(std::slice::from_ref(&args.file));
+    protect(&inputs, &[("--record", args.record.as_deref())])?;
+    let charts = args.plot.as_ref().map(|folder| CRITICALITY_CHARTS.map(|name| folder.join(name)));
+    for chart in charts.iter().flatten() {
+        protect(&inputs, &[("--plot", Some(chart))])?;
+    }
     let data = read_with(&args.file, args.read.options())?;
     for warning in data.warnings() {
         print_error(format_args!("warning: {}: {warning}\n", args.file.display()));
@@ -192,6 +201,9 @@ pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> 
         };
         write_recording(path, &[film_lane_change(&smoothed, chosen)?])?;
         print_written(path);
+    }
+    if let (Some(folder), Some(paths)) = (&args.plot, &charts) {
+        write_charts(folder, paths, &criticality_charts(&changes, args.speed_limit_mps)?)?;
     }
     match args.format {
         Format::Json => outln!("{:#}", stamped(serde_json::json!(changes), None, None)),

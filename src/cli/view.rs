@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use closecall_report::serve::{Server, WebViewer, open_in_browser};
+use closecall_viewer::{Server, WebViewer, open_in_browser};
 
 use super::CliError;
 use super::output::{outln, print_error};

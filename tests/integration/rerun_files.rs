@@ -144,7 +144,15 @@ fn a_scenario_and_a_sample_of_a_campaign_give_the_same_figure() {
     for wrong in [["plot", &out, "-o", &png].to_vec(), ["plot", &out, "7", "-o", &png].to_vec()] {
         assert_eq!(code(&closecall(wrong)), 2);
     }
-    assert_eq!(code(&closecall(["plot", scenario.to_str().unwrap(), "-o", "figure.jpg"])), 2);
+    let pdf = file("figure.pdf");
+    stdout(&closecall(["plot", scenario.to_str().unwrap(), "--paired", "--width-mm", "180", "-o", &pdf]), 0);
+    let page = std::fs::read(&pdf).unwrap();
+    assert!(page.starts_with(b"%PDF-") && String::from_utf8_lossy(&page).contains("/MediaBox [0 0 510.2"));
+    for wrong in [["-o", "figure.jpg"].as_slice(), &["-o", &pdf, "--width-mm", "nan"]] {
+        let output = closecall(["plot", scenario.to_str().unwrap()].iter().chain(wrong));
+        assert_eq!(code(&output), 2, "{wrong:?}");
+        assert!(stderr(&output).contains("must end with") || stderr(&output).contains("from 50 to 1200"), "{wrong:?}");
+    }
 }
 
 #[test]

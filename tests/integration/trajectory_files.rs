@@ -136,7 +136,8 @@ fn every_criterion_finds_the_true_lane_changes_of_an_in_car_log_and_two_tolerate
     assert!(distance <= 0.5 * reference, "distance {distance}");
     assert!(found["fails_from_noise_m_per_sqrt_s"]["peak"].as_f64().unwrap() > 0.0);
     for name in ["noise.svg", "offset.svg"] {
-        assert!(fs::read_to_string(plots.join(name)).unwrap().contains("gradient: found again"));
+        let chart = fs::read_to_string(plots.join(name)).unwrap();
+        assert!(chart.contains("gradient: found again") && chart.contains("distance fails"), "{name}");
     }
 }
 
@@ -157,7 +158,17 @@ fn statistics_count_lane_changes_by_class_and_draw_box_plots() {
     assert!(classes.iter().any(|class| class["duration_s"]["n"].as_u64() > Some(5)));
     assert_eq!(found["correlations"].as_array().unwrap().len(), 15);
     for name in ["duration.svg", "width.svg", "speed.svg"] {
-        assert!(fs::read_to_string(plots.join(name)).unwrap().contains("car (n = "));
+        let chart = fs::read_to_string(plots.join(name)).unwrap();
+        let complete: u64 = classes.iter().map(|class| class["complete"].as_u64().unwrap()).sum();
+        assert!(chart.contains("car (n = ") && chart.matches("<circle").count() as u64 == complete, "{name}");
+    }
+    let args = ["criticality", csv, "--format", "json", "--plot", plots.to_str().unwrap()];
+    let output = closecall(args);
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    for (name, limit) in
+        [("thw_s.svg", "critical below 0.9"), ("a_lat_mps2.svg", "critical above"), ("dce_m.svg", "below 1.0")]
+    {
+        assert!(fs::read_to_string(plots.join(name)).unwrap().contains(limit), "{name}");
     }
 }
 

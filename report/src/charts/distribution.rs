@@ -5,12 +5,14 @@ use std::io;
 use maud::Markup;
 use plotters::prelude::*;
 
-use super::style::{ChartAxis, SMALL_PX, arm_colour, axes, fate_colour, inline, number_text};
+use super::style::{ChartAxis, SMALL_PX, arm_colour, axes, fate_colour, inline, label_text, number_text};
 use crate::campaign::overview::{Axis, BINS, CELLS, Fate, MarginBins, MarginKind};
 use crate::units::labelled;
 
 /// Room above the highest bar, as a share of its height.
 const HEADROOM: f64 = 1.08;
+/// Distance of the name of a limit from its line, as a share of the axis.
+const LABEL_GAP: f64 = 0.01;
 /// Opacity of the area below a distribution.
 const AREA_OPACITY: f64 = 0.18;
 /// White space on both sides of a bar, as a share of its width.
@@ -39,6 +41,13 @@ pub(crate) fn margin(kind: &MarginKind, arms: &[MarginBins]) -> io::Result<Marku
                 .collect();
             plot.draw_series(AreaSeries::new(steps.iter().copied(), 0.0, colour.mix(AREA_OPACITY)))?;
             plot.draw_series(LineSeries::new(steps, colour.stroke_width(2)))?;
+        }
+        if let Some((limit, name)) = kind.limit {
+            let top = HEADROOM * most.max(1) as f64;
+            let style = fate_colour(Fate::Induced).stroke_width(1);
+            plot.draw_series(DashedLineSeries::new([(limit, 0.0), (limit, top)], 4, 3, style))?;
+            let text = Text::new(name, (limit + LABEL_GAP * kind.high, 0.98 * top), label_text(true));
+            plot.draw_series([text])?;
         }
         Ok(())
     })

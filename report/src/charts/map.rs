@@ -18,7 +18,8 @@ const SMALL_POINT_PX: i32 = 2;
 /// Width over which the points at one label are spread, in steps between labels.
 const SPREAD: f64 = 0.6;
 
-/// Draws the map of two parameters. The shade of a cell is the share of its samples with a collision in any arm. Points
+/// Draws the map of two parameters. The shade of a cell is the share of its samples with a collision in the arm under
+/// test. Points
 /// are samples.
 pub(crate) fn outcome_map(scenario: &ScenarioOverview, pair: &PairBins) -> io::Result<Markup> {
     let [across, up] = pair.axes.map(|index| &scenario.axes[index]);
@@ -38,12 +39,18 @@ pub(crate) fn outcome_map(scenario: &ScenarioOverview, pair: &PairBins) -> io::R
     })
 }
 
+/// Returns the colour of a cell with this share of samples with a collision, as a style sheet writes it.
+pub(crate) fn cell_css(share: f64) -> String {
+    let RGBColor(red, green, blue) = COLLISIONS;
+    format!("rgba({red}, {green}, {blue}, {:.2})", LARGEST_OPACITY * share)
+}
+
 fn draw_cells(plot: &mut Plot<'_, '_>, pair: &PairBins, across: &Axis, up: &Axis) -> Drawn {
     let ([left, right], [bottom, top]) = (across.ends(), up.ends());
     let (columns, rows) = (across.cells(CELLS), up.cells(CELLS));
     let (width, height) = ((right - left) / columns as f64, (top - bottom) / rows as f64);
     for (column, cells) in pair.cells.iter().enumerate().take(columns) {
-        for (row, [samples, collisions]) in cells.iter().enumerate().take(rows) {
+        for (row, [samples, _, collisions]) in cells.iter().enumerate().take(rows) {
             if *collisions > 0 {
                 let share = *collisions as f64 / *samples as f64;
                 let (x, y) = (left + column as f64 * width, bottom + row as f64 * height);

@@ -16,6 +16,6 @@ mod tornado;
 
 pub(super) use bars::{balance, rate};
 pub(super) use distribution::{coverage, margin};
-pub(super) use map::outcome_map;
+pub(super) use map::{cell_css, outcome_map};
 pub(crate) use scatter::{ScatterPoint, scatter};
 pub(crate) use tornado::{TornadoBar, TornadoTexts, tornado};

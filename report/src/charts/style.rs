@@ -31,8 +31,8 @@ pub(crate) const FILE_PX: (u32, u32) = (860, 520);
 const MARGIN_PX: u32 = 8;
 /// Margin on the right, where half of the last label of the horizontal axis stands (px).
 const RIGHT_MARGIN_PX: u32 = 20;
-/// Font of all text.
-const FONT: &str = "sans-serif";
+/// Font of all text, as in the figures of encounters.
+const FONT: &str = "DejaVu Sans, sans-serif";
 /// Font sizes, as plotters counts them: letters come out smaller by a factor of 1.24 (px).
 const LABEL_PX: i32 = 13;
 const NAME_PX: i32 = 15;

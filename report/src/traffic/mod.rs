@@ -1,13 +1,11 @@
-//! Simulated traffic written as trajectory data, and what was found in trajectory data: texts and charts.
+//! What was found in trajectory data: texts and charts.
 
 pub mod drift;
 pub mod fit;
-pub mod in_car;
 pub mod lane_changes;
 pub mod paper;
-mod paper_charts;
+pub mod paper_charts;
 pub mod quality;
-pub mod recorder;
 pub mod reenactment;
 pub mod robustness;
 pub mod sampling;

@@ -7,24 +7,14 @@
 //! | 6 | histograms of the seven metrics with their thresholds | `figure-6-….svg` |
 //! | 7 | critical shares to the left and to the right, with exact intervals | `figure-7-shares.svg` |
 
-use closecall_scenarios::criticality::{BoxPlot, CriticalLaneChange, Statistics, statistics};
-use closecall_scenarios::lane_change::LaneChange;
+use closecall_scenarios::criticality::{CriticalLaneChange, Statistics, statistics};
 use closecall_scenarios::robustness::Robustness;
 use maud::{DOCTYPE, PreEscaped, html};
 
 use super::paper_charts::{METRICS, histogram, share_chart};
 use super::robustness::{RobustnessText, robustness_charts};
-use super::statistics::StatisticsText;
-use super::trajectory_charts::{BoxChart, BoxSummary, ChartError};
-
-/// The lane changes of one trajectory file.
-#[derive(Clone, Debug)]
-pub struct RecordedChanges {
-    /// Name of the trajectory data.
-    pub name: String,
-    /// Its lane changes.
-    pub changes: Vec<CriticalLaneChange>,
-}
+use super::statistics::{BOXED, Boxed, RecordedChanges, StatisticsText, box_chart, by_class, summary};
+use super::trajectory_charts::{BoxSummary, ChartError};
 
 /// A picture of the page.
 #[derive(Clone, Debug)]
@@ -36,26 +26,6 @@ pub struct Picture {
     /// The picture (SVG).
     pub svg: String,
 }
-
-/// A quantity of a lane change in a box plot.
-struct Boxed {
-    file: &'static str,
-    title: &'static str,
-    y_name: &'static str,
-    value: fn(&LaneChange) -> f64,
-}
-
-/// The quantities of figure 5.
-const BOXED: [Boxed; 3] = [
-    Boxed { file: "duration", title: "Duration", y_name: "duration [s]", value: |change| change.duration_s },
-    Boxed {
-        file: "width",
-        title: "Width of the peak of lateral speed",
-        y_name: "width [s]",
-        value: |change| change.width_s,
-    },
-    Boxed { file: "speed", title: "Speed at the crossing", y_name: "speed [m/s]", value: |change| change.speed_mps },
-];
 
 /// The figures, with what they are drawn from.
 #[derive(Clone, Debug)]
@@ -97,26 +67,6 @@ impl Paper {
         let page = page(recordings, &statistics(&all), robustness, &pictures);
         Ok(Self { pictures, page })
     }
-}
-
-fn box_chart(boxed: &Boxed, boxes: Vec<BoxSummary>) -> BoxChart {
-    BoxChart { title: format!("{} of complete lane changes", boxed.title), y_name: boxed.y_name.to_owned(), boxes }
-}
-
-fn summary<'a>(name: &str, changes: impl Iterator<Item = &'a CriticalLaneChange>, boxed: &Boxed) -> Option<BoxSummary> {
-    let complete = changes.filter(|change| change.lane_change.complete);
-    let BoxPlot { n, five, outliers, .. } =
-        BoxPlot::of(complete.map(|change| (boxed.value)(&change.lane_change)).collect())?;
-    Some(BoxSummary { name: format!("{name} (n = {n})"), five, outliers })
-}
-
-fn by_class(all: &[CriticalLaneChange], boxed: &Boxed) -> Vec<BoxSummary> {
-    let classes = closecall_traffic::VehicleClass::ALL.into_iter();
-    classes
-        .filter_map(|class| {
-            summary(class.name(), all.iter().filter(|change| change.lane_change.vehicle_class == class), boxed)
-        })
-        .collect()
 }
 
 fn by_file(recordings: &[RecordedChanges], boxed: &Boxed) -> Vec<BoxSummary> {

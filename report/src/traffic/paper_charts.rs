@@ -22,6 +22,22 @@ const HALF_BAR: f64 = 0.16;
 pub(super) const METRICS: [&str; 7] =
     ["distance_m", "speed_mps", "a_lon_mps2", "a_lat_mps2", "thw_s", "dce_m", "ttce_s"];
 
+/// Names of the charts' files: one per metric.
+pub const CRITICALITY_CHARTS: [&str; 7] =
+    ["distance_m.svg", "speed_mps.svg", "a_lon_mps2.svg", "a_lat_mps2.svg", "thw_s.svg", "dce_m.svg", "ttce_s.svg"];
+
+/// Draws how often the values of each metric occur among complete lane changes, with the thresholds. The charts (SVG) are
+/// in the order of [`CRITICALITY_CHARTS`].
+///
+/// # Errors
+/// [`ChartError`] if a chart cannot be drawn.
+pub fn criticality_charts(
+    changes: &[CriticalLaneChange],
+    speed_limit_mps: Option<f64>,
+) -> Result<Vec<String>, ChartError> {
+    METRICS.iter().map(|metric| histogram(changes, metric, speed_limit_mps)).collect()
+}
+
 /// Returns the value of a metric beyond which it is critical.
 fn threshold(metric: &str, speed_limit_mps: Option<f64>) -> f64 {
     match metric {
@@ -33,6 +49,11 @@ fn threshold(metric: &str, speed_limit_mps: Option<f64>) -> f64 {
         "dce_m" => CRITICAL_DCE_M,
         _ => CRITICAL_TTCE_S,
     }
+}
+
+/// Returns true if large values of a metric are critical.
+fn is_above(metric: &str) -> bool {
+    matches!(metric, "speed_mps" | "a_lon_mps2" | "a_lat_mps2")
 }
 
 /// Draws how often the values of a metric occur among complete lane changes, with the threshold (SVG).
@@ -51,10 +72,17 @@ pub(super) fn histogram(
     let values: Vec<f64> = complete.filter_map(value_of).filter(|value| value.is_finite()).collect();
     let limit = threshold(metric, speed_limit_mps);
     let title = format!("{} of {} complete lane changes", labelled(metric), values.len());
-    file(&title, |canvas| draw_histogram(canvas, &title, &labelled(metric), (&values, limit)))
+    file(&title, |canvas| draw_histogram(canvas, &title, &labelled(metric), (&values, limit), is_above(metric)))
 }
 
-fn draw_histogram(canvas: &Canvas<'_>, title: &str, name: &str, (values, limit): (&[f64], f64)) -> Drawn {
+fn draw_histogram(
+    canvas: &Canvas<'_>,
+    title: &str,
+    name: &str,
+    (values, limit): (&[f64], f64),
+    is_above: bool,
+) -> Drawn {
+    let side = if is_above { "above" } else { "below" };
     let x = number_axis(name, range(values.iter().copied().chain([limit]), Some(0.0)));
     let (start, width) = (x.range.start, (x.range.end - x.range.start) / BARS as f64);
     let mut counts = [0_u32; BARS];
@@ -72,7 +100,7 @@ fn draw_histogram(canvas: &Canvas<'_>, title: &str, name: &str, (values, limit):
     }))?;
     let line = [(limit, 0.0), (limit, y.range.end)];
     plot.draw_series(DashedLineSeries::new(line, 6, 4, series_colour(1).stroke_width(2)))?
-        .label("critical")
+        .label(format!("critical {side} {limit:.1}"))
         .legend(|(x, y)| PathElement::new([(x, y), (x + 18, y)], series_colour(1).stroke_width(2)));
     plot.configure_series_labels()
         .position(SeriesLabelPosition::UpperRight)

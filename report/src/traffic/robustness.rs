@@ -4,7 +4,7 @@ use std::fmt;
 
 use closecall_scenarios::robustness::{CriterionCounts, ReferenceKind, Robustness, Setup};
 
-use super::trajectory_charts::{ChartError, Legend, Line, LineChart};
+use super::trajectory_charts::{Band, ChartError, Legend, Line, LineChart, Mark};
 
 /// Names of the charts' files: over the noise, and over the offset.
 pub const ROBUSTNESS_CHARTS: [&str; 2] = ["noise.svg", "offset.svg"];
@@ -91,7 +91,8 @@ fn failures(found: &Robustness) -> Vec<String> {
     columns.into_iter().map(line).collect()
 }
 
-/// Draws the lane changes that each criterion finds, over the levels of noise and of offset. The charts (SVG) are in the
+/// Draws the lane changes that each criterion finds, over the levels of noise and of offset, with the range over the draws
+/// of the noise and the levels from which on it fails. The charts (SVG) are in the
 /// order of [`ROBUSTNESS_CHARTS`].
 ///
 /// # Errors
@@ -99,10 +100,30 @@ fn failures(found: &Robustness) -> Vec<String> {
 pub fn robustness_charts(found: &Robustness) -> Result<[String; 2], ChartError> {
     let levels = &found.setup;
     let means = found.mean_noise();
-    let noise = Axis { name: "Brownian noise [m/√s]", levels: &levels.noise_m_per_sqrt_s, rows: &means };
-    let offset = Axis { name: "Lateral offset [m]", levels: &levels.offset_m, rows: &found.offset };
-    let draw = |legend, axis| LineChart { legend, ..chart(found, &axis) }.svg();
-    Ok([draw(Legend::LowerLeft, noise)?, draw(Legend::LowerMiddle, offset)?])
+    let least = |column: usize| found.failing_noise_m_per_sqrt_s(column).into_iter().collect();
+    let noise = Axis {
+        name: "Brownian noise [m/√s]",
+        levels: &levels.noise_m_per_sqrt_s,
+        rows: &means,
+        draws: &found.noise,
+        failing: (0..found.criteria.len()).map(least).collect(),
+    };
+    let offset = Axis {
+        name: "Lateral offset [m]",
+        levels: &levels.offset_m,
+        rows: &found.offset,
+        draws: &[],
+        failing: (0..found.criteria.len()).map(|column| failing_offsets_m(found, column)).collect(),
+    };
+    Ok([chart(found, &noise).svg()?, chart(found, &offset).svg()?])
+}
+
+/// Returns the offsets to either side, nearest to zero, at which a criterion fails (m).
+fn failing_offsets_m(found: &Robustness, column: usize) -> Vec<f64> {
+    let failing =
+        found.setup.offset_m.iter().zip(&found.offset).filter(|(_, cells)| found.fails(column, &cells[column]));
+    let (left, right): (Vec<f64>, Vec<f64>) = failing.map(|(level, _)| *level).partition(|level| *level < 0.0);
+    left.into_iter().max_by(f64::total_cmp).into_iter().chain(right.into_iter().min_by(f64::total_cmp)).collect()
 }
 
 /// A disturbance, its levels, and the results at each level.
@@ -110,27 +131,74 @@ struct Axis<'a> {
     name: &'a str,
     levels: &'a [f64],
     rows: &'a [Vec<CriterionCounts>],
+    /// The results of each draw at each level; empty if there is only one.
+    draws: &'a [Vec<Vec<CriterionCounts>>],
+    /// The levels from which on each criterion fails.
+    failing: Vec<Vec<f64>>,
 }
 
+/// Counts above this multiple of the reference are not shown, so that those that decide are legible.
+const MOST: f64 = 1.5;
+
+/// Number of levels that are shown beyond that at which the last criterion fails.
+const LEVELS_BEYOND: usize = 3;
+
 fn chart(found: &Robustness, axis: &Axis<'_>) -> LineChart {
+    // Far beyond the level at which the last criterion fails, nothing is to be seen.
+    let fails_at = axis.failing.iter().map(|levels| levels.iter().copied().fold(f64::NEG_INFINITY, f64::max));
+    let last = fails_at.fold(f64::NEG_INFINITY, f64::max);
+    let all_fail = axis.failing.iter().all(|levels| !levels.is_empty());
+    let shown = axis.levels.iter().filter(|level| !all_fail || **level <= last).count() + LEVELS_BEYOND;
+    let shown = shown.min(axis.levels.len());
     let points = |column: usize, value: fn(&CriterionCounts) -> f64| -> Vec<(f64, f64)> {
-        axis.levels.iter().zip(axis.rows).map(|(level, cells)| (*level, value(&cells[column]))).collect()
+        let levels = axis.levels.iter().zip(axis.rows).take(shown);
+        levels.map(|(level, cells)| (*level, value(&cells[column]))).collect()
     };
     let lines = found.criteria.iter().enumerate().flat_map(|(column, criterion)| {
         let name = criterion.name();
         let again = points(column, |cell| cell.again);
-        let all = points(column, |cell| cell.found);
+        let invented = points(column, |cell| cell.invented);
         [
             Line { name: format!("{name}: found again"), points: again, colour: column, faint: false },
-            Line { name: format!("{name}: all that is found"), points: all, colour: column, faint: true },
+            Line { name: format!("{name}: false ones"), points: invented, colour: column, faint: true },
         ]
     });
+    let ends = |draws: &Vec<Vec<CriterionCounts>>, column: usize| {
+        let again = draws.iter().map(|cells| cells[column].again);
+        again.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], count| [low.min(count), high.max(count)])
+    };
+    let band = |column: usize| Band {
+        points: axis
+            .levels
+            .iter()
+            .zip(axis.draws)
+            .take(shown)
+            .map(|(level, draws)| (*level, ends(draws, column)))
+            .collect(),
+        colour: column,
+    };
+    let marks = axis.failing.iter().enumerate().flat_map(|(column, levels)| {
+        let name = found.criteria[column].name();
+        levels.iter().enumerate().map(move |(number, level)| Mark {
+            name: if number == 0 { format!("{name} fails") } else { String::new() },
+            x: *level,
+            colour: column,
+        })
+    });
+    let spread = match axis.draws.first().map_or(0, Vec::len) {
+        0 | 1 => String::new(),
+        draws => format!(": mean and range of {draws} draws"),
+    };
+    let most = found.undisturbed.iter().copied().max().unwrap_or(0).max(found.reference);
     LineChart {
-        title: "Lane changes found, by criterion".to_owned(),
+        title: format!("Lane changes found, by criterion{spread}"),
         x_name: axis.name.to_owned(),
         y_name: "lane changes".to_owned(),
         lines: lines.collect(),
         level: Some(("reference".to_owned(), found.reference as f64)),
-        legend: Legend::LowerLeft,
+        legend: Legend::Right,
+        bands: if axis.draws.is_empty() { Vec::new() } else { (0..found.criteria.len()).map(band).collect() },
+        marks: marks.collect(),
+        most: Some((MOST * most as f64).max(1.0)),
     }
 }

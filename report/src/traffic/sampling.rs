@@ -24,10 +24,10 @@ use closecall_traffic::{Lane, Time, Trajectory, TrajectoryPoint};
 use plotters::prelude::*;
 use serde::Serialize;
 
-use super::recorder::TrafficRecorder;
 use super::trajectory_charts::{ChartError, Legend, Line, LineChart};
 use crate::charts::style::{Canvas, Drawn, svg};
 use crate::run::film::{Film, TrafficFilmError, film_lane_change};
+use closecall_simulation::trajectories::TrafficRecorder;
 
 /// Size of the figure with its three charts (px).
 const FIGURE_PX: (u32, u32) = (900, 1_260);
@@ -271,6 +271,9 @@ impl Sampled {
             lines,
             level: None,
             legend: Legend::Right,
+            bands: Vec::new(),
+            marks: Vec::new(),
+            most: None,
         };
         let time = "time [s]";
         vec![

@@ -1,8 +1,9 @@
-//! Statistics of recorded lane changes: a table for human readers, and box plots by vehicle class.
+//! Statistics of recorded lane changes: a table for human readers, and box plots by trajectory file and vehicle class.
 
 use std::fmt;
 
-use closecall_scenarios::criticality::{BoxPlot, ClassStatistics, Correlation, Statistics};
+use closecall_scenarios::criticality::{BoxPlot, ClassStatistics, Correlation, CriticalLaneChange, Statistics};
+use closecall_scenarios::lane_change::LaneChange;
 
 use super::trajectory_charts::{BoxChart, BoxSummary, ChartError};
 
@@ -57,26 +58,75 @@ fn write_box(
     )
 }
 
-/// Draws the durations, widths and speeds of complete lane changes as box plots, one box per vehicle class. The charts (SVG)
-/// are in the order of [`STATISTICS_CHARTS`].
+/// The lane changes of one trajectory file.
+#[derive(Clone, Debug)]
+pub struct RecordedChanges {
+    /// Name of the trajectory data.
+    pub name: String,
+    /// Its lane changes.
+    pub changes: Vec<CriticalLaneChange>,
+}
+
+/// A quantity of a lane change in a box plot.
+pub(super) struct Boxed {
+    pub(super) file: &'static str,
+    title: &'static str,
+    y_name: &'static str,
+    value: fn(&LaneChange) -> f64,
+}
+
+/// The quantities that have box plots.
+pub(super) const BOXED: [Boxed; 3] = [
+    Boxed { file: "duration", title: "Duration", y_name: "duration [s]", value: |change| change.duration_s },
+    Boxed {
+        file: "width",
+        title: "Width of the peak of lateral speed",
+        y_name: "width [s]",
+        value: |change| change.width_s,
+    },
+    Boxed { file: "speed", title: "Speed at the crossing", y_name: "speed [m/s]", value: |change| change.speed_mps },
+];
+
+/// Draws the durations, widths and speeds of complete lane changes as box plots with the single values, one box per
+/// trajectory file and vehicle class. The charts (SVG) are in the order of [`STATISTICS_CHARTS`].
 ///
 /// # Errors
 /// [`ChartError`] if a chart cannot be drawn.
-pub fn statistics_charts(found: &Statistics) -> Result<[String; 3], ChartError> {
-    let chart = |title: &str, y_name: &str, value: fn(&ClassStatistics) -> Option<&BoxPlot>| {
-        let boxes = found.classes.iter().filter_map(|class| Some(box_of(class, value(class)?))).collect();
-        BoxChart { title: title.to_owned(), y_name: y_name.to_owned(), boxes }.svg()
+pub fn statistics_charts(recordings: &[RecordedChanges]) -> Result<[String; 3], ChartError> {
+    let boxes = |boxed: &Boxed| {
+        let of_file = |one: &RecordedChanges| {
+            let mut boxes = by_class(&one.changes, boxed);
+            if recordings.len() > 1 {
+                boxes.iter_mut().for_each(|found| found.name = format!("{} {}", one.name, found.name));
+            }
+            boxes
+        };
+        recordings.iter().flat_map(of_file).collect()
     };
-    Ok([
-        chart("Duration of complete lane changes", "duration [s]", |class| class.duration_s.as_ref())?,
-        chart("Width of the peak of lateral speed of complete lane changes", "width [s]", |class| {
-            class.width_s.as_ref()
-        })?,
-        chart("Speed at the crossing of complete lane changes", "speed [m/s]", |class| class.speed_mps.as_ref())?,
-    ])
+    let [duration, width, speed] = BOXED.each_ref().map(|boxed| box_chart(boxed, boxes(boxed)).svg());
+    Ok([duration?, width?, speed?])
 }
 
-fn box_of(class: &ClassStatistics, numbers: &BoxPlot) -> BoxSummary {
-    let name = format!("{} (n = {})", class.vehicle_class.name(), numbers.n);
-    BoxSummary { name, five: numbers.five, outliers: numbers.outliers.clone() }
+pub(super) fn box_chart(boxed: &Boxed, boxes: Vec<BoxSummary>) -> BoxChart {
+    BoxChart { title: format!("{} of complete lane changes", boxed.title), y_name: boxed.y_name.to_owned(), boxes }
+}
+
+pub(super) fn summary<'a>(
+    name: &str,
+    changes: impl Iterator<Item = &'a CriticalLaneChange>,
+    boxed: &Boxed,
+) -> Option<BoxSummary> {
+    let complete = changes.filter(|change| change.lane_change.complete);
+    let values: Vec<f64> = complete.map(|change| (boxed.value)(&change.lane_change)).collect();
+    let BoxPlot { n, five, .. } = BoxPlot::of(values.clone())?;
+    Some(BoxSummary { name: format!("{name} (n = {n})"), five, values })
+}
+
+pub(super) fn by_class(all: &[CriticalLaneChange], boxed: &Boxed) -> Vec<BoxSummary> {
+    let classes = closecall_traffic::VehicleClass::ALL.into_iter();
+    classes
+        .filter_map(|class| {
+            summary(class.name(), all.iter().filter(|change| change.lane_change.vehicle_class == class), boxed)
+        })
+        .collect()
 }

@@ -18,6 +18,16 @@ const MAX_DOTS: usize = 50;
 /// Largest number of labels on an axis of numbers.
 const LABELS: usize = 10;
 
+/// Opacity of the range behind a line, and of a dot.
+const BAND_OPACITY: f64 = 0.15;
+const DOT_OPACITY: f64 = 0.7;
+/// Width over which the dots of a box are spread, as a share of the distance between two boxes (-).
+const DOTS: f64 = 0.36;
+/// The golden ratio, whose multiples spread the dots evenly.
+const GOLDEN: f64 = 0.618_033_988_749_895;
+/// Width of a letter of a box's name with the room between two names (px).
+const LETTER_PX: usize = 7;
+
 /// A chart that cannot be drawn.
 #[derive(Debug, thiserror::Error)]
 #[error("failed to draw the chart \"{title}\": {message}")]
@@ -39,6 +49,26 @@ pub struct Line {
     pub colour: usize,
     /// True if the line is drawn pale, beside a line that matters more.
     pub faint: bool,
+}
+
+/// The range of the values at each x, drawn as an area of the colour of a line.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Band {
+    /// x, and the smallest and the largest value there, in rising order of x.
+    pub points: Vec<(f64, [f64; 2])>,
+    /// The index of the colour.
+    pub colour: usize,
+}
+
+/// A vertical line at a value of the horizontal axis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mark {
+    /// The name in the legend; empty if another mark has it.
+    pub name: String,
+    /// The value.
+    pub x: f64,
+    /// The index of the colour.
+    pub colour: usize,
 }
 
 /// The position of the legend, to be chosen so that it covers no line.
@@ -67,6 +97,12 @@ pub struct LineChart {
     pub level: Option<(String, f64)>,
     /// The position of the legend.
     pub legend: Legend,
+    /// The ranges behind the lines.
+    pub bands: Vec<Band>,
+    /// The vertical lines.
+    pub marks: Vec<Mark>,
+    /// The largest value of the vertical axis, if larger values do not matter. Lines end where they exceed it.
+    pub most: Option<f64>,
 }
 
 /// One box of a box plot.
@@ -76,8 +112,8 @@ pub struct BoxSummary {
     pub name: String,
     /// Lower whisker, lower quartile, median, upper quartile and upper whisker.
     pub five: [f64; 5],
-    /// Values beyond the whiskers.
-    pub outliers: Vec<f64>,
+    /// All values, drawn as dots.
+    pub values: Vec<f64>,
 }
 
 /// Boxes side by side.
@@ -104,7 +140,10 @@ impl LineChart {
         let points = || self.lines.iter().flat_map(|line| line.points.iter().copied());
         let mut x = number_axis(&self.x_name, range(points().map(|point| point.0), None));
         let level = self.level.iter().map(|level| level.1);
-        let y = number_axis(&self.y_name, range(points().map(|point| point.1).chain(level), Some(0.0)));
+        let highest = self.bands.iter().flat_map(|band| band.points.iter().map(|(_, ends)| ends[1]));
+        let values = points().map(|point| point.1).chain(level).chain(highest);
+        let most = self.most.unwrap_or(f64::INFINITY);
+        let y = number_axis(&self.y_name, range(values.map(|value| value.min(most)), Some(0.0)));
         let ends = [x.range.start, x.range.end];
         if self.legend == Legend::Right {
             x.range.end += LEGEND_SHARE * (x.range.end - x.range.start);
@@ -118,10 +157,24 @@ impl LineChart {
                 .label(name)
                 .legend(legend_line(BLACK.stroke_width(1)));
         }
+        for Band { points, colour } in &self.bands {
+            let lower = points.iter().map(|(x, [low, _])| (*x, low.min(most)));
+            let upper = points.iter().rev().map(|(x, [_, high])| (*x, high.min(most)));
+            let area: Vec<(f64, f64)> = lower.chain(upper).collect();
+            plot.draw_series([Polygon::new(area, series_colour(*colour).mix(BAND_OPACITY).filled())])?;
+        }
+        for Mark { name, x, colour } in &self.marks {
+            let style = series_colour(*colour).stroke_width(1);
+            let line = [(*x, y.range.start), (*x, y.range.end)];
+            let drawn = plot.draw_series(DashedLineSeries::new(line, 2, 4, style))?;
+            if !name.is_empty() {
+                drawn.label(name).legend(move |(x, y)| PathElement::new([(x + 9, y - 6), (x + 9, y + 6)], style));
+            }
+        }
         for line in &self.lines {
             let opacity = if line.faint { FAINT_OPACITY } else { 1.0 };
             let style = series_colour(line.colour).mix(opacity).stroke_width(2);
-            let points = line.points.iter().copied().filter(|(x, y)| x.is_finite() && y.is_finite());
+            let points = below(&line.points, most);
             let dots_px = if line.points.len() > MAX_DOTS { 0 } else { 3 };
             plot.draw_series(LineSeries::new(points, style).point_size(dots_px))?
                 .label(&line.name)
@@ -141,13 +194,32 @@ impl LineChart {
     }
 }
 
+/// Returns the finite points of a line up to the value `most`, with the point at which the line exceeds it.
+fn below(points: &[(f64, f64)], most: f64) -> Vec<(f64, f64)> {
+    let mut shown: Vec<(f64, f64)> = Vec::new();
+    for &(x, y) in points.iter().filter(|(x, y)| x.is_finite() && y.is_finite()) {
+        if y <= most {
+            shown.push((x, y));
+            continue;
+        }
+        if let Some(&(from_x, from_y)) = shown.last() {
+            shown.push((from_x + (most - from_y) / (y - from_y) * (x - from_x), most));
+        }
+        break;
+    }
+    shown
+}
+
 impl BoxChart {
     /// Returns the chart as the text of an SVG file.
     ///
     /// # Errors
     /// [`ChartError`] if the drawing library fails.
     pub fn svg(&self) -> Result<String, ChartError> {
-        file(&self.title, |canvas| self.draw(canvas))
+        let longest = self.boxes.iter().map(|one| one.name.chars().count()).max().unwrap_or(0);
+        let boxes_px = self.boxes.len().saturating_mul(longest.saturating_mul(LETTER_PX));
+        let width = FILE_PX.0.max(u32::try_from(boxes_px).unwrap_or(u32::MAX));
+        sized_file(&self.title, (width, FILE_PX.1), |canvas| self.draw(canvas))
     }
 
     fn draw(&self, canvas: &Canvas<'_>) -> Drawn {
@@ -158,13 +230,18 @@ impl BoxChart {
             text: Box::new(|x: &f64| self.name_at(*x)),
             has_grid: false,
         };
-        let values = self.boxes.iter().flat_map(|one| one.five.iter().chain(&one.outliers).copied());
+        let values = self.boxes.iter().flat_map(|one| one.five.iter().chain(&one.values).copied());
         let y = number_axis(&self.y_name, range(values, Some(0.0)));
         let mut plot = axes(canvas, Some(&self.title), &x, &y)?;
         for (index, one) in self.boxes.iter().enumerate() {
             plot.draw_series(elements(index, one))?;
-            let dot = |value: &f64| Circle::new((index as f64, *value), 3, series_colour(index).stroke_width(1));
-            plot.draw_series(one.outliers.iter().map(dot))?;
+            // The dots lie beside each other, so that equal values do not cover each other.
+            let beside = |number: usize| DOTS * ((number as f64 * GOLDEN).fract() - 0.5);
+            let dot = |(number, value): (usize, &f64)| {
+                let style = series_colour(index).mix(DOT_OPACITY).filled();
+                Circle::new((index as f64 + beside(number), *value), 2, style)
+            };
+            plot.draw_series(one.values.iter().enumerate().map(dot))?;
         }
         Ok(())
     }
@@ -206,7 +283,12 @@ pub(super) fn number_axis(name: &str, range: Range<f64>) -> ChartAxis<'_> {
 
 /// Returns the SVG of a chart on a white background.
 pub(super) fn file(title: &str, draw: impl FnOnce(&Canvas<'_>) -> Drawn) -> Result<String, ChartError> {
-    let drawn = svg(FILE_PX, |canvas| canvas.fill(&WHITE).and_then(|()| draw(canvas)));
+    sized_file(title, FILE_PX, draw)
+}
+
+/// Returns the SVG of a chart of this size (px) on a white background.
+fn sized_file(title: &str, size_px: (u32, u32), draw: impl FnOnce(&Canvas<'_>) -> Drawn) -> Result<String, ChartError> {
+    let drawn = svg(size_px, |canvas| canvas.fill(&WHITE).and_then(|()| draw(canvas)));
     drawn.map_err(|error| ChartError { title: title.to_owned(), message: error.to_string() })
 }
 
@@ -243,17 +325,28 @@ mod tests {
             lines: vec![line("peak", 0, false), line("distance", 1, true)],
             level: Some(("reference".to_owned(), 3.0)),
             legend: Legend::LowerLeft,
+            bands: vec![Band { points: vec![(0.0, [2.0, 3.5]), (2.0, [0.5, 2.0])], colour: 0 }],
+            marks: vec![Mark { name: "peak fails".to_owned(), x: 1.5, colour: 0 }],
+            most: None,
         };
         let svg = chart.svg().unwrap();
-        for text in ["<svg", "Noise", "peak", "distance", "reference", "level", "count"] {
+        for text in ["<svg", "Noise", "peak", "distance", "reference", "level", "count", "peak fails", "polygon"] {
             assert!(svg.contains(text), "{text}");
         }
         assert_eq!(svg, chart.svg().unwrap());
     }
 
     #[test]
+    fn a_line_ends_where_it_exceeds_the_axis() {
+        let points = [(0.0, 2.0), (1.0, 4.0), (2.0, 8.0), (3.0, 1.0)];
+        assert_eq!(below(&points, 6.0), [(0.0, 2.0), (1.0, 4.0), (1.5, 6.0)]);
+        assert_eq!(below(&points, f64::INFINITY), points);
+    }
+
+    #[test]
     fn boxes_are_named_and_a_chart_without_boxes_is_drawn() {
-        let one = BoxSummary { name: "car (n = 9)".to_owned(), five: [1.0, 2.0, 3.0, 4.0, 6.0], outliers: vec![9.0] };
+        let one =
+            BoxSummary { name: "car (n = 9)".to_owned(), five: [1.0, 2.0, 3.0, 4.0, 6.0], values: vec![1.0, 2.0, 9.0] };
         let chart = |boxes| BoxChart { title: "Durations".to_owned(), y_name: "s".to_owned(), boxes }.svg().unwrap();
         assert!(chart(vec![one.clone()]).contains("car (n = 9)"));
         assert!(chart(vec![one.clone(), one]).contains("</svg>"));

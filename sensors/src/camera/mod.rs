@@ -37,7 +37,7 @@ pub use config::{Camera, CameraConfig, Pipeline, Sun, SunConfig};
 pub use frame::{Frame, FrameBuffers};
 pub use image::{CHANNELS, CROP_PX, Crop, Image, LabelledImage};
 pub use image_memory::ImageMemory;
-pub use pinhole::{GroundBox, HEIGHT_PX, PixelRect, WIDTH_PX};
+pub use pinhole::{FOCAL_PX, GroundBox, HEIGHT_PX, PixelRect, WIDTH_PX};
 pub use pipeline::CropClassifier;
 pub use rear_camera::{ExposureKey, RearCamera};
 pub use shapes::HELD_OUT_SHAPES;

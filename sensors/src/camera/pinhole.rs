@@ -21,6 +21,8 @@ pub const WIDTH_PX: u16 = 1280;
 pub const HEIGHT_PX: u16 = 800;
 /// Horizontal field of view (rad): 60°.
 const FIELD_OF_VIEW_RAD: f64 = std::f64::consts::FRAC_PI_3;
+/// Focal length (px): half of the width over the tangent of half of the field of view, 1 / √3.
+pub const FOCAL_PX: f64 = WIDTH_PX as f64 / 2.0 * 1.732_050_807_568_877_2;
 /// Depth of the near plane (m). Nothing nearer is rendered or projected, because the ego's own body lies there.
 pub(crate) const NEAR_M: f64 = 0.3;
 
@@ -182,6 +184,11 @@ mod tests {
             pitch_rad,
         };
         Lens::new(&camera, &ego)
+    }
+
+    #[test]
+    fn the_focal_length_is_that_of_the_lens() {
+        assert!((FOCAL_PX - lens(0.0).focal_px).abs() < 1e-9);
     }
 
     #[test]

@@ -44,15 +44,21 @@ fn fate_legend(scenario: &ScenarioOverview) -> Markup {
 
 fn map(scenario: &ScenarioOverview) -> io::Result<Markup> {
     let Some(pair) = scenario.map() else { return Ok(Markup::default()) };
+    let tested = scenario.arms.last().map_or("", String::as_str);
     let [across, up] = pair.axes.map(|index| labelled(scenario.axes[index].name()));
     Ok(html! {
         h3 { "Outcome map" }
         p.note {
             "Of all pairs of parameters, " (across) " and " (up) " tell the most about the outcome. The darker a cell, the "
-            "larger the share of its samples in which the ego collides in any arm. Points are samples, drawn evenly from "
+            "larger the share of its samples with a collision in the arm under test. Points are samples, drawn evenly from "
             "those of each colour."
         }
         (fate_legend(scenario))
+        p.legend {
+            @for share in [0.25, 0.5, 1.0] {
+                (legend_key(&charts::cell_css(share), &format!("{:.0} % collide with {tested}", 100.0 * share)))
+            }
+        }
         figure.map { (charts::outcome_map(scenario, pair)?) }
     })
 }

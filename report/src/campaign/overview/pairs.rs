@@ -7,28 +7,29 @@ use super::Axis;
 /// Number of cells along each axis.
 pub const CELLS: usize = 8;
 
-/// The number of samples in each cell of the plane of two parameters, and of those in which the ego of any arm collides.
+/// The number of samples in each cell of the plane of two parameters, and of those with a collision.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PairBins {
     /// The indices of both parameters among the axes.
     pub axes: [usize; 2],
-    /// The number of samples, and of samples with a collision in any arm, by the cell of the first and of the second
-    /// parameter.
-    pub cells: [[[u64; 2]; CELLS]; CELLS],
+    /// The number of samples, of samples with a collision in any arm, and of samples with one in the arm under test, by the
+    /// cell of the first and of the second parameter.
+    pub cells: [[[u64; 3]; CELLS]; CELLS],
 }
 
 impl PairBins {
     pub(super) const fn new(axes: [usize; 2]) -> Self {
-        Self { axes, cells: [[[0; 2]; CELLS]; CELLS] }
+        Self { axes, cells: [[[0; 3]; CELLS]; CELLS] }
     }
 
-    pub(super) fn push(&mut self, axes: &[Axis], parameters: &[Option<usize>], collided: bool) {
+    pub(super) fn push(&mut self, axes: &[Axis], parameters: &[Option<usize>], [any, tested]: [bool; 2]) {
         let [one, other] = self.axes;
         if let (Some(x), Some(y)) = (parameters[one], parameters[other]) {
             debug_assert!(axes.len() == parameters.len());
-            let [samples, collisions] = &mut self.cells[x][y];
+            let [samples, in_any, in_tested] = &mut self.cells[x][y];
             *samples += 1;
-            *collisions += u64::from(collided);
+            *in_any += u64::from(any);
+            *in_tested += u64::from(tested);
         }
     }
 
@@ -36,14 +37,14 @@ impl PairBins {
     /// whether there was a collision, less the amount that chance alone is expected to show (G. A. Miller, *Note on the
     /// bias of information estimates*, 1955).
     pub fn information_nat(&self) -> f64 {
-        let cells = || self.cells.iter().flatten().filter(|[samples, _]| *samples > 0);
-        let samples: u64 = cells().map(|[samples, _]| samples).sum();
-        let collisions: u64 = cells().map(|[_, collisions]| collisions).sum();
+        let cells = || self.cells.iter().flatten().filter(|[samples, ..]| *samples > 0);
+        let samples: u64 = cells().map(|[samples, ..]| samples).sum();
+        let collisions: u64 = cells().map(|[_, collisions, _]| collisions).sum();
         if samples == 0 {
             return 0.0;
         }
         let total = samples as f64;
-        let within: f64 = cells().map(|[n, k]| *n as f64 / total * entropy_nat(*k as f64 / *n as f64)).sum();
+        let within: f64 = cells().map(|[n, k, _]| *n as f64 / total * entropy_nat(*k as f64 / *n as f64)).sum();
         let by_chance = (cells().count() as f64 - 1.0) / (2.0 * total);
         entropy_nat(collisions as f64 / total) - within - by_chance
     }
@@ -51,7 +52,7 @@ impl PairBins {
     /// Returns the number of cells with a sample, and the number of all cells.
     pub fn coverage(&self, axes: &[Axis]) -> [usize; 2] {
         let [one, other] = self.axes;
-        let hit = self.cells.iter().flatten().filter(|[samples, _]| *samples > 0).count();
+        let hit = self.cells.iter().flatten().filter(|[samples, ..]| *samples > 0).count();
         [hit, axes[one].cells(CELLS) * axes[other].cells(CELLS)]
     }
 }

@@ -147,7 +147,8 @@ impl ScenarioOverview {
                 counts[*cell][fate as usize] += 1;
             }
         }
-        let collided = matches!(fate, Fate::Prevented | Fate::Failed | Fate::Induced);
+        let tested = matches!(fate, Fate::Failed | Fate::Induced);
+        let collided = [tested || fate == Fate::Prevented, tested];
         for pair in &mut self.pairs {
             pair.push(&self.axes, &cells, collided);
         }

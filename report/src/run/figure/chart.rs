@@ -8,6 +8,8 @@ pub(super) const INK: &str = "#222222";
 pub(super) const FAINT: &str = "#dddddd";
 /// Colour of the lines that mark moments.
 pub(super) const MOMENT: &str = "#8a8a8a";
+/// Colour of reference levels, which are solid and thin: the curves of a baseline are dashed.
+const LIMIT: &str = "#d62728";
 const TICK_FONT_SIZE_PX: f64 = 10.0;
 const NAME_FONT_SIZE_PX: f64 = 11.0;
 /// Distance of two moments below which their style are at different heights (px).
@@ -46,11 +48,11 @@ impl Chart<'_> {
         svg.clipped(area, |svg| {
             for &(at, _) in self.moments {
                 let x = self.x_of(at, area);
-                svg.line([x, area.top], [x, area.bottom()], Stroke::dashed(MOMENT, 0.8));
+                svg.line([x, area.top], [x, area.bottom()], Stroke { dash: Some("1 3"), ..Stroke::solid(MOMENT, 0.9) });
             }
             for (level, _) in &self.levels {
                 let y = self.y_of(*level, area);
-                svg.line([area.left, y], [area.right(), y], Stroke::dashed("#d62728", 1.0));
+                svg.line([area.left, y], [area.right(), y], Stroke::solid(LIMIT, 0.8));
             }
             for curve in &self.curves {
                 for piece in pieces(&curve.points) {
@@ -71,7 +73,7 @@ impl Chart<'_> {
             svg.text([x + 2.0, area.top + if is_low { 24.0 } else { 12.0 }], &letter.to_string(), style);
         }
         for (level, name) in self.levels.iter().filter(|(level, _)| *level >= self.y[0] && *level <= self.y[1]) {
-            let style = TextStyle { size: 9.0, colour: "#d62728", anchor: Anchor::End };
+            let style = TextStyle { size: 9.0, colour: LIMIT, anchor: Anchor::End };
             svg.text([area.right() - 4.0, self.y_of(*level, area) - 3.0], name, style);
         }
         self.legend(svg, area);
@@ -149,7 +151,7 @@ pub(super) fn ticks([low, high]: Range) -> Vec<f64> {
 }
 
 /// Returns the text of a tick, without trailing zeros and without a negative zero.
-fn tick_text(value: f64) -> String {
+pub(super) fn tick_text(value: f64) -> String {
     let text = format!("{value:.2}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
     if text == "-0" { "0".to_owned() } else { text.replace('-', "\u{2212}") }

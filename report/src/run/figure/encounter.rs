@@ -1,8 +1,8 @@
 //! The figure of a whole encounter, laid out like the paper's: the road at the moments (a) to (e), the trajectories in
 //! the road frame, and plots over time with the moments marked.
 //!
-//! If there are two films, the first is the baseline. Its curves are dashed, and its moments are not marked, but the road at
-//! its hazard, moment (a), is shown first.
+//! If there are two films, the first is the baseline. Its curves are dashed, its vehicles are outlines, and its moments
+//! are not marked, but the road at its hazard, moment (a), and at its collision is shown first.
 
 use closecall_scenarios::criticality::CRITICAL_TTCE_S;
 use closecall_traffic::Time;
@@ -24,6 +24,8 @@ const STRIP_PERIOD: f64 = 96.0;
 const CHART_HEIGHT: f64 = 112.0;
 const CHART_PERIOD: f64 = 150.0;
 const BAND_HEIGHT: f64 = 16.0;
+/// Width of a letter in a band of states (px).
+const LETTER_PX: f64 = 6.0;
 const INK: &str = "#222222";
 /// Rear and front end of the road that the strips show, relative to the ego (m).
 const REACH_M: [f64; 2] = [-125.0, 95.0];
@@ -37,30 +39,43 @@ const BASELINE_DASH: &str = "5 3";
 pub fn encounter(films: &[Film]) -> String {
     let Some(film) = films.last() else { return Svg::new([WIDTH, 1.0]).finish() };
     let instants = instants(film);
-    let hazard = films.first().filter(|_| films.len() > 1).and_then(hazard);
+    let baseline = films.first().filter(|_| films.len() > 1);
     let charts = charts(films);
-    let mut strips: Vec<(&Film, &Instant)> = instants.iter().map(|instant| (film, instant)).collect();
-    if let Some(hazard) = &hazard {
-        strips.insert(0, (&films[0], hazard));
-    }
+    let of_baseline: Vec<Instant> = baseline.map(worst_instants).unwrap_or_default();
+    let own = instants.iter().map(|instant| ((film, baseline), instant));
+    let strips = of_baseline.iter().filter_map(|instant| Some(((baseline?, None), instant))).chain(own);
+    let strips: Vec<((&Film, Option<&Film>), &Instant)> = strips.collect();
     let top_of_charts = 64.0 + STRIP_PERIOD * strips.len() as f64 + 34.0;
     let height = top_of_charts + CHART_PERIOD * charts.len() as f64 + 3.0 * BAND_HEIGHT + 30.0;
     let mut svg = Svg::new([WIDTH, height]);
     title(&mut svg, films);
-    for (index, (film, (time, letter, text))) in strips.into_iter().enumerate() {
+    let count = strips.len();
+    for (index, ((film, other), (time, letter, text))) in strips.into_iter().enumerate() {
         let top = 76.0 + STRIP_PERIOD * index as f64;
         let area = Area { left: LEFT, top, width: INNER, height: STRIP_HEIGHT };
-        let frame_index = film.frames.partition_point(|frame| frame.time <= *time).saturating_sub(1);
+        // Of a collision the first frame in which the vehicles touch is shown.
+        let is_collision = film.worst_collision().is_some_and(|collision| collision.time == *time);
+        let frames_before =
+            film.frames.partition_point(|frame| frame.time < *time || !is_collision && frame.time == *time);
+        let last = film.frames.len().saturating_sub(1);
+        let frame_index = if is_collision { frames_before.min(last) } else { frames_before.saturating_sub(1) };
         let style = |size, anchor| TextStyle { size, colour: INK, anchor };
         svg.text([LEFT - 12.0, top + 0.5 * STRIP_HEIGHT + 4.0], &format!("({letter})"), style(14.0, Anchor::End));
         svg.text([LEFT, top - 5.0], &format!("{:.2} s: {text}", time.s()), style(11.0, Anchor::Start));
-        strip::draw(&mut svg, film, frame_index, (area, REACH_M));
+        strip::draw(&mut svg, (film, other), frame_index, (area, REACH_M));
+        if index + 1 == count {
+            strip::scale(&mut svg, area, REACH_M);
+        }
+        if let Some(other) = other {
+            let at = [LEFT + INNER, top - 5.0];
+            svg.text(at, &format!("outlines: {}", other.arm_label()), style(10.0, Anchor::End));
+        }
     }
     let marks: Vec<(f64, char)> = instants.iter().map(|(time, letter, _)| (time.s(), *letter)).collect();
-    let count = charts.len();
+    let chart_count = charts.len();
     for (index, chart) in charts.into_iter().enumerate() {
         let is_trajectory = index == 0;
-        let x_name = if index + 1 == count { Some("time [s]") } else { chart.x_name };
+        let x_name = if index + 1 == chart_count { Some("time [s]") } else { chart.x_name };
         let top = top_of_charts + CHART_PERIOD * index as f64;
         let area = Area { left: LEFT, top, width: INNER, height: CHART_HEIGHT };
         let moments = if is_trajectory { ego_positions(film, &instants) } else { marks.clone() };
@@ -73,13 +88,13 @@ pub fn encounter(films: &[Film]) -> String {
 fn title(svg: &mut Svg, films: &[Film]) {
     let style = |size, colour| TextStyle { size, colour, anchor: Anchor::Start };
     let names = films.iter().map(Film::title).collect::<Vec<_>>().join(" and ");
-    svg.text([LEFT, 20.0], &names, style(13.0, INK));
+    svg.text([LEFT, 20.0], &format!("{} · {names}", Film::verdict_word(films)), style(13.0, INK));
     for (row, film) in films.iter().enumerate() {
         let has_collision = film.worst_collision().is_some();
-        let line = if films.len() > 1 { format!("{}: {}", film.arm_label(), film.headline()) } else { film.headline() };
+        let result = film.result().unwrap_or_else(|| film.headline());
         svg.text(
             [LEFT, 36.0 + 14.0 * row as f64],
-            &line,
+            &format!("{}: {result}", film.arm_label()),
             style(11.0, if has_collision { "#c40018" } else { "#1e7d32" }),
         );
     }
@@ -88,10 +103,14 @@ fn title(svg: &mut Svg, films: &[Film]) {
 /// A time to show, with its letter and text.
 type Instant = (Time, char, String);
 
-/// Returns moment (a) of the baseline, if it reached that.
-fn hazard(baseline: &Film) -> Option<Instant> {
-    let noted = baseline.moments().iter().find(|noted| noted.moment == Moment::Hazard)?;
-    Some((noted.time, noted.moment.letter()?, format!("{} ({})", noted.moment.text(), baseline.arm_label())))
+/// Returns moment (a) and the collision of the baseline, as far as it reached these.
+fn worst_instants(baseline: &Film) -> Vec<Instant> {
+    let arm = baseline.arm_label();
+    let hazard = baseline.moments().iter().find(|noted| noted.moment == Moment::Hazard);
+    let hazard =
+        hazard.and_then(|noted| Some((noted.time, noted.moment.letter()?, format!("{} ({arm})", noted.moment.text()))));
+    let collision = baseline.worst_collision().map(|collision| (collision.time, '!', format!("collision ({arm})")));
+    hazard.into_iter().chain(collision).collect()
 }
 
 /// Returns the instants to show, in order of time, each with its letter and text: the moments of the paper that the run reached, and
@@ -310,9 +329,10 @@ fn bands(svg: &mut Svg, films: &[Film], top: f64) {
                 height: BAND_HEIGHT,
             };
             svg.rect(area, band_colour(state));
-            svg.clipped(area, |svg| {
-                svg.text([area.left + 4.0, y + 12.0], ego_state_name(state), style("#ffffff", Anchor::Start));
-            });
+            let name = ego_state_name(state);
+            if LETTER_PX * name.len() as f64 + 8.0 < area.width {
+                svg.text([area.left + 4.0, y + 12.0], name, style("#ffffff", Anchor::Start));
+            }
             first = next;
         }
     }

@@ -3,7 +3,7 @@
 //!
 //! ```text
 //!   Film ─▶ road strips at (a) … (e) ─┐
-//!        ─▶ trajectories, plots ──────┴─▶ SVG ─(bundled font)─▶ PNG
+//!        ─▶ trajectories, plots ──────┴─▶ SVG ─(bundled font)─▶ PNG, PDF
 //! ```
 //!
 //! The same film gives the same bytes on every machine: this module writes the SVG itself, and renders its text with
@@ -12,14 +12,15 @@
 mod chart;
 mod colours;
 mod encounter;
-mod png;
+mod pdf;
+mod picture;
 mod scrubber;
 mod still;
 mod strip;
 mod svg;
 
 pub use encounter::encounter;
-pub use png::{PngError, png};
+pub use picture::{PictureError, PictureFile, parse_width_mm};
 pub(crate) use scrubber::scrubber;
 pub use still::still;
 

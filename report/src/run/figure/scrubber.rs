@@ -34,6 +34,11 @@ pub(crate) fn scrubber(films: &[Film]) -> Markup {
             label {
                 "Time " input type="range" min="0" max=(films.iter().map(last).max().unwrap_or(0)) value=(start);
             }
+            p.legend {
+                @for (index, actor) in tested.actors.iter().enumerate() {
+                    span.key style={ "--key:" (colour(index, tested.ego)) } { (actor.name) }
+                }
+            }
             script type="application/json" { (PreEscaped(format!("[{}]", rows.join(",")))) }
         }
     }

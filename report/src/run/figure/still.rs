@@ -25,8 +25,12 @@ pub fn still(film: &Film) -> String {
     let title = format!("{} · {:.2} s", film.title(), critical.s());
     let style = |size, colour| TextStyle { size, colour, anchor: Anchor::Start };
     svg.text([10.0, 18.0], &title, style(12.0, "#222222"));
-    svg.text([10.0, 35.0], &film.headline(), style(10.0, if has_collision { "#c40018" } else { "#1e7d32" }));
-    strip::draw(&mut svg, film, frame_index, (STRIP, REACH_M));
+    svg.text(
+        [10.0, 35.0],
+        &film.result().unwrap_or_else(|| film.headline()),
+        style(10.0, if has_collision { "#c40018" } else { "#1e7d32" }),
+    );
+    strip::draw(&mut svg, (film, None), frame_index, (STRIP, REACH_M));
     let start = film.frames.first().map_or(0.0, |frame| frame.time.s());
     let curve = |name: &str, colour, of: fn(&Frame) -> Option<f64>| Curve {
         name: name.to_owned(),

@@ -1,7 +1,8 @@
 //! A road strip: the road from above at one instant, in a frame that moves with the ego.
 
-use closecall_traffic::{Lane, Measured};
+use closecall_traffic::{Lane, Measured, VehicleState};
 
+use super::chart::tick_text;
 use super::colours::colour;
 use super::svg::{Anchor, Area, Stroke, Svg, TextStyle};
 use crate::run::film::{Film, Frame};
@@ -15,6 +16,14 @@ const CRITICAL: &str = "#c40018";
 const SAFE: &str = "#1e7d32";
 /// Lengths of the dashes and gaps of a lane marking in the picture (px).
 const DASH: &str = "9 9";
+const SCALE: &str = "#555555";
+/// Distance between two marks of the scale (m), and their length in the picture (px).
+const MARK_EVERY_M: f64 = 25.0;
+const MARK_PX: f64 = 6.0;
+/// Length of a gap in the picture from which on its headway has room (px).
+const HEADWAY_PX: f64 = 28.0;
+/// Width of a letter as a share of the font size.
+const LETTER: f64 = 0.6;
 /// Font size of names and headways (px).
 const FONT_SIZE_PX: f64 = 10.0;
 
@@ -34,13 +43,21 @@ struct Strip<'a> {
     reach: Reach,
 }
 
-/// Draws the frame `frame_index` into `area`.
-pub(super) fn draw(svg: &mut Svg, film: &Film, frame_index: usize, (area, reach): (Area, Reach)) {
+/// Draws the frame `frame_index` into `area`. The vehicles of `other`, another film of the same sample, appear as outlines.
+pub(super) fn draw(
+    svg: &mut Svg,
+    (film, other): (&Film, Option<&Film>),
+    frame_index: usize,
+    (area, reach): (Area, Reach),
+) {
     let Some(frame) = film.frames.get(frame_index) else { return };
     let strip = Strip { film, frame, area, reach };
     svg.rect(area, ASPHALT);
     svg.clipped(area, |svg| {
         strip.lanes(svg);
+        if let Some(other) = other {
+            strip.outlines(svg, other);
+        }
         strip.gaps(svg);
         for actor in (0..film.actors.len()).filter(|&actor| film.is_present(actor, frame_index)) {
             strip.vehicle(svg, actor);
@@ -49,6 +66,26 @@ pub(super) fn draw(svg: &mut Svg, film: &Film, frame_index: usize, (area, reach)
             strip.impact(svg);
         }
     });
+    for mark_m in marks_m(reach) {
+        let x = area.left + (mark_m - reach[0]) / (reach[1] - reach[0]) * area.width;
+        svg.line([x, area.bottom()], [x, area.bottom() - MARK_PX], Stroke::solid(MARKING, 1.0));
+    }
+}
+
+/// Writes the distances from the ego at the marks below a strip.
+pub(super) fn scale(svg: &mut Svg, area: Area, reach: Reach) {
+    let style = |anchor| TextStyle { size: FONT_SIZE_PX, colour: SCALE, anchor };
+    for mark_m in marks_m(reach) {
+        let x = area.left + (mark_m - reach[0]) / (reach[1] - reach[0]) * area.width;
+        svg.text([x, area.bottom() + 12.0], &tick_text(mark_m), style(Anchor::Middle));
+    }
+    svg.text([area.right() + 8.0, area.bottom() + 12.0], "m from E", style(Anchor::Start));
+}
+
+/// Returns the positions of the marks of the scale, relative to the ego (m).
+fn marks_m([rear_m, front_m]: Reach) -> impl Iterator<Item = f64> {
+    let first = (rear_m / MARK_EVERY_M).ceil();
+    (0..).map(move |mark| (first + f64::from(mark)) * MARK_EVERY_M).take_while(move |&mark_m| mark_m <= front_m)
 }
 
 impl Strip<'_> {
@@ -76,13 +113,31 @@ impl Strip<'_> {
         }
     }
 
-    /// Draws the body with its pointed front, the brake light, the indicator, and the name with the speed.
+    /// Returns the outline of a vehicle's body with its pointed front.
+    fn shape(&self, film: &Film, actor: usize, state: &VehicleState) -> [[f64; 2]; 6] {
+        let size = &film.actors[actor].vehicle.dimensions;
+        let (half_m, side_m) = (0.5 * size.length_m, 0.5 * size.width_m);
+        let corner = |[along, across]: [f64; 2]| self.at(state.s_m + along * half_m, state.d_m + across * side_m);
+        [[-1.0, -1.0], [0.5, -1.0], [1.0, -0.5], [1.0, 0.5], [0.5, 1.0], [-1.0, 1.0]].map(corner)
+    }
+
+    /// Draws the outlines of the vehicles of another film at the same time.
+    fn outlines(&self, svg: &mut Svg, other: &Film) {
+        let index = other.frames.partition_point(|frame| frame.time <= self.frame.time).saturating_sub(1);
+        let Some(frame) = other.frames.get(index) else { return };
+        for actor in (0..other.actors.len()).filter(|&actor| other.is_present(actor, index)) {
+            let shape = self.shape(other, actor, &frame.states[actor]);
+            svg.polygon(&shape, "none", Stroke::solid(colour(actor, other.ego), 1.0));
+        }
+    }
+
+    /// Draws the body, the brake light, the indicator, and the name with the speed.
     fn vehicle(&self, svg: &mut Svg, actor: usize) {
         let (state, film_actor) = (&self.frame.states[actor], &self.film.actors[actor]);
         let (half_m, side_m) =
             (0.5 * film_actor.vehicle.dimensions.length_m, 0.5 * film_actor.vehicle.dimensions.width_m);
         let corner = |[along, across]: [f64; 2]| self.at(state.s_m + along * half_m, state.d_m + across * side_m);
-        let shape = [[-1.0, -1.0], [0.5, -1.0], [1.0, -0.5], [1.0, 0.5], [0.5, 1.0], [-1.0, 1.0]].map(corner);
+        let shape = self.shape(self.film, actor, state);
         let paint = colour(actor, self.film.ego);
         svg.polygon(&shape, paint, Stroke::solid("#ffffff", 0.6));
         if state.brake_light {
@@ -96,12 +151,23 @@ impl Strip<'_> {
         if let Some(side) = side {
             svg.circle(corner([-1.0, side]), 3.0, INDICATOR);
         }
-        let [x, _] = corner([0.0, 0.0]);
         // The name of the ego is below its body, those of the others are above: a vehicle beside the ego covers
-        // neither.
+        // neither. The others' names extend away from the ego, so that the headway has room.
+        let text = format!("{} {:.1} m/s", film_actor.name, state.speed_mps);
+        let width = LETTER * FONT_SIZE_PX * text.chars().count() as f64;
+        let own_m = self.frame.states[self.film.ego].s_m;
+        let (along, anchor) = match state.s_m - own_m {
+            _ if actor == self.film.ego => (0.0, Anchor::Middle),
+            ahead_m if ahead_m > 0.0 => (-1.0, Anchor::Start),
+            _ => (1.0, Anchor::End),
+        };
+        let x = match (corner([along, 0.0])[0], anchor) {
+            (x, Anchor::Start) => x.min(self.area.right() - width),
+            (x, Anchor::End) => x.max(self.area.left + width),
+            (x, Anchor::Middle) => x,
+        };
         let y = if actor == self.film.ego { corner([0.0, -1.0])[1] + 11.0 } else { corner([0.0, 1.0])[1] - 3.0 };
-        let style = TextStyle { size: FONT_SIZE_PX, colour: paint, anchor: Anchor::Middle };
-        svg.text([x, y], &format!("{} {:.1} m/s", film_actor.name, state.speed_mps), style);
+        svg.text([x, y], &text, TextStyle { size: FONT_SIZE_PX, colour: paint, anchor });
     }
 
     /// Draws the gaps in front of and behind the ego with their time headways.
@@ -116,6 +182,9 @@ impl Strip<'_> {
             let colour = if thw_s < CRITICAL_THW_S { CRITICAL } else { SAFE };
             let ends = [half_m, half_m + gap_m].map(|along_m| self.at(own.s_m + sign * along_m, own.d_m));
             svg.line(ends[0], ends[1], Stroke::solid(colour, 2.0));
+            if (ends[1][0] - ends[0][0]).abs() < HEADWAY_PX {
+                return;
+            }
             let style = TextStyle { size: FONT_SIZE_PX, colour, anchor: Anchor::Middle };
             let middle = [0.5 * (ends[0][0] + ends[1][0]), ends[0][1] - 4.0];
             svg.text(middle, &format!("{thw_s:.2} s"), style);

@@ -38,10 +38,6 @@ impl<'a> Stroke<'a> {
     pub(super) fn solid(colour: &'a str, width: f64) -> Self {
         Self { colour, width, dash: None }
     }
-
-    pub(super) fn dashed(colour: &'a str, width: f64) -> Self {
-        Self { colour, width, dash: Some("5 3") }
-    }
 }
 
 /// The part of a text that its point marks.

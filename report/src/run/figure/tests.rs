@@ -28,31 +28,28 @@ fn films(name: &str, arms: &[ControllerChoice]) -> Vec<Film> {
 fn the_figure_of_the_papers_scenario_shows_all_five_moments_and_the_prevented_collision() {
     let films = films("paper-figure", &[ControllerChoice::ACC, ControllerChoice::MIS]);
     let text = encounter(&films);
-    for letter in ["(a)", "(b)", "(c)", "(d)", "(e)", "COLLISION", "No collision", "critical 0.9 s", "increasing"] {
+    for letter in [
+        "(a)",
+        "(b)",
+        "(c)",
+        "(d)",
+        "(e)",
+        "PREVENTED",
+        "collision of ego and rear",
+        "no collision",
+        "m from E",
+        "critical 0.9 s",
+        "increasing",
+    ] {
         assert!(text.contains(letter), "{letter}");
     }
     assert!(!text.contains("NaN") && !text.contains("inf"), "the figure contains a number that is not finite");
 }
 
 #[test]
-fn a_picture_renders_its_text_and_gives_the_same_bytes_each_time() {
-    let svg = "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"60\" height=\"20\">\
-               <text x=\"2\" y=\"15\" font-size=\"14\" font-family=\"'DejaVu Sans', sans-serif\">ΔV 9.8</text></svg>";
-    let bytes = png(svg).unwrap();
-    assert_eq!(bytes, png(svg).unwrap());
-    let empty = png(&svg.replace("ΔV 9.8", "")).unwrap();
-    assert!(bytes.len() > empty.len() + 100, "{} {}", bytes.len(), empty.len());
-}
-
-#[test]
 fn a_run_without_other_vehicles_nearby_has_a_still_and_a_figure() {
     let films = films("empty-wet-road", &[ControllerChoice::MIS]);
     for text in [still(&films[0]), encounter(&films)] {
-        assert!(text.contains("No collision") && !text.contains("NaN") && !text.contains("inf"));
+        assert!(text.contains("no collision") && !text.contains("NaN") && !text.contains("inf"));
     }
-}
-
-#[test]
-fn invalid_svg_is_an_error() {
-    assert!(png("no picture").is_err());
 }

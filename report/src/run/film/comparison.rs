@@ -9,7 +9,7 @@ use closecall_scenarios::encounter::{REAR_INDEX, RecordedEncounter};
 use closecall_traffic::metrics::time_headway_s;
 use closecall_traffic::{Absent, Measured, Time};
 
-use super::{Film, Frame};
+use super::{Film, Frame, headway_text};
 use closecall_simulation::outcome::worse;
 use closecall_simulation::scenario::RearDriver;
 
@@ -80,14 +80,13 @@ impl EncounterComparison {
         let [ego, front, rear] = encounter.ego_lead_rear().map(|track| track.track_id);
         let (arm, start_s) = (simulated.arm_label(), encounter.start.s());
         let mut page = format!("### Recorded, and {arm}\n\n");
-        for (side, name) in ["recorded", arm].into_iter().enumerate() {
-            let values: Vec<String> =
-                self.rows().take(SHOWN_ROWS).map(|(metric, texts)| format!("{metric} {}", texts[side])).collect();
+        let result = simulated.result().map_or(String::new(), |result| format!("{result}; "));
+        for (side, name, result) in [(&self.recorded, "recorded", ""), (&self.simulated, arm, &result)] {
             // Writing to a string cannot fail.
-            let _ = writeln!(page, "- **{name}:** {}", values.join("; "));
+            let _ = writeln!(page, "- **{name}:** {result}{}", side.sentence());
         }
         let rear_driver = match driver {
-            RearDriver::Model => "a model of a human driver drives R and pulls out at the recorded headway",
+            RearDriver::Model => "R drives like a human",
             RearDriver::Recorded => "R drives as recorded, whatever E does",
         };
         if let Some(warning) = self.never_crosses() {
@@ -100,16 +99,12 @@ impl EncounterComparison {
         };
         let _ = writeln!(
             page,
-            "- Track {rear} (R) behind {ego} (E) behind {front} (F), alike at {start_s:.1} s. F drives as recorded; {rear_driver}{missing_text}. Thin outlines: the other side. Trajectory data: \
-             `{}`.\n",
+            "- Track {rear} (R) behind {ego} (E) behind {front} (F), alike at {start_s:.1} s; {rear_driver}{missing_text}; data: `{}`\n",
             encounter.data_name
         );
         page
     }
 }
-
-/// Number of metrics in the text; the command line prints all of them.
-const SHOWN_ROWS: usize = 4;
 
 /// A metric of the comparison: its name, its unit, and the function that reads it.
 type Row = (&'static str, &'static str, fn(&EncounterMetrics) -> Measured);
@@ -124,6 +119,22 @@ const ROWS: [Row; 6] = [
 ];
 
 impl EncounterMetrics {
+    /// Returns the crossing with the headways then, and the hardest braking, as one line.
+    fn sentence(&self) -> String {
+        let text = |value: Measured| value.map_or("-".to_owned(), headway_text);
+        let crossing = match self.crossing_s {
+            Ok(crossing_s) => {
+                let headways = [self.thw_front_at_crossing_s, self.thw_rear_at_crossing_s].map(text);
+                format!(
+                    "headway front {}, rear {} as R crosses the marking at {crossing_s:.2} s",
+                    headways[0], headways[1]
+                )
+            }
+            Err(_) => "R never crosses the marking".to_owned(),
+        };
+        format!("{crossing}; braking up to {:.2} m/s²", self.max_deceleration_mps2)
+    }
+
     /// Evaluates a film up to `crossing`, the time at which the rear vehicle crosses the marking, if it does.
     fn measure(film: &Film, crossing: Option<Time>) -> Self {
         let collided_at = film.worst_collision().map(|collision| collision.time);

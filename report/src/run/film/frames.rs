@@ -235,7 +235,7 @@ impl Film {
     }
 
     /// Returns the box of a vehicle with its velocity in the plane.
-    pub(super) fn moving_box(&self, frame: &Frame, actor: usize) -> Moving {
+    pub(in crate::run) fn moving_box(&self, frame: &Frame, actor: usize) -> Moving {
         let state = &frame.states[actor];
         let size = &self.actors[actor].vehicle.dimensions;
         let pose = self.road.plane_pose(state.s_m, state.d_m, state.heading_rad);

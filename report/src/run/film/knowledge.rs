@@ -77,13 +77,30 @@ impl Film {
         }
         let weather = self.weather().map_or(String::new(), |weather| format!("; {weather}"));
         let first = spans.iter().find_map(|span| Some((span.time, span.from_m?)));
+        let lost = self.lost(&spans);
         Some(match first {
             Some((time, from_m)) if time > self.frames[0].time => {
-                format!("No vehicle was seen behind until {:.2} s ({from_m:.0} m{weather}).", time.s())
+                format!("No vehicle was seen behind until {:.2} s ({from_m:.0} m{weather}).{lost}", time.s())
             }
-            Some((_, from_m)) => format!("A vehicle behind was seen from the start ({from_m:.0} m{weather})."),
+            Some((_, from_m)) => format!("A vehicle behind was seen from the start ({from_m:.0} m{weather}).{lost}"),
             None => format!("No vehicle was seen behind{}.", weather.replacen("; ", " (", 1) + closing(&weather)),
         })
+    }
+}
+
+impl Film {
+    /// Returns a sentence on the spans before the critical moment in which a vehicle that was known is out of sight.
+    fn lost(&self, spans: &[KnownSpan]) -> String {
+        let critical = self.critical_moment();
+        let ends =
+            spans.windows(2).filter(|pair| pair[0].is_later && pair[0].from_m.is_none() && pair[1].time <= critical);
+        let texts: Vec<String> =
+            ends.map(|pair| format!("{:.2} to {:.2} s", pair[0].time.s(), pair[1].time.s())).collect();
+        match texts.as_slice() {
+            [] => String::new(),
+            [one] => format!(" It was lost from {one}."),
+            more => format!(" It was lost {} times, first from {}.", more.len(), more[0]),
+        }
     }
 }
 

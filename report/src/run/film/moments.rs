@@ -11,7 +11,7 @@ impl Film {
     /// This is the first of these that exists:
     /// 1. the first collision of the ego, else of any vehicles
     /// 2. in a recorded encounter: the time at which the rear vehicle crosses the lane marking
-    /// 3. in other recorded traffic: the time at which another vehicle is closest to the ego
+    /// 3. in a recorded lane change: the time of a critical metric, else that at which another vehicle is closest to the ego
     /// 4. in a run: the time of the smallest time headway of the vehicle behind
     /// 5. the end
     pub fn critical_moment(&self) -> Time {

@@ -2,7 +2,8 @@
 
 use closecall_controllers::CheckedDriver;
 use closecall_sensors::camera::Pipeline;
-use closecall_sensors::{NoiseKey, SensorMode};
+use closecall_sensors::lidar::RearLidar;
+use closecall_sensors::{Detection, NoiseKey, SensorMode};
 use closecall_traffic::Time;
 
 use super::knowledge::rear_seen;
@@ -17,7 +18,8 @@ const GRAVITY_MPS2: f64 = 9.81;
 
 // A run has more than a million LiDAR points, so that a film keeps only some of its scans: sparse ones throughout,
 // dense ones in the critical and the overtaking phase up to a maximum number, and always the one nearest to the smallest
-// rear headway.
+// rear headway. The dense ones lack the bare road: the simulation traces none of it, and to add it costs more than a
+// control step.
 
 /// Number of frames between two kept scans in all phases.
 const SPARSE_SCAN_INTERVAL: usize = 100;
@@ -32,8 +34,8 @@ pub struct FilmRecorder {
     dense_scan_count: usize,
     /// The smallest rear headway in the critical phase so far (s).
     smallest_s: f64,
-    /// The index of its frame and its scan, unless the frame has the scan.
-    closest: Option<(usize, Scan)>,
+    /// The index of its frame, with the sensor and what it detected.
+    closest: Option<(usize, RearLidar, Vec<Detection>)>,
 }
 
 impl FilmRecorder {
@@ -87,10 +89,10 @@ impl FilmRecorder {
             actor.present_frames.end = frame_count;
         }
         film.outcome = Some(outcome.clone());
-        if let Some((index, scan)) = self.closest
+        if let Some((index, lidar, boxes)) = self.closest
             && let Some(frame) = film.frames.get_mut(index)
         {
-            frame.scan.get_or_insert(scan);
+            frame.scan = Scan::completed(&lidar, &boxes);
         }
         film
     }
@@ -105,16 +107,19 @@ impl FilmRecorder {
             matches!(view.phase, Phase::Critical | Phase::Overtaking) && index.is_multiple_of(DENSE_SCAN_INTERVAL);
         let is_dense = is_eventful && self.dense_scan_count < MAX_DENSE_SCANS;
         self.dense_scan_count += usize::from(is_dense);
-        let scan =
-            if is_dense || index.is_multiple_of(SPARSE_SCAN_INTERVAL) { Scan::latest(view.perception) } else { None };
+        let scan = match (index.is_multiple_of(SPARSE_SCAN_INTERVAL), is_dense) {
+            (true, _) => Scan::complete(view.perception),
+            (false, true) => Scan::latest(view.perception),
+            (false, false) => None,
+        };
         if let Ok(thw_s) = view.margins.thw_rear_s
             && is_eventful
             && view.phase == Phase::Critical
             && thw_s < self.smallest_s
         {
             self.smallest_s = thw_s;
-            let own = if scan.is_none() { Scan::latest(view.perception) } else { None };
-            self.closest = own.map(|scan| (index, scan));
+            let boxes = || view.perception.rear_detections().to_vec();
+            self.closest = view.perception.rear_lidar().map(|lidar| (index, lidar.clone(), boxes()));
         }
         scan
     }

@@ -1,7 +1,7 @@
 //! One scan of the rear LiDAR in a compact form, since a run has about a thousand of them.
 
-use closecall_sensors::Detection;
-use closecall_sensors::Perception;
+use closecall_sensors::lidar::RearLidar;
+use closecall_sensors::{Detection, Perception};
 
 /// Quantization steps of a stored coordinate per metre. With a power of two most bits of the resulting float are zero,
 /// which compresses well. 1/64 m is a fraction of the range noise.
@@ -22,10 +22,24 @@ pub(crate) struct Scan {
 }
 
 impl Scan {
-    /// Returns the latest scan of these sensors, or `None` if they have no rear LiDAR.
+    /// Returns the latest scan of these sensors, or `None` if they have no rear LiDAR. It lacks most points of the bare
+    /// road, which the detector discards.
     pub(super) fn latest(perception: &dyn Perception) -> Option<Self> {
+        Some(Self::of(perception.rear_lidar()?, perception.rear_detections()))
+    }
+
+    /// Returns the latest scan of these sensors with all its points, or `None` if they have no rear LiDAR.
+    pub(super) fn complete(perception: &dyn Perception) -> Option<Self> {
+        Self::completed(perception.rear_lidar()?, perception.rear_detections())
+    }
+
+    /// Returns the latest scan of the LiDAR with all its points.
+    pub(super) fn completed(lidar: &RearLidar, boxes: &[Detection]) -> Option<Self> {
         // The scan of the simulation has clustered without an error before, and so does the complete one.
-        let lidar = perception.rear_lidar()?.completed().ok()?;
+        Some(Self::of(&lidar.completed().ok()?, boxes))
+    }
+
+    fn of(lidar: &RearLidar, boxes: &[Detection]) -> Self {
         let scan = lidar.latest();
         let points = scan.x_m.iter().zip(&scan.y_m).zip(&scan.z_m);
         let mut clusters = vec![NO_CLUSTER; scan.len()];
@@ -36,12 +50,12 @@ impl Scan {
             }
         }
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a float cast saturates")]
-        Some(Self {
+        Self {
             points: points.map(|((x, y), z)| [x, y, z].map(|value_m| (value_m * STEPS_PER_M) as i16)).collect(),
             intensities: scan.intensity.iter().map(|intensity| (intensity * 255.0) as u8).collect(),
             clusters,
-            boxes: perception.rear_detections().to_vec(),
-        })
+            boxes: boxes.to_vec(),
+        }
     }
 
     /// Returns the coordinates of the points (m).

@@ -7,7 +7,7 @@
 
 use closecall_scenarios::criticality::{
     CRITICAL_A_LAT_MPS2, CRITICAL_A_LON_MPS2, CRITICAL_DCE_M, CRITICAL_DISTANCE_M, CRITICAL_SPEED_FACTOR,
-    CRITICAL_TTCE_S, CriticalLaneChange,
+    CRITICAL_TTCE_S, CriticalLaneChange, MetricResult,
 };
 use closecall_scenarios::filters::{PERIOD, SmoothedTrajectoryData};
 use closecall_traffic::metrics::{CRITICAL_THW_S, time_headway_s, time_to_collision_s};
@@ -89,7 +89,7 @@ pub fn film_lane_change(
         acceleration_limits: Vec::new(),
         camera: None,
         outcome: None,
-        highlight: None,
+        highlight: critical_time(change),
         foreword: String::new(),
         settings: Vec::new(),
     };
@@ -222,6 +222,16 @@ fn margins(tracks: &[&Trajectory], present: &[(usize, TrajectoryPoint)]) -> Curr
     }
 }
 
+/// Returns the time of the critical headway or, if that is not critical, of another critical metric between two vehicles.
+fn critical_time(change: &CriticalLaneChange) -> Option<Time> {
+    let at = |(name, metric): (&'static str, MetricResult)| match metric {
+        MetricResult::Value { opponent: Some(_), time_s, critical: true, .. } => Some((name != "thw_s", time_s)),
+        _ => None,
+    };
+    let first = change.metrics.named().into_iter().filter_map(at).min_by_key(|(is_other, _)| *is_other);
+    first.map(|(_, time_s)| Time::from_s(time_s))
+}
+
 /// Returns notes about the lane change and its metrics, each with the time at which it applies.
 fn notes(change: &CriticalLaneChange) -> Vec<(Time, String)> {
     let found = &change.lane_change;
@@ -231,7 +241,7 @@ fn notes(change: &CriticalLaneChange) -> Vec<(Time, String)> {
         (Time::from_s(found.end_s), "the lane change ends".to_owned()),
     ];
     for (name, metric) in change.metrics.named() {
-        if let closecall_scenarios::criticality::MetricResult::Value { value, opponent, time_s, critical } = metric {
+        if let MetricResult::Value { value, opponent, time_s, critical } = metric {
             let against = opponent.map_or(String::new(), |track| format!(" to track {track}"));
             let (label, limit) = described(name);
             let mark = if critical { "CRITICAL" } else { "not critical" };

@@ -121,7 +121,8 @@ fn scenes(films: &[FilmContents]) -> Option<Node> {
     for film in films.iter().filter(|film| film.has_scene) {
         let mut own = vec![(3.0, scene(film))];
         if film.has_camera {
-            let camera = View::new("2D", titled("Rear camera", films, film), format!("{}camera", film.root));
+            let camera =
+                View::new("2D", titled("Rear camera", films, film), format!("{}{}", film.root, super::camera::ENTITY));
             own.push((1.6, camera.into()));
         }
         nodes.extend(below(own).map(|node| (1.0, node)));

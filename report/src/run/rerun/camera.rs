@@ -4,8 +4,10 @@
 //! same noise. It renders every [`PIXEL_STEP`]-th pixel, and only at selected instants, since an image costs as much as
 //! a hundred control steps. An image and its windows stay visible until the next image.
 
-use crate::run::rerun::sdk::{AsComponents, Boxes2D, Image};
-use closecall_sensors::camera::{ExposureKey, Frame as Exposure, FrameBuffers, PixelRect, RearCamera};
+use crate::run::rerun::sdk::{AsComponents, Boxes2D, Image, Pinhole, Transform3D};
+use closecall_sensors::camera::{
+    Camera, ExposureKey, FOCAL_PX, Frame as Exposure, FrameBuffers, PixelRect, RearCamera,
+};
 use closecall_sensors::{Detection, rear_exposures};
 use closecall_traffic::{Time, VehicleClass};
 
@@ -21,14 +23,40 @@ const PIXEL_ROWS: std::ops::Range<u16> = 230..610;
 /// Times before the critical moment for which an image is rendered, besides the first scan and the moments of the encounter.
 const TIMES_BEFORE: [Time; 3] = [Time::from_ms(2_000), Time::from_ms(800), Time::ZERO];
 /// Least time between an image and the one before it. That of the critical moment is rendered in any case.
-const LEAST_INTERVAL: Time = Time::from_ms(700);
+const LEAST_INTERVAL: Time = Time::from_ms(2_500);
+
+/// Entity of the camera, which moves with the ego.
+pub(super) const ENTITY: &str = "world/ego/camera";
+/// Distance at which the scene shows the image behind the camera (m): near, so that it hides no vehicle.
+const IMAGE_DISTANCE_M: f32 = 1.2;
+
+/// Writes position and projection of the camera, so that the scene shows its image where it is taken. The pitch of the
+/// body is left out.
+fn write_pinhole(writer: &Writer<'_>, film: &Film, camera: &Camera) -> Result<(), RecordingError> {
+    let ahead_m = camera.mount_from_rear_m - 0.5 * film.actors[film.ego].vehicle.dimensions.length_m;
+    let (sin, cos) = camera.pitch_rad.sin_cos();
+    // The axes of the camera in the ego frame: right, down, and backward along the road.
+    let axes = [[0.0, 1.0, 0.0], [sin, 0.0, -cos], [-cos, 0.0, -sin]].map(|axis| axis.map(|value| value as f32));
+    let position_m = [ahead_m as f32, 0.0, camera.mount_height_m as f32];
+    writer.write_static(ENTITY, &Transform3D::from_translation_mat3x3(position_m, axes))?;
+    let (step, first_row) = (f32::from(PIXEL_STEP), f32::from(PIXEL_ROWS.start));
+    let rows = f32::from(PIXEL_ROWS.end) - first_row;
+    let [width, height] = [PixelRect::IMAGE.width as f32, PixelRect::IMAGE.height as f32];
+    let focal = FOCAL_PX as f32 / step;
+    let pinhole = Pinhole::from_focal_length_and_resolution([focal, focal], [width / step, rows / step])
+        .with_principal_point([0.5 * width / step, (0.5 * height - first_row) / step])
+        .with_image_plane_distance(IMAGE_DISTANCE_M);
+    writer.write_static(ENTITY, &pinhole)
+}
 
 /// Writes the images. Returns true if there are any.
 pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<bool, RecordingError> {
     let Some((camera, key)) = &film.camera else { return Ok(false) };
+    write_pinhole(writer, film, camera)?;
     let camera = RearCamera::new(*camera);
+    let windows_entity = format!("{ENTITY}/windows");
     let fixed = Boxes2D::update_fields().with_radii([-1.5_f32]).with_show_labels(true);
-    writer.write_static("camera/windows", &fixed)?;
+    writer.write_static(&windows_entity, &fixed)?;
     let mut lists = FrameBuffers::default();
     let (mut images, mut marks) = (Vec::new(), Vec::new());
     for (frame, exposure) in frames_to_render(film, rear_exposures(key)) {
@@ -39,8 +67,8 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<bool, RecordingE
     }
     let images: Vec<(Time, &dyn AsComponents)> = images.iter().map(|(time, image)| (*time, image as _)).collect();
     let marks: Vec<(Time, &dyn AsComponents)> = marks.iter().map(|(time, boxes)| (*time, boxes as _)).collect();
-    writer.write_each("camera", &images)?;
-    writer.write_each("camera/windows", &marks)?;
+    writer.write_each(ENTITY, &images)?;
+    writer.write_each(&windows_entity, &marks)?;
     Ok(!images.is_empty())
 }
 

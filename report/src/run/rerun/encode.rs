@@ -9,12 +9,17 @@
 //! same bytes.
 
 use crate::run::rerun::sdk::{StoreId, StoreKind};
+use arrow::array::RecordBatch;
 use arrow::datatypes::Schema;
+use arrow::ipc::writer::StreamWriter;
+use re_protos::common::v1alpha1::Compression as CompressionCode;
+use re_protos::log_msg::v1alpha1::{ArrowMsg, Encoding, RrdFooter, RrdManifest, log_msg::Msg};
+use re_sdk::external::re_log_encoding::external::lz4_flex;
 use re_sdk::external::re_log_encoding::{
-    Compression, CrateVersion, Encodable, EncodingOptions, MessageHeader, MessageKind, RRD_FOURCC, RawRrdManifest,
-    RrdFooter, RrdManifestBuilder, StreamFooter, StreamHeader, ToTransport,
+    Compression, CrateVersion, Encodable, EncodingOptions, MessageHeader, MessageKind, RRD_FOURCC, RrdManifestBuilder,
+    StreamFooter, StreamHeader, ToTransport,
 };
-use re_sdk::external::re_log_types::{ArrowMsg, BlueprintActivationCommand, SetStoreInfo, StoreInfo, StoreSource};
+use re_sdk::external::re_log_types::{BlueprintActivationCommand, SetStoreInfo, StoreInfo, StoreSource};
 use re_sdk::log::{Chunk, LogMsg};
 use re_span::Span;
 
@@ -46,7 +51,7 @@ impl Recording {
         let mut manifests = vec![file.store(&blueprint, &self.layout)?];
         file.message(&LogMsg::BlueprintActivationCommand(BlueprintActivationCommand::make_active(blueprint)))?;
         manifests.push(file.store(&id(StoreKind::Recording), &self.data)?);
-        file.finish(&manifests)
+        file.finish(manifests)
     }
 }
 
@@ -68,42 +73,61 @@ impl File {
         what.to_rrd_bytes(&mut self.bytes).map(|_| ()).map_err(RecordingError::encode)
     }
 
-    /// Appends a message, and returns its size before compression (bytes).
-    fn message(&mut self, message: &LogMsg) -> Result<u64, RecordingError> {
-        let message = message.to_transport(Compression::LZ4).map_err(RecordingError::encode)?;
-        self.push(&message)?;
-        Ok(message.byte_size_uncompressed())
+    /// Appends a message without data.
+    fn message(&mut self, message: &LogMsg) -> Result<(), RecordingError> {
+        self.push(&message.to_transport(Compression::LZ4).map_err(RecordingError::encode)?)
+    }
+
+    /// Appends the columns of a chunk, and returns their size before compression (bytes).
+    ///
+    /// The library's own conversion parses all columns again to learn whether they are static.
+    fn columns(&mut self, id: &StoreId, chunk: &Chunk, columns: &RecordBatch) -> Result<u64, RecordingError> {
+        let mut stream = StreamWriter::try_new(Vec::new(), columns.schema_ref()).map_err(RecordingError::encode)?;
+        stream.write(columns).map_err(RecordingError::encode)?;
+        let bytes = stream.into_inner().map_err(RecordingError::encode)?;
+        let uncompressed_size = bytes.len() as u64;
+        self.push(&Msg::ArrowMsg(ArrowMsg {
+            store_id: Some(id.clone().into()),
+            chunk_id: Some(chunk.id().as_tuid().into()),
+            compression: CompressionCode::Lz4 as i32,
+            uncompressed_size,
+            encoding: Encoding::ArrowIpc as i32,
+            payload: lz4_flex::block::compress(&bytes).into(),
+            is_static: Some(chunk.is_static()),
+        }))?;
+        Ok(uncompressed_size)
     }
 
     /// Appends the chunks of a store, and returns their index.
-    fn store(&mut self, id: &StoreId, chunks: &[Chunk]) -> Result<RawRrdManifest, RecordingError> {
+    fn store(&mut self, id: &StoreId, chunks: &[Chunk]) -> Result<RrdManifest, RecordingError> {
         let info = StoreInfo::new(id.clone(), StoreSource::Other("closecall".to_owned()));
         self.message(&LogMsg::SetStoreInfo(SetStoreInfo { row_id: tuid(chunks.len()), info }))?;
         let mut index = RrdManifestBuilder::default();
         for chunk in chunks {
             let columns = chunk.to_chunk_batch().map_err(RecordingError::encode)?;
             let before = self.bytes.len();
-            let message = ArrowMsg { chunk_id: chunk.id().as_tuid(), batch: columns.clone().into(), on_release: None };
-            let uncompressed = self.message(&LogMsg::ArrowMsg(id.clone(), message))?;
+            let uncompressed = self.columns(id, chunk, &columns)?;
             let start = before + MessageHeader::ENCODED_SIZE_BYTES;
             let span = Span { start: start as u64, len: (self.bytes.len() - start) as u64 };
             index.append(&columns, span, uncompressed).map_err(RecordingError::encode)?;
         }
-        let mut index = index.build(id.clone()).map_err(RecordingError::encode)?;
+        let index = index.build(id.clone()).map_err(RecordingError::encode)?;
         let mut fields = index.sorbet_schema.fields().to_vec();
         fields.sort();
-        index.sorbet_schema = Schema::new_with_metadata(fields, std::mem::take(&mut index.sorbet_schema.metadata));
-        Ok(index)
+        let schema = Schema::new_with_metadata(fields, index.sorbet_schema.metadata);
+        // The library's own conversion checks the index that the library has just built.
+        Ok(RrdManifest {
+            store_id: Some(index.store_id.into()),
+            sorbet_schema: Some((&schema).try_into().map_err(RecordingError::encode)?),
+            sorbet_schema_sha256: Some(index.sorbet_schema_sha256.to_vec().into()),
+            data: Some(index.data.into()),
+        })
     }
 
     /// Appends the index, and returns the bytes of the file.
-    fn finish(mut self, manifests: &[RawRrdManifest]) -> Result<Vec<u8>, RecordingError> {
-        let mut footer = RrdFooter::default().to_transport(()).map_err(RecordingError::encode)?;
-        for manifest in manifests {
-            footer.manifests.push(manifest.to_transport(()).map_err(RecordingError::encode)?);
-        }
+    fn finish(mut self, manifests: Vec<RrdManifest>) -> Result<Vec<u8>, RecordingError> {
         let mut bytes = Vec::new();
-        footer.to_rrd_bytes(&mut bytes).map_err(RecordingError::encode)?;
+        RrdFooter { manifests }.to_rrd_bytes(&mut bytes).map_err(RecordingError::encode)?;
         self.push(&MessageHeader { kind: MessageKind::End, len: bytes.len() as u64 })?;
         let start = self.bytes.len() as u64;
         self.bytes.extend_from_slice(&bytes);

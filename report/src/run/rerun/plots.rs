@@ -6,8 +6,12 @@ pub(super) use self::bands::phase_name;
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
-use crate::run::rerun::sdk::SeriesLines;
+use crate::run::rerun::sdk::{
+    AsComponents, ComponentDescriptor, ComponentIdentifier, Scalars, SerializedComponentBatch, SeriesLines,
+};
+use arrow::array::StringArray;
 use closecall_controllers::{EgoState, MisPlan};
 use closecall_scenarios::criticality::{CRITICAL_DCE_M, CRITICAL_TTCE_S};
 use closecall_traffic::Time;
@@ -75,6 +79,22 @@ impl Kind {
             Self::Encounter => "TTCE [s] · DCE [m]",
             Self::Margin => "Headway gained [s]",
         }
+    }
+
+    /// Returns the unit of a curve of the plot.
+    fn unit(self, curve: &str) -> &'static str {
+        match self {
+            Self::Acceleration => "m/s²",
+            Self::Speed => "m/s",
+            Self::Gap => "m",
+            Self::Encounter if curve.contains("dce") => "m",
+            Self::Headway | Self::Encounter | Self::Margin => "s",
+        }
+    }
+
+    /// Returns the plot to which an entity belongs.
+    fn of_entity(entity: &str) -> Option<Self> {
+        KINDS.into_iter().find(|kind| entity.starts_with(&format!("plots/{}/", kind.name())))
     }
 
     /// Returns the smallest span of the value axis, so that noise does not look like an event.
@@ -175,9 +195,7 @@ impl Plots<'_> {
 
     /// Extends the range of the plot to which `entity` belongs.
     fn note_span(&self, entity: &str, values: &[Option<f64>]) {
-        let Some(kind) = KINDS.iter().find(|kind| entity.starts_with(&format!("plots/{}/", kind.name()))) else {
-            return;
-        };
+        let Some(kind) = Kind::of_entity(entity) else { return };
         let mut spans = self.spans.borrow_mut();
         let span = spans.entry(kind.name()).or_insert([f64::INFINITY, f64::NEG_INFINITY]);
         for value in values.iter().flatten() {
@@ -201,16 +219,29 @@ impl Plots<'_> {
         if self.role == Role::Baseline {
             return Ok(());
         }
-        for (number, noted) in self.film.moments().iter().enumerate() {
-            let entity = format!("plots/{}/moment_{number}", plot.kind.name());
-            let style = SeriesLines::new()
-                .with_names([noted.moment.label()])
-                .with_colors([palette::moment(noted.moment)])
-                .with_widths([THIN_LINE_WIDTH]);
-            self.writer.write_static(&entity, &style)?;
-            self.writer.write_series(&entity, &[noted.time; 2], &plot.range.map(Some))?;
+        let moments = self.film.moments();
+        if moments.is_empty() {
+            return Ok(());
         }
-        Ok(())
+        let entity = format!("plots/{}/moments", plot.kind.name());
+        let style = SeriesLines::new()
+            .with_names(moments.iter().map(|noted| noted.moment.label()))
+            .with_colors(moments.iter().map(|noted| palette::moment(noted.moment)))
+            .with_widths(moments.iter().map(|_| THIN_LINE_WIDTH));
+        self.writer.write_static(&entity, &style)?;
+        // The view of a pair can show more than the range of this film.
+        let largest = plot.kind.largest_range();
+        let ends = [0, 1].map(|end| if largest[end].is_finite() { largest[end] } else { plot.range[end] });
+        // One series per moment in one entity. A series has values in the two rows of its moment alone.
+        let rows: Vec<(Time, usize, f64)> =
+            moments.iter().enumerate().flat_map(|(number, noted)| ends.map(|end| (noted.time, number, end))).collect();
+        let times: Vec<Time> = rows.iter().map(|row| row.0).collect();
+        self.writer.write_curve(&entity, &times, |range| {
+            let values = rows[range].iter().flat_map(|&(_, shown, end)| {
+                (0..moments.len()).map(move |number| if number == shown { end } else { f64::NAN })
+            });
+            Scalars::new(values).columns(vec![moments.len(); times.len()])
+        })
     }
 
     /// Writes name and style of a curve.
@@ -223,8 +254,13 @@ impl Plots<'_> {
             Role::Baseline => (palette::darker(curve.colour), THIN_LINE_WIDTH),
             Role::Alone | Role::Tested => (curve.colour, curve.width),
         };
-        let style = SeriesLines::new().with_names([name]).with_colors([colour]).with_widths([width]);
-        self.writer.write_static(entity, &style)
+        self.write_line(entity, SeriesLines::new().with_names([name]).with_colors([colour]).with_widths([width]))
+    }
+
+    /// Writes the style of a curve with the unit of its values.
+    fn write_line(&self, entity: &str, style: SeriesLines) -> Result<(), RecordingError> {
+        let unit = Kind::of_entity(entity).map_or("", |kind| kind.unit(entity));
+        self.writer.write_static(entity, &WithUnit { style, unit })
     }
 
     /// Writes a reference level from the first to the last frame. The baseline writes none, since the tested film has
@@ -235,7 +271,7 @@ impl Plots<'_> {
         }
         let style =
             SeriesLines::new().with_names([name]).with_colors([palette::CRITICAL]).with_widths([THIN_LINE_WIDTH]);
-        self.writer.write_static(entity, &style)?;
+        self.write_line(entity, style)?;
         let (Some(&first), Some(&last)) = (self.times.first(), self.times.last()) else { return Ok(()) };
         self.writer.write_series(entity, &[first, last], &[Some(level); 2])
     }
@@ -322,6 +358,21 @@ impl Plots<'_> {
         let style = CurveStyle { name: "goal +2 s", colour: palette::SAFE, width: THIN_LINE_WIDTH };
         self.curve("plots/margin/goal", &style, |frame| goal_s.filter(|_| frame.time >= since))?;
         Ok(true)
+    }
+}
+
+/// A curve's style, and the unit of its values, in the component `unit`.
+struct WithUnit {
+    style: SeriesLines,
+    unit: &'static str,
+}
+
+impl AsComponents for WithUnit {
+    fn as_serialized_batches(&self) -> Vec<SerializedComponentBatch> {
+        let component = ComponentIdentifier::from("unit");
+        let descriptor = ComponentDescriptor { archetype: None, component, component_type: None };
+        let unit = SerializedComponentBatch::new(Arc::new(StringArray::from(vec![self.unit])), descriptor);
+        self.style.as_serialized_batches().into_iter().chain([unit]).collect()
     }
 }
 

@@ -56,7 +56,10 @@ fn push_pair(page: &mut String, films: [&Film; 2], fate: PairFate) {
 
 /// Appends the verdict on one film. That of a re-enactment stands below the comparison with the recorded encounter.
 fn push_single(page: &mut String, film: &Film, is_reenactment: bool) {
+    // What is critical is read first.
+    let is_critical = |note: &&(Time, String)| note.1.contains(": CRITICAL");
     let word = match (&film.outcome, film.worst_collision()) {
+        (None, _) if film.notes.iter().any(|note| is_critical(&note)) => "CRITICAL · recorded traffic",
         (None, _) => "Recorded traffic",
         (Some(_), Some(_)) => "COLLISION",
         (Some(_), None) => "NO COLLISION",
@@ -65,13 +68,13 @@ fn push_single(page: &mut String, film: &Film, is_reenactment: bool) {
         let _ = write!(page, "### {word}\n\n");
     }
     match film.result() {
+        // The comparison has it.
+        Some(_) if is_reenactment => {}
         Some(result) => {
             let _ = writeln!(page, "- **{}:** {result}", film.arm_label());
         }
         None => {
             let _ = write!(page, "**{}**\n\n", film.title);
-            // What is critical is read first.
-            let is_critical = |note: &&(Time, String)| note.1.contains(": CRITICAL");
             let critical = film.notes.iter().filter(is_critical);
             for (time, note) in critical.chain(film.notes.iter().filter(|note| !is_critical(note))) {
                 let _ = writeln!(page, "- {:.2} s: {note}", time.s());

@@ -18,7 +18,7 @@ const ARROW_ABOVE_M: f64 = 0.4;
 /// Heights of the names above the roof (m): different ones, so that the names of vehicles that touch do not cover each
 /// other.
 /// The name of the ego lies on the road, to its right.
-const EGO_LABEL_AT_M: [f32; 3] = [4.0, -3.0, 0.0];
+const EGO_LABEL_AT_M: [f32; 3] = [5.0, -5.0, 0.0];
 const LEAD_LABEL_M: f64 = 5.8;
 const OTHER_LABEL_M: f64 = 1.6;
 const REAR_LABEL_M: f64 = 3.2;
@@ -35,6 +35,8 @@ const FRONT_TEXT_Y_M: f32 = 7.0;
 const TOUCHING_M: f64 = 0.3;
 /// Front gap below which no headway is written, since the name of the ego is there (m).
 const NAMED_GAP_M: f64 = 15.0;
+/// Share of the rear gap that is added to it.
+const NAMED_GAP_SHARE: f64 = 0.4;
 /// Height at which gaps are drawn (m).
 const GAP_Z_M: f64 = 0.5;
 
@@ -75,7 +77,8 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingErr
             let at_m = if index == film.ego { EGO_LABEL_AT_M } else { [0.0, 0.0, above_m as f32] };
             // Dense recorded traffic has room for three names. The view from above has the others.
             if film.outcome.is_some() || !matches!(actor.part, Part::Other(_)) {
-                write_name(writer, &entity, times, &states, (actor.name.as_str(), at_m, colour))?;
+                let texts = names(film, index);
+                write_name(writer, &entity, times, &texts, (at_m, colour))?;
             }
         }
         write_lights(writer, &entity, times, &states, (actor.vehicle.class, size))?;
@@ -157,20 +160,33 @@ fn write_velocity(
     })
 }
 
+/// Returns the name of a vehicle with its rounded speed, for each frame in which it is present. A vehicle that touches the
+/// ego has none: the names would lie on each other, and the collision's text has both.
+fn names(film: &Film, actor: usize) -> Vec<String> {
+    let name = film.actors[actor].name.as_str();
+    let text = |frame: &Frame| {
+        let distance_m = || film.moving_box(frame, actor).shape.distance_m(&film.moving_box(frame, film.ego).shape);
+        if actor != film.ego && film.outcome.is_some() && distance_m() < TOUCHING_M {
+            return String::new();
+        }
+        format!("{name} {:.0} m/s", frame.states[actor].speed_mps)
+    };
+    film.frames[film.actors[actor].present_frames.clone()].iter().map(text).collect()
+}
+
 fn write_name(
     writer: &Writer<'_>,
     entity: &str,
     times: &[Time],
-    states: &[&VehicleState],
-    (name, at_m, colour): (&str, [f32; 3], Rgba),
+    texts: &[String],
+    (at_m, colour): ([f32; 3], Rgba),
 ) -> Result<(), RecordingError> {
     let entity = format!("{entity}/name");
     let fixed =
         Points3D::new([at_m]).with_colors([palette::text(colour)]).with_radii([0.05_f32]).with_show_labels(true);
     writer.write_static(&entity, &fixed)?;
     // Only a change of the rounded speed gives a new row.
-    let texts: Vec<String> = states.iter().map(|state| format!("{name} {:.0} m/s", state.speed_mps)).collect();
-    let rows = changes(&texts);
+    let rows = changes(texts);
     let times: Vec<Time> = rows.iter().map(|&row| times[row]).collect();
     writer.write_rows(&entity, &times, |range| {
         let texts = rows[range].iter().map(|&row| texts[row].as_str());
@@ -249,8 +265,14 @@ fn write_lamps(
 /// Writes the gaps in front of and behind the ego, bumper to bumper, with their time headways. A critical gap is red.
 fn write_gaps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordingError> {
     let bumper_m = 0.5 * film.actors[film.ego].vehicle.dimensions.length_m;
-    let front = |frame: &Frame| Gap::new([bumper_m, 1.0], frame.margins.gap_front_m, frame.margins.thw_front_s);
-    let rear = |frame: &Frame| Gap::new([-bumper_m, -1.0], frame.margins.gap_rear_m, frame.margins.thw_rear_s);
+    let front = |frame: &Frame| {
+        let (gap_m, thw_s) = (frame.margins.gap_front_m, frame.margins.thw_front_s);
+        // From farther back the names of the ego and of the lead vehicle are closer together.
+        let named_m = NAMED_GAP_M + NAMED_GAP_SHARE * frame.margins.gap_rear_m.unwrap_or(0.0).clamp(0.0, MAX_RIG_M);
+        Gap::new([bumper_m, 1.0], gap_m, thw_s, named_m)
+    };
+    let rear =
+        |frame: &Frame| Gap::new([-bumper_m, -1.0], frame.margins.gap_rear_m, frame.margins.thw_rear_s, TOUCHING_M);
     let both: [(&str, Vec<Option<Gap>>); 2] = [
         ("world/ego/gap_front", film.frames.iter().map(front).collect()),
         ("world/ego/gap_rear", film.frames.iter().map(rear).collect()),
@@ -289,13 +311,13 @@ struct Gap {
 
 impl Gap {
     /// Returns the gap that begins at `bumper_m` and extends in the direction of `sign`, in the ego frame, or `None` if
-    /// there is no positive gap.
-    fn new([bumper_m, sign]: [f64; 2], gap_m: Measured, thw_s: Measured) -> Option<Self> {
+    /// there is no positive gap. Below `named_m` it has no text.
+    fn new([bumper_m, sign]: [f64; 2], gap_m: Measured, thw_s: Measured, named_m: f64) -> Option<Self> {
         let gap_m = gap_m.ok().filter(|&gap_m| gap_m > 0.0)?;
         let is_critical = thw_s.is_ok_and(|thw_s| thw_s < CRITICAL_THW_S);
         let end = |x_m: f64| [x_m as f32, 0.0, GAP_Z_M as f32];
         let text = match thw_s {
-            _ if gap_m < if sign > 0.0 { NAMED_GAP_M } else { TOUCHING_M } => String::new(),
+            _ if gap_m < named_m => String::new(),
             Ok(thw_s) => headway_text(thw_s),
             Err(_) => format!("{gap_m:.1} m"),
         };

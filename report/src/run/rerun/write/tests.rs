@@ -13,11 +13,11 @@ use re_sdk::log::Chunk;
 use super::super::stream::{OPENING_TIMELINE, STEP_TIMELINE, TIME_TIMELINE};
 use super::*;
 use crate::run::film::{EncounterComparison, FilmRecorder, film_encounter};
-use crate::traffic::recorder::TrafficRecorder;
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::outcome::{ClosedBy, Collision, Phase};
 use closecall_simulation::scenario::{RearDriver, ScenarioFile, reenact};
+use closecall_simulation::trajectories::TrafficRecorder;
 use closecall_simulation::{Arm, CONTROL_STEP, RunKey, simulate};
 
 fn library(name: &str) -> ScenarioFile {
@@ -179,8 +179,8 @@ fn full_sensors_show_points_boxes_ground_truth_and_images() {
         "/mis/world/ego/truth/known",
         "/mis/world/ego/truth/missed",
         "/mis/world/ego/truth/false_tracks",
-        "/mis/camera",
-        "/mis/camera/windows",
+        "/mis/world/ego/camera",
+        "/mis/world/ego/camera/windows",
     ];
     for entity in entities {
         assert!(data.iter().any(|chunk| chunk.entity_path().to_string() == entity), "{entity}");

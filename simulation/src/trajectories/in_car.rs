@@ -6,9 +6,9 @@
 use closecall_scenarios::trajectory_data::{BusFrame, InCarFrame, InCarLog, MarkingDistances, TrueLaneChange};
 use closecall_traffic::{Dimensions, Lane, Road, Side, Time, VehicleClass, VehicleState};
 
+use crate::scenario::{ActorConfig, Scenario, ScenarioConfig};
+use crate::{CONTROL_STEP, Observer, RunEvent, StepView};
 use closecall_controllers::DriverConfig;
-use closecall_simulation::scenario::{ActorConfig, Scenario, ScenarioConfig};
-use closecall_simulation::{CONTROL_STEP, Observer, RunEvent, StepView};
 
 /// Time between two runs, which leaves a gap in the log.
 const PAUSE: Time = Time::from_ms(10_000);

@@ -1,7 +1,7 @@
 //! The server that gives out recordings and the viewer.
 
 use std::fs;
-use std::io::{self, BufRead, BufReader, Write};
+use std::io::{self, BufRead, BufReader, Read, Write};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
@@ -10,12 +10,14 @@ use std::time::Duration;
 
 use maud::{DOCTYPE, html};
 
-use super::WebViewer;
+use crate::WebViewer;
 
 /// The page that a campaign writes of its recordings.
 const CAMPAIGN_PAGE: &str = "recordings/index.html";
 /// Time after which a silent connection is closed.
 const SILENCE: Duration = Duration::from_secs(30);
+/// First bytes of a recording, before the version of its format.
+const MAGIC: &[u8] = b"RRF";
 /// Largest number of header lines that are read.
 const MAX_HEADER_LINES: usize = 100;
 
@@ -25,6 +27,12 @@ pub enum ServeError {
     /// The path has no recording.
     #[error("failed to find a recording in {path}: name a file .rrd, or a folder that has such files")]
     Nothing {
+        /// The path.
+        path: PathBuf,
+    },
+    /// The file has the name of a recording, but is none.
+    #[error("failed to open {path}: the file is no recording, which begins with the letters RRF")]
+    Foreign {
         /// The path.
         path: PathBuf,
     },
@@ -118,7 +126,15 @@ fn recordings(path: &Path) -> Result<(PathBuf, Vec<String>), ServeError> {
         let (Some(folder), Some(name)) = (whole.parent(), whole.file_name().and_then(|name| name.to_str())) else {
             return Err(nothing());
         };
-        return if is_recording(name) { Ok((folder.to_owned(), vec![name.to_owned()])) } else { Err(nothing()) };
+        if !is_recording(name) {
+            return Err(nothing());
+        }
+        let mut start = Vec::new();
+        fs::File::open(&whole).and_then(|file| file.take(MAGIC.len() as u64).read_to_end(&mut start)).map_err(read)?;
+        if start != MAGIC {
+            return Err(ServeError::Foreign { path: path.to_owned() });
+        }
+        return Ok((folder.to_owned(), vec![name.to_owned()]));
     }
     let mut found = Vec::new();
     for below in ["", "recordings/"] {
@@ -290,5 +306,8 @@ mod tests {
         assert_eq!(recordings(folder.path()).unwrap().1, ["b.rrd", "recordings/a.rrd"]);
         assert!(matches!(recordings(&folder.path().join("notes.txt")), Err(ServeError::Nothing { .. })));
         assert!(matches!(recordings(&folder.path().join("none.rrd")), Err(ServeError::Read { .. })));
+        assert!(matches!(recordings(&folder.path().join("b.rrd")), Err(ServeError::Foreign { .. })));
+        fs::write(folder.path().join("b.rrd"), "RRF2").unwrap();
+        assert_eq!(recordings(&folder.path().join("b.rrd")).unwrap().1, ["b.rrd"]);
     }
 }

@@ -3,8 +3,8 @@
 use closecall_scenarios::trajectory_data::TrajectoryData;
 use closecall_traffic::{Lane, Time, Trajectory, TrajectoryPoint};
 
-use closecall_simulation::scenario::Scenario;
-use closecall_simulation::{CONTROL_STEP, Observer, RunEvent, StepView};
+use crate::scenario::Scenario;
+use crate::{CONTROL_STEP, Observer, RunEvent, StepView};
 
 /// Time between two runs, so that vehicles of different runs never meet.
 const PAUSE: Time = Time::from_ms(10_000);

@@ -8,7 +8,7 @@ use std::process::{Child, Command, Stdio};
 use std::thread;
 use std::time::Duration;
 
-use super::fetch::get;
+use crate::fetch::get;
 
 /// The files of the web build. The page loads the two others.
 const FILES: [&str; 3] = ["index.html", "re_viewer.js", "re_viewer_bg.wasm"];

@@ -1,0 +1,7 @@
+//! Simulated traffic as trajectory data: all vehicles seen from the road, or one as it would log itself.
+
+mod in_car;
+mod recorder;
+
+pub use in_car::{InCarRecorder, recorded_actor};
+pub use recorder::TrafficRecorder;
