@@ -75,6 +75,13 @@ pub(crate) struct PerceivedVehicle {
     pub(crate) d_m: f64,
 }
 
+impl PerceivedVehicle {
+    /// Returns true if the vehicle would hit or be hit by that of the driver, if both kept their lateral positions.
+    pub(crate) fn is_in_path(&self, input: &DriverInput<'_>) -> bool {
+        (self.d_m - input.own.d_m).abs() < 0.5 * (input.vehicle.dimensions.width_m + self.width_m)
+    }
+}
+
 /// An adjacent lane as the driver perceives it now.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct PerceivedLane {

@@ -158,10 +158,8 @@ impl Step<'_> {
     /// ahead one reaction time ago, in the original lane, may have been passed since. An overtaken vehicle that comes
     /// into the driver's path is an ordinary lead vehicle.
     pub(super) fn ahead_except(&self, overtaken: Option<usize>) -> Option<&PerceivedVehicle> {
-        let DriverInput { own, vehicle, .. } = self.input;
-        let in_path =
-            |ahead: &PerceivedVehicle| (ahead.d_m - own.d_m).abs() < 0.5 * (vehicle.dimensions.width_m + ahead.width_m);
-        self.scene.ahead.as_ref().filter(|ahead| Some(ahead.actor) != overtaken || in_path(ahead))
+        let ahead = self.scene.ahead.as_ref();
+        ahead.filter(|ahead| Some(ahead.actor) != overtaken || ahead.is_in_path(self.input))
     }
 
     /// Returns the present lateral position of the intended path (m).

@@ -3,7 +3,7 @@
 //! The labels are those of `linfa-clustering` to the bit, numbering included. They agree with those of scikit-learn
 //! (`tests/golden/dbscan.py`), which uses the same convention: a neighbour is at most the radius away.
 
-use std::collections::VecDeque;
+use std::ops::RangeInclusive;
 
 /// Maximum number of cells along each axis. Points that are spread wider get larger cells.
 const MAX_CELLS: f64 = 256.0;
@@ -15,64 +15,35 @@ pub(super) struct Dbscan {
     pub(super) labels: Vec<Option<u32>>,
     grid: Grid,
     /// Rows that the growing cluster has reached but not visited.
-    queue: VecDeque<u32>,
-    /// Whether each row is in the queue.
-    is_queued: Vec<bool>,
-    /// Rows without a cluster that are neighbours of the visited row.
-    free: Vec<u32>,
+    reached: Vec<u32>,
 }
 
 impl Dbscan {
     /// Assigns each point to a cluster. Returns the number of clusters.
     ///
-    /// A neighbour is at most `radius` away. A core point has at least `core_points` neighbours, itself included.
+    /// A neighbour is at most `radius` away. A core point has at least `core_points` neighbours, itself included. The order
+    /// in which a cluster reaches its points does not change the labels.
     pub(super) fn run(&mut self, points: &[[f64; 2]], radius: f64, core_points: usize) -> u32 {
         self.labels.clear();
         self.labels.resize(points.len(), None);
-        self.is_queued.clear();
-        self.is_queued.resize(points.len(), false);
         self.grid.build(points, radius);
         let mut clusters = 0;
-        for (row, &point) in (0..).zip(points) {
-            if self.labels[row as usize].is_some() || self.collect_free(row, point, radius) < core_points {
+        for (row, &point) in points.iter().enumerate() {
+            if self.labels[row].is_some() || !self.grid.has_within(point, radius, core_points) {
                 continue;
             }
-            self.enqueue();
-            self.labels[row as usize] = Some(clusters);
-            while let Some(reached) = self.queue.pop_front() {
-                self.is_queued[reached as usize] = false;
-                let neighbours = self.collect_free(reached, points[reached as usize], radius);
+            self.grid.take_within(point, radius, &mut self.reached);
+            while let Some(row) = self.reached.pop() {
                 // A point within the radius of a core point belongs to the cluster even if it is no core point.
-                self.labels[reached as usize] = Some(clusters);
-                if neighbours >= core_points {
-                    self.enqueue();
+                self.labels[row as usize] = Some(clusters);
+                let point = points[row as usize];
+                if self.grid.has_within(point, radius, core_points) {
+                    self.grid.take_within(point, radius, &mut self.reached);
                 }
             }
             clusters += 1;
         }
         clusters
-    }
-
-    /// Sets `free` to the neighbours of `row` that have no cluster. Returns the number of all neighbours.
-    fn collect_free(&mut self, row: u32, point: [f64; 2], radius: f64) -> usize {
-        let (free, labels, mut neighbours) = (&mut self.free, &self.labels, 0);
-        free.clear();
-        self.grid.for_each_within(point, radius, |other| {
-            neighbours += 1;
-            if labels[other as usize].is_none() && other != row {
-                free.push(other);
-            }
-        });
-        neighbours
-    }
-
-    /// Appends the rows in `free` to the queue, except those that it contains.
-    fn enqueue(&mut self) {
-        for &row in &self.free {
-            if !std::mem::replace(&mut self.is_queued[row as usize], true) {
-                self.queue.push_back(row);
-            }
-        }
     }
 }
 
@@ -86,8 +57,9 @@ struct Grid {
     size: [usize; 2],
     /// Index in `sorted` at which each cell begins, followed by the length of `sorted`.
     starts: Vec<u32>,
-    /// Index in `sorted` at which the next point of each cell goes.
-    next: Vec<u32>,
+    /// Index in `sorted` at which the points of each cell end that have not been taken. While the grid is built, the index
+    /// at which the next point of the cell goes.
+    free_ends: Vec<u32>,
     /// Coordinates and row of each point, in order of the cells.
     sorted: Vec<([f64; 2], u32)>,
 }
@@ -114,12 +86,12 @@ impl Grid {
         for cell in 1..self.starts.len() {
             self.starts[cell] += self.starts[cell - 1];
         }
-        self.next.clone_from(&self.starts);
+        self.free_ends.clone_from(&self.starts);
         self.sorted.resize(points.len(), ([0.0; 2], 0));
         for (row, &point) in (0..).zip(points) {
             let cell = self.cell_of(point);
-            self.sorted[self.next[cell] as usize] = (point, row);
-            self.next[cell] += 1;
+            self.sorted[self.free_ends[cell] as usize] = (point, row);
+            self.free_ends[cell] += 1;
         }
     }
 
@@ -135,25 +107,59 @@ impl Grid {
         column * self.size[1] + row
     }
 
-    /// Calls `each` with the row of each point within `range`.
-    fn for_each_within(&self, point: [f64; 2], range: f64, mut each: impl FnMut(u32)) {
-        let square = range * range;
-        let span = |axis: usize| {
+    /// Returns the columns and rows of the cells that may contain points within `range`.
+    fn span(&self, point: [f64; 2], range: f64) -> [RangeInclusive<usize>; 2] {
+        [0, 1].map(|axis| {
             let max = self.size[axis] - 1;
             self.cell_along(point[axis] - range, axis, max)..=self.cell_along(point[axis] + range, axis, max)
-        };
-        let rows = span(1);
-        for column in span(0) {
+        })
+    }
+
+    /// Returns true if there are at least `count` points within `range`.
+    fn has_within(&self, point: [f64; 2], range: f64, count: usize) -> bool {
+        let [columns, rows] = self.span(point, range);
+        // The own column first: it has most neighbours.
+        let own = self.cell_along(point[0], 0, self.size[0] - 1);
+        let mut found = 0;
+        for column in std::iter::once(own).chain(columns.filter(|&column| column != own)) {
             let first = self.starts[column * self.size[1] + rows.start()] as usize;
             let end = self.starts[column * self.size[1] + rows.end() + 1] as usize;
-            for &(other, row) in &self.sorted[first..end] {
-                let (x, y) = (other[0] - point[0], other[1] - point[1]);
-                if x * x + y * y <= square {
-                    each(row);
+            for (other, _) in &self.sorted[first..end] {
+                found += usize::from(is_within(*other, point, range));
+                if found >= count {
+                    return true;
                 }
             }
         }
+        false
     }
+
+    /// Appends to `taken` the rows of the points within `range` that no earlier call has taken.
+    fn take_within(&mut self, point: [f64; 2], range: f64, taken: &mut Vec<u32>) {
+        let [columns, rows] = self.span(point, range);
+        for column in columns {
+            for cell in column * self.size[1] + rows.start()..=column * self.size[1] + rows.end() {
+                let (mut next, mut end) = (self.starts[cell] as usize, self.free_ends[cell]);
+                while next < end as usize {
+                    let (other, row) = self.sorted[next];
+                    if is_within(other, point, range) {
+                        taken.push(row);
+                        end -= 1;
+                        self.sorted.swap(next, end as usize);
+                    } else {
+                        next += 1;
+                    }
+                }
+                self.free_ends[cell] = end;
+            }
+        }
+    }
+}
+
+/// Returns true if two points are at most `range` apart.
+fn is_within(one: [f64; 2], other: [f64; 2], range: f64) -> bool {
+    let (x, y) = (one[0] - other[0], one[1] - other[1]);
+    x * x + y * y <= range * range
 }
 
 #[cfg(test)]
