@@ -3,12 +3,14 @@
 use closecall_campaign::baseline::BaselineError;
 use closecall_campaign::compare::CompareError;
 use closecall_campaign::execution::CampaignError;
+use closecall_campaign::failure::FailureKind;
 use closecall_campaign::folder::FolderError;
 use closecall_campaign::gate::ProjectError;
 use closecall_campaign::merge::MergeError;
 use closecall_campaign::plan::PlanError;
 use closecall_campaign::saved::SavedError;
 use closecall_campaign::sensitivity::PlanFailure;
+use closecall_causes::CausesError;
 use closecall_report::campaign::ReportError;
 use closecall_report::run::figure::PngError;
 use closecall_report::run::film::TrafficFilmError;
@@ -137,6 +139,10 @@ pub enum CliError {
     /// The reports of a campaign cannot be written.
     #[error(transparent)]
     Report(#[from] ReportError),
+    /// A cause cannot be found.
+    #[error(transparent)]
+    #[diagnostic(help("see `closecall --help`"))]
+    Causes(#[from] CausesError),
     /// A campaign cannot be compared with a baseline.
     #[error(transparent)]
     Baseline(#[from] BaselineError),
@@ -188,30 +194,15 @@ impl From<&CliError> for ExitCode {
             | CliError::Project(_)
             | CliError::Serve(ServeError::Nothing { .. })
             | CliError::Classifier(_) => Self::InvalidInput,
-            CliError::Folder(error) => Self::from(error),
-            CliError::Campaign(error) => Self::from(error),
-            CliError::Saved(error) => Self::from(error),
+            CliError::Folder(error) => FailureKind::from(error).into(),
+            CliError::Campaign(error) => FailureKind::from(error).into(),
+            CliError::Saved(error) => FailureKind::from(error).into(),
             CliError::Sensitivity(PlanFailure::Workers(_)) => Self::Io,
             CliError::Sensitivity(_) => Self::Usage,
-            CliError::Report(error) => match error {
-                ReportError::Folder(error) => Self::from(error),
-                ReportError::Saved(error) => Self::from(error),
-                ReportError::Write(_) | ReportError::Recording(_) => Self::Io,
-                ReportError::Sample { .. } => Self::SampleError,
-            },
-            CliError::Merge(error) => match error {
-                MergeError::Campaign(error) => Self::from(error),
-                MergeError::OutOfOrder { .. } => Self::InvalidInput,
-                MergeError::NotAPart { .. }
-                | MergeError::OtherCampaign { .. }
-                | MergeError::Duplicate { .. }
-                | MergeError::Missing { .. }
-                | MergeError::Incomplete { .. } => Self::Usage,
-            },
-            CliError::Compare(error) => match error {
-                CompareError::Folder(error) => Self::from(error),
-                CompareError::Different { .. } | CompareError::OtherSample { .. } => Self::Usage,
-            },
+            CliError::Report(error) => error.kind().into(),
+            CliError::Merge(error) => FailureKind::from(error).into(),
+            CliError::Compare(error) => FailureKind::from(error).into(),
+            CliError::Causes(error) => error.kind().into(),
             CliError::Write(_)
             | CliError::Chart(_)
             | CliError::Record(_)
@@ -229,37 +220,13 @@ impl From<&CliError> for ExitCode {
     }
 }
 
-impl From<&FolderError> for ExitCode {
-    fn from(error: &FolderError) -> Self {
-        match error {
-            FolderError::Write(_) | FolderError::Read { .. } | FolderError::Busy { .. } => Self::Io,
-            FolderError::AlreadyThere { .. } | FolderError::OtherCampaign { .. } | FolderError::NotACampaign { .. } => {
-                Self::Usage
-            }
-            FolderError::Content { .. } => Self::InvalidInput,
-        }
-    }
-}
-
-impl From<&SavedError> for ExitCode {
-    fn from(error: &SavedError) -> Self {
-        match error {
-            SavedError::Folder(error) => Self::from(error),
-            SavedError::Scenario(error) => Self::from(error),
-            SavedError::Sample { .. } => Self::SampleError,
-            SavedError::ScenarioNotNamed { .. }
-            | SavedError::UnknownScenario { .. }
-            | SavedError::UnknownSample { .. }
-            | SavedError::UnknownArm { .. } => Self::Usage,
-        }
-    }
-}
-
-impl From<&CampaignError> for ExitCode {
-    fn from(error: &CampaignError) -> Self {
-        match error {
-            CampaignError::Folder(error) => Self::from(error),
-            CampaignError::Write(_) | CampaignError::Workers(_) => Self::Io,
+impl From<FailureKind> for ExitCode {
+    fn from(kind: FailureKind) -> Self {
+        match kind {
+            FailureKind::Usage => Self::Usage,
+            FailureKind::InvalidInput => Self::InvalidInput,
+            FailureKind::Sample => Self::SampleError,
+            FailureKind::Io => Self::Io,
         }
     }
 }

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use closecall_campaign::arguments::picture;
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_campaign::saved::SavedCampaign;
 use closecall_report::run::figure::{encounter, png};
@@ -47,15 +48,6 @@ pub(super) struct PlotArgs {
     /// File to write; its extension, .svg or .png, determines the format
     #[arg(short, long, value_name = "FILE.svg|FILE.png", value_parser = picture)]
     output: PathBuf,
-}
-
-/// Parses the path of a picture, whose extension must be .svg or .png.
-fn picture(text: &str) -> Result<PathBuf, String> {
-    let path = PathBuf::from(text);
-    match path.extension().and_then(|extension| extension.to_str()) {
-        Some("svg" | "png") => Ok(path),
-        _ => Err(format!("`{text}` must end with .svg or .png")),
-    }
 }
 
 pub(super) fn plot(args: &PlotArgs) -> Result<ExitCode, CliError> {

@@ -38,12 +38,3 @@ pub(super) fn of_campaign(folder: &Path) -> Vec<PathBuf> {
     let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
     entries.filter_map(|entry| Some(entry.ok()?.path())).filter(|path| path.is_file()).collect()
 }
-
-/// Parses the path of a recording, whose extension must be .rrd.
-pub(super) fn recording(text: &str) -> Result<PathBuf, String> {
-    let path = PathBuf::from(text);
-    match path.extension() {
-        Some(extension) if extension == "rrd" => Ok(path),
-        _ => Err(format!("`{text}` must end with .rrd")),
-    }
-}

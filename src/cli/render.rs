@@ -8,7 +8,7 @@ use closecall_sensors::camera::dataset::{Content, DatasetOptions, Set, render_da
 use serde_json::json;
 
 use super::CliError;
-use super::args::{Format, count};
+use super::args::Format;
 use super::output::outln;
 use crate::exit_code::ExitCode;
 
