@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use closecall_campaign::arguments::count;
 use closecall_report::json::stamped;
 use closecall_sensors::camera::dataset::{Content, DatasetOptions, Set, render_dataset};
 use serde_json::json;
