@@ -1,6 +1,8 @@
 //! Arguments of a command line: numbers, and paths with a known extension. A refusal says what is allowed.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+
+use closecall_traffic::ActorId;
 
 /// Parses a finite number above 0.
 ///
@@ -109,6 +111,33 @@ pub fn sample_count(text: &str) -> Result<u64, String> {
         number if number <= MAX_SAMPLES => Ok(number),
         number => Err(format!("`{number}` is too large: a trajectory file holds up to {MAX_SAMPLES} samples")),
     }
+}
+
+/// Parses a number of scenes.
+///
+/// # Errors
+/// What is wrong, and what is allowed.
+pub fn scene_count(text: &str) -> Result<u32, String> {
+    u32::try_from(count(text)?).map_err(|_| format!("`{text}` is too large"))
+}
+
+/// Parses the name of a scenario.
+///
+/// # Errors
+/// What is wrong, and what is allowed.
+pub fn scenario_name(text: &str) -> Result<String, String> {
+    match ActorId::new(text) {
+        Ok(_) => Ok(text.to_owned()),
+        Err(_) => Err(format!(
+            "`{text}` is not a scenario's name: lower-case letters, digits and hyphens, starting with a letter"
+        )),
+    }
+}
+
+/// Returns the files of a campaign's folder. Its recordings, which can be made again, are not among them.
+pub fn files_of_campaign(folder: &Path) -> Vec<PathBuf> {
+    let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
+    entries.filter_map(|entry| Some(entry.ok()?.path())).filter(|path| path.is_file()).collect()
 }
 
 #[cfg(test)]

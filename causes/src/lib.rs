@@ -13,7 +13,9 @@
 
 pub mod attribution;
 pub mod case;
+pub mod cost;
 pub mod explain;
+pub mod exposure;
 pub mod failures;
 pub mod map;
 pub mod minimize;

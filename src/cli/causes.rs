@@ -1,4 +1,4 @@
-//! `closecall explain`, `minimize` and `map`: from a collision to its cause.
+//! `closecall explain`, `minimize`, `map` and `exposure`: from a collision to its cause, and how often it matters.
 
 use std::path::PathBuf;
 
@@ -7,17 +7,23 @@ use closecall_campaign::arguments::positive;
 use closecall_campaign::saved::SavedCampaign;
 use closecall_causes::CausesError;
 use closecall_causes::case::Case;
+use closecall_causes::cost::{CostText, cost as cost_of};
 use closecall_causes::explain::ExplanationText;
+use closecall_causes::exposure::{
+    Counted, EventRule, ExposureText, StatedRange, exposure as compute_exposure, observe, shares_of,
+};
 use closecall_causes::failures::explain_failures;
 use closecall_causes::map::{MapGrid, MapText, map as compute_map, write_map};
 use closecall_causes::minimize::{MinimizedText, minimize_sample, write_files};
 use closecall_report::campaign::write_causes;
 use closecall_report::json::stamped;
+use closecall_scenarios::filters::smooth;
+use closecall_scenarios::trajectory_data::read_with;
 use closecall_simulation::controller::ControllerChoice;
 use serde_json::json;
 
 use super::CliError;
-use super::args::{Format, SetArgs};
+use super::args::{Format, ReadArgs, SetArgs};
 use super::output::{outln, print_written};
 use super::protect::{of_campaign, protect};
 use crate::exit_code::ExitCode;
@@ -134,4 +140,50 @@ pub(super) fn map(args: &MapArgs) -> Result<ExitCode, CliError> {
         Format::Human => outln!("{}", MapText(&found)),
     }
     Ok(ExitCode::Pass)
+}
+
+/// Arguments of `closecall exposure`.
+#[derive(Debug, Args)]
+pub(super) struct ExposureArgs {
+    /// Trajectory files, in which the encounters are counted
+    #[arg(value_name = "TRAJECTORY_FILE")]
+    files: Vec<PathBuf>,
+    #[command(flatten)]
+    read: ReadArgs,
+    /// Deceleration in m/s² from which the lead vehicle counts as braking
+    #[arg(long, value_name = "M/S²", value_parser = positive, default_value = "4")]
+    braking_mps2: f64,
+    /// Encounters per 10^6 km, as a range that is stated: for want of files that show one
+    #[arg(long, value_name = "LOW..HIGH", conflicts_with = "counted")]
+    per_million_km: Option<StatedRange>,
+    /// Encounters that were counted elsewhere, and the distance in km
+    #[arg(long, value_name = "EVENTS/KM", conflicts_with = "files")]
+    counted: Option<Counted>,
+    /// Folder of a paired campaign: what the system prevents and induces, given an encounter
+    #[arg(long, value_name = "DIR")]
+    campaign: Option<PathBuf>,
+    /// Output format
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+pub(super) fn exposure(args: &ExposureArgs) -> Result<ExitCode, CliError> {
+    let rule = EventRule { braking_mps2: args.braking_mps2 };
+    let mut observed = args.counted.map(Counted::observed);
+    for path in &args.files {
+        let data = read_with(path, args.read.options())?;
+        observe(&smooth(&data), rule, observed.get_or_insert_default());
+    }
+    let saved = args.campaign.as_deref().map(SavedCampaign::open).transpose()?;
+    let shares = saved.as_ref().map(shares_of).transpose()?;
+    let cost = saved.as_ref().map(cost_of).transpose()?;
+    let found = compute_exposure(rule, observed, args.per_million_km.map(|range| range.0), shares);
+    match args.format {
+        Format::Json => outln!("{:#}", stamped(json!({ "exposure": found, "cost": cost }), None, None)),
+        Format::Human => {
+            outln!("{}", ExposureText(&found));
+            cost.iter().for_each(|cost| outln!("{}", CostText(cost)));
+        }
+    }
+    Ok(if found.effect.is_some() { ExitCode::Pass } else { ExitCode::Inconclusive })
 }

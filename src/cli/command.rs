@@ -76,6 +76,8 @@ enum Command {
     Minimize(causes::MinimizeArgs),
     /// Map the margin that the system reaches, over approach speed, detection distance and front time headway
     Map(causes::MapArgs),
+    /// Count how often the encounter happens in trajectory files, and state the net effect of the system per 10^6 km
+    Exposure(causes::ExposureArgs),
     /// Check scenario files without running them
     Check(check::CheckArgs),
     /// Print the JSON Schema of scenario files
@@ -164,6 +166,7 @@ fn dispatch(command: Command) -> Result<ExitCode, CliError> {
         Command::Explain(args) => causes::explain(&args),
         Command::Minimize(args) => causes::minimize(&args),
         Command::Map(args) => causes::map(&args),
+        Command::Exposure(args) => causes::exposure(&args),
         Command::Check(args) => check::check(&args),
         Command::Schema => Ok(schema::schema()),
         Command::Inspect(args) => inspect::inspect(&args),

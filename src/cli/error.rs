@@ -18,7 +18,7 @@ use closecall_report::run::rerun::RecordingError;
 use closecall_report::serve::{ServeError, ViewerError};
 use closecall_report::traffic::trajectory_charts::ChartError;
 use closecall_scenarios::atomic::WriteError;
-use closecall_scenarios::encounter::NoEncounter;
+use closecall_scenarios::encounter::{NoEncounter, track_suggestion};
 use closecall_scenarios::following::FollowingError;
 use closecall_scenarios::lane_change::ReferenceError;
 use closecall_scenarios::trajectory_data::{TrajectoryFileError, WriteError as TrajectoryWriteError};
@@ -32,9 +32,6 @@ use closecall_simulation::scenario::source::SourceError;
 use miette::Diagnostic;
 
 use crate::exit_code::ExitCode;
-
-/// Largest number of tracks that a message suggests.
-const MAX_SUGGESTED: usize = 10;
 
 /// The reason for which a command has no result.
 #[derive(Debug, thiserror::Error, Diagnostic)]
@@ -88,7 +85,7 @@ pub enum CliError {
     #[error(transparent)]
     TrafficFilm(#[from] TrafficFilmError),
     /// A recorded lane change is not an encounter that can be re-enacted.
-    #[error("failed to re-enact an encounter of {file}: {source}{}", suggestion(possible))]
+    #[error("failed to re-enact an encounter of {file}: {source}{}", track_suggestion(possible))]
     NoEncounter {
         /// The trajectory file.
         file: String,
@@ -166,18 +163,6 @@ impl From<SourceError> for CliError {
 impl From<UnknownScenario> for CliError {
     fn from(error: UnknownScenario) -> Self {
         Self::Usage { message: error.to_string() }
-    }
-}
-
-/// Returns the tracks that `--track` can name, as the end of a message.
-fn suggestion(possible: &[u64]) -> String {
-    let named: Vec<String> = possible.iter().take(MAX_SUGGESTED).map(u64::to_string).collect();
-    match possible.len() {
-        0 => String::new(),
-        count if count > MAX_SUGGESTED => {
-            format!("; --track can name {count} other tracks, such as {}", named.join(", "))
-        }
-        _ => format!("; --track can name {}", named.join(", ")),
     }
 }
 

@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use closecall_campaign::folder::Folder;
 use closecall_campaign::saved::SavedCampaign;
+use closecall_causes::cost::{cost, section as cost_section};
 use closecall_causes::failures::{CAUSES, Failures, campaign_failures, section, without_section, write_rows};
 use closecall_scenarios::atomic::{WriteError, write_file};
-use maud::Markup;
+use maud::{Markup, html};
 
 /// The name of the report.
 const REPORT: &str = "report.html";
@@ -32,9 +33,11 @@ pub fn write_causes(saved: &SavedCampaign, failures: &Failures) -> Result<Vec<Pa
     Ok(written)
 }
 
-/// Returns the table of causes of a campaign. A folder that cannot be read again has none.
+/// Returns the table of causes of a campaign, and its cost where nothing happens. A folder that cannot be read again has none.
 pub(super) fn table(folder: &Folder) -> Markup {
     let saved = SavedCampaign::of(folder.clone()).ok();
     let found = saved.as_ref().and_then(|saved| campaign_failures(saved).ok()).unwrap_or_default();
-    section(&found, saved.is_some_and(|saved| saved.manifest().scenarios.len() > 1))
+    let cost = saved.as_ref().and_then(|saved| cost(saved).ok());
+    let is_named = saved.is_some_and(|saved| saved.manifest().scenarios.len() > 1);
+    html! { (section(&found, is_named)) (cost.map_or_else(Markup::default, |cost| cost_section(&cost))) }
 }
