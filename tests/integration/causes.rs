@@ -73,7 +73,8 @@ fn a_named_stage_is_confirmed_by_a_run_with_that_stage_alone_replaced() {
         let perfect = json(&closecall(["replay", dir, &sample, "--set", &setting, "--format", "json"]), 0);
         assert_eq!(number_of_collisions(&perfect), 0, "sample {sample} with {setting}");
         // A plain run of the scenario with the same seed and settings is the same run.
-        let plain = ["run", "low-thw-overtake", "--seed", SEED, "--sample", &sample, "--set", &setting, "--format", "json"];
+        let plain =
+            ["run", "low-thw-overtake", "--seed", SEED, "--sample", &sample, "--set", &setting, "--format", "json"];
         assert_eq!(number_of_collisions(&json(&closecall(plain), 0)), 0, "sample {sample} with {setting}");
     }
     // The report names every failure with its cause and its commands.
@@ -154,7 +155,10 @@ fn the_net_effect_is_recomputed_from_its_inputs_or_cannot_be_said() {
     assert!(found["cost"]["arms"][1]["time_lost_s"].as_f64().unwrap() > 0.0, "{found:#}");
     let nothing = closecall(["exposure"]);
     let text = stdout(&nothing, 4);
-    assert!(text.contains("cannot be said") && text.contains("--per-million-km") && text.contains("--campaign"), "{text}");
+    assert!(
+        text.contains("cannot be said") && text.contains("--per-million-km") && text.contains("--campaign"),
+        "{text}"
+    );
 }
 
 #[test]

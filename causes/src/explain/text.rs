@@ -25,7 +25,12 @@ impl Explanation {
             Cause::Stage { stage } => {
                 let unusual = self.confirmation().and_then(|run| run.unusual.as_ref());
                 let unusual = unusual.map_or_else(String::new, |how| format!(" ({how})"));
-                format!("It is due to {}{unusual}: with {}, no vehicle collides.", stage.name(), stage.replacement())
+                let narrowly = self.confirmation().and_then(narrowly).unwrap_or_default();
+                format!(
+                    "It is due to {}{unusual}: with {}, no vehicle collides{narrowly}.",
+                    stage.name(),
+                    stage.replacement()
+                )
             }
             Cause::Pair { stages: [one, other] } => format!(
                 "No stage alone is to blame. With {} and {} together, no vehicle collides.",
@@ -39,6 +44,15 @@ impl Explanation {
             None => due,
         }
     }
+}
+
+/// Gap below which a run counts as having passed narrowly (m): an assumption, a quarter of a car's width.
+const NARROW_GAP_M: f64 = 0.5;
+
+/// Returns by how little a run has passed, if it has passed narrowly.
+fn narrowly(run: &StageRun) -> Option<String> {
+    let least_m = [run.min_gap_rear_m, run.min_gap_front_m].into_iter().flatten().reduce(f64::min)?;
+    (least_m < NARROW_GAP_M).then(|| format!(", but narrowly: the least gap is {least_m:.1} m"))
 }
 
 /// Returns what the margin increase system did that induced a failure.

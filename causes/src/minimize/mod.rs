@@ -16,9 +16,11 @@ mod run;
 mod subset;
 mod text;
 mod trial;
+mod twin;
 mod words;
 mod write;
 
-pub use run::{Minimized, Offset, Twin, minimize, minimize_sample};
+pub use run::{Minimized, Offset, minimize, minimize_sample};
 pub use text::MinimizedText;
+pub use twin::Twin;
 pub use write::{MinimizedFiles, write_files};

@@ -1,19 +1,16 @@
 //! Minimizes a failing sample.
 
 use closecall_campaign::saved::SavedCampaign;
-use closecall_simulation::scenario::{Setting, StartConfig};
-use closecall_traffic::{Num, ParameterName, Parameters, Value};
+use closecall_traffic::{ParameterName, Parameters, Value};
 use serde::Serialize;
 
 use super::subset::fewest;
 use super::trial::Trial;
+use super::twin::{Candidate, Twin, twin};
 use super::{grid, words};
 use crate::attribution::{Attribution, attribute};
 use crate::case::{Case, CausesError, fails};
 use crate::failures::passes;
-
-/// Largest shift of the start of a rear vehicle that is tried for a twin (s), in steps of 0.1 s.
-const MOST_SHIFT_TENTHS: i32 = 20;
 
 /// A parameter of the smallest case that is off its nominal value.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -27,15 +24,6 @@ pub struct Offset {
     /// Its nominal value.
     pub nominal: String,
     /// The value in words, in the units of a reader.
-    pub words: String,
-}
-
-/// The nearest case that passes.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Twin {
-    /// The settings that make the passing case of the failing one, each as `key=value`.
-    pub settings: Vec<String>,
-    /// The difference in words, after "passes when".
     pub words: String,
 }
 
@@ -123,14 +111,6 @@ fn offset(trial: &Trial<'_>, values: &Parameters, name: &ParameterName) -> Optio
     })
 }
 
-/// A change of one parameter that makes the case pass.
-struct Candidate {
-    name: ParameterName,
-    value: Value,
-    /// The size of the change, in widths of the distribution.
-    distance: f64,
-}
-
 /// Moves each named parameter towards its nominal value as far as the case still fails. Returns the values, and for each
 /// parameter the next value that passes.
 fn shrunk(trial: &Trial<'_>, names: &[ParameterName]) -> (Parameters, Vec<Candidate>) {
@@ -143,6 +123,12 @@ fn shrunk(trial: &Trial<'_>, names: &[ParameterName]) -> (Parameters, Vec<Candid
     // The other parameters have moved since: the boundary of each is looked for again.
     let candidates = names.iter().filter_map(|name| {
         let (failing, passing) = boundary(trial, &values, name)?;
+        // What does not fail may also be no valid scenario, which is no twin.
+        let mut changed = values.clone();
+        changed.insert(name.clone(), passing.clone());
+        if !trial.passes(&changed) {
+            return None;
+        }
         let distance = match (&failing, &passing, trial.span(name)) {
             (Value::Number(failing), Value::Number(passing), Some(span)) => (failing - passing).abs() / span,
             _ => 1.0,
@@ -191,56 +177,4 @@ fn boundary(trial: &Trial<'_>, values: &Parameters, name: &ParameterName) -> Opt
         }
     }
     Some((number(failing), number(passing)))
-}
-
-/// Returns the nearest case that passes: with one parameter changed, or with the rear vehicle starting earlier or later.
-fn twin(trial: &Trial<'_>, values: &Parameters, candidates: &[Candidate]) -> Option<Twin> {
-    let nearest = candidates.iter().min_by(|one, other| one.distance.total_cmp(&other.distance));
-    let by_parameter = nearest.map(|candidate| {
-        let mut changed = values.clone();
-        changed.insert(candidate.name.clone(), candidate.value.clone());
-        let failing = values.get(&candidate.name).cloned().unwrap_or_else(|| candidate.value.clone());
-        let twin = Twin {
-            settings: Trial::settings(&changed).iter().map(ToString::to_string).collect(),
-            words: words::change(candidate.name.as_str(), &failing, &candidate.value),
-        };
-        (candidate.distance, twin)
-    });
-    let by_start = shifted_start(trial, values);
-    // A shift by the largest one counts like a parameter that moves by the width of its distribution.
-    match (by_parameter, by_start) {
-        (Some((distance, twin)), Some((shift, other))) => Some(if distance <= shift { twin } else { other }),
-        (one, other) => one.or(other).map(|(_, twin)| twin),
-    }
-}
-
-/// Returns the smallest shift of the start of a rear vehicle with which the case passes, as a share of the largest one.
-fn shifted_start(trial: &Trial<'_>, values: &Parameters) -> Option<(f64, Twin)> {
-    let settings = Trial::settings(values);
-    let scenario = trial.case.concrete(&settings).ok()?;
-    let ego = &scenario.actors[scenario.ego];
-    let (id, gap_m) = trial.case.file.config().actors.iter().find_map(|actor| match &actor.start {
-        StartConfig::Behind(start) if start.of == ego.id => match start.gap_m {
-            Some(Num::Fixed(gap_m)) => Some((&actor.id, gap_m)),
-            _ => None,
-        },
-        _ => None,
-    })?;
-    let rear = scenario.actors.iter().find(|actor| actor.id == *id)?;
-    let closing_mps = rear.start.speed_mps - ego.start.speed_mps;
-    let shifts = (1..=MOST_SHIFT_TENTHS).flat_map(|tenths| [f64::from(tenths), -f64::from(tenths)]);
-    shifts.map(|tenths| tenths / 10.0).find_map(|earlier_s| {
-        let changed: Setting =
-            format!("actor.{id}.start.behind.gap-m={:.2}", gap_m - earlier_s * closing_mps).parse().ok()?;
-        let all = [settings.clone(), vec![changed]].concat();
-        let passes = trial.case.run(&all).is_ok_and(|outcome| !fails(&outcome));
-        passes.then(|| {
-            let when = if earlier_s > 0.0 { "earlier" } else { "later" };
-            let twin = Twin {
-                settings: all.iter().map(ToString::to_string).collect(),
-                words: format!("{id} starts {:.1} s {when}", earlier_s.abs()),
-            };
-            (10.0 * earlier_s.abs() / f64::from(MOST_SHIFT_TENTHS), twin)
-        })
-    })
 }

@@ -60,6 +60,11 @@ impl<'a> Trial<'a> {
         found
     }
 
+    /// Returns whether a case is a valid scenario in which no vehicle collides.
+    pub(super) fn passes(&self, parameters: &Parameters) -> bool {
+        self.run(parameters).is_ok_and(|outcome| !fails(&outcome))
+    }
+
     /// Runs a case.
     pub(super) fn run(&self, parameters: &Parameters) -> Result<Outcome, CausesError> {
         let scenario = self.case.file.concrete(parameters)?;

@@ -11,7 +11,7 @@ use super::Minimized;
 use crate::case::{Case, CausesError};
 
 /// Tables and keys that belong to a campaign of many samples, and not to a single case.
-const OF_CAMPAIGNS: [&str; 5] = ["parameters", "checks", "gate", "expects", "expects-share"];
+const OF_CAMPAIGNS: [&str; 6] = ["parameters", "requirements", "checks", "gate", "expects", "expects-share"];
 
 /// The files that were written.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -103,9 +103,10 @@ fn concrete(case: &Case, settings: &[String], text: &Text<'_>) -> Result<String,
     Ok(written)
 }
 
-/// Seeds above the largest signed number wrap around in TOML, which has no others.
+/// Returns a seed or the number of a sample. TOML has no number above the largest signed one: such a seed is written as text,
+/// which the check below refuses with a message.
 fn number(value: u64) -> Value {
-    Value::from(i64::try_from(value).unwrap_or(i64::MAX))
+    i64::try_from(value).map_or_else(|_| Value::from(value.to_string()), Value::from)
 }
 
 fn sentence(text: &Text<'_>) -> String {

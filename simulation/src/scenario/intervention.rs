@@ -154,3 +154,55 @@ impl Interventions {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use closecall_controllers::HumanDriver;
+
+    use super::*;
+    use crate::scenario::{Scenario, ScenarioFile, source};
+
+    fn with(settings: &[&str]) -> Scenario {
+        let settings: Vec<_> = settings.iter().map(|text| text.parse().unwrap()).collect();
+        let file: ScenarioFile = source::load(Path::new("low-thw-overtake"), &settings).unwrap();
+        file.check().unwrap();
+        file.concrete(&file.space().nominal()).unwrap()
+    }
+
+    fn reaction_s(scenario: &Scenario) -> f64 {
+        let rear = scenario.actors.iter().find(|actor| actor.id.as_str() == "rear").unwrap();
+        let CheckedDriver::Human(human @ HumanDriver::Overtaker(_)) = &rear.driver else { panic!("an overtaker") };
+        human.reaction_s().unwrap()
+    }
+
+    #[test]
+    fn each_stage_changes_what_it_names_and_nothing_else() {
+        let usual = with(&[]);
+        assert!((reaction_s(&usual) - 1.245).abs() < 0.01, "{}", reaction_s(&usual));
+        assert_eq!(reaction_s(&with(&["ideal.rear-reaction=true"])), 0.0);
+        assert_eq!(reaction_s(&with(&["fault.rear-reaction-s=1"])), reaction_s(&usual) + 1.0);
+        assert_eq!(reaction_s(&with(&["fault.rear-reaction-s=3"])), 3.0, "no driver needs more");
+        assert_eq!(reaction_s(&with(&["fault.rear-reaction-s=1", "ideal.rear-reaction=true"])), 0.0);
+        let events = |scenario: &Scenario| scenario.actors.iter().map(|actor| actor.events.len()).sum::<usize>();
+        assert_eq!((events(&usual), events(&with(&["ideal.lead-braking=true"]))), (1, 0));
+        assert_eq!(usual.sensors.latency_steps(), [2, 1, 2]);
+        assert_eq!(with(&["fault.delay-s=0.1"]).sensors.latency_steps(), [5, 4, 5]);
+        assert_eq!(with(&["fault.delay-s=0.4"]).sensors.latency_steps(), [10, 10, 10], "no sensor is later");
+        assert_eq!(with(&["fault.delay-s=0.1", "ideal.timing=true"]).sensors.latency_steps(), [0, 0, 0]);
+        assert_eq!(with(&["ideal.class=true"]).sensors.latency_steps(), [2, 1, 2]);
+        assert_eq!(with(&["ideal.without-mis=[\"holding\"]"]).interventions.without_mis, [MisState::Holding]);
+    }
+
+    #[test]
+    fn a_fault_out_of_range_or_a_misspelt_stage_is_refused_by_its_key() {
+        let refused = |text: &str| {
+            let loaded = source::load(Path::new("low-thw-overtake"), &[text.parse().unwrap()]);
+            loaded.and_then(|file| file.check()).unwrap_err().to_string()
+        };
+        assert!(refused("fault.delay-s=0.5").contains("`fault.delay-s` is 0.5"), "{}", refused("fault.delay-s=0.5"));
+        assert!(refused("ideal.clas=true").contains("did you mean `class`?"), "{}", refused("ideal.clas=true"));
+        assert!(refused("ideals.class=true").contains("leads nowhere"), "{}", refused("ideals.class=true"));
+    }
+}
