@@ -175,3 +175,18 @@ fn a_sample_that_does_not_fail_has_no_cause() {
     let beyond = closecall(["explain", path.to_str().unwrap(), "400"]);
     assert!(message(&beyond).contains("there is no sample 400"), "{}", message(&beyond));
 }
+
+#[test]
+fn every_stage_of_the_full_sensors_can_be_replaced_and_the_system_still_engages() {
+    let run = |setting: &str| {
+        let words =
+            ["run", "low-thw-overtake", "--seed", SEED, "--sensors", "full", "--set", setting, "--format", "json"];
+        json(&closecall(words), 0)["mis"]["engaged_at_s"].as_f64()
+    };
+    let usual = run("ideal.points=false").unwrap();
+    for stage in ["points", "clusters", "class", "tracks", "timing", "actuation"] {
+        let engaged = run(&format!("ideal.{stage}=true")).unwrap();
+        assert!((engaged - usual).abs() < 1.0, "{stage}: engaged at {engaged} s instead of {usual} s");
+    }
+    assert_eq!(run("fault.class-background=true"), None, "a vehicle without a class is no target");
+}

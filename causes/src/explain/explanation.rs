@@ -14,6 +14,8 @@ use crate::case::fails;
 pub struct StageRun {
     /// The stages that are replaced.
     pub stages: Vec<Stage>,
+    /// Whether the stage is made as usual, and not perfect.
+    pub is_usual: bool,
     /// The settings that replace them, each as `key=value`.
     pub settings: Vec<String>,
     /// How the stage is worse than, or differs from, what is usual; `None` if it does not.
@@ -36,6 +38,7 @@ impl StageRun {
         let outcome = result.as_ref().ok();
         Self {
             stages: stages.to_vec(),
+            is_usual: false,
             settings,
             unusual: None,
             prevents: outcome.is_some_and(|outcome| !fails(outcome)),
@@ -128,6 +131,6 @@ impl Explanation {
             Cause::Pair { stages } => stages.to_vec(),
             Cause::None => return None,
         };
-        self.stages.iter().chain(&self.pairs).find(|run| run.stages == stages)
+        self.stages.iter().chain(&self.pairs).find(|run| run.prevents && run.stages == stages)
     }
 }

@@ -7,7 +7,7 @@ use closecall_simulation::scenario::{MisState, Setting, SettingError};
 use closecall_simulation::{Arm, NoObserver};
 use rayon::prelude::*;
 
-use super::usual::unusual;
+use super::usual::{unusual, usual_settings};
 use super::{Cause, Explanation, MisEffect, MisRun, Stage, StageRun};
 use crate::attribution::attribute;
 use crate::case::{Case, CausesError, fails};
@@ -31,9 +31,15 @@ pub fn explain(case: &Case) -> Result<Option<Explanation>, CausesError> {
     let scenario = case.concrete(&[])?;
     let run = |stages: &Vec<Stage>| {
         let unusual = unusual(stages[0], case, &scenario);
-        StageRun { unusual, ..replaced(case, stages) }
+        let perfect = StageRun { unusual: unusual.clone(), ..replaced(case, stages) };
+        // A stage that is out of order may be the cause although its perfection brings about another failure.
+        let usual = usual_settings(stages[0]);
+        if unusual.is_none() || perfect.prevents || usual.is_empty() {
+            return vec![perfect];
+        }
+        vec![perfect, StageRun { unusual, is_usual: true, ..with_settings(case, stages, usual) }]
     };
-    let stages: Vec<StageRun> = present.par_iter().map(run).collect();
+    let stages: Vec<StageRun> = present.par_iter().flat_map(run).collect();
     let first_of = |is_unusual: bool| {
         stages.iter().find(|run| run.prevents && (run.unusual.is_some() || !is_unusual)).map(|run| run.stages[0])
     };
@@ -77,14 +83,17 @@ fn tried_pairs(case: &Case, present: &[Vec<Stage>]) -> Vec<StageRun> {
 
 /// Runs the case with stages replaced.
 fn replaced(case: &Case, stages: &[Stage]) -> StageRun {
-    let settings: Result<Vec<Setting>, SettingError> = stages.iter().map(|stage| stage.setting()).collect();
-    match settings {
-        Ok(settings) => {
-            let texts = settings.iter().map(ToString::to_string).collect();
-            StageRun::new(stages, texts, case.run(&settings).map_err(|error| error.to_string()))
-        }
-        Err(error) => StageRun::new(stages, Vec::new(), Err(error.to_string())),
-    }
+    with_settings(case, stages, stages.iter().map(|stage| stage.setting_text()).collect())
+}
+
+/// Runs the case with settings that replace stages.
+fn with_settings(case: &Case, stages: &[Stage], texts: Vec<String>) -> StageRun {
+    let settings: Result<Vec<Setting>, SettingError> = texts.iter().map(|text| text.parse()).collect();
+    let result = match settings {
+        Ok(settings) => case.run(&settings).map_err(|error| error.to_string()),
+        Err(error) => Err(error.to_string()),
+    };
+    StageRun::new(stages, texts, result)
 }
 
 /// Returns what the margin increase system has to do with the failure; `None` if the controller has none.

@@ -1,7 +1,7 @@
 //! The stages of the chain, and how each is replaced by the truth.
 
 use closecall_sensors::SensorMode;
-use closecall_simulation::scenario::{EffectConfig, ScenarioFile, Setting, SettingError};
+use closecall_simulation::scenario::{EffectConfig, ScenarioFile};
 use serde::{Deserialize, Serialize};
 
 /// A stage of the chain from the sensors of the ego to the drivers of the other vehicles.
@@ -67,12 +67,9 @@ impl Stage {
         }
     }
 
-    /// Returns the setting that replaces the stage.
-    ///
-    /// # Errors
-    /// None in practice: the text is a setting.
-    pub fn setting(self) -> Result<Setting, SettingError> {
-        format!("ideal.{}=true", self.name()).parse()
+    /// Returns the setting that replaces the stage, as `key=value`.
+    pub fn setting_text(self) -> String {
+        format!("ideal.{}=true", self.name())
     }
 
     /// Returns why the stage does not exist in a run; `None` if it exists.
@@ -101,7 +98,7 @@ mod tests {
     #[test]
     fn every_stage_has_a_setting_that_the_scenarios_of_the_library_accept() {
         for stage in Stage::ALL {
-            let setting = stage.setting().unwrap();
+            let setting = stage.setting_text().parse().unwrap();
             let path = std::path::Path::new("low-thw-overtake");
             let file = closecall_simulation::scenario::source::load(path, &[setting]).unwrap();
             file.check().unwrap();

@@ -26,11 +26,9 @@ impl Explanation {
                 let unusual = self.confirmation().and_then(|run| run.unusual.as_ref());
                 let unusual = unusual.map_or_else(String::new, |how| format!(" ({how})"));
                 let narrowly = self.confirmation().and_then(narrowly).unwrap_or_default();
-                format!(
-                    "It is due to {}{unusual}: with {}, no vehicle collides{narrowly}.",
-                    stage.name(),
-                    stage.replacement()
-                )
+                let is_usual = self.confirmation().is_some_and(|run| run.is_usual);
+                let with = if is_usual { "it as usual, though not with it perfect" } else { stage.replacement() };
+                format!("It is due to {}{unusual}: with {with}, no vehicle collides{narrowly}.", stage.name())
             }
             Cause::Pair { stages: [one, other] } => format!(
                 "No stage alone is to blame. With {} and {} together, no vehicle collides.",
@@ -97,7 +95,8 @@ impl fmt::Display for ExplanationText<'_> {
         writeln!(f, "{}", explanation.sentence())?;
         writeln!(f)?;
         for run in &explanation.stages {
-            writeln!(f, "  {:<14} {}", run.stages[0].name(), outcome_words(run))?;
+            let as_usual = if run.is_usual { "as usual: " } else { "" };
+            writeln!(f, "  {:<14} {as_usual}{}", run.stages[0].name(), outcome_words(run))?;
         }
         for (stage, reason) in &explanation.missing {
             writeln!(f, "  {:<14} does not exist: {reason}", stage.name())?;

@@ -22,6 +22,24 @@ use crate::case::Case;
 /// Human Factors 2 (2000).
 const USUAL_REACTION_S: f64 = 1.5;
 
+/// Returns the settings that make a stage usual again, each as `key=value`. Empty if there are none.
+pub(super) fn usual_settings(stage: Stage) -> Vec<String> {
+    match stage {
+        Stage::Class => vec!["fault.class-background=false".to_owned()],
+        Stage::RearReaction => vec!["fault.rear-reaction-s=0".to_owned()],
+        Stage::Timing => {
+            let Ok(shipped) = SensorsConfig::default().check(&Parameters::default()) else { return Vec::new() };
+            let latency_s = |steps: usize| steps as f64 * CONTROL_STEP.s();
+            let [front, surround, rear] = shipped.with_mode(SensorMode::Object).latency_steps().map(latency_s);
+            let [_, _, tracker] = shipped.with_mode(SensorMode::Full).latency_steps().map(latency_s);
+            let sensors = [("front-radar", front), ("surround", surround), ("rear-object", rear), ("tracker", tracker)];
+            let latency = |(sensor, latency_s)| format!("sensors.{sensor}.latency-s={latency_s}");
+            std::iter::once("fault.delay-s=0".to_owned()).chain(sensors.into_iter().map(latency)).collect()
+        }
+        Stage::Points | Stage::Clusters | Stage::Tracks | Stage::Actuation | Stage::LeadBraking => Vec::new(),
+    }
+}
+
 /// Returns how a stage of a run is out of the ordinary; `None` if it is not.
 pub(super) fn unusual(stage: Stage, case: &Case, scenario: &Scenario) -> Option<String> {
     let config = &case.file.config().sensors;

@@ -13,12 +13,12 @@ pub struct ExposureText<'a>(pub &'a Exposure);
 impl fmt::Display for ExposureText<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Exposure { rule, observed, rate, campaign, effect, missing } = self.0;
-        if let Some(seen) = observed {
+        if let Some(seen) = observed.as_ref().filter(|seen| seen.hours > 0.0) {
             write_observed(f, seen, rule.braking_mps2)?;
         }
         match rate {
             Some(Rate::Counted { events, distance_km }) => {
-                writeln!(f, "rate: N = {events} events in D = {distance_km:.3} km")?;
+                writeln!(f, "rate: N = {events} events in D = {distance_km} km")?;
             }
             Some(Rate::Prior { low, high }) => {
                 writeln!(f, "rate: stated, from {low} to {high} events per 10^6 km (value: their geometric mean)")?;
@@ -38,17 +38,18 @@ impl fmt::Display for ExposureText<'_> {
         match effect {
             Some(effect) => {
                 let [low, high] = effect.rate_95;
-                writeln!(f, "encounters per 10^6 km: {:.4} ({low:.4} to {high:.4})", effect.rate)?;
+                let stated = if matches!(rate, Some(Rate::Prior { .. })) { "as stated" } else { "95 %" };
+                writeln!(f, "encounters per 10^6 km: {:.4} ({stated}: {low:.4} to {high:.4})", effect.rate)?;
                 let [low, high] = effect.difference_95;
                 writeln!(
                     f,
-                    "prevented less induced, given an encounter: {:.6} ({low:.6} to {high:.6})",
+                    "prevented less induced, given an encounter: {:.6} (95 %: {low:.6} to {high:.6})",
                     effect.difference
                 )?;
                 let [low, high] = effect.net_95;
                 writeln!(
                     f,
-                    "NET EFFECT: {:.4} fewer collisions per 10^6 km (95 %: {low:.4} to {high:.4})",
+                    "NET EFFECT: {:.4} fewer collisions per 10^6 km ({stated}: {low:.4} to {high:.4})",
                     effect.net
                 )?;
                 if low <= 0.0 && high >= 0.0 {

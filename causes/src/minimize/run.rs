@@ -12,6 +12,9 @@ use crate::attribution::{Attribution, attribute};
 use crate::case::{Case, CausesError, fails};
 use crate::failures::passes;
 
+/// Number of steps of the grid beyond a failing value in which a passing one is looked for.
+const MOST_STEPS_TO_TWIN: i64 = 20;
+
 /// A parameter of the smallest case that is off its nominal value.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Offset {
@@ -122,13 +125,8 @@ fn shrunk(trial: &Trial<'_>, names: &[ParameterName]) -> (Parameters, Vec<Candid
     }
     // The other parameters have moved since: the boundary of each is looked for again.
     let candidates = names.iter().filter_map(|name| {
-        let (failing, passing) = boundary(trial, &values, name)?;
-        // What does not fail may also be no valid scenario, which is no twin.
-        let mut changed = values.clone();
-        changed.insert(name.clone(), passing.clone());
-        if !trial.passes(&changed) {
-            return None;
-        }
+        let (failing, next) = boundary(trial, &values, name)?;
+        let passing = first_passing(trial, &values, name, (&failing, next))?;
         let distance = match (&failing, &passing, trial.span(name)) {
             (Value::Number(failing), Value::Number(passing), Some(span)) => (failing - passing).abs() / span,
             _ => 1.0,
@@ -137,6 +135,30 @@ fn shrunk(trial: &Trial<'_>, names: &[ParameterName]) -> (Parameters, Vec<Candid
     });
     let candidates = candidates.collect();
     (values, candidates)
+}
+
+/// Returns the first value of a parameter from `next` on, away from the failing one, with which the case passes: what does not
+/// fail may also fail at half the time step only, or be no valid scenario.
+fn first_passing(
+    trial: &Trial<'_>,
+    values: &Parameters,
+    name: &ParameterName,
+    (failing, next): (&Value, Value),
+) -> Option<Value> {
+    let steps = match (failing, &next, trial.span(name)) {
+        (Value::Number(failing), Value::Number(next), Some(span)) => {
+            let step = grid::step(span);
+            let first = grid::beyond(*next, *failing, step);
+            let sign = if next > failing { 1 } else { -1 };
+            (0..MOST_STEPS_TO_TWIN).map(|count| Value::Number(grid::at(first + sign * count, step))).collect()
+        }
+        _ => Vec::new(),
+    };
+    std::iter::once(next).chain(steps).find(|value| {
+        let mut changed = values.clone();
+        changed.insert(name.clone(), value.clone());
+        trial.passes(&changed)
+    })
 }
 
 /// Returns the value of a parameter that is nearest to nominal and still fails, and the next one, which passes. `None` if even

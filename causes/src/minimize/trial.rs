@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 use std::sync::Mutex;
 
 use closecall_campaign::runner::run_guarded;
+use closecall_simulation::NoObserver;
 use closecall_simulation::outcome::Outcome;
-use closecall_simulation::scenario::Setting;
-use closecall_simulation::{NoObserver, SampleError};
+use closecall_simulation::scenario::{Scenario, Setting};
 use closecall_traffic::{ParameterName, Parameters, Value};
 
-use crate::case::{Case, CausesError, fails};
+use crate::case::{Case, fails};
 
 /// A sample whose parameters can be moved to their nominal values.
 pub(super) struct Trial<'a> {
@@ -20,6 +20,8 @@ pub(super) struct Trial<'a> {
     pub(super) nominal: Parameters,
     /// The parameters whose two values differ, in the order of their names.
     pub(super) differing: Vec<ParameterName>,
+    /// Whether a case must have the same result at half the time step, too. Not if the sample itself has not.
+    is_robust: bool,
     /// Results that are known already, by the values of the parameters.
     known: Mutex<BTreeMap<String, bool>>,
 }
@@ -33,7 +35,9 @@ impl<'a> Trial<'a> {
         let nominal = space.nominal();
         let differing = sampled.iter().filter(|(name, value)| nominal.get(name) != Some(value));
         let differing = differing.map(|(name, _)| name.clone()).collect();
-        Self { case, sampled, nominal, differing, known: Mutex::default() }
+        let trial = Self { case, sampled, nominal, differing, is_robust: true, known: Mutex::default() };
+        let is_robust = trial.fails(&trial.sampled);
+        Self { is_robust, known: Mutex::default(), ..trial }
     }
 
     /// Returns the nominal values with the named parameters at the values of the sample.
@@ -53,7 +57,7 @@ impl<'a> Trial<'a> {
         if let Some(known) = self.known.lock().ok().and_then(|known| known.get(&key).copied()) {
             return known;
         }
-        let found = self.run(parameters).is_ok_and(|outcome| fails(&outcome));
+        let found = self.case.file.concrete(parameters).is_ok_and(|scenario| self.holds_in(&scenario, fails));
         if let Ok(mut known) = self.known.lock() {
             known.insert(key, found);
         }
@@ -62,17 +66,19 @@ impl<'a> Trial<'a> {
 
     /// Returns whether a case is a valid scenario in which no vehicle collides.
     pub(super) fn passes(&self, parameters: &Parameters) -> bool {
-        self.run(parameters).is_ok_and(|outcome| !fails(&outcome))
+        self.case.file.concrete(parameters).is_ok_and(|scenario| self.is_passed(&scenario))
     }
 
-    /// Runs a case.
-    pub(super) fn run(&self, parameters: &Parameters) -> Result<Outcome, CausesError> {
-        let scenario = self.case.file.concrete(parameters)?;
-        run_guarded(&scenario, self.case.key(), &self.case.arm, &mut NoObserver).map_err(|source| self.failed(source))
+    /// Returns whether no vehicle collides in a scenario.
+    pub(super) fn is_passed(&self, scenario: &Scenario) -> bool {
+        self.holds_in(scenario, |outcome| !fails(outcome))
     }
 
-    fn failed(&self, source: SampleError) -> CausesError {
-        CausesError::Sample { sample: self.case.sample, source }
+    /// Returns whether a condition holds for the outcome of a scenario, at the time step and at half of it.
+    fn holds_in(&self, scenario: &Scenario, holds: impl Fn(&Outcome) -> bool) -> bool {
+        let run = |scenario: &Scenario| run_guarded(scenario, self.case.key(), &self.case.arm, &mut NoObserver);
+        let has = |scenario: &Scenario| run(scenario).is_ok_and(|outcome| holds(&outcome));
+        has(scenario) && (!self.is_robust || has(&scenario.at_half_step()))
     }
 
     /// Returns the width of the middle 95 % of a parameter's distribution; `None` for a choice.

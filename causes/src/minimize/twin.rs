@@ -7,7 +7,6 @@ use serde::Serialize;
 
 use super::trial::Trial;
 use super::{grid, words};
-use crate::case::fails;
 
 /// Largest shift of the start of a rear vehicle that is tried (s), in steps of 0.1 s.
 const MOST_SHIFT_TENTHS: i32 = 20;
@@ -74,7 +73,7 @@ fn shifted_start(trial: &Trial<'_>, values: &Parameters) -> Option<(f64, Twin)> 
         let changed: Setting =
             format!("actor.{id}.start.behind.gap-m={:.2}", gap_m - earlier_s * closing_mps).parse().ok()?;
         let all = [settings.clone(), vec![changed]].concat();
-        let passes = trial.case.run(&all).is_ok_and(|outcome| !fails(&outcome));
+        let passes = trial.case.concrete(&all).is_ok_and(|scenario| trial.is_passed(&scenario));
         passes.then(|| {
             let when = if earlier_s > 0.0 { "earlier" } else { "later" };
             let twin = Twin {
