@@ -8,10 +8,13 @@ use super::Trace;
 /// Time for which the motion is continued beyond the collision (s). Full braking from any speed on a motorway ends earlier.
 const BEYOND_S: f64 = 15.0;
 
+/// Largest braking of a cruise control above 20 m/s (m/s²) (ISO 15622). The careful driver in the loop sees a risk beyond it.
+const CRUISE_CONTROL_MPS2: f64 = 3.5;
+
 /// How the striking vehicle brakes instead.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Braking {
-    /// As the competent and careful driver of UN Regulation 157, from a time to collision of 2 s on.
+    /// As the competent and careful driver of UN Regulation 157, from the perception of a risk on.
     Careful,
     /// With all that the road allows (m/s²), from the moment on at which the hazard can be perceived.
     FullFromHazard(f64),
@@ -77,10 +80,24 @@ impl Pair<'_> {
         reaction: &mut Option<BrakingReaction>,
     ) -> Option<f64> {
         let closing_mps = own.speed_mps - other.speed_mps;
-        if reaction.is_none() && self.is_in_path(own, other) && self.gap_m(own, other) <= CRITICAL_TTC_S * closing_mps {
+        if reaction.is_none() && self.is_in_path(own, other) && self.is_risk(own, other) {
             *reaction = Some(BrakingReaction::default());
         }
         reaction.as_mut().map(|reaction| if closing_mps > 0.0 { reaction.advance(self.step_s) } else { 0.0 })
+    }
+
+    /// Returns whether the careful driver sees a risk: as the same driver in the loop, at a time to collision of 2 s, or if more
+    /// braking is needed than a cruise control may use.
+    fn is_risk(&self, own: &VehicleState, other: &VehicleState) -> bool {
+        let (gap_m, closing_mps) = (self.gap_m(own, other), own.speed_mps - other.speed_mps);
+        // Both brake to a standstill, or the own speed falls to that of a vehicle that does not brake.
+        let braking_mps2 = -other.acceleration_mps2;
+        let needed_mps2 = if braking_mps2 > 0.0 {
+            own.speed_mps.powi(2) / (2.0 * (gap_m + other.speed_mps.powi(2) / (2.0 * braking_mps2)))
+        } else {
+            closing_mps.max(0.0).powi(2) / (2.0 * gap_m)
+        };
+        gap_m <= CRITICAL_TTC_S * closing_mps || !(needed_mps2 <= CRUISE_CONTROL_MPS2)
     }
 
     /// Returns the first step at which the struck vehicle can be seen to brake, or at which the time to collision falls to
@@ -187,7 +204,8 @@ mod tests {
 
     #[test]
     fn a_careful_driver_needs_a_gap_that_its_delay_uses_up() {
-        // Risk at gap = 2 s · 6 m/s² · t; then 0.75 s of delay, and 7.59 m/s² reached in 0.6 s.
+        // At once a risk. 0.75 s of delay, and 7.59 m/s² reached in 0.6 s: 31 m before the driver brakes fully, and 56 m from
+        // then on, of the gap and the 75 m of the vehicle ahead.
         assert!(!avoided(5.0, Braking::Careful));
         assert!(avoided(60.0, Braking::Careful));
         let least = (1..100).map(f64::from).find(|gap_m| avoided(*gap_m, Braking::Careful)).unwrap();
