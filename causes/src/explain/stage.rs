@@ -82,9 +82,9 @@ impl Stage {
                 Some("the tracks are the truth already")
             }
             (Self::LeadBraking, _) => {
-                let brakes = file.config().actors.iter().flat_map(|actor| &actor.events);
-                let is_none = brakes.filter(|event| matches!(event.then, EffectConfig::Brake(_))).next().is_none();
-                is_none.then_some("no vehicle brakes by an event")
+                let mut events = file.config().actors.iter().flat_map(|actor| &actor.events);
+                let brakes = events.any(|event| matches!(event.then, EffectConfig::Brake(_)));
+                (!brakes).then_some("no vehicle brakes by an event")
             }
             _ => None,
         }
