@@ -5,7 +5,7 @@
 //! ```
 //!
 //! The statistic is the mean normalised error squared (NEES) of the confirmed rear tracks' state (x, y, vx, vy) with its
-//! 95 % bounds, as defined by `Consistency` of closecall-sensors:
+//! 95 % bounds, as defined by `Consistency` of closecall-statistics:
 //!
 //! - consistent: the tracker's covariance agrees with its errors;
 //! - conservative: the errors are smaller than the covariance states;
@@ -28,10 +28,11 @@ use std::process::ExitCode;
 
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_scenarios::sampling::Design;
-use closecall_sensors::{Consistency, Credibility, NEES_QUANTILE_95, SensorMode, TrackAudit};
+use closecall_sensors::{NEES_QUANTILE_95, SensorMode, TrackAudit};
 use closecall_simulation::controller::BuiltIn;
 use closecall_simulation::scenario::ScenarioFile;
 use closecall_simulation::{Arm, RunKey, TrackAuditor, simulate};
+use closecall_statistics::consistency::{Consistency, Credibility};
 use rayon::prelude::*;
 
 const SECONDS_PER_HOUR: f64 = 3_600.0;

@@ -18,11 +18,13 @@
 //! | [`controllers`] | the ego stack and the human drivers |
 //! | [`simulation`] | one run: scenario file, world, closed loop, outcome |
 //! | [`campaign`] | many runs: journal, workers, gates, validity, verdict |
+//! | [`causes`] | the cause of a collision, the smallest failing case, the map, exposure |
 //! | [`report`] | Rerun recordings, figures, Parquet, JUnit, HTML, JSON |
 //!
 //! `examples/campaign.rs` runs a campaign without the command line.
 
 pub use closecall_campaign as campaign;
+pub use closecall_causes as causes;
 pub use closecall_controllers as controllers;
 pub use closecall_report as report;
 pub use closecall_scenarios as scenarios;

@@ -3,6 +3,7 @@
 //! Both campaigns ran the same samples, each in its own arm under test. If a sample passed and now fails, no statistics
 //! are needed to show it: the sample can be replayed from both folders.
 
+use std::fmt;
 use std::path::PathBuf;
 
 use super::folder::{Folder, FolderError};
@@ -186,6 +187,43 @@ fn is_same(baseline: &ArmRecord, current: &ArmRecord) -> bool {
             before.has_same_bits(after)
         }
         (before, after) => before == after,
+    }
+}
+
+/// Whether a campaign is worse than an earlier one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Regression {
+    /// It is not.
+    None,
+    /// Samples end in an error that had an outcome. This takes precedence over [`Self::Worse`].
+    NewErrors,
+    /// More samples fail than allowed, or a margin has shrunk.
+    Worse,
+}
+
+impl Regression {
+    /// Judges a comparison. Up to `max_newly_failing` samples may fail that passed, and a quantile of a margin may fall by the
+    /// share `tolerance`.
+    pub fn of(found: &[ScenarioComparison], max_newly_failing: u64, tolerance: f64) -> Self {
+        let newly_failing: usize = found.iter().map(|scenario| scenario.newly_failing.len()).sum();
+        let has_lost_margin = found.iter().any(|scenario| !scenario.margin_regressions(tolerance).is_empty());
+        if found.iter().any(|scenario| !scenario.newly_in_error.is_empty()) {
+            Self::NewErrors
+        } else if newly_failing as u64 > max_newly_failing || has_lost_margin {
+            Self::Worse
+        } else {
+            Self::None
+        }
+    }
+}
+
+impl fmt::Display for Regression {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::None => "NO REGRESSION",
+            Self::NewErrors => "NEW ERRORS",
+            Self::Worse => "REGRESSION",
+        })
     }
 }
 

@@ -15,6 +15,7 @@
 //! Rates are conditional on the sampled scenario: they are the share of *sampled encounters* that end in a collision,
 //! not the frequency of collisions on a road.
 
+pub mod arguments;
 pub mod arm_pairs;
 pub mod baseline;
 pub mod compare;
@@ -22,6 +23,7 @@ pub mod drift;
 pub mod end_rule;
 pub mod ensemble;
 pub mod execution;
+pub mod failure;
 pub mod fingerprint;
 pub mod folder;
 mod folder_error;

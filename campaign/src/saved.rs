@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use closecall_simulation::scenario::{Scenario, ScenarioError, ScenarioFile};
+use closecall_simulation::scenario::{Scenario, ScenarioError, ScenarioFile, Setting};
 use closecall_simulation::{Arm, RunKey, SampleError};
 
 use crate::folder::{Folder, FolderError};
@@ -122,7 +122,21 @@ impl SavedCampaign {
     /// # Errors
     /// [`SavedError`] if the campaign has no such scenario or sample.
     pub fn sample(&self, scenario: Option<&str>, sample: u64) -> Result<(Scenario, RunKey), SavedError> {
-        let file = scenario_file(self.folder.path(), self.choose(scenario)?)?;
+        self.sample_with(scenario, sample, &[])
+    }
+
+    /// Returns the concrete scenario of one sample with further settings.
+    ///
+    /// # Errors
+    /// [`SavedError`] if the campaign has no such scenario or sample, or a setting does not fit.
+    pub fn sample_with(
+        &self,
+        scenario: Option<&str>,
+        sample: u64,
+        settings: &[Setting],
+    ) -> Result<(Scenario, RunKey), SavedError> {
+        let file = self.file(scenario)?;
+        let file = ScenarioFile::parse(file.path(), file.text(), settings)?;
         let sampling = self.manifest.sampling;
         let samples = file.space().samples(sampling.design, sampling.samples);
         if sample >= samples {
@@ -130,6 +144,14 @@ impl SavedCampaign {
         }
         let scenario = concrete(&file, sampling, sample).map_err(|source| SavedError::Sample { sample, source })?;
         Ok((scenario, RunKey { seed: sampling.seed, sample }))
+    }
+
+    /// Returns a scenario of the campaign with the campaign's settings. `scenario` may be left out if there is only one.
+    ///
+    /// # Errors
+    /// [`SavedError`] if the campaign has no such scenario, or it cannot be used.
+    pub fn file(&self, scenario: Option<&str>) -> Result<ScenarioFile, SavedError> {
+        scenario_file(self.folder.path(), self.choose(scenario)?)
     }
 
     fn choose(&self, name: Option<&str>) -> Result<&ManifestScenario, SavedError> {

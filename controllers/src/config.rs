@@ -5,8 +5,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::driver::{
-    Driver, Idm, IdmConfig, Overtaker, OvertakerConfig, Prescribed, PrescribedConfig, Wiedemann99Config,
-    Wiedemann99Driver,
+    Driver, Idm, IdmConfig, Overtaker, OvertakerConfig, Prescribed, PrescribedConfig, Reaction, ReactionChange,
+    Wiedemann99Config, Wiedemann99Driver,
 };
 use crate::ego::{EgoSettings, EgoStackConfig};
 
@@ -29,6 +29,7 @@ pub enum DriverConfig {
 
 /// A checked driver, which cannot be invalid.
 #[derive(Clone, Debug, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "a scenario has a handful of them")]
 pub enum CheckedDriver {
     /// The controller under test.
     Ego(EgoSettings),
@@ -62,6 +63,28 @@ pub enum HumanDriver {
 }
 
 impl HumanDriver {
+    /// Returns the same driver with another reaction. Drivers without a reaction time stay as they are.
+    #[must_use]
+    pub fn reacting(&self, change: ReactionChange) -> Self {
+        match self {
+            Self::Prescribed(_) => self.clone(),
+            Self::Wiedemann99(settings) => Self::Wiedemann99(settings.reacting(change)),
+            Self::Idm(settings) => Self::Idm(settings.reacting(change)),
+            Self::Overtaker(settings) => Self::Overtaker(settings.reacting(change)),
+        }
+    }
+
+    /// Returns the typical reaction time (s): the value, or the median if it is drawn in each run. Returns `None` for a driver
+    /// without a reaction time.
+    pub fn reaction_s(&self) -> Option<f64> {
+        match self {
+            Self::Prescribed(_) => None,
+            Self::Wiedemann99(settings) => settings.reaction.map(Reaction::typical_s),
+            Self::Idm(settings) => settings.reaction.map(Reaction::typical_s),
+            Self::Overtaker(settings) => Some(settings.reaction.typical_s()),
+        }
+    }
+
     /// Builds a new driver for one run. It allocates memory here and in its first step, and none afterwards.
     pub fn build(&self) -> Box<dyn Driver> {
         match self {

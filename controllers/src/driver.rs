@@ -29,7 +29,7 @@ pub use lane_keeping::{Deviation, LaneKeeping, LaneKeepingConfig, Weave};
 pub use overtaker::{Follow, FollowConfig, Overtaker, OvertakerConfig, Return, ReturnConfig};
 pub use perception::{Evidence, EvidenceConfig, PerceptionConfig, PerceptionSettings};
 pub use prescribed::{Prescribed, PrescribedConfig, PrescribedLaneChangeConfig, RecordedConfig};
-pub use reaction::{LogNormalConfig, Reaction, ReactionConfig};
+pub use reaction::{LogNormalConfig, Reaction, ReactionChange, ReactionConfig};
 pub use speed_keeping::{DesiredSpeedNoise, SpeedKeeping, SpeedKeepingConfig};
 pub use wiedemann99::{Regime, Thresholds, Wiedemann99, Wiedemann99Config, Wiedemann99Driver, Wiedemann99Model};
 

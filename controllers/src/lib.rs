@@ -27,9 +27,9 @@ pub use driver::{
     DesiredSpeedNoise, Deviation, Driver, DriverAction, DriverError, DriverInput, DriverNote, Evidence, EvidenceConfig,
     Follow, FollowConfig, Idm, IdmConfig, LaneChange, LaneKeeping, LaneKeepingConfig, LaneNeighbours, Lapse,
     LapseConfig, Lead, LogNormalConfig, Looks, Neighbour, Neighbours, Overtaker, OvertakerConfig, PerceptionConfig,
-    PerceptionSettings, Prescribed, PrescribedConfig, PrescribedLaneChangeConfig, Reaction, ReactionConfig,
-    RecordedConfig, Regime, Return, ReturnConfig, SpeedKeeping, SpeedKeepingConfig, Thresholds, Weave, Wiedemann99,
-    Wiedemann99Config, Wiedemann99Driver, Wiedemann99Model,
+    PerceptionSettings, Prescribed, PrescribedConfig, PrescribedLaneChangeConfig, Reaction, ReactionChange,
+    ReactionConfig, RecordedConfig, Regime, Return, ReturnConfig, SpeedKeeping, SpeedKeepingConfig, Thresholds, Weave,
+    Wiedemann99, Wiedemann99Config, Wiedemann99Driver, Wiedemann99Model,
 };
 pub use ego::{
     Acc, AccConfig, Aeb, AebConfig, ArrivalPrediction, BrakingResponse, ControllerError, EgoCommand, EgoController,

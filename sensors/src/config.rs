@@ -8,8 +8,8 @@ use crate::camera::{Camera, CameraConfig, Pipeline};
 use crate::lidar::LidarConfig;
 use crate::worker_classifier::WorkerClassifier;
 use crate::{
-    FullModel, FullPerception, GroundTruth, NoiseKey, ObjectPerception, ObjectSensorConfig, ObjectSensorModel,
-    Perception, SensorError, TrackerConfig,
+    Alterations, FullModel, FullPerception, GroundTruth, NoiseKey, ObjectPerception, ObjectSensorConfig,
+    ObjectSensorModel, Perception, SensorError, TrackerConfig,
 };
 
 /// Level of detail at which the sensors are simulated.
@@ -78,6 +78,7 @@ pub struct Sensors {
     full: FullModel,
     camera: Camera,
     rear_object: ObjectSensorModel,
+    altered: Alterations,
 }
 
 impl Check for SensorsConfig {
@@ -95,6 +96,7 @@ impl Check for SensorsConfig {
             },
             camera: self.rear_camera.check(parameters).map_err(within("rear-camera"))?,
             rear_object: self.rear_object.check_rear_object(parameters).map_err(within("rear-object"))?,
+            altered: Alterations::default(),
         })
     }
 }
@@ -121,6 +123,29 @@ impl Sensors {
         Self { mode, ..self }
     }
 
+    /// Returns the same sensors with stages that are replaced by the truth, or made worse.
+    #[must_use]
+    pub fn altered(self, altered: Alterations) -> Self {
+        let FullModel { front_radar, surround, rear_lidar, tracker } = self.full;
+        let full = FullModel {
+            front_radar: front_radar.altered(&altered, false),
+            surround: surround.altered(&altered, false),
+            rear_lidar: if altered.has_true_points { rear_lidar.exact() } else { rear_lidar },
+            tracker: tracker.altered(&altered),
+        };
+        Self { full, rear_object: self.rear_object.altered(&altered, true), altered, ..self }
+    }
+
+    /// Returns the latencies of the sensors ahead, around and behind, in control steps.
+    pub fn latency_steps(&self) -> [usize; 3] {
+        let rear = match self.mode {
+            SensorMode::Full => self.full.tracker.latency_steps(),
+            SensorMode::Object => self.rear_object.latency_steps(),
+            SensorMode::GroundTruth => return [0; 3],
+        };
+        [self.full.front_radar.latency_steps(), self.full.surround.latency_steps(), rear]
+    }
+
     /// Builds the perception of one run, whose random streams are keyed by `key`.
     ///
     /// # Errors
@@ -133,10 +158,11 @@ impl Sensors {
                 Box::new(ObjectPerception::new(models, key))
             }
             SensorMode::Full => {
-                let perception = FullPerception::new(&self.full, key);
-                match self.camera.pipeline {
-                    Pipeline::Off => Box::new(perception),
-                    Pipeline::CropClassifier => {
+                let perception = FullPerception::new(&self.full, key).altered(self.altered);
+                match (self.altered.classifier(), self.camera.pipeline) {
+                    (Some(classifier), _) => Box::new(perception.with_classifier(classifier)),
+                    (None, Pipeline::Off) => Box::new(perception),
+                    (None, Pipeline::CropClassifier) => {
                         let classifier = WorkerClassifier::new(self.camera, key);
                         Box::new(perception.with_classifier(Box::new(classifier)))
                     }

@@ -11,14 +11,15 @@
 
 use std::collections::VecDeque;
 
-use closecall_traffic::{Road, Stream, Time, Track, VehicleState};
+use closecall_traffic::{Environment, Road, Stream, Time, Track, VehicleState};
 
+use crate::alterations::give_true_boxes;
 use crate::lidar::{HALF_FIELD_TAN, Lidar, RearLidar};
 use crate::object::{DEGRADED_SHARE, NoiseKey, ObjectSensor, ObjectSensorModel, ScanInput, range_in_weather_m};
 use crate::perception::FieldOfView;
 use crate::surroundings::{OtherVehicle, transform_scene};
 use crate::tracking::{RearView, TrackList, Tracker, TrackerModel, TrackerScan};
-use crate::{Detection, Health, Perception, Scene, SensorError, SensorHealth};
+use crate::{Alterations, Detection, Health, Perception, Scene, SensorError, SensorHealth};
 
 /// Number of successive scans without a single point, not even from the road, after which the LiDAR counts as blocked:
 /// 1 s.
@@ -70,6 +71,7 @@ pub struct FullPerception {
     classifier: Option<Box<dyn DetectionClassifier>>,
     latency_steps: usize,
     pending: VecDeque<PendingScan>,
+    altered: Alterations,
     tracker: Tracker,
     others: Vec<OtherVehicle>,
     list: TrackList,
@@ -90,6 +92,7 @@ impl FullPerception {
             classifier: None,
             latency_steps: model.tracker.latency_steps(),
             pending: VecDeque::new(),
+            altered: Alterations::default(),
             tracker: Tracker::new(model.tracker),
             others: Vec::new(),
             list: TrackList::default(),
@@ -102,12 +105,23 @@ impl FullPerception {
         Self { classifier: Some(classifier), ..self }
     }
 
+    /// Returns the same sensors with parts of the rear LiDAR's chain replaced by the truth.
+    #[must_use]
+    pub(crate) fn altered(self, altered: Alterations) -> Self {
+        Self { altered, ..self }
+    }
+
     /// Scans the scene and appends its detections to the queue of pending scans.
     fn detect(&mut self, scene: &Scene<'_>) -> Result<(), SensorError> {
-        self.lidar.scan(scene, &mut self.rng);
+        let seen = match self.altered.has_true_points {
+            true => &Scene { environment: &Environment::CLEAR_DAY, ..*scene },
+            false => scene,
+        };
+        self.lidar.scan(seen, &mut self.rng);
         self.empty_scans = if self.lidar.is_dark() { self.empty_scans.saturating_add(1) } else { 0 };
         self.health = self.judge_health(scene);
-        let found = self.lidar.detect()?;
+        let has_true_clusters = self.altered.has_true_clusters;
+        let found = if has_true_clusters { self.lidar.detect_by_truth()? } else { self.lidar.detect()? };
         // Reuses the memory of a scan that the tracker has processed.
         let mut detections = match self.pending.len() > self.latency_steps {
             true => self.pending.pop_front().map(|scan| scan.detections).unwrap_or_default(),
@@ -115,6 +129,9 @@ impl FullPerception {
         };
         detections.clear();
         detections.extend_from_slice(found);
+        if has_true_clusters {
+            give_true_boxes(&mut detections, &self.others, scene);
+        }
         if let Some(classifier) = &mut self.classifier {
             classifier.classify(scene, &mut detections)?;
         }

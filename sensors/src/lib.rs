@@ -7,6 +7,7 @@
 //!            └ object/  range, noise, latency, field of view (front radar, surround, rear sensor) ─▶ tracks
 //! ```
 
+mod alterations;
 mod bodies;
 pub mod camera;
 mod config;
@@ -25,6 +26,7 @@ mod testing;
 pub mod tracking;
 mod worker_classifier;
 
+pub use alterations::Alterations;
 pub use config::{SensorMode, Sensors, SensorsConfig};
 pub use detection::{Detection, Extent};
 pub use full::{DetectionClassifier, FullModel, FullPerception};
@@ -32,5 +34,5 @@ pub use ground_truth::GroundTruth;
 pub use object::{NoiseKey, ObjectPerception, ObjectSensorConfig, ObjectSensorModel};
 pub use perception::{FieldOfView, Health, Perception, SensorError, SensorHealth};
 pub use scene::{Scene, SceneVehicle};
-pub use tracking::{Consistency, Credibility, NEES_QUANTILE_95, TrackAudit, TrackerConfig, TrackerModel};
+pub use tracking::{NEES_QUANTILE_95, TrackAudit, TrackerConfig, TrackerModel};
 pub use worker_classifier::{inference_backend, rear_exposures, set_inference_backend};

@@ -144,37 +144,3 @@ impl SetArgs {
         Ok(file)
     }
 }
-
-/// Parses a finite number above 0.
-pub(super) fn positive(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
-        _ => Err(format!("`{text}` is not a number above 0")),
-    }
-}
-
-/// Parses a number of samples or scenes: a whole number above 0.
-pub(super) fn count(text: &str) -> Result<u64, String> {
-    let reason = match text.parse::<i128>() {
-        Ok(number) if number > 0 => return u64::try_from(number).map_err(|_| format!("`{text}` is too large")),
-        Ok(0) => "is no sample at all",
-        Ok(_) => "is negative",
-        Err(_) => "is not a whole number",
-    };
-    Err(format!("`{text}` {reason}: a whole number of 1 or more is needed"))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_count_is_a_whole_number_above_zero() {
-        assert_eq!(count("200"), Ok(200));
-        for (text, reason) in [("-5", "is negative"), ("0", "no sample"), ("1.5", "not a whole number"), ("", "whole")]
-        {
-            assert!(count(text).unwrap_err().contains(reason), "{text}");
-        }
-        assert!(count("99999999999999999999999").unwrap_err().contains("too large"));
-    }
-}

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
+use closecall_campaign::arguments::share;
 use closecall_campaign::baseline::Baseline;
 use closecall_campaign::folder::Folder;
 use closecall_report::campaign::BaselineText;
@@ -11,7 +12,6 @@ use serde_json::json;
 
 use super::CliError;
 use super::args::Format;
-use super::gates::share;
 use super::output::{out, outln};
 use crate::exit_code::ExitCode;
 

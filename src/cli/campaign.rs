@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use clap::Args;
+use closecall_campaign::arguments::positive;
 use closecall_campaign::end_rule::EndMonitor;
 use closecall_campaign::execution::{Campaign, End, NextRecord};
 use closecall_campaign::folder::Folder;
@@ -24,7 +25,7 @@ use closecall_simulation::scenario::source::expand;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::CliError;
-use super::args::{Format, SensorsChoice, SetArgs, positive};
+use super::args::{Format, SensorsChoice, SetArgs};
 use super::arms::{ComparisonArgs, ControllerArgs};
 use super::backend::check_backend;
 use super::ending::{EndArgs, Ending};

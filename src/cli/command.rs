@@ -8,9 +8,9 @@ use closecall_simulation::controller::exec::{adopt_orphans, end_all};
 use super::backend::choose_backend;
 use super::output::print_error;
 use super::{
-    CliError, baseline, calibrate, campaign, check, compare, drift, generate, inspect, interrupt, library, merge, new,
-    paper, plot, record, reenact, render, replay, robustness, run, sample, schema, statistics, study, trajectories,
-    view, watching,
+    CliError, baseline, calibrate, campaign, causes, check, compare, drift, generate, inspect, interrupt, library,
+    merge, new, paper, plot, record, reenact, render, replay, robustness, run, sample, schema, statistics, study,
+    trajectories, view, watching,
 };
 use crate::exit_code::ExitCode;
 
@@ -70,6 +70,14 @@ enum Command {
     Baseline(baseline::BaselineArgs),
     /// Run one sample of a campaign again, and check that it gives the same bits
     Replay(replay::ReplayArgs),
+    /// Find the stage of the chain whose perfection prevents a failure of a campaign, and what the system did
+    Explain(causes::ExplainArgs),
+    /// Find the smallest failing case near a failing sample of a campaign, and the nearest case that passes
+    Minimize(causes::MinimizeArgs),
+    /// Map the margin that the system reaches, over approach speed, detection distance and front time headway
+    Map(causes::MapArgs),
+    /// Count how often the encounter happens in trajectory files, and state the net effect of the system per 10^6 km
+    Exposure(causes::ExposureArgs),
     /// Check scenario files without running them
     Check(check::CheckArgs),
     /// Print the JSON Schema of scenario files
@@ -155,6 +163,10 @@ fn dispatch(command: Command) -> Result<ExitCode, CliError> {
         Command::Compare(args) => compare::compare(&args),
         Command::Baseline(args) => baseline::baseline(&args),
         Command::Replay(args) => replay::replay(&args),
+        Command::Explain(args) => causes::explain(&args),
+        Command::Minimize(args) => causes::minimize(&args),
+        Command::Map(args) => causes::map(&args),
+        Command::Exposure(args) => causes::exposure(&args),
         Command::Check(args) => check::check(&args),
         Command::Schema => Ok(schema::schema()),
         Command::Inspect(args) => inspect::inspect(&args),

@@ -3,14 +3,14 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use closecall_campaign::compare::{ScenarioComparison, compare as compare_folders};
+use closecall_campaign::arguments::share;
+use closecall_campaign::compare::{Regression, compare as compare_folders};
 use closecall_campaign::folder::Folder;
 use closecall_report::campaign::ComparisonText;
 use closecall_report::json::{self, stamped};
 
 use super::CliError;
 use super::args::Format;
-use super::gates::share;
 use super::output::{out, outln};
 use crate::exit_code::ExitCode;
 
@@ -37,7 +37,12 @@ pub(super) fn compare(args: &CompareArgs) -> Result<ExitCode, CliError> {
     let (baseline_manifest, current_manifest) = (baseline.manifest()?, current.manifest()?);
     let differences = baseline_manifest.differences(&current_manifest);
     let found = compare_folders(&baseline, &current)?;
-    let code = judge(&found, args.max_newly_failing, args.tolerance);
+    let regression = Regression::of(&found, args.max_newly_failing, args.tolerance);
+    let code = match regression {
+        Regression::None => ExitCode::Pass,
+        Regression::NewErrors => ExitCode::SampleError,
+        Regression::Worse => ExitCode::Fail,
+    };
     match args.format {
         Format::Json => {
             outln!(
@@ -52,25 +57,8 @@ pub(super) fn compare(args: &CompareArgs) -> Result<ExitCode, CliError> {
         Format::Human => {
             let (scenarios, differences) = (&found[..], &differences[..]);
             out!("{}", ComparisonText { scenarios, differences, tolerance: args.tolerance });
-            outln!("{}", verdict(code));
+            outln!("{regression}");
         }
     }
     Ok(code)
-}
-
-fn judge(found: &[ScenarioComparison], max_newly_failing: u64, tolerance: f64) -> ExitCode {
-    let newly_failing: usize = found.iter().map(|scenario| scenario.newly_failing.len()).sum();
-    let has_lost_margin = found.iter().any(|scenario| !scenario.margin_regressions(tolerance).is_empty());
-    let is_regression = newly_failing as u64 > max_newly_failing || has_lost_margin;
-    let has_new_errors = found.iter().any(|scenario| !scenario.newly_in_error.is_empty());
-    let codes = [(is_regression, ExitCode::Fail), (has_new_errors, ExitCode::SampleError)];
-    ExitCode::first_of(codes.into_iter().filter(|(holds, _)| *holds).map(|(_, code)| code))
-}
-
-fn verdict(code: ExitCode) -> &'static str {
-    match code {
-        ExitCode::Pass => "NO REGRESSION",
-        ExitCode::SampleError => "NEW ERRORS",
-        _ => "REGRESSION",
-    }
 }

@@ -3,19 +3,21 @@
 use closecall_campaign::baseline::BaselineError;
 use closecall_campaign::compare::CompareError;
 use closecall_campaign::execution::CampaignError;
+use closecall_campaign::failure::FailureKind;
 use closecall_campaign::folder::FolderError;
 use closecall_campaign::gate::ProjectError;
 use closecall_campaign::merge::MergeError;
 use closecall_campaign::plan::PlanError;
 use closecall_campaign::saved::SavedError;
 use closecall_campaign::sensitivity::PlanFailure;
+use closecall_causes::CausesError;
 use closecall_report::campaign::ReportError;
 use closecall_report::run::figure::PictureError;
 use closecall_report::run::film::TrafficFilmError;
 use closecall_report::run::rerun::RecordingError;
 use closecall_report::traffic::trajectory_charts::ChartError;
 use closecall_scenarios::atomic::WriteError;
-use closecall_scenarios::encounter::NoEncounter;
+use closecall_scenarios::encounter::{NoEncounter, track_suggestion};
 use closecall_scenarios::following::FollowingError;
 use closecall_scenarios::lane_change::ReferenceError;
 use closecall_scenarios::trajectory_data::{TrajectoryFileError, WriteError as TrajectoryWriteError};
@@ -30,9 +32,6 @@ use closecall_viewer::{ServeError, ViewerError};
 use miette::Diagnostic;
 
 use crate::exit_code::ExitCode;
-
-/// Largest number of tracks that a message suggests.
-const MAX_SUGGESTED: usize = 10;
 
 /// The reason for which a command has no result.
 #[derive(Debug, thiserror::Error, Diagnostic)]
@@ -86,7 +85,7 @@ pub enum CliError {
     #[error(transparent)]
     TrafficFilm(#[from] TrafficFilmError),
     /// A recorded lane change is not an encounter that can be re-enacted.
-    #[error("failed to re-enact an encounter of {file}: {source}{}", suggestion(possible))]
+    #[error("failed to re-enact an encounter of {file}: {source}{}", track_suggestion(possible))]
     NoEncounter {
         /// The trajectory file.
         file: String,
@@ -137,6 +136,10 @@ pub enum CliError {
     /// The reports of a campaign cannot be written.
     #[error(transparent)]
     Report(#[from] ReportError),
+    /// A cause cannot be found.
+    #[error(transparent)]
+    #[diagnostic(help("see `closecall --help`"))]
+    Causes(#[from] CausesError),
     /// A campaign cannot be compared with a baseline.
     #[error(transparent)]
     Baseline(#[from] BaselineError),
@@ -163,18 +166,6 @@ impl From<UnknownScenario> for CliError {
     }
 }
 
-/// Returns the tracks that `--track` can name, as the end of a message.
-fn suggestion(possible: &[u64]) -> String {
-    let named: Vec<String> = possible.iter().take(MAX_SUGGESTED).map(u64::to_string).collect();
-    match possible.len() {
-        0 => String::new(),
-        count if count > MAX_SUGGESTED => {
-            format!("; --track can name {count} other tracks, such as {}", named.join(", "))
-        }
-        _ => format!("; --track can name {}", named.join(", ")),
-    }
-}
-
 impl From<&CliError> for ExitCode {
     fn from(error: &CliError) -> Self {
         match error {
@@ -188,30 +179,15 @@ impl From<&CliError> for ExitCode {
             | CliError::Project(_)
             | CliError::Serve(ServeError::Nothing { .. } | ServeError::Foreign { .. })
             | CliError::Classifier(_) => Self::InvalidInput,
-            CliError::Folder(error) => Self::from(error),
-            CliError::Campaign(error) => Self::from(error),
-            CliError::Saved(error) => Self::from(error),
+            CliError::Folder(error) => FailureKind::from(error).into(),
+            CliError::Campaign(error) => FailureKind::from(error).into(),
+            CliError::Saved(error) => FailureKind::from(error).into(),
             CliError::Sensitivity(PlanFailure::Workers(_)) => Self::Io,
             CliError::Sensitivity(_) => Self::Usage,
-            CliError::Report(error) => match error {
-                ReportError::Folder(error) => Self::from(error),
-                ReportError::Saved(error) => Self::from(error),
-                ReportError::Write(_) | ReportError::Recording(_) => Self::Io,
-                ReportError::Sample { .. } => Self::SampleError,
-            },
-            CliError::Merge(error) => match error {
-                MergeError::Campaign(error) => Self::from(error),
-                MergeError::OutOfOrder { .. } => Self::InvalidInput,
-                MergeError::NotAPart { .. }
-                | MergeError::OtherCampaign { .. }
-                | MergeError::Duplicate { .. }
-                | MergeError::Missing { .. }
-                | MergeError::Incomplete { .. } => Self::Usage,
-            },
-            CliError::Compare(error) => match error {
-                CompareError::Folder(error) => Self::from(error),
-                CompareError::Different { .. } | CompareError::OtherSample { .. } => Self::Usage,
-            },
+            CliError::Report(error) => error.kind().into(),
+            CliError::Merge(error) => FailureKind::from(error).into(),
+            CliError::Compare(error) => FailureKind::from(error).into(),
+            CliError::Causes(error) => error.kind().into(),
             CliError::Write(_)
             | CliError::Chart(_)
             | CliError::Record(_)
@@ -229,37 +205,13 @@ impl From<&CliError> for ExitCode {
     }
 }
 
-impl From<&FolderError> for ExitCode {
-    fn from(error: &FolderError) -> Self {
-        match error {
-            FolderError::Write(_) | FolderError::Read { .. } | FolderError::Busy { .. } => Self::Io,
-            FolderError::AlreadyThere { .. } | FolderError::OtherCampaign { .. } | FolderError::NotACampaign { .. } => {
-                Self::Usage
-            }
-            FolderError::Content { .. } => Self::InvalidInput,
-        }
-    }
-}
-
-impl From<&SavedError> for ExitCode {
-    fn from(error: &SavedError) -> Self {
-        match error {
-            SavedError::Folder(error) => Self::from(error),
-            SavedError::Scenario(error) => Self::from(error),
-            SavedError::Sample { .. } => Self::SampleError,
-            SavedError::ScenarioNotNamed { .. }
-            | SavedError::UnknownScenario { .. }
-            | SavedError::UnknownSample { .. }
-            | SavedError::UnknownArm { .. } => Self::Usage,
-        }
-    }
-}
-
-impl From<&CampaignError> for ExitCode {
-    fn from(error: &CampaignError) -> Self {
-        match error {
-            CampaignError::Folder(error) => Self::from(error),
-            CampaignError::Write(_) | CampaignError::Workers(_) => Self::Io,
+impl From<FailureKind> for ExitCode {
+    fn from(kind: FailureKind) -> Self {
+        match kind {
+            FailureKind::Usage => Self::Usage,
+            FailureKind::InvalidInput => Self::InvalidInput,
+            FailureKind::Sample => Self::SampleError,
+            FailureKind::Io => Self::Io,
         }
     }
 }

@@ -1,14 +1,14 @@
 //! The gates by which a campaign is judged, on the command line and in the project file.
 
 use clap::Args;
-use closecall_campaign::gate::{GateSet, GateSource, GateSpec, ProbabilitySpec, ProjectFile, Scope};
+use closecall_campaign::arguments::{confidence, positive, probability, share};
+use closecall_campaign::gate::{AssemblyError, GateSet, GateSource, PresetGates, ProbabilitySpec, Scope};
 use closecall_campaign::probability::ProbabilityGate;
 use closecall_campaign::verdict::MAX_FLIP_RATE;
 use closecall_scenarios::sampling::Design;
 use closecall_simulation::criteria::Expression;
 
 use super::CliError;
-use super::args::positive;
 
 /// The gates of a campaign.
 #[derive(Clone, Debug, Args)]
@@ -62,15 +62,6 @@ pub(super) struct GateArgs {
     max_flip_rate: f64,
 }
 
-/// The gates that a preset adds.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct PresetGates {
-    /// The preset's name.
-    pub(super) name: &'static str,
-    /// The criteria.
-    pub(super) require: &'static [&'static str],
-}
-
 impl GateArgs {
     /// Returns the gates: those of the command line, then those of a preset, then those of the project file. `is_paired` says
     /// whether the campaign has a baseline, `design` is its sampling design.
@@ -81,31 +72,11 @@ impl GateArgs {
         preset: Option<PresetGates>,
     ) -> Result<GateSet, CliError> {
         let mut set = GateSet { is_measurement: self.no_gate, max_flip_rate: self.max_flip_rate, ..GateSet::default() };
-        for (expression, scope) in self.criteria()? {
-            if expression.needs_pairs() && !is_paired {
-                let message = format!("`{expression}` compares with a baseline: it needs --paired");
-                return Err(CliError::Usage { message });
-            }
-            set.push(GateSpec { expression, source: GateSource::CommandLine, scope });
-        }
         set.probability = self.probability()?.map(|gate| ProbabilitySpec { gate, source: GateSource::CommandLine });
-        if let Some(preset) = preset {
-            for text in preset.require {
-                let expression = criterion(text)?;
-                let (source, scope) = (GateSource::Preset(preset.name), Scope::EachScenario);
-                set.push(GateSpec { expression, source, scope });
-            }
-        }
-        let here = std::env::current_dir().ok();
-        if let Some(project) = here.map(|folder| ProjectFile::find(&folder)).transpose()?.flatten() {
-            project.add_to(&mut set)?;
-        }
-        if set.probability.is_some() && design != Design::Random {
-            let message = format!(
-                "--max-probability needs independent samples, and those of --design {design} are not: use --design random"
-            );
-            return Err(CliError::Usage { message });
-        }
+        set.assemble(self.criteria()?, preset, is_paired, design).map_err(|error| match error {
+            AssemblyError::Project(error) => error.into(),
+            error => CliError::Usage { message: error.to_string() },
+        })?;
         Ok(set)
     }
 
@@ -138,29 +109,4 @@ impl GateArgs {
 
 fn criterion(text: &str) -> Result<Expression, CliError> {
     text.parse().map_err(|error| CliError::Usage { message: format!("{error}") })
-}
-
-/// Parses a probability, above 0 and below 1: 0 and 1 cannot be shown by samples.
-fn probability(text: &str) -> Result<f64, String> {
-    between(text, 0.0, "above 0 and below 1")
-}
-
-/// Parses a confidence, above 0.5 and below 1.
-fn confidence(text: &str) -> Result<f64, String> {
-    between(text, 0.5, "above 0.5 and below 1")
-}
-
-fn between(text: &str, low: f64, allowed: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if value > low && value < 1.0 => Ok(value),
-        _ => Err(format!("`{text}` is not a number {allowed}")),
-    }
-}
-
-/// Parses a share, 0 to 1.
-pub(super) fn share(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if (0.0..=1.0).contains(&value) => Ok(value),
-        _ => Err(format!("`{text}` is not a number from 0 to 1")),
-    }
 }

@@ -6,6 +6,7 @@ mod backend;
 mod baseline;
 mod calibrate;
 mod campaign;
+mod causes;
 mod check;
 mod command;
 mod compare;

@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use closecall_campaign::arguments::scenario_name;
 use closecall_campaign::repository::{Installation, create, repository_files, scenario_path, scenario_template};
 use closecall_simulation::scenario::ScenarioFile;
 use closecall_simulation::scenario::library::copy_of;
 use closecall_simulation::scenario::source::SCENARIOS;
-use closecall_traffic::ActorId;
 
 use super::CliError;
 use super::output::outln;
@@ -39,16 +39,6 @@ pub(super) struct InitArgs {
     /// Commit or tag that the CI job installs
     #[arg(long, value_name = "REV", default_value = concat!("v", env!("CARGO_PKG_VERSION")))]
     rev: String,
-}
-
-/// Parses the name of a scenario.
-fn scenario_name(text: &str) -> Result<String, String> {
-    match ActorId::new(text) {
-        Ok(_) => Ok(text.to_owned()),
-        Err(_) => Err(format!(
-            "`{text}` is not a scenario's name: lower-case letters, digits and hyphens, starting with a letter"
-        )),
-    }
 }
 
 pub(super) fn new(args: &NewArgs) -> Result<ExitCode, CliError> {

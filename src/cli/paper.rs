@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use closecall_campaign::arguments::positive;
 use closecall_campaign::robustness::robustness;
 use closecall_report::traffic::paper::Paper;
 use closecall_report::traffic::statistics::RecordedChanges;
@@ -12,7 +13,7 @@ use closecall_scenarios::filters::smooth;
 use closecall_scenarios::robustness::Setup;
 
 use super::CliError;
-use super::args::{FilesArgs, positive};
+use super::args::FilesArgs;
 use super::output::{print_written, write_charts};
 use super::protect::{of_trajectories, protect};
 use super::robustness::refused;

@@ -3,13 +3,13 @@
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
+use closecall_campaign::arguments::{count, share};
+use closecall_campaign::gate::PresetGates;
 use closecall_campaign::ledger::Inference;
 use closecall_campaign::stop::duration;
 use closecall_campaign::validity::CheckPlan;
 
 use super::CliError;
-use super::args::count;
-use super::gates::{PresetGates, share};
 
 /// Default number of samples of each scenario.
 const SAMPLES: u64 = 200;

@@ -1,7 +1,8 @@
 //! No command overwrites one of its inputs.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
+pub(super) use closecall_campaign::arguments::files_of_campaign as of_campaign;
 use closecall_campaign::fingerprint::named_files;
 pub(super) use closecall_scenarios::same_file::Output;
 use closecall_scenarios::same_file::check_outputs;
@@ -31,19 +32,4 @@ pub(super) fn of_trajectories(paths: &[PathBuf]) -> Vec<PathBuf> {
 pub(super) fn of_controller(controller: &ControllerChoice) -> Vec<PathBuf> {
     let files = controller.exec().map(|settings| named_files(settings, None)).unwrap_or_default();
     files.into_iter().map(|(_, path)| path).collect()
-}
-
-/// Returns the files of a campaign's folder. Its recordings, which can be made again, are not among them.
-pub(super) fn of_campaign(folder: &Path) -> Vec<PathBuf> {
-    let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
-    entries.filter_map(|entry| Some(entry.ok()?.path())).filter(|path| path.is_file()).collect()
-}
-
-/// Parses the path of a recording, whose extension must be .rrd.
-pub(super) fn recording(text: &str) -> Result<PathBuf, String> {
-    let path = PathBuf::from(text);
-    match path.extension() {
-        Some(extension) if extension == "rrd" => Ok(path),
-        _ => Err(format!("`{text}` must end with .rrd")),
-    }
 }

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use closecall_campaign::arguments::sample_count;
 use closecall_campaign::runner::{Sampling, concrete, run_guarded};
 use closecall_scenarios::sampling::Design;
 use closecall_scenarios::trajectory_data::{ground_truth_path, write_ground_truth, write_in_car, write_trajectories};
@@ -11,7 +12,7 @@ use closecall_simulation::trajectories::{InCarRecorder, TrafficRecorder, recorde
 use closecall_simulation::{Observer, RunKey};
 
 use super::CliError;
-use super::args::{SimulationArgs, count};
+use super::args::SimulationArgs;
 use super::backend::check_backend_of;
 use super::output::outln;
 use super::protect::{of_scenario, protect};
@@ -34,17 +35,6 @@ pub(super) struct RecordArgs {
     /// Trajectory file to write, in the plain CSV layout; with --in-car in the in-car layout
     #[arg(short, long, value_name = "FILE.csv")]
     output: PathBuf,
-}
-
-/// Largest number of samples in one trajectory file.
-const MAX_SAMPLES: u64 = 100_000;
-
-/// Parses a number of samples that fit into one trajectory file.
-fn sample_count(text: &str) -> Result<u64, String> {
-    match count(text)? {
-        number if number <= MAX_SAMPLES => Ok(number),
-        number => Err(format!("`{number}` is too large: a trajectory file holds up to {MAX_SAMPLES} samples")),
-    }
 }
 
 pub(super) fn record(args: &RecordArgs) -> Result<ExitCode, CliError> {

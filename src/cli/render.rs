@@ -3,12 +3,13 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use closecall_campaign::arguments::scene_count;
 use closecall_report::json::stamped;
 use closecall_sensors::camera::dataset::{Content, DatasetOptions, Set, render_dataset};
 use serde_json::json;
 
 use super::CliError;
-use super::args::{Format, count};
+use super::args::Format;
 use super::output::outln;
 use crate::exit_code::ExitCode;
 
@@ -43,11 +44,6 @@ pub(super) struct RenderArgs {
     /// Output format
     #[arg(long, value_enum, default_value_t)]
     format: Format,
-}
-
-/// Parses a number of scenes.
-fn scene_count(text: &str) -> Result<u32, String> {
-    u32::try_from(count(text)?).map_err(|_| format!("`{text}` is too large"))
 }
 
 pub(super) fn render(args: &RenderArgs) -> Result<ExitCode, CliError> {

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use closecall_campaign::arguments::positive;
 use closecall_report::json::stamped;
 use closecall_report::traffic::statistics::{RecordedChanges, STATISTICS_CHARTS, StatisticsText, statistics_charts};
 use closecall_scenarios::criticality::{CriticalLaneChange, Judgement, criticality, statistics as compute};
@@ -10,7 +11,7 @@ use closecall_scenarios::filters::smooth;
 use closecall_scenarios::trajectory_data::TrajectoryData;
 
 use super::CliError;
-use super::args::{FilesArgs, Format, positive};
+use super::args::{FilesArgs, Format};
 use super::output::{out, outln, write_charts};
 use super::protect::{of_trajectories, protect};
 use crate::exit_code::ExitCode;

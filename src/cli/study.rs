@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use closecall_campaign::arguments::count;
 use closecall_campaign::execution::CampaignError;
 use closecall_campaign::frontier::{FrontierPlan, Grid};
 use closecall_campaign::runner::Sampling;
@@ -15,7 +16,7 @@ use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::scenario::ScenarioFile;
 
 use super::CliError;
-use super::args::{Format, SensorsChoice, SetArgs, count};
+use super::args::{Format, SensorsChoice, SetArgs};
 use super::arms::ControllerArgs;
 use super::backend::check_backend;
 use super::campaign::progress_bar;

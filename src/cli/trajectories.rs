@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use closecall_campaign::arguments::{positive, recording as trajectory_path};
 use closecall_report::json::{self, stamped};
 use closecall_report::run::film::film_lane_change;
 use closecall_report::run::rerun::write_recording;
@@ -19,9 +20,9 @@ use closecall_scenarios::lane_change::{
 use closecall_scenarios::trajectory_data::{Layout, open, read_with};
 
 use super::CliError;
-use super::args::{FilesArgs, Format, ReadArgs, positive};
+use super::args::{FilesArgs, Format, ReadArgs};
 use super::output::{command_line, out, outln, print_error, print_written, write_charts};
-use super::protect::{of_trajectories, protect, recording as trajectory_path};
+use super::protect::{of_trajectories, protect};
 
 use crate::exit_code::ExitCode;
 

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use closecall_campaign::arguments::{recording, table};
 use closecall_campaign::runner::run_guarded;
 use closecall_report::run::film::{Film, FilmRecorder, Level};
 use closecall_report::run::observers::RunObservers;
@@ -15,7 +16,7 @@ use closecall_simulation::{Arm, RunKey};
 use super::CliError;
 use super::backend::check_backend_of;
 use super::output::print_written;
-use super::protect::{Output, recording};
+use super::protect::Output;
 
 /// The level of detail of a recording.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -58,15 +59,6 @@ impl WatchArgs {
     /// Returns the files to write.
     pub(super) fn outputs(&self) -> [Output<'_>; 2] {
         [("--record", self.record.as_deref()), ("--trace", self.trace.as_deref())]
-    }
-}
-
-/// Parses the path of a table, whose extension must be .csv or .parquet.
-fn table(text: &str) -> Result<PathBuf, String> {
-    let path = PathBuf::from(text);
-    match path.extension().and_then(|extension| extension.to_str()) {
-        Some("csv" | "parquet") => Ok(path),
-        _ => Err(format!("`{text}` must end with .csv or .parquet")),
     }
 }
 

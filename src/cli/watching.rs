@@ -4,14 +4,15 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
 use clap::Args;
+use closecall_campaign::arguments::count;
 use closecall_campaign::runner::{Sampling, concrete, run_guarded};
+use closecall_report::run::text::outcome_line;
 use closecall_scenarios::sampling::Design;
-use closecall_simulation::outcome::Outcome;
 use closecall_simulation::scenario::source::existing;
 use closecall_simulation::{NoObserver, RunKey};
 
 use super::CliError;
-use super::args::{SimulationArgs, count};
+use super::args::SimulationArgs;
 use super::arms::ComparisonArgs;
 use super::output::{outln, print_error};
 use crate::exit_code::ExitCode;
@@ -88,20 +89,8 @@ fn round(args: &WatchingArgs, path: &Path) -> Result<(), CliError> {
         for arm in &arms {
             let key = RunKey { seed: args.sim.seed, sample };
             let outcome = run_guarded(&scenario, key, arm, &mut NoObserver).map_err(fail)?;
-            outln!("  {}", line(&outcome));
+            outln!("  {}", outcome_line(&outcome));
         }
     }
     Ok(())
-}
-
-/// Returns an outcome in one line.
-fn line(outcome: &Outcome) -> String {
-    let result = if outcome.ego_collided() { "COLLISION" } else { "no collision" };
-    let rear = outcome.margins.min_gap_rear_m.map_or("-".to_owned(), |gap_m| format!("{gap_m:.1} m"));
-    let engaged = match &outcome.mis {
-        Ok(mis) => mis.engaged_at_s.map_or("not engaged".to_owned(), |time_s| format!("engaged at {time_s:.1} s")),
-        Err(_) => "no MIS".to_owned(),
-    };
-    let (sample, controller) = (outcome.sample, &outcome.controller);
-    format!("sample {sample}  {controller:<5} {result:<12}  smallest rear gap {rear:>7}  {engaged}")
 }

@@ -6,6 +6,7 @@
 //! ```
 //!
 //! * [`binomial`]: probabilities of the binomial distribution, accurate to the last few bits
+//! * [`consistency`]: whether a filter's covariance agrees with its errors
 //! * [`format`](mod@format): shares as text
 //! * [`interval`]: exact bounds of a probability for a number of samples that is fixed in advance
 //! * [`sequence`]: bounds of a probability that hold at every number of samples at once, and may be inspected at any time
@@ -20,6 +21,7 @@
 //! All methods for probabilities assume independent, identically distributed samples, as in the random sampling design.
 
 pub mod binomial;
+pub mod consistency;
 pub mod format;
 pub mod holm;
 pub mod interval;

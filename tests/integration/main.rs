@@ -7,6 +7,7 @@ mod arms;
 mod assumptions;
 mod calibrate;
 mod campaign_example;
+mod causes;
 mod changed_controller;
 mod commands;
 mod comparison;

@@ -2,10 +2,11 @@
 
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_scenarios::sampling::Design;
-use closecall_sensors::{Consistency, Credibility, NEES_QUANTILE_95, SensorMode};
+use closecall_sensors::{NEES_QUANTILE_95, SensorMode};
 use closecall_simulation::controller::BuiltIn;
 use closecall_simulation::scenario::ScenarioFile;
 use closecall_simulation::{Arm, RunKey, TrackAuditor, simulate};
+use closecall_statistics::consistency::{Consistency, Credibility};
 use rayon::prelude::*;
 
 use crate::support::all_of_library;

@@ -4,12 +4,14 @@
 //!  GateSet ─▶ Judge ─(one record after the other)─▶ Judgement { verdict, gates, requirements, expectations, reasons }
 //! ```
 
+mod assemble;
 mod evaluate;
 mod judge;
 mod project;
 mod result;
 mod set;
 
+pub use assemble::{AssemblyError, PresetGates};
 pub use evaluate::{Accumulator, Answer, Evaluation, OpenReason};
 pub use judge::Judge;
 pub use project::{ProjectError, ProjectFile};

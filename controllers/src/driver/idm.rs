@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use super::attention::{Lapse, LapseConfig, check_lapse};
 use super::pedals::{Pedals, check_brake_build_up};
 use super::perception::{Perception, PerceptionConfig, PerceptionSettings, check_perception};
-use super::reaction::{Reaction, ReactionConfig};
+use super::reaction::{Reaction, ReactionChange, ReactionConfig};
 use super::wiedemann99::{EmergencyBrakingDetector, brake_for_brake_light, default_desired_mps, nearest_lead};
 use super::{Driver, DriverAction, DriverError, DriverInput, Lead, Looks, check_finite, check_hardest_braking, finite};
 
@@ -100,6 +100,14 @@ impl Check for IdmConfig {
 }
 
 impl Idm {
+    /// Returns the same driver with another reaction.
+    #[must_use]
+    pub(crate) fn reacting(self, change: ReactionChange) -> Self {
+        let lapse = self.lapse.filter(|_| change != ReactionChange::AtOnce);
+        let reaction = self.reaction.map(|reaction| reaction.changed(change));
+        Self { reaction, perception: self.perception.changed(change), lapse, ..self }
+    }
+
     /// Returns the gap that the driver keeps behind a vehicle at `speed_mps`, s₀ + T·v (m).
     pub(crate) fn safe_gap_m(&self, speed_mps: f64) -> f64 {
         self.standstill_gap_m + self.time_gap_s * speed_mps

@@ -113,17 +113,48 @@ pub enum Reaction {
         median_s: f64,
         /// Standard deviation of the logarithm, at least 0.
         sigma: f64,
+        /// Time by which the driver reacts later than drawn (s).
+        later_s: f64,
     },
 }
 
+/// A change of the reaction of a driver.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ReactionChange {
+    /// The driver reacts at once to what it sees, and never looks away.
+    AtOnce,
+    /// The driver reacts this much later (s), but at most 3 s after what it sees.
+    Later(f64),
+}
+
 impl Reaction {
+    /// Returns the value, or the median of the drawn ones (s).
+    pub(crate) fn typical_s(self) -> f64 {
+        match self {
+            Self::Fixed(value) => value,
+            Self::LogNormal { median_s, later_s, .. } => median_s + later_s,
+        }
+    }
+
+    /// Returns the changed reaction time.
+    #[must_use]
+    pub(crate) fn changed(self, change: ReactionChange) -> Self {
+        match (self, change) {
+            (_, ReactionChange::AtOnce) => Self::Fixed(0.0),
+            (Self::Fixed(value), ReactionChange::Later(later_s)) => Self::Fixed((value + later_s).min(MAX_REACTION_S)),
+            (Self::LogNormal { median_s, sigma, .. }, ReactionChange::Later(later_s)) => {
+                Self::LogNormal { median_s, sigma, later_s }
+            }
+        }
+    }
+
     /// Returns the reaction time of one driver in one run (s), at most 3 s.
     pub fn draw_s(self, rng: &mut Stream) -> f64 {
         match self {
             Self::Fixed(value) => value,
-            Self::LogNormal { median_s, sigma } => {
+            Self::LogNormal { median_s, sigma, later_s } => {
                 let normal: f64 = StandardNormal.sample(rng);
-                (median_s * (sigma * normal).exp()).min(MAX_REACTION_S)
+                (median_s * (sigma * normal).exp() + later_s).min(MAX_REACTION_S)
             }
         }
     }
@@ -143,7 +174,7 @@ impl Check for ReactionConfig {
                 let range = Range::above(0.0, MAX_REACTION_S);
                 let median_s = parameters.number(&config.median, "median", range).map_err(locate)?;
                 let sigma = parameters.number(&config.sigma, "sigma", Range::UNIT).map_err(locate)?;
-                Ok(Reaction::LogNormal { median_s, sigma })
+                Ok(Reaction::LogNormal { median_s, sigma, later_s: 0.0 })
             }
         }
     }
@@ -158,7 +189,7 @@ mod tests {
     #[test]
     fn a_drawn_reaction_time_has_the_given_median() {
         let mut rng = stream(0, 0, &ActorId::new("rear").unwrap(), "driver");
-        let reaction = Reaction::LogNormal { median_s: 0.9, sigma: 0.3 };
+        let reaction = Reaction::LogNormal { median_s: 0.9, sigma: 0.3, later_s: 0.0 };
         let mut drawn: Vec<f64> = (0..4001).map(|_| reaction.draw_s(&mut rng)).collect();
         drawn.sort_by(f64::total_cmp);
         assert!((drawn[2000] - 0.9).abs() < 0.02, "{}", drawn[2000]);

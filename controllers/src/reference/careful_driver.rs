@@ -9,11 +9,11 @@ use super::{Assessment, BUILD_UP_MPS3, Conflict, DELAY_S, HARDEST_BRAKING_MPS2, 
 /// Deceleration during the delay (m/s²) (JRC-FSM).
 const RELEASED_ACCELERATOR_MPS2: f64 = 0.4;
 /// Time to collision up to which there is a risk (s) (JRC-FSM).
-pub(crate) const CRITICAL_TTC_S: f64 = 2.0;
+pub const CRITICAL_TTC_S: f64 = 2.0;
 
-/// The reaction to a risk.
+/// The reaction of the driver to a risk: first the accelerator is released, then the brake is applied.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct BrakingReaction {
+pub struct BrakingReaction {
     /// Time for which the risk has been perceived (s).
     perceived_s: f64,
     /// Present deceleration (m/s²); 0 without a risk.
@@ -22,7 +22,7 @@ pub(crate) struct BrakingReaction {
 
 impl BrakingReaction {
     /// Reacts to a risk for `step_s` more, and returns the deceleration (m/s²).
-    pub(crate) fn advance(&mut self, step_s: f64) -> f64 {
+    pub fn advance(&mut self, step_s: f64) -> f64 {
         self.braking_mps2 = if self.perceived_s < DELAY_S {
             RELEASED_ACCELERATOR_MPS2
         } else {

@@ -13,8 +13,7 @@ mod careful_driver;
 mod cut_in;
 mod fuzzy_safety;
 
-pub use careful_driver::CarefulDriver;
-pub(crate) use careful_driver::{BrakingReaction, CRITICAL_TTC_S};
+pub use careful_driver::{BrakingReaction, CRITICAL_TTC_S, CarefulDriver};
 pub use cut_in::CutIn;
 pub use fuzzy_safety::FuzzySafetyModel;
 pub(crate) use fuzzy_safety::following_gap_m;

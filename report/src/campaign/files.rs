@@ -5,6 +5,7 @@ use std::io::Write;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use closecall_campaign::failure::FailureKind;
 use closecall_campaign::folder::{Folder, FolderError};
 use closecall_campaign::manifest::Manifest;
 use closecall_campaign::record::{ArmRecord, Record};
@@ -57,6 +58,18 @@ pub enum ReportError {
         /// Why it has no outcome.
         source: SampleError,
     },
+}
+
+impl ReportError {
+    /// Returns the kind of the error.
+    pub fn kind(&self) -> FailureKind {
+        match self {
+            Self::Folder(error) => FailureKind::from(error),
+            Self::Saved(error) => FailureKind::from(error),
+            Self::Write(_) | Self::Recording(_) => FailureKind::Io,
+            Self::Sample { .. } => FailureKind::Sample,
+        }
+    }
 }
 
 /// A finished campaign with its verdict.
@@ -152,6 +165,7 @@ impl CampaignReport<'_> {
             overview: &self.tally.overview,
             recordings,
             gallery: has_gallery.then_some(gallery.as_str()),
+            folder,
             slowest,
         })
     }

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::overview::Overview;
 use super::timings::Timing;
+use closecall_campaign::folder::Folder;
 use closecall_campaign::manifest::Manifest;
 use closecall_campaign::summary::Summary;
 use closecall_campaign::verdict::Judgement;
@@ -30,6 +31,8 @@ pub struct Findings<'a> {
     pub recordings: &'a Recordings,
     /// The page of the recordings, relative to the campaign's folder, if there is one.
     pub gallery: Option<&'a str>,
+    /// The campaign's folder, if there is one.
+    pub folder: Option<&'a Folder>,
     /// The samples with the longest wall times, in falling order.
     pub slowest: &'a [Timing],
 }

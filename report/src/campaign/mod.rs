@@ -7,6 +7,7 @@
 //! ```
 
 mod arm_pairs;
+mod causes;
 mod comparison;
 mod ensemble;
 mod files;
@@ -22,6 +23,7 @@ mod tally;
 mod text;
 pub mod timings;
 
+pub use causes::write_causes;
 pub use comparison::{BaselineText, ComparisonText};
 pub use ensemble::{ensemble_json, ensemble_text};
 pub use files::{CampaignReport, ReportError};

@@ -5,6 +5,18 @@ use std::fmt;
 use closecall_simulation::outcome::Outcome;
 use closecall_traffic::Measured;
 
+/// Returns an outcome in one line.
+pub fn outcome_line(outcome: &Outcome) -> String {
+    let result = if outcome.ego_collided() { "COLLISION" } else { "no collision" };
+    let rear = outcome.margins.min_gap_rear_m.map_or("-".to_owned(), |gap_m| format!("{gap_m:.1} m"));
+    let engaged = match &outcome.mis {
+        Ok(mis) => mis.engaged_at_s.map_or("not engaged".to_owned(), |time_s| format!("engaged at {time_s:.1} s")),
+        Err(_) => "no MIS".to_owned(),
+    };
+    let (sample, controller) = (outcome.sample, &outcome.controller);
+    format!("sample {sample}  {controller:<5} {result:<12}  smallest rear gap {rear:>7}  {engaged}")
+}
+
 /// The outcome of a run as text for human readers, over several lines.
 #[derive(Clone, Copy, Debug)]
 pub struct OutcomeText<'a>(pub &'a Outcome);

@@ -30,7 +30,7 @@ mod recorded;
 #[cfg(test)]
 mod tests;
 
-pub use choose::{ChoiceError, choose};
+pub use choose::{ChoiceError, choose, track_suggestion};
 pub use find::encounter;
 pub use recorded::{
     EGO_INDEX, LEAD_IN, LEAD_INDEX, LEAD_OUT, LONGEST_THW_S, NoEncounter, Participant, REACH_M, REAR_INDEX,

@@ -87,6 +87,22 @@ impl Clustering {
         self.labels.extend(self.row_of.iter().map(|&row| found[row as usize].unwrap_or(NOISE)));
     }
 
+    /// Assigns the candidates to clusters by the vehicle that each belongs to, `None` for one that belongs to no vehicle.
+    pub(crate) fn assign(&mut self, vehicles: impl Iterator<Item = Option<usize>>) {
+        let mut seen = Vec::new();
+        self.labels.clear();
+        for vehicle in vehicles {
+            let index = vehicle.map(|vehicle| {
+                seen.iter().position(|known| *known == vehicle).unwrap_or_else(|| {
+                    seen.push(vehicle);
+                    seen.len() - 1
+                })
+            });
+            self.labels.push(index.and_then(|index| u32::try_from(index).ok()).unwrap_or(NOISE));
+        }
+        self.count = seen.len();
+    }
+
     /// Merges each cluster into its parent, which is another cluster or itself. Chains of parents are followed to their
     /// end.
     pub(crate) fn merge(&mut self, parents: &[u32]) {

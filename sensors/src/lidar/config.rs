@@ -60,6 +60,20 @@ pub struct Lidar {
     pub(crate) dropout: f64,
     pub(crate) levelling_sd_rad: f64,
     pub(crate) window_transmission: f64,
+    /// Whether the points are the truth: no noise, no loss, no weather.
+    pub(crate) is_exact: bool,
+}
+
+/// Range of a LiDAR whose points are the truth (m): more than that of the region of interest.
+const EXACT_RANGE_M: f64 = 500.0;
+
+impl Lidar {
+    /// Returns the same LiDAR without noise and losses.
+    pub(crate) fn exact(self) -> Self {
+        let (dropout, levelling_sd_rad, window_transmission) = (0.0, 0.0, 1.0);
+        let nominal_range_m = EXACT_RANGE_M;
+        Self { nominal_range_m, dropout, levelling_sd_rad, window_transmission, is_exact: true, ..self }
+    }
 }
 
 impl Check for LidarConfig {
@@ -75,6 +89,7 @@ impl Check for LidarConfig {
             dropout: number(&self.dropout, "dropout", Range::closed(0.0, 0.5))?,
             levelling_sd_rad: number(&self.levelling_sd_rad, "levelling-sd-rad", Range::closed(0.0, 0.02))?,
             window_transmission: number(&self.window_transmission, "window-transmission", Range::closed(0.0, 1.0))?,
+            is_exact: false,
         })
     }
 }
@@ -90,6 +105,7 @@ impl Default for Lidar {
             dropout: 0.01,
             levelling_sd_rad: 0.0005,
             window_transmission: 1.0,
+            is_exact: false,
         }
     }
 }

@@ -6,7 +6,7 @@ use super::boxes::BoxFit;
 use super::classify::{class_scores, typical_size_m};
 use super::clustering::{Clustering, NOISE};
 use super::ground::{Candidate, select_candidates};
-use super::{LaneGeometry, LidarScan};
+use super::{LaneGeometry, LidarScan, PointSource, ScanTruth};
 use crate::{Detection, Extent, SensorError};
 
 /// Number of columns between the edges of two clusters within which the nearer cluster may occlude the other.
@@ -91,6 +91,32 @@ impl Detector {
             let mut parents = self.parents.iter().zip(0..).map(|(&parent, own)| parent == own);
             self.fits.retain(|_| parents.next().unwrap_or(false));
         }
+        for index in 0..self.fits.len() {
+            let hidden = occluded_edges(index, &self.fits);
+            self.detections.push(detection(&self.fits[index], hidden, scan.start, lane));
+        }
+        Ok(&self.detections)
+    }
+
+    /// Detects boxes in a scan whose points are assigned to the vehicles that they belong to.
+    ///
+    /// # Errors
+    /// Returns the errors of [`Detector::detect`].
+    pub(crate) fn detect_by_truth(
+        &mut self,
+        (scan, truth): (&LidarScan, &ScanTruth),
+        lane: &LaneGeometry,
+    ) -> Result<&[Detection], SensorError> {
+        self.detections.clear();
+        select_candidates(scan, lane, scan.end, &mut self.candidates)?;
+        self.clustering.assign(self.candidates.iter().map(|candidate| {
+            match truth.points[candidate.index as usize].source {
+                PointSource::Actor(actor) => Some(actor),
+                _ => None,
+            }
+        }));
+        self.group_by_cluster();
+        self.fit(scan, lane);
         for index in 0..self.fits.len() {
             let hidden = occluded_edges(index, &self.fits);
             self.detections.push(detection(&self.fits[index], hidden, scan.start, lane));

@@ -42,12 +42,19 @@ pub(crate) const MAX_NORMAL: f32 = 3.465;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Noise {
     key: u64,
+    /// Factor of all normal numbers: 1, or 0 for a scan without noise.
+    scale: f32,
 }
 
 impl Noise {
     /// Draws the key of a scan from the stream, as exactly one number.
     pub(crate) fn draw(rng: &mut Stream) -> Self {
-        Self { key: rng.next_u64() }
+        Self { key: rng.next_u64(), scale: 1.0 }
+    }
+
+    /// Returns the same noise with all normal numbers at zero.
+    pub(crate) fn silenced(self) -> Self {
+        Self { scale: 0.0, ..self }
     }
 
     /// Returns 64 random bits for a beam and a purpose.
@@ -75,7 +82,7 @@ impl Noise {
             + ((bits >> 16) & 0xffff) as u32
             + ((bits >> 32) & 0xffff) as u32
             + (bits >> 48) as u32;
-        ((sum as f32 + 2.0) * (1.0 / 65_536.0) - 2.0) * SQRT_3
+        ((sum as f32 + 2.0) * (1.0 / 65_536.0) - 2.0) * SQRT_3 * self.scale
     }
 }
 

@@ -36,6 +36,15 @@ impl RearLidar {
         }
     }
 
+    /// Detects boxes in the latest scan, with the points of each vehicle as one cluster.
+    ///
+    /// # Errors
+    /// Returns the errors of [`Detector::detect`].
+    pub(crate) fn detect_by_truth(&mut self) -> Result<&[Detection], SensorError> {
+        let scan = (self.scanner.latest(), self.scanner.truth());
+        self.lane.as_ref().map_or(Ok(&[]), |lane| self.detector.detect_by_truth(scan, lane))
+    }
+
     /// Returns true if the latest scan has no point, not even one of the road.
     pub fn is_dark(&mut self) -> bool {
         self.scanner.is_dark()

@@ -120,7 +120,8 @@ impl Scanner {
     ///
     /// Points of the bare road that the detector would discard are left out; see [`Scanner::complete`].
     pub fn scan(&mut self, scene: &Scene<'_>, rng: &mut Stream) -> &LidarScan {
-        let noise = Noise::draw(rng);
+        let drawn = Noise::draw(rng);
+        let noise = if self.lidar.is_exact { drawn.silenced() } else { drawn };
         let mirror_side = Self::mirror_side_at(scene.time);
         let viewpoint = Viewpoint::new(scene, &self.lidar);
         self.collect_targets(scene, mirror_side, &viewpoint);

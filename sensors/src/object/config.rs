@@ -27,6 +27,7 @@ use closecall_traffic::{CONTROL_STEP, ConfigError, Num, Parameters, Problem, Ran
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::Alterations;
 use crate::lidar::HALF_FIELD_DEG;
 use crate::tracking::lifecycle::{LifecycleRules, MAX_WINDOW};
 
@@ -87,6 +88,25 @@ pub struct ObjectSensorModel {
     pub(super) dropout: f64,
     pub(super) rules: LifecycleRules,
     pub(super) class_confidence: f64,
+    /// Whether every vehicle is classified as background.
+    pub(super) is_class_background: bool,
+}
+
+impl ObjectSensorModel {
+    /// Returns the latency in control steps.
+    pub(crate) fn latency_steps(&self) -> usize {
+        self.latency_steps
+    }
+
+    /// Returns the same sensor with the altered latency and, if it looks back, the altered class.
+    pub(crate) fn altered(self, altered: &Alterations, looks_back: bool) -> Self {
+        Self {
+            latency_steps: altered.latency_steps(self.latency_steps, MAX_LATENCY_STEPS),
+            class_confidence: if altered.has_true_class && looks_back { 1.0 } else { self.class_confidence },
+            is_class_background: altered.is_class_background && !altered.has_true_class && looks_back,
+            ..self
+        }
+    }
 }
 
 /// The default values of one sensor, in the units of the configuration.
@@ -216,6 +236,7 @@ impl ObjectSensorConfig {
             dropout,
             rules: self.rules(defaults, dropout, steps(coast_s))?,
             class_confidence,
+            is_class_background: false,
         })
     }
 

@@ -14,6 +14,7 @@ use super::config::{MAX_LATENCY_STEPS, ObjectSensorModel};
 use super::noise::{MeasurementErrors, NoiseKey, TargetNoise};
 use super::visibility::{Direction, Field, Visibility};
 use super::weather::range_in_weather_m;
+use crate::alterations::BACKGROUND;
 use crate::gaussian::Gaussian;
 use crate::perception::FieldOfView;
 use crate::surroundings::OtherVehicle;
@@ -265,7 +266,10 @@ impl ObjectSensor {
             heading_rad: estimate.heading_rad,
             length_m: other.length_m,
             width_m: other.width_m,
-            class: class_scores(other.class, self.model.class_confidence),
+            class: match self.model.is_class_background {
+                true => BACKGROUND,
+                false => class_scores(other.class, self.model.class_confidence),
+            },
             existence: report.lifecycle.existence(),
             lane: input.frame.lane_probabilities(across.position_m, across.position_variance_m2.sqrt()),
         }

@@ -5,6 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::lifecycle::{LifecycleRules, MAX_WINDOW};
+use crate::Alterations;
 
 /// The tracker as a scenario file describes it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -47,6 +48,12 @@ impl TrackerModel {
     /// Returns the number of whole control steps from the end of a scan to its tracks.
     pub(crate) fn latency_steps(&self) -> usize {
         self.latency_steps as usize
+    }
+
+    /// Returns the same tracker with the altered latency.
+    pub(crate) fn altered(self, altered: &Alterations) -> Self {
+        let steps = altered.latency_steps(self.latency_steps(), steps(MAX_LATENCY_S) as usize);
+        Self { latency_steps: u32::try_from(steps).unwrap_or(self.latency_steps), ..self }
     }
 }
 

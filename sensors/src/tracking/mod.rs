@@ -16,7 +16,6 @@ mod audit;
 pub(crate) mod axis;
 mod classes;
 mod config;
-mod consistency;
 mod extent;
 pub(crate) mod lifecycle;
 mod measurement;
@@ -30,7 +29,6 @@ mod view;
 
 pub use audit::{NEES_QUANTILE_95, TrackAudit};
 pub use config::{TrackerConfig, TrackerModel};
-pub use consistency::{Consistency, Credibility};
 pub use track_list::TrackList;
 pub use tracker::{Tracker, TrackerScan};
 pub use view::RearView;

@@ -2,6 +2,7 @@
 
 mod fixed_gap;
 
+use closecall_statistics::consistency::{Consistency, Credibility};
 use closecall_traffic::{
     ActorId, CONTROL_STEP, Check, ClassScores, Environment, Parameters, Road, Stream, Track, TrackId, TrackStatus,
     VehicleClass, stream,

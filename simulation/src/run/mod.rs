@@ -12,7 +12,9 @@
 mod arm;
 mod auditor;
 mod closed_loop;
+mod delayed_truth;
 mod ego_input;
+mod equipment;
 mod error;
 mod events;
 mod humans;
@@ -24,6 +26,7 @@ mod phase;
 mod settling;
 mod start;
 mod state;
+mod suppressed;
 
 pub use arm::{Arm, ControllerFactory, RunKey};
 pub use auditor::TrackAuditor;

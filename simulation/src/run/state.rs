@@ -4,10 +4,11 @@ use closecall_controllers::CheckedDriver;
 use closecall_controllers::{
     DriverInput, DriverNote, EgoCommand, EgoController, EgoInput, EgoState, Looks, MisSettings, Neighbours,
 };
-use closecall_sensors::{NoiseKey, Perception, Scene, SceneVehicle};
+use closecall_sensors::{Perception, Scene, SceneVehicle};
 use closecall_traffic::{CONTROL_STEP, ENGAGEMENT_CLOSING_MPS, ENGAGEMENT_GAP_M, Measured, Track, VehicleState};
 
 use super::ego_input::{odometry, sensor_availability};
+use super::equipment::{controller, perception};
 use super::events::Events;
 use super::humans::{Human, human_drivers, looks, weave};
 use super::margins::{MarginMeter, Widths};
@@ -62,12 +63,16 @@ impl<'a> Run<'a> {
         let CheckedDriver::Ego(settings) = &scenario.actors[scenario.ego].driver else {
             unreachable!("a checked scenario has its ego stack at `ego`")
         };
+        let own = key;
+        // Noise and drivers draw from these random numbers; the outcome names the run itself.
+        let key = scenario.random_numbers.map_or(own, |of| RunKey { seed: of.seed, sample: of.sample });
         let world_with = |ego: VehicleState| {
             let vehicles = scenario.actors.iter().enumerate().map(|(index, actor)| InitialVehicle {
                 id: actor.id.clone(),
                 vehicle: actor.vehicle,
                 state: if index == scenario.ego { ego } else { actor.start },
                 weave: weave(actor, &scenario.road, key),
+                has_ideal_actuators: index == scenario.ego && scenario.interventions.has_ideal_actuation,
             });
             World::new(scenario.road, scenario.environment.friction, scenario.physics_step, vehicles.collect())
         };
@@ -79,22 +84,13 @@ impl<'a> Run<'a> {
         }
         let widths = Widths { vehicle_m: 0.0, lane_m: scenario.road.lane_width_m() };
         let margins = CurrentMargins::new(world.state(scenario.ego), &Neighbours::default(), widths);
-        let sensors = match arm.sensors {
-            Some(mode) => scenario.sensors.with_mode(mode),
-            None => scenario.sensors,
-        };
         let humans = human_drivers(scenario, key);
         let mut run = Self {
             scenario,
-            key,
+            key: own,
             arm,
-            perception: sensors.build(&NoiseKey {
-                seed: key.seed,
-                sample: key.sample,
-                ego: scenario.ego_id().clone(),
-                actors: scenario.actors.iter().map(|actor| actor.id.clone()).collect(),
-            })?,
-            controller: arm.controller.build(settings),
+            perception: perception(scenario, arm, key)?,
+            controller: controller(scenario, settings, arm),
             looks: looks(&humans, scenario.actors.len()),
             humans,
             events: Events::new(scenario),

@@ -9,8 +9,9 @@ use closecall_traffic::{
 
 use crate::world::lateral_grip_mps2;
 
-use super::config::{ActorConfig, SCHEMA_VERSION, ScenarioConfig};
+use super::config::{ActorConfig, RandomNumbersConfig, SCHEMA_VERSION, ScenarioConfig};
 use super::events::{self, Event};
+use super::intervention::Interventions;
 use super::{placement, traffic};
 
 /// Largest probability or confidence that a gate may ask for: the largest number below 1 (-).
@@ -55,6 +56,10 @@ pub struct Scenario {
     pub parameters: Parameters,
     /// Step of the vehicle dynamics and the human drivers. The control step is a multiple of it.
     pub(crate) physics_step: Time,
+    /// The sample whose random numbers every run uses; `None` for those of the run itself.
+    pub(crate) random_numbers: Option<RandomNumbersConfig>,
+    /// Stages that are replaced by the truth, and made faults.
+    pub(crate) interventions: Interventions,
 }
 
 impl Scenario {
@@ -78,6 +83,9 @@ impl Check for ScenarioConfig {
             traffic::add(traffic, &mut actors, ego, &road, parameters)
                 .map_err(|error| error.within_index(index).within("traffic"))?;
         }
+        let interventions = Interventions::check(&self.ideal, &self.fault, parameters)?;
+        interventions.apply(&mut actors, ego);
+        let sensors = self.sensors.check(parameters).map_err(|error| error.within("sensors"))?;
         Ok(Scenario {
             name: self.name.clone(),
             duration: Time::from_s(duration_s),
@@ -85,9 +93,11 @@ impl Check for ScenarioConfig {
             environment,
             ego,
             actors,
-            sensors: self.sensors.check(parameters).map_err(|error| error.within("sensors"))?,
+            sensors: sensors.altered(interventions.sensors),
             parameters: parameters.clone(),
             physics_step: PHYSICS_STEP,
+            random_numbers: self.random_numbers,
+            interventions,
         })
     }
 }

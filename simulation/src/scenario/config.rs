@@ -10,6 +10,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::events::EventConfig;
+use super::intervention::{FaultConfig, IdealConfig};
 use super::traffic::TrafficConfig;
 use crate::criteria::{Expression, FlagName, GateConfig};
 
@@ -65,6 +66,20 @@ pub struct ScenarioConfig {
     /// The ego's sensors.
     #[serde(default)]
     pub sensors: SensorsConfig,
+    /// The sample whose random numbers every run uses, instead of those of its own seed and number. For cases that were made
+    /// from a sample.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub random_numbers: Option<RandomNumbersConfig>,
+    /// Stages of the chain that are replaced by the truth. Default: none.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub ideal: IdealConfig,
+    /// Made faults. Default: none.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub fault: FaultConfig,
+}
+
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
 }
 
 /// Share of the samples in which what is expected must happen unless the file says otherwise (-).
@@ -72,6 +87,16 @@ pub(super) const EXPECTS_SHARE: f64 = 0.95;
 
 const fn default_expects_share() -> f64 {
     EXPECTS_SHARE
+}
+
+/// A sample whose random numbers are used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct RandomNumbersConfig {
+    /// The seed.
+    pub seed: u64,
+    /// The sample's number.
+    pub sample: u64,
 }
 
 /// One vehicle with its driver.

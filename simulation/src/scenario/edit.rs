@@ -19,6 +19,9 @@ pub struct Setting {
     value: String,
 }
 
+/// Tables at the top level that a file may leave out and a setting may create.
+const OPTIONAL_TABLES: [&str; 2] = ["ideal", "fault"];
+
 /// A setting that cannot be applied.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SettingError {
@@ -101,7 +104,8 @@ impl Setting {
         let mut parents = parents.iter();
         while let Some(part) = parents.next() {
             // Below the first level, a table that the file leaves out is created. Its content is checked like the rest.
-            if !table.contains_key(part) && *part != self.key[0] {
+            let is_optional = *part != self.key[0] || OPTIONAL_TABLES.contains(&part.as_str());
+            if !table.contains_key(part) && is_optional {
                 table.insert(part, Item::Value(Value::InlineTable(InlineTable::new())));
             }
             let known = keys(table);

@@ -86,6 +86,16 @@ pub enum ScenarioError {
 }
 
 impl ScenarioError {
+    /// Returns whether the file cannot be read at all.
+    pub const fn is_io(&self) -> bool {
+        matches!(self, Self::Read { .. })
+    }
+
+    /// Returns whether a setting is wrong, and not the file.
+    pub const fn is_setting(&self) -> bool {
+        matches!(self, Self::Set { .. })
+    }
+
     /// Returns the line of the error, counted from 1, or `None` if it has none.
     pub const fn line(&self) -> Option<usize> {
         match self {

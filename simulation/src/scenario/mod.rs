@@ -13,6 +13,7 @@ mod config;
 mod edit;
 mod events;
 mod file;
+mod intervention;
 pub mod library;
 mod locate;
 pub mod member;
@@ -28,7 +29,10 @@ mod traffic;
 mod variation;
 
 pub use checked::{Actor, Scenario};
-pub use config::{AbsoluteStartConfig, ActorConfig, RelativeStartConfig, SCHEMA_VERSION, ScenarioConfig, StartConfig};
+pub use config::{
+    AbsoluteStartConfig, ActorConfig, RandomNumbersConfig, RelativeStartConfig, SCHEMA_VERSION, ScenarioConfig,
+    StartConfig,
+};
 pub use edit::{Setting, SettingError};
 pub(crate) use events::{Brake, Effect, Event, Trigger};
 pub use events::{
@@ -36,6 +40,7 @@ pub use events::{
     ThwBelowConfig, TriggerConfig,
 };
 pub use file::{ScenarioError, ScenarioFile};
+pub use intervention::{FaultConfig, IdealConfig, MisState};
 pub use reenacted::{RearDriver, actor_name, reenact};
 pub use sampled::{SampledEncounter, opp2_of, sampled};
 pub use schema::strict_schema;

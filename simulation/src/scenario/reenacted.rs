@@ -160,6 +160,9 @@ pub(super) fn config(encounter: &RecordedEncounter, rear: RearDriver) -> Result<
         actors,
         traffic: Vec::new(),
         sensors: Default::default(),
+        random_numbers: None,
+        ideal: Default::default(),
+        fault: Default::default(),
     })
 }
 

@@ -124,6 +124,12 @@ impl Plant {
         }
     }
 
+    /// Returns the same vehicle with actuators that follow the command at once.
+    pub(crate) fn with_ideal_actuators(self) -> Self {
+        let capability = Capability { lag_s: 0.0, jerk_limit_mps3: f64::INFINITY, ..self.capability };
+        Self { capability, lag_share: 1.0, ..self }
+    }
+
     /// Returns the current state.
     pub(crate) fn state(&self) -> &VehicleState {
         &self.state

@@ -34,6 +34,8 @@ pub(crate) struct InitialVehicle {
     pub(crate) state: VehicleState,
     /// The lateral deviation of its driver, or `None` if the driver does not weave.
     pub(crate) weave: Option<Weave>,
+    /// Whether its actuators follow the command at once.
+    pub(crate) has_ideal_actuators: bool,
 }
 
 enum Body {
@@ -87,8 +89,10 @@ impl World {
     pub(crate) fn new(road: Road, friction: f64, step: Time, vehicles: Vec<InitialVehicle>) -> Self {
         let actors: Vec<Actor> = vehicles
             .into_iter()
-            .map(|InitialVehicle { id, vehicle, state, weave }| {
-                let body = Body::Driven(Box::new(Plant::new(&vehicle, state, weave, friction, step.s())));
+            .map(|InitialVehicle { id, vehicle, state, weave, has_ideal_actuators }| {
+                let plant = Plant::new(&vehicle, state, weave, friction, step.s());
+                let body =
+                    Body::Driven(Box::new(if has_ideal_actuators { plant.with_ideal_actuators() } else { plant }));
                 Actor { id, vehicle, body }
             })
             .collect();

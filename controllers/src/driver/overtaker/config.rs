@@ -11,7 +11,7 @@ use super::returning::{Return, ReturnConfig};
 use crate::driver::attention::{Lapse, LapseConfig, check_lapse};
 use crate::driver::pedals::check_brake_build_up;
 use crate::driver::perception::{PerceptionConfig, PerceptionSettings, check_perception};
-use crate::driver::reaction::{Reaction, ReactionConfig};
+use crate::driver::reaction::{Reaction, ReactionChange, ReactionConfig};
 
 /// Default duration of a whole lane change (s): the mean of 7,192 single lane changes of commuters, with a standard
 /// deviation of 2.0 s (Lee, Olsen and Wierwille, *A Comprehensive Examination of Naturalistic Lane-Changes*, DOT HS 809
@@ -70,6 +70,14 @@ pub struct Overtaker {
 }
 
 impl Overtaker {
+    /// Returns the same driver with another reaction.
+    #[must_use]
+    pub(crate) fn reacting(self, change: ReactionChange) -> Self {
+        let lapse = self.lapse.filter(|_| change != ReactionChange::AtOnce);
+        let reaction = self.reaction.changed(change);
+        Self { reaction, perception: self.perception.changed(change), lapse, ..self }
+    }
+
     /// Creates a driver for one run.
     pub(crate) fn driver(&self) -> OvertakerDriver {
         OvertakerDriver::new(*self)

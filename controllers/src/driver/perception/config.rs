@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::evidence::{Evidence, EvidenceConfig};
+use crate::driver::reaction::ReactionChange;
 
 /// How a driver perceives the vehicles ahead, as a scenario file describes it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -29,6 +30,13 @@ pub struct PerceptionSettings {
 }
 
 impl PerceptionSettings {
+    /// Returns the settings of a driver whose reaction changes: one who reacts at once accumulates no evidence.
+    #[must_use]
+    pub(crate) fn changed(self, change: ReactionChange) -> Self {
+        let evidence = self.evidence.filter(|_| change != ReactionChange::AtOnce);
+        Self { evidence, ..self }
+    }
+
     /// Returns whether the driver looks at the vehicle beyond the one ahead.
     pub(crate) fn looks_beyond(&self) -> bool {
         self.anticipation > 0.0

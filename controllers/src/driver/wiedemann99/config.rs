@@ -8,7 +8,7 @@ use crate::driver::attention::{Lapse, LapseConfig, check_lapse};
 use crate::driver::check_hardest_braking;
 use crate::driver::pedals::check_brake_build_up;
 use crate::driver::perception::{PerceptionConfig, PerceptionSettings, check_perception};
-use crate::driver::reaction::{Reaction, ReactionConfig};
+use crate::driver::reaction::{Reaction, ReactionChange, ReactionConfig};
 
 /// The Wiedemann 99 model as a scenario file describes it. The defaults of cc0 to cc9 are those published for Vissim.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -95,6 +95,14 @@ pub struct Wiedemann99 {
 }
 
 impl Wiedemann99 {
+    /// Returns the same driver with another reaction.
+    #[must_use]
+    pub(crate) fn reacting(self, change: ReactionChange) -> Self {
+        let lapse = self.lapse.filter(|_| change != ReactionChange::AtOnce);
+        let reaction = self.reaction.map(|reaction| reaction.changed(change));
+        Self { reaction, perception: self.perception.changed(change), lapse, ..self }
+    }
+
     /// Returns the safe gap behind a vehicle at `speed_mps`, cc0 + cc1·v (m).
     pub fn safe_gap_m(&self, speed_mps: f64) -> f64 {
         self.parameters.cc0_m + self.parameters.cc1_s * speed_mps

@@ -7,6 +7,7 @@ use std::path::Path;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::{ledger, provenance, samples, scenario, verdict};
+use crate::campaign::causes;
 use crate::campaign::ensemble::ensemble_html;
 use crate::campaign::findings::Findings;
 use closecall_scenarios::atomic::{WriteError, write_file};
@@ -31,6 +32,7 @@ pub(super) fn campaign(findings: &Findings<'_>) -> io::Result<Markup> {
         (verdict::gates(findings))
         (verdict::requirements(findings))
         (ledger::validity(findings))
+        (findings.folder.map_or_else(Markup::default, causes::table))
         @for overview in &findings.overview.scenarios { (scenario::section(findings, overview)?) }
         (samples::slowest(findings))
         (provenance::provenance(findings))

@@ -48,6 +48,7 @@ fn page() -> String {
         overview: &tally.overview,
         recordings: &recordings,
         gallery: Some("recordings/index.html"),
+        folder: None,
         slowest: &[Timing { scenario, sample: 1, controller, wall_s: 0.25 }],
     };
     campaign(&findings).unwrap().into_string()

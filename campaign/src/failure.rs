@@ -1,0 +1,80 @@
+//! The kind of an error: what a caller can do about it, and so the exit code of a program.
+
+use super::compare::CompareError;
+use super::execution::CampaignError;
+use super::folder::FolderError;
+use super::merge::MergeError;
+use super::saved::SavedError;
+
+/// The kind of an error.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FailureKind {
+    /// What was asked for does not exist or contradicts itself.
+    Usage,
+    /// A file cannot be used as it is.
+    InvalidInput,
+    /// A sample has no outcome.
+    Sample,
+    /// A file or folder cannot be read or written.
+    Io,
+}
+
+impl From<&FolderError> for FailureKind {
+    fn from(error: &FolderError) -> Self {
+        match error {
+            FolderError::Write(_) | FolderError::Read { .. } | FolderError::Busy { .. } => Self::Io,
+            FolderError::AlreadyThere { .. } | FolderError::OtherCampaign { .. } | FolderError::NotACampaign { .. } => {
+                Self::Usage
+            }
+            FolderError::Content { .. } => Self::InvalidInput,
+        }
+    }
+}
+
+impl From<&SavedError> for FailureKind {
+    fn from(error: &SavedError) -> Self {
+        match error {
+            SavedError::Folder(error) => Self::from(error),
+            SavedError::Scenario(error) if error.is_setting() => Self::Usage,
+            SavedError::Scenario(error) if error.is_io() => Self::Io,
+            SavedError::Scenario(_) => Self::InvalidInput,
+            SavedError::Sample { .. } => Self::Sample,
+            SavedError::ScenarioNotNamed { .. }
+            | SavedError::UnknownScenario { .. }
+            | SavedError::UnknownSample { .. }
+            | SavedError::UnknownArm { .. } => Self::Usage,
+        }
+    }
+}
+
+impl From<&CampaignError> for FailureKind {
+    fn from(error: &CampaignError) -> Self {
+        match error {
+            CampaignError::Folder(error) => Self::from(error),
+            CampaignError::Write(_) | CampaignError::Workers(_) => Self::Io,
+        }
+    }
+}
+
+impl From<&MergeError> for FailureKind {
+    fn from(error: &MergeError) -> Self {
+        match error {
+            MergeError::Campaign(error) => Self::from(error),
+            MergeError::OutOfOrder { .. } => Self::InvalidInput,
+            MergeError::NotAPart { .. }
+            | MergeError::OtherCampaign { .. }
+            | MergeError::Duplicate { .. }
+            | MergeError::Missing { .. }
+            | MergeError::Incomplete { .. } => Self::Usage,
+        }
+    }
+}
+
+impl From<&CompareError> for FailureKind {
+    fn from(error: &CompareError) -> Self {
+        match error {
+            CompareError::Folder(error) => Self::from(error),
+            CompareError::Different { .. } | CompareError::OtherSample { .. } => Self::Usage,
+        }
+    }
+}

@@ -1,0 +1,76 @@
+//! Assembles the gates of a campaign: those of the command line, of a preset, and of the project file.
+
+use closecall_scenarios::sampling::Design;
+use closecall_simulation::criteria::Expression;
+
+use super::{GateSet, GateSource, GateSpec, ProjectError, ProjectFile, Scope};
+
+/// The gates that a preset adds.
+#[derive(Clone, Copy, Debug)]
+pub struct PresetGates {
+    /// The preset's name.
+    pub name: &'static str,
+    /// The criteria.
+    pub require: &'static [&'static str],
+}
+
+/// Gates that do not fit the campaign.
+#[derive(Debug, thiserror::Error)]
+pub enum AssemblyError {
+    /// A criterion needs a baseline, and there is none.
+    #[error("`{expression}` compares with a baseline: it needs --paired")]
+    NoBaseline {
+        /// The criterion.
+        expression: Expression,
+    },
+    /// A gate on a probability needs independent samples.
+    #[error("--max-probability needs independent samples, and those of --design {design} are not: use --design random")]
+    DependentSamples {
+        /// The sampling design.
+        design: Design,
+    },
+    /// A criterion of a preset is wrong.
+    #[error("{message}")]
+    Preset {
+        /// What is wrong.
+        message: String,
+    },
+    /// The project file cannot be used.
+    #[error(transparent)]
+    Project(#[from] ProjectError),
+}
+
+impl GateSet {
+    /// Adds the criteria of the command line, then those of a preset, then those of the project file, if there is one in the
+    /// folder of this process or above it.
+    ///
+    /// # Errors
+    /// [`AssemblyError`] if a gate does not fit the campaign.
+    pub fn assemble(
+        &mut self,
+        command_line: Vec<(Expression, Scope)>,
+        preset: Option<PresetGates>,
+        is_paired: bool,
+        design: Design,
+    ) -> Result<(), AssemblyError> {
+        for (expression, scope) in command_line {
+            if expression.needs_pairs() && !is_paired {
+                return Err(AssemblyError::NoBaseline { expression });
+            }
+            self.push(GateSpec { expression, source: GateSource::CommandLine, scope });
+        }
+        for (name, text) in preset.iter().flat_map(|preset| preset.require.iter().map(|text| (preset.name, text))) {
+            let expression: Result<Expression, _> = text.parse();
+            let expression = expression.map_err(|error| AssemblyError::Preset { message: error.to_string() })?;
+            self.push(GateSpec { expression, source: GateSource::Preset(name), scope: Scope::EachScenario });
+        }
+        let here = std::env::current_dir().ok();
+        if let Some(project) = here.map(|folder| ProjectFile::find(&folder)).transpose()?.flatten() {
+            project.add_to(self)?;
+        }
+        if self.probability.is_some() && design != Design::Random {
+            return Err(AssemblyError::DependentSamples { design });
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,173 @@
+//! The attribution of the first collision of a run.
+
+use std::sync::Arc;
+
+use closecall_controllers::EgoState;
+use closecall_sensors::SensorMode;
+use closecall_simulation::outcome::{ClosedBy, Collision, Moment, Outcome, Phase};
+use closecall_simulation::scenario::{Scenario, Setting};
+use closecall_simulation::{Arm, NoObserver};
+use closecall_traffic::geometry::BoxSide;
+use closecall_traffic::{ActorId, GRAVITY_MPS2, PHYSICS_STEP};
+use serde::{Deserialize, Serialize};
+
+use super::Trace;
+use super::careful_ego::CarefulEgo;
+use super::counterfactual::{Braking, Pair};
+use crate::case::{Case, CausesError, fails};
+
+/// A vehicle of a collision.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Party {
+    /// Its name.
+    pub actor: ActorId,
+    /// The side that was struck.
+    pub side: BoxSide,
+}
+
+/// By which driver, or by what, a collision was avoidable. `None`: the question does not apply.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Avoidable {
+    /// By the competent and careful driver of UN Regulation 157 in the place of the striking vehicle.
+    pub careful_in_striking: bool,
+    /// By that driver in the place of the ego; `None` if the run with it has no outcome.
+    pub careful_as_ego: Option<bool>,
+    /// By full braking of the striking vehicle from the moment on at which the hazard can be perceived.
+    pub full_braking_from_hazard: bool,
+    /// By full braking of the striking vehicle from the start on.
+    pub full_braking_from_start: bool,
+}
+
+impl Avoidable {
+    /// Returns the answer in words: the weakest means that avoids the collision.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self { careful_in_striking: true, careful_as_ego: Some(true), .. } => "either careful driver",
+            Self { careful_in_striking: true, .. } => "a careful driver of the striking vehicle",
+            Self { careful_as_ego: Some(true), .. } => "a careful driver in place of the ego",
+            Self { full_braking_from_hazard: true, .. } => "full braking from the hazard on only",
+            Self { full_braking_from_start: true, .. } => "full braking from the start only",
+            _ => "nothing that was tried",
+        }
+    }
+}
+
+/// The attribution of the first collision of a run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Attribution {
+    /// Time of the first contact (s).
+    pub time_s: f64,
+    /// The vehicle that closed the gap.
+    pub striking: Party,
+    /// The other vehicle.
+    pub struck: Party,
+    /// Whether both moved towards each other.
+    pub is_mutual: bool,
+    /// Phase of the encounter.
+    pub phase: Phase,
+    /// Whether the lead vehicle had begun to brake; `None` if it never did before the collision of the ego.
+    pub is_after_lead_braking: bool,
+    /// State of the ego stack at the contact.
+    pub ego_state: EgoState,
+    /// Relative speed at the contact (m/s).
+    pub relative_speed_mps: f64,
+    /// Largest change of velocity of a vehicle of the collision (m/s).
+    pub delta_v_mps: f64,
+    /// Further collisions of the run.
+    pub further_collisions: usize,
+    /// Who could have avoided it.
+    pub avoidable: Avoidable,
+}
+
+impl Attribution {
+    /// Returns the phase in words: of the encounter, of the braking of the lead vehicle, and of the system.
+    pub fn phase_words(&self) -> String {
+        let braking = if self.is_after_lead_braking { "after F's braking" } else { "without braking of F" };
+        format!("{}, {braking}, {}", phase_word(self.phase), state_word(self.ego_state))
+    }
+}
+
+/// Returns the phase of the encounter in a word.
+pub fn phase_word(phase: Phase) -> &'static str {
+    match phase {
+        Phase::Approach => "approach",
+        Phase::Critical => "critical",
+        Phase::Overtaking => "overtaking",
+        Phase::After => "after overtaking",
+    }
+}
+
+/// Returns what the ego stack does in a state.
+pub fn state_word(state: EgoState) -> &'static str {
+    match state {
+        EgoState::Following => "ego following",
+        EgoState::Increasing => "MIS braking",
+        EgoState::Holding => "MIS holding",
+        EgoState::Releasing => "MIS returning the margin",
+        EgoState::EmergencyBraking => "emergency braking",
+    }
+}
+
+/// Returns the indices of the striking and of the struck vehicle in `collision.between`. If both moved towards each other, the
+/// vehicle whose front was struck is the striking one.
+pub(crate) fn roles(collision: &Collision) -> [usize; 2] {
+    match collision.closed_by {
+        ClosedBy::First => [0, 1],
+        ClosedBy::Second => [1, 0],
+        ClosedBy::Both if collision.struck_side[0] != BoxSide::Front && collision.struck_side[1] == BoxSide::Front => {
+            [1, 0]
+        }
+        ClosedBy::Both => [0, 1],
+    }
+}
+
+/// Runs a case with further settings, and attributes its first collision. Returns the outcome, and `None` if no vehicle
+/// collides.
+///
+/// # Errors
+/// [`CausesError`] if the sample has no outcome.
+pub fn attribute(case: &Case, settings: &[Setting]) -> Result<(Outcome, Option<Attribution>), CausesError> {
+    let scenario = case.concrete(settings)?;
+    let mut trace = Trace::default();
+    let outcome = case.run_as(settings, &case.arm, &mut trace)?;
+    let Some(collision) = outcome.collisions.first() else { return Ok((outcome, None)) };
+    let careful = Arm { controller: Arc::new(CarefulEgo), sensors: Some(SensorMode::GroundTruth) };
+    let as_ego = case.run_as(settings, &careful, &mut NoObserver).ok().map(|outcome| !fails(&outcome));
+    let attribution = of_collision(collision, &outcome, &scenario, &trace, as_ego);
+    Ok((outcome, attribution))
+}
+
+fn of_collision(
+    collision: &Collision,
+    outcome: &Outcome,
+    scenario: &Scenario,
+    trace: &Trace,
+    careful_as_ego: Option<bool>,
+) -> Option<Attribution> {
+    let roles = roles(collision);
+    let party = |role: usize| Party { actor: collision.between[role].clone(), side: collision.struck_side[role] };
+    let index = |role: usize| scenario.actors.iter().position(|actor| actor.id == collision.between[role]);
+    let indices = [index(roles[0])?, index(roles[1])?];
+    let vehicles = indices.map(|index| scenario.actors[index].vehicle);
+    let pair = Pair { trace, step_s: PHYSICS_STEP.s(), indices, vehicles };
+    let full_mps2 = scenario.environment.friction * GRAVITY_MPS2;
+    let full_from_hazard = pair.is_avoided(Braking::FullFromHazard(full_mps2));
+    Some(Attribution {
+        time_s: collision.time.s(),
+        striking: party(roles[0]),
+        struck: party(roles[1]),
+        is_mutual: collision.closed_by == ClosedBy::Both,
+        phase: collision.phase,
+        is_after_lead_braking: outcome.moment(Moment::FrontBrakes).is_some_and(|time| time <= collision.time),
+        ego_state: trace.ego_state,
+        relative_speed_mps: collision.relative_speed_mps,
+        delta_v_mps: collision.delta_v_mps[0].max(collision.delta_v_mps[1]),
+        further_collisions: outcome.collisions.len() - 1,
+        avoidable: Avoidable {
+            careful_in_striking: pair.is_avoided(Braking::Careful),
+            careful_as_ego,
+            full_braking_from_hazard: full_from_hazard,
+            full_braking_from_start: full_from_hazard || pair.is_avoided(Braking::FullFromStart(full_mps2)),
+        },
+    })
+}

@@ -1,0 +1,214 @@
+//! What would have happened with another way of braking of the striking vehicle.
+
+use closecall_controllers::reference::{BrakingReaction, CRITICAL_TTC_S};
+use closecall_traffic::{Vehicle, VehicleState};
+
+use super::Trace;
+
+/// Time for which the motion is continued beyond the collision (s). Full braking from any speed on a motorway ends earlier.
+const BEYOND_S: f64 = 15.0;
+
+/// Largest braking of a cruise control above 20 m/s (m/s²) (ISO 15622). The careful driver in the loop sees a risk beyond it.
+const CRUISE_CONTROL_MPS2: f64 = 3.5;
+
+/// How the striking vehicle brakes instead.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Braking {
+    /// As the competent and careful driver of UN Regulation 157, from the perception of a risk on.
+    Careful,
+    /// With all that the road allows (m/s²), from the moment on at which the hazard can be perceived.
+    FullFromHazard(f64),
+    /// With all that the road allows (m/s²), from the start of the run on.
+    FullFromStart(f64),
+}
+
+/// The two vehicles of a collision.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pair<'a> {
+    pub(super) trace: &'a Trace,
+    /// Step of the simulation (s).
+    pub(super) step_s: f64,
+    /// Index of the striking and of the struck vehicle in the list of actors.
+    pub(super) indices: [usize; 2],
+    /// The vehicles.
+    pub(super) vehicles: [Vehicle; 2],
+}
+
+impl Pair<'_> {
+    /// Returns whether the vehicles stay apart if the striking vehicle brakes in another way.
+    pub(super) fn is_avoided(&self, braking: Braking) -> bool {
+        let Some(first) = self.trace.states.first() else { return false };
+        let [striking, struck] = self.indices;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "15 s in steps of 10 ms")]
+        let steps = self.trace.states.len() + (BEYOND_S / self.step_s) as usize;
+        let hazard = self.hazard_step();
+        let mut own = first[striking];
+        let mut last_of_other = first[struck];
+        let (mut reaction, mut differs) = (None::<BrakingReaction>, false);
+        for step in 0..steps {
+            let recorded = self.trace.states.get(step);
+            let other = recorded.map_or_else(|| continued(&last_of_other, self.step_s), |states| states[struck]);
+            last_of_other = other;
+            if let (false, Some(states)) = (differs, recorded) {
+                own = states[striking];
+            }
+            if step > 0 && self.touch(&own, &other) {
+                return false;
+            }
+            let wanted_mps2 = match braking {
+                Braking::Careful => self.careful_mps2(&own, &other, &mut reaction),
+                Braking::FullFromHazard(mps2) => hazard.is_some_and(|hazard| step >= hazard).then_some(mps2),
+                Braking::FullFromStart(mps2) => Some(mps2),
+            };
+            if let Some(mps2) = wanted_mps2 {
+                differs = true;
+                own = self.braked(&own, mps2);
+            }
+            if differs && own.speed_mps == 0.0 {
+                return true;
+            }
+        }
+        true
+    }
+
+    /// Returns the braking of the careful driver (m/s²); `None` before its first risk. While it is no faster than the vehicle
+    /// ahead, it keeps its speed.
+    fn careful_mps2(
+        &self,
+        own: &VehicleState,
+        other: &VehicleState,
+        reaction: &mut Option<BrakingReaction>,
+    ) -> Option<f64> {
+        let closing_mps = own.speed_mps - other.speed_mps;
+        if reaction.is_none() && self.is_in_path(own, other) && self.is_risk(own, other) {
+            *reaction = Some(BrakingReaction::default());
+        }
+        reaction.as_mut().map(|reaction| if closing_mps > 0.0 { reaction.advance(self.step_s) } else { 0.0 })
+    }
+
+    /// Returns whether the careful driver sees a risk: as the same driver in the loop, at a time to collision of 2 s, or if more
+    /// braking is needed than a cruise control may use.
+    fn is_risk(&self, own: &VehicleState, other: &VehicleState) -> bool {
+        let (gap_m, closing_mps) = (self.gap_m(own, other), own.speed_mps - other.speed_mps);
+        // Both brake to a standstill, or the own speed falls to that of a vehicle that does not brake.
+        let braking_mps2 = -other.acceleration_mps2;
+        let needed_mps2 = if braking_mps2 > 0.0 {
+            own.speed_mps.powi(2) / (2.0 * (gap_m + other.speed_mps.powi(2) / (2.0 * braking_mps2)))
+        } else {
+            closing_mps.max(0.0).powi(2) / (2.0 * gap_m)
+        };
+        gap_m <= CRITICAL_TTC_S * closing_mps || !(needed_mps2 <= CRUISE_CONTROL_MPS2)
+    }
+
+    /// Returns the first step at which the struck vehicle can be seen to brake, or at which the time to collision falls to
+    /// the 2 s of the careful driver, whichever comes first.
+    fn hazard_step(&self) -> Option<usize> {
+        let [striking, struck] = self.indices;
+        self.trace.states.iter().position(|states| {
+            let (own, other) = (&states[striking], &states[struck]);
+            let closing_mps = own.speed_mps - other.speed_mps;
+            other.brake_light || (self.is_in_path(own, other) && self.gap_m(own, other) <= CRITICAL_TTC_S * closing_mps)
+        })
+    }
+
+    /// Returns the vehicle one step later, if it brakes with `braking_mps2` along the path that it had.
+    fn braked(&self, own: &VehicleState, braking_mps2: f64) -> VehicleState {
+        let speed_mps = (own.speed_mps - braking_mps2 * self.step_s).max(0.0);
+        let s_m = own.s_m + 0.5 * (own.speed_mps + speed_mps) * self.step_s;
+        VehicleState { s_m, d_m: self.lateral_m(s_m), speed_mps, acceleration_mps2: -braking_mps2, ..*own }
+    }
+
+    /// Returns the lateral position of the striking vehicle at `s_m` of its path.
+    fn lateral_m(&self, s_m: f64) -> f64 {
+        let [striking, _] = self.indices;
+        let states = &self.trace.states;
+        let next = states.partition_point(|states| states[striking].s_m < s_m);
+        states.get(next).or(states.last()).map_or(0.0, |states| states[striking].d_m)
+    }
+
+    /// Returns the gap along the road (m); negative while the vehicles overlap lengthwise or the other one is behind.
+    fn gap_m(&self, own: &VehicleState, other: &VehicleState) -> f64 {
+        other.s_m - own.s_m - 0.5 * self.vehicles.map(|vehicle| vehicle.dimensions.length_m).iter().sum::<f64>()
+    }
+
+    fn overlaps_sideways(&self, own: &VehicleState, other: &VehicleState) -> bool {
+        let half_m = 0.5 * self.vehicles.map(|vehicle| vehicle.dimensions.width_m).iter().sum::<f64>();
+        (own.d_m - other.d_m).abs() < half_m
+    }
+
+    /// Returns whether the other vehicle is ahead in the path of the striking one.
+    fn is_in_path(&self, own: &VehicleState, other: &VehicleState) -> bool {
+        other.s_m > own.s_m && self.overlaps_sideways(own, other)
+    }
+
+    fn touch(&self, own: &VehicleState, other: &VehicleState) -> bool {
+        let lengths_m: f64 = self.vehicles.map(|vehicle| vehicle.dimensions.length_m).iter().sum();
+        self.overlaps_sideways(own, other) && (own.s_m - other.s_m).abs() < 0.5 * lengths_m
+    }
+}
+
+/// Returns a vehicle one step later that goes on with its acceleration, if that is braking, to a standstill.
+fn continued(state: &VehicleState, step_s: f64) -> VehicleState {
+    let speed_mps = (state.speed_mps + state.acceleration_mps2.min(0.0) * step_s).max(0.0);
+    let s_m = state.s_m + 0.5 * (state.speed_mps + speed_mps) * step_s;
+    VehicleState { s_m, speed_mps, ..*state }
+}
+
+#[cfg(test)]
+mod tests {
+    use closecall_traffic::{Time, VehicleClass};
+
+    use super::*;
+
+    const STEP_S: f64 = 0.01;
+
+    /// A vehicle at 30 m/s follows another at 30 m/s with `gap_m`. That one brakes with 6 m/s² from 1 s on, and the follower does
+    /// not. The trace ends at the contact.
+    fn trace(gap_m: f64) -> Trace {
+        let mut trace = Trace::default();
+        let at = |s_m: f64, speed_mps: f64, acceleration_mps2: f64| VehicleState {
+            s_m,
+            speed_mps,
+            acceleration_mps2,
+            brake_light: acceleration_mps2 < 0.0,
+            ..VehicleState::default()
+        };
+        let length_m = Vehicle::typical(VehicleClass::Car).dimensions.length_m;
+        let (mut own, mut other) = (at(0.0, 30.0, 0.0), at(gap_m + length_m, 30.0, 0.0));
+        let mut step = 0;
+        while other.s_m - own.s_m >= length_m && step < 2_000 {
+            trace.times.push(Time::from_ms(10 * step));
+            trace.states.push(vec![own, other]);
+            let braking = if step >= 100 { 6.0 } else { 0.0 };
+            let speed_mps = (other.speed_mps - braking * STEP_S).max(0.0);
+            other = at(other.s_m + 0.5 * (speed_mps + other.speed_mps) * STEP_S, speed_mps, -braking);
+            own = at(own.s_m + 30.0 * STEP_S, 30.0, 0.0);
+            step += 1;
+        }
+        trace
+    }
+
+    fn avoided(gap_m: f64, braking: Braking) -> bool {
+        let trace = trace(gap_m);
+        let vehicles = [Vehicle::typical(VehicleClass::Car); 2];
+        Pair { trace: &trace, step_s: STEP_S, indices: [0, 1], vehicles }.is_avoided(braking)
+    }
+
+    #[test]
+    fn full_braking_at_once_keeps_any_gap_behind_a_vehicle_that_brakes_less() {
+        assert!(avoided(0.5, Braking::FullFromHazard(8.0)));
+        assert!(!avoided(2.0, Braking::FullFromHazard(5.0)), "75 m behind a vehicle that needs 75 m, braking less");
+        assert!(avoided(20.0, Braking::FullFromHazard(5.0)), "90 m are enough, 75 + 20 m are there");
+        assert!(avoided(0.5, Braking::FullFromStart(8.0)));
+    }
+
+    #[test]
+    fn a_careful_driver_needs_a_gap_that_its_delay_uses_up() {
+        // At once a risk. 0.75 s of delay, and 7.59 m/s² reached in 0.6 s: 31 m before the driver brakes fully, and 56 m from
+        // then on, of the gap and the 75 m of the vehicle ahead.
+        assert!(!avoided(5.0, Braking::Careful));
+        assert!(avoided(60.0, Braking::Careful));
+        let least = (1..100).map(f64::from).find(|gap_m| avoided(*gap_m, Braking::Careful)).unwrap();
+        assert!((10.0..40.0).contains(&least), "{least}");
+    }
+}

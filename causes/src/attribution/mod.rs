@@ -1,0 +1,21 @@
+//! Attribution of a collision: which vehicle closed the gap, in which phase, and who could have avoided it.
+//!
+//! ```text
+//!  run of the sample ─▶ trace of all vehicles ─┬▶ striking vehicle, struck vehicle, phase, state of the system
+//!                                              ├▶ careful driver in the place of the striking vehicle
+//!                                              ├▶ full braking of the striking vehicle
+//!  run with the careful driver as the ego ─────┴▶ careful driver in the place of the ego
+//! ```
+//!
+//! The counterfactuals of the striking vehicle keep the motion of the struck vehicle as it was. What follows the collision is
+//! not known of it: it goes on with its last acceleration, at most to a standstill, in the lane position that it had. The
+//! counterfactual of the ego is a run of the loop, in which the other drivers react to the other ego.
+
+mod careful_ego;
+mod collision;
+mod counterfactual;
+mod trace;
+
+pub(crate) use collision::roles;
+pub use collision::{Attribution, Avoidable, Party, attribute, phase_word, state_word};
+pub use trace::Trace;

@@ -1,0 +1,158 @@
+//! One sample of a campaign in one arm, which can be run again with settings.
+
+use closecall_campaign::failure::FailureKind;
+use closecall_campaign::folder::FolderError;
+use closecall_campaign::runner::{Sampling, concrete, run_guarded};
+use closecall_campaign::saved::{SavedCampaign, SavedError};
+use closecall_scenarios::atomic::WriteError;
+use closecall_sensors::SensorMode;
+use closecall_simulation::outcome::Outcome;
+use closecall_simulation::scenario::{Scenario, ScenarioError, ScenarioFile, Setting};
+use closecall_simulation::{Arm, NoObserver, Observer, RunKey, SampleError};
+
+use crate::map::MapError;
+
+/// The reason for which no cause can be found.
+#[derive(Debug, thiserror::Error)]
+pub enum CausesError {
+    /// The campaign has no such sample or arm.
+    #[error(transparent)]
+    Saved(#[from] SavedError),
+    /// A map cannot be computed.
+    #[error(transparent)]
+    Map(#[from] MapError),
+    /// The folder of the campaign cannot be used.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    /// A file cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// A setting does not fit the scenario.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
+    /// The sample has no outcome.
+    #[error("failed to run sample {sample}: {source}")]
+    Sample {
+        /// The sample's number.
+        sample: u64,
+        /// Why it has no outcome.
+        source: SampleError,
+    },
+    /// No vehicle collides in the sample.
+    #[error("sample {sample} does not fail with `{controller}`: no vehicle collides; failing samples are {failing}")]
+    Passes {
+        /// The sample's number.
+        sample: u64,
+        /// The controller.
+        controller: String,
+        /// Some samples that fail, in words.
+        failing: String,
+    },
+}
+
+impl CausesError {
+    /// Returns the kind of the error.
+    pub fn kind(&self) -> FailureKind {
+        match self {
+            Self::Saved(error) => FailureKind::from(error),
+            Self::Folder(error) => FailureKind::from(error),
+            Self::Map(MapError::Scenario(error)) if error.is_setting() => FailureKind::Usage,
+            Self::Map(MapError::Scenario(_)) => FailureKind::InvalidInput,
+            Self::Map(MapError::NoMis { .. }) => FailureKind::Usage,
+            Self::Map(MapError::Point { .. }) => FailureKind::Sample,
+            Self::Write(_) => FailureKind::Io,
+            Self::Scenario(error) if error.is_io() => FailureKind::Io,
+            Self::Scenario(error) if error.is_setting() => FailureKind::Usage,
+            Self::Scenario(_) => FailureKind::InvalidInput,
+            Self::Sample { .. } => FailureKind::Sample,
+            Self::Passes { .. } => FailureKind::Usage,
+        }
+    }
+}
+
+/// One sample of a campaign in one arm.
+#[derive(Clone)]
+pub struct Case {
+    /// The scenario with the campaign's settings.
+    pub file: ScenarioFile,
+    /// How the campaign draws its samples.
+    pub sampling: Sampling,
+    /// The sample's number.
+    pub sample: u64,
+    /// The arm.
+    pub arm: Arm,
+}
+
+impl std::fmt::Debug for Case {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Case").field("scenario", &self.file.config().name).field("sample", &self.sample).finish()
+    }
+}
+
+impl Case {
+    /// Returns a sample of a saved campaign. `scenario` may be left out if the campaign has only one, `controller` for the arm
+    /// under test.
+    ///
+    /// # Errors
+    /// [`SavedError`] if the campaign has no such scenario, sample or arm.
+    pub fn of(
+        saved: &SavedCampaign,
+        scenario: Option<&str>,
+        sample: u64,
+        controller: Option<&str>,
+    ) -> Result<Self, SavedError> {
+        // Checks that there is such a sample.
+        saved.sample(scenario, sample)?;
+        let (file, sampling) = (saved.file(scenario)?, saved.manifest().sampling);
+        Ok(Self { file, sampling, sample, arm: saved.arm(controller)? })
+    }
+
+    /// Returns the depth of the sensor simulation.
+    pub fn sensors(&self) -> SensorMode {
+        let of_file = || match self.concrete(&[]) {
+            Ok(scenario) => scenario.sensors.mode(),
+            Err(_) => SensorMode::default(),
+        };
+        self.arm.sensors.unwrap_or_else(of_file)
+    }
+
+    /// Returns what identifies the run.
+    pub fn key(&self) -> RunKey {
+        RunKey { seed: self.sampling.seed, sample: self.sample }
+    }
+
+    /// Returns the concrete scenario with further settings.
+    ///
+    /// # Errors
+    /// [`CausesError`] if a setting does not fit, or the sampled values contradict each other.
+    pub fn concrete(&self, settings: &[Setting]) -> Result<Scenario, CausesError> {
+        let file = ScenarioFile::parse(self.file.path(), self.file.text(), settings)?;
+        concrete(&file, self.sampling, self.sample).map_err(|source| self.failed(source))
+    }
+
+    /// Runs the sample with further settings.
+    ///
+    /// # Errors
+    /// [`CausesError`] if a setting does not fit, or the sample has no outcome.
+    pub fn run(&self, settings: &[Setting]) -> Result<Outcome, CausesError> {
+        self.run_as(settings, &self.arm, &mut NoObserver)
+    }
+
+    /// Runs the sample with further settings in any arm.
+    ///
+    /// # Errors
+    /// As for [`Self::run`].
+    pub fn run_as(&self, settings: &[Setting], arm: &Arm, observer: &mut dyn Observer) -> Result<Outcome, CausesError> {
+        let scenario = self.concrete(settings)?;
+        run_guarded(&scenario, self.key(), arm, observer).map_err(|source| self.failed(source))
+    }
+
+    fn failed(&self, source: SampleError) -> CausesError {
+        CausesError::Sample { sample: self.sample, source }
+    }
+}
+
+/// Returns whether a run fails: whether any two vehicles collide.
+pub fn fails(outcome: &Outcome) -> bool {
+    !outcome.collisions.is_empty()
+}

@@ -1,0 +1,123 @@
+//! The cost of each arm of a campaign.
+
+use closecall_campaign::saved::SavedCampaign;
+use closecall_simulation::outcome::Outcome;
+use closecall_statistics::quantiles::quantile;
+use closecall_traffic::Measured;
+use serde::Serialize;
+
+use super::time_lost::mean_time_lost_s;
+use crate::case::{CausesError, fails};
+
+/// Largest number of samples that are run again for the time lost.
+pub const TIMED_SAMPLES: usize = 50;
+/// Thresholds of the rear time headway (s): 1 s, and the headway below which the paper calls a following critical.
+pub(super) const THW_BELOW_S: [f64; 2] = [1.0, 0.5];
+/// Threshold of the rear time to collision (s): the time to closest encounter below which the paper calls an encounter critical.
+pub(super) const TTC_BELOW_S: f64 = 2.6;
+const SECONDS_PER_HOUR: f64 = 3_600.0;
+
+/// The cost of one arm.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ArmCost {
+    /// The controller.
+    pub controller: String,
+    /// The 1st, the 5th and the 50th percentile of the smallest rear time headway (s); `None` if no vehicle is behind.
+    pub min_thw_rear_s: Option<[f64; 3]>,
+    /// The same of the smallest rear time to collision (s); `None` if no vehicle approaches.
+    pub min_ttc_rear_s: Option<[f64; 3]>,
+    /// Share of the samples whose rear time headway falls below 1 s, and below 0.5 s.
+    pub share_thw_below: [f64; 2],
+    /// Share of the samples whose rear time to collision falls below 2.6 s.
+    pub share_ttc_below: f64,
+    /// Mean and 95th percentile of the largest speed deficit to the lead vehicle (m/s).
+    pub speed_lost_mps: [f64; 2],
+    /// Engagements of the system per hour of simulated encounters.
+    pub engagements_per_hour: f64,
+    /// Mean time that the ego loses to the baseline (s); `None` for the baseline itself, and if no sample was run again.
+    pub time_lost_s: Option<f64>,
+}
+
+/// The cost of the arms of a campaign.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Cost {
+    /// Samples in which no vehicle collides in any arm.
+    pub samples: u64,
+    /// Number of them that were run again for the time lost.
+    pub timed_samples: usize,
+    /// The arms, the baseline first.
+    pub arms: Vec<ArmCost>,
+}
+
+/// The values of one arm over the samples.
+#[derive(Default)]
+struct Values {
+    controller: String,
+    thw_s: Vec<f64>,
+    ttc_s: Vec<f64>,
+    deficit_mps: Vec<f64>,
+    engagements: u64,
+    duration_s: f64,
+}
+
+/// Returns the cost of the arms of a saved campaign.
+///
+/// # Errors
+/// [`CausesError`] if the folder cannot be read.
+pub fn cost(saved: &SavedCampaign) -> Result<Cost, CausesError> {
+    let mut arms: Vec<Values> = Vec::new();
+    let (mut samples, mut uneventful) = (0, Vec::new());
+    for record in saved.folder().records()? {
+        let record = record?;
+        let outcomes: Option<Vec<&Outcome>> = record.arms.iter().map(|arm| arm.result.as_ref().ok()).collect();
+        let Some(outcomes) = outcomes.filter(|outcomes| !outcomes.iter().any(|outcome| fails(outcome))) else {
+            continue;
+        };
+        samples += 1;
+        if uneventful.len() < TIMED_SAMPLES {
+            uneventful.push((record.scenario.clone(), record.sample));
+        }
+        arms.resize_with(outcomes.len(), Values::default);
+        for (values, outcome) in arms.iter_mut().zip(outcomes) {
+            values.push(outcome);
+        }
+    }
+    let lost = mean_time_lost_s(saved, &uneventful);
+    let timed_samples = if lost.is_some() { uneventful.len() } else { 0 };
+    let of_arm = |(index, values): (usize, Values)| {
+        let time_lost_s = if index == 0 { None } else { lost.as_ref().and_then(|lost| lost.get(index).copied()) };
+        values.finish(samples, time_lost_s)
+    };
+    Ok(Cost { samples, timed_samples, arms: arms.into_iter().enumerate().map(of_arm).collect() })
+}
+
+impl Values {
+    fn push(&mut self, outcome: &Outcome) {
+        let keep = |values: &mut Vec<f64>, value: Measured| values.extend(value);
+        self.controller.clone_from(&outcome.controller);
+        keep(&mut self.thw_s, outcome.margins.min_thw_rear_s);
+        keep(&mut self.ttc_s, outcome.margins.min_ttc_rear_s);
+        self.deficit_mps.push(outcome.margins.max_speed_deficit_mps);
+        self.engagements += u64::from(outcome.mis.as_ref().is_ok_and(|mis| mis.engaged_at_s.is_ok()));
+        self.duration_s += outcome.duration.s();
+    }
+
+    fn finish(mut self, samples: u64, time_lost_s: Option<f64>) -> ArmCost {
+        for values in [&mut self.thw_s, &mut self.ttc_s, &mut self.deficit_mps] {
+            values.sort_by(f64::total_cmp);
+        }
+        let percentiles = |sorted: &[f64]| (!sorted.is_empty()).then(|| [0.01, 0.05, 0.5].map(|u| quantile(sorted, u)));
+        let below = |sorted: &[f64], limit: f64| sorted.partition_point(|value| *value < limit) as f64 / samples as f64;
+        let mean_mps = self.deficit_mps.iter().sum::<f64>() / samples as f64;
+        ArmCost {
+            min_thw_rear_s: percentiles(&self.thw_s),
+            min_ttc_rear_s: percentiles(&self.ttc_s),
+            share_thw_below: THW_BELOW_S.map(|limit| below(&self.thw_s, limit)),
+            share_ttc_below: below(&self.ttc_s, TTC_BELOW_S),
+            speed_lost_mps: [mean_mps, quantile(&self.deficit_mps, 0.95)],
+            engagements_per_hour: self.engagements as f64 * SECONDS_PER_HOUR / self.duration_s,
+            time_lost_s,
+            controller: self.controller,
+        }
+    }
+}

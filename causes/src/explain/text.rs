@@ -1,0 +1,137 @@
+//! An explanation in words.
+
+use std::fmt;
+use std::path::Path;
+
+use closecall_campaign::resume_command::quoted;
+use closecall_simulation::scenario::MisState;
+
+use super::{Cause, Explanation, MisEffect, StageRun};
+use crate::attribution::phase_word;
+
+/// An explanation as text for readers.
+#[derive(Clone, Copy, Debug)]
+pub struct ExplanationText<'a> {
+    /// The explanation.
+    pub explanation: &'a Explanation,
+    /// The folder of the campaign, for the commands that confirm the explanation.
+    pub folder: &'a Path,
+}
+
+impl Explanation {
+    /// Returns the cause in one sentence.
+    pub fn sentence(&self) -> String {
+        let due = match &self.cause {
+            Cause::Stage { stage } => {
+                let unusual = self.confirmation().and_then(|run| run.unusual.as_ref());
+                let unusual = unusual.map_or_else(String::new, |how| format!(" ({how})"));
+                let narrowly = self.confirmation().and_then(narrowly).unwrap_or_default();
+                let is_usual = self.confirmation().is_some_and(|run| run.is_usual);
+                let with = if is_usual { "it as usual, though not with it perfect" } else { stage.replacement() };
+                format!("It is due to {}{unusual}: with {with}, no vehicle collides{narrowly}.", stage.name())
+            }
+            Cause::Pair { stages: [one, other] } => format!(
+                "No stage alone is to blame. With {} and {} together, no vehicle collides.",
+                one.replacement(),
+                other.replacement()
+            ),
+            Cause::None => "No stage of the chain, and no pair of stages, prevents it if perfect.".to_owned(),
+        };
+        match self.mis.as_ref().filter(|mis| mis.is_induced) {
+            Some(mis) => format!("{due} {}", induced_words(mis)),
+            None => due,
+        }
+    }
+}
+
+/// Gap below which a run counts as having passed narrowly (m): an assumption, a quarter of a car's width.
+const NARROW_GAP_M: f64 = 0.5;
+
+/// Returns by how little a run has passed, if it has passed narrowly.
+fn narrowly(run: &StageRun) -> Option<String> {
+    let least_m = [run.min_gap_rear_m, run.min_gap_front_m].into_iter().flatten().reduce(f64::min)?;
+    (least_m < NARROW_GAP_M).then(|| format!(", but narrowly: the least gap is {least_m:.1} m"))
+}
+
+/// Returns what the margin increase system did that induced a failure.
+fn induced_words(mis: &MisEffect) -> String {
+    let what = match mis.state {
+        Some(MisState::Increasing) => {
+            let by =
+                mis.mean_deceleration_mps2.map_or_else(String::new, |mps2| format!(" by {mps2:.2} m/s² in the mean"));
+            format!("it had slowed the ego down{by}; without this braking, no vehicle collides")
+        }
+        Some(MisState::Holding) => {
+            "it held its speed instead of braking; without holding, no vehicle collides".to_owned()
+        }
+        Some(MisState::Releasing) => {
+            "it returned the margin; if the cruise control drives instead, no vehicle collides".to_owned()
+        }
+        None => "no state of the system alone is to blame, but all of them together".to_owned(),
+    };
+    format!("The system induces it (without the system, no vehicle collides): {what}.")
+}
+
+impl fmt::Display for ExplanationText<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { explanation, folder } = self;
+        let folder = quoted(&folder.display().to_string());
+        let replay = format!("closecall replay {folder} {} --scenario {}", explanation.sample, explanation.scenario);
+        let collision = &explanation.collision;
+        writeln!(
+            f,
+            "{} sample {} ({}, {} sensors): {} strikes {} at {:.2} s with {:.1} m/s, phase {}",
+            explanation.scenario,
+            explanation.sample,
+            explanation.controller,
+            explanation.sensors,
+            collision.striking.actor,
+            collision.struck.actor,
+            collision.time_s,
+            collision.relative_speed_mps,
+            phase_word(collision.phase),
+        )?;
+        writeln!(f, "  {}; avoidable by: {}", collision.phase_words(), collision.avoidable.words())?;
+        writeln!(f, "{}", explanation.sentence())?;
+        writeln!(f)?;
+        for run in &explanation.stages {
+            let as_usual = if run.is_usual { "as usual: " } else { "" };
+            writeln!(f, "  {:<14} {as_usual}{}", run.stages[0].name(), outcome_words(run))?;
+        }
+        for (stage, reason) in &explanation.missing {
+            writeln!(f, "  {:<14} does not exist: {reason}", stage.name())?;
+        }
+        for run in explanation.pairs.iter().filter(|run| run.prevents) {
+            writeln!(f, "  {} + {}: {}", run.stages[0].name(), run.stages[1].name(), outcome_words(run))?;
+        }
+        for run in explanation.mis.iter().flat_map(|mis| &mis.runs) {
+            let off: Vec<&str> = run.off.iter().map(|state| state.name()).collect();
+            let result = if run.prevents { "no collision" } else { "still collides" };
+            writeln!(f, "  without the system while {}: {result}", off.join(", "))?;
+        }
+        if let Some(run) = explanation.confirmation() {
+            let set: Vec<String> = run.settings.iter().map(|setting| format!(" --set {setting}")).collect();
+            writeln!(f, "\nto confirm: {replay}{}", set.concat())?;
+        }
+        if let Some(run) = explanation.mis.iter().flat_map(|mis| &mis.runs).find(|run| run.prevents) {
+            writeln!(f, "to confirm what the system did: {replay} --set '{}'", run.setting)?;
+        }
+        Ok(())
+    }
+}
+
+/// Returns the outcome of a run with a stage replaced in words.
+fn outcome_words(run: &StageRun) -> String {
+    let gap =
+        |name: &str, gap_m: Option<f64>| gap_m.map_or_else(String::new, |m| format!(", least {name} gap {m:.1} m"));
+    match (&run.error, run.collisions) {
+        (Some(error), _) => format!("no outcome: {error}"),
+        (None, Some(0)) => {
+            format!("no collision{}{}", gap("rear", run.min_gap_rear_m), gap("front", run.min_gap_front_m))
+        }
+        (None, count) => match count.unwrap_or_default() {
+            1 => "still collides".to_owned(),
+            count => format!("still collides ({count} collisions)"),
+        },
+    }
+}

@@ -1,0 +1,170 @@
+//! Encounters in trajectory data: the lead vehicle of a vehicle brakes while another comes near from behind.
+
+use closecall_scenarios::filters::SmoothedTrajectoryData;
+use closecall_traffic::metrics::bumper_gap_m;
+use closecall_traffic::{ENGAGEMENT_CLOSING_MPS, ENGAGEMENT_GAP_M, Trajectory, TrajectoryPoint};
+use serde::Serialize;
+
+/// Time for which the lead vehicle must not have braked before an event, so that one braking counts once (s): an assumption.
+const APART_S: f64 = 2.0;
+/// Largest front time headway of the ego at which the lead vehicle matters (s): that below which the system engages.
+const SHORT_THW_S: f64 = 1.5;
+/// Speed below which a time headway is meaningless (m/s).
+const MIN_SPEED_MPS: f64 = 1.0;
+
+/// What counts as an event.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct EventRule {
+    /// Deceleration of the lead vehicle from which it counts as braking (m/s²).
+    pub braking_mps2: f64,
+}
+
+/// What was observed in trajectory data.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Observed {
+    /// Names of the data.
+    pub sources: Vec<String>,
+    /// Distance that all vehicles drove (km).
+    pub distance_km: f64,
+    /// Time that all vehicles were seen (h).
+    pub hours: f64,
+    /// Times at which a vehicle comes near another from behind, which follows a third at a short headway.
+    pub approaches: u64,
+    /// Events: the lead vehicle begins to brake while the rear vehicle is near.
+    pub events: u64,
+    /// Speed differences of the rear vehicle at the beginning of each approach (m/s).
+    pub closing_mps: Vec<f64>,
+    /// Time headways of the rear vehicle to the ego at each event (s).
+    pub rear_thw_s: Vec<f64>,
+}
+
+/// Adds what smoothed trajectory data shows.
+pub fn observe(data: &SmoothedTrajectoryData, rule: EventRule, into: &mut Observed) {
+    into.sources.push(data.name.clone());
+    for (index, track) in data.tracks.iter().enumerate() {
+        let points = &track.trajectory.points;
+        if let (Some(first), Some(last)) = (points.first(), points.last()) {
+            into.distance_km += (last.s_m - first.s_m).abs() / 1_000.0;
+            into.hours += (last.time - first.time).s() / 3_600.0;
+        }
+        observe_ego(data, index, rule, into);
+    }
+}
+
+/// Observes one vehicle as the ego.
+fn observe_ego(data: &SmoothedTrajectoryData, ego: usize, rule: EventRule, into: &mut Observed) {
+    let own = &data.tracks[ego].trajectory;
+    let (mut was_near, mut last_braked_s) = (false, f64::NEG_INFINITY);
+    for point in &own.points {
+        let Some((lead, rear)) = neighbours(data, ego, (own, point)) else {
+            was_near = false;
+            continue;
+        };
+        let closing_mps = rear.point.speed_mps - point.speed_mps;
+        let thw_s = lead.gap_m / point.speed_mps.max(MIN_SPEED_MPS);
+        // Once near, the rear vehicle stays near until it is out of reach: its approach ends when it has come close.
+        let is_near = thw_s < SHORT_THW_S
+            && rear.gap_m <= ENGAGEMENT_GAP_M
+            && (was_near || closing_mps >= ENGAGEMENT_CLOSING_MPS);
+        if is_near && !was_near {
+            into.approaches += 1;
+            into.closing_mps.push(closing_mps);
+        }
+        let brakes = lead.point.acceleration_mps2 <= -rule.braking_mps2;
+        if brakes {
+            let now_s = point.time.s();
+            if is_near && now_s - last_braked_s > APART_S {
+                into.events += 1;
+                into.rear_thw_s.push(rear.gap_m / rear.point.speed_mps.max(MIN_SPEED_MPS));
+            }
+            last_braked_s = now_s;
+        }
+        was_near = is_near;
+    }
+}
+
+/// A neighbour in the lane.
+struct Neighbour<'a> {
+    point: &'a TrajectoryPoint,
+    /// Gap, bumper to bumper (m).
+    gap_m: f64,
+}
+
+/// Returns the vehicles ahead and behind in the ego's lane; `None` if one is missing.
+fn neighbours<'a>(
+    data: &'a SmoothedTrajectoryData,
+    ego: usize,
+    (own, point): (&Trajectory, &TrajectoryPoint),
+) -> Option<(Neighbour<'a>, Neighbour<'a>)> {
+    let (mut ahead, mut behind) = (None::<Neighbour<'a>>, None::<Neighbour<'a>>);
+    for &presence in data.present_at(point.time).iter().filter(|presence| presence.track_index != ego) {
+        let (other, at) = data.look_up(presence);
+        if at.lane != point.lane {
+            continue;
+        }
+        let distance_m = at.s_m - point.s_m;
+        let gap_m = bumper_gap_m(distance_m.abs(), own.dimensions.length_m, other.dimensions.length_m);
+        let nearest = if distance_m > 0.0 { &mut ahead } else { &mut behind };
+        if nearest.as_ref().is_none_or(|known| gap_m < known.gap_m) {
+            *nearest = Some(Neighbour { point: at, gap_m });
+        }
+    }
+    Some((ahead?, behind?))
+}
+
+#[cfg(test)]
+mod tests {
+    use closecall_scenarios::filters::smooth;
+    use closecall_scenarios::trajectory_data::TrajectoryData;
+    use closecall_traffic::{Dimensions, Lane, Time, VehicleClass};
+
+    use super::*;
+
+    const STEP_S: f64 = 0.04;
+
+    fn track(track_id: u64, at: impl Fn(f64) -> (f64, f64, f64)) -> Trajectory {
+        let points = (0..350).map(|step| {
+            let time_s = f64::from(step) * STEP_S;
+            let (s_m, speed_mps, acceleration_mps2) = at(time_s);
+            TrajectoryPoint {
+                time: Time::from_s(time_s),
+                s_m,
+                d_m: -5.625,
+                speed_mps,
+                acceleration_mps2,
+                lateral_speed_mps: 0.0,
+                lateral_acceleration_mps2: 0.0,
+                lane: Lane(2),
+            }
+        });
+        let dimensions = Dimensions { length_m: 4.6, width_m: 1.8, height_m: 1.5 };
+        Trajectory { track_id, vehicle_id: track_id, class: VehicleClass::Car, dimensions, points: points.collect() }
+    }
+
+    /// Three vehicles in a lane: the lead vehicle brakes by 6 m/s² from 12 s to 13 s, and the rear vehicle, which starts `rear_m`
+    /// behind the ego, is 8 m/s faster.
+    fn observed(rear_m: f64, braking_mps2: f64) -> Observed {
+        let lead = |t: f64| {
+            let braked = (t - 12.0).clamp(0.0, 1.0);
+            let lost_m = 3.0 * braked * braked + 6.0 * (t - 13.0).max(0.0);
+            (40.0 + 30.0 * t - lost_m, 30.0 - 6.0 * braked, if (12.0..13.0).contains(&t) { -6.0 } else { 0.0 })
+        };
+        let rear = |t: f64| (-rear_m + 38.0 * t, 38.0, 0.0);
+        let tracks = vec![track(1, lead), track(2, |t| (30.0 * t, 30.0, 0.0)), track(3, rear)];
+        let data = TrajectoryData::new("made", Time::from_s(STEP_S), tracks);
+        let mut found = Observed::default();
+        observe(&smooth(&data), EventRule { braking_mps2 }, &mut found);
+        found
+    }
+
+    #[test]
+    fn a_braking_lead_vehicle_counts_if_a_rear_vehicle_is_near() {
+        // At 12 s the rear vehicle is 130 − 96 = 34 m behind.
+        let found = observed(130.0, 4.0);
+        assert_eq!((found.events, found.approaches), (1, 1), "{found:?}");
+        assert!((found.closing_mps[0] - 8.0).abs() < 0.2 && (0.6..1.0).contains(&found.rear_thw_s[0]), "{found:?}");
+        assert!((found.distance_km - 1.35).abs() < 0.05, "{found:?}");
+        assert_eq!(observed(320.0, 4.0).events, 0, "too far away");
+        assert_eq!(observed(130.0, 7.0).events, 0, "braking less than that");
+    }
+}

@@ -1,0 +1,105 @@
+//! The exposure as text, with the inputs and equations from which it can be recomputed.
+
+use std::fmt;
+
+use closecall_statistics::quantiles::quantile;
+
+use super::{Exposure, Observed, Rate};
+
+/// The exposure as text for readers.
+#[derive(Clone, Copy, Debug)]
+pub struct ExposureText<'a>(pub &'a Exposure);
+
+impl fmt::Display for ExposureText<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Exposure { rule, observed, rate, campaign, effect, missing } = self.0;
+        if let Some(seen) = observed.as_ref().filter(|seen| seen.hours > 0.0) {
+            write_observed(f, seen, rule.braking_mps2)?;
+        }
+        match rate {
+            Some(Rate::Counted { events, distance_km }) => {
+                writeln!(f, "rate: N = {events} events in D = {distance_km} km")?;
+            }
+            Some(Rate::Prior { low, high }) => {
+                writeln!(f, "rate: stated, from {low} to {high} events per 10^6 km (value: their geometric mean)")?;
+            }
+            None => {}
+        }
+        if let Some(campaign) = campaign {
+            writeln!(
+                f,
+                "campaign {}: n = {} paired samples, {} prevented, {} induced",
+                campaign.scenarios.join(", "),
+                campaign.samples,
+                campaign.prevented,
+                campaign.induced,
+            )?;
+        }
+        match effect {
+            Some(effect) => {
+                let [low, high] = effect.rate_95;
+                let stated = if matches!(rate, Some(Rate::Prior { .. })) { "as stated" } else { "95 %" };
+                writeln!(f, "encounters per 10^6 km: {:.4} ({stated}: {low:.4} to {high:.4})", effect.rate)?;
+                let [low, high] = effect.difference_95;
+                writeln!(
+                    f,
+                    "prevented less induced, given an encounter: {:.6} (95 %: {low:.6} to {high:.6})",
+                    effect.difference
+                )?;
+                let [low, high] = effect.net_95;
+                writeln!(
+                    f,
+                    "NET EFFECT: {:.4} fewer collisions per 10^6 km ({stated}: {low:.4} to {high:.4})",
+                    effect.net
+                )?;
+                if low <= 0.0 && high >= 0.0 {
+                    writeln!(
+                        f,
+                        "its sign cannot be said: the interval contains 0, more events or more samples are needed"
+                    )?;
+                }
+                writeln!(
+                    f,
+                    "by hand: rate = 10^6 N / D, interval by gamma quantiles of shape N + 1/2 over D; difference = (prevented - \
+                     induced) / n, Wilson intervals combined; net = rate x difference, intervals combined as in docs/causes.md"
+                )?;
+                writeln!(
+                    f,
+                    "assumed: the events are independent of each other, and the sampled encounters are those of the road"
+                )
+            }
+            None => {
+                writeln!(f, "NET EFFECT: cannot be said. It would have to be known:")?;
+                missing.iter().try_for_each(|missing| writeln!(f, "  {missing}"))
+            }
+        }
+    }
+}
+
+fn write_observed(f: &mut fmt::Formatter<'_>, seen: &Observed, braking_mps2: f64) -> fmt::Result {
+    writeln!(f, "{}: {:.3} km, {:.3} h of all vehicles", seen.sources.join(", "), seen.distance_km, seen.hours)?;
+    writeln!(
+        f,
+        "  {} approaches: a vehicle comes within 100 m of one that follows at less than 1.5 s, 10 km/h or more faster",
+        seen.approaches
+    )?;
+    writeln!(f, "  {} events: the lead vehicle brakes by {braking_mps2} m/s² or more meanwhile", seen.events)?;
+    for (what, values, unit) in [
+        ("speed difference at an approach", &seen.closing_mps, "m/s"),
+        ("rear time headway at an event", &seen.rear_thw_s, "s"),
+    ] {
+        let mut sorted = values.clone();
+        sorted.sort_by(f64::total_cmp);
+        if !sorted.is_empty() {
+            let at = |share: f64| quantile(&sorted, share);
+            writeln!(
+                f,
+                "  {what}: median {:.2} {unit}, 5 to 95 %: {:.2} to {:.2} {unit}",
+                at(0.5),
+                at(0.05),
+                at(0.95)
+            )?;
+        }
+    }
+    Ok(())
+}

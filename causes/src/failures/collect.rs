@@ -1,0 +1,117 @@
+//! Collects the failures of a campaign, attributes and explains them.
+
+use closecall_campaign::saved::SavedCampaign;
+use closecall_sensors::SensorMode;
+use rayon::prelude::*;
+
+use super::{FailureRow, order, read_rows};
+use crate::attribution::attribute;
+use crate::case::{Case, CausesError};
+use crate::explain::{Explanation, explain};
+
+/// Largest number of failures that a report attributes, so that a report of a large campaign takes seconds.
+const MOST_ATTRIBUTED: usize = 200;
+
+/// The failures of a campaign.
+#[derive(Clone, Debug, Default)]
+pub struct Failures {
+    /// The failures in the order of the table.
+    pub rows: Vec<FailureRow>,
+    /// Number of failures without an attribution, because of the sensors or because there are too many.
+    pub without_attribution: usize,
+}
+
+/// Returns the failures of the arm under test of a campaign, with attributions and what is kept of earlier explanations.
+///
+/// # Errors
+/// [`CausesError`] if the folder cannot be read.
+pub fn campaign_failures(saved: &SavedCampaign) -> Result<Failures, CausesError> {
+    let mut rows = rows(saved)?;
+    let attributed: Vec<_> = rows
+        .par_iter()
+        .take(MOST_ATTRIBUTED)
+        .map(|row| match &row.attribution {
+            Some(kept) => Some(kept.clone()),
+            None => {
+                let case = Case::of(saved, Some(&row.scenario), row.sample, Some(&row.controller)).ok()?;
+                let is_fast = case.sensors() != SensorMode::Full && is_built_in(saved, &row.controller);
+                if is_fast { attribute(&case, &[]).ok()?.1 } else { None }
+            }
+        })
+        .collect();
+    for (row, attribution) in rows.iter_mut().zip(attributed) {
+        row.attribution = attribution;
+    }
+    let without_attribution = rows.iter().filter(|row| row.attribution.is_none()).count();
+    Ok(Failures { rows, without_attribution })
+}
+
+/// Explains failures of the arm under test: `sample` alone, or up to `most` in the order of the table. Returns the explanations
+/// in that order, and all failures of the campaign with them.
+///
+/// # Errors
+/// [`CausesError`] if the folder cannot be read, or a sample has no outcome or no failure.
+pub fn explain_failures(
+    saved: &SavedCampaign,
+    scenario: Option<&str>,
+    sample: Option<u64>,
+    most: usize,
+) -> Result<(Vec<Explanation>, Failures), CausesError> {
+    if let Some(sample) = sample {
+        let case = Case::of(saved, scenario, sample, None)?;
+        let Some(explanation) = explain(&case)? else { return Err(passes(saved, &case)) };
+        let mut failures = campaign_failures(saved)?;
+        keep(&mut failures.rows, explanation.clone());
+        return Ok((vec![explanation], failures));
+    }
+    let mut failures = campaign_failures(saved)?;
+    let chosen = failures.rows.iter().filter(|row| scenario.is_none_or(|name| row.scenario == name)).take(most);
+    let mut explanations = Vec::new();
+    for row in chosen {
+        let case = Case::of(saved, Some(&row.scenario), row.sample, Some(&row.controller))?;
+        explanations.extend(explain(&case)?);
+    }
+    for explanation in &explanations {
+        keep(&mut failures.rows, explanation.clone());
+    }
+    Ok((explanations, failures))
+}
+
+/// Returns the error for a sample that does not fail, with some that do.
+pub(crate) fn passes(saved: &SavedCampaign, case: &Case) -> CausesError {
+    let failing: Vec<String> =
+        rows(saved).unwrap_or_default().iter().take(5).map(|row| row.sample.to_string()).collect();
+    let failing = if failing.is_empty() { "none".to_owned() } else { failing.join(", ") };
+    CausesError::Passes { sample: case.sample, controller: case.arm.controller.name().to_owned(), failing }
+}
+
+/// Returns the failures of the arm under test with what is kept of earlier explanations.
+fn rows(saved: &SavedCampaign) -> Result<Vec<FailureRow>, CausesError> {
+    let kept = read_rows(saved.folder());
+    let mut rows = Vec::new();
+    for record in saved.folder().records()? {
+        let Some(row) = FailureRow::of(&record?) else { continue };
+        let known = kept.iter().find(|known| known.is_same(&row) && known.time_s == row.time_s);
+        rows.push(known.cloned().unwrap_or(row));
+    }
+    rows.sort_by(order);
+    Ok(rows)
+}
+
+/// Returns whether the controller is part of this program: a process of another author is not started for a report.
+fn is_built_in(saved: &SavedCampaign, controller: &str) -> bool {
+    let manifest = saved.manifest();
+    let mut arms = manifest.arms.iter().zip(manifest.arm_names());
+    arms.any(|(arm, name)| name == controller && arm.exec().is_none())
+}
+
+fn keep(rows: &mut [FailureRow], explanation: Explanation) {
+    let is_of = |row: &&mut FailureRow| {
+        (&row.scenario, row.sample, &row.controller)
+            == (&explanation.scenario, explanation.sample, &explanation.controller)
+    };
+    if let Some(row) = rows.iter_mut().find(is_of) {
+        row.explain(explanation);
+    }
+    rows.sort_by(order);
+}

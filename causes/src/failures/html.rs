@@ -1,0 +1,108 @@
+//! The table of causes as a part of a campaign's report.
+
+use std::collections::BTreeMap;
+
+use maud::{Markup, PreEscaped, html};
+
+use super::{FailureRow, Failures};
+use crate::attribution::{phase_word, state_word};
+use crate::explain::Cause;
+
+/// The comments around the section, by which it is found and replaced.
+const BEGIN: &str = "<!-- causes -->";
+const END: &str = "<!-- end of causes -->";
+/// Largest number of failures that the page lists.
+const MOST_LISTED: usize = 100;
+
+/// Returns the section of the report. `is_named` says whether a command must name the scenario. Without failures there is none.
+pub fn section(failures: &Failures, is_named: bool) -> Markup {
+    let body = if failures.rows.is_empty() { Markup::default() } else { body(failures, is_named) };
+    html! { (PreEscaped(BEGIN)) (body) (PreEscaped(END)) }
+}
+
+/// Returns the part of a page before the section, the section, and the part after it; `None` if the page has none.
+pub fn without_section(page: &str) -> Option<[&str; 3]> {
+    let (before, rest) = page.split_once(BEGIN)?;
+    let (section, after) = rest.split_once(END)?;
+    Some([before, section, after])
+}
+
+fn body(failures: &Failures, is_named: bool) -> Markup {
+    let rows = &failures.rows;
+    html! {
+        h2 { "Causes" }
+        p.note {
+            "All failures of the arm under test: induced ones first, then those that no perfect stage prevents, then those with the most "
+            "harm. Avoidable: whether the competent and careful driver of UN Regulation 157 in the place of the striking vehicle or of the "
+            "ego, or full braking of the striking vehicle, would have avoided the first collision. Due to: the stage of the chain whose "
+            "perfection prevents the failure, once " code { "closecall explain" } " has found it."
+        }
+        (counts(rows))
+        @if failures.without_attribution > 0 {
+            p.note {
+                (failures.without_attribution) " of " (rows.len()) " failures are not attributed yet: they are many, or their sensors are "
+                "slow. " code { "closecall explain ." } " does it."
+            }
+        }
+        div.wide tabindex="0" {
+            table {
+                thead { tr {
+                    th.number { "sample" } th { "strikes" } th { "phase" } th { "induced" } th.number { "harm" } th { "avoidable by" }
+                    th { "due to" } th { "commands" }
+                } }
+                tbody { @for row in rows.iter().take(MOST_LISTED) { (line(row, is_named)) } }
+            }
+        }
+        @if rows.len() > MOST_LISTED { p.note { "The first " (MOST_LISTED) " of " (rows.len()) " failures." } }
+    }
+}
+
+/// Returns the counts by striking vehicle, phase and avoidability.
+fn counts(rows: &[FailureRow]) -> Markup {
+    let mut counted: BTreeMap<(String, &str, &str), usize> = BTreeMap::new();
+    for row in rows {
+        let avoidable = row.attribution.as_ref().map_or("not known", |found| found.avoidable.words());
+        let who = format!("{} strikes {}", row.vehicles[0], row.vehicles[1]);
+        *counted.entry((who, phase_word(row.phase), avoidable)).or_default() += 1;
+    }
+    html! {
+        div.wide tabindex="0" { table {
+            thead { tr { th { "who" } th { "phase" } th { "avoidable by" } th.number { "failures" } } }
+            tbody { @for ((who, phase, avoidable), count) in &counted {
+                tr { td { (who) } td { (phase) } td { (avoidable) } td.number { (count) } }
+            } }
+        } }
+    }
+}
+
+fn line(row: &FailureRow, is_named: bool) -> Markup {
+    let named = if is_named { format!(" --scenario {}", row.scenario) } else { String::new() };
+    let phase = match (&row.attribution, row.is_after_lead_braking) {
+        (Some(found), _) => found.phase_words(),
+        (None, true) => format!("{}, after F's braking", phase_word(row.phase)),
+        (None, false) => format!("{}, without braking of F", phase_word(row.phase)),
+    };
+    let state = row.attribution.as_ref().map_or("", |found| state_word(found.ego_state));
+    html! {
+        tr.collided {
+            td.number { (row.sample) }
+            td title=(row.scenario) { (row.vehicles[0]) " → " (row.vehicles[1]) }
+            td title=(state) { (phase) }
+            td { (match row.is_induced { Some(true) => "induced", Some(false) => "no", None => "" }) }
+            td.number { (format!("{:.3}", row.harm)) }
+            td { (row.attribution.as_ref().map_or("", |found| found.avoidable.words())) }
+            td title=(row.sentence.clone().unwrap_or_default()) { (due_to(row)) }
+            td { @for command in ["replay", "explain", "minimize"] { code { "closecall " (command) " . " (row.sample) (named) } br; } }
+        }
+    }
+}
+
+/// Returns what the failure is due to.
+fn due_to(row: &FailureRow) -> String {
+    match &row.cause {
+        None => String::new(),
+        Some(Cause::Stage { stage }) => stage.name().to_owned(),
+        Some(Cause::Pair { stages: [one, other] }) => format!("{} and {}", one.name(), other.name()),
+        Some(Cause::None) => "no stage".to_owned(),
+    }
+}

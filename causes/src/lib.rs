@@ -1,0 +1,23 @@
+//! From a collision to its cause.
+//!
+//! ```text
+//!  failing sample ─▶ attribution   which vehicle closed the gap, in which phase, who could have avoided it
+//!                 ─▶ explain       the first stage of the chain whose perfection prevents the failure
+//!                 ─▶ minimize      the smallest failing case near it, and the nearest case that passes
+//!  grid           ─▶ map           the margin that is reached, in theory and in the loop
+//!  campaign       ─▶ cost          what the system costs where nothing happens
+//!  recordings     ─▶ exposure      how often the encounter happens on a road: the net effect per 10⁶ km
+//! ```
+//!
+//! Every statement rests on runs that can be repeated: each is a run of the same sample with settings, as `--set` applies them.
+
+pub mod attribution;
+pub mod case;
+pub mod cost;
+pub mod explain;
+pub mod exposure;
+pub mod failures;
+pub mod map;
+pub mod minimize;
+
+pub use case::CausesError;

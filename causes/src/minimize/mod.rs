@@ -1,0 +1,26 @@
+//! The smallest failing case near a failing sample, and the nearest case that passes.
+//!
+//! ```text
+//!  sample ─▶ fewest parameters off nominal that still fail ─▶ each as near to nominal as it still fails ─▶ concrete scenario
+//!                                                                              └─▶ nearest value that passes ─▶ its twin
+//! ```
+//!
+//! First every set of one, two and three parameters is tried, all others at their nominal values. If none fails, delta debugging
+//! (Zeller and Hildebrandt, *Simplifying and isolating failure-inducing input*, IEEE Transactions on Software Engineering 28
+//! (2002) 183–200) removes parameters from the sample until no single one can be removed. Then each remaining number moves
+//! towards its nominal value by bisection, on a grid of readable values. The random numbers stay those of the sample: the
+//! files name them, so that a plain `closecall run FILE` repeats the case.
+
+mod grid;
+mod run;
+mod subset;
+mod text;
+mod trial;
+mod twin;
+mod words;
+mod write;
+
+pub use run::{Minimized, Offset, minimize, minimize_sample};
+pub use text::MinimizedText;
+pub use twin::Twin;
+pub use write::{MinimizedFiles, write_files};

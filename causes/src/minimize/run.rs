@@ -1,0 +1,202 @@
+//! Minimizes a failing sample.
+
+use closecall_campaign::saved::SavedCampaign;
+use closecall_traffic::{ParameterName, Parameters, Value};
+use serde::Serialize;
+
+use super::subset::fewest;
+use super::trial::Trial;
+use super::twin::{Candidate, Twin, twin};
+use super::{grid, words};
+use crate::attribution::{Attribution, attribute};
+use crate::case::{Case, CausesError, fails};
+use crate::failures::passes;
+
+/// Number of steps of the grid beyond a failing value in which a passing one is looked for.
+const MOST_STEPS_TO_TWIN: i64 = 20;
+
+/// A parameter of the smallest case that is off its nominal value.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Offset {
+    /// The parameter's name.
+    pub name: String,
+    /// Its value in the smallest case, as text.
+    pub value: String,
+    /// Its value in the sample.
+    pub sampled: String,
+    /// Its nominal value.
+    pub nominal: String,
+    /// The value in words, in the units of a reader.
+    pub words: String,
+}
+
+/// The smallest failing case near a sample.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Minimized {
+    /// The scenario's name.
+    pub scenario: String,
+    /// The seed.
+    pub seed: u64,
+    /// The sample's number.
+    pub sample: u64,
+    /// The controller.
+    pub controller: String,
+    /// Depth of the sensor simulation.
+    pub sensors: String,
+    /// The parameters that are off their nominal values.
+    pub off_nominal: Vec<Offset>,
+    /// Number of the sample's parameters that were off their nominal values.
+    pub sampled_off_nominal: usize,
+    /// Why there are more than three parameters; `None` if there are not.
+    pub why_more_than_three: Option<String>,
+    /// The settings that make the case of the scenario, each as `key=value`.
+    pub settings: Vec<String>,
+    /// The collision of the smallest case.
+    pub collision: Attribution,
+    /// The case in a sentence.
+    pub sentence: String,
+    /// The nearest case that passes; `None` if none was found.
+    pub twin: Option<Twin>,
+}
+
+/// Minimizes a failing case. Returns `None` if no vehicle collides in it.
+///
+/// # Errors
+/// [`CausesError`] if the sample has no outcome.
+pub fn minimize(case: &Case) -> Result<Option<Minimized>, CausesError> {
+    if !fails(&case.run(&[])?) {
+        return Ok(None);
+    }
+    let trial = Trial::new(case);
+    let found = fewest(&trial);
+    let (values, candidates) = shrunk(&trial, &found.names);
+    let settings = Trial::settings(&values);
+    let (_, collision) = attribute(case, &settings)?;
+    let Some(collision) = collision else { return Ok(None) };
+    let off_nominal: Vec<Offset> = found.names.iter().filter_map(|name| offset(&trial, &values, name)).collect();
+    let why_more_than_three = (off_nominal.len() > 3).then(|| {
+        let more = if found.is_smallest { "four are needed" } else { "of these, none can be left out" };
+        format!("no set of three parameters fails with the others at their nominal values, and {more}")
+    });
+    let sentence = words::sentence(&collision, &off_nominal);
+    Ok(Some(Minimized {
+        scenario: case.file.config().name.clone(),
+        seed: case.sampling.seed,
+        sample: case.sample,
+        controller: case.arm.controller.name().to_owned(),
+        sensors: case.sensors().name().to_owned(),
+        off_nominal,
+        sampled_off_nominal: trial.differing.len(),
+        why_more_than_three,
+        settings: settings.iter().map(ToString::to_string).collect(),
+        twin: twin(&trial, &values, &candidates),
+        collision,
+        sentence,
+    }))
+}
+
+/// Minimizes a failing sample of a campaign.
+///
+/// # Errors
+/// [`CausesError`] if the sample does not fail, or has no outcome.
+pub fn minimize_sample(saved: &SavedCampaign, case: &Case) -> Result<Minimized, CausesError> {
+    minimize(case)?.ok_or_else(|| passes(saved, case))
+}
+
+fn offset(trial: &Trial<'_>, values: &Parameters, name: &ParameterName) -> Option<Offset> {
+    let (value, nominal) = (values.get(name)?, trial.nominal.get(name)?);
+    Some(Offset {
+        name: name.to_string(),
+        value: value.to_string(),
+        sampled: trial.sampled.get(name)?.to_string(),
+        nominal: nominal.to_string(),
+        words: words::value(name.as_str(), value, nominal),
+    })
+}
+
+/// Moves each named parameter towards its nominal value as far as the case still fails. Returns the values, and for each
+/// parameter the next value that passes.
+fn shrunk(trial: &Trial<'_>, names: &[ParameterName]) -> (Parameters, Vec<Candidate>) {
+    let mut values = trial.with(names);
+    for name in names {
+        if let Some((failing, _)) = boundary(trial, &values, name) {
+            values.insert(name.clone(), failing);
+        }
+    }
+    // The other parameters have moved since: the boundary of each is looked for again.
+    let candidates = names.iter().filter_map(|name| {
+        let (failing, next) = boundary(trial, &values, name)?;
+        let passing = first_passing(trial, &values, name, (&failing, next))?;
+        let distance = match (&failing, &passing, trial.span(name)) {
+            (Value::Number(failing), Value::Number(passing), Some(span)) => (failing - passing).abs() / span,
+            _ => 1.0,
+        };
+        Some(Candidate { name: name.clone(), value: passing, distance })
+    });
+    let candidates = candidates.collect();
+    (values, candidates)
+}
+
+/// Returns the first value of a parameter from `next` on, away from the failing one, with which the case passes: what does not
+/// fail may also fail at half the time step only, or be no valid scenario.
+fn first_passing(
+    trial: &Trial<'_>,
+    values: &Parameters,
+    name: &ParameterName,
+    (failing, next): (&Value, Value),
+) -> Option<Value> {
+    let steps = match (failing, &next, trial.span(name)) {
+        (Value::Number(failing), Value::Number(next), Some(span)) => {
+            let step = grid::step(span);
+            let first = grid::beyond(*next, *failing, step);
+            let sign = if next > failing { 1 } else { -1 };
+            (0..MOST_STEPS_TO_TWIN).map(|count| Value::Number(grid::at(first + sign * count, step))).collect()
+        }
+        _ => Vec::new(),
+    };
+    std::iter::once(next).chain(steps).find(|value| {
+        let mut changed = values.clone();
+        changed.insert(name.clone(), value.clone());
+        trial.passes(&changed)
+    })
+}
+
+/// Returns the value of a parameter that is nearest to nominal and still fails, and the next one, which passes. `None` if even
+/// the nominal value fails.
+fn boundary(trial: &Trial<'_>, values: &Parameters, name: &ParameterName) -> Option<(Value, Value)> {
+    let at = |value: Value| {
+        let mut changed = values.clone();
+        changed.insert(name.clone(), value);
+        changed
+    };
+    let (present, nominal) = (values.get(name)?.clone(), trial.nominal.get(name)?.clone());
+    if trial.fails(&at(nominal.clone())) {
+        return None;
+    }
+    let (Value::Number(present_value), Value::Number(nominal_value), Some(span)) =
+        (&present, &nominal, trial.span(name))
+    else {
+        return Some((present, nominal));
+    };
+    let step = grid::step(span);
+    let number = |index: i64| Value::Number(grid::at(index, step));
+    let mut failing = grid::beyond(*present_value, *nominal_value, step);
+    let inner = grid::beyond(*nominal_value, *present_value, step);
+    if !trial.fails(&at(number(failing))) {
+        // The readable value next to the sample's passes: the sample's own value stays.
+        return Some((present, number(failing)));
+    }
+    let mut passing = inner;
+    if trial.fails(&at(number(passing))) {
+        return Some((number(passing), nominal));
+    }
+    while (failing - passing).abs() > 1 {
+        let middle = i64::midpoint(failing, passing);
+        if trial.fails(&at(number(middle))) {
+            failing = middle;
+        } else {
+            passing = middle;
+        }
+    }
+    Some((number(failing), number(passing)))
+}

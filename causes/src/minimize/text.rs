@@ -1,0 +1,45 @@
+//! A minimized case in words.
+
+use std::fmt;
+
+use super::{Minimized, MinimizedFiles};
+
+/// A minimized case as text for readers.
+#[derive(Clone, Copy, Debug)]
+pub struct MinimizedText<'a> {
+    /// The case.
+    pub found: &'a Minimized,
+    /// Its files.
+    pub files: &'a MinimizedFiles,
+}
+
+impl fmt::Display for MinimizedText<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { found, files } = self;
+        writeln!(
+            f,
+            "{} sample {} ({}, {} sensors): {} of {} parameters must be off their nominal values",
+            found.scenario,
+            found.sample,
+            found.controller,
+            found.sensors,
+            found.off_nominal.len(),
+            found.sampled_off_nominal,
+        )?;
+        for offset in &found.off_nominal {
+            writeln!(f, "  {} (sample: {})", offset.words, offset.sampled)?;
+        }
+        if let Some(why) = &found.why_more_than_three {
+            writeln!(f, "  {why}")?;
+        }
+        writeln!(f, "{}", found.sentence)?;
+        writeln!(f, "fails:  closecall run {}", files.failing.display())?;
+        match (&found.twin, &files.twin) {
+            (Some(twin), Some(path)) => {
+                writeln!(f, "passes when {}", twin.words)?;
+                write!(f, "passes: closecall run {}", path.display())
+            }
+            _ => write!(f, "no near case that passes was found"),
+        }
+    }
+}

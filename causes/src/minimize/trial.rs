@@ -1,0 +1,97 @@
+//! Runs of a sample with other parameter values.
+
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+
+use closecall_campaign::runner::run_guarded;
+use closecall_simulation::NoObserver;
+use closecall_simulation::outcome::Outcome;
+use closecall_simulation::scenario::{Scenario, Setting};
+use closecall_traffic::{ParameterName, Parameters, Value};
+
+use crate::case::{Case, fails};
+
+/// A sample whose parameters can be moved to their nominal values.
+pub(super) struct Trial<'a> {
+    pub(super) case: &'a Case,
+    /// The values of the sample.
+    pub(super) sampled: Parameters,
+    /// The nominal values.
+    pub(super) nominal: Parameters,
+    /// The parameters whose two values differ, in the order of their names.
+    pub(super) differing: Vec<ParameterName>,
+    /// Whether a case must have the same result at half the time step, too. Not if the sample itself has not.
+    is_robust: bool,
+    /// Results that are known already, by the values of the parameters.
+    known: Mutex<BTreeMap<String, bool>>,
+}
+
+impl<'a> Trial<'a> {
+    /// Creates the trials of a case.
+    pub(super) fn new(case: &'a Case) -> Self {
+        let space = case.file.space();
+        let sampling = case.sampling;
+        let sampled = space.sample(sampling.design, sampling.seed, case.sample, sampling.samples);
+        let nominal = space.nominal();
+        let differing = sampled.iter().filter(|(name, value)| nominal.get(name) != Some(value));
+        let differing = differing.map(|(name, _)| name.clone()).collect();
+        let trial = Self { case, sampled, nominal, differing, is_robust: true, known: Mutex::default() };
+        let is_robust = trial.fails(&trial.sampled);
+        Self { is_robust, known: Mutex::default(), ..trial }
+    }
+
+    /// Returns the nominal values with the named parameters at the values of the sample.
+    pub(super) fn with(&self, names: &[ParameterName]) -> Parameters {
+        let mut parameters = self.nominal.clone();
+        for name in names {
+            if let Some(value) = self.sampled.get(name) {
+                parameters.insert(name.clone(), value.clone());
+            }
+        }
+        parameters
+    }
+
+    /// Returns whether a case fails. A case that is no valid scenario, or has no outcome, does not.
+    pub(super) fn fails(&self, parameters: &Parameters) -> bool {
+        let key = parameters.iter().map(|(name, value)| format!("{name}={value:?};")).collect::<String>();
+        if let Some(known) = self.known.lock().ok().and_then(|known| known.get(&key).copied()) {
+            return known;
+        }
+        let found = self.case.file.concrete(parameters).is_ok_and(|scenario| self.holds_in(&scenario, fails));
+        if let Ok(mut known) = self.known.lock() {
+            known.insert(key, found);
+        }
+        found
+    }
+
+    /// Returns whether a case is a valid scenario in which no vehicle collides.
+    pub(super) fn passes(&self, parameters: &Parameters) -> bool {
+        self.case.file.concrete(parameters).is_ok_and(|scenario| self.is_passed(&scenario))
+    }
+
+    /// Returns whether no vehicle collides in a scenario.
+    pub(super) fn is_passed(&self, scenario: &Scenario) -> bool {
+        self.holds_in(scenario, |outcome| !fails(outcome))
+    }
+
+    /// Returns whether a condition holds for the outcome of a scenario, at the time step and at half of it.
+    fn holds_in(&self, scenario: &Scenario, holds: impl Fn(&Outcome) -> bool) -> bool {
+        let run = |scenario: &Scenario| run_guarded(scenario, self.case.key(), &self.case.arm, &mut NoObserver);
+        let has = |scenario: &Scenario| run(scenario).is_ok_and(|outcome| holds(&outcome));
+        has(scenario) && (!self.is_robust || has(&scenario.at_half_step()))
+    }
+
+    /// Returns the width of the middle 95 % of a parameter's distribution; `None` for a choice.
+    pub(super) fn span(&self, name: &ParameterName) -> Option<f64> {
+        let distribution = &self.case.file.space().get(name)?.distribution;
+        match [0.025, 0.975].map(|u| distribution.quantile(u)) {
+            [Value::Number(low), Value::Number(high)] if high > low => Some(high - low),
+            _ => None,
+        }
+    }
+
+    /// Returns the settings that fix all parameters, in the order of their names.
+    pub(super) fn settings(parameters: &Parameters) -> Vec<Setting> {
+        parameters.iter().filter_map(|(name, value)| format!("{name}={value}").parse().ok()).collect()
+    }
+}

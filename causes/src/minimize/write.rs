@@ -1,0 +1,158 @@
+//! The scenario files of a smallest case and of its twin.
+
+use std::path::{Path, PathBuf};
+
+use closecall_scenarios::atomic::write_file;
+use closecall_simulation::scenario::{ScenarioFile, Setting};
+use serde::Serialize;
+use toml_edit::{Array, DocumentMut, InlineTable, Item, Table, TableLike, Value};
+
+use super::Minimized;
+use crate::case::{Case, CausesError};
+
+/// Tables and keys that belong to a campaign of many samples, and not to a single case.
+const OF_CAMPAIGNS: [&str; 6] = ["parameters", "requirements", "checks", "gate", "expects", "expects-share"];
+
+/// The files that were written.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct MinimizedFiles {
+    /// The smallest failing case.
+    pub failing: PathBuf,
+    /// The nearest case that passes.
+    pub twin: Option<PathBuf>,
+}
+
+/// Writes the smallest case to `path` and its twin beside it, with `-passes` at the end of its name.
+///
+/// # Errors
+/// [`CausesError`] if a case is no valid scenario, or a file cannot be written.
+pub fn write_files(case: &Case, found: &Minimized, path: &Path) -> Result<MinimizedFiles, CausesError> {
+    let stem = path.file_stem().map_or_else(|| "minimized".to_owned(), |stem| stem.to_string_lossy().into_owned());
+    let name = named(&stem);
+    let failing = concrete(case, &found.settings, &Text { name: &name, found, is_twin: false })?;
+    let passing = match &found.twin {
+        Some(twin) => {
+            let name = format!("{name}-passes");
+            Some(concrete(case, &twin.settings, &Text { name: &name, found, is_twin: true })?)
+        }
+        None => None,
+    };
+    let write = |path: &Path, text: &str| write_file(path, |file| file.write_all(text.as_bytes()));
+    write(path, &failing)?;
+    let twin = path.with_file_name(format!("{stem}-passes.toml"));
+    if let Some(passing) = &passing {
+        write(&twin, passing)?;
+    }
+    Ok(MinimizedFiles { failing: path.to_owned(), twin: passing.map(|_| twin) })
+}
+
+/// What a file says about its case.
+struct Text<'a> {
+    name: &'a str,
+    found: &'a Minimized,
+    is_twin: bool,
+}
+
+/// Returns a name of a scenario that is made of the name of a file.
+fn named(stem: &str) -> String {
+    let is_allowed = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit();
+    let text: String = stem.to_lowercase().chars().map(|c| if is_allowed(c) { c } else { '-' }).collect();
+    let text = text.trim_matches('-');
+    if text.starts_with(|c: char| c.is_ascii_lowercase()) { text.to_owned() } else { format!("case-{text}") }
+}
+
+/// Returns the text of a concrete scenario, in which every parameter has its value.
+fn concrete(case: &Case, settings: &[String], text: &Text<'_>) -> Result<String, CausesError> {
+    let parsed: Vec<Setting> = settings.iter().filter_map(|setting| setting.parse().ok()).collect();
+    let file = ScenarioFile::parse(case.file.path(), case.file.text(), &parsed)?;
+    let values = file.space().nominal();
+    let mut document: DocumentMut = file.text().parse().unwrap_or_default();
+    OF_CAMPAIGNS.iter().for_each(|key| drop(document.remove(key)));
+    inline(document.as_table_mut(), &|name| {
+        let name = closecall_traffic::ParameterName::new(name)?;
+        Some(match values.get(&name)? {
+            closecall_traffic::Value::Number(number) => Value::from(*number),
+            closecall_traffic::Value::Label(label) => Value::from(label.as_str()),
+        })
+    });
+    let found = text.found;
+    document.insert("name", Item::Value(text.name.into()));
+    document.insert("description", Item::Value(sentence(text).into()));
+    let kind = if text.is_twin { "passes" } else { "fails" };
+    document.insert("tags", Item::Value(Value::Array(Array::from_iter(["regression", kind]))));
+    let random = InlineTable::from_iter([("seed", number(found.seed)), ("sample", number(found.sample))]);
+    document.insert("random-numbers", Item::Value(Value::InlineTable(random)));
+    if let Some(sensors) = document.entry("sensors").or_insert(Item::Table(Table::new())).as_table_like_mut() {
+        sensors.insert("mode", Item::Value(found.sensors.as_str().into()));
+    }
+    let (ego, least) = if text.is_twin {
+        ("count(ego_collided) <= 0", "count(others_collided) <= 0")
+    } else {
+        let involves_ego = [&found.collision.striking, &found.collision.struck]
+            .iter()
+            .any(|party| Some(&party.actor) == case.file.ego_id());
+        if involves_ego { ("count(ego_collided) >= 1", "") } else { ("count(others_collided) >= 1", "") }
+    };
+    let require = Array::from_iter([ego, least].into_iter().filter(|text| !text.is_empty()));
+    let mut gate = Table::new();
+    gate.insert("require", Item::Value(Value::Array(require)));
+    document.insert("gate", Item::Table(gate));
+    let written = format!("{}{document}", heading(text));
+    // The file must be a scenario: a mistake shows here, and not when it is run.
+    ScenarioFile::parse(Path::new(text.name), &written, &[])?.check()?;
+    Ok(written)
+}
+
+/// Returns a seed or the number of a sample. TOML has no number above the largest signed one: such a seed is written as text,
+/// which the check below refuses with a message.
+fn number(value: u64) -> Value {
+    i64::try_from(value).map_or_else(|_| Value::from(value.to_string()), Value::from)
+}
+
+fn sentence(text: &Text<'_>) -> String {
+    let twin = text.found.twin.as_ref();
+    match (text.is_twin, twin) {
+        (true, Some(twin)) => format!("Passes when {}. Otherwise: {}", twin.words, text.found.sentence),
+        _ => text.found.sentence.clone(),
+    }
+}
+
+fn heading(text: &Text<'_>) -> String {
+    let found = text.found;
+    let controller =
+        if found.controller == "mis" { String::new() } else { format!(" --controller {}", found.controller) };
+    format!(
+        "# Made by `closecall minimize` from sample {} of `{}`, seed {}.\n# {}\n# Run: closecall run FILE{controller}\n",
+        found.sample,
+        found.scenario,
+        found.seed,
+        sentence(text),
+    )
+}
+
+/// Replaces every `"$name"` by the value of the parameter.
+fn inline(table: &mut dyn TableLike, value: &dyn Fn(&str) -> Option<Value>) {
+    for (_, item) in table.iter_mut() {
+        match item {
+            Item::Value(inner) => inline_value(inner, value),
+            Item::Table(inner) => inline(inner, value),
+            Item::ArrayOfTables(tables) => tables.iter_mut().for_each(|inner| inline(inner, value)),
+            Item::None => {}
+        }
+    }
+}
+
+fn inline_value(item: &mut Value, value: &dyn Fn(&str) -> Option<Value>) {
+    match item {
+        Value::String(text) => {
+            if let Some(found) = text.value().strip_prefix('$').and_then(value) {
+                let decor = item.decor().clone();
+                *item = found;
+                *item.decor_mut() = decor;
+            }
+        }
+        Value::Array(values) => values.iter_mut().for_each(|inner| inline_value(inner, value)),
+        Value::InlineTable(inner) => inline(inner, value),
+        _ => {}
+    }
+}

@@ -1,0 +1,189 @@
+//! `closecall explain`, `minimize`, `map` and `exposure`: from a collision to its cause, and how often it matters.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use closecall_campaign::arguments::positive;
+use closecall_campaign::saved::SavedCampaign;
+use closecall_causes::CausesError;
+use closecall_causes::case::Case;
+use closecall_causes::cost::{CostText, cost as cost_of};
+use closecall_causes::explain::ExplanationText;
+use closecall_causes::exposure::{
+    Counted, EventRule, ExposureText, StatedRange, exposure as compute_exposure, observe, shares_of,
+};
+use closecall_causes::failures::explain_failures;
+use closecall_causes::map::{MapGrid, MapText, map as compute_map, write_map};
+use closecall_causes::minimize::{MinimizedText, minimize_sample, write_files};
+use closecall_report::campaign::write_causes;
+use closecall_report::json::stamped;
+use closecall_scenarios::filters::smooth;
+use closecall_scenarios::trajectory_data::read_with;
+use closecall_simulation::controller::ControllerChoice;
+use serde_json::json;
+
+use super::CliError;
+use super::args::{Format, ReadArgs, SetArgs};
+use super::output::{outln, print_written};
+use super::protect::{of_campaign, protect};
+use crate::exit_code::ExitCode;
+
+/// Arguments of `closecall explain`.
+#[derive(Debug, Args)]
+pub(super) struct ExplainArgs {
+    /// Folder of the campaign
+    dir: PathBuf,
+    /// Number of a failing sample [default: all failing samples, up to --most]
+    sample: Option<u64>,
+    /// Name of the scenario; required if a sample is named and the campaign has several
+    #[arg(long)]
+    scenario: Option<String>,
+    /// Largest number of samples to explain: induced failures first, then those with the most harm
+    #[arg(long, value_name = "N", default_value_t = 100, conflicts_with = "sample")]
+    most: usize,
+    /// Output format
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+pub(super) fn explain(args: &ExplainArgs) -> Result<ExitCode, CliError> {
+    let saved = SavedCampaign::open(&args.dir)?;
+    let (found, failures) = explain_failures(&saved, args.scenario.as_deref(), args.sample, args.most)?;
+    write_causes(&saved, &failures)?.iter().for_each(|path| print_written(path));
+    match (args.format, args.sample, &found[..]) {
+        (Format::Json, Some(_), [one]) => outln!("{:#}", stamped(json!(one), Some(one.seed), None)),
+        (Format::Json, ..) => outln!("{:#}", stamped(json!(found), None, None)),
+        (Format::Human, _, []) => outln!("no sample fails"),
+        (Format::Human, ..) => {
+            let text = |explanation| ExplanationText { explanation, folder: &args.dir };
+            found.iter().for_each(|explanation| outln!("{}", text(explanation)));
+        }
+    }
+    Ok(ExitCode::Pass)
+}
+
+/// Arguments of `closecall minimize`.
+#[derive(Debug, Args)]
+pub(super) struct MinimizeArgs {
+    /// Folder of the campaign
+    dir: PathBuf,
+    /// Number of a failing sample
+    sample: u64,
+    /// Name of the scenario; required if the campaign has several
+    #[arg(long)]
+    scenario: Option<String>,
+    /// Controller of the arm [default: the controller under test]
+    #[arg(long, value_name = "NAME")]
+    controller: Option<String>,
+    /// Scenario file to write [default: SCENARIO-SAMPLE.toml]. The nearest case that passes is written beside it, with
+    /// `-passes` at the end of its name
+    #[arg(short, long, value_name = "FILE.toml")]
+    output: Option<PathBuf>,
+    /// Output format
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+pub(super) fn minimize(args: &MinimizeArgs) -> Result<ExitCode, CliError> {
+    let saved = SavedCampaign::open(&args.dir)?;
+    let case = Case::of(&saved, args.scenario.as_deref(), args.sample, args.controller.as_deref());
+    let case = case.map_err(CausesError::from)?;
+    let found = minimize_sample(&saved, &case)?;
+    let path = args.output.clone().unwrap_or_else(|| format!("{}-{}.toml", found.scenario, found.sample).into());
+    protect(&of_campaign(&args.dir), &[("--output", Some(&path))])?;
+    let files = write_files(&case, &found, &path)?;
+    match args.format {
+        Format::Json => outln!("{:#}", stamped(json!({ "minimized": found, "files": files }), Some(found.seed), None)),
+        Format::Human => outln!("{}", MinimizedText { found: &found, files: &files }),
+    }
+    Ok(ExitCode::Pass)
+}
+
+/// Arguments of `closecall map`.
+#[derive(Debug, Args)]
+pub(super) struct MapArgs {
+    /// Speed of the ego and of the lead vehicle
+    #[arg(long, value_name = "M/S", value_parser = positive, default_value = "30")]
+    speed_mps: f64,
+    /// Speed differences of the rear vehicle
+    #[arg(long, value_name = "KM/H,…", value_delimiter = ',', value_parser = positive, default_value = "10,15,20,22.5,25,27.5,30,40,50")]
+    closing_kmh: Vec<f64>,
+    /// Gaps at which the system may engage
+    #[arg(long, value_name = "M,…", value_delimiter = ',', value_parser = positive, default_value = "60,80,100,120,150")]
+    detection_m: Vec<f64>,
+    /// Front time headways at the start
+    #[arg(long, value_name = "S,…", value_delimiter = ',', value_parser = positive, default_value = "0.5,0.7,0.9,1.2")]
+    front_thw_s: Vec<f64>,
+    /// Engage at the gaps of the paper's system or of the extended one, and brake as hard: `mis` or `mis-extended`
+    #[arg(long, default_value = "mis")]
+    controller: ControllerChoice,
+    /// Folder for the page, the pictures (SVG) and the points (CSV, JSON)
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    set: SetArgs,
+    /// Output format
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+pub(super) fn map(args: &MapArgs) -> Result<ExitCode, CliError> {
+    let MapArgs { speed_mps, closing_kmh, detection_m, front_thw_s, .. } = args;
+    let (closing_kmh, detection_m, front_thw_s) = (closing_kmh.clone(), detection_m.clone(), front_thw_s.clone());
+    let grid = MapGrid { speed_mps: *speed_mps, closing_kmh, detection_m, front_thw_s };
+    let found = compute_map(&grid, &args.controller, &args.set.settings).map_err(CausesError::from)?;
+    if let Some(out) = &args.out {
+        write_map(out, &found)?.iter().for_each(|path| print_written(path));
+    }
+    match args.format {
+        Format::Json => outln!("{:#}", stamped(json!(found), None, None)),
+        Format::Human => outln!("{}", MapText(&found)),
+    }
+    Ok(ExitCode::Pass)
+}
+
+/// Arguments of `closecall exposure`.
+#[derive(Debug, Args)]
+pub(super) struct ExposureArgs {
+    /// Trajectory files, in which the encounters are counted
+    #[arg(value_name = "TRAJECTORY_FILE")]
+    files: Vec<PathBuf>,
+    #[command(flatten)]
+    read: ReadArgs,
+    /// Deceleration in m/s² from which the lead vehicle counts as braking
+    #[arg(long, value_name = "M/S²", value_parser = positive, default_value = "4")]
+    braking_mps2: f64,
+    /// Encounters per 10^6 km, as a range that is stated: for want of files that show one
+    #[arg(long, value_name = "LOW..HIGH", conflicts_with = "counted")]
+    per_million_km: Option<StatedRange>,
+    /// Encounters that were counted elsewhere, and the distance in km
+    #[arg(long, value_name = "EVENTS/KM", conflicts_with = "files")]
+    counted: Option<Counted>,
+    /// Folder of a paired campaign: what the system prevents and induces, given an encounter
+    #[arg(long, value_name = "DIR")]
+    campaign: Option<PathBuf>,
+    /// Output format
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+pub(super) fn exposure(args: &ExposureArgs) -> Result<ExitCode, CliError> {
+    let rule = EventRule { braking_mps2: args.braking_mps2 };
+    let mut observed = args.counted.map(Counted::observed);
+    for path in &args.files {
+        let data = read_with(path, args.read.options())?;
+        observe(&smooth(&data), rule, observed.get_or_insert_default());
+    }
+    let saved = args.campaign.as_deref().map(SavedCampaign::open).transpose()?;
+    let shares = saved.as_ref().map(shares_of).transpose()?;
+    let cost = saved.as_ref().map(cost_of).transpose()?;
+    let found = compute_exposure(rule, observed, args.per_million_km.map(|range| range.0), shares);
+    match args.format {
+        Format::Json => outln!("{:#}", stamped(json!({ "exposure": found, "cost": cost }), None, None)),
+        Format::Human => {
+            outln!("{}", ExposureText(&found));
+            cost.iter().for_each(|cost| outln!("{}", CostText(cost)));
+        }
+    }
+    Ok(if found.effect.is_some() { ExitCode::Pass } else { ExitCode::Inconclusive })
+}

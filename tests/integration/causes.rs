@@ -1,0 +1,192 @@
+//! From a collision to its cause: what `explain`, `minimize`, `map` and `exposure` say, and that it can be repeated.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use closecall_campaign::folder::Folder;
+use serde_json::Value;
+
+use crate::support::{ROOT, closecall, code, folder, json, library, message, stdout};
+
+/// The seed of all campaigns here.
+const SEED: &str = "4021";
+
+/// Runs a campaign of `low-thw-overtake` with object-level sensors, and returns its folder.
+fn campaign(parent: &Path, name: &str, samples: u64, arguments: &[&str]) -> PathBuf {
+    let path = parent.join(name);
+    let (scenario, samples) = (library("low-thw-overtake"), samples.to_string());
+    let base = ["campaign", scenario.to_str().unwrap(), "-n", &samples, "--seed", SEED, "--no-gate", "--out"];
+    let words = base.iter().copied().chain([path.to_str().unwrap()]).chain(arguments.iter().copied());
+    stdout(&closecall(words), 0);
+    path
+}
+
+/// Returns the samples of a campaign in which any vehicles collide in the arm under test.
+fn failing(folder: &Path) -> BTreeSet<u64> {
+    let records = Folder::open(folder).records().unwrap().map(Result::unwrap);
+    let fails = records.filter(|record| {
+        record.arms.last().is_some_and(|arm| arm.result.as_ref().is_ok_and(|outcome| !outcome.collisions.is_empty()))
+    });
+    fails.map(|record| record.sample).collect()
+}
+
+fn number_of_collisions(run: &Value) -> usize {
+    run["collisions"].as_array().unwrap().len()
+}
+
+#[test]
+fn a_made_fault_is_named_in_the_failures_that_it_causes() {
+    let parent = folder();
+    let usual = failing(&campaign(parent.path(), "usual", 240, &[]));
+    for (fault, stage) in [
+        ("fault.delay-s=0.1", "timing"),
+        ("fault.class-background=true", "class"),
+        ("fault.rear-reaction-s=1", "rear-reaction"),
+    ] {
+        let faulty = campaign(parent.path(), stage, 240, &["--set", fault]);
+        let caused: BTreeSet<u64> = failing(&faulty).difference(&usual).copied().collect();
+        assert!(!caused.is_empty(), "{fault} causes no failure");
+        let all = closecall(["explain", faulty.to_str().unwrap(), "--most", "1000", "--format", "json"]);
+        let explained = json(&all, 0);
+        let is_caused = |found: &&Value| caused.contains(&found["sample"].as_u64().unwrap());
+        let found: Vec<&Value> = explained.as_array().unwrap().iter().filter(is_caused).collect();
+        assert_eq!(found.len(), caused.len());
+        let named = found.iter().filter(|found| found["cause"]["stage"] == stage).count();
+        assert!(100 * named >= 95 * caused.len(), "{fault}: {stage} is named in {named} of {}", caused.len());
+    }
+}
+
+#[test]
+fn a_named_stage_is_confirmed_by_a_run_with_that_stage_alone_replaced() {
+    let parent = folder();
+    let path = campaign(parent.path(), "paired", 120, &["--paired"]);
+    let dir = path.to_str().unwrap();
+    let explained = json(&closecall(["explain", dir, "--format", "json"]), 0);
+    let explained = explained.as_array().unwrap();
+    assert_eq!(explained.len(), failing(&path).len());
+    for found in explained {
+        let sample = found["sample"].to_string();
+        let replayed = json(&closecall(["replay", dir, &sample, "--format", "json"]), 0);
+        assert!(number_of_collisions(&replayed) > 0, "{sample} fails");
+        let Some(stage) = found["cause"]["stage"].as_str() else { continue };
+        let setting = format!("ideal.{stage}=true");
+        let perfect = json(&closecall(["replay", dir, &sample, "--set", &setting, "--format", "json"]), 0);
+        assert_eq!(number_of_collisions(&perfect), 0, "sample {sample} with {setting}");
+        // A plain run of the scenario with the same seed and settings is the same run.
+        let plain =
+            ["run", "low-thw-overtake", "--seed", SEED, "--sample", &sample, "--set", &setting, "--format", "json"];
+        assert_eq!(number_of_collisions(&json(&closecall(plain), 0)), 0, "sample {sample} with {setting}");
+    }
+    // The report names every failure with its cause and its commands.
+    let page = std::fs::read_to_string(path.join("report.html")).unwrap();
+    assert!(page.contains("<h2 id=\"part-") && page.contains(">Causes</h2>"), "no table of causes");
+    assert!(page.contains("Cost where nothing happens"));
+    for found in explained {
+        for command in ["replay", "explain", "minimize"] {
+            assert!(page.contains(&format!("<code>closecall {command} . {}</code>", found["sample"])), "{command}");
+        }
+    }
+    assert_eq!(page.matches("<!-- causes -->").count(), 1);
+}
+
+#[test]
+fn a_minimized_case_fails_and_its_twin_passes_as_plain_scenario_files() {
+    let parent = folder();
+    let path = campaign(parent.path(), "usual", 120, &[]);
+    for sample in failing(&path).into_iter().take(5) {
+        let file = parent.path().join(format!("case-{sample}.toml"));
+        let (dir, name, number) = (path.to_str().unwrap(), file.to_str().unwrap(), sample.to_string());
+        let found = json(&closecall(["minimize", dir, &number, "--output", name, "--format", "json"]), 0);
+        let off = found["minimized"]["off_nominal"].as_array().unwrap().len();
+        assert!(off <= 3 || found["minimized"]["why_more_than_three"].is_string(), "{found:#}");
+        let run = |file: &str| number_of_collisions(&json(&closecall(["run", file, "--format", "json"]), 0));
+        assert!(run(name) > 0, "{name}");
+        let twin = found["files"]["twin"].as_str().unwrap();
+        assert_eq!(run(twin), 0, "{twin}");
+        // A campaign judges both by the gates that they carry.
+        stdout(&closecall(["campaign", name, twin, "-n", "1"]), 0);
+    }
+}
+
+#[test]
+fn the_collected_regressions_have_the_outcomes_that_they_state() {
+    let cases = Path::new(ROOT).join("scenarios/regressions");
+    let files: Vec<_> = std::fs::read_dir(&cases).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let cases_of = |kind: &str| files.iter().filter(|file| file.to_string_lossy().ends_with(kind)).count();
+    assert!(cases_of("-passes.toml") >= 3 && cases_of(".toml") == 2 * cases_of("-passes.toml"), "{files:?}");
+    let text = stdout(&closecall(["campaign", cases.to_str().unwrap(), "-n", "1"]), 0);
+    assert!(text.contains("PASS"), "{text}");
+}
+
+#[test]
+fn the_map_agrees_with_theory_or_says_why() {
+    let grid = ["map", "--closing-kmh", "8,15,24,40", "--detection-m", "80,100", "--front-thw-s", "0.7,1.6"];
+    let out = folder();
+    let dir = out.path().join("map");
+    let found = json(&closecall(grid.iter().copied().chain(["--format", "json", "--out", dir.to_str().unwrap()])), 0);
+    let points = found["points"].as_array().unwrap();
+    assert_eq!(points.len(), 16);
+    for point in points {
+        let differs = match (point["theory_s"].as_f64(), point["loop_s"].as_f64()) {
+            (Some(theory_s), Some(loop_s)) => (theory_s - loop_s).abs() > 0.2,
+            (theory, driven) => theory.is_some() != driven.is_some(),
+        };
+        assert_eq!(differs, point["reason"].is_string(), "{point}");
+    }
+    let page = std::fs::read_to_string(dir.join("map.html")).unwrap();
+    assert!(page.contains("paper: always") && page.contains("paper: never"));
+    assert_eq!(std::fs::read_to_string(dir.join("map.csv")).unwrap().lines().count(), 17);
+    let refused = closecall(["map", "--controller", "acc"]);
+    assert_eq!(code(&refused), 2);
+    assert!(message(&refused).contains("the map needs `mis` or `mis-extended`"), "{}", message(&refused));
+}
+
+#[test]
+fn the_net_effect_is_recomputed_from_its_inputs_or_cannot_be_said() {
+    let parent = folder();
+    let path = campaign(parent.path(), "paired", 100, &["--paired"]);
+    let dir = path.to_str().unwrap();
+    let found = json(&closecall(["exposure", "--counted", "20/5000", "--campaign", dir, "--format", "json"]), 0);
+    let shares = &found["exposure"]["campaign"];
+    let of = |key: &str| shares[key].as_f64().unwrap();
+    let by_hand = 1e6 * 20.0 / 5_000.0 * (of("prevented") - of("induced")) / of("samples");
+    assert!((found["exposure"]["effect"]["net"].as_f64().unwrap() - by_hand).abs() < 1e-6, "{found:#}");
+    assert_eq!(found["cost"]["arms"].as_array().unwrap().len(), 2);
+    assert!(found["cost"]["arms"][1]["time_lost_s"].as_f64().unwrap() > 0.0, "{found:#}");
+    let nothing = closecall(["exposure"]);
+    let text = stdout(&nothing, 4);
+    assert!(
+        text.contains("cannot be said") && text.contains("--per-million-km") && text.contains("--campaign"),
+        "{text}"
+    );
+}
+
+#[test]
+fn a_sample_that_does_not_fail_has_no_cause() {
+    let parent = folder();
+    let path = campaign(parent.path(), "usual", 30, &[]);
+    let failing = failing(&path);
+    let passes = (0..30).find(|sample| !failing.contains(sample)).unwrap().to_string();
+    for command in ["explain", "minimize"] {
+        let refused = closecall([command, path.to_str().unwrap(), &passes]);
+        assert_eq!(code(&refused), 2);
+        assert!(message(&refused).contains("does not fail with `mis`: no vehicle collides"), "{}", message(&refused));
+    }
+    let beyond = closecall(["explain", path.to_str().unwrap(), "400"]);
+    assert!(message(&beyond).contains("there is no sample 400"), "{}", message(&beyond));
+}
+
+#[test]
+fn every_stage_of_the_full_sensors_can_be_replaced_and_the_system_still_engages() {
+    let run = |setting: &str| {
+        let words =
+            ["run", "low-thw-overtake", "--seed", SEED, "--sensors", "full", "--set", setting, "--format", "json"];
+        json(&closecall(words), 0)["mis"]["engaged_at_s"].as_f64()
+    };
+    let usual = run("ideal.points=false").unwrap();
+    for stage in ["points", "clusters", "class", "tracks", "timing", "actuation"] {
+        let engaged = run(&format!("ideal.{stage}=true")).unwrap();
+        assert!((engaged - usual).abs() < 1.0, "{stage}: engaged at {engaged} s instead of {usual} s");
+    }
+    assert_eq!(run("fault.class-background=true"), None, "a vehicle without a class is no target");
+}
