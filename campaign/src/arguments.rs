@@ -87,18 +87,6 @@ pub fn recording(text: &str) -> Result<PathBuf, String> {
     }
 }
 
-/// Parses the path of a picture, whose extension must be .svg or .png.
-///
-/// # Errors
-/// What is wrong, and what is allowed.
-pub fn picture(text: &str) -> Result<PathBuf, String> {
-    let path = PathBuf::from(text);
-    match path.extension().and_then(|extension| extension.to_str()) {
-        Some("svg" | "png") => Ok(path),
-        _ => Err(format!("`{text}` must end with .svg or .png")),
-    }
-}
-
 /// Largest number of samples in one trajectory file.
 const MAX_SAMPLES: u64 = 100_000;
 

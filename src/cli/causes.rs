@@ -55,8 +55,7 @@ pub(super) fn explain(args: &ExplainArgs) -> Result<ExitCode, CliError> {
         (Format::Json, ..) => outln!("{:#}", stamped(json!(found), None, None)),
         (Format::Human, _, []) => outln!("no sample fails"),
         (Format::Human, ..) => {
-            let text = |explanation| ExplanationText { explanation, folder: &args.dir };
-            found.iter().for_each(|explanation| outln!("{}", text(explanation)));
+            found.iter().for_each(|explanation| outln!("{}", ExplanationText { explanation, folder: &args.dir }));
         }
     }
     Ok(ExitCode::Pass)

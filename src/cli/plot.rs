@@ -63,9 +63,7 @@ pub(super) fn plot(args: &PlotArgs) -> Result<ExitCode, CliError> {
 
 fn of_scenario(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
     if args.scenario.is_some() {
-        let message =
-            "--scenario chooses a scenario of a campaign: name the campaign's folder instead of a scenario file"
-                .to_owned();
+        let message = "--scenario chooses a scenario of a campaign: name its folder instead of a file".to_owned();
         return Err(CliError::Usage { message });
     }
     let file = args.set.load(&args.source)?;

@@ -23,7 +23,6 @@ use super::CliError;
 use super::args::{FilesArgs, Format, ReadArgs};
 use super::output::{command_line, out, outln, print_error, print_written, write_charts};
 use super::protect::{of_trajectories, protect};
-
 use crate::exit_code::ExitCode;
 
 /// The criterion by which lane changes are found.

@@ -17,9 +17,7 @@
 //! Thinning never joins clusters that DBSCAN would keep apart. It may split a cluster that is connected only by gaps of
 //! more than 0.43 of the radius, which is the radius less two diagonals of a cell.
 
-mod dbscan;
-
-use dbscan::Dbscan;
+use closecall_statistics::dbscan::Dbscan;
 
 use super::ground::Candidate;
 

@@ -10,9 +10,9 @@ const MAX_CELLS: f64 = 256.0;
 
 /// The clusters of a set of points in the plane.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Dbscan {
+pub struct Dbscan {
     /// Cluster of each point, or `None` for noise.
-    pub(super) labels: Vec<Option<u32>>,
+    pub labels: Vec<Option<u32>>,
     grid: Grid,
     /// Rows that the growing cluster has reached but not visited.
     reached: Vec<u32>,
@@ -23,7 +23,7 @@ impl Dbscan {
     ///
     /// A neighbour is at most `radius` away. A core point has at least `core_points` neighbours, itself included. The order
     /// in which a cluster reaches its points does not change the labels.
-    pub(super) fn run(&mut self, points: &[[f64; 2]], radius: f64, core_points: usize) -> u32 {
+    pub fn run(&mut self, points: &[[f64; 2]], radius: f64, core_points: usize) -> u32 {
         self.labels.clear();
         self.labels.resize(points.len(), None);
         self.grid.build(points, radius);
@@ -184,7 +184,7 @@ mod tests {
 
     #[test]
     fn clusters_match_scikit_learn_up_to_numbering() {
-        let golden = include_str!("../../../tests/golden/dbscan.csv");
+        let golden = include_str!("../tests/golden/dbscan.csv");
         let mut sets: Vec<GoldenSet<'_>> = Vec::new();
         for line in golden.lines().skip(1) {
             let fields: Vec<&str> = line.split(',').collect();
