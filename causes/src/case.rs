@@ -1,5 +1,7 @@
 //! One sample of a campaign in one arm, which can be run again with settings.
 
+use std::path::PathBuf;
+
 use closecall_campaign::failure::FailureKind;
 use closecall_campaign::folder::FolderError;
 use closecall_campaign::runner::{Sampling, concrete, run_guarded};
@@ -7,7 +9,7 @@ use closecall_campaign::saved::{SavedCampaign, SavedError};
 use closecall_scenarios::atomic::WriteError;
 use closecall_sensors::SensorMode;
 use closecall_simulation::outcome::Outcome;
-use closecall_simulation::scenario::{Scenario, ScenarioError, ScenarioFile, Setting};
+use closecall_simulation::scenario::{Scenario, ScenarioError, ScenarioFile, Setting, SettingError};
 use closecall_simulation::{Arm, NoObserver, Observer, RunKey, SampleError};
 
 use crate::map::MapError;
@@ -38,6 +40,37 @@ pub enum CausesError {
         /// Why it has no outcome.
         source: SampleError,
     },
+    /// The sample fails in the journal of the campaign, and not if it is run again.
+    #[error(
+        "sample {sample} with `{controller}` collides in the journal of the campaign, but not if it is run again: the \
+         controller or the program has changed, or does not repeat"
+    )]
+    NotRepeated {
+        /// The sample's number.
+        sample: u64,
+        /// The controller.
+        controller: String,
+    },
+    /// The reduced case of a sample does not fail if it is run again.
+    #[error(
+        "the reduced case of sample {sample} with `{controller}` collided while it was looked for, but not if it is run \
+         again: the controller does not repeat"
+    )]
+    NotReduced {
+        /// The sample's number.
+        sample: u64,
+        /// The controller.
+        controller: String,
+    },
+    /// A setting of a reduced case cannot be read.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
+    /// A file that another program or a person has written would be overwritten.
+    #[error("{} exists, and `closecall minimize` has not written it: name another file with --output", path.display())]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+    },
     /// No vehicle collides in the sample.
     #[error("sample {sample} does not fail with `{controller}`: no vehicle collides; failing samples are {failing}")]
     Passes {
@@ -64,8 +97,8 @@ impl CausesError {
             Self::Scenario(error) if error.is_io() => FailureKind::Io,
             Self::Scenario(error) if error.is_setting() => FailureKind::Usage,
             Self::Scenario(_) => FailureKind::InvalidInput,
-            Self::Sample { .. } => FailureKind::Sample,
-            Self::Passes { .. } => FailureKind::Usage,
+            Self::Sample { .. } | Self::NotRepeated { .. } | Self::NotReduced { .. } => FailureKind::Sample,
+            Self::Passes { .. } | Self::Foreign { .. } | Self::Setting(_) => FailureKind::Usage,
         }
     }
 }

@@ -1,7 +1,7 @@
 //! From a collision to its cause.
 //!
 //! ```text
-//!  failing sample ─▶ attribution   which vehicle closed the gap, in which phase, who could have avoided it
+//!  failing sample ─▶ attribution   which vehicle closed the gap, in which phase, how it was avoidable
 //!                 ─▶ explain       the first stage of the chain whose perfection prevents the failure
 //!                 ─▶ minimize      the smallest failing case near it, and the nearest case that passes
 //!  grid           ─▶ map           the margin that is reached, in theory and in the loop
@@ -9,7 +9,8 @@
 //!  recordings     ─▶ exposure      how often the encounter happens on a road: the net effect per 10⁶ km
 //! ```
 //!
-//! Every statement rests on runs that can be repeated: each is a run of the same sample with settings, as `--set` applies them.
+//! Stages and minimized cases rest on runs that can be repeated: each is a run of the same sample with settings, as `--set` applies
+//! them. Avoidability is computed: from the recorded motion, with another way of braking, and by a run with another driver as the ego.
 
 pub mod attribution;
 pub mod case;

@@ -1,4 +1,4 @@
-//! Perception with single stages replaced by the truth, and with made faults: for finding the stage that a failure is due to.
+//! Perception with single stages replaced by the truth, and with injected faults: for finding the stage that a failure is due to.
 
 use closecall_traffic::{CONTROL_STEP, ClassScores};
 
@@ -24,9 +24,9 @@ pub struct Alterations {
     pub has_true_class: bool,
     /// No sensor and no tracker needs time.
     pub has_no_latency: bool,
-    /// Additional latency of all sensors (s), a made fault: it is rounded to whole control steps of 40 ms.
+    /// Additional latency of all sensors (s), an injected fault: it is rounded to the nearest control step of 0.04 s.
     pub extra_latency_s: f64,
-    /// Every vehicle behind the ego is classified as background, a made fault.
+    /// Every vehicle behind the ego is classified as background, an injected fault.
     pub is_class_background: bool,
 }
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use closecall_campaign::arguments::positive;
+use closecall_campaign::arguments::{count, positive};
 use closecall_campaign::saved::SavedCampaign;
 use closecall_causes::CausesError;
 use closecall_causes::case::Case;
@@ -14,7 +14,7 @@ use closecall_causes::exposure::{
 };
 use closecall_causes::failures::explain_failures;
 use closecall_causes::map::{MapGrid, MapText, map as compute_map, write_map};
-use closecall_causes::minimize::{MinimizedText, minimize_sample, write_files};
+use closecall_causes::minimize::{MinimizedText, minimize_sample, output_files, write_files};
 use closecall_report::campaign::write_causes;
 use closecall_report::json::stamped;
 use closecall_scenarios::filters::smooth;
@@ -39,8 +39,8 @@ pub(super) struct ExplainArgs {
     #[arg(long)]
     scenario: Option<String>,
     /// Largest number of samples to explain: induced failures first, then those with the most harm
-    #[arg(long, value_name = "N", default_value_t = 100, conflicts_with = "sample")]
-    most: usize,
+    #[arg(long, value_name = "N", value_parser = count, default_value = "100", conflicts_with = "sample")]
+    most: u64,
     /// Output format
     #[arg(long, value_enum, default_value_t)]
     format: Format,
@@ -53,7 +53,7 @@ pub(super) fn explain(args: &ExplainArgs) -> Result<ExitCode, CliError> {
     match (args.format, args.sample, &found[..]) {
         (Format::Json, Some(_), [one]) => outln!("{:#}", stamped(json!(one), Some(one.seed), None)),
         (Format::Json, ..) => outln!("{:#}", stamped(json!(found), None, None)),
-        (Format::Human, _, []) => outln!("no sample fails"),
+        (Format::Human, _, []) => outln!("no sample of {} fails", args.scenario.as_deref().unwrap_or("the campaign")),
         (Format::Human, ..) => {
             found.iter().for_each(|explanation| outln!("{}", ExplanationText { explanation, folder: &args.dir }));
         }
@@ -87,10 +87,10 @@ pub(super) fn minimize(args: &MinimizeArgs) -> Result<ExitCode, CliError> {
     let saved = SavedCampaign::open(&args.dir)?;
     let case = Case::of(&saved, args.scenario.as_deref(), args.sample, args.controller.as_deref());
     let case = case.map_err(CausesError::from)?;
+    let paths = output_files(&case, args.output.as_deref())?;
+    protect(&of_campaign(&args.dir), &paths.each_ref().map(|path| ("--output", Some(path.as_path()))))?;
     let found = minimize_sample(&saved, &case)?;
-    let path = args.output.clone().unwrap_or_else(|| format!("{}-{}.toml", found.scenario, found.sample).into());
-    protect(&of_campaign(&args.dir), &[("--output", Some(&path))])?;
-    let files = write_files(&case, &found, &path)?;
+    let files = write_files(&case, &found, &paths)?;
     match args.format {
         Format::Json => outln!("{:#}", stamped(json!({ "minimized": found, "files": files }), Some(found.seed), None)),
         Format::Human => outln!("{}", MinimizedText { found: &found, files: &files }),

@@ -25,28 +25,30 @@ pub struct Party {
     pub side: BoxSide,
 }
 
-/// By which driver, or by what, a collision was avoidable. `None`: the question does not apply.
+/// By which driver, or by what, a collision was avoidable. `None`: it is not decided. The answers for the striking vehicle are
+/// decided if its front strikes the rear of the other one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Avoidable {
     /// By the competent and careful driver of UN Regulation 157 in the place of the striking vehicle.
-    pub careful_in_striking: bool,
+    pub careful_in_striking: Option<bool>,
     /// By that driver in the place of the ego; `None` if the run with it has no outcome.
     pub careful_as_ego: Option<bool>,
     /// By full braking of the striking vehicle from the moment on at which the hazard can be perceived.
-    pub full_braking_from_hazard: bool,
+    pub full_braking_from_hazard: Option<bool>,
     /// By full braking of the striking vehicle from the start on.
-    pub full_braking_from_start: bool,
+    pub full_braking_from_start: Option<bool>,
 }
 
 impl Avoidable {
     /// Returns the answer in words: the weakest means that avoids the collision.
     pub fn words(self) -> &'static str {
         match self {
-            Self { careful_in_striking: true, careful_as_ego: Some(true), .. } => "either careful driver",
-            Self { careful_in_striking: true, .. } => "a careful driver of the striking vehicle",
+            Self { careful_in_striking: Some(true), careful_as_ego: Some(true), .. } => "either careful driver",
+            Self { careful_in_striking: Some(true), .. } => "a careful driver of the striking vehicle",
             Self { careful_as_ego: Some(true), .. } => "a careful driver in place of the ego",
-            Self { full_braking_from_hazard: true, .. } => "full braking from the hazard on only",
-            Self { full_braking_from_start: true, .. } => "full braking from the start only",
+            Self { full_braking_from_hazard: Some(true), .. } => "full braking from the hazard on only",
+            Self { full_braking_from_start: Some(true), .. } => "full braking from the start only",
+            Self { careful_in_striking: None, .. } => "not decided",
             _ => "nothing that was tried",
         }
     }
@@ -65,7 +67,7 @@ pub struct Attribution {
     pub is_mutual: bool,
     /// Phase of the encounter.
     pub phase: Phase,
-    /// Whether the lead vehicle had begun to brake; `None` if it never did before the collision of the ego.
+    /// Whether the lead vehicle had begun to brake before the contact.
     pub is_after_lead_braking: bool,
     /// State of the ego stack at the contact.
     pub ego_state: EgoState,
@@ -75,16 +77,21 @@ pub struct Attribution {
     pub delta_v_mps: f64,
     /// Further collisions of the run.
     pub further_collisions: usize,
-    /// Who could have avoided it.
+    /// How it was avoidable.
     pub avoidable: Avoidable,
 }
 
 impl Attribution {
     /// Returns the phase in words: of the encounter, of the braking of the lead vehicle, and of the system.
     pub fn phase_words(&self) -> String {
-        let braking = if self.is_after_lead_braking { "after F's braking" } else { "without braking of F" };
-        format!("{}, {braking}, {}", phase_word(self.phase), state_word(self.ego_state))
+        format!("{}, {}", braking_words(self.phase, self.is_after_lead_braking), state_word(self.ego_state))
     }
+}
+
+/// Returns the phase of the encounter, and whether the lead vehicle had begun to brake, in words.
+pub fn braking_words(phase: Phase, is_after_lead_braking: bool) -> String {
+    let when = if is_after_lead_braking { "after" } else { "without" };
+    format!("{}, {when} braking of the lead vehicle", phase_word(phase))
 }
 
 /// Returns the phase of the encounter in a word.
@@ -149,9 +156,14 @@ fn of_collision(
     let index = |role: usize| scenario.actors.iter().position(|actor| actor.id == collision.between[role]);
     let indices = [index(roles[0])?, index(roles[1])?];
     let vehicles = indices.map(|index| scenario.actors[index].vehicle);
-    let pair = Pair { trace, step_s: PHYSICS_STEP.s(), indices, vehicles };
+    let sides = roles.map(|role| collision.struck_side[role]);
+    let pair = Pair { trace, step_s: PHYSICS_STEP.s(), indices, vehicles, sides };
     let full_mps2 = scenario.environment.friction * GRAVITY_MPS2;
     let full_from_hazard = pair.is_avoided(Braking::FullFromHazard(full_mps2));
+    let full_from_start = match full_from_hazard {
+        Some(true) => Some(true),
+        _ => pair.is_avoided(Braking::FullFromStart(full_mps2)),
+    };
     Some(Attribution {
         time_s: collision.time.s(),
         striking: party(roles[0]),
@@ -167,7 +179,7 @@ fn of_collision(
             careful_in_striking: pair.is_avoided(Braking::Careful),
             careful_as_ego,
             full_braking_from_hazard: full_from_hazard,
-            full_braking_from_start: full_from_hazard || pair.is_avoided(Braking::FullFromStart(full_mps2)),
+            full_braking_from_start: full_from_start,
         },
     })
 }

@@ -1,6 +1,7 @@
 //! What would have happened with another way of braking of the striking vehicle.
 
 use closecall_controllers::reference::{BrakingReaction, CRITICAL_TTC_S};
+use closecall_traffic::geometry::BoxSide;
 use closecall_traffic::{Vehicle, VehicleState};
 
 use super::Trace;
@@ -32,12 +33,18 @@ pub(super) struct Pair<'a> {
     pub(super) indices: [usize; 2],
     /// The vehicles.
     pub(super) vehicles: [Vehicle; 2],
+    /// The sides that were struck.
+    pub(super) sides: [BoxSide; 2],
 }
 
 impl Pair<'_> {
-    /// Returns whether the vehicles stay apart if the striking vehicle brakes in another way.
-    pub(super) fn is_avoided(&self, braking: Braking) -> bool {
-        let Some(first) = self.trace.states.first() else { return false };
+    /// Returns whether the vehicles stay apart if the striking vehicle brakes in another way; `None` if that is not decided.
+    /// Braking along the lane says something about a front that strikes a rear, and about no other contact.
+    pub(super) fn is_avoided(&self, braking: Braking) -> Option<bool> {
+        if self.sides != [BoxSide::Front, BoxSide::Rear] {
+            return None;
+        }
+        let first = self.trace.states.first()?;
         let [striking, struck] = self.indices;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "15 s in steps of 10 ms")]
         let steps = self.trace.states.len() + (BEYOND_S / self.step_s) as usize;
@@ -47,13 +54,17 @@ impl Pair<'_> {
         let (mut reaction, mut differs) = (None::<BrakingReaction>, false);
         for step in 0..steps {
             let recorded = self.trace.states.get(step);
+            if recorded.is_none() && !differs {
+                // The vehicle drives as it did up to the contact, and the contact follows.
+                return Some(false);
+            }
             let other = recorded.map_or_else(|| continued(&last_of_other, self.step_s), |states| states[struck]);
             last_of_other = other;
             if let (false, Some(states)) = (differs, recorded) {
                 own = states[striking];
             }
             if step > 0 && self.touch(&own, &other) {
-                return false;
+                return Some(false);
             }
             let wanted_mps2 = match braking {
                 Braking::Careful => self.careful_mps2(&own, &other, &mut reaction),
@@ -65,10 +76,10 @@ impl Pair<'_> {
                 own = self.braked(&own, mps2);
             }
             if differs && own.speed_mps == 0.0 {
-                return true;
+                return Some(true);
             }
         }
-        true
+        Some(differs)
     }
 
     /// Returns the braking of the careful driver (m/s²); `None` before its first risk. While it is no faster than the vehicle
@@ -189,9 +200,39 @@ mod tests {
     }
 
     fn avoided(gap_m: f64, braking: Braking) -> bool {
-        let trace = trace(gap_m);
+        decided(&trace(gap_m), [BoxSide::Front, BoxSide::Rear], braking).unwrap()
+    }
+
+    fn decided(trace: &Trace, sides: [BoxSide; 2], braking: Braking) -> Option<bool> {
         let vehicles = [Vehicle::typical(VehicleClass::Car); 2];
-        Pair { trace: &trace, step_s: STEP_S, indices: [0, 1], vehicles }.is_avoided(braking)
+        Pair { trace, step_s: STEP_S, indices: [0, 1], vehicles, sides }.is_avoided(braking)
+    }
+
+    #[test]
+    fn a_driver_who_does_nothing_else_avoids_nothing() {
+        // Of two vehicles side by side, the second drifts into the path of the first in the last step. No brake light, no risk.
+        let at = |s_m: f64, d_m: f64| VehicleState { s_m, d_m, speed_mps: 30.0, ..VehicleState::default() };
+        let mut trace = Trace::default();
+        for step in 0..100_u32 {
+            trace.times.push(Time::from_ms(10 * i64::from(step)));
+            let s_m = 0.3 * f64::from(step);
+            trace.states.push(vec![at(s_m, 0.0), at(s_m + 3.0, 2.5)]);
+        }
+        let rear_end = [BoxSide::Front, BoxSide::Rear];
+        assert_eq!(decided(&trace, rear_end, Braking::Careful), Some(false));
+        assert_eq!(decided(&trace, rear_end, Braking::FullFromHazard(8.0)), Some(false));
+        assert_eq!(decided(&trace, rear_end, Braking::FullFromStart(8.0)), Some(true));
+    }
+
+    #[test]
+    fn a_side_contact_is_not_decided() {
+        let trace = trace(20.0);
+        for sides in [[BoxSide::Front, BoxSide::Left], [BoxSide::Right, BoxSide::Rear], [BoxSide::Rear, BoxSide::Front]]
+        {
+            for braking in [Braking::Careful, Braking::FullFromHazard(8.0), Braking::FullFromStart(8.0)] {
+                assert_eq!(decided(&trace, sides, braking), None, "{sides:?} {braking:?}");
+            }
+        }
     }
 
     #[test]

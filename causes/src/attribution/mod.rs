@@ -1,4 +1,4 @@
-//! Attribution of a collision: which vehicle closed the gap, in which phase, and who could have avoided it.
+//! Attribution of a collision: which vehicle closed the gap, in which phase, and how it was avoidable.
 //!
 //! ```text
 //!  run of the sample ─▶ trace of all vehicles ─┬▶ striking vehicle, struck vehicle, phase, state of the system
@@ -9,7 +9,8 @@
 //!
 //! The counterfactuals of the striking vehicle keep the motion of the struck vehicle as it was. What follows the collision is
 //! not known of it: it goes on with its last acceleration, at most to a standstill, in the lane position that it had. The
-//! counterfactual of the ego is a run of the loop, in which the other drivers react to the other ego.
+//! counterfactual of the ego is a run of the loop, in which the other drivers react to the other ego. Braking decides about a
+//! front that strikes a rear; of other contacts, the counterfactuals of the striking vehicle say nothing.
 
 mod careful_ego;
 mod collision;
@@ -17,5 +18,5 @@ mod counterfactual;
 mod trace;
 
 pub(crate) use collision::roles;
-pub use collision::{Attribution, Avoidable, Party, attribute, phase_word, state_word};
+pub use collision::{Attribution, Avoidable, Party, attribute, braking_words, phase_word, state_word};
 pub use trace::Trace;

@@ -1,7 +1,7 @@
 //! Explanation of a failure: the first stage of the chain whose perfection prevents it.
 //!
 //! ```text
-//!  points ─▶ clusters ─▶ class ─▶ tracks ─▶ timing ─▶ actuation ─▶ reaction of R ─▶ braking of F
+//!  points ─▶ clusters ─▶ class ─▶ tracks ─▶ timing ─▶ actuation ─▶ rear reaction ─▶ lead braking
 //! ```
 //!
 //! Each stage is replaced by the truth while all others stay as they were, and the sample is run again. The first stage of the

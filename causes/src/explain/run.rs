@@ -33,7 +33,7 @@ pub fn explain(case: &Case) -> Result<Option<Explanation>, CausesError> {
         let unusual = unusual(stages[0], case, &scenario);
         let perfect = StageRun { unusual: unusual.clone(), ..replaced(case, stages) };
         // A stage that is out of order may be the cause although its perfection brings about another failure.
-        let usual = usual_settings(stages[0]);
+        let usual = usual_settings(stages[0], case);
         if unusual.is_none() || perfect.prevents || usual.is_empty() {
             return vec![perfect];
         }

@@ -6,27 +6,30 @@
 //! | class | the shipped class confidence and the shipped rear camera |
 //! | tracks | the shipped sensors and tracker, apart from their latency and class confidence |
 //! | timing | the latencies of the shipped sensors |
-//! | reaction of R | up to 1.5 s |
+//! | rear-reaction | no injected fault, and up to the 97.5 % quantile of the parameter that gives it; up to 2.5 s without one |
 //!
 //! Clusters, actuation and the braking of the lead vehicle have no usual values: they never count as unusual.
 
 use closecall_controllers::CheckedDriver;
+use closecall_scenarios::parameters::Distribution;
 use closecall_sensors::{ObjectSensorConfig, SensorMode, SensorsConfig, TrackerConfig};
-use closecall_simulation::scenario::Scenario;
-use closecall_traffic::{CONTROL_STEP, Check, Environment, Parameters};
+use closecall_simulation::scenario::{Actor, Scenario};
+use closecall_traffic::{CONTROL_STEP, Check, Environment, ParameterName, Parameters, Range};
 
 use super::Stage;
 use crate::case::Case;
 
-/// Longest usual reaction time (s): the mean for surprising events in Green, *How long does it take to stop?*, Transportation
-/// Human Factors 2 (2000).
-const USUAL_REACTION_S: f64 = 1.5;
+/// Longest usual reaction time of a driver without a sampled one (s): an assumption, the upper end of the distribution of the
+/// library's scenarios.
+const USUAL_REACTION_S: f64 = 2.5;
+/// Quantile of a sampled reaction time up to which it is usual: the upper end of the middle 95 %.
+const USUAL_QUANTILE: f64 = 0.975;
 
 /// Returns the settings that make a stage usual again, each as `key=value`. Empty if there are none.
-pub(super) fn usual_settings(stage: Stage) -> Vec<String> {
+pub(super) fn usual_settings(stage: Stage, case: &Case) -> Vec<String> {
     match stage {
-        Stage::Class => vec!["fault.class-background=false".to_owned()],
-        Stage::RearReaction => vec!["fault.rear-reaction-s=0".to_owned()],
+        Stage::Class if case.file.config().fault.class_background => vec!["fault.class-background=false".to_owned()],
+        Stage::RearReaction if later_s(case) > 0.0 => vec!["fault.rear-reaction-s=0".to_owned()],
         Stage::Timing => {
             let Ok(shipped) = SensorsConfig::default().check(&Parameters::default()) else { return Vec::new() };
             let latency_s = |steps: usize| steps as f64 * CONTROL_STEP.s();
@@ -36,8 +39,55 @@ pub(super) fn usual_settings(stage: Stage) -> Vec<String> {
             let latency = |(sensor, latency_s)| format!("sensors.{sensor}.latency-s={latency_s}");
             std::iter::once("fault.delay-s=0".to_owned()).chain(sensors.into_iter().map(latency)).collect()
         }
-        Stage::Points | Stage::Clusters | Stage::Tracks | Stage::Actuation | Stage::LeadBraking => Vec::new(),
+        _ => Vec::new(),
     }
+}
+
+/// Returns the values of the case's parameters.
+fn parameters(case: &Case) -> Parameters {
+    let sampling = case.sampling;
+    case.file.space().sample(sampling.design, sampling.seed, case.sample, sampling.samples)
+}
+
+/// Returns by how much an injected fault delays the reaction of drivers behind the ego (s).
+fn later_s(case: &Case) -> f64 {
+    let later = case.file.config().fault.rear_reaction_s.as_ref();
+    parameters(case).number_or(later, "rear-reaction-s", Range::closed(0.0, f64::MAX), 0.0).unwrap_or_default()
+}
+
+/// Returns the reaction time of a driver (s); `None` for the ego and for a driver without one.
+fn reaction_s(actor: &Actor) -> Option<f64> {
+    match &actor.driver {
+        CheckedDriver::Human(human) => human.reaction_s(),
+        CheckedDriver::Ego(_) => None,
+    }
+}
+
+/// Returns the longest usual reaction time of an actor (s): the quantile of the parameter that gives it, or else 2.5 s.
+fn usual_reaction_s(case: &Case, index: usize, now_s: f64) -> f64 {
+    let (space, parameters) = (case.file.space(), parameters(case));
+    let with_quantile = |name: &ParameterName, distribution: &Distribution| {
+        let mut changed = parameters.clone();
+        changed.insert(name.clone(), distribution.quantile(USUAL_QUANTILE));
+        reaction_s(case.file.concrete(&changed).ok()?.actors.get(index)?)
+    };
+    let mut quantiles = space.varying().filter_map(|(name, parameter)| with_quantile(name, &parameter.distribution));
+    quantiles.find(|quantile_s| *quantile_s != now_s).unwrap_or(USUAL_REACTION_S)
+}
+
+/// Returns how the reaction of a driver behind the ego is out of the ordinary.
+fn unusual_reaction(case: &Case, scenario: &Scenario) -> Option<String> {
+    let later_s = later_s(case);
+    if later_s > 0.0 {
+        return Some(format!("drivers behind the ego react {later_s:.2} s later by an injected fault"));
+    }
+    let ego_m = scenario.actors[scenario.ego].start.s_m;
+    let behind = scenario.actors.iter().enumerate().filter(|(_, actor)| actor.start.s_m < ego_m);
+    let slow = behind.filter_map(|(index, actor)| {
+        let now_s = reaction_s(actor)?;
+        (now_s > usual_reaction_s(case, index, now_s)).then_some(now_s)
+    });
+    slow.reduce(f64::max).map(|slowest_s| format!("a driver behind the ego needs {slowest_s:.2} s to react"))
 }
 
 /// Returns how a stage of a run is out of the ordinary; `None` if it is not.
@@ -88,17 +138,7 @@ pub(super) fn unusual(stage: Stage, case: &Case, scenario: &Scenario) -> Option<
             let worst = later.map(|(now, usual)| *now - usual).max()?;
             Some(format!("a sensor is {:.2} s later than the shipped one", worst as f64 * CONTROL_STEP.s()))
         }
-        Stage::RearReaction => {
-            let ego_m = scenario.actors[scenario.ego].start.s_m;
-            let behind = scenario.actors.iter().filter(|actor| actor.start.s_m < ego_m);
-            let slowest_s = behind
-                .filter_map(|actor| match &actor.driver {
-                    CheckedDriver::Human(human) => human.reaction_s(),
-                    CheckedDriver::Ego(_) => None,
-                })
-                .fold(0.0, f64::max);
-            (slowest_s > USUAL_REACTION_S).then(|| format!("a driver behind the ego needs {slowest_s:.2} s to react"))
-        }
+        Stage::RearReaction => unusual_reaction(case, scenario),
         Stage::Clusters | Stage::Actuation | Stage::LeadBraking => None,
     }
 }

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::{FailureRow, order, read_rows};
 use crate::attribution::attribute;
-use crate::case::{Case, CausesError};
+use crate::case::{Case, CausesError, fails};
 use crate::explain::{Explanation, explain};
 
 /// Largest number of failures that a report attributes, so that a report of a large campaign takes seconds.
@@ -50,12 +50,12 @@ pub fn campaign_failures(saved: &SavedCampaign) -> Result<Failures, CausesError>
 /// in that order, and all failures of the campaign with them.
 ///
 /// # Errors
-/// [`CausesError`] if the folder cannot be read, or a sample has no outcome or no failure.
+/// [`CausesError`] if the folder cannot be read, the campaign has no such scenario, or a sample has no outcome or no failure.
 pub fn explain_failures(
     saved: &SavedCampaign,
     scenario: Option<&str>,
     sample: Option<u64>,
-    most: usize,
+    most: u64,
 ) -> Result<(Vec<Explanation>, Failures), CausesError> {
     if let Some(sample) = sample {
         let case = Case::of(saved, scenario, sample, None)?;
@@ -64,12 +64,17 @@ pub fn explain_failures(
         keep(&mut failures.rows, explanation.clone());
         return Ok((vec![explanation], failures));
     }
+    if scenario.is_some() {
+        // Checks that there is such a scenario.
+        saved.file(scenario)?;
+    }
     let mut failures = campaign_failures(saved)?;
+    let most = usize::try_from(most).unwrap_or(usize::MAX);
     let chosen = failures.rows.iter().filter(|row| scenario.is_none_or(|name| row.scenario == name)).take(most);
     let mut explanations = Vec::new();
     for row in chosen {
         let case = Case::of(saved, Some(&row.scenario), row.sample, Some(&row.controller))?;
-        explanations.extend(explain(&case)?);
+        explanations.push(explain(&case)?.ok_or_else(|| passes(saved, &case))?);
     }
     for explanation in &explanations {
         keep(&mut failures.rows, explanation.clone());
@@ -77,12 +82,29 @@ pub fn explain_failures(
     Ok((explanations, failures))
 }
 
-/// Returns the error for a sample that does not fail, with some that do.
+/// Returns the error for a sample that does not fail, with some that do; or, if it fails in the journal, for one that does not
+/// repeat.
 pub(crate) fn passes(saved: &SavedCampaign, case: &Case) -> CausesError {
+    if has_failed(saved, case).unwrap_or(false) {
+        return CausesError::NotRepeated { sample: case.sample, controller: case.arm.controller.name().to_owned() };
+    }
     let failing: Vec<String> =
         rows(saved).unwrap_or_default().iter().take(5).map(|row| row.sample.to_string()).collect();
     let failing = if failing.is_empty() { "none".to_owned() } else { failing.join(", ") };
     CausesError::Passes { sample: case.sample, controller: case.arm.controller.name().to_owned(), failing }
+}
+
+/// Returns whether the case fails in the journal of the campaign.
+fn has_failed(saved: &SavedCampaign, case: &Case) -> Result<bool, CausesError> {
+    let (scenario, controller) = (&case.file.config().name, case.arm.controller.name());
+    for record in saved.folder().records()? {
+        let record = record?;
+        if (&record.scenario, record.sample) == (scenario, case.sample) {
+            let mut arms = record.arms.iter().filter(|arm| arm.controller == controller);
+            return Ok(arms.any(|arm| arm.result.as_ref().is_ok_and(fails)));
+        }
+    }
+    Ok(false)
 }
 
 /// Returns the failures of the arm under test with what is kept of earlier explanations.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use maud::{Markup, PreEscaped, html};
 
 use super::{FailureRow, Failures};
-use crate::attribution::{phase_word, state_word};
+use crate::attribution::{braking_words, phase_word, state_word};
 use crate::explain::Cause;
 
 /// The comments around the section, by which it is found and replaced.
@@ -34,7 +34,8 @@ fn body(failures: &Failures, is_named: bool) -> Markup {
         p.note {
             "All failures of the arm under test: induced ones first, then those that no perfect stage prevents, then those with the most "
             "harm. Avoidable: whether the competent and careful driver of UN Regulation 157 in the place of the striking vehicle or of the "
-            "ego, or full braking of the striking vehicle, would have avoided the first collision. Due to: the stage of the chain whose "
+            "ego, or full braking of the striking vehicle, would have avoided the first collision; braking decides about a "
+            "front that strikes a rear only. Due to: the stage of the chain whose "
             "perfection prevents the failure, once " code { "closecall explain" } " has found it."
         }
         (counts(rows))
@@ -67,7 +68,7 @@ fn counts(rows: &[FailureRow]) -> Markup {
     }
     html! {
         div.wide tabindex="0" { table {
-            thead { tr { th { "who" } th { "phase" } th { "avoidable by" } th.number { "failures" } } }
+            thead { tr { th { "vehicles" } th { "phase" } th { "avoidable by" } th.number { "failures" } } }
             tbody { @for ((who, phase, avoidable), count) in &counted {
                 tr { td { (who) } td { (phase) } td { (avoidable) } td.number { (count) } }
             } }
@@ -79,8 +80,7 @@ fn line(row: &FailureRow, is_named: bool) -> Markup {
     let named = if is_named { format!(" --scenario {}", row.scenario) } else { String::new() };
     let phase = match (&row.attribution, row.is_after_lead_braking) {
         (Some(found), _) => found.phase_words(),
-        (None, true) => format!("{}, after F's braking", phase_word(row.phase)),
-        (None, false) => format!("{}, without braking of F", phase_word(row.phase)),
+        (None, is_after) => braking_words(row.phase, is_after),
     };
     let state = row.attribution.as_ref().map_or("", |found| state_word(found.ego_state));
     html! {

@@ -33,7 +33,7 @@ pub struct FailureRow {
     pub phase: Phase,
     /// Whether the lead vehicle had begun to brake.
     pub is_after_lead_braking: bool,
-    /// Who could have avoided it; `None` if the sample was not run again.
+    /// How it was avoidable; `None` if the sample was not run again.
     pub attribution: Option<Attribution>,
     /// What the failure is due to; `None` if it was not explained.
     pub cause: Option<Cause>,

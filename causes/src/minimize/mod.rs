@@ -23,4 +23,4 @@ mod write;
 pub use run::{Minimized, Offset, minimize, minimize_sample};
 pub use text::MinimizedText;
 pub use twin::Twin;
-pub use write::{MinimizedFiles, write_files};
+pub use write::{MinimizedFiles, output_files, write_files};

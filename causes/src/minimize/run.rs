@@ -1,6 +1,8 @@
 //! Minimizes a failing sample.
 
+use closecall_campaign::resume_command::quoted;
 use closecall_campaign::saved::SavedCampaign;
+use closecall_simulation::controller::ControllerChoice;
 use closecall_traffic::{ParameterName, Parameters, Value};
 use serde::Serialize;
 
@@ -41,6 +43,8 @@ pub struct Minimized {
     pub sample: u64,
     /// The controller.
     pub controller: String,
+    /// The controller as the option `--controller` takes it.
+    pub choice: String,
     /// Depth of the sensor simulation.
     pub sensors: String,
     /// The parameters that are off their nominal values.
@@ -59,6 +63,18 @@ pub struct Minimized {
     pub twin: Option<Twin>,
 }
 
+impl Minimized {
+    /// Returns whether a command drives with this controller if it names none.
+    pub(super) fn is_default(&self) -> bool {
+        self.choice == ControllerChoice::MIS.name()
+    }
+
+    /// Returns the option that names the controller, with a space before it; nothing for the one that needs no option.
+    pub(super) fn option(&self) -> String {
+        if self.is_default() { String::new() } else { format!(" --controller {}", quoted(&self.choice)) }
+    }
+}
+
 /// Minimizes a failing case. Returns `None` if no vehicle collides in it.
 ///
 /// # Errors
@@ -70,9 +86,11 @@ pub fn minimize(case: &Case) -> Result<Option<Minimized>, CausesError> {
     let trial = Trial::new(case);
     let found = fewest(&trial);
     let (values, candidates) = shrunk(&trial, &found.names);
-    let settings = Trial::settings(&values);
+    let settings = Trial::settings(&values)?;
     let (_, collision) = attribute(case, &settings)?;
-    let Some(collision) = collision else { return Ok(None) };
+    let controller = case.arm.controller.name();
+    let not_reduced = || CausesError::NotReduced { sample: case.sample, controller: controller.to_owned() };
+    let collision = collision.ok_or_else(not_reduced)?;
     let off_nominal: Vec<Offset> = found.names.iter().filter_map(|name| offset(&trial, &values, name)).collect();
     let why_more_than_three = (off_nominal.len() > 3).then(|| {
         let more = if found.is_smallest { "four are needed" } else { "of these, none can be left out" };
@@ -83,13 +101,14 @@ pub fn minimize(case: &Case) -> Result<Option<Minimized>, CausesError> {
         scenario: case.file.config().name.clone(),
         seed: case.sampling.seed,
         sample: case.sample,
-        controller: case.arm.controller.name().to_owned(),
+        controller: controller.to_owned(),
+        choice: controller.to_owned(),
         sensors: case.sensors().name().to_owned(),
         off_nominal,
         sampled_off_nominal: trial.differing.len(),
         why_more_than_three,
         settings: settings.iter().map(ToString::to_string).collect(),
-        twin: twin(&trial, &values, &candidates),
+        twin: twin(&trial, &values, &candidates)?,
         collision,
         sentence,
     }))
@@ -100,7 +119,12 @@ pub fn minimize(case: &Case) -> Result<Option<Minimized>, CausesError> {
 /// # Errors
 /// [`CausesError`] if the sample does not fail, or has no outcome.
 pub fn minimize_sample(saved: &SavedCampaign, case: &Case) -> Result<Minimized, CausesError> {
-    minimize(case)?.ok_or_else(|| passes(saved, case))
+    let found = minimize(case)?.ok_or_else(|| passes(saved, case))?;
+    // A process has a name in reports, and a command on the command line.
+    let manifest = saved.manifest();
+    let mut arms = manifest.arms.iter().zip(manifest.arm_names());
+    let choice = arms.find(|(_, name)| *name == found.controller).map(|(arm, _)| arm.to_string());
+    Ok(Minimized { choice: choice.unwrap_or_else(|| found.controller.clone()), ..found })
 }
 
 fn offset(trial: &Trial<'_>, values: &Parameters, name: &ParameterName) -> Option<Offset> {
@@ -110,7 +134,7 @@ fn offset(trial: &Trial<'_>, values: &Parameters, name: &ParameterName) -> Optio
         value: value.to_string(),
         sampled: trial.sampled.get(name)?.to_string(),
         nominal: nominal.to_string(),
-        words: words::value(name.as_str(), value, nominal),
+        words: words::value(name.as_str(), value, nominal, trial.step(name)),
     })
 }
 

@@ -1,6 +1,9 @@
 //! A minimized case in words.
 
 use std::fmt;
+use std::path::Path;
+
+use closecall_campaign::resume_command::quoted;
 
 use super::{Minimized, MinimizedFiles};
 
@@ -33,11 +36,12 @@ impl fmt::Display for MinimizedText<'_> {
             writeln!(f, "  {why}")?;
         }
         writeln!(f, "{}", found.sentence)?;
-        writeln!(f, "fails:  closecall run {}", files.failing.display())?;
+        let command = |path: &Path| format!("closecall run {}{}", quoted(&path.display().to_string()), found.option());
+        writeln!(f, "fails:  {}", command(&files.failing))?;
         match (&found.twin, &files.twin) {
             (Some(twin), Some(path)) => {
                 writeln!(f, "passes when {}", twin.words)?;
-                write!(f, "passes: closecall run {}", path.display())
+                write!(f, "passes: {}", command(path))
             }
             _ => write!(f, "no near case that passes was found"),
         }

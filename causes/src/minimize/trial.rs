@@ -6,9 +6,10 @@ use std::sync::Mutex;
 use closecall_campaign::runner::run_guarded;
 use closecall_simulation::NoObserver;
 use closecall_simulation::outcome::Outcome;
-use closecall_simulation::scenario::{Scenario, Setting};
+use closecall_simulation::scenario::{Scenario, Setting, SettingError};
 use closecall_traffic::{ParameterName, Parameters, Value};
 
+use super::grid;
 use crate::case::{Case, fails};
 
 /// A sample whose parameters can be moved to their nominal values.
@@ -90,8 +91,16 @@ impl<'a> Trial<'a> {
         }
     }
 
+    /// Returns the step of the grid of a parameter's readable values; `None` for a choice.
+    pub(super) fn step(&self, name: &ParameterName) -> Option<f64> {
+        self.span(name).map(grid::step)
+    }
+
     /// Returns the settings that fix all parameters, in the order of their names.
-    pub(super) fn settings(parameters: &Parameters) -> Vec<Setting> {
-        parameters.iter().filter_map(|(name, value)| format!("{name}={value}").parse().ok()).collect()
+    ///
+    /// # Errors
+    /// [`SettingError`] if a value cannot be written as a setting.
+    pub(super) fn settings(parameters: &Parameters) -> Result<Vec<Setting>, SettingError> {
+        parameters.iter().map(|(name, value)| format!("{name}={value}").parse()).collect()
     }
 }

@@ -1,6 +1,6 @@
 //! The nearest case that passes.
 
-use closecall_simulation::scenario::{Setting, StartConfig};
+use closecall_simulation::scenario::{Setting, SettingError, StartConfig};
 use closecall_traffic::{Num, ParameterName, Parameters, Value};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -31,33 +31,39 @@ pub(super) struct Candidate {
 }
 
 /// Returns the nearest case that passes: with one parameter changed, or with the rear vehicle starting earlier or later.
-pub(super) fn twin(trial: &Trial<'_>, values: &Parameters, candidates: &[Candidate]) -> Option<Twin> {
+///
+/// # Errors
+/// [`SettingError`] if a value cannot be written as a setting.
+pub(super) fn twin(
+    trial: &Trial<'_>,
+    values: &Parameters,
+    candidates: &[Candidate],
+) -> Result<Option<Twin>, SettingError> {
     // A case that fails at nominal values has no way back to them: every parameter is moved in both directions.
     let moved = if candidates.is_empty() { moved_parameters(trial, values) } else { Vec::new() };
     let all = candidates.iter().chain(&moved);
     let nearest = all.min_by(|one, other| one.distance.total_cmp(&other.distance));
-    let by_parameter = nearest.map(|candidate| {
+    let by_parameter = nearest.map(|candidate| -> Result<_, SettingError> {
         let mut changed = values.clone();
         changed.insert(candidate.name.clone(), candidate.value.clone());
         let failing = values.get(&candidate.name).cloned().unwrap_or_else(|| candidate.value.clone());
         let twin = Twin {
-            settings: Trial::settings(&changed).iter().map(ToString::to_string).collect(),
-            words: words::change(candidate.name.as_str(), &failing, &candidate.value),
+            settings: Trial::settings(&changed)?.iter().map(ToString::to_string).collect(),
+            words: words::change(candidate.name.as_str(), &failing, &candidate.value, trial.step(&candidate.name)),
         };
-        (candidate.distance, twin)
+        Ok((candidate.distance, twin))
     });
-    let by_start = shifted_start(trial, values);
+    let by_start = shifted_start(trial, values, &Trial::settings(values)?);
     // A shift by the largest one counts like a parameter that moves by the width of its distribution.
-    match (by_parameter, by_start) {
+    Ok(match (by_parameter.transpose()?, by_start) {
         (Some((distance, twin)), Some((shift, other))) => Some(if distance <= shift { twin } else { other }),
         (one, other) => one.or(other).map(|(_, twin)| twin),
-    }
+    })
 }
 
 /// Returns the smallest shift of the start of a rear vehicle with which the case passes, as a share of the largest one.
-fn shifted_start(trial: &Trial<'_>, values: &Parameters) -> Option<(f64, Twin)> {
-    let settings = Trial::settings(values);
-    let scenario = trial.case.concrete(&settings).ok()?;
+fn shifted_start(trial: &Trial<'_>, values: &Parameters, settings: &[Setting]) -> Option<(f64, Twin)> {
+    let scenario = trial.case.file.concrete(values).ok()?;
     let ego = &scenario.actors[scenario.ego];
     let (id, gap_m) = trial.case.file.config().actors.iter().find_map(|actor| match &actor.start {
         StartConfig::Behind(start) if start.of == ego.id => match start.gap_m {
@@ -72,7 +78,7 @@ fn shifted_start(trial: &Trial<'_>, values: &Parameters) -> Option<(f64, Twin)> 
     shifts.map(|tenths| tenths / 10.0).find_map(|earlier_s| {
         let changed: Setting =
             format!("actor.{id}.start.behind.gap-m={:.2}", gap_m - earlier_s * closing_mps).parse().ok()?;
-        let all = [settings.clone(), vec![changed]].concat();
+        let all = [settings, &[changed]].concat();
         let passes = trial.case.concrete(&all).is_ok_and(|scenario| trial.is_passed(&scenario));
         passes.then(|| {
             let when = if earlier_s > 0.0 { "earlier" } else { "later" };

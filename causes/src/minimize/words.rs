@@ -35,34 +35,47 @@ impl Named<'_> {
         found.unwrap_or_else(|| Named { name: name.replace('-', " "), unit: "", factor: 1.0, decimals: 2 })
     }
 
-    /// Returns a number in the unit of a reader, with more decimals if `beside` would look the same.
-    fn number(&self, value: f64, beside: f64) -> String {
-        let text = |decimals: usize, value: f64| format!("{:.decimals$}", value * self.factor);
-        let decimals =
-            (self.decimals..self.decimals + 4).find(|&decimals| text(decimals, value) != text(decimals, beside));
-        format!("{} {}", text(decimals.unwrap_or(self.decimals), value), self.unit).trim_end().to_owned()
+    /// Returns two numbers and their difference in the unit of a reader, all with the same decimals: as many as a step of the grid
+    /// needs, or more if the two numbers would look the same. The difference is that of the numbers as they are written.
+    fn numbers(&self, values: [f64; 2], step: Option<f64>) -> [String; 3] {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "steps are above 1e-12")]
+        let needed = |step: f64| (-(step * self.factor).log10()).ceil().max(0.0) as usize;
+        let least = step.map_or(self.decimals, needed);
+        let written = |decimals: i32| values.map(|value| (value * self.factor * 10_f64.powi(decimals)).round());
+        let differ = |decimals: &usize| {
+            let [one, other] = written(*decimals as i32);
+            one != other
+        };
+        let decimals = (least..least + 4).find(differ).unwrap_or(least);
+        let [one, other] = written(decimals as i32);
+        let text = |number: f64| {
+            let number = number / 10_f64.powi(decimals as i32);
+            format!("{number:.decimals$} {}", self.unit).trim_end().to_owned()
+        };
+        [text(one), text(other), text((one - other).abs())]
     }
 }
 
 /// Returns a value and the nominal one in words, such as `closing 39.2 km/h (nominal 30.1 km/h)`.
-pub(super) fn value(name: &str, value: &Value, nominal: &Value) -> String {
+/// `step` is that of the parameter's grid.
+pub(super) fn value(name: &str, value: &Value, nominal: &Value, step: Option<f64>) -> String {
     let named = Named::of(name);
     match (value, nominal) {
         (Value::Number(value), Value::Number(nominal)) => {
-            format!("{} {} (nominal {})", named.name, named.number(*value, *nominal), named.number(*nominal, *value))
+            let [value, nominal, _] = named.numbers([*value, *nominal], step);
+            format!("{} {value} (nominal {nominal})", named.name)
         }
         _ => format!("{} {value} (nominal {nominal})", named.name),
     }
 }
 
-/// Returns a change in words, after "passes when".
-pub(super) fn change(name: &str, failing: &Value, passing: &Value) -> String {
+/// Returns a change in words, after "passes when". `step` is that of the parameter's grid.
+pub(super) fn change(name: &str, failing: &Value, passing: &Value, step: Option<f64>) -> String {
     let named = Named::of(name);
     match (failing, passing) {
         (Value::Number(failing), Value::Number(passing)) => {
             let how = if passing > failing { "more" } else { "less" };
-            let by = named.number((passing - failing).abs(), 0.0);
-            let (from, to) = (named.number(*failing, *passing), named.number(*passing, *failing));
+            let [to, from, by] = named.numbers([*passing, *failing], step);
             format!("{} is {by} {how} ({to} instead of {from})", named.name)
         }
         _ => format!("{} is {passing} instead of {failing}", named.name),
@@ -91,16 +104,34 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_change_does_not_contradict_itself() {
+        let change =
+            |name, failing, passing, step| change(name, &Value::Number(failing), &Value::Number(passing), Some(step));
+        assert_eq!(
+            change("braking-mps2", 6.88, 6.84, 0.02),
+            "braking is 0.04 m/s² less (6.84 m/s² instead of 6.88 m/s²)"
+        );
+        assert_eq!(change("brake-phase", 0.245, 0.26, 0.005), "brake phase is 0.015 more (0.260 instead of 0.245)");
+        assert_eq!(change("brake-at-s", 16.2, 16.0, 0.1), "brake at is 0.2 s less (16.0 s instead of 16.2 s)");
+        assert_eq!(change("gap-m", 120.0, 100.0, 20.0), "gap is 20 m less (100 m instead of 120 m)");
+        // 30.06 and 29.916 km/h: the difference is that of the numbers that stand there.
+        assert_eq!(
+            change("closing-mps", 8.35, 8.31, 0.05),
+            "closing is 0.2 km/h less (29.9 km/h instead of 30.1 km/h)"
+        );
+    }
+
+    #[test]
     fn values_and_changes_have_the_units_of_a_reader() {
         let number = Value::Number;
-        assert_eq!(value("closing-mps", &number(10.0), &number(8.35)), "closing 36.0 km/h (nominal 30.1 km/h)");
+        assert_eq!(value("closing-mps", &number(10.0), &number(8.35), None), "closing 36.0 km/h (nominal 30.1 km/h)");
         assert_eq!(
-            change("brake-mps2", &number(6.0), &number(5.95)),
+            change("brake-mps2", &number(6.0), &number(5.95), None),
             "brake is 0.05 m/s² less (5.95 m/s² instead of 6.00 m/s²)"
         );
         let label = |text: &str| Value::Label(text.to_owned());
         assert_eq!(
-            change("rear-class", &label("motorcycle"), &label("car")),
+            change("rear-class", &label("motorcycle"), &label("car"), None),
             "rear class is car instead of motorcycle"
         );
     }

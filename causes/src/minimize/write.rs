@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use closecall_scenarios::atomic::write_file;
-use closecall_simulation::scenario::{ScenarioFile, Setting};
+use closecall_simulation::scenario::{ScenarioFile, Setting, SettingError};
 use serde::Serialize;
 use toml_edit::{Array, DocumentMut, InlineTable, Item, Table, TableLike, Value};
 
@@ -12,6 +12,9 @@ use crate::case::{Case, CausesError};
 
 /// Tables and keys that belong to a campaign of many samples, and not to a single case.
 const OF_CAMPAIGNS: [&str; 6] = ["parameters", "requirements", "checks", "gate", "expects", "expects-share"];
+
+/// How every file begins that the command writes.
+const MADE: &str = "# Made by `closecall minimize`";
 
 /// The files that were written.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -22,11 +25,28 @@ pub struct MinimizedFiles {
     pub twin: Option<PathBuf>,
 }
 
-/// Writes the smallest case to `path` and its twin beside it, with `-passes` at the end of its name.
+/// Returns the files of a smallest case and of its twin: `output`, or else a name made of the scenario and the sample, and
+/// beside it a file with `-passes` at the end of its name.
+///
+/// # Errors
+/// [`CausesError::Foreign`] if there is such a file already, and `closecall minimize` has not written it.
+pub fn output_files(case: &Case, output: Option<&Path>) -> Result<[PathBuf; 2], CausesError> {
+    let usual = || format!("{}-{}.toml", case.file.config().name, case.sample).into();
+    let failing = output.map_or_else(usual, Path::to_owned);
+    let stem = failing.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let files = [failing.clone(), failing.with_file_name(format!("{stem}-passes.toml"))];
+    let is_foreign = |path: &&PathBuf| std::fs::read(path).is_ok_and(|bytes| !bytes.starts_with(MADE.as_bytes()));
+    match files.iter().find(is_foreign) {
+        Some(path) => Err(CausesError::Foreign { path: path.clone() }),
+        None => Ok(files),
+    }
+}
+
+/// Writes the smallest case and its twin.
 ///
 /// # Errors
 /// [`CausesError`] if a case is no valid scenario, or a file cannot be written.
-pub fn write_files(case: &Case, found: &Minimized, path: &Path) -> Result<MinimizedFiles, CausesError> {
+pub fn write_files(case: &Case, found: &Minimized, [path, twin]: &[PathBuf; 2]) -> Result<MinimizedFiles, CausesError> {
     let stem = path.file_stem().map_or_else(|| "minimized".to_owned(), |stem| stem.to_string_lossy().into_owned());
     let name = named(&stem);
     let failing = concrete(case, &found.settings, &Text { name: &name, found, is_twin: false })?;
@@ -39,11 +59,10 @@ pub fn write_files(case: &Case, found: &Minimized, path: &Path) -> Result<Minimi
     };
     let write = |path: &Path, text: &str| write_file(path, |file| file.write_all(text.as_bytes()));
     write(path, &failing)?;
-    let twin = path.with_file_name(format!("{stem}-passes.toml"));
     if let Some(passing) = &passing {
-        write(&twin, passing)?;
+        write(twin, passing)?;
     }
-    Ok(MinimizedFiles { failing: path.to_owned(), twin: passing.map(|_| twin) })
+    Ok(MinimizedFiles { failing: path.clone(), twin: passing.map(|_| twin.clone()) })
 }
 
 /// What a file says about its case.
@@ -63,7 +82,7 @@ fn named(stem: &str) -> String {
 
 /// Returns the text of a concrete scenario, in which every parameter has its value.
 fn concrete(case: &Case, settings: &[String], text: &Text<'_>) -> Result<String, CausesError> {
-    let parsed: Vec<Setting> = settings.iter().filter_map(|setting| setting.parse().ok()).collect();
+    let parsed: Vec<Setting> = settings.iter().map(|setting| setting.parse()).collect::<Result<_, SettingError>>()?;
     let file = ScenarioFile::parse(case.file.path(), case.file.text(), &parsed)?;
     let values = file.space().nominal();
     let mut document: DocumentMut = file.text().parse().unwrap_or_default();
@@ -85,22 +104,30 @@ fn concrete(case: &Case, settings: &[String], text: &Text<'_>) -> Result<String,
     if let Some(sensors) = document.entry("sensors").or_insert(Item::Table(Table::new())).as_table_like_mut() {
         sensors.insert("mode", Item::Value(found.sensors.as_str().into()));
     }
+    // A campaign that names no controller judges by the gate. It drives with another controller than this case needs, if not so.
+    if found.is_default() {
+        document.insert("gate", Item::Table(gate(case, text)));
+    }
+    let written = format!("{}{document}", heading(text));
+    // The file must be a scenario: a mistake shows here, and not when it is run.
+    ScenarioFile::parse(Path::new(text.name), &written, &[])?.check()?;
+    Ok(written)
+}
+
+/// Returns the gate that holds a case to its outcome.
+fn gate(case: &Case, text: &Text<'_>) -> Table {
+    let collision = &text.found.collision;
     let (ego, least) = if text.is_twin {
         ("count(ego_collided) <= 0", "count(others_collided) <= 0")
     } else {
-        let involves_ego = [&found.collision.striking, &found.collision.struck]
-            .iter()
-            .any(|party| Some(&party.actor) == case.file.ego_id());
+        let mut parties = [&collision.striking, &collision.struck].into_iter();
+        let involves_ego = parties.any(|party| Some(&party.actor) == case.file.ego_id());
         if involves_ego { ("count(ego_collided) >= 1", "") } else { ("count(others_collided) >= 1", "") }
     };
     let require = Array::from_iter([ego, least].into_iter().filter(|text| !text.is_empty()));
     let mut gate = Table::new();
     gate.insert("require", Item::Value(Value::Array(require)));
-    document.insert("gate", Item::Table(gate));
-    let written = format!("{}{document}", heading(text));
-    // The file must be a scenario: a mistake shows here, and not when it is run.
-    ScenarioFile::parse(Path::new(text.name), &written, &[])?.check()?;
-    Ok(written)
+    gate
 }
 
 /// Returns a seed or the number of a sample. TOML has no number above the largest signed one: such a seed is written as text,
@@ -119,14 +146,13 @@ fn sentence(text: &Text<'_>) -> String {
 
 fn heading(text: &Text<'_>) -> String {
     let found = text.found;
-    let controller =
-        if found.controller == "mis" { String::new() } else { format!(" --controller {}", found.controller) };
     format!(
-        "# Made by `closecall minimize` from sample {} of `{}`, seed {}.\n# {}\n# Run: closecall run FILE{controller}\n",
+        "{MADE} from sample {} of `{}`, seed {}.\n# {}\n# Run: closecall run FILE{}\n",
         found.sample,
         found.scenario,
         found.seed,
         sentence(text),
+        found.option(),
     )
 }
 

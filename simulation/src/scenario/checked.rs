@@ -58,7 +58,7 @@ pub struct Scenario {
     pub(crate) physics_step: Time,
     /// The sample whose random numbers every run uses; `None` for those of the run itself.
     pub(crate) random_numbers: Option<RandomNumbersConfig>,
-    /// Stages that are replaced by the truth, and made faults.
+    /// Stages that are replaced by the truth, and injected faults.
     pub(crate) interventions: Interventions,
 }
 

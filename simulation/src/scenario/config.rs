@@ -73,7 +73,7 @@ pub struct ScenarioConfig {
     /// Stages of the chain that are replaced by the truth. Default: none.
     #[serde(default, skip_serializing_if = "is_default")]
     pub ideal: IdealConfig,
-    /// Made faults. Default: none.
+    /// Injected faults. Default: none.
     #[serde(default, skip_serializing_if = "is_default")]
     pub fault: FaultConfig,
 }

@@ -1,16 +1,16 @@
-//! Interventions in a scenario: stages of the chain from sensors to drivers that are replaced by the truth, and made faults.
+//! Interventions in a scenario: stages of the chain from sensors to drivers that are replaced by the truth, and injected faults.
 //!
 //! ```text
-//!  points ─▶ clusters ─▶ class ─▶ tracks ─▶ timing ─▶ (controller) ─▶ actuation ─▶ reaction of R ─▶ braking of F
+//!  points ─▶ clusters ─▶ class ─▶ tracks ─▶ timing ─▶ (controller) ─▶ actuation ─▶ rear reaction ─▶ lead braking
 //! ```
 //!
-//! A run in which one stage is ideal and all else is as before shows whether that stage has caused a failure. A made fault
-//! is the opposite: it causes failures of a known cause. Both are values of the scenario, so that `--set ideal.class=true`
+//! A run in which one stage is ideal and all else is as before shows whether that stage has caused a failure. An injected
+//! fault is the opposite: it causes failures of a known cause. Both are values of the scenario, so that `--set ideal.class=true`
 //! repeats such a run. Neither changes the sampled values or the random numbers of other stages.
 
 use closecall_controllers::{CheckedDriver, EgoState, ReactionChange};
 use closecall_sensors::Alterations;
-use closecall_traffic::{ConfigError, Num, Parameters, Range};
+use closecall_traffic::{CONTROL_STEP, ConfigError, Num, Parameters, Problem, Range};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -79,11 +79,12 @@ pub struct IdealConfig {
     pub without_mis: Vec<MisState>,
 }
 
-/// Made faults, whose effect shows whether a diagnosis finds them.
+/// Injected faults, whose effect shows whether a diagnosis finds them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct FaultConfig {
-    /// Additional latency of all sensors (s), rounded to whole control steps of 40 ms. No sensor is later than 0.4 s.
+    /// Additional latency of all sensors (s): 0, or 0.04 to 0.4, rounded to the nearest control step of 0.04 s: 0.1 s is three steps,
+    /// 0.12 s. No sensor is later than 0.4 s.
     pub delay_s: Option<Num>,
     /// Every vehicle behind the ego is classified as background.
     pub class_background: bool,
@@ -120,6 +121,12 @@ impl Interventions {
             value.map_err(|error| error.within("fault"))
         };
         let extra_latency_s = number(&fault.delay_s, "delay-s", MAX_LATENCY_S)?;
+        if extra_latency_s > 0.0 && extra_latency_s < CONTROL_STEP.s() {
+            // Half a step would become one or none.
+            let allowed = Range::closed(CONTROL_STEP.s(), MAX_LATENCY_S);
+            let problem = Problem::OutOfRange { value: extra_latency_s, allowed };
+            return Err(ConfigError::new("delay-s", problem).within("fault"));
+        }
         let later_s = number(&fault.rear_reaction_s, "rear-reaction-s", MAX_REACTION_S)?;
         let later = (later_s > 0.0).then_some(ReactionChange::Later(later_s));
         Ok(Self {
@@ -189,6 +196,8 @@ mod tests {
         assert_eq!((events(&usual), events(&with(&["ideal.lead-braking=true"]))), (1, 0));
         assert_eq!(usual.sensors.latency_steps(), [2, 1, 2]);
         assert_eq!(with(&["fault.delay-s=0.1"]).sensors.latency_steps(), [5, 4, 5]);
+        assert_eq!(with(&["fault.delay-s=0.04"]).sensors.latency_steps(), [3, 2, 3]);
+        assert_eq!(with(&["fault.delay-s=0"]).sensors.latency_steps(), [2, 1, 2]);
         assert_eq!(with(&["fault.delay-s=0.4"]).sensors.latency_steps(), [10, 10, 10], "no sensor is later");
         assert_eq!(with(&["fault.delay-s=0.1", "ideal.timing=true"]).sensors.latency_steps(), [0, 0, 0]);
         assert_eq!(with(&["ideal.class=true"]).sensors.latency_steps(), [2, 1, 2]);
@@ -202,6 +211,8 @@ mod tests {
             loaded.and_then(|file| file.check()).unwrap_err().to_string()
         };
         assert!(refused("fault.delay-s=0.5").contains("`fault.delay-s` is 0.5"), "{}", refused("fault.delay-s=0.5"));
+        let too_short = refused("fault.delay-s=0.01");
+        assert!(too_short.contains("`fault.delay-s` is 0.01") && too_short.contains("0.04"), "{too_short}");
         assert!(refused("ideal.clas=true").contains("did you mean `class`?"), "{}", refused("ideal.clas=true"));
         assert!(refused("ideals.class=true").contains("leads nowhere"), "{}", refused("ideals.class=true"));
     }
