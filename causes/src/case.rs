@@ -71,6 +71,19 @@ pub enum CausesError {
         /// The file.
         path: PathBuf,
     },
+    /// A scenario of a campaign is not the encounter that is counted.
+    #[error(
+        "in `{scenario}` the lead vehicle brakes in {braked} of {runs} samples: the event that is counted is that it begins to brake, \
+         so that these samples say nothing about it; a scenario in which it brakes in at least 95 % is needed"
+    )]
+    OtherEncounter {
+        /// The scenario.
+        scenario: String,
+        /// Samples in which the lead vehicle brakes without the system.
+        braked: u64,
+        /// Samples with an outcome without the system.
+        runs: u64,
+    },
     /// No vehicle collides in the sample.
     #[error("sample {sample} does not fail with `{controller}`: no vehicle collides; failing samples are {failing}")]
     Passes {
@@ -91,14 +104,18 @@ impl CausesError {
             Self::Folder(error) => FailureKind::from(error),
             Self::Map(MapError::Scenario(error)) if error.is_setting() => FailureKind::Usage,
             Self::Map(MapError::Scenario(_)) => FailureKind::InvalidInput,
-            Self::Map(MapError::NoMis { .. }) => FailureKind::Usage,
+            Self::Map(MapError::NoMis { .. } | MapError::OfGrid { .. } | MapError::Sensors { .. }) => {
+                FailureKind::Usage
+            }
             Self::Map(MapError::Point { .. }) => FailureKind::Sample,
             Self::Write(_) => FailureKind::Io,
             Self::Scenario(error) if error.is_io() => FailureKind::Io,
             Self::Scenario(error) if error.is_setting() => FailureKind::Usage,
             Self::Scenario(_) => FailureKind::InvalidInput,
             Self::Sample { .. } | Self::NotRepeated { .. } | Self::NotReduced { .. } => FailureKind::Sample,
-            Self::Passes { .. } | Self::Foreign { .. } | Self::Setting(_) => FailureKind::Usage,
+            Self::Passes { .. } | Self::Foreign { .. } | Self::OtherEncounter { .. } | Self::Setting(_) => {
+                FailureKind::Usage
+            }
         }
     }
 }

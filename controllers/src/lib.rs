@@ -32,7 +32,8 @@ pub use driver::{
     Wiedemann99, Wiedemann99Config, Wiedemann99Driver, Wiedemann99Model,
 };
 pub use ego::{
-    Acc, AccConfig, Aeb, AebConfig, ArrivalPrediction, BrakingResponse, ControllerError, EgoCommand, EgoController,
-    EgoInput, EgoSettings, EgoStack, EgoStackConfig, EgoState, Encounter, Front, LeadVehicleSelector, MisConfig,
-    MisPlan, MisSettings, Odometry, R157Driver, R157Fuzzy, Reason, SensorAvailability, Solution,
+    ACTUATOR_LAG_S, Acc, AccConfig, Aeb, AebConfig, ArrivalPrediction, BRAKE_RELEASE_JERK_MPS3, BrakingResponse,
+    ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoStack, EgoStackConfig, EgoState, Encounter,
+    Front, GOAL_TOLERANCE_S, LeadVehicleSelector, MisConfig, MisPlan, MisSettings, Odometry, R157Driver, R157Fuzzy,
+    Reason, SensorAvailability, Solution,
 };

@@ -41,12 +41,10 @@ impl ControllerArgs {
         if let (Some(built_in), true, false) =
             (controllers.last(), timeout_ms.is_some() || memory_mib.is_some(), has_process)
         {
-            return Err(CliError::Usage {
-                message: format!(
-                    "--controller-timeout-ms and --controller-memory-mib apply to a process, and `{built_in}` is built in: \
+            return Err(CliError::usage(format!(
+                "--controller-timeout-ms and --controller-memory-mib apply to a process, and `{built_in}` is built in: \
                      name a process with --controller exec:COMMAND"
-                ),
-            });
+            )));
         }
         let limited = |controller: &ControllerChoice| match controller.exec() {
             Some(exec) => ControllerChoice::Exec(ExecSettings {
@@ -105,16 +103,16 @@ impl ComparisonArgs {
     ) -> Result<Vec<ControllerChoice>, CliError> {
         if self.arms.is_empty() {
             return match tested.choice()? {
-                ControllerChoice::ACC if self.paired => Err(CliError::Usage {
-                    message: "--paired compares a controller with `acc`: name another with --controller".to_owned(),
-                }),
+                ControllerChoice::ACC if self.paired => {
+                    Err(CliError::usage("--paired compares a controller with `acc`: name another with --controller"))
+                }
                 tested if self.paired || (by_default && tested != ControllerChoice::ACC) => {
                     Ok(vec![ControllerChoice::ACC, tested])
                 }
                 tested => Ok(vec![tested]),
             };
         }
-        let arms = ArmList::joined(&self.arms).map_err(|error| CliError::Usage { message: error.to_string() })?;
+        let arms = ArmList::joined(&self.arms).map_err(|error| CliError::usage(error.to_string()))?;
         tested.limited(&arms)
     }
 

@@ -161,6 +161,9 @@ pub(super) struct ExposureArgs {
     /// Folder of a paired campaign: what the system prevents and induces, given an encounter
     #[arg(long, value_name = "DIR")]
     campaign: Option<PathBuf>,
+    /// Name of the scenario, in which the lead vehicle brakes; required if the campaign has several
+    #[arg(long, value_name = "NAME", requires = "campaign")]
+    scenario: Option<String>,
     /// Output format
     #[arg(long, value_enum, default_value_t)]
     format: Format,
@@ -174,7 +177,7 @@ pub(super) fn exposure(args: &ExposureArgs) -> Result<ExitCode, CliError> {
         observe(&smooth(&data), rule, observed.get_or_insert_default());
     }
     let saved = args.campaign.as_deref().map(SavedCampaign::open).transpose()?;
-    let shares = saved.as_ref().map(shares_of).transpose()?;
+    let shares = saved.as_ref().map(|saved| shares_of(saved, args.scenario.as_deref())).transpose()?;
     let cost = saved.as_ref().map(cost_of).transpose()?;
     let found = compute_exposure(rule, observed, args.per_million_km.map(|range| range.0), shares);
     match args.format {

@@ -30,8 +30,7 @@ impl EnsembleArgs {
             print_error(format_args!("{scenario}: the member `{member}` has no effect, and is not run\n"));
         }
         if ensemble.entries.is_empty() {
-            let message = "--ensemble: no member has any effect on these scenarios: nothing can be run".to_owned();
-            return Err(CliError::Usage { message });
+            return Err(CliError::usage("--ensemble: no member has any effect on these scenarios: nothing can be run"));
         }
         Ok(ensemble)
     }

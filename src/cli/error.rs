@@ -148,14 +148,19 @@ pub enum CliError {
     Compare(#[from] CompareError),
 }
 
+impl CliError {
+    /// Returns the error of arguments that clap does not refuse.
+    pub(super) fn usage(message: impl Into<String>) -> Self {
+        Self::Usage { message: message.into() }
+    }
+}
+
 impl From<SourceError> for CliError {
     fn from(error: SourceError) -> Self {
         match error {
             SourceError::Scenario(error) => Self::Scenario(error),
-            SourceError::StandardInputTwice => Self::Usage { message: error.to_string() },
-            SourceError::NoScenario { .. } => {
-                Self::Usage { message: format!("{error}: `closecall new NAME` writes one") }
-            }
+            SourceError::StandardInputTwice => Self::usage(error.to_string()),
+            SourceError::NoScenario { .. } => Self::usage(format!("{error}: `closecall new NAME` writes one")),
         }
     }
 }

@@ -75,7 +75,7 @@ impl GateArgs {
         set.probability = self.probability()?.map(|gate| ProbabilitySpec { gate, source: GateSource::CommandLine });
         set.assemble(self.criteria()?, preset, is_paired, design).map_err(|error| match error {
             AssemblyError::Project(error) => error.into(),
-            error => CliError::Usage { message: error.to_string() },
+            error => CliError::usage(error.to_string()),
         })?;
         Ok(set)
     }
@@ -102,11 +102,11 @@ impl GateArgs {
     /// Returns the gate on the probability of a collision.
     pub(super) fn probability(&self) -> Result<Option<ProbabilityGate>, CliError> {
         let gate = |max| ProbabilityGate::new(max, self.confidence.unwrap_or(ProbabilityGate::CONFIDENCE));
-        let usage = |error| CliError::Usage { message: format!("--max-probability: {error}") };
+        let usage = |error| CliError::usage(format!("--max-probability: {error}"));
         self.max_probability.map(gate).transpose().map_err(usage)
     }
 }
 
 fn criterion(text: &str) -> Result<Expression, CliError> {
-    text.parse().map_err(|error| CliError::Usage { message: format!("{error}") })
+    text.parse().map_err(|error| CliError::usage(format!("{error}")))
 }

@@ -63,8 +63,7 @@ pub(super) fn plot(args: &PlotArgs) -> Result<ExitCode, CliError> {
 
 fn of_scenario(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
     if args.scenario.is_some() {
-        let message = "--scenario chooses a scenario of a campaign: name its folder instead of a file".to_owned();
-        return Err(CliError::Usage { message });
+        return Err(CliError::usage("--scenario chooses a scenario of a campaign: name its folder instead of a file"));
     }
     let file = args.set.load(&args.source)?;
     protect(&[files_of(&file), args.comparison.files(&args.arm)].concat(), &[("--output", Some(args.output.path()))])?;
@@ -77,16 +76,15 @@ fn of_scenario(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
 /// Films a sample of a campaign as the campaign ran it, in every arm.
 fn of_campaign(args: &PlotArgs) -> Result<Vec<Film>, CliError> {
     if args.seed.is_some() || !args.set.settings.is_empty() {
-        let message = "a campaign has its own seed and settings: --seed and --set cannot change them".to_owned();
-        return Err(CliError::Usage { message });
+        return Err(CliError::usage("a campaign has its own seed and settings: --seed and --set cannot change them"));
     }
     if !args.comparison.arms.is_empty() {
-        let message = "a campaign has its own arms, all of which are drawn: --arms cannot change them".to_owned();
-        return Err(CliError::Usage { message });
+        return Err(CliError::usage("a campaign has its own arms, all of which are drawn: --arms cannot change them"));
     }
     let Some(sample) = args.number.or(args.sample) else {
-        let message = "a campaign has many samples: name one, as in `closecall plot DIR SAMPLE -o FILE.svg`".to_owned();
-        return Err(CliError::Usage { message });
+        return Err(CliError::usage(
+            "a campaign has many samples: name one, as `closecall plot DIR SAMPLE -o FILE.svg`",
+        ));
     };
     protect(&files_of_campaign(&args.source), &[("--output", Some(args.output.path()))])?;
     let saved = SavedCampaign::open(&args.source)?;

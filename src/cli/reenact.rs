@@ -105,7 +105,7 @@ pub(super) fn chosen(path: &Path, read: &ReadArgs, track: Option<u64>) -> Result
     found.map_err(|error| match error {
         ChoiceError::NoLaneChange => {
             let of_track = track.map_or(String::new(), |track| format!(" of track {track}"));
-            CliError::Usage { message: format!("{file} has no lane change{of_track} to re-enact") }
+            CliError::usage(format!("{file} has no lane change{of_track} to re-enact"))
         }
         ChoiceError::NoEncounter { source, possible } => {
             CliError::NoEncounter { file: file.to_string(), source, possible }

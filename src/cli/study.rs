@@ -154,8 +154,7 @@ pub(super) fn frontier(args: &FrontierArgs) -> Result<ExitCode, CliError> {
     let (sensors, workers) = (study.sensors.map(SensorsChoice::mode), Workers::with_jobs(study.jobs));
     let controllers = study.controllers()?;
     if controllers.len() < 2 {
-        let message = "a frontier compares a controller with `acc`: name another with --controller".to_owned();
-        return Err(CliError::Usage { message });
+        return Err(CliError::usage("a frontier compares a controller with `acc`: name another with --controller"));
     }
     let plan = FrontierPlan { file, grid, sampling, controllers, sensors, workers };
     let prepared = plan.prepare()?;

@@ -143,8 +143,7 @@ pub(super) fn lane_changes(args: &LaneChangesArgs) -> Result<ExitCode, CliError>
         return Err(CliError::Usage { message });
     }
     if args.criterion != CriterionChoice::Peak && args.lanes == LanesChoice::None {
-        let message = "`--lanes none` is for `--criterion peak`: the other criteria need lanes or markings".to_owned();
-        return Err(CliError::Usage { message });
+        return Err(CliError::usage("`--lanes none` is for `--criterion peak`: other criteria need lanes or markings"));
     }
     let name = tracks.name().to_owned();
     let references = references.map(|all| listed_for(all, &name)).transpose();
@@ -196,8 +195,7 @@ pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> 
         let chosen = by_severity(&changes, args.track);
         let Some(chosen) = chosen.first() else {
             let of_track = args.track.map_or(String::new(), |track| format!(" of track {track}"));
-            let message = format!("the trajectory file has no lane change{of_track} to record");
-            return Err(CliError::Usage { message });
+            return Err(CliError::usage(format!("the trajectory file has no lane change{of_track} to record")));
         };
         write_recording(path, &[film_lane_change(&smoothed, chosen)?])?;
         print_written(path);

@@ -1,7 +1,7 @@
 //! The cost of each arm of a campaign.
 
 use closecall_campaign::saved::SavedCampaign;
-use closecall_simulation::outcome::Outcome;
+use closecall_simulation::outcome::{Moment, Outcome};
 use closecall_statistics::quantiles::quantile;
 use closecall_traffic::Measured;
 use serde::Serialize;
@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::time_lost::mean_time_lost_s;
 use crate::case::{CausesError, fails};
 
-/// Largest number of samples that are run again for the time lost.
+/// Number of samples of a campaign that are run again for the time lost, in equal numbers for each scenario, and at least one each.
 pub const TIMED_SAMPLES: usize = 50;
 /// Thresholds of the rear time headway (s): 1 s, and the headway below which the paper calls a following critical.
 pub(super) const THW_BELOW_S: [f64; 2] = [1.0, 0.5];
@@ -41,12 +41,34 @@ pub struct ArmCost {
 /// The cost of the arms of a campaign.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Cost {
+    /// The scenarios, in the order of the campaign.
+    pub scenarios: Vec<ScenarioCost>,
+}
+
+/// The cost of the arms in a scenario.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ScenarioCost {
+    /// The scenario.
+    pub scenario: String,
     /// Samples in which no vehicle collides in any arm.
+    pub samples_without_collision: u64,
+    /// Of these, samples in which the lead vehicle does not brake in any arm: those where nothing happens.
     pub samples: u64,
     /// Number of them that were run again for the time lost.
     pub timed_samples: usize,
-    /// The arms, the baseline first.
+    /// The arms, the baseline first; empty without such a sample.
     pub arms: Vec<ArmCost>,
+}
+
+impl ScenarioCost {
+    /// Returns why there is no cost; `None` if there is one.
+    pub(super) fn why_none(&self) -> Option<&'static str> {
+        match (self.samples, self.samples_without_collision) {
+            (0, 0) => Some("no sample without a collision"),
+            (0, _) => Some("no sample without braking of the lead vehicle"),
+            _ => None,
+        }
+    }
 }
 
 /// The values of one arm over the samples.
@@ -65,30 +87,68 @@ struct Values {
 /// # Errors
 /// [`CausesError`] if the folder cannot be read.
 pub fn cost(saved: &SavedCampaign) -> Result<Cost, CausesError> {
-    let mut arms: Vec<Values> = Vec::new();
-    let (mut samples, mut uneventful) = (0, Vec::new());
+    let names: Vec<&String> = saved.manifest().scenarios.iter().map(|scenario| &scenario.name).collect();
+    let mut found: Vec<Uneventful> = names.iter().map(|_| Uneventful::default()).collect();
     for record in saved.folder().records()? {
         let record = record?;
         let outcomes: Option<Vec<&Outcome>> = record.arms.iter().map(|arm| arm.result.as_ref().ok()).collect();
-        let Some(outcomes) = outcomes.filter(|outcomes| !outcomes.iter().any(|outcome| fails(outcome))) else {
-            continue;
-        };
-        samples += 1;
-        if uneventful.len() < TIMED_SAMPLES {
-            uneventful.push((record.scenario.clone(), record.sample));
+        let index = names.iter().position(|name| **name == record.scenario);
+        if let (Some(outcomes), Some(index)) = (outcomes, index) {
+            found[index].push(record.sample, &outcomes);
         }
-        arms.resize_with(outcomes.len(), Values::default);
-        for (values, outcome) in arms.iter_mut().zip(outcomes) {
+    }
+    let timed = TIMED_SAMPLES.div_ceil(names.len().max(1));
+    let of_scenario = |(found, name): (Uneventful, &&String)| found.finish(saved, name, timed);
+    Ok(Cost { scenarios: found.into_iter().zip(&names).map(of_scenario).collect() })
+}
+
+/// The samples of a scenario in which nothing happens.
+#[derive(Default)]
+struct Uneventful {
+    without_collision: u64,
+    samples: Vec<u64>,
+    arms: Vec<Values>,
+}
+
+impl Uneventful {
+    fn push(&mut self, sample: u64, outcomes: &[&Outcome]) {
+        if outcomes.iter().any(|outcome| fails(outcome)) {
+            return;
+        }
+        self.without_collision += 1;
+        if outcomes.iter().any(|outcome| outcome.moment(Moment::FrontBrakes).is_some()) {
+            return;
+        }
+        self.samples.push(sample);
+        self.arms.resize_with(outcomes.len(), Values::default);
+        for (values, outcome) in self.arms.iter_mut().zip(outcomes) {
             values.push(outcome);
         }
     }
-    let lost = mean_time_lost_s(saved, &uneventful);
-    let timed_samples = if lost.is_some() { uneventful.len() } else { 0 };
-    let of_arm = |(index, values): (usize, Values)| {
-        let time_lost_s = if index == 0 { None } else { lost.as_ref().and_then(|lost| lost.get(index).copied()) };
-        values.finish(samples, time_lost_s)
-    };
-    Ok(Cost { samples, timed_samples, arms: arms.into_iter().enumerate().map(of_arm).collect() })
+
+    fn finish(mut self, saved: &SavedCampaign, name: &str, timed: usize) -> ScenarioCost {
+        self.samples.sort_unstable();
+        let chosen = evenly(&self.samples, timed);
+        let lost = mean_time_lost_s(saved, name, &chosen);
+        let samples = self.samples.len() as u64;
+        let of_arm = |(index, values): (usize, Values)| {
+            let time_lost_s = if index == 0 { None } else { lost.as_ref().and_then(|lost| lost.get(index).copied()) };
+            values.finish(samples, time_lost_s)
+        };
+        ScenarioCost {
+            scenario: name.to_owned(),
+            samples_without_collision: self.without_collision,
+            samples,
+            timed_samples: if lost.is_some() { chosen.len() } else { 0 },
+            arms: self.arms.into_iter().enumerate().map(of_arm).collect(),
+        }
+    }
+}
+
+/// Returns up to `most` values, evenly over all.
+fn evenly(values: &[u64], most: usize) -> Vec<u64> {
+    let count = most.min(values.len());
+    (0..count).map(|index| values[index * values.len() / count]).collect()
 }
 
 impl Values {
@@ -119,5 +179,30 @@ impl Values {
             time_lost_s,
             controller: self.controller,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn timed_samples_lie_evenly_over_all() {
+        let all: Vec<u64> = (0..10).collect();
+        assert_eq!(evenly(&all, 5), [0, 2, 4, 6, 8]);
+        assert_eq!(evenly(&all, 3), [0, 3, 6]);
+        assert_eq!(evenly(&all[..2], 50), [0, 1]);
+        assert_eq!(evenly(&[], 50), [0; 0]);
+    }
+
+    #[test]
+    fn a_scenario_without_an_uneventful_sample_says_why() {
+        let of = |samples_without_collision, samples| {
+            let scenario = "a".to_owned();
+            ScenarioCost { scenario, samples_without_collision, samples, timed_samples: 0, arms: Vec::new() }.why_none()
+        };
+        assert_eq!(of(0, 0), Some("no sample without a collision"));
+        assert_eq!(of(4, 0), Some("no sample without braking of the lead vehicle"));
+        assert_eq!(of(4, 1), None);
     }
 }

@@ -22,12 +22,12 @@ impl Observer for Positions {
     }
 }
 
-/// Returns the mean time that the ego of each arm loses to that of the first arm (s), over samples that are run again. Returns
+/// Returns the mean time that the ego of each arm loses to that of the first arm (s), over samples of a scenario that are run again. Returns
 /// `None` without samples, if the sensors are simulated in full, or if a controller is a process of its own.
 ///
 /// At the time at which the shorter of the two runs ends, the ego of the arm is behind that of the baseline by some distance. The
 /// time lost is how long before the baseline was there.
-pub(super) fn mean_time_lost_s(saved: &SavedCampaign, samples: &[(String, u64)]) -> Option<Vec<f64>> {
+pub(super) fn mean_time_lost_s(saved: &SavedCampaign, scenario: &str, samples: &[u64]) -> Option<Vec<f64>> {
     let manifest = saved.manifest();
     if samples.is_empty() || manifest.arms.iter().any(|arm| arm.exec().is_some()) {
         return None;
@@ -35,10 +35,10 @@ pub(super) fn mean_time_lost_s(saved: &SavedCampaign, samples: &[(String, u64)])
     let names = manifest.arm_names();
     let lost: Option<Vec<Vec<f64>>> = samples
         .par_iter()
-        .map(|(scenario, sample)| {
+        .map(|&sample| {
             let mut runs = Vec::new();
             for name in &names {
-                let case = Case::of(saved, Some(scenario), *sample, Some(name)).ok()?;
+                let case = Case::of(saved, Some(scenario), sample, Some(name)).ok()?;
                 if case.sensors() == SensorMode::Full {
                     return None;
                 }

@@ -5,12 +5,16 @@ use std::fmt;
 use closecall_campaign::ledger::Pairs;
 use closecall_campaign::saved::SavedCampaign;
 use closecall_campaign::summary::Summary;
+use closecall_simulation::outcome::Moment;
 use serde::Serialize;
 
-use super::interval::{product, rate_interval, share_difference};
+use super::interval::{extremes, product, rate_interval, share_difference};
 use super::{EventRule, Observed};
 use crate::case::CausesError;
 
+/// Share of the samples in which the lead vehicle must brake for a scenario to be the counted encounter: an assumption; runs that
+/// end by a collision before it brakes are part of the encounter.
+const LEAD_BRAKES_SHARE: f64 = 0.95;
 /// The distance that the effect refers to (km).
 const PER_KM: f64 = 1e6;
 
@@ -51,8 +55,10 @@ impl Rate {
 /// What a paired campaign says about the system, given an encounter.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CampaignShares {
-    /// The scenarios.
-    pub scenarios: Vec<String>,
+    /// The scenario.
+    pub scenario: String,
+    /// Share of its samples in which the lead vehicle brakes without the system.
+    pub lead_braked_share: f64,
     /// Samples with both outcomes.
     pub samples: u64,
     /// Samples in which the system prevents the collision of the ego.
@@ -95,7 +101,8 @@ pub struct NetEffect {
     pub difference_95: [f64; 2],
     /// The net effect.
     pub net: f64,
-    /// Interval of the net effect at 95 %.
+    /// Interval of the net effect at 95 %; with a stated range of the rate its extremes over the range, each with the interval of
+    /// the difference.
     pub net_95: [f64; 2],
 }
 
@@ -106,6 +113,8 @@ pub struct Exposure {
     pub rule: EventRule,
     /// What trajectory files show; `None` without files.
     pub observed: Option<Observed>,
+    /// The largest rate at 95 % if no event was seen (events per 10⁶ km); `None` if one was, or no distance is known.
+    pub at_most_per_million_km: Option<f64>,
     /// The rate; `None` if it is not known.
     pub rate: Option<Rate>,
     /// The campaign; `None` if there is none.
@@ -127,31 +136,52 @@ pub fn exposure(
         .as_ref()
         .filter(|seen| seen.distance_km > 0.0 && seen.events > 0)
         .map(|seen| Rate::Counted { events: seen.events, distance_km: seen.distance_km });
+    let without_event = observed.as_ref().filter(|seen| seen.distance_km > 0.0 && seen.events == 0);
+    let at_most_per_million_km = without_event.map(|seen| rate_interval(0, seen.distance_km)[1] * PER_KM);
     let rate = counted.or(prior.map(|[low, high]| Rate::Prior { low, high }));
     let usable = campaign.as_ref().filter(|campaign| campaign.samples > 0);
-    let effect = rate.as_ref().zip(usable).map(|(rate, campaign)| {
-        let (rate, rate_95) = rate.per_million_km();
+    let effect = rate.as_ref().zip(usable).map(|(source, campaign)| {
+        let (rate, rate_95) = source.per_million_km();
         let (difference, difference_95) = share_difference(campaign.prevented, campaign.induced, campaign.samples);
-        let (net, net_95) = product((rate, rate_95), (difference, difference_95));
+        let (net, counted_95) = product((rate, rate_95), (difference, difference_95));
+        let net_95 = match source {
+            Rate::Counted { .. } => counted_95,
+            Rate::Prior { low, high } => extremes([*low, *high], difference_95),
+        };
         NetEffect { rate, rate_95, difference, difference_95, net, net_95 }
     });
     let lacks = [(rate.is_none(), Missing::Rate), (usable.is_none(), Missing::Campaign)];
     let missing = lacks.into_iter().filter(|(lacks, _)| *lacks).map(|(_, missing)| missing).collect();
-    Exposure { rule, observed, rate, campaign, effect, missing }
+    Exposure { rule, observed, at_most_per_million_km, rate, campaign, effect, missing }
 }
 
-/// Returns what a saved campaign says, given an encounter: over all of its scenarios. An unpaired campaign has no samples.
+/// Returns what a scenario of a saved campaign says, given an encounter. `scenario` may be left out if the campaign has only one.
+/// An unpaired campaign has no samples.
 ///
 /// # Errors
-/// [`CausesError`] if the folder cannot be read.
-pub fn shares_of(saved: &SavedCampaign) -> Result<CampaignShares, CausesError> {
+/// [`CausesError`] if the folder cannot be read, there is no such scenario, or the lead vehicle does not brake in it.
+pub fn shares_of(saved: &SavedCampaign, scenario: Option<&str>) -> Result<CampaignShares, CausesError> {
+    let name = saved.file(scenario)?.config().name.clone();
     let mut summary = Summary::of(&saved.works()?);
+    let (mut runs, mut braked) = (0_u64, 0_u64);
     for record in saved.folder().records()? {
-        summary.push(&record?);
+        let record = record?;
+        if record.scenario == name
+            && let Some(Ok(baseline)) = record.arms.first().map(|arm| arm.result.as_ref())
+        {
+            runs += 1;
+            braked += u64::from(baseline.moment(Moment::FrontBrakes).is_some());
+        }
+        summary.push(&record);
     }
-    let Pairs { prevented, induced, both, neither, .. } = summary.total().pairs;
-    let scenarios = summary.scenarios.iter().map(|(name, _)| name.clone()).collect();
-    Ok(CampaignShares { scenarios, samples: prevented + induced + both + neither, prevented, induced })
+    let lead_braked_share = braked as f64 / runs.max(1) as f64;
+    if runs > 0 && lead_braked_share < LEAD_BRAKES_SHARE {
+        return Err(CausesError::OtherEncounter { scenario: name, braked, runs });
+    }
+    let pairs = summary.scenarios.iter().find(|(found, _)| *found == name).map(|(_, counts)| counts.pairs);
+    let Pairs { prevented, induced, both, neither, .. } = pairs.unwrap_or_default();
+    let samples = prevented + induced + both + neither;
+    Ok(CampaignShares { scenario: name, lead_braked_share, samples, prevented, induced })
 }
 
 #[cfg(test)]
@@ -161,7 +191,7 @@ mod tests {
     const RULE: EventRule = EventRule { braking_mps2: 4.0 };
 
     fn campaign(prevented: u64, induced: u64) -> Option<CampaignShares> {
-        Some(CampaignShares { scenarios: vec!["a".to_owned()], samples: 1_000, prevented, induced })
+        Some(CampaignShares { scenario: "a".to_owned(), lead_braked_share: 1.0, samples: 1_000, prevented, induced })
     }
 
     #[test]
@@ -183,7 +213,19 @@ mod tests {
             [Missing::Rate],
             "no event was seen"
         );
-        let with_prior = exposure(RULE, Some(seen), Some([100.0, 10_000.0]), campaign(50, 10));
-        assert!((with_prior.effect.unwrap().net - 40.0).abs() < 1e-9, "geometric mean 1000 · 0.04");
+        let with_prior = exposure(RULE, Some(seen), Some([100.0, 10_000.0]), campaign(50, 10)).effect.unwrap();
+        assert!((with_prior.net - 40.0).abs() < 1e-9, "geometric mean 1000 · 0.04");
+        let [low, high] = with_prior.difference_95;
+        assert_eq!(with_prior.net_95, [100.0 * low, 10_000.0 * high], "{with_prior:?}");
+    }
+
+    #[test]
+    fn no_event_in_a_distance_bounds_the_rate() {
+        let seen = Observed { events: 0, distance_km: 5_000.0, ..Observed::default() };
+        let found = exposure(RULE, Some(seen), None, None);
+        // The 97.5 % quantile of chi-squared with one degree of freedom is 5.0239: half of it in 5,000 km.
+        assert!((found.at_most_per_million_km.unwrap() - 502.39).abs() < 0.01, "{found:?}");
+        let text = super::super::ExposureText(&found).to_string();
+        assert!(text.contains("0 events in 5000 km: at most 502 per 10^6 km (95 %)"), "{text}");
     }
 }

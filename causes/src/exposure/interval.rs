@@ -43,6 +43,11 @@ pub fn product((rate, rate_95): (f64, [f64; 2]), (effect, effect_95): (f64, [f64
     (value, [value - bound(toward_low, effect_95[0]), value + bound(toward_high, effect_95[1])])
 }
 
+/// Returns the smallest and the largest product of a positive quantity in a stated range and any quantity in an interval.
+pub fn extremes([low, high]: [f64; 2], [effect_low, effect_high]: [f64; 2]) -> [f64; 2] {
+    [if effect_low >= 0.0 { low } else { high } * effect_low, if effect_high >= 0.0 { high } else { low } * effect_high]
+}
+
 #[cfg(test)]
 mod tests {
     use closecall_traffic::{ActorId, Stream, stream};
@@ -100,6 +105,15 @@ mod tests {
             let covered = covered(2_000, mean, shares, 400);
             assert!((1_860..=1_940).contains(&covered), "{covered} of 2,000 with {mean} events and {shares:?}");
         }
+    }
+
+    #[test]
+    fn a_stated_range_gives_the_extremes_of_the_products() {
+        let stated = [100.0, 10_000.0];
+        let [low, high] = extremes(stated, [0.0717, 0.2803]);
+        assert!((low - 7.17).abs() < 1e-9 && (high - 2_803.0).abs() < 1e-9, "{low} {high}");
+        assert_eq!(extremes(stated, [-0.5, 0.25]), [-5_000.0, 2_500.0]);
+        assert_eq!(extremes(stated, [-0.5, -0.25]), [-5_000.0, -25.0]);
     }
 
     #[test]

@@ -17,6 +17,9 @@
 //!   effect measures*, Statistics in Medicine 27 (2008) 1693–1702), which combines the distances of the bounds to the estimates
 //!   like standard deviations; p and q of the same samples are correlated by −√(p·q/((1 − p)·(1 − q))).
 //!
+//! A stated range of λ has no confidence. The net effect then has the extremes of the products: the ends of the range with the ends
+//! of the interval of p − q.
+//!
 //! The events count as independent of each other, and the sampled encounters as those of the road: neither can be shown by the
 //! data, and the result says so.
 
@@ -28,6 +31,6 @@ mod text;
 
 pub use arguments::{Counted, StatedRange};
 pub use effect::{CampaignShares, Exposure, Missing, NetEffect, Rate, exposure, shares_of};
-pub use interval::{product, rate_interval, share_difference};
+pub use interval::{extremes, product, rate_interval, share_difference};
 pub use observe::{EventRule, Observed, observe};
 pub use text::ExposureText;

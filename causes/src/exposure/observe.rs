@@ -1,6 +1,6 @@
 //! Encounters in trajectory data: the lead vehicle of a vehicle brakes while another comes near from behind.
 
-use closecall_scenarios::filters::SmoothedTrajectoryData;
+use closecall_scenarios::filters::{Presence, SmoothedTrajectoryData};
 use closecall_traffic::metrics::bumper_gap_m;
 use closecall_traffic::{ENGAGEMENT_CLOSING_MPS, ENGAGEMENT_GAP_M, Trajectory, TrajectoryPoint};
 use serde::Serialize;
@@ -54,14 +54,16 @@ pub fn observe(data: &SmoothedTrajectoryData, rule: EventRule, into: &mut Observ
 /// Observes one vehicle as the ego.
 fn observe_ego(data: &SmoothedTrajectoryData, ego: usize, rule: EventRule, into: &mut Observed) {
     let own = &data.tracks[ego].trajectory;
-    let (mut was_near, mut last_braked_s) = (false, f64::NEG_INFINITY);
+    // The rear vehicle that is near, by the index of its track.
+    let mut near = None;
     for point in &own.points {
         let Some((lead, rear)) = neighbours(data, ego, (own, point)) else {
-            was_near = false;
+            near = None;
             continue;
         };
         let closing_mps = rear.point.speed_mps - point.speed_mps;
         let thw_s = lead.gap_m / point.speed_mps.max(MIN_SPEED_MPS);
+        let was_near = near == Some(rear.presence.track_index);
         // Once near, the rear vehicle stays near until it is out of reach: its approach ends when it has come close.
         let is_near = thw_s < SHORT_THW_S
             && rear.gap_m <= ENGAGEMENT_GAP_M
@@ -70,21 +72,26 @@ fn observe_ego(data: &SmoothedTrajectoryData, ego: usize, rule: EventRule, into:
             into.approaches += 1;
             into.closing_mps.push(closing_mps);
         }
-        let brakes = lead.point.acceleration_mps2 <= -rule.braking_mps2;
-        if brakes {
-            let now_s = point.time.s();
-            if is_near && now_s - last_braked_s > APART_S {
-                into.events += 1;
-                into.rear_thw_s.push(rear.gap_m / rear.point.speed_mps.max(MIN_SPEED_MPS));
-            }
-            last_braked_s = now_s;
+        if is_near && begins_to_brake(data, lead.presence, rule) {
+            into.events += 1;
+            into.rear_thw_s.push(rear.gap_m / rear.point.speed_mps.max(MIN_SPEED_MPS));
         }
-        was_near = is_near;
+        near = is_near.then_some(rear.presence.track_index);
     }
+}
+
+/// Returns whether a vehicle brakes, and was seen not to brake in the time before. It need not have been the lead vehicle then.
+fn begins_to_brake(data: &SmoothedTrajectoryData, presence: Presence, rule: EventRule) -> bool {
+    let (track, now) = data.look_up(presence);
+    let brakes = |point: &TrajectoryPoint| point.acceleration_mps2 <= -rule.braking_mps2;
+    let before = &track.points[..presence.point_index];
+    let mut recent = before.iter().rev().take_while(|point| (now.time - point.time).s() <= APART_S);
+    brakes(now) && !before.is_empty() && !recent.any(brakes)
 }
 
 /// A neighbour in the lane.
 struct Neighbour<'a> {
+    presence: Presence,
     point: &'a TrajectoryPoint,
     /// Gap, bumper to bumper (m).
     gap_m: f64,
@@ -106,7 +113,7 @@ fn neighbours<'a>(
         let gap_m = bumper_gap_m(distance_m.abs(), own.dimensions.length_m, other.dimensions.length_m);
         let nearest = if distance_m > 0.0 { &mut ahead } else { &mut behind };
         if nearest.as_ref().is_none_or(|known| gap_m < known.gap_m) {
-            *nearest = Some(Neighbour { point: at, gap_m });
+            *nearest = Some(Neighbour { presence, point: at, gap_m });
         }
     }
     Some((ahead?, behind?))
@@ -123,6 +130,10 @@ mod tests {
     const STEP_S: f64 = 0.04;
 
     fn track(track_id: u64, at: impl Fn(f64) -> (f64, f64, f64)) -> Trajectory {
+        track_in(track_id, |_| 2, at)
+    }
+
+    fn track_in(track_id: u64, lane: impl Fn(f64) -> u8, at: impl Fn(f64) -> (f64, f64, f64)) -> Trajectory {
         let points = (0..350).map(|step| {
             let time_s = f64::from(step) * STEP_S;
             let (s_m, speed_mps, acceleration_mps2) = at(time_s);
@@ -134,7 +145,7 @@ mod tests {
                 acceleration_mps2,
                 lateral_speed_mps: 0.0,
                 lateral_acceleration_mps2: 0.0,
-                lane: Lane(2),
+                lane: Lane(lane(time_s)),
             }
         });
         let dimensions = Dimensions { length_m: 4.6, width_m: 1.8, height_m: 1.5 };
@@ -144,13 +155,22 @@ mod tests {
     /// Three vehicles in a lane: the lead vehicle brakes by 6 m/s² from 12 s to 13 s, and the rear vehicle, which starts `rear_m`
     /// behind the ego, is 8 m/s faster.
     fn observed(rear_m: f64, braking_mps2: f64) -> Observed {
-        let lead = |t: f64| {
-            let braked = (t - 12.0).clamp(0.0, 1.0);
-            let lost_m = 3.0 * braked * braked + 6.0 * (t - 13.0).max(0.0);
-            (40.0 + 30.0 * t - lost_m, 30.0 - 6.0 * braked, if (12.0..13.0).contains(&t) { -6.0 } else { 0.0 })
-        };
         let rear = |t: f64| (-rear_m + 38.0 * t, 38.0, 0.0);
-        let tracks = vec![track(1, lead), track(2, |t| (30.0 * t, 30.0, 0.0)), track(3, rear)];
+        observed_in(
+            vec![track(1, |t| braking_from(12.0, t)), track(2, |t| (30.0 * t, 30.0, 0.0)), track(3, rear)],
+            braking_mps2,
+        )
+    }
+
+    /// A vehicle 40 m ahead of the ego that brakes by 6 m/s² for 1 s.
+    fn braking_from(start_s: f64, t: f64) -> (f64, f64, f64) {
+        let braked = (t - start_s).clamp(0.0, 1.0);
+        let lost_m = 3.0 * braked * braked + 6.0 * (t - start_s - 1.0).max(0.0);
+        let is_braking = (start_s..start_s + 1.0).contains(&t);
+        (40.0 + 30.0 * t - lost_m, 30.0 - 6.0 * braked, if is_braking { -6.0 } else { 0.0 })
+    }
+
+    fn observed_in(tracks: Vec<Trajectory>, braking_mps2: f64) -> Observed {
         let data = TrajectoryData::new("made", Time::from_s(STEP_S), tracks);
         let mut found = Observed::default();
         observe(&smooth(&data), EventRule { braking_mps2 }, &mut found);
@@ -166,5 +186,30 @@ mod tests {
         assert!((found.distance_km - 1.35).abs() < 0.05, "{found:?}");
         assert_eq!(observed(320.0, 4.0).events, 0, "too far away");
         assert_eq!(observed(130.0, 7.0).events, 0, "braking less than that");
+    }
+
+    #[test]
+    fn an_approach_is_that_of_one_rear_vehicle() {
+        let scene = |leaves_s: f64| {
+            let rear = track_in(3, |t| if t < leaves_s { 2 } else { 1 }, |t| (-130.0 + 38.0 * t, 38.0, 0.0));
+            let follower = track(4, |t| (-70.0 + 30.0 * t, 30.0, 0.0));
+            let lead = track(1, |t| braking_from(12.0, t));
+            observed_in(vec![lead, track(2, |t| (30.0 * t, 30.0, 0.0)), rear, follower], 4.0)
+        };
+        // The faster vehicle passes the follower at 60 / 8 = 7.5 s, and is the rear vehicle from then on.
+        assert_eq!(scene(20.0).events, 1);
+        assert_eq!(scene(11.0).events, 0, "the follower behind it never approached");
+    }
+
+    #[test]
+    fn the_lead_vehicle_must_begin_to_brake() {
+        let scene = |brakes_s: f64, arrives_s: f64| {
+            let lead = track_in(1, |t| if t < arrives_s { 1 } else { 2 }, |t| braking_from(brakes_s, t));
+            let ahead = track_in(4, |t| if t < arrives_s { 2 } else { 1 }, |t| (41.0 + 30.0 * t, 30.0, 0.0));
+            let rear = track(3, |t| (-130.0 + 38.0 * t, 38.0, 0.0));
+            observed_in(vec![lead, track(2, |t| (30.0 * t, 30.0, 0.0)), rear, ahead], 4.0)
+        };
+        assert_eq!(scene(12.0, 11.0).events, 1);
+        assert_eq!(scene(12.0, 12.5).events, 0, "it brakes already when it becomes the lead vehicle");
     }
 }

@@ -12,9 +12,13 @@ pub struct ExposureText<'a>(pub &'a Exposure);
 
 impl fmt::Display for ExposureText<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Exposure { rule, observed, rate, campaign, effect, missing } = self.0;
+        let Exposure { rule, observed, at_most_per_million_km, rate, campaign, effect, missing } = self.0;
         if let Some(seen) = observed.as_ref().filter(|seen| seen.hours > 0.0) {
             write_observed(f, seen, rule.braking_mps2)?;
+        }
+        if let (Some(seen), Some(at_most)) = (observed, at_most_per_million_km) {
+            let km = (1_000.0 * seen.distance_km).round() / 1_000.0;
+            writeln!(f, "0 events in {km} km: at most {at_most:.0} per 10^6 km (95 %)")?;
         }
         match rate {
             Some(Rate::Counted { events, distance_km }) => {
@@ -28,17 +32,19 @@ impl fmt::Display for ExposureText<'_> {
         if let Some(campaign) = campaign {
             writeln!(
                 f,
-                "campaign {}: n = {} paired samples, {} prevented, {} induced",
-                campaign.scenarios.join(", "),
+                "campaign {}: n = {} paired samples, {} prevented, {} induced; the lead vehicle brakes in {:.0} %",
+                campaign.scenario,
                 campaign.samples,
                 campaign.prevented,
                 campaign.induced,
+                100.0 * campaign.lead_braked_share,
             )?;
         }
         match effect {
             Some(effect) => {
                 let [low, high] = effect.rate_95;
-                let stated = if matches!(rate, Some(Rate::Prior { .. })) { "as stated" } else { "95 %" };
+                let is_stated = matches!(rate, Some(Rate::Prior { .. }));
+                let stated = if is_stated { "as stated" } else { "95 %" };
                 writeln!(f, "encounters per 10^6 km: {:.4} ({stated}: {low:.4} to {high:.4})", effect.rate)?;
                 let [low, high] = effect.difference_95;
                 writeln!(
@@ -47,9 +53,14 @@ impl fmt::Display for ExposureText<'_> {
                     effect.difference
                 )?;
                 let [low, high] = effect.net_95;
+                let net_of = if is_stated {
+                    "over the stated range, each end with the 95 % interval of the shares"
+                } else {
+                    "95 %"
+                };
                 writeln!(
                     f,
-                    "NET EFFECT: {:.4} fewer collisions per 10^6 km ({stated}: {low:.4} to {high:.4})",
+                    "NET EFFECT: {:.4} fewer collisions per 10^6 km ({net_of}: {low:.4} to {high:.4})",
                     effect.net
                 )?;
                 if low <= 0.0 && high >= 0.0 {
@@ -58,11 +69,20 @@ impl fmt::Display for ExposureText<'_> {
                         "its sign cannot be said: the interval contains 0, more events or more samples are needed"
                     )?;
                 }
-                writeln!(
-                    f,
-                    "by hand: rate = 10^6 N / D, interval by gamma quantiles of shape N + 1/2 over D; difference = (prevented - \
+                if is_stated {
+                    writeln!(
+                        f,
+                        "by hand: difference = (prevented - induced) / n, Wilson intervals combined; net = geometric mean of the \
+                         stated range x difference; low = lower rate x lower difference, high = higher rate x higher difference \
+                         (a negative difference takes the other rate)"
+                    )?;
+                } else {
+                    writeln!(
+                        f,
+                        "by hand: rate = 10^6 N / D, interval by gamma quantiles of shape N + 1/2 over D; difference = (prevented - \
                      induced) / n, Wilson intervals combined; net = rate x difference, intervals combined as in docs/causes.md"
-                )?;
+                    )?;
+                }
                 writeln!(
                     f,
                     "assumed: the events are independent of each other, and the sampled encounters are those of the road"

@@ -8,8 +8,6 @@ pub const PAPER_IN_TIME: [(f64, &str); 3] = [(20.0, "always"), (25.0, "59 %"), (
 
 /// Largest difference of margin between theory and loop that needs no reason (s).
 pub(super) const AGREES_WITHIN_S: f64 = 0.2;
-/// Largest shortfall with which the goal still counts as reached (s): that of the system itself.
-pub(super) const GOAL_TOLERANCE_S: f64 = 0.08;
 
 /// One point of the map.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -3,17 +3,20 @@
 use std::path::Path;
 
 use closecall_campaign::runner::run_guarded;
-use closecall_controllers::{ArrivalPrediction, BrakingResponse, CheckedDriver, Encounter, MisSettings, Reason};
+use closecall_controllers::{
+    ACTUATOR_LAG_S, ArrivalPrediction, BRAKE_RELEASE_JERK_MPS3, BrakingResponse, CheckedDriver, Encounter,
+    GOAL_TOLERANCE_S, MisSettings, Reason,
+};
+use closecall_sensors::SensorMode;
 use closecall_simulation::controller::{BuiltIn, ControllerChoice};
 use closecall_simulation::outcome::Outcome;
 use closecall_simulation::scenario::{ScenarioError, ScenarioFile, Setting};
 use closecall_simulation::{Arm, NoObserver, RunKey, SampleError};
-use closecall_traffic::{ParameterName, Parameters, Value};
+use closecall_traffic::{CONTROL_STEP, ParameterName, Parameters, Value};
 use rayon::prelude::*;
 use serde::Serialize;
 
 use super::MapPoint;
-use super::point::GOAL_TOLERANCE_S;
 
 /// The scenario of every point.
 const SCENARIO: &str = include_str!("scenario.toml");
@@ -21,11 +24,14 @@ const SCENARIO: &str = include_str!("scenario.toml");
 const KMH_PER_MPS: f64 = 3.6;
 /// Time for which the rear vehicle approaches before it can be detected (s), so that the run starts in balance.
 const BEFORE_DETECTION_S: f64 = 1.0;
-/// Jerk with which the system releases the brake (m/s³) and time constant of the actuators (s), as the system plans with them.
-const RELEASE_JERK_MPS3: f64 = 3.0;
-const ACTUATOR_LAG_S: f64 = 0.15;
-/// Step of the controller (s): the system engages up to one step after its conditions hold.
-const CONTROL_STEP_S: f64 = 0.04;
+/// The parameters of the grid, and the options that set them.
+const OF_GRID: [(&str, &str); 5] = [
+    ("speed-mps", "--speed-mps"),
+    ("closing-mps", "--closing-kmh"),
+    ("detection-m", "--detection-m"),
+    ("start-gap-m", "--detection-m and --closing-kmh, from which it follows"),
+    ("front-thw-s", "--front-thw-s"),
+];
 
 /// A map that cannot be computed.
 #[derive(Debug, thiserror::Error)]
@@ -38,6 +44,24 @@ pub enum MapError {
     NoMis {
         /// The controller.
         controller: String,
+    },
+    /// A setting changes a parameter of the grid.
+    #[error("`--set {setting}`: the grid has the values of `{parameter}`, by {option}")]
+    OfGrid {
+        /// The setting.
+        setting: String,
+        /// The parameter.
+        parameter: &'static str,
+        /// The option that sets it.
+        option: &'static str,
+    },
+    /// The settings ask for tracks that are not true.
+    #[error(
+        "the map needs true tracks, as the theory assumes them: `sensors.mode` is `{mode}`, and may only be `ground-truth`"
+    )]
+    Sensors {
+        /// The mode.
+        mode: &'static str,
     },
     /// A point has no outcome.
     #[error("failed to run the point at {closing_kmh} km/h, {detection_m} m and {front_thw_s} s: {source}")]
@@ -66,6 +90,18 @@ pub struct MapGrid {
     pub front_thw_s: Vec<f64>,
 }
 
+impl MapGrid {
+    /// Returns the grid with each list in rising order, without values that it has twice.
+    fn sorted(&self) -> Self {
+        let mut grid = self.clone();
+        for list in [&mut grid.closing_kmh, &mut grid.detection_m, &mut grid.front_thw_s] {
+            list.sort_by(f64::total_cmp);
+            list.dedup();
+        }
+        grid
+    }
+}
+
 /// A map.
 #[derive(Clone, Debug, Serialize)]
 pub struct Map {
@@ -85,14 +121,17 @@ pub struct Map {
     pub points: Vec<MapPoint>,
 }
 
-/// Computes the map of a margin increase system. `settings` change the scenario of the points.
+/// Computes the map of a margin increase system. `settings` change the scenario of the points, but not the values of the grid, nor
+/// the true tracks.
 ///
 /// # Errors
-/// [`MapError`] if a value is out of range, or a point has no outcome.
+/// [`MapError`] if a value is out of range, a setting changes what the map sets, or a point has no outcome.
 pub fn map(grid: &MapGrid, controller: &ControllerChoice, settings: &[Setting]) -> Result<Map, MapError> {
     let Some(BuiltIn::Mis | BuiltIn::MisExtended) = controller.built_in() else {
         return Err(MapError::NoMis { controller: controller.to_string() });
     };
+    settings.iter().try_for_each(leaves_grid)?;
+    let grid = grid.sorted();
     let file = ScenarioFile::parse(Path::new("the scenario of the map"), SCENARIO, settings)?;
     let mut cells = Vec::new();
     for &front_thw_s in &grid.front_thw_s {
@@ -100,13 +139,13 @@ pub fn map(grid: &MapGrid, controller: &ControllerChoice, settings: &[Setting]) 
             cells.extend(grid.closing_kmh.iter().map(|&closing_kmh| Cell { closing_kmh, detection_m, front_thw_s }));
         }
     }
-    let arm = Arm { controller: controller.factory(), sensors: None };
+    let arm = Arm { controller: controller.factory(), sensors: Some(SensorMode::GroundTruth) };
     let computed: Result<Vec<(MapPoint, MisSettings)>, MapError> =
         cells.par_iter().map(|cell| cell.compute(grid.speed_mps, &file, &arm)).collect();
     let computed = computed?;
     let mis = computed.first().map_or(MisSettings::PAPER, |(_, mis)| *mis);
     Ok(Map {
-        grid: grid.clone(),
+        grid,
         controller: controller.to_string(),
         max_deceleration_mps2: mis.max_deceleration_mps2,
         goal_s: mis.thw_gain_s,
@@ -114,6 +153,18 @@ pub fn map(grid: &MapGrid, controller: &ControllerChoice, settings: &[Setting]) 
         engages_from_kmh: KMH_PER_MPS * mis.engage_closing_mps,
         points: computed.into_iter().map(|(point, _)| point).collect(),
     })
+}
+
+/// Refuses a setting that changes a parameter of the grid.
+fn leaves_grid(setting: &Setting) -> Result<(), MapError> {
+    let setting = setting.to_string();
+    let key = setting.split('=').next().unwrap_or_default();
+    let mut parts = key.strip_prefix("parameters.").unwrap_or(key).split('.');
+    let first = parts.next().unwrap_or_default();
+    match OF_GRID.into_iter().find(|(parameter, _)| *parameter == first) {
+        Some((parameter, option)) => Err(MapError::OfGrid { setting, parameter, option }),
+        None => Ok(()),
+    }
 }
 
 /// One point of the grid.
@@ -147,6 +198,10 @@ impl Cell {
         let CheckedDriver::Ego(ego) = &scenario.actors[scenario.ego].driver else {
             return Err(self.failed(SampleError::Panic { message: "the map has no ego".to_owned() }));
         };
+        let mode = scenario.sensors.mode();
+        if mode != SensorMode::GroundTruth {
+            return Err(MapError::Sensors { mode: mode.name() });
+        }
         let mis = arm.controller.settings(ego).mis().copied().unwrap_or(MisSettings::PAPER);
         let outcome = run_guarded(&scenario, RunKey { seed: 0, sample: 0 }, arm, &mut NoObserver)
             .map_err(|source| self.failed(source))?;
@@ -192,7 +247,7 @@ impl Cell {
             commanded_mps2: 0.0,
             braking_mps2: 0.0,
             build_up_mps3: mis.max_jerk_mps3,
-            release_mps3: RELEASE_JERK_MPS3,
+            release_mps3: BRAKE_RELEASE_JERK_MPS3,
             lag_s: ACTUATOR_LAG_S,
         };
         let prediction = ArrivalPrediction { encounter, response };
@@ -216,8 +271,9 @@ impl Cell {
             return "the plan has no solution in theory, and the loop brakes as hard as it may".to_owned();
         }
         let closing_mps = self.closing_kmh / KMH_PER_MPS;
+        // The system engages up to one step of the controller after its conditions hold.
         let expected_s = BEFORE_DETECTION_S + (self.detection_m - mis.engage_gap_m).max(0.0) / closing_mps;
-        if engaged_at_s - expected_s > CONTROL_STEP_S + 1e-9 {
+        if engaged_at_s - expected_s > CONTROL_STEP.s() + 1e-9 {
             let later_s = engaged_at_s - expected_s;
             return format!("the system engages {later_s:.2} s later in the loop than its conditions hold in theory");
         }
@@ -234,8 +290,7 @@ impl Cell {
         }
         let mean = summary.mean_deceleration_mps2.map_or_else(|_| "-".to_owned(), |mps2| format!("{mps2:.2}"));
         format!(
-            "the ego brakes by {mean} m/s² in the mean in the loop, the plan at the engagement asks for {:.2} m/s²: the plan is \
-             computed afresh at every step, and front and rear gaps differ from their values at the engagement",
+            "not explained: the ego brakes by {mean} m/s² in the mean in the loop, the plan at the engagement asks for {:.2} m/s²",
             point.planned_mps2.unwrap_or(f64::NAN),
         )
     }
@@ -268,6 +323,33 @@ mod tests {
         }
         let agreeing = map.points.iter().filter(|point| point.agrees() && point.loop_s.is_some()).count();
         assert!(agreeing >= 5, "{:?}", map.points);
+    }
+
+    #[test]
+    fn what_the_map_sets_cannot_be_set_and_lists_are_sorted() {
+        let refused =
+            |text: &str| map(&grid(), &ControllerChoice::MIS, &[text.parse().unwrap()]).unwrap_err().to_string();
+        for (parameter, option) in OF_GRID {
+            for key in [parameter.to_owned(), format!("parameters.{parameter}.fixed")] {
+                let message = refused(&format!("{key}=3"));
+                assert!(message.contains(&format!("`{parameter}`")) && message.contains(option), "{message}");
+            }
+        }
+        assert!(refused("sensors.mode=object").contains("may only be `ground-truth`"));
+        let unsorted = MapGrid { closing_kmh: vec![24.0, 15.0, 24.0], detection_m: vec![100.0], ..grid() };
+        assert_eq!(map(&unsorted, &ControllerChoice::MIS, &[]).unwrap().grid.closing_kmh, [15.0, 24.0]);
+    }
+
+    #[test]
+    fn a_known_cause_of_a_difference_is_named() {
+        let one = MapGrid { closing_kmh: vec![24.0], detection_m: vec![100.0], ..grid() };
+        let settings = ["actor.rear.driver.prescribed.acceleration-profile=[[0.0, 0.0], [3.0, -3.0]]".parse().unwrap()];
+        let map = map(&one, &ControllerChoice::MIS, &settings).unwrap();
+        let reason = map.points[0].reason.as_deref().unwrap();
+        assert!(
+            reason.contains("the rear vehicle never is at the critical gap in the loop: it releases at"),
+            "{reason}"
+        );
     }
 
     #[test]

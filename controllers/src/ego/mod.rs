@@ -18,7 +18,10 @@ pub(crate) use acc::GapPolicy;
 pub use acc::{Acc, AccConfig};
 pub use aeb::{Aeb, AebConfig};
 pub use interface::{ControllerError, EgoCommand, EgoController, EgoInput, EgoState, Odometry, SensorAvailability};
-pub use mis::{ArrivalPrediction, BrakingResponse, Encounter, MisConfig, MisPlan, MisSettings, Solution};
+pub use mis::{
+    ACTUATOR_LAG_S, ArrivalPrediction, BRAKE_RELEASE_JERK_MPS3, BrakingResponse, Encounter, GOAL_TOLERANCE_S,
+    MisConfig, MisPlan, MisSettings, Solution,
+};
 pub use r157_driver::R157Driver;
 pub use r157_fuzzy::R157Fuzzy;
 pub use reason::Reason;

@@ -31,15 +31,15 @@ const LOSS_TIMEOUT: Time = Time::from_ms(500);
 const MIN_THW_SPEED_MPS: f64 = 1.0;
 
 /// Jerk with which braking is released (m/s³): an assumption; 2 to 5 are plausible.
-pub(crate) const BRAKE_RELEASE_JERK_MPS3: f64 = 3.0;
+pub const BRAKE_RELEASE_JERK_MPS3: f64 = 3.0;
 
 /// Time constant of the actuators, as the ego knows it (s): that of the simulated car; published responses of car brakes
 /// are 0.1 to 0.3 s.
-const ACTUATOR_LAG_S: f64 = 0.15;
+pub const ACTUATOR_LAG_S: f64 = 0.15;
 
 /// Largest shortfall at which the goal still counts as in reach (s). A margin that falls short by 0.1 s is still called
 /// reached; the difference covers effects that the prediction does not model, such as the control steps.
-const GOAL_TOLERANCE_S: f64 = 0.08;
+pub const GOAL_TOLERANCE_S: f64 = 0.08;
 
 /// Multiple of the gap of the ACC within which the margin counts as returned: an assumption; 1.05 to 1.5 are plausible.
 const RETURNED_GAP_RATIO: f64 = 1.2;

@@ -147,7 +147,8 @@ mod target;
 mod tests;
 
 pub use config::{MisConfig, MisSettings};
-pub(crate) use machine::{BRAKE_RELEASE_JERK_MPS3, Mis, Request, Situation};
+pub use machine::{ACTUATOR_LAG_S, BRAKE_RELEASE_JERK_MPS3, GOAL_TOLERANCE_S};
+pub(crate) use machine::{Mis, Request, Situation};
 pub use plan::MisPlan;
 pub use prediction::ArrivalPrediction;
 pub use response::BrakingResponse;
