@@ -144,3 +144,18 @@ impl SetArgs {
         Ok(file)
     }
 }
+
+/// A sample of a saved campaign.
+#[derive(Debug, Args)]
+pub(super) struct SavedSampleArgs {
+    /// Folder of the campaign
+    pub(super) dir: PathBuf,
+    /// Number of the sample
+    pub(super) sample: u64,
+    /// Name of the scenario; required if the campaign has several
+    #[arg(long)]
+    pub(super) scenario: Option<String>,
+    /// Controller of the arm to run again [default: the controller under test]
+    #[arg(long, value_name = "NAME")]
+    pub(super) controller: Option<String>,
+}

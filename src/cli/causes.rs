@@ -23,7 +23,7 @@ use closecall_simulation::controller::ControllerChoice;
 use serde_json::json;
 
 use super::CliError;
-use super::args::{Format, ReadArgs, SetArgs};
+use super::args::{Format, ReadArgs, SavedSampleArgs, SetArgs};
 use super::output::{outln, print_written};
 use super::protect::{of_campaign, protect};
 use crate::exit_code::ExitCode;
@@ -64,16 +64,8 @@ pub(super) fn explain(args: &ExplainArgs) -> Result<ExitCode, CliError> {
 /// Arguments of `closecall minimize`.
 #[derive(Debug, Args)]
 pub(super) struct MinimizeArgs {
-    /// Folder of the campaign
-    dir: PathBuf,
-    /// Number of a failing sample
-    sample: u64,
-    /// Name of the scenario; required if the campaign has several
-    #[arg(long)]
-    scenario: Option<String>,
-    /// Controller of the arm [default: the controller under test]
-    #[arg(long, value_name = "NAME")]
-    controller: Option<String>,
+    #[command(flatten)]
+    of: SavedSampleArgs,
     /// Scenario file to write [default: SCENARIO-SAMPLE.toml]. The nearest case that passes is written beside it, with
     /// `-passes` at the end of its name
     #[arg(short, long, value_name = "FILE.toml")]
@@ -84,11 +76,11 @@ pub(super) struct MinimizeArgs {
 }
 
 pub(super) fn minimize(args: &MinimizeArgs) -> Result<ExitCode, CliError> {
-    let saved = SavedCampaign::open(&args.dir)?;
-    let case = Case::of(&saved, args.scenario.as_deref(), args.sample, args.controller.as_deref());
+    let saved = SavedCampaign::open(&args.of.dir)?;
+    let case = Case::of(&saved, args.of.scenario.as_deref(), args.of.sample, args.of.controller.as_deref());
     let case = case.map_err(CausesError::from)?;
     let paths = output_files(&case, args.output.as_deref())?;
-    protect(&of_campaign(&args.dir), &paths.each_ref().map(|path| ("--output", Some(path.as_path()))))?;
+    protect(&of_campaign(&args.of.dir), &paths.each_ref().map(|path| ("--output", Some(path.as_path()))))?;
     let found = minimize_sample(&saved, &case)?;
     let files = write_files(&case, &found, &paths)?;
     match args.format {

@@ -1,7 +1,5 @@
 //! `closecall replay`: runs one sample of a campaign again, and compares the outcome bit for bit unless settings change it.
 
-use std::path::PathBuf;
-
 use clap::Args;
 use closecall_campaign::folder::Folder;
 use closecall_campaign::manifest::{Manifest, version};
@@ -9,7 +7,7 @@ use closecall_campaign::saved::SavedCampaign;
 use closecall_simulation::outcome::Outcome;
 
 use super::CliError;
-use super::args::{Format, SetArgs};
+use super::args::{Format, SavedSampleArgs, SetArgs};
 use super::output::print_error;
 use super::protect::{of_campaign, of_controller, protect};
 use super::run::print;
@@ -19,16 +17,8 @@ use crate::exit_code::ExitCode;
 /// Arguments of `closecall replay`.
 #[derive(Debug, Args)]
 pub(super) struct ReplayArgs {
-    /// Folder of the campaign
-    dir: PathBuf,
-    /// Number of the sample
-    sample: u64,
-    /// Name of the scenario; required if the campaign has several
-    #[arg(long)]
-    scenario: Option<String>,
-    /// Controller of the arm to run again [default: the controller under test]
-    #[arg(long, value_name = "NAME")]
-    controller: Option<String>,
+    #[command(flatten)]
+    of: SavedSampleArgs,
     /// Run every arm of the campaign again; --record saves all of them in one file
     #[arg(long, conflicts_with = "controller")]
     paired: bool,
@@ -42,13 +32,13 @@ pub(super) struct ReplayArgs {
 }
 
 pub(super) fn replay(args: &ReplayArgs) -> Result<ExitCode, CliError> {
-    let saved = SavedCampaign::open(&args.dir)?;
+    let saved = SavedCampaign::open(&args.of.dir)?;
     let controllers = saved.manifest().arms.iter().flat_map(of_controller);
-    protect(&of_campaign(&args.dir).into_iter().chain(controllers).collect::<Vec<_>>(), &args.watch.outputs())?;
-    let (scenario, key) = saved.sample_with(args.scenario.as_deref(), args.sample, &args.set.settings)?;
+    protect(&of_campaign(&args.of.dir).into_iter().chain(controllers).collect::<Vec<_>>(), &args.watch.outputs())?;
+    let (scenario, key) = saved.sample_with(args.of.scenario.as_deref(), args.of.sample, &args.set.settings)?;
     let arms = match args.paired {
         true => saved.manifest().arms(),
-        false => vec![saved.arm(args.controller.as_deref())?],
+        false => vec![saved.arm(args.of.controller.as_deref())?],
     };
     for arm in &arms {
         announce_process(saved.manifest(), arm.controller.name());
