@@ -194,9 +194,9 @@ impl Road {
 
     /// Returns the lane in which the lateral position `d_m` lies; beyond an edge, the lane at that edge.
     pub fn lane_at(&self, d_m: f64) -> Lane {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 1..=8 before the cast")]
-        let lane = ((-d_m / self.lane_width_m).floor() + 1.0).clamp(1.0, f64::from(self.lanes)) as u8;
-        Lane(lane)
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 0..=7 before the cast")]
+        let before = (-d_m / self.lane_width_m).clamp(0.0, f64::from(self.lanes) - 1.0) as u8;
+        Lane(before + 1)
     }
 
     /// Returns the lane next to `lane` on one side, or `None` if the road has none there.

@@ -335,16 +335,16 @@ impl ModeEstimate {
             [x[0] + t * x[1] + half * x[2], speed * x[1] + t * x[2], persistence * x[2], slow_share * x[3]]
         };
         self.state = propagated(self.state.into()).into();
-        for column in 0..4 {
-            let from = &mut self.covariance.data.0[column];
-            *from = propagated(*from);
-        }
+        // On a local array, which the compiler keeps in registers.
+        let mut columns = self.covariance.data.0;
+        columns = columns.map(propagated);
         for row in 0..4 {
-            let to = propagated([0, 1, 2, 3].map(|column| self.covariance[(row, column)]));
-            for (column, value) in to.into_iter().enumerate() {
-                self.covariance[(row, column)] = value;
+            let to = propagated(columns.map(|column| column[row]));
+            for (column, value) in columns.iter_mut().zip(to) {
+                column[row] = value;
             }
         }
+        self.covariance.data.0 = columns;
         let q = mode.white_density_m2ps3;
         let new_share = 1.0 - persistence * persistence;
         self.covariance[(0, 0)] += q * t * t * t / 3.0;

@@ -142,11 +142,10 @@ impl MarginMeter {
 
 /// Replaces `least` by `now` if that is smaller. A value replaces an absence; an absence never replaces anything.
 fn keep_least(least: &mut Measured, now: Measured) {
-    *least = match (*least, now) {
-        (Ok(least), Ok(now)) => Ok(least.min(now)),
-        (Err(_), Ok(now)) => Ok(now),
-        (least, Err(_)) => least,
-    };
+    let Ok(value) = now else { return };
+    if !least.is_ok_and(|least| least <= value) {
+        *least = now;
+    }
 }
 
 #[cfg(test)]

@@ -93,6 +93,10 @@ pub enum RunEvent {
 
 /// Observes a run.
 pub trait Observer {
+    /// Returns whether [`Observer::step`] is to be called. The view of a step takes time to compute.
+    fn wants_steps(&self) -> bool {
+        true
+    }
     /// Called at each control step (25 Hz).
     fn step(&mut self, view: &StepView<'_>);
     /// Called when something happens, with its time.
@@ -105,6 +109,9 @@ pub trait Observer {
 pub struct NoObserver;
 
 impl Observer for NoObserver {
+    fn wants_steps(&self) -> bool {
+        false
+    }
     fn step(&mut self, _: &StepView<'_>) {}
     fn event(&mut self, _: Time, _: &RunEvent) {}
 }

@@ -249,7 +249,7 @@ impl<'a> Run<'a> {
 
     /// Reports the control step to the observer.
     fn report_step(&mut self, observer: &mut dyn Observer) {
-        let Some(command) = &self.command else { return };
+        let Some(command) = self.command.as_ref().filter(|_| observer.wants_steps()) else { return };
         self.fronts.clear();
         for actor in 0..self.world.len() {
             let now = CurrentMargins::new(self.world.state(actor), &self.neighbours[actor], self.widths(actor));

@@ -79,15 +79,13 @@ impl LanesAround {
         Self { own: LaneBand::new(road, own), left: beside(Side::Left), right: beside(Side::Right) }
     }
 
-    /// Returns the neighbours before any is found.
-    pub(super) fn nobody(&self) -> Around {
-        Around {
-            own: LaneAround::default(),
-            left: self.left.map(|_| LaneAround::default()),
-            right: self.right.map(|_| LaneAround::default()),
-            in_path: None,
-            beyond: None,
-        }
+    /// Sets `around` to the neighbours before any is found.
+    pub(super) fn clear(&self, around: &mut Around) {
+        around.own = LaneAround::default();
+        around.left = self.left.map(|_| LaneAround::default());
+        around.right = self.right.map(|_| LaneAround::default());
+        around.in_path = None;
+        around.beyond = None;
     }
 }
 
@@ -142,7 +140,7 @@ fn describe(nearest: Option<Nearest>, world: &World, neighbour: &mut Option<Neig
 }
 
 /// The nearest vehicles around a vehicle: what [`Neighbours`] describes in full.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Around {
     pub(super) own: LaneAround,
     pub(super) left: Option<LaneAround>,
@@ -172,11 +170,11 @@ impl Around {
     }
 }
 
-/// Returns the vehicles around `actor`, which is compared with every other one. [`super::search`] is faster if there are many
-/// vehicles.
-pub(super) fn find(extents: &[Extent], actor: usize, road: &Road, looks: Looks) -> Around {
+/// Sets `around` to the vehicles around `actor`, which is compared with every other one. [`super::search`] is faster if there
+/// are many vehicles.
+pub(super) fn find(extents: &[Extent], actor: usize, road: &Road, looks: Looks, around: &mut Around) {
     let lanes = LanesAround::new(road, extents[actor].d_m, looks);
-    let mut around = lanes.nobody();
+    lanes.clear(around);
     for other in (0..extents.len()).filter(|other| *other != actor) {
         let candidate = Candidate::new(extents, [actor, other]);
         let sides_m = extents[other].sides_m();
@@ -201,7 +199,6 @@ pub(super) fn find(extents: &[Extent], actor: usize, road: &Road, looks: Looks) 
             keep_beyond(&mut around.beyond, extents, [actor, ahead, other]);
         }
     }
-    around
 }
 
 /// Puts a vehicle into `slot` if it is ahead of the vehicle ahead of `actor`, in its path, and nearer than the one there.

@@ -95,6 +95,8 @@ pub(crate) struct Plant {
     distance_m: f64,
     /// Deviation from the intended lateral state.
     deviation: Deviation,
+    /// Direction of motion relative to the lane (rad).
+    course_rad: f64,
 }
 
 impl Plant {
@@ -121,6 +123,7 @@ impl Plant {
             weave,
             distance_m: 0.0,
             deviation: Deviation::default(),
+            course_rad: 0.0,
         }
     }
 
@@ -192,9 +195,8 @@ impl Plant {
     /// Moves the vehicle by `distance_m` along its path.
     fn steer(&mut self, distance_m: f64, road: &Road) {
         // Path and weaving are functions of the distance in the direction of the lane.
-        let slope = self.lateral().slope;
         // The functions below are exact at zero: most vehicles drive straight on.
-        let along_m = if slope == 0.0 { distance_m } else { distance_m * slope.atan().cos() };
+        let along_m = if self.course_rad == 0.0 { distance_m } else { distance_m * self.course_rad.cos() };
         self.distance_m += along_m;
         if let Some(weave) = &mut self.weave {
             self.deviation = weave.at(self.distance_m);
@@ -212,6 +214,7 @@ impl Plant {
         } else {
             (slope.atan(), second_derivative_per_m / (1.0 + slope * slope).powf(1.5))
         };
+        self.course_rad = course_rad;
         // Slip angle at the centre of the box, half a wheelbase ahead of the rear axle.
         let slip_sin = (0.5 * self.wheelbase_m * curvature_per_m).clamp(-0.5, 0.5);
         let slip_rad = if slip_sin == 0.0 { slip_sin } else { slip_sin.asin() };

@@ -56,12 +56,13 @@ impl NeighbourSearch {
         if !few {
             self.sort(road);
         }
+        let mut around = Around::default();
         for ((actor, found), looks) in found.iter_mut().enumerate().zip(looks) {
-            let around = if few {
-                neighbours::find(&self.extents, actor, road, *looks)
+            if few {
+                neighbours::find(&self.extents, actor, road, *looks, &mut around);
             } else {
-                self.around(actor, road, *looks)
-            };
+                self.find(actor, road, *looks, &mut around);
+            }
             around.describe(world, found);
         }
     }
@@ -95,10 +96,10 @@ impl NeighbourSearch {
         }
     }
 
-    /// Returns the vehicles around `actor`.
-    fn around(&self, actor: usize, road: &Road, looks: Looks) -> Around {
+    /// Sets `around` to the vehicles around `actor`.
+    fn find(&self, actor: usize, road: &Road, looks: Looks, around: &mut Around) {
         let lanes = LanesAround::new(road, self.extents[actor].d_m, looks);
-        let mut around = lanes.nobody();
+        lanes.clear(around);
         self.fill(actor, lanes.own, &mut around.own);
         if let (Some(lane), Some(slot)) = (lanes.left, &mut around.left) {
             self.fill(actor, lane, slot);
@@ -114,7 +115,6 @@ impl NeighbourSearch {
         {
             self.fill_beyond(road, [actor, ahead], &mut around.beyond);
         }
-        around
     }
 
     /// Fills `slot` with the nearest vehicle in the path of the vehicle ahead of `actor`.

@@ -7,7 +7,7 @@ use nalgebra::Vector2;
 
 use super::contact::{self, ContactSearch, StepBoxes, StruckVehicle, Touch};
 use super::impact::{BodyId, BodySpec, IMPACT_DURATION_S, Motion, Wreckage};
-use super::neighbours::{self, Extent};
+use super::neighbours::{self, Around, Extent};
 use super::plant::Plant;
 use super::search::NeighbourSearch;
 use crate::outcome::{Collision, Phase};
@@ -180,7 +180,9 @@ impl World {
     pub(crate) fn neighbours(&self, actor: usize) -> Neighbours {
         let extents: Vec<Extent> = (0..self.len()).map(|actor| Extent::of(self, actor)).collect();
         let mut found = Neighbours::default();
-        neighbours::find(&extents, actor, &self.road, Looks::AROUND).describe(self, &mut found);
+        let mut around = Around::default();
+        neighbours::find(&extents, actor, &self.road, Looks::AROUND, &mut around);
+        around.describe(self, &mut found);
         found
     }
 
