@@ -8,6 +8,7 @@ use closecall_sensors::SensorMode;
 use closecall_simulation::Arm;
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::scenario::{Scenario, Setting};
+use object::{Object, ReadCache};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -20,20 +21,37 @@ use super::validity::CheckPlan;
 /// The version of the layout of a campaign's folder.
 pub const MANIFEST_VERSION: u32 = 2;
 
-/// Length of the executable's hash in a version (hexadecimal digits).
-const HASH_DIGITS: usize = 16;
+/// Length of the build's identifier in a version (hexadecimal digits).
+const BUILD_DIGITS: usize = 16;
 
 /// Number of parts of the executable that are hashed at the same time.
 const HASH_PARTS: u64 = 8;
 
-/// Returns the version of this program: the release and a hash of the executable, since two builds of one release may
-/// differ. The hash is that of the hashes of the parts, so that a campaign starts sooner.
+/// Returns the version of this program: the release and an identifier of the build, since two builds of one release may
+/// differ.
+///
+/// The identifier is the one that the linker computes from the content of the executable (`readelf -n`: the build ID). An
+/// executable without one is hashed, which takes longer than a short campaign.
 pub fn version() -> String {
     let release = env!("CARGO_PKG_VERSION");
-    match std::env::current_exe().and_then(|path| parts_hash(&path)) {
-        Ok(hash) => format!("{release}+{}", &hash.to_hex()[..HASH_DIGITS]),
+    let build = std::env::current_exe().and_then(|path| match build_id(&path) {
+        Some(id) => Ok(id.iter().map(|byte| format!("{byte:02x}")).collect()),
+        None => parts_hash(&path).map(|hash| hash.to_hex().to_string()),
+    });
+    match build {
+        Ok(build) => format!("{release}+{}", build.chars().take(BUILD_DIGITS).collect::<String>()),
         Err(_) => release.to_owned(),
     }
+}
+
+/// Returns the identifier that the linker wrote into an executable, or `None` if there is none of at least
+/// [`BUILD_DIGITS`] digits.
+fn build_id(path: &Path) -> Option<Vec<u8>> {
+    let file = ReadCache::new(File::open(path).ok()?);
+    let executable = object::File::parse(&file).ok()?;
+    let of_mach = || executable.mach_uuid().ok().flatten().map(|id| id.to_vec());
+    let id = executable.build_id().ok().flatten().map(<[u8]>::to_vec).or_else(of_mach)?;
+    (2 * id.len() >= BUILD_DIGITS).then_some(id)
 }
 
 /// Returns the BLAKE3 hash of a file, without loading the file into memory.
@@ -156,7 +174,7 @@ impl Manifest {
     }
 
     /// Returns the manifest as JSON without what does not affect the outcomes: the command line, the paths of the
-    /// scenario files, the partition, and the hash of the executable. It is the same for a campaign that ran in one go,
+    /// scenario files, the partition, and the build of the program. It is the same for a campaign that ran in one go,
     /// in parts or with interruptions. Returns `None` if it cannot be written as JSON.
     pub fn determining_json(&self) -> Option<String> {
         let mut whole = self.whole();
@@ -282,6 +300,20 @@ mod tests {
             without_effect: Vec::new(),
             command: vec!["closecall".to_owned()],
         }
+    }
+
+    #[test]
+    fn the_version_names_the_build() {
+        let id = build_id(&std::env::current_exe().unwrap());
+        #[cfg(target_os = "linux")]
+        assert!(id.is_some(), "the linker writes a build ID");
+        let digits = id.unwrap_or_default().iter().map(|byte| format!("{byte:02x}")).collect::<String>();
+        let version = version();
+        let (release, build) = version.split_once('+').unwrap();
+        assert_eq!((release, build.len()), (env!("CARGO_PKG_VERSION"), BUILD_DIGITS));
+        assert!(digits.is_empty() || digits.starts_with(build), "{digits} {build}");
+        // A file that is not an executable has no identifier.
+        assert_eq!(build_id(Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml").as_path()), None);
     }
 
     #[test]

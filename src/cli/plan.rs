@@ -67,11 +67,11 @@ pub(super) struct PlanArgs {
         conflicts_with_all = ["partition", "resume", "max_collisions", "max_induced"]
     )]
     time_budget: Option<Duration>,
-    /// Share of the samples in which the validity of the simulator is checked, above 0 and up to 1. The first four
+    /// Share of the samples in which the validity of the simulator is checked, above 0 and up to 1. The first two
     /// samples of each scenario are always checked
     #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = CheckPlan::SHARE)]
     check_share: f64,
-    /// Largest number of samples of each scenario that are checked, besides the first four
+    /// Largest number of samples of each scenario that are checked, besides the first two
     #[arg(long, value_name = "N", default_value_t = CheckPlan::AT_MOST)]
     check_at_most: u64,
     /// Check the validity of the simulator in no sample, for measurements of speed. Every report says so
