@@ -17,8 +17,6 @@ pub(crate) const GROUND_M: f32 = 0.10;
 /// Increase of that height per metre of distance (rad). It covers three standard deviations of the levelling error, and
 /// the footprint, whose near edge returns more light than its far edge.
 pub(crate) const GROUND_SLOPE: f32 = 0.005;
-/// Half the width of the region of interest about the ego's path (m): two lanes to each side.
-const HALF_WIDTH_M: f32 = 9.5;
 /// Distance behind the sensor beyond which points are not used (m).
 const REACH_M: f32 = 200.0;
 /// Intensity below which a near return is taken for a droplet. A tyre at 60° still has 0.025. The method is
@@ -51,7 +49,8 @@ pub(crate) fn select_candidates(
 ) -> Result<(), SensorError> {
     candidates.clear();
     #[expect(clippy::cast_possible_truncation, reason = "points are in single precision")]
-    let (slope, bend) = (-lane.heading_rad as f32, 0.5 * lane.curvature_per_m as f32);
+    let (slope, bend, [left_end_m, right_end_m]) =
+        (-lane.heading_rad as f32, 0.5 * lane.curvature_per_m as f32, lane.region_m.map(|end_m| end_m as f32));
     let points = scan.x_m.iter().zip(&scan.y_m).zip(&scan.z_m).zip(&scan.intensity);
     for ((((&x, &y), &z), &intensity), index) in points.zip(0..) {
         if !(x + y + z + intensity).is_finite() {
@@ -59,7 +58,7 @@ pub(crate) fn select_candidates(
         }
         let back_m = scan.sensor_x_m - x;
         let left_m = y - (slope + bend * x) * x;
-        let inside = back_m > 0.0 && back_m < REACH_M && left_m.abs() < HALF_WIDTH_M;
+        let inside = back_m > 0.0 && back_m < REACH_M && left_m < left_end_m && left_m > right_end_m;
         let range_m = (back_m * back_m + y * y).sqrt();
         let ground = range_m < GROUND_REACH_M && z < GROUND_M + GROUND_SLOPE * range_m;
         let droplet = range_m < DROPLET_REACH_M && intensity < DROPLET_INTENSITY;
@@ -74,9 +73,14 @@ pub(crate) fn select_candidates(
 mod tests {
     use super::*;
 
-    const LANE: LaneGeometry = LaneGeometry { heading_rad: 0.0, curvature_per_m: 0.0, edges_m: [5.6, -5.6] };
+    const LANE: LaneGeometry =
+        LaneGeometry { heading_rad: 0.0, curvature_per_m: 0.0, edges_m: [5.6, -5.6], region_m: [9.5, -9.5] };
 
     fn kept(points: &[[f32; 4]]) -> Result<Vec<u32>, SensorError> {
+        kept_on(&LANE, points)
+    }
+
+    fn kept_on(lane: &LaneGeometry, points: &[[f32; 4]]) -> Result<Vec<u32>, SensorError> {
         let mut scan = LidarScan { sensor_x_m: -2.3, ..LidarScan::default() };
         for &[x, y, z, intensity] in points {
             scan.x_m.push(x);
@@ -85,7 +89,7 @@ mod tests {
             scan.intensity.push(intensity);
         }
         let mut kept = Vec::new();
-        select_candidates(&scan, &LANE, Time::ZERO, &mut kept)?;
+        select_candidates(&scan, lane, Time::ZERO, &mut kept)?;
         Ok(kept.into_iter().map(|candidate| candidate.index).collect())
     }
 
@@ -99,6 +103,14 @@ mod tests {
             [-90.0, 0.0, 0.05, 0.01],
         ];
         assert_eq!(kept(&points), Ok(vec![1, 4]));
+    }
+
+    #[test]
+    fn points_beyond_the_region_of_interest_are_removed() {
+        let points = [[-30.0, 5.7, 0.6, 0.1], [-30.0, 6.3, 0.6, 0.1], [-30.0, -8.0, 0.6, 0.1], [-30.0, -8.5, 0.6, 0.1]];
+        assert_eq!(kept(&points), Ok(vec![0, 1, 2, 3]));
+        let lane = LaneGeometry { region_m: [5.85, -8.1], ..LANE };
+        assert_eq!(kept_on(&lane, &points), Ok(vec![0, 2]));
     }
 
     #[test]

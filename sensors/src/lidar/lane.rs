@@ -1,6 +1,13 @@
 //! The course of the road behind the ego, as the ego knows it from a camera and a map.
 
 use crate::Scene;
+use crate::guard_rail::{LEFT_OFFSET_M, RIGHT_OFFSET_M};
+
+/// Half the width of the region of interest about the ego's path (m): two lanes to each side.
+const HALF_WIDTH_M: f64 = 9.5;
+/// Distance from a guard rail within which a point counts as one of the rail (m). It covers the errors of a point and of a map
+/// to the rail's face; on the left, the region then still reaches 0.25 m beyond the edge of the road.
+const RAIL_MARGIN_M: f64 = 0.5;
 
 /// The geometry of the road behind the ego, in the ego's vehicle frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -11,6 +18,9 @@ pub struct LaneGeometry {
     pub curvature_per_m: f64,
     /// Lateral positions of the road's left and right edge relative to the ego, positive to the left (m).
     pub edges_m: [f64; 2],
+    /// Lateral limits of the region of interest about the ego's path, left and right, positive to the left (m): two lanes to
+    /// each side, and not as far as the guard rails.
+    pub region_m: [f64; 2],
 }
 
 impl LaneGeometry {
@@ -18,11 +28,19 @@ impl LaneGeometry {
     pub fn from_scene(scene: &Scene<'_>) -> Self {
         let state = &scene.ego.state;
         let curvature = scene.road.curvature_per_m();
+        let edges_m = [-state.d_m, scene.road.right_edge_m() - state.d_m];
         Self {
             heading_rad: state.heading_rad,
             // The road's curvature refers to its reference line, d = 0. The ego's path is offset from that line.
             curvature_per_m: curvature / (1.0 - curvature * state.d_m),
-            edges_m: [-state.d_m, scene.road.right_edge_m() - state.d_m],
+            edges_m,
+            region_m: match scene.road.has_guard_rails() {
+                true => [
+                    (edges_m[0] + LEFT_OFFSET_M - RAIL_MARGIN_M).min(HALF_WIDTH_M),
+                    (edges_m[1] - RIGHT_OFFSET_M + RAIL_MARGIN_M).max(-HALF_WIDTH_M),
+                ],
+                false => [HALF_WIDTH_M, -HALF_WIDTH_M],
+            },
         }
     }
 

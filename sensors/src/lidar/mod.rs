@@ -23,6 +23,7 @@ mod material;
 mod noise;
 mod pattern;
 mod power;
+mod rail_returns;
 mod rear;
 mod receiver;
 mod roadside;

@@ -13,6 +13,7 @@ use super::material::asphalt;
 use super::noise::Noise;
 use super::pattern::{Pattern, SWEEP_NS};
 use super::power::LinkBudget;
+use super::rail_returns::RailReturns;
 use super::receiver::{Receiver, SensorPoseEstimate};
 use super::roadside::{PlacedSolid, append_guard_rails};
 use super::shapes::append_solids;
@@ -20,7 +21,7 @@ use super::soft::{self, Plume};
 use super::solid::Solid;
 use super::targets::{Beams, Surface, Targets};
 use super::viewpoint::{Viewpoint, plane_from_body};
-use super::{Lidar, LidarScan, Material, MirrorSide, PointSource, ScanTruth};
+use super::{LaneGeometry, Lidar, LidarScan, Material, MirrorSide, PointSource, ScanTruth};
 use crate::{Scene, SceneVehicle};
 
 /// Duration of a sweep (s).
@@ -36,6 +37,7 @@ struct Sweep {
     pose: SensorPoseEstimate,
     link: LinkBudget,
     noise: Noise,
+    rails: Option<RailReturns>,
 }
 
 /// The extent of a sweep.
@@ -45,8 +47,8 @@ enum Extent {
     Complete,
     /// All returns, up to the first column that has one.
     UntilFirst,
-    /// All returns but those of the bare road that the detector would discard.
-    WithoutBareRoad,
+    /// All returns but those of the bare road and of guard rails that the detector would discard.
+    WithoutBackground,
 }
 
 /// The scanner of the rear LiDAR. It keeps no state from scan to scan except the latest sweep and allocated memory.
@@ -85,7 +87,7 @@ impl Scanner {
         }
     }
 
-    /// Returns the latest scan, without the points of the bare road that the detector would discard.
+    /// Returns the latest scan, without the points of the bare road and of guard rails that the detector would discard.
     pub fn latest(&self) -> &LidarScan {
         &self.scan
     }
@@ -100,7 +102,7 @@ impl Scanner {
         if time.ns().div_euclid(CONTROL_STEP.ns()) % 2 == 0 { MirrorSide::Plus } else { MirrorSide::Minus }
     }
 
-    /// Adds the points of the bare road that the latest scan leaves out.
+    /// Adds the points that the latest scan leaves out.
     pub fn complete(&mut self) {
         self.repeat(Extent::Complete);
     }
@@ -118,7 +120,7 @@ impl Scanner {
 
     /// Scans the scene. The scan ends at the scene's time. Draws exactly one number from `rng`.
     ///
-    /// Points of the bare road that the detector would discard are left out; see [`Scanner::complete`].
+    /// Points that the detector would discard are left out; see [`Scanner::complete`].
     pub fn scan(&mut self, scene: &Scene<'_>, rng: &mut Stream) -> &LidarScan {
         let drawn = Noise::draw(rng);
         let noise = if self.lidar.is_exact { drawn.silenced() } else { drawn };
@@ -128,9 +130,10 @@ impl Scanner {
         let pose = SensorPoseEstimate::new(scene, &self.lidar, noise);
         self.begin(scene.time, mirror_side, &pose);
         let link = LinkBudget::new(&self.lidar, scene.environment);
-        let sweep = Sweep { mirror_side, viewpoint, pose, link, noise };
+        let rails = RailReturns::new(&LaneGeometry::from_scene(scene));
+        let sweep = Sweep { mirror_side, viewpoint, pose, link, noise, rails };
         self.latest = Some(sweep);
-        self.sweep(&sweep, Extent::WithoutBareRoad);
+        self.sweep(&sweep, Extent::WithoutBackground);
         &self.scan
     }
 
@@ -147,20 +150,25 @@ impl Scanner {
         #[expect(clippy::cast_possible_truncation, reason = "a bound of a metre, with a margin")]
         let max_shift_m = of.viewpoint.max_shift_m(SWEEP_S) as f32;
         let bare_road = BareRoad::new(&self.targets, &of.link, of.pose, max_shift_m);
-        let omitted = bare_road.as_ref().filter(|_| extent == Extent::WithoutBareRoad);
+        let omitted = bare_road.as_ref().filter(|_| extent == Extent::WithoutBackground);
         let road = Road::new(&self.targets, &of.link);
         let in_air = !self.plumes.is_empty() || of.link.has_fog();
         self.active.start(&self.targets);
         for index in 0..self.pattern.columns.len() {
             let parts = self.active.advance_to(index, &self.targets);
+            let column = &self.pattern.columns[index];
+            let elevations = self.pattern.elevations(of.mirror_side, index);
+            let before_end_s = SWEEP_S - f64::from(column.offset_ns) * 1e-9;
+            let has_rails_alone = || {
+                let pose = of.pose.deskewed(of.viewpoint.deskew(before_end_s));
+                of.rails.is_some_and(|rails| rails.are_discarded((column, elevations), &pose, parts, &self.targets))
+            };
             if !in_air
-                && parts.is_empty()
                 && omitted.is_some_and(|bare| bare.covers(self.pattern.centre_lines(of.mirror_side, index), &road))
+                && (parts.is_empty() || has_rails_alone())
             {
                 continue;
             }
-            let column = &self.pattern.columns[index];
-            let elevations = self.pattern.elevations(of.mirror_side, index);
             self.hits.clear();
             for &part in parts {
                 self.hits.cast(column, elevations, &self.targets.parts[part], &self.targets);
@@ -169,7 +177,6 @@ impl Scanner {
             if !in_air && self.hits.is_bare() {
                 continue;
             }
-            let before_end_s = SWEEP_S - f64::from(column.offset_ns) * 1e-9;
             let receiver = Receiver {
                 column_index: index,
                 column,

@@ -52,7 +52,7 @@ proptest! {
             (0..found.len()).map(|at| points(lidar, |point| lidar.point_indices_of(at).contains(&(point as u32)))).collect()
         };
         prop_assert_eq!(members(&lidar), members(&complete));
-        let solid = |lidar: &RearLidar| points(lidar, |at| lidar.truth().points[at].source != PointSource::Ground);
+        let solid = |lidar: &RearLidar| points(lidar, |at| matches!(lidar.truth().points[at].source, PointSource::Actor(_)));
         prop_assert_eq!(solid(&lidar), solid(&complete));
         prop_assert!(complete.latest().len() >= lidar.latest().len());
     }
@@ -65,6 +65,20 @@ fn nearly_all_points_of_an_empty_road_are_left_out() {
     let complete = lidar.completed().unwrap().latest().len();
     assert!(complete > 3_000, "{complete}");
     assert!(lidar.latest().len() < complete / 20, "{} of {complete}", lidar.latest().len());
+}
+
+#[test]
+fn nearly_all_points_of_guard_rails_are_left_out() {
+    let mut lidar = RearLidar::new(Lidar::default());
+    let mut setup = TestScene::new();
+    setup.road = road_with_guard_rails(0.0);
+    setup.detect(&mut lidar, 0);
+    let complete = lidar.completed().unwrap();
+    let rails =
+        |lidar: &RearLidar| lidar.truth().points.iter().filter(|point| point.source == PointSource::GuardRail).count();
+    assert!(rails(&complete) > 300, "{}", rails(&complete));
+    assert!(rails(&lidar) < rails(&complete) / 10, "{} of {}", rails(&lidar), rails(&complete));
+    assert_eq!(lidar.detections(), []);
 }
 
 #[test]

@@ -1,0 +1,109 @@
+//! The returns of guard rails that a scan can leave out, since the detector would discard them.
+//!
+//! On a straight road, each column meets the face of a rail at one distance in the plane. A point lies on the centre line of its
+//! beam, not nearer than that distance but for the error of its range. Along that line, the lateral distance from the road
+//! grows. If the nearest possible point is beyond the region of interest, all points of the column are:
+//!
+//! ```text
+//!   sensor o--.__                      region of interest
+//!   . . . . . . .'--.__. . . . . . . . . . . . . . . . .
+//!                      '*-.__          * nearest possible point
+//!   =========================*====     rail
+//! ```
+//!
+//! A pulse that meets the rail and the road in front of it gives a point between them. The beam must then be wider than the
+//! rail's lower edge is high, which it is not below [`NARROW_TO_M`].
+
+use super::echo::PULSE_M;
+use super::noise::MAX_NORMAL;
+use super::pattern::{Column, Elevation};
+use super::power::range_sd_m;
+use super::receiver::SensorPoseEstimate;
+use super::targets::{Part, Targets};
+use super::{LaneGeometry, PointSource};
+
+/// Distance up to which a beam is lower than the 0.44 m below a rail (m): its height is 0.6°, and 0.8° with a margin.
+const NARROW_TO_M: f32 = 30.0;
+/// Margin for rounding, and for the tilt of the sensor's frame (m).
+const MARGIN_M: f32 = 0.03;
+/// Distance by which a point is moved along its beam to learn whether the beam leads away from the road (m).
+const STEP_M: f32 = 10.0;
+
+/// The limits beyond which the points of a guard rail are discarded.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RailReturns {
+    /// Slope of the road in the ego's frame.
+    slope: f32,
+    /// Lateral limits of the region of interest, left and right (m).
+    region_m: [f32; 2],
+    /// Greatest error of a measured range (m).
+    max_error_m: f32,
+}
+
+impl RailReturns {
+    /// Returns the limits, or `None` on a curved road, on which the distance of the rails varies within a column.
+    #[expect(clippy::cast_possible_truncation, reason = "points are in single precision")]
+    pub(crate) fn new(lane: &LaneGeometry) -> Option<Self> {
+        (lane.curvature_per_m == 0.0).then(|| Self {
+            slope: -lane.heading_rad as f32,
+            region_m: lane.region_m.map(|end_m| end_m as f32),
+            max_error_m: MAX_NORMAL * range_sd_m(1.0),
+        })
+    }
+
+    /// Returns true if all parts belong to guard rails, and the detector would discard every point that the column may give of
+    /// them. `pose` is the ego's estimate at the time of the column.
+    pub(crate) fn are_discarded(
+        &self,
+        (column, elevations): (&Column, &[Elevation]),
+        pose: &SensorPoseEstimate,
+        parts: &[usize],
+        targets: &Targets,
+    ) -> bool {
+        let (Some(lowest), Some(highest)) = (elevations.first(), elevations.last()) else { return false };
+        let tans = [lowest.tan[0], highest.tan[highest.tan.len() - 1]];
+        let mut inverse = 0.0_f32;
+        for &part in parts {
+            let part = &targets.parts[part];
+            if !is_guard_rail(part, targets) {
+                return false;
+            }
+            inverse = inverse.max(greatest_inverse(column, tans, part, targets));
+        }
+        let plane_m = 1.0 / inverse;
+        let pulse_m = if plane_m > NARROW_TO_M { PULSE_M } else { 0.0 };
+        let nearest_m = (plane_m - self.max_error_m - pulse_m) * lowest.centre[1].min(highest.centre[1]);
+        // The comparisons are false for NaN.
+        inverse == 0.0 || column.centre.iter().all(|&azimuth| self.is_beyond(nearest_m, azimuth, pose))
+    }
+
+    /// Returns true if all points at least `nearest_m` from the sensor, in this direction, are beyond the region of interest.
+    fn is_beyond(&self, nearest_m: f32, [cos, sin]: [f32; 2], pose: &SensorPoseEstimate) -> bool {
+        let left_m = |level_m: f32| {
+            let [x_m, y_m, _] = pose.ego_frame_point_m([level_m * cos, level_m * sin, 0.0]);
+            y_m - self.slope * x_m
+        };
+        let (near_m, far_m) = (left_m(nearest_m), left_m(nearest_m + STEP_M));
+        let [left_end_m, right_end_m] = self.region_m;
+        nearest_m > 0.0
+            && ((near_m > left_end_m + MARGIN_M && far_m > near_m)
+                || (near_m < right_end_m - MARGIN_M && far_m < near_m))
+    }
+}
+
+fn is_guard_rail(part: &Part, targets: &Targets) -> bool {
+    targets.faces[part.faces.first as usize].source == PointSource::GuardRail
+}
+
+/// Returns a bound on the inverse distance in the plane at which a sub-ray of a column meets a solid (1/m), or 0 if none does.
+///
+/// A ray meets a convex solid at the least inverse distance of its front-facing faces, which is not above that of any of them.
+fn greatest_inverse(column: &Column, tans: [f32; 2], part: &Part, targets: &Targets) -> f32 {
+    let azimuths = || column.cos.as_flattened().iter().zip(column.sin.as_flattened());
+    let of_face = |[x, y, z]: [f32; 3]| {
+        let upward = (z * tans[0]).max(z * tans[1]);
+        azimuths().map(|(cos, sin)| x * cos + y * sin + upward).fold(f32::NEG_INFINITY, f32::max)
+    };
+    let faces = &targets.faces[part.faces.front_facing()];
+    faces.iter().map(|face| of_face(face.inverse)).fold(f32::INFINITY, f32::min).max(0.0)
+}
