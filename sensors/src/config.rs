@@ -1,5 +1,6 @@
 //! The `[sensors]` table of a scenario file: the perception mode and the parameters of each sensor model.
 
+use closecall_tracking::MAX_LATENCY_STEPS as MAX_TRACKER_LATENCY_STEPS;
 use closecall_traffic::{Check, Choice, ConfigError, Parameters};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -131,7 +132,8 @@ impl Sensors {
             front_radar: front_radar.altered(&altered, false),
             surround: surround.altered(&altered, false),
             rear_lidar: if altered.has_true_points { rear_lidar.exact() } else { rear_lidar },
-            tracker: tracker.altered(&altered),
+            tracker: tracker
+                .with_latency_steps(altered.latency_steps(tracker.latency_steps(), MAX_TRACKER_LATENCY_STEPS)),
         };
         Self { full, rear_object: self.rear_object.altered(&altered, true), altered, ..self }
     }

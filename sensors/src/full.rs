@@ -18,8 +18,8 @@ use crate::lidar::{HALF_FIELD_TAN, Lidar, RearLidar};
 use crate::object::{DEGRADED_SHARE, NoiseKey, ObjectSensor, ObjectSensorModel, ScanInput, range_in_weather_m};
 use crate::perception::FieldOfView;
 use crate::surroundings::{OtherVehicle, transform_scene};
-use crate::tracking::{RearView, TrackList, Tracker, TrackerModel, TrackerScan};
 use crate::{Alterations, Detection, Health, Perception, Scene, SensorError, SensorHealth};
+use closecall_tracking::{RearView, TrackList, Tracker, TrackerModel, TrackerScan};
 
 /// Number of successive scans without a single point, not even from the road, after which the LiDAR counts as blocked:
 /// 1 s.

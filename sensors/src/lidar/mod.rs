@@ -42,7 +42,6 @@ pub use config::{Lidar, LidarConfig, LidarModel};
 pub use detector::Detector;
 #[cfg(test)]
 pub(crate) use detector::FACE_SD_M;
-pub(crate) use detector::SIDE_PROTRUSION_M;
 pub use lane::LaneGeometry;
 pub use material::Material;
 pub use pattern::{BEAMS, COLUMNS, LAYERS, Pattern};

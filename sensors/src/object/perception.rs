@@ -4,8 +4,8 @@ use super::sensor::{ObjectSensor, ScanInput};
 use super::{NoiseKey, ObjectSensorModel};
 use crate::perception::FieldOfView;
 use crate::surroundings::{OtherVehicle, transform_scene};
-use crate::tracking::TrackList;
 use crate::{Perception, Scene, SensorError, SensorHealth};
+use closecall_tracking::TrackList;
 use closecall_traffic::Track;
 
 /// Perception by object-level sensors only.

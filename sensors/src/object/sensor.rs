@@ -15,17 +15,19 @@ use super::noise::{MeasurementErrors, NoiseKey, TargetNoise};
 use super::visibility::{Direction, Field, Visibility};
 use super::weather::range_in_weather_m;
 use crate::alterations::BACKGROUND;
-use crate::gaussian::Gaussian;
 use crate::perception::FieldOfView;
 use crate::surroundings::OtherVehicle;
-use crate::tracking::TrackList;
-use crate::tracking::axis::{AxisEstimate, AxisFilter, AxisMeasurement};
-use crate::tracking::lifecycle::Lifecycle;
-use crate::tracking::motion::{
+use crate::{Health, Scene};
+use closecall_tracking::Gaussian;
+use closecall_tracking::TrackList;
+use closecall_tracking::axis::{AxisEstimate, AxisFilter, AxisMeasurement};
+use closecall_tracking::lifecycle::Lifecycle;
+use closecall_tracking::motion::{
     ACROSS_MODES, ACROSS_WHITE_MODE, ALONG_MODES, ALONG_WHITE_MODE, EgoRear, Mode, RearVehicle, Situation,
 };
-use crate::tracking::road_filter::{LATERAL_SPEED_PRIOR_SD_MPS, POSITION_PRIOR_SD_M, SPEED_PRIOR_SD_MPS, in_ego_frame};
-use crate::{Health, Scene};
+use closecall_tracking::road_filter::{
+    LATERAL_SPEED_PRIOR_SD_MPS, POSITION_PRIOR_SD_M, SPEED_PRIOR_SD_MPS, in_ego_frame,
+};
 use closecall_traffic::ego_frame::EgoFrame;
 
 /// Standard deviation of a track's speed above which the track is not confirmed (m/s): no function could act on it yet.

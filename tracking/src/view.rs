@@ -16,7 +16,7 @@ pub struct RearView {
 
 /// A vehicle's face as the sensor sees it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Face {
+pub(crate) struct Face {
     distance_m: f64,
     /// Slope (lateral position over distance) of the right edge.
     low_slope: f64,
@@ -33,7 +33,7 @@ const MIN_DISTANCE_M: f64 = 0.1;
 impl RearView {
     /// Returns the face of width `width_m` whose middle is at (`x_m`, `y_m`) in the ego's frame. Returns `None` if it
     /// is out of view.
-    pub(super) fn face(&self, x_m: f64, y_m: f64, width_m: f64) -> Option<Face> {
+    pub(crate) fn face(&self, x_m: f64, y_m: f64, width_m: f64) -> Option<Face> {
         let distance_m = self.sensor_x_m - x_m;
         let in_range = distance_m >= MIN_DISTANCE_M && distance_m <= self.range_m;
         let in_view = y_m.abs() <= self.half_angle_tan * distance_m;
@@ -44,7 +44,7 @@ impl RearView {
 
 impl Face {
     /// Returns whether one of the nearer faces in `others` covers most of this face.
-    pub(super) fn is_hidden(&self, others: &[Option<Face>]) -> bool {
+    pub(crate) fn is_hidden(&self, others: &[Option<Face>]) -> bool {
         others.iter().flatten().any(|other| {
             let overlap = self.high_slope.min(other.high_slope) - self.low_slope.max(other.low_slope);
             other.distance_m < self.distance_m && overlap > HIDDEN_SHARE * (self.high_slope - self.low_slope)

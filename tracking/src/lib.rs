@@ -1,5 +1,7 @@
 //! Multi-object tracking of the rear LiDAR's detections: association, filter, extent, class and lifecycle.
 //!
+//! The crate knows no truth: it sees detections, the ego's odometry and the map.
+//!
 //! ```text
 //!  detections of one scan ─▶ road axes ─▶ gate, assign ─▶ filter, extent, class ─▶ confirm / coast / delete
 //!                                ▲                                                        │
@@ -12,23 +14,23 @@
 //! looks like a manoeuvre of another vehicle.
 
 mod association;
-mod audit;
-pub(crate) mod axis;
+pub mod axis;
 mod classes;
 mod config;
+mod detection;
 mod extent;
-pub(crate) mod lifecycle;
+mod gaussian;
+pub mod lifecycle;
 mod measurement;
-pub(crate) mod motion;
-pub(crate) mod road_filter;
-#[cfg(test)]
-mod tests;
+pub mod motion;
+pub mod road_filter;
 mod track_list;
 mod tracker;
 mod view;
 
-pub use audit::{NEES_QUANTILE_95, TrackAudit};
-pub use config::{TrackerConfig, TrackerModel};
+pub use config::{MAX_LATENCY_STEPS, TrackerConfig, TrackerModel};
+pub use detection::{Detection, Extent, SIDE_PROTRUSION_M};
+pub use gaussian::Gaussian;
 pub use track_list::TrackList;
 pub use tracker::{Tracker, TrackerScan};
 pub use view::RearView;

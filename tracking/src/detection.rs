@@ -6,6 +6,9 @@
 
 use closecall_traffic::{ClassScores, Time};
 
+/// Distance by which mirrors and wheels may protrude from a vehicle's side (m).
+pub const SIDE_PROTRUSION_M: f64 = 0.25;
+
 /// Origin of one extent (length or width) of a fitted box.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Extent {

@@ -24,7 +24,7 @@
 //! on the library's scenarios with separate seeds. The example `validate_perception` judges them on other seeds.
 
 /// Maximum number of modes of an axis.
-pub(crate) const MODES: usize = 3;
+pub const MODES: usize = 3;
 
 /// TTC to the ego below which a vehicle starts to react (s).
 const ANTICIPATION_S: f64 = 14.0;
@@ -33,39 +33,41 @@ const MIN_TTC_S: f64 = 0.5;
 
 /// The ego's rear bumper in road axes.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct EgoRear {
-    pub(crate) s_m: f64,
-    pub(crate) d_m: f64,
+pub struct EgoRear {
+    /// Position along the road (m).
+    pub s_m: f64,
+    /// Lateral position of the ego's centre line (m); positive to the left.
+    pub d_m: f64,
     /// Speed along the road (m/s).
-    pub(crate) speed_mps: f64,
+    pub speed_mps: f64,
     /// Half of the lane width (m). A vehicle drives in the ego's lane if its lateral offset from the ego is smaller.
-    pub(crate) half_lane_m: f64,
+    pub half_lane_m: f64,
 }
 
 /// A vehicle behind the ego in road axes, at the same time as [`EgoRear`].
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct RearVehicle {
+pub struct RearVehicle {
     /// Position of the front (m).
-    pub(crate) front_s_m: f64,
+    pub front_s_m: f64,
     /// Lateral position of the centre line (m).
-    pub(crate) d_m: f64,
+    pub d_m: f64,
     /// Speed along the road (m/s).
-    pub(crate) speed_mps: f64,
+    pub speed_mps: f64,
 }
 
 /// The traffic situation of a vehicle, which determines its rates of switching between modes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Situation {
+pub struct Situation {
     /// 1/TTC to the ego minus its value at the time of the first reaction (1/s); 0 without a reason to react.
     urgency_per_s: f64,
 }
 
 impl Situation {
     /// A situation without a reason to react.
-    pub(crate) const FREE: Self = Self { urgency_per_s: 0.0 };
+    pub const FREE: Self = Self { urgency_per_s: 0.0 };
 
     /// Returns the situation of a vehicle relative to the ego.
-    pub(crate) fn of(other: &RearVehicle, ego: &EgoRear) -> Self {
+    pub fn of(other: &RearVehicle, ego: &EgoRear) -> Self {
         let (gap_m, closing_mps) = (ego.s_m - other.front_s_m, other.speed_mps - ego.speed_mps);
         let is_behind = gap_m > 0.0 && (other.d_m - ego.d_m).abs() < ego.half_lane_m;
         if is_behind && closing_mps * ANTICIPATION_S > gap_m {
@@ -79,21 +81,21 @@ impl Situation {
 
 /// One mode of motion along one axis.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Mode {
+pub struct Mode {
     /// Spectral density of the white acceleration (m²/s³).
-    pub(crate) white_density_m2ps3: f64,
+    pub white_density_m2ps3: f64,
     /// Standard deviation of the correlated acceleration (m/s²).
-    pub(crate) acceleration_sd_mps2: f64,
+    pub acceleration_sd_mps2: f64,
     /// Correlation time of this acceleration (s); 0 if there is none.
-    pub(crate) persistence_s: f64,
+    pub persistence_s: f64,
     /// Time constant with which a speed decays (s); infinite if it does not decay.
-    pub(crate) speed_decay_s: f64,
+    pub speed_decay_s: f64,
     /// Rates of switching to each mode in a free situation (1/s); the mode's own entry is not used.
-    pub(crate) switch_rates_per_s: [f64; MODES],
+    pub switch_rates_per_s: [f64; MODES],
     /// Increase of each rate per unit of the [`Situation`]'s urgency.
-    pub(crate) urgency_gains: [f64; MODES],
+    pub urgency_gains: [f64; MODES],
     /// Prior probability of the mode.
-    pub(crate) prior_probability: f64,
+    pub prior_probability: f64,
 }
 
 /// Spectral density of the white acceleration along the direction of travel (m²/s³), for a single mode.
@@ -122,19 +124,19 @@ const fn white_mode(white_density_m2ps3: f64) -> [Mode; 1] {
 }
 
 /// The single mode along the road, for sensors that measure speed or see only nearby vehicles.
-pub(crate) const ALONG_WHITE_MODE: &[Mode] = &white_mode(ALONG_WHITE_M2PS3);
+pub const ALONG_WHITE_MODE: &[Mode] = &white_mode(ALONG_WHITE_M2PS3);
 /// The single mode across the road, for the same sensors.
-pub(crate) const ACROSS_WHITE_MODE: &[Mode] = &white_mode(ACROSS_WHITE_M2PS3);
+pub const ACROSS_WHITE_MODE: &[Mode] = &white_mode(ACROSS_WHITE_M2PS3);
 
 impl Mode {
     /// Returns the rates of switching to each mode in a situation (1/s).
-    pub(crate) fn rates_per_s(&self, situation: Situation) -> [f64; MODES] {
+    pub fn rates_per_s(&self, situation: Situation) -> [f64; MODES] {
         std::array::from_fn(|to| self.switch_rates_per_s[to] + self.urgency_gains[to] * situation.urgency_per_s)
     }
 }
 
 /// The modes along the road: holds its speed, drives, brakes.
-pub(crate) const ALONG_MODES: &[Mode] = &[
+pub const ALONG_MODES: &[Mode] = &[
     Mode {
         white_density_m2ps3: 0.000_1,
         acceleration_sd_mps2: 0.2,
@@ -165,7 +167,7 @@ pub(crate) const ALONG_MODES: &[Mode] = &[
 ];
 
 /// The modes across the road: keeps its lane, changes lanes.
-pub(crate) const ACROSS_MODES: &[Mode] = &[
+pub const ACROSS_MODES: &[Mode] = &[
     Mode {
         white_density_m2ps3: 0.002,
         acceleration_sd_mps2: 0.215,

@@ -5,7 +5,6 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::lifecycle::{LifecycleRules, MAX_WINDOW};
-use crate::Alterations;
 
 /// The tracker as a scenario file describes it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -39,20 +38,21 @@ impl Default for TrackerConfig {
 /// A checked tracker configuration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackerModel {
-    pub(super) rules: LifecycleRules,
+    pub(crate) rules: LifecycleRules,
     latency_steps: u32,
-    pub(super) settled_speed_sd_mps: f64,
+    pub(crate) settled_speed_sd_mps: f64,
 }
 
 impl TrackerModel {
     /// Returns the number of whole control steps from the end of a scan to its tracks.
-    pub(crate) fn latency_steps(&self) -> usize {
+    pub fn latency_steps(&self) -> usize {
         self.latency_steps as usize
     }
 
-    /// Returns the same tracker with the altered latency.
-    pub(crate) fn altered(self, altered: &Alterations) -> Self {
-        let steps = altered.latency_steps(self.latency_steps(), steps(MAX_LATENCY_S) as usize);
+    /// Returns the same tracker with a latency of `steps` control steps, at most [`MAX_LATENCY_STEPS`].
+    #[must_use]
+    pub fn with_latency_steps(self, steps: usize) -> Self {
+        let steps = steps.min(MAX_LATENCY_STEPS);
         Self { latency_steps: u32::try_from(steps).unwrap_or(self.latency_steps), ..self }
     }
 }
@@ -63,6 +63,9 @@ fn steps(time_s: f64) -> u32 {
     let steps = (time_s / CONTROL_STEP.s()).round() as u32;
     steps
 }
+
+/// Maximum latency in control steps: 0.4 s.
+pub const MAX_LATENCY_STEPS: usize = 10;
 
 /// Maximum latency (s).
 const MAX_LATENCY_S: f64 = 0.4;

@@ -18,18 +18,18 @@ const MIN_PROBABILITY: f64 = 1e-3;
 
 /// The fused probabilities of car, truck, motorcycle and background, in this order.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct FusedClass {
+pub(crate) struct FusedClass {
     scores: [f64; 4],
 }
 
 impl FusedClass {
     /// Creates the probabilities before the first observation.
-    pub(super) const fn unknown() -> Self {
+    pub(crate) const fn unknown() -> Self {
         Self { scores: ClassScores::UNKNOWN.0 }
     }
 
     /// Updates the probabilities with the scores `seen` of a box of `points` points.
-    pub(super) fn update(&mut self, seen: &ClassScores, points: usize) {
+    pub(crate) fn update(&mut self, seen: &ClassScores, points: usize) {
         let weight = weight(points);
         for (score, seen) in self.scores.iter_mut().zip(seen.0) {
             *score *= seen.max(MIN_PROBABILITY).powf(weight);
@@ -42,7 +42,7 @@ impl FusedClass {
         self.scores = self.scores.map(|score| score / sum);
     }
 
-    pub(super) fn scores(&self) -> ClassScores {
+    pub(crate) fn scores(&self) -> ClassScores {
         ClassScores(self.scores)
     }
 }
@@ -54,7 +54,7 @@ fn weight(points: usize) -> f64 {
 
 /// Returns the log-likelihood ratio of these scores for a vehicle of any class against background, with the same weight
 /// as in [`FusedClass`].
-pub(super) fn vehicle_log_likelihood_ratio(seen: &ClassScores, points: usize) -> f64 {
+pub(crate) fn vehicle_log_likelihood_ratio(seen: &ClassScores, points: usize) -> f64 {
     let background = seen.0[ClassScores::BACKGROUND].clamp(MIN_PROBABILITY, 1.0 - MIN_PROBABILITY);
     // Under equal priors of the four classes, a vehicle of any class has three times the prior of background.
     weight(points) * ((1.0 - background) / (3.0 * background)).ln()

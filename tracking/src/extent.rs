@@ -44,20 +44,20 @@ impl ExtentEstimate {
 
 /// Length and width of one track.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct TrackExtent {
+pub(crate) struct TrackExtent {
     length: ExtentEstimate,
     width: ExtentEstimate,
 }
 
 impl TrackExtent {
     /// Updates length and width with the box of one scan.
-    pub(super) fn update(&mut self, detection: &Detection) {
+    pub(crate) fn update(&mut self, detection: &Detection) {
         self.length.update(detection.length_m, detection.length);
         self.width.update(detection.width_m, detection.width);
     }
 
     /// Returns length and width (m) of a track with the class scores `class`.
-    pub(super) fn size_m(&self, class: &ClassScores) -> (f64, f64) {
+    pub(crate) fn size_m(&self, class: &ClassScores) -> (f64, f64) {
         let Dimensions { length_m, width_m, .. } = class.best_vehicle_class().typical_dimensions();
         (self.length.value_m(length_m), self.width.value_m(width_m))
     }

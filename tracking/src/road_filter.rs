@@ -14,16 +14,16 @@ use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 /// Prior standard deviation of a vehicle's speed, whose prior mean is the ego's speed (m/s).
 ///
 /// It is wide enough for a parked vehicle, which is at 3 σ.
-pub(crate) const SPEED_PRIOR_SD_MPS: f64 = 10.0;
+pub const SPEED_PRIOR_SD_MPS: f64 = 10.0;
 /// Prior standard deviation of a vehicle's speed across the road (m/s).
-pub(crate) const LATERAL_SPEED_PRIOR_SD_MPS: f64 = 0.7;
+pub const LATERAL_SPEED_PRIOR_SD_MPS: f64 = 0.7;
 /// Prior standard deviation of a vehicle's position (m): wide enough to have no influence.
-pub(crate) const POSITION_PRIOR_SD_M: f64 = 1_000.0;
+pub const POSITION_PRIOR_SD_M: f64 = 1_000.0;
 /// Correlation time of the slow measurement error (s).
-pub(crate) const SLOW_TIME_S: f64 = 5.0;
+pub const SLOW_TIME_S: f64 = 5.0;
 /// Correlation length of the slow measurement error (m). The error also changes with the distance to the ego, as the
 /// beams wander over the vehicle.
-pub(crate) const SLOW_DISTANCE_M: f64 = 5.0;
+pub const SLOW_DISTANCE_M: f64 = 5.0;
 /// Standard deviation of half of a vehicle's length (m).
 ///
 /// Cars are 3.6 to 5.2 m long, and a follower shows nothing of its length. Half of the length is therefore within ±0.4
@@ -31,13 +31,13 @@ pub(crate) const SLOW_DISTANCE_M: f64 = 5.0;
 /// moves across the road.
 const HALF_LENGTH_SD_M: f64 = 0.4;
 /// Speed below which the direction of motion does not determine the heading (m/s).
-pub(crate) const HEADING_SPEED_MPS: f64 = 3.0;
+pub const HEADING_SPEED_MPS: f64 = 3.0;
 
 /// The measured position of a vehicle's face.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Measurement {
-    pub(super) along: AxisMeasurement,
-    pub(super) across: AxisMeasurement,
+pub(crate) struct Measurement {
+    pub(crate) along: AxisMeasurement,
+    pub(crate) across: AxisMeasurement,
 }
 
 impl Measurement {
@@ -60,7 +60,7 @@ impl Measurement {
     }
 
     /// Returns whether all values are finite.
-    pub(super) fn is_finite(&self) -> bool {
+    pub(crate) fn is_finite(&self) -> bool {
         [&self.along, &self.across]
             .iter()
             .all(|axis| (axis.position_m + axis.white_sd_m + axis.slow_sd_m + axis.time_offset_s).is_finite())
@@ -69,7 +69,7 @@ impl Measurement {
 
 /// The filter for the position and motion of one vehicle.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct RoadFilter {
+pub(crate) struct RoadFilter {
     along: AxisFilter,
     across: AxisFilter,
     /// Variance of the slow error along and across the road, as it is smoothed over the measurements (m²).
@@ -80,7 +80,7 @@ pub(super) struct RoadFilter {
 
 impl RoadFilter {
     /// Creates a filter at its first measurement. The prior speed along the road is `speed_mps`.
-    pub(super) fn new(measurement: &Measurement, speed_mps: f64) -> Self {
+    pub(crate) fn new(measurement: &Measurement, speed_mps: f64) -> Self {
         let at = |axis: &AxisMeasurement| Gaussian::new(axis.position_m, POSITION_PRIOR_SD_M);
         let along_mps = Gaussian::new(speed_mps, SPEED_PRIOR_SD_MPS);
         let across_mps = Gaussian::new(0.0, LATERAL_SPEED_PRIOR_SD_MPS);
@@ -95,7 +95,7 @@ impl RoadFilter {
     }
 
     /// Predicts by `step_s`, to the time at which the ego's rear is at `ego`.
-    pub(super) fn predict(&mut self, step_s: f64, ego: &EgoRear) {
+    pub(crate) fn predict(&mut self, step_s: f64, ego: &EgoRear) {
         let [along, across] = self.estimate();
         let distance_m = (along.speed_mps - ego.speed_mps).abs() * step_s;
         let slow_share = (-step_s / SLOW_TIME_S - distance_m / SLOW_DISTANCE_M).exp();
@@ -109,7 +109,7 @@ impl RoadFilter {
 
     /// Corrects the filter with a measurement of the face, which lies half a length of `half_length_m` ahead of the
     /// centre.
-    pub(super) fn correct(&mut self, measurement: &Measurement, half_length_m: f64) {
+    pub(crate) fn correct(&mut self, measurement: &Measurement, half_length_m: f64) {
         let new_share = 1.0 - self.slow_share;
         for (smoothed, latest) in self.slow_m2.iter_mut().zip(measurement.slow_m2()) {
             *smoothed += new_share * (latest - *smoothed);
@@ -135,34 +135,36 @@ impl RoadFilter {
     }
 
     /// Returns how well a measurement fits, along and across the road, for half a length of `half_length_m`.
-    pub(super) fn fit(&self, measurement: &Measurement, half_length_m: f64) -> [AxisFit; 2] {
+    pub(crate) fn fit(&self, measurement: &Measurement, half_length_m: f64) -> [AxisFit; 2] {
         let measurement = self.smoothed(measurement);
         let across = measurement.across_for(half_length_m, &self.estimate());
         [self.along.fit(&measurement.along), self.across.fit(&across)]
     }
 
     /// Returns the estimates along the road (of the face) and across it (of the centre).
-    pub(super) fn estimate(&self) -> [AxisEstimate; 2] {
+    pub(crate) fn estimate(&self) -> [AxisEstimate; 2] {
         [self.along.estimate(), self.across.estimate()]
     }
 
     /// Returns the same estimates, predicted by `horizon_s`.
-    pub(super) fn predicted(&self, horizon_s: f64) -> [AxisEstimate; 2] {
+    pub(crate) fn predicted(&self, horizon_s: f64) -> [AxisEstimate; 2] {
         [self.along.predicted(horizon_s), self.across.predicted(horizon_s)]
     }
 }
 
 /// State, covariance and heading of a vehicle in the ego's frame.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct EgoEstimate {
+pub struct EgoEstimate {
     /// `[x, y, vx, vy]` (m, m/s).
-    pub(crate) state: Vector4<f64>,
-    pub(crate) covariance: Matrix4<f64>,
-    pub(crate) heading_rad: f64,
+    pub state: Vector4<f64>,
+    /// Covariance of `state`.
+    pub covariance: Matrix4<f64>,
+    /// Heading relative to the ego's (rad).
+    pub heading_rad: f64,
 }
 
 /// Transforms the estimates along and across the road to the ego's frame. The covariance is rotated with them.
-pub(crate) fn in_ego_frame([along, across]: &[AxisEstimate; 2], frame: &EgoFrame<'_>) -> EgoEstimate {
+pub fn in_ego_frame([along, across]: &[AxisEstimate; 2], frame: &EgoFrame<'_>) -> EgoEstimate {
     let point = frame.point(along.position_m, across.position_m);
     let (sin, cos) = point.road_yaw_rad.sin_cos();
     let path_scale = frame.path_scale(across.position_m);

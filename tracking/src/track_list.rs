@@ -6,13 +6,13 @@ use closecall_traffic::{Track, TrackId};
 #[derive(Clone, Debug, Default)]
 pub struct TrackList {
     /// The tracks of the latest step.
-    pub(crate) tracks: Vec<Track>,
+    pub tracks: Vec<Track>,
     next_id: u32,
 }
 
 impl TrackList {
     /// Returns an id that no track of this run has had.
-    pub(crate) fn new_id(&mut self) -> TrackId {
+    pub fn new_id(&mut self) -> TrackId {
         let id = TrackId(self.next_id);
         self.next_id += 1;
         id

@@ -9,7 +9,7 @@
 use closecall_traffic::TrackStatus;
 
 /// Maximum number of scans in the confirmation window.
-pub(crate) const MAX_WINDOW: u8 = 16;
+pub const MAX_WINDOW: u8 = 16;
 
 /// Maximum absolute value of the log-odds (an existence probability of 0.9999), so that misses can still lower it
 /// for a track that was detected a thousand times.
@@ -20,22 +20,22 @@ const INITIAL_LOG_ODDS: f64 = 0.0;
 
 /// The rules of confirmation and deletion. The sensor's configuration checks the values.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct LifecycleRules {
+pub struct LifecycleRules {
     /// Number of hits that confirm a track (M).
-    pub(crate) confirm_hits: u32,
+    pub confirm_hits: u32,
     /// Number of latest scans in which the hits are counted (N): 1 to [`MAX_WINDOW`].
-    pub(crate) confirm_window: u32,
+    pub confirm_window: u32,
     /// Number of successive scans without a hit after which a confirmed track is deleted.
-    pub(crate) delete_after_misses: u32,
+    pub delete_after_misses: u32,
     /// Probability that a scan detects a vehicle in view (P_D).
-    pub(crate) detection_probability: f64,
+    pub detection_probability: f64,
     /// Probability that clutter gives a detection inside the gate (P_F).
-    pub(crate) clutter_probability: f64,
+    pub clutter_probability: f64,
 }
 
 /// The lifecycle state of one track.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Lifecycle {
+pub struct Lifecycle {
     /// One bit per scan, 1 for a hit; the lowest bit is the latest scan.
     history: u32,
     /// Number of latest successive scans without a hit.
@@ -47,14 +47,14 @@ pub(crate) struct Lifecycle {
 
 impl Lifecycle {
     /// Creates the lifecycle of a track at its first detection.
-    pub(crate) fn first_hit(rules: &LifecycleRules) -> Self {
+    pub fn first_hit(rules: &LifecycleRules) -> Self {
         let mut lifecycle = Self { history: 0, misses: 0, confirmed: false, log_odds: INITIAL_LOG_ODDS };
         lifecycle.hit(rules, true);
         lifecycle
     }
 
     /// Adds a scan that detected the track. The scan can confirm the track only if `is_settled`.
-    pub(crate) fn hit(&mut self, rules: &LifecycleRules, is_settled: bool) {
+    pub fn hit(&mut self, rules: &LifecycleRules, is_settled: bool) {
         self.history = self.history << 1 | 1;
         self.misses = 0;
         self.confirmed |= is_settled && self.hits_in_window(rules) >= rules.confirm_hits;
@@ -62,7 +62,7 @@ impl Lifecycle {
     }
 
     /// Adds a scan that did not detect the track, although it was in view.
-    pub(crate) fn miss(&mut self, rules: &LifecycleRules) {
+    pub fn miss(&mut self, rules: &LifecycleRules) {
         self.skip();
         self.add_evidence(((1.0 - rules.detection_probability) / (1.0 - rules.clutter_probability)).ln());
     }
@@ -70,19 +70,19 @@ impl Lifecycle {
     /// Adds a scan that could not detect the track, because it was hidden or out of view.
     ///
     /// Such a scan leaves the existence probability unchanged, but counts against the coasting time.
-    pub(crate) fn skip(&mut self) {
+    pub fn skip(&mut self) {
         self.history <<= 1;
         self.misses += 1;
     }
 
     /// Multiplies the odds of existence by exp(`log_likelihood_ratio`).
-    pub(crate) fn add_evidence(&mut self, log_likelihood_ratio: f64) {
+    pub fn add_evidence(&mut self, log_likelihood_ratio: f64) {
         self.log_odds = (self.log_odds + log_likelihood_ratio).clamp(-MAX_LOG_ODDS, MAX_LOG_ODDS);
     }
 
     /// Returns whether the track has ended: a tentative track that can no longer reach M hits in N scans, or a
     /// confirmed track that was not detected for too long.
-    pub(crate) fn should_delete(&self, rules: &LifecycleRules) -> bool {
+    pub fn should_delete(&self, rules: &LifecycleRules) -> bool {
         if self.confirmed {
             self.misses >= rules.delete_after_misses
         } else {
@@ -90,7 +90,8 @@ impl Lifecycle {
         }
     }
 
-    pub(crate) fn status(&self) -> TrackStatus {
+    /// Returns the status that is reported for the track.
+    pub fn status(&self) -> TrackStatus {
         match (self.confirmed, self.misses) {
             (false, _) => TrackStatus::Tentative,
             (true, 0) => TrackStatus::Confirmed,
@@ -99,7 +100,7 @@ impl Lifecycle {
     }
 
     /// Returns the existence probability.
-    pub(crate) fn existence(&self) -> f64 {
+    pub fn existence(&self) -> f64 {
         1.0 / (1.0 + (-self.log_odds).exp())
     }
 

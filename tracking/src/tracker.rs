@@ -13,8 +13,7 @@ use super::measurement::measurement;
 use super::motion::EgoRear;
 use super::road_filter::{Measurement, RoadFilter, in_ego_frame};
 use super::view::{Face, RearView};
-use crate::Detection;
-use crate::lidar::SIDE_PROTRUSION_M;
+use crate::{Detection, SIDE_PROTRUSION_M};
 use closecall_traffic::ego_frame::EgoFrame;
 
 /// Speed difference below which a track inside another track's box is a part of the same vehicle (m/s).
@@ -132,7 +131,7 @@ impl Tracker {
     }
 
     /// Appends every track to `list`, predicted to `time` and in the ego's frame `frame` at that time.
-    pub(crate) fn report(&self, time: Time, frame: &EgoFrame<'_>, list: &mut TrackList) {
+    pub fn report(&self, time: Time, frame: &EgoFrame<'_>, list: &mut TrackList) {
         let ahead_s = (time - self.time).s();
         for track in &self.tracks {
             list.tracks.push(to_track(track, track.filter.predicted(ahead_s), frame, time));

@@ -1,7 +1,5 @@
 //! Tests of the tracker on simulated detections against the true states.
 
-mod fixed_gap;
-
 use closecall_statistics::consistency::{Consistency, Credibility};
 use closecall_traffic::{
     ActorId, CONTROL_STEP, Check, ClassScores, Environment, Parameters, Road, Stream, Track, TrackId, TrackStatus,
@@ -10,17 +8,17 @@ use closecall_traffic::{
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
-use super::motion::{ACROSS_MODES, ALONG_MODES, Mode, Situation};
-use super::road_filter::{SLOW_DISTANCE_M, SLOW_TIME_S};
-use super::*;
 use crate::lidar::FACE_SD_M;
 use crate::surroundings::transform_scene;
 use crate::testing::{OWN_LANE_M, scene_vehicle, with_speed};
-use crate::{Detection, Extent, Scene, SceneVehicle};
+use crate::{Detection, Extent, Scene, SceneVehicle, TrackAudit, TrackerConfig};
+use closecall_tracking::motion::{ACROSS_MODES, ALONG_MODES, Mode, Situation};
+use closecall_tracking::road_filter::{SLOW_DISTANCE_M, SLOW_TIME_S};
+use closecall_tracking::{RearView, TrackList, Tracker, TrackerScan};
 use closecall_traffic::ego_frame::EgoFrame;
 
 const LEFT_LANE_M: f64 = -1.875;
-const PERIOD_S: f64 = CONTROL_STEP.s();
+pub(super) const PERIOD_S: f64 = CONTROL_STEP.s();
 const RANGE_SD_M: f64 = 0.1;
 const LATERAL_SD_M: f64 = 0.15;
 /// Slow share of the lateral error's variance.
@@ -174,7 +172,7 @@ impl Bench {
     }
 }
 
-fn follower(s_m: f64, d_m: f64, speed_mps: f64) -> SceneVehicle {
+pub(super) fn follower(s_m: f64, d_m: f64, speed_mps: f64) -> SceneVehicle {
     with_speed(scene_vehicle(1, VehicleClass::Car, s_m, d_m), speed_mps)
 }
 

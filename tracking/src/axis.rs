@@ -65,7 +65,7 @@ impl Remaining {
 
 /// The filter of one vehicle along one axis.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct AxisFilter {
+pub struct AxisFilter {
     modes: &'static [Mode],
     estimates: [ModeEstimate; MODES],
     /// What remains after a control step, the usual step.
@@ -76,41 +76,47 @@ pub(crate) struct AxisFilter {
 
 /// How well a measurement fits the estimate along one axis.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct AxisFit {
+pub struct AxisFit {
     /// Squared innovation over its variance, which allows for a manoeuvre, under the mode in which this is least.
-    pub(crate) squared_distance: f64,
+    pub squared_distance: f64,
     /// −2 · the logarithm of the likelihood over all modes, up to a constant.
-    pub(crate) cost: f64,
+    pub cost: f64,
     /// Logarithm of that variance's mean over all modes: the cost of a measurement without deviation.
-    pub(crate) log_variance: f64,
+    pub log_variance: f64,
 }
 
 /// A measured position along one axis.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct AxisMeasurement {
-    pub(crate) position_m: f64,
+pub struct AxisMeasurement {
+    /// Measured position (m).
+    pub position_m: f64,
     /// Standard deviation of the white error (m).
-    pub(crate) white_sd_m: f64,
+    pub white_sd_m: f64,
     /// Standard deviation of the slow error (m).
-    pub(crate) slow_sd_m: f64,
+    pub slow_sd_m: f64,
     /// Time after which the vehicle is at the measured position at its present speed (s); negative for an old
     /// measurement.
-    pub(crate) time_offset_s: f64,
+    pub time_offset_s: f64,
 }
 
 /// Position and speed along one axis, with their covariance.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct AxisEstimate {
-    pub(crate) position_m: f64,
-    pub(crate) speed_mps: f64,
-    pub(crate) position_variance_m2: f64,
-    pub(crate) position_speed_covariance_m2ps: f64,
-    pub(crate) speed_variance_m2ps2: f64,
+pub struct AxisEstimate {
+    /// Position (m).
+    pub position_m: f64,
+    /// Speed (m/s).
+    pub speed_mps: f64,
+    /// Variance of the position (m²).
+    pub position_variance_m2: f64,
+    /// Covariance of position and speed (m²/s).
+    pub position_speed_covariance_m2ps: f64,
+    /// Variance of the speed (m²/s²).
+    pub speed_variance_m2ps2: f64,
 }
 
 impl AxisFilter {
     /// Creates a filter before its first measurement, with the prior distributions of position and speed.
-    pub(crate) fn prior(modes: &'static [Mode], position_m: Gaussian, speed_mps: Gaussian) -> Self {
+    pub fn prior(modes: &'static [Mode], position_m: Gaussian, speed_mps: Gaussian) -> Self {
         let estimates = std::array::from_fn(|index| {
             let mode = modes.get(index);
             let acceleration_sd = mode.map_or(0.0, |mode| mode.acceleration_sd_mps2);
@@ -128,7 +134,7 @@ impl AxisFilter {
     }
 
     /// Predicts by `step_s` in this situation, after which the share `slow_share` of the slow error remains.
-    pub(crate) fn predict(&mut self, step_s: f64, slow_share: f64, situation: Situation) {
+    pub fn predict(&mut self, step_s: f64, slow_share: f64, situation: Situation) {
         self.situation = situation;
         let remaining = if step_s == CONTROL_STEP.s() {
             self.usual
@@ -170,7 +176,7 @@ impl AxisFilter {
     /// alone would reject the start of a lane change. The allowance for a manoeuvre is needed in addition at short
     /// range, where the position is known to millimetres and all modes would reject the measurements of a swerving
     /// vehicle.
-    pub(crate) fn fit(&self, measurement: &AxisMeasurement) -> AxisFit {
+    pub fn fit(&self, measurement: &AxisMeasurement) -> AxisFit {
         let (mut squared_distance, mut likelihood, mut variance) = (f64::INFINITY, 0.0, 0.0);
         for estimate in &self.estimates[..self.modes.len()] {
             let (innovation_m, _, predicted_variance_m2) = estimate.innovation(measurement);
@@ -184,7 +190,7 @@ impl AxisFilter {
     }
 
     /// Corrects the filter with a measured position.
-    pub(crate) fn measure_position(&mut self, measurement: &AxisMeasurement) {
+    pub fn measure_position(&mut self, measurement: &AxisMeasurement) {
         let count = self.modes.len();
         let mut logs = [f64::NEG_INFINITY; MODES];
         for (estimate, log) in self.estimates.iter_mut().zip(&mut logs).take(count) {
@@ -196,7 +202,7 @@ impl AxisFilter {
     }
 
     /// Corrects the filter with a measured speed.
-    pub(crate) fn measure_speed(&mut self, speed_mps: f64, sd_mps: f64) {
+    pub fn measure_speed(&mut self, speed_mps: f64, sd_mps: f64) {
         let count = self.modes.len();
         let mut logs = [f64::NEG_INFINITY; MODES];
         for (estimate, log) in self.estimates.iter_mut().zip(&mut logs).take(count) {
@@ -226,7 +232,7 @@ impl AxisFilter {
     }
 
     /// Returns the present estimate of position and speed: the mean over the modes.
-    pub(crate) fn estimate(&self) -> AxisEstimate {
+    pub fn estimate(&self) -> AxisEstimate {
         let estimates = &self.estimates[..self.modes.len()];
         let (state, covariance) = match estimates {
             [only] => ([only.state[0], only.state[1]], COVARIANCES.map(|at| only.covariance[at])),
@@ -263,7 +269,7 @@ impl AxisFilter {
     }
 
     /// Returns the estimate predicted by `horizon_s`, in the situation of the latest prediction.
-    pub(crate) fn predicted(&self, horizon_s: f64) -> AxisEstimate {
+    pub fn predicted(&self, horizon_s: f64) -> AxisEstimate {
         let mut predicted = *self;
         let mut remaining_s = horizon_s;
         while remaining_s > ROUNDING_S {

@@ -1,10 +1,17 @@
 //! The whole chain from the point cloud to the track, at a constant gap: the beams then hit the same places in each scan
 //! of one side of the mirror, and the errors of the boxes never average out.
 
-use closecall_traffic::{ActorId, Environment, Road, VehicleClass, stream};
+use closecall_statistics::consistency::Consistency;
+use closecall_tracking::{RearView, TrackList, Tracker, TrackerScan};
+use closecall_traffic::ego_frame::EgoFrame;
+use closecall_traffic::{
+    ActorId, CONTROL_STEP, Check, Environment, Parameters, Road, TrackStatus, VehicleClass, stream,
+};
 
-use super::*;
+use super::tracking::{PERIOD_S, follower};
 use crate::lidar::{Lidar, RearLidar};
+use crate::testing::{OWN_LANE_M, scene_vehicle, with_speed};
+use crate::{Scene, TrackAudit, TrackerConfig};
 
 /// Gaps from the ego's rear to the front of the other vehicle (m).
 const GAPS_M: [f64; 8] = [30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 100.0];

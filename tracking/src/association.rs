@@ -15,7 +15,7 @@ use super::road_filter::{Measurement, RoadFilter};
 ///
 /// A true pair lies outside of the gate once in a thousand scans. It does so even less often at short range, where the
 /// allowance for a manoeuvre dominates S.
-pub(super) const GATE: f64 = 13.8;
+pub(crate) const GATE: f64 = 13.8;
 
 /// Integer cost per unit of d² + ln det S.
 const COST_SCALE: f64 = 1_000.0;
@@ -33,7 +33,7 @@ fn to_integer(cost: f64) -> i64 {
 /// Writes into `assigned` the index in `measurements` of each track's detection, or `None` if it has none.
 ///
 /// Each track is given by its filter and half of its length (m).
-pub(super) fn assign<'a>(
+pub(crate) fn assign<'a>(
     tracks: impl ExactSizeIterator<Item = (&'a RoadFilter, f64)>,
     measurements: &[Measurement],
     assigned: &mut Vec<Option<usize>>,
@@ -70,8 +70,8 @@ pub(super) fn assign<'a>(
 mod tests {
     use proptest::prelude::*;
 
-    use super::super::axis::AxisMeasurement;
     use super::*;
+    use crate::axis::AxisMeasurement;
 
     fn track(s_m: f64, d_m: f64) -> RoadFilter {
         RoadFilter::new(&measurement(s_m, d_m), 0.0)

@@ -35,7 +35,7 @@ const MIN_WHOLE_FACE_POINTS: usize = 6;
 const MAX_PART_OFFSET_M: f64 = 0.8;
 
 /// Converts a detection to a measurement, for a scan that ended at `time` with the ego's frame `frame`.
-pub(super) fn measurement(detection: &Detection, frame: &EgoFrame<'_>, time: Time) -> Measurement {
+pub(crate) fn measurement(detection: &Detection, frame: &EgoFrame<'_>, time: Time) -> Measurement {
     let (s_m, d_m) = frame.road_position_m(detection.face_x_m, detection.face_y_m);
     let class = detection.class.best_vehicle_class();
     let part_offset_sd_m = match class {
