@@ -12,6 +12,7 @@ mod audit;
 mod bodies;
 pub mod camera;
 mod config;
+pub mod faults;
 mod full;
 mod ground_truth;
 mod guard_rail;

@@ -236,7 +236,9 @@ mod tests {
             let mut open = vec![first];
             while let Some(row) = open.pop() {
                 found[row] = Some(count);
-                open.extend((0..points.len()).filter(|&to| found[to].is_none() && is_within(points[row], points[to], radius)));
+                open.extend(
+                    (0..points.len()).filter(|&to| found[to].is_none() && is_within(points[row], points[to], radius)),
+                );
             }
             count += 1;
         }

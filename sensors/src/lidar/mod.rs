@@ -33,6 +33,7 @@ mod shapes;
 mod silhouette;
 mod soft;
 mod solid;
+mod spoil;
 mod targets;
 #[cfg(test)]
 mod tests;

@@ -18,9 +18,11 @@ use super::roadside::{PlacedSolid, append_guard_rails};
 use super::shapes::append_solids;
 use super::soft::{self, Plume};
 use super::solid::Solid;
+use super::spoil::Spoiler;
 use super::targets::{Beams, Surface, Targets};
 use super::viewpoint::{Viewpoint, plane_from_body};
-use super::{Lidar, LidarScan, Material, MirrorSide, PointSource, ScanTruth};
+use super::{LaneGeometry, Lidar, LidarScan, Material, MirrorSide, PointSource, ScanTruth};
+use crate::faults::LidarFault;
 use crate::{Scene, SceneVehicle};
 
 /// Duration of a sweep (s).
@@ -36,6 +38,8 @@ struct Sweep {
     pose: SensorPoseEstimate,
     link: LinkBudget,
     noise: Noise,
+    /// What a fault does to the points, and the road if guard rails stand along it.
+    fault: Option<(LidarFault, Option<LaneGeometry>)>,
 }
 
 /// The extent of a sweep.
@@ -110,7 +114,8 @@ impl Scanner {
         if !self.scan.is_empty() {
             return false;
         }
-        self.repeat(Extent::UntilFirst);
+        let is_spoilt = self.latest.is_some_and(|sweep| sweep.fault.is_some());
+        self.repeat(if is_spoilt { Extent::Complete } else { Extent::UntilFirst });
         let is_dark = self.scan.is_empty();
         self.clear();
         is_dark
@@ -120,17 +125,41 @@ impl Scanner {
     ///
     /// Points of the bare road that the detector would discard are left out; see [`Scanner::complete`].
     pub fn scan(&mut self, scene: &Scene<'_>, rng: &mut Stream) -> &LidarScan {
+        self.scan_with(scene, rng, None)
+    }
+
+    /// Replaces the latest scan by one without points, as of a sensor that is silent. Draws exactly one number from `rng`.
+    pub(crate) fn blank(&mut self, time: Time, rng: &mut Stream) {
+        Noise::draw(rng);
+        self.clear();
+        self.stamp(time);
+        self.latest = None;
+    }
+
+    /// Keeps the latest scan as the scan at `time`, as of a sensor that is frozen. Draws exactly one number from `rng`.
+    pub(crate) fn hold(&mut self, time: Time, rng: &mut Stream) {
+        Noise::draw(rng);
+        self.stamp(time);
+    }
+
+    /// Scans the scene with a fault of the sensor, as [`Scanner::scan`] does without one.
+    pub(crate) fn scan_with(&mut self, scene: &Scene<'_>, rng: &mut Stream, fault: Option<&LidarFault>) -> &LidarScan {
         let drawn = Noise::draw(rng);
         let noise = if self.lidar.is_exact { drawn.silenced() } else { drawn };
         let mirror_side = Self::mirror_side_at(scene.time);
-        let viewpoint = Viewpoint::new(scene, &self.lidar);
+        let actual = fault.map_or(self.lidar, |fault| self.lidar.with_fault(fault));
+        let viewpoint = Viewpoint::new(scene, &actual);
         self.collect_targets(scene, mirror_side, &viewpoint);
         let pose = SensorPoseEstimate::new(scene, &self.lidar, noise);
         self.begin(scene.time, mirror_side, &pose);
-        let link = LinkBudget::new(&self.lidar, scene.environment);
-        let sweep = Sweep { mirror_side, viewpoint, pose, link, noise };
+        let link = LinkBudget::new(&actual, scene.environment);
+        let fault = fault
+            .filter(|fault| fault.changes_points())
+            .map(|fault| (*fault, scene.road.has_guard_rails().then(|| LaneGeometry::from_scene(scene))));
+        let sweep = Sweep { mirror_side, viewpoint, pose, link, noise, fault };
         self.latest = Some(sweep);
         self.sweep(&sweep, Extent::WithoutBareRoad);
+        self.spoil(&sweep);
         &self.scan
     }
 
@@ -139,7 +168,22 @@ impl Scanner {
         if let Some(sweep) = self.latest {
             self.clear();
             self.sweep(&sweep, extent);
+            self.spoil(&sweep);
         }
+    }
+
+    /// Spoils the points of the scan if the sensor has a fault.
+    fn spoil(&mut self, sweep: &Sweep) {
+        let Some((fault, rails)) = &sweep.fault else { return };
+        let spoiler = Spoiler {
+            fault,
+            noise: sweep.noise.of_faults(),
+            pose: &sweep.pose,
+            pattern: &self.pattern,
+            mirror_side: sweep.mirror_side,
+            rails: rails.as_ref(),
+        };
+        spoiler.spoil(&mut self.scan, &mut self.truth);
     }
 
     /// Sweeps over all columns and appends their returns to the scan.
@@ -197,12 +241,17 @@ impl Scanner {
     /// Clears the scan and sets its times and its mirror side.
     fn begin(&mut self, end: Time, mirror_side: MirrorSide, pose: &SensorPoseEstimate) {
         self.clear();
+        self.stamp(end);
+        self.scan.mirror_side = mirror_side;
+        self.scan.sensor_x_m = pose.sensor_x_m();
+    }
+
+    /// Sets the times of the scan.
+    fn stamp(&mut self, end: Time) {
         #[expect(clippy::cast_possible_truncation, reason = "a sweep has 14,777,777 ns")]
         let sweep = Time::from_ns(SWEEP_NS as i64);
         self.scan.start = end - sweep;
         self.scan.end = end;
-        self.scan.mirror_side = mirror_side;
-        self.scan.sensor_x_m = pose.sensor_x_m();
     }
 
     /// Collects all solids and spray plumes that a beam could hit.
@@ -226,7 +275,7 @@ impl Scanner {
         self.guard_rails.clear();
         append_guard_rails(scene.road, scene.ego.state.s_m, &mut self.guard_rails);
         let appearance = scene.ego.vehicle.appearance;
-        let steel = |material: Material| material.reflectivity(&appearance, scene.environment);
+        let steel = |material: Material| material.reflectivity(None, &appearance, scene.environment);
         let surface = Surface { source: PointSource::GuardRail, reflectivity: &steel };
         for (solid, pose) in &self.guard_rails {
             let placed = plane_from_body(*pose, 0.0);
@@ -246,7 +295,8 @@ impl Scanner {
         let frozen = view.sensor_from_plane(before_end_s)
             * plane_from_body(moved_back(pose, other, before_end_s), other.pitch_rad);
         let appearance = other.vehicle.appearance;
-        let reflectivity = |material: Material| material.reflectivity(&appearance, scene.environment);
+        let plate = self.lidar.plate_reflectivity;
+        let reflectivity = |material: Material| material.reflectivity(plate, &appearance, scene.environment);
         let surface = Surface { source: PointSource::Actor(other.actor), reflectivity: &reflectivity };
         self.solids.clear();
         append_solids(&other.vehicle, &mut self.solids);
