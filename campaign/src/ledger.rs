@@ -67,6 +67,8 @@ pub struct ArmCounts {
     pub engagements: u64,
     /// Engagements whose goal is in reach.
     pub goals_in_reach: u64,
+    /// Samples in which the margin increase system is not available for some time, because sensors have failed.
+    pub unavailable: u64,
     /// Largest speed deficit of the ego to the lead vehicle in any sample (m/s).
     pub max_speed_deficit_mps: f64,
     /// Largest jerk of the ego in any sample, before any collision of its own (m/s³).
@@ -88,6 +90,8 @@ pub struct Tally {
     pub engaged: bool,
     /// Whether its goal is in reach when it engages.
     pub goal_in_reach: bool,
+    /// Whether the margin increase system is not available for some time.
+    pub unavailable: bool,
     /// Largest speed deficit of the ego to the lead vehicle (m/s).
     pub speed_deficit_mps: f64,
     /// Largest jerk of the ego (m/s³).
@@ -110,6 +114,7 @@ impl ArmCounts {
         }
         self.engagements += u64::from(tally.engaged);
         self.goals_in_reach += u64::from(tally.engaged && tally.goal_in_reach);
+        self.unavailable += u64::from(tally.unavailable);
         self.max_speed_deficit_mps = worse(self.max_speed_deficit_mps, tally.speed_deficit_mps);
         self.max_jerk_mps3 = worse(self.max_jerk_mps3, tally.jerk_mps3);
         self.max_delta_v_mps = worse(self.max_delta_v_mps, tally.delta_v_mps);
@@ -123,6 +128,7 @@ impl ArmCounts {
         self.errors += other.errors;
         self.engagements += other.engagements;
         self.goals_in_reach += other.goals_in_reach;
+        self.unavailable += other.unavailable;
         self.max_speed_deficit_mps = worse(self.max_speed_deficit_mps, other.max_speed_deficit_mps);
         self.max_jerk_mps3 = worse(self.max_jerk_mps3, other.max_jerk_mps3);
         self.max_delta_v_mps = worse(self.max_delta_v_mps, other.max_delta_v_mps);

@@ -46,6 +46,7 @@ impl ArmRecord {
                     others_collided: outcome.others_collided(),
                     engaged: mis.is_some_and(|mis| mis.engaged_at_s.is_ok()),
                     goal_in_reach: mis.is_some_and(|mis| mis.goal_in_reach == Some(true)),
+                    unavailable: mis.is_some_and(|mis| mis.unavailable.is_some()),
                     speed_deficit_mps: outcome.margins.max_speed_deficit_mps,
                     jerk_mps3: outcome.margins.max_jerk_mps3,
                     delta_v_mps: outcome.ego_delta_v_mps().unwrap_or(0.0),

@@ -239,6 +239,24 @@ fn judge_expectations(judge: &Judge, found: &mut Found) -> Vec<ExpectationResult
     expectations
 }
 
+/// Says in how many samples the system under test was not available. A system that was never available for engaging has not been
+/// tested.
+fn judge_availability(summary: &Summary, found: &mut Found) {
+    for (name, counts) in &summary.scenarios {
+        let Some(tested) = counts.arms.last().filter(|tested| tested.unavailable > 0) else { continue };
+        let sentence = format!(
+            "{name}: the margin increase system was not available, because sensors had failed, in {} of {}",
+            tested.unavailable,
+            samples(tested.outcomes)
+        );
+        if tested.unavailable == tested.outcomes && tested.engagements == 0 {
+            found.add(Decision::Inconclusive, format!("{sentence}, and never engaged: nothing says what it does"));
+        } else {
+            found.note(sentence);
+        }
+    }
+}
+
 /// Judges whether there are samples at all.
 fn judge_samples(summary: &Summary, judge: &Judge, found: &mut Found) {
     let outcomes = |tested: Option<u64>| tested.unwrap_or_default();
@@ -246,6 +264,7 @@ fn judge_samples(summary: &Summary, judge: &Judge, found: &mut Found) {
         found.add(Decision::Inconclusive, "no sample has an outcome".to_owned());
         return;
     }
+    judge_availability(summary, found);
     for (name, counts) in &summary.scenarios {
         if counts.samples == 0 {
             found.add(Decision::Inconclusive, format!("{name}: no sample was run"));

@@ -186,7 +186,8 @@ fn default(key: &Key, stated: Option<String>) -> String {
     if key.required {
         return "required".to_owned();
     }
-    if let Some((_, values)) = SENSOR_DEFAULTS.iter().find(|(name, _)| is_sensor_key(key, name)) {
+    let of_sensors = SENSOR_DEFAULTS.iter().find(|(name, _)| is_sensor_key(key, name));
+    if let (None, Some((_, values))) = (&stated, of_sensors) {
         return values.map(|value| value.map_or("-".to_owned(), |value| value.to_string())).join(" / ");
     }
     match (&key.default, stated) {

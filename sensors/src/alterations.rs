@@ -2,6 +2,7 @@
 
 use closecall_traffic::{CONTROL_STEP, ClassScores};
 
+use crate::faults::Faults;
 use crate::full::DetectionClassifier;
 use crate::surroundings::{OtherVehicle, transform_scene};
 use crate::{Detection, Extent, Scene, SensorError};
@@ -28,6 +29,8 @@ pub struct Alterations {
     pub extra_latency_s: f64,
     /// Every vehicle behind the ego is classified as background, an injected fault.
     pub is_class_background: bool,
+    /// Injected faults of single sensors.
+    pub faults: Faults,
 }
 
 impl Alterations {

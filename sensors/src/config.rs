@@ -1,10 +1,12 @@
 //! The `[sensors]` table of a scenario file: the perception mode and the parameters of each sensor model.
 
+use closecall_tracking::MAX_LATENCY_STEPS as MAX_TRACKER_LATENCY_STEPS;
 use closecall_traffic::{Check, Choice, ConfigError, Parameters};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::camera::{Camera, CameraConfig, Pipeline};
+use crate::faults::OdometryErrors;
 use crate::lidar::LidarConfig;
 use crate::worker_classifier::WorkerClassifier;
 use crate::{
@@ -131,9 +133,15 @@ impl Sensors {
             front_radar: front_radar.altered(&altered, false),
             surround: surround.altered(&altered, false),
             rear_lidar: if altered.has_true_points { rear_lidar.exact() } else { rear_lidar },
-            tracker: tracker.altered(&altered),
+            tracker: tracker
+                .with_latency_steps(altered.latency_steps(tracker.latency_steps(), MAX_TRACKER_LATENCY_STEPS)),
         };
         Self { full, rear_object: self.rear_object.altered(&altered, true), altered, ..self }
+    }
+
+    /// Returns the errors of the ego's odometry and map.
+    pub fn odometry_errors(&self) -> OdometryErrors {
+        self.altered.faults.odometry
     }
 
     /// Returns the latencies of the sensors ahead, around and behind, in control steps.
@@ -155,15 +163,17 @@ impl Sensors {
             SensorMode::GroundTruth => Box::new(GroundTruth::new()),
             SensorMode::Object => {
                 let models = [self.full.front_radar, self.full.surround, self.rear_object];
-                Box::new(ObjectPerception::new(models, key))
+                Box::new(ObjectPerception::new(models, key).with_faults(&self.altered.faults))
             }
             SensorMode::Full => {
-                let perception = FullPerception::new(&self.full, key).altered(self.altered);
+                let perception =
+                    FullPerception::new(&self.full, key).altered(self.altered).with_faults(&self.altered.faults);
                 match (self.altered.classifier(), self.camera.pipeline) {
                     (Some(classifier), _) => Box::new(perception.with_classifier(classifier)),
                     (None, Pipeline::Off) => Box::new(perception),
                     (None, Pipeline::CropClassifier) => {
-                        let classifier = WorkerClassifier::new(self.camera, key);
+                        let classifier =
+                            WorkerClassifier::new(self.camera, key).with_faults(self.altered.faults.rear_camera);
                         Box::new(perception.with_classifier(Box::new(classifier)))
                     }
                 }

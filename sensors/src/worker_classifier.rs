@@ -6,11 +6,12 @@
 use std::cell::RefCell;
 use std::sync::OnceLock;
 
-use closecall_traffic::Stream;
+use closecall_traffic::{Environment, Road, Stream, Time};
 
-use crate::camera::{Backend, Camera, CropClassifier, ExposureKey, ImageMemory};
+use crate::camera::{Backend, Camera, CropClassifier, ExposureKey, ImageMemory, ImagedScene};
+use crate::faults::{CameraFault, FaultList, NOTICED_AFTER_SCANS};
 use crate::full::DetectionClassifier;
-use crate::{Detection, NoiseKey, Scene, SensorError};
+use crate::{Detection, Health, NoiseKey, Scene, SceneVehicle, SensorError};
 
 /// Name of the camera's random stream.
 const CHANNEL: &str = "rear-camera";
@@ -48,12 +49,50 @@ pub(crate) struct WorkerClassifier {
     camera: Camera,
     exposures: Stream,
     memory: ImageMemory,
+    faults: FaultList<CameraFault>,
+    /// The latest image before the camera froze.
+    held: Option<HeldImage>,
+    /// Number of latest successive steps in which the camera delivered no image, or the same one again.
+    failed_steps: u32,
+}
+
+/// The scene of an image, and the key of its noise.
+struct HeldImage {
+    time: Time,
+    environment: Environment,
+    road: Road,
+    ego: SceneVehicle,
+    others: Vec<SceneVehicle>,
+    key: ExposureKey,
+}
+
+impl HeldImage {
+    fn of(scene: &Scene<'_>, key: ExposureKey) -> Self {
+        let Scene { time, ego, .. } = *scene;
+        Self { time, environment: *scene.environment, road: *scene.road, ego, others: scene.others.to_vec(), key }
+    }
+
+    fn scene(&self) -> Scene<'_> {
+        Scene { time: self.time, road: &self.road, environment: &self.environment, ego: self.ego, others: &self.others }
+    }
 }
 
 impl WorkerClassifier {
     /// Creates the camera of one run, whose exposure noise is keyed by `key`.
     pub(crate) fn new(camera: Camera, key: &NoiseKey) -> Self {
-        Self { camera, exposures: key.stream(CHANNEL), memory: ImageMemory::default() }
+        Self {
+            camera,
+            exposures: key.stream(CHANNEL),
+            memory: ImageMemory::default(),
+            faults: FaultList::default(),
+            held: None,
+            failed_steps: 0,
+        }
+    }
+
+    /// Returns the same camera with faults.
+    pub(crate) fn with_faults(self, faults: FaultList<CameraFault>) -> Self {
+        Self { faults, ..self }
     }
 }
 
@@ -61,6 +100,17 @@ impl DetectionClassifier for WorkerClassifier {
     fn classify(&mut self, scene: &Scene<'_>, detections: &mut [Detection]) -> Result<(), SensorError> {
         // The key is drawn even if nothing is detected, so that both arms of a pair get the same exposures.
         let key = ExposureKey::draw(&mut self.exposures);
+        let fault = if self.faults.is_empty() { None } else { self.faults.at(scene.time) };
+        let (is_dead, is_frozen) = fault.map_or((false, false), |fault| (fault.is_dead, fault.is_frozen));
+        self.failed_steps = if is_dead || is_frozen { self.failed_steps.saturating_add(1) } else { 0 };
+        self.held = is_frozen.then(|| self.held.take().unwrap_or_else(|| HeldImage::of(scene, key)));
+        if is_dead {
+            return Ok(());
+        }
+        let held = self.held.as_ref().map(|held| (held.scene(), held.key));
+        let (imaged, key) = held.as_ref().map_or((scene, key), |(scene, key)| (scene, *key));
+        let seen = ImagedScene { now: scene, imaged, fault: fault.as_ref() };
+        let memory = &mut self.memory;
         NETWORK.with_borrow_mut(|slot| {
             if slot.as_ref().is_none_or(|(camera, _)| *camera != self.camera) {
                 let backend = inference_backend();
@@ -69,9 +119,13 @@ impl DetectionClassifier for WorkerClassifier {
                 *slot = Some((self.camera, network));
             }
             match slot {
-                Some((_, network)) => network.classify_detections(scene, key, &mut self.memory, detections).map(|_| ()),
+                Some((_, network)) => network.classify_with(seen, key, memory, detections).map(|_| ()),
                 None => Ok(()),
             }
         })
+    }
+
+    fn health(&self) -> Health {
+        if self.failed_steps >= NOTICED_AFTER_SCANS { Health::Failed } else { Health::Ok }
     }
 }

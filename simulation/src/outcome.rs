@@ -200,6 +200,20 @@ pub struct MisSummary {
     pub goal_in_reach: Option<bool>,
     /// The reason for the engagement or, if it never engaged, the reason given at the last control step.
     pub reason: Reason,
+    /// When and why it was not available. `None` if it was available all the time.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unavailable: Option<Unavailability>,
+}
+
+/// When the margin increase system was not available, because the ego knew that sensors had failed.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Unavailability {
+    /// Time from which on it was not available, for the first time (s).
+    pub from_s: f64,
+    /// Time for which it was not available, in sum (s).
+    pub lasted_s: f64,
+    /// The reason, at that first time.
+    pub reason: Reason,
 }
 
 /// The result of one run. A collision is a result, not an error. A run that cannot be completed has no outcome but a

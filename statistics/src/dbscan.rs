@@ -23,7 +23,12 @@ impl Dbscan {
     ///
     /// A neighbour is at most `radius` away. A core point has at least `core_points` neighbours, itself included. The order
     /// in which a cluster reaches its points does not change the labels.
+    ///
+    /// With `core_points` = 1, every finite point is a core point: there is no noise, and the clusters are the connected
+    /// components of the points that are at most `radius` apart. 0 counts as 1. A point that is not finite is noise.
     pub fn run(&mut self, points: &[[f64; 2]], radius: f64, core_points: usize) -> u32 {
+        // Every point is its own neighbour, so that 0 would mean the same, but for points that are not finite.
+        let core_points = core_points.max(1);
         self.labels.clear();
         self.labels.resize(points.len(), None);
         self.grid.build(points, radius);
@@ -220,6 +225,36 @@ mod tests {
         }
     }
 
+    /// Returns the connected component of each point, numbered by their first points.
+    fn components(points: &[[f64; 2]], radius: f64) -> Vec<Option<u32>> {
+        let mut found = vec![None; points.len()];
+        let mut count = 0;
+        for first in 0..points.len() {
+            if found[first].is_some() {
+                continue;
+            }
+            let mut open = vec![first];
+            while let Some(row) = open.pop() {
+                found[row] = Some(count);
+                open.extend(
+                    (0..points.len()).filter(|&to| found[to].is_none() && is_within(points[row], points[to], radius)),
+                );
+            }
+            count += 1;
+        }
+        found
+    }
+
+    #[test]
+    fn a_point_that_is_not_finite_is_noise_for_every_number_of_core_points() {
+        let points = [[0.0, 0.0], [f64::NAN, 0.0], [0.5, 0.0], [9.0, f64::NAN]];
+        let mut dbscan = Dbscan::default();
+        for core_points in [0, 1, 2] {
+            assert_eq!(dbscan.run(&points, 1.0, core_points), 1, "{core_points}");
+            assert_eq!(dbscan.labels, [Some(0), None, Some(0), None], "{core_points}");
+        }
+    }
+
     /// Points in clumps, so that clusters, their borders and noise all occur.
     fn clumps() -> impl Strategy<Value = Vec<[f64; 2]>> {
         let clump = ((0.0..30.0_f64, -9.0..9.0_f64), prop::collection::vec((-1.5..1.5_f64, -1.5..1.5_f64), 1..20));
@@ -230,6 +265,14 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn with_one_core_point_the_clusters_are_the_connected_components(points in clumps(), radius in 0.2..2.0_f64) {
+            let mut dbscan = Dbscan::default();
+            let clusters = dbscan.run(&points, radius, 1);
+            prop_assert_eq!(&dbscan.labels, &components(&points, radius));
+            prop_assert_eq!(clusters as usize, dbscan.labels.iter().flatten().max().map_or(0, |max| *max as usize + 1));
+        }
+
         #[test]
         fn the_clusters_are_those_of_linfa(points in clumps(), earlier in clumps(), radius in 0.2..2.0_f64) {
             let rows = Array2::from_shape_vec((points.len(), 2), points.concat()).unwrap();

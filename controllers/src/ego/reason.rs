@@ -4,6 +4,8 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+use super::SensorAvailability;
+
 /// The reason for the state of the stack: after a change of state, the cause of the change; while following, the
 /// condition that keeps the margin increase system from engaging.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -13,6 +15,12 @@ pub enum Reason {
     NoMis,
     /// The ego is not in automated mode.
     NotAutomated,
+    /// The system is not available, because the front radar has failed.
+    FrontSensorFailed,
+    /// The system is not available, because the surround sensors have failed.
+    SurroundSensorsFailed,
+    /// The system is not available, because the rear sensors have failed.
+    RearSensorsFailed,
     /// No vehicle is ahead in the lane of the ego.
     NoFront,
     /// The front time headway is already long enough.
@@ -73,6 +81,9 @@ impl Reason {
         match self {
             Self::NoMis => "no margin increase system",
             Self::NotAutomated => "not in automated mode",
+            Self::FrontSensorFailed => "not available: front radar failed",
+            Self::SurroundSensorsFailed => "not available: surround sensors failed",
+            Self::RearSensorsFailed => "not available: rear sensors failed",
             Self::NoFront => "no vehicle ahead",
             Self::FrontMarginLong => "front time headway long enough",
             Self::NoRear => "no vehicle behind in the lane",
@@ -99,6 +110,18 @@ impl Reason {
             Self::BrakingRequired => "emergency braking required",
             Self::BrakingDone => "emergency braking done",
             Self::External => "the controller's own reason",
+        }
+    }
+}
+
+impl SensorAvailability {
+    /// Returns the reason for which a system that needs all sensors is not available; `None` if all sensors work.
+    pub const fn reason(&self) -> Option<Reason> {
+        match self {
+            Self { front: false, .. } => Some(Reason::FrontSensorFailed),
+            Self { surround: false, .. } => Some(Reason::SurroundSensorsFailed),
+            Self { rear: false, .. } => Some(Reason::RearSensorsFailed),
+            Self { front: true, surround: true, rear: true } => None,
         }
     }
 }

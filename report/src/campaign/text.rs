@@ -119,6 +119,9 @@ fn write_arm(f: &mut fmt::Formatter<'_>, name: &str, arm: &ArmCounts, inference:
     if arm.engagements > 0 {
         write!(f, "  {} engaged, goal in reach in {}", arm.engagements, arm.goals_in_reach)?;
     }
+    if arm.unavailable > 0 {
+        write!(f, "  not available in {}", arm.unavailable)?;
+    }
     write!(f, "  up to {:.1} m/s slower than the lead vehicle", arm.max_speed_deficit_mps)?;
     if arm.errors > 0 {
         write!(f, "  {} ERRORS", arm.errors)?;

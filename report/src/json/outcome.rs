@@ -1,6 +1,6 @@
 //! The outcome of a run as JSON.
 
-use closecall_simulation::outcome::{Collision, Margins, MisSummary, Outcome, ReachedMoment};
+use closecall_simulation::outcome::{Collision, Margins, MisSummary, Outcome, ReachedMoment, Unavailability};
 use closecall_traffic::{Absent, Measured, Value as ParameterValue};
 use serde_json::{Map, Value, json};
 
@@ -95,6 +95,11 @@ fn mis(mis: &Result<MisSummary, Absent>) -> Value {
     insert(&mut object, "thw_front_at_critical_s", of(|mis| mis.thw_front_at_critical_s));
     insert(&mut object, "mean_deceleration_mps2", of(|mis| mis.mean_deceleration_mps2));
     object.insert("goal_in_reach".to_owned(), json!(mis.as_ref().ok().and_then(|mis| mis.goal_in_reach)));
+    if let Some(unavailable) = mis.as_ref().ok().and_then(|mis| mis.unavailable) {
+        let Unavailability { from_s, lasted_s, reason } = unavailable;
+        let value = json!({ "from_s": from_s, "lasted_s": lasted_s, "reason": reason.to_string() });
+        object.insert("unavailable".to_owned(), value);
+    }
     let reason = mis.as_ref().map_or_else(ToString::to_string, |mis| mis.reason.to_string());
     object.insert("reason".to_owned(), json!(reason));
     Value::Object(object)

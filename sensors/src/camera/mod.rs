@@ -35,10 +35,12 @@ mod window;
 pub use classifier::{Backend, Classifier, ClassifierError, SHIPPED_MODEL};
 pub use config::{Camera, CameraConfig, Pipeline, Sun, SunConfig};
 pub use frame::{Frame, FrameBuffers};
+pub(crate) use image::sample_positions;
 pub use image::{CHANNELS, CROP_PX, Crop, Image, LabelledImage};
 pub use image_memory::ImageMemory;
 pub use pinhole::{FOCAL_PX, GroundBox, HEIGHT_PX, PixelRect, WIDTH_PX};
 pub use pipeline::CropClassifier;
+pub(crate) use pipeline::ImagedScene;
 pub use rear_camera::{ExposureKey, RearCamera};
 pub use shapes::HELD_OUT_SHAPES;
 #[cfg(test)]

@@ -5,6 +5,7 @@ use closecall_traffic::ClassScores;
 use super::classifier::{Backend, Classifier, ClassifierError};
 use super::image_memory::ImageMemory;
 use super::{Camera, Crop, ExposureKey, Frame, FrameBuffers, GroundBox, PixelRect, RearCamera};
+use crate::faults::CameraFault;
 use crate::lidar::LaneGeometry;
 use crate::{Detection, Scene, SceneVehicle, SensorError};
 
@@ -15,6 +16,15 @@ pub(super) const MIN_SHARE_IN_IMAGE: f64 = 0.6;
 const MIN_SCORE: f64 = 0.02;
 /// Minimum height assumed for a cluster (m), because the LiDAR's beams may have hit only the lower part of the object.
 const MIN_HEIGHT_M: f64 = 0.8;
+
+/// The scene in which detections are classified, and the one that the image shows, which is older if the camera is frozen.
+#[derive(Clone, Copy)]
+pub(crate) struct ImagedScene<'a> {
+    pub(crate) now: &'a Scene<'a>,
+    pub(crate) imaged: &'a Scene<'a>,
+    /// The fault of the camera.
+    pub(crate) fault: Option<&'a CameraFault>,
+}
 
 /// The camera and the neural network of one worker thread.
 #[derive(Debug)]
@@ -52,6 +62,17 @@ impl CropClassifier {
         memory: &mut ImageMemory,
         detections: &mut [Detection],
     ) -> Result<usize, SensorError> {
+        self.classify_with(ImagedScene { now: scene, imaged: scene, fault: None }, key, memory, detections)
+    }
+
+    /// Classifies as [`CropClassifier::classify_detections`] does, with a fault of the camera.
+    pub(crate) fn classify_with(
+        &mut self,
+        ImagedScene { now: scene, imaged, fault }: ImagedScene<'_>,
+        key: ExposureKey,
+        memory: &mut ImageMemory,
+        detections: &mut [Detection],
+    ) -> Result<usize, SensorError> {
         let lane = LaneGeometry::from_scene(scene);
         memory.begin(scene.time);
         let mut due: Vec<(usize, PixelRect)> = Vec::new();
@@ -67,9 +88,12 @@ impl CropClassifier {
         }
         let windows: Vec<PixelRect> = due.iter().map(|(_, window)| *window).collect();
         let mut frame =
-            Frame::with_buffers(std::mem::take(&mut self.lists), self.camera.camera(), scene, key, &windows);
+            Frame::with_buffers(std::mem::take(&mut self.lists), self.camera.camera(), imaged, key, &windows);
         for (index, window) in &due {
             frame.crop(*window, &mut self.crop);
+            if let Some(fault) = fault {
+                fault.apply(&mut self.crop, fault.glare(imaged));
+            }
             let image_scores = self
                 .classifier
                 .classify(&self.crop)

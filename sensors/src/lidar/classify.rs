@@ -9,7 +9,7 @@ use closecall_traffic::ClassScores;
 
 use super::LaneGeometry;
 use super::boxes::BoxFit;
-use crate::gaussian::Gaussian;
+use closecall_tracking::Gaussian;
 
 /// The prior and the size distribution of a class.
 struct ClassModel {

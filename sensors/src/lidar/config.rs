@@ -4,12 +4,43 @@ use closecall_traffic::{Check, Choice, ConfigError, Num, Parameters, Range};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::faults::LidarFault;
+
 /// A LiDAR model that can be simulated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum LidarModel {
     /// The second generation of the Valeo SCALA.
     #[serde(rename = "scala-2")]
     Scala2,
+}
+
+/// The state of the registration plates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Plates {
+    /// As on vehicles in use.
+    InUse,
+    /// Covered with road dirt, which takes four fifths of the light.
+    Dirty,
+    /// Not mounted at the front, as some states and vehicles allow: the paint is seen in its place.
+    None,
+}
+
+/// A retro-reflector with the coefficient R_A (cd/(lx·m²)) looks like a Lambertian surface of ρ = π·R_A. New plates have some
+/// tens (ISO 7591 sets the minimum). 20 is assumed for a plate in use.
+const PLATE: f64 = std::f64::consts::PI * 20.0;
+/// Share of a plate's reflectivity that remains under dirt (assumption).
+const DIRTY_SHARE: f64 = 0.2;
+
+impl Plates {
+    /// Returns the equivalent Lambertian reflectivity; `None` if there is no plate.
+    fn reflectivity(self) -> Option<f64> {
+        match self {
+            Self::InUse => Some(PLATE),
+            Self::Dirty => Some(DIRTY_SHARE * PLATE),
+            Self::None => None,
+        }
+    }
 }
 
 /// The rear LiDAR as described in a scenario file.
@@ -32,6 +63,9 @@ pub struct LidarConfig {
     /// Share of the light (0 to 1) that the sensor's window transmits each way: 1 if clean, 0 if blocked by snow or
     /// mud.
     pub window_transmission: Num,
+    /// State of the registration plates of the vehicles behind. Their plates are retro-reflectors, which carry the detection of
+    /// dark cars.
+    pub plates: Choice<Plates>,
 }
 
 impl Default for LidarConfig {
@@ -46,6 +80,7 @@ impl Default for LidarConfig {
             dropout: Num::Fixed(0.01),
             levelling_sd_rad: Num::Fixed(0.0005),
             window_transmission: Num::Fixed(1.0),
+            plates: Choice::Fixed(Plates::InUse),
         }
     }
 }
@@ -60,6 +95,10 @@ pub struct Lidar {
     pub(crate) dropout: f64,
     pub(crate) levelling_sd_rad: f64,
     pub(crate) window_transmission: f64,
+    /// Reflectivity of registration plates; `None` if vehicles have none.
+    pub(crate) plate_reflectivity: Option<f64>,
+    /// Rotation of the sensor about the vertical axis (rad): an error of the mounting.
+    pub(crate) yaw_rad: f64,
     /// Whether the points are the truth: no noise, no loss, no weather.
     pub(crate) is_exact: bool,
 }
@@ -68,6 +107,17 @@ pub struct Lidar {
 const EXACT_RANGE_M: f64 = 500.0;
 
 impl Lidar {
+    /// Returns the LiDAR as it is with this fault, of which the ego does not know.
+    pub(crate) fn with_fault(self, fault: &LidarFault) -> Self {
+        Self {
+            mount_height_m: self.mount_height_m + fault.height_m,
+            tilt_rad: self.tilt_rad + fault.pitch_rad,
+            yaw_rad: self.yaw_rad + fault.yaw_rad,
+            window_transmission: self.window_transmission * fault.window_transmission,
+            ..self
+        }
+    }
+
     /// Returns the same LiDAR without noise and losses.
     pub(crate) fn exact(self) -> Self {
         let (dropout, levelling_sd_rad, window_transmission) = (0.0, 0.0, 1.0);
@@ -89,6 +139,8 @@ impl Check for LidarConfig {
             dropout: number(&self.dropout, "dropout", Range::closed(0.0, 0.5))?,
             levelling_sd_rad: number(&self.levelling_sd_rad, "levelling-sd-rad", Range::closed(0.0, 0.02))?,
             window_transmission: number(&self.window_transmission, "window-transmission", Range::closed(0.0, 1.0))?,
+            plate_reflectivity: parameters.word(&self.plates, "plates")?.reflectivity(),
+            yaw_rad: 0.0,
             is_exact: false,
         })
     }
@@ -105,6 +157,8 @@ impl Default for Lidar {
             dropout: 0.01,
             levelling_sd_rad: 0.0005,
             window_transmission: 1.0,
+            plate_reflectivity: Plates::InUse.reflectivity(),
+            yaw_rad: 0.0,
             is_exact: false,
         }
     }

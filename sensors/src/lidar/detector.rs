@@ -7,6 +7,8 @@ use super::classify::{class_scores, typical_size_m};
 use super::clustering::{Clustering, NOISE};
 use super::ground::{Candidate, select_candidates};
 use super::{LaneGeometry, LidarScan, PointSource, ScanTruth};
+use closecall_tracking::SIDE_PROTRUSION_M;
+
 use crate::{Detection, Extent, SensorError};
 
 /// Number of columns between the edges of two clusters within which the nearer cluster may occlude the other.
@@ -53,8 +55,6 @@ const WHEEL_SD_M: f64 = 0.08;
 const TRUNCATED_LENGTH_SD_M: f64 = 0.5;
 /// Standard deviation of such a front if the rear end is not seen either (m).
 const TRUNCATED_SD_M: f64 = 3.0;
-/// Distance by which mirrors and wheels may protrude from a vehicle's side (m).
-pub(crate) const SIDE_PROTRUSION_M: f64 = 0.25;
 /// Length of the visible side from which a vehicle's length counts as measured (m).
 const SIDE_SEEN_M: f64 = 3.0;
 /// Spacing of the columns on a side below which the farthest point of the side counts as its end (m).

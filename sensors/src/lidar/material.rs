@@ -36,9 +36,6 @@ pub enum Material {
 /// Windows transmit nearly all light or reflect it away from the sensor. Only dust and the edge of the dashboard return
 /// light (assumption).
 const GLASS: f64 = 0.05;
-/// A retro-reflector with the coefficient R_A (cd/(lx·m²)) looks like a Lambertian surface of ρ = π·R_A. New plates
-/// have some tens (ISO 7591 sets the minimum). 20 is assumed for a plate in use.
-const PLATE: f64 = std::f64::consts::PI * 20.0;
 /// A clear lens in front of a reflector (assumption).
 const LAMP: f64 = 1.0;
 /// Rubber with carbon black (assumption, in line with the reflectivity of dark rubber in the near infrared).
@@ -63,11 +60,13 @@ const WET_FILM_MM: f64 = 0.2;
 
 impl Material {
     /// Returns the equivalent Lambertian reflectivity on a vehicle of this appearance, in this weather.
-    pub fn reflectivity(self, appearance: &Appearance, environment: &Environment) -> f64 {
+    ///
+    /// The reflectivity of a plate is that of the LiDAR's configuration; the paint is seen where there is none.
+    pub fn reflectivity(self, plate: Option<f64>, appearance: &Appearance, environment: &Environment) -> f64 {
         match self {
             Self::Paint => appearance.paint_reflectivity,
             Self::Glass => GLASS,
-            Self::Plate => PLATE,
+            Self::Plate => plate.unwrap_or(appearance.paint_reflectivity),
             Self::Lamp => LAMP,
             Self::Tyre => TYRE,
             Self::Plastic => PLASTIC,

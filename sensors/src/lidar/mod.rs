@@ -34,6 +34,7 @@ mod shapes;
 mod silhouette;
 mod soft;
 mod solid;
+mod spoil;
 mod targets;
 #[cfg(test)]
 mod tests;
@@ -43,7 +44,6 @@ pub use config::{Lidar, LidarConfig, LidarModel};
 pub use detector::Detector;
 #[cfg(test)]
 pub(crate) use detector::FACE_SD_M;
-pub(crate) use detector::SIDE_PROTRUSION_M;
 pub use lane::LaneGeometry;
 pub use material::Material;
 pub use pattern::{BEAMS, COLUMNS, LAYERS, Pattern};

@@ -32,6 +32,8 @@ pub(crate) enum Purpose {
 const PURPOSES: u64 = 8;
 /// 2⁶⁴ divided by the golden ratio, the increment of SplitMix64.
 const INCREMENT: u64 = 0x9e37_79b9_7f4a_7c15;
+/// What tells the key of the faults of a scan from the key of its noise: an arbitrary number.
+const FAULTS: u64 = 0x5c0f_fa17_0b5e_55ed;
 /// Factor that scales a sum of four uniform numbers, of variance 1/12 each, to variance 1.
 const SQRT_3: f32 = 1.732_050_8;
 
@@ -55,6 +57,11 @@ impl Noise {
     /// Returns the same noise with all normal numbers at zero.
     pub(crate) fn silenced(self) -> Self {
         Self { scale: 0.0, ..self }
+    }
+
+    /// Returns other noise for the same scan, for what faults do to it.
+    pub(crate) fn of_faults(self) -> Self {
+        Self { key: self.key ^ FAULTS, scale: 1.0 }
     }
 
     /// Returns 64 random bits for a beam and a purpose.

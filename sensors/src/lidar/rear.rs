@@ -3,6 +3,7 @@
 use closecall_traffic::Stream;
 
 use super::{Detector, LaneGeometry, Lidar, LidarScan, ScanTruth, Scanner, SegmentationReport};
+use crate::faults::LidarFault;
 use crate::{Detection, Scene, SensorError};
 
 /// The rear LiDAR: its scanner and its processing chain.
@@ -23,6 +24,24 @@ impl RearLidar {
     pub fn scan(&mut self, scene: &Scene<'_>, rng: &mut Stream) -> &LidarScan {
         self.lane = Some(LaneGeometry::from_scene(scene));
         self.scanner.scan(scene, rng)
+    }
+
+    /// Scans `scene` with a fault of the sensor. The processing takes the road to be that of `believed`, the scene as the ego
+    /// believes it to be. Draws exactly one number from `rng`.
+    pub(crate) fn scan_with(
+        &mut self,
+        [scene, believed]: [&Scene<'_>; 2],
+        rng: &mut Stream,
+        fault: Option<&LidarFault>,
+    ) {
+        let lane = *self.lane.insert(LaneGeometry::from_scene(believed));
+        match fault {
+            Some(fault) if fault.is_dead => self.scanner.blank(scene.time, rng),
+            Some(fault) if fault.is_frozen => self.scanner.hold(scene.time, rng),
+            _ => {
+                self.scanner.scan_with((scene, &lane), rng, fault);
+            }
+        }
     }
 
     /// Detects boxes in the latest scan. Returns no boxes before the first scan.

@@ -15,7 +15,7 @@ use super::{Lidar, LidarScan, Material, PointSource, PointTruth, ScanTruth};
 use crate::Scene;
 
 /// Intensity at which the receiver saturates, as a reflectivity.
-const MAX_INTENSITY: f32 = 4.0;
+pub(super) const MAX_INTENSITY: f32 = 4.0;
 
 /// The sensor's pose as the ego estimates it: the pitch is measured with an error.
 #[derive(Clone, Copy, Debug)]

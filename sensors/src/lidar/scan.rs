@@ -79,6 +79,8 @@ pub enum PointSource {
     Spray,
     /// Droplets of fog or rain.
     Fog,
+    /// Nothing: a fault of the sensor.
+    False,
 }
 
 /// The ground truth of one point.

@@ -19,9 +19,11 @@ use super::roadside::{PlacedSolid, append_guard_rails};
 use super::shapes::append_solids;
 use super::soft::{self, Plume};
 use super::solid::Solid;
+use super::spoil::Spoiler;
 use super::targets::{Beams, Surface, Targets};
 use super::viewpoint::{Viewpoint, plane_from_body};
 use super::{LaneGeometry, Lidar, LidarScan, Material, MirrorSide, PointSource, ScanTruth};
+use crate::faults::LidarFault;
 use crate::{Scene, SceneVehicle};
 
 /// Duration of a sweep (s).
@@ -37,7 +39,10 @@ struct Sweep {
     pose: SensorPoseEstimate,
     link: LinkBudget,
     noise: Noise,
+    /// What tells the returns of guard rails that the detector would discard; `None` if the sensor has a fault.
     rails: Option<RailReturns>,
+    /// What a fault does to the points, and the road if guard rails stand along it.
+    fault: Option<(LidarFault, Option<LaneGeometry>)>,
 }
 
 /// The extent of a sweep.
@@ -112,7 +117,8 @@ impl Scanner {
         if !self.scan.is_empty() {
             return false;
         }
-        self.repeat(Extent::UntilFirst);
+        let is_spoilt = self.latest.is_some_and(|sweep| sweep.fault.is_some());
+        self.repeat(if is_spoilt { Extent::Complete } else { Extent::UntilFirst });
         let is_dark = self.scan.is_empty();
         self.clear();
         is_dark
@@ -122,18 +128,49 @@ impl Scanner {
     ///
     /// Points that the detector would discard are left out; see [`Scanner::complete`].
     pub fn scan(&mut self, scene: &Scene<'_>, rng: &mut Stream) -> &LidarScan {
+        self.scan_with((scene, &LaneGeometry::from_scene(scene)), rng, None)
+    }
+
+    /// Replaces the latest scan by one without points, as of a sensor that is silent. Draws exactly one number from `rng`.
+    pub(crate) fn blank(&mut self, time: Time, rng: &mut Stream) {
+        Noise::draw(rng);
+        self.clear();
+        self.stamp(time);
+        self.latest = None;
+    }
+
+    /// Keeps the latest scan as the scan at `time`, as of a sensor that is frozen. Draws exactly one number from `rng`.
+    pub(crate) fn hold(&mut self, time: Time, rng: &mut Stream) {
+        Noise::draw(rng);
+        self.stamp(time);
+    }
+
+    /// Scans the scene with a fault of the sensor, as [`Scanner::scan`] does without one. `lane` is the road that the detector
+    /// assumes.
+    pub(crate) fn scan_with(
+        &mut self,
+        (scene, lane): (&Scene<'_>, &LaneGeometry),
+        rng: &mut Stream,
+        fault: Option<&LidarFault>,
+    ) -> &LidarScan {
         let drawn = Noise::draw(rng);
         let noise = if self.lidar.is_exact { drawn.silenced() } else { drawn };
         let mirror_side = Self::mirror_side_at(scene.time);
-        let viewpoint = Viewpoint::new(scene, &self.lidar);
+        let actual = fault.map_or(self.lidar, |fault| self.lidar.with_fault(fault));
+        let viewpoint = Viewpoint::new(scene, &actual);
         self.collect_targets(scene, mirror_side, &viewpoint);
         let pose = SensorPoseEstimate::new(scene, &self.lidar, noise);
         self.begin(scene.time, mirror_side, &pose);
-        let link = LinkBudget::new(&self.lidar, scene.environment);
-        let rails = RailReturns::new(&LaneGeometry::from_scene(scene));
-        let sweep = Sweep { mirror_side, viewpoint, pose, link, noise, rails };
+        let link = LinkBudget::new(&actual, scene.environment);
+        // With a fault, a point may be elsewhere than its return.
+        let rails = if fault.is_none() { RailReturns::new(lane) } else { None };
+        let fault = fault
+            .filter(|fault| fault.changes_points())
+            .map(|fault| (*fault, scene.road.has_guard_rails().then(|| LaneGeometry::from_scene(scene))));
+        let sweep = Sweep { mirror_side, viewpoint, pose, link, noise, rails, fault };
         self.latest = Some(sweep);
         self.sweep(&sweep, Extent::WithoutBackground);
+        self.spoil(&sweep);
         &self.scan
     }
 
@@ -142,7 +179,22 @@ impl Scanner {
         if let Some(sweep) = self.latest {
             self.clear();
             self.sweep(&sweep, extent);
+            self.spoil(&sweep);
         }
+    }
+
+    /// Spoils the points of the scan if the sensor has a fault.
+    fn spoil(&mut self, sweep: &Sweep) {
+        let Some((fault, rails)) = &sweep.fault else { return };
+        let spoiler = Spoiler {
+            fault,
+            noise: sweep.noise.of_faults(),
+            pose: &sweep.pose,
+            pattern: &self.pattern,
+            mirror_side: sweep.mirror_side,
+            rails: rails.as_ref(),
+        };
+        spoiler.spoil(&mut self.scan, &mut self.truth);
     }
 
     /// Sweeps over all columns and appends their returns to the scan.
@@ -204,12 +256,17 @@ impl Scanner {
     /// Clears the scan and sets its times and its mirror side.
     fn begin(&mut self, end: Time, mirror_side: MirrorSide, pose: &SensorPoseEstimate) {
         self.clear();
+        self.stamp(end);
+        self.scan.mirror_side = mirror_side;
+        self.scan.sensor_x_m = pose.sensor_x_m();
+    }
+
+    /// Sets the times of the scan.
+    fn stamp(&mut self, end: Time) {
         #[expect(clippy::cast_possible_truncation, reason = "a sweep has 14,777,777 ns")]
         let sweep = Time::from_ns(SWEEP_NS as i64);
         self.scan.start = end - sweep;
         self.scan.end = end;
-        self.scan.mirror_side = mirror_side;
-        self.scan.sensor_x_m = pose.sensor_x_m();
     }
 
     /// Collects all solids and spray plumes that a beam could hit.
@@ -233,7 +290,7 @@ impl Scanner {
         self.guard_rails.clear();
         append_guard_rails(scene.road, scene.ego.state.s_m, &mut self.guard_rails);
         let appearance = scene.ego.vehicle.appearance;
-        let steel = |material: Material| material.reflectivity(&appearance, scene.environment);
+        let steel = |material: Material| material.reflectivity(None, &appearance, scene.environment);
         let surface = Surface { source: PointSource::GuardRail, reflectivity: &steel };
         for (solid, pose) in &self.guard_rails {
             let placed = plane_from_body(*pose, 0.0);
@@ -253,7 +310,8 @@ impl Scanner {
         let frozen = view.sensor_from_plane(before_end_s)
             * plane_from_body(moved_back(pose, other, before_end_s), other.pitch_rad);
         let appearance = other.vehicle.appearance;
-        let reflectivity = |material: Material| material.reflectivity(&appearance, scene.environment);
+        let plate = self.lidar.plate_reflectivity;
+        let reflectivity = |material: Material| material.reflectivity(plate, &appearance, scene.environment);
         let surface = Surface { source: PointSource::Actor(other.actor), reflectivity: &reflectivity };
         self.solids.clear();
         append_solids(&other.vehicle, &mut self.solids);
@@ -295,94 +353,4 @@ fn moved_back(pose: PlanePose, vehicle: &SceneVehicle, before_end_s: f64) -> Pla
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::cast::NO_FACE;
-    use super::super::cast::by_brute_force;
-    use super::super::pattern::{Column, Elevation, LAYERS, LAYERS_PER_GROUP, SUBRAY_ROWS, SUBRAYS};
-    use super::*;
-
-    /// Maximum relative difference between a distance in single and in double precision.
-    const PRECISION: f64 = 2e-5;
-
-    impl Scanner {
-        /// Asserts that three ray casts of a scene agree: the fast one, the one by brute force, and one in double
-        /// precision that clips a ray at one plane after the other. The first two agree to the bit. The third may
-        /// differ at edges.
-        pub(crate) fn assert_cast_agrees_with_brute_force(&mut self, scene: &Scene<'_>) {
-            let mirror_side = Self::mirror_side_at(scene.time);
-            self.collect_targets(scene, mirror_side, &Viewpoint::new(scene, &self.lidar));
-            self.active.start(&self.targets);
-            let (mut hits, mut differ) = (0, 0);
-            for (index, column) in self.pattern.columns.iter().enumerate() {
-                let elevations = self.pattern.elevations(mirror_side, index);
-                self.hits.clear();
-                for &part in self.active.advance_to(index, &self.targets) {
-                    self.hits.cast(column, elevations, &self.targets.parts[part], &self.targets);
-                }
-                let brute = by_brute_force(column, elevations, &self.targets);
-                assert_eq!(self.hits.beams, brute.beams, "column {index}");
-                if index % 5 == 0 {
-                    for layer in 0..LAYERS {
-                        let [rays, differing] = self.compare_exactly(column, elevations, layer);
-                        hits += rays;
-                        differ += differing;
-                    }
-                }
-            }
-            assert!(differ <= 2 + hits / 200, "{differ} of {hits}");
-        }
-
-        /// Returns the number of sub-rays of a beam that hit something, and how many of them differ in double
-        /// precision.
-        fn compare_exactly(&self, column: &Column, elevations: &[Elevation], layer: usize) -> [usize; 2] {
-            let group = layer / LAYERS_PER_GROUP;
-            let hits = &self.hits.beams[layer];
-            let mut counts = [0; 2];
-            for subray in 0..SUBRAYS {
-                let (across, upward) = super::super::cast::subray_position(subray);
-                assert!(upward < SUBRAY_ROWS);
-                let direction = [column.cos[group][across], column.sin[group][across], elevations[layer].tan[upward]];
-                let exact = self.nearest_m(direction.map(f64::from));
-                let quick = (hits.face[subray] != NO_FACE).then(|| 1.0 / f64::from(hits.inverse[subray]));
-                counts[0] += usize::from(quick.is_some());
-                counts[1] += usize::from(match (quick, exact) {
-                    (Some(quick), Some(exact)) => (quick / exact - 1.0).abs() > PRECISION * (1.0 + exact),
-                    (None, None) => false,
-                    _ => true,
-                });
-            }
-            counts
-        }
-
-        /// Returns the distance at which a ray first enters a solid (m), found by clipping it at one plane after the
-        /// other.
-        fn nearest_m(&self, direction: [f64; 3]) -> Option<f64> {
-            let mut nearest: Option<f64> = None;
-            for part in &self.targets.parts {
-                let (mut enter, mut leave) = (0.0_f64, f64::INFINITY);
-                let sides = part
-                    .faces
-                    .front_facing()
-                    .map(|face| (face, -1.0))
-                    .chain(part.faces.back_facing().map(|face| (face, 1.0)));
-                for (face, sign) in sides {
-                    let face = &self.targets.faces[face];
-                    let offset = sign * f64::from(face.offset_m);
-                    let along: f64 = face.inverse.iter().zip(direction).map(|(n, d)| f64::from(*n) * offset * d).sum();
-                    let at = offset / along;
-                    if along < 0.0 {
-                        enter = enter.max(at);
-                    } else if along > 0.0 {
-                        leave = leave.min(at);
-                    } else if offset < 0.0 {
-                        leave = 0.0;
-                    }
-                }
-                if enter < leave && enter > 0.0 {
-                    nearest = Some(nearest.map_or(enter, |other| other.min(enter)));
-                }
-            }
-            nearest
-        }
-    }
-}
+mod tests;

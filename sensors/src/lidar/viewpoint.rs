@@ -30,6 +30,8 @@ pub(crate) struct Viewpoint {
     pub(crate) sensor_position_m: Vector3<f64>,
     /// Angle of the sensor's axis above the horizontal (rad).
     pub(crate) axis_rad: f64,
+    /// Rotation of the sensor about the vertical axis, to the left seen from above (rad).
+    yaw_rad: f64,
 }
 
 /// The ego's motion from an instant of the sweep to its end, as a rotation and a translation that transform a point
@@ -61,6 +63,7 @@ impl Viewpoint {
                 ego.pitch_rad,
             ),
             axis_rad: ego.pitch_rad + lidar.tilt_rad,
+            yaw_rad: lidar.yaw_rad,
         }
     }
 
@@ -79,7 +82,11 @@ impl Viewpoint {
     /// Returns the transform from the plane to the sensor's frame, `before_end_s` before the end of the sweep.
     pub(crate) fn sensor_from_plane(&self, before_end_s: f64) -> Isometry3<f64> {
         let level_from_plane = plane_from_body(self.ego_at(before_end_s), 0.0).inverse();
-        let turn = UnitQuaternion::from_rotation_matrix(&sensor_axes(self.axis_rad));
+        let level = UnitQuaternion::from_rotation_matrix(&sensor_axes(self.axis_rad));
+        let turn = match self.yaw_rad {
+            0.0 => level,
+            yaw_rad => level * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -yaw_rad),
+        };
         Isometry3::from_parts(Translation3::from(-(turn * self.sensor_position_m)), turn) * level_from_plane
     }
 

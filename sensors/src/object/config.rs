@@ -29,7 +29,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::Alterations;
 use crate::lidar::HALF_FIELD_DEG;
-use crate::tracking::lifecycle::{LifecycleRules, MAX_WINDOW};
+use closecall_tracking::lifecycle::{LifecycleRules, MAX_WINDOW};
 
 /// Maximum latency in control steps: 0.4 s.
 pub(super) const MAX_LATENCY_STEPS: usize = 10;

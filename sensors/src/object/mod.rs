@@ -9,11 +9,13 @@
 //!
 //! - The vehicle that a measurement belongs to is known.
 //! - Lengths and widths are the true ones.
-//! - There are no ghost objects.
+//! - There are no ghost objects, unless the scenario injects one.
 //! - The radar's angle error does not grow with range.
-//! - The ego's own motion and its position in the lane are known exactly (odometry and map).
+//! - The ego's own motion and its position in the lane are known exactly (odometry and map), unless the scenario gives them
+//!   errors.
 
 mod config;
+mod faulty;
 mod noise;
 mod perception;
 mod sensor;

@@ -2,10 +2,11 @@
 
 use super::sensor::{ObjectSensor, ScanInput};
 use super::{NoiseKey, ObjectSensorModel};
+use crate::faults::{Belief, Faults};
 use crate::perception::FieldOfView;
 use crate::surroundings::{OtherVehicle, transform_scene};
-use crate::tracking::TrackList;
 use crate::{Perception, Scene, SensorError, SensorHealth};
+use closecall_tracking::TrackList;
 use closecall_traffic::Track;
 
 /// Perception by object-level sensors only.
@@ -14,6 +15,7 @@ pub struct ObjectPerception {
     sensors: [ObjectSensor; 3],
     others: Vec<OtherVehicle>,
     list: TrackList,
+    belief: Belief,
 }
 
 impl ObjectPerception {
@@ -29,16 +31,30 @@ impl ObjectPerception {
             ],
             others: Vec::new(),
             list: TrackList::default(),
+            belief: Belief::default(),
         }
+    }
+
+    /// Returns the same sensors with faults.
+    #[must_use]
+    pub(crate) fn with_faults(self, faults: &Faults) -> Self {
+        let [front, surround, rear] = self.sensors;
+        let sensors = [
+            front.with_faults(faults.front_radar),
+            surround.with_faults(faults.surround),
+            rear.with_faults(faults.rear_object),
+        ];
+        Self { sensors, belief: Belief::new(faults.odometry), ..self }
     }
 }
 
 impl Perception for ObjectPerception {
     fn step(&mut self, scene: &Scene<'_>) -> Result<&[Track], SensorError> {
-        let frame = transform_scene(scene, &mut self.others)?;
+        let scene = self.belief.of(scene);
+        let frame = transform_scene(&scene, &mut self.others)?;
         self.list.tracks.clear();
         self.list.tracks.reserve(self.sensors.len() * scene.others.len());
-        let input = ScanInput { scene, frame: &frame, others: &self.others };
+        let input = ScanInput { scene: &scene, frame: &frame, others: &self.others };
         for sensor in &mut self.sensors {
             sensor.scan(&input, &mut self.list);
         }

@@ -8,24 +8,30 @@
 //! L is the latency in control steps. The vehicle that a measurement belongs to is known, because an object-level
 //! sensor models the output of a sensor with its own tracking. Only the full LiDAR chain can confuse two vehicles.
 
-use closecall_traffic::{CONTROL_STEP, ClassScores, Environment, Source, Track, TrackId, VehicleClass};
+use rand::RngExt;
+
+use closecall_traffic::{CONTROL_STEP, ClassScores, Environment, Source, Stream, Track, TrackId, VehicleClass};
 
 use super::config::{MAX_LATENCY_STEPS, ObjectSensorModel};
+use super::faulty::Faulty;
 use super::noise::{MeasurementErrors, NoiseKey, TargetNoise};
 use super::visibility::{Direction, Field, Visibility};
 use super::weather::range_in_weather_m;
 use crate::alterations::BACKGROUND;
-use crate::gaussian::Gaussian;
+use crate::faults::{FaultList, ObjectFault};
 use crate::perception::FieldOfView;
 use crate::surroundings::OtherVehicle;
-use crate::tracking::TrackList;
-use crate::tracking::axis::{AxisEstimate, AxisFilter, AxisMeasurement};
-use crate::tracking::lifecycle::Lifecycle;
-use crate::tracking::motion::{
+use crate::{Health, Scene};
+use closecall_tracking::Gaussian;
+use closecall_tracking::TrackList;
+use closecall_tracking::axis::{AxisEstimate, AxisFilter, AxisMeasurement};
+use closecall_tracking::lifecycle::Lifecycle;
+use closecall_tracking::motion::{
     ACROSS_MODES, ACROSS_WHITE_MODE, ALONG_MODES, ALONG_WHITE_MODE, EgoRear, Mode, RearVehicle, Situation,
 };
-use crate::tracking::road_filter::{LATERAL_SPEED_PRIOR_SD_MPS, POSITION_PRIOR_SD_M, SPEED_PRIOR_SD_MPS, in_ego_frame};
-use crate::{Health, Scene};
+use closecall_tracking::road_filter::{
+    LATERAL_SPEED_PRIOR_SD_MPS, POSITION_PRIOR_SD_M, SPEED_PRIOR_SD_MPS, in_ego_frame,
+};
 use closecall_traffic::ego_frame::EgoFrame;
 
 /// Standard deviation of a track's speed above which the track is not confirmed (m/s): no function could act on it yet.
@@ -51,6 +57,8 @@ struct Target {
     filters: Option<(TrackId, Lifecycle, [AxisFilter; 2])>,
     /// Ring buffer of the latest reports; the index is the step modulo the length.
     reports: [Option<Report>; MAX_LATENCY_STEPS + 1],
+    /// Decides which measurements a fault loses; drawn from in each step if the sensor has faults.
+    fault_rng: Option<Stream>,
 }
 
 /// The input of one scan.
@@ -78,6 +86,9 @@ pub(crate) struct ObjectSensor {
     range_m: f64,
     targets: Vec<Target>,
     step: usize,
+    faults: FaultList<ObjectFault>,
+    fault: Option<ObjectFault>,
+    faulty: Faulty,
 }
 
 impl ObjectSensor {
@@ -118,7 +129,15 @@ impl ObjectSensor {
             range_m: model.range_m,
             targets: Vec::new(),
             step: 0,
+            faults: FaultList::default(),
+            fault: None,
+            faulty: Faulty::default(),
         }
+    }
+
+    /// Returns the same sensor with faults.
+    pub(crate) fn with_faults(self, faults: FaultList<ObjectFault>) -> Self {
+        Self { faults, ..self }
     }
 
     /// Measures one scene, and appends to `list` the tracks whose latency has elapsed.
@@ -135,15 +154,56 @@ impl ObjectSensor {
         let field =
             Field { direction: self.direction, range_m: self.range_m, half_angle_tan: self.model.half_angle_tan };
         self.visibility.update(self.direction, input.others, &size);
+        let has_faults = !self.faults.is_empty();
+        let before = list.tracks.len();
+        self.fault = if has_faults { self.faults.at(input.scene.time) } else { None };
         for other in input.others {
             let index = self.target_index(other.actor);
             let errors = self.targets[index].noise.draw(&self.model);
             let errors = errors.mirrored_for(input.scene.road.overtaking_side());
+            let errors = MeasurementErrors { is_lost: errors.is_lost || has_faults && self.loses(index), ..errors };
             let errors = self.visibility.sees(&field, other, &size).then_some(errors);
             self.update_target(index, other, errors, &ego, list);
             self.report(index, other, input, list);
         }
+        if has_faults {
+            self.degrade(before, input, list);
+        }
         self.step += 1;
+    }
+
+    /// Returns whether a fault loses the measurement of a vehicle in this step.
+    fn loses(&mut self, index: usize) -> bool {
+        let share = self.fault.map_or(0.0, |fault| fault.dropout);
+        self.targets[index].fault_rng.as_mut().is_some_and(|rng| rng.random::<f64>() < share)
+    }
+
+    /// Returns the latency in control steps, with that of a fault.
+    fn latency_steps(&self) -> usize {
+        let late = self.fault.map_or(0, |fault| fault.delay_steps());
+        (self.model.latency_steps + late).min(MAX_LATENCY_STEPS)
+    }
+
+    /// Changes the tracks of this step, which are those from `before` on, as the faults do: none of a dead sensor, the former ones
+    /// of a frozen one, and one without a vehicle.
+    fn degrade(&mut self, before: usize, input: &ScanInput<'_>, list: &mut TrackList) {
+        let fault = self.fault.unwrap_or_default();
+        self.faulty.observe(&fault);
+        if fault.is_dead {
+            list.tracks.truncate(before);
+            // After a restart, the sensor begins anew.
+            for target in &mut self.targets {
+                (target.filters, target.reports) = (None, [None; MAX_LATENCY_STEPS + 1]);
+            }
+            return;
+        }
+        self.faulty.hold(fault.is_frozen, before, input.scene.time, list);
+        if let Some(ghost) = fault.ghost {
+            let since_s = self.faults.since_s(input.scene.time).unwrap_or(0.0);
+            let is_ahead = self.direction == Direction::Ahead;
+            let track = self.faulty.ghost(ghost, since_s, is_ahead, (self.source, input), list);
+            list.tracks.extend(track);
+        }
     }
 
     /// Updates the range if the weather has changed.
@@ -157,9 +217,16 @@ impl ObjectSensor {
         }
     }
 
-    /// Returns the sensor's health: degraded if the weather costs more than half of the range.
+    /// Returns the sensor's health: failed if it has delivered nothing, or always the same, for a while; degraded if the weather
+    /// costs more than half of the range.
     pub(crate) fn health(&self) -> Health {
-        if self.range_m < DEGRADED_SHARE * self.model.range_m { Health::Degraded } else { Health::Ok }
+        if self.faulty.is_noticed() {
+            Health::Failed
+        } else if self.range_m < DEGRADED_SHARE * self.model.range_m {
+            Health::Degraded
+        } else {
+            Health::Ok
+        }
     }
 
     /// Returns the field of view in the weather of the latest scan.
@@ -171,7 +238,10 @@ impl ObjectSensor {
     fn target_index(&mut self, actor: usize) -> usize {
         self.targets.iter().position(|target| target.actor == actor).unwrap_or_else(|| {
             let noise = TargetNoise::new(&self.key, self.channel, actor, &self.model);
-            self.targets.push(Target { actor, noise, filters: None, reports: [None; MAX_LATENCY_STEPS + 1] });
+            let fault_channel = || format!("{}-fault", self.channel);
+            let fault_rng = (!self.faults.is_empty()).then(|| self.key.stream_about(&fault_channel(), actor));
+            let reports = [None; MAX_LATENCY_STEPS + 1];
+            self.targets.push(Target { actor, noise, filters: None, reports, fault_rng });
             self.targets.len() - 1
         })
     }
@@ -236,7 +306,8 @@ impl ObjectSensor {
 
     /// Stores the current estimate in the ring buffer, and appends the one stored `latency_steps` ago to `list`.
     fn report(&mut self, index: usize, other: &OtherVehicle, input: &ScanInput<'_>, list: &mut TrackList) {
-        let latency_s = self.model.latency_steps as f64 * CONTROL_STEP.s();
+        let latency_steps = self.latency_steps();
+        let latency_s = latency_steps as f64 * CONTROL_STEP.s();
         let target = &mut self.targets[index];
         let length = target.reports.len();
         target.reports[self.step % length] = target.filters.as_ref().map(|(id, lifecycle, [along, across])| Report {
@@ -246,7 +317,7 @@ impl ObjectSensor {
             across: across.predicted(latency_s),
         });
         // The entry is still `None` before the first report is due.
-        let due = target.reports[(self.step + length - self.model.latency_steps) % length];
+        let due = target.reports[(self.step + length - latency_steps) % length];
         if let Some(report) = due {
             list.tracks.push(self.track(&report, other, input));
         }

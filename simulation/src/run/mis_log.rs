@@ -1,9 +1,9 @@
 //! Summarises what the margin increase system (MIS) did in a run, from its commands.
 
 use closecall_controllers::{EgoCommand, EgoState, Reason};
-use closecall_traffic::{Absent, Measured, Time};
+use closecall_traffic::{Absent, CONTROL_STEP, Measured, Time};
 
-use crate::outcome::MisSummary;
+use crate::outcome::{MisSummary, Unavailability};
 
 /// The ego at one control step, as the summary needs it.
 pub(super) struct MisObservation<'a> {
@@ -13,6 +13,8 @@ pub(super) struct MisObservation<'a> {
     pub(super) thw_front_s: Measured,
     /// True only at the first control step at which the rear vehicle is at the critical distance.
     pub(super) is_critical: bool,
+    /// Why the system is not available; `None` if it is.
+    pub(super) failed: Option<Reason>,
 }
 
 /// The ego at the first engagement.
@@ -33,12 +35,17 @@ pub(super) struct MisLog {
     thw_front_at_critical_s: Option<Measured>,
     mean_deceleration_mps2: Option<f64>,
     last_reason: Option<Reason>,
+    unavailable: Option<Unavailability>,
 }
 
 impl MisLog {
     /// Observes one control step.
     pub(super) fn observe(&mut self, now: &MisObservation<'_>) {
         self.last_reason = Some(now.command.reason);
+        if let Some(reason) = now.failed {
+            let first = Unavailability { from_s: now.time.s(), lasted_s: 0.0, reason };
+            self.unavailable.get_or_insert(first).lasted_s += CONTROL_STEP.s();
+        }
         let is_active = matches!(now.command.state, EgoState::Increasing | EgoState::Holding);
         if self.engaged.is_none() && now.command.state == EgoState::Increasing {
             self.engaged = Some(Engagement {
@@ -78,6 +85,7 @@ impl MisLog {
             mean_deceleration_mps2: self.mean_deceleration_mps2.ok_or(after_engagement(Absent::NotReleased)),
             goal_in_reach: engaged.and_then(|engaged| engaged.goal_in_reach),
             reason: engaged.map_or(last_reason, |engaged| engaged.reason),
+            unavailable: self.unavailable,
         })
     }
 }

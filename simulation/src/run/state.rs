@@ -2,7 +2,7 @@
 
 use closecall_controllers::CheckedDriver;
 use closecall_controllers::{
-    DriverInput, DriverNote, EgoCommand, EgoController, EgoInput, EgoState, Looks, MisSettings, Neighbours,
+    DriverInput, DriverNote, EgoCommand, EgoController, EgoInput, EgoState, Looks, MisSettings, Neighbours, Reason,
 };
 use closecall_sensors::{Perception, Scene, SceneVehicle};
 use closecall_traffic::{CONTROL_STEP, ENGAGEMENT_CLOSING_MPS, ENGAGEMENT_GAP_M, Measured, Track, VehicleState};
@@ -172,14 +172,14 @@ impl<'a> Run<'a> {
             if !command.acceleration_mps2.is_finite() {
                 return Err(SampleError::Command { value: command.acceleration_mps2, time });
             }
-            self.accept_command(command, observer);
+            self.accept_command(command, input.sensors.reason(), observer);
         }
         self.report_step(observer);
         Ok(())
     }
 
-    /// Stores the command of the ego controller, and notes what follows from it.
-    fn accept_command(&mut self, command: EgoCommand, observer: &mut dyn Observer) {
+    /// Stores the command of the ego controller, and notes what follows from it. `failed` says which sensors have failed.
+    fn accept_command(&mut self, command: EgoCommand, failed: Option<Reason>, observer: &mut dyn Observer) {
         let time = self.world.time();
         let from = self.command.map_or(EgoState::Following, |last| last.state);
         if command.state != from {
@@ -196,6 +196,7 @@ impl<'a> Run<'a> {
             speed_mps: self.world.state(ego).speed_mps,
             thw_front_s: self.margins.thw_front_s,
             is_critical,
+            failed,
         });
     }
 

@@ -12,7 +12,7 @@ use toml_edit::DocumentMut;
 
 use super::edit::{Setting, SettingError};
 use super::recorded::RecordedError;
-use super::{Scenario, ScenarioConfig, locate, recorded};
+use super::{Scenario, ScenarioConfig, base, locate, recorded};
 
 /// Number of random samples that `check` checks in addition to the nominal values and the bounds.
 const CHECKED_SAMPLES: u64 = 64;
@@ -145,6 +145,17 @@ impl ScenarioFile {
         if text.trim().is_empty() {
             return Err(ScenarioError::Empty { path: path.to_owned() });
         }
+        match base::expand(text) {
+            Ok(None) => Self::parse_whole(path, text, settings),
+            Ok(Some(whole)) => {
+                Self::parse_whole(path, &whole, settings).map_err(|error| base::located(error, &whole, text))
+            }
+            Err(message) => Err(ScenarioError::Syntax { path: path.to_owned(), line: 1, message }),
+        }
+    }
+
+    /// Parses the text of a scenario that has no base.
+    fn parse_whole(path: &Path, text: &str, settings: &[Setting]) -> Result<Self, ScenarioError> {
         // The unchanged text is parsed first, so that errors in the file have the line numbers of the file.
         let mut config = deserialize(path, text)?;
         // A setting may replace the only use of a parameter. Only a parameter that the file itself does not use is a mistake.

@@ -10,6 +10,9 @@
 
 use closecall_controllers::{CheckedDriver, EgoState, ReactionChange};
 use closecall_sensors::Alterations;
+use closecall_sensors::faults::{
+    CameraFaultConfig, FaultEntries, LidarFaultConfig, ObjectFaultConfig, OdometryErrorConfig,
+};
 use closecall_traffic::{CONTROL_STEP, ConfigError, Num, Parameters, Problem, Range};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -90,6 +93,18 @@ pub struct FaultConfig {
     pub class_background: bool,
     /// Additional reaction time of drivers who start behind the ego (s). No driver needs more than 3 s.
     pub rear_reaction_s: Option<Num>,
+    /// Faults of the rear LiDAR, at most four: sensor mode `full`.
+    pub rear_lidar: Vec<LidarFaultConfig>,
+    /// Faults of the rear camera, at most four: sensor mode `full`.
+    pub rear_camera: Vec<CameraFaultConfig>,
+    /// Faults of the front radar, at most four.
+    pub front_radar: Vec<ObjectFaultConfig>,
+    /// Faults of the surround sensors, at most four.
+    pub surround: Vec<ObjectFaultConfig>,
+    /// Faults of the object-level sensor that replaces LiDAR and camera in mode `object`, at most four.
+    pub rear_object: Vec<ObjectFaultConfig>,
+    /// Errors of the ego's odometry and map, of which the ego does not know. Default: none.
+    pub odometry: Option<OdometryErrorConfig>,
 }
 
 /// Checked interventions.
@@ -127,6 +142,13 @@ impl Interventions {
             let problem = Problem::OutOfRange { value: extra_latency_s, allowed };
             return Err(ConfigError::new("delay-s", problem).within("fault"));
         }
+        let entries = FaultEntries {
+            rear_lidar: &fault.rear_lidar,
+            rear_camera: &fault.rear_camera,
+            object: [&fault.front_radar, &fault.surround, &fault.rear_object],
+            odometry: fault.odometry.as_ref(),
+        };
+        let faults = entries.check(parameters).map_err(|error| error.within("fault"))?;
         let later_s = number(&fault.rear_reaction_s, "rear-reaction-s", MAX_REACTION_S)?;
         let later = (later_s > 0.0).then_some(ReactionChange::Later(later_s));
         Ok(Self {
@@ -137,6 +159,7 @@ impl Interventions {
                 has_no_latency: ideal.timing,
                 extra_latency_s,
                 is_class_background: fault.class_background,
+                faults,
             },
             has_true_tracks: ideal.tracks,
             has_ideal_actuation: ideal.actuation,

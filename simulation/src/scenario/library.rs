@@ -1,12 +1,13 @@
 //! The scenario library: the files of `scenarios/library`, which are part of the program.
 
 use std::path::PathBuf;
+use std::sync::LazyLock;
 
 use closecall_traffic::suggest::nearest;
 use serde::Serialize;
 use toml::{Table, Value};
 
-use super::{ScenarioError, ScenarioFile};
+use super::{ScenarioError, ScenarioFile, base};
 
 /// Embeds scenarios of `scenarios/library`, or of a folder in it, by their names.
 macro_rules! embedded {
@@ -39,9 +40,63 @@ const LIBRARY: [(&str, &str); 14] = embedded![
 /// The scenarios of the folder `traffic` of the library: those with surrounding traffic.
 const TRAFFIC: [(&str, &str); 2] = embedded!["traffic": "busy-overtake", "dense-traffic"];
 
-/// Returns all scenarios, those with surrounding traffic last.
+/// The scenarios of the folder `faults` of the library: those in which a sensor has a fault. They say how they differ from their
+/// base.
+const FAULTS: [(&str, &str); 27] = embedded![
+    "faults":
+    "camera-dead",
+    "camera-dirty",
+    "camera-frozen",
+    "camera-low-sun",
+    "camera-main-beam",
+    "camera-out-of-focus",
+    "front-radar-dead",
+    "lidar-blocked",
+    "lidar-blooming",
+    "lidar-clock-offset",
+    "lidar-crosstalk",
+    "lidar-dead",
+    "lidar-dirty",
+    "lidar-dropout",
+    "lidar-frozen",
+    "lidar-jitter",
+    "lidar-late",
+    "lidar-lost-frames",
+    "lidar-misaligned",
+    "lidar-noisy",
+    "lidar-rail-ghosts",
+    "object-dead",
+    "object-dropout",
+    "object-frozen",
+    "object-ghost",
+    "object-late",
+    "odometry-wrong",
+];
+
+/// The scenarios of [`FAULTS`], each with the text of the whole scenario.
+static EXPANDED_FAULTS: LazyLock<Vec<(&str, String)>> = LazyLock::new(|| {
+    let whole = |text: &str| base::expand(text).ok().flatten().unwrap_or_else(|| text.to_owned());
+    FAULTS.iter().map(|(name, text)| (*name, whole(text))).collect()
+});
+
+/// Returns all scenarios: those with surrounding traffic, and then those with faults last.
 fn all() -> impl Iterator<Item = (&'static str, &'static str)> {
+    plain().chain(EXPANDED_FAULTS.iter().map(|(name, text)| (*name, text.as_str())))
+}
+
+/// Returns all scenarios that have no base.
+fn plain() -> impl Iterator<Item = (&'static str, &'static str)> {
     LIBRARY.into_iter().chain(TRAFFIC)
+}
+
+/// Returns the names of the scenarios that can be a base.
+pub(super) fn plain_names() -> impl Iterator<Item = &'static str> {
+    plain().map(|(name, _)| name)
+}
+
+/// Returns the text of a scenario that can be a base, or `None` if the library has none of that name.
+pub(super) fn plain_text(name: &str) -> Option<&'static str> {
+    plain().find(|(known, _)| *known == name).map(|(_, text)| text)
 }
 
 /// A name that is not that of a scenario of the library.
@@ -99,7 +154,8 @@ impl LibraryEntry {
     }
 }
 
-/// Returns the names of the scenarios, in alphabetical order, those with surrounding traffic last.
+/// Returns the names of the scenarios, in alphabetical order, those with surrounding traffic and then those with faults
+/// last.
 pub fn names() -> impl Iterator<Item = &'static str> {
     all().map(|(name, _)| name)
 }
@@ -156,7 +212,8 @@ mod tests {
             names.sort();
             names
         };
-        let expected = [names_in(&folder), names_in(&folder.join("traffic"))].concat();
+        let expected =
+            [names_in(&folder), names_in(&folder.join("traffic")), names_in(&folder.join("faults"))].concat();
         assert_eq!(names().collect::<Vec<_>>(), expected);
         for (entry, (name, text)) in entries().unwrap().into_iter().zip(all()) {
             assert_eq!(entry.name, ScenarioFile::parse(&path(name), text, &[]).unwrap().config().name);

@@ -8,6 +8,7 @@
 //! A scenario file describes a *logical* scenario: fixed values, and parameters that are sampled. The parameter values of
 //! one sample turn it into a *concrete* scenario, [`Scenario`], which is valid by construction.
 
+mod base;
 mod checked;
 mod config;
 mod edit;

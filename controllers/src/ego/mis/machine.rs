@@ -186,6 +186,9 @@ impl Mis {
         if !situation.automated {
             return Err(Reason::NotAutomated);
         }
+        if let Some(failed) = situation.input.sensors.reason() {
+            return Err(failed);
+        }
         let thw_s = situation.thw_front_s().map_err(|_| Reason::NoFront)?;
         if !(thw_s < settings.short_thw_s) {
             return Err(Reason::FrontMarginLong);
@@ -252,7 +255,7 @@ impl Mis {
         } else if lane == PassingLane::Occupied {
             release(Reason::PassingLaneOccupied)
         } else if now - target.last_lane_free > LOSS_TIMEOUT {
-            release(Reason::PassingLaneUnknown)
+            release(situation.input.sensors.reason().unwrap_or(Reason::PassingLaneUnknown))
         } else {
             None
         }

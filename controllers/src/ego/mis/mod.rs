@@ -22,6 +22,7 @@
 //! | condition | holds if | reason otherwise |
 //! |---|---|---|
 //! | the ego is in automated mode | `automated` | `NotAutomated` |
+//! | the system is available: no group of sensors has failed | front, surround and rear sensors work | `FrontSensorFailed`, `SurroundSensorsFailed`, `RearSensorsFailed` |
 //! | the ego follows a lead vehicle at a short margin | a track is ahead in the lane of the ego, and THW_F < `short-thw-s` | `NoFront`, `FrontMarginLong` |
 //! | a rear vehicle is present | a track is behind with at least half of its probability in the lane of the ego; nearer tracks that are not confirmed or not classified as vehicles do not hide it | `NoRear` |
 //! | its track is established | confirmed, or coasting | `RearUnconfirmed` |
@@ -29,7 +30,7 @@
 //! | it is near | d_R ≤ `engage-gap-m` | `RearFar` |
 //! | it approaches | Δv − 1.645·σ ≥ `engage-closing-mps`: with confidence, judged by the covariance of its track | `RearNotApproaching` |
 //! | it has a passing lane | the road has a lane on the overtaking side of the ego | `NoPassingLane` |
-//! | the state of that lane is known | front, surround and rear sensors work, and no unconfirmed track is in the way there | `PassingLaneUnknown` |
+//! | the state of that lane is known | no unconfirmed track is in the way there | `PassingLaneUnknown` |
 //! | that lane is free | no vehicle there is within 15 m of the rear vehicle while that uses it: from 40 m behind the ego until 10 m ahead of it, all at constant speed | `PassingLaneOccupied` |
 //!
 //! # Transitions
@@ -48,7 +49,7 @@
 //! | | releasing | d_R > 1.2 × `engage-gap-m` | `RearFellBack` |
 //! | | releasing | Δv < ½ `engage-closing-mps` for 1 s | `RearFollows` |
 //! | | releasing | the passing lane is occupied | `PassingLaneOccupied` |
-//! | | releasing | the passing lane has not been known to be free for half a second; this includes sensor failures | `PassingLaneUnknown` |
+//! | | releasing | the passing lane has not been known to be free for half a second; this includes sensor failures | `PassingLaneUnknown`, or which sensor has failed |
 //! | holding | releasing | the lead vehicle is lost; the rear vehicle is entirely ahead; the rear vehicle is lost for half a second | as above |
 //! | | releasing | `hold-s` has expired | `HoldExpired` |
 //! | | releasing | there is no room any more | `NoRoomToHold` |

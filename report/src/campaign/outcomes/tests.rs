@@ -45,6 +45,7 @@ fn outcome(sample: u64, controller: &str) -> Outcome {
         mean_deceleration_mps2: Ok(0.75),
         goal_in_reach: Some(true),
         reason: Reason::Engaged,
+        unavailable: None,
     };
     Outcome {
         scenario: "low-thw-overtake".to_owned(),

@@ -85,7 +85,7 @@ fn rear_receding_or_slow() {
 fn passing_lane_occupied_unknown_or_absent() {
     let mut bench = Bench::new();
     bench.sensors.surround = false;
-    bench.assert_not_engaged(Reason::PassingLaneUnknown);
+    bench.assert_not_engaged(Reason::SurroundSensorsFailed);
     bench.sensors = SensorAvailability::ALL;
     bench.tracks.push(track(3, 5.0, 30.0, 0));
     bench.assert_not_engaged(Reason::PassingLaneOccupied);

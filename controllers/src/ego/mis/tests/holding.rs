@@ -136,16 +136,16 @@ fn the_length_of_a_truck_or_motorcycle_decides_when_it_is_past() {
 
 #[test]
 fn a_sensor_failure_releases_after_half_a_second() {
-    for broken in [
-        SensorAvailability { surround: false, ..SensorAvailability::ALL },
-        SensorAvailability { rear: false, ..SensorAvailability::ALL },
-        SensorAvailability { front: false, ..SensorAvailability::ALL },
+    for (broken, reason) in [
+        (SensorAvailability { surround: false, ..SensorAvailability::ALL }, Reason::SurroundSensorsFailed),
+        (SensorAvailability { rear: false, ..SensorAvailability::ALL }, Reason::RearSensorsFailed),
+        (SensorAvailability { front: false, ..SensorAvailability::ALL }, Reason::FrontSensorFailed),
     ] {
         let mut bench = Bench::engaged();
         bench.lead().state[0] = 60.0;
         bench.sensors = broken;
         assert_eq!(bench.step_for(0.4).state, EgoState::Increasing);
-        bench.assert_released(0.2, Reason::PassingLaneUnknown);
+        bench.assert_released(0.2, reason);
         // The system does not engage again while the sensor is missing.
         bench.lead().state[0] = 21.0 + CAR_M;
         assert_eq!(bench.step_for(1.0).state, EgoState::Following);

@@ -1,0 +1,442 @@
+//! The faults of the rear LiDAR, the rear camera and the object-level sensors as a scenario file describes them.
+//!
+//! Sources: the yaw of a mounted LiDAR can be measured to 0.1° in production (Kim et al. 2020, arXiv 2008.10542), so that a
+//! residual of some tenths of a degree is what a fault of the mounting means. All other magnitudes are the scenario's choice.
+
+use closecall_traffic::{CONTROL_STEP, ConfigError, Num, Parameters, Problem, Range};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::camera::CameraFault;
+use super::list::{Combine, FaultList, check_span};
+use crate::lidar::HALF_FIELD_DEG;
+
+/// Longest additional latency (s).
+const MAX_DELAY_S: f64 = 0.4;
+/// Greatest share of measurements that can be lost.
+const SHARE: Range = Range::closed(0.0, 1.0);
+/// Maximum number of blocked sectors: one for each entry.
+pub(crate) const MAX_SECTORS: usize = 4;
+
+/// A fault of the rear LiDAR. It holds from `from-s` to `until-s`, with all effects that it names.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
+pub struct LidarFaultConfig {
+    /// Time at which the fault begins (s). Default: before the start of the run.
+    pub from_s: Option<Num>,
+    /// Time at which the fault ends (s). Default: the end of the run.
+    pub until_s: Option<Num>,
+    /// The sensor delivers nothing.
+    pub dead: bool,
+    /// The sensor delivers the points of its latest scan again and again, with new time stamps.
+    pub frozen: bool,
+    /// Share of scans that do not arrive (-).
+    pub lost_frames: Option<Num>,
+    /// Share of points that are lost, regardless of their power (-), in addition to the sensor's own `dropout`. Default: 0.
+    pub dropout: Option<Num>,
+    /// Azimuth at which a blocked sector begins (deg): 0 is straight behind, positive is to the ego's left.
+    pub blocked_from_deg: Option<Num>,
+    /// Azimuth at which the blocked sector ends (deg).
+    pub blocked_to_deg: Option<Num>,
+    /// Share of the light that dirt on the window transmits each way (-), in addition to the sensor's own
+    /// `window-transmission`.
+    pub window_transmission: Option<Num>,
+    /// Additional latency of each scan (s).
+    pub delay_s: Option<Num>,
+    /// Greatest further latency of a scan, drawn anew for each (s). Scans arrive in their order.
+    pub jitter_s: Option<Num>,
+    /// Error of the time stamps (s): positive if a scan counts as measured later than it was.
+    pub clock_offset_s: Option<Num>,
+    /// Error of the mounting, of which the ego does not know: rotation of the sensor about the vertical axis, to the left seen
+    /// from above (deg). After calibration some tenths of a degree remain.
+    pub yaw_deg: Option<Num>,
+    /// Error of the mounting: upward tilt of the sensor's axis (deg).
+    pub pitch_deg: Option<Num>,
+    /// Error of the mounting: height of the sensor above the place at which the ego believes it (m).
+    pub height_m: Option<Num>,
+    /// Standard deviation of an additional error of each range (m).
+    pub range_noise_m: Option<Num>,
+    /// Share of the points on vehicles that return a second time as a mirror image behind a guard rail (-). It needs
+    /// `guard-rails`.
+    pub rail_ghosts: Option<Num>,
+    /// Mean number of bursts of false points in a scan, as pulses of another LiDAR cause them (-).
+    pub crosstalk: Option<Num>,
+    /// Half-width of the halo of false points around a saturated return of a registration plate (deg).
+    pub blooming_deg: Option<Num>,
+}
+
+/// The effects of faults of the rear LiDAR at one instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct LidarFault {
+    pub(crate) is_dead: bool,
+    pub(crate) is_frozen: bool,
+    pub(crate) lost_frames: f64,
+    pub(crate) dropout: f64,
+    /// Azimuths of blocked sectors, from the right to the left (deg).
+    pub(crate) blocked_deg: [Option<[f64; 2]>; MAX_SECTORS],
+    pub(crate) window_transmission: f64,
+    pub(crate) delay_s: f64,
+    pub(crate) jitter_s: f64,
+    pub(crate) clock_offset_s: f64,
+    pub(crate) yaw_rad: f64,
+    pub(crate) pitch_rad: f64,
+    pub(crate) height_m: f64,
+    pub(crate) range_noise_m: f64,
+    pub(crate) rail_ghosts: f64,
+    pub(crate) crosstalk: f64,
+    pub(crate) blooming_deg: f64,
+}
+
+impl Default for LidarFault {
+    fn default() -> Self {
+        Self {
+            is_dead: false,
+            is_frozen: false,
+            lost_frames: 0.0,
+            dropout: 0.0,
+            blocked_deg: [None; MAX_SECTORS],
+            window_transmission: 1.0,
+            delay_s: 0.0,
+            jitter_s: 0.0,
+            clock_offset_s: 0.0,
+            yaw_rad: 0.0,
+            pitch_rad: 0.0,
+            height_m: 0.0,
+            range_noise_m: 0.0,
+            rail_ghosts: 0.0,
+            crosstalk: 0.0,
+            blooming_deg: 0.0,
+        }
+    }
+}
+
+/// Returns the share that two independent losses cause together.
+fn either(one: f64, other: f64) -> f64 {
+    1.0 - (1.0 - one) * (1.0 - other)
+}
+
+impl Combine for LidarFault {
+    fn and(self, other: Self) -> Self {
+        let mut blocked_deg = self.blocked_deg;
+        let free = blocked_deg.iter_mut().filter(|sector| sector.is_none());
+        free.zip(other.blocked_deg.into_iter().flatten()).for_each(|(slot, sector)| *slot = Some(sector));
+        Self {
+            is_dead: self.is_dead || other.is_dead,
+            is_frozen: self.is_frozen || other.is_frozen,
+            lost_frames: either(self.lost_frames, other.lost_frames),
+            dropout: either(self.dropout, other.dropout),
+            blocked_deg,
+            window_transmission: self.window_transmission * other.window_transmission,
+            delay_s: self.delay_s + other.delay_s,
+            jitter_s: self.jitter_s + other.jitter_s,
+            clock_offset_s: self.clock_offset_s + other.clock_offset_s,
+            yaw_rad: self.yaw_rad + other.yaw_rad,
+            pitch_rad: self.pitch_rad + other.pitch_rad,
+            height_m: self.height_m + other.height_m,
+            range_noise_m: self.range_noise_m.hypot(other.range_noise_m),
+            rail_ghosts: either(self.rail_ghosts, other.rail_ghosts),
+            crosstalk: self.crosstalk + other.crosstalk,
+            blooming_deg: self.blooming_deg.max(other.blooming_deg),
+        }
+    }
+}
+
+impl LidarFault {
+    /// Returns the additional latency in control steps, for a uniform random number of this scan.
+    pub(crate) fn delay_steps(&self, uniform: f64) -> u64 {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "checked to be at most some seconds"
+        )]
+        let steps = ((self.delay_s + uniform * self.jitter_s) / CONTROL_STEP.s()).round() as u64;
+        steps
+    }
+
+    /// Returns whether the points of a scan differ from those of a sensor without faults, apart from power and pose.
+    pub(crate) fn changes_points(&self) -> bool {
+        let amounts = [self.dropout, self.range_noise_m, self.rail_ghosts, self.crosstalk, self.blooming_deg];
+        amounts.iter().any(|amount| *amount > 0.0) || self.blocked_deg.iter().any(Option::is_some)
+    }
+}
+
+/// Returns the error of an entry that names no effect.
+fn without_effect() -> ConfigError {
+    ConfigError::new("dead", Problem::Missing { needed: "an effect of the fault, such as `dead = true`" })
+}
+
+impl LidarFaultConfig {
+    /// Checks the entries of `[[fault.rear-lidar]]`.
+    pub(crate) fn check_all(
+        key: &str,
+        entries: &[Self],
+        parameters: &Parameters,
+    ) -> Result<FaultList<LidarFault>, ConfigError> {
+        FaultList::check(key, entries, |entry| entry.check(parameters))
+    }
+
+    fn check(&self, parameters: &Parameters) -> Result<(LidarFault, [f64; 2]), ConfigError> {
+        let number = |num: &Option<Num>, key, range| parameters.number_or(num.as_ref(), key, range, 0.0);
+        let angle = Range::closed(-HALF_FIELD_DEG, HALF_FIELD_DEG);
+        let sector = match (&self.blocked_from_deg, &self.blocked_to_deg) {
+            (None, None) => None,
+            (Some(from), Some(to)) => {
+                let from = parameters.number(from, "blocked-from-deg", angle)?;
+                let to = parameters.number(to, "blocked-to-deg", angle)?;
+                if !(from < to) {
+                    let rule = "a sector ends farther left than it begins".to_owned();
+                    let problem = Problem::Contradiction { other: "blocked-from-deg", rule };
+                    return Err(ConfigError::new("blocked-to-deg", problem));
+                }
+                Some([from, to])
+            }
+            (one, _) => {
+                let key = if one.is_none() { "blocked-from-deg" } else { "blocked-to-deg" };
+                return Err(ConfigError::new(key, Problem::Missing { needed: "a blocked sector has two ends" }));
+            }
+        };
+        let mut blocked_deg = [None; MAX_SECTORS];
+        blocked_deg[0] = sector;
+        let transmission =
+            parameters.number_or(self.window_transmission.as_ref(), "window-transmission", SHARE, 1.0)?;
+        let fault = LidarFault {
+            is_dead: self.dead,
+            is_frozen: self.frozen,
+            lost_frames: number(&self.lost_frames, "lost-frames", SHARE)?,
+            dropout: number(&self.dropout, "dropout", SHARE)?,
+            blocked_deg,
+            window_transmission: transmission,
+            delay_s: number(&self.delay_s, "delay-s", Range::closed(0.0, MAX_DELAY_S))?,
+            jitter_s: number(&self.jitter_s, "jitter-s", Range::closed(0.0, MAX_DELAY_S))?,
+            clock_offset_s: number(&self.clock_offset_s, "clock-offset-s", Range::closed(-0.2, 0.2))?,
+            yaw_rad: number(&self.yaw_deg, "yaw-deg", Range::closed(-5.0, 5.0))?.to_radians(),
+            pitch_rad: number(&self.pitch_deg, "pitch-deg", Range::closed(-5.0, 5.0))?.to_radians(),
+            height_m: number(&self.height_m, "height-m", Range::closed(-0.2, 0.5))?,
+            range_noise_m: number(&self.range_noise_m, "range-noise-m", Range::closed(0.0, 5.0))?,
+            rail_ghosts: number(&self.rail_ghosts, "rail-ghosts", SHARE)?,
+            crosstalk: number(&self.crosstalk, "crosstalk", Range::closed(0.0, 50.0))?,
+            blooming_deg: number(&self.blooming_deg, "blooming-deg", Range::closed(0.0, 5.0))?,
+        };
+        let has_effect = fault != LidarFault::default() || self.has_numbers();
+        if !has_effect {
+            return Err(without_effect());
+        }
+        Ok((fault, check_span([&self.from_s, &self.until_s], parameters)?))
+    }
+
+    /// Returns whether the entry names an effect by a number, which may be zero.
+    fn has_numbers(&self) -> bool {
+        [
+            &self.lost_frames,
+            &self.dropout,
+            &self.window_transmission,
+            &self.delay_s,
+            &self.jitter_s,
+            &self.clock_offset_s,
+            &self.yaw_deg,
+            &self.pitch_deg,
+            &self.height_m,
+            &self.range_noise_m,
+            &self.rail_ghosts,
+            &self.crosstalk,
+            &self.blooming_deg,
+        ]
+        .into_iter()
+        .any(Option::is_some)
+    }
+}
+
+/// A fault of the rear camera. It holds from `from-s` to `until-s`, with all effects that it names.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
+pub struct CameraFaultConfig {
+    /// Time at which the fault begins (s). Default: before the start of the run.
+    pub from_s: Option<Num>,
+    /// Time at which the fault ends (s). Default: the end of the run.
+    pub until_s: Option<Num>,
+    /// The camera delivers no image.
+    pub dead: bool,
+    /// The camera delivers its latest image again and again.
+    pub frozen: bool,
+    /// Share of the pixel's range that a low sun in the image adds to every pixel, while it takes the same share of the contrast
+    /// (-).
+    pub sun_glare: Option<Num>,
+    /// The same for the main beam of the nearest vehicle behind, at 30 m and below (-). Farther away it falls with the square of
+    /// the distance.
+    pub main_beam_glare: Option<Num>,
+    /// Share of the lens that opaque dirt covers, in blots (-).
+    pub dirt: Option<Num>,
+    /// Standard deviation of the blur of an image that is out of focus (px).
+    pub blur_px: Option<Num>,
+}
+
+impl CameraFaultConfig {
+    /// Checks the entries of `[[fault.rear-camera]]`.
+    pub(crate) fn check_all(
+        key: &str,
+        entries: &[Self],
+        parameters: &Parameters,
+    ) -> Result<FaultList<CameraFault>, ConfigError> {
+        FaultList::check(key, entries, |entry| entry.check(parameters))
+    }
+
+    fn check(&self, parameters: &Parameters) -> Result<(CameraFault, [f64; 2]), ConfigError> {
+        let number = |num: &Option<Num>, key, range| parameters.number_or(num.as_ref(), key, range, 0.0);
+        let fault = CameraFault {
+            is_dead: self.dead,
+            is_frozen: self.frozen,
+            sun_glare: number(&self.sun_glare, "sun-glare", SHARE)?,
+            main_beam_glare: number(&self.main_beam_glare, "main-beam-glare", SHARE)?,
+            dirt: number(&self.dirt, "dirt", SHARE)?,
+            blur_px: number(&self.blur_px, "blur-px", Range::closed(0.0, 50.0))?,
+        };
+        let named = [&self.sun_glare, &self.main_beam_glare, &self.dirt, &self.blur_px];
+        if fault == CameraFault::default() && named.into_iter().all(Option::is_none) {
+            return Err(without_effect());
+        }
+        Ok((fault, check_span([&self.from_s, &self.until_s], parameters)?))
+    }
+}
+
+impl Combine for CameraFault {
+    fn and(self, other: Self) -> Self {
+        Self {
+            is_dead: self.is_dead || other.is_dead,
+            is_frozen: self.is_frozen || other.is_frozen,
+            sun_glare: either(self.sun_glare, other.sun_glare),
+            main_beam_glare: either(self.main_beam_glare, other.main_beam_glare),
+            dirt: either(self.dirt, other.dirt),
+            blur_px: self.blur_px.hypot(other.blur_px),
+        }
+    }
+}
+
+/// A fault of an object-level sensor. It holds from `from-s` to `until-s`, with all effects that it names.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
+pub struct ObjectFaultConfig {
+    /// Time at which the fault begins (s). Default: before the start of the run.
+    pub from_s: Option<Num>,
+    /// Time at which the fault ends (s). Default: the end of the run.
+    pub until_s: Option<Num>,
+    /// The sensor delivers nothing.
+    pub dead: bool,
+    /// The sensor delivers its latest tracks again and again, with new time stamps.
+    pub frozen: bool,
+    /// Share of the measurements of visible vehicles that are lost (-), in addition to the sensor's own `dropout`. Default: 0.
+    pub dropout: Option<Num>,
+    /// Additional latency (s). No sensor is later than 0.4 s.
+    pub delay_s: Option<Num>,
+    /// Distance of a track without a vehicle, in the ego's lane, when the fault begins (m): ahead of the ego for the front
+    /// radar, behind it for the other sensors.
+    pub ghost_gap_m: Option<Num>,
+    /// Speed at which that track approaches the ego (m/s). Default: 0.
+    pub ghost_closing_mps: Option<Num>,
+}
+
+/// The effects of faults of an object-level sensor at one instant.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct ObjectFault {
+    pub(crate) is_dead: bool,
+    pub(crate) is_frozen: bool,
+    pub(crate) dropout: f64,
+    pub(crate) delay_s: f64,
+    /// Gap of the ghost when its fault begins (m), and the speed at which the gap closes (m/s).
+    pub(crate) ghost: Option<[f64; 2]>,
+}
+
+impl Combine for ObjectFault {
+    fn and(self, other: Self) -> Self {
+        Self {
+            is_dead: self.is_dead || other.is_dead,
+            is_frozen: self.is_frozen || other.is_frozen,
+            dropout: either(self.dropout, other.dropout),
+            delay_s: self.delay_s + other.delay_s,
+            ghost: other.ghost.or(self.ghost),
+        }
+    }
+}
+
+impl ObjectFault {
+    /// Returns the additional latency in control steps.
+    pub(crate) fn delay_steps(&self) -> usize {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "checked to be at most some seconds"
+        )]
+        let steps = (self.delay_s / CONTROL_STEP.s()).round() as usize;
+        steps
+    }
+}
+
+impl ObjectFaultConfig {
+    /// Checks the entries of one object-level sensor.
+    pub(crate) fn check_all(
+        key: &str,
+        entries: &[Self],
+        parameters: &Parameters,
+    ) -> Result<FaultList<ObjectFault>, ConfigError> {
+        FaultList::check(key, entries, |entry| entry.check(parameters))
+    }
+
+    fn check(&self, parameters: &Parameters) -> Result<(ObjectFault, [f64; 2]), ConfigError> {
+        let number = |num: &Option<Num>, key, range| parameters.number_or(num.as_ref(), key, range, 0.0);
+        let closing_mps = number(&self.ghost_closing_mps, "ghost-closing-mps", Range::closed(-30.0, 30.0))?;
+        let ghost = match &self.ghost_gap_m {
+            Some(gap) => Some([parameters.number(gap, "ghost-gap-m", Range::closed(0.0, 200.0))?, closing_mps]),
+            None if self.ghost_closing_mps.is_some() => {
+                let problem = Problem::Missing { needed: "the gap of the track that approaches" };
+                return Err(ConfigError::new("ghost-gap-m", problem));
+            }
+            None => None,
+        };
+        let fault = ObjectFault {
+            is_dead: self.dead,
+            is_frozen: self.frozen,
+            dropout: number(&self.dropout, "dropout", SHARE)?,
+            delay_s: number(&self.delay_s, "delay-s", Range::closed(0.0, MAX_DELAY_S))?,
+            ghost,
+        };
+        let named = [&self.dropout, &self.delay_s];
+        if fault == ObjectFault::default() && named.into_iter().all(Option::is_none) {
+            return Err(without_effect());
+        }
+        Ok((fault, check_span([&self.from_s, &self.until_s], parameters)?))
+    }
+}
+
+/// The lists of a scenario's table `[fault]` that concern the sensors.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FaultEntries<'a> {
+    /// `[[fault.rear-lidar]]`
+    pub rear_lidar: &'a [LidarFaultConfig],
+    /// `[[fault.rear-camera]]`
+    pub rear_camera: &'a [CameraFaultConfig],
+    /// `[[fault.front-radar]]`, `[[fault.surround]]` and `[[fault.rear-object]]`
+    pub object: [&'a [ObjectFaultConfig]; 3],
+    /// `[fault.odometry]`
+    pub odometry: Option<&'a super::OdometryErrorConfig>,
+}
+
+impl FaultEntries<'_> {
+    /// Checks all entries.
+    ///
+    /// # Errors
+    /// [`ConfigError`] with the entry's key, if a value is out of its range, an entry names no effect, or there are more than
+    /// four entries for a sensor.
+    pub fn check(&self, parameters: &Parameters) -> Result<super::Faults, ConfigError> {
+        let [front, surround, rear] = self.object;
+        Ok(super::Faults {
+            rear_lidar: LidarFaultConfig::check_all("rear-lidar", self.rear_lidar, parameters)?,
+            rear_camera: CameraFaultConfig::check_all("rear-camera", self.rear_camera, parameters)?,
+            front_radar: ObjectFaultConfig::check_all("front-radar", front, parameters)?,
+            surround: ObjectFaultConfig::check_all("surround", surround, parameters)?,
+            rear_object: ObjectFaultConfig::check_all("rear-object", rear, parameters)?,
+            odometry: match self.odometry {
+                Some(odometry) => odometry.check(parameters).map_err(|error| error.within("odometry"))?,
+                None => super::OdometryErrors::default(),
+            },
+        })
+    }
+}

@@ -1,0 +1,99 @@
+//! The checked faults of each sensor, and which of them hold at an instant.
+
+use closecall_traffic::{ConfigError, Num, Parameters, Problem, Range, Time};
+
+use super::{CameraFault, LidarFault, ObjectFault, OdometryErrors};
+
+/// Maximum number of entries of one sensor.
+const MAX_ENTRIES: usize = 4;
+/// Longest time of a start or an end (s), that of the longest run.
+const MAX_TIME_S: f64 = 3_600.0;
+
+/// Effects that can be combined if several entries hold at once.
+pub(crate) trait Combine: Copy + PartialEq {
+    /// Returns both effects together.
+    fn and(self, other: Self) -> Self;
+}
+
+/// The entries of one sensor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct FaultList<T> {
+    entries: [Option<Entry<T>>; MAX_ENTRIES],
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Entry<T> {
+    from_s: f64,
+    until_s: f64,
+    effect: T,
+}
+
+impl<T: Copy> Default for FaultList<T> {
+    fn default() -> Self {
+        Self { entries: [None; MAX_ENTRIES] }
+    }
+}
+
+impl<T: Combine> FaultList<T> {
+    /// Checks the entries of the list `key`, which `check` turns into effects with their `from-s` and `until-s`.
+    pub(crate) fn check<C>(
+        key: &str,
+        configs: &[C],
+        check: impl Fn(&C) -> Result<(T, [f64; 2]), ConfigError>,
+    ) -> Result<Self, ConfigError> {
+        if configs.len() > MAX_ENTRIES {
+            let problem = Problem::WrongCount { value: configs.len() as u64, allowed: "at most four entries" };
+            return Err(ConfigError::new(key, problem));
+        }
+        let mut list = Self::default();
+        for (index, (slot, config)) in list.entries.iter_mut().zip(configs).enumerate() {
+            let (effect, [from_s, until_s]) = check(config).map_err(|error| error.within_index(index).within(key))?;
+            *slot = Some(Entry { from_s, until_s, effect });
+        }
+        Ok(list)
+    }
+
+    /// Returns whether there is no entry.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.entries.iter().all(Option::is_none)
+    }
+
+    /// Returns what holds at `time`: all entries together whose time has begun and has not ended. `None` if there is none.
+    pub(crate) fn at(&self, time: Time) -> Option<T> {
+        self.held(time).map(|entry| entry.effect).reduce(T::and)
+    }
+
+    /// Returns the time since the latest entry that holds at `time` began (s); `None` if none holds.
+    pub(crate) fn since_s(&self, time: Time) -> Option<f64> {
+        self.held(time).map(|entry| time.s() - entry.from_s.max(0.0)).reduce(f64::min)
+    }
+
+    fn held(&self, time: Time) -> impl Iterator<Item = &Entry<T>> {
+        self.entries.iter().flatten().filter(move |entry| entry.from_s <= time.s() && time.s() < entry.until_s)
+    }
+}
+
+/// Checks start and end of an entry. Without them, it holds from before the start of the run, or to its end.
+pub(super) fn check_span([from, until]: [&Option<Num>; 2], parameters: &Parameters) -> Result<[f64; 2], ConfigError> {
+    let number = |num: &Option<Num>, key, default| {
+        parameters.number_or(num.as_ref(), key, Range::closed(0.0, MAX_TIME_S), default)
+    };
+    let span = [number(from, "from-s", f64::NEG_INFINITY)?, number(until, "until-s", f64::INFINITY)?];
+    if !(span[0] < span[1]) {
+        let rule = "a fault ends after it has begun".to_owned();
+        return Err(ConfigError::new("until-s", Problem::Contradiction { other: "from-s", rule }));
+    }
+    Ok(span)
+}
+
+/// The checked faults of all sensors. None by default.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Faults {
+    pub(crate) rear_lidar: FaultList<LidarFault>,
+    pub(crate) rear_camera: FaultList<CameraFault>,
+    pub(crate) front_radar: FaultList<ObjectFault>,
+    pub(crate) surround: FaultList<ObjectFault>,
+    pub(crate) rear_object: FaultList<ObjectFault>,
+    /// The errors of the ego's odometry and map.
+    pub odometry: OdometryErrors,
+}

@@ -1,0 +1,37 @@
+//! Faults of the sensors, each with a start and an end: what breaks, becomes dirty, is late, or is mounted askew.
+//!
+//! ```text
+//!  [[fault.rear-lidar]]  ─▶ FaultList ─▶ what holds at this instant ─▶ scan, frames, health
+//!  [[fault.rear-camera]] ─▶     〃    ─▶            〃              ─▶ pixels of each crop, health
+//!  [[fault.front-radar]] and the other object-level sensors         ─▶ measurements, tracks, health
+//!  [fault.odometry]      ─▶ OdometryErrors ─▶ the scene as the ego believes it to be
+//! ```
+//!
+//! The ego does not know its faults. It notices only what a monitor of the sensor's output can notice: that a sensor delivers
+//! nothing ([`Health::Failed`](crate::Health::Failed) after [`NOTICED_AFTER_SCANS`] scans), or the same bits again and again.
+//! Dirt, glare, noise and a wrong mounting remain unnoticed.
+//!
+//! The random numbers of faults come from streams of their own, and from the address of a beam in a scan. A scenario without
+//! faults draws none of them.
+
+mod camera;
+mod config;
+mod list;
+mod odometry;
+#[cfg(test)]
+mod tests;
+
+pub(crate) use camera::CameraFault;
+pub use config::{CameraFaultConfig, FaultEntries, LidarFaultConfig, ObjectFaultConfig};
+pub(crate) use list::FaultList;
+pub use list::Faults;
+pub(crate) use odometry::Belief;
+pub use odometry::{OdometryErrorConfig, OdometryErrors};
+
+pub(crate) use config::{LidarFault, ObjectFault};
+
+/// Number of successive scans without output, or with the same output, after which the ego counts a sensor as failed: 1 s.
+///
+/// An assumption: long enough for a restart of the connection, and short against the 4 s or more from the detection of a rear
+/// vehicle to the critical distance.
+pub const NOTICED_AFTER_SCANS: u32 = 25;

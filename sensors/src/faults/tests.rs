@@ -1,0 +1,489 @@
+//! What each fault does to perception: the same scene with and without it.
+
+use closecall_traffic::{
+    ActorId, CONTROL_STEP, Check, ClassScores, Environment, Light, Parameters, Road, RoadConfig, Source, Time, Track,
+    TrackStatus, VehicleClass,
+};
+use serde::Deserialize;
+
+use super::config::{CameraFaultConfig, FaultEntries, LidarFaultConfig, ObjectFaultConfig};
+use super::{Faults, NOTICED_AFTER_SCANS, OdometryErrorConfig};
+use crate::camera::{Backend, CropClassifier, ExposureKey, ImageMemory, ImagedScene};
+use crate::lidar::PointSource;
+use crate::testing::{OWN_LANE_M, scene_vehicle, with_speed};
+use crate::{Alterations, Detection, Extent, Health, NoiseKey, Scene, SceneVehicle, SensorsConfig};
+
+const PERIOD_S: f64 = CONTROL_STEP.s();
+const EGO_S_M: f64 = 1_000.0;
+const LEFT_LANE_M: f64 = -1.875;
+
+/// The table `[fault]` of a scenario, as far as it concerns sensors.
+#[derive(Default, Deserialize)]
+#[serde(rename_all = "kebab-case", default, deny_unknown_fields)]
+struct Table {
+    rear_lidar: Vec<LidarFaultConfig>,
+    rear_camera: Vec<CameraFaultConfig>,
+    front_radar: Vec<ObjectFaultConfig>,
+    surround: Vec<ObjectFaultConfig>,
+    rear_object: Vec<ObjectFaultConfig>,
+    odometry: Option<OdometryErrorConfig>,
+}
+
+fn faults(text: &str) -> Result<Faults, String> {
+    let table: Table = toml::from_str(text).map_err(|error| error.to_string())?;
+    let entries = FaultEntries {
+        rear_lidar: &table.rear_lidar,
+        rear_camera: &table.rear_camera,
+        object: [&table.front_radar, &table.surround, &table.rear_object],
+        odometry: table.odometry.as_ref(),
+    };
+    entries.check(&Parameters::default()).map_err(|error| error.to_string())
+}
+
+/// What one step showed.
+struct Step {
+    tracks: Vec<Track>,
+    health: Health,
+    /// Position and source of each point of the rear LiDAR.
+    points: Vec<([f64; 3], PointSource)>,
+    widths_m: Vec<f64>,
+}
+
+impl Step {
+    /// Returns the track of a vehicle behind, if it is confirmed.
+    fn rear(&self) -> Option<&Track> {
+        self.tracks.iter().find(|track| track.source == Source::Rear && track.status != TrackStatus::Tentative)
+    }
+
+    fn on_vehicles(&self) -> usize {
+        self.points.iter().filter(|(_, source)| matches!(source, PointSource::Actor(_))).count()
+    }
+}
+
+/// A drive with sensors and faults.
+struct Drive<'a> {
+    sensors: &'a str,
+    faults: &'a str,
+    environment: Environment,
+    has_rails: bool,
+    others: Vec<SceneVehicle>,
+    steps: i64,
+}
+
+impl Default for Drive<'_> {
+    fn default() -> Self {
+        Self {
+            sensors: "mode = \"full\"\nrear-camera.pipeline = \"off\"",
+            faults: "",
+            environment: Environment::CLEAR_DAY,
+            has_rails: false,
+            others: vec![behind(60.0, OWN_LANE_M, 30.0)],
+            steps: 100,
+        }
+    }
+}
+
+/// Returns a car whose front is `gap_m` behind the ego's rear.
+fn behind(gap_m: f64, d_m: f64, speed_mps: f64) -> SceneVehicle {
+    let car = scene_vehicle(1, VehicleClass::Car, 0.0, d_m);
+    let s_m = EGO_S_M - gap_m - car.vehicle.dimensions.length_m;
+    with_speed(scene_vehicle(1, VehicleClass::Car, s_m, d_m), speed_mps)
+}
+
+impl Drive<'_> {
+    fn run(mut self) -> Vec<Step> {
+        let config: SensorsConfig = toml::from_str(self.sensors).unwrap();
+        let altered = Alterations { faults: faults(self.faults).unwrap(), ..Alterations::default() };
+        let sensors = config.check(&Parameters::default()).unwrap().altered(altered);
+        let names = ["ego", "rear"].map(|name| ActorId::new(name).unwrap());
+        let key = NoiseKey { seed: 3, sample: 1, ego: names[0].clone(), actors: names.into() };
+        let mut perception = sensors.build(&key).unwrap();
+        let mut config: RoadConfig = toml::from_str("lanes = 3").unwrap();
+        config.guard_rails = self.has_rails;
+        let road = config.check(&Parameters::default()).unwrap();
+        let mut ego = with_speed(scene_vehicle(0, VehicleClass::Car, EGO_S_M, OWN_LANE_M), 30.0);
+        let mut steps = Vec::new();
+        for step in 0..self.steps {
+            let time = CONTROL_STEP * step;
+            let scene = Scene { time, road: &road, environment: &self.environment, ego, others: &self.others };
+            let tracks = perception.step(&scene).unwrap().to_vec();
+            let mut points = Vec::new();
+            if let Some(lidar) = perception.rear_lidar() {
+                let (scan, truth) = (lidar.latest(), lidar.truth());
+                let at = |index: usize| [scan.x_m[index], scan.y_m[index], scan.z_m[index]].map(f64::from);
+                points.extend((0..scan.len()).map(|index| (at(index), truth.points[index].source)));
+            }
+            let health = perception.health();
+            let health = if health.front == Health::Failed { health.front } else { health.rear };
+            let widths_m = perception.rear_detections().iter().map(|detection| detection.width_m).collect();
+            steps.push(Step { tracks, health, points, widths_m });
+            for vehicle in self.others.iter_mut().chain([&mut ego]) {
+                vehicle.state.s_m += PERIOD_S * vehicle.state.speed_mps;
+            }
+        }
+        steps
+    }
+}
+
+fn lidar(fault: &str) -> String {
+    format!("[[rear-lidar]]\n{fault}\n")
+}
+
+fn with(fault: &str) -> Vec<Step> {
+    Drive { faults: &lidar(fault), ..Drive::default() }.run()
+}
+
+fn first_confirmed(steps: &[Step]) -> Option<usize> {
+    steps.iter().position(|step| step.rear().is_some())
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let values: Vec<f64> = values.collect();
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+fn points_per_scan(steps: &[Step]) -> f64 {
+    mean(steps.iter().map(|step| step.on_vehicles() as f64))
+}
+
+#[test]
+fn a_fault_holds_from_its_start_to_its_end_and_leaves_the_rest_as_it_is() {
+    let usual = with("dropout = 0.0");
+    let faulty = with("dropout = 0.9\nfrom-s = 1.0\nuntil-s = 2.0");
+    for (step, (usual, faulty)) in usual.iter().zip(&faulty).enumerate() {
+        let is_faulty = (25..50).contains(&step);
+        assert_eq!(usual.points == faulty.points, !is_faulty, "step {step}");
+    }
+}
+
+#[test]
+fn dropout_loses_the_stated_share_of_the_points() {
+    let share = points_per_scan(&with("dropout = 0.6")) / points_per_scan(&with("dropout = 0.0"));
+    assert!((0.33..0.47).contains(&share), "{share}");
+}
+
+#[test]
+fn a_blocked_sector_hides_what_lies_in_it_only() {
+    let others = vec![behind(60.0, OWN_LANE_M, 30.0), {
+        let mut left = behind(40.0, LEFT_LANE_M, 30.0);
+        left.actor = 2;
+        left
+    }];
+    let fault = lidar("blocked-from-deg = -1.5\nblocked-to-deg = 1.5");
+    let last = Drive { faults: &fault, others, ..Drive::default() }.run().pop().unwrap();
+    assert!(last.points.iter().all(|([_, y_m, _], _)| y_m.abs() > 0.3), "nothing straight behind");
+    let rear: Vec<_> = last.tracks.iter().filter(|track| track.source == Source::Rear).collect();
+    assert!(rear.iter().any(|track| track.y_m() > 3.0) && rear.iter().all(|track| track.y_m() > 2.0), "{rear:?}");
+}
+
+#[test]
+fn dirt_hides_a_distant_dark_car_and_costs_points() {
+    let far = |fault: &str| {
+        let mut car = behind(70.0, OWN_LANE_M, 30.0);
+        car.vehicle.appearance.paint_reflectivity = 0.2;
+        let sensors = "mode = \"full\"\nrear-camera.pipeline = \"off\"\nrear-lidar.plates = \"none\"";
+        Drive { sensors, faults: &lidar(fault), others: vec![car], ..Drive::default() }.run()
+    };
+    let (clean, dirty) = (far("window-transmission = 1.0"), far("window-transmission = 0.15"));
+    assert!(first_confirmed(&clean).is_some() && first_confirmed(&dirty).is_none());
+    assert!(points_per_scan(&dirty) < 0.3 * points_per_scan(&clean));
+    assert_eq!((clean[99].health, dirty[99].health), (Health::Ok, Health::Degraded));
+}
+
+#[test]
+fn latency_and_jitter_confirm_later_and_keep_the_order() {
+    let confirmed = |fault: &str| first_confirmed(&with(fault)).unwrap();
+    let usual = confirmed("delay-s = 0.0");
+    assert_eq!(confirmed("delay-s = 0.2"), usual + 5);
+    let jittered = confirmed("jitter-s = 0.4");
+    assert!((usual..=usual + 10).contains(&jittered), "{jittered}");
+    // A delay that ends: the late scans arrive together, none is lost.
+    let ending = with("delay-s = 0.4\nuntil-s = 2.0");
+    let usual = with("delay-s = 0.0");
+    let error_m = (ending[99].rear().unwrap().x_m() - usual[99].rear().unwrap().x_m()).abs();
+    assert!(error_m < 0.05, "{error_m} m");
+}
+
+#[test]
+fn a_frozen_lidar_leaves_the_track_behind_and_is_noticed_after_a_second() {
+    let run = |fault: &str| {
+        let others = vec![behind(80.0, OWN_LANE_M, 40.0)];
+        Drive { faults: &lidar(fault), others, ..Drive::default() }.run()
+    };
+    let (usual, frozen) = (run("frozen = true\nfrom-s = 3.9"), run("frozen = true\nfrom-s = 2.0"));
+    let noticed = frozen.iter().position(|step| step.health == Health::Failed).unwrap();
+    assert_eq!(noticed as u32, 50 + NOTICED_AFTER_SCANS - 1);
+    let [usual_m, frozen_m] = [&usual, &frozen].map(|steps| steps[90].rear().unwrap().x_m());
+    assert!(frozen_m < usual_m - 3.0, "{frozen_m} {usual_m}");
+}
+
+#[test]
+fn lost_frames_let_a_track_coast() {
+    let coasting = |fault: &str| {
+        let steps = with(fault);
+        steps.iter().filter_map(Step::rear).filter(|track| track.status == TrackStatus::Coasting).count()
+    };
+    let (usual, lossy) = (coasting("lost-frames = 0.0"), coasting("lost-frames = 0.5"));
+    assert!(usual < 10 && (30..70).contains(&lossy), "{usual} {lossy}");
+}
+
+#[test]
+fn a_dead_lidar_loses_its_tracks_and_is_noticed_after_a_second() {
+    let steps = with("dead = true\nfrom-s = 2.0");
+    assert!(steps[49].rear().is_some() && steps[99].rear().is_none());
+    let noticed = steps.iter().position(|step| step.health == Health::Failed).unwrap();
+    assert_eq!(noticed as u32, 50 + NOTICED_AFTER_SCANS - 1);
+    let back = with("dead = true\nfrom-s = 1.0\nuntil-s = 2.5");
+    assert_eq!(back[99].health, Health::Ok);
+    assert!(back[99].rear().is_some());
+}
+
+#[test]
+fn a_wrong_mounting_moves_what_is_seen_by_its_angle_and_height() {
+    let lateral_m = |fault: &str| with(fault).iter().filter_map(Step::rear).map(Track::y_m).last().unwrap();
+    // The sensor is turned to the left, so that it looks to the right, and a vehicle straight behind appears to its left of
+    // centre: at 60 m by 60 · tan 0.5°.
+    let shift_m = lateral_m("yaw-deg = 0.5") - lateral_m("yaw-deg = 0.0");
+    assert!((shift_m.abs() - 60.0 * 0.5_f64.to_radians().tan()).abs() < 0.08, "{shift_m}");
+    assert!(lateral_m("yaw-deg = -0.5") * shift_m < 0.0);
+    let height_m = |fault: &str| {
+        let steps = with(fault);
+        let points = steps.iter().flat_map(|step| &step.points);
+        mean(points.filter(|(_, of)| *of == PointSource::Actor(1)).map(|([_, _, z_m], _)| *z_m))
+    };
+    assert!(height_m("pitch-deg = -1.0") > height_m("pitch-deg = 0.0") + 0.3);
+    assert!(height_m("height-m = -0.2") > height_m("height-m = 0.0") + 0.05);
+}
+
+#[test]
+fn range_noise_scatters_the_points_along_the_line_of_sight() {
+    let spread_m = |fault: &str| {
+        let steps = with(fault);
+        let ahead = |step: &Step| step.points.iter().map(|([x_m, _, _], _)| *x_m).fold(f64::NEG_INFINITY, f64::max);
+        let nearest: Vec<f64> = steps.iter().map(ahead).filter(|x_m| x_m.is_finite()).collect();
+        let centre = mean(nearest.iter().copied());
+        mean(nearest.iter().map(|x_m| (x_m - centre).powi(2))).sqrt()
+    };
+    assert!(spread_m("range-noise-m = 0.5") > 3.0 * spread_m("range-noise-m = 0.0"));
+}
+
+#[test]
+fn a_wrong_clock_moves_an_approaching_vehicle_by_its_closing_speed() {
+    let x_m = |fault: &str| {
+        let others = vec![behind(80.0, OWN_LANE_M, 40.0)];
+        Drive { faults: &lidar(fault), others, ..Drive::default() }.run()[95].rear().unwrap().x_m()
+    };
+    let shift_m = x_m("clock-offset-s = -0.1") - x_m("clock-offset-s = 0.0");
+    assert!((shift_m - 1.0).abs() < 0.15, "{shift_m}");
+}
+
+#[test]
+fn rails_mirror_vehicles_and_only_where_there_are_rails() {
+    let run = |fault: &str, has_rails: bool| {
+        let others = vec![behind(25.0, LEFT_LANE_M, 30.0)];
+        Drive { faults: &lidar(fault), others, has_rails, ..Drive::default() }.run()
+    };
+    let ghosts = |steps: &[Step]| {
+        let points = steps.iter().flat_map(|step| &step.points);
+        points.filter(|(_, of)| *of == PointSource::False).map(|(at_m, _)| at_m[1]).collect::<Vec<f64>>()
+    };
+    let mirrored = run("rail-ghosts = 0.5", true);
+    let left: Vec<f64> = ghosts(&mirrored).into_iter().filter(|y_m| *y_m > 0.0).collect();
+    // The rail stands 0.75 m beyond the edge, 5.625 m to the left of the ego: the mirror image of 3.75 m is 9 m.
+    let y_m = mean(left.iter().copied());
+    assert!(left.len() > 1_000 && (y_m - 9.0).abs() < 0.3, "{} {y_m}", left.len());
+    let usual = run("rail-ghosts = 0.0", true);
+    assert!(ghosts(&usual).is_empty() && ghosts(&run("rail-ghosts = 0.5", false)).is_empty());
+    // The image stands close behind the rail, and is taken for a part of what stands there: the boxes beside the road change,
+    // and the track of the vehicle does not.
+    let boxes = |steps: &[Step]| steps.iter().map(|step| step.widths_m.len()).sum::<usize>();
+    assert_ne!(boxes(&mirrored), boxes(&usual));
+    let track_m = |steps: &[Step]| {
+        let own = |track: &&Track| track.source == Source::Rear && (track.y_m() - 3.75).abs() < 0.5;
+        steps[99].tracks.iter().find(own).unwrap().y_m()
+    };
+    assert!((track_m(&mirrored) - track_m(&usual)).abs() < 0.05);
+}
+
+#[test]
+fn crosstalk_adds_bursts_of_false_points_at_its_rate() {
+    let steps = with("crosstalk = 3.0");
+    let false_points = steps.iter().flat_map(|step| &step.points).filter(|(_, of)| *of == PointSource::False).count();
+    // Three bursts of 3 to 10 columns and four layers in each of the 100 scans.
+    let expected = 100.0 * 3.0 * 6.5 * 4.0;
+    assert!((false_points as f64 / expected - 1.0).abs() < 0.15, "{false_points}");
+    let detections = |steps: &[Step]| steps.iter().map(|step| step.widths_m.len()).sum::<usize>();
+    assert!(detections(&steps) > detections(&with("crosstalk = 0.0")) + 20);
+}
+
+#[test]
+fn blooming_widens_the_box() {
+    let width_m = |fault: &str| {
+        let others = vec![behind(30.0, OWN_LANE_M, 30.0)];
+        let steps = Drive { faults: &lidar(fault), others, ..Drive::default() }.run();
+        mean(steps.iter().flat_map(|step| step.widths_m.iter().copied()))
+    };
+    // A halo of 3° at 30 m reaches 1.6 m to either side of the plate.
+    let (usual_m, wide_m) = (width_m("blooming-deg = 0.0"), width_m("blooming-deg = 3.0"));
+    assert!(wide_m > usual_m + 0.5, "{usual_m} {wide_m}");
+}
+
+/// Returns the mean score that the image of a car behind gives to its class, at these gaps.
+fn score(fault: &str, environment: Environment, gaps_m: &[f64]) -> f64 {
+    let text = format!("[[rear-camera]]\n{fault}\n");
+    let fault = faults(&text).unwrap().rear_camera.at(Time::ZERO);
+    let camera = crate::camera::CameraConfig::default().check(&Parameters::default()).unwrap();
+    let mut classifier = CropClassifier::new(camera, &Backend::Tract).unwrap();
+    let road = Road::straight(3);
+    let ego = with_speed(scene_vehicle(0, VehicleClass::Car, EGO_S_M, OWN_LANE_M), 30.0);
+    mean(gaps_m.iter().flat_map(|gap_m| (0..10).map(move |key| (*gap_m, key))).map(|(gap_m, key)| {
+        let others = [behind(gap_m, OWN_LANE_M, 30.0)];
+        let scene = Scene { time: Time::ZERO, road: &road, environment: &environment, ego, others: &others };
+        let size = others[0].vehicle.dimensions;
+        let mut detections = [Detection {
+            time: Time::ZERO,
+            face_x_m: -gap_m - 0.5 * size.length_m,
+            face_y_m: 0.0,
+            range_sd_m: 0.1,
+            lateral_sd_m: 0.1,
+            heading_rad: 0.0,
+            length_m: size.length_m,
+            length: Extent::Assumed,
+            width_m: size.width_m,
+            width: Extent::Seen,
+            top_m: size.height_m,
+            points: 20,
+            class: ClassScores::UNKNOWN,
+        }];
+        let seen = ImagedScene { now: &scene, imaged: &scene, fault: fault.as_ref() };
+        let key = ExposureKey(key);
+        classifier.classify_with(seen, key, &mut ImageMemory::default(), &mut detections).unwrap();
+        detections[0].class.0[VehicleClass::Car as usize]
+    }))
+}
+
+#[test]
+fn glare_dirt_and_blur_cost_the_classification_of_a_car() {
+    let gaps_m = [25.0, 40.0, 60.0];
+    let usual = score("dirt = 0.0", Environment::CLEAR_DAY, &gaps_m);
+    assert!(usual > 0.9, "{usual}");
+    for fault in ["sun-glare = 0.97", "dirt = 0.6", "blur-px = 20.0"] {
+        let spoilt = score(fault, Environment::CLEAR_DAY, &gaps_m);
+        assert!(spoilt < usual - 0.05, "{fault}: {spoilt} of {usual}");
+    }
+}
+
+#[test]
+fn the_main_beam_blinds_near_the_ego() {
+    let night = Environment { light: Light::Night, ..Environment::CLEAR_DAY };
+    let loss =
+        |gap_m| score("main-beam-glare = 0.0", night, &[gap_m]) - score("main-beam-glare = 0.97", night, &[gap_m]);
+    assert!(loss(25.0) > loss(80.0) && loss(25.0) > 0.05, "{} {}", loss(25.0), loss(80.0));
+}
+
+#[test]
+fn a_dead_or_frozen_camera_is_noticed_after_a_second_and_one_frozen_before_the_vehicle_came_shows_none() {
+    let run = |fault: &str| {
+        let text = format!("[[rear-camera]]\n{fault}\n");
+        // The car appears from beyond the range, long after the camera has failed.
+        let others = vec![behind(45.0, OWN_LANE_M, 30.0)];
+        Drive { sensors: "mode = \"full\"", faults: &text, others, steps: 60, ..Drive::default() }.run()
+    };
+    for fault in ["dead = true\nfrom-s = 1.0", "frozen = true\nfrom-s = 1.0"] {
+        let noticed = run(fault).iter().position(|step| step.health == Health::Failed).unwrap();
+        assert_eq!(noticed as u32, 25 + NOTICED_AFTER_SCANS - 1, "{fault}");
+    }
+    let car = |steps: &[Step]| steps[59].rear().unwrap().class.0[VehicleClass::Car as usize];
+    assert!(car(&run("dead = true")) < car(&run("dirt = 0.0")), "only the shape is left");
+}
+
+fn object(sensor: &str, fault: &str, others: Vec<SceneVehicle>) -> Vec<Step> {
+    let text = format!("[[{sensor}]]\n{fault}\n");
+    Drive { sensors: "", faults: &text, others, ..Drive::default() }.run()
+}
+
+#[test]
+fn an_object_level_sensor_loses_measurements_and_is_late() {
+    let near = || vec![behind(40.0, OWN_LANE_M, 30.0)];
+    let coasting = |fault: &str| {
+        let steps = object("rear-object", fault, near());
+        steps.iter().filter_map(Step::rear).filter(|track| track.status == TrackStatus::Coasting).count()
+    };
+    assert!(coasting("dropout = 0.6") > coasting("dropout = 0.0") + 20);
+    let confirmed = |fault: &str| first_confirmed(&object("rear-object", fault, near())).unwrap();
+    assert_eq!(confirmed("delay-s = 0.2"), confirmed("delay-s = 0.0") + 5);
+}
+
+#[test]
+fn a_dead_object_level_sensor_is_silent_and_a_frozen_one_repeats_itself_until_it_is_noticed() {
+    for sensor in ["rear-object", "front-radar"] {
+        let place = |speed_mps| match sensor {
+            "rear-object" => vec![behind(60.0, OWN_LANE_M, speed_mps)],
+            _ => vec![with_speed(scene_vehicle(1, VehicleClass::Car, EGO_S_M + 60.0, OWN_LANE_M), speed_mps)],
+        };
+        let dead = object(sensor, "dead = true\nfrom-s = 2.0", place(33.0));
+        assert!(!dead[49].tracks.is_empty() && dead[50].tracks.is_empty(), "{sensor}");
+        let noticed = dead.iter().position(|step| step.health == Health::Failed).unwrap();
+        assert_eq!(noticed as u32, 50 + NOTICED_AFTER_SCANS - 1, "{sensor}");
+        let frozen = object(sensor, "frozen = true\nfrom-s = 2.0\nuntil-s = 3.5", place(33.0));
+        assert_eq!(frozen[50].tracks[0].state, frozen[80].tracks[0].state);
+        assert_ne!(frozen[49].tracks[0].state, frozen[90].tracks[0].state);
+        assert_eq!((frozen[80].health, frozen[95].health), (Health::Failed, Health::Ok));
+    }
+}
+
+#[test]
+fn a_ghost_is_a_track_without_a_vehicle_that_approaches_as_stated() {
+    let steps =
+        object("rear-object", "ghost-gap-m = 50.0\nghost-closing-mps = 10.0\nfrom-s = 1.0\nuntil-s = 3.0", vec![]);
+    assert!(steps[24].tracks.is_empty() && steps[75].tracks.is_empty());
+    let [first, last] = [25, 74].map(|step| steps[step].rear().unwrap().clone());
+    assert_eq!(first.id, last.id);
+    assert!((last.x_m() - first.x_m() - 10.0 * 49.0 * PERIOD_S).abs() < 1e-9);
+    assert!((first.vx_mps() - 40.0).abs() < 1e-9 && first.lane[1] > 0.99);
+}
+
+#[test]
+fn wrong_odometry_changes_the_speeds_and_the_lanes_of_others_and_nothing_else() {
+    for sensors in ["mode = \"full\"\nrear-camera.pipeline = \"off\"", ""] {
+        let run = |faults: &str| {
+            let others = vec![behind(50.0, OWN_LANE_M, 32.0)];
+            Drive { sensors, faults, others, ..Drive::default() }.run()[95].rear().unwrap().clone()
+        };
+        let (usual, fast) = (run(""), run("[odometry]\nspeed-scale = 0.03"));
+        assert!((fast.vx_mps() - usual.vx_mps() - 0.03 * 30.0).abs() < 0.05, "{} {}", fast.vx_mps(), usual.vx_mps());
+        assert!((fast.x_m() - usual.x_m()).abs() < 0.1);
+        let aside = run("[odometry]\nlateral-m = 1.0");
+        assert!((aside.y_m() - usual.y_m()).abs() < 0.05, "{} {}", aside.y_m(), usual.y_m());
+    }
+}
+
+#[test]
+fn entries_that_cannot_be_right_are_refused_by_their_keys() {
+    let refused = |text: &str| faults(text).unwrap_err();
+    for (text, key, why) in [
+        ("[[rear-lidar]]\nfrom-s = 1.0", "rear-lidar[0].dead", "an effect of the fault"),
+        (
+            "[[rear-lidar]]\ndead = true\nfrom-s = 3.0\nuntil-s = 2.0",
+            "rear-lidar[0].until-s",
+            "ends after it has begun",
+        ),
+        ("[[rear-lidar]]\nblocked-from-deg = 1.0", "rear-lidar[0].blocked-to-deg", "two ends"),
+        (
+            "[[rear-lidar]]\nblocked-from-deg = 1.0\nblocked-to-deg = -1.0",
+            "rear-lidar[0].blocked-to-deg",
+            "farther left",
+        ),
+        ("[[rear-lidar]]\ndropout = 1.5", "rear-lidar[0].dropout", "from 0 to 1"),
+        ("[[rear-camera]]\ndirt = -0.1", "rear-camera[0].dirt", "from 0 to 1"),
+        ("[[rear-object]]\nghost-closing-mps = 3.0", "rear-object[0].ghost-gap-m", "the gap"),
+        ("[[surround]]\ndelay-s = 0.5", "surround[0].delay-s", "from 0 to 0.4"),
+        ("[odometry]\nspeed-scale = 0.5", "odometry.speed-scale", "from -0.1 to 0.1"),
+    ] {
+        let message = refused(text);
+        assert!(message.contains(key) && message.contains(why), "{text}: {message}");
+    }
+    let five = "[[rear-lidar]]\ndead = true\n".repeat(5);
+    assert!(refused(&five).contains("at most four"), "{}", refused(&five));
+    assert!(refused("[[rear-lidar]]\ndeaf = true").contains("deaf"));
+}

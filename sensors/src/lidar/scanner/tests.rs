@@ -1,0 +1,89 @@
+use super::super::cast::NO_FACE;
+use super::super::cast::by_brute_force;
+use super::super::pattern::{Column, Elevation, LAYERS, LAYERS_PER_GROUP, SUBRAY_ROWS, SUBRAYS};
+use super::*;
+
+/// Maximum relative difference between a distance in single and in double precision.
+const PRECISION: f64 = 2e-5;
+
+impl Scanner {
+    /// Asserts that three ray casts of a scene agree: the fast one, the one by brute force, and one in double
+    /// precision that clips a ray at one plane after the other. The first two agree to the bit. The third may
+    /// differ at edges.
+    pub(crate) fn assert_cast_agrees_with_brute_force(&mut self, scene: &Scene<'_>) {
+        let mirror_side = Self::mirror_side_at(scene.time);
+        self.collect_targets(scene, mirror_side, &Viewpoint::new(scene, &self.lidar));
+        self.active.start(&self.targets);
+        let (mut hits, mut differ) = (0, 0);
+        for (index, column) in self.pattern.columns.iter().enumerate() {
+            let elevations = self.pattern.elevations(mirror_side, index);
+            self.hits.clear();
+            for &part in self.active.advance_to(index, &self.targets) {
+                self.hits.cast(column, elevations, &self.targets.parts[part], &self.targets);
+            }
+            let brute = by_brute_force(column, elevations, &self.targets);
+            assert_eq!(self.hits.beams, brute.beams, "column {index}");
+            if index % 5 == 0 {
+                for layer in 0..LAYERS {
+                    let [rays, differing] = self.compare_exactly(column, elevations, layer);
+                    hits += rays;
+                    differ += differing;
+                }
+            }
+        }
+        assert!(differ <= 2 + hits / 200, "{differ} of {hits}");
+    }
+
+    /// Returns the number of sub-rays of a beam that hit something, and how many of them differ in double
+    /// precision.
+    fn compare_exactly(&self, column: &Column, elevations: &[Elevation], layer: usize) -> [usize; 2] {
+        let group = layer / LAYERS_PER_GROUP;
+        let hits = &self.hits.beams[layer];
+        let mut counts = [0; 2];
+        for subray in 0..SUBRAYS {
+            let (across, upward) = super::super::cast::subray_position(subray);
+            assert!(upward < SUBRAY_ROWS);
+            let direction = [column.cos[group][across], column.sin[group][across], elevations[layer].tan[upward]];
+            let exact = self.nearest_m(direction.map(f64::from));
+            let quick = (hits.face[subray] != NO_FACE).then(|| 1.0 / f64::from(hits.inverse[subray]));
+            counts[0] += usize::from(quick.is_some());
+            counts[1] += usize::from(match (quick, exact) {
+                (Some(quick), Some(exact)) => (quick / exact - 1.0).abs() > PRECISION * (1.0 + exact),
+                (None, None) => false,
+                _ => true,
+            });
+        }
+        counts
+    }
+
+    /// Returns the distance at which a ray first enters a solid (m), found by clipping it at one plane after the
+    /// other.
+    fn nearest_m(&self, direction: [f64; 3]) -> Option<f64> {
+        let mut nearest: Option<f64> = None;
+        for part in &self.targets.parts {
+            let (mut enter, mut leave) = (0.0_f64, f64::INFINITY);
+            let sides = part
+                .faces
+                .front_facing()
+                .map(|face| (face, -1.0))
+                .chain(part.faces.back_facing().map(|face| (face, 1.0)));
+            for (face, sign) in sides {
+                let face = &self.targets.faces[face];
+                let offset = sign * f64::from(face.offset_m);
+                let along: f64 = face.inverse.iter().zip(direction).map(|(n, d)| f64::from(*n) * offset * d).sum();
+                let at = offset / along;
+                if along < 0.0 {
+                    enter = enter.max(at);
+                } else if along > 0.0 {
+                    leave = leave.min(at);
+                } else if offset < 0.0 {
+                    leave = 0.0;
+                }
+            }
+            if enter < leave && enter > 0.0 {
+                nearest = Some(nearest.map_or(enter, |other| other.min(enter)));
+            }
+        }
+        nearest
+    }
+}

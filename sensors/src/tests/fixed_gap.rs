@@ -1,0 +1,89 @@
+//! The whole chain from the point cloud to the track, at a constant gap: the beams then hit the same places in each scan
+//! of one side of the mirror, and the errors of the boxes never average out.
+
+use closecall_statistics::consistency::Consistency;
+use closecall_tracking::{RearView, TrackList, Tracker, TrackerScan};
+use closecall_traffic::ego_frame::EgoFrame;
+use closecall_traffic::{
+    ActorId, CONTROL_STEP, Check, Environment, Parameters, Road, TrackStatus, VehicleClass, stream,
+};
+
+use super::tracking::{PERIOD_S, follower};
+use crate::lidar::{Lidar, RearLidar};
+use crate::testing::{OWN_LANE_M, scene_vehicle, with_speed};
+use crate::{Scene, TrackAudit, TrackerConfig};
+
+/// Gaps from the ego's rear to the front of the other vehicle (m).
+const GAPS_M: [f64; 8] = [30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 100.0];
+/// Reflectivities of the paint.
+const PAINTS: [f64; 5] = [0.1, 0.2, 0.35, 0.5, 0.8];
+
+/// The track of a car straight behind, from 10 s on, over 100 scans of either side of the mirror.
+struct Found {
+    /// Number of scans in which the track was confirmed.
+    scans: u32,
+    /// Mean lateral error (m).
+    error_m: f64,
+    audit: TrackAudit,
+}
+
+/// Follows a car with this paint at a constant gap for 18 s.
+fn at_gap(gap_m: f64, paint_reflectivity: f64, sample: u64) -> Found {
+    let road = Road::straight(3);
+    let mut ego = with_speed(scene_vehicle(0, VehicleClass::Car, 1_000.0, OWN_LANE_M), 30.0);
+    let behind_m = gap_m + ego.vehicle.dimensions.length_m;
+    let mut others = vec![follower(ego.state.s_m - behind_m, OWN_LANE_M, 30.0)];
+    others[0].vehicle.appearance.paint_reflectivity = paint_reflectivity;
+    let mut lidar = RearLidar::new(Lidar::default());
+    let mut rng = stream(5, sample, &ActorId::new("ego").unwrap(), "fixed-gap");
+    let mut tracker = Tracker::new(TrackerConfig::default().check(&Parameters::default()).unwrap());
+    let (mut list, mut audit) = (TrackList::default(), TrackAudit::default());
+    let (mut error_sum_m, mut scans) = (0.0, 0);
+    for scan in 0..450 {
+        let time = CONTROL_STEP * scan;
+        for vehicle in others.iter_mut().chain([&mut ego]) {
+            vehicle.state.s_m += PERIOD_S * vehicle.state.speed_mps;
+        }
+        let scene = Scene { time, road: &road, environment: &Environment::CLEAR_DAY, ego, others: &others };
+        lidar.scan(&scene, &mut rng);
+        let view = RearView { half_angle_tan: 2.3, range_m: 200.0, sensor_x_m: -2.3 };
+        let detections = lidar.detect().unwrap();
+        list.tracks.clear();
+        tracker.update(&TrackerScan { time, road: &road, ego: ego.state, view, detections }, &mut list);
+        tracker.report(time, &EgoFrame::new(&road, &ego.state), &mut list);
+        if scan < 250 {
+            continue;
+        }
+        audit.observe(&list.tracks, &scene).unwrap();
+        if let Some(track) = list.tracks.iter().find(|track| track.status == TrackStatus::Confirmed) {
+            error_sum_m += track.y_m();
+            scans += 1;
+        }
+    }
+    Found { scans, error_m: error_sum_m / f64::from(scans), audit }
+}
+
+#[test]
+fn a_track_at_a_constant_gap_is_where_the_vehicle_is() {
+    let mut runs = Vec::new();
+    let mut followed = 0;
+    for (row, &gap_m) in (0..).zip(&GAPS_M) {
+        for (column, &paint) in (0..).zip(&PAINTS) {
+            let Found { scans, error_m, audit } = at_gap(gap_m, paint, 10 * row + column);
+            // Beyond 60 m, the LiDAR sees only lamps and plate of a dark car.
+            let limit_m = if paint < 0.2 && gap_m > 60.0 { 0.15 } else { 0.05 };
+            if scans == 200 {
+                followed += 1;
+                assert!(error_m.abs() <= limit_m, "{error_m} at {gap_m} m with {paint}");
+            }
+            if scans > 0 {
+                let across: f64 = audit.nees_by_axis.iter().map(|[_, across]| across).sum();
+                assert!(across < 4.0 * f64::from(scans), "{across} of {scans} at {gap_m} m with {paint}");
+                runs.push(audit.nees);
+            }
+        }
+    }
+    assert!(followed >= 25, "{followed}");
+    let consistency = Consistency::of(&runs).unwrap();
+    assert!(consistency.mean < 4.0, "{consistency:?}");
+}

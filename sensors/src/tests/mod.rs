@@ -1,0 +1,4 @@
+//! Tests of the chain behind the rear LiDAR, and of the tracker on simulated detections, against the true states.
+
+mod fixed_gap;
+mod tracking;

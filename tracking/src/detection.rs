@@ -1,0 +1,63 @@
+//! A detection: a box fitted to one cluster of points of one scan.
+//!
+//! The LiDAR looks back, so it sees the *front* face of a vehicle that follows in the lane, and one side of a vehicle
+//! in a neighbouring lane. The extent of a face that is not seen is assumed from the class's usual size. The tracker
+//! may trust measured extents only, so a detection says which extents are measured.
+
+use closecall_traffic::{ClassScores, Time};
+
+/// Distance by which mirrors and wheels may protrude from a vehicle's side (m).
+pub const SIDE_PROTRUSION_M: f64 = 0.25;
+
+/// Origin of one extent (length or width) of a fitted box.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Extent {
+    /// Measured: both ends are seen.
+    Seen,
+    /// Assumed: not both ends are seen. The extent is the class's usual one, or the seen part if that is larger.
+    Assumed,
+}
+
+/// A box fitted to one cluster, in the ego's vehicle frame at the end of the scan.
+///
+/// The box shows where the target was at `time`, relative to where the ego is at the end of the scan.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Detection {
+    /// Time at which the position holds: the mean measurement time of the points, compensated for the ego's motion.
+    pub time: Time,
+    /// Position ahead of the ego of the middle of the box's nearest face (m); negative behind the ego.
+    pub face_x_m: f64,
+    /// Position to the left of the ego of the middle of that face (m).
+    pub face_y_m: f64,
+    /// Standard deviation of the face's position along the line of sight (m).
+    pub range_sd_m: f64,
+    /// Standard deviation of the face's position across the line of sight (m).
+    pub lateral_sd_m: f64,
+    /// Heading of the vehicle relative to the ego's (rad), within ±π/2: it is taken to travel in the ego's direction.
+    pub heading_rad: f64,
+    /// Length of the box (m).
+    pub length_m: f64,
+    /// Whether the length is measured or assumed.
+    pub length: Extent,
+    /// Width of the box (m).
+    pub width_m: f64,
+    /// Whether the width is measured or assumed.
+    pub width: Extent,
+    /// Height of the highest point above the ground (m).
+    pub top_m: f64,
+    /// Number of points in the cluster.
+    pub points: usize,
+    /// Class scores from the box's shape, or from the camera if it has classified the box.
+    pub class: ClassScores,
+}
+
+impl Detection {
+    /// Returns the box's centre (x, y) in the ego's vehicle frame (m).
+    ///
+    /// The centre lies half a length farther from the ego than the nearest face.
+    pub fn centre_m(&self) -> (f64, f64) {
+        let away = if self.face_x_m < 0.0 { -0.5 } else { 0.5 } * self.length_m;
+        let (sin, cos) = self.heading_rad.sin_cos();
+        (self.face_x_m + away * cos, self.face_y_m + away * sin)
+    }
+}

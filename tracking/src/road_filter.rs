@@ -1,0 +1,186 @@
+//! The filter of one track in road coordinates, with one axis along the road and one across.
+//!
+//! Along the road, the filter follows the face that the ego sees (a follower's front): the face is measured, and it
+//! defines the gap. Across the road, the filter follows the vehicle's centre. The middle of the front lies half a
+//! length ahead of the centre along the heading, and is therefore offset by ½·L·v_d/v_s to the side (L: length; v_s,
+//! v_d: speeds along and across the road).
+
+use super::axis::{AxisEstimate, AxisFilter, AxisFit, AxisMeasurement};
+use super::motion::{ACROSS_MODES, ALONG_MODES, EgoRear, RearVehicle, Situation};
+use crate::gaussian::Gaussian;
+use closecall_traffic::ego_frame::EgoFrame;
+use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
+
+/// Prior standard deviation of a vehicle's speed, whose prior mean is the ego's speed (m/s).
+///
+/// It is wide enough for a parked vehicle, which is at 3 σ.
+pub const SPEED_PRIOR_SD_MPS: f64 = 10.0;
+/// Prior standard deviation of a vehicle's speed across the road (m/s).
+pub const LATERAL_SPEED_PRIOR_SD_MPS: f64 = 0.7;
+/// Prior standard deviation of a vehicle's position (m): wide enough to have no influence.
+pub const POSITION_PRIOR_SD_M: f64 = 1_000.0;
+/// Correlation time of the slow measurement error (s).
+pub const SLOW_TIME_S: f64 = 5.0;
+/// Correlation length of the slow measurement error (m). The error also changes with the distance to the ego, as the
+/// beams wander over the vehicle.
+pub const SLOW_DISTANCE_M: f64 = 5.0;
+/// Standard deviation of half of a vehicle's length (m).
+///
+/// Cars are 3.6 to 5.2 m long, and a follower shows nothing of its length. Half of the length is therefore within ±0.4
+/// m of the typical one. The same value is used for measured lengths and for trucks: it matters only while a vehicle
+/// moves across the road.
+const HALF_LENGTH_SD_M: f64 = 0.4;
+/// Speed below which the direction of motion does not determine the heading (m/s).
+pub const HEADING_SPEED_MPS: f64 = 3.0;
+
+/// The measured position of a vehicle's face.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Measurement {
+    pub(crate) along: AxisMeasurement,
+    pub(crate) across: AxisMeasurement,
+}
+
+impl Measurement {
+    /// Returns the measurement across the road for a vehicle with half the length `half_length_m` and the given motion.
+    ///
+    /// It accounts for the offset between the middle of the front and the centre, and for the uncertainty of the
+    /// length.
+    fn across_for(&self, half_length_m: f64, [along, across]: &[AxisEstimate; 2]) -> AxisMeasurement {
+        if !(along.speed_mps > HEADING_SPEED_MPS) {
+            return self.across;
+        }
+        let offset_sd_m = HALF_LENGTH_SD_M * across.speed_mps / along.speed_mps;
+        let time_offset_s = self.across.time_offset_s + half_length_m / along.speed_mps;
+        AxisMeasurement { time_offset_s, slow_sd_m: self.across.slow_sd_m.hypot(offset_sd_m), ..self.across }
+    }
+
+    /// Returns the variances of the slow error along and across the road (m²).
+    fn slow_m2(&self) -> [f64; 2] {
+        [self.along, self.across].map(|axis| axis.slow_sd_m * axis.slow_sd_m)
+    }
+
+    /// Returns whether all values are finite.
+    pub(crate) fn is_finite(&self) -> bool {
+        [&self.along, &self.across]
+            .iter()
+            .all(|axis| (axis.position_m + axis.white_sd_m + axis.slow_sd_m + axis.time_offset_s).is_finite())
+    }
+}
+
+/// The filter for the position and motion of one vehicle.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RoadFilter {
+    along: AxisFilter,
+    across: AxisFilter,
+    /// Variance of the slow error along and across the road, as it is smoothed over the measurements (m²).
+    slow_m2: [f64; 2],
+    /// Share of the slow error that remains since the latest measurement.
+    slow_share: f64,
+}
+
+impl RoadFilter {
+    /// Creates a filter at its first measurement. The prior speed along the road is `speed_mps`.
+    pub(crate) fn new(measurement: &Measurement, speed_mps: f64) -> Self {
+        let at = |axis: &AxisMeasurement| Gaussian::new(axis.position_m, POSITION_PRIOR_SD_M);
+        let along_mps = Gaussian::new(speed_mps, SPEED_PRIOR_SD_MPS);
+        let across_mps = Gaussian::new(0.0, LATERAL_SPEED_PRIOR_SD_MPS);
+        let mut filter = Self {
+            along: AxisFilter::prior(ALONG_MODES, at(&measurement.along), along_mps),
+            across: AxisFilter::prior(ACROSS_MODES, at(&measurement.across), across_mps),
+            slow_m2: measurement.slow_m2(),
+            slow_share: 1.0,
+        };
+        filter.correct(measurement, 0.0);
+        filter
+    }
+
+    /// Predicts by `step_s`, to the time at which the ego's rear is at `ego`.
+    pub(crate) fn predict(&mut self, step_s: f64, ego: &EgoRear) {
+        let [along, across] = self.estimate();
+        let distance_m = (along.speed_mps - ego.speed_mps).abs() * step_s;
+        let slow_share = (-step_s / SLOW_TIME_S - distance_m / SLOW_DISTANCE_M).exp();
+        let front_s_m = along.position_m + along.speed_mps * step_s;
+        let situation =
+            Situation::of(&RearVehicle { front_s_m, d_m: across.position_m, speed_mps: along.speed_mps }, ego);
+        self.along.predict(step_s, slow_share, situation);
+        self.across.predict(step_s, slow_share, situation);
+        self.slow_share *= slow_share;
+    }
+
+    /// Corrects the filter with a measurement of the face, which lies half a length of `half_length_m` ahead of the
+    /// centre.
+    pub(crate) fn correct(&mut self, measurement: &Measurement, half_length_m: f64) {
+        let new_share = 1.0 - self.slow_share;
+        for (smoothed, latest) in self.slow_m2.iter_mut().zip(measurement.slow_m2()) {
+            *smoothed += new_share * (latest - *smoothed);
+        }
+        self.slow_share = 1.0;
+        let measurement = self.smoothed(measurement);
+        let across = measurement.across_for(half_length_m, &self.estimate());
+        self.along.measure_position(&measurement.along);
+        self.across.measure_position(&across);
+    }
+
+    /// Returns the measurement with the smoothed standard deviations of the slow error.
+    ///
+    /// The slow error is part of the state in units of its standard deviation, and stays the same while the two sides of the
+    /// mirror alternate. Their boxes have different standard deviations. With these, the filter would take the difference
+    /// between the two sides for information on the slow error.
+    fn smoothed(&self, measurement: &Measurement) -> Measurement {
+        let with = |axis: AxisMeasurement, slow_m2: f64| AxisMeasurement { slow_sd_m: slow_m2.sqrt(), ..axis };
+        Measurement {
+            along: with(measurement.along, self.slow_m2[0]),
+            across: with(measurement.across, self.slow_m2[1]),
+        }
+    }
+
+    /// Returns how well a measurement fits, along and across the road, for half a length of `half_length_m`.
+    pub(crate) fn fit(&self, measurement: &Measurement, half_length_m: f64) -> [AxisFit; 2] {
+        let measurement = self.smoothed(measurement);
+        let across = measurement.across_for(half_length_m, &self.estimate());
+        [self.along.fit(&measurement.along), self.across.fit(&across)]
+    }
+
+    /// Returns the estimates along the road (of the face) and across it (of the centre).
+    pub(crate) fn estimate(&self) -> [AxisEstimate; 2] {
+        [self.along.estimate(), self.across.estimate()]
+    }
+
+    /// Returns the same estimates, predicted by `horizon_s`.
+    pub(crate) fn predicted(&self, horizon_s: f64) -> [AxisEstimate; 2] {
+        [self.along.predicted(horizon_s), self.across.predicted(horizon_s)]
+    }
+}
+
+/// State, covariance and heading of a vehicle in the ego's frame.
+#[derive(Clone, Copy, Debug)]
+pub struct EgoEstimate {
+    /// `[x, y, vx, vy]` (m, m/s).
+    pub state: Vector4<f64>,
+    /// Covariance of `state`.
+    pub covariance: Matrix4<f64>,
+    /// Heading relative to the ego's (rad).
+    pub heading_rad: f64,
+}
+
+/// Transforms the estimates along and across the road to the ego's frame. The covariance is rotated with them.
+pub fn in_ego_frame([along, across]: &[AxisEstimate; 2], frame: &EgoFrame<'_>) -> EgoEstimate {
+    let point = frame.point(along.position_m, across.position_m);
+    let (sin, cos) = point.road_yaw_rad.sin_cos();
+    let path_scale = frame.path_scale(across.position_m);
+    let to_ego = Matrix2::new(cos * path_scale, -sin, sin * path_scale, cos);
+    let velocity_mps = to_ego * Vector2::new(along.speed_mps, across.speed_mps);
+    let turned = |along: f64, across: f64| to_ego * Matrix2::new(along, 0.0, 0.0, across) * to_ego.transpose();
+    let cross = turned(along.position_speed_covariance_m2ps, across.position_speed_covariance_m2ps);
+    let mut covariance = Matrix4::zeros();
+    covariance.fixed_view_mut::<2, 2>(0, 0).copy_from(&turned(along.position_variance_m2, across.position_variance_m2));
+    covariance.fixed_view_mut::<2, 2>(0, 2).copy_from(&cross);
+    covariance.fixed_view_mut::<2, 2>(2, 0).copy_from(&cross);
+    covariance.fixed_view_mut::<2, 2>(2, 2).copy_from(&turned(along.speed_variance_m2ps2, across.speed_variance_m2ps2));
+    let moves = along.speed_mps > HEADING_SPEED_MPS;
+    EgoEstimate {
+        state: Vector4::new(point.x_m, point.y_m, velocity_mps.x, velocity_mps.y),
+        covariance,
+        heading_rad: if moves { velocity_mps.y.atan2(velocity_mps.x) } else { point.road_yaw_rad },
+    }
+}
