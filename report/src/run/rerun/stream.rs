@@ -48,6 +48,8 @@ pub(super) struct Writer<'a> {
     chunks: &'a Chunks,
     /// Prefix of the entity paths of this film.
     root: String,
+    /// Whether the recording has no other film, so that the scene has room for speeds and headways.
+    pub(super) is_alone: bool,
     /// Duration of a control step.
     period: Time,
     /// Times of the first and the last frame of the recording.
@@ -59,8 +61,9 @@ pub(super) struct Writer<'a> {
 impl<'a> Writer<'a> {
     /// Creates the writer of one film whose entity paths begin with `root`. `span` holds the first and the last moment of any
     /// film.
-    pub(super) fn new(chunks: &'a Chunks, film: &Film, root: &str, span: [Time; 2]) -> Self {
-        Self { chunks, critical: film.critical_frame_time(), root: root.to_owned(), period: film.period, span }
+    pub(super) fn new(chunks: &'a Chunks, film: &Film, (root, is_alone): (&str, bool), span: [Time; 2]) -> Self {
+        let critical = film.critical_frame_time();
+        Self { chunks, critical, root: root.to_owned(), is_alone, period: film.period, span }
     }
 
     /// Returns the share of the time axis that a duration takes.

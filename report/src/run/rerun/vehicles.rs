@@ -77,7 +77,7 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<(), RecordingErr
             let at_m = if index == film.ego { EGO_LABEL_AT_M } else { [0.0, 0.0, above_m as f32] };
             // Dense recorded traffic has room for three names. The view from above has the others.
             if film.outcome.is_some() || !matches!(actor.part, Part::Other(_)) {
-                let texts = names(film, index);
+                let texts = names(film, index, writer.is_alone);
                 write_name(writer, &entity, times, &texts, (at_m, colour))?;
             }
         }
@@ -160,16 +160,19 @@ fn write_velocity(
     })
 }
 
-/// Returns the name of a vehicle with its rounded speed, for each frame in which it is present. A vehicle that touches the
-/// ego has none: the names would lie on each other, and the collision's text has both.
-fn names(film: &Film, actor: usize) -> Vec<String> {
+/// Returns the name of a vehicle, with its rounded speed if there is room, for each frame in which it is present. A vehicle that
+/// touches the ego has none: the names would lie on each other, and the collision's text has both.
+fn names(film: &Film, actor: usize, has_room: bool) -> Vec<String> {
     let name = film.actors[actor].name.as_str();
     let text = |frame: &Frame| {
         let distance_m = || film.moving_box(frame, actor).shape.distance_m(&film.moving_box(frame, film.ego).shape);
         if actor != film.ego && film.outcome.is_some() && distance_m() < TOUCHING_M {
             return String::new();
         }
-        format!("{name} {:.0} m/s", frame.states[actor].speed_mps)
+        match has_room {
+            true => format!("{name} {:.0} m/s", frame.states[actor].speed_mps),
+            false => name.to_owned(),
+        }
     };
     film.frames[film.actors[actor].present_frames.clone()].iter().map(text).collect()
 }
@@ -267,12 +270,17 @@ fn write_gaps(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), Re
     let bumper_m = 0.5 * film.actors[film.ego].vehicle.dimensions.length_m;
     let front = |frame: &Frame| {
         let (gap_m, thw_s) = (frame.margins.gap_front_m, frame.margins.thw_front_s);
+        // In the smaller scenes of a pair, the headways would lie on the names; the view from above has them.
+        if !writer.is_alone {
+            return Gap::new([bumper_m, 1.0], gap_m, thw_s, f64::INFINITY);
+        }
         // From farther back the names of the ego and of the lead vehicle are closer together.
         let named_m = NAMED_GAP_M + NAMED_GAP_SHARE * frame.margins.gap_rear_m.unwrap_or(0.0).clamp(0.0, MAX_RIG_M);
         Gap::new([bumper_m, 1.0], gap_m, thw_s, named_m)
     };
+    let rear_named_m = if writer.is_alone { TOUCHING_M } else { f64::INFINITY };
     let rear =
-        |frame: &Frame| Gap::new([-bumper_m, -1.0], frame.margins.gap_rear_m, frame.margins.thw_rear_s, TOUCHING_M);
+        |frame: &Frame| Gap::new([-bumper_m, -1.0], frame.margins.gap_rear_m, frame.margins.thw_rear_s, rear_named_m);
     let both: [(&str, Vec<Option<Gap>>); 2] = [
         ("world/ego/gap_front", film.frames.iter().map(front).collect()),
         ("world/ego/gap_rear", film.frames.iter().map(rear).collect()),

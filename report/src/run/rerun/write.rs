@@ -88,7 +88,7 @@ fn record(films: &[Film]) -> Result<Recording, RecordingError> {
             _ => Role::Tested,
         };
         let root = format!("{}/", film.arm);
-        let writer = Writer::new(&data, film, &root, span);
+        let writer = Writer::new(&data, film, (&root, films.len() == 1), span);
         contents.push(write_film(&writer, &canvases[index], (root, role))?);
         if let Some(ghosts) = ghosts_in(films, index).filter(|_| film.level >= Level::Objects) {
             ghosts::write(&writer, &canvases[index], ghosts)?;
