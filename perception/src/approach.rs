@@ -89,7 +89,7 @@ pub fn approach(case: &Case, sensors: &Sensors, road: &Road, at: Address) -> Res
     Ok(found)
 }
 
-#[expect(clippy::missing_panics_doc, clippy::unwrap_used, reason = "a legal name")]
+#[expect(clippy::unwrap_used, reason = "a legal name")]
 fn ego_name() -> ActorId {
     ActorId::new("ego").unwrap()
 }

@@ -9,14 +9,14 @@ use closecall_sensors::SensorMode;
 use closecall_simulation::scenario::source;
 
 fn study(settings: &[&str], mode: SensorMode, runs: u64) -> Result<Study, StudyError> {
-    let settings: Vec<_> = settings.iter().map(|text| text.parse().unwrap()).collect();
-    let file = source::load(Path::new("low-thw-overtake"), &settings).unwrap();
+    let settings: Vec<_> = settings.iter().map(|text| text.parse().expect("a setting")).collect();
+    let file = source::load(Path::new("low-thw-overtake"), &settings).expect("a scenario of the library");
     Study::of(&file, Some(mode), 5, Extent::Runs(runs))
 }
 
 /// Returns the study of the LiDAR without the camera, which no detection depends on.
 fn of_lidar(runs: u64) -> Study {
-    study(&["sensors.rear-camera.pipeline=\"off\""], SensorMode::Full, runs).unwrap()
+    study(&["sensors.rear-camera.pipeline=\"off\""], SensorMode::Full, runs).expect("no model fails")
 }
 
 fn figures<'a>(study: &'a Study, name: &str) -> &'a Figures {
@@ -41,7 +41,9 @@ fn detection_falls_with_distance_darker_paint_rain_and_fog() {
     for (case, of) in study.cases.iter().filter(|(case, _)| !matches!(case.factor, "fault" | "traffic")) {
         let shares: Vec<f64> = of.curve.iter().map(|point| point.confirmed.value).collect();
         assert!(shares.windows(2).all(|pair| pair[0] >= pair[1] - 0.26), "{}: {shares:?}", case.name);
-        assert!(shares[0] > 0.99 && of.curve.iter().all(|point| point.confirmed.interval_95[0] <= point.confirmed.value));
+        assert!(
+            shares[0] > 0.99 && of.curve.iter().all(|point| point.confirmed.interval_95[0] <= point.confirmed.value)
+        );
     }
 }
 

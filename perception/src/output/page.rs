@@ -56,7 +56,9 @@ pub(super) fn page(studies: &[Study]) -> Markup {
         p { "Bars are 95 % intervals (Clopper and Pearson). An error has no value at a distance at which fewer than two approaches have a track." }
         @for factor in factors {
             h2 { (heading(factor)) }
-            div { @for (name, shown) in CHARTS { (PreEscaped(chart(name, &lines(studies, factor, shown)))) } }
+            @for names in groups(studies, factor) {
+                div { @for (name, shown) in CHARTS { (PreEscaped(chart(name, &lines(studies, &names, shown)))) } }
+            }
         }
         h2 { "Figures" }
         @for (study, name) in studies.iter().zip(&names) {
@@ -82,11 +84,22 @@ fn heading(factor: &str) -> &'static str {
     }
 }
 
-/// Returns the lines of a factor: the usual case and those that vary it, of each study.
-fn lines(studies: &[Study], factor: &str, shown: Shown) -> Vec<Line> {
+/// Returns the names of the cases of a factor, in groups of as many as a chart can show beside the usual one.
+fn groups<'a>(studies: &'a [Study], factor: &str) -> Vec<Vec<&'a str>> {
+    let mut names: Vec<&str> = Vec::new();
+    for (case, _) in studies.iter().flat_map(|study| &study.cases).filter(|(case, _)| case.factor == factor) {
+        if !names.contains(&&*case.name) {
+            names.push(&case.name);
+        }
+    }
+    names.chunks(COLOURS.len() - 1).map(<[&str]>::to_vec).collect()
+}
+
+/// Returns the lines of some cases beside the usual one, of each study.
+fn lines(studies: &[Study], names: &[&str], shown: Shown) -> Vec<Line> {
     let mut lines = Vec::new();
     for (dash, study) in studies.iter().enumerate() {
-        let varied = study.cases.iter().filter(|(case, _)| case.factor == factor || case.factor == "usual");
+        let varied = study.cases.iter().filter(|(case, _)| names.contains(&&*case.name) || case.factor == "usual");
         for (case, figures) in varied {
             let point = |it: &CurvePoint| shown(it).map(|(value, interval)| (it.gap_m, value, interval));
             let name = if studies.len() > 1 { format!("{}: {}", study.name, case.name) } else { case.name.clone() };
@@ -109,7 +122,7 @@ fn chart(name: &str, lines: &[Line]) -> String {
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {}\" width=\"{width}\" role=\"img\" \
          font-family=\"DejaVu Sans, sans-serif\" font-size=\"11\" fill=\"#333\"><title>{}</title>\
          <text x=\"{left}\" y=\"15\" font-size=\"13\">{}</text>",
-        height + 15.0 * lines.len() as f64,
+        height + 15.0 * lines.len() as f64 + 10.0,
         escaped(name),
         escaped(name)
     );
@@ -160,7 +173,7 @@ fn chart(name: &str, lines: &[Line]) -> String {
                 y(*high)
             ));
         }
-        let at = height + 15.0 * index as f64 + 4.0;
+        let at = height + 15.0 * index as f64 + 12.0;
         put(format_args!(
             "<path d=\"M{left} {:.1}h26\" stroke=\"{colour}\" stroke-width=\"2\" stroke-dasharray=\"{dash}\"/><text x=\"{:.1}\" y=\"{at:.1}\">{}</text>",
             at - 4.0,
