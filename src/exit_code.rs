@@ -1,5 +1,6 @@
 //! Exit codes. An exit code is a verdict or the kind of a failure, never a count.
 
+use closecall_campaign::failure::FailureKind;
 use closecall_campaign::verdict::{Decision, Judgement};
 use closecall_scenarios::atomic::WriteError;
 use closecall_simulation::scenario::ScenarioError;
@@ -72,15 +73,7 @@ impl From<ExitCode> for std::process::ExitCode {
 
 impl From<&ScenarioError> for ExitCode {
     fn from(error: &ScenarioError) -> Self {
-        match error {
-            ScenarioError::Set { .. } => Self::Usage,
-            ScenarioError::Read { .. } => Self::Io,
-            ScenarioError::NotText { .. }
-            | ScenarioError::TooLarge { .. }
-            | ScenarioError::Empty { .. }
-            | ScenarioError::Syntax { .. }
-            | ScenarioError::Value { .. } => Self::InvalidInput,
-        }
+        FailureKind::from(error).into()
     }
 }
 

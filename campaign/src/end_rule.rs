@@ -4,9 +4,13 @@
 
 use std::fmt;
 use std::ops::ControlFlow;
+use std::path::Path;
+
+use serde_json::{Value, json};
 
 use crate::execution::End;
 use crate::record::Record;
+use crate::resume_command::{quoted, resume_command};
 
 /// When a campaign ends before its last sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -48,6 +52,47 @@ impl fmt::Display for EarlyEnd {
             }
             Self::Errors { errors } => write!(f, "{errors} samples ended in an error"),
         }
+    }
+}
+
+/// A campaign that has ended early, for those who started it.
+#[derive(Clone, Debug)]
+pub struct EndedEarly<'a> {
+    /// Why it ended, in words.
+    pub message: String,
+    /// The sample or the samples that ended it; `None` if a signal did.
+    pub ending: Option<&'a EarlyEnd>,
+    /// Samples that are done, and samples of the whole campaign.
+    pub samples: [u64; 2],
+    /// The campaign's folder, and the command line that started it.
+    pub kept: Option<(&'a Path, Vec<String>)>,
+}
+
+impl EndedEarly<'_> {
+    fn resume(&self) -> Option<String> {
+        let retries = matches!(self.ending, Some(EarlyEnd::Errors { .. }));
+        self.kept.as_ref().map(|(_, command)| resume_command(command.iter().cloned(), retries))
+    }
+
+    /// Returns the end as JSON.
+    pub fn json(&self) -> Value {
+        let [done, of] = self.samples;
+        json!({ "ended_early": self.message, "samples": done, "of": of, "resume": self.resume() })
+    }
+}
+
+impl fmt::Display for EndedEarly<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [done, of] = self.samples;
+        writeln!(f, "ENDED EARLY, without a verdict: {}; {done} of {of} samples are done", self.message)?;
+        let (Some(resume), Some((out, _))) = (self.resume(), &self.kept) else {
+            return writeln!(f, "nothing was kept: a campaign with --out can be resumed");
+        };
+        if let Some(EarlyEnd::Failure { scenario, sample, .. }) = self.ending {
+            let out = quoted(&out.display().to_string());
+            writeln!(f, "look:   closecall replay {out} {sample} --scenario {scenario} --record failure.rrd")?;
+        }
+        writeln!(f, "resume: {resume}")
     }
 }
 

@@ -1,5 +1,7 @@
 //! The kind of an error: what a caller can do about it, and so the exit code of a program.
 
+use closecall_simulation::scenario::ScenarioError;
+
 use super::compare::CompareError;
 use super::execution::CampaignError;
 use super::folder::FolderError;
@@ -17,6 +19,20 @@ pub enum FailureKind {
     Sample,
     /// A file or folder cannot be read or written.
     Io,
+}
+
+impl From<&ScenarioError> for FailureKind {
+    fn from(error: &ScenarioError) -> Self {
+        match error {
+            ScenarioError::Set { .. } => Self::Usage,
+            ScenarioError::Read { .. } => Self::Io,
+            ScenarioError::NotText { .. }
+            | ScenarioError::TooLarge { .. }
+            | ScenarioError::Empty { .. }
+            | ScenarioError::Syntax { .. }
+            | ScenarioError::Value { .. } => Self::InvalidInput,
+        }
+    }
 }
 
 impl From<&FolderError> for FailureKind {

@@ -29,6 +29,7 @@ pub mod folder;
 mod folder_error;
 pub mod frontier;
 pub mod gate;
+pub mod inputs;
 pub mod journal;
 pub mod ledger;
 pub mod lock;

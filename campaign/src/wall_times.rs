@@ -118,6 +118,13 @@ fn lines(mut reader: impl BufRead) -> impl Iterator<Item = (WallTime, u64)> {
     })
 }
 
+/// Returns what share of the wall time of runs and of their validity checks (s) the checks have taken, in brackets; nothing if there
+/// were none.
+pub fn check_share([run_s, check_s]: [f64; 2]) -> String {
+    let share = 100.0 * check_s / (run_s + check_s);
+    if check_s > 0.0 { format!(" ({share:.0} % of their time for validity checks)") } else { String::new() }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

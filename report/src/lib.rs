@@ -6,6 +6,7 @@
 //! * [`calibration`]: the result of a calibration, and the member of a driver ensemble that it gives
 //! * [`heartbeat`]: the progress of a long command as lines of text
 //! * [`json`]: results as JSON with stable keys
+//! * [`page`], [`table`]: what all pages and all Parquet tables share
 //! * [`study`]: output of sensitivity studies and frontiers: tables, charts and pages
 //! * [`traffic`]: texts and charts of what was found in trajectory data
 //!
@@ -15,10 +16,14 @@ pub mod calibration;
 pub mod campaign;
 mod charts;
 mod escape;
+/// The parts of a page of HTML: the document, tables, and a legend.
+pub mod page {
+    pub use crate::campaign::html::page::{document, number, number_heads, table, text_heads};
+}
 pub mod heartbeat;
 pub mod json;
 pub mod run;
 pub mod study;
-mod table;
+pub mod table;
 pub mod traffic;
 mod units;

@@ -1,8 +1,14 @@
 //! Settings that all Parquet tables share.
 
 use std::collections::HashMap;
+use std::io;
+use std::path::Path;
+use std::sync::Arc;
 
-use arrow::datatypes::{DataType, Field};
+use arrow::array::{ArrayRef, Float64Array, RecordBatch, StringArray};
+use arrow::datatypes::{DataType, Field, Schema};
+use closecall_scenarios::atomic::{WriteError, write_file};
+use parquet::arrow::ArrowWriter;
 use parquet::basic::Compression;
 use parquet::file::properties::WriterProperties;
 
@@ -29,4 +35,36 @@ pub(crate) fn field(name: &str, data_type: DataType, unit: Option<&str>) -> Fiel
 /// Returns a column in which every row has a value.
 pub(crate) fn required(name: &str, data_type: DataType, unit: Option<&str>) -> Field {
     field(name, data_type, unit).with_nullable(false)
+}
+
+/// A column of a small table.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Column {
+    /// Texts.
+    Text(Vec<String>),
+    /// Numbers, which may be missing.
+    Number(Vec<Option<f64>>),
+}
+
+/// Writes a small table, whose columns have a name and a unit (empty if they have none).
+///
+/// # Errors
+/// [`WriteError`] if the columns differ in length or the file cannot be written. An existing file then stays as it is.
+pub fn write_columns(path: &Path, columns: Vec<(&str, &str, Column)>) -> Result<(), WriteError> {
+    let (mut fields, mut arrays): (Vec<Field>, Vec<ArrayRef>) = (Vec::new(), Vec::new());
+    for (name, unit, column) in columns {
+        let unit = Some(unit).filter(|unit| !unit.is_empty());
+        let (kind, array): (DataType, ArrayRef) = match column {
+            Column::Text(texts) => (DataType::Utf8, Arc::new(StringArray::from(texts))),
+            Column::Number(numbers) => (DataType::Float64, Arc::new(Float64Array::from(numbers))),
+        };
+        fields.push(field(name, kind, unit));
+        arrays.push(array);
+    }
+    let schema = Arc::new(Schema::new(fields));
+    write_file(path, |file| {
+        let batch = RecordBatch::try_new(schema.clone(), arrays).map_err(io::Error::other)?;
+        let mut writer = ArrowWriter::try_new(file, schema, Some(properties())).map_err(io::Error::other)?;
+        writer.write(&batch).and_then(|()| writer.close()).map(drop).map_err(io::Error::other)
+    })
 }

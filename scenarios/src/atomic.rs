@@ -26,6 +26,24 @@ impl WriteError {
     }
 }
 
+/// Writes texts, such as charts, into a folder, which is created if it does not exist. Each path belongs to the text of the same
+/// index, and is given to `written` afterwards.
+///
+/// # Errors
+/// [`WriteError`] if the folder or a file cannot be written.
+pub fn write_texts(
+    folder: &Path,
+    (paths, texts): (&[PathBuf], &[String]),
+    written: impl Fn(&Path),
+) -> Result<(), WriteError> {
+    std::fs::create_dir_all(folder).map_err(|source| WriteError::new(folder, source))?;
+    for (path, text) in paths.iter().zip(texts) {
+        write_file(path, |file| file.write_all(text.as_bytes()))?;
+        written(path);
+    }
+    Ok(())
+}
+
 /// Writes a file as [`write_atomically`] does, and names it if that fails.
 ///
 /// # Errors

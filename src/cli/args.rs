@@ -99,15 +99,10 @@ pub(super) struct ReadArgs {
     layout: Option<Layout>,
     /// Skip and count rows that cannot be used, instead of refusing the file
     #[arg(long)]
-    drop_bad_rows: bool,
+    pub(super) drop_bad_rows: bool,
 }
 
 impl ReadArgs {
-    /// Returns true if rows that cannot be used are skipped.
-    pub(super) fn drops_bad_rows(&self) -> bool {
-        self.drop_bad_rows
-    }
-
     pub(super) fn options(&self) -> ReadOptions {
         let layout = self.layout.map(|layout| match layout {
             Layout::Ngsim => LayoutChoice::Ngsim,

@@ -15,6 +15,7 @@ use closecall_campaign::plan::Plan;
 use closecall_campaign::runner::Sampling;
 use closecall_campaign::selection::Selection;
 use closecall_campaign::stop::{StopMonitor, StopRule};
+use closecall_campaign::wall_times::check_share;
 use closecall_campaign::workers::Workers;
 use closecall_report::campaign::{CampaignReport, CountsText, Tally, VerdictText, ensemble_text};
 use closecall_report::heartbeat::Heartbeat;
@@ -131,8 +132,8 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
     stop_gracefully(&campaign.stop);
     let started = Instant::now();
     let stop = StopRule {
-        until_certain: gates.probability.as_ref().map(|spec| spec.gate).filter(|_| args.plan.ends_when_certain()),
-        time_budget: args.plan.time_budget(),
+        until_certain: gates.probability.as_ref().map(|spec| spec.gate).filter(|_| args.plan.until_certain),
+        time_budget: args.plan.time_budget,
         scenarios: campaign.works.len(),
     };
     let mut progress = Progress::new(&campaign, &gates, StopMonitor::start(stop), EndMonitor::new(args.end.rule()));
@@ -155,13 +156,7 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
         Format::Human => {
             out!("{}", CountsText(&tally.summary));
             let (simulated_s, jobs) = (tally.summary.total().simulated_s, campaign.workers.jobs);
-            let [run_s, check_s] = progress.spent_s;
-            let share = 100.0 * check_s / (run_s + check_s);
-            let checks = if check_s > 0.0 {
-                format!(" ({share:.0} % of their time for validity checks)")
-            } else {
-                String::new()
-            };
+            let checks = check_share(progress.spent_s);
             outln!("{simulated_s:.0} simulated seconds in {wall_s:.1} s on {jobs} threads{checks}");
             out!("{}", ensemble_text(&tally.summary, &manifest));
             out!("{}", VerdictText(&judged));

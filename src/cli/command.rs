@@ -9,8 +9,8 @@ use super::backend::choose_backend;
 use super::output::print_error;
 use super::{
     CliError, baseline, calibrate, campaign, causes, check, compare, drift, generate, inspect, interrupt, library,
-    merge, new, paper, plot, record, reenact, render, replay, robustness, run, sample, schema, statistics, study,
-    trajectories, view, watching,
+    merge, new, paper, plot, record, reenact, render, replay, robustness, run, sample, schema, sensors, statistics,
+    study, trajectories, view, watching,
 };
 use crate::exit_code::ExitCode;
 
@@ -78,6 +78,8 @@ enum Command {
     Map(causes::MapArgs),
     /// Count how often the encounter happens in trajectory files, and state the net effect of the system per 10^6 km
     Exposure(causes::ExposureArgs),
+    /// Study the rear sensors without a controller: detection, errors, classes and consistency over distance and conditions
+    Sensors(sensors::SensorsArgs),
     /// Check scenario files without running them
     Check(check::CheckArgs),
     /// Print the JSON Schema of scenario files
@@ -167,6 +169,7 @@ fn dispatch(command: Command) -> Result<ExitCode, CliError> {
         Command::Minimize(args) => causes::minimize(&args),
         Command::Map(args) => causes::map(&args),
         Command::Exposure(args) => causes::exposure(&args),
+        Command::Sensors(args) => sensors::sensors(&args),
         Command::Check(args) => check::check(&args),
         Command::Schema => Ok(schema::schema()),
         Command::Inspect(args) => inspect::inspect(&args),

@@ -4,12 +4,10 @@
 use std::path::Path;
 
 use clap::Args;
-use closecall_campaign::end_rule::{EarlyEnd, EndRule};
+use closecall_campaign::end_rule::{EarlyEnd, EndRule, EndedEarly};
 use closecall_campaign::execution::Campaign;
-use closecall_campaign::resume_command::{quoted, resume_command};
 use closecall_campaign::summary::Summary;
 use closecall_report::campaign::CountsText;
-use serde_json::json;
 
 use super::args::Format;
 use super::interrupt::Signal;
@@ -65,29 +63,15 @@ impl Ending {
 
     /// Prints the counts so far, and how to go on. `out` is the campaign's folder.
     pub(super) fn print(&self, format: Format, campaign: &Campaign, summary: &Summary, out: Option<&Path>) -> ExitCode {
-        let (done, of, message) = (summary.total().samples, campaign.len(), self.message());
-        let resume = out.map(|_| resume_command(std::env::args(), matches!(self, Self::Rule(EarlyEnd::Errors { .. }))));
+        let ended = EndedEarly {
+            message: self.message(),
+            ending: if let Self::Rule(ending) = self { Some(ending) } else { None },
+            samples: [summary.total().samples, campaign.len()],
+            kept: out.map(|out| (out, std::env::args().collect())),
+        };
         match format {
-            Format::Json => {
-                let ended = json!({ "ended_early": message, "samples": done, "of": of, "resume": resume });
-                outln!("{ended:#}");
-            }
-            Format::Human => {
-                out!("{}", CountsText(summary));
-                outln!("ENDED EARLY, without a verdict: {message}; {done} of {of} samples are done");
-                match (&resume, out) {
-                    (Some(resume), Some(out)) => {
-                        if let Self::Rule(EarlyEnd::Failure { scenario, sample, .. }) = self {
-                            let out = quoted(&out.display().to_string());
-                            outln!(
-                                "look:   closecall replay {out} {sample} --scenario {scenario} --record failure.rrd"
-                            );
-                        }
-                        outln!("resume: {resume}");
-                    }
-                    _ => outln!("nothing was kept: a campaign with --out can be resumed"),
-                }
-            }
+            Format::Json => outln!("{:#}", ended.json()),
+            Format::Human => out!("{}{ended}", CountsText(summary)),
         }
         self.exit_code()
     }

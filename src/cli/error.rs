@@ -11,6 +11,7 @@ use closecall_campaign::plan::PlanError;
 use closecall_campaign::saved::SavedError;
 use closecall_campaign::sensitivity::PlanFailure;
 use closecall_causes::CausesError;
+use closecall_perception::StudyError;
 use closecall_report::campaign::ReportError;
 use closecall_report::run::figure::PictureError;
 use closecall_report::run::film::TrafficFilmError;
@@ -140,6 +141,9 @@ pub enum CliError {
     #[error(transparent)]
     #[diagnostic(help("see `closecall --help`"))]
     Causes(#[from] CausesError),
+    /// The sensors cannot be studied.
+    #[error(transparent)]
+    Sensors(#[from] StudyError),
     /// A campaign cannot be compared with a baseline.
     #[error(transparent)]
     Baseline(#[from] BaselineError),
@@ -193,6 +197,7 @@ impl From<&CliError> for ExitCode {
             CliError::Merge(error) => FailureKind::from(error).into(),
             CliError::Compare(error) => FailureKind::from(error).into(),
             CliError::Causes(error) => error.kind().into(),
+            CliError::Sensors(error) => error.kind().into(),
             CliError::Write(_)
             | CliError::Chart(_)
             | CliError::Record(_)

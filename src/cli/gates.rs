@@ -2,7 +2,7 @@
 
 use clap::Args;
 use closecall_campaign::arguments::{confidence, positive, probability, share};
-use closecall_campaign::gate::{AssemblyError, GateSet, GateSource, PresetGates, ProbabilitySpec, Scope};
+use closecall_campaign::gate::{AssemblyError, GateOptions, GateSet, GateSource, PresetGates, ProbabilitySpec, Scope};
 use closecall_campaign::probability::ProbabilityGate;
 use closecall_campaign::verdict::MAX_FLIP_RATE;
 use closecall_scenarios::sampling::Design;
@@ -82,21 +82,19 @@ impl GateArgs {
 
     /// Returns the criteria that the options stand for.
     fn criteria(&self) -> Result<Vec<(Expression, Scope)>, CliError> {
-        let each = |text: String| Ok::<_, CliError>((criterion(&text)?, Scope::EachScenario));
-        let all = |text: String| Ok::<_, CliError>((criterion(&text)?, Scope::AllScenarios));
-        let own = self.require.iter().map(|&expression| Ok((expression, Scope::EachScenario)));
-        let options = [
-            self.max_collisions.map(|most| all(format!("count(ego_collided) <= {most}"))),
-            self.max_other_collisions.map(|most| all(format!("count(others_collided) <= {most}"))),
-            self.max_induced.map(|most| all(format!("count(induced) <= {most}"))),
-            self.min_prevented.map(|least| each(format!("lower(prevented | baseline.ego_collided) >= {least}"))),
-            self.max_harm.map(|most| each(format!("sum(harm) <= {most}"))),
-            self.min_rear_thw.map(|least| each(format!("min(min_thw_rear_s) >= {least}"))),
-            self.max_engagement_rate.map(|most| each(format!("share(engaged) <= {most}"))),
-            self.max_speed_deficit_mps.map(|most| each(format!("max(max_speed_deficit_mps) <= {most}"))),
-            self.max_jerk.map(|most| each(format!("max(max_jerk_mps3) <= {most}"))),
-        ];
-        own.chain(options.into_iter().flatten()).collect()
+        let options = GateOptions {
+            max_collisions: self.max_collisions,
+            max_other_collisions: self.max_other_collisions,
+            max_induced: self.max_induced,
+            min_prevented: self.min_prevented,
+            max_harm: self.max_harm,
+            min_rear_thw: self.min_rear_thw,
+            max_engagement_rate: self.max_engagement_rate,
+            max_speed_deficit_mps: self.max_speed_deficit_mps,
+            max_jerk: self.max_jerk,
+        };
+        let own = self.require.iter().map(|&expression| (expression, Scope::EachScenario));
+        Ok(own.chain(options.criteria().map_err(CliError::usage)?).collect())
     }
 
     /// Returns the gate on the probability of a collision.
@@ -105,8 +103,4 @@ impl GateArgs {
         let usage = |error| CliError::usage(format!("--max-probability: {error}"));
         self.max_probability.map(gate).transpose().map_err(usage)
     }
-}
-
-fn criterion(text: &str) -> Result<Expression, CliError> {
-    text.parse().map_err(|error| CliError::usage(format!("{error}")))
 }

@@ -38,7 +38,7 @@ pub(super) fn inspect(args: &InspectArgs) -> Result<ExitCode, CliError> {
         Format::Human => out!("{}", QualityText { tracks: &tracks, inspector: &inspector }),
     }
     let dropped = tracks.dropped();
-    if dropped.count() == 0 || args.read.drops_bad_rows() {
+    if dropped.count() == 0 || args.read.drop_bad_rows {
         return Ok(ExitCode::Pass);
     }
     let path = tracks.path().display();

@@ -34,6 +34,7 @@ mod robustness;
 mod run;
 mod sample;
 mod schema;
+mod sensors;
 mod statistics;
 mod study;
 mod trajectories;

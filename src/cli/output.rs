@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use closecall_campaign::folder::{Folder, REPORT_FILES};
 use closecall_report::heartbeat::Heartbeat;
-use closecall_scenarios::atomic::{WriteError, write_file};
+use closecall_scenarios::atomic::{WriteError, write_texts};
 use closecall_simulation::scenario::ScenarioFile;
 use indicatif::ProgressBar;
 
@@ -36,12 +36,7 @@ pub(super) fn print_written(path: &Path) {
 
 /// Writes charts (SVG) into a folder, which is created if it does not exist, and prints their paths to standard error.
 pub(super) fn write_charts(folder: &Path, paths: &[PathBuf], charts: &[String]) -> Result<(), WriteError> {
-    std::fs::create_dir_all(folder).map_err(|source| WriteError::new(folder, source))?;
-    for (path, svg) in paths.iter().zip(charts) {
-        write_file(path, |file| file.write_all(svg.as_bytes()))?;
-        print_written(path);
-    }
-    Ok(())
+    write_texts(folder, (paths, charts), print_written)
 }
 
 /// Starts to print the progress of `bar` as lines. A terminal shows the bar itself instead.

@@ -57,7 +57,7 @@ pub(super) struct PlanArgs {
     /// With --max-probability: stop each scenario as soon as its samples show whether its probability is low enough.
     /// The bounds (confidence sequences) are valid although they are evaluated after every sample
     #[arg(long, requires = "max_probability", conflicts_with_all = ["partition", "max_collisions", "max_induced"])]
-    until_certain: bool,
+    pub(super) until_certain: bool,
     /// Stop after this wall time, such as 90s, 15m or 8h, divided evenly among the scenarios. Only the samples before
     /// the first unfinished one are judged
     #[arg(
@@ -66,7 +66,7 @@ pub(super) struct PlanArgs {
         value_parser = duration,
         conflicts_with_all = ["partition", "resume", "max_collisions", "max_induced"]
     )]
-    time_budget: Option<Duration>,
+    pub(super) time_budget: Option<Duration>,
     /// Share of the samples in which the validity of the simulator is checked, above 0 and up to 1. The first two
     /// samples of each scenario are always checked
     #[arg(long, value_name = "SHARE", value_parser = share, default_value_t = CheckPlan::SHARE)]
@@ -102,16 +102,6 @@ impl PlanArgs {
     /// Returns what determines the number of samples.
     pub(super) fn inference(&self) -> Inference {
         if self.until_certain || self.time_budget.is_some() { Inference::Sequential } else { Inference::FixedSamples }
-    }
-
-    /// Returns true if a scenario ends as soon as the answer of its probability gate is certain.
-    pub(super) fn ends_when_certain(&self) -> bool {
-        self.until_certain
-    }
-
-    /// Returns the wall time for all scenarios together.
-    pub(super) fn time_budget(&self) -> Option<Duration> {
-        self.time_budget
     }
 
     /// Returns the samples that are checked.

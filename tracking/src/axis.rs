@@ -116,6 +116,7 @@ pub struct AxisEstimate {
 
 impl AxisFilter {
     /// Creates a filter before its first measurement, with the prior distributions of position and speed.
+    #[inline]
     pub fn prior(modes: &'static [Mode], position_m: Gaussian, speed_mps: Gaussian) -> Self {
         let estimates = std::array::from_fn(|index| {
             let mode = modes.get(index);
@@ -134,6 +135,7 @@ impl AxisFilter {
     }
 
     /// Predicts by `step_s` in this situation, after which the share `slow_share` of the slow error remains.
+    #[inline]
     pub fn predict(&mut self, step_s: f64, slow_share: f64, situation: Situation) {
         self.situation = situation;
         let remaining = if step_s == CONTROL_STEP.s() {
@@ -176,6 +178,7 @@ impl AxisFilter {
     /// alone would reject the start of a lane change. The allowance for a manoeuvre is needed in addition at short
     /// range, where the position is known to millimetres and all modes would reject the measurements of a swerving
     /// vehicle.
+    #[inline]
     pub fn fit(&self, measurement: &AxisMeasurement) -> AxisFit {
         let (mut squared_distance, mut likelihood, mut variance) = (f64::INFINITY, 0.0, 0.0);
         for estimate in &self.estimates[..self.modes.len()] {
@@ -190,6 +193,7 @@ impl AxisFilter {
     }
 
     /// Corrects the filter with a measured position.
+    #[inline]
     pub fn measure_position(&mut self, measurement: &AxisMeasurement) {
         let count = self.modes.len();
         let mut logs = [f64::NEG_INFINITY; MODES];
@@ -202,6 +206,7 @@ impl AxisFilter {
     }
 
     /// Corrects the filter with a measured speed.
+    #[inline]
     pub fn measure_speed(&mut self, speed_mps: f64, sd_mps: f64) {
         let count = self.modes.len();
         let mut logs = [f64::NEG_INFINITY; MODES];
@@ -232,6 +237,7 @@ impl AxisFilter {
     }
 
     /// Returns the present estimate of position and speed: the mean over the modes.
+    #[inline]
     pub fn estimate(&self) -> AxisEstimate {
         let estimates = &self.estimates[..self.modes.len()];
         let (state, covariance) = match estimates {
@@ -269,6 +275,7 @@ impl AxisFilter {
     }
 
     /// Returns the estimate predicted by `horizon_s`, in the situation of the latest prediction.
+    #[inline]
     pub fn predicted(&self, horizon_s: f64) -> AxisEstimate {
         let mut predicted = *self;
         let mut remaining_s = horizon_s;

@@ -11,6 +11,7 @@ pub struct Gaussian {
 
 impl Gaussian {
     /// Creates a normal distribution.
+    #[inline]
     pub const fn new(mean: f64, sd: f64) -> Self {
         Self { mean, sd }
     }

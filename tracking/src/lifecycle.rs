@@ -47,6 +47,7 @@ pub struct Lifecycle {
 
 impl Lifecycle {
     /// Creates the lifecycle of a track at its first detection.
+    #[inline]
     pub fn first_hit(rules: &LifecycleRules) -> Self {
         let mut lifecycle = Self { history: 0, misses: 0, confirmed: false, log_odds: INITIAL_LOG_ODDS };
         lifecycle.hit(rules, true);
@@ -54,6 +55,7 @@ impl Lifecycle {
     }
 
     /// Adds a scan that detected the track. The scan can confirm the track only if `is_settled`.
+    #[inline]
     pub fn hit(&mut self, rules: &LifecycleRules, is_settled: bool) {
         self.history = self.history << 1 | 1;
         self.misses = 0;
@@ -62,6 +64,7 @@ impl Lifecycle {
     }
 
     /// Adds a scan that did not detect the track, although it was in view.
+    #[inline]
     pub fn miss(&mut self, rules: &LifecycleRules) {
         self.skip();
         self.add_evidence(((1.0 - rules.detection_probability) / (1.0 - rules.clutter_probability)).ln());
@@ -70,18 +73,21 @@ impl Lifecycle {
     /// Adds a scan that could not detect the track, because it was hidden or out of view.
     ///
     /// Such a scan leaves the existence probability unchanged, but counts against the coasting time.
+    #[inline]
     pub fn skip(&mut self) {
         self.history <<= 1;
         self.misses += 1;
     }
 
     /// Multiplies the odds of existence by exp(`log_likelihood_ratio`).
+    #[inline]
     pub fn add_evidence(&mut self, log_likelihood_ratio: f64) {
         self.log_odds = (self.log_odds + log_likelihood_ratio).clamp(-MAX_LOG_ODDS, MAX_LOG_ODDS);
     }
 
     /// Returns whether the track has ended: a tentative track that can no longer reach M hits in N scans, or a
     /// confirmed track that was not detected for too long.
+    #[inline]
     pub fn should_delete(&self, rules: &LifecycleRules) -> bool {
         if self.confirmed {
             self.misses >= rules.delete_after_misses
@@ -91,6 +97,7 @@ impl Lifecycle {
     }
 
     /// Returns the status that is reported for the track.
+    #[inline]
     pub fn status(&self) -> TrackStatus {
         match (self.confirmed, self.misses) {
             (false, _) => TrackStatus::Tentative,
@@ -100,6 +107,7 @@ impl Lifecycle {
     }
 
     /// Returns the existence probability.
+    #[inline]
     pub fn existence(&self) -> f64 {
         1.0 / (1.0 + (-self.log_odds).exp())
     }

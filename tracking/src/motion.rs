@@ -67,6 +67,7 @@ impl Situation {
     pub const FREE: Self = Self { urgency_per_s: 0.0 };
 
     /// Returns the situation of a vehicle relative to the ego.
+    #[inline]
     pub fn of(other: &RearVehicle, ego: &EgoRear) -> Self {
         let (gap_m, closing_mps) = (ego.s_m - other.front_s_m, other.speed_mps - ego.speed_mps);
         let is_behind = gap_m > 0.0 && (other.d_m - ego.d_m).abs() < ego.half_lane_m;
@@ -130,6 +131,7 @@ pub const ACROSS_WHITE_MODE: &[Mode] = &white_mode(ACROSS_WHITE_M2PS3);
 
 impl Mode {
     /// Returns the rates of switching to each mode in a situation (1/s).
+    #[inline]
     pub fn rates_per_s(&self, situation: Situation) -> [f64; MODES] {
         std::array::from_fn(|to| self.switch_rates_per_s[to] + self.urgency_gains[to] * situation.urgency_per_s)
     }

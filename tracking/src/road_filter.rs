@@ -164,6 +164,7 @@ pub struct EgoEstimate {
 }
 
 /// Transforms the estimates along and across the road to the ego's frame. The covariance is rotated with them.
+#[inline]
 pub fn in_ego_frame([along, across]: &[AxisEstimate; 2], frame: &EgoFrame<'_>) -> EgoEstimate {
     let point = frame.point(along.position_m, across.position_m);
     let (sin, cos) = point.road_yaw_rad.sin_cos();

@@ -12,6 +12,7 @@ pub struct TrackList {
 
 impl TrackList {
     /// Returns an id that no track of this run has had.
+    #[inline]
     pub fn new_id(&mut self) -> TrackId {
         let id = TrackId(self.next_id);
         self.next_id += 1;

@@ -7,6 +7,7 @@
 mod assemble;
 mod evaluate;
 mod judge;
+mod options;
 mod project;
 mod result;
 mod set;
@@ -14,6 +15,7 @@ mod set;
 pub use assemble::{AssemblyError, PresetGates};
 pub use evaluate::{Accumulator, Answer, Evaluation, OpenReason};
 pub use judge::Judge;
+pub use options::GateOptions;
 pub use project::{ProjectError, ProjectFile};
 pub use result::{ExpectationResult, GateResult, RequirementResult, Standing};
 pub use set::{GateSet, GateSource, GateSpec, ProbabilitySpec, Scope};

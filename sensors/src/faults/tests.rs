@@ -240,7 +240,7 @@ fn a_dead_lidar_loses_its_tracks_and_is_noticed_after_a_second() {
 
 #[test]
 fn a_wrong_mounting_moves_what_is_seen_by_its_angle_and_height() {
-    let lateral_m = |fault: &str| with(fault).iter().filter_map(Step::rear).map(Track::y_m).last().unwrap();
+    let lateral_m = |fault: &str| with(fault).iter().filter_map(Step::rear).map(Track::y_m).next_back().unwrap();
     // The sensor is turned to the left, so that it looks to the right, and a vehicle straight behind appears to its left of
     // centre: at 60 m by 60 · tan 0.5°.
     let shift_m = lateral_m("yaw-deg = 0.5") - lateral_m("yaw-deg = 0.0");

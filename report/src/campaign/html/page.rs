@@ -60,7 +60,7 @@ fn with_contents(body: &str) -> (Markup, PreEscaped<String>) {
 }
 
 /// Returns a whole page.
-pub(crate) fn document(title: &str, body: &Markup) -> Markup {
+pub fn document(title: &str, body: &Markup) -> Markup {
     html! {
         (DOCTYPE)
         html lang="en" {
@@ -76,7 +76,7 @@ pub(crate) fn document(title: &str, body: &Markup) -> Markup {
 }
 
 /// Returns a table that scrolls sideways if the page is too narrow; `head` holds cells, `rows` holds rows.
-pub(crate) fn table(head: &Markup, rows: &Markup) -> Markup {
+pub fn table(head: &Markup, rows: &Markup) -> Markup {
     html! {
         div.wide tabindex="0" {
             table {
@@ -88,17 +88,17 @@ pub(crate) fn table(head: &Markup, rows: &Markup) -> Markup {
 }
 
 /// Returns the heads of columns of text.
-pub(crate) fn text_heads(names: &[&str]) -> Markup {
+pub fn text_heads(names: &[&str]) -> Markup {
     html! { @for name in names { @if name.is_empty() { td {} } @else { th { (name) } } } }
 }
 
 /// Returns the heads of columns of numbers.
-pub(crate) fn number_heads(names: &[&str]) -> Markup {
+pub fn number_heads(names: &[&str]) -> Markup {
     html! { @for name in names { th.number { (name) } } }
 }
 
 /// Returns a cell with a number.
-pub(crate) fn number(value: impl Display) -> Markup {
+pub fn number(value: impl Display) -> Markup {
     html! { td.number { (value.to_string()) } }
 }
 

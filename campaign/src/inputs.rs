@@ -1,0 +1,26 @@
+//! The files that a command reads, so that none of them is overwritten.
+
+use std::path::PathBuf;
+
+use closecall_scenarios::trajectory_data::input_files;
+use closecall_simulation::controller::ControllerChoice;
+use closecall_simulation::scenario::ScenarioFile;
+
+use crate::fingerprint::named_files;
+
+/// Returns the files from which a scenario was read.
+pub fn of_scenario(file: &ScenarioFile) -> Vec<PathBuf> {
+    let recorded = file.trajectory_files().iter().flat_map(|path| input_files(path));
+    std::iter::once(file.path().to_owned()).chain(recorded).collect()
+}
+
+/// Returns the files of trajectory data, which may be several for one path.
+pub fn of_trajectories(paths: &[PathBuf]) -> Vec<PathBuf> {
+    paths.iter().flat_map(|path| input_files(path)).collect()
+}
+
+/// Returns the files that the command of a controller names.
+pub fn of_controller(controller: &ControllerChoice) -> Vec<PathBuf> {
+    let files = controller.exec().map(|settings| named_files(settings, None)).unwrap_or_default();
+    files.into_iter().map(|(_, path)| path).collect()
+}

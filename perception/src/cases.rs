@@ -1,0 +1,107 @@
+//! The conditions under which perception is studied: each differs from the usual one in one respect.
+
+use closecall_sensors::{SensorMode, Sensors};
+use closecall_simulation::scenario::{ScenarioFile, library};
+use closecall_traffic::{Environment, Light, Road, VehicleClass};
+
+/// Reflectivity of the usual paint (-).
+pub const USUAL_PAINT: f64 = 0.5;
+/// Reflectivities of paint, from black to white (-).
+const PAINTS: [f64; 4] = [0.1, 0.2, 0.35, 0.8];
+/// Rates of moderate and heavy rain (mm/h): the lower ends of the classes "strong" and "very strong" of the German Weather Service.
+const RAIN_MM_PER_H: [f64; 2] = [10.0, 30.0];
+/// Visibilities in fog (m).
+const FOG_M: [f64; 2] = [200.0, 100.0];
+/// Lateral offset of the neighbouring lane (m), and of a vehicle that straddles the marking.
+const OFFSETS_M: [f64; 2] = [3.75, 1.9];
+
+/// A condition.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Case {
+    /// What is varied: `class`, `paint`, `offset`, `weather`, `light`, `traffic` or `fault`.
+    pub factor: &'static str,
+    /// The condition, in words.
+    pub name: String,
+    /// Class of the vehicle that approaches.
+    pub class: VehicleClass,
+    /// Reflectivity of its paint (-).
+    pub paint: f64,
+    /// Its lateral offset from the ego, positive to the left (m).
+    pub offset_m: f64,
+    /// Light and weather.
+    pub environment: Environment,
+    /// Whether another car drives 25 m behind the ego, in its lane.
+    pub is_screened: bool,
+    /// The sensors, if they differ from those of the study: they have a fault.
+    pub sensors: Option<Sensors>,
+    /// The road, if it differs from that of the study.
+    pub road: Option<Road>,
+}
+
+impl Case {
+    fn usual() -> Self {
+        Self {
+            factor: "usual",
+            name: "usual: car, paint 0.5, own lane, clear day".to_owned(),
+            class: VehicleClass::Car,
+            paint: USUAL_PAINT,
+            offset_m: 0.0,
+            environment: Environment::CLEAR_DAY,
+            is_screened: false,
+            sensors: None,
+            road: None,
+        }
+    }
+
+    fn of(factor: &'static str, name: String) -> Self {
+        Self { factor, name, ..Self::usual() }
+    }
+}
+
+/// Returns the cases, the usual one first. `mode` says which faults of the library apply.
+pub fn cases(mode: SensorMode) -> Vec<Case> {
+    let mut cases = vec![Case::usual()];
+    for class in [VehicleClass::Truck, VehicleClass::Motorcycle] {
+        cases.push(Case { class, ..Case::of("class", class.name().to_owned()) });
+    }
+    for paint in PAINTS {
+        cases.push(Case { paint, ..Case::of("paint", format!("paint {paint}")) });
+    }
+    for offset_m in OFFSETS_M {
+        cases.push(Case { offset_m, ..Case::of("offset", format!("{offset_m} m to the left")) });
+    }
+    for rain_mm_per_h in RAIN_MM_PER_H {
+        let environment = Environment { rain_mm_per_h, ..Environment::CLEAR_DAY };
+        cases.push(Case { environment, ..Case::of("weather", format!("rain {rain_mm_per_h} mm/h")) });
+    }
+    for visibility_m in FOG_M {
+        let environment = Environment { visibility_m, ..Environment::CLEAR_DAY };
+        cases.push(Case { environment, ..Case::of("weather", format!("fog, visibility {visibility_m} m")) });
+    }
+    for (light, name) in [(Light::Dusk, "dusk"), (Light::Night, "night")] {
+        let environment = Environment { light, ..Environment::CLEAR_DAY };
+        cases.push(Case { environment, ..Case::of("light", name.to_owned()) });
+    }
+    for (offset_m, name) in [(0.0, "car 25 m behind, in line"), (1.9, "car 25 m behind, 1.9 m aside")] {
+        cases.push(Case { is_screened: true, offset_m, ..Case::of("traffic", name.to_owned()) });
+    }
+    cases.extend(faults(mode));
+    cases
+}
+
+/// Returns a case for each scenario of the library in which a rear sensor of this mode has a fault.
+fn faults(mode: SensorMode) -> impl Iterator<Item = Case> {
+    library::names().filter_map(move |name| {
+        let file = ScenarioFile::parse(&library::path(name), library::text(name)?, &[]).ok()?;
+        let is_fault = file.config().tags.iter().any(|tag| tag == "fault") && name != "front-radar-dead";
+        let scenario = file.concrete(&file.space().nominal()).ok().filter(|_| is_fault)?;
+        let applies = scenario.sensors.mode() == mode;
+        let environment = scenario.environment;
+        applies.then(|| Case {
+            sensors: Some(scenario.sensors),
+            environment,
+            road: Some(scenario.road),
+            ..Case::of("fault", format!("fault: {name}"))
+        })
+    })
+}

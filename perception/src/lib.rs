@@ -1,0 +1,24 @@
+//! A study of perception without a controller: where it ends, how it errs, and what spoils it.
+//!
+//! ```text
+//!  scenario ─▶ sensors ─┐
+//!  cases ───────────────┼─▶ approaches (in parallel) ─▶ observations ─▶ curves, figures ─▶ text │ JSON │ Parquet │ page
+//!  seed ────────────────┘
+//! ```
+//!
+//! Each case varies one condition: class, paint, lateral offset, weather, light, traffic in between, or a fault. In each of its
+//! approaches, a vehicle comes from 150 m behind to 5 m at a closing speed of its own. The ego keeps its speed and its lane.
+//!
+//! * [`cases`]: the conditions
+//! * [`approach`]: one approach
+//! * [`study`]: all approaches of all cases
+//! * [`figures`]: what follows from the approaches of a case, with intervals
+//! * [`output`]: text, JSON, Parquet and the page
+
+pub mod approach;
+pub mod cases;
+pub mod figures;
+pub mod output;
+pub mod study;
+
+pub use study::{Extent, Study, StudyError};

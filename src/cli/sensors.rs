@@ -1,0 +1,65 @@
+//! `closecall sensors`: a study of perception without a controller.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use closecall_campaign::arguments::count;
+use closecall_perception::output::Studies;
+use closecall_perception::{Extent, Study};
+
+use super::CliError;
+use super::args::{Format, SensorsChoice, SetArgs};
+use super::backend::check_backend;
+use super::output::{out, outln, print_written};
+use crate::exit_code::ExitCode;
+
+/// Arguments of `closecall sensors`.
+#[derive(Debug, Args)]
+pub(super) struct SensorsArgs {
+    /// Scenario file, or name of a scenario of the library, whose sensors are studied, at the nominal values of its parameters
+    #[arg(default_value = "low-thw-overtake")]
+    scenario: PathBuf,
+    /// Study the sensors of another scenario, too, and show both side by side
+    #[arg(long, value_name = "SCENARIO")]
+    compare: Option<PathBuf>,
+    /// Depth of the sensor simulation [default: full]
+    #[arg(long, value_enum)]
+    sensors: Option<SensorsChoice>,
+    /// Few approaches: a first look within a minute
+    #[arg(long, conflicts_with = "approaches")]
+    quick: bool,
+    /// Number of approaches of each case [default: 120; with --quick: 8]
+    #[arg(short = 'n', long, value_name = "N", value_parser = count)]
+    approaches: Option<u64>,
+    /// Seed of the random numbers
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Folder for the page (sensors.html), the figures (JSON, Parquet) and the curves (Parquet)
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    set: SetArgs,
+    /// Output format
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+pub(super) fn sensors(args: &SensorsArgs) -> Result<ExitCode, CliError> {
+    let choice = args.sensors.unwrap_or(SensorsChoice::Full);
+    check_backend(choice == SensorsChoice::Full)?;
+    let extent = args.approaches.map_or(if args.quick { Extent::Quick } else { Extent::Full }, Extent::Runs);
+    let study = |path: &PathBuf| -> Result<Study, CliError> {
+        Ok(Study::of(&args.set.load(path)?, Some(choice.mode()), args.seed, extent)?)
+    };
+    let studies: Result<Vec<Study>, CliError> =
+        [Some(&args.scenario), args.compare.as_ref()].into_iter().flatten().map(study).collect();
+    let studies = Studies(studies?);
+    match args.format {
+        Format::Json => outln!("{:#}", studies.json()),
+        Format::Human => out!("{studies}"),
+    }
+    if let Some(out) = &args.out {
+        studies.write(out)?.iter().for_each(|path| print_written(path));
+    }
+    Ok(ExitCode::Pass)
+}
