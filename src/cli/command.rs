@@ -112,7 +112,7 @@ enum Command {
     Plot(plot::PlotArgs),
     /// Show recordings in the browser, with the web build of an installed Rerun viewer
     View(view::ViewArgs),
-    /// Render labelled images of the rear camera
+    /// Render labelled images of the rear camera, or of an aerial one
     Render(render::RenderArgs),
     /// Print a script that completes commands and options in a shell
     Completions(generate::CompletionsArgs),

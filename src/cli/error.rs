@@ -1,5 +1,6 @@
 //! The errors of the commands, and the exit code of each.
 
+use closecall_aerial::AerialError;
 use closecall_campaign::baseline::BaselineError;
 use closecall_campaign::compare::CompareError;
 use closecall_campaign::execution::CampaignError;
@@ -98,6 +99,9 @@ pub enum CliError {
     /// A set of rendered images cannot be written.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
+    /// The aerial acquisition fails.
+    #[error(transparent)]
+    Aerial(#[from] AerialError),
     /// The requested inference backend cannot be used.
     #[error(transparent)]
     Classifier(#[from] ClassifierError),
@@ -205,7 +209,8 @@ impl From<&CliError> for ExitCode {
             | CliError::Viewer(_)
             | CliError::Figure(_)
             | CliError::WriteRecording(_)
-            | CliError::Dataset(_) => Self::Io,
+            | CliError::Dataset(_)
+            | CliError::Aerial(_) => Self::Io,
             CliError::Member(MemberError::Read { .. }) | CliError::Following(FollowingError::Read { .. }) => Self::Io,
             CliError::Member(MemberError::Unknown { .. } | MemberError::SameName { .. }) => Self::Usage,
             CliError::Member(_) | CliError::Apply(_) | CliError::Following(_) => Self::InvalidInput,

@@ -1,8 +1,9 @@
-//! `closecall render`: renders labelled images of the rear camera, to train and to test classifiers.
+//! `closecall render`: renders labelled images of the rear camera or of an aerial one, to train and to test networks.
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use closecall_aerial::dataset::{AerialDatasetOptions, render_aerial_dataset};
 use closecall_campaign::arguments::scene_count;
 use closecall_report::json::stamped;
 use closecall_sensors::camera::dataset::{Content, DatasetOptions, Set, render_dataset};
@@ -12,16 +13,6 @@ use super::CliError;
 use super::args::Format;
 use super::output::outln;
 use crate::exit_code::ExitCode;
-
-/// The purpose of the images.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-enum Purpose {
-    /// Body shapes and paints for training
-    #[default]
-    Training,
-    /// Body shapes and paints that are not used for training
-    HeldOut,
-}
 
 /// Arguments of `closecall render`.
 #[derive(Debug, Args)]
@@ -35,9 +26,12 @@ pub(super) struct RenderArgs {
     /// Seed of the random scenes
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Body shapes and paints of the vehicles
-    #[arg(long, value_enum, default_value_t)]
-    set: Purpose,
+    /// Body shapes and paints of the vehicles: those for training, or those that are not used for training
+    #[arg(long, value_parser = ["training", "held-out"], default_value = "training")]
+    set: String,
+    /// Render oblique aerial images with oriented boxes, in the layout of DOTA, instead of images of the rear camera
+    #[arg(long, conflicts_with = "crops")]
+    aerial: bool,
     /// Write the crops that are the classifier's input, instead of whole images with COCO annotations
     #[arg(long)]
     crops: bool,
@@ -47,15 +41,18 @@ pub(super) struct RenderArgs {
 }
 
 pub(super) fn render(args: &RenderArgs) -> Result<ExitCode, CliError> {
-    let options = DatasetOptions {
-        set: match args.set {
-            Purpose::Training => Set::Training,
-            Purpose::HeldOut => Set::HeldOut,
-        },
-        content: if args.crops { Content::Crops } else { Content::Images },
-        scenes: args.scenes,
-        seed: args.seed,
-    };
+    let set = if args.set == "training" { Set::Training } else { Set::HeldOut };
+    let (scenes, seed) = (args.scenes, args.seed);
+    if args.aerial {
+        let summary = render_aerial_dataset(&AerialDatasetOptions { set, pictures: scenes, seed }, &args.output)?;
+        match args.format {
+            Format::Json => outln!("{:#}", stamped(json!(summary), Some(seed), None)),
+            Format::Human => outln!("{summary} written to {}", args.output.display()),
+        }
+        return Ok(ExitCode::Pass);
+    }
+    let content = if args.crops { Content::Crops } else { Content::Images };
+    let options = DatasetOptions { set, content, scenes, seed };
     let summary = render_dataset(&options, &args.output)?;
     match args.format {
         Format::Json => outln!("{:#}", stamped(json!(summary), Some(args.seed), None)),

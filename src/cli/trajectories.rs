@@ -13,7 +13,7 @@ use closecall_report::traffic::paper_charts::{CRITICALITY_CHARTS, criticality_ch
 use closecall_scenarios::atomic::WriteError;
 use closecall_scenarios::criticality::{Counted, Judgement, by_severity, criticality as evaluate};
 use closecall_scenarios::filters::smooth;
-use closecall_scenarios::fit::{Heading, fit as fit_distributions, to_toml, write_toml};
+use closecall_scenarios::fit::{Heading, correlated, fit as fit_distributions, to_toml, write_toml};
 use closecall_scenarios::lane_change::{
     Criterion, FoundLaneChanges, LaneReliability, find, listed_for, read_references, score,
 };
@@ -123,6 +123,10 @@ pub(super) struct FitArgs {
     /// Origin of the trajectory files, for the heading of the output
     #[arg(long, default_value = "")]
     provenance: String,
+    /// Also write how the quantities of one lane change, or of one pair of vehicles, depend on each other: rank correlations,
+    /// by which scenarios sample them together
+    #[arg(long)]
+    correlations: bool,
     /// Seed of the bootstrap, which computes the confidence intervals
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -159,18 +163,12 @@ pub(super) fn lane_changes(args: &LaneChangesArgs) -> Result<ExitCode, CliError>
         print_error(format_args!("warning: {}: {warning}\n", args.file.display()));
     }
     match (args.format, scored) {
-        (Format::Json, None) => outln!("{:#}", stamped(serde_json::json!(changes), None, None)),
-        (Format::Json, Some(scored)) => {
-            outln!("{:#}", stamped(serde_json::json!({ "lane_changes": changes, "score": scored }), None, None));
-        }
+        (Format::Json, scored) => outln!("{:#}", stamped(json::lane_changes(&changes, scored.as_ref()), None, None)),
         (Format::Human, scored) => {
             let (rows, period, dropped) = (tracks.rows(), tracks.period(), tracks.dropped().count());
             outln!("{name}: {count} tracks, {rows} rows every {period}, {dropped} rows skipped");
             outln!("{basis}");
-            out!("{}", LaneChangesText(&changes));
-            if let Some(scored) = scored {
-                out!("{}", ScoreText(&scored));
-            }
+            out!("{}{}", LaneChangesText(&changes), scored.as_ref().map_or_else(String::new, ScoreText::text));
         }
     }
     Ok(ExitCode::Pass)
@@ -213,7 +211,7 @@ pub(super) fn criticality(args: &CriticalityArgs) -> Result<ExitCode, CliError> 
 pub(super) fn fit(args: &FitArgs) -> Result<ExitCode, CliError> {
     protect(&of_trajectories(&args.data.files), &[("--output", args.output.as_deref())])?;
     let data_sets = args.data.read_all()?;
-    let fitted = fit_distributions(&data_sets, args.seed);
+    let fitted = if args.correlations { correlated } else { fit_distributions }(&data_sets, args.seed);
     let heading = Heading { command: command_line(), provenance: args.provenance.clone() };
     if let Some(path) = &args.output {
         write_toml(&fitted, &heading, path).map_err(|source| WriteError::new(path, source))?;

@@ -17,4 +17,4 @@ pub use frontier::frontier;
 pub use outcome::{encounter_metrics, outcome};
 pub use sensitivity::sensitivity;
 pub use stamp::stamped;
-pub use trajectory_data::{fitted, quality, robustness};
+pub use trajectory_data::{fitted, lane_changes, quality, robustness};

@@ -1,6 +1,7 @@
 //! What was found in trajectory data as JSON.
 
-use closecall_scenarios::fit::{FittedDistributions, FittedQuantity, Quantity};
+use closecall_scenarios::fit::{FittedDistributions, FittedQuantity, Quantity, RankCorrelation};
+use closecall_scenarios::lane_change::{LaneChange, Score};
 use closecall_scenarios::robustness::Robustness;
 use closecall_scenarios::trajectory_data::{QualityInspector, Tracks};
 use serde_json::{Value, json};
@@ -29,6 +30,11 @@ pub fn quality(tracks: &Tracks<'_>, inspector: &QualityInspector) -> Value {
     })
 }
 
+/// Returns lane changes; with a score, an object of both.
+pub fn lane_changes(changes: &[LaneChange], score: Option<&Score>) -> Value {
+    score.map_or_else(|| json!(changes), |score| json!({ "lane_changes": changes, "score": score }))
+}
+
 /// Returns the results of a robustness study, with the lowest level of noise at which each criterion fails.
 pub fn robustness(found: &Robustness) -> Value {
     let fails = found.criteria.iter().enumerate();
@@ -54,13 +60,18 @@ pub fn fitted(fitted: &FittedDistributions) -> Value {
             "median": quantity.median,
             "interval_95": quantity.interval_95,
             "quantiles": quantity.quantiles,
+            "goodness_of_fit": quantity.form.map(|(form, fit)| {
+                json!({ "form": form.name(), "distance": fit.distance, "p_value": fit.p_value })
+            }),
         })
     };
+    let correlation = |one: &RankCorrelation| json!({ "of": one.of.name(), "with": one.with.name(), "n": one.n, "spearman": one.spearman });
     let too_few = |(quantity, n): &(Quantity, usize)| json!({ "name": quantity.name(), "n": n });
     json!({
         "trajectory_data": fitted.data_sets.iter().map(|(name, _)| name).collect::<Vec<_>>(),
         "seed": fitted.seed,
         "fitted": fitted.fitted.iter().map(quantity).collect::<Vec<_>>(),
+        "correlations": fitted.correlations.iter().map(correlation).collect::<Vec<_>>(),
         "too_few": fitted.too_few.iter().map(too_few).collect::<Vec<_>>(),
     })
 }

@@ -20,6 +20,10 @@ impl fmt::Display for FitText<'_> {
                 None => writeln!(f, "; no parametric form suits these values")?,
             }
         }
+        for one in &self.0.correlations {
+            let (of, with) = (one.of.name(), one.with.name());
+            writeln!(f, "{of:<24} with {with}: rank correlation {:.2}, n = {}", one.spearman, one.n)?;
+        }
         for (quantity, n) in &self.0.too_few {
             writeln!(f, "{:<24} n = {n:>4}, too few to fit", quantity.name())?;
         }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use closecall_scenarios::criticality::{Counted, CriticalLaneChange, shares};
+use closecall_scenarios::criticality::{Counted, CriticalLaneChange, MetricResult, shares};
 use closecall_scenarios::lane_change::{LaneChange, Score};
 use closecall_scenarios::trajectory_data::{TrajectoryData, count_flaws};
 use closecall_traffic::Side;
@@ -36,6 +36,13 @@ impl fmt::Display for LaneChangesText<'_> {
 /// How well the lane changes that were found match known ones.
 #[derive(Clone, Copy, Debug)]
 pub struct ScoreText<'a>(pub &'a Score);
+
+impl ScoreText<'_> {
+    /// Returns the text of a score.
+    pub fn text(score: &Score) -> String {
+        ScoreText(score).to_string()
+    }
+}
 
 impl fmt::Display for ScoreText<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -76,12 +83,11 @@ impl fmt::Display for CriticalityText<'_> {
         )?;
         for change in changes {
             writeln!(f, "{}", line(&change.lane_change))?;
-            for (name, metric) in change.metrics.named() {
-                let mark = if metric.is_critical() { "  CRITICAL" } else { "" };
-                match metric.value() {
-                    Some(value) => writeln!(f, "         {name:<12} {value:>9.2}{mark}")?,
-                    None => writeln!(f, "         {name:<12}         -")?,
-                }
+            for (name, whole, crossing) in change.named() {
+                let mark = if whole.is_critical() { "  CRITICAL" } else { "" };
+                let number = |found: MetricResult| found.value().map_or("-".to_owned(), |value| format!("{value:.2}"));
+                let (whole, crossing) = (number(whole), number(crossing));
+                writeln!(f, "         {name:<12} {whole:>9}  at the crossing {crossing:>9}{mark}")?;
             }
         }
         let shares = shares(changes, counted);

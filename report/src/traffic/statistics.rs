@@ -7,8 +7,9 @@ use closecall_scenarios::lane_change::LaneChange;
 
 use super::trajectory_charts::{BoxChart, BoxSummary, ChartError};
 
-/// Names of the charts' files: the durations, the widths of the peaks of lateral speed, and the speeds.
-pub const STATISTICS_CHARTS: [&str; 3] = ["duration.svg", "width.svg", "speed.svg"];
+/// Names of the charts' files: the durations, the widths of the peaks of lateral speed, and the speeds at
+/// the crossing and at the peak.
+pub const STATISTICS_CHARTS: [&str; 4] = ["duration.svg", "width.svg", "speed.svg", "peak-speed.svg"];
 
 /// The statistics as a table for human readers.
 #[derive(Clone, Copy, Debug)]
@@ -76,7 +77,7 @@ pub(super) struct Boxed {
 }
 
 /// The quantities that have box plots.
-pub(super) const BOXED: [Boxed; 3] = [
+pub(super) const BOXED: [Boxed; 4] = [
     Boxed { file: "duration", title: "Duration", y_name: "duration [s]", value: |change| change.duration_s },
     Boxed {
         file: "width",
@@ -85,6 +86,12 @@ pub(super) const BOXED: [Boxed; 3] = [
         value: |change| change.width_s,
     },
     Boxed { file: "speed", title: "Speed at the crossing", y_name: "speed [m/s]", value: |change| change.speed_mps },
+    Boxed {
+        file: "peak-speed",
+        title: "Speed at the peak of lateral speed",
+        y_name: "speed [m/s]",
+        value: |change| change.peak_speed_mps,
+    },
 ];
 
 /// Draws the durations, widths and speeds of complete lane changes as box plots with the single values, one box per
@@ -92,7 +99,7 @@ pub(super) const BOXED: [Boxed; 3] = [
 ///
 /// # Errors
 /// [`ChartError`] if a chart cannot be drawn.
-pub fn statistics_charts(recordings: &[RecordedChanges]) -> Result<[String; 3], ChartError> {
+pub fn statistics_charts(recordings: &[RecordedChanges]) -> Result<[String; 4], ChartError> {
     let boxes = |boxed: &Boxed| {
         let of_file = |one: &RecordedChanges| {
             let mut boxes = by_class(&one.changes, boxed);
@@ -103,8 +110,8 @@ pub fn statistics_charts(recordings: &[RecordedChanges]) -> Result<[String; 3], 
         };
         recordings.iter().flat_map(of_file).collect()
     };
-    let [duration, width, speed] = BOXED.each_ref().map(|boxed| box_chart(boxed, boxes(boxed)).svg());
-    Ok([duration?, width?, speed?])
+    let [duration, width, speed, peak_speed] = BOXED.each_ref().map(|boxed| box_chart(boxed, boxes(boxed)).svg());
+    Ok([duration?, width?, speed?, peak_speed?])
 }
 
 pub(super) fn box_chart(boxed: &Boxed, boxes: Vec<BoxSummary>) -> BoxChart {

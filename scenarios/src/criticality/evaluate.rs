@@ -1,14 +1,18 @@
 //! Evaluation of the metrics over the window of a lane change.
 
 use closecall_traffic::geometry::OrientedBox;
-use closecall_traffic::metrics::{CRITICAL_THW_S, Moving, bumper_gap_m, closest_encounter, time_headway_s};
+use closecall_traffic::metrics::{
+    CRITICAL_THW_S, Moving, bumper_gap_m, closest_encounter, required_deceleration_mps2, time_headway_s,
+    time_to_collision_s,
+};
 use closecall_traffic::{Absent, Lane, Time, Trajectory, TrajectoryPoint};
 
 use super::{
     CRITICAL_A_LAT_MPS2, CRITICAL_A_LON_MPS2, CRITICAL_DCE_M, CRITICAL_DISTANCE_M, CRITICAL_SPEED_FACTOR,
-    CRITICAL_TTCE_S, CriticalLaneChange, DEFAULT_SPEED_LIMIT_MPS, ENCOUNTER_HORIZON_S, MetricResult, Metrics,
+    CRITICAL_TTCE_S, CriticalLaneChange, DEFAULT_SPEED_LIMIT_MPS, ENCOUNTER_HORIZON_S, Evaluation, FollowingMetrics,
+    MetricResult, Metrics,
 };
-use crate::filters::SmoothedTrajectoryData;
+use crate::filters::{PERIOD, SmoothedTrajectoryData};
 use crate::lane_change::{LaneChange, detect};
 
 /// Speed below which a vehicle is assumed to point along the road, because its direction of movement is noise (m/s).
@@ -26,26 +30,38 @@ pub struct Judgement {
 /// Detects all lane changes of `data` and evaluates their metrics.
 pub fn criticality(data: &SmoothedTrajectoryData, judgement: &Judgement) -> Vec<CriticalLaneChange> {
     let evaluated = detect(data).into_iter().filter_map(|lane_change| {
-        let metrics = evaluate(data, &lane_change, judgement)?;
-        Some(CriticalLaneChange { lane_change, metrics })
+        let Evaluation { metrics, following } = evaluate(data, &lane_change, window(&lane_change), judgement)?;
+        let (half, crossing) = (Time::from_ns(PERIOD.ns() / 2), Time::from_s(lane_change.crossing_s));
+        let at_crossing = evaluate(data, &lane_change, [crossing - half, crossing + half], judgement)?;
+        Some(CriticalLaneChange { lane_change, metrics, following, at_crossing })
     });
     evaluated.collect()
 }
 
-/// Evaluates the metrics of one lane change. Returns `None` if `data` does not have its track.
-pub fn evaluate(data: &SmoothedTrajectoryData, lane_change: &LaneChange, judgement: &Judgement) -> Option<Metrics> {
+/// Returns the first and the last instant of a lane change. The estimated manoeuvre may end before the crossing, or begin after
+/// it: the crossing belongs to the window.
+fn window(lane_change: &LaneChange) -> [Time; 2] {
+    let LaneChange { start_s, crossing_s, end_s, .. } = *lane_change;
+    [Time::from_s(start_s.min(crossing_s)), Time::from_s(end_s.max(crossing_s))]
+}
+
+/// Evaluates the metrics of one lane change from the first to the last instant of a window. Returns `None` if `data` does not
+/// have its track.
+fn evaluate(
+    data: &SmoothedTrajectoryData,
+    lane_change: &LaneChange,
+    [start, end]: [Time; 2],
+    judgement: &Judgement,
+) -> Option<Evaluation> {
     let own_index = data.track_index(lane_change.track_id)?;
     let own = &data.tracks[own_index].trajectory;
-    // The estimated manoeuvre may end before the crossing, or begin after it: the crossing belongs to the window.
-    let LaneChange { start_s, crossing_s, end_s, .. } = *lane_change;
-    let (start, end) = (Time::from_s(start_s.min(crossing_s)), Time::from_s(end_s.max(crossing_s)));
     let mut extremes = Extremes::default();
     for point in own.points.iter().filter(|point| point.time >= start && point.time <= end) {
         let others = data.present_at(point.time).iter().filter(|presence| presence.track_index != own_index);
         let others: Vec<VehicleState<'_>> = others.map(|&presence| VehicleState::new(data.look_up(presence))).collect();
         extremes.observe(&VehicleState::new((own, point)), &others, Lane(lane_change.to_lane));
     }
-    Some(extremes.metrics(judgement))
+    Some(Evaluation { metrics: extremes.metrics(judgement), following: extremes.following() })
 }
 
 /// The state of one vehicle at one instant.
@@ -115,6 +131,9 @@ struct Extremes {
     a_lon: Option<Extreme>,
     a_lat: Option<Extreme>,
     thw: Option<Extreme>,
+    ttc: Option<Extreme>,
+    drac: Option<Extreme>,
+    has_lead: bool,
     dce: Option<Extreme>,
     ttce: Option<Extreme>,
     has_opponent: bool,
@@ -148,15 +167,44 @@ impl Extremes {
     }
 
     fn observe_headway(&mut self, own: &VehicleState<'_>, others: &[VehicleState<'_>], target: Lane) {
-        let in_lane = |other: &&VehicleState<'_>| other.point.lane == own.point.lane || other.point.lane == target;
-        let ahead = others.iter().filter(in_lane).filter_map(|other| Some((own.gap_to_m(other)?, other)));
-        let Some((gap_m, lead)) = ahead.min_by(|a, b| a.0.total_cmp(&b.0)) else { return };
+        let nearest_in = |lane: Lane| {
+            let in_lane = others.iter().filter(move |other| other.point.lane == lane);
+            let ahead = in_lane.filter_map(|other| Some((own.gap_to_m(other)?, other)));
+            ahead.min_by(|a, b| a.0.total_cmp(&b.0))
+        };
+        let leads = [nearest_in(own.point.lane), nearest_in(target)];
+        for (gap_m, lead) in leads.iter().flatten() {
+            self.observe_closing(own, lead, *gap_m);
+        }
+        let nearest = leads.into_iter().flatten().min_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((gap_m, lead)) = nearest else { return };
         match time_headway_s(gap_m, own.point.speed_mps) {
             Ok(value) => {
                 let (opponent, time_s) = (Some(lead.track.track_id), own.point.time.s());
                 keep_smaller(&mut self.thw, Extreme { value, opponent, time_s });
             }
             Err(_) => self.was_standing_behind_lead = true,
+        }
+    }
+
+    /// Updates TTC and DRAC with a vehicle ahead.
+    fn observe_closing(&mut self, own: &VehicleState<'_>, lead: &VehicleState<'_>, gap_m: f64) {
+        self.has_lead = true;
+        let against = |value| Extreme { value, opponent: Some(lead.track.track_id), time_s: own.point.time.s() };
+        let (own_mps, lead_mps) = (own.point.speed_mps, lead.point.speed_mps);
+        if let Ok(ttc_s) = time_to_collision_s(gap_m, own_mps, lead_mps) {
+            keep_smaller(&mut self.ttc, against(ttc_s));
+        }
+        if let Ok(drac_mps2) = required_deceleration_mps2(gap_m, own_mps, lead_mps, 0.0) {
+            keep_larger(&mut self.drac, against(drac_mps2));
+        }
+    }
+
+    fn following(&self) -> FollowingMetrics {
+        let otherwise = if self.has_lead { Absent::NotApproaching } else { Absent::NoLead };
+        FollowingMetrics {
+            ttc_s: metric_record(self.ttc, otherwise, |_| false),
+            drac_mps2: metric_record(self.drac, otherwise, |_| false),
         }
     }
 
@@ -289,13 +337,37 @@ mod tests {
         let own = changing_track(1, (0.0, 30.0), (-5.25, -1.75), (3.0, 5.0), 110);
         let data = smooth(&trajectory_data_of(vec![own, lead]));
         let whole = detect(&data).remove(0);
-        let thw_s =
-            |change: &LaneChange| evaluate(&data, change, &Judgement::default()).unwrap().thw_s.value().unwrap();
+        let thw_s = |change: &LaneChange| {
+            let found = evaluate(&data, change, window(change), &Judgement::default()).unwrap();
+            found.metrics.thw_s.value().unwrap()
+        };
         // The estimated end of a manoeuvre can lie before its crossing.
         let early = LaneChange { end_s: whole.crossing_s - 1.0, ..whole.clone() };
         let until_crossing = LaneChange { end_s: whole.crossing_s, ..whole.clone() };
         assert_eq!(thw_s(&early), thw_s(&until_crossing));
         assert!(thw_s(&early) > thw_s(&whole), "{} {}", thw_s(&early), thw_s(&whole));
+    }
+
+    #[test]
+    fn ttc_and_drac_have_their_closed_form_and_the_crossing_its_own_values() {
+        // The lead vehicle in the target lane is 45.5 m ahead at first, and 4 m/s slower.
+        let found = evaluated(vec![straight_track(2, 50.0, 26.0, -1.75, 110)]);
+        let crossing_s = found.lane_change.crossing_s;
+        let gap_m = 45.5 - 4.0 * crossing_s;
+        let value = |name: &str| found.named().find(|(of, ..)| *of == name).unwrap();
+        let (_, whole, crossing) = value("ttc_s");
+        assert!((crossing.value().unwrap() - gap_m / 4.0).abs() < 1e-6, "{crossing:?}");
+        assert!(whole.value().unwrap() <= crossing.value().unwrap());
+        let (_, whole, crossing) = value("drac_mps2");
+        assert!((crossing.value().unwrap() - 16.0 / (2.0 * gap_m)).abs() < 1e-6, "{crossing:?}");
+        assert!(whole.value().unwrap() >= crossing.value().unwrap() && !whole.is_critical());
+        let (_, _, thw) = value("thw_s");
+        assert!((thw.value().unwrap() - gap_m / 30.0).abs() < 1e-6);
+        assert!(matches!(thw, MetricResult::Value { time_s, .. } if (time_s - crossing_s).abs() < 1e-9));
+        let alone = evaluated(Vec::new());
+        assert_eq!(absent(alone.following.ttc_s), Some(Absent::NoLead));
+        let away = evaluated(vec![straight_track(2, 50.0, 40.0, -5.25, 110)]);
+        assert_eq!(absent(away.following.drac_mps2), Some(Absent::NotApproaching));
     }
 
     #[test]

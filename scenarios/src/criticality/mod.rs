@@ -1,4 +1,4 @@
-//! Criticality of a lane change: seven metrics, each with the opponent and the time of its most critical value.
+//! Criticality of a lane change: metrics, each with the opponent and the time of its most critical value.
 //!
 //! | metric       | meaning                                                 | critical            |
 //! |--------------|---------------------------------------------------------|---------------------|
@@ -9,6 +9,10 @@
 //! | `thw_s`      | its time headway (THW)                                  | < 0.9 s             |
 //! | `dce_m`      | distance at closest encounter (DCE), if TTCE < 2.6 s    | < 1.0 m             |
 //! | `ttce_s`     | time to closest encounter (TTCE)                        | only if asked for: < 2.6 s |
+//!
+//! Beside them, two metrics without a threshold: the time to collision `ttc_s` (TTC) and the deceleration rate to avoid a crash
+//! `drac_mps2` (DRAC), both towards the vehicles ahead that count for THW, at constant speeds of both vehicles. All metrics are
+//! also evaluated at the instant of the crossing alone.
 //!
 //! # Definitions
 //!
@@ -41,10 +45,11 @@ mod shares;
 mod statistics;
 mod thresholds;
 
-pub use evaluate::{Judgement, criticality, evaluate};
-pub use record::{CriticalLaneChange, MetricResult, Metrics};
+pub use evaluate::{Judgement, criticality};
+pub use record::{CriticalLaneChange, Evaluation, FollowingMetrics, MetricResult, Metrics};
 pub use severity::by_severity;
 pub use shares::{Counted, CriticalShare, CriticalShares, shares};
+pub(crate) use statistics::spearman;
 pub use statistics::{BoxPlot, ClassStatistics, Correlation, Statistics, statistics};
 pub use thresholds::{
     CRITICAL_A_LAT_MPS2, CRITICAL_A_LON_MPS2, CRITICAL_DCE_M, CRITICAL_DISTANCE_M, CRITICAL_SPEED_FACTOR,

@@ -76,12 +76,60 @@ impl Metrics {
     }
 }
 
+/// Two further metrics towards the vehicles ahead, for comparison with other publications. They are never critical: the
+/// published method has no threshold for them.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct FollowingMetrics {
+    /// Smallest time to collision (TTC) at constant speeds (s).
+    pub ttc_s: MetricResult,
+    /// Largest deceleration rate to avoid a crash (DRAC): the constant deceleration that suffices if the vehicle ahead keeps
+    /// its speed (m/s²).
+    pub drac_mps2: MetricResult,
+}
+
+impl FollowingMetrics {
+    /// Returns both metrics with their names, in a fixed order.
+    pub const fn named(&self) -> [(&'static str, MetricResult); 2] {
+        [("ttc_s", self.ttc_s), ("drac_mps2", self.drac_mps2)]
+    }
+}
+
+/// The values of all metrics over one window of time.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Evaluation {
+    /// The seven metrics.
+    #[serde(flatten)]
+    pub metrics: Metrics,
+    /// The two further metrics.
+    #[serde(flatten)]
+    pub following: FollowingMetrics,
+}
+
+impl Evaluation {
+    /// Returns all nine metrics with their names, in a fixed order.
+    pub fn named(self) -> impl Iterator<Item = (&'static str, MetricResult)> {
+        self.metrics.named().into_iter().chain(self.following.named())
+    }
+}
+
 /// A lane change with its criticality metrics.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CriticalLaneChange {
     /// The lane change.
     #[serde(flatten)]
     pub lane_change: LaneChange,
-    /// The metrics.
+    /// The metrics over the whole lane change.
     pub metrics: Metrics,
+    /// Two further metrics over the whole lane change.
+    pub following: FollowingMetrics,
+    /// All metrics at the instant of the crossing alone.
+    pub at_crossing: Evaluation,
+}
+
+impl CriticalLaneChange {
+    /// Returns the nine metrics over the whole lane change, each with its name and its value at the crossing.
+    pub fn named(&self) -> impl Iterator<Item = (&'static str, MetricResult, MetricResult)> {
+        let whole = Evaluation { metrics: self.metrics, following: self.following };
+        whole.named().zip(self.at_crossing.named()).map(|((name, whole), (_, crossing))| (name, whole, crossing))
+    }
 }

@@ -153,7 +153,7 @@ fn correlation(
 ) -> Correlation {
     let pairs = complete.iter().filter_map(|change| first(change).zip(second(change)));
     let (a, b): (Vec<f64>, Vec<f64>) = pairs.filter(|(a, b)| a.is_finite() && b.is_finite()).unzip();
-    Correlation { of, with, n: a.len(), pearson: pearson(&a, &b), spearman: pearson(&ranks(&a), &ranks(&b)) }
+    Correlation { of, with, n: a.len(), pearson: pearson(&a, &b), spearman: spearman(&a, &b) }
 }
 
 /// Returns Pearson's correlation coefficient, or `None` with too few pairs or if a quantity does not vary.
@@ -164,6 +164,11 @@ fn pearson(a: &[f64], b: &[f64]) -> Option<f64> {
         |product: &dyn Fn(f64, f64) -> f64| a.iter().zip(b).map(|(a, b)| product(a - mean_a, b - mean_b)).sum::<f64>();
     let (aa, bb, ab) = (sum(&|a, _| a * a), sum(&|_, b| b * b), sum(&|a, b| a * b));
     (a.len() >= MIN_PAIRS && aa > 0.0 && bb > 0.0).then(|| (ab / (aa.sqrt() * bb.sqrt())).clamp(-1.0, 1.0))
+}
+
+/// Returns Spearman's rank correlation, or `None` with too few pairs or if a quantity does not vary.
+pub(crate) fn spearman(a: &[f64], b: &[f64]) -> Option<f64> {
+    pearson(&ranks(a), &ranks(b))
 }
 
 /// Returns the ranks of `values`, starting at 1; equal values share their mean rank.

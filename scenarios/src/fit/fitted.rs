@@ -1,5 +1,6 @@
 //! The fitted distributions of all quantities.
 
+use super::correlation::{RankCorrelation, correlations};
 use super::{FittedQuantity, Quantity, Samples, observe};
 use crate::filters::smooth;
 use crate::trajectory_data::TrajectoryData;
@@ -15,10 +16,17 @@ pub struct FittedDistributions {
     pub fitted: Vec<FittedQuantity>,
     /// The quantities with too few values, each with the number of its values.
     pub too_few: Vec<(Quantity, usize)>,
+    /// Rank correlations between quantities; empty if they were not asked for.
+    pub correlations: Vec<RankCorrelation>,
 }
 
 /// Fits the distributions of all quantities to `data_sets`; `seed` is the seed of the bootstrap.
 pub fn fit(data_sets: &[TrajectoryData], seed: u64) -> FittedDistributions {
+    FittedDistributions { correlations: Vec::new(), ..correlated(data_sets, seed) }
+}
+
+/// Fits the distributions like [`fit`], and the rank correlations between the quantities.
+pub fn correlated(data_sets: &[TrajectoryData], seed: u64) -> FittedDistributions {
     let mut samples = Samples::default();
     for data in data_sets {
         samples.extend(observe(&smooth(data)));
@@ -32,5 +40,6 @@ pub fn fit(data_sets: &[TrajectoryData], seed: u64) -> FittedDistributions {
         }
     }
     let data_sets = data_sets.iter().map(|data| (data.name.clone(), data.hash.clone())).collect();
-    FittedDistributions { data_sets, seed, fitted, too_few }
+    let correlations = correlations(&samples);
+    FittedDistributions { data_sets, seed, fitted, too_few, correlations }
 }

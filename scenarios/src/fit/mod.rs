@@ -32,13 +32,17 @@
 //! Kolmogorov–Smirnov distance and the probability of a larger one if the form were true. That probability comes from a
 //! parametric bootstrap (1,000 samples, with the form refitted to each), because the parameters are fitted to the same
 //! values. With fewer than 5 values nothing is fitted.
+//!
+//! [`correlated`] adds Spearman's rank correlations, which scenarios sample by a Gaussian copula ([`crate::parameters`]).
 
+mod correlation;
 mod distribution;
 mod fitted;
 mod observe;
 mod toml_text;
 
+pub use correlation::RankCorrelation;
 pub use distribution::{FittedQuantity, Form, GoodnessOfFit, MIN_VALUES};
-pub use fitted::{FittedDistributions, fit};
+pub use fitted::{FittedDistributions, correlated, fit};
 pub use observe::{Quantity, Samples, observe};
 pub use toml_text::{Heading, to_toml, write_toml};

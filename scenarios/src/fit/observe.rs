@@ -92,6 +92,8 @@ impl Quantity {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Samples {
     values: BTreeMap<Quantity, Vec<f64>>,
+    /// The values of each lane change and of each pair of vehicles, for correlations.
+    rows: Vec<BTreeMap<Quantity, f64>>,
 }
 
 impl Samples {
@@ -105,9 +107,23 @@ impl Samples {
         for (quantity, values) in other.values {
             self.values.entry(quantity).or_default().extend(values);
         }
+        self.rows.extend(other.rows);
+    }
+
+    /// Returns the values of two quantities of the lane changes or pairs that have both.
+    pub(super) fn pairs(&self, a: Quantity, b: Quantity) -> (Vec<f64>, Vec<f64>) {
+        self.rows.iter().filter_map(|row| Some((*row.get(&a)?, *row.get(&b)?))).unzip()
+    }
+
+    /// Begins the values of a further lane change or pair.
+    fn begin(&mut self) {
+        self.rows.push(BTreeMap::new());
     }
 
     fn push(&mut self, quantity: Quantity, value: f64) {
+        if let Some(row) = self.rows.last_mut() {
+            row.insert(quantity, value);
+        }
         self.values.entry(quantity).or_default().push(value);
     }
 
@@ -131,6 +147,7 @@ pub fn observe(data: &SmoothedTrajectoryData) -> Samples {
 }
 
 fn observe_lane_change(data: &SmoothedTrajectoryData, change: &LaneChange, samples: &mut Samples) {
+    samples.begin();
     samples.push(Quantity::CrossingSpeed, change.speed_mps);
     if change.complete {
         samples.push(Quantity::LaneChangeDuration, change.duration_s);
@@ -203,6 +220,7 @@ fn observe_following(data: &SmoothedTrajectoryData, samples: &mut Samples) {
         if PERIOD * (instants.len() as i64) < MIN_FOLLOWING {
             continue;
         }
+        samples.begin();
         let (headways, speeds): (Vec<f64>, Vec<f64>) = instants.into_iter().unzip();
         samples.push_headway(Quantity::FrontThw, Quantity::ShortFrontThw, SHORTEST_ACC_S, median(headways));
         samples.push(Quantity::FollowingSpeed, median(speeds));

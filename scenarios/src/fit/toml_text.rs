@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::io;
 use std::path::Path;
 
-use super::{FittedDistributions, FittedQuantity, Form, MIN_VALUES};
+use super::{FittedDistributions, FittedQuantity, Form, MIN_VALUES, Quantity};
 use crate::atomic::write_atomically;
 
 /// Text for the heading of the file.
@@ -28,7 +28,8 @@ pub fn to_toml(result: &FittedDistributions, heading: &Heading) -> String {
     for fitted in &result.fitted {
         push_line(&mut text, &format!("# {}", fitted.quantity.meaning()));
         let quantiles = fitted.quantiles.iter().map(|value| number(*value)).collect::<Vec<_>>().join(", ");
-        push_entry(&mut text, fitted, &format!("empirical = {{ quantiles = [{quantiles}] }}"), &source);
+        let dependence = dependence(result, fitted.quantity);
+        push_entry(&mut text, fitted, &format!("empirical = {{ quantiles = [{quantiles}] }}{dependence}"), &source);
     }
     for (quantity, n) in &result.too_few {
         let name = quantity.name();
@@ -45,6 +46,14 @@ pub fn to_toml(result: &FittedDistributions, heading: &Heading) -> String {
         push_entry(&mut text, fitted, &form_text(form), &source);
     }
     text
+}
+
+/// Returns the rank correlations of a quantity with those that follow it, as a further key of its parameter.
+fn dependence(result: &FittedDistributions, quantity: Quantity) -> String {
+    let is_fitted = |quantity: Quantity| result.fitted.iter().any(|fitted| fitted.quantity == quantity);
+    let own = result.correlations.iter().filter(|one| one.of == quantity && is_fitted(one.with));
+    let own: Vec<String> = own.map(|one| format!("{} = {:.2}", one.with.name(), one.spearman)).collect();
+    if own.is_empty() { String::new() } else { format!(", spearman = {{ {} }}", own.join(", ")) }
 }
 
 /// Writes the distributions to `path` atomically.
@@ -115,7 +124,7 @@ mod tests {
     use closecall_traffic::ParameterName;
 
     use super::*;
-    use crate::fit::Quantity;
+    use crate::fit::RankCorrelation;
     use crate::parameters::ParametersConfig;
 
     fn result() -> FittedDistributions {
@@ -127,6 +136,12 @@ mod tests {
             seed: 3,
             fitted: fitted.to_vec(),
             too_few: vec![(Quantity::Closing, 2)],
+            correlations: vec![RankCorrelation {
+                of: Quantity::CutOutThw,
+                with: Quantity::CrossingSpeed,
+                n: 30,
+                spearman: -0.4,
+            }],
         }
     }
 
@@ -140,6 +155,7 @@ mod tests {
             let entry = &config.0[&ParameterName::new("cut-out-thw-s").unwrap()];
             assert_eq!(entry.fitted.as_ref().unwrap().n, 30);
         }
+        assert!(text.contains("spearman = { crossing-mps = -0.40 }"), "{text}");
         assert!(text.contains("# closing-mps: not fitted, 2 values where 5 are needed"));
     }
 

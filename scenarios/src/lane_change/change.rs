@@ -33,6 +33,8 @@ pub struct LaneChange {
     pub width_s: f64,
     /// Speed along the road at the crossing (m/s).
     pub speed_mps: f64,
+    /// Speed along the road at the peak of lateral speed (m/s).
+    pub peak_speed_mps: f64,
     /// Largest lateral speed, positive in the direction of the lane change (m/s).
     pub peak_lateral_speed_mps: f64,
     /// Lateral shift from start to end, as far as recorded, positive in the direction of the lane change (m).

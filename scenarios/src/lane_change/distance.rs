@@ -117,6 +117,7 @@ fn lane_change(sampled: &Sampled<'_>, direction: Side, samples: &Samples) -> Lan
         duration_s,
         width_s: duration_s,
         speed_mps: track.points[crossing].speed_mps,
+        peak_speed_mps: sampled.peak_speed_mps(direction, span),
         peak_lateral_speed_mps: speeds.fold(f64::NEG_INFINITY, f64::max),
         lateral_shift_m,
         overlapping: false,

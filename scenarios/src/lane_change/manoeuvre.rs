@@ -139,6 +139,14 @@ impl<'a> Sampled<'a> {
         sign(direction) * (self.point(end.ceil()).d_m - self.point(start.floor()).d_m)
     }
 
+    /// Returns the speed along the road at the largest lateral speed towards `direction` between two samples (m/s). Of two
+    /// equal ones the earlier counts.
+    pub(super) fn peak_speed_mps(&self, direction: Side, [start, end]: [f64; 2]) -> f64 {
+        let points = &self.track.points[self.index(start.floor())..=self.index(end.ceil())];
+        let lateral = |point: &TrajectoryPoint| sign(direction) * point.lateral_speed_mps;
+        points.iter().rev().max_by(|a, b| lateral(a).total_cmp(&lateral(b))).map_or(0.0, |point| point.speed_mps)
+    }
+
     /// Returns the first sample at which the given share of the lateral shift between two samples is done.
     pub(super) fn sample_of_share(&self, share: f64, [start, end]: [f64; 2]) -> f64 {
         let (first, last) = (self.index(start.floor()), self.index(end.ceil()));

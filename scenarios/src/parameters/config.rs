@@ -6,6 +6,7 @@ use closecall_traffic::{ConfigError, KeyPath, ParameterName, Problem, Value};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::copula::Copula;
 use super::distribution::{FINITE, at_least};
 use super::space::{ParameterSpace, Provenance, SpaceEntry};
 use super::{Distribution, finite};
@@ -29,7 +30,11 @@ impl ParametersConfig {
             let entry = config.check().map_err(|error| error.within(name.as_str()))?;
             Ok((name.clone(), entry))
         };
-        self.0.iter().map(check).collect()
+        let entries = self.0.iter().map(check).collect::<Result<BTreeMap<_, _>, ConfigError>>()?;
+        let stated = self.0.iter().filter(|(_, config)| !config.spearman.is_empty());
+        let stated = stated.map(|(name, config)| (name.clone(), config.spearman.clone())).collect();
+        let copula = Copula::new(&entries, &stated)?;
+        Ok(ParameterSpace::new(entries, copula))
     }
 }
 
@@ -65,6 +70,10 @@ pub struct ParameterConfig {
     /// Provenance: the distribution was assumed, for the reason given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub assumed: Option<String>,
+    /// Rank correlations (Spearman) with other parameters, by their names: from -0.99 to 0.99. It suffices that one of two
+    /// parameters states theirs. A pair that neither states is independent.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "finite::correlations")]
+    pub spearman: BTreeMap<ParameterName, f64>,
     /// A remark for the reader.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub note: Option<String>,

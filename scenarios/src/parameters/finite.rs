@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
-use closecall_traffic::Value;
+use closecall_traffic::{ParameterName, Value};
 use schemars::{Schema, SchemaGenerator, json_schema};
 use serde::de::{Error, Visitor};
 use serde::{Deserialize, Deserializer};
@@ -89,6 +89,14 @@ pub(super) fn list<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<f64
 pub(super) fn pair<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<[f64; 2]>, D::Error> {
     let [low, high] = <[Finite; 2]>::deserialize(deserializer)?;
     Ok(Some([low.0, high.0]))
+}
+
+/// Deserializes finite rank correlations, by the name of the other parameter.
+pub(super) fn correlations<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<BTreeMap<ParameterName, f64>, D::Error> {
+    let found = BTreeMap::<ParameterName, Finite>::deserialize(deserializer)?;
+    Ok(found.into_iter().map(|(name, value)| (name, value.0)).collect())
 }
 
 /// Deserializes optional labels with finite weights.

@@ -16,6 +16,9 @@
 //! chooses one number in [0, 1) for each parameter.
 
 mod config;
+mod copula;
+#[cfg(test)]
+mod copula_tests;
 mod distribution;
 mod finite;
 mod space;
@@ -26,5 +29,6 @@ pub use config::{
     EmpiricalConfig, FittedConfig, LogNormalConfig, ParameterConfig, ParametersConfig, TruncatedNormalConfig,
     UniformConfig,
 };
+pub(crate) use copula::cholesky;
 pub use distribution::Distribution;
 pub use space::{ParameterSpace, Provenance, SpaceEntry, Variation};

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use closecall_traffic::{ParameterName, Parameters, Value};
 
+use super::copula::Copula;
 use super::{Distribution, FittedConfig};
 
 /// The provenance of a distribution.
@@ -30,9 +31,13 @@ pub struct SpaceEntry {
 
 /// The parameters of a scenario with their distributions, in the order of their names.
 ///
-/// The parameters are sampled independently of each other, by the designs of [`crate::sampling`].
+/// The parameters are sampled by the designs of [`crate::sampling`], independently of each other unless they state rank
+/// correlations.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct ParameterSpace(BTreeMap<ParameterName, SpaceEntry>);
+pub struct ParameterSpace {
+    entries: BTreeMap<ParameterName, SpaceEntry>,
+    copula: Copula,
+}
 
 /// How much sampled values vary, in rising order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -46,19 +51,30 @@ pub enum Variation {
 }
 
 impl ParameterSpace {
+    pub(super) const fn new(entries: BTreeMap<ParameterName, SpaceEntry>, copula: Copula) -> Self {
+        Self { entries, copula }
+    }
+
+    /// Returns the values at the numbers u of all parameters, in the order of the names. Correlated parameters are coupled
+    /// first.
+    pub(crate) fn values(&self, mut numbers: Vec<f64>) -> Parameters {
+        self.copula.couple(&mut numbers);
+        self.map(|_, index, distribution| distribution.quantile(numbers[index]))
+    }
+
     /// Iterates over all parameters in the order of their names.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = (&ParameterName, &SpaceEntry)> {
-        self.0.iter()
+        self.entries.iter()
     }
 
     /// Returns the parameter `name`, or `None` if there is none.
     pub fn get(&self, name: &ParameterName) -> Option<&SpaceEntry> {
-        self.0.get(name)
+        self.entries.get(name)
     }
 
     /// Returns how much the parameters vary.
     pub fn variation(&self) -> Variation {
-        let variations = self.0.values().map(|entry| entry.distribution.variation());
+        let variations = self.entries.values().map(|entry| entry.distribution.variation());
         variations.max().unwrap_or(Variation::None)
     }
 
@@ -73,7 +89,8 @@ impl ParameterSpace {
     }
 
     /// Returns the values at a point of the unit cube, which has a coordinate in [0, 1) for each parameter of
-    /// [`Self::varying`]: its quantile there. The other parameters have their only value. A coordinate that is missing is taken as the median.
+    /// [`Self::varying`]: its quantile there. Rank correlations do not count here: a
+    /// study of sensitivity varies one parameter after the other. The other parameters have their only value. A coordinate that is missing is taken as the median.
     pub fn at(&self, point: &[f64]) -> Parameters {
         let mut coordinates = point.iter();
         self.map(|_, _, distribution| match distribution.variation() {
@@ -88,7 +105,7 @@ impl ParameterSpace {
     pub fn extremes(&self) -> Vec<Parameters> {
         let nominal = self.nominal();
         let mut extremes = vec![nominal.clone()];
-        for (name, entry) in &self.0 {
+        for (name, entry) in &self.entries {
             let bounds = entry.distribution.bounds().into_iter().flatten().map(Value::Number);
             let labels = entry.distribution.labels().iter().cloned().map(Value::Label);
             for value in bounds.chain(labels).filter(|value| nominal.get(name) != Some(value)) {
@@ -103,13 +120,14 @@ impl ParameterSpace {
     /// Maps every parameter to a value. `value` receives its name, its index in the order of the names, and its
     /// distribution.
     pub(crate) fn map(&self, mut value: impl FnMut(&ParameterName, usize, &Distribution) -> Value) -> Parameters {
-        let entries = self.0.iter().enumerate();
+        let entries = self.entries.iter().enumerate();
         entries.map(|(index, (name, entry))| (name.clone(), value(name, index, &entry.distribution))).collect()
     }
 }
 
+/// Collects parameters that are independent of each other.
 impl FromIterator<(ParameterName, SpaceEntry)> for ParameterSpace {
     fn from_iter<I: IntoIterator<Item = (ParameterName, SpaceEntry)>>(entries: I) -> Self {
-        Self(entries.into_iter().collect())
+        Self { entries: entries.into_iter().collect(), copula: Copula::default() }
     }
 }

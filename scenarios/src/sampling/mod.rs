@@ -9,6 +9,9 @@
 //! | `random` | independent, from the random stream of (seed, k, parameter name)         | no                        |
 //! | `sobol`  | Sobol sequence, Owen-scrambled by the seed, one dimension for each name  | no                        |
 //! | `grid`   | midpoints of equally probable parts, in all combinations                 | yes                       |
+//!
+//! Parameters that state rank correlations ([`crate::parameters`]) are coupled in `random` and `sobol`. A grid covers all
+//! combinations of its levels, whatever their correlation.
 
 mod design;
 mod grid;

@@ -14,9 +14,8 @@ const OWNER: &str = "scenario";
 
 /// Returns the parameter values of sample `index`.
 pub(super) fn sample(space: &ParameterSpace, seed: u64, index: u64) -> Parameters {
-    space.map(|name, _, distribution| {
-        distribution.quantile(scenario_stream(seed, index, &format!("parameter/{name}")).random())
-    })
+    let number = |name| scenario_stream(seed, index, &format!("parameter/{name}")).random();
+    space.values(space.iter().map(|(name, _)| number(name)).collect())
 }
 
 /// Returns a random stream that belongs to the scenario as a whole, not to an actor.

@@ -23,13 +23,14 @@ pub(super) fn sample(space: &ParameterSpace, seed: u64, index: u64) -> Parameter
     let block = index >> BLOCK_BITS;
     let point = (index & ((1 << BLOCK_BITS) - 1)) as u32;
     let mut scramble = 0;
-    space.map(|_, name_index, distribution| {
+    let number = |name_index: usize| {
         let (group, dimension) = (name_index as u32 / NUM_DIMENSIONS, name_index as u32 % NUM_DIMENSIONS);
         if dimension == 0 {
             scramble = scenario_stream(seed, block, &format!("sobol/{group}")).next_u32();
         }
-        distribution.quantile(f64::from(sobol_burley::sample(point, dimension, scramble)) + HALF_CELL)
-    })
+        f64::from(sobol_burley::sample(point, dimension, scramble)) + HALF_CELL
+    };
+    space.values((0..space.iter().len()).map(number).collect())
 }
 
 /// Returns point `index` of a scrambled Sobol sequence in the open unit cube, for searches that need no seed.

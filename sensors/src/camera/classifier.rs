@@ -151,7 +151,7 @@ fn scores_from(output: &[f32]) -> Result<ClassScores, ClassifierError> {
     Ok(ClassScores(probabilities.map(|score| score / sum)))
 }
 
-fn open_session(model: &[u8], environment: &Environment, backend: &Backend) -> Result<Session, ort::Error> {
+pub(super) fn open_session(model: &[u8], environment: &Environment, backend: &Backend) -> Result<Session, ort::Error> {
     let builder = Session::builder(environment)?;
     let mut builder = builder.with_optimization_level(GraphOptimizationLevel::Level3)?;
     if *backend != Backend::Tract {
@@ -162,7 +162,7 @@ fn open_session(model: &[u8], environment: &Environment, backend: &Backend) -> R
 }
 
 /// Returns the environment of the process's backend, which the first call sets up.
-fn environment(backend: &Backend) -> Result<&'static Environment, ClassifierError> {
+pub(super) fn environment(backend: &Backend) -> Result<&'static Environment, ClassifierError> {
     static CHOSEN: OnceLock<(Backend, Result<Environment, String>)> = OnceLock::new();
     let (chosen, loaded) = CHOSEN.get_or_init(|| (backend.clone(), load_backend(backend)));
     if chosen != backend {

@@ -22,6 +22,7 @@ mod image;
 mod image_memory;
 mod light;
 mod mesh;
+mod network;
 mod pinhole;
 mod pipeline;
 mod raster;
@@ -29,6 +30,7 @@ mod rear_camera;
 mod shapes;
 mod sky;
 mod spray;
+mod triangles;
 mod vector_registers;
 mod window;
 
@@ -38,6 +40,7 @@ pub use frame::{Frame, FrameBuffers};
 pub(crate) use image::sample_positions;
 pub use image::{CHANNELS, CROP_PX, Crop, Image, LabelledImage};
 pub use image_memory::ImageMemory;
+pub use network::Network;
 pub use pinhole::{FOCAL_PX, GroundBox, HEIGHT_PX, PixelRect, WIDTH_PX};
 pub use pipeline::CropClassifier;
 pub(crate) use pipeline::ImagedScene;
@@ -45,3 +48,4 @@ pub use rear_camera::{ExposureKey, RearCamera};
 pub use shapes::HELD_OUT_SHAPES;
 #[cfg(test)]
 pub(crate) use shapes::vehicle as vehicle_mesh;
+pub use triangles::{BodyTriangle, body_triangles};

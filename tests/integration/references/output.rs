@@ -214,7 +214,8 @@ fn the_keys_of_the_commands_on_trajectory_data_are_those_documented() {
     hold("reenact", [&program(&["reenact", &csv], 0)]);
     let sampled = program(&["sample", &csv, "--vary", "cc1", "--from", "1", "--to", "0.5", "--steps", "2"], 0);
     hold("sample", [&sampled]);
-    hold("fit", [&program(&["fit", &csv], 0), &program(&["fit", &few], 0)]);
+    let fit = |file: &str| program(&["fit", file, "--correlations"], 0);
+    hold("fit", [&fit(&csv), &fit(&few)]);
     let fitted = at("fitted.toml");
     stdout(&closecall(["fit", &csv, "-o", &fitted]), 0);
     hold("drift", [&program(&["drift", &fitted, &csv], 0), &program(&["drift", &fitted, &few], 4)]);

@@ -1,0 +1,130 @@
+//! Dependence between parameters: a Gaussian copula with given rank correlations.
+//!
+//! Each number u of a coupled parameter becomes a standard normal variate, the variates are mixed by the Cholesky factor of their
+//! correlation matrix, and the result becomes a number u again. Each number stays uniform, so that each parameter keeps its own
+//! distribution. Spearman's ρ of two parameters belongs to the correlation r = 2·sin(π·ρ/6) of their variates (K. Pearson, 1907).
+//! Of the coupled parameters, the first in the order of the names keeps its number.
+
+use std::collections::BTreeMap;
+use std::f64::consts::PI;
+
+use closecall_statistics::normal::TruncatedStandardNormal;
+use closecall_traffic::{ConfigError, ParameterName, Problem, Range};
+
+use super::space::{SpaceEntry, Variation};
+
+/// Range of a rank correlation: at ±1 one parameter would follow from the other.
+const RANK_CORRELATION: Range = Range::closed(-0.99, 0.99);
+/// Key of the rank correlations of a parameter.
+pub(super) const KEY: &str = "spearman";
+
+/// The dependence between the parameters of a scenario.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Copula {
+    /// Indices of the coupled parameters in the order of the names, with the rows of the lower Cholesky factor.
+    rows: Vec<(usize, Vec<f64>)>,
+}
+
+impl Copula {
+    /// Creates the copula of parameters with the rank correlations that each states.
+    ///
+    /// # Errors
+    /// [`ConfigError`] for a correlation that is out of range, with a parameter that does not exist or does not vary
+    /// continuously, that is stated twice differently, or for which no joint distribution exists.
+    pub(super) fn new(
+        entries: &BTreeMap<ParameterName, SpaceEntry>,
+        stated: &BTreeMap<ParameterName, BTreeMap<ParameterName, f64>>,
+    ) -> Result<Self, ConfigError> {
+        let mut pairs: BTreeMap<(usize, usize), f64> = BTreeMap::new();
+        for (name, partners) in stated {
+            for (partner, spearman) in partners {
+                let at = |error: ConfigError| error.within(KEY).within(name.as_str());
+                let pair = [name, partner].map(|one| entries.keys().position(|known| known == one));
+                check(entries, (name, partner), *spearman).map_err(at)?;
+                let [Some(a), Some(b)] = pair else { continue };
+                let known = pairs.insert((a.min(b), a.max(b)), *spearman);
+                if known.is_some_and(|known| known != *spearman) {
+                    let rule = format!("`{name}` and `{partner}` state different rank correlations of the two");
+                    return Err(at(contradiction(partner.as_str(), rule)));
+                }
+            }
+        }
+        let is_member = |index: &usize| pairs.keys().any(|(a, b)| a == index || b == index);
+        let members: Vec<usize> = (0..entries.len()).filter(is_member).collect();
+        let correlation = |a: usize, b: usize| match pairs.get(&(a.min(b), a.max(b))) {
+            _ if a == b => 1.0,
+            Some(spearman) => 2.0 * (PI * spearman / 6.0).sin(),
+            None => 0.0,
+        };
+        let matrix: Vec<Vec<f64>> =
+            members.iter().map(|a| members.iter().map(|b| correlation(*a, *b)).collect()).collect();
+        let rows = cholesky(&matrix).ok_or_else(|| {
+            let name = stated.keys().next().map_or("", ParameterName::as_str);
+            contradiction(KEY, "no joint distribution has the rank correlations of all parameters".to_owned())
+                .within(name)
+        })?;
+        Ok(Self { rows: members.into_iter().zip(rows).collect() })
+    }
+
+    /// Couples the numbers u of all parameters, which are in the order of the names.
+    pub(super) fn couple(&self, numbers: &mut [f64]) {
+        let Some(normal) = TruncatedStandardNormal::new(f64::NEG_INFINITY, f64::INFINITY) else { return };
+        // The quantile is finite only strictly between 0 and 1.
+        let variate = |u: f64| normal.quantile(u.max(f64::MIN_POSITIVE));
+        let variates: Vec<f64> = self.rows.iter().map(|(index, _)| variate(numbers[*index])).collect();
+        for (place, (index, row)) in self.rows.iter().enumerate().skip(1) {
+            let mixed: f64 = row[..=place].iter().zip(&variates).map(|(weight, z)| weight * z).sum();
+            numbers[*index] = normal.cdf(mixed);
+        }
+    }
+}
+
+fn check(
+    entries: &BTreeMap<ParameterName, SpaceEntry>,
+    (name, partner): (&ParameterName, &ParameterName),
+    spearman: f64,
+) -> Result<(), ConfigError> {
+    if name == partner {
+        return Err(contradiction(partner.as_str(), "a parameter has no correlation with itself".to_owned()));
+    }
+    if !entries.contains_key(partner) {
+        let known = entries.keys().map(ParameterName::as_str).collect::<Vec<_>>().join(", ");
+        return Err(ConfigError::new(partner.as_str(), Problem::UnknownParameter { name: partner.clone(), known }));
+    }
+    for one in [name, partner] {
+        if entries.get(one).is_none_or(|entry| entry.distribution.variation() != Variation::Continuous) {
+            let rule = format!("only numbers that vary continuously have a rank correlation, and `{one}` does not");
+            return Err(contradiction(partner.as_str(), rule));
+        }
+    }
+    if !RANK_CORRELATION.contains(spearman) {
+        let problem = Problem::OutOfRange { value: spearman, allowed: RANK_CORRELATION };
+        return Err(ConfigError::new(partner.as_str(), problem));
+    }
+    Ok(())
+}
+
+fn contradiction(key: &str, rule: String) -> ConfigError {
+    ConfigError::new(key, Problem::Contradiction { other: "parameters", rule })
+}
+
+/// Returns the rows of the lower Cholesky factor, or `None` if the matrix is not positive definite.
+pub(crate) fn cholesky(matrix: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
+    /// Smallest square on the diagonal: below it, a parameter follows from the others but for rounding.
+    const SMALLEST: f64 = 1e-9;
+    let mut rows: Vec<Vec<f64>> = Vec::with_capacity(matrix.len());
+    for (i, given) in matrix.iter().enumerate() {
+        let mut row = vec![0.0; matrix.len()];
+        for j in 0..i {
+            let known: f64 = (0..j).map(|k| row[k] * rows[j][k]).sum();
+            row[j] = (given[j] - known) / rows[j][j];
+        }
+        let square = given[i] - row[..i].iter().map(|x| x * x).sum::<f64>();
+        if !(square > SMALLEST) {
+            return None;
+        }
+        row[i] = square.sqrt();
+        rows.push(row);
+    }
+    Some(rows)
+}
