@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use closecall_aerial::dataset::{AerialDatasetOptions, render_aerial_dataset};
-use closecall_sensors::camera::dataset::Set;
+use closecall_datasets::Set;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();

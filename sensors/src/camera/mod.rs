@@ -12,7 +12,6 @@
 mod body;
 mod classifier;
 mod config;
-pub mod dataset;
 mod draw;
 mod frame;
 mod glow;
@@ -37,13 +36,14 @@ mod window;
 pub use classifier::{Backend, Classifier, ClassifierError, SHIPPED_MODEL};
 pub use config::{Camera, CameraConfig, Pipeline, Sun, SunConfig};
 pub use frame::{Frame, FrameBuffers};
+pub use hash::mix;
 pub(crate) use image::sample_positions;
 pub use image::{CHANNELS, CROP_PX, Crop, Image, LabelledImage};
 pub use image_memory::ImageMemory;
 pub use network::Network;
 pub use pinhole::{FOCAL_PX, GroundBox, HEIGHT_PX, PixelRect, WIDTH_PX};
-pub use pipeline::CropClassifier;
 pub(crate) use pipeline::ImagedScene;
+pub use pipeline::{CropClassifier, MIN_SHARE_IN_IMAGE};
 pub use rear_camera::{ExposureKey, RearCamera};
 pub use shapes::HELD_OUT_SHAPES;
 #[cfg(test)]

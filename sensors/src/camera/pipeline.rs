@@ -10,7 +10,7 @@ use crate::lidar::LaneGeometry;
 use crate::{Detection, Scene, SceneVehicle, SensorError};
 
 /// Minimum share of a window that must lie in the image for it to be classified (0 to 1).
-pub(super) const MIN_SHARE_IN_IMAGE: f64 = 0.6;
+pub const MIN_SHARE_IN_IMAGE: f64 = 0.6;
 /// Lower bound that the fusion applies to each score (0 to 1), so that neither the shape nor the image alone can rule
 /// out a class.
 const MIN_SCORE: f64 = 0.02;

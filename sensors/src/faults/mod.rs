@@ -17,18 +17,21 @@
 mod camera;
 mod config;
 mod list;
+mod object;
 mod odometry;
 #[cfg(test)]
 mod tests;
 
 pub(crate) use camera::CameraFault;
-pub use config::{CameraFaultConfig, FaultEntries, LidarFaultConfig, ObjectFaultConfig};
+pub use config::{CameraFaultConfig, FaultEntries, LidarFaultConfig};
 pub(crate) use list::FaultList;
 pub use list::Faults;
 pub(crate) use odometry::Belief;
 pub use odometry::{OdometryErrorConfig, OdometryErrors};
 
-pub(crate) use config::{LidarFault, ObjectFault};
+pub(crate) use config::LidarFault;
+pub(crate) use object::ObjectFault;
+pub use object::ObjectFaultConfig;
 
 /// Number of successive scans without output, or with the same output, after which the ego counts a sensor as failed: 1 s.
 ///

@@ -1,13 +1,16 @@
 //! What each fault does to perception: the same scene with and without it.
 
+mod camera;
+mod object;
+
 use closecall_traffic::{
     ActorId, CONTROL_STEP, Check, ClassScores, Environment, Light, Parameters, Road, RoadConfig, Source, Time, Track,
     TrackStatus, VehicleClass,
 };
 use serde::Deserialize;
 
-use super::config::{CameraFaultConfig, FaultEntries, LidarFaultConfig, ObjectFaultConfig};
-use super::{Faults, NOTICED_AFTER_SCANS, OdometryErrorConfig};
+use super::config::{CameraFaultConfig, FaultEntries, LidarFaultConfig};
+use super::{Faults, NOTICED_AFTER_SCANS, ObjectFaultConfig, OdometryErrorConfig};
 use crate::camera::{Backend, CropClassifier, ExposureKey, ImageMemory, ImagedScene};
 use crate::lidar::PointSource;
 use crate::testing::{OWN_LANE_M, scene_vehicle, with_speed};
@@ -326,121 +329,6 @@ fn blooming_widens_the_box() {
     // A halo of 3° at 30 m reaches 1.6 m to either side of the plate.
     let (usual_m, wide_m) = (width_m("blooming-deg = 0.0"), width_m("blooming-deg = 3.0"));
     assert!(wide_m > usual_m + 0.5, "{usual_m} {wide_m}");
-}
-
-/// Returns the mean score that the image of a car behind gives to its class, at these gaps.
-fn score(fault: &str, environment: Environment, gaps_m: &[f64]) -> f64 {
-    let text = format!("[[rear-camera]]\n{fault}\n");
-    let fault = faults(&text).unwrap().rear_camera.at(Time::ZERO);
-    let camera = crate::camera::CameraConfig::default().check(&Parameters::default()).unwrap();
-    let mut classifier = CropClassifier::new(camera, &Backend::Tract).unwrap();
-    let road = Road::straight(3);
-    let ego = with_speed(scene_vehicle(0, VehicleClass::Car, EGO_S_M, OWN_LANE_M), 30.0);
-    mean(gaps_m.iter().flat_map(|gap_m| (0..10).map(move |key| (*gap_m, key))).map(|(gap_m, key)| {
-        let others = [behind(gap_m, OWN_LANE_M, 30.0)];
-        let scene = Scene { time: Time::ZERO, road: &road, environment: &environment, ego, others: &others };
-        let size = others[0].vehicle.dimensions;
-        let mut detections = [Detection {
-            time: Time::ZERO,
-            face_x_m: -gap_m - 0.5 * size.length_m,
-            face_y_m: 0.0,
-            range_sd_m: 0.1,
-            lateral_sd_m: 0.1,
-            heading_rad: 0.0,
-            length_m: size.length_m,
-            length: Extent::Assumed,
-            width_m: size.width_m,
-            width: Extent::Seen,
-            top_m: size.height_m,
-            points: 20,
-            class: ClassScores::UNKNOWN,
-        }];
-        let seen = ImagedScene { now: &scene, imaged: &scene, fault: fault.as_ref() };
-        let key = ExposureKey(key);
-        classifier.classify_with(seen, key, &mut ImageMemory::default(), &mut detections).unwrap();
-        detections[0].class.0[VehicleClass::Car as usize]
-    }))
-}
-
-#[test]
-fn glare_dirt_and_blur_cost_the_classification_of_a_car() {
-    let gaps_m = [25.0, 40.0, 60.0];
-    let usual = score("dirt = 0.0", Environment::CLEAR_DAY, &gaps_m);
-    assert!(usual > 0.9, "{usual}");
-    for fault in ["sun-glare = 0.97", "dirt = 0.6", "blur-px = 20.0"] {
-        let spoilt = score(fault, Environment::CLEAR_DAY, &gaps_m);
-        assert!(spoilt < usual - 0.05, "{fault}: {spoilt} of {usual}");
-    }
-}
-
-#[test]
-fn the_main_beam_blinds_near_the_ego() {
-    let night = Environment { light: Light::Night, ..Environment::CLEAR_DAY };
-    let loss =
-        |gap_m| score("main-beam-glare = 0.0", night, &[gap_m]) - score("main-beam-glare = 0.97", night, &[gap_m]);
-    assert!(loss(25.0) > loss(80.0) && loss(25.0) > 0.05, "{} {}", loss(25.0), loss(80.0));
-}
-
-#[test]
-fn a_dead_or_frozen_camera_is_noticed_after_a_second_and_one_frozen_before_the_vehicle_came_shows_none() {
-    let run = |fault: &str| {
-        let text = format!("[[rear-camera]]\n{fault}\n");
-        // The car appears from beyond the range, long after the camera has failed.
-        let others = vec![behind(45.0, OWN_LANE_M, 30.0)];
-        Drive { sensors: "mode = \"full\"", faults: &text, others, steps: 60, ..Drive::default() }.run()
-    };
-    for fault in ["dead = true\nfrom-s = 1.0", "frozen = true\nfrom-s = 1.0"] {
-        let noticed = run(fault).iter().position(|step| step.health == Health::Failed).unwrap();
-        assert_eq!(noticed as u32, 25 + NOTICED_AFTER_SCANS - 1, "{fault}");
-    }
-    let car = |steps: &[Step]| steps[59].rear().unwrap().class.0[VehicleClass::Car as usize];
-    assert!(car(&run("dead = true")) < car(&run("dirt = 0.0")), "only the shape is left");
-}
-
-fn object(sensor: &str, fault: &str, others: Vec<SceneVehicle>) -> Vec<Step> {
-    let text = format!("[[{sensor}]]\n{fault}\n");
-    Drive { sensors: "", faults: &text, others, ..Drive::default() }.run()
-}
-
-#[test]
-fn an_object_level_sensor_loses_measurements_and_is_late() {
-    let near = || vec![behind(40.0, OWN_LANE_M, 30.0)];
-    let coasting = |fault: &str| {
-        let steps = object("rear-object", fault, near());
-        steps.iter().filter_map(Step::rear).filter(|track| track.status == TrackStatus::Coasting).count()
-    };
-    assert!(coasting("dropout = 0.6") > coasting("dropout = 0.0") + 20);
-    let confirmed = |fault: &str| first_confirmed(&object("rear-object", fault, near())).unwrap();
-    assert_eq!(confirmed("delay-s = 0.2"), confirmed("delay-s = 0.0") + 5);
-}
-
-#[test]
-fn a_dead_object_level_sensor_is_silent_and_a_frozen_one_repeats_itself_until_it_is_noticed() {
-    for sensor in ["rear-object", "front-radar"] {
-        let place = |speed_mps| match sensor {
-            "rear-object" => vec![behind(60.0, OWN_LANE_M, speed_mps)],
-            _ => vec![with_speed(scene_vehicle(1, VehicleClass::Car, EGO_S_M + 60.0, OWN_LANE_M), speed_mps)],
-        };
-        let dead = object(sensor, "dead = true\nfrom-s = 2.0", place(33.0));
-        assert!(!dead[49].tracks.is_empty() && dead[50].tracks.is_empty(), "{sensor}");
-        let noticed = dead.iter().position(|step| step.health == Health::Failed).unwrap();
-        assert_eq!(noticed as u32, 50 + NOTICED_AFTER_SCANS - 1, "{sensor}");
-        let frozen = object(sensor, "frozen = true\nfrom-s = 2.0\nuntil-s = 3.5", place(33.0));
-        assert_eq!(frozen[50].tracks[0].state, frozen[80].tracks[0].state);
-        assert_ne!(frozen[49].tracks[0].state, frozen[90].tracks[0].state);
-        assert_eq!((frozen[80].health, frozen[95].health), (Health::Failed, Health::Ok));
-    }
-}
-
-#[test]
-fn a_ghost_is_a_track_without_a_vehicle_that_approaches_as_stated() {
-    let steps =
-        object("rear-object", "ghost-gap-m = 50.0\nghost-closing-mps = 10.0\nfrom-s = 1.0\nuntil-s = 3.0", vec![]);
-    assert!(steps[24].tracks.is_empty() && steps[75].tracks.is_empty());
-    let [first, last] = [25, 74].map(|step| steps[step].rear().unwrap().clone());
-    assert_eq!(first.id, last.id);
-    assert!((last.x_m() - first.x_m() - 10.0 * 49.0 * PERIOD_S).abs() < 1e-9);
-    assert!((first.vx_mps() - 40.0).abs() < 1e-9 && first.lane[1] > 0.99);
 }
 
 #[test]

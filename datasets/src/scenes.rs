@@ -10,8 +10,8 @@ use closecall_traffic::{
 use rand::RngExt;
 
 use super::Set;
-use crate::camera::{Camera, CameraConfig, HELD_OUT_SHAPES, Pipeline, SunConfig};
-use crate::{Scene, SceneVehicle};
+use closecall_sensors::camera::{Camera, CameraConfig, HELD_OUT_SHAPES, Pipeline, SunConfig};
+use closecall_sensors::{Scene, SceneVehicle};
 
 /// Range of the distance from the ego's centre back to the front of a vehicle (m).
 const BEHIND_M: std::ops::Range<f64> = 6.0..125.0;

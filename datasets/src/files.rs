@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use super::DatasetError;
-use crate::camera::Image;
+use closecall_sensors::camera::Image;
 
 /// The folder that receives the files.
 pub(super) struct Output {

@@ -7,9 +7,9 @@ use rand::RngExt;
 
 use super::DatasetSummary;
 use super::scenes::RandomScene;
-use crate::camera::pipeline::MIN_SHARE_IN_IMAGE;
-use crate::camera::{Crop, ExposureKey, Frame, GroundBox, PixelRect, RearCamera};
-use crate::{Scene, SceneVehicle};
+use closecall_sensors::camera::MIN_SHARE_IN_IMAGE;
+use closecall_sensors::camera::{Crop, ExposureKey, Frame, GroundBox, PixelRect, RearCamera};
+use closecall_sensors::{Scene, SceneVehicle};
 
 /// Minimum unoccluded share of a vehicle for it to be labelled (0 to 1).
 const MIN_VISIBLE_SHARE: f64 = 0.55;

@@ -1,7 +1,7 @@
 //! Generates a synthetic trajectory file of any size, to measure memory use and reading speed.
 //!
 //! ```sh
-//! cargo run --release -p closecall-scenarios --example make_trajectory_file -- plain 10GB /tmp/big.csv
+//! cargo run --release --example make_trajectory_file -- plain 10GB /tmp/big.csv
 //! /usr/bin/time -v closecall lane-changes /tmp/big.csv > /tmp/changes.txt     # peak memory, user time
 //! /usr/bin/time -v closecall inspect /tmp/big.csv
 //! ```

@@ -1,13 +1,13 @@
 //! Renders labelled images of the rear camera, for the training and the evaluation of classifiers.
 //!
 //! ```text
-//! cargo run --release -p closecall-sensors --example render_dataset -- crops training 9000 0 target/crops/training
+//! cargo run --release -p closecall-datasets --example render_dataset -- crops training 9000 0 target/crops/training
 //! ```
 
 use std::path::Path;
 use std::process::ExitCode;
 
-use closecall_sensors::camera::dataset::{Content, DatasetOptions, Set, render_dataset};
+use closecall_datasets::{Content, DatasetOptions, Set, render_dataset};
 
 const USAGE: &str = "usage: render_dataset crops|images training|held-out SCENES SEED FOLDER";
 
