@@ -272,12 +272,26 @@ fn range_noise_scatters_the_points_along_the_line_of_sight() {
 
 #[test]
 fn a_wrong_clock_moves_an_approaching_vehicle_by_its_closing_speed() {
-    let x_m = |fault: &str| {
+    let run = |fault: &str| {
         let others = vec![behind(80.0, OWN_LANE_M, 40.0)];
-        Drive { faults: &lidar(fault), others, ..Drive::default() }.run()[95].rear().unwrap().x_m()
+        Drive { faults: &lidar(fault), others, ..Drive::default() }.run()
     };
-    let shift_m = x_m("clock-offset-s = -0.1") - x_m("clock-offset-s = 0.0");
-    assert!((shift_m - 1.0).abs() < 0.15, "{shift_m}");
+    let x_m = |offset: &str| run(&format!("clock-offset-s = {offset}"))[95].rear().unwrap().x_m();
+    let right_m = x_m("0.0");
+    for (offset, expected_m) in [("-0.1", 1.0), ("-0.2", 2.0), ("0.1", -1.0), ("0.2", -2.0)] {
+        let shift_m = x_m(offset) - right_m;
+        assert!((shift_m - expected_m).abs() < 0.3, "{offset}: {shift_m}");
+    }
+    for offset in ["-0.2", "0.2"] {
+        let steps = run(&format!("clock-offset-s = {offset}\nfrom-s = 1.5\nuntil-s = 3.0"));
+        for (step, track) in steps.iter().enumerate().flat_map(|(step, of)| of.tracks.iter().map(move |it| (step, it)))
+        {
+            let is_right = track.state.iter().all(|value| value.is_finite()) && track.covariance.cholesky().is_some();
+            assert!(is_right, "{offset}: step {step}: {track:?}");
+        }
+        let error_m = steps[99].rear().unwrap().x_m() - run("clock-offset-s = 0.0")[99].rear().unwrap().x_m();
+        assert!(error_m.abs() < 0.3, "{offset}: {error_m}");
+    }
 }
 
 #[test]
