@@ -63,9 +63,11 @@ impl<T: Combine> FaultList<T> {
         self.held(time).map(|entry| entry.effect).reduce(T::and)
     }
 
-    /// Returns the time since the latest entry that holds at `time` began (s); `None` if none holds.
-    pub(crate) fn since_s(&self, time: Time) -> Option<f64> {
-        self.held(time).map(|entry| time.s() - entry.from_s.max(0.0)).reduce(f64::min)
+    /// Returns the time since the latest entry began that holds at `time` and has the effect `has` (s); `None` if none holds. An
+    /// entry without a start begins with the run.
+    pub(crate) fn since_s(&self, time: Time, has: impl Fn(&T) -> bool) -> Option<f64> {
+        let supplier = self.held(time).filter(|entry| has(&entry.effect)).last();
+        supplier.map(|entry| time.s() - entry.from_s.max(0.0))
     }
 
     fn held(&self, time: Time) -> impl Iterator<Item = &Entry<T>> {
