@@ -26,6 +26,10 @@ use super::validity::CheckCounts;
 /// Default of the share of checked verdicts that may flip at half the time step (-).
 pub const MAX_FLIP_RATE: f64 = 0.05;
 
+/// Share of the outcomes in which the system under test may not be available for some time, and the campaign still says what the
+/// system does (-). An assumption: with more, the usual run is one in which the system cannot act as it was built to.
+const MAX_UNAVAILABLE_SHARE: f64 = 0.5;
+
 /// The answer of a campaign.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub enum Verdict {
@@ -239,8 +243,8 @@ fn judge_expectations(judge: &Judge, found: &mut Found) -> Vec<ExpectationResult
     expectations
 }
 
-/// Says in how many samples the system under test was not available. A system that was never available for engaging has not been
-/// tested.
+/// Says in how many samples the system under test was not available for some time. If those are more than
+/// [`MAX_UNAVAILABLE_SHARE`], the samples do not decide what the system does, even if it engages before its sensors fail.
 fn judge_availability(summary: &Summary, found: &mut Found) {
     for (name, counts) in &summary.scenarios {
         let Some(tested) = counts.arms.last().filter(|tested| tested.unavailable > 0) else { continue };
@@ -249,8 +253,13 @@ fn judge_availability(summary: &Summary, found: &mut Found) {
             tested.unavailable,
             samples(tested.outcomes)
         );
-        if tested.unavailable == tested.outcomes && tested.engagements == 0 {
-            found.add(Decision::Inconclusive, format!("{sentence}, and never engaged: nothing says what it does"));
+        if tested.unavailable as f64 > MAX_UNAVAILABLE_SHARE * tested.outcomes as f64 {
+            let reason = format!(
+                "{sentence}, more than {}, so that they do not decide what it does (it engaged in {})",
+                percent(MAX_UNAVAILABLE_SHARE),
+                samples(tested.engagements)
+            );
+            found.add(Decision::Inconclusive, reason);
         } else {
             found.note(sentence);
         }

@@ -192,7 +192,7 @@ fn time_to_confirm(case: &Case, sensors: &Sensors, road: &Road, at: Address) -> 
     let mut traffic = Traffic::new(&case, road, APPEARS_AT_M, 0.0);
     let mut perception = build(sensors, at)?;
     for step in 0..WAIT_STEPS {
-        // The faults of the library have begun by then.
+        // A fault of the studied scenario has begun by then.
         let time = CONTROL_STEP * (APPEARS_AFTER_STEPS + step);
         let scene = Scene { time, road, environment: &case.environment, ego: traffic.ego, others: &traffic.others };
         let tracks = perception.step(&scene)?;

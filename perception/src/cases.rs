@@ -1,5 +1,6 @@
 //! The conditions under which perception is studied: each differs from the usual one in one respect.
 
+use closecall_sensors::faults::Faults;
 use closecall_sensors::{SensorMode, Sensors};
 use closecall_simulation::scenario::{ScenarioFile, library};
 use closecall_traffic::{Environment, Light, Road, VehicleClass};
@@ -32,10 +33,10 @@ pub struct Case {
     pub environment: Environment,
     /// Whether another car drives 25 m behind the ego, in its lane.
     pub is_screened: bool,
-    /// The sensors, if they differ from those of the study: they have a fault.
-    pub sensors: Option<Sensors>,
-    /// The road, if it differs from that of the study.
-    pub road: Option<Road>,
+    /// The faults of the sensors, which hold for the whole approach; `None` for those of the study.
+    pub faults: Option<Faults>,
+    /// Whether guard rails stand along the road, if the road of the study has none.
+    pub has_guard_rails: bool,
 }
 
 impl Case {
@@ -48,8 +49,8 @@ impl Case {
             offset_m: 0.0,
             environment: Environment::CLEAR_DAY,
             is_screened: false,
-            sensors: None,
-            road: None,
+            faults: None,
+            has_guard_rails: false,
         }
     }
 
@@ -89,19 +90,62 @@ pub fn cases(mode: SensorMode) -> Vec<Case> {
     cases
 }
 
-/// Returns a case for each scenario of the library in which a rear sensor of this mode has a fault.
+/// Returns a case for each scenario of the library in which a rear sensor of this mode has a fault. Of the scenario come the fault
+/// and what it needs: the light and the guard rails. The sensors are those of the study.
 fn faults(mode: SensorMode) -> impl Iterator<Item = Case> {
     library::names().filter_map(move |name| {
         let file = ScenarioFile::parse(&library::path(name), library::text(name)?, &[]).ok()?;
         let is_fault = file.config().tags.iter().any(|tag| tag == "fault") && name != "front-radar-dead";
         let scenario = file.concrete(&file.space().nominal()).ok().filter(|_| is_fault)?;
         let applies = scenario.sensors.mode() == mode;
-        let environment = scenario.environment;
         applies.then(|| Case {
-            sensors: Some(scenario.sensors),
-            environment,
-            road: Some(scenario.road),
+            faults: Some(scenario.sensors.faults().throughout()),
+            environment: Environment { light: scenario.environment.light, ..Environment::CLEAR_DAY },
+            has_guard_rails: scenario.road.has_guard_rails(),
             ..Case::of("fault", format!("fault: {name}"))
         })
     })
+}
+
+impl Case {
+    /// Returns the sensors of the study with the faults of this case.
+    pub(crate) fn sensors(&self, studied: &Sensors) -> Sensors {
+        self.faults.map_or(*studied, |faults| studied.with_faults(faults))
+    }
+
+    /// Returns the road of the study with the guard rails of this case.
+    pub(crate) fn road(&self, studied: &Road) -> Road {
+        if self.has_guard_rails { studied.with_guard_rails() } else { *studied }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fault_is_one_of_the_studied_sensors_and_holds_for_the_whole_approach() {
+        let sensors = |settings: &[&str]| {
+            let settings: Vec<_> = settings.iter().map(|setting| setting.parse().unwrap()).collect();
+            let text = library::text("low-thw-overtake").unwrap();
+            let file = ScenarioFile::parse(&library::path("low-thw-overtake"), text, &settings).unwrap();
+            file.concrete(&file.space().nominal()).unwrap().sensors
+        };
+        let (stock, own) = (sensors(&[]), sensors(&["sensors.rear-lidar.nominal-range-m=60.0"]));
+        let cases = cases(SensorMode::Full);
+        let faulty: Vec<&Case> = cases.iter().filter(|case| case.factor == "fault").collect();
+        assert!(faulty.len() >= 15, "{}", faulty.len());
+        for case in faulty {
+            let sensors = case.sensors(&own);
+            assert_eq!(sensors.with_faults(Faults::default()), own, "{}", case.name);
+            assert_ne!(sensors, own, "{}", case.name);
+            assert_ne!(sensors, case.sensors(&stock), "{}", case.name);
+            let faults = *sensors.faults();
+            assert_eq!(faults, faults.throughout(), "{}", case.name);
+        }
+        let road = Road::straight(3);
+        let with_rails: Vec<&str> =
+            cases.iter().filter(|case| case.road(&road).has_guard_rails()).map(|case| &*case.name).collect();
+        assert_eq!(with_rails, ["fault: lidar-rail-ghosts"]);
+    }
 }

@@ -108,8 +108,7 @@ pub(crate) fn study(
     let jobs: Vec<(usize, u64)> = (0..cases.len()).flat_map(|case| (0..runs).map(move |run| (case, run))).collect();
     let run_one = |&(case, run): &(usize, u64)| {
         let case = &cases[case];
-        let sensors = case.sensors.as_ref().unwrap_or(sensors);
-        approach(case, sensors, case.road.as_ref().unwrap_or(road), Address { seed, run })
+        approach(case, &case.sensors(sensors), &case.road(road), Address { seed, run })
             .map_err(|source| StudyError::Sensor { case: case.name.clone(), run, source })
     };
     let approaches: Vec<Approach> = jobs.par_iter().map(run_one).collect::<Result<_, _>>()?;

@@ -1,18 +1,21 @@
 //! The `[sensors]` table of a scenario file: the perception mode and the parameters of each sensor model.
 
 use closecall_tracking::MAX_LATENCY_STEPS as MAX_TRACKER_LATENCY_STEPS;
-use closecall_traffic::{Check, Choice, ConfigError, Parameters};
+use closecall_traffic::{Check, Choice, ConfigError, Parameters, Problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::camera::{Camera, CameraConfig, Pipeline};
-use crate::faults::OdometryErrors;
+use crate::faults::{Faults, OdometryErrors};
 use crate::lidar::LidarConfig;
 use crate::worker_classifier::WorkerClassifier;
 use crate::{
     Alterations, FullModel, FullPerception, GroundTruth, NoiseKey, ObjectPerception, ObjectSensorConfig,
     ObjectSensorModel, Perception, SensorError, TrackerConfig,
 };
+
+/// Least height of the LiDAR above the road with the errors of its mounting (m).
+const MIN_LIDAR_HEIGHT_M: f64 = 0.1;
 
 /// Level of detail at which the sensors are simulated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -137,6 +140,32 @@ impl Sensors {
                 .with_latency_steps(altered.latency_steps(tracker.latency_steps(), MAX_TRACKER_LATENCY_STEPS)),
         };
         Self { full, rear_object: self.rear_object.altered(&altered, true), altered, ..self }
+    }
+
+    /// Returns the injected faults.
+    pub fn faults(&self) -> &Faults {
+        &self.altered.faults
+    }
+
+    /// Returns the same sensors with these faults in place of their own.
+    #[must_use]
+    pub fn with_faults(self, faults: Faults) -> Self {
+        Self { altered: Alterations { faults, ..self.altered }, ..self }
+    }
+
+    /// Checks that no fault puts the rear LiDAR lower than the model covers.
+    ///
+    /// # Errors
+    /// [`ConfigError`] at `rear-lidar.mount-height-m`.
+    pub fn check_mounting(&self) -> Result<(), ConfigError> {
+        let height_m = self.full.rear_lidar.mount_height_m;
+        let lowest_m = self.faults().rear_lidar.combinations().map(|(_, fault)| fault.height_m).fold(0.0, f64::min);
+        if height_m + lowest_m >= MIN_LIDAR_HEIGHT_M {
+            return Ok(());
+        }
+        let rule = format!("a fault of the mounting leaves the LiDAR at least {MIN_LIDAR_HEIGHT_M} m above the road");
+        let problem = Problem::Contradiction { other: "fault.rear-lidar", rule };
+        Err(ConfigError::new("mount-height-m", problem).within("rear-lidar"))
     }
 
     /// Returns the errors of the ego's odometry and map.

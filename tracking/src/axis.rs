@@ -275,8 +275,14 @@ impl AxisFilter {
     }
 
     /// Returns the estimate predicted by `horizon_s`, in the situation of the latest prediction.
+    ///
+    /// A negative horizon, as a clock that runs ahead causes it, moves the position back at constant speed. The covariance stays.
     #[inline]
     pub fn predicted(&self, horizon_s: f64) -> AxisEstimate {
+        if horizon_s < -ROUNDING_S {
+            let latest = self.estimate();
+            return AxisEstimate { position_m: latest.position_m + latest.speed_mps * horizon_s, ..latest };
+        }
         let mut predicted = *self;
         let mut remaining_s = horizon_s;
         while remaining_s > ROUNDING_S {

@@ -98,11 +98,13 @@ impl Tracker {
         }
     }
 
-    /// Updates all tracks with one scan, which must not be older than the previous one. `list` issues the ids of new
-    /// tracks.
+    /// Updates all tracks with one scan. `list` issues the ids of new tracks.
+    ///
+    /// A scan that is dated before the previous one, as an error of the clock causes it, counts as measured at the time of the
+    /// previous one: no filter is predicted backwards. Its measurements keep their own times, which lie before that of the filters.
     pub fn update(&mut self, scan: &TrackerScan<'_>, list: &mut TrackList) {
-        let elapsed_s = (scan.time - self.time).s();
-        self.time = scan.time;
+        let elapsed_s = (scan.time - self.time).s().max(0.0);
+        self.time = scan.time.max(self.time);
         let frame = EgoFrame::new(scan.road, &scan.ego);
         let ego_mps = scan.ego.speed_mps * scan.ego.heading_rad.cos() / frame.path_scale(scan.ego.d_m);
         let ego = EgoRear {
@@ -111,11 +113,13 @@ impl Tracker {
             speed_mps: ego_mps,
             half_lane_m: 0.5 * scan.road.lane_width_m(),
         };
-        for track in &mut self.tracks {
-            track.filter.predict(elapsed_s, &ego);
+        if elapsed_s > 0.0 {
+            for track in &mut self.tracks {
+                track.filter.predict(elapsed_s, &ego);
+            }
         }
         self.measurements.clear();
-        let measured = scan.detections.iter().map(|detection| measurement(detection, &frame, scan.time));
+        let measured = scan.detections.iter().map(|detection| measurement(detection, &frame, self.time));
         self.measurements.extend(measured);
         let tracks = self.tracks.iter().map(|track| (&track.filter, 0.5 * track.size_m().0));
         assign(tracks, &self.measurements, &mut self.assigned);

@@ -187,6 +187,12 @@ impl Road {
         self.guard_rails
     }
 
+    /// Returns the same road with guard rails on both sides.
+    #[must_use]
+    pub const fn with_guard_rails(self) -> Self {
+        Self { guard_rails: true, ..self }
+    }
+
     /// Returns the lateral position of the centre of a lane (m), which is negative.
     pub fn lane_centre_m(&self, lane: Lane) -> f64 {
         -(f64::from(lane.0) - 0.5) * self.lane_width_m

@@ -16,6 +16,11 @@ use crate::lidar::HALF_FIELD_DEG;
 pub(super) const MAX_DELAY_S: f64 = 0.4;
 /// Greatest share of measurements that can be lost.
 pub(super) const SHARE: Range = Range::closed(0.0, 1.0);
+/// Errors of the clock (s) and of the mounting (deg, m) that the model covers: those of one entry, and those of all entries that
+/// hold at once together.
+const CLOCK_OFFSET_S: Range = Range::closed(-0.2, 0.2);
+const ANGLE_DEG: Range = Range::closed(-5.0, 5.0);
+const HEIGHT_M: Range = Range::closed(-0.2, 0.5);
 /// Maximum number of blocked sectors: one for each entry.
 pub(crate) const MAX_SECTORS: usize = 4;
 
@@ -58,7 +63,7 @@ pub struct LidarFaultConfig {
     /// Standard deviation of an additional error of each range (m).
     pub range_noise_m: Option<Num>,
     /// Share of the points on vehicles that return a second time as a mirror image behind a guard rail (-). It needs
-    /// `guard-rails`.
+    /// `guard-rails`. The images appear in the scan; the detector drops them, because the map says where the road ends.
     pub rail_ghosts: Option<Num>,
     /// Mean number of bursts of false points in a scan, as pulses of another LiDAR cause them (-).
     pub crosstalk: Option<Num>,
@@ -173,7 +178,17 @@ impl LidarFaultConfig {
         entries: &[Self],
         parameters: &Parameters,
     ) -> Result<FaultList<LidarFault>, ConfigError> {
-        FaultList::check(key, entries, |entry| entry.check(parameters))
+        let list = FaultList::check(key, entries, |entry| entry.check(parameters))?;
+        for (index, sum) in list.combinations() {
+            // A sum of allowed values may exceed its limit by rounding.
+            let check = |value: f64, key, range: Range| range.check((1e9 * value).round() / 1e9, key).map(|_| ());
+            check(sum.clock_offset_s, "clock-offset-s", CLOCK_OFFSET_S)
+                .and_then(|()| check(sum.yaw_rad.to_degrees(), "yaw-deg", ANGLE_DEG))
+                .and_then(|()| check(sum.pitch_rad.to_degrees(), "pitch-deg", ANGLE_DEG))
+                .and_then(|()| check(sum.height_m, "height-m", HEIGHT_M))
+                .map_err(|error| error.within_index(index).within(key))?;
+        }
+        Ok(list)
     }
 
     fn check(&self, parameters: &Parameters) -> Result<(LidarFault, [f64; 2]), ConfigError> {
@@ -209,10 +224,10 @@ impl LidarFaultConfig {
             window_transmission: transmission,
             delay_s: number(&self.delay_s, "delay-s", Range::closed(0.0, MAX_DELAY_S))?,
             jitter_s: number(&self.jitter_s, "jitter-s", Range::closed(0.0, MAX_DELAY_S))?,
-            clock_offset_s: number(&self.clock_offset_s, "clock-offset-s", Range::closed(-0.2, 0.2))?,
-            yaw_rad: number(&self.yaw_deg, "yaw-deg", Range::closed(-5.0, 5.0))?.to_radians(),
-            pitch_rad: number(&self.pitch_deg, "pitch-deg", Range::closed(-5.0, 5.0))?.to_radians(),
-            height_m: number(&self.height_m, "height-m", Range::closed(-0.2, 0.5))?,
+            clock_offset_s: number(&self.clock_offset_s, "clock-offset-s", CLOCK_OFFSET_S)?,
+            yaw_rad: number(&self.yaw_deg, "yaw-deg", ANGLE_DEG)?.to_radians(),
+            pitch_rad: number(&self.pitch_deg, "pitch-deg", ANGLE_DEG)?.to_radians(),
+            height_m: number(&self.height_m, "height-m", HEIGHT_M)?,
             range_noise_m: number(&self.range_noise_m, "range-noise-m", Range::closed(0.0, 5.0))?,
             rail_ghosts: number(&self.rail_ghosts, "rail-ghosts", SHARE)?,
             crosstalk: number(&self.crosstalk, "crosstalk", Range::closed(0.0, 50.0))?,

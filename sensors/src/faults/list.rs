@@ -60,16 +60,32 @@ impl<T: Combine> FaultList<T> {
 
     /// Returns what holds at `time`: all entries together whose time has begun and has not ended. `None` if there is none.
     pub(crate) fn at(&self, time: Time) -> Option<T> {
-        self.held(time).map(|entry| entry.effect).reduce(T::and)
+        self.held(time.s()).map(|entry| entry.effect).reduce(T::and)
     }
 
-    /// Returns the time since the latest entry that holds at `time` began (s); `None` if none holds.
-    pub(crate) fn since_s(&self, time: Time) -> Option<f64> {
-        self.held(time).map(|entry| time.s() - entry.from_s.max(0.0)).reduce(f64::min)
+    /// Returns the time since the latest entry began that holds at `time` and has the effect `has` (s); `None` if none holds. An
+    /// entry without a start begins with the run.
+    pub(crate) fn since_s(&self, time: Time, has: impl Fn(&T) -> bool) -> Option<f64> {
+        let supplier = self.held(time.s()).filter(|entry| has(&entry.effect)).last();
+        supplier.map(|entry| time.s() - entry.from_s.max(0.0))
     }
 
-    fn held(&self, time: Time) -> impl Iterator<Item = &Entry<T>> {
-        self.entries.iter().flatten().filter(move |entry| entry.from_s <= time.s() && time.s() < entry.until_s)
+    /// Returns the same entries, each from before the start of the run to its end.
+    fn throughout(self) -> Self {
+        let always = |entry: Entry<T>| Entry { from_s: f64::NEG_INFINITY, until_s: f64::INFINITY, ..entry };
+        Self { entries: self.entries.map(|entry| entry.map(always)) }
+    }
+
+    /// Returns everything that holds together at some time, each with the index of the entry that begins or ends then.
+    pub(crate) fn combinations(&self) -> impl Iterator<Item = (usize, T)> {
+        let spans = self.entries.iter().flatten().map(|entry| [entry.from_s, entry.until_s]);
+        let instants_s = spans.enumerate().flat_map(|(index, span)| span.map(|time_s| (index, time_s)));
+        instants_s
+            .filter_map(|(index, time_s)| Some((index, self.held(time_s).map(|entry| entry.effect).reduce(T::and)?)))
+    }
+
+    fn held(&self, time_s: f64) -> impl Iterator<Item = &Entry<T>> {
+        self.entries.iter().flatten().filter(move |entry| entry.from_s <= time_s && time_s < entry.until_s)
     }
 }
 
@@ -96,4 +112,19 @@ pub struct Faults {
     pub(crate) rear_object: FaultList<ObjectFault>,
     /// The errors of the ego's odometry and map.
     pub odometry: OdometryErrors,
+}
+
+impl Faults {
+    /// Returns the same faults, each from before the start of the run to its end.
+    #[must_use]
+    pub fn throughout(self) -> Self {
+        Self {
+            rear_lidar: self.rear_lidar.throughout(),
+            rear_camera: self.rear_camera.throughout(),
+            front_radar: self.front_radar.throughout(),
+            surround: self.surround.throughout(),
+            rear_object: self.rear_object.throughout(),
+            odometry: self.odometry,
+        }
+    }
 }

@@ -4,7 +4,8 @@
 //! random number is addressed by the scan's key, a beam and a purpose.
 //!
 //! - *Mirror images behind a guard rail.* A beam that a rail deflects to a vehicle and back measures the whole path. The point
-//!   appears behind the rail, at the mirror image of the vehicle. A rail is taken for a plane mirror.
+//!   appears behind the rail, at the mirror image of the vehicle. A rail is taken for a plane mirror. The region of interest
+//!   ends short of the rails on the map, so that the detector drops these points as it drops those of the rails.
 //! - *Crosstalk.* The pulses of another LiDAR that arrive within the listening time count as returns. Two scanners with nearly the
 //!   same pulse rate give bursts: neighbouring columns, whose false ranges drift (the mechanism of mutual interference:
 //!   Remote Sensing 14 (2022) 1129). Length and drift of a burst are assumptions.

@@ -27,9 +27,12 @@ pub(super) struct Faulty {
 }
 
 impl Faulty {
-    /// Counts one step with this fault.
-    pub(super) fn observe(&mut self, fault: &ObjectFault) {
-        let has_failed = fault.is_dead || fault.is_frozen;
+    /// Counts one step with this fault. `in_view` are the numbers of vehicles in view, and of those whose measurement arrives.
+    ///
+    /// A sensor that loses the measurement of every vehicle in view delivers nothing, whether it is dead or not.
+    pub(super) fn observe(&mut self, fault: &ObjectFault, [in_view, measured]: [usize; 2]) {
+        let is_silent = fault.dropout > 0.0 && in_view > 0 && measured == 0;
+        let has_failed = fault.is_dead || fault.is_frozen || is_silent;
         self.failed_steps = if has_failed { self.failed_steps.saturating_add(1) } else { 0 };
     }
 

@@ -39,6 +39,9 @@ const SETTLED_SPEED_SD_MPS: f64 = 1.0;
 /// Share of the nominal range below which a sensor counts as degraded.
 pub(crate) const DEGRADED_SHARE: f64 = 0.5;
 
+/// A track's id and lifecycle, and its filters along and across the road.
+type Filters = (TrackId, Lifecycle, [AxisFilter; 2]);
+
 /// The estimate of one vehicle at the end of one scan, predicted by the latency.
 #[derive(Clone, Copy, Debug)]
 struct Report {
@@ -54,9 +57,11 @@ struct Target {
     actor: usize,
     noise: TargetNoise,
     /// The track's id and lifecycle, and its filters along and across the road; `None` without a track.
-    filters: Option<(TrackId, Lifecycle, [AxisFilter; 2])>,
+    filters: Option<Filters>,
     /// Ring buffer of the latest reports; the index is the step modulo the length.
     reports: [Option<Report>; MAX_LATENCY_STEPS + 1],
+    /// The latest filters, in the same order, if the sensor has faults: a latency that changes predicts them by their own age.
+    history: Vec<Option<Filters>>,
     /// Decides which measurements a fault loses; drawn from in each step if the sensor has faults.
     fault_rng: Option<Stream>,
 }
@@ -157,17 +162,20 @@ impl ObjectSensor {
         let has_faults = !self.faults.is_empty();
         let before = list.tracks.len();
         self.fault = if has_faults { self.faults.at(input.scene.time) } else { None };
+        let [mut in_view, mut measured] = [0; 2];
         for other in input.others {
             let index = self.target_index(other.actor);
             let errors = self.targets[index].noise.draw(&self.model);
             let errors = errors.mirrored_for(input.scene.road.overtaking_side());
             let errors = MeasurementErrors { is_lost: errors.is_lost || has_faults && self.loses(index), ..errors };
             let errors = self.visibility.sees(&field, other, &size).then_some(errors);
+            in_view += usize::from(errors.is_some());
+            measured += usize::from(errors.is_some_and(|errors| !errors.is_lost));
             self.update_target(index, other, errors, &ego, list);
             self.report(index, other, input, list);
         }
         if has_faults {
-            self.degrade(before, input, list);
+            self.degrade([in_view, measured], before, input, list);
         }
         self.step += 1;
     }
@@ -185,21 +193,22 @@ impl ObjectSensor {
     }
 
     /// Changes the tracks of this step, which are those from `before` on, as the faults do: none of a dead sensor, the former ones
-    /// of a frozen one, and one without a vehicle.
-    fn degrade(&mut self, before: usize, input: &ScanInput<'_>, list: &mut TrackList) {
+    /// of a frozen one, and one without a vehicle. `in_view` are the numbers of vehicles in view, and of those measured.
+    fn degrade(&mut self, in_view: [usize; 2], before: usize, input: &ScanInput<'_>, list: &mut TrackList) {
         let fault = self.fault.unwrap_or_default();
-        self.faulty.observe(&fault);
+        self.faulty.observe(&fault, in_view);
         if fault.is_dead {
             list.tracks.truncate(before);
             // After a restart, the sensor begins anew.
             for target in &mut self.targets {
                 (target.filters, target.reports) = (None, [None; MAX_LATENCY_STEPS + 1]);
+                target.history.clear();
             }
             return;
         }
         self.faulty.hold(fault.is_frozen, before, input.scene.time, list);
         if let Some(ghost) = fault.ghost {
-            let since_s = self.faults.since_s(input.scene.time).unwrap_or(0.0);
+            let since_s = self.faults.since_s(input.scene.time, |fault| fault.ghost.is_some()).unwrap_or(0.0);
             let is_ahead = self.direction == Direction::Ahead;
             let track = self.faulty.ghost(ghost, since_s, is_ahead, (self.source, input), list);
             list.tracks.extend(track);
@@ -241,7 +250,7 @@ impl ObjectSensor {
             let fault_channel = || format!("{}-fault", self.channel);
             let fault_rng = (!self.faults.is_empty()).then(|| self.key.stream_about(&fault_channel(), actor));
             let reports = [None; MAX_LATENCY_STEPS + 1];
-            self.targets.push(Target { actor, noise, filters: None, reports, fault_rng });
+            self.targets.push(Target { actor, noise, filters: None, reports, history: Vec::new(), fault_rng });
             self.targets.len() - 1
         })
     }
@@ -308,16 +317,25 @@ impl ObjectSensor {
     fn report(&mut self, index: usize, other: &OtherVehicle, input: &ScanInput<'_>, list: &mut TrackList) {
         let latency_steps = self.latency_steps();
         let latency_s = latency_steps as f64 * CONTROL_STEP.s();
+        let has_faults = !self.faults.is_empty();
         let target = &mut self.targets[index];
         let length = target.reports.len();
-        target.reports[self.step % length] = target.filters.as_ref().map(|(id, lifecycle, [along, across])| Report {
+        let (latest, due) = (self.step % length, (self.step + length - latency_steps) % length);
+        let predicted = |(id, lifecycle, [along, across]): &Filters| Report {
             id: *id,
             lifecycle: *lifecycle,
             along: along.predicted(latency_s),
             across: across.predicted(latency_s),
-        });
+        };
         // The entry is still `None` before the first report is due.
-        let due = target.reports[(self.step + length - latency_steps) % length];
+        let due = if has_faults {
+            target.history.resize(length, None);
+            target.history[latest] = target.filters;
+            target.history[due].as_ref().map(predicted)
+        } else {
+            target.reports[latest] = target.filters.as_ref().map(predicted);
+            target.reports[due]
+        };
         if let Some(report) = due {
             list.tracks.push(self.track(&report, other, input));
         }

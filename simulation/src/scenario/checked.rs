@@ -12,7 +12,7 @@ use crate::world::lateral_grip_mps2;
 use super::config::{ActorConfig, RandomNumbersConfig, SCHEMA_VERSION, ScenarioConfig};
 use super::events::{self, Event};
 use super::intervention::Interventions;
-use super::{placement, traffic};
+use super::{inert_fault, placement, traffic};
 
 /// Largest probability or confidence that a gate may ask for: the largest number below 1 (-).
 const BELOW_ONE: f64 = 1.0 - 0.5 * f64::EPSILON;
@@ -86,6 +86,9 @@ impl Check for ScenarioConfig {
         let interventions = Interventions::check(&self.ideal, &self.fault, parameters)?;
         interventions.apply(&mut actors, ego);
         let sensors = self.sensors.check(parameters).map_err(|error| error.within("sensors"))?;
+        inert_fault::refuse(&self.fault, (&sensors, &road), duration_s, parameters)?;
+        let sensors = sensors.altered(interventions.sensors);
+        sensors.check_mounting().map_err(|error| error.within("sensors"))?;
         Ok(Scenario {
             name: self.name.clone(),
             duration: Time::from_s(duration_s),
@@ -93,7 +96,7 @@ impl Check for ScenarioConfig {
             environment,
             ego,
             actors,
-            sensors: sensors.altered(interventions.sensors),
+            sensors,
             parameters: parameters.clone(),
             physics_step: PHYSICS_STEP,
             random_numbers: self.random_numbers,

@@ -192,3 +192,18 @@ fn the_prediction_equals_the_full_products_of_the_matrices() {
     assert_eq!(state.covariance[(2, 1)], full[(2, 1)]);
     assert_eq!(state.covariance[(3, 1)], full[(3, 1)]);
 }
+
+#[test]
+fn a_negative_horizon_moves_the_position_back_at_constant_speed() {
+    for modes in [ALONG_MODES, ALONG_WHITE_MODE] {
+        let mut vehicle = SimulatedVehicle::new(modes, 3);
+        for _ in 0..50 {
+            vehicle.measure();
+            vehicle.advance();
+        }
+        let (latest, before) = (vehicle.filter.estimate(), vehicle.filter.predicted(-0.2));
+        assert_eq!(before.position_m, latest.position_m - 0.2 * latest.speed_mps);
+        assert_ne!(latest.speed_mps, 0.0);
+        assert_eq!(AxisEstimate { position_m: latest.position_m, ..before }, latest);
+    }
+}

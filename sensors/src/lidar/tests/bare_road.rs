@@ -12,22 +12,29 @@ fn setup() -> impl Strategy<Value = (TestScene, Lidar)> {
         vehicle.vehicle.appearance.body_shape = body_shape;
         with_speed(vehicle, SPEED_MPS)
     });
-    let ego = (-0.04..0.04_f64, 0.0..45.0_f64, -0.3..0.3_f64);
+    let ego = (-0.04..0.04_f64, 0.0..45.0_f64, -0.3..0.3_f64, -0.03..0.03_f64);
     let air = prop::sample::select(vec![(1e4, 0.0), (1e4, 1.0), (150.0, 0.0)]);
     // A strong sensor and a large error of the pitch, so that some of the road's points pass for something else.
-    let lidar = (0.2..2.5_f64, prop::sample::select(vec![0.0005, 0.02]), prop::sample::select(vec![200.0, 500.0]));
+    let lidar = (
+        0.2..2.5_f64,
+        -0.1..0.1_f64,
+        prop::sample::select(vec![0.0005, 0.02]),
+        prop::sample::select(vec![200.0, 500.0]),
+    );
     (prop::collection::vec(vehicle, 0..3), ego, air, lidar, any::<bool>()).prop_map(
-        |(others, (pitch_rad, speed_mps, yaw_rate_radps), air, (mount_height_m, levelling_sd_rad, range), rails)| {
+        |(others, (pitch_rad, speed_mps, yaw_rate_radps, heading_rad), air, lidar, rails)| {
+            let (mount_height_m, tilt_rad, levelling_sd_rad, nominal_range_m) = lidar;
             let mut setup = TestScene::new();
             setup.others = others;
             setup.ego.pitch_rad = pitch_rad;
             setup.ego.state.speed_mps = speed_mps;
             setup.ego.state.yaw_rate_radps = yaw_rate_radps;
+            setup.ego.state.heading_rad = heading_rad;
             (setup.environment.visibility_m, setup.environment.water_film_mm) = air;
             if rails {
                 setup.road = road_with_guard_rails(0.0);
             }
-            (setup, Lidar { mount_height_m, levelling_sd_rad, nominal_range_m: range, ..Lidar::default() })
+            (setup, Lidar { mount_height_m, tilt_rad, levelling_sd_rad, nominal_range_m, ..Lidar::default() })
         },
     )
 }

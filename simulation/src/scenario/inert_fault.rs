@@ -1,0 +1,135 @@
+//! Injected faults that cannot act in a scenario: they would pass for faults that do no harm.
+
+use closecall_sensors::camera::Pipeline;
+use closecall_sensors::{SensorMode, Sensors};
+use closecall_traffic::{ConfigError, Num, Parameters, Problem, Range, Road};
+
+use super::intervention::FaultConfig;
+
+/// Refuses faults that cannot act: those of sensors that do not exist in the mode of the scenario, mirror images without guard
+/// rails, and entries that begin when the run has ended.
+///
+/// A scenario with faults both of LiDAR or camera and of the object-level sensor behind is meant for both modes. A mode that the
+/// command line gives is not known here.
+pub(super) fn refuse(
+    fault: &FaultConfig,
+    (sensors, road): (&Sensors, &Road),
+    duration_s: f64,
+    parameters: &Parameters,
+) -> Result<(), ConfigError> {
+    refuse_absent(fault, sensors)?;
+    for (index, of) in fault.rear_lidar.iter().enumerate() {
+        let share = parameters.number_or(of.rail_ghosts.as_ref(), "rail-ghosts", Range::closed(0.0, 1.0), 0.0);
+        if share.map_err(|error| at("rear-lidar", index, error))? > 0.0 && !road.has_guard_rails() {
+            let error = contradiction("rail-ghosts", "road.guard-rails", "only guard rails mirror vehicles");
+            return Err(at("rear-lidar", index, error));
+        }
+    }
+    let refuse_late = |key, starts: &mut dyn Iterator<Item = &Option<Num>>| {
+        for (index, from) in starts.enumerate() {
+            let from_s = parameters.number_or(from.as_ref(), "from-s", Range::closed(0.0, f64::MAX), 0.0);
+            if from_s.map_err(|error| at(key, index, error))? >= duration_s {
+                let rule = "a fault begins before the run ends";
+                return Err(at(key, index, contradiction("from-s", "duration-s", rule)));
+            }
+        }
+        Ok(())
+    };
+    refuse_late("rear-lidar", &mut fault.rear_lidar.iter().map(|of| &of.from_s))?;
+    refuse_late("rear-camera", &mut fault.rear_camera.iter().map(|of| &of.from_s))?;
+    refuse_late("front-radar", &mut fault.front_radar.iter().map(|of| &of.from_s))?;
+    refuse_late("surround", &mut fault.surround.iter().map(|of| &of.from_s))?;
+    refuse_late("rear-object", &mut fault.rear_object.iter().map(|of| &of.from_s))
+}
+
+/// Refuses faults of sensors that do not exist.
+fn refuse_absent(fault: &FaultConfig, sensors: &Sensors) -> Result<(), ConfigError> {
+    const MODE: &str = "sensors.mode";
+    let mode = sensors.mode();
+    let (has_lidar, has_camera) = (!fault.rear_lidar.is_empty(), !fault.rear_camera.is_empty());
+    let has_object = !fault.rear_object.is_empty();
+    let is_for_both = has_object && (has_lidar || has_camera) && mode != SensorMode::GroundTruth;
+    let full_only = "LiDAR and camera exist in mode `full` only";
+    let object_only = "the object-level sensor behind exists in mode `object` only";
+    let no_sensor = "mode `ground-truth` has no sensor that can fail";
+    let camera_is_off = mode == SensorMode::Full && sensors.camera().pipeline == Pipeline::Off;
+    let is_truth = mode == SensorMode::GroundTruth;
+    let absent = [
+        (has_lidar && mode != SensorMode::Full && !is_for_both, "rear-lidar", MODE, full_only),
+        (has_camera && mode != SensorMode::Full && !is_for_both, "rear-camera", MODE, full_only),
+        (has_object && mode != SensorMode::Object && !is_for_both, "rear-object", MODE, object_only),
+        (is_truth && !fault.front_radar.is_empty(), "front-radar", MODE, no_sensor),
+        (is_truth && !fault.surround.is_empty(), "surround", MODE, no_sensor),
+        (
+            has_camera && camera_is_off,
+            "rear-camera",
+            "sensors.rear-camera.pipeline",
+            "a camera whose pipeline is off is not used",
+        ),
+    ];
+    match absent.into_iter().find(|(is_absent, ..)| *is_absent) {
+        Some((_, key, other, rule)) => Err(contradiction(key, other, rule).within("fault")),
+        None => Ok(()),
+    }
+}
+
+fn contradiction(key: &str, other: &'static str, rule: &str) -> ConfigError {
+    ConfigError::new(key, Problem::Contradiction { other, rule: rule.to_owned() })
+}
+
+/// Returns an error of an entry with its place in the file.
+fn at(key: &str, index: usize, error: ConfigError) -> ConfigError {
+    error.within_index(index).within(key).within("fault")
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::scenario::{ScenarioFile, library};
+
+    /// Returns what the check says of the shipped scenario with these keys added.
+    fn check(keys: &str) -> Result<(), String> {
+        let text = format!("base = \"low-thw-overtake\"\nname = \"own\"\n{keys}");
+        let file = ScenarioFile::parse(&library::path("own"), &text, &[]).map_err(|error| error.to_string())?;
+        file.concrete(&file.space().nominal()).map(|_| ()).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn faults_that_cannot_act_are_refused_by_their_keys() {
+        let (full, object) = ("sensors.mode = \"full\"\n", "sensors.mode = \"object\"\n");
+        let truth = "sensors.mode = \"ground-truth\"\n";
+        let lidar = "[[fault.rear-lidar]]\ndead = true\n";
+        let camera = "[[fault.rear-camera]]\ndead = true\n";
+        let behind = "[[fault.rear-object]]\ndead = true\n";
+        let radar = "[[fault.front-radar]]\ndead = true\n";
+        let is_off = "sensors.rear-camera.pipeline = \"off\"\n";
+        let mirrors = "[[fault.rear-lidar]]\nrail-ghosts = 0.5\n";
+        for (keys, key, why) in [
+            (format!("{object}{lidar}"), "fault.rear-lidar", "in mode `full` only"),
+            (format!("{object}{camera}"), "fault.rear-camera", "in mode `full` only"),
+            (format!("{full}{behind}"), "fault.rear-object", "in mode `object` only"),
+            (format!("{truth}{radar}"), "fault.front-radar", "no sensor that can fail"),
+            (format!("{truth}{lidar}{behind}"), "fault.rear-lidar", "in mode `full` only"),
+            (format!("{full}{is_off}{camera}"), "fault.rear-camera", "`sensors.rear-camera.pipeline`"),
+            (format!("{full}{mirrors}"), "fault.rear-lidar[0].rail-ghosts", "`road.guard-rails`"),
+            (format!("{object}{behind}from-s = 3000.0\n"), "fault.rear-object[0].from-s", "`duration-s`"),
+            (
+                format!("{full}sensors.rear-lidar.mount-height-m = 0.25\n[[fault.rear-lidar]]\nheight-m = -0.2\n"),
+                "sensors.rear-lidar.mount-height-m",
+                "at least 0.1 m above the road",
+            ),
+            (format!("{full}{lidar}{lidar}from-s = 3000.0\n"), "fault.rear-lidar[1].from-s", "`duration-s`"),
+        ] {
+            let message = check(&keys).unwrap_err();
+            assert!(message.contains(key) && message.contains(why), "{keys}: {message}");
+        }
+        for keys in [
+            format!("{full}{lidar}{camera}{radar}"),
+            format!("{object}{behind}{radar}"),
+            format!("{full}road.guard-rails = true\n{mirrors}"),
+            format!("{object}{behind}{lidar}"),
+            format!("{full}{behind}{lidar}"),
+        ] {
+            check(&keys).unwrap();
+        }
+    }
+}
