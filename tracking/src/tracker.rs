@@ -78,6 +78,7 @@ impl TrackState {
 #[derive(Clone, Debug)]
 pub struct Tracker {
     model: TrackerModel,
+    /// Time of the tracks: that of the latest scan, and the earliest possible one before the first scan.
     time: Time,
     tracks: Vec<TrackState>,
     measurements: Vec<Measurement>,
@@ -90,7 +91,7 @@ impl Tracker {
     pub fn new(model: TrackerModel) -> Self {
         Self {
             model,
-            time: Time::ZERO,
+            time: Time::from_ns(i64::MIN),
             tracks: Vec::new(),
             measurements: Vec::new(),
             assigned: Vec::new(),
@@ -103,7 +104,9 @@ impl Tracker {
     /// A scan that is dated before the previous one, as an error of the clock causes it, counts as measured at the time of the
     /// previous one: no filter is predicted backwards. Its measurements keep their own times, which lie before that of the filters.
     pub fn update(&mut self, scan: &TrackerScan<'_>, list: &mut TrackList) {
-        let elapsed_s = (scan.time - self.time).s().max(0.0);
+        // The time before the start of a run is negative. Before the first scan, there is nothing to predict.
+        let elapsed_s =
+            if scan.time > self.time && !self.tracks.is_empty() { (scan.time - self.time).s() } else { 0.0 };
         self.time = scan.time.max(self.time);
         let frame = EgoFrame::new(scan.road, &scan.ego);
         let ego_mps = scan.ego.speed_mps * scan.ego.heading_rad.cos() / frame.path_scale(scan.ego.d_m);
@@ -136,8 +139,8 @@ impl Tracker {
 
     /// Appends every track to `list`, predicted to `time` and in the ego's frame `frame` at that time.
     pub fn report(&self, time: Time, frame: &EgoFrame<'_>, list: &mut TrackList) {
-        let ahead_s = (time - self.time).s();
         for track in &self.tracks {
+            let ahead_s = (time - self.time).s();
             list.tracks.push(to_track(track, track.filter.predicted(ahead_s), frame, time));
         }
     }

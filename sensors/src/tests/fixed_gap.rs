@@ -87,3 +87,36 @@ fn a_track_at_a_constant_gap_is_where_the_vehicle_is() {
     let consistency = Consistency::of(&runs).unwrap();
     assert!(consistency.mean < 4.0, "{consistency:?}");
 }
+
+/// Returns position and speed of the tracks after each of 100 scans, of which the first is that of step `first`, with a car that
+/// approaches at 5 m/s.
+fn states_from(first: i64) -> Vec<Vec<[f64; 4]>> {
+    let road = Road::straight(3);
+    let ego = with_speed(scene_vehicle(0, VehicleClass::Car, 1_000.0, OWN_LANE_M), 0.0);
+    let mut others = vec![follower(940.0, OWN_LANE_M, 5.0)];
+    let mut lidar = RearLidar::new(Lidar::default());
+    let mut rng = stream(5, 0, &ActorId::new("ego").unwrap(), "before-zero");
+    let mut tracker = Tracker::new(TrackerConfig::default().check(&Parameters::default()).unwrap());
+    let mut list = TrackList::default();
+    let mut states = Vec::new();
+    for scan in 0..100 {
+        let time = CONTROL_STEP * (first + scan);
+        others[0].state.s_m += PERIOD_S * others[0].state.speed_mps;
+        let scene = Scene { time, road: &road, environment: &Environment::CLEAR_DAY, ego, others: &others };
+        lidar.scan(&scene, &mut rng);
+        let view = RearView { half_angle_tan: 2.3, range_m: 200.0, sensor_x_m: -2.3 };
+        let detections = lidar.detect().unwrap();
+        list.tracks.clear();
+        tracker.update(&TrackerScan { time, road: &road, ego: ego.state, view, detections }, &mut list);
+        tracker.report(time, &EgoFrame::new(&road, &ego.state), &mut list);
+        states.push(list.tracks.iter().map(|track| track.state.into()).collect());
+    }
+    states
+}
+
+#[test]
+fn the_tracks_of_scans_before_time_zero_are_those_of_later_scans() {
+    let later = states_from(0);
+    assert!(!later[99].is_empty());
+    assert!(states_from(-50) == later);
+}
