@@ -163,8 +163,8 @@ impl ObjectSensor {
         let before = list.tracks.len();
         self.fault = if has_faults { self.faults.at(input.scene.time) } else { None };
         let [mut in_view, mut measured] = [0; 2];
-        for other in input.others {
-            let index = self.target_index(other.actor);
+        for (position, other) in input.others.iter().enumerate() {
+            let index = self.target_index(other.actor, position);
             let errors = self.targets[index].noise.draw(&self.model);
             let errors = errors.mirrored_for(input.scene.road.overtaking_side());
             let errors = MeasurementErrors { is_lost: errors.is_lost || has_faults && self.loses(index), ..errors };
@@ -243,8 +243,12 @@ impl ObjectSensor {
         FieldOfView { half_angle_tan: self.model.half_angle_tan, range_m: self.range_m }
     }
 
-    /// Returns the index in `targets` of the vehicle `actor`, and adds the vehicle if it is new.
-    fn target_index(&mut self, actor: usize) -> usize {
+    /// Returns the index in `targets` of the vehicle `actor`, and adds the vehicle if it is new. It is usually `position`, that in
+    /// the list of other vehicles.
+    fn target_index(&mut self, actor: usize, position: usize) -> usize {
+        if self.targets.get(position).is_some_and(|target| target.actor == actor) {
+            return position;
+        }
         self.targets.iter().position(|target| target.actor == actor).unwrap_or_else(|| {
             let noise = TargetNoise::new(&self.key, self.channel, actor, &self.model);
             let fault_channel = || format!("{}-fault", self.channel);

@@ -157,12 +157,13 @@ impl LibraryEntry {
 /// Returns the names of the scenarios, in alphabetical order, those with surrounding traffic and then those with faults
 /// last.
 pub fn names() -> impl Iterator<Item = &'static str> {
-    all().map(|(name, _)| name)
+    plain_names().chain(FAULTS.into_iter().map(|(name, _)| name))
 }
 
 /// Returns the text of a scenario, or `None` if the library has no scenario of that name.
 pub fn text(name: &str) -> Option<&'static str> {
-    all().find(|(known, _)| *known == name).map(|(_, text)| text)
+    // Without the scenarios with faults, which are put together from their bases, if possible.
+    plain_text(name).or_else(|| all().find(|(known, _)| *known == name).map(|(_, text)| text))
 }
 
 /// Returns the path by which messages and manifests name a scenario of the library. No such file is read.
