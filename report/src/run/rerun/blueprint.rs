@@ -102,12 +102,11 @@ fn bird_share(films: &[FilmContents]) -> f32 {
     }
 }
 
-/// Returns the room for the verdict. That on recorded traffic is longer, and that on its re-enactment compares the two.
+/// Returns the room for the verdict. That on recorded traffic is longer.
 fn verdict_share(films: &[FilmContents]) -> f32 {
     match films {
         [_] if is_traffic(films) => 3.4,
         [_] => 2.6,
-        [recorded, ..] if !recorded.has_states => 4.2,
         _ => 2.9,
     }
 }
