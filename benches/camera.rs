@@ -5,7 +5,7 @@
 
 use std::hint::black_box;
 
-use closecall_sensors::camera::{Backend, CameraConfig, Classifier, Crop, ExposureKey, Frame, GroundBox, RearCamera};
+use closecall_camera::{Backend, CameraConfig, Classifier, Crop, ExposureKey, Frame, GroundBox, RearCamera};
 use closecall_sensors::{Scene, SceneVehicle};
 use closecall_traffic::{Check, Environment, Light, Parameters, Road, Time, Vehicle, VehicleClass, VehicleState};
 use criterion::{Criterion, criterion_group, criterion_main};

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
+use closecall_camera::ClassifierError;
 use closecall_scenarios::atomic::WriteError;
-use closecall_sensors::camera::ClassifierError;
 
 /// The reason why the aerial acquisition fails.
 #[derive(Debug, thiserror::Error)]

@@ -9,7 +9,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use closecall_sensors::camera::{Backend, SHIPPED_MODEL};
+use closecall_camera::{Backend, SHIPPED_MODEL};
 use closecall_sensors::{SensorMode, inference_backend};
 use closecall_simulation::Arm;
 use closecall_simulation::controller::ControllerChoice;

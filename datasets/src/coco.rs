@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::scenes::RandomScene;
 use super::{DatasetOptions, DatasetSummary};
-use closecall_sensors::camera::LabelledImage;
+use closecall_camera::LabelledImage;
 
 #[derive(Serialize)]
 pub(super) struct Annotations {

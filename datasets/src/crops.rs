@@ -7,8 +7,8 @@ use rand::RngExt;
 
 use super::DatasetSummary;
 use super::scenes::RandomScene;
-use closecall_sensors::camera::MIN_SHARE_IN_IMAGE;
-use closecall_sensors::camera::{Crop, ExposureKey, Frame, GroundBox, PixelRect, RearCamera};
+use closecall_camera::MIN_SHARE_IN_IMAGE;
+use closecall_camera::{Crop, ExposureKey, Frame, GroundBox, PixelRect, RearCamera};
 use closecall_sensors::{Scene, SceneVehicle};
 
 /// Minimum unoccluded share of a vehicle for it to be labelled (0 to 1).

@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use super::DatasetError;
-use closecall_sensors::camera::Image;
+use closecall_camera::Image;
 
 /// The folder that receives the files.
 pub(super) struct Output {

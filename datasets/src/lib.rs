@@ -6,7 +6,7 @@
 //! - *crops*: `crops.rgb`, which holds 32 × 32 × 3 bytes per crop, and `crops.csv`, which holds one row per crop. The
 //!   classifier is trained on them. Their boxes have errors as large as those of boxes fitted to LiDAR clusters.
 //!
-//! The training set and the held-out set share no body shape ([`HELD_OUT_SHAPES`](closecall_sensors::camera::HELD_OUT_SHAPES)), no paint
+//! The training set and the held-out set share no body shape ([`HELD_OUT_SHAPES`](closecall_camera::HELD_OUT_SHAPES)), no paint
 //! and no random numbers.
 
 mod coco;

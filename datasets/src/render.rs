@@ -97,11 +97,8 @@ pub fn render_dataset(options: &DatasetOptions, folder: &Path) -> Result<Dataset
             let mut annotations = coco::Annotations::new(options);
             for index in 0..options.scenes {
                 let scene = random_scene(options, index)?;
-                let key = closecall_sensors::camera::ExposureKey(closecall_sensors::camera::mix(
-                    options.seed ^ u64::from(index),
-                ));
-                let picture =
-                    closecall_sensors::camera::RearCamera::new(scene.camera).render_image(&scene.scene(), key);
+                let key = closecall_camera::ExposureKey(closecall_camera::mix(options.seed ^ u64::from(index)));
+                let picture = closecall_camera::RearCamera::new(scene.camera).render_image(&scene.scene(), key);
                 let name = format!("image-{index:06}.png");
                 output.png(&name, &picture.image)?;
                 annotations.add(&name, &picture, &scene, &mut summary);

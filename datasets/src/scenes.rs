@@ -10,7 +10,7 @@ use closecall_traffic::{
 use rand::RngExt;
 
 use super::Set;
-use closecall_sensors::camera::{Camera, CameraConfig, HELD_OUT_SHAPES, Pipeline, SunConfig};
+use closecall_camera::{Camera, CameraConfig, HELD_OUT_SHAPES, Pipeline, SunConfig};
 use closecall_sensors::{Scene, SceneVehicle};
 
 /// Range of the distance from the ego's centre back to the front of a vehicle (m).

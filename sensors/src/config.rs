@@ -5,7 +5,6 @@ use closecall_traffic::{Check, Choice, ConfigError, Parameters, Problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::camera::{Camera, CameraConfig, Pipeline};
 use crate::faults::{Faults, OdometryErrors};
 use crate::lidar::LidarConfig;
 use crate::worker_classifier::WorkerClassifier;
@@ -13,6 +12,7 @@ use crate::{
     Alterations, FullModel, FullPerception, GroundTruth, NoiseKey, ObjectPerception, ObjectSensorConfig,
     ObjectSensorModel, Perception, SensorError, TrackerConfig,
 };
+use closecall_camera::{Camera, CameraConfig, Pipeline};
 
 /// Least height of the LiDAR above the road with the errors of its mounting (m).
 const MIN_LIDAR_HEIGHT_M: f64 = 0.1;

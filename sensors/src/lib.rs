@@ -9,17 +9,13 @@
 
 mod alterations;
 mod audit;
-mod bodies;
-pub mod camera;
 mod config;
 pub mod faults;
 mod full;
 mod ground_truth;
-mod guard_rail;
 pub mod lidar;
 mod object;
 mod perception;
-mod scene;
 mod surroundings;
 #[cfg(test)]
 mod testing;
@@ -30,10 +26,10 @@ mod worker_classifier;
 pub use alterations::Alterations;
 pub use audit::{NEES_QUANTILE_95, TrackAudit};
 pub use closecall_tracking::{Detection, Extent, TrackerConfig, TrackerModel};
+pub use closecall_traffic::{Scene, SceneVehicle};
 pub use config::{SensorMode, Sensors, SensorsConfig};
 pub use full::{DetectionClassifier, FullModel, FullPerception};
 pub use ground_truth::GroundTruth;
 pub use object::{NoiseKey, ObjectPerception, ObjectSensorConfig, ObjectSensorModel};
 pub use perception::{FieldOfView, Health, Perception, SensorError, SensorHealth};
-pub use scene::{Scene, SceneVehicle};
 pub use worker_classifier::{inference_backend, rear_exposures, set_inference_backend};

@@ -8,10 +8,11 @@ use std::sync::OnceLock;
 
 use closecall_traffic::{Environment, Road, Stream, Time};
 
-use crate::camera::{Backend, Camera, CropClassifier, ExposureKey, ImageMemory, ImagedScene};
-use crate::faults::{CameraFault, FaultList, NOTICED_AFTER_SCANS};
+use crate::faults::{FaultList, NOTICED_AFTER_SCANS};
 use crate::full::DetectionClassifier;
 use crate::{Detection, Health, NoiseKey, Scene, SceneVehicle, SensorError};
+use closecall_camera::CameraFault;
+use closecall_camera::{Backend, Camera, CropClassifier, ExposureKey, ImageMemory, ImagedScene};
 
 /// Name of the camera's random stream.
 const CHANNEL: &str = "rear-camera";
@@ -119,7 +120,10 @@ impl DetectionClassifier for WorkerClassifier {
                 *slot = Some((self.camera, network));
             }
             match slot {
-                Some((_, network)) => network.classify_with(seen, key, memory, detections).map(|_| ()),
+                Some((_, network)) => network
+                    .classify_with(seen, key, memory, detections)
+                    .map(|_| ())
+                    .map_err(|error| SensorError::Classifier { reason: error.to_string() }),
                 None => Ok(()),
             }
         })

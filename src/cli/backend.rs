@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use closecall_sensors::camera::{Backend, Classifier};
+use closecall_camera::{Backend, Classifier};
 use closecall_sensors::{SensorMode, inference_backend, set_inference_backend};
 use closecall_simulation::Arm;
 use closecall_simulation::scenario::Scenario;

@@ -1,6 +1,7 @@
 //! The errors of the commands, and the exit code of each.
 
 use closecall_aerial::AerialError;
+use closecall_camera::ClassifierError;
 use closecall_campaign::baseline::BaselineError;
 use closecall_campaign::compare::CompareError;
 use closecall_campaign::execution::CampaignError;
@@ -24,7 +25,6 @@ use closecall_scenarios::encounter::{NoEncounter, track_suggestion};
 use closecall_scenarios::following::FollowingError;
 use closecall_scenarios::lane_change::ReferenceError;
 use closecall_scenarios::trajectory_data::{TrajectoryFileError, WriteError as TrajectoryWriteError};
-use closecall_sensors::camera::ClassifierError;
 use closecall_simulation::SampleError;
 use closecall_simulation::scenario::ScenarioError;
 use closecall_simulation::scenario::library::UnknownScenario;

@@ -7,10 +7,10 @@ use closecall_traffic::{CONTROL_STEP, ConfigError, Num, Parameters, Problem, Ran
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::camera::CameraFault;
 use super::list::{Combine, FaultList, check_span};
 use super::object::ObjectFaultConfig;
 use crate::lidar::HALF_FIELD_DEG;
+use closecall_camera::CameraFault;
 
 /// Longest additional latency (s).
 pub(super) const MAX_DELAY_S: f64 = 0.4;

@@ -2,7 +2,8 @@
 
 use closecall_traffic::{ConfigError, Num, Parameters, Problem, Range, Time};
 
-use super::{CameraFault, LidarFault, ObjectFault, OdometryErrors};
+use super::{LidarFault, ObjectFault, OdometryErrors};
+use closecall_camera::CameraFault;
 
 /// Maximum number of entries of one sensor.
 const MAX_ENTRIES: usize = 4;

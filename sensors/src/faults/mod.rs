@@ -14,7 +14,6 @@
 //! The random numbers of faults come from streams of their own, and from the address of a beam in a scan. A scenario without
 //! faults draws none of them.
 
-mod camera;
 mod config;
 mod list;
 mod object;
@@ -22,7 +21,6 @@ mod odometry;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use camera::CameraFault;
 pub use config::{CameraFaultConfig, FaultEntries, LidarFaultConfig};
 pub(crate) use list::FaultList;
 pub use list::Faults;

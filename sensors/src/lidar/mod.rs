@@ -18,7 +18,6 @@ mod config;
 mod detector;
 mod echo;
 mod ground;
-mod lane;
 mod material;
 mod noise;
 mod pattern;
@@ -40,15 +39,15 @@ mod targets;
 mod tests;
 mod viewpoint;
 
+pub use closecall_tracking::LaneGeometry;
 pub use config::{Lidar, LidarConfig, LidarModel};
 pub use detector::Detector;
 #[cfg(test)]
 pub(crate) use detector::FACE_SD_M;
-pub use lane::LaneGeometry;
 pub use material::Material;
 pub use pattern::{BEAMS, COLUMNS, LAYERS, Pattern};
 pub(crate) use pattern::{HALF_FIELD_DEG, HALF_FIELD_TAN};
-pub(crate) use power::{KOSCHMIEDER, extinction_per_m, rain_db_per_km};
+pub(crate) use power::extinction_per_m;
 pub use rear::RearLidar;
 pub use scan::{LidarScan, MirrorSide, PointSource, PointTruth, ScanTruth};
 pub use scanner::Scanner;

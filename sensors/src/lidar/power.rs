@@ -16,7 +16,7 @@
 //! range (200 m), in air that does not attenuate. A surface of reflectivity 0.8 is then detected with probability 0.9
 //! up to 226 m, and one of reflectivity 0.1 up to 80 m.
 
-use closecall_traffic::Environment;
+use closecall_traffic::{Environment, KOSCHMIEDER, rain_db_per_km};
 
 use super::Lidar;
 
@@ -34,13 +34,6 @@ const NOMINAL_REFLECTIVITY: f64 = 0.5;
 const RANGE_SD_M: f32 = 0.03;
 /// Additional standard deviation of the measured range at the detection threshold (m), independent of the former.
 const RANGE_SD_AT_THRESHOLD_M: f32 = 0.09;
-/// Product of extinction and meteorological visibility V, the distance at which contrast falls to 2 %: α = ln 50 / V
-/// (Koschmieder 1924).
-pub(crate) const KOSCHMIEDER: f64 = 3.912;
-/// Factor in the extinction of rain at optical wavelengths: 1.076·r^0.67 dB/km at r mm/h (Carbonneau and Wisely 1998).
-const RAIN_DB_PER_KM: f64 = 1.076;
-/// Exponent of the rain rate in that formula.
-const RAIN_EXPONENT: f64 = 0.67;
 /// Extinction in dB/km that corresponds to an extinction of 1/m: decibels per neper of power, times metres per
 /// kilometre.
 const DB_PER_KM_OVER_PER_M: f64 = 4_342.944_819;
@@ -84,11 +77,6 @@ impl LinkBudget {
 /// The two are not added, because a visibility observed in rain already includes the extinction of the rain.
 pub(crate) fn extinction_per_m(environment: &Environment) -> f64 {
     (KOSCHMIEDER / environment.visibility_m).max(rain_db_per_km(environment) / DB_PER_KM_OVER_PER_M)
-}
-
-/// Returns the extinction of the rain (dB/km).
-pub(crate) fn rain_db_per_km(environment: &Environment) -> f64 {
-    RAIN_DB_PER_KM * environment.rain_mm_per_h.powf(RAIN_EXPONENT)
 }
 
 /// Returns the standard deviation of the measured range (m): 0.03 m for a strong return, 0.1 m at the threshold.

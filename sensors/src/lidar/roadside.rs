@@ -4,7 +4,7 @@ use closecall_traffic::{PlanePose, Road};
 
 use super::Material::Steel;
 use super::solid::Solid;
-use crate::guard_rail::{BEAM_DEPTH_M, BEAM_TOP_M, LEFT_OFFSET_M, POST_SPACING_M, RIGHT_OFFSET_M};
+use closecall_traffic::guard_rail::{BEAM_DEPTH_M, BEAM_TOP_M, LEFT_OFFSET_M, POST_SPACING_M, RIGHT_OFFSET_M};
 
 const BEAM_LOW_M: f64 = 0.44;
 const POST_WIDTH_M: f64 = 0.10;

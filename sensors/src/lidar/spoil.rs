@@ -17,7 +17,7 @@ use super::pattern::{BEAMS, COLUMNS, LAYERS, LAYERS_PER_GROUP, Pattern};
 use super::receiver::{MAX_INTENSITY, SensorPoseEstimate};
 use super::{LaneGeometry, LidarScan, Material, MirrorSide, PointSource, PointTruth, ScanTruth};
 use crate::faults::LidarFault;
-use crate::guard_rail::{LEFT_OFFSET_M, RIGHT_OFFSET_M};
+use closecall_traffic::guard_rail::{LEFT_OFFSET_M, RIGHT_OFFSET_M};
 
 /// Number of columns of a burst, from the fewest to the most.
 const BURST_COLUMNS: [usize; 2] = [3, 10];

@@ -1,6 +1,6 @@
 //! Injected faults that cannot act in a scenario: they would pass for faults that do no harm.
 
-use closecall_sensors::camera::Pipeline;
+use closecall_camera::Pipeline;
 use closecall_sensors::{SensorMode, Sensors};
 use closecall_traffic::{ConfigError, Num, Parameters, Problem, Range, Road};
 

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
+use closecall_camera::Camera;
 use closecall_controllers::EgoCommand;
-use closecall_sensors::camera::Camera;
 use closecall_sensors::{FieldOfView, NoiseKey, Scene, SceneVehicle};
 use closecall_traffic::geometry::OrientedBox;
 use closecall_traffic::metrics::{Encounter, Moving, closest_encounter};

@@ -5,9 +5,7 @@
 //! a hundred control steps. An image and its windows stay visible until the next image.
 
 use crate::run::rerun::sdk::{AsComponents, Boxes2D, Image, Pinhole, Transform3D};
-use closecall_sensors::camera::{
-    Camera, ExposureKey, FOCAL_PX, Frame as Exposure, FrameBuffers, PixelRect, RearCamera,
-};
+use closecall_camera::{Camera, ExposureKey, FOCAL_PX, Frame as Exposure, FrameBuffers, PixelRect, RearCamera};
 use closecall_sensors::{Detection, rear_exposures};
 use closecall_traffic::{Time, VehicleClass};
 

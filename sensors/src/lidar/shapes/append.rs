@@ -3,8 +3,8 @@
 use super::super::Material;
 use super::super::solid::Solid;
 use super::{car, motorcycle, truck};
-use crate::bodies::Proportions;
 use closecall_traffic::Vehicle;
+use closecall_traffic::bodies::Proportions;
 
 /// Appends the solids of a vehicle, in its own frame.
 pub(crate) fn append_solids(vehicle: &Vehicle, solids: &mut Vec<Solid>) {

@@ -3,9 +3,9 @@
 use closecall_traffic::Dimensions;
 
 use super::append_pair;
-use crate::bodies::{CarProportions, GREENHOUSE_FOOT_HALF_WIDTH};
 use crate::lidar::Material::{Glass, Lamp, Paint, Plastic, Plate, Tyre};
 use crate::lidar::solid::{HalfWidth, Solid, corner};
+use closecall_traffic::bodies::{CarProportions, GREENHOUSE_FOOT_HALF_WIDTH};
 
 /// Protrusion of the plate from the painted front (m). Grille and lamps protrude by half of it.
 const PROTRUSION_M: f64 = 0.01;

@@ -3,9 +3,9 @@
 use closecall_traffic::Dimensions;
 
 use super::append_pair;
-use crate::bodies::{HEAD_BACK_M, HIP_X_M, MotorcycleProportions, RIDER, WHEEL_RADIUS_M};
 use crate::lidar::Material::{Glass, Lamp, Paint, Plastic, Textile, Tyre};
 use crate::lidar::solid::{HalfWidth, Solid, corner};
+use closecall_traffic::bodies::{HEAD_BACK_M, HIP_X_M, MotorcycleProportions, RIDER, WHEEL_RADIUS_M};
 
 const TYRE_HALF_WIDTH_M: f64 = 0.07;
 /// Half of the width of fork, lamp and instruments without a fairing (m).

@@ -3,11 +3,11 @@
 use closecall_traffic::Dimensions;
 
 use super::append_pair;
-use crate::bodies::{
-    CAB_M, CRATE, DECK, LOAD_FLOOR_M, LOAD_GAP_M, Load, SCREEN_RAKE_M, Slab, TANK_FLOOR_M, TruckProportions, VISOR,
-};
 use crate::lidar::Material::{self, Glass, Lamp, Paint, Plastic, Plate, Steel, Tarpaulin, Tyre};
 use crate::lidar::solid::{HalfWidth, Solid, corner};
+use closecall_traffic::bodies::{
+    CAB_M, CRATE, DECK, LOAD_FLOOR_M, LOAD_GAP_M, Load, SCREEN_RAKE_M, Slab, TANK_FLOOR_M, TruckProportions, VISOR,
+};
 
 /// Height of the cab's underside (m).
 const CAB_FLOOR_M: f64 = 0.35;

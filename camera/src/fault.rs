@@ -1,0 +1,119 @@
+//! What a fault of the camera does to the pixels that the classifier receives.
+
+use super::image::{CHANNELS, CROP_PX, Crop, sample_positions};
+use closecall_traffic::{Scene, SceneVehicle};
+
+/// Distance to a headlamp below which the glare no longer grows (m): the lamp saturates the image around it.
+const FULL_GLARE_M: f64 = 30.0;
+/// Distance across the road beyond which a main beam misses the camera (m): a lane and a half.
+const BEAM_HALF_WIDTH_M: f64 = 5.6;
+/// Side of the cells of the image that a blot of dirt covers or leaves (px). On a lens of 5 mm with 1280 pixels, a blot of
+/// 0.15 mm covers about 40 pixels (assumption).
+const BLOT_PX: i32 = 40;
+/// Colour of light that has passed through dirt, sRGB (assumption: dark brown, as of dried road spray).
+const DIRT_RGB: [f32; CHANNELS] = [70.0, 62.0, 52.0];
+/// Key of the pattern of blots. The same for all runs, so that dirt does not change between paired arms.
+const BLOT_KEY: u64 = 0x0b10_7b10_7b10_70b1;
+
+/// The effects of faults of the rear camera at one instant. None by default.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CameraFault {
+    /// The camera delivers no image.
+    pub is_dead: bool,
+    /// The camera delivers its latest image again and again.
+    pub is_frozen: bool,
+    /// Share of the pixels' range that the sun's stray light adds (0 to 1).
+    pub sun_glare: f64,
+    /// Share of the pixels' range that the main beam of a vehicle 30 m behind adds (0 to 1).
+    pub main_beam_glare: f64,
+    /// Share of the lens that dirt covers (0 to 1).
+    pub dirt: f64,
+    /// Standard deviation of the blur of an image out of focus (px).
+    pub blur_px: f64,
+}
+
+impl CameraFault {
+    /// Returns the share of the pixel's range that stray light adds in this scene.
+    pub fn glare(&self, scene: &Scene<'_>) -> f64 {
+        let beam = nearest_behind_m(scene.others, &scene.ego)
+            .map_or(0.0, |gap_m| self.main_beam_glare * (FULL_GLARE_M / gap_m.max(FULL_GLARE_M)).powi(2));
+        1.0 - (1.0 - self.sun_glare) * (1.0 - beam)
+    }
+
+    /// Changes the pixels of a crop. `glare` comes from [`CameraFault::glare`].
+    #[expect(clippy::cast_possible_truncation, reason = "pixels need no more than single precision")]
+    pub fn apply(&self, crop: &mut Crop, glare: f64) {
+        if self.dirt > 0.0 {
+            self.cover(crop);
+        }
+        if self.blur_px > 0.0 {
+            blur(crop, (self.blur_px * CROP_PX as f64 / f64::from(crop.window.width)) as f32);
+        }
+        if glare > 0.0 {
+            let glare = glare as f32;
+            for value in &mut crop.rgb {
+                *value = to_byte((1.0 - glare) * f32::from(*value) + glare * 255.0);
+            }
+        }
+    }
+
+    /// Covers the pixels that lie behind a blot.
+    fn cover(&self, crop: &mut Crop) {
+        let columns = sample_positions(crop.window.left, crop.window.width);
+        let rows = sample_positions(crop.window.top, crop.window.height);
+        for (index, pixel) in crop.rgb.chunks_exact_mut(CHANNELS).enumerate() {
+            let cell = [columns[index % CROP_PX], rows[index / CROP_PX]].map(|at| at.div_euclid(BLOT_PX));
+            if is_blot(cell, self.dirt) {
+                pixel.iter_mut().zip(DIRT_RGB).for_each(|(value, dirt)| *value = to_byte(dirt));
+            }
+        }
+    }
+}
+
+/// Returns the distance to the nearest front of a vehicle behind that drives within a main beam's width (m).
+fn nearest_behind_m(others: &[SceneVehicle], ego: &SceneVehicle) -> Option<f64> {
+    let half_m = |vehicle: &SceneVehicle| 0.5 * vehicle.vehicle.dimensions.length_m;
+    let gap_m = |other: &SceneVehicle| ego.state.s_m - half_m(ego) - other.state.s_m - half_m(other);
+    let near = others.iter().filter(|other| (other.state.d_m - ego.state.d_m).abs() < BEAM_HALF_WIDTH_M);
+    near.map(gap_m).filter(|gap_m| *gap_m > 0.0).reduce(f64::min)
+}
+
+/// Returns whether a cell of the image lies behind a blot: the cells are covered at random with the probability `share`.
+fn is_blot([column, row]: [i32; 2], share: f64) -> bool {
+    let mut z = BLOT_KEY ^ ((column as u32 as u64) << 32 | row as u32 as u64);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64 <= share && share > 0.0
+}
+
+/// Blurs a crop with a Gaussian kernel of this standard deviation (crop pixels), along rows and columns.
+fn blur(crop: &mut Crop, sd: f32) {
+    if sd < 0.1 {
+        return;
+    }
+    let side = CROP_PX as i32;
+    let weights: Vec<f32> = (0..side).map(|at| (-0.5 * (at as f32 / sd).powi(2)).exp()).collect();
+    let mut blurred = vec![0_u8; crop.rgb.len()];
+    for [step, across] in [[CHANNELS as i32, CHANNELS as i32 * side], [CHANNELS as i32 * side, CHANNELS as i32]] {
+        for line in 0..side {
+            for at in 0..side {
+                for channel in 0..CHANNELS as i32 {
+                    let (mut sum, mut total) = (0.0, 0.0);
+                    for from in 0..side {
+                        let weight = weights[(from - at).unsigned_abs() as usize];
+                        sum += weight * f32::from(crop.rgb[(line * across + from * step + channel) as usize]);
+                        total += weight;
+                    }
+                    blurred[(line * across + at * step + channel) as usize] = to_byte(sum / total);
+                }
+            }
+        }
+        crop.rgb.copy_from_slice(&blurred);
+    }
+}
+
+/// Rounds to a pixel's value.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
+fn to_byte(value: f32) -> u8 {
+    value.round().clamp(0.0, 255.0) as u8
+}

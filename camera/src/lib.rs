@@ -1,0 +1,49 @@
+//! The rear camera: a software renderer, and a neural network that classifies the image of each LiDAR cluster.
+//!
+//! ```text
+//!   detection ─▶ box in the ego's frame ─▶ window of the image ─▶ crop, 32 × 32 px ─▶ network ─▶ class scores
+//!                                              scene ──────────────▲
+//! ```
+//!
+//! The camera is a pinhole camera in the ego's rear window. Its image has 1280 × 800 px and covers 60° horizontally.
+//! A simulated run renders only the crops that the network classifies, never the whole image. Each pixel of a crop is
+//! identical, bit for bit, to the same pixel of the whole image (see [`Frame`]).
+
+mod body;
+mod classifier;
+mod config;
+mod draw;
+mod fault;
+mod frame;
+mod glow;
+mod ground;
+mod hash;
+mod image;
+mod image_memory;
+mod light;
+mod mesh;
+mod network;
+mod pinhole;
+mod pipeline;
+mod raster;
+mod rear_camera;
+mod shapes;
+mod sky;
+mod spray;
+mod triangles;
+mod vector_registers;
+mod window;
+
+pub use classifier::{Backend, Classifier, ClassifierError, SHIPPED_MODEL};
+pub use config::{Camera, CameraConfig, Pipeline, Sun, SunConfig};
+pub use fault::CameraFault;
+pub use frame::{Frame, FrameBuffers};
+pub use hash::mix;
+pub use image::{CHANNELS, CROP_PX, Crop, Image, LabelledImage};
+pub use image_memory::ImageMemory;
+pub use network::Network;
+pub use pinhole::{FOCAL_PX, GroundBox, HEIGHT_PX, PixelRect, WIDTH_PX};
+pub use pipeline::{CropClassifier, ImagedScene, MIN_SHARE_IN_IMAGE};
+pub use rear_camera::{ExposureKey, RearCamera};
+pub use shapes::HELD_OUT_SHAPES;
+pub use triangles::{BodyTriangle, body_triangles};

@@ -1,0 +1,212 @@
+//! The public interface of the rear camera: it projects boxes to windows and renders scenes to images and crops.
+
+use rand::RngExt;
+
+use super::image::{Crop, LabelledImage};
+use super::pinhole::{GroundBox, Lens, NEAR_M, PixelRect};
+use super::{Camera, Frame};
+use closecall_traffic::{Scene, SceneVehicle};
+
+/// Ratio of the side of a window to the larger side of the object's projection.
+const WINDOW_TO_OBJECT_RATIO: f64 = 1.3;
+/// Minimum width of a window, measured at the object's distance (m), so that a crop of a single post also shows its
+/// surroundings.
+const MIN_WINDOW_WIDTH_M: f64 = 2.2;
+/// Maximum width of a window (px).
+const MAX_WINDOW_WIDTH_PX: f64 = 2_400.0;
+/// A box has a window only if part of it lies deeper than this along the optical axis (m).
+const MIN_DEPTH_M: f64 = 1.5;
+
+/// The key of the noise of one exposure: the same scene and key give the same pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct ExposureKey(pub u64);
+
+impl ExposureKey {
+    /// Draws the key of the next exposure.
+    pub fn draw(rng: &mut impl rand::Rng) -> Self {
+        Self(rng.random())
+    }
+}
+
+/// The rear camera of the ego vehicle.
+#[derive(Clone, Debug)]
+pub struct RearCamera {
+    camera: Camera,
+}
+
+impl RearCamera {
+    /// Creates a camera from its checked configuration.
+    pub fn new(camera: Camera) -> Self {
+        Self { camera }
+    }
+
+    /// Returns the checked configuration.
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// Returns the square window of the image around a box given in the vehicle frame of `ego`. Returns `None` if the
+    /// box is not behind the ego vehicle or is too near to the lens.
+    pub fn project(&self, ego: &SceneVehicle, object: &GroundBox) -> Option<PixelRect> {
+        let lens = Lens::new(&self.camera, ego);
+        let relative_to_lens = GroundBox { x_m: object.x_m - lens.ahead_m, ..*object };
+        let corners = relative_to_lens.corners().map(|corner| lens.in_camera(corner));
+        let nearest = corners.iter().map(|corner| corner[2]).fold(f64::INFINITY, f64::min);
+        let farthest = corners.iter().map(|corner| corner[2]).fold(f64::NEG_INFINITY, f64::max);
+        if !(farthest > MIN_DEPTH_M) {
+            return None;
+        }
+        let [left, top, right, bottom] = lens.bounds(&corners)?;
+        let min_side = MIN_WINDOW_WIDTH_M * lens.focal_px / nearest.max(NEAR_M).max(MIN_DEPTH_M);
+        let side = ((right - left).max(bottom - top) * WINDOW_TO_OBJECT_RATIO).max(min_side).min(MAX_WINDOW_WIDTH_PX);
+        if !(side >= 1.0) {
+            return None;
+        }
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "bounded above, and 1 or more")]
+        let (side, left, top) = (
+            side.round() as u32,
+            ((left + right - side) / 2.0).round() as i32,
+            ((top + bottom - side) / 2.0).round() as i32,
+        );
+        Some(PixelRect { left, top, width: side, height: side })
+    }
+
+    /// Renders the whole image, and for each pixel the vehicle that it shows.
+    pub fn render_image(&self, scene: &Scene<'_>, key: ExposureKey) -> LabelledImage {
+        Frame::new(&self.camera, scene, key, &[PixelRect::IMAGE]).image()
+    }
+
+    /// Renders the crop of one window. For several windows of the same exposure, prepare one [`Frame`] instead.
+    pub fn render_crop(&self, scene: &Scene<'_>, window: PixelRect, key: ExposureKey, crop: &mut Crop) {
+        Frame::new(&self.camera, scene, key, &[window]).crop(window, crop);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use closecall_traffic::{Check, Environment, Light, Parameters, Road, Time, Vehicle, VehicleClass, VehicleState};
+    use proptest::prelude::*;
+
+    use super::super::CameraConfig;
+    use super::super::image::{CROP_PX, sample_positions};
+    use super::*;
+
+    fn rear_camera() -> RearCamera {
+        RearCamera::new(CameraConfig::default().check(&Parameters::default()).unwrap())
+    }
+
+    fn vehicle(class: VehicleClass, s_m: f64, d_m: f64) -> SceneVehicle {
+        let state = VehicleState { s_m, d_m, speed_mps: 30.0, ..VehicleState::default() };
+        SceneVehicle { actor: 1, vehicle: Vehicle::typical(class), state, pitch_rad: 0.0 }
+    }
+
+    fn box_of(ego: &SceneVehicle, other: &SceneVehicle) -> GroundBox {
+        let size = other.vehicle.dimensions;
+        GroundBox {
+            x_m: other.state.s_m - ego.state.s_m,
+            y_m: other.state.d_m - ego.state.d_m,
+            heading_rad: 0.0,
+            length_m: size.length_m,
+            width_m: size.width_m,
+            height_m: size.height_m,
+        }
+    }
+
+    /// A varied scene: a vehicle of each class, rain, spray, guard rails and a bend.
+    fn varied_scene(light: Light) -> (Road, Environment, Vec<SceneVehicle>) {
+        let road = Road::straight(3).with_curvature(0.001);
+        let environment =
+            Environment { light, rain_mm_per_h: 4.0, water_film_mm: 0.8, visibility_m: 2_000.0, friction: 0.6 };
+        let others = vec![
+            vehicle(VehicleClass::Car, 470.0, -5.6),
+            vehicle(VehicleClass::Truck, 440.0, -9.4),
+            vehicle(VehicleClass::Motorcycle, 480.0, -1.9),
+        ];
+        (road, environment, others)
+    }
+
+    fn assert_crops_match(light: Light, windows: &[PixelRect]) {
+        let (road, environment, others) = varied_scene(light);
+        let ego = vehicle(VehicleClass::Car, 500.0, -5.6);
+        let scene = Scene { time: Time::from_ms(880), road: &road, environment: &environment, ego, others: &others };
+        let camera = rear_camera();
+        let image = camera.render_image(&scene, ExposureKey(42)).image;
+        let mut crop = Crop::default();
+        for window in windows {
+            camera.render_crop(&scene, *window, ExposureKey(42), &mut crop);
+            let (columns, rows) =
+                (sample_positions(window.left, window.width), sample_positions(window.top, window.height));
+            for (index, rgb) in crop.rgb.chunks_exact(3).enumerate() {
+                let (u, v) = (columns[index % CROP_PX], rows[index / CROP_PX]);
+                let whole = u32::try_from(u).ok().zip(u32::try_from(v).ok()).and_then(|(u, v)| image.pixel(u, v));
+                assert_eq!(rgb, whole.unwrap_or_default(), "{light:?} {window:?} at {u} {v}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_crop_has_the_same_bits_as_the_whole_image() {
+        let square = |left, top, side| PixelRect { left, top, width: side, height: side };
+        let windows = [square(600, 380, 32), square(500, 300, 301), square(620, 395, 21), square(-40, 700, 200)];
+        for light in [Light::Day, Light::Dusk, Light::Night] {
+            assert_crops_match(light, &windows);
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(3))]
+        #[test]
+        fn any_crop_has_the_same_bits_as_the_whole_image(
+            windows in prop::collection::vec((-50_i32..1280, -50_i32..800, 8_u32..500), 12),
+        ) {
+            let squares: Vec<_> = windows.into_iter().map(|(left, top, side)| PixelRect { left, top, width: side, height: side }).collect();
+            assert_crops_match(Light::Night, &squares);
+        }
+    }
+
+    #[test]
+    fn the_projected_window_of_a_vehicle_shows_the_vehicle() {
+        let (_, environment, others) = varied_scene(Light::Day);
+        let ego = vehicle(VehicleClass::Car, 500.0, -5.6);
+        let road = Road::straight(3);
+        let scene = Scene { time: Time::ZERO, road: &road, environment: &environment, ego, others: &others };
+        let camera = rear_camera();
+        for (index, other) in others.iter().enumerate() {
+            let window = camera.project(&ego, &box_of(&ego, other)).unwrap();
+            let mut frame = Frame::new(camera.camera(), &scene, ExposureKey(1), &[window]);
+            frame.crop(window, &mut Crop::default());
+            let share = frame.instance_share(index);
+            assert!((0.1..0.9).contains(&share), "{:?}: {share}", other.vehicle.class);
+        }
+    }
+
+    #[test]
+    fn the_same_key_gives_the_same_image_and_a_different_key_different_noise() {
+        let (road, environment, others) = varied_scene(Light::Dusk);
+        let ego = vehicle(VehicleClass::Car, 500.0, -5.6);
+        let scene = Scene { time: Time::ZERO, road: &road, environment: &environment, ego, others: &others };
+        let window = PixelRect { left: 600, top: 380, width: 64, height: 64 };
+        let rendered = |key| {
+            let mut crop = Crop::default();
+            rear_camera().render_crop(&scene, window, ExposureKey(key), &mut crop);
+            crop
+        };
+        assert_eq!(rendered(5), rendered(5));
+        assert_ne!(rendered(5), rendered(6));
+    }
+
+    #[test]
+    fn boxes_ahead_and_alongside_have_no_visible_window() {
+        let ego = vehicle(VehicleClass::Car, 500.0, -5.6);
+        let box_at = |x_m| GroundBox { x_m, y_m: 3.7, heading_rad: 0.0, length_m: 4.6, width_m: 1.8, height_m: 1.5 };
+        assert_eq!(rear_camera().project(&ego, &box_at(30.0)), None);
+        assert_eq!(
+            rear_camera()
+                .project(&ego, &box_at(0.0))
+                .map(|window| window.share_in_image())
+                .filter(|share| *share > 0.0),
+            None
+        );
+        assert!(rear_camera().project(&ego, &box_at(-30.0)).is_some());
+    }
+}
