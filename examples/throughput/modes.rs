@@ -94,9 +94,11 @@ pub(crate) fn modes() -> Result<Vec<Mode>, Box<dyn Error>> {
     ];
     for vehicles in VEHICLES {
         let file = ScenarioFile::parse(Path::new("traffic.toml"), &traffic(vehicles), &[])?;
+        // The clock counts in steps of milliseconds: runs with few vehicles are repeated.
+        let light = 10 * (100 / vehicles as u64);
         for (name, sensors, samples) in [
-            ("ground-truth", SensorMode::GroundTruth, 10),
-            ("object", SensorMode::Object, 10),
+            ("ground-truth", SensorMode::GroundTruth, light),
+            ("object", SensorMode::Object, light),
             ("full", SensorMode::Full, 1),
         ] {
             modes.push(Mode::new(&format!("{name}, {vehicles} vehicles"), sensors, &file, samples));

@@ -8,6 +8,8 @@
 //!
 //! The result is that of [`super::neighbours::find`] to the bit.
 
+use std::ops::RangeInclusive;
+
 use closecall_controllers::{Looks, Neighbours};
 use closecall_traffic::metrics::bumper_gap_m;
 use closecall_traffic::{Lane, Road};
@@ -40,6 +42,8 @@ pub(super) struct NeighbourSearch {
     /// The vehicles whose path touches each strip. The strips are the lanes at their full width, and what lies beyond
     /// the road on both sides.
     strips: Vec<Vec<Entry>>,
+    /// The strips that the path of each vehicle touches.
+    touched: Vec<RangeInclusive<usize>>,
     /// Length of the longest vehicle (m).
     longest_m: f64,
     /// Number of pairs of vehicles that were compared.
@@ -83,14 +87,15 @@ impl NeighbourSearch {
             entry.s_m = self.extents[entry.actor].s_m;
         }
         self.order.sort_unstable_by(|one, other| one.s_m.total_cmp(&other.s_m).then(one.actor.cmp(&other.actor)));
+        self.touched.clear();
+        self.touched.extend(self.extents.iter().map(|extent| strips(road, extent.sides_m())));
+        for (lane, list) in (1..).zip(&mut self.lanes) {
+            let band = LaneBand::new(road, Lane(lane));
+            let is_in_lane = |entry: &&Entry| band.contains(self.extents[entry.actor].sides_m());
+            list.extend(self.order.iter().filter(is_in_lane));
+        }
         for &entry in &self.order {
-            let sides_m = self.extents[entry.actor].sides_m();
-            for (lane, list) in (1..).zip(&mut self.lanes) {
-                if LaneBand::new(road, Lane(lane)).contains(sides_m) {
-                    list.push(entry);
-                }
-            }
-            for strip in strips(road, sides_m) {
+            for strip in self.touched[entry.actor].clone() {
                 self.strips[strip].push(entry);
             }
         }
@@ -107,19 +112,19 @@ impl NeighbourSearch {
         if let (Some(lane), Some(slot)) = (lanes.right, &mut around.right) {
             self.fill(actor, lane, slot);
         }
-        for strip in strips(road, self.extents[actor].sides_m()) {
+        for strip in self.touched[actor].clone() {
             self.fill_path(actor, &self.strips[strip], &mut around.in_path);
         }
         if looks.beyond
             && let Some(ahead) = around.ahead()
         {
-            self.fill_beyond(road, [actor, ahead], &mut around.beyond);
+            self.fill_beyond([actor, ahead], &mut around.beyond);
         }
     }
 
     /// Fills `slot` with the nearest vehicle in the path of the vehicle ahead of `actor`.
-    fn fill_beyond(&self, road: &Road, [actor, ahead]: [usize; 2], slot: &mut Option<Nearest>) {
-        for strip in strips(road, self.extents[ahead].sides_m()) {
+    fn fill_beyond(&self, [actor, ahead]: [usize; 2], slot: &mut Option<Nearest>) {
+        for strip in self.touched[ahead].clone() {
             let list = &self.strips[strip];
             let start = list.partition_point(|entry| entry.s_m <= self.extents[ahead].s_m);
             for entry in &list[start..] {
@@ -183,11 +188,12 @@ impl NeighbourSearch {
     }
 }
 
-/// Returns the indices of the strips that the path of a vehicle between these lateral positions touches.
-fn strips(road: &Road, [right_m, left_m]: [f64; 2]) -> std::ops::RangeInclusive<usize> {
+/// Returns the indices of the strips that the path of a vehicle between these lateral positions touches. Two paths with a
+/// common point have a common strip, whatever the rounding, because the index never falls to the right.
+fn strips(road: &Road, [right_m, left_m]: [f64; 2]) -> RangeInclusive<usize> {
     let last = f64::from(road.lanes()) + 1.0;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped before the cast")]
-    let strip = |d_m: f64| ((-d_m / road.lane_width_m()).floor() + 1.0).clamp(0.0, last) as usize;
+    let strip = |d_m: f64| (1.0 - d_m / road.lane_width_m()).clamp(0.0, last) as usize;
     strip(left_m + PATH_MARGIN_M)..=strip(right_m - PATH_MARGIN_M)
 }
 
