@@ -12,12 +12,11 @@ convolutions. The graph takes pixel values from 0 to 255 of any picture whose si
 import argparse
 
 import numpy as np
-import onnx
 import torch
-from onnx import TensorProto, helper, numpy_helper
 from torch import nn
 
 import aerial_data as data
+from export import Exporter
 
 # Output channels, kernel size, stride and dilation of each convolution.
 LAYERS = (
@@ -33,7 +32,6 @@ LAYERS = (
     (48, 3, 1, 1),
 )
 OUTPUTS = 8
-OPSET = 17
 # Rows and columns of a training tile (px): of a square picture, and of a strip.
 TILES = ((256, 256), (192, 320))
 # Share of the batches that come from square pictures, which show roads in all directions (-).
@@ -143,40 +141,14 @@ def train(network, pictures, steps, batch, generator):
             sums[:] = 0.0
 
 
-def export(network, path):
+def write(network, path):
     """Writes the ONNX graph: convolutions with rectifiers, then the convolution of the head."""
     network.eval()
-    nodes, weights = [], []
-
-    def constant(name, values):
-        weights.append(numpy_helper.from_array(np.ascontiguousarray(values, dtype=np.float32), name))
-        return name
-
-    value = "pixels"
-    for index, (_, kernel, stride, dilation) in enumerate(LAYERS):
-        convolution, norm = network.features[3 * index], network.features[3 * index + 1]
-        gain = norm.weight / torch.sqrt(norm.running_var + norm.eps)
-        weight = convolution.weight * gain[:, None, None, None] / (255.0 if index == 0 else 1.0)
-        bias = norm.bias - norm.running_mean * gain
-        inputs = [value, constant(f"weight{index}", weight.detach()), constant(f"bias{index}", bias.detach())]
-        padding = [dilation * (kernel // 2)] * 4
-        shape = {"kernel_shape": [kernel, kernel], "strides": [stride] * 2, "dilations": [dilation] * 2, "pads": padding}
-        nodes.append(helper.make_node("Conv", inputs, [f"sum{index}"], **shape))
-        nodes.append(helper.make_node("Relu", [f"sum{index}"], [f"layer{index}"]))
-        value = f"layer{index}"
-    head = [constant("head", network.head.weight.detach()), constant("offset", network.head.bias.detach())]
-    nodes.append(helper.make_node("Conv", [value, *head], ["boxes"], kernel_shape=[1, 1]))
-    graph = helper.make_graph(
-        nodes,
-        "aerial-detector",
-        [helper.make_tensor_value_info("pixels", TensorProto.FLOAT, [1, 3, "height", "width"])],
-        [helper.make_tensor_value_info("boxes", TensorProto.FLOAT, [1, OUTPUTS, "rows", "columns"])],
-        weights,
-    )
-    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], producer_name="closecall")
-    model.ir_version = 8
-    onnx.checker.check_model(model)
-    onnx.save(model, path)
+    exporter = Exporter()
+    exporter.convolutions(network.features, LAYERS)
+    head = [exporter.constant("head", network.head.weight.detach()), exporter.constant("offset", network.head.bias.detach())]
+    exporter.node("Conv", [exporter.value, *head], "boxes", kernel_shape=[1, 1])
+    exporter.save("aerial-detector", [1, 3, "height", "width"], [1, OUTPUTS, "rows", "columns"], path)
 
 
 def main():
@@ -192,7 +164,7 @@ def main():
     torch.manual_seed(arguments.seed)
     network = Network()
     train(network, data.read(arguments.pictures), arguments.steps, arguments.batch, np.random.default_rng(arguments.seed))
-    export(network, arguments.out)
+    write(network, arguments.out)
 
 
 if __name__ == "__main__":

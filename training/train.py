@@ -12,17 +12,15 @@ motorcycle and background.
 import argparse
 
 import numpy as np
-import onnx
 import torch
-from onnx import TensorProto, helper, numpy_helper
 from torch import nn
 
 import crops
+from export import Exporter
 
 # Output channels, kernel size and stride of each convolution.
 LAYERS = ((16, 5, 2), (32, 3, 2), (48, 3, 1), (64, 3, 2))
 CELLS = 4 * 4
-OPSET = 17
 
 
 class Network(nn.Module):
@@ -98,46 +96,19 @@ def fit_temperature(logits, labels):
     return float(log_temperature.detach().exp())
 
 
-def export(network, temperature, path):
+def write(network, temperature, path):
     """Writes the ONNX graph: four times convolution and rectifier, then a linear layer and softmax."""
     network.eval()
-    nodes, weights = [], []
-
-    def constant(name, values):
-        weights.append(numpy_helper.from_array(np.ascontiguousarray(values, dtype=np.float32), name))
-        return name
-
-    value = "pixels"
-    for index, (_, kernel, stride) in enumerate(LAYERS):
-        convolution, norm = network.features[3 * index], network.features[3 * index + 1]
-        gain = norm.weight / torch.sqrt(norm.running_var + norm.eps)
-        weight = convolution.weight * gain[:, None, None, None]
-        bias = norm.bias - norm.running_mean * gain
-        if index == 0:
-            weight = weight / 255.0
-        inputs = [value, constant(f"weight{index}", weight.detach()), constant(f"bias{index}", bias.detach())]
-        shape = {"kernel_shape": [kernel, kernel], "strides": [stride, stride], "pads": [kernel // 2] * 4}
-        nodes.append(helper.make_node("Conv", inputs, [f"sum{index}"], **shape))
-        nodes.append(helper.make_node("Relu", [f"sum{index}"], [f"layer{index}"]))
-        value = f"layer{index}"
-    nodes.append(helper.make_node("Flatten", [value], ["flat"], axis=1))
+    exporter = Exporter()
+    exporter.convolutions(network.features, [(*layer, 1) for layer in LAYERS])
+    exporter.node("Flatten", [exporter.value], "flat", axis=1)
     head = network.head
-    matrix = constant("matrix", (head.weight / temperature).detach().numpy().T)
-    offset = constant("offset", (head.bias / temperature).detach())
-    nodes.append(helper.make_node("Gemm", ["flat", matrix, offset], ["logits"]))
-    nodes.append(helper.make_node("Softmax", ["logits"], ["scores"], axis=1))
+    matrix = exporter.constant("matrix", (head.weight / temperature).detach().numpy().T)
+    offset = exporter.constant("offset", (head.bias / temperature).detach())
+    exporter.node("Gemm", ["flat", matrix, offset], "logits")
+    exporter.node("Softmax", ["logits"], "scores", axis=1)
     side = crops.SIDE_PX
-    graph = helper.make_graph(
-        nodes,
-        "rear-classifier",
-        [helper.make_tensor_value_info("pixels", TensorProto.FLOAT, [1, 3, side, side])],
-        [helper.make_tensor_value_info("scores", TensorProto.FLOAT, [1, len(crops.CLASSES)])],
-        weights,
-    )
-    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], producer_name="closecall")
-    model.ir_version = 8
-    onnx.checker.check_model(model)
-    onnx.save(model, path)
+    exporter.save("rear-classifier", [1, 3, side, side], [1, len(crops.CLASSES)], path)
 
 
 def main():
@@ -161,7 +132,7 @@ def main():
     temperature = fit_temperature(logits, labels)
     accuracy = float((logits.argmax(1) == labels).float().mean())
     print(f"kept tenth: accuracy {accuracy:.4f}, temperature {temperature:.3f}")
-    export(network, temperature, arguments.out)
+    write(network, temperature, arguments.out)
 
 
 if __name__ == "__main__":
