@@ -138,14 +138,6 @@ fn labels_text(picture: &AerialPicture, scene: &AerialScene) -> (String, AerialD
 /// # Errors
 /// [`AerialError`] if the image cannot be encoded or written.
 pub fn write_png(path: &Path, image: &Image) -> Result<(), AerialError> {
-    let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, image.width, image.height);
-    encoder.set_color(png::ColorType::Rgb);
-    encoder.set_depth(png::BitDepth::Eight);
-    let encoded = encoder.write_header().and_then(|mut writer| {
-        writer.write_image_data(&image.rgb)?;
-        writer.finish()
-    });
-    encoded.map_err(|source| AerialError::Encode { path: path.to_owned(), source })?;
+    let bytes = image.png().map_err(|source| AerialError::Encode { path: path.to_owned(), source })?;
     Ok(write_file(path, |file| file.write_all(&bytes))?)
 }

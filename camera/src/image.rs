@@ -28,6 +28,21 @@ impl Image {
         let bytes = self.rgb.get(first..first + CHANNELS)?;
         Some([bytes[0], bytes[1], bytes[2]])
     }
+
+    /// Returns the image as a PNG file.
+    ///
+    /// # Errors
+    /// The reason of the encoder, such as a size that does not agree with the number of bytes.
+    pub fn png(&self) -> Result<Vec<u8>, png::EncodingError> {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, self.width, self.height);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(&self.rgb)?;
+        writer.finish()?;
+        Ok(bytes)
+    }
 }
 
 /// The classifier's input for one object: 32 × 32 pixels sampled from a square window of the image.

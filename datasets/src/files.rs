@@ -30,15 +30,7 @@ impl Output {
 
     /// Writes an image as a PNG file.
     pub(super) fn png(&self, name: &str, image: &Image) -> Result<(), DatasetError> {
-        let mut bytes = Vec::new();
-        let mut encoder = png::Encoder::new(&mut bytes, image.width, image.height);
-        encoder.set_color(png::ColorType::Rgb);
-        encoder.set_depth(png::BitDepth::Eight);
-        let encoded = encoder.write_header().and_then(|mut writer| {
-            writer.write_image_data(&image.rgb)?;
-            writer.finish()
-        });
-        encoded.map_err(|source| DatasetError::Encode { path: self.folder.join(name), source })?;
+        let bytes = image.png().map_err(|source| DatasetError::Encode { path: self.folder.join(name), source })?;
         self.write(name, &bytes)
     }
 }
