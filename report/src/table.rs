@@ -15,6 +15,9 @@ use parquet::file::properties::WriterProperties;
 /// Number of rows in a row group: the unit that a writer holds in memory and that a reader can skip.
 pub(crate) const ROWS_PER_GROUP: usize = 8_192;
 
+/// Number of rows that are encoded at once. It divides the group, so that the bytes do not depend on it.
+pub(crate) const ROWS_PER_BATCH: usize = 1_024;
+
 /// Returns the writer properties of every table.
 ///
 /// The file names neither a time nor a place nor a library version, so that equal rows give equal bytes.

@@ -17,7 +17,7 @@ use parquet::arrow::ArrowWriter;
 use parquet::file::metadata::KeyValue;
 use serde::Serialize;
 
-use crate::table::{ROWS_PER_GROUP, field, properties, required};
+use crate::table::{ROWS_PER_BATCH, field, properties, required};
 use crate::units::unit_of;
 use closecall_campaign::manifest::Manifest;
 use closecall_campaign::record::SampleFailure;
@@ -82,7 +82,7 @@ pub fn parameter_columns<'a>(
 /// The key under which the metadata of the file holds the manifest, as JSON.
 pub const MANIFEST_KEY: &str = "closecall:manifest";
 
-/// Writes the table, with the `manifest` of the campaign in its metadata. The rows are written in groups, so that memory is bounded.
+/// Writes the table, with the `manifest` of the campaign in its metadata. The rows are encoded in batches, so that memory is bounded.
 ///
 /// # Errors
 /// The first error of `rows`, or [`WriteError`]. An existing file then stays as it is.
@@ -100,7 +100,7 @@ pub fn write_outcomes<E: From<WriteError>>(
         let options = properties().into_builder().set_key_value_metadata(Some(metadata(&columns, manifest))).build();
         let mut writer = ArrowWriter::try_new(file, schema.clone(), Some(options)).map_err(io::Error::other)?;
         loop {
-            let group: Result<Vec<OutcomeRow>, E> = rows.by_ref().take(ROWS_PER_GROUP).collect();
+            let group: Result<Vec<OutcomeRow>, E> = rows.by_ref().take(ROWS_PER_BATCH).collect();
             let group = match group {
                 Ok(group) => group,
                 Err(error) => {

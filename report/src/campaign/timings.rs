@@ -9,7 +9,7 @@ use arrow::array::{ArrayRef, Float64Array, RecordBatch, StringArray, UInt64Array
 use arrow::datatypes::{DataType, Schema};
 use parquet::arrow::ArrowWriter;
 
-use crate::table::{ROWS_PER_GROUP, properties, required};
+use crate::table::{ROWS_PER_BATCH, properties, required};
 use closecall_scenarios::atomic::{WriteError, write_file};
 
 /// The wall time of one sample in one arm.
@@ -40,7 +40,7 @@ pub fn write_timings(path: &Path, timings: impl Iterator<Item = Timing>) -> Resu
     write_file(path, |file| {
         let mut writer = ArrowWriter::try_new(file, schema.clone(), Some(properties())).map_err(io::Error::other)?;
         loop {
-            let group: Vec<Timing> = timings.by_ref().take(ROWS_PER_GROUP).collect();
+            let group: Vec<Timing> = timings.by_ref().take(ROWS_PER_BATCH).collect();
             if group.is_empty() {
                 break;
             }

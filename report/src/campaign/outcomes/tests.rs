@@ -9,6 +9,7 @@ use closecall_traffic::{Absent, ActorId, Time};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
 use super::*;
+use crate::table::ROWS_PER_GROUP;
 use closecall_simulation::outcome::{ClosedBy, EndReason, Margins, Phase};
 
 fn parameters(rear_class: &str) -> Parameters {

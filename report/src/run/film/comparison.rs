@@ -92,6 +92,7 @@ impl EncounterComparison {
         if let Some(warning) = self.never_crosses() {
             let _ = writeln!(page, "- **{arm}:** {warning}");
         }
+        page.extend(simulated.system_line());
         let missing_count = encounter.vehicles.len().saturating_sub(simulated.actors.len());
         let missing_text = match missing_count {
             0 => String::new(),
@@ -119,20 +120,16 @@ const ROWS: [Row; 6] = [
 ];
 
 impl EncounterMetrics {
-    /// Returns the crossing with the headways then, and the hardest braking, as one line.
+    /// Returns the headways at the crossing, as one line.
     fn sentence(&self) -> String {
         let text = |value: Measured| value.map_or("-".to_owned(), headway_text);
-        let crossing = match self.crossing_s {
+        match self.crossing_s {
             Ok(crossing_s) => {
-                let headways = [self.thw_front_at_crossing_s, self.thw_rear_at_crossing_s].map(text);
-                format!(
-                    "headway front {}, rear {} as R crosses the marking at {crossing_s:.2} s",
-                    headways[0], headways[1]
-                )
+                let [front, rear] = [self.thw_front_at_crossing_s, self.thw_rear_at_crossing_s].map(text);
+                format!("front {front}, rear {rear} as R crosses at {crossing_s:.2} s")
             }
             Err(_) => "R never crosses the marking".to_owned(),
-        };
-        format!("{crossing}; braking up to {:.2} m/s²", self.max_deceleration_mps2)
+        }
     }
 
     /// Evaluates a film up to `crossing`, the time at which the rear vehicle crosses the marking, if it does.

@@ -72,6 +72,12 @@ impl Film {
         Some(format!("{collision}; smallest headway: {headways}"))
     }
 
+    /// Returns what the system did, and since when it saw the vehicle behind, as a line of a list.
+    pub(in crate::run) fn system_line(&self) -> Option<String> {
+        let sight = self.sight().map_or(String::new(), |sight| format!(" {sight}"));
+        Some(format!("- {}{sight}\n", self.mis_summary()?))
+    }
+
     /// Returns the weather and light, or `None` on a clear, dry day.
     pub(in crate::run) fn weather(&self) -> Option<String> {
         let weather = &self.environment;

@@ -36,8 +36,8 @@ pub(super) const SIGHT: Rgba = [40, 160, 190, 255];
 pub(super) const EVENT: Rgba = [214, 150, 30, 255];
 /// The ground beside the road in the view from above. It is dark in both themes of the viewer, so that labels are legible.
 pub(super) const GROUND: Rgba = [24, 27, 31, 255];
-/// Fog, as the scene shows it.
-const FOG: Rgba = [196, 200, 204, 255];
+/// Fog, as the scene shows it. It is darker than by day, so that labels are legible.
+const FOG: Rgba = [118, 122, 128, 255];
 /// Text beside the road.
 pub(super) const NOTE: Rgba = [222, 226, 230, 255];
 
@@ -89,7 +89,7 @@ pub(super) fn with_opacity([red, green, blue, _]: Rgba, opacity: u8) -> Rgba {
 /// Returns a paler shade of a colour, for text. The viewer puts text on a box that is dark in its dark theme, and grey in
 /// its light theme.
 pub(super) fn text([red, green, blue, opacity]: Rgba) -> Rgba {
-    let paler = |channel: u8| 255 - (u16::from(255 - channel) * 9 / 20) as u8;
+    let paler = |channel: u8| 255 - (u16::from(255 - channel) * 3 / 10) as u8;
     [paler(red), paler(green), paler(blue), opacity]
 }
 

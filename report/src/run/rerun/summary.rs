@@ -46,7 +46,7 @@ fn push_pair(page: &mut String, films: [&Film; 2], fate: PairFate) {
         }
     }
     let [_, tested] = films;
-    push_system(page, tested);
+    page.extend(tested.system_line());
     let conditions = conditions(tested);
     if let Some(outcome) = &tested.outcome {
         let _ =
@@ -68,7 +68,7 @@ fn push_single(page: &mut String, film: &Film, is_reenactment: bool) {
         let _ = write!(page, "### {word}\n\n");
     }
     match film.result() {
-        // The comparison has it.
+        // The comparison has it, and what the system did.
         Some(_) if is_reenactment => {}
         Some(result) => {
             let _ = writeln!(page, "- **{}:** {result}", film.arm_label());
@@ -81,18 +81,13 @@ fn push_single(page: &mut String, film: &Film, is_reenactment: bool) {
             }
         }
     }
-    push_system(page, film);
+    if !is_reenactment {
+        page.extend(film.system_line());
+    }
     if let Some(outcome) = &film.outcome {
         let (seed, sample, conditions) = (outcome.seed, outcome.sample, conditions(film));
         let _ = writeln!(page, "- {} · seed {seed} · sample {sample}{conditions}", outcome.scenario);
     }
-}
-
-/// Appends what the system did, and since when it saw the vehicle behind.
-fn push_system(page: &mut String, film: &Film) {
-    let Some(summary) = film.mis_summary() else { return };
-    let sight = film.sight().map_or(String::new(), |sight| format!(" {sight}"));
-    let _ = writeln!(page, "- {summary}{sight}");
 }
 
 /// Returns the weather and the settings of the command line.
