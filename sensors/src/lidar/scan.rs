@@ -3,6 +3,7 @@
 use closecall_traffic::Time;
 
 use super::Material;
+use super::kind::Resolution;
 
 /// The side of the two-sided mirror that deflects the beams of a scan.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -29,6 +30,8 @@ pub struct LidarScan {
     pub mirror_side: MirrorSide,
     /// Longitudinal position of the sensor in the ego's frame (m): negative, because it is in the rear bumper.
     pub sensor_x_m: f32,
+    /// Columns and layers of the pattern.
+    pub(crate) resolution: Resolution,
     /// Longitudinal position of each point (m), negative behind the ego's origin.
     pub x_m: Vec<f32>,
     /// Lateral position of each point (m), positive to the left.
@@ -40,7 +43,7 @@ pub struct LidarScan {
     pub intensity: Vec<f32>,
     /// Time of measurement of each point after `start` (ns).
     pub offset_ns: Vec<u32>,
-    /// Beam of each point, as column · 16 + layer.
+    /// Beam of each point, as column · layers + layer.
     pub beam: Vec<u16>,
 }
 
