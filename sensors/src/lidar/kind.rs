@@ -19,7 +19,9 @@ use super::pattern::GROUPS;
 use super::power::{NOMINAL_REFLECTIVITY, THRESHOLD_OVER_NOISE};
 
 /// Greatest number of layers.
-pub(crate) const MAX_LAYERS: usize = 64;
+const MAX_LAYERS: usize = 64;
+/// Greatest elevation of a layer (°).
+const MAX_ELEVATION_DEG: f64 = 45.0;
 /// Greatest number of beams in a scan: beams are numbered with 16 bits.
 const MAX_BEAMS: usize = 65_535;
 /// Greatest difference from a whole number of azimuth steps (steps).
@@ -239,9 +241,6 @@ impl LidarKindConfig {
         Ok(range_m * (power * (NOMINAL_REFLECTIVITY / reflectivity)).sqrt())
     }
 }
-
-/// Greatest elevation of a layer (°).
-const MAX_ELEVATION_DEG: f64 = 45.0;
 
 fn number(value: f64, key: &str, range: Range) -> Result<f64, ConfigError> {
     Parameters::default().number(&Num::Fixed(value), key, range)

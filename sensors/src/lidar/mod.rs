@@ -53,7 +53,7 @@ pub(crate) use pattern::HALF_FIELD_DEG;
 pub use pattern::Pattern;
 pub(crate) use power::extinction_per_m;
 pub use rear::RearLidar;
-pub use scan::{LidarScan, MirrorSide, PointSource, PointTruth, ScanTruth};
+pub use scan::{LidarScan, MirrorSide, PointBeam, PointSource, PointTruth, ScanTruth};
 pub use scanner::Scanner;
 pub use segmentation::SegmentationReport;
 #[cfg(test)]

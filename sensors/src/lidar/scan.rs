@@ -86,6 +86,35 @@ pub enum PointSource {
     False,
 }
 
+impl PointSource {
+    /// Returns the name of the kind of object.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Actor(_) => "actor",
+            Self::Ground => "ground",
+            Self::GuardRail => "guard-rail",
+            Self::Spray => "spray",
+            Self::Fog => "fog",
+            Self::False => "false",
+        }
+    }
+}
+
+/// The beam of a point, and what the sensor measured along it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointBeam {
+    /// Index of the column, in the order of the sweep.
+    pub column: u16,
+    /// Index of the layer, from the lowest.
+    pub layer: u16,
+    /// Azimuth of the beam's centre about the sensor's vertical axis, from its viewing axis, counter-clockwise seen from above (rad).
+    pub azimuth_rad: f64,
+    /// Elevation of the beam's centre (rad).
+    pub elevation_rad: f64,
+    /// Measured range (m).
+    pub range_m: f32,
+}
+
 /// The ground truth of one point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointTruth {

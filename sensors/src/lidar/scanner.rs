@@ -22,7 +22,7 @@ use super::solid::Solid;
 use super::spoil::Spoiler;
 use super::targets::{Beams, Surface, Targets};
 use super::viewpoint::{Viewpoint, plane_from_body};
-use super::{LaneGeometry, Lidar, LidarScan, Material, MirrorSide, PointSource, ScanTruth};
+use super::{LaneGeometry, Lidar, LidarScan, Material, MirrorSide, PointBeam, PointSource, ScanTruth};
 use crate::faults::LidarFault;
 use crate::{Scene, SceneVehicle};
 
@@ -96,6 +96,33 @@ impl Scanner {
     /// Returns the ground truth of the latest scan.
     pub fn truth(&self) -> &ScanTruth {
         &self.truth
+    }
+
+    /// Returns the beam of a point of the latest scan, and the range that was measured along it.
+    pub(crate) fn point_beam(&self, point: usize) -> PointBeam {
+        let (beam, layers) = (self.scan.beam[point], self.scan.resolution.layers);
+        let (azimuth_rad, elevation_rad) = self.pattern.direction_rad(self.scan.mirror_side, beam);
+        #[expect(clippy::cast_possible_truncation, reason = "a part of a number of 16 bits")]
+        let [column, layer] = [usize::from(beam) / layers, usize::from(beam) % layers].map(|index| index as u16);
+        PointBeam { column, layer, azimuth_rad, elevation_rad, range_m: self.range_m(point) }
+    }
+
+    /// Returns the range of a point from where the sensor was when it measured the point (m).
+    #[expect(clippy::cast_possible_truncation, reason = "points are in single precision")]
+    fn range_m(&self, point: usize) -> f32 {
+        let scan = &self.scan;
+        let at_m = [scan.x_m[point], scan.y_m[point], scan.z_m[point]].map(f64::from);
+        let Some(sweep) = &self.latest else { return at_m.iter().map(|axis| axis * axis).sum::<f64>().sqrt() as f32 };
+        let to = sweep.viewpoint.deskew(self.sweep_s() - f64::from(scan.offset_ns[point]) * 1e-9);
+        let (x_m, y_m) = (at_m[0] - to.x_m, at_m[1] - to.y_m);
+        let (ahead_m, left_m) = (to.cos * x_m + to.sin * y_m, to.cos * y_m - to.sin * x_m);
+        let up_m = at_m[2] - f64::from(sweep.pose.sensor_z_m());
+        (ahead_m - f64::from(sweep.pose.sensor_x_m())).hypot(left_m).hypot(up_m) as f32
+    }
+
+    /// Returns true if the sensor has a mirror with two sides.
+    pub(crate) fn has_mirror_sides(&self) -> bool {
+        self.pattern.kind().mirror_cubic_deg.is_some()
     }
 
     /// Returns the mirror side of the scan that ends at `time`. The sides alternate from scan to scan.
