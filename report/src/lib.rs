@@ -1,7 +1,7 @@
 //! The output files of a run and of a campaign: pictures and recordings to view, tables to evaluate, and reports that a
 //! CI gate reads.
 //!
-//! * [`run`](mod@run): output of one run, or of a pair of runs: Rerun recording, static figure, trace
+//! * [`run`](mod@run): output of one run, or of a pair of runs: Rerun recording, static figure
 //! * [`campaign`]: output of many runs: HTML page, JUnit, Parquet, Markdown, recordings of selected samples
 //! * [`calibration`]: the result of a calibration, and the member of a driver ensemble that it gives
 //! * [`heartbeat`]: the progress of a long command as lines of text
@@ -10,7 +10,7 @@
 //! * [`study`]: output of sensitivity studies and frontiers: tables, charts and pages
 //! * [`traffic`]: texts and charts of what was found in trajectory data
 //!
-//! This crate is the only one that uses rerun, arrow and plotters.
+//! This crate is the only one that uses rerun and plotters.
 
 pub mod calibration;
 pub mod campaign;
@@ -24,6 +24,7 @@ pub mod heartbeat;
 pub mod json;
 pub mod run;
 pub mod study;
-pub mod table;
 pub mod traffic;
 mod units;
+
+pub use closecall_tables::table;

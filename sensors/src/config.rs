@@ -56,6 +56,9 @@ pub struct SensorsConfig {
     pub rear_object: ObjectSensorConfig,
     /// The rear LiDAR.
     pub rear_lidar: LidarConfig,
+    /// The LiDAR that looks ahead in place of the radar, in mode `full`. Default: none; the radar looks ahead.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub front_lidar: Option<LidarConfig>,
     /// The rear camera, whose network classifies each cluster of the rear LiDAR.
     pub rear_camera: CameraConfig,
     /// The tracker that processes the boxes of the rear LiDAR.
@@ -70,6 +73,7 @@ impl Default for SensorsConfig {
             surround: ObjectSensorConfig::default(),
             rear_object: ObjectSensorConfig::default(),
             rear_lidar: LidarConfig::default(),
+            front_lidar: None,
             rear_camera: CameraConfig::default(),
             tracker: TrackerConfig::default(),
         }
@@ -97,6 +101,10 @@ impl Check for SensorsConfig {
                 front_radar: self.front_radar.check_front_radar(parameters).map_err(within("front-radar"))?,
                 surround: self.surround.check_surround(parameters).map_err(within("surround"))?,
                 rear_lidar: self.rear_lidar.check(parameters).map_err(within("rear-lidar"))?,
+                front_lidar: match &self.front_lidar {
+                    Some(lidar) => Some(lidar.check(parameters).map_err(within("front-lidar"))?),
+                    None => None,
+                },
                 tracker: self.tracker.check(parameters).map_err(within("tracker"))?,
             },
             camera: self.rear_camera.check(parameters).map_err(within("rear-camera"))?,
@@ -131,9 +139,10 @@ impl Sensors {
     /// Returns the same sensors with stages that are replaced by the truth, or made worse.
     #[must_use]
     pub fn altered(self, altered: Alterations) -> Self {
-        let FullModel { front_radar, surround, rear_lidar, tracker } = self.full;
+        let FullModel { front_radar, front_lidar, surround, rear_lidar, tracker } = self.full;
         let full = FullModel {
             front_radar: front_radar.altered(&altered, false),
+            front_lidar,
             surround: surround.altered(&altered, false),
             rear_lidar: if altered.has_true_points { rear_lidar.exact() } else { rear_lidar },
             tracker: tracker
@@ -180,7 +189,11 @@ impl Sensors {
             SensorMode::Object => self.rear_object.latency_steps(),
             SensorMode::GroundTruth => return [0; 3],
         };
-        [self.full.front_radar.latency_steps(), self.full.surround.latency_steps(), rear]
+        let front = match (self.mode, self.full.front_lidar) {
+            (SensorMode::Full, Some(_)) => rear,
+            _ => self.full.front_radar.latency_steps(),
+        };
+        [front, self.full.surround.latency_steps(), rear]
     }
 
     /// Builds the perception of one run, whose random streams are keyed by `key`.

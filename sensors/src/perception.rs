@@ -55,6 +55,18 @@ pub trait Perception: Send {
         None
     }
 
+    /// Returns the LiDAR that looks ahead with its latest points and boxes, for display. They are in the frame of an ego that is
+    /// turned by half a turn: x and y have the opposite sign. Returns `None` if no such LiDAR is simulated.
+    fn front_lidar(&self) -> Option<&RearLidar> {
+        None
+    }
+
+    /// Returns the boxes found in the latest scan of the LiDAR that looks ahead, in its frame. Returns an empty slice if no such
+    /// LiDAR is simulated.
+    fn front_detections(&self) -> &[Detection] {
+        &[]
+    }
+
     /// Returns the boxes found in the latest scan of the rear LiDAR, with the camera's class scores if the camera is
     /// simulated. Returns an empty slice if the LiDAR is not simulated.
     fn rear_detections(&self) -> &[Detection] {

@@ -72,8 +72,8 @@ pub(super) struct ReenactArgs {
 
 pub(super) fn reenact(args: &ReenactArgs) -> Result<ExitCode, CliError> {
     let inputs = [of_trajectories(std::slice::from_ref(&args.file)), args.sim.arm.files()].concat();
-    let [record, trace] = args.watch.outputs();
-    protect(&inputs, &[("--output", args.output.as_deref()), record, trace])?;
+    let outputs = [&[("--output", args.output.as_deref())], args.watch.outputs().as_slice()].concat();
+    protect(&inputs, &outputs)?;
     let found = chosen(&args.file, &args.read, args.track)?;
     let source = format!("{} (track {})", args.file.display(), found.change.track_id);
     let file = scenario_of(&found, args.rear.into(), (Path::new(&source), &args.sim.set.settings))?;

@@ -8,10 +8,10 @@ use closecall_campaign::runner::run_guarded;
 use closecall_report::run::film::{Film, FilmRecorder, Level};
 use closecall_report::run::observers::RunObservers;
 use closecall_report::run::rerun::{check_recording_possible, write_recording_unchecked};
-use closecall_report::run::trace::TraceWriter;
 use closecall_simulation::outcome::Outcome;
 use closecall_simulation::scenario::{Scenario, Setting};
 use closecall_simulation::{Arm, RunKey};
+use closecall_tables::RunTables;
 
 use super::CliError;
 use super::backend::check_backend_of;
@@ -53,12 +53,15 @@ pub(super) struct WatchArgs {
     /// under test
     #[arg(long, value_name = "FILE.csv|FILE.parquet", value_parser = table)]
     pub(super) trace: Option<PathBuf>,
+    /// Write every return of the LiDARs as a table, of the same run: beam, range, position, intensity, time, box and truth
+    #[arg(long, value_name = "FILE.parquet")]
+    pub(super) scans: Option<PathBuf>,
 }
 
 impl WatchArgs {
     /// Returns the files to write.
-    pub(super) fn outputs(&self) -> [Output<'_>; 2] {
-        [("--record", self.record.as_deref()), ("--trace", self.trace.as_deref())]
+    pub(super) fn outputs(&self) -> [Output<'_>; 3] {
+        [("--record", self.record.as_deref()), ("--trace", self.trace.as_deref()), ("--scans", self.scans.as_deref())]
     }
 }
 
@@ -74,11 +77,11 @@ pub(super) fn run_watched(
         let named = |film: Film| film.with_settings(settings.iter().map(ToString::to_string));
         write_recording_unchecked(path, &films.into_iter().map(named).collect::<Vec<_>>())?;
     }
-    [&watch.record, &watch.trace].into_iter().flatten().for_each(|path| print_written(path));
+    watch.outputs().into_iter().filter_map(|(_, path)| path).for_each(print_written);
     Ok(outcomes)
 }
 
-/// Runs a sample in one arm, writes the requested trace, and returns a film of the run. The caller saves the recording.
+/// Runs a sample in one arm, writes the requested tables, and returns a film of the run. The caller saves the recording.
 pub(super) fn run_filmed(
     scenario: &Scenario,
     key: RunKey,
@@ -89,7 +92,7 @@ pub(super) fn run_filmed(
     Ok((outcomes.swap_remove(0), films.swap_remove(0)))
 }
 
-/// Runs a sample in each arm, and writes the requested trace. Returns the films if there are to be any.
+/// Runs a sample in each arm, and writes the requested tables. Returns the films if there are to be any.
 fn run(
     scenario: &Scenario,
     key: RunKey,
@@ -98,17 +101,17 @@ fn run(
 ) -> Result<(Vec<Outcome>, Vec<Film>), CliError> {
     watch.record.as_deref().map(check_recording_possible).transpose()?;
     check_backend_of(scenario, arms)?;
-    let mut trace = watch.trace.as_deref().map(TraceWriter::new).transpose()?;
+    let mut tables = RunTables::new(watch.trace.as_deref(), watch.scans.as_deref())?;
     let (mut films, mut outcomes) = (Vec::new(), Vec::new());
     for (index, arm) in arms.iter().enumerate() {
         let is_tested = index + 1 == arms.len();
         let mut recorder = is_filmed.then(|| FilmRecorder::new(scenario, key, arm, watch.record_level.into()));
-        let mut observers = RunObservers { recorder: recorder.as_mut(), trace: trace.as_mut().filter(|_| is_tested) };
+        let mut observers = RunObservers { recorder: recorder.as_mut(), tables: is_tested.then_some(&mut tables) };
         let outcome = run_guarded(scenario, key, arm, &mut observers)
             .map_err(|source| CliError::Sample { sample: key.sample, source })?;
         films.extend(recorder.map(|recorder| recorder.finish(&outcome)));
         outcomes.push(outcome);
     }
-    trace.map(TraceWriter::finish).transpose()?;
+    tables.finish()?;
     Ok((outcomes, films))
 }

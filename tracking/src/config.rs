@@ -49,6 +49,20 @@ impl TrackerModel {
         self.latency_steps as usize
     }
 
+    /// Returns the same tracker for a sensor that scans once in `period_s`, in place of once in a control step: it coasts for the
+    /// same time.
+    #[must_use]
+    pub fn with_scan_period_s(self, period_s: f64) -> Self {
+        let coast_s = f64::from(self.rules.delete_after_misses - 1) * CONTROL_STEP.s();
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "0 to 10 s, at most 25 scans per second"
+        )]
+        let delete_after_misses = (coast_s / period_s).round() as u32 + 1;
+        Self { rules: LifecycleRules { delete_after_misses, ..self.rules }, ..self }
+    }
+
     /// Returns the same tracker with a latency of `steps` control steps, at most [`MAX_LATENCY_STEPS`].
     #[must_use]
     pub fn with_latency_steps(self, steps: usize) -> Self {

@@ -1,7 +1,6 @@
 //! The course of the road behind the ego, as the ego knows it from a camera and a map.
 
 use closecall_traffic::Scene;
-use closecall_traffic::guard_rail::{LEFT_OFFSET_M, RIGHT_OFFSET_M};
 
 /// Half the width of the region of interest about the ego's path (m): two lanes to each side.
 const HALF_WIDTH_M: f64 = 9.5;
@@ -28,6 +27,7 @@ impl LaneGeometry {
     pub fn from_scene(scene: &Scene<'_>) -> Self {
         let state = &scene.ego.state;
         let curvature = scene.road.curvature_per_m();
+        let [left_offset_m, right_offset_m] = scene.road.guard_rail_offsets_m();
         let edges_m = [-state.d_m, scene.road.right_edge_m() - state.d_m];
         Self {
             heading_rad: state.heading_rad,
@@ -36,8 +36,8 @@ impl LaneGeometry {
             edges_m,
             region_m: match scene.road.has_guard_rails() {
                 true => [
-                    (edges_m[0] + LEFT_OFFSET_M - RAIL_MARGIN_M).min(HALF_WIDTH_M),
-                    (edges_m[1] - RIGHT_OFFSET_M + RAIL_MARGIN_M).max(-HALF_WIDTH_M),
+                    (edges_m[0] + left_offset_m - RAIL_MARGIN_M).min(HALF_WIDTH_M),
+                    (edges_m[1] - right_offset_m + RAIL_MARGIN_M).max(-HALF_WIDTH_M),
                 ],
                 false => [HALF_WIDTH_M, -HALF_WIDTH_M],
             },

@@ -15,6 +15,7 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::guard_rail::{LEFT_OFFSET_M, RIGHT_OFFSET_M};
 use crate::{Check, ConfigError, Num, Parameters, Problem, Range};
 
 /// A lateral side: left or right.
@@ -106,6 +107,8 @@ pub struct Road {
     speed_limit_mps: f64,
     overtaking_side: Side,
     guard_rails: bool,
+    /// Whether the road runs against the traffic, so that its left edge is the right edge of the traffic.
+    is_reversed: bool,
 }
 
 impl Check for RoadConfig {
@@ -125,6 +128,7 @@ impl Check for RoadConfig {
             speed_limit_mps: number(&self.speed_limit_mps, "speed-limit-mps", Range::above(0.0, 100.0))?,
             overtaking_side: self.overtaking_side,
             guard_rails: self.guard_rails,
+            is_reversed: false,
         })
     }
 }
@@ -140,6 +144,7 @@ impl Road {
             speed_limit_mps: 36.1,
             overtaking_side: Side::Left,
             guard_rails: false,
+            is_reversed: false,
         }
     }
 
@@ -155,6 +160,34 @@ impl Road {
     pub fn mirrored(self) -> Option<Self> {
         let overtaking_side = self.overtaking_side.opposite();
         (self.curvature_per_m == 0.0).then_some(Self { overtaking_side, ..self })
+    }
+
+    /// Returns the same road in the opposite direction: s runs against the traffic, and d = 0 is the right edge of the traffic.
+    #[must_use]
+    pub fn reversed(self) -> Self {
+        // The former right edge has another curvature than the left edge, and bends to the other side if passed the other way.
+        let curvature_per_m = -self.curvature_per_m / (1.0 - self.curvature_per_m * self.right_edge_m());
+        let overtaking_side = self.overtaking_side.opposite();
+        Self { curvature_per_m, overtaking_side, is_reversed: !self.is_reversed, ..self }
+    }
+
+    /// Returns the position (s, d) (m) on the [`reversed`](Self::reversed) road of the point (`s_m`, `d_m`) of this road.
+    pub fn reversed_position_m(&self, s_m: f64, d_m: f64) -> (f64, f64) {
+        let right_edge_m = self.right_edge_m();
+        (-s_m * (1.0 - self.curvature_per_m * right_edge_m), right_edge_m - d_m)
+    }
+
+    /// Returns true if the road runs against the traffic.
+    pub fn is_reversed(&self) -> bool {
+        self.is_reversed
+    }
+
+    /// Returns the distances of the faces of the guard rails from the left and from the right edge of the road (m).
+    pub fn guard_rail_offsets_m(&self) -> [f64; 2] {
+        match self.is_reversed {
+            false => [LEFT_OFFSET_M, RIGHT_OFFSET_M],
+            true => [RIGHT_OFFSET_M, LEFT_OFFSET_M],
+        }
     }
 
     /// Returns the number of lanes.

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!  simulation ─▶ FilmRecorder ─▶ Film ─▶ rerun (to view) │ figure (to print)
-//!             ├▶ TraceWriter ─▶ CSV or Parquet (to evaluate)
+//!             ├▶ crate `tables` ─▶ CSV or Parquet (to evaluate)
 //!             └▶ Outcome ─▶ text
 //! ```
 
@@ -11,4 +11,3 @@ pub mod film;
 pub mod observers;
 pub mod rerun;
 pub mod text;
-pub mod trace;

@@ -1,17 +1,17 @@
 //! The observers of a run whose output is requested.
 
 use closecall_simulation::{Observer, RunEvent, StepView};
+use closecall_tables::RunTables;
 use closecall_traffic::Time;
 
 use super::film::FilmRecorder;
-use super::trace::TraceWriter;
 
-/// A recorder and a trace that observe the same run, each only if it is requested.
+/// A recorder and tables that observe the same run, each only if it is requested.
 pub struct RunObservers<'a> {
     /// The recorder of the film.
     pub recorder: Option<&'a mut FilmRecorder>,
-    /// The writer of the trace.
-    pub trace: Option<&'a mut TraceWriter>,
+    /// The writer of the tables.
+    pub tables: Option<&'a mut RunTables>,
 }
 
 impl Observer for RunObservers<'_> {
@@ -19,8 +19,8 @@ impl Observer for RunObservers<'_> {
         if let Some(recorder) = &mut self.recorder {
             recorder.step(view);
         }
-        if let Some(trace) = &mut self.trace {
-            trace.step(view);
+        if let Some(tables) = &mut self.tables {
+            tables.step(view);
         }
     }
 
@@ -28,8 +28,8 @@ impl Observer for RunObservers<'_> {
         if let Some(recorder) = &mut self.recorder {
             recorder.event(time, what);
         }
-        if let Some(trace) = &mut self.trace {
-            trace.event(time, what);
+        if let Some(tables) = &mut self.tables {
+            tables.event(time, what);
         }
     }
 }

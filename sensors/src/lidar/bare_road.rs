@@ -18,8 +18,8 @@
 use super::cast::{ColumnHits, SubRays};
 use super::ground::{GROUND_M, GROUND_REACH_M, GROUND_SLOPE};
 use super::noise::MAX_NORMAL;
-use super::pattern::{CentreLines, Column, Elevation, LAYERS_PER_GROUP, ROAD_LAYERS};
-use super::power::{LinkBudget, MIN_POWER, range_sd_m};
+use super::pattern::{CentreLines, Column, Elevation, ROAD_LAYERS};
+use super::power::{LinkBudget, MIN_POWER};
 use super::receiver::SensorPoseEstimate;
 use super::targets::{FaceRange, Targets};
 
@@ -53,7 +53,7 @@ impl BareRoad {
         pose: SensorPoseEstimate,
         max_shift_m: f32,
     ) -> Option<Self> {
-        let max_error_m = MAX_NORMAL * range_sd_m(1.0);
+        let max_error_m = MAX_NORMAL * link.range_sd_m(1.0);
         let farthest_m = (POWER_MARGIN * link.gain_m2 * targets.faces[0].strength_m / MIN_POWER).cbrt();
         let is_near = farthest_m + max_error_m + max_shift_m + MARGIN_M < GROUND_REACH_M;
         is_near.then_some(Self { pose, max_error_m, max_shift_m })
@@ -134,7 +134,7 @@ pub(crate) fn cast_ground(
     hits: &mut ColumnHits,
 ) {
     for (layer, elevation) in elevations.iter().enumerate() {
-        let group = layer / LAYERS_PER_GROUP;
+        let group = elevation.group;
         // The lowest sub-ray hits the road at the shortest distance and at the steepest angle.
         let per_distance = road.per_distance(column.centre[group], elevation.tan[0]);
         if !road.is_detectable(per_distance) {

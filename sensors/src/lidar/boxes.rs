@@ -12,17 +12,10 @@
 //! enough of a side is seen, the heading is refined about that direction by the closeness criterion of L-shape fitting
 //! (Zhang, Xu, Dong and Dolan 2017, "Efficient L-shape fitting for vehicle detection using laser scanners").
 
-use super::{COLUMNS, LAYERS, LaneGeometry, LidarScan};
+use super::kind::Resolution;
+use super::{LaneGeometry, LidarScan};
 
-/// Azimuth step within 15° of the sensor's axis (rad).
-const FINE_STEP_RAD: f64 = 0.125 * DEGREE;
-/// Azimuth step outside of that field (rad).
-const COARSE_STEP_RAD: f64 = 0.25 * DEGREE;
-/// Azimuth at which the fine steps end (rad).
-const FINE_FIELD_RAD: f64 = 15.0 * DEGREE;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
-/// Spacing of layers (rad), taken as the height of a footprint.
-const LAYER_STEP_RAD: f64 = 0.6 * DEGREE;
 /// Number of columns at either end of the field of view. A cluster with a point in one of them may extend beyond the
 /// field of view.
 const EDGE_COLUMNS: usize = 4;
@@ -75,6 +68,8 @@ pub(crate) struct BoxFit {
     pub(crate) range_m: f64,
     /// Spacing of columns at that distance, across the line of sight (m).
     pub(crate) spacing_m: f64,
+    /// Spacing of layers (rad).
+    pub(crate) layer_rad: f64,
     /// Least and greatest azimuth of the points about the sensor's axis, positive to the ego's left (rad).
     pub(crate) azimuth_rad: [f64; 2],
     /// Whether the right and the left edge of the cluster are truncated by the field of view.
@@ -121,7 +116,8 @@ impl BoxFit {
         fit.azimuth_rad = slopes.map(f64::atan);
         fit.rear_u_m = far;
         fit.range_m = squares.sqrt();
-        fit.spacing_m = fit.range_m * column_step_rad(0.5 * (fit.azimuth_rad[0] + fit.azimuth_rad[1]));
+        fit.spacing_m =
+            fit.range_m * column_step_rad(&scan.resolution, 0.5 * (fit.azimuth_rad[0] + fit.azimuth_rad[1]));
         fit.locate_front(nearest.value(), [sin, cos], members, scan);
         fit
     }
@@ -143,6 +139,7 @@ impl BoxFit {
             offset_ns: offsets.sum::<f64>() / members.len() as f64,
             range_m: 0.0,
             spacing_m: 0.0,
+            layer_rad: scan.resolution.layer_rad,
             azimuth_rad: [0.0; 2],
             truncated: truncated_edges(members, scan),
         }
@@ -178,7 +175,7 @@ impl BoxFit {
 
     /// Returns the spacing of layers at this distance (m).
     pub(crate) fn layer_m(&self) -> f64 {
-        self.range_m * LAYER_STEP_RAD
+        self.range_m * self.layer_rad
     }
 
     /// Returns true if the field of view truncates the cluster.
@@ -190,9 +187,10 @@ impl BoxFit {
 /// Returns whether any point comes from the outermost columns on the ego's right, and on its left. The sweep begins on
 /// the left.
 fn truncated_edges(members: &[u32], scan: &LidarScan) -> [bool; 2] {
-    let columns = members.iter().map(|&member| usize::from(scan.beam[member as usize]) / LAYERS);
-    let (first, last) = columns.fold((COLUMNS, 0), |(first, last), column| (first.min(column), last.max(column)));
-    [last >= COLUMNS - EDGE_COLUMNS, first < EDGE_COLUMNS]
+    let Resolution { columns: count, layers, .. } = scan.resolution;
+    let columns = members.iter().map(|&member| usize::from(scan.beam[member as usize]) / layers);
+    let (first, last) = columns.fold((count, 0), |(first, last), column| (first.min(column), last.max(column)));
+    [last + EDGE_COLUMNS >= count, first < EDGE_COLUMNS]
 }
 
 /// The largest of the inserted values, which yield a quantile near the maximum.
@@ -262,8 +260,9 @@ fn refined_heading_rad(road_rad: f64, members: &[u32], scan: &LidarScan) -> f64 
 }
 
 /// Returns the spacing of columns at an azimuth about the sensor's axis (rad).
-fn column_step_rad(azimuth_rad: f64) -> f64 {
-    if azimuth_rad.abs() < FINE_FIELD_RAD { FINE_STEP_RAD } else { COARSE_STEP_RAD }
+fn column_step_rad(resolution: &Resolution, azimuth_rad: f64) -> f64 {
+    let [fine_field_rad, fine_step_rad] = resolution.fine_rad;
+    if azimuth_rad.abs() < fine_field_rad { fine_step_rad } else { resolution.step_rad }
 }
 
 fn point(scan: &LidarScan, member: u32) -> [f64; 3] {

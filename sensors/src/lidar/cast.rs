@@ -7,7 +7,7 @@
 //! The columns and layers that can hit a solid follow from its bounds, and only these are tried. `by_brute_force` tries
 //! all of them, and a property test requires the same result to the bit.
 
-use super::pattern::{Column, Elevation, LAYERS, LAYERS_PER_GROUP, SUBRAY_COLUMNS, SUBRAY_ROWS, SUBRAYS};
+use super::pattern::{Column, Elevation, SUBRAY_COLUMNS, SUBRAY_ROWS, SUBRAYS};
 use super::targets::{FaceRange, Part, Targets};
 
 /// The face index of a sub-ray that hits nothing.
@@ -27,33 +27,30 @@ impl BeamHits {
 }
 
 /// The first hits of the beams of a column.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct ColumnHits {
     /// First hits of the beam of each layer.
-    pub(crate) beams: [BeamHits; LAYERS],
+    pub(crate) beams: Vec<BeamHits>,
     /// Bit mask of the layers that were tested against at least one solid.
-    pub(crate) tested: u16,
+    pub(crate) tested: u64,
     /// Number of layers, counted from the lowest, that may receive a return from the road.
     pub(crate) ground_below: usize,
     /// Bit mask of those layers whose returns from the bare road are left out.
-    pub(crate) bare: u16,
-}
-
-impl Default for ColumnHits {
-    fn default() -> Self {
-        Self { beams: [BeamHits::NONE; LAYERS], tested: 0, ground_below: 0, bare: 0 }
-    }
+    pub(crate) bare: u64,
 }
 
 impl ColumnHits {
+    /// Returns the hits of a column with this number of layers, before the first cast.
+    pub(crate) fn new(layers: usize) -> Self {
+        Self { beams: vec![BeamHits::NONE; layers], ..Self::default() }
+    }
+
     /// Resets the hits for the next column.
     pub(crate) fn clear(&mut self) {
-        for layer in 0..LAYERS {
-            if self.is_tested(layer) {
-                self.beams[layer] = BeamHits::NONE;
-            }
+        while self.tested != 0 {
+            self.beams[self.tested.trailing_zeros() as usize] = BeamHits::NONE;
+            self.tested &= self.tested - 1;
         }
-        self.tested = 0;
         self.ground_below = 0;
         self.bare = 0;
     }
@@ -76,7 +73,7 @@ impl ColumnHits {
     /// Intersects the beams of a column with a solid.
     pub(crate) fn cast(&mut self, column: &Column, elevations: &[Elevation], part: &Part, targets: &Targets) {
         for layer in part.layers.clone() {
-            let group = layer / LAYERS_PER_GROUP;
+            let group = elevations[layer].group;
             let subrays = SubRays { cos: column.cos[group], sin: column.sin[group], tan: elevations[layer].tan };
             self.intersect(layer, &subrays, part.faces, targets);
         }
@@ -185,9 +182,9 @@ impl ActiveParts {
 /// Returns the hits of a column, with every beam tested against every solid regardless of its bounds.
 #[cfg(test)]
 pub(crate) fn by_brute_force(column: &Column, elevations: &[Elevation], targets: &Targets) -> ColumnHits {
-    let mut hits = ColumnHits::default();
+    let mut hits = ColumnHits::new(elevations.len());
     for part in &targets.parts {
-        hits.cast(column, elevations, &Part { columns: 0..usize::MAX, layers: 0..LAYERS, ..*part }, targets);
+        hits.cast(column, elevations, &Part { columns: 0..usize::MAX, layers: 0..elevations.len(), ..*part }, targets);
     }
     hits
 }

@@ -1,18 +1,11 @@
 //! The rear LiDAR's configuration: the text of a scenario file, and the checked value that it becomes.
 
-use closecall_traffic::{Check, Choice, ConfigError, Num, Parameters, Range};
+use closecall_traffic::{Check, Choice, ConfigError, Num, Parameters, Problem, Range};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::{LidarKind, LidarKindConfig, LidarModel};
 use crate::faults::LidarFault;
-
-/// A LiDAR model that can be simulated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-pub enum LidarModel {
-    /// The second generation of the Valeo SCALA.
-    #[serde(rename = "scala-2")]
-    Scala2,
-}
 
 /// The state of the registration plates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -47,15 +40,23 @@ impl Plates {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct LidarConfig {
-    /// Model of the LiDAR.
+    /// Model of the LiDAR, whose pattern and range ship with Closecall; `pattern-file` replaces them.
     pub model: Choice<LidarModel>,
+    /// File with the pattern and the range of another LiDAR, relative to the scenario file. Its contents become `pattern` when the
+    /// scenario is read. Default: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pattern_file: Option<String>,
+    /// Pattern and range of another LiDAR, with the keys of its file. Default: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pattern: Option<LidarKindConfig>,
     /// Height of the sensor's centre above the ground (m).
     pub mount_height_m: Num,
     /// Upward tilt of the sensor's axis relative to the ego's body (rad).
     pub tilt_rad: Num,
     /// Nominal range (m): the range at which a target of 50 % reflectivity that fills the beam is detected with
-    /// probability 0.5, in air that does not attenuate.
-    pub nominal_range_m: Num,
+    /// probability 0.5, in air that does not attenuate. Default: that of the LiDAR's pattern; 200 for `scala-2`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nominal_range_m: Option<Num>,
     /// Share of returns (0 to 1) that are lost regardless of their power.
     pub dropout: Num,
     /// Standard deviation of the error of the pitch angle that the ego uses to level its points (rad).
@@ -74,9 +75,11 @@ impl Default for LidarConfig {
     fn default() -> Self {
         Self {
             model: Choice::Fixed(LidarModel::Scala2),
+            pattern_file: None,
+            pattern: None,
             mount_height_m: Num::Fixed(0.6),
             tilt_rad: Num::Fixed(0.0),
-            nominal_range_m: Num::Fixed(200.0),
+            nominal_range_m: None,
             dropout: Num::Fixed(0.01),
             levelling_sd_rad: Num::Fixed(0.0005),
             window_transmission: Num::Fixed(1.0),
@@ -88,7 +91,8 @@ impl Default for LidarConfig {
 /// A checked rear LiDAR configuration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lidar {
-    pub(crate) model: LidarModel,
+    /// Scan pattern and range.
+    pub(crate) kind: &'static LidarKind,
     pub(crate) mount_height_m: f64,
     pub(crate) tilt_rad: f64,
     pub(crate) nominal_range_m: f64,
@@ -126,16 +130,34 @@ impl Lidar {
     }
 }
 
+impl LidarConfig {
+    /// Returns the scan pattern and the range.
+    fn kind(&self, parameters: &Parameters) -> Result<&'static LidarKind, ConfigError> {
+        let model = parameters.word(&self.model, "model")?;
+        if self.pattern_file.is_some() {
+            let needed =
+                "the contents of the file that `pattern-file` names, which a scenario that is read from a file has";
+            return Err(ConfigError::new("pattern", Problem::Missing { needed }));
+        }
+        match &self.pattern {
+            Some(pattern) => pattern.kind().map_err(|error| error.within("pattern")),
+            None => Ok(model.kind()),
+        }
+    }
+}
+
 impl Check for LidarConfig {
     type Checked = Lidar;
 
     fn check(&self, parameters: &Parameters) -> Result<Lidar, ConfigError> {
         let number = |num, key, range| parameters.number(num, key, range);
+        let kind = self.kind(parameters)?;
+        let nominal = (self.nominal_range_m.as_ref(), Range::closed(10.0, 500.0));
         Ok(Lidar {
-            model: parameters.word(&self.model, "model")?,
+            kind,
             mount_height_m: number(&self.mount_height_m, "mount-height-m", Range::closed(0.2, 2.5))?,
             tilt_rad: number(&self.tilt_rad, "tilt-rad", Range::closed(-0.1, 0.1))?,
-            nominal_range_m: number(&self.nominal_range_m, "nominal-range-m", Range::closed(10.0, 500.0))?,
+            nominal_range_m: parameters.number_or(nominal.0, "nominal-range-m", nominal.1, kind.nominal_range_m)?,
             dropout: number(&self.dropout, "dropout", Range::closed(0.0, 0.5))?,
             levelling_sd_rad: number(&self.levelling_sd_rad, "levelling-sd-rad", Range::closed(0.0, 0.02))?,
             window_transmission: number(&self.window_transmission, "window-transmission", Range::closed(0.0, 1.0))?,
@@ -150,7 +172,7 @@ impl Default for Lidar {
     /// Returns the configuration that an empty table gives.
     fn default() -> Self {
         Self {
-            model: LidarModel::Scala2,
+            kind: LidarModel::Scala2.kind(),
             mount_height_m: 0.6,
             tilt_rad: 0.0,
             nominal_range_m: 200.0,

@@ -155,7 +155,7 @@ mod tests {
                 hits.face[subray] = 0;
             }
         }
-        let level = Elevation { centre: [0.0, 1.0], tan: [0.0; SUBRAY_ROWS], cos: [1.0; SUBRAY_ROWS] };
+        let level = Elevation { group: 0, centre: [0.0, 1.0], tan: [0.0; SUBRAY_ROWS], cos: [1.0; SUBRAY_ROWS] };
         let link = LinkBudget::new(&Lidar::default(), &Environment::CLEAR_DAY);
         // At 10 m each sub-ray contributes 1/8 of gain·ρ·cos γ/R² with ρ·cos γ = 1.
         let found = Echoes::of(&hits, &level, &[face(10.0)], &link);

@@ -18,7 +18,9 @@ mod config;
 mod detector;
 mod echo;
 mod ground;
+mod kind;
 mod material;
+mod model;
 mod noise;
 mod pattern;
 mod power;
@@ -40,16 +42,18 @@ mod tests;
 mod viewpoint;
 
 pub use closecall_tracking::LaneGeometry;
-pub use config::{Lidar, LidarConfig, LidarModel};
+pub use config::{Lidar, LidarConfig};
 pub use detector::Detector;
 #[cfg(test)]
 pub(crate) use detector::FACE_SD_M;
+pub use kind::{LidarKind, LidarKindConfig};
 pub use material::Material;
-pub use pattern::{BEAMS, COLUMNS, LAYERS, Pattern};
-pub(crate) use pattern::{HALF_FIELD_DEG, HALF_FIELD_TAN};
+pub use model::LidarModel;
+pub(crate) use pattern::HALF_FIELD_DEG;
+pub use pattern::Pattern;
 pub(crate) use power::extinction_per_m;
 pub use rear::RearLidar;
-pub use scan::{LidarScan, MirrorSide, PointSource, PointTruth, ScanTruth};
+pub use scan::{LidarScan, MirrorSide, PointBeam, PointSource, PointTruth, ScanTruth};
 pub use scanner::Scanner;
 pub use segmentation::SegmentationReport;
 #[cfg(test)]

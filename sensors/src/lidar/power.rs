@@ -29,11 +29,7 @@ pub(crate) const THRESHOLD_OVER_NOISE: f32 = 5.0;
 /// return above the threshold.
 pub(crate) const MIN_POWER: f32 = 1.0 - 3.47 / THRESHOLD_OVER_NOISE;
 /// Reflectivity of the target that defines the nominal range.
-const NOMINAL_REFLECTIVITY: f64 = 0.5;
-/// Standard deviation of the measured range at high power (m).
-const RANGE_SD_M: f32 = 0.03;
-/// Additional standard deviation of the measured range at the detection threshold (m), independent of the former.
-const RANGE_SD_AT_THRESHOLD_M: f32 = 0.09;
+pub(crate) const NOMINAL_REFLECTIVITY: f64 = 0.5;
 /// Extinction in dB/km that corresponds to an extinction of 1/m: decibels per neper of power, times metres per
 /// kilometre.
 const DB_PER_KM_OVER_PER_M: f64 = 4_342.944_819;
@@ -48,6 +44,10 @@ pub(crate) struct LinkBudget {
     pub(crate) gain_m2: f32,
     /// Extinction coefficient α of the air (1/m).
     pub(crate) extinction_per_m: f32,
+    /// Standard deviation of the measured range at high power, and the additional one at the detection threshold (m).
+    range_sd_m: [f32; 2],
+    /// Range beyond which nothing is reported (m).
+    pub(crate) max_range_m: f32,
 }
 
 impl LinkBudget {
@@ -58,7 +58,16 @@ impl LinkBudget {
             // The window attenuates the light on the way out and on the way back.
             gain_m2: ((lidar.nominal_range_m * lidar.window_transmission).powi(2) / NOMINAL_REFLECTIVITY) as f32,
             extinction_per_m: extinction_per_m(environment) as f32,
+            range_sd_m: lidar.kind.range_sd_m,
+            max_range_m: if lidar.is_exact { f32::INFINITY } else { lidar.kind.max_range_m },
         }
+    }
+
+    /// Returns the standard deviation of the measured range (m): 0.03 m for a strong return of the SCALA, 0.1 m at the threshold.
+    pub(crate) fn range_sd_m(&self, power: f32) -> f32 {
+        let [strong, at_threshold] = self.range_sd_m;
+        let weak = at_threshold / power.max(1.0);
+        (strong * strong + weak * weak).sqrt()
     }
 
     /// Returns true if the air contains enough droplets for detectable backscatter.
@@ -77,12 +86,6 @@ impl LinkBudget {
 /// The two are not added, because a visibility observed in rain already includes the extinction of the rain.
 pub(crate) fn extinction_per_m(environment: &Environment) -> f64 {
     (KOSCHMIEDER / environment.visibility_m).max(rain_db_per_km(environment) / DB_PER_KM_OVER_PER_M)
-}
-
-/// Returns the standard deviation of the measured range (m): 0.03 m for a strong return, 0.1 m at the threshold.
-pub(crate) fn range_sd_m(power: f32) -> f32 {
-    let weak = RANGE_SD_AT_THRESHOLD_M / power.max(1.0);
-    (RANGE_SD_M * RANGE_SD_M + weak * weak).sqrt()
 }
 
 #[cfg(test)]
@@ -106,7 +109,8 @@ mod tests {
 
     #[test]
     fn weak_returns_have_a_larger_range_error() {
-        assert!((range_sd_m(1.0) - 0.0949).abs() < 1e-3);
-        assert!((range_sd_m(100.0) - 0.03).abs() < 1e-3);
+        let link = LinkBudget::new(&Lidar::default(), &Environment::CLEAR_DAY);
+        assert!((link.range_sd_m(1.0) - 0.0949).abs() < 1e-3);
+        assert!((link.range_sd_m(100.0) - 0.03).abs() < 1e-3);
     }
 }

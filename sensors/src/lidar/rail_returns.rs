@@ -17,7 +17,7 @@
 use super::echo::PULSE_M;
 use super::noise::MAX_NORMAL;
 use super::pattern::{Column, Elevation};
-use super::power::range_sd_m;
+use super::power::LinkBudget;
 use super::receiver::SensorPoseEstimate;
 use super::targets::{Part, Targets};
 use super::{LaneGeometry, PointSource};
@@ -43,11 +43,11 @@ pub(crate) struct RailReturns {
 impl RailReturns {
     /// Returns the limits, or `None` on a curved road, on which the distance of the rails varies within a column.
     #[expect(clippy::cast_possible_truncation, reason = "points are in single precision")]
-    pub(crate) fn new(lane: &LaneGeometry) -> Option<Self> {
+    pub(crate) fn new(lane: &LaneGeometry, link: &LinkBudget) -> Option<Self> {
         (lane.curvature_per_m == 0.0).then(|| Self {
             slope: -lane.heading_rad as f32,
             region_m: lane.region_m.map(|end_m| end_m as f32),
-            max_error_m: MAX_NORMAL * range_sd_m(1.0),
+            max_error_m: MAX_NORMAL * link.range_sd_m(1.0),
         })
     }
 

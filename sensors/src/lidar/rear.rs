@@ -2,7 +2,7 @@
 
 use closecall_traffic::Stream;
 
-use super::{Detector, LaneGeometry, Lidar, LidarScan, ScanTruth, Scanner, SegmentationReport};
+use super::{Detector, LaneGeometry, Lidar, LidarScan, PointBeam, ScanTruth, Scanner, SegmentationReport};
 use crate::faults::LidarFault;
 use crate::{Detection, Scene, SensorError};
 
@@ -100,6 +100,16 @@ impl RearLidar {
     /// Returns the indices of one detection's points in the latest scan.
     pub fn point_indices_of(&self, detection: usize) -> &[u32] {
         self.detector.point_indices_of(detection)
+    }
+
+    /// Returns the beam of a point of the latest scan, and the range that was measured along it.
+    pub fn point_beam(&self, point: usize) -> PointBeam {
+        self.scanner.point_beam(point)
+    }
+
+    /// Returns true if the sensor has a mirror with two sides, which deflect the scans in turn.
+    pub fn has_mirror_sides(&self) -> bool {
+        self.scanner.has_mirror_sides()
     }
 
     /// Adds the latest scan to a report on the segmentation quality.

@@ -6,8 +6,8 @@
 use super::cast::ColumnHits;
 use super::echo::{Echo, Echoes};
 use super::noise::{Noise, Purpose};
-use super::pattern::{BEAMS, Column, Elevation, LAYERS, LAYERS_PER_GROUP};
-use super::power::{LinkBudget, MIN_POWER, THRESHOLD_OVER_NOISE, range_sd_m};
+use super::pattern::{Column, Elevation};
+use super::power::{LinkBudget, MIN_POWER, THRESHOLD_OVER_NOISE};
 use super::soft::{self, DropletEffect, Plume, SoftEcho};
 use super::targets::Targets;
 use super::viewpoint::{Deskew, sensor_position_m};
@@ -30,7 +30,7 @@ impl SensorPoseEstimate {
     #[expect(clippy::cast_possible_truncation, reason = "points are in single precision")]
     /// Returns the estimate for the end of the sweep, with a random error of the pitch.
     pub(crate) fn new(scene: &Scene<'_>, lidar: &Lidar, noise: Noise) -> Self {
-        let error_rad = lidar.levelling_sd_rad * f64::from(noise.normal(BEAMS, Purpose::Levelling));
+        let error_rad = lidar.levelling_sd_rad * f64::from(noise.normal(lidar.kind.beams(), Purpose::Levelling));
         let pitch_rad = scene.ego.pitch_rad + error_rad;
         let sensor = sensor_position_m(0.5 * scene.ego.vehicle.dimensions.length_m, lidar.mount_height_m, pitch_rad);
         let (sin, cos) = (pitch_rad + lidar.tilt_rad).sin_cos();
@@ -89,6 +89,8 @@ struct DetectedReturn {
 pub(crate) struct Receiver<'a> {
     /// Index of the column.
     pub(crate) column_index: usize,
+    /// Number of beams in a scan.
+    pub(crate) beams: usize,
     pub(crate) column: &'a Column,
     pub(crate) elevations: &'a [Elevation],
     pub(crate) pose: SensorPoseEstimate,
@@ -111,7 +113,7 @@ impl Receiver<'_> {
             let echoes = if hits.is_tested(layer) {
                 Echoes::of(&hits.beams[layer], elevation, &self.targets.faces, self.link)
             } else if layer < hits.ground_below {
-                let centre = self.column.centre[layer / LAYERS_PER_GROUP];
+                let centre = self.column.centre[elevation.group];
                 Echoes::of_ground(centre, elevation, &self.targets.faces[0], self.link)
             } else {
                 Echoes::NONE
@@ -129,10 +131,10 @@ impl Receiver<'_> {
 
     /// Returns the effect of the droplets in the air on a beam.
     fn droplet_effect(&self, layer: usize) -> DropletEffect {
-        let [cos, sin] = self.column.centre[layer / LAYERS_PER_GROUP];
+        let [cos, sin] = self.column.centre[self.elevations[layer].group];
         let centre = [cos, sin, self.elevations[layer].centre[0]];
-        let beam = self.column_index * LAYERS + layer;
-        soft::droplet_effect(beam, centre, self.plumes, (self.targets, self.link, self.noise))
+        let beam = self.column_index * self.elevations.len() + layer;
+        soft::droplet_effect((beam, self.elevations.len()), centre, self.plumes, (self.targets, self.link, self.noise))
     }
 
     /// Returns true if droplets may give a return on a beam.
@@ -154,7 +156,7 @@ impl Receiver<'_> {
         transmission: impl Fn(f32) -> f32,
         soft: Option<SoftEcho>,
     ) -> [Option<DetectedReturn>; 2] {
-        let beam = self.column_index * LAYERS + layer;
+        let beam = self.column_index * self.elevations.len() + layer;
         let mut found = [None, None];
         let before_hard = |soft: &SoftEcho| echoes.first().is_none_or(|echo| soft.range_m < echo.range_m);
         let soft = soft.filter(before_hard).map(|soft| PotentialReturn {
@@ -173,7 +175,7 @@ impl Receiver<'_> {
             PotentialReturn { range_m: echo.range_m, power, source: face.source, material: face.material }
         });
         for (index, potential) in soft.into_iter().chain(hard).enumerate() {
-            if let Some(detected) = self.detect_one(index * BEAMS + beam, potential) {
+            if let Some(detected) = self.detect_one(index * self.beams + beam, potential) {
                 if found[0].is_none() {
                     found[0] = Some(detected);
                 } else {
@@ -186,20 +188,20 @@ impl Receiver<'_> {
 
     /// Returns the measurement if the power with noise exceeds the threshold and the return is not dropped.
     fn detect_one(&self, address: usize, potential: PotentialReturn) -> Option<DetectedReturn> {
-        if !(potential.power > MIN_POWER) {
+        if !(potential.power > MIN_POWER) || potential.range_m > self.link.max_range_m {
             return None;
         }
         let measured_power = potential.power + self.noise.normal(address, Purpose::Detection) / THRESHOLD_OVER_NOISE;
         if !(measured_power > 1.0) || self.noise.uniform(address, Purpose::Dropout) < self.dropout {
             return None;
         }
-        let error = range_sd_m(measured_power) * self.noise.normal(address, Purpose::Range);
+        let error = self.link.range_sd_m(measured_power) * self.noise.normal(address, Purpose::Range);
         Some(DetectedReturn { potential, measured_m: potential.range_m + error, measured_power })
     }
 
     /// Appends a detected return to the scan and to its ground truth.
     fn append(&self, layer: usize, found: &DetectedReturn, scan: &mut LidarScan, truth: &mut ScanTruth) {
-        let [cos, sin] = self.column.centre[layer / LAYERS_PER_GROUP];
+        let [cos, sin] = self.column.centre[self.elevations[layer].group];
         let [tan, cosine] = self.elevations[layer].centre;
         let level = found.measured_m * cosine;
         let [x, y, z] = self.pose.ego_frame_point_m([level * cos, level * sin, level * tan]);
@@ -209,8 +211,8 @@ impl Receiver<'_> {
         let square = found.measured_m * found.measured_m;
         scan.intensity.push((found.measured_power * square / self.link.gain_m2).min(MAX_INTENSITY));
         scan.offset_ns.push(self.column.offset_ns);
-        #[expect(clippy::cast_possible_truncation, reason = "653 columns of 16 layers")]
-        scan.beam.push((self.column_index * LAYERS + layer) as u16);
+        #[expect(clippy::cast_possible_truncation, reason = "a pattern has at most 65,535 beams")]
+        scan.beam.push((self.column_index * self.elevations.len() + layer) as u16);
         let PotentialReturn { range_m, source, material, .. } = found.potential;
         truth.points.push(PointTruth { source, material, range_m });
     }

@@ -4,7 +4,7 @@ use closecall_traffic::{PlanePose, Road};
 
 use super::Material::Steel;
 use super::solid::Solid;
-use closecall_traffic::guard_rail::{BEAM_DEPTH_M, BEAM_TOP_M, LEFT_OFFSET_M, POST_SPACING_M, RIGHT_OFFSET_M};
+use closecall_traffic::guard_rail::{BEAM_DEPTH_M, BEAM_TOP_M, POST_SPACING_M};
 
 const BEAM_LOW_M: f64 = 0.44;
 const POST_WIDTH_M: f64 = 0.10;
@@ -23,7 +23,8 @@ pub(super) type PlacedSolid = (Solid, PlanePose);
 /// Appends the guard rails behind the road position `s_m`.
 pub(super) fn append_guard_rails(road: &Road, s_m: f64, placed: &mut Vec<PlacedSolid>) {
     let chord = if road.curvature_per_m() == 0.0 { RAIL_REACH_M } else { CHORD_M };
-    for (d_m, outward) in [(LEFT_OFFSET_M, 1.0), (road.right_edge_m() - RIGHT_OFFSET_M, -1.0)] {
+    let [left_m, right_m] = road.guard_rail_offsets_m();
+    for (d_m, outward) in [(left_m, 1.0), (road.right_edge_m() - right_m, -1.0)] {
         let mut from = s_m - RAIL_REACH_M;
         while from < s_m {
             let to = (from + chord).min(s_m);

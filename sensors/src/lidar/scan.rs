@@ -3,6 +3,7 @@
 use closecall_traffic::Time;
 
 use super::Material;
+use super::kind::Resolution;
 
 /// The side of the two-sided mirror that deflects the beams of a scan.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -29,6 +30,8 @@ pub struct LidarScan {
     pub mirror_side: MirrorSide,
     /// Longitudinal position of the sensor in the ego's frame (m): negative, because it is in the rear bumper.
     pub sensor_x_m: f32,
+    /// Columns and layers of the pattern.
+    pub(crate) resolution: Resolution,
     /// Longitudinal position of each point (m), negative behind the ego's origin.
     pub x_m: Vec<f32>,
     /// Lateral position of each point (m), positive to the left.
@@ -40,7 +43,7 @@ pub struct LidarScan {
     pub intensity: Vec<f32>,
     /// Time of measurement of each point after `start` (ns).
     pub offset_ns: Vec<u32>,
-    /// Beam of each point, as column · 16 + layer.
+    /// Beam of each point, as column · layers + layer.
     pub beam: Vec<u16>,
 }
 
@@ -81,6 +84,35 @@ pub enum PointSource {
     Fog,
     /// Nothing: a fault of the sensor.
     False,
+}
+
+impl PointSource {
+    /// Returns the name of the kind of object.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Actor(_) => "actor",
+            Self::Ground => "ground",
+            Self::GuardRail => "guard-rail",
+            Self::Spray => "spray",
+            Self::Fog => "fog",
+            Self::False => "false",
+        }
+    }
+}
+
+/// The beam of a point, and what the sensor measured along it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointBeam {
+    /// Index of the column, in the order of the sweep.
+    pub column: u16,
+    /// Index of the layer, from the lowest.
+    pub layer: u16,
+    /// Azimuth of the beam's centre about the sensor's vertical axis, from its viewing axis, counter-clockwise seen from above (rad).
+    pub azimuth_rad: f64,
+    /// Elevation of the beam's centre (rad).
+    pub elevation_rad: f64,
+    /// Measured range (m).
+    pub range_m: f32,
 }
 
 /// The ground truth of one point.

@@ -11,23 +11,21 @@ use super::bare_road::{BareRoad, Road, cast_ground};
 use super::cast::{ActiveParts, ColumnHits};
 use super::material::asphalt;
 use super::noise::Noise;
-use super::pattern::{Pattern, SWEEP_NS};
+use super::pattern::Pattern;
 use super::power::LinkBudget;
 use super::rail_returns::RailReturns;
 use super::receiver::{Receiver, SensorPoseEstimate};
 use super::roadside::{PlacedSolid, append_guard_rails};
-use super::shapes::append_solids;
+use super::shapes::{append_rear_plate, append_solids};
 use super::soft::{self, Plume};
 use super::solid::Solid;
 use super::spoil::Spoiler;
 use super::targets::{Beams, Surface, Targets};
 use super::viewpoint::{Viewpoint, plane_from_body};
-use super::{LaneGeometry, Lidar, LidarScan, Material, MirrorSide, PointSource, ScanTruth};
+use super::{LaneGeometry, Lidar, LidarScan, Material, MirrorSide, PointBeam, PointSource, ScanTruth};
 use crate::faults::LidarFault;
 use crate::{Scene, SceneVehicle};
 
-/// Duration of a sweep (s).
-const SWEEP_S: f64 = SWEEP_NS * 1e-9;
 /// Distance of a vehicle's centre beyond which the vehicle is ignored (m). From there only a plate could give a return.
 const MAX_CENTRE_DISTANCE_M: f64 = 300.0;
 
@@ -77,15 +75,13 @@ impl Scanner {
     pub fn new(lidar: Lidar) -> Self {
         Self {
             lidar,
-            pattern: match lidar.model {
-                super::LidarModel::Scala2 => Pattern::scala_2(),
-            },
+            pattern: Pattern::new(lidar.kind),
             targets: Targets::default(),
             plumes: Vec::new(),
             solids: Vec::new(),
             guard_rails: Vec::new(),
             active: ActiveParts::default(),
-            hits: ColumnHits::default(),
+            hits: ColumnHits::new(lidar.kind.layers()),
             scan: LidarScan::default(),
             truth: ScanTruth::default(),
             latest: None,
@@ -100,6 +96,33 @@ impl Scanner {
     /// Returns the ground truth of the latest scan.
     pub fn truth(&self) -> &ScanTruth {
         &self.truth
+    }
+
+    /// Returns the beam of a point of the latest scan, and the range that was measured along it.
+    pub(crate) fn point_beam(&self, point: usize) -> PointBeam {
+        let (beam, layers) = (self.scan.beam[point], self.scan.resolution.layers);
+        let (azimuth_rad, elevation_rad) = self.pattern.direction_rad(self.scan.mirror_side, beam);
+        #[expect(clippy::cast_possible_truncation, reason = "a part of a number of 16 bits")]
+        let [column, layer] = [usize::from(beam) / layers, usize::from(beam) % layers].map(|index| index as u16);
+        PointBeam { column, layer, azimuth_rad, elevation_rad, range_m: self.range_m(point) }
+    }
+
+    /// Returns the range of a point from where the sensor was when it measured the point (m).
+    #[expect(clippy::cast_possible_truncation, reason = "points are in single precision")]
+    fn range_m(&self, point: usize) -> f32 {
+        let scan = &self.scan;
+        let at_m = [scan.x_m[point], scan.y_m[point], scan.z_m[point]].map(f64::from);
+        let Some(sweep) = &self.latest else { return at_m.iter().map(|axis| axis * axis).sum::<f64>().sqrt() as f32 };
+        let to = sweep.viewpoint.deskew(self.sweep_s() - f64::from(scan.offset_ns[point]) * 1e-9);
+        let (x_m, y_m) = (at_m[0] - to.x_m, at_m[1] - to.y_m);
+        let (ahead_m, left_m) = (to.cos * x_m + to.sin * y_m, to.cos * y_m - to.sin * x_m);
+        let up_m = at_m[2] - f64::from(sweep.pose.sensor_z_m());
+        (ahead_m - f64::from(sweep.pose.sensor_x_m())).hypot(left_m).hypot(up_m) as f32
+    }
+
+    /// Returns true if the sensor has a mirror with two sides.
+    pub(crate) fn has_mirror_sides(&self) -> bool {
+        self.pattern.kind().mirror_cubic_deg.is_some()
     }
 
     /// Returns the mirror side of the scan that ends at `time`. The sides alternate from scan to scan.
@@ -163,7 +186,7 @@ impl Scanner {
         self.begin(scene.time, mirror_side, &pose);
         let link = LinkBudget::new(&actual, scene.environment);
         // With a fault, a point may be elsewhere than its return.
-        let rails = if fault.is_none() { RailReturns::new(lane) } else { None };
+        let rails = if fault.is_none() { RailReturns::new(lane, &link) } else { None };
         let fault = fault
             .filter(|fault| fault.changes_points())
             .map(|fault| (*fault, scene.road.has_guard_rails().then(|| LaneGeometry::from_scene(scene))));
@@ -199,8 +222,9 @@ impl Scanner {
 
     /// Sweeps over all columns and appends their returns to the scan.
     fn sweep(&mut self, of: &Sweep, extent: Extent) {
+        let sweep_s = self.sweep_s();
         #[expect(clippy::cast_possible_truncation, reason = "a bound of a metre, with a margin")]
-        let max_shift_m = of.viewpoint.max_shift_m(SWEEP_S) as f32;
+        let max_shift_m = of.viewpoint.max_shift_m(sweep_s) as f32;
         let bare_road = BareRoad::new(&self.targets, &of.link, of.pose, max_shift_m);
         let omitted = bare_road.as_ref().filter(|_| extent == Extent::WithoutBackground);
         let road = Road::new(&self.targets, &of.link);
@@ -210,7 +234,7 @@ impl Scanner {
             let parts = self.active.advance_to(index, &self.targets);
             let column = &self.pattern.columns[index];
             let elevations = self.pattern.elevations(of.mirror_side, index);
-            let before_end_s = SWEEP_S - f64::from(column.offset_ns) * 1e-9;
+            let before_end_s = sweep_s - f64::from(column.offset_ns) * 1e-9;
             let has_rails_alone = || {
                 let pose = of.pose.deskewed(of.viewpoint.deskew(before_end_s));
                 of.rails.is_some_and(|rails| rails.are_discarded((column, elevations), &pose, parts, &self.targets))
@@ -231,6 +255,7 @@ impl Scanner {
             }
             let receiver = Receiver {
                 column_index: index,
+                beams: self.pattern.kind().beams(),
                 column,
                 elevations,
                 pose: of.pose.deskewed(of.viewpoint.deskew(before_end_s)),
@@ -247,6 +272,17 @@ impl Scanner {
         }
     }
 
+    /// Returns the duration of a sweep (s).
+    fn sweep_s(&self) -> f64 {
+        self.pattern.kind().sweep_ns * 1e-9
+    }
+
+    /// Returns how long before its end the sweep crosses the origin of a body's frame (s).
+    fn crossing_before_end_s(&self, view: &Viewpoint, plane_from_thing: &Isometry3<f64>) -> f64 {
+        let middle = view.sensor_from_plane(0.0) * (plane_from_thing * Point3::origin());
+        self.sweep_s() - self.pattern.kind().sweep_offset_s(middle.y.atan2(middle.x).to_degrees())
+    }
+
     /// Removes all points of the scan.
     fn clear(&mut self) {
         self.scan.clear();
@@ -258,13 +294,17 @@ impl Scanner {
         self.clear();
         self.stamp(end);
         self.scan.mirror_side = mirror_side;
+        self.scan.resolution = self.pattern.kind().resolution;
         self.scan.sensor_x_m = pose.sensor_x_m();
     }
 
     /// Sets the times of the scan.
     fn stamp(&mut self, end: Time) {
-        #[expect(clippy::cast_possible_truncation, reason = "a sweep has 14,777,777 ns")]
-        let sweep = Time::from_ns(SWEEP_NS as i64);
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "a sweep of the SCALA has 14,777,777 ns, and none more than a second"
+        )]
+        let sweep = Time::from_ns(self.pattern.kind().sweep_ns as i64);
         self.scan.start = end - sweep;
         self.scan.end = end;
     }
@@ -294,7 +334,7 @@ impl Scanner {
         let surface = Surface { source: PointSource::GuardRail, reflectivity: &steel };
         for (solid, pose) in &self.guard_rails {
             let placed = plane_from_body(*pose, 0.0);
-            let frozen = view.sensor_from_plane(crossing_before_end_s(view, &placed)) * placed;
+            let frozen = view.sensor_from_plane(self.crossing_before_end_s(view, &placed)) * placed;
             self.targets.push(Beams { pattern: &self.pattern, mirror_side }, solid, &frozen, surface);
         }
     }
@@ -306,7 +346,7 @@ impl Scanner {
         if !(centre.norm() < MAX_CENTRE_DISTANCE_M && centre.x > -other.vehicle.dimensions.length_m) {
             return;
         }
-        let before_end_s = crossing_before_end_s(view, &plane_from_body(pose, other.pitch_rad));
+        let before_end_s = self.crossing_before_end_s(view, &plane_from_body(pose, other.pitch_rad));
         let frozen = view.sensor_from_plane(before_end_s)
             * plane_from_body(moved_back(pose, other, before_end_s), other.pitch_rad);
         let appearance = other.vehicle.appearance;
@@ -315,6 +355,9 @@ impl Scanner {
         let surface = Surface { source: PointSource::Actor(other.actor), reflectivity: &reflectivity };
         self.solids.clear();
         append_solids(&other.vehicle, &mut self.solids);
+        if scene.road.is_reversed() {
+            append_rear_plate(&other.vehicle, &mut self.solids);
+        }
         for solid in &self.solids {
             self.targets.push(Beams { pattern: &self.pattern, mirror_side }, solid, &frozen, surface);
         }
@@ -337,12 +380,6 @@ impl Scanner {
         let faces = self.targets.push_faces(&solid, &placed, surface);
         self.plumes.push(Plume { faces, columns, extinction_per_m });
     }
-}
-
-/// Returns how long before its end the sweep crosses the origin of a body's frame (s).
-fn crossing_before_end_s(view: &Viewpoint, plane_from_thing: &Isometry3<f64>) -> f64 {
-    let middle = view.sensor_from_plane(0.0) * (plane_from_thing * Point3::origin());
-    SWEEP_S - Pattern::sweep_offset_s(middle.y.atan2(middle.x).to_degrees())
 }
 
 /// Returns the pose of a vehicle `before_end_s` earlier, extrapolated at its current speed and heading.

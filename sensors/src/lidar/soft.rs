@@ -22,7 +22,6 @@ use closecall_traffic::{Environment, Vehicle, VehicleClass};
 
 use super::echo::PULSE_M;
 use super::noise::{Noise, Purpose};
-use super::pattern::LAYERS;
 use super::power::LinkBudget;
 use super::solid::Solid;
 use super::targets::{FaceRange, Targets};
@@ -114,9 +113,9 @@ pub(crate) fn spray_plume(vehicle: &Vehicle, speed_mps: f64, environment: &Envir
     Some((Solid::cuboid(low, high, Material::Water), extinction))
 }
 
-/// Returns the effect of the droplets on the beam whose centre has this direction.
+/// Returns the effect of the droplets on the beam whose centre has this direction. A column has `layers` beams.
 pub(crate) fn droplet_effect(
-    beam: usize,
+    (beam, layers): (usize, usize),
     centre: [f32; 3],
     plumes: &[Plume],
     of: (&Targets, &LinkBudget, Noise),
@@ -127,11 +126,11 @@ pub(crate) fn droplet_effect(
     let mut clump = None;
     let depth = noise.uniform(beam, Purpose::Depth);
     let mut has_echo = false;
-    let column = beam / LAYERS;
+    let column = beam / layers;
     for plume in plumes.iter().filter(|plume| plume.columns.contains(&column)) {
         let Some([from, to]) = plume_interval_m(centre, plume.faces, targets) else { continue };
         let clump = *clump.get_or_insert_with(|| {
-            let clump_at = (column / CLUMP_COLUMNS) * LAYERS + beam % LAYERS;
+            let clump_at = (column / CLUMP_COLUMNS) * layers + beam % layers;
             -noise.uniform(clump_at, Purpose::Plume).ln()
         });
         let extinction = plume.extinction_per_m * clump;

@@ -13,7 +13,7 @@
 //!   range of the plate, and fades to its edge.
 
 use super::noise::{Noise, Purpose};
-use super::pattern::{BEAMS, COLUMNS, LAYERS, LAYERS_PER_GROUP, Pattern};
+use super::pattern::Pattern;
 use super::receiver::{MAX_INTENSITY, SensorPoseEstimate};
 use super::{LaneGeometry, LidarScan, Material, MirrorSide, PointSource, PointTruth, ScanTruth};
 use crate::faults::LidarFault;
@@ -92,7 +92,7 @@ impl Spoiler<'_> {
     /// Returns a uniform random number for the point with this index and its beam.
     fn uniform(&self, index: usize, beam: u16, purpose: Purpose) -> f64 {
         // Two returns of a beam are neighbours in the scan, so that the parity of the index tells them apart.
-        f64::from(self.noise.uniform((index % 2) * BEAMS + usize::from(beam), purpose))
+        f64::from(self.noise.uniform((index % 2) * self.pattern.kind().beams() + usize::from(beam), purpose))
     }
 
     /// Returns the position of the sensor (m).
@@ -114,7 +114,7 @@ impl Spoiler<'_> {
                     let beam = scan.beam[index];
                     let address = step * 2 + usize::from(side > 0.0);
                     let share = HALO_SHARE * (1.0 - step as f64 / (steps + 1) as f64);
-                    let row = address * BEAMS + usize::from(beam);
+                    let row = address * self.pattern.kind().beams() + usize::from(beam);
                     if f64::from(self.noise.uniform(row, Purpose::Dropout)) >= share {
                         continue;
                     }
@@ -150,7 +150,7 @@ impl Spoiler<'_> {
                 continue;
             }
             for (side, rail_y_m) in rails_y_m(lane, f64::from(scan.x_m[index])).into_iter().enumerate() {
-                let row = (2 + side) * BEAMS + usize::from(scan.beam[index]);
+                let row = (2 + side) * self.pattern.kind().beams() + usize::from(scan.beam[index]);
                 if f64::from(self.noise.uniform(row, Purpose::Depth)) >= self.fault.rail_ghosts {
                     continue;
                 }
@@ -174,24 +174,25 @@ impl Spoiler<'_> {
     fn interfere(&self, added: &mut Vec<Added>) {
         let uniform = |burst: usize, what: usize| self.noise.uniform((burst + 1) * 8 + what, Purpose::FogClump);
         let bursts = (self.fault.crosstalk + f64::from(uniform(0, 0))).floor() as usize;
+        let kind = self.pattern.kind();
         let elevations_of = |column| self.pattern.elevations(self.mirror_side, column);
         for burst in 1..=bursts {
             let [fewest, most] = BURST_COLUMNS;
             let length = fewest + (uniform(burst, 1) * (most - fewest + 1) as f32) as usize;
-            let first = (uniform(burst, 2) * (COLUMNS - length) as f32) as usize;
-            let group = (uniform(burst, 3) * (LAYERS / LAYERS_PER_GROUP) as f32) as usize;
+            let first = (uniform(burst, 2) * (self.pattern.columns.len() - length) as f32) as usize;
+            let group = (uniform(burst, 3) * kind.groups() as f32) as usize;
             let mut range_m = BURST_RANGE_M[0] + uniform(burst, 4) * (BURST_RANGE_M[1] - BURST_RANGE_M[0]);
             let drift_m = (2.0 * uniform(burst, 5) - 1.0) * BURST_DRIFT_M;
             for column in first..first + length {
                 let [cos, sin] = self.pattern.columns[column].centre[group];
-                for layer in group * LAYERS_PER_GROUP..(group + 1) * LAYERS_PER_GROUP {
+                for layer in group * kind.layers_per_group..(group + 1) * kind.layers_per_group {
                     let [tan, cosine] = elevations_of(column)[layer].centre;
                     let level = range_m * cosine;
                     added.push(Added {
                         at_m: self.pose.ego_frame_point_m([level * cos, level * sin, level * tan]),
                         intensity: FALSE_INTENSITY,
                         offset_ns: self.pattern.columns[column].offset_ns,
-                        beam: (column * LAYERS + layer) as u16,
+                        beam: (column * kind.layers() + layer) as u16,
                         truth: PointTruth { source: PointSource::False, material: Material::Water, range_m },
                     });
                 }
@@ -208,7 +209,7 @@ impl Spoiler<'_> {
         for index in 0..scan.len() {
             let at_m = [scan.x_m[index], scan.y_m[index], scan.z_m[index]];
             let range_m = (0..3).map(|axis| (at_m[axis] - sensor[axis]).powi(2)).sum::<f32>().sqrt().max(0.1);
-            let row = (index % 2) * BEAMS + usize::from(scan.beam[index]);
+            let row = (index % 2) * self.pattern.kind().beams() + usize::from(scan.beam[index]);
             let factor = ((range_m + sd_m * self.noise.normal(row, Purpose::FogDepth)) / range_m).max(0.0);
             [scan.x_m[index], scan.y_m[index], scan.z_m[index]] = self.turned(at_m, 0.0, factor);
         }

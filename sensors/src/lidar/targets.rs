@@ -114,7 +114,7 @@ impl Targets {
     pub(crate) fn push(&mut self, beams: Beams<'_>, solid: &Solid, pose: &Isometry3<f64>, surface: Surface<'_>) {
         let bounds = Bounds::of(solid, pose);
         let columns = beams.pattern.columns_between(bounds.azimuth_deg[0], bounds.azimuth_deg[1]);
-        let layers = Pattern::layers_between(beams.mirror_side, bounds.elevation_deg[0], bounds.elevation_deg[1]);
+        let layers = beams.pattern.layers_between(beams.mirror_side, bounds.elevation_deg[0], bounds.elevation_deg[1]);
         if columns.is_empty() || layers.is_empty() {
             return;
         }
@@ -131,7 +131,7 @@ impl Targets {
         for start in columns.clone().step_by(BLOCK_COLUMNS) {
             let block = start..(start + BLOCK_COLUMNS).min(columns.end);
             if let Some([low_deg, high_deg]) = silhouette.elevations_deg(beams.pattern.azimuths_deg(&block)) {
-                let narrow = Pattern::layers_between(beams.mirror_side, low_deg, high_deg);
+                let narrow = beams.pattern.layers_between(beams.mirror_side, low_deg, high_deg);
                 let layers = narrow.start.max(layers.start)..narrow.end.min(layers.end);
                 if !layers.is_empty() {
                     self.parts.push(Part { faces, columns: block, layers });

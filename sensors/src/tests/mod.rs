@@ -1,5 +1,6 @@
 //! Tests of the chain behind the rear LiDAR, and of the tracker on simulated detections, against the true states.
 
 mod fixed_gap;
+mod front;
 mod silhouettes;
 mod tracking;

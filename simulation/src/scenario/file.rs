@@ -12,7 +12,7 @@ use toml_edit::DocumentMut;
 
 use super::edit::{Setting, SettingError};
 use super::recorded::RecordedError;
-use super::{Scenario, ScenarioConfig, base, locate, recorded};
+use super::{Scenario, ScenarioConfig, base, lidar_file, locate, recorded};
 
 /// Number of random samples that `check` checks in addition to the nominal values and the bounds.
 const CHECKED_SAMPLES: u64 = 64;
@@ -169,6 +169,10 @@ impl ScenarioFile {
         if let Some(inlined) =
             recorded::inline(path, &text, &config).map_err(|error| recorded_error(path, &text, &error))?
         {
+            text = inlined;
+            config = deserialize(path, &text)?;
+        }
+        if let Some(inlined) = lidar_file::inline(path, &text, &config)? {
             text = inlined;
             config = deserialize(path, &text)?;
         }

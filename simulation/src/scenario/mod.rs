@@ -17,6 +17,7 @@ mod file;
 mod inert_fault;
 mod intervention;
 pub mod library;
+mod lidar_file;
 mod locate;
 pub mod member;
 mod placement;

@@ -99,6 +99,20 @@ fn the_columns_of_a_trace_are_those_documented() {
     assert_eq!(written, expected);
 }
 
+#[test]
+fn the_columns_of_the_scans_are_those_documented() {
+    let folder = folder();
+    let path = folder.path().join("scans.parquet");
+    let scenario = library("paper-figure");
+    let options =
+        ["--set", "duration-s=1", "--set", "sensors.rear-camera.pipeline=off", "--scans", path.to_str().unwrap()];
+    let args = [&["run", scenario.to_str().unwrap(), "--sensors", "full"], options.as_slice()].concat();
+    stdout(&closecall(args), 0);
+    let expected: Vec<String> = documented_columns("scans").into_iter().map(|[name, ..]| name).collect();
+    let written: Vec<String> = columns(&path).into_iter().map(|[name, ..]| name).collect();
+    assert_eq!(written, expected);
+}
+
 /// The records of a file with one JSON value on each line, behind a checksum if it has one.
 fn lines(path: &Path, has_checksum: bool) -> Vec<Value> {
     let text = std::fs::read_to_string(path).unwrap();

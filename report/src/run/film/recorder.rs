@@ -107,7 +107,8 @@ impl FilmRecorder {
             matches!(view.phase, Phase::Critical | Phase::Overtaking) && index.is_multiple_of(DENSE_SCAN_INTERVAL);
         let is_dense = is_eventful && self.dense_scan_count < MAX_DENSE_SCANS;
         self.dense_scan_count += usize::from(is_dense);
-        let scan = match (index.is_multiple_of(SPARSE_SCAN_INTERVAL), is_dense) {
+        // Two successive scans are those of both sides of the mirror.
+        let scan = match (index % SPARSE_SCAN_INTERVAL < 2, is_dense) {
             (true, _) => Scan::complete(view.perception),
             (false, true) => Scan::latest(view.perception),
             (false, false) => None,

@@ -5,8 +5,19 @@
 //! | `clusters` | points that belong to a box | by box |
 //! | `rejected` | points that belong to no box: ground, guard rails, spray, noise | by intensity |
 //! | `intensity` | the points of `clusters` again | by intensity; together with `rejected`, the raw scan |
+//!
+//! The points of `clusters` and `rejected` are those of the sensor to the bit. Each has its beam (`beam`: column · layers + layer), the
+//! time after the start of the sweep at which it was measured (`offset_ns`), and its intensity as a reflectivity (`intensity`).
 
-use crate::run::rerun::sdk::{Boxes3D, FillMode, Points3D};
+use std::ops::Range;
+use std::sync::Arc;
+
+use arrow::array::{ArrayRef, Float32Array, UInt16Array, UInt32Array};
+
+use crate::run::rerun::sdk::{
+    Boxes3D, ComponentDescriptor, ComponentIdentifier, FillMode, Points3D, SerializationResult,
+    SerializedComponentBatch, SerializedComponentColumn,
+};
 use closecall_sensors::Detection;
 use closecall_traffic::Time;
 
@@ -28,7 +39,7 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<Vec<String>, Rec
     let times: Vec<Time> = kept.iter().map(|(time, _)| *time).collect();
     let scans: Vec<&Scan> = kept.iter().map(|(_, scan)| *scan).collect();
     let is_clustered = |scan: &Scan, point: usize| scan.clusters[point] != NO_CLUSTER;
-    let shade = |scan: &Scan, point: usize| palette::intensity(scan.intensities[point]);
+    let shade = |scan: &Scan, point: usize| palette::intensity(scan.shade(point));
     let clusters =
         layer(&scans, |scan, point| is_clustered(scan, point).then(|| palette::cluster(scan.clusters[point])));
     write_layer(writer, "world/ego/lidar/clusters", &times, &clusters)?;
@@ -50,6 +61,9 @@ fn kept_scans(film: &Film) -> Vec<(Time, &Scan)> {
 struct Layer {
     points_m: Vec<[f32; 3]>,
     colours: Vec<Rgba>,
+    beams: Vec<u16>,
+    offsets_ns: Vec<u32>,
+    intensities: Vec<f32>,
     /// Number of points of each scan.
     lengths: Vec<usize>,
     /// Index of the first point of each scan.
@@ -66,6 +80,9 @@ fn layer(scans: &[&Scan], colour: impl Fn(&Scan, usize) -> Option<Rgba>) -> Laye
             if let Some(colour) = colour(scan, point) {
                 layer.points_m.push(at_m);
                 layer.colours.push(colour);
+                layer.beams.push(scan.points.beam[point]);
+                layer.offsets_ns.push(scan.points.offset_ns[point]);
+                layer.intensities.push(scan.points.intensity[point]);
             }
         }
         layer.lengths.push(layer.points_m.len() - first);
@@ -78,11 +95,29 @@ fn write_layer(writer: &Writer<'_>, entity: &str, times: &[Time], layer: &Layer)
     writer.write_rows(entity, times, |range| {
         let first = layer.starts[range.start];
         let last = layer.starts.get(range.end).copied().unwrap_or(layer.points_m.len());
-        Points3D::update_fields()
+        let points = Points3D::update_fields()
             .with_positions(layer.points_m[first..last].iter().copied())
             .with_colors(layer.colours[first..last].iter().copied())
-            .columns(layer.lengths[range].iter().copied())
+            .columns(layer.lengths[range.clone()].iter().copied())?;
+        Ok(points.chain(layer.measured(first..last, &layer.lengths[range])?))
     })
+}
+
+impl Layer {
+    /// Returns what the sensor has measured of the points besides their position.
+    fn measured(&self, points: Range<usize>, lengths: &[usize]) -> SerializationResult<[SerializedComponentColumn; 3]> {
+        let column = |name: &'static str, array: ArrayRef| {
+            let component = ComponentIdentifier::from(name);
+            let descriptor = ComponentDescriptor { archetype: None, component, component_type: None };
+            SerializedComponentBatch::new(array, descriptor).partitioned(lengths.iter().copied())
+        };
+        let intensities = &self.intensities[points.clone()];
+        Ok([
+            column("beam", Arc::new(UInt16Array::from(self.beams[points.clone()].to_vec())))?,
+            column("offset_ns", Arc::new(UInt32Array::from(self.offsets_ns[points].to_vec())))?,
+            column("intensity", Arc::new(Float32Array::from(intensities.to_vec())))?,
+        ])
+    }
 }
 
 /// Writes the boxes fitted to the clusters.

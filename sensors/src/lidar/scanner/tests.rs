@@ -1,6 +1,6 @@
 use super::super::cast::NO_FACE;
 use super::super::cast::by_brute_force;
-use super::super::pattern::{Column, Elevation, LAYERS, LAYERS_PER_GROUP, SUBRAY_ROWS, SUBRAYS};
+use super::super::pattern::{Column, Elevation, SUBRAY_ROWS, SUBRAYS};
 use super::*;
 
 /// Maximum relative difference between a distance in single and in double precision.
@@ -24,7 +24,7 @@ impl Scanner {
             let brute = by_brute_force(column, elevations, &self.targets);
             assert_eq!(self.hits.beams, brute.beams, "column {index}");
             if index % 5 == 0 {
-                for layer in 0..LAYERS {
+                for layer in 0..elevations.len() {
                     let [rays, differing] = self.compare_exactly(column, elevations, layer);
                     hits += rays;
                     differ += differing;
@@ -37,7 +37,7 @@ impl Scanner {
     /// Returns the number of sub-rays of a beam that hit something, and how many of them differ in double
     /// precision.
     fn compare_exactly(&self, column: &Column, elevations: &[Elevation], layer: usize) -> [usize; 2] {
-        let group = layer / LAYERS_PER_GROUP;
+        let group = elevations[layer].group;
         let hits = &self.hits.beams[layer];
         let mut counts = [0; 2];
         for subray in 0..SUBRAYS {

@@ -3,8 +3,8 @@
 use super::super::Material;
 use super::super::solid::Solid;
 use super::{car, motorcycle, truck};
-use closecall_traffic::Vehicle;
 use closecall_traffic::bodies::Proportions;
+use closecall_traffic::{Vehicle, VehicleClass};
 
 /// Appends the solids of a vehicle, in its own frame.
 pub(crate) fn append_solids(vehicle: &Vehicle, solids: &mut Vec<Solid>) {
@@ -16,6 +16,22 @@ pub(crate) fn append_solids(vehicle: &Vehicle, solids: &mut Vec<Solid>) {
     }
 }
 
+/// Height of the middle of the rear plate (m): between 0.30 m for its lower and 1.20 m for its upper edge, which Commission Regulation
+/// (EU) No 1003/2010 allows (assumption).
+const REAR_PLATE_M: f64 = 0.75;
+/// Half extents of the rear plate of a motorcycle, and of other vehicles (m): 180 × 200 mm and 520 × 110 mm.
+const REAR_PLATES_M: [[f64; 2]; 2] = [[0.09, 0.10], [0.26, 0.055]];
+/// Distance by which the rear plate stands out from the rear end (m).
+const REAR_PLATE_OUT_M: f64 = 0.01;
+
+/// Appends the plate at the rear of a vehicle, which only a sensor behind the vehicle sees.
+pub(crate) fn append_rear_plate(vehicle: &Vehicle, solids: &mut Vec<Solid>) {
+    let rear = -0.5 * vehicle.dimensions.length_m;
+    let [half, up] = REAR_PLATES_M[usize::from(vehicle.class != VehicleClass::Motorcycle)];
+    let low = [rear - REAR_PLATE_OUT_M, -half, REAR_PLATE_M - up];
+    solids.push(Solid::cuboid(low, [rear + 0.1, half, REAR_PLATE_M + up], Material::Plate));
+}
+
 /// Appends a block and its mirror image on the other side of y = 0.
 pub(super) fn append_pair(low: [f64; 3], high: [f64; 3], material: Material, solids: &mut Vec<Solid>) {
     solids.push(Solid::cuboid(low, high, material));
@@ -24,7 +40,7 @@ pub(super) fn append_pair(low: [f64; 3], high: [f64; 3], material: Material, sol
 
 #[cfg(test)]
 mod tests {
-    use closecall_traffic::{BodyShape, VehicleClass};
+    use closecall_traffic::BodyShape;
 
     use super::*;
 

@@ -16,4 +16,4 @@ mod motorcycle;
 mod truck;
 
 use append::append_pair;
-pub(crate) use append::append_solids;
+pub(crate) use append::{append_rear_plate, append_solids};

@@ -6,13 +6,13 @@ use super::*;
 
 /// Returns the number of beams whose centres hit an upright rectangle, from the formula of the scan pattern alone.
 fn hand_count(mirror_side: MirrorSide, distance_m: f64, half_width_m: f64, [low_m, high_m]: [f64; 2]) -> usize {
-    let pattern = Pattern::scala_2();
+    let pattern = Pattern::new(LidarModel::Scala2.kind());
     let meets = |&beam: &u16| {
         let (azimuth, elevation) = pattern.direction_rad(mirror_side, beam);
         let height = 0.6 + distance_m / azimuth.cos() * elevation.tan();
         (distance_m * azimuth.tan()).abs() < half_width_m && height > low_m && height < high_m
     };
-    (0..u16::try_from(BEAMS).unwrap()).filter(meets).count()
+    (0..u16::try_from(10_448).unwrap()).filter(meets).count()
 }
 
 #[test]
@@ -67,7 +67,7 @@ fn a_motorcycle_at_100_m_fills_three_columns() {
         setup.detect(&mut lidar, scan_index);
         let points = lidar.latest().beam.iter().zip(&lidar.truth().points);
         let on = points.filter(|(_, point)| point.source == PointSource::Actor(1));
-        let mut columns: Vec<usize> = on.map(|(&beam, _)| usize::from(beam) / LAYERS).collect();
+        let mut columns: Vec<usize> = on.map(|(&beam, _)| usize::from(beam) / 16).collect();
         columns.sort_unstable();
         columns.dedup();
         assert!((3..=4).contains(&columns.len()), "{columns:?}");

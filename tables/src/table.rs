@@ -13,7 +13,7 @@ use parquet::basic::Compression;
 use parquet::file::properties::WriterProperties;
 
 /// Number of rows in a row group: the unit that a writer holds in memory and that a reader can skip.
-pub(crate) const ROWS_PER_GROUP: usize = 8_192;
+pub const ROWS_PER_GROUP: usize = 8_192;
 
 /// Number of rows that are encoded at once. It divides the group, so that the bytes do not depend on it.
 pub(crate) const ROWS_PER_BATCH: usize = 1_024;
@@ -21,7 +21,7 @@ pub(crate) const ROWS_PER_BATCH: usize = 1_024;
 /// Returns the writer properties of every table.
 ///
 /// The file names neither a time nor a place nor a library version, so that equal rows give equal bytes.
-pub(crate) fn properties() -> WriterProperties {
+pub fn properties() -> WriterProperties {
     WriterProperties::builder()
         .set_created_by("closecall".to_owned())
         .set_compression(Compression::SNAPPY)
@@ -30,13 +30,13 @@ pub(crate) fn properties() -> WriterProperties {
 }
 
 /// Returns a column whose cells may be null. Its metadata holds its unit, if it has one.
-pub(crate) fn field(name: &str, data_type: DataType, unit: Option<&str>) -> Field {
+pub fn field(name: &str, data_type: DataType, unit: Option<&str>) -> Field {
     let metadata: HashMap<String, String> = unit.map(|unit| ("unit".to_owned(), unit.to_owned())).into_iter().collect();
     Field::new(name, data_type, true).with_metadata(metadata)
 }
 
 /// Returns a column in which every row has a value.
-pub(crate) fn required(name: &str, data_type: DataType, unit: Option<&str>) -> Field {
+pub fn required(name: &str, data_type: DataType, unit: Option<&str>) -> Field {
     field(name, data_type, unit).with_nullable(false)
 }
 

@@ -1,0 +1,62 @@
+//! The LiDAR that looks ahead: the chain of the rear LiDAR on a scene turned by half a turn.
+//!
+//! It measures the rears of the vehicles ahead, with their plates. The boxes are classified by their shape alone: no camera looks
+//! ahead. Two things differ from a chain made for this direction. While a vehicle ahead changes lanes, its lateral position is that
+//! of the middle of its rear, up to half a length times the sine of its heading from its centre. The processing allows for what of a
+//! vehicle's *front* may remain unseen.
+
+use closecall_tracking::{TrackList, TrackerModel};
+use closecall_traffic::Source;
+use closecall_traffic::ego_frame::EgoFrame;
+
+use crate::half_turn::{HalfTurn, turn_back};
+use crate::lidar::{Lidar, RearLidar};
+use crate::lidar_chain::{LidarChain, Seen};
+use crate::object::NoiseKey;
+use crate::{Alterations, Detection, Health, Scene, SensorError};
+
+/// The front LiDAR with its processing.
+pub(crate) struct FrontLidar {
+    chain: LidarChain,
+}
+
+impl FrontLidar {
+    /// Creates the chain before its first step, with random streams keyed by `key`.
+    pub(crate) fn new(lidar: Lidar, tracker: TrackerModel, key: &NoiseKey) -> Self {
+        Self { chain: LidarChain::new(lidar, tracker, key, ["front-lidar", "front-lidar-fault"]) }
+    }
+
+    /// Measures `scene`, which the ego believes to be `believed`, and appends the tracks to `list`.
+    ///
+    /// # Errors
+    /// [`SensorError`] if a model fails.
+    pub(crate) fn step(&mut self, [scene, believed]: [&Scene<'_>; 2], list: &mut TrackList) -> Result<(), SensorError> {
+        let turned = [scene, believed].map(HalfTurn::of);
+        let [scene, believed] = [&turned[0], &turned[1]].map(HalfTurn::scene);
+        let altered = &Alterations::default();
+        self.chain.detect(Seen { scene: &scene, believed: &believed, others: &[], altered }, None)?;
+        self.chain.update_tracker(-0.5 * scene.ego.vehicle.dimensions.length_m, list);
+        let first = list.tracks.len();
+        self.chain.report(scene.time, &EgoFrame::new(believed.road, &believed.ego.state), list);
+        for track in &mut list.tracks[first..] {
+            turn_back(track);
+            track.source = Source::Front;
+        }
+        Ok(())
+    }
+
+    /// Returns the sensor with its latest scan, in the turned frame.
+    pub(crate) fn lidar(&self) -> &RearLidar {
+        &self.chain.lidar
+    }
+
+    /// Returns the boxes of the latest scan, in the turned frame.
+    pub(crate) fn detections(&self) -> &[Detection] {
+        self.chain.detections()
+    }
+
+    /// Returns the health of the sensor.
+    pub(crate) fn health(&self) -> Health {
+        self.chain.health
+    }
+}

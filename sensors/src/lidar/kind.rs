@@ -1,0 +1,400 @@
+//! The kinds of LiDAR: scan pattern, rate, footprint and range as a file describes them.
+//!
+//! The shipped kinds are the files in `sensors/lidars`. A scenario names one of them by its `model`, or a file of its own by
+//! `pattern-file`.
+//!
+//! The range of a target of reflectivity ρ that fills the beam follows from one published range R at the reflectivity ρ₀, which is
+//! reached with the probability p: the received power is then P = 1 + Φ⁻¹(p)/T thresholds (see [`super::power`]). The nominal
+//! range of the model, at ρ = 0.5 with probability 0.5, is R·√(P·0.5/ρ₀).
+
+use std::sync::{Mutex, PoisonError};
+
+use closecall_traffic::{CONTROL_STEP, Check, ConfigError, Num, Parameters, Problem, Range, Time};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use statrs::distribution::{ContinuousCDF, Normal};
+
+use super::LidarModel;
+use super::pattern::GROUPS;
+use super::power::{NOMINAL_REFLECTIVITY, THRESHOLD_OVER_NOISE};
+
+/// Greatest number of layers.
+const MAX_LAYERS: usize = 64;
+/// Greatest elevation of a layer (°).
+const MAX_ELEVATION_DEG: f64 = 45.0;
+/// Greatest number of beams in a scan: beams are numbered with 16 bits.
+const MAX_BEAMS: usize = 65_535;
+/// Greatest difference from a whole number of azimuth steps (steps).
+const STEP_TOLERANCE: f64 = 1e-6;
+/// Decimals to which the tangent of half of the field of view is rounded, as a factor.
+const TANGENT_DECIMALS: f64 = 1e4;
+
+/// The scan pattern and the range of a kind of LiDAR, as a file describes them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct LidarKindConfig {
+    /// Name of the sensor.
+    pub name: String,
+    /// Where the numbers are published.
+    pub source: String,
+    /// Elevations of the layers at azimuth 0, without the mirror's contribution (deg): 1 to 64, from the lowest to the highest.
+    pub layers_deg: Vec<f64>,
+    /// Number of successive layers that share an azimuth shift: a divisor of the number of layers, which makes 4 groups or fewer.
+    /// Default: all layers.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub layers_per_group: Option<usize>,
+    /// Azimuth shift between successive groups (deg). Default: 0.
+    #[serde(default)]
+    pub group_shift_deg: f64,
+    /// Coefficients of 1, φ, φ² and φ³ of the elevation that one side of a two-sided mirror adds and the other subtracts (deg, with
+    /// the azimuth φ in deg). Default: the sensor has no such mirror.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mirror_cubic_deg: Option<[f64; 4]>,
+    /// Half of the horizontal field of view (deg): a whole number of azimuth steps.
+    pub half_field_deg: f64,
+    /// Azimuth step (deg).
+    pub azimuth_step_deg: f64,
+    /// Half of the field about the axis in which the steps are finer (deg). Default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fine_half_field_deg: Option<f64>,
+    /// Azimuth step in that field (deg). Default: `azimuth-step-deg`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fine_azimuth_step_deg: Option<f64>,
+    /// Width of a beam's footprint (deg).
+    pub beam_width_deg: f64,
+    /// Height of a beam's footprint (deg).
+    pub beam_height_deg: f64,
+    /// Spacing of the layers near the horizon (deg), from which the processing judges what a beam may have missed.
+    pub layer_spacing_deg: f64,
+    /// Scans per second (Hz), at most 25. A rate that does not divide 25 gives scans at alternating distances of whole control
+    /// steps of 40 ms.
+    pub rate_hz: f64,
+    /// Share of the period in which the field of view is swept (-). Default: that of a head or a mirror that passes 360° of azimuth
+    /// in each period.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sweep_share: Option<f64>,
+    /// Range at which a target of `range-reflectivity` is detected with `range-probability` (m).
+    pub range_m: f64,
+    /// Reflectivity of that target (-).
+    pub range_reflectivity: f64,
+    /// Probability of its detection in one scan by a beam that it fills (-).
+    pub range_probability: f64,
+    /// Range beyond which nothing is reported (m). Default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_range_m: Option<f64>,
+    /// Standard deviation of the range of a strong return (m).
+    pub range_sd_m: f64,
+    /// Additional standard deviation of the range at the detection threshold (m).
+    pub range_sd_at_threshold_m: f64,
+}
+
+/// The resolution of a scan, which the processing knows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Resolution {
+    pub(crate) columns: usize,
+    pub(crate) layers: usize,
+    /// Azimuth step outside of the fine field (rad).
+    pub(crate) step_rad: f64,
+    /// Half of the fine field (rad), and the step in it (rad).
+    pub(crate) fine_rad: [f64; 2],
+    /// Spacing of layers (rad).
+    pub(crate) layer_rad: f64,
+}
+
+impl Default for Resolution {
+    /// Returns the resolution of the SCALA.
+    fn default() -> Self {
+        LidarModel::Scala2.kind().resolution
+    }
+}
+
+/// A checked kind of LiDAR.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LidarKind {
+    /// Name of the sensor.
+    pub name: String,
+    pub(crate) layers_deg: Vec<f64>,
+    pub(crate) layers_per_group: usize,
+    pub(crate) group_shift_deg: f64,
+    pub(crate) mirror_cubic_deg: Option<[f64; 4]>,
+    /// Azimuth of each column (°).
+    pub(crate) azimuths_deg: Vec<f64>,
+    half_field_deg: f64,
+    /// Tangent of half of the field of view.
+    pub(crate) half_field_tan: f64,
+    pub(crate) beam_width_deg: f64,
+    pub(crate) beam_height_deg: f64,
+    /// Time from a scan to the next (ns).
+    period_ns: i64,
+    /// Duration of a sweep over the field of view (ns).
+    pub(crate) sweep_ns: f64,
+    /// Range at reflectivity 0.5 and probability 0.5 (m).
+    pub(crate) nominal_range_m: f64,
+    /// Range beyond which nothing is reported (m); infinite if there is no such bound.
+    pub(crate) max_range_m: f32,
+    /// Standard deviation of the range of a strong return, and what is added at the threshold (m).
+    pub(crate) range_sd_m: [f32; 2],
+    pub(crate) resolution: Resolution,
+}
+
+impl LidarKind {
+    /// Returns the number of layers.
+    pub(crate) fn layers(&self) -> usize {
+        self.layers_deg.len()
+    }
+
+    /// Returns the number of groups of layers.
+    pub(crate) fn groups(&self) -> usize {
+        self.layers() / self.layers_per_group
+    }
+
+    /// Returns the number of beams in a scan.
+    pub(crate) fn beams(&self) -> usize {
+        self.azimuths_deg.len() * self.layers()
+    }
+
+    /// Returns the time from a scan to the next (s).
+    pub(crate) fn period_s(&self) -> f64 {
+        Time::from_ns(self.period_ns).s()
+    }
+
+    /// Returns whether a scan ends at the control step of `time`: whether a period has ended since the previous step.
+    pub(crate) fn is_due(&self, time: Time) -> bool {
+        let periods_at = |time_ns: i64| time_ns.div_euclid(self.period_ns);
+        periods_at(time.ns()) != periods_at(time.ns() - CONTROL_STEP.ns())
+    }
+
+    /// Returns the time after the scan's start at which a column at this azimuth is measured (s), clamped to the sweep.
+    pub(crate) fn sweep_offset_s(&self, azimuth_deg: f64) -> f64 {
+        let share = ((azimuth_deg + self.half_field_deg) / (2.0 * self.half_field_deg)).clamp(0.0, 1.0);
+        share * self.sweep_ns * 1e-9
+    }
+}
+
+impl LidarKindConfig {
+    /// Reads the text of a file.
+    ///
+    /// # Errors
+    /// The message of the TOML reader.
+    pub fn parse(text: &str) -> Result<Self, toml::de::Error> {
+        toml::from_str(text)
+    }
+
+    /// Checks the keys, and returns the kind. The same keys always give the same reference.
+    ///
+    /// # Errors
+    /// [`ConfigError`] for the first wrong key.
+    pub fn kind(&self) -> Result<&'static LidarKind, ConfigError> {
+        Ok(intern(self.check(&Parameters::default())?))
+    }
+
+    /// Returns the azimuths of all columns (°).
+    fn azimuths_deg(&self) -> Result<Vec<f64>, ConfigError> {
+        let step = number(self.azimuth_step_deg, "azimuth-step-deg", Range::closed(0.02, 2.0))?;
+        let half = number(self.half_field_deg, "half-field-deg", Range::closed(5.0, 85.0))?;
+        let fine_half =
+            number(self.fine_half_field_deg.unwrap_or(0.0), "fine-half-field-deg", Range::closed(0.0, half))?;
+        let fine_step =
+            number(self.fine_azimuth_step_deg.unwrap_or(step), "fine-azimuth-step-deg", Range::closed(0.02, step))?;
+        let coarse = whole_steps(half - fine_half, step, "half-field-deg", "azimuth-step-deg")?;
+        let fine = whole_steps(fine_half, fine_step, "fine-half-field-deg", "fine-azimuth-step-deg")?;
+        let left = (0..coarse).map(|index| -half + f64::from(index) * step);
+        let middle = (-fine..=fine).map(|index| f64::from(index) * fine_step);
+        let right = (1..=coarse).map(|index| fine_half + f64::from(index) * step);
+        Ok(left.chain(middle).chain(right).collect())
+    }
+
+    /// Returns the number of layers of a group.
+    fn checked_group(&self) -> Result<usize, ConfigError> {
+        let layers = self.layers_deg.len();
+        let count = |value: usize, allowed| Problem::WrongCount { value: value as u64, allowed };
+        if !(1..=MAX_LAYERS).contains(&layers) {
+            return Err(ConfigError::new("layers-deg", count(layers, "a list of 1 to 64 elevations")));
+        }
+        for (index, pair) in self.layers_deg.windows(2).enumerate() {
+            if !(pair[0] < pair[1]) {
+                let problem = Problem::OutOfRange { value: pair[1], allowed: Range::above(pair[0], MAX_ELEVATION_DEG) };
+                return Err(ConfigError::new("layers-deg", problem).within_index(index + 1));
+            }
+        }
+        for elevation_deg in &self.layers_deg {
+            number(*elevation_deg, "layers-deg", Range::closed(-MAX_ELEVATION_DEG, MAX_ELEVATION_DEG))?;
+        }
+        let group = self.layers_per_group.unwrap_or(layers);
+        if group == 0 || layers % group != 0 || layers / group > GROUPS {
+            let allowed = "a divisor of the number of layers that makes 1 to 4 groups";
+            return Err(ConfigError::new("layers-per-group", count(group, allowed)));
+        }
+        Ok(group)
+    }
+
+    /// Returns the nominal range (m).
+    fn nominal_range_m(&self) -> Result<f64, ConfigError> {
+        let range_m = number(self.range_m, "range-m", Range::closed(5.0, 500.0))?;
+        let reflectivity = number(self.range_reflectivity, "range-reflectivity", Range::closed(0.01, 1.0))?;
+        let probability = number(self.range_probability, "range-probability", Range::closed(0.5, 0.99))?;
+        let above = match probability {
+            0.5 => 0.0,
+            _ => Normal::standard().inverse_cdf(probability),
+        };
+        let power = 1.0 + above / f64::from(THRESHOLD_OVER_NOISE);
+        Ok(range_m * (power * (NOMINAL_REFLECTIVITY / reflectivity)).sqrt())
+    }
+}
+
+fn number(value: f64, key: &str, range: Range) -> Result<f64, ConfigError> {
+    Parameters::default().number(&Num::Fixed(value), key, range)
+}
+
+/// Returns how many steps fit into a field.
+fn whole_steps(field_deg: f64, step_deg: f64, key: &str, of: &'static str) -> Result<i32, ConfigError> {
+    let steps = field_deg / step_deg;
+    if (steps - steps.round()).abs() > STEP_TOLERANCE {
+        let rule = format!("{field_deg}° must be a whole number of steps of {step_deg}°, not {steps:.3}");
+        return Err(ConfigError::new(key, Problem::Contradiction { other: of, rule }));
+    }
+    #[expect(clippy::cast_possible_truncation, reason = "at most 85° in steps of at least 0.02°")]
+    Ok(steps.round() as i32)
+}
+
+impl Check for LidarKindConfig {
+    type Checked = LidarKind;
+
+    fn check(&self, _: &Parameters) -> Result<LidarKind, ConfigError> {
+        let layers_per_group = self.checked_group()?;
+        let azimuths_deg = self.azimuths_deg()?;
+        let beams = azimuths_deg.len() * self.layers_deg.len();
+        if beams > MAX_BEAMS {
+            let problem = Problem::WrongCount { value: beams as u64, allowed: "a pattern of at most 65,535 beams" };
+            return Err(ConfigError::new("layers-deg", problem));
+        }
+        for coefficient in self.mirror_cubic_deg.iter().flatten() {
+            number(*coefficient, "mirror-cubic-deg", Range::closed(-5.0, 5.0))?;
+        }
+        let half_field_deg = self.half_field_deg;
+        let rate_hz = number(self.rate_hz, "rate-hz", Range::closed(1.0, 1.0 / CONTROL_STEP.s()))?;
+        let share = match self.sweep_share {
+            Some(share) => number(share, "sweep-share", Range::above(0.0, 1.0))?,
+            None => half_field_deg / 180.0,
+        };
+        #[expect(clippy::cast_possible_truncation, reason = "at most a second")]
+        let period_ns = (1e9 / rate_hz).round() as i64;
+        let degree = std::f64::consts::PI / 180.0;
+        let fine_step_deg = self.fine_azimuth_step_deg.unwrap_or(self.azimuth_step_deg);
+        let beam = Range::closed(0.01, 3.0);
+        let spacing_deg = number(self.layer_spacing_deg, "layer-spacing-deg", Range::closed(0.02, 10.0))?;
+        let resolution = Resolution {
+            columns: azimuths_deg.len(),
+            layers: self.layers_deg.len(),
+            step_rad: self.azimuth_step_deg * degree,
+            fine_rad: [self.fine_half_field_deg.unwrap_or(0.0) * degree, fine_step_deg * degree],
+            layer_rad: spacing_deg * degree,
+        };
+        #[expect(clippy::cast_possible_truncation, reason = "ranges need no more than single precision")]
+        let single = |value: f64, key, range| number(value, key, range).map(|value| value as f32);
+        Ok(LidarKind {
+            name: self.name.clone(),
+            layers_deg: self.layers_deg.clone(),
+            layers_per_group,
+            group_shift_deg: number(self.group_shift_deg, "group-shift-deg", Range::closed(0.0, 1.0))?,
+            mirror_cubic_deg: self.mirror_cubic_deg,
+            azimuths_deg,
+            half_field_deg,
+            half_field_tan: (half_field_deg.to_radians().tan() * TANGENT_DECIMALS).round() / TANGENT_DECIMALS,
+            beam_width_deg: number(self.beam_width_deg, "beam-width-deg", beam)?,
+            beam_height_deg: number(self.beam_height_deg, "beam-height-deg", beam)?,
+            period_ns,
+            // At the rate of the control loop, the product is that of whole numbers.
+            sweep_ns: match self.sweep_share {
+                None => period_ns as f64 * half_field_deg / 180.0,
+                Some(_) => period_ns as f64 * share,
+            },
+            nominal_range_m: self.nominal_range_m()?,
+            max_range_m: match self.max_range_m {
+                Some(max_range_m) => single(max_range_m, "max-range-m", Range::closed(5.0, 500.0))?,
+                None => f32::INFINITY,
+            },
+            range_sd_m: [
+                single(self.range_sd_m, "range-sd-m", Range::closed(0.0, 0.5))?,
+                single(self.range_sd_at_threshold_m, "range-sd-at-threshold-m", Range::closed(0.0, 0.5))?,
+            ],
+            resolution,
+        })
+    }
+}
+
+/// Returns the one reference to this kind. A process sees few kinds, so that they are never released.
+fn intern(kind: LidarKind) -> &'static LidarKind {
+    static KINDS: Mutex<Vec<&'static LidarKind>> = Mutex::new(Vec::new());
+    let mut kinds = KINDS.lock().unwrap_or_else(PoisonError::into_inner);
+    match kinds.iter().find(|known| ***known == kind) {
+        Some(known) => known,
+        None => {
+            let kind: &'static LidarKind = Box::leak(Box::new(kind));
+            kinds.push(kind);
+            kind
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn checked(change: impl Fn(&mut LidarKindConfig)) -> Result<&'static LidarKind, String> {
+        let mut config = LidarKindConfig::parse(LidarModel::Scala2.file()).unwrap();
+        change(&mut config);
+        config.kind().map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn every_shipped_file_is_read_and_the_same_file_is_the_same_kind() {
+        for model in LidarModel::ALL {
+            let config = LidarKindConfig::parse(model.file()).unwrap();
+            assert!(std::ptr::eq(config.kind().unwrap(), model.kind()), "{}", config.name);
+            assert!(config.source.len() > 40);
+            let word = serde_json::to_value(model).unwrap();
+            assert_eq!(word, config.name.as_str());
+        }
+    }
+
+    #[test]
+    fn the_scala_keeps_the_numbers_of_the_model() {
+        let kind = LidarModel::Scala2.kind();
+        assert_eq!((kind.beams(), kind.layers(), kind.groups()), (10_448, 16, 4));
+        assert_eq!(kind.nominal_range_m.to_bits(), 200.0_f64.to_bits());
+        assert_eq!(kind.half_field_tan.to_bits(), 2.2998_f64.to_bits());
+        assert_eq!(kind.sweep_ns.to_bits(), (40e6_f64 * 66.5 / 180.0).to_bits());
+        assert_eq!(kind.resolution.layer_rad.to_bits(), (0.6 * (std::f64::consts::PI / 180.0)).to_bits());
+        assert!((0..100).all(|step| kind.is_due(Time::from_ns(step * CONTROL_STEP.ns()))));
+    }
+
+    #[test]
+    fn a_rate_of_10_hz_gives_10_scans_in_a_second() {
+        let kind = LidarModel::Os1With64.kind();
+        let due = (-25..0).filter(|step| kind.is_due(Time::from_ns(step * CONTROL_STEP.ns()))).count();
+        assert_eq!(due, 10);
+        // 40 m at 10 % with probability 0.9: P = 1 + 1.2816/5, so that the nominal range is 40·√(1.2563·5) m.
+        assert!((kind.nominal_range_m - 100.25).abs() < 0.01, "{}", kind.nominal_range_m);
+    }
+
+    #[test]
+    fn a_wrong_value_is_answered_with_key_and_allowed_range() {
+        let error = checked(|config| config.rate_hz = 30.0).unwrap_err();
+        assert_eq!(error, "`rate-hz` is 30, but a number from 1 to 25 is needed");
+        let error = checked(|config| config.half_field_deg = 66.6).unwrap_err();
+        assert!(error.starts_with("`half-field-deg` contradicts `azimuth-step-deg`: "), "{error}");
+        let error = checked(|config| config.layers_deg.swap(3, 4)).unwrap_err();
+        assert!(error.contains("above -2.185"), "{error}");
+        let error = checked(|config| config.layers_per_group = Some(5)).unwrap_err();
+        assert!(error.contains("1 to 4 groups"), "{error}");
+        let error = checked(|config| config.layers_deg = Vec::new()).unwrap_err();
+        assert!(error.contains("1 to 64"), "{error}");
+        let error = checked(|config| config.range_probability = f64::NAN).unwrap_err();
+        assert!(error.contains("from 0.5 to 0.99"), "{error}");
+        let narrow = |config: &mut LidarKindConfig| {
+            (config.azimuth_step_deg, config.fine_half_field_deg, config.fine_azimuth_step_deg) = (0.02, None, None);
+        };
+        assert!(checked(narrow).unwrap_err().contains("65,535"));
+    }
+}

@@ -1,0 +1,101 @@
+//! The LiDAR that looks ahead.
+
+use closecall_traffic::{
+    ActorId, CONTROL_STEP, Check, Environment, Parameters, Road, Source, Time, Track, TrackStatus, VehicleClass,
+};
+
+use crate::testing::{OWN_LANE_M, scene_vehicle, with_speed};
+use crate::{NoiseKey, Perception, Scene, SceneVehicle, SensorsConfig};
+
+/// Returns the perception of these sensors.
+fn perception(sensors: &str) -> Box<dyn Perception> {
+    let text = format!("mode = \"full\"\nrear-camera.pipeline = \"off\"\n{sensors}");
+    let sensors = toml::from_str::<SensorsConfig>(&text).unwrap().check(&Parameters::default()).unwrap();
+    let key = NoiseKey { seed: 1, sample: 2, ego: ActorId::new("ego").unwrap(), actors: [].into() };
+    sensors.build(&key).unwrap()
+}
+
+/// Lets the ego drive at 30 m/s behind a vehicle, and returns the confirmed front tracks of the last step with the true gap.
+fn follow(sensors: &str, road: &Road, class: VehicleClass, [gap_m, speed_mps]: [f64; 2]) -> (Vec<Track>, f64) {
+    let mut perception = perception(sensors);
+    let environment = Environment::CLEAR_DAY;
+    let (mut tracks, mut true_gap_m) = (Vec::new(), 0.0);
+    for step in 0..75 {
+        let time = Time::from_ns(step * CONTROL_STEP.ns());
+        let ego = with_speed(scene_vehicle(0, VehicleClass::Car, 500.0 + 30.0 * time.s(), OWN_LANE_M), 30.0);
+        let mut lead = with_speed(scene_vehicle(1, class, 0.0, OWN_LANE_M + 0.3), speed_mps);
+        let half_m = |vehicle: &SceneVehicle| 0.5 * vehicle.vehicle.dimensions.length_m;
+        lead.state.s_m = 500.0 + half_m(&ego) + gap_m + half_m(&lead) + speed_mps * time.s();
+        true_gap_m = lead.state.s_m - ego.state.s_m - half_m(&ego) - half_m(&lead);
+        let scene = Scene { time, road, environment: &environment, ego, others: &[lead] };
+        tracks = perception.step(&scene).unwrap().to_vec();
+    }
+    tracks.retain(|track| track.source == Source::Front && track.status == TrackStatus::Confirmed);
+    (tracks, true_gap_m)
+}
+
+/// Asserts that the only front track lies where the vehicle is.
+fn assert_follows(sensors: &str, road: &Road, class: VehicleClass, motion: [f64; 2]) {
+    let (tracks, true_gap_m) = follow(sensors, road, class, motion);
+    let [track] = tracks.as_slice() else { panic!("{} tracks of {class:?} for {sensors}", tracks.len()) };
+    let gap_m = track.x_m() - 0.5 * track.length_m - 2.3;
+    assert!((gap_m - true_gap_m).abs() < 0.5, "{class:?}, {sensors}: {gap_m} instead of {true_gap_m}");
+    assert!((track.vx_mps() - motion[1]).abs() < 0.8, "{class:?}, {sensors}: {} m/s", track.vx_mps());
+    assert!(track.lane[1] > 0.9 && track.heading_rad.abs() < 0.1, "{:?} {}", track.lane, track.heading_rad);
+}
+
+#[test]
+fn a_vehicle_ahead_gives_one_track_with_gap_speed_and_lane() {
+    for class in VehicleClass::ALL {
+        assert_follows("front-lidar = {}", &Road::straight(3).with_guard_rails(), class, [45.0, 28.0]);
+        assert_follows("front-lidar = {}", &Road::straight(3), class, [30.0, 33.0]);
+    }
+    // On a bend the gap along the path of the ego differs from that along the reference line by less than the tolerance.
+    let bend = Road::straight(3).with_curvature(0.000_5).with_guard_rails();
+    assert_follows("front-lidar = {}", &bend, VehicleClass::Car, [40.0, 29.0]);
+}
+
+#[test]
+fn other_kinds_of_lidar_look_ahead_at_their_own_rate() {
+    for model in ["os1-64", "pandar-xt-16"] {
+        let sensors = format!("front-lidar.model = \"{model}\"");
+        assert_follows(&sensors, &Road::straight(3), VehicleClass::Car, [20.0, 29.0]);
+    }
+}
+
+#[test]
+fn a_front_lidar_leaves_the_tracks_of_the_other_sensors_as_they_are() {
+    let road = Road::straight(3);
+    let environment = Environment::CLEAR_DAY;
+    let run = |sensors: &str| {
+        let mut perception = perception(sensors);
+        let mut rear = Vec::new();
+        for step in 0..40 {
+            let time = Time::from_ns(step * CONTROL_STEP.ns());
+            let ego = with_speed(scene_vehicle(0, VehicleClass::Car, 500.0 + 30.0 * time.s(), OWN_LANE_M), 30.0);
+            let other = with_speed(scene_vehicle(1, VehicleClass::Car, 450.0 + 32.0 * time.s(), OWN_LANE_M), 32.0);
+            let scene = Scene { time, road: &road, environment: &environment, ego, others: &[other] };
+            let tracks = perception.step(&scene).unwrap().to_vec();
+            rear.extend(tracks.into_iter().filter(|track| track.source == Source::Rear).map(|track| track.state));
+        }
+        rear
+    };
+    let with_radar = run("");
+    assert!(!with_radar.is_empty());
+    assert_eq!(with_radar, run("front-lidar = {}"));
+}
+
+#[test]
+fn the_front_lidar_measures_the_vehicle_at_points() {
+    let mut perception = perception("front-lidar = {}");
+    let (road, environment) = (Road::straight(3), Environment::CLEAR_DAY);
+    let ego = with_speed(scene_vehicle(0, VehicleClass::Car, 500.0, OWN_LANE_M), 30.0);
+    let lead = with_speed(scene_vehicle(1, VehicleClass::Car, 530.0, OWN_LANE_M), 30.0);
+    let scene = Scene { time: Time::ZERO, road: &road, environment: &environment, ego, others: &[lead] };
+    perception.step(&scene).unwrap();
+    let lidar = perception.front_lidar().unwrap();
+    assert!(lidar.latest().len() > 100);
+    // In the turned frame, the rear of the vehicle ahead is 30 m less two half lengths behind the sensor.
+    let [detection] = perception.front_detections() else { panic!("{:?}", perception.front_detections()) };
+    assert!((detection.face_x_m + 30.0 - 2.3).abs() < 0.3, "{}", detection.face_x_m);
+}

@@ -1,0 +1,117 @@
+//! LiDARs whose scan pattern is a file of its own. It is read together with the scenario file.
+//!
+//! The contents of the file replace `pattern-file` in the text of the scenario. All later steps (checking, hashing, a campaign's
+//! manifest, replay) do not need the file.
+
+use std::path::Path;
+
+use closecall_sensors::lidar::{LidarConfig, LidarKindConfig};
+use toml_edit::{DocumentMut, Item, Value};
+
+use super::{ScenarioConfig, ScenarioError, locate};
+
+/// The key of the file, and the key that its contents become.
+const KEYS: [&str; 2] = ["pattern-file", "pattern"];
+
+/// Returns the text with the contents of each pattern file in place of its name, or `None` if there is none. `path` is the path of
+/// the scenario file.
+///
+/// # Errors
+/// [`ScenarioError`] with the path of the pattern file if the file cannot be read, or has a wrong key.
+pub(super) fn inline(path: &Path, text: &str, config: &ScenarioConfig) -> Result<Option<String>, ScenarioError> {
+    let mut document: Option<DocumentMut> = None;
+    for (key, lidar) in lidars(config) {
+        let Some(name) = &lidar.pattern_file else { continue };
+        let pattern = read(&path.with_file_name(name))?;
+        let syntax = |message: &str| {
+            let line = text.lines().position(|line| line.contains(KEYS[0])).map_or(1, |index| index + 1);
+            ScenarioError::Syntax { path: path.to_owned(), line, message: format!("`{}`: {message}", KEYS[0]) }
+        };
+        if lidar.pattern.is_some() {
+            return Err(syntax("contradicts `pattern`: one of the two describes the LiDAR"));
+        }
+        let document = match &mut document {
+            Some(document) => document,
+            none => none.insert(text.parse().map_err(|_| syntax("the scenario is not TOML"))?),
+        };
+        let table = document.get_mut("sensors").and_then(|sensors| sensors.get_mut(key));
+        let table = table.and_then(Item::as_table_like_mut);
+        let table = table.ok_or_else(|| syntax("the sensor must be written as a table"))?;
+        table.remove(KEYS[0]);
+        table.insert(KEYS[1], Item::Value(Value::InlineTable(pattern)));
+    }
+    Ok(document.map(|document| document.to_string()))
+}
+
+/// Returns the LiDARs of a scenario with their keys.
+fn lidars(config: &ScenarioConfig) -> impl Iterator<Item = (&'static str, &LidarConfig)> {
+    let front = config.sensors.front_lidar.as_ref().map(|lidar| ("front-lidar", lidar));
+    std::iter::once(("rear-lidar", &config.sensors.rear_lidar)).chain(front)
+}
+
+/// Reads and checks a pattern file.
+fn read(path: &Path) -> Result<toml_edit::InlineTable, ScenarioError> {
+    let text = std::fs::read_to_string(path).map_err(|source| ScenarioError::Read { path: path.to_owned(), source })?;
+    let syntax = |line, message| ScenarioError::Syntax { path: path.to_owned(), line, message };
+    let config = LidarKindConfig::parse(&text).map_err(|error| {
+        let line = locate::line_at(&text, error.span().map_or(0, |span| span.start));
+        syntax(line, error.message().to_owned())
+    })?;
+    config.kind().map_err(|source| {
+        let line = locate::line_of(&text, &source.path);
+        ScenarioError::Value { path: path.to_owned(), line, source: Box::new(source), at: String::new() }
+    })?;
+    let plain = toml::to_string(&config).map_err(|error| syntax(1, error.to_string()))?;
+    let document: DocumentMut = plain.parse().map_err(|error: toml_edit::TomlError| syntax(1, error.to_string()))?;
+    Ok(document.as_table().clone().into_inline_table())
+}
+
+#[cfg(test)]
+mod tests {
+    use closecall_sensors::lidar::LidarModel;
+
+    use super::super::{ScenarioFile, library};
+    use super::*;
+
+    fn parse(folder: &Path, pattern: &str) -> Result<ScenarioFile, ScenarioError> {
+        std::fs::write(folder.join("mine.toml"), pattern).unwrap();
+        let name = library::plain_names().next().unwrap();
+        let text = format!("base = \"{name}\"\nsensors.rear-lidar.pattern-file = \"mine.toml\"\n");
+        ScenarioFile::parse(&folder.join("scenario.toml"), &text, &[])
+    }
+
+    #[test]
+    fn the_contents_of_the_file_become_part_of_the_scenario() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = parse(folder.path(), LidarModel::Os1With64.file()).unwrap();
+        let lidar = &file.config().sensors.rear_lidar;
+        assert_eq!(lidar.pattern_file, None);
+        assert_eq!(lidar.pattern, Some(LidarKindConfig::parse(LidarModel::Os1With64.file()).unwrap()));
+        file.check().unwrap();
+        // The text needs the file no longer.
+        let again = ScenarioFile::parse(Path::new("elsewhere.toml"), file.text(), &[]).unwrap();
+        assert_eq!(again.config(), file.config());
+    }
+
+    #[test]
+    fn a_wrong_file_is_named_with_line_key_and_allowed_range() {
+        let folder = tempfile::tempdir().unwrap();
+        let shipped = LidarModel::Os1With64.file();
+        let fails = |pattern: &str| parse(folder.path(), pattern).unwrap_err().to_string();
+        let message = fails(&shipped.replace("rate-hz = 10.0", "rate-hz = 40.0"));
+        assert!(
+            message.contains("mine.toml:") && message.ends_with("`rate-hz` is 40, but a number from 1 to 25 is needed"),
+            "{message}"
+        );
+        let message = fails(&shipped.replace("beam-width-deg", "beam-widht-deg"));
+        assert!(message.contains("mine.toml:") && message.contains("unknown field `beam-widht-deg`"), "{message}");
+        let message = fails("");
+        assert!(message.contains("missing field"), "{message}");
+        std::fs::remove_file(folder.path().join("mine.toml")).unwrap();
+        let text = "base = \"free-overtake\"\nsensors.rear-lidar.pattern-file = \"mine.toml\"\n";
+        let name = library::plain_names().next().unwrap();
+        let text = text.replace("free-overtake", name);
+        let error = ScenarioFile::parse(&folder.path().join("scenario.toml"), &text, &[]).unwrap_err();
+        assert!(error.is_io() && error.to_string().contains("mine.toml"), "{error}");
+    }
+}

@@ -1,0 +1,122 @@
+//! The points of the LiDARs of a run, as a Parquet table with one row per return.
+//!
+//! | column | meaning |
+//! |---|---|
+//! | `sensor` | `rear-lidar` or `front-lidar` |
+//! | `frame`, `time_s` | number of the sensor's scan, and the time at which it ends (s) |
+//! | `mirror_side` | `plus` or `minus` if the sensor has a mirror with two sides |
+//! | `beam`, `column`, `layer` | beam = column · layers + layer; column 0 is the first that is swept, layer 0 the lowest |
+//! | `azimuth_rad`, `elevation_rad` | direction of the beam's centre in the sensor's frame (rad): x along its axis, y to the left of that |
+//! | `range_m` | measured range (m) |
+//! | `x_m`, `y_m`, `z_m` | the point in the ego's vehicle frame at the end of the scan (m), with the ego's motion and measured pitch compensated |
+//! | `intensity` | received power times range², scaled to the reflectivity of a target that fills the beam |
+//! | `offset_ns` | time of measurement after the start of the sweep (ns) |
+//! | `cluster` | number of the box that the point belongs to; null for ground, rails and noise |
+//! | `source`, `true_range_m` | the truth: the name of the actor, or `ground`, `guard-rail`, `spray`, `fog`, `false`; and the range without noise (m) |
+//!
+//! The scans are complete: they have the returns of the bare road, which a simulation leaves out because the detector discards them.
+
+use std::fs::File;
+use std::io::{self, Seek};
+use std::path::{Path, PathBuf};
+
+use closecall_scenarios::atomic::{WriteError, check_writable, write_file};
+use closecall_sensors::lidar::RearLidar;
+use closecall_simulation::{Observer, RunEvent, StepView};
+use closecall_traffic::Time;
+use parquet::arrow::ArrowWriter;
+
+use crate::scan_columns::{Mounting, ScanColumns};
+use crate::table::properties;
+
+/// Number of rows that are collected before they are written.
+const ROWS_IN_MEMORY: usize = 65_536;
+
+/// Observes a run and writes the returns of its LiDARs.
+pub struct ScanWriter {
+    path: PathBuf,
+    writer: ArrowWriter<File>,
+    rows: ScanColumns,
+    /// Number of scans of the front and of the rear LiDAR, and the end of the latest.
+    frames: [(u32, Option<Time>); 2],
+    /// The first error, after which nothing is written.
+    failed: Option<io::Error>,
+}
+
+impl ScanWriter {
+    /// Creates a writer of the Parquet file `path`.
+    ///
+    /// # Errors
+    /// [`WriteError`] if the extension is not `.parquet`, or if no file can be created there.
+    pub fn new(path: &Path) -> Result<Self, WriteError> {
+        let fail = |error| WriteError::new(path, error);
+        if path.extension().is_none_or(|extension| extension != "parquet") {
+            return Err(fail(io::Error::new(io::ErrorKind::InvalidInput, "scans are a file *.parquet")));
+        }
+        check_writable(path)?;
+        let file = tempfile::tempfile().map_err(fail)?;
+        let writer = ArrowWriter::try_new(file, ScanColumns::schema(), Some(properties()));
+        let writer = writer.map_err(|error| fail(io::Error::other(error)))?;
+        Ok(Self { path: path.to_owned(), writer, rows: ScanColumns::default(), frames: [(0, None); 2], failed: None })
+    }
+
+    /// Completes the file.
+    ///
+    /// # Errors
+    /// [`WriteError`] if the run had no LiDAR, or if the file cannot be written completely. An existing file then stays as it is.
+    pub fn finish(mut self) -> Result<(), WriteError> {
+        let path = self.path.clone();
+        let fail = |error| WriteError::new(&path, error);
+        if self.frames.iter().all(|(count, _)| *count == 0) {
+            let message = "the run has no LiDAR, which only sensors of mode `full` have (--sensors full)";
+            return Err(fail(io::Error::new(io::ErrorKind::InvalidInput, message)));
+        }
+        self.flush();
+        if let Some(error) = self.failed {
+            return Err(fail(error));
+        }
+        let mut file = self.writer.into_inner().map_err(|error| fail(io::Error::other(error)))?;
+        file.rewind().map_err(fail)?;
+        write_file(&path, |to| io::copy(&mut file, to).map(drop))
+    }
+
+    /// Writes the collected rows.
+    fn flush(&mut self) {
+        if self.failed.is_none() {
+            let batch = self.rows.take_batch();
+            let written = batch.and_then(|batch| self.writer.write(&batch).map_err(io::Error::other));
+            self.failed = written.err();
+        }
+    }
+
+    /// Appends the latest scan of a LiDAR, if it is a new one.
+    fn append(&mut self, mounting: Mounting, lidar: &RearLidar, view: &StepView<'_>) {
+        let (count, latest) = &mut self.frames[mounting as usize];
+        if lidar.latest().end != view.time || *latest == Some(view.time) {
+            return;
+        }
+        let frame = *count;
+        (*count, *latest) = (frame + 1, Some(view.time));
+        // The scan of the simulation has clustered without an error before, and so does the complete one.
+        let Ok(complete) = lidar.completed() else { return };
+        let actors = &view.scenario.actors;
+        let name = |index: usize| actors.get(index).map_or_else(|| index.to_string(), |actor| actor.id.to_string());
+        self.rows.append((mounting, frame), &complete, &name);
+    }
+}
+
+impl Observer for ScanWriter {
+    fn step(&mut self, view: &StepView<'_>) {
+        if let Some(lidar) = view.perception.front_lidar() {
+            self.append(Mounting::Front, lidar, view);
+        }
+        if let Some(lidar) = view.perception.rear_lidar() {
+            self.append(Mounting::Rear, lidar, view);
+        }
+        if self.rows.len() >= ROWS_IN_MEMORY {
+            self.flush();
+        }
+    }
+
+    fn event(&mut self, _: Time, _: &RunEvent) {}
+}

@@ -1,0 +1,102 @@
+//! The table of scans is read back, and compared with itself and with the truth.
+#![expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
+
+use std::path::Path;
+
+use arrow::array::{Array, Float32Array, Float64Array, Int32Array, RecordBatch, StringArray, UInt16Array, UInt32Array};
+use closecall_simulation::controller::BuiltIn;
+use closecall_simulation::scenario::{Scenario, ScenarioFile};
+use closecall_simulation::{Arm, RunKey, simulate};
+use closecall_tables::RunTables;
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+
+/// Returns a scenario of the library with these sensors, cut to a second.
+fn scenario(sensors: &str) -> Scenario {
+    let text =
+        format!("base = \"low-thw-overtake\"\nduration-s = 1.0\nsensors.rear-camera.pipeline = \"off\"\n{sensors}");
+    let file = ScenarioFile::parse(Path::new("scans.toml"), &text, &[]).unwrap();
+    file.concrete(&file.space().nominal()).unwrap()
+}
+
+/// Runs the scenario, writes its scans to `path`, and returns the error if there is one.
+fn write(path: &Path, sensors: &str) -> Result<(), String> {
+    let scenario = scenario(sensors);
+    let mut tables = RunTables::new(None, Some(path)).map_err(|error| error.to_string())?;
+    let arm = Arm { controller: BuiltIn::Acc.factory(), sensors: None };
+    simulate(&scenario, RunKey { seed: 1, sample: 0 }, &arm, &mut tables).unwrap();
+    tables.finish().map_err(|error| error.to_string())
+}
+
+/// Returns all rows of a table.
+fn read(path: &Path) -> Vec<RecordBatch> {
+    let file = std::fs::File::open(path).unwrap();
+    ParquetRecordBatchReaderBuilder::try_new(file).unwrap().build().unwrap().map(Result::unwrap).collect()
+}
+
+fn column<'a, T: 'static>(batch: &'a RecordBatch, name: &str) -> &'a T {
+    batch.column_by_name(name).unwrap_or_else(|| panic!("{name}")).as_any().downcast_ref().unwrap()
+}
+
+#[test]
+fn the_points_of_both_lidars_are_read_back_with_beam_range_time_and_truth() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scans.parquet");
+    write(&path, "sensors.mode = \"full\"\nsensors.front-lidar.model = \"os1-64\"\n").unwrap();
+    let (mut rows, mut of_actors, mut clustered, mut sides) = (0, 0, 0, Vec::new());
+    let mut frames = [0, 0];
+    for batch in read(&path) {
+        let text = |name| column::<StringArray>(&batch, name);
+        let single = |name| column::<Float32Array>(&batch, name);
+        let (sensor, source, side) = (text("sensor"), text("source"), text("mirror_side"));
+        let (range_m, true_range_m, intensity) = (single("range_m"), single("true_range_m"), single("intensity"));
+        let [azimuth_rad, elevation_rad, x_m] = ["azimuth_rad", "elevation_rad", "x_m"].map(single);
+        let [beam, of_column, layer] = ["beam", "column", "layer"].map(|name| column::<UInt16Array>(&batch, name));
+        let (cluster, frame) = (column::<Int32Array>(&batch, "cluster"), column::<UInt32Array>(&batch, "frame"));
+        let (time_s, offset_ns) =
+            (column::<Float64Array>(&batch, "time_s"), column::<UInt32Array>(&batch, "offset_ns"));
+        for row in 0..batch.num_rows() {
+            let is_rear = sensor.value(row) == "rear-lidar";
+            let (layers, rate_hz) = if is_rear { (16, 25) } else { (64, 10) };
+            assert_eq!(beam.value(row), of_column.value(row) * layers + layer.value(row));
+            assert!((0.0..=1.0).contains(&time_s.value(row)) && offset_ns.value(row) < 1_000_000_000 / rate_hz);
+            // The error of a range is below four standard deviations at the threshold; droplets and faults there are none.
+            assert!(
+                (range_m.value(row) - true_range_m.value(row)).abs() < 0.4,
+                "{} {}",
+                range_m.value(row),
+                true_range_m.value(row)
+            );
+            assert!(
+                intensity.value(row) > 0.0
+                    && azimuth_rad.value(row).abs() < 1.17
+                    && elevation_rad.value(row).abs() < 0.3
+            );
+            assert_eq!(x_m.value(row) < 0.0, is_rear, "the rear sensor sees what is behind the ego's origin");
+            assert_eq!(side.is_valid(row), is_rear, "the OS1 has no mirror");
+            if is_rear && !sides.contains(&side.value(row).to_owned()) {
+                sides.push(side.value(row).to_owned());
+            }
+            of_actors += usize::from(["front", "rear"].contains(&source.value(row)));
+            clustered += usize::from(cluster.is_valid(row));
+            let frames = &mut frames[usize::from(is_rear)];
+            *frames = (frame.value(row) + 1).max(*frames);
+        }
+        rows += batch.num_rows();
+    }
+    assert!(rows > 10_000 && of_actors > 500 && clustered > 500, "{rows} {of_actors} {clustered}");
+    assert!(clustered < rows, "the road belongs to no box");
+    assert_eq!(sides.len(), 2, "{sides:?}");
+    // A second has 26 control steps with its ends.
+    assert!((10..=11).contains(&frames[0]) && (25..=26).contains(&frames[1]), "{frames:?}");
+}
+
+#[test]
+fn a_run_without_a_lidar_and_a_wrong_extension_are_answered() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scans.parquet");
+    let error = write(&path, "sensors.mode = \"object\"\n").unwrap_err();
+    assert!(error.contains("scans.parquet") && error.contains("--sensors full"), "{error}");
+    assert!(!path.exists());
+    let error = write(&folder.path().join("scans.pcd"), "").unwrap_err();
+    assert!(error.contains("*.parquet"), "{error}");
+}
