@@ -1,6 +1,7 @@
 //! Exit codes. An exit code is a verdict or the kind of a failure, never a count.
 
 use closecall_campaign::failure::FailureKind;
+use closecall_campaign::interrupt::Signal;
 use closecall_campaign::verdict::{Decision, Judgement};
 use closecall_scenarios::atomic::WriteError;
 use closecall_simulation::scenario::ScenarioError;
@@ -68,6 +69,16 @@ impl ExitCode {
 impl From<ExitCode> for std::process::ExitCode {
     fn from(code: ExitCode) -> Self {
         Self::from(code as u8)
+    }
+}
+
+/// Returns 128 plus the number of the signal.
+impl From<Signal> for ExitCode {
+    fn from(signal: Signal) -> Self {
+        match signal {
+            Signal::Interrupt => Self::Interrupted,
+            Signal::Terminate => Self::Terminated,
+        }
     }
 }
 

@@ -1,5 +1,5 @@
 //! The `closecall` program.
 
 fn main() -> std::process::ExitCode {
-    closecall::cli::main().into()
+    closecall::cli::main(std::env::args().collect()).into()
 }

@@ -16,6 +16,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use closecall_scenarios::atomic::{WriteError, is_temporary, write_file};
+use closecall_simulation::outcome::Outcome;
 
 use super::journal::{self, Entry, Journal};
 use super::lock::Lock;
@@ -180,6 +181,22 @@ impl Folder {
             }
             Err(source) => Some(Err(FolderError::Read { path: path.clone(), source })),
         }))
+    }
+
+    /// Returns false if the journal has a result of this sample that differs in any bit. Returns true if it has none.
+    ///
+    /// # Errors
+    /// [`FolderError`] if a line of the journal is damaged or cannot be read.
+    pub fn agrees_with(&self, outcome: &Outcome) -> Result<bool, FolderError> {
+        let Ok(records) = self.records() else { return Ok(true) };
+        for record in records {
+            let record = record?;
+            if record.scenario == outcome.scenario && record.sample == outcome.sample {
+                let same_arm = record.arms.iter().find(|arm| arm.controller == outcome.controller);
+                return Ok(same_arm.is_none_or(|arm| arm.result.as_ref().is_ok_and(|kept| kept.has_same_bits(outcome))));
+            }
+        }
+        Ok(true)
     }
 
     /// Returns the wall time of each sample, in the order of the plan.

@@ -3,6 +3,7 @@
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use closecall_sensors::SensorMode;
 use closecall_simulation::Arm;
@@ -24,6 +25,9 @@ pub const MANIFEST_VERSION: u32 = 2;
 /// Length of the build's identifier in a version (hexadecimal digits).
 const BUILD_DIGITS: usize = 16;
 
+/// The file that holds this program, if it is not the executable.
+static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
+
 /// Number of parts of the executable that are hashed at the same time.
 const HASH_PARTS: u64 = 8;
 
@@ -34,7 +38,8 @@ const HASH_PARTS: u64 = 8;
 /// executable without one is hashed, which takes longer than a short campaign.
 pub fn version() -> String {
     let release = env!("CARGO_PKG_VERSION");
-    let build = std::env::current_exe().and_then(|path| match build_id(&path) {
+    let program = PROGRAM.get().map_or_else(std::env::current_exe, |path| Ok(path.clone()));
+    let build = program.and_then(|path| match build_id(&path) {
         Some(id) => Ok(id.iter().map(|byte| format!("{byte:02x}")).collect()),
         None => parts_hash(&path).map(|hash| hash.to_hex().to_string()),
     });
@@ -42,6 +47,11 @@ pub fn version() -> String {
         Ok(build) => format!("{release}+{}", build.chars().take(BUILD_DIGITS).collect::<String>()),
         Err(_) => release.to_owned(),
     }
+}
+
+/// Sets the file that holds this program, if it is not the executable: the library that an interpreter has loaded.
+pub fn set_program(library: PathBuf) {
+    PROGRAM.get_or_init(|| library);
 }
 
 /// Returns the identifier that the linker wrote into an executable, or `None` if there is none of at least

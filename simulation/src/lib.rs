@@ -27,5 +27,5 @@ mod world;
 pub use closecall_traffic::CONTROL_STEP;
 pub use run::{
     Arm, ControllerFactory, CurrentMargins, Lead, NoObserver, Observer, RunEvent, RunKey, SampleError, StepView,
-    TrackAuditor, simulate,
+    Stepper, TrackAuditor, simulate,
 };

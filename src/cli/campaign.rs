@@ -14,6 +14,7 @@ use closecall_campaign::partition::Partition;
 use closecall_campaign::plan::Plan;
 use closecall_campaign::runner::Sampling;
 use closecall_campaign::selection::Selection;
+use closecall_campaign::session;
 use closecall_campaign::stop::{StopMonitor, StopRule};
 use closecall_campaign::wall_times::check_share;
 use closecall_campaign::workers::Workers;
@@ -23,7 +24,7 @@ use closecall_report::json;
 use closecall_scenarios::sampling::Design;
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::scenario::source::expand;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::CliError;
 use super::args::{Format, SensorsChoice, SetArgs};
@@ -32,7 +33,6 @@ use super::backend::check_backend;
 use super::ending::{EndArgs, Ending};
 use super::ensemble::EnsembleArgs;
 use super::gates::GateArgs;
-use super::interrupt::{received, stop_gracefully};
 use super::output::{heartbeat, out, outln, print_error, print_report_files};
 use super::plan::PlanArgs;
 use crate::exit_code::ExitCode;
@@ -123,13 +123,13 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
     let gates = args.gates.gates(is_paired, args.design, args.plan.preset_gates(is_paired))?;
     let plan = args.plan(controllers)?;
     check_backend(plan.uses_classifier())?;
-    let (mut campaign, manifest) = (plan.campaign(), plan.manifest(std::env::args().collect())?);
+    let (mut campaign, manifest) = (plan.campaign(), plan.manifest(session::arguments())?);
     let locked = match &args.out {
         Some(path) => Some(Folder::lock(path, &manifest, args.resume)?),
         None => None,
     };
     campaign.retry_errors = args.end.retry_errors;
-    stop_gracefully(&campaign.stop);
+    session::stop_on_request(&mut campaign.stop);
     let started = Instant::now();
     let stop = StopRule {
         until_certain: gates.probability.as_ref().map(|spec| spec.gate).filter(|_| args.plan.until_certain),
@@ -140,7 +140,9 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
     let resumption = campaign.run(locked.as_ref(), |next| progress.push(next))?;
     progress.bar.finish_and_clear();
     resumption.messages().iter().for_each(|message| print_error(format_args!("{message}\n")));
-    if let Some(ending) = received().map(Ending::Signal).or_else(|| progress.end.into_ending().map(Ending::Rule)) {
+    if let Some(ending) =
+        session::received().map(Ending::Signal).or_else(|| progress.end.into_ending().map(Ending::Rule))
+    {
         return Ok(ending.print(args.format, &campaign, &progress.tally.summary, args.out.as_deref()));
     }
     let wall_s = started.elapsed().as_secs_f64();
@@ -197,6 +199,7 @@ impl Progress {
     fn push(&mut self, next: NextRecord<'_>) -> ControlFlow<End> {
         self.tally.push(next.record);
         self.bar.inc(1);
+        session::report(self.bar.position(), self.bar.length().unwrap_or_default());
         self.spent_s = [0, 1].map(|index| self.spent_s[index] + next.spent_s[index]);
         if !next.is_new {
             // Records read from the journal say nothing about how long the rest will take.
@@ -211,6 +214,9 @@ impl Progress {
 /// Returns a progress bar. It is shown on standard error if that is a terminal.
 pub(super) fn progress_bar(samples: u64) -> ProgressBar {
     let bar = ProgressBar::new(samples);
+    if session::is_active() {
+        bar.set_draw_target(ProgressDrawTarget::hidden());
+    }
     if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} samples, {per_sec}, {eta} left") {
         bar.set_style(style);
     }

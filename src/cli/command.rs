@@ -3,14 +3,16 @@
 use std::path::PathBuf;
 
 use clap::{CommandFactory, Parser, Subcommand};
+use closecall_campaign::interrupt::watch;
+use closecall_campaign::session::{Printed, Session, set_arguments};
 use closecall_simulation::controller::exec::{adopt_orphans, end_all};
 
 use super::backend::choose_backend;
-use super::output::print_error;
+use super::output::{announce, print_error};
 use super::{
-    CliError, baseline, calibrate, campaign, causes, check, compare, drift, generate, inspect, interrupt, library,
-    merge, new, paper, plot, record, reenact, render, replay, robustness, run, sample, schema, sensors, statistics,
-    study, trajectories, view, watching,
+    CliError, baseline, calibrate, campaign, causes, check, compare, drift, generate, inspect, library, merge, new,
+    paper, plot, record, reenact, render, replay, robustness, run, sample, schema, sensors, statistics, study,
+    trajectories, view, watching,
 };
 use crate::exit_code::ExitCode;
 
@@ -120,15 +122,16 @@ enum Command {
     Man(generate::ManArgs),
 }
 
-/// Runs the program with the arguments of the process.
-pub fn main() -> ExitCode {
+/// Runs the program with these arguments, of which the first is the program's name.
+pub fn main(arguments: Vec<String>) -> ExitCode {
+    set_arguments(arguments.clone());
     // Messages name their causes themselves. Lines are not wrapped, so that paths can be copied.
     let handler = |_: &_| -> Box<dyn miette::ReportHandler> {
         Box::new(miette::MietteHandlerOpts::new().without_cause_chain().wrap_lines(false).build())
     };
     // If a hook is already set, the program that uses this crate as a library has set it: it stays.
     drop(miette::set_hook(Box::new(handler)));
-    let cli = match Cli::try_parse() {
+    let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,
         Err(error) => {
             // Help and version are not errors: clap prints them to standard output.
@@ -137,7 +140,7 @@ pub fn main() -> ExitCode {
         }
     };
     adopt_orphans();
-    interrupt::watch();
+    watch(announce, |signal| std::process::exit(ExitCode::from(signal) as i32));
     choose_backend(cli.onnxruntime.as_deref());
     let result = dispatch(cli.command);
     end_all();
@@ -149,6 +152,16 @@ pub fn main() -> ExitCode {
             code
         }
     }
+}
+
+/// Runs a command that another program calls, and returns the exit code of the command line and what it has printed. The first
+/// of the arguments is the program's name.
+pub fn call(session: &Session, arguments: Vec<String>) -> (Result<ExitCode, CliError>, Printed) {
+    session.run(arguments.clone(), || {
+        let cli = Cli::try_parse_from(arguments).map_err(|error| CliError::refused(&error.to_string()))?;
+        choose_backend(cli.onnxruntime.as_deref());
+        dispatch(cli.command)
+    })
 }
 
 fn dispatch(command: Command) -> Result<ExitCode, CliError> {

@@ -6,11 +6,12 @@ use std::path::Path;
 use clap::Args;
 use closecall_campaign::end_rule::{EarlyEnd, EndRule, EndedEarly};
 use closecall_campaign::execution::Campaign;
+use closecall_campaign::interrupt::Signal;
+use closecall_campaign::session;
 use closecall_campaign::summary::Summary;
 use closecall_report::campaign::CountsText;
 
 use super::args::Format;
-use super::interrupt::Signal;
 use super::output::{out, outln};
 use crate::exit_code::ExitCode;
 
@@ -48,7 +49,7 @@ impl EndArgs {
 impl Ending {
     fn exit_code(&self) -> ExitCode {
         match self {
-            Self::Signal(signal) => signal.exit_code(),
+            Self::Signal(signal) => (*signal).into(),
             Self::Rule(EarlyEnd::Failure { is_error: false, .. }) => ExitCode::Fail,
             Self::Rule(EarlyEnd::Failure { is_error: true, .. } | EarlyEnd::Errors { .. }) => ExitCode::SampleError,
         }
@@ -67,7 +68,7 @@ impl Ending {
             message: self.message(),
             ending: if let Self::Rule(ending) = self { Some(ending) } else { None },
             samples: [summary.total().samples, campaign.len()],
-            kept: out.map(|out| (out, std::env::args().collect())),
+            kept: out.map(|out| (out, session::arguments())),
         };
         match format {
             Format::Json => outln!("{:#}", ended.json()),

@@ -161,6 +161,12 @@ impl CliError {
     pub(super) fn usage(message: impl Into<String>) -> Self {
         Self::Usage { message: message.into() }
     }
+
+    /// Returns the error of arguments that clap refuses, without clap's advice to read the help.
+    pub(super) fn refused(message: &str) -> Self {
+        let message = message.split("\n\nUsage:").next().unwrap_or_default();
+        Self::usage(message.trim().trim_start_matches("error: "))
+    }
 }
 
 impl From<SourceError> for CliError {

@@ -6,6 +6,7 @@ use clap::Args;
 use closecall_campaign::merge::Parts;
 use closecall_campaign::saved::{SavedCampaign, works};
 use closecall_campaign::selection::Selection;
+use closecall_campaign::session;
 use closecall_report::campaign::{CampaignReport, CountsText, Tally, VerdictText, ensemble_text};
 use closecall_report::json;
 
@@ -41,7 +42,7 @@ pub(super) fn merge(args: &MergeArgs) -> Result<ExitCode, CliError> {
     parts.check(&works)?;
     let is_paired = works.iter().all(|work| work.arms.len() > 1);
     let gates = args.gates.gates(is_paired, parts.manifest().sampling.design, None)?;
-    let merged = parts.merge(&works, &args.out, std::env::args().collect())?;
+    let merged = parts.merge(&works, &args.out, session::arguments())?;
     let saved = SavedCampaign::of(merged.folder.clone())?;
     let tally = Tally::of(&saved, &works, &gates)?;
     let judged = tally.judgement();

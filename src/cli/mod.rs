@@ -17,7 +17,6 @@ mod error;
 mod gates;
 mod generate;
 mod inspect;
-mod interrupt;
 mod library;
 mod merge;
 mod new;
@@ -42,5 +41,5 @@ mod view;
 mod watch;
 mod watching;
 
-pub use command::main;
+pub use command::{call, main};
 pub use error::CliError;

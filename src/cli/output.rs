@@ -5,6 +5,8 @@ use std::io::{ErrorKind, IsTerminal, Write, stderr, stdout};
 use std::path::{Path, PathBuf};
 
 use closecall_campaign::folder::{Folder, REPORT_FILES};
+use closecall_campaign::interrupt::Signal;
+use closecall_campaign::session;
 use closecall_report::heartbeat::Heartbeat;
 use closecall_scenarios::atomic::{WriteError, write_texts};
 use closecall_simulation::scenario::ScenarioFile;
@@ -15,6 +17,9 @@ use crate::exit_code::ExitCode;
 /// Prints to standard output. A reader that has closed the pipe (`closecall … | head`) does not change the exit code.
 /// Any other failure ends the program with [`ExitCode::Io`].
 pub(super) fn print(text: Arguments<'_>) {
+    if session::keep_output(text) {
+        return;
+    }
     let mut out = stdout().lock();
     if let Err(error) = out.write_fmt(text).and_then(|()| out.flush())
         && error.kind() != ErrorKind::BrokenPipe
@@ -26,7 +31,16 @@ pub(super) fn print(text: Arguments<'_>) {
 
 /// Prints to standard error. A failure is ignored, since there is nowhere left to report it.
 pub(super) fn print_error(text: Arguments<'_>) {
+    if session::keep_message(text) {
+        return;
+    }
     drop(stderr().lock().write_fmt(text));
+}
+
+/// Prints which signal stops the running campaign.
+pub(super) fn announce(signal: Signal) {
+    let name = signal.name();
+    print_error(format_args!("\n{name}: running samples are completed; a second signal ends at once\n"));
 }
 
 /// Prints to standard error which file was written. Standard output may be read by a program.
@@ -43,12 +57,16 @@ pub(super) fn write_charts(folder: &Path, paths: &[PathBuf], charts: &[String]) 
 pub(super) fn heartbeat(bar: &ProgressBar) -> Option<Heartbeat> {
     let bar = bar.clone();
     let progress = move || [bar.position(), bar.length().unwrap_or_default()];
-    (!stderr().is_terminal()).then(|| Heartbeat::start(progress, |line| print_error(format_args!("{line}\n"))))
+    (!session::is_active() && !stderr().is_terminal())
+        .then(|| Heartbeat::start(progress, |line| print_error(format_args!("{line}\n"))))
 }
 
 /// Returns the command line of this program, as it was called.
 pub(super) fn command_line() -> String {
-    std::iter::once("closecall".to_owned()).chain(std::env::args().skip(1)).collect::<Vec<_>>().join(" ")
+    std::iter::once("closecall".to_owned())
+        .chain(session::arguments().into_iter().skip(1))
+        .collect::<Vec<_>>()
+        .join(" ")
 }
 
 /// Returns the text of a scenario that was made from the trajectory file `source`, with a heading that states its origin.

@@ -1,10 +1,8 @@
 //! `closecall replay`: runs one sample of a campaign again, and compares the outcome bit for bit unless settings change it.
 
 use clap::Args;
-use closecall_campaign::folder::Folder;
 use closecall_campaign::manifest::{Manifest, version};
 use closecall_campaign::saved::SavedCampaign;
-use closecall_simulation::outcome::Outcome;
 
 use super::CliError;
 use super::args::{Format, SavedSampleArgs, SetArgs};
@@ -55,7 +53,7 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<ExitCode, CliError> {
     }
     let mut agrees = true;
     for outcome in &outcomes {
-        agrees &= agrees_with_journal(saved.folder(), outcome)?;
+        agrees &= saved.folder().agrees_with(outcome)?;
     }
     if agrees {
         return Ok(ExitCode::Pass);
@@ -80,17 +78,4 @@ fn announce_process(manifest: &Manifest, name: &str) {
             print_error(format_args!("running the controller that the campaign names: {}\n", exec.command));
         }
     }
-}
-
-/// Returns false if the journal has a result of this sample that differs in any bit. Returns true if it has none.
-fn agrees_with_journal(folder: &Folder, outcome: &Outcome) -> Result<bool, CliError> {
-    let Ok(records) = folder.records() else { return Ok(true) };
-    for record in records {
-        let record = record?;
-        if record.scenario == outcome.scenario && record.sample == outcome.sample {
-            let same_arm = record.arms.iter().find(|arm| arm.controller == outcome.controller);
-            return Ok(same_arm.is_none_or(|arm| arm.result.as_ref().is_ok_and(|kept| kept.has_same_bits(outcome))));
-        }
-    }
-    Ok(true)
 }

@@ -8,6 +8,7 @@ use closecall_campaign::execution::CampaignError;
 use closecall_campaign::frontier::{FrontierPlan, Grid};
 use closecall_campaign::runner::Sampling;
 use closecall_campaign::sensitivity::{FactorRange, Method, SensitivityPlan};
+use closecall_campaign::session;
 use closecall_campaign::stop::StopFlag;
 use closecall_campaign::workers::Workers;
 use closecall_report::study::{Study, write_study};
@@ -20,7 +21,6 @@ use super::args::{Format, SensorsChoice, SetArgs};
 use super::arms::ControllerArgs;
 use super::backend::check_backend;
 use super::campaign::progress_bar;
-use super::interrupt::{Signal, received, stop_gracefully};
 use super::output::{heartbeat, out, outln, print_written};
 use crate::exit_code::ExitCode;
 
@@ -109,8 +109,8 @@ impl StudyArgs {
         steps: u64,
         study: impl FnOnce(&StopFlag, &mut dyn FnMut()) -> Result<Option<T>, E>,
     ) -> Result<Option<T>, E> {
-        let (stop, bar) = (StopFlag::default(), progress_bar(steps));
-        stop_gracefully(&stop);
+        let (mut stop, bar) = (StopFlag::default(), progress_bar(steps));
+        session::stop_on_request(&mut stop);
         let _heartbeat = heartbeat(&bar);
         let found = study(&stop, &mut || bar.inc(1));
         bar.finish_and_clear();
@@ -119,10 +119,10 @@ impl StudyArgs {
 
     /// Prints a study, and writes its files. Without a result, a signal has ended it, and nothing is kept.
     fn print(&self, study: Option<Study>) -> Result<ExitCode, CliError> {
-        let signal = received();
+        let signal = session::received();
         let Some(study) = study else {
             outln!("ENDED EARLY, without a result: nothing was kept");
-            return Ok(signal.map_or(ExitCode::Interrupted, Signal::exit_code));
+            return Ok(signal.map_or(ExitCode::Interrupted, ExitCode::from));
         };
         match self.format {
             Format::Json => outln!("{:#}", study.json()),

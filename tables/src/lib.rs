@@ -13,4 +13,4 @@ mod trace;
 
 pub use run_tables::RunTables;
 pub use scans::ScanWriter;
-pub use trace::TraceWriter;
+pub use trace::{TraceWriter, trace_batch};

@@ -16,7 +16,7 @@ use parquet::file::properties::WriterProperties;
 pub const ROWS_PER_GROUP: usize = 8_192;
 
 /// Number of rows that are encoded at once. It divides the group, so that the bytes do not depend on it.
-pub(crate) const ROWS_PER_BATCH: usize = 1_024;
+pub const ROWS_PER_BATCH: usize = 1_024;
 
 /// Returns the writer properties of every table.
 ///

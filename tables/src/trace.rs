@@ -6,11 +6,12 @@ use std::sync::Arc;
 
 use arrow::array::{ArrayRef, Float64Array, RecordBatch, StringArray, UInt8Array};
 use arrow::datatypes::{DataType, Schema};
-use closecall_traffic::{ActorId, Lane, Measured, Time};
+use closecall_traffic::{Measured, Time};
 use parquet::arrow::ArrowWriter;
 
 use crate::table::{field, properties, required};
 use closecall_scenarios::atomic::{WriteError, check_writable, write_file};
+use closecall_simulation::trajectories::{TraceRecorder, TraceRow};
 use closecall_simulation::{Observer, RunEvent, StepView};
 
 /// The file format of a trace.
@@ -31,25 +32,11 @@ impl Format {
     }
 }
 
-/// One row: an actor at a control step.
-#[derive(Clone, Debug)]
-struct Row {
-    time: Time,
-    actor: ActorId,
-    lane: Lane,
-    s_m: f64,
-    d_m: f64,
-    speed_mps: f64,
-    acceleration_mps2: f64,
-    gap_front_m: Measured,
-    thw_front_s: Measured,
-}
-
 /// Observes a run and writes its trace. A value that does not exist is an empty cell in CSV and null in Parquet.
 pub struct TraceWriter {
     path: PathBuf,
     format: Format,
-    rows: Vec<Row>,
+    trace: TraceRecorder,
 }
 
 impl TraceWriter {
@@ -60,7 +47,7 @@ impl TraceWriter {
     pub fn new(path: &Path) -> Result<Self, WriteError> {
         let format = Format::from_path(path).map_err(|error| WriteError::new(path, error))?;
         check_writable(path)?;
-        Ok(Self { path: path.to_owned(), format, rows: Vec::new() })
+        Ok(Self { path: path.to_owned(), format, trace: TraceRecorder::default() })
     }
 
     /// Writes the file.
@@ -69,26 +56,15 @@ impl TraceWriter {
     /// [`WriteError`] if the file cannot be written completely.
     pub fn finish(self) -> Result<(), WriteError> {
         write_file(&self.path, |file| match self.format {
-            Format::Csv => write_csv(file, &self.rows),
-            Format::Parquet => write_parquet(file, &self.rows),
+            Format::Csv => write_csv(file, &self.trace.rows),
+            Format::Parquet => write_parquet(file, &self.trace.rows),
         })
     }
 }
 
 impl Observer for TraceWriter {
     fn step(&mut self, view: &StepView<'_>) {
-        let actors = view.scenario.actors.iter().zip(view.vehicles).zip(view.fronts);
-        self.rows.extend(actors.map(|((actor, vehicle), &(gap_front_m, thw_front_s))| Row {
-            time: view.time,
-            actor: actor.id.clone(),
-            lane: view.scenario.road.lane_at(vehicle.state.d_m),
-            s_m: vehicle.state.s_m,
-            d_m: vehicle.state.d_m,
-            speed_mps: vehicle.state.speed_mps,
-            acceleration_mps2: vehicle.state.acceleration_mps2,
-            gap_front_m,
-            thw_front_s,
-        }));
+        self.trace.step(view);
     }
 
     fn event(&mut self, _: Time, _: &RunEvent) {}
@@ -96,7 +72,7 @@ impl Observer for TraceWriter {
 
 /// Writes the rows as CSV. The names of actors need no quotes, because they consist of letters, digits and hyphens. The
 /// numbers have enough digits to be read back to the same bits.
-fn write_csv(file: &mut (impl Write + ?Sized), rows: &[Row]) -> io::Result<()> {
+fn write_csv(file: &mut (impl Write + ?Sized), rows: &[TraceRow]) -> io::Result<()> {
     writeln!(file, "time_s,actor,lane,s_m,d_m,speed_mps,acceleration_mps2,gap_front_m,thw_front_s")?;
     for row in rows {
         write!(file, "{},{},{},{},{},", row.time.s(), row.actor, row.lane, row.s_m, row.d_m)?;
@@ -107,8 +83,11 @@ fn write_csv(file: &mut (impl Write + ?Sized), rows: &[Row]) -> io::Result<()> {
     Ok(())
 }
 
-/// Writes the rows as Parquet, in one record batch.
-fn write_parquet(file: &mut (impl Write + Send + ?Sized), rows: &[Row]) -> io::Result<()> {
+/// Returns the rows as one record batch.
+///
+/// # Errors
+/// An error of Arrow.
+pub fn trace_batch(rows: &[TraceRow]) -> io::Result<RecordBatch> {
     let schema = Arc::new(Schema::new(vec![
         required("time_s", DataType::Float64, Some("s")),
         required("actor", DataType::Utf8, None),
@@ -120,7 +99,8 @@ fn write_parquet(file: &mut (impl Write + Send + ?Sized), rows: &[Row]) -> io::R
         field("gap_front_m", DataType::Float64, Some("m")),
         field("thw_front_s", DataType::Float64, Some("s")),
     ]));
-    let floats = |of: fn(&Row) -> Option<f64>| -> ArrayRef { Arc::new(rows.iter().map(of).collect::<Float64Array>()) };
+    let floats =
+        |of: fn(&TraceRow) -> Option<f64>| -> ArrayRef { Arc::new(rows.iter().map(of).collect::<Float64Array>()) };
     let columns = vec![
         floats(|row| Some(row.time.s())),
         Arc::new(rows.iter().map(|row| Some(row.actor.as_str())).collect::<StringArray>()),
@@ -132,8 +112,13 @@ fn write_parquet(file: &mut (impl Write + Send + ?Sized), rows: &[Row]) -> io::R
         floats(|row| row.gap_front_m.ok()),
         floats(|row| row.thw_front_s.ok()),
     ];
-    let batch = RecordBatch::try_new(schema.clone(), columns).map_err(io::Error::other)?;
-    let mut writer = ArrowWriter::try_new(file, schema, Some(properties())).map_err(io::Error::other)?;
+    RecordBatch::try_new(schema, columns).map_err(io::Error::other)
+}
+
+/// Writes the rows as Parquet, in one record batch.
+fn write_parquet(file: &mut (impl Write + Send + ?Sized), rows: &[TraceRow]) -> io::Result<()> {
+    let batch = trace_batch(rows)?;
+    let mut writer = ArrowWriter::try_new(file, batch.schema(), Some(properties())).map_err(io::Error::other)?;
     writer.write(&batch).map_err(io::Error::other)?;
     writer.close().map_err(io::Error::other)?;
     Ok(())
@@ -141,10 +126,12 @@ fn write_parquet(file: &mut (impl Write + Send + ?Sized), rows: &[Row]) -> io::R
 
 #[cfg(test)]
 mod tests {
+    use closecall_traffic::{ActorId, Lane};
+
     use super::*;
 
-    fn rows() -> Vec<Row> {
-        let row = |name: &str, gap_front_m: Measured, thw_front_s: Measured| Row {
+    fn rows() -> Vec<TraceRow> {
+        let row = |name: &str, gap_front_m: Measured, thw_front_s: Measured| TraceRow {
             time: Time::from_ms(40),
             actor: ActorId::new(name).unwrap(),
             lane: Lane(2),

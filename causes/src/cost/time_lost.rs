@@ -29,7 +29,7 @@ impl Observer for Positions {
 /// time lost is how long before the baseline was there.
 pub(super) fn mean_time_lost_s(saved: &SavedCampaign, scenario: &str, samples: &[u64]) -> Option<Vec<f64>> {
     let manifest = saved.manifest();
-    if samples.is_empty() || manifest.arms.iter().any(|arm| arm.exec().is_some()) {
+    if samples.is_empty() || manifest.arms.iter().any(|arm| arm.built_in().is_none()) {
         return None;
     }
     let names = manifest.arm_names();

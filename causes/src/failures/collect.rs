@@ -124,7 +124,7 @@ fn rows(saved: &SavedCampaign) -> Result<Vec<FailureRow>, CausesError> {
 fn is_built_in(saved: &SavedCampaign, controller: &str) -> bool {
     let manifest = saved.manifest();
     let mut arms = manifest.arms.iter().zip(manifest.arm_names());
-    arms.any(|(arm, name)| name == controller && arm.exec().is_none())
+    arms.any(|(arm, name)| name == controller && arm.built_in().is_some())
 }
 
 fn keep(rows: &mut [FailureRow], explanation: Explanation) {

@@ -9,6 +9,7 @@ use closecall_traffic::suggest::hint;
 use serde::{Deserialize, Serialize};
 
 use super::exec::{DEFAULT_MEMORY_MIB, DEFAULT_TIMEOUT_MS, ExecFactory, ExecSettings, NAME as EXEC};
+use super::hosted::{self, HostedController, PREFIX as HOSTED};
 use super::{BuiltIn, TimeGap};
 use crate::run::ControllerFactory;
 
@@ -20,6 +21,8 @@ pub enum ControllerChoice {
     BuiltIn(BuiltIn),
     /// A separate process for each sample.
     Exec(ExecSettings),
+    /// A controller of the program that has Closecall as a library.
+    Hosted(HostedController),
 }
 
 /// The names and forms of the controllers, as messages list them.
@@ -42,6 +45,7 @@ impl ControllerChoice {
         match self {
             Self::BuiltIn(built_in) => built_in.to_string(),
             Self::Exec(_) => EXEC.to_owned(),
+            Self::Hosted(hosted) => hosted.name(),
         }
     }
 
@@ -78,6 +82,7 @@ impl ControllerChoice {
         match self {
             Self::BuiltIn(built_in) => built_in.factory(),
             Self::Exec(settings) => Arc::new(ExecFactory::new(settings.clone(), folder).named(name)),
+            Self::Hosted(hosted) => hosted.factory(),
         }
     }
 
@@ -96,9 +101,10 @@ impl From<BuiltIn> for ControllerChoice {
 /// Writes the controller as it is given to `--controller`.
 impl fmt::Display for ControllerChoice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.exec() {
-            None => f.write_str(&self.name()),
-            Some(settings) => write!(f, "{EXEC}:{}", settings.command),
+        match self {
+            Self::BuiltIn(built_in) => built_in.fmt(f),
+            Self::Exec(settings) => write!(f, "{EXEC}:{}", settings.command),
+            Self::Hosted(hosted) => hosted.fmt(f),
         }
     }
 }
@@ -123,6 +129,12 @@ pub enum UnknownController {
         /// The text.
         text: String,
     },
+    /// There is no controller of this name in the program that has Closecall as a library.
+    #[error("`{text}` is a controller of a Python program, and can be run from there only: {}", hosted::known())]
+    Hosted {
+        /// The text.
+        text: String,
+    },
     /// The command of an `exec:COMMAND` cannot be split into words.
     #[error("`{command}` is not a command: it is empty, or its quotes do not match")]
     Command {
@@ -144,6 +156,11 @@ impl FromStr for ControllerChoice {
                 .then_some(Self::Exec(exec))
                 .ok_or_else(|| UnknownController::Command { command: command.to_owned() });
         }
+        if let Some((HOSTED, _)) = text.split_once(':') {
+            let hosted = HostedController::new(text);
+            let found = hosted.is_registered().then_some(Self::Hosted(hosted));
+            return found.ok_or_else(|| UnknownController::Hosted { text: text.to_owned() });
+        }
         if let Some(found) = BuiltIn::FIXED.into_iter().find(|built_in| built_in.to_string() == text) {
             return Ok(found.into());
         }
@@ -160,7 +177,7 @@ impl FromStr for ControllerChoice {
     }
 }
 
-/// The form in a manifest: the name of a built-in controller, or the settings of a process.
+/// The form in a manifest: the name of a built-in or hosted controller, or the settings of a process.
 #[derive(Serialize, Deserialize)]
 #[serde(untagged)]
 enum Stored {
@@ -179,6 +196,7 @@ impl From<ControllerChoice> for Stored {
         match choice {
             ControllerChoice::Exec(exec) => Self::Process(StoredProcess { exec }),
             ControllerChoice::BuiltIn(built_in) => Self::BuiltIn(built_in.to_string()),
+            ControllerChoice::Hosted(hosted) => Self::BuiltIn(hosted.to_string()),
         }
     }
 }
@@ -188,6 +206,10 @@ impl TryFrom<Stored> for ControllerChoice {
 
     fn try_from(stored: Stored) -> Result<Self, UnknownController> {
         match stored {
+            // A folder can be read without the program that its controller belongs to.
+            Stored::BuiltIn(name) if name.split(':').next() == Some(HOSTED) => {
+                Ok(Self::Hosted(HostedController::new(&name)))
+            }
             Stored::BuiltIn(name) => name.parse(),
             Stored::Process(process) => Ok(Self::Exec(process.exec)),
         }

@@ -10,6 +10,7 @@
 //! | `r157-driver` | the competent and careful human driver of UN Regulation 157 |
 //! | `r157-fsm` | the fuzzy safety model of UN Regulation 157 |
 //! | `exec:COMMAND` | an external process, started anew for each sample ([`exec`]) |
+//! | `python:NAME` | a controller of the Python program that runs Closecall ([`hosted`]) |
 //!
 //! A controller in Rust implements [`EgoController`](closecall_controllers::EgoController). A campaign creates it through a
 //! [`ControllerFactory`](crate::run::ControllerFactory). `examples/own_controller.rs` is a complete example.
@@ -18,6 +19,7 @@ mod arm_list;
 mod built_in;
 mod choice;
 pub mod exec;
+pub mod hosted;
 mod time_gap;
 
 pub use arm_list::{ArmList, ArmsError};

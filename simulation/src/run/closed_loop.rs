@@ -1,6 +1,9 @@
 //! The loop of one run.
 
-use super::state::Run;
+use std::borrow::Cow;
+
+use super::equipment::controller;
+use super::state::{Next, Run, settings_of};
 use super::{Arm, Observer, RunKey, SampleError};
 use crate::outcome::Outcome;
 use crate::scenario::Scenario;
@@ -15,17 +18,17 @@ pub fn simulate(
     arm: &Arm,
     observer: &mut dyn Observer,
 ) -> Result<Outcome, SampleError> {
-    let mut run = Run::new(scenario, key, arm)?;
+    let mut run = Run::new(Cow::Borrowed(scenario), key, Cow::Borrowed(arm))?;
+    let mut controller = controller(scenario, settings_of(scenario), arm);
     loop {
-        run.report_motion(observer);
-        run.update_surroundings(observer);
-        if run.is_control_step() {
-            run.perceive_and_control(observer)?;
+        match run.go_on(observer)? {
+            Next::End(end) => return Ok(run.finish(end)),
+            Next::Control => {
+                let command = controller.step(&run.input())?;
+                if let Some(end) = run.command(command, observer)? {
+                    return Ok(run.finish(end));
+                }
+            }
         }
-        if let Some(end) = run.end() {
-            return Ok(run.finish(end));
-        }
-        run.decide_actions(observer)?;
-        run.advance(observer);
     }
 }

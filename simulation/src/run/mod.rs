@@ -26,6 +26,7 @@ mod phase;
 mod settling;
 mod start;
 mod state;
+mod stepper;
 mod suppressed;
 
 pub use arm::{Arm, ControllerFactory, RunKey};
@@ -33,3 +34,4 @@ pub use auditor::TrackAuditor;
 pub use closed_loop::simulate;
 pub use error::SampleError;
 pub use observer::{CurrentMargins, Lead, NoObserver, Observer, RunEvent, StepView};
+pub use stepper::Stepper;

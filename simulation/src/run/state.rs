@@ -1,20 +1,22 @@
 //! The state of one run, and the parts of its step.
 
+mod acting;
+
+use std::borrow::Cow;
+
 use closecall_controllers::CheckedDriver;
-use closecall_controllers::{
-    DriverInput, DriverNote, EgoCommand, EgoController, EgoInput, EgoState, Looks, MisSettings, Neighbours, Reason,
-};
+use closecall_controllers::{EgoCommand, EgoInput, EgoSettings, EgoState, Looks, MisSettings, Neighbours, Reason};
 use closecall_sensors::{Perception, Scene, SceneVehicle};
 use closecall_traffic::{CONTROL_STEP, ENGAGEMENT_CLOSING_MPS, ENGAGEMENT_GAP_M, Measured, Track, VehicleState};
 
 use super::ego_input::{odometry, sensor_availability};
-use super::equipment::{controller, perception};
+use super::equipment::perception;
 use super::events::Events;
 use super::humans::{Human, human_drivers, looks, weave};
 use super::margins::{MarginMeter, Widths};
 use super::mis_log::{MisLog, MisObservation};
 use super::moments::Moments;
-use super::phase::{AFTER_COLLISION, Encounter, Follower};
+use super::phase::{Encounter, Follower};
 use super::settling::settle_sensors;
 use super::start::start_of_ego;
 use super::{Arm, CurrentMargins, Observer, RunEvent, RunKey, SampleError, StepView};
@@ -26,14 +28,29 @@ use crate::world::{Action, InitialVehicle, World};
 /// comfort limit with its overshoot; 1.2 to 3 are plausible.
 const HAZARD_BRAKING_MPS2: f64 = 1.5;
 
-/// The state of one run.
+/// What a run waits for.
+pub(super) enum Next {
+    /// A command of the ego controller.
+    Control,
+    /// Nothing: it has ended.
+    End(EndReason),
+}
+
+/// Returns the settings of the ego stack.
+pub(super) fn settings_of(scenario: &Scenario) -> &EgoSettings {
+    let CheckedDriver::Ego(settings) = &scenario.actors[scenario.ego].driver else {
+        unreachable!("a checked scenario has its ego stack at `ego`")
+    };
+    settings
+}
+
+/// The state of one run. It borrows its scenario and its arm, or owns them.
 pub(super) struct Run<'a> {
-    scenario: &'a Scenario,
+    scenario: Cow<'a, Scenario>,
     key: RunKey,
-    arm: &'a Arm,
+    arm: Cow<'a, Arm>,
     world: World,
     perception: Box<dyn Perception>,
-    controller: Box<dyn EgoController>,
     humans: Vec<Human>,
     events: Events,
     encounter: Encounter,
@@ -59,10 +76,8 @@ pub(super) struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    pub(super) fn new(scenario: &'a Scenario, key: RunKey, arm: &'a Arm) -> Result<Self, SampleError> {
-        let CheckedDriver::Ego(settings) = &scenario.actors[scenario.ego].driver else {
-            unreachable!("a checked scenario has its ego stack at `ego`")
-        };
+    pub(super) fn new(scenario: Cow<'a, Scenario>, key: RunKey, arm: Cow<'a, Arm>) -> Result<Self, SampleError> {
+        let settings = *settings_of(&scenario);
         let own = key;
         // Noise and drivers draw from these random numbers; the outcome names the run itself.
         let key = scenario.random_numbers.map_or(own, |of| RunKey { seed: of.seed, sample: of.sample });
@@ -78,22 +93,19 @@ impl<'a> Run<'a> {
         };
         let placed = scenario.actors[scenario.ego].start;
         let mut world = world_with(placed);
-        let start = start_of_ego(scenario, settings, arm, &world)?;
+        let start = start_of_ego(&scenario, &settings, &arm, &world)?;
         if start != placed {
             world = world_with(start);
         }
         let widths = Widths { vehicle_m: 0.0, lane_m: scenario.road.lane_width_m() };
         let margins = CurrentMargins::new(world.state(scenario.ego), &Neighbours::default(), widths);
-        let humans = human_drivers(scenario, key);
+        let humans = human_drivers(&scenario, key);
         let mut run = Self {
-            scenario,
             key: own,
-            arm,
-            perception: perception(scenario, arm, key)?,
-            controller: controller(scenario, settings, arm),
+            perception: perception(&scenario, &arm, key)?,
             looks: looks(&humans, scenario.actors.len()),
             humans,
-            events: Events::new(scenario),
+            events: Events::new(&scenario),
             encounter: Encounter::default(),
             meter: MarginMeter::new(scenario.physics_step.s()),
             mis: MisLog::default(),
@@ -109,25 +121,87 @@ impl<'a> Run<'a> {
             vehicles: Vec::with_capacity(world.len()),
             fronts: Vec::with_capacity(world.len()),
             world,
+            scenario,
+            arm,
         };
         run.collect_vehicles();
-        let ego = run.vehicles[scenario.ego];
-        settle_sensors(run.perception.as_mut(), scenario, ego, &run.others)?;
+        let ego = run.vehicles[run.scenario.ego];
+        settle_sensors(run.perception.as_mut(), &run.scenario, ego, &run.others)?;
         Ok(run)
     }
 
-    /// Returns whether sensors and ego controller act at the current time.
-    pub(super) fn is_control_step(&self) -> bool {
-        self.world.time().is_multiple_of(CONTROL_STEP)
+    /// Goes on until the ego controller has to act, or the run ends. [`Self::input`] is then the controller's input, and
+    /// [`Self::command`] takes its answer.
+    pub(super) fn go_on(&mut self, observer: &mut dyn Observer) -> Result<Next, SampleError> {
+        loop {
+            self.report_motion(observer);
+            self.update_surroundings(observer);
+            if self.world.time().is_multiple_of(CONTROL_STEP) {
+                self.collect_vehicles();
+                if !self.world.is_wrecked(self.scenario.ego) {
+                    self.perceive()?;
+                    return Ok(Next::Control);
+                }
+                self.report_step(observer);
+            }
+            if let Some(end) = self.complete_step(observer)? {
+                return Ok(Next::End(end));
+            }
+        }
+    }
+
+    /// Takes the command of the ego controller for the current time. Returns why the run has ended, or `None` if it goes on.
+    pub(super) fn command(
+        &mut self,
+        command: EgoCommand,
+        observer: &mut dyn Observer,
+    ) -> Result<Option<EndReason>, SampleError> {
+        if !command.acceleration_mps2.is_finite() {
+            return Err(SampleError::Command { value: command.acceleration_mps2, time: self.world.time() });
+        }
+        self.accept_command(command, observer);
+        self.report_step(observer);
+        self.complete_step(observer)
+    }
+
+    /// Returns the input of the ego controller at the current time.
+    pub(super) fn input(&self) -> EgoInput<'_> {
+        EgoInput {
+            time: self.world.time(),
+            odometry: odometry(&self.scenario, &self.world),
+            road: &self.scenario.road,
+            tracks: &self.tracks,
+            sensors: sensor_availability(self.perception.as_ref()),
+        }
+    }
+
+    /// Returns the scenario.
+    pub(super) fn scenario(&self) -> &Scenario {
+        &self.scenario
+    }
+
+    /// Returns the ego's true margins at the current time.
+    pub(super) fn margins(&self) -> &CurrentMargins {
+        &self.margins
+    }
+
+    /// Ends the step, unless the run has ended: all vehicles act, and move to the next instant.
+    fn complete_step(&mut self, observer: &mut dyn Observer) -> Result<Option<EndReason>, SampleError> {
+        if let Some(end) = self.end() {
+            return Ok(Some(end));
+        }
+        self.decide_actions(observer)?;
+        self.advance(observer);
+        Ok(None)
     }
 
     /// Reports the states of all vehicles to the observer.
-    pub(super) fn report_motion(&self, observer: &mut dyn Observer) {
+    fn report_motion(&self, observer: &mut dyn Observer) {
         observer.moved(self.world.time(), &mut (0..self.world.len()).map(|actor| *self.world.state(actor)));
     }
 
     /// Updates the neighbours of all vehicles, the ego's margins, and the phase of the encounter.
-    pub(super) fn update_surroundings(&mut self, observer: &mut dyn Observer) {
+    fn update_surroundings(&mut self, observer: &mut dyn Observer) {
         self.world.find_neighbours(&self.looks, &mut self.neighbours);
         let ego = self.scenario.ego;
         let own = self.world.state(ego);
@@ -145,42 +219,25 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Runs the ego's sensors and its controller, unless the ego has collided.
-    pub(super) fn perceive_and_control(&mut self, observer: &mut dyn Observer) -> Result<(), SampleError> {
-        let ego = self.scenario.ego;
-        self.collect_vehicles();
-        let time = self.world.time();
-        if !self.world.is_wrecked(ego) {
-            let scene = Scene {
-                time,
-                road: &self.scenario.road,
-                environment: &self.scenario.environment,
-                ego: self.vehicles[ego],
-                others: &self.others,
-            };
-            let tracks = self.perception.step(&scene)?;
-            self.tracks.clear();
-            self.tracks.extend_from_slice(tracks);
-            let input = EgoInput {
-                time,
-                odometry: odometry(self.scenario, &self.world),
-                road: &self.scenario.road,
-                tracks: &self.tracks,
-                sensors: sensor_availability(self.perception.as_ref()),
-            };
-            let command = self.controller.step(&input)?;
-            if !command.acceleration_mps2.is_finite() {
-                return Err(SampleError::Command { value: command.acceleration_mps2, time });
-            }
-            self.accept_command(command, input.sensors.reason(), observer);
-        }
-        self.report_step(observer);
+    /// Runs the ego's sensors.
+    fn perceive(&mut self) -> Result<(), SampleError> {
+        let scene = Scene {
+            time: self.world.time(),
+            road: &self.scenario.road,
+            environment: &self.scenario.environment,
+            ego: self.vehicles[self.scenario.ego],
+            others: &self.others,
+        };
+        let tracks = self.perception.step(&scene)?;
+        self.tracks.clear();
+        self.tracks.extend_from_slice(tracks);
         Ok(())
     }
 
-    /// Stores the command of the ego controller, and notes what follows from it. `failed` says which sensors have failed.
-    fn accept_command(&mut self, command: EgoCommand, failed: Option<Reason>, observer: &mut dyn Observer) {
+    /// Stores the command of the ego controller, and notes what follows from it.
+    fn accept_command(&mut self, command: EgoCommand, observer: &mut dyn Observer) {
         let time = self.world.time();
+        let failed: Option<Reason> = sensor_availability(self.perception.as_ref()).reason();
         let from = self.command.map_or(EgoState::Following, |last| last.state);
         if command.state != from {
             let changed = RunEvent::EgoStateChanged { from, to: command.state, reason: command.reason };
@@ -258,7 +315,7 @@ impl<'a> Run<'a> {
         }
         observer.step(&StepView {
             time: self.world.time(),
-            scenario: self.scenario,
+            scenario: &self.scenario,
             vehicles: &self.vehicles,
             fronts: &self.fronts,
             tracks: &self.tracks,
@@ -269,115 +326,9 @@ impl<'a> Run<'a> {
         });
     }
 
-    /// Determines the actions of all vehicles, from the current state: of the human drivers, of the scenario's events, and
-    /// of the ego controller.
-    pub(super) fn decide_actions(&mut self, observer: &mut dyn Observer) -> Result<(), SampleError> {
-        let time = self.world.time();
-        self.events.update(&self.world, |event| {
-            observer.event(time, &RunEvent::EventTriggered { event: event.to_owned() });
-        });
-        let ego = self.scenario.ego;
-        let commanded_mps2 = self.command.map_or(0.0, |command| command.acceleration_mps2);
-        self.actions[ego] = Action { acceleration_mps2: commanded_mps2, ..Action::default() };
-        for human in &mut self.humans {
-            let actor = human.actor;
-            if self.world.is_wrecked(actor) {
-                continue;
-            }
-            let input = DriverInput {
-                time,
-                vehicle: self.world.vehicle(actor),
-                own: self.world.state(actor),
-                neighbours: &self.neighbours[actor],
-                road: &self.scenario.road,
-                lane_change_target: self.world.lane_change_target(actor),
-                lateral_deviation_m: self.world.lateral_deviation_m(actor),
-                desired_speed_offset_mps: human.desired_speed_noise.as_mut().map_or(0.0, |noise| noise.at(time)),
-            };
-            let action = human
-                .driver
-                .step(&input, &mut human.rng)
-                .map_err(|source| SampleError::Driver { actor: self.scenario.actors[actor].id.clone(), source })?;
-            if let Some(note) = action.note {
-                if note == DriverNote::CutOutStarted {
-                    self.events.note_cut_out(actor, time);
-                    if !self.world.is_wrecked(ego) && self.margins.follower == Some(actor) {
-                        self.moments.note(Moment::CutOut, time);
-                    }
-                }
-                observer.event(time, &RunEvent::DriverNote { actor, note });
-            }
-            self.actions[actor] = Action {
-                acceleration_mps2: self
-                    .events
-                    .requested_mps2(actor, &self.world)
-                    .map_or(action.acceleration_mps2, |event_mps2| event_mps2.min(action.acceleration_mps2)),
-                lane_change: action.lane_change.or(self.events.lane_change(actor, &self.world, &self.scenario.road)),
-                indicator: action.indicator,
-            };
-        }
-        Ok(())
-    }
-
-    /// Moves the world by one step and reports new collisions to the observer.
-    pub(super) fn advance(&mut self, observer: &mut dyn Observer) {
-        let known = self.world.collisions().len();
-        self.world.step(&self.actions, self.encounter.phase());
-        for index in known..self.world.collisions().len() {
-            let collision = &self.world.collisions()[index];
-            if collision.involves(self.scenario.ego_id()) {
-                let is_ahead = self.is_ahead_of_ego(index);
-                self.meter.note_collision(is_ahead);
-            }
-            observer.event(collision.time, &RunEvent::Collision(collision.clone()));
-        }
-    }
-
-    /// Returns whether the other vehicle of a collision of the ego has its centre ahead of the ego's. `collision` is an
-    /// index into the list of collisions.
-    fn is_ahead_of_ego(&self, collision: usize) -> bool {
-        let ego = self.scenario.ego;
-        let between = &self.world.collisions()[collision].between;
-        let other = self
-            .scenario
-            .actors
-            .iter()
-            .position(|actor| actor.id != *self.scenario.ego_id() && between.contains(&actor.id));
-        other.is_some_and(|other| self.world.state(other).s_m > self.world.state(ego).s_m)
-    }
-
-    /// Returns why the run has ended, or `None` if it goes on.
-    pub(super) fn end(&self) -> Option<EndReason> {
-        let time = self.world.time();
-        if let Some(first) = self.world.collisions().first() {
-            if time >= first.time + AFTER_COLLISION {
-                return Some(EndReason::Collision);
-            }
-        } else if self.stands_still() {
-            return Some(EndReason::Standstill);
-        }
-        (time >= self.scenario.duration).then_some(EndReason::Duration)
-    }
-
-    /// Returns whether the ego, its lead vehicle and all vehicles behind it stand still, so that the ego can no longer
-    /// collide.
-    fn stands_still(&self) -> bool {
-        let ego = self.scenario.ego;
-        let own = self.world.state(ego);
-        let lead = self.neighbours[ego].own.lead.map(|lead| lead.actor);
-        own.speed_mps == 0.0
-            && (0..self.world.len()).all(|actor| {
-                let state = self.world.state(actor);
-                let matters = state.s_m <= own.s_m || Some(actor) == lead;
-                !matters || state.speed_mps == 0.0
-            })
-    }
-
     /// Returns the outcome of the run.
     pub(super) fn finish(self, end: EndReason) -> Outcome {
-        let CheckedDriver::Ego(settings) = &self.scenario.actors[self.scenario.ego].driver else {
-            unreachable!("a checked scenario has its ego stack at `ego`")
-        };
+        let settings = settings_of(&self.scenario);
         Outcome {
             scenario: self.scenario.name.clone(),
             seed: self.key.seed,

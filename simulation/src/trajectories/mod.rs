@@ -2,6 +2,8 @@
 
 mod in_car;
 mod recorder;
+mod trace;
 
 pub use in_car::{InCarRecorder, recorded_actor};
 pub use recorder::TrafficRecorder;
+pub use trace::{TraceRecorder, TraceRow};

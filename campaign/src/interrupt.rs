@@ -3,17 +3,15 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread;
 
-use closecall_campaign::stop::StopFlag;
 use closecall_simulation::controller::exec::end_all;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
-use super::output::print_error;
-use crate::exit_code::ExitCode;
+use crate::stop::StopFlag;
 
 /// A signal that ends the program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Signal {
+pub enum Signal {
     /// Ctrl-C.
     Interrupt,
     /// SIGTERM, as a job scheduler sends it.
@@ -21,18 +19,11 @@ pub(super) enum Signal {
 }
 
 impl Signal {
-    pub(super) const fn name(self) -> &'static str {
+    /// Returns the name of the signal.
+    pub const fn name(self) -> &'static str {
         match self {
             Self::Interrupt => "SIGINT",
             Self::Terminate => "SIGTERM",
-        }
-    }
-
-    /// Returns 128 plus the number of the signal.
-    pub(super) const fn exit_code(self) -> ExitCode {
-        match self {
-            Self::Interrupt => ExitCode::Interrupted,
-            Self::Terminate => ExitCode::Terminated,
         }
     }
 }
@@ -51,8 +42,9 @@ fn state() -> MutexGuard<'static, State> {
     STATE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Starts the thread that receives the signals.
-pub(super) fn watch() {
+/// Starts the thread that receives the signals. `announce` is called with the first signal if it stops a campaign, `exit` with
+/// one that ends the program.
+pub fn watch(announce: fn(Signal), exit: fn(Signal)) {
     // Without the thread the signals end the program as the system does by default.
     let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) else { return };
     let body = move || {
@@ -64,14 +56,11 @@ pub(super) fn watch() {
                     campaign.set();
                     state.received = Some(signal);
                     drop(state);
-                    let name = signal.name();
-                    print_error(format_args!(
-                        "\n{name}: running samples are completed; a second signal ends at once\n"
-                    ));
+                    announce(signal);
                 }
                 _ => {
                     end_all();
-                    std::process::exit(signal.exit_code() as i32);
+                    exit(signal);
                 }
             }
         }
@@ -80,12 +69,12 @@ pub(super) fn watch() {
 }
 
 /// From now on the first signal sets `campaign`, and only the second one ends the program.
-pub(super) fn stop_gracefully(campaign: &StopFlag) {
+pub fn stop_gracefully(campaign: &StopFlag) {
     state().campaign = Some(campaign.clone());
 }
 
 /// Returns the signal that has stopped the campaign. From now on a signal ends the program at once.
-pub(super) fn received() -> Option<Signal> {
+pub fn received() -> Option<Signal> {
     let mut state = state();
     state.campaign = None;
     state.received.take()

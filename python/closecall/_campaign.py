@@ -1,0 +1,125 @@
+"""Campaigns."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from . import _native
+from ._command import call, option
+from ._controller import ControllerLike, registered
+from ._errors import UsageError
+from ._run import SensorsLike
+from ._scenario import Scenario
+
+ScenarioLike = Scenario | str | os.PathLike[str]
+
+
+@dataclass(frozen=True)
+class CampaignResult:
+    """The result of a campaign, as ``closecall campaign --format json`` prints it."""
+
+    #: The exit code of the command line: 0 pass, 1 fail, 4 inconclusive or not judged, 5 a sample ended in an error, 7 invalid.
+    exit_code: int
+    #: The verdict, such as ``PASS`` or ``FAIL``.
+    verdict: str
+    #: Number of samples.
+    samples: int
+    #: Number of samples that ended in an error.
+    errors: int
+    #: All keys of the output.
+    report: dict[str, Any] = field(repr=False)
+    #: The folder of the campaign, if there is one.
+    folder: Path | None = None
+
+    def outcomes(self) -> _native.Table:
+        """Returns ``outcomes.parquet``: a row for each sample and controller."""
+        if self.folder is None:
+            raise UsageError("a campaign without `out` keeps no outcomes")
+        return _native.read_table(self.folder / "outcomes.parquet")
+
+
+def campaign(
+    scenarios: ScenarioLike | Sequence[ScenarioLike],
+    n: int | None = None,
+    *,
+    controller: ControllerLike | None = None,
+    arms: Sequence[ControllerLike] | None = None,
+    paired: bool = False,
+    seed: int = 0,
+    design: Literal["random", "sobol", "grid"] = "random",
+    sensors: SensorsLike | None = None,
+    jobs: int | None = None,
+    out: str | os.PathLike[str] | None = None,
+    resume: bool = False,
+    gate: Sequence[str] = (),
+    progress: bool | Callable[[int, int], Any] = False,
+    **options: str | float | bool | Sequence[str] | None,
+) -> CampaignResult:
+    """Runs many samples of scenarios, and judges the result, as ``closecall campaign`` does.
+
+    The folder, the verdict and the exit code are those of the command line. ``n`` is the number of samples of each scenario.
+    ``controller`` is as in :func:`run`; ``paired`` compares it with ``acc`` on the same samples. ``arms`` names
+    several controllers, the baseline first. ``gate`` lists criteria such as ``"upper(induced) <= 0.01"``. ``options`` are
+    further options of the command line, with underscores: ``max_collisions=3``, ``sample_timeout_s=10``, ``no_gate=True``.
+
+    ``progress`` is called with the number of samples that are done and of all; ``True`` shows a bar of ``tqdm``.
+
+    A controller that raises, or answers no finite number, costs its sample: it counts as an error, and the exit code is 5.
+    Ctrl-C raises ``KeyboardInterrupt`` after the samples that are running. With ``out``, ``resume=True`` goes on from there.
+    """
+    several = [scenarios] if isinstance(scenarios, (Scenario, str, os.PathLike)) else scenarios
+    settings: list[str] = []
+    words: list[str] = []
+    for scenario in several:
+        if isinstance(scenario, Scenario):
+            words.append(scenario._native.source)
+            if settings and settings != scenario._native.settings:
+                raise UsageError("the scenarios of a campaign are changed by the same settings (`set`), or by none")
+            settings = scenario._native.settings
+        else:
+            words.append(os.fspath(scenario))
+    if arms is not None and (controller is not None or paired):
+        raise UsageError("`arms` names all controllers: leave out `controller` and `paired`")
+    chosen: list[ControllerLike] = list(arms) if arms is not None else [] if controller is None else [controller]
+    with registered(chosen) as names, _reporter(progress) as report:
+        which = option("arms" if arms is not None else "controller", names)
+        named: dict[str, object] = {"samples": n, "paired": paired, "seed": seed, "design": design, "sensors": sensors, "jobs": jobs}
+        named |= {"out": None if out is None else os.fspath(out), "resume": resume, "gate": list(gate), "set": settings}
+        further = [word for name, value in {**named, **options}.items() for word in option(name, value)]
+        code, output = call(["campaign", "--format=json", *which, *further, "--", *words], report)
+    keys = json.loads(output)
+    folder = None if out is None else Path(out)
+    return CampaignResult(code, keys["verdict"], keys["samples"], keys["errors"], keys, folder)
+
+
+class _reporter:
+    """Calls a function, or shows a bar of tqdm, for as long as the context lasts."""
+
+    def __init__(self, progress: bool | Callable[[int, int], Any]) -> None:
+        self._progress = progress
+        self._bar: Any = None
+
+    def __enter__(self) -> Callable[[int, int], Any] | None:
+        if self._progress is False:
+            return None
+        if self._progress is not True:
+            return self._progress
+        try:
+            from tqdm.auto import tqdm  # type: ignore[import-untyped,unused-ignore]
+        except ImportError as error:
+            raise UsageError("progress=True needs tqdm: `pip install tqdm`, or give a function") from error
+        self._bar = tqdm(unit="sample")
+        return self._show
+
+    def _show(self, done: int, total: int) -> None:
+        self._bar.total = total
+        self._bar.update(done - self._bar.n)
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.close()

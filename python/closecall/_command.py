@@ -1,0 +1,47 @@
+"""The command ``closecall``, and calls of its commands."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import warnings
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from . import _native
+
+PROGRAM = "closecall"
+
+if _native.__file__:
+    _native.set_program(_native.__file__)
+
+
+def main() -> int:
+    """Runs the program with the arguments of the process, and returns its exit code."""
+    # The program has handlers of its own. Python's would raise KeyboardInterrupt after a campaign that was stopped.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    return _native.main([PROGRAM, *sys.argv[1:]])
+
+
+def call(arguments: Iterable[str], progress: Callable[[int, int], Any] | None = None) -> tuple[int, str]:
+    """Runs a command, and returns its exit code and its output. Its warnings become Python's."""
+    code, output, messages = _native.call([PROGRAM, *arguments], progress)
+    for message in messages:
+        if message.startswith("warning: "):
+            warnings.warn(message.removeprefix("warning: "), stacklevel=3)
+    return code, output
+
+
+def option(name: str, value: object) -> list[str]:
+    """Returns the words of an option: ``max_collisions=3`` is ``--max-collisions 3``.
+
+    ``None`` and ``False`` leave it out, ``True`` is an option without a value, a list repeats it.
+    """
+    word = "--" + name.rstrip("_").replace("_", "-")
+    if value is None or value is False:
+        return []
+    if value is True:
+        return [word]
+    if isinstance(value, (list, tuple)):
+        return [part for item in value for part in option(name, item)]
+    return [f"{word}={value}"]

@@ -1,0 +1,168 @@
+"""The outcome of a run, with typed fields. Units are part of the names."""
+
+from __future__ import annotations
+
+import html
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from . import _native
+
+Side = Literal["front", "rear", "left", "right"]
+Phase = Literal["approach", "critical", "overtaking", "after"]
+
+
+@dataclass(frozen=True)
+class Collision:
+    """The first contact of two vehicles."""
+
+    #: Time of the first contact (s).
+    time_s: float
+    #: The names of the two vehicles.
+    between: tuple[str, str]
+    #: The side of each vehicle that was struck.
+    struck_side: tuple[Side, Side]
+    #: Which of the two closed the gap.
+    closed_by: Literal["first", "second", "both"]
+    #: The phase of the encounter.
+    phase: Phase
+    #: Relative speed at the contact (m/s).
+    relative_speed_mps: float
+    #: Change of velocity of each vehicle by the impact (m/s).
+    delta_v_mps: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A moment of the encounter, with its letter in the paper's figure."""
+
+    moment: str
+    letter: str | None
+    #: Time (s).
+    time_s: float
+
+
+@dataclass(frozen=True)
+class Margins:
+    """The smallest margins of the ego, from the truth. An absent value is ``None``, and ``absent`` names the reason."""
+
+    #: Smallest front time headway (s).
+    min_thw_front_s: float | None
+    #: Smallest rear time headway (s).
+    min_thw_rear_s: float | None
+    #: Smallest front gap, bumper to bumper (m).
+    min_gap_front_m: float | None
+    #: Smallest rear gap, bumper to bumper (m).
+    min_gap_rear_m: float | None
+    #: Smallest time to collision of the rear vehicle (s).
+    min_ttc_rear_s: float | None
+    #: Largest deceleration (m/s²).
+    max_deceleration_mps2: float
+    #: Largest jerk (m/s³).
+    max_jerk_mps3: float
+    #: Largest speed deficit to the lead vehicle (m/s).
+    max_speed_deficit_mps: float
+    absent: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class MisSummary:
+    """What the margin increase system did. An absent value is ``None``, and ``absent`` names the reason."""
+
+    #: Time of the first engagement (s).
+    engaged_at_s: float | None
+    #: Time of the release (s).
+    released_at_s: float | None
+    #: Front time headway at the engagement (s).
+    thw_front_at_engagement_s: float | None
+    #: Front time headway when the rear vehicle is at the critical distance (s).
+    thw_front_at_critical_s: float | None
+    #: Mean deceleration from the engagement to the critical distance (m/s²).
+    mean_deceleration_mps2: float | None
+    #: Whether the goal was in reach.
+    goal_in_reach: bool | None
+    #: Why the system did what it did.
+    reason: str
+    #: When and why the system was not available: ``from_s``, ``lasted_s``, ``reason``.
+    unavailable: Mapping[str, Any] | None = None
+    absent: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The outcome of a run. In a notebook it shows the figure that ``closecall plot`` draws."""
+
+    scenario: str
+    seed: int
+    sample: int
+    controller: str
+    end: Literal["duration", "standstill", "collision"]
+    #: Simulated time (s).
+    duration_s: float
+    #: The sampled values, with the units that their names state.
+    parameters: Mapping[str, float | str]
+    collisions: tuple[Collision, ...]
+    moments: tuple[Moment, ...]
+    margins: Margins
+    mis: MisSummary
+    _json: str = field(repr=False, compare=False, default="")
+    _run: _native.Run | None = field(repr=False, compare=False, default=None)
+
+    @classmethod
+    def from_json(cls, text: str, run: _native.Run | None = None) -> Outcome:
+        """Returns the outcome that ``closecall run --format json`` prints."""
+        keys = json.loads(text)
+        return cls(
+            **{key: keys[key] for key in ("scenario", "seed", "sample", "controller", "end", "duration_s", "parameters")},
+            collisions=tuple(_collision(one) for one in keys["collisions"]),
+            moments=tuple(Moment(**one) for one in keys["moments"]),
+            margins=Margins(**_split(keys["margins"])),
+            mis=MisSummary(**_split(keys["mis"])),
+            _json=text,
+            _run=run,
+        )
+
+    @property
+    def collided(self) -> bool:
+        """Whether any two vehicles collided."""
+        return bool(self.collisions)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Returns the keys of ``closecall run --format json``."""
+        keys: dict[str, Any] = json.loads(self._json)
+        return keys
+
+    def trace(self) -> _native.Table:
+        """Returns a table with a row for each control step (25 Hz) and actor.
+
+        Its columns: ``time_s``, ``actor``, ``lane``, ``s_m``, ``d_m``, ``speed_mps``, ``acceleration_mps2``, ``gap_front_m``,
+        ``thw_front_s``. ``pyarrow.table(t)``, ``polars.DataFrame(t)`` and ``pandas.DataFrame.from_arrow(t)`` read it
+        without copying.
+        """
+        return self._of_run().trace()
+
+    def figure(self) -> str:
+        """Returns the figure of the encounter (SVG), as ``closecall plot`` draws it."""
+        return self._of_run().figure()
+
+    def _of_run(self) -> _native.Run:
+        if self._run is None:
+            raise ValueError("this outcome was read from JSON: only `closecall.run` leaves a trace and a figure")
+        return self._run
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{html.escape(repr(self))}</pre>" if self._run is None else self.figure()
+
+
+def _collision(keys: dict[str, Any]) -> Collision:
+    between, struck = tuple(keys["between"]), tuple(keys["struck_side"])
+    return Collision(**{**keys, "between": between, "struck_side": struck})
+
+
+def _split(keys: dict[str, Any]) -> dict[str, Any]:
+    """Moves the reasons of absent values, whose keys end with ``_absent``, into a dictionary of their own."""
+    suffix = "_absent"
+    absent = {key.removesuffix(suffix): value for key, value in keys.items() if key.endswith(suffix)}
+    return {**{key: value for key, value in keys.items() if not key.endswith(suffix)}, "absent": absent}

@@ -1,0 +1,34 @@
+"""One run."""
+
+from __future__ import annotations
+
+import os
+from typing import Literal
+
+from . import _native
+from ._controller import ControllerLike, native
+from ._outcome import Outcome
+from ._scenario import Scenario, loaded
+
+#: The depth of the sensor simulation.
+SensorsLike = Literal["full", "object", "ground-truth"]
+
+
+def run(
+    scenario: Scenario | str | os.PathLike[str],
+    controller: ControllerLike = "mis",
+    *,
+    sample: int = 0,
+    seed: int = 0,
+    sensors: SensorsLike | None = None,
+) -> Outcome:
+    """Runs one sample of a scenario, as ``closecall run`` does, and returns its outcome.
+
+    ``controller`` is the name of a built-in controller (``"acc"``, ``"mis"``, ``"gap-1.6"`` …), ``"exec:COMMAND"``, an object
+    with a method ``step``, or a class or function that creates one. ``sensors`` is the depth of the sensor simulation,
+    by default that of the scenario.
+
+    Raises :class:`SampleError` if the sample has no outcome. Its ``__cause__`` is the exception of the controller.
+    """
+    done = _native.run(loaded(scenario)._native, native(controller), seed, sample, sensors)
+    return Outcome.from_json(done.json(), done)

@@ -1,0 +1,78 @@
+"""Scenario files."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Literal
+
+from . import _native
+
+
+class Scenario:
+    """A scenario that has been read and checked: what is sampled, and what each sample is."""
+
+    def __init__(self, native: _native.Scenario) -> None:
+        self._native = native
+
+    @classmethod
+    def load(cls, source: str | os.PathLike[str], set: Mapping[str, object] | None = None) -> Scenario:
+        """Reads a scenario file, or the scenario of the library with that name.
+
+        ``set`` changes single values, named by a path of keys (``"actor.rear.start.behind.gap-m"``) or by a parameter
+        (``"brake-mps2"``).
+
+        Raises :class:`InputError` with file, line and key if the scenario cannot be used, :class:`UsageError` if a
+        setting cannot be applied, :class:`FileError` if the file cannot be read.
+        """
+        settings = [f"{key}={_toml(value)}" for key, value in (set or {}).items()]
+        return cls(_native.Scenario.load(os.fspath(source), settings))
+
+    @staticmethod
+    def library() -> list[str]:
+        """Returns the names of the scenarios that are part of the program."""
+        return _native.Scenario.library()
+
+    @property
+    def name(self) -> str:
+        """The name in reports."""
+        return self._native.name
+
+    @property
+    def path(self) -> str:
+        """The path of the file."""
+        return str(self._native.path)
+
+    @property
+    def text(self) -> str:
+        """The text of the file (TOML)."""
+        return self._native.text
+
+    @property
+    def parameters(self) -> list[str]:
+        """The names of the sampled parameters, in alphabetical order."""
+        return self._native.parameters
+
+    def sample(
+        self, seed: int = 0, n: int = 1, design: Literal["random", "sobol", "grid"] = "random"
+    ) -> list[dict[str, float | str]]:
+        """Returns the parameters of the samples 0 to ``n`` − 1, with the units that their names state.
+
+        They are those of ``campaign(scenario, n=n, seed=seed, design=design)``. A grid may have fewer samples.
+        """
+        return self._native.sample(seed, n, design)
+
+    def __repr__(self) -> str:
+        return f"Scenario({self.name!r}, {len(self.parameters)} parameters)"
+
+
+def _toml(value: object) -> str:
+    """Returns a value as ``--set`` takes it."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return str(value)
+
+
+def loaded(scenario: Scenario | str | os.PathLike[str]) -> Scenario:
+    """Returns the scenario, which is read if it is a path or a name."""
+    return scenario if isinstance(scenario, Scenario) else Scenario.load(scenario)

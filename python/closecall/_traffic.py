@@ -1,0 +1,91 @@
+"""From recorded traffic to distributions."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from typing import Any, Literal
+
+from ._command import call, option
+
+PathLike = str | os.PathLike[str]
+#: The layout of a trajectory file. By default it is recognised by the content.
+Layout = Literal["ngsim", "highd", "commonroad", "csv", "in-car"]
+
+
+def lane_changes(
+    file: PathLike,
+    *,
+    criterion: Literal["peak", "distance", "gradient"] = "peak",
+    lanes: Literal["recorded", "none"] = "recorded",
+    reference: PathLike | None = None,
+    layout: Layout | None = None,
+    drop_bad_rows: bool = False,
+) -> list[dict[str, Any]] | dict[str, Any]:
+    """Finds the lane changes in a trajectory file, as ``closecall lane-changes`` does.
+
+    Each has ``track_id``, ``direction``, ``start_s``, ``crossing_s``, ``end_s``, ``duration_s``, ``speed_mps`` (m/s), ``complete`` and
+    more. With ``reference``, a list of known lane changes (CSV), the result is a dictionary with recall and precision.
+
+    Raises :class:`InputError` with file, line and column (``key``) if the file cannot be used.
+    """
+    named: dict[str, object] = {"criterion": criterion, "lanes": lanes, "reference": _path(reference)}
+    found: list[dict[str, Any]] | dict[str, Any] = _json("lane-changes", [file], {**named, **_reading(layout, drop_bad_rows)})
+    return found
+
+
+def criticality(
+    file: PathLike,
+    *,
+    speed_limit_mps: float | None = None,
+    ttce_alone: bool = False,
+    layout: Layout | None = None,
+    drop_bad_rows: bool = False,
+) -> list[dict[str, Any]]:
+    """Computes how critical each lane change of a trajectory file is, as ``closecall criticality`` does.
+
+    ``speed_limit_mps`` (m/s) is 120 km/h by default. Each lane change has the keys of :func:`lane_changes` and ``metrics``
+    with ``distance_m``, ``speed_mps``, ``a_lon_mps2``, ``a_lat_mps2``, ``thw_s``, ``dce_m``, ``ttce_s``.
+    """
+    named: dict[str, object] = {"speed_limit_mps": speed_limit_mps, "ttce_alone": ttce_alone}
+    found = _json("criticality", [file], {**named, **_reading(layout, drop_bad_rows)})
+    assert isinstance(found, list)
+    return found
+
+
+def fit(
+    files: PathLike | Sequence[PathLike],
+    *,
+    output: PathLike | None = None,
+    provenance: str = "",
+    correlations: bool = False,
+    seed: int = 0,
+    layout: Layout | None = None,
+    drop_bad_rows: bool = False,
+) -> dict[str, Any]:
+    """Fits the distributions of a logical scenario to trajectory files, as ``closecall fit`` does.
+
+    ``output`` is the scenario part to write (TOML). The result has ``fitted``: for each parameter ``name``, ``median``,
+    ``interval_95``, ``quantiles``, ``n`` and ``goodness_of_fit``.
+    """
+    several = [files] if isinstance(files, (str, os.PathLike)) else files
+    named: dict[str, object] = {"output": _path(output), "provenance": provenance, "correlations": correlations, "seed": seed}
+    found = _json("fit", several, {**named, **_reading(layout, drop_bad_rows)})
+    assert isinstance(found, dict)
+    return found
+
+
+def _reading(layout: Layout | None, drop_bad_rows: bool) -> dict[str, object]:
+    return {"layout": layout, "drop_bad_rows": drop_bad_rows}
+
+
+def _path(path: PathLike | None) -> str | None:
+    return None if path is None else os.fspath(path)
+
+
+def _json(command: str, files: Sequence[PathLike], options: dict[str, object]) -> Any:
+    """Runs a command on trajectory files, and returns its output."""
+    words = [word for name, value in options.items() for word in option(name, value)]
+    _, output = call([command, "--format=json", *words, "--", *(os.fspath(file) for file in files)])
+    return json.loads(output)

@@ -1,0 +1,94 @@
+//! The commands of the program, called from Python.
+
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::thread;
+use std::time::Duration;
+
+use arrow::array::RecordBatchReader;
+use closecall::cli;
+use closecall_campaign::session::Session;
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use pyo3::exceptions::{PyOSError, PyRuntimeError};
+use pyo3::prelude::*;
+
+use crate::error::exception;
+use crate::table::Table;
+
+/// Interval at which Python's signals and the progress of a command are looked at.
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
+
+/// Sets the file of this module, by which campaigns identify the program.
+#[pyfunction]
+pub(crate) fn set_program(path: PathBuf) {
+    closecall_campaign::manifest::set_program(path);
+}
+
+/// Runs the program `closecall` with these arguments, of which the first is its name, and returns its exit code.
+#[pyfunction]
+pub(crate) fn main(py: Python<'_>, arguments: Vec<String>) -> u8 {
+    py.detach(|| cli::main(arguments) as u8)
+}
+
+/// Runs a command in a thread of its own, and returns its exit code, its output and its messages. The first of the arguments
+/// is the program's name. `progress` is called with the number of samples that are done and of all.
+///
+/// Ctrl-C stops a campaign after the samples that are running. Any other command goes on unseen.
+#[pyfunction]
+#[pyo3(signature = (arguments, progress=None))]
+pub(crate) fn call(
+    py: Python<'_>,
+    arguments: Vec<String>,
+    progress: Option<Bound<'_, PyAny>>,
+) -> PyResult<(u8, String, Vec<String>)> {
+    let session = Session::default();
+    let (sender, mut receiver) = channel();
+    let called = session.clone();
+    let body = move || {
+        // The receiver is gone if Ctrl-C has ended the call.
+        sender.send(cli::call(&called, arguments)).ok();
+    };
+    thread::Builder::new().name("command".to_owned()).spawn(body)?;
+    let mut reported = [0; 2];
+    let mut interrupt = None;
+    loop {
+        let results = &mut receiver;
+        let received = py.detach(move || results.recv_timeout(POLL_INTERVAL));
+        let samples = session.samples.each_ref().map(|count| count.load(Ordering::Relaxed));
+        let is_campaign = samples[1] > 0;
+        if let Some(progress) = progress.as_ref().filter(|_| interrupt.is_none() && samples != reported) {
+            reported = samples;
+            interrupt = progress.call1((samples[0], samples[1])).err();
+        }
+        if interrupt.is_none() {
+            interrupt = py.check_signals().err();
+        }
+        if interrupt.is_some() {
+            session.stop.set();
+        }
+        match (received, interrupt) {
+            (Ok(_), Some(interrupt)) => return Err(interrupt),
+            (Ok((Ok(code), printed)), None) => return Ok((code as u8, printed.output, printed.messages)),
+            (Ok((Err(error), _)), None) => return Err(exception(py, &error)),
+            (Err(RecvTimeoutError::Disconnected), _) => {
+                return Err(PyRuntimeError::new_err("the command has panicked: the message is on standard error"));
+            }
+            (Err(RecvTimeoutError::Timeout), Some(raised)) if !is_campaign => return Err(raised),
+            (Err(RecvTimeoutError::Timeout), raised) => interrupt = raised,
+        }
+    }
+}
+
+/// Reads a Parquet file.
+#[pyfunction]
+pub(crate) fn read_table(path: PathBuf) -> PyResult<Table> {
+    let fail =
+        |error: &dyn std::fmt::Display| PyOSError::new_err(format!("failed to read {}: {error}", path.display()));
+    let file = std::fs::File::open(&path).map_err(|error| fail(&error))?;
+    let reader = ParquetRecordBatchReaderBuilder::try_new(file).and_then(|builder| builder.build());
+    let reader = reader.map_err(|error| fail(&error))?;
+    let schema = reader.schema();
+    let batches = reader.collect::<Result<Vec<_>, _>>().map_err(|error| fail(&error))?;
+    Ok(Table::new(schema, batches))
+}

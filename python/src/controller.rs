@@ -1,0 +1,232 @@
+//! Controllers that are Python objects: what they are given, and how their answers and exceptions are taken.
+
+use std::collections::BTreeSet;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use closecall_controllers::{
+    ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoState, LeadVehicleSelector, Reason,
+};
+use closecall_simulation::ControllerFactory;
+use closecall_simulation::controller::hosted::{Registration, register};
+use closecall_traffic::{CONTROL_STEP, Road};
+use pyo3::exceptions::{PyKeyboardInterrupt, PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::PyTuple;
+use serde_json::json;
+
+mod input;
+
+pub(crate) use input::{ControllerInput, LeadVehicle, Odometry, Sensors, Setup, Track};
+
+/// What a controller may answer, for messages.
+const ANSWERS: &str = "a number (m/s²), or a pair of a number and a state";
+/// The states, for messages.
+const STATES: &str = "following, increasing, holding, releasing, emergency-braking";
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// What all controllers of a campaign share.
+#[derive(Debug, Default)]
+struct Shared {
+    /// True if no controller is to make another step.
+    is_cancelled: AtomicBool,
+    /// The exception of the latest failure.
+    failure: Mutex<Option<PyErr>>,
+    /// Python's identifiers of the threads that are in a step.
+    threads: Mutex<BTreeSet<u64>>,
+}
+
+/// A controller that is a Python object: a callable that creates it for each sample.
+#[pyclass(frozen, module = "closecall._native")]
+pub(crate) struct PythonController {
+    /// `python:NAME@VERSION`.
+    #[pyo3(get)]
+    name: String,
+    create: Arc<Py<PyAny>>,
+    shared: Arc<Shared>,
+    registration: Mutex<Option<Registration>>,
+}
+
+impl PythonController {
+    /// Returns a factory of the controller.
+    pub(crate) fn factory(&self, _: Python<'_>) -> Arc<dyn ControllerFactory> {
+        let name = self.name.split_once('@').map_or(&self.name[..], |(name, _)| name).to_owned();
+        Arc::new(Factory { name, create: self.create.clone(), shared: self.shared.clone() })
+    }
+
+    /// Returns the exception of the latest failure.
+    pub(crate) fn take_failure(&self) -> Option<PyErr> {
+        lock(&self.shared.failure).take()
+    }
+
+    /// Lets every controller fail at its next step.
+    pub(crate) fn cancel(&self) {
+        self.shared.is_cancelled.store(true, Ordering::Relaxed);
+    }
+}
+
+#[pymethods]
+impl PythonController {
+    /// Creates a controller. `name` is `python:NAME@VERSION`; `create` is called without arguments for each sample.
+    #[new]
+    fn new(name: String, create: Py<PyAny>) -> Self {
+        Self { name, create: Arc::new(create), shared: Arc::default(), registration: Mutex::default() }
+    }
+
+    /// Lets the commands of the program use the controller by its name.
+    fn register(&self, py: Python<'_>) {
+        *lock(&self.registration) = Some(register(&self.name, self.factory(py)));
+    }
+
+    /// Undoes `register`, lets every controller fail at its next step, and returns Python's identifiers of the threads that are
+    /// still in a step.
+    fn unregister(&self) -> Vec<u64> {
+        lock(&self.registration).take();
+        self.cancel();
+        lock(&self.shared.threads).iter().copied().collect()
+    }
+}
+
+struct Factory {
+    name: String,
+    create: Arc<Py<PyAny>>,
+    shared: Arc<Shared>,
+}
+
+impl ControllerFactory for Factory {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The outcome summarises the states that the controller answers if the scenario has a margin increase system.
+    fn has_mis(&self, settings: &EgoSettings) -> bool {
+        settings.mis().is_some()
+    }
+
+    fn build(&self, settings: &EgoSettings) -> Box<dyn EgoController> {
+        Box::new(Controller {
+            settings: *settings,
+            create: self.create.clone(),
+            shared: self.shared.clone(),
+            lead: LeadVehicleSelector::default(),
+            step: None,
+            thread: 0,
+        })
+    }
+}
+
+/// A Python object that drives one run. It is created at the first step.
+struct Controller {
+    settings: EgoSettings,
+    create: Arc<Py<PyAny>>,
+    shared: Arc<Shared>,
+    lead: LeadVehicleSelector,
+    /// The object's method `step`.
+    step: Option<Py<PyAny>>,
+    /// Python's identifier of the thread of the run.
+    thread: u64,
+}
+
+impl Controller {
+    fn call(&mut self, py: Python<'_>, input: &EgoInput<'_>) -> PyResult<(f64, EgoState)> {
+        let given = ControllerInput::new(input, self.lead.update(input));
+        let step = match &self.step {
+            Some(step) => step.bind(py),
+            None => {
+                let step = self.start(py, input.road)?;
+                self.step.insert(step).bind(py)
+            }
+        };
+        lock(&self.shared.threads).insert(self.thread);
+        let answer = step.call1((Bound::new(py, given)?,));
+        lock(&self.shared.threads).remove(&self.thread);
+        parse(&answer?)
+    }
+
+    /// Creates the object, calls its method `start` if it has one, and returns its method `step`.
+    fn start(&mut self, py: Python<'_>, road: &Road) -> PyResult<Py<PyAny>> {
+        self.thread = py.import("threading")?.call_method0("get_ident")?.extract()?;
+        lock(&self.shared.threads).insert(self.thread);
+        let started = self.create(py, road);
+        lock(&self.shared.threads).remove(&self.thread);
+        started
+    }
+
+    fn create(&self, py: Python<'_>, road: &Road) -> PyResult<Py<PyAny>> {
+        let object = self.create.bind(py).call0()?;
+        if let Ok(start) = object.getattr("start") {
+            start.call1((Setup::new(&self.settings, road),))?;
+        }
+        Ok(object.getattr("step")?.unbind())
+    }
+}
+
+impl EgoController for Controller {
+    fn step(&mut self, input: &EgoInput<'_>) -> Result<EgoCommand, ControllerError> {
+        input.check_finite()?;
+        let called = if self.shared.is_cancelled.load(Ordering::Relaxed) {
+            Err("the Python program has ended the run".to_owned())
+        } else {
+            Python::attach(|py| {
+                self.call(py, input).map_err(|error| {
+                    let text = described(py, &error);
+                    *lock(&self.shared.failure) = Some(error);
+                    text
+                })
+            })
+        };
+        let (acceleration_mps2, state) = called.map_err(|reason| ControllerError::Own { reason, time: input.time })?;
+        Ok(EgoCommand { acceleration_mps2, state, reason: Reason::External, plan: None })
+    }
+}
+
+/// Returns the acceleration and the state of an answer.
+fn parse(answer: &Bound<'_, PyAny>) -> PyResult<(f64, EgoState)> {
+    if let Ok(acceleration_mps2) = answer.extract::<f64>() {
+        return Ok((acceleration_mps2, EgoState::Following));
+    }
+    if let Ok(pair) = answer.cast::<PyTuple>()
+        && let Ok((acceleration_mps2, state)) = pair.extract::<(f64, String)>()
+    {
+        let found = serde_json::from_value(json!(state));
+        let refused = |_| PyValueError::new_err(format!("`step` answered the state `{state}`: it is one of {STATES}"));
+        return Ok((acceleration_mps2, found.map_err(refused)?));
+    }
+    let found = answer.get_type().name()?;
+    Err(PyTypeError::new_err(format!("`step` answered {}, a `{found}`: it must be {ANSWERS}", answer.repr()?)))
+}
+
+/// Describes an exception: its type and message, then the traceback.
+fn described(py: Python<'_>, error: &PyErr) -> String {
+    if error.is_instance_of::<PyKeyboardInterrupt>(py) {
+        return "the Python program has ended the run".to_owned();
+    }
+    let traceback = || -> PyResult<String> {
+        let parts = (error.get_type(py), error.value(py), error.traceback(py));
+        let lines = py.import("traceback")?.call_method1("format_exception", parts)?;
+        Ok(lines.extract::<Vec<String>>()?.concat())
+    };
+    match traceback() {
+        Ok(text) => format!("{error}\n{}", text.trim_end()),
+        Err(_) => error.to_string(),
+    }
+}
+
+/// Returns the settings of the ego stack and the road as JSON, with the keys of the protocol of external processes.
+fn setup_json(settings: &EgoSettings, road: &Road) -> String {
+    json!({
+        "control_step_s": CONTROL_STEP.s(),
+        "settings": settings,
+        "road": {
+            "lanes": road.lanes(),
+            "lane_width_m": road.lane_width_m(),
+            "curvature_per_m": road.curvature_per_m(),
+            "speed_limit_mps": road.speed_limit_mps(),
+            "overtaking_side": road.overtaking_side(),
+        },
+    })
+    .to_string()
+}

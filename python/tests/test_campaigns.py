@@ -1,0 +1,237 @@
+"""Campaigns, and controllers that are Python objects."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import pyarrow
+import pyarrow.parquet
+import pytest
+from helpers import SCENARIO, command
+
+import closecall as cc
+
+from acc import Acc  # isort: skip (helpers finds the examples)
+
+
+def sha256(file: Path) -> str:
+    return hashlib.sha256(file.read_bytes()).hexdigest()
+
+
+def test_the_folder_is_that_of_the_command_line(tmp_path: Path) -> None:
+    words = ["-n", "30", "--seed", "3", "--sensors", "object", "--paired", "--max-induced", "0"]
+    # In the same folder, whose path is part of the commands that the reports print.
+    folder, there = tmp_path / "out", tmp_path / "there"
+    done = command("campaign", SCENARIO, *words, "--out", folder, "--format", "json")
+    folder.rename(there)
+    counted: list[tuple[int, int]] = []
+    result = cc.campaign(
+        SCENARIO,
+        n=30,
+        seed=3,
+        sensors="object",
+        paired=True,
+        max_induced=0,
+        out=folder,
+        progress=lambda done, total: counted.append((done, total)),
+    )
+    assert result.exit_code == done.returncode
+    for file in ("outcomes.parquet", "arm_pairs.parquet"):
+        assert sha256(folder / file) == sha256(there / file), file
+    printed = json.loads(done.stdout)
+    assert {**result.report, "wall_s": None} == {**printed, "wall_s": None}
+    assert counted[-1] == (30, 30) and counted == sorted(counted)
+    assert result.outcomes().num_rows == 60
+    manifests = [json.loads((at / "manifest.json").read_text()) for at in (folder, there)]
+    assert manifests[0]["closecall_version"] == manifests[1]["closecall_version"]
+
+
+def test_a_python_controller_reproduces_acc_to_the_last_bit(tmp_path: Path) -> None:
+    names = {"acc": "acc", "own": Acc}
+    tables = {}
+    for name, controller in names.items():
+        cc.campaign(SCENARIO, n=20, seed=5, sensors="object", controller=controller, out=tmp_path / name, no_gate=True)
+        table = pyarrow.parquet.read_table(tmp_path / name / "outcomes.parquet")
+        # The summary of the margin increase system differs: only the own controller could have one.
+        columns = [column for column in table.column_names if column != "controller" and not column.startswith("mis_")]
+        tables[name] = table.select(columns).to_pylist()
+    assert tables["own"] == tables["acc"] and len(tables["own"]) == 20
+    # On one thread and on several, by class and by object.
+    variants: list[dict[str, Any]] = [{"jobs": 1, "controller": Acc}, {"jobs": 4, "controller": Acc()}]
+    for index, options in enumerate(variants):
+        cc.campaign(SCENARIO, n=20, seed=5, sensors="object", no_gate=True, out=tmp_path / str(index), **options)
+        assert sha256(tmp_path / str(index) / "outcomes.parquet") == sha256(tmp_path / "own" / "outcomes.parquet")
+
+
+class Sometimes:
+    """Fails in some samples, each time in another way."""
+
+    def __init__(self) -> None:
+        self.failure = 0
+
+    def step(self, input: cc.ControllerInput) -> object:
+        if input.time_s == 0.0:
+            self.failure = int(1e6 * input.odometry.speed_mps) % 5
+        if input.time_s < 0.5 or self.failure == 0:
+            return 0.0
+        if self.failure == 1:
+            raise ZeroDivisionError("one in five")
+        return [None, None, float("nan"), "0.0", (0.0, "driving")][self.failure]
+
+
+def test_a_failing_controller_costs_its_sample_only(tmp_path: Path) -> None:
+    result = cc.campaign(SCENARIO, n=40, seed=1, sensors="object", controller=Sometimes, out=tmp_path / "out")  # type: ignore[arg-type]
+    rows = pyarrow.table(result.outcomes()).to_pylist()
+    failed = [row for row in rows if row["status"] == "error"]
+    assert (result.exit_code, len(rows), result.errors) == (5, 40, len(failed))
+    assert 0 < len(failed) < 40
+    messages = "\n".join(row["error_message"] for row in failed)
+    for part in [
+        "ZeroDivisionError: one in five",
+        f'File "{__file__}", line',
+        "acceleration of NaN m/s²",
+        "`step` answered '0.0', a `str`: it must be a number",
+        "`step` answered the state `driving`: it is one of following",
+    ]:
+        assert part in messages, part
+    # The command line can read the folder, and says why it cannot run the samples again.
+    again = command("replay", tmp_path / "out", "0")
+    assert again.returncode == 5 and "controller of a Python program" in again.stderr
+    assert command("compare", tmp_path / "out", tmp_path / "out").returncode == 0
+
+
+def test_the_cause_of_a_failed_run_is_the_exception() -> None:
+    class Raises:
+        def step(self, input: cc.ControllerInput) -> float:
+            raise KeyError("of the controller")
+
+    with pytest.raises(cc.SampleError) as raised:
+        cc.run(SCENARIO, Raises, sensors="object")
+    assert isinstance(raised.value.__cause__, KeyError) and raised.value.exit_code == 5
+    with pytest.raises(cc.SampleError, match="has no attribute 'step'"):
+        cc.run(SCENARIO, lambda: 3, sensors="object")  # type: ignore[arg-type,return-value]
+
+
+def test_a_controller_that_hangs_costs_its_sample_only() -> None:
+    class Hangs:
+        def step(self, input: cc.ControllerInput) -> float:
+            while input.time_s > 1.0:
+                time.sleep(0.001)
+            return 0.0
+
+    result = cc.campaign(SCENARIO, n=2, sensors="object", controller=Hangs, sample_timeout_s=0.5)
+    assert (result.exit_code, result.errors) == (5, 2)
+    # The threads of the steps end, so that the interpreter can.
+    deadline = time.monotonic() + 30.0
+    while any(thread.name.startswith("Dummy") for thread in threading.enumerate()) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert time.monotonic() < deadline
+
+
+def test_a_controller_that_has_changed_does_not_resume(tmp_path: Path) -> None:
+    def written(gain: float) -> Any:
+        file = tmp_path / f"own_{int(10 * gain)}.py"
+        file.write_text(f"class Own:\n    def step(self, input):\n        return {gain} * (30.0 - input.odometry.speed_mps)\n")
+        spec = importlib.util.spec_from_file_location(file.stem, file)
+        assert spec is not None and spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        sys.modules[file.stem] = module
+        spec.loader.exec_module(module)
+        return module.Own
+
+    def campaign(gain: float, resume: bool) -> int:
+        options: dict[str, Any] = {"n": 4, "sensors": "object", "out": tmp_path / "out", "no_gate": True}
+        return cc.campaign(SCENARIO, controller=written(gain), resume=resume, **options).exit_code
+
+    assert campaign(0.5, resume=False) == 0
+    with pytest.raises(cc.UsageError):
+        campaign(0.6, resume=True)
+    assert campaign(0.5, resume=True) == 0
+
+
+INTERRUPTED = """
+import sys, closecall as cc
+try:
+    cc.campaign("low-thw-overtake", n=100_000, seed=2, sensors="object", no_gate=True, out=sys.argv[1],
+                progress=lambda done, total: print(done, flush=True))
+except KeyboardInterrupt:
+    print("interrupted", flush=True)
+    raise SystemExit(7)
+"""
+
+
+def test_ctrl_c_stops_a_campaign_that_can_be_resumed(tmp_path: Path) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-c", INTERRUPTED, str(tmp_path / "out")], stdout=subprocess.PIPE, text=True
+    )
+    assert process.stdout is not None
+    assert int(process.stdout.readline()) > 0
+    process.send_signal(signal.SIGINT)
+    rest, _ = process.communicate(timeout=60)
+    assert process.returncode == 7 and rest.splitlines()[-1] == "interrupted"
+    records = (tmp_path / "out" / "journal.jsonl").read_text().count("\n")
+    assert 0 < records < 100_000
+
+
+def test_ctrl_c_ends_the_command_as_it_does_without_python(tmp_path: Path) -> None:
+    program = Path(sys.executable).with_name("closecall")
+    words = ["campaign", SCENARIO, "-n", "100000", "--sensors", "object", "--no-gate", "--out", str(tmp_path / "out")]
+    process = subprocess.Popen([program, *words], stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
+    journal = tmp_path / "out" / "journal.jsonl"
+    while not (journal.exists() and journal.stat().st_size):
+        time.sleep(0.02)
+    process.send_signal(signal.SIGINT)
+    _, messages = process.communicate(timeout=60)
+    assert process.returncode == 130 and "SIGINT" in messages and "Traceback" not in messages
+
+
+def test_exit_codes_of_the_command(tmp_path: Path) -> None:
+    assert command("--version").returncode == 0
+    assert command("campaign").returncode == 2
+    bad = tmp_path / "bad.toml"
+    bad.write_text("name = 3\n")
+    assert command("check", bad).returncode == 3
+    assert command("run", tmp_path / "none.toml").returncode == 6
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"max_collision": 3}, "--max-collision"),
+        ({"paired": True, "controller": "acc"}, "paired compares"),
+        ({"arms": ["acc", "mis"], "paired": True}, "leave out `controller` and `paired`"),
+        ({"n": 0}, "samples"),
+    ],
+)
+def test_wrong_arguments_are_refused(arguments: dict[str, object], message: str) -> None:
+    with pytest.raises(cc.UsageError, match=message) as raised:
+        cc.campaign(SCENARIO, **arguments)  # type: ignore[arg-type]
+    assert raised.value.exit_code == 2
+
+
+def test_the_interpreter_goes_on_during_a_campaign() -> None:
+    ticks = 0
+    is_over = False
+
+    def tick() -> None:
+        nonlocal ticks
+        while not is_over:
+            ticks += 1
+            time.sleep(0.001)
+
+    thread = threading.Thread(target=tick)
+    thread.start()
+    cc.campaign(SCENARIO, n=60, sensors="object", no_gate=True, jobs=os.cpu_count())
+    is_over = True
+    thread.join()
+    assert ticks > 10

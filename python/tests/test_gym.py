@@ -1,0 +1,142 @@
+"""The stepping interface."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from helpers import SCENARIO
+
+import closecall as cc
+import closecall.gym as ccgym
+
+from acc import Acc  # isort: skip (helpers finds the examples)
+
+
+def test_gymnasium_accepts_the_environment(recwarn: pytest.WarningsRecorder) -> None:
+    check_env(gymnasium.make("closecall/Encounter-v0", scenario=SCENARIO).unwrapped)
+    # The action is an acceleration in m/s², and no share of one: wrappers rescale it where a learner needs that.
+    others = [text for text in (str(warning.message) for warning in recwarn) if "symmetric and normalized" not in text]
+    assert others == []
+
+
+class Recorder:
+    """Drives as `acc`, and keeps what it has commanded."""
+
+    commands: list[float] = []
+
+    def __init__(self) -> None:
+        self.acc = Acc()
+        self.start = self.acc.start
+        Recorder.commands = []
+
+    def step(self, input: cc.ControllerInput) -> float:
+        acceleration: float = self.acc.step(input)[0]
+        Recorder.commands.append(acceleration)
+        return acceleration
+
+
+@pytest.mark.parametrize("sample", [0, 1, 2])
+def test_the_same_commands_lead_to_the_same_outcome(sample: int) -> None:
+    expected = cc.run(SCENARIO, Recorder, seed=6, sample=sample, sensors="object")
+    env = ccgym.EncounterEnv(SCENARIO)
+    _, info = env.reset(seed=6, options={"sample": sample})
+    assert (info["seed"], info["sample"]) == (6, sample)
+    for index, command in enumerate(Recorder.commands):
+        _, _, terminated, truncated, info = env.step(command)
+        assert (terminated or truncated) == (index + 1 == len(Recorder.commands))
+    outcome = info["outcome"]
+    for name in ("parameters", "collisions", "moments", "margins", "duration_s", "end"):
+        assert getattr(outcome, name) == getattr(expected, name), name
+    assert terminated == (outcome.end != "duration")
+
+
+def test_the_observation_is_what_a_controller_is_given() -> None:
+    seen: list[tuple[float, float, int, float]] = []
+
+    class Looks:
+        def step(self, input: cc.ControllerInput) -> float:
+            gap_m = 0.0 if input.front is None else input.front.gap_m
+            nearest = min(input.tracks, key=lambda track: (track.x_m**2 + track.y_m**2) ** 0.5)
+            seen.append((input.odometry.speed_mps, gap_m, len(input.tracks), nearest.x_m))
+            return 0.0
+
+    cc.run(SCENARIO, Looks, seed=1, sample=3, sensors="object")
+    env = ccgym.EncounterEnv(SCENARIO, max_tracks=8)
+    observation, _ = env.reset(seed=1, options={"sample": 3})
+    for speed_mps, gap_m, count, x_m in seen:
+        tracks = observation["tracks"]
+        assert tracks.shape == (8, len(ccgym.TRACK))
+        assert observation["odometry"][ccgym.ODOMETRY.index("speed_mps")] == speed_mps
+        assert observation["lead"][ccgym.LEAD.index("lead_gap_m")] == gap_m
+        assert tracks[:, ccgym.TRACK.index("present")].sum() == min(count, 8)
+        assert tracks[0, ccgym.TRACK.index("x_m")] == x_m
+        assert observation in env.observation_space
+        observation = env.step(0.0)[0]
+
+
+def test_a_policy_drives_a_campaign_as_it_was_trained() -> None:
+    def policy(observation: ccgym.Observation) -> float:
+        tracks = observation["tracks"]
+        return float(np.tanh(tracks[:, 1:5].sum() / 1000.0) - 0.5 * observation["lead"][0])
+
+    expected = cc.run(SCENARIO, ccgym.PolicyController(policy), seed=1, sample=5, sensors="object")
+    env = ccgym.EncounterEnv(SCENARIO)
+    observation, _ = env.reset(seed=1, options={"sample": 5})
+    is_over = False
+    while not is_over:
+        observation, _, terminated, truncated, info = env.step(policy(observation))
+        is_over = terminated or truncated
+    assert info["outcome"].margins == expected.margins and info["outcome"].collisions == expected.collisions
+
+
+def test_the_truth_is_in_the_info_only() -> None:
+    env = ccgym.EncounterEnv(SCENARIO)
+    observation, info = env.reset(seed=1, options={"sample": 3})
+    assert set(info["truth"]) == {"gap_front_m", "thw_front_s", "gap_rear_m", "thw_rear_s", "ttc_rear_s"}
+    # The radar is noisy: what the ego perceives is not the truth.
+    perceived = observation["lead"][ccgym.LEAD.index("lead_gap_m")]
+    assert perceived != info["truth"]["gap_front_m"] and abs(perceived - info["truth"]["gap_front_m"]) < 3.0
+    assert "truth" not in ccgym.EncounterEnv(SCENARIO, truth=False).reset(seed=1)[1]
+
+
+def test_wrong_steps_are_refused() -> None:
+    env = ccgym.EncounterEnv(SCENARIO)
+    with pytest.raises(cc.UsageError, match="reset"):
+        env.step(0.0)
+    env.reset(seed=1)
+    with pytest.raises(cc.SampleError, match="NaN"):
+        env.step(float("nan"))
+
+
+def test_vectorised_runs_are_those_of_single_ones() -> None:
+    count, steps = 5, 1600
+    envs = gymnasium.make_vec("closecall/Encounter-v0", num_envs=count, scenario=SCENARIO)
+    singles = [ccgym.EncounterEnv(SCENARIO) for _ in range(count)]
+    observation, info = envs.reset(seed=9, options={"sample": range(count)})
+    for index, single in enumerate(singles):
+        first = single.reset(seed=9, options={"sample": index})[0]
+        assert all((observation[name][index] == first[name]).all() for name in first)
+    assert list(info["sample"]) == list(range(count))
+    ended: list[Any] = [None] * count
+    generator = np.random.default_rng(3)
+    restarts = 0
+    for _ in range(steps):
+        actions = generator.uniform(-1.0, 0.5, (count, 1))
+        was_over = [outcome is not None for outcome in ended]
+        observation, rewards, terminated, truncated, info = envs.step(actions)
+        for index, single in enumerate(singles):
+            if was_over[index]:
+                continue
+            expected, reward, is_terminated, is_truncated, single_info = single.step(actions[index])
+            assert all((observation[name][index] == expected[name]).all() for name in expected)
+            assert (rewards[index], terminated[index], truncated[index]) == (reward, is_terminated, is_truncated)
+            if is_terminated or is_truncated:
+                ended[index] = info["outcome"][index]
+                assert ended[index] == single_info["outcome"]
+        restarts += sum(was_over)
+    assert all(outcome is not None for outcome in ended) and restarts > 0
+    assert observation in envs.observation_space
