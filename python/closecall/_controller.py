@@ -127,14 +127,18 @@ def _code(code: types.CodeType) -> tuple[Any, ...]:
     return code.co_code, code.co_names, constants
 
 
-def _end_steps(controller: _native.PythonController) -> None:
+def end_steps(controller: _native.PythonController) -> None:
     """Ends the steps that hang: they would keep their threads busy, and the interpreter could not end in order."""
-    for thread in controller.unregister():
-        ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), ctypes.py_object(SystemExit))
+    hanging, raised = controller.unregister(), set[int]()
     deadline_s = time.monotonic() + END_TIMEOUT_S
-    while (hanging := controller.unregister()) and time.monotonic() < deadline_s:
-        time.sleep(0.01)
-    if hanging:
+    while controller.is_busy and time.monotonic() < deadline_s:
+        for thread in hanging:
+            if thread not in raised:
+                ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), ctypes.py_object(SystemExit))
+                raised.add(thread)
+        time.sleep(0.005)
+        hanging = controller.unregister()
+    if controller.is_busy:
         warnings.warn(f"{len(hanging)} steps of the controller hang in a call that cannot be interrupted", stacklevel=4)
 
 
@@ -155,4 +159,4 @@ def registered(controllers: list[ControllerLike]) -> Iterator[list[str]]:
         yield names
     finally:
         for made in own:
-            _end_steps(made)
+            end_steps(made)
