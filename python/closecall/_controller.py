@@ -6,12 +6,23 @@ import copy
 import ctypes
 import hashlib
 import inspect
+import io
+import pickle
+import sys
+import sysconfig
+import time
+import types
+import uuid
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, Literal, Protocol, runtime_checkable
 
 from . import _native
 from ._errors import UsageError
+
+#: Time that a hanging step has to end after the campaign (s).
+END_TIMEOUT_S = 5.0
 
 #: What the ego stack does, for the summary of the margin increase system.
 State = Literal["following", "increasing", "holding", "releasing", "emergency-braking"]
@@ -39,7 +50,7 @@ def native(controller: ControllerLike) -> str | _native.PythonController:
         return controller
     if not isinstance(controller, type) and callable(getattr(controller, "step", None)):
         # Each sample starts without the memory of another one.
-        return _native.PythonController(_name(type(controller)), lambda: copy.deepcopy(controller))
+        return _native.PythonController(_name(controller), lambda: copy.deepcopy(controller))
     if callable(controller):
         return _native.PythonController(_name(controller), controller)
     raise UsageError(
@@ -47,17 +58,88 @@ def native(controller: ControllerLike) -> str | _native.PythonController:
     )
 
 
-def _name(creator: Any) -> str:
-    """Returns ``python:NAME@VERSION``. The version changes with the source text of the module that defines the controller."""
-    name = getattr(creator, "__qualname__", type(creator).__name__).rpartition(".<locals>.")[2]
-    try:
-        module = inspect.getmodule(creator)
-        source = inspect.getsource(module if module is not None else creator)
-    except (OSError, TypeError):
-        source = ""
-    version = hashlib.sha256(source.encode()).hexdigest()[:12]
+def _name(controller: Any) -> str:
+    """Returns ``python:NAME@VERSION``, in which the version identifies the code and the state of the controller."""
+    own = controller if isinstance(controller, (type, types.FunctionType)) else type(controller)
+    name = own.__qualname__.rpartition(".<locals>.")[2]
     word = "".join(letter if letter.isalnum() or letter in "._-" else "-" for letter in name)
-    return f"{_native.PYTHON_PREFIX}:{word}@{version}"
+    return f"{_native.PYTHON_PREFIX}:{word}@{_version(controller)}"
+
+
+def _version(controller: Any) -> str:
+    """Returns a hash of the code and the state of a controller, or a unique word if the state cannot be pickled."""
+    described = io.BytesIO()
+    try:
+        _Describer(described).dump(controller)
+    except Exception:
+        # Nothing says whether such a controller has changed: no campaign is resumed with it.
+        return f"unidentified-{uuid.uuid4().hex[:12]}"
+    return hashlib.sha256(described.getvalue()).hexdigest()[:12]
+
+
+class _Describer(pickle.Pickler):
+    """Pickles an object for its hash: with the code of its functions and classes, not only their names.
+
+    Installed packages are left to their names. The source text of a module stands for its other functions and constants.
+    """
+
+    def __init__(self, file: io.BytesIO) -> None:
+        super().__init__(file, protocol=4)
+        self._seen: set[int] = set()
+
+    def reducer_override(self, obj: Any) -> Any:
+        if not isinstance(obj, (type, types.FunctionType)) or _is_installed(obj):
+            return NotImplemented
+        if id(obj) in self._seen:
+            return str, (obj.__qualname__,)
+        self._seen.add(id(obj))
+        if isinstance(obj, types.FunctionType):
+            cells = tuple(cell.cell_contents for cell in obj.__closure__ or ())
+            return _described, (_module_source(obj), _code(obj.__code__), obj.__defaults__, cells)
+        functions = tuple(value for value in vars(obj).values() if isinstance(value, types.FunctionType))
+        return _described, (obj.__qualname__, _module_source(obj), obj.__bases__, functions)
+
+
+def _described(*parts: Any) -> tuple[Any, ...]:
+    """Returns its arguments: what a pickle of the describer would be read as."""
+    return parts
+
+
+def _is_installed(obj: Any) -> bool:
+    """Returns whether a function or class belongs to Python or to an installed package."""
+    path = getattr(sys.modules.get(obj.__module__), "__file__", None)
+    places = [sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib")]
+    return obj.__module__ == "builtins" or (path is not None and any(path.startswith(place) for place in places))
+
+
+def _module_source(obj: Any) -> str:
+    try:
+        module = inspect.getmodule(obj)
+        return "" if module is None else inspect.getsource(module)
+    except (OSError, TypeError):
+        # A notebook is no file: its functions stand for themselves.
+        return ""
+
+
+def _code(code: types.CodeType) -> tuple[Any, ...]:
+    """Returns what a function does, without the place where it is written."""
+    constants = tuple(_code(item) if isinstance(item, types.CodeType) else repr(item) for item in code.co_consts)
+    return code.co_code, code.co_names, constants
+
+
+def end_steps(controller: _native.PythonController) -> None:
+    """Ends the steps that hang: they would keep their threads busy, and the interpreter could not end in order."""
+    hanging, raised = controller.unregister(), set[int]()
+    deadline_s = time.monotonic() + END_TIMEOUT_S
+    while controller.is_busy and time.monotonic() < deadline_s:
+        for thread in hanging:
+            if thread not in raised:
+                ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), ctypes.py_object(SystemExit))
+                raised.add(thread)
+        time.sleep(0.005)
+        hanging = controller.unregister()
+    if controller.is_busy:
+        warnings.warn(f"{len(hanging)} steps of the controller hang in a call that cannot be interrupted", stacklevel=4)
 
 
 @contextmanager
@@ -77,6 +159,4 @@ def registered(controllers: list[ControllerLike]) -> Iterator[list[str]]:
         yield names
     finally:
         for made in own:
-            for thread in made.unregister():
-                # A step that never returns would keep its thread, and with it the interpreter, busy.
-                ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), ctypes.py_object(SystemExit))
+            end_steps(made)

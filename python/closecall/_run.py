@@ -6,7 +6,7 @@ import os
 from typing import Literal
 
 from . import _native
-from ._controller import ControllerLike, native
+from ._controller import ControllerLike, end_steps, native
 from ._outcome import Outcome
 from ._scenario import Scenario, loaded
 
@@ -30,5 +30,10 @@ def run(
 
     Raises :class:`SampleError` if the sample has no outcome. Its ``__cause__`` is the exception of the controller.
     """
-    done = _native.run(loaded(scenario)._native, native(controller), seed, sample, sensors)
+    chosen = native(controller)
+    try:
+        done = _native.run(loaded(scenario)._native, chosen, seed, sample, sensors)
+    finally:
+        if not isinstance(chosen, str):
+            end_steps(chosen)
     return Outcome.from_json(done.json(), done)

@@ -1,7 +1,7 @@
 //! Controllers that are Python objects: what they are given, and how their answers and exceptions are taken.
 
 use std::collections::BTreeSet;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use closecall_controllers::{
@@ -37,6 +37,24 @@ struct Shared {
     failure: Mutex<Option<PyErr>>,
     /// Python's identifiers of the threads that are in a step.
     threads: Mutex<BTreeSet<u64>>,
+    /// Number of threads that are in a step, or about to begin one.
+    active: AtomicUsize,
+}
+
+/// A thread that is in a step, until this value is dropped.
+struct Active<'a>(&'a Shared);
+
+impl<'a> Active<'a> {
+    fn new(shared: &'a Shared) -> Self {
+        shared.active.fetch_add(1, Ordering::SeqCst);
+        Self(shared)
+    }
+}
+
+impl Drop for Active<'_> {
+    fn drop(&mut self) {
+        self.0.active.fetch_sub(1, Ordering::SeqCst);
+    }
 }
 
 /// A controller that is a Python object: a callable that creates it for each sample.
@@ -64,7 +82,7 @@ impl PythonController {
 
     /// Lets every controller fail at its next step.
     pub(crate) fn cancel(&self) {
-        self.shared.is_cancelled.store(true, Ordering::Relaxed);
+        self.shared.is_cancelled.store(true, Ordering::SeqCst);
     }
 }
 
@@ -87,6 +105,12 @@ impl PythonController {
         lock(&self.registration).take();
         self.cancel();
         lock(&self.shared.threads).iter().copied().collect()
+    }
+
+    /// Whether any thread is in a step.
+    #[getter]
+    fn is_busy(&self) -> bool {
+        self.shared.active.load(Ordering::SeqCst) > 0
     }
 }
 
@@ -167,13 +191,16 @@ impl Controller {
 impl EgoController for Controller {
     fn step(&mut self, input: &EgoInput<'_>) -> Result<EgoCommand, ControllerError> {
         input.check_finite()?;
-        let called = if self.shared.is_cancelled.load(Ordering::Relaxed) {
+        let shared = self.shared.clone();
+        // The interpreter must not end while a thread is about to enter it, in it, or about to leave it.
+        let _active = Active::new(&shared);
+        let called = if shared.is_cancelled.load(Ordering::SeqCst) {
             Err("the Python program has ended the run".to_owned())
         } else {
             Python::attach(|py| {
                 self.call(py, input).map_err(|error| {
                     let text = described(py, &error);
-                    *lock(&self.shared.failure) = Some(error);
+                    *lock(&shared.failure) = Some(error);
                     text
                 })
             })

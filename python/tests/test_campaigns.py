@@ -20,6 +20,7 @@ import pytest
 from helpers import SCENARIO, command
 
 import closecall as cc
+from closecall._controller import registered
 
 from acc import Acc  # isort: skip (helpers finds the examples)
 
@@ -66,11 +67,15 @@ def test_a_python_controller_reproduces_acc_to_the_last_bit(tmp_path: Path) -> N
         columns = [column for column in table.column_names if column != "controller" and not column.startswith("mis_")]
         tables[name] = table.select(columns).to_pylist()
     assert tables["own"] == tables["acc"] and len(tables["own"]) == 20
-    # On one thread and on several, by class and by object.
-    variants: list[dict[str, Any]] = [{"jobs": 1, "controller": Acc}, {"jobs": 4, "controller": Acc()}]
-    for index, options in enumerate(variants):
-        cc.campaign(SCENARIO, n=20, seed=5, sensors="object", no_gate=True, out=tmp_path / str(index), **options)
-        assert sha256(tmp_path / str(index) / "outcomes.parquet") == sha256(tmp_path / "own" / "outcomes.parquet")
+    # On one thread and on several the file is the same.
+    for jobs in (1, 4):
+        out = tmp_path / str(jobs)
+        cc.campaign(SCENARIO, n=20, seed=5, sensors="object", controller=Acc, out=out, no_gate=True, jobs=jobs)
+        assert sha256(out / "outcomes.parquet") == sha256(tmp_path / "own" / "outcomes.parquet")
+    # An object is another controller than its class, whose hash the file holds. Its outcomes are the same.
+    cc.campaign(SCENARIO, n=20, seed=5, sensors="object", controller=Acc(), out=tmp_path / "object", no_gate=True)
+    tables = {name: pyarrow.parquet.read_table(tmp_path / name / "outcomes.parquet") for name in ("own", "object")}
+    assert tables["own"].equals(tables["object"])
 
 
 class Sometimes:
@@ -122,20 +127,59 @@ def test_the_cause_of_a_failed_run_is_the_exception() -> None:
         cc.run(SCENARIO, lambda: 3, sensors="object")  # type: ignore[arg-type,return-value]
 
 
-def test_a_controller_that_hangs_costs_its_sample_only() -> None:
-    class Hangs:
-        def step(self, input: cc.ControllerInput) -> float:
-            while input.time_s > 1.0:
-                time.sleep(0.001)
-            return 0.0
+HANGING = """
+import closecall as cc
 
-    result = cc.campaign(SCENARIO, n=2, sensors="object", controller=Hangs, sample_timeout_s=0.5)
-    assert (result.exit_code, result.errors) == (5, 2)
-    # The threads of the steps end, so that the interpreter can.
-    deadline = time.monotonic() + 30.0
-    while any(thread.name.startswith("Dummy") for thread in threading.enumerate()) and time.monotonic() < deadline:
-        time.sleep(0.05)
-    assert time.monotonic() < deadline
+class Hangs:
+    def step(self, input):
+        while input.time_s > 1.0:
+            pass
+        return 0.0
+
+result = cc.campaign("low-thw-overtake", n=3, sensors="object", controller=Hangs, sample_timeout_s=1, jobs=2)
+print(result.exit_code, result.errors, flush=True)
+"""
+
+
+def test_a_controller_that_hangs_costs_its_sample_only() -> None:
+    # The interpreter ends, although threads hang in the controller.
+    done = subprocess.run([sys.executable, "-c", HANGING], capture_output=True, text=True, timeout=120)
+    assert (done.stdout.split(), done.returncode, done.stderr) == (["5", "3"], 0, "")
+
+
+class Gain:
+    """Holds a speed with a gain."""
+
+    def __init__(self, gain: float) -> None:
+        self.gain = gain
+        self.others: list[object] = []
+
+    def step(self, input: cc.ControllerInput) -> float:
+        return self.gain * (30.0 - input.odometry.speed_mps)
+
+
+def test_the_name_of_a_controller_changes_with_its_code_and_state() -> None:
+    def names(*controllers: Any) -> list[str]:
+        with registered(list(controllers)) as found:
+            return found
+
+    first, again, other = names(Gain(0.5), Gain(0.5), Gain(0.6))
+    assert first == again != other and first.startswith("python:Gain@")
+
+    def enclosing(gain: float) -> Any:
+        return lambda: Gain(gain)
+
+    first, again, other = names(enclosing(0.5), enclosing(0.5), enclosing(0.6))
+    assert first == again != other
+    unknown = Gain(0.5)
+    unknown.others = [threading.Lock()]
+    assert "unidentified" in names(Gain)[0] + names(lambda: unknown)[0]
+
+
+def test_several_objects_of_one_class_are_compared() -> None:
+    arms = ["acc", Gain(0.5), Gain(0.6)]
+    result = cc.campaign(SCENARIO, n=4, sensors="object", arms=arms, no_gate=True)
+    assert sorted(result.report["controllers"]) == ["acc", "python:Gain-1", "python:Gain-2"]
 
 
 def test_a_controller_that_has_changed_does_not_resume(tmp_path: Path) -> None:
@@ -181,6 +225,31 @@ def test_ctrl_c_stops_a_campaign_that_can_be_resumed(tmp_path: Path) -> None:
     assert process.returncode == 7 and rest.splitlines()[-1] == "interrupted"
     records = (tmp_path / "out" / "journal.jsonl").read_text().count("\n")
     assert 0 < records < 100_000
+
+
+SLOW = """
+import time, closecall as cc
+
+class Slow:
+    def step(self, input):
+        print("step", flush=True)
+        time.sleep(0.05)
+        return 0.0
+
+try:
+    cc.run("low-thw-overtake", Slow, sensors="object")
+except KeyboardInterrupt:
+    print("interrupted", flush=True)
+    raise SystemExit(7)
+"""
+
+
+def test_ctrl_c_ends_a_run() -> None:
+    process = subprocess.Popen([sys.executable, "-c", SLOW], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stdout is not None and process.stdout.readline() == "step\n"
+    process.send_signal(signal.SIGINT)
+    rest, messages = process.communicate(timeout=30)
+    assert (process.returncode, messages) == (7, "") and "interrupted" in rest and rest.count("step") < 100
 
 
 def test_ctrl_c_ends_the_command_as_it_does_without_python(tmp_path: Path) -> None:

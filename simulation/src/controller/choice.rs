@@ -49,16 +49,16 @@ impl ControllerChoice {
         }
     }
 
-    /// Returns the names of the arms of a campaign. Several processes are numbered, so that each arm has a name of its own.
+    /// Returns the names of the arms of a campaign. Arms that would have the same name, such as several processes, are
+    /// numbered.
     pub fn names(arms: &[Self]) -> Vec<String> {
-        let is_process = |arm: &&Self| arm.exec().is_some();
-        let has_several = arms.iter().filter(is_process).count() > 1;
-        let mut processes = 0;
-        let name = |arm: &Self| {
-            processes += u32::from(arm.exec().is_some());
-            if has_several && arm.exec().is_some() { format!("{EXEC}-{processes}") } else { arm.name() }
+        let names: Vec<String> = arms.iter().map(Self::name).collect();
+        let count = |names: &[String], name: &str| names.iter().filter(|other| *other == name).count();
+        let numbered = |(index, name): (usize, &String)| match count(&names, name) {
+            1 => name.clone(),
+            _ => format!("{name}-{}", count(&names[..=index], name)),
         };
-        arms.iter().map(name).collect()
+        names.iter().enumerate().map(numbered).collect()
     }
 
     /// Returns the built-in controller, or `None` if this is a process.
@@ -76,13 +76,13 @@ impl ControllerChoice {
         self.factory_in(None, self.name())
     }
 
-    /// Returns a factory of this controller. A process runs in the given folder, or in that of this program, and has the
-    /// given name in reports.
+    /// Returns a factory of this controller. A process runs in the given folder, or in that of this program. All but a built-in
+    /// controller have the given name in reports.
     pub fn factory_in(&self, folder: Option<&Path>, name: String) -> Arc<dyn ControllerFactory> {
         match self {
             Self::BuiltIn(built_in) => built_in.factory(),
             Self::Exec(settings) => Arc::new(ExecFactory::new(settings.clone(), folder).named(name)),
-            Self::Hosted(hosted) => hosted.factory(),
+            Self::Hosted(hosted) => hosted.factory(name),
         }
     }
 

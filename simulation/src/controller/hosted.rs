@@ -69,10 +69,11 @@ impl HostedController {
         self.0.split_once('@').map_or(&self.0[..], |(name, _)| name).to_owned()
     }
 
-    /// Returns the factory. The controllers of a name that is not registered fail at their first step.
-    pub(super) fn factory(&self) -> Arc<dyn ControllerFactory> {
+    /// Returns the factory, under the given name. The controllers of a name that is not registered fail at their first step.
+    pub(super) fn factory(&self, name: String) -> Arc<dyn ControllerFactory> {
         let factory = registry().get(&self.0).cloned();
-        factory.unwrap_or_else(|| Arc::new(Missing { name: self.name() }))
+        let factory = factory.unwrap_or_else(|| Arc::new(Missing { name: self.name() }));
+        Arc::new(Named { name, factory })
     }
 }
 
@@ -80,6 +81,30 @@ impl HostedController {
 impl fmt::Display for HostedController {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.0)
+    }
+}
+
+/// A factory under another name.
+struct Named {
+    name: String,
+    factory: Arc<dyn ControllerFactory>,
+}
+
+impl ControllerFactory for Named {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn settings(&self, settings: &EgoSettings) -> EgoSettings {
+        self.factory.settings(settings)
+    }
+
+    fn has_mis(&self, settings: &EgoSettings) -> bool {
+        self.factory.has_mis(settings)
+    }
+
+    fn build(&self, settings: &EgoSettings) -> Box<dyn EgoController> {
+        self.factory.build(settings)
     }
 }
 
@@ -129,6 +154,11 @@ mod tests {
         // The manifest can still be read, and names the controller that is missing.
         assert_eq!(serde_json::from_str::<ControllerChoice>(&stored).unwrap(), choice);
         assert_eq!(choice.factory().name(), "python:mine");
+        let other = ControllerChoice::Hosted(HostedController::new("python:mine@3c4d"));
+        assert_eq!(
+            ControllerChoice::names(&[choice, ControllerChoice::ACC, other]),
+            ["python:mine-1", "acc", "python:mine-2"]
+        );
         assert!(name.parse::<ControllerChoice>().is_err());
     }
 }
