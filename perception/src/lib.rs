@@ -12,12 +12,14 @@
 //! * [`cases`]: the conditions
 //! * [`approach`]: one approach
 //! * [`study`]: all approaches of all cases
+//! * [`fit`]: the fit of the object-level sensor to the full chain
 //! * [`figures`]: what follows from the approaches of a case, with intervals
 //! * [`output`]: text, JSON, Parquet and the page
 
 pub mod approach;
 pub mod cases;
 pub mod figures;
+pub mod fit;
 pub mod output;
 pub mod study;
 
