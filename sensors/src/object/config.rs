@@ -4,12 +4,12 @@
 //!
 //! | key | front radar | surround | rear object |
 //! |---|---|---|---|
-//! | `range-m` | 150 | 14 (b) | 120 (c) |
+//! | `range-m` | 150 | 14 (b) | 134.6 (c) |
 //! | `half-angle-deg` | 45 (a) | all directions | 66.5 (c) |
-//! | `range-sd-m` | 0.1 (a) | 0.1 (b) | 0.1 (c) |
-//! | `lateral-sd-m` | 0.3 | 0.15 | 0.15 |
-//! | `drift-sd-m` | 0.1 | 0.05 | 0.1 |
-//! | `drift-time-s` | 1.0 | 1.0 | 1.0 |
+//! | `range-sd-m` | 0.1 (a) | 0.1 (b) | 0.01 (c) |
+//! | `lateral-sd-m` | 0.3 | 0.15 | 0.01 (c) |
+//! | `drift-sd-m` | 0.1 | 0.05 | 0.0499 (c) |
+//! | `drift-time-s` | 1.0 | 1.0 | 8.34 (c) |
 //! | `speed-sd-mps` | 0.1 (a) | not measured | not measured |
 //! | `latency-s` | 0.08 (a) | 0.04 | 0.08 |
 //! | `dropout` | 0.02 | 0.02 | 0.05 |
@@ -18,8 +18,8 @@
 //!   of its near scan.
 //! - (b) Autoliv's 24 GHz short-range module NB24G1V2 (user's manual, blind spot mode): 0.5 to 14 m, error ±0.2 m, taken
 //!   as two standard deviations.
-//! - (c) This sensor replaces the rear LiDAR with its tracker. The field of view is Valeo SCALA Gen 2's. The range is the
-//!   one at which a usual car is confirmed.
+//! - (c) This sensor replaces the rear LiDAR with its tracker. The field of view is Valeo SCALA Gen 2's. The rest is that of
+//!   the fit to the full chain ([`RearFit`]); the range is that of a usual car.
 //!
 //! All other values are assumptions.
 

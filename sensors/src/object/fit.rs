@@ -159,9 +159,16 @@ impl RearFit {
         self.shapes.iter().try_for_each(|(shape, factor)| within(&format!("shapes.{shape}"), *factor, [0.1, 10.0]))
     }
 
-    /// Returns the range of a usual car on a clear day (m): grey, with a clean plate.
+    /// Returns the range of a usual car on a clear day (m): grey, with a clean plate. Like the grid, it has decimetres.
     pub(super) fn usual_m(&self) -> f64 {
-        self.grid_m(VehicleClass::Car, USUAL_PAINT, Plate::Clean, extinction_per_m(&Environment::CLEAR_DAY))
+        let clear_per_m = extinction_per_m(&Environment::CLEAR_DAY);
+        (10.0 * self.grid_m(VehicleClass::Car, USUAL_PAINT, Plate::Clean, clear_per_m)).round() / 10.0
+    }
+
+    /// Returns what the sensors are a fit of, for reports.
+    pub fn origin_text(&self) -> String {
+        let Origin { version, scenario, seed, approaches, .. } = &self.origin;
+        format!("fit of {version} to the full chain of {scenario}, seed {seed}, {approaches} approaches of each point")
     }
 
     /// Returns the range of a vehicle (m).
