@@ -32,7 +32,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         file: &file,
         seed: args.seed,
         approaches: args.approaches,
-        command: format!("cargo run --release --example fit_object_sensors -- -n {} --seed {}", args.approaches, args.seed),
+        command: format!(
+            "cargo run --release --example fit_object_sensors -- -n {} --seed {}",
+            args.approaches, args.seed
+        ),
         version: env!("CARGO_PKG_VERSION").to_owned(),
     })?;
     let head = "# The rear object-level sensor, fitted to the full chain by examples/fit_object_sensors. Not edited by hand.\n\n";

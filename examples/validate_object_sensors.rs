@@ -52,11 +52,21 @@ fn main() -> Result<ExitCode, Box<dyn std::error::Error>> {
         agrees &= kappa.is_none_or(|kappa| kappa >= MIN_KAPPA) && (object - full).abs() <= MAX_DIFFERENCE;
         let shown = kappa.map_or_else(|| "-".to_owned(), |kappa| format!("{kappa:.3}"));
         let differing: Vec<_> = agreement.pairs.iter().filter(|pair| pair.differs()).collect();
-        println!("{name}: kappa {shown}, collisions {:.1} % object, {:.1} % full, {} differ", 100.0 * object, 100.0 * full, differing.len());
+        println!(
+            "{name}: kappa {shown}, collisions {:.1} % object, {:.1} % full, {} differ",
+            100.0 * object,
+            100.0 * full,
+            differing.len()
+        );
         for pair in differing {
-            let rear = pair.rear.map_or_else(String::new, |(class, paint)| format!("{}, paint {paint:.2}", class.name()));
+            let rear =
+                pair.rear.map_or_else(String::new, |(class, paint)| format!("{}, paint {paint:.2}", class.name()));
             let only = if pair.object.has_collided { "object" } else { "full" };
-            lists.push_str(&format!("{name}, sample {}: collides with {only} only; {rear}; {}\n", pair.sample, pair.reason()));
+            lists.push_str(&format!(
+                "{name}, sample {}: collides with {only} only; {rear}; {}\n",
+                pair.sample,
+                pair.reason()
+            ));
         }
     }
     print!("{lists}");

@@ -8,8 +8,8 @@ use closecall_campaign::runner::{Sampling, concrete};
 use closecall_scenarios::sampling::Design;
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::BuiltIn;
-use closecall_simulation::scenario::ScenarioFile;
 use closecall_simulation::outcome::Outcome;
+use closecall_simulation::scenario::ScenarioFile;
 use closecall_simulation::{Arm, NoObserver, RunKey, SampleError, simulate};
 use closecall_traffic::VehicleClass;
 use rayon::prelude::*;
@@ -89,7 +89,9 @@ impl Pair {
             .or_else(|| differ("releases", object.released_at_s, full.released_at_s))
             .unwrap_or_else(|| {
                 let missed = if object.has_collided { full } else { object };
-                let gap = missed.min_gap_rear_m.map_or_else(String::new, |gap_m| format!(": the other run passes by {gap_m:.2} m"));
+                let gap = missed
+                    .min_gap_rear_m
+                    .map_or_else(String::new, |gap_m| format!(": the other run passes by {gap_m:.2} m"));
                 format!("engaged and released within {DIFFERENT_S} s of each other, on the edge of a contact{gap}")
             })
     }
@@ -122,7 +124,8 @@ impl Agreement {
 
     /// Returns the collision rates with object-level sensors and with the full chain.
     pub fn rates(&self) -> [f64; 2] {
-        let rate = |of: fn(&Pair) -> bool| self.pairs.iter().filter(|pair| of(pair)).count() as f64 / self.pairs.len() as f64;
+        let rate =
+            |of: fn(&Pair) -> bool| self.pairs.iter().filter(|pair| of(pair)).count() as f64 / self.pairs.len() as f64;
         [rate(|pair| pair.object.has_collided), rate(|pair| pair.full.has_collided)]
     }
 
@@ -163,7 +166,10 @@ mod tests {
     #[test]
     fn a_reason_is_the_first_difference() {
         let mut differing = pair(true, false);
-        assert!(differing.differs() && differing.reason().contains("on the edge of a contact: the other run passes by 0.40 m"));
+        assert!(
+            differing.differs()
+                && differing.reason().contains("on the edge of a contact: the other run passes by 0.40 m")
+        );
         differing.object.released_at_s = Some(8.0);
         assert_eq!(differing.reason(), "the system releases 1.00 s earlier with the object-level sensors");
         differing.full.engaged_at_s = None;

@@ -231,12 +231,7 @@ fn follow(
 ///
 /// # Errors
 /// [`SensorError`] if a sensor model fails.
-pub(crate) fn first_confirmed_m(
-    case: &Case,
-    sensors: &Sensors,
-    road: &Road,
-    at: Address,
-) -> Result<f64, SensorError> {
+pub(crate) fn first_confirmed_m(case: &Case, sensors: &Sensors, road: &Road, at: Address) -> Result<f64, SensorError> {
     let mut first_m = GAPS_M[1];
     follow((case, sensors, road, at), GAPS_M[0], |gap_m, track, _| {
         if track.is_some() {

@@ -210,7 +210,8 @@ impl Fitter<'_> {
             let scaled = |sd_m: f64, axis: usize| {
                 rounded((sd_m * goal[axis] / own[axis]).clamp(SD_BOUNDS_M[0], SD_BOUNDS_M[1]), 1e4)
             };
-            (drift_sd_m, lateral_sd_m, range_sd_m) = (scaled(drift_sd_m, 0), scaled(lateral_sd_m, 1), scaled(range_sd_m, 2));
+            (drift_sd_m, lateral_sd_m, range_sd_m) =
+                (scaled(drift_sd_m, 0), scaled(lateral_sd_m, 1), scaled(range_sd_m, 2));
         }
         Ok(FittedErrors { range_sd_m, lateral_sd_m, drift_sd_m, drift_time_s })
     }
@@ -234,7 +235,8 @@ impl Fitter<'_> {
 /// Returns the root mean squares of the errors along (m), across (m) and of the speed (m/s).
 fn root_mean_squares(watched: &[Watched]) -> [f64; 3] {
     std::array::from_fn(|axis| {
-        let squares: Vec<f64> = watched.iter().flat_map(|one| one.errors.iter().map(|it| it[axis] * it[axis])).collect();
+        let squares: Vec<f64> =
+            watched.iter().flat_map(|one| one.errors.iter().map(|it| it[axis] * it[axis])).collect();
         mean(&squares).sqrt()
     })
 }

@@ -77,7 +77,16 @@ fn the_object_level_sensor_detects_as_the_full_chain_does() {
     falls(&["usual", "fog, visibility 200", "fog, visibility 100"]);
     falls(&["truck", "usual", "motorcycle"]);
     falls(&["paint 0.2", "fog, visibility 100"]);
-    for name in ["usual", "paint 0.1,", "paint 0.2", "paint 0.8", "fog, visibility 200", "fog, visibility 100", "night", "motorcycle"] {
+    for name in [
+        "usual",
+        "paint 0.1,",
+        "paint 0.2",
+        "paint 0.8",
+        "fog, visibility 200",
+        "fog, visibility 100",
+        "night",
+        "motorcycle",
+    ] {
         let [object_m, full_m] = [&object, &full].map(|study| range_m(study, name));
         assert!((object_m / full_m - 1.0).abs() < 0.12, "{name}: {object_m} m instead of {full_m} m");
     }

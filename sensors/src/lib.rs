@@ -34,7 +34,8 @@ pub use config::{SensorMode, Sensors, SensorsConfig};
 pub use full::{DetectionClassifier, FullModel, FullPerception};
 pub use ground_truth::GroundTruth;
 pub use object::{
-    ByClass, FitError, FittedErrors, NoiseKey, ObjectPerception, ObjectSensorConfig, ObjectSensorModel, Origin, RangeGrid, RearFit,
+    ByClass, FitError, FittedErrors, NoiseKey, ObjectPerception, ObjectSensorConfig, ObjectSensorModel, Origin,
+    RangeGrid, RearFit,
 };
 pub use perception::{FieldOfView, Health, Perception, SensorError, SensorHealth};
 pub use scene::{Scene, SceneVehicle};

@@ -223,7 +223,10 @@ impl ObjectSensorConfig {
 
     pub(crate) fn check_rear_object(&self, parameters: &Parameters) -> Result<ObjectSensorModel, ConfigError> {
         let fit = RearFit::shipped().map_err(|error| {
-            ConfigError::new("range-m", Problem::UnknownWord { value: error.to_string(), allowed: "the fit that ships".to_owned() })
+            ConfigError::new(
+                "range-m",
+                Problem::UnknownWord { value: error.to_string(), allowed: "the fit that ships".to_owned() },
+            )
         })?;
         self.check_against(&rear_object(fit), parameters)
     }

@@ -152,7 +152,9 @@ impl RearFit {
             let has_size = grid.range_m.len() == self.paints.len()
                 && grid.range_m.iter().all(|row| row.len() == self.extinctions_per_m.len());
             if !has_size {
-                return Err(format!("`{key}` needs a row for each of `paints` with a number for each of `extinctions-per-m`"));
+                return Err(format!(
+                    "`{key}` needs a row for each of `paints` with a number for each of `extinctions-per-m`"
+                ));
             }
             grid.range_m.iter().flatten().try_for_each(|range_m| within(&key, *range_m, [1.0, 500.0]))?;
         }

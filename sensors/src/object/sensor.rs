@@ -11,7 +11,9 @@
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
-use closecall_traffic::{CONTROL_STEP, ClassScores, Environment, Source, Stream, Track, TrackId, Vehicle, VehicleClass};
+use closecall_traffic::{
+    CONTROL_STEP, ClassScores, Environment, Source, Stream, Track, TrackId, Vehicle, VehicleClass,
+};
 
 use super::config::{MAX_LATENCY_STEPS, ObjectSensorModel};
 use super::faulty::Faulty;

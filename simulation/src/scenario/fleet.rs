@@ -29,7 +29,8 @@ const MIN_SOURCE_LEN: usize = 20;
 const TEXTS: [&str; 1] = [include_str!("../../../scenarios/library/fleets/germany.toml")];
 
 /// The fleets that ship. A test reads each of them, so that none is left out here.
-static FLEETS: LazyLock<Vec<Fleet>> = LazyLock::new(|| TEXTS.iter().filter_map(|text| Fleet::parse(text).ok()).collect());
+static FLEETS: LazyLock<Vec<Fleet>> =
+    LazyLock::new(|| TEXTS.iter().filter_map(|text| Fleet::parse(text).ok()).collect());
 
 /// How the vehicles on a road look.
 #[derive(Clone, Debug, PartialEq, Deserialize)]

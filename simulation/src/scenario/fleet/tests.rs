@@ -50,7 +50,10 @@ fn wrong_fleets_are_refused_with_key_and_range() {
 fn an_unknown_fleet_is_refused_with_the_known_ones() {
     let config = VehicleConfig { fleet: Some("germani".to_owned()), ..VehicleConfig::typical(VehicleClass::Car) };
     let error = FleetOf::check(&config).unwrap_err().to_string();
-    assert!(error.contains("`fleet`") && error.contains("germani") && error.contains("did you mean `germany`"), "{error}");
+    assert!(
+        error.contains("`fleet`") && error.contains("germani") && error.contains("did you mean `germany`"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -80,7 +83,9 @@ fn looks_have_the_shares_of_the_file() {
 
 #[test]
 fn what_the_file_gives_is_kept_and_a_seed_draws_the_same() {
-    let fixed = scenario("vehicle = { class = \"car\", fleet = \"germany\", paint-reflectivity = 0.3, body-shape = \"van\", plate = \"dirty\" }");
+    let fixed = scenario(
+        "vehicle = { class = \"car\", fleet = \"germany\", paint-reflectivity = 0.3, body-shape = \"van\", plate = \"dirty\" }",
+    );
     let free = scenario("vehicle = { class = \"car\", fleet = \"germany\" }");
     let mut colours = Vec::new();
     for sample in 0..50 {
