@@ -14,7 +14,7 @@ use closecall_sensors::{SensorMode, inference_backend};
 use closecall_simulation::Arm;
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::controller::exec::ExecSettings;
-use closecall_simulation::scenario::ScenarioFile;
+use closecall_simulation::scenario::{ScenarioError, ScenarioFile};
 use closecall_traffic::Choice;
 
 use crate::execution::Campaign;
@@ -103,6 +103,18 @@ impl Plan {
             workers: Workers::default(),
             without_effect: Vec::new(),
         })
+    }
+
+    /// Uses these sensors instead of those of each scenario, if any are given.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] if a fault of a scenario could not act in this mode: the campaign would test nothing, and pass.
+    pub fn use_sensors(&mut self, sensors: Option<SensorMode>) -> Result<(), ScenarioError> {
+        if let Some(mode) = sensors {
+            self.scenarios.iter().try_for_each(|file| file.check_faults_in(mode))?;
+        }
+        self.sensors = sensors;
+        Ok(())
     }
 
     /// Returns the campaign, ready to run.

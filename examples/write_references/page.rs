@@ -14,19 +14,19 @@ use super::text::Described;
 /// The defaults of the object-level sensors: of the front radar, the surround sensors and the rear object-level sensor. A
 /// sensor without a default does not have the property.
 pub(crate) const SENSOR_DEFAULTS: [(&str, [Option<f64>; 3]); 13] = [
-    ("range-m", [Some(150.0), Some(14.0), Some(120.0)]),
+    ("range-m", [Some(150.0), Some(14.0), Some(134.6)]),
     ("half-angle-deg", [Some(45.0), None, Some(66.5)]),
-    ("range-sd-m", [Some(0.1), Some(0.1), Some(0.1)]),
-    ("lateral-sd-m", [Some(0.3), Some(0.15), Some(0.15)]),
-    ("drift-sd-m", [Some(0.1), Some(0.05), Some(0.1)]),
-    ("drift-time-s", [Some(1.0), Some(1.0), Some(1.0)]),
+    ("range-sd-m", [Some(0.1), Some(0.1), Some(0.01)]),
+    ("lateral-sd-m", [Some(0.3), Some(0.15), Some(0.01)]),
+    ("drift-sd-m", [Some(0.1), Some(0.05), Some(0.0499)]),
+    ("drift-time-s", [Some(1.0), Some(1.0), Some(8.34)]),
     ("speed-sd-mps", [Some(0.1), None, None]),
     ("latency-s", [Some(0.08), Some(0.04), Some(0.08)]),
     ("dropout", [Some(0.02), Some(0.02), Some(0.05)]),
     ("confirm-hits", [Some(3.0), Some(2.0), Some(3.0)]),
     ("confirm-window", [Some(5.0), Some(4.0), Some(5.0)]),
     ("coast-s", [Some(0.6), Some(0.3), Some(1.0)]),
-    ("class-confidence", [Some(0.97), Some(0.97), Some(0.97)]),
+    ("class-confidence", [Some(0.97), Some(0.97), Some(0.997)]),
 ];
 
 const INTRODUCTION: &str = "\

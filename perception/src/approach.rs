@@ -116,7 +116,13 @@ impl Traffic {
             vehicle(actor, class, s_m, ego_d_m + offset_m, speed_mps)
         };
         let mut target = behind(1, case.class, gap_m, case.offset_m, EGO_MPS + closing_mps);
-        target.vehicle.appearance.paint_reflectivity = case.paint;
+        let appearance = &mut target.vehicle.appearance;
+        (appearance.paint_reflectivity, appearance.plate) = (case.paint, case.plate);
+        if let Some(shape) = case.shape {
+            // As for a vehicle of a fleet, the other dimensions stay as they are.
+            appearance.body_shape = shape;
+            target.vehicle.dimensions.height_m = shape.usual_dimensions().height_m;
+        }
         let screen = case.is_screened.then(|| behind(2, VehicleClass::Car, SCREEN_GAP_M, 0.0, EGO_MPS));
         Self { ego, others: std::iter::once(target).chain(screen).collect() }
     }
@@ -184,6 +190,79 @@ fn drive(case: &Case, sensors: &Sensors, road: &Road, at: Address, rng: &mut Str
     found.false_tracks = audit.false_tracks() as u64;
     found.nees = audit.nees;
     Ok(found)
+}
+
+/// What the tracks of a vehicle show while it is at certain gaps.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Watched {
+    /// Errors along (m), across (m) and of the speed (m/s), step by step.
+    pub(crate) errors: Vec<[f64; 3]>,
+    /// Scores of the true class.
+    pub(crate) scores: Vec<f64>,
+}
+
+/// Drives an approach, and calls `see` with the gap (m), the confirmed track, and the traffic in each step, until it is false.
+fn follow(
+    (case, sensors, road, at): (&Case, &Sensors, &Road, Address),
+    from_m: f64,
+    mut see: impl FnMut(f64, Option<&Track>, &Traffic) -> bool,
+) -> Result<(), SensorError> {
+    let mut rng = stream(at.seed, at.run, &ego_name(), "approach");
+    let [slowest, fastest] = CLOSING_MPS;
+    let closing_mps = slowest + (fastest - slowest) * rng.random::<f64>();
+    let start_m = from_m + closing_mps * 2.0 * CONTROL_STEP.s() * rng.random::<f64>();
+    let mut traffic = Traffic::new(case, road, start_m, closing_mps);
+    let mut perception = build(sensors, at)?;
+    for step in 0.. {
+        let gap_m = traffic.gap_m();
+        let time = CONTROL_STEP * step;
+        let scene = Scene { time, road, environment: &case.environment, ego: traffic.ego, others: &traffic.others };
+        let tracks = perception.step(&scene)?;
+        let confirmed: Vec<&Track> = confirmed(tracks).collect();
+        if gap_m < GAPS_M[1] || !see(gap_m, nearest(&confirmed, traffic.truths_m()[0]), &traffic) {
+            break;
+        }
+        traffic.advance();
+    }
+    Ok(())
+}
+
+/// Returns the gap at which the vehicle has a confirmed track for the first time (m); that of the end of the approach if never.
+///
+/// # Errors
+/// [`SensorError`] if a sensor model fails.
+pub(crate) fn first_confirmed_m(case: &Case, sensors: &Sensors, road: &Road, at: Address) -> Result<f64, SensorError> {
+    let mut first_m = GAPS_M[1];
+    follow((case, sensors, road, at), GAPS_M[0], |gap_m, track, _| {
+        if track.is_some() {
+            first_m = gap_m;
+        }
+        track.is_none()
+    })?;
+    Ok(first_m)
+}
+
+/// Returns what the tracks show between two gaps (m).
+///
+/// # Errors
+/// [`SensorError`] if a sensor model fails.
+pub(crate) fn watch(
+    case: &Case,
+    sensors: &Sensors,
+    road: &Road,
+    at: Address,
+    [near_m, far_m]: [f64; 2],
+) -> Result<Watched, SensorError> {
+    let mut watched = Watched::default();
+    // The track has settled when the vehicle reaches the gaps.
+    follow((case, sensors, road, at), far_m + 20.0, |gap_m, track, traffic| {
+        let Some(track) = track.filter(|_| gap_m <= far_m) else { return gap_m >= near_m };
+        let found = errors(track, traffic.truths_m()[0], &traffic.others[0]);
+        watched.errors.push([found.position_m[0], found.position_m[1], found.speed_mps]);
+        watched.scores.push(track.class.0[case.class as usize]);
+        gap_m >= near_m
+    })?;
+    Ok(watched)
 }
 
 /// Returns the time until a vehicle that appears at [`APPEARS_AT_M`] has a confirmed track (s).

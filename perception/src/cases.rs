@@ -3,7 +3,7 @@
 use closecall_sensors::faults::Faults;
 use closecall_sensors::{SensorMode, Sensors};
 use closecall_simulation::scenario::{ScenarioFile, library};
-use closecall_traffic::{Environment, Light, Road, VehicleClass};
+use closecall_traffic::{BodyShape, Environment, Light, Plate, Road, VehicleClass};
 
 /// Reflectivity of the usual paint (-).
 pub const USUAL_PAINT: f64 = 0.5;
@@ -19,7 +19,7 @@ const OFFSETS_M: [f64; 2] = [3.75, 1.9];
 /// A condition.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Case {
-    /// What is varied: `class`, `paint`, `offset`, `weather`, `light`, `traffic` or `fault`.
+    /// What is varied: `class`, `paint`, `plate`, `offset`, `weather`, `light`, `traffic` or `fault`.
     pub factor: &'static str,
     /// The condition, in words.
     pub name: String,
@@ -27,6 +27,10 @@ pub struct Case {
     pub class: VehicleClass,
     /// Reflectivity of its paint (-).
     pub paint: f64,
+    /// The state of its plate.
+    pub plate: Plate,
+    /// Its body shape; `None` for the first of its class.
+    pub shape: Option<BodyShape>,
     /// Its lateral offset from the ego, positive to the left (m).
     pub offset_m: f64,
     /// Light and weather.
@@ -40,12 +44,14 @@ pub struct Case {
 }
 
 impl Case {
-    fn usual() -> Self {
+    pub(crate) fn usual() -> Self {
         Self {
             factor: "usual",
             name: "usual: car, paint 0.5, own lane, clear day".to_owned(),
             class: VehicleClass::Car,
             paint: USUAL_PAINT,
+            plate: Plate::Clean,
+            shape: None,
             offset_m: 0.0,
             environment: Environment::CLEAR_DAY,
             is_screened: false,
@@ -67,6 +73,9 @@ pub fn cases(mode: SensorMode) -> Vec<Case> {
     }
     for paint in PAINTS {
         cases.push(Case { paint, ..Case::of("paint", format!("paint {paint}")) });
+    }
+    for (plate, name) in [(Plate::Dirty, "dirty"), (Plate::None, "none")] {
+        cases.push(Case { plate, paint: PAINTS[0], ..Case::of("plate", format!("paint {}, plate {name}", PAINTS[0])) });
     }
     for offset_m in OFFSETS_M {
         cases.push(Case { offset_m, ..Case::of("offset", format!("{offset_m} m to the left")) });

@@ -10,14 +10,18 @@
 //! approaches, a vehicle comes from 150 m behind to 5 m at a closing speed of its own. The ego keeps its speed and its lane.
 //!
 //! * [`cases`]: the conditions
+//! * [`agreement`]: verdicts with object-level sensors against those with the full chain
 //! * [`approach`]: one approach
 //! * [`study`]: all approaches of all cases
+//! * [`fit`]: the fit of the object-level sensor to the full chain
 //! * [`figures`]: what follows from the approaches of a case, with intervals
 //! * [`output`]: text, JSON, Parquet and the page
 
+pub mod agreement;
 pub mod approach;
 pub mod cases;
 pub mod figures;
+pub mod fit;
 pub mod output;
 pub mod study;
 

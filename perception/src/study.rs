@@ -41,6 +41,14 @@ pub enum StudyError {
     /// The sensors have no error, so that there is nothing to study.
     #[error("failed to study the sensors: those of mode `ground-truth` have no errors; choose `full` or `object`")]
     GroundTruth,
+    /// A run of a sample fails.
+    #[error("failed to compare the sensors: sample {sample}: {message}")]
+    Run {
+        /// The sample.
+        sample: u64,
+        /// Why.
+        message: String,
+    },
     /// A sensor model fails.
     #[error("failed to study the sensors: {case}, approach {run}: {source}")]
     Sensor {
@@ -59,7 +67,7 @@ impl StudyError {
         match self {
             Self::Scenario(error) => error.into(),
             Self::GroundTruth => FailureKind::Usage,
-            Self::Sensor { .. } => FailureKind::Sample,
+            Self::Sensor { .. } | Self::Run { .. } => FailureKind::Sample,
         }
     }
 }

@@ -64,6 +64,41 @@ fn faults_show_where_they_act() {
 }
 
 #[test]
+fn the_object_level_sensor_detects_as_the_full_chain_does() {
+    let (full, object) = (of_lidar(6), study(&[], SensorMode::Object, 6).unwrap());
+    let range_m = |study: &Study, name: &str| figures(study, name).range_m.value;
+    let falls = |names: &[&str]| {
+        let ranges_m: Vec<f64> = names.iter().map(|name| range_m(&object, name)).collect();
+        assert!(ranges_m.windows(2).all(|pair| pair[0] > pair[1] - 2.0), "{names:?}: {ranges_m:?}");
+        assert!(ranges_m[0] > ranges_m[ranges_m.len() - 1] + 10.0, "{names:?}: {ranges_m:?}");
+    };
+    falls(&["paint 0.8", "usual", "paint 0.35", "paint 0.2"]);
+    falls(&["usual", "rain 10", "rain 30"]);
+    falls(&["usual", "fog, visibility 200", "fog, visibility 100"]);
+    falls(&["truck", "usual", "motorcycle"]);
+    falls(&["paint 0.2", "fog, visibility 100"]);
+    for name in [
+        "usual",
+        "paint 0.1,",
+        "paint 0.2",
+        "paint 0.8",
+        "fog, visibility 200",
+        "fog, visibility 100",
+        "night",
+        "motorcycle",
+    ] {
+        let [object_m, full_m] = [&object, &full].map(|study| range_m(study, name));
+        assert!((object_m / full_m - 1.0).abs() < 0.12, "{name}: {object_m} m instead of {full_m} m");
+    }
+    // A usual car has the errors of the full chain, too.
+    let rmse = |study: &Study, axis: usize| figures(study, "usual").errors.unwrap()[axis].rmse.value;
+    for (axis, unit) in ["along", "across", "speed"].iter().enumerate() {
+        let ratio = rmse(&object, axis) / rmse(&full, axis);
+        assert!((0.5..2.0).contains(&ratio), "{unit}: {ratio}");
+    }
+}
+
+#[test]
 fn one_thread_and_several_give_the_same_bits() {
     let with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

@@ -177,6 +177,13 @@ impl Sensors {
         Err(ConfigError::new("mount-height-m", problem).within("rear-lidar"))
     }
 
+    /// Returns the same sensors with an object-level sensor behind that has one range for all vehicles: what the fit to the full
+    /// chain is made with.
+    #[must_use]
+    pub fn without_range_fit(self) -> Self {
+        Self { rear_object: self.rear_object.without_fit(), ..self }
+    }
+
     /// Returns the errors of the ego's odometry and map.
     pub fn odometry_errors(&self) -> OdometryErrors {
         self.altered.faults.odometry

@@ -33,6 +33,9 @@ pub use closecall_traffic::{Scene, SceneVehicle};
 pub use config::{SensorMode, Sensors, SensorsConfig};
 pub use full::{DetectionClassifier, FullModel, FullPerception};
 pub use ground_truth::GroundTruth;
-pub use object::{NoiseKey, ObjectPerception, ObjectSensorConfig, ObjectSensorModel};
+pub use object::{
+    ByClass, FitError, FittedErrors, NoiseKey, ObjectPerception, ObjectSensorConfig, ObjectSensorModel, Origin,
+    RangeGrid, RearFit,
+};
 pub use perception::{FieldOfView, Health, Perception, SensorError, SensorHealth};
 pub use worker_classifier::{inference_backend, rear_exposures, set_inference_backend};

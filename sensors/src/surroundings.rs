@@ -1,6 +1,6 @@
 //! The other vehicles in the ego's frame, computed once per step and shared by all object-level models.
 
-use closecall_traffic::VehicleClass;
+use closecall_traffic::{Appearance, VehicleClass};
 
 use crate::{Scene, SceneVehicle, SensorError};
 use closecall_traffic::ego_frame::EgoFrame;
@@ -11,6 +11,7 @@ pub(crate) struct OtherVehicle {
     /// Index in the scenario's list of actors.
     pub(crate) actor: usize,
     pub(crate) class: VehicleClass,
+    pub(crate) appearance: Appearance,
     pub(crate) length_m: f64,
     pub(crate) width_m: f64,
     /// Road coordinates (s, d) of the box's centre (m).
@@ -59,6 +60,7 @@ pub(crate) fn transform_scene<'a>(
         others.push(OtherVehicle {
             actor: vehicle.actor,
             class: vehicle.vehicle.class,
+            appearance: vehicle.vehicle.appearance,
             length_m: vehicle.vehicle.dimensions.length_m,
             width_m: vehicle.vehicle.dimensions.width_m,
             road_m: [state.s_m, state.d_m],

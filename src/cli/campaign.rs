@@ -108,7 +108,7 @@ impl CampaignArgs {
         let ensemble = self.ensemble.apply(files)?;
         let mut plan = Plan::new(ensemble.entries, self.sampling(), controllers)?;
         plan.without_effect = ensemble.without_effect;
-        plan.sensors = self.sensors.map(SensorsChoice::mode);
+        plan.use_sensors(self.sensors.map(SensorsChoice::mode))?;
         plan.partition = self.partition;
         plan.checks = self.plan.checks()?;
         plan.inference = self.plan.inference();

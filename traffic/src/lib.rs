@@ -93,4 +93,4 @@ pub use seed::{Stream, stream};
 pub use time::Time;
 pub use track::{ClassScores, Source, Track, TrackId, TrackStatus};
 pub use trajectory::{Trajectory, TrajectoryPoint};
-pub use vehicle::{Appearance, Dimensions, Indicator, Vehicle, VehicleClass, VehicleConfig, VehicleState};
+pub use vehicle::{Appearance, Dimensions, Indicator, Plate, Vehicle, VehicleClass, VehicleConfig, VehicleState};

@@ -69,6 +69,21 @@ pub struct Appearance {
     pub paint_rgb: [u8; 3],
     /// Body shape.
     pub body_shape: BodyShape,
+    /// State of the front registration plate.
+    pub plate: Plate,
+}
+
+/// The state of the front registration plate of a vehicle: its retro-reflection carries the detection of dark cars.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Plate {
+    /// As on vehicles in use.
+    #[default]
+    Clean,
+    /// Covered with road dirt, or shaded by the bumper.
+    Dirty,
+    /// Not mounted at the front.
+    None,
 }
 
 /// A vehicle as a scenario file describes it.
@@ -92,6 +107,13 @@ pub struct VehicleConfig {
     /// Body shape, which must belong to the class. If it is given, length, width and height are those that are usual for
     /// it, unless they are given, too; `saloon`, `tarpaulin-trailer` or `naked-bike` if absent.
     pub body_shape: Option<Choice<BodyShape>>,
+    /// State of the front registration plate: `clean`, `dirty` or `none`; `clean` if absent. The worse of this state and of the
+    /// one that `sensors.rear-lidar.plates` gives to all vehicles counts.
+    pub plate: Option<Choice<Plate>>,
+    /// Fleet of the library from which paint, colour, body shape with its height, and plate are drawn in each sample, such as
+    /// `germany`. What else is given here is kept. If absent, nothing is drawn.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fleet: Option<String>,
     /// Deceleration at which the brake light switches on (m/s²), 0.7 to 1.3; 0.7 if absent.
     pub brake_light_from_mps2: Option<Num>,
 }
@@ -126,6 +148,7 @@ impl Vehicle {
                 paint_reflectivity: 0.5,
                 paint_rgb: [128, 128, 132],
                 body_shape: BodyShape::of_class(class)[0],
+                plate: Plate::Clean,
             },
             brake_light_from_mps2: BRAKE_LIGHT_MPS2[0],
         }
@@ -144,6 +167,8 @@ impl VehicleConfig {
             paint_reflectivity: None,
             paint_rgb: None,
             body_shape: None,
+            plate: None,
+            fleet: None,
             brake_light_from_mps2: None,
         }
     }
@@ -189,6 +214,10 @@ impl Check for VehicleConfig {
                 )?,
                 paint_rgb: self.paint_rgb.unwrap_or(look.paint_rgb),
                 body_shape: body_shape.unwrap_or(look.body_shape),
+                plate: match &self.plate {
+                    Some(plate) => parameters.word(plate, "plate")?,
+                    None => look.plate,
+                },
             },
             brake_light_from_mps2: or_typical(
                 &self.brake_light_from_mps2,

@@ -24,13 +24,15 @@ pub enum Plates {
 const PLATE: f64 = std::f64::consts::PI * 20.0;
 /// Share of a plate's reflectivity that remains under dirt (assumption).
 const DIRTY_SHARE: f64 = 0.2;
+/// Equivalent Lambertian reflectivity of a dirty plate.
+pub(super) const DIRTY_PLATE: f64 = DIRTY_SHARE * PLATE;
 
 impl Plates {
     /// Returns the equivalent Lambertian reflectivity; `None` if there is no plate.
     fn reflectivity(self) -> Option<f64> {
         match self {
             Self::InUse => Some(PLATE),
-            Self::Dirty => Some(DIRTY_SHARE * PLATE),
+            Self::Dirty => Some(DIRTY_PLATE),
             Self::None => None,
         }
     }

@@ -4,7 +4,9 @@
 //! wavelength, 905 nm, at normal incidence. If no measurement is cited, the value is an assumption within the usual
 //! range for the material.
 
-use closecall_traffic::{Appearance, Environment};
+use closecall_traffic::{Appearance, Environment, Plate};
+
+use super::config::DIRTY_PLATE;
 
 /// The material of a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,7 +68,7 @@ impl Material {
         match self {
             Self::Paint => appearance.paint_reflectivity,
             Self::Glass => GLASS,
-            Self::Plate => plate.unwrap_or(appearance.paint_reflectivity),
+            Self::Plate => plate_of(plate, appearance.plate).unwrap_or(appearance.paint_reflectivity),
             Self::Lamp => LAMP,
             Self::Tyre => TYRE,
             Self::Plastic => PLASTIC,
@@ -76,6 +78,15 @@ impl Material {
             Self::Asphalt => asphalt(environment),
             Self::Water => 0.0,
         }
+    }
+}
+
+/// Returns the reflectivity of a plate in this state, of those that have the reflectivity `usual`; `None` if there is none.
+fn plate_of(usual: Option<f64>, state: Plate) -> Option<f64> {
+    match state {
+        Plate::Clean => usual,
+        Plate::Dirty => usual.map(|usual| usual.min(DIRTY_PLATE)),
+        Plate::None => None,
     }
 }
 

@@ -4,12 +4,12 @@
 //!
 //! | key | front radar | surround | rear object |
 //! |---|---|---|---|
-//! | `range-m` | 150 | 14 (b) | 120 (c) |
+//! | `range-m` | 150 | 14 (b) | 134.6 (c) |
 //! | `half-angle-deg` | 45 (a) | all directions | 66.5 (c) |
-//! | `range-sd-m` | 0.1 (a) | 0.1 (b) | 0.1 (c) |
-//! | `lateral-sd-m` | 0.3 | 0.15 | 0.15 |
-//! | `drift-sd-m` | 0.1 | 0.05 | 0.1 |
-//! | `drift-time-s` | 1.0 | 1.0 | 1.0 |
+//! | `range-sd-m` | 0.1 (a) | 0.1 (b) | 0.01 (c) |
+//! | `lateral-sd-m` | 0.3 | 0.15 | 0.01 (c) |
+//! | `drift-sd-m` | 0.1 | 0.05 | 0.0499 (c) |
+//! | `drift-time-s` | 1.0 | 1.0 | 8.34 (c) |
 //! | `speed-sd-mps` | 0.1 (a) | not measured | not measured |
 //! | `latency-s` | 0.08 (a) | 0.04 | 0.08 |
 //! | `dropout` | 0.02 | 0.02 | 0.05 |
@@ -18,8 +18,8 @@
 //!   of its near scan.
 //! - (b) Autoliv's 24 GHz short-range module NB24G1V2 (user's manual, blind spot mode): 0.5 to 14 m, error ±0.2 m, taken
 //!   as two standard deviations.
-//! - (c) This sensor replaces the rear LiDAR with its tracker. The field of view is Valeo SCALA Gen 2's. The range is the
-//!   one at which a usual car is confirmed.
+//! - (c) This sensor replaces the rear LiDAR with its tracker. The field of view is Valeo SCALA Gen 2's. The rest is that of
+//!   the fit to the full chain ([`RearFit`]); the range is that of a usual car.
 //!
 //! All other values are assumptions.
 
@@ -27,6 +27,7 @@ use closecall_traffic::{CONTROL_STEP, ConfigError, Num, Parameters, Problem, Ran
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::fit::{ByClass, RearFit};
 use crate::Alterations;
 use crate::lidar::HALF_FIELD_DEG;
 use closecall_tracking::lifecycle::{LifecycleRules, MAX_WINDOW};
@@ -42,7 +43,8 @@ const CLUTTER_PROBABILITY: f64 = 0.05;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct ObjectSensorConfig {
-    /// Distance from the bumper to a vehicle's nearest face up to which the vehicle is seen on a clear day (m).
+    /// Distance from the bumper to a vehicle's nearest face up to which the vehicle is seen on a clear day (m); behind the ego,
+    /// that of a usual car, in relation to which the ranges of other paints, plates, shapes and classes stand.
     pub range_m: Option<Num>,
     /// Half of the horizontal field of view (deg); not allowed for the surround sensors, which see in all directions.
     pub half_angle_deg: Option<Num>,
@@ -87,7 +89,10 @@ pub struct ObjectSensorModel {
     pub(super) latency_steps: usize,
     pub(super) dropout: f64,
     pub(super) rules: LifecycleRules,
-    pub(super) class_confidence: f64,
+    /// Score of the true class.
+    pub(super) class_confidence: ByClass,
+    /// The fit to the full chain that ranges come from; `None` for a sensor with one range for all vehicles.
+    pub(super) fit: Option<&'static RearFit>,
     /// Whether every vehicle is classified as background.
     pub(super) is_class_background: bool,
 }
@@ -98,11 +103,19 @@ impl ObjectSensorModel {
         self.latency_steps
     }
 
+    /// Returns the same sensor with one range for all vehicles, which the weather shortens by a power law.
+    pub(crate) fn without_fit(self) -> Self {
+        Self { fit: None, ..self }
+    }
+
     /// Returns the same sensor with the altered latency and, if it looks back, the altered class.
     pub(crate) fn altered(self, altered: &Alterations, looks_back: bool) -> Self {
         Self {
             latency_steps: altered.latency_steps(self.latency_steps, MAX_LATENCY_STEPS),
-            class_confidence: if altered.has_true_class && looks_back { 1.0 } else { self.class_confidence },
+            class_confidence: match altered.has_true_class && looks_back {
+                true => ByClass { car: 1.0, truck: 1.0, motorcycle: 1.0 },
+                false => self.class_confidence,
+            },
             is_class_background: altered.is_class_background && !altered.has_true_class && looks_back,
             ..self
         }
@@ -116,11 +129,14 @@ struct Defaults {
     range_sd_m: f64,
     lateral_sd_m: f64,
     drift_sd_m: f64,
+    drift_time_s: f64,
     speed_sd_mps: Option<f64>,
     latency_s: f64,
     dropout: f64,
     confirm: Confirmation,
     coast_s: f64,
+    class_confidence: ByClass,
+    fit: Option<&'static RearFit>,
 }
 
 /// How a track is confirmed: by `hits` measurements within `window` scans.
@@ -130,7 +146,7 @@ struct Confirmation {
 }
 
 const DRIFT_TIME_S: f64 = 1.0;
-const CLASS_CONFIDENCE: f64 = 0.97;
+const CLASS_CONFIDENCE: ByClass = ByClass { car: 0.97, truck: 0.97, motorcycle: 0.97 };
 
 const FRONT_RADAR: Defaults = Defaults {
     range_m: 150.0,
@@ -138,11 +154,14 @@ const FRONT_RADAR: Defaults = Defaults {
     range_sd_m: 0.1,
     lateral_sd_m: 0.3,
     drift_sd_m: 0.1,
+    drift_time_s: DRIFT_TIME_S,
     speed_sd_mps: Some(0.1),
     latency_s: 0.08,
     dropout: 0.02,
     confirm: Confirmation { hits: 3, window: 5 },
     coast_s: 0.6,
+    class_confidence: CLASS_CONFIDENCE,
+    fit: None,
 };
 
 const SURROUND: Defaults = Defaults {
@@ -151,25 +170,34 @@ const SURROUND: Defaults = Defaults {
     range_sd_m: 0.1,
     lateral_sd_m: 0.15,
     drift_sd_m: 0.05,
+    drift_time_s: DRIFT_TIME_S,
     speed_sd_mps: None,
     latency_s: 0.04,
     dropout: 0.02,
     confirm: Confirmation { hits: 2, window: 4 },
     coast_s: 0.3,
+    class_confidence: CLASS_CONFIDENCE,
+    fit: None,
 };
 
-const REAR_OBJECT: Defaults = Defaults {
-    range_m: 120.0,
-    half_angle_deg: Some(HALF_FIELD_DEG),
-    range_sd_m: 0.1,
-    lateral_sd_m: 0.15,
-    drift_sd_m: 0.1,
-    speed_sd_mps: None,
-    latency_s: 0.08,
-    dropout: 0.05,
-    confirm: Confirmation { hits: 3, window: 5 },
-    coast_s: 1.0,
-};
+/// Returns the default values of the sensor that replaces the rear LiDAR and camera: what the fit to them gives.
+fn rear_object(fit: &'static RearFit) -> Defaults {
+    Defaults {
+        range_m: fit.usual_m(),
+        half_angle_deg: Some(HALF_FIELD_DEG),
+        range_sd_m: fit.errors.range_sd_m,
+        lateral_sd_m: fit.errors.lateral_sd_m,
+        drift_sd_m: fit.errors.drift_sd_m,
+        drift_time_s: fit.errors.drift_time_s,
+        speed_sd_mps: None,
+        latency_s: 0.08,
+        dropout: 0.05,
+        confirm: Confirmation { hits: 3, window: 5 },
+        coast_s: 1.0,
+        class_confidence: fit.class_confidence,
+        fit: Some(fit),
+    }
+}
 
 /// Returns the error for a `half-angle-deg` of a sensor that sees in all directions.
 fn half_angle_not_allowed() -> ConfigError {
@@ -194,7 +222,13 @@ impl ObjectSensorConfig {
     }
 
     pub(crate) fn check_rear_object(&self, parameters: &Parameters) -> Result<ObjectSensorModel, ConfigError> {
-        self.check_against(&REAR_OBJECT, parameters)
+        let fit = RearFit::shipped().map_err(|error| {
+            ConfigError::new(
+                "range-m",
+                Problem::UnknownWord { value: error.to_string(), allowed: "the fit that ships".to_owned() },
+            )
+        })?;
+        self.check_against(&rear_object(fit), parameters)
     }
 
     fn check_against(&self, defaults: &Defaults, parameters: &Parameters) -> Result<ObjectSensorModel, ConfigError> {
@@ -210,7 +244,7 @@ impl ObjectSensorConfig {
             }
         };
         let white_sd = Range::closed(0.01, 10.0);
-        let drift_time_s = number(&self.drift_time_s, DRIFT_TIME_S, "drift-time-s", Range::above(0.0, 100.0))?;
+        let drift_time_s = number(&self.drift_time_s, defaults.drift_time_s, "drift-time-s", Range::above(0.0, 100.0))?;
         let speed_sd_mps = match (&self.speed_sd_mps, defaults.speed_sd_mps) {
             (Some(num), _) => Some(parameters.number(num, "speed-sd-mps", Range::closed(0.01, 20.0))?),
             (None, default) => default,
@@ -219,9 +253,13 @@ impl ObjectSensorConfig {
         let latency_s = number(&self.latency_s, defaults.latency_s, "latency-s", Range::closed(0.0, longest_s))?;
         let dropout = number(&self.dropout, defaults.dropout, "dropout", Range::closed(0.0, 0.95))?;
         let coast_s = number(&self.coast_s, defaults.coast_s, "coast-s", Range::closed(0.0, 10.0))?;
-        let class_confidence = &self.class_confidence;
-        let class_confidence =
-            number(class_confidence, CLASS_CONFIDENCE, "class-confidence", Range::closed(0.25, 1.0))?;
+        let class_confidence = match &self.class_confidence {
+            Some(num) => {
+                let all = parameters.number(num, "class-confidence", Range::closed(0.25, 1.0))?;
+                ByClass { car: all, truck: all, motorcycle: all }
+            }
+            None => defaults.class_confidence,
+        };
         Ok(ObjectSensorModel {
             range_m: number(&self.range_m, defaults.range_m, "range-m", Range::above(0.0, 500.0))?,
             half_angle_tan,
@@ -237,6 +275,7 @@ impl ObjectSensorConfig {
             rules: self.rules(defaults, dropout, steps(coast_s))?,
             class_confidence,
             is_class_background: false,
+            fit: defaults.fit,
         })
     }
 

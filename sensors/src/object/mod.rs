@@ -2,8 +2,9 @@
 //!
 //! They leave out the physics of the measurement. One sensor looks ahead, one around the ego, and one behind. Each has
 //! a field of view, a range, errors (white and slowly varying), a latency, lost measurements, and a filter whose
-//! covariance follows from the errors. The rear sensor replaces LiDAR and camera in fast campaigns. Like them, it has a
-//! shorter range in fog and rain. The other two sensors are part of the full chain, too.
+//! covariance follows from the errors. The rear sensor replaces LiDAR and camera in fast campaigns. Its ranges and errors
+//! are fitted to theirs ([`RearFit`]), so that dark paint, fog and rain shorten its range, too. The other two sensors are part of
+//! the full chain.
 //!
 //! The models deviate from real sensors on purpose:
 //!
@@ -16,6 +17,7 @@
 
 mod config;
 mod faulty;
+mod fit;
 mod noise;
 mod perception;
 mod sensor;
@@ -25,6 +27,7 @@ mod visibility;
 mod weather;
 
 pub use config::{ObjectSensorConfig, ObjectSensorModel};
+pub use fit::{ByClass, FitError, FittedErrors, Origin, RangeGrid, RearFit};
 pub use noise::NoiseKey;
 pub use perception::ObjectPerception;
 pub(crate) use sensor::{DEGRADED_SHARE, ObjectSensor, ScanInput};

@@ -9,8 +9,11 @@
 //! sensor models the output of a sensor with its own tracking. Only the full LiDAR chain can confuse two vehicles.
 
 use rand::RngExt;
+use rand_distr::StandardNormal;
 
-use closecall_traffic::{CONTROL_STEP, ClassScores, Environment, Source, Stream, Track, TrackId, VehicleClass};
+use closecall_traffic::{
+    CONTROL_STEP, ClassScores, Environment, Source, Stream, Track, TrackId, Vehicle, VehicleClass,
+};
 
 use super::config::{MAX_LATENCY_STEPS, ObjectSensorModel};
 use super::faulty::Faulty;
@@ -55,6 +58,10 @@ struct Report {
 #[derive(Clone, Debug)]
 struct Target {
     actor: usize,
+    /// Number of standard deviations by which the range of this vehicle deviates (-).
+    range_deviation: f64,
+    /// Range in this weather (m).
+    range_m: f64,
     noise: TargetNoise,
     /// The track's id and lifecycle, and its filters along and across the road; `None` without a track.
     filters: Option<Filters>,
@@ -87,7 +94,7 @@ pub(crate) struct ObjectSensor {
     visibility: Visibility,
     /// The weather that `range_m` holds for.
     weather: Option<Environment>,
-    /// Range in this weather (m).
+    /// Range of a usual car in this weather (m).
     range_m: f64,
     targets: Vec<Target>,
     step: usize,
@@ -156,15 +163,15 @@ impl ObjectSensor {
             half_lane_m: 0.5 * input.scene.road.lane_width_m(),
         };
         self.update_range(input.scene.environment);
-        let field =
-            Field { direction: self.direction, range_m: self.range_m, half_angle_tan: self.model.half_angle_tan };
         self.visibility.update(self.direction, input.others, &size);
         let has_faults = !self.faults.is_empty();
         let before = list.tracks.len();
         self.fault = if has_faults { self.faults.at(input.scene.time) } else { None };
         let [mut in_view, mut measured] = [0; 2];
         for (position, other) in input.others.iter().enumerate() {
-            let index = self.target_index(other.actor, position);
+            let index = self.target_index(other, position);
+            let range_m = self.targets[index].range_m;
+            let field = Field { direction: self.direction, range_m, half_angle_tan: self.model.half_angle_tan };
             let errors = self.targets[index].noise.draw(&self.model);
             let errors = errors.mirrored_for(input.scene.road.overtaking_side());
             let errors = MeasurementErrors { is_lost: errors.is_lost || has_faults && self.loses(index), ..errors };
@@ -222,7 +229,26 @@ impl ObjectSensor {
     fn update_range(&mut self, environment: &Environment) {
         if self.direction == Direction::Behind && self.weather != Some(*environment) {
             self.weather = Some(*environment);
-            self.range_m = range_in_weather_m(self.model.range_m, environment);
+            self.range_m = match self.model.fit {
+                Some(fit) => {
+                    let usual = Vehicle::typical(VehicleClass::Car);
+                    self.model.range_m / fit.usual_m() * fit.range_m(usual.class, &usual.appearance, environment)
+                }
+                None => range_in_weather_m(self.model.range_m, environment),
+            };
+            // New vehicles get theirs when they are seen first.
+            self.targets.iter_mut().for_each(|target| target.range_m = f64::NAN);
+        }
+    }
+
+    /// Returns the range of one vehicle in this weather (m). `deviation` is that of the vehicle, in standard deviations.
+    fn range_of_m(&self, other: &OtherVehicle, deviation: f64) -> f64 {
+        match (self.model.fit, &self.weather) {
+            (Some(fit), Some(weather)) => {
+                let relative = self.model.range_m / fit.usual_m();
+                relative * fit.range_m(other.class, &other.appearance, weather) * (fit.range_spread * deviation).exp()
+            }
+            _ => self.range_m,
         }
     }
 
@@ -245,18 +271,36 @@ impl ObjectSensor {
 
     /// Returns the index in `targets` of the vehicle `actor`, and adds the vehicle if it is new. It is usually `position`, that in
     /// the list of other vehicles.
-    fn target_index(&mut self, actor: usize, position: usize) -> usize {
-        if self.targets.get(position).is_some_and(|target| target.actor == actor) {
-            return position;
+    fn target_index(&mut self, other: &OtherVehicle, position: usize) -> usize {
+        let actor = other.actor;
+        let is_at = |target: &Target| target.actor == actor;
+        let index = match self.targets.get(position).is_some_and(is_at) {
+            true => position,
+            false => self.targets.iter().position(is_at).unwrap_or_else(|| self.add_target(actor)),
+        };
+        if self.targets[index].range_m.is_nan() {
+            self.targets[index].range_m = self.range_of_m(other, self.targets[index].range_deviation);
         }
-        self.targets.iter().position(|target| target.actor == actor).unwrap_or_else(|| {
-            let noise = TargetNoise::new(&self.key, self.channel, actor, &self.model);
-            let fault_channel = || format!("{}-fault", self.channel);
-            let fault_rng = (!self.faults.is_empty()).then(|| self.key.stream_about(&fault_channel(), actor));
-            let reports = [None; MAX_LATENCY_STEPS + 1];
-            self.targets.push(Target { actor, noise, filters: None, reports, history: Vec::new(), fault_rng });
-            self.targets.len() - 1
-        })
+        index
+    }
+
+    /// Adds a vehicle, and returns its index in `targets`.
+    fn add_target(&mut self, actor: usize) -> usize {
+        let noise = TargetNoise::new(&self.key, self.channel, actor, &self.model);
+        let stream = |purpose: &str| self.key.stream_about(&format!("{}-{purpose}", self.channel), actor);
+        let fault_rng = (!self.faults.is_empty()).then(|| stream("fault"));
+        let range_deviation = if self.model.fit.is_some() { stream("range").sample(StandardNormal) } else { 0.0 };
+        self.targets.push(Target {
+            actor,
+            range_deviation,
+            range_m: f64::NAN,
+            noise,
+            filters: None,
+            reports: [None; MAX_LATENCY_STEPS + 1],
+            history: Vec::new(),
+            fault_rng,
+        });
+        self.targets.len() - 1
     }
 
     /// Predicts and corrects the filters of one vehicle. `errors` is `None` if the vehicle is not in view.
@@ -361,7 +405,7 @@ impl ObjectSensor {
             width_m: other.width_m,
             class: match self.model.is_class_background {
                 true => BACKGROUND,
-                false => class_scores(other.class, self.model.class_confidence),
+                false => class_scores(other.class, self.model.class_confidence.of(other.class)),
             },
             existence: report.lifecycle.existence(),
             lane: input.frame.lane_probabilities(across.position_m, across.position_variance_m2.sqrt()),

@@ -78,7 +78,7 @@ fn the_rear_vehicle_is_confirmed_beyond_100_m() {
             }
             encounter.advance();
         };
-        assert!((105.0..124.0).contains(&at_m), "sample {sample}: {at_m} m");
+        assert!((115.0..140.0).contains(&at_m), "sample {sample}: {at_m} m");
     }
 }
 

@@ -158,6 +158,7 @@ mod tests {
         OtherVehicle {
             actor,
             class: VehicleClass::Car,
+            appearance: closecall_traffic::Vehicle::typical(VehicleClass::Car).appearance,
             length_m: 4.6,
             width_m: 1.85,
             road_m: [x_m, y_m],

@@ -84,7 +84,7 @@ impl<'a> Run<'a> {
         let world_with = |ego: VehicleState| {
             let vehicles = scenario.actors.iter().enumerate().map(|(index, actor)| InitialVehicle {
                 id: actor.id.clone(),
-                vehicle: actor.vehicle,
+                vehicle: scenario.vehicle(index, own),
                 state: if index == scenario.ego { ego } else { actor.start },
                 weave: weave(actor, &scenario.road, key),
                 has_ideal_actuators: index == scenario.ego && scenario.interventions.has_ideal_actuation,

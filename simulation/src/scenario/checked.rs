@@ -11,6 +11,7 @@ use crate::world::lateral_grip_mps2;
 
 use super::config::{ActorConfig, RandomNumbersConfig, SCHEMA_VERSION, ScenarioConfig};
 use super::events::{self, Event};
+use super::fleet::FleetOf;
 use super::intervention::Interventions;
 use super::{inert_fault, placement, traffic};
 
@@ -33,6 +34,8 @@ pub struct Actor {
     /// How the desired speed of its driver varies, or `None` if it is constant.
     pub speed_keeping: Option<SpeedKeeping>,
     pub(crate) events: Vec<Event>,
+    /// The fleet that its look is drawn from in each run; see [`Scenario::vehicle`].
+    pub(crate) fleet: Option<FleetOf>,
 }
 
 /// A concrete scenario: every value is a number, and every number has been checked.
@@ -184,9 +187,11 @@ impl ScenarioConfig {
     fn check_actors(&self, road: &Road, friction: f64, parameters: &Parameters) -> Result<Vec<Actor>, ConfigError> {
         let at = |index: usize, error: ConfigError| error.within_index(index).within("actor");
         let mut vehicles = Vec::with_capacity(self.actors.len());
+        let mut fleets = Vec::with_capacity(self.actors.len());
         for (index, actor) in self.actors.iter().enumerate() {
-            let vehicle = actor.vehicle.check(parameters).map_err(|error| at(index, error.within("vehicle")))?;
-            vehicles.push(vehicle);
+            let in_vehicle = |error: ConfigError| at(index, error.within("vehicle"));
+            vehicles.push(actor.vehicle.check(parameters).map_err(in_vehicle)?);
+            fleets.push(FleetOf::check(&actor.vehicle).map_err(in_vehicle)?);
         }
         let states = placement::initial_states(&self.actors, &vehicles, road, parameters)?;
         let start = events::Start { actors: &self.actors, vehicles: &vehicles, states: &states };
@@ -216,6 +221,7 @@ impl ScenarioConfig {
                 lane_keeping,
                 speed_keeping,
                 events,
+                fleet: fleets[index],
             });
         }
         Ok(checked)

@@ -239,10 +239,13 @@ impl ScenarioFile {
     /// # Errors
     /// [`ScenarioError::Value`] if a value is out of range or contradicts another value.
     pub fn concrete(&self, parameters: &Parameters) -> Result<Scenario, ScenarioError> {
-        self.config.check(parameters).map_err(|source| {
-            let line = locate::line_of(&self.text, &source.path);
-            ScenarioError::Value { path: self.path.clone(), line, source: Box::new(source), at: describe(parameters) }
-        })
+        self.config.check(parameters).map_err(|source| self.located(source, describe(parameters)))
+    }
+
+    /// Returns an error with its place in the file. `at` says when it holds.
+    pub(super) fn located(&self, source: ConfigError, at: String) -> ScenarioError {
+        let line = locate::line_of(&self.text, &source.path);
+        ScenarioError::Value { path: self.path.clone(), line, source: Box::new(source), at }
     }
 
     /// Checks the scenario with the median of every parameter, with each parameter at each of its bounds, and with 64

@@ -2,15 +2,16 @@
 
 use closecall_camera::Pipeline;
 use closecall_sensors::{SensorMode, Sensors};
-use closecall_traffic::{ConfigError, Num, Parameters, Problem, Range, Road};
+use closecall_traffic::{Check, ConfigError, Num, Parameters, Problem, Range, Road};
 
 use super::intervention::FaultConfig;
+use super::{ScenarioError, ScenarioFile};
 
 /// Refuses faults that cannot act: those of sensors that do not exist in the mode of the scenario, mirror images without guard
 /// rails, and entries that begin when the run has ended.
 ///
 /// A scenario with faults both of LiDAR or camera and of the object-level sensor behind is meant for both modes. A mode that the
-/// command line gives is not known here.
+/// command line gives is checked by [`ScenarioFile::check_faults_in`].
 pub(super) fn refuse(
     fault: &FaultConfig,
     (sensors, road): (&Sensors, &Road),
@@ -40,6 +41,22 @@ pub(super) fn refuse(
     refuse_late("front-radar", &mut fault.front_radar.iter().map(|of| &of.from_s))?;
     refuse_late("surround", &mut fault.surround.iter().map(|of| &of.from_s))?;
     refuse_late("rear-object", &mut fault.rear_object.iter().map(|of| &of.from_s))
+}
+
+impl ScenarioFile {
+    /// Refuses a mode of the sensors, given instead of the file's, in which a fault of the file could not act: the runs would pass
+    /// for runs with the fault.
+    ///
+    /// # Errors
+    /// [`ScenarioError::Value`] with the fault.
+    pub fn check_faults_in(&self, mode: SensorMode) -> Result<(), ScenarioError> {
+        let parameters = self.space().nominal();
+        let at = format!(" (with the mode `{}`, which is given instead of the file's)", mode.name());
+        let checked = self.config().sensors.check(&parameters).map_err(|error| error.within("sensors"));
+        checked
+            .and_then(|sensors| refuse_absent(&self.config().fault, &sensors.with_mode(mode)))
+            .map_err(|error| self.located(error, at))
+    }
 }
 
 /// Refuses faults of sensors that do not exist.
@@ -84,6 +101,8 @@ fn at(key: &str, index: usize, error: ConfigError) -> ConfigError {
 
 #[cfg(test)]
 mod tests {
+    use closecall_sensors::SensorMode;
+
     use crate::scenario::{ScenarioFile, library};
 
     /// Returns what the check says of the shipped scenario with these keys added.
@@ -91,6 +110,28 @@ mod tests {
         let text = format!("base = \"low-thw-overtake\"\nname = \"own\"\n{keys}");
         let file = ScenarioFile::parse(&library::path("own"), &text, &[]).map_err(|error| error.to_string())?;
         file.concrete(&file.space().nominal()).map(|_| ()).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_mode_in_which_a_fault_cannot_act_is_refused() {
+        let in_mode = |name: &str, mode| {
+            let file = ScenarioFile::parse(&library::path(name), library::text(name).unwrap(), &[]).unwrap();
+            file.check_faults_in(mode).map_err(|error| error.to_string())
+        };
+        for (name, mode, key) in [
+            ("lidar-dirty", SensorMode::Object, "fault.rear-lidar"),
+            ("camera-dead", SensorMode::Object, "fault.rear-camera"),
+            ("object-late", SensorMode::Full, "fault.rear-object"),
+            ("front-radar-dead", SensorMode::GroundTruth, "fault.front-radar"),
+        ] {
+            let message = in_mode(name, mode).unwrap_err();
+            assert!(message.contains(&format!("`{key}` contradicts `sensors.mode`")), "{message}");
+            assert!(message.contains(&format!("the mode `{}`, which is given", mode.name())), "{message}");
+        }
+        in_mode("lidar-dirty", SensorMode::Full).unwrap();
+        in_mode("front-radar-dead", SensorMode::Full).unwrap();
+        in_mode("odometry-wrong", SensorMode::Full).unwrap();
+        in_mode("low-thw-overtake", SensorMode::GroundTruth).unwrap();
     }
 
     #[test]

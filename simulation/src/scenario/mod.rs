@@ -14,6 +14,7 @@ mod config;
 mod edit;
 mod events;
 mod file;
+mod fleet;
 mod inert_fault;
 mod intervention;
 pub mod library;

@@ -23,6 +23,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Actor;
+use super::fleet::FleetOf;
 
 /// Name of the random stream of a vehicle.
 const CHANNEL: &str = "traffic";
@@ -63,6 +64,9 @@ pub struct TrafficConfig {
     pub speed_sd_mps: Option<Num>,
     /// Weights of the classes. Default: cars only.
     pub classes: Option<ClassWeightsConfig>,
+    /// Fleet of the library from which paint, colour, body shape and plate of each vehicle are drawn. If absent, nothing is drawn.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fleet: Option<String>,
     /// The drivers: a human driver model.
     pub driver: DriverConfig,
 }
@@ -120,6 +124,7 @@ pub(super) fn add(
             lane_keeping: None,
             speed_keeping: None,
             events: Vec::new(),
+            fleet: block.fleet,
         });
     }
     Ok(())
@@ -152,6 +157,7 @@ struct Block<'a> {
     /// The classes with their weights.
     classes: Vec<(VehicleClass, f64)>,
     driver: CheckedDriver,
+    fleet: Option<FleetOf>,
 }
 
 impl<'a> Block<'a> {
@@ -192,7 +198,8 @@ impl<'a> Block<'a> {
             return Err(ConfigError::new(key, Problem::Contradiction { other: "min-thw-s", rule }));
         }
         let draw = number(&config.draw, "draw", Range::UNIT)?;
-        Ok(Self { id: &config.id, draw, mean_thw_s, min_thw_s, speed_mps, speed_sd_mps, classes, driver })
+        let fleet = config.fleet.as_deref().map(FleetOf::of_name).transpose()?;
+        Ok(Self { id: &config.id, draw, mean_thw_s, min_thw_s, speed_mps, speed_sd_mps, classes, driver, fleet })
     }
 
     fn name(&self, number: u32) -> Result<ActorId, ConfigError> {

@@ -52,6 +52,10 @@ fn entries(findings: &Findings<'_>) -> Vec<(&'static str, String)> {
     entries.push(("seed", sampling.seed.to_string()));
     entries.push(("design", format!("{}, {} samples asked for", sampling.design, sampling.samples)));
     entries.push(("sensors", sensors));
+    let is_object = manifest.sensors.is_none_or(|mode| mode == closecall_sensors::SensorMode::Object);
+    if let (true, Ok(fit)) = (is_object, closecall_sensors::RearFit::shipped()) {
+        entries.push(("object-level sensors", fit.origin_text()));
+    }
     for setting in manifest.settings() {
         entries.push(("setting", setting.to_string()));
     }

@@ -49,7 +49,7 @@ impl FilmRecorder {
         let has_camera = sensors.mode() == SensorMode::Full && sensors.camera().pipeline != Pipeline::Off;
         let film_actor = |(index, actor): (usize, &closecall_simulation::scenario::Actor)| FilmActor {
             name: actor.id.to_string(),
-            vehicle: actor.vehicle,
+            vehicle: scenario.vehicle(index, key),
             present_frames: 0..usize::MAX,
             part: Part::of_index(index, scenario.ego),
             is_plotted: true,

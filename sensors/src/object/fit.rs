@@ -1,0 +1,270 @@
+//! The fit of the rear object-level sensor to the full chain: at which distance a vehicle is confirmed, by its class, paint, plate
+//! and body shape and by the extinction of the air, and how large the errors of its track are.
+//!
+//! ```text
+//!  full chain ─▶ approaches ─▶ `perception::fit` ─▶ data/rear-object.toml ─▶ RearFit ─▶ ObjectSensor
+//! ```
+//!
+//! The ranges stand in a grid over paint and extinction, between whose points they are interpolated: linearly in the logarithm of
+//! the paint's reflectivity, and in the extinction. Beyond the grid, its border holds.
+
+use std::collections::BTreeMap;
+use std::sync::LazyLock;
+
+use closecall_traffic::{Appearance, Environment, Plate, VehicleClass};
+use serde::{Deserialize, Serialize};
+
+use crate::lidar::extinction_per_m;
+
+/// The text of the fit that ships.
+const SHIPPED: &str = include_str!("../../data/rear-object.toml");
+
+static FIT: LazyLock<Result<RearFit, FitError>> = LazyLock::new(|| RearFit::parse(SHIPPED));
+
+/// A file of a fit that cannot be used.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("failed to read the fit of the object-level sensor: {0}")]
+pub struct FitError(String);
+
+/// A fit of the rear object-level sensor to the full chain.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct RearFit {
+    /// Where the fit comes from.
+    pub origin: Origin,
+    /// Errors of the measurements.
+    pub errors: FittedErrors,
+    /// Score of the true class, by class.
+    pub class_confidence: ByClass,
+    /// Standard deviation of the logarithm of the range of one vehicle about that of the grid (-).
+    pub range_spread: f64,
+    /// Reflectivities of the paint of the grid (-), in rising order.
+    pub paints: Vec<f64>,
+    /// Extinctions of the grid (1/m), in rising order.
+    pub extinctions_per_m: Vec<f64>,
+    /// Ranges of each class and plate.
+    pub range: Vec<RangeGrid>,
+    /// Range of a body shape relative to that of its class (-); 1 if absent.
+    pub shapes: BTreeMap<String, f64>,
+}
+
+/// Where a fit comes from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct Origin {
+    /// The command that writes the file.
+    pub command: String,
+    /// Version of the program.
+    pub version: String,
+    /// The scenario whose sensors were fitted.
+    pub scenario: String,
+    /// The seed.
+    pub seed: u64,
+    /// Number of approaches of each point of the grid.
+    pub approaches: u64,
+}
+
+/// The fitted errors of the measurements.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct FittedErrors {
+    /// Standard deviation of the white error along the road (m).
+    pub range_sd_m: f64,
+    /// Standard deviation of the white error across the road (m).
+    pub lateral_sd_m: f64,
+    /// Standard deviation of the slow error (m).
+    pub drift_sd_m: f64,
+    /// Correlation time of the slow error (s).
+    pub drift_time_s: f64,
+}
+
+/// A value for each class.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct ByClass {
+    /// That of cars.
+    pub car: f64,
+    /// That of trucks.
+    pub truck: f64,
+    /// That of motorcycles.
+    pub motorcycle: f64,
+}
+
+/// The ranges of vehicles of one class with plates in one state.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct RangeGrid {
+    /// The class.
+    pub class: VehicleClass,
+    /// The state of the plates.
+    pub plate: Plate,
+    /// For each paint, the range in each extinction (m).
+    pub range_m: Vec<Vec<f64>>,
+}
+
+impl ByClass {
+    /// Returns the value of a class.
+    pub const fn of(&self, class: VehicleClass) -> f64 {
+        match class {
+            VehicleClass::Car => self.car,
+            VehicleClass::Truck => self.truck,
+            VehicleClass::Motorcycle => self.motorcycle,
+        }
+    }
+}
+
+impl RearFit {
+    /// Returns the fit that ships.
+    ///
+    /// # Errors
+    /// [`FitError`] if the file is wrong, which is a defect of the program.
+    pub fn shipped() -> Result<&'static Self, FitError> {
+        FIT.as_ref().map_err(Clone::clone)
+    }
+
+    /// Parses and checks the text of a fit.
+    ///
+    /// # Errors
+    /// [`FitError`] with the key, and what is allowed.
+    pub fn parse(text: &str) -> Result<Self, FitError> {
+        let fit: Self = toml::from_str(text).map_err(|error| FitError(error.to_string()))?;
+        fit.check().map_err(FitError)?;
+        Ok(fit)
+    }
+
+    fn check(&self) -> Result<(), String> {
+        let FittedErrors { range_sd_m, lateral_sd_m, drift_sd_m, drift_time_s } = self.errors;
+        within("errors.range-sd-m", range_sd_m, [0.01, 10.0])?;
+        within("errors.lateral-sd-m", lateral_sd_m, [0.01, 10.0])?;
+        within("errors.drift-sd-m", drift_sd_m, [0.0, 10.0])?;
+        within("errors.drift-time-s", drift_time_s, [0.04, 100.0])?;
+        within("range-spread", self.range_spread, [0.0, 1.0])?;
+        for class in VehicleClass::ALL {
+            within(&format!("class-confidence.{}", class.name()), self.class_confidence.of(class), [0.25, 1.0])?;
+            if !self.range.iter().any(|grid| grid.class == class && grid.plate == Plate::Clean) {
+                return Err(format!("`range` lacks a {} with the plate `clean`", class.name()));
+            }
+        }
+        rising("paints", &self.paints, [0.01, 1.0])?;
+        rising("extinctions-per-m", &self.extinctions_per_m, [0.0, 1.0])?;
+        for (index, grid) in self.range.iter().enumerate() {
+            let key = format!("range[{index}].range-m");
+            let has_size = grid.range_m.len() == self.paints.len()
+                && grid.range_m.iter().all(|row| row.len() == self.extinctions_per_m.len());
+            if !has_size {
+                return Err(format!(
+                    "`{key}` needs a row for each of `paints` with a number for each of `extinctions-per-m`"
+                ));
+            }
+            grid.range_m.iter().flatten().try_for_each(|range_m| within(&key, *range_m, [1.0, 500.0]))?;
+        }
+        self.shapes.iter().try_for_each(|(shape, factor)| within(&format!("shapes.{shape}"), *factor, [0.1, 10.0]))
+    }
+
+    /// Returns the range of a usual car on a clear day (m): grey, with a clean plate. Like the grid, it has decimetres.
+    pub(super) fn usual_m(&self) -> f64 {
+        let clear_per_m = extinction_per_m(&Environment::CLEAR_DAY);
+        (10.0 * self.grid_m(VehicleClass::Car, USUAL_PAINT, Plate::Clean, clear_per_m)).round() / 10.0
+    }
+
+    /// Returns what the sensors are a fit of, for reports.
+    pub fn origin_text(&self) -> String {
+        let Origin { version, scenario, seed, approaches, .. } = &self.origin;
+        format!("fit of {version} to the full chain of {scenario}, seed {seed}, {approaches} approaches of each point")
+    }
+
+    /// Returns the range of a vehicle (m).
+    pub(super) fn range_m(&self, class: VehicleClass, appearance: &Appearance, environment: &Environment) -> f64 {
+        let factor = self.shapes.get(appearance.body_shape.name()).copied().unwrap_or(1.0);
+        factor * self.grid_m(class, appearance.paint_reflectivity, appearance.plate, extinction_per_m(environment))
+    }
+
+    fn grid_m(&self, class: VehicleClass, paint: f64, plate: Plate, extinction_per_m: f64) -> f64 {
+        let of = |plate| self.range.iter().find(|grid| grid.class == class && grid.plate == plate);
+        // A motorcycle has no plate at its front, so that its state does not matter.
+        let Some(grid) = of(plate).or_else(|| of(Plate::Clean)) else { return 0.0 };
+        let logs: Vec<f64> = self.paints.iter().map(|paint| paint.ln()).collect();
+        let (row, row_share) = place(&logs, paint.ln());
+        let (column, column_share) = place(&self.extinctions_per_m, extinction_per_m);
+        let in_row = |row: usize| {
+            let values = &grid.range_m[row.min(self.paints.len() - 1)];
+            let next = (column + 1).min(values.len() - 1);
+            values[column] + column_share * (values[next] - values[column])
+        };
+        in_row(row) + row_share * (in_row(row + 1) - in_row(row))
+    }
+}
+
+/// Reflectivity of the paint of a usual car (-): that of a vehicle whose paint is not given.
+const USUAL_PAINT: f64 = 0.5;
+
+/// Returns the index of the last knot at or below `value`, and the share of the way to the next one.
+fn place(knots: &[f64], value: f64) -> (usize, f64) {
+    let index = knots.partition_point(|knot| *knot <= value).saturating_sub(1);
+    match knots.get(index + 1) {
+        Some(next) => (index, ((value - knots[index]) / (next - knots[index])).clamp(0.0, 1.0)),
+        None => (index, 0.0),
+    }
+}
+
+fn within(key: &str, value: f64, [low, high]: [f64; 2]) -> Result<(), String> {
+    if value >= low && value <= high {
+        return Ok(());
+    }
+    Err(format!("`{key}` is {value}, but a number from {low} to {high} is needed"))
+}
+
+fn rising(key: &str, values: &[f64], range: [f64; 2]) -> Result<(), String> {
+    values.iter().try_for_each(|value| within(key, *value, range))?;
+    if values.len() > 1 && values.windows(2).all(|pair| pair[0] < pair[1]) {
+        return Ok(());
+    }
+    Err(format!("`{key}` needs at least two numbers in rising order"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_fit_that_ships_is_read_and_names_its_origin() {
+        let fit = RearFit::shipped().unwrap();
+        assert!(fit.origin.command.contains("fit_object_sensors") && !fit.origin.version.is_empty());
+        assert_eq!(RearFit::parse(&toml::to_string(fit).unwrap()).as_ref(), Ok(fit));
+    }
+
+    #[test]
+    fn wrong_files_are_refused_with_key_and_range() {
+        let fit = RearFit::shipped().unwrap();
+        let refused = |change: &dyn Fn(&mut RearFit)| {
+            let mut wrong = fit.clone();
+            change(&mut wrong);
+            RearFit::parse(&toml::to_string(&wrong).unwrap()).unwrap_err().to_string()
+        };
+        for (message, key, range) in [
+            (refused(&|fit| fit.range_spread = f64::NAN), "range-spread", "0 to 1"),
+            (refused(&|fit| fit.errors.lateral_sd_m = 0.0), "errors.lateral-sd-m", "0.01 to 10"),
+            (refused(&|fit| fit.class_confidence.truck = 1.5), "class-confidence.truck", "0.25 to 1"),
+            (refused(&|fit| fit.paints.reverse()), "paints", "rising order"),
+            (refused(&|fit| fit.range[0].range_m[0][0] = 0.0), "range[0].range-m", "1 to 500"),
+            (refused(&|fit| drop(fit.range[0].range_m.pop())), "range[0].range-m", "a row for each of `paints`"),
+            (refused(&|fit| fit.range.retain(|grid| grid.class != VehicleClass::Truck)), "range", "truck"),
+        ] {
+            assert!(message.contains(key) && message.contains(range), "{message}");
+        }
+        let text = toml::to_string(fit).unwrap();
+        assert!(RearFit::parse(&format!("colour = 1\n{text}")).unwrap_err().to_string().contains("colour"));
+    }
+
+    #[test]
+    fn ranges_lie_between_the_points_of_the_grid_and_end_at_its_border() {
+        let fit = RearFit::shipped().unwrap();
+        let at = |paint, extinction| fit.grid_m(VehicleClass::Car, paint, Plate::Clean, extinction);
+        let [low, high] = [fit.paints[1], fit.paints[2]];
+        let first = fit.extinctions_per_m[0];
+        let between = at((low * high).sqrt(), first);
+        assert!((between - 0.5 * (at(low, first) + at(high, first))).abs() < 1e-9);
+        assert_eq!(at(1e-6, first), at(fit.paints[0], first));
+        assert_eq!(at(1.0, 10.0), *fit.range[0].range_m.last().unwrap().last().unwrap());
+    }
+}
