@@ -223,7 +223,7 @@ impl LidarKindConfig {
             number(*elevation_deg, "layers-deg", Range::closed(-MAX_ELEVATION_DEG, MAX_ELEVATION_DEG))?;
         }
         let group = self.layers_per_group.unwrap_or(layers);
-        if group == 0 || layers % group != 0 || layers / group > GROUPS {
+        if group == 0 || !layers.is_multiple_of(group) || layers / group > GROUPS {
             let allowed = "a divisor of the number of layers that makes 1 to 4 groups";
             return Err(ConfigError::new("layers-per-group", count(group, allowed)));
         }
