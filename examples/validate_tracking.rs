@@ -74,6 +74,7 @@ fn road(guard_rails: bool) -> Road {
         speed_limit_mps: 36.1.into(),
         overtaking_side: closecall_traffic::Side::Left,
         guard_rails,
+        roadside: closecall_traffic::RoadsideConfig::default(),
     };
     config.check(&Parameters::default()).expect("a valid road")
 }

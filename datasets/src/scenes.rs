@@ -109,6 +109,7 @@ fn road(rng: &mut Stream) -> Result<Road, ConfigError> {
         speed_limit_mps: Num::Fixed(36.1),
         overtaking_side: Side::Left,
         guard_rails: rng.random_bool(0.5),
+        roadside: closecall_traffic::RoadsideConfig::default(),
     };
     config.check(&Parameters::default())
 }

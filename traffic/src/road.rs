@@ -16,7 +16,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::guard_rail::{LEFT_OFFSET_M, RIGHT_OFFSET_M};
-use crate::{Check, ConfigError, Num, Parameters, Problem, Range};
+use crate::{Check, ConfigError, Num, Parameters, Problem, Range, Roadside, RoadsideConfig};
 
 /// A lateral side: left or right.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
@@ -82,6 +82,9 @@ pub struct RoadConfig {
     /// Whether guard rails with posts stand along both edges.
     #[serde(default)]
     pub guard_rails: bool,
+    /// Other things that stand along the road. Default: none.
+    #[serde(default, skip_serializing_if = "RoadsideConfig::is_empty")]
+    pub roadside: RoadsideConfig,
 }
 
 fn default_lane_width() -> Num {
@@ -107,6 +110,7 @@ pub struct Road {
     speed_limit_mps: f64,
     overtaking_side: Side,
     guard_rails: bool,
+    roadside: Roadside,
     /// Whether the road runs against the traffic, so that its left edge is the right edge of the traffic.
     is_reversed: bool,
 }
@@ -128,6 +132,7 @@ impl Check for RoadConfig {
             speed_limit_mps: number(&self.speed_limit_mps, "speed-limit-mps", Range::above(0.0, 100.0))?,
             overtaking_side: self.overtaking_side,
             guard_rails: self.guard_rails,
+            roadside: self.roadside.check(parameters).map_err(|error| error.within("roadside"))?,
             is_reversed: false,
         })
     }
@@ -144,6 +149,7 @@ impl Road {
             speed_limit_mps: 36.1,
             overtaking_side: Side::Left,
             guard_rails: false,
+            roadside: Roadside::default(),
             is_reversed: false,
         }
     }
@@ -218,6 +224,11 @@ impl Road {
     /// Returns true if guard rails with posts stand along both edges.
     pub fn has_guard_rails(&self) -> bool {
         self.guard_rails
+    }
+
+    /// Returns what else stands along the road.
+    pub fn roadside(&self) -> &Roadside {
+        &self.roadside
     }
 
     /// Returns the same road with guard rails on both sides.

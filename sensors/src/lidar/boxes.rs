@@ -68,8 +68,8 @@ pub(crate) struct BoxFit {
     pub(crate) range_m: f64,
     /// Spacing of columns at that distance, across the line of sight (m).
     pub(crate) spacing_m: f64,
-    /// Spacing of layers (rad).
-    pub(crate) layer_rad: f64,
+    /// Spacing of layers, and height of a footprint (rad).
+    pub(crate) vertical_rad: [f64; 2],
     /// Least and greatest azimuth of the points about the sensor's axis, positive to the ego's left (rad).
     pub(crate) azimuth_rad: [f64; 2],
     /// Whether the right and the left edge of the cluster are truncated by the field of view.
@@ -139,7 +139,7 @@ impl BoxFit {
             offset_ns: offsets.sum::<f64>() / members.len() as f64,
             range_m: 0.0,
             spacing_m: 0.0,
-            layer_rad: scan.resolution.layer_rad,
+            vertical_rad: [scan.resolution.layer_rad, scan.resolution.footprint_rad],
             azimuth_rad: [0.0; 2],
             truncated: truncated_edges(members, scan),
         }
@@ -175,7 +175,12 @@ impl BoxFit {
 
     /// Returns the spacing of layers at this distance (m).
     pub(crate) fn layer_m(&self) -> f64 {
-        self.range_m * self.layer_rad
+        self.range_m * self.vertical_rad[0]
+    }
+
+    /// Returns the height of a footprint at this distance (m).
+    pub(crate) fn footprint_m(&self) -> f64 {
+        self.range_m * self.vertical_rad[1]
     }
 
     /// Returns true if the field of view truncates the cluster.

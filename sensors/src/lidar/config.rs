@@ -61,6 +61,10 @@ pub struct LidarConfig {
     pub nominal_range_m: Option<Num>,
     /// Share of returns (0 to 1) that are lost regardless of their power.
     pub dropout: Num,
+    /// Probability (0 to 0.01) that a beam gives a point in a scan although there is nothing: noise of the receiver above its threshold.
+    /// A maker states 0.0001 (data sheet of the Ouster OS1). Default: 0.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub false_alarm_rate: Num,
     /// Standard deviation of the error of the pitch angle that the ego uses to level its points (rad).
     pub levelling_sd_rad: Num,
     /// Share of the light (0 to 1) that the sensor's window transmits each way: 1 if clean, 0 if blocked by snow or
@@ -69,6 +73,10 @@ pub struct LidarConfig {
     /// State of the registration plates of the vehicles behind. Their plates are retro-reflectors, which carry the detection of
     /// dark cars.
     pub plates: Choice<Plates>,
+}
+
+fn is_zero(number: &Num) -> bool {
+    *number == Num::Fixed(0.0)
 }
 
 impl Default for LidarConfig {
@@ -83,6 +91,7 @@ impl Default for LidarConfig {
             tilt_rad: Num::Fixed(0.0),
             nominal_range_m: None,
             dropout: Num::Fixed(0.01),
+            false_alarm_rate: Num::Fixed(0.0),
             levelling_sd_rad: Num::Fixed(0.0005),
             window_transmission: Num::Fixed(1.0),
             plates: Choice::Fixed(Plates::InUse),
@@ -99,6 +108,7 @@ pub struct Lidar {
     pub(crate) tilt_rad: f64,
     pub(crate) nominal_range_m: f64,
     pub(crate) dropout: f64,
+    pub(crate) false_alarm_rate: f64,
     pub(crate) levelling_sd_rad: f64,
     pub(crate) window_transmission: f64,
     /// Reflectivity of registration plates; `None` if vehicles have none.
@@ -126,9 +136,17 @@ impl Lidar {
 
     /// Returns the same LiDAR without noise and losses.
     pub(crate) fn exact(self) -> Self {
-        let (dropout, levelling_sd_rad, window_transmission) = (0.0, 0.0, 1.0);
+        let (dropout, false_alarm_rate, levelling_sd_rad, window_transmission) = (0.0, 0.0, 0.0, 1.0);
         let nominal_range_m = EXACT_RANGE_M;
-        Self { nominal_range_m, dropout, levelling_sd_rad, window_transmission, is_exact: true, ..self }
+        Self {
+            nominal_range_m,
+            dropout,
+            false_alarm_rate,
+            levelling_sd_rad,
+            window_transmission,
+            is_exact: true,
+            ..self
+        }
     }
 }
 
@@ -161,6 +179,7 @@ impl Check for LidarConfig {
             tilt_rad: number(&self.tilt_rad, "tilt-rad", Range::closed(-0.1, 0.1))?,
             nominal_range_m: parameters.number_or(nominal.0, "nominal-range-m", nominal.1, kind.nominal_range_m)?,
             dropout: number(&self.dropout, "dropout", Range::closed(0.0, 0.5))?,
+            false_alarm_rate: number(&self.false_alarm_rate, "false-alarm-rate", Range::closed(0.0, 0.01))?,
             levelling_sd_rad: number(&self.levelling_sd_rad, "levelling-sd-rad", Range::closed(0.0, 0.02))?,
             window_transmission: number(&self.window_transmission, "window-transmission", Range::closed(0.0, 1.0))?,
             plate_reflectivity: parameters.word(&self.plates, "plates")?.reflectivity(),
@@ -179,6 +198,7 @@ impl Default for Lidar {
             tilt_rad: 0.0,
             nominal_range_m: 200.0,
             dropout: 0.01,
+            false_alarm_rate: 0.0,
             levelling_sd_rad: 0.0005,
             window_transmission: 1.0,
             plate_reflectivity: Plates::InUse.reflectivity(),

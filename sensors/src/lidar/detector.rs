@@ -275,7 +275,7 @@ fn front(fit: &BoxFit, class: &ClassScores) -> (f64, f64) {
         };
     }
     match class.best_vehicle_class() {
-        VehicleClass::Car if fit.front_bottom_m - 0.5 * fit.layer_m() > CABIN_ONLY_FROM_M => {
+        VehicleClass::Car if fit.front_bottom_m - 0.5 * fit.footprint_m() > CABIN_ONLY_FROM_M => {
             (fit.front_u_m + BUMPER_OFFSET_M, sd.hypot(BUMPER_OFFSET_SD_M))
         }
         VehicleClass::Motorcycle if fit.range_m > RIDER_ONLY_FROM_M => {

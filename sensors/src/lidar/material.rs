@@ -29,6 +29,10 @@ pub enum Material {
     Tarpaulin,
     /// Galvanised steel.
     Steel,
+    /// The retro-reflective face of a road sign.
+    Sign,
+    /// The bark of a tree.
+    Bark,
     /// The road's surface.
     Asphalt,
     /// Droplets in the air.
@@ -50,6 +54,11 @@ const TEXTILE: f64 = 0.35;
 const TARPAULIN: f64 = 0.5;
 /// Weathered zinc; only its diffuse reflection counts (assumption).
 const STEEL: f64 = 0.35;
+/// A retro-reflector with the coefficient R_A (cd/(lx·m²)) looks like a Lambertian surface of ρ = π·R_A. EN 12899-1 asks 250 of new white
+/// sheeting of class RA2.
+const SIGN: f64 = std::f64::consts::PI * 250.0;
+/// Bark in the near infrared (assumption).
+const BARK: f64 = 0.3;
 /// Worn asphalt in the near infrared: 0.1 to 0.2 (Herold and Roberts 2005, "Spectral characteristics of asphalt road
 /// aging and deterioration").
 const ASPHALT: f64 = 0.15;
@@ -75,6 +84,8 @@ impl Material {
             Self::Textile => TEXTILE,
             Self::Tarpaulin => TARPAULIN,
             Self::Steel => STEEL,
+            Self::Sign => SIGN,
+            Self::Bark => BARK,
             Self::Asphalt => asphalt(environment),
             Self::Water => 0.0,
         }

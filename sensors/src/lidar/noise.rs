@@ -34,6 +34,8 @@ const PURPOSES: u64 = 8;
 const INCREMENT: u64 = 0x9e37_79b9_7f4a_7c15;
 /// What tells the key of the faults of a scan from the key of its noise: an arbitrary number.
 const FAULTS: u64 = 0x5c0f_fa17_0b5e_55ed;
+/// What tells the key of the false alarms of a scan from the key of its noise: an arbitrary number.
+const FALSE_ALARMS: u64 = 0xfa15_ea1a_2735_0001;
 /// Factor that scales a sum of four uniform numbers, of variance 1/12 each, to variance 1.
 const SQRT_3: f32 = 1.732_050_8;
 
@@ -62,6 +64,11 @@ impl Noise {
     /// Returns other noise for the same scan, for what faults do to it.
     pub(crate) fn of_faults(self) -> Self {
         Self { key: self.key ^ FAULTS, scale: 1.0 }
+    }
+
+    /// Returns other noise for the same scan, for the beams in which the receiver's noise alone exceeds the threshold.
+    pub(crate) fn of_false_alarms(self) -> Self {
+        Self { key: self.key ^ FALSE_ALARMS, scale: 1.0 }
     }
 
     /// Returns 64 random bits for a beam and a purpose.

@@ -78,11 +78,13 @@ pub enum PointSource {
     Ground,
     /// A guard rail or one of its posts.
     GuardRail,
+    /// A sign, a gantry or a tree beside the road.
+    Roadside,
     /// Spray behind a vehicle.
     Spray,
     /// Droplets of fog or rain.
     Fog,
-    /// Nothing: a fault of the sensor.
+    /// Nothing: a false alarm, or a fault of the sensor.
     False,
 }
 
@@ -93,6 +95,7 @@ impl PointSource {
             Self::Actor(_) => "actor",
             Self::Ground => "ground",
             Self::GuardRail => "guard-rail",
+            Self::Roadside => "roadside",
             Self::Spray => "spray",
             Self::Fog => "fog",
             Self::False => "false",

@@ -4,7 +4,7 @@
 //! sweep crosses the middle of its vehicle. The error is small: the sweep crosses the width of a vehicle in 0.4 ms at
 //! 30 m and in 4 ms at 3 m, and the vehicle moves relative to the ego by millimetres to centimetres in that time.
 
-use closecall_traffic::{CONTROL_STEP, PlanePose, Stream, Time};
+use closecall_traffic::{CONTROL_STEP, PlanePose, Roadside, Stream, Time};
 use nalgebra::{Isometry3, Point3};
 
 use super::bare_road::{BareRoad, Road, cast_ground};
@@ -15,14 +15,14 @@ use super::pattern::Pattern;
 use super::power::LinkBudget;
 use super::rail_returns::RailReturns;
 use super::receiver::{Receiver, SensorPoseEstimate};
-use super::roadside::{PlacedSolid, append_guard_rails};
+use super::roadside::{PlacedSolid, append_guard_rails, append_roadside};
 use super::shapes::{append_rear_plate, append_solids};
 use super::soft::{self, Plume};
 use super::solid::Solid;
 use super::spoil::Spoiler;
 use super::targets::{Beams, Surface, Targets};
 use super::viewpoint::{Viewpoint, plane_from_body};
-use super::{LaneGeometry, Lidar, LidarScan, Material, MirrorSide, PointBeam, PointSource, ScanTruth};
+use super::{LaneGeometry, Lidar, LidarScan, Material, MirrorSide, PointSource, ScanTruth};
 use crate::faults::LidarFault;
 use crate::{Scene, SceneVehicle};
 
@@ -68,6 +68,8 @@ pub struct Scanner {
     scan: LidarScan,
     truth: ScanTruth,
     latest: Option<Sweep>,
+    /// Number of false alarms in the latest scan.
+    false_alarms: usize,
 }
 
 impl Scanner {
@@ -85,6 +87,7 @@ impl Scanner {
             scan: LidarScan::default(),
             truth: ScanTruth::default(),
             latest: None,
+            false_alarms: 0,
         }
     }
 
@@ -96,33 +99,6 @@ impl Scanner {
     /// Returns the ground truth of the latest scan.
     pub fn truth(&self) -> &ScanTruth {
         &self.truth
-    }
-
-    /// Returns the beam of a point of the latest scan, and the range that was measured along it.
-    pub(crate) fn point_beam(&self, point: usize) -> PointBeam {
-        let (beam, layers) = (self.scan.beam[point], self.scan.resolution.layers);
-        let (azimuth_rad, elevation_rad) = self.pattern.direction_rad(self.scan.mirror_side, beam);
-        #[expect(clippy::cast_possible_truncation, reason = "a part of a number of 16 bits")]
-        let [column, layer] = [usize::from(beam) / layers, usize::from(beam) % layers].map(|index| index as u16);
-        PointBeam { column, layer, azimuth_rad, elevation_rad, range_m: self.range_m(point) }
-    }
-
-    /// Returns the range of a point from where the sensor was when it measured the point (m).
-    #[expect(clippy::cast_possible_truncation, reason = "points are in single precision")]
-    fn range_m(&self, point: usize) -> f32 {
-        let scan = &self.scan;
-        let at_m = [scan.x_m[point], scan.y_m[point], scan.z_m[point]].map(f64::from);
-        let Some(sweep) = &self.latest else { return at_m.iter().map(|axis| axis * axis).sum::<f64>().sqrt() as f32 };
-        let to = sweep.viewpoint.deskew(self.sweep_s() - f64::from(scan.offset_ns[point]) * 1e-9);
-        let (x_m, y_m) = (at_m[0] - to.x_m, at_m[1] - to.y_m);
-        let (ahead_m, left_m) = (to.cos * x_m + to.sin * y_m, to.cos * y_m - to.sin * x_m);
-        let up_m = at_m[2] - f64::from(sweep.pose.sensor_z_m());
-        (ahead_m - f64::from(sweep.pose.sensor_x_m())).hypot(left_m).hypot(up_m) as f32
-    }
-
-    /// Returns true if the sensor has a mirror with two sides.
-    pub(crate) fn has_mirror_sides(&self) -> bool {
-        self.pattern.kind().mirror_cubic_deg.is_some()
     }
 
     /// Returns the mirror side of the scan that ends at `time`. The sides alternate from scan to scan.
@@ -137,12 +113,13 @@ impl Scanner {
 
     /// Returns true if the latest scan has no point, not even one of the bare road.
     pub fn is_dark(&mut self) -> bool {
-        if !self.scan.is_empty() {
+        // A monitor of the output knows how many false alarms to expect.
+        if self.scan.len() > self.false_alarms {
             return false;
         }
         let is_spoilt = self.latest.is_some_and(|sweep| sweep.fault.is_some());
         self.repeat(if is_spoilt { Extent::Complete } else { Extent::UntilFirst });
-        let is_dark = self.scan.is_empty();
+        let is_dark = self.scan.len() <= self.false_alarms;
         self.clear();
         is_dark
     }
@@ -193,6 +170,7 @@ impl Scanner {
         let sweep = Sweep { mirror_side, viewpoint, pose, link, noise, rails, fault };
         self.latest = Some(sweep);
         self.sweep(&sweep, Extent::WithoutBackground);
+        self.raise_false_alarms(&sweep);
         self.spoil(&sweep);
         &self.scan
     }
@@ -202,6 +180,11 @@ impl Scanner {
         if let Some(sweep) = self.latest {
             self.clear();
             self.sweep(&sweep, extent);
+            if extent == Extent::UntilFirst {
+                self.false_alarms = 0;
+            } else {
+                self.raise_false_alarms(&sweep);
+            }
             self.spoil(&sweep);
         }
     }
@@ -317,7 +300,10 @@ impl Scanner {
         let surface = Surface { source: PointSource::Ground, reflectivity: &ground };
         self.targets.push_ground(&view.sensor_from_plane(0.0), surface);
         if scene.road.has_guard_rails() {
-            self.collect_guard_rails(scene, mirror_side, view);
+            self.collect_along_road((scene, PointSource::GuardRail), mirror_side, view);
+        }
+        if *scene.road.roadside() != Roadside::default() {
+            self.collect_along_road((scene, PointSource::Roadside), mirror_side, view);
         }
         self.collect_plume(&scene.ego, scene, view);
         for other in scene.others {
@@ -326,12 +312,19 @@ impl Scanner {
         }
     }
 
-    fn collect_guard_rails(&mut self, scene: &Scene<'_>, mirror_side: MirrorSide, view: &Viewpoint) {
+    /// Collects the guard rails, or the other things along the road.
+    fn collect_along_road(
+        &mut self,
+        (scene, source): (&Scene<'_>, PointSource),
+        mirror_side: MirrorSide,
+        view: &Viewpoint,
+    ) {
         self.guard_rails.clear();
-        append_guard_rails(scene.road, scene.ego.state.s_m, &mut self.guard_rails);
+        let append = if source == PointSource::GuardRail { append_guard_rails } else { append_roadside };
+        append(scene.road, scene.ego.state.s_m, &mut self.guard_rails);
         let appearance = scene.ego.vehicle.appearance;
         let steel = |material: Material| material.reflectivity(None, &appearance, scene.environment);
-        let surface = Surface { source: PointSource::GuardRail, reflectivity: &steel };
+        let surface = Surface { source, reflectivity: &steel };
         for (solid, pose) in &self.guard_rails {
             let placed = plane_from_body(*pose, 0.0);
             let frozen = view.sensor_from_plane(self.crossing_before_end_s(view, &placed)) * placed;
@@ -389,5 +382,6 @@ fn moved_back(pose: PlanePose, vehicle: &SceneVehicle, before_end_s: f64) -> Pla
     PlanePose { x_m: pose.x_m - distance_m * cos, y_m: pose.y_m - distance_m * sin, ..pose }
 }
 
+mod points;
 #[cfg(test)]
 mod tests;

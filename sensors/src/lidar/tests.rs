@@ -1,5 +1,6 @@
 //! Tests of the rear LiDAR as a whole, with vehicles at known positions.
 
+mod alongside;
 mod bare_road;
 mod boxes;
 mod cast;

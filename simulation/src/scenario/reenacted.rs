@@ -154,6 +154,7 @@ pub(super) fn config(encounter: &RecordedEncounter, rear: RearDriver) -> Result<
             speed_limit_mps: rounded(max_speed_mps(encounter.vehicles.iter().map(|vehicle| &vehicle.trajectory))),
             overtaking_side: encounter.change.direction,
             guard_rails: false,
+            roadside: closecall_traffic::RoadsideConfig::default(),
         },
         environment: Default::default(),
         parameters: Default::default(),

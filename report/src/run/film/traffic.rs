@@ -155,6 +155,7 @@ pub(super) fn straight_road(lanes: u8, lane_width_m: f64) -> Result<Road, Config
         speed_limit_mps: Num::Fixed(SPEED_LIMIT_MPS),
         overtaking_side: Side::Left,
         guard_rails: false,
+        roadside: closecall_traffic::RoadsideConfig::default(),
     };
     config.check(&Parameters::default())
 }

@@ -1,0 +1,60 @@
+use super::*;
+
+fn checked(change: impl Fn(&mut LidarKindConfig)) -> Result<&'static LidarKind, String> {
+    let mut config = LidarKindConfig::parse(LidarModel::Scala2.file()).unwrap();
+    change(&mut config);
+    config.kind().map_err(|error| error.to_string())
+}
+
+#[test]
+fn every_shipped_file_is_read_and_the_same_file_is_the_same_kind() {
+    for model in LidarModel::ALL {
+        let config = LidarKindConfig::parse(model.file()).unwrap();
+        assert!(std::ptr::eq(config.kind().unwrap(), model.kind()), "{}", config.name);
+        assert!(config.source.len() > 40);
+        let word = serde_json::to_value(model).unwrap();
+        assert_eq!(word, config.name.as_str());
+    }
+}
+
+#[test]
+fn the_scala_keeps_the_numbers_of_the_model() {
+    let kind = LidarModel::Scala2.kind();
+    assert_eq!((kind.beams(), kind.layers(), kind.groups()), (10_448, 16, 4));
+    assert_eq!(kind.nominal_range_m.to_bits(), 200.0_f64.to_bits());
+    assert_eq!(kind.half_field_tan.to_bits(), 2.2998_f64.to_bits());
+    assert_eq!(kind.sweep_ns.to_bits(), (40e6_f64 * 66.5 / 180.0).to_bits());
+    for angle_rad in [kind.resolution.layer_rad, kind.resolution.footprint_rad] {
+        assert_eq!(angle_rad.to_bits(), (0.6 * (std::f64::consts::PI / 180.0)).to_bits());
+    }
+    assert!((0..100).all(|step| kind.is_due(Time::from_ns(step * CONTROL_STEP.ns()))));
+}
+
+#[test]
+fn a_rate_of_10_hz_gives_10_scans_in_a_second() {
+    let kind = LidarModel::Os1With64.kind();
+    let due = (-25..0).filter(|step| kind.is_due(Time::from_ns(step * CONTROL_STEP.ns()))).count();
+    assert_eq!(due, 10);
+    // 40 m at 10 % with probability 0.9: P = 1 + 1.2816/5, so that the nominal range is 40·√(1.2563·5) m.
+    assert!((kind.nominal_range_m - 100.25).abs() < 0.01, "{}", kind.nominal_range_m);
+}
+
+#[test]
+fn a_wrong_value_is_answered_with_key_and_allowed_range() {
+    let error = checked(|config| config.rate_hz = 30.0).unwrap_err();
+    assert_eq!(error, "`rate-hz` is 30, but a number from 1 to 25 is needed");
+    let error = checked(|config| config.half_field_deg = 66.6).unwrap_err();
+    assert!(error.starts_with("`half-field-deg` contradicts `azimuth-step-deg`: "), "{error}");
+    let error = checked(|config| config.layers_deg.swap(3, 4)).unwrap_err();
+    assert!(error.contains("above -2.185"), "{error}");
+    let error = checked(|config| config.layers_per_group = Some(5)).unwrap_err();
+    assert!(error.contains("1 to 4 groups"), "{error}");
+    let error = checked(|config| config.layers_deg = Vec::new()).unwrap_err();
+    assert!(error.contains("1 to 64"), "{error}");
+    let error = checked(|config| config.range_probability = f64::NAN).unwrap_err();
+    assert!(error.contains("from 0.5 to 0.99"), "{error}");
+    let narrow = |config: &mut LidarKindConfig| {
+        (config.azimuth_step_deg, config.fine_half_field_deg, config.fine_azimuth_step_deg) = (0.02, None, None);
+    };
+    assert!(checked(narrow).unwrap_err().contains("65,535"));
+}
