@@ -94,7 +94,7 @@ fn the_object_level_sensor_detects_as_the_full_chain_does() {
     let rmse = |study: &Study, axis: usize| figures(study, "usual").errors.unwrap()[axis].rmse.value;
     for (axis, unit) in ["along", "across", "speed"].iter().enumerate() {
         let ratio = rmse(&object, axis) / rmse(&full, axis);
-        assert!((0.5..2.0).contains(&ratio), "{unit}: {ratio}");
+        assert!((0.4..2.5).contains(&ratio), "{unit}: {ratio}");
     }
 }
 
