@@ -5,6 +5,8 @@
 //!
 //! It takes some minutes. The result depends on the seed and on the number of approaches, and not on the number of threads.
 
+#![expect(clippy::print_stdout, reason = "a command prints its result")]
+
 use std::path::{Path, PathBuf};
 
 use clap::Parser;

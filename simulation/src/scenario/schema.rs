@@ -16,6 +16,8 @@ use super::{SCHEMA_VERSION, ScenarioConfig, ScenarioError, ScenarioFile};
 const EVERY_KEY: &str = include_str!("../../../docs/scenario/every-key.toml");
 /// The actor of that scenario that follows trajectory data: a file that is not part of the program.
 const RECORDED_ACTOR: &str = "recorded";
+/// The key of a LiDAR that names another file, which is not part of the program either.
+const PATTERN_FILE: &str = "pattern-file";
 /// Larger than every number that a scenario allows.
 const HUGE: f64 = 1e300;
 /// Bound of a quantity that may have any value: it is not written.
@@ -70,6 +72,10 @@ fn ranges(schema: &Value) -> BTreeMap<String, Range> {
     let Ok(mut document) = EVERY_KEY.parse::<Table>() else { return BTreeMap::new() };
     if let Some(actors) = document.get_mut("actor").and_then(toml::Value::as_array_mut) {
         actors.retain(|actor| actor.get("id").and_then(toml::Value::as_str) != Some(RECORDED_ACTOR));
+    }
+    // A pattern in a file has the ranges of a pattern in the scenario.
+    for lidar in document.get_mut("sensors").and_then(toml::Value::as_table_mut).into_iter().flat_map(Table::values_mut) {
+        lidar.as_table_mut().and_then(|lidar| lidar.remove(PATTERN_FILE));
     }
     // The ranges of distributions depend on the other numbers of the same distribution.
     let sampled = ["parameters"];
