@@ -8,12 +8,12 @@ use closecall_testing::browser;
 
 use crate::support::{folder, library, program, stdout};
 
-/// Runs a campaign of two scenarios with 240 samples each. Returns its standard output.
+/// Runs a campaign of two scenarios with 480 samples each. Returns its standard output.
 fn campaign(out: &Path, more: &[&str], summary: Option<&Path>, expected: i32) -> String {
     let scenarios = ["low-thw-overtake-at-cut-out", "overtake-without-brake"].map(library);
     let mut command = program();
     command.arg("campaign").args(&scenarios);
-    command.args(["-n", "240", "--seed", "1", "--paired"]).args(more).arg("--out").arg(out);
+    command.args(["-n", "480", "--seed", "1", "--paired"]).args(more).arg("--out").arg(out);
     match summary {
         Some(path) => command.env("GITHUB_STEP_SUMMARY", path),
         None => command.env_remove("GITHUB_STEP_SUMMARY"),
@@ -105,7 +105,7 @@ fn the_summary_is_appended_to_the_step_summary_of_the_ci_server() {
     assert_eq!(text, format!("the summary of an earlier step\n{own}"));
     assert!(own.starts_with("## Closecall: PASS"), "{own}");
     assert!(
-        own.contains("| low-thw-overtake-at-cut-out | mis | 240 |")
+        own.contains("| low-thw-overtake-at-cut-out | mis | 480 |")
             && own.contains("| MIS-1 | low-thw-overtake-at-cut-out | met |"),
         "{own}"
     );
@@ -122,8 +122,8 @@ fn the_samples_have_a_case_for_every_outcome_and_attachments_that_exist() {
     let out = folder.path().join("out");
     campaign(&out, &["--recordings", "1"], None, 0);
     let xml = fs::read_to_string(out.join("samples.xml")).unwrap();
-    assert_eq!(xml.matches("<testcase ").count(), 2 * 2 * 240);
-    assert!(xml.contains("<testsuites name=\"closecall\" tests=\"960\""));
+    assert_eq!(xml.matches("<testcase ").count(), 2 * 2 * 480);
+    assert!(xml.contains("<testsuites name=\"closecall\" tests=\"1920\""));
     let failures = xml.matches("<failure ").count();
     assert!(failures > 0 && xml.contains(&format!("failures=\"{failures}\"")), "{failures}");
     let attached: Vec<&str> = xml

@@ -74,7 +74,8 @@ fn ranges(schema: &Value) -> BTreeMap<String, Range> {
         actors.retain(|actor| actor.get("id").and_then(toml::Value::as_str) != Some(RECORDED_ACTOR));
     }
     // A pattern in a file has the ranges of a pattern in the scenario.
-    for lidar in document.get_mut("sensors").and_then(toml::Value::as_table_mut).into_iter().flat_map(Table::values_mut) {
+    for lidar in document.get_mut("sensors").and_then(toml::Value::as_table_mut).into_iter().flat_map(Table::values_mut)
+    {
         lidar.as_table_mut().and_then(|lidar| lidar.remove(PATTERN_FILE));
     }
     // The ranges of distributions depend on the other numbers of the same distribution.
