@@ -1,5 +1,5 @@
 //! The `closecall` program.
 
 fn main() -> std::process::ExitCode {
-    closecall::cli::main(std::env::args().collect()).into()
+    closecall::cli::main(&std::env::args_os().collect::<Vec<_>>()).into()
 }

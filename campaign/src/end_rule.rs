@@ -64,6 +64,8 @@ pub struct EndedEarly<'a> {
     pub ending: Option<&'a EarlyEnd>,
     /// Samples that are done, and samples of the whole campaign.
     pub samples: [u64; 2],
+    /// Samples that ended in an error.
+    pub errors: u64,
     /// The campaign's folder, and the command line that started it.
     pub kept: Option<(&'a Path, Vec<String>)>,
 }
@@ -77,7 +79,13 @@ impl EndedEarly<'_> {
     /// Returns the end as JSON.
     pub fn json(&self) -> Value {
         let [done, of] = self.samples;
-        json!({ "ended_early": self.message, "samples": done, "of": of, "resume": self.resume() })
+        json!({
+            "ended_early": self.message,
+            "samples": done,
+            "of": of,
+            "errors": self.errors,
+            "resume": self.resume(),
+        })
     }
 }
 

@@ -4,6 +4,7 @@
 //! A command runs in one thread, and looks up its session there.
 
 use std::cell::RefCell;
+use std::ffi::OsString;
 use std::fmt::{Arguments, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -44,16 +45,21 @@ thread_local! {
 impl Session {
     /// Runs a command in this thread, and returns its result and what it has printed. The first of the arguments is the
     /// program's name.
-    pub fn run<T>(&self, arguments: Vec<String>, command: impl FnOnce() -> T) -> (T, Printed) {
-        RUNNING.set(Running { arguments, session: Some(self.clone()), printed: Printed::default() });
+    pub fn run<T>(&self, arguments: &[OsString], command: impl FnOnce() -> T) -> (T, Printed) {
+        RUNNING.set(Running { arguments: texts(arguments), session: Some(self.clone()), printed: Printed::default() });
         let result = command();
         (result, RUNNING.take().printed)
     }
 }
 
 /// Sets the arguments of the program, whose commands nothing calls but itself.
-pub fn set_arguments(arguments: Vec<String>) {
-    RUNNING.set(Running { arguments, ..Running::default() });
+pub fn set_arguments(arguments: &[OsString]) {
+    RUNNING.set(Running { arguments: texts(arguments), ..Running::default() });
+}
+
+/// Returns the arguments as texts for manifests and messages. What is not UTF-8 is replaced.
+fn texts(arguments: &[OsString]) -> Vec<String> {
+    arguments.iter().map(|argument| argument.to_string_lossy().into_owned()).collect()
 }
 
 /// Returns the arguments of the command, of which the first is the program's name.
@@ -114,7 +120,7 @@ mod tests {
     #[test]
     fn a_called_command_prints_to_its_caller() {
         let session = Session::default();
-        let ((), printed) = session.run(vec!["closecall".to_owned(), "list".to_owned()], || {
+        let ((), printed) = session.run(&["closecall".into(), "list".into()], || {
             assert!(is_active());
             assert_eq!(arguments(), ["closecall", "list"]);
             assert!(keep_output(format_args!("one ")) && keep_output(format_args!("line")));

@@ -11,17 +11,28 @@ use crate::probability::ProbabilityGate;
 
 /// A request from outside to start no further samples. Clones share the request.
 #[derive(Clone, Debug, Default)]
-pub struct StopFlag(Arc<AtomicBool>);
+pub struct StopFlag(Arc<[AtomicBool; 2]>);
 
 impl StopFlag {
     /// Requests the stop.
     pub fn set(&self) {
-        self.0.store(true, Ordering::Relaxed);
+        self.0[0].store(true, Ordering::Relaxed);
+    }
+
+    /// Requests the stop, and that the running samples are not waited for: their results are lost.
+    pub fn abandon(&self) {
+        self.set();
+        self.0[1].store(true, Ordering::Relaxed);
     }
 
     /// Returns true if the stop was requested.
     pub fn is_set(&self) -> bool {
-        self.0.load(Ordering::Relaxed)
+        self.0[0].load(Ordering::Relaxed)
+    }
+
+    /// Returns true if the running samples are not to be waited for.
+    pub fn is_abandoned(&self) -> bool {
+        self.0[1].load(Ordering::Relaxed)
     }
 }
 

@@ -93,7 +93,8 @@ pub(crate) trait Samples: Send + Sync + 'static {
 
 impl Workers {
     /// Runs the given samples, and passes each result to `on_finished` in the order of `samples`. Stops when
-    /// `on_finished` breaks. If `stop` is set, no further sample starts, and those that run are given a few seconds.
+    /// `on_finished` breaks. If `stop` is set, no further sample starts, and those that run are given a few seconds,
+    /// or none if it is abandoned.
     ///
     /// # Errors
     /// The error of `on_finished`, or [`WorkersError`]. No further result is passed on then.
@@ -135,6 +136,9 @@ impl Workers {
             }
             let is_idle = pool.is_idle();
             let results = pool.wait()?;
+            if stop.is_abandoned() {
+                return Ok(());
+            }
             let is_over = stopped.is_some_and(|at| is_idle && results.is_empty() || at.elapsed() >= STOP_TIMEOUT);
             for done in results {
                 order.waiting.insert(done.index, done);

@@ -25,7 +25,7 @@ class CampaignResult:
 
     #: The exit code of the command line: 0 pass, 1 fail, 4 inconclusive or not judged, 5 a sample ended in an error, 7 invalid.
     exit_code: int
-    #: The verdict, such as ``PASS`` or ``FAIL``.
+    #: The verdict, such as ``PASS`` or ``FAIL``; ``ENDED EARLY`` if ``fail_fast`` or ``max_errors`` has ended the campaign.
     verdict: str
     #: Number of samples.
     samples: int
@@ -70,19 +70,21 @@ def campaign(
     ``progress`` is called with the number of samples that are done and of all; ``True`` shows a bar of ``tqdm``.
 
     A controller that raises, or answers no finite number, costs its sample: it counts as an error, and the exit code is 5.
-    Ctrl-C raises ``KeyboardInterrupt`` after the samples that are running. With ``out``, ``resume=True`` goes on from there.
+    Ctrl-C raises ``KeyboardInterrupt`` after the samples that are running, and a second one at once. With ``out``, ``resume=True`` goes on from there.
     """
     several = [scenarios] if isinstance(scenarios, (Scenario, str, os.PathLike)) else scenarios
-    settings: list[str] = []
     words: list[str] = []
+    changes: list[list[str]] = []
     for scenario in several:
         if isinstance(scenario, Scenario):
             words.append(scenario._native.source)
-            if settings and settings != scenario._native.settings:
-                raise UsageError("the scenarios of a campaign are changed by the same settings (`set`), or by none")
-            settings = scenario._native.settings
+            changes.append(scenario._native.settings)
         else:
             words.append(os.fspath(scenario))
+            changes.append([])
+    settings = changes[0] if changes else []
+    if any(other != settings for other in changes):
+        raise UsageError("the scenarios of a campaign are changed by the same settings (`set`), or by none")
     if arms is not None and (controller is not None or paired):
         raise UsageError("`arms` names all controllers: leave out `controller` and `paired`")
     chosen: list[ControllerLike] = list(arms) if arms is not None else [] if controller is None else [controller]
@@ -94,7 +96,7 @@ def campaign(
         code, output = call(["campaign", "--format=json", *which, *further, "--", *words], report)
     keys = json.loads(output)
     folder = None if out is None else Path(out)
-    return CampaignResult(code, keys["verdict"], keys["samples"], keys["errors"], keys, folder)
+    return CampaignResult(code, keys.get("verdict", "ENDED EARLY"), keys["samples"], keys["errors"], keys, folder)
 
 
 class _reporter:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import ctypes
+import functools
 import hashlib
 import inspect
 import io
@@ -68,13 +69,18 @@ def _name(controller: Any) -> str:
 
 def _version(controller: Any) -> str:
     """Returns a hash of the code and the state of a controller, or a unique word if the state cannot be pickled."""
-    described = io.BytesIO()
     try:
-        _Describer(described).dump(controller)
+        return _digest(controller)[:12]
     except Exception:
         # Nothing says whether such a controller has changed: no campaign is resumed with it.
         return f"unidentified-{uuid.uuid4().hex[:12]}"
-    return hashlib.sha256(described.getvalue()).hexdigest()[:12]
+
+
+def _digest(obj: Any) -> str:
+    """Returns a hash of the code and the state of an object."""
+    described = io.BytesIO()
+    _Describer(described).dump(obj)
+    return hashlib.sha256(described.getvalue()).hexdigest()
 
 
 class _Describer(pickle.Pickler):
@@ -87,17 +93,28 @@ class _Describer(pickle.Pickler):
         super().__init__(file, protocol=4)
         self._seen: set[int] = set()
 
+    def persistent_id(self, obj: Any) -> Any:
+        # The order of a set differs from process to process.
+        if isinstance(obj, (set, frozenset)):
+            return type(obj), sorted(_digest(member) for member in obj), getattr(obj, "__dict__", None)
+        return None
+
     def reducer_override(self, obj: Any) -> Any:
-        if not isinstance(obj, (type, types.FunctionType)) or _is_installed(obj):
+        if not isinstance(obj, (type, types.FunctionType)):
+            return NotImplemented
+        is_installed = _is_installed(obj)
+        if is_installed and (isinstance(obj, type) or _is_importable(obj)):
             return NotImplemented
         if id(obj) in self._seen:
             return str, (obj.__qualname__,)
         self._seen.add(id(obj))
         if isinstance(obj, types.FunctionType):
             cells = tuple(cell.cell_contents for cell in obj.__closure__ or ())
-            return _described, (_module_source(obj), _code(obj.__code__), obj.__defaults__, cells)
-        functions = tuple(value for value in vars(obj).values() if isinstance(value, types.FunctionType))
-        return _described, (obj.__qualname__, _module_source(obj), obj.__bases__, functions)
+            if is_installed:
+                # Such as a wrapper, which may enclose a function of the controller.
+                return _described, (obj.__module__, obj.__qualname__, cells)
+            return _described, (_module_source(obj), _code(obj.__code__), obj.__defaults__, obj.__kwdefaults__, cells)
+        return _described, (obj.__qualname__, _module_source(obj), obj.__bases__, _members(obj))
 
 
 def _described(*parts: Any) -> tuple[Any, ...]:
@@ -105,11 +122,34 @@ def _described(*parts: Any) -> tuple[Any, ...]:
     return parts
 
 
+def _members(own: type) -> tuple[tuple[Any, ...], ...]:
+    """Returns the functions and attributes of a class. Of the names with two underscores, only functions are its author's."""
+    members: list[tuple[Any, ...]] = []
+    for name, value in vars(own).items():
+        if isinstance(value, property):
+            members.append((name, value.fget, value.fset, value.fdel))
+        elif isinstance(value, functools.cached_property):
+            members.append((name, value.func))
+        elif isinstance(value, (staticmethod, classmethod)):
+            members.append((name, value.__func__))
+        elif isinstance(value, types.FunctionType) or not (name.startswith("__") or name == "_abc_impl"):
+            members.append((name, value))
+    return tuple(members)
+
+
 def _is_installed(obj: Any) -> bool:
     """Returns whether a function or class belongs to Python or to an installed package."""
     path = getattr(sys.modules.get(obj.__module__), "__file__", None)
     places = [sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib")]
     return obj.__module__ == "builtins" or (path is not None and any(path.startswith(place) for place in places))
+
+
+def _is_importable(obj: types.FunctionType) -> bool:
+    """Returns whether a function is found by its name in its module."""
+    found: object = sys.modules.get(obj.__module__)
+    for name in obj.__qualname__.split("."):
+        found = getattr(found, name, None)
+    return found is obj
 
 
 def _module_source(obj: Any) -> str:
@@ -123,8 +163,18 @@ def _module_source(obj: Any) -> str:
 
 def _code(code: types.CodeType) -> tuple[Any, ...]:
     """Returns what a function does, without the place where it is written."""
-    constants = tuple(_code(item) if isinstance(item, types.CodeType) else repr(item) for item in code.co_consts)
-    return code.co_code, code.co_names, constants
+    return code.co_code, code.co_names, tuple(map(_constant, code.co_consts))
+
+
+def _constant(value: object) -> Any:
+    """Returns a constant of a function as text, and code as what it does."""
+    if isinstance(value, types.CodeType):
+        return _code(value)
+    if isinstance(value, tuple):
+        return tuple(map(_constant, value))
+    if isinstance(value, frozenset):
+        return "frozenset", sorted(repr(_constant(item)) for item in value)
+    return repr(value)
 
 
 def end_steps(controller: _native.PythonController) -> None:

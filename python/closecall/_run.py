@@ -8,7 +8,7 @@ from typing import Literal
 from . import _native
 from ._controller import ControllerLike, end_steps, native
 from ._outcome import Outcome
-from ._scenario import Scenario, loaded
+from ._scenario import Scenario, loaded, whole
 
 #: The depth of the sensor simulation.
 SensorsLike = Literal["full", "object", "ground-truth"]
@@ -32,7 +32,7 @@ def run(
     """
     chosen = native(controller)
     try:
-        done = _native.run(loaded(scenario)._native, chosen, seed, sample, sensors)
+        done = _native.run(loaded(scenario)._native, chosen, whole("seed", seed), whole("sample", sample), sensors)
     finally:
         if not isinstance(chosen, str):
             end_steps(chosen)

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Literal
 
 from . import _native
+from ._errors import UsageError
 
 
 class Scenario:
@@ -71,6 +72,14 @@ def _toml(value: object) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     return str(value)
+
+
+def whole(name: str, value: int) -> int:
+    """Returns a seed or the number of a sample, which is a whole number from 0 to 2^64 - 1."""
+    number = int(value)
+    if number != value or not 0 <= number < 2**64:
+        raise UsageError(f"{name}: {value!r} is none: expected a whole number from 0 to 2^64 - 1")
+    return number
 
 
 def loaded(scenario: Scenario | str | os.PathLike[str]) -> Scenario:

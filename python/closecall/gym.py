@@ -24,9 +24,10 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from . import _native
+from ._errors import UsageError
 from ._outcome import Outcome
 from ._run import SensorsLike
-from ._scenario import Scenario, loaded
+from ._scenario import Scenario, loaded, whole
 
 __all__ = [
     "CONTROL_STEP_S",
@@ -58,6 +59,9 @@ TRACK: tuple[str, ...] = tuple(_native.TRACK_KEYS)
 
 _X, _VX, _LENGTH, _CONFIRMED, _LANE_OWN = map(TRACK.index, ("x_m", "vx_mps", "length_m", "confirmed", "lane_own"))
 
+#: The true margins, with their units.
+_TRUTH = ("gap_front_m", "thw_front_s", "gap_rear_m", "thw_rear_s", "ttc_rear_s")
+
 #: A bound that no quantity reaches (m, m/s, m/s²).
 _BOUND = 1.0e4
 #: The numbers between 0 and 1.
@@ -81,9 +85,15 @@ def _box(keys: Sequence[str], rows: int | None = None) -> spaces.Box:
     return spaces.Box(low, high, dtype=np.float64)
 
 
+def _check_max_tracks(max_tracks: int) -> None:
+    if max_tracks < 1:
+        raise UsageError(f"max_tracks: {max_tracks} is too few: an observation has at least one row of tracks")
+
+
 def observation_space(max_tracks: int = 16) -> spaces.Dict:
     """Returns the space of an observation. Its parts are named by :data:`ODOMETRY`, :data:`ROAD`, :data:`SENSORS`,
     :data:`LEAD` and :data:`TRACK`; ``tracks`` has the shape (``max_tracks``, 19)."""
+    _check_max_tracks(max_tracks)
     named = {"odometry": ODOMETRY, "road": ROAD, "sensors": SENSORS, "lead": LEAD}
     parts: dict[str, spaces.Space[Any]] = {name: _box(keys) for name, keys in named.items()}
     return spaces.Dict({**parts, "tracks": _box(TRACK, max_tracks)})
@@ -127,8 +137,9 @@ class EncounterEnv(gymnasium.Env[Observation, NDArray[np.float64]]):
     """One encounter of a scenario, stepped by its caller.
 
     ``scenario`` is a scenario, a path, or a name of the library. ``sensors`` is the depth of the sensor simulation (``"object"``
-    by default). ``max_tracks`` is the number of tracks in an observation. ``action_limits_mps2`` bounds the action, an
-    acceleration (m/s², shape (1,)). ``reward`` replaces :func:`default_reward`. With ``truth``, ``info["truth"]`` holds the ego's true
+    by default). ``max_tracks`` is the number of tracks in an observation. ``action_limits_mps2`` are the
+    bounds of ``action_space``, an acceleration (m/s², shape (1,)): a step does not clip, as a campaign does not clip the same
+    command; ``gymnasium.wrappers.ClipAction`` does. ``reward`` replaces :func:`default_reward`. With ``truth``, ``info["truth"]`` holds the ego's true
     margins: ``gap_front_m``, ``thw_front_s``, ``gap_rear_m``, ``thw_rear_s``, ``ttc_rear_s``, each ``None`` if absent. At the end
     ``info["outcome"]`` is the :class:`closecall.Outcome`, which is the truth, too.
 
@@ -166,7 +177,7 @@ class EncounterEnv(gymnasium.Env[Observation, NDArray[np.float64]]):
         if seed is not None:
             self._seed = seed
         drawn = (options or {}).get("sample")
-        sample = int(self.np_random.integers(2**31)) if drawn is None else int(drawn)
+        sample = int(self.np_random.integers(2**31)) if drawn is None else whole("sample", drawn)
         observed = self._observation(self._episode.reset(self._seed, sample))
         return observed, {"seed": self._seed, "sample": sample, **self._true_margins()}
 
@@ -174,9 +185,14 @@ class EncounterEnv(gymnasium.Env[Observation, NDArray[np.float64]]):
         self, action: NDArray[np.float64] | float
     ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Commands an acceleration (m/s²) for 0.04 s."""
-        acceleration_mps2 = float(action if isinstance(action, (float, int)) else action[0])
-        values, end = self._episode.step(acceleration_mps2)
-        observed = self._observation(values)
+        if not isinstance(action, (float, int)):
+            values = np.asarray(action, dtype=np.float64)
+            if values.size != 1:
+                raise UsageError(f"the action has the shape {values.shape}: it is one acceleration (m/s²)")
+            action = values.item()
+        acceleration_mps2 = float(action)
+        observed_bytes, end = self._episode.step(acceleration_mps2)
+        observed = self._observation(observed_bytes)
         info = self._true_margins()
         if end:
             info["outcome"] = self.outcome()
@@ -197,6 +213,7 @@ class EncounterEnv(gymnasium.Env[Observation, NDArray[np.float64]]):
 
 class EncounterVectorEnv(VectorEnv[Observation, NDArray[np.float64], NDArray[Any]]):
     """Several encounters of a scenario, stepped at once on all cores. Arguments are as in :class:`EncounterEnv`.
+    ``truth`` is left out by default. ``info["truth"]`` has an array for each margin, with NaN for an absent one.
 
     ``reset(seed=S, options={"sample": [K, …]})`` starts these samples; without ``sample``, they are drawn. A run that has
     ended starts anew at the next step (``AutoresetMode.NEXT_STEP``), with a sample that is drawn. ``info["outcome"]`` holds
@@ -214,6 +231,7 @@ class EncounterVectorEnv(VectorEnv[Observation, NDArray[np.float64], NDArray[Any
         max_tracks: int = 16,
         action_limits_mps2: tuple[float, float] = (-9.0, 3.0),
         reward: Reward = default_reward,
+        truth: bool = False,
         render_mode: str | None = None,
     ) -> None:
         self.num_envs = num_envs
@@ -226,6 +244,7 @@ class EncounterVectorEnv(VectorEnv[Observation, NDArray[np.float64], NDArray[Any
         self._episodes = _native.Episodes(self.scenario._native, sensors, max_tracks, num_envs)
         self._max_tracks = max_tracks
         self._reward = reward
+        self._truth = truth
         self._seeds = [0] * num_envs
         self._has_ended = np.zeros(num_envs, dtype=bool)
 
@@ -240,17 +259,20 @@ class EncounterVectorEnv(VectorEnv[Observation, NDArray[np.float64], NDArray[Any
         elif seed is not None:
             self._seeds = [own if one is None else one for own, one in zip(self._seeds, seed, strict=True)]
         given = (options or {}).get("sample")
-        samples = self._draw() if given is None else [int(sample) for sample in given]
+        samples = self._draw() if given is None else [whole("sample", sample) for sample in given]
         starts: list[tuple[int, int] | None] = list(zip(self._seeds, samples, strict=True))
         values, _ = self._episodes.step([0.0] * self.num_envs, starts)
         self._has_ended[:] = False
-        return self._observation(values), {"sample": np.array(samples)}
+        return self._observation(values), {"sample": np.array(samples), **self._true_margins()}
 
     def step(
         self, actions: NDArray[np.float64]
     ) -> tuple[Observation, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         """Commands an acceleration (m/s²) to each run; ``actions`` has the shape (``num_envs``, 1)."""
-        accelerations = np.asarray(actions, dtype=np.float64).reshape(self.num_envs)
+        accelerations = np.asarray(actions, dtype=np.float64)
+        if accelerations.size != self.num_envs:
+            raise UsageError(f"the actions have the shape {accelerations.shape}: expected ({self.num_envs}, 1)")
+        accelerations = accelerations.reshape(self.num_envs)
         starts: list[tuple[int, int] | None] = [None] * self.num_envs
         restarted = self._has_ended.copy()
         if restarted.any():
@@ -262,7 +284,7 @@ class EncounterVectorEnv(VectorEnv[Observation, NDArray[np.float64], NDArray[Any
         observed = self._observation(values)
         rewards = np.where(restarted, 0.0, self._reward(observed, accelerations, ends == _CRASH))
         self._has_ended = ends > 0
-        info: dict[str, Any] = {}
+        info: dict[str, Any] = self._true_margins()
         for ended in np.flatnonzero(ends):
             text = self._episodes.outcome(int(ended))
             if text is not None:
@@ -272,6 +294,13 @@ class EncounterVectorEnv(VectorEnv[Observation, NDArray[np.float64], NDArray[Any
     def truth(self, index: int) -> dict[str, float | None]:
         """Returns the true margins of the ego of one run."""
         return self._episodes.truth(index)
+
+    def _true_margins(self) -> dict[str, Any]:
+        if not self._truth:
+            return {}
+        truths = [self._episodes.truth(index) for index in range(self.num_envs)]
+        # NumPy reads None as NaN.
+        return {"truth": {name: np.array([truth.get(name) for truth in truths], dtype=np.float64) for name in _TRUTH}}
 
     def _draw(self) -> list[int]:
         drawn: list[int] = self.np_random.integers(2**31, size=self.num_envs).tolist()
@@ -291,6 +320,7 @@ class PolicyController:
     """
 
     def __init__(self, policy: Callable[[Observation], Any], max_tracks: int = 16) -> None:
+        _check_max_tracks(max_tracks)
         self.policy = policy
         self.max_tracks = max_tracks
 

@@ -1,5 +1,6 @@
 //! The commands of the program, called from Python.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -27,42 +28,48 @@ pub(crate) fn set_program(path: PathBuf) {
 
 /// Runs the program `closecall` with these arguments, of which the first is its name, and returns its exit code.
 #[pyfunction]
-pub(crate) fn main(py: Python<'_>, arguments: Vec<String>) -> u8 {
-    py.detach(|| cli::main(arguments) as u8)
+pub(crate) fn main(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
+    py.detach(|| cli::main(&arguments) as u8)
 }
 
 /// Runs a command in a thread of its own, and returns its exit code, its output and its messages. The first of the arguments
 /// is the program's name. `progress` is called with the number of samples that are done and of all.
 ///
-/// Ctrl-C stops a campaign after the samples that are running. Any other command goes on unseen.
+/// Ctrl-C stops a campaign after the samples that are running, and a second one returns at once. Any other command goes on
+/// unseen.
 #[pyfunction]
 #[pyo3(signature = (arguments, progress=None))]
 pub(crate) fn call(
     py: Python<'_>,
-    arguments: Vec<String>,
+    arguments: Vec<OsString>,
     progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<(u8, String, Vec<String>)> {
     let session = Session::default();
+    let is_campaign = arguments.get(1).is_some_and(|command| command == "campaign");
     let (sender, mut receiver) = channel();
     let called = session.clone();
     let body = move || {
         // The receiver is gone if Ctrl-C has ended the call.
-        sender.send(cli::call(&called, arguments)).ok();
+        sender.send(cli::call(&called, &arguments)).ok();
     };
     thread::Builder::new().name("command".to_owned()).spawn(body)?;
     let mut reported = [0; 2];
-    let mut interrupt = None;
+    let mut interrupt: Option<PyErr> = None;
     loop {
         let results = &mut receiver;
         let received = py.detach(move || results.recv_timeout(POLL_INTERVAL));
         let samples = session.samples.each_ref().map(|count| count.load(Ordering::Relaxed));
-        let is_campaign = samples[1] > 0;
         if let Some(progress) = progress.as_ref().filter(|_| interrupt.is_none() && samples != reported) {
             reported = samples;
             interrupt = progress.call1((samples[0], samples[1])).err();
         }
-        if interrupt.is_none() {
-            interrupt = py.check_signals().err();
+        if let Err(signal) = py.check_signals() {
+            if interrupt.is_some() {
+                // The samples that are ended now must not enter the journal as errors.
+                session.stop.abandon();
+                return Err(signal);
+            }
+            interrupt = Some(signal);
         }
         if interrupt.is_some() {
             session.stop.set();

@@ -96,13 +96,15 @@ impl PythonController {
 
     /// Lets the commands of the program use the controller by its name.
     fn register(&self, py: Python<'_>) {
-        *lock(&self.registration) = Some(register(&self.name, self.factory(py)));
+        let earlier = lock(&self.registration).replace(register(&self.name, self.factory(py)));
+        drop(earlier);
     }
 
     /// Undoes `register`, lets every controller fail at its next step, and returns Python's identifiers of the threads that are
     /// still in a step.
     fn unregister(&self) -> Vec<u64> {
-        lock(&self.registration).take();
+        let registration = lock(&self.registration).take();
+        drop(registration);
         self.cancel();
         lock(&self.shared.threads).iter().copied().collect()
     }
@@ -200,7 +202,10 @@ impl EgoController for Controller {
             Python::attach(|py| {
                 self.call(py, input).map_err(|error| {
                     let text = described(py, &error);
-                    *lock(&shared.failure) = Some(error);
+                    // The earlier exception is dropped without the lock: its objects may run code, during which another thread
+                    // takes the interpreter and waits for the lock.
+                    let earlier = lock(&shared.failure).replace(error);
+                    drop(earlier);
                     text
                 })
             })

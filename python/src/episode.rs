@@ -1,6 +1,8 @@
 //! Runs that Python steps: one, or several at once.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::mem;
+use std::process;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use closecall_controllers::{EgoCommand, EgoState, LeadVehicleSelector, Reason};
 use closecall_report::json;
@@ -8,16 +10,43 @@ use closecall_sensors::SensorMode;
 use closecall_simulation::outcome::EndReason;
 use closecall_simulation::{NoObserver, RunKey, SampleError, Stepper};
 use closecall_traffic::Measured;
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use rayon::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
 use crate::error::{sample_exception, usage_exception};
 use crate::observation::{bytes, len, write};
 use crate::run::sensor_mode;
 use crate::scenario::Scenario;
 
-/// One run and what is observed of it.
+/// The threads that step several runs, and the process that has started them.
+static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
+
+/// Returns the threads of this process. A process that was forked has none of the threads of its parent.
+fn pool() -> Result<Arc<ThreadPool>, ThreadPoolBuildError> {
+    let mut kept = POOL.lock().unwrap_or_else(PoisonError::into_inner);
+    match &*kept {
+        Some((owner, pool)) if *owner == process::id() => Ok(pool.clone()),
+        _ => {
+            let pool = Arc::new(ThreadPoolBuilder::new().build()?);
+            // The pool of the parent is not dropped: that would tell its threads, which are not here, to end.
+            mem::forget(kept.replace((process::id(), pool.clone())));
+            Ok(pool)
+        }
+    }
+}
+
+/// Why several runs have not been stepped.
+enum StepError {
+    /// The run with this index has ended or not begun.
+    NotRunning(usize),
+    /// A run has ended without an outcome.
+    Sample(u64, SampleError),
+}
+
+/// One run and what is observed of it. A run that has ended in an error has no stepper.
 #[derive(Default)]
 struct State {
     stepper: Option<Stepper>,
@@ -38,6 +67,7 @@ impl State {
         max_tracks: usize,
     ) -> Result<(), SampleError> {
         (self.lead, self.sample, self.has_ended) = (LeadVehicleSelector::default(), key.sample, false);
+        self.stepper = None;
         let concrete = scenario.concrete(key.seed, key.sample)?;
         self.stepper = Some(Stepper::new(concrete, key, sensors, &mut NoObserver)?);
         self.observe(max_tracks);
@@ -49,7 +79,10 @@ impl State {
         let Some(stepper) = &mut self.stepper else { return Ok(()) };
         let command =
             EgoCommand { acceleration_mps2, state: EgoState::Following, reason: Reason::External, plan: None };
-        stepper.step(command, &mut NoObserver)?;
+        if let Err(error) = stepper.step(command, &mut NoObserver) {
+            self.stepper = None;
+            return Err(error);
+        }
         self.has_ended = stepper.outcome().is_some();
         self.observe(max_tracks);
         Ok(())
@@ -207,17 +240,32 @@ impl Episodes {
                 Some(key) => state.reset(&self.scenario, key, self.sensors, self.max_tracks),
                 None => state.step(acceleration_mps2, self.max_tracks),
             };
-            result.map_err(|error| (state.sample, error))
+            result.map_err(|error| StepError::Sample(state.sample, error))
         };
+        let pool = pool().map_err(|error| PyRuntimeError::new_err(format!("failed to start threads: {error}")))?;
         let stepped = py.detach(|| {
             let mut states = self.states();
-            let stepped = states.par_iter_mut().zip(inputs).map(|(state, input)| step(state, input));
-            stepped.collect::<Result<(), _>>()?;
+            let pairs = || states.iter().zip(&inputs);
+            if let Some(index) = pairs().position(|(state, (_, start))| state.stepper.is_none() && start.is_none()) {
+                return Err(StepError::NotRunning(index));
+            }
+            // All runs are stepped, also if one of them fails.
+            let runs = &mut *states;
+            let stepped: Vec<Result<(), StepError>> = pool.install(|| {
+                let pairs = runs.par_iter_mut().zip(inputs);
+                pairs.map(|(state, input)| step(state, input)).collect()
+            });
+            stepped.into_iter().collect::<Result<(), _>>()?;
             let mut observed = Vec::with_capacity(self.count * len(self.max_tracks) * size_of::<f64>());
             states.iter().for_each(|state| observed.extend(bytes(&state.values)));
             Ok((observed, states.iter().map(State::end).collect::<Vec<u8>>()))
         });
-        let (observed, ends) = stepped.map_err(|(sample, error)| sample_exception(py, sample, &error))?;
+        let (observed, ends) = stepped.map_err(|error| match error {
+            StepError::NotRunning(index) => {
+                usage_exception(py, &format!("run {index} has ended or not begun: call `reset` before `step`"))
+            }
+            StepError::Sample(sample, error) => sample_exception(py, sample, &error),
+        })?;
         Ok((PyBytes::new(py, &observed), ends))
     }
 

@@ -203,6 +203,149 @@ def test_a_controller_that_has_changed_does_not_resume(tmp_path: Path) -> None:
     assert campaign(0.5, resume=True) == 0
 
 
+def script(text: str, *words: str | Path, timeout_s: float = 120.0, **variables: str) -> subprocess.CompletedProcess[str]:
+    """Runs a Python program."""
+    environment = {**os.environ, **variables}
+    program = [sys.executable, "-c", text, *map(str, words)]
+    return subprocess.run(program, capture_output=True, text=True, timeout=timeout_s, env=environment)
+
+
+DROPPED = """
+import time, closecall as cc
+
+class Resource:
+    def __del__(self):
+        time.sleep(0.01)
+
+class Raises:
+    def step(self, input):
+        resource = Resource()
+        if input.time_s > 0.5:
+            raise ValueError("of the controller")
+        return 0.0
+
+result = cc.campaign("low-thw-overtake", n=60, sensors="object", controller=Raises, jobs=4, no_gate=True)
+print(result.exit_code, result.errors)
+"""
+
+
+def test_dropping_an_exception_whose_objects_wait_does_not_block_the_campaign() -> None:
+    done = script(DROPPED)
+    assert (done.stdout.split(), done.returncode, done.stderr) == (["5", "60"], 0, "")
+
+
+HASHED = """
+from closecall._controller import registered
+
+class Base:
+    GAIN = 0.5
+    MODES = frozenset({"a", "b", "c"})
+
+    @property
+    def limit(self):
+        return 3.0
+
+    @staticmethod
+    def near(gap_m):
+        return gap_m < 5.0
+
+    @classmethod
+    def make(cls):
+        return cls()
+
+class Own(Base):
+    def __init__(self):
+        self.words = {"d", "e", "f"}
+
+    def step(self, input):
+        return 0.0 if input in {"g", "h", "i"} else 1.0
+
+with registered([Own, Own()]) as names:
+    print(*names)
+"""
+
+
+def test_the_hash_of_a_controller_covers_its_class_and_is_that_of_any_process() -> None:
+    names = script(HASHED, PYTHONHASHSEED="1").stdout.split()
+    assert len(names) == 2 and all("python:Own@" in name and "unidentified" not in name for name in names)
+    assert script(HASHED, PYTHONHASHSEED="2").stdout.split() == names
+    for old, new in [
+        ("GAIN = 0.5", "GAIN = 0.6"),
+        ('"c"})', '"z"})'),
+        ("return 3.0", "return 4.0"),
+        ("gap_m < 5.0", "gap_m < 6.0"),
+        ("return cls()", "return None"),
+        ('"g", "h"', '"g", "z"'),
+    ]:
+        assert old in HASHED
+        changed = script(HASHED.replace(old, new), PYTHONHASHSEED="1").stdout.split()
+        assert len(changed) == 2 and not set(changed) & set(names), new
+
+
+class Fails:
+    """Raises at its first step."""
+
+    def step(self, input: cc.ControllerInput) -> float:
+        raise ValueError("at once")
+
+
+def test_a_campaign_that_ends_early_has_a_result(tmp_path: Path) -> None:
+    for options in ({"fail_fast": True}, {"max_errors": 0}):
+        out = tmp_path / next(iter(options))
+        result = cc.campaign(SCENARIO, n=20, sensors="object", controller=Fails, out=out, **options)
+        assert (result.verdict, result.exit_code, result.errors, result.samples) == ("ENDED EARLY", 5, 1, 1)
+        assert result.report["of"] == 20 and "--resume" in result.report["resume"]
+
+
+def test_the_settings_of_one_scenario_are_not_those_of_another() -> None:
+    plain, short = cc.Scenario.load(SCENARIO), cc.Scenario.load(SCENARIO, set={"duration-s": 5})
+    orders: list[list[cc.Scenario | str]] = [[plain, short], [short, plain], [SCENARIO, short], [short, SCENARIO]]
+    for several in orders:
+        with pytest.raises(cc.UsageError, match="by the same settings"):
+            cc.campaign(several, n=1)
+
+
+PAUSED = """
+import os, sys, time, closecall as cc
+
+class Slow:
+    def step(self, input):
+        os.write(1, b"step\\n")
+        time.sleep(float(os.environ["PAUSE_S"]))
+        return 0.0
+
+try:
+    result = cc.campaign("low-thw-overtake", n=4, seed=2, sensors="object", controller=Slow, no_gate=True, jobs=2,
+                         out=sys.argv[1], resume=sys.argv[2] == "resume")
+except KeyboardInterrupt:
+    raise SystemExit(7)
+raise SystemExit(result.exit_code)
+"""
+
+
+@pytest.mark.parametrize("signals", [1, 2])
+def test_ctrl_c_before_the_first_sample_is_done_leaves_no_errors(tmp_path: Path, signals: int) -> None:
+    out, there = tmp_path / "out", tmp_path / "there"
+    assert script(PAUSED, out, "start", PAUSE_S="0").returncode == 0
+    out.rename(there)
+    program = [sys.executable, "-c", PAUSED, str(out), "start"]
+    environment = {**os.environ, "PAUSE_S": "0.1"}
+    process = subprocess.Popen(program, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
+    assert process.stdout is not None and process.stdout.readline() == "step\n"
+    process.send_signal(signal.SIGINT)
+    if signals == 2:
+        time.sleep(0.5)
+        assert process.poll() is None
+        process.send_signal(signal.SIGINT)
+    steps, messages = process.communicate(timeout=60)
+    assert (process.returncode, messages) == (7, "")
+    # The second signal ends the steps, which the first one grants 5 s: about 50 in each of two threads.
+    assert steps.count("step") < 40 if signals == 2 else steps.count("step") >= 40
+    assert '"error"' not in (out / "journal.jsonl").read_text()
+    assert script(PAUSED, out, "resume", PAUSE_S="0").returncode == 0
+    assert sha256(out / "outcomes.parquet") == sha256(there / "outcomes.parquet")
+
+
 INTERRUPTED = """
 import sys, closecall as cc
 try:
@@ -252,6 +395,31 @@ def test_ctrl_c_ends_a_run() -> None:
     assert (process.returncode, messages) == (7, "") and "interrupted" in rest and rest.count("step") < 100
 
 
+ENDLESS = """
+import closecall as cc
+
+class Endless:
+    def step(self, input):
+        print("step", flush=True)
+        while input.time_s >= 0.0:
+            pass
+        return 0.0
+
+try:
+    cc.run("low-thw-overtake", Endless, sensors="object")
+except KeyboardInterrupt:
+    raise SystemExit(7)
+"""
+
+
+def test_ctrl_c_ends_a_run_whose_controller_hangs() -> None:
+    process = subprocess.Popen([sys.executable, "-c", ENDLESS], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stdout is not None and process.stdout.readline() == "step\n"
+    process.send_signal(signal.SIGINT)
+    _, messages = process.communicate(timeout=30)
+    assert (process.returncode, messages) == (7, "")
+
+
 def test_ctrl_c_ends_the_command_as_it_does_without_python(tmp_path: Path) -> None:
     program = Path(sys.executable).with_name("closecall")
     words = ["campaign", SCENARIO, "-n", "100000", "--sensors", "object", "--no-gate", "--out", str(tmp_path / "out")]
@@ -262,6 +430,12 @@ def test_ctrl_c_ends_the_command_as_it_does_without_python(tmp_path: Path) -> No
     process.send_signal(signal.SIGINT)
     _, messages = process.communicate(timeout=60)
     assert process.returncode == 130 and "SIGINT" in messages and "Traceback" not in messages
+
+
+def test_an_argument_that_is_not_utf_8_is_passed_on(tmp_path: Path) -> None:
+    program = os.fsencode(Path(sys.executable).with_name("closecall"))
+    done = subprocess.run([program, b"check", os.fsencode(tmp_path) + b"/\xff.toml"], capture_output=True, timeout=60)
+    assert done.returncode == 6 and b".toml" in done.stderr
 
 
 def test_exit_codes_of_the_command(tmp_path: Path) -> None:

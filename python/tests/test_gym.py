@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from typing import Any
 
 import gymnasium
@@ -110,6 +112,80 @@ def test_wrong_steps_are_refused() -> None:
     env.reset(seed=1)
     with pytest.raises(cc.SampleError, match="NaN"):
         env.step(float("nan"))
+    with pytest.raises(cc.UsageError, match="reset"):
+        env.step(0.0)
+    env.reset(seed=1)
+    with pytest.raises(cc.UsageError, match=r"shape \(2,\)"):
+        env.step(np.zeros(2))
+    for sample in (-1, 2**64, 0.5):
+        with pytest.raises(cc.UsageError, match="expected a whole number from 0"):
+            env.reset(options={"sample": sample})
+    with pytest.raises(cc.UsageError, match="expected a whole number from 0"):
+        cc.run(SCENARIO, sample=-1)
+    for make in (ccgym.EncounterEnv, ccgym.EncounterVectorEnv):
+        with pytest.raises(cc.UsageError, match="max_tracks: 0 is too few"):
+            make(scenario=SCENARIO, max_tracks=0)
+
+
+def test_an_action_is_a_number_an_array_without_axes_or_one_of_one() -> None:
+    env = ccgym.EncounterEnv(SCENARIO)
+    speeds = []
+    for action in (-0.5, np.float64(-0.5), np.array(-0.5), np.array([-0.5]), [-0.5]):
+        env.reset(seed=1, options={"sample": 0})
+        for _ in range(10):
+            observation = env.step(action)[0]  # type: ignore[arg-type]
+        speeds.append(observation["odometry"][0])
+    assert len(set(speeds)) == 1
+
+
+def test_a_vectorised_run_in_error_goes_on_only_after_a_reset() -> None:
+    envs = ccgym.EncounterVectorEnv(3, SCENARIO)
+    with pytest.raises(cc.UsageError, match="run 0 has ended or not begun: call `reset`"):
+        envs.step(np.zeros((3, 1)))
+    envs.reset(seed=1)
+    with pytest.raises(cc.SampleError, match="NaN"):
+        envs.step(np.array([[0.0], [float("nan")], [0.0]]))
+    with pytest.raises(cc.UsageError, match="run 1 has ended or not begun: call `reset`"):
+        envs.step(np.zeros((3, 1)))
+    envs.reset(seed=1)
+    envs.step(np.zeros((3, 1)))
+    with pytest.raises(cc.UsageError, match=r"expected \(3, 1\)"):
+        envs.step(np.zeros((2, 1)))
+
+
+def test_vectorised_runs_have_the_truth_that_single_ones_have() -> None:
+    envs = gymnasium.make_vec("closecall/Encounter-v0", num_envs=2, scenario=SCENARIO, truth=True)
+    single = ccgym.EncounterEnv(SCENARIO)
+    _, info = envs.reset(seed=1, options={"sample": [3, 4]})
+    _, expected = single.reset(seed=1, options={"sample": 4})
+    for _ in range(20):
+        assert set(info["truth"]) == set(expected["truth"])
+        for name, value in expected["truth"].items():
+            np.testing.assert_equal(info["truth"][name][1], np.nan if value is None else value)
+        info, expected = envs.step(np.zeros((2, 1)))[4], single.step(0.0)[4]
+    without = gymnasium.make_vec("closecall/Encounter-v0", num_envs=2, scenario=SCENARIO, truth=False)
+    assert "truth" not in without.reset(seed=1)[1]
+
+
+FORKED = """
+import os, signal, numpy as np, closecall.gym as ccgym
+
+envs = ccgym.EncounterVectorEnv(4, "low-thw-overtake")
+envs.reset(seed=1, options={"sample": range(4)})
+child = os.fork()
+signal.alarm(40)
+observed = envs.step(np.full((4, 1), -0.5))[0]
+print(float(observed["odometry"].sum()), flush=True)
+if child == 0:
+    os._exit(0)
+print(os.waitpid(child, 0)[1])
+"""
+
+
+def test_a_forked_process_has_threads_of_its_own() -> None:
+    done = subprocess.run([sys.executable, "-c", FORKED], capture_output=True, text=True, timeout=60)
+    first, second, status = done.stdout.split()
+    assert (first == second, status, done.returncode) == (True, "0", 0)
 
 
 def test_vectorised_runs_are_those_of_single_ones() -> None:

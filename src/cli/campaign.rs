@@ -145,8 +145,7 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
     {
         return Ok(ending.print(args.format, &campaign, &progress.tally.summary, args.out.as_deref()));
     }
-    let wall_s = started.elapsed().as_secs_f64();
-    let tally = &progress.tally;
+    let (wall_s, tally) = (started.elapsed().as_secs_f64(), &progress.tally);
     let judged = tally.judgement();
     let report = CampaignReport { manifest: &manifest, works: &campaign.works, tally, judged: &judged };
     match &locked {

@@ -123,8 +123,8 @@ enum Command {
 }
 
 /// Runs the program with these arguments, of which the first is the program's name.
-pub fn main(arguments: Vec<String>) -> ExitCode {
-    set_arguments(arguments.clone());
+pub fn main(arguments: &[std::ffi::OsString]) -> ExitCode {
+    set_arguments(arguments);
     // Messages name their causes themselves. Lines are not wrapped, so that paths can be copied.
     let handler = |_: &_| -> Box<dyn miette::ReportHandler> {
         Box::new(miette::MietteHandlerOpts::new().without_cause_chain().wrap_lines(false).build())
@@ -156,8 +156,8 @@ pub fn main(arguments: Vec<String>) -> ExitCode {
 
 /// Runs a command that another program calls, and returns the exit code of the command line and what it has printed. The first
 /// of the arguments is the program's name.
-pub fn call(session: &Session, arguments: Vec<String>) -> (Result<ExitCode, CliError>, Printed) {
-    session.run(arguments.clone(), || {
+pub fn call(session: &Session, arguments: &[std::ffi::OsString]) -> (Result<ExitCode, CliError>, Printed) {
+    session.run(arguments, || {
         let cli = Cli::try_parse_from(arguments).map_err(|error| CliError::refused(&error.to_string()))?;
         choose_backend(cli.onnxruntime.as_deref());
         dispatch(cli.command)

@@ -68,6 +68,7 @@ impl Ending {
             message: self.message(),
             ending: if let Self::Rule(ending) = self { Some(ending) } else { None },
             samples: [summary.total().samples, campaign.len()],
+            errors: summary.total().errors(),
             kept: out.map(|out| (out, session::arguments())),
         };
         match format {

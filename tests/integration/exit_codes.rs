@@ -52,6 +52,20 @@ fn a_broken_scenario_names_file_line_and_key() {
     assert!(output.stdout.is_empty());
 }
 
+#[cfg(unix)]
+#[test]
+fn an_argument_that_is_not_utf_8_names_a_file_like_any_other() {
+    use std::ffi::OsString;
+    use std::os::unix::ffi::OsStringExt;
+
+    let folder = folder();
+    let none = folder.path().join(OsString::from_vec(b"none\xff.toml".to_vec()));
+    let output = closecall(["check".as_ref(), none.as_os_str()]);
+    assert_eq!(code(&output), 6);
+    let message = message(&output);
+    assert!(message.contains("none\u{fffd}.toml") && !message.contains("panic"), "{message}");
+}
+
 #[test]
 fn a_folder_that_cannot_be_written_is_an_error_before_the_first_sample() {
     let folder = folder();

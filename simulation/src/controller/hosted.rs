@@ -32,14 +32,17 @@ pub struct Registration(String);
 
 impl Drop for Registration {
     fn drop(&mut self) {
-        registry().remove(&self.0);
+        // A factory is dropped without the lock, since its code may wait for another thread.
+        let factory = registry().remove(&self.0);
+        drop(factory);
     }
 }
 
 /// Registers a controller. `name` is `python:NAME` or `python:NAME@VERSION`. A controller of the same name is replaced.
 #[must_use]
 pub fn register(name: &str, factory: Arc<dyn ControllerFactory>) -> Registration {
-    registry().insert(name.to_owned(), factory);
+    let earlier = registry().insert(name.to_owned(), factory);
+    drop(earlier);
     Registration(name.to_owned())
 }
 
