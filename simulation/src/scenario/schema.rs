@@ -74,9 +74,9 @@ fn ranges(schema: &Value) -> BTreeMap<String, Range> {
         actors.retain(|actor| actor.get("id").and_then(toml::Value::as_str) != Some(RECORDED_ACTOR));
     }
     // A pattern in a file has the ranges of a pattern in the scenario.
-    for lidar in document.get_mut("sensors").and_then(toml::Value::as_table_mut).into_iter().flat_map(Table::values_mut)
-    {
-        lidar.as_table_mut().and_then(|lidar| lidar.remove(PATTERN_FILE));
+    let sensors = document.get_mut("sensors").and_then(toml::Value::as_table_mut);
+    for (_, sensor) in sensors.into_iter().flatten() {
+        sensor.as_table_mut().and_then(|sensor| sensor.remove(PATTERN_FILE));
     }
     // The ranges of distributions depend on the other numbers of the same distribution.
     let sampled = ["parameters"];
