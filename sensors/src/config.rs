@@ -56,7 +56,8 @@ pub struct SensorsConfig {
     pub rear_object: ObjectSensorConfig,
     /// The rear LiDAR.
     pub rear_lidar: LidarConfig,
-    /// The LiDAR that looks ahead in place of the radar, in mode `full`. Default: none; the radar looks ahead.
+    /// The LiDAR that looks ahead in place of the radar, in mode `full`. It has no faults yet. Default: none; the radar looks
+    /// ahead.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub front_lidar: Option<LidarConfig>,
     /// The rear camera, whose network classifies each cluster of the rear LiDAR.

@@ -1,9 +1,10 @@
 //! The LiDAR that looks ahead: the chain of the rear LiDAR on a scene turned by half a turn.
 //!
 //! It measures the rears of the vehicles ahead, with their plates. The boxes are classified by their shape alone: no camera looks
-//! ahead. Two things differ from a chain made for this direction. While a vehicle ahead changes lanes, its lateral position is that
+//! ahead. Three things differ from a chain made for this direction. While a vehicle ahead changes lanes, its lateral position is that
 //! of the middle of its rear, up to half a length times the sine of its heading from its centre. The processing allows for what of a
-//! vehicle's *front* may remain unseen.
+//! vehicle's *front* may remain unseen. The tracker takes a vehicle that the ego closes on for one that has to react, and expects a
+//! change of its motion sooner than that of a vehicle ahead.
 
 use closecall_tracking::{TrackList, TrackerModel};
 use closecall_traffic::Source;

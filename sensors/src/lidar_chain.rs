@@ -60,6 +60,8 @@ pub(crate) struct LidarChain {
     /// Scan pattern and range of the LiDAR.
     kind: &'static LidarKind,
     nominal_range_m: f64,
+    /// Range up to which vehicles are expected (m).
+    reach_m: f64,
     /// The nominal range times the transmission of the sensor's window (m).
     clear_range_m: f64,
     /// Number of latest successive scans without a point.
@@ -88,6 +90,7 @@ impl LidarChain {
             lidar: RearLidar::new(lidar),
             kind: lidar.kind,
             nominal_range_m: lidar.nominal_range_m,
+            reach_m: lidar.reach_m(),
             clear_range_m: lidar.nominal_range_m * lidar.window_transmission,
             empty_scans: 0,
             frozen_scans: 0,
@@ -199,7 +202,7 @@ impl LidarChain {
         let due = self.pending.iter_mut().filter(|scan| !scan.is_processed && scan.due_step <= self.step);
         for scan in due {
             scan.is_processed = true;
-            let range_m = if scan.is_missing { 0.0 } else { self.nominal_range_m };
+            let range_m = if scan.is_missing { 0.0 } else { self.reach_m };
             let view = RearView { half_angle_tan: self.kind.half_field_tan, range_m, sensor_x_m };
             let scan =
                 TrackerScan { time: scan.time, road: &scan.road, ego: scan.ego, view, detections: &scan.detections };
@@ -220,7 +223,7 @@ impl LidarChain {
 
     /// Returns the field of view.
     pub(crate) fn field(&self) -> FieldOfView {
-        FieldOfView { half_angle_tan: self.kind.half_field_tan, range_m: self.nominal_range_m }
+        FieldOfView { half_angle_tan: self.kind.half_field_tan, range_m: self.reach_m }
     }
 }
 

@@ -53,7 +53,7 @@ pub(super) struct WatchArgs {
     /// under test
     #[arg(long, value_name = "FILE.csv|FILE.parquet", value_parser = table)]
     pub(super) trace: Option<PathBuf>,
-    /// Write every return of the LiDARs as a table, of the same run: beam, range, position, intensity, time, box and truth
+    /// Write every return of the LiDARs (mode `full`) as a table, of the same run: beam, range, position, intensity, time, box and truth
     #[arg(long, value_name = "FILE.parquet")]
     pub(super) scans: Option<PathBuf>,
 }
@@ -101,7 +101,7 @@ fn run(
 ) -> Result<(Vec<Outcome>, Vec<Film>), CliError> {
     watch.record.as_deref().map(check_recording_possible).transpose()?;
     check_backend_of(scenario, arms)?;
-    let mut tables = RunTables::new(watch.trace.as_deref(), watch.scans.as_deref())?;
+    let mut tables = RunTables::new((scenario, arms.last()), watch.trace.as_deref(), watch.scans.as_deref())?;
     let (mut films, mut outcomes) = (Vec::new(), Vec::new());
     for (index, arm) in arms.iter().enumerate() {
         let is_tested = index + 1 == arms.len();

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use closecall_scenarios::atomic::WriteError;
-use closecall_simulation::{Observer, RunEvent, StepView};
+use closecall_simulation::scenario::Scenario;
+use closecall_simulation::{Arm, Observer, RunEvent, StepView};
 use closecall_traffic::Time;
 
 use crate::{ScanWriter, TraceWriter};
@@ -15,13 +16,18 @@ pub struct RunTables {
 }
 
 impl RunTables {
-    /// Creates the writers of the files, whose extensions give the formats.
+    /// Creates the writers of the files of a run in this arm, whose extensions give the formats.
     ///
     /// # Errors
-    /// [`WriteError`] if an extension is wrong, or if a file cannot be created.
-    pub fn new(trace: Option<&Path>, scans: Option<&Path>) -> Result<Self, WriteError> {
+    /// [`WriteError`] if an extension is wrong, if a file cannot be created, or if scans are requested of an arm without a LiDAR.
+    pub fn new(
+        (scenario, arm): (&Scenario, Option<&Arm>),
+        trace: Option<&Path>,
+        scans: Option<&Path>,
+    ) -> Result<Self, WriteError> {
+        let mode = arm.and_then(|arm| arm.sensors).unwrap_or_else(|| scenario.sensors.mode());
         let trace = trace.map(TraceWriter::new).transpose()?;
-        Ok(Self { trace, scans: scans.map(ScanWriter::new).transpose()? })
+        Ok(Self { trace, scans: scans.map(|path| ScanWriter::new(path, mode)).transpose()? })
     }
 
     /// Writes the files.

@@ -21,6 +21,7 @@ use std::io::{self, Seek};
 use std::path::{Path, PathBuf};
 
 use closecall_scenarios::atomic::{WriteError, check_writable, write_file};
+use closecall_sensors::SensorMode;
 use closecall_sensors::lidar::RearLidar;
 use closecall_simulation::{Observer, RunEvent, StepView};
 use closecall_traffic::Time;
@@ -47,9 +48,14 @@ impl ScanWriter {
     /// Creates a writer of the Parquet file `path`.
     ///
     /// # Errors
-    /// [`WriteError`] if the extension is not `.parquet`, or if no file can be created there.
-    pub fn new(path: &Path) -> Result<Self, WriteError> {
+    /// [`WriteError`] if the sensors of this mode have no LiDAR, if the extension is not `.parquet`, or if no file can be created
+    /// there.
+    pub fn new(path: &Path, mode: SensorMode) -> Result<Self, WriteError> {
         let fail = |error| WriteError::new(path, error);
+        if mode != SensorMode::Full {
+            let message = "the run has no LiDAR, which only sensors of mode `full` have (--sensors full)";
+            return Err(fail(io::Error::new(io::ErrorKind::InvalidInput, message)));
+        }
         if path.extension().is_none_or(|extension| extension != "parquet") {
             return Err(fail(io::Error::new(io::ErrorKind::InvalidInput, "scans are a file *.parquet")));
         }
@@ -63,14 +69,10 @@ impl ScanWriter {
     /// Completes the file.
     ///
     /// # Errors
-    /// [`WriteError`] if the run had no LiDAR, or if the file cannot be written completely. An existing file then stays as it is.
+    /// [`WriteError`] if a scan could not be completed, or if the file cannot be written completely. An existing file then stays as it is.
     pub fn finish(mut self) -> Result<(), WriteError> {
         let path = self.path.clone();
         let fail = |error| WriteError::new(&path, error);
-        if self.frames.iter().all(|(count, _)| *count == 0) {
-            let message = "the run has no LiDAR, which only sensors of mode `full` have (--sensors full)";
-            return Err(fail(io::Error::new(io::ErrorKind::InvalidInput, message)));
-        }
         self.flush();
         if let Some(error) = self.failed {
             return Err(fail(error));
@@ -97,8 +99,13 @@ impl ScanWriter {
         }
         let frame = *count;
         (*count, *latest) = (frame + 1, Some(view.time));
-        // The scan of the simulation has clustered without an error before, and so does the complete one.
-        let Ok(complete) = lidar.completed() else { return };
+        let complete = match lidar.completed() {
+            Ok(complete) => complete,
+            Err(error) => {
+                self.failed.get_or_insert(io::Error::other(error));
+                return;
+            }
+        };
         let actors = &view.scenario.actors;
         let name = |index: usize| actors.get(index).map_or_else(|| index.to_string(), |actor| actor.id.to_string());
         self.rows.append((mounting, frame), &complete, &name);

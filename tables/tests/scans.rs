@@ -21,10 +21,12 @@ fn scenario(sensors: &str) -> Scenario {
 /// Runs the scenario, writes its scans to `path`, and returns the error if there is one.
 fn write(path: &Path, sensors: &str) -> Result<(), String> {
     let scenario = scenario(sensors);
-    let mut tables = RunTables::new(None, Some(path)).map_err(|error| error.to_string())?;
     let arm = Arm { controller: BuiltIn::Acc.factory(), sensors: None };
+    // A wrong request is answered before the run.
+    let mut tables = RunTables::new((&scenario, Some(&arm)), None, Some(path)).map_err(|error| error.to_string())?;
     simulate(&scenario, RunKey { seed: 1, sample: 0 }, &arm, &mut tables).unwrap();
-    tables.finish().map_err(|error| error.to_string())
+    tables.finish().unwrap();
+    Ok(())
 }
 
 /// Returns all rows of a table.
@@ -49,7 +51,7 @@ fn the_points_of_both_lidars_are_read_back_with_beam_range_time_and_truth() {
         let single = |name| column::<Float32Array>(&batch, name);
         let (sensor, source, side) = (text("sensor"), text("source"), text("mirror_side"));
         let (range_m, true_range_m, intensity) = (single("range_m"), single("true_range_m"), single("intensity"));
-        let [azimuth_rad, elevation_rad, x_m] = ["azimuth_rad", "elevation_rad", "x_m"].map(single);
+        let [azimuth_rad, elevation_rad, x_m, y_m] = ["azimuth_rad", "elevation_rad", "x_m", "y_m"].map(single);
         let [beam, of_column, layer] = ["beam", "column", "layer"].map(|name| column::<UInt16Array>(&batch, name));
         let (cluster, frame) = (column::<Int32Array>(&batch, "cluster"), column::<UInt32Array>(&batch, "frame"));
         let (time_s, offset_ns) =
@@ -72,6 +74,10 @@ fn the_points_of_both_lidars_are_read_back_with_beam_range_time_and_truth() {
                     && elevation_rad.value(row).abs() < 0.3
             );
             assert_eq!(x_m.value(row) < 0.0, is_rear, "the rear sensor sees what is behind the ego's origin");
+            // The left of the rear sensor's axis is the right of the ego.
+            let left_m = range_m.value(row) * elevation_rad.value(row).cos() * azimuth_rad.value(row).sin();
+            let y_error_m = y_m.value(row) - if is_rear { -left_m } else { left_m };
+            assert!(y_error_m.abs() < 0.1 + 0.01 * range_m.value(row), "{y_error_m} at {left_m}");
             assert_eq!(side.is_valid(row), is_rear, "the OS1 has no mirror");
             if is_rear && !sides.contains(&side.value(row).to_owned()) {
                 sides.push(side.value(row).to_owned());
@@ -97,6 +103,6 @@ fn a_run_without_a_lidar_and_a_wrong_extension_are_answered() {
     let error = write(&path, "sensors.mode = \"object\"\n").unwrap_err();
     assert!(error.contains("scans.parquet") && error.contains("--sensors full"), "{error}");
     assert!(!path.exists());
-    let error = write(&folder.path().join("scans.pcd"), "").unwrap_err();
+    let error = write(&folder.path().join("scans.pcd"), "sensors.mode = \"full\"\n").unwrap_err();
     assert!(error.contains("*.parquet"), "{error}");
 }

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::list::{Combine, FaultList, check_span};
 use super::object::ObjectFaultConfig;
-use crate::lidar::HALF_FIELD_DEG;
+use crate::lidar::MAX_HALF_FIELD_DEG;
 use closecall_camera::CameraFault;
 
 /// Longest additional latency (s).
@@ -40,7 +40,8 @@ pub struct LidarFaultConfig {
     pub lost_frames: Option<Num>,
     /// Share of points that are lost, regardless of their power (-), in addition to the sensor's own `dropout`. Default: 0.
     pub dropout: Option<Num>,
-    /// Azimuth at which a blocked sector begins (deg): 0 is straight behind, positive is to the ego's left.
+    /// Azimuth at which a blocked sector begins (deg), within the LiDAR's field of view: 0 is straight behind, positive is to the
+    /// ego's left.
     pub blocked_from_deg: Option<Num>,
     /// Azimuth at which the blocked sector ends (deg).
     pub blocked_to_deg: Option<Num>,
@@ -193,7 +194,7 @@ impl LidarFaultConfig {
 
     fn check(&self, parameters: &Parameters) -> Result<(LidarFault, [f64; 2]), ConfigError> {
         let number = |num: &Option<Num>, key, range| parameters.number_or(num.as_ref(), key, range, 0.0);
-        let angle = Range::closed(-HALF_FIELD_DEG, HALF_FIELD_DEG);
+        let angle = Range::closed(-MAX_HALF_FIELD_DEG, MAX_HALF_FIELD_DEG);
         let sector = match (&self.blocked_from_deg, &self.blocked_to_deg) {
             (None, None) => None,
             (Some(from), Some(to)) => {

@@ -68,6 +68,8 @@ pub(crate) struct BoxFit {
     pub(crate) range_m: f64,
     /// Spacing of columns at that distance, across the line of sight (m).
     pub(crate) spacing_m: f64,
+    /// Height up to which the sensor sees at that distance (m).
+    pub(crate) in_view_m: f64,
     /// Spacing of layers, and height of a footprint (rad).
     pub(crate) vertical_rad: [f64; 2],
     /// Least and greatest azimuth of the points about the sensor's axis, positive to the ego's left (rad).
@@ -116,6 +118,7 @@ impl BoxFit {
         fit.azimuth_rad = slopes.map(f64::atan);
         fit.rear_u_m = far;
         fit.range_m = squares.sqrt();
+        fit.in_view_m = scan.resolution.mount_height_m + fit.range_m * scan.resolution.highest_tan;
         fit.spacing_m =
             fit.range_m * column_step_rad(&scan.resolution, 0.5 * (fit.azimuth_rad[0] + fit.azimuth_rad[1]));
         fit.locate_front(nearest.value(), [sin, cos], members, scan);
@@ -139,6 +142,7 @@ impl BoxFit {
             offset_ns: offsets.sum::<f64>() / members.len() as f64,
             range_m: 0.0,
             spacing_m: 0.0,
+            in_view_m: 0.0,
             vertical_rad: [scan.resolution.layer_rad, scan.resolution.footprint_rad],
             azimuth_rad: [0.0; 2],
             truncated: truncated_edges(members, scan),

@@ -51,8 +51,6 @@ const CLASS_MODELS: [ClassModel; 4] = [
         length_m: Gaussian::new(6.0, 10.0),
     },
 ];
-/// Tangent of the elevation of the uppermost layer's upper edge.
-const HIGHEST_TAN: f64 = 0.085;
 /// Distance from which the upper part of a vehicle may be missed entirely (m).
 const LOST_TOP_M: f64 = 100.0;
 /// Distance beyond the road's edge from which only background is expected (m).
@@ -109,9 +107,8 @@ fn width_log(fit: &BoxFit, model: &ClassModel, seen: bool) -> f64 {
 /// Returns the log likelihood of the visible height.
 fn height_log(fit: &BoxFit, model: &ClassModel) -> f64 {
     let Gaussian { mean: height, sd } = model.height_m;
-    let in_view = 0.6 + fit.range_m * HIGHEST_TAN;
     let half_layer = 0.5 * fit.layer_m();
-    let expected = height.min(in_view - half_layer);
+    let expected = height.min(fit.in_view_m - half_layer);
     let sd = sd.hypot(half_layer).hypot(0.1);
     // From afar a single layer may hit the vehicle, and the upper part of a car is glass, which returns little light.
     let lost = height * (fit.range_m / LOST_TOP_M).min(1.0);

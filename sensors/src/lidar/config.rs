@@ -4,6 +4,8 @@ use closecall_traffic::{Check, Choice, ConfigError, Num, Parameters, Problem, Ra
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::ground::REACH_M;
+use super::kind::NOMINAL_RANGE_M;
 use super::{LidarKind, LidarKindConfig, LidarModel};
 use crate::faults::LidarFault;
 
@@ -123,6 +125,17 @@ pub struct Lidar {
 const EXACT_RANGE_M: f64 = 500.0;
 
 impl Lidar {
+    /// Returns half of the horizontal field of view (deg).
+    pub fn half_field_deg(&self) -> f64 {
+        self.kind.half_field_deg
+    }
+
+    /// Returns the range up to which the processing expects vehicles (m): beyond it no point is reported or used.
+    pub(crate) fn reach_m(&self) -> f64 {
+        let max_range_m = if self.is_exact { f64::INFINITY } else { self.kind.max_range_m.into() };
+        self.nominal_range_m.min(max_range_m).min(REACH_M.into())
+    }
+
     /// Returns the LiDAR as it is with this fault, of which the ego does not know.
     pub(crate) fn with_fault(self, fault: &LidarFault) -> Self {
         Self {
@@ -172,7 +185,7 @@ impl Check for LidarConfig {
     fn check(&self, parameters: &Parameters) -> Result<Lidar, ConfigError> {
         let number = |num, key, range| parameters.number(num, key, range);
         let kind = self.kind(parameters)?;
-        let nominal = (self.nominal_range_m.as_ref(), Range::closed(10.0, 500.0));
+        let nominal = (self.nominal_range_m.as_ref(), NOMINAL_RANGE_M);
         Ok(Lidar {
             kind,
             mount_height_m: number(&self.mount_height_m, "mount-height-m", Range::closed(0.2, 2.5))?,

@@ -18,7 +18,7 @@ pub(crate) const GROUND_M: f32 = 0.10;
 /// the footprint, whose near edge returns more light than its far edge.
 pub(crate) const GROUND_SLOPE: f32 = 0.005;
 /// Distance behind the sensor beyond which points are not used (m).
-const REACH_M: f32 = 200.0;
+pub(crate) const REACH_M: f32 = 200.0;
 /// Intensity below which a near return is taken for a droplet. A tyre at 60° still has 0.025. The method is
 /// low-intensity outlier removal after Park et al. 2020, "Fast and accurate desnowing algorithm for LiDAR point
 /// clouds".

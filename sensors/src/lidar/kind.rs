@@ -14,10 +14,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, Normal};
 
-use super::LidarModel;
-use super::pattern::GROUPS;
+use super::pattern::{GROUPS, mirror_bounds_deg};
 use super::power::{NOMINAL_REFLECTIVITY, THRESHOLD_OVER_NOISE};
+use super::{LidarModel, MirrorSide};
 
+/// Height of a sensor of which nothing else is said (m): in the bumper.
+const MOUNT_HEIGHT_M: f64 = 0.6;
 /// Greatest number of layers.
 const MAX_LAYERS: usize = 64;
 /// Greatest elevation of a layer (°).
@@ -26,6 +28,12 @@ const MAX_ELEVATION_DEG: f64 = 45.0;
 const MAX_BEAMS: usize = 65_535;
 /// Greatest difference from a whole number of azimuth steps (steps).
 const STEP_TOLERANCE: f64 = 1e-6;
+/// Greatest half of the horizontal field of view (°).
+pub(crate) const MAX_HALF_FIELD_DEG: f64 = 85.0;
+/// Nominal ranges that the model covers (m).
+pub(crate) const NOMINAL_RANGE_M: Range = Range::closed(10.0, 500.0);
+/// Decimals to which the tangent of the highest elevation that is in view is rounded, as a factor.
+const HIGHEST_DECIMALS: f64 = 1e3;
 /// Decimals to which the tangent of half of the field of view is rounded, as a factor.
 const TANGENT_DECIMALS: f64 = 1e4;
 
@@ -101,6 +109,10 @@ pub(crate) struct Resolution {
     pub(crate) layer_rad: f64,
     /// Height of a footprint (rad).
     pub(crate) footprint_rad: f64,
+    /// Tangent of the elevation up to which both mirror sides see.
+    pub(crate) highest_tan: f64,
+    /// Height of the sensor's centre above the ground (m).
+    pub(crate) mount_height_m: f64,
 }
 
 impl Default for Resolution {
@@ -121,7 +133,9 @@ pub struct LidarKind {
     pub(crate) mirror_cubic_deg: Option<[f64; 4]>,
     /// Azimuth of each column (°).
     pub(crate) azimuths_deg: Vec<f64>,
-    half_field_deg: f64,
+    pub(crate) half_field_deg: f64,
+    /// Finest azimuth step (°).
+    pub(crate) finest_step_deg: f64,
     /// Tangent of half of the field of view.
     pub(crate) half_field_tan: f64,
     pub(crate) beam_width_deg: f64,
@@ -166,6 +180,11 @@ impl LidarKind {
         periods_at(time.ns()) != periods_at(time.ns() - CONTROL_STEP.ns())
     }
 
+    /// Returns the mirror side of the scan that ends at `time`. The sides alternate from scan to scan.
+    pub(crate) fn mirror_side_at(&self, time: Time) -> MirrorSide {
+        if time.ns().div_euclid(self.period_ns) % 2 == 0 { MirrorSide::Plus } else { MirrorSide::Minus }
+    }
+
     /// Returns the time after the scan's start at which a column at this azimuth is measured (s), clamped to the sweep.
     pub(crate) fn sweep_offset_s(&self, azimuth_deg: f64) -> f64 {
         let share = ((azimuth_deg + self.half_field_deg) / (2.0 * self.half_field_deg)).clamp(0.0, 1.0);
@@ -193,7 +212,7 @@ impl LidarKindConfig {
     /// Returns the azimuths of all columns (°).
     fn azimuths_deg(&self) -> Result<Vec<f64>, ConfigError> {
         let step = number(self.azimuth_step_deg, "azimuth-step-deg", Range::closed(0.02, 2.0))?;
-        let half = number(self.half_field_deg, "half-field-deg", Range::closed(5.0, 85.0))?;
+        let half = number(self.half_field_deg, "half-field-deg", Range::closed(5.0, MAX_HALF_FIELD_DEG))?;
         let fine_half =
             number(self.fine_half_field_deg.unwrap_or(0.0), "fine-half-field-deg", Range::closed(0.0, half))?;
         let fine_step =
@@ -240,7 +259,11 @@ impl LidarKindConfig {
             _ => Normal::standard().inverse_cdf(probability),
         };
         let power = 1.0 + above / f64::from(THRESHOLD_OVER_NOISE);
-        Ok(range_m * (power * (NOMINAL_REFLECTIVITY / reflectivity)).sqrt())
+        let nominal_m = range_m * (power * (NOMINAL_REFLECTIVITY / reflectivity)).sqrt();
+        NOMINAL_RANGE_M.check(nominal_m, "range-m").map_err(|_| {
+            let rule = format!("they give a nominal range of {nominal_m:.1} m, but it must be {NOMINAL_RANGE_M}");
+            ConfigError::new("range-m", Problem::Contradiction { other: "range-reflectivity", rule })
+        })
     }
 }
 
@@ -285,6 +308,12 @@ impl Check for LidarKindConfig {
         let fine_step_deg = self.fine_azimuth_step_deg.unwrap_or(self.azimuth_step_deg);
         let beam = Range::closed(0.01, 3.0);
         let spacing_deg = number(self.layer_spacing_deg, "layer-spacing-deg", Range::closed(0.02, 10.0))?;
+        let [least_deg, most_deg] = mirror_bounds_deg(self.mirror_cubic_deg, &azimuths_deg);
+        // The other side of the mirror contributes the opposite.
+        let highest_deg = self
+            .layers_deg
+            .last()
+            .map_or(0.0, |layer_deg| layer_deg + 0.5 * self.beam_height_deg + least_deg.min(-most_deg));
         let resolution = Resolution {
             columns: azimuths_deg.len(),
             layers: self.layers_deg.len(),
@@ -292,6 +321,8 @@ impl Check for LidarKindConfig {
             fine_rad: [self.fine_half_field_deg.unwrap_or(0.0) * degree, fine_step_deg * degree],
             layer_rad: spacing_deg * degree,
             footprint_rad: self.beam_height_deg * degree,
+            highest_tan: (highest_deg.to_radians().tan() * HIGHEST_DECIMALS).round() / HIGHEST_DECIMALS,
+            mount_height_m: MOUNT_HEIGHT_M,
         };
         #[expect(clippy::cast_possible_truncation, reason = "ranges need no more than single precision")]
         let single = |value: f64, key, range| number(value, key, range).map(|value| value as f32);
@@ -303,6 +334,7 @@ impl Check for LidarKindConfig {
             mirror_cubic_deg: self.mirror_cubic_deg,
             azimuths_deg,
             half_field_deg,
+            finest_step_deg: fine_step_deg,
             half_field_tan: (half_field_deg.to_radians().tan() * TANGENT_DECIMALS).round() / TANGENT_DECIMALS,
             beam_width_deg: number(self.beam_width_deg, "beam-width-deg", beam)?,
             beam_height_deg: number(self.beam_height_deg, "beam-height-deg", beam)?,

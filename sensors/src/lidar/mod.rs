@@ -47,6 +47,7 @@ pub use config::{Lidar, LidarConfig};
 pub use detector::Detector;
 #[cfg(test)]
 pub(crate) use detector::FACE_SD_M;
+pub(crate) use kind::MAX_HALF_FIELD_DEG;
 pub use kind::{LidarKind, LidarKindConfig};
 pub use material::Material;
 pub use model::LidarModel;

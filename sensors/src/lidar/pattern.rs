@@ -131,7 +131,13 @@ impl Pattern {
             of_columns.map(|(column, elevations)| CentreLines::new(column, elevations)).collect()
         };
         let centre_lines = elevations.iter().map(of_side).collect();
-        Self { kind, columns, elevations, centre_lines, mirror_bounds_deg: mirror_bounds_deg(kind) }
+        Self {
+            kind,
+            columns,
+            elevations,
+            centre_lines,
+            mirror_bounds_deg: mirror_bounds_deg(kind.mirror_cubic_deg, &kind.azimuths_deg),
+        }
     }
 
     /// Returns the kind of LiDAR.
@@ -208,9 +214,9 @@ impl Pattern {
 const BOUND_STEP_DEG: f64 = 0.001;
 
 /// Returns bounds of the mirror's contribution over the field of view, rounded outward (°).
-fn mirror_bounds_deg(kind: &LidarKind) -> [f64; 2] {
-    let Some(cubic) = kind.mirror_cubic_deg else { return [0.0; 2] };
-    let values = || kind.azimuths_deg.iter().map(|azimuth_deg| cubic_deg(cubic, *azimuth_deg) / BOUND_STEP_DEG);
+pub(crate) fn mirror_bounds_deg(cubic: Option<[f64; 4]>, azimuths_deg: &[f64]) -> [f64; 2] {
+    let Some(cubic) = cubic else { return [0.0; 2] };
+    let values = || azimuths_deg.iter().map(|azimuth_deg| cubic_deg(cubic, *azimuth_deg) / BOUND_STEP_DEG);
     let least = values().fold(f64::INFINITY, f64::min).floor();
     [least * BOUND_STEP_DEG, values().fold(f64::NEG_INFINITY, f64::max).ceil() * BOUND_STEP_DEG]
 }

@@ -4,11 +4,12 @@
 //! sweep crosses the middle of its vehicle. The error is small: the sweep crosses the width of a vehicle in 0.4 ms at
 //! 30 m and in 4 ms at 3 m, and the vehicle moves relative to the ego by millimetres to centimetres in that time.
 
-use closecall_traffic::{CONTROL_STEP, PlanePose, Roadside, Stream, Time};
+use closecall_traffic::{PlanePose, Roadside, Stream, Time};
 use nalgebra::{Isometry3, Point3};
 
 use super::bare_road::{BareRoad, Road, cast_ground};
 use super::cast::{ActiveParts, ColumnHits};
+use super::kind::Resolution;
 use super::material::asphalt;
 use super::noise::Noise;
 use super::pattern::Pattern;
@@ -101,11 +102,6 @@ impl Scanner {
         &self.truth
     }
 
-    /// Returns the mirror side of the scan that ends at `time`. The sides alternate from scan to scan.
-    pub fn mirror_side_at(time: Time) -> MirrorSide {
-        if time.ns().div_euclid(CONTROL_STEP.ns()) % 2 == 0 { MirrorSide::Plus } else { MirrorSide::Minus }
-    }
-
     /// Adds the points that the latest scan leaves out.
     pub fn complete(&mut self) {
         self.repeat(Extent::Complete);
@@ -155,7 +151,7 @@ impl Scanner {
     ) -> &LidarScan {
         let drawn = Noise::draw(rng);
         let noise = if self.lidar.is_exact { drawn.silenced() } else { drawn };
-        let mirror_side = Self::mirror_side_at(scene.time);
+        let mirror_side = self.lidar.kind.mirror_side_at(scene.time);
         let actual = fault.map_or(self.lidar, |fault| self.lidar.with_fault(fault));
         let viewpoint = Viewpoint::new(scene, &actual);
         self.collect_targets(scene, mirror_side, &viewpoint);
@@ -277,7 +273,8 @@ impl Scanner {
         self.clear();
         self.stamp(end);
         self.scan.mirror_side = mirror_side;
-        self.scan.resolution = self.pattern.kind().resolution;
+        let mount_height_m = self.lidar.mount_height_m;
+        self.scan.resolution = Resolution { mount_height_m, ..self.pattern.kind().resolution };
         self.scan.sensor_x_m = pose.sensor_x_m();
     }
 

@@ -13,7 +13,7 @@
 //!   range of the plate, and fades to its edge.
 
 use super::noise::{Noise, Purpose};
-use super::pattern::Pattern;
+use super::pattern::{Elevation, Pattern};
 use super::receiver::{MAX_INTENSITY, SensorPoseEstimate};
 use super::{LaneGeometry, LidarScan, Material, MirrorSide, PointSource, PointTruth, ScanTruth};
 use crate::faults::LidarFault;
@@ -21,14 +21,14 @@ use closecall_traffic::guard_rail::{LEFT_OFFSET_M, RIGHT_OFFSET_M};
 
 /// Number of columns of a burst, from the fewest to the most.
 const BURST_COLUMNS: [usize; 2] = [3, 10];
+/// Number of adjacent layers of a burst: those of a group of detector cells of the SCALA (an assumption for other sensors).
+const BURST_LAYERS: usize = 4;
 /// Least and greatest range of the first point of a burst (m).
 const BURST_RANGE_M: [f32; 2] = [3.0, 150.0];
 /// Greatest change of the range from column to column of a burst (m).
 const BURST_DRIFT_M: f32 = 0.5;
 /// Intensity of a false point, as a reflectivity (assumption: that of a usual surface).
 const FALSE_INTENSITY: f32 = 0.3;
-/// Step between the beams of a halo (deg): the fine azimuth step of the pattern.
-const HALO_STEP_DEG: f64 = 0.125;
 /// Standard deviation of the range of a point of a halo (m).
 const HALO_RANGE_SD_M: f32 = 0.1;
 /// Share of a plate's saturated returns that have a halo point at its centre; it falls linearly to zero at the edge.
@@ -101,9 +101,14 @@ impl Spoiler<'_> {
     }
 
     /// Adds the halos of saturated plates.
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few degrees in steps of an eighth")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a few degrees in steps of at least 0.02"
+    )]
     fn bloom(&self, scan: &LidarScan, truth: &ScanTruth, added: &mut Vec<Added>) {
-        let steps = (self.fault.blooming_deg / HALO_STEP_DEG).floor() as usize;
+        let step_deg = self.pattern.kind().finest_step_deg;
+        let steps = (self.fault.blooming_deg / step_deg).floor() as usize;
         for index in 0..scan.len() {
             let point = truth.points[index];
             if point.material != Material::Plate || scan.intensity[index] < MAX_INTENSITY {
@@ -118,7 +123,7 @@ impl Spoiler<'_> {
                     if f64::from(self.noise.uniform(row, Purpose::Dropout)) >= share {
                         continue;
                     }
-                    let angle = (side * step as f64 * HALO_STEP_DEG).to_radians();
+                    let angle = (side * step as f64 * step_deg).to_radians();
                     let longer =
                         1.0 + HALO_RANGE_SD_M * self.noise.normal(row, Purpose::Range) / point.range_m.max(1.0);
                     added.push(Added {
@@ -179,14 +184,15 @@ impl Spoiler<'_> {
         for burst in 1..=bursts {
             let [fewest, most] = BURST_COLUMNS;
             let length = fewest + (uniform(burst, 1) * (most - fewest + 1) as f32) as usize;
+            let length = length.min(self.pattern.columns.len());
             let first = (uniform(burst, 2) * (self.pattern.columns.len() - length) as f32) as usize;
-            let group = (uniform(burst, 3) * kind.groups() as f32) as usize;
+            let lowest = BURST_LAYERS * (uniform(burst, 3) * kind.layers().div_ceil(BURST_LAYERS) as f32) as usize;
             let mut range_m = BURST_RANGE_M[0] + uniform(burst, 4) * (BURST_RANGE_M[1] - BURST_RANGE_M[0]);
             let drift_m = (2.0 * uniform(burst, 5) - 1.0) * BURST_DRIFT_M;
             for column in first..first + length {
-                let [cos, sin] = self.pattern.columns[column].centre[group];
-                for layer in group * kind.layers_per_group..(group + 1) * kind.layers_per_group {
-                    let [tan, cosine] = elevations_of(column)[layer].centre;
+                for layer in lowest..kind.layers().min(lowest + BURST_LAYERS) {
+                    let Elevation { group, centre: [tan, cosine], .. } = elevations_of(column)[layer];
+                    let [cos, sin] = self.pattern.columns[column].centre[group];
                     let level = range_m * cosine;
                     added.push(Added {
                         at_m: self.pose.ego_frame_point_m([level * cos, level * sin, level * tan]),

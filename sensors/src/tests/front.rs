@@ -56,6 +56,28 @@ fn a_vehicle_ahead_gives_one_track_with_gap_speed_and_lane() {
 }
 
 #[test]
+fn a_vehicle_in_the_left_lane_that_moves_to_the_left_is_not_mirrored() {
+    let (road, environment) = (Road::straight(3), Environment::CLEAR_DAY);
+    let mut perception = perception("front-lidar = {}");
+    let (mut tracks, mut true_y_m) = (Vec::new(), 0.0);
+    for step in 0..75 {
+        let time = Time::from_ns(step * CONTROL_STEP.ns());
+        let ego = with_speed(scene_vehicle(0, VehicleClass::Car, 500.0 + 29.0 * time.s(), OWN_LANE_M), 29.0);
+        true_y_m = 3.0 + 0.4 * time.s();
+        let (s_m, d_m) = (540.0 + 29.0 * time.s(), OWN_LANE_M + true_y_m);
+        let mut lead = with_speed(scene_vehicle(1, VehicleClass::Car, s_m, d_m), 29.0);
+        lead.state.heading_rad = (0.4_f64 / 29.0).atan();
+        let scene = Scene { time, road: &road, environment: &environment, ego, others: &[lead] };
+        tracks = perception.step(&scene).unwrap().to_vec();
+    }
+    tracks.retain(|track| track.source == Source::Front && track.status == TrackStatus::Confirmed);
+    let [track] = tracks.as_slice() else { panic!("{} tracks", tracks.len()) };
+    assert!((track.y_m() - true_y_m).abs() < 0.3, "{} instead of {true_y_m}", track.y_m());
+    assert!((track.vy_mps() - 0.4).abs() < 0.3, "{} m/s", track.vy_mps());
+    assert!(track.lane[0] > 0.9, "{:?}", track.lane);
+}
+
+#[test]
 fn other_kinds_of_lidar_look_ahead_at_their_own_rate() {
     for model in ["os1-64", "pandar-xt-16"] {
         let sensors = format!("front-lidar.model = \"{model}\"");

@@ -7,8 +7,9 @@ use closecall_traffic::{Check, ConfigError, Num, Parameters, Problem, Range, Roa
 use super::intervention::FaultConfig;
 use super::{ScenarioError, ScenarioFile};
 
-/// Refuses faults that cannot act: those of sensors that do not exist in the mode of the scenario, mirror images without guard
-/// rails, and entries that begin when the run has ended.
+/// Refuses faults that cannot act: those of sensors that do not exist in the mode of the scenario, those of a front radar that a
+/// LiDAR replaces, blocked sectors outside of the field of view, mirror images without guard rails, and entries that begin when the
+/// run has ended.
 ///
 /// A scenario with faults both of LiDAR or camera and of the object-level sensor behind is meant for both modes. A mode that the
 /// command line gives is checked by [`ScenarioFile::check_faults_in`].
@@ -19,7 +20,12 @@ pub(super) fn refuse(
     parameters: &Parameters,
 ) -> Result<(), ConfigError> {
     refuse_absent(fault, sensors)?;
+    let half_deg = sensors.full_model().rear_lidar.half_field_deg();
     for (index, of) in fault.rear_lidar.iter().enumerate() {
+        for (end, key) in [(&of.blocked_from_deg, "blocked-from-deg"), (&of.blocked_to_deg, "blocked-to-deg")] {
+            let within = Range::closed(-half_deg, half_deg);
+            parameters.number_or(end.as_ref(), key, within, 0.0).map_err(|error| at("rear-lidar", index, error))?;
+        }
         let share = parameters.number_or(of.rail_ghosts.as_ref(), "rail-ghosts", Range::closed(0.0, 1.0), 0.0);
         if share.map_err(|error| at("rear-lidar", index, error))? > 0.0 && !road.has_guard_rails() {
             let error = contradiction("rail-ghosts", "road.guard-rails", "only guard rails mirror vehicles");
@@ -77,6 +83,12 @@ fn refuse_absent(fault: &FaultConfig, sensors: &Sensors) -> Result<(), ConfigErr
         (has_object && mode != SensorMode::Object && !is_for_both, "rear-object", MODE, object_only),
         (is_truth && !fault.front_radar.is_empty(), "front-radar", MODE, no_sensor),
         (is_truth && !fault.surround.is_empty(), "surround", MODE, no_sensor),
+        (
+            !fault.front_radar.is_empty() && sensors.full_model().front_lidar.is_some() && !is_for_both,
+            "front-radar",
+            "sensors.front-lidar",
+            "a LiDAR looks ahead in place of the radar, and has no faults yet",
+        ),
         (
             has_camera && camera_is_off,
             "rear-camera",
@@ -150,6 +162,13 @@ mod tests {
             (format!("{full}{behind}"), "fault.rear-object", "in mode `object` only"),
             (format!("{truth}{radar}"), "fault.front-radar", "no sensor that can fail"),
             (format!("{truth}{lidar}{behind}"), "fault.rear-lidar", "in mode `full` only"),
+            (format!("{full}sensors.front-lidar = {{}}\n{radar}"), "fault.front-radar", "`sensors.front-lidar`"),
+            (format!("{object}sensors.front-lidar = {{}}\n{radar}"), "fault.front-radar", "`sensors.front-lidar`"),
+            (
+                format!("{full}[[fault.rear-lidar]]\nblocked-from-deg = 60.0\nblocked-to-deg = 70.0\n"),
+                "fault.rear-lidar[0].blocked-to-deg",
+                "from -66.5 to 66.5",
+            ),
             (format!("{full}{is_off}{camera}"), "fault.rear-camera", "`sensors.rear-camera.pipeline`"),
             (format!("{full}{mirrors}"), "fault.rear-lidar[0].rail-ghosts", "`road.guard-rails`"),
             (format!("{object}{behind}from-s = 3000.0\n"), "fault.rear-object[0].from-s", "`duration-s`"),

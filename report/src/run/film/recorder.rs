@@ -32,6 +32,8 @@ const MAX_DENSE_SCANS: usize = 40;
 pub struct FilmRecorder {
     film: Film,
     dense_scan_count: usize,
+    /// Number of new scans to keep next in all phases, and whether to keep the next one of the two phases.
+    due: (usize, bool),
     /// The smallest rear headway in the critical phase so far (s).
     smallest_s: f64,
     /// The index of its frame, with the sensor and what it detected.
@@ -77,7 +79,7 @@ impl FilmRecorder {
             foreword: String::new(),
             settings: Vec::new(),
         };
-        Self { film, dense_scan_count: 0, smallest_s: f64::INFINITY, closest: None }
+        Self { film, dense_scan_count: 0, due: (0, false), smallest_s: f64::INFINITY, closest: None }
     }
 
     /// Completes the film with the outcome of the run.
@@ -108,19 +110,25 @@ impl FilmRecorder {
         let is_dense = is_eventful && self.dense_scan_count < MAX_DENSE_SCANS;
         self.dense_scan_count += usize::from(is_dense);
         // Two successive scans are those of both sides of the mirror.
-        let scan = match (index % SPARSE_SCAN_INTERVAL < 2, is_dense) {
-            (true, _) => Scan::complete(view.perception),
-            (false, true) => Scan::latest(view.perception),
-            (false, false) => None,
+        self.due = (if index.is_multiple_of(SPARSE_SCAN_INTERVAL) { 2 } else { self.due.0 }, self.due.1 || is_dense);
+        // A sensor below the rate of the control loop has no new scan in some steps.
+        let lidar = view.perception.rear_lidar().filter(|lidar| lidar.latest().end == view.time);
+        let (sparse, dense) = lidar.map_or((0, false), |_| std::mem::take(&mut self.due));
+        self.due.0 += sparse.saturating_sub(1);
+        let boxes = view.perception.rear_detections();
+        let scan = match lidar {
+            Some(lidar) if sparse > 0 => Scan::completed(lidar, boxes),
+            Some(lidar) if dense => Some(Scan::of(lidar, boxes)),
+            _ => None,
         };
-        if let Ok(thw_s) = view.margins.thw_rear_s
+        if let Some(lidar) = lidar
+            && let Ok(thw_s) = view.margins.thw_rear_s
             && is_eventful
             && view.phase == Phase::Critical
             && thw_s < self.smallest_s
         {
             self.smallest_s = thw_s;
-            let boxes = || view.perception.rear_detections().to_vec();
-            self.closest = view.perception.rear_lidar().map(|lidar| (index, lidar.clone(), boxes()));
+            self.closest = Some((index, lidar.clone(), boxes.to_vec()));
         }
         scan
     }

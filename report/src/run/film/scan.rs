@@ -1,7 +1,7 @@
 //! One scan of the rear LiDAR as it was measured, with the boxes fitted to its clusters.
 
+use closecall_sensors::Detection;
 use closecall_sensors::lidar::{LidarScan, RearLidar};
-use closecall_sensors::{Detection, Perception};
 
 /// Cluster number of a point that belongs to no cluster.
 pub(crate) const NO_CLUSTER: u8 = u8::MAX;
@@ -17,24 +17,14 @@ pub(crate) struct Scan {
 }
 
 impl Scan {
-    /// Returns the latest scan of these sensors, or `None` if they have no rear LiDAR. It lacks most points of the bare
-    /// road, which the detector discards.
-    pub(super) fn latest(perception: &dyn Perception) -> Option<Self> {
-        Some(Self::of(perception.rear_lidar()?, perception.rear_detections()))
-    }
-
-    /// Returns the latest scan of these sensors with all its points, or `None` if they have no rear LiDAR.
-    pub(super) fn complete(perception: &dyn Perception) -> Option<Self> {
-        Self::completed(perception.rear_lidar()?, perception.rear_detections())
-    }
-
     /// Returns the latest scan of the LiDAR with all its points.
     pub(super) fn completed(lidar: &RearLidar, boxes: &[Detection]) -> Option<Self> {
         // The scan of the simulation has clustered without an error before, and so does the complete one.
         Some(Self::of(&lidar.completed().ok()?, boxes))
     }
 
-    fn of(lidar: &RearLidar, boxes: &[Detection]) -> Self {
+    /// Returns the latest scan of the LiDAR. It lacks most points of the bare road, which the detector discards.
+    pub(super) fn of(lidar: &RearLidar, boxes: &[Detection]) -> Self {
         let points = lidar.latest().clone();
         let mut clusters = vec![NO_CLUSTER; points.len()];
         for detection in 0..lidar.detections().len() {

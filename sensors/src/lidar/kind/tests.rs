@@ -40,6 +40,35 @@ fn a_rate_of_10_hz_gives_10_scans_in_a_second() {
 }
 
 #[test]
+fn the_sides_of_a_mirror_alternate_from_scan_to_scan_at_every_rate() {
+    for rate_hz in [25.0, 20.0, 12.5, 10.0, 3.0] {
+        let kind = checked(|config| config.rate_hz = rate_hz).unwrap();
+        let times = (-50..200).map(|step| CONTROL_STEP * step).filter(|time| kind.is_due(*time));
+        let sides: Vec<_> = times.map(|time| kind.mirror_side_at(time)).collect();
+        assert!(sides.len() > 20 && sides.windows(2).all(|pair| pair[0] != pair[1]), "{rate_hz} Hz: {sides:?}");
+    }
+}
+
+#[test]
+fn the_processing_knows_how_far_and_how_high_a_kind_sees() {
+    let seen = |model: LidarModel| {
+        let lidar = super::super::Lidar {
+            kind: model.kind(),
+            nominal_range_m: model.kind().nominal_range_m,
+            ..Default::default()
+        };
+        (lidar.reach_m(), model.kind().resolution.highest_tan)
+    };
+    let (reach_m, highest_tan) = seen(LidarModel::Scala2);
+    assert_eq!((reach_m.to_bits(), highest_tan.to_bits()), (200.0_f64.to_bits(), 0.085_f64.to_bits()));
+    // 16.6° and 15° with half a footprint; nothing is reported beyond 120 m.
+    let (reach_m, highest_tan) = seen(LidarModel::Os1With64);
+    assert!((reach_m - 100.25).abs() < 0.01 && (highest_tan - 0.299).abs() < 1e-9, "{reach_m} {highest_tan}");
+    let (reach_m, highest_tan) = seen(LidarModel::PandarXt16);
+    assert!((reach_m - 120.0).abs() < 1e-9 && (highest_tan - 0.270).abs() < 1e-9, "{reach_m} {highest_tan}");
+}
+
+#[test]
 fn a_wrong_value_is_answered_with_key_and_allowed_range() {
     let error = checked(|config| config.rate_hz = 30.0).unwrap_err();
     assert_eq!(error, "`rate-hz` is 30, but a number from 1 to 25 is needed");
@@ -53,6 +82,12 @@ fn a_wrong_value_is_answered_with_key_and_allowed_range() {
     assert!(error.contains("1 to 64"), "{error}");
     let error = checked(|config| config.range_probability = f64::NAN).unwrap_err();
     assert!(error.contains("from 0.5 to 0.99"), "{error}");
+    let far = |config: &mut LidarKindConfig| (config.range_m, config.range_reflectivity) = (500.0, 0.01);
+    let error = checked(far).unwrap_err();
+    assert!(
+        error.starts_with("`range-m` contradicts `range-reflectivity`: ") && error.contains("10 to 500"),
+        "{error}"
+    );
     let narrow = |config: &mut LidarKindConfig| {
         (config.azimuth_step_deg, config.fine_half_field_deg, config.fine_azimuth_step_deg) = (0.02, None, None);
     };

@@ -11,7 +11,7 @@ impl Scanner {
     /// precision that clips a ray at one plane after the other. The first two agree to the bit. The third may
     /// differ at edges.
     pub(crate) fn assert_cast_agrees_with_brute_force(&mut self, scene: &Scene<'_>) {
-        let mirror_side = Self::mirror_side_at(scene.time);
+        let mirror_side = self.lidar.kind.mirror_side_at(scene.time);
         self.collect_targets(scene, mirror_side, &Viewpoint::new(scene, &self.lidar));
         self.active.start(&self.targets);
         let (mut hits, mut differ) = (0, 0);

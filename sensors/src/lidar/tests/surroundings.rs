@@ -1,8 +1,43 @@
 //! Occlusion, pitch, spray, fog and guard rails.
 
-use closecall_traffic::VehicleClass;
+use closecall_traffic::{ClassScores, VehicleClass};
 
 use super::*;
+use crate::faults::LidarFault;
+
+#[test]
+fn no_class_counts_as_background_at_any_height_of_the_field_of_view() {
+    for model in LidarModel::ALL {
+        let kind = model.kind();
+        let mut lidar = RearLidar::new(Lidar { kind, nominal_range_m: kind.nominal_range_m, ..Lidar::default() });
+        for class in VehicleClass::ALL {
+            for gap_m in [4.0, 6.0, 10.0] {
+                let mut setup = TestScene::new().with(class, gap_m, 0.0);
+                let found = setup.detect(&mut lidar, 0);
+                let (detection, ..) = first_vehicle_error(&setup, &found).unwrap();
+                let background = detection.class.0[ClassScores::BACKGROUND];
+                assert!(background < 0.5, "{model:?}, {class:?} at {gap_m} m: {background}");
+            }
+        }
+    }
+}
+
+#[test]
+fn bursts_of_another_lidar_fit_into_narrow_and_into_high_patterns() {
+    let mut narrow = LidarKindConfig::parse(LidarModel::Os1With64.file()).unwrap();
+    (narrow.half_field_deg, narrow.azimuth_step_deg) = (6.0, 2.0);
+    let fault = LidarFault { crosstalk: 5.0, ..LidarFault::default() };
+    let setup = TestScene::new();
+    for kind in [narrow.kind().unwrap(), LidarModel::Os1With64.kind()] {
+        let mut lidar = RearLidar::new(Lidar { kind, nominal_range_m: kind.nominal_range_m, ..Lidar::default() });
+        for sample in 0..20 {
+            lidar.scan_with([&setup.scene(), &setup.scene()], &mut random(sample), Some(&fault));
+            // Five bursts of 3 to 10 columns and four layers.
+            let points = count(lidar.truth(), PointSource::False);
+            assert!((60..=200).contains(&points), "{}: {points}", kind.name);
+        }
+    }
+}
 
 #[test]
 fn vehicles_occlude_each_other() {
