@@ -21,8 +21,8 @@ const GRAVITY_MPS2: f64 = 9.81;
 // rear headway. The dense ones lack the bare road: the simulation traces none of it, and to add it costs more than a
 // control step.
 
-/// Number of frames between two kept scans in all phases.
-const SPARSE_SCAN_INTERVAL: usize = 100;
+/// Number of frames between two pairs of kept scans, one of each side of the mirror, in all phases.
+const SPARSE_SCAN_INTERVAL: usize = 200;
 /// Number of frames between two kept scans in the critical and the overtaking phase.
 const DENSE_SCAN_INTERVAL: usize = 5;
 /// Maximum number of dense scans in a film.

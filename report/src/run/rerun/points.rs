@@ -42,11 +42,11 @@ pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<Vec<String>, Rec
     let shade = |scan: &Scan, point: usize| palette::intensity(scan.shade(point));
     let clusters =
         layer(&scans, |scan, point| is_clustered(scan, point).then(|| palette::cluster(scan.clusters[point])));
-    write_layer(writer, "world/ego/lidar/clusters", &times, &clusters)?;
+    write_layer(writer, "world/ego/lidar/clusters", &times, &clusters, true)?;
     let intensity = layer(&scans, |scan, point| is_clustered(scan, point).then(|| shade(scan, point)));
-    write_layer(writer, "world/ego/lidar/intensity", &times, &intensity)?;
+    write_layer(writer, "world/ego/lidar/intensity", &times, &intensity, false)?;
     let rejected = layer(&scans, |scan, point| (!is_clustered(scan, point)).then(|| shade(scan, point)));
-    write_layer(writer, "world/ego/lidar/rejected", &times, &rejected)?;
+    write_layer(writer, "world/ego/lidar/rejected", &times, &rejected, true)?;
     write_boxes(writer, &times, &scans)?;
     Ok(["intensity", "rejected", "boxes"].map(|layer| format!("world/ego/lidar/{layer}")).to_vec())
 }
@@ -90,7 +90,14 @@ fn layer(scans: &[&Scan], colour: impl Fn(&Scan, usize) -> Option<Rgba>) -> Laye
     layer
 }
 
-fn write_layer(writer: &Writer<'_>, entity: &str, times: &[Time], layer: &Layer) -> Result<(), RecordingError> {
+/// Writes a layer, with what the sensor has measured of its points unless another layer has the same ones.
+fn write_layer(
+    writer: &Writer<'_>,
+    entity: &str,
+    times: &[Time],
+    layer: &Layer,
+    is_measured: bool,
+) -> Result<(), RecordingError> {
     writer.write_static(entity, &Points3D::update_fields().with_radii([POINT_RADIUS_M]))?;
     writer.write_rows(entity, times, |range| {
         let first = layer.starts[range.start];
@@ -99,7 +106,8 @@ fn write_layer(writer: &Writer<'_>, entity: &str, times: &[Time], layer: &Layer)
             .with_positions(layer.points_m[first..last].iter().copied())
             .with_colors(layer.colours[first..last].iter().copied())
             .columns(layer.lengths[range.clone()].iter().copied())?;
-        Ok(points.chain(layer.measured(first..last, &layer.lengths[range])?))
+        let measured = if is_measured { Some(layer.measured(first..last, &layer.lengths[range])?) } else { None };
+        Ok(points.chain(measured.into_iter().flatten()))
     })
 }
 
