@@ -12,7 +12,6 @@
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
-use closecall_traffic::suggest::nearest;
 use closecall_traffic::{BodyShape, ConfigError, Plate, Problem, Stream, Vehicle, VehicleClass, VehicleConfig, stream};
 use rand::RngExt;
 use serde::Deserialize;
@@ -144,9 +143,7 @@ impl Fleet {
     /// [`ConfigError`] at `fleet` if there is none.
     fn named(name: &str) -> Result<&'static Self, ConfigError> {
         FLEETS.iter().find(|fleet| fleet.name == name).ok_or_else(|| {
-            let known = || FLEETS.iter().map(|fleet| &*fleet.name);
-            let hint = nearest(name, known()).map(|near| format!("; did you mean `{near}`?")).unwrap_or_default();
-            let allowed = format!("one of the fleets {}{hint}", known().collect::<Vec<_>>().join(", "));
+            let allowed = FLEETS.iter().map(|fleet| &*fleet.name).collect::<Vec<_>>().join(", ");
             ConfigError::new("fleet", Problem::UnknownWord { value: name.to_owned(), allowed })
         })
     }

@@ -51,7 +51,7 @@ fn an_unknown_fleet_is_refused_with_the_known_ones() {
     let config = VehicleConfig { fleet: Some("germani".to_owned()), ..VehicleConfig::typical(VehicleClass::Car) };
     let error = FleetOf::check(&config).unwrap_err().to_string();
     assert!(
-        error.contains("`fleet`") && error.contains("germani") && error.contains("did you mean `germany`"),
+        error.contains("`fleet`") && error.contains("germani") && error.contains("one of germany is needed"),
         "{error}"
     );
 }
