@@ -21,6 +21,7 @@ mod fit;
 mod noise;
 mod perception;
 mod sensor;
+mod target;
 #[cfg(test)]
 mod tests;
 mod visibility;

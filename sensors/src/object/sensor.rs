@@ -11,13 +11,12 @@
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
-use closecall_traffic::{
-    CONTROL_STEP, ClassScores, Environment, Source, Stream, Track, TrackId, Vehicle, VehicleClass,
-};
+use closecall_traffic::{CONTROL_STEP, ClassScores, Environment, Source, Track, Vehicle, VehicleClass};
 
 use super::config::{MAX_LATENCY_STEPS, ObjectSensorModel};
 use super::faulty::Faulty;
 use super::noise::{MeasurementErrors, NoiseKey, TargetNoise};
+use super::target::{Filters, Report, Target};
 use super::visibility::{Direction, Field, Visibility};
 use super::weather::range_in_weather_m;
 use crate::alterations::BACKGROUND;
@@ -41,37 +40,6 @@ use closecall_traffic::ego_frame::EgoFrame;
 const SETTLED_SPEED_SD_MPS: f64 = 1.0;
 /// Share of the nominal range below which a sensor counts as degraded.
 pub(crate) const DEGRADED_SHARE: f64 = 0.5;
-
-/// A track's id and lifecycle, and its filters along and across the road.
-type Filters = (TrackId, Lifecycle, [AxisFilter; 2]);
-
-/// The estimate of one vehicle at the end of one scan, predicted by the latency.
-#[derive(Clone, Copy, Debug)]
-struct Report {
-    id: TrackId,
-    lifecycle: Lifecycle,
-    along: AxisEstimate,
-    across: AxisEstimate,
-}
-
-/// The sensor's state for one vehicle, whether the vehicle is seen or not.
-#[derive(Clone, Debug)]
-struct Target {
-    actor: usize,
-    /// Number of standard deviations by which the range of this vehicle deviates (-).
-    range_deviation: f64,
-    /// Range in this weather (m).
-    range_m: f64,
-    noise: TargetNoise,
-    /// The track's id and lifecycle, and its filters along and across the road; `None` without a track.
-    filters: Option<Filters>,
-    /// Ring buffer of the latest reports; the index is the step modulo the length.
-    reports: [Option<Report>; MAX_LATENCY_STEPS + 1],
-    /// The latest filters, in the same order, if the sensor has faults: a latency that changes predicts them by their own age.
-    history: Vec<Option<Filters>>,
-    /// Decides which measurements a fault loses; drawn from in each step if the sensor has faults.
-    fault_rng: Option<Stream>,
-}
 
 /// The input of one scan.
 #[derive(Clone, Copy, Debug)]

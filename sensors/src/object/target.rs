@@ -1,0 +1,39 @@
+//! What an object-level sensor keeps for one vehicle.
+
+use closecall_tracking::axis::{AxisEstimate, AxisFilter};
+use closecall_tracking::lifecycle::Lifecycle;
+use closecall_traffic::{Stream, TrackId};
+
+use super::config::MAX_LATENCY_STEPS;
+use super::noise::TargetNoise;
+
+/// A track's id and lifecycle, and its filters along and across the road.
+pub(super) type Filters = (TrackId, Lifecycle, [AxisFilter; 2]);
+
+/// The estimate of one vehicle at the end of one scan, predicted by the latency.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Report {
+    pub(super) id: TrackId,
+    pub(super) lifecycle: Lifecycle,
+    pub(super) along: AxisEstimate,
+    pub(super) across: AxisEstimate,
+}
+
+/// The sensor's state for one vehicle, whether the vehicle is seen or not.
+#[derive(Clone, Debug)]
+pub(super) struct Target {
+    pub(super) actor: usize,
+    /// Number of standard deviations by which the range of this vehicle deviates (-).
+    pub(super) range_deviation: f64,
+    /// Range in this weather (m).
+    pub(super) range_m: f64,
+    pub(super) noise: TargetNoise,
+    /// The track's id and lifecycle, and its filters along and across the road; `None` without a track.
+    pub(super) filters: Option<Filters>,
+    /// Ring buffer of the latest reports; the index is the step modulo the length.
+    pub(super) reports: [Option<Report>; MAX_LATENCY_STEPS + 1],
+    /// The latest filters, in the same order, if the sensor has faults: a latency that changes predicts them by their own age.
+    pub(super) history: Vec<Option<Filters>>,
+    /// Decides which measurements a fault loses; drawn from in each step if the sensor has faults.
+    pub(super) fault_rng: Option<Stream>,
+}
