@@ -17,12 +17,12 @@ from typing import Any
 import pyarrow
 import pyarrow.parquet
 import pytest
-from helpers import SCENARIO, command
+from support import SCENARIO, command
 
 import closecall as cc
 from closecall._controller import registered
 
-from acc import Acc  # isort: skip (helpers finds the examples)
+from acc import Acc  # isort: skip (support finds the examples)
 
 
 def sha256(file: Path) -> str:

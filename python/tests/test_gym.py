@@ -10,12 +10,12 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
-from helpers import SCENARIO
+from support import SCENARIO
 
 import closecall as cc
 import closecall.gym as ccgym
 
-from acc import Acc  # isort: skip (helpers finds the examples)
+from acc import Acc  # isort: skip (support finds the examples)
 
 
 def test_gymnasium_accepts_the_environment(recwarn: pytest.WarningsRecorder) -> None:

@@ -9,7 +9,7 @@ import pandas
 import polars
 import pyarrow
 import pytest
-from helpers import SCENARIO, command
+from support import SCENARIO, command
 
 import closecall as cc
 
