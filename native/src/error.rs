@@ -1,0 +1,89 @@
+//! The reasons for which a library or an FMU cannot be used.
+
+use std::io;
+
+/// The reason for which a library or an FMU cannot be used as a controller.
+#[derive(Debug, thiserror::Error)]
+pub enum LoadError {
+    /// The file cannot be read.
+    #[error("failed to read {path}: {source}")]
+    Read {
+        /// The file.
+        path: String,
+        /// The reason of the system.
+        source: io::Error,
+    },
+    /// The file is no shared library.
+    #[error("{path} is not a shared library: {reason}; expected one for {own}")]
+    NotALibrary {
+        /// The file.
+        path: String,
+        /// What it is, or what is wrong.
+        reason: String,
+        /// The platform of this program.
+        own: String,
+    },
+    /// The library is for another platform.
+    #[error("{path} is a library for {found}; expected one for {own}")]
+    Platform {
+        /// The file.
+        path: String,
+        /// Its platform.
+        found: String,
+        /// The platform of this program.
+        own: String,
+    },
+    /// The library lacks a function.
+    #[error("{path} does not export {}; {}", listed(missing), exported(found))]
+    Symbol {
+        /// The file.
+        path: String,
+        /// The missing functions.
+        missing: Vec<String>,
+        /// The functions of the interface, or others, that it exports.
+        found: Vec<String>,
+    },
+    /// The library has another version of the interface.
+    #[error(
+        "{path} has version {found} of the interface, this is version {own}: build it again with the header of this program"
+    )]
+    Abi {
+        /// The file.
+        path: String,
+        /// The version of the library.
+        found: u32,
+        /// The version of this program.
+        own: u32,
+    },
+    /// The system's loader refuses the library.
+    #[error("failed to load {path}: {reason}")]
+    Loader {
+        /// The file.
+        path: String,
+        /// The reason of the loader.
+        reason: String,
+    },
+    /// The FMU cannot be used.
+    #[error("{path}: {reason}")]
+    Fmu {
+        /// The file.
+        path: String,
+        /// What is wrong, and what is expected.
+        reason: String,
+    },
+}
+
+impl LoadError {
+    /// Returns true if the file cannot be read.
+    pub const fn is_io(&self) -> bool {
+        matches!(self, Self::Read { .. })
+    }
+}
+
+fn listed(names: &[String]) -> String {
+    names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
+}
+
+fn exported(found: &[String]) -> String {
+    if found.is_empty() { "it exports nothing".to_owned() } else { format!("it exports {}", listed(found)) }
+}

@@ -1,0 +1,36 @@
+//! Ego controllers that are shared libraries (`lib:PATH`) or functional mock-up units (`fmu:PATH`).
+//!
+//! ```text
+//!  EgoInput ─▶ Input ─▶ library: closecall_controller_step     ─▶ Answer ─▶ EgoCommand
+//!                   └─▶ FMU: set inputs, doStep, get outputs ─┘
+//! ```
+//!
+//! * [`Loaded`] is a library or an FMU that this process has loaded, and creates a controller for each run.
+//! * [`NativeController`] adapts such a controller to the closed loop.
+//! * [`bridge`] serves one as a process that speaks the protocol of external processes.
+//! * [`watch`] ends a process whose controller does not answer.
+//!
+//! The code of a library can do anything to the process that loads it. So this crate is used in worker processes, and the
+//! program that starts them learns of a crash from their end.
+//!
+//! `include/closecall_controller.h` is the interface of a library. The interface of an FMU is the Functional Mock-up Interface
+//! for co-simulation, versions 2.0 and 3.0 (<https://fmi-standard.org>).
+
+pub mod abi;
+mod arithmetic;
+pub mod bridge;
+mod controller;
+pub mod cost;
+mod error;
+mod exchange;
+mod fmu;
+mod library;
+mod loaded;
+mod platform;
+pub mod watch;
+
+pub use controller::NativeController;
+pub use error::LoadError;
+pub use exchange::{Answer, Input, Setup};
+pub use fmu::{Given, VariableTable};
+pub use loaded::{Identity, Kind, Loaded, Variables, unload_all};

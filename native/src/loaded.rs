@@ -1,0 +1,133 @@
+//! Libraries and FMUs that this process has loaded.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::error::LoadError;
+use crate::exchange::{Answer, Input, Setup};
+use crate::fmu::{Fmu, VariableTable};
+use crate::library::Library;
+
+/// The kind of a controller that is a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// A shared library: `lib:PATH`.
+    Lib,
+    /// A functional mock-up unit: `fmu:PATH`.
+    Fmu,
+}
+
+impl Kind {
+    /// All kinds.
+    pub const ALL: [Self; 2] = [Self::Lib, Self::Fmu];
+
+    /// Returns the prefix of the names on the command line.
+    pub const fn prefix(self) -> &'static str {
+        match self {
+            Self::Lib => "lib",
+            Self::Fmu => "fmu",
+        }
+    }
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.prefix())
+    }
+}
+
+/// What a controller states about itself.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Identity {
+    /// Its name.
+    pub name: Option<String>,
+    /// Its version.
+    pub version: Option<String>,
+}
+
+/// What a scenario says of the variables of an FMU.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Variables {
+    /// The names of its table.
+    pub table: VariableTable,
+    /// The settings of the ego stack.
+    pub settings: Value,
+}
+
+/// A controller that drives one run.
+pub(crate) trait Run: Send {
+    /// Returns the answer to a control step, or why there is none.
+    fn step(&mut self, input: &Input) -> Result<Answer, String>;
+}
+
+/// A library or an FMU that this process has loaded.
+#[derive(Clone, Debug)]
+pub struct Loaded(Inner);
+
+#[derive(Clone, Debug)]
+enum Inner {
+    Library(Arc<Library>),
+    Fmu(Arc<Fmu>),
+}
+
+/// What this process has loaded. A library stays loaded until the end of the process.
+static LOADED: Mutex<BTreeMap<(Kind, PathBuf), Loaded>> = Mutex::new(BTreeMap::new());
+
+/// Forgets what this process has loaded, at its end: the folders of FMUs are removed.
+pub fn unload_all() {
+    let loaded = std::mem::take(&mut *LOADED.lock().unwrap_or_else(PoisonError::into_inner));
+    drop(loaded);
+}
+
+impl Loaded {
+    /// Loads a library or an FMU, once for each process. This runs code of the file: only a process that may crash does so.
+    ///
+    /// # Errors
+    /// [`LoadError`] if the file cannot be used.
+    pub fn open(kind: Kind, path: &Path) -> Result<Self, LoadError> {
+        let mut loaded = LOADED.lock().unwrap_or_else(PoisonError::into_inner);
+        let key = (kind, path.to_owned());
+        if let Some(found) = loaded.get(&key) {
+            return Ok(found.clone());
+        }
+        let found = match kind {
+            Kind::Lib => Self(Inner::Library(Arc::new(Library::load(path)?))),
+            Kind::Fmu => Self(Inner::Fmu(Arc::new(Fmu::load(path)?))),
+        };
+        loaded.insert(key, found.clone());
+        Ok(found)
+    }
+
+    /// Returns what the controller states about itself.
+    pub fn identity(&self) -> Identity {
+        match &self.0 {
+            Inner::Library(library) => library.identity().clone(),
+            Inner::Fmu(fmu) => fmu.identity(),
+        }
+    }
+
+    /// Checks that every variable of an FMU has its counterpart.
+    ///
+    /// # Errors
+    /// The variable that has none, and those that exist.
+    pub fn check(&self, variables: &Variables) -> Result<(), String> {
+        match &self.0 {
+            Inner::Library(_) => Ok(()),
+            Inner::Fmu(fmu) => fmu.check(&variables.table, &Setup::of_settings(&variables.settings)),
+        }
+    }
+
+    /// Creates a controller for one run, or returns why there is none. `table` names the variables of an FMU.
+    pub(crate) fn start(&self, setup: &Setup, table: &VariableTable) -> Result<Box<dyn Run>, String> {
+        match &self.0 {
+            Inner::Library(library) => Ok(Box::new(library.start(setup)?)),
+            Inner::Fmu(fmu) => Ok(Box::new(fmu.start(setup, table)?)),
+        }
+    }
+}
