@@ -5,7 +5,7 @@ use super::hash::split;
 use super::light::Illumination;
 use super::mesh::{Mesh, Surface, Texture, Vec3, add_scaled, cross, dot, each, normalised, sub};
 use super::pinhole::Lens;
-use super::raster::{ScreenTriangle, project};
+use super::raster::{Projection, ScreenTriangle, project};
 
 /// Number of moments within one exposure at which the scene is sampled, once per pixel each. The mean over these
 /// samples blurs moving objects and smooths edges (Haeberli and Akeley, *The accumulation buffer*, 1990).
@@ -100,6 +100,8 @@ pub(crate) fn add_body(
         };
         faces.push(Shade { radiance, texture: face.surface.texture, map, offset, instance: placement.instance });
     }
+    let lens = shading.lens;
+    let projection = Projection { focal_px: lens.focal_px as f32, optics: &lens.optics };
     let mut camera = vec![[0.0; 3]; mesh.vertices.len()];
     for (moment, triangles) in moments.iter_mut().enumerate() {
         let delay_s = f64::from(shading.light.exposure_s) * moment_offset(moment);
@@ -108,10 +110,13 @@ pub(crate) fn add_body(
         let at = shift.map(|part| part as f32);
         for (to, from) in camera.iter_mut().zip(&mesh.vertices) {
             *to = transform_point(&transform.camera_rotation, at, *from);
+            if lens.readout_s > 0.0 {
+                *to = lens.when_read(to.map(f64::from), placement.velocity).map(|part| part as f32);
+            }
         }
         for (index, face) in mesh.faces.iter().enumerate() {
             let corners = face.corners.map(|corner| camera[usize::from(corner)]);
-            project(corners, shading.lens.focal_px as f32, (first + index) as u32, triangles);
+            project(corners, projection, (first + index) as u32, triangles);
         }
     }
 }

@@ -4,6 +4,8 @@ use closecall_traffic::{Check, Choice, ConfigError, Num, Parameters, Range};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::optics::{LensConfig, Optics};
+
 /// The processing of the camera's image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -51,6 +53,14 @@ pub struct CameraConfig {
     pub exposure_ev: Num,
     /// Position of the sun.
     pub sun: SunConfig,
+    /// The lens.
+    pub lens: LensConfig,
+    /// Time from the reading of the first row of the image to that of the last (s): 0 for a global shutter, 0.01 to 0.03 for a
+    /// rolling one.
+    pub readout_s: Num,
+    /// Brightness of the night sky, relative to the sky over a town, which the default shows (0 to 1). Far from towns it is about
+    /// 0.03: 0.2 instead of 7 mcd/m².
+    pub night_sky: Num,
 }
 
 impl Default for CameraConfig {
@@ -64,6 +74,9 @@ impl Default for CameraConfig {
             dirt: Num::Fixed(0.05),
             exposure_ev: Num::Fixed(0.0),
             sun: SunConfig::default(),
+            lens: LensConfig::default(),
+            readout_s: Num::Fixed(0.0),
+            night_sky: Num::Fixed(1.0),
         }
     }
 }
@@ -96,6 +109,14 @@ pub struct Camera {
     pub exposure_ev: f64,
     /// Position of the sun.
     pub sun: Sun,
+    /// The lens.
+    pub optics: Optics,
+    /// Time from the reading of the first row of the image to that of the last (s).
+    pub readout_s: f64,
+    /// Brightness of the night sky, relative to the sky over a town (0 to 1): a natural sky has 0.17 to 0.25 mcd/m² (F. Falchi et
+    /// al., *The new world atlas of artificial night sky brightness*, Science Advances 2016; A. Jechow et al., arXiv:1807.10593),
+    /// and that over a town 7 mcd/m² and more, the end of the scale of that atlas.
+    pub night_sky: f64,
 }
 
 impl Check for CameraConfig {
@@ -117,6 +138,9 @@ impl Check for CameraConfig {
                 azimuth_rad: number(&self.sun.azimuth_rad, "azimuth-rad", -half_turn, half_turn).map_err(sun)?,
                 elevation_rad: number(&self.sun.elevation_rad, "elevation-rad", 0.0, half_turn / 2.0).map_err(sun)?,
             },
+            optics: self.lens.check(parameters).map_err(|error| error.within("lens"))?,
+            readout_s: number(&self.readout_s, "readout-s", 0.0, 0.1)?,
+            night_sky: parameters.number(&self.night_sky, "night-sky", Range::UNIT)?,
         })
     }
 }

@@ -170,7 +170,11 @@ impl Frame {
             glow.add_to(at, &mut light);
         }
         let glare = glow::sun(direction, &self.light);
-        let radiance = self.window.transmitted(pixel, each(|i| light[i] + glare[i]), &self.light);
+        let mut radiance = self.window.transmitted(pixel, each(|i| light[i] + glare[i]), &self.light);
+        if self.lens.optics.vignetting > 0.0 {
+            let kept = self.lens.optics.transmitted(length);
+            radiance = radiance.map(|part| part * kept);
+        }
         self.window.encode(pixel, radiance, &self.light)
     }
 
@@ -182,7 +186,11 @@ impl Frame {
             let position = (pixel[axis] * SUBPIXEL_STEPS + subpixel[axis]) as f32 / steps;
             (position - f32::from(extent) / 2.0) / focal
         };
-        let [x, y] = [part(0, WIDTH_PX), part(1, HEIGHT_PX)];
+        let mut at = [part(0, WIDTH_PX), part(1, HEIGHT_PX)];
+        if !self.lens.optics.is_straight() {
+            at = self.lens.optics.undistorted(at.map(f64::from)).map(|part| part as f32);
+        }
+        let [x, y] = at;
         ([x, y], (x * x + y * y + 1.0).sqrt())
     }
 
@@ -209,10 +217,16 @@ impl Frame {
         if slope * GROUND_TO_M < -height {
             let depth = -height / direction[2];
             let at = [direction[0] * depth, direction[1] * depth];
-            let radiance = self.ground.radiance(at, self.travelled_m[moment], &self.light, patches);
+            let travelled_m = self.travelled_m[moment] + self.travelled_at(pixel[1]);
+            let radiance = self.ground.radiance(at, travelled_m, &self.light, patches);
             return (self.through_air(radiance, depth * length), 1.0 / depth);
         }
         (sky::radiance(slope, -direction[1] / direction[0] + self.ego_yaw_rad, &self.light), 0.0)
+    }
+
+    /// Returns the distance that the ego has moved when a row of the image is read, relative to the middle row (m).
+    fn travelled_at(&self, row: i32) -> f32 {
+        (self.ego_speed_mps * self.lens.read_after_s(f64::from(row) + 0.5)) as f32
     }
 
     fn through_air(&self, radiance: Vec3, distance_m: f32) -> Vec3 {

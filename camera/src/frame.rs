@@ -17,7 +17,7 @@ use super::glow::Glow;
 use super::ground::{BEAM_M, CONTACT_SHADOW_M, Ground, LONGEST_SHADOW_M, Patch, PatchKind};
 use super::hash::{mix, normal3};
 use super::light::Illumination;
-use super::mesh::{Emission, Mesh};
+use super::mesh::{Emission, Mesh, Vec3};
 use super::pinhole::{GroundBox, Lens, PixelRect};
 use super::raster::{SUBPIXEL_STEPS, ScreenTriangle, Visibility};
 use super::spray::{self, Cloud};
@@ -58,6 +58,8 @@ pub struct Frame {
     pub(super) subpixel: [[i32; 2]; MOMENTS],
     /// Distance that the ego has moved along s at each moment, relative to the middle of the exposure (m).
     pub(super) travelled_m: [f32; MOMENTS],
+    /// Speed of the ego (m/s).
+    pub(super) ego_speed_mps: f64,
     /// Yaw of the ego in the plane (rad).
     pub(super) ego_yaw_rad: f32,
     pub(super) lists: FrameBuffers,
@@ -121,6 +123,7 @@ impl Frame {
             subpixel: shaken_offsets(camera, &light, &lens, key),
             travelled_m: [0, 1, 2, 3].map(|moment| (ego.speed_mps * moment_offset(moment)) as f32 * light.exposure_s),
             light,
+            ego_speed_mps: ego.speed_mps,
             ego_yaw_rad: yaw as f32,
             lists,
         };
@@ -128,6 +131,7 @@ impl Frame {
             frame.add_vehicle(scene, vehicle, u16::try_from(index + 1).unwrap_or(0), regions);
         }
         frame.add_roadside(scene, s_m, regions);
+        frame.add_ghosts_of_the_sun();
         let own = spray::clouds_behind(
             &scene.ego,
             scene,
@@ -180,7 +184,7 @@ impl Frame {
             self.window.noise_key,
         );
         self.add_clouds(clouds);
-        let bounds = self.bounds_of(&body);
+        let bounds = self.bounds_of(&self.while_read(&placement, body));
         let lamps_matter = self.light.is_dark() && bounds.is_some();
         let is_wanted =
             bounds.is_some_and(|bounds| regions.iter().any(|region| touches(&bounds, &bounds_of_rect(region))));
@@ -211,6 +215,9 @@ impl Frame {
             anchor.state = closecall_traffic::VehicleState { s_m: body.s_m, d_m: body.d_m, ..Default::default() };
             let (at, heading) = self.lens.pose_in_ground(scene, &anchor);
             let [half_length, half_width, height_m] = body.extent_m.map(f64::from);
+            let (sin, cos) = heading.sin_cos();
+            let velocity = [-scene.ego.state.speed_mps, 0.0];
+            let placement = Placement { at, turn: [cos, sin], pitch_rad: 0.0, velocity, instance: 0 };
             let around = GroundBox {
                 x_m: at[0],
                 y_m: at[1],
@@ -219,13 +226,10 @@ impl Frame {
                 width_m: 2.0 * half_width,
                 height_m,
             };
-            let Some(bounds) = self.bounds_of(&around) else { continue };
+            let Some(bounds) = self.bounds_of(&self.while_read(&placement, around)) else { continue };
             if !regions.iter().any(|region| touches(&bounds, &bounds_of_rect(region))) {
                 continue;
             }
-            let (sin, cos) = heading.sin_cos();
-            let velocity = [-scene.ego.state.speed_mps, 0.0];
-            let placement = Placement { at, turn: [cos, sin], pitch_rad: 0.0, velocity, instance: 0 };
             self.add_object(&body.mesh(), &placement, [false; 2], bounds);
         }
     }
@@ -284,22 +288,55 @@ impl Frame {
             let [x, y, z] = lamp.at.map(f64::from);
             let ground = [placement.at[0] + cos * x - sin * y, placement.at[1] + sin * x + cos * y];
             let radiance = self.light.emitted_radiance(lamp.emission, |is_left| indicators[usize::from(!is_left)]);
-            let camera = self.lens.in_camera([ground[0], ground[1], z]);
+            let mut camera = self.lens.in_camera([ground[0], ground[1], z]);
+            if self.lens.readout_s > 0.0 {
+                camera = self.lens.when_read(camera, placement.velocity);
+            }
             if camera[2] < 1.0 || radiance[0] <= 0.0 {
                 continue;
             }
             let project = |point: [f64; 3]| self.lens.pixel(point).map(|x| x as f32);
             let left = self.light.transmission(camera[2] as f32);
             let strength = if lamp.emission == Emission::Headlamp { 1.0 } else { 0.15 };
-            let halo =
-                Glow::halo(project(camera), camera[2] as f32, facing as f32, radiance.map(|x| x * left * strength));
+            let at_px = project(camera);
+            let halo = Glow::halo(at_px, camera[2] as f32, facing as f32, radiance.map(|x| x * left * strength));
             self.lists.glows.push((halo.bounds(), halo));
             let mirrored = self.lens.in_camera([ground[0], ground[1], -z]);
             if self.light.wetness > 0.0 && mirrored[2] > 1.0 {
                 let streak = Glow::streak(project(mirrored), &halo, self.light.wetness);
                 self.lists.glows.push((streak.bounds(), streak));
             }
+            if lamp.emission == Emission::Headlamp {
+                let irradiance = self.light.headlamp_irradiance(camera[2] as f32, facing as f32) * left;
+                self.add_ghosts(at_px, [irradiance; 3]);
+            }
         }
+    }
+
+    /// Adds the ghosts of a source of light at a position in the image (px), which illuminates the lens so much.
+    fn add_ghosts(&mut self, source_px: [f32; 2], irradiance: Vec3) {
+        let reflectance = self.lens.optics.surface_reflectance as f32;
+        if reflectance > 0.0 {
+            let ghosts = Glow::ghosts(source_px, irradiance.map(|part| part * reflectance * reflectance));
+            self.lists.glows.extend(ghosts.map(|ghost| (ghost.bounds(), ghost)));
+        }
+    }
+
+    fn add_ghosts_of_the_sun(&mut self) {
+        let towards = self.lens.direction_in_camera(self.light.to_sun.map(f64::from));
+        if self.light.sun[0] > 0.0 && towards[2] > 0.0 {
+            let at_px = self.lens.pixel(towards).map(|part| part as f32);
+            // The light of the sun is that of a white surface facing it, which is matt: its radiance is E/π.
+            self.add_ghosts(at_px, self.light.sun.map(|part| std::f32::consts::PI * part));
+        }
+    }
+
+    /// Returns a box around all places at which a body is while a rolling shutter reads the image.
+    fn while_read(&self, placement: &Placement, body: GroundBox) -> GroundBox {
+        let ([x, y], [cos, sin]) = (placement.velocity, placement.turn);
+        let [along_m, across_m] =
+            [x * cos + y * sin, y * cos - x * sin].map(|speed_mps| speed_mps.abs() * self.lens.readout_s);
+        GroundBox { length_m: body.length_m + along_m, width_m: body.width_m + across_m, ..body }
     }
 
     /// Returns the bounds in the image of a box given in the ground frame, never too small. Returns `None` if the box

@@ -6,18 +6,23 @@
 
 use super::light::Illumination;
 use super::mesh::{Vec3, dot};
+use super::pinhole::{FOCAL_PX, HEIGHT_PX, WIDTH_PX};
 
 /// Cosine of the angle to the sun within which glare is visible: about 53°.
 const GLARE_FROM_COSINE: f32 = 0.6;
 
-/// A halo or a streak in the image.
+/// Places of the ghosts, as a multiple of the source's distance to the middle of the image, and their radii (px): an assumption,
+/// because each lens has its own. Ghosts are the sharper the nearer the second reflection is to a focus.
+const GHOSTS: [[f32; 2]; 3] = [[-0.5, 60.0], [-1.1, 36.0], [0.35, 90.0]];
+
+/// A halo, a streak or a ghost in the image.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Glow {
     /// Centre (px).
     pub(crate) centre_px: [f32; 2],
     /// Horizontal and vertical radius, beyond which there is no light (px).
     pub(crate) reach_px: [f32; 2],
-    /// Sharpness of the peak in the middle, dimensionless: 0 for a streak, which has none.
+    /// Sharpness of the peak in the middle, dimensionless: 0 for streaks and ghosts, which have none.
     pub(crate) peak: f32,
     /// Radiance in the centre.
     pub(crate) radiance: Vec3,
@@ -45,6 +50,20 @@ impl Glow {
         let [side, _] = halo.reach_px;
         let reach_px = [0.16 * side, 0.9 * side];
         Self { centre_px, reach_px, peak: 0.0, radiance: halo.radiance.map(|x| x * 0.5 * wetness) }
+    }
+
+    /// Returns the ghosts of a source at a position in the image (px): light that two surfaces of the lens have reflected appears
+    /// again on the line through the middle of the image. `irradiance` is what all of it would bring to the lens.
+    pub(crate) fn ghosts(source_px: [f32; 2], irradiance: Vec3) -> [Self; GHOSTS.len()] {
+        let middle = [WIDTH_PX, HEIGHT_PX].map(|extent| f32::from(extent) / 2.0);
+        GHOSTS.map(|[place, radius_px]| {
+            let centre_px = [0, 1].map(|axis| middle[axis] + place * (source_px[axis] - middle[axis]));
+            let radius = radius_px / FOCAL_PX as f32;
+            // The falloff of `add_to` without a peak has a third of the flux of a uniform disc.
+            let solid_angle = std::f32::consts::PI * radius * radius / 3.0;
+            let radiance = irradiance.map(|part| part / solid_angle);
+            Self { centre_px, reach_px: [radius_px; 2], peak: 0.0, radiance }
+        })
     }
 
     /// Returns the bounds `[left, top, right, bottom]` of the glow in the image (px).

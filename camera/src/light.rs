@@ -138,13 +138,14 @@ impl Illumination {
         let overcast = |clear_value: f32, grey_value: f32| grey_value + (clear_value - grey_value) * clear;
         let extinction_per_m =
             KOSCHMIEDER / environment.visibility_m + rain_db_per_km(environment) * PER_METRE_OF_DB_PER_KM;
+        let night_sky = if environment.light == Light::Night { camera.night_sky as f32 } else { 1.0 };
         let brake = if ego.brake_light { BRAKE_LIGHT } else { 1.0 };
         Self {
-            ambient: level.ambient.map(|value| overcast(value, 0.78 * grey)),
+            ambient: level.ambient.map(|value| night_sky * overcast(value, 0.78 * grey)),
             sun: [1.0, 0.95, 0.86].map(|tint| tint * level.sun * clear),
             to_sun: [cos * cos_azimuth, cos * sin_azimuth, sin].map(|part| part as f32),
-            zenith: level.zenith.map(|value| overcast(value, 0.9 * grey)),
-            horizon: level.horizon.map(|value| overcast(value, grey)),
+            zenith: level.zenith.map(|value| night_sky * overcast(value, 0.9 * grey)),
+            horizon: level.horizon.map(|value| night_sky * overcast(value, grey)),
             extinction_per_m: extinction_per_m as f32,
             gain: level.gain * (camera.exposure_ev as f32).exp2(),
             exposure_s: level.exposure_s,
@@ -179,6 +180,16 @@ impl Illumination {
                 [1.0, 0.5, 0.05].map(|tint| tint * on)
             }
         }
+    }
+
+    /// Returns the illumination of the lens by a headlamp at a distance (m), in units of π times the radiance of a white surface.
+    /// `facing` is the cosine of the angle between the lamp's axis and the direction to the lens.
+    pub(crate) fn headlamp_irradiance(&self, distance_m: f32, facing: f32) -> f32 {
+        /// Distance at which a headlamp lights a white surface as [`Illumination::beam`] states (m).
+        const BEAM_FROM_M: f32 = 10.0;
+        let near = BEAM_FROM_M / distance_m.max(1.0);
+        let facing = facing.max(0.0);
+        std::f32::consts::PI * self.beam * near * near * facing * facing * facing
     }
 
     /// Returns the radiance that a matt white face with this normal vector reflects.

@@ -9,11 +9,12 @@
 //! ```
 //!
 //! The camera axes follow the convention of computer vision: x right, y down, z along the optical axis (the *depth*).
-//! Pixels are square, and the lens has no distortion.
+//! Pixels are square. Unless the lens is configured otherwise ([`Optics`]), it has no distortion.
 
 use closecall_traffic::{Scene, SceneVehicle};
 
 use super::Camera;
+use super::optics::Optics;
 
 /// Width of the image (px).
 pub const WIDTH_PX: u16 = 1280;
@@ -96,6 +97,10 @@ pub(crate) struct Lens {
     pub(crate) sin_pitch: f64,
     /// Cosine of the downward pitch of the optical axis.
     pub(crate) cos_pitch: f64,
+    /// How the lens differs from a pinhole.
+    pub(crate) optics: Optics,
+    /// Time from the reading of the first row of the image to that of the last (s).
+    pub(crate) readout_s: f64,
 }
 
 impl Lens {
@@ -110,6 +115,8 @@ impl Lens {
             height_m: camera.mount_height_m - ahead_m * ego.pitch_rad,
             sin_pitch: pitch.sin(),
             cos_pitch: pitch.cos(),
+            optics: camera.optics,
+            readout_s: camera.readout_s,
         }
     }
 
@@ -128,7 +135,36 @@ impl Lens {
 
     /// Projects a point in camera axes to the image (px). The point must lie in front of the lens.
     pub(crate) fn pixel(&self, [x, y, z]: [f64; 3]) -> [f64; 2] {
+        if self.optics.is_straight() {
+            return self.pinhole_pixel([x, y, z]);
+        }
+        let [x, y] = self.optics.distorted([x / z, y / z]);
+        self.pinhole_pixel([x, y, 1.0])
+    }
+
+    /// Projects a point in camera axes to the image of a pinhole camera (px).
+    fn pinhole_pixel(&self, [x, y, z]: [f64; 3]) -> [f64; 2] {
         [f64::from(WIDTH_PX) / 2.0 + self.focal_px * x / z, f64::from(HEIGHT_PX) / 2.0 + self.focal_px * y / z]
+    }
+
+    /// Returns the position in camera axes of a moving point when the row of the image is read in which it appears. The
+    /// velocity is relative to the lens, in the ground frame (m/s).
+    pub(crate) fn when_read(&self, [x, y, z]: [f64; 3], [along, left]: [f64; 2]) -> [f64; 3] {
+        let [_, row] = self.pixel([x, y, z.max(NEAR_M)]);
+        let after_s = self.read_after_s(row);
+        let [dx, dy, dz] = self.direction_in_camera([along, left, 0.0]);
+        [x + after_s * dx, y + after_s * dy, z + after_s * dz]
+    }
+
+    /// Returns when a row of the image is read, relative to the middle row (s).
+    pub(crate) fn read_after_s(&self, row: f64) -> f64 {
+        self.readout_s * (row / f64::from(HEIGHT_PX) - 0.5).clamp(-0.5, 0.5)
+    }
+
+    /// Rotates a direction from the ground frame into camera axes.
+    pub(crate) fn direction_in_camera(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
+        let (s, c) = (self.sin_pitch, self.cos_pitch);
+        [y, s * x - c * z, -c * x - s * z]
     }
 
     /// Returns the pose of vehicle `other` in the ground frame: the position (x, y) of its centre (m) and its heading
@@ -148,7 +184,7 @@ impl Lens {
     pub(crate) fn bounds(&self, corners: &[[f64; 3]]) -> Option<[f64; 4]> {
         let mut bounds = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
         let mut include = |point: [f64; 3]| {
-            let [u, v] = self.pixel(point);
+            let [u, v] = self.pinhole_pixel(point);
             bounds = [bounds[0].min(u), bounds[1].min(v), bounds[2].max(u), bounds[3].max(v)];
         };
         for (index, &a) in corners.iter().enumerate() {
@@ -163,7 +199,8 @@ impl Lens {
                 }
             }
         }
-        (bounds[0] <= bounds[2]).then_some(bounds)
+        let is_visible = bounds[0] <= bounds[2];
+        is_visible.then(|| if self.optics.is_straight() { bounds } else { self.optics.bounds(bounds) })
     }
 }
 

@@ -5,6 +5,7 @@
 //! triangles leave no gaps, and the result for one pixel does not depend on which other pixels are rendered.
 
 use super::mesh::{Vec3, cross, dot, sub};
+use super::optics::Optics;
 use super::pinhole::{HEIGHT_PX, NEAR_M, WIDTH_PX};
 
 /// Number of steps of the fixed-point grid per pixel.
@@ -93,9 +94,18 @@ impl Visibility {
     }
 }
 
+/// The lens as the rasteriser sees it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Projection<'a> {
+    /// Focal length (px).
+    pub(crate) focal_px: f32,
+    /// How the lens differs from a pinhole. The corners of triangles are distorted, and their edges remain straight.
+    pub(crate) optics: &'a Optics,
+}
+
 /// Projects a triangle given in camera axes (m) and appends its visible part to `out`. Appends nothing if the triangle
 /// faces away from the lens.
-pub(crate) fn project(corners: [Vec3; 3], focal_px: f32, face: u32, out: &mut Vec<ScreenTriangle>) {
+pub(crate) fn project(corners: [Vec3; 3], projection: Projection<'_>, face: u32, out: &mut Vec<ScreenTriangle>) {
     let normal = cross(sub(corners[1], corners[0]), sub(corners[2], corners[0]));
     let offset = dot(normal, corners[0]);
     // The lens is the origin of the camera axes, so a face is seen from outside if the origin lies in front of its
@@ -103,10 +113,11 @@ pub(crate) fn project(corners: [Vec3; 3], focal_px: f32, face: u32, out: &mut Ve
     if !(offset < 0.0) {
         return;
     }
-    let plane = Plane { normal: normal.map(f64::from), offset: f64::from(offset), focal_px: f64::from(focal_px) };
+    let focal_px = f64::from(projection.focal_px);
+    let plane = Plane { normal: normal.map(f64::from), offset: f64::from(offset), focal_px };
     let near = NEAR_M as f32;
     if corners.iter().all(|corner| corner[2] >= near) {
-        append(corners.map(|corner| snap(corner, focal_px)), &plane, face, out);
+        append(corners, projection, &plane, face, out);
         return;
     }
     let mut clipped: [Vec3; 4] = [[0.0; 3]; 4];
@@ -124,8 +135,7 @@ pub(crate) fn project(corners: [Vec3; 3], focal_px: f32, face: u32, out: &mut Ve
         }
     }
     for last in 2..count {
-        let corners = [clipped[0], clipped[last - 1], clipped[last]];
-        append(corners.map(|corner| snap(corner, focal_px)), &plane, face, out);
+        append([clipped[0], clipped[last - 1], clipped[last]], projection, &plane, face, out);
     }
 }
 
@@ -136,37 +146,59 @@ struct Plane {
     focal_px: f64,
 }
 
+impl Plane {
+    /// Returns the coefficients of 1/depth on the fixed-point grid (1/m).
+    fn inverse_depth(&self) -> [f64; 3] {
+        // The ray (x, y, 1)·depth intersects the plane at depth·(normal · ray) = offset.
+        let steps = f64::from(SUBPIXEL_STEPS);
+        let [nx, ny, nz] = self.normal.map(|part| part / self.offset);
+        let centre = [WIDTH_PX, HEIGHT_PX].map(|extent| f64::from(extent) / 2.0);
+        let slope = [nx, ny].map(|part| part / (self.focal_px * steps));
+        let constant = nz - (nx * centre[0] + ny * centre[1]) / self.focal_px;
+        [slope[0], slope[1], constant]
+    }
+}
+
+/// Returns the coefficients a, b and c of a·x + b·y + c, which has these values at three points of the fixed-point grid.
+fn interpolated(corners: [[i32; 2]; 3], values: [f64; 3]) -> [f64; 3] {
+    let [from, one, other] = corners.map(|corner| corner.map(f64::from));
+    let [[x1, y1], [x2, y2]] = [one, other].map(|to| [to[0] - from[0], to[1] - from[1]]);
+    let [w1, w2] = [values[1] - values[0], values[2] - values[0]];
+    let area = x1 * y2 - x2 * y1;
+    let (a, b) = ((w1 * y2 - w2 * y1) / area, (x1 * w2 - x2 * w1) / area);
+    [a, b, values[0] - a * from[0] - b * from[1]]
+}
+
 /// Projects a point in camera axes to the fixed-point grid.
 #[expect(clippy::cast_possible_truncation, reason = "a float cast saturates, and the near plane bounds the quotient")]
-fn snap([x, y, z]: Vec3, focal_px: f32) -> [i32; 2] {
+fn snap([x, y, z]: Vec3, Projection { focal_px, optics }: Projection<'_>) -> [i32; 2] {
     let steps = SUBPIXEL_STEPS as f32;
-    let to_grid = |centre: u16, offset: f32| ((f32::from(centre) / 2.0 + focal_px * offset / z) * steps).round() as i32;
+    let to_grid = |centre: u16, offset: f32| ((f32::from(centre) / 2.0 + offset) * steps).round() as i32;
+    if optics.is_straight() {
+        return [to_grid(WIDTH_PX, focal_px * x / z), to_grid(HEIGHT_PX, focal_px * y / z)];
+    }
+    let [x, y] = optics.distorted([x / z, y / z].map(f64::from)).map(|part| focal_px * part as f32);
     [to_grid(WIDTH_PX, x), to_grid(HEIGHT_PX, y)]
 }
 
-fn append(mut corners: [[i32; 2]; 3], plane: &Plane, face: u32, out: &mut Vec<ScreenTriangle>) {
+fn append(at: [Vec3; 3], projection: Projection<'_>, plane: &Plane, face: u32, out: &mut Vec<ScreenTriangle>) {
+    let mut corners = at.map(|corner| snap(corner, projection));
     let [a, b, c] = corners.map(|corner| corner.map(i64::from));
     let doubled_area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
     // Counter-clockwise corners have a negative area in image coordinates, because y points down.
     if doubled_area >= 0 {
         return;
     }
+    let inverse_depth = if projection.optics.is_straight() {
+        plane.inverse_depth()
+    } else {
+        interpolated(corners, at.map(|corner| 1.0 / f64::from(corner[2])))
+    };
     corners.swap(1, 2);
     let edges = [0, 1, 2].map(|index| edge(corners[index], corners[(index + 1) % 3]));
     let low = |axis: usize| corners.iter().map(|corner| corner[axis]).fold(i32::MAX, i32::min);
     let high = |axis: usize| corners.iter().map(|corner| corner[axis]).fold(i32::MIN, i32::max);
-    // The ray (x, y, 1)·depth intersects the plane at depth·(normal · ray) = offset.
-    let steps = f64::from(SUBPIXEL_STEPS);
-    let [nx, ny, nz] = plane.normal.map(|part| part / plane.offset);
-    let centre = [WIDTH_PX, HEIGHT_PX].map(|extent| f64::from(extent) / 2.0);
-    let slope = [nx, ny].map(|part| part / (plane.focal_px * steps));
-    let constant = nz - (nx * centre[0] + ny * centre[1]) / plane.focal_px;
-    out.push(ScreenTriangle {
-        edges,
-        bounds: [low(0), high(0), low(1), high(1)],
-        inverse_depth: [slope[0], slope[1], constant],
-        face,
-    });
+    out.push(ScreenTriangle { edges, bounds: [low(0), high(0), low(1), high(1)], inverse_depth, face });
 }
 
 /// The edge function from `a` to `b`, inside on the right of it; samples on the edge itself belong to the triangle
@@ -182,7 +214,8 @@ fn edge(a: [i32; 2], b: [i32; 2]) -> [i64; 3] {
 mod tests {
     use super::*;
 
-    const FOCAL_PX: f32 = 1000.0;
+    const PINHOLE: Projection<'_> = Projection { focal_px: 1000.0, optics: &STRAIGHT };
+    const STRAIGHT: Optics = Optics { distortion: [0.0; 2], vignetting: 0.0, surface_reflectance: 0.0 };
 
     fn rasterised(triangles: &[ScreenTriangle], columns: &[i32], rows: &[i32]) -> Visibility {
         let mut visibility = Visibility::default();
@@ -195,8 +228,8 @@ mod tests {
     fn square() -> Vec<ScreenTriangle> {
         let [a, b, c, d] = [[-1.0, 1.0, 10.0], [1.0, 1.0, 10.0], [1.0, -1.0, 10.0], [-1.0, -1.0, 10.0]];
         let mut out = Vec::new();
-        project([a, b, c], FOCAL_PX, 0, &mut out);
-        project([a, c, d], FOCAL_PX, 1, &mut out);
+        project([a, b, c], PINHOLE, 0, &mut out);
+        project([a, c, d], PINHOLE, 1, &mut out);
         out
     }
 
@@ -217,14 +250,14 @@ mod tests {
     #[test]
     fn a_triangle_that_faces_away_is_not_rendered() {
         let mut out = Vec::new();
-        project([[-1.0, 1.0, 10.0], [1.0, -1.0, 10.0], [1.0, 1.0, 10.0]], FOCAL_PX, 0, &mut out);
+        project([[-1.0, 1.0, 10.0], [1.0, -1.0, 10.0], [1.0, 1.0, 10.0]], PINHOLE, 0, &mut out);
         assert!(out.is_empty());
     }
 
     #[test]
     fn the_nearer_triangle_hides_the_farther_one_in_either_order() {
         let mut near = Vec::new();
-        project([[-1.0, 1.0, 5.0], [1.0, 1.0, 5.0], [1.0, -1.0, 5.0]], FOCAL_PX, 7, &mut near);
+        project([[-1.0, 1.0, 5.0], [1.0, 1.0, 5.0], [1.0, -1.0, 5.0]], PINHOLE, 7, &mut near);
         let forwards: Vec<_> = square().into_iter().chain(near.clone()).collect();
         let backwards: Vec<_> = near.into_iter().chain(square()).collect();
         let (columns, rows): (Vec<i32>, Vec<i32>) = ((600..700).collect(), (380..420).collect());
@@ -235,8 +268,8 @@ mod tests {
     #[test]
     fn a_triangle_across_the_near_plane_is_clipped() {
         let mut out = Vec::new();
-        project([[-1.0, 1.0, -2.0], [-1.0, 1.0, 10.0], [-1.0, -1.0, 10.0]], FOCAL_PX, 0, &mut out);
-        project([[-1.0, 1.0, -2.0], [-1.0, -1.0, 10.0], [-1.0, 1.0, 10.0]], FOCAL_PX, 0, &mut out);
+        project([[-1.0, 1.0, -2.0], [-1.0, 1.0, 10.0], [-1.0, -1.0, 10.0]], PINHOLE, 0, &mut out);
+        project([[-1.0, 1.0, -2.0], [-1.0, -1.0, 10.0], [-1.0, 1.0, 10.0]], PINHOLE, 0, &mut out);
         assert_eq!(out.len(), 2, "a quadrangle is left of the one that is seen from outside");
     }
 }

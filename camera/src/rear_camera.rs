@@ -84,7 +84,9 @@ impl RearCamera {
 
 #[cfg(test)]
 mod tests {
-    use closecall_traffic::{Check, Environment, Light, Parameters, Road, Time, Vehicle, VehicleClass, VehicleState};
+    use closecall_traffic::{
+        Check, Environment, Light, Num, Parameters, Road, Time, Vehicle, VehicleClass, VehicleState,
+    };
     use proptest::prelude::*;
 
     use super::super::CameraConfig;
@@ -93,6 +95,23 @@ mod tests {
 
     fn rear_camera() -> RearCamera {
         RearCamera::new(CameraConfig::default().check(&Parameters::default()).unwrap())
+    }
+
+    fn camera_with(change: impl FnOnce(&mut CameraConfig)) -> RearCamera {
+        let mut config = CameraConfig::default();
+        change(&mut config);
+        RearCamera::new(config.check(&Parameters::default()).unwrap())
+    }
+
+    /// Returns a camera with every deviation from the ideal one.
+    fn real_camera() -> RearCamera {
+        camera_with(|config| {
+            config.lens.distortion_k1 = Num::Fixed(-0.3);
+            config.lens.vignetting = Num::Fixed(1.0);
+            config.lens.surface_reflectance = Num::Fixed(0.04);
+            config.readout_s = Num::Fixed(0.03);
+            config.night_sky = Num::Fixed(0.03);
+        })
     }
 
     fn vehicle(class: VehicleClass, s_m: f64, d_m: f64) -> SceneVehicle {
@@ -125,11 +144,10 @@ mod tests {
         (road, environment, others)
     }
 
-    fn assert_crops_match(light: Light, windows: &[PixelRect]) {
+    fn assert_crops_match(camera: &RearCamera, light: Light, windows: &[PixelRect]) {
         let (road, environment, others) = varied_scene(light);
         let ego = vehicle(VehicleClass::Car, 500.0, -5.6);
         let scene = Scene { time: Time::from_ms(880), road: &road, environment: &environment, ego, others: &others };
-        let camera = rear_camera();
         let image = camera.render_image(&scene, ExposureKey(42)).image;
         let mut crop = Crop::default();
         for window in windows {
@@ -149,7 +167,8 @@ mod tests {
         let square = |left, top, side| PixelRect { left, top, width: side, height: side };
         let windows = [square(600, 380, 32), square(500, 300, 301), square(620, 395, 21), square(-40, 700, 200)];
         for light in [Light::Day, Light::Dusk, Light::Night] {
-            assert_crops_match(light, &windows);
+            assert_crops_match(&rear_camera(), light, &windows);
+            assert_crops_match(&real_camera(), light, &windows);
         }
     }
 
@@ -160,7 +179,8 @@ mod tests {
             windows in prop::collection::vec((-50_i32..1280, -50_i32..800, 8_u32..500), 12),
         ) {
             let squares: Vec<_> = windows.into_iter().map(|(left, top, side)| PixelRect { left, top, width: side, height: side }).collect();
-            assert_crops_match(Light::Night, &squares);
+            assert_crops_match(&rear_camera(), Light::Night, &squares);
+            assert_crops_match(&real_camera(), Light::Night, &squares);
         }
     }
 
@@ -193,6 +213,94 @@ mod tests {
         };
         assert_eq!(rendered(5), rendered(5));
         assert_ne!(rendered(5), rendered(6));
+    }
+
+    /// Place along the road of the car of the varied scene (m), and the speed of the ego (m/s).
+    const AS_PLACED: [f64; 2] = [470.0, 30.0];
+
+    /// Renders the varied scene on a dry road, with its car at this place (m) and speed (m/s).
+    fn rendered(camera: &RearCamera, light: Light, [s_m, speed_mps]: [f64; 2]) -> LabelledImage {
+        let (road, environment, mut others) = varied_scene(light);
+        let environment = Environment { rain_mm_per_h: 0.0, water_film_mm: 0.0, visibility_m: 20_000.0, ..environment };
+        (others[0].state.s_m, others[0].state.speed_mps) = (s_m, speed_mps);
+        let ego = vehicle(VehicleClass::Car, 500.0, -5.6);
+        let scene = Scene { time: Time::ZERO, road: &road, environment: &environment, ego, others: &others };
+        camera.render_image(&scene, ExposureKey(3))
+    }
+
+    fn brightness(picture: &LabelledImage, [left, top]: [usize; 2]) -> f64 {
+        let rows = (top..top + 40).flat_map(|row| picture.image.rgb[3 * (1280 * row + left)..][..3 * 40].iter());
+        rows.map(|value| f64::from(*value)).sum::<f64>() / (3.0 * 1_600.0)
+    }
+
+    /// Returns the mean position in the image of the pixels that show the first other vehicle (px).
+    fn centre_px(picture: &LabelledImage) -> [f64; 2] {
+        let shown = picture.instances.iter().enumerate().filter(|(_, instance)| **instance == 1);
+        let at: Vec<[f64; 2]> = shown.map(|(index, _)| [(index % 1280) as f64, (index / 1280) as f64]).collect();
+        assert!(at.len() > 100);
+        [0, 1].map(|axis| at.iter().map(|at| at[axis]).sum::<f64>() / at.len() as f64)
+    }
+
+    #[test]
+    fn an_uncorrected_lens_darkens_the_corners_and_not_the_middle() {
+        let ideal = rendered(&rear_camera(), Light::Day, AS_PLACED);
+        let dark = rendered(&camera_with(|config| config.lens.vignetting = Num::Fixed(1.0)), Light::Day, AS_PLACED);
+        assert!(brightness(&dark, [0, 0]) < 0.8 * brightness(&ideal, [0, 0]));
+        assert!((brightness(&dark, [620, 380]) - brightness(&ideal, [620, 380])).abs() < 1.0);
+    }
+
+    #[test]
+    fn barrel_distortion_draws_vehicles_nearer_to_the_middle_and_the_window_follows() {
+        let camera = camera_with(|config| config.lens.distortion_k1 = Num::Fixed(-0.4));
+        let [_, ideal_v] = centre_px(&rendered(&rear_camera(), Light::Day, AS_PLACED));
+        let [u, v] = centre_px(&rendered(&camera, Light::Day, AS_PLACED));
+        assert!((v - 400.0).abs() < (ideal_v - 400.0).abs());
+        let ego = vehicle(VehicleClass::Car, 500.0, -5.6);
+        let window = camera.project(&ego, &box_of(&ego, &varied_scene(Light::Day).2[0])).unwrap();
+        let middle = [window.left, window.top].map(|low| f64::from(low) + 0.5 * f64::from(window.width));
+        assert!(
+            (middle[0] - u).abs() < 0.2 * f64::from(window.width)
+                && (middle[1] - v).abs() < 0.2 * f64::from(window.width)
+        );
+    }
+
+    #[test]
+    fn a_rolling_shutter_moves_only_what_moves_and_what_the_rows_beside_the_middle_show() {
+        let rolling = camera_with(|config| config.readout_s = Num::Fixed(0.1));
+        // 8 m behind the lens, the car lies below the middle of the image, where rows are read later.
+        let height = |camera: &RearCamera, mps: f64| centre_px(&rendered(camera, Light::Day, [488.0, mps]))[1];
+        assert!(height(&rear_camera(), 50.0) > 400.0);
+        assert!((height(&rolling, 30.0) - height(&rear_camera(), 30.0)).abs() < 0.5, "as fast as the ego");
+        // By then it has come nearer, and appears lower.
+        assert!(height(&rolling, 50.0) > height(&rear_camera(), 50.0) + 0.2);
+    }
+
+    #[test]
+    fn the_sky_far_from_towns_is_darker_only_at_night() {
+        let far = camera_with(|config| config.night_sky = Num::Fixed(0.03));
+        let sky = |camera: &RearCamera, light| brightness(&rendered(camera, light, AS_PLACED), [100, 100]);
+        assert!(sky(&far, Light::Night) < 0.6 * sky(&rear_camera(), Light::Night));
+        assert_eq!(sky(&far, Light::Day), sky(&rear_camera(), Light::Day));
+    }
+
+    #[test]
+    fn reflections_in_the_lens_draw_ghosts_of_headlamps_and_of_the_sun() {
+        let ghostly = |lens: &dyn Fn(&mut CameraConfig)| {
+            camera_with(|config| {
+                config.sun.azimuth_rad = Num::Fixed(2.9);
+                config.sun.elevation_rad = Num::Fixed(0.2);
+                lens(config);
+            })
+        };
+        for light in [Light::Day, Light::Night] {
+            let total = |reflectance: f64| {
+                let camera = ghostly(&|config| config.lens.surface_reflectance = Num::Fixed(reflectance));
+                let rgb = rendered(&camera, light, AS_PLACED).image.rgb;
+                rgb.iter().map(|value| f64::from(*value)).sum::<f64>()
+            };
+            let (none, coated, bare) = (total(0.0), total(0.005), total(0.04));
+            assert!(coated > none && bare > 10.0 * (coated - none) + none, "{light:?}: {none} {coated} {bare}");
+        }
     }
 
     #[test]

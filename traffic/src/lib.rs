@@ -67,7 +67,7 @@ mod optics;
 mod parameters;
 mod quintic;
 mod road;
-mod roadside;
+pub mod roadside;
 mod scene;
 mod seed;
 mod time;

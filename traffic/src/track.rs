@@ -66,6 +66,12 @@ impl ClassScores {
         }
         best
     }
+
+    /// Returns whether the object is at least as likely a vehicle as not, and one vehicle class is more probable than the
+    /// background. Equal scores carry no information and are not those of a vehicle.
+    pub fn is_vehicle(&self) -> bool {
+        self.vehicle() >= 0.5 && self.0[self.best_vehicle_class() as usize] > self.0[Self::BACKGROUND]
+    }
 }
 
 /// The perceived state of another vehicle, in the vehicle frame of the ego at `time`.

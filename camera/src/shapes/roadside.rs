@@ -1,4 +1,4 @@
-//! Roadside furniture: guard rails with their posts, delineator posts, and gantries with signs.
+//! Roadside furniture: guard rails with their posts, delineator posts, signs, gantries, and trees.
 //!
 //! The positions depend only on the road (multiples of a spacing along s), so that the furniture passes by as the ego
 //! drives. Delineators stand every 50 m, as is German practice.
@@ -8,6 +8,7 @@ use closecall_traffic::Road;
 use crate::hash::{mix_at, unit};
 use crate::mesh::{Mesh, Surface, Vec3};
 use closecall_traffic::guard_rail::{BEAM_DEPTH_M, BEAM_TOP_M, LEFT_OFFSET_M, POST_SPACING_M, RIGHT_OFFSET_M};
+use closecall_traffic::roadside::{BESIDE_M, GANTRY_M, LEG_HALF_M, SHEET_M, SIGN_M, TREE_M, outer_edge, positions_m};
 
 /// Lateral distance of the middle of the guard rails beyond the left and the right edge of the road (m).
 const RAIL_OFFSET_M: [f64; 2] = [LEFT_OFFSET_M + 0.5 * BEAM_DEPTH_M, RIGHT_OFFSET_M + 0.5 * BEAM_DEPTH_M];
@@ -19,6 +20,8 @@ const GANTRY_SPACING_M: f64 = 400.0;
 const MAX_DISTANCE_M: f64 = 240.0;
 /// Distance up to which the posts of rails are rendered (m). Beyond it they are thinner than a pixel.
 const MAX_POST_DISTANCE_M: f64 = 90.0;
+/// Height of the lower end of a tree's crown, half of its width, and height of its upper end (m) (assumption).
+const CROWN_M: [f64; 3] = [4.5, 2.0, 9.0];
 /// Key of the random positions and sizes of gantries and their signs.
 const PLACEMENT_KEY: u64 = 0x706c_6163_6573;
 
@@ -39,6 +42,9 @@ enum Kind {
     Post,
     Delineator,
     Gantry { index: i32 },
+    Sign,
+    PlainGantry,
+    Tree,
 }
 
 impl Roadside {
@@ -49,6 +55,9 @@ impl Roadside {
             Kind::Post => post(),
             Kind::Delineator => delineator(),
             Kind::Gantry { index } => gantry(self.extent_m[1] - 0.2, index),
+            Kind::Sign => sign(),
+            Kind::PlainGantry => plain_gantry(self.extent_m[1] - LEG_HALF_M[1] as f32),
+            Kind::Tree => tree(),
         }
     }
 }
@@ -68,6 +77,10 @@ pub(crate) fn roadside(road: &Road, s_m: f64) -> Vec<Roadside> {
                 bodies.push(Roadside { s_m, d_m, extent_m: [0.06, 0.06, 1.02], kind: Kind::Delineator });
             }
         }
+    }
+    configured(&mut bodies, road, s_m);
+    if road.roadside().gantry_spacing_m.is_some() {
+        return bodies;
     }
     for index in spacing_indices(s_m, GANTRY_SPACING_M, MAX_DISTANCE_M) {
         let shift = f64::from(unit(mix_at(PLACEMENT_KEY, index, 0))) * 0.6 * GANTRY_SPACING_M;
@@ -100,6 +113,63 @@ fn rail(bodies: &mut Vec<Roadside>, s_m: f64, d_m: f64) {
         let s_m = f64::from(index) * POST_SPACING_M;
         bodies.push(Roadside { s_m, d_m, extent_m: [0.05, 0.06, 0.66], kind: Kind::Post });
     }
+}
+
+/// Appends what a scenario places along the road, where the LiDARs see it as well.
+fn configured(bodies: &mut Vec<Roadside>, road: &Road, s_m: f64) {
+    let (edge_m, outward) = outer_edge(road);
+    let roadside = road.roadside();
+    let mut append = |spacing_m, d_m, extent_m: [f64; 3], kind: fn() -> Kind| {
+        let extent_m = extent_m.map(|part| part as f32);
+        let at = positions_m(spacing_m, s_m, MAX_DISTANCE_M);
+        bodies.extend(at.map(|s_m| Roadside { s_m, d_m, extent_m, kind: kind() }));
+    };
+    let [width, height, low] = SIGN_M;
+    let sign_d_m = edge_m + outward * (BESIDE_M + 0.5 * width);
+    let thickness_m = SHEET_M + 2.0 * LEG_HALF_M[0];
+    append(roadside.sign_spacing_m, sign_d_m, [thickness_m, 0.5 * width, low + height], || Kind::Sign);
+    let middle_m = 0.5 * road.right_edge_m();
+    let half_m = middle_m.abs() + BESIDE_M + LEG_HALF_M[1];
+    append(roadside.gantry_spacing_m, middle_m, [LEG_HALF_M[1], half_m, GANTRY_M[1]], || Kind::PlainGantry);
+    let [beside, ..] = TREE_M;
+    let [_, crown_half_m, crown_top_m] = CROWN_M;
+    let extent_m = [crown_half_m, crown_half_m, crown_top_m];
+    append(roadside.tree_spacing_m, edge_m + outward * beside, extent_m, || Kind::Tree);
+}
+
+/// Builds a sign as the rear camera sees it: the back of its sheet, and its post.
+fn sign() -> Mesh {
+    let ([width, height, low], [half, _]) = (SIGN_M.map(|part| part as f32), LEG_HALF_M.map(|part| part as f32));
+    let mut mesh = Mesh::default();
+    mesh.block([0.0, 0.0, low + 0.5 * height], [SHEET_M as f32, 0.5 * width, 0.5 * height], Surface::METAL);
+    let top = 0.5 * (low + height);
+    mesh.block([-half, 0.0, top], [half, half, top], Surface::METAL);
+    mesh
+}
+
+/// Builds a gantry whose signs are as wide as the road.
+fn plain_gantry(half_m: f32) -> Mesh {
+    let ([low, high], leg) = (GANTRY_M.map(|part| part as f32), LEG_HALF_M[1] as f32);
+    let mut mesh = Mesh::default();
+    for side in [-1.0, 1.0] {
+        mesh.block([0.0, side * half_m, 0.5 * high], [leg, leg, 0.5 * high], Surface::METAL);
+    }
+    mesh.block([0.0, 0.0, 0.5 * (low + high)], [SHEET_M as f32, half_m, 0.5 * (high - low)], Surface::METAL);
+    mesh
+}
+
+/// Builds a tree: its stem, and a crown of two blocks above the beams of the LiDARs.
+fn tree() -> Mesh {
+    const BARK: Surface = Surface::plain([0.08, 0.06, 0.045], 0.0);
+    const LEAVES: Surface = Surface::plain([0.04, 0.07, 0.025], 0.0);
+    let [_, half, height] = TREE_M.map(|part| part as f32);
+    let [low, wide, high] = CROWN_M.map(|part| part as f32);
+    let (middle, quarter) = (0.5 * (low + high), 0.25 * (high - low));
+    let mut mesh = Mesh::default();
+    mesh.block([0.0, 0.0, 0.5 * height], [half, half, 0.5 * height], BARK);
+    mesh.block([0.0, 0.0, middle], [wide, wide, quarter], LEAVES);
+    mesh.block([0.0, 0.0, middle], [0.6 * wide, 0.6 * wide, 2.0 * quarter], LEAVES);
+    mesh
 }
 
 fn beam(half_m: f32) -> Mesh {

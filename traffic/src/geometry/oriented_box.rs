@@ -85,6 +85,12 @@ impl OrientedBox {
 
     /// Returns true if the two boxes overlap or touch. NaN counts as an overlap.
     pub fn overlaps(&self, other: &Self) -> bool {
+        let reach_m = 0.5 * (self.length_m + self.width_m + other.length_m + other.width_m);
+        // Farther apart than their corners reach, as most pairs are: no angle needs to be known.
+        let is_far = (other.centre_m() - self.centre_m()).norm_squared() > reach_m * reach_m;
+        if is_far && (self.yaw_rad + other.yaw_rad).is_finite() {
+            return false;
+        }
         self.overlap_of_frames(other, &Frame::new(self), &Frame::new(other))
     }
 
