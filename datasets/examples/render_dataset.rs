@@ -7,7 +7,7 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use closecall_datasets::{Content, DatasetOptions, Set, render_dataset};
+use closecall_datasets::{CameraLooks, Content, DatasetOptions, Set, render_dataset};
 
 const USAGE: &str = "usage: render_dataset crops|images training|held-out SCENES SEED FOLDER";
 
@@ -23,7 +23,13 @@ fn options(words: &[String]) -> Option<(DatasetOptions, &Path)> {
         "held-out" => Set::HeldOut,
         _ => return None,
     };
-    let options = DatasetOptions { content, set, scenes: scenes.parse().ok()?, seed: seed.parse().ok()? };
+    let options = DatasetOptions {
+        content,
+        set,
+        scenes: scenes.parse().ok()?,
+        seed: seed.parse().ok()?,
+        looks: CameraLooks::default(),
+    };
     Some((options, Path::new(folder)))
 }
 

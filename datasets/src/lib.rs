@@ -15,4 +15,4 @@ mod files;
 mod render;
 mod scenes;
 
-pub use render::{Content, DatasetError, DatasetOptions, DatasetSummary, Set, render_dataset};
+pub use render::{CameraLooks, Content, DatasetError, DatasetOptions, DatasetSummary, Set, render_dataset};

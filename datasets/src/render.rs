@@ -3,6 +3,7 @@
 use super::files::Output;
 use super::scenes::RandomScene;
 use super::{coco, crops};
+use closecall_camera::{Camera, Optics};
 use closecall_traffic::{ActorId, ConfigError, stream};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -28,8 +29,25 @@ pub enum Content {
     Crops,
 }
 
+/// How the cameras of a data set differ from the ideal one. The default is the ideal camera, with which the network was trained.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CameraLooks {
+    /// The lens.
+    pub optics: Optics,
+    /// Time from the reading of the first row of an image to that of the last (s).
+    pub readout_s: f64,
+    /// Brightness of the night sky, relative to the sky over a town (0 to 1).
+    pub night_sky: f64,
+}
+
+impl Default for CameraLooks {
+    fn default() -> Self {
+        Self { optics: Optics::default(), readout_s: 0.0, night_sky: 1.0 }
+    }
+}
+
 /// The options of a data set to be rendered.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DatasetOptions {
     /// The set to render, training or held-out.
     pub set: Set,
@@ -39,6 +57,8 @@ pub struct DatasetOptions {
     pub scenes: u32,
     /// Seed of the scenes. 0 is a seed like any other.
     pub seed: u64,
+    /// How the cameras differ from the ideal one. The scenes are the same for all of them.
+    pub looks: CameraLooks,
 }
 
 /// The summary of a written data set.
@@ -134,7 +154,10 @@ impl Set {
 
 fn random_scene(options: &DatasetOptions, index: u32) -> Result<RandomScene, DatasetError> {
     let mut rng = stream(options.seed, u64::from(index), &ActorId::new("ego")?, options.set.channel("scenes"));
-    Ok(RandomScene::draw(options.set, &mut rng)?)
+    let mut scene = RandomScene::draw(options.set, &mut rng)?;
+    let CameraLooks { optics, readout_s, night_sky } = options.looks;
+    scene.camera = Camera { optics, readout_s, night_sky, ..scene.camera };
+    Ok(scene)
 }
 
 #[cfg(test)]
@@ -147,7 +170,13 @@ mod tests {
 
     #[test]
     fn each_crop_has_a_row_and_the_same_options_give_the_same_bytes() {
-        let options = DatasetOptions { set: Set::HeldOut, content: Content::Crops, scenes: 6, seed: 3 };
+        let options = DatasetOptions {
+            set: Set::HeldOut,
+            content: Content::Crops,
+            scenes: 6,
+            seed: 3,
+            looks: CameraLooks::default(),
+        };
         let (first, second) = (folder("a"), folder("b"));
         let summary = render_dataset(&options, &first).unwrap();
         render_dataset(&options, &second).unwrap();
@@ -165,7 +194,13 @@ mod tests {
 
     #[test]
     fn the_masks_of_an_image_fit_their_bounding_boxes() {
-        let options = DatasetOptions { set: Set::Training, content: Content::Images, scenes: 1, seed: 1 };
+        let options = DatasetOptions {
+            set: Set::Training,
+            content: Content::Images,
+            scenes: 1,
+            seed: 1,
+            looks: CameraLooks::default(),
+        };
         let folder = folder("images");
         render_dataset(&options, &folder).unwrap();
         let text = std::fs::read(folder.join("annotations.json")).unwrap();

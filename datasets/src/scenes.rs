@@ -146,6 +146,7 @@ fn camera(rng: &mut Stream) -> Result<Camera, ConfigError> {
             azimuth_rad: Num::Fixed(rng.random_range(-PI..PI)),
             elevation_rad: Num::Fixed(rng.random_range(0.08..1.2)),
         },
+        ..CameraConfig::default()
     };
     config.check(&Parameters::default())
 }

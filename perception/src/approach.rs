@@ -227,19 +227,31 @@ fn follow(
     Ok(())
 }
 
-/// Returns the gap at which the vehicle has a confirmed track for the first time (m); that of the end of the approach if never.
+/// The gaps at which the track of a vehicle reaches a state for the first time (m); those of the end of the approach if never.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Firsts {
+    /// The track is confirmed.
+    pub(crate) confirmed_m: f64,
+    /// The track is confirmed, exists at least as likely as not, and is classified as a vehicle: what a function waits for.
+    pub(crate) classified_m: f64,
+}
+
+/// Returns when the track of the vehicle is confirmed and classified.
 ///
 /// # Errors
 /// [`SensorError`] if a sensor model fails.
-pub(crate) fn first_confirmed_m(case: &Case, sensors: &Sensors, road: &Road, at: Address) -> Result<f64, SensorError> {
-    let mut first_m = GAPS_M[1];
+pub(crate) fn firsts(case: &Case, sensors: &Sensors, road: &Road, at: Address) -> Result<Firsts, SensorError> {
+    let mut firsts = Firsts { confirmed_m: GAPS_M[1], classified_m: GAPS_M[1] };
     follow((case, sensors, road, at), GAPS_M[0], |gap_m, track, _| {
-        if track.is_some() {
-            first_m = gap_m;
+        let Some(track) = track else { return true };
+        firsts.confirmed_m = firsts.confirmed_m.max(gap_m);
+        let is_classified = track.existence >= 0.5 && track.class.is_vehicle();
+        if is_classified {
+            firsts.classified_m = gap_m;
         }
-        track.is_none()
+        !is_classified
     })?;
-    Ok(first_m)
+    Ok(firsts)
 }
 
 /// Returns what the tracks show between two gaps (m).

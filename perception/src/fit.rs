@@ -1,24 +1,27 @@
 //! The fit of the rear object-level sensor to the full chain.
 //!
 //! ```text
-//!  scenario ─▶ full chain ─┬▶ distance of the first confirmed track, over class, paint, plate, shape, extinction ─▶ ranges
+//!  scenario ─▶ full chain ─┬▶ distances of the first confirmed track and of the first one that is classified as a vehicle,
+//!                          │  over class, paint, plate, shape, extinction ─▶ ranges
 //!                          ├▶ errors of the tracks of a usual car ─▶ errors of the measurements
 //!                          └▶ scores of the true class ─▶ confidence
 //! ```
 //!
 //! Only what is perceived is fitted: no controller runs, and no collision counts. A range is the mean distance of the first
-//! confirmed track, plus the distance that the object-level sensor itself needs to confirm a vehicle. The errors of the
+//! confirmed track, plus the distance that the object-level sensor itself needs to confirm a vehicle. A class range is the mean
+//! distance at which a confirmed track is first classified as a vehicle, plus the distance that the latency costs. It is a distance
+//! and no time, because the full chain recognises a vehicle in fog at nearly the same distance at all closing speeds. The errors of the
 //! measurements are those with which the errors of its tracks have the root mean squares of the full chain's; their correlation
 //! time is that of the full chain's errors along the road.
 
 use std::collections::BTreeMap;
 
-use closecall_sensors::{ByClass, FittedErrors, Origin, RangeGrid, RearFit, SensorMode, Sensors};
+use closecall_sensors::{ByClass, FittedErrors, Origin, RangeGrid, RearFit, SensorMode, Sensors, ShapeRatios};
 use closecall_simulation::scenario::{Scenario, ScenarioFile, Setting};
 use closecall_traffic::{BodyShape, CONTROL_STEP, Environment, Plate, VehicleClass};
 use rayon::prelude::*;
 
-use crate::approach::{Address, Watched, first_confirmed_m, watch};
+use crate::approach::{Address, Firsts, Watched, firsts, watch};
 use crate::cases::Case;
 use crate::study::StudyError;
 
@@ -28,12 +31,14 @@ const PAINTS: [f64; 6] = [0.05, 0.1, 0.2, 0.35, 0.5, 0.8];
 const VISIBILITIES_M: [f64; 9] = [10_000.0, 1_000.0, 500.0, 300.0, 200.0, 150.0, 100.0, 70.0, 50.0];
 /// Extinction times visibility: Koschmieder's contrast threshold of 2 %.
 const KOSCHMIEDER: f64 = 3.912;
-/// Paints and visibilities (m) in which body shapes are compared.
-const SHAPES_IN: [(f64, f64); 4] = [(0.1, 10_000.0), (0.3, 10_000.0), (0.1, 150.0), (0.3, 150.0)];
+/// Reflectivities (-) and visibilities (m) in which body shapes are compared: a coarser grid.
+const SHAPE_PAINTS: [f64; 2] = [0.1, 0.4];
+const SHAPE_VISIBILITIES_M: [f64; 5] = [10_000.0, 500.0, 200.0, 100.0, 50.0];
 /// Gaps between which the errors of tracks are compared (m).
 const GAPS_M: [f64; 2] = [20.0, 80.0];
-/// Range at which the object-level sensor's own time to confirm is measured (m).
+/// Ranges at which the object-level sensor's own time to confirm, and to report a class, are measured (m).
 const TEST_RANGE_M: f64 = 100.0;
+const TEST_CLASS_RANGE_M: f64 = 60.0;
 /// Number of steps in which the errors are adapted; each scales them by the ratio of the root mean squares.
 const ITERATIONS: usize = 6;
 /// Lag at which the correlation of the errors is taken (control steps): 1 s.
@@ -61,7 +66,9 @@ pub struct FitPlan<'a> {
 struct Fitter<'a> {
     plan: &'a FitPlan<'a>,
     scenario: Scenario,
-    /// The LiDAR without the camera, which no detection depends on.
+    /// The full chain.
+    full: Sensors,
+    /// The LiDAR without the camera, which no error depends on.
     lidar: Sensors,
 }
 
@@ -73,16 +80,18 @@ pub fn fit(plan: &FitPlan<'_>) -> Result<RearFit, StudyError> {
     let nominal = plan.file.space().nominal();
     let without_camera = with_settings(plan.file, &["sensors.rear-camera.pipeline=\"off\"".to_owned()])?;
     let lidar = without_camera.concrete(&nominal)?.sensors.with_mode(SensorMode::Full);
-    let fitter = Fitter { plan, scenario: plan.file.concrete(&nominal)?, lidar };
-    let (range, range_spread) = fitter.ranges()?;
+    let scenario = plan.file.concrete(&nominal)?;
+    let fitter = Fitter { plan, full: scenario.sensors.with_mode(SensorMode::Full), scenario, lidar };
+    let errors = fitter.errors()?;
+    let (range, range_spread) = fitter.ranges(&errors)?;
     let FitPlan { seed, approaches, command, version, file } = plan.clone();
     Ok(RearFit {
         origin: Origin { command, version, scenario: file.config().name.clone(), seed, approaches },
-        errors: fitter.errors()?,
+        errors,
         class_confidence: fitter.class_confidence()?,
         range_spread,
         paints: PAINTS.to_vec(),
-        extinctions_per_m: VISIBILITIES_M.iter().map(|visibility_m| rounded(KOSCHMIEDER / visibility_m, 1e6)).collect(),
+        extinctions_per_m: extinctions_per_m(&VISIBILITIES_M),
         range,
         shapes: fitter.shapes()?,
     })
@@ -93,6 +102,10 @@ fn with_settings(file: &ScenarioFile, settings: &[String]) -> Result<ScenarioFil
     Ok(ScenarioFile::parse(file.path(), file.text(), &settings)?)
 }
 
+fn extinctions_per_m(visibilities_m: &[f64]) -> Vec<f64> {
+    visibilities_m.iter().map(|visibility_m| rounded(KOSCHMIEDER / visibility_m, 1e6)).collect()
+}
+
 fn rounded(value: f64, per_unit: f64) -> f64 {
     (value * per_unit).round() / per_unit
 }
@@ -101,37 +114,58 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
+/// Returns the settings of the object-level sensor that give its measurements these errors.
+fn settings_of(errors: &FittedErrors) -> [String; 4] {
+    let FittedErrors { range_sd_m, lateral_sd_m, drift_sd_m, drift_time_s } = errors;
+    [
+        format!("sensors.rear-object.range-sd-m={range_sd_m:?}"),
+        format!("sensors.rear-object.lateral-sd-m={lateral_sd_m:?}"),
+        format!("sensors.rear-object.drift-sd-m={drift_sd_m:?}"),
+        format!("sensors.rear-object.drift-time-s={drift_time_s:?}"),
+    ]
+}
+
+/// Returns the mean distances at which tracks are confirmed and classified (m).
+fn means_m(firsts: &[Firsts]) -> [f64; 2] {
+    let of = |distance_m: fn(&Firsts) -> f64| mean(&firsts.iter().map(distance_m).collect::<Vec<_>>());
+    [of(|firsts| firsts.confirmed_m), of(|firsts| firsts.classified_m)]
+}
+
 impl Fitter<'_> {
     fn case(class: VehicleClass, paint: f64, plate: Plate, visibility_m: f64) -> Case {
         let environment = Environment { visibility_m, ..Environment::CLEAR_DAY };
         Case { class, paint, plate, environment, ..Case::usual() }
     }
 
-    /// Returns the distances of the first confirmed track in all approaches of a case (m).
-    fn first_m(&self, case: &Case, sensors: &Sensors) -> Result<Vec<f64>, StudyError> {
+    /// Returns when the tracks are confirmed and classified in all approaches of a case.
+    fn firsts(&self, case: &Case, sensors: &Sensors) -> Result<Vec<Firsts>, StudyError> {
         let one = |run| {
-            first_confirmed_m(case, sensors, &self.scenario.road, Address { seed: self.plan.seed, run })
+            firsts(case, sensors, &self.scenario.road, Address { seed: self.plan.seed, run })
                 .map_err(|source| StudyError::Sensor { case: case.name.clone(), run, source })
         };
         (0..self.plan.approaches).into_par_iter().map(one).collect()
     }
 
-    /// Returns the distance that the object-level sensor needs to confirm a vehicle (m).
-    fn own_delay_m(&self) -> Result<f64, StudyError> {
-        let sensors = self.object(&[format!("sensors.rear-object.range-m={TEST_RANGE_M:?}")])?;
-        Ok(TEST_RANGE_M - mean(&self.first_m(&Case::usual(), &sensors)?))
+    /// Returns the distances that the object-level sensor with these errors needs to confirm a vehicle, and to report its class (m).
+    fn own_delays_m(&self, errors: &FittedErrors) -> Result<[f64; 2], StudyError> {
+        let mut settings = settings_of(errors).to_vec();
+        settings.push(format!("sensors.rear-object.range-m={TEST_RANGE_M:?}"));
+        let sensors = self.object(&settings, TEST_CLASS_RANGE_M)?;
+        let [confirmed_m, classified_m] = means_m(&self.firsts(&Case::usual(), &sensors)?);
+        Ok([TEST_RANGE_M - confirmed_m, TEST_CLASS_RANGE_M - classified_m])
     }
 
-    /// Returns the object-level sensors with one range for all vehicles, and these settings.
-    fn object(&self, settings: &[String]) -> Result<Sensors, StudyError> {
+    /// Returns the object-level sensors with one range for all vehicles, whose classes they know up to `class_range_m` (m), and
+    /// these settings.
+    fn object(&self, settings: &[String], class_range_m: f64) -> Result<Sensors, StudyError> {
         let file = with_settings(self.plan.file, settings)?;
         let sensors = file.concrete(&file.space().nominal())?.sensors;
-        Ok(sensors.with_mode(SensorMode::Object).without_range_fit())
+        Ok(sensors.with_mode(SensorMode::Object).without_range_fit(class_range_m))
     }
 
     /// Returns the ranges of all classes and plates, and the scatter of the logarithm of a car's range.
-    fn ranges(&self) -> Result<(Vec<RangeGrid>, f64), StudyError> {
-        let delay_m = self.own_delay_m()?;
+    fn ranges(&self, errors: &FittedErrors) -> Result<(Vec<RangeGrid>, f64), StudyError> {
+        let [delay_m, class_delay_m] = self.own_delays_m(errors)?;
         let (mut grids, mut squares, mut count) = (Vec::new(), 0.0, 0.0);
         for (class, plate) in [
             (VehicleClass::Car, Plate::Clean),
@@ -140,44 +174,59 @@ impl Fitter<'_> {
             (VehicleClass::Truck, Plate::Clean),
             (VehicleClass::Motorcycle, Plate::Clean),
         ] {
-            let mut range_m = Vec::new();
+            let mut grid = RangeGrid { class, plate, range_m: Vec::new(), class_range_m: Vec::new() };
             for paint in PAINTS {
-                let mut row = Vec::new();
+                let (mut row_m, mut class_row_m) = (Vec::new(), Vec::new());
                 for visibility_m in VISIBILITIES_M {
-                    let found_m = self.first_m(&Self::case(class, paint, plate, visibility_m), &self.lidar)?;
-                    let centre_m = mean(&found_m);
+                    let found = self.firsts(&Self::case(class, paint, plate, visibility_m), &self.full)?;
+                    let [centre_m, classified_m] = means_m(&found);
                     if class == VehicleClass::Car {
-                        squares += found_m.iter().map(|it| (it / centre_m).ln().powi(2)).sum::<f64>();
-                        count += found_m.len() as f64 - 1.0;
+                        squares += found.iter().map(|it| (it.confirmed_m / centre_m).ln().powi(2)).sum::<f64>();
+                        count += found.len() as f64 - 1.0;
                     }
-                    row.push(rounded(centre_m + delay_m, 10.0));
+                    let range_m = rounded(centre_m + delay_m, 10.0);
+                    // A class that the full chain knows when it confirms the track limits nothing.
+                    let is_known_at_once = found.iter().all(|it| it.classified_m == it.confirmed_m);
+                    let class_range_m = rounded(classified_m + class_delay_m, 10.0).min(range_m);
+                    row_m.push(range_m);
+                    class_row_m.push(if is_known_at_once { range_m } else { class_range_m });
                 }
-                range_m.push(row);
+                grid.range_m.push(row_m);
+                grid.class_range_m.push(class_row_m);
             }
-            grids.push(RangeGrid { class, plate, range_m });
+            grids.push(grid);
         }
         Ok((grids, rounded((squares / count.max(1.0)).sqrt(), 1e4)))
     }
 
-    /// Returns the range of each body shape relative to the first of its class.
-    fn shapes(&self) -> Result<BTreeMap<String, f64>, StudyError> {
-        let mut factors = BTreeMap::new();
+    /// Returns the ranges of each body shape relative to those of the first of its class.
+    fn shapes(&self) -> Result<ShapeRatios, StudyError> {
+        let (mut range, mut class_range) = (BTreeMap::new(), BTreeMap::new());
         for class in VehicleClass::ALL {
-            let range_m = |shape: BodyShape| {
-                let of = |&(paint, visibility_m): &(f64, f64)| {
+            let means_m = |shape: BodyShape| {
+                let of = |paint: f64, visibility_m: f64| {
                     let case = Case { shape: Some(shape), ..Self::case(class, paint, Plate::Clean, visibility_m) };
-                    self.first_m(&case, &self.lidar).map(|found_m| mean(&found_m))
+                    self.firsts(&case, &self.full).map(|found| means_m(&found))
                 };
-                SHAPES_IN.iter().map(of).collect::<Result<Vec<f64>, StudyError>>()
+                let row = |paint| SHAPE_VISIBILITIES_M.iter().map(|visibility_m| of(paint, *visibility_m)).collect();
+                SHAPE_PAINTS.into_iter().map(row).collect::<Result<Vec<Vec<[f64; 2]>>, StudyError>>()
             };
             let shapes = BodyShape::of_class(class);
-            let first_m = range_m(shapes[0])?;
+            let first_m = means_m(shapes[0])?;
             for shape in &shapes[1..] {
-                let ratios: Vec<f64> = range_m(*shape)?.iter().zip(&first_m).map(|(own, of)| own / of).collect();
-                factors.insert(shape.name().to_owned(), rounded(mean(&ratios), 1e3));
+                let own_m = means_m(*shape)?;
+                let ratios = |of: usize| -> Vec<Vec<f64>> {
+                    let row = |(own, first): (&Vec<[f64; 2]>, &Vec<[f64; 2]>)| {
+                        own.iter().zip(first).map(|(own, first)| rounded(own[of] / first[of], 1e3)).collect()
+                    };
+                    own_m.iter().zip(&first_m).map(row).collect()
+                };
+                range.insert(shape.name().to_owned(), ratios(0));
+                class_range.insert(shape.name().to_owned(), ratios(1));
             }
         }
-        Ok(factors)
+        let extinctions_per_m = extinctions_per_m(&SHAPE_VISIBILITIES_M);
+        Ok(ShapeRatios { paints: SHAPE_PAINTS.to_vec(), extinctions_per_m, range, class_range })
     }
 
     /// Returns what the tracks of a case show in all approaches.
@@ -200,12 +249,8 @@ impl Fitter<'_> {
         // Errors of the speed follow from the white error along the road, those of the position from the slow one.
         let [mut range_sd_m, mut lateral_sd_m, mut drift_sd_m] = [0.1; 3];
         for _ in 0..ITERATIONS {
-            let sensors = self.object(&[
-                format!("sensors.rear-object.range-sd-m={range_sd_m:?}"),
-                format!("sensors.rear-object.lateral-sd-m={lateral_sd_m:?}"),
-                format!("sensors.rear-object.drift-sd-m={drift_sd_m:?}"),
-                format!("sensors.rear-object.drift-time-s={drift_time_s:?}"),
-            ])?;
+            let errors = FittedErrors { range_sd_m, lateral_sd_m, drift_sd_m, drift_time_s };
+            let sensors = self.object(&settings_of(&errors), f64::INFINITY)?;
             let own = root_mean_squares(&self.watched(&usual, &sensors)?);
             let scaled = |sd_m: f64, axis: usize| {
                 rounded((sd_m * goal[axis] / own[axis]).clamp(SD_BOUNDS_M[0], SD_BOUNDS_M[1]), 1e4)
@@ -218,9 +263,8 @@ impl Fitter<'_> {
 
     /// Returns the mean score of the true class, of each class.
     fn class_confidence(&self) -> Result<ByClass, StudyError> {
-        let sensors = self.scenario.sensors.with_mode(SensorMode::Full);
         let of = |class| {
-            let watched = self.watched(&Case { class, ..Case::usual() }, &sensors)?;
+            let watched = self.watched(&Case { class, ..Case::usual() }, &self.full)?;
             let scores: Vec<f64> = watched.iter().flat_map(|one| one.scores.iter().copied()).collect();
             Ok::<f64, StudyError>(rounded(mean(&scores).clamp(0.25, 1.0), 1e4))
         };

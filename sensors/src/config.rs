@@ -56,8 +56,8 @@ pub struct SensorsConfig {
     pub rear_object: ObjectSensorConfig,
     /// The rear LiDAR.
     pub rear_lidar: LidarConfig,
-    /// The LiDAR that looks ahead in place of the radar, in mode `full`. It has no faults yet. Default: none; the radar looks
-    /// ahead.
+    /// The LiDAR that looks ahead in place of the radar, in mode `full`. Its faults are those of `fault.front-lidar`. Default: none;
+    /// the radar looks ahead.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub front_lidar: Option<LidarConfig>,
     /// The rear camera, whose network classifies each cluster of the rear LiDAR.
@@ -163,26 +163,31 @@ impl Sensors {
         Self { altered: Alterations { faults, ..self.altered }, ..self }
     }
 
-    /// Checks that no fault puts the rear LiDAR lower than the model covers.
+    /// Checks that no fault puts a LiDAR lower than the model covers.
     ///
     /// # Errors
-    /// [`ConfigError`] at `rear-lidar.mount-height-m`.
+    /// [`ConfigError`] at `rear-lidar.mount-height-m` or `front-lidar.mount-height-m`.
     pub fn check_mounting(&self) -> Result<(), ConfigError> {
-        let height_m = self.full.rear_lidar.mount_height_m;
-        let lowest_m = self.faults().rear_lidar.combinations().map(|(_, fault)| fault.height_m).fold(0.0, f64::min);
-        if height_m + lowest_m >= MIN_LIDAR_HEIGHT_M {
-            return Ok(());
+        let Faults { rear_lidar, front_lidar, .. } = self.faults();
+        let front = self.full.front_lidar.map(|lidar| (lidar, front_lidar, "front-lidar", "fault.front-lidar"));
+        let rear = (self.full.rear_lidar, rear_lidar, "rear-lidar", "fault.rear-lidar");
+        for (lidar, faults, key, other) in std::iter::once(rear).chain(front) {
+            let lowest_m = faults.combinations().map(|(_, fault)| fault.height_m).fold(0.0, f64::min);
+            if !(lidar.mount_height_m + lowest_m >= MIN_LIDAR_HEIGHT_M) {
+                let rule =
+                    format!("a fault of the mounting leaves the LiDAR at least {MIN_LIDAR_HEIGHT_M} m above the road");
+                let problem = Problem::Contradiction { other, rule };
+                return Err(ConfigError::new("mount-height-m", problem).within(key));
+            }
         }
-        let rule = format!("a fault of the mounting leaves the LiDAR at least {MIN_LIDAR_HEIGHT_M} m above the road");
-        let problem = Problem::Contradiction { other: "fault.rear-lidar", rule };
-        Err(ConfigError::new("mount-height-m", problem).within("rear-lidar"))
+        Ok(())
     }
 
-    /// Returns the same sensors with an object-level sensor behind that has one range for all vehicles: what the fit to the full
-    /// chain is made with.
+    /// Returns the same sensors with an object-level sensor behind that has one range for all vehicles, and knows their classes up
+    /// to `class_range_m` (m): what the fit to the full chain is made with.
     #[must_use]
-    pub fn without_range_fit(self) -> Self {
-        Self { rear_object: self.rear_object.without_fit(), ..self }
+    pub fn without_range_fit(self, class_range_m: f64) -> Self {
+        Self { rear_object: self.rear_object.without_fit(class_range_m), ..self }
     }
 
     /// Returns the errors of the ego's odometry and map.

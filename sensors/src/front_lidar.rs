@@ -10,6 +10,7 @@ use closecall_tracking::{TrackList, TrackerModel};
 use closecall_traffic::Source;
 use closecall_traffic::ego_frame::EgoFrame;
 
+use crate::faults::{FaultList, LidarFault};
 use crate::half_turn::{HalfTurn, turn_back};
 use crate::lidar::{Lidar, RearLidar};
 use crate::lidar_chain::{LidarChain, Seen};
@@ -25,6 +26,11 @@ impl FrontLidar {
     /// Creates the chain before its first step, with random streams keyed by `key`.
     pub(crate) fn new(lidar: Lidar, tracker: TrackerModel, key: &NoiseKey) -> Self {
         Self { chain: LidarChain::new(lidar, tracker, key, ["front-lidar", "front-lidar-fault"]) }
+    }
+
+    /// Returns the same sensor with faults.
+    pub(crate) fn with_faults(self, faults: FaultList<LidarFault>) -> Self {
+        Self { chain: self.chain.with_faults(faults.map(LidarFault::turned)) }
     }
 
     /// Measures `scene`, which the ego believes to be `believed`, and appends the tracks to `list`.

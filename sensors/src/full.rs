@@ -89,6 +89,7 @@ impl FullPerception {
     pub(crate) fn with_faults(self, faults: &Faults) -> Self {
         Self {
             front: self.front.with_faults(faults.front_radar),
+            front_lidar: self.front_lidar.map(|lidar| lidar.with_faults(faults.front_lidar)),
             surround: self.surround.with_faults(faults.surround),
             rear: self.rear.with_faults(faults.rear_lidar),
             belief: Belief::new(faults.odometry),

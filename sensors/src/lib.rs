@@ -35,7 +35,7 @@ pub use full::{DetectionClassifier, FullModel, FullPerception};
 pub use ground_truth::GroundTruth;
 pub use object::{
     ByClass, FitError, FittedErrors, NoiseKey, ObjectPerception, ObjectSensorConfig, ObjectSensorModel, Origin,
-    RangeGrid, RearFit,
+    RangeGrid, RearFit, ShapeRatios,
 };
 pub use perception::{FieldOfView, Health, Perception, SensorError, SensorHealth};
 pub use worker_classifier::{inference_backend, rear_exposures, set_inference_backend};

@@ -5,6 +5,7 @@
 //!           └─▶ ScanWriter    one row per LiDAR return
 //! ```
 
+mod pcd;
 mod run_tables;
 mod scan_columns;
 mod scans;

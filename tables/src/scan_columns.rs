@@ -21,7 +21,8 @@ pub(crate) enum Mounting {
 }
 
 impl Mounting {
-    const fn name(self) -> &'static str {
+    /// Returns the name in the table.
+    pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::Front => "front-lidar",
             Self::Rear => "rear-lidar",
@@ -29,7 +30,7 @@ impl Mounting {
     }
 
     /// Returns the factor of x and y in the ego's frame.
-    const fn sign(self) -> f32 {
+    pub(crate) const fn sign(self) -> f32 {
         match self {
             Self::Front => -1.0,
             Self::Rear => 1.0,

@@ -1,4 +1,4 @@
-//! The points of the LiDARs of a run, as a Parquet table with one row per return.
+//! The points of the LiDARs of a run: a Parquet table with one row per return, or a folder of point clouds (`crate::pcd`).
 //!
 //! | column | meaning |
 //! |---|---|
@@ -27,6 +27,7 @@ use closecall_simulation::{Observer, RunEvent, StepView};
 use closecall_traffic::Time;
 use parquet::arrow::ArrowWriter;
 
+use crate::pcd::PcdFolder;
 use crate::scan_columns::{Mounting, ScanColumns};
 use crate::table::properties;
 
@@ -36,37 +37,50 @@ const ROWS_IN_MEMORY: usize = 65_536;
 /// Observes a run and writes the returns of its LiDARs.
 pub struct ScanWriter {
     path: PathBuf,
-    writer: ArrowWriter<File>,
-    rows: ScanColumns,
+    sink: Sink,
     /// Number of scans of the front and of the rear LiDAR, and the end of the latest.
     frames: [(u32, Option<Time>); 2],
     /// The first error, after which nothing is written.
     failed: Option<io::Error>,
 }
 
+/// What the scans are written to.
+enum Sink {
+    /// A table, with the rows that are not written yet.
+    Table(Box<ArrowWriter<File>>, Box<ScanColumns>),
+    /// A folder of point clouds.
+    Folder(PcdFolder),
+}
+
 impl ScanWriter {
-    /// Creates a writer of the Parquet file `path`.
+    /// Creates a writer of the Parquet file or of the folder `path`, which ends in `.parquet` or `.pcd`.
     ///
     /// # Errors
-    /// [`WriteError`] if the sensors of this mode have no LiDAR, if the extension is not `.parquet`, or if no file can be created
-    /// there.
+    /// [`WriteError`] if the sensors of this mode have no LiDAR, if the extension is another, or if no file can be created there.
     pub fn new(path: &Path, mode: SensorMode) -> Result<Self, WriteError> {
         let fail = |error| WriteError::new(path, error);
         if mode != SensorMode::Full {
             let message = "the run has no LiDAR, which only sensors of mode `full` have (--sensors full)";
             return Err(fail(io::Error::new(io::ErrorKind::InvalidInput, message)));
         }
-        if path.extension().is_none_or(|extension| extension != "parquet") {
-            return Err(fail(io::Error::new(io::ErrorKind::InvalidInput, "scans are a file *.parquet")));
-        }
-        check_writable(path)?;
-        let file = tempfile::tempfile().map_err(fail)?;
-        let writer = ArrowWriter::try_new(file, ScanColumns::schema(), Some(properties()));
-        let writer = writer.map_err(|error| fail(io::Error::other(error)))?;
-        Ok(Self { path: path.to_owned(), writer, rows: ScanColumns::default(), frames: [(0, None); 2], failed: None })
+        let sink = match path.extension().and_then(|extension| extension.to_str()) {
+            Some("parquet") => {
+                check_writable(path)?;
+                let file = tempfile::tempfile().map_err(fail)?;
+                let writer = ArrowWriter::try_new(file, ScanColumns::schema(), Some(properties()));
+                let writer = writer.map_err(|error| fail(io::Error::other(error)))?;
+                Sink::Table(Box::new(writer), Box::default())
+            }
+            Some("pcd") => Sink::Folder(PcdFolder::new(path).map_err(fail)?),
+            _ => {
+                let message = "scans are a file *.parquet or a folder *.pcd";
+                return Err(fail(io::Error::new(io::ErrorKind::InvalidInput, message)));
+            }
+        };
+        Ok(Self { path: path.to_owned(), sink, frames: [(0, None); 2], failed: None })
     }
 
-    /// Completes the file.
+    /// Completes the file or the folder.
     ///
     /// # Errors
     /// [`WriteError`] if a scan could not be completed, or if the file cannot be written completely. An existing file then stays as it is.
@@ -77,16 +91,21 @@ impl ScanWriter {
         if let Some(error) = self.failed {
             return Err(fail(error));
         }
-        let mut file = self.writer.into_inner().map_err(|error| fail(io::Error::other(error)))?;
-        file.rewind().map_err(fail)?;
-        write_file(&path, |to| io::copy(&mut file, to).map(drop))
+        match self.sink {
+            Sink::Table(writer, _) => {
+                let mut file = writer.into_inner().map_err(|error| fail(io::Error::other(error)))?;
+                file.rewind().map_err(fail)?;
+                write_file(&path, |to| io::copy(&mut file, to).map(drop))
+            }
+            Sink::Folder(folder) => folder.finish(&path).map_err(fail),
+        }
     }
 
     /// Writes the collected rows.
     fn flush(&mut self) {
-        if self.failed.is_none() {
-            let batch = self.rows.take_batch();
-            let written = batch.and_then(|batch| self.writer.write(&batch).map_err(io::Error::other));
+        if let (None, Sink::Table(writer, rows)) = (&self.failed, &mut self.sink) {
+            let batch = rows.take_batch();
+            let written = batch.and_then(|batch| writer.write(&batch).map_err(io::Error::other));
             self.failed = written.err();
         }
     }
@@ -108,7 +127,13 @@ impl ScanWriter {
         };
         let actors = &view.scenario.actors;
         let name = |index: usize| actors.get(index).map_or_else(|| index.to_string(), |actor| actor.id.to_string());
-        self.rows.append((mounting, frame), &complete, &name);
+        match &mut self.sink {
+            Sink::Table(_, rows) => rows.append((mounting, frame), &complete, &name),
+            Sink::Folder(folder) if self.failed.is_none() => {
+                self.failed = folder.write(mounting, frame, &complete).err();
+            }
+            Sink::Folder(_) => {}
+        }
     }
 }
 
@@ -120,7 +145,7 @@ impl Observer for ScanWriter {
         if let Some(lidar) = view.perception.rear_lidar() {
             self.append(Mounting::Rear, lidar, view);
         }
-        if self.rows.len() >= ROWS_IN_MEMORY {
+        if matches!(&self.sink, Sink::Table(_, rows) if rows.len() >= ROWS_IN_MEMORY) {
             self.flush();
         }
     }

@@ -105,6 +105,95 @@ fn a_run_without_a_lidar_and_a_wrong_extension_are_answered() {
     let error = write(&path, "sensors.mode = \"object\"\n").unwrap_err();
     assert!(error.contains("scans.parquet") && error.contains("--sensors full"), "{error}");
     assert!(!path.exists());
-    let error = write(&folder.path().join("scans.pcd"), "sensors.mode = \"full\"\n").unwrap_err();
-    assert!(error.contains("*.parquet"), "{error}");
+    let error = write(&folder.path().join("scans.las"), "sensors.mode = \"full\"\n").unwrap_err();
+    assert!(error.contains("*.parquet or a folder *.pcd"), "{error}");
+    let taken = folder.path().join("taken.pcd");
+    std::fs::create_dir(&taken).unwrap();
+    std::fs::write(taken.join("notes"), "kept").unwrap();
+    let error = write(&taken, "sensors.mode = \"full\"\n").unwrap_err();
+    assert!(error.contains("taken.pcd") && error.contains("not an empty folder"), "{error}");
+    assert_eq!(std::fs::read_to_string(taken.join("notes")).unwrap(), "kept");
+}
+
+/// A point cloud: position, intensity, beam and time of each point.
+type Cloud = Vec<([f32; 4], u16, f64)>;
+
+/// Reads a binary PCD file as its header describes it.
+fn read_pcd(path: &Path) -> Cloud {
+    let bytes = std::fs::read(path).unwrap();
+    let marker = b"DATA binary\n";
+    let data = bytes.windows(marker.len()).position(|window| window == marker).unwrap() + marker.len();
+    let header = std::str::from_utf8(&bytes[..data]).unwrap();
+    let entry = |key: &str| -> Vec<String> {
+        let line = header.lines().find_map(|line| line.strip_prefix(key)).unwrap_or_else(|| panic!("{key}"));
+        line.split_whitespace().map(str::to_owned).collect()
+    };
+    assert_eq!(entry("VERSION"), ["0.7"]);
+    assert_eq!(entry("FIELDS"), ["x", "y", "z", "intensity", "beam", "time"]);
+    assert_eq!((entry("TYPE"), entry("COUNT")), (entry("TYPE"), vec!["1".to_owned(); 6]));
+    let sizes: Vec<usize> = entry("SIZE").iter().map(|size| size.parse().unwrap()).collect();
+    let points: usize = entry("POINTS")[0].parse().unwrap();
+    assert_eq!((entry("WIDTH"), entry("HEIGHT")[0].as_str()), (entry("POINTS"), "1"));
+    assert_eq!(bytes.len() - data, points * sizes.iter().sum::<usize>());
+    let fields = |record: &[u8]| -> Vec<Vec<u8>> {
+        let mut rest = record;
+        sizes
+            .iter()
+            .map(|size| {
+                let (field, after) = rest.split_at(*size);
+                rest = after;
+                field.to_vec()
+            })
+            .collect()
+    };
+    let single = |bytes: &[u8]| f32::from_le_bytes(bytes.try_into().unwrap());
+    bytes[data..]
+        .chunks(sizes.iter().sum())
+        .map(fields)
+        .map(|field| {
+            let at = [0, 1, 2, 3].map(|index| single(&field[index]));
+            (
+                at,
+                u16::from_le_bytes(field[4][..].try_into().unwrap()),
+                f64::from_le_bytes(field[5][..].try_into().unwrap()),
+            )
+        })
+        .collect()
+}
+
+#[test]
+fn the_point_clouds_are_read_back_as_the_rows_of_the_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let [table, clouds] = ["scans.parquet", "scans.pcd"].map(|name| folder.path().join(name));
+    let sensors = "sensors.mode = \"full\"\nsensors.front-lidar.model = \"os1-64\"\n";
+    write(&table, sensors).unwrap();
+    write(&clouds, sensors).unwrap();
+    let mut expected: std::collections::BTreeMap<String, Cloud> = std::collections::BTreeMap::new();
+    for batch in read(&table) {
+        let single = |name| column::<Float32Array>(&batch, name);
+        let [x_m, y_m, z_m, intensity] = ["x_m", "y_m", "z_m", "intensity"].map(single);
+        let (sensor, frame) = (column::<StringArray>(&batch, "sensor"), column::<UInt32Array>(&batch, "frame"));
+        let (beam, offset_ns) = (column::<UInt16Array>(&batch, "beam"), column::<UInt32Array>(&batch, "offset_ns"));
+        for row in 0..batch.num_rows() {
+            let name = format!("{}-{:05}.pcd", sensor.value(row), frame.value(row));
+            let at = [x_m, y_m, z_m, intensity].map(|values| values.value(row));
+            let offset_s = f64::from(offset_ns.value(row)) * 1e-9;
+            expected.entry(name).or_default().push((at, beam.value(row), offset_s));
+        }
+    }
+    let mut names: Vec<String> =
+        std::fs::read_dir(&clouds).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    assert_eq!(names, expected.keys().cloned().collect::<Vec<_>>());
+    assert!(names.len() > 30, "{} files", names.len());
+    for (name, rows) in expected {
+        let cloud = read_pcd(&clouds.join(&name));
+        assert_eq!(cloud.len(), rows.len(), "{name}");
+        // Times differ by the start of the sweep, which is the same for all points of a scan.
+        let start_s = cloud[0].2 - rows[0].2;
+        for ((at, beam, time_s), (expected_at, expected_beam, offset_s)) in cloud.iter().zip(&rows) {
+            assert_eq!((at.map(f32::to_bits), beam), (expected_at.map(f32::to_bits), expected_beam), "{name}");
+            assert!((time_s - offset_s - start_s).abs() < 1e-9, "{name}: {time_s} {offset_s}");
+        }
+    }
 }

@@ -4,7 +4,7 @@
 //! as being in a lane if the tracker gives that lane a probability of at least one half.
 
 use closecall_traffic::metrics::{bumper_gap_m, touching_distance_m};
-use closecall_traffic::{ClassScores, Side, Source, Time, Track, TrackId, TrackStatus};
+use closecall_traffic::{Side, Source, Time, Track, TrackId, TrackStatus};
 use serde::Serialize;
 
 use super::{EgoInput, Odometry};
@@ -267,14 +267,6 @@ fn exists(track: &Track) -> bool {
     track.existence >= LIKELY
 }
 
-/// Returns true if the track is at least as likely a vehicle as not, and one vehicle class is more probable than the
-/// background. Equal scores carry no information and do not classify a track.
-fn is_classified(track: &Track) -> bool {
-    let scores = track.class.0;
-    let best = scores[track.class.best_vehicle_class() as usize];
-    track.class.vehicle() >= LIKELY && best > scores[ClassScores::BACKGROUND]
-}
-
 pub(crate) fn rear_vehicle_from(track: &Track, input: &EgoInput<'_>) -> RearVehicle {
     RearVehicle {
         track: track.id,
@@ -285,7 +277,7 @@ pub(crate) fn rear_vehicle_from(track: &Track, input: &EgoInput<'_>) -> RearVehi
         speed_mps: track.vx_mps(),
         speed_sd_mps: track.covariance[(2, 2)].max(0.0).sqrt(),
         confirmed: is_established(track),
-        classified: is_classified(track),
+        classified: track.class.is_vehicle(),
         own_lane: track.lane[OWN_LANE_INDEX],
         passing_lane: track.lane[passing_lane_index(input.road.overtaking_side())],
     }
@@ -300,7 +292,7 @@ pub(crate) fn nearest_rear_vehicle(input: &EgoInput<'_>) -> Option<RearVehicle> 
     let nearer = |a: &&Track, b: &&Track| b.x_m().total_cmp(&a.x_m());
     let vehicles = || input.tracks.iter().filter(behind);
     let best = vehicles()
-        .filter(|track| is_established(track) && is_classified(track))
+        .filter(|track| is_established(track) && track.class.is_vehicle())
         .min_by(nearer)
         .or_else(|| vehicles().min_by(nearer))?;
     Some(rear_vehicle_from(best, input))

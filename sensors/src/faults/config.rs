@@ -1,4 +1,4 @@
-//! The faults of the rear LiDAR and the rear camera as a scenario file describes them, and the table of all faults.
+//! The faults of the LiDARs and the rear camera as a scenario file describes them, and the table of all faults.
 //!
 //! Sources: the yaw of a mounted LiDAR can be measured to 0.1° in production (Kim et al. 2020, arXiv 2008.10542), so that a
 //! residual of some tenths of a degree is what a fault of the mounting means. All other magnitudes are the scenario's choice.
@@ -24,7 +24,7 @@ const HEIGHT_M: Range = Range::closed(-0.2, 0.5);
 /// Maximum number of blocked sectors: one for each entry.
 pub(crate) const MAX_SECTORS: usize = 4;
 
-/// A fault of the rear LiDAR. It holds from `from-s` to `until-s`, with all effects that it names.
+/// A fault of a LiDAR. It holds from `from-s` to `until-s`, with all effects that it names.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct LidarFaultConfig {
@@ -40,8 +40,8 @@ pub struct LidarFaultConfig {
     pub lost_frames: Option<Num>,
     /// Share of points that are lost, regardless of their power (-), in addition to the sensor's own `dropout`. Default: 0.
     pub dropout: Option<Num>,
-    /// Azimuth at which a blocked sector begins (deg), within the LiDAR's field of view: 0 is straight behind, positive is to the
-    /// ego's left.
+    /// Azimuth at which a blocked sector begins (deg), within the LiDAR's field of view: 0 is straight behind, or straight ahead for
+    /// the LiDAR that looks ahead; positive is to the ego's left.
     pub blocked_from_deg: Option<Num>,
     /// Azimuth at which the blocked sector ends (deg).
     pub blocked_to_deg: Option<Num>,
@@ -72,7 +72,7 @@ pub struct LidarFaultConfig {
     pub blooming_deg: Option<Num>,
 }
 
-/// The effects of faults of the rear LiDAR at one instant.
+/// The effects of faults of a LiDAR at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct LidarFault {
     pub(crate) is_dead: bool,
@@ -149,6 +149,11 @@ impl Combine for LidarFault {
 }
 
 impl LidarFault {
+    /// Returns the fault in a scene turned by half a turn, in which the ego's left is on its right. Rotations keep their sense.
+    pub(crate) fn turned(self) -> Self {
+        Self { blocked_deg: self.blocked_deg.map(|sector| sector.map(|[from, to]| [-to, -from])), ..self }
+    }
+
     /// Returns the additional latency in control steps, for a uniform random number of this scan.
     pub(crate) fn delay_steps(&self, uniform: f64) -> u64 {
         #[expect(
@@ -173,7 +178,7 @@ pub(super) fn without_effect() -> ConfigError {
 }
 
 impl LidarFaultConfig {
-    /// Checks the entries of `[[fault.rear-lidar]]`.
+    /// Checks the entries of `[[fault.rear-lidar]]` or `[[fault.front-lidar]]`.
     pub(crate) fn check_all(
         key: &str,
         entries: &[Self],
@@ -333,6 +338,8 @@ impl Combine for CameraFault {
 pub struct FaultEntries<'a> {
     /// `[[fault.rear-lidar]]`
     pub rear_lidar: &'a [LidarFaultConfig],
+    /// `[[fault.front-lidar]]`
+    pub front_lidar: &'a [LidarFaultConfig],
     /// `[[fault.rear-camera]]`
     pub rear_camera: &'a [CameraFaultConfig],
     /// `[[fault.front-radar]]`, `[[fault.surround]]` and `[[fault.rear-object]]`
@@ -351,6 +358,7 @@ impl FaultEntries<'_> {
         let [front, surround, rear] = self.object;
         Ok(super::Faults {
             rear_lidar: LidarFaultConfig::check_all("rear-lidar", self.rear_lidar, parameters)?,
+            front_lidar: LidarFaultConfig::check_all("front-lidar", self.front_lidar, parameters)?,
             rear_camera: CameraFaultConfig::check_all("rear-camera", self.rear_camera, parameters)?,
             front_radar: ObjectFaultConfig::check_all("front-radar", front, parameters)?,
             surround: ObjectFaultConfig::check_all("surround", surround, parameters)?,

@@ -71,6 +71,12 @@ impl<T: Combine> FaultList<T> {
         supplier.map(|entry| time.s() - entry.from_s.max(0.0))
     }
 
+    /// Returns the same entries with other effects.
+    pub(crate) fn map(self, change: impl Fn(T) -> T) -> Self {
+        let changed = |entry: Entry<T>| Entry { effect: change(entry.effect), ..entry };
+        Self { entries: self.entries.map(|entry| entry.map(changed)) }
+    }
+
     /// Returns the same entries, each from before the start of the run to its end.
     fn throughout(self) -> Self {
         let always = |entry: Entry<T>| Entry { from_s: f64::NEG_INFINITY, until_s: f64::INFINITY, ..entry };
@@ -107,6 +113,7 @@ pub(super) fn check_span([from, until]: [&Option<Num>; 2], parameters: &Paramete
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Faults {
     pub(crate) rear_lidar: FaultList<LidarFault>,
+    pub(crate) front_lidar: FaultList<LidarFault>,
     pub(crate) rear_camera: FaultList<CameraFault>,
     pub(crate) front_radar: FaultList<ObjectFault>,
     pub(crate) surround: FaultList<ObjectFault>,
@@ -121,6 +128,7 @@ impl Faults {
     pub fn throughout(self) -> Self {
         Self {
             rear_lidar: self.rear_lidar.throughout(),
+            front_lidar: self.front_lidar.throughout(),
             rear_camera: self.rear_camera.throughout(),
             front_radar: self.front_radar.throughout(),
             surround: self.surround.throughout(),

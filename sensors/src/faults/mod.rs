@@ -1,7 +1,7 @@
 //! Faults of the sensors, each with a start and an end: what breaks, becomes dirty, is late, or is mounted askew.
 //!
 //! ```text
-//!  [[fault.rear-lidar]]  ─▶ FaultList ─▶ what holds at this instant ─▶ scan, frames, health
+//!  [[fault.rear-lidar]]  ─▶ FaultList ─▶ what holds at this instant ─▶ scan, frames, health (also [[fault.front-lidar]])
 //!  [[fault.rear-camera]] ─▶     〃    ─▶            〃              ─▶ pixels of each crop, health
 //!  [[fault.front-radar]] and the other object-level sensors         ─▶ measurements, tracks, health
 //!  [fault.odometry]      ─▶ OdometryErrors ─▶ the scene as the ego believes it to be

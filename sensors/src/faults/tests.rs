@@ -1,6 +1,7 @@
 //! What each fault does to perception: the same scene with and without it.
 
 mod camera;
+mod front_lidar;
 mod object;
 
 use closecall_traffic::{
@@ -25,6 +26,7 @@ const LEFT_LANE_M: f64 = -1.875;
 #[serde(rename_all = "kebab-case", default, deny_unknown_fields)]
 struct Table {
     rear_lidar: Vec<LidarFaultConfig>,
+    front_lidar: Vec<LidarFaultConfig>,
     rear_camera: Vec<CameraFaultConfig>,
     front_radar: Vec<ObjectFaultConfig>,
     surround: Vec<ObjectFaultConfig>,
@@ -36,6 +38,7 @@ fn faults(text: &str) -> Result<Faults, String> {
     let table: Table = toml::from_str(text).map_err(|error| error.to_string())?;
     let entries = FaultEntries {
         rear_lidar: &table.rear_lidar,
+        front_lidar: &table.front_lidar,
         rear_camera: &table.rear_camera,
         object: [&table.front_radar, &table.surround, &table.rear_object],
         odometry: table.odometry.as_ref(),

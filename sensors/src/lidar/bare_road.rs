@@ -16,7 +16,7 @@
 //! leaving out a beam changes no other one.
 
 use super::cast::{ColumnHits, SubRays};
-use super::ground::{GROUND_M, GROUND_REACH_M, GROUND_SLOPE};
+use super::ground::{GROUND_M, GROUND_SLOPE};
 use super::noise::MAX_NORMAL;
 use super::pattern::{CentreLines, Column, Elevation, ROAD_LAYERS};
 use super::power::{LinkBudget, MIN_POWER};
@@ -44,18 +44,23 @@ pub(crate) struct BareRoad {
     max_shift_m: f32,
 }
 
+/// Returns the distance beyond which a road of this strength (m) returns too little light to be detected (m).
+pub(crate) fn farthest_road_return_m(link: &LinkBudget, strength_m: f32) -> f32 {
+    (POWER_MARGIN * link.gain_m2 * strength_m / MIN_POWER).cbrt()
+}
+
 impl BareRoad {
-    /// Returns the bounds, or `None` if the road may return light from beyond the distance up to which it counts as
-    /// ground.
+    /// Returns the bounds, or `None` if the road may return light from beyond `ground_reach_m`, up to which it counts as ground (m).
+    /// `max_shift_m` is the distance by which deskewing may move a point (m).
     pub(crate) fn new(
         targets: &Targets,
         link: &LinkBudget,
         pose: SensorPoseEstimate,
-        max_shift_m: f32,
+        [max_shift_m, ground_reach_m]: [f32; 2],
     ) -> Option<Self> {
         let max_error_m = MAX_NORMAL * link.range_sd_m(1.0);
-        let farthest_m = (POWER_MARGIN * link.gain_m2 * targets.faces[0].strength_m / MIN_POWER).cbrt();
-        let is_near = farthest_m + max_error_m + max_shift_m + MARGIN_M < GROUND_REACH_M;
+        let farthest_m = farthest_road_return_m(link, targets.faces[0].strength_m);
+        let is_near = farthest_m + max_error_m + max_shift_m + MARGIN_M < ground_reach_m;
         is_near.then_some(Self { pose, max_error_m, max_shift_m })
     }
 

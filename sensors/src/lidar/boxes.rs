@@ -70,6 +70,8 @@ pub(crate) struct BoxFit {
     pub(crate) spacing_m: f64,
     /// Height up to which the sensor sees at that distance (m).
     pub(crate) in_view_m: f64,
+    /// Standard deviation of the range of a usual point (m).
+    pub(crate) point_sd_m: f64,
     /// Spacing of layers, and height of a footprint (rad).
     pub(crate) vertical_rad: [f64; 2],
     /// Least and greatest azimuth of the points about the sensor's axis, positive to the ego's left (rad).
@@ -143,6 +145,7 @@ impl BoxFit {
             range_m: 0.0,
             spacing_m: 0.0,
             in_view_m: 0.0,
+            point_sd_m: scan.resolution.point_sd_m,
             vertical_rad: [scan.resolution.layer_rad, scan.resolution.footprint_rad],
             azimuth_rad: [0.0; 2],
             truncated: truncated_edges(members, scan),

@@ -19,8 +19,6 @@ const OCCLUSION_DEPTH_M: f64 = 1.0;
 const EDGE_SD_COLUMNS: f64 = 0.3;
 /// Standard deviation of the position of a vehicle's front (m), which is not flat: bumper, plate, bonnet edge.
 pub(crate) const FACE_SD_M: f64 = 0.034;
-/// Standard deviation of the range of a single point (m).
-const POINT_SD_M: f64 = 0.05;
 /// Additional standard deviation of the front if a side is seen too, whose points lie close behind those of the front
 /// (m).
 const CORNER_SD_M: f64 = 0.05;
@@ -265,7 +263,7 @@ fn detection(fit: &BoxFit, hidden: [bool; 2], start: Time, lane: &LaneGeometry) 
 /// Returns the position of the front face along the box's heading, and its standard deviation (m).
 fn front(fit: &BoxFit, class: &ClassScores) -> (f64, f64) {
     let face_sd_m = if sees_side(fit) { FACE_SD_M.hypot(CORNER_SD_M) } else { FACE_SD_M };
-    let sd = face_sd_m.hypot(POINT_SD_M / (fit.front_points.max(1) as f64).sqrt());
+    let sd = face_sd_m.hypot(fit.point_sd_m / (fit.front_points.max(1) as f64).sqrt());
     if fit.is_truncated() {
         // The vehicle is partly or entirely beside the ego. The front follows from the rear end and the typical length.
         let [typical_length, _] = typical_size_m(class.best_vehicle_class() as usize);

@@ -1,17 +1,23 @@
 //! Selection of the points that may belong to a vehicle: those in the region of interest that are not on the ground.
 //!
 //! The road returns light only where beams meet it steeply enough: within about 20 m at the usual mounting height. A
-//! point near z = 0 therefore counts as ground up to [`GROUND_REACH_M`]. Beyond that distance a low point is kept,
-//! since it can only originate from an object on the road. Its height is that of the beam's centre, and may be off by
-//! half a footprint.
+//! point near z = 0 therefore counts as ground up to [`ground_reach_m`]: 40 m, and more for a stronger or a higher sensor. Beyond
+//! that distance a low point is kept, since it can only originate from an object on the road. Its height is that of the beam's
+//! centre, and may be off by half a footprint.
 
-use closecall_traffic::Time;
+use closecall_traffic::{Environment, Time};
 
-use super::{LaneGeometry, LidarScan};
+use super::bare_road::farthest_road_return_m;
+use super::material::asphalt;
+use super::noise::MAX_NORMAL;
+use super::power::LinkBudget;
+use super::{LaneGeometry, Lidar, LidarScan};
 use crate::SensorError;
 
-/// Distance from the sensor up to which the road may give returns (m).
-pub(crate) const GROUND_REACH_M: f32 = 40.0;
+/// Distance from the sensor up to which the road may give returns, at least (m).
+const MIN_GROUND_REACH_M: f32 = 40.0;
+/// Distance by which the pitch of the ego and the motion within a sweep may change the distance of a return (m).
+const GROUND_MARGIN_M: f32 = 1.0;
 /// Height below which a point counts as ground, at distance zero (m).
 pub(crate) const GROUND_M: f32 = 0.10;
 /// Increase of that height per metre of distance (rad). It covers three standard deviations of the levelling error, and
@@ -25,6 +31,19 @@ pub(crate) const REACH_M: f32 = 200.0;
 const DROPLET_INTENSITY: f32 = 0.02;
 /// Distance up to which returns are checked for droplets (m).
 const DROPLET_REACH_M: f32 = 15.0;
+
+/// Returns the distance from this sensor up to which a dry road may give returns (m), in whole metres.
+#[expect(clippy::cast_possible_truncation, reason = "distances are in single precision")]
+pub(crate) fn ground_reach_m(lidar: &Lidar) -> f32 {
+    let link = LinkBudget::new(lidar, &Environment::CLEAR_DAY);
+    if lidar.is_exact {
+        // Without noise, no return is stronger than its power.
+        return MIN_GROUND_REACH_M;
+    }
+    let strength_m = asphalt(&Environment::CLEAR_DAY) * lidar.mount_height_m;
+    let farthest_m = farthest_road_return_m(&link, strength_m as f32) + MAX_NORMAL * link.range_sd_m(1.0);
+    (farthest_m + GROUND_MARGIN_M).ceil().max(MIN_GROUND_REACH_M)
+}
 
 /// A point that may belong to a vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,7 +79,7 @@ pub(crate) fn select_candidates(
         let left_m = y - (slope + bend * x) * x;
         let inside = back_m > 0.0 && back_m < REACH_M && left_m < left_end_m && left_m > right_end_m;
         let range_m = (back_m * back_m + y * y).sqrt();
-        let ground = range_m < GROUND_REACH_M && z < GROUND_M + GROUND_SLOPE * range_m;
+        let ground = range_m < scan.resolution.ground_reach_m && z < GROUND_M + GROUND_SLOPE * range_m;
         let droplet = range_m < DROPLET_REACH_M && intensity < DROPLET_INTENSITY;
         if inside && !ground && !droplet {
             candidates.push(Candidate { index, back_m, left_m });

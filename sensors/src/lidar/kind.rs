@@ -20,6 +20,13 @@ use super::{LidarModel, MirrorSide};
 
 /// Height of a sensor of which nothing else is said (m): in the bumper.
 const MOUNT_HEIGHT_M: f64 = 0.6;
+/// Distance up to which the road may give returns to a sensor of which nothing else is said (m).
+const GROUND_REACH_M: f32 = 40.0;
+/// Power of a usual return from a vehicle (detection thresholds): assumption, that of a grey car that fills the beam at 130 m. The
+/// range of such a point of the SCALA has a standard deviation of 0.05 m.
+const USUAL_POWER: f64 = 2.25;
+/// Decimals to which that standard deviation is rounded, as a factor.
+const SD_DECIMALS: f64 = 1e4;
 /// Greatest number of layers.
 const MAX_LAYERS: usize = 64;
 /// Greatest elevation of a layer (°).
@@ -111,8 +118,12 @@ pub(crate) struct Resolution {
     pub(crate) footprint_rad: f64,
     /// Tangent of the elevation up to which both mirror sides see.
     pub(crate) highest_tan: f64,
+    /// Standard deviation of the range of a usual point (m).
+    pub(crate) point_sd_m: f64,
     /// Height of the sensor's centre above the ground (m).
     pub(crate) mount_height_m: f64,
+    /// Distance up to which the road may give returns (m).
+    pub(crate) ground_reach_m: f32,
 }
 
 impl Default for Resolution {
@@ -322,7 +333,10 @@ impl Check for LidarKindConfig {
             layer_rad: spacing_deg * degree,
             footprint_rad: self.beam_height_deg * degree,
             highest_tan: (highest_deg.to_radians().tan() * HIGHEST_DECIMALS).round() / HIGHEST_DECIMALS,
+            point_sd_m: (self.range_sd_m.hypot(self.range_sd_at_threshold_m / USUAL_POWER) * SD_DECIMALS).round()
+                / SD_DECIMALS,
             mount_height_m: MOUNT_HEIGHT_M,
+            ground_reach_m: GROUND_REACH_M,
         };
         #[expect(clippy::cast_possible_truncation, reason = "ranges need no more than single precision")]
         let single = |value: f64, key, range| number(value, key, range).map(|value| value as f32);

@@ -11,8 +11,8 @@
 //!   =========================*====     rail
 //! ```
 //!
-//! A pulse that meets the rail and the road in front of it gives a point between them. The beam must then be wider than the
-//! rail's lower edge is high, which it is not below [`NARROW_TO_M`].
+//! A pulse that meets the rail and the road in front of it gives a point between them. The beam must then be higher than the
+//! rail's lower edge, which it is not up to [`narrow_to_m`].
 
 use super::echo::PULSE_M;
 use super::noise::MAX_NORMAL;
@@ -22,8 +22,11 @@ use super::receiver::SensorPoseEstimate;
 use super::targets::{Part, Targets};
 use super::{LaneGeometry, PointSource};
 
-/// Distance up to which a beam is lower than the 0.44 m below a rail (m): its height is 0.6°, and 0.8° with a margin.
-const NARROW_TO_M: f32 = 30.0;
+/// Height of the lower edge of a rail (m).
+const BELOW_RAIL_M: f64 = 0.44;
+/// Factor on the height of a beam, and the step to which a distance is rounded down (m): margins.
+const BEAM_MARGIN: f64 = 4.0 / 3.0;
+const NARROW_STEP_M: f64 = 10.0;
 /// Margin for rounding, and for the tilt of the sensor's frame (m).
 const MARGIN_M: f32 = 0.03;
 /// Distance by which a point is moved along its beam to learn whether the beam leads away from the road (m).
@@ -38,16 +41,27 @@ pub(crate) struct RailReturns {
     region_m: [f32; 2],
     /// Greatest error of a measured range (m).
     max_error_m: f32,
+    /// Distance up to which a beam is lower than the lower edge of a rail (m).
+    narrow_to_m: f32,
+}
+
+/// Returns the distance up to which a beam of this height (°) is lower than the lower edge of a rail (m): 30 m for 0.6°.
+#[expect(clippy::cast_possible_truncation, reason = "points are in single precision")]
+pub(crate) fn narrow_to_m(beam_height_deg: f64) -> f32 {
+    let exact_m = BELOW_RAIL_M / (BEAM_MARGIN * beam_height_deg).to_radians().tan();
+    ((exact_m / NARROW_STEP_M).floor() * NARROW_STEP_M) as f32
 }
 
 impl RailReturns {
-    /// Returns the limits, or `None` on a curved road, on which the distance of the rails varies within a column.
+    /// Returns the limits for beams of this height (°), or `None` on a curved road, on which the distance of the rails varies within
+    /// a column.
     #[expect(clippy::cast_possible_truncation, reason = "points are in single precision")]
-    pub(crate) fn new(lane: &LaneGeometry, link: &LinkBudget) -> Option<Self> {
+    pub(crate) fn new(lane: &LaneGeometry, link: &LinkBudget, beam_height_deg: f64) -> Option<Self> {
         (lane.curvature_per_m == 0.0).then(|| Self {
             slope: -lane.heading_rad as f32,
             region_m: lane.region_m.map(|end_m| end_m as f32),
             max_error_m: MAX_NORMAL * link.range_sd_m(1.0),
+            narrow_to_m: narrow_to_m(beam_height_deg),
         })
     }
 
@@ -71,7 +85,7 @@ impl RailReturns {
             inverse = inverse.max(greatest_inverse(column, tans, part, targets));
         }
         let plane_m = 1.0 / inverse;
-        let pulse_m = if plane_m > NARROW_TO_M { PULSE_M } else { 0.0 };
+        let pulse_m = if plane_m > self.narrow_to_m { PULSE_M } else { 0.0 };
         let nearest_m = (plane_m - self.max_error_m - pulse_m) * lowest.centre[1].min(highest.centre[1]);
         // The comparisons are false for NaN.
         inverse == 0.0 || column.centre.iter().all(|&azimuth| self.is_beyond(nearest_m, azimuth, pose))

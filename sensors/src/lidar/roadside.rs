@@ -5,6 +5,7 @@ use closecall_traffic::{PlanePose, Road};
 use super::Material::{Bark, Sign, Steel};
 use super::solid::Solid;
 use closecall_traffic::guard_rail::{BEAM_DEPTH_M, BEAM_TOP_M, POST_SPACING_M};
+use closecall_traffic::roadside::{BESIDE_M, GANTRY_M, LEG_HALF_M, SHEET_M, SIGN_M, TREE_M, outer_edge, positions_m};
 
 const BEAM_LOW_M: f64 = 0.44;
 const POST_WIDTH_M: f64 = 0.10;
@@ -47,39 +48,24 @@ pub(super) fn append_guard_rails(road: &Road, s_m: f64, placed: &mut Vec<PlacedS
     }
 }
 
-/// Distance of the near edge of a sign, and of the legs of a gantry, from the edge of the road (m): a hard shoulder of 2.5 m, and the
-/// clearance of 1.5 m (assumption within the usual cross-sections of German motorways, RAA 2008).
-const BESIDE_M: f64 = 4.0;
-/// Width and height of a sign (m), and height of its lower edge (m) (assumption).
-const SIGN_M: [f64; 3] = [1.0, 1.0, 1.5];
-/// Thickness of the face and of the back of a sign (m).
-const SHEET_M: f64 = 0.02;
-/// Half of the width of the post of a sign, and of a leg of a gantry (m).
-const LEG_HALF_M: [f64; 2] = [0.04, 0.2];
-/// Heights of the lower and of the upper edge of a gantry's signs (m): above the clearance of 4.7 m (assumption).
-const GANTRY_M: [f64; 2] = [5.0, 6.5];
-/// Distance of the stem of a tree from the edge of the road, half of its width, and its height (m) (assumption).
-const TREE_M: [f64; 3] = [7.5, 0.2, 6.0];
 /// Length of the road behind the ego on which these things are modelled (m).
 const REACH_M: f64 = 200.0;
 
 /// Appends the signs, gantries and trees behind the road position `s_m`.
 pub(super) fn append_roadside(road: &Road, s_m: f64, placed: &mut Vec<PlacedSolid>) {
     // On a reversed road the traffic's right edge is d = 0, and signs face the other way.
-    let (edge_m, outward, facing_rad) = match road.is_reversed() {
-        false => (road.right_edge_m(), -1.0, 0.0),
-        true => (0.0, 1.0, std::f64::consts::PI),
-    };
+    let (edge_m, outward) = outer_edge(road);
+    let facing_rad = if road.is_reversed() { std::f64::consts::PI } else { 0.0 };
     let far_edge_m = road.right_edge_m() - edge_m;
     let roadside = road.roadside();
-    for at_m in positions_m(roadside.sign_spacing_m, s_m) {
+    for at_m in positions_m(roadside.sign_spacing_m, s_m, REACH_M) {
         let [width, height, low] = SIGN_M;
         let pose = road.plane_pose(at_m, edge_m + outward * (BESIDE_M + 0.5 * width), facing_rad);
         append_sign([0.5 * width, low, low + height], pose, placed);
         let [half, _] = LEG_HALF_M;
         placed.push((Solid::cuboid([SHEET_M, -half, 0.0], [SHEET_M + 2.0 * half, half, low + height], Steel), pose));
     }
-    for at_m in positions_m(roadside.gantry_spacing_m, s_m) {
+    for at_m in positions_m(roadside.gantry_spacing_m, s_m, REACH_M) {
         let half_m = 0.5 * road.right_edge_m().abs() + BESIDE_M;
         let pose = road.plane_pose(at_m, 0.5 * road.right_edge_m(), facing_rad);
         append_sign([half_m, GANTRY_M[0], GANTRY_M[1]], pose, placed);
@@ -89,7 +75,7 @@ pub(super) fn append_roadside(road: &Road, s_m: f64, placed: &mut Vec<PlacedSoli
             placed.push((leg, road.plane_pose(at_m, end_m, 0.0)));
         }
     }
-    for at_m in positions_m(roadside.tree_spacing_m, s_m) {
+    for at_m in positions_m(roadside.tree_spacing_m, s_m, REACH_M) {
         let [beside, half, height] = TREE_M;
         let stem = Solid::cuboid([-half, -half, 0.0], [half, half, height], Bark);
         placed.push((stem, road.plane_pose(at_m, edge_m + outward * beside, 0.0)));
@@ -100,12 +86,4 @@ pub(super) fn append_roadside(road: &Road, s_m: f64, placed: &mut Vec<PlacedSoli
 fn append_sign([half_m, low_m, high_m]: [f64; 3], pose: PlanePose, placed: &mut Vec<PlacedSolid>) {
     placed.push((Solid::cuboid([-SHEET_M, -half_m, low_m], [0.0, half_m, high_m], Sign), pose));
     placed.push((Solid::cuboid([0.0, -half_m, low_m], [SHEET_M, half_m, high_m], Steel), pose));
-}
-
-/// Returns the positions along the road of things of a kind (m), which are multiples of their spacing, wherever the ego is.
-fn positions_m(spacing_m: Option<f64>, s_m: f64) -> impl Iterator<Item = f64> {
-    let spacing_m = spacing_m.unwrap_or(f64::INFINITY);
-    let first = ((s_m - REACH_M) / spacing_m).ceil();
-    let from_first = (0..).map(move |index| (first + f64::from(index)) * spacing_m);
-    from_first.take_while(move |at_m| *at_m < s_m)
 }

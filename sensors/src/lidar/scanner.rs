@@ -9,6 +9,7 @@ use nalgebra::{Isometry3, Point3};
 
 use super::bare_road::{BareRoad, Road, cast_ground};
 use super::cast::{ActiveParts, ColumnHits};
+use super::ground::ground_reach_m;
 use super::kind::Resolution;
 use super::material::asphalt;
 use super::noise::Noise;
@@ -60,6 +61,8 @@ enum Extent {
 pub struct Scanner {
     lidar: Lidar,
     pattern: Pattern,
+    /// Distance up to which the road may give returns (m).
+    ground_reach_m: f32,
     targets: Targets,
     plumes: Vec<Plume>,
     solids: Vec<Solid>,
@@ -79,6 +82,7 @@ impl Scanner {
         Self {
             lidar,
             pattern: Pattern::new(lidar.kind),
+            ground_reach_m: ground_reach_m(&lidar),
             targets: Targets::default(),
             plumes: Vec::new(),
             solids: Vec::new(),
@@ -159,7 +163,7 @@ impl Scanner {
         self.begin(scene.time, mirror_side, &pose);
         let link = LinkBudget::new(&actual, scene.environment);
         // With a fault, a point may be elsewhere than its return.
-        let rails = if fault.is_none() { RailReturns::new(lane, &link) } else { None };
+        let rails = if fault.is_none() { RailReturns::new(lane, &link, self.lidar.kind.beam_height_deg) } else { None };
         let fault = fault
             .filter(|fault| fault.changes_points())
             .map(|fault| (*fault, scene.road.has_guard_rails().then(|| LaneGeometry::from_scene(scene))));
@@ -204,7 +208,7 @@ impl Scanner {
         let sweep_s = self.sweep_s();
         #[expect(clippy::cast_possible_truncation, reason = "a bound of a metre, with a margin")]
         let max_shift_m = of.viewpoint.max_shift_m(sweep_s) as f32;
-        let bare_road = BareRoad::new(&self.targets, &of.link, of.pose, max_shift_m);
+        let bare_road = BareRoad::new(&self.targets, &of.link, of.pose, [max_shift_m, self.ground_reach_m]);
         let omitted = bare_road.as_ref().filter(|_| extent == Extent::WithoutBackground);
         let road = Road::new(&self.targets, &of.link);
         let in_air = !self.plumes.is_empty() || of.link.has_fog();
@@ -273,8 +277,8 @@ impl Scanner {
         self.clear();
         self.stamp(end);
         self.scan.mirror_side = mirror_side;
-        let mount_height_m = self.lidar.mount_height_m;
-        self.scan.resolution = Resolution { mount_height_m, ..self.pattern.kind().resolution };
+        let (mount_height_m, ground_reach_m) = (self.lidar.mount_height_m, self.ground_reach_m);
+        self.scan.resolution = Resolution { mount_height_m, ground_reach_m, ..self.pattern.kind().resolution };
         self.scan.sensor_x_m = pose.sensor_x_m();
     }
 

@@ -4,7 +4,7 @@
 //!
 //! | key | front radar | surround | rear object |
 //! |---|---|---|---|
-//! | `range-m` | 150 | 14 (b) | 134.6 (c) |
+//! | `range-m` | 150 | 14 (b) | 133.9 (c) |
 //! | `half-angle-deg` | 45 (a) | all directions | 66.5 (c) |
 //! | `range-sd-m` | 0.1 (a) | 0.1 (b) | 0.01 (c) |
 //! | `lateral-sd-m` | 0.3 | 0.15 | 0.01 (c) |
@@ -91,6 +91,8 @@ pub struct ObjectSensorModel {
     pub(super) rules: LifecycleRules,
     /// Score of the true class.
     pub(super) class_confidence: ByClass,
+    /// Distance up to which classes are known (m), in place of that of the fit.
+    pub(super) class_range_m: Option<f64>,
     /// The fit to the full chain that ranges come from; `None` for a sensor with one range for all vehicles.
     pub(super) fit: Option<&'static RearFit>,
     /// Whether every vehicle is classified as background.
@@ -103,9 +105,10 @@ impl ObjectSensorModel {
         self.latency_steps
     }
 
-    /// Returns the same sensor with one range for all vehicles, which the weather shortens by a power law.
-    pub(crate) fn without_fit(self) -> Self {
-        Self { fit: None, ..self }
+    /// Returns the same sensor with one range for all vehicles, which the weather shortens by a power law, and with classes that
+    /// are known up to `class_range_m` (m).
+    pub(crate) fn without_fit(self, class_range_m: f64) -> Self {
+        Self { fit: None, class_range_m: Some(class_range_m), ..self }
     }
 
     /// Returns the same sensor with the altered latency and, if it looks back, the altered class.
@@ -115,6 +118,10 @@ impl ObjectSensorModel {
             class_confidence: match altered.has_true_class && looks_back {
                 true => ByClass { car: 1.0, truck: 1.0, motorcycle: 1.0 },
                 false => self.class_confidence,
+            },
+            class_range_m: match altered.has_true_class && looks_back {
+                true => Some(f64::INFINITY),
+                false => self.class_range_m,
             },
             is_class_background: altered.is_class_background && !altered.has_true_class && looks_back,
             ..self
@@ -274,6 +281,7 @@ impl ObjectSensorConfig {
             dropout,
             rules: self.rules(defaults, dropout, steps(coast_s))?,
             class_confidence,
+            class_range_m: None,
             is_class_background: false,
             fit: defaults.fit,
         })

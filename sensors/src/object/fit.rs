@@ -1,12 +1,14 @@
-//! The fit of the rear object-level sensor to the full chain: at which distance a vehicle is confirmed, by its class, paint, plate
-//! and body shape and by the extinction of the air, and how large the errors of its track are.
+//! The fit of the rear object-level sensor to the full chain: at which distance a vehicle is confirmed, and at which it is classified
+//! as a vehicle, by its class, paint, plate and body shape and by the extinction of the air; and how large the errors of its track
+//! are.
 //!
 //! ```text
 //!  full chain ─▶ approaches ─▶ `perception::fit` ─▶ data/rear-object.toml ─▶ RearFit ─▶ ObjectSensor
 //! ```
 //!
-//! The ranges stand in a grid over paint and extinction, between whose points they are interpolated: linearly in the logarithm of
-//! the paint's reflectivity, and in the extinction. Beyond the grid, its border holds.
+//! Ranges stand in a grid over paint and extinction, between whose points they are interpolated: linearly in the logarithm of the
+//! paint's reflectivity, and in the extinction. Beyond the grid, its border holds. The ratios of body shapes stand in a coarser grid
+//! of the same kind.
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -44,8 +46,8 @@ pub struct RearFit {
     pub extinctions_per_m: Vec<f64>,
     /// Ranges of each class and plate.
     pub range: Vec<RangeGrid>,
-    /// Range of a body shape relative to that of its class (-); 1 if absent.
-    pub shapes: BTreeMap<String, f64>,
+    /// Ranges of body shapes relative to those of their class.
+    pub shapes: ShapeRatios,
 }
 
 /// Where a fit comes from.
@@ -100,6 +102,22 @@ pub struct RangeGrid {
     pub plate: Plate,
     /// For each paint, the range in each extinction (m).
     pub range_m: Vec<Vec<f64>>,
+    /// For each paint, the distance in each extinction from which on a vehicle is classified as one (m): at most the range.
+    pub class_range_m: Vec<Vec<f64>>,
+}
+
+/// The ranges of body shapes relative to those of the first shape of their class.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct ShapeRatios {
+    /// Reflectivities of the paint of the grid (-), in rising order.
+    pub paints: Vec<f64>,
+    /// Extinctions of the grid (1/m), in rising order.
+    pub extinctions_per_m: Vec<f64>,
+    /// For each shape and paint, the ratio of the ranges in each extinction (-); 1 if a shape is absent.
+    pub range: BTreeMap<String, Vec<Vec<f64>>>,
+    /// For each shape and paint, the ratio of the distances from which on a vehicle is classified as one (-); 1 if a shape is absent.
+    pub class_range: BTreeMap<String, Vec<Vec<f64>>>,
 }
 
 impl ByClass {
@@ -145,26 +163,28 @@ impl RearFit {
                 return Err(format!("`range` lacks a {} with the plate `clean`", class.name()));
             }
         }
-        rising("paints", &self.paints, [0.01, 1.0])?;
-        rising("extinctions-per-m", &self.extinctions_per_m, [0.0, 1.0])?;
+        let knots = [&*self.paints, &*self.extinctions_per_m];
+        check_knots("", knots)?;
         for (index, grid) in self.range.iter().enumerate() {
-            let key = format!("range[{index}].range-m");
-            let has_size = grid.range_m.len() == self.paints.len()
-                && grid.range_m.iter().all(|row| row.len() == self.extinctions_per_m.len());
-            if !has_size {
-                return Err(format!(
-                    "`{key}` needs a row for each of `paints` with a number for each of `extinctions-per-m`"
-                ));
-            }
-            grid.range_m.iter().flatten().try_for_each(|range_m| within(&key, *range_m, [1.0, 500.0]))?;
+            check_grid(&format!("range[{index}].range-m"), &grid.range_m, knots, [1.0, 500.0])?;
+            check_grid(&format!("range[{index}].class-range-m"), &grid.class_range_m, knots, [1.0, 500.0])?;
         }
-        self.shapes.iter().try_for_each(|(shape, factor)| within(&format!("shapes.{shape}"), *factor, [0.1, 10.0]))
+        let ShapeRatios { paints, extinctions_per_m, range, class_range } = &self.shapes;
+        let knots = [&**paints, &**extinctions_per_m];
+        check_knots("shapes.", knots)?;
+        for (name, ratios) in [("range", range), ("class-range", class_range)] {
+            for (shape, ratios) in ratios {
+                check_grid(&format!("shapes.{name}.{shape}"), ratios, knots, [0.05, 20.0])?;
+            }
+        }
+        Ok(())
     }
 
     /// Returns the range of a usual car on a clear day (m): grey, with a clean plate. Like the grid, it has decimetres.
     pub(super) fn usual_m(&self) -> f64 {
         let clear_per_m = extinction_per_m(&Environment::CLEAR_DAY);
-        (10.0 * self.grid_m(VehicleClass::Car, USUAL_PAINT, Plate::Clean, clear_per_m)).round() / 10.0
+        let [range_m, _] = self.grid_m(VehicleClass::Car, Plate::Clean, [USUAL_PAINT, clear_per_m]);
+        (10.0 * range_m).round() / 10.0
     }
 
     /// Returns what the sensors are a fit of, for reports.
@@ -173,26 +193,43 @@ impl RearFit {
         format!("fit of {version} to the full chain of {scenario}, seed {seed}, {approaches} approaches of each point")
     }
 
-    /// Returns the range of a vehicle (m).
-    pub(super) fn range_m(&self, class: VehicleClass, appearance: &Appearance, environment: &Environment) -> f64 {
-        let factor = self.shapes.get(appearance.body_shape.name()).copied().unwrap_or(1.0);
-        factor * self.grid_m(class, appearance.paint_reflectivity, appearance.plate, extinction_per_m(environment))
+    /// Returns the distances up to which a vehicle is seen, and up to which its class is known (m).
+    pub(super) fn ranges_m(&self, class: VehicleClass, appearance: &Appearance, environment: &Environment) -> [f64; 2] {
+        let at = [appearance.paint_reflectivity, extinction_per_m(environment)];
+        let [range_m, class_range_m] = self.grid_m(class, appearance.plate, at);
+        let ShapeRatios { paints, extinctions_per_m, range, class_range } = &self.shapes;
+        let shape = appearance.body_shape.name();
+        let ratio = |of: &BTreeMap<String, Vec<Vec<f64>>>| {
+            of.get(shape).map_or(1.0, |ratios| interpolated([paints, extinctions_per_m], ratios, at))
+        };
+        [range_m * ratio(range), class_range_m * ratio(class_range)]
     }
 
-    fn grid_m(&self, class: VehicleClass, paint: f64, plate: Plate, extinction_per_m: f64) -> f64 {
+    /// Returns the ranges of the first body shape of a class, of a paint in air of an extinction (1/m).
+    fn grid_m(&self, class: VehicleClass, plate: Plate, at: [f64; 2]) -> [f64; 2] {
         let of = |plate| self.range.iter().find(|grid| grid.class == class && grid.plate == plate);
         // A motorcycle has no plate at its front, so that its state does not matter.
-        let Some(grid) = of(plate).or_else(|| of(Plate::Clean)) else { return 0.0 };
-        let logs: Vec<f64> = self.paints.iter().map(|paint| paint.ln()).collect();
-        let (row, row_share) = place(&logs, paint.ln());
-        let (column, column_share) = place(&self.extinctions_per_m, extinction_per_m);
-        let in_row = |row: usize| {
-            let values = &grid.range_m[row.min(self.paints.len() - 1)];
-            let next = (column + 1).min(values.len() - 1);
-            values[column] + column_share * (values[next] - values[column])
-        };
-        in_row(row) + row_share * (in_row(row + 1) - in_row(row))
+        let Some(grid) = of(plate).or_else(|| of(Plate::Clean)) else { return [0.0; 2] };
+        let knots = [&*self.paints, &*self.extinctions_per_m];
+        [interpolated(knots, &grid.range_m, at), interpolated(knots, &grid.class_range_m, at)]
     }
+}
+
+/// Returns the value of a grid over paints and extinctions, for each of which it has a row and a column.
+fn interpolated(
+    [paints, extinctions_per_m]: [&[f64]; 2],
+    grid: &[Vec<f64>],
+    [paint, extinction_per_m]: [f64; 2],
+) -> f64 {
+    let logs: Vec<f64> = paints.iter().map(|paint| paint.ln()).collect();
+    let (row, row_share) = place(&logs, paint.ln());
+    let (column, column_share) = place(extinctions_per_m, extinction_per_m);
+    let in_row = |row: usize| {
+        let values = &grid[row.min(paints.len() - 1)];
+        let next = (column + 1).min(values.len() - 1);
+        values[column] + column_share * (values[next] - values[column])
+    };
+    in_row(row) + row_share * (in_row(row + 1) - in_row(row))
 }
 
 /// Reflectivity of the paint of a usual car (-): that of a vehicle whose paint is not given.
@@ -222,6 +259,18 @@ fn rising(key: &str, values: &[f64], range: [f64; 2]) -> Result<(), String> {
     Err(format!("`{key}` needs at least two numbers in rising order"))
 }
 
+fn check_knots(of: &str, [paints, extinctions_per_m]: [&[f64]; 2]) -> Result<(), String> {
+    rising(&format!("{of}paints"), paints, [0.01, 1.0])?;
+    rising(&format!("{of}extinctions-per-m"), extinctions_per_m, [0.0, 1.0])
+}
+
+fn check_grid(key: &str, rows: &[Vec<f64>], [paints, extinctions]: [&[f64]; 2], range: [f64; 2]) -> Result<(), String> {
+    if rows.len() != paints.len() || rows.iter().any(|row| row.len() != extinctions.len()) {
+        return Err(format!("`{key}` needs a row for each of `paints` with a number for each of `extinctions-per-m`"));
+    }
+    rows.iter().flatten().try_for_each(|value| within(key, *value, range))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -248,6 +297,13 @@ mod tests {
             (refused(&|fit| fit.paints.reverse()), "paints", "rising order"),
             (refused(&|fit| fit.range[0].range_m[0][0] = 0.0), "range[0].range-m", "1 to 500"),
             (refused(&|fit| drop(fit.range[0].range_m.pop())), "range[0].range-m", "a row for each of `paints`"),
+            (refused(&|fit| fit.range[1].class_range_m[0][0] = 0.0), "range[1].class-range-m", "1 to 500"),
+            (refused(&|fit| fit.shapes.paints.reverse()), "shapes.paints", "rising order"),
+            (
+                refused(&|fit| fit.shapes.class_range.get_mut("pickup").unwrap()[0][0] = -1.0),
+                "shapes.class-range.pickup",
+                "0.05 to 20",
+            ),
             (refused(&|fit| fit.range.retain(|grid| grid.class != VehicleClass::Truck)), "range", "truck"),
         ] {
             assert!(message.contains(key) && message.contains(range), "{message}");
@@ -259,7 +315,7 @@ mod tests {
     #[test]
     fn ranges_lie_between_the_points_of_the_grid_and_end_at_its_border() {
         let fit = RearFit::shipped().unwrap();
-        let at = |paint, extinction| fit.grid_m(VehicleClass::Car, paint, Plate::Clean, extinction);
+        let at = |paint, extinction| fit.grid_m(VehicleClass::Car, Plate::Clean, [paint, extinction])[0];
         let [low, high] = [fit.paints[1], fit.paints[2]];
         let first = fit.extinctions_per_m[0];
         let between = at((low * high).sqrt(), first);

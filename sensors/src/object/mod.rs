@@ -3,8 +3,10 @@
 //! They leave out the physics of the measurement. One sensor looks ahead, one around the ego, and one behind. Each has
 //! a field of view, a range, errors (white and slowly varying), a latency, lost measurements, and a filter whose
 //! covariance follows from the errors. The rear sensor replaces LiDAR and camera in fast campaigns. Its ranges and errors
-//! are fitted to theirs ([`RearFit`]), so that dark paint, fog and rain shorten its range, too. The other two sensors are part of
-//! the full chain.
+//! are fitted to theirs ([`RearFit`]), so that dark paint, fog and rain shorten its range, too. In fog, the LiDAR sees the plate or
+//! the lamps of a vehicle that the camera does not recognise yet: its track is confirmed, and classified as background
+//! until the vehicle has come within the distance at which the full chain classifies it as a vehicle. The other two sensors are part
+//! of the full chain.
 //!
 //! The models deviate from real sensors on purpose:
 //!
@@ -20,6 +22,7 @@ mod faulty;
 mod fit;
 mod noise;
 mod perception;
+mod ranges;
 mod sensor;
 mod target;
 #[cfg(test)]
@@ -28,7 +31,7 @@ mod visibility;
 mod weather;
 
 pub use config::{ObjectSensorConfig, ObjectSensorModel};
-pub use fit::{ByClass, FitError, FittedErrors, Origin, RangeGrid, RearFit};
+pub use fit::{ByClass, FitError, FittedErrors, Origin, RangeGrid, RearFit, ShapeRatios};
 pub use noise::NoiseKey;
 pub use perception::ObjectPerception;
 pub(crate) use sensor::{DEGRADED_SHARE, ObjectSensor, ScanInput};

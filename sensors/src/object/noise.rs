@@ -9,8 +9,9 @@
 //!
 //! It models a radar's centre of reflection, which wanders over the vehicle's body instead of jumping from scan to scan.
 //!
-//! Every step draws the same number of random values, whether the vehicle is seen or not. Two runs that differ only in
-//! the ego's behaviour (with and without MIS) therefore have the same errors at the same times.
+//! Every step takes the same number of random values, whether the vehicle is seen or not. Two runs that differ only in
+//! the ego's behaviour (with and without MIS) therefore have the same errors at the same times. The values of a vehicle that is
+//! not in view are drawn once it is seen, and never if it is not.
 
 use std::sync::Arc;
 
@@ -56,6 +57,8 @@ impl NoiseKey {
 pub(super) struct TargetNoise {
     rng: Stream,
     drift_m: [f64; 2],
+    /// Number of scans whose errors have not been drawn yet, because nothing needed them.
+    skipped: u64,
 }
 
 /// The errors of one vehicle's measurement in one scan.
@@ -89,11 +92,23 @@ impl TargetNoise {
     pub(super) fn new(key: &NoiseKey, channel: &str, actor: usize, model: &ObjectSensorModel) -> Self {
         let mut rng = key.stream_about(channel, actor);
         let drift_m = [(); 2].map(|()| model.drift_sd_m * normal(&mut rng));
-        Self { rng, drift_m }
+        Self { rng, drift_m, skipped: 0 }
     }
 
-    /// Draws the errors of the next scan.
+    /// Passes over the errors of a scan that does not see the vehicle. They are drawn before the next ones that are needed.
+    pub(super) fn skip(&mut self) {
+        self.skipped += 1;
+    }
+
+    /// Returns the errors of the next scan.
     pub(super) fn draw(&mut self, model: &ObjectSensorModel) -> MeasurementErrors {
+        for _ in 0..std::mem::take(&mut self.skipped) {
+            self.draw_next(model);
+        }
+        self.draw_next(model)
+    }
+
+    fn draw_next(&mut self, model: &ObjectSensorModel) -> MeasurementErrors {
         let decay = model.drift_decay;
         let increment_sd_m = model.drift_sd_m * (1.0 - decay * decay).sqrt();
         let mut position_m = [0.0; 2];
@@ -109,4 +124,31 @@ impl TargetNoise {
 
 fn normal(rng: &mut Stream) -> f64 {
     rng.sample(StandardNormal)
+}
+
+#[cfg(test)]
+mod tests {
+    use closecall_traffic::Parameters;
+
+    use super::super::config::ObjectSensorConfig;
+    use super::*;
+
+    #[test]
+    fn scans_that_are_passed_over_change_no_later_error() {
+        let model = ObjectSensorConfig::default().check_rear_object(&Parameters::default()).unwrap();
+        let key = NoiseKey { seed: 1, sample: 2, ego: ActorId::new("ego").unwrap(), actors: Arc::from([]) };
+        let mut drawn = TargetNoise::new(&key, "rear-object", 1, &model);
+        let mut lazy = drawn.clone();
+        for scan in 0..200 {
+            let errors = drawn.draw(&model);
+            // In view now and then: for one scan, for several, and after a long time.
+            if matches!(scan, 0 | 7 | 8 | 9 | 150..) {
+                let late = lazy.draw(&model);
+                assert_eq!(errors.position_m.map(f64::to_bits), late.position_m.map(f64::to_bits), "scan {scan}");
+                assert_eq!(errors.is_lost, late.is_lost);
+            } else {
+                lazy.skip();
+            }
+        }
+    }
 }

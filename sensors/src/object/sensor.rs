@@ -11,14 +11,14 @@
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
-use closecall_traffic::{CONTROL_STEP, ClassScores, Environment, Source, Track, Vehicle, VehicleClass};
+use closecall_traffic::{CONTROL_STEP, ClassScores, Source, Track, VehicleClass};
 
 use super::config::{MAX_LATENCY_STEPS, ObjectSensorModel};
 use super::faulty::Faulty;
 use super::noise::{MeasurementErrors, NoiseKey, TargetNoise};
+use super::ranges::Ranges;
 use super::target::{Filters, Report, Target};
 use super::visibility::{Direction, Field, Visibility};
-use super::weather::range_in_weather_m;
 use crate::alterations::BACKGROUND;
 use crate::faults::{FaultList, ObjectFault};
 use crate::perception::FieldOfView;
@@ -60,10 +60,7 @@ pub(crate) struct ObjectSensor {
     /// Motion modes along and across the road.
     modes: [&'static [Mode]; 2],
     visibility: Visibility,
-    /// The weather that `range_m` holds for.
-    weather: Option<Environment>,
-    /// Range of a usual car in this weather (m).
-    range_m: f64,
+    ranges: Ranges,
     targets: Vec<Target>,
     step: usize,
     faults: FaultList<ObjectFault>,
@@ -105,8 +102,7 @@ impl ObjectSensor {
             key: key.clone(),
             modes,
             visibility: Visibility::default(),
-            weather: None,
-            range_m: model.range_m,
+            ranges: Ranges::new(&model),
             targets: Vec::new(),
             step: 0,
             faults: FaultList::default(),
@@ -130,7 +126,11 @@ impl ObjectSensor {
             speed_mps: state.speed_mps,
             half_lane_m: 0.5 * input.scene.road.lane_width_m(),
         };
-        self.update_range(input.scene.environment);
+        // Fog and rain shorten the range of the rear sensor only, which is optical. Radars are unaffected over these distances.
+        if self.direction == Direction::Behind && self.ranges.update(&self.model, input.scene.environment) {
+            // Each vehicle gets its own when it is seen next.
+            self.targets.iter_mut().for_each(|target| target.range_m = f64::NAN);
+        }
         self.visibility.update(self.direction, input.others, &size);
         let has_faults = !self.faults.is_empty();
         let before = list.tracks.len();
@@ -140,13 +140,21 @@ impl ObjectSensor {
             let index = self.target_index(other, position);
             let range_m = self.targets[index].range_m;
             let field = Field { direction: self.direction, range_m, half_angle_tan: self.model.half_angle_tan };
-            let errors = self.targets[index].noise.draw(&self.model);
-            let errors = errors.mirrored_for(input.scene.road.overtaking_side());
-            let errors = MeasurementErrors { is_lost: errors.is_lost || has_faults && self.loses(index), ..errors };
-            let errors = self.visibility.sees(&field, other, &size).then_some(errors);
+            let is_seen = self.visibility.sees(&field, position, other, &size);
+            // Whether a fault draws depends on the errors.
+            let errors = if is_seen || has_faults {
+                let errors = self.targets[index].noise.draw(&self.model);
+                let errors = errors.mirrored_for(input.scene.road.overtaking_side());
+                let is_lost = errors.is_lost || has_faults && self.loses(index);
+                is_seen.then_some(MeasurementErrors { is_lost, ..errors })
+            } else {
+                self.targets[index].noise.skip();
+                None
+            };
+            let is_classified = self.visibility.is_within(self.targets[index].class_range_m, position);
             in_view += usize::from(errors.is_some());
             measured += usize::from(errors.is_some_and(|errors| !errors.is_lost));
-            self.update_target(index, other, errors, &ego, list);
+            self.update_target(index, other, errors.map(|errors| (errors, is_classified)), &ego, list);
             self.report(index, other, input, list);
         }
         if has_faults {
@@ -190,42 +198,12 @@ impl ObjectSensor {
         }
     }
 
-    /// Updates the range if the weather has changed.
-    ///
-    /// Fog and rain shorten the range of the rear sensor only, which is optical. Radars are unaffected over these
-    /// distances.
-    fn update_range(&mut self, environment: &Environment) {
-        if self.direction == Direction::Behind && self.weather != Some(*environment) {
-            self.weather = Some(*environment);
-            self.range_m = match self.model.fit {
-                Some(fit) => {
-                    let usual = Vehicle::typical(VehicleClass::Car);
-                    self.model.range_m / fit.usual_m() * fit.range_m(usual.class, &usual.appearance, environment)
-                }
-                None => range_in_weather_m(self.model.range_m, environment),
-            };
-            // New vehicles get theirs when they are seen first.
-            self.targets.iter_mut().for_each(|target| target.range_m = f64::NAN);
-        }
-    }
-
-    /// Returns the range of one vehicle in this weather (m). `deviation` is that of the vehicle, in standard deviations.
-    fn range_of_m(&self, other: &OtherVehicle, deviation: f64) -> f64 {
-        match (self.model.fit, &self.weather) {
-            (Some(fit), Some(weather)) => {
-                let relative = self.model.range_m / fit.usual_m();
-                relative * fit.range_m(other.class, &other.appearance, weather) * (fit.range_spread * deviation).exp()
-            }
-            _ => self.range_m,
-        }
-    }
-
     /// Returns the sensor's health: failed if it has delivered nothing, or always the same, for a while; degraded if the weather
     /// costs more than half of the range.
     pub(crate) fn health(&self) -> Health {
         if self.faulty.is_noticed() {
             Health::Failed
-        } else if self.range_m < DEGRADED_SHARE * self.model.range_m {
+        } else if self.ranges.usual_m() < DEGRADED_SHARE * self.model.range_m {
             Health::Degraded
         } else {
             Health::Ok
@@ -234,7 +212,7 @@ impl ObjectSensor {
 
     /// Returns the field of view in the weather of the latest scan.
     pub(crate) fn field_of_view(&self) -> FieldOfView {
-        FieldOfView { half_angle_tan: self.model.half_angle_tan, range_m: self.range_m }
+        FieldOfView { half_angle_tan: self.model.half_angle_tan, range_m: self.ranges.usual_m() }
     }
 
     /// Returns the index in `targets` of the vehicle `actor`, and adds the vehicle if it is new. It is usually `position`, that in
@@ -247,7 +225,9 @@ impl ObjectSensor {
             false => self.targets.iter().position(is_at).unwrap_or_else(|| self.add_target(actor)),
         };
         if self.targets[index].range_m.is_nan() {
-            self.targets[index].range_m = self.range_of_m(other, self.targets[index].range_deviation);
+            let deviation = self.targets[index].range_deviation;
+            let [range_m, class_range_m] = self.ranges.of_m(&self.model, other, deviation);
+            (self.targets[index].range_m, self.targets[index].class_range_m) = (range_m, class_range_m);
         }
         index
     }
@@ -262,6 +242,7 @@ impl ObjectSensor {
             actor,
             range_deviation,
             range_m: f64::NAN,
+            class_range_m: f64::NAN,
             noise,
             filters: None,
             reports: [None; MAX_LATENCY_STEPS + 1],
@@ -271,17 +252,18 @@ impl ObjectSensor {
         self.targets.len() - 1
     }
 
-    /// Predicts and corrects the filters of one vehicle. `errors` is `None` if the vehicle is not in view.
+    /// Predicts and corrects the filters of one vehicle. `seen` holds the errors of the measurement, and whether the vehicle is near
+    /// enough for its class to be known; it is `None` if the vehicle is not in view.
     fn update_target(
         &mut self,
         index: usize,
         other: &OtherVehicle,
-        errors: Option<MeasurementErrors>,
+        seen: Option<(MeasurementErrors, bool)>,
         ego: &EgoRear,
         list: &mut TrackList,
     ) {
         let (model, target) = (&self.model, &mut self.targets[index]);
-        if let Some((_, _, [along, across])) = &mut target.filters {
+        if let Some(Filters { axes: [along, across], .. }) = &mut target.filters {
             // The filter estimates the position of the vehicle's centre.
             let AxisEstimate { position_m, speed_mps, .. } = along.estimate();
             let front_s_m = position_m + 0.5 * other.length_m + speed_mps * CONTROL_STEP.s();
@@ -291,18 +273,26 @@ impl ObjectSensor {
                 axis.predict(CONTROL_STEP.s(), model.drift_decay, situation);
             }
         }
-        if let Some(errors) = errors.filter(|errors| !errors.is_lost) {
+        if let Some((errors, is_classified)) = seen.filter(|(errors, _)| !errors.is_lost) {
             let measured_m = [other.road_m[0] + errors.position_m[0], other.road_m[1] + errors.position_m[1]];
             let is_new = target.filters.is_none();
-            let (_, lifecycle, [along, across]) = target.filters.get_or_insert_with(|| {
+            let track = target.filters.get_or_insert_with(|| {
                 let along_mps = Gaussian::new(ego.speed_mps, SPEED_PRIOR_SD_MPS);
                 let across_mps = Gaussian::new(0.0, LATERAL_SPEED_PRIOR_SD_MPS);
                 let prior = |axis: usize, speed_mps| {
                     let position_m = Gaussian::new(measured_m[axis], POSITION_PRIOR_SD_M);
                     AxisFilter::prior(self.modes[axis], position_m, speed_mps)
                 };
-                (list.new_id(), Lifecycle::first_hit(&model.rules), [prior(0, along_mps), prior(1, across_mps)])
+                Filters {
+                    id: list.new_id(),
+                    lifecycle: Lifecycle::first_hit(&model.rules),
+                    axes: [prior(0, along_mps), prior(1, across_mps)],
+                    is_classified: false,
+                }
             });
+            // What the camera has once recognised, it does not lose again.
+            track.is_classified |= is_classified;
+            let Filters { lifecycle, axes: [along, across], .. } = track;
             for (road_axis, axis) in [&mut *along, across].into_iter().enumerate() {
                 axis.measure_position(&AxisMeasurement {
                     position_m: measured_m[road_axis],
@@ -317,8 +307,8 @@ impl ObjectSensor {
             if !is_new {
                 lifecycle.hit(&model.rules, along.estimate().speed_variance_m2ps2.sqrt() <= SETTLED_SPEED_SD_MPS);
             }
-        } else if let Some((_, lifecycle, _)) = &mut target.filters {
-            if errors.is_some() {
+        } else if let Some(Filters { lifecycle, .. }) = &mut target.filters {
+            if seen.is_some() {
                 lifecycle.miss(&model.rules)
             } else {
                 lifecycle.skip()
@@ -337,11 +327,12 @@ impl ObjectSensor {
         let target = &mut self.targets[index];
         let length = target.reports.len();
         let (latest, due) = (self.step % length, (self.step + length - latency_steps) % length);
-        let predicted = |(id, lifecycle, [along, across]): &Filters| Report {
-            id: *id,
-            lifecycle: *lifecycle,
-            along: along.predicted(latency_s),
-            across: across.predicted(latency_s),
+        let predicted = |track: &Filters| Report {
+            id: track.id,
+            lifecycle: track.lifecycle,
+            along: track.axes[0].predicted(latency_s),
+            across: track.axes[1].predicted(latency_s),
+            is_classified: track.is_classified,
         };
         // The entry is still `None` before the first report is due.
         let due = if has_faults {
@@ -373,12 +364,20 @@ impl ObjectSensor {
             width_m: other.width_m,
             class: match self.model.is_class_background {
                 true => BACKGROUND,
-                false => class_scores(other.class, self.model.class_confidence.of(other.class)),
+                false if report.is_classified => class_scores(other.class, self.model.class_confidence.of(other.class)),
+                false => unrecognised(self.model.class_confidence.of(other.class)),
             },
             existence: report.lifecycle.existence(),
             lane: input.frame.lane_probabilities(across.position_m, across.position_variance_m2.sqrt()),
         }
     }
+}
+
+/// Returns the scores of a vehicle that is not recognised yet: the full chain takes it for background.
+fn unrecognised(confidence: f64) -> ClassScores {
+    let mut scores = [(1.0 - confidence) / 3.0; 4];
+    scores[ClassScores::BACKGROUND] = confidence;
+    ClassScores(scores)
 }
 
 /// Returns class scores with `confidence` for `class` and equal shares of the rest for the three others.

@@ -7,8 +7,16 @@ use closecall_traffic::{Stream, TrackId};
 use super::config::MAX_LATENCY_STEPS;
 use super::noise::TargetNoise;
 
-/// A track's id and lifecycle, and its filters along and across the road.
-pub(super) type Filters = (TrackId, Lifecycle, [AxisFilter; 2]);
+/// A track with its filters.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Filters {
+    pub(super) id: TrackId,
+    pub(super) lifecycle: Lifecycle,
+    /// The filters along and across the road.
+    pub(super) axes: [AxisFilter; 2],
+    /// Whether the vehicle has been near enough for its class to be known.
+    pub(super) is_classified: bool,
+}
 
 /// The estimate of one vehicle at the end of one scan, predicted by the latency.
 #[derive(Clone, Copy, Debug)]
@@ -17,6 +25,7 @@ pub(super) struct Report {
     pub(super) lifecycle: Lifecycle,
     pub(super) along: AxisEstimate,
     pub(super) across: AxisEstimate,
+    pub(super) is_classified: bool,
 }
 
 /// The sensor's state for one vehicle, whether the vehicle is seen or not.
@@ -27,8 +36,10 @@ pub(super) struct Target {
     pub(super) range_deviation: f64,
     /// Range in this weather (m).
     pub(super) range_m: f64,
+    /// Distance in this weather up to which the class of the vehicle is known (m).
+    pub(super) class_range_m: f64,
     pub(super) noise: TargetNoise,
-    /// The track's id and lifecycle, and its filters along and across the road; `None` without a track.
+    /// The track; `None` without one.
     pub(super) filters: Option<Filters>,
     /// Ring buffer of the latest reports; the index is the step modulo the length.
     pub(super) reports: [Option<Report>; MAX_LATENCY_STEPS + 1],

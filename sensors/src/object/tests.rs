@@ -9,7 +9,7 @@ use super::*;
 use crate::SceneVehicle;
 use crate::surroundings::transform_scene;
 use crate::testing::{OWN_LANE_M, scene_vehicle, with_speed};
-use crate::{Perception, Scene};
+use crate::{Alterations, Perception, Scene};
 
 const PERIOD_S: f64 = CONTROL_STEP.s();
 
@@ -18,12 +18,16 @@ fn key(sample: u64) -> NoiseKey {
 }
 
 fn perception(sample: u64) -> ObjectPerception {
+    altered_perception(sample, &Alterations::default())
+}
+
+fn altered_perception(sample: u64, altered: &Alterations) -> ObjectPerception {
     let config = ObjectSensorConfig::default();
     let none = Parameters::default();
     let models = [
         config.check_front_radar(&none).unwrap(),
         config.check_surround(&none).unwrap(),
-        config.check_rear_object(&none).unwrap(),
+        config.check_rear_object(&none).unwrap().altered(altered, true),
     ];
     ObjectPerception::new(models, &key(sample))
 }
@@ -33,6 +37,7 @@ struct Encounter {
     road: Road,
     ego: SceneVehicle,
     others: Vec<SceneVehicle>,
+    environment: Environment,
     scans: i64,
 }
 
@@ -45,13 +50,14 @@ impl Encounter {
                 with_speed(scene_vehicle(1, VehicleClass::Car, 1_030.0, OWN_LANE_M), 30.0),
                 with_speed(scene_vehicle(2, VehicleClass::Car, 870.0, OWN_LANE_M), 40.0),
             ],
+            environment: Environment::CLEAR_DAY,
             scans: 0,
         }
     }
 
     fn scene(&self) -> Scene<'_> {
         let time = CONTROL_STEP * self.scans;
-        Scene { time, road: &self.road, environment: &Environment::CLEAR_DAY, ego: self.ego, others: &self.others }
+        Scene { time, road: &self.road, environment: &self.environment, ego: self.ego, others: &self.others }
     }
 
     fn advance(&mut self) {
@@ -185,4 +191,45 @@ fn the_track_of_a_hidden_vehicle_coasts_and_is_then_deleted() {
     assert!((20..=30).contains(&coasted), "{coasted} scans");
     let tracks = perception.step(&encounter.scene()).unwrap();
     assert!(tracks.iter().all(|track| track.x_m() > -40.0), "{tracks:?}");
+}
+
+/// Returns the gaps behind the ego at which the rear vehicle, of a class and in fog of a visibility, is confirmed and classified (m).
+fn confirmed_and_classified_m(class: VehicleClass, visibility_m: f64, altered: &Alterations) -> [f64; 2] {
+    let mut encounter = Encounter::new();
+    encounter.environment.visibility_m = visibility_m;
+    encounter.others[1] = with_speed(scene_vehicle(2, class, 870.0, OWN_LANE_M), 40.0);
+    let half_m = 0.5 * (encounter.others[1].vehicle.dimensions.length_m + encounter.ego.vehicle.dimensions.length_m);
+    let mut perception = altered_perception(4, altered);
+    let mut found_m = [0.0_f64; 2];
+    while encounter.others[1].state.s_m < encounter.ego.state.s_m - half_m - 5.0 {
+        let gap_m = encounter.ego.state.s_m - encounter.others[1].state.s_m - half_m;
+        let tracks = perception.step(&encounter.scene()).unwrap();
+        let track = confirmed_track(tracks, Source::Rear);
+        let lead = confirmed_track(tracks, Source::Front);
+        assert!(lead.is_none_or(|lead| lead.class.is_vehicle()), "a radar needs no camera");
+        for (found_m, is_found) in found_m.iter_mut().zip([true, track.is_some_and(|track| track.class.is_vehicle())]) {
+            *found_m = if track.is_some() && is_found { found_m.max(gap_m) } else { *found_m };
+        }
+        encounter.advance();
+    }
+    found_m
+}
+
+#[test]
+fn in_fog_a_truck_is_confirmed_by_its_plate_long_before_it_is_recognised() {
+    let fitted = Alterations::default();
+    let [confirmed_m, classified_m] = confirmed_and_classified_m(VehicleClass::Truck, 100.0, &fitted);
+    assert!(
+        (60.0..70.0).contains(&confirmed_m) && (25.0..45.0).contains(&classified_m),
+        "{confirmed_m} {classified_m}"
+    );
+    // Denser fog, nearer.
+    let [_, denser_m] = confirmed_and_classified_m(VehicleClass::Truck, 60.0, &fitted);
+    assert!(denser_m < classified_m - 5.0, "{denser_m}");
+    let [confirmed_m, classified_m] = confirmed_and_classified_m(VehicleClass::Truck, 10_000.0, &fitted);
+    // The drive begins at a gap of some 120 m, within the range of a truck.
+    assert!(classified_m == confirmed_m && confirmed_m > 110.0, "in clear air at once: {confirmed_m} {classified_m}");
+    let known = Alterations { has_true_class: true, ..Alterations::default() };
+    let [confirmed_m, classified_m] = confirmed_and_classified_m(VehicleClass::Truck, 100.0, &known);
+    assert_eq!(classified_m, confirmed_m, "a class that is given is known at once");
 }

@@ -45,7 +45,6 @@ const MIN_OUTWARD_M: f64 = 0.1;
 /// The range of slopes that one vehicle covers.
 #[derive(Clone, Copy, Debug)]
 struct Silhouette {
-    actor: usize,
     /// Outward distance of the nearest corner (m).
     near_m: f64,
     /// Least slope.
@@ -57,7 +56,8 @@ struct Silhouette {
 /// The visibility of all vehicles for one sensor, computed for each scan in reused memory.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Visibility {
-    silhouettes: Vec<Silhouette>,
+    /// In the order of the vehicles; `None` for one behind the sensor's plane.
+    silhouettes: Vec<Option<Silhouette>>,
     /// The parts of one vehicle's range of slopes that nearer vehicles cover.
     covered: Vec<(f64, f64)>,
 }
@@ -74,24 +74,32 @@ impl Visibility {
             Direction::Behind => -1.0,
             Direction::Around => return,
         };
-        let silhouettes = others.iter().filter_map(|other| silhouette(other, outward, 0.5 * ego.length_m));
+        let silhouettes = others.iter().map(|other| silhouette(other, outward, 0.5 * ego.length_m));
         self.silhouettes.extend(silhouettes);
     }
 
-    /// Returns whether `other` is within the field of view, in range, and not hidden.
-    pub(super) fn sees(&mut self, field: &Field, other: &OtherVehicle, ego: &Dimensions) -> bool {
+    /// Returns whether the nearest part of the vehicle with this place in the list is at most `range_m` away in the direction of
+    /// view (m).
+    pub(super) fn is_within(&self, range_m: f64, place: usize) -> bool {
+        range_m == f64::INFINITY || self.silhouette(place).is_some_and(|seen| seen.near_m <= range_m)
+    }
+
+    fn silhouette(&self, place: usize) -> Option<Silhouette> {
+        self.silhouettes.get(place).copied().flatten()
+    }
+
+    /// Returns whether `other`, with this place in the list, is within the field of view, in range, and not hidden.
+    pub(super) fn sees(&mut self, field: &Field, place: usize, other: &OtherVehicle, ego: &Dimensions) -> bool {
         if field.direction == Direction::Around {
             return box_distance_m(other, ego) <= field.range_m;
         }
-        let Some(target) = self.silhouettes.iter().find(|seen| seen.actor == other.actor).copied() else {
-            return false;
-        };
+        let Some(target) = self.silhouette(place) else { return false };
         let (low, high) = (target.low.max(-field.half_angle_tan), target.high.min(field.half_angle_tan));
         if !(target.near_m <= field.range_m && low < high) {
             return false;
         }
         self.covered.clear();
-        for nearer in self.silhouettes.iter().filter(|seen| seen.near_m < target.near_m) {
+        for nearer in self.silhouettes.iter().flatten().filter(|seen| seen.near_m < target.near_m) {
             let overlap = (nearer.low.max(low), nearer.high.min(high));
             if overlap.0 < overlap.1 {
                 self.covered.push(overlap);
@@ -108,7 +116,7 @@ impl Visibility {
 fn silhouette(other: &OtherVehicle, outward: f64, mount_m: f64) -> Option<Silhouette> {
     let (ahead_m, left_m) = (0.5 * other.length_m, 0.5 * other.width_m);
     let corners = [(ahead_m, left_m), (ahead_m, -left_m), (-ahead_m, left_m), (-ahead_m, -left_m)];
-    let mut seen = Silhouette { actor: other.actor, near_m: f64::INFINITY, low: f64::INFINITY, high: -f64::INFINITY };
+    let mut seen = Silhouette { near_m: f64::INFINITY, low: f64::INFINITY, high: -f64::INFINITY };
     let mut far_m = -f64::INFINITY;
     for (ahead_m, left_m) in corners {
         let out_m = outward * (other.x_m + ahead_m * other.cos - left_m * other.sin) - mount_m;
@@ -178,7 +186,7 @@ mod tests {
     fn seen(field: Field, others: &[OtherVehicle]) -> Vec<bool> {
         let mut visibility = Visibility::default();
         visibility.update(field.direction, others, &EGO);
-        others.iter().map(|other| visibility.sees(&field, other, &EGO)).collect()
+        others.iter().enumerate().map(|(place, other)| visibility.sees(&field, place, other, &EGO)).collect()
     }
 
     #[test]

@@ -69,6 +69,34 @@ fn the_processing_knows_how_far_and_how_high_a_kind_sees() {
 }
 
 #[test]
+fn the_processing_knows_points_beams_and_ground_of_a_kind() {
+    use super::super::Lidar;
+    use super::super::ground::ground_reach_m;
+    use super::super::rail_returns::narrow_to_m;
+    let lidar = |kind: &'static LidarKind| Lidar { kind, nominal_range_m: kind.nominal_range_m, ..Lidar::default() };
+    let known = |kind: &'static LidarKind| {
+        (kind.resolution.point_sd_m, narrow_to_m(kind.beam_height_deg), ground_reach_m(&lidar(kind)))
+    };
+    let (point_sd_m, narrow_m, ground_m) = known(LidarModel::Scala2.kind());
+    assert_eq!(
+        (point_sd_m.to_bits(), narrow_m.to_bits(), ground_m.to_bits()),
+        (0.05_f64.to_bits(), 30.0_f32.to_bits(), 40.0_f32.to_bits())
+    );
+    assert_eq!(Resolution::default().ground_reach_m, ground_m, "also for a scan of which nothing else is said");
+    // √(0.015² + (0.237/2.25)²) m; 0.44 m over the tangent of 4/3 of 0.13°, down to tens of metres.
+    assert_eq!(known(LidarModel::Os1With64.kind()), (0.1064, 140.0, 40.0));
+    assert_eq!(known(LidarModel::PandarXt16.kind()), (0.0167, 100.0, 40.0));
+    // A beam of 3° is as high as a rail's lower edge at 6 m: no distance is safe.
+    assert_eq!(narrow_to_m(3.0), 0.0);
+    let strong = checked(|config| (config.range_m, config.range_reflectivity) = (450.0, 0.5)).unwrap();
+    let (_, _, strong_m) = known(strong);
+    assert!((45.0..60.0).contains(&strong_m), "{strong_m}");
+    let high_m = ground_reach_m(&Lidar { mount_height_m: 2.5, ..lidar(strong) });
+    assert!((70.0..95.0).contains(&high_m), "{high_m}");
+    assert_eq!(ground_reach_m(&lidar(strong).exact()), 40.0);
+}
+
+#[test]
 fn a_wrong_value_is_answered_with_key_and_allowed_range() {
     let error = checked(|config| config.rate_hz = 30.0).unwrap_err();
     assert_eq!(error, "`rate-hz` is 30, but a number from 1 to 25 is needed");

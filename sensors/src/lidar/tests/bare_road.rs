@@ -97,3 +97,19 @@ fn a_scan_of_the_bare_road_is_not_dark_and_one_behind_a_dirty_window_is() {
         assert_eq!(lidar.completed().unwrap().latest().is_empty(), is_dark, "{window_transmission}");
     }
 }
+
+#[test]
+fn a_strong_and_high_sensor_takes_no_far_return_of_the_road_for_an_object() {
+    let lidar = Lidar { mount_height_m: 2.0, nominal_range_m: 500.0, ..Lidar::default() };
+    let mut lidar = RearLidar::new(lidar);
+    let mut beyond = 0;
+    for index in 0..20 {
+        assert_eq!(TestScene::new().detect(&mut lidar, index), []);
+        let complete = lidar.completed().unwrap();
+        assert_eq!(complete.detections(), []);
+        let scan = complete.latest();
+        beyond += (0..scan.len()).filter(|&at| scan.x_m[at] < scan.sensor_x_m - 41.0).count();
+    }
+    // One point alone would be an object.
+    assert!(beyond >= 5, "the road returns light from beyond 40 m: {beyond} points");
+}

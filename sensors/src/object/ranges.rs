@@ -1,0 +1,58 @@
+//! How far an object-level sensor sees in the weather of the latest scan.
+
+use closecall_traffic::{Environment, Vehicle, VehicleClass};
+
+use super::config::ObjectSensorModel;
+use super::weather::range_in_weather_m;
+use crate::surroundings::OtherVehicle;
+
+/// The ranges of a sensor in the weather of the latest scan.
+#[derive(Clone, Debug)]
+pub(super) struct Ranges {
+    /// The weather that `usual_m` holds for.
+    weather: Option<Environment>,
+    /// Range of a usual car (m).
+    usual_m: f64,
+}
+
+impl Ranges {
+    /// Creates the ranges before the first scan: those in clear air.
+    pub(super) fn new(model: &ObjectSensorModel) -> Self {
+        Self { weather: None, usual_m: model.range_m }
+    }
+
+    /// Returns the range of a usual car (m).
+    pub(super) fn usual_m(&self) -> f64 {
+        self.usual_m
+    }
+
+    /// Sets the weather, and returns whether it has changed.
+    pub(super) fn update(&mut self, model: &ObjectSensorModel, environment: &Environment) -> bool {
+        if self.weather == Some(*environment) {
+            return false;
+        }
+        self.weather = Some(*environment);
+        self.usual_m = match model.fit {
+            Some(fit) => {
+                let usual = Vehicle::typical(VehicleClass::Car);
+                let [range_m, _] = fit.ranges_m(usual.class, &usual.appearance, environment);
+                model.range_m / fit.usual_m() * range_m
+            }
+            None => range_in_weather_m(model.range_m, environment),
+        };
+        true
+    }
+
+    /// Returns the distances up to which one vehicle is seen, and up to which its class is known (m). `deviation` is that of the
+    /// vehicle's ranges, in standard deviations.
+    pub(super) fn of_m(&self, model: &ObjectSensorModel, other: &OtherVehicle, deviation: f64) -> [f64; 2] {
+        let [range_m, class_range_m] = match (model.fit, &self.weather) {
+            (Some(fit), Some(weather)) => {
+                let relative = model.range_m / fit.usual_m() * (fit.range_spread * deviation).exp();
+                fit.ranges_m(other.class, &other.appearance, weather).map(|range_m| relative * range_m)
+            }
+            _ => [self.usual_m, f64::INFINITY],
+        };
+        [range_m, model.class_range_m.unwrap_or(class_range_m)]
+    }
+}
