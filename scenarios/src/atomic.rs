@@ -87,7 +87,8 @@ pub fn is_temporary(name: &OsStr) -> bool {
     name.to_string_lossy().starts_with(TEMPORARY_PREFIX)
 }
 
-fn parent_folder(path: &Path) -> &Path {
+/// Returns the folder that a file is in: the working folder if the path has a name only.
+pub fn parent_folder(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 

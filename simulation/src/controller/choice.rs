@@ -5,11 +5,13 @@ use std::path::Path;
 use std::str::FromStr;
 use std::sync::Arc;
 
+use closecall_native::Kind;
 use closecall_traffic::suggest::hint;
 use serde::{Deserialize, Serialize};
 
 use super::exec::{DEFAULT_MEMORY_MIB, DEFAULT_TIMEOUT_MS, ExecFactory, ExecSettings, NAME as EXEC};
 use super::hosted::{self, HostedController, PREFIX as HOSTED};
+use super::native::{NativeFactory, NativeSettings};
 use super::{BuiltIn, TimeGap};
 use crate::run::ControllerFactory;
 
@@ -21,16 +23,16 @@ pub enum ControllerChoice {
     BuiltIn(BuiltIn),
     /// A separate process for each sample.
     Exec(ExecSettings),
+    /// A shared library or an FMU, in a process of its own.
+    Native(NativeSettings),
     /// A controller of the program that has Closecall as a library.
     Hosted(HostedController),
 }
 
 /// The names and forms of the controllers, as messages list them.
-const KNOWN: &str =
-    "`acc`, `mis`, `mis-extended`, `gap-SECONDS`, `r157-gap`, `r157-driver`, `r157-fsm` or `exec:COMMAND`";
+const KNOWN: &str = "`acc`, `mis`, `mis-extended`, `gap-SECONDS`, `r157-gap`, `r157-driver`, `r157-fsm`, `lib:PATH`, `fmu:PATH` or `exec:COMMAND`";
 /// The words that are suggested for a misspelt one.
-const WORDS: &str =
-    "`acc`, `mis`, `mis-extended`, `gap-1.2`, `gap-1.6`, `gap-2.0`, `r157-gap`, `r157-driver`, `r157-fsm`, `exec`";
+const WORDS: &str = "`acc`, `mis`, `mis-extended`, `gap-1.2`, `gap-1.6`, `gap-2.0`, `r157-gap`, `r157-driver`, `r157-fsm`, `exec`, `lib`, `fmu`";
 /// The beginning of the name of a controller with another constant time gap.
 const GAP: &str = "gap-";
 
@@ -45,6 +47,7 @@ impl ControllerChoice {
         match self {
             Self::BuiltIn(built_in) => built_in.to_string(),
             Self::Exec(_) => EXEC.to_owned(),
+            Self::Native(native) => native.name(),
             Self::Hosted(hosted) => hosted.name(),
         }
     }
@@ -71,6 +74,31 @@ impl ControllerChoice {
         if let Self::Exec(settings) = self { Some(settings) } else { None }
     }
 
+    /// Returns the library or FMU, or `None` if this is none.
+    pub const fn native(&self) -> Option<&NativeSettings> {
+        if let Self::Native(settings) = self { Some(settings) } else { None }
+    }
+
+    /// Returns the same controller with other limits, if it has any: the time limit of each answer (ms), and the memory of the
+    /// process (MiB). `None` leaves a limit as it is.
+    #[must_use]
+    pub fn limited(&self, timeout_ms: Option<u64>, memory_mib: Option<u64>) -> Self {
+        let mut limited = self.clone();
+        let limits = match &mut limited {
+            Self::Exec(exec) => (&mut exec.timeout_ms, &mut exec.memory_mib),
+            Self::Native(native) => (&mut native.timeout_ms, &mut native.memory_mib),
+            Self::BuiltIn(_) | Self::Hosted(_) => return limited,
+        };
+        *limits.0 = timeout_ms.unwrap_or(*limits.0);
+        *limits.1 = memory_mib.unwrap_or(*limits.1);
+        limited
+    }
+
+    /// Returns true if the controller runs in a process that has limits.
+    pub const fn has_limits(&self) -> bool {
+        matches!(self, Self::Exec(_) | Self::Native(_))
+    }
+
     /// Returns a factory of this controller.
     pub fn factory(&self) -> Arc<dyn ControllerFactory> {
         self.factory_in(None, self.name())
@@ -82,6 +110,7 @@ impl ControllerChoice {
         match self {
             Self::BuiltIn(built_in) => built_in.factory(),
             Self::Exec(settings) => Arc::new(ExecFactory::new(settings.clone(), folder).named(name)),
+            Self::Native(native) => Arc::new(NativeFactory::new(native, folder, name)),
             Self::Hosted(hosted) => hosted.factory(name),
         }
     }
@@ -104,6 +133,7 @@ impl fmt::Display for ControllerChoice {
         match self {
             Self::BuiltIn(built_in) => built_in.fmt(f),
             Self::Exec(settings) => write!(f, "{EXEC}:{}", settings.command),
+            Self::Native(native) => f.write_str(&native.text()),
             Self::Hosted(hosted) => hosted.fmt(f),
         }
     }
@@ -135,6 +165,12 @@ pub enum UnknownController {
         /// The text.
         text: String,
     },
+    /// A `lib:PATH` or `fmu:PATH` names no file.
+    #[error("`{text}` names no file: a path follows the colon, as in `lib:./my_controller.so`")]
+    Path {
+        /// The text.
+        text: String,
+    },
     /// The command of an `exec:COMMAND` cannot be split into words.
     #[error("`{command}` is not a command: it is empty, or its quotes do not match")]
     Command {
@@ -155,6 +191,12 @@ impl FromStr for ControllerChoice {
             return is_command
                 .then_some(Self::Exec(exec))
                 .ok_or_else(|| UnknownController::Command { command: command.to_owned() });
+        }
+        if let Some((word, path)) = text.split_once(':')
+            && let Some(kind) = Kind::ALL.into_iter().find(|kind| kind.prefix() == word)
+        {
+            let native = (!path.is_empty()).then(|| Self::Native(NativeSettings::new(kind, path)));
+            return native.ok_or_else(|| UnknownController::Path { text: text.to_owned() });
         }
         if let Some((HOSTED, _)) = text.split_once(':') {
             let hosted = HostedController::new(text);
@@ -177,7 +219,7 @@ impl FromStr for ControllerChoice {
     }
 }
 
-/// The form in a manifest: the name of a built-in or hosted controller, or the settings of a process.
+/// The form in a manifest: the name of a built-in or hosted controller, or the settings of a process, a library or an FMU.
 #[derive(Serialize, Deserialize)]
 #[serde(untagged)]
 enum Stored {
@@ -186,15 +228,17 @@ enum Stored {
 }
 
 #[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct StoredProcess {
-    exec: ExecSettings,
+#[serde(rename_all = "lowercase")]
+enum StoredProcess {
+    Exec(ExecSettings),
+    Native(NativeSettings),
 }
 
 impl From<ControllerChoice> for Stored {
     fn from(choice: ControllerChoice) -> Self {
         match choice {
-            ControllerChoice::Exec(exec) => Self::Process(StoredProcess { exec }),
+            ControllerChoice::Exec(exec) => Self::Process(StoredProcess::Exec(exec)),
+            ControllerChoice::Native(native) => Self::Process(StoredProcess::Native(native)),
             ControllerChoice::BuiltIn(built_in) => Self::BuiltIn(built_in.to_string()),
             ControllerChoice::Hosted(hosted) => Self::BuiltIn(hosted.to_string()),
         }
@@ -211,7 +255,8 @@ impl TryFrom<Stored> for ControllerChoice {
                 Ok(Self::Hosted(HostedController::new(&name)))
             }
             Stored::BuiltIn(name) => name.parse(),
-            Stored::Process(process) => Ok(Self::Exec(process.exec)),
+            Stored::Process(StoredProcess::Exec(exec)) => Ok(Self::Exec(exec)),
+            Stored::Process(StoredProcess::Native(native)) => Ok(Self::Native(native)),
         }
     }
 }
@@ -236,6 +281,13 @@ mod tests {
             assert_eq!(text, format!("\"{name}\""));
             assert_eq!(serde_json::from_str::<ControllerChoice>(&text).unwrap(), choice);
         }
+        for text in ["lib:./a.so", "fmu:/b/c.fmu"] {
+            let choice = text.parse::<ControllerChoice>().unwrap().limited(Some(250), None);
+            assert_eq!(choice.to_string(), text);
+            let stored = serde_json::to_string(&choice).unwrap();
+            assert_eq!(serde_json::from_str::<ControllerChoice>(&stored).unwrap(), choice, "{stored}");
+        }
+        assert_eq!("lib:./a.so".parse::<ControllerChoice>().unwrap().name(), "lib:a");
         let process = exec("python3 'a b.py'");
         let text = serde_json::to_string(&process).unwrap();
         assert!(text.starts_with("{\"exec\":{\"command\":"), "{text}");
@@ -251,6 +303,7 @@ mod tests {
         assert!(refusal("r157-drivr").ends_with("; did you mean `r157-driver`?"));
         assert!(refusal("gap-3.0").contains("0.8 to 2.5 s in steps of 0.1 s"));
         assert!(refusal("exec:").contains("it is empty"));
+        assert!(refusal("lib:").contains("names no file"));
     }
 
     #[test]

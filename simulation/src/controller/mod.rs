@@ -1,4 +1,4 @@
-//! The controllers that can drive the ego: built-in ones, and external processes.
+//! The controllers that can drive the ego: built-in ones, and those from outside.
 //!
 //! | `--controller` | controller |
 //! |---|---|
@@ -10,6 +10,8 @@
 //! | `r157-driver` | the competent and careful human driver of UN Regulation 157 |
 //! | `r157-fsm` | the fuzzy safety model of UN Regulation 157 |
 //! | `exec:COMMAND` | an external process, started anew for each sample ([`exec`]) |
+//! | `lib:PATH` | a shared library, in a process of its own ([`native`]) |
+//! | `fmu:PATH` | a functional mock-up unit, in a process of its own ([`native`]) |
 //! | `python:NAME` | a controller of the Python program that runs Closecall ([`hosted`]) |
 //!
 //! A controller in Rust implements [`EgoController`](closecall_controllers::EgoController). A campaign creates it through a
@@ -20,6 +22,7 @@ mod built_in;
 mod choice;
 pub mod exec;
 pub mod hosted;
+pub mod native;
 mod time_gap;
 
 pub use arm_list::{ArmList, ArmsError};

@@ -3,7 +3,10 @@
 use std::sync::Arc;
 
 use closecall_controllers::{EgoController, EgoSettings};
+use closecall_native::VariableTable;
 use closecall_sensors::SensorMode;
+
+use crate::controller::native::NativeFactory;
 
 /// Identifies one sample of a scenario.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,8 +28,17 @@ pub trait ControllerFactory: Send + Sync {
     }
     /// Returns whether the controller has a margin increase system whose actions the outcome summarises.
     fn has_mis(&self, settings: &EgoSettings) -> bool;
+    /// Returns the library or FMU that a worker process is to run, together with the whole sample; `None` for every controller that
+    /// runs in this process, or brings a process of its own.
+    fn isolated(&self) -> Option<&NativeFactory> {
+        None
+    }
     /// Creates a new controller with the settings of the scenario's ego stack.
     fn build(&self, settings: &EgoSettings) -> Box<dyn EgoController>;
+    /// Creates a new controller as [`Self::build`] does, with the scenario's names of the variables of an FMU.
+    fn build_with(&self, settings: &EgoSettings, _: &VariableTable) -> Box<dyn EgoController> {
+        self.build(settings)
+    }
 }
 
 /// One arm of a campaign: the ego's controller and its sensors.

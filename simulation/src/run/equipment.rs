@@ -27,7 +27,7 @@ pub(super) fn perception(scenario: &Scenario, arm: &Arm, key: RunKey) -> Result<
 
 /// Returns the controller of the arm in a run.
 pub(super) fn controller(scenario: &Scenario, settings: &EgoSettings, arm: &Arm) -> Box<dyn EgoController> {
-    let controller = arm.controller.build(settings);
+    let controller = arm.controller.build_with(settings, &scenario.variables);
     let off = &scenario.interventions.without_mis;
     if off.is_empty() || !arm.controller.has_mis(settings) {
         return controller;

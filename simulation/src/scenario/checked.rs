@@ -1,6 +1,7 @@
 //! Concrete scenarios: every value is a number, and every number has been checked.
 
 use closecall_controllers::{CheckedDriver, DriverConfig, HumanDriver, LaneKeeping, SpeedKeeping};
+use closecall_native::VariableTable;
 use closecall_sensors::Sensors;
 use closecall_traffic::{
     ActorId, Check, ConfigError, Environment, PHYSICS_STEP, Parameters, Problem, Range, Road, Time, Vehicle,
@@ -63,6 +64,8 @@ pub struct Scenario {
     pub(crate) random_numbers: Option<RandomNumbersConfig>,
     /// Stages that are replaced by the truth, and injected faults.
     pub(crate) interventions: Interventions,
+    /// The names of the variables of an FMU.
+    pub(crate) variables: VariableTable,
 }
 
 impl Scenario {
@@ -104,6 +107,7 @@ impl Check for ScenarioConfig {
             physics_step: PHYSICS_STEP,
             random_numbers: self.random_numbers,
             interventions,
+            variables: self.controller.fmu.clone(),
         })
     }
 }

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use closecall_controllers::{DriverConfig, LaneKeepingConfig, SpeedKeepingConfig};
+use closecall_native::VariableTable;
 use closecall_scenarios::parameters::ParametersConfig;
 use closecall_sensors::SensorsConfig;
 use closecall_traffic::{ActorId, EnvironmentConfig, Lane, Num, RoadConfig, VehicleConfig};
@@ -70,6 +71,9 @@ pub struct ScenarioConfig {
     /// from a sample.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub random_numbers: Option<RandomNumbersConfig>,
+    /// What a controller from outside needs to know of the scenario. Default: nothing.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub controller: ControllerConfig,
     /// Stages of the chain that are replaced by the truth. Default: none.
     #[serde(default, skip_serializing_if = "is_default")]
     pub ideal: IdealConfig,
@@ -87,6 +91,15 @@ pub(super) const EXPECTS_SHARE: f64 = 0.95;
 
 const fn default_expects_share() -> f64 {
     EXPECTS_SHARE
+}
+
+/// What a controller from outside needs to know of the scenario.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct ControllerConfig {
+    /// The names of the variables of an FMU, if they are not those of the quantities.
+    #[serde(default)]
+    pub fmu: VariableTable,
 }
 
 /// A sample whose random numbers are used.

@@ -1,17 +1,20 @@
 //! Injected faults that cannot act in a scenario: they would pass for faults that do no harm.
 
 use closecall_camera::Pipeline;
-use closecall_sensors::{SensorMode, Sensors};
+use closecall_sensors::faults::LidarFaultConfig;
+use closecall_sensors::lidar::Lidar;
+use closecall_sensors::{FullModel, SensorMode, Sensors};
 use closecall_traffic::{Check, ConfigError, Num, Parameters, Problem, Range, Road};
 
 use super::intervention::FaultConfig;
 use super::{ScenarioError, ScenarioFile};
 
 /// Refuses faults that cannot act: those of sensors that do not exist in the mode of the scenario, those of a front radar that a
-/// LiDAR replaces, blocked sectors outside of the field of view, mirror images without guard rails, and entries that begin when the
+/// LiDAR replaces and of a front LiDAR that does not exist, blocked sectors outside of the field of view, mirror images without guard rails, and entries that begin when the
 /// run has ended.
 ///
-/// A scenario with faults both of LiDAR or camera and of the object-level sensor behind is meant for both modes. A mode that the
+/// A scenario with faults both of LiDAR or camera and of the object-level sensor behind is meant for both modes, and so is one with
+/// faults both of the LiDAR and of the radar that look ahead. A mode that the
 /// command line gives is checked by [`ScenarioFile::check_faults_in`].
 pub(super) fn refuse(
     fault: &FaultConfig,
@@ -20,17 +23,10 @@ pub(super) fn refuse(
     parameters: &Parameters,
 ) -> Result<(), ConfigError> {
     refuse_absent(fault, sensors)?;
-    let half_deg = sensors.full_model().rear_lidar.half_field_deg();
-    for (index, of) in fault.rear_lidar.iter().enumerate() {
-        for (end, key) in [(&of.blocked_from_deg, "blocked-from-deg"), (&of.blocked_to_deg, "blocked-to-deg")] {
-            let within = Range::closed(-half_deg, half_deg);
-            parameters.number_or(end.as_ref(), key, within, 0.0).map_err(|error| at("rear-lidar", index, error))?;
-        }
-        let share = parameters.number_or(of.rail_ghosts.as_ref(), "rail-ghosts", Range::closed(0.0, 1.0), 0.0);
-        if share.map_err(|error| at("rear-lidar", index, error))? > 0.0 && !road.has_guard_rails() {
-            let error = contradiction("rail-ghosts", "road.guard-rails", "only guard rails mirror vehicles");
-            return Err(at("rear-lidar", index, error));
-        }
+    let FullModel { rear_lidar, front_lidar, .. } = sensors.full_model();
+    refuse_of_lidar(("rear-lidar", &fault.rear_lidar), &rear_lidar, road, parameters)?;
+    if let Some(front_lidar) = front_lidar {
+        refuse_of_lidar(("front-lidar", &fault.front_lidar), &front_lidar, road, parameters)?;
     }
     let refuse_late = |key, starts: &mut dyn Iterator<Item = &Option<Num>>| {
         for (index, from) in starts.enumerate() {
@@ -43,10 +39,33 @@ pub(super) fn refuse(
         Ok(())
     };
     refuse_late("rear-lidar", &mut fault.rear_lidar.iter().map(|of| &of.from_s))?;
+    refuse_late("front-lidar", &mut fault.front_lidar.iter().map(|of| &of.from_s))?;
     refuse_late("rear-camera", &mut fault.rear_camera.iter().map(|of| &of.from_s))?;
     refuse_late("front-radar", &mut fault.front_radar.iter().map(|of| &of.from_s))?;
     refuse_late("surround", &mut fault.surround.iter().map(|of| &of.from_s))?;
     refuse_late("rear-object", &mut fault.rear_object.iter().map(|of| &of.from_s))
+}
+
+/// Refuses blocked sectors outside of the field of view of a LiDAR, and mirror images without guard rails.
+fn refuse_of_lidar(
+    (of, entries): (&str, &[LidarFaultConfig]),
+    lidar: &Lidar,
+    road: &Road,
+    parameters: &Parameters,
+) -> Result<(), ConfigError> {
+    let half_deg = lidar.half_field_deg();
+    for (index, entry) in entries.iter().enumerate() {
+        for (end, key) in [(&entry.blocked_from_deg, "blocked-from-deg"), (&entry.blocked_to_deg, "blocked-to-deg")] {
+            let within = Range::closed(-half_deg, half_deg);
+            parameters.number_or(end.as_ref(), key, within, 0.0).map_err(|error| at(of, index, error))?;
+        }
+        let share = parameters.number_or(entry.rail_ghosts.as_ref(), "rail-ghosts", Range::closed(0.0, 1.0), 0.0);
+        if share.map_err(|error| at(of, index, error))? > 0.0 && !road.has_guard_rails() {
+            let error = contradiction("rail-ghosts", "road.guard-rails", "only guard rails mirror vehicles");
+            return Err(at(of, index, error));
+        }
+    }
+    Ok(())
 }
 
 impl ScenarioFile {
@@ -72,6 +91,8 @@ fn refuse_absent(fault: &FaultConfig, sensors: &Sensors) -> Result<(), ConfigErr
     let (has_lidar, has_camera) = (!fault.rear_lidar.is_empty(), !fault.rear_camera.is_empty());
     let has_object = !fault.rear_object.is_empty();
     let is_for_both = has_object && (has_lidar || has_camera) && mode != SensorMode::GroundTruth;
+    let (has_front_lidar, has_front_radar) = (!fault.front_lidar.is_empty(), !fault.front_radar.is_empty());
+    let is_front_for_both = has_front_lidar && has_front_radar && mode != SensorMode::GroundTruth;
     let full_only = "LiDAR and camera exist in mode `full` only";
     let object_only = "the object-level sensor behind exists in mode `object` only";
     let no_sensor = "mode `ground-truth` has no sensor that can fail";
@@ -81,13 +102,20 @@ fn refuse_absent(fault: &FaultConfig, sensors: &Sensors) -> Result<(), ConfigErr
         (has_lidar && mode != SensorMode::Full && !is_for_both, "rear-lidar", MODE, full_only),
         (has_camera && mode != SensorMode::Full && !is_for_both, "rear-camera", MODE, full_only),
         (has_object && mode != SensorMode::Object && !is_for_both, "rear-object", MODE, object_only),
-        (is_truth && !fault.front_radar.is_empty(), "front-radar", MODE, no_sensor),
+        (is_truth && has_front_radar, "front-radar", MODE, no_sensor),
         (is_truth && !fault.surround.is_empty(), "surround", MODE, no_sensor),
         (
-            !fault.front_radar.is_empty() && sensors.full_model().front_lidar.is_some() && !is_for_both,
+            has_front_lidar && sensors.full_model().front_lidar.is_none(),
+            "front-lidar",
+            "sensors.front-lidar",
+            "no LiDAR looks ahead: the radar's faults are those of `fault.front-radar`",
+        ),
+        (has_front_lidar && mode != SensorMode::Full && !is_front_for_both, "front-lidar", MODE, full_only),
+        (
+            has_front_radar && sensors.full_model().front_lidar.is_some() && !is_front_for_both,
             "front-radar",
             "sensors.front-lidar",
-            "a LiDAR looks ahead in place of the radar, and has no faults yet",
+            "in mode `full`, a LiDAR looks ahead in place of the radar: its faults are those of `fault.front-lidar`",
         ),
         (
             has_camera && camera_is_off,
@@ -154,6 +182,7 @@ mod tests {
         let camera = "[[fault.rear-camera]]\ndead = true\n";
         let behind = "[[fault.rear-object]]\ndead = true\n";
         let radar = "[[fault.front-radar]]\ndead = true\n";
+        let (front, ahead) = ("sensors.front-lidar = {}\n", "[[fault.front-lidar]]\ndead = true\n");
         let is_off = "sensors.rear-camera.pipeline = \"off\"\n";
         let mirrors = "[[fault.rear-lidar]]\nrail-ghosts = 0.5\n";
         for (keys, key, why) in [
@@ -169,6 +198,30 @@ mod tests {
                 "fault.rear-lidar[0].blocked-to-deg",
                 "from -66.5 to 66.5",
             ),
+            (
+                format!("{full}sensors.front-lidar = {{}}\n{behind}{lidar}{radar}"),
+                "fault.front-radar",
+                "`fault.front-lidar`",
+            ),
+            (format!("{full}{ahead}"), "fault.front-lidar", "no LiDAR looks ahead"),
+            (format!("{object}{front}{ahead}"), "fault.front-lidar", "in mode `full` only"),
+            (format!("{truth}{front}{ahead}{radar}"), "fault.front-radar", "no sensor that can fail"),
+            (
+                format!("{full}{front}[[fault.front-lidar]]\nblocked-from-deg = -70.0\nblocked-to-deg = 0.0\n"),
+                "fault.front-lidar[0].blocked-from-deg",
+                "from -66.5 to 66.5",
+            ),
+            (
+                format!("{full}{front}[[fault.front-lidar]]\nrail-ghosts = 0.5\n"),
+                "fault.front-lidar[0].rail-ghosts",
+                "`road.guard-rails`",
+            ),
+            (
+                format!("{full}sensors.front-lidar.mount-height-m = 0.25\n[[fault.front-lidar]]\nheight-m = -0.2\n"),
+                "sensors.front-lidar.mount-height-m",
+                "`fault.front-lidar`",
+            ),
+            (format!("{full}{front}{ahead}from-s = 3000.0\n"), "fault.front-lidar[0].from-s", "`duration-s`"),
             (format!("{full}{is_off}{camera}"), "fault.rear-camera", "`sensors.rear-camera.pipeline`"),
             (format!("{full}{mirrors}"), "fault.rear-lidar[0].rail-ghosts", "`road.guard-rails`"),
             (format!("{object}{behind}from-s = 3000.0\n"), "fault.rear-object[0].from-s", "`duration-s`"),
@@ -188,6 +241,9 @@ mod tests {
             format!("{full}road.guard-rails = true\n{mirrors}"),
             format!("{object}{behind}{lidar}"),
             format!("{full}{behind}{lidar}"),
+            format!("{full}{front}{ahead}"),
+            format!("{full}{front}{ahead}{radar}"),
+            format!("{object}{front}{ahead}{radar}"),
         ] {
             check(&keys).unwrap();
         }

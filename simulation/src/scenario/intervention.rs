@@ -95,6 +95,8 @@ pub struct FaultConfig {
     pub rear_reaction_s: Option<Num>,
     /// Faults of the rear LiDAR, at most four: sensor mode `full`.
     pub rear_lidar: Vec<LidarFaultConfig>,
+    /// Faults of the LiDAR that looks ahead, at most four: sensor mode `full` with `sensors.front-lidar`.
+    pub front_lidar: Vec<LidarFaultConfig>,
     /// Faults of the rear camera, at most four: sensor mode `full`.
     pub rear_camera: Vec<CameraFaultConfig>,
     /// Faults of the front radar, at most four.
@@ -144,6 +146,7 @@ impl Interventions {
         }
         let entries = FaultEntries {
             rear_lidar: &fault.rear_lidar,
+            front_lidar: &fault.front_lidar,
             rear_camera: &fault.rear_camera,
             object: [&fault.front_radar, &fault.surround, &fault.rear_object],
             odometry: fault.odometry.as_ref(),

@@ -22,7 +22,7 @@ pub(super) fn inline(path: &Path, text: &str, config: &ScenarioConfig) -> Result
     let mut document: Option<DocumentMut> = None;
     for (key, lidar) in lidars(config) {
         let Some(name) = &lidar.pattern_file else { continue };
-        let pattern = read(&path.with_file_name(name))?;
+        let pattern = read(&path.with_file_name(name), &format!("sensors.{key}.{}", KEYS[0]))?;
         let syntax = |message: &str| {
             let line = text.lines().position(|line| line.contains(KEYS[0])).map_or(1, |index| index + 1);
             ScenarioError::Syntax { path: path.to_owned(), line, message: format!("`{}`: {message}", KEYS[0]) }
@@ -49,9 +49,12 @@ fn lidars(config: &ScenarioConfig) -> impl Iterator<Item = (&'static str, &Lidar
     std::iter::once(("rear-lidar", &config.sensors.rear_lidar)).chain(front)
 }
 
-/// Reads and checks a pattern file.
-fn read(path: &Path) -> Result<toml_edit::InlineTable, ScenarioError> {
-    let text = std::fs::read_to_string(path).map_err(|source| ScenarioError::Read { path: path.to_owned(), source })?;
+/// Reads and checks a pattern file, which the key `key` names.
+fn read(path: &Path, key: &str) -> Result<toml_edit::InlineTable, ScenarioError> {
+    let text = std::fs::read_to_string(path).map_err(|source| {
+        let source = std::io::Error::new(source.kind(), format!("`{key}` names this file: {source}"));
+        ScenarioError::Read { path: path.to_owned(), source }
+    })?;
     let syntax = |line, message| ScenarioError::Syntax { path: path.to_owned(), line, message };
     let config = LidarKindConfig::parse(&text).map_err(|error| {
         let line = locate::line_at(&text, error.span().map_or(0, |span| span.start));
@@ -112,6 +115,9 @@ mod tests {
         let name = library::plain_names().next().unwrap();
         let text = text.replace("free-overtake", name);
         let error = ScenarioFile::parse(&folder.path().join("scenario.toml"), &text, &[]).unwrap_err();
-        assert!(error.is_io() && error.to_string().contains("mine.toml"), "{error}");
+        let (message, cause) = (error.to_string(), std::error::Error::source(&error).map(ToString::to_string));
+        let said = format!("{message}: {}", cause.unwrap_or_default());
+        assert!(error.is_io() && said.contains("mine.toml"), "{said}");
+        assert!(said.contains("`sensors.rear-lidar.pattern-file` names this file"), "{said}");
     }
 }

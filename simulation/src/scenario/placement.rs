@@ -62,14 +62,14 @@ fn reject_overlaps(
     road: &Road,
     states: &[VehicleState],
 ) -> Result<(), ConfigError> {
-    let shape = |index: usize| {
-        let state: &VehicleState = &states[index];
+    let shape = |(state, vehicle): (&VehicleState, &Vehicle)| {
         let pose = road.plane_pose(state.s_m, state.d_m, state.heading_rad);
-        closecall_traffic::geometry::OrientedBox::new(pose, vehicles[index].dimensions)
+        closecall_traffic::geometry::OrientedBox::new(pose, vehicle.dimensions)
     };
+    let shapes: Vec<_> = states.iter().zip(vehicles).map(shape).collect();
     for later in 1..actors.len() {
         for earlier in 0..later {
-            if shape(earlier).overlaps(&shape(later)) {
+            if shapes[earlier].overlaps(&shapes[later]) {
                 let rule = format!("`{}` and `{}` overlap at the start", actors[earlier].id, actors[later].id);
                 let problem = Problem::Contradiction { other: "start", rule };
                 return Err(ConfigError::new("start", problem).within_index(later).within("actor"));

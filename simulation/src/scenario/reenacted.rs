@@ -162,6 +162,7 @@ pub(super) fn config(encounter: &RecordedEncounter, rear: RearDriver) -> Result<
         traffic: Vec::new(),
         sensors: Default::default(),
         random_numbers: None,
+        controller: Default::default(),
         ideal: Default::default(),
         fault: Default::default(),
     })

@@ -42,7 +42,6 @@ impl Extent {
 /// A lane as neighbours see it: a vehicle is in it that reaches between these lateral positions (m).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LaneBand {
-    pub(super) lane: Lane,
     right_m: f64,
     left_m: f64,
 }
@@ -51,7 +50,7 @@ impl LaneBand {
     pub(super) fn new(road: &Road, lane: Lane) -> Self {
         let centre_m = road.lane_centre_m(lane);
         let half_m = 0.5 * road.lane_width_m() - LANE_OVERLAP_M;
-        Self { lane, right_m: centre_m - half_m, left_m: centre_m + half_m }
+        Self { right_m: centre_m - half_m, left_m: centre_m + half_m }
     }
 
     /// Returns whether a vehicle between these lateral positions, of its right and of its left end, is in the lane.
@@ -63,20 +62,17 @@ impl LaneBand {
 /// The lanes in which a vehicle has neighbours.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LanesAround {
-    pub(super) own: LaneBand,
-    pub(super) left: Option<LaneBand>,
-    pub(super) right: Option<LaneBand>,
+    pub(super) own: Lane,
+    pub(super) left: Option<Lane>,
+    pub(super) right: Option<Lane>,
 }
 
 impl LanesAround {
     /// Returns the lanes around a vehicle at the lateral position `d_m`, as far as its driver looks.
     pub(super) fn new(road: &Road, d_m: f64, looks: Looks) -> Self {
         let own = road.lane_at(d_m);
-        let beside = |side| {
-            let lane = if looks.adjacent { road.beside(own, side) } else { None };
-            lane.map(|lane| LaneBand::new(road, lane))
-        };
-        Self { own: LaneBand::new(road, own), left: beside(Side::Left), right: beside(Side::Right) }
+        let beside = |side| if looks.adjacent { road.beside(own, side) } else { None };
+        Self { own, left: beside(Side::Left), right: beside(Side::Right) }
     }
 
     /// Sets `around` to the neighbours before any is found.
@@ -175,13 +171,15 @@ impl Around {
 pub(super) fn find(extents: &[Extent], actor: usize, road: &Road, looks: Looks, around: &mut Around) {
     let lanes = LanesAround::new(road, extents[actor].d_m, looks);
     lanes.clear(around);
+    let band = |lane| LaneBand::new(road, lane);
+    let (own, left, right) = (band(lanes.own), lanes.left.map(band), lanes.right.map(band));
     for other in (0..extents.len()).filter(|other| *other != actor) {
         let candidate = Candidate::new(extents, [actor, other]);
         let sides_m = extents[other].sides_m();
-        if lanes.own.contains(sides_m) {
+        if own.contains(sides_m) {
             candidate.insert_into(&mut around.own);
         }
-        for (band, slot) in [(&lanes.left, &mut around.left), (&lanes.right, &mut around.right)] {
+        for (band, slot) in [(&left, &mut around.left), (&right, &mut around.right)] {
             if let (Some(band), Some(slot)) = (band, slot)
                 && band.contains(sides_m)
             {

@@ -44,6 +44,11 @@ pub(super) struct NeighbourSearch {
     strips: Vec<Vec<Entry>>,
     /// The strips that the path of each vehicle touches.
     touched: Vec<RangeInclusive<usize>>,
+    /// For each vehicle, the number of vehicles of each lane, and then of each strip that it touches, that come before it in
+    /// `order`.
+    ranks: Vec<usize>,
+    /// The lanes.
+    bands: Vec<LaneBand>,
     /// Length of the longest vehicle (m).
     longest_m: f64,
     /// Number of pairs of vehicles that were compared.
@@ -89,16 +94,40 @@ impl NeighbourSearch {
         self.order.sort_unstable_by(|one, other| one.s_m.total_cmp(&other.s_m).then(one.actor.cmp(&other.actor)));
         self.touched.clear();
         self.touched.extend(self.extents.iter().map(|extent| strips(road, extent.sides_m())));
-        for (lane, list) in (1..).zip(&mut self.lanes) {
-            let band = LaneBand::new(road, Lane(lane));
-            let is_in_lane = |entry: &&Entry| band.contains(self.extents[entry.actor].sides_m());
-            list.extend(self.order.iter().filter(is_in_lane));
-        }
+        self.bands.clear();
+        self.bands.extend((1..=road.lanes()).map(|lane| LaneBand::new(road, Lane(lane))));
+        let lists = self.lanes.len() + self.strips.len();
+        self.ranks.resize(lists * self.extents.len(), 0);
         for &entry in &self.order {
-            for strip in self.touched[entry.actor].clone() {
-                self.strips[strip].push(entry);
+            let ranks = &mut self.ranks[lists * entry.actor..][..lists];
+            let (in_lanes, in_strips) = ranks.split_at_mut(self.lanes.len());
+            let sides_m = self.extents[entry.actor].sides_m();
+            for ((rank, list), band) in in_lanes.iter_mut().zip(&mut self.lanes).zip(&self.bands) {
+                *rank = list.len();
+                if band.contains(sides_m) {
+                    list.push(entry);
+                }
+            }
+            let touched = self.touched[entry.actor].clone();
+            for (rank, list) in in_strips[touched.clone()].iter_mut().zip(&mut self.strips[touched]) {
+                *rank = list.len();
+                list.push(entry);
             }
         }
+    }
+
+    /// Returns the number of vehicles of a lane that come before a vehicle.
+    fn rank_in_lane(&self, actor: usize, lane: usize) -> usize {
+        self.ranks[(self.lanes.len() + self.strips.len()) * actor + lane]
+    }
+
+    /// Returns the vehicles of a strip whose centre is ahead of that of a vehicle, which touches the strip.
+    fn ahead_in_strip(&self, actor: usize, strip: usize) -> &[Entry] {
+        let rank = self.rank_in_lane(actor, self.lanes.len() + strip);
+        let list = &self.strips[strip][rank..];
+        let own_s_m = self.extents[actor].s_m;
+        let level = list.iter().take_while(|entry| entry.s_m <= own_s_m).count();
+        &list[level..]
     }
 
     /// Sets `around` to the vehicles around `actor`.
@@ -113,7 +142,7 @@ impl NeighbourSearch {
             self.fill(actor, lane, slot);
         }
         for strip in self.touched[actor].clone() {
-            self.fill_path(actor, &self.strips[strip], &mut around.in_path);
+            self.fill_path(actor, self.ahead_in_strip(actor, strip), &mut around.in_path);
         }
         if looks.beyond
             && let Some(ahead) = around.ahead()
@@ -125,9 +154,7 @@ impl NeighbourSearch {
     /// Fills `slot` with the nearest vehicle in the path of the vehicle ahead of `actor`.
     fn fill_beyond(&self, [actor, ahead]: [usize; 2], slot: &mut Option<Nearest>) {
         for strip in self.touched[ahead].clone() {
-            let list = &self.strips[strip];
-            let start = list.partition_point(|entry| entry.s_m <= self.extents[ahead].s_m);
-            for entry in &list[start..] {
+            for entry in self.ahead_in_strip(ahead, strip) {
                 if self.is_beyond(actor, entry, slot) {
                     break;
                 }
@@ -139,16 +166,17 @@ impl NeighbourSearch {
     }
 
     /// Fills `slot` with the neighbours of `actor` in a lane.
-    fn fill(&self, actor: usize, band: LaneBand, slot: &mut LaneAround) {
-        let list = &self.lanes[usize::from(band.lane.0) - 1];
-        let start = list.partition_point(|entry| entry.s_m < self.extents[actor].s_m);
-        for entry in &list[start..] {
+    fn fill(&self, actor: usize, lane: Lane, slot: &mut LaneAround) {
+        let lane = usize::from(lane.0) - 1;
+        // A vehicle at the same position along the road is alongside, whichever of the two comes first.
+        let (behind, ahead) = self.lanes[lane].split_at(self.rank_in_lane(actor, lane));
+        for entry in ahead {
             if self.is_beyond(actor, entry, &slot.lead) {
                 break;
             }
             self.visit(actor, entry, |candidate| candidate.insert_into(slot));
         }
-        for entry in list[..start].iter().rev() {
+        for entry in behind.iter().rev() {
             if self.is_beyond(actor, entry, &slot.follower) {
                 break;
             }
@@ -156,10 +184,9 @@ impl NeighbourSearch {
         }
     }
 
-    /// Fills `slot` with the nearest vehicle of a strip that is ahead in the path of `actor`.
-    fn fill_path(&self, actor: usize, list: &[Entry], slot: &mut Option<Nearest>) {
-        let start = list.partition_point(|entry| entry.s_m <= self.extents[actor].s_m);
-        for entry in &list[start..] {
+    /// Fills `slot` with the nearest vehicle in the path of `actor`, of those that are `ahead`.
+    fn fill_path(&self, actor: usize, ahead: &[Entry], slot: &mut Option<Nearest>) {
+        for entry in ahead {
             if self.is_beyond(actor, entry, slot) {
                 break;
             }

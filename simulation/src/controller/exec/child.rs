@@ -36,7 +36,7 @@ const BUFFERED_LINES: usize = 2;
 const CHUNK_BYTES: usize = 4_096;
 
 /// A child process with its pipes.
-pub(super) struct Child {
+pub struct Child {
     process: process::Child,
     /// `None` once the standard input of the process is to be closed.
     requests: Option<Sender<Vec<u8>>>,
@@ -56,7 +56,10 @@ pub(super) struct Child {
 
 impl Child {
     /// Starts the process in the given folder, or in that of this program.
-    pub(super) fn start(settings: &ExecSettings, folder: Option<&Path>) -> Result<Self, ExecError> {
+    ///
+    /// # Errors
+    /// [`ExecError`] if it cannot be started.
+    pub fn start(settings: &ExecSettings, folder: Option<&Path>) -> Result<Self, ExecError> {
         let invalid_command = || ExecError::Command { command: settings.command.clone() };
         let words = settings.words().ok_or_else(invalid_command)?;
         let (program, arguments) = words.split_first().ok_or_else(invalid_command)?;
@@ -97,8 +100,39 @@ impl Child {
         Ok(child)
     }
 
+    /// Sends a line that needs no answer.
+    pub fn send(&self, line: Vec<u8>) {
+        // If the writing thread is gone, so is the process, which reading then reports.
+        if let Some(requests) = &self.requests {
+            drop(requests.send(line));
+        }
+    }
+
+    /// Sends a line and waits for its answer. Returns `None` if there is none within `limit`: the process is then killed when this
+    /// value is dropped.
+    ///
+    /// # Errors
+    /// [`ExecError`] if the process ends, or does not keep to its limits.
+    pub fn request_within(&mut self, line: Vec<u8>, limit: Duration) -> Result<Option<Vec<u8>>, ExecError> {
+        self.send(line);
+        let answer = self.wait(limit);
+        match &answer {
+            Ok(Some(_)) => self.answered += 1,
+            Ok(None) | Err(_) => self.has_failed = true,
+        }
+        answer
+    }
+
+    /// Returns the number of answers so far.
+    pub const fn answered(&self) -> u64 {
+        self.answered
+    }
+
     /// Sends a line and waits for its answer. `limit` is the time limit.
-    pub(super) fn request(&mut self, line: Vec<u8>, limit: Duration) -> Result<Vec<u8>, ExecError> {
+    ///
+    /// # Errors
+    /// [`ExecError`] if the process ends, does not answer in time, or does not keep to its limits.
+    pub fn request(&mut self, line: Vec<u8>, limit: Duration) -> Result<Vec<u8>, ExecError> {
         let answer = self.exchange(line, limit);
         match &answer {
             Ok(_) => self.answered += 1,
@@ -112,10 +146,7 @@ impl Child {
         if self.answered > 0 {
             self.reject_unrequested_line()?;
         }
-        // If the writing thread is gone, so is the process, which reading then reports.
-        if let Some(requests) = &self.requests {
-            drop(requests.send(line));
-        }
+        self.send(line);
         match self.wait(limit)? {
             Some(answer) => Ok(answer),
             // A second wait distinguishes a late process from one that hangs.
@@ -152,6 +183,11 @@ impl Child {
                 Ok(Line::Whole(line)) => return Ok(Some(line)),
                 Ok(Line::TooLong) => return Err(ExecError::LongLine { limit: MAX_LINE_BYTES }),
                 Err(RecvTimeoutError::Disconnected) => return Err(self.exit_error()),
+                // A descendant may hold the pipe open after the end of the process. What the process has written still arrives.
+                Err(RecvTimeoutError::Timeout) if self.has_ended() => match self.answers.recv_timeout(EXIT_TIMEOUT) {
+                    Ok(Line::Whole(line)) => return Ok(Some(line)),
+                    _ => return Err(self.exit_error()),
+                },
                 Err(RecvTimeoutError::Timeout) if left.is_zero() => return Ok(None),
                 Err(RecvTimeoutError::Timeout) => {}
             }
@@ -188,10 +224,8 @@ impl Child {
     /// Returns whether the process ends by itself within `limit`. It is not reaped by this.
     fn ends_within(&self, limit: Duration) -> bool {
         let started = Instant::now();
-        let options = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
         loop {
-            // An error means that there is no process to wait for.
-            if !matches!(waitid(WaitId::Pid(self.pid()), options), Ok(None)) {
+            if self.has_ended() {
                 return true;
             }
             if started.elapsed() >= limit {
@@ -199,6 +233,13 @@ impl Child {
             }
             thread::sleep(EXIT_POLL_INTERVAL);
         }
+    }
+
+    /// Returns whether the process has ended. It is not reaped by this.
+    fn has_ended(&self) -> bool {
+        let options = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
+        // An error means that there is no process to wait for.
+        !matches!(waitid(WaitId::Pid(self.pid()), options), Ok(None))
     }
 
     fn pid(&self) -> Pid {

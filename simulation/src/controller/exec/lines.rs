@@ -16,6 +16,10 @@ const QUOTED_LINES: usize = 5;
 /// Longest excerpt of a line in an error message (characters).
 const MAX_EXCERPT_CHARS: usize = 120;
 
+/// Written to standard error by a worker process when a sample begins, so that no message quotes what an earlier sample wrote: the
+/// record separator of ASCII.
+pub const NEW_SAMPLE: u8 = 0x1e;
+
 /// A line of standard output.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Line {
@@ -62,6 +66,13 @@ pub(super) struct Tail(VecDeque<u8>);
 impl Tail {
     /// Appends bytes, and drops the oldest ones beyond [`KEPT_STDERR_BYTES`].
     pub(super) fn push(&mut self, bytes: &[u8]) {
+        let bytes = match bytes.iter().rposition(|byte| *byte == NEW_SAMPLE) {
+            Some(at) => {
+                self.0.clear();
+                &bytes[at + 1..]
+            }
+            None => bytes,
+        };
         self.0.extend(bytes);
         let excess = self.0.len().saturating_sub(KEPT_STDERR_BYTES);
         self.0.drain(..excess);

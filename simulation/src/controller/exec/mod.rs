@@ -44,8 +44,10 @@ mod processes;
 mod protocol;
 mod settings;
 
+pub use child::Child;
 pub use controller::{ExecFactory, identify};
 pub use error::ExecError;
+pub use lines::NEW_SAMPLE;
 pub use processes::{adopt_orphans, end_all};
 pub use protocol::Identity;
 pub use settings::{DEFAULT_MEMORY_MIB, DEFAULT_TIMEOUT_MS, ExecSettings, NAME};
