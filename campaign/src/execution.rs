@@ -7,9 +7,11 @@ use closecall_scenarios::atomic::WriteError;
 
 use super::folder::{FolderError, LockedFolder, ResumedFiles, TornLine};
 use super::gate::{GateSet, Judge};
+use super::host::refusal;
 use super::ledger::Inference;
 use super::partition::Partition;
 use super::record::Record;
+use super::remote::{RemoteError, RemoteWorkers};
 use super::repair::{Repair, key_of, repair};
 use super::runner::Work;
 use super::stop::StopFlag;
@@ -29,6 +31,8 @@ pub struct Campaign {
     pub workers: Workers,
     /// What determines the number of samples.
     pub inference: Inference,
+    /// The machines that run the samples, if this one does not.
+    pub remote: Option<Arc<RemoteWorkers>>,
     /// True if samples of the journal that ended in an error are run again.
     pub retry_errors: bool,
     /// A request from outside to start no further samples.
@@ -73,6 +77,15 @@ pub enum CampaignError {
     /// The worker threads could not be started.
     #[error(transparent)]
     Workers(#[from] WorkersError),
+    /// A worker process has found another controller, or is another version of this program.
+    #[error("failed to go on: {reason}")]
+    Refused {
+        /// What has changed.
+        reason: String,
+    },
+    /// The samples cannot run on other machines.
+    #[error(transparent)]
+    Remote(#[from] RemoteError),
 }
 
 /// What a caller of [`Campaign::run`] ends after a record.
@@ -101,7 +114,7 @@ impl Campaign {
     /// Returns a campaign that runs every sample of the given scenarios.
     pub fn new(works: Vec<Arc<Work>>, workers: Workers) -> Self {
         let (inference, stop) = (Inference::default(), StopFlag::default());
-        Self { works, partition: None, workers, inference, retry_errors: false, stop }
+        Self { works, partition: None, workers, inference, remote: None, retry_errors: false, stop }
     }
 
     /// Returns a summary of no samples yet.
@@ -136,6 +149,11 @@ impl Campaign {
         })?;
         let judged = verdict::judge(&summary, &judge, gates.max_flip_rate);
         Ok((summary, judged))
+    }
+
+    /// Returns what runs the samples, for a message: `8 threads`.
+    pub fn place(&self) -> String {
+        if self.remote.is_some() { "a cluster".to_owned() } else { format!("{} threads", self.workers.jobs) }
     }
 
     /// Returns the number of samples of all scenarios.
@@ -238,7 +256,7 @@ impl Campaign {
         for (number, work) in self.works.iter().enumerate().skip(start.work) {
             let done = if number == start.work { start.done } else { 0 };
             let samples = work.samples(self.partition).skip(done);
-            self.workers.run(work, samples, &self.stop, |finished: Finished| {
+            self.run_samples((number, work), samples, |finished: Finished| {
                 if let Some(files) = files.as_deref_mut() {
                     append(files, index, &finished)?;
                 }
@@ -247,13 +265,30 @@ impl Campaign {
                 let next = NextRecord { work: number, record: &finished.record, is_new: true, spent_s };
                 let end = on_record(next).break_value();
                 is_over = end == Some(End::Campaign);
-                Ok::<_, CampaignError>(if end.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
+                Ok(if end.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
             })?;
             if is_over || self.stop.is_set() {
                 break;
             }
         }
         Ok(())
+    }
+
+    /// Runs samples of one scenario, which is given with its index, on this machine or on others. See [`Workers::run`].
+    pub(super) fn run_samples(
+        &self,
+        (number, work): (usize, &Arc<Work>),
+        samples: impl Iterator<Item = u64>,
+        mut on_finished: impl FnMut(Finished) -> Result<ControlFlow<()>, CampaignError>,
+    ) -> Result<(), CampaignError> {
+        let on_finished = |finished: Finished| match refusal(&finished.record) {
+            Some(reason) => Err(CampaignError::Refused { reason: reason.to_owned() }),
+            None => on_finished(finished),
+        };
+        match &self.remote {
+            Some(remote) => remote.run((number, work), samples, &self.stop, on_finished),
+            None => self.workers.run(work, samples, &self.stop, on_finished),
+        }
     }
 }
 

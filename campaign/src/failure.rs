@@ -1,5 +1,6 @@
 //! The kind of an error: what a caller can do about it, and so the exit code of a program.
 
+use closecall_simulation::controller::native::NativeError;
 use closecall_simulation::scenario::ScenarioError;
 
 use super::compare::CompareError;
@@ -31,6 +32,15 @@ impl From<&ScenarioError> for FailureKind {
             | ScenarioError::Empty { .. }
             | ScenarioError::Syntax { .. }
             | ScenarioError::Value { .. } => Self::InvalidInput,
+        }
+    }
+}
+
+impl From<&NativeError> for FailureKind {
+    fn from(error: &NativeError) -> Self {
+        match error {
+            NativeError::Refused { is_io: true, .. } => Self::Io,
+            NativeError::Refused { .. } | NativeError::Crash { .. } => Self::InvalidInput,
         }
     }
 }
@@ -67,7 +77,9 @@ impl From<&CampaignError> for FailureKind {
     fn from(error: &CampaignError) -> Self {
         match error {
             CampaignError::Folder(error) => Self::from(error),
-            CampaignError::Write(_) | CampaignError::Workers(_) => Self::Io,
+            CampaignError::Refused { .. } => Self::InvalidInput,
+            CampaignError::Remote(error) if error.is_input() => Self::InvalidInput,
+            CampaignError::Write(_) | CampaignError::Workers(_) | CampaignError::Remote(_) => Self::Io,
         }
     }
 }

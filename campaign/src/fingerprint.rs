@@ -7,7 +7,9 @@
 use std::path::{Path, PathBuf};
 
 use closecall_controllers::CheckedDriver;
+use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::controller::exec::{ExecSettings, Identity, identify};
+use closecall_simulation::controller::native::NativeSettings;
 use closecall_simulation::scenario::Scenario;
 use serde::{Deserialize, Serialize};
 
@@ -53,6 +55,27 @@ impl Fingerprint {
             command: settings.command.clone(),
             files: named_files(settings, folder).into_iter().map(hash).collect(),
             identity: greeted.unwrap_or_default(),
+        }
+    }
+
+    /// Returns the fingerprint of a controller that runs in a process; `None` for all others.
+    pub fn of_choice(choice: &ControllerChoice, folder: Option<&Path>, scenario: Option<&Scenario>) -> Option<Self> {
+        match choice {
+            ControllerChoice::Exec(exec) => Some(Self::of(exec, folder, scenario)),
+            ControllerChoice::Native(native) => Some(Self::of_native(native, folder)),
+            ControllerChoice::BuiltIn(_) | ControllerChoice::Hosted(_) => None,
+        }
+    }
+
+    /// Returns the fingerprint of a library or an FMU. One that cannot be loaded has no identity.
+    fn of_native(settings: &NativeSettings, folder: Option<&Path>) -> Self {
+        let path = folder.map_or_else(|| PathBuf::from(&settings.path), |folder| folder.join(&settings.path));
+        let blake3 = file_hash(&path).map_or_else(|error| error.to_string(), |hash| hash.to_string());
+        let stated = settings.probe(folder).unwrap_or_default();
+        Self {
+            command: settings.text(),
+            files: vec![FileHash { name: settings.path.clone(), blake3 }],
+            identity: Identity { name: stated.name, version: stated.version },
         }
     }
 

@@ -201,6 +201,11 @@ impl Manifest {
         serde_json::to_string(&value).ok()
     }
 
+    /// Returns the BLAKE3 hash of [`Self::determining_json`].
+    pub fn configuration(&self) -> String {
+        blake3::hash(self.determining_json().unwrap_or_default().as_bytes()).to_string()
+    }
+
     /// Returns the folder in which the controllers of the campaign run, or `None` if it no longer exists.
     pub fn controller_folder(&self) -> Option<&Path> {
         self.working_folder.as_deref().filter(|folder| folder.is_dir())
@@ -209,8 +214,8 @@ impl Manifest {
     /// Returns one message for each difference between the controllers of the campaign and those that its commands start
     /// now.
     pub fn changed_controllers(&self, scenario: &Scenario) -> Vec<String> {
-        let fingerprint = |settings| Fingerprint::of(settings, self.controller_folder(), Some(scenario));
-        let now: Vec<_> = self.arms.iter().filter_map(ControllerChoice::exec).map(fingerprint).collect();
+        let fingerprint = |choice| Fingerprint::of_choice(choice, self.controller_folder(), Some(scenario));
+        let now: Vec<_> = self.arms.iter().filter_map(fingerprint).collect();
         fingerprint::differences(&self.controllers, &now)
     }
 

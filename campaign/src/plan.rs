@@ -6,14 +6,14 @@
 //!  controllers    ┘        └─▶ Manifest (stores it)
 //! ```
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use closecall_camera::{Backend, SHIPPED_MODEL};
 use closecall_sensors::{SensorMode, inference_backend};
 use closecall_simulation::Arm;
 use closecall_simulation::controller::ControllerChoice;
-use closecall_simulation::controller::exec::ExecSettings;
+use closecall_simulation::controller::native::NativeError;
 use closecall_simulation::scenario::{ScenarioError, ScenarioFile};
 use closecall_traffic::Choice;
 
@@ -40,6 +40,14 @@ pub enum PlanError {
         second: PathBuf,
         /// The name of both.
         name: String,
+    },
+    /// A controller does not fit a scenario.
+    #[error("{scenario}: {source}")]
+    Controller {
+        /// The scenario.
+        scenario: String,
+        /// What is wrong.
+        source: NativeError,
     },
     /// Two arms have the same controller, so that they would have the same outcomes.
     #[error("`{controller}` is named twice: every arm needs a controller of its own")]
@@ -74,7 +82,7 @@ impl Plan {
     /// under test. If there are several, the first is the baseline, and those between are references.
     ///
     /// # Errors
-    /// [`PlanError`] if two scenarios have the same name, or two arms the same controller.
+    /// [`PlanError`] if two scenarios have the same name, two arms the same controller, or a variable of an FMU has no counterpart.
     pub fn new(
         scenarios: Vec<ScenarioFile>,
         sampling: Sampling,
@@ -87,10 +95,17 @@ impl Plan {
                 return Err(PlanError::SameName { first, second, name: name.clone() });
             }
         }
+        let natives: Vec<_> = controllers.iter().filter_map(ControllerChoice::native).collect();
         for (index, controller) in controllers.iter().enumerate() {
             if controllers[..index].contains(controller) {
                 return Err(PlanError::SameArm { controller: controller.to_string() });
             }
+        }
+        for (file, native) in scenarios.iter().flat_map(|file| natives.iter().map(move |native| (file, native))) {
+            // A scenario without a nominal sample is an error of its samples.
+            let Ok(nominal) = file.concrete(&file.space().nominal()) else { continue };
+            let fail = |source| PlanError::Controller { scenario: file.config().name.clone(), source };
+            native.check_variables(&nominal).map_err(fail)?;
         }
         Ok(Self {
             scenarios,
@@ -130,6 +145,7 @@ impl Plan {
             workers: self.workers,
             inference: self.inference,
             retry_errors: false,
+            remote: None,
             stop: StopFlag::default(),
         }
     }
@@ -144,11 +160,11 @@ impl Plan {
         self.scenarios.iter().any(may_be_full)
     }
 
-    /// Returns what identifies the controllers that run as processes.
-    fn fingerprints(&self) -> Vec<Fingerprint> {
+    /// Returns what identifies the controllers that run as processes in the given folder, or in that of this program.
+    fn fingerprints(&self, folder: Option<&Path>) -> Vec<Fingerprint> {
         let nominal = self.scenarios.first().and_then(|file| file.concrete(&file.space().nominal()).ok());
-        let fingerprint = |settings: &ExecSettings| Fingerprint::of(settings, None, nominal.as_ref());
-        self.controllers.iter().filter_map(ControllerChoice::exec).map(fingerprint).collect()
+        let fingerprint = |choice| Fingerprint::of_choice(choice, folder, nominal.as_ref());
+        self.controllers.iter().filter_map(fingerprint).collect()
     }
 
     /// Returns the manifest of the campaign. `command` is the command line that started it.
@@ -156,6 +172,11 @@ impl Plan {
     /// # Errors
     /// [`FolderError::Read`] if the inference library that is in use cannot be read.
     pub fn manifest(&self, command: Vec<String>) -> Result<Manifest, FolderError> {
+        self.manifest_in(command, None)
+    }
+
+    /// Does the same as [`Self::manifest`] for controllers that run in another folder than this program.
+    pub(crate) fn manifest_in(&self, command: Vec<String>, folder: Option<&Path>) -> Result<Manifest, FolderError> {
         let scenario = |file: &ScenarioFile| ManifestScenario {
             name: file.config().name.clone(),
             path: file.path().display().to_string(),
@@ -174,7 +195,7 @@ impl Plan {
             checks: self.checks,
             inference: self.inference,
             models: if self.uses_classifier() { vec![rear_classifier()?] } else { Vec::new() },
-            controllers: self.fingerprints(),
+            controllers: self.fingerprints(folder),
             working_folder: std::env::current_dir().ok(),
             sample_timeout_s: self.workers.sample_timeout.as_secs_f64(),
             without_effect: self.without_effect.clone(),

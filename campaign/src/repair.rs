@@ -140,9 +140,9 @@ fn run_again(campaign: &Campaign, redos: &[Redo]) -> Result<BTreeMap<Key, Finish
     for (index, work) in campaign.works.iter().enumerate() {
         let keys = redos.iter().flat_map(|redo| &redo.samples).filter(|(work, _)| *work == index);
         let samples: Vec<u64> = keys.map(|(_, sample)| *sample).collect();
-        campaign.workers.run(work, samples.into_iter(), &campaign.stop, |finished| {
+        campaign.run_samples((index, work), samples.into_iter(), |finished| {
             results.insert((index, finished.record.sample), finished);
-            Ok::<_, CampaignError>(ControlFlow::Continue(()))
+            Ok(ControlFlow::Continue(()))
         })?;
     }
     Ok(results)

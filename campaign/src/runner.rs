@@ -2,7 +2,7 @@
 
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use closecall_scenarios::sampling::Design;
 use closecall_simulation::outcome::Outcome;
@@ -10,6 +10,7 @@ use closecall_simulation::scenario::{Scenario, ScenarioFile};
 use closecall_simulation::{Arm, NoObserver, Observer, RunKey, SampleError, simulate};
 use closecall_traffic::Check;
 
+use super::host;
 use super::partition::Partition;
 use super::record::{ArmRecord, SampleFailure};
 use super::validity::{CheckPlan, CheckedRun};
@@ -83,9 +84,12 @@ impl Samples for Work {
         &self.arms
     }
 
-    /// Runs one sample in one arm, and checks it if the plan of the checks includes it.
-    fn run(&self, sample: u64, arm: usize) -> ArmRun {
-        let arm = &self.arms[arm];
+    /// Runs one sample in one arm, in a worker process if its controller is a library or an FMU, and checks it if the plan of the checks includes it.
+    fn run(&self, sample: u64, index: usize, limit: Duration) -> ArmRun {
+        let arm = &self.arms[index];
+        if let Some(native) = arm.controller.isolated() {
+            return host::run(self, (index, native), sample, limit);
+        }
         let key = RunKey { seed: self.sampling.seed, sample };
         let started = Instant::now();
         let scenario = guarded(|| concrete(&self.file, self.sampling, sample));

@@ -128,7 +128,8 @@ impl SavedCampaign {
     /// Returns the concrete scenario of one sample with further settings.
     ///
     /// # Errors
-    /// [`SavedError`] if the campaign has no such scenario or sample, or a setting does not fit.
+    /// [`SavedError`] if the campaign has no such scenario or sample, a setting does not fit, or a fault that it sets cannot act with
+    /// the sensors of the campaign.
     pub fn sample_with(
         &self,
         scenario: Option<&str>,
@@ -137,6 +138,9 @@ impl SavedCampaign {
     ) -> Result<(Scenario, RunKey), SavedError> {
         let file = self.file(scenario)?;
         let file = ScenarioFile::parse(file.path(), file.text(), settings)?;
+        if let Some(mode) = self.manifest.sensors.filter(|_| !settings.is_empty()) {
+            file.check_faults_in(mode)?;
+        }
         let sampling = self.manifest.sampling;
         let samples = file.space().samples(sampling.design, sampling.samples);
         if sample >= samples {

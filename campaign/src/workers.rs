@@ -87,8 +87,8 @@ pub(crate) trait Samples: Send + Sync + 'static {
     fn scenario(&self) -> &str;
     /// Returns the arms in which each sample runs.
     fn arms(&self) -> &[Arm];
-    /// Runs one sample in one arm.
-    fn run(&self, sample: u64, arm: usize) -> ArmRun;
+    /// Runs one sample in one arm. `limit` is its time limit, after which nothing waits for it any more.
+    fn run(&self, sample: u64, arm: usize, limit: Duration) -> ArmRun;
 }
 
 impl Workers {
@@ -216,6 +216,7 @@ impl<S: Samples> WorkerPool<S> {
         let slot = Slot::default();
         let (own_slot, work, stop) = (slot.clone(), self.work.clone(), self.stop.clone());
         let (job_queue, result_sender) = (self.job_queue.clone(), self.result_sender.clone());
+        let limit = self.workers.sample_timeout;
         let body = move || {
             loop {
                 let Ok(job) = lock(&job_queue).recv() else { return };
@@ -223,7 +224,7 @@ impl<S: Samples> WorkerPool<S> {
                     return;
                 }
                 *lock(&own_slot) = Some((job, Instant::now()));
-                let run = work.run(job.sample, job.arm);
+                let run = work.run(job.sample, job.arm, limit);
                 let is_abandoned = lock(&own_slot).take().is_none();
                 let done = Done { index: job.index, sample: job.sample, run };
                 if is_abandoned || result_sender.send(done).is_err() {

@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::str::FromStr;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::ControllerChoice;
@@ -112,6 +112,9 @@ impl FrontierPlan {
         let settings = settings.collect::<Result<Vec<_>, _>>()?;
         let file = ScenarioFile::parse(self.file.path(), self.file.text(), &settings)?;
         file.check()?;
+        if let Some(mode) = self.sensors {
+            file.check_faults_in(mode)?;
+        }
         Ok(file)
     }
 
@@ -218,7 +221,7 @@ impl Samples for Unchecked {
         &self.arms
     }
 
-    fn run(&self, sample: u64, arm: usize) -> ArmRun {
+    fn run(&self, sample: u64, arm: usize, _: Duration) -> ArmRun {
         let (arm, started) = (&self.arms[arm], Instant::now());
         let key = RunKey { seed: self.sampling.seed, sample };
         let result = guarded(|| concrete(&self.file, self.sampling, sample))

@@ -68,6 +68,9 @@ pub struct SensitivityPlan {
 /// A study that cannot be planned or run.
 #[derive(Debug, thiserror::Error)]
 pub enum PlanFailure {
+    /// A fault of the scenario cannot act in the mode of the sensors.
+    #[error(transparent)]
+    Fault(Box<ScenarioError>),
     /// The end of a range does not give a valid scenario.
     #[error("the factor {range} cannot be used: {source}")]
     Range {
@@ -130,6 +133,9 @@ impl SensitivityPlan {
         named: Vec<FactorRange>,
         with_defaults: bool,
     ) -> Result<Self, PlanFailure> {
+        if let Some(mode) = sensors {
+            file.check_faults_in(mode).map_err(|error| PlanFailure::Fault(Box::new(error)))?;
+        }
         let (mut ranges, left_out) = if with_defaults { factors_of(file, &named) } else { (Vec::new(), Vec::new()) };
         ranges.extend(named);
         for (index, range) in ranges.iter().enumerate() {

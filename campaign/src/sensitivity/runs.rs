@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use closecall_simulation::outcome::Outcome;
 use closecall_simulation::scenario::ScenarioFile;
@@ -94,7 +94,7 @@ impl<P: Fn(usize) -> Vec<f64> + Send + Sync + 'static> Samples for Points<P> {
         &self.arms
     }
 
-    fn run(&self, sample: u64, arm: usize) -> ArmRun {
+    fn run(&self, sample: u64, arm: usize, _: Duration) -> ArmRun {
         let (arm, started) = (&self.arms[arm], Instant::now());
         let point = (self.point)(usize::try_from(sample).unwrap_or(usize::MAX));
         let result = self.cube.run(&point, arm);

@@ -1,0 +1,164 @@
+//! What a worker process does: `closecall host …`.
+
+use std::fs::File;
+use std::io::{self, BufRead, Write};
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use closecall_controllers::ControllerError;
+use closecall_native::{Kind, Loaded, VariableTable, Variables, bridge, cost, unload_all, watch};
+use closecall_simulation::controller::exec::NEW_SAMPLE;
+use closecall_simulation::controller::native::Probe;
+use closecall_simulation::run::ControllerFactory;
+use closecall_simulation::scenario::ScenarioFile;
+use closecall_simulation::{Arm, SampleError};
+
+use super::{Answer, REFUSED, Task};
+use crate::manifest::version;
+use crate::record::{ArmRecord, SampleFailure};
+use crate::runner::{ArmRun, Work};
+use crate::workers::Samples;
+
+/// Number of tracks of the measurement of a control step: those of dense traffic.
+const COST_TRACKS: usize = 12;
+/// Number of control steps of the measurement.
+const COST_STEPS: u32 = 200_000;
+
+/// Runs a worker process with the arguments after `closecall host`, and returns what went wrong.
+///
+/// | arguments | what the process does |
+/// |---|---|
+/// | `probe lib:PATH VARIABLES` | loads the file, and writes what it is |
+/// | `step lib:PATH TABLE` | answers control steps, with the protocol of external processes |
+/// | `samples` | runs whole samples |
+/// | `cost lib:PATH` | measures a control step, and writes its mean wall time |
+///
+/// # Errors
+/// The message of the failure.
+pub fn serve(arguments: &[String]) -> Result<(), String> {
+    let result = serve_one(arguments);
+    unload_all();
+    result
+}
+
+fn serve_one(arguments: &[String]) -> Result<(), String> {
+    // What a library prints must not be taken for an answer.
+    let mut answers = take_output().map_err(|error| format!("failed to set up the output: {error}"))?;
+    let requests = io::stdin().lock();
+    match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+        ["probe", controller, variables] => {
+            let (kind, path) = file(controller)?;
+            let variables: Option<Variables> = read(variables)?;
+            let probe = Probe::of(kind, Path::new(path), variables.as_ref());
+            let text = serde_json::to_string(&probe).map_err(|error| error.to_string())?;
+            writeln!(answers, "{text}").map_err(|error| error.to_string())
+        }
+        ["step", controller, table] => {
+            let table: VariableTable = read(table)?;
+            let (kind, path) = file(controller)?;
+            let loaded = Loaded::open(kind, Path::new(path)).map_err(|error| error.to_string())?;
+            bridge::serve((&loaded, &table), requests, answers)
+        }
+        ["cost", controller] => {
+            let (kind, path) = file(controller)?;
+            let loaded = Loaded::open(kind, Path::new(path)).map_err(|error| error.to_string())?;
+            let step_s = cost::step_s(&loaded, COST_TRACKS, COST_STEPS)?;
+            writeln!(answers, "{controller}: {:.3} µs per control step", 1e6 * step_s)
+                .map_err(|error| error.to_string())
+        }
+        ["samples"] => samples(requests, &Arc::new(Mutex::new(answers))),
+        _ => Err("expected `samples`, or `probe`, `step` or `cost` with a controller such as `lib:PATH`".to_owned()),
+    }
+}
+
+/// Returns the standard output, to which from now on nothing but the returned file writes: what is printed goes to standard error.
+fn take_output() -> io::Result<File> {
+    // A process that the library starts must not hold it open, since its end reports the end of this process.
+    let own = rustix::io::fcntl_dupfd_cloexec(io::stdout(), 3)?;
+    rustix::stdio::dup2_stdout(io::stderr())?;
+    Ok(File::from(own))
+}
+
+fn file(controller: &str) -> Result<(Kind, &str), String> {
+    controller
+        .split_once(':')
+        .and_then(|(word, path)| Some((Kind::ALL.into_iter().find(|kind| kind.prefix() == word)?, path)))
+        .ok_or_else(|| format!("`{controller}` is not `lib:PATH` or `fmu:PATH`"))
+}
+
+/// Runs the samples whose numbers `requests` gives, after the task in its first line.
+fn samples(requests: impl BufRead, answers: &Arc<Mutex<File>>) -> Result<(), String> {
+    let mut lines = requests.lines();
+    let Some(first) = lines.next() else { return Ok(()) };
+    let first = first.map_err(|error| error.to_string())?;
+    // The task of another version may have another form.
+    let Stated { version: there } = read(&first)?;
+    if there != version() {
+        let reason = format!(
+            "Closecall has changed since the start: it was {there}, and is {}. The results so far are kept",
+            version()
+        );
+        return if lines.next().is_some() { refuse(answers, reason) } else { Ok(()) };
+    }
+    let task: Task = read(&first)?;
+    if let Err(reason) = task.controller.check_unchanged() {
+        return if lines.next().is_some() { refuse(answers, reason) } else { Ok(()) };
+    }
+    let file = ScenarioFile::parse(&task.path, &task.text, &[]).map_err(|error| error.to_string())?;
+    let controller = task.controller.in_this_process();
+    let (name, timeout_ms) = (controller.name().to_owned(), controller.settings().timeout_ms);
+    let arms = vec![Arm { controller: Arc::new(controller), sensors: task.sensors }];
+    let work = Work { file, sampling: task.sampling, arms, checks: task.checks };
+    let is_answered = Arc::new(AtomicBool::new(true));
+    let late = {
+        let (answers, is_answered) = (answers.clone(), is_answered.clone());
+        move |time| {
+            let reason = format!("no answer within {timeout_ms} ms");
+            let failure = SampleFailure::from(SampleError::from(ControllerError::Own { reason, time }));
+            let record = ArmRecord { controller: name.clone(), result: Err(failure), checks: None };
+            if !is_answered.swap(true, Ordering::SeqCst) {
+                // The process ends after this. If the answer is lost, its end is the error of the sample.
+                answer(&answers, ArmRun { record, wall_s: timeout_ms as f64 * 1e-3, check_s: 0.0 }, true).ok();
+            }
+        }
+    };
+    watch::start(Duration::from_millis(timeout_ms), late).map_err(|error| error.to_string())?;
+    let limit = Duration::MAX;
+    for line in lines {
+        let sample: u64 = line.map_err(|error| error.to_string()).and_then(|line| read(&line))?;
+        io::stderr().write_all(&[NEW_SAMPLE]).map_err(|error| error.to_string())?;
+        is_answered.store(false, Ordering::SeqCst);
+        let run = work.run(sample, 0, limit);
+        if !is_answered.swap(true, Ordering::SeqCst) {
+            answer(answers, run, false)?;
+        }
+    }
+    Ok(())
+}
+
+/// The part of a task that every version has.
+#[derive(serde::Deserialize)]
+struct Stated {
+    version: String,
+}
+
+/// Answers a sample with the reason for which this process does not run it.
+fn refuse(answers: &Mutex<File>, message: String) -> Result<(), String> {
+    let failure = SampleFailure { kind: REFUSED.to_owned(), message };
+    let record = ArmRecord { controller: String::new(), result: Err(failure), checks: None };
+    answer(answers, ArmRun { record, wall_s: 0.0, check_s: 0.0 }, true)
+}
+
+fn read<T: serde::de::DeserializeOwned>(line: &str) -> Result<T, String> {
+    serde_json::from_str(line).map_err(|error| format!("failed to read a message: {error}"))
+}
+
+fn answer(answers: &Mutex<File>, run: ArmRun, is_last: bool) -> Result<(), String> {
+    let ArmRun { record, wall_s, check_s } = run;
+    let mut line =
+        serde_json::to_vec(&Answer { record, wall_s, check_s, is_last }).map_err(|error| error.to_string())?;
+    line.push(b'\n');
+    answers.lock().unwrap_or_else(PoisonError::into_inner).write_all(&line).map_err(|error| error.to_string())
+}

@@ -1,0 +1,110 @@
+//! The results of a block as bytes, and what is checked of them.
+//!
+//! ```text
+//!  {"closecall_version":…,"configuration":…,"wall_s":[[…],…],"check_s":[…]}
+//!  one line of the journal for each sample, with its checksum
+//! ```
+
+use closecall_simulation::outcome::Outcome;
+use serde::{Deserialize, Serialize};
+
+use crate::journal;
+use crate::record::Record;
+use crate::runner::Work;
+use crate::workers::{Finished, Samples};
+
+/// The first line of an answer.
+#[derive(Serialize, Deserialize)]
+struct Header {
+    /// The version of the program that has run the block.
+    closecall_version: String,
+    /// The configuration that it has run.
+    configuration: String,
+    /// Wall time of each sample in each arm (s).
+    wall_s: Vec<Vec<f64>>,
+    /// Wall time of the validity checks of each sample (s).
+    check_s: Vec<f64>,
+}
+
+/// Returns the results of a block as bytes.
+pub(super) fn encode(version: &str, configuration: &str, results: &[Finished]) -> serde_json::Result<Vec<u8>> {
+    let header = Header {
+        closecall_version: version.to_owned(),
+        configuration: configuration.to_owned(),
+        wall_s: results.iter().map(|finished| finished.wall_s.clone()).collect(),
+        check_s: results.iter().map(|finished| finished.check_s).collect(),
+    };
+    let mut bytes = serde_json::to_vec(&header)?;
+    bytes.push(b'\n');
+    for finished in results {
+        bytes.extend(journal::line(&finished.record).map_err(serde_json::Error::io)?);
+    }
+    Ok(bytes)
+}
+
+/// What the answer to a block must be.
+pub(super) struct Expected<'a> {
+    pub(super) version: &'a str,
+    pub(super) configuration: &'a str,
+    pub(super) work: &'a Work,
+    pub(super) samples: &'a [u64],
+}
+
+impl Expected<'_> {
+    /// Returns the results of a block in the order of its samples. Returns what is wrong if a sample is missing, or if
+    /// one is of another campaign.
+    pub(super) fn decode(&self, bytes: &[u8]) -> Result<Vec<Finished>, String> {
+        let mut lines = bytes.split_inclusive(|byte| *byte == b'\n');
+        let header: Header = serde_json::from_slice(lines.next().unwrap_or_default())
+            .map_err(|error| format!("the answer has no header: {error}"))?;
+        let (here, there) = (self.version, &header.closecall_version);
+        if there != here {
+            return Err(format!("they were made by Closecall {there}, and this program is {here}"));
+        }
+        if header.configuration != self.configuration {
+            return Err("they are of another configuration".to_owned());
+        }
+        let records = lines.map(journal::parse).collect::<Result<Vec<_>, _>>()?;
+        let counts = [records.len(), header.wall_s.len(), header.check_s.len()];
+        if counts != [self.samples.len(); 3] {
+            return Err(format!("there are {} instead of {}", records.len(), self.samples.len()));
+        }
+        let mut results = Vec::with_capacity(records.len());
+        let times = header.wall_s.into_iter().zip(header.check_s);
+        for ((record, (wall_s, check_s)), &sample) in records.into_iter().zip(times).zip(self.samples) {
+            self.check(&record, sample)?;
+            results.push(Finished { record, wall_s, check_s });
+        }
+        Ok(results)
+    }
+
+    /// Returns what is wrong if a record is not that of the sample.
+    fn check(&self, record: &Record, sample: u64) -> Result<(), String> {
+        let (work, scenario) = (self.work, self.work.scenario());
+        if record.scenario != scenario || record.sample != sample {
+            let (there, number) = (&record.scenario, record.sample);
+            return Err(format!("there is sample {number} of `{there}` instead of {sample} of `{scenario}`"));
+        }
+        let names = || work.arms.iter().map(|arm| arm.controller.name());
+        if !record.arms.iter().map(|arm| arm.controller.as_str()).eq(names()) {
+            let names: Vec<&str> = names().collect();
+            return Err(format!("sample {sample} was not run with {}", names.join(" and ")));
+        }
+        let sampling = work.sampling;
+        let values = work.file.space().sample(sampling.design, sampling.seed, sample, sampling.samples);
+        let is_own = |outcome: &Outcome| {
+            (outcome.scenario.as_str(), outcome.seed, outcome.sample) == (scenario, sampling.seed, sample)
+        };
+        for arm in &record.arms {
+            let Ok(outcome) = &arm.result else { continue };
+            if !is_own(outcome) {
+                let (there, seed) = (outcome.sample, outcome.seed);
+                return Err(format!("sample {sample} is sample {there} of the seed {seed}, not of {}", sampling.seed));
+            }
+            if outcome.controller != arm.controller || outcome.parameters != values {
+                return Err(format!("sample {sample} has other values than the seed {} draws", sampling.seed));
+            }
+        }
+        Ok(())
+    }
+}

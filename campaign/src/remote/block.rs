@@ -1,0 +1,98 @@
+//! Runs blocks of a campaign on the machine that an engine has chosen.
+
+use std::num::NonZeroUsize;
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use closecall_camera::Backend;
+use closecall_sensors::set_inference_backend;
+use tempfile::TempDir;
+
+use super::answer;
+use super::engine::RemoteError;
+use super::shipment::Shipment;
+use crate::folder::FolderError;
+use crate::host::refusal;
+use crate::manifest::{Manifest, version};
+use crate::plan::Plan;
+use crate::runner::Work;
+use crate::saved::{SavedError, works};
+use crate::stop::StopFlag;
+use crate::workers::{Finished, Workers, WorkersError};
+
+/// The variable that names the library of ONNX Runtime, as for the command line.
+const BACKEND_VARIABLE: &str = "ORT_DYLIB_PATH";
+
+/// A campaign, ready to run blocks of its samples.
+#[derive(Debug)]
+pub struct BlockRunner {
+    works: Vec<Arc<Work>>,
+    workers: Workers,
+    version: String,
+    configuration: String,
+    /// The files of the controllers.
+    _folder: Option<TempDir>,
+}
+
+impl BlockRunner {
+    /// Prepares the campaign of a shipment, and checks that this machine runs the same one: the same version of the program,
+    /// scenarios, networks and controllers.
+    ///
+    /// # Errors
+    /// [`RemoteError`] with what differs.
+    pub fn prepare(shipment: &Shipment) -> Result<Self, RemoteError> {
+        let here = version();
+        if shipment.version != here {
+            return Err(RemoteError::Version { there: shipment.version.clone(), here });
+        }
+        let sent: Manifest = serde_json::from_str(&shipment.manifest)?;
+        set_inference_backend(Backend::choose(None, std::env::var_os(BACKEND_VARIABLE).map(Into::into)));
+        let folder = shipment.unpack()?;
+        let unpacked = folder.as_ref().map(|folder| folder.path().to_owned());
+        let local = Manifest { working_folder: unpacked.or_else(|| sent.working_folder.clone()), ..sent.clone() };
+        let works = works(Path::new(""), &local)?;
+        let too_long = |error: std::time::TryFromFloatSecsError| {
+            let (path, message) = ("manifest.json".into(), format!("sample_timeout_s: {error}"));
+            RemoteError::Folder(FolderError::Content { path, line: 1, message })
+        };
+        let sample_timeout = Duration::try_from_secs_f64(sent.sample_timeout_s).map_err(too_long)?;
+        let files = works.iter().map(|work| work.file.clone()).collect();
+        let mut plan = Plan::new(files, sent.sampling, sent.arms.clone())?;
+        plan.use_sensors(sent.sensors).map_err(SavedError::from)?;
+        plan.partition = sent.partition;
+        plan.checks = sent.checks;
+        plan.inference = sent.inference;
+        plan.workers = Workers { jobs: NonZeroUsize::MIN, sample_timeout };
+        plan.without_effect.clone_from(&sent.without_effect);
+        let own = plan.manifest_in(sent.command.clone(), local.controller_folder())?;
+        let differences = sent.differences(&own);
+        if !differences.is_empty() {
+            return Err(RemoteError::Different { differences });
+        }
+        let configuration = Manifest { working_folder: sent.working_folder, ..own }.configuration();
+        Ok(Self { works, workers: plan.workers, version: here, configuration, _folder: folder })
+    }
+
+    /// Runs samples of the scenario with index `work` in one thread, and returns their records.
+    ///
+    /// # Errors
+    /// [`RemoteError`] if there is no such scenario or sample, or no thread can be started.
+    pub fn run(&self, work: usize, samples: &[u64]) -> Result<Vec<u8>, RemoteError> {
+        let Some(found) = self.works.get(work).filter(|work| samples.iter().all(|&sample| sample < work.count()))
+        else {
+            return Err(RemoteError::NoBlock { work });
+        };
+        let mut results: Vec<Finished> = Vec::with_capacity(samples.len());
+        let done = self.workers.run(found, samples.iter().copied(), &StopFlag::default(), |finished| {
+            results.push(finished);
+            Ok::<_, WorkersError>(ControlFlow::Continue(()))
+        });
+        done.map_err(|error| super::EngineError { message: error.to_string(), is_input: false })?;
+        if let Some(reason) = results.iter().find_map(|finished| refusal(&finished.record)) {
+            return Err(super::EngineError { message: reason.to_owned(), is_input: true }.into());
+        }
+        Ok(answer::encode(&self.version, &self.configuration, &results)?)
+    }
+}

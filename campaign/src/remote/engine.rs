@@ -1,0 +1,175 @@
+//! What an engine does, and the one that the program has.
+
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use super::shipment::Shipment;
+use super::workers::RemoteWorkers;
+use crate::folder::FolderError;
+use crate::manifest::Manifest;
+use crate::plan::PlanError;
+use crate::saved::SavedError;
+
+static ENGINE: Mutex<Option<Arc<dyn Engine>>> = Mutex::new(None);
+
+/// Runs blocks of samples on other machines.
+pub trait Engine: Send + Sync {
+    /// Connects to the cluster at `address`, which is to run blocks of one campaign.
+    ///
+    /// # Errors
+    /// [`EngineError`] if there is no such cluster, or it cannot be used.
+    fn connect(&self, address: &str, shipment: &Shipment) -> Result<Box<dyn Cluster>, EngineError>;
+}
+
+/// The machines that run the blocks of one campaign.
+pub trait Cluster: Send + Sync {
+    /// Returns the number of blocks that can run at the same time now. More are submitted, so that the cluster can grow.
+    ///
+    /// # Errors
+    /// [`EngineError`] if the cluster cannot be reached.
+    fn capacity(&self) -> Result<usize, EngineError>;
+
+    /// Submits a block: samples of the scenario with index `work`.
+    ///
+    /// # Errors
+    /// [`EngineError`] if the cluster cannot be reached.
+    fn submit(&self, block: u64, work: usize, samples: &[u64]) -> Result<(), EngineError>;
+
+    /// Waits for at most `timeout`, and returns the blocks that are done, each with what [`BlockRunner::run`] has returned.
+    ///
+    /// # Errors
+    /// [`EngineError`] if a block has failed for good, or the cluster cannot be reached.
+    ///
+    /// [`BlockRunner::run`]: super::BlockRunner::run
+    fn wait(&self, timeout: Duration) -> Result<Vec<(u64, Vec<u8>)>, EngineError>;
+
+    /// Gives up all blocks that are not done.
+    fn cancel(&self);
+
+    /// Ends the connection.
+    fn close(&self);
+}
+
+/// An error of an engine.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{message}")]
+pub struct EngineError {
+    /// What has failed.
+    pub message: String,
+    /// True if the cluster cannot be used as it is: another version of the program, a missing file. False if it has failed.
+    pub is_input: bool,
+}
+
+/// The reason for which samples cannot run elsewhere.
+#[derive(Debug, thiserror::Error)]
+pub enum RemoteError {
+    /// The program has no engine.
+    #[error(
+        "failed to run on Ray: this program was built without Python. Install the Python package, whose command `closecall` \
+         can: pip install \"closecall[ray]\""
+    )]
+    NoEngine,
+    /// The engine has failed.
+    #[error("failed to run on Ray: {0}")]
+    Engine(#[from] EngineError),
+    /// A file that is to be shipped cannot be read, or one that was shipped cannot be written.
+    #[error("failed to ship {}: {source}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// The error of the operating system.
+        source: std::io::Error,
+    },
+    /// The manifest cannot be read.
+    #[error("failed to read the manifest: {0}")]
+    Manifest(#[from] serde_json::Error),
+    /// The machine has another version of the program.
+    #[error(
+        "the campaign was started by Closecall {there}, and this machine has {here}: install the same wheel on both"
+    )]
+    Version {
+        /// The version that has started the campaign.
+        there: String,
+        /// The version of this machine.
+        here: String,
+    },
+    /// The machine would run another campaign.
+    #[error("this machine would not run the same campaign:\n  {}", differences.join("\n  "))]
+    Different {
+        /// What differs, one message for each difference.
+        differences: Vec<String>,
+    },
+    /// The scenarios of the manifest cannot form a campaign.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// A scenario of the manifest cannot be used.
+    #[error(transparent)]
+    Saved(#[from] SavedError),
+    /// A model cannot be read.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    /// There is no such block.
+    #[error("the campaign has no scenario {work} with these samples")]
+    NoBlock {
+        /// The index of the scenario.
+        work: usize,
+    },
+    /// The answer of a machine is not that of the block.
+    #[error(
+        "failed to use the results of block {block} of `{scenario}` ({samples} samples from {first} on): {message}"
+    )]
+    Answer {
+        /// The block.
+        block: u64,
+        /// The scenario.
+        scenario: String,
+        /// Number of its samples.
+        samples: usize,
+        /// Its first sample.
+        first: u64,
+        /// What is wrong.
+        message: String,
+    },
+    /// A block was answered that was not submitted, or twice.
+    #[error("the cluster has answered block {block}, which is not awaited")]
+    NotAwaited {
+        /// The block.
+        block: u64,
+    },
+}
+
+impl RemoteError {
+    /// Returns true if what was given cannot be used as it is. Otherwise something has failed.
+    pub const fn is_input(&self) -> bool {
+        match self {
+            Self::Engine(error) => error.is_input,
+            Self::File { .. } | Self::Answer { .. } | Self::NotAwaited { .. } => false,
+            Self::NoEngine
+            | Self::Manifest(_)
+            | Self::Version { .. }
+            | Self::Different { .. }
+            | Self::Plan(_)
+            | Self::Saved(_)
+            | Self::Folder(_)
+            | Self::NoBlock { .. } => true,
+        }
+    }
+}
+
+/// Sets the engine of the program. An earlier one is replaced.
+pub fn set_engine(engine: Arc<dyn Engine>) {
+    let earlier = ENGINE.lock().unwrap_or_else(PoisonError::into_inner).replace(engine);
+    drop(earlier);
+}
+
+/// Connects to the cluster at `address`, if one is given.
+///
+/// # Errors
+/// [`RemoteError`] if the program has no engine, a file cannot be shipped, or the cluster cannot be used.
+pub fn connect(address: Option<&str>, manifest: &Manifest) -> Result<Option<Arc<RemoteWorkers>>, RemoteError> {
+    let Some(address) = address else { return Ok(None) };
+    let engine = ENGINE.lock().unwrap_or_else(PoisonError::into_inner).clone().ok_or(RemoteError::NoEngine)?;
+    let cluster = engine.connect(address, &Shipment::of(manifest)?)?;
+    Ok(Some(Arc::new(RemoteWorkers::new(cluster, manifest))))
+}
