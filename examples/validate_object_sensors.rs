@@ -37,13 +37,16 @@ struct Args {
     /// The seed
     #[arg(long, default_value_t = 2026)]
     seed: u64,
+    /// Only the conditions whose names contain this text, such as `fog`
+    #[arg(long, default_value = "")]
+    condition: String,
 }
 
 fn main() -> Result<ExitCode, Box<dyn std::error::Error>> {
     let args = Args::parse();
     println!("{}, {} samples, seed {}", args.scenario, args.samples, args.seed);
     let (mut agrees, mut lists) = (true, String::new());
-    for (name, settings) in CONDITIONS {
+    for (name, settings) in CONDITIONS.into_iter().filter(|(name, _)| name.contains(&args.condition)) {
         let settings = settings.iter().map(|text| text.parse()).collect::<Result<Vec<_>, _>>()?;
         let file = source::load(Path::new(&args.scenario), &settings)?;
         let agreement = Agreement::of(&file, args.seed, args.samples)?;

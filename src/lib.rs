@@ -16,6 +16,7 @@
 //! | [`scenarios`] | trajectory data, lane changes, distributions, sampling designs |
 //! | [`sensors`] | the perception of the ego vehicle |
 //! | [`controllers`] | the ego stack and the human drivers |
+//! | `native` | controllers that are shared libraries or FMUs |
 //! | [`simulation`] | one run: scenario file, world, closed loop, outcome |
 //! | [`campaign`] | many runs: journal, workers, gates, validity, verdict |
 //! | [`causes`] | the cause of a collision, the smallest failing case, the map, exposure |

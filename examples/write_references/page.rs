@@ -14,7 +14,7 @@ use super::text::Described;
 /// The defaults of the object-level sensors: of the front radar, the surround sensors and the rear object-level sensor. A
 /// sensor without a default does not have the property.
 pub(crate) const SENSOR_DEFAULTS: [(&str, [Option<f64>; 3]); 13] = [
-    ("range-m", [Some(150.0), Some(14.0), Some(134.6)]),
+    ("range-m", [Some(150.0), Some(14.0), Some(133.9)]),
     ("half-angle-deg", [Some(45.0), None, Some(66.5)]),
     ("range-sd-m", [Some(0.1), Some(0.1), Some(0.01)]),
     ("lateral-sd-m", [Some(0.3), Some(0.15), Some(0.01)]),

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 use closecall_simulation::Arm;
-use closecall_simulation::controller::exec::ExecSettings;
 use closecall_simulation::controller::{ArmList, ControllerChoice};
 
 use super::CliError;
@@ -16,14 +15,14 @@ use super::protect::of_controller;
 pub(super) struct ControllerArgs {
     /// Controller of the ego vehicle: `acc`, `mis`, `mis-extended`, `gap-SECONDS` (cruise control with a longer time gap:
     /// `gap-1.2`, `gap-1.6`, `gap-2.0`), `r157-gap` (the minimum following distance of UN Regulation 157), `r157-driver` and
-    /// `r157-fsm` (its reference models), or `exec:COMMAND` for a program of your own, which reads a line per control step and answers with
-    /// a line
-    #[arg(long, value_name = "acc|mis|gap-SECONDS|…|exec:COMMAND", default_value = "mis")]
+    /// `r157-fsm` (its reference models), `lib:PATH` (a shared library of your own), `fmu:PATH` (an FMU), or `exec:COMMAND` for a
+    /// program of your own, which reads a line per control step and answers with a line
+    #[arg(long, value_name = "acc|mis|gap-SECONDS|…|lib:PATH|fmu:PATH|exec:COMMAND", default_value = "mis")]
     controller: ControllerChoice,
-    /// Time limit for each answer of an `exec` controller [default: 1000]
+    /// Time limit for each answer of an `exec`, `lib` or `fmu` controller [default: 1000]
     #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u64).range(1..=600_000))]
     controller_timeout_ms: Option<u64>,
-    /// Memory limit of each process of an `exec` controller [default: 1024]
+    /// Memory limit of each process of an `exec`, `lib` or `fmu` controller [default: 1024]
     #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1_048_576))]
     controller_memory_mib: Option<u64>,
 }
@@ -34,27 +33,20 @@ impl ControllerArgs {
         Ok(self.limited(std::slice::from_ref(&self.controller))?.swap_remove(0))
     }
 
-    /// Returns the controllers, the processes among them with the limits of the command line.
+    /// Returns the controllers, the processes among them with the limits of the command line. Libraries and FMUs are tried.
     fn limited(&self, controllers: &[ControllerChoice]) -> Result<Vec<ControllerChoice>, CliError> {
         let (timeout_ms, memory_mib) = (self.controller_timeout_ms, self.controller_memory_mib);
-        let has_process = controllers.iter().any(|controller| controller.exec().is_some());
-        if let (Some(built_in), true, false) =
-            (controllers.last(), timeout_ms.is_some() || memory_mib.is_some(), has_process)
+        if let (Some(last), true) = (controllers.last(), timeout_ms.is_some() || memory_mib.is_some())
+            && !controllers.iter().any(ControllerChoice::has_limits)
         {
             return Err(CliError::usage(format!(
-                "--controller-timeout-ms and --controller-memory-mib apply to a process, and `{built_in}` is built in: \
-                     name a process with --controller exec:COMMAND"
+                "--controller-timeout-ms and --controller-memory-mib apply to a process, and `{last}` is built in: \
+                     name a process with --controller exec:COMMAND, lib:PATH or fmu:PATH"
             )));
         }
-        let limited = |controller: &ControllerChoice| match controller.exec() {
-            Some(exec) => ControllerChoice::Exec(ExecSettings {
-                timeout_ms: timeout_ms.unwrap_or(exec.timeout_ms),
-                memory_mib: memory_mib.unwrap_or(exec.memory_mib),
-                ..exec.clone()
-            }),
-            None => controller.clone(),
-        };
-        Ok(controllers.iter().map(limited).collect())
+        let limited: Vec<_> = controllers.iter().map(|choice| choice.limited(timeout_ms, memory_mib)).collect();
+        limited.iter().filter_map(ControllerChoice::native).try_for_each(|native| native.probe(None).map(drop))?;
+        Ok(limited)
     }
 }
 

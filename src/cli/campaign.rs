@@ -7,11 +7,12 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use closecall_campaign::arguments::positive;
 use closecall_campaign::end_rule::EndMonitor;
-use closecall_campaign::execution::{Campaign, End, NextRecord};
+use closecall_campaign::execution::{Campaign, CampaignError, End, NextRecord};
 use closecall_campaign::folder::Folder;
 use closecall_campaign::gate::GateSet;
 use closecall_campaign::partition::Partition;
 use closecall_campaign::plan::Plan;
+use closecall_campaign::remote::connect;
 use closecall_campaign::runner::Sampling;
 use closecall_campaign::selection::Selection;
 use closecall_campaign::session;
@@ -61,6 +62,10 @@ pub(super) struct CampaignArgs {
     /// Number of worker threads [default: one per processor]
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
+    /// Run the samples on a Ray cluster: `auto` (the one of this machine), HOST:PORT, or `local` (start one here). Needs the
+    /// Python package: pip install "closecall[ray]"
+    #[arg(long, value_name = "ADDRESS", conflicts_with = "jobs")]
+    ray: Option<String>,
     /// Longest wall time of a sample with one controller; a sample that takes longer ends in an error
     #[arg(long, value_name = "S", default_value_t = 300.0, value_parser = positive)]
     sample_timeout_s: f64,
@@ -124,6 +129,7 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
     let plan = args.plan(controllers)?;
     check_backend(plan.uses_classifier())?;
     let (mut campaign, manifest) = (plan.campaign(), plan.manifest(session::arguments())?);
+    campaign.remote = connect(args.ray.as_deref(), &manifest).map_err(CampaignError::from)?;
     let locked = match &args.out {
         Some(path) => Some(Folder::lock(path, &manifest, args.resume)?),
         None => None,
@@ -156,9 +162,9 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
         Format::Json => outln!("{:#}", json::campaign_report(&report, Some(wall_s))),
         Format::Human => {
             out!("{}", CountsText(&tally.summary));
-            let (simulated_s, jobs) = (tally.summary.total().simulated_s, campaign.workers.jobs);
+            let (simulated_s, place) = (tally.summary.total().simulated_s, campaign.place());
             let checks = check_share(progress.spent_s);
-            outln!("{simulated_s:.0} simulated seconds in {wall_s:.1} s on {jobs} threads{checks}");
+            outln!("{simulated_s:.0} simulated seconds in {wall_s:.1} s on {place}{checks}");
             out!("{}", ensemble_text(&tally.summary, &manifest));
             out!("{}", VerdictText(&judged));
         }

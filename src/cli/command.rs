@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{CommandFactory, Parser, Subcommand};
+use closecall_campaign::host;
 use closecall_campaign::interrupt::watch;
 use closecall_campaign::session::{Printed, Session, set_arguments};
 use closecall_simulation::controller::exec::{adopt_orphans, end_all};
@@ -116,6 +117,9 @@ enum Command {
     View(view::ViewArgs),
     /// Render labelled images of the rear camera, or of an aerial one
     Render(render::RenderArgs),
+    /// Run samples with a library or an FMU, for another process of this program
+    #[command(hide = true)]
+    Host { arguments: Vec<String> },
     /// Print a script that completes commands and options in a shell
     Completions(generate::CompletionsArgs),
     /// Print the manual page, or write one for each command
@@ -200,6 +204,13 @@ fn dispatch(command: Command) -> Result<ExitCode, CliError> {
         Command::Plot(args) => plot::plot(&args),
         Command::View(args) => view::view(&args),
         Command::Render(args) => render::render(&args),
+        Command::Host { arguments } => Ok(host::serve(&arguments).map_or_else(
+            |message| {
+                print_error(format_args!("{message}\n"));
+                ExitCode::SampleError
+            },
+            |()| ExitCode::Pass,
+        )),
         Command::Completions(args) => generate::completions(&args, Cli::command()),
         Command::Man(args) => generate::man(&args, Cli::command()),
     }

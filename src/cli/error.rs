@@ -26,6 +26,7 @@ use closecall_scenarios::following::FollowingError;
 use closecall_scenarios::lane_change::ReferenceError;
 use closecall_scenarios::trajectory_data::{TrajectoryFileError, WriteError as TrajectoryWriteError};
 use closecall_simulation::SampleError;
+use closecall_simulation::controller::native::NativeError;
 use closecall_simulation::scenario::ScenarioError;
 use closecall_simulation::scenario::library::UnknownScenario;
 use closecall_simulation::scenario::member::{ApplyError, MemberError};
@@ -102,6 +103,9 @@ pub enum CliError {
     /// The aerial acquisition fails.
     #[error(transparent)]
     Aerial(#[from] AerialError),
+    /// A library or an FMU cannot be used as a controller.
+    #[error(transparent)]
+    Controller(#[from] NativeError),
     /// The requested inference backend cannot be used.
     #[error(transparent)]
     Classifier(#[from] ClassifierError),
@@ -198,10 +202,12 @@ impl From<&CliError> for ExitCode {
             | CliError::Project(_)
             | CliError::Serve(ServeError::Nothing { .. } | ServeError::Foreign { .. })
             | CliError::Classifier(_) => Self::InvalidInput,
+            CliError::Controller(error) => FailureKind::from(error).into(),
             CliError::Folder(error) => FailureKind::from(error).into(),
             CliError::Campaign(error) => FailureKind::from(error).into(),
             CliError::Saved(error) => FailureKind::from(error).into(),
             CliError::Sensitivity(PlanFailure::Workers(_)) => Self::Io,
+            CliError::Sensitivity(PlanFailure::Fault(error)) => Self::from(&**error),
             CliError::Sensitivity(_) => Self::Usage,
             CliError::Report(error) => error.kind().into(),
             CliError::Merge(error) => FailureKind::from(error).into(),
@@ -221,6 +227,7 @@ impl From<&CliError> for ExitCode {
             CliError::Member(MemberError::Unknown { .. } | MemberError::SameName { .. }) => Self::Usage,
             CliError::Member(_) | CliError::Apply(_) | CliError::Following(_) => Self::InvalidInput,
             CliError::Sample { .. } => Self::SampleError,
+            CliError::Plan(PlanError::Controller { .. }) => Self::InvalidInput,
             CliError::Usage { .. } | CliError::Plan(_) | CliError::Baseline(_) => Self::Usage,
         }
     }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use closecall_aerial::dataset::{AerialDatasetOptions, render_aerial_dataset};
 use closecall_campaign::arguments::scene_count;
-use closecall_datasets::{Content, DatasetOptions, Set, render_dataset};
+use closecall_datasets::{CameraLooks, Content, DatasetOptions, Set, render_dataset};
 use closecall_report::json::stamped;
 use serde_json::json;
 
@@ -52,7 +52,7 @@ pub(super) fn render(args: &RenderArgs) -> Result<ExitCode, CliError> {
         return Ok(ExitCode::Pass);
     }
     let content = if args.crops { Content::Crops } else { Content::Images };
-    let options = DatasetOptions { set, content, scenes, seed };
+    let options = DatasetOptions { set, content, scenes, seed, looks: CameraLooks::default() };
     let summary = render_dataset(&options, &args.output)?;
     match args.format {
         Format::Json => outln!("{:#}", stamped(json!(summary), Some(args.seed), None)),

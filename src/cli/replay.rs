@@ -72,10 +72,9 @@ pub(super) fn replay(args: &ReplayArgs) -> Result<ExitCode, CliError> {
 /// must not run unnoticed.
 fn announce_process(manifest: &Manifest, name: &str) {
     for (arm, arm_name) in manifest.arms.iter().zip(manifest.arm_names()) {
-        if let Some(exec) = arm.exec()
-            && arm_name == name
-        {
-            print_error(format_args!("running the controller that the campaign names: {}\n", exec.command));
+        if arm.has_limits() && arm_name == name {
+            let shown = arm.exec().map_or_else(|| arm.to_string(), |exec| exec.command.clone());
+            print_error(format_args!("running the controller that the campaign names: {shown}\n"));
         }
     }
 }

@@ -53,8 +53,8 @@ pub(super) struct WatchArgs {
     /// under test
     #[arg(long, value_name = "FILE.csv|FILE.parquet", value_parser = table)]
     pub(super) trace: Option<PathBuf>,
-    /// Write every return of the LiDARs (mode `full`) as a table, of the same run: beam, range, position, intensity, time, box and truth
-    #[arg(long, value_name = "FILE.parquet")]
+    /// Write every return of the LiDARs (mode `full`) of the same run: a table with beam, range, position, intensity, time, box and truth, or a new folder with a point cloud for each scan
+    #[arg(long, value_name = "FILE.parquet|FOLDER.pcd")]
     pub(super) scans: Option<PathBuf>,
 }
 

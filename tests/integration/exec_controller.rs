@@ -49,7 +49,7 @@ fn run_with(controller: &str, mark: &str) -> Output {
 ///
 /// The program kills its processes when it ends, and the kernel removes them some time later. This function waits for
 /// that, at most a minute.
-fn left_behind(mark: &str) -> Vec<String> {
+pub(crate) fn left_behind(mark: &str) -> Vec<String> {
     const LOOKS: usize = 600;
     const PAUSE: Duration = Duration::from_millis(100);
     let mut running = marked(mark);

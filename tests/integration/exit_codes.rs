@@ -80,6 +80,19 @@ fn a_folder_that_cannot_be_written_is_an_error_before_the_first_sample() {
 }
 
 #[test]
+fn a_program_without_python_says_how_to_run_on_ray() {
+    let folder = folder();
+    let out = folder.path().join("out");
+    let headline = library("low-thw-overtake");
+    let args = ["campaign", headline.to_str().unwrap(), "--ray", "auto", "--out", out.to_str().unwrap()];
+    let output = closecall(args);
+    assert_eq!(code(&output), 3);
+    assert!(stderr(&output).contains("pip install \"closecall[ray]\""), "{}", stderr(&output));
+    assert!(!out.exists());
+    assert_eq!(code(&closecall(args.into_iter().chain(["--jobs", "2"]))), 2);
+}
+
+#[test]
 fn a_folder_with_other_files_is_not_used() {
     let folder = folder();
     let out = folder.path().join("out");

@@ -10,6 +10,7 @@ use parquet::file::reader::{FileReader, SerializedFileReader};
 use serde_json::Value;
 
 use super::documented::{document, hold, rows};
+use crate::native_controllers::compile;
 use crate::support::{ROOT, closecall, folder, json, library, stdout};
 
 /// A list of objects as its objects.
@@ -173,7 +174,10 @@ fn the_files_and_keys_of_a_campaign_are_those_documented() {
     let journals = ["open", "exec"].map(|name| lines(&folder.path().join(name).join("journal.jsonl"), true));
     hold("journal", journals.iter().flatten());
     hold("wall-times", &lines(&out.join("wall-times.jsonl"), false));
-    let manifests = ["open", "exec", "part"].map(|name| {
+    let shared = compile("examples/acc_controller.c", &folder.path().join("acc.so"), &[]);
+    let native = format!("lib:{}", shared.display());
+    program(&["campaign", headline, "-n", "2", "--no-gate", "--controller", &native, "--out", &at("lib")], 0);
+    let manifests = ["open", "exec", "part", "lib"].map(|name| {
         let text = std::fs::read_to_string(folder.path().join(name).join("manifest.json")).unwrap();
         serde_json::from_str::<Value>(&text).unwrap()
     });
