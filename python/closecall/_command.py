@@ -12,8 +12,23 @@ from . import _native
 
 PROGRAM = "closecall"
 
+#: Starts the program in a process of its own. The working folder holds no modules for it: `-m` would search there first.
+START = "import sys; sys.path[:] = filter(None, sys.path); from closecall._command import main; raise SystemExit(main())"
+
 if _native.__file__:
-    _native.set_program(_native.__file__)
+    _native.set_program(_native.__file__, [sys.executable, "-c", START])
+
+
+class _RayEngine:
+    """Runs the samples of a campaign on Ray, which is loaded only then."""
+
+    def connect(self, address: str, shipment: Any) -> object:
+        from . import ray
+
+        return ray.connect(address, shipment)
+
+
+_native.set_engine(_RayEngine())
 
 
 def main() -> int:

@@ -8,6 +8,7 @@ import functools
 import hashlib
 import inspect
 import io
+import os
 import pickle
 import sys
 import sysconfig
@@ -44,16 +45,25 @@ class Controller(Protocol):
 #: that creates one without arguments (called for each sample).
 ControllerLike = str | Controller | Callable[[], Controller]
 
+#: The controllers of the campaigns that run, by their names.
+REGISTERED: dict[str, ControllerLike] = {}
+
 
 def native(controller: ControllerLike) -> str | _native.PythonController:
     """Returns the name, or the native controller that creates an object for each sample."""
     if isinstance(controller, str):
         return controller
-    if not isinstance(controller, type) and callable(getattr(controller, "step", None)):
+    return _native.PythonController(_name(controller), factory(controller))
+
+
+def factory(controller: ControllerLike) -> Callable[[], Controller]:
+    """Returns a function that creates an object for each sample."""
+    if not isinstance(controller, (str, type)) and callable(getattr(controller, "step", None)):
         # Each sample starts without the memory of another one.
-        return _native.PythonController(_name(controller), lambda: copy.deepcopy(controller))
+        kept: Any = controller
+        return lambda: copy.deepcopy(kept)
     if callable(controller):
-        return _native.PythonController(_name(controller), controller)
+        return controller
     raise UsageError(
         f"controller: {controller!r} is none: expected a name, an object with a method `step`, or a class or function that creates one"
     )
@@ -140,8 +150,16 @@ def _members(own: type) -> tuple[tuple[Any, ...], ...]:
 def _is_installed(obj: Any) -> bool:
     """Returns whether a function or class belongs to Python or to an installed package."""
     path = getattr(sys.modules.get(obj.__module__), "__file__", None)
-    places = [sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib")]
-    return obj.__module__ == "builtins" or (path is not None and any(path.startswith(place) for place in places))
+    return obj.__module__ == "builtins" or (path is not None and is_installed_file(path))
+
+
+def is_installed_file(path: str) -> bool:
+    """Returns whether a file belongs to Python or to an installed package, be it outside of the virtual environment."""
+    whole = os.path.abspath(path)
+    if {"site-packages", "dist-packages"} & set(whole.split(os.sep)):
+        return True
+    places = {sysconfig.get_path(name) for name in ("stdlib", "platstdlib", "purelib", "platlib")}
+    return any(whole.startswith(place + os.sep) for place in places)
 
 
 def _is_importable(obj: types.FunctionType) -> bool:
@@ -205,8 +223,10 @@ def registered(controllers: list[ControllerLike]) -> Iterator[list[str]]:
             else:
                 made.register()
                 own.append(made)
+                REGISTERED[made.name] = controller
                 names.append(made.name)
         yield names
     finally:
         for made in own:
+            REGISTERED.pop(made.name, None)
             end_steps(made)

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import html
+import importlib
 import json
+import os
+import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Literal
 
 from . import _native
@@ -92,7 +96,8 @@ class MisSummary:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of a run. In a notebook it shows the figure that ``closecall plot`` draws."""
+    """The outcome of a run. In a notebook it shows itself in the viewer of Rerun if ``rerun-sdk[notebook]`` is installed, and otherwise
+    the figure that ``closecall plot`` draws."""
 
     scenario: str
     seed: int
@@ -147,10 +152,38 @@ class Outcome:
         """Returns the figure of the encounter (SVG), as ``closecall plot`` draws it."""
         return self._of_run().figure()
 
+    def record(self, path: str | os.PathLike[str]) -> None:
+        """Writes a recording (Rerun file), as ``closecall run --record`` does, without the raw data of the sensors."""
+        self._of_run().record(os.fspath(path))
+
+    def viewer(self) -> Any:
+        """Returns the viewer of Rerun with the recording, a widget for notebooks; ``None`` if ``rerun-sdk[notebook]`` is not installed."""
+        try:
+            rerun, notebook = map(importlib.import_module, ("rerun", "rerun.notebook"))
+            widget = notebook.Viewer(use_global_recording=False)
+        except ImportError:
+            # The exception of a viewer that lacks its own packages is one, too.
+            return None
+        stream = rerun.RecordingStream("closecall")
+        widget.add_recording(stream)
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder, "run.rrd")
+            self.record(file)
+            stream.log_file_from_contents(file, file.read_bytes())
+        stream.flush()
+        return widget
+
     def _of_run(self) -> _native.Run:
         if self._run is None:
             raise ValueError("this outcome was read from JSON: only `closecall.run` leaves a trace and a figure")
         return self._run
+
+    def _ipython_display_(self) -> None:
+        widget = None if self._run is None else self.viewer()
+        if widget is None:
+            # IPython then asks for the HTML.
+            raise NotImplementedError
+        widget.display()
 
     def _repr_html_(self) -> str:
         return f"<pre>{html.escape(repr(self))}</pre>" if self._run is None else self.figure()

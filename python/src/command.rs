@@ -20,10 +20,12 @@ use crate::table::Table;
 /// Interval at which Python's signals and the progress of a command are looked at.
 const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
-/// Sets the file of this module, by which campaigns identify the program.
+/// Sets the file of this module, by which campaigns identify the program, and the words that start the program, which serves
+/// libraries and FMUs in processes of its own.
 #[pyfunction]
-pub(crate) fn set_program(path: PathBuf) {
+pub(crate) fn set_program(path: PathBuf, words: Vec<String>) {
     closecall_campaign::manifest::set_program(path);
+    closecall_simulation::controller::native::set_program(words);
 }
 
 /// Runs the program `closecall` with these arguments, of which the first is its name, and returns its exit code.

@@ -242,7 +242,10 @@ impl Episodes {
             };
             result.map_err(|error| StepError::Sample(state.sample, error))
         };
-        let pool = pool().map_err(|error| PyRuntimeError::new_err(format!("failed to start threads: {error}")))?;
+        // Handing a single run to a thread takes longer than stepping it.
+        let pool = (self.count > 1).then(pool).transpose();
+        let pool = pool.map_err(|error| PyRuntimeError::new_err(format!("failed to start threads: {error}")))?;
+        let pool = pool.filter(|pool| pool.current_num_threads() > 1);
         let stepped = py.detach(|| {
             let mut states = self.states();
             let pairs = || states.iter().zip(&inputs);
@@ -251,10 +254,13 @@ impl Episodes {
             }
             // All runs are stepped, also if one of them fails.
             let runs = &mut *states;
-            let stepped: Vec<Result<(), StepError>> = pool.install(|| {
-                let pairs = runs.par_iter_mut().zip(inputs);
-                pairs.map(|(state, input)| step(state, input)).collect()
-            });
+            let stepped: Vec<Result<(), StepError>> = match &pool {
+                Some(pool) => pool.install(|| {
+                    let pairs = runs.par_iter_mut().zip(inputs);
+                    pairs.map(|(state, input)| step(state, input)).collect()
+                }),
+                None => runs.iter_mut().zip(inputs).map(|(state, input)| step(state, input)).collect(),
+            };
             stepped.into_iter().collect::<Result<(), _>>()?;
             let mut observed = Vec::with_capacity(self.count * len(self.max_tracks) * size_of::<f64>());
             states.iter().for_each(|state| observed.extend(bytes(&state.values)));

@@ -39,6 +39,12 @@ pub(crate) fn usage_exception(py: Python<'_>, message: &str) -> PyErr {
     raise(py, ExitCode::Usage, message, &Location::default())
 }
 
+/// Returns the exception of samples that cannot run elsewhere.
+pub(crate) fn remote_exception(py: Python<'_>, is_input: bool, message: &str) -> PyErr {
+    let code = if is_input { ExitCode::InvalidInput } else { ExitCode::Io };
+    raise(py, code, message, &Location::default())
+}
+
 /// Returns the exception of a sample that has no outcome.
 pub(crate) fn sample_exception(py: Python<'_>, sample: u64, error: &SampleError) -> PyErr {
     let message = format!("failed to run sample {sample}: {error}");

@@ -6,6 +6,7 @@
 //! |---|---|
 //! | `command` | the commands of the program, called from Python |
 //! | `scenario` | scenario files and their samples |
+//! | `remote` | campaigns whose samples run on a cluster |
 //! | `run` | one run, with its trace and its figure |
 //! | `controller` | controllers that are Python objects |
 //! | `episode` | runs that Python steps |
@@ -17,6 +18,7 @@ mod controller;
 mod episode;
 mod error;
 mod observation;
+mod remote;
 mod run;
 mod scenario;
 mod table;
@@ -35,6 +37,8 @@ mod _native {
     const ODOMETRY_KEYS: [&str; 18] = super::observation::ODOMETRY_KEYS;
     #[pymodule_export]
     const TRACK_KEYS: [&str; 19] = super::observation::TRACK_KEYS;
+    #[pymodule_export]
+    use super::remote::{BlockRunner, set_engine, version};
     #[pymodule_export]
     use super::run::{Run, run};
     #[pymodule_export]

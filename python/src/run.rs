@@ -1,5 +1,6 @@
 //! One run, with its trace and its figure.
 
+use std::path::PathBuf;
 use std::str::FromStr;
 use std::sync::Arc;
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -10,6 +11,7 @@ use closecall_campaign::runner::run_guarded;
 use closecall_report::json;
 use closecall_report::run::figure::encounter;
 use closecall_report::run::film::{Film, FilmRecorder, Level};
+use closecall_report::run::rerun::write_recording;
 use closecall_sensors::SensorMode;
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::outcome::Outcome;
@@ -22,7 +24,7 @@ use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::controller::PythonController;
-use crate::error::{sample_exception, usage_exception};
+use crate::error::{exception, sample_exception, usage_exception};
 use crate::scenario::Scenario;
 use crate::table::Table;
 
@@ -62,6 +64,12 @@ impl Run {
     fn trace(&self) -> PyResult<Table> {
         let batch = trace_batch(&self.trace.rows).map_err(|error| PyValueError::new_err(error.to_string()))?;
         Ok(batch.into())
+    }
+
+    /// Writes a recording (Rerun file).
+    fn record(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let written = py.detach(|| write_recording(&path, std::slice::from_ref(&self.film)));
+        written.map_err(|error| exception(py, &error.into()))
     }
 
     /// Returns the figure of the encounter as SVG.
@@ -107,8 +115,13 @@ pub(crate) fn run(
             choice.factory()
         }
     };
+    let native = factory.isolated().map(|native| native.settings().clone());
     let arm = Arm { controller: factory, sensors: sensor_mode(py, sensors)? };
     let concrete = scenario.get().concrete(seed, sample).map_err(|error| sample_exception(py, sample, &error))?;
+    if let Some(native) = native {
+        let checked = py.detach(|| native.probe(None).and_then(|_| native.check_variables(&concrete)));
+        checked.map_err(|error| exception(py, &error.into()))?;
+    }
     let (sender, mut receiver) = channel();
     // The receiver is gone if Ctrl-C has ended the call.
     let body = move || sender.send(record(&concrete, RunKey { seed, sample }, &arm)).is_ok();

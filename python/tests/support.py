@@ -8,7 +8,7 @@ from pathlib import Path
 
 SCENARIO = "low-thw-overtake"
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
+sys.path[:0] = [str(Path(__file__).parents[1] / name) for name in ("examples", "benches")]
 
 
 def command(*words: str | Path) -> subprocess.CompletedProcess[str]:

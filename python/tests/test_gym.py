@@ -105,6 +105,21 @@ def test_the_truth_is_in_the_info_only() -> None:
     assert "truth" not in ccgym.EncounterEnv(SCENARIO, truth=False).reset(seed=1)[1]
 
 
+def test_the_reward_of_one_run_is_that_of_several() -> None:
+    rewards: dict[int, list[float]] = {}
+    for count in (1, 3):
+        envs = ccgym.EncounterVectorEnv(count, SCENARIO)
+        envs.reset(seed=9, options={"sample": range(count)})
+        generator = np.random.default_rng(3)
+        actions = [generator.uniform(-4.0, 2.0) for _ in range(1200)]
+        rewards[count] = [float(envs.step(np.full((count, 1), action))[1][0]) for action in actions]
+    first = next(index for index, pair in enumerate(zip(*rewards.values(), strict=True)) if pair[0] != pair[1])
+    # They are equal to the last bit until the first run has ended, after which each draws another sample.
+    assert first > 300 and rewards[3][first - 1] == 0.0
+    # Some of them are for headways, and not for the command alone.
+    assert sum(reward < -0.04 * 0.05 * 16.0 for reward in rewards[1][:first]) > 10
+
+
 def test_wrong_steps_are_refused() -> None:
     env = ccgym.EncounterEnv(SCENARIO)
     with pytest.raises(cc.UsageError, match="reset"):
