@@ -15,8 +15,11 @@ use parquet::file::properties::WriterProperties;
 /// Number of rows in a row group: the unit that a writer holds in memory and that a reader can skip.
 pub const ROWS_PER_GROUP: usize = 8_192;
 
-/// Number of rows that are encoded at once. It divides the group, so that the bytes do not depend on it.
-pub const ROWS_PER_BATCH: usize = 1_024;
+/// Number of rows that are encoded at once: a batch of outcomes takes about 4 kB of memory for each row. It divides the group.
+pub const ROWS_PER_BATCH: usize = 256;
+
+/// Size from which on a column's dictionary is given up (bytes). Most columns hold numbers that hardly repeat: 2,048 of them fill it.
+const DICTIONARY_BYTES: usize = 16_384;
 
 /// Returns the writer properties of every table.
 ///
@@ -26,6 +29,7 @@ pub fn properties() -> WriterProperties {
         .set_created_by("closecall".to_owned())
         .set_compression(Compression::SNAPPY)
         .set_max_row_group_row_count(Some(ROWS_PER_GROUP))
+        .set_dictionary_page_size_limit(DICTIONARY_BYTES)
         .build()
 }
 

@@ -8,6 +8,8 @@
 //! process to process. Here the layout comes before the data, and the columns are sorted, so that the same run gives the
 //! same bytes.
 
+use std::io::Write;
+
 use crate::run::rerun::sdk::{StoreId, StoreKind};
 use arrow::array::RecordBatch;
 use arrow::datatypes::Schema;
@@ -43,34 +45,42 @@ impl Recording {
         Self { application, name, layout: layout.into_ordered(), data: data.into_ordered() }
     }
 
-    /// Returns the bytes of the file.
-    pub(super) fn encode(&self) -> Result<Vec<u8>, RecordingError> {
-        let mut file = File::new()?;
+    /// Writes the bytes of the file to `output`, chunk by chunk, so that never all of them are in memory.
+    pub(super) fn encode(self, output: &mut dyn Write) -> Result<(), RecordingError> {
+        let mut file = File::new(output)?;
         let id = |kind| StoreId::new(kind, self.application, self.name.as_str());
         let blueprint = id(StoreKind::Blueprint);
-        let mut manifests = vec![file.store(&blueprint, &self.layout)?];
+        let mut manifests = vec![file.store(&blueprint, self.layout)?];
         file.message(&LogMsg::BlueprintActivationCommand(BlueprintActivationCommand::make_active(blueprint)))?;
-        manifests.push(file.store(&id(StoreKind::Recording), &self.data)?);
+        manifests.push(file.store(&id(StoreKind::Recording), self.data)?);
         file.finish(manifests)
     }
 }
 
 /// A file that is being written.
-struct File {
-    bytes: Vec<u8>,
+struct File<'a> {
+    output: &'a mut dyn Write,
+    /// Number of bytes written.
+    len: u64,
+    /// The bytes of one message.
+    buffer: Vec<u8>,
 }
 
-impl File {
-    fn new() -> Result<Self, RecordingError> {
+impl<'a> File<'a> {
+    fn new(output: &'a mut dyn Write) -> Result<Self, RecordingError> {
         let options = EncodingOptions::PROTOBUF_COMPRESSED;
         let header = StreamHeader { fourcc: RRD_FOURCC, version: CrateVersion::LOCAL.to_bytes(), options };
-        let mut file = Self { bytes: Vec::new() };
+        let mut file = Self { output, len: 0, buffer: Vec::new() };
         file.push(&header)?;
         Ok(file)
     }
 
     fn push(&mut self, what: &impl Encodable) -> Result<(), RecordingError> {
-        what.to_rrd_bytes(&mut self.bytes).map(|_| ()).map_err(RecordingError::encode)
+        self.buffer.clear();
+        what.to_rrd_bytes(&mut self.buffer).map_err(RecordingError::encode)?;
+        self.output.write_all(&self.buffer)?;
+        self.len += self.buffer.len() as u64;
+        Ok(())
     }
 
     /// Appends a message without data.
@@ -99,16 +109,15 @@ impl File {
     }
 
     /// Appends the chunks of a store, and returns their index.
-    fn store(&mut self, id: &StoreId, chunks: &[Chunk]) -> Result<RrdManifest, RecordingError> {
+    fn store(&mut self, id: &StoreId, chunks: Vec<Chunk>) -> Result<RrdManifest, RecordingError> {
         let info = StoreInfo::new(id.clone(), StoreSource::Other("closecall".to_owned()));
         self.message(&LogMsg::SetStoreInfo(SetStoreInfo { row_id: tuid(chunks.len()), info }))?;
         let mut index = RrdManifestBuilder::default();
         for chunk in chunks {
             let columns = chunk.to_chunk_batch().map_err(RecordingError::encode)?;
-            let before = self.bytes.len();
-            let uncompressed = self.columns(id, chunk, &columns)?;
-            let start = before + MessageHeader::ENCODED_SIZE_BYTES;
-            let span = Span { start: start as u64, len: (self.bytes.len() - start) as u64 };
+            let start = self.len + MessageHeader::ENCODED_SIZE_BYTES as u64;
+            let uncompressed = self.columns(id, &chunk, &columns)?;
+            let span = Span { start, len: self.len - start };
             index.append(&columns, span, uncompressed).map_err(RecordingError::encode)?;
         }
         let index = index.build(id.clone()).map_err(RecordingError::encode)?;
@@ -124,14 +133,12 @@ impl File {
         })
     }
 
-    /// Appends the index, and returns the bytes of the file.
-    fn finish(mut self, manifests: Vec<RrdManifest>) -> Result<Vec<u8>, RecordingError> {
+    /// Appends the index.
+    fn finish(mut self, manifests: Vec<RrdManifest>) -> Result<(), RecordingError> {
         let mut bytes = Vec::new();
         RrdFooter { manifests }.to_rrd_bytes(&mut bytes).map_err(RecordingError::encode)?;
         self.push(&MessageHeader { kind: MessageKind::End, len: bytes.len() as u64 })?;
-        let start = self.bytes.len() as u64;
-        self.bytes.extend_from_slice(&bytes);
-        self.push(&StreamFooter::from_rrd_footer_bytes(start, &bytes))?;
-        Ok(self.bytes)
+        self.output.write_all(&bytes)?;
+        self.push(&StreamFooter::from_rrd_footer_bytes(self.len, &bytes))
     }
 }

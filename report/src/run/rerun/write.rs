@@ -1,5 +1,6 @@
 //! Writing films into a recording file.
 
+use std::io;
 use std::path::Path;
 
 use crate::run::rerun::sdk::{MediaType, RecordingStreamError, TextDocument, ViewCoordinates};
@@ -14,7 +15,7 @@ use super::{
     bird, camera, fog, ghosts, log, palette, perceived, plots, points, properties, road, summary, truth, vehicles,
 };
 use crate::run::film::{Film, Level};
-use closecall_scenarios::atomic::{WriteError, check_writable, write_file};
+use closecall_scenarios::atomic::{WriteError, check_writable, write_atomically};
 
 /// The reason why a recording cannot be written. A file of that name is then unchanged.
 #[derive(Debug, thiserror::Error)]
@@ -34,6 +35,9 @@ pub enum RecordingError {
     /// The file cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
+    /// The bytes cannot be written to where they go. [`write_recording`] names the file, as [`Self::Write`].
+    #[error(transparent)]
+    Output(#[from] io::Error),
 }
 
 impl RecordingError {
@@ -59,9 +63,11 @@ pub fn check_recording_possible(path: &Path) -> Result<(), RecordingError> {
 /// # Errors
 /// [`RecordingError`] if the file cannot be written completely.
 pub fn write_recording_unchecked(path: &Path, films: &[Film]) -> Result<(), RecordingError> {
-    let bytes = record(films)?.encode()?;
-    write_file(path, |file| file.write_all(&bytes))?;
-    Ok(())
+    let recording = record(films)?;
+    write_atomically(path, |file| recording.encode(file)).map_err(|error| match error {
+        RecordingError::Output(source) => WriteError::new(path, source).into(),
+        other => other,
+    })
 }
 
 /// Writes films like [`write_recording_unchecked`], after [`check_recording_possible`].
