@@ -43,6 +43,13 @@ pub(crate) struct Column {
     pub(crate) sin: [[f32; SUBRAY_COLUMNS]; GROUPS],
 }
 
+impl Column {
+    /// Returns the least magnitude of the sines of the azimuths of the beams' centres.
+    pub(crate) fn least_sine(&self) -> f32 {
+        self.centre.iter().map(|[_, sin]| sin.abs()).fold(1.0, f32::min)
+    }
+}
+
 /// The elevations of a beam and its sub-rays.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Elevation {

@@ -8,7 +8,7 @@ use super::echo::{Echo, Echoes};
 use super::noise::{Noise, Purpose};
 use super::pattern::{Column, Elevation};
 use super::power::{LinkBudget, MIN_POWER, THRESHOLD_OVER_NOISE};
-use super::soft::{self, DropletEffect, Plume, SoftEcho};
+use super::soft::{self, BeamIndex, DropletEffect, Plume, SoftEcho};
 use super::targets::Targets;
 use super::viewpoint::{Deskew, sensor_position_m};
 use super::{Lidar, LidarScan, Material, PointSource, PointTruth, ScanTruth};
@@ -96,6 +96,10 @@ pub(crate) struct Receiver<'a> {
     pub(crate) pose: SensorPoseEstimate,
     pub(crate) targets: &'a Targets,
     pub(crate) plumes: &'a [Plume],
+    /// See [`soft::greatest_depth`].
+    pub(crate) greatest_depth: f32,
+    /// See [`soft::bound_clumps`].
+    pub(crate) clumps: &'a [f32],
     pub(crate) link: &'a LinkBudget,
     pub(crate) noise: Noise,
     /// Share of returns that are lost regardless of their power.
@@ -107,7 +111,10 @@ impl Receiver<'_> {
     pub(crate) fn receive(&self, hits: &ColumnHits, scan: &mut LidarScan, truth: &mut ScanTruth) {
         let in_air = !self.plumes.is_empty() || self.link.has_fog();
         for (layer, elevation) in self.elevations.iter().enumerate() {
-            if !(hits.needs_echoes(layer) || in_air && self.has_droplet_return(layer)) {
+            let needs_echoes = hits.needs_echoes(layer);
+            let droplets =
+                (in_air && (needs_echoes || self.may_have_droplet_return(layer))).then(|| self.droplet_effect(layer));
+            if !needs_echoes && !droplets.is_some_and(|droplets| droplets.is_detectable()) {
                 continue;
             }
             let echoes = if hits.is_tested(layer) {
@@ -118,10 +125,12 @@ impl Receiver<'_> {
             } else {
                 Echoes::NONE
             };
-            let found = if in_air {
-                self.detect_in_air(layer, echoes.as_slice())
-            } else {
-                self.detect(layer, echoes.as_slice(), |_| 1.0, None)
+            let found = match droplets {
+                Some(droplets) => {
+                    let transmission = |range_m| droplets.transmission(range_m);
+                    self.detect(layer, echoes.as_slice(), transmission, droplets.echo)
+                }
+                None => self.detect(layer, echoes.as_slice(), |_| 1.0, None),
             };
             for found in found.into_iter().flatten() {
                 self.append(layer, &found, scan, truth);
@@ -133,19 +142,36 @@ impl Receiver<'_> {
     fn droplet_effect(&self, layer: usize) -> DropletEffect {
         let [cos, sin] = self.column.centre[self.elevations[layer].group];
         let centre = [cos, sin, self.elevations[layer].centre[0]];
+        let at = BeamIndex { column: self.column_index, layer, layers: self.elevations.len() };
+        soft::droplet_effect(at, centre, self.plumes, (self.targets, self.link, self.noise))
+    }
+
+    /// Returns true if droplets give a return on some beam of this column that may be detected.
+    pub(crate) fn has_droplet_returns(&self) -> bool {
+        let is_detectable = |layer| self.droplet_effect(layer).is_detectable();
+        (0..self.elevations.len()).any(|layer| self.may_have_droplet_return(layer) && is_detectable(layer))
+    }
+
+    /// Returns false if droplets surely give no return on a beam that can be detected.
+    fn may_have_droplet_return(&self, layer: usize) -> bool {
         let beam = self.column_index * self.elevations.len() + layer;
-        soft::droplet_effect((beam, self.elevations.len()), centre, self.plumes, (self.targets, self.link, self.noise))
+        let bounds = || [self.greatest_depth, self.elevations[layer].centre[1], self.clumps[layer]];
+        self.greatest_depth > 0.0 && soft::may_return_from_spray(beam, bounds(), self.noise)
+            || self.link.has_fog() && soft::may_return_from_fog(beam, self.link, self.noise)
     }
 
-    /// Returns true if droplets may give a return on a beam.
-    fn has_droplet_return(&self, layer: usize) -> bool {
-        self.droplet_effect(layer).echo.is_some_and(|echo| echo.power > MIN_POWER)
-    }
-
-    /// Returns the detected returns of a beam if there are droplets in the air.
-    fn detect_in_air(&self, layer: usize, echoes: &[Echo]) -> [Option<DetectedReturn>; 2] {
-        let droplets = self.droplet_effect(layer);
-        self.detect(layer, echoes, |range_m| droplets.transmission(range_m), droplets.echo)
+    /// Returns the number of beams on which droplets give a return that may be detected, and of those that are looked at closely.
+    #[cfg(test)]
+    pub(crate) fn droplet_returns(&self) -> [usize; 2] {
+        let mut counts = [0; 2];
+        for layer in 0..self.elevations.len() {
+            let is_found = self.droplet_effect(layer).is_detectable();
+            let is_looked_at = self.may_have_droplet_return(layer);
+            assert!(is_looked_at || !is_found, "column {}, layer {layer}", self.column_index);
+            counts[0] += usize::from(is_found);
+            counts[1] += usize::from(is_looked_at);
+        }
+        counts
     }
 
     /// Returns the first and the last detected return. The second is `None` if there is only one.

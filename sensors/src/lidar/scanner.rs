@@ -65,6 +65,8 @@ pub struct Scanner {
     ground_reach_m: f32,
     targets: Targets,
     plumes: Vec<Plume>,
+    /// What [`soft::bound_clumps`] sets.
+    clumps: Vec<f32>,
     solids: Vec<Solid>,
     guard_rails: Vec<PlacedSolid>,
     active: ActiveParts,
@@ -85,6 +87,7 @@ impl Scanner {
             ground_reach_m: ground_reach_m(&lidar),
             targets: Targets::default(),
             plumes: Vec::new(),
+            clumps: Vec::new(),
             solids: Vec::new(),
             guard_rails: Vec::new(),
             active: ActiveParts::default(),
@@ -222,10 +225,30 @@ impl Scanner {
                 let pose = of.pose.deskewed(of.viewpoint.deskew(before_end_s));
                 of.rails.is_some_and(|rails| rails.are_discarded((column, elevations), &pose, parts, &self.targets))
             };
-            if !in_air
-                && omitted.is_some_and(|bare| bare.covers(self.pattern.centre_lines(of.mirror_side, index), &road))
-                && (parts.is_empty() || has_rails_alone())
-            {
+            let is_covered = omitted
+                .is_some_and(|bare| bare.covers(self.pattern.centre_lines(of.mirror_side, index), &road))
+                && (parts.is_empty() || !in_air && has_rails_alone());
+            if is_covered && !in_air {
+                continue;
+            }
+            if !self.plumes.is_empty() {
+                soft::bound_clumps(index, elevations.len(), of.noise, &mut self.clumps);
+            }
+            let receiver = Receiver {
+                column_index: index,
+                beams: self.pattern.kind().beams(),
+                column,
+                elevations,
+                pose: of.pose.deskewed(of.viewpoint.deskew(before_end_s)),
+                targets: &self.targets,
+                plumes: &self.plumes,
+                greatest_depth: soft::greatest_depth(&self.plumes, index, column.least_sine()),
+                clumps: &self.clumps,
+                link: &of.link,
+                noise: of.noise,
+                dropout: self.lidar.dropout as f32,
+            };
+            if is_covered && !receiver.has_droplet_returns() {
                 continue;
             }
             self.hits.clear();
@@ -236,18 +259,6 @@ impl Scanner {
             if !in_air && self.hits.is_bare() {
                 continue;
             }
-            let receiver = Receiver {
-                column_index: index,
-                beams: self.pattern.kind().beams(),
-                column,
-                elevations,
-                pose: of.pose.deskewed(of.viewpoint.deskew(before_end_s)),
-                targets: &self.targets,
-                plumes: &self.plumes,
-                link: &of.link,
-                noise: of.noise,
-                dropout: self.lidar.dropout as f32,
-            };
             receiver.receive(&self.hits, &mut self.scan, &mut self.truth);
             if extent == Extent::UntilFirst && !self.scan.is_empty() {
                 return;
@@ -372,7 +383,7 @@ impl Scanner {
         let surface = Surface { source: PointSource::Spray, reflectivity: &water };
         let columns = Targets::columns_of(&self.pattern, &solid, &placed);
         let faces = self.targets.push_faces(&solid, &placed, surface);
-        self.plumes.push(Plume { faces, columns, extinction_per_m });
+        self.plumes.push(Plume::new((faces, columns), (&solid, &placed), extinction_per_m));
     }
 }
 

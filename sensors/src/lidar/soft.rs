@@ -19,10 +19,11 @@
 use std::ops::Range;
 
 use closecall_traffic::{Environment, Vehicle, VehicleClass};
+use nalgebra::Isometry3;
 
 use super::echo::PULSE_M;
 use super::noise::{Noise, Purpose};
-use super::power::LinkBudget;
+use super::power::{LinkBudget, MIN_POWER};
 use super::solid::Solid;
 use super::targets::{FaceRange, Targets};
 use super::{Material, PointSource};
@@ -61,6 +62,26 @@ pub(crate) struct Plume {
     pub(crate) columns: Range<usize>,
     /// Mean extinction (1/m).
     pub(crate) extinction_per_m: f32,
+    /// Length of the longest path through the plume (m).
+    pub(crate) longest_m: f32,
+    /// Extent of the plume across the sensor's axis (m).
+    pub(crate) across_m: f32,
+}
+
+impl Plume {
+    /// Returns a plume in the shape of a solid, of this mean extinction (1/m), whose pose in the sensor's frame is given.
+    #[expect(clippy::cast_possible_truncation, reason = "bounds of metres")]
+    pub(crate) fn new(
+        (faces, columns): (FaceRange, Range<usize>),
+        (solid, pose): (&Solid, &Isometry3<f64>),
+        extinction_per_m: f32,
+    ) -> Self {
+        let corners = || solid.corners().map(|corner| pose * corner);
+        let diagonals = corners().flat_map(|from| corners().map(move |to| to - from));
+        let [longest, across] =
+            diagonals.fold([0.0; 2], |[longest, across], way| [way.norm().max(longest), way.y.max(across)]);
+        Self { faces, columns, extinction_per_m, longest_m: longest as f32, across_m: across as f32 }
+    }
 }
 
 /// A false return from droplets.
@@ -85,6 +106,11 @@ pub(crate) struct DropletEffect {
 }
 
 impl DropletEffect {
+    /// Returns true if the false return may be detected.
+    pub(crate) fn is_detectable(&self) -> bool {
+        self.echo.is_some_and(|echo| echo.power > MIN_POWER)
+    }
+
     /// Returns the share of the light from `range_m` that the plumes transmit, on the way out and back.
     pub(crate) fn transmission(&self, range_m: f32) -> f32 {
         if self.optical_depth > 0.0 && range_m > self.near_m { (-2.0 * self.optical_depth).exp() } else { 1.0 }
@@ -113,26 +139,44 @@ pub(crate) fn spray_plume(vehicle: &Vehicle, speed_mps: f64, environment: &Envir
     Some((Solid::cuboid(low, high, Material::Water), extinction))
 }
 
-/// Returns the effect of the droplets on the beam whose centre has this direction. A column has `layers` beams.
+/// The place of a beam in the pattern.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BeamIndex {
+    pub(crate) column: usize,
+    pub(crate) layer: usize,
+    /// Number of layers.
+    pub(crate) layers: usize,
+}
+
+impl BeamIndex {
+    /// Returns the number of the beam in the scan.
+    pub(crate) fn beam(self) -> usize {
+        self.column * self.layers + self.layer
+    }
+
+    /// Returns the number that stands for the clump of droplets that the beam may meet.
+    fn clump(self) -> usize {
+        (self.column / CLUMP_COLUMNS) * self.layers + self.layer
+    }
+}
+
+/// Returns the effect of the droplets on the beam whose centre has this direction.
 pub(crate) fn droplet_effect(
-    (beam, layers): (usize, usize),
+    at: BeamIndex,
     centre: [f32; 3],
     plumes: &[Plume],
     of: (&Targets, &LinkBudget, Noise),
 ) -> DropletEffect {
     let (targets, link, noise) = of;
+    let beam = at.beam();
     let mut found = DropletEffect { echo: fog(beam, link, noise), near_m: f32::INFINITY, optical_depth: 0.0 };
     // Logarithms are computed only if needed: not for a beam that crosses no plume, ...
     let mut clump = None;
     let depth = noise.uniform(beam, Purpose::Depth);
     let mut has_echo = false;
-    let column = beam / layers;
-    for plume in plumes.iter().filter(|plume| plume.columns.contains(&column)) {
+    for plume in plumes.iter().filter(|plume| plume.columns.contains(&at.column)) {
         let Some([from, to]) = plume_interval_m(centre, plume.faces, targets) else { continue };
-        let clump = *clump.get_or_insert_with(|| {
-            let clump_at = (column / CLUMP_COLUMNS) * layers + beam % layers;
-            -noise.uniform(clump_at, Purpose::Plume).ln()
-        });
+        let clump = *clump.get_or_insert_with(|| -noise.uniform(at.clump(), Purpose::Plume).ln());
         let extinction = plume.extinction_per_m * clump;
         let before = found.optical_depth;
         found.near_m = found.near_m.min(from);
@@ -154,6 +198,58 @@ pub(crate) fn droplet_effect(
     found
 }
 
+/// Returns a bound of the optical depth in spray of the beams of a column, for clumps of mean density, times the cosine of their elevation.
+/// `sine` is the least sine of their azimuths.
+pub(crate) fn greatest_depth(plumes: &[Plume], column: usize, sine: f32) -> f32 {
+    let crossed = plumes.iter().filter(|plume| plume.columns.contains(&column));
+    // A beam leaves a plume at its sides: the path times the sine is at most the extent across.
+    let path_m = |plume: &Plume| plume.longest_m.min(plume.across_m / sine);
+    crossed.map(|plume| plume.extinction_per_m * path_m(plume)).sum()
+}
+
+/// Sets, for each layer, a bound of the density of the clump in spray that the beams of a column meet, relative to the mean.
+///
+/// Neighbouring columns share clumps: nothing happens except at the first of them.
+pub(crate) fn bound_clumps(column: usize, layers: usize, noise: Noise, bounds: &mut Vec<f32>) {
+    if column.is_multiple_of(CLUMP_COLUMNS) {
+        let clump = |layer| noise.uniform(BeamIndex { column, layer, layers }.clump(), Purpose::Plume);
+        bounds.clear();
+        bounds.extend((0..layers).map(|layer| most_logarithm(clump(layer)) * ROUNDING));
+    }
+}
+
+/// Returns false if spray surely gives no return on the beam, whose column has this [`greatest_depth`], whose elevation has this cosine,
+/// and whose clump has this bound.
+///
+/// It does not know which plumes the beam crosses, and takes no logarithm: most beams need nothing else.
+pub(crate) fn may_return_from_spray(beam: usize, [greatest_depth, cosine, clump]: [f32; 3], noise: Noise) -> bool {
+    // −ln u ≥ 2·(1 − u)/(1 + u)
+    let depth = noise.uniform(beam, Purpose::Depth);
+    (1.0 - depth) * cosine < greatest_depth * clump * (1.0 + depth)
+}
+
+/// Returns false if the return from fog on the beam is surely too weak to be detected.
+pub(crate) fn may_return_from_fog(beam: usize, link: &LinkBudget, noise: Noise) -> bool {
+    let depth = noise.uniform(beam, Purpose::FogDepth);
+    let from_m = NEAREST_M + (1.0 - depth) / ((1.0 + depth) * link.extinction_per_m);
+    let clump = most_logarithm(noise.uniform(beam, Purpose::FogClump)) * ROUNDING;
+    // The light is at most that from the nearest place that it may come from: exp(−x) ≤ 1/(1 + x).
+    let unattenuated = power_in_clear_air(link.extinction_per_m * FOG_CLUMPINESS * clump, from_m, link);
+    unattenuated > MIN_POWER * (1.0 + 2.0 * link.extinction_per_m * from_m)
+}
+
+/// Factor that covers the rounding errors of bounds in single precision.
+const ROUNDING: f32 = 1.001;
+
+/// Returns an upper bound of −ln u, for u between 0 and 1, by at most 0.06 too great.
+fn most_logarithm(u: f32) -> f32 {
+    // The bits of a number, read as an integer, are its exponent and what its mantissa exceeds 1 by, which is at most the logarithm of
+    // the mantissa to the base of two.
+    const BIAS: f32 = 127.0;
+    const MANTISSA: f32 = 8_388_608.0;
+    std::f32::consts::LN_2 * (BIAS - u.to_bits() as f32 / MANTISSA)
+}
+
 /// Returns the ranges at which a beam enters and leaves a plume (m), or `None` if it does not cross the plume.
 fn plume_interval_m([cos, sin, tan]: [f32; 3], faces: FaceRange, targets: &Targets) -> Option<[f32; 2]> {
     let slant = (1.0 + tan * tan).sqrt();
@@ -168,10 +264,15 @@ fn plume_interval_m([cos, sin, tan]: [f32; 3], faces: FaceRange, targets: &Targe
 
 /// Returns the received power from a clump of droplets, in multiples of the detection threshold.
 fn soft_power(extinction_per_m: f32, range_m: f32, link: &LinkBudget) -> f32 {
+    power_in_clear_air(extinction_per_m, range_m, link) * link.transmission(range_m)
+}
+
+/// Returns what [`soft_power`] returns if the air before the clump takes no light.
+fn power_in_clear_air(extinction_per_m: f32, range_m: f32, link: &LinkBudget) -> f32 {
     let reflectivity = std::f32::consts::PI * extinction_per_m * PULSE_M / LIDAR_RATIO_SR;
     let square = range_m * range_m;
     let overlap = square / (square + OVERLAP_M * OVERLAP_M);
-    link.gain_m2 * reflectivity * overlap / square * link.transmission(range_m)
+    link.gain_m2 * reflectivity * overlap / square
 }
 
 /// Returns the return from the first clump of fog or rain that the beam hits, or `None` if the air is clear.

@@ -34,6 +34,34 @@ impl Scanner {
         assert!(differ <= 2 + hits / 200, "{differ} of {hits}");
     }
 
+    /// Asserts that no return from droplets is missed for not being looked at, in the scan of this scene with the next random key.
+    /// Returns the number of these returns, and of beams that are looked at.
+    pub(crate) fn droplet_returns(&mut self, scene: &Scene<'_>, rng: &mut Stream) -> [usize; 2] {
+        self.scan(scene, rng);
+        let of = self.latest.unwrap();
+        let mut counts = [0; 2];
+        for (index, column) in self.pattern.columns.iter().enumerate() {
+            soft::bound_clumps(index, self.pattern.kind().layers(), of.noise, &mut self.clumps);
+            let receiver = Receiver {
+                column_index: index,
+                beams: self.pattern.kind().beams(),
+                column,
+                elevations: self.pattern.elevations(of.mirror_side, index),
+                pose: of.pose,
+                targets: &self.targets,
+                plumes: &self.plumes,
+                greatest_depth: soft::greatest_depth(&self.plumes, index, column.least_sine()),
+                clumps: &self.clumps,
+                link: &of.link,
+                noise: of.noise,
+                dropout: 0.0,
+            };
+            let [returns, looked_at] = receiver.droplet_returns();
+            counts = [counts[0] + returns, counts[1] + looked_at];
+        }
+        counts
+    }
+
     /// Returns the number of sub-rays of a beam that hit something, and how many of them differ in double
     /// precision.
     fn compare_exactly(&self, column: &Column, elevations: &[Elevation], layer: usize) -> [usize; 2] {

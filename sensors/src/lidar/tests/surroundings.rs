@@ -96,6 +96,28 @@ fn there_is_spray_behind_the_ego_on_wet_roads_only() {
 }
 
 #[test]
+fn no_return_from_droplets_is_missed_for_not_being_looked_at() {
+    for model in LidarModel::ALL {
+        let mut scanner = Scanner::new(Lidar { kind: model.kind(), ..Lidar::default() });
+        let mut setup = TestScene::new().with(VehicleClass::Truck, 9.0, 2.0).with(VehicleClass::Car, 18.0, -0.4);
+        for (film_mm, visibility_m) in [(0.4, 2_000.0), (1.0, 2_000.0), (5.0, 2_000.0), (0.0, 40.0), (1.0, 100.0)] {
+            setup.environment.water_film_mm = film_mm;
+            setup.environment.visibility_m = visibility_m;
+            for sample in 0..4_u32 {
+                setup.ego.pitch_rad = 0.01 * (f64::from(sample) - 1.5);
+                let rng = &mut random(sample.into());
+                setup.time = CONTROL_STEP * i64::from(sample);
+                let [returns, looked_at] = scanner.droplet_returns(&setup.scene(), rng);
+                assert!(
+                    returns > 10 && looked_at < model.kind().beams() / 2,
+                    "{model:?}, {film_mm} mm: {returns}, {looked_at}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
 fn fog_gives_false_returns_that_are_not_classified_as_vehicles() {
     let mut setup = TestScene::new();
     setup.environment.visibility_m = 60.0;
