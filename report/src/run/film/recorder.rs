@@ -37,8 +37,18 @@ pub struct FilmRecorder {
     due: Vec<(usize, bool)>,
     /// The smallest rear headway in the critical phase so far (s).
     smallest_s: f64,
-    /// The index of its frame, with the sensor and what it detected.
-    closest: Option<(usize, RearLidar, Vec<Detection>)>,
+    /// The index of its frame, with the LiDARs that have a scan then.
+    closest: Option<(usize, Vec<KeptLidar>)>,
+}
+
+/// A LiDAR with its latest scan, which is completed if it remains the one to keep.
+struct KeptLidar {
+    name: &'static str,
+    /// Whether it is the first of those that look back.
+    is_main: bool,
+    looks_ahead: bool,
+    lidar: RearLidar,
+    detections: Vec<Detection>,
 }
 
 impl FilmRecorder {
@@ -92,10 +102,17 @@ impl FilmRecorder {
             actor.present_frames.end = frame_count;
         }
         film.outcome = Some(outcome.clone());
-        if let Some((index, lidar, boxes)) = self.closest
+        if let Some((index, lidars)) = self.closest
             && let Some(frame) = film.frames.get_mut(index)
         {
-            frame.scan = Scan::completed(&lidar, &boxes);
+            frame.other_scans.clear();
+            for KeptLidar { name, is_main, looks_ahead, lidar, detections } in lidars {
+                let scan = Scan::completed(&lidar, &detections);
+                match is_main {
+                    true => frame.scan = scan,
+                    false => frame.other_scans.extend(scan.map(|scan| (name, scan.in_ego_frame(looks_ahead)))),
+                }
+            }
         }
         film
     }
@@ -129,19 +146,28 @@ impl FilmRecorder {
                 (false, true) => Some(Scan::of(lidar.lidar, lidar.detections)),
                 (false, false) => None,
             };
-            if first_rear != Some(at) {
-                others.extend(scan.map(|scan| (lidar.name, scan.in_ego_frame(lidar))));
-                continue;
+            if first_rear == Some(at) {
+                main = scan;
+            } else {
+                others.extend(scan.map(|scan| (lidar.name, scan.in_ego_frame(lidar.looks_ahead))));
             }
-            main = scan;
-            if let Ok(thw_s) = view.margins.thw_rear_s
-                && is_eventful
-                && view.phase == Phase::Critical
-                && thw_s < self.smallest_s
-            {
-                self.smallest_s = thw_s;
-                self.closest = Some((index, lidar.lidar.clone(), lidar.detections.to_vec()));
-            }
+        }
+        let has_new = |at: usize| lidars[at].lidar.latest().end == view.time;
+        if first_rear.is_some_and(has_new)
+            && let Ok(thw_s) = view.margins.thw_rear_s
+            && is_eventful
+            && view.phase == Phase::Critical
+            && thw_s < self.smallest_s
+        {
+            self.smallest_s = thw_s;
+            let kept = |at: usize| KeptLidar {
+                name: lidars[at].name,
+                is_main: first_rear == Some(at),
+                looks_ahead: lidars[at].looks_ahead,
+                lidar: lidars[at].lidar.clone(),
+                detections: lidars[at].detections.to_vec(),
+            };
+            self.closest = Some((index, (0..lidars.len()).filter(|at| has_new(*at)).map(kept).collect()));
         }
         (main, others)
     }

@@ -1,7 +1,7 @@
 //! One scan of a LiDAR as it was measured, with the boxes fitted to its clusters.
 
+use closecall_sensors::Detection;
 use closecall_sensors::lidar::{LidarScan, RearLidar};
-use closecall_sensors::{Detection, MountedLidar};
 
 /// Cluster number of a point that belongs to no cluster.
 pub(crate) const NO_CLUSTER: u8 = u8::MAX;
@@ -37,8 +37,8 @@ impl Scan {
     }
 
     /// Returns the same scan in the ego's frame, of a LiDAR that may look ahead.
-    pub(super) fn in_ego_frame(mut self, lidar: &MountedLidar<'_>) -> Self {
-        if lidar.looks_ahead {
+    pub(super) fn in_ego_frame(mut self, looks_ahead: bool) -> Self {
+        if looks_ahead {
             let LidarScan { x_m, y_m, .. } = &mut self.points;
             x_m.iter_mut().chain(y_m).for_each(|at_m| *at_m = -*at_m);
             for found in &mut self.boxes {
