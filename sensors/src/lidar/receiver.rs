@@ -76,17 +76,19 @@ impl SensorPoseEstimate {
     }
 
     /// Transforms a point from the sensor's frame to the ego's frame at the end of the sweep (m).
+    #[inline(always)]
     pub(crate) fn ego_frame_point_m(&self, at_m: [f32; 3]) -> [f32; 3] {
         match &self.turned {
             None => self.level_point_m(at_m),
-            Some(axes) => {
-                let [x, y, z] = at_m;
-                let [ahead, left, above] = std::array::from_fn(|axis| {
-                    self.sensor_m[axis] + axes[0][axis] * x + axes[1][axis] * y + axes[2][axis] * z
-                });
-                self.at_end([ahead, left, above])
-            }
+            Some(axes) => self.turned_point_m(axes, at_m),
         }
+    }
+
+    /// Does what [`SensorPoseEstimate::ego_frame_point_m`] does for a turned sensor.
+    #[cold]
+    fn turned_point_m(&self, axes: &[[f32; 3]; 3], [x, y, z]: [f32; 3]) -> [f32; 3] {
+        let along = |axis: usize| self.sensor_m[axis] + axes[0][axis] * x + axes[1][axis] * y + axes[2][axis] * z;
+        self.at_end([along(0), along(1), along(2)])
     }
 
     /// Does what [`SensorPoseEstimate::ego_frame_point_m`] does for a sensor that is not turned, without branches.
