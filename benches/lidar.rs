@@ -76,9 +76,13 @@ struct TrackerLoop {
 impl TrackerLoop {
     fn new(road: Road) -> Self {
         let tracker = Tracker::new(sensors().full_model().tracker);
-        let field = full().rear_field().expect("a rear sensor has one");
-        let view =
-            RearView { half_angle_tan: field.half_angle_tan, range_m: field.range_m, sensor_x_m: REAR_S_M - EGO_S_M };
+        let field = full().rear_fields().pop().expect("a rear sensor has one");
+        let view = RearView {
+            half_angle_tan: field.half_angle_tan,
+            range_m: field.range_m,
+            sensor_x_m: REAR_S_M - EGO_S_M,
+            ..RearView::default()
+        };
         Self { tracker, list: TrackList::default(), view, road, time: Time::ZERO }
     }
 
@@ -86,7 +90,14 @@ impl TrackerLoop {
         self.time += CONTROL_STEP;
         let s_m = EGO_S_M + SPEED_MPS * self.time.s();
         let ego = VehicleState { s_m, d_m: EGO_D_M, speed_mps: SPEED_MPS, ..VehicleState::default() };
-        let scan = TrackerScan { time: self.time, road: &self.road, ego, view: self.view, detections };
+        let scan = TrackerScan {
+            time: self.time,
+            road: &self.road,
+            ego,
+            view: self.view,
+            rear_x_m: REAR_S_M - EGO_S_M,
+            detections,
+        };
         self.tracker.update(&scan, &mut self.list);
     }
 }

@@ -6,11 +6,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::faults::{Faults, OdometryErrors};
-use crate::lidar::LidarConfig;
+use crate::lidar::{FRONT_NAME, Lidar, LidarConfig, REAR_NAME};
 use crate::worker_classifier::WorkerClassifier;
 use crate::{
-    Alterations, FullModel, FullPerception, GroundTruth, NoiseKey, ObjectPerception, ObjectSensorConfig,
-    ObjectSensorModel, Perception, SensorError, TrackerConfig,
+    Alterations, FullModel, FullPerception, GroundTruth, MAX_ADDITIONAL_LIDARS, NoiseKey, ObjectPerception,
+    ObjectSensorConfig, ObjectSensorModel, Perception, SensorError, TrackerConfig,
 };
 use closecall_camera::{Camera, CameraConfig, Pipeline};
 
@@ -56,6 +56,10 @@ pub struct SensorsConfig {
     pub rear_object: ObjectSensorConfig,
     /// The rear LiDAR.
     pub rear_lidar: LidarConfig,
+    /// Further rear LiDARs, at most three, each with a name, a kind and a mounting of its own: mode `full`. The tracker is corrected
+    /// with the boxes of all. Default: none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub additional_rear_lidars: Vec<LidarConfig>,
     /// The LiDAR that looks ahead in place of the radar, in mode `full`. Its faults are those of `fault.front-lidar`. Default: none;
     /// the radar looks ahead.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -74,6 +78,7 @@ impl Default for SensorsConfig {
             surround: ObjectSensorConfig::default(),
             rear_object: ObjectSensorConfig::default(),
             rear_lidar: LidarConfig::default(),
+            additional_rear_lidars: Vec::new(),
             front_lidar: None,
             rear_camera: CameraConfig::default(),
             tracker: TrackerConfig::default(),
@@ -96,16 +101,20 @@ impl Check for SensorsConfig {
 
     fn check(&self, parameters: &Parameters) -> Result<Sensors, ConfigError> {
         let within = |key: &'static str| move |error: ConfigError| error.within(key);
+        let rear_lidar = self.rear_lidar.check_named(Some(REAR_NAME), parameters).map_err(within("rear-lidar"))?;
+        let front_lidar = match &self.front_lidar {
+            Some(lidar) => Some(lidar.check_named(Some(FRONT_NAME), parameters).map_err(within("front-lidar"))?),
+            None => None,
+        };
+        let additional_rear_lidars = self.check_additional([Some(rear_lidar), front_lidar], parameters)?;
         Ok(Sensors {
             mode: parameters.word(&self.mode, "mode")?,
             full: FullModel {
                 front_radar: self.front_radar.check_front_radar(parameters).map_err(within("front-radar"))?,
                 surround: self.surround.check_surround(parameters).map_err(within("surround"))?,
-                rear_lidar: self.rear_lidar.check(parameters).map_err(within("rear-lidar"))?,
-                front_lidar: match &self.front_lidar {
-                    Some(lidar) => Some(lidar.check(parameters).map_err(within("front-lidar"))?),
-                    None => None,
-                },
+                rear_lidar,
+                additional_rear_lidars,
+                front_lidar,
                 tracker: self.tracker.check(parameters).map_err(within("tracker"))?,
             },
             camera: self.rear_camera.check(parameters).map_err(within("rear-camera"))?,
@@ -113,6 +122,43 @@ impl Check for SensorsConfig {
             altered: Alterations::default(),
         })
     }
+}
+
+impl SensorsConfig {
+    /// Checks the further rear LiDARs, whose names differ from those of the `known` ones.
+    fn check_additional(
+        &self,
+        known: [Option<Lidar>; 2],
+        parameters: &Parameters,
+    ) -> Result<[Option<Lidar>; MAX_ADDITIONAL_LIDARS], ConfigError> {
+        const KEY: &str = "additional-rear-lidars";
+        let mut names: Vec<&str> = known.iter().flatten().map(Lidar::name).collect();
+        if let [rear, front] = names[..]
+            && rear == front
+        {
+            return Err(same_name(rear).within("front-lidar"));
+        }
+        if self.additional_rear_lidars.len() > MAX_ADDITIONAL_LIDARS {
+            let value = self.additional_rear_lidars.len() as u64;
+            return Err(ConfigError::new(KEY, Problem::WrongCount { value, allowed: "at most three further LiDARs" }));
+        }
+        let mut checked = [None; MAX_ADDITIONAL_LIDARS];
+        for (index, (slot, config)) in checked.iter_mut().zip(&self.additional_rear_lidars).enumerate() {
+            let located = |error: ConfigError| error.within_index(index).within(KEY);
+            let lidar = config.check_named(None, parameters).map_err(located)?;
+            if names.contains(&lidar.name()) {
+                return Err(located(same_name(lidar.name())));
+            }
+            names.push(lidar.name());
+            *slot = Some(lidar);
+        }
+        Ok(checked)
+    }
+}
+
+fn same_name(name: &str) -> ConfigError {
+    let rule = format!("another LiDAR is called `{name}`, too, and faults could not tell them apart");
+    ConfigError::new("name", Problem::Contradiction { other: "name", rule })
 }
 
 impl Sensors {
@@ -140,12 +186,14 @@ impl Sensors {
     /// Returns the same sensors with stages that are replaced by the truth, or made worse.
     #[must_use]
     pub fn altered(self, altered: Alterations) -> Self {
-        let FullModel { front_radar, front_lidar, surround, rear_lidar, tracker } = self.full;
+        let FullModel { front_radar, front_lidar, surround, rear_lidar, additional_rear_lidars, tracker } = self.full;
+        let exact = |lidar: Lidar| if altered.has_true_points { lidar.exact() } else { lidar };
         let full = FullModel {
             front_radar: front_radar.altered(&altered, false),
             front_lidar,
             surround: surround.altered(&altered, false),
-            rear_lidar: if altered.has_true_points { rear_lidar.exact() } else { rear_lidar },
+            rear_lidar: exact(rear_lidar),
+            additional_rear_lidars: additional_rear_lidars.map(|lidar| lidar.map(exact)),
             tracker: tracker
                 .with_latency_steps(altered.latency_steps(tracker.latency_steps(), MAX_TRACKER_LATENCY_STEPS)),
         };
@@ -166,18 +214,23 @@ impl Sensors {
     /// Checks that no fault puts a LiDAR lower than the model covers.
     ///
     /// # Errors
-    /// [`ConfigError`] at `rear-lidar.mount-height-m` or `front-lidar.mount-height-m`.
+    /// [`ConfigError`] at the `mount-height-m` of the LiDAR.
     pub fn check_mounting(&self) -> Result<(), ConfigError> {
         let Faults { rear_lidar, front_lidar, .. } = self.faults();
         let front = self.full.front_lidar.map(|lidar| (lidar, front_lidar, "front-lidar", "fault.front-lidar"));
-        let rear = (self.full.rear_lidar, rear_lidar, "rear-lidar", "fault.rear-lidar");
-        for (lidar, faults, key, other) in std::iter::once(rear).chain(front) {
+        let rear = self.full.rear_lidars().map(|lidar| (lidar, rear_lidar, "rear-lidar", "fault.rear-lidar"));
+        for (index, (lidar, faults, key, other)) in rear.chain(front).enumerate() {
+            let faults = faults.of_sensor(lidar.name());
             let lowest_m = faults.combinations().map(|(_, fault)| fault.height_m).fold(0.0, f64::min);
             if !(lidar.mount_height_m + lowest_m >= MIN_LIDAR_HEIGHT_M) {
                 let rule =
                     format!("a fault of the mounting leaves the LiDAR at least {MIN_LIDAR_HEIGHT_M} m above the road");
                 let problem = Problem::Contradiction { other, rule };
-                return Err(ConfigError::new("mount-height-m", problem).within(key));
+                let error = ConfigError::new("mount-height-m", problem);
+                return Err(match index.checked_sub(1).filter(|_| key == "rear-lidar") {
+                    Some(further) => error.within_index(further).within("additional-rear-lidars"),
+                    None => error.within(key),
+                });
             }
         }
         Ok(())
@@ -273,5 +326,25 @@ mod tests {
             toml::from_str("mode = \"object\"\nrear-object = { range-m = \"$range-m\" }").unwrap();
         let again: SensorsConfig = toml::from_str(&toml::to_string(&config).unwrap()).unwrap();
         assert_eq!(again, config);
+    }
+
+    #[test]
+    fn several_rear_lidars_have_names_of_their_own() {
+        let sensors = check("additional-rear-lidars = [{ name = \"left\", left-m = 0.8, azimuth-deg = 45 }]").unwrap();
+        let names: Vec<&str> = sensors.full_model().rear_lidars().map(|lidar| lidar.name()).collect();
+        assert_eq!(names, ["rear-lidar", "left"]);
+        let error = |text: &str| check(text).unwrap_err().to_string();
+        assert!(error("additional-rear-lidars = [{}]").contains("`additional-rear-lidars[0].name`"));
+        for text in [
+            "additional-rear-lidars = [{ name = \"rear-lidar\" }]",
+            "additional-rear-lidars = [{ name = \"left\" }, { name = \"left\" }]",
+            "rear-lidar.name = \"one\"\nfront-lidar.name = \"one\"",
+        ] {
+            assert!(error(text).contains("another LiDAR is called"), "{text}: {}", error(text));
+        }
+        assert!(error("rear-lidar.name = \"Left one\"").contains("`Left one` is no name"));
+        let five = "{ name = \"a\" }, { name = \"b\" }, { name = \"c\" }, { name = \"d\" }";
+        assert!(error(&format!("additional-rear-lidars = [{five}]")).contains("at most three further LiDARs"));
+        assert!(error("additional-rear-lidars = [{ name = \"a\", azimuth-deg = 90 }]").contains("[0].azimuth-deg"));
     }
 }

@@ -12,10 +12,11 @@ use closecall_traffic::ego_frame::EgoFrame;
 
 use crate::faults::{FaultList, LidarFault};
 use crate::half_turn::{HalfTurn, turn_back};
-use crate::lidar::{Lidar, RearLidar};
+use crate::lidar::Lidar;
 use crate::lidar_chain::{LidarChain, Seen};
 use crate::object::NoiseKey;
-use crate::{Alterations, Detection, Health, Scene, SensorError};
+use crate::perception::MountedLidar;
+use crate::{Alterations, Health, Scene, SensorError};
 
 /// The front LiDAR with its processing.
 pub(crate) struct FrontLidar {
@@ -25,7 +26,7 @@ pub(crate) struct FrontLidar {
 impl FrontLidar {
     /// Creates the chain before its first step, with random streams keyed by `key`.
     pub(crate) fn new(lidar: Lidar, tracker: TrackerModel, key: &NoiseKey) -> Self {
-        Self { chain: LidarChain::new(lidar, tracker, key, ["front-lidar", "front-lidar-fault"]) }
+        Self { chain: LidarChain::new([lidar.half_turned()], tracker, key, ["front-lidar", "front-lidar-fault"]) }
     }
 
     /// Returns the same sensor with faults.
@@ -53,17 +54,12 @@ impl FrontLidar {
     }
 
     /// Returns the sensor with its latest scan, in the turned frame.
-    pub(crate) fn lidar(&self) -> &RearLidar {
-        &self.chain.lidar
-    }
-
-    /// Returns the boxes of the latest scan, in the turned frame.
-    pub(crate) fn detections(&self) -> &[Detection] {
-        self.chain.detections()
+    pub(crate) fn lidar(&self) -> impl Iterator<Item = MountedLidar<'_>> {
+        self.chain.lidars().map(|lidar| MountedLidar { looks_ahead: true, ..lidar })
     }
 
     /// Returns the health of the sensor.
     pub(crate) fn health(&self) -> Health {
-        self.chain.health
+        self.chain.health()
     }
 }

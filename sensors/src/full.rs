@@ -7,10 +7,10 @@ use closecall_traffic::Track;
 
 use crate::faults::{Belief, Faults};
 use crate::front_lidar::FrontLidar;
-use crate::lidar::{Lidar, RearLidar};
+use crate::lidar::Lidar;
 use crate::lidar_chain::{LidarChain, Seen};
 use crate::object::{NoiseKey, ObjectSensor, ObjectSensorModel, ScanInput};
-use crate::perception::FieldOfView;
+use crate::perception::{FieldOfView, MountedLidar};
 use crate::surroundings::{OtherVehicle, transform_scene};
 use crate::{Alterations, Detection, Health, Perception, Scene, SensorError, SensorHealth};
 
@@ -39,8 +39,20 @@ pub struct FullModel {
     pub surround: ObjectSensorModel,
     /// The rear LiDAR.
     pub rear_lidar: Lidar,
+    /// Further rear LiDARs.
+    pub additional_rear_lidars: [Option<Lidar>; MAX_ADDITIONAL_LIDARS],
     /// The tracker that processes the boxes of the rear LiDAR.
     pub tracker: TrackerModel,
+}
+
+/// Maximum number of rear LiDARs besides the first.
+pub const MAX_ADDITIONAL_LIDARS: usize = 3;
+
+impl FullModel {
+    /// Returns all rear LiDARs.
+    pub fn rear_lidars(&self) -> impl Iterator<Item = Lidar> + use<> {
+        std::iter::once(self.rear_lidar).chain(self.additional_rear_lidars.into_iter().flatten())
+    }
 }
 
 /// Perception by LiDAR point clouds behind the ego, and by object-level sensors in the other directions.
@@ -63,7 +75,7 @@ impl FullPerception {
             front: ObjectSensor::front_radar(model.front_radar, key),
             front_lidar: model.front_lidar.map(|lidar| FrontLidar::new(lidar, model.tracker, key)),
             surround: ObjectSensor::surround(model.surround, key),
-            rear: LidarChain::new(model.rear_lidar, model.tracker, key, ["rear-lidar", "rear-lidar-fault"]),
+            rear: LidarChain::new(model.rear_lidars(), model.tracker, key, ["rear-lidar", "rear-lidar-fault"]),
             belief: Belief::default(),
             classifier: None,
             altered: Alterations::default(),
@@ -114,12 +126,13 @@ impl FullPerception {
         Ok(())
     }
 
-    /// Returns the worse of the health of the LiDAR and of the camera.
+    /// Returns the worse of the health of the LiDARs and of the camera.
     fn rear_health(&self) -> Health {
+        let lidars = self.rear.health();
         match self.classifier.as_ref().map_or(Health::Ok, |classifier| classifier.health()) {
-            Health::Ok => self.rear.health,
+            Health::Ok => lidars,
             Health::Failed => Health::Failed,
-            Health::Degraded if self.rear.health == Health::Failed => Health::Failed,
+            Health::Degraded if lidars == Health::Failed => Health::Failed,
             Health::Degraded => Health::Degraded,
         }
     }
@@ -138,23 +151,11 @@ impl Perception for FullPerception {
         SensorHealth { front, surround: self.surround.health(), rear: self.rear_health() }
     }
 
-    fn rear_lidar(&self) -> Option<&RearLidar> {
-        Some(&self.rear.lidar)
+    fn lidars(&self) -> Vec<MountedLidar<'_>> {
+        self.front_lidar.iter().flat_map(FrontLidar::lidar).chain(self.rear.lidars()).collect()
     }
 
-    fn front_lidar(&self) -> Option<&RearLidar> {
-        self.front_lidar.as_ref().map(FrontLidar::lidar)
-    }
-
-    fn front_detections(&self) -> &[Detection] {
-        self.front_lidar.as_ref().map_or(&[], FrontLidar::detections)
-    }
-
-    fn rear_detections(&self) -> &[Detection] {
-        self.rear.detections()
-    }
-
-    fn rear_field(&self) -> Option<FieldOfView> {
-        Some(self.rear.field())
+    fn rear_fields(&self) -> Vec<FieldOfView> {
+        self.rear.fields().collect()
     }
 }

@@ -31,11 +31,11 @@ pub use audit::{NEES_QUANTILE_95, TrackAudit};
 pub use closecall_tracking::{Detection, Extent, TrackerConfig, TrackerModel};
 pub use closecall_traffic::{Scene, SceneVehicle};
 pub use config::{SensorMode, Sensors, SensorsConfig};
-pub use full::{DetectionClassifier, FullModel, FullPerception};
+pub use full::{DetectionClassifier, FullModel, FullPerception, MAX_ADDITIONAL_LIDARS};
 pub use ground_truth::GroundTruth;
 pub use object::{
     ByClass, FitError, FittedErrors, NoiseKey, ObjectPerception, ObjectSensorConfig, ObjectSensorModel, Origin,
     RangeGrid, RearFit, ShapeRatios,
 };
-pub use perception::{FieldOfView, Health, Perception, SensorError, SensorHealth};
+pub use perception::{FieldOfView, Health, MountedLidar, Perception, SensorError, SensorHealth};
 pub use worker_classifier::{inference_backend, rear_exposures, set_inference_backend};

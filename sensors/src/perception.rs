@@ -1,5 +1,6 @@
 //! The interface between the sensors and the simulation loop.
 
+use closecall_tracking::RearView;
 use closecall_traffic::{Time, Track};
 
 use crate::lidar::RearLidar;
@@ -28,13 +29,52 @@ pub struct SensorHealth {
     pub rear: Health,
 }
 
-/// The horizontal field of view of a sensor: a wedge whose apex is the sensor's position at the bumper.
+/// The horizontal field of view of a rear sensor: a wedge whose apex is the sensor's position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FieldOfView {
     /// Tangent of half of the opening angle.
     pub half_angle_tan: f64,
     /// Range (m); it is the range in the current weather if the sensor's model derives one.
     pub range_m: f64,
+    /// Distance of the sensor from the bumper towards the ego's middle (m).
+    pub inset_m: f64,
+    /// Position of the sensor to the left of the ego's centre line (m).
+    pub left_m: f64,
+    /// Azimuth of the sensor's axis (rad): 0 is straight behind, positive to the ego's left.
+    pub azimuth_rad: f64,
+}
+
+impl FieldOfView {
+    /// Returns the field of a sensor in the middle of the rear bumper that looks straight back.
+    pub fn straight_back(half_angle_tan: f64, range_m: f64) -> Self {
+        Self { half_angle_tan, range_m, inset_m: 0.0, left_m: 0.0, azimuth_rad: 0.0 }
+    }
+
+    /// Returns whether a point is in view that lies behind the bumper and to the left of the ego's centre line by these distances (m).
+    pub fn contains(&self, back_m: f64, left_m: f64) -> bool {
+        let view = RearView {
+            half_angle_tan: self.half_angle_tan,
+            range_m: self.range_m,
+            sensor_x_m: self.inset_m,
+            sensor_y_m: self.left_m,
+            axis_azimuth_rad: self.azimuth_rad,
+        };
+        view.contains(-back_m, left_m)
+    }
+}
+
+/// A LiDAR with its latest scan, for display and for tables.
+#[derive(Clone, Copy, Debug)]
+pub struct MountedLidar<'a> {
+    /// Name of the sensor.
+    pub name: &'static str,
+    /// Whether it looks ahead. Its points and boxes are then in the frame of an ego that is turned by half a turn: x and y have the
+    /// opposite sign.
+    pub looks_ahead: bool,
+    /// The sensor with its latest points and boxes.
+    pub lidar: &'a RearLidar,
+    /// The boxes of the latest scan, with the camera's class scores if a camera has classified them.
+    pub detections: &'a [Detection],
 }
 
 /// All of the ego's sensors with their processing, from the scene to the tracks.
@@ -50,33 +90,20 @@ pub trait Perception: Send {
     /// Returns the health of the sensors after the latest step.
     fn health(&self) -> SensorHealth;
 
-    /// Returns the rear LiDAR with its latest points and boxes, for display. Returns `None` if it is not simulated.
-    fn rear_lidar(&self) -> Option<&RearLidar> {
-        None
+    /// Returns the LiDARs with their latest points and boxes: that which looks ahead, and those that look back in the order of the
+    /// scenario. Returns none if none are simulated.
+    fn lidars(&self) -> Vec<MountedLidar<'_>> {
+        Vec::new()
     }
 
-    /// Returns the LiDAR that looks ahead with its latest points and boxes, for display. They are in the frame of an ego that is
-    /// turned by half a turn: x and y have the opposite sign. Returns `None` if no such LiDAR is simulated.
-    fn front_lidar(&self) -> Option<&RearLidar> {
-        None
+    /// Returns the first of the rear LiDARs. Returns `None` if none is simulated.
+    fn rear_lidar(&self) -> Option<MountedLidar<'_>> {
+        self.lidars().into_iter().find(|lidar| !lidar.looks_ahead)
     }
 
-    /// Returns the boxes found in the latest scan of the LiDAR that looks ahead, in its frame. Returns an empty slice if no such
-    /// LiDAR is simulated.
-    fn front_detections(&self) -> &[Detection] {
-        &[]
-    }
-
-    /// Returns the boxes found in the latest scan of the rear LiDAR, with the camera's class scores if the camera is
-    /// simulated. Returns an empty slice if the LiDAR is not simulated.
-    fn rear_detections(&self) -> &[Detection] {
-        &[]
-    }
-
-    /// Returns the field of view of the rear sensor from the rear bumper. Returns `None` if its limits are not
-    /// simulated.
-    fn rear_field(&self) -> Option<FieldOfView> {
-        None
+    /// Returns the fields of view of the rear sensors. Returns none if their limits are not simulated.
+    fn rear_fields(&self) -> Vec<FieldOfView> {
+        Vec::new()
     }
 }
 

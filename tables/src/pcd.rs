@@ -18,10 +18,11 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use closecall_scenarios::atomic::parent_folder;
+use closecall_sensors::MountedLidar;
 use closecall_sensors::lidar::RearLidar;
 use tempfile::{Builder, TempDir};
 
-use crate::scan_columns::Mounting;
+use crate::scan_columns::sign;
 
 /// Number of nanoseconds in a second.
 const NS_PER_S: f64 = 1e9;
@@ -49,8 +50,8 @@ impl PcdFolder {
     }
 
     /// Writes the latest scan of a LiDAR as its scan number `frame`.
-    pub(crate) fn write(&self, mounting: Mounting, frame: u32, lidar: &RearLidar) -> io::Result<()> {
-        let path = self.folder.path().join(format!("{}-{frame:05}.pcd", mounting.name()));
+    pub(crate) fn write(&self, mounted: &MountedLidar<'_>, frame: u32, lidar: &RearLidar) -> io::Result<()> {
+        let path = self.folder.path().join(format!("{}-{frame:05}.pcd", mounted.name));
         let mut file = io::BufWriter::new(fs::File::create(path)?);
         let scan = lidar.latest();
         let points = scan.len();
@@ -69,7 +70,7 @@ impl PcdFolder {
              DATA binary\n"
         )?;
         for point in 0..points {
-            let [x_m, y_m] = [scan.x_m[point], scan.y_m[point]].map(|at_m| mounting.sign() * at_m);
+            let [x_m, y_m] = [scan.x_m[point], scan.y_m[point]].map(|at_m| sign(mounted) * at_m);
             for value in [x_m, y_m, scan.z_m[point], scan.intensity[point]] {
                 file.write_all(&value.to_le_bytes())?;
             }

@@ -7,35 +7,15 @@ use arrow::array::{
     ArrayRef, Float32Array, Float64Array, Int32Array, RecordBatch, StringArray, UInt16Array, UInt32Array,
 };
 use arrow::datatypes::{DataType, Field, Schema};
+use closecall_sensors::MountedLidar;
 use closecall_sensors::lidar::{MirrorSide, PointSource, RearLidar};
 
 use crate::table::{field, required};
 
-/// The mounting of a LiDAR.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Mounting {
-    /// At the front. Its points are those of an ego that is turned by half a turn.
-    Front,
-    /// At the rear.
-    Rear,
-}
-
-impl Mounting {
-    /// Returns the name in the table.
-    pub(crate) const fn name(self) -> &'static str {
-        match self {
-            Self::Front => "front-lidar",
-            Self::Rear => "rear-lidar",
-        }
-    }
-
-    /// Returns the factor of x and y in the ego's frame.
-    pub(crate) const fn sign(self) -> f32 {
-        match self {
-            Self::Front => -1.0,
-            Self::Rear => 1.0,
-        }
-    }
+/// Returns the factor of x and y in the ego's frame. The points of a LiDAR that looks ahead are those of an ego that is turned by half
+/// a turn.
+pub(crate) const fn sign(lidar: &MountedLidar<'_>) -> f32 {
+    if lidar.looks_ahead { -1.0 } else { 1.0 }
 }
 
 /// The returns of some scans, column by column.
@@ -71,7 +51,7 @@ impl ScanColumns {
     )]
     pub(crate) fn append(
         &mut self,
-        (mounting, frame): (Mounting, u32),
+        (mounted, frame): (&MountedLidar<'_>, u32),
         lidar: &RearLidar,
         actor: &dyn Fn(usize) -> String,
     ) {
@@ -88,7 +68,7 @@ impl ScanColumns {
         });
         for point in 0..scan.len() {
             let beam = lidar.point_beam(point);
-            self.sensor.push(mounting.name());
+            self.sensor.push(mounted.name);
             self.frame.push(frame);
             self.time_s.push(scan.end.s());
             self.mirror_side.push(side);
@@ -98,8 +78,8 @@ impl ScanColumns {
             self.angles_rad[0].push(beam.azimuth_rad as f32);
             self.angles_rad[1].push(beam.elevation_rad as f32);
             self.range_m.push(beam.range_m);
-            self.at_m[0].push(mounting.sign() * scan.x_m[point]);
-            self.at_m[1].push(mounting.sign() * scan.y_m[point]);
+            self.at_m[0].push(sign(mounted) * scan.x_m[point]);
+            self.at_m[1].push(sign(mounted) * scan.y_m[point]);
             self.at_m[2].push(scan.z_m[point]);
             self.intensity.push(scan.intensity[point]);
             self.offset_ns.push(scan.offset_ns[point]);

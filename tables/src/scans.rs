@@ -2,7 +2,7 @@
 //!
 //! | column | meaning |
 //! |---|---|
-//! | `sensor` | `rear-lidar` or `front-lidar` |
+//! | `sensor` | name of the LiDAR: `rear-lidar` and `front-lidar`, unless the scenario gives them others |
 //! | `frame`, `time_s` | number of the sensor's scan, and the time at which it ends (s) |
 //! | `mirror_side` | `plus` or `minus` if the sensor has a mirror with two sides |
 //! | `beam`, `column`, `layer` | beam = column · layers + layer; column 0 is the first that is swept, layer 0 the lowest |
@@ -21,14 +21,13 @@ use std::io::{self, Seek};
 use std::path::{Path, PathBuf};
 
 use closecall_scenarios::atomic::{WriteError, check_writable, write_file};
-use closecall_sensors::SensorMode;
-use closecall_sensors::lidar::RearLidar;
+use closecall_sensors::{MountedLidar, SensorMode};
 use closecall_simulation::{Observer, RunEvent, StepView};
 use closecall_traffic::Time;
 use parquet::arrow::ArrowWriter;
 
 use crate::pcd::PcdFolder;
-use crate::scan_columns::{Mounting, ScanColumns};
+use crate::scan_columns::ScanColumns;
 use crate::table::properties;
 
 /// Number of rows that are collected before they are written.
@@ -38,8 +37,8 @@ const ROWS_IN_MEMORY: usize = 65_536;
 pub struct ScanWriter {
     path: PathBuf,
     sink: Sink,
-    /// Number of scans of the front and of the rear LiDAR, and the end of the latest.
-    frames: [(u32, Option<Time>); 2],
+    /// Number of scans of each LiDAR, and the end of the latest.
+    frames: Vec<(u32, Option<Time>)>,
     /// The first error, after which nothing is written.
     failed: Option<io::Error>,
 }
@@ -77,7 +76,7 @@ impl ScanWriter {
                 return Err(fail(io::Error::new(io::ErrorKind::InvalidInput, message)));
             }
         };
-        Ok(Self { path: path.to_owned(), sink, frames: [(0, None); 2], failed: None })
+        Ok(Self { path: path.to_owned(), sink, frames: Vec::new(), failed: None })
     }
 
     /// Completes the file or the folder.
@@ -111,8 +110,12 @@ impl ScanWriter {
     }
 
     /// Appends the latest scan of a LiDAR, if it is a new one.
-    fn append(&mut self, mounting: Mounting, lidar: &RearLidar, view: &StepView<'_>) {
-        let (count, latest) = &mut self.frames[mounting as usize];
+    fn append(&mut self, (index, mounted): (usize, &MountedLidar<'_>), view: &StepView<'_>) {
+        let lidar = mounted.lidar;
+        if self.frames.len() <= index {
+            self.frames.resize(index + 1, (0, None));
+        }
+        let (count, latest) = &mut self.frames[index];
         if lidar.latest().end != view.time || *latest == Some(view.time) {
             return;
         }
@@ -128,9 +131,9 @@ impl ScanWriter {
         let actors = &view.scenario.actors;
         let name = |index: usize| actors.get(index).map_or_else(|| index.to_string(), |actor| actor.id.to_string());
         match &mut self.sink {
-            Sink::Table(_, rows) => rows.append((mounting, frame), &complete, &name),
+            Sink::Table(_, rows) => rows.append((mounted, frame), &complete, &name),
             Sink::Folder(folder) if self.failed.is_none() => {
-                self.failed = folder.write(mounting, frame, &complete).err();
+                self.failed = folder.write(mounted, frame, &complete).err();
             }
             Sink::Folder(_) => {}
         }
@@ -139,11 +142,8 @@ impl ScanWriter {
 
 impl Observer for ScanWriter {
     fn step(&mut self, view: &StepView<'_>) {
-        if let Some(lidar) = view.perception.front_lidar() {
-            self.append(Mounting::Front, lidar, view);
-        }
-        if let Some(lidar) = view.perception.rear_lidar() {
-            self.append(Mounting::Rear, lidar, view);
+        for (index, lidar) in view.perception.lidars().iter().enumerate() {
+            self.append((index, lidar), view);
         }
         if matches!(&self.sink, Sink::Table(_, rows) if rows.len() >= ROWS_IN_MEMORY) {
             self.flush();

@@ -35,4 +35,4 @@ pub use gaussian::Gaussian;
 pub use lane::LaneGeometry;
 pub use track_list::TrackList;
 pub use tracker::{Tracker, TrackerScan};
-pub use view::RearView;
+pub use view::{MAX_SIDE_AZIMUTH_RAD, RearView};

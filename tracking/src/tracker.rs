@@ -35,8 +35,10 @@ pub struct TrackerScan<'a> {
     pub road: &'a Road,
     /// State of the ego at `time`, from its odometry and its position in the lane.
     pub ego: VehicleState,
-    /// Field of view and position of the sensor.
+    /// Field of view and mounting of the sensor.
     pub view: RearView,
+    /// Position of the ego's rear end ahead of its origin (m); negative.
+    pub rear_x_m: f64,
     /// The detections.
     pub detections: &'a [Detection],
 }
@@ -49,6 +51,22 @@ struct TrackState {
     lifecycle: Lifecycle,
     class: FusedClass,
     extent: TrackExtent,
+    /// What the scans of the present update show of it.
+    seen: Seen,
+}
+
+/// What the scans of one time show of a track, from the least to the most.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+enum Seen {
+    /// No sensor could see it.
+    #[default]
+    OutOfView,
+    /// Only sensors that have no scan of this time could see it.
+    NotScanned,
+    /// A sensor could see it, and none did.
+    Missed,
+    /// A sensor detected it.
+    Hit,
 }
 
 impl TrackState {
@@ -104,6 +122,40 @@ impl Tracker {
     /// A scan that is dated before the previous one, as an error of the clock causes it, counts as measured at the time of the
     /// previous one: no filter is predicted backwards. Its measurements keep their own times, which lie before that of the filters.
     pub fn update(&mut self, scan: &TrackerScan<'_>, list: &mut TrackList) {
+        self.update_together(std::slice::from_ref(scan), &[], list);
+    }
+
+    /// Updates all tracks with the scans of several sensors that have the same time, one after the other. `idle` has the views of
+    /// the sensors without a scan of this time.
+    ///
+    /// The scans count as one for the lifecycle of a track: it is hit if one of the sensors detects it, and missed if one of them
+    /// could see it and none does. A track that only idle sensors could see keeps its state.
+    pub fn update_together(&mut self, scans: &[TrackerScan<'_>], idle: &[RearView], list: &mut TrackList) {
+        self.tracks.iter_mut().for_each(|track| track.seen = Seen::OutOfView);
+        for scan in scans {
+            self.measure(scan, list);
+        }
+        if let Some(latest) = scans.last() {
+            for view in idle {
+                let frame = EgoFrame::new(latest.road, &latest.ego);
+                self.project_faces(view, &frame);
+                for (track, face) in self.tracks.iter_mut().zip(&self.faces) {
+                    track.seen = if face.is_some() { track.seen.max(Seen::NotScanned) } else { track.seen };
+                }
+            }
+        }
+        for track in &mut self.tracks {
+            match track.seen {
+                Seen::OutOfView => track.lifecycle.skip(),
+                Seen::Missed => track.lifecycle.miss(&self.model.rules),
+                Seen::NotScanned | Seen::Hit => {}
+            }
+        }
+        self.delete_tracks();
+    }
+
+    /// Predicts all tracks to the time of a scan, and corrects or starts those that it detects.
+    fn measure(&mut self, scan: &TrackerScan<'_>, list: &mut TrackList) {
         // The time before the start of a run is negative. Before the first scan, there is nothing to predict.
         let elapsed_s =
             if scan.time > self.time && !self.tracks.is_empty() { (scan.time - self.time).s() } else { 0.0 };
@@ -111,7 +163,7 @@ impl Tracker {
         let frame = EgoFrame::new(scan.road, &scan.ego);
         let ego_mps = scan.ego.speed_mps * scan.ego.heading_rad.cos() / frame.path_scale(scan.ego.d_m);
         let ego = EgoRear {
-            s_m: scan.ego.s_m + scan.view.sensor_x_m,
+            s_m: scan.ego.s_m + scan.rear_x_m,
             d_m: scan.ego.d_m,
             speed_mps: ego_mps,
             half_lane_m: 0.5 * scan.road.lane_width_m(),
@@ -126,7 +178,7 @@ impl Tracker {
         self.measurements.extend(measured);
         let tracks = self.tracks.iter().map(|track| (&track.filter, 0.5 * track.size_m().0));
         assign(tracks, &self.measurements, &mut self.assigned);
-        self.project_faces(scan, &frame);
+        self.project_faces(&scan.view, &frame);
         for track_index in 0..self.tracks.len() {
             match self.assigned[track_index] {
                 Some(detection_index) => self.correct(track_index, detection_index, &scan.detections[detection_index]),
@@ -134,7 +186,6 @@ impl Tracker {
             }
         }
         self.start_tracks(scan, ego_mps, list);
-        self.delete_tracks();
     }
 
     /// Appends every track to `list`, predicted to `time` and in the ego's frame `frame` at that time.
@@ -152,24 +203,28 @@ impl Tracker {
         track.extent.update(detection);
         track.class.update(&detection.class, detection.points);
         let [along, _] = track.filter.estimate();
-        track.lifecycle.hit(&self.model.rules, along.speed_variance_m2ps2.sqrt() <= self.model.settled_speed_sd_mps);
+        if track.seen != Seen::Hit {
+            let is_settled = along.speed_variance_m2ps2.sqrt() <= self.model.settled_speed_sd_mps;
+            track.lifecycle.hit(&self.model.rules, is_settled);
+            track.seen = Seen::Hit;
+        }
         track.lifecycle.add_evidence(vehicle_log_likelihood_ratio(&detection.class, detection.points));
     }
 
-    /// Updates the lifecycle of a track without a detection.
+    /// Notes whether a scan could have detected a track that it did not detect.
     fn miss(&mut self, track_index: usize) {
         let could_be_seen = self.faces[track_index].is_some_and(|face| !face.is_hidden(&self.faces));
-        let lifecycle = &mut self.tracks[track_index].lifecycle;
-        if could_be_seen { lifecycle.miss(&self.model.rules) } else { lifecycle.skip() }
+        let track = &mut self.tracks[track_index];
+        track.seen = if could_be_seen { track.seen.max(Seen::Missed) } else { track.seen };
     }
 
     /// Computes each track's face as the sensor sees it.
-    fn project_faces(&mut self, scan: &TrackerScan<'_>, frame: &EgoFrame<'_>) {
+    fn project_faces(&mut self, view: &RearView, frame: &EgoFrame<'_>) {
         self.faces.clear();
         self.faces.extend(self.tracks.iter().map(|track| {
             let [along, across] = track.filter.estimate();
             let seen = frame.point(along.position_m, across.position_m);
-            scan.view.face(seen.x_m, seen.y_m, track.size_m().1)
+            view.face(seen.x_m, seen.y_m, track.size_m().1)
         }));
     }
 
@@ -189,6 +244,7 @@ impl Tracker {
                 lifecycle: Lifecycle::first_hit(&self.model.rules),
                 class: FusedClass::unknown(),
                 extent: TrackExtent::default(),
+                seen: Seen::Hit,
             };
             track.extent.update(detection);
             track.class.update(&detection.class, detection.points);

@@ -3,8 +3,8 @@
 //! A missing detection counts against a track only if the sensor could have seen the vehicle. A track behind a nearer
 //! one coasts and keeps its existence probability.
 
-/// Field of view and position of the rear sensor.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Field of view and mounting of a rear sensor.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RearView {
     /// Tangent of half of the horizontal field of view.
     pub half_angle_tan: f64,
@@ -12,6 +12,10 @@ pub struct RearView {
     pub range_m: f64,
     /// Position of the sensor ahead of the ego's origin (m); negative, because the sensor is at the rear bumper.
     pub sensor_x_m: f64,
+    /// Position of the sensor to the left of the ego's centre line (m).
+    pub sensor_y_m: f64,
+    /// Azimuth of the sensor's axis (rad): 0 is straight behind, positive to the ego's left.
+    pub axis_azimuth_rad: f64,
 }
 
 /// A vehicle's face as the sensor sees it.
@@ -30,13 +34,28 @@ const HIDDEN_SHARE: f64 = 0.5;
 /// Least distance from the sensor's plane (m). Nearer faces are alongside the ego and out of view.
 const MIN_DISTANCE_M: f64 = 0.1;
 
+/// Greatest azimuth from straight behind at which a turned sensor is expected to detect a vehicle (rad): 80°. Beyond it, a vehicle
+/// reaches past the sensor, and its front is not seen.
+pub const MAX_SIDE_AZIMUTH_RAD: f64 = 80.0 * std::f64::consts::PI / 180.0;
+
 impl RearView {
+    /// Returns whether a point of the ego's frame (m) is in view.
+    pub fn contains(&self, x_m: f64, y_m: f64) -> bool {
+        self.face(x_m, y_m, 0.0).is_some()
+    }
+
     /// Returns the face of width `width_m` whose middle is at (`x_m`, `y_m`) in the ego's frame. Returns `None` if it
     /// is out of view.
     pub(crate) fn face(&self, x_m: f64, y_m: f64, width_m: f64) -> Option<Face> {
-        let distance_m = self.sensor_x_m - x_m;
+        let (distance_m, y_m) = (self.sensor_x_m - x_m, y_m - self.sensor_y_m);
         let in_range = distance_m >= MIN_DISTANCE_M && distance_m <= self.range_m;
-        let in_view = y_m.abs() <= self.half_angle_tan * distance_m;
+        let in_view = if self.axis_azimuth_rad == 0.0 {
+            y_m.abs() <= self.half_angle_tan * distance_m
+        } else {
+            let azimuth_rad = y_m.atan2(distance_m);
+            (azimuth_rad - self.axis_azimuth_rad).abs() <= self.half_angle_tan.atan()
+                && azimuth_rad.abs() <= MAX_SIDE_AZIMUTH_RAD
+        };
         let (low_slope, high_slope) = ((y_m - 0.5 * width_m) / distance_m, (y_m + 0.5 * width_m) / distance_m);
         (in_range && in_view).then_some(Face { distance_m, low_slope, high_slope })
     }
@@ -56,7 +75,8 @@ impl Face {
 mod tests {
     use super::*;
 
-    const VIEW: RearView = RearView { half_angle_tan: 2.3, range_m: 200.0, sensor_x_m: -2.3 };
+    const VIEW: RearView =
+        RearView { half_angle_tan: 2.3, range_m: 200.0, sensor_x_m: -2.3, sensor_y_m: 0.0, axis_azimuth_rad: 0.0 };
 
     #[test]
     fn a_nearer_face_hides_a_farther_one_in_line() {
@@ -70,5 +90,16 @@ mod tests {
         assert!(VIEW.face(-2.0, 3.75, 1.8).is_none());
         assert!(VIEW.face(-3.0, 3.75, 1.8).is_none());
         assert!(VIEW.face(-230.0, 0.0, 1.8).is_none());
+    }
+
+    #[test]
+    fn a_corner_sensor_sees_its_own_side() {
+        // 60° to each side of an axis that points 45° to the left.
+        let corner = RearView { half_angle_tan: 1.732, sensor_y_m: 0.8, axis_azimuth_rad: 0.785, ..VIEW };
+        let sees = |x, y| corner.face(x, y, 1.8).is_some();
+        assert!(sees(-5.0, 4.0) && sees(-40.0, 0.0) && sees(-40.0, 3.75));
+        assert!(!sees(-6.0, -3.75) && VIEW.face(-6.0, -3.75, 1.8).is_some());
+        // 10 m to the side and 1 m behind, the vehicle is within the field of the sensor, but reaches past it.
+        assert!(!sees(-2.8, 10.0));
     }
 }

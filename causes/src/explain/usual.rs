@@ -95,7 +95,8 @@ pub(super) fn unusual(stage: Stage, case: &Case, scenario: &Scenario) -> Option<
     let config = &case.file.config().sensors;
     match stage {
         Stage::Points => {
-            let is_other = config.rear_lidar != SensorsConfig::default().rear_lidar;
+            let is_other =
+                config.rear_lidar != SensorsConfig::default().rear_lidar || !config.additional_rear_lidars.is_empty();
             let environment = &scenario.environment;
             let is_bad =
                 environment.visibility_m < Environment::CLEAR_DAY.visibility_m || environment.rain_mm_per_h > 0.0;

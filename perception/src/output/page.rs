@@ -18,6 +18,9 @@ const MARGINS_PX: [f64; 4] = [52.0, 12.0, 26.0, 40.0];
 const COLOURS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000"];
 /// Dashes of the lines of the second study, and of the lines beyond the colours.
 const DASHES: [&str; 4] = ["", "6 3", "2 3", "8 3 2 3"];
+/// Width of the last line that is drawn (px), what each one below it is wider, and the greatest width: of lines that coincide, each
+/// shows at the edges of the next.
+const WIDTHS_PX: [f64; 3] = [1.6, 0.8, 5.6];
 
 /// A line of a chart.
 struct Line {
@@ -76,6 +79,7 @@ fn heading(factor: &str) -> &'static str {
     match factor {
         "class" => "Class of the vehicle",
         "paint" => "Reflectivity of the paint",
+        "plate" => "Registration plate of a dark car",
         "offset" => "Lateral offset",
         "weather" => "Weather",
         "light" => "Light",
@@ -151,7 +155,14 @@ fn chart(name: &str, lines: &[Line]) -> String {
         0.5 * (left + width - right),
         height - 6.0
     ));
+    let [last_px, wider_px, widest_px] = WIDTHS_PX;
     for (index, line) in lines.iter().enumerate() {
+        let same = lines[..index].iter().find(|earlier| earlier.points == line.points);
+        let note = match same {
+            _ if line.points.is_empty() => " (no track)".to_owned(),
+            Some(earlier) => format!(" (the same as {})", earlier.name),
+            None => String::new(),
+        };
         let of_study = index % of_lines.max(1);
         let colour = COLOURS[of_study % COLOURS.len()];
         let dash = DASHES[(line.dash + of_study / COLOURS.len()) % DASHES.len()];
@@ -159,8 +170,9 @@ fn chart(name: &str, lines: &[Line]) -> String {
             line.points.iter().map(|point| format!("{:.1} {:.1}", x(point.0), y(point.1))).collect();
         if !path.is_empty() {
             put(format_args!(
-                "<path d=\"M{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.6\" stroke-dasharray=\"{dash}\"/>",
-                path.join("L")
+                "<path d=\"M{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{:.1}\" stroke-dasharray=\"{dash}\"/>",
+                path.join("L"),
+                (last_px + wider_px * (lines.len() - 1 - index) as f64).min(widest_px)
             ));
         }
         for (gap_m, _, interval) in &line.points {
@@ -178,7 +190,7 @@ fn chart(name: &str, lines: &[Line]) -> String {
             "<path d=\"M{left} {:.1}h26\" stroke=\"{colour}\" stroke-width=\"2\" stroke-dasharray=\"{dash}\"/><text x=\"{:.1}\" y=\"{at:.1}\">{}</text>",
             at - 4.0,
             left + 34.0,
-            escaped(&line.name)
+            escaped(&format!("{}{note}", line.name))
         ));
     }
     svg.push_str("</svg>");

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::list::{Combine, FaultList, check_span};
 use super::object::ObjectFaultConfig;
-use crate::lidar::MAX_HALF_FIELD_DEG;
+use crate::lidar::{MAX_HALF_FIELD_DEG, intern_name};
 use closecall_camera::CameraFault;
 
 /// Longest additional latency (s).
@@ -32,6 +32,8 @@ pub struct LidarFaultConfig {
     pub from_s: Option<Num>,
     /// Time at which the fault ends (s). Default: the end of the run.
     pub until_s: Option<Num>,
+    /// Name of the LiDAR that has the fault. Default: each rear LiDAR, or the one that looks ahead.
+    pub sensor: Option<String>,
     /// The sensor delivers nothing.
     pub dead: bool,
     /// The sensor delivers the points of its latest scan again and again, with new time stamps.
@@ -75,6 +77,8 @@ pub struct LidarFaultConfig {
 /// The effects of faults of a LiDAR at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct LidarFault {
+    /// Name of the sensor; `None` if each has the fault.
+    pub(crate) sensor: Option<&'static str>,
     pub(crate) is_dead: bool,
     pub(crate) is_frozen: bool,
     pub(crate) lost_frames: f64,
@@ -97,6 +101,7 @@ pub(crate) struct LidarFault {
 impl Default for LidarFault {
     fn default() -> Self {
         Self {
+            sensor: None,
             is_dead: false,
             is_frozen: false,
             lost_frames: 0.0,
@@ -128,6 +133,8 @@ impl Combine for LidarFault {
         let free = blocked_deg.iter_mut().filter(|sector| sector.is_none());
         free.zip(other.blocked_deg.into_iter().flatten()).for_each(|(slot, sector)| *slot = Some(sector));
         Self {
+            // Of several entries, those of one sensor hold together.
+            sensor: self.sensor.or(other.sensor),
             is_dead: self.is_dead || other.is_dead,
             is_frozen: self.is_frozen || other.is_frozen,
             lost_frames: either(self.lost_frames, other.lost_frames),
@@ -185,7 +192,10 @@ impl LidarFaultConfig {
         parameters: &Parameters,
     ) -> Result<FaultList<LidarFault>, ConfigError> {
         let list = FaultList::check(key, entries, |entry| entry.check(parameters))?;
-        for (index, sum) in list.combinations() {
+        // Entries of different sensors do not add up. Those without a sensor add up with those of each.
+        // No sensor has the empty name: it stands for those that no entry names.
+        let lists = list.sensors().chain([""]).map(|sensor| list.of_sensor(sensor));
+        for (index, sum) in lists.flat_map(|list| list.combinations().collect::<Vec<_>>()) {
             // A sum of allowed values may exceed its limit by rounding.
             let check = |value: f64, key, range: Range| range.check((1e9 * value).round() / 1e9, key).map(|_| ());
             check(sum.clock_offset_s, "clock-offset-s", CLOCK_OFFSET_S)
@@ -222,6 +232,7 @@ impl LidarFaultConfig {
         let transmission =
             parameters.number_or(self.window_transmission.as_ref(), "window-transmission", SHARE, 1.0)?;
         let fault = LidarFault {
+            sensor: None,
             is_dead: self.dead,
             is_frozen: self.frozen,
             lost_frames: number(&self.lost_frames, "lost-frames", SHARE)?,
@@ -243,6 +254,7 @@ impl LidarFaultConfig {
         if !has_effect {
             return Err(without_effect());
         }
+        let fault = LidarFault { sensor: self.sensor.as_deref().map(intern_name), ..fault };
         Ok((fault, check_span([&self.from_s, &self.until_s], parameters)?))
     }
 

@@ -85,14 +85,27 @@ impl<T: Combine> FaultList<T> {
 
     /// Returns everything that holds together at some time, each with the index of the entry that begins or ends then.
     pub(crate) fn combinations(&self) -> impl Iterator<Item = (usize, T)> {
-        let spans = self.entries.iter().flatten().map(|entry| [entry.from_s, entry.until_s]);
-        let instants_s = spans.enumerate().flat_map(|(index, span)| span.map(|time_s| (index, time_s)));
+        let entries = self.entries.iter().enumerate().filter_map(|(index, entry)| entry.as_ref().map(|of| (index, of)));
+        let instants_s = entries.flat_map(|(index, of)| [of.from_s, of.until_s].map(|time_s| (index, time_s)));
         instants_s
             .filter_map(|(index, time_s)| Some((index, self.held(time_s).map(|entry| entry.effect).reduce(T::and)?)))
     }
 
     fn held(&self, time_s: f64) -> impl Iterator<Item = &Entry<T>> {
         self.entries.iter().flatten().filter(move |entry| entry.from_s <= time_s && time_s < entry.until_s)
+    }
+}
+
+impl FaultList<LidarFault> {
+    /// Returns the entries of the sensor with this name: those that name it, and those that name none.
+    pub(crate) fn of_sensor(self, name: &str) -> Self {
+        let is_own = |entry: &Entry<LidarFault>| entry.effect.sensor.is_none_or(|sensor| sensor == name);
+        Self { entries: self.entries.map(|entry| entry.filter(is_own)) }
+    }
+
+    /// Returns the names of sensors that the entries have.
+    pub(crate) fn sensors(&self) -> impl Iterator<Item = &'static str> + use<> {
+        self.entries.into_iter().flatten().filter_map(|entry| entry.effect.sensor)
     }
 }
 

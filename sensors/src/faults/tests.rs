@@ -3,6 +3,7 @@
 mod camera;
 mod front_lidar;
 mod object;
+mod refused;
 
 use closecall_traffic::{
     ActorId, CONTROL_STEP, Check, ClassScores, Environment, Light, Parameters, Road, RoadConfig, Source, Time, Track,
@@ -14,7 +15,7 @@ use super::config::{CameraFaultConfig, FaultEntries, LidarFaultConfig};
 use super::{Faults, NOTICED_AFTER_SCANS, ObjectFaultConfig, OdometryErrorConfig};
 use crate::lidar::PointSource;
 use crate::testing::{OWN_LANE_M, scene_vehicle, with_speed};
-use crate::{Alterations, Detection, Extent, Health, NoiseKey, Scene, SceneVehicle, SensorsConfig};
+use crate::{Alterations, Detection, Extent, Health, MountedLidar, NoiseKey, Scene, SceneVehicle, SensorsConfig};
 use closecall_camera::{Backend, CropClassifier, ExposureKey, ImageMemory, ImagedScene};
 
 const PERIOD_S: f64 = CONTROL_STEP.s();
@@ -53,6 +54,8 @@ struct Step {
     /// Position and source of each point of the rear LiDAR.
     points: Vec<([f64; 3], PointSource)>,
     widths_m: Vec<f64>,
+    /// Heights of the points of the front LiDAR on vehicles (m).
+    front_points_z_m: Vec<f64>,
 }
 
 impl Step {
@@ -64,6 +67,13 @@ impl Step {
     fn on_vehicles(&self) -> usize {
         self.points.iter().filter(|(_, source)| matches!(source, PointSource::Actor(_))).count()
     }
+}
+
+/// Returns the heights of the points on vehicles (m).
+fn on_vehicles_z_m(mounted: &MountedLidar<'_>) -> Vec<f64> {
+    let (scan, truth) = (mounted.lidar.latest(), mounted.lidar.truth());
+    let is_on_vehicle = |index: &usize| matches!(truth.points[*index].source, PointSource::Actor(_));
+    (0..scan.len()).filter(is_on_vehicle).map(|index| f64::from(scan.z_m[index])).collect()
 }
 
 /// A drive with sensors and faults.
@@ -114,15 +124,19 @@ impl Drive<'_> {
             let scene = Scene { time, road: &road, environment: &self.environment, ego, others: &self.others };
             let tracks = perception.step(&scene).unwrap().to_vec();
             let mut points = Vec::new();
-            if let Some(lidar) = perception.rear_lidar() {
+            if let Some(lidar) = perception.rear_lidar().map(|mounted| mounted.lidar) {
                 let (scan, truth) = (lidar.latest(), lidar.truth());
                 let at = |index: usize| [scan.x_m[index], scan.y_m[index], scan.z_m[index]].map(f64::from);
                 points.extend((0..scan.len()).map(|index| (at(index), truth.points[index].source)));
             }
             let health = perception.health();
             let health = if health.front == Health::Failed { health.front } else { health.rear };
-            let widths_m = perception.rear_detections().iter().map(|detection| detection.width_m).collect();
-            steps.push(Step { tracks, health, points, widths_m });
+            let boxes = perception.rear_lidar().map_or(&[][..], |mounted| mounted.detections);
+            let widths_m = boxes.iter().map(|detection| detection.width_m).collect();
+            let lidars = perception.lidars();
+            let front_points_z_m =
+                lidars.iter().filter(|mounted| mounted.looks_ahead).flat_map(on_vehicles_z_m).collect();
+            steps.push(Step { tracks, health, points, widths_m, front_points_z_m });
             for vehicle in self.others.iter_mut().chain([&mut ego]) {
                 vehicle.state.s_m += PERIOD_S * vehicle.state.speed_mps;
             }
@@ -358,42 +372,4 @@ fn wrong_odometry_changes_the_speeds_and_the_lanes_of_others_and_nothing_else() 
         let aside = run("[odometry]\nlateral-m = 1.0");
         assert!((aside.y_m() - usual.y_m()).abs() < 0.05, "{} {}", aside.y_m(), usual.y_m());
     }
-}
-
-#[test]
-fn entries_that_cannot_be_right_are_refused_by_their_keys() {
-    let refused = |text: &str| faults(text).unwrap_err();
-    for (text, key, why) in [
-        ("[[rear-lidar]]\nfrom-s = 1.0", "rear-lidar[0].dead", "an effect of the fault"),
-        (
-            "[[rear-lidar]]\ndead = true\nfrom-s = 3.0\nuntil-s = 2.0",
-            "rear-lidar[0].until-s",
-            "ends after it has begun",
-        ),
-        ("[[rear-lidar]]\nblocked-from-deg = 1.0", "rear-lidar[0].blocked-to-deg", "two ends"),
-        (
-            "[[rear-lidar]]\nblocked-from-deg = 1.0\nblocked-to-deg = -1.0",
-            "rear-lidar[0].blocked-to-deg",
-            "farther left",
-        ),
-        ("[[rear-lidar]]\ndropout = 1.5", "rear-lidar[0].dropout", "from 0 to 1"),
-        ("[[rear-lidar]]\nheight-m = -0.1\n".repeat(3).as_str(), "rear-lidar[0].height-m", "from -0.2 to 0.5"),
-        (
-            "[[rear-lidar]]\npitch-deg = 3\nfrom-s = 1.0\n[[rear-lidar]]\npitch-deg = -2\nuntil-s = 9.0\n\
-             [[rear-lidar]]\npitch-deg = 3\nfrom-s = 2.0",
-            "rear-lidar[1].pitch-deg",
-            "from -5 to 5",
-        ),
-        ("[[rear-lidar]]\nyaw-deg = 3\n".repeat(2).as_str(), "rear-lidar[0].yaw-deg", "from -5 to 5"),
-        ("[[rear-camera]]\ndirt = -0.1", "rear-camera[0].dirt", "from 0 to 1"),
-        ("[[rear-object]]\nghost-closing-mps = 3.0", "rear-object[0].ghost-gap-m", "the gap"),
-        ("[[surround]]\ndelay-s = 0.5", "surround[0].delay-s", "from 0 to 0.4"),
-        ("[odometry]\nspeed-scale = 0.5", "odometry.speed-scale", "from -0.1 to 0.1"),
-    ] {
-        let message = refused(text);
-        assert!(message.contains(key) && message.contains(why), "{text}: {message}");
-    }
-    let five = "[[rear-lidar]]\ndead = true\n".repeat(5);
-    assert!(refused(&five).contains("at most four"), "{}", refused(&five));
-    assert!(refused("[[rear-lidar]]\ndeaf = true").contains("deaf"));
 }

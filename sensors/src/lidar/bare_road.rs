@@ -69,11 +69,16 @@ impl BareRoad {
     ///
     /// Written without branches, so that the layers are tested side by side in vector registers.
     pub(crate) fn covers(&self, lines: &CentreLines, road: &Road) -> bool {
+        if self.pose.is_turned() { self.covers_as::<true>(lines, road) } else { self.covers_as::<false>(lines, road) }
+    }
+
+    #[inline(always)]
+    fn covers_as<const IS_TURNED: bool>(&self, lines: &CentreLines, road: &Road) -> bool {
         let mut kept = [false; ROAD_LAYERS];
         for (layer, kept) in kept.iter_mut().enumerate() {
             let azimuth = [lines.cos[layer], lines.sin[layer]];
             let per_distance = road.per_distance(azimuth, lines.lowest_tan[layer]);
-            let counts = self.counts_as_ground(
+            let counts = self.counts_as_ground::<IS_TURNED>(
                 azimuth,
                 [lines.tan[layer], lines.cosine[layer]],
                 per_distance * lines.lowest_cosine[layer],
@@ -83,14 +88,29 @@ impl BareRoad {
         kept == [false; ROAD_LAYERS]
     }
 
+    /// Returns [`BareRoad::counts_as_ground`] for this sensor.
+    fn is_ground(&self, azimuth: [f32; 2], elevation: [f32; 2], per_range: f32) -> bool {
+        match self.pose.is_turned() {
+            true => self.counts_as_ground::<true>(azimuth, elevation, per_range),
+            false => self.counts_as_ground::<false>(azimuth, elevation, per_range),
+        }
+    }
+
     /// Returns true if every point that a beam may give counts as ground. `azimuth` has the cosine and sine of the azimuth
     /// of its centre line, `elevation` the tangent and cosine of its elevation. `per_range` is the inverse range at which
     /// the lowest sub-ray meets the road (1/m).
     #[inline(always)]
-    fn counts_as_ground(&self, [cos, sin]: [f32; 2], [tan, cosine]: [f32; 2], per_range: f32) -> bool {
+    fn counts_as_ground<const IS_TURNED: bool>(
+        &self,
+        [cos, sin]: [f32; 2],
+        [tan, cosine]: [f32; 2],
+        per_range: f32,
+    ) -> bool {
         let nearest_m = 1.0 / per_range - self.max_error_m;
         let level_m = nearest_m * cosine;
-        let [_, _, height_m] = self.pose.ego_frame_point_m([level_m * cos, level_m * sin, level_m * tan]);
+        let at_m = [level_m * cos, level_m * sin, level_m * tan];
+        let [_, _, height_m] =
+            if IS_TURNED { self.pose.ego_frame_point_m(at_m) } else { self.pose.level_point_m(at_m) };
         let fall_m = self.pose.sensor_z_m() - height_m;
         let ground_m = GROUND_M + GROUND_SLOPE * (LEVEL_SHARE * nearest_m - self.max_shift_m) - MARGIN_M;
         // The comparisons are false for NaN.
@@ -149,9 +169,9 @@ pub(crate) fn cast_ground(
         if hits.is_tested(layer) {
             let subrays = SubRays { cos: column.cos[group], sin: column.sin[group], tan: elevation.tan };
             hits.intersect(layer, &subrays, GROUND_FACES, targets);
-        } else if omitted.is_some_and(|bare| {
-            bare.counts_as_ground(column.centre[group], elevation.centre, per_distance * elevation.cos[0])
-        }) {
+        } else if omitted
+            .is_some_and(|bare| bare.is_ground(column.centre[group], elevation.centre, per_distance * elevation.cos[0]))
+        {
             hits.bare |= 1 << layer;
         }
     }

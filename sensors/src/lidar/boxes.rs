@@ -12,6 +12,8 @@
 //! enough of a side is seen, the heading is refined about that direction by the closeness criterion of L-shape fitting
 //! (Zhang, Xu, Dong and Dolan 2017, "Efficient L-shape fitting for vehicle detection using laser scanners").
 
+use closecall_tracking::MAX_SIDE_AZIMUTH_RAD;
+
 use super::kind::Resolution;
 use super::{LaneGeometry, LidarScan};
 
@@ -36,6 +38,9 @@ const HEADING_STEP_RAD: f64 = 1.0 * DEGREE;
 const HEADING_SD_RAD: f64 = 2.5 * DEGREE;
 /// Maximum distance from a side that counts in the closeness criterion (m). Points farther away carry no information.
 const MAX_CLOSENESS_M: f64 = 0.5;
+/// Azimuth from straight behind beyond which a cluster seen by a turned sensor may extend past the selected points (rad): 2° less than
+/// that of the selection.
+const SIDE_EDGE_RAD: f64 = MAX_SIDE_AZIMUTH_RAD - 2.0 * DEGREE;
 /// Maximum number of points that are used to try headings.
 const REFINE_MAX_POINTS: usize = 80;
 
@@ -74,7 +79,9 @@ pub(crate) struct BoxFit {
     pub(crate) point_sd_m: f64,
     /// Spacing of layers, and height of a footprint (rad).
     pub(crate) vertical_rad: [f64; 2],
-    /// Least and greatest azimuth of the points about the sensor's axis, positive to the ego's left (rad).
+    /// Position of the sensor to the left of the ego's centre line (m).
+    pub(crate) sensor_y_m: f64,
+    /// Least and greatest azimuth of the points from straight behind the sensor, positive to the ego's left (rad).
     pub(crate) azimuth_rad: [f64; 2],
     /// Whether the right and the left edge of the cluster are truncated by the field of view.
     ///
@@ -100,7 +107,7 @@ impl BoxFit {
     fn with_heading(heading_rad: f64, members: &[u32], scan: &LidarScan) -> Self {
         let (sin, cos) = heading_rad.sin_cos();
         let mut fit = Self::without_extent(heading_rad, members, scan);
-        let sensor_x = f64::from(scan.sensor_x_m);
+        let (sensor_x, sensor_y) = (f64::from(scan.sensor_x_m), f64::from(scan.sensor_y_m));
         let mut nearest = LargestValues::default();
         let (mut far, mut squares) = (f64::INFINITY, f64::INFINITY);
         let mut slopes = [f64::INFINITY, f64::NEG_INFINITY];
@@ -113,16 +120,21 @@ impl BoxFit {
             fit.top_m = fit.top_m.max(z);
             fit.bottom_m = fit.bottom_m.min(z);
             // All points are behind the sensor, so the slope increases with the azimuth.
-            let slope = y / (sensor_x - x);
+            let slope = (y - sensor_y) / (sensor_x - x);
             slopes = [slopes[0].min(slope), slopes[1].max(slope)];
-            squares = squares.min((sensor_x - x).powi(2) + y * y);
+            squares = squares.min((sensor_x - x).powi(2) + (y - sensor_y) * (y - sensor_y));
         }
         fit.azimuth_rad = slopes.map(f64::atan);
         fit.rear_u_m = far;
         fit.range_m = squares.sqrt();
         fit.in_view_m = scan.resolution.mount_height_m + fit.range_m * scan.resolution.highest_tan;
-        fit.spacing_m =
-            fit.range_m * column_step_rad(&scan.resolution, 0.5 * (fit.azimuth_rad[0] + fit.azimuth_rad[1]));
+        let from_axis_rad = 0.5 * (fit.azimuth_rad[0] + fit.azimuth_rad[1]) - scan.axis_azimuth_rad;
+        fit.spacing_m = fit.range_m * column_step_rad(&scan.resolution, from_axis_rad);
+        if scan.axis_azimuth_rad != 0.0 {
+            // The selection of points ends at a side, as the field of view does.
+            fit.truncated[0] |= fit.azimuth_rad[0] < -SIDE_EDGE_RAD;
+            fit.truncated[1] |= fit.azimuth_rad[1] > SIDE_EDGE_RAD;
+        }
         fit.locate_front(nearest.value(), [sin, cos], members, scan);
         fit
     }
@@ -148,6 +160,7 @@ impl BoxFit {
             point_sd_m: scan.resolution.point_sd_m,
             vertical_rad: [scan.resolution.layer_rad, scan.resolution.footprint_rad],
             azimuth_rad: [0.0; 2],
+            sensor_y_m: scan.sensor_y_m.into(),
             truncated: truncated_edges(members, scan),
         }
     }

@@ -1,6 +1,8 @@
 //! The rear LiDAR's configuration: the text of a scenario file, and the checked value that it becomes.
 
-use closecall_traffic::{Check, Choice, ConfigError, Num, Parameters, Problem, Range};
+use std::sync::{Mutex, PoisonError};
+
+use closecall_traffic::{ActorId, Check, Choice, ConfigError, Num, Parameters, Problem, Range};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -44,6 +46,10 @@ impl Plates {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct LidarConfig {
+    /// Name of the sensor in faults, recordings and tables: lower-case letters, digits and hyphens. Each of
+    /// `additional-rear-lidars` needs one. Default: `rear-lidar` or `front-lidar`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
     /// Model of the LiDAR, whose pattern and range ship with Closecall; `pattern-file` replaces them.
     pub model: Choice<LidarModel>,
     /// File with the pattern and the range of another LiDAR, relative to the scenario file. Its contents become `pattern` when the
@@ -57,6 +63,19 @@ pub struct LidarConfig {
     pub mount_height_m: Num,
     /// Upward tilt of the sensor's axis relative to the ego's body (rad).
     pub tilt_rad: Num,
+    /// Distance of the sensor from the bumper towards the ego's middle (m). The ego's own body hides nothing. Default: 0.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub inset_m: Num,
+    /// Distance of the sensor from the ego's centre line to the left (m). Default: 0.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub left_m: Num,
+    /// Azimuth of the sensor's axis (deg): 0 is straight behind, or straight ahead for the LiDAR that looks ahead; positive is to the
+    /// ego's left. Default: 0.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub azimuth_deg: Num,
+    /// Rotation of the sensor about its axis, clockwise as it sees it (deg). Default: 0.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub roll_deg: Num,
     /// Nominal range (m): the range at which a target of 50 % reflectivity that fills the beam is detected with
     /// probability 0.5, in air that does not attenuate. Default: that of the LiDAR's pattern; 200 for `scala-2`.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -86,11 +105,16 @@ impl Default for LidarConfig {
     /// −0.24° or +0.24°. At 100 m these two elevations meet the two halves of a car's painted front as seen from 0.6 m.
     fn default() -> Self {
         Self {
+            name: None,
             model: Choice::Fixed(LidarModel::Scala2),
             pattern_file: None,
             pattern: None,
             mount_height_m: Num::Fixed(0.6),
             tilt_rad: Num::Fixed(0.0),
+            inset_m: Num::Fixed(0.0),
+            left_m: Num::Fixed(0.0),
+            azimuth_deg: Num::Fixed(0.0),
+            roll_deg: Num::Fixed(0.0),
             nominal_range_m: None,
             dropout: Num::Fixed(0.01),
             false_alarm_rate: Num::Fixed(0.0),
@@ -104,10 +128,18 @@ impl Default for LidarConfig {
 /// A checked rear LiDAR configuration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lidar {
+    /// Name in faults, recordings and tables.
+    pub(crate) name: &'static str,
     /// Scan pattern and range.
     pub(crate) kind: &'static LidarKind,
     pub(crate) mount_height_m: f64,
     pub(crate) tilt_rad: f64,
+    /// Distance from the bumper towards the ego's middle, and from its centre line to the left (m).
+    pub(crate) inset_m: f64,
+    pub(crate) left_m: f64,
+    /// Azimuth of the axis, positive to the ego's left, and rotation about the axis, clockwise as the sensor sees it (rad).
+    pub(crate) azimuth_rad: f64,
+    pub(crate) roll_rad: f64,
     pub(crate) nominal_range_m: f64,
     pub(crate) dropout: f64,
     pub(crate) false_alarm_rate: f64,
@@ -125,6 +157,21 @@ pub struct Lidar {
 const EXACT_RANGE_M: f64 = 500.0;
 
 impl Lidar {
+    /// Returns the name in faults, recordings and tables.
+    pub fn name(&self) -> &'static str {
+        self.name
+    }
+
+    /// Returns true if the axis does not point straight behind, or the sensor is turned about it.
+    pub(crate) fn is_turned(&self) -> bool {
+        self.azimuth_rad != 0.0 || self.roll_rad != 0.0
+    }
+
+    /// Returns the sensor in a scene turned by half a turn, in which the ego's left is on its right.
+    pub(crate) fn half_turned(self) -> Self {
+        Self { left_m: -self.left_m, azimuth_rad: -self.azimuth_rad, ..self }
+    }
+
     /// Returns half of the horizontal field of view (deg).
     pub fn half_field_deg(&self) -> f64 {
         self.kind.half_field_deg
@@ -179,17 +226,29 @@ impl LidarConfig {
     }
 }
 
-impl Check for LidarConfig {
-    type Checked = Lidar;
+/// Names of the sensors of which the scenario gives none.
+pub(crate) const REAR_NAME: &str = "rear-lidar";
+pub(crate) const FRONT_NAME: &str = "front-lidar";
 
-    fn check(&self, parameters: &Parameters) -> Result<Lidar, ConfigError> {
+impl LidarConfig {
+    /// Checks the keys of a sensor that has this name if the scenario gives it none.
+    pub(crate) fn check_named(
+        &self,
+        default_name: Option<&'static str>,
+        parameters: &Parameters,
+    ) -> Result<Lidar, ConfigError> {
         let number = |num, key, range| parameters.number(num, key, range);
         let kind = self.kind(parameters)?;
         let nominal = (self.nominal_range_m.as_ref(), NOMINAL_RANGE_M);
         Ok(Lidar {
+            name: self.checked_name(default_name)?,
             kind,
             mount_height_m: number(&self.mount_height_m, "mount-height-m", Range::closed(0.2, 2.5))?,
             tilt_rad: number(&self.tilt_rad, "tilt-rad", Range::closed(-0.1, 0.1))?,
+            inset_m: number(&self.inset_m, "inset-m", Range::closed(0.0, 3.0))?,
+            left_m: number(&self.left_m, "left-m", Range::closed(-1.3, 1.3))?,
+            azimuth_rad: number(&self.azimuth_deg, "azimuth-deg", Range::closed(-80.0, 80.0))?.to_radians(),
+            roll_rad: number(&self.roll_deg, "roll-deg", Range::closed(-10.0, 10.0))?.to_radians(),
             nominal_range_m: parameters.number_or(nominal.0, "nominal-range-m", nominal.1, kind.nominal_range_m)?,
             dropout: number(&self.dropout, "dropout", Range::closed(0.0, 0.5))?,
             false_alarm_rate: number(&self.false_alarm_rate, "false-alarm-rate", Range::closed(0.0, 0.01))?,
@@ -200,15 +259,59 @@ impl Check for LidarConfig {
             is_exact: false,
         })
     }
+
+    /// Returns the name of the sensor.
+    fn checked_name(&self, default_name: Option<&'static str>) -> Result<&'static str, ConfigError> {
+        match (&self.name, default_name) {
+            (Some(name), _) if ActorId::new(name).is_ok() => Ok(intern_name(name)),
+            (Some(name), _) => {
+                let rule =
+                    format!("`{name}` is no name: it needs lower-case letters, digits and hyphens, a letter first");
+                Err(ConfigError::new("name", Problem::Contradiction { other: "name", rule }))
+            }
+            (None, Some(name)) => Ok(name),
+            (None, None) => {
+                let needed = "each of several sensors needs a name, such as `name = \"left\"`";
+                Err(ConfigError::new("name", Problem::Missing { needed }))
+            }
+        }
+    }
+}
+
+/// Returns the one reference to a name. A process sees few names, so that they are never released.
+pub(crate) fn intern_name(name: &str) -> &'static str {
+    static NAMES: Mutex<Vec<&'static str>> = Mutex::new(Vec::new());
+    let mut names = NAMES.lock().unwrap_or_else(PoisonError::into_inner);
+    match names.iter().find(|known| **known == name) {
+        Some(known) => known,
+        None => {
+            let name: &'static str = Box::leak(name.into());
+            names.push(name);
+            name
+        }
+    }
+}
+
+impl Check for LidarConfig {
+    type Checked = Lidar;
+
+    fn check(&self, parameters: &Parameters) -> Result<Lidar, ConfigError> {
+        self.check_named(Some(REAR_NAME), parameters)
+    }
 }
 
 impl Default for Lidar {
     /// Returns the configuration that an empty table gives.
     fn default() -> Self {
         Self {
+            name: REAR_NAME,
             kind: LidarModel::Scala2.kind(),
             mount_height_m: 0.6,
             tilt_rad: 0.0,
+            inset_m: 0.0,
+            left_m: 0.0,
+            azimuth_rad: 0.0,
+            roll_rad: 0.0,
             nominal_range_m: 200.0,
             dropout: 0.01,
             false_alarm_rate: 0.0,

@@ -338,5 +338,6 @@ fn sees_rear(fit: &BoxFit) -> bool {
     let middle = 0.5 * (fit.across_m[0] + fit.across_m[1]);
     let (x, y) = (fit.rear_u_m * cos - middle * sin, fit.rear_u_m * sin + middle * cos);
     let step_rad = fit.spacing_m / fit.range_m.max(1.0);
+    let y = y - fit.sensor_y_m;
     y.abs() > 1.0 && step_rad * (x * x + y * y) / y.abs() < SIDE_SPACING_M
 }

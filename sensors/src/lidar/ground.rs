@@ -5,6 +5,7 @@
 //! that distance a low point is kept, since it can only originate from an object on the road. Its height is that of the beam's
 //! centre, and may be off by half a footprint.
 
+use closecall_tracking::MAX_SIDE_AZIMUTH_RAD;
 use closecall_traffic::{Environment, Time};
 
 use super::bare_road::farthest_road_return_m;
@@ -70,6 +71,7 @@ pub(crate) fn select_candidates(
     #[expect(clippy::cast_possible_truncation, reason = "points are in single precision")]
     let (slope, bend, [left_end_m, right_end_m]) =
         (-lane.heading_rad as f32, 0.5 * lane.curvature_per_m as f32, lane.region_m.map(|end_m| end_m as f32));
+    let max_side_tan = MAX_SIDE_AZIMUTH_RAD.tan() as f32;
     let points = scan.x_m.iter().zip(&scan.y_m).zip(&scan.z_m).zip(&scan.intensity);
     for ((((&x, &y), &z), &intensity), index) in points.zip(0..) {
         if !(x + y + z + intensity).is_finite() {
@@ -78,10 +80,13 @@ pub(crate) fn select_candidates(
         let back_m = scan.sensor_x_m - x;
         let left_m = y - (slope + bend * x) * x;
         let inside = back_m > 0.0 && back_m < REACH_M && left_m < left_end_m && left_m > right_end_m;
-        let range_m = (back_m * back_m + y * y).sqrt();
+        let beside_m = y - scan.sensor_y_m;
+        let range_m = (back_m * back_m + beside_m * beside_m).sqrt();
         let ground = range_m < scan.resolution.ground_reach_m && z < GROUND_M + GROUND_SLOPE * range_m;
         let droplet = range_m < DROPLET_REACH_M && intensity < DROPLET_INTENSITY;
-        if inside && !ground && !droplet {
+        // A sensor that is turned to a side also sees along the ego's flank, where a vehicle has no front that it could see.
+        let is_behind = scan.axis_azimuth_rad == 0.0 || beside_m.abs() <= max_side_tan * back_m;
+        if inside && is_behind && !ground && !droplet {
             candidates.push(Candidate { index, back_m, left_m });
         }
     }

@@ -43,6 +43,7 @@ mod tests;
 mod viewpoint;
 
 pub use closecall_tracking::LaneGeometry;
+pub(crate) use config::{FRONT_NAME, REAR_NAME, intern_name};
 pub use config::{Lidar, LidarConfig};
 pub use detector::Detector;
 #[cfg(test)]

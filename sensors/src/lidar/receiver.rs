@@ -10,7 +10,7 @@ use super::pattern::{Column, Elevation};
 use super::power::{LinkBudget, MIN_POWER, THRESHOLD_OVER_NOISE};
 use super::soft::{self, BeamIndex, DropletEffect, Plume, SoftEcho};
 use super::targets::Targets;
-use super::viewpoint::{Deskew, sensor_position_m};
+use super::viewpoint::{Deskew, sensor_position_m, turned_axes};
 use super::{Lidar, LidarScan, Material, PointSource, PointTruth, ScanTruth};
 use crate::Scene;
 
@@ -24,6 +24,8 @@ pub(crate) struct SensorPoseEstimate {
     cos: f32,
     sin: f32,
     deskew: [f32; 4],
+    /// Axes of a turned sensor in the ego's frame.
+    turned: Option<[[f32; 3]; 3]>,
 }
 
 impl SensorPoseEstimate {
@@ -32,14 +34,29 @@ impl SensorPoseEstimate {
     pub(crate) fn new(scene: &Scene<'_>, lidar: &Lidar, noise: Noise) -> Self {
         let error_rad = lidar.levelling_sd_rad * f64::from(noise.normal(lidar.kind.beams(), Purpose::Levelling));
         let pitch_rad = scene.ego.pitch_rad + error_rad;
-        let sensor = sensor_position_m(0.5 * scene.ego.vehicle.dimensions.length_m, lidar.mount_height_m, pitch_rad);
+        let back_m = 0.5 * scene.ego.vehicle.dimensions.length_m - lidar.inset_m;
+        let sensor = sensor_position_m([back_m, lidar.left_m, lidar.mount_height_m], pitch_rad);
         let (sin, cos) = (pitch_rad + lidar.tilt_rad).sin_cos();
         Self {
             sensor_m: [sensor.x as f32, sensor.y as f32, sensor.z as f32],
             cos: cos as f32,
             sin: sin as f32,
             deskew: [1.0, 0.0, 0.0, 0.0],
+            turned: lidar.is_turned().then(|| {
+                let axes = turned_axes(lidar, pitch_rad).inverse();
+                std::array::from_fn(|of| std::array::from_fn(|axis| axes[(axis, of)] as f32))
+            }),
         }
+    }
+
+    /// Returns true if the sensor is turned to a side or about its axis.
+    pub(crate) fn is_turned(&self) -> bool {
+        self.turned.is_some()
+    }
+
+    /// Returns the position of the sensor to the left of the ego's centre line (m).
+    pub(crate) fn sensor_y_m(&self) -> f32 {
+        self.sensor_m[1]
     }
 
     /// Returns the height of the sensor above the road (m).
@@ -59,10 +76,33 @@ impl SensorPoseEstimate {
     }
 
     /// Transforms a point from the sensor's frame to the ego's frame at the end of the sweep (m).
-    pub(crate) fn ego_frame_point_m(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
+    #[inline(always)]
+    pub(crate) fn ego_frame_point_m(&self, at_m: [f32; 3]) -> [f32; 3] {
+        match &self.turned {
+            None => self.level_point_m(at_m),
+            Some(axes) => self.turned_point_m(axes, at_m),
+        }
+    }
+
+    /// Does what [`SensorPoseEstimate::ego_frame_point_m`] does for a turned sensor.
+    #[cold]
+    fn turned_point_m(&self, axes: &[[f32; 3]; 3], [x, y, z]: [f32; 3]) -> [f32; 3] {
+        let along = |axis: usize| self.sensor_m[axis] + axes[0][axis] * x + axes[1][axis] * y + axes[2][axis] * z;
+        self.at_end([along(0), along(1), along(2)])
+    }
+
+    /// Does what [`SensorPoseEstimate::ego_frame_point_m`] does for a sensor that is not turned, without branches.
+    #[inline(always)]
+    pub(crate) fn level_point_m(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
         let ahead = self.sensor_m[0] - self.cos * x + self.sin * z;
         let left = self.sensor_m[1] - y;
         let above = self.sensor_m[2] + self.sin * x + self.cos * z;
+        self.at_end([ahead, left, above])
+    }
+
+    /// Transforms a point from the ego's frame at the time of the column to that at the end of the sweep (m).
+    #[inline(always)]
+    fn at_end(&self, [ahead, left, above]: [f32; 3]) -> [f32; 3] {
         let [cos, sin, shift_x, shift_y] = self.deskew;
         [cos * ahead - sin * left + shift_x, sin * ahead + cos * left + shift_y, above]
     }

@@ -30,6 +30,10 @@ pub struct LidarScan {
     pub mirror_side: MirrorSide,
     /// Longitudinal position of the sensor in the ego's frame (m): negative, because it is in the rear bumper.
     pub sensor_x_m: f32,
+    /// Lateral position of the sensor in the ego's frame, positive to the left (m).
+    pub sensor_y_m: f32,
+    /// Azimuth of the sensor's axis (rad): 0 is straight behind, positive to the ego's left.
+    pub axis_azimuth_rad: f64,
     /// Columns and layers of the pattern.
     pub(crate) resolution: Resolution,
     /// Longitudinal position of each point (m), negative behind the ego's origin.

@@ -166,7 +166,9 @@ impl Scanner {
         self.begin(scene.time, mirror_side, &pose);
         let link = LinkBudget::new(&actual, scene.environment);
         // With a fault, a point may be elsewhere than its return.
-        let rails = if fault.is_none() { RailReturns::new(lane, &link, self.lidar.kind.beam_height_deg) } else { None };
+        // The limits hold for a sensor that looks straight back.
+        let is_plain = fault.is_none() && !self.lidar.is_turned();
+        let rails = if is_plain { RailReturns::new(lane, &link, self.lidar.kind.beam_height_deg) } else { None };
         let fault = fault
             .filter(|fault| fault.changes_points())
             .map(|fault| (*fault, scene.road.has_guard_rails().then(|| LaneGeometry::from_scene(scene))));
@@ -290,7 +292,8 @@ impl Scanner {
         self.scan.mirror_side = mirror_side;
         let (mount_height_m, ground_reach_m) = (self.lidar.mount_height_m, self.ground_reach_m);
         self.scan.resolution = Resolution { mount_height_m, ground_reach_m, ..self.pattern.kind().resolution };
-        self.scan.sensor_x_m = pose.sensor_x_m();
+        (self.scan.sensor_x_m, self.scan.sensor_y_m) = (pose.sensor_x_m(), pose.sensor_y_m());
+        self.scan.axis_azimuth_rad = self.lidar.azimuth_rad;
     }
 
     /// Sets the times of the scan.

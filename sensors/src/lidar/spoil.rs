@@ -97,7 +97,7 @@ impl Spoiler<'_> {
 
     /// Returns the position of the sensor (m).
     fn sensor_m(&self) -> [f32; 3] {
-        [self.pose.sensor_x_m(), 0.0, self.pose.sensor_z_m()]
+        [self.pose.sensor_x_m(), self.pose.sensor_y_m(), self.pose.sensor_z_m()]
     }
 
     /// Adds the halos of saturated plates.
@@ -223,9 +223,9 @@ impl Spoiler<'_> {
 
     /// Removes the points that are lost, and those in blocked sectors.
     fn lose(&self, scan: &mut LidarScan, truth: &mut ScanTruth) {
-        let sensor = self.sensor_m();
+        let (sensor, axis_deg) = (self.sensor_m(), scan.axis_azimuth_rad.to_degrees());
         let is_blocked = |x_m: f32, y_m: f32| {
-            let azimuth_deg = f64::from((y_m - sensor[1]).atan2(sensor[0] - x_m)).to_degrees();
+            let azimuth_deg = f64::from((y_m - sensor[1]).atan2(sensor[0] - x_m)).to_degrees() - axis_deg;
             self.fault.blocked_deg.iter().flatten().any(|[from, to]| (*from..=*to).contains(&azimuth_deg))
         };
         let mut kept = 0;

@@ -32,6 +32,8 @@ pub(crate) struct Viewpoint {
     pub(crate) axis_rad: f64,
     /// Rotation of the sensor about the vertical axis, to the left seen from above (rad).
     yaw_rad: f64,
+    /// Rotation from the ego's level frame to that of the sensor, if the sensor is turned.
+    turned: Option<Rotation3<f64>>,
 }
 
 /// The ego's motion from an instant of the sweep to its end, as a rotation and a translation that transform a point
@@ -58,12 +60,12 @@ impl Viewpoint {
             speed_mps: state.speed_mps,
             yaw_rate_radps: state.yaw_rate_radps,
             sensor_position_m: sensor_position_m(
-                0.5 * ego.vehicle.dimensions.length_m,
-                lidar.mount_height_m,
+                [0.5 * ego.vehicle.dimensions.length_m - lidar.inset_m, lidar.left_m, lidar.mount_height_m],
                 ego.pitch_rad,
             ),
             axis_rad: ego.pitch_rad + lidar.tilt_rad,
             yaw_rad: lidar.yaw_rad,
+            turned: lidar.is_turned().then(|| turned_axes(lidar, ego.pitch_rad)),
         }
     }
 
@@ -83,9 +85,10 @@ impl Viewpoint {
     pub(crate) fn sensor_from_plane(&self, before_end_s: f64) -> Isometry3<f64> {
         let level_from_plane = plane_from_body(self.ego_at(before_end_s), 0.0).inverse();
         let level = UnitQuaternion::from_rotation_matrix(&sensor_axes(self.axis_rad));
-        let turn = match self.yaw_rad {
-            0.0 => level,
-            yaw_rad => level * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -yaw_rad),
+        let turn = match (&self.turned, self.yaw_rad) {
+            (Some(turned), _) => UnitQuaternion::from_rotation_matrix(turned),
+            (None, 0.0) => level,
+            (None, yaw_rad) => level * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -yaw_rad),
         };
         Isometry3::from_parts(Translation3::from(-(turn * self.sensor_position_m)), turn) * level_from_plane
     }
@@ -113,10 +116,20 @@ fn small_sin_cos(angle_rad: f64) -> (f64, f64) {
     (angle_rad * (1.0 - square / 6.0), 1.0 - 0.5 * square * (1.0 - square / 12.0))
 }
 
-/// Returns the position in the ego's vehicle frame of a sensor that is mounted `back_m` behind the ego's origin (m).
-pub(crate) fn sensor_position_m(back_m: f64, height_m: f64, pitch_rad: f64) -> Vector3<f64> {
+/// Returns the position in the ego's vehicle frame of a sensor that is mounted behind, to the left of and above the ego's origin (m).
+pub(crate) fn sensor_position_m([back_m, left_m, height_m]: [f64; 3], pitch_rad: f64) -> Vector3<f64> {
     let (sin, cos) = pitch_rad.sin_cos();
-    Vector3::new(-back_m * cos + height_m * sin, 0.0, back_m * sin + height_m * cos)
+    Vector3::new(-back_m * cos + height_m * sin, left_m, back_m * sin + height_m * cos)
+}
+
+/// Returns the rotation from the ego's vehicle frame to the frame of a turned sensor: that of the body by its pitch, of the sensor
+/// about the body's vertical axis, by its tilt, and about its own axis.
+pub(crate) fn turned_axes(lidar: &Lidar, pitch_rad: f64) -> Rotation3<f64> {
+    let about = |axis, angle_rad| Rotation3::from_axis_angle(&axis, angle_rad);
+    about(Vector3::x_axis(), -lidar.roll_rad)
+        * sensor_axes(lidar.tilt_rad)
+        * about(Vector3::z_axis(), lidar.azimuth_rad - lidar.yaw_rad)
+        * about(Vector3::y_axis(), -pitch_rad)
 }
 
 /// Returns the rotation from the ego's vehicle frame to the frame of a sensor whose axis points `axis_rad` above the
@@ -177,5 +190,26 @@ mod tests {
         let x = to.cos * earlier.x - to.sin * earlier.y + to.x_m;
         let y = to.sin * earlier.x + to.cos * earlier.y + to.y_m;
         assert!((x - latest.x).abs() < 1e-9 && (y - latest.y).abs() < 1e-9, "{x} {y} {latest}");
+    }
+
+    #[test]
+    fn a_turned_sensor_without_an_angle_is_one_that_is_not_turned() {
+        for (tilt_rad, pitch_rad) in [(0.0, 0.0), (0.02, 0.01), (-0.03, -0.02)] {
+            let turned = turned_axes(&Lidar { tilt_rad, ..Lidar::default() }, pitch_rad);
+            assert!((turned.matrix() - sensor_axes(tilt_rad + pitch_rad).matrix()).norm() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn the_azimuth_turns_the_axis_to_the_left_and_the_roll_raises_its_left() {
+        let axis = |azimuth_deg: f64, roll_deg: f64| {
+            let (azimuth_rad, roll_rad) = (azimuth_deg.to_radians(), roll_deg.to_radians());
+            turned_axes(&Lidar { azimuth_rad, roll_rad, ..Lidar::default() }, 0.0).inverse()
+        };
+        let along = axis(90.0, 0.0) * Vector3::x();
+        assert!((along - Vector3::y()).norm() < 1e-12, "{along}");
+        // The sensor that looks back has its left on the ego's right.
+        let left = axis(0.0, 10.0) * Vector3::y();
+        assert!(left.y < -0.98 && left.z > 0.17, "{left}");
     }
 }

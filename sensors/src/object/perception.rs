@@ -66,8 +66,8 @@ impl Perception for ObjectPerception {
         SensorHealth { front: front.health(), surround: surround.health(), rear: rear.health() }
     }
 
-    fn rear_field(&self) -> Option<FieldOfView> {
+    fn rear_fields(&self) -> Vec<FieldOfView> {
         let [_, _, rear] = &self.sensors;
-        Some(rear.field_of_view())
+        vec![rear.field_of_view()]
     }
 }

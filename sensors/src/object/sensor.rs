@@ -212,7 +212,7 @@ impl ObjectSensor {
 
     /// Returns the field of view in the weather of the latest scan.
     pub(crate) fn field_of_view(&self) -> FieldOfView {
-        FieldOfView { half_angle_tan: self.model.half_angle_tan, range_m: self.ranges.usual_m() }
+        FieldOfView::straight_back(self.model.half_angle_tan, self.ranges.usual_m())
     }
 
     /// Returns the index in `targets` of the vehicle `actor`, and adds the vehicle if it is new. It is usually `position`, that in

@@ -46,10 +46,10 @@ fn at_gap(gap_m: f64, paint_reflectivity: f64, sample: u64) -> Found {
         }
         let scene = Scene { time, road: &road, environment: &Environment::CLEAR_DAY, ego, others: &others };
         lidar.scan(&scene, &mut rng);
-        let view = RearView { half_angle_tan: 2.3, range_m: 200.0, sensor_x_m: -2.3 };
+        let view = RearView { half_angle_tan: 2.3, range_m: 200.0, sensor_x_m: -2.3, ..RearView::default() };
         let detections = lidar.detect().unwrap();
         list.tracks.clear();
-        tracker.update(&TrackerScan { time, road: &road, ego: ego.state, view, detections }, &mut list);
+        tracker.update(&TrackerScan { time, road: &road, ego: ego.state, view, rear_x_m: -2.3, detections }, &mut list);
         tracker.report(time, &EgoFrame::new(&road, &ego.state), &mut list);
         if scan < 250 {
             continue;
@@ -104,10 +104,10 @@ fn states_from(first: i64) -> Vec<Vec<[f64; 4]>> {
         others[0].state.s_m += PERIOD_S * others[0].state.speed_mps;
         let scene = Scene { time, road: &road, environment: &Environment::CLEAR_DAY, ego, others: &others };
         lidar.scan(&scene, &mut rng);
-        let view = RearView { half_angle_tan: 2.3, range_m: 200.0, sensor_x_m: -2.3 };
+        let view = RearView { half_angle_tan: 2.3, range_m: 200.0, sensor_x_m: -2.3, ..RearView::default() };
         let detections = lidar.detect().unwrap();
         list.tracks.clear();
-        tracker.update(&TrackerScan { time, road: &road, ego: ego.state, view, detections }, &mut list);
+        tracker.update(&TrackerScan { time, road: &road, ego: ego.state, view, rear_x_m: -2.3, detections }, &mut list);
         tracker.report(time, &EgoFrame::new(&road, &ego.state), &mut list);
         states.push(list.tracks.iter().map(|track| track.state.into()).collect());
     }

@@ -115,9 +115,14 @@ fn the_front_lidar_measures_the_vehicle_at_points() {
     let lead = with_speed(scene_vehicle(1, VehicleClass::Car, 530.0, OWN_LANE_M), 30.0);
     let scene = Scene { time: Time::ZERO, road: &road, environment: &environment, ego, others: &[lead] };
     perception.step(&scene).unwrap();
-    let lidar = perception.front_lidar().unwrap();
-    assert!(lidar.latest().len() > 100);
+    let lidars = perception.lidars();
+    let [front, rear] = lidars[..] else { panic!("{} LiDARs", lidars.len()) };
+    assert_eq!(
+        [(front.name, front.looks_ahead), (rear.name, rear.looks_ahead)],
+        [("front-lidar", true), ("rear-lidar", false)]
+    );
+    assert!(front.lidar.latest().len() > 100);
     // In the turned frame, the rear of the vehicle ahead is 30 m less two half lengths behind the sensor.
-    let [detection] = perception.front_detections() else { panic!("{:?}", perception.front_detections()) };
+    let [detection] = front.detections else { panic!("{:?}", front.detections) };
     assert!((detection.face_x_m + 30.0 - 2.3).abs() < 0.3, "{}", detection.face_x_m);
 }

@@ -2,5 +2,6 @@
 
 mod fixed_gap;
 mod front;
+mod several_lidars;
 mod silhouettes;
 mod tracking;

@@ -162,8 +162,8 @@ impl Bench {
                 class: ClassScores([0.6, 0.1, 0.1, 0.2]),
             });
         }
-        let view = RearView { half_angle_tan: 2.3, range_m: 200.0, sensor_x_m: -2.3 };
-        let scan = TrackerScan { time, road: &road, ego: ego.state, view, detections: &detections };
+        let view = RearView { half_angle_tan: 2.3, range_m: 200.0, sensor_x_m: -2.3, ..RearView::default() };
+        let scan = TrackerScan { time, road: &road, ego: ego.state, view, rear_x_m: -2.3, detections: &detections };
         self.list.tracks.clear();
         self.tracker.update(&scan, &mut self.list);
         self.tracker.report(time, &EgoFrame::new(&road, &ego.state), &mut self.list);

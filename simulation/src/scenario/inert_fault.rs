@@ -3,7 +3,7 @@
 use closecall_camera::Pipeline;
 use closecall_sensors::faults::LidarFaultConfig;
 use closecall_sensors::lidar::Lidar;
-use closecall_sensors::{FullModel, SensorMode, Sensors};
+use closecall_sensors::{SensorMode, Sensors};
 use closecall_traffic::{Check, ConfigError, Num, Parameters, Problem, Range, Road};
 
 use super::intervention::FaultConfig;
@@ -23,10 +23,11 @@ pub(super) fn refuse(
     parameters: &Parameters,
 ) -> Result<(), ConfigError> {
     refuse_absent(fault, sensors)?;
-    let FullModel { rear_lidar, front_lidar, .. } = sensors.full_model();
-    refuse_of_lidar(("rear-lidar", &fault.rear_lidar), &rear_lidar, road, parameters)?;
-    if let Some(front_lidar) = front_lidar {
-        refuse_of_lidar(("front-lidar", &fault.front_lidar), &front_lidar, road, parameters)?;
+    let model = sensors.full_model();
+    let rear_lidars: Vec<Lidar> = model.rear_lidars().collect();
+    refuse_of_lidars(("rear-lidar", &fault.rear_lidar), &rear_lidars, road, parameters)?;
+    if let Some(front_lidar) = model.front_lidar {
+        refuse_of_lidars(("front-lidar", &fault.front_lidar), &[front_lidar], road, parameters)?;
     }
     let refuse_late = |key, starts: &mut dyn Iterator<Item = &Option<Num>>| {
         for (index, from) in starts.enumerate() {
@@ -46,15 +47,22 @@ pub(super) fn refuse(
     refuse_late("rear-object", &mut fault.rear_object.iter().map(|of| &of.from_s))
 }
 
-/// Refuses blocked sectors outside of the field of view of a LiDAR, and mirror images without guard rails.
-fn refuse_of_lidar(
+/// Refuses names that no LiDAR has, blocked sectors outside of the field of view of a LiDAR, and mirror images without guard rails.
+fn refuse_of_lidars(
     (of, entries): (&str, &[LidarFaultConfig]),
-    lidar: &Lidar,
+    lidars: &[Lidar],
     road: &Road,
     parameters: &Parameters,
 ) -> Result<(), ConfigError> {
-    let half_deg = lidar.half_field_deg();
     for (index, entry) in entries.iter().enumerate() {
+        let is_meant = |lidar: &&Lidar| entry.sensor.as_deref().is_none_or(|name| name == lidar.name());
+        let half_deg = lidars.iter().filter(is_meant).map(Lidar::half_field_deg).fold(f64::INFINITY, f64::min);
+        if !half_deg.is_finite() {
+            let names: Vec<&str> = lidars.iter().map(Lidar::name).collect();
+            let rule = format!("no such LiDAR is called that, but `{}`", names.join("`, `"));
+            let problem = Problem::Contradiction { other: "sensors", rule };
+            return Err(at(of, index, ConfigError::new("sensor", problem)));
+        }
         for (end, key) in [(&entry.blocked_from_deg, "blocked-from-deg"), (&entry.blocked_to_deg, "blocked-to-deg")] {
             let within = Range::closed(-half_deg, half_deg);
             parameters.number_or(end.as_ref(), key, within, 0.0).map_err(|error| at(of, index, error))?;
@@ -179,6 +187,7 @@ mod tests {
         let (full, object) = ("sensors.mode = \"full\"\n", "sensors.mode = \"object\"\n");
         let truth = "sensors.mode = \"ground-truth\"\n";
         let lidar = "[[fault.rear-lidar]]\ndead = true\n";
+        let further = "sensors.additional-rear-lidars = [{ name = \"left\", mount-height-m = 0.25 }]\n";
         let camera = "[[fault.rear-camera]]\ndead = true\n";
         let behind = "[[fault.rear-object]]\ndead = true\n";
         let radar = "[[fault.front-radar]]\ndead = true\n";
@@ -222,6 +231,17 @@ mod tests {
                 "`fault.front-lidar`",
             ),
             (format!("{full}{front}{ahead}from-s = 3000.0\n"), "fault.front-lidar[0].from-s", "`duration-s`"),
+            (
+                format!("{full}{further}[[fault.rear-lidar]]\ndead = true\nsensor = \"right\"\n"),
+                "fault.rear-lidar[0].sensor",
+                "`rear-lidar`, `left`",
+            ),
+            (
+                format!("{full}{further}[[fault.rear-lidar]]\nheight-m = -0.2\nsensor = \"left\"\n"),
+                "sensors.additional-rear-lidars[0].mount-height-m",
+                "at least 0.1 m above the road",
+            ),
+            (format!("{full}{front}{ahead}sensor = \"rear-lidar\"\n"), "fault.front-lidar[0].sensor", "`front-lidar`"),
             (format!("{full}{is_off}{camera}"), "fault.rear-camera", "`sensors.rear-camera.pipeline`"),
             (format!("{full}{mirrors}"), "fault.rear-lidar[0].rail-ghosts", "`road.guard-rails`"),
             (format!("{object}{behind}from-s = 3000.0\n"), "fault.rear-object[0].from-s", "`duration-s`"),
@@ -237,6 +257,8 @@ mod tests {
         }
         for keys in [
             format!("{full}{lidar}{camera}{radar}"),
+            format!("{full}{further}{lidar}sensor = \"left\"\n"),
+            format!("{full}{further}[[fault.rear-lidar]]\nheight-m = -0.2\nsensor = \"rear-lidar\"\n"),
             format!("{object}{behind}{radar}"),
             format!("{full}road.guard-rails = true\n{mirrors}"),
             format!("{object}{behind}{lidar}"),

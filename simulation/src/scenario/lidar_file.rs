@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use closecall_sensors::lidar::{LidarConfig, LidarKindConfig};
-use toml_edit::{DocumentMut, Item, Value};
+use toml_edit::{DocumentMut, Item, TableLike, Value};
 
 use super::{ScenarioConfig, ScenarioError, locate};
 
@@ -20,9 +20,10 @@ const KEYS: [&str; 2] = ["pattern-file", "pattern"];
 /// [`ScenarioError`] with the path of the pattern file if the file cannot be read, or has a wrong key.
 pub(super) fn inline(path: &Path, text: &str, config: &ScenarioConfig) -> Result<Option<String>, ScenarioError> {
     let mut document: Option<DocumentMut> = None;
-    for (key, lidar) in lidars(config) {
+    for ((key, index), lidar) in lidars(config) {
         let Some(name) = &lidar.pattern_file else { continue };
-        let pattern = read(&path.with_file_name(name), &format!("sensors.{key}.{}", KEYS[0]))?;
+        let element = index.map_or_else(String::new, |index| format!("[{index}]"));
+        let pattern = read(&path.with_file_name(name), &format!("sensors.{key}{element}.{}", KEYS[0]))?;
         let syntax = |message: &str| {
             let line = text.lines().position(|line| line.contains(KEYS[0])).map_or(1, |index| index + 1);
             ScenarioError::Syntax { path: path.to_owned(), line, message: format!("`{}`: {message}", KEYS[0]) }
@@ -34,8 +35,11 @@ pub(super) fn inline(path: &Path, text: &str, config: &ScenarioConfig) -> Result
             Some(document) => document,
             none => none.insert(text.parse().map_err(|_| syntax("the scenario is not TOML"))?),
         };
-        let table = document.get_mut("sensors").and_then(|sensors| sensors.get_mut(key));
-        let table = table.and_then(Item::as_table_like_mut);
+        let item = document.get_mut("sensors").and_then(|sensors| sensors.get_mut(key));
+        let table = match index {
+            None => item.and_then(Item::as_table_like_mut),
+            Some(index) => item.and_then(|list| element_of(list, index)),
+        };
         let table = table.ok_or_else(|| syntax("the sensor must be written as a table"))?;
         table.remove(KEYS[0]);
         table.insert(KEYS[1], Item::Value(Value::InlineTable(pattern)));
@@ -43,10 +47,23 @@ pub(super) fn inline(path: &Path, text: &str, config: &ScenarioConfig) -> Result
     Ok(document.map(|document| document.to_string()))
 }
 
-/// Returns the LiDARs of a scenario with their keys.
-fn lidars(config: &ScenarioConfig) -> impl Iterator<Item = (&'static str, &LidarConfig)> {
-    let front = config.sensors.front_lidar.as_ref().map(|lidar| ("front-lidar", lidar));
-    std::iter::once(("rear-lidar", &config.sensors.rear_lidar)).chain(front)
+/// Returns the LiDARs of a scenario with their keys, and their indices if the key is that of a list.
+fn lidars(config: &ScenarioConfig) -> impl Iterator<Item = ((&'static str, Option<usize>), &LidarConfig)> {
+    let front = config.sensors.front_lidar.as_ref().map(|lidar| (("front-lidar", None), lidar));
+    let further = config.sensors.additional_rear_lidars.iter().enumerate();
+    let further = further.map(|(index, lidar)| (("additional-rear-lidars", Some(index)), lidar));
+    std::iter::once((("rear-lidar", None), &config.sensors.rear_lidar)).chain(front).chain(further)
+}
+
+/// Returns the table at `index` of a list of tables, in either of the two forms of TOML.
+fn element_of(list: &mut Item, index: usize) -> Option<&mut dyn TableLike> {
+    match list {
+        Item::ArrayOfTables(tables) => tables.get_mut(index).map(|table| table as &mut dyn TableLike),
+        Item::Value(Value::Array(values)) => {
+            values.get_mut(index).and_then(Value::as_inline_table_mut).map(|table| table as &mut dyn TableLike)
+        }
+        _ => None,
+    }
 }
 
 /// Reads and checks a pattern file, which the key `key` names.
@@ -94,6 +111,28 @@ mod tests {
         // The text needs the file no longer.
         let again = ScenarioFile::parse(Path::new("elsewhere.toml"), file.text(), &[]).unwrap();
         assert_eq!(again.config(), file.config());
+    }
+
+    #[test]
+    fn the_files_of_further_lidars_become_part_of_the_scenario_in_both_forms_of_a_list() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("mine.toml"), LidarModel::Os1With64.file()).unwrap();
+        let base = format!("base = \"{}\"\n", library::plain_names().next().unwrap());
+        for list in [
+            "sensors.additional-rear-lidars = [{ name = \"a\" }, { name = \"b\", pattern-file = \"mine.toml\" }]\n",
+            "[[sensors.additional-rear-lidars]]\nname = \"a\"\n\
+             [[sensors.additional-rear-lidars]]\nname = \"b\"\npattern-file = \"mine.toml\"\n",
+        ] {
+            let path = folder.path().join("scenario.toml");
+            let file = ScenarioFile::parse(&path, &format!("{base}{list}"), &[]).unwrap();
+            let [_, second] = &file.config().sensors.additional_rear_lidars[..] else { panic!("two LiDARs") };
+            assert_eq!(second.pattern, Some(LidarKindConfig::parse(LidarModel::Os1With64.file()).unwrap()));
+            file.check().unwrap();
+            let missing = format!("{base}{}", list.replace("mine.toml", "none.toml"));
+            let error = ScenarioFile::parse(&path, &missing, &[]).unwrap_err();
+            let cause = std::error::Error::source(&error).map(ToString::to_string).unwrap_or_default();
+            assert!(cause.contains("`sensors.additional-rear-lidars[1].pattern-file` names this file"), "{cause}");
+        }
     }
 
     #[test]

@@ -91,10 +91,12 @@ pub struct Frame {
     pub(in crate::run) command: Option<EgoCommand>,
     /// Phase of the encounter; `None` for recorded traffic.
     pub(in crate::run) phase: Option<Phase>,
-    /// Field of view of the rear sensor; `None` if it is not simulated or below [`Level::Objects`].
-    pub(in crate::run) rear_field: Option<FieldOfView>,
-    /// Scan of the rear LiDAR, in the frames whose scan is kept.
+    /// Fields of view of the rear sensors; none if they are not simulated or below [`Level::Objects`].
+    pub(in crate::run) rear_fields: Vec<FieldOfView>,
+    /// Scan of the rear LiDAR, the first one if there are several, in the frames whose scan is kept.
     pub(in crate::run) scan: Option<Scan>,
+    /// Scans of the other LiDARs with their names, likewise.
+    pub(in crate::run) other_scans: Vec<(&'static str, Scan)>,
 }
 
 /// A reference level of a plotted quantity.

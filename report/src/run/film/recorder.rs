@@ -32,12 +32,23 @@ const MAX_DENSE_SCANS: usize = 40;
 pub struct FilmRecorder {
     film: Film,
     dense_scan_count: usize,
-    /// Number of new scans to keep next in all phases, and whether to keep the next one of the two phases.
-    due: (usize, bool),
+    /// What to keep of each LiDAR: the number of new scans to keep next in all phases, and whether to keep the next one of the two
+    /// phases.
+    due: Vec<(usize, bool)>,
     /// The smallest rear headway in the critical phase so far (s).
     smallest_s: f64,
-    /// The index of its frame, with the sensor and what it detected.
-    closest: Option<(usize, RearLidar, Vec<Detection>)>,
+    /// The index of its frame, with the LiDARs that have a scan then.
+    closest: Option<(usize, Vec<KeptLidar>)>,
+}
+
+/// A LiDAR with its latest scan, which is completed if it remains the one to keep.
+struct KeptLidar {
+    name: &'static str,
+    /// Whether it is the first of those that look back.
+    is_main: bool,
+    looks_ahead: bool,
+    lidar: RearLidar,
+    detections: Vec<Detection>,
 }
 
 impl FilmRecorder {
@@ -79,7 +90,7 @@ impl FilmRecorder {
             foreword: String::new(),
             settings: Vec::new(),
         };
-        Self { film, dense_scan_count: 0, due: (0, false), smallest_s: f64::INFINITY, closest: None }
+        Self { film, dense_scan_count: 0, due: Vec::new(), smallest_s: f64::INFINITY, closest: None }
     }
 
     /// Completes the film with the outcome of the run.
@@ -91,46 +102,74 @@ impl FilmRecorder {
             actor.present_frames.end = frame_count;
         }
         film.outcome = Some(outcome.clone());
-        if let Some((index, lidar, boxes)) = self.closest
+        if let Some((index, lidars)) = self.closest
             && let Some(frame) = film.frames.get_mut(index)
         {
-            frame.scan = Scan::completed(&lidar, &boxes);
+            frame.other_scans.clear();
+            for KeptLidar { name, is_main, looks_ahead, lidar, detections } in lidars {
+                let scan = Scan::completed(&lidar, &detections);
+                match is_main {
+                    true => frame.scan = scan,
+                    false => frame.other_scans.extend(scan.map(|scan| (name, scan.in_ego_frame(looks_ahead)))),
+                }
+            }
         }
         film
     }
 
-    /// Returns the scan of a control step, or `None` if it is not one to keep.
-    fn scan(&mut self, view: &StepView<'_>) -> Option<Scan> {
+    /// Returns the scans of a control step that are to be kept: that of the first rear LiDAR, and those of the others.
+    fn scans(&mut self, view: &StepView<'_>) -> (Option<Scan>, Vec<(&'static str, Scan)>) {
         if self.film.level < Level::Full {
-            return None;
+            return (None, Vec::new());
         }
         let index = self.film.frames.len();
         let is_eventful =
             matches!(view.phase, Phase::Critical | Phase::Overtaking) && index.is_multiple_of(DENSE_SCAN_INTERVAL);
         let is_dense = is_eventful && self.dense_scan_count < MAX_DENSE_SCANS;
         self.dense_scan_count += usize::from(is_dense);
-        // Two successive scans are those of both sides of the mirror.
-        self.due = (if index.is_multiple_of(SPARSE_SCAN_INTERVAL) { 2 } else { self.due.0 }, self.due.1 || is_dense);
-        // A sensor below the rate of the control loop has no new scan in some steps.
-        let lidar = view.perception.rear_lidar().filter(|lidar| lidar.latest().end == view.time);
-        let (sparse, dense) = lidar.map_or((0, false), |_| std::mem::take(&mut self.due));
-        self.due.0 += sparse.saturating_sub(1);
-        let boxes = view.perception.rear_detections();
-        let scan = match lidar {
-            Some(lidar) if sparse > 0 => Scan::completed(lidar, boxes),
-            Some(lidar) if dense => Some(Scan::of(lidar, boxes)),
-            _ => None,
-        };
-        if let Some(lidar) = lidar
+        let lidars = view.perception.lidars();
+        self.due.resize(lidars.len(), (0, false));
+        let first_rear = lidars.iter().position(|lidar| !lidar.looks_ahead);
+        let (mut main, mut others) = (None, Vec::new());
+        for (at, lidar) in lidars.iter().enumerate() {
+            let due = &mut self.due[at];
+            // Two successive scans are those of both sides of the mirror.
+            *due = (if index.is_multiple_of(SPARSE_SCAN_INTERVAL) { 2 } else { due.0 }, due.1 || is_dense);
+            // A sensor below the rate of the control loop has no new scan in some steps.
+            if lidar.lidar.latest().end != view.time {
+                continue;
+            }
+            let (sparse, dense) = std::mem::take(due);
+            due.0 = sparse.saturating_sub(1);
+            let scan = match (sparse > 0, dense) {
+                (true, _) => Scan::completed(lidar.lidar, lidar.detections),
+                (false, true) => Some(Scan::of(lidar.lidar, lidar.detections)),
+                (false, false) => None,
+            };
+            if first_rear == Some(at) {
+                main = scan;
+            } else {
+                others.extend(scan.map(|scan| (lidar.name, scan.in_ego_frame(lidar.looks_ahead))));
+            }
+        }
+        let has_new = |at: usize| lidars[at].lidar.latest().end == view.time;
+        if first_rear.is_some_and(has_new)
             && let Ok(thw_s) = view.margins.thw_rear_s
             && is_eventful
             && view.phase == Phase::Critical
             && thw_s < self.smallest_s
         {
             self.smallest_s = thw_s;
-            self.closest = Some((index, lidar.clone(), boxes.to_vec()));
+            let kept = |at: usize| KeptLidar {
+                name: lidars[at].name,
+                is_main: first_rear == Some(at),
+                looks_ahead: lidars[at].looks_ahead,
+                lidar: lidars[at].lidar.clone(),
+                detections: lidars[at].detections.to_vec(),
+            };
+            self.closest = Some((index, (0..lidars.len()).filter(|at| has_new(*at)).map(kept).collect()));
         }
-        scan
+        (main, others)
     }
 }
 
@@ -151,7 +190,7 @@ fn limits(scenario: &Scenario, arm: &Arm) -> Vec<Limit> {
 impl Observer for FilmRecorder {
     fn step(&mut self, view: &StepView<'_>) {
         let keeps_objects = self.film.level >= Level::Objects;
-        let scan = self.scan(view);
+        let (scan, other_scans) = self.scans(view);
         let ego_length_m = self.film.actors[self.film.ego].vehicle.dimensions.length_m;
         self.film.frames.push(Frame {
             time: view.time,
@@ -162,8 +201,9 @@ impl Observer for FilmRecorder {
             rear_seen: rear_seen(view.tracks, ego_length_m),
             command: Some(*view.command),
             phase: Some(view.phase),
-            rear_field: view.perception.rear_field().filter(|_| keeps_objects),
+            rear_fields: if keeps_objects { view.perception.rear_fields() } else { Vec::new() },
             scan,
+            other_scans,
         });
     }
 

@@ -1,4 +1,4 @@
-//! One scan of the rear LiDAR as it was measured, with the boxes fitted to its clusters.
+//! One scan of a LiDAR as it was measured, with the boxes fitted to its clusters.
 
 use closecall_sensors::Detection;
 use closecall_sensors::lidar::{LidarScan, RearLidar};
@@ -34,6 +34,18 @@ impl Scan {
             }
         }
         Self { points, clusters, boxes: boxes.to_vec() }
+    }
+
+    /// Returns the same scan in the ego's frame, of a LiDAR that may look ahead.
+    pub(super) fn in_ego_frame(mut self, looks_ahead: bool) -> Self {
+        if looks_ahead {
+            let LidarScan { x_m, y_m, .. } = &mut self.points;
+            x_m.iter_mut().chain(y_m).for_each(|at_m| *at_m = -*at_m);
+            for found in &mut self.boxes {
+                (found.face_x_m, found.face_y_m) = (-found.face_x_m, -found.face_y_m);
+            }
+        }
+        self
     }
 
     /// Returns the coordinates of the points (m).

@@ -179,7 +179,8 @@ pub(super) fn frame_at(tracks: &[&Trajectory], time: Time) -> Frame {
         rear_seen: None,
         command: None,
         phase: None,
-        rear_field: None,
+        rear_fields: Vec::new(),
+        other_scans: Vec::new(),
         scan: None,
     }
 }

@@ -1,4 +1,4 @@
-//! The ego's perception in the ego frame: the field of view of the rear sensor, and the tracks as boxes with the
+//! The ego's perception in the ego frame: the fields of view of the rear sensors, and the tracks as boxes with the
 //! covariance of their position. Each group of sensors has entities of its own, so that the user can switch each group
 //! off.
 
@@ -103,10 +103,10 @@ fn predicted_distance_m(speed_mps: f64, acceleration_mps2: f64) -> f64 {
     speed_mps * duration_s + 0.5 * acceleration_mps2 * duration_s * duration_s
 }
 
-/// Writes the outline of the field of view of the rear sensor, which begins at the rear bumper.
+/// Writes the outlines of the fields of view of the rear sensors.
 fn write_rear_field(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<(), RecordingError> {
-    let fields: Vec<Option<FieldOfView>> = film.frames.iter().map(|frame| frame.rear_field).collect();
-    if fields.iter().all(Option::is_none) {
+    let fields: Vec<&[FieldOfView]> = film.frames.iter().map(|frame| &frame.rear_fields[..]).collect();
+    if fields.iter().all(|fields| fields.is_empty()) {
         return Ok(());
     }
     let bumper_m = -0.5 * film.actors[film.ego].vehicle.dimensions.length_m;
@@ -116,20 +116,21 @@ fn write_rear_field(writer: &Writer<'_>, film: &Film, times: &[Time]) -> Result<
     let rows = changes(&fields);
     let times: Vec<Time> = rows.iter().map(|&row| times[row]).collect();
     writer.write_rows(entity, &times, |range| {
-        let shown: Vec<Option<FieldOfView>> = rows[range].iter().map(|&row| fields[row]).collect();
-        let edges = shown.iter().flatten().map(|field| edge(field, bumper_m));
-        LineStrips3D::new(edges).columns(shown.iter().map(|field| usize::from(field.is_some())).collect::<Vec<_>>())
+        let shown: Vec<&[FieldOfView]> = rows[range].iter().map(|&row| fields[row]).collect();
+        let edges = shown.iter().copied().flatten().map(|field| edge(field, bumper_m));
+        LineStrips3D::new(edges).columns(shown.iter().map(|fields| fields.len()).collect::<Vec<_>>())
     })
 }
 
 /// Returns the outline of the field of view: from the sensor along one side, along the arc, and back to the sensor.
 fn edge(field: &FieldOfView, bumper_m: f64) -> Vec<[f32; 3]> {
     let half_rad = field.half_angle_tan.atan();
-    let sensor = [bumper_m as f32, 0.0, FIELD_Z_M as f32];
+    let [x_m, y_m] = [bumper_m + field.inset_m, field.left_m];
+    let sensor = [x_m as f32, y_m as f32, FIELD_Z_M as f32];
     let arc = (0..=ARC_PIECES).map(|piece| {
         let angle_rad = half_rad * (2.0 * f64::from(piece) / f64::from(ARC_PIECES) - 1.0);
-        let (sin, cos) = angle_rad.sin_cos();
-        [(bumper_m - field.range_m * cos) as f32, (field.range_m * sin) as f32, FIELD_Z_M as f32]
+        let (sin, cos) = (field.azimuth_rad + angle_rad).sin_cos();
+        [(x_m - field.range_m * cos) as f32, (y_m + field.range_m * sin) as f32, FIELD_Z_M as f32]
     });
     [sensor].into_iter().chain(arc).chain([sensor]).collect()
 }

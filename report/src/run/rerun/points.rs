@@ -1,4 +1,5 @@
-//! The points of the rear LiDAR, in layers that the user can switch, and the boxes fitted to the clusters.
+//! The points of the LiDARs, in layers that the user can switch, and the boxes fitted to the clusters. The layers of the rear LiDAR are
+//! below `lidar`, those of the other LiDARs below `lidars/NAME`.
 //!
 //! | layer | points | colour |
 //! |---|---|---|
@@ -25,35 +26,44 @@ use super::RecordingError;
 use super::palette::{self, Rgba};
 use super::stream::Writer;
 use super::vehicles::yaw_rotation;
-use crate::run::film::{Film, NO_CLUSTER, Scan};
+use crate::run::film::{Film, Frame, NO_CLUSTER, Scan};
 
 /// Radius of the ball that shows a point (m).
 const POINT_RADIUS_M: f32 = 0.05;
 
-/// Writes the layers, and returns the entities that the scene hides until the user switches them on.
+/// Writes the layers of each LiDAR, and returns the entities that the scene hides until the user switches them on.
 pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<Vec<String>, RecordingError> {
-    let kept: Vec<(Time, &Scan)> = kept_scans(film);
+    let main = film.frames.iter().filter_map(|frame| Some((frame.time, frame.scan.as_ref()?))).collect();
+    let mut hidden = write_lidar(writer, "world/ego/lidar", main)?;
+    let mut names: Vec<&str> =
+        film.frames.iter().flat_map(|frame| frame.other_scans.iter().map(|(name, _)| *name)).collect();
+    names.sort_unstable();
+    names.dedup();
+    for name in names {
+        let of_name = |frame: &'_ Frame| frame.other_scans.iter().position(|(other, _)| *other == name);
+        let kept = film.frames.iter().filter_map(|frame| Some((frame.time, &frame.other_scans[of_name(frame)?].1)));
+        hidden.extend(write_lidar(writer, &format!("world/ego/lidars/{name}"), kept.collect())?);
+    }
+    Ok(hidden)
+}
+
+/// Writes the layers of a LiDAR below `root`, and returns those that are hidden at first.
+fn write_lidar(writer: &Writer<'_>, root: &str, kept: Vec<(Time, &Scan)>) -> Result<Vec<String>, RecordingError> {
     if kept.is_empty() {
         return Ok(Vec::new());
     }
-    let times: Vec<Time> = kept.iter().map(|(time, _)| *time).collect();
-    let scans: Vec<&Scan> = kept.iter().map(|(_, scan)| *scan).collect();
+    let (times, scans): (Vec<Time>, Vec<&Scan>) = kept.into_iter().unzip();
     let is_clustered = |scan: &Scan, point: usize| scan.clusters[point] != NO_CLUSTER;
     let shade = |scan: &Scan, point: usize| palette::intensity(scan.shade(point));
     let clusters =
         layer(&scans, |scan, point| is_clustered(scan, point).then(|| palette::cluster(scan.clusters[point])));
-    write_layer(writer, "world/ego/lidar/clusters", &times, &clusters, true)?;
+    write_layer(writer, &format!("{root}/clusters"), &times, &clusters, true)?;
     let intensity = layer(&scans, |scan, point| is_clustered(scan, point).then(|| shade(scan, point)));
-    write_layer(writer, "world/ego/lidar/intensity", &times, &intensity, false)?;
+    write_layer(writer, &format!("{root}/intensity"), &times, &intensity, false)?;
     let rejected = layer(&scans, |scan, point| (!is_clustered(scan, point)).then(|| shade(scan, point)));
-    write_layer(writer, "world/ego/lidar/rejected", &times, &rejected, true)?;
-    write_boxes(writer, &times, &scans)?;
-    Ok(["intensity", "rejected", "boxes"].map(|layer| format!("world/ego/lidar/{layer}")).to_vec())
-}
-
-/// Returns the scans of a film with their times.
-fn kept_scans(film: &Film) -> Vec<(Time, &Scan)> {
-    film.frames.iter().filter_map(|frame| Some((frame.time, frame.scan.as_ref()?))).collect()
+    write_layer(writer, &format!("{root}/rejected"), &times, &rejected, true)?;
+    write_boxes(writer, &format!("{root}/boxes"), &times, &scans)?;
+    Ok(["intensity", "rejected", "boxes"].map(|layer| format!("{root}/{layer}")).to_vec())
 }
 
 /// The points of a layer, of all scans one after the other.
@@ -129,8 +139,7 @@ impl Layer {
 }
 
 /// Writes the boxes fitted to the clusters.
-fn write_boxes(writer: &Writer<'_>, times: &[Time], scans: &[&Scan]) -> Result<(), RecordingError> {
-    let entity = "world/ego/lidar/boxes";
+fn write_boxes(writer: &Writer<'_>, entity: &str, times: &[Time], scans: &[&Scan]) -> Result<(), RecordingError> {
     let fixed = Boxes3D::update_fields()
         .with_fill_mode(FillMode::MajorWireframe)
         .with_radii([0.02_f32])

@@ -41,7 +41,7 @@ type Layer = (&'static str, Rgba, fn(&FrameComparison) -> &Vec<Shape>);
 
 /// Writes the layers, and returns the entities that the scene hides until the user switches them on.
 pub(super) fn write(writer: &Writer<'_>, film: &Film) -> Result<Vec<String>, RecordingError> {
-    if film.frames.iter().all(|frame| frame.tracks.is_empty() && frame.rear_field.is_none()) {
+    if film.frames.iter().all(|frame| frame.tracks.is_empty() && frame.rear_fields.is_empty()) {
         return Ok(Vec::new());
     }
     let times = film.times();
@@ -93,7 +93,7 @@ fn compare(film: &Film, frame: &Frame) -> FrameComparison {
     let length_m = |actor: usize| film.actors[actor].vehicle.dimensions.length_m;
     for &(actor, pose) in &poses {
         let face = face_m(pose, length_m(actor));
-        if face[0] > bumper_m || !frame.rear_field.is_none_or(|field| is_in_field(&field, bumper_m, face)) {
+        if face[0] > bumper_m || !is_in_a_field(&frame.rear_fields, bumper_m, face) {
             continue;
         }
         let is_known = tracks.iter().any(|track| are_close(face, track_face_m(track)));
@@ -147,8 +147,7 @@ fn are_close(one: [f64; 2], other: [f64; 2]) -> bool {
     (one[0] - other[0]).hypot(one[1] - other[1]) <= MATCH_DISTANCE_M
 }
 
-/// Returns true if a point in the ego frame lies in the field of view.
-fn is_in_field(field: &FieldOfView, bumper_m: f64, [x_m, y_m]: [f64; 2]) -> bool {
-    let back_m = bumper_m - x_m;
-    back_m.hypot(y_m) <= field.range_m && y_m.abs() <= field.half_angle_tan * back_m
+/// Returns true if a point in the ego frame lies in one of the fields of view, or if their limits are not simulated.
+fn is_in_a_field(fields: &[FieldOfView], bumper_m: f64, [x_m, y_m]: [f64; 2]) -> bool {
+    fields.is_empty() || fields.iter().any(|field| field.contains(bumper_m - x_m, y_m))
 }

@@ -80,3 +80,111 @@ fn dirt_dropout_latency_and_a_wrong_clock_act_on_the_front_lidar() {
     };
     assert_eq!(first("delay-s = 0.2") - first("delay-s = 0.0"), 5);
 }
+
+/// What the confirmed front track of a vehicle `gap_m` ahead shows in each step: its position and its status.
+fn followed(fault: &str, lead: SceneVehicle) -> Vec<Option<(f64, TrackStatus)>> {
+    let is_front = |track: &&Track| track.source == Source::Front && track.status != TrackStatus::Tentative;
+    let shown = |step: &Step| step.tracks.iter().find(is_front).map(|track| (track.x_m(), track.status));
+    with(fault, vec![lead]).iter().map(shown).collect()
+}
+
+/// Returns what the rear sensors show in each step, with a car behind and one ahead.
+fn behind_with(fault: &str) -> Vec<Vec<Track>> {
+    let others = vec![behind(40.0, OWN_LANE_M, 31.0), with_actor(2, ahead(40.0, OWN_LANE_M))];
+    let of_rear = |step: Step| step.tracks.into_iter().filter(|track| track.source == Source::Rear).collect();
+    with(fault, others).into_iter().map(of_rear).collect()
+}
+
+#[test]
+fn a_wrong_clock_of_the_front_lidar_moves_a_lead_vehicle_by_its_closing_speed() {
+    // The ego closes by 5 m/s: a scan that is dated 0.2 s too late puts the vehicle 1 m too far away by the time it counts for.
+    let x_m = |offset: &str| {
+        let lead = with_speed(ahead(60.0, OWN_LANE_M), 25.0);
+        followed(&format!("clock-offset-s = {offset}"), lead)[95].unwrap().0
+    };
+    let right_m = x_m("0.0");
+    for (offset, expected_m) in [("-0.2", -1.0), ("-0.1", -0.5), ("0.1", 0.5), ("0.2", 1.0)] {
+        let shift_m = x_m(offset) - right_m;
+        assert!((shift_m - expected_m).abs() < 0.2, "{offset}: {shift_m}");
+    }
+}
+
+#[test]
+fn lost_frames_let_the_track_of_a_lead_vehicle_coast() {
+    let coasting = |fault: &str| {
+        let steps = followed(fault, ahead(40.0, OWN_LANE_M));
+        steps.into_iter().flatten().filter(|(_, status)| *status == TrackStatus::Coasting).count()
+    };
+    let (usual, lossy) = (coasting("lost-frames = 0.0"), coasting("lost-frames = 0.5"));
+    assert!(usual < 10 && (30..70).contains(&lossy), "{usual} {lossy}");
+}
+
+#[test]
+fn jitter_of_the_front_lidar_makes_tracks_old_by_turns_and_loses_none() {
+    let shown = |fault: &str| {
+        let steps = followed(fault, with_speed(ahead(80.0, OWN_LANE_M), 20.0));
+        let settled = || steps.iter().skip(50).flatten();
+        (settled().count(), settled().filter(|(_, status)| *status == TrackStatus::Coasting).count())
+    };
+    assert_eq!(shown("jitter-s = 0.0"), (50, 0));
+    assert_eq!(shown("jitter-s = 0.4"), (50, 0));
+    let confirmed = |fault: &str| followed(fault, ahead(40.0, OWN_LANE_M)).iter().position(Option::is_some).unwrap();
+    let (usual, jittered) = (confirmed("jitter-s = 0.0"), confirmed("jitter-s = 0.4"));
+    assert!((usual + 1..=usual + 10).contains(&jittered), "{usual} {jittered}");
+}
+
+#[test]
+fn a_wrong_pitch_or_height_of_the_front_lidar_raises_or_lowers_what_it_sees() {
+    let height_m = |fault: &str| {
+        let text = format!("[[front-lidar]]\n{fault}\n");
+        let drive =
+            Drive { sensors: SENSORS, faults: &text, others: vec![ahead(40.0, OWN_LANE_M)], ..Drive::default() };
+        mean(drive.run().iter().flat_map(|step| step.front_points_z_m.iter().copied()))
+    };
+    let right_m = height_m("dropout = 0.0");
+    // The axis points upward, and the ego believes it to be level: what it sees lies higher than it believes.
+    assert!(height_m("pitch-deg = 1.0") < right_m - 0.3, "{} {right_m}", height_m("pitch-deg = 1.0"));
+    assert!(height_m("pitch-deg = -1.0") > right_m + 0.3, "{} {right_m}", height_m("pitch-deg = -1.0"));
+    assert!(height_m("height-m = -0.2") > right_m + 0.05 && height_m("height-m = 0.4") < right_m - 0.05);
+}
+
+#[test]
+fn faults_of_the_front_lidar_leave_the_rear_tracks_as_they_are() {
+    let usual = behind_with("dropout = 0.0");
+    assert!(usual[99].iter().any(|track| track.status == TrackStatus::Confirmed));
+    for fault in [
+        "clock-offset-s = 0.2",
+        "lost-frames = 0.5",
+        "jitter-s = 0.4",
+        "delay-s = 0.2",
+        "pitch-deg = 2.0",
+        "yaw-deg = 2.0",
+        "height-m = 0.4",
+        "dead = true",
+        "crosstalk = 5.0",
+    ] {
+        let faulty = behind_with(fault);
+        for (step, (usual, faulty)) in usual.iter().zip(&faulty).enumerate() {
+            let states =
+                |tracks: &[Track]| tracks.iter().map(|track| (track.state, track.covariance)).collect::<Vec<_>>();
+            assert!(states(usual) == states(faulty), "{fault}, step {step}");
+        }
+    }
+}
+
+#[test]
+fn faults_of_the_rear_lidar_leave_the_front_tracks_as_they_are() {
+    let front = |fault: &str| -> Vec<_> {
+        let others = vec![behind(40.0, OWN_LANE_M, 31.0), with_actor(2, ahead(40.0, OWN_LANE_M))];
+        let steps = Drive { sensors: SENSORS, faults: fault, others, ..Drive::default() }.run();
+        let of_front = |step: &Step| -> Vec<_> {
+            step.tracks.iter().filter(|track| track.source == Source::Front).map(|track| track.state).collect()
+        };
+        steps.iter().map(of_front).collect()
+    };
+    let usual = front("");
+    assert!(!usual[99].is_empty());
+    for fault in ["dead = true", "clock-offset-s = 0.2", "pitch-deg = 2.0", "yaw-deg = 1.0", "jitter-s = 0.4"] {
+        assert!(front(&lidar(fault)) == usual, "{fault}");
+    }
+}

@@ -24,6 +24,7 @@ impl Scanner {
         let (x_m, y_m) = (at_m[0] - to.x_m, at_m[1] - to.y_m);
         let (ahead_m, left_m) = (to.cos * x_m + to.sin * y_m, to.cos * y_m - to.sin * x_m);
         let up_m = at_m[2] - f64::from(sweep.pose.sensor_z_m());
+        let left_m = left_m - f64::from(sweep.pose.sensor_y_m());
         (ahead_m - f64::from(sweep.pose.sensor_x_m())).hypot(left_m).hypot(up_m) as f32
     }
 

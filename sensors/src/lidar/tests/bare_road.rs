@@ -20,10 +20,13 @@ fn setup() -> impl Strategy<Value = (TestScene, Lidar)> {
         -0.1..0.1_f64,
         prop::sample::select(vec![0.0005, 0.02]),
         prop::sample::select(vec![200.0, 500.0]),
+        // Half of the sensors look straight back from the middle of the bumper.
+        prop_oneof![Just([0.0; 4]), [0.0..3.0_f64, -1.0..1.0_f64, -1.3..1.3_f64, -0.17..0.17_f64]],
     );
     (prop::collection::vec(vehicle, 0..3), ego, air, lidar, any::<bool>()).prop_map(
         |(others, (pitch_rad, speed_mps, yaw_rate_radps, heading_rad), air, lidar, rails)| {
-            let (mount_height_m, tilt_rad, levelling_sd_rad, nominal_range_m) = lidar;
+            let (mount_height_m, tilt_rad, levelling_sd_rad, nominal_range_m, mounting) = lidar;
+            let [inset_m, left_m, azimuth_rad, roll_rad] = mounting;
             let mut setup = TestScene::new();
             setup.others = others;
             setup.ego.pitch_rad = pitch_rad;
@@ -34,7 +37,8 @@ fn setup() -> impl Strategy<Value = (TestScene, Lidar)> {
             if rails {
                 setup.road = road_with_guard_rails(0.0);
             }
-            (setup, Lidar { mount_height_m, tilt_rad, levelling_sd_rad, nominal_range_m, ..Lidar::default() })
+            let turned = Lidar { inset_m, left_m, azimuth_rad, roll_rad, ..Lidar::default() };
+            (setup, Lidar { mount_height_m, tilt_rad, levelling_sd_rad, nominal_range_m, ..turned })
         },
     )
 }

@@ -12,7 +12,7 @@ use re_sdk::log::Chunk;
 
 use super::super::stream::{OPENING_TIMELINE, STEP_TIMELINE, TIME_TIMELINE};
 use super::*;
-use crate::run::film::{EncounterComparison, FilmRecorder, film_encounter};
+use crate::run::film::{EncounterComparison, FilmRecorder, Scan, film_encounter};
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::outcome::{ClosedBy, Collision, Phase};
@@ -188,6 +188,46 @@ fn full_sensors_show_points_boxes_ground_truth_and_images() {
     let (_, empty, _) = empty_views(&films);
     assert!(empty.is_empty(), "{empty:?}");
     assert!(encoded(&films).len() < 25_000_000);
+}
+
+#[test]
+fn every_lidar_has_its_points_and_boxes_where_it_looks() {
+    let text = "base = \"low-thw-overtake\"\nname = \"three\"\nduration-s = 3.0\nsensors.mode = \"full\"\n\
+                sensors.rear-camera.pipeline = \"off\"\nsensors.front-lidar.name = \"nose\"\n\
+                sensors.additional-rear-lidars = [{ name = \"left\", left-m = 0.8, azimuth-deg = 45.0 }]\n";
+    let file = ScenarioFile::parse(Path::new("three.toml"), text, &[]).unwrap();
+    let scenario = file.concrete(&file.space().nominal()).unwrap();
+    let arm = Arm { controller: ControllerChoice::MIS.factory(), sensors: None };
+    let key = RunKey { seed: 1, sample: 0 };
+    let mut recorder = FilmRecorder::new(&scenario, key, &arm, Level::Full);
+    let outcome = simulate(&scenario, key, &arm, &mut recorder).unwrap();
+    let films = [recorder.finish(&outcome)];
+    let data = chunks(&films, StoreKind::Recording);
+    for root in ["lidar", "lidars/nose", "lidars/left"] {
+        for layer in ["clusters", "intensity", "rejected", "boxes"] {
+            let entity = format!("/mis/world/ego/{root}/{layer}");
+            assert!(data.iter().any(|chunk| chunk.entity_path().to_string() == entity), "{entity}");
+        }
+    }
+    let frames = &films[0].frames;
+    let of = |name: &str| -> Vec<&Scan> {
+        frames
+            .iter()
+            .flat_map(|frame| &frame.other_scans)
+            .filter(|(other, _)| *other == name)
+            .map(|(_, of)| of)
+            .collect()
+    };
+    // The lead vehicle is ahead, and its box there; the corner sensor sees more of its own side.
+    assert!(of("nose").iter().any(|scan| !scan.boxes.is_empty()));
+    assert!(of("nose").iter().all(|scan| scan.points_m().all(|[x, ..]| x > 0.0)));
+    assert!(of("nose").iter().flat_map(|scan| &scan.boxes).all(|found| found.centre_m().0 > found.face_x_m));
+    let left = of("left").iter().flat_map(|scan| scan.points_m()).filter(|[_, y, _]| *y > 0.8).count();
+    let all = of("left").iter().map(|scan| scan.points_m().count()).sum::<usize>();
+    assert!(all > 500 && 3 * left > 2 * all, "{left} of {all}");
+    let (_, empty, _) = empty_views(&films);
+    assert!(empty.is_empty(), "{empty:?}");
+    assert!(frames.iter().all(|frame| frame.rear_fields.len() == 2));
 }
 
 #[test]

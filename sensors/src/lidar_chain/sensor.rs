@@ -1,0 +1,216 @@
+//! One LiDAR of a chain: its scans, its faults, and the boxes that wait for the tracker.
+
+use std::collections::VecDeque;
+
+use rand::RngExt;
+
+use closecall_tracking::RearView;
+use closecall_traffic::{CONTROL_STEP, Environment, Road, Stream, Time, VehicleState};
+
+use super::Seen;
+use crate::alterations::give_true_boxes;
+use crate::faults::{FaultList, LidarFault, NOTICED_AFTER_SCANS};
+use crate::lidar::{Lidar, LidarKind, RearLidar};
+use crate::object::{DEGRADED_SHARE, NoiseKey, range_in_weather_m};
+use crate::perception::FieldOfView;
+use crate::{Detection, Health, Scene, SensorError};
+
+/// One scan whose processing latency has not elapsed.
+#[derive(Clone, Debug)]
+pub(super) struct PendingScan {
+    pub(super) time: Time,
+    pub(super) road: Road,
+    pub(super) ego: VehicleState,
+    pub(super) detections: Vec<Detection>,
+    /// Number of the step from which on the tracker may have the scan.
+    pub(super) due_step: u64,
+    /// Whether the tracker has had it.
+    pub(super) is_processed: bool,
+    /// Whether no scan has arrived: nothing could be detected.
+    pub(super) is_missing: bool,
+}
+
+/// A LiDAR with its faults.
+pub(super) struct ChainSensor {
+    pub(super) lidar: RearLidar,
+    pub(super) model: Lidar,
+    /// Scan pattern and range of the LiDAR.
+    kind: &'static LidarKind,
+    /// Range up to which vehicles are expected (m).
+    reach_m: f64,
+    /// The nominal range times the transmission of the sensor's window (m).
+    clear_range_m: f64,
+    /// Number of latest successive scans without a point.
+    empty_scans: u32,
+    /// Number of latest successive scans with the same points.
+    frozen_scans: u32,
+    /// Number of such scans from which the ego counts the sensor as failed.
+    noticed_after_scans: u32,
+    pub(super) faults: FaultList<LidarFault>,
+    /// Whether scans are lost and late, drawn with each scan if the LiDAR has faults.
+    fault_rng: Stream,
+    pub(super) health: Health,
+    rng: Stream,
+    pub(super) pending: VecDeque<PendingScan>,
+}
+
+/// A scan before its boxes are classified.
+pub(super) struct NewScan {
+    pub(super) detections: Vec<Detection>,
+    fault: Option<LidarFault>,
+    late_steps: u64,
+}
+
+impl ChainSensor {
+    /// Creates the sensor before its first step, with random streams keyed by `key` and `channel`.
+    pub(super) fn new(lidar: Lidar, key: &NoiseKey, channel: [&str; 2]) -> Self {
+        let noticed_s = f64::from(NOTICED_AFTER_SCANS) * CONTROL_STEP.s();
+        Self {
+            lidar: RearLidar::new(lidar),
+            model: lidar,
+            kind: lidar.kind,
+            reach_m: lidar.reach_m(),
+            clear_range_m: lidar.nominal_range_m * lidar.window_transmission,
+            empty_scans: 0,
+            frozen_scans: 0,
+            noticed_after_scans: scans_in(noticed_s, lidar.kind.period_s()),
+            faults: FaultList::default(),
+            fault_rng: key.stream(channel[1]),
+            health: Health::Ok,
+            rng: key.stream(channel[0]),
+            pending: VecDeque::new(),
+        }
+    }
+
+    /// Returns whether a scan ends at this time.
+    pub(super) fn is_due(&self, time: Time) -> bool {
+        self.kind.is_due(time)
+    }
+
+    /// Returns the fault of the LiDAR in this step, in which a lost scan counts as that of a dead sensor, and the number of steps
+    /// by which the scan is late.
+    fn fault_now(&mut self, time: Time) -> (Option<LidarFault>, u64) {
+        if self.faults.is_empty() {
+            return (None, 0);
+        }
+        let [lost, late]: [f64; 2] = self.fault_rng.random();
+        let fault = self
+            .faults
+            .at(time)
+            .map(|fault| LidarFault { is_dead: fault.is_dead || lost < fault.lost_frames, ..fault });
+        (fault, fault.map_or(0, |fault| fault.delay_steps(late)))
+    }
+
+    /// Scans the scene, and detects boxes.
+    ///
+    /// # Errors
+    /// [`SensorError`] if a model fails.
+    pub(super) fn scan(&mut self, seen: &Seen<'_>) -> Result<NewScan, SensorError> {
+        let Seen { scene, believed, others, altered } = *seen;
+        let (fault, late_steps) = self.fault_now(scene.time);
+        let seen = match altered.has_true_points {
+            true => &Scene { environment: &Environment::CLEAR_DAY, ..*scene },
+            false => scene,
+        };
+        self.lidar.scan_with([seen, believed], &mut self.rng, fault.as_ref());
+        let is_frozen = fault.is_some_and(|fault| fault.is_frozen && !fault.is_dead);
+        // The noise of a working sensor never repeats, so that a monitor finds a frozen one by comparing two scans.
+        self.frozen_scans = if is_frozen { self.frozen_scans.saturating_add(1) } else { 0 };
+        self.empty_scans = if self.lidar.is_dark() { self.empty_scans.saturating_add(1) } else { 0 };
+        self.health = self.judge_health(scene, fault.as_ref());
+        let has_true_clusters = altered.has_true_clusters;
+        let found = if has_true_clusters { self.lidar.detect_by_truth()? } else { self.lidar.detect()? };
+        // Reuses the memory of a scan that the tracker has processed.
+        let mut detections = Vec::new();
+        while let Some(scan) = self.pending.pop_front_if(|scan| scan.is_processed) {
+            detections = scan.detections;
+        }
+        detections.clear();
+        detections.extend_from_slice(found);
+        if has_true_clusters {
+            give_true_boxes(&mut detections, others, believed);
+        }
+        Ok(NewScan { detections, fault, late_steps })
+    }
+
+    /// Appends a scan to the queue. The tracker may have it from `step` on, if it is not late.
+    pub(super) fn push(&mut self, new: NewScan, step: u64, Seen { scene, believed, .. }: &Seen<'_>) {
+        let mut scan = PendingScan {
+            time: scene.time,
+            road: *scene.road,
+            ego: believed.ego.state,
+            detections: new.detections,
+            // Scans arrive in their order.
+            due_step: (step + new.late_steps).max(self.pending.back().map_or(0, |scan| scan.due_step)),
+            is_processed: false,
+            is_missing: new.fault.is_some_and(|fault| fault.is_dead),
+        };
+        if let Some(offset_s) = new.fault.map(|fault| fault.clock_offset_s).filter(|offset_s| *offset_s != 0.0) {
+            scan.misdate(offset_s);
+        }
+        self.pending.push_back(scan);
+    }
+
+    /// Returns the LiDAR's health: failed if no point has returned for a while, or the same ones again and again; degraded if weather or dirt cost more
+    /// than half of the range.
+    fn judge_health(&self, scene: &Scene<'_>, fault: Option<&LidarFault>) -> Health {
+        let degraded_below_m = DEGRADED_SHARE * self.model.nominal_range_m;
+        let clear_range_m = fault.map_or(self.clear_range_m, |fault| self.clear_range_m * fault.window_transmission);
+        if self.empty_scans.max(self.frozen_scans) >= self.noticed_after_scans {
+            Health::Failed
+        } else if clear_range_m < degraded_below_m
+            || range_in_weather_m(clear_range_m, scene.environment) < degraded_below_m
+        {
+            Health::Degraded
+        } else {
+            Health::Ok
+        }
+    }
+
+    /// Returns the boxes of the latest scan.
+    pub(super) fn detections(&self) -> &[Detection] {
+        self.pending.back().map_or(&[], |scan| &scan.detections)
+    }
+
+    /// Returns the field of view.
+    pub(super) fn field(&self) -> FieldOfView {
+        FieldOfView {
+            half_angle_tan: self.kind.half_field_tan,
+            range_m: self.reach_m,
+            inset_m: self.model.inset_m,
+            left_m: self.model.left_m,
+            azimuth_rad: self.model.azimuth_rad,
+        }
+    }
+
+    /// Returns the field of view for the tracker, of a sensor whose ego has its rear end at `rear_x_m`.
+    pub(super) fn view(&self, rear_x_m: f64) -> RearView {
+        RearView {
+            half_angle_tan: self.kind.half_field_tan,
+            range_m: self.reach_m,
+            sensor_x_m: rear_x_m + self.model.inset_m,
+            sensor_y_m: self.model.left_m,
+            axis_azimuth_rad: self.model.azimuth_rad,
+        }
+    }
+}
+
+/// Returns the number of scans in a time, one at least.
+fn scans_in(time_s: f64, period_s: f64) -> u32 {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a second has 25 scans at most")]
+    let scans = (time_s / period_s).round() as u32;
+    scans.max(1)
+}
+
+impl PendingScan {
+    /// Dates the scan `offset_s` later than it was measured: the ego then takes itself to have measured it from where it was
+    /// at that time.
+    fn misdate(&mut self, offset_s: f64) {
+        #[expect(clippy::cast_possible_truncation, reason = "some milliseconds")]
+        let offset = Time::from_ns((offset_s * 1e9).round() as i64);
+        self.time += offset;
+        self.ego.s_m += self.ego.speed_mps * self.ego.heading_rad.cos() * offset_s;
+        self.ego.d_m += self.ego.speed_mps * self.ego.heading_rad.sin() * offset_s;
+        self.detections.iter_mut().for_each(|detection| detection.time += offset);
+    }
+}
