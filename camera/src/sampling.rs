@@ -67,7 +67,9 @@ mod tests {
     fn columns_and_rows_ascend_within_the_image() {
         let sampling = Sampling::parse("0 5 1279", "3\n799").unwrap();
         assert_eq!((sampling.columns(), sampling.rows()), (&[0, 5, 1279][..], &[3, 799][..]));
-        for (columns, rows) in [("", "1"), ("1 1", "1"), ("2 1", "1"), ("-1", "1"), ("1280", "1"), ("1", "800"), ("x", "1")] {
+        for (columns, rows) in
+            [("", "1"), ("1 1", "1"), ("2 1", "1"), ("-1", "1"), ("1280", "1"), ("1", "800"), ("x", "1")]
+        {
             let error = Sampling::parse(columns, rows).unwrap_err().to_string();
             assert!(error.contains("are not ascending whole numbers from 0 to"), "{error}");
         }

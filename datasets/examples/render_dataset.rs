@@ -44,9 +44,8 @@ fn sampled(sampling: &str, set: Set, [scenes, seed]: [&str; 2], folder: &str) ->
         eprintln!("{USAGE}");
         return ExitCode::from(2);
     };
-    let rendered = Sampling::parse(columns, rows)
-        .map_err(|error| format!("{sampling}: {error}"))
-        .and_then(|sampling| {
+    let rendered =
+        Sampling::parse(columns, rows).map_err(|error| format!("{sampling}: {error}")).and_then(|sampling| {
             render_sampled(set, [scenes, seed], &sampling, Path::new(folder)).map_err(|error| error.to_string())
         });
     match rendered {

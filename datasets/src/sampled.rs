@@ -8,7 +8,7 @@ use std::path::Path;
 use closecall_camera::{ExposureKey, Frame, PixelRect, Sampling, mix};
 
 use super::files::Output;
-use super::render::{scene_rng, DatasetError};
+use super::render::{DatasetError, scene_rng};
 use super::scenes::RandomScene;
 use super::{DatasetSummary, Set};
 

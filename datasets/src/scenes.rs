@@ -35,7 +35,11 @@ impl RandomScene {
     pub(super) const USUAL_VEHICLES: std::ops::RangeInclusive<usize> = 1..=5;
 
     /// Draws a random scene with so many vehicles, or fewer if there is no room.
-    pub(super) fn draw(set: Set, vehicles: std::ops::RangeInclusive<usize>, rng: &mut Stream) -> Result<Self, ConfigError> {
+    pub(super) fn draw(
+        set: Set,
+        vehicles: std::ops::RangeInclusive<usize>,
+        rng: &mut Stream,
+    ) -> Result<Self, ConfigError> {
         let road = road(rng)?;
         let environment = environment(rng);
         let camera = camera(rng)?;

@@ -162,6 +162,7 @@ impl LidarChain {
         }
         if let Some(classifier) = classifier {
             classifier.classify(believed, &mut detections)?;
+            detections.extend_from_slice(classifier.seen_alone());
         }
         let mut scan = PendingScan {
             time: scene.time,
