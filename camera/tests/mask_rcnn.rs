@@ -29,8 +29,8 @@ fn assert_same(found: &Instance, (sides, score, cells): (&[f64], f64, &[f32])) {
         assert!((own - wanted).abs() <= BOX_PX, "{:?} instead of {sides:?}", found.box_px);
     }
     assert!((found.score - score).abs() <= SCORE, "{} instead of {score}", found.score);
-    let area: [f64; 4] = sides.try_into().unwrap();
-    let wanted = Mask::new(area, [CELLS, CELLS], cells.to_vec()).unwrap();
+    let area: [f64; 4] = sides.try_into().expect("four sides");
+    let wanted = Mask::new(area, [CELLS, CELLS], cells.to_vec()).expect("a mask");
     let share = mask_overlap(&found.mask, &wanted);
     assert!(share >= MASK_OVERLAP, "masks overlap by {share}");
 }

@@ -119,7 +119,7 @@ impl LidarChain {
                 let mut all: Vec<Detection> = several.iter().flat_map(|(_, scan)| scan.detections.clone()).collect();
                 classifier.classify(seen.believed, &mut all)?;
                 let mut classified = all.into_iter();
-                for (_, scan) in several {
+                for (_, scan) in several.iter_mut() {
                     scan.detections.iter_mut().zip(&mut classified).for_each(|(slot, found)| *slot = found);
                 }
                 // What only the camera sees belongs to no LiDAR: it comes with the first.

@@ -155,8 +155,12 @@ fn is_confirmed(lidar_scans: usize, has_camera: bool) -> bool {
             _ => Vec::new(),
         };
         detections.iter_mut().for_each(|seen| seen.time = time);
-        let view = RearView { half_angle_tan: 1.0, range_m: 150.0, sensor_x_m: -2.0 };
-        tracker.update(&TrackerScan { time, road: &road, ego: state, view, detections: &detections }, &mut list);
+        let view =
+            RearView { half_angle_tan: 1.0, range_m: 150.0, sensor_x_m: -2.0, sensor_y_m: 0.0, axis_azimuth_rad: 0.0 };
+        tracker.update(
+            &TrackerScan { time, road: &road, ego: state, view, rear_x_m: -2.0, detections: &detections },
+            &mut list,
+        );
         list.tracks.clear();
         tracker.report(time, &EgoFrame::new(&road, &state), &mut list);
         confirmed = list.tracks.iter().any(|track| track.status != TrackStatus::Tentative);
