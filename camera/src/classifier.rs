@@ -72,6 +72,19 @@ pub enum ClassifierError {
         /// The reason that the library gives.
         reason: String,
     },
+    /// The network needs ONNX Runtime, and this process has none.
+    #[error(
+        "failed to load the Mask R-CNN: it needs ONNX Runtime, because tract has no RoiAlign; `pip install onnxruntime` installs it, and `--onnxruntime PATH` names its libonnxruntime.so"
+    )]
+    NeedsOnnxRuntime,
+    /// The network has other inputs or outputs.
+    #[error("failed to use the network: it has {found}; wanted are {wanted}")]
+    Layout {
+        /// What it has.
+        found: String,
+        /// What it must have.
+        wanted: &'static str,
+    },
     /// The network failed during inference. The session must not be used again.
     #[error("failed to run the classifier's network: {reason}")]
     Run {

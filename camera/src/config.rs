@@ -4,6 +4,7 @@ use closecall_traffic::{Check, Choice, ConfigError, Num, Parameters, Range};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::mask_rcnn_config::{MaskRcnn, MaskRcnnConfig};
 use super::optics::{LensConfig, Optics};
 
 /// The processing of the camera's image.
@@ -12,6 +13,8 @@ use super::optics::{LensConfig, Optics};
 pub enum Pipeline {
     /// A neural network classifies the part of the image that shows each LiDAR cluster.
     CropClassifier,
+    /// A Mask R-CNN finds vehicles in the whole image, which are then associated with the LiDAR clusters. Needs ONNX Runtime.
+    MaskRcnn,
     /// The image is not used: class scores come from the shapes of the LiDAR clusters alone.
     Off,
 }
@@ -39,6 +42,8 @@ impl Default for SunConfig {
 pub struct CameraConfig {
     /// Processing of the image.
     pub pipeline: Choice<Pipeline>,
+    /// The Mask R-CNN of the pipeline `mask-rcnn`.
+    pub mask_rcnn: MaskRcnnConfig,
     /// Height of the lens above the ground (m).
     pub mount_height_m: Num,
     /// Distance of the lens ahead of the ego's rear bumper (m).
@@ -67,6 +72,7 @@ impl Default for CameraConfig {
     fn default() -> Self {
         Self {
             pipeline: Choice::Fixed(Pipeline::CropClassifier),
+            mask_rcnn: MaskRcnnConfig::default(),
             mount_height_m: Num::Fixed(1.2),
             mount_from_rear_m: Num::Fixed(0.6),
             pitch_rad: Num::Fixed(0.03),
@@ -95,6 +101,8 @@ pub struct Sun {
 pub struct Camera {
     /// Processing of the image.
     pub pipeline: Pipeline,
+    /// The Mask R-CNN of the pipeline `mask-rcnn`.
+    pub mask_rcnn: MaskRcnn,
     /// Height of the lens above the ground (m).
     pub mount_height_m: f64,
     /// Distance of the lens ahead of the ego's rear bumper (m).
@@ -128,6 +136,7 @@ impl Check for CameraConfig {
         let sun = |error: ConfigError| error.within("sun");
         Ok(Camera {
             pipeline: parameters.word(&self.pipeline, "pipeline")?,
+            mask_rcnn: self.mask_rcnn.check(parameters).map_err(|error| error.within("mask-rcnn"))?,
             mount_height_m: number(&self.mount_height_m, "mount-height-m", 0.4, 3.5)?,
             mount_from_rear_m: number(&self.mount_from_rear_m, "mount-from-rear-m", 0.0, 3.0)?,
             pitch_rad: number(&self.pitch_rad, "pitch-rad", -0.2, 0.3)?,

@@ -27,52 +27,43 @@ struct Effects {
 impl Frame {
     /// Renders the whole image with the instance number of each pixel.
     pub fn image(&mut self) -> LabelledImage {
-        /// Side of the square tiles in which the image is rendered (px), small enough for the processor's cache.
-        const TILE: i32 = 64;
-        let (width, height) = (i32::from(WIDTH_PX), i32::from(HEIGHT_PX));
-        let mut rgb = vec![0; usize::from(WIDTH_PX) * usize::from(HEIGHT_PX) * CHANNELS];
-        let mut instances = vec![0; usize::from(WIDTH_PX) * usize::from(HEIGHT_PX)];
-        let mut tile = Vec::new();
-        for top in (0..height).step_by(TILE as usize) {
-            let rows: Vec<i32> = (top..(top + TILE).min(height)).collect();
-            for left in (0..width).step_by(TILE as usize) {
-                let columns: Vec<i32> = (left..(left + TILE).min(width)).collect();
-                tile.resize(rows.len() * columns.len() * CHANNELS, 0);
-                self.draw(&columns, &rows, &mut tile);
-                for (row, line) in tile.chunks_exact(columns.len() * CHANNELS).enumerate() {
-                    let at = (top as usize + row) * usize::from(WIDTH_PX) + left as usize;
-                    rgb[at * CHANNELS..at * CHANNELS + line.len()].copy_from_slice(line);
-                    for column in 0..columns.len() {
-                        instances[at + column] = self.instance(row * columns.len() + column);
-                    }
-                }
-            }
-        }
-        LabelledImage { image: Image { width: WIDTH_PX.into(), height: HEIGHT_PX.into(), rgb }, instances }
+        let [columns, rows] = [WIDTH_PX, HEIGHT_PX].map(|extent| (0..i32::from(extent)).collect::<Vec<i32>>());
+        self.sampled(&columns, &rows)
     }
 
     /// Renders every `step`-th pixel of the rows `rows` of the image, as a small picture for human viewers. Each pixel
     /// is identical to that of the whole image.
     pub fn preview(&mut self, step: u16, rows: std::ops::Range<u16>) -> Image {
-        /// Side of the square tiles in which the picture is rendered (px), small enough for the processor's cache.
-        const TILE: usize = 64;
         let columns: Vec<i32> = (step / 2..WIDTH_PX).step_by(step.into()).map(i32::from).collect();
         let rows: Vec<i32> =
             (rows.start + step / 2..rows.end.min(HEIGHT_PX)).step_by(step.into()).map(i32::from).collect();
-        let mut rgb = vec![0; columns.len() * rows.len() * CHANNELS];
+        self.sampled(&columns, &rows).image
+    }
+
+    /// Renders the pixels at the intersections of `columns` and `rows`, in their order, with the instance number of
+    /// each. Each pixel is identical to that of the whole image.
+    pub fn sampled(&mut self, columns: &[i32], rows: &[i32]) -> LabelledImage {
+        /// Side of the square tiles in which the picture is rendered (px), small enough for the processor's cache.
+        const TILE: usize = 64;
+        let width = columns.len();
+        let mut rgb = vec![0; width * rows.len() * CHANNELS];
+        let mut instances = vec![0; width * rows.len()];
         let mut tile = Vec::new();
-        for (upper, rows) in rows.chunks(TILE).enumerate() {
+        for (upper, some_rows) in rows.chunks(TILE).enumerate() {
             for (before, some) in columns.chunks(TILE).enumerate() {
-                tile.resize(rows.len() * some.len() * CHANNELS, 0);
-                self.draw(some, rows, &mut tile);
+                tile.resize(some_rows.len() * some.len() * CHANNELS, 0);
+                self.draw(some, some_rows, &mut tile);
                 for (row, line) in tile.chunks_exact(some.len() * CHANNELS).enumerate() {
-                    let at = ((upper * TILE + row) * columns.len() + before * TILE) * CHANNELS;
-                    rgb[at..at + line.len()].copy_from_slice(line);
+                    let at = (upper * TILE + row) * width + before * TILE;
+                    rgb[at * CHANNELS..at * CHANNELS + line.len()].copy_from_slice(line);
+                    for column in 0..some.len() {
+                        instances[at + column] = self.instance(row * some.len() + column);
+                    }
                 }
             }
         }
-        let [width, height] = [columns.len(), rows.len()].map(|count| u32::try_from(count).unwrap_or(0));
-        Image { width, height, rgb }
+        let [width, height] = [width, rows.len()].map(|count| u32::try_from(count).unwrap_or(0));
+        LabelledImage { image: Image { width, height, rgb }, instances }
     }
 
     /// Renders the classifier's crop of a square window.

@@ -1,6 +1,7 @@
 //! What a fault of the camera does to the pixels that the classifier receives.
 
-use super::image::{CHANNELS, CROP_PX, Crop, sample_positions};
+use super::image::{CHANNELS, CROP_PX, Crop, Image, sample_positions};
+use super::sampling::Sampling;
 use closecall_traffic::{Scene, SceneVehicle};
 
 /// Distance to a headlamp below which the glare no longer grows (m): the lamp saturates the image around it.
@@ -52,6 +53,29 @@ impl CameraFault {
         if glare > 0.0 {
             let glare = glare as f32;
             for value in &mut crop.rgb {
+                *value = to_byte((1.0 - glare) * f32::from(*value) + glare * 255.0);
+            }
+        }
+    }
+
+    /// Changes the pixels of a picture of the columns and rows `sampling` of the image. `glare` comes from [`CameraFault::glare`].
+    #[expect(clippy::cast_possible_truncation, reason = "pixels need no more than single precision")]
+    pub fn apply_to_picture(&self, picture: &mut Image, sampling: &Sampling, glare: f64) {
+        if self.dirt > 0.0 {
+            let places =
+                sampling.rows().iter().flat_map(|row| sampling.columns().iter().map(move |column| [column, row]));
+            for (pixel, place) in picture.rgb.chunks_exact_mut(CHANNELS).zip(places) {
+                if is_blot(place.map(|at| at.div_euclid(BLOT_PX)), self.dirt) {
+                    pixel.iter_mut().zip(DIRT_RGB).for_each(|(value, dirt)| *value = to_byte(dirt));
+                }
+            }
+        }
+        if self.blur_px > 0.0 {
+            blur_picture(picture, sampling, self.blur_px as f32);
+        }
+        if glare > 0.0 {
+            let glare = glare as f32;
+            for value in &mut picture.rgb {
                 *value = to_byte((1.0 - glare) * f32::from(*value) + glare * 255.0);
             }
         }
@@ -109,6 +133,36 @@ fn blur(crop: &mut Crop, sd: f32) {
             }
         }
         crop.rgb.copy_from_slice(&blurred);
+    }
+}
+
+/// Blurs a picture of these columns and rows with a Gaussian kernel of this standard deviation (px of the image), along rows and
+/// columns. Pixels count by their distance in the image.
+fn blur_picture(picture: &mut Image, sampling: &Sampling, sd_px: f32) {
+    /// Distance beyond which a pixel does not count (standard deviations).
+    const REACH: f32 = 3.0;
+    let width = sampling.columns().len();
+    for (places, lines, step, across) in
+        [(sampling.columns(), sampling.rows().len(), 1, width), (sampling.rows(), width, width, 1)]
+    {
+        let sharp = picture.rgb.clone();
+        for (at, place) in places.iter().enumerate() {
+            let weights: Vec<(usize, f32)> = places
+                .iter()
+                .enumerate()
+                .map(|(from, other)| (from, (other - place) as f32 / sd_px))
+                .filter(|(_, apart)| apart.abs() <= REACH)
+                .map(|(from, apart)| (from, (-0.5 * apart * apart).exp()))
+                .collect();
+            let total: f32 = weights.iter().map(|(_, weight)| weight).sum();
+            for line in 0..lines {
+                for channel in 0..CHANNELS {
+                    let index = |along: usize| (line * across + along * step) * CHANNELS + channel;
+                    let sum: f32 = weights.iter().map(|(from, weight)| weight * f32::from(sharp[index(*from)])).sum();
+                    picture.rgb[index(at)] = to_byte(sum / total);
+                }
+            }
+        }
     }
 }
 

@@ -5,13 +5,16 @@
 //!                                              scene ──────────────▲
 //! ```
 //!
+//! A second pipeline finds vehicles in the whole image by a Mask R-CNN ([`WholeImageDetector`]); it needs ONNX Runtime.
+//!
 //! The camera is a pinhole camera in the ego's rear window. Its image has 1280 × 800 px and covers 60° horizontally.
-//! A simulated run renders only the crops that the network classifies, never the whole image. Each pixel of a crop is
+//! A simulated run renders only the pixels that a network reads. Each pixel of a crop is
 //! identical, bit for bit, to the same pixel of the whole image (see [`Frame`]).
 
 mod body;
 mod classifier;
 mod config;
+mod detector;
 mod draw;
 mod fault;
 mod frame;
@@ -20,7 +23,9 @@ mod ground;
 mod hash;
 mod image;
 mod image_memory;
+mod instance;
 mod light;
+mod mask_rcnn_config;
 mod mesh;
 mod network;
 mod optics;
@@ -28,24 +33,31 @@ mod pinhole;
 mod pipeline;
 mod raster;
 mod rear_camera;
+mod sampling;
 mod shapes;
 mod sky;
 mod spray;
 mod triangles;
 mod vector_registers;
+mod whole_image;
 mod window;
 
 pub use classifier::{Backend, Classifier, ClassifierError, SHIPPED_MODEL};
 pub use config::{Camera, CameraConfig, Pipeline, Sun, SunConfig};
+pub use detector::{InstanceDetector, LabelMap, SHIPPED_MASK_RCNN};
 pub use fault::CameraFault;
 pub use frame::{Frame, FrameBuffers};
 pub use hash::mix;
 pub use image::{CHANNELS, CROP_PX, Crop, Image, LabelledImage};
 pub use image_memory::ImageMemory;
+pub use instance::{Instance, MASK_THRESHOLD, Mask, overlap};
+pub use mask_rcnn_config::{MaskRcnn, MaskRcnnConfig};
 pub use network::Network;
 pub use optics::{LensConfig, Optics};
 pub use pinhole::{FOCAL_PX, GroundBox, HEIGHT_PX, PixelRect, WIDTH_PX};
-pub use pipeline::{CropClassifier, ImagedScene, MIN_SHARE_IN_IMAGE};
+pub use pipeline::{CropClassifier, ImagedScene, MIN_SHARE_IN_IMAGE, fuse, is_beside_road};
 pub use rear_camera::{ExposureKey, RearCamera};
+pub use sampling::{Sampling, SamplingError};
 pub use shapes::HELD_OUT_SHAPES;
 pub use triangles::{BodyTriangle, body_triangles};
+pub use whole_image::WholeImageDetector;

@@ -111,21 +111,25 @@ impl RearCamera {
     /// Returns the window of the image that the network classifies for a detection. Returns `None` if too little of the
     /// window lies in the image.
     pub fn detection_window(&self, ego: &SceneVehicle, detection: &Detection) -> Option<PixelRect> {
-        let (x_m, y_m) = detection.centre_m();
-        let object = GroundBox {
-            x_m,
-            y_m,
-            heading_rad: detection.heading_rad,
-            length_m: detection.length_m,
-            width_m: detection.width_m,
-            height_m: detection.top_m.max(MIN_HEIGHT_M),
-        };
-        self.project(ego, &object).filter(|window| window.share_in_image() >= MIN_SHARE_IN_IMAGE)
+        self.project(ego, &ground_box(detection)).filter(|window| window.share_in_image() >= MIN_SHARE_IN_IMAGE)
+    }
+}
+
+/// Returns the box of a detection, which stands on the ground.
+pub(super) fn ground_box(detection: &Detection) -> GroundBox {
+    let (x_m, y_m) = detection.centre_m();
+    GroundBox {
+        x_m,
+        y_m,
+        heading_rad: detection.heading_rad,
+        length_m: detection.length_m,
+        width_m: detection.width_m,
+        height_m: detection.top_m.max(MIN_HEIGHT_M),
     }
 }
 
 /// Returns true if a detection lies entirely beside the road.
-fn is_beside_road(detection: &Detection, lane: &LaneGeometry) -> bool {
+pub fn is_beside_road(detection: &Detection, lane: &LaneGeometry) -> bool {
     let left_m = detection.face_y_m - lane.path_y_m(detection.face_x_m);
     let half_m = 0.5 * detection.width_m;
     left_m - half_m > lane.edges_m[0] || left_m + half_m < lane.edges_m[1]
@@ -133,7 +137,7 @@ fn is_beside_road(detection: &Detection, lane: &LaneGeometry) -> bool {
 
 /// Fuses the scores from shape and image by their normalised product, which assumes that their errors are independent
 /// and that all classes are equally likely a priori.
-fn fuse(shape: &ClassScores, image: &ClassScores) -> ClassScores {
+pub fn fuse(shape: &ClassScores, image: &ClassScores) -> ClassScores {
     let product = [0, 1, 2, 3].map(|class| shape.0[class].max(MIN_SCORE) * image.0[class].max(MIN_SCORE));
     let sum: f64 = product.iter().sum();
     ClassScores(product.map(|score| score / sum))

@@ -9,7 +9,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use closecall_camera::{Backend, SHIPPED_MODEL};
+use closecall_camera::{Backend, CameraConfig, Pipeline, SHIPPED_MASK_RCNN, SHIPPED_MODEL};
 use closecall_sensors::{SensorMode, inference_backend};
 use closecall_simulation::Arm;
 use closecall_simulation::controller::ControllerChoice;
@@ -88,6 +88,16 @@ impl Plan {
         sampling: Sampling,
         controllers: Vec<ControllerChoice>,
     ) -> Result<Self, PlanError> {
+        Self::new_in(None, scenarios, sampling, controllers)
+    }
+
+    /// Returns what [`Plan::new`] returns if relative paths of controllers are in `folder`.
+    pub(crate) fn new_in(
+        folder: Option<&Path>,
+        scenarios: Vec<ScenarioFile>,
+        sampling: Sampling,
+        controllers: Vec<ControllerChoice>,
+    ) -> Result<Self, PlanError> {
         for (index, file) in scenarios.iter().enumerate() {
             let name = &file.config().name;
             if let Some(same) = scenarios[..index].iter().find(|earlier| earlier.config().name == *name) {
@@ -105,7 +115,7 @@ impl Plan {
             // A scenario without a nominal sample is an error of its samples.
             let Ok(nominal) = file.concrete(&file.space().nominal()) else { continue };
             let fail = |source| PlanError::Controller { scenario: file.config().name.clone(), source };
-            native.check_variables(&nominal).map_err(fail)?;
+            native.check_variables(&nominal, folder).map_err(fail)?;
         }
         Ok(Self {
             scenarios,
@@ -160,6 +170,34 @@ impl Plan {
         self.scenarios.iter().any(may_be_full)
     }
 
+    /// Returns the rear cameras of the scenarios in which some sample may need the camera's network.
+    pub fn cameras(&self) -> impl Iterator<Item = &CameraConfig> {
+        let files = self.scenarios.iter().filter(|_| self.uses_classifier());
+        files.map(|file| &file.config().sensors.rear_camera)
+    }
+
+    /// Returns the networks that some sample may need.
+    fn models(&self) -> Result<Vec<ManifestModel>, FolderError> {
+        if !self.uses_classifier() {
+            return Ok(Vec::new());
+        }
+        let classifier = rear_classifier()?;
+        let mut models = Vec::new();
+        for camera in self.cameras().filter(|camera| camera.pipeline == Choice::Fixed(Pipeline::MaskRcnn)) {
+            let (name, blake3) = match &camera.mask_rcnn.model {
+                None => ("rear-mask-rcnn".to_owned(), blake3::hash(SHIPPED_MASK_RCNN).to_string()),
+                Some(path) => {
+                    let hash = file_hash(Path::new(path));
+                    let read = |source| FolderError::Read { path: path.into(), source };
+                    (path.clone(), hash.map_err(read)?.to_string())
+                }
+            };
+            models.push(ManifestModel { name, blake3, backend: classifier.backend.clone() });
+        }
+        models.dedup();
+        Ok(std::iter::once(classifier).chain(models).collect())
+    }
+
     /// Returns what identifies the controllers that run as processes in the given folder, or in that of this program.
     fn fingerprints(&self, folder: Option<&Path>) -> Vec<Fingerprint> {
         let nominal = self.scenarios.first().and_then(|file| file.concrete(&file.space().nominal()).ok());
@@ -194,7 +232,7 @@ impl Plan {
             sensors: self.sensors,
             checks: self.checks,
             inference: self.inference,
-            models: if self.uses_classifier() { vec![rear_classifier()?] } else { Vec::new() },
+            models: self.models()?,
             controllers: self.fingerprints(folder),
             working_folder: std::env::current_dir().ok(),
             sample_timeout_s: self.workers.sample_timeout.as_secs_f64(),

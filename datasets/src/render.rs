@@ -4,7 +4,7 @@ use super::files::Output;
 use super::scenes::RandomScene;
 use super::{coco, crops};
 use closecall_camera::{Camera, Optics};
-use closecall_traffic::{ActorId, ConfigError, stream};
+use closecall_traffic::{ActorId, ConfigError, Stream, stream};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -152,9 +152,14 @@ impl Set {
     }
 }
 
+/// Returns the random stream of a scene.
+pub(super) fn scene_rng(set: Set, seed: u64, index: u32) -> Result<Stream, DatasetError> {
+    Ok(stream(seed, u64::from(index), &ActorId::new("ego")?, set.channel("scenes")))
+}
+
 fn random_scene(options: &DatasetOptions, index: u32) -> Result<RandomScene, DatasetError> {
-    let mut rng = stream(options.seed, u64::from(index), &ActorId::new("ego")?, options.set.channel("scenes"));
-    let mut scene = RandomScene::draw(options.set, &mut rng)?;
+    let mut rng = scene_rng(options.set, options.seed, index)?;
+    let mut scene = RandomScene::draw(options.set, RandomScene::USUAL_VEHICLES, &mut rng)?;
     let CameraLooks { optics, readout_s, night_sky } = options.looks;
     scene.camera = Camera { optics, readout_s, night_sky, ..scene.camera };
     Ok(scene)

@@ -31,8 +31,15 @@ pub(super) struct RandomScene {
 }
 
 impl RandomScene {
-    /// Draws a random scene.
-    pub(super) fn draw(set: Set, rng: &mut Stream) -> Result<Self, ConfigError> {
+    /// Numbers of vehicles that a scene usually has.
+    pub(super) const USUAL_VEHICLES: std::ops::RangeInclusive<usize> = 1..=5;
+
+    /// Draws a random scene with so many vehicles, or fewer if there is no room.
+    pub(super) fn draw(
+        set: Set,
+        vehicles: std::ops::RangeInclusive<usize>,
+        rng: &mut Stream,
+    ) -> Result<Self, ConfigError> {
         let road = road(rng)?;
         let environment = environment(rng);
         let camera = camera(rng)?;
@@ -55,7 +62,7 @@ impl RandomScene {
             ego,
             others: Vec::new(),
         };
-        for actor in 1..=rng.random_range(1..=5) {
+        for actor in 1..=rng.random_range(vehicles) {
             scene.add_vehicle(actor, set, rng);
         }
         Ok(scene)

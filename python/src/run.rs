@@ -119,7 +119,7 @@ pub(crate) fn run(
     let arm = Arm { controller: factory, sensors: sensor_mode(py, sensors)? };
     let concrete = scenario.get().concrete(seed, sample).map_err(|error| sample_exception(py, sample, &error))?;
     if let Some(native) = native {
-        let checked = py.detach(|| native.probe(None).and_then(|_| native.check_variables(&concrete)));
+        let checked = py.detach(|| native.probe(None).and_then(|_| native.check_variables(&concrete, None)));
         checked.map_err(|error| exception(py, &error.into()))?;
     }
     let (sender, mut receiver) = channel();

@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::faults::{Faults, OdometryErrors};
+use crate::image_detector::ImageDetector;
 use crate::lidar::{FRONT_NAME, Lidar, LidarConfig, REAR_NAME};
 use crate::worker_classifier::WorkerClassifier;
 use crate::{
@@ -279,6 +280,10 @@ impl Sensors {
                 match (self.altered.classifier(), self.camera.pipeline) {
                     (Some(classifier), _) => Box::new(perception.with_classifier(classifier)),
                     (None, Pipeline::Off) => Box::new(perception),
+                    (None, Pipeline::MaskRcnn) => {
+                        let detector = ImageDetector::new(self.camera, key, self.altered.faults.rear_camera);
+                        Box::new(perception.with_classifier(Box::new(detector)))
+                    }
                     (None, Pipeline::CropClassifier) => {
                         let classifier =
                             WorkerClassifier::new(self.camera, key).with_faults(self.altered.faults.rear_camera);

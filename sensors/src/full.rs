@@ -22,6 +22,11 @@ pub trait DetectionClassifier: Send {
     /// Returns [`SensorError::Classifier`] if the classifier cannot be run.
     fn classify(&mut self, scene: &Scene<'_>, detections: &mut [Detection]) -> Result<(), SensorError>;
 
+    /// Returns what that sensor alone has seen, as of the latest scan. Usually nothing.
+    fn seen_alone(&self) -> &[Detection] {
+        &[]
+    }
+
     /// Returns the health of that sensor.
     fn health(&self) -> Health {
         Health::Ok

@@ -15,6 +15,8 @@ mod front_lidar;
 mod full;
 mod ground_truth;
 mod half_turn;
+mod image_detector;
+mod image_evidence;
 pub mod lidar;
 mod lidar_chain;
 mod object;

@@ -111,13 +111,20 @@ impl LidarChain {
         }
         match (classifier, &mut scans[..]) {
             (None, _) | (_, []) => {}
-            (Some(classifier), [(_, scan)]) => classifier.classify(seen.believed, &mut scan.detections)?,
+            (Some(classifier), [(_, scan)]) => {
+                classifier.classify(seen.believed, &mut scan.detections)?;
+                scan.detections.extend_from_slice(classifier.seen_alone());
+            }
             (Some(classifier), several) => {
                 let mut all: Vec<Detection> = several.iter().flat_map(|(_, scan)| scan.detections.clone()).collect();
                 classifier.classify(seen.believed, &mut all)?;
                 let mut classified = all.into_iter();
-                for (_, scan) in several {
+                for (_, scan) in several.iter_mut() {
                     scan.detections.iter_mut().zip(&mut classified).for_each(|(slot, found)| *slot = found);
+                }
+                // What only the camera sees belongs to no LiDAR: it comes with the first.
+                if let [(_, scan), ..] = several {
+                    scan.detections.extend_from_slice(classifier.seen_alone());
                 }
             }
         }

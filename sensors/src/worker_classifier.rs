@@ -15,7 +15,7 @@ use closecall_camera::CameraFault;
 use closecall_camera::{Backend, Camera, CropClassifier, ExposureKey, ImageMemory, ImagedScene};
 
 /// Name of the camera's random stream.
-const CHANNEL: &str = "rear-camera";
+pub(crate) const CHANNEL: &str = "rear-camera";
 
 /// Returns the noise keys of the rear camera's exposures in one run, scan by scan.
 ///
@@ -58,22 +58,22 @@ pub(crate) struct WorkerClassifier {
 }
 
 /// The scene of an image, and the key of its noise.
-struct HeldImage {
+pub(crate) struct HeldImage {
     time: Time,
     environment: Environment,
     road: Road,
     ego: SceneVehicle,
     others: Vec<SceneVehicle>,
-    key: ExposureKey,
+    pub(crate) key: ExposureKey,
 }
 
 impl HeldImage {
-    fn of(scene: &Scene<'_>, key: ExposureKey) -> Self {
+    pub(crate) fn of(scene: &Scene<'_>, key: ExposureKey) -> Self {
         let Scene { time, ego, .. } = *scene;
         Self { time, environment: *scene.environment, road: *scene.road, ego, others: scene.others.to_vec(), key }
     }
 
-    fn scene(&self) -> Scene<'_> {
+    pub(crate) fn scene(&self) -> Scene<'_> {
         Scene { time: self.time, road: &self.road, environment: &self.environment, ego: self.ego, others: &self.others }
     }
 }

@@ -30,7 +30,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use super::CliError;
 use super::args::{Format, SensorsChoice, SetArgs};
 use super::arms::{ComparisonArgs, ControllerArgs};
-use super::backend::check_backend;
+use super::backend::{check_backend, check_cameras};
 use super::ending::{EndArgs, Ending};
 use super::ensemble::EnsembleArgs;
 use super::gates::GateArgs;
@@ -128,6 +128,7 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<ExitCode, CliError> {
     let gates = args.gates.gates(is_paired, args.design, args.plan.preset_gates(is_paired))?;
     let plan = args.plan(controllers)?;
     check_backend(plan.uses_classifier())?;
+    check_cameras(plan.cameras())?;
     let (mut campaign, manifest) = (plan.campaign(), plan.manifest(session::arguments())?);
     campaign.remote = connect(args.ray.as_deref(), &manifest).map_err(CampaignError::from)?;
     let locked = match &args.out {

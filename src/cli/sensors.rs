@@ -9,7 +9,7 @@ use closecall_perception::{Extent, Study};
 
 use super::CliError;
 use super::args::{Format, SensorsChoice, SetArgs};
-use super::backend::check_backend;
+use super::backend::{check_backend, check_cameras};
 use super::output::{out, outln, print_written};
 use crate::exit_code::ExitCode;
 
@@ -49,7 +49,9 @@ pub(super) fn sensors(args: &SensorsArgs) -> Result<ExitCode, CliError> {
     check_backend(choice == SensorsChoice::Full)?;
     let extent = args.approaches.map_or(if args.quick { Extent::Quick } else { Extent::Full }, Extent::Runs);
     let study = |path: &PathBuf| -> Result<Study, CliError> {
-        Ok(Study::of(&args.set.load(path)?, Some(choice.mode()), args.seed, extent)?)
+        let file = args.set.load(path)?;
+        check_cameras((choice == SensorsChoice::Full).then_some(&file.config().sensors.rear_camera))?;
+        Ok(Study::of(&file, Some(choice.mode()), args.seed, extent)?)
     };
     let studies: Result<Vec<Study>, CliError> =
         [Some(&args.scenario), args.compare.as_ref()].into_iter().flatten().map(study).collect();

@@ -29,6 +29,7 @@ mod inspect;
 mod library;
 mod looking;
 mod malformed;
+mod mask_rcnn;
 mod mis_page;
 mod native_controllers;
 mod nothing_checked;

@@ -63,8 +63,9 @@ fn in_process(
                 return Ok(answer);
             }
             Ok(None) => return Err(SampleError::Timeout { limit_s: limit.as_secs_f64() }.into()),
-            // The process may have grown in earlier samples: what this one needs shows in a new process.
-            Err(ExecError::Memory { .. }) if !is_new => {}
+            // Earlier samples may have left something behind in the process, such as memory that it has written over or not given back: what
+            // this sample does shows in a new one.
+            Err(_) if !is_new => {}
             Err(error) => return Err(failure(&error)),
         }
     }

@@ -59,7 +59,7 @@ impl BlockRunner {
         };
         let sample_timeout = Duration::try_from_secs_f64(sent.sample_timeout_s).map_err(too_long)?;
         let files = works.iter().map(|work| work.file.clone()).collect();
-        let mut plan = Plan::new(files, sent.sampling, sent.arms.clone())?;
+        let mut plan = Plan::new_in(local.controller_folder(), files, sent.sampling, sent.arms.clone())?;
         plan.use_sensors(sent.sensors).map_err(SavedError::from)?;
         plan.partition = sent.partition;
         plan.checks = sent.checks;

@@ -93,16 +93,16 @@ impl NativeSettings {
         self.try_with(folder, None)
     }
 
-    /// Checks that every variable of an FMU has its counterpart in a scenario.
+    /// Checks that every variable of an FMU has its counterpart in a scenario. A relative path is in `folder`, or in that of this program.
     ///
     /// # Errors
     /// [`NativeError`] if one has none.
-    pub fn check_variables(&self, scenario: &Scenario) -> Result<(), NativeError> {
+    pub fn check_variables(&self, scenario: &Scenario, folder: Option<&Path>) -> Result<(), NativeError> {
         let CheckedDriver::Ego(ego) = &scenario.actors[scenario.ego].driver else { return Ok(()) };
         // Serialising structs of numbers and names cannot fail.
         let settings = serde_json::to_value(ego).unwrap_or_default();
         let variables = Variables { table: scenario.variables.clone(), settings };
-        if self.kind == Kind::Fmu { self.try_with(None, Some(&variables)).map(drop) } else { Ok(()) }
+        if self.kind == Kind::Fmu { self.try_with(folder, Some(&variables)).map(drop) } else { Ok(()) }
     }
 
     fn try_with(&self, folder: Option<&Path>, variables: Option<&Variables>) -> Result<Identity, NativeError> {

@@ -1,0 +1,77 @@
+//! The columns and rows of the image that a network reads.
+//!
+//! A network need not read every pixel. Objects far away are small and lie near the horizon, and near ones are large, so
+//! that few pixels say as much as all. What is not read need not be rendered.
+
+use super::pinhole::{HEIGHT_PX, WIDTH_PX};
+
+/// The columns and rows of the image that a network reads, in ascending order.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Sampling {
+    columns: Vec<i32>,
+    rows: Vec<i32>,
+}
+
+/// The reason why columns or rows cannot be sampled.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the {what} {text:?} are not {wanted}")]
+pub struct SamplingError {
+    what: &'static str,
+    text: String,
+    wanted: String,
+}
+
+impl Sampling {
+    /// Returns every pixel of the image.
+    pub fn all() -> Self {
+        Self { columns: (0..i32::from(WIDTH_PX)).collect(), rows: (0..i32::from(HEIGHT_PX)).collect() }
+    }
+
+    /// Reads columns and rows from whole numbers, separated by blanks.
+    ///
+    /// # Errors
+    /// [`SamplingError`] if the numbers do not ascend, or lie outside of the image.
+    pub fn parse(columns: &str, rows: &str) -> Result<Self, SamplingError> {
+        let read = |what, text: &str, limit: u16| {
+            let numbers: Option<Vec<i32>> = text.split_whitespace().map(|word| word.parse().ok()).collect();
+            let is_right = |numbers: &Vec<i32>| {
+                numbers.first().is_some_and(|first| *first >= 0)
+                    && numbers.last().is_some_and(|last| *last < i32::from(limit))
+                    && numbers.is_sorted_by(|one, next| one < next)
+            };
+            numbers.filter(is_right).ok_or_else(|| SamplingError {
+                what,
+                text: text.chars().take(80).collect(),
+                wanted: format!("ascending whole numbers from 0 to {}", limit - 1),
+            })
+        };
+        Ok(Self { columns: read("columns", columns, WIDTH_PX)?, rows: read("rows", rows, HEIGHT_PX)? })
+    }
+
+    /// Returns the columns.
+    pub fn columns(&self) -> &[i32] {
+        &self.columns
+    }
+
+    /// Returns the rows.
+    pub fn rows(&self) -> &[i32] {
+        &self.rows
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_and_rows_ascend_within_the_image() {
+        let sampling = Sampling::parse("0 5 1279", "3\n799").unwrap();
+        assert_eq!((sampling.columns(), sampling.rows()), (&[0, 5, 1279][..], &[3, 799][..]));
+        for (columns, rows) in
+            [("", "1"), ("1 1", "1"), ("2 1", "1"), ("-1", "1"), ("1280", "1"), ("1", "800"), ("x", "1")]
+        {
+            let error = Sampling::parse(columns, rows).unwrap_err().to_string();
+            assert!(error.contains("are not ascending whole numbers from 0 to"), "{error}");
+        }
+    }
+}

@@ -1,0 +1,195 @@
+//! The pipeline `mask-rcnn` in the simulation loop: images at a fixed rate, whose results arrive later.
+//!
+//! ```text
+//!   scan k:      detections ─▶ linked to the objects of the scan before
+//!   image due:   exposure ─▶ instances ─▶ associated with the detections of *this* scan ─┐
+//!                                                                                        │ latency
+//!   scan k + n:  evidence of each object ◀───────────────────────────────────────────────┘
+//! ```
+//!
+//! The evidence of an object remains until that of the next image. Each worker thread keeps one network, as for the crop
+//! classifier.
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+
+use closecall_camera::{Camera, CameraFault, ExposureKey, WholeImageDetector, fuse};
+use closecall_traffic::{Stream, Time};
+
+use crate::faults::{FaultList, NOTICED_AFTER_SCANS};
+use crate::full::DetectionClassifier;
+use crate::image_evidence::{Evidence, Exposed, ImageResult, associate, moved};
+use crate::worker_classifier::{CHANNEL, HeldImage, inference_backend};
+use crate::{Detection, Extent, Health, NoiseKey, Scene, SensorError};
+
+/// Distance along and across the ego's axis by which an object may move between two scans that detect it (m), as in the memory of
+/// the crop classifier: a closing speed of 50 m/s over one control step, and a lane change over two.
+const GATE_M: [f64; 2] = [2.0, 1.0];
+/// Time after which an object that was not detected is forgotten.
+const KEPT_FOR: Time = Time::from_ms(200);
+
+thread_local! {
+    /// The thread's network with the camera that it was built for.
+    static NETWORK: RefCell<Option<(Camera, WholeImageDetector)>> = const { RefCell::new(None) };
+}
+
+/// An object that the LiDAR has detected in successive scans.
+#[derive(Clone, Copy, Debug)]
+struct Known {
+    id: u64,
+    face_m: [f64; 2],
+    seen_at: Time,
+    evidence: Option<Evidence>,
+}
+
+/// An image whose result has not arrived.
+#[derive(Debug)]
+struct Pending {
+    due: Time,
+    exposed: Exposed,
+    /// The objects of the detections with which the instances were associated.
+    ids: Vec<u64>,
+    result: ImageResult,
+}
+
+/// The camera of one run with the Mask R-CNN of its thread.
+pub(crate) struct ImageDetector {
+    camera: Camera,
+    exposures: Stream,
+    faults: FaultList<CameraFault>,
+    held: Option<HeldImage>,
+    /// Number of latest successive scans in which the camera delivered no image, or the same one again.
+    failed_scans: u32,
+    next_image: Option<Time>,
+    next_id: u64,
+    known: Vec<Known>,
+    pending: VecDeque<Pending>,
+    /// What the camera alone has seen in the image whose result arrived with the latest scan.
+    alone: Vec<Detection>,
+}
+
+impl ImageDetector {
+    /// Creates the camera of one run, whose exposure noise is keyed by `key`.
+    pub(crate) fn new(camera: Camera, key: &NoiseKey, faults: FaultList<CameraFault>) -> Self {
+        Self {
+            camera,
+            exposures: key.stream(CHANNEL),
+            faults,
+            held: None,
+            failed_scans: 0,
+            next_image: None,
+            next_id: 0,
+            known: Vec::new(),
+            pending: VecDeque::new(),
+            alone: Vec::new(),
+        }
+    }
+
+    /// Links the detections of a scan to the known objects, and returns the object of each. A detection without one is a new object.
+    fn link(&mut self, time: Time, detections: &[Detection]) -> Vec<u64> {
+        self.known.retain(|known| time - known.seen_at <= KEPT_FOR);
+        let mut is_taken = vec![false; self.known.len()];
+        let before = self.known.len();
+        let mut ids = Vec::with_capacity(detections.len());
+        for detection in detections {
+            let face_m = [detection.face_x_m, detection.face_y_m];
+            let apart = |known: &Known| [0, 1].map(|axis| (known.face_m[axis] - face_m[axis]).abs());
+            let free = self.known[..before].iter().enumerate().filter(|(index, _)| !is_taken[*index]);
+            let near = free.filter(|(_, known)| apart(known).iter().zip(GATE_M).all(|(m, gate_m)| *m <= gate_m));
+            let sum = |known: &Known| apart(known).iter().sum::<f64>();
+            let nearest = near.min_by(|one, other| sum(one.1).total_cmp(&sum(other.1))).map(|(index, _)| index);
+            let index = nearest.unwrap_or_else(|| {
+                self.known.push(Known { id: self.next_id, face_m, seen_at: time, evidence: None });
+                self.next_id += 1;
+                self.known.len() - 1
+            });
+            if let Some(taken) = is_taken.get_mut(index) {
+                *taken = true;
+            }
+            (self.known[index].face_m, self.known[index].seen_at) = (face_m, time);
+            ids.push(self.known[index].id);
+        }
+        ids
+    }
+
+    /// Takes an image and queues its result.
+    fn expose(
+        &mut self,
+        scene: &Scene<'_>,
+        key: ExposureKey,
+        fault: Option<&CameraFault>,
+        (ids, detections): (&[u64], &[Detection]),
+    ) -> Result<(), SensorError> {
+        let held = self.held.as_ref().map(|held| (held.scene(), held.key));
+        let (imaged, key) = held.as_ref().map_or((scene, key), |(scene, key)| (scene, *key));
+        let failed = |error: closecall_camera::ClassifierError| SensorError::Classifier { reason: error.to_string() };
+        let result = NETWORK.with_borrow_mut(|slot| {
+            if slot.as_ref().is_none_or(|(camera, _)| *camera != self.camera) {
+                *slot = Some((self.camera, WholeImageDetector::new(self.camera, inference_backend()).map_err(failed)?));
+            }
+            let Some((_, network)) = slot else { return Ok(ImageResult::default()) };
+            let instances = network.detect(imaged, key, fault).map_err(failed)?;
+            Ok(associate(network.camera(), scene, &instances, detections))
+        })?;
+        let due = scene.time + seconds(self.camera.mask_rcnn.latency_s);
+        let exposed = Exposed { time: scene.time, ego: scene.ego };
+        self.pending.push_back(Pending { due, exposed, ids: ids.to_vec(), result });
+        Ok(())
+    }
+
+    /// Gives the objects the evidence of the images whose results have arrived.
+    fn receive(&mut self, scene: &Scene<'_>) {
+        self.alone.clear();
+        while let Some(pending) = self.pending.pop_front_if(|pending| pending.due <= scene.time) {
+            for known in &mut self.known {
+                if let Some(place) = pending.ids.iter().position(|id| *id == known.id) {
+                    known.evidence = pending.result.evidence[place];
+                }
+            }
+            self.alone = pending.result.alone.iter().map(|seen| moved(seen, &pending.exposed, scene)).collect();
+        }
+    }
+}
+
+impl DetectionClassifier for ImageDetector {
+    fn classify(&mut self, scene: &Scene<'_>, detections: &mut [Detection]) -> Result<(), SensorError> {
+        // The key is drawn in each scan, so that both arms of a pair get the same exposures.
+        let key = ExposureKey::draw(&mut self.exposures);
+        let fault = if self.faults.is_empty() { None } else { self.faults.at(scene.time) };
+        let (is_dead, is_frozen) = fault.map_or((false, false), |fault| (fault.is_dead, fault.is_frozen));
+        self.failed_scans = if is_dead || is_frozen { self.failed_scans.saturating_add(1) } else { 0 };
+        self.held = is_frozen.then(|| self.held.take().unwrap_or_else(|| HeldImage::of(scene, key)));
+        let ids = self.link(scene.time, detections);
+        let due = *self.next_image.get_or_insert(scene.time);
+        if scene.time >= due {
+            self.next_image = Some(due + seconds(self.camera.mask_rcnn.period_s));
+            if !is_dead {
+                self.expose(scene, key, fault.as_ref(), (&ids, detections))?;
+            }
+        }
+        self.receive(scene);
+        for (detection, id) in detections.iter_mut().zip(&ids) {
+            let known = self.known.iter().find(|known| known.id == *id);
+            let Some(evidence) = known.and_then(|known| known.evidence) else { continue };
+            detection.class = fuse(&detection.class, &evidence.scores);
+            if let (Extent::Assumed, Some(width_m)) = (detection.width, evidence.width_m) {
+                (detection.width_m, detection.width) = (width_m, Extent::Seen);
+            }
+        }
+        Ok(())
+    }
+
+    fn seen_alone(&self) -> &[Detection] {
+        &self.alone
+    }
+
+    fn health(&self) -> Health {
+        if self.failed_scans >= NOTICED_AFTER_SCANS { Health::Failed } else { Health::Ok }
+    }
+}
+
+/// Returns a time of so many seconds.
+fn seconds(seconds: f64) -> Time {
+    #[expect(clippy::cast_possible_truncation, reason = "checked to be 0 to 1 s")]
+    Time::from_ns((seconds * 1e9).round() as i64)
+}

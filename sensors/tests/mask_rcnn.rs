@@ -1,0 +1,126 @@
+//! The pipeline `mask-rcnn` in the chain of the rear sensors: latency, faults of the camera, and what only one sensor sees.
+//!
+//! Needs the shared library of the `onnxruntime` wheel.
+
+use closecall_camera::Backend;
+use closecall_sensors::faults::{CameraFaultConfig, FaultEntries, Faults, LidarFaultConfig};
+use closecall_sensors::{
+    Detection, Health, NoiseKey, Perception, Scene, SceneVehicle, SensorsConfig, set_inference_backend,
+};
+use closecall_traffic::{
+    ActorId, CONTROL_STEP, Check, Environment, Parameters, Road, Vehicle, VehicleClass, VehicleState,
+};
+
+/// A network whose result arrives five control steps after the exposure.
+const SENSORS: &str = "mode = 'full'\nrear-camera = { pipeline = 'mask-rcnn', mask-rcnn = { latency-s = 0.2 } }\n";
+
+fn has_backend() -> bool {
+    let library = closecall_testing::onnxruntime();
+    library.map(|library| set_inference_backend(Backend::OnnxRuntime(library))).is_some()
+}
+
+fn faults(camera: &str, lidar: &str) -> Faults {
+    let camera: Vec<CameraFaultConfig> =
+        (!camera.is_empty()).then(|| toml::from_str(camera).unwrap()).into_iter().collect();
+    let lidar: Vec<LidarFaultConfig> =
+        (!lidar.is_empty()).then(|| toml::from_str(lidar).unwrap()).into_iter().collect();
+    let entries = FaultEntries {
+        rear_lidar: &lidar,
+        front_lidar: &[],
+        rear_camera: &camera,
+        object: [&[], &[], &[]],
+        odometry: None,
+    };
+    entries.check(&Parameters::default()).unwrap()
+}
+
+fn perception(sensors: &str, faults: Faults) -> Box<dyn Perception> {
+    let config: SensorsConfig = toml::from_str(sensors).unwrap();
+    let key = NoiseKey { seed: 1, sample: 2, ego: ActorId::new("ego").unwrap(), actors: [].into() };
+    config.check(&Parameters::default()).unwrap().with_faults(faults).build(&key).unwrap()
+}
+
+fn vehicle(actor: usize, class: VehicleClass, s_m: f64) -> SceneVehicle {
+    let state = VehicleState { s_m, d_m: -5.625, speed_mps: 30.0, ..VehicleState::default() };
+    SceneVehicle { actor, vehicle: Vehicle::typical(class), state, pitch_rad: 0.0 }
+}
+
+/// Runs a second and a half with a truck whose front is 30 m behind the ego's middle. Returns the detections of each step, and the health.
+fn follow(mut perception: Box<dyn Perception>) -> (Vec<Vec<Detection>>, Health) {
+    let (road, environment) = (Road::straight(3), Environment::CLEAR_DAY);
+    let mut detections = Vec::new();
+    for step in 0..38 {
+        let time = CONTROL_STEP * step;
+        let ego = vehicle(0, VehicleClass::Car, 500.0 + 30.0 * time.s());
+        let truck = vehicle(1, VehicleClass::Truck, ego.state.s_m - 30.0);
+        let mut truck = truck;
+        truck.state.s_m -= 0.5 * truck.vehicle.dimensions.length_m;
+        perception.step(&Scene { time, road: &road, environment: &environment, ego, others: &[truck] }).unwrap();
+        detections.push(perception.rear_detections().to_vec());
+    }
+    (detections, perception.health().rear)
+}
+
+fn truck_score(detections: &[Detection]) -> f64 {
+    detections.iter().map(|seen| seen.class.0[VehicleClass::Truck as usize]).fold(0.0, f64::max)
+}
+
+#[test]
+fn the_result_arrives_with_its_latency_and_applies_to_what_was_there() {
+    if !has_backend() {
+        return;
+    }
+    let off = "mode = 'full'\nrear-camera = { pipeline = 'off' }\n";
+    let (without, _) = follow(perception(off, Faults::default()));
+    let (with, health) = follow(perception(SENSORS, Faults::default()));
+    assert_eq!(health, Health::Ok);
+    for step in 0..5 {
+        assert_eq!(with[step], without[step], "step {step}: no image has arrived");
+    }
+    assert!(truck_score(&with[5]) > 0.9 && truck_score(&with[5]) > truck_score(&without[5]), "{:?}", with[5]);
+    // Until the next image, the evidence remains.
+    assert!((5..38).all(|step| truck_score(&with[step]) > 0.9));
+}
+
+#[test]
+fn a_dead_or_frozen_camera_is_noticed_and_a_dead_one_says_nothing() {
+    if !has_backend() {
+        return;
+    }
+    let off = "mode = 'full'\nrear-camera = { pipeline = 'off' }\n";
+    let (without, _) = follow(perception(off, Faults::default()));
+    let (dead, health) = follow(perception(SENSORS, faults("dead = true", "")));
+    assert_eq!((health, dead == without), (Health::Failed, true));
+    assert_eq!(follow(perception(SENSORS, faults("frozen = true", ""))).1, Health::Failed);
+}
+
+#[test]
+fn dirt_before_the_lens_hides_the_vehicle() {
+    if !has_backend() {
+        return;
+    }
+    let off = "mode = 'full'\nrear-camera = { pipeline = 'off' }\n";
+    let [off, clean] = [off, SENSORS].map(|sensors| truck_score(&follow(perception(sensors, Faults::default())).0[30]));
+    let (dirty, health) = follow(perception(SENSORS, faults("dirt = 1.0", "")));
+    let dirty = truck_score(&dirty[30]);
+    assert_eq!(health, Health::Ok, "no monitor notices dirt");
+    // The image speaks against the vehicle, and for it when it is clean; the shape alone stands between both.
+    assert!(dirty < off && off < clean, "{dirty}, {off}, {clean}");
+}
+
+#[test]
+fn without_lidar_the_camera_sees_the_vehicle_alone_and_five_times_per_second() {
+    if !has_backend() {
+        return;
+    }
+    let (seen, health) = follow(perception(SENSORS, faults("", "dead = true")));
+    assert_eq!(health, Health::Failed);
+    let steps: Vec<usize> = (0..seen.len()).filter(|step| !seen[*step].is_empty()).collect();
+    assert_eq!(steps, [5, 10, 15, 20, 25, 30, 35]);
+    for step in steps {
+        let [alone] = &seen[step][..] else { panic!("{:?}", seen[step]) };
+        // The ego has moved on by 6 m since the exposure, and the spot on the road has not.
+        assert!((alone.face_x_m + 36.0).abs() < 2.0 * alone.range_sd_m, "{alone:?}");
+        assert!(alone.face_y_m.abs() < 1.0 && alone.class.0[VehicleClass::Truck as usize] > 0.5, "{alone:?}");
+    }
+}

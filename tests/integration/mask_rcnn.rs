@@ -1,0 +1,74 @@
+//! The pipeline `mask-rcnn` from the command line.
+
+use std::path::Path;
+
+use crate::support::{closecall, code, folder, library, stderr};
+
+const PIPELINE: [&str; 2] = ["--set", "sensors.rear-camera.pipeline=mask-rcnn"];
+
+fn campaign<'a>(scenario: &'a str, out: &'a str, more: &[&'a str]) -> Vec<&'a str> {
+    let args =
+        ["campaign", scenario, "-n", "2", "--seed", "5", "--sensors", "full", "--no-gate", "--no-validity-checks"];
+    args.iter().chain(&["--set", "duration-s=12", "--out", out]).chain(&PIPELINE).chain(more).copied().collect()
+}
+
+/// Returns the message of a command that is refused.
+fn refused(args: &[&str]) -> String {
+    let output = closecall(args);
+    assert_eq!(code(&output), 3, "{args:?}: {}", stderr(&output));
+    stderr(&output)
+}
+
+#[test]
+fn without_onnx_runtime_it_says_how_to_get_it() {
+    let scenario = library("low-thw-overtake");
+    let scenario = scenario.to_str().unwrap();
+    let out = folder();
+    let out = out.path().join("out");
+    for args in [
+        campaign(scenario, out.to_str().unwrap(), &[]),
+        ["run", scenario, "--sensors", "full"].iter().chain(&PIPELINE).copied().collect(),
+        ["sensors", scenario, "--quick"].iter().chain(&PIPELINE).copied().collect::<Vec<&str>>(),
+    ] {
+        let text = refused(&args);
+        assert!(text.contains("pip install onnxruntime") && text.contains("--onnxruntime PATH"), "{args:?}: {text}");
+    }
+    assert!(!out.exists(), "nothing is written");
+}
+
+#[test]
+fn a_network_with_another_layout_is_refused_before_any_work() {
+    let Some(library_file) = closecall_testing::onnxruntime() else { return };
+    let scenario = library("low-thw-overtake");
+    let out = folder();
+    let out = out.path().join("out");
+    let wrong = "sensors.rear-camera.mask-rcnn.model=camera/models/rear-classifier.onnx";
+    let more = ["--onnxruntime", library_file.to_str().unwrap(), "--set", wrong];
+    let text = refused(&campaign(scenario.to_str().unwrap(), out.to_str().unwrap(), &more));
+    for part in ["rear-classifier.onnx", "wanted are", "masks float [n, 1, height, width]"] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    let missing = "sensors.rear-camera.mask-rcnn.model=nowhere.onnx";
+    let more = ["--onnxruntime", library_file.to_str().unwrap(), "--set", missing];
+    let text = refused(&campaign(scenario.to_str().unwrap(), out.to_str().unwrap(), &more));
+    assert!(text.contains("nowhere.onnx"), "{text}");
+}
+
+#[test]
+fn one_and_three_jobs_give_the_same_bits() {
+    let Some(library_file) = closecall_testing::onnxruntime() else { return };
+    let scenario = library("low-thw-overtake");
+    let folder = folder();
+    let outcomes = |jobs: &str| {
+        let out = folder.path().join(jobs);
+        let more = ["--onnxruntime", library_file.to_str().unwrap(), "--paired", "--jobs", jobs];
+        // After 12 s, the events that the scenario expects have not happened: no verdict is wanted, but the same one.
+        let output = closecall(campaign(scenario.to_str().unwrap(), out.to_str().unwrap(), &more));
+        let verdict = code(&output);
+        let read = |path: &Path| std::fs::read(path).unwrap();
+        (verdict, read(&out.join("outcomes.parquet")))
+    };
+    let (one, three) = (outcomes("1"), outcomes("3"));
+    assert_eq!(one.0, three.0);
+    assert!(one.1 == three.1, "the outcomes differ");
+}
