@@ -56,7 +56,7 @@ fn follow(mut perception: Box<dyn Perception>) -> (Vec<Vec<Detection>>, Health) 
         let mut truck = truck;
         truck.state.s_m -= 0.5 * truck.vehicle.dimensions.length_m;
         perception.step(&Scene { time, road: &road, environment: &environment, ego, others: &[truck] }).unwrap();
-        detections.push(perception.rear_detections().to_vec());
+        detections.push(perception.rear_lidar().map(|lidar| lidar.detections.to_vec()).unwrap_or_default());
     }
     (detections, perception.health().rear)
 }
