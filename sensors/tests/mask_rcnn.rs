@@ -21,9 +21,9 @@ fn has_backend() -> bool {
 
 fn faults(camera: &str, lidar: &str) -> Faults {
     let camera: Vec<CameraFaultConfig> =
-        (!camera.is_empty()).then(|| toml::from_str(camera).unwrap()).into_iter().collect();
+        (!camera.is_empty()).then(|| toml::from_str(camera).expect("a camera fault")).into_iter().collect();
     let lidar: Vec<LidarFaultConfig> =
-        (!lidar.is_empty()).then(|| toml::from_str(lidar).unwrap()).into_iter().collect();
+        (!lidar.is_empty()).then(|| toml::from_str(lidar).expect("a LiDAR fault")).into_iter().collect();
     let entries = FaultEntries {
         rear_lidar: &lidar,
         front_lidar: &[],
@@ -31,13 +31,18 @@ fn faults(camera: &str, lidar: &str) -> Faults {
         object: [&[], &[], &[]],
         odometry: None,
     };
-    entries.check(&Parameters::default()).unwrap()
+    entries.check(&Parameters::default()).expect("valid settings and scenes")
 }
 
 fn perception(sensors: &str, faults: Faults) -> Box<dyn Perception> {
-    let config: SensorsConfig = toml::from_str(sensors).unwrap();
-    let key = NoiseKey { seed: 1, sample: 2, ego: ActorId::new("ego").unwrap(), actors: [].into() };
-    config.check(&Parameters::default()).unwrap().with_faults(faults).build(&key).unwrap()
+    let config: SensorsConfig = toml::from_str(sensors).expect("valid settings and scenes");
+    let key = NoiseKey {
+        seed: 1,
+        sample: 2,
+        ego: ActorId::new("ego").expect("valid settings and scenes"),
+        actors: [].into(),
+    };
+    config.check(&Parameters::default()).expect("valid settings and scenes").with_faults(faults).build(&key).unwrap()
 }
 
 fn vehicle(actor: usize, class: VehicleClass, s_m: f64) -> SceneVehicle {
@@ -55,7 +60,9 @@ fn follow(mut perception: Box<dyn Perception>) -> (Vec<Vec<Detection>>, Health) 
         let truck = vehicle(1, VehicleClass::Truck, ego.state.s_m - 30.0);
         let mut truck = truck;
         truck.state.s_m -= 0.5 * truck.vehicle.dimensions.length_m;
-        perception.step(&Scene { time, road: &road, environment: &environment, ego, others: &[truck] }).unwrap();
+        perception
+            .step(&Scene { time, road: &road, environment: &environment, ego, others: &[truck] })
+            .expect("valid settings and scenes");
         detections.push(perception.rear_lidar().map(|lidar| lidar.detections.to_vec()).unwrap_or_default());
     }
     (detections, perception.health().rear)
