@@ -42,7 +42,12 @@ fn perception(sensors: &str, faults: Faults) -> Box<dyn Perception> {
         ego: ActorId::new("ego").expect("valid settings and scenes"),
         actors: [].into(),
     };
-    config.check(&Parameters::default()).expect("valid settings and scenes").with_faults(faults).build(&key).unwrap()
+    config
+        .check(&Parameters::default())
+        .expect("valid settings and scenes")
+        .with_faults(faults)
+        .build(&key)
+        .expect("valid settings and scenes")
 }
 
 fn vehicle(actor: usize, class: VehicleClass, s_m: f64) -> SceneVehicle {
