@@ -61,13 +61,14 @@ fn measure(samples: u64) -> Result<f64, Box<dyn Error>> {
 fn draw(path: &Path, points: &[(u64, f64)]) -> Result<(), Box<dyn Error>> {
     let most = points.last().map_or(1, |point| point.0);
     let first = points.first().map_or(1, |point| point.0);
+    let highest = points.iter().fold(LIMIT_MB, |highest, point| highest.max(point.1));
     let canvas = SVGBackend::new(path, SIZE).into_drawing_area();
     canvas.fill(&WHITE)?;
     let mut chart = ChartBuilder::on(&canvas)
         .margin(16)
         .x_label_area_size(46)
         .y_label_area_size(64)
-        .build_cartesian_2d((first as f64..most as f64).log_scale(), 0.0..1.25 * LIMIT_MB)?;
+        .build_cartesian_2d((first as f64..most as f64).log_scale(), 0.0..1.25 * highest)?;
     chart
         .configure_mesh()
         .light_line_style(WHITE)
