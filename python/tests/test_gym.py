@@ -190,10 +190,11 @@ envs.reset(seed=1, options={"sample": range(4)})
 child = os.fork()
 signal.alarm(40)
 observed = envs.step(np.full((4, 1), -0.5))[0]
-print(float(observed["odometry"].sum()), flush=True)
+# In one piece each, for both write to the same pipe.
+os.write(1, f"{observed['odometry'].sum()}\\n".encode())
 if child == 0:
     os._exit(0)
-print(os.waitpid(child, 0)[1])
+os.write(1, f"{os.waitpid(child, 0)[1]}\\n".encode())
 """
 
 

@@ -268,5 +268,5 @@ def test_ctrl_c_stops_a_campaign_that_goes_on_without_ray(machines: Any, expecte
 
 
 def test_killed_machines_and_a_killed_driver_lose_nothing(tmp_path: Path) -> None:
-    log = cluster.survive(1_500, 2, tmp_path)
+    log = cluster.survive(8_000, 2, tmp_path)
     assert sum("killed" in line for line in log) == 3
