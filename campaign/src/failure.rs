@@ -40,7 +40,7 @@ impl From<&NativeError> for FailureKind {
     fn from(error: &NativeError) -> Self {
         match error {
             NativeError::Refused { is_io: true, .. } => Self::Io,
-            NativeError::Refused { .. } | NativeError::Crash { .. } => Self::InvalidInput,
+            NativeError::Refused { .. } | NativeError::Crash { .. } | NativeError::Start { .. } => Self::InvalidInput,
         }
     }
 }

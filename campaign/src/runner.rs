@@ -84,11 +84,11 @@ impl Samples for Work {
         &self.arms
     }
 
-    /// Runs one sample in one arm, in a worker process if its controller is a library or an FMU, and checks it if the plan of the checks includes it.
+    /// Runs one sample in one arm, in a worker process if its controller is isolated, and checks it if the plan of the checks includes it.
     fn run(&self, sample: u64, index: usize, limit: Duration) -> ArmRun {
         let arm = &self.arms[index];
-        if let Some(native) = arm.controller.isolated() {
-            return host::run(self, (index, native), sample, limit);
+        if let Some(isolated) = arm.controller.isolated() {
+            return host::run(self, (index, isolated), sample, limit);
         }
         let key = RunKey { seed: self.sampling.seed, sample };
         let started = Instant::now();

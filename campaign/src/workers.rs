@@ -114,44 +114,9 @@ impl Workers {
         work: &Arc<S>,
         samples: impl Iterator<Item = u64>,
         stop: &StopFlag,
-        mut on_finished: impl FnMut(Finished) -> Result<ControlFlow<()>, E>,
+        on_finished: impl FnMut(Finished) -> Result<ControlFlow<()>, E>,
     ) -> Result<(), E> {
-        let arms = work.arms().len();
-        let mut runs = samples.flat_map(|sample| (0..arms).map(move |arm| (sample, arm)));
-        let mut pool = WorkerPool::new(*self, work, stop)?;
-        let mut order = Reorder { arms, next: 0, waiting: BTreeMap::new() };
-        let mut stopped: Option<Instant> = None;
-        loop {
-            if stop.is_set() {
-                stopped.get_or_insert_with(Instant::now);
-            }
-            while stopped.is_none()
-                && pool.has_room(order.next)
-                && let Some((sample, arm)) = runs.next()
-            {
-                pool.submit(sample, arm);
-            }
-            if order.next == pool.submitted {
-                return Ok(());
-            }
-            let is_idle = pool.is_idle();
-            let results = pool.wait()?;
-            if stop.is_abandoned() {
-                return Ok(());
-            }
-            let is_over = stopped.is_some_and(|at| is_idle && results.is_empty() || at.elapsed() >= STOP_TIMEOUT);
-            for done in results {
-                order.waiting.insert(done.index, done);
-            }
-            while let Some(finished) = order.pop(&**work) {
-                if on_finished(finished)?.is_break() {
-                    return Ok(());
-                }
-            }
-            if is_over {
-                return Ok(());
-            }
-        }
+        WorkerPool::new(*self, work, stop)?.run(samples, on_finished)
     }
 }
 
@@ -181,7 +146,8 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-struct WorkerPool<S> {
+/// Threads that run samples, with the worker processes that each of them has. They end when this value is dropped.
+pub(crate) struct WorkerPool<S> {
     workers: Workers,
     work: Arc<S>,
     stop: StopFlag,
@@ -197,7 +163,11 @@ struct WorkerPool<S> {
 }
 
 impl<S: Samples> WorkerPool<S> {
-    fn new(workers: Workers, work: &Arc<S>, stop: &StopFlag) -> Result<Self, WorkersError> {
+    /// Starts the threads.
+    ///
+    /// # Errors
+    /// [`WorkersError`] if the system refuses one.
+    pub(crate) fn new(workers: Workers, work: &Arc<S>, stop: &StopFlag) -> Result<Self, WorkersError> {
         let ((jobs, job_queue), (result_sender, results)) = (channel(), channel());
         let job_queue = Arc::new(Mutex::new(job_queue));
         let slots = Vec::with_capacity(workers.jobs.get());
@@ -209,6 +179,53 @@ impl<S: Samples> WorkerPool<S> {
             pool.slots.push(slot);
         }
         Ok(pool)
+    }
+
+    /// Does the same as [`Workers::run`]. A pool that has not passed on all results is not used again.
+    ///
+    /// # Errors
+    /// Those of [`Workers::run`].
+    pub(crate) fn run<E: From<WorkersError>>(
+        &mut self,
+        samples: impl Iterator<Item = u64>,
+        mut on_finished: impl FnMut(Finished) -> Result<ControlFlow<()>, E>,
+    ) -> Result<(), E> {
+        let (work, stop) = (self.work.clone(), self.stop.clone());
+        let arms = work.arms().len();
+        let mut runs = samples.flat_map(|sample| (0..arms).map(move |arm| (sample, arm)));
+        let mut order = Reorder { arms, next: self.submitted, waiting: BTreeMap::new() };
+        let mut stopped: Option<Instant> = None;
+        loop {
+            if stop.is_set() {
+                stopped.get_or_insert_with(Instant::now);
+            }
+            while stopped.is_none()
+                && self.has_room(order.next)
+                && let Some((sample, arm)) = runs.next()
+            {
+                self.submit(sample, arm);
+            }
+            if order.next == self.submitted {
+                return Ok(());
+            }
+            let is_idle = self.is_idle();
+            let results = self.wait()?;
+            if stop.is_abandoned() {
+                return Ok(());
+            }
+            let is_over = stopped.is_some_and(|at| is_idle && results.is_empty() || at.elapsed() >= STOP_TIMEOUT);
+            for done in results {
+                order.waiting.insert(done.index, done);
+            }
+            while let Some(finished) = order.pop(&*work) {
+                if on_finished(finished)?.is_break() {
+                    return Ok(());
+                }
+            }
+            if is_over {
+                return Ok(());
+            }
+        }
     }
 
     /// Starts a thread that works until there are no more jobs, or until it is abandoned.

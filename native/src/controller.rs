@@ -59,7 +59,9 @@ impl Session {
         setup: impl FnOnce() -> Setup,
         input: &Input,
     ) -> Result<Answer, String> {
-        let call = Call::begin(Time::from_ns(input.values().time_ns));
+        // It may first have to read its files, or to start an interpreter.
+        let begin = if self.0.is_none() { Call::begin_start } else { Call::begin };
+        let call = begin(Time::from_ns(input.values().time_ns));
         let run = match &mut self.0 {
             Some(run) => run,
             None => self.0.insert(loaded.start(&setup(), table)?),

@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-from . import _native
+from . import _host, _native
 from ._command import call, option
-from ._controller import ControllerLike, registered
+from ._controller import SAMPLE_TIMEOUT_S, ControllerLike, registered
 from ._errors import UsageError
 from ._run import SensorsLike
 from ._scenario import Scenario
@@ -58,6 +58,7 @@ def campaign(
     resume: bool = False,
     gate: Sequence[str] = (),
     progress: bool | Callable[[int, int], Any] = False,
+    isolate: bool = False,
     **options: str | float | bool | Sequence[str] | None,
 ) -> CampaignResult:
     """Runs many samples of scenarios, and judges the result, as ``closecall campaign`` does.
@@ -70,6 +71,10 @@ def campaign(
     ``progress`` is called with the number of samples that are done and of all; ``True`` shows a bar of ``tqdm``.
 
     A controller that raises, or answers no finite number, costs its sample: it counts as an error, and the exit code is 5.
+    ``isolate=True`` runs objects in worker processes, one for each job: a crash, a step that takes longer than
+    ``controller_timeout_ms`` (1000) and a process that needs more than ``controller_memory_mib`` (1024) cost the sample only, too, and
+    several jobs use several cores. It needs ``cloudpickle``.
+
     Ctrl-C raises ``KeyboardInterrupt`` after the samples that are running, and a second one at once. With ``out``, ``resume=True`` goes on from there.
     """
     several = [scenarios] if isinstance(scenarios, (Scenario, str, os.PathLike)) else scenarios
@@ -88,7 +93,15 @@ def campaign(
     if arms is not None and (controller is not None or paired):
         raise UsageError("`arms` names all controllers: leave out `controller` and `paired`")
     chosen: list[ControllerLike] = list(arms) if arms is not None else [] if controller is None else [controller]
-    with registered(chosen) as names, _reporter(progress) as report:
+    # On a cluster, objects run in worker processes, whatever they do to them.
+    is_remote = "ray" in options
+    limits = _limits(options) if isolate or is_remote else None
+    if limits is None and set(LIMITS) & set(options) and not any(isinstance(one, str) and ":" in one for one in chosen):
+        raise UsageError("`controller_timeout_ms` and `controller_memory_mib` limit processes: add `isolate=True`, or name one")
+    timeout_s = options.get("sample_timeout_s")
+    # What is no number, the command line refuses.
+    limit_s = timeout_s if isinstance(timeout_s, (int, float)) else SAMPLE_TIMEOUT_S
+    with registered(chosen, limits, is_remote, limit_s) as names, _reporter(progress) as report:
         which = option("arms" if arms is not None else "controller", names)
         named: dict[str, object] = {"samples": n, "paired": paired, "seed": seed, "design": design, "sensors": sensors, "jobs": jobs}
         named |= {"out": None if out is None else os.fspath(out), "resume": resume, "gate": list(gate), "set": settings}
@@ -97,6 +110,22 @@ def campaign(
     keys = json.loads(output)
     folder = None if out is None else Path(out)
     return CampaignResult(code, keys.get("verdict", "ENDED EARLY"), keys["samples"], keys["errors"], keys, folder)
+
+
+#: The options that limit worker processes, with their largest values.
+LIMITS = {"controller_timeout_ms": 600_000, "controller_memory_mib": 1_048_576}
+
+
+def _limits(options: dict[str, Any]) -> _host.Limits:
+    """Returns the limits of worker processes that the options give."""
+    values = []
+    for (name, largest), default in zip(LIMITS.items(), _host.Limits()):
+        value = options.get(name)
+        value = default if value is None else value
+        if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= largest:
+            raise UsageError(f"{name}: expected a whole number from 1 to {largest}, not {value!r}")
+        values.append(value)
+    return _host.Limits(*values)
 
 
 class _reporter:

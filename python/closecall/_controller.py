@@ -12,19 +12,25 @@ import os
 import pickle
 import sys
 import sysconfig
+import tempfile
+import threading
 import time
 import types
 import uuid
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import Any, Literal, Protocol, runtime_checkable
 
-from . import _native
+from . import _host, _native
 from ._errors import UsageError
 
 #: Time that a hanging step has to end after the campaign (s).
 END_TIMEOUT_S = 5.0
+#: Interval at which steps that hang are looked for (s), and the time after which the campaign has certainly given up their sample (s).
+WATCH_INTERVAL_S, GIVEN_UP_S = 0.25, 1.0
+#: Default time limit of a sample: that of ``closecall campaign`` (s).
+SAMPLE_TIMEOUT_S = 300.0
 
 #: What the ego stack does, for the summary of the margin increase system.
 State = Literal["following", "increasing", "holding", "releasing", "emergency-braking"]
@@ -45,8 +51,8 @@ class Controller(Protocol):
 #: that creates one without arguments (called for each sample).
 ControllerLike = str | Controller | Callable[[], Controller]
 
-#: The controllers of the campaigns that run, by their names.
-REGISTERED: dict[str, ControllerLike] = {}
+#: The controllers of the campaigns that run, by their names, with their limits in processes of their own.
+REGISTERED: dict[str, tuple[ControllerLike, _host.Limits]] = {}
 
 
 def native(controller: ControllerLike) -> str | _native.PythonController:
@@ -195,6 +201,11 @@ def _constant(value: object) -> Any:
     return repr(value)
 
 
+def _end(thread: int) -> None:
+    """Raises ``SystemExit`` in a thread, as soon as it runs Python code."""
+    ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), ctypes.py_object(SystemExit))
+
+
 def end_steps(controller: _native.PythonController) -> None:
     """Ends the steps that hang: they would keep their threads busy, and the interpreter could not end in order."""
     hanging, raised = controller.unregister(), set[int]()
@@ -202,7 +213,7 @@ def end_steps(controller: _native.PythonController) -> None:
     while controller.is_busy and time.monotonic() < deadline_s:
         for thread in hanging:
             if thread not in raised:
-                ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), ctypes.py_object(SystemExit))
+                _end(thread)
                 raised.add(thread)
         time.sleep(0.005)
         hanging = controller.unregister()
@@ -211,22 +222,55 @@ def end_steps(controller: _native.PythonController) -> None:
 
 
 @contextmanager
-def registered(controllers: list[ControllerLike]) -> Iterator[list[str]]:
-    """Gives every controller a name that the commands of the program know, for as long as the context lasts."""
-    names: list[str] = []
-    own: list[_native.PythonController] = []
+def _watched(controllers: list[_native.PythonController], sample_timeout_s: float) -> Iterator[None]:
+    """Ends steps whose sample was given up, for as long as the context lasts: each would take its share of the interpreter."""
+    is_over = threading.Event()
+
+    def watch() -> None:
+        while not is_over.wait(WATCH_INTERVAL_S):
+            for controller in controllers:
+                for thread in controller.late(sample_timeout_s + GIVEN_UP_S):
+                    _end(thread)
+
+    watching = threading.Thread(target=watch, name="closecall watch", daemon=True)
+    watching.start()
     try:
-        for controller in controllers:
-            made = native(controller)
-            if isinstance(made, str):
-                names.append(made)
-            else:
+        yield
+    finally:
+        is_over.set()
+        watching.join()
+
+
+@contextmanager
+def registered(
+    controllers: list[ControllerLike], limits: _host.Limits | None = None, is_remote: bool = False, timeout_s: float = SAMPLE_TIMEOUT_S
+) -> Iterator[list[str]]:
+    """Gives every controller a name that the commands of the program know, for as long as the context lasts.
+
+    With ``limits``, the samples of objects run in worker processes that keep to them: of this program, or of a cluster. Without,
+    steps end that hang for longer than ``timeout_s``, the time limit of a sample.
+    """
+    names = [one if isinstance(one, str) else _name(one) for one in controllers]
+    objects = {name: one for name, one in zip(names, controllers) if not isinstance(one, str)}
+    own: list[_native.PythonController] = []
+    process: tuple[list[str], int, int] | None = None
+    with ExitStack() as ends:
+        if limits is not None and objects:
+            words: list[str] = []
+            if not is_remote:
+                folder = ends.enter_context(tempfile.TemporaryDirectory(prefix="closecall-"))
+                words = _host.parcel(objects, limits).write(folder)
+            process = (words, *limits)
+        try:
+            for name, controller in objects.items():
+                made = _native.PythonController(name, factory(controller), process)
                 made.register()
                 own.append(made)
-                REGISTERED[made.name] = controller
-                names.append(made.name)
-        yield names
-    finally:
-        for made in own:
-            REGISTERED.pop(made.name, None)
-            end_steps(made)
+                REGISTERED[name] = controller, limits or _host.Limits()
+            if own and limits is None:
+                ends.enter_context(_watched(own, timeout_s))
+            yield names
+        finally:
+            for made in own:
+                REGISTERED.pop(made.name, None)
+                end_steps(made)

@@ -16,21 +16,21 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import importlib
-import linecache
 import os
+import pickle
 import signal
 import socket
-import sys
+import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from . import _native
+from . import _host, _native
 from . import _campaign as _campaigns
 from ._campaign import CampaignResult, ScenarioLike
-from ._controller import REGISTERED, ControllerLike, end_steps, factory, is_installed_file
+from ._controller import REGISTERED
 from ._errors import ClosecallError, FileError, InputError
 
 __all__ = ["campaign"]
@@ -153,7 +153,7 @@ class Cluster:
         version, manifest, names, files = shipment
         self._ray = ray
         self._end = end
-        pickled = _pickled(ray, {name: REGISTERED[name] for name in names})
+        pickled = pickle.dumps(_parcel(names))
         digest = hashlib.sha256(repr((version, manifest, files)).encode() + pickled).hexdigest()
         shipped: Shipped = (digest, version, manifest, files, pickled)
         self._shipped = ray.put(shipped)
@@ -247,19 +247,23 @@ def _task() -> Callable[[Shipped, int, list[int]], tuple[str, Any]]:
     return run_block
 
 
+def _parcel(names: list[str]) -> _host.Parcel:
+    """Returns the controllers of the campaign that is to run, as the workers need them."""
+    controllers = {name: REGISTERED[name] for name in names}
+    limits = next((limits for _, limits in controllers.values()), _host.Limits())
+    return _host.parcel({name: one for name, (one, _) in controllers.items()}, limits)
+
+
 class _Prepared:
-    """A campaign that a worker has prepared. Its blocks come one after the other."""
+    """A campaign that a worker has prepared. Controllers run in processes of their own, which stay from block to block."""
 
     def __init__(self, shipped: Shipped) -> None:
         self.digest, version, manifest, files, pickled = shipped
-        cloudpickle = importlib.import_module("ray.cloudpickle")
-        controllers: dict[str, ControllerLike]
-        controllers, sources = cloudpickle.loads(pickled)
-        for file, lines in sources.items():
-            # A traceback quotes the lines as it does in the driver.
-            linecache.cache[file] = (sum(map(len, lines)), None, lines, file)
-        self.controllers = [_native.PythonController(name, factory(one)) for name, one in controllers.items()]
-        for controller in self.controllers:
+        parcel: _host.Parcel = pickle.loads(pickled)
+        self._folder = tempfile.TemporaryDirectory(prefix="closecall-")
+        words = parcel.write(self._folder.name)
+        self._controllers = [_native.PythonController(name, _absent, (words, *parcel.limits)) for name in parcel.names]
+        for controller in self._controllers:
             controller.register()
         try:
             self.runner = _native.BlockRunner(version, manifest, files)
@@ -267,12 +271,15 @@ class _Prepared:
             self.end()
             raise
 
-    def is_busy(self) -> bool:
-        return any(controller.is_busy for controller in self.controllers)
-
     def end(self) -> None:
-        for controller in self.controllers:
-            end_steps(controller)
+        for controller in self._controllers:
+            controller.unregister()
+        self._folder.cleanup()
+
+
+def _absent() -> Any:
+    """Stands for a controller that the processes of this one have."""
+    raise RuntimeError("the controller runs in processes of its own")
 
 
 _prepared: _Prepared | None = None
@@ -287,39 +294,6 @@ def answer(shipped: Shipped, work: int, samples: list[int]) -> tuple[str, Any]:
                 _prepared.end()
                 _prepared = None
             _prepared = _Prepared(shipped)
-        records = _prepared.runner.run(work, samples)
-        if _prepared.is_busy():
-            # A step hangs. Its sample is an error, and the next block begins with controllers of its own.
-            _prepared.end()
-            _prepared = None
-        return "done", records
+        return "done", _prepared.runner.run(work, samples)
     except ClosecallError as error:
         return "refused" if error.exit_code == 3 else "failed", str(error)
-    except ImportError as error:
-        return "refused", f"a controller needs a package that is not installed there: {error}"
-
-
-def _pickled(ray: Any, controllers: dict[str, ControllerLike]) -> bytes:
-    """Pickles controllers with the code of all modules that are not installed, and with their source text."""
-    cloudpickle = importlib.import_module("ray.cloudpickle")
-    own = [module for module in list(sys.modules.values()) if _is_own(module)] if controllers else []
-    for module in own:
-        cloudpickle.register_pickle_by_value(module)
-    files = [getattr(module, "__file__", None) for module in [*own, sys.modules["__main__"]]] if controllers else []
-    sources = {file: linecache.getlines(file) for file in files if file is not None}
-    try:
-        pickled: bytes = cloudpickle.dumps((controllers, sources))
-        return pickled
-    except Exception as error:
-        raise InputError(f"a controller cannot be shipped, since it cannot be pickled: {error}", exit_code=3) from error
-    finally:
-        for module in own:
-            cloudpickle.unregister_pickle_by_value(module)
-
-
-def _is_own(module: Any) -> bool:
-    """Returns whether a module is a file of the user, and belongs to no installed package."""
-    file, name = getattr(module, "__file__", None), getattr(module, "__name__", "")
-    if file is None or name == "__main__" or name.partition(".")[0] in ("closecall", "ray"):
-        return False
-    return name in sys.modules and not is_installed_file(file)

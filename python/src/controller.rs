@@ -1,14 +1,17 @@
 //! Controllers that are Python objects: what they are given, and how their answers and exceptions are taken.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
 
 use closecall_controllers::{
     ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings, EgoState, LeadVehicleSelector, Reason,
 };
+use closecall_native::watch::Call;
 use closecall_simulation::ControllerFactory;
-use closecall_simulation::controller::hosted::{Registration, register};
+use closecall_simulation::controller::hosted::{self, HostedProcess, Registration, register};
+use closecall_simulation::controller::isolated::Isolated;
 use closecall_traffic::{CONTROL_STEP, Road};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -35,8 +38,8 @@ struct Shared {
     is_cancelled: AtomicBool,
     /// The exception of the latest failure.
     failure: Mutex<Option<PyErr>>,
-    /// Python's identifiers of the threads that are in a step.
-    threads: Mutex<BTreeSet<u64>>,
+    /// The threads that are in a step, by Python's identifiers, with the time at which the step began.
+    threads: Mutex<BTreeMap<u64, Instant>>,
     /// Number of threads that are in a step, or about to begin one.
     active: AtomicUsize,
 }
@@ -65,14 +68,15 @@ pub(crate) struct PythonController {
     name: String,
     create: Arc<Py<PyAny>>,
     shared: Arc<Shared>,
+    process: Option<HostedProcess>,
     registration: Mutex<Option<Registration>>,
 }
 
 impl PythonController {
     /// Returns a factory of the controller.
     pub(crate) fn factory(&self, _: Python<'_>) -> Arc<dyn ControllerFactory> {
-        let name = self.name.split_once('@').map_or(&self.name[..], |(name, _)| name).to_owned();
-        Arc::new(Factory { name, create: self.create.clone(), shared: self.shared.clone() })
+        let (name, process) = (reported(&self.name).to_owned(), self.process.clone());
+        Arc::new(Factory { name, create: self.create.clone(), shared: self.shared.clone(), process })
     }
 
     /// Returns the exception of the latest failure.
@@ -88,10 +92,17 @@ impl PythonController {
 
 #[pymethods]
 impl PythonController {
-    /// Creates a controller. `name` is `python:NAME@VERSION`; `create` is called without arguments for each sample.
+    /// Creates a controller. `name` is `python:NAME@VERSION`; `create` is called without arguments for each sample. `process` has the
+    /// words that start a worker process, and its limits: the time of an answer (ms), and the memory (MiB). Campaigns then run its
+    /// samples in such processes.
     #[new]
-    fn new(name: String, create: Py<PyAny>) -> Self {
-        Self { name, create: Arc::new(create), shared: Arc::default(), registration: Mutex::default() }
+    #[pyo3(signature = (name, create, process=None))]
+    fn new(name: String, create: Py<PyAny>, process: Option<(Vec<String>, u64, u64)>) -> Self {
+        let process = process.map(|(words, timeout_ms, memory_mib)| {
+            let (id, name) = (name.clone(), reported(&name).to_owned());
+            HostedProcess { id, name, words, timeout_ms, memory_mib }
+        });
+        Self { name, create: Arc::new(create), shared: Arc::default(), process, registration: Mutex::default() }
     }
 
     /// Lets the commands of the program use the controller by its name.
@@ -106,7 +117,14 @@ impl PythonController {
         let registration = lock(&self.registration).take();
         drop(registration);
         self.cancel();
-        lock(&self.shared.threads).iter().copied().collect()
+        lock(&self.shared.threads).keys().copied().collect()
+    }
+
+    /// Python's identifiers of the threads that have been in the same step for longer than `limit_s`.
+    fn late(&self, limit_s: f64) -> Vec<u64> {
+        let threads = lock(&self.shared.threads);
+        let late = threads.iter().filter(|(_, began)| began.elapsed().as_secs_f64() > limit_s);
+        late.map(|(thread, _)| *thread).collect()
     }
 
     /// Whether any thread is in a step.
@@ -116,10 +134,22 @@ impl PythonController {
     }
 }
 
+/// Lets this process, which is a worker process, refuse the samples of a controller that it cannot load.
+#[pyfunction]
+pub(crate) fn refuse(name: &str, reason: String) {
+    hosted::refuse(name, reason);
+}
+
+/// Returns the name in reports, which lacks the version.
+fn reported(name: &str) -> &str {
+    name.split_once('@').map_or(name, |(name, _)| name)
+}
+
 struct Factory {
     name: String,
     create: Arc<Py<PyAny>>,
     shared: Arc<Shared>,
+    process: Option<HostedProcess>,
 }
 
 impl ControllerFactory for Factory {
@@ -130,6 +160,10 @@ impl ControllerFactory for Factory {
     /// The outcome summarises the states that the controller answers if the scenario has a margin increase system.
     fn has_mis(&self, settings: &EgoSettings) -> bool {
         settings.mis().is_some()
+    }
+
+    fn isolated(&self) -> Option<Isolated> {
+        self.process.clone().map(Isolated::Hosted)
     }
 
     fn build(&self, settings: &EgoSettings) -> Box<dyn EgoController> {
@@ -166,7 +200,7 @@ impl Controller {
                 self.step.insert(step).bind(py)
             }
         };
-        lock(&self.shared.threads).insert(self.thread);
+        lock(&self.shared.threads).insert(self.thread, Instant::now());
         let answer = step.call1((Bound::new(py, given)?,));
         lock(&self.shared.threads).remove(&self.thread);
         parse(&answer?)
@@ -175,7 +209,7 @@ impl Controller {
     /// Creates the object, calls its method `start` if it has one, and returns its method `step`.
     fn start(&mut self, py: Python<'_>, road: &Road) -> PyResult<Py<PyAny>> {
         self.thread = py.import("threading")?.call_method0("get_ident")?.extract()?;
-        lock(&self.shared.threads).insert(self.thread);
+        lock(&self.shared.threads).insert(self.thread, Instant::now());
         let started = self.create(py, road);
         lock(&self.shared.threads).remove(&self.thread);
         started
@@ -199,6 +233,9 @@ impl EgoController for Controller {
         let called = if shared.is_cancelled.load(Ordering::SeqCst) {
             Err("the Python program has ended the run".to_owned())
         } else {
+            // A worker process ends if a call takes too long, also if it keeps the interpreter to itself.
+            let begin = if self.step.is_none() { Call::begin_start } else { Call::begin };
+            let _call = begin(input.time);
             Python::attach(|py| {
                 self.call(py, input).map_err(|error| {
                     let text = described(py, &error);

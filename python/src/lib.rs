@@ -30,7 +30,7 @@ mod _native {
     #[pymodule_export]
     use super::command::{call, main, read_table, set_program};
     #[pymodule_export]
-    use super::controller::{ControllerInput, LeadVehicle, Odometry, PythonController, Sensors, Setup, Track};
+    use super::controller::{ControllerInput, LeadVehicle, Odometry, PythonController, Sensors, Setup, Track, refuse};
     #[pymodule_export]
     use super::episode::{Episode, Episodes};
     #[pymodule_export]

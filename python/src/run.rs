@@ -115,7 +115,7 @@ pub(crate) fn run(
             choice.factory()
         }
     };
-    let native = factory.isolated().map(|native| native.settings().clone());
+    let native = factory.isolated().and_then(|isolated| Some(isolated.native()?.settings().clone()));
     let arm = Arm { controller: factory, sensors: sensor_mode(py, sensors)? };
     let concrete = scenario.get().concrete(seed, sample).map_err(|error| sample_exception(py, sample, &error))?;
     if let Some(native) = native {

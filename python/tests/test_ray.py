@@ -82,15 +82,15 @@ def test_a_controller_in_python_is_shipped(machines: Any, tmp_path: Path, monkey
     spec.loader.exec_module(module)
     options: dict[str, Any] = {"n": 12, "sensors": "object", "controller": module.Own, "no_gate": True}
     local = cc.campaign(SCENARIO, out=tmp_path / "local", **options)
-    pickled = closecall.ray._pickled
+    parcel = closecall.ray._parcel
 
-    def remove(*arguments: Any) -> bytes:
+    def remove(*arguments: Any) -> Any:
         # What the workers need is not there for them: the module comes to them with the campaign.
-        shipped = pickled(*arguments)
+        shipped = parcel(*arguments)
         file.unlink()
         return shipped
 
-    monkeypatch.setattr(closecall.ray, "_pickled", remove)
+    monkeypatch.setattr(closecall.ray, "_parcel", remove)
     result = closecall.ray.campaign(SCENARIO, address=machines.address, out=tmp_path / "ray", **options)
     assert not file.exists()
     assert (result.exit_code, result.errors) == (local.exit_code, local.errors) == (5, local.errors)
@@ -176,13 +176,16 @@ def test_an_answer_that_is_not_that_of_the_block_is_an_error(
 
 
 def test_a_block_that_ends_its_worker_is_an_error(machines: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    class Crashes:
-        def step(self, input: cc.ControllerInput) -> float:
+    def task() -> Any:
+        def run_block(shipped: Any, work: int, samples: list[int]) -> tuple[str, bytes]:
             os._exit(9)
 
+        return run_block
+
     monkeypatch.setattr(closecall.ray, "RETRIES", 1)
+    monkeypatch.setattr(closecall.ray, "_task", task)
     with pytest.raises(cc.FileError, match="has failed for good"):
-        closecall.ray.campaign(SCENARIO, 4, address=machines.address, controller=Crashes, sensors="object", no_gate=True)
+        closecall.ray.campaign(SCENARIO, 4, address=machines.address, sensors="object", no_gate=True)
 
 
 def test_a_worker_that_needs_too_much_memory_is_not_started_without_end() -> None:

@@ -33,7 +33,7 @@ impl ControllerArgs {
         Ok(self.limited(std::slice::from_ref(&self.controller))?.swap_remove(0))
     }
 
-    /// Returns the controllers, the processes among them with the limits of the command line. Libraries and FMUs are tried.
+    /// Returns the controllers, the processes among them with the limits of the command line. Each is tried.
     fn limited(&self, controllers: &[ControllerChoice]) -> Result<Vec<ControllerChoice>, CliError> {
         let (timeout_ms, memory_mib) = (self.controller_timeout_ms, self.controller_memory_mib);
         if let (Some(last), true) = (controllers.last(), timeout_ms.is_some() || memory_mib.is_some())
@@ -45,7 +45,7 @@ impl ControllerArgs {
             )));
         }
         let limited: Vec<_> = controllers.iter().map(|choice| choice.limited(timeout_ms, memory_mib)).collect();
-        limited.iter().filter_map(ControllerChoice::native).try_for_each(|native| native.probe(None).map(drop))?;
+        limited.iter().try_for_each(|choice| choice.try_in(None))?;
         Ok(limited)
     }
 }

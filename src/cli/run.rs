@@ -46,8 +46,8 @@ pub(super) fn run(args: &RunArgs) -> Result<ExitCode, CliError> {
     let scenario = concrete(&file, sampling, args.sample).map_err(fail)?;
     let key = RunKey { seed: args.sim.seed, sample: args.sample };
     let arms = args.comparison.arms(&args.sim.arm)?;
-    for native in arms.iter().filter_map(|arm| arm.controller.isolated()) {
-        native.settings().check_variables(&scenario, None)?;
+    for isolated in arms.iter().filter_map(|arm| arm.controller.isolated()) {
+        isolated.check_variables(&scenario, None)?;
     }
     arms.iter().filter_map(|arm| arm.sensors).try_for_each(|mode| file.check_faults_in(mode))?;
     let outcomes = run_watched(&scenario, key, &arms, (&args.watch, &args.sim.set.settings))?;

@@ -106,8 +106,9 @@ fn a_controller_that_uses_too_much_memory_is_stopped() {
 #[test]
 fn a_command_that_cannot_be_started_or_parsed_is_an_error() {
     let output = run_with("exec:no-such-program --fast", "none");
-    assert_eq!(code(&output), 5);
-    assert!(message(&output).contains("`no-such-program` could not be started: No such file"), "{}", stderr(&output));
+    assert_eq!(code(&output), 3);
+    let expected = "failed to use the controller `exec:no-such-program --fast`: `no-such-program` could not be started: No such file";
+    assert!(message(&output).contains(expected), "{}", stderr(&output));
     let headline = library("low-thw-overtake");
     for arguments in [
         vec!["--controller", "exec:"],

@@ -8,8 +8,7 @@ use closecall_camera::Backend;
 use closecall_sensors::inference_backend;
 use closecall_simulation::SampleError;
 use closecall_simulation::controller::exec::{Child, ExecError};
-use closecall_simulation::controller::native::NativeFactory;
-use closecall_simulation::run::ControllerFactory;
+use closecall_simulation::controller::isolated::Isolated;
 
 use super::{Answer, Task};
 use crate::manifest::version;
@@ -26,13 +25,14 @@ thread_local! {
 }
 
 /// Runs one sample in a worker process. `arm` is the index of the arm, and its controller. `limit` is the time limit of the sample.
-pub(crate) fn run(work: &Work, arm: (usize, &NativeFactory), sample: u64, limit: Duration) -> ArmRun {
+pub(crate) fn run(work: &Work, (arm, isolated): (usize, Isolated), sample: u64, limit: Duration) -> ArmRun {
     let started = Instant::now();
-    let answer = PROCESSES.with_borrow_mut(|processes| in_process(processes, work, arm, (sample, limit)));
+    let name = isolated.name().to_owned();
+    let answer = PROCESSES.with_borrow_mut(|processes| in_process(processes, work, (arm, isolated), (sample, limit)));
     match answer {
         Ok(Answer { record, wall_s, check_s, .. }) => ArmRun { record, wall_s, check_s },
         Err(failure) => ArmRun {
-            record: ArmRecord { controller: arm.1.name().to_owned(), result: Err(failure), checks: None },
+            record: ArmRecord { controller: name, result: Err(failure), checks: None },
             wall_s: started.elapsed().as_secs_f64(),
             check_s: 0.0,
         },
@@ -42,14 +42,14 @@ pub(crate) fn run(work: &Work, arm: (usize, &NativeFactory), sample: u64, limit:
 fn in_process(
     processes: &mut BTreeMap<(usize, usize), Child>,
     work: &Work,
-    (index, native): (usize, &NativeFactory),
+    (index, isolated): (usize, Isolated),
     (sample, limit): (u64, Duration),
 ) -> Result<Answer, SampleFailure> {
     let key = (std::ptr::from_ref(work) as usize, index);
     loop {
         let (mut process, is_new) = match processes.remove(&key) {
             Some(process) => (process, false),
-            None => (start(work, index, native).map_err(|error| failure(&error))?, true),
+            None => (start(work, index, &isolated).map_err(|error| failure(&error))?, true),
         };
         match process.request_within(line(&sample), limit) {
             Ok(Some(line)) => {
@@ -72,21 +72,21 @@ fn in_process(
 }
 
 /// Starts a worker process, and gives it its task.
-fn start(work: &Work, arm: usize, native: &NativeFactory) -> Result<Child, ExecError> {
+fn start(work: &Work, arm: usize, isolated: &Isolated) -> Result<Child, ExecError> {
     let library = match inference_backend() {
         Backend::Tract => None,
         Backend::OnnxRuntime(library) => Some(library.display().to_string()),
     };
     let backend = library.iter().flat_map(|library| ["--onnxruntime", library.as_str()]);
     let arguments: Vec<&str> = std::iter::once("samples").chain(backend).collect();
-    let process = Child::start(&native.settings().process(&arguments), None)?;
+    let process = Child::start(&isolated.process(&arguments), None)?;
     process.send(line(&Task {
         version: version(),
         path: work.file.path().to_owned(),
         text: work.file.text().to_owned(),
         sampling: work.sampling,
         checks: work.checks,
-        controller: native.clone(),
+        controller: isolated.clone(),
         sensors: work.arms[arm].sensors,
     }));
     Ok(process)

@@ -1,4 +1,5 @@
-//! Worker processes that run whole samples with a library or an FMU as their controller.
+//! Worker processes that run whole samples with a controller that may crash or hang: a library, an FMU, or an object of the
+//! program that has Closecall as a library.
 //!
 //! ```text
 //!  campaign, one thread per job                         worker process: `closecall host samples`
@@ -25,7 +26,7 @@ pub use serve::serve;
 use std::path::PathBuf;
 
 use closecall_sensors::SensorMode;
-use closecall_simulation::controller::native::NativeFactory;
+use closecall_simulation::controller::isolated::Isolated;
 use serde::{Deserialize, Serialize};
 
 use super::record::{ArmRecord, Record};
@@ -52,7 +53,7 @@ struct Task {
     text: String,
     sampling: Sampling,
     checks: CheckPlan,
-    controller: NativeFactory,
+    controller: Isolated,
     sensors: Option<SensorMode>,
 }
 

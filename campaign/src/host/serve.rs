@@ -11,7 +11,6 @@ use closecall_controllers::ControllerError;
 use closecall_native::{Kind, Loaded, VariableTable, Variables, bridge, cost, unload_all, watch};
 use closecall_simulation::controller::exec::NEW_SAMPLE;
 use closecall_simulation::controller::native::Probe;
-use closecall_simulation::run::ControllerFactory;
 use closecall_simulation::scenario::ScenarioFile;
 use closecall_simulation::{Arm, SampleError};
 
@@ -103,24 +102,25 @@ fn samples(requests: impl BufRead, answers: &Arc<Mutex<File>>) -> Result<(), Str
         return if lines.next().is_some() { refuse(answers, reason) } else { Ok(()) };
     }
     let task: Task = read(&first)?;
-    if let Err(reason) = task.controller.check_unchanged() {
-        return if lines.next().is_some() { refuse(answers, reason) } else { Ok(()) };
-    }
+    let timeout_ms = task.controller.timeout_ms();
+    let controller = match task.controller.in_this_process() {
+        Ok(controller) => controller,
+        Err(reason) => return if lines.next().is_some() { refuse(answers, reason) } else { Ok(()) },
+    };
+    let name = controller.name().to_owned();
     let file = ScenarioFile::parse(&task.path, &task.text, &[]).map_err(|error| error.to_string())?;
-    let controller = task.controller.in_this_process();
-    let (name, timeout_ms) = (controller.name().to_owned(), controller.settings().timeout_ms);
-    let arms = vec![Arm { controller: Arc::new(controller), sensors: task.sensors }];
+    let arms = vec![Arm { controller, sensors: task.sensors }];
     let work = Work { file, sampling: task.sampling, arms, checks: task.checks };
     let is_answered = Arc::new(AtomicBool::new(true));
     let late = {
         let (answers, is_answered) = (answers.clone(), is_answered.clone());
-        move |time| {
-            let reason = format!("no answer within {timeout_ms} ms");
+        move |time, limit: Duration| {
+            let reason = format!("no answer within {} ms", limit.as_millis());
             let failure = SampleFailure::from(SampleError::from(ControllerError::Own { reason, time }));
             let record = ArmRecord { controller: name.clone(), result: Err(failure), checks: None };
             if !is_answered.swap(true, Ordering::SeqCst) {
                 // The process ends after this. If the answer is lost, its end is the error of the sample.
-                answer(&answers, ArmRun { record, wall_s: timeout_ms as f64 * 1e-3, check_s: 0.0 }, true).ok();
+                answer(&answers, ArmRun { record, wall_s: limit.as_secs_f64(), check_s: 0.0 }, true).ok();
             }
         }
     };

@@ -1,9 +1,10 @@
 //! Runs blocks of a campaign on the machine that an engine has chosen.
 
+use std::fmt;
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use closecall_camera::Backend;
@@ -20,20 +21,27 @@ use crate::plan::Plan;
 use crate::runner::Work;
 use crate::saved::{SavedError, works};
 use crate::stop::StopFlag;
-use crate::workers::{Finished, Workers, WorkersError};
+use crate::workers::{Finished, WorkerPool, Workers, WorkersError};
 
 /// The variable that names the library of ONNX Runtime, as for the command line.
 const BACKEND_VARIABLE: &str = "ORT_DYLIB_PATH";
 
 /// A campaign, ready to run blocks of its samples.
-#[derive(Debug)]
 pub struct BlockRunner {
     works: Vec<Arc<Work>>,
     workers: Workers,
+    /// The thread of the latest scenario, with the scenario's index. It keeps its worker processes from block to block.
+    pool: Mutex<Option<(usize, WorkerPool<Work>)>>,
     version: String,
     configuration: String,
     /// The files of the controllers.
     _folder: Option<TempDir>,
+}
+
+impl fmt::Debug for BlockRunner {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("BlockRunner").field("configuration", &self.configuration).finish_non_exhaustive()
+    }
 }
 
 impl BlockRunner {
@@ -59,6 +67,7 @@ impl BlockRunner {
         };
         let sample_timeout = Duration::try_from_secs_f64(sent.sample_timeout_s).map_err(too_long)?;
         let files = works.iter().map(|work| work.file.clone()).collect();
+        sent.arms.iter().try_for_each(|arm| arm.try_in(local.controller_folder()))?;
         let mut plan = Plan::new_in(local.controller_folder(), files, sent.sampling, sent.arms.clone())?;
         plan.use_sensors(sent.sensors).map_err(SavedError::from)?;
         plan.partition = sent.partition;
@@ -72,7 +81,8 @@ impl BlockRunner {
             return Err(RemoteError::Different { differences });
         }
         let configuration = Manifest { working_folder: sent.working_folder, ..own }.configuration();
-        Ok(Self { works, workers: plan.workers, version: here, configuration, _folder: folder })
+        let pool = Mutex::default();
+        Ok(Self { works, workers: plan.workers, pool, version: here, configuration, _folder: folder })
     }
 
     /// Runs samples of the scenario with index `work` in one thread, and returns their records.
@@ -85,14 +95,30 @@ impl BlockRunner {
             return Err(RemoteError::NoBlock { work });
         };
         let mut results: Vec<Finished> = Vec::with_capacity(samples.len());
-        let done = self.workers.run(found, samples.iter().copied(), &StopFlag::default(), |finished| {
-            results.push(finished);
-            Ok::<_, WorkersError>(ControlFlow::Continue(()))
-        });
+        let done = self.run_in_pool((work, found), samples, |finished| results.push(finished));
         done.map_err(|error| super::EngineError { message: error.to_string(), is_input: false })?;
         if let Some(reason) = results.iter().find_map(|finished| refusal(&finished.record)) {
             return Err(super::EngineError { message: reason.to_owned(), is_input: true }.into());
         }
         Ok(answer::encode(&self.version, &self.configuration, &results)?)
+    }
+
+    fn run_in_pool(
+        &self,
+        (number, work): (usize, &Arc<Work>),
+        samples: &[u64],
+        mut on_finished: impl FnMut(Finished),
+    ) -> Result<(), WorkersError> {
+        let mut kept = self.pool.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut pool = match kept.take() {
+            Some((same, pool)) if same == number => pool,
+            _ => WorkerPool::new(self.workers, work, &StopFlag::default())?,
+        };
+        pool.run(samples.iter().copied(), |finished| {
+            on_finished(finished);
+            Ok::<_, WorkersError>(ControlFlow::Continue(()))
+        })?;
+        *kept = Some((number, pool));
+        Ok(())
     }
 }

@@ -4,6 +4,8 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+use closecall_simulation::controller::native::NativeError;
+
 use super::shipment::Shipment;
 use super::workers::RemoteWorkers;
 use crate::folder::FolderError;
@@ -106,6 +108,9 @@ pub enum RemoteError {
     /// A scenario of the manifest cannot be used.
     #[error(transparent)]
     Saved(#[from] SavedError),
+    /// A controller cannot be used there.
+    #[error(transparent)]
+    Controller(#[from] NativeError),
     /// A model cannot be read.
     #[error(transparent)]
     Folder(#[from] FolderError),
@@ -150,6 +155,7 @@ impl RemoteError {
             | Self::Version { .. }
             | Self::Different { .. }
             | Self::Plan(_)
+            | Self::Controller(_)
             | Self::Saved(_)
             | Self::Folder(_)
             | Self::NoBlock { .. } => true,

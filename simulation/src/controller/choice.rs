@@ -9,9 +9,9 @@ use closecall_native::Kind;
 use closecall_traffic::suggest::hint;
 use serde::{Deserialize, Serialize};
 
-use super::exec::{DEFAULT_MEMORY_MIB, DEFAULT_TIMEOUT_MS, ExecFactory, ExecSettings, NAME as EXEC};
+use super::exec::{Child, DEFAULT_MEMORY_MIB, DEFAULT_TIMEOUT_MS, ExecFactory, ExecSettings, NAME as EXEC};
 use super::hosted::{self, HostedController, PREFIX as HOSTED};
-use super::native::{NativeFactory, NativeSettings};
+use super::native::{NativeError, NativeFactory, NativeSettings};
 use super::{BuiltIn, TimeGap};
 use crate::run::ControllerFactory;
 
@@ -95,8 +95,26 @@ impl ControllerChoice {
     }
 
     /// Returns true if the controller runs in a process that has limits.
-    pub const fn has_limits(&self) -> bool {
-        matches!(self, Self::Exec(_) | Self::Native(_))
+    pub fn has_limits(&self) -> bool {
+        match self {
+            Self::BuiltIn(_) => false,
+            Self::Exec(_) | Self::Native(_) => true,
+            Self::Hosted(hosted) => hosted.has_processes(),
+        }
+    }
+
+    /// Tries whether the program of a process can be started, and whether a library or an FMU can be loaded. A relative path is in
+    /// `folder`, or in that of this program.
+    ///
+    /// # Errors
+    /// [`NativeError`] if not.
+    pub fn try_in(&self, folder: Option<&Path>) -> Result<(), NativeError> {
+        match self {
+            Self::Exec(exec) => Child::try_start(exec, folder)
+                .map_err(|error| NativeError::Start { controller: self.to_string(), reason: error.to_string() }),
+            Self::Native(native) => native.probe(folder).map(drop),
+            Self::BuiltIn(_) | Self::Hosted(_) => Ok(()),
+        }
     }
 
     /// Returns a factory of this controller.

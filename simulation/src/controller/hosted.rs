@@ -6,13 +6,19 @@
 //!
 //! A name may end with `@VERSION`. Reports leave the version out. A manifest keeps it, so that a campaign is not resumed
 //! with a controller that has changed.
+//!
+//! A controller runs in the process of its program, or in worker processes that load it for themselves: see [`HostedProcess`].
 
 use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use closecall_controllers::{ControllerError, EgoCommand, EgoController, EgoInput, EgoSettings};
+use serde::{Deserialize, Serialize};
 
+use super::exec::ExecSettings;
+use super::isolated::Isolated;
+use super::native::COMMAND;
 use crate::run::ControllerFactory;
 
 /// The prefix of the names.
@@ -21,9 +27,52 @@ pub const PREFIX: &str = "python";
 type Factories = BTreeMap<String, Arc<dyn ControllerFactory>>;
 
 static REGISTRY: Mutex<Factories> = Mutex::new(BTreeMap::new());
+/// Why controllers cannot be loaded in this process, by their names.
+static REFUSED: Mutex<BTreeMap<String, String>> = Mutex::new(BTreeMap::new());
 
 fn registry() -> MutexGuard<'static, Factories> {
     REGISTRY.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Lets a worker process refuse the samples of a controller that it cannot load, with this reason.
+pub fn refuse(name: &str, reason: String) {
+    REFUSED.lock().unwrap_or_else(PoisonError::into_inner).insert(name.to_owned(), reason);
+}
+
+/// A controller of a program that worker processes run, with what starts one. The process registers the controller under its
+/// name, and then runs the hidden command that serves samples.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct HostedProcess {
+    /// The name with its version, under which the process registers the controller.
+    pub id: String,
+    /// The name in reports.
+    pub name: String,
+    /// The words that start the process, to which the hidden command is added.
+    pub words: Vec<String>,
+    /// Time limit of each answer (ms).
+    pub timeout_ms: u64,
+    /// Largest resident memory of the process (MiB).
+    pub memory_mib: u64,
+}
+
+impl HostedProcess {
+    /// Returns the settings of a process with these arguments of the hidden command.
+    pub(super) fn process(&self, arguments: &[&str]) -> ExecSettings {
+        let words = self.words.iter().map(String::as_str).chain([COMMAND]).chain(arguments.iter().copied());
+        // A word with a NUL character, which cannot be quoted, starts nothing.
+        let command = shlex::try_join(words).unwrap_or_default();
+        ExecSettings { command, timeout_ms: self.timeout_ms, memory_mib: self.memory_mib }
+    }
+
+    /// Returns the factory in the worker process.
+    pub(super) fn in_this_process(self) -> Result<Arc<dyn ControllerFactory>, String> {
+        let refused = REFUSED.lock().unwrap_or_else(PoisonError::into_inner).get(&self.id).cloned();
+        match (refused, registry().get(&self.id).cloned()) {
+            (Some(reason), _) => Err(reason),
+            (None, Some(factory)) => Ok(Arc::new(Named { name: self.name, factory })),
+            (None, None) => Err(format!("the process of the controller does not have `{}`: {}", self.id, known())),
+        }
+    }
 }
 
 /// A controller stays registered as long as this value lives.
@@ -67,6 +116,12 @@ impl HostedController {
         registry().contains_key(&self.0)
     }
 
+    /// Returns true if the program has registered the controller for processes of its own.
+    pub(super) fn has_processes(&self) -> bool {
+        let factory = registry().get(&self.0).cloned();
+        factory.is_some_and(|factory| factory.isolated().is_some())
+    }
+
     /// Returns the name in reports, which lacks the version.
     pub(super) fn name(&self) -> String {
         self.0.split_once('@').map_or(&self.0[..], |(name, _)| name).to_owned()
@@ -104,6 +159,13 @@ impl ControllerFactory for Named {
 
     fn has_mis(&self, settings: &EgoSettings) -> bool {
         self.factory.has_mis(settings)
+    }
+
+    fn isolated(&self) -> Option<Isolated> {
+        match self.factory.isolated()? {
+            Isolated::Hosted(hosted) => Some(Isolated::Hosted(HostedProcess { name: self.name.clone(), ..hosted })),
+            native @ Isolated::Native(_) => Some(native),
+        }
     }
 
     fn build(&self, settings: &EgoSettings) -> Box<dyn EgoController> {

@@ -22,6 +22,7 @@ mod built_in;
 mod choice;
 pub mod exec;
 pub mod hosted;
+pub mod isolated;
 pub mod native;
 mod time_gap;
 

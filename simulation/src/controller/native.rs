@@ -17,6 +17,7 @@ use closecall_native::{Identity, Kind, Loaded, NativeController, VariableTable, 
 use serde::{Deserialize, Serialize};
 
 use super::exec::{Child, DEFAULT_MEMORY_MIB, DEFAULT_TIMEOUT_MS, ExecError, ExecFactory, ExecSettings};
+use super::isolated::Isolated;
 use crate::run::ControllerFactory;
 use crate::scenario::Scenario;
 
@@ -148,7 +149,7 @@ impl Probe {
     }
 }
 
-/// A library or an FMU that cannot be used.
+/// A library, an FMU or a process that cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NativeError {
     /// The file is not what is expected.
@@ -167,6 +168,14 @@ pub enum NativeError {
         /// The controller.
         controller: String,
         /// How the process ended.
+        reason: String,
+    },
+    /// The process cannot be started.
+    #[error("failed to use the controller `{controller}`: {reason}")]
+    Start {
+        /// The controller.
+        controller: String,
+        /// Why it cannot be started.
         reason: String,
     },
 }
@@ -262,8 +271,8 @@ impl ControllerFactory for NativeFactory {
         }
     }
 
-    fn isolated(&self) -> Option<&NativeFactory> {
-        (!self.is_worker).then_some(self)
+    fn isolated(&self) -> Option<Isolated> {
+        (!self.is_worker).then(|| Isolated::Native(self.clone()))
     }
 }
 

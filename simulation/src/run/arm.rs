@@ -6,7 +6,7 @@ use closecall_controllers::{EgoController, EgoSettings};
 use closecall_native::VariableTable;
 use closecall_sensors::SensorMode;
 
-use crate::controller::native::NativeFactory;
+use crate::controller::isolated::Isolated;
 
 /// Identifies one sample of a scenario.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,9 +28,9 @@ pub trait ControllerFactory: Send + Sync {
     }
     /// Returns whether the controller has a margin increase system whose actions the outcome summarises.
     fn has_mis(&self, settings: &EgoSettings) -> bool;
-    /// Returns the library or FMU that a worker process is to run, together with the whole sample; `None` for every controller that
+    /// Returns the controller that a worker process is to run, together with the whole sample; `None` for every controller that
     /// runs in this process, or brings a process of its own.
-    fn isolated(&self) -> Option<&NativeFactory> {
+    fn isolated(&self) -> Option<Isolated> {
         None
     }
     /// Creates a new controller with the settings of the scenario's ego stack.

@@ -100,6 +100,17 @@ impl Child {
         Ok(child)
     }
 
+    /// Tries whether the process can be started. It is killed at once.
+    ///
+    /// # Errors
+    /// [`ExecError`] if it cannot be started.
+    pub fn try_start(settings: &ExecSettings, folder: Option<&Path>) -> Result<(), ExecError> {
+        let mut child = Self::start(settings, folder)?;
+        // It need not end by itself.
+        child.has_failed = true;
+        Ok(())
+    }
+
     /// Sends a line that needs no answer.
     pub fn send(&self, line: Vec<u8>) {
         // If the writing thread is gone, so is the process, which reading then reports.
