@@ -105,9 +105,10 @@ impl Chooser {
         Self { selection, samples: Vec::new() }
     }
 
-    /// Adds a sample. A sample that ended in an error is left out, since it cannot be recorded.
+    /// Adds a sample. A sample that ended in an error in any arm is left out, since it cannot be recorded.
     pub fn push(&mut self, record: &Record) {
-        if let Some(ArmRecord { result: Ok(outcome), .. }) = record.arms.last() {
+        let has_failed = record.arms.iter().any(|arm| arm.result.is_err());
+        if let (false, Some(ArmRecord { result: Ok(outcome), .. })) = (has_failed, record.arms.last()) {
             let is_safe_in_baseline = match &record.arms[..] {
                 [baseline, .., _] => baseline.result.as_ref().is_ok_and(|outcome| !outcome.ego_collided()),
                 _ => false,

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import ctypes
 import os
+import re
+import shutil
+import socket
 import subprocess
 import sys
 import time
@@ -180,6 +183,85 @@ def test_each_fault_of_another_controller_costs_its_samples_on_a_cluster(
     assert len(kept) == 2 and all(message in row["error_message"] for row in kept), kept
     # The other arm has its outcomes.
     assert [row["status"] for row in rows(result)].count("ok") == 2
+
+
+#: Where a controller is, and what the machine without it says.
+ABSENT = {
+    "lib": ("lib:{folder}/own.so", 6, "failed to use the controller `lib:{folder}/own.so`: failed to read {folder}/own.so"),
+    "exec": ("exec:{folder}/own.sh dies", 3, "`{folder}/own.sh` could not be started: No such file"),
+    "script": ("exec:sh {folder}/own.sh dies", 3, "{folder}/own.sh has changed: "),
+}
+
+
+@pytest.mark.parametrize("kind", ABSENT)
+def test_what_a_machine_lacks_is_refused_with_its_name(
+    machines: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
+) -> None:
+    compiled("nan", tmp_path, "lib")
+    files = {tmp_path / "own.so": tmp_path / "nan.lib", tmp_path / "own.sh": ROOT / "tests/fixtures/controllers/bad.sh"}
+    for to, source in files.items():
+        shutil.copy(source, to)
+        to.chmod(0o700)
+    controller, code, message = ABSENT[kind]
+    controller, message = controller.format(folder=tmp_path), message.format(folder=tmp_path)
+    options: dict[str, Any] = {"address": machines.address, "controller": controller, **COMMON}
+    parcel = closecall.ray._parcel
+
+    def remove(*arguments: Any) -> Any:
+        # The driver has seen it, and the machines do not find it.
+        for file in files:
+            file.unlink()
+        return parcel(*arguments)
+
+    monkeypatch.setattr(closecall.ray, "_parcel", remove)
+    with pytest.raises(cc.InputError) as raised:
+        closecall.ray.campaign(SCENARIO, 2, out=tmp_path / "out", **options)
+    assert raised.value.exit_code == 3
+    assert f"failed to run on Ray: {socket.gethostname()}: " in str(raised.value) and message in str(raised.value)
+    # Where the campaign is prepared, it is refused before anything runs. Of a script, only its program can be tried.
+    if kind != "script":
+        with pytest.raises(cc.ClosecallError, match=re.escape(message)) as raised_here:
+            closecall.ray.campaign(SCENARIO, 2, out=tmp_path / "none", **options)
+        assert raised_here.value.exit_code == code and not (tmp_path / "none").exists()
+
+
+def test_libraries_and_fmus_with_a_relative_path_are_shipped(
+    machines: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "own").mkdir()
+    include = ["-I", str(ROOT / "include"), "-I", str(ROOT / "examples")]
+    options = ["-std=c11", "-O2", "-ffp-contract=off", "-shared", "-fPIC", *include]
+    subprocess.run(["cc", *options, "-o", "own/acc.so", ROOT / "examples/acc_controller.c", "-lm"], check=True)
+    # An FMU with a name of its own, which the scenario maps to a quantity.
+    description = (ROOT / "examples/fmu/modelDescription-fmi2.xml").read_text().replace('name="ego_speed"', 'name="VEH_SPD"')
+    (tmp_path / "own.xml").write_text(description)
+    subprocess.run([sys.executable, ROOT / "examples/fmu/build.py", "2", "own/acc.fmu", "--description", "own.xml"], check=True)
+    text = (ROOT / "scenarios/library/low-thw-overtake.toml").read_text()
+    table = '[controller.fmu]\ninputs = { VEH_SPD = "ego_speed" }\n\n[parameters]'
+    (tmp_path / "mapped.toml").write_text(text.replace("[parameters]", table, 1))
+    parcel = closecall.ray._parcel
+    arms = ["acc", "lib:own/acc.so", "fmu:./own/acc.fmu"]
+    local = cc.campaign("mapped.toml", 4, arms=arms, out=tmp_path / "local", **COMMON)
+
+    def remove(*arguments: Any) -> Any:
+        shutil.rmtree(tmp_path / "own")
+        return parcel(*arguments)
+
+    monkeypatch.setattr(closecall.ray, "_parcel", remove)
+    result = closecall.ray.campaign("mapped.toml", 4, arms=arms, address=machines.address, out=tmp_path / "ray", **COMMON)
+    assert (local.exit_code, result.exit_code, result.errors) == (0, 0, 0)
+    assert journal(tmp_path / "ray") == journal(tmp_path / "local") and not (tmp_path / "own").exists()
+
+
+def test_a_sample_with_an_error_in_any_arm_is_not_recorded(tmp_path: Path) -> None:
+    options = {**COMMON, "record": "random:3,worst:3"}
+    arms = [Misbehaves, "acc"]
+    result = cc.campaign(SCENARIO, 12, arms=arms, isolate=True, jobs=2, out=tmp_path / "out", **LIMITS, **options)
+    failed = {row["sample"] for row in rows(result) if row["status"] == "error"}
+    recorded = {int(file.stem.rpartition("-")[2]) for file in (tmp_path / "out" / "recordings").glob("*.rrd")}
+    # This process would end, or hang, if it ran one of them again.
+    assert result.exit_code == 5 and failed and recorded and not failed & recorded
 
 
 class Endless:
