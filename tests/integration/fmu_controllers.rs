@@ -10,7 +10,7 @@ use crate::native_controllers::{campaign, is_as_baseline, records};
 use crate::support::{ROOT, code, folder, headline_with, message, program, stderr, stdout};
 
 /// Builds the FMU of the example, and returns the value of `--controller`.
-fn fmu(fmi: &str, to: &Path, options: &[&str]) -> String {
+pub(crate) fn fmu(fmi: &str, to: &Path, options: &[&str]) -> String {
     let mut command = Command::new("python3");
     let output = command.current_dir(ROOT).args(["examples/fmu/build.py", fmi]).arg(to).args(options).output().unwrap();
     assert!(output.status.success(), "{}", stderr(&output));

@@ -52,3 +52,4 @@ mod support;
 mod trajectory_files;
 mod validity;
 mod viewer;
+mod worker_processes;

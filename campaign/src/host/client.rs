@@ -57,8 +57,11 @@ fn in_process(
                     kind: KIND.to_owned(),
                     message: format!("the process of the controller gave an answer that cannot be read: {error}"),
                 })?;
-                if !answer.is_last {
-                    processes.insert(key, process);
+                match (answer.is_last, is_new) {
+                    (false, _) => drop(processes.insert(key, process)),
+                    // It hangs in a call.
+                    (true, false) => continue,
+                    (true, true) => {}
                 }
                 return Ok(answer);
             }
