@@ -15,6 +15,9 @@
  * process: what the library keeps in variables of its own outlives a run, and makes outcomes depend on the order of the
  * samples. All pointers that Closecall passes are valid during the call only.
  *
+ * An exception of C++ must not leave a function: it would abort the process, which costs the sample (SIGABRT). A function catches it,
+ * answers NULL or another number than 0, and gives its text to closecall_controller_error.
+ *
  * Times are in s, lengths in m, speeds in m/s, accelerations in m/s^2, angles in rad. x points ahead of the ego, y to its left.
  *
  * The interface is that of CLOSECALL_CONTROLLER_ABI. Any change of it changes that number, and Closecall refuses a library of a

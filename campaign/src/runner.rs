@@ -90,6 +90,15 @@ impl Samples for Work {
         if let Some(isolated) = arm.controller.isolated() {
             return host::run(self, (index, isolated), sample, limit);
         }
+        let mut done = None;
+        arm.controller.in_thread(&mut || done = Some(self.run_here(sample, arm)));
+        done.unwrap_or_else(|| self.run_here(sample, arm))
+    }
+}
+
+impl Work {
+    /// Runs one sample in one arm in this thread.
+    fn run_here(&self, sample: u64, arm: &Arm) -> ArmRun {
         let key = RunKey { seed: self.sampling.seed, sample };
         let started = Instant::now();
         let scenario = guarded(|| concrete(&self.file, self.sampling, sample));

@@ -166,6 +166,17 @@ impl ControllerFactory for Factory {
         self.process.clone().map(Isolated::Hosted)
     }
 
+    /// The thread keeps its state of the interpreter during the run. Otherwise each step would create one, which takes longer than the call.
+    fn in_thread(&self, run: &mut (dyn FnMut() + Send)) {
+        // The interpreter must not end while a thread is about to enter it, in it, or about to leave it.
+        let _active = Active::new(&self.shared);
+        if self.shared.is_cancelled.load(Ordering::SeqCst) {
+            run();
+        } else {
+            Python::attach(|py| py.detach(run));
+        }
+    }
+
     fn build(&self, settings: &EgoSettings) -> Box<dyn EgoController> {
         Box::new(Controller {
             settings: *settings,

@@ -124,7 +124,11 @@ pub(crate) fn run(
     }
     let (sender, mut receiver) = channel();
     // The receiver is gone if Ctrl-C has ended the call.
-    let body = move || sender.send(record(&concrete, RunKey { seed, sample }, &arm)).is_ok();
+    let body = move || {
+        let mut done = None;
+        arm.controller.in_thread(&mut || done = Some(record(&concrete, RunKey { seed, sample }, &arm)));
+        done.is_some_and(|done| sender.send(done).is_ok())
+    };
     thread::Builder::new().name("run".to_owned()).spawn(body)?;
     loop {
         let results = &mut receiver;

@@ -179,6 +179,28 @@ fn a_fault_costs_its_samples_and_changes_no_other() {
 }
 
 #[test]
+fn the_header_and_the_examples_in_c_compile_without_warnings() {
+    let check = |compiler: &str, arguments: &[&str]| {
+        let strict = ["-Wall", "-Wextra", "-pedantic", "-Werror", "-O2", "-fsyntax-only", "-I", "include"];
+        Command::new(compiler).current_dir(ROOT).args(strict).args(arguments).output()
+    };
+    let sources: [&[&str]; 4] = [
+        &["-std=c11", "examples/acc_controller.c"],
+        &["-std=c11", "-DFMI=2", "examples/fmu/acc.c"],
+        &["-std=c11", "-DFMI=3", "examples/fmu/acc.c"],
+        &["-std=c99", "-x", "c", "include/closecall_controller.h"],
+    ];
+    for source in sources {
+        let output = check("cc", source).unwrap();
+        assert!(output.status.success(), "{source:?}: {}", stderr(&output));
+    }
+    // The header is for C++, too. Not every machine has a compiler for it.
+    if let Ok(output) = check("c++", &["-std=c++11", "-x", "c++", "include/closecall_controller.h"]) {
+        assert!(output.status.success(), "{}", stderr(&output));
+    }
+}
+
+#[test]
 fn the_rounding_mode_of_a_library_is_not_that_of_the_simulation() {
     let folder = folder();
     let library = lib(&compile("tests/fixtures/controllers/faulty.c", &folder.path().join("faulty.so"), &[]));

@@ -168,6 +168,10 @@ impl ControllerFactory for Named {
         }
     }
 
+    fn in_thread(&self, run: &mut (dyn FnMut() + Send)) {
+        self.factory.in_thread(run);
+    }
+
     fn build(&self, settings: &EgoSettings) -> Box<dyn EgoController> {
         self.factory.build(settings)
     }

@@ -33,6 +33,11 @@ pub trait ControllerFactory: Send + Sync {
     fn isolated(&self) -> Option<Isolated> {
         None
     }
+    /// Calls `run` once, which makes a run with a controller of this factory. A controller that needs something in its thread for a
+    /// whole run prepares it before, and gives it back afterwards.
+    fn in_thread(&self, run: &mut (dyn FnMut() + Send)) {
+        run();
+    }
     /// Creates a new controller with the settings of the scenario's ego stack.
     fn build(&self, settings: &EgoSettings) -> Box<dyn EgoController>;
     /// Creates a new controller as [`Self::build`] does, with the scenario's names of the variables of an FMU.
