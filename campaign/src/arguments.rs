@@ -29,6 +29,14 @@ pub fn count(text: &str) -> Result<u64, String> {
     Err(format!("`{text}` {reason}: a whole number of 1 or more is needed"))
 }
 
+/// Parses a seed: a whole number from 0 to 2^64 - 1.
+///
+/// # Errors
+/// What is allowed.
+pub fn seed(text: &str) -> Result<u64, String> {
+    text.parse().map_err(|_| format!("`{text}` is not a whole number from 0 to {}", u64::MAX))
+}
+
 /// Parses a probability, above 0 and below 1: 0 and 1 cannot be shown by samples.
 ///
 /// # Errors

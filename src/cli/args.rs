@@ -48,7 +48,7 @@ impl SensorsChoice {
 #[derive(Clone, Debug, Args)]
 pub(super) struct SimulationArgs {
     /// Seed of the random numbers
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed)]
     pub(super) seed: u64,
     #[command(flatten)]
     pub(super) arm: ArmArgs,

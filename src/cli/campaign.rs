@@ -47,7 +47,7 @@ pub(super) struct CampaignArgs {
     #[command(flatten)]
     plan: PlanArgs,
     /// Seed of the random numbers
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed)]
     seed: u64,
     /// Sampling design: `random`, `sobol` (a low-discrepancy sequence) or `grid`
     #[arg(long, default_value_t = Design::Random)]

@@ -21,7 +21,7 @@ pub(super) struct DriftArgs {
     #[command(flatten)]
     data: FilesArgs,
     /// Seed of the simulated distances
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed)]
     seed: u64,
     /// Output format
     #[arg(long, value_enum, default_value_t)]

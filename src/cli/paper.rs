@@ -28,7 +28,7 @@ pub(super) struct PaperArgs {
     #[arg(long, value_name = "M/S", value_parser = positive)]
     speed_limit_mps: Option<f64>,
     /// Seed of the noise of figure 3
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed)]
     seed: u64,
     /// Number of draws of the noise at each level; 0 leaves figure 3 out
     #[arg(long, default_value_t = Setup::default().repetitions, value_parser = clap::value_parser!(u64).range(0..=10_000))]

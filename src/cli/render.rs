@@ -24,7 +24,7 @@ pub(super) struct RenderArgs {
     #[arg(short = 'n', long = "scenes", default_value_t = 20, allow_negative_numbers = true, value_parser = scene_count)]
     scenes: u32,
     /// Seed of the random scenes
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed)]
     seed: u64,
     /// Body shapes and paints of the vehicles: those for training, or those that are not used for training
     #[arg(long, value_parser = ["training", "held-out"], default_value = "training")]

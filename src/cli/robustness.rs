@@ -20,7 +20,7 @@ pub(super) struct RobustnessArgs {
     #[command(flatten)]
     data: FilesArgs,
     /// Seed of the noise
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed)]
     seed: u64,
     /// Number of draws of the noise at each level
     #[arg(long, default_value_t = Setup::default().repetitions, value_parser = clap::value_parser!(u64).range(1..=10_000))]

@@ -40,7 +40,7 @@ pub(super) struct SampleArgs {
     #[arg(long, default_value_t = 5)]
     steps: usize,
     /// Seed of the random numbers
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed)]
     seed: u64,
     #[command(flatten)]
     set: SetArgs,

@@ -32,7 +32,7 @@ pub(super) struct SensorsArgs {
     #[arg(short = 'n', long, value_name = "N", value_parser = count)]
     approaches: Option<u64>,
     /// Seed of the random numbers
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed)]
     seed: u64,
     /// Folder for the page (sensors.html), the figures (JSON, Parquet) and the curves (Parquet)
     #[arg(long, value_name = "DIR")]

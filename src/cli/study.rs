@@ -30,7 +30,7 @@ pub(super) struct StudyArgs {
     /// Scenario file, or name of a scenario of the library
     scenario: PathBuf,
     /// Seed of the random numbers
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed)]
     seed: u64,
     #[command(flatten)]
     controller: ControllerArgs,

@@ -128,7 +128,7 @@ pub(super) struct FitArgs {
     #[arg(long)]
     correlations: bool,
     /// Seed of the bootstrap, which computes the confidence intervals
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = closecall_campaign::arguments::seed)]
     seed: u64,
     /// Output format; without --output, `human` prints the text of the file
     #[arg(long, value_enum, default_value_t)]
