@@ -14,7 +14,7 @@ from ._command import call, option
 from ._controller import SAMPLE_TIMEOUT_S, ControllerLike, registered
 from ._errors import UsageError
 from ._run import SensorsLike
-from ._scenario import Scenario
+from ._scenario import Scenario, whole
 
 ScenarioLike = Scenario | str | os.PathLike[str]
 
@@ -87,11 +87,15 @@ def campaign(
         else:
             words.append(os.fspath(scenario))
             changes.append([])
-    settings = changes[0] if changes else []
+    if not words:
+        raise UsageError("scenarios: none is named")
+    settings = changes[0]
     if any(other != settings for other in changes):
         raise UsageError("the scenarios of a campaign are changed by the same settings (`set`), or by none")
     if arms is not None and (controller is not None or paired):
         raise UsageError("`arms` names all controllers: leave out `controller` and `paired`")
+    if arms is not None and (isinstance(arms, str) or not arms):
+        raise UsageError(f"arms: expected a list of controllers, not {arms!r}")
     chosen: list[ControllerLike] = list(arms) if arms is not None else [] if controller is None else [controller]
     # On a cluster, objects run in worker processes, whatever they do to them.
     is_remote = "ray" in options
@@ -103,8 +107,8 @@ def campaign(
     limit_s = timeout_s if isinstance(timeout_s, (int, float)) else SAMPLE_TIMEOUT_S
     with registered(chosen, limits, is_remote, limit_s) as names, _reporter(progress) as report:
         which = option("arms" if arms is not None else "controller", names)
-        named: dict[str, object] = {"samples": n, "paired": paired, "seed": seed, "design": design, "sensors": sensors, "jobs": jobs}
-        named |= {"out": None if out is None else os.fspath(out), "resume": resume, "gate": list(gate), "set": settings}
+        named: dict[str, object] = {"samples": n, "paired": paired, "seed": whole("seed", seed), "design": design, "sensors": sensors, "jobs": jobs}
+        named |= {"out": None if out is None else os.fspath(out), "resume": resume, "gate": [gate] if isinstance(gate, str) else list(gate), "set": settings}
         further = [word for name, value in {**named, **options}.items() for word in option(name, value)]
         code, output = call(["campaign", "--format=json", *which, *further, "--", *words], report)
     keys = json.loads(output)
@@ -138,8 +142,10 @@ class _reporter:
     def __enter__(self) -> Callable[[int, int], Any] | None:
         if self._progress is False:
             return None
-        if self._progress is not True:
+        if callable(self._progress):
             return self._progress
+        if self._progress is not True:
+            raise UsageError(f"progress: expected a function of two numbers, or True, not {self._progress!r}")
         try:
             from tqdm.auto import tqdm  # type: ignore[import-untyped,unused-ignore]
         except ImportError as error:

@@ -71,7 +71,7 @@ def factory(controller: ControllerLike) -> Callable[[], Controller]:
     if callable(controller):
         return controller
     raise UsageError(
-        f"controller: {controller!r} is none: expected a name, an object with a method `step`, or a class or function that creates one"
+        f"controller: expected a name, an object with a method `step`, or a class or function that creates one, not {controller!r}"
     )
 
 

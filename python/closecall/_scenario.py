@@ -26,6 +26,8 @@ class Scenario:
         Raises :class:`InputError` with file, line and key if the scenario cannot be used, :class:`UsageError` if a
         setting cannot be applied, :class:`FileError` if the file cannot be read.
         """
+        if set is not None and not isinstance(set, Mapping):
+            raise UsageError(f"set: expected a dictionary such as {{'brake-mps2': 6}}, not {set!r}")
         settings = [f"{key}={_toml(value)}" for key, value in (set or {}).items()]
         return cls(_native.Scenario.load(os.fspath(source), settings))
 
@@ -76,9 +78,12 @@ def _toml(value: object) -> str:
 
 def whole(name: str, value: int) -> int:
     """Returns a seed or the number of a sample, which is a whole number from 0 to 2^64 - 1."""
-    number = int(value)
-    if number != value or not 0 <= number < 2**64:
-        raise UsageError(f"{name}: {value!r} is none: expected a whole number from 0 to 2^64 - 1")
+    try:
+        number = int(value)
+    except (TypeError, ValueError, OverflowError):
+        number = -1
+    if isinstance(value, bool) or number != value or not 0 <= number < 2**64:
+        raise UsageError(f"{name}: expected a whole number from 0 to 2^64 - 1, not {value!r}")
     return number
 
 

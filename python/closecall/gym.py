@@ -16,12 +16,15 @@ import os
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import gymnasium
-import numpy as np
-from gymnasium import spaces
-from gymnasium.vector import AutoresetMode, VectorEnv
-from gymnasium.vector.utils import batch_space
-from numpy.typing import NDArray
+try:
+    import gymnasium
+    import numpy as np
+    from gymnasium import spaces
+    from gymnasium.vector import AutoresetMode, VectorEnv
+    from gymnasium.vector.utils import batch_space
+    from numpy.typing import NDArray
+except ImportError as error:
+    raise ImportError(f'closecall.gym needs Gymnasium and NumPy ({error}): pip install "closecall[gym]"') from error
 
 from . import _native
 from ._errors import UsageError
@@ -64,6 +67,8 @@ _TRUTH = ("gap_front_m", "thw_front_s", "gap_rear_m", "thw_rear_s", "ttc_rear_s"
 
 #: A bound that no quantity reaches (m, m/s, m/s²).
 _BOUND = 1.0e4
+#: What the action of one run is, for messages.
+_ONE = "one acceleration (m/s²)"
 #: The numbers between 0 and 1.
 _SHARES = {"front_works", "surround_works", "rear_works", "has_lead", "present", "existence", "confirmed", "coasting"}
 _SHARES |= {"lane_left", "lane_own", "lane_right", "car", "truck", "motorcycle", "background"}
@@ -156,6 +161,29 @@ def _action_space(limits_mps2: tuple[float, float]) -> spaces.Box:
     return spaces.Box(limits_mps2[0], limits_mps2[1], (1,), dtype=np.float64)
 
 
+def _numbers(action: Any, count: int, shape: str) -> NDArray[np.float64]:
+    """Returns the accelerations of an action as an array of the shape (``count``,)."""
+    try:
+        values = np.asarray(action, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise UsageError(f"the action {action!r} is not a number: expected {shape}") from None
+    if values.size != count:
+        raise UsageError(f"the action has the shape {values.shape}: expected {shape}")
+    return values.reshape(count)
+
+
+def _sample_of(options: dict[str, Any] | None) -> Any:
+    """Returns the sample that the options of ``reset`` name, or ``None``."""
+    for name in set(options or {}) - {"sample"}:
+        raise UsageError(f"options: there is no {name!r}, only 'sample'")
+    return (options or {}).get("sample")
+
+
+def _check_open(is_closed: bool) -> None:
+    if is_closed:
+        raise UsageError("the environment is closed")
+
+
 class EncounterEnv(gymnasium.Env[Observation, NDArray[np.float64]]):
     """One encounter of a scenario, stepped by its caller.
 
@@ -191,15 +219,17 @@ class EncounterEnv(gymnasium.Env[Observation, NDArray[np.float64]]):
         self._reward = reward
         self._truth = truth
         self._seed = 0
+        self._is_closed = False
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
         """Starts a sample: ``options["sample"]`` (from 0), or one that is drawn. ``seed`` is that of the campaign."""
+        _check_open(self._is_closed)
+        drawn = _sample_of(options)
         super().reset(seed=seed)
         if seed is not None:
             self._seed = seed
-        drawn = (options or {}).get("sample")
         sample = int(self.np_random.integers(2**31)) if drawn is None else whole("sample", drawn)
         observed = self._observation(self._episode.reset(self._seed, sample))
         return observed, {"seed": self._seed, "sample": sample, **self._true_margins()}
@@ -208,12 +238,8 @@ class EncounterEnv(gymnasium.Env[Observation, NDArray[np.float64]]):
         self, action: NDArray[np.float64] | float
     ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Commands an acceleration (m/s²) for 0.04 s."""
-        if not isinstance(action, (float, int)):
-            values = np.asarray(action, dtype=np.float64)
-            if values.size != 1:
-                raise UsageError(f"the action has the shape {values.shape}: it is one acceleration (m/s²)")
-            action = values.item()
-        acceleration_mps2 = float(action)
+        _check_open(self._is_closed)
+        acceleration_mps2 = float(action if isinstance(action, (float, int)) else _numbers(action, 1, _ONE).item())
         observed_bytes, end = self._episode.step(acceleration_mps2)
         observed = self._observation(observed_bytes)
         info = self._true_margins()
@@ -221,6 +247,10 @@ class EncounterEnv(gymnasium.Env[Observation, NDArray[np.float64]]):
             info["outcome"] = self.outcome()
         reward = float(self._reward(observed, acceleration_mps2, end == _CRASH))
         return observed, reward, end > _DURATION, end == _DURATION, info
+
+    def close(self) -> None:
+        """Ends the use of the environment."""
+        self._is_closed = True
 
     def outcome(self) -> Outcome | None:
         """Returns the outcome of the run; ``None`` as long as it goes on."""
@@ -257,6 +287,8 @@ class EncounterVectorEnv(VectorEnv[Observation, NDArray[np.float64], NDArray[Any
         truth: bool = False,
         render_mode: str | None = None,
     ) -> None:
+        if num_envs < 1:
+            raise UsageError(f"num_envs: expected 1 or more, not {num_envs}")
         self.num_envs = num_envs
         self.render_mode = render_mode
         self.scenario = loaded(scenario)
@@ -275,13 +307,17 @@ class EncounterVectorEnv(VectorEnv[Observation, NDArray[np.float64], NDArray[Any
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
         """Starts a sample in each run. ``seed`` is that of the campaign, or a list with one for each run."""
+        _check_open(self.closed)
+        given = _sample_of(options)
+        for name, several in (("seed", seed), ("sample", given)):
+            if not (isinstance(several, int) or several is None) and len(several) != self.num_envs:
+                raise UsageError(f"{name}: {len(several)} are given for {self.num_envs} runs")
         first = seed if isinstance(seed, int) or seed is None else seed[0]
         super().reset(seed=first)
         if isinstance(seed, int):
             self._seeds = [seed] * self.num_envs
         elif seed is not None:
             self._seeds = [own if one is None else one for own, one in zip(self._seeds, seed, strict=True)]
-        given = (options or {}).get("sample")
         samples = self._draw() if given is None else [whole("sample", sample) for sample in given]
         starts: list[tuple[int, int] | None] = list(zip(self._seeds, samples, strict=True))
         values, _ = self._episodes.step([0.0] * self.num_envs, starts)
@@ -292,10 +328,8 @@ class EncounterVectorEnv(VectorEnv[Observation, NDArray[np.float64], NDArray[Any
         self, actions: NDArray[np.float64]
     ) -> tuple[Observation, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         """Commands an acceleration (m/s²) to each run; ``actions`` has the shape (``num_envs``, 1)."""
-        accelerations = np.asarray(actions, dtype=np.float64)
-        if accelerations.size != self.num_envs:
-            raise UsageError(f"the actions have the shape {accelerations.shape}: expected ({self.num_envs}, 1)")
-        accelerations = accelerations.reshape(self.num_envs)
+        _check_open(self.closed)
+        accelerations = _numbers(actions, self.num_envs, f"({self.num_envs}, 1)")
         starts: list[tuple[int, int] | None] = [None] * self.num_envs
         restarted, has_restarted = self._has_ended, self._has_ended.any()
         if has_restarted:
@@ -340,19 +374,23 @@ class PolicyController:
     """A policy as a controller, for :func:`closecall.run` and :func:`closecall.campaign`: how a policy that was trained by
     stepping is judged.
 
-    ``policy(observation)`` returns the acceleration (m/s²) for an observation of :class:`EncounterEnv` with the same ``max_tracks``.
+    ``policy(observation)`` returns the acceleration (m/s²), or an action of the environment, for an observation of
+    :class:`EncounterEnv` with the same ``max_tracks``.
     A policy with a memory is given as a function that creates one: ``campaign(controller=lambda: PolicyController(Mine()))``.
     """
 
     def __init__(self, policy: Callable[[Observation], Any], max_tracks: int = 16) -> None:
         _check_max_tracks(max_tracks)
+        if not callable(policy):
+            raise UsageError(f"policy: {policy!r} cannot be called with an observation")
         self.policy = policy
         self.max_tracks = max_tracks
 
     def step(self, input: _native.ControllerInput) -> float:
         """Returns the acceleration (m/s²) that the policy answers."""
         values = np.frombuffer(input.observation(self.max_tracks), dtype=np.float64)
-        return float(self.policy(_split(values, self.max_tracks)))
+        answer = self.policy(_split(values, self.max_tracks))
+        return float(answer if isinstance(answer, (float, int)) else _numbers(answer, 1, _ONE).item())
 
 
 gymnasium.register(

@@ -15,6 +15,9 @@ struct Location {
     key: Option<String>,
 }
 
+/// What the parser of the command line adds, which says nothing to a caller in Python.
+const HELP: &str = "For more information, try '--help'.";
+
 /// Returns the exception of a command that has no result.
 pub(crate) fn exception(py: Python<'_>, error: &CliError) -> PyErr {
     let location = match error {
@@ -26,7 +29,9 @@ pub(crate) fn exception(py: Python<'_>, error: &CliError) -> PyErr {
         },
         _ => Location::default(),
     };
-    raise(py, ExitCode::from(error), &error.to_string(), &location)
+    let message = error.to_string();
+    let message = message.trim_end().strip_suffix(HELP).unwrap_or(&message).trim_end();
+    raise(py, ExitCode::from(error), message, &location)
 }
 
 /// Returns the exception of a scenario that cannot be used.

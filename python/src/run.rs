@@ -39,7 +39,7 @@ pub(crate) fn sensor_mode(py: Python<'_>, word: Option<&str>) -> PyResult<Option
         Some("object") => Ok(Some(SensorMode::Object)),
         Some("ground-truth") => Ok(Some(SensorMode::GroundTruth)),
         Some(other) => {
-            let message = format!("sensors: `{other}` is none: expected `full`, `object` or `ground-truth`");
+            let message = format!("sensors: expected `full`, `object` or `ground-truth`, not `{other}`");
             Err(usage_exception(py, &message))
         }
     }
@@ -112,6 +112,7 @@ pub(crate) fn run(
         None => {
             let name: String = controller.extract()?;
             let choice = ControllerChoice::from_str(&name).map_err(|error| usage_exception(py, &error.to_string()))?;
+            py.detach(|| choice.try_in(None)).map_err(|error| exception(py, &error.into()))?;
             choice.factory()
         }
     };
@@ -119,7 +120,7 @@ pub(crate) fn run(
     let arm = Arm { controller: factory, sensors: sensor_mode(py, sensors)? };
     let concrete = scenario.get().concrete(seed, sample).map_err(|error| sample_exception(py, sample, &error))?;
     if let Some(native) = native {
-        let checked = py.detach(|| native.probe(None).and_then(|_| native.check_variables(&concrete, None)));
+        let checked = py.detach(|| native.check_variables(&concrete, None));
         checked.map_err(|error| exception(py, &error.into()))?;
     }
     let (sender, mut receiver) = channel();
