@@ -12,7 +12,6 @@ import os
 import pickle
 import sys
 import sysconfig
-import tempfile
 import threading
 import time
 import types
@@ -258,8 +257,7 @@ def registered(
         if limits is not None and objects:
             words: list[str] = []
             if not is_remote:
-                folder = ends.enter_context(tempfile.TemporaryDirectory(prefix="closecall-"))
-                words = _host.parcel(objects, limits).write(folder)
+                words = ends.enter_context(_host.parcel(objects, limits).file())
             process = (words, *limits)
         try:
             for name, controller in objects.items():

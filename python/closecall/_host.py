@@ -14,6 +14,9 @@ import os
 import pickle
 import signal
 import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -45,11 +48,20 @@ class Parcel(NamedTuple):
     pickled: bytes
     limits: Limits
 
-    def write(self, folder: str | os.PathLike[str]) -> list[str]:
-        """Writes a file into a folder, and returns the words that start a worker process with it."""
-        file = Path(folder) / "controllers.pickle"
-        file.write_bytes(pickle.dumps((sys.path, self.names, self.library, self.pickled)))
-        return [sys.executable, "-c", START, str(file)]
+    @contextmanager
+    def file(self) -> Iterator[list[str]]:
+        """Writes a file, for as long as the context lasts, and returns the words that start a worker process with it."""
+        content = pickle.dumps((sys.path, self.names, self.library, self.pickled))
+        with ExitStack() as ends:
+            if sys.platform == "linux":
+                # The system frees it with this process, which may end without notice, as those of Ray do.
+                number = os.memfd_create("closecall-controllers")
+                ends.callback(os.close, number)
+                file = Path(f"/proc/{os.getpid()}/fd/{number}")
+            else:
+                file = Path(ends.enter_context(tempfile.TemporaryDirectory(prefix="closecall-")), "controllers.pickle")
+            file.write_bytes(content)
+            yield [sys.executable, "-c", START, str(file)]
 
 
 def pickle_library() -> str:

@@ -20,11 +20,10 @@ import os
 import pickle
 import signal
 import socket
-import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import Any
 
 from . import _host, _native
@@ -260,8 +259,8 @@ class _Prepared:
     def __init__(self, shipped: Shipped) -> None:
         self.digest, version, manifest, files, pickled = shipped
         parcel: _host.Parcel = pickle.loads(pickled)
-        self._folder = tempfile.TemporaryDirectory(prefix="closecall-")
-        words = parcel.write(self._folder.name)
+        self._ends = ExitStack()
+        words = self._ends.enter_context(parcel.file()) if parcel.names else []
         self._controllers = [_native.PythonController(name, _absent, (words, *parcel.limits)) for name in parcel.names]
         for controller in self._controllers:
             controller.register()
@@ -274,7 +273,7 @@ class _Prepared:
     def end(self) -> None:
         for controller in self._controllers:
             controller.unregister()
-        self._folder.cleanup()
+        self._ends.close()
 
 
 def _absent() -> Any:
