@@ -41,6 +41,7 @@ FAULTS = [
     "holds more than the 512 MiB of memory allowed",
     "acceleration of NaN m/s²",
     "`step` answered None, a `NoneType`: it must be a number",
+    "failed at 0.52 s: no answer within 1500 ms",
 ]
 
 
@@ -75,6 +76,9 @@ class Misbehaves:
         if self.fault == 7:
             kept = [bytearray(b"x" * (1 << 20)) for _ in range(1 << 20)]
             del kept
+        if self.fault == 10:
+            # Takes years, and keeps the interpreter to itself.
+            re.match(r"(a+)+$", "a" * 60 + "b")
         return {8: float("nan"), 9: None}.get(self.fault, 0.0)
 
 
