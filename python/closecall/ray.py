@@ -110,6 +110,8 @@ def _initialise(ray: Any, address: str) -> Callable[[], None]:
         is_ready.wait()
     for error in raised:
         message = f"failed to connect to the cluster `{address}`: {error}"
+        if isinstance(error, ValueError):
+            message += "; expected `auto`, `local`, `HOST:PORT` or `ray://HOST:PORT`"
         # Ray refuses a cluster with another version of Ray or Python by a RuntimeError.
         if isinstance(error, RuntimeError) and "ersion" in str(error):
             raise InputError(message, exit_code=3) from error

@@ -242,6 +242,8 @@ def test_a_cluster_that_is_not_there_is_named(tmp_path: Path) -> None:
     done = command("campaign", SCENARIO, *WORDS, "--ray", "127.0.0.1:9", "--out", tmp_path / "out")
     assert done.returncode == 6 and "there is no cluster at `127.0.0.1:9`" in done.stderr
     assert not (tmp_path / "out").exists()
+    done = command("campaign", SCENARIO, *WORDS, "--ray", "nonsense", "--out", tmp_path / "out")
+    assert done.returncode == 6 and "expected `auto`, `local`, `HOST:PORT` or `ray://HOST:PORT`" in done.stderr
     assert command("campaign", SCENARIO, *WORDS, "--ray", "auto", "--jobs", "2").returncode == 2
 
 
