@@ -13,6 +13,7 @@
 //! All of this refers to the arm under test, and the counts are for each scenario. A count alone is the count of
 //! failures. A sample that is selected for several reasons is recorded once.
 
+use std::collections::BTreeMap;
 use std::str::FromStr;
 
 use closecall_simulation::outcome::Outcome;
@@ -92,17 +93,23 @@ struct Severity {
     is_eventful: bool,
 }
 
-/// Selects samples of one scenario, whose records are passed to it one by one.
+/// Selects samples of one scenario, whose records are passed to it one by one. Its memory grows with the selection, not with the samples.
 #[derive(Debug)]
 pub struct Chooser {
     selection: Selection,
-    samples: Vec<Severity>,
+    /// The worst samples, the worst first.
+    worst: Vec<Severity>,
+    /// The first samples in which the ego collided: those that the system induced, and the others.
+    induced: Vec<u64>,
+    others: Vec<u64>,
+    samples: SpacedNumbers,
 }
 
 impl Chooser {
     /// Returns a chooser without samples.
     pub fn new(selection: Selection) -> Self {
-        Self { selection, samples: Vec::new() }
+        let (worst, induced, others) = (Vec::new(), Vec::new(), Vec::new());
+        Self { selection, worst, induced, others, samples: SpacedNumbers::default() }
     }
 
     /// Adds a sample. A sample that ended in an error in any arm is left out, since it cannot be recorded.
@@ -113,7 +120,22 @@ impl Chooser {
                 [baseline, .., _] => baseline.result.as_ref().is_ok_and(|outcome| !outcome.ego_collided()),
                 _ => false,
             };
-            self.samples.push(Severity { is_safe_in_baseline, ..severity(record.sample, outcome) });
+            self.add(Severity { is_safe_in_baseline, ..severity(record.sample, outcome) });
+        }
+    }
+
+    fn add(&mut self, severity: Severity) {
+        self.samples.push(severity.sample);
+        if severity.delta_v_mps.is_some() {
+            let failures = if severity.is_safe_in_baseline { &mut self.induced } else { &mut self.others };
+            if failures.len() < count(self.selection.failures) {
+                failures.push(severity.sample);
+            }
+        }
+        let index = self.worst.partition_point(|worse| compare(worse, &severity).is_ge());
+        if severity.is_eventful && index < count(self.selection.worst) {
+            self.worst.insert(index, severity);
+            self.worst.truncate(count(self.selection.worst));
         }
     }
 
@@ -126,24 +148,75 @@ impl Chooser {
             Some(known) => known.reasons.push(reason),
             None => chosen.push(Chosen { sample, reasons: vec![reason] }),
         };
-        let count = |count: u64| usize::try_from(count).unwrap_or(usize::MAX);
-        let mut worst: Vec<&Severity> = self.samples.iter().filter(|severity| severity.is_eventful).collect();
-        worst.sort_by(|a, b| compare(b, a));
-        worst.iter().take(count(self.selection.worst)).for_each(|severity| add(severity.sample, "worst"));
-        let all = self.samples.iter().filter(|severity| severity.delta_v_mps.is_some());
-        let (induced, others): (Vec<&Severity>, Vec<&Severity>) =
-            all.partition(|severity| severity.is_safe_in_baseline);
-        let failures = induced.into_iter().chain(others);
-        failures.take(count(self.selection.failures)).for_each(|severity| add(severity.sample, "failure"));
-        let mut left: Vec<u64> = self.samples.iter().map(|severity| severity.sample).collect();
-        let mut rng = stream(seed, 0, ego, CHANNEL);
-        let mut drawn = Vec::new();
-        while drawn.len() < count(self.selection.random) && !left.is_empty() {
-            drawn.push(left.swap_remove(rng.random_range(0..left.len())));
-        }
+        self.worst.iter().for_each(|severity| add(severity.sample, "worst"));
+        let failures = self.induced.iter().chain(&self.others);
+        failures.take(count(self.selection.failures)).for_each(|sample| add(*sample, "failure"));
+        let mut drawn = self.samples.draw(count(self.selection.random), &mut stream(seed, 0, ego, CHANNEL));
         drawn.sort_unstable();
         drawn.into_iter().for_each(|sample| add(sample, "random"));
         chosen
+    }
+}
+
+/// Returns a number of samples as a length of a list.
+fn count(number: u64) -> usize {
+    usize::try_from(number).unwrap_or(usize::MAX)
+}
+
+/// Numbers in the order in which they came, most of them equally spaced.
+#[derive(Debug, Default)]
+struct SpacedNumbers {
+    runs: Vec<Run>,
+    len: usize,
+}
+
+/// Equally spaced numbers.
+#[derive(Debug)]
+struct Run {
+    first: u64,
+    spacing: u64,
+    len: usize,
+}
+
+impl SpacedNumbers {
+    fn push(&mut self, number: u64) {
+        self.len += 1;
+        if let Some(run) = self.runs.last_mut() {
+            if run.len == 1 {
+                run.spacing = number.wrapping_sub(run.first);
+            }
+            if run.at(run.len) == number {
+                run.len += 1;
+                return;
+            }
+        }
+        self.runs.push(Run { first: number, spacing: 0, len: 1 });
+    }
+
+    fn at(&self, mut index: usize) -> Option<u64> {
+        self.runs.iter().find_map(|run| {
+            let found = (index < run.len).then(|| run.at(index));
+            index = index.wrapping_sub(run.len);
+            found
+        })
+    }
+
+    /// Draws numbers without replacement; all of them if there are not as many. Each drawn one changes places with the last one that is left.
+    fn draw(&self, most: usize, rng: &mut impl RngExt) -> Vec<u64> {
+        let mut moved = BTreeMap::new();
+        let number = |draw: usize| {
+            let left = self.len - 1 - draw;
+            let index = rng.random_range(0..=left);
+            let last = moved.get(&left).copied().unwrap_or(left);
+            self.at(moved.insert(index, last).unwrap_or(index))
+        };
+        (0..most.min(self.len)).filter_map(number).collect()
+    }
+}
+
+impl Run {
+    fn at(&self, index: usize) -> u64 {
+        self.first.wrapping_add(self.spacing.wrapping_mul(index as u64))
     }
 }
 
@@ -178,8 +251,7 @@ mod tests {
         }
     }
 
-    fn chooser(selection: Selection, samples: &[(Option<f64>, f64)]) -> Chooser {
-        let samples = samples.iter().zip(0..);
+    fn eventful(samples: &[(Option<f64>, f64)]) -> Vec<Severity> {
         let severity = |(&(delta_v_mps, thw_s), sample): (&(Option<f64>, f64), u64)| Severity {
             sample,
             delta_v_mps,
@@ -187,15 +259,20 @@ mod tests {
             is_safe_in_baseline: false,
             is_eventful: true,
         };
-        let samples = samples.map(severity).collect();
-        Chooser { selection, samples }
+        samples.iter().zip(0..).map(severity).collect()
+    }
+
+    fn chooser(selection: Selection, samples: Vec<Severity>) -> Chooser {
+        let mut chooser = Chooser::new(selection);
+        samples.into_iter().for_each(|severity| chooser.add(severity));
+        chooser
     }
 
     #[test]
     fn collisions_are_worse_than_near_misses_and_each_sample_is_selected_once() {
         let samples = [(None, 0.4), (Some(2.0), 0.1), (None, 0.1), (Some(9.0), 0.3)];
-        let chosen =
-            chooser(Selection { worst: 3, failures: 1, random: 0 }, &samples).choose(0, &ActorId::new("ego").unwrap());
+        let chosen = chooser(Selection { worst: 3, failures: 1, random: 0 }, eventful(&samples))
+            .choose(0, &ActorId::new("ego").unwrap());
         let numbers: Vec<u64> = chosen.iter().map(|chosen| chosen.sample).collect();
         assert_eq!(numbers, [3, 1, 2]);
         assert_eq!(chosen[1].reasons, ["worst", "failure"]);
@@ -204,20 +281,18 @@ mod tests {
     #[test]
     fn an_uneventful_sample_is_not_among_the_worst() {
         let selection = Selection { worst: 2, failures: 0, random: 0 };
-        let mut chooser = chooser(selection, &[(None, 0.7), (None, 0.9)]);
-        chooser.samples[0].is_eventful = false;
-        let chosen = chooser.choose(0, &ActorId::new("ego").unwrap());
+        let mut samples = eventful(&[(None, 0.7), (None, 0.9)]);
+        samples[0].is_eventful = false;
+        let chosen = chooser(selection, samples).choose(0, &ActorId::new("ego").unwrap());
         assert_eq!(chosen.iter().map(|chosen| chosen.sample).collect::<Vec<_>>(), [1]);
     }
 
     #[test]
     fn induced_failures_precede_all_others() {
-        let mut chooser = chooser(
-            Selection { worst: 0, failures: 2, random: 0 },
-            &[(Some(9.0), 0.1), (Some(2.0), 0.1), (Some(1.0), 0.1)],
-        );
-        chooser.samples[2].is_safe_in_baseline = true;
-        let chosen = chooser.choose(0, &ActorId::new("ego").unwrap());
+        let mut samples = eventful(&[(Some(9.0), 0.1), (Some(2.0), 0.1), (Some(1.0), 0.1)]);
+        samples[2].is_safe_in_baseline = true;
+        let chosen =
+            chooser(Selection { worst: 0, failures: 2, random: 0 }, samples).choose(0, &ActorId::new("ego").unwrap());
         let numbers: Vec<u64> = chosen.iter().map(|chosen| chosen.sample).collect();
         assert_eq!(numbers, [2, 0]);
     }
@@ -226,10 +301,40 @@ mod tests {
     fn the_seed_determines_the_random_samples_and_none_repeats() {
         let samples = [(None, 1.0); 20];
         let choose = |random, seed| {
-            chooser(Selection { worst: 0, failures: 0, random }, &samples).choose(seed, &ActorId::new("ego").unwrap())
+            chooser(Selection { worst: 0, failures: 0, random }, eventful(&samples))
+                .choose(seed, &ActorId::new("ego").unwrap())
         };
         assert_eq!(choose(5, 1), choose(5, 1));
         assert_ne!(choose(5, 1), choose(5, 2));
         assert_eq!(choose(100, 1).len(), 20);
+    }
+
+    #[test]
+    fn the_worst_are_those_of_all_samples_sorted() {
+        let samples: Vec<(Option<f64>, f64)> =
+            (0..500_u32).map(|n| ((n % 7 == 0).then(|| f64::from(n * 37 % 23)), f64::from(n * 71 % 101))).collect();
+        let mut sorted = eventful(&samples);
+        sorted.sort_by(|a, b| compare(b, a));
+        let expected: Vec<u64> = sorted.iter().take(100).map(|severity| severity.sample).collect();
+        let chooser = chooser(Selection { worst: 100, failures: 3, random: 0 }, eventful(&samples));
+        assert_eq!(chooser.worst.iter().map(|severity| severity.sample).collect::<Vec<_>>(), expected);
+        assert_eq!(chooser.others, [0, 7, 14]);
+    }
+
+    #[test]
+    fn the_draws_are_those_of_a_list_and_the_numbers_take_no_memory() {
+        let numbers: Vec<u64> = (0..10_000).map(|n| 3 + 4 * n).filter(|n| n % 1_000 != 7).chain([2, 1]).collect();
+        let mut spaced = SpacedNumbers::default();
+        numbers.iter().for_each(|number| spaced.push(*number));
+        assert!(spaced.runs.len() < 50 && (0..numbers.len()).all(|index| spaced.at(index) == Some(numbers[index])));
+        assert_eq!(spaced.at(numbers.len()), None);
+        for most in [0, 1, 30, 9_000, 20_000] {
+            let rng = || stream(5, 0, &ActorId::new("ego").unwrap(), CHANNEL);
+            let (mut left, mut generator, mut drawn) = (numbers.clone(), rng(), Vec::new());
+            while drawn.len() < most && !left.is_empty() {
+                drawn.push(left.swap_remove(generator.random_range(0..left.len())));
+            }
+            assert_eq!(spaced.draw(most, &mut rng()), drawn, "{most}");
+        }
     }
 }

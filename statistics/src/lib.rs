@@ -13,6 +13,7 @@
 //! * [`needed`]: the number of samples that a bound needs
 //! * [`mcnemar`]: whether two arms differ on the same samples
 //! * [`holm`]: p-values corrected for the number of tests
+//! * [`log_linear`]: quantiles of any number of values in bounded memory
 //! * [`quantiles`]: quantiles of sorted values, and the distribution that they define
 //! * [`two_sample`]: whether new values come from a fitted distribution
 //! * [`normal`]: the truncated normal distribution
@@ -27,6 +28,7 @@ pub mod dbscan;
 pub mod format;
 pub mod holm;
 pub mod interval;
+pub mod log_linear;
 pub mod mcnemar;
 pub mod needed;
 pub mod normal;

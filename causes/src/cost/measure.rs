@@ -2,8 +2,7 @@
 
 use closecall_campaign::saved::SavedCampaign;
 use closecall_simulation::outcome::{Moment, Outcome};
-use closecall_statistics::quantiles::quantile;
-use closecall_traffic::Measured;
+use closecall_statistics::log_linear::LogLinearHistogram;
 use serde::Serialize;
 
 use super::time_lost::mean_time_lost_s;
@@ -16,13 +15,15 @@ pub(super) const THW_BELOW_S: [f64; 2] = [1.0, 0.5];
 /// Threshold of the rear time to collision (s): the time to closest encounter below which the paper calls an encounter critical.
 pub(super) const TTC_BELOW_S: f64 = 2.6;
 const SECONDS_PER_HOUR: f64 = 3_600.0;
+/// Number of samples that are kept, of which those to be timed are taken.
+const MAX_KEPT: usize = 4_096;
 
 /// The cost of one arm.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ArmCost {
     /// The controller.
     pub controller: String,
-    /// The 1st, the 5th and the 50th percentile of the smallest rear time headway (s); `None` if no vehicle is behind.
+    /// The 1st, the 5th and the 50th percentile of the smallest rear time headway (s), to a part in 16,384; `None` if no vehicle is behind.
     pub min_thw_rear_s: Option<[f64; 3]>,
     /// The same of the smallest rear time to collision (s); `None` if no vehicle approaches.
     pub min_ttc_rear_s: Option<[f64; 3]>,
@@ -75,9 +76,12 @@ impl ScenarioCost {
 #[derive(Default)]
 struct Values {
     controller: String,
-    thw_s: Vec<f64>,
-    ttc_s: Vec<f64>,
-    deficit_mps: Vec<f64>,
+    thw_s: LogLinearHistogram,
+    thw_below: [u64; 2],
+    ttc_s: LogLinearHistogram,
+    ttc_below: u64,
+    deficit_mps: LogLinearHistogram,
+    sum_deficit_mps: f64,
     engagements: u64,
     duration_s: f64,
 }
@@ -103,11 +107,19 @@ pub fn cost(saved: &SavedCampaign) -> Result<Cost, CausesError> {
 }
 
 /// The samples of a scenario in which nothing happens.
-#[derive(Default)]
 struct Uneventful {
     without_collision: u64,
-    samples: Vec<u64>,
+    samples: u64,
+    /// Some of the samples: every `spacing`-th one.
+    kept: Vec<u64>,
+    spacing: u64,
     arms: Vec<Values>,
+}
+
+impl Default for Uneventful {
+    fn default() -> Self {
+        Self { without_collision: 0, samples: 0, kept: Vec::new(), spacing: 1, arms: Vec::new() }
+    }
 }
 
 impl Uneventful {
@@ -119,18 +131,33 @@ impl Uneventful {
         if outcomes.iter().any(|outcome| outcome.moment(Moment::FrontBrakes).is_some()) {
             return;
         }
-        self.samples.push(sample);
+        self.keep(sample);
         self.arms.resize_with(outcomes.len(), Values::default);
         for (values, outcome) in self.arms.iter_mut().zip(outcomes) {
             values.push(outcome);
         }
     }
 
+    /// Counts a sample, and keeps its number if it is one of those to be kept.
+    fn keep(&mut self, sample: u64) {
+        if self.samples.is_multiple_of(self.spacing) {
+            if self.kept.len() == MAX_KEPT {
+                let mut index = 0..MAX_KEPT;
+                self.kept.retain(|_| index.next().is_some_and(|index| index % 2 == 0));
+                self.spacing *= 2;
+            }
+            if self.samples.is_multiple_of(self.spacing) {
+                self.kept.push(sample);
+            }
+        }
+        self.samples += 1;
+    }
+
     fn finish(mut self, saved: &SavedCampaign, name: &str, timed: usize) -> ScenarioCost {
-        self.samples.sort_unstable();
-        let chosen = evenly(&self.samples, timed);
+        self.kept.sort_unstable();
+        let chosen = evenly(&self.kept, timed);
         let lost = mean_time_lost_s(saved, name, &chosen);
-        let samples = self.samples.len() as u64;
+        let samples = self.samples;
         let of_arm = |(index, values): (usize, Values)| {
             let time_lost_s = if index == 0 { None } else { lost.as_ref().and_then(|lost| lost.get(index).copied()) };
             values.finish(samples, time_lost_s)
@@ -153,28 +180,33 @@ fn evenly(values: &[u64], most: usize) -> Vec<u64> {
 
 impl Values {
     fn push(&mut self, outcome: &Outcome) {
-        let keep = |values: &mut Vec<f64>, value: Measured| values.extend(value);
         self.controller.clone_from(&outcome.controller);
-        keep(&mut self.thw_s, outcome.margins.min_thw_rear_s);
-        keep(&mut self.ttc_s, outcome.margins.min_ttc_rear_s);
+        if let Ok(thw_s) = outcome.margins.min_thw_rear_s {
+            self.thw_s.push(thw_s);
+            for (count, limit_s) in self.thw_below.iter_mut().zip(THW_BELOW_S) {
+                *count += u64::from(thw_s < limit_s);
+            }
+        }
+        if let Ok(ttc_s) = outcome.margins.min_ttc_rear_s {
+            self.ttc_s.push(ttc_s);
+            self.ttc_below += u64::from(ttc_s < TTC_BELOW_S);
+        }
         self.deficit_mps.push(outcome.margins.max_speed_deficit_mps);
+        self.sum_deficit_mps += outcome.margins.max_speed_deficit_mps;
         self.engagements += u64::from(outcome.mis.as_ref().is_ok_and(|mis| mis.engaged_at_s.is_ok()));
         self.duration_s += outcome.duration.s();
     }
 
-    fn finish(mut self, samples: u64, time_lost_s: Option<f64>) -> ArmCost {
-        for values in [&mut self.thw_s, &mut self.ttc_s, &mut self.deficit_mps] {
-            values.sort_by(f64::total_cmp);
-        }
-        let percentiles = |sorted: &[f64]| (!sorted.is_empty()).then(|| [0.01, 0.05, 0.5].map(|u| quantile(sorted, u)));
-        let below = |sorted: &[f64], limit: f64| sorted.partition_point(|value| *value < limit) as f64 / samples as f64;
-        let mean_mps = self.deficit_mps.iter().sum::<f64>() / samples as f64;
+    fn finish(self, samples: u64, time_lost_s: Option<f64>) -> ArmCost {
+        let percentiles =
+            |values: &LogLinearHistogram| (!values.is_empty()).then(|| [0.01, 0.05, 0.5].map(|u| values.quantile(u)));
+        let share = |count: u64| count as f64 / samples as f64;
         ArmCost {
             min_thw_rear_s: percentiles(&self.thw_s),
             min_ttc_rear_s: percentiles(&self.ttc_s),
-            share_thw_below: THW_BELOW_S.map(|limit| below(&self.thw_s, limit)),
-            share_ttc_below: below(&self.ttc_s, TTC_BELOW_S),
-            speed_lost_mps: [mean_mps, quantile(&self.deficit_mps, 0.95)],
+            share_thw_below: self.thw_below.map(share),
+            share_ttc_below: share(self.ttc_below),
+            speed_lost_mps: [self.sum_deficit_mps / samples as f64, self.deficit_mps.quantile(0.95)],
             engagements_per_hour: self.engagements as f64 * SECONDS_PER_HOUR / self.duration_s,
             time_lost_s,
             controller: self.controller,
@@ -193,6 +225,17 @@ mod tests {
         assert_eq!(evenly(&all, 3), [0, 3, 6]);
         assert_eq!(evenly(&all[..2], 50), [0, 1]);
         assert_eq!(evenly(&[], 50), [0; 0]);
+    }
+
+    #[test]
+    fn the_samples_kept_of_many_lie_evenly_over_all() {
+        let mut found = Uneventful::default();
+        for sample in 0..100_000 {
+            found.keep(sample);
+        }
+        assert_eq!((found.samples, found.spacing), (100_000, 32));
+        assert!(found.kept.iter().zip(0..).all(|(sample, index)| *sample == 32 * index));
+        assert_eq!(found.kept.len(), 3_125);
     }
 
     #[test]
