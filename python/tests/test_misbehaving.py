@@ -33,15 +33,15 @@ COMMON: dict[str, Any] = {"seed": 1, "sensors": "object", "no_gate": True, "reco
 FAULTS = [
     "",
     "ZeroDivisionError: of the controller",
-    "failed at 0.52 s: no answer within 1500 ms",
-    "failed at 0.52 s: no answer within 1500 ms",
+    "failed at 0.52 s: no answer within 3000 ms",
+    "failed at 0.52 s: no answer within 3000 ms",
     "the controller ended its process (exit status: 9)",
     "the controller ended its process (signal: 11 (SIGSEGV)); it last wrote: ",
     "the controller ended its process (signal: 6 (SIGABRT)); it last wrote: ",
-    "holds more than the 512 MiB of memory allowed",
+    "holds more than the 192 MiB of memory allowed",
     "acceleration of NaN m/s²",
     "`step` answered None, a `NoneType`: it must be a number",
-    "failed at 0.52 s: no answer within 1500 ms",
+    "failed at 0.52 s: no answer within 3000 ms",
 ]
 
 
@@ -91,7 +91,8 @@ class Constant:
 
 #: Enough for every fault to appear.
 SAMPLES = 40
-LIMITS = {"controller_timeout_ms": 1_500, "controller_memory_mib": 512}
+#: On a busy machine, too, what leaks reaches its limit long before the time is over.
+LIMITS = {"controller_timeout_ms": 3_000, "controller_memory_mib": 192}
 
 
 def rows(result: cc.CampaignResult) -> list[dict[str, Any]]:
@@ -162,15 +163,15 @@ def compiled(fault: str, folder: Path, kind: str) -> str:
 OTHERS = [
     ("lib", "segfault", "(signal: 11 (SIGSEGV)); it last wrote: about to crash"),
     ("lib", "exit-3", "(exit status: 3)"),
-    ("lib", "hang", "no answer within 1500 ms"),
-    ("lib", "leak", "holds more than the 512 MiB of memory allowed"),
+    ("lib", "hang", "no answer within 3000 ms"),
+    ("lib", "leak", "holds more than the 192 MiB of memory allowed"),
     ("lib", "nan", "acceleration of NaN m/s²"),
     ("fmu", "segfault", "(signal: 11 (SIGSEGV))"),
-    ("fmu", "hang", "no answer within 1500 ms"),
+    ("fmu", "hang", "no answer within 3000 ms"),
     ("fmu", "fatal", "fmi2DoStep answered fmi2Fatal: the solver does not converge"),
     ("exec", "dies", "the process ended (exit status: 3) after 1 answer; it last wrote: out of cheese"),
     ("exec", "killed", "(signal: 9 (SIGKILL))"),
-    ("exec", "hangs", "the process hangs: no answer in twice the 1500 ms allowed"),
+    ("exec", "hangs", "the process hangs: no answer in twice the 3000 ms allowed"),
     ("exec", "nan", "which is not a finite number"),
 ]
 
