@@ -139,6 +139,7 @@ mod tests {
             width: Extent::Seen,
             top_m: 1.5,
             points: 50,
+            is_centred: false,
             class: ClassScores::UNKNOWN,
         }
     }

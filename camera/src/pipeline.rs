@@ -170,6 +170,7 @@ mod tests {
             width: Extent::Seen,
             top_m,
             points: 50,
+            is_centred: false,
             class: ClassScores::UNKNOWN,
         }
     }

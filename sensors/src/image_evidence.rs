@@ -177,6 +177,7 @@ fn alone(camera: &RearCamera, scene: &Scene<'_>, instance: &Instance, lane: &Lan
         width: Extent::Assumed,
         top_m: typical.height_m,
         points: ALONE_POINTS,
+        is_centred: false,
         class: ClassScores(scores),
     };
     (!is_beside_road(&detection, lane)).then_some(detection)

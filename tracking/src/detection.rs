@@ -47,6 +47,9 @@ pub struct Detection {
     pub top_m: f64,
     /// Number of points in the cluster.
     pub points: usize,
+    /// Whether the seen parts are symmetric about the middle of the vehicle, as a plate or both headlamps are. Otherwise, a few points
+    /// may be a part off the middle.
+    pub is_centred: bool,
     /// Class scores from the box's shape, or from the camera if it has classified the box.
     pub class: ClassScores,
 }

@@ -39,6 +39,7 @@ pub(crate) fn measurement(detection: &Detection, frame: &EgoFrame<'_>, time: Tim
     let (s_m, d_m) = frame.road_position_m(detection.face_x_m, detection.face_y_m);
     let class = detection.class.best_vehicle_class();
     let part_offset_sd_m = match class {
+        _ if detection.is_centred => 0.0,
         _ if detection.points < MIN_WHOLE_FACE_POINTS => uniform_sd_m(MAX_PART_OFFSET_M),
         VehicleClass::Motorcycle => 0.0,
         VehicleClass::Car | VehicleClass::Truck => uniform_sd_m(MAX_PART_OFFSET_M - 0.5 * detection.width_m),
@@ -95,6 +96,7 @@ mod tests {
             width: Extent::Seen,
             top_m: 1.5,
             points,
+            is_centred: false,
             class: ClassScores(scores),
         };
         let ego = VehicleState { s_m: 1_000.0, d_m: -5.625, speed_mps: 30.0, ..VehicleState::default() };

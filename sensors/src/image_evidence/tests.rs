@@ -36,6 +36,7 @@ fn detection(class: VehicleClass, face_x_m: f64, face_y_m: f64) -> Detection {
         width: Extent::Assumed,
         top_m: size.height_m,
         points: 50,
+        is_centred: false,
         class: ClassScores::UNKNOWN,
     }
 }

@@ -15,6 +15,7 @@
 use closecall_tracking::MAX_SIDE_AZIMUTH_RAD;
 
 use super::kind::Resolution;
+use super::receiver::MAX_INTENSITY;
 use super::{LaneGeometry, LidarScan};
 
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
@@ -55,6 +56,8 @@ pub(crate) struct BoxFit {
     pub(crate) rear_u_m: f64,
     /// Least and greatest position v across the box's heading (m).
     pub(crate) across_m: [f64; 2],
+    /// Least and greatest position v of the points on a retro-reflector (m), which saturate the receiver; `None` if there is none.
+    pub(crate) plate_m: Option<[f64; 2]>,
     /// Height of the highest point (m).
     pub(crate) top_m: f64,
     /// Height of the lowest point (m).
@@ -117,6 +120,10 @@ impl BoxFit {
             nearest.insert(u, members.len() / POINTS_PER_STRAY);
             far = far.min(u);
             fit.across_m = [fit.across_m[0].min(v), fit.across_m[1].max(v)];
+            if scan.intensity[member as usize] >= MAX_INTENSITY {
+                let [right, left] = fit.plate_m.unwrap_or([v; 2]);
+                fit.plate_m = Some([right.min(v), left.max(v)]);
+            }
             fit.top_m = fit.top_m.max(z);
             fit.bottom_m = fit.bottom_m.min(z);
             // All points are behind the sensor, so the slope increases with the azimuth.
@@ -147,6 +154,7 @@ impl BoxFit {
             front_u_m: 0.0,
             rear_u_m: 0.0,
             across_m: [f64::INFINITY, f64::NEG_INFINITY],
+            plate_m: None,
             top_m: f64::NEG_INFINITY,
             bottom_m: f64::INFINITY,
             front_bottom_m: f64::INFINITY,

@@ -5,10 +5,11 @@
 //! be lost. The background class covers objects that stand beside the carriageway, return too little light, or are too
 //! low or too thin.
 
-use closecall_traffic::ClassScores;
+use closecall_traffic::{ClassScores, VehicleClass};
 
 use super::LaneGeometry;
 use super::boxes::BoxFit;
+use super::parts::is_plate_alone;
 use closecall_tracking::Gaussian;
 
 /// The prior and the size distribution of a class.
@@ -65,6 +66,9 @@ const FAINT_INTENSITY: f64 = 0.03;
 const FAINT_REACH_M: f64 = 20.0;
 /// Factor on the odds of background for a cluster of such low intensity.
 const FAINT_ODDS: f64 = 30.0;
+/// Factor on the odds of a motorcycle for a cluster with a plate (assumption): in front, motorcycles have none in most states of Europe
+/// (the United Kingdom forbids it since 2001).
+const MOTORCYCLE_PLATE_ODDS: f64 = 0.02;
 /// Minimum score of each class, because shape alone cannot rule out a class.
 const MIN_SCORE: f64 = 0.005;
 
@@ -77,9 +81,15 @@ pub(crate) fn typical_size_m(class: usize) -> [f64; 2] {
 pub(crate) fn class_scores(fit: &BoxFit, width_seen: bool, lane: &LaneGeometry) -> ClassScores {
     let mut logs = [0.0; 4];
     for (log, model) in logs.iter_mut().zip(&CLASS_MODELS) {
-        *log = model.prior.ln() + width_log(fit, model, width_seen) + height_log(fit, model) + length_log(fit, model);
+        *log = model.prior.ln()
+            + width_log(fit, model, width_seen && !is_plate_alone(fit))
+            + height_log(fit, model)
+            + length_log(fit, model);
     }
     logs[ClassScores::BACKGROUND] += background_log(fit, lane);
+    if fit.plate_m.is_some() {
+        logs[VehicleClass::Motorcycle as usize] += MOTORCYCLE_PLATE_ODDS.ln();
+    }
     let max = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let mut scores = logs.map(|log| (log - max).exp());
     let sum: f64 = scores.iter().sum();

@@ -6,6 +6,7 @@ use super::boxes::BoxFit;
 use super::classify::{class_scores, typical_size_m};
 use super::clustering::{Clustering, NOISE};
 use super::ground::{Candidate, select_candidates};
+use super::parts::{join_lamps, plate_middle};
 use super::{LaneGeometry, LidarScan, PointSource, ScanTruth};
 use closecall_tracking::SIDE_PROTRUSION_M;
 
@@ -70,6 +71,8 @@ pub struct Detector {
     fits: Vec<BoxFit>,
     /// For each cluster, the cluster whose vehicle it is part of: usually itself.
     parents: Vec<u32>,
+    /// For each cluster, whether it is a pair of headlamps.
+    is_pair: Vec<bool>,
     detections: Vec<Detection>,
 }
 
@@ -82,18 +85,41 @@ impl Detector {
         self.detections.clear();
         self.cluster(scan, lane)?;
         self.fit(scan, lane);
-        if self.find_parents(lane) {
-            self.clustering.merge(&self.parents);
-            self.group_by_cluster();
-            // Front and sides are those of the parent cluster. The parts behind them would only blur the fit.
-            let mut parents = self.parents.iter().zip(0..).map(|(&parent, own)| parent == own);
-            self.fits.retain(|_| parents.next().unwrap_or(false));
+        let has_parts = self.find_parents(lane);
+        if join_lamps(&self.fits, &mut self.parents, &mut self.is_pair) || has_parts {
+            self.merge_parts(scan, lane);
         }
         for index in 0..self.fits.len() {
             let hidden = occluded_edges(index, &self.fits);
-            self.detections.push(detection(&self.fits[index], hidden, scan.start, lane));
+            self.detections.push(detection(&self.fits[index], (hidden, self.is_pair[index]), scan.start, lane));
         }
         Ok(&self.detections)
+    }
+
+    /// Merges each cluster into its parent.
+    ///
+    /// Front and sides are those of the parent cluster, since the parts behind them would only blur the fit. A pair of headlamps has
+    /// a box around both.
+    fn merge_parts(&mut self, scan: &LidarScan, lane: &LaneGeometry) {
+        self.clustering.merge(&self.parents);
+        self.group_by_cluster();
+        let is_own = |index: usize| self.parents[index] as usize == index;
+        let mut kept = 0;
+        for index in 0..self.fits.len() {
+            if is_own(index) {
+                self.fits[kept] = self.fits[index];
+                self.is_pair[kept] = self.is_pair[index];
+                kept += 1;
+            }
+        }
+        self.fits.truncate(kept);
+        self.is_pair.truncate(kept);
+        for cluster in 0..kept {
+            if self.is_pair[cluster] {
+                let members = &self.members[self.starts[cluster] as usize..self.starts[cluster + 1] as usize];
+                self.fits[cluster] = BoxFit::new(members, scan, lane);
+            }
+        }
     }
 
     /// Detects boxes in a scan whose points are assigned to the vehicles that they belong to.
@@ -117,7 +143,7 @@ impl Detector {
         self.fit(scan, lane);
         for index in 0..self.fits.len() {
             let hidden = occluded_edges(index, &self.fits);
-            self.detections.push(detection(&self.fits[index], hidden, scan.start, lane));
+            self.detections.push(detection(&self.fits[index], (hidden, false), scan.start, lane));
         }
         Ok(&self.detections)
     }
@@ -231,8 +257,8 @@ fn occluded_edges(index: usize, fits: &[BoxFit]) -> [bool; 2] {
 }
 
 /// Returns the detection for a fitted box. `hidden` tells whether its edge at the least and at the greatest azimuth is
-/// hidden.
-fn detection(fit: &BoxFit, hidden: [bool; 2], start: Time, lane: &LaneGeometry) -> Detection {
+/// hidden, `is_pair` whether it surrounds a pair of headlamps.
+fn detection(fit: &BoxFit, (hidden, is_pair): ([bool; 2], bool), start: Time, lane: &LaneGeometry) -> Detection {
     // Vehicles point in about the same direction as the ego: the edge at the least azimuth is also that at the least v.
     let width_seen = !hidden[0] && !hidden[1];
     let class = class_scores(fit, width_seen, lane);
@@ -256,6 +282,7 @@ fn detection(fit: &BoxFit, hidden: [bool; 2], start: Time, lane: &LaneGeometry) 
         width: across.extent,
         top_m: fit.top_m,
         points: fit.points,
+        is_centred: is_pair || across.is_by_plate,
         class,
     }
 }
@@ -290,6 +317,8 @@ struct Across {
     sd_m: f64,
     width_m: f64,
     extent: Extent,
+    /// Whether the middle is that of the plate.
+    is_by_plate: bool,
 }
 
 /// Returns the lateral extent of a box from its visible edges and the typical width of its class.
@@ -318,7 +347,20 @@ fn across(fit: &BoxFit, [right_hidden, left_hidden]: [bool; 2], typical_m: f64) 
         Extent::Assumed => seen.max(typical_m),
     };
     let side_sd_m = if sees_side(fit) { SIDE_SD_M } else { 0.0 };
-    Across { middle_m, sd_m: sd_m.max(MIN_LATERAL_SD_M).hypot(side_sd_m), width_m, extent }
+    let sd_m = sd_m.max(MIN_LATERAL_SD_M).hypot(side_sd_m);
+    let by_edges = Across { middle_m, sd_m, width_m, extent, is_by_plate: false };
+    let Some(plate) = plate_middle(fit) else {
+        return by_edges;
+    };
+    // Both hold: the mean is weighted by the inverse variances.
+    let plate_m2 = 0.5 * edge_sd * edge_sd + plate.offset_sd_m * plate.offset_sd_m;
+    let share = sd_m * sd_m / (sd_m * sd_m + plate_m2);
+    Across {
+        middle_m: middle_m + share * (plate.v_m - middle_m),
+        sd_m: (share * plate_m2).sqrt(),
+        is_by_plate: true,
+        ..by_edges
+    }
 }
 
 /// Returns true if the box is so far to one side of the sensor's axis that one of its sides is visible.

@@ -23,6 +23,7 @@ mod kind;
 mod material;
 mod model;
 mod noise;
+mod parts;
 mod pattern;
 mod power;
 mod rail_returns;

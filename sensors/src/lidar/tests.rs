@@ -6,6 +6,7 @@ mod boxes;
 mod cast;
 mod counts;
 mod motion;
+mod parts;
 mod surroundings;
 
 use super::*;

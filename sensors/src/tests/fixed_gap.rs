@@ -20,10 +20,10 @@ const PAINTS: [f64; 5] = [0.1, 0.2, 0.35, 0.5, 0.8];
 
 /// The track of a car straight behind, from 10 s on, over 100 scans of either side of the mirror.
 struct Found {
-    /// Number of scans in which the track was confirmed.
-    scans: u32,
-    /// Mean lateral error (m).
-    error_m: f64,
+    /// Number of scans of either side of the mirror after which the track was confirmed. It coasts after a scan that misses it.
+    scans: [u32; 2],
+    /// Mean lateral error after these scans (m).
+    errors_m: [f64; 2],
     audit: TrackAudit,
 }
 
@@ -38,7 +38,7 @@ fn at_gap(gap_m: f64, paint_reflectivity: f64, sample: u64) -> Found {
     let mut rng = stream(5, sample, &ActorId::new("ego").unwrap(), "fixed-gap");
     let mut tracker = Tracker::new(TrackerConfig::default().check(&Parameters::default()).unwrap());
     let (mut list, mut audit) = (TrackList::default(), TrackAudit::default());
-    let (mut error_sum_m, mut scans) = (0.0, 0);
+    let (mut error_sums_m, mut scans) = ([0.0; 2], [0_u32; 2]);
     for scan in 0..450 {
         let time = CONTROL_STEP * scan;
         for vehicle in others.iter_mut().chain([&mut ego]) {
@@ -56,34 +56,41 @@ fn at_gap(gap_m: f64, paint_reflectivity: f64, sample: u64) -> Found {
         }
         audit.observe(&list.tracks, &scene).unwrap();
         if let Some(track) = list.tracks.iter().find(|track| track.status == TrackStatus::Confirmed) {
-            error_sum_m += track.y_m();
-            scans += 1;
+            let side = usize::from(scan % 2 == 1);
+            error_sums_m[side] += track.y_m();
+            scans[side] += 1;
         }
     }
-    Found { scans, error_m: error_sum_m / f64::from(scans), audit }
+    let errors_m = [0, 1].map(|side| error_sums_m[side] / f64::from(scans[side]));
+    Found { scans, errors_m, audit }
 }
+
+/// Mean lateral error that a track may have (m).
+const LIMIT_M: f64 = 0.05;
 
 #[test]
 fn a_track_at_a_constant_gap_is_where_the_vehicle_is() {
     let mut runs = Vec::new();
-    let mut followed = 0;
     for (row, &gap_m) in (0..).zip(&GAPS_M) {
         for (column, &paint) in (0..).zip(&PAINTS) {
-            let Found { scans, error_m, audit } = at_gap(gap_m, paint, 10 * row + column);
-            // Beyond 60 m, the LiDAR sees only lamps and plate of a dark car.
-            let limit_m = if paint < 0.2 && gap_m > 60.0 { 0.15 } else { 0.05 };
-            if scans == 200 {
-                followed += 1;
-                assert!(error_m.abs() <= limit_m, "{error_m} at {gap_m} m with {paint}");
+            let Found { scans, errors_m, audit } = at_gap(gap_m, paint, 10 * row + column);
+            // The plate carries every car as far as 86 m (docs/perception.md); beyond, the body of a bright one.
+            let is_followed = gap_m <= 80.0 || paint >= 0.5;
+            let most = scans[0].max(scans[1]);
+            assert!(!is_followed || most >= 99, "{scans:?} scans at {gap_m} m with {paint}");
+            // A track that comes and goes after scans of the same side is not at a constant distance from what the beams hit.
+            if most < 99 {
+                continue;
             }
-            if scans > 0 {
-                let across: f64 = audit.nees_by_axis.iter().map(|[_, across]| across).sum();
-                assert!(across < 4.0 * f64::from(scans), "{across} of {scans} at {gap_m} m with {paint}");
-                runs.push(audit.nees);
+            for (scans, error_m) in scans.into_iter().zip(errors_m) {
+                assert!(scans == 0 || error_m.abs() <= LIMIT_M, "{error_m} at {gap_m} m with {paint}");
             }
+            let scans = scans[0] + scans[1];
+            let across: f64 = audit.nees_by_axis.iter().map(|[_, across]| across).sum();
+            assert!(across < 4.0 * f64::from(scans), "{across} of {scans} at {gap_m} m with {paint}");
+            runs.push(audit.nees);
         }
     }
-    assert!(followed >= 25, "{followed}");
     let consistency = Consistency::of(&runs).unwrap();
     assert!(consistency.mean < 4.0, "{consistency:?}");
 }

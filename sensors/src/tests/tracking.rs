@@ -159,6 +159,7 @@ impl Bench {
                 width: Extent::Seen,
                 top_m: 1.5,
                 points: 20,
+                is_centred: false,
                 class: ClassScores([0.6, 0.1, 0.1, 0.2]),
             });
         }

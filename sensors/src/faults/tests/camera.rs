@@ -27,6 +27,7 @@ fn score(fault: &str, environment: Environment, gaps_m: &[f64]) -> f64 {
             width: Extent::Seen,
             top_m: size.height_m,
             points: 20,
+            is_centred: false,
             class: ClassScores::UNKNOWN,
         }];
         let seen = ImagedScene { now: &scene, imaged: &scene, fault: fault.as_ref() };
