@@ -2,7 +2,7 @@
 
 use closecall_sensors::faults::Faults;
 use closecall_sensors::{SensorMode, Sensors};
-use closecall_simulation::scenario::{ScenarioFile, library};
+use closecall_simulation::scenario::{ScenarioError, ScenarioFile, library};
 use closecall_traffic::{BodyShape, Environment, Light, Plate, Road, VehicleClass};
 
 /// Reflectivity of the usual paint (-).
@@ -66,7 +66,10 @@ impl Case {
 }
 
 /// Returns the cases, the usual one first. `mode` says which faults of the library apply.
-pub fn cases(mode: SensorMode) -> Vec<Case> {
+///
+/// # Errors
+/// [`ScenarioError`] if a scenario of the library is broken.
+pub fn cases(mode: SensorMode) -> Result<Vec<Case>, ScenarioError> {
     let mut cases = vec![Case::usual()];
     for class in [VehicleClass::Truck, VehicleClass::Motorcycle] {
         cases.push(Case { class, ..Case::of("class", class.name().to_owned()) });
@@ -95,25 +98,35 @@ pub fn cases(mode: SensorMode) -> Vec<Case> {
     for (offset_m, name) in [(0.0, "car 25 m behind, in line"), (1.9, "car 25 m behind, 1.9 m aside")] {
         cases.push(Case { is_screened: true, offset_m, ..Case::of("traffic", name.to_owned()) });
     }
-    cases.extend(faults(mode));
-    cases
+    cases.extend(faults(mode)?);
+    Ok(cases)
 }
 
-/// Returns a case for each scenario of the library in which a rear sensor of this mode has a fault. Of the scenario come the fault
-/// and what it needs: the light and the guard rails. The sensors are those of the study.
-fn faults(mode: SensorMode) -> impl Iterator<Item = Case> {
-    library::names().filter_map(move |name| {
-        let file = ScenarioFile::parse(&library::path(name), library::text(name)?, &[]).ok()?;
-        let is_fault = file.config().tags.iter().any(|tag| tag == "fault") && name != "front-radar-dead";
-        let scenario = file.concrete(&file.space().nominal()).ok().filter(|_| is_fault)?;
-        let applies = scenario.sensors.mode() == mode;
-        applies.then(|| Case {
-            faults: Some(scenario.sensors.faults().throughout()),
-            environment: Environment { light: scenario.environment.light, ..Environment::CLEAR_DAY },
-            has_guard_rails: scenario.road.has_guard_rails(),
-            ..Case::of("fault", format!("fault: {name}"))
-        })
-    })
+/// Returns a case for each scenario of the library in which a rear sensor of this mode, the odometry or the map has a fault. Of the
+/// scenario come the fault and what it needs: the light and the guard rails. The sensors are those of the study.
+///
+/// # Errors
+/// [`ScenarioError`] if a scenario of the library is broken: its fault would silently be missing.
+fn faults(mode: SensorMode) -> Result<Vec<Case>, ScenarioError> {
+    let mut cases = Vec::new();
+    for name in library::names() {
+        let text = library::text(name).unwrap_or_default();
+        let file = ScenarioFile::parse(&library::path(name), text, &[])?;
+        if !file.config().tags.iter().any(|tag| tag == "fault") {
+            continue;
+        }
+        let scenario = file.concrete(&file.space().nominal())?;
+        let faults = scenario.sensors.faults();
+        if faults.concern_odometry_only() || faults.concern_rear() && scenario.sensors.mode() == mode {
+            cases.push(Case {
+                faults: Some(faults.throughout()),
+                environment: Environment { light: scenario.environment.light, ..Environment::CLEAR_DAY },
+                has_guard_rails: scenario.road.has_guard_rails(),
+                ..Case::of("fault", format!("fault: {name}"))
+            });
+        }
+    }
+    Ok(cases)
 }
 
 impl Case {
@@ -141,9 +154,15 @@ mod tests {
             file.concrete(&file.space().nominal()).unwrap().sensors
         };
         let (stock, own) = (sensors(&[]), sensors(&["sensors.rear-lidar.nominal-range-m=60.0"]));
-        let cases = cases(SensorMode::Full);
+        let cases = cases(SensorMode::Full).unwrap();
         let faulty: Vec<&Case> = cases.iter().filter(|case| case.factor == "fault").collect();
-        assert!(faulty.len() >= 15, "{}", faulty.len());
+        // Those of the rear LiDAR and camera, of odometry and map, and no others.
+        let names: Vec<&str> = faulty.iter().filter_map(|case| case.name.strip_prefix("fault: ")).collect();
+        let expected: Vec<&str> = library::names()
+            .filter(|name| ["camera-", "lidar-", "map-", "odometry-"].iter().any(|start| name.starts_with(start)))
+            .filter(|name| library::text(name).unwrap().contains("\"fault\""))
+            .collect();
+        assert!(names == expected && names.len() > 30, "{names:?} {expected:?}");
         for case in faulty {
             let sensors = case.sensors(&own);
             assert_eq!(sensors.with_faults(Faults::default()), own, "{}", case.name);
@@ -155,6 +174,18 @@ mod tests {
         let road = Road::straight(3);
         let with_rails: Vec<&str> =
             cases.iter().filter(|case| case.road(&road).has_guard_rails()).map(|case| &*case.name).collect();
-        assert_eq!(with_rails, ["fault: lidar-rail-ghosts"]);
+        assert_eq!(with_rails, ["fault: lidar-rail-ghosts", "fault: map-without-rails"]);
+    }
+
+    #[test]
+    fn each_fault_of_the_object_level_rear_sensor_is_a_case_of_its_mode() {
+        let cases = cases(SensorMode::Object).unwrap();
+        let names: Vec<&str> = cases.iter().filter_map(|case| case.name.strip_prefix("fault: ")).collect();
+        let is_expected = |name: &&str| {
+            ["object-", "odometry-"].iter().any(|start| name.starts_with(start)) || name.starts_with("map-")
+        };
+        let expected: Vec<&str> =
+            library::names().filter(is_expected).filter(|name| *name != "map-without-rails").collect();
+        assert_eq!(names, expected);
     }
 }

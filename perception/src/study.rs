@@ -100,7 +100,7 @@ impl Study {
         if sensors.mode() == SensorMode::GroundTruth {
             return Err(StudyError::GroundTruth);
         }
-        let found = study(&cases(sensors.mode()), &sensors, &scenario.road, [seed, extent.runs()])?;
+        let found = study(&cases(sensors.mode())?, &sensors, &scenario.road, [seed, extent.runs()])?;
         let name = file.config().name.clone();
         Ok(Self { name, mode: sensors.mode(), seed, runs: extent.runs(), cases: found })
     }

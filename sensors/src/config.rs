@@ -178,6 +178,11 @@ impl Sensors {
         self.full
     }
 
+    /// Returns the model of the object-level sensor behind, which exists in every mode.
+    pub fn rear_object(&self) -> &ObjectSensorModel {
+        &self.rear_object
+    }
+
     /// Returns the same sensors in another mode, such as one given on the command line.
     #[must_use]
     pub fn with_mode(self, mode: SensorMode) -> Self {

@@ -112,12 +112,12 @@ impl LidarChain {
         match (classifier, &mut scans[..]) {
             (None, _) | (_, []) => {}
             (Some(classifier), [(_, scan)]) => {
-                classifier.classify(seen.believed, &mut scan.detections)?;
+                classifier.classify(seen.scene, &mut scan.detections)?;
                 scan.detections.extend_from_slice(classifier.seen_alone());
             }
             (Some(classifier), several) => {
                 let mut all: Vec<Detection> = several.iter().flat_map(|(_, scan)| scan.detections.clone()).collect();
-                classifier.classify(seen.believed, &mut all)?;
+                classifier.classify(seen.scene, &mut all)?;
                 let mut classified = all.into_iter();
                 for (_, scan) in several.iter_mut() {
                     scan.detections.iter_mut().zip(&mut classified).for_each(|(slot, found)| *slot = found);

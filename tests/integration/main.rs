@@ -27,6 +27,7 @@ mod hidden_lead;
 mod inputs;
 mod inspect;
 mod library;
+mod library_faults;
 mod looking;
 mod malformed;
 mod mask_rcnn;

@@ -126,9 +126,8 @@ impl Check for RoadConfig {
         let number = |num, key, range| parameters.number(num, key, range);
         Ok(Road {
             lanes: self.lanes,
-            lane_width_m: number(&self.lane_width_m, "lane-width-m", Range::closed(2.5, 5.0))?,
-            // 400 m is the smallest radius at which the small-angle lane geometry used here still holds.
-            curvature_per_m: number(&self.curvature_per_m, "curvature-per-m", Range::closed(-0.0025, 0.0025))?,
+            lane_width_m: number(&self.lane_width_m, "lane-width-m", Road::LANE_WIDTH_M)?,
+            curvature_per_m: number(&self.curvature_per_m, "curvature-per-m", Road::CURVATURE_PER_M)?,
             speed_limit_mps: number(&self.speed_limit_mps, "speed-limit-mps", Range::above(0.0, 100.0))?,
             overtaking_side: self.overtaking_side,
             guard_rails: self.guard_rails,
@@ -139,6 +138,11 @@ impl Check for RoadConfig {
 }
 
 impl Road {
+    /// Widths of a lane that the models cover (m).
+    pub const LANE_WIDTH_M: Range = Range::closed(2.5, 5.0);
+    /// Curvatures that the models cover (1/m): 400 m is the smallest radius at which the small-angle lane geometry still holds.
+    pub const CURVATURE_PER_M: Range = Range::closed(-0.0025, 0.0025);
+
     /// Creates a straight road of `lanes` lanes (clamped to 1 to 8), each 3.75 m wide, with a speed limit of 36.1 m/s,
     /// overtaking on the left and no guard rails.
     pub fn straight(lanes: u8) -> Self {
@@ -158,6 +162,12 @@ impl Road {
     #[must_use]
     pub fn with_curvature(self, curvature_per_m: f64) -> Self {
         Self { curvature_per_m: curvature_per_m.clamp(-0.0025, 0.0025), ..self }
+    }
+
+    /// Returns the same road with lanes of another width (m), clamped to 2.5 to 5 m.
+    #[must_use]
+    pub fn with_lane_width(self, lane_width_m: f64) -> Self {
+        Self { lane_width_m: lane_width_m.clamp(2.5, 5.0), ..self }
     }
 
     /// Returns the mirror image of a straight road: vehicles overtake on the other side, and lane 1 corresponds to the
@@ -235,6 +245,12 @@ impl Road {
     #[must_use]
     pub const fn with_guard_rails(self) -> Self {
         Self { guard_rails: true, ..self }
+    }
+
+    /// Returns the same road without guard rails.
+    #[must_use]
+    pub const fn without_guard_rails(self) -> Self {
+        Self { guard_rails: false, ..self }
     }
 
     /// Returns the lateral position of the centre of a lane (m), which is negative.

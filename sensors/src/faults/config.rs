@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::list::{Combine, FaultList, check_span};
 use super::object::ObjectFaultConfig;
+use super::sector::{MAX_SECTORS, Sectors, add_sectors, check_sector};
 use crate::lidar::{MAX_HALF_FIELD_DEG, intern_name};
 use closecall_camera::CameraFault;
 
@@ -18,11 +19,9 @@ pub(super) const MAX_DELAY_S: f64 = 0.4;
 pub(super) const SHARE: Range = Range::closed(0.0, 1.0);
 /// Errors of the clock (s) and of the mounting (deg, m) that the model covers: those of one entry, and those of all entries that
 /// hold at once together.
-const CLOCK_OFFSET_S: Range = Range::closed(-0.2, 0.2);
-const ANGLE_DEG: Range = Range::closed(-5.0, 5.0);
+pub(super) const CLOCK_OFFSET_S: Range = Range::closed(-0.2, 0.2);
+pub(super) const ANGLE_DEG: Range = Range::closed(-5.0, 5.0);
 const HEIGHT_M: Range = Range::closed(-0.2, 0.5);
-/// Maximum number of blocked sectors: one for each entry.
-pub(crate) const MAX_SECTORS: usize = 4;
 
 /// A fault of a LiDAR. It holds from `from-s` to `until-s`, with all effects that it names.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -66,7 +65,7 @@ pub struct LidarFaultConfig {
     /// Standard deviation of an additional error of each range (m).
     pub range_noise_m: Option<Num>,
     /// Share of the points on vehicles that return a second time as a mirror image behind a guard rail (-). It needs
-    /// `guard-rails`. The images appear in the scan; the detector drops them, because the map says where the road ends.
+    /// `guard-rails`. The images appear in the scan; the detector drops them, unless the map is wrong about where the road ends.
     pub rail_ghosts: Option<Num>,
     /// Mean number of bursts of false points in a scan, as pulses of another LiDAR cause them (-).
     pub crosstalk: Option<Num>,
@@ -84,7 +83,7 @@ pub(crate) struct LidarFault {
     pub(crate) lost_frames: f64,
     pub(crate) dropout: f64,
     /// Azimuths of blocked sectors, from the right to the left (deg).
-    pub(crate) blocked_deg: [Option<[f64; 2]>; MAX_SECTORS],
+    pub(crate) blocked_deg: Sectors,
     pub(crate) window_transmission: f64,
     pub(crate) delay_s: f64,
     pub(crate) jitter_s: f64,
@@ -129,9 +128,6 @@ pub(super) fn either(one: f64, other: f64) -> f64 {
 
 impl Combine for LidarFault {
     fn and(self, other: Self) -> Self {
-        let mut blocked_deg = self.blocked_deg;
-        let free = blocked_deg.iter_mut().filter(|sector| sector.is_none());
-        free.zip(other.blocked_deg.into_iter().flatten()).for_each(|(slot, sector)| *slot = Some(sector));
         Self {
             // Of several entries, those of one sensor hold together.
             sensor: self.sensor.or(other.sensor),
@@ -139,7 +135,7 @@ impl Combine for LidarFault {
             is_frozen: self.is_frozen || other.is_frozen,
             lost_frames: either(self.lost_frames, other.lost_frames),
             dropout: either(self.dropout, other.dropout),
-            blocked_deg,
+            blocked_deg: add_sectors(self.blocked_deg, other.blocked_deg),
             window_transmission: self.window_transmission * other.window_transmission,
             delay_s: self.delay_s + other.delay_s,
             jitter_s: self.jitter_s + other.jitter_s,
@@ -209,26 +205,7 @@ impl LidarFaultConfig {
 
     fn check(&self, parameters: &Parameters) -> Result<(LidarFault, [f64; 2]), ConfigError> {
         let number = |num: &Option<Num>, key, range| parameters.number_or(num.as_ref(), key, range, 0.0);
-        let angle = Range::closed(-MAX_HALF_FIELD_DEG, MAX_HALF_FIELD_DEG);
-        let sector = match (&self.blocked_from_deg, &self.blocked_to_deg) {
-            (None, None) => None,
-            (Some(from), Some(to)) => {
-                let from = parameters.number(from, "blocked-from-deg", angle)?;
-                let to = parameters.number(to, "blocked-to-deg", angle)?;
-                if !(from < to) {
-                    let rule = "a sector ends farther left than it begins".to_owned();
-                    let problem = Problem::Contradiction { other: "blocked-from-deg", rule };
-                    return Err(ConfigError::new("blocked-to-deg", problem));
-                }
-                Some([from, to])
-            }
-            (one, _) => {
-                let key = if one.is_none() { "blocked-from-deg" } else { "blocked-to-deg" };
-                return Err(ConfigError::new(key, Problem::Missing { needed: "a blocked sector has two ends" }));
-            }
-        };
-        let mut blocked_deg = [None; MAX_SECTORS];
-        blocked_deg[0] = sector;
+        let azimuth_deg = Range::closed(-MAX_HALF_FIELD_DEG, MAX_HALF_FIELD_DEG);
         let transmission =
             parameters.number_or(self.window_transmission.as_ref(), "window-transmission", SHARE, 1.0)?;
         let fault = LidarFault {
@@ -237,7 +214,7 @@ impl LidarFaultConfig {
             is_frozen: self.frozen,
             lost_frames: number(&self.lost_frames, "lost-frames", SHARE)?,
             dropout: number(&self.dropout, "dropout", SHARE)?,
-            blocked_deg,
+            blocked_deg: check_sector([&self.blocked_from_deg, &self.blocked_to_deg], azimuth_deg, parameters)?,
             window_transmission: transmission,
             delay_s: number(&self.delay_s, "delay-s", Range::closed(0.0, MAX_DELAY_S))?,
             jitter_s: number(&self.jitter_s, "jitter-s", Range::closed(0.0, MAX_DELAY_S))?,

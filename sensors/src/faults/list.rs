@@ -136,6 +136,17 @@ pub struct Faults {
 }
 
 impl Faults {
+    /// Returns whether a fault concerns the sensors that look back, or the odometry and the map that all sensors depend on.
+    pub fn concern_rear(&self) -> bool {
+        let has_sensor = !(self.rear_lidar.is_empty() && self.rear_camera.is_empty() && self.rear_object.is_empty());
+        has_sensor || !self.odometry.is_none()
+    }
+
+    /// Returns whether odometry and map are all that is wrong: such faults act in each mode of the sensors.
+    pub fn concern_odometry_only(&self) -> bool {
+        !self.odometry.is_none() && *self == Self { odometry: self.odometry, ..Self::default() }
+    }
+
     /// Returns the same faults, each from before the start of the run to its end.
     #[must_use]
     pub fn throughout(self) -> Self {
@@ -146,7 +157,7 @@ impl Faults {
             front_radar: self.front_radar.throughout(),
             surround: self.surround.throughout(),
             rear_object: self.rear_object.throughout(),
-            odometry: self.odometry,
+            odometry: self.odometry.throughout(),
         }
     }
 }

@@ -4,12 +4,14 @@
 //!  [[fault.rear-lidar]]  ─▶ FaultList ─▶ what holds at this instant ─▶ scan, frames, health (also [[fault.front-lidar]])
 //!  [[fault.rear-camera]] ─▶     〃    ─▶            〃              ─▶ pixels of each crop, health
 //!  [[fault.front-radar]] and the other object-level sensors         ─▶ measurements, tracks, health
-//!  [fault.odometry]      ─▶ OdometryErrors ─▶ the scene as the ego believes it to be
+//!  [fault.odometry]      ─▶ OdometryErrors ─▶ the scene and the map as the ego believes them to be
 //! ```
 //!
 //! The ego does not know its faults. It notices only what a monitor of the sensor's output can notice: that a sensor delivers
 //! nothing ([`Health::Failed`](crate::Health::Failed) after [`NOTICED_AFTER_SCANS`] scans), or the same bits again and again.
-//! Dirt, glare, noise and a wrong mounting remain unnoticed.
+//! A sensor whose dirt leaves less than half of its range reports [`Health::Degraded`](crate::Health::Degraded), as sensors with a
+//! blockage monitor do; no function acts on that. Glare, dirt on the camera, a blocked sector, noise, wrong time stamps, a wrong
+//! mounting, and a wrong odometry or map remain unnoticed.
 //!
 //! The random numbers of faults come from streams of their own, and from the address of a beam in a scan. A scenario without
 //! faults draws none of them.
@@ -18,6 +20,7 @@ mod config;
 mod list;
 mod object;
 mod odometry;
+mod sector;
 #[cfg(test)]
 mod tests;
 
@@ -30,6 +33,7 @@ pub use odometry::{OdometryErrorConfig, OdometryErrors};
 pub(crate) use config::LidarFault;
 pub(crate) use object::ObjectFault;
 pub use object::ObjectFaultConfig;
+pub(crate) use sector::Sectors;
 
 /// Number of successive scans without output, or with the same output, after which the ego counts a sensor as failed: 1 s.
 ///

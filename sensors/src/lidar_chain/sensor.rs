@@ -137,7 +137,7 @@ impl ChainSensor {
     pub(super) fn push(&mut self, new: NewScan, step: u64, Seen { scene, believed, .. }: &Seen<'_>) {
         let mut scan = PendingScan {
             time: scene.time,
-            road: *scene.road,
+            road: *believed.road,
             ego: believed.ego.state,
             detections: new.detections,
             // Scans arrive in their order.

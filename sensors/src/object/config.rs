@@ -105,6 +105,18 @@ impl ObjectSensorModel {
         self.latency_steps
     }
 
+    /// Returns half of the field of view (deg); `None` if the sensor sees in all directions.
+    pub fn half_angle_deg(&self) -> Option<f64> {
+        // Up to rounding, the value of the configuration.
+        let rounded_deg = (1e9 * self.half_angle_tan.atan().to_degrees()).round() / 1e9;
+        self.half_angle_tan.is_finite().then_some(rounded_deg)
+    }
+
+    /// Returns whether the sensor measures speed.
+    pub fn measures_speed(&self) -> bool {
+        self.speed_sd_mps.is_some()
+    }
+
     /// Returns the same sensor with one range for all vehicles, which the weather shortens by a power law, and with classes that
     /// are known up to `class_range_m` (m).
     pub(crate) fn without_fit(self, class_range_m: f64) -> Self {

@@ -1,12 +1,19 @@
-//! What faults make of the tracks of an object-level sensor, and what its monitor notices of them.
+//! What faults make of the measurements and the tracks of an object-level sensor, and what its monitor notices of them.
 
-use closecall_traffic::{ClassScores, Source, Time, Track, TrackId, TrackStatus, VehicleClass};
+use closecall_traffic::{CONTROL_STEP, ClassScores, Source, Stream, Time, Track, TrackId, TrackStatus, VehicleClass};
 use nalgebra::{Matrix4, Vector4};
+use rand::RngExt;
+use rand_distr::StandardNormal;
 
 use closecall_tracking::TrackList;
 
+use super::arrivals::Arrivals;
+use super::noise::{MeasurementErrors, NoiseKey};
+use super::sector::Blocked;
 use super::sensor::ScanInput;
-use crate::faults::{NOTICED_AFTER_SCANS, ObjectFault};
+use super::visibility::{Direction, NEEDED_SHARE};
+use crate::faults::{FaultList, NOTICED_AFTER_SCANS, ObjectFault};
+use crate::surroundings::OtherVehicle;
 
 /// Length and width of a vehicle that is not there (m): those of a usual car.
 const GHOST_SIZE_M: [f64; 2] = [4.6, 1.8];
@@ -15,9 +22,36 @@ const GHOST_SD: [f64; 2] = [0.15, 0.3];
 /// Score of its class, car.
 const GHOST_CONFIDENCE: f64 = 0.97;
 
-/// The memory of a sensor with faults.
+/// The random numbers of the faults for one vehicle.
+#[derive(Clone, Debug)]
+pub(super) struct FaultStreams {
+    /// Decides which measurements are lost.
+    losses: Stream,
+    /// The additional noise.
+    noise: Stream,
+}
+
+impl FaultStreams {
+    /// Creates the streams for the vehicle with the index `actor`.
+    pub(super) fn new(key: &NoiseKey, channel: &str, actor: usize) -> Self {
+        let [losses, noise] = ["fault", "fault-noise"].map(|of| key.stream_about(&format!("{channel}-{of}"), actor));
+        Self { losses, noise }
+    }
+}
+
+/// The faults of a sensor, with its memory of them.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Faulty {
+    faults: FaultList<ObjectFault>,
+    /// What holds in this step.
+    fault: ObjectFault,
+    /// Decides which scans are lost and late; `None` without faults.
+    rng: Option<Stream>,
+    is_frame_lost: bool,
+    arrivals: Arrivals,
+    /// Age of the newest scan that has arrived (steps).
+    age_steps: usize,
+    blocked: Blocked,
     /// Number of latest successive steps in which the sensor delivered nothing, or the same tracks again.
     failed_steps: u32,
     /// The tracks that a frozen sensor repeats.
@@ -27,13 +61,112 @@ pub(super) struct Faulty {
 }
 
 impl Faulty {
-    /// Counts one step with this fault. `in_view` are the numbers of vehicles in view, and of those whose measurement arrives.
+    /// Creates the memory of a sensor with these faults, whose scans are lost and late by random numbers of `rng`.
+    pub(super) fn new(faults: FaultList<ObjectFault>, rng: Stream) -> Self {
+        let rng = (!faults.is_empty()).then_some(rng);
+        Self { faults, rng, ..Self::default() }
+    }
+
+    /// Returns whether the sensor has faults at some time.
+    pub(super) fn has_faults(&self) -> bool {
+        self.rng.is_some()
+    }
+
+    /// Begins a step of a sensor that looks in this direction and has a latency of `latency_steps` without faults.
+    pub(super) fn begin(&mut self, time: Time, step: usize, (direction, latency_steps): (Direction, usize)) {
+        let Some(rng) = &mut self.rng else { return };
+        let [lost, late]: [f64; 2] = rng.random();
+        self.fault = self.faults.at(time).unwrap_or_default();
+        self.is_frame_lost = lost < self.fault.lost_frames;
+        let more_s = self.fault.delay_s + late * self.fault.jitter_s;
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "checked to be at most some seconds"
+        )]
+        let more_steps = (more_s / CONTROL_STEP.s()).round() as usize;
+        self.age_steps = self.arrivals.observe(step, latency_steps + more_steps);
+        self.blocked.set(&self.fault.blocked_deg, direction);
+    }
+
+    /// Returns the share of the range that is left.
+    pub(super) fn range_share(&self) -> f64 {
+        self.fault.range_share
+    }
+
+    /// Returns the slopes in which the sensor sees nothing.
+    pub(super) fn blocked_slopes(&self) -> &[[f64; 2]] {
+        self.blocked.slopes()
+    }
+
+    /// Returns whether a blocked azimuth hides the vehicle from a sensor that looks around.
+    pub(super) fn hides(&mut self, other: &OtherVehicle) -> bool {
+        self.blocked.hidden_share(other) > 1.0 - NEEDED_SHARE
+    }
+
+    /// Returns the age of the newest scan that has arrived (steps).
+    pub(super) fn age_steps(&self) -> usize {
+        self.age_steps
+    }
+
+    /// Returns whether the scan of this step does not arrive.
+    pub(super) fn is_frame_lost(&self) -> bool {
+        self.is_frame_lost
+    }
+
+    /// Returns the errors of a measurement with those that the faults add.
+    pub(super) fn spoil(&self, errors: MeasurementErrors, streams: Option<&mut FaultStreams>) -> MeasurementErrors {
+        let Some(FaultStreams { losses, noise }) = streams else { return errors };
+        let is_lost = errors.is_lost || losses.random::<f64>() < self.fault.dropout;
+        let [along, across, speed]: [f64; 3] = std::array::from_fn(|_| noise.sample(StandardNormal));
+        let [along_m, across_m] = errors.position_m;
+        let [along_sd_m, across_sd_m] = self.fault.noise_m;
+        MeasurementErrors {
+            position_m: [along_m + along_sd_m * along, across_m + across_sd_m * across],
+            speed_mps: errors.speed_mps + self.fault.speed_noise_mps * speed,
+            is_lost,
+        }
+    }
+
+    /// Returns by how much a wrong mounting and a wrong clock move a vehicle along and across the road (m).
     ///
-    /// A sensor that loses the measurement of every vehicle in view delivers nothing, whether it is dead or not.
-    pub(super) fn observe(&mut self, fault: &ObjectFault, [in_view, measured]: [usize; 2]) {
+    /// A sensor at `mount_m` ahead of the ego's middle that is turned to the left sees everything turned to the right. A scan that
+    /// is dated too late counts as measured from where the ego is then, and the vehicle as having been there by then.
+    pub(super) fn shift_m(&self, other: &OtherVehicle, mount_m: f64, input: &ScanInput<'_>) -> [f64; 2] {
+        let [mut along_m, mut across_m] = [0.0; 2];
+        if self.fault.yaw_rad != 0.0 {
+            let (sin, cos) = self.fault.yaw_rad.sin_cos();
+            let ahead_m = other.x_m - mount_m;
+            let turned = (mount_m + ahead_m * cos + other.y_m * sin, other.y_m * cos - ahead_m * sin);
+            let (s_m, d_m) = input.frame.road_position_m(other.x_m, other.y_m);
+            let (turned_s_m, turned_d_m) = input.frame.road_position_m(turned.0, turned.1);
+            (along_m, across_m) = (turned_s_m - s_m, turned_d_m - d_m);
+        }
+        let offset_s = self.fault.clock_offset_s;
+        if offset_s != 0.0 {
+            let own = &input.scene.ego.state;
+            let (sin, cos) = own.heading_rad.sin_cos();
+            let own_mps = [own.speed_mps * cos / input.frame.path_scale(own.d_m), own.speed_mps * sin];
+            along_m += (own_mps[0] - other.road_mps[0]) * offset_s;
+            across_m += (own_mps[1] - other.road_mps[1]) * offset_s;
+        }
+        [along_m, across_m]
+    }
+
+    /// Counts one step. `in_view` are the numbers of vehicles in view, and of those whose measurement arrives.
+    ///
+    /// A sensor whose scan does not arrive, or that loses the measurement of every vehicle in view, delivers nothing, whether it is
+    /// dead or not.
+    pub(super) fn observe(&mut self, [in_view, measured]: [usize; 2]) {
+        let fault = &self.fault;
         let is_silent = fault.dropout > 0.0 && in_view > 0 && measured == 0;
-        let has_failed = fault.is_dead || fault.is_frozen || is_silent;
+        let has_failed = fault.is_dead || fault.is_frozen || is_silent || self.is_frame_lost;
         self.failed_steps = if has_failed { self.failed_steps.saturating_add(1) } else { 0 };
+    }
+
+    /// Returns whether the sensor delivers nothing.
+    pub(super) fn is_dead(&self) -> bool {
+        self.fault.is_dead
     }
 
     /// Returns whether a monitor has noticed the fault. The monitor finds that nothing arrives, or that the noise of successive
@@ -43,8 +176,8 @@ impl Faulty {
     }
 
     /// Replaces the tracks from `before` on by those of the step in which the sensor froze, with the present time.
-    pub(super) fn hold(&mut self, is_frozen: bool, before: usize, time: Time, list: &mut TrackList) {
-        if !is_frozen {
+    pub(super) fn hold(&mut self, before: usize, time: Time, list: &mut TrackList) {
+        if !self.fault.is_frozen {
             self.held = None;
             return;
         }
@@ -53,15 +186,15 @@ impl Faulty {
         list.tracks.extend(held.iter().map(|track| Track { time, ..track.clone() }));
     }
 
-    /// Returns the track without a vehicle, whose fault began `since_s` ago; `None` once it would have reached the ego.
+    /// Returns the track without a vehicle, if there is one; `None` once it would have reached the ego.
     pub(super) fn ghost(
         &mut self,
-        [gap_m, closing_mps]: [f64; 2],
-        since_s: f64,
         is_ahead: bool,
         (source, input): (Source, &ScanInput<'_>),
         list: &mut TrackList,
     ) -> Option<Track> {
+        let [gap_m, closing_mps] = self.fault.ghost?;
+        let since_s = self.faults.since_s(input.scene.time, |fault| fault.ghost.is_some()).unwrap_or(0.0);
         let gap_m = gap_m - closing_mps * since_s;
         if !(gap_m >= 0.0) {
             return None;

@@ -17,12 +17,14 @@
 //! - The ego's own motion and its position in the lane are known exactly (odometry and map), unless the scenario gives them
 //!   errors.
 
+mod arrivals;
 mod config;
 mod faulty;
 mod fit;
 mod noise;
 mod perception;
 mod ranges;
+mod sector;
 mod sensor;
 mod target;
 #[cfg(test)]

@@ -14,7 +14,7 @@ use rand_distr::StandardNormal;
 use closecall_traffic::{CONTROL_STEP, ClassScores, Source, Track, VehicleClass};
 
 use super::config::{MAX_LATENCY_STEPS, ObjectSensorModel};
-use super::faulty::Faulty;
+use super::faulty::{FaultStreams, Faulty};
 use super::noise::{MeasurementErrors, NoiseKey, TargetNoise};
 use super::ranges::Ranges;
 use super::target::{Filters, Report, Target};
@@ -63,8 +63,6 @@ pub(crate) struct ObjectSensor {
     ranges: Ranges,
     targets: Vec<Target>,
     step: usize,
-    faults: FaultList<ObjectFault>,
-    fault: Option<ObjectFault>,
     faulty: Faulty,
 }
 
@@ -105,15 +103,14 @@ impl ObjectSensor {
             ranges: Ranges::new(&model),
             targets: Vec::new(),
             step: 0,
-            faults: FaultList::default(),
-            fault: None,
             faulty: Faulty::default(),
         }
     }
 
     /// Returns the same sensor with faults.
     pub(crate) fn with_faults(self, faults: FaultList<ObjectFault>) -> Self {
-        Self { faults, ..self }
+        let rng = self.key.stream(&format!("{}-fault", self.channel));
+        Self { faulty: Faulty::new(faults, rng), ..self }
     }
 
     /// Measures one scene, and appends to `list` the tracks whose latency has elapsed.
@@ -132,25 +129,13 @@ impl ObjectSensor {
             self.targets.iter_mut().for_each(|target| target.range_m = f64::NAN);
         }
         self.visibility.update(self.direction, input.others, &size);
-        let has_faults = !self.faults.is_empty();
         let before = list.tracks.len();
-        self.fault = if has_faults { self.faults.at(input.scene.time) } else { None };
+        let has_faults = self.faulty.has_faults();
+        self.faulty.begin(input.scene.time, self.step, (self.direction, self.model.latency_steps));
         let [mut in_view, mut measured] = [0; 2];
         for (position, other) in input.others.iter().enumerate() {
             let index = self.target_index(other, position);
-            let range_m = self.targets[index].range_m;
-            let field = Field { direction: self.direction, range_m, half_angle_tan: self.model.half_angle_tan };
-            let is_seen = self.visibility.sees(&field, position, other, &size);
-            // Whether a fault draws depends on the errors.
-            let errors = if is_seen || has_faults {
-                let errors = self.targets[index].noise.draw(&self.model);
-                let errors = errors.mirrored_for(input.scene.road.overtaking_side());
-                let is_lost = errors.is_lost || has_faults && self.loses(index);
-                is_seen.then_some(MeasurementErrors { is_lost, ..errors })
-            } else {
-                self.targets[index].noise.skip();
-                None
-            };
+            let errors = self.errors(index, (position, other), input);
             let is_classified = self.visibility.is_within(self.targets[index].class_range_m, position);
             in_view += usize::from(errors.is_some());
             measured += usize::from(errors.is_some_and(|errors| !errors.is_lost));
@@ -163,24 +148,45 @@ impl ObjectSensor {
         self.step += 1;
     }
 
-    /// Returns whether a fault loses the measurement of a vehicle in this step.
-    fn loses(&mut self, index: usize) -> bool {
-        let share = self.fault.map_or(0.0, |fault| fault.dropout);
-        self.targets[index].fault_rng.as_mut().is_some_and(|rng| rng.random::<f64>() < share)
-    }
-
-    /// Returns the latency in control steps, with that of a fault.
-    fn latency_steps(&self) -> usize {
-        let late = self.fault.map_or(0, |fault| fault.delay_steps());
-        (self.model.latency_steps + late).min(MAX_LATENCY_STEPS)
+    /// Returns the errors of the measurement of a vehicle at this place in the list; `None` if it is not in view, or the scan does not
+    /// arrive.
+    fn errors(
+        &mut self,
+        index: usize,
+        (position, other): (usize, &OtherVehicle),
+        input: &ScanInput<'_>,
+    ) -> Option<MeasurementErrors> {
+        let (size, side) = (&input.scene.ego.vehicle.dimensions, input.scene.road.overtaking_side());
+        let has_faults = self.faulty.has_faults();
+        let field = Field {
+            direction: self.direction,
+            range_m: self.targets[index].range_m * self.faulty.range_share(),
+            half_angle_tan: self.model.half_angle_tan,
+            blocked: self.faulty.blocked_slopes(),
+        };
+        let is_seen = self.visibility.sees(&field, position, other, size) && !(has_faults && self.faulty.hides(other));
+        let target = &mut self.targets[index];
+        if !has_faults {
+            if is_seen {
+                return Some(target.noise.draw(&self.model).mirrored_for(side));
+            }
+            target.noise.skip();
+            return None;
+        }
+        // The errors are drawn whether the vehicle is seen or not: whether a fault draws depends on them.
+        let errors = target.noise.draw(&self.model);
+        let errors = self.faulty.spoil(errors, target.fault_streams.as_mut()).mirrored_for(side);
+        let mount_m = 0.5 * size.length_m * self.direction.sign();
+        let [along_m, across_m] = self.faulty.shift_m(other, mount_m, input);
+        let position_m = [errors.position_m[0] + along_m, errors.position_m[1] + across_m];
+        (is_seen && !self.faulty.is_frame_lost()).then_some(MeasurementErrors { position_m, ..errors })
     }
 
     /// Changes the tracks of this step, which are those from `before` on, as the faults do: none of a dead sensor, the former ones
     /// of a frozen one, and one without a vehicle. `in_view` are the numbers of vehicles in view, and of those measured.
     fn degrade(&mut self, in_view: [usize; 2], before: usize, input: &ScanInput<'_>, list: &mut TrackList) {
-        let fault = self.fault.unwrap_or_default();
-        self.faulty.observe(&fault, in_view);
-        if fault.is_dead {
+        self.faulty.observe(in_view);
+        if self.faulty.is_dead() {
             list.tracks.truncate(before);
             // After a restart, the sensor begins anew.
             for target in &mut self.targets {
@@ -189,21 +195,17 @@ impl ObjectSensor {
             }
             return;
         }
-        self.faulty.hold(fault.is_frozen, before, input.scene.time, list);
-        if let Some(ghost) = fault.ghost {
-            let since_s = self.faults.since_s(input.scene.time, |fault| fault.ghost.is_some()).unwrap_or(0.0);
-            let is_ahead = self.direction == Direction::Ahead;
-            let track = self.faulty.ghost(ghost, since_s, is_ahead, (self.source, input), list);
-            list.tracks.extend(track);
-        }
+        self.faulty.hold(before, input.scene.time, list);
+        let track = self.faulty.ghost(self.direction == Direction::Ahead, (self.source, input), list);
+        list.tracks.extend(track);
     }
 
-    /// Returns the sensor's health: failed if it has delivered nothing, or always the same, for a while; degraded if the weather
-    /// costs more than half of the range.
+    /// Returns the sensor's health: failed if it has delivered nothing, or always the same, for a while; degraded if weather and dirt
+    /// cost more than half of the range.
     pub(crate) fn health(&self) -> Health {
         if self.faulty.is_noticed() {
             Health::Failed
-        } else if self.ranges.usual_m() < DEGRADED_SHARE * self.model.range_m {
+        } else if self.ranges.usual_m() * self.faulty.range_share() < DEGRADED_SHARE * self.model.range_m {
             Health::Degraded
         } else {
             Health::Ok
@@ -236,7 +238,8 @@ impl ObjectSensor {
     fn add_target(&mut self, actor: usize) -> usize {
         let noise = TargetNoise::new(&self.key, self.channel, actor, &self.model);
         let stream = |purpose: &str| self.key.stream_about(&format!("{}-{purpose}", self.channel), actor);
-        let fault_rng = (!self.faults.is_empty()).then(|| stream("fault"));
+        let has_faults = self.faulty.has_faults();
+        let fault_streams = has_faults.then(|| FaultStreams::new(&self.key, self.channel, actor));
         let range_deviation = if self.model.fit.is_some() { stream("range").sample(StandardNormal) } else { 0.0 };
         self.targets.push(Target {
             actor,
@@ -247,7 +250,7 @@ impl ObjectSensor {
             filters: None,
             reports: [None; MAX_LATENCY_STEPS + 1],
             history: Vec::new(),
-            fault_rng,
+            fault_streams,
         });
         self.targets.len() - 1
     }
@@ -321,9 +324,9 @@ impl ObjectSensor {
 
     /// Stores the current estimate in the ring buffer, and appends the one stored `latency_steps` ago to `list`.
     fn report(&mut self, index: usize, other: &OtherVehicle, input: &ScanInput<'_>, list: &mut TrackList) {
-        let latency_steps = self.latency_steps();
+        let has_faults = self.faulty.has_faults();
+        let latency_steps = if has_faults { self.faulty.age_steps() } else { self.model.latency_steps };
         let latency_s = latency_steps as f64 * CONTROL_STEP.s();
-        let has_faults = !self.faults.is_empty();
         let target = &mut self.targets[index];
         let length = target.reports.len();
         let (latest, due) = (self.step % length, (self.step + length - latency_steps) % length);

@@ -2,9 +2,10 @@
 
 use closecall_tracking::axis::{AxisEstimate, AxisFilter};
 use closecall_tracking::lifecycle::Lifecycle;
-use closecall_traffic::{Stream, TrackId};
+use closecall_traffic::TrackId;
 
 use super::config::MAX_LATENCY_STEPS;
+use super::faulty::FaultStreams;
 use super::noise::TargetNoise;
 
 /// A track with its filters.
@@ -45,6 +46,6 @@ pub(super) struct Target {
     pub(super) reports: [Option<Report>; MAX_LATENCY_STEPS + 1],
     /// The latest filters, in the same order, if the sensor has faults: a latency that changes predicts them by their own age.
     pub(super) history: Vec<Option<Filters>>,
-    /// Decides which measurements a fault loses; drawn from in each step if the sensor has faults.
-    pub(super) fault_rng: Option<Stream>,
+    /// What faults do to the measurements of the vehicle; drawn from in each step if the sensor has faults.
+    pub(super) fault_streams: Option<FaultStreams>,
 }

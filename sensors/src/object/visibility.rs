@@ -24,19 +24,32 @@ pub(super) enum Direction {
     Behind,
 }
 
+impl Direction {
+    /// Returns on which side of the ego's middle the sensor is: 1 ahead, −1 behind, 0 for those around.
+    pub(super) fn sign(self) -> f64 {
+        match self {
+            Self::Ahead => 1.0,
+            Self::Around => 0.0,
+            Self::Behind => -1.0,
+        }
+    }
+}
+
 /// Field of view and range of a sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Field {
+pub(super) struct Field<'a> {
     pub(super) direction: Direction,
     /// Maximum distance from the bumper, or from the body, to a vehicle's nearest face (m).
     pub(super) range_m: f64,
     /// Tangent of half of the field of view.
     pub(super) half_angle_tan: f64,
+    /// Slopes in which the sensor sees nothing.
+    pub(super) blocked: &'a [[f64; 2]],
 }
 
 /// Share of a vehicle's angular width that must be in view for a detection (assumption: a quarter of a car's rear still
 /// returns more than the thresholds of radar or LiDAR need).
-const NEEDED_SHARE: f64 = 0.25;
+pub(super) const NEEDED_SHARE: f64 = 0.25;
 
 /// Least outward distance for which slopes are computed (m). Parts of a box that are nearer to the sensor's plane are
 /// treated as if at this distance, so that slopes stay finite.
@@ -89,7 +102,7 @@ impl Visibility {
     }
 
     /// Returns whether `other`, with this place in the list, is within the field of view, in range, and not hidden.
-    pub(super) fn sees(&mut self, field: &Field, place: usize, other: &OtherVehicle, ego: &Dimensions) -> bool {
+    pub(super) fn sees(&mut self, field: &Field<'_>, place: usize, other: &OtherVehicle, ego: &Dimensions) -> bool {
         if field.direction == Direction::Around {
             return box_distance_m(other, ego) <= field.range_m;
         }
@@ -99,6 +112,12 @@ impl Visibility {
             return false;
         }
         self.covered.clear();
+        for [from, to] in field.blocked {
+            let overlap = (from.max(low), to.min(high));
+            if overlap.0 < overlap.1 {
+                self.covered.push(overlap);
+            }
+        }
         for nearer in self.silhouettes.iter().flatten().filter(|seen| seen.near_m < target.near_m) {
             let overlap = (nearer.low.max(low), nearer.high.min(high));
             if overlap.0 < overlap.1 {
@@ -137,7 +156,7 @@ fn box_distance_m(other: &OtherVehicle, ego: &Dimensions) -> f64 {
 }
 
 /// Returns the total width of the union of `intervals`, which it sorts.
-fn union_width(intervals: &mut [(f64, f64)]) -> f64 {
+pub(super) fn union_width(intervals: &mut [(f64, f64)]) -> f64 {
     intervals.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     let mut width = 0.0;
     let mut end = f64::NEG_INFINITY;
@@ -181,9 +200,9 @@ mod tests {
     }
 
     const EGO: Dimensions = VehicleClass::Car.typical_dimensions();
-    const BEHIND: Field = Field { direction: Direction::Behind, range_m: 120.0, half_angle_tan: 2.3 };
+    const BEHIND: Field<'_> = Field { direction: Direction::Behind, range_m: 120.0, half_angle_tan: 2.3, blocked: &[] };
 
-    fn seen(field: Field, others: &[OtherVehicle]) -> Vec<bool> {
+    fn seen(field: Field<'_>, others: &[OtherVehicle]) -> Vec<bool> {
         let mut visibility = Visibility::default();
         visibility.update(field.direction, others, &EGO);
         others.iter().enumerate().map(|(place, other)| visibility.sees(&field, place, other, &EGO)).collect()
@@ -199,8 +218,22 @@ mod tests {
     }
 
     #[test]
+    fn a_blot_hides_a_vehicle_of_which_less_than_a_quarter_is_free() {
+        // The car 60 m behind, with its front at 55.4 m, covers the slopes of ±0.0167.
+        let in_line = [car(1, -60.0, 0.0)];
+        for (blocked, is_seen) in
+            [([-0.02, 0.008], true), ([-0.02, 0.009], false), ([-0.008, 0.02], true), ([0.02, 0.1], true)]
+        {
+            assert_eq!(seen(Field { blocked: &[blocked], ..BEHIND }, &in_line), [is_seen], "{blocked:?}");
+        }
+        let left = [car(1, -60.0, 3.75)];
+        assert_eq!(seen(Field { blocked: &[[0.03, 0.1]], ..BEHIND }, &left), [false], "the left is positive");
+        assert_eq!(seen(Field { blocked: &[[-0.1, -0.03]], ..BEHIND }, &left), [true]);
+    }
+
+    #[test]
     fn surround_sensors_see_vehicles_near_the_ego_body() {
-        let around = Field { direction: Direction::Around, range_m: 14.0, half_angle_tan: f64::INFINITY };
+        let around = Field { direction: Direction::Around, range_m: 14.0, half_angle_tan: f64::INFINITY, blocked: &[] };
         let others = [car(1, 0.0, 3.75), car(2, 18.0, 3.75), car(3, 19.5, 0.0), car(4, -15.0, -3.75)];
         assert_eq!(seen(around, &others), [true, true, false, true]);
     }

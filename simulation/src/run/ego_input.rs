@@ -9,16 +9,17 @@ use crate::world::World;
 /// Returns the ego's own motion, its position in its lane, and its size, as its odometry and its map give them.
 pub(super) fn odometry(scenario: &Scenario, world: &World) -> Odometry {
     let state = world.state(scenario.ego);
-    let errors = scenario.sensors.odometry_errors();
-    let d_m = state.d_m + errors.lateral_m;
-    let lane = scenario.road.lane_at(d_m);
+    let errors = scenario.sensors.odometry_errors().at(world.time());
+    let d_m = errors.own_d_m(&scenario.road, state.d_m);
+    let map = errors.map_of(&scenario.road);
+    let lane = map.lane_at(d_m);
     let size = world.vehicle(scenario.ego).dimensions;
     Odometry {
         speed_mps: state.speed_mps * (1.0 + errors.speed_scale),
         acceleration_mps2: state.acceleration_mps2,
         yaw_rate_radps: state.yaw_rate_radps,
         lane,
-        lane_offset_m: d_m - scenario.road.lane_centre_m(lane),
+        lane_offset_m: d_m - map.lane_centre_m(lane),
         length_m: size.length_m,
         width_m: size.width_m,
     }

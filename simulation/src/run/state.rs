@@ -7,7 +7,7 @@ use std::borrow::Cow;
 use closecall_controllers::CheckedDriver;
 use closecall_controllers::{EgoCommand, EgoInput, EgoSettings, EgoState, Looks, MisSettings, Neighbours, Reason};
 use closecall_sensors::{Perception, Scene, SceneVehicle};
-use closecall_traffic::{CONTROL_STEP, ENGAGEMENT_CLOSING_MPS, ENGAGEMENT_GAP_M, Measured, Track, VehicleState};
+use closecall_traffic::{CONTROL_STEP, ENGAGEMENT_CLOSING_MPS, ENGAGEMENT_GAP_M, Measured, Road, Track, VehicleState};
 
 use super::ego_input::{odometry, sensor_availability};
 use super::equipment::perception;
@@ -73,6 +73,8 @@ pub(super) struct Run<'a> {
     vehicles: Vec<SceneVehicle>,
     /// Front gap (m) and front time headway (s) of each actor.
     fronts: Vec<(Measured, Measured)>,
+    /// The road as the map shows it while its errors hold.
+    wrong_map: Road,
 }
 
 impl<'a> Run<'a> {
@@ -120,6 +122,7 @@ impl<'a> Run<'a> {
             others: Vec::with_capacity(world.len()),
             vehicles: Vec::with_capacity(world.len()),
             fronts: Vec::with_capacity(world.len()),
+            wrong_map: scenario.sensors.odometry_errors().map_of(&scenario.road),
             world,
             scenario,
             arm,
@@ -166,10 +169,12 @@ impl<'a> Run<'a> {
 
     /// Returns the input of the ego controller at the current time.
     pub(super) fn input(&self) -> EgoInput<'_> {
+        let time = self.world.time();
+        let is_map_right = self.scenario.sensors.odometry_errors().at(time).is_none();
         EgoInput {
-            time: self.world.time(),
+            time,
             odometry: odometry(&self.scenario, &self.world),
-            road: &self.scenario.road,
+            road: if is_map_right { &self.scenario.road } else { &self.wrong_map },
             tracks: &self.tracks,
             sensors: sensor_availability(self.perception.as_ref()),
         }

@@ -6,6 +6,7 @@ use closecall_sensors::lidar::Lidar;
 use closecall_sensors::{SensorMode, Sensors};
 use closecall_traffic::{Check, ConfigError, Num, Parameters, Problem, Range, Road};
 
+use super::inert_object_fault::{refuse_of_map, refuse_of_objects};
 use super::intervention::FaultConfig;
 use super::{ScenarioError, ScenarioFile};
 
@@ -44,7 +45,12 @@ pub(super) fn refuse(
     refuse_late("rear-camera", &mut fault.rear_camera.iter().map(|of| &of.from_s))?;
     refuse_late("front-radar", &mut fault.front_radar.iter().map(|of| &of.from_s))?;
     refuse_late("surround", &mut fault.surround.iter().map(|of| &of.from_s))?;
-    refuse_late("rear-object", &mut fault.rear_object.iter().map(|of| &of.from_s))
+    refuse_late("rear-object", &mut fault.rear_object.iter().map(|of| &of.from_s))?;
+    refuse_of_objects(fault, sensors, parameters)?;
+    match &fault.odometry {
+        Some(odometry) => refuse_of_map(odometry, (sensors, road), duration_s, parameters),
+        None => Ok(()),
+    }
 }
 
 /// Refuses names that no LiDAR has, blocked sectors outside of the field of view of a LiDAR, and mirror images without guard rails.
@@ -138,12 +144,12 @@ fn refuse_absent(fault: &FaultConfig, sensors: &Sensors) -> Result<(), ConfigErr
     }
 }
 
-fn contradiction(key: &str, other: &'static str, rule: &str) -> ConfigError {
+pub(super) fn contradiction(key: &str, other: &'static str, rule: &str) -> ConfigError {
     ConfigError::new(key, Problem::Contradiction { other, rule: rule.to_owned() })
 }
 
 /// Returns an error of an entry with its place in the file.
-fn at(key: &str, index: usize, error: ConfigError) -> ConfigError {
+pub(super) fn at(key: &str, index: usize, error: ConfigError) -> ConfigError {
     error.within_index(index).within(key).within("fault")
 }
 

@@ -16,6 +16,7 @@ mod events;
 mod file;
 mod fleet;
 mod inert_fault;
+mod inert_object_fault;
 mod intervention;
 pub mod library;
 mod lidar_file;

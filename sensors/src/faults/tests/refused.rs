@@ -30,6 +30,21 @@ fn entries_that_cannot_be_right_are_refused_by_their_keys() {
         ("[[rear-camera]]\ndirt = -0.1", "rear-camera[0].dirt", "from 0 to 1"),
         ("[[rear-object]]\nghost-closing-mps = 3.0", "rear-object[0].ghost-gap-m", "the gap"),
         ("[[surround]]\ndelay-s = 0.5", "surround[0].delay-s", "from 0 to 0.4"),
+        ("[[front-radar]]\nlost-frames = 1.1", "front-radar[0].lost-frames", "from 0 to 1"),
+        ("[[front-radar]]\nrange-share = 0.0", "front-radar[0].range-share", "above 0 and up to 1"),
+        ("[[surround]]\nblocked-from-deg = -1.0", "surround[0].blocked-to-deg", "two ends"),
+        ("[[surround]]\njitter-s = -0.1", "surround[0].jitter-s", "from 0 to 0.4"),
+        ("[[rear-object]]\nrange-noise-m = 6", "rear-object[0].range-noise-m", "from 0 to 5"),
+        ("[[rear-object]]\nyaw-deg = 3\n".repeat(2).as_str(), "rear-object[0].yaw-deg", "from -5 to 5"),
+        (
+            "[[rear-object]]\nclock-offset-s = 0.15\n".repeat(2).as_str(),
+            "rear-object[0].clock-offset-s",
+            "from -0.2 to 0.2",
+        ),
+        ("[odometry]\nheading-deg = 4", "odometry.heading-deg", "from -3 to 3"),
+        ("[odometry]\ncurvature-per-m = 0.01", "odometry.curvature-per-m", "from -0.001 to 0.001"),
+        ("[odometry]\nlane-width-m = -2", "odometry.lane-width-m", "from -1 to 1"),
+        ("[odometry]\nlateral-m = 0.1\nfrom-s = 3\nuntil-s = 2", "odometry.until-s", "ends after it has begun"),
         ("[odometry]\nspeed-scale = 0.5", "odometry.speed-scale", "from -0.1 to 0.1"),
     ] {
         let message = refused(text);
