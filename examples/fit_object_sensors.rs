@@ -2,8 +2,11 @@
 //!
 //!     cargo run --release --example fit_object_sensors                  # sensors/data/rear-object.toml
 //!     cargo run --release --example fit_object_sensors -- -n 2 -o own.toml
+//!     cargo run --release --example fit_object_sensors -- --validate -n 6
 //!
-//! It takes some minutes. The result depends on the seed and on the number of approaches, and not on the number of threads.
+//! A fit takes some minutes. The sensor has its figures after the next build. With `--validate`, the errors, delays and misses of the
+//! sensor as built are measured beside those of the full chain, written into the file as `[validation]`, and every difference that
+//! matters is printed. The results depend on the seed and on the number of approaches, and not on the number of threads.
 
 #![expect(clippy::print_stdout, reason = "a command prints its result")]
 
@@ -11,7 +14,13 @@ use std::path::{Path, PathBuf};
 
 use clap::Parser;
 use closecall::simulation::scenario::source;
-use closecall_perception::fit::{FitPlan, fit};
+use closecall_perception::fit::{FitPlan, at_bounds, fit};
+use closecall_perception::validation::{Measured, differences, measure, table};
+use closecall_sensors::{Chain, RearFit};
+
+/// First line of the file.
+const HEAD: &str =
+    "# The rear object-level sensor, fitted to the full chain by examples/fit_object_sensors. Not edited by hand.\n\n";
 
 /// Fits the rear object-level sensor to the full chain.
 #[derive(Parser)]
@@ -25,23 +34,65 @@ struct Args {
     /// The file to write
     #[arg(short, long, default_value = "sensors/data/rear-object.toml")]
     output: PathBuf,
+    /// Measure the sensor as built beside the full chain, in place of a fit
+    #[arg(long)]
+    validate: bool,
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let args = Args::parse();
     let file = source::load(Path::new("low-thw-overtake"), &[])?;
-    let found = fit(&FitPlan {
+    let plan = FitPlan {
         file: &file,
         seed: args.seed,
         approaches: args.approaches,
         command: format!(
-            "cargo run --release --example fit_object_sensors -- -n {} --seed {}",
-            args.approaches, args.seed
+            "cargo run --release --example fit_object_sensors -- {}-n {} --seed {}",
+            if args.validate { "--validate " } else { "" },
+            args.approaches,
+            args.seed
         ),
         version: env!("CARGO_PKG_VERSION").to_owned(),
-    })?;
-    let head = "# The rear object-level sensor, fitted to the full chain by examples/fit_object_sensors. Not edited by hand.\n\n";
-    std::fs::write(&args.output, format!("{head}{}", toml::to_string(&found)?))?;
+    };
+    let found = if args.validate { validated(&plan)? } else { fit(&plan)? };
+    at_bounds(&found.errors).iter().for_each(|warning| println!("warning: {warning}"));
+    std::fs::write(&args.output, format!("{HEAD}{}", toml::to_string(&found)?))?;
     println!("written: {}", args.output.display());
     Ok(())
+}
+
+/// Returns the fit as built, with its tracks measured beside those of the full chain.
+fn validated(plan: &FitPlan<'_>) -> Result<RearFit, Box<dyn std::error::Error>> {
+    let measured = measure(plan, |_, _, _| true)?;
+    let table = table(plan, &measured);
+    print(&measured);
+    for it in differences(&table) {
+        let [visibility_m, rain_mm_per_h] = it.weather;
+        println!(
+            "differs: {}, paint {}, visibility {visibility_m} m, rain {rain_mm_per_h} mm/h: {} {} in the full chain, {} at object level",
+            it.class.name(),
+            it.paint,
+            it.figure,
+            it.full,
+            it.object
+        );
+    }
+    Ok(RearFit { validation: Some(table), ..RearFit::shipped()?.clone() })
+}
+
+/// Prints what was measured: root mean square errors along (m), across (m) and of the speed (m/s) up to 50 m and beyond, their
+/// correlation times (s), delays (s), misses, and lags (s).
+fn print(measured: &[Measured]) {
+    for it in measured {
+        let (class, paint, [visibility_m, rain_mm_per_h]) = it.at;
+        println!("{}, paint {paint}, visibility {visibility_m} m, rain {rain_mm_per_h} mm/h", class.name());
+        for chain in [Chain::Full, Chain::Object] {
+            let of = it.of(chain);
+            let [near, far] = of.near_far_sd;
+            println!(
+                "  {chain:?}: near {near:.3?}, far {far:.3?}, time {:.1?}, after {:.2?}, missed {:.3} (longest {:.2} s), coasting {:.3}, lag {:.2?}",
+                of.time_s, of.after_s, of.missed, of.longest_gap_s, of.coasting, of.lag_s
+            );
+        }
+    }
 }

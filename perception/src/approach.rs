@@ -8,6 +8,8 @@ use rand::RngExt;
 
 use crate::cases::Case;
 
+pub(crate) mod watching;
+
 /// Speed of the ego (m/s).
 const EGO_MPS: f64 = 30.0;
 /// Position of the ego along the road at the start (m).

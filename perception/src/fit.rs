@@ -77,16 +77,11 @@ struct Fitter<'a> {
 /// # Errors
 /// [`StudyError`] if the scenario cannot be used, or a sensor model fails.
 pub fn fit(plan: &FitPlan<'_>) -> Result<RearFit, StudyError> {
-    let nominal = plan.file.space().nominal();
-    let without_camera = with_settings(plan.file, &["sensors.rear-camera.pipeline=\"off\"".to_owned()])?;
-    let lidar = without_camera.concrete(&nominal)?.sensors.with_mode(SensorMode::Full);
-    let scenario = plan.file.concrete(&nominal)?;
-    let fitter = Fitter { plan, full: scenario.sensors.with_mode(SensorMode::Full), scenario, lidar };
+    let fitter = Fitter::new(plan)?;
     let errors = fitter.errors()?;
     let (range, range_spread) = fitter.ranges(&errors)?;
-    let FitPlan { seed, approaches, command, version, file } = plan.clone();
     Ok(RearFit {
-        origin: Origin { command, version, scenario: file.config().name.clone(), seed, approaches },
+        origin: plan.origin(),
         errors,
         class_confidence: fitter.class_confidence()?,
         range_spread,
@@ -94,7 +89,35 @@ pub fn fit(plan: &FitPlan<'_>) -> Result<RearFit, StudyError> {
         extinctions_per_m: extinctions_per_m(&VISIBILITIES_M),
         range,
         shapes: fitter.shapes()?,
+        validation: None,
     })
+}
+
+impl FitPlan<'_> {
+    /// Returns what a file says about where its figures come from.
+    pub(crate) fn origin(&self) -> Origin {
+        let FitPlan { seed, approaches, command, version, file } = self.clone();
+        Origin { command, version, scenario: file.config().name.clone(), seed, approaches }
+    }
+}
+
+/// Returns the fitted errors that lie on a bound, each with what that means.
+pub fn at_bounds(errors: &FittedErrors) -> Vec<String> {
+    let FittedErrors { range_sd_m, lateral_sd_m, drift_sd_m, drift_time_s } = *errors;
+    let on = |key: &str, value: f64, [low, high]: [f64; 2]| {
+        let which = if value <= low { "lower" } else { "upper" };
+        let is_on = value <= low || value >= high;
+        is_on.then(|| {
+            format!("`errors.{key}` is {value}, its {which} bound: the full chain may ask for a value beyond it")
+        })
+    };
+    let found = [
+        on("range-sd-m", range_sd_m, SD_BOUNDS_M),
+        on("lateral-sd-m", lateral_sd_m, SD_BOUNDS_M),
+        on("drift-sd-m", drift_sd_m, SD_BOUNDS_M),
+        on("drift-time-s", drift_time_s, TIME_BOUNDS_S),
+    ];
+    found.into_iter().flatten().collect()
 }
 
 fn with_settings(file: &ScenarioFile, settings: &[String]) -> Result<ScenarioFile, StudyError> {
@@ -129,6 +152,16 @@ fn settings_of(errors: &FittedErrors) -> [String; 4] {
 fn means_m(firsts: &[Firsts]) -> [f64; 2] {
     let of = |distance_m: fn(&Firsts) -> f64| mean(&firsts.iter().map(distance_m).collect::<Vec<_>>());
     [of(|firsts| firsts.confirmed_m), of(|firsts| firsts.classified_m)]
+}
+
+impl<'a> Fitter<'a> {
+    fn new(plan: &'a FitPlan<'a>) -> Result<Self, StudyError> {
+        let nominal = plan.file.space().nominal();
+        let without_camera = with_settings(plan.file, &["sensors.rear-camera.pipeline=\"off\"".to_owned()])?;
+        let lidar = without_camera.concrete(&nominal)?.sensors.with_mode(SensorMode::Full);
+        let scenario = plan.file.concrete(&nominal)?;
+        Ok(Self { plan, full: scenario.sensors.with_mode(SensorMode::Full), scenario, lidar })
+    }
 }
 
 impl Fitter<'_> {

@@ -14,15 +14,19 @@
 //! * [`approach`]: one approach
 //! * [`study`]: all approaches of all cases
 //! * [`fit`]: the fit of the object-level sensor to the full chain
+//! * [`behaviour`]: errors, delays and misses of the tracks of a vehicle
+//! * [`validation`]: the object-level sensor against the full chain, in these respects
 //! * [`figures`]: what follows from the approaches of a case, with intervals
 //! * [`output`]: text, JSON, Parquet and the page
 
 pub mod agreement;
 pub mod approach;
+pub mod behaviour;
 pub mod cases;
 pub mod figures;
 pub mod fit;
 pub mod output;
 pub mod study;
+pub mod validation;
 
 pub use study::{Extent, Study, StudyError};

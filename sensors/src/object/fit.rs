@@ -16,6 +16,7 @@ use std::sync::LazyLock;
 use closecall_traffic::{Appearance, Environment, Plate, VehicleClass};
 use serde::{Deserialize, Serialize};
 
+use super::validated::Validation;
 use crate::lidar::extinction_per_m;
 
 /// The text of the fit that ships.
@@ -48,6 +49,9 @@ pub struct RearFit {
     pub range: Vec<RangeGrid>,
     /// Ranges of body shapes relative to those of their class.
     pub shapes: ShapeRatios,
+    /// How the tracks of the sensor compare with those of the full chain, if that was measured. No sensor reads it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub validation: Option<Validation>,
 }
 
 /// Where a fit comes from.
@@ -177,7 +181,7 @@ impl RearFit {
                 check_grid(&format!("shapes.{name}.{shape}"), ratios, knots, [0.05, 20.0])?;
             }
         }
-        Ok(())
+        self.validation.as_ref().map_or(Ok(()), Validation::check)
     }
 
     /// Returns the range of a usual car on a clear day (m): grey, with a clean plate. Like the grid, it has decimetres.
@@ -273,6 +277,9 @@ fn check_grid(key: &str, rows: &[Vec<f64>], [paints, extinctions]: [&[f64]; 2], 
 
 #[cfg(test)]
 mod tests {
+    use closecall_traffic::{CONTROL_STEP, Parameters};
+
+    use super::super::config::ObjectSensorConfig;
     use super::*;
 
     #[test]
@@ -280,6 +287,18 @@ mod tests {
         let fit = RearFit::shipped().unwrap();
         assert!(fit.origin.command.contains("fit_object_sensors") && !fit.origin.version.is_empty());
         assert_eq!(RearFit::parse(&toml::to_string(fit).unwrap()).as_ref(), Ok(fit));
+    }
+
+    #[test]
+    fn the_sensor_has_the_figures_of_the_file() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/data/rear-object.toml");
+        let file: toml::Table = std::fs::read_to_string(path).unwrap().parse().unwrap();
+        let number = |table: &str, key: &str| file[table][key].as_float().unwrap();
+        let model = ObjectSensorConfig::default().check_rear_object(&Parameters::default()).unwrap();
+        assert_eq!(model.white_sd_m, ["range-sd-m", "lateral-sd-m"].map(|key| number("errors", key)));
+        assert_eq!(model.drift_sd_m, number("errors", "drift-sd-m"));
+        assert_eq!(model.drift_decay, (-CONTROL_STEP.s() / number("errors", "drift-time-s")).exp());
+        assert_eq!(model.class_confidence.car, number("class-confidence", "car"));
     }
 
     #[test]

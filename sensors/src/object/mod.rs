@@ -29,6 +29,7 @@ mod sensor;
 mod target;
 #[cfg(test)]
 mod tests;
+mod validated;
 mod visibility;
 mod weather;
 
@@ -37,4 +38,5 @@ pub use fit::{ByClass, FitError, FittedErrors, Origin, RangeGrid, RearFit, Shape
 pub use noise::NoiseKey;
 pub use perception::ObjectPerception;
 pub(crate) use sensor::{DEGRADED_SHARE, ObjectSensor, ScanInput};
+pub use validated::{Chain, Validation, ValidationFigures};
 pub(crate) use weather::range_in_weather_m;
