@@ -108,7 +108,6 @@ fn the_classifier_loses_a_car_the_more_the_stronger_the_glare_and_sees_none_wher
         ("sun", STRENGTHS.map(|strength| seen(Light::Day, &camera(0.1), &sun(strength)))),
         ("main beam", STRENGTHS.map(|strength| seen(Light::Night, &camera(0.1), &beam(strength)))),
     ] {
-        println!("{name}: {found:?}");
         let falls = |pair: &[[f64; 2]]| pair[1][0] <= pair[0][0] + BY_CHANCE && pair[1][1] >= pair[0][1];
         assert!(found.windows(2).all(falls), "{name}: {found:?}");
         assert!(found[0][0] > 0.9, "{name}: {found:?}");
