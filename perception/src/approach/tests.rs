@@ -33,7 +33,7 @@ fn gospa_of(truths_m: &[[f64; 2]], tracks_m: &[[f64; 2]]) -> f64 {
 #[test]
 fn gospa_is_that_of_worked_examples() {
     let close = |value: f64, expected: f64| assert!((value - expected).abs() < 1e-9, "{value} instead of {expected}");
-    let alone_m2 = 12.5; // Half of the square of the cut-off of 5 m: the share of a vehicle without a track, or of a track without a vehicle.
+    let alone_m2: f64 = 12.5; // Half of the square of the cut-off of 5 m: the share of a vehicle without a track, or of a track without a vehicle.
     close(gospa_of(&[], &[]), 0.0);
     close(gospa_of(&[[-30.0, 0.0]], &[]), alone_m2.sqrt());
     close(gospa_of(&[], &[[-30.0, 0.0], [-60.0, 0.0]]), 5.0);

@@ -394,7 +394,7 @@ fn beam_time_and_intensity_in_the_file_are_those_of_the_scan() {
         for frame in &film.frames {
             let Some(scan) = &frame.scan else { continue };
             let is_in_layer = |point: &usize| (scan.clusters[*point] != NO_CLUSTER) == is_clustered;
-            let measured = |point| {
+            let measured = |point: usize| {
                 let of = &scan.points;
                 (of.beam[point], of.offset_ns[point], of.intensity[point].to_bits())
             };
