@@ -160,6 +160,9 @@ impl Frame {
         for glow in &effects.glows {
             glow.add_to(at, &mut light);
         }
+        for veil in &self.lists.veils {
+            veil.add_to(direction, &mut light);
+        }
         let glare = glow::sun(direction, &self.light);
         let mut radiance = self.window.transmitted(pixel, each(|i| light[i] + glare[i]), &self.light);
         if self.lens.optics.vignetting > 0.0 {

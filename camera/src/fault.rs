@@ -1,13 +1,9 @@
-//! What a fault of the camera does to the pixels that the classifier receives.
+//! What a fault of the camera does to the pixels that the classifier receives. Glare is light, and part of the exposure
+//! ([`Frame::add_glare`](super::Frame::add_glare)); dirt and blur change its pixels.
 
 use super::image::{CHANNELS, CROP_PX, Crop, Image, sample_positions};
 use super::sampling::Sampling;
-use closecall_traffic::{Scene, SceneVehicle};
 
-/// Distance to a headlamp below which the glare no longer grows (m): the lamp saturates the image around it.
-const FULL_GLARE_M: f64 = 30.0;
-/// Distance across the road beyond which a main beam misses the camera (m): a lane and a half.
-const BEAM_HALF_WIDTH_M: f64 = 5.6;
 /// Side of the cells of the image that a blot of dirt covers or leaves (px). On a lens of 5 mm with 1280 pixels, a blot of
 /// 0.15 mm covers about 40 pixels (assumption).
 const BLOT_PX: i32 = 40;
@@ -23,9 +19,9 @@ pub struct CameraFault {
     pub is_dead: bool,
     /// The camera delivers its latest image again and again.
     pub is_frozen: bool,
-    /// Share of the pixels' range that the sun's stray light adds (0 to 1).
+    /// Stray light of the sun, relative to that in a healthy young eye.
     pub sun_glare: f64,
-    /// Share of the pixels' range that the main beam of a vehicle 30 m behind adds (0 to 1).
+    /// Stray light of the main beam of the nearest vehicle behind, relative to that in a healthy young eye.
     pub main_beam_glare: f64,
     /// Share of the lens that dirt covers (0 to 1).
     pub dirt: f64,
@@ -34,33 +30,20 @@ pub struct CameraFault {
 }
 
 impl CameraFault {
-    /// Returns the share of the pixel's range that stray light adds in this scene.
-    pub fn glare(&self, scene: &Scene<'_>) -> f64 {
-        let beam = nearest_behind_m(scene.others, &scene.ego)
-            .map_or(0.0, |gap_m| self.main_beam_glare * (FULL_GLARE_M / gap_m.max(FULL_GLARE_M)).powi(2));
-        1.0 - (1.0 - self.sun_glare) * (1.0 - beam)
-    }
-
-    /// Changes the pixels of a crop. `glare` comes from [`CameraFault::glare`].
+    /// Changes the pixels of a crop.
     #[expect(clippy::cast_possible_truncation, reason = "pixels need no more than single precision")]
-    pub fn apply(&self, crop: &mut Crop, glare: f64) {
+    pub fn apply(&self, crop: &mut Crop) {
         if self.dirt > 0.0 {
             self.cover(crop);
         }
         if self.blur_px > 0.0 {
             blur(crop, (self.blur_px * CROP_PX as f64 / f64::from(crop.window.width)) as f32);
         }
-        if glare > 0.0 {
-            let glare = glare as f32;
-            for value in &mut crop.rgb {
-                *value = to_byte((1.0 - glare) * f32::from(*value) + glare * 255.0);
-            }
-        }
     }
 
-    /// Changes the pixels of a picture of the columns and rows `sampling` of the image. `glare` comes from [`CameraFault::glare`].
+    /// Changes the pixels of a picture of the columns and rows `sampling` of the image.
     #[expect(clippy::cast_possible_truncation, reason = "pixels need no more than single precision")]
-    pub fn apply_to_picture(&self, picture: &mut Image, sampling: &Sampling, glare: f64) {
+    pub fn apply_to_picture(&self, picture: &mut Image, sampling: &Sampling) {
         if self.dirt > 0.0 {
             let places =
                 sampling.rows().iter().flat_map(|row| sampling.columns().iter().map(move |column| [column, row]));
@@ -72,12 +55,6 @@ impl CameraFault {
         }
         if self.blur_px > 0.0 {
             blur_picture(picture, sampling, self.blur_px as f32);
-        }
-        if glare > 0.0 {
-            let glare = glare as f32;
-            for value in &mut picture.rgb {
-                *value = to_byte((1.0 - glare) * f32::from(*value) + glare * 255.0);
-            }
         }
     }
 
@@ -92,14 +69,6 @@ impl CameraFault {
             }
         }
     }
-}
-
-/// Returns the distance to the nearest front of a vehicle behind that drives within a main beam's width (m).
-fn nearest_behind_m(others: &[SceneVehicle], ego: &SceneVehicle) -> Option<f64> {
-    let half_m = |vehicle: &SceneVehicle| 0.5 * vehicle.vehicle.dimensions.length_m;
-    let gap_m = |other: &SceneVehicle| ego.state.s_m - half_m(ego) - other.state.s_m - half_m(other);
-    let near = others.iter().filter(|other| (other.state.d_m - ego.state.d_m).abs() < BEAM_HALF_WIDTH_M);
-    near.map(gap_m).filter(|gap_m| *gap_m > 0.0).reduce(f64::min)
 }
 
 /// Returns whether a cell of the image lies behind a blot: the cells are covered at random with the probability `share`.

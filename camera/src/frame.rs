@@ -21,6 +21,7 @@ use super::mesh::{Emission, Mesh, Vec3};
 use super::pinhole::{GroundBox, Lens, PixelRect};
 use super::raster::{SUBPIXEL_STEPS, ScreenTriangle, Visibility};
 use super::spray::{self, Cloud};
+use super::veil::Veil;
 use super::window::RearWindow;
 use super::{Camera, ExposureKey, shapes};
 use closecall_traffic::{Scene, SceneVehicle};
@@ -74,6 +75,7 @@ pub struct FrameBuffers {
     pub(super) patches: Vec<(Bounds, Patch)>,
     pub(super) clouds: Vec<(Bounds, Cloud)>,
     pub(super) glows: Vec<(Bounds, Glow)>,
+    pub(super) veils: Vec<Veil>,
     pub(super) visibility: [Visibility; MOMENTS],
 }
 
@@ -91,6 +93,7 @@ impl FrameBuffers {
         self.patches.clear();
         self.clouds.clear();
         self.glows.clear();
+        self.veils.clear();
     }
 }
 

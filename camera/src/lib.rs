@@ -39,6 +39,7 @@ mod sky;
 mod spray;
 mod triangles;
 mod vector_registers;
+mod veil;
 mod whole_image;
 mod window;
 

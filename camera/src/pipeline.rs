@@ -93,10 +93,13 @@ impl CropClassifier {
         let windows: Vec<PixelRect> = due.iter().map(|(_, window)| *window).collect();
         let mut frame =
             Frame::with_buffers(std::mem::take(&mut self.lists), self.camera.camera(), imaged, key, &windows);
+        if let Some(fault) = fault {
+            frame.add_glare(fault, imaged);
+        }
         for (index, window) in &due {
             frame.crop(*window, &mut self.crop);
             if let Some(fault) = fault {
-                fault.apply(&mut self.crop, fault.glare(imaged));
+                fault.apply(&mut self.crop);
             }
             let image_scores = self.classifier.classify(&self.crop)?;
             memory.store(&detections[*index], image_scores);

@@ -82,11 +82,14 @@ impl WholeImageDetector {
     ) -> Result<Vec<Instance>, ClassifierError> {
         let lists = std::mem::take(&mut self.lists);
         let mut frame = Frame::with_buffers(lists, self.camera.camera(), imaged, key, &[PixelRect::IMAGE]);
+        if let Some(fault) = fault {
+            frame.add_glare(fault, imaged);
+        }
         let sampling = self.detector.sampling();
         let mut picture = frame.sampled(sampling.columns(), sampling.rows()).image;
         self.lists = frame.into_buffers();
         if let Some(fault) = fault {
-            fault.apply_to_picture(&mut picture, sampling, fault.glare(imaged));
+            fault.apply_to_picture(&mut picture, sampling);
         }
         self.detector.detect(&picture)
     }

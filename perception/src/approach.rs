@@ -6,7 +6,7 @@ use closecall_traffic::{
 };
 use rand::RngExt;
 
-use crate::cases::Case;
+use crate::cases::{Case, ego_lane};
 
 pub(crate) mod watching;
 
@@ -104,7 +104,7 @@ struct Traffic {
 
 impl Traffic {
     fn new(case: &Case, road: &Road, gap_m: f64, closing_mps: f64) -> Self {
-        let ego_d_m = road.lane_centre_m(road.lane_at(-1.5 * road.lane_width_m()));
+        let ego_d_m = road.lane_centre_m(ego_lane(road));
         let vehicle = |actor, class, s_m, d_m, speed_mps| SceneVehicle {
             actor,
             vehicle: Vehicle::typical(class),
@@ -158,8 +158,16 @@ fn drive(case: &Case, sensors: &Sensors, road: &Road, at: Address, rng: &mut Str
     let closing_mps = from + (to - from) * rng.random::<f64>();
     // The offset varies the distances at which each side of the alternating mirror scans the vehicle.
     let start_m = GAPS_M[0] + closing_mps * 2.0 * CONTROL_STEP.s() * rng.random::<f64>();
-    let mut traffic = Traffic::new(case, road, start_m, closing_mps);
-    let mut perception = build(sensors, at)?;
+    let traffic = Traffic::new(case, road, start_m, closing_mps);
+    observe((case, road), traffic, &mut *build(sensors, at)?)
+}
+
+/// Observes an approach of these vehicles with this perception.
+fn observe(
+    (case, road): (&Case, &Road),
+    mut traffic: Traffic,
+    perception: &mut dyn Perception,
+) -> Result<Approach, SensorError> {
     let mut audit = TrackAudit::default();
     let mut found = Approach::default();
     // A vehicle in the way is not driven through.
@@ -355,3 +363,6 @@ fn least_m2(truths_m: &[[f64; 2]], free: &mut Vec<[f64; 2]>) -> f64 {
     }
     least
 }
+
+#[cfg(test)]
+mod tests;

@@ -42,9 +42,33 @@ pub struct CurvePoint {
     pub gap_m: f64,
     /// Probability that the vehicle has a confirmed track there.
     pub confirmed: Estimate,
-    /// Root mean square error of the position along the road (m), of the position across it (m), and of the speed (m/s), over
-    /// the approaches with a track there; `None` if there are fewer than two.
-    pub rmse: Option<[f64; 3]>,
+    /// Errors of the position along the road (m), of the position across it (m), and of the speed (m/s), over the approaches with a
+    /// track there; `None` if there are fewer than two.
+    pub errors: Option<[PointErrors; 3]>,
+}
+
+/// Bias, root mean square and 95 % quantile of the magnitude of an error at one distance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointErrors {
+    /// Mean error.
+    pub bias: f64,
+    /// Root mean square error.
+    pub rmse: f64,
+    /// Quantile of the magnitude that 95 % of the approaches are below.
+    pub q95: f64,
+}
+
+impl PointErrors {
+    /// Returns the figures of at least one error.
+    fn of(errors: &[f64]) -> Self {
+        let mut magnitudes: Vec<f64> = errors.iter().map(|error| error.abs()).collect();
+        magnitudes.sort_by(f64::total_cmp);
+        Self {
+            bias: mean(errors.iter().copied()),
+            rmse: mean(errors.iter().map(|error| error * error)).sqrt(),
+            q95: quantile(&magnitudes, 0.95),
+        }
+    }
 }
 
 /// A bin of the calibration of the class scores.
@@ -209,10 +233,10 @@ fn curve(approaches: &[Approach]) -> Vec<CurvePoint> {
             return None;
         }
         let tracked: Vec<Tracked> = seen.iter().flatten().copied().collect();
-        let rmse = |of: fn(&Tracked) -> f64| mean(tracked.iter().map(|it| of(it).powi(2))).sqrt();
-        let rmse = (tracked.len() > 1)
-            .then(|| [rmse(|it| it.position_m[0]), rmse(|it| it.position_m[1]), rmse(|it| it.speed_mps)]);
-        Some(CurvePoint { gap_m, confirmed: share(tracked.len(), seen.len()), rmse })
+        let of = |error: fn(&Tracked) -> f64| PointErrors::of(&tracked.iter().map(error).collect::<Vec<f64>>());
+        let errors =
+            (tracked.len() > 1).then(|| [of(|it| it.position_m[0]), of(|it| it.position_m[1]), of(|it| it.speed_mps)]);
+        Some(CurvePoint { gap_m, confirmed: share(tracked.len(), seen.len()), errors })
     };
     (1..=points).filter_map(at).collect()
 }
@@ -243,6 +267,7 @@ fn calibration(runs: &[Vec<Tracked>]) -> (Vec<CalibrationBin>, Option<f64>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::approach::Observation;
 
     #[test]
     fn intervals_are_those_of_the_tables() {
@@ -263,5 +288,29 @@ mod tests {
         let figures = error_figures(&runs).unwrap();
         assert!((figures.bias.value - 1.0).abs() < 1e-12 && (figures.rmse.value - 3.0_f64.sqrt()).abs() < 1e-12);
         assert!(error_figures(&[vec![]]).is_none());
+    }
+
+    #[test]
+    fn a_point_of_a_curve_has_the_errors_of_the_approaches_at_its_distance() {
+        let tracked = |along_m| Tracked {
+            position_m: [along_m, 0.5],
+            speed_mps: -along_m,
+            is_class_right: true,
+            confidence: 1.0,
+        };
+        // The second observation of an approach is nearer than the distance of the point, and does not count.
+        let approach = |along_m| Approach {
+            observations: [(29.0, along_m), (28.0, 100.0)]
+                .map(|(gap_m, along_m)| Observation { gap_m, tracked: Some(tracked(along_m)), gospa_m: 0.0 })
+                .to_vec(),
+            ..Approach::default()
+        };
+        let points = curve(&[approach(-1.0), approach(2.0), approach(3.0)]);
+        let point = points.iter().find(|point| point.gap_m == 30.0).unwrap();
+        let [along, across, speed] = point.errors.unwrap();
+        assert!((along.bias - 4.0 / 3.0).abs() < 1e-12 && (along.rmse - (14.0_f64 / 3.0).sqrt()).abs() < 1e-12);
+        // The quantile lies between the two largest magnitudes, a tenth of their difference below the largest.
+        assert!((along.q95 - 2.9).abs() < 1e-12 && (speed.bias + along.bias).abs() < 1e-12, "{along:?}");
+        assert_eq!(across, PointErrors { bias: 0.5, rmse: 0.5, q95: 0.5 });
     }
 }

@@ -8,9 +8,10 @@ use closecall_report::table::{Column, write_columns};
 use closecall_scenarios::atomic::{WriteError, write_file};
 use serde_json::{Value, json};
 
-use crate::figures::{CurvePoint, Estimate, Figures};
+use crate::figures::{CalibrationBin, CurvePoint, Estimate, Figures, PointErrors};
 use crate::study::Study;
 
+mod chart;
 mod page;
 
 /// One study, or two that are compared.
@@ -27,20 +28,22 @@ impl Studies {
         }
     }
 
-    /// Writes `sensors.json`, `sensors.parquet`, `curves.parquet` and `sensors.html` into a folder, which is created if it does not
-    /// exist. Returns their paths.
+    /// Writes `sensors.json`, `sensors.parquet`, `curves.parquet`, `calibration.parquet` and `sensors.html` into a folder, which is
+    /// created if it does not exist. Returns their paths.
     ///
     /// # Errors
     /// [`WriteError`] if a file cannot be written. An existing file then stays as it is.
     pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>, WriteError> {
         std::fs::create_dir_all(folder).map_err(|source| WriteError::new(folder, source))?;
-        let paths = ["sensors.html", "sensors.json", "sensors.parquet", "curves.parquet"].map(|name| folder.join(name));
+        let names = ["sensors.html", "sensors.json", "sensors.parquet", "curves.parquet", "calibration.parquet"];
+        let paths = names.map(|name| folder.join(name));
         let page = page::page(&self.0).into_string();
         write_file(&paths[0], |file| file.write_all(page.as_bytes()))?;
         let text = format!("{:#}\n", self.json());
         write_file(&paths[1], |file| file.write_all(text.as_bytes()))?;
         write_columns(&paths[2], self.figure_columns())?;
         write_columns(&paths[3], self.curve_columns())?;
+        write_columns(&paths[4], self.calibration_columns())?;
         Ok(paths.to_vec())
     }
 
@@ -52,6 +55,9 @@ impl Studies {
         let high = |of: fn(&Figures) -> Option<Estimate>| number(&|it| of(it).map(|it| it.interval_95[1]));
         let mut columns = vec![
             ("configuration", "", Column::Text(rows().map(|(study, _, _)| study.name.clone()).collect())),
+            ("sensors", "", Column::Text(rows().map(|(study, _, _)| study.mode.name().to_owned()).collect())),
+            ("seed", "", Column::Number(rows().map(|(study, _, _)| Some(study.seed as f64)).collect())),
+            ("approaches", "", Column::Number(rows().map(|(study, _, _)| Some(study.runs as f64)).collect())),
             ("factor", "", Column::Text(rows().map(|(_, case, _)| case.factor.to_owned()).collect())),
             ("case", "", Column::Text(rows().map(|(_, case, _)| case.name.clone()).collect())),
         ];
@@ -59,6 +65,9 @@ impl Studies {
             columns.push((names[0], unit, value(of)));
             columns.push((names[1], unit, low(of)));
             columns.push((names[2], unit, high(of)));
+        }
+        for (name, unit, of) in PLAIN {
+            columns.push((name, unit, number(&of)));
         }
         columns
     }
@@ -73,16 +82,41 @@ impl Studies {
             .collect();
         let number =
             |of: &dyn Fn(&CurvePoint) -> Option<f64>| Column::Number(rows.iter().map(|row| of(row.2)).collect());
-        vec![
+        let mut columns = vec![
             ("configuration", "", Column::Text(rows.iter().map(|row| row.0.name.clone()).collect())),
             ("case", "", Column::Text(rows.iter().map(|row| row.1.to_owned()).collect())),
             ("gap_m", "m", number(&|it| Some(it.gap_m))),
             ("confirmed", "", number(&|it| Some(it.confirmed.value))),
             ("confirmed_low_95", "", number(&|it| Some(it.confirmed.interval_95[0]))),
             ("confirmed_high_95", "", number(&|it| Some(it.confirmed.interval_95[1]))),
-            ("along_rmse_m", "m", number(&|it| it.rmse.map(|of| of[0]))),
-            ("across_rmse_m", "m", number(&|it| it.rmse.map(|of| of[1]))),
-            ("speed_rmse_mps", "m/s", number(&|it| it.rmse.map(|of| of[2]))),
+        ];
+        for (names, unit, index) in CURVE_ERRORS {
+            let error = |of: fn(&PointErrors) -> f64| number(&|it| it.errors.map(|errors| of(&errors[index])));
+            columns.push((names[0], unit, error(|it| it.bias)));
+            columns.push((names[1], unit, error(|it| it.rmse)));
+            columns.push((names[2], unit, error(|it| it.q95)));
+        }
+        columns
+    }
+
+    fn calibration_columns(&self) -> Vec<(&'static str, &'static str, Column)> {
+        let rows: Vec<(&Study, &str, &CalibrationBin)> = self
+            .0
+            .iter()
+            .flat_map(|study| {
+                study
+                    .cases
+                    .iter()
+                    .flat_map(move |(case, of)| of.calibration.iter().map(move |bin| (study, &*case.name, bin)))
+            })
+            .collect();
+        let number = |of: fn(&CalibrationBin) -> f64| Column::Number(rows.iter().map(|row| Some(of(row.2))).collect());
+        vec![
+            ("configuration", "", Column::Text(rows.iter().map(|row| row.0.name.clone()).collect())),
+            ("case", "", Column::Text(rows.iter().map(|row| row.1.to_owned()).collect())),
+            ("confidence", "", number(|bin| bin.confidence)),
+            ("accuracy", "", number(|bin| bin.accuracy)),
+            ("steps", "", number(|bin| bin.steps as f64)),
         ]
     }
 }
@@ -90,7 +124,7 @@ impl Studies {
 /// The figures with intervals: the names of value, lower and upper bound, the unit, and the figure.
 type Named = ([&'static str; 3], &'static str, fn(&Figures) -> Option<Estimate>);
 
-const FIGURES: [Named; 14] = [
+const FIGURES: [Named; 15] = [
     (["range_m", "range_low_95_m", "range_high_95_m"], "m", |it| Some(it.range_m)),
     (["along_bias_m", "along_bias_low_95_m", "along_bias_high_95_m"], "m", |it| it.errors.map(|it| it[0].bias)),
     (["along_rmse_m", "along_rmse_low_95_m", "along_rmse_high_95_m"], "m", |it| it.errors.map(|it| it[0].rmse)),
@@ -107,6 +141,24 @@ const FIGURES: [Named; 14] = [
     (["unavailable", "unavailable_low_95", "unavailable_high_95"], "", |it| Some(it.unavailable)),
     (["gospa_m", "gospa_low_95_m", "gospa_high_95_m"], "m", |it| Some(it.gospa_m)),
     (["class_accuracy", "class_accuracy_low_95", "class_accuracy_high_95"], "", |it| it.class_accuracy),
+    (["nees", "nees_low_95", "nees_high_95"], "", |it| it.nees),
+];
+
+/// The figures without intervals: name, unit, and the figure.
+type Plain = (&'static str, &'static str, fn(&Figures) -> Option<f64>);
+
+const PLAIN: [Plain; 4] = [
+    ("along_q95_m", "m", |it| it.errors.map(|it| it[0].q95)),
+    ("across_q95_m", "m", |it| it.errors.map(|it| it[1].q95)),
+    ("speed_q95_mps", "m/s", |it| it.errors.map(|it| it[2].q95)),
+    ("calibration_error", "", |it| it.calibration_error),
+];
+
+/// The errors of a curve: names of bias, root mean square and 95 % quantile of the magnitude, unit, and index.
+const CURVE_ERRORS: [([&str; 3], &str, usize); 3] = [
+    (["along_bias_m", "along_rmse_m", "along_q95_m"], "m", 0),
+    (["across_bias_m", "across_rmse_m", "across_q95_m"], "m", 1),
+    (["speed_bias_mps", "speed_rmse_mps", "speed_q95_mps"], "m/s", 2),
 ];
 
 /// Returns the JSON of a value with its interval; a bound that does not exist is `null`.
@@ -124,10 +176,14 @@ fn study_json(study: &Study) -> Value {
         })
     };
     let point = |it: &CurvePoint| {
-        json!({
-            "gap_m": it.gap_m, "confirmed": estimate(&it.confirmed), "along_rmse_m": it.rmse.map(|of| of[0]),
-            "across_rmse_m": it.rmse.map(|of| of[1]), "speed_rmse_mps": it.rmse.map(|of| of[2]),
-        })
+        let mut point = json!({ "gap_m": it.gap_m, "confirmed": estimate(&it.confirmed) });
+        for (names, _, index) in CURVE_ERRORS {
+            let errors = it.errors.map(|errors| errors[index]);
+            point[names[0]] = json!(errors.map(|it| it.bias));
+            point[names[1]] = json!(errors.map(|it| it.rmse));
+            point[names[2]] = json!(errors.map(|it| it.q95));
+        }
+        point
     };
     let cases: Vec<Value> = study
         .cases

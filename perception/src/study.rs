@@ -88,7 +88,8 @@ pub struct Study {
 }
 
 impl Study {
-    /// Studies the sensors of a scenario at the nominal values of its parameters. `mode` replaces the scenario's.
+    /// Studies the sensors of a scenario at the nominal values of its parameters, in its light and weather and on its road. `mode`
+    /// replaces the scenario's.
     ///
     /// The result does not depend on the number of threads.
     ///
@@ -100,7 +101,8 @@ impl Study {
         if sensors.mode() == SensorMode::GroundTruth {
             return Err(StudyError::GroundTruth);
         }
-        let found = study(&cases(sensors.mode())?, &sensors, &scenario.road, [seed, extent.runs()])?;
+        let cases = cases(sensors.mode(), &scenario.environment, &scenario.road)?;
+        let found = study(&cases, &sensors, &scenario.road, [seed, extent.runs()])?;
         let name = file.config().name.clone();
         Ok(Self { name, mode: sensors.mode(), seed, runs: extent.runs(), cases: found })
     }

@@ -1,12 +1,17 @@
 //! A small study: what must hold of any sensor that looks by light, and that the result does not depend on the threads.
 
 use std::path::Path;
+use std::process::Command;
 
 use closecall_perception::figures::Figures;
 use closecall_perception::output::Studies;
 use closecall_perception::{Extent, Study, StudyError};
 use closecall_sensors::SensorMode;
 use closecall_simulation::scenario::source;
+use closecall_testing::browser;
+use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::record::Field;
+use serde_json::Value;
 
 fn study(settings: &[&str], mode: SensorMode, runs: u64) -> Result<Study, StudyError> {
     let settings: Vec<_> = settings.iter().map(|text| text.parse().expect("a setting")).collect();
@@ -116,8 +121,155 @@ fn true_tracks_are_refused_and_the_files_of_two_configurations_are_written() {
     let folder = tempfile::tempdir().unwrap();
     let studies = Studies(vec![one, other]);
     let paths = studies.write(folder.path()).unwrap();
-    assert_eq!(paths.len(), 4);
+    assert_eq!(paths.len(), 5);
     let page = std::fs::read_to_string(&paths[0]).unwrap();
     assert!(page.contains("<svg") && page.contains("against") && !page.contains("NaN") && !page.contains("inf"));
     assert_eq!(studies.json().as_array().unwrap().len(), 2);
+}
+
+/// Returns the rows of a Parquet file, each with the names of its columns.
+fn rows(path: &Path) -> Vec<Vec<(String, Field)>> {
+    let reader = SerializedFileReader::new(std::fs::File::open(path).unwrap()).unwrap();
+    let row =
+        |row: parquet::record::Row| row.get_column_iter().map(|(name, field)| (name.clone(), field.clone())).collect();
+    reader.get_row_iter(None).unwrap().map(|found| row(found.unwrap())).collect()
+}
+
+/// Fails if a number of a Parquet file is not that of the JSON; an absent one is `null` in both.
+fn assert_same(row: &[(String, Field)], name: &str, json: &Value) {
+    let (_, field) = row.iter().find(|(column, _)| column == name).unwrap_or_else(|| panic!("no column {name}"));
+    match (field, json) {
+        (Field::Null, Value::Null) => {}
+        (Field::Double(bound), Value::Null) => assert!(bound.is_infinite(), "{name}: {bound}"),
+        (Field::Double(value), Value::Number(number)) => assert_eq!(*value, number.as_f64().unwrap(), "{name}"),
+        _ => panic!("{name}: {field:?} and {json}"),
+    }
+}
+
+#[test]
+fn the_parquet_files_have_the_figures_of_the_json() {
+    let folder = tempfile::tempdir().unwrap();
+    let studies = Studies(vec![study(&[], SensorMode::Object, 3).unwrap()]);
+    studies.write(folder.path()).unwrap();
+    let json: Value =
+        serde_json::from_str(&std::fs::read_to_string(folder.path().join("sensors.json")).unwrap()).unwrap();
+    let cases = json["cases"].as_array().unwrap();
+    let [figures, curves, bins] =
+        ["sensors", "curves", "calibration"].map(|name| rows(&folder.path().join(format!("{name}.parquet"))));
+    assert_eq!(figures.len(), cases.len());
+    for (row, case) in figures.iter().zip(cases) {
+        assert_same(row, "seed", &Value::from(5.0));
+        assert_same(row, "approaches", &Value::from(3.0));
+        for (key, stem, unit) in [
+            ("range_m", "range", "_m"),
+            ("confirmed_after_s", "confirmed_after", "_s"),
+            ("confirms", "confirms", ""),
+            ("false_tracks_per_h", "false_tracks", "_per_h"),
+            ("id_switches", "id_switches", ""),
+            ("unavailable", "unavailable", ""),
+            ("gospa_m", "gospa", "_m"),
+            ("class_accuracy", "class_accuracy", ""),
+            ("nees", "nees", ""),
+        ] {
+            assert_same(row, &format!("{stem}{unit}"), &case[key]["value"]);
+            assert_same(row, &format!("{stem}_low_95{unit}"), &case[key]["low_95"]);
+            assert_same(row, &format!("{stem}_high_95{unit}"), &case[key]["high_95"]);
+        }
+        assert_same(row, "calibration_error", &case["calibration_error"]);
+        for (key, stem, unit) in
+            [("along_m", "along", "_m"), ("across_m", "across", "_m"), ("speed_mps", "speed", "_mps")]
+        {
+            let errors = &case["errors"][key];
+            assert_same(row, &format!("{stem}_q95{unit}"), &errors["q95"]);
+            for figure in ["bias", "rmse"] {
+                assert_same(row, &format!("{stem}_{figure}{unit}"), &errors[figure]["value"]);
+                assert_same(row, &format!("{stem}_{figure}_low_95{unit}"), &errors[figure]["low_95"]);
+                assert_same(row, &format!("{stem}_{figure}_high_95{unit}"), &errors[figure]["high_95"]);
+            }
+        }
+    }
+    let points: Vec<&Value> = cases.iter().flat_map(|case| case["curve"].as_array().unwrap()).collect();
+    assert_eq!(curves.len(), points.len());
+    for (row, point) in curves.iter().zip(points) {
+        assert_same(row, "confirmed", &point["confirmed"]["value"]);
+        for name in
+            ["gap_m", "along_bias_m", "along_rmse_m", "along_q95_m", "across_bias_m", "across_rmse_m", "across_q95_m"]
+                .into_iter()
+                .chain(["speed_bias_mps", "speed_rmse_mps", "speed_q95_mps"])
+        {
+            assert_same(row, name, &point[name]);
+        }
+    }
+    let all: Vec<&Value> = cases.iter().flat_map(|case| case["calibration"].as_array().unwrap()).collect();
+    assert_eq!(bins.len(), all.len());
+    for (row, bin) in bins.iter().zip(all) {
+        assert_same(row, "confidence", &bin["confidence"]);
+        assert_same(row, "accuracy", &bin["accuracy"]);
+        assert_same(row, "steps", &Value::from(bin["steps"].as_f64().unwrap()));
+    }
+}
+
+#[test]
+fn the_study_has_the_light_and_the_weather_of_its_scenario() {
+    let [clear, foggy] =
+        [&[][..], &["environment.visibility-m=100"]].map(|settings| study(settings, SensorMode::Object, 3).unwrap());
+    let range_m = |study: &Study, name: &str| figures(study, name).range_m.value;
+    assert!((range_m(&foggy, "usual") - range_m(&clear, "fog, visibility 100")).abs() < 1e-9);
+    assert!(range_m(&foggy, "usual") < 0.7 * range_m(&clear, "usual"));
+    assert_eq!(range_m(&foggy, "clear air"), range_m(&clear, "usual"));
+    // Paint is varied in the fog.
+    assert!(range_m(&foggy, "paint 0.8") < 0.8 * range_m(&clear, "paint 0.8"));
+}
+
+/// Opens a page without a window. Returns the document after its scripts have run, and what the browser has reported on its console.
+fn opened(browser: &str, page: &Path, profile: &Path) -> (String, Vec<String>) {
+    let quiet = [
+        "--no-first-run",
+        "--disable-background-networking",
+        "--disable-component-update",
+        "--disable-sync",
+        "--disable-quic",
+    ];
+    let shown = Command::new(browser)
+        .args(["--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--dump-dom"])
+        .args(quiet)
+        .arg(format!("--user-data-dir={}", profile.display()))
+        .arg(format!("file://{}", page.display()))
+        .output()
+        .unwrap();
+    let errors = String::from_utf8_lossy(&shown.stderr);
+    let console = errors.lines().filter(|line| line.contains("CONSOLE")).map(str::to_owned).collect();
+    (String::from_utf8_lossy(&shown.stdout).into_owned(), console)
+}
+
+#[test]
+fn a_browser_draws_the_curves_of_every_chart_of_the_page() {
+    /// Appended to a copy of the page: the title becomes the number of drawn curves of each chart.
+    const COUNT: &str = "<script>document.title = Array.from(document.querySelectorAll('figure svg'), chart => \
+        Array.from(chart.querySelectorAll('path.curve')).filter(path => path.getTotalLength() > 0 \
+        && path.getBoundingClientRect().width > 0).length).join(' ');</script>";
+    let Some(browser) = browser() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let one = study(&[], SensorMode::Object, 3).unwrap();
+    let factors: std::collections::BTreeSet<&str> = one.cases.iter().map(|(case, _)| case.factor).collect();
+    let groups = factors.len() - 1;
+    let paths = Studies(vec![one]).write(folder.path()).unwrap();
+    let page = std::fs::read_to_string(&paths[0]).unwrap();
+    let open = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        opened(browser, &path, &folder.path().join("profile"))
+    };
+    let (document, console) = open("counted.html", &format!("{page}{COUNT}"));
+    assert!(console.is_empty(), "{console:?}");
+    let title = document.split("<title>").nth(1).unwrap().split("</title>").next().unwrap();
+    let drawn: Vec<usize> = title.split(' ').map(|count| count.parse().unwrap()).collect();
+    // A chart of the probability and nine of errors for each group of cases, each with the usual case and another one.
+    assert_eq!((drawn.len() % 10, page.matches("<figure>").count()), (0, drawn.len()), "{drawn:?}");
+    assert!(drawn.len() >= 10 * groups && drawn.iter().all(|curves| *curves >= 2), "{drawn:?}");
+    assert_eq!(drawn.iter().sum::<usize>(), page.matches("class=\"curve\"").count());
+    // A curve that cannot be drawn is noticed.
+    let broken = page.replacen("class=\"curve\" d=\"M", "class=\"curve\" d=\"MNaN ", 1);
+    let (_, console) = open("broken.html", &broken);
+    assert!(console.iter().any(|line| line.contains("attribute d")), "{console:?}");
 }

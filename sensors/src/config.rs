@@ -13,7 +13,7 @@ use crate::{
     Alterations, FullModel, FullPerception, GroundTruth, MAX_ADDITIONAL_LIDARS, NoiseKey, ObjectPerception,
     ObjectSensorConfig, ObjectSensorModel, Perception, SensorError, TrackerConfig,
 };
-use closecall_camera::{Camera, CameraConfig, Pipeline};
+use closecall_camera::{Camera, CameraConfig, Pipeline, Sun};
 
 /// Least height of the LiDAR above the road with the errors of its mounting (m).
 const MIN_LIDAR_HEIGHT_M: f64 = 0.1;
@@ -215,6 +215,12 @@ impl Sensors {
     #[must_use]
     pub fn with_faults(self, faults: Faults) -> Self {
         Self { altered: Alterations { faults, ..self.altered }, ..self }
+    }
+
+    /// Returns the same sensors under a sun at another place.
+    #[must_use]
+    pub fn with_sun(self, sun: Sun) -> Self {
+        Self { camera: Camera { sun, ..self.camera }, ..self }
     }
 
     /// Checks that no fault puts a LiDAR lower than the model covers.

@@ -22,6 +22,8 @@ pub(super) const SHARE: Range = Range::closed(0.0, 1.0);
 pub(super) const CLOCK_OFFSET_S: Range = Range::closed(-0.2, 0.2);
 pub(super) const ANGLE_DEG: Range = Range::closed(-5.0, 5.0);
 const HEIGHT_M: Range = Range::closed(-0.2, 0.5);
+/// Stray light in a camera relative to that in a healthy young eye: up to a hundred times, at which one source veils the whole image.
+const GLARE: Range = Range::closed(0.0, 100.0);
 
 /// A fault of a LiDAR. It holds from `from-s` to `until-s`, with all effects that it names.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -269,11 +271,12 @@ pub struct CameraFaultConfig {
     pub dead: bool,
     /// The camera delivers its latest image again and again.
     pub frozen: bool,
-    /// Share of the pixel's range that a low sun in the image adds to every pixel, while it takes the same share of the contrast
-    /// (-).
+    /// Stray light of the sun in the lens and on its window, relative to that in a healthy young eye (-): a veil that falls with the
+    /// square of the angle to the sun (`sensors.rear-camera.sun`), and saturates the pixels near it. At 1, that is 4° around a sun on a
+    /// clear day; at 3, 7°.
     pub sun_glare: Option<Num>,
-    /// The same for the main beam of the nearest vehicle behind, at 30 m and below (-). Farther away it falls with the square of
-    /// the distance.
+    /// The same for the main beam of the nearest vehicle behind, at dusk and at night (-). At 1, the veil of a car's headlamps
+    /// saturates 2.6 m to either side of them at night, at any distance up to 150 m.
     pub main_beam_glare: Option<Num>,
     /// Share of the lens that opaque dirt covers, in blots (-).
     pub dirt: Option<Num>,
@@ -296,8 +299,8 @@ impl CameraFaultConfig {
         let fault = CameraFault {
             is_dead: self.dead,
             is_frozen: self.frozen,
-            sun_glare: number(&self.sun_glare, "sun-glare", SHARE)?,
-            main_beam_glare: number(&self.main_beam_glare, "main-beam-glare", SHARE)?,
+            sun_glare: number(&self.sun_glare, "sun-glare", GLARE)?,
+            main_beam_glare: number(&self.main_beam_glare, "main-beam-glare", GLARE)?,
             dirt: number(&self.dirt, "dirt", SHARE)?,
             blur_px: number(&self.blur_px, "blur-px", Range::closed(0.0, 50.0))?,
         };
@@ -314,8 +317,8 @@ impl Combine for CameraFault {
         Self {
             is_dead: self.is_dead || other.is_dead,
             is_frozen: self.is_frozen || other.is_frozen,
-            sun_glare: either(self.sun_glare, other.sun_glare),
-            main_beam_glare: either(self.main_beam_glare, other.main_beam_glare),
+            sun_glare: self.sun_glare + other.sun_glare,
+            main_beam_glare: self.main_beam_glare + other.main_beam_glare,
             dirt: either(self.dirt, other.dirt),
             blur_px: self.blur_px.hypot(other.blur_px),
         }

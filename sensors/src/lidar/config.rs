@@ -83,8 +83,8 @@ pub struct LidarConfig {
     /// Share of returns (0 to 1) that are lost regardless of their power.
     pub dropout: Num,
     /// Probability (0 to 0.01) that a beam gives a point in a scan although there is nothing: noise of the receiver above its threshold.
-    /// A maker states 0.0001 (data sheet of the Ouster OS1). Default: 0.
-    #[serde(skip_serializing_if = "is_zero")]
+    /// Makers specify their ranges at 0.0001 (data sheet of the Ouster OS1, manual of the LeddarTech Pixell). Default: 0.0001.
+    #[serde(skip_serializing_if = "is_usual_rate")]
     pub false_alarm_rate: Num,
     /// Standard deviation of the error of the pitch angle that the ego uses to level its points (rad).
     pub levelling_sd_rad: Num,
@@ -98,6 +98,14 @@ pub struct LidarConfig {
 
 fn is_zero(number: &Num) -> bool {
     *number == Num::Fixed(0.0)
+}
+
+/// Probability of a false alarm in a beam, per scan: the rate at which makers specify the range of their LiDARs (data sheet of the Ouster OS1:
+/// "false positive rate of 1/10,000"; manual of the LeddarTech Pixell: "0.0001 false alarm rate"). No source gives that of the SCALA 2.
+const FALSE_ALARM_RATE: f64 = 1e-4;
+
+fn is_usual_rate(number: &Num) -> bool {
+    *number == Num::Fixed(FALSE_ALARM_RATE)
 }
 
 impl Default for LidarConfig {
@@ -117,7 +125,7 @@ impl Default for LidarConfig {
             roll_deg: Num::Fixed(0.0),
             nominal_range_m: None,
             dropout: Num::Fixed(0.01),
-            false_alarm_rate: Num::Fixed(0.0),
+            false_alarm_rate: Num::Fixed(FALSE_ALARM_RATE),
             levelling_sd_rad: Num::Fixed(0.0005),
             window_transmission: Num::Fixed(1.0),
             plates: Choice::Fixed(Plates::InUse),
@@ -314,7 +322,7 @@ impl Default for Lidar {
             roll_rad: 0.0,
             nominal_range_m: 200.0,
             dropout: 0.01,
-            false_alarm_rate: 0.0,
+            false_alarm_rate: FALSE_ALARM_RATE,
             levelling_sd_rad: 0.0005,
             window_transmission: 1.0,
             plate_reflectivity: Plates::InUse.reflectivity(),

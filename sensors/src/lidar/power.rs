@@ -22,8 +22,8 @@ use super::Lidar;
 
 /// Ratio T of the detection threshold to the standard deviation of the receiver's noise.
 ///
-/// With T = 5, a scan of 10⁴ beams with 10² independent range cells each has a false alarm every third time. False
-/// alarms are not modelled.
+/// With T = 5, a scan of 10⁴ beams with 10² independent range cells each has a false alarm every third time: a rate of 3·10⁻⁵ in each
+/// beam. Makers state 10⁻⁴, and that is the rate of `false-alarm-rate`.
 pub(crate) const THRESHOLD_OVER_NOISE: f32 = 5.0;
 /// Power below which a return cannot be detected: the noise stays within 3.47 standard deviations, and cannot raise the
 /// return above the threshold.

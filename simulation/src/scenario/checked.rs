@@ -92,7 +92,7 @@ impl Check for ScenarioConfig {
         let interventions = Interventions::check(&self.ideal, &self.fault, parameters)?;
         interventions.apply(&mut actors, ego);
         let sensors = self.sensors.check(parameters).map_err(|error| error.within("sensors"))?;
-        inert_fault::refuse(&self.fault, (&sensors, &road), duration_s, parameters)?;
+        inert_fault::refuse(&self.fault, (&sensors, &road, &environment), duration_s, parameters)?;
         let sensors = sensors.altered(interventions.sensors);
         sensors.check_mounting().map_err(|error| error.within("sensors"))?;
         Ok(Scenario {

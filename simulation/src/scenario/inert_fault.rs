@@ -1,29 +1,30 @@
 //! Injected faults that cannot act in a scenario: they would pass for faults that do no harm.
 
 use closecall_camera::Pipeline;
-use closecall_sensors::faults::LidarFaultConfig;
+use closecall_sensors::faults::{CameraFaultConfig, LidarFaultConfig};
 use closecall_sensors::lidar::Lidar;
 use closecall_sensors::{SensorMode, Sensors};
-use closecall_traffic::{Check, ConfigError, Num, Parameters, Problem, Range, Road};
+use closecall_traffic::{Check, ConfigError, Environment, Light, Num, Parameters, Problem, Range, Road};
 
 use super::inert_object_fault::{refuse_of_map, refuse_of_objects};
 use super::intervention::FaultConfig;
 use super::{ScenarioError, ScenarioFile};
 
 /// Refuses faults that cannot act: those of sensors that do not exist in the mode of the scenario, those of a front radar that a
-/// LiDAR replaces and of a front LiDAR that does not exist, blocked sectors outside of the field of view, mirror images without guard rails, and entries that begin when the
-/// run has ended.
+/// LiDAR replaces and of a front LiDAR that does not exist, blocked sectors outside of the field of view, mirror images without guard rails,
+/// glare of a source that does not shine into the camera, and entries that begin when the run has ended.
 ///
 /// A scenario with faults both of LiDAR or camera and of the object-level sensor behind is meant for both modes, and so is one with
 /// faults both of the LiDAR and of the radar that look ahead. A mode that the
 /// command line gives is checked by [`ScenarioFile::check_faults_in`].
 pub(super) fn refuse(
     fault: &FaultConfig,
-    (sensors, road): (&Sensors, &Road),
+    (sensors, road, environment): (&Sensors, &Road, &Environment),
     duration_s: f64,
     parameters: &Parameters,
 ) -> Result<(), ConfigError> {
     refuse_absent(fault, sensors)?;
+    refuse_glare(fault, (sensors, road, environment))?;
     let model = sensors.full_model();
     let rear_lidars: Vec<Lidar> = model.rear_lidars().collect();
     refuse_of_lidars(("rear-lidar", &fault.rear_lidar), &rear_lidars, road, parameters)?;
@@ -77,6 +78,41 @@ fn refuse_of_lidars(
         if share.map_err(|error| at(of, index, error))? > 0.0 && !road.has_guard_rails() {
             let error = contradiction("rail-ghosts", "road.guard-rails", "only guard rails mirror vehicles");
             return Err(at(of, index, error));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses an entry whose only effect is glare of a source that does not shine into the camera.
+fn refuse_glare(
+    fault: &FaultConfig,
+    (sensors, road, environment): (&Sensors, &Road, &Environment),
+) -> Result<(), ConfigError> {
+    let sun = sensors.camera().sun;
+    // On a curved road, the sun is behind the ego sooner or later.
+    let is_ahead = road.curvature_per_m() == 0.0 && sun.azimuth_rad.cos() * sun.elevation_rad.cos() >= 0.0;
+    let is_day = environment.light == Light::Day;
+    for (index, entry) in fault.rear_camera.iter().enumerate() {
+        let CameraFaultConfig { sun_glare, main_beam_glare, from_s, until_s, .. } = entry.clone();
+        let of_sun = CameraFaultConfig { sun_glare, from_s, until_s, ..CameraFaultConfig::default() };
+        let of_beam = CameraFaultConfig { main_beam_glare, sun_glare: None, ..of_sun.clone() };
+        let inert = [
+            (*entry == of_sun && !is_day, "sun-glare", "environment.light", "the sun shines by day only"),
+            (
+                *entry == of_sun && is_ahead,
+                "sun-glare",
+                "sensors.rear-camera.sun",
+                "a sun ahead of the ego does not shine into its rear camera: its azimuth is beyond 1.58 rad to either side",
+            ),
+            (
+                *entry == of_beam && is_day,
+                "main-beam-glare",
+                "environment.light",
+                "a main beam blinds at dusk and at night only",
+            ),
+        ];
+        if let Some((_, key, other, rule)) = inert.into_iter().find(|(is_inert, ..)| *is_inert) {
+            return Err(at("rear-camera", index, contradiction(key, other, rule)));
         }
     }
     Ok(())
@@ -198,6 +234,9 @@ mod tests {
         let behind = "[[fault.rear-object]]\ndead = true\n";
         let radar = "[[fault.front-radar]]\ndead = true\n";
         let (front, ahead) = ("sensors.front-lidar = {}\n", "[[fault.front-lidar]]\ndead = true\n");
+        let (sun, beam) =
+            ("[[fault.rear-camera]]\nsun-glare = 1.0\n", "[[fault.rear-camera]]\nmain-beam-glare = 1.0\n");
+        let (low_sun, night) = ("sensors.rear-camera.sun.azimuth-rad = 3.1\n", "environment.light = \"night\"\n");
         let is_off = "sensors.rear-camera.pipeline = \"off\"\n";
         let mirrors = "[[fault.rear-lidar]]\nrail-ghosts = 0.5\n";
         for (keys, key, why) in [
@@ -248,6 +287,9 @@ mod tests {
                 "at least 0.1 m above the road",
             ),
             (format!("{full}{front}{ahead}sensor = \"rear-lidar\"\n"), "fault.front-lidar[0].sensor", "`front-lidar`"),
+            (format!("{full}{sun}"), "fault.rear-camera[0].sun-glare", "`sensors.rear-camera.sun`"),
+            (format!("{full}{low_sun}{night}{sun}"), "fault.rear-camera[0].sun-glare", "by day only"),
+            (format!("{full}{beam}"), "fault.rear-camera[0].main-beam-glare", "`environment.light`"),
             (format!("{full}{is_off}{camera}"), "fault.rear-camera", "`sensors.rear-camera.pipeline`"),
             (format!("{full}{mirrors}"), "fault.rear-lidar[0].rail-ghosts", "`road.guard-rails`"),
             (format!("{object}{behind}from-s = 3000.0\n"), "fault.rear-object[0].from-s", "`duration-s`"),
@@ -263,6 +305,9 @@ mod tests {
         }
         for keys in [
             format!("{full}{lidar}{camera}{radar}"),
+            format!("{full}{low_sun}{sun}"),
+            format!("{full}{night}{beam}"),
+            format!("{full}{sun}dirt = 0.1\n"),
             format!("{full}{further}{lidar}sensor = \"left\"\n"),
             format!("{full}{further}[[fault.rear-lidar]]\nheight-m = -0.2\nsensor = \"rear-lidar\"\n"),
             format!("{object}{behind}{radar}"),

@@ -34,13 +34,13 @@ impl Scanner {
     }
 
     /// Adds the false alarms of the receiver.
-    #[expect(clippy::cast_possible_truncation, reason = "probabilities and ranges in single precision")]
+    #[expect(clippy::cast_possible_truncation, reason = "ranges in single precision")]
     pub(super) fn raise_false_alarms(&mut self, sweep: &Sweep) {
         let before = self.scan.len();
         if self.lidar.false_alarm_rate > 0.0 {
             let sweep_s = self.sweep_s();
             let alarms = FalseAlarms {
-                rate: self.lidar.false_alarm_rate as f32,
+                rate: self.lidar.false_alarm_rate,
                 reach_m: (self.lidar.nominal_range_m as f32).min(sweep.link.max_range_m),
                 gain_m2: sweep.link.gain_m2,
                 noise: sweep.noise.of_false_alarms(),

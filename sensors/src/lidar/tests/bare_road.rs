@@ -95,7 +95,7 @@ fn nearly_all_points_of_guard_rails_are_left_out() {
 #[test]
 fn a_scan_of_the_bare_road_is_not_dark_and_one_behind_a_dirty_window_is() {
     for (window_transmission, is_dark) in [(1.0, false), (0.0, true)] {
-        let mut lidar = RearLidar::new(Lidar { window_transmission, ..Lidar::default() });
+        let mut lidar = RearLidar::new(Lidar { window_transmission, false_alarm_rate: 0.0, ..Lidar::default() });
         TestScene::new().detect(&mut lidar, 0);
         assert_eq!(lidar.is_dark(), is_dark, "{window_transmission}");
         assert_eq!(lidar.completed().unwrap().latest().is_empty(), is_dark, "{window_transmission}");

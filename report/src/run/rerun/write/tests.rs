@@ -1,4 +1,11 @@
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
+
+use arrow::array::{Array, AsArray, RecordBatch};
+use arrow::datatypes::{Float32Type, Int64Type, UInt16Type, UInt32Type};
+use arrow::ipc::reader::StreamReader;
+use re_protos::log_msg::v1alpha1::ArrowMsg;
+use re_sdk::external::re_log_encoding::external::lz4_flex;
+use re_sdk::external::re_log_encoding::{Decodable, MessageHeader, MessageKind, StreamHeader};
 
 use crate::run::rerun::sdk::StoreKind;
 use closecall_scenarios::encounter::encounter;
@@ -12,7 +19,7 @@ use re_sdk::log::Chunk;
 
 use super::super::stream::{OPENING_TIMELINE, STEP_TIMELINE, TIME_TIMELINE};
 use super::*;
-use crate::run::film::{EncounterComparison, FilmRecorder, Scan, film_encounter};
+use crate::run::film::{EncounterComparison, FilmRecorder, NO_CLUSTER, Scan, film_encounter};
 use closecall_campaign::runner::{Sampling, concrete};
 use closecall_simulation::controller::ControllerChoice;
 use closecall_simulation::outcome::{ClosedBy, Collision, Phase};
@@ -323,4 +330,82 @@ fn the_file_is_complete_and_no_temporary_file_remains() {
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     let error = check_recording_possible(&folder.path().join("no/folder.rrd")).unwrap_err();
     assert!(error.to_string().contains("no/folder.rrd"), "{error}");
+}
+
+/// A point as it was measured: beam, time after the start of the sweep (ns), and bits of the intensity.
+type Measured = (u16, u32, u32);
+
+/// Returns the columns of the messages of a recording file that belong to an entity.
+fn columns_in_file(bytes: &[u8], entity: &str) -> Vec<RecordBatch> {
+    let mut found = Vec::new();
+    let mut at = StreamHeader::ENCODED_SIZE_BYTES;
+    loop {
+        let header = MessageHeader::from_rrd_bytes(&bytes[at..at + MessageHeader::ENCODED_SIZE_BYTES]).unwrap();
+        let start = at + MessageHeader::ENCODED_SIZE_BYTES;
+        at = start + usize::try_from(header.len).unwrap();
+        match header.kind {
+            MessageKind::End => return found,
+            MessageKind::ArrowMsg => {
+                let message = ArrowMsg::from_rrd_bytes(&bytes[start..at]).unwrap();
+                let size = usize::try_from(message.uncompressed_size).unwrap();
+                let columns = lz4_flex::block::decompress(&message.payload, size).unwrap();
+                let batches = StreamReader::try_new(columns.as_slice(), None).unwrap();
+                let is_of = |batch: &RecordBatch| {
+                    batch.schema().metadata().get("rerun:entity_path").is_some_and(|path| path == entity)
+                };
+                found.extend(batches.map(Result::unwrap).filter(is_of));
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Returns the measured points of each step that a recording file has in a layer.
+fn measured_in_file(bytes: &[u8], entity: &str) -> BTreeMap<i64, Vec<Measured>> {
+    let mut steps = BTreeMap::new();
+    for batch in columns_in_file(bytes, entity) {
+        // What is static, and the copy of the critical moment, is at no step.
+        let Some(times) = batch.column_by_name(STEP_TIMELINE) else { continue };
+        let times = times.as_primitive::<Int64Type>().values().to_vec();
+        let lists =
+            |name: &str| batch.column_by_name(name).unwrap_or_else(|| panic!("no {name}")).as_list::<i32>().clone();
+        let [beams, offsets, intensities] = ["beam", "offset_ns", "intensity"].map(lists);
+        for (row, step) in times.into_iter().enumerate() {
+            let (beams, offsets, intensities) = (beams.value(row), offsets.value(row), intensities.value(row));
+            let beams = beams.as_primitive::<UInt16Type>().values();
+            let offsets = offsets.as_primitive::<UInt32Type>().values();
+            let intensities = intensities.as_primitive::<Float32Type>().values();
+            assert!(beams.len() == offsets.len() && beams.len() == intensities.len());
+            let points = beams.iter().zip(offsets).zip(intensities);
+            steps.insert(step, points.map(|((beam, offset), of)| (*beam, *offset, of.to_bits())).collect());
+        }
+    }
+    steps
+}
+
+#[test]
+fn beam_time_and_intensity_in_the_file_are_those_of_the_scan() {
+    let films = [filmed("low-thw-overtake", ControllerChoice::MIS, (Some(SensorMode::Full), Level::Full))];
+    let bytes = encoded(&films);
+    let film = &films[0];
+    for (layer, is_clustered) in [("clusters", true), ("rejected", false)] {
+        let found = measured_in_file(&bytes, &format!("/mis/world/ego/lidar/{layer}"));
+        let mut points = 0;
+        for frame in &film.frames {
+            let Some(scan) = &frame.scan else { continue };
+            let is_in_layer = |point: &usize| (scan.clusters[*point] != NO_CLUSTER) == is_clustered;
+            let measured = |point: usize| {
+                let of = &scan.points;
+                (of.beam[point], of.offset_ns[point], of.intensity[point].to_bits())
+            };
+            let expected: Vec<Measured> = (0..scan.points.len()).filter(is_in_layer).map(measured).collect();
+            let step = frame.time.ns() / film.period.ns();
+            assert_eq!(found.get(&step), Some(&expected), "{layer}, step {step}");
+            points += expected.len();
+        }
+        assert!(points > 1_000, "{layer}: {points}");
+        let all: Vec<&Measured> = found.values().flatten().collect();
+        let differs = |of: fn(&Measured) -> u32| all.iter().any(|point| of(point) != of(all[0]));
+        assert!(differs(|it| it.0.into()) && differs(|it| it.1) && differs(|it| it.2), "{layer}");
+    }
 }

@@ -1,0 +1,98 @@
+//! What an approach counts, against values worked by hand.
+
+use closecall_sensors::SensorHealth;
+use closecall_traffic::{ClassScores, Environment, Time, TrackId};
+use nalgebra::{Matrix4, Vector4};
+
+use super::*;
+
+/// Returns a confirmed track of a car whose front is at this place relative to the ego (m).
+fn track(id: u32, [front_x_m, y_m]: [f64; 2], speed_mps: f64) -> Track {
+    let length_m = 4.5;
+    Track {
+        id: TrackId(id),
+        source: Source::Rear,
+        status: TrackStatus::Confirmed,
+        time: Time::ZERO,
+        state: Vector4::new(front_x_m - 0.5 * length_m, y_m, speed_mps, 0.0),
+        covariance: Matrix4::identity(),
+        heading_rad: 0.0,
+        length_m,
+        width_m: 1.8,
+        class: ClassScores::certain(VehicleClass::Car),
+        existence: 0.99,
+        lane: [0.0, 1.0, 0.0],
+    }
+}
+
+fn gospa_of(truths_m: &[[f64; 2]], tracks_m: &[[f64; 2]]) -> f64 {
+    let tracks: Vec<Track> = tracks_m.iter().zip(1..).map(|(at_m, id)| track(id, *at_m, 30.0)).collect();
+    gospa_m(truths_m, &tracks.iter().collect::<Vec<_>>())
+}
+
+#[test]
+fn gospa_is_that_of_worked_examples() {
+    let close = |value: f64, expected: f64| assert!((value - expected).abs() < 1e-9, "{value} instead of {expected}");
+    let alone_m2: f64 = 12.5; // Half of the square of the cut-off of 5 m: the share of a vehicle without a track, or of a track without a vehicle.
+    close(gospa_of(&[], &[]), 0.0);
+    close(gospa_of(&[[-30.0, 0.0]], &[]), alone_m2.sqrt());
+    close(gospa_of(&[], &[[-30.0, 0.0], [-60.0, 0.0]]), 5.0);
+    // 3 m along and 2 m across.
+    close(gospa_of(&[[-30.0, 0.0]], &[[-33.0, 2.0]]), 13.0_f64.sqrt());
+    // At the cut-off, a pair costs as much as a missed vehicle and a false track.
+    close(gospa_of(&[[-30.0, 0.0]], &[[-35.0, 0.0]]), 5.0);
+    close(gospa_of(&[[-30.0, 0.0]], &[[-80.0, 0.0]]), 5.0);
+    // Two vehicles, two tracks and a false one: the pairs that cross would cost 16 + 9 m², the others 1 + 4 m².
+    let truths_m = [[-30.0, 0.0], [-30.0, 3.0]];
+    let tracks_m = [[-30.0, 5.0], [-31.0, 0.0], [-90.0, 0.0]];
+    close(gospa_of(&truths_m, &tracks_m), (1.0_f64 + 4.0 + alone_m2).sqrt());
+    // The nearest track of the first vehicle is left to the second, which no other track reaches: 4 + 1 m² instead of 1 m² and two alone.
+    close(gospa_of(&[[-30.0, 0.0], [-30.0, 2.0]], &[[-30.0, 1.0], [-30.0, -2.0]]), 5.0_f64.sqrt());
+}
+
+/// Perception that reports the truth, from step 100 on under another id, and between steps 50 and 60 one more track 30 m farther away.
+struct Scripted {
+    step: u32,
+    class: ClassScores,
+    tracks: Vec<Track>,
+}
+
+impl Perception for Scripted {
+    fn step(&mut self, scene: &Scene<'_>) -> Result<&[Track], SensorError> {
+        let (ego, other) = (&scene.ego, &scene.others[0]);
+        let front_x_m = other.state.s_m + 0.5 * other.vehicle.dimensions.length_m - ego.state.s_m;
+        let at_m = [front_x_m, other.state.d_m - ego.state.d_m];
+        let id = if self.step < 100 { 1 } else { 2 };
+        self.tracks = vec![track(id, at_m, other.state.speed_mps)];
+        if (50..60).contains(&self.step) {
+            self.tracks.push(Track { class: self.class, ..track(9, [front_x_m - 30.0, 0.0], 30.0) });
+        }
+        self.step += 1;
+        Ok(&self.tracks)
+    }
+
+    fn health(&self) -> SensorHealth {
+        SensorHealth::default()
+    }
+}
+
+#[test]
+fn a_forced_change_of_the_id_and_a_forced_false_track_are_counted() {
+    let (case, road) = (Case::usual(), Road::straight(3));
+    assert_eq!(case.environment, Environment::CLEAR_DAY);
+    let with_class = |class| {
+        let traffic = Traffic::new(&case, &road, 150.0, 10.0);
+        observe((&case, &road), traffic, &mut Scripted { step: 0, class, tracks: Vec::new() }).unwrap()
+    };
+    let found = with_class(ClassScores::certain(VehicleClass::Car));
+    assert_eq!((found.id_switches, found.false_tracks, found.failed_steps), (1, 1, 0));
+    // The true track has no error; the false one costs its share in each of its ten steps.
+    for (step, seen) in found.observations.iter().enumerate() {
+        let expected = if (50..60).contains(&step) { 12.5_f64.sqrt() } else { 0.0 };
+        assert!((seen.gospa_m - expected).abs() < 1e-6, "step {step}: {}", seen.gospa_m);
+        assert!(seen.tracked.is_some_and(|it| it.position_m[0].abs() < 1e-6 && it.is_class_right));
+    }
+    // What is known to be no vehicle is no false track.
+    let background = ClassScores([0.0, 0.0, 0.0, 1.0]);
+    assert_eq!(with_class(background).false_tracks, 0);
+}
