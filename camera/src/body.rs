@@ -79,21 +79,22 @@ fn transform_point(rotation: &[Vec3; 3], at: Vec3, point: Vec3) -> Vec3 {
     sum
 }
 
-/// Shades the faces of a body, projects them for each moment, and appends the results to `faces` and `moments`.
+/// Shades the faces of a body, projects them for each moment, and appends the results to `faces` and `moments`. `corners` is
+/// memory that the next call may reuse.
 pub(crate) fn add_body(
     mesh: &Mesh,
     placement: &Placement,
     shading: &Shading<'_>,
-    faces: &mut Vec<Shade>,
-    moments: &mut [Vec<ScreenTriangle>; MOMENTS],
+    (faces, moments): (&mut Vec<Shade>, &mut [Vec<ScreenTriangle>; MOMENTS]),
+    corners: &mut Vec<Vec3>,
 ) {
     let transform = Transform::new(placement, shading.lens);
     let first = faces.len();
-    let ground: Vec<Vec3> =
-        mesh.vertices.iter().map(|v| transform_point(&transform.rotation, transform.at, *v)).collect();
+    corners.clear();
+    corners.extend(mesh.vertices.iter().map(|v| transform_point(&transform.rotation, transform.at, *v)));
     for face in &mesh.faces {
-        let corners = face.corners.map(|corner| ground[usize::from(corner)]);
-        let radiance = shaded_radiance(&corners, &face.surface, shading);
+        let on_ground = face.corners.map(|corner| corners[usize::from(corner)]);
+        let radiance = shaded_radiance(&on_ground, &face.surface, shading);
         let (map, offset) = match face.surface.texture {
             Texture::Plain => ([[0.0; 3]; 2], [0.0; 2]),
             _ => texture_map(mesh, usize::from(face.map), &transform),
@@ -102,21 +103,20 @@ pub(crate) fn add_body(
     }
     let lens = shading.lens;
     let projection = Projection { focal_px: lens.focal_px as f32, optics: &lens.optics };
-    let mut camera = vec![[0.0; 3]; mesh.vertices.len()];
     for (moment, triangles) in moments.iter_mut().enumerate() {
         let delay_s = f64::from(shading.light.exposure_s) * moment_offset(moment);
         let moved = [placement.velocity[0] * delay_s, placement.velocity[1] * delay_s];
         let shift = shading.lens.in_camera([placement.at[0] + moved[0], placement.at[1] + moved[1], 0.0]);
         let at = shift.map(|part| part as f32);
-        for (to, from) in camera.iter_mut().zip(&mesh.vertices) {
+        for (to, from) in corners.iter_mut().zip(&mesh.vertices) {
             *to = transform_point(&transform.camera_rotation, at, *from);
             if lens.readout_s > 0.0 {
                 *to = lens.when_read(to.map(f64::from), placement.velocity).map(|part| part as f32);
             }
         }
         for (index, face) in mesh.faces.iter().enumerate() {
-            let corners = face.corners.map(|corner| camera[usize::from(corner)]);
-            project(corners, projection, (first + index) as u32, triangles);
+            let in_camera = face.corners.map(|corner| corners[usize::from(corner)]);
+            project(in_camera, projection, (first + index) as u32, triangles);
         }
     }
 }

@@ -4,7 +4,7 @@
 
 use super::Frame;
 use super::body::{MOMENTS, texture_factor};
-use super::frame::touches;
+use super::frame::{Bounds, touches};
 use super::glow::{self, Glow};
 use super::ground::Patch;
 use super::image::{CHANNELS, Crop, Image, LabelledImage, sample_positions};
@@ -18,10 +18,17 @@ use super::spray::Cloud;
 const GROUND_TO_M: f32 = 350.0;
 
 /// The shadows, beams, spray clouds and glows that can affect the pixels that are being rendered.
-struct Effects {
+#[derive(Default)]
+pub(super) struct Effects {
     patches: Vec<Patch>,
     clouds: Vec<Cloud>,
     glows: Vec<Glow>,
+}
+
+/// Replaces `kept` by those of `all` whose bounds touch these.
+fn keep_touching<T: Copy>(kept: &mut Vec<T>, all: &[(Bounds, T)], bounds: &Bounds) {
+    kept.clear();
+    kept.extend(all.iter().filter(|(own, _)| touches(own, bounds)).map(|(_, one)| *one));
 }
 
 impl Frame {
@@ -111,27 +118,15 @@ impl Frame {
                     .draw(&self.lists.triangles[moment][object.triangles[moment].clone()], &lattice);
             }
         }
-        let effects = Effects {
-            patches: self
-                .lists
-                .patches
-                .iter()
-                .filter(|(own, _)| touches(own, &bounds))
-                .map(|(_, patch)| *patch)
-                .collect(),
-            clouds: self
-                .lists
-                .clouds
-                .iter()
-                .filter(|(own, _)| touches(own, &bounds))
-                .map(|(_, cloud)| *cloud)
-                .collect(),
-            glows: self.lists.glows.iter().filter(|(own, _)| touches(own, &bounds)).map(|(_, glow)| *glow).collect(),
-        };
+        let mut effects = std::mem::take(&mut self.lists.effects);
+        keep_touching(&mut effects.patches, &self.lists.patches, &bounds);
+        keep_touching(&mut effects.clouds, &self.lists.clouds, &bounds);
+        keep_touching(&mut effects.glows, &self.lists.glows, &bounds);
         for (sample, out) in rgb.chunks_exact_mut(CHANNELS).enumerate() {
             let pixel = [columns[sample % columns.len()], rows[sample / columns.len()]];
             out.copy_from_slice(&self.pixel(sample, pixel, &effects));
         }
+        self.lists.effects = effects;
     }
 
     fn pixel(&self, sample: usize, pixel: [i32; 2], effects: &Effects) -> [u8; 3] {

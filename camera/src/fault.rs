@@ -85,8 +85,8 @@ fn blur(crop: &mut Crop, sd: f32) {
         return;
     }
     let side = CROP_PX as i32;
-    let weights: Vec<f32> = (0..side).map(|at| (-0.5 * (at as f32 / sd).powi(2)).exp()).collect();
-    let mut blurred = vec![0_u8; crop.rgb.len()];
+    let weights: [f32; CROP_PX] = std::array::from_fn(|at| (-0.5 * (at as f32 / sd).powi(2)).exp());
+    let mut blurred = [0_u8; CROP_PX * CROP_PX * CHANNELS];
     for [step, across] in [[CHANNELS as i32, CHANNELS as i32 * side], [CHANNELS as i32 * side, CHANNELS as i32]] {
         for line in 0..side {
             for at in 0..side {

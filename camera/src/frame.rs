@@ -13,6 +13,7 @@
 use closecall_traffic::{Indicator, Time};
 
 use super::body::{MOMENTS, Placement, Shade, Shading, add_body, moment_offset};
+use super::draw::Effects;
 use super::glow::Glow;
 use super::ground::{BEAM_M, CONTACT_SHADOW_M, Ground, LONGEST_SHADOW_M, Patch, PatchKind};
 use super::hash::{mix, normal3};
@@ -20,6 +21,7 @@ use super::light::Illumination;
 use super::mesh::{Emission, Mesh, Vec3};
 use super::pinhole::{GroundBox, Lens, PixelRect};
 use super::raster::{SUBPIXEL_STEPS, ScreenTriangle, Visibility};
+use super::shapes::Roadside;
 use super::spray::{self, Cloud};
 use super::veil::Veil;
 use super::window::RearWindow;
@@ -77,6 +79,12 @@ pub struct FrameBuffers {
     pub(super) glows: Vec<(Bounds, Glow)>,
     pub(super) veils: Vec<Veil>,
     pub(super) visibility: [Visibility; MOMENTS],
+    /// What may affect the pixels that are being rendered.
+    pub(super) effects: Effects,
+    /// The body that is being added, and its corners in the frame of the ground or of the camera.
+    mesh: Mesh,
+    corners: Vec<Vec3>,
+    roadside: Vec<Roadside>,
 }
 
 impl std::fmt::Debug for FrameBuffers {
@@ -143,7 +151,7 @@ impl Frame {
             lens.height_m as f32,
             key.0,
         );
-        frame.add_clouds(own);
+        frame.add_clouds(own.into_iter().flatten());
         frame
     }
 
@@ -186,7 +194,7 @@ impl Frame {
             self.lens.height_m as f32,
             self.window.noise_key,
         );
-        self.add_clouds(clouds);
+        self.add_clouds(clouds.into_iter().flatten());
         let bounds = self.bounds_of(&self.while_read(&placement, body));
         let lamps_matter = self.light.is_dark() && bounds.is_some();
         let is_wanted =
@@ -194,7 +202,8 @@ impl Frame {
         if !(is_wanted || lamps_matter) {
             return;
         }
-        let mesh = shapes::vehicle(&vehicle.vehicle);
+        let mut mesh = std::mem::take(&mut self.lists.mesh);
+        shapes::build_vehicle(&mut mesh, &vehicle.vehicle);
         let indicators = blinking(vehicle.state.indicator, scene.time);
         if lamps_matter {
             self.add_glows(&mesh, &placement, indicators);
@@ -202,18 +211,22 @@ impl Frame {
         if let (true, Some(bounds)) = (is_wanted, bounds) {
             self.add_object(&mesh, &placement, indicators, bounds);
         }
+        self.lists.mesh = mesh;
     }
 
     fn add_object(&mut self, mesh: &Mesh, placement: &Placement, indicators: [bool; 2], bounds: Bounds) {
         let before: [usize; MOMENTS] = std::array::from_fn(|moment| self.lists.triangles[moment].len());
         let shading = Shading { lens: &self.lens, light: &self.light, indicators };
-        add_body(mesh, placement, &shading, &mut self.lists.faces, &mut self.lists.triangles);
+        let out = (&mut self.lists.faces, &mut self.lists.triangles);
+        add_body(mesh, placement, &shading, out, &mut self.lists.corners);
         let triangles = std::array::from_fn(|moment| before[moment]..self.lists.triangles[moment].len());
         self.lists.objects.push(Object { bounds, triangles });
     }
 
     fn add_roadside(&mut self, scene: &Scene<'_>, s_m: f64, regions: &[PixelRect]) {
-        for body in shapes::roadside(scene.road, s_m) {
+        let (mut bodies, mut mesh) = (std::mem::take(&mut self.lists.roadside), std::mem::take(&mut self.lists.mesh));
+        shapes::roadside(scene.road, s_m, &mut bodies);
+        for body in &bodies {
             let mut anchor = SceneVehicle { pitch_rad: 0.0, ..scene.ego };
             anchor.state = closecall_traffic::VehicleState { s_m: body.s_m, d_m: body.d_m, ..Default::default() };
             let (at, heading) = self.lens.pose_in_ground(scene, &anchor);
@@ -233,8 +246,10 @@ impl Frame {
             if !regions.iter().any(|region| touches(&bounds, &bounds_of_rect(region))) {
                 continue;
             }
-            self.add_object(&body.mesh(), &placement, [false; 2], bounds);
+            body.build(&mut mesh);
+            self.add_object(&mesh, &placement, [false; 2], bounds);
         }
+        (self.lists.roadside, self.lists.mesh) = (bodies, mesh);
     }
 
     fn add_patches(&mut self, body: &GroundBox, height_m: f64) {
@@ -269,7 +284,7 @@ impl Frame {
         }
     }
 
-    fn add_clouds(&mut self, clouds: Vec<Cloud>) {
+    fn add_clouds(&mut self, clouds: impl IntoIterator<Item = Cloud>) {
         for cloud in clouds {
             let radius = f64::from(cloud.radius_m);
             let [x, y, up] = cloud.at.map(f64::from);

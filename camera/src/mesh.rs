@@ -145,7 +145,18 @@ pub(crate) struct Mesh {
     pub(crate) lamps: Vec<Lamp>,
 }
 
+/// Number of corners of a prism's outline, at most.
+const MAX_RIBS: usize = 8;
+
 impl Mesh {
+    /// Removes everything but keeps the allocated memory.
+    pub(crate) fn clear(&mut self) {
+        self.vertices.clear();
+        self.faces.clear();
+        self.maps.clear();
+        self.lamps.clear();
+    }
+
     fn vertex(&mut self, at: Vec3) -> u16 {
         self.vertices.push(at);
         u16::try_from(self.vertices.len() - 1).unwrap_or(u16::MAX)
@@ -166,15 +177,16 @@ impl Mesh {
     }
 
     /// Adds a prism that is symmetric about y = `centre_y`. Its outline is convex in the x–z plane, and each corner of
-    /// the outline has its own half width.
+    /// the outline, of which there are at most eight, has its own half width.
     pub(crate) fn prism(&mut self, ribs: &[Rib], centre_y: f32, surface: Surface) {
         let count = ribs.len() as f32;
         let mean = |part: usize| ribs.iter().map(|rib| rib[part]).sum::<f32>() / count;
         let inside = [mean(0), centre_y, mean(1)];
         let side = |sign: f32| move |rib: &Rib| [rib[0], centre_y + sign * rib[2], rib[1]];
         for sign in [-1.0, 1.0] {
-            let outline: Vec<Vec3> = ribs.iter().map(side(sign)).collect();
-            self.polygon(&outline, inside, surface);
+            let mut outline = [[0.0; 3]; MAX_RIBS];
+            outline.iter_mut().zip(ribs).for_each(|(corner, rib)| *corner = side(sign)(rib));
+            self.polygon(&outline[..ribs.len()], inside, surface);
         }
         for (index, a) in ribs.iter().enumerate() {
             let b = &ribs[(index + 1) % ribs.len()];
@@ -191,10 +203,12 @@ impl Mesh {
 
     /// Adds a wheel: an octagonal prism that stands on the ground, with its axis along y.
     pub(crate) fn wheel(&mut self, [x, y, radius]: Vec3, half_width: f32) {
-        let rim = [(0.92, 0.38), (0.38, 0.92), (-0.38, 0.92), (-0.92, 0.38)];
-        let round = rim.into_iter().chain(rim.into_iter().map(|(a, b)| (-a, -b)));
-        let ribs: Vec<Rib> =
-            round.map(|(a, b): (f32, f32)| [x + a * radius, radius + b * radius, half_width]).collect();
+        const RIM: [(f32, f32); 4] = [(0.92, 0.38), (0.38, 0.92), (-0.38, 0.92), (-0.92, 0.38)];
+        let ribs: [Rib; 2 * RIM.len()] = std::array::from_fn(|index| {
+            let (a, b) = RIM[index % RIM.len()];
+            let (a, b) = if index < RIM.len() { (a, b) } else { (-a, -b) };
+            [x + a * radius, radius + b * radius, half_width]
+        });
         self.prism(&ribs, y, Surface::RUBBER);
     }
 
@@ -215,7 +229,7 @@ impl Mesh {
                 self.polygon(&corners, centre, surface);
             }
         }
-        let lid: Vec<Vec3> = (0..SECTORS.len()).map(|sector| at(sector, RINGS[3])).collect();
+        let lid: [Vec3; SECTORS.len()] = std::array::from_fn(|sector| at(sector, RINGS[3]));
         self.polygon(&lid, centre, surface);
     }
 

@@ -34,6 +34,9 @@ pub struct CropClassifier {
     classifier: Classifier,
     crop: Crop,
     lists: FrameBuffers,
+    /// The detections that are due, by their index, and their windows.
+    due: Vec<usize>,
+    windows: Vec<PixelRect>,
 }
 
 impl CropClassifier {
@@ -43,7 +46,14 @@ impl CropClassifier {
     /// Returns a [`ClassifierError`] if the backend cannot be set up.
     pub fn new(camera: Camera, backend: &Backend) -> Result<Self, ClassifierError> {
         let classifier = Classifier::shipped(backend)?;
-        Ok(Self { camera: RearCamera::new(camera), classifier, crop: Crop::default(), lists: FrameBuffers::default() })
+        Ok(Self {
+            camera: RearCamera::new(camera),
+            classifier,
+            crop: Crop::default(),
+            lists: FrameBuffers::default(),
+            due: Vec::new(),
+            windows: Vec::new(),
+        })
     }
 
     /// Classifies the detections that lie in the image and on the road, and fuses the network's scores with the class
@@ -79,24 +89,27 @@ impl CropClassifier {
     ) -> Result<usize, ClassifierError> {
         let lane = LaneGeometry::from_scene(scene);
         memory.begin(scene.time);
-        let mut due: Vec<(usize, PixelRect)> = Vec::new();
+        self.due.clear();
+        self.windows.clear();
         for (index, detection) in detections.iter_mut().enumerate().filter(|(_, at)| !is_beside_road(at, &lane)) {
             let Some(window) = self.camera.detection_window(&scene.ego, detection) else { continue };
             match memory.recall(detection) {
                 Some(scores) => detection.class = fuse(&detection.class, &scores),
-                None => due.push((index, window)),
+                None => {
+                    self.due.push(index);
+                    self.windows.push(window);
+                }
             }
         }
-        if due.is_empty() {
+        if self.due.is_empty() {
             return Ok(0);
         }
-        let windows: Vec<PixelRect> = due.iter().map(|(_, window)| *window).collect();
         let mut frame =
-            Frame::with_buffers(std::mem::take(&mut self.lists), self.camera.camera(), imaged, key, &windows);
+            Frame::with_buffers(std::mem::take(&mut self.lists), self.camera.camera(), imaged, key, &self.windows);
         if let Some(fault) = fault {
             frame.add_glare(fault, imaged);
         }
-        for (index, window) in &due {
+        for (index, window) in self.due.iter().zip(&self.windows) {
             frame.crop(*window, &mut self.crop);
             if let Some(fault) = fault {
                 fault.apply(&mut self.crop);
@@ -106,7 +119,7 @@ impl CropClassifier {
             detections[*index].class = fuse(&detections[*index].class, &image_scores);
         }
         self.lists = frame.into_buffers();
-        Ok(due.len())
+        Ok(self.due.len())
     }
 }
 

@@ -21,7 +21,7 @@ const NOMINAL_FILM_MM: f64 = 1.0;
 /// (1/m).
 const DENSITY_PER_M: f32 = 0.55;
 /// Number of clouds in one chain.
-const CLOUDS: i32 = 6;
+const CLOUDS: usize = 6;
 /// Distance between the clouds of a chain (m).
 const CLOUD_SPACING_M: f32 = 1.7;
 
@@ -67,8 +67,11 @@ fn cell_key(vehicle: &SceneVehicle) -> u64 {
     (u64::from(along.cast_unsigned()) << 32) | u64::from(across.cast_unsigned())
 }
 
+/// Number of clouds behind one vehicle: a chain behind each of four wheels.
+const CLOUDS_BEHIND: usize = 4 * CLOUDS;
+
 /// Returns the clouds behind one vehicle, given its position `at` (m) and the cosine and sine of its heading, `turn`,
-/// in the ground frame.
+/// in the ground frame. Returns `None` if it throws up no spray.
 pub(crate) fn clouds_behind(
     vehicle: &SceneVehicle,
     scene: &Scene<'_>,
@@ -76,11 +79,11 @@ pub(crate) fn clouds_behind(
     turn: [f32; 2],
     lens_height_m: f32,
     key: u64,
-) -> Vec<Cloud> {
+) -> Option<[Cloud; CLOUDS_BEHIND]> {
     let speed = (vehicle.state.speed_mps - MIN_SPEED_MPS) / (NOMINAL_SPEED_MPS - MIN_SPEED_MPS);
     let film = (scene.environment.water_film_mm / NOMINAL_FILM_MM).min(2.0);
     if !(speed > 0.0 && film > 0.0) {
-        return Vec::new();
+        return None;
     }
     let (size_factor, density_factor) = match vehicle.vehicle.class {
         VehicleClass::Car => (1.0, 1.0),
@@ -90,24 +93,21 @@ pub(crate) fn clouds_behind(
     let density = DENSITY_PER_M * density_factor * (speed * speed).min(1.5) as f32 * film as f32;
     let size = vehicle.vehicle.dimensions;
     let half_track = (0.40 * size.width_m) as f32;
-    let mut clouds = Vec::new();
     let key = mix(key ^ cell_key(vehicle));
-    for axle_m in [0.3 * size.length_m as f32, -0.35 * size.length_m as f32] {
-        for side in [-1_i8, 1] {
-            for index in 0..CLOUDS {
-                let bits = mix_at(key, index, i32::from(side) + if axle_m > 0.0 { 10 } else { 0 });
-                let back = axle_m - 0.6 - CLOUD_SPACING_M * (index as f32 + 0.6 * unit(bits));
-                let relative_radius = 0.35 + 0.13 * index as f32;
-                let radius_m = size_factor * relative_radius * (0.8 + 0.5 * unit(bits << 12));
-                let left = f32::from(side) * half_track * (1.0 + 0.06 * index as f32) + 0.3 * (unit(bits << 24) - 0.5);
-                let up = 0.7 * radius_m - lens_height_m;
-                let dilution = 1.0 / (1.0 + 0.35 * index as f32);
-                let middle = [at[0] + turn[0] * back - turn[1] * left, at[1] + turn[1] * back + turn[0] * left, up];
-                clouds.push(Cloud::new(middle, radius_m, density * dilution * (0.3 + 1.4 * unit(bits << 36))));
-            }
-        }
-    }
-    clouds
+    let axles_m = [0.3 * size.length_m as f32, -0.35 * size.length_m as f32];
+    Some(std::array::from_fn(|cloud| {
+        let (wheel, index) = (cloud / CLOUDS, (cloud % CLOUDS) as i32);
+        let (axle_m, side) = (axles_m[wheel / 2], [-1_i8, 1][wheel % 2]);
+        let bits = mix_at(key, index, i32::from(side) + if axle_m > 0.0 { 10 } else { 0 });
+        let back = axle_m - 0.6 - CLOUD_SPACING_M * (index as f32 + 0.6 * unit(bits));
+        let relative_radius = 0.35 + 0.13 * index as f32;
+        let radius_m = size_factor * relative_radius * (0.8 + 0.5 * unit(bits << 12));
+        let left = f32::from(side) * half_track * (1.0 + 0.06 * index as f32) + 0.3 * (unit(bits << 24) - 0.5);
+        let up = 0.7 * radius_m - lens_height_m;
+        let dilution = 1.0 / (1.0 + 0.35 * index as f32);
+        let middle = [at[0] + turn[0] * back - turn[1] * left, at[1] + turn[1] * back + turn[0] * left, up];
+        Cloud::new(middle, radius_m, density * dilution * (0.3 + 1.4 * unit(bits << 36)))
+    }))
 }
 
 #[cfg(test)]

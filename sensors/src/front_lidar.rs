@@ -16,22 +16,25 @@ use crate::lidar::Lidar;
 use crate::lidar_chain::{LidarChain, Seen};
 use crate::object::NoiseKey;
 use crate::perception::MountedLidar;
-use crate::{Alterations, Health, Scene, SensorError};
+use crate::{Alterations, Health, Scene, SceneVehicle, SensorError};
 
 /// The front LiDAR with its processing.
 pub(crate) struct FrontLidar {
     chain: LidarChain,
+    /// Memory of the vehicles of the scene, and of the one that the ego believes.
+    memory: [Vec<SceneVehicle>; 2],
 }
 
 impl FrontLidar {
     /// Creates the chain before its first step, with random streams keyed by `key`.
     pub(crate) fn new(lidar: Lidar, tracker: TrackerModel, key: &NoiseKey) -> Self {
-        Self { chain: LidarChain::new([lidar.half_turned()], tracker, key, ["front-lidar", "front-lidar-fault"]) }
+        let chain = LidarChain::new([lidar.half_turned()], tracker, key, ["front-lidar", "front-lidar-fault"]);
+        Self { chain, memory: Default::default() }
     }
 
     /// Returns the same sensor with faults.
     pub(crate) fn with_faults(self, faults: FaultList<LidarFault>) -> Self {
-        Self { chain: self.chain.with_faults(faults.map(LidarFault::turned)) }
+        Self { chain: self.chain.with_faults(faults.map(LidarFault::turned)), ..self }
     }
 
     /// Measures `scene`, which the ego believes to be `believed`, and appends the tracks to `list`.
@@ -39,7 +42,8 @@ impl FrontLidar {
     /// # Errors
     /// [`SensorError`] if a model fails.
     pub(crate) fn step(&mut self, [scene, believed]: [&Scene<'_>; 2], list: &mut TrackList) -> Result<(), SensorError> {
-        let turned = [scene, believed].map(HalfTurn::of);
+        let [one, other] = std::mem::take(&mut self.memory);
+        let turned = [HalfTurn::of(scene, one), HalfTurn::of(believed, other)];
         let [scene, believed] = [&turned[0], &turned[1]].map(HalfTurn::scene);
         let altered = &Alterations::default();
         self.chain.detect(Seen { scene: &scene, believed: &believed, others: &[], altered }, None)?;
@@ -50,6 +54,7 @@ impl FrontLidar {
             turn_back(track);
             track.source = Source::Front;
         }
+        self.memory = turned.map(HalfTurn::into_memory);
         Ok(())
     }
 

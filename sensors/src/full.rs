@@ -60,6 +60,9 @@ impl FullModel {
     }
 }
 
+/// Number of tracks of all sensors together for which memory is reserved.
+const RESERVED_TRACKS: usize = 64;
+
 /// Perception by LiDAR point clouds behind the ego, and by object-level sensors in the other directions.
 pub struct FullPerception {
     front: ObjectSensor,
@@ -85,7 +88,7 @@ impl FullPerception {
             classifier: None,
             altered: Alterations::default(),
             others: Vec::new(),
-            list: TrackList::default(),
+            list: TrackList::with_capacity(RESERVED_TRACKS),
         }
     }
 

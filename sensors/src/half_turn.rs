@@ -24,8 +24,8 @@ pub(crate) struct HalfTurn {
 }
 
 impl HalfTurn {
-    /// Returns the turned scene.
-    pub(crate) fn of(scene: &Scene<'_>) -> Self {
+    /// Returns the turned scene. `others` is memory for its vehicles, such as [`HalfTurn::into_memory`] returns it.
+    pub(crate) fn of(scene: &Scene<'_>, mut others: Vec<SceneVehicle>) -> Self {
         let turned = |vehicle: &SceneVehicle| {
             let VehicleState { s_m, d_m, heading_rad, .. } = vehicle.state;
             let (s_m, d_m) = scene.road.reversed_position_m(s_m, d_m);
@@ -42,13 +42,20 @@ impl HalfTurn {
             acceleration_mps2: -scene.ego.state.acceleration_mps2,
             ..ego.state
         };
+        others.clear();
+        others.extend(scene.others.iter().map(turned));
         Self {
             time: scene.time,
             road: scene.road.reversed(),
             environment: *scene.environment,
             ego: SceneVehicle { state, pitch_rad: -scene.ego.pitch_rad, ..ego },
-            others: scene.others.iter().map(turned).collect(),
+            others,
         }
+    }
+
+    /// Returns the memory of the vehicles, for another scene.
+    pub(crate) fn into_memory(self) -> Vec<SceneVehicle> {
+        self.others
     }
 
     /// Returns the turned scene as a scene.
@@ -82,7 +89,7 @@ mod tests {
             ego.state.heading_rad = 0.02;
             let lead = with_speed(scene_vehicle(1, VehicleClass::Truck, 560.0, -1.9), 25.0);
             let scene = Scene { time: Time::ZERO, road: &road, environment: &environment, ego, others: &[lead] };
-            let turned = HalfTurn::of(&scene);
+            let turned = HalfTurn::of(&scene, Vec::new());
             let seen = turned.scene();
             let before = EgoFrame::new(&road, &ego.state).point(560.0, -1.9);
             let other = &seen.others[0].state;
@@ -94,7 +101,7 @@ mod tests {
             let [left_m, right_m] = road.guard_rail_offsets_m();
             assert_eq!(seen.road.guard_rail_offsets_m(), [right_m, left_m]);
             // Turned twice, everything is where it was.
-            let again = HalfTurn::of(&seen);
+            let again = HalfTurn::of(&seen, Vec::new());
             assert!((again.scene().ego.state.s_m - 500.0).abs() < 1e-6);
             assert!((again.scene().road.curvature_per_m() - curvature_per_m).abs() < 1e-12);
         }

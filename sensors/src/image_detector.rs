@@ -66,6 +66,10 @@ pub(crate) struct ImageDetector {
     pending: VecDeque<Pending>,
     /// What the camera alone has seen in the image whose result arrived with the latest scan.
     alone: Vec<Detection>,
+    /// The object of each detection of the latest scan.
+    ids: Vec<u64>,
+    /// Whether a detection of the latest scan has been linked to each object of the earlier ones.
+    is_taken: Vec<bool>,
 }
 
 impl ImageDetector {
@@ -82,19 +86,22 @@ impl ImageDetector {
             known: Vec::new(),
             pending: VecDeque::new(),
             alone: Vec::new(),
+            ids: Vec::new(),
+            is_taken: Vec::new(),
         }
     }
 
-    /// Links the detections of a scan to the known objects, and returns the object of each. A detection without one is a new object.
-    fn link(&mut self, time: Time, detections: &[Detection]) -> Vec<u64> {
+    /// Links the detections of a scan to the known objects. A detection without one is a new object.
+    fn link(&mut self, time: Time, detections: &[Detection]) {
         self.known.retain(|known| time - known.seen_at <= KEPT_FOR);
-        let mut is_taken = vec![false; self.known.len()];
         let before = self.known.len();
-        let mut ids = Vec::with_capacity(detections.len());
+        self.is_taken.clear();
+        self.is_taken.resize(before, false);
+        self.ids.clear();
         for detection in detections {
             let face_m = [detection.face_x_m, detection.face_y_m];
             let apart = |known: &Known| [0, 1].map(|axis| (known.face_m[axis] - face_m[axis]).abs());
-            let free = self.known[..before].iter().enumerate().filter(|(index, _)| !is_taken[*index]);
+            let free = self.known[..before].iter().enumerate().filter(|(index, _)| !self.is_taken[*index]);
             let near = free.filter(|(_, known)| apart(known).iter().zip(GATE_M).all(|(m, gate_m)| *m <= gate_m));
             let sum = |known: &Known| apart(known).iter().sum::<f64>();
             let nearest = near.min_by(|one, other| sum(one.1).total_cmp(&sum(other.1))).map(|(index, _)| index);
@@ -103,13 +110,12 @@ impl ImageDetector {
                 self.next_id += 1;
                 self.known.len() - 1
             });
-            if let Some(taken) = is_taken.get_mut(index) {
+            if let Some(taken) = self.is_taken.get_mut(index) {
                 *taken = true;
             }
             (self.known[index].face_m, self.known[index].seen_at) = (face_m, time);
-            ids.push(self.known[index].id);
+            self.ids.push(self.known[index].id);
         }
-        ids
     }
 
     /// Takes an image and queues its result.
@@ -118,7 +124,7 @@ impl ImageDetector {
         scene: &Scene<'_>,
         key: ExposureKey,
         fault: Option<&CameraFault>,
-        (ids, detections): (&[u64], &[Detection]),
+        detections: &[Detection],
     ) -> Result<(), SensorError> {
         let held = self.held.as_ref().map(|held| (held.scene(), held.key));
         let (imaged, key) = held.as_ref().map_or((scene, key), |(scene, key)| (scene, *key));
@@ -133,7 +139,7 @@ impl ImageDetector {
         })?;
         let due = scene.time + seconds(self.camera.mask_rcnn.latency_s);
         let exposed = Exposed { time: scene.time, ego: scene.ego };
-        self.pending.push_back(Pending { due, exposed, ids: ids.to_vec(), result });
+        self.pending.push_back(Pending { due, exposed, ids: self.ids.clone(), result });
         Ok(())
     }
 
@@ -146,7 +152,8 @@ impl ImageDetector {
                     known.evidence = pending.result.evidence[place];
                 }
             }
-            self.alone = pending.result.alone.iter().map(|seen| moved(seen, &pending.exposed, scene)).collect();
+            self.alone.clear();
+            self.alone.extend(pending.result.alone.iter().map(|seen| moved(seen, &pending.exposed, scene)));
         }
     }
 }
@@ -159,16 +166,16 @@ impl DetectionClassifier for ImageDetector {
         let (is_dead, is_frozen) = fault.map_or((false, false), |fault| (fault.is_dead, fault.is_frozen));
         self.failed_scans = if is_dead || is_frozen { self.failed_scans.saturating_add(1) } else { 0 };
         self.held = is_frozen.then(|| self.held.take().unwrap_or_else(|| HeldImage::of(scene, key)));
-        let ids = self.link(scene.time, detections);
+        self.link(scene.time, detections);
         let due = *self.next_image.get_or_insert(scene.time);
         if scene.time >= due {
             self.next_image = Some(due + seconds(self.camera.mask_rcnn.period_s));
             if !is_dead {
-                self.expose(scene, key, fault.as_ref(), (&ids, detections))?;
+                self.expose(scene, key, fault.as_ref(), detections)?;
             }
         }
         self.receive(scene);
-        for (detection, id) in detections.iter_mut().zip(&ids) {
+        for (detection, id) in detections.iter_mut().zip(&self.ids) {
             let known = self.known.iter().find(|known| known.id == *id);
             let Some(evidence) = known.and_then(|known| known.evidence) else { continue };
             detection.class = fuse(&detection.class, &evidence.scores);

@@ -21,7 +21,7 @@ use closecall_traffic::Time;
 use closecall_traffic::ego_frame::EgoFrame;
 
 use crate::faults::{FaultList, LidarFault};
-use crate::full::DetectionClassifier;
+use crate::full::{DetectionClassifier, MAX_ADDITIONAL_LIDARS};
 use crate::lidar::Lidar;
 use crate::object::NoiseKey;
 use crate::perception::{FieldOfView, MountedLidar};
@@ -32,6 +32,9 @@ mod health;
 mod sensor;
 
 use sensor::{ChainSensor, NewScan};
+
+/// Number of LiDARs of a chain, at most.
+const MAX_LIDARS: usize = 1 + MAX_ADDITIONAL_LIDARS;
 
 /// What a chain sees in one step.
 #[derive(Clone, Copy)]
@@ -56,6 +59,8 @@ pub(crate) struct LidarChain {
     tracker: Tracker,
     /// The scans of this step, with the indices of their sensors.
     scans: Vec<(usize, NewScan)>,
+    /// The detections of several scans.
+    all: Vec<Detection>,
 }
 
 impl LidarChain {
@@ -81,7 +86,8 @@ impl LidarChain {
             step: 0,
             latency_steps: tracker.latency_steps(),
             tracker: Tracker::new(tracker.with_scan_period_s(period_s)),
-            scans: Vec::new(),
+            scans: Vec::with_capacity(MAX_LIDARS),
+            all: Vec::new(),
         }
     }
 
@@ -116,9 +122,10 @@ impl LidarChain {
                 scan.detections.extend_from_slice(classifier.seen_alone());
             }
             (Some(classifier), several) => {
-                let mut all: Vec<Detection> = several.iter().flat_map(|(_, scan)| scan.detections.clone()).collect();
-                classifier.classify(seen.scene, &mut all)?;
-                let mut classified = all.into_iter();
+                self.all.clear();
+                several.iter().for_each(|(_, scan)| self.all.extend_from_slice(&scan.detections));
+                classifier.classify(seen.scene, &mut self.all)?;
+                let mut classified = self.all.drain(..);
                 for (_, scan) in several.iter_mut() {
                     scan.detections.iter_mut().zip(&mut classified).for_each(|(slot, found)| *slot = found);
                 }
@@ -139,16 +146,16 @@ impl LidarChain {
     /// `rear_x_m` is the position of the ego's rear end (m).
     pub(crate) fn update_tracker(&mut self, rear_x_m: f64, list: &mut TrackList) {
         while let Some(time) = self.earliest_due() {
-            let mut idle: Vec<RearView> = Vec::new();
-            let mut due: Vec<TrackerScan<'_>> = Vec::new();
-            for sensor in &mut self.sensors {
+            let mut idle: [Option<RearView>; MAX_LIDARS] = [None; MAX_LIDARS];
+            let mut due: [Option<TrackerScan<'_>>; MAX_LIDARS] = [None; MAX_LIDARS];
+            for ((sensor, due), idle) in self.sensors.iter_mut().zip(&mut due).zip(&mut idle) {
                 let view = sensor.view(rear_x_m);
                 let next = sensor.pending.iter_mut().find(|scan| !scan.is_processed && scan.due_step <= self.step);
                 match next.filter(|scan| scan.time == time) {
                     Some(scan) => {
                         scan.is_processed = true;
                         let range_m = if scan.is_missing { 0.0 } else { view.range_m };
-                        due.push(TrackerScan {
+                        *due = Some(TrackerScan {
                             time: scan.time,
                             road: &scan.road,
                             ego: scan.ego,
@@ -157,10 +164,10 @@ impl LidarChain {
                             detections: &scan.detections,
                         });
                     }
-                    None => idle.push(view),
+                    None => *idle = Some(view),
                 }
             }
-            self.tracker.update_together(&due, &idle, list);
+            self.tracker.update_together(due.into_iter().flatten(), idle.into_iter().flatten(), list);
         }
         self.step += 1;
     }

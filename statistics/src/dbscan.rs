@@ -19,6 +19,17 @@ pub struct Dbscan {
 }
 
 impl Dbscan {
+    /// Creates a clustering with memory for so many points in a grid of so many cells. More need more memory.
+    pub fn with_capacity(points: usize, cells: usize) -> Self {
+        let grid = Grid {
+            starts: Vec::with_capacity(cells + 1),
+            free_ends: Vec::with_capacity(cells + 1),
+            sorted: Vec::with_capacity(points),
+            ..Grid::default()
+        };
+        Self { labels: Vec::with_capacity(points), grid, reached: Vec::with_capacity(points) }
+    }
+
     /// Assigns each point to a cluster. Returns the number of clusters.
     ///
     /// A neighbour is at most `radius` away. A core point has at least `core_points` neighbours, itself included. The order

@@ -3,11 +3,10 @@
 //! The cost of a pair is its negative log-likelihood up to constants, d² + ln det S. Here d is the Mahalanobis distance
 //! and S the innovation covariance, enlarged for a manoeuvre that has just begun. A pair is allowed if d² does not
 //! exceed the gate. A track may also stay without a detection, at the cost of a detection at the edge of the gate, so
-//! that an implausible pair is never forced. The Kuhn–Munkres algorithm of the `pathfinding` crate finds the optimum.
-//! It works on integers, so that the result does not depend on rounding.
+//! that an implausible pair is never forced. The Kuhn–Munkres algorithm finds the optimum ([`super::assignment`]). It works
+//! on integers, so that the result does not depend on rounding.
 
-use pathfinding::prelude::{Matrix, kuhn_munkres_min};
-
+use super::assignment::Assignment;
 use super::axis::AxisFit;
 use super::road_filter::{Measurement, RoadFilter};
 
@@ -32,10 +31,11 @@ fn to_integer(cost: f64) -> i64 {
 
 /// Writes into `assigned` the index in `measurements` of each track's detection, or `None` if it has none.
 ///
-/// Each track is given by its filter and half of its length (m).
+/// Each track is given by its filter and half of its length (m). `costs` is memory that the next call may reuse.
 pub(crate) fn assign<'a>(
     tracks: impl ExactSizeIterator<Item = (&'a RoadFilter, f64)>,
     measurements: &[Measurement],
+    costs: &mut Assignment,
     assigned: &mut Vec<Option<usize>>,
 ) {
     assigned.clear();
@@ -45,25 +45,24 @@ pub(crate) fn assign<'a>(
         return;
     }
     // The additional column of each track stands for "no detection".
-    let mut costs = Matrix::new(rows, detections + rows, FORBIDDEN);
+    costs.begin(rows, detections + rows, FORBIDDEN);
     for (row, (track, half_length_m)) in tracks.enumerate() {
         let mut largest_log_variance = f64::NEG_INFINITY;
         for (column, measurement) in measurements.iter().enumerate() {
             let axes = track.fit(measurement, half_length_m);
             let sum = |of: fn(&AxisFit) -> f64| of(&axes[0]) + of(&axes[1]);
             if sum(|axis| axis.squared_distance) <= GATE {
-                costs[(row, column)] = to_integer(sum(|axis| axis.cost));
+                costs.set_cost(row, column, to_integer(sum(|axis| axis.cost)));
                 largest_log_variance = largest_log_variance.max(sum(|axis| axis.log_variance));
             }
         }
-        costs[(row, detections + row)] =
-            if largest_log_variance.is_finite() { to_integer(GATE + largest_log_variance) } else { 0 };
+        let none = if largest_log_variance.is_finite() { to_integer(GATE + largest_log_variance) } else { 0 };
+        costs.set_cost(row, detections + row, none);
     }
-    let (_, columns) = kuhn_munkres_min(&costs);
-    assigned.extend(columns.iter().enumerate().map(|(row, &column)| {
-        let allowed = column < detections && costs[(row, column)] < FORBIDDEN;
-        allowed.then_some(column)
-    }));
+    assigned.extend_from_slice(costs.solve());
+    for (row, column) in assigned.iter_mut().enumerate() {
+        *column = column.filter(|&column| column < detections && costs.cost(row, column) < FORBIDDEN);
+    }
 }
 
 #[cfg(test)]
@@ -84,7 +83,7 @@ mod tests {
 
     fn assignment(tracks: &[RoadFilter], measurements: &[Measurement]) -> Vec<Option<usize>> {
         let mut assigned = Vec::new();
-        assign(tracks.iter().map(|track| (track, 0.0)), measurements, &mut assigned);
+        assign(tracks.iter().map(|track| (track, 0.0)), measurements, &mut Assignment::new(), &mut assigned);
         assigned
     }
 

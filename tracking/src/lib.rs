@@ -13,6 +13,7 @@
 //! the length. State and noise are in road axes, so that neither the ego's braking and turning nor a bend of the road
 //! looks like a manoeuvre of another vehicle.
 
+mod assignment;
 mod association;
 pub mod axis;
 mod classes;

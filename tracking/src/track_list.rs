@@ -11,6 +11,11 @@ pub struct TrackList {
 }
 
 impl TrackList {
+    /// Creates a list with memory for so many tracks. More need more memory.
+    pub fn with_capacity(tracks: usize) -> Self {
+        Self { tracks: Vec::with_capacity(tracks), next_id: 0 }
+    }
+
     /// Returns an id that no track of this run has had.
     #[inline]
     pub fn new_id(&mut self) -> TrackId {

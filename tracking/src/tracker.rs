@@ -3,6 +3,7 @@
 use closecall_traffic::{Road, Source, Time, Track, TrackId, VehicleState};
 
 use super::TrackList;
+use super::assignment::{Assignment, RESERVED};
 use super::association::assign;
 use super::axis::AxisEstimate;
 use super::classes::{FusedClass, vehicle_log_likelihood_ratio};
@@ -100,6 +101,7 @@ pub struct Tracker {
     time: Time,
     tracks: Vec<TrackState>,
     measurements: Vec<Measurement>,
+    assignment: Assignment,
     assigned: Vec<Option<usize>>,
     faces: Vec<Option<Face>>,
 }
@@ -110,10 +112,11 @@ impl Tracker {
         Self {
             model,
             time: Time::from_ns(i64::MIN),
-            tracks: Vec::new(),
-            measurements: Vec::new(),
-            assigned: Vec::new(),
-            faces: Vec::new(),
+            tracks: Vec::with_capacity(RESERVED),
+            measurements: Vec::with_capacity(RESERVED),
+            assignment: Assignment::new(),
+            assigned: Vec::with_capacity(RESERVED),
+            faces: Vec::with_capacity(RESERVED),
         }
     }
 
@@ -122,7 +125,7 @@ impl Tracker {
     /// A scan that is dated before the previous one, as an error of the clock causes it, counts as measured at the time of the
     /// previous one: no filter is predicted backwards. Its measurements keep their own times, which lie before that of the filters.
     pub fn update(&mut self, scan: &TrackerScan<'_>, list: &mut TrackList) {
-        self.update_together(std::slice::from_ref(scan), &[], list);
+        self.update_together([*scan], [], list);
     }
 
     /// Updates all tracks with the scans of several sensors that have the same time, one after the other. `idle` has the views of
@@ -130,15 +133,22 @@ impl Tracker {
     ///
     /// The scans count as one for the lifecycle of a track: it is hit if one of the sensors detects it, and missed if one of them
     /// could see it and none does. A track that only idle sensors could see keeps its state.
-    pub fn update_together(&mut self, scans: &[TrackerScan<'_>], idle: &[RearView], list: &mut TrackList) {
+    pub fn update_together<'a>(
+        &mut self,
+        scans: impl IntoIterator<Item = TrackerScan<'a>>,
+        idle: impl IntoIterator<Item = RearView>,
+        list: &mut TrackList,
+    ) {
         self.tracks.iter_mut().for_each(|track| track.seen = Seen::OutOfView);
+        let mut latest = None;
         for scan in scans {
-            self.measure(scan, list);
+            self.measure(&scan, list);
+            latest = Some(scan);
         }
-        if let Some(latest) = scans.last() {
+        if let Some(latest) = latest {
             for view in idle {
                 let frame = EgoFrame::new(latest.road, &latest.ego);
-                self.project_faces(view, &frame);
+                self.project_faces(&view, &frame);
                 for (track, face) in self.tracks.iter_mut().zip(&self.faces) {
                     track.seen = if face.is_some() { track.seen.max(Seen::NotScanned) } else { track.seen };
                 }
@@ -177,7 +187,7 @@ impl Tracker {
         let measured = scan.detections.iter().map(|detection| measurement(detection, &frame, self.time));
         self.measurements.extend(measured);
         let tracks = self.tracks.iter().map(|track| (&track.filter, 0.5 * track.size_m().0));
-        assign(tracks, &self.measurements, &mut self.assigned);
+        assign(tracks, &self.measurements, &mut self.assignment, &mut self.assigned);
         self.project_faces(&scan.view, &frame);
         for track_index in 0..self.tracks.len() {
             match self.assigned[track_index] {

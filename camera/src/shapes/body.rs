@@ -11,13 +11,21 @@ pub const HELD_OUT_SHAPES: [BodyShape; 6] =
 
 /// Builds the body of a vehicle in its own frame.
 pub(crate) fn vehicle(vehicle: &Vehicle) -> Mesh {
+    let mut mesh = Mesh::default();
+    build_vehicle(&mut mesh, vehicle);
+    mesh
+}
+
+/// Replaces `mesh` by the body of a vehicle in its own frame.
+pub(crate) fn build_vehicle(mesh: &mut Mesh, vehicle: &Vehicle) {
+    mesh.clear();
     let look = &vehicle.appearance;
     let paint = Surface::plain(look.paint_rgb.map(linear), 0.6);
     let body = Body { size: vehicle.dimensions, paint };
     match Proportions::of(look.body_shape) {
-        Proportions::Car(shape) => car::mesh(&body, shape),
-        Proportions::Truck(shape) => truck::mesh(&body, shape),
-        Proportions::Motorcycle(shape) => motorcycle::mesh(&body, shape),
+        Proportions::Car(shape) => car::append(mesh, &body, shape),
+        Proportions::Truck(shape) => truck::append(mesh, &body, shape),
+        Proportions::Motorcycle(shape) => motorcycle::append(mesh, &body, shape),
     }
 }
 

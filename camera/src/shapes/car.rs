@@ -4,12 +4,11 @@ use super::Body;
 use crate::mesh::{Emission, Mesh, Rib, Surface};
 use closecall_traffic::bodies::{CarProportions, GREENHOUSE_FOOT_HALF_WIDTH};
 
-/// Builds the body in its own frame.
-pub(super) fn mesh(body: &Body, shape: &CarProportions) -> Mesh {
-    let mut mesh = Mesh::default();
-    shell(&mut mesh, body, shape);
-    windows(&mut mesh, body, shape);
-    front(&mut mesh, body, shape);
+/// Appends the body in its own frame.
+pub(super) fn append(mesh: &mut Mesh, body: &Body, shape: &CarProportions) {
+    shell(mesh, body, shape);
+    windows(mesh, body, shape);
+    front(mesh, body, shape);
     let [length, width, height] = body.extents();
     let radius = (0.22 * height).min(0.36);
     for x in [0.32 * length, -0.30 * length] {
@@ -17,7 +16,6 @@ pub(super) fn mesh(body: &Body, shape: &CarProportions) -> Mesh {
             mesh.wheel([x, y * (width / 2.0 - 0.12), radius], 0.11);
         }
     }
-    mesh
 }
 
 /// Returns the four ribs of the greenhouse: bottom and top of the windscreen, top and bottom of the rear window.

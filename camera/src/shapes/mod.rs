@@ -11,5 +11,5 @@ mod truck;
 
 use body::Body;
 pub use body::HELD_OUT_SHAPES;
-pub(crate) use body::vehicle;
-pub(crate) use roadside::roadside;
+pub(crate) use body::{build_vehicle, vehicle};
+pub(crate) use roadside::{Roadside, roadside};

@@ -4,12 +4,10 @@ use super::Body;
 use crate::mesh::{Emission, Mesh, Surface};
 use closecall_traffic::bodies::{HEAD_BACK_M, HIP_X_M, Lamps, MotorcycleProportions, RIDER, WHEEL_RADIUS_M};
 
-/// Builds the body in its own frame.
-pub(super) fn mesh(body: &Body, shape: &MotorcycleProportions) -> Mesh {
-    let mut mesh = Mesh::default();
-    machine(&mut mesh, body, shape);
-    rider(&mut mesh, body, shape);
-    mesh
+/// Appends the body in its own frame.
+pub(super) fn append(mesh: &mut Mesh, body: &Body, shape: &MotorcycleProportions) {
+    machine(mesh, body, shape);
+    rider(mesh, body, shape);
 }
 
 fn machine(mesh: &mut Mesh, body: &Body, shape: &MotorcycleProportions) {

@@ -48,27 +48,28 @@ enum Kind {
 }
 
 impl Roadside {
-    /// Builds the mesh: x along the road, y left, z up. It is built only for bodies that are in view.
-    pub(crate) fn mesh(&self) -> Mesh {
+    /// Replaces `mesh` by that of the body: x along the road, y left, z up. It is built only for bodies that are in view.
+    pub(crate) fn build(&self, mesh: &mut Mesh) {
+        mesh.clear();
         match self.kind {
-            Kind::Beam => beam(self.extent_m[0]),
-            Kind::Post => post(),
-            Kind::Delineator => delineator(),
-            Kind::Gantry { index } => gantry(self.extent_m[1] - 0.2, index),
-            Kind::Sign => sign(),
-            Kind::PlainGantry => plain_gantry(self.extent_m[1] - LEG_HALF_M[1] as f32),
-            Kind::Tree => tree(),
+            Kind::Beam => beam(mesh, self.extent_m[0]),
+            Kind::Post => post(mesh),
+            Kind::Delineator => delineator(mesh),
+            Kind::Gantry { index } => gantry(mesh, self.extent_m[1] - 0.2, index),
+            Kind::Sign => sign(mesh),
+            Kind::PlainGantry => plain_gantry(mesh, self.extent_m[1] - LEG_HALF_M[1] as f32),
+            Kind::Tree => tree(mesh),
         }
     }
 }
 
-/// Returns all roadside bodies from [`MAX_DISTANCE_M`] behind `s_m` up to `s_m`.
-pub(crate) fn roadside(road: &Road, s_m: f64) -> Vec<Roadside> {
-    let mut bodies = Vec::new();
+/// Replaces `bodies` by all roadside bodies from [`MAX_DISTANCE_M`] behind `s_m` up to `s_m`.
+pub(crate) fn roadside(road: &Road, s_m: f64, bodies: &mut Vec<Roadside>) {
+    bodies.clear();
     let sides = [RAIL_OFFSET_M[0], road.right_edge_m() - RAIL_OFFSET_M[1]];
     if road.has_guard_rails() {
         for d_m in sides {
-            rail(&mut bodies, s_m, d_m);
+            rail(bodies, s_m, d_m);
         }
     } else {
         for index in spacing_indices(s_m, DELINEATOR_SPACING_M, MAX_DISTANCE_M) {
@@ -78,9 +79,9 @@ pub(crate) fn roadside(road: &Road, s_m: f64) -> Vec<Roadside> {
             }
         }
     }
-    configured(&mut bodies, road, s_m);
+    configured(bodies, road, s_m);
     if road.roadside().gantry_spacing_m.is_some() {
-        return bodies;
+        return;
     }
     for index in spacing_indices(s_m, GANTRY_SPACING_M, MAX_DISTANCE_M) {
         let shift = f64::from(unit(mix_at(PLACEMENT_KEY, index, 0))) * 0.6 * GANTRY_SPACING_M;
@@ -89,7 +90,6 @@ pub(crate) fn roadside(road: &Road, s_m: f64) -> Vec<Roadside> {
         let d_m = road.right_edge_m() / 2.0;
         bodies.push(Roadside { s_m, d_m, extent_m: [0.4, half_m + 0.2, 7.2], kind: Kind::Gantry { index } });
     }
-    bodies
 }
 
 /// Returns the indices of the multiples of `spacing_m` from `distance_m` behind `s_m` up to `s_m`.
@@ -138,68 +138,55 @@ fn configured(bodies: &mut Vec<Roadside>, road: &Road, s_m: f64) {
 }
 
 /// Builds a sign as the rear camera sees it: the back of its sheet, and its post.
-fn sign() -> Mesh {
+fn sign(mesh: &mut Mesh) {
     let ([width, height, low], [half, _]) = (SIGN_M.map(|part| part as f32), LEG_HALF_M.map(|part| part as f32));
-    let mut mesh = Mesh::default();
     mesh.block([0.0, 0.0, low + 0.5 * height], [SHEET_M as f32, 0.5 * width, 0.5 * height], Surface::METAL);
     let top = 0.5 * (low + height);
     mesh.block([-half, 0.0, top], [half, half, top], Surface::METAL);
-    mesh
 }
 
 /// Builds a gantry whose signs are as wide as the road.
-fn plain_gantry(half_m: f32) -> Mesh {
+fn plain_gantry(mesh: &mut Mesh, half_m: f32) {
     let ([low, high], leg) = (GANTRY_M.map(|part| part as f32), LEG_HALF_M[1] as f32);
-    let mut mesh = Mesh::default();
     for side in [-1.0, 1.0] {
         mesh.block([0.0, side * half_m, 0.5 * high], [leg, leg, 0.5 * high], Surface::METAL);
     }
     mesh.block([0.0, 0.0, 0.5 * (low + high)], [SHEET_M as f32, half_m, 0.5 * (high - low)], Surface::METAL);
-    mesh
 }
 
 /// Builds a tree: its stem, and a crown of two blocks above the beams of the LiDARs.
-fn tree() -> Mesh {
+fn tree(mesh: &mut Mesh) {
     const BARK: Surface = Surface::plain([0.08, 0.06, 0.045], 0.0);
     const LEAVES: Surface = Surface::plain([0.04, 0.07, 0.025], 0.0);
     let [_, half, height] = TREE_M.map(|part| part as f32);
     let [low, wide, high] = CROWN_M.map(|part| part as f32);
     let (middle, quarter) = (0.5 * (low + high), 0.25 * (high - low));
-    let mut mesh = Mesh::default();
     mesh.block([0.0, 0.0, 0.5 * height], [half, half, 0.5 * height], BARK);
     mesh.block([0.0, 0.0, middle], [wide, wide, quarter], LEAVES);
     mesh.block([0.0, 0.0, middle], [0.6 * wide, 0.6 * wide, 2.0 * quarter], LEAVES);
-    mesh
 }
 
-fn beam(half_m: f32) -> Mesh {
-    let mut mesh = Mesh::default();
+fn beam(mesh: &mut Mesh, half_m: f32) {
     for (z, half_z) in [(0.68, 0.07), (0.51, 0.06)] {
         mesh.block([0.0, 0.0, z], [half_m, 0.03, half_z], Surface::METAL);
     }
-    mesh
 }
 
-fn post() -> Mesh {
-    let mut mesh = Mesh::default();
+fn post(mesh: &mut Mesh) {
     mesh.block([0.0, 0.0, 0.33], [0.05, 0.06, 0.33], Surface::METAL);
-    mesh
 }
 
-fn delineator() -> Mesh {
+fn delineator(mesh: &mut Mesh) {
     const WHITE: Surface = Surface::plain([0.75, 0.75, 0.75], 0.1);
-    let mut mesh = Mesh::default();
     mesh.block([0.0, 0.0, 0.38], [0.06, 0.06, 0.38], WHITE);
     mesh.block([0.0, 0.0, 0.86], [0.06, 0.06, 0.10], Surface::PLASTIC);
     mesh.block([0.0, 0.0, 0.99], [0.05, 0.05, 0.03], WHITE);
-    mesh
 }
 
 /// Builds a sign gantry as wide as the road. The rear camera sees the backs of its signs.
-fn gantry(half_m: f32, index: i32) -> Mesh {
+fn gantry(mesh: &mut Mesh, half_m: f32, index: i32) {
     const CLEAR_M: f32 = 5.2;
     const BACK: Surface = Surface::plain([0.30, 0.31, 0.32], 0.2);
-    let mut mesh = Mesh::default();
     for side in [-1.0, 1.0] {
         mesh.block([0.0, side * half_m, (CLEAR_M + 1.0) / 2.0], [0.2, 0.2, (CLEAR_M + 1.0) / 2.0], Surface::METAL);
     }
@@ -210,7 +197,6 @@ fn gantry(half_m: f32, index: i32) -> Mesh {
         let y = half_m * (unit(bits) - 0.5) * 1.4;
         mesh.block([0.3, y, CLEAR_M + 0.9], [0.05, 1.0 + unit(bits << 20), 0.8], BACK);
     }
-    mesh
 }
 
 #[cfg(test)]
@@ -220,11 +206,13 @@ mod tests {
     #[test]
     fn no_body_exceeds_its_extents() {
         let road = Road::straight(3);
-        let mut bodies = roadside(&road, 3_000.0);
+        let (mut bodies, mut mesh) = (Vec::new(), Mesh::default());
+        roadside(&road, 3_000.0, &mut bodies);
         rail(&mut bodies, 3_000.0, 1.0);
         assert!(bodies.iter().any(|body| matches!(body.kind, Kind::Gantry { .. })));
         for body in bodies {
-            for vertex in body.mesh().vertices {
+            body.build(&mut mesh);
+            for vertex in &mesh.vertices {
                 let [along, across, up] = body.extent_m;
                 assert!(vertex[0].abs() <= along && vertex[1].abs() <= across && vertex[2] <= up, "{vertex:?}");
             }

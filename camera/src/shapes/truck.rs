@@ -6,12 +6,11 @@ use closecall_traffic::bodies::{
     CAB_M, CRATE, DECK, LOAD_FLOOR_M, LOAD_GAP_M, Load, SCREEN_RAKE_M, TANK_FLOOR_M, TruckProportions, VISOR,
 };
 
-/// Builds the body in its own frame.
-pub(super) fn mesh(body: &Body, shape: &TruckProportions) -> Mesh {
-    let mut mesh = Mesh::default();
-    cab(&mut mesh, body, shape);
-    front(&mut mesh, body, shape);
-    load(&mut mesh, body, shape);
+/// Appends the body in its own frame.
+pub(super) fn append(mesh: &mut Mesh, body: &Body, shape: &TruckProportions) {
+    cab(mesh, body, shape);
+    front(mesh, body, shape);
+    load(mesh, body, shape);
     let [length, width, _] = body.extents();
     let front = length / 2.0;
     for x in [front - 1.4, front - 4.6, -0.22 * length, -0.32 * length] {
@@ -19,7 +18,6 @@ pub(super) fn mesh(body: &Body, shape: &TruckProportions) -> Mesh {
             mesh.wheel([x, y * (width / 2.0 - 0.17), 0.5], 0.15);
         }
     }
-    mesh
 }
 
 /// Returns the longitudinal position of the windscreen and the height of the cab's roof (m).

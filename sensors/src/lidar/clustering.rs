@@ -34,11 +34,15 @@ pub(crate) const CORE_POINTS: usize = 3;
 /// Radius in the stretched plane.
 const RADIUS: f64 = 1.0;
 /// Number of thinning cells per radius. All points of a cell are within the radius of each other.
-const CELLS_PER_RADIUS: f32 = 5.0;
+const CELLS_PER_RADIUS: f32 = CELLS_IN_RADIUS as f32;
+const CELLS_IN_RADIUS: usize = 5;
 /// Number of thinning cells along the road, which cover the region of interest.
 const CELLS_ALONG: usize = 525;
 /// Number of thinning cells across the road, which cover the region of interest.
 const CELLS_ACROSS: usize = 200;
+
+/// Number of cells with a side of one radius that cover the same region.
+const GRID_CELLS: usize = (CELLS_ALONG / CELLS_IN_RADIUS + 1) * (CELLS_ACROSS / CELLS_IN_RADIUS + 1);
 
 /// Label of a point that belongs to no cluster.
 pub(crate) const NOISE: u32 = u32::MAX;
@@ -59,23 +63,34 @@ pub(crate) struct Clustering {
     /// Stretched coordinates of the candidates that were kept.
     rows: Vec<[f64; 2]>,
     dbscan: Dbscan,
+    /// New number of each cluster that is merged into no other one.
+    renumbered: Vec<u32>,
+    /// The vehicles of the clusters that the truth gives.
+    vehicles: Vec<usize>,
 }
 
 impl Default for Clustering {
     fn default() -> Self {
-        Self {
-            labels: Vec::new(),
-            count: 0,
-            cells: vec![(0, 0); CELLS_ALONG * CELLS_ACROSS],
-            cell_of: Vec::new(),
-            row_of: Vec::new(),
-            rows: Vec::new(),
-            dbscan: Dbscan::default(),
-        }
+        Self::with_capacity(0)
     }
 }
 
 impl Clustering {
+    /// Creates a clustering with memory for so many candidates.
+    pub(crate) fn with_capacity(candidates: usize) -> Self {
+        Self {
+            labels: Vec::with_capacity(candidates),
+            count: 0,
+            cells: vec![(0, 0); CELLS_ALONG * CELLS_ACROSS],
+            cell_of: Vec::with_capacity(candidates),
+            row_of: Vec::with_capacity(candidates),
+            rows: Vec::with_capacity(candidates),
+            dbscan: Dbscan::with_capacity(candidates, GRID_CELLS),
+            renumbered: Vec::with_capacity(super::RESERVED_CLUSTERS),
+            vehicles: Vec::new(),
+        }
+    }
+
     /// Assigns the candidates to clusters.
     pub(crate) fn run(&mut self, candidates: &[Candidate]) {
         self.thin(candidates);
@@ -87,18 +102,18 @@ impl Clustering {
 
     /// Assigns the candidates to clusters by the vehicle that each belongs to, `None` for one that belongs to no vehicle.
     pub(crate) fn assign(&mut self, vehicles: impl Iterator<Item = Option<usize>>) {
-        let mut seen = Vec::new();
+        self.vehicles.clear();
         self.labels.clear();
         for vehicle in vehicles {
             let index = vehicle.map(|vehicle| {
-                seen.iter().position(|known| *known == vehicle).unwrap_or_else(|| {
-                    seen.push(vehicle);
-                    seen.len() - 1
+                self.vehicles.iter().position(|known| *known == vehicle).unwrap_or_else(|| {
+                    self.vehicles.push(vehicle);
+                    self.vehicles.len() - 1
                 })
             });
             self.labels.push(index.and_then(|index| u32::try_from(index).ok()).unwrap_or(NOISE));
         }
-        self.count = seen.len();
+        self.count = self.vehicles.len();
     }
 
     /// Merges each cluster into its parent, which is another cluster or itself. Chains of parents are followed to their
@@ -113,15 +128,16 @@ impl Clustering {
             root
         };
         let mut next = 0;
-        let mut renumbered = vec![NOISE; parents.len()];
+        self.renumbered.clear();
+        self.renumbered.resize(parents.len(), NOISE);
         for (label, &parent) in (0..).zip(parents) {
             if label == parent {
-                renumbered[label as usize] = next;
+                self.renumbered[label as usize] = next;
                 next += 1;
             }
         }
         for label in self.labels.iter_mut().filter(|label| **label != NOISE) {
-            *label = renumbered[root(*label) as usize];
+            *label = self.renumbered[root(*label) as usize];
         }
         self.count = next as usize;
     }

@@ -7,7 +7,7 @@ use super::classify::{class_scores, typical_size_m};
 use super::clustering::{Clustering, NOISE};
 use super::ground::{Candidate, select_candidates};
 use super::parts::{join_lamps, plate_middle};
-use super::{LaneGeometry, LidarScan, PointSource, ScanTruth};
+use super::{LaneGeometry, LidarScan, PointSource, RESERVED_CLUSTERS, ScanTruth};
 use closecall_tracking::SIDE_PROTRUSION_M;
 
 use crate::{Detection, Extent, SensorError};
@@ -77,6 +77,20 @@ pub struct Detector {
 }
 
 impl Detector {
+    /// Creates a detector with memory for so many points. More need more memory.
+    pub(crate) fn with_capacity(points: usize) -> Self {
+        Self {
+            candidates: Vec::with_capacity(points),
+            clustering: Clustering::with_capacity(points),
+            members: Vec::with_capacity(points),
+            starts: Vec::with_capacity(RESERVED_CLUSTERS + 1),
+            fits: Vec::with_capacity(RESERVED_CLUSTERS),
+            parents: Vec::with_capacity(RESERVED_CLUSTERS),
+            is_pair: Vec::with_capacity(RESERVED_CLUSTERS),
+            detections: Vec::with_capacity(RESERVED_CLUSTERS),
+        }
+    }
+
     /// Detects boxes in a scan.
     ///
     /// # Errors

@@ -43,6 +43,9 @@ mod targets;
 mod tests;
 mod viewpoint;
 
+/// Number of clusters in a scan for which memory is reserved. More need more, and no error follows.
+pub(crate) const RESERVED_CLUSTERS: usize = 64;
+
 pub use closecall_tracking::LaneGeometry;
 pub(crate) use config::{FRONT_NAME, REAR_NAME, intern_name};
 pub use config::{Lidar, LidarConfig};

@@ -17,7 +17,7 @@ pub struct RearLidar {
 impl RearLidar {
     /// Creates a rear LiDAR with this configuration.
     pub fn new(lidar: Lidar) -> Self {
-        Self { scanner: Scanner::new(lidar), detector: Detector::default(), lane: None }
+        Self { scanner: Scanner::new(lidar), detector: Detector::with_capacity(lidar.kind.beams()), lane: None }
     }
 
     /// Scans the scene. The scan ends at the scene's time. Draws exactly one number from `rng`.

@@ -62,6 +62,13 @@ impl LidarScan {
         self.x_m.is_empty()
     }
 
+    /// Creates a scan without points, with memory for so many.
+    pub(crate) fn with_capacity(points: usize) -> Self {
+        let [x_m, y_m, z_m, intensity] = std::array::from_fn(|_| Vec::with_capacity(points));
+        let (offset_ns, beam) = (Vec::with_capacity(points), Vec::with_capacity(points));
+        Self { x_m, y_m, z_m, intensity, offset_ns, beam, ..Self::default() }
+    }
+
     /// Removes all points but keeps the allocated memory.
     pub(crate) fn clear(&mut self) {
         self.x_m.clear();

@@ -18,7 +18,7 @@ use super::receiver::{Receiver, SensorPoseEstimate};
 use super::roadside::PlacedSolid;
 use super::soft::{self, Plume};
 use super::solid::Solid;
-use super::spoil::Spoiler;
+use super::spoil::{Added, Spoiler};
 use super::targets::Targets;
 use super::viewpoint::Viewpoint;
 use super::{LaneGeometry, Lidar, LidarScan, MirrorSide, ScanTruth};
@@ -67,6 +67,8 @@ pub struct Scanner {
     hits: ColumnHits,
     scan: LidarScan,
     truth: ScanTruth,
+    /// The points that a fault adds.
+    added: Vec<Added>,
     latest: Option<Sweep>,
     /// Number of false alarms in the latest scan.
     false_alarms: usize,
@@ -86,8 +88,10 @@ impl Scanner {
             guard_rails: Vec::new(),
             active: ActiveParts::default(),
             hits: ColumnHits::new(lidar.kind.layers()),
-            scan: LidarScan::default(),
-            truth: ScanTruth::default(),
+            // One return per beam. What is not used is never touched.
+            scan: LidarScan::with_capacity(lidar.kind.beams()),
+            truth: ScanTruth { points: Vec::with_capacity(lidar.kind.beams()) },
+            added: Vec::new(),
             latest: None,
             false_alarms: 0,
         }
@@ -199,7 +203,7 @@ impl Scanner {
             mirror_side: sweep.mirror_side,
             rails: rails.as_ref(),
         };
-        spoiler.spoil(&mut self.scan, &mut self.truth);
+        spoiler.spoil(&mut self.scan, &mut self.truth, &mut self.added);
     }
 
     /// Sweeps over all columns and appends their returns to the scan.

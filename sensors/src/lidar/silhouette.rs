@@ -21,13 +21,15 @@ use super::Material;
 use super::solid::Solid;
 use super::targets::BOUND_MARGIN_DEG;
 
+/// Number of faces of a box.
+const BOX_FACES: usize = 6;
 /// Distance of a plane from the sensor below which the plane bounds nothing (m).
 const MIN_OFFSET_M: f64 = 1e-3;
 
 /// The bounding box of a solid, as seen from the sensor.
 pub(super) struct Silhouette {
-    /// Vectors m = n/w of the front-facing and of the back-facing planes (1/m).
-    planes: [Vec<[f64; 3]>; 2],
+    /// Vectors m = n/w of the front-facing and of the back-facing planes (1/m), and the number of each.
+    planes: [([[f64; 3]; BOX_FACES], usize); 2],
     /// Azimuth (rad) and tangent of the elevation of each corner.
     corners: [[f64; 2]; 8],
 }
@@ -36,12 +38,14 @@ impl Silhouette {
     /// Returns the silhouette of a solid with this pose in the sensor's frame.
     pub(super) fn of(solid: &Solid, pose: &Isometry3<f64>) -> Self {
         let bounding_box = Solid::cuboid(solid.low.into(), solid.high.into(), Material::Asphalt);
-        let mut planes = [Vec::new(), Vec::new()];
+        let mut planes = [([[0.0; 3]; BOX_FACES], 0); 2];
         for face in bounding_box.faces() {
             let normal = pose.rotation * face.normal;
             let offset_m = face.offset_m + normal.dot(&pose.translation.vector);
             if offset_m.abs() >= MIN_OFFSET_M {
-                planes[usize::from(offset_m > 0.0)].push((normal / offset_m).into());
+                let (of_side, count) = &mut planes[usize::from(offset_m > 0.0)];
+                of_side[*count] = (normal / offset_m).into();
+                *count += 1;
             }
         }
         let mut corners = [[0.0; 2]; 8];
@@ -85,9 +89,10 @@ impl Silhouette {
                 bounds = [f64::INFINITY, f64::NEG_INFINITY];
             }
         };
-        for front in self.planes[0].iter().map(line) {
+        let [fronts, backs] = self.planes.each_ref().map(|(planes, count)| &planes[..*count]);
+        for front in fronts.iter().map(line) {
             require_positive(front);
-            for back in self.planes[1].iter().map(line) {
+            for back in backs.iter().map(line) {
                 require_positive([front[0] - back[0], front[1] - back[1]]);
             }
         }

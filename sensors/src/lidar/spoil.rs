@@ -53,7 +53,8 @@ pub(super) struct Spoiler<'a> {
 }
 
 /// A point that a fault adds.
-struct Added {
+#[derive(Clone, Debug)]
+pub(super) struct Added {
     at_m: [f32; 3],
     intensity: f32,
     offset_ns: u32,
@@ -62,19 +63,19 @@ struct Added {
 }
 
 impl Spoiler<'_> {
-    /// Spoils the scan and its ground truth.
-    pub(super) fn spoil(&self, scan: &mut LidarScan, truth: &mut ScanTruth) {
-        let mut added = Vec::new();
+    /// Spoils the scan and its ground truth. `added` is memory that the next call may reuse.
+    pub(super) fn spoil(&self, scan: &mut LidarScan, truth: &mut ScanTruth, added: &mut Vec<Added>) {
+        added.clear();
         if self.fault.blooming_deg > 0.0 {
-            self.bloom(scan, truth, &mut added);
+            self.bloom(scan, truth, added);
         }
         if let Some(lane) = self.rails.filter(|_| self.fault.rail_ghosts > 0.0) {
-            self.mirror(lane, scan, truth, &mut added);
+            self.mirror(lane, scan, truth, added);
         }
         if self.fault.crosstalk > 0.0 {
-            self.interfere(&mut added);
+            self.interfere(added);
         }
-        for point in added {
+        for point in added.drain(..) {
             scan.x_m.push(point.at_m[0]);
             scan.y_m.push(point.at_m[1]);
             scan.z_m.push(point.at_m[2]);

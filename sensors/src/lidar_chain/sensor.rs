@@ -10,10 +10,13 @@ use closecall_traffic::{CONTROL_STEP, Environment, Road, Stream, Time, VehicleSt
 use super::Seen;
 use crate::alterations::give_true_boxes;
 use crate::faults::{FaultList, LidarFault, NOTICED_AFTER_SCANS};
-use crate::lidar::{Lidar, LidarKind, RearLidar};
+use crate::lidar::{Lidar, LidarKind, RESERVED_CLUSTERS, RearLidar};
 use crate::object::{DEGRADED_SHARE, NoiseKey, range_in_weather_m};
 use crate::perception::FieldOfView;
 use crate::{Detection, Health, Scene, SensorError};
+
+/// Number of scans that wait for the tracker, or whose memory does, for which a list is reserved. Late scans may need more.
+const RESERVED_SCANS: usize = 8;
 
 /// One scan whose processing latency has not elapsed.
 #[derive(Clone, Debug)]
@@ -52,6 +55,8 @@ pub(super) struct ChainSensor {
     pub(super) health: Health,
     rng: Stream,
     pub(super) pending: VecDeque<PendingScan>,
+    /// Memory of the scans that the tracker has processed, for later ones.
+    spare: Vec<Vec<Detection>>,
 }
 
 /// A scan before its boxes are classified.
@@ -78,7 +83,8 @@ impl ChainSensor {
             fault_rng: key.stream(channel[1]),
             health: Health::Ok,
             rng: key.stream(channel[0]),
-            pending: VecDeque::new(),
+            pending: VecDeque::with_capacity(RESERVED_SCANS),
+            spare: Vec::with_capacity(RESERVED_SCANS),
         }
     }
 
@@ -120,11 +126,10 @@ impl ChainSensor {
         self.health = self.judge_health(scene, fault.as_ref());
         let has_true_clusters = altered.has_true_clusters;
         let found = if has_true_clusters { self.lidar.detect_by_truth()? } else { self.lidar.detect()? };
-        // Reuses the memory of a scan that the tracker has processed.
-        let mut detections = Vec::new();
         while let Some(scan) = self.pending.pop_front_if(|scan| scan.is_processed) {
-            detections = scan.detections;
+            self.spare.push(scan.detections);
         }
+        let mut detections = self.spare.pop().unwrap_or_else(|| Vec::with_capacity(RESERVED_CLUSTERS));
         detections.clear();
         detections.extend_from_slice(found);
         if has_true_clusters {
