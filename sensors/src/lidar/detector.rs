@@ -9,7 +9,7 @@ use super::ground::{Candidate, select_candidates};
 use super::{LaneGeometry, LidarScan, PointSource, ScanTruth};
 use closecall_tracking::SIDE_PROTRUSION_M;
 
-use crate::{Detection, Extent, SensorError};
+use crate::{Detection, Extent, SeenBy, SensorError};
 
 /// Number of columns between the edges of two clusters within which the nearer cluster may occlude the other.
 const OCCLUSION_COLUMNS: f64 = 3.0;
@@ -255,6 +255,7 @@ fn detection(fit: &BoxFit, hidden: [bool; 2], start: Time, lane: &LaneGeometry) 
         width_m: across.width_m,
         width: across.extent,
         top_m: fit.top_m,
+        seen_by: SeenBy::Lidar,
         points: fit.points,
         class,
     }
