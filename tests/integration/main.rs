@@ -30,6 +30,7 @@ mod library;
 mod looking;
 mod malformed;
 mod mask_rcnn;
+mod mask_rcnn_agreement;
 mod mis_page;
 mod native_controllers;
 mod nothing_checked;
